@@ -1,0 +1,36 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "core/lidar/scan.hpp"
+#include "core/odometry/trajectory.hpp"
+
+namespace stillmap {
+
+/// Writes a recording as a SemanticKITTI sequence: velodyne/, labels/, calib.txt, times.txt and
+/// poses.txt (camera frame, relative to the first scan, as KITTI has it). What .bin cannot hold
+/// goes into files of our own that ScanDataset reads back: time_offsets/NNNNNN.bin (float32 a
+/// point, seconds) and rings/NNNNNN.bin (uint16 a point).
+class KittiSequenceWriter {
+ public:
+  /// Makes the folders. Throws DatasetError when that fails or `folder` holds a sequence already.
+  explicit KittiSequenceWriter(const std::filesystem::path& folder);
+
+  /// Writes the next scan at once. `raw_labels` is empty or has one entry a point. Stamps must not
+  /// be negative: times.txt keeps them as they are. Throws DatasetError.
+  void add(const Scan& scan, std::span<const std::uint32_t> raw_labels,
+           const Eigen::Isometry3d& T_map_lidar);
+
+  /// Writes calib.txt, times.txt and poses.txt. Throws DatasetError.
+  void finish() const;
+
+ private:
+  std::filesystem::path folder_;
+  Trajectory trajectory_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,97 @@
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <iterator>
+#include <string_view>
+
+#include "core/dataset/binary_file.hpp"
+#include "core/dataset/point_cloud_header.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr std::size_t max_header_lines = 1000;
+
+using Words = std::vector<std::string>;
+
+struct PlyType {
+  std::string_view name;
+  char kind;
+  std::uint64_t bytes;
+};
+
+constexpr std::array<PlyType, 16> ply_types{{{"char", 'I', 1},
+                                             {"int8", 'I', 1},
+                                             {"uchar", 'U', 1},
+                                             {"uint8", 'U', 1},
+                                             {"short", 'I', 2},
+                                             {"int16", 'I', 2},
+                                             {"ushort", 'U', 2},
+                                             {"uint16", 'U', 2},
+                                             {"int", 'I', 4},
+                                             {"int32", 'I', 4},
+                                             {"uint", 'U', 4},
+                                             {"uint32", 'U', 4},
+                                             {"float", 'F', 4},
+                                             {"float32", 'F', 4},
+                                             {"double", 'F', 8},
+                                             {"float64", 'F', 8}}};
+
+CloudField ply_field(const std::filesystem::path& file, const Words& words) {
+  const auto type = std::ranges::find(ply_types, words[1], &PlyType::name);
+  if (type != ply_types.end()) return {words[2], type->kind, type->bytes, 1};
+  throw DatasetError(file, "property type \"" + words[1].substr(0, 40) +
+                               "\" cannot be read; write points with plain numbers only");
+}
+
+/// Takes one line of the header; `elements` counts the elements so far.
+void take_line(const std::filesystem::path& file, const Words& words, CloudContent& content,
+               int& elements) {
+  if (words[0] == "format" && words.size() >= 2) content.encoding = words[1];
+  if (words[0] == "element" && words.size() >= 3 && ++elements == 1) {
+    if (words[1] != "vertex") {
+      throw DatasetError(file, "the first element is not \"vertex\"; export the points first");
+    }
+    content.width = header_count(file, "element vertex", words[2]);
+  }
+  if (words[0] == "property" && words.size() >= 3 && elements == 1) {
+    content.fields.push_back(ply_field(file, words));
+  }
+}
+
+CloudContent ply_header(const std::filesystem::path& file, std::istream& in) {
+  std::string line;
+  if (!std::getline(in, line) || words_of(line) != Words{"ply"}) {
+    throw DatasetError(file, "does not begin with \"ply\"; the file is of another kind");
+  }
+  CloudContent content;
+  int elements = 0;
+  for (std::size_t lines = 0; lines < max_header_lines && std::getline(in, line); ++lines) {
+    const Words words = words_of(line);
+    if (words.empty()) continue;
+    if (words[0] == "end_header") return content;
+    take_line(file, words, content, elements);
+  }
+  throw DatasetError(file, "has no \"end_header\"; the file is damaged");
+}
+
+}  // namespace
+
+CloudContent read_ply_content(const std::filesystem::path& file) {
+  static_cast<void>(scan_file_size(file));
+  std::ifstream in(file, std::ios::binary);
+  CloudContent content = ply_header(file, in);
+  content.body.assign(std::istreambuf_iterator<char>(in), {});
+  if (content.encoding == "ascii") {
+    check_room(file, content,
+               content.points() == 0 ? 0 : 2 * content.points() * content.fields.size() - 1);
+  } else if (content.encoding == "binary_little_endian" ||
+             content.encoding == "binary_big_endian") {
+    check_room(file, content, content.points() * content.point_bytes());
+  } else {
+    throw DatasetError(file, "format \"" + content.encoding.substr(0, 40) + "\" is not PLY's");
+  }
+  return content;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,235 @@
+#include "core/dataset/scan_dataset.hpp"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <system_error>
+#include <utility>
+
+#include "core/dataset/binary_file.hpp"
+#include "core/dataset/kitti_files.hpp"
+#include "core/dataset/point_cloud_files.hpp"
+#include "core/dataset/recording_time.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::int64_t default_period_ns = 100'000'000;
+
+bool is_scan_file(const fs::path& file, std::string_view extension) {
+  std::error_code error;
+  return file.extension() == extension && fs::is_regular_file(file, error);
+}
+
+/// The files of one kind in natural order: of the first kind that the folder has.
+std::vector<fs::path> scans_in(const fs::path& folder) {
+  for (const std::string_view extension : {".bin", ".pcd", ".ply"}) {
+    std::vector<fs::path> files;
+    for (const auto& entry : fs::directory_iterator(folder)) {
+      if (is_scan_file(entry.path(), extension)) files.push_back(entry.path());
+    }
+    std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
+      return natural_less(a.filename().string(), b.filename().string());
+    });
+    if (!files.empty()) return files;
+  }
+  return {};
+}
+
+std::vector<fs::path> scans_of(const fs::path& path) {
+  std::error_code error;
+  if (!fs::exists(path, error)) throw DatasetError(path, "no such file or folder; check the path");
+  if (!fs::is_directory(path, error)) {
+    const bool known =
+        is_scan_file(path, ".bin") || is_scan_file(path, ".pcd") || is_scan_file(path, ".ply");
+    if (known) return {path};
+    throw DatasetError(path, "is no recording; give a .bin, .pcd or .ply file or a folder of them");
+  }
+  const fs::path velodyne = path / "velodyne";
+  const bool sequence = fs::is_directory(velodyne, error);
+  std::vector<fs::path> files;
+  try {
+    files = scans_in(sequence ? velodyne : path);
+  } catch (const fs::filesystem_error& fault) {
+    throw DatasetError(path, std::string("cannot be read: ") + fault.what());
+  }
+  if (files.empty()) {
+    throw DatasetError(sequence ? velodyne : path,
+                       "holds no .bin, .pcd or .ply file; give the folder that does, or the one "
+                       "above velodyne/");
+  }
+  return files;
+}
+
+/// Line of each scan in the sequence's text files: the number in its name, so that a cut-out of a
+/// sequence keeps its times and poses; the place in the folder where names are not numbers.
+std::vector<std::size_t> lines_of(const std::vector<fs::path>& files) {
+  std::vector<std::size_t> lines;
+  for (const fs::path& file : files) {
+    const std::string stem = file.stem().string();
+    std::size_t line = 0;
+    const auto [end, error] = std::from_chars(stem.data(), stem.data() + stem.size(), line);
+    if (error != std::errc{} || end != stem.data() + stem.size()) break;
+    lines.push_back(line);
+  }
+  if (lines.size() == files.size()) return lines;
+  lines.resize(files.size());
+  for (std::size_t i = 0; i < files.size(); ++i) lines[i] = i;
+  return lines;
+}
+
+/// Checks that a text file of a sequence reaches to all scans. A file that has exactly one line a
+/// scan belongs to them in order, whatever the names say.
+std::vector<std::size_t> lines_in(const fs::path& file, const std::vector<std::size_t>& by_name,
+                                  std::size_t present) {
+  if (*std::ranges::max_element(by_name) < present) return by_name;
+  if (present != by_name.size()) {
+    throw DatasetError(file, "has " + std::to_string(present) + " lines, fewer than the " +
+                                 std::to_string(by_name.size()) +
+                                 " scans need; take the file that belongs to this recording");
+  }
+  std::vector<std::size_t> in_order(present);
+  for (std::size_t i = 0; i < present; ++i) in_order[i] = i;
+  return in_order;
+}
+
+std::vector<std::int64_t> stamps_from_names(const std::vector<fs::path>& files) {
+  std::vector<std::int64_t> stamps_ns;
+  for (const fs::path& file : files) {
+    const auto stamp_ns = stamp_ns_from_name(file.stem().string());
+    if (!stamp_ns) break;
+    stamps_ns.push_back(*stamp_ns);
+  }
+  if (stamps_ns.size() == files.size()) return stamps_ns;
+  stamps_ns.clear();
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    stamps_ns.push_back(static_cast<std::int64_t>(i) * default_period_ns);
+  }
+  return stamps_ns;
+}
+
+/// A percentile that a few bright or broken values do not move.
+float bright_intensity(std::vector<float> intensity) {
+  std::erase_if(intensity, [](float value) { return !std::isfinite(value); });
+  if (intensity.empty()) return 0.0F;
+  const auto middle = intensity.begin() + static_cast<std::ptrdiff_t>(intensity.size() * 99 / 100);
+  std::ranges::nth_element(intensity, middle);
+  return *middle;
+}
+
+double highest_elevation(const Scan& scan) {
+  double highest = 0.0;
+  for (const auto& p : scan.points_lidar) {
+    const double elevation = std::abs(std::atan2(p.z(), std::hypot(p.x(), p.y())));
+    if (std::isfinite(elevation)) highest = std::max(highest, elevation);
+  }
+  return highest;
+}
+
+SensorModel guess_sensor(const Scan& scan, bool kitti_file) {
+  if (!scan.ring.empty()) {
+    const int rings = *std::ranges::max_element(scan.ring) + 1;
+    return rings <= 16 ? vlp_16() : (rings <= 32 ? hdl_32e() : hdl_64e());
+  }
+  constexpr double just_above_vlp_16 = 16.0 * std::numbers::pi / 180.0;
+  if (kitti_file || scan.empty()) return hdl_64e();
+  return highest_elevation(scan) < just_above_vlp_16 ? vlp_16() : hdl_64e();
+}
+
+}  // namespace
+
+ScanDataset::ScanDataset(const fs::path& path) : files_(scans_of(path)), lines_(lines_of(files_)) {
+  if (files_.front().parent_path().filename() == "velodyne") {
+    sequence_ = files_.front().parent_path().parent_path();
+  }
+  const fs::path times = sequence_ / "times.txt";
+  if (!sequence_.empty() && fs::exists(times)) {
+    const auto times_ns = read_kitti_times_ns(times);
+    for (const std::size_t line : lines_in(times, lines_, times_ns.size())) {
+      stamps_ns_.push_back(times_ns[line]);
+    }
+  } else {
+    stamps_ns_ = stamps_from_names(files_);
+  }
+  const Scan first = read_unscaled(0).scan;
+  // Half above full scale: a recording in 0..1 may overshoot a little.
+  if (bright_intensity(first.intensity) > 1.5F) intensity_scale_ = 1.0F / 255.0F;
+  suggested_sensor_ = guess_sensor(first, files_.front().extension() == ".bin");
+}
+
+fs::path ScanDataset::beside(std::size_t i, const char* folder, const char* extension) const {
+  if (sequence_.empty()) return {};
+  return sequence_ / folder / (file(i).stem().string() + extension);
+}
+
+bool ScanDataset::has_labels(std::size_t i) const {
+  return file(i).extension() == ".bin" ? fs::exists(beside(i, "labels", ".label"))
+                                       : !read(i).raw_labels.empty();
+}
+
+DatasetFrame ScanDataset::read_unscaled(std::size_t i) const {
+  if (file(i).extension() != ".bin") {
+    auto [scan, raw_labels] = read_point_cloud(file(i), stamp_ns(i));
+    return {std::move(scan), std::move(raw_labels)};
+  }
+  DatasetFrame frame;
+  frame.scan = read_kitti_bin(file(i));
+  frame.scan.stamp_ns = stamp_ns(i);
+  const std::size_t points = frame.scan.size();
+  if (const auto labels = beside(i, "labels", ".label"); fs::exists(labels)) {
+    frame.raw_labels = read_kitti_labels(labels, points);
+  }
+  const auto side_file = [&]<class T>(const char* folder, std::vector<T>& values) {
+    const fs::path side = beside(i, folder, ".bin");
+    if (!fs::exists(side)) return;
+    values = read_values<T>(side);
+    if (values.size() == points) return;
+    throw DatasetError(side, std::to_string(values.size()) + " values for a scan of " +
+                                 std::to_string(points) + " points; remove the file");
+  };
+  side_file("time_offsets", frame.scan.time_offset_s);
+  side_file("rings", frame.scan.ring);
+  return frame;
+}
+
+DatasetFrame ScanDataset::read(std::size_t i) const {
+  DatasetFrame frame = read_unscaled(i);
+  if (intensity_scale_ != 1.0F) {
+    for (float& value : frame.scan.intensity) value *= intensity_scale_;
+  }
+  frame.scan.labels = reduced_classes(frame.raw_labels);
+  return frame;
+}
+
+std::optional<Trajectory> ScanDataset::truth() const {
+  if (sequence_.empty()) return std::nullopt;
+  const fs::path lidar_file = sequence_ / "poses_lidar.txt";
+  const fs::path camera_file = sequence_ / "poses.txt";
+  const bool in_lidar_frame = fs::exists(lidar_file);
+  if (!in_lidar_frame && !fs::exists(camera_file)) return std::nullopt;
+  const fs::path& pose_file = in_lidar_frame ? lidar_file : camera_file;
+
+  std::vector<Eigen::Isometry3d> T_map_lidar = read_poses(pose_file);
+  if (!in_lidar_frame) {
+    const fs::path calibration = sequence_ / "calib.txt";
+    if (!fs::exists(calibration)) {
+      throw DatasetError(calibration,
+                         "no such file, and poses.txt is in the camera frame; add the sequence's "
+                         "calib.txt, or poses in the lidar frame as poses_lidar.txt");
+    }
+    T_map_lidar = lidar_poses_from_camera(T_map_lidar, read_kitti_calibration(calibration));
+  }
+  Trajectory trajectory;
+  const auto lines = lines_in(pose_file, lines_, T_map_lidar.size());
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    trajectory.push_back({stamp_ns(i), T_map_lidar[lines[i]]});
+  }
+  return trajectory;
+}
+
+}  // namespace stillmap

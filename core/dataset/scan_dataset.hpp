@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <vector>
+
+#include "core/lidar/scan.hpp"
+#include "core/lidar/sensor_model.hpp"
+#include "core/odometry/trajectory.hpp"
+
+namespace stillmap {
+
+/// One scan of a recording and its truth.
+struct DatasetFrame {
+  /// With the labels reduced to the network's classes, where the recording has labels.
+  Scan scan;
+  /// Original SemanticKITTI labels: moving ids in the low, instances in the high 16 bits. Truth for
+  /// evaluation only. Empty without labels.
+  std::vector<std::uint32_t> raw_labels;
+};
+
+/// A recording on disk, read scan by scan:
+/// - a SemanticKITTI sequence: velodyne/*.bin, and where present labels/*.label, times.txt,
+///   calib.txt and poses.txt (camera frame) or poses_lidar.txt (lidar frame), and our own
+///   time_offsets/ and rings/ (see KittiSequenceWriter);
+/// - a folder of .bin, .pcd or .ply files, in natural order ("2" before "10");
+/// - a single such file.
+/// Intensity is brought to 0..1: as the first scan decides, for the whole recording.
+class ScanDataset {
+ public:
+  /// Throws DatasetError when there is no scan to be found. Reads the first scan.
+  explicit ScanDataset(const std::filesystem::path& path);
+
+  [[nodiscard]] std::size_t size() const { return files_.size(); }
+  [[nodiscard]] const std::filesystem::path& file(std::size_t i) const { return files_.at(i); }
+
+  /// From times.txt, else from the file's name, else 0.1 s apart from 0.
+  [[nodiscard]] std::int64_t stamp_ns(std::size_t i) const { return stamps_ns_.at(i); }
+
+  [[nodiscard]] bool has_labels(std::size_t i) const;
+
+  /// Throws DatasetError when a file of the scan is damaged; the others can still be read.
+  [[nodiscard]] DatasetFrame read(std::size_t i) const;
+
+  /// True poses, one a scan, in the lidar frame of the pose file's first line; nothing without a
+  /// pose file. Throws DatasetError when it is damaged, has too few lines, or is in the camera
+  /// frame and there is no calib.txt.
+  [[nodiscard]] std::optional<Trajectory> truth() const;
+
+  /// A guess from the kind of file and the first scan's rings or elevations.
+  [[nodiscard]] SensorModel suggested_sensor() const { return suggested_sensor_; }
+
+ private:
+  [[nodiscard]] DatasetFrame read_unscaled(std::size_t i) const;
+  [[nodiscard]] std::filesystem::path beside(std::size_t i, const char* folder,
+                                             const char* extension) const;
+
+  /// Where velodyne/ lies; empty for other recordings.
+  std::filesystem::path sequence_;
+  std::vector<std::filesystem::path> files_;
+  /// Line of each scan in times.txt and the pose files.
+  std::vector<std::size_t> lines_;
+  std::vector<std::int64_t> stamps_ns_;
+  float intensity_scale_ = 1.0F;
+  SensorModel suggested_sensor_;
+};
+
+}  // namespace stillmap

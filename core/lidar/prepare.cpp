@@ -1,0 +1,133 @@
+#include "core/lidar/prepare.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <cstddef>
+
+namespace stillmap {
+namespace {
+
+/// Points whose time lies more than this many periods away have a broken clock, not a long way.
+constexpr double max_periods = 2.0;
+
+class Usable {
+ public:
+  explicit Usable(const PrepareConfig& config)
+      : min_squared_(static_cast<float>(config.min_range_m * config.min_range_m)),
+        max_squared_(static_cast<float>(config.max_range_m * config.max_range_m)),
+        ego_hull_lidar_(config.ego_hull_lidar.cast<float>()) {}
+
+  bool operator()(const Eigen::Vector3f& point_lidar) const {
+    const float squared = point_lidar.squaredNorm();
+    // Written so that NaN fails. Infinity fails for any max_range_m that faults() lets through.
+    if (!(squared >= min_squared_ && squared <= max_squared_ && std::isfinite(squared))) {
+      return false;
+    }
+    return ego_hull_lidar_.isEmpty() || !ego_hull_lidar_.contains(point_lidar);
+  }
+
+ private:
+  float min_squared_;
+  float max_squared_;
+  Eigen::AlignedBox3f ego_hull_lidar_;
+};
+
+float repaired_intensity(float intensity) {
+  return std::isfinite(intensity) ? std::clamp(intensity, 0.0F, 1.0F) : 0.0F;
+}
+
+/// Steady motion along a screw: exp(s log(T)) for many s, with the constant parts worked out once.
+class ScrewMotion {
+ public:
+  explicit ScrewMotion(const Eigen::Isometry3d& T) {
+    const Eigen::AngleAxisd rotation(T.rotation());
+    const double half = 0.5 * rotation.angle();
+    angle_ = static_cast<float>(rotation.angle());
+    straight_ = std::abs(half) < small_angle;
+    const Eigen::Vector3d axis = rotation.axis();
+    const Eigen::Vector3d t = T.translation();
+    const Eigen::Vector3d along = axis * axis.dot(t);
+    const Eigen::Vector3d across = t - along;
+    axis_ = axis.cast<float>();
+    along_ = along.cast<float>();
+    // V^-1 of SE(3)'s exponential map, on the part across the axis; its limit for small angles.
+    const double cotangent = straight_ ? 1.0 : half / std::tan(half);
+    const Eigen::Vector3d velocity = cotangent * across - half * axis.cross(across);
+    across_ = velocity.cast<float>();
+    sideways_ = axis.cross(velocity).cast<float>();
+  }
+
+  /// exp(s log(T)) p.
+  [[nodiscard]] Eigen::Vector3f move(const Eigen::Vector3f& p, double s) const {
+    const auto part = static_cast<float>(s);
+    const float half_angle = 0.5F * part * angle_;
+    const float half_sine = std::sin(half_angle);
+    const float sine = 2.0F * half_sine * std::cos(half_angle);
+    // 1 - cos(angle), without its loss of digits at small angles.
+    const float versine = 2.0F * half_sine * half_sine;
+    const float forward = straight_ ? part : sine / angle_;
+    const float aside = straight_ ? 0.0F : versine / angle_;
+    const Eigen::Vector3f turned = axis_.cross(p);
+    return p + sine * turned + versine * axis_.cross(turned) + part * along_ + forward * across_ +
+           aside * sideways_;
+  }
+
+ private:
+  static constexpr double small_angle = 1e-9;
+
+  float angle_ = 0.0F;
+  bool straight_ = false;
+  Eigen::Vector3f axis_, along_, across_, sideways_;
+};
+
+}  // namespace
+
+Scan drop_unusable_points(Scan scan, const PrepareConfig& config) {
+  const Usable usable(config);
+  std::size_t kept = 0;
+  const auto move_down = [&kept](auto& values, std::size_t from) {
+    if (!values.empty()) values[kept] = values[from];
+  };
+  const std::size_t points = scan.size();
+  for (std::size_t i = 0; i < points; ++i) {
+    if (!usable(scan.points_lidar[i])) continue;
+    move_down(scan.points_lidar, i);
+    move_down(scan.intensity, i);
+    move_down(scan.time_offset_s, i);
+    move_down(scan.ring, i);
+    move_down(scan.labels, i);
+    ++kept;
+  }
+  const auto cut = [kept](auto& values) {
+    if (!values.empty()) values.resize(kept);
+  };
+  cut(scan.points_lidar);
+  cut(scan.intensity);
+  cut(scan.time_offset_s);
+  cut(scan.ring);
+  cut(scan.labels);
+  std::ranges::transform(scan.intensity, scan.intensity.begin(), repaired_intensity);
+  return scan;
+}
+
+Scan compensate_motion(Scan scan, const Eigen::Isometry3d& T_start_end, double period_s) {
+  assert(period_s > 0.0);
+  if (scan.time_offset_s.empty()) return scan;
+  assert(scan.time_offset_s.size() == scan.size());
+  const ScrewMotion motion(T_start_end);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scan.size(), 4096), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i) {
+      const double periods = scan.time_offset_s[i] / period_s;
+      if (!(std::abs(periods) <= max_periods)) continue;
+      scan.points_lidar[i] = motion.move(scan.points_lidar[i], periods);
+    }
+  });
+  scan.time_offset_s.clear();
+  return scan;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "core/lidar/scan.hpp"
+
+namespace stillmap {
+
+struct PrepareConfig {
+  double min_range_m = 0.5;
+  double max_range_m = 120.0;
+  /// Points inside this box belong to the robot itself; empty by default. Lidar frame [m].
+  Eigen::AlignedBox3d ego_hull_lidar;
+  /// Undo the motion during the revolution when points carry their time.
+  bool compensate_motion = true;
+};
+
+/// The scan without points that are not finite, too near, too far or on the robot itself. All
+/// per-point vectors stay aligned.
+[[nodiscard]] Scan drop_unusable_points(Scan scan, const PrepareConfig& config);
+
+/// The scan as if taken in one instant, at `stamp_ns` (paper II-A, "jelly effect"). The lidar is
+/// taken to move steadily; `T_start_end` is its motion during `period_s`. Clears `time_offset_s`.
+/// A scan without times comes back as it is.
+[[nodiscard]] Scan compensate_motion(Scan scan, const Eigen::Isometry3d& T_start_end,
+                                     double period_s);
+
+}  // namespace stillmap

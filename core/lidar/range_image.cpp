@@ -1,0 +1,161 @@
+#include "core/lidar/range_image.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace stillmap {
+namespace {
+
+constexpr auto pi = static_cast<float>(std::numbers::pi);
+
+/// atan2 to 3e-7 radians without branches, so that the compiler makes vectors of it: reduced to
+/// -tan(pi/8)..tan(pi/8), then Cephes' polynomial for single precision.
+inline float fast_atan2(float y, float x) {
+  const float abs_x = std::abs(x), abs_y = std::abs(y);
+  const float larger = std::max(abs_x, abs_y), smaller = std::min(abs_x, abs_y);
+  constexpr float tan_pi_8 = 0.41421356F;
+  const bool upper = smaller > tan_pi_8 * larger;
+  const float t = upper ? (smaller - larger) / (smaller + larger) : smaller / larger;
+  const float z = t * t;
+  const float polynomial =
+      (((8.05374449538e-2F * z - 1.38776856032e-1F) * z + 1.99777106478e-1F) * z -
+       3.33329491539e-1F) *
+          z * t +
+      t;
+  float angle = polynomial + (upper ? pi / 4.0F : 0.0F);
+  angle = abs_y > abs_x ? pi / 2.0F - angle : angle;
+  angle = x < 0.0F ? pi - angle : angle;
+  return std::copysign(angle, y);
+}
+
+/// Equation 1 with its constants worked out once.
+class Projection {
+ public:
+  explicit Projection(const ProjectionModel& model)
+      : rows_(model.rows),
+        columns_(model.columns),
+        fov_down_(static_cast<float>(model.fov_down)),
+        columns_per_radian_(static_cast<float>(model.columns / (2.0 * std::numbers::pi))),
+        rows_per_radian_(static_cast<float>(model.rows / (model.fov_up - model.fov_down))) {}
+
+  /// Pixel of a point, whatever its values; meant for points that are finite and not the origin.
+  [[nodiscard]] std::int32_t pixel(float x, float y, float z) const {
+    const float yaw = fast_atan2(y, x);
+    // asin(z/range), but as precise straight up as elsewhere.
+    const float pitch = fast_atan2(z, std::sqrt(x * x + y * y));
+    const float u = 0.5F * static_cast<float>(columns_) - yaw * columns_per_radian_;
+    const float v = static_cast<float>(rows_) - (pitch - fov_down_) * rows_per_radian_;
+    return inside(v, rows_) * columns_ + inside(u, columns_);
+  }
+
+ private:
+  /// Rounded down and clamped; NaN becomes 0.
+  static std::int32_t inside(float coordinate, std::int32_t size) {
+    return static_cast<std::int32_t>(
+        std::min(std::max(0.0F, coordinate), static_cast<float>(size - 1)));
+  }
+
+  std::int32_t rows_, columns_;
+  float fov_down_;
+  float columns_per_radian_, rows_per_radian_;
+};
+
+/// Few points share a pixel: insertion sort beats std::sort there. The many of a strange scan go
+/// the safe way.
+template <class Before>
+void sort_mostly_few(std::span<std::int32_t> points, Before before) {
+  constexpr std::size_t few = 16;
+  if (points.size() > few) {
+    std::ranges::sort(points, before);
+    return;
+  }
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const std::int32_t point = points[i];
+    std::size_t place = i;
+    for (; place > 0 && before(point, points[place - 1]); --place) {
+      points[place] = points[place - 1];
+    }
+    points[place] = point;
+  }
+}
+
+}  // namespace
+
+ProjectionModel projection_model(const SensorModel& sensor) {
+  return {.rows = sensor.rings,
+          .columns = sensor.columns,
+          .fov_up = sensor.fov_up,
+          .fov_down = sensor.fov_down};
+}
+
+RangeImage::RangeImage(std::span<const Eigen::Vector3f> points_lidar, const ProjectionModel& model)
+    : rows_(model.rows),
+      columns_(model.columns),
+      pixel_of_point_(points_lidar.size()),
+      range_of_point_m_(points_lidar.size()),
+      nearest_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_), none),
+      range_m_(nearest_.size(), -1.0F) {
+  assert(model.rows > 0 && model.columns > 0 && model.fov_down < model.fov_up);
+  project(points_lidar, model);
+  put_into_pixels();
+  sort_within_pixels();
+}
+
+void RangeImage::project(std::span<const Eigen::Vector3f> points_lidar,
+                         const ProjectionModel& model) {
+  const Projection projection(model);
+  const tbb::blocked_range<std::size_t> all(0, points_lidar.size(), 4096);
+  tbb::parallel_for(all, [&](const auto& some) {
+    for (std::size_t i = some.begin(); i < some.end(); ++i) {
+      const float x = points_lidar[i].x(), y = points_lidar[i].y(), z = points_lidar[i].z();
+      const float range = std::sqrt(x * x + y * y + z * z);
+      const std::int32_t pixel = projection.pixel(x, y, z);
+      const bool projectable = range > 0.0F && range <= std::numeric_limits<float>::max();
+      range_of_point_m_[i] = range;
+      pixel_of_point_[i] = projectable ? pixel : none;
+    }
+  });
+}
+
+void RangeImage::put_into_pixels() {
+  begin_.assign(pixel_count() + 1, 0);
+  // Counting sort: begin_[p] first counts the points before the end of pixel p and is moved down
+  // to the beginning while the points are put in.
+  for (const std::int32_t pixel : pixel_of_point_) {
+    if (pixel != none) ++begin_[static_cast<std::size_t>(pixel)];
+  }
+  std::uint32_t end = 0;
+  for (std::uint32_t& entry : begin_) entry = end += entry;
+  points_by_pixel_.resize(end);
+  for (std::size_t i = 0; i < pixel_of_point_.size(); ++i) {
+    if (pixel_of_point_[i] == none) continue;
+    points_by_pixel_[--begin_[static_cast<std::size_t>(pixel_of_point_[i])]] =
+        static_cast<std::int32_t>(i);
+  }
+}
+
+void RangeImage::sort_within_pixels() {
+  const auto range = [this](std::int32_t point) {
+    return range_of_point_m_[static_cast<std::size_t>(point)];
+  };
+  const auto farther = [&](std::int32_t a, std::int32_t b) {
+    return range(a) > range(b) || (range(a) == range(b) && a > b);
+  };
+  const tbb::blocked_range<std::size_t> all(0, pixel_count(), 4096);
+  tbb::parallel_for(all, [&](const auto& some) {
+    for (std::size_t p = some.begin(); p < some.end(); ++p) {
+      const auto points = std::span(points_by_pixel_).subspan(begin_[p], begin_[p + 1] - begin_[p]);
+      if (points.empty()) continue;
+      sort_mostly_few(points, farther);
+      nearest_[p] = points.back();
+      range_m_[p] = range(points.back());
+    }
+  });
+}
+
+}  // namespace stillmap

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
+
+namespace stillmap {
+
+struct StampedPose {
+  std::int64_t stamp_ns = 0;
+  /// Takes points of the lidar frame to the map frame [m].
+  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+};
+
+using Trajectory = std::vector<StampedPose>;
+
+}  // namespace stillmap

@@ -1,0 +1,228 @@
+#include "core/dataset/scan_dataset.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "core/dataset/dataset_error.hpp"
+#include "core/dataset/kitti_files.hpp"
+#include "core/dataset/kitti_sequence_writer.hpp"
+#include "core/dataset/point_cloud_files.hpp"
+#include "tests/dataset/scratch_folder.hpp"
+
+namespace stillmap {
+namespace {
+
+using testing::AllOf;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+Scan small_scan(std::size_t points, std::int64_t stamp_ns) {
+  Scan scan;
+  scan.stamp_ns = stamp_ns;
+  for (std::size_t i = 0; i < points; ++i) {
+    scan.points_lidar.emplace_back(static_cast<float>(i + 1), 2.0F, -1.0F);
+    scan.intensity.push_back(0.25F);
+  }
+  return scan;
+}
+
+Eigen::Isometry3d pose_at(double x, double yaw) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.rotate(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
+  T.pretranslate(Eigen::Vector3d(x, 0.5 * x, 0.1));
+  return T;
+}
+
+std::vector<std::string> names_of(const ScanDataset& dataset) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < dataset.size(); ++i) {
+    names.push_back(dataset.file(i).filename().string());
+  }
+  return names;
+}
+
+/// A PCD of one point.
+std::string pcd(const std::string& intensity = "0.5") {
+  return "VERSION 0.7\nFIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\n"
+         "WIDTH 1\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 1\nDATA ascii\n1 2 0 " +
+         intensity + "\n";
+}
+
+TEST(KittiSequenceWriter, WhatIsWrittenComesBack) {
+  const ScratchFolder folder;
+  KittiSequenceWriter writer(folder.path() / "sequence");
+  std::vector<std::vector<std::uint32_t>> raw_labels;
+  for (std::size_t k = 0; k < 3; ++k) {
+    Scan scan = small_scan(4 + k, 1'600'000'000'000'000'123 + static_cast<std::int64_t>(k) * 99);
+    for (std::size_t i = 0; i < scan.size(); ++i) {
+      scan.time_offset_s.push_back(0.01F * static_cast<float>(i));
+      scan.ring.push_back(static_cast<std::uint16_t>(15 - i));
+    }
+    raw_labels.emplace_back(scan.size(), (5U << 16U) | 252U);
+    writer.add(scan, raw_labels.back(), pose_at(10.0 + static_cast<double>(k), 0.1));
+  }
+  writer.finish();
+
+  const ScanDataset dataset(folder.path() / "sequence");
+  ASSERT_EQ(dataset.size(), 3U);
+  EXPECT_EQ(dataset.suggested_sensor().name, "VLP-16");
+  for (std::size_t k = 0; k < 3; ++k) {
+    EXPECT_TRUE(dataset.has_labels(k));
+    const DatasetFrame frame = dataset.read(k);
+    const Scan expected = small_scan(4 + k, 0);
+    EXPECT_EQ(frame.scan.stamp_ns, 1'600'000'000'000'000'123 + static_cast<std::int64_t>(k) * 99);
+    EXPECT_EQ(frame.scan.points_lidar, expected.points_lidar);
+    EXPECT_EQ(frame.scan.intensity, expected.intensity);
+    EXPECT_FLOAT_EQ(frame.scan.time_offset_s.at(3), 0.03F);
+    EXPECT_EQ(frame.scan.ring.at(3), 12);
+    EXPECT_EQ(frame.raw_labels, raw_labels[k]);
+    // The moving id is truth; what odometry and map may see is a car.
+    EXPECT_THAT(frame.scan.labels, testing::Each(SemanticClass::car));
+  }
+}
+
+TEST(KittiSequenceWriter, TruthIsInTheFirstLidarFrame) {
+  const ScratchFolder folder;
+  KittiSequenceWriter writer(folder.path());
+  for (int k = 0; k < 4; ++k) writer.add(small_scan(2, 100 * k), {}, pose_at(3.0 * k, 0.2 * k + 1));
+  writer.finish();
+  const auto truth = ScanDataset(folder.path()).truth();
+  ASSERT_TRUE(truth.has_value());
+  ASSERT_EQ(truth->size(), 4U);
+  for (int k = 0; k < 4; ++k) {
+    const Eigen::Isometry3d expected = pose_at(0.0, 1).inverse() * pose_at(3.0 * k, 0.2 * k + 1);
+    const StampedPose& pose = truth->at(static_cast<std::size_t>(k));
+    EXPECT_LT((pose.T_map_lidar.matrix() - expected.matrix()).norm(), 1e-9);
+    EXPECT_EQ(pose.stamp_ns, 100 * k);
+  }
+}
+
+TEST(KittiSequenceWriter, RefusesAnExistingSequenceAndUnevenScans) {
+  const ScratchFolder folder;
+  KittiSequenceWriter writer(folder.path());
+  EXPECT_THAT(message_of<DatasetError>([&] { KittiSequenceWriter again(folder.path()); }),
+              HasSubstr("already"));
+  EXPECT_THROW(writer.add(small_scan(3, 0), std::vector<std::uint32_t>(2), pose_at(0, 0)),
+               DatasetError);
+}
+
+TEST(ScanDataset, ReadsAFolderInNaturalOrder) {
+  const ScratchFolder folder;
+  for (const char* name : {"10.pcd", "9.pcd", "100.pcd", "2.pcd"}) (void)folder.file(name, pcd());
+  (void)folder.file("readme.txt", "not a scan");
+  const ScanDataset dataset(folder.path());
+  EXPECT_THAT(names_of(dataset), ElementsAre("2.pcd", "9.pcd", "10.pcd", "100.pcd"));
+  EXPECT_EQ(dataset.stamp_ns(0), 0);
+  EXPECT_EQ(dataset.stamp_ns(3), 300'000'000);
+  EXPECT_FALSE(dataset.truth().has_value());
+  EXPECT_FALSE(dataset.has_labels(0));
+}
+
+TEST(ScanDataset, TakesStampsFromFileNames) {
+  const ScratchFolder folder;
+  (void)folder.file("1539765928.346003000.pcd", pcd());
+  (void)folder.file("1539765928.446003001.pcd", pcd());
+  const ScanDataset dataset(folder.path());
+  EXPECT_EQ(dataset.stamp_ns(0), 1'539'765'928'346'003'000);
+  EXPECT_EQ(dataset.read(1).scan.stamp_ns, 1'539'765'928'446'003'001);
+}
+
+TEST(ScanDataset, ReadsASingleFile) {
+  const ScratchFolder folder;
+  const auto file = folder.file("scan.pcd", pcd());
+  const ScanDataset dataset(file);
+  ASSERT_EQ(dataset.size(), 1U);
+  EXPECT_EQ(dataset.read(0).scan.size(), 1U);
+}
+
+TEST(ScanDataset, ReadsTheVelodyneFolderOfASequenceLikeTheSequence) {
+  const ScratchFolder folder;
+  KittiSequenceWriter writer(folder.path());
+  writer.add(small_scan(2, 5), std::vector<std::uint32_t>{40, 40}, pose_at(0, 0));
+  writer.finish();
+  const ScanDataset dataset(folder.path() / "velodyne");
+  EXPECT_EQ(dataset.stamp_ns(0), 5);
+  EXPECT_TRUE(dataset.has_labels(0));
+}
+
+TEST(ScanDataset, BringsTheIntensityOfAWholeRecordingTo0To1) {
+  const ScratchFolder folder;
+  (void)folder.file("0.pcd", pcd("51"));
+  (void)folder.file("1.pcd", pcd("1"));
+  const ScanDataset dataset(folder.path());
+  EXPECT_FLOAT_EQ(dataset.read(0).scan.intensity.at(0), 0.2F);
+  EXPECT_FLOAT_EQ(dataset.read(1).scan.intensity.at(0), 1.0F / 255.0F);
+}
+
+TEST(ScanDataset, ACutOutOfASequenceKeepsItsTimesAndPoses) {
+  const ScratchFolder folder;
+  std::filesystem::create_directories(folder.path() / "velodyne");
+  write_kitti_bin(folder.path() / "velodyne" / "000002.bin", small_scan(1, 0));
+  write_kitti_bin(folder.path() / "velodyne" / "000003.bin", small_scan(1, 0));
+  write_kitti_times_ns(folder.path() / "times.txt", std::vector<std::int64_t>{10, 11, 12, 13});
+  std::vector<Eigen::Isometry3d> poses;
+  for (int k = 0; k < 4; ++k) poses.push_back(pose_at(k, 0.0));
+  write_poses(folder.path() / "poses_lidar.txt", poses);
+  const ScanDataset dataset(folder.path());
+  EXPECT_EQ(dataset.stamp_ns(0), 12);
+  EXPECT_NEAR(dataset.truth()->at(1).T_map_lidar.translation().x(), 3.0, 1e-9);
+
+  // Files with one line a scan belong to the scans in order.
+  write_kitti_times_ns(folder.path() / "times.txt", std::vector<std::int64_t>{70, 80});
+  EXPECT_EQ(ScanDataset(folder.path()).stamp_ns(1), 80);
+  write_kitti_times_ns(folder.path() / "times.txt", std::vector<std::int64_t>{70});
+  EXPECT_THAT(message_of<DatasetError>([&] { ScanDataset{folder.path()}; }),
+              AllOf(HasSubstr("times.txt"), HasSubstr("1 lines"), HasSubstr("2 scans")));
+}
+
+TEST(ScanDataset, OneDamagedScanLeavesTheOthersReadable) {
+  const ScratchFolder folder;
+  (void)folder.file("0.pcd", pcd());
+  (void)folder.file("1.pcd", "DATA");
+  (void)folder.file("2.pcd", pcd());
+  const ScanDataset dataset(folder.path());
+  EXPECT_THROW((void)dataset.read(1), DatasetError);
+  EXPECT_EQ(dataset.read(2).scan.size(), 1U);
+}
+
+TEST(ScanDataset, FaultsSayWhatToDo) {
+  const ScratchFolder folder;
+  const auto message = [](const std::filesystem::path& path) {
+    return message_of<DatasetError>([&] { ScanDataset{path}; });
+  };
+  EXPECT_THAT(message(folder.path() / "nowhere"), HasSubstr("check the path"));
+  EXPECT_THAT(message(folder.path()), HasSubstr("no .bin, .pcd or .ply"));
+  EXPECT_THAT(message(folder.file("a.txt", "x")), HasSubstr("no recording"));
+  std::filesystem::create_directories(folder.path() / "velodyne");
+  EXPECT_THAT(message(folder.path()), HasSubstr("velodyne"));
+}
+
+TEST(ScanDataset, CameraPosesWithoutCalibrationAreAnError) {
+  const ScratchFolder folder;
+  KittiSequenceWriter writer(folder.path());
+  writer.add(small_scan(1, 0), {}, pose_at(0, 0));
+  writer.finish();
+  std::filesystem::remove(folder.path() / "calib.txt");
+  const ScanDataset dataset(folder.path());
+  EXPECT_THAT(
+      message_of<DatasetError>([&] { (void)dataset.truth(); }),
+      AllOf(HasSubstr("calib.txt"), HasSubstr("camera frame"), HasSubstr("poses_lidar.txt")));
+}
+
+TEST(ScanDataset, LabelsOfAnotherScanAreRefused) {
+  const ScratchFolder folder;
+  KittiSequenceWriter writer(folder.path());
+  for (int k = 0; k < 2; ++k) {
+    writer.add(small_scan(2, k), std::vector<std::uint32_t>(2), pose_at(0, 0));
+  }
+  writer.finish();
+  (void)folder.file("labels/000001.label", std::string(12, '\0'));
+  (void)folder.file("rings/000000.bin", std::string(2, '\0'));
+  EXPECT_THAT(message_of<DatasetError>([&] { ScanDataset{folder.path()}; }),
+              AllOf(HasSubstr("rings"), HasSubstr("1 values"), HasSubstr("2 points")));
+  std::filesystem::remove_all(folder.path() / "rings");
+  EXPECT_THROW((void)ScanDataset(folder.path()).read(1), DatasetError);
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,178 @@
+#include "core/lidar/prepare.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+
+namespace stillmap {
+namespace {
+
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+constexpr float inf = std::numeric_limits<float>::infinity();
+
+/// Every per-point value carries the point's number, so that misalignment shows.
+Scan numbered_scan(std::vector<Eigen::Vector3f> points) {
+  Scan scan;
+  scan.stamp_ns = 42;
+  scan.points_lidar = std::move(points);
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    scan.intensity.push_back(static_cast<float>(i) / 100.0F);
+    scan.time_offset_s.push_back(static_cast<float>(i));
+    scan.ring.push_back(static_cast<std::uint16_t>(i));
+    scan.labels.push_back(static_cast<SemanticClass>(i % semantic_class_count));
+  }
+  return scan;
+}
+
+TEST(DropUnusablePoints, KeepsAllValuesOfAPointTogether) {
+  const PrepareConfig config{.min_range_m = 1.0, .max_range_m = 50.0, .ego_hull_lidar = {}};
+  const Scan kept = drop_unusable_points(numbered_scan({{nan, 0, 0},
+                                                        {2, 0, 0},
+                                                        {0, inf, 0},
+                                                        {0.5, 0, 0},
+                                                        {0, 49, 0},
+                                                        {0, 0, 51},
+                                                        {0, 0, -inf},
+                                                        {0, 0, 0},
+                                                        {-3, -3, 1}}),
+                                         config);
+  const std::vector<std::size_t> expected{1, 4, 8};
+  ASSERT_EQ(kept.size(), expected.size());
+  EXPECT_EQ(kept.stamp_ns, 42);
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_EQ(kept.ring.at(i), expected[i]);
+    EXPECT_FLOAT_EQ(kept.time_offset_s.at(i), static_cast<float>(expected[i]));
+    EXPECT_FLOAT_EQ(kept.intensity.at(i), static_cast<float>(expected[i]) / 100.0F);
+    EXPECT_EQ(kept.labels.at(i), static_cast<SemanticClass>(expected[i]));
+  }
+  EXPECT_EQ(kept.points_lidar[2], Eigen::Vector3f(-3, -3, 1));
+}
+
+TEST(DropUnusablePoints, LeavesEmptyVectorsEmpty) {
+  Scan scan;
+  scan.points_lidar = {{5, 0, 0}, {nan, 0, 0}};
+  const Scan kept = drop_unusable_points(scan, {});
+  EXPECT_EQ(kept.size(), 1U);
+  EXPECT_TRUE(kept.intensity.empty() && kept.ring.empty() && kept.time_offset_s.empty() &&
+              kept.labels.empty());
+  EXPECT_TRUE(drop_unusable_points(Scan{}, {}).empty());
+}
+
+TEST(DropUnusablePoints, DropsTheRobotItself) {
+  PrepareConfig config;
+  config.ego_hull_lidar =
+      Eigen::AlignedBox3d(Eigen::Vector3d(-2, -1, -2), Eigen::Vector3d(2, 1, 0.5));
+  const Scan kept = drop_unusable_points(
+      numbered_scan({{1.5, 0.5, -1}, {1.5, 0.5, 1}, {2.5, 0, 0}, {-1, -0.9F, 0}}), config);
+  EXPECT_THAT(kept.ring, testing::ElementsAre(1, 2));
+}
+
+TEST(DropUnusablePoints, BringsIntensityInto0To1) {
+  Scan scan;
+  scan.points_lidar.assign(4, {5, 0, 0});
+  scan.intensity = {nan, -0.5F, 0.25F, 7.0F};
+  EXPECT_THAT(drop_unusable_points(scan, {}).intensity,
+              testing::ElementsAre(0.0F, 0.0F, 0.25F, 1.0F));
+}
+
+/// A steady motion: turning `rotation` (a rotation vector) while moving by `velocity`.
+struct Twist {
+  Eigen::Vector3d rotation, velocity;
+};
+
+/// exp(s twist) as the sum of its power series.
+Eigen::Isometry3d part_of(const Twist& twist, double s) {
+  const Eigen::Vector3d w = s * twist.rotation, v = s * twist.velocity;
+  Eigen::Matrix4d generator;
+  generator << 0, -w.z(), w.y(), v.x(), w.z(), 0, -w.x(), v.y(), -w.y(), w.x(), 0, v.z(), 0, 0, 0,
+      0;
+  Eigen::Matrix4d sum = Eigen::Matrix4d::Identity(), term = sum;
+  for (int n = 1; n < 60; ++n) {
+    term = term * generator / n;
+    sum += term;
+  }
+  return Eigen::Isometry3d(sum);
+}
+
+Eigen::Isometry3d pose(double angle, const Eigen::Vector3d& axis, const Eigen::Vector3d& t) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = Eigen::AngleAxisd(angle, axis.normalized()).toRotationMatrix();
+  T.translation() = t;
+  return T;
+}
+
+TEST(CompensateMotion, AgreesWithTheMatrixExponential) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> any(-1.0, 1.0);
+  for (const double angle : {0.0, 1e-12, 1e-7, 1e-3, 0.1, 1.5, 3.0}) {
+    const auto vector = [&] { return Eigen::Vector3d(any(random), any(random), any(random)); };
+    const Twist twist{angle * vector().normalized(), 3.0 * vector()};
+    const Eigen::Isometry3d T_start_end = part_of(twist, 1.0);
+    Scan scan;
+    std::vector<Eigen::Vector3d> expected;
+    for (int i = 0; i < 100; ++i) {
+      const Eigen::Vector3d p = 50.0 * vector();
+      const double offset_s = 0.1 * any(random);
+      scan.points_lidar.push_back(p.cast<float>());
+      scan.time_offset_s.push_back(static_cast<float>(offset_s));
+      expected.push_back(part_of(twist, offset_s / 0.1) * p);
+    }
+    const Scan still = compensate_motion(scan, T_start_end, 0.1);
+    ASSERT_EQ(still.size(), expected.size());
+    for (std::size_t i = 0; i < expected.size(); ++i) {
+      EXPECT_LT((still.points_lidar[i].cast<double>() - expected[i]).norm(), 1e-4)
+          << "angle " << angle;
+    }
+    EXPECT_TRUE(still.time_offset_s.empty());
+  }
+}
+
+TEST(CompensateMotion, MakesAWallFlatThatATurningLidarSawBent) {
+  // The lidar drives 2 m and turns 0.2 rad in a revolution while it looks at the wall x = 20.
+  const Twist twist{0.2 * Eigen::Vector3d::UnitZ(), {2.0, 0.1, 0.0}};
+  Scan scan;
+  for (int i = 0; i <= 100; ++i) {
+    const double part = i / 100.0;
+    const Eigen::Vector3d p_start(20.0, 10.0 * (part - 0.5), 1.0);
+    scan.points_lidar.push_back((part_of(twist, part).inverse() * p_start).cast<float>());
+    scan.time_offset_s.push_back(static_cast<float>(0.1 * part));
+  }
+  EXPECT_GT(std::abs(scan.points_lidar.back().x() - 20.0F), 1.0F);
+  const Scan still = compensate_motion(scan, part_of(twist, 1.0), 0.1);
+  for (const auto& p : still.points_lidar) EXPECT_NEAR(p.x(), 20.0F, 1e-4F);
+}
+
+TEST(CompensateMotion, LeavesAScanWithoutTimesAsItIs) {
+  Scan scan;
+  scan.points_lidar = {{1, 2, 3}};
+  const auto T = pose(0.3, Eigen::Vector3d::UnitX(), {1, 1, 1});
+  EXPECT_EQ(compensate_motion(scan, T, 0.1).points_lidar, scan.points_lidar);
+}
+
+TEST(CompensateMotion, MovesPointsOfOneTimeAlike) {
+  Scan scan;
+  scan.points_lidar = {{1, 2, 3}, {4, 5, 6}, {-7, 8, 9}};
+  const auto T = pose(0.3, Eigen::Vector3d::UnitZ(), {1, 0, 0});
+  scan.time_offset_s.assign(3, 0.0F);
+  EXPECT_EQ(compensate_motion(scan, T, 0.1).points_lidar, scan.points_lidar);
+  scan.time_offset_s.assign(3, 0.1F);
+  const Scan moved = compensate_motion(scan, T, 0.1);
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_LT((moved.points_lidar[i] - T.cast<float>() * scan.points_lidar[i]).norm(), 1e-5F);
+  }
+}
+
+TEST(CompensateMotion, LeavesPointsOfBrokenClocksWhereTheyAre) {
+  Scan scan;
+  scan.points_lidar.assign(3, {10, 0, 0});
+  scan.time_offset_s = {nan, inf, 1e9F};
+  const auto T = pose(0.3, Eigen::Vector3d::UnitZ(), {1, 0, 0});
+  EXPECT_EQ(compensate_motion(scan, T, 0.1).points_lidar, scan.points_lidar);
+}
+
+}  // namespace
+}  // namespace stillmap
