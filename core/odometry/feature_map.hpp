@@ -1,0 +1,102 @@
+#pragma once
+
+#include <tsl/robin_map.h>
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/lidar/semantic_class.hpp"
+#include "core/odometry/odometry_config.hpp"
+
+namespace stillmap {
+
+struct LabelledPoint {
+  Eigen::Vector3f position_map;
+  SemanticClass label = SemanticClass::unlabeled;
+};
+
+/// The nearest points of a feature map, nearest first.
+struct Neighbours {
+  static constexpr int capacity = 16;
+  std::array<LabelledPoint, capacity> points;
+  std::array<float, capacity> squared_distance;
+  int count = 0;
+};
+
+/// One of the paper's local feature sets, M_e or M_p: labelled points in a voxel hash with a
+/// bounded number of points a voxel. NOT safe for one writer beside readers; many readers are fine.
+class FeatureMap {
+ public:
+  explicit FeatureMap(const LocalMapConfig& config);
+
+  /// Adds points that have no other point of their voxel within `min_spacing_m`, while it has room.
+  void insert(std::span<const LabelledPoint> points);
+
+  /// The `n` <= Neighbours::capacity nearest points within `max_distance_m`, which is at most the
+  /// voxel size.
+  [[nodiscard]] Neighbours nearest(const Eigen::Vector3f& position_map, int n,
+                                   float max_distance_m) const;
+
+  /// Forgets voxels whose first point is farther than the configured radius from `centre_map`.
+  void forget_far_from(const Eigen::Vector3f& centre_map);
+
+  /// Removes the movable points for which `is_gone(position_map)` holds.
+  template <typename Predicate>
+  void remove_movable_if(Predicate is_gone);
+
+  void clear();
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] bool empty() const { return size_ == 0; }
+
+ private:
+  static constexpr int block_capacity = 32;
+  /// Points of one voxel; coordinates apart so that distances are computed eight at a time.
+  struct Block {
+    std::array<float, block_capacity> x, y, z;
+    std::array<SemanticClass, block_capacity> label;
+    int count = 0;
+    int movable = 0;
+
+    [[nodiscard]] Eigen::Vector3f position(int i) const {
+      const auto k = static_cast<std::size_t>(i);
+      return {x[k], y[k], z[k]};
+    }
+    void push(const LabelledPoint& point);
+    void remove(int i);
+  };
+  struct Hash {
+    std::size_t operator()(std::uint64_t key) const noexcept;
+  };
+
+  [[nodiscard]] Eigen::Vector3i voxel_of(const Eigen::Vector3f& position_map) const;
+  void insert(const LabelledPoint& point);
+  [[nodiscard]] Block& block_at(std::uint64_t key);
+
+  /// Voxel to its place in `blocks_`: the table that every look-up walks stays small.
+  tsl::robin_map<std::uint64_t, std::uint32_t, Hash> index_;
+  std::vector<Block> blocks_;
+  std::vector<std::uint32_t> free_blocks_;
+  std::size_t size_ = 0;
+  int max_points_;
+  float voxel_size_m_;
+  float min_spacing_m_;
+  float radius_m_;
+};
+
+template <typename Predicate>
+void FeatureMap::remove_movable_if(Predicate is_gone) {
+  for (Block& block : blocks_) {
+    if (block.movable == 0) continue;
+    for (int i = block.count - 1; i >= 0; --i) {
+      if (!is_movable(block.label[static_cast<std::size_t>(i)]) || !is_gone(block.position(i)))
+        continue;
+      block.remove(i);
+      --size_;
+    }
+  }
+}
+
+}  // namespace stillmap

@@ -1,0 +1,185 @@
+#include "core/odometry/features.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <span>
+
+#include "core/odometry/thinning.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr std::size_t half_window = 5;
+constexpr std::size_t sectors = 6;
+/// A step along a ring larger than this share of the range is a jump in depth, not a surface.
+constexpr float jump_share = 0.1F;
+/// A picked edge covers its neighbours up to a squared step of this size [m^2] (A-LOAM).
+constexpr float same_edge_step_m2 = 0.05F;
+
+/// Points of the scan by ring: ring r is order[begin[r] .. begin[r + 1]), in firing order.
+struct RingOrder {
+  std::vector<std::uint32_t> order;
+  std::vector<std::uint32_t> begin;
+};
+
+RingOrder order_by_ring(const Scan& scan) {
+  const std::size_t rings =
+      scan.empty() ? 0 : std::size_t{*std::ranges::max_element(scan.ring)} + 1;
+  RingOrder rings_of{std::vector<std::uint32_t>(scan.size()),
+                     std::vector<std::uint32_t>(rings + 1, 0)};
+  for (const std::uint16_t ring : scan.ring) ++rings_of.begin[ring + 1U];
+  std::partial_sum(rings_of.begin.begin(), rings_of.begin.end(), rings_of.begin.begin());
+  std::vector<std::uint32_t> next(rings_of.begin.begin(), rings_of.begin.end());
+  for (std::uint32_t i = 0; i < scan.size(); ++i) rings_of.order[next[scan.ring[i]]++] = i;
+  return rings_of;
+}
+
+/// Whether the azimuth runs one way along the ring, but for the noise of motion compensation.
+bool runs_round(const std::vector<Eigen::Vector3f>& points, std::span<const std::uint32_t> ring) {
+  std::size_t forwards = 0;
+  std::size_t backwards = 0;
+  for (std::size_t i = 1; i < ring.size(); ++i) {
+    const Eigen::Vector3f& a = points[ring[i - 1]];
+    const Eigen::Vector3f& b = points[ring[i]];
+    (a.x() * b.y() - a.y() * b.x() >= 0.0F ? forwards : backwards) += 1;
+  }
+  return std::min(forwards, backwards) * 10 <= ring.size();
+}
+
+void sort_by_azimuth(const std::vector<Eigen::Vector3f>& points, std::span<std::uint32_t> ring) {
+  std::ranges::stable_sort(
+      ring, {}, [&](std::uint32_t i) { return std::atan2(points[i].y(), points[i].x()); });
+}
+
+enum class Use : std::uint8_t { free, taken, edge };
+
+/// Keeps neighbours of a picked edge on the same surface from being picked too.
+void cover_neighbours(std::span<const Eigen::Vector3f> ring, std::size_t picked,
+                      std::vector<Use>& use) {
+  for (const int direction : {-1, 1}) {
+    std::size_t i = picked;
+    for (std::size_t step = 0; step < half_window; ++step) {
+      if (direction < 0 ? i == 0 : i + 1 >= ring.size()) break;
+      const std::size_t next = direction < 0 ? i - 1 : i + 1;
+      if ((ring[next] - ring[i]).squaredNorm() > same_edge_step_m2) break;
+      if (use[next] == Use::free) use[next] = Use::taken;
+      i = next;
+    }
+  }
+}
+
+struct RingFeatures {
+  std::vector<std::uint32_t> edges;
+  std::vector<std::uint32_t> planes;
+};
+
+void pick_edges(std::span<const Eigen::Vector3f> ring, std::span<const float> curvature,
+                const FeatureConfig& config, std::vector<Use>& use) {
+  std::vector<std::uint32_t> sharp;
+  for (std::size_t sector = 0; sector < sectors; ++sector) {
+    const std::size_t first = ring.size() * sector / sectors;
+    const std::size_t last = ring.size() * (sector + 1) / sectors;
+    sharp.clear();
+    for (std::size_t i = first; i < last; ++i)
+      if (curvature[i] > static_cast<float>(config.edge_curvature_m2))
+        sharp.push_back(static_cast<std::uint32_t>(i));
+    std::ranges::sort(sharp, [&](std::uint32_t a, std::uint32_t b) {
+      return curvature[a] != curvature[b] ? curvature[a] > curvature[b] : a < b;
+    });
+    int picked = 0;
+    for (const std::uint32_t i : sharp) {
+      if (picked == config.edges_per_sector) break;
+      if (use[i] != Use::free) continue;
+      use[i] = Use::edge;
+      ++picked;
+      cover_neighbours(ring, i, use);
+    }
+  }
+}
+
+RingFeatures features_of_ring(const Scan& scan, std::span<std::uint32_t> order,
+                              const FeatureConfig& config) {
+  RingFeatures features;
+  if (order.size() <= 2 * half_window) return features;
+  if (!runs_round(scan.points_lidar, order)) sort_by_azimuth(scan.points_lidar, order);
+  std::vector<Eigen::Vector3f> ring(order.size());
+  std::ranges::transform(order, ring.begin(), [&](auto i) { return scan.points_lidar[i]; });
+  const std::vector<float> curvature = ring_curvature(ring);
+  std::vector<Use> use(ring.size(), Use::free);
+  pick_edges(ring, curvature, config, use);
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    if (use[i] == Use::edge)
+      features.edges.push_back(order[i]);
+    else if (curvature[i] < static_cast<float>(config.plane_curvature_m2))
+      features.planes.push_back(order[i]);
+  }
+  return features;
+}
+
+/// Marks the far side of a jump in depth, which the near side may hide from another place, and
+/// points on surfaces that the beam grazes: both change with the place of the lidar.
+std::vector<bool> unreliable_points(std::span<const Eigen::Vector3f> ring) {
+  std::vector<bool> unreliable(ring.size(), false);
+  for (std::size_t i = 0; i + 1 < ring.size(); ++i) {
+    const float range = ring[i].norm();
+    const float next_range = ring[i + 1].norm();
+    const float jump = jump_share * std::min(range, next_range);
+    if (std::abs(range - next_range) <= jump) continue;
+    const bool next_is_far = next_range > range;
+    const std::size_t first = next_is_far ? i + 1 : (i >= half_window ? i - half_window : 0);
+    const std::size_t last = next_is_far ? std::min(i + half_window + 1, ring.size() - 1) : i;
+    for (std::size_t k = first; k <= last; ++k) unreliable[k] = true;
+  }
+  for (std::size_t i = 1; i + 1 < ring.size(); ++i) {
+    const float grazing = 0.0002F * ring[i].squaredNorm();
+    if ((ring[i] - ring[i - 1]).squaredNorm() > grazing &&
+        (ring[i + 1] - ring[i]).squaredNorm() > grazing)
+      unreliable[i] = true;
+  }
+  return unreliable;
+}
+
+}  // namespace
+
+std::vector<float> ring_curvature(const std::vector<Eigen::Vector3f>& ring) {
+  std::vector<float> curvature(ring.size(), std::numeric_limits<float>::quiet_NaN());
+  if (ring.size() <= 2 * half_window) return curvature;
+  const std::vector<bool> unreliable = unreliable_points(ring);
+  for (std::size_t i = half_window; i + half_window < ring.size(); ++i) {
+    if (unreliable[i]) continue;
+    Eigen::Vector3f sum = -static_cast<float>(2 * half_window) * ring[i];
+    for (std::size_t k = 1; k <= half_window; ++k) sum += ring[i - k] + ring[i + k];
+    curvature[i] = sum.squaredNorm();
+  }
+  return curvature;
+}
+
+Features extract_features(const Scan& scan, const FeatureConfig& config) {
+  assert(scan.ring.size() == scan.size());
+  RingOrder rings = order_by_ring(scan);
+  const std::size_t ring_count = rings.begin.size() - 1;
+  std::vector<RingFeatures> of_ring(ring_count);
+  tbb::parallel_for(std::size_t{0}, ring_count, [&](std::size_t r) {
+    const std::span ring(rings.order.begin() + rings.begin[r],
+                         rings.order.begin() + rings.begin[r + 1]);
+    of_ring[r] = features_of_ring(scan, ring, config);
+  });
+  std::vector<std::uint32_t> edges;
+  std::vector<std::uint32_t> planes;
+  for (const RingFeatures& ring : of_ring) {
+    edges.insert(edges.end(), ring.edges.begin(), ring.edges.end());
+    planes.insert(planes.end(), ring.planes.begin(), ring.planes.end());
+  }
+  Features features;
+  features.edges = thin(scan.points_lidar, edges, config.edge_spacing_m);
+  features.planes = thin(scan.points_lidar, planes, config.map_plane_spacing_m);
+  features.registered_planes = thin(scan.points_lidar, features.planes, config.plane_spacing_m);
+  return features;
+}
+
+}  // namespace stillmap

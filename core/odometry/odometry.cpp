@@ -1,0 +1,278 @@
+#include "core/odometry/odometry.hpp"
+
+#include <tbb/parallel_invoke.h>
+
+#include <cassert>
+#include <stdexcept>
+#include <utility>
+
+#include "core/odometry/features.hpp"
+#include "core/odometry/motion_split.hpp"
+#include "core/odometry/objects.hpp"
+#include "core/odometry/past_views.hpp"
+#include "core/odometry/registration.hpp"
+#include "core/odometry/se3.hpp"
+
+namespace stillmap {
+namespace {
+
+/// A gap in time beyond which the last velocity says nothing any more [s].
+constexpr double max_prediction_s = 1.0;
+/// Reach of the coarse alignment [m]: 30 m/s at 10 scans a second.
+constexpr double coarse_reach_m = 3.0;
+constexpr double coarse_robust_scale_m = 0.5;
+/// After so many scans without a pose the local map starts anew where the prediction is.
+constexpr int max_lost_scans = 10;
+
+double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
+
+}  // namespace
+
+namespace {
+
+/// The paper's "no weighting" is exactly that.
+OdometryConfig without_unused_kernel(OdometryConfig config) {
+  if (config.weighting == Weighting::none) config.registration.robust_scale_m = 0.0;
+  return config;
+}
+
+}  // namespace
+
+struct Odometry::State {
+  State(const OdometryConfig& odometry_config, const SensorModel& sensor_model)
+      : config(without_unused_kernel(odometry_config)),
+        sensor(sensor_model),
+        map{FeatureMap(odometry_config.local_map), FeatureMap(odometry_config.local_map)},
+        past(odometry_config.motion) {}
+
+  [[nodiscard]] std::vector<ObjectVerdict> judge(const Scan& scan, const PointLabels& labels,
+                                                 const Objects& objects,
+                                                 const Eigen::Isometry3d& T_map_lidar) const;
+  /// Whether the last velocity says where a scan of this time is.
+  [[nodiscard]] bool knows_velocity(std::int64_t stamp_ns) const;
+  /// A scan without a pose stays out of the local map, unless the map is given up for good.
+  [[nodiscard]] bool may_extend_map(OdometryHealth health);
+  [[nodiscard]] OdometryResult registered(const FeatureSets& features,
+                                          Eigen::Isometry3d T_map_lidar_predicted,
+                                          bool prediction_is_good) const;
+  void remember(const Scan& scan, const PointLabels& labels, const Eigen::Isometry3d& T_map_lidar);
+
+  OdometryConfig config;
+  SensorModel sensor;
+  LocalMap map;
+  PastViews past;
+  bool started = false;
+  /// Scans in a row that could not be registered.
+  int lost_scans = 0;
+  std::int64_t last_stamp_ns = 0;
+  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+  /// The last scan's features, to align the next one coarsely where no velocity is known.
+  FeatureSets last_features;
+  /// Motion from the last scan but one to the last, and the time between them.
+  Eigen::Isometry3d last_motion = Eigen::Isometry3d::Identity();
+  double last_interval_s = 0.0;
+};
+
+namespace {
+
+/// Registration that finds a motion of up to `coarse_reach_m` from no idea of it. Eq. (10) has no
+/// weight for residuals above 1 m: the robust kernel alone decides.
+OdometryConfig coarse(OdometryConfig config) {
+  config.weighting = Weighting::none;
+  config.registration.robust_scale_m = coarse_robust_scale_m;
+  config.registration.max_neighbour_distance_m = coarse_reach_m;
+  config.registration.max_residual_m = coarse_reach_m;
+  config.registration.max_iterations = 50;
+  config.registration.step_translation_m = 0.01;
+  config.registration.step_rotation_rad = 0.001;
+  return config;
+}
+
+LocalMap coarse_map(const FeatureSets& features, const Eigen::Isometry3d& T_map_lidar) {
+  const LocalMapConfig config{
+      .voxel_size_m = coarse_reach_m, .max_points_per_voxel = 32, .min_spacing_m = 0.5};
+  LocalMap map{FeatureMap(config), FeatureMap(config)};
+  const Eigen::Isometry3f T = T_map_lidar.cast<float>();
+  const auto fill = [&](const std::vector<FeaturePoint>& from, FeatureMap& to) {
+    std::vector<LabelledPoint> points;
+    points.reserve(from.size());
+    for (const FeaturePoint& f : from) points.push_back({T * f.position_lidar, f.label});
+    to.insert(points);
+  };
+  fill(features.edges, map.edges);
+  fill(features.planes, map.planes);
+  return map;
+}
+
+}  // namespace
+
+std::vector<ObjectVerdict> Odometry::State::judge(const Scan& scan, const PointLabels& labels,
+                                                  const Objects& objects,
+                                                  const Eigen::Isometry3d& T_map_lidar) const {
+  if (!config.motion.use_past_views || objects.count == 0)
+    return std::vector<ObjectVerdict>(objects.count, ObjectVerdict::undecided);
+  const RangeView now(scan, labels.classes, sensor, T_map_lidar);
+  return judge_objects(scan, objects, T_map_lidar, past, now, config.motion);
+}
+
+bool Odometry::State::knows_velocity(std::int64_t stamp_ns) const {
+  return last_interval_s > 0.0 && lost_scans == 0 &&
+         seconds(stamp_ns - last_stamp_ns) <= max_prediction_s;
+}
+
+bool Odometry::State::may_extend_map(OdometryHealth health) {
+  lost_scans = health == OdometryHealth::lost ? lost_scans + 1 : 0;
+  if (lost_scans < max_lost_scans) return lost_scans == 0;
+  map.edges.clear();
+  map.planes.clear();
+  lost_scans = 0;
+  return true;
+}
+
+OdometryResult Odometry::State::registered(const FeatureSets& features,
+                                           Eigen::Isometry3d T_map_lidar_predicted,
+                                           bool prediction_is_good) const {
+  if (!started) return OdometryResult{.T_map_lidar = T_map_lidar_predicted};
+  if (!prediction_is_good) {
+    const LocalMap last_scan = coarse_map(last_features, T_map_lidar);
+    T_map_lidar_predicted =
+        register_features(features, last_scan, T_map_lidar_predicted, coarse(config)).T_map_lidar;
+  }
+  return register_features(features, map, T_map_lidar_predicted, config);
+}
+
+void Odometry::State::remember(const Scan& scan, const PointLabels& labels,
+                               const Eigen::Isometry3d& T_map_lidar_now) {
+  if (started) {
+    last_motion = T_map_lidar.inverse() * T_map_lidar_now;
+    last_interval_s = seconds(scan.stamp_ns - last_stamp_ns);
+  }
+  started = true;
+  last_stamp_ns = scan.stamp_ns;
+  T_map_lidar = T_map_lidar_now;
+  if (labels.empty() || !config.motion.use_past_views) return;
+  RangeView now(scan, labels.classes, sensor, T_map_lidar);
+  const auto is_gone = [&](const Eigen::Vector3f& p_map) { return past.sees_through(now, p_map); };
+  map.edges.remove_movable_if(is_gone);
+  map.planes.remove_movable_if(is_gone);
+  past.add(std::move(now));
+}
+
+namespace {
+
+SemanticClass label_of(const PointLabels& labels, std::size_t i) {
+  return labels.empty() ? SemanticClass::unlabeled : labels.classes[i];
+}
+
+/// Points that registration and local map may use: with semantics, a movable point must belong to
+/// an object that past views have shown parked (or, without past views, pass eq. (9)).
+class UsablePoints {
+ public:
+  UsablePoints(const OdometryConfig& config, const Objects& objects,
+               const std::vector<ObjectVerdict>& verdicts)
+      : semantic_(config.weighting == Weighting::semantic),
+        past_views_(config.motion.use_past_views),
+        objects_(objects),
+        verdicts_(verdicts) {}
+
+  [[nodiscard]] bool operator()(std::size_t i) const {
+    const std::int32_t object = objects_.of_point[i];
+    if (!semantic_ || object == Objects::none || !past_views_) return true;
+    return verdicts_[static_cast<std::size_t>(object)] == ObjectVerdict::parked;
+  }
+  [[nodiscard]] bool operator()(std::size_t i, Motion motion) const {
+    return (*this)(i) && !(semantic_ && motion == Motion::highly_dynamic);
+  }
+
+ private:
+  bool semantic_;
+  bool past_views_;
+  const Objects& objects_;
+  const std::vector<ObjectVerdict>& verdicts_;
+};
+
+FeatureSets feature_sets(const Scan& scan, const PointLabels& labels, const Features& features,
+                         const UsablePoints& usable) {
+  FeatureSets sets;
+  const auto collect = [&](const std::vector<std::uint32_t>& from, std::vector<FeaturePoint>& to) {
+    to.reserve(from.size());
+    for (const std::uint32_t i : from)
+      if (usable(i)) to.push_back({scan.points_lidar[i], label_of(labels, i)});
+  };
+  collect(features.edges, sets.edges);
+  collect(features.registered_planes, sets.planes);
+  return sets;
+}
+
+void extend_local_map(LocalMap& map, const Scan& scan, const PointLabels& labels,
+                      const Features& features, const UsablePoints& usable,
+                      const std::vector<Motion>& motion, const Eigen::Isometry3d& T_map_lidar) {
+  const Eigen::Isometry3f T = T_map_lidar.cast<float>();
+  const auto extend = [&](const std::vector<std::uint32_t>& from, FeatureMap& to) {
+    std::vector<LabelledPoint> points;
+    points.reserve(from.size());
+    for (const std::uint32_t i : from)
+      if (usable(i, motion[i])) points.push_back({T * scan.points_lidar[i], label_of(labels, i)});
+    to.insert(points);
+    to.forget_far_from(T.translation());
+  };
+  tbb::parallel_invoke([&] { extend(features.edges, map.edges); },
+                       [&] { extend(features.planes, map.planes); });
+}
+
+}  // namespace
+
+Odometry::Odometry(const OdometryConfig& config, const SensorModel& sensor)
+    : state_(std::make_unique<State>(config, sensor)) {
+  if (const std::string faults = config.faults(); !faults.empty())
+    throw std::invalid_argument(faults);
+}
+
+Odometry::~Odometry() = default;
+Odometry::Odometry(Odometry&&) noexcept = default;
+Odometry& Odometry::operator=(Odometry&&) noexcept = default;
+
+Eigen::Isometry3d Odometry::predict(std::int64_t stamp_ns) const {
+  return state_->T_map_lidar * motion_during(seconds(stamp_ns - state_->last_stamp_ns));
+}
+
+Eigen::Isometry3d Odometry::motion_during(double period_s) const {
+  if (state_->last_interval_s <= 0.0 || period_s <= 0.0 || period_s > max_prediction_s)
+    return Eigen::Isometry3d::Identity();
+  return scaled_motion(state_->last_motion, period_s / state_->last_interval_s);
+}
+
+Odometry::Step Odometry::add(const Scan& scan, const PointLabels& labels,
+                             const std::optional<Eigen::Isometry3d>& T_map_lidar_prior) {
+  assert(labels.empty() || labels.classes.size() == scan.size());
+  State& state = *state_;
+  const OdometryConfig& config = state.config;
+  const Eigen::Isometry3d T_map_lidar_predicted =
+      T_map_lidar_prior.value_or(predict(scan.stamp_ns));
+
+  // Features F_e and F_p, without those on objects that may be moving.
+  const Features features = extract_features(scan, config.features);
+  const Objects objects =
+      find_objects(scan.points_lidar, labels.classes, config.motion.object_gap_m);
+  const auto verdicts = state.judge(scan, labels, objects, T_map_lidar_predicted);
+  const UsablePoints usable(config, objects, verdicts);
+  FeatureSets sets = feature_sets(scan, labels, features, usable);
+
+  // Pose against the local map, eq. (5)-(13).
+  Step step;
+  const bool prediction_is_good = T_map_lidar_prior || state.knows_velocity(scan.stamp_ns);
+  step.result = state.registered(sets, T_map_lidar_predicted, prediction_is_good);
+  const Eigen::Isometry3d& T_map_lidar = step.result.T_map_lidar;
+
+  // What moves stays out of the local map, eq. (9) and c > c_th.
+  step.motion = split_by_motion(scan, labels, objects, verdicts, T_map_lidar, state.map, config);
+  if (state.may_extend_map(step.result.health))
+    extend_local_map(state.map, scan, labels, features, usable, step.motion, T_map_lidar);
+  state.remember(scan, labels, T_map_lidar);
+  state.last_features = std::move(sets);
+  return step;
+}
+
+void Odometry::reset() { *state_ = State(state_->config, state_->sensor); }
+
+}  // namespace stillmap

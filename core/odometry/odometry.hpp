@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/lidar/labelled_scan.hpp"
+#include "core/lidar/sensor_model.hpp"
+#include "core/odometry/odometry_config.hpp"
+#include "core/odometry/odometry_state.hpp"
+
+namespace stillmap {
+
+/// Lidar odometry of the paper, II-C: features, correspondences in the local map, weighted
+/// Gauss-Newton; and the local map that it registers against.
+class Odometry {
+ public:
+  /// Throws std::invalid_argument with `config.faults()`.
+  Odometry(const OdometryConfig& config, const SensorModel& sensor);
+  ~Odometry();
+  Odometry(Odometry&&) noexcept;
+  Odometry& operator=(Odometry&&) noexcept;
+
+  /// Motion that the next scan is expected to bring: the last one again (constant velocity), scaled
+  /// to the time that passed.
+  [[nodiscard]] Eigen::Isometry3d predict(std::int64_t stamp_ns) const;
+
+  /// Motion of the lidar during `period_s` at the last velocity, for motion compensation.
+  [[nodiscard]] Eigen::Isometry3d motion_during(double period_s) const;
+
+  struct Step {
+    OdometryResult result;
+    /// Motion of every point of the scan (II-C.2).
+    std::vector<Motion> motion;
+  };
+
+  /// Registers a prepared scan, splits its points by motion, and adds it to the local map.
+  /// `scan.ring` must be known.
+  [[nodiscard]] Step add(const Scan& scan, const PointLabels& labels,
+                         const std::optional<Eigen::Isometry3d>& T_map_lidar_prior);
+
+  /// Forgets poses and local map.
+  void reset();
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace stillmap

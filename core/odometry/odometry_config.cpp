@@ -1,0 +1,91 @@
+#include "core/odometry/odometry_config.hpp"
+
+#include <sstream>
+
+#include "core/odometry/feature_map.hpp"
+
+namespace stillmap {
+namespace {
+
+/// Collects faults as "field = value: must be ..." lines.
+class FaultList {
+ public:
+  void require(bool holds, const char* field, double value, const char* must) {
+    if (!holds) text_ << field << " = " << value << ": must be " << must << '\n';
+  }
+  [[nodiscard]] std::string text() const { return text_.str(); }
+
+ private:
+  std::ostringstream text_;
+};
+
+void check(const FeatureConfig& c, FaultList& faults) {
+  faults.require(c.edge_curvature_m2 > 0.0, "features.edge_curvature_m2", c.edge_curvature_m2,
+                 "above 0");
+  faults.require(c.plane_curvature_m2 > 0.0, "features.plane_curvature_m2", c.plane_curvature_m2,
+                 "above 0");
+  faults.require(c.edges_per_sector >= 0, "features.edges_per_sector", c.edges_per_sector,
+                 "0 or more");
+  faults.require(c.edge_spacing_m > 0.0, "features.edge_spacing_m", c.edge_spacing_m, "above 0");
+  faults.require(c.map_plane_spacing_m > 0.0, "features.map_plane_spacing_m", c.map_plane_spacing_m,
+                 "above 0");
+  faults.require(c.plane_spacing_m > 0.0, "features.plane_spacing_m", c.plane_spacing_m, "above 0");
+}
+
+void check(const LocalMapConfig& c, FaultList& faults) {
+  faults.require(c.voxel_size_m > 0.0, "local_map.voxel_size_m", c.voxel_size_m, "above 0");
+  faults.require(c.max_points_per_voxel >= 1 && c.max_points_per_voxel <= 32,
+                 "local_map.max_points_per_voxel", c.max_points_per_voxel, "within 1..32");
+  faults.require(c.min_spacing_m >= 0.0, "local_map.min_spacing_m", c.min_spacing_m, "0 or more");
+  faults.require(c.radius_m > 0.0, "local_map.radius_m", c.radius_m, "above 0");
+}
+
+void check(const RegistrationConfig& c, const LocalMapConfig& map, FaultList& faults) {
+  faults.require(c.neighbours >= 5 && c.neighbours <= Neighbours::capacity,
+                 "registration.neighbours", c.neighbours, "within 5..16");
+  faults.require(c.max_neighbour_distance_m > 0.0 && c.max_neighbour_distance_m <= map.voxel_size_m,
+                 "registration.max_neighbour_distance_m", c.max_neighbour_distance_m,
+                 "above 0 and at most local_map.voxel_size_m");
+  faults.require(c.max_residual_m > 0.0 && c.max_residual_m <= 1.0, "registration.max_residual_m",
+                 c.max_residual_m, "above 0 and at most 1");
+  faults.require(c.max_iterations >= 1, "registration.max_iterations", c.max_iterations,
+                 "1 or more");
+  faults.require(c.step_translation_m > 0.0, "registration.step_translation_m",
+                 c.step_translation_m, "above 0");
+  faults.require(c.step_rotation_rad > 0.0, "registration.step_rotation_rad", c.step_rotation_rad,
+                 "above 0");
+  faults.require(c.robust_scale_m >= 0.0, "registration.robust_scale_m", c.robust_scale_m,
+                 "0 or more");
+  faults.require(c.min_correspondences >= 6, "registration.min_correspondences",
+                 c.min_correspondences, "6 or more");
+  faults.require(c.min_observability >= 0.0 && c.min_observability < 1.0,
+                 "registration.min_observability", c.min_observability, "within 0..1");
+}
+
+void check(const MotionConfig& c, FaultList& faults) {
+  faults.require(c.inconsistency_threshold >= 0.0 && c.inconsistency_threshold <= 1.0,
+                 "motion.inconsistency_threshold", c.inconsistency_threshold, "within 0..1");
+  faults.require(c.past_views >= 1, "motion.past_views", c.past_views, "1 or more");
+  faults.require(c.past_view_interval >= 1, "motion.past_view_interval", c.past_view_interval,
+                 "1 or more");
+  faults.require(c.free_margin_m > 0.0, "motion.free_margin_m", c.free_margin_m, "above 0");
+  faults.require(c.free_margin_share >= 0.0, "motion.free_margin_share", c.free_margin_share,
+                 "0 or more");
+  faults.require(c.moving_share > 0.0 && c.moving_share <= 1.0, "motion.moving_share",
+                 c.moving_share, "above 0 and at most 1");
+  faults.require(c.object_gap_m > 0.0, "motion.object_gap_m", c.object_gap_m, "above 0");
+}
+
+}  // namespace
+
+std::string OdometryConfig::faults() const {
+  FaultList faults;
+  faults.require(alpha >= 0.0 && alpha <= 1.0, "alpha", alpha, "within 0..1");
+  check(features, faults);
+  check(local_map, faults);
+  check(registration, local_map, faults);
+  check(motion, faults);
+  return faults.text();
+}
+
+}  // namespace stillmap

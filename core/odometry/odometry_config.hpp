@@ -1,0 +1,100 @@
+#pragma once
+
+#include <string>
+
+namespace stillmap {
+
+/// Rows of the paper's Table I: what a correspondence counts.
+enum class Weighting {
+  /// w = 1.
+  none,
+  /// w = 1 - d.
+  geometric,
+  /// w = 1 - alpha d - beta c, eq. (10).
+  semantic,
+};
+
+/// Edge and plane points of a ring (LOAM V-A).
+struct FeatureConfig {
+  /// |sum over 5 neighbours to each side of (p_j - p_i)|^2 above which a point is an edge [m^2].
+  /// Range noise of 2 cm alone makes 0.044 on a plane: A-LOAM's 0.1 takes noise for edges, whose
+  /// "lines" follow the rings on the road and so drag the pose along with the lidar. 1.0 is five
+  /// standard deviations.
+  double edge_curvature_m2 = 1.0;
+  /// The same sum below which a point lies on a plane [m^2].
+  double plane_curvature_m2 = 0.3;
+  /// Edge points taken from each of the six sectors of a ring, sharpest first.
+  int edges_per_sector = 20;
+  /// At most one edge point in a cube of this size [m].
+  double edge_spacing_m = 0.5;
+  /// At most one plane point in a cube of this size enters the local map [m].
+  double map_plane_spacing_m = 0.5;
+  /// At most one plane point in a cube of this size is registered [m].
+  double plane_spacing_m = 1.0;
+};
+
+/// The points that scans register against.
+struct LocalMapConfig {
+  /// Edge of a hash voxel [m]; neighbours are found in the 27 voxels round a point.
+  double voxel_size_m = 1.0;
+  int max_points_per_voxel = 20;
+  /// Points nearer than this to one that is there already bring nothing new [m].
+  double min_spacing_m = 0.2;
+  /// Voxels farther from the lidar than this are forgotten [m].
+  double radius_m = 100.0;
+};
+
+struct RegistrationConfig {
+  /// N of eq. (5): map points that make a line or a plane.
+  int neighbours = 5;
+  /// A line or plane is fitted to neighbours within this distance [m].
+  double max_neighbour_distance_m = 1.0;
+  /// Correspondences with a larger residual are discarded [m]; the paper's [0, 1].
+  double max_residual_m = 1.0;
+  int max_iterations = 20;
+  /// Converged when a step is below both.
+  double step_translation_m = 0.001;
+  double step_rotation_rad = 0.0001;
+  /// Scale of the Geman-McClure kernel on top of the weights of eq. (10), not in the paper; 0
+  /// switches it off. Weighting::none goes without it [m].
+  double robust_scale_m = 0.2;
+  /// Fewer correspondences than this give no pose.
+  int min_correspondences = 50;
+  /// A direction is degenerate when one metre (or radian, times the scan's mean range) along it
+  /// changes the mean squared residual by less than this share.
+  double min_observability = 0.005;
+};
+
+/// What moves (paper II-C.2, and past views).
+struct MotionConfig {
+  /// Semantic inconsistency, eq. (9), above which a movable point can be highly dynamic.
+  double inconsistency_threshold = 0.6;
+  /// Take movable objects out whose place an earlier scan saw free; not in the paper.
+  bool use_past_views = true;
+  /// Earlier scans that are kept for it, and how many scans lie between two of them.
+  int past_views = 4;
+  int past_view_interval = 2;
+  /// An earlier ray must have gone this much farther than the point to have seen it free [m], and
+  /// this share of the range.
+  double free_margin_m = 0.4;
+  double free_margin_share = 0.01;
+  /// Share of an object's points that stand in free space above which all of it moves.
+  double moving_share = 0.2;
+  /// Movable points nearer than this to each other are one object [m].
+  double object_gap_m = 0.5;
+};
+
+struct OdometryConfig {
+  Weighting weighting = Weighting::semantic;
+  /// alpha of eq. (10), the weight of the distance; beta = 1 - alpha weighs the semantics.
+  double alpha = 0.5;
+  FeatureConfig features;
+  LocalMapConfig local_map;
+  RegistrationConfig registration;
+  MotionConfig motion;
+
+  /// Every fault in words, one a line; empty when the configuration can be used.
+  [[nodiscard]] std::string faults() const;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+
+namespace stillmap {
+
+/// How far a pose can be trusted.
+enum class OdometryHealth : std::uint8_t {
+  /// First scan: there was no map to register against.
+  initialised = 0,
+  good = 1,
+  /// Some direction of motion is not observable in this scan; the prediction fills it.
+  degenerate = 2,
+  /// Too few correspondences: the pose is the prediction.
+  lost = 3,
+};
+
+/// What registration says of one scan.
+struct OdometryResult {
+  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+  /// Covariance of the pose error xi = (translation [m], rotation [rad]) in the map frame, from
+  /// the normal equations of eq. (13).
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+  OdometryHealth health = OdometryHealth::initialised;
+  bool converged = false;
+  int iterations = 0;
+  int edge_correspondences = 0;
+  int plane_correspondences = 0;
+  /// Root mean square of the weighted residuals after the last iteration [m].
+  double rms_residual_m = 0.0;
+};
+
+[[nodiscard]] constexpr const char* name(OdometryHealth health) {
+  switch (health) {
+    case OdometryHealth::initialised:
+      return "initialised";
+    case OdometryHealth::good:
+      return "good";
+    case OdometryHealth::degenerate:
+      return "degenerate";
+    case OdometryHealth::lost:
+      return "lost";
+  }
+  return "unknown";
+}
+
+}  // namespace stillmap

@@ -1,0 +1,112 @@
+#include "core/odometry/past_views.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace stillmap {
+namespace {
+
+/// Finer columns would leave pixels empty between the shots of a turning lidar.
+constexpr int max_columns = 1024;
+/// A surface is the same one within this distance along the ray [m].
+constexpr float same_surface_m = 0.3F;
+/// What stood farther before the point than this was another object [m].
+constexpr float max_gone_gap_m = 3.0F;
+
+}  // namespace
+
+RangeView::RangeView(const Scan& scan, std::span<const SemanticClass> labels,
+                     const SensorModel& sensor, const Eigen::Isometry3d& T_map_lidar)
+    : rows_(sensor.rings),
+      columns_(std::min(sensor.columns, max_columns)),
+      fov_up_(static_cast<float>(sensor.fov_up)),
+      rows_per_rad_(static_cast<float>(sensor.rings / (sensor.fov_up - sensor.fov_down))),
+      T_lidar_map_(T_map_lidar.inverse().cast<float>()),
+      origin_map_(T_map_lidar.translation().cast<float>()),
+      pixels_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_), 0.0F) {
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const float range = scan.points_lidar[i].norm();
+    const auto pixel = pixel_of(scan.points_lidar[i], range);
+    if (!pixel) continue;
+    float& old = pixels_[*pixel];
+    if (old != 0.0F && std::abs(old) <= range) continue;
+    old = !labels.empty() && is_movable(labels[i]) ? range : -range;
+  }
+}
+
+std::optional<std::size_t> RangeView::pixel_of(const Eigen::Vector3f& point_lidar,
+                                               float range_m) const {
+  if (range_m <= 0.0F) return std::nullopt;
+  const float elevation = std::asin(std::clamp(point_lidar.z() / range_m, -1.0F, 1.0F));
+  const float row = (fov_up_ - elevation) * rows_per_rad_;
+  // Half a row of slack: the outermost beams look along the edge of the field of view.
+  if (row < -0.5F || row >= static_cast<float>(rows_) + 0.5F) return std::nullopt;
+  const float turn =
+      0.5F * (1.0F - std::atan2(point_lidar.y(), point_lidar.x()) * std::numbers::inv_pi_v<float>);
+  const int r = std::clamp(static_cast<int>(row), 0, rows_ - 1);
+  const int c = std::clamp(static_cast<int>(turn * static_cast<float>(columns_)), 0, columns_ - 1);
+  return static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) +
+         static_cast<std::size_t>(c);
+}
+
+std::optional<RangeView::Sight> RangeView::look_at(const Eigen::Vector3f& point_map) const {
+  const Eigen::Vector3f point_lidar = T_lidar_map_ * point_map;
+  Sight sight{};
+  sight.point_range_m = point_lidar.norm();
+  const auto pixel = pixel_of(point_lidar, sight.point_range_m);
+  if (!pixel || pixels_[*pixel] == 0.0F) return std::nullopt;
+  sight.range_m = std::abs(pixels_[*pixel]);
+  sight.movable = pixels_[*pixel] > 0.0F;
+  sight.nearest_m = sight.range_m;
+  sight.direction_map = (point_map - origin_map_) / sight.point_range_m;
+  const int row = static_cast<int>(*pixel) / columns_;
+  const int column = static_cast<int>(*pixel) % columns_;
+  for (int r = std::max(0, row - 1); r <= std::min(rows_ - 1, row + 1); ++r) {
+    for (int step = -1; step <= 1; ++step) {
+      const int c = (column + step + columns_) % columns_;
+      const float range = std::abs(pixels_[static_cast<std::size_t>(r * columns_ + c)]);
+      if (range > 0.0F) sight.nearest_m = std::min(sight.nearest_m, range);
+    }
+  }
+  return sight;
+}
+
+float PastViews::margin(float range_m) const {
+  return static_cast<float>(config_.free_margin_m) +
+         static_cast<float>(config_.free_margin_share) * range_m;
+}
+
+std::size_t PastViews::size() const {
+  return views_.size() / static_cast<std::size_t>(config_.past_view_interval);
+}
+
+PastSight PastViews::sight(std::size_t age, const Eigen::Vector3f& point_map,
+                           const RangeView& now) const {
+  const auto interval = static_cast<std::size_t>(config_.past_view_interval);
+  const RangeView& past = views_[views_.size() - (age + 1) * interval];
+  const auto sight = past.look_at(point_map);
+  if (!sight) return PastSight::unknown;
+  if (sight->nearest_m > sight->point_range_m + margin(sight->point_range_m))
+    return PastSight::free;
+  if (!sight->movable) return PastSight::unknown;
+  if (std::abs(sight->range_m - sight->point_range_m) < same_surface_m) return PastSight::same;
+  const float gap = sight->point_range_m - sight->range_m;
+  if (gap < margin(sight->range_m) || gap > max_gone_gap_m) return PastSight::unknown;
+  const Eigen::Vector3f surface_map = past.origin_map() + sight->range_m * sight->direction_map;
+  return sees_through(now, surface_map) ? PastSight::gone_before_it : PastSight::unknown;
+}
+
+bool PastViews::sees_through(const RangeView& view, const Eigen::Vector3f& point_map) const {
+  const auto sight = view.look_at(point_map);
+  return sight && sight->nearest_m > sight->point_range_m + margin(sight->point_range_m);
+}
+
+void PastViews::add(RangeView view) {
+  views_.push_back(std::move(view));
+  const auto kept = static_cast<std::size_t>(config_.past_views * config_.past_view_interval);
+  if (views_.size() > kept) views_.pop_front();
+}
+
+}  // namespace stillmap

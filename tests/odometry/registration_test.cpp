@@ -1,0 +1,173 @@
+#include "core/odometry/registration.hpp"
+
+#include <gtest/gtest.h>
+#include <tbb/global_control.h>
+
+#include <Eigen/Eigenvalues>
+
+#include "tests/odometry/poses.hpp"
+#include "tests/odometry/surface_world.hpp"
+
+namespace stillmap {
+namespace {
+
+using test::corridor;
+using test::courtyard;
+using test::expect_near;
+using test::level_pose;
+using test::SurfaceWorld;
+
+const Eigen::Isometry3d T_true = level_pose(0.7, -0.4, 0.1);
+
+PoseTangent tangent(const Eigen::Vector3d& translation, const Eigen::Vector3d& rotation) {
+  PoseTangent xi;
+  xi.head<3>() = translation;
+  xi.tail<3>() = rotation;
+  return xi;
+}
+
+OdometryConfig with_weighting(Weighting weighting) {
+  OdometryConfig config;
+  config.weighting = weighting;
+  return config;
+}
+
+class RegisterInCourtyard : public ::testing::TestWithParam<Weighting> {
+ protected:
+  const SurfaceWorld world_ = courtyard();
+  const LocalMap map_ = world_.local_map();
+  const FeatureSets features_ = world_.features(T_true, 0.01, 1);
+
+  void expect_converges_from(const Eigen::Isometry3d& start) const {
+    const auto result = register_features(features_, map_, start, with_weighting(GetParam()));
+    EXPECT_EQ(result.health, OdometryHealth::good);
+    EXPECT_TRUE(result.converged);
+    EXPECT_GT(result.edge_correspondences, 20);
+    EXPECT_GT(result.plane_correspondences, 500);
+    EXPECT_LE(result.rms_residual_m, 0.03);
+    expect_near(result.T_map_lidar, T_true, 0.01, 0.001);
+  }
+};
+
+TEST_P(RegisterInCourtyard, StaysAtTheTruth) { expect_converges_from(T_true); }
+
+TEST_P(RegisterInCourtyard, ComesFromBehindAndFromAhead) {
+  for (const double ahead : {-0.4, 0.4})
+    expect_converges_from(T_true * Eigen::Translation3d(ahead, 0.0, 0.0));
+}
+
+TEST_P(RegisterInCourtyard, ComesFromAnyPerturbedStart) {
+  std::mt19937 random(5);
+  for (int k = 0; k < 10; ++k)
+    expect_converges_from(boxplus(
+        T_true, tangent(test::random_vector(random, 0.25), test::random_vector(random, 0.02))));
+}
+
+TEST_P(RegisterInCourtyard, IsTheSameOnOneThreadAndOnTwo) {
+  const auto result_on = [&](std::size_t threads) {
+    const tbb::global_control limit(tbb::global_control::max_allowed_parallelism, threads);
+    return register_features(features_, map_, level_pose(0.5, -0.3, 0.12),
+                             with_weighting(GetParam()));
+  };
+  const OdometryResult one = result_on(1);
+  const OdometryResult two = result_on(2);
+  EXPECT_EQ(one.T_map_lidar.matrix(), two.T_map_lidar.matrix());
+  EXPECT_EQ(one.covariance, two.covariance);
+  EXPECT_EQ(one.iterations, two.iterations);
+}
+
+INSTANTIATE_TEST_SUITE_P(AllWeightings, RegisterInCourtyard,
+                         ::testing::Values(Weighting::none, Weighting::geometric,
+                                           Weighting::semantic));
+
+TEST(RegisterFeatures, CorridorIsDegenerateAndKeepsThePredictionAlongIt) {
+  const LocalMap map = corridor(80.0).local_map();
+  const FeatureSets features = corridor(40.0).features(level_pose(0.0, 0.0, 0.0), 0.01, 2);
+  const Eigen::Isometry3d predicted = level_pose(0.6, 0.2, 0.02);
+  const OdometryResult result = register_features(features, map, predicted, OdometryConfig{});
+  EXPECT_EQ(result.health, OdometryHealth::degenerate);
+  EXPECT_NEAR(result.T_map_lidar.translation().x(), 0.6, 0.02);
+  EXPECT_NEAR(result.T_map_lidar.translation().y(), 0.0, 0.01);
+  EXPECT_NEAR(result.T_map_lidar.translation().z(), 0.0, 0.01);
+  EXPECT_LE(test::rotation_error(result.T_map_lidar, Eigen::Isometry3d::Identity()), 0.001);
+  // The covariance says so too.
+  EXPECT_GT(result.covariance(0, 0), 100.0 * result.covariance(1, 1));
+}
+
+TEST(RegisterFeatures, TooFewCorrespondencesAreLostAtThePrediction) {
+  const SurfaceWorld world = courtyard();
+  FeatureSets few = world.features(T_true, 0.01, 3);
+  few.edges.resize(20);
+  few.planes.resize(20);
+  const Eigen::Isometry3d predicted = level_pose(0.5, -0.3, 0.08);
+  const LocalMapConfig empty;
+  const auto lost = [&](const FeatureSets& features, const LocalMap& map) {
+    const OdometryResult result = register_features(features, map, predicted, OdometryConfig{});
+    EXPECT_EQ(result.health, OdometryHealth::lost);
+    EXPECT_FALSE(result.converged);
+    EXPECT_EQ(result.T_map_lidar.matrix(), predicted.matrix());
+  };
+  lost(few, world.local_map());
+  lost(FeatureSets{}, world.local_map());
+  lost(world.features(T_true, 0.01, 3), LocalMap{FeatureMap(empty), FeatureMap(empty)});
+}
+
+TEST(RegisterFeatures, CovarianceIsPositiveDefiniteAndGrowsWithTheNoise) {
+  const SurfaceWorld world = courtyard();
+  const LocalMap map = world.local_map();
+  double last_trace = 0.0;
+  for (const double noise_m : {0.01, 0.03, 0.09}) {
+    const OdometryResult result =
+        register_features(world.features(T_true, noise_m, 4), map, T_true, OdometryConfig{});
+    ASSERT_EQ(result.health, OdometryHealth::good);
+    const Eigen::Matrix<double, 6, 6>& covariance = result.covariance;
+    EXPECT_LE((covariance - covariance.transpose()).norm(), 1e-9 * covariance.norm());
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix<double, 6, 6>> eigen(covariance);
+    EXPECT_GT(eigen.eigenvalues().minCoeff(), 0.0);
+    EXPECT_GT(covariance.trace(), 2.0 * last_trace);
+    last_trace = covariance.trace();
+  }
+}
+
+/// Fences across the corridor that the map knows, where the scan sees cars' ends that have moved
+/// on by 0.3 m: a third of what tells the position along x.
+struct MovedThird {
+  SurfaceWorld map_world = courtyard();
+  SurfaceWorld scan_world = courtyard();
+
+  MovedThird() {
+    for (const double x : {-8.0, 0.0, 8.0}) {
+      const test::Patch fence{
+          {x, -5.0, -1.5}, {0.0, 10.0, 0.0}, {0.0, 0.0, 3.5}, SemanticClass::fence};
+      map_world.planes.push_back(fence);
+      test::Patch car = fence;
+      car.corner_map.x() += 0.3;
+      car.label = SemanticClass::car;
+      scan_world.planes.push_back(car);
+    }
+  }
+
+  [[nodiscard]] double error_m(const OdometryConfig& config) const {
+    const auto result = register_features(scan_world.features(T_true, 0.01, 6),
+                                          map_world.local_map(), T_true, config);
+    EXPECT_NE(result.health, OdometryHealth::lost);
+    return test::translation_error(result.T_map_lidar, T_true);
+  }
+};
+
+TEST(RegisterFeatures, SemanticsHoldAgainstAMovedThirdOfTheScene) {
+  const MovedThird scene;
+  // The paper's weights alone, without the robust kernel.
+  OdometryConfig config = with_weighting(Weighting::none);
+  config.registration.robust_scale_m = 0.0;
+  const double none = scene.error_m(config);
+  EXPECT_GT(none, 0.05) << "without weights the moved third pulls";
+  config.weighting = Weighting::semantic;
+  const double semantic = scene.error_m(config);
+  EXPECT_LT(semantic, 0.6 * none);
+  // As shipped.
+  EXPECT_LT(scene.error_m(OdometryConfig{}), 0.5 * semantic);
+}
+
+}  // namespace
+}  // namespace stillmap
