@@ -1,0 +1,28 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <optional>
+
+#include "core/map/tile.hpp"
+#include "core/odometry/trajectory.hpp"
+
+namespace stillmap {
+
+struct MapPictureOptions {
+  /// Longest side of the map on the picture, without the legend [px].
+  int max_side_px = 1800;
+  /// Drawn beside the estimate; in the map frame [m].
+  std::optional<Trajectory> truth;
+  /// Outline of a query; map frame [m], infinite faces end at the picture's edge.
+  std::optional<Eigen::AlignedBox3d> query_box_map;
+};
+
+/// Writes a PNG of the map from above, x to the right and y up: classes in SemanticKITTI's colours
+/// (voxels without a class by their height above the ground), relief as brightness, the trajectory
+/// from its start (ring) to its end (disc), scale bar and legend. An empty map gives a picture that
+/// says so. Throws std::runtime_error naming the file when it cannot be written.
+void write_map_picture(const std::filesystem::path& file, const MapView& view,
+                       const Trajectory& estimate, const MapPictureOptions& options = {});
+
+}  // namespace stillmap

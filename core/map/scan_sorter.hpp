@@ -1,0 +1,55 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/lidar/labelled_scan.hpp"
+#include "core/map/live_tile.hpp"
+#include "core/map/voxel_grid.hpp"
+
+namespace stillmap {
+
+/// Sorts the points of a scan by the tile they fall into. Keeps its memory from scan to scan.
+class ScanSorter {
+ public:
+  ScanSorter(const VoxelGrid& grid, double max_range_m);
+
+  /// The points of one tile, in the order of the scan.
+  struct Batch {
+    TileId tile;
+    std::span<const TilePoint> points;
+  };
+
+  /// Tiles hit by points that are mapped: finite, within range, not highly dynamic. The batches
+  /// are valid until the next call.
+  [[nodiscard]] std::span<const Batch> sort(const LabelledScan& scan,
+                                            const Eigen::Isometry3d& T_map_lidar);
+
+ private:
+  /// A square of tiles round the lidar; every point within range falls into it.
+  struct Window {
+    TileId first;
+    std::int32_t side = 0;
+  };
+
+  void place_points(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+                    const Window& window);
+  void place_point(std::size_t i, const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+                   const Window& window);
+  void group_by_tile(const Window& window);
+
+  VoxelGrid grid_;
+  double max_range_m_;
+  std::int32_t reach_tiles_;
+  /// Of every point of the scan: its place in the window (`no_tile` when not mapped), its voxel.
+  std::vector<std::uint32_t> window_places_;
+  std::vector<TilePoint> placed_;
+  /// Where each tile of the window begins in `grouped_`, and one past the last.
+  std::vector<std::uint32_t> begins_;
+  std::vector<TilePoint> grouped_;
+  std::vector<Batch> batches_;
+};
+
+}  // namespace stillmap

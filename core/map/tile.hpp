@@ -1,0 +1,97 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <compare>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/lidar/semantic_class.hpp"
+
+namespace stillmap {
+
+/// A square column of the map frame: [x, x+1) * tile_size_m by [y, y+1) * tile_size_m, all heights.
+struct TileId {
+  std::int32_t x = 0;
+  std::int32_t y = 0;
+  friend auto operator<=>(const TileId&, const TileId&) = default;
+};
+
+/// A voxel's place in its tile: column and row from the tile's corner, layer from map height 0.
+struct VoxelIndex {
+  std::uint16_t x = 0;
+  std::uint16_t y = 0;
+  std::int16_t z = 0;
+  friend auto operator<=>(const VoxelIndex&, const VoxelIndex&) = default;
+};
+
+/// Votes for the classes that a voxel was seen as. The strongest few are kept, so that a class can
+/// change its mind at a bounded size.
+class ClassEvidence {
+ public:
+  /// Adds `weight` (a confidence, 0..1) for `label`; the weakest candidate gives way. `unlabeled`
+  /// and weights that are not positive say nothing and change nothing.
+  void add(SemanticClass label, float weight);
+  /// The class with most evidence, `unlabeled` without any.
+  [[nodiscard]] SemanticClass winner() const;
+  /// The winner's share of all evidence kept, 0..1.
+  [[nodiscard]] float share() const;
+
+  struct Vote {
+    SemanticClass label = SemanticClass::unlabeled;
+    float weight = 0.0F;
+    friend bool operator==(const Vote&, const Vote&) = default;
+  };
+  static constexpr std::size_t candidates = 3;
+  /// Older evidence fades once all of it weighs this much: however long a voxel was seen as one
+  /// class, max_total * ln 2 = 139 confident votes in a row for another one turn it (some ten
+  /// scans of a lidar nearby).
+  static constexpr float max_total = 200.0F;
+  std::array<Vote, candidates> votes{};
+  friend bool operator==(const ClassEvidence&, const ClassEvidence&) = default;
+};
+
+struct Voxel {
+  VoxelIndex index;
+  std::uint32_t point_count = 0;
+  /// Mean of the points seen in it, map frame [m].
+  Eigen::Vector3f mean_map = Eigen::Vector3f::Zero();
+  ClassEvidence evidence;
+  std::int64_t first_seen_ns = 0;
+  std::int64_t last_seen_ns = 0;
+};
+
+/// What a client needs to know whether its copy of a tile is current.
+struct TileInfo {
+  TileId id;
+  /// Version of the map in which the tile last changed: what changed since version v is every
+  /// tile whose revision is above v.
+  std::uint64_t revision = 0;
+  /// Hash of the tile's voxels; equal content has equal hashes, whatever its history.
+  std::uint64_t content_hash = 0;
+  /// Smallest box around the voxels' means, map frame [m].
+  Eigen::AlignedBox3f bounds_map;
+  std::uint32_t voxel_count = 0;
+};
+
+/// An immutable tile; voxels sorted by index.
+struct Tile {
+  TileInfo info;
+  std::vector<Voxel> voxels;
+};
+
+/// An immutable state of the whole map; cheap to copy, safe to read from any thread.
+struct MapView {
+  /// Grows with every change of the map; 0 is the empty map.
+  std::uint64_t version = 0;
+  /// Distinguishes maps: changes with reset and load, so that versions of different maps are never
+  /// compared.
+  std::uint64_t map_id = 0;
+  double tile_size_m = 0.0;
+  double voxel_size_m = 0.0;
+  /// Sorted by id.
+  std::vector<std::shared_ptr<const Tile>> tiles;
+};
+
+}  // namespace stillmap

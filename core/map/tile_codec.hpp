@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <stdexcept>
+#include <vector>
+
+#include "core/map/tile.hpp"
+
+namespace stillmap {
+
+/// A tile that cannot be encoded, or bytes that are no tile; the text says what is wrong.
+class TileCodecError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// A tile as bytes, nothing lost: a version byte, then a zstd frame (with checksum) of
+///   i32 x, i32 y, u64 revision, u64 content_hash, u32 voxel count,
+///   and the voxels by byte planes: the first byte of all, the second byte of all, and so on, which
+///   compresses better than voxel after voxel.
+/// All little-endian. Bounds are not stored, they follow from the voxels.
+[[nodiscard]] std::vector<std::uint8_t> encode_tile(const Tile& tile);
+
+/// Throws TileCodecError for whatever encode_tile did not write; reads nothing beyond `bytes`.
+[[nodiscard]] Tile decode_tile(std::span<const std::uint8_t> bytes);
+
+}  // namespace stillmap

@@ -1,0 +1,74 @@
+#include "core/map/tile_lookup.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace stillmap {
+namespace {
+
+struct IdRange {
+  std::int32_t first;
+  std::int32_t last;
+};
+
+std::int32_t clamped_id(double id) {
+  constexpr double lowest = std::numeric_limits<std::int32_t>::min() + 1.0;
+  constexpr double highest = std::numeric_limits<std::int32_t>::max() - 1.0;
+  return static_cast<std::int32_t>(std::clamp(std::floor(id), lowest, highest));
+}
+
+/// Tiles that [min, max] may touch, one more on either side: a mean in float may lie just outside
+/// its tile. The tiles' bounds decide.
+IdRange ids_between(double min_m, double max_m, double tile_size_m) {
+  return {clamped_id(min_m / tile_size_m) - 1, clamped_id(max_m / tile_size_m) + 1};
+}
+
+bool is_usable(const Eigen::AlignedBox3d& box) {
+  return (box.min().array() <= box.max().array()).all();  // false for NaN
+}
+
+}  // namespace
+
+std::vector<std::size_t> tiles_in_box(const MapView& view, const Eigen::AlignedBox3d& box_map) {
+  std::vector<std::size_t> found;
+  if (view.tiles.empty() || !is_usable(box_map)) return found;
+  const IdRange xs = ids_between(box_map.min().x(), box_map.max().x(), view.tile_size_m);
+  const IdRange ys = ids_between(box_map.min().y(), box_map.max().y(), view.tile_size_m);
+  const auto id_of = [](const std::shared_ptr<const Tile>& tile) { return tile->info.id; };
+
+  auto tile = std::ranges::lower_bound(view.tiles, TileId{xs.first, ys.first}, {}, id_of);
+  while (tile != view.tiles.end() && id_of(*tile).x <= xs.last) {
+    const TileId id = id_of(*tile);
+    if (id.y < ys.first || id.y > ys.last) {
+      // On to where the box begins in this row of tiles or in the next one.
+      const TileId next{id.y < ys.first ? id.x : id.x + 1, ys.first};
+      tile = std::ranges::lower_bound(tile, view.tiles.end(), next, {}, id_of);
+      continue;
+    }
+    if (box_map.intersects((*tile)->info.bounds_map.cast<double>())) {
+      found.push_back(static_cast<std::size_t>(tile - view.tiles.begin()));
+    }
+    ++tile;
+  }
+  return found;
+}
+
+std::vector<TileInfo> tile_versions(const MapView& view, const Eigen::AlignedBox3d& box_map) {
+  std::vector<TileInfo> infos;
+  for (const std::size_t i : tiles_in_box(view, box_map)) infos.push_back(view.tiles[i]->info);
+  return infos;
+}
+
+std::vector<std::shared_ptr<const Tile>> find_tiles(const MapView& view,
+                                                    std::span<const TileId> ids) {
+  std::vector<std::shared_ptr<const Tile>> found;
+  for (const TileId& id : ids) {
+    const auto tile = std::ranges::lower_bound(
+        view.tiles, id, {}, [](const auto& candidate) { return candidate->info.id; });
+    if (tile != view.tiles.end() && (*tile)->info.id == id) found.push_back(*tile);
+  }
+  return found;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+
+#include "core/map/tile.hpp"
+
+namespace stillmap {
+
+/// The map frame cut into tiles, and tiles into voxels.
+class VoxelGrid {
+ public:
+  /// Positions farther from the map's origin than this, in any axis, belong to no voxel: beyond
+  /// it a float resolves a voxel's mean no better than 8 mm.
+  static constexpr double max_coordinate_m = 100'000.0;
+  /// Most voxels along a tile's side: column, row and layer together fit 32 bits.
+  static constexpr int max_columns = 256;
+
+  /// `tile_size_m` is a whole number of voxels, at most `max_columns`.
+  VoxelGrid(double voxel_size_m, double tile_size_m)
+      : voxel_size_m_(voxel_size_m),
+        columns_(static_cast<int>(std::lround(tile_size_m / voxel_size_m))) {}
+
+  [[nodiscard]] double voxel_size_m() const { return voxel_size_m_; }
+  [[nodiscard]] double tile_size_m() const { return voxel_size_m_ * columns_; }
+
+  struct Place {
+    TileId tile;
+    VoxelIndex voxel;
+    /// From the voxel's lowest corner, in voxels: 0..1.
+    Eigen::Vector3d offset;
+  };
+
+  /// Whether the position has a voxel: finite, and not too far from the origin.
+  [[nodiscard]] bool holds(const Eigen::Vector3d& p_map) const;
+
+  /// Requires holds(p_map).
+  [[nodiscard]] Place place(const Eigen::Vector3d& p_map) const;
+
+  /// The voxel's lowest corner, map frame [m].
+  [[nodiscard]] Eigen::Vector3d corner_map(TileId tile, VoxelIndex voxel) const;
+
+ private:
+  double voxel_size_m_;
+  int columns_;
+};
+
+}  // namespace stillmap

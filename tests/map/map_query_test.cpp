@@ -1,0 +1,258 @@
+#include "core/map/map_query.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+#include <map>
+#include <random>
+#include <tuple>
+
+#include "tests/map/map_worlds.hpp"
+
+namespace stillmap {
+namespace {
+
+using Eigen::AlignedBox3d;
+using Eigen::Vector3d;
+
+constexpr double infinity = std::numeric_limits<double>::infinity();
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+const AlignedBox3d everywhere(Vector3d::Constant(-infinity), Vector3d::Constant(infinity));
+
+using Row = std::tuple<float, float, float, SemanticClass, std::uint32_t>;
+
+Row row(const QueryVoxel& v) {
+  return {v.position_map.x(), v.position_map.y(), v.position_map.z(), v.label, v.point_count};
+}
+
+bool is_asked_for(const MapQuery& query, const Voxel& voxel) {
+  const Vector3d p = voxel.mean_map.cast<double>();
+  return (p.array() >= query.box_map.min().array()).all() &&
+         (p.array() <= query.box_map.max().array()).all() &&
+         (query.classes.none() || query.classes[static_cast<std::size_t>(voxel.evidence.winner())]);
+}
+
+/// Every voxel of the map looked at.
+std::vector<Row> oracle(const MapView& view, const MapQuery& query) {
+  std::vector<Row> rows;
+  for (const auto& tile : view.tiles) {
+    for (const Voxel& voxel : tile->voxels) {
+      if (!is_asked_for(query, voxel)) continue;
+      rows.push_back(row({voxel.mean_map, voxel.evidence.winner(), 0.0F, voxel.point_count}));
+    }
+  }
+  return rows;
+}
+
+/// All pages, one after the other.
+std::vector<Row> all_pages(const MapView& view, MapQuery query, int& pages) {
+  std::vector<Row> rows;
+  pages = 0;
+  do {
+    const MapQueryResult result = query_map(view, query);
+    EXPECT_EQ(result.status, QueryStatus::ok) << result.reason;
+    EXPECT_LE(result.voxels.size() * query_voxel_bytes, query.max_bytes);
+    EXPECT_EQ(result.map_version, view.version);
+    for (const QueryVoxel& voxel : result.voxels) rows.push_back(row(voxel));
+    query.continuation = result.continuation;
+    ++pages;
+    if (query.continuation.empty()) {
+      EXPECT_EQ(result.total_voxels, rows.size());
+    }
+  } while (!query.continuation.empty() && pages < 10'000);
+  return rows;
+}
+
+class MapQueryTest : public testing::Test {
+ protected:
+  static void SetUpTestSuite() { view_ = test::street_map(12, 300).view(); }
+  static void TearDownTestSuite() { view_.reset(); }
+  static const MapView& view() { return *view_; }
+
+  static MapQuery everything() {
+    MapQuery query;
+    query.box_map = everywhere;
+    return query;
+  }
+
+ private:
+  static inline std::shared_ptr<const MapView> view_;
+};
+
+TEST_F(MapQueryTest, AgreesWithBruteForceOnRandomBoxesAndClasses) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> coordinate(-70.0, 70.0);
+  for (int i = 0; i < 200; ++i) {
+    MapQuery query;
+    for (int corner = 0; corner < 2; ++corner) {
+      query.box_map.extend(
+          Vector3d(coordinate(random), coordinate(random), coordinate(random) / 10.0));
+    }
+    if (i % 3 == 0) query.classes = random();
+    query.max_bytes = 10'000'000;
+    int pages = 0;
+    EXPECT_EQ(all_pages(view(), query, pages), oracle(view(), query)) << i;
+  }
+}
+
+TEST_F(MapQueryTest, PagesTogetherAreTheWholeAnswer) {
+  for (const std::uint32_t max_bytes : {7'777U, 20'000U, 1'000'000'000U}) {
+    MapQuery query = everything();
+    query.max_bytes = max_bytes;
+    query.classes.set(static_cast<std::size_t>(SemanticClass::building));
+    int pages = 0;
+    EXPECT_EQ(all_pages(view(), query, pages), oracle(view(), query));
+    EXPECT_EQ(pages > 1, max_bytes < 1'000'000U);
+  }
+}
+
+TEST_F(MapQueryTest, PageSizeMayChangeBetweenPages) {
+  MapQuery query = everything();
+  query.max_bytes = 1000;
+  const MapQueryResult first = query_map(view(), query);
+  query.continuation = first.continuation;
+  query.max_bytes = 1'000'000'000;
+  const MapQueryResult rest = query_map(view(), query);
+  EXPECT_EQ(first.voxels.size() + rest.voxels.size(), oracle(view(), everything()).size());
+  EXPECT_EQ(rest.total_voxels, first.total_voxels);
+}
+
+TEST_F(MapQueryTest, CoarseCellsAreWeightedMeansOfTheirVoxels) {
+  struct Sum {
+    Vector3d weighted = Vector3d::Zero();
+    std::uint64_t points = 0;
+    std::map<SemanticClass, double> evidence;
+  };
+  for (const double resolution_m : {0.5, 0.73, 35.0}) {
+    std::map<std::tuple<int, int, int>, Sum> cells;
+    for (const auto& tile : view().tiles) {
+      for (const Voxel& voxel : tile->voxels) {
+        const Vector3d mean = voxel.mean_map.cast<double>();
+        const Vector3d cell = (mean / resolution_m).array().floor();
+        Sum& sum = cells[{int(cell.x()), int(cell.y()), int(cell.z())}];
+        sum.weighted += mean * voxel.point_count;
+        sum.points += voxel.point_count;
+        for (const auto& vote : voxel.evidence.votes) sum.evidence[vote.label] += vote.weight;
+      }
+    }
+    MapQuery query = everything();
+    query.resolution_m = resolution_m;
+    query.max_bytes = 100'000'000;
+    const MapQueryResult result = query_map(view(), query);
+    ASSERT_EQ(result.voxels.size(), cells.size());
+    auto expected = cells.begin();
+    for (const QueryVoxel& voxel : result.voxels) {
+      const Sum& sum = (expected++)->second;
+      EXPECT_LT((voxel.position_map.cast<double>() - sum.weighted / sum.points).norm(), 1e-4);
+      EXPECT_EQ(voxel.point_count, sum.points);
+      for (const auto& [label, weight] : sum.evidence) {
+        EXPECT_LE(weight, sum.evidence.at(voxel.label) * (1.0 + 1e-5));
+      }
+    }
+    query.max_bytes = static_cast<std::uint32_t>(query_voxel_bytes * (cells.size() / 3 + 1));
+    int pages = 0;
+    EXPECT_EQ(all_pages(view(), query, pages).size(), cells.size());
+    EXPECT_EQ(pages, 3);
+  }
+}
+
+TEST_F(MapQueryTest, ResolutionThatCameAsFloatIsTheMapsOwn) {
+  MapQuery query = everything();
+  query.max_bytes = 100'000'000;
+  const std::size_t own = query_map(view(), query).voxels.size();
+  query.resolution_m = 0.2F;
+  EXPECT_EQ(query_map(view(), query).voxels.size(), own);
+}
+
+TEST_F(MapQueryTest, NothingThereIsAFineAnswer) {
+  MapQuery query;
+  query.box_map = AlignedBox3d(Vector3d::Constant(5000.0), Vector3d::Constant(5001.0));
+  MapQueryResult result = query_map(view(), query);
+  EXPECT_EQ(result.status, QueryStatus::ok);
+  EXPECT_TRUE(result.voxels.empty());
+  EXPECT_TRUE(result.continuation.empty());
+  query.box_map = AlignedBox3d(Vector3d::Constant(1e308), Vector3d::Constant(infinity));
+  EXPECT_EQ(query_map(view(), query).total_voxels, 0U);
+  EXPECT_EQ(query_map(MapView{}, everything()).status, QueryStatus::ok);
+  query.resolution_m = 1.0;
+  EXPECT_EQ(query_map(MapView{}, query).status, QueryStatus::ok);
+}
+
+TEST_F(MapQueryTest, RefusesWhatCannotBeAnsweredAndNamesIt) {
+  const auto expect_refused = [](const MapQuery& query, const std::string& named) {
+    const MapQueryResult result = query_map(view(), query);
+    EXPECT_EQ(result.status, QueryStatus::invalid_request);
+    EXPECT_THAT(result.reason, testing::HasSubstr(named));
+    EXPECT_TRUE(result.voxels.empty());
+  };
+  expect_refused(MapQuery{}, "box x is from");
+  MapQuery query = everything();
+  query.box_map.min().y() = nan;
+  expect_refused(query, "box y is from nan");
+  query = everything();
+  query.box_map.min().z() = 3.0;
+  query.box_map.max().z() = 2.0;
+  expect_refused(query, "box z is from 3 to 2");
+  for (const double resolution_m : {-1.0, 0.1, nan, infinity, -infinity}) {
+    query = everything();
+    query.resolution_m = resolution_m;
+    expect_refused(query, "resolution_m is");
+  }
+  query = everything();
+  query.max_bytes = query_voxel_bytes - 1;
+  expect_refused(query, "max_bytes is 20; must be at least 21");
+}
+
+TEST_F(MapQueryTest, HugeResolutionGivesFewCells) {
+  MapQuery query = everything();
+  query.resolution_m = 1e300;
+  EXPECT_LE(query_map(view(), query).total_voxels, 8U);
+}
+
+TEST_F(MapQueryTest, ContinuationOfAnotherVersionOrMapIsStale) {
+  MapQuery query = everything();
+  query.max_bytes = 1000;
+  query.continuation = query_map(view(), query).continuation;
+  EXPECT_EQ(continuation_version(query.continuation), view().version);
+  MapView later = view();
+  ++later.version;
+  MapQueryResult result = query_map(later, query);
+  EXPECT_EQ(result.status, QueryStatus::stale_continuation);
+  EXPECT_THAT(result.reason, testing::HasSubstr("ask again"));
+  EXPECT_EQ(result.map_version, later.version);
+  MapView other = view();
+  ++other.map_id;
+  EXPECT_EQ(query_map(other, query).status, QueryStatus::stale_continuation);
+}
+
+TEST_F(MapQueryTest, ContinuationOfAnotherQueryIsRefused) {
+  MapQuery query = everything();
+  query.max_bytes = 1000;
+  query.continuation = query_map(view(), query).continuation;
+  query.box_map.max().x() = 10.0;
+  const MapQueryResult result = query_map(view(), query);
+  EXPECT_EQ(result.status, QueryStatus::invalid_request);
+  EXPECT_THAT(result.reason, testing::HasSubstr("another query"));
+}
+
+TEST_F(MapQueryTest, DamagedContinuationsAreRefused) {
+  MapQuery query = everything();
+  query.max_bytes = 1000;
+  const std::string token = query_map(view(), query).continuation;
+  std::vector<std::string> damaged{"x", token + "0", std::string(token.size(), 'f'),
+                                   std::string(1'000'000, '\0')};
+  for (std::size_t i = 0; i < token.size(); ++i) {
+    damaged.push_back(token.substr(0, i + 1 == token.size() ? i : i + 1));
+    damaged.push_back(token);
+    damaged.back()[i] = token[i] == '5' ? '6' : '5';
+  }
+  for (const std::string& continuation : damaged) {
+    query.continuation = continuation;
+    EXPECT_EQ(query_map(view(), query).status, QueryStatus::invalid_request) << continuation;
+    EXPECT_EQ(continuation_version(continuation), std::nullopt);
+  }
+}
+
+}  // namespace
+}  // namespace stillmap
