@@ -1,0 +1,55 @@
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/lidar/semantic_class.hpp"
+#include "core/segmentation/knn_postprocess.hpp"
+
+namespace stillmap {
+
+/// Channels of the network's input, in this order: range, x, y, z [m], remission (0..1).
+inline constexpr std::size_t input_channels = 5;
+
+/// Mean and standard deviation of each input channel over the training set.
+struct InputStatistics {
+  std::array<float, input_channels> mean{};
+  std::array<float, input_channels> deviation{};
+};
+
+/// What must be known of a network to run it and to read its output; model.yaml in a model folder.
+struct ModelDescription {
+  std::string name;
+  std::string licence;
+  /// Sensor whose scans it was trained on, in words.
+  std::string sensor;
+  /// How it was trained and how well it does, in words.
+  std::string training;
+  std::string accuracy;
+  /// The weights, an ONNX file.
+  std::filesystem::path network_file;
+
+  /// Range image that the network wants.
+  int rows = 64;
+  int columns = 1024;
+  /// Upper and lower edge of the image [rad]; points beyond are squeezed into the edge rows.
+  double fov_up = 0.0;
+  double fov_down = 0.0;
+  InputStatistics statistics;
+
+  /// Entry n is the class of the network's output n.
+  std::vector<SemanticClass> classes;
+  /// Absent: a point takes the class of its pixel.
+  std::optional<KnnConfig> knn;
+  /// Leave the scan's point 0 out of the image, as lidar-bonnetal's mask does. For parity tests.
+  bool mask_first_point = false;
+
+  /// Every fault in words, one a line; empty when the description can be used.
+  [[nodiscard]] std::string faults() const;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,33 @@
+#include "core/segmentation/network_input.hpp"
+
+#include <array>
+#include <cassert>
+#include <cmath>
+
+namespace stillmap {
+
+std::vector<float> make_network_input(const Scan& scan, const RangeImage& image,
+                                      const ModelDescription& model) {
+  assert(image.point_count() == scan.size());
+  assert(scan.intensity.empty() || scan.intensity.size() == scan.size());
+  const std::size_t pixels = image.pixel_count();
+  const InputStatistics& statistics = model.statistics;
+  std::vector<float> input(input_channels * pixels, 0.0F);
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    const std::int32_t nearest = image.nearest()[pixel];
+    if (nearest == RangeImage::none || (model.mask_first_point && nearest == 0)) continue;
+    const auto point = static_cast<std::size_t>(nearest);
+    const Eigen::Vector3f& p_lidar = scan.points_lidar[point];
+    const float remission = scan.intensity.empty() ? statistics.mean.back() : scan.intensity[point];
+    const std::array<float, input_channels> values{image.range_m()[pixel], p_lidar.x(), p_lidar.y(),
+                                                   p_lidar.z(), remission};
+    for (std::size_t c = 0; c < input_channels; ++c) {
+      const float normalised = (values[c] - statistics.mean[c]) / statistics.deviation[c];
+      // Only remission can be no number here, and must not spoil its surroundings.
+      if (std::isfinite(normalised)) input[c * pixels + pixel] = normalised;
+    }
+  }
+  return input;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,25 @@
+#pragma once
+
+#include <memory>
+
+#include "core/segmentation/model_description.hpp"
+#include "core/segmentation/segmentation_network.hpp"
+
+namespace stillmap {
+
+/// Runs any ONNX network on OpenCV's dnn module: the reference engine and the fallback.
+class OpenCvNetwork final : public SegmentationNetwork {
+ public:
+  /// Loads the network and tries it once. Throws ModelError when the file cannot be read, holds
+  /// weights that are not finite, or does not turn 1 x 5 x rows x columns into one score a class.
+  explicit OpenCvNetwork(const ModelDescription& model);
+  ~OpenCvNetwork() override;
+
+  [[nodiscard]] PixelOutputs run(std::span<const float> input) override;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,149 @@
+#include "core/mapper.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <stdexcept>
+
+#include "core/segmentation/stream_labels.hpp"
+#include "tests/odometry/box_drive.hpp"
+#include "tests/odometry/poses.hpp"
+
+namespace stillmap {
+namespace {
+
+using test::BoxDrive;
+using ::testing::Each;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+MapperConfig box_config() {
+  MapperConfig config;
+  config.sensor = test::test_lidar();
+  return config;
+}
+
+Mapper box_mapper(StageListener stage_ended = {}) {
+  return {box_config(), std::make_unique<StreamLabels>(), std::move(stage_ended)};
+}
+
+const BoxDrive& traffic_drive() {
+  static const BoxDrive drive(test::street_with_traffic(), 30);
+  return drive;
+}
+
+std::size_t voxels_in(const MapView& view) {
+  std::size_t count = 0;
+  for (const auto& tile : view.tiles) count += tile->voxels.size();
+  return count;
+}
+
+TEST(MapperDrive, GivesPosesMotionAndAMapWithoutTraffic) {
+  Mapper mapper = box_mapper();
+  const BoxDrive& drive = traffic_drive();
+  for (std::size_t k = 0; k < drive.scans.size(); ++k) {
+    const auto mapped = mapper.process(drive.scans[k].scan);
+    ASSERT_TRUE(mapped) << mapper.last_rejection().reason;
+    test::expect_near(mapped->odometry.T_map_lidar, drive.T_map_lidar[k], 0.2, 0.01);
+    EXPECT_EQ(mapped->labelled.scan.stamp_ns, drive.scans[k].scan.stamp_ns);
+    EXPECT_EQ(mapped->labelled.motion.size(), mapped->labelled.scan.size());
+    EXPECT_EQ(mapped->labelled.labels.classes.size(), mapped->labelled.scan.size());
+  }
+  ASSERT_EQ(mapper.trajectory().size(), drive.scans.size());
+  EXPECT_EQ(mapper.trajectory().back().stamp_ns, drive.scans.back().scan.stamp_ns);
+
+  const auto view = mapper.map_view();
+  EXPECT_GT(voxels_in(*view), 5000U);
+  for (const auto& tile : view->tiles)
+    for (const Voxel& voxel : tile->voxels) ASSERT_FALSE(is_movable(voxel.evidence.winner()));
+}
+
+TEST(MapperDrive, PriorReplacesThePrediction) {
+  Mapper mapper = box_mapper();
+  const Eigen::Isometry3d T_start = test::level_pose(3.0, 4.0, 0.5);
+  const auto mapped = mapper.process(traffic_drive().scans[0].scan, T_start);
+  ASSERT_TRUE(mapped);
+  test::expect_near(mapped->odometry.T_map_lidar, T_start, 1e-12, 1e-7);
+}
+
+TEST(MapperDrive, WithoutLabelsAllIsStationary) {
+  Mapper mapper(box_config(), std::make_unique<NoLabels>());
+  EXPECT_EQ(mapper.label_source(), "none");
+  for (std::size_t k = 0; k < 10; ++k) {
+    const auto mapped = mapper.process(traffic_drive().scans[k].scan);
+    ASSERT_TRUE(mapped);
+    EXPECT_TRUE(mapped->labelled.labels.empty());
+    EXPECT_THAT(mapped->labelled.motion, Each(Motion::stationary));
+    test::expect_near(mapped->odometry.T_map_lidar, traffic_drive().T_map_lidar[k], 0.2, 0.02);
+  }
+}
+
+TEST(MapperDrive, StagesEndInTheOrderOfAScan) {
+  std::vector<std::string> stages;
+  Mapper mapper = box_mapper([&](std::string_view stage) { stages.emplace_back(stage); });
+  ASSERT_TRUE(mapper.process(traffic_drive().scans[0].scan));
+  EXPECT_THAT(stages, ElementsAre("prepare", "segment", "odometry", "static_map"));
+}
+
+TEST(MapperDrive, PointsThatAreNoMeasurementsAreDropped) {
+  Scan scan = traffic_drive().scans[0].scan;
+  const std::size_t good = scan.size();
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  const float infinity = std::numeric_limits<float>::infinity();
+  for (const Eigen::Vector3f& p :
+       {Eigen::Vector3f(nan, 1.0F, 1.0F), Eigen::Vector3f(1.0F, infinity, 1.0F),
+        Eigen::Vector3f(0.0F, 0.0F, 0.0F), Eigen::Vector3f(1e6F, 0.0F, 0.0F)}) {
+    scan.points_lidar.push_back(p);
+    scan.ring.push_back(0);
+    scan.labels.push_back(SemanticClass::car);
+  }
+  Mapper mapper = box_mapper();
+  const auto mapped = mapper.process(scan);
+  ASSERT_TRUE(mapped);
+  EXPECT_EQ(mapped->labelled.scan.size(), good);
+}
+
+TEST(MapperReset, StartsAnotherMapAtTheOrigin) {
+  Mapper mapper = box_mapper();
+  for (std::size_t k = 0; k < 5; ++k) ASSERT_TRUE(mapper.process(traffic_drive().scans[k].scan));
+  mapper.reset(77);
+  EXPECT_TRUE(mapper.trajectory().empty());
+  EXPECT_EQ(mapper.map_view()->map_id, 77U);
+  EXPECT_EQ(voxels_in(*mapper.map_view()), 0U);
+  // An earlier stamp is fine in a new map.
+  const auto mapped = mapper.process(traffic_drive().scans[0].scan);
+  ASSERT_TRUE(mapped);
+  EXPECT_EQ(mapped->odometry.health, OdometryHealth::initialised);
+  test::expect_near(mapped->odometry.T_map_lidar, Eigen::Isometry3d::Identity(), 1e-12, 1e-7);
+}
+
+TEST(MapperRestore, ExtendsAStoredMap) {
+  Mapper before = box_mapper();
+  for (std::size_t k = 0; k < 5; ++k) ASSERT_TRUE(before.process(traffic_drive().scans[k].scan));
+  const auto stored = before.map_view();
+  Mapper after = box_mapper();
+  after.restore(*stored);
+  EXPECT_EQ(voxels_in(*after.map_view()), voxels_in(*stored));
+  for (std::size_t k = 0; k < 10; ++k) ASSERT_TRUE(after.process(traffic_drive().scans[k].scan));
+  EXPECT_GT(voxels_in(*after.map_view()), voxels_in(*stored));
+}
+
+TEST(MapperConfig, FaultsOfEveryPartAreThrown) {
+  MapperConfig config = box_config();
+  config.sensor.rings = 0;
+  config.odometry.alpha = 2.0;
+  config.static_map.voxel_size_m = -1.0;
+  try {
+    Mapper mapper(config, std::make_unique<NoLabels>());
+    FAIL() << "accepted a bad configuration";
+  } catch (const std::invalid_argument& fault) {
+    EXPECT_THAT(config.faults(), HasSubstr("rings"));
+    EXPECT_THAT(config.faults(), HasSubstr("alpha"));
+    EXPECT_THAT(config.faults(), HasSubstr("voxel_size_m"));
+    EXPECT_STREQ(fault.what(), config.faults().c_str());
+  }
+}
+
+}  // namespace
+}  // namespace stillmap

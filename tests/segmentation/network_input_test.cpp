@@ -1,0 +1,74 @@
+#include "core/segmentation/network_input.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/segmentation/sample_model.hpp"
+
+namespace stillmap {
+namespace {
+
+using test::describe;
+using test::project;
+using test::random_network;
+using test::random_scan;
+
+const ModelDescription model = describe(random_network(8, 32, 3));
+constexpr std::size_t pixels = 8 * 32;
+
+/// Value of `channel` of the point, not yet normalised.
+float raw(const Scan& scan, std::size_t point, std::size_t channel) {
+  if (channel == 0) return scan.points_lidar[point].norm();
+  if (channel == 4) return scan.intensity[point];
+  return scan.points_lidar[point][static_cast<Eigen::Index>(channel) - 1];
+}
+
+TEST(NetworkInput, IsTheNormalisedNearestPointAndZeroWhereNoneIs) {
+  const Scan scan = random_scan(200, 1);
+  const RangeImage image = project(scan, model);
+  const std::vector<float> input = make_network_input(scan, image, model);
+  ASSERT_EQ(input.size(), 5 * pixels);
+  int empty = 0;
+  for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
+    const std::int32_t nearest = image.nearest()[pixel];
+    empty += nearest == RangeImage::none ? 1 : 0;
+    for (std::size_t c = 0; c < 5; ++c) {
+      const float expected =
+          nearest == RangeImage::none
+              ? 0.0F
+              : (raw(scan, static_cast<std::size_t>(nearest), c) - model.statistics.mean[c]) /
+                    model.statistics.deviation[c];
+      EXPECT_NEAR(input[c * pixels + pixel], expected, 1e-5F);
+    }
+  }
+  EXPECT_GT(empty, 0);
+}
+
+TEST(NetworkInput, MasksTheFirstPointOnlyOnRequest) {
+  Scan scan;
+  scan.points_lidar = {{5.0F, 0.0F, 0.0F}};
+  scan.intensity = {0.9F};
+  const RangeImage image = project(scan, model);
+  ModelDescription masking = model;
+  masking.mask_first_point = true;
+  const std::vector<float> zeros(5 * pixels, 0.0F);
+  EXPECT_NE(make_network_input(scan, image, model), zeros);
+  EXPECT_EQ(make_network_input(scan, image, masking), zeros);
+}
+
+TEST(NetworkInput, TakesTheMeanRemissionWhenThereIsNone) {
+  Scan scan;
+  scan.points_lidar = {{5.0F, 0.0F, 0.0F}, {-5.0F, 0.0F, 0.0F}};
+  scan.intensity = {std::numeric_limits<float>::quiet_NaN(), 1.0F};
+  const RangeImage image = project(scan, model);
+  const auto pixel = static_cast<std::size_t>(image.pixel_of_point()[0]);
+  EXPECT_EQ(make_network_input(scan, image, model)[4 * pixels + pixel], 0.0F);
+  scan.intensity.clear();
+  for (std::size_t i = 4 * pixels; i < 5 * pixels; ++i) {
+    EXPECT_EQ(make_network_input(scan, image, model)[i], 0.0F);
+  }
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <random>
+#include <vector>
+
+#include "core/segmentation/model_description.hpp"
+#include "tests/segmentation/tiny_onnx.hpp"
+
+namespace stillmap::test {
+
+/// Fits `network`; output n is class n.
+inline ModelDescription describe(const TinyNetwork& network) {
+  ModelDescription model;
+  model.name = "tiny";
+  model.rows = network.rows;
+  model.columns = network.columns;
+  model.fov_up = 0.2;
+  model.fov_down = -0.4;
+  model.statistics = {.mean = {12.0F, 10.0F, 0.2F, -1.0F, 0.2F},
+                      .deviation = {12.0F, 11.0F, 7.0F, 0.9F, 0.2F}};
+  for (std::size_t i = 0; i < network.bias.size(); ++i) {
+    model.classes.push_back(static_cast<SemanticClass>(i));
+  }
+  return model;
+}
+
+/// Points in all directions, several a pixel of a small image, with intensity.
+inline Scan random_scan(std::size_t points, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> level(-15.0F, 15.0F);
+  std::uniform_real_distribution<float> height(-3.0F, 1.0F);
+  std::uniform_real_distribution<float> share(0.0F, 1.0F);
+  Scan scan;
+  for (std::size_t i = 0; i < points; ++i) {
+    scan.points_lidar.emplace_back(level(random), level(random), height(random));
+    scan.intensity.push_back(share(random));
+  }
+  return scan;
+}
+
+inline RangeImage project(const Scan& scan, const ModelDescription& model) {
+  return {scan.points_lidar,
+          {.rows = model.rows,
+           .columns = model.columns,
+           .fov_up = model.fov_up,
+           .fov_down = model.fov_down}};
+}
+
+}  // namespace stillmap::test
