@@ -1,0 +1,117 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+namespace stillmap {
+
+/// Cross-section of a street from its centre line outwards, the same on both sides [m].
+struct StreetProfile {
+  double half_median_m = 0.0;
+  int lanes = 1;
+  double lane_width_m = 3.2;
+  double bike_lane_m = 1.3;
+  double parking_m = 2.2;
+  double verge_m = 0.0;
+  double sidewalk_m = 2.6;
+
+  [[nodiscard]] double lane_centre_m(int lane) const {
+    return half_median_m + (lane + 0.5) * lane_width_m;
+  }
+  [[nodiscard]] double bike_centre_m() const {
+    return half_median_m + lanes * lane_width_m + 0.5 * bike_lane_m;
+  }
+  /// Centre line to where the parking bays begin, to the kerb, to the back of the sidewalk.
+  [[nodiscard]] double half_driven_m() const {
+    return half_median_m + lanes * lane_width_m + bike_lane_m;
+  }
+  [[nodiscard]] double half_road_m() const { return half_driven_m() + parking_m; }
+  [[nodiscard]] double half_street_m() const { return half_road_m() + verge_m + sidewalk_m; }
+};
+
+/// A straight street in plan coordinates, all across the city: u = position or v = position.
+struct StreetPlan {
+  double position_m = 0.0;
+  StreetProfile profile;
+};
+
+/// Who is on the move, and how close together. Densities count along the route, in objects per
+/// kilometre of one lane.
+struct TrafficPlan {
+  double vehicles_per_km = 4.0;
+  /// Of the vehicles. Long ones sweep over the next lane in turns of less than 20 m radius.
+  double share_trucks = 0.0;
+  double share_buses = 0.0;
+  /// A lorry and a bus set out in the lanes beside the ego vehicle, as fast as it: most of what the
+  /// lidar sees goes along with it.
+  bool escorted = false;
+  double cyclists_per_km = 2.0;
+  double pedestrians_per_km = 6.0;
+  /// People who cross the road while the traffic has red.
+  int crossing_pedestrians = 2;
+  double speed_mps = 9.0;
+  /// How much drivers' wishes differ, as a share of the speed.
+  double speed_spread = 0.15;
+  /// Period and red part of every pedestrian light [s].
+  double light_period_s = 60.0;
+  double light_red_s = 10.0;
+  int parked_per_100m = 9;
+};
+
+/// How the blocks between the streets are filled.
+struct BlockPlan {
+  double setback_min_m = 2.0, setback_max_m = 5.0;
+  double gap_min_m = 0.0, gap_max_m = 7.0;
+  int floors_min = 2, floors_max = 4;
+  double trees_per_100m = 5.0;
+  double garden_trees_per_100m = 6.0;
+  /// Share of lots behind a fence, behind a hedge, behind a wall; the rest is open.
+  double share_fence = 0.35, share_hedge = 0.25, share_wall = 0.15;
+};
+
+/// A city of streets on a grid in flat plan coordinates (u, v) [m]; `GroundShape` bends it into
+/// the map frame. The traffic, the ego vehicle too, goes round one closed route of streets for
+/// ever.
+struct CityPlan {
+  std::string name;
+  std::vector<StreetPlan> streets_along_v;
+  std::vector<StreetPlan> streets_along_u;
+  /// Ground beyond the outermost streets [m].
+  double margin_m = 60.0;
+  /// Corners of the route; each leg lies on a street, turns are at right angles.
+  std::vector<Eigen::Vector2d> route;
+  /// Radius of the route's centre line in the turns [m].
+  double turn_radius_m = 9.0;
+  /// Cross-section on the route.
+  StreetProfile route_profile;
+  /// Pedestrian crossings with lights, on the route's centre line.
+  std::vector<Eigen::Vector2d> crossings;
+  /// Where on the route the ego vehicle starts [m], and its lane (0 = next to the middle).
+  double ego_start_m = 0.0;
+  int ego_lane = 0;
+  /// Streets are sine waves of this amplitude and (angular) length about the grid [m].
+  double bend_m = 6.0;
+  double bend_length_m = 55.0;
+  /// Hills: amplitude and angular wave length [m].
+  double hill_m = 1.2;
+  double hill_length_m = 45.0;
+  double kerb_m = 0.13;
+  BlockPlan blocks;
+  TrafficPlan traffic;
+
+  /// Every fault in words, one a line; empty when a city can be built.
+  [[nodiscard]] std::string faults() const;
+};
+
+/// Narrow residential streets, many turns, parked cars, little traffic; 900 m round.
+[[nodiscard]] CityPlan quiet_city();
+/// An avenue of three lanes each way, full of vehicles; 1.7 km round.
+[[nodiscard]] CityPlan crowded_avenue();
+/// One small block, for tests; 200 m round.
+[[nodiscard]] CityPlan test_yard();
+/// The plan of that name ("quiet", "crowd", "yard").
+/// @throws std::invalid_argument with the names that exist.
+[[nodiscard]] CityPlan city_plan(const std::string& name);
+
+}  // namespace stillmap

@@ -1,0 +1,140 @@
+#include "core/simulation/ground_shape.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "core/simulation/random.hpp"
+
+namespace stillmap {
+namespace {
+
+// Bays and verges end this far from the kerb of a crossing street, medians a little nearer.
+constexpr double bay_clearance_m = 7.0;
+constexpr double median_clearance_m = 4.0;
+
+struct NearestStreet {
+  double distance_m = std::numeric_limits<double>::infinity();
+  const StreetProfile* profile = nullptr;
+};
+
+NearestStreet nearest(const std::vector<StreetPlan>& streets, double position) {
+  NearestStreet best;
+  for (const StreetPlan& street : streets) {
+    const double distance = std::abs(position - street.position_m);
+    if (distance < best.distance_m) best = {distance, &street.profile};
+  }
+  return best;
+}
+
+// Zone by one street, when `other` is the nearest street across it.
+Zone zone_by(const NearestStreet& street, const NearestStreet& other) {
+  if (street.profile == nullptr || street.distance_m > street.profile->half_street_m()) {
+    return Zone::lot;
+  }
+  const StreetProfile& profile = *street.profile;
+  const double clear = other.profile == nullptr ? std::numeric_limits<double>::infinity()
+                                                : other.distance_m - other.profile->half_road_m();
+  if (street.distance_m < profile.half_median_m) {
+    return clear > median_clearance_m ? Zone::median : Zone::road;
+  }
+  if (street.distance_m < profile.half_driven_m()) return Zone::road;
+  if (street.distance_m < profile.half_road_m()) {
+    return clear > bay_clearance_m ? Zone::parking : Zone::road;
+  }
+  const bool verge = street.distance_m < profile.half_road_m() + profile.verge_m;
+  return verge && clear > bay_clearance_m ? Zone::verge : Zone::sidewalk;
+}
+
+bool is_driven(Zone zone) { return zone == Zone::road || zone == Zone::parking; }
+
+}  // namespace
+
+GroundShape::GroundShape(CityPlan plan, std::uint64_t seed) : plan_(std::move(plan)) {
+  Random random(seed, 11);
+  for (double& phase : phase_) phase = random.uniform(0.0, 2.0 * std::numbers::pi);
+}
+
+Zone GroundShape::zone(const Eigen::Vector2d& spot_plan) const {
+  const NearestStreet along_v = nearest(plan_.streets_along_v, spot_plan.x());
+  const NearestStreet along_u = nearest(plan_.streets_along_u, spot_plan.y());
+  const Zone first = zone_by(along_v, along_u);
+  const Zone second = zone_by(along_u, along_v);
+  // At junctions the road wins, then the sidewalk.
+  for (const Zone zone : {first, second}) {
+    if (zone == Zone::road) return zone;
+  }
+  for (const Zone zone : {first, second}) {
+    if (is_driven(zone) || zone == Zone::median) return zone;
+  }
+  if (first == Zone::sidewalk || second == Zone::sidewalk) return Zone::sidewalk;
+  return first == Zone::lot ? second : first;
+}
+
+double GroundShape::height(const Eigen::Vector2d& spot_plan, Zone zone) const {
+  const double u = spot_plan.x();
+  const double v = spot_plan.y();
+  const double k = 1.0 / plan_.hill_length_m;
+  double height = plan_.hill_m * (std::sin(u * k + phase_[0]) + 0.7 * std::sin(v * k + phase_[1]));
+  height += 0.015 * std::sin(u / 4.3 + phase_[2]) * std::sin(v / 3.7 + phase_[3]);
+  const double off_centre = std::min({nearest(plan_.streets_along_v, u).distance_m,
+                                      nearest(plan_.streets_along_u, v).distance_m, 6.0});
+  height -= 0.02 * off_centre;
+  if (!is_driven(zone)) height += plan_.kerb_m;
+  if (zone == Zone::lot || zone == Zone::verge || zone == Zone::median) height += bump(spot_plan);
+  return height;
+}
+
+// Uneven grass, a few centimetres.
+double GroundShape::bump(const Eigen::Vector2d& spot_plan) const {
+  const double u = spot_plan.x();
+  const double v = spot_plan.y();
+  return 0.03 * std::sin(u * 1.3 + phase_[4]) * std::sin(v * 1.1 + phase_[5]) +
+         0.03 * std::sin(u * 0.41 + v * 0.3 + phase_[6]);
+}
+
+Eigen::Vector2d GroundShape::to_map(const Eigen::Vector2d& spot_plan) const {
+  const double k = 1.0 / plan_.bend_length_m;
+  return {spot_plan.x() + plan_.bend_m * std::sin(spot_plan.y() * k + 0.7),
+          spot_plan.y() + plan_.bend_m * std::sin(spot_plan.x() * k)};
+}
+
+Eigen::Vector3d GroundShape::on_ground(const Eigen::Vector2d& spot_plan) const {
+  return on_ground(spot_plan, zone(spot_plan));
+}
+
+Eigen::Vector3d GroundShape::on_ground(const Eigen::Vector2d& spot_plan, Zone zone) const {
+  const Eigen::Vector2d spot_map = to_map(spot_plan);
+  return {spot_map.x(), spot_map.y(), height(spot_plan, zone)};
+}
+
+Eigen::Isometry3d GroundShape::frame_at(const Eigen::Vector2d& spot_plan,
+                                        double heading_plan) const {
+  const Eigen::Vector2d ahead(std::cos(heading_plan), std::sin(heading_plan));
+  const Eigen::Vector2d along = to_map(spot_plan + 0.5 * ahead) - to_map(spot_plan - 0.5 * ahead);
+  Eigen::Isometry3d T_map_frame(Eigen::Translation3d(on_ground(spot_plan)));
+  T_map_frame.rotate(Eigen::AngleAxisd(std::atan2(along.y(), along.x()), Eigen::Vector3d::UnitZ()));
+  return T_map_frame;
+}
+
+Eigen::Isometry3d GroundShape::leaning_frame_at(const Eigen::Vector2d& spot_plan,
+                                                double heading_plan, double wheelbase_m) const {
+  const Eigen::Vector2d ahead(std::cos(heading_plan), std::sin(heading_plan));
+  const Eigen::Vector2d left(-ahead.y(), ahead.x());
+  const Zone here = zone(spot_plan);
+  const double half = 0.5 * wheelbase_m;
+  const Eigen::Vector3d front = on_ground(spot_plan + half * ahead, here);
+  const Eigen::Vector3d rear = on_ground(spot_plan - half * ahead, here);
+  const Eigen::Vector3d port = on_ground(spot_plan + 0.7 * left, here);
+  const Eigen::Vector3d starboard = on_ground(spot_plan - 0.7 * left, here);
+  const Eigen::Vector3d x = (front - rear).normalized();
+  const Eigen::Vector3d z = x.cross(port - starboard).normalized();
+  Eigen::Isometry3d T_map_frame = Eigen::Isometry3d::Identity();
+  T_map_frame.linear() << x, z.cross(x), z;
+  T_map_frame.translation() = 0.5 * (front + rear);
+  return T_map_frame;
+}
+
+}  // namespace stillmap

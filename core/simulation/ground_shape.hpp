@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+
+#include "core/simulation/city_plan.hpp"
+
+namespace stillmap {
+
+/// What a spot of ground is.
+enum class Zone : std::uint8_t { road, parking, median, verge, sidewalk, lot };
+
+/// The city's ground: from flat plan coordinates (u, v) to the map frame, with hills, crowned
+/// roads, kerbs and rough grass.
+class GroundShape {
+ public:
+  GroundShape(CityPlan plan, std::uint64_t seed);
+
+  [[nodiscard]] const CityPlan& plan() const { return plan_; }
+  [[nodiscard]] Zone zone(const Eigen::Vector2d& spot_plan) const;
+  /// Height of the bare surface at `spot_plan` if it belongs to `zone` [m, map frame].
+  [[nodiscard]] double height(const Eigen::Vector2d& spot_plan, Zone zone) const;
+  /// The point of the map on the ground at `spot_plan`.
+  [[nodiscard]] Eigen::Vector3d on_ground(const Eigen::Vector2d& spot_plan) const;
+  [[nodiscard]] Eigen::Vector3d on_ground(const Eigen::Vector2d& spot_plan, Zone zone) const;
+  [[nodiscard]] Eigen::Vector2d to_map(const Eigen::Vector2d& spot_plan) const;
+  /// Upright frame on the ground, x along `heading_plan` [rad] as the plan bends it.
+  [[nodiscard]] Eigen::Isometry3d frame_at(const Eigen::Vector2d& spot_plan,
+                                           double heading_plan) const;
+  /// Frame on the ground that leans with it, for wheels `wheelbase_m` apart.
+  [[nodiscard]] Eigen::Isometry3d leaning_frame_at(const Eigen::Vector2d& spot_plan,
+                                                   double heading_plan, double wheelbase_m) const;
+
+ private:
+  [[nodiscard]] double bump(const Eigen::Vector2d& spot_plan) const;
+
+  CityPlan plan_;
+  Eigen::Array<double, 8, 1> phase_;
+};
+
+}  // namespace stillmap

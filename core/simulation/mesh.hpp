@@ -1,0 +1,55 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/simulation/surface.hpp"
+
+namespace stillmap {
+
+/// Triangles with a surface each. Both sides of a triangle reflect. Lengths in metres.
+struct Mesh {
+  std::vector<Eigen::Vector3f> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  /// One for each triangle.
+  std::vector<Surface> surfaces;
+
+  void add_triangle(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c,
+                    Surface surface);
+  /// Corners in order round the quadrangle.
+  void add_quad(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c,
+                const Eigen::Vector3f& d, Surface surface);
+  /// A copy of `part`, moved.
+  void append(const Mesh& part, const Eigen::Isometry3f& T_mesh_part);
+};
+
+/// Box between two corners, its edges along the axes.
+void add_box(Mesh& mesh, const Eigen::Vector3f& low, const Eigen::Vector3f& high, Surface surface);
+
+/// Upright block with a rectangular foot [x0, x1] x [-half_width, half_width] at height `z` and a
+/// rectangular top; the shape of a car's cabin.
+struct FrustumFace {
+  float x0, x1, half_width, z;
+};
+void add_frustum(Mesh& mesh, const FrustumFace& foot, const FrustumFace& top, Surface sides,
+                 Surface lid);
+
+/// Convex side view in the x-z plane, extruded to y = -half_width .. half_width.
+void add_prism(Mesh& mesh, std::span<const Eigen::Vector2f> profile_xz, float half_width,
+               Surface surface);
+
+/// Closed cylinder or cone from a to b.
+struct Tube {
+  Eigen::Vector3f a, b;
+  float radius_a, radius_b;
+  int sides = 8;
+};
+void add_tube(Mesh& mesh, const Tube& tube, Surface surface);
+
+void add_ellipsoid(Mesh& mesh, const Eigen::Vector3f& centre, const Eigen::Vector3f& radii,
+                   Surface surface);
+
+}  // namespace stillmap

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/simulation/mesh.hpp"
+#include "core/simulation/random.hpp"
+
+namespace stillmap {
+
+/// What an object is; gives its SemanticKITTI ids.
+enum class ObjectKind : std::uint8_t {
+  car,
+  truck,
+  bus,
+  bicycle,
+  motorcycle,
+  bicyclist,
+  motorcyclist,
+  person,
+};
+
+/// SemanticKITTI id of an object that stands, and of one that moves (252..259; things nobody
+/// moves have no id for it and keep the first).
+[[nodiscard]] std::uint16_t standing_label(ObjectKind kind);
+[[nodiscard]] std::uint16_t moving_label(ObjectKind kind);
+
+/// A body on the ground at the origin, front along +x [m].
+struct ObjectShape {
+  ObjectKind kind = ObjectKind::car;
+  float length_m = 0.0F, width_m = 0.0F;
+  Mesh mesh;
+};
+
+/// A shape of that kind: body type and size vary with `random`.
+[[nodiscard]] ObjectShape make_object(ObjectKind kind, Random random);
+
+}  // namespace stillmap

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "core/simulation/mesh.hpp"
+#include "core/simulation/random.hpp"
+
+namespace stillmap {
+
+/// People and two-wheelers on the ground, centred on the origin, front along +x.
+[[nodiscard]] Mesh make_person(Random& random);
+[[nodiscard]] Mesh make_bicycle();
+[[nodiscard]] Mesh make_motorcycle();
+[[nodiscard]] Mesh make_bicyclist();
+[[nodiscard]] Mesh make_motorcyclist();
+
+}  // namespace stillmap

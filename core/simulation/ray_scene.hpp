@@ -1,0 +1,79 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/simulation/mesh.hpp"
+
+namespace stillmap {
+
+struct Ray {
+  Eigen::Vector3f origin_map;
+  /// Unit length.
+  Eigen::Vector3f direction_map;
+  float max_range_m;
+  /// 0 = start, 1 = end of the scan.
+  float time = 0.0F;
+};
+
+struct RayHit {
+  float range_m;
+  /// Of the angle between ray and surface normal, 0..1.
+  float cos_incidence;
+  Surface surface;
+  /// Index of the body hit, in the order in which they were given to the scene.
+  std::size_t body;
+};
+
+/// A mesh that goes steadily from one pose to another during a scan.
+struct MovingMesh {
+  std::size_t mesh;
+  Eigen::Isometry3d T_map_start, T_map_end;
+};
+
+/// A body that stands for ever.
+struct StandingMesh {
+  std::size_t mesh;
+  Eigen::Isometry3d T_map_mesh;
+};
+
+class RaySnapshot;
+
+/// Meshes in a ray tracer's trees (Embree). Thread-safe once made.
+class RayScene {
+ public:
+  RayScene(std::vector<const Mesh*> meshes, std::span<const StandingMesh> standing);
+  ~RayScene();
+  RayScene(const RayScene&) = delete;
+  RayScene& operator=(const RayScene&) = delete;
+
+  /// The scene during one scan. Bodies count from the standing ones on.
+  [[nodiscard]] RaySnapshot with(std::span<const MovingMesh> moving) const;
+
+ private:
+  friend class RaySnapshot;
+  struct Trees;
+  std::unique_ptr<Trees> trees_;
+};
+
+/// The scene during one scan; must not outlive its `RayScene`. Thread-safe.
+class RaySnapshot {
+ public:
+  ~RaySnapshot();
+  RaySnapshot(RaySnapshot&&) noexcept;
+  RaySnapshot& operator=(RaySnapshot&&) = delete;
+
+  /// The nearest hit, if any.
+  [[nodiscard]] std::optional<RayHit> cast(const Ray& ray) const;
+
+ private:
+  friend class RayScene;
+  struct Bodies;
+  explicit RaySnapshot(std::unique_ptr<Bodies> bodies);
+  std::unique_ptr<Bodies> bodies_;
+};
+
+}  // namespace stillmap

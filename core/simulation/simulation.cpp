@@ -1,0 +1,230 @@
+#include "core/simulation/simulation.hpp"
+
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
+#include <cassert>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+#include <utility>
+
+#include "core/simulation/city.hpp"
+#include "core/simulation/ray_scene.hpp"
+#include "core/simulation/traffic.hpp"
+
+namespace stillmap {
+namespace {
+
+int firings_of(const SimulationConfig& config) {
+  if (config.firings > 0) return config.firings;
+  return config.sensor.rings > 32 ? 2083 : config.sensor.rings > 16 ? 2170 : 1800;
+}
+
+std::vector<double> elevations_of(const SensorModel& sensor) {
+  if (!sensor.beam_elevations.empty()) return sensor.beam_elevations;
+  std::vector<double> out;
+  for (int ring = 0; ring < sensor.rings; ++ring) {
+    const double part = sensor.rings > 1 ? static_cast<double>(ring) / (sensor.rings - 1) : 0.0;
+    out.push_back(sensor.fov_up + part * (sensor.fov_down - sensor.fov_up));
+  }
+  return out;
+}
+
+// What one beam saw in one firing; range 0: nothing.
+struct Pixel {
+  float range_m = 0.0F;
+  float intensity = 0.0F;
+  std::uint32_t label = 0;
+};
+
+std::vector<const Mesh*> all_meshes(const City& city, const Traffic& traffic) {
+  std::vector<const Mesh*> meshes{&city.fixed};
+  for (const Mesh& shape : city.shapes) meshes.push_back(&shape);
+  for (const ObjectShape& shape : traffic.shapes()) meshes.push_back(&shape.mesh);
+  return meshes;
+}
+
+std::vector<StandingMesh> standing_meshes(const City& city) {
+  std::vector<StandingMesh> standing{{0, Eigen::Isometry3d::Identity()}};
+  for (const Body& body : city.bodies) standing.push_back({body.shape + 1, body.T_map_body});
+  return standing;
+}
+
+}  // namespace
+
+struct Simulation::World {
+  explicit World(SimulationConfig c)
+      : config(std::move(c)),
+        ground(config.plan, config.seed),
+        city(build_city(ground, config.seed)),
+        traffic(ground, config.seed, {0.0, (config.scans + 1) * config.sensor.period_s},
+                city.instances),
+        scene(all_meshes(city, traffic), standing_meshes(city)),
+        firings(firings_of(config)) {
+    for (const double elevation : elevations_of(config.sensor)) {
+      beams.emplace_back(std::cos(elevation), std::sin(elevation));
+    }
+    for (int firing = 0; firing < firings; ++firing) {
+      const double azimuth = 2.0 * std::numbers::pi * firing / firings;
+      azimuths.emplace_back(std::cos(azimuth), std::sin(azimuth));
+    }
+    static_bodies.emplace_back();
+    static_bodies.insert(static_bodies.end(), city.bodies.begin(), city.bodies.end());
+  }
+
+  /// All bodies at a time: the standing ones as the scene counts them, then the movers.
+  [[nodiscard]] std::vector<Body> bodies_at(double time_s) const {
+    std::vector<Body> bodies = static_bodies;
+    for (const Mover& mover : traffic.movers()) bodies.push_back(traffic.body_at(mover, time_s));
+    return bodies;
+  }
+
+  [[nodiscard]] std::vector<MovingMesh> motions(double start_s, double end_s) const {
+    std::vector<MovingMesh> out;
+    for (const Mover& mover : traffic.movers()) {
+      const Body start = traffic.body_at(mover, start_s);
+      out.push_back({1 + city.shapes.size() + start.shape, start.T_map_body,
+                     traffic.body_at(mover, end_s).T_map_body});
+    }
+    return out;
+  }
+
+  [[nodiscard]] Eigen::Isometry3d T_map_lidar_at(double time_s) const {
+    // Springs: the body nods when it brakes, and is never quite still while it drives.
+    const double dt = 0.2;
+    const double v = traffic.ego_speed_at(time_s);
+    const double nod =
+        -0.006 * (traffic.ego_speed_at(time_s + dt) - traffic.ego_speed_at(time_s - dt)) / (2 * dt);
+    const double shake = 0.0015 * std::min(1.0, v / 5.0);
+    const double pitch = nod + shake * std::sin(7.3 * time_s);
+    const double roll = shake * std::sin(5.1 * time_s + 1.0);
+    Eigen::Isometry3d T_map_lidar = traffic.T_map_ego_at(time_s);
+    T_map_lidar.rotate(Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
+                       Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()));
+    return T_map_lidar * Eigen::Translation3d(0, 0, config.lidar_height_m);
+  }
+
+  [[nodiscard]] Pixel fire(const RaySnapshot& snapshot, const std::vector<Body>& bodies,
+                           const Ray& ray, Random random) const {
+    const std::optional<RayHit> hit = snapshot.cast(ray);
+    if (!hit) return {};
+    const Body& body = bodies[hit->body];
+    const SurfaceFacts facts = facts_of(hit->surface);
+    const auto seen =
+        beam_return(config.noise, hit->range_m, hit->cos_incidence, facts, body.brightness, random);
+    if (!seen || seen->range_m < config.sensor.min_range_m ||
+        seen->range_m > config.sensor.max_range_m) {
+      return {};
+    }
+    const std::uint32_t label = facts.label != 0 ? facts.label : body.label;
+    return {seen->range_m, seen->intensity,
+            label | static_cast<std::uint32_t>(body.instance) << 16U};
+  }
+
+  /// Unit vector in the lidar's frame.
+  [[nodiscard]] Eigen::Vector3f direction(std::size_t ring, int firing) const {
+    const Eigen::Vector2f& level = azimuths[static_cast<std::size_t>(firing)];
+    const Eigen::Vector2f& beam = beams[ring];
+    return {beam.x() * level.x(), beam.x() * level.y(), beam.y()};
+  }
+
+  [[nodiscard]] std::vector<Pixel> turn(int index) const;
+  [[nodiscard]] SimulatedScan collect(int index, const std::vector<Pixel>& pixels) const;
+
+  SimulationConfig config;
+  GroundShape ground;
+  City city;
+  Traffic traffic;
+  RayScene scene;
+  int firings;
+  /// Cosine and sine of each beam's elevation and of each firing's azimuth.
+  std::vector<Eigen::Vector2f> beams, azimuths;
+  std::vector<Body> static_bodies;
+};
+
+std::vector<Pixel> Simulation::World::turn(int index) const {
+  const double period_s = config.rolling ? config.sensor.period_s : 0.0;
+  const double start_s = index * config.sensor.period_s;
+  const std::vector<Body> bodies = bodies_at(start_s);
+  const RaySnapshot snapshot = scene.with(motions(start_s, start_s + period_s));
+  std::vector<Pixel> pixels(beams.size() * static_cast<std::size_t>(firings));
+  const Eigen::Isometry3d T_map_start = T_map_lidar_at(start_s);
+  const auto fire_column = [&](int firing) {
+    const double part = static_cast<double>(firing) / firings;
+    const Eigen::Isometry3f T_map_lidar =
+        (config.rolling ? T_map_lidar_at(start_s + part * period_s) : T_map_start).cast<float>();
+    for (std::size_t ring = 0; ring < beams.size(); ++ring) {
+      const std::size_t pixel =
+          ring * static_cast<std::size_t>(firings) + static_cast<std::size_t>(firing);
+      const Ray ray{T_map_lidar.translation(), T_map_lidar.linear() * direction(ring, firing),
+                    static_cast<float>(config.sensor.max_range_m), static_cast<float>(part)};
+      pixels[pixel] = fire(snapshot, bodies, ray,
+                           Random(config.seed, 41, static_cast<std::uint64_t>(index), pixel));
+    }
+  };
+  tbb::parallel_for(tbb::blocked_range<int>(0, firings, 32), [&](const auto& range) {
+    for (int firing = range.begin(); firing < range.end(); ++firing) fire_column(firing);
+  });
+  return pixels;
+}
+
+SimulatedScan Simulation::World::collect(int index, const std::vector<Pixel>& pixels) const {
+  SimulatedScan out;
+  const double start_s = index * config.sensor.period_s;
+  out.stamp_ns = std::llround(start_s * 1e9);
+  out.T_map_lidar = T_map_lidar_at(start_s);
+  out.scan.stamp_ns = out.stamp_ns;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const Pixel& pixel = pixels[i];
+    if (pixel.range_m <= 0.0F) continue;
+    const std::size_t ring = i / static_cast<std::size_t>(firings);
+    const auto firing = static_cast<int>(i % static_cast<std::size_t>(firings));
+    out.scan.points_lidar.emplace_back(pixel.range_m * direction(ring, firing));
+    out.scan.intensity.push_back(pixel.intensity);
+    out.scan.ring.push_back(static_cast<std::uint16_t>(ring));
+    out.scan.labels.push_back(
+        class_from_semantic_kitti(static_cast<std::uint16_t>(pixel.label & 0xFFFFU)));
+    out.raw_labels.push_back(pixel.label);
+    if (config.rolling) {
+      out.scan.time_offset_s.push_back(
+          static_cast<float>(config.sensor.period_s * firing / firings));
+    }
+  }
+  return out;
+}
+
+std::string SimulationConfig::faults() const {
+  std::string out = plan.faults() + sensor.faults() + noise.faults();
+  const auto check = [&](double value, double low, double high, const char* field) {
+    if (value >= low && value <= high) return;
+    out += std::string("simulation.") + field + " is " + std::to_string(value) + ", must be " +
+           std::to_string(low) + " to " + std::to_string(high) + '\n';
+  };
+  check(scans, 1, 100000, "scans");
+  check(firings, 0, 10000, "firings");
+  check(lidar_height_m, 0.3, 4.0, "lidar_height_m");
+  return out;
+}
+
+Simulation::Simulation(SimulationConfig config) {
+  if (const std::string faults = config.faults(); !faults.empty()) {
+    throw std::invalid_argument("The simulation cannot run:\n" + faults);
+  }
+  world_ = std::make_unique<World>(std::move(config));
+}
+
+Simulation::~Simulation() = default;
+
+const SimulationConfig& Simulation::config() const { return world_->config; }
+
+SimulatedScan Simulation::scan(int index) const {
+  assert(index >= 0 && index < world_->config.scans);
+  return world_->collect(index, world_->turn(index));
+}
+
+Eigen::Isometry3d Simulation::T_map_lidar_at(double time_s) const {
+  return world_->T_map_lidar_at(time_s);
+}
+
+}  // namespace stillmap

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/lidar/scan.hpp"
+#include "core/lidar/sensor_model.hpp"
+#include "core/simulation/beam_noise.hpp"
+#include "core/simulation/city_plan.hpp"
+
+namespace stillmap {
+
+struct SimulationConfig {
+  CityPlan plan = quiet_city();
+  /// Another seed is another city with other traffic.
+  std::uint64_t seed = 1;
+  SensorModel sensor = hdl_64e();
+  /// Scans that exist, one every `sensor.period_s`.
+  int scans = 400;
+  /// Firings of each beam in a revolution; 0: what the sensor does at 10 Hz.
+  int firings = 0;
+  /// True: the lidar and the traffic move while the lidar turns, every point has its time.
+  /// False: all points are of one instant.
+  bool rolling = false;
+  double lidar_height_m = 1.73;
+  BeamNoise noise;
+
+  /// Every fault in words, one a line; empty when it can be simulated.
+  [[nodiscard]] std::string faults() const;
+};
+
+/// A scan and the truth about it.
+struct SimulatedScan {
+  /// Ring after ring from the highest, each anticlockwise from straight ahead. Labels are those
+  /// of `raw_labels`, reduced to the network's classes. With `rolling`, points are in the lidar's
+  /// frame at their own time, else at the stamp.
+  Scan scan;
+  /// SemanticKITTI: class id (252..259 for what moves) in the low 16 bits, instance id in the high.
+  std::vector<std::uint32_t> raw_labels;
+  /// True pose of the lidar at the stamp.
+  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+  std::int64_t stamp_ns = 0;
+};
+
+/// A drive with a lidar through a made-up city. Deterministic: the same configuration gives the
+/// same bits, in whatever order and on however many threads. `scan` is thread-safe.
+class Simulation {
+ public:
+  /// @throws std::invalid_argument with all faults of the configuration.
+  explicit Simulation(SimulationConfig config);
+  ~Simulation();
+
+  [[nodiscard]] const SimulationConfig& config() const;
+  /// @pre 0 <= index < config().scans
+  [[nodiscard]] SimulatedScan scan(int index) const;
+  /// True pose of the lidar, `time_s` after the first scan's stamp.
+  [[nodiscard]] Eigen::Isometry3d T_map_lidar_at(double time_s) const;
+
+ private:
+  struct World;
+  std::unique_ptr<World> world_;
+};
+
+}  // namespace stillmap

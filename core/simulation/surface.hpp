@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+
+namespace stillmap {
+
+/// What a triangle is made of.
+enum class Surface : std::uint8_t {
+  asphalt,
+  lane_marking,
+  parking_bay,
+  pavement,
+  kerb,
+  grass,
+  plaster,
+  brick,
+  window,
+  roof,
+  fence_wood,
+  fence_metal,
+  garden_wall,
+  leaves,
+  hedge,
+  bark,
+  pole,
+  sign_face,
+  sign_back,
+  // From here on parts of objects: their class is the object's.
+  paint,
+  glass,
+  tyre,
+  licence_plate,
+  cloth,
+  skin,
+};
+
+struct SurfaceFacts {
+  /// SemanticKITTI id; 0: the class of the object it belongs to.
+  std::uint16_t label;
+  /// Share of light that comes back at right angles, 0..1; above 1: retroreflective.
+  float reflectivity;
+  /// Share of beams that never come back: mirrored away or let through.
+  float lost = 0.0F;
+};
+
+[[nodiscard]] SurfaceFacts facts_of(Surface surface);
+
+}  // namespace stillmap

@@ -1,0 +1,224 @@
+#include "core/simulation/traffic.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+namespace stillmap {
+namespace {
+
+constexpr float ego_length_m = 4.6F;
+// Traffic has sorted itself by the time of the first scan.
+constexpr double warm_up_s = 15.0;
+constexpr double stands_below_mps = 0.1;
+constexpr DriverModel vehicle_driver{};
+constexpr DriverModel walker{.acceleration_mps2 = 1.0,
+                             .braking_mps2 = 1.5,
+                             .headway_s = 0.4,
+                             .standstill_gap_m = 0.6,
+                             .side_acceleration_mps2 = 1.5};
+
+double wheelbase(ObjectKind kind) {
+  switch (kind) {
+    case ObjectKind::bus:
+      return 5.4;
+    case ObjectKind::truck:
+      return 5.0;
+    case ObjectKind::car:
+      return 2.6;
+    default:
+      return 1.0;
+  }
+}
+
+// One behind the other with uneven gaps, once round the lane.
+std::vector<LaneUser> spread_out(const LaneCrew& crew, double lane_m, double first_m,
+                                 Random& random) {
+  const std::vector<double>& lengths = crew.lengths_m;
+  const double occupied = std::accumulate(lengths.begin(), lengths.end(), 0.0);
+  const double gap = (lane_m - occupied) / static_cast<double>(lengths.size());
+  std::vector<LaneUser> users;
+  double rear = first_m - 0.5 * lengths.front();
+  for (std::size_t i = 0; i < lengths.size(); ++i) {
+    const double shift = i == 0 ? 0.0 : 0.35 * gap * random.uniform(-1.0, 1.0);
+    users.push_back({rear + 0.5 * lengths[i] + shift, lengths[i], crew.wishes_mps[i]});
+    rear += lengths[i] + gap;
+  }
+  return users;
+}
+
+}  // namespace
+
+void LaneCrew::add(std::optional<std::size_t> shape, double length_m, double wish_mps) {
+  shapes.push_back(shape);
+  lengths_m.push_back(length_m);
+  wishes_mps.push_back(wish_mps);
+}
+
+Traffic::Traffic(const GroundShape& ground, std::uint64_t seed, TimeSpan span,
+                 std::uint16_t first_instance)
+    : ground_(ground), span_{span.from_s - warm_up_s, span.to_s}, instances_(first_instance) {
+  const CityPlan& plan = ground.plan();
+  const TrafficPlan& traffic = plan.traffic;
+  Random random(seed, 31);
+  for (std::size_t i = 0; i < plan.crossings.size(); ++i) {
+    lights_.push_back(
+        {traffic.light_period_s, traffic.light_red_s, random.uniform(0.0, traffic.light_period_s)});
+  }
+  add_shapes(random);
+  const StreetProfile& profile = plan.route_profile;
+  for (const bool reversed : {false, true}) {
+    for (int lane = 0; lane < profile.lanes; ++lane) add_vehicle_lane(reversed, lane, random);
+    add_slow_lane(ObjectKind::bicyclist, reversed, profile.bike_centre_m(), 5.0,
+                  traffic.cyclists_per_km, random);
+    // Two walking lanes a sidewalk, against each other.
+    const double back = profile.half_street_m();
+    const double walk_m = traffic.pedestrians_per_km / 2.0;
+    add_slow_lane(ObjectKind::person, reversed, back - 0.6, 1.35, walk_m, random);
+    add_slow_lane(ObjectKind::person, !reversed, -(back - 1.5), 1.35, walk_m, random);
+  }
+  add_crossing_people(random);
+}
+
+void Traffic::add_shapes(Random& random) {
+  constexpr std::array<std::pair<ObjectKind, int>, 5> variants{{{ObjectKind::car, 12},
+                                                                {ObjectKind::truck, 4},
+                                                                {ObjectKind::bus, 1},
+                                                                {ObjectKind::bicyclist, 1},
+                                                                {ObjectKind::person, 8}}};
+  for (const auto& [kind, count] : variants) {
+    for (int i = 0; i < count; ++i) {
+      shapes_.push_back(make_object(kind, Random(random.index(1U << 30U))));
+    }
+  }
+}
+
+std::size_t Traffic::random_shape(ObjectKind kind, Random& random) const {
+  const auto first = std::ranges::find(shapes_, kind, &ObjectShape::kind);
+  const auto count = std::ranges::count(shapes_, kind, &ObjectShape::kind);
+  return static_cast<std::size_t>(first - shapes_.begin()) +
+         random.index(static_cast<std::size_t>(count));
+}
+
+ObjectKind Traffic::random_vehicle(Random& random) const {
+  const TrafficPlan& traffic = ground_.plan().traffic;
+  const double kind = random.uniform();
+  if (kind < traffic.share_trucks) return ObjectKind::truck;
+  return kind < traffic.share_trucks + traffic.share_buses ? ObjectKind::bus : ObjectKind::car;
+}
+
+void Traffic::add_mover(std::size_t shape, std::size_t path, Track track, Random& random) {
+  movers_.push_back(
+      {shape, path, std::move(track), ++instances_, static_cast<float>(random.uniform(0.25, 1.5))});
+}
+
+std::vector<StopLine> Traffic::stop_lines(const Path& path) const {
+  const CityPlan& plan = ground_.plan();
+  std::vector<StopLine> stops;
+  for (std::size_t i = 0; i < plan.crossings.size(); ++i) {
+    stops.push_back({path.nearest(plan.crossings[i]) - 3.6, lights_[i]});
+  }
+  return stops;
+}
+
+LaneCrew Traffic::vehicle_crew(const Path& lane, std::optional<ObjectKind> escort, bool with_ego,
+                               Random& random) const {
+  const TrafficPlan& traffic = ground_.plan().traffic;
+  LaneCrew crew;
+  if (with_ego) crew.add(std::nullopt, ego_length_m, traffic.speed_mps);
+  if (escort) {
+    const std::size_t shape = random_shape(*escort, random);
+    crew.add(shape, shapes_[shape].length_m, traffic.speed_mps);
+  }
+  const auto wanted = static_cast<std::size_t>(traffic.vehicles_per_km * lane.length_m() / 1000.0);
+  // Room for everybody at walking pace, whatever is drawn.
+  double room_m = lane.length_m() - 40.0;
+  while (crew.shapes.size() < wanted) {
+    const std::size_t shape = random_shape(random_vehicle(random), random);
+    room_m -= shapes_[shape].length_m + 3.0;
+    if (room_m < 0.0) break;
+    const double wish = 1.0 + traffic.speed_spread * random.uniform(-1.0, 1.0);
+    crew.add(shape, shapes_[shape].length_m, traffic.speed_mps * wish);
+  }
+  return crew;
+}
+
+Eigen::Vector2d Traffic::ego_start_plan() const {
+  const CityPlan& plan = ground_.plan();
+  const double offset = plan.route_profile.lane_centre_m(plan.ego_lane);
+  return route_path(ground_, false, offset).at(plan.ego_start_m).plan;
+}
+
+void Traffic::add_vehicle_lane(bool reversed, int lane, Random& random) {
+  const CityPlan& plan = ground_.plan();
+  const bool with_ego = !reversed && lane == plan.ego_lane;
+  const bool beside_ego = !reversed && std::abs(lane - plan.ego_lane) == 1;
+  std::optional<ObjectKind> escort;
+  if (plan.traffic.escorted && beside_ego) {
+    escort = lane < plan.ego_lane ? ObjectKind::truck : ObjectKind::bus;
+  }
+  Path path = route_path(ground_, reversed, plan.route_profile.lane_centre_m(lane));
+  const LaneCrew crew = vehicle_crew(path, escort, with_ego, random);
+  double first_m = random.uniform(0.0, path.length_m());
+  if (with_ego) first_m = plan.ego_start_m;
+  if (escort) first_m = path.nearest(ego_start_plan()) + random.uniform(-4.0, 4.0);
+  const std::vector<StopLine> stops = stop_lines(path);
+  add_crew(crew, std::move(path), first_m, vehicle_driver, stops, random);
+}
+
+void Traffic::add_slow_lane(ObjectKind kind, bool reversed, double offset_m, double wish_mps,
+                            double per_km, Random& random) {
+  const bool walks = kind == ObjectKind::person;
+  Path path = walks ? route_path(ground_, reversed, offset_m, 1.0)
+                    : route_path(ground_, reversed, offset_m);
+  const auto count = static_cast<std::size_t>(per_km * path.length_m() / 1000.0);
+  LaneCrew crew;
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t shape = random_shape(kind, random);
+    crew.add(shape, shapes_[shape].length_m, wish_mps * random.uniform(0.85, 1.15));
+  }
+  const double first_m = random.uniform(0.0, path.length_m());
+  const auto stops = walks ? std::vector<StopLine>{} : stop_lines(path);
+  add_crew(crew, std::move(path), first_m, walker, stops, random);
+}
+
+void Traffic::add_crew(const LaneCrew& crew, Path lane, double first_m, const DriverModel& driver,
+                       const std::vector<StopLine>& stops, Random& random) {
+  if (crew.shapes.empty()) return;
+  const auto users = spread_out(crew, lane.length_m(), first_m, random);
+  std::vector<Track> tracks = drive_lane(lane, users, stops, driver, span_);
+  paths_.push_back(std::move(lane));
+  for (std::size_t i = 0; i < tracks.size(); ++i) {
+    if (crew.shapes[i]) {
+      add_mover(*crew.shapes[i], paths_.size() - 1, std::move(tracks[i]), random);
+    } else {
+      ego_.push_back({.path = paths_.size() - 1, .track = std::move(tracks[i])});
+    }
+  }
+}
+
+Body Traffic::body_at(const Mover& mover, double time_s) const {
+  const Path::Spot spot = paths_[mover.path].at(mover.track.position_at(time_s));
+  const ObjectKind kind = shapes_[mover.shape].kind;
+  const bool moving = mover.track.speed_at(time_s) > stands_below_mps;
+  return {
+      .shape = mover.shape,
+      .T_map_body = kind == ObjectKind::person
+                        ? ground_.frame_at(spot.plan, spot.heading_plan)
+                        : ground_.leaning_frame_at(spot.plan, spot.heading_plan, wheelbase(kind)),
+      .label = moving ? moving_label(kind) : standing_label(kind),
+      .instance = mover.instance,
+      .brightness = mover.brightness};
+}
+
+Eigen::Isometry3d Traffic::T_map_ego_at(double time_s) const {
+  const Mover& ego = ego_.front();
+  const Path::Spot spot = paths_[ego.path].at(ego.track.position_at(time_s));
+  return ground_.leaning_frame_at(spot.plan, spot.heading_plan, wheelbase(ObjectKind::car));
+}
+
+double Traffic::ego_speed_at(double time_s) const { return ego_.front().track.speed_at(time_s); }
+
+}  // namespace stillmap
