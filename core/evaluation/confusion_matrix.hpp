@@ -1,0 +1,36 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "core/lidar/semantic_class.hpp"
+
+namespace stillmap {
+
+/// Counts of (true class, predicted class), as semantic-kitti-api counts them: points whose truth
+/// is `unlabeled` are left out, a labelled point that was predicted `unlabeled` is a miss.
+class ConfusionMatrix {
+ public:
+  /// Counts one scan. Throws std::invalid_argument when the lengths differ.
+  void add(std::span<const SemanticClass> truth, std::span<const SemanticClass> predicted);
+
+  [[nodiscard]] std::uint64_t count(SemanticClass truth, SemanticClass predicted) const;
+  /// Points counted.
+  [[nodiscard]] std::uint64_t total() const;
+
+  /// TP / (TP + FP + FN); nothing for a class that was neither seen nor predicted.
+  [[nodiscard]] std::optional<double> iou(SemanticClass label) const;
+  /// Mean over all 19 classes; one that never occurs counts 0, as in semantic-kitti-api.
+  [[nodiscard]] double mean_iou() const;
+  /// Mean over the classes that were seen or predicted; nothing when there are none.
+  [[nodiscard]] std::optional<double> mean_iou_of_present() const;
+  /// Share of points with the right class; nothing when no point was counted.
+  [[nodiscard]] std::optional<double> accuracy() const;
+
+ private:
+  std::array<std::array<std::uint64_t, semantic_class_count>, semantic_class_count> counts_{};
+};
+
+}  // namespace stillmap

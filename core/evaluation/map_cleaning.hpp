@@ -1,0 +1,58 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <unordered_map>
+#include <vector>
+
+namespace stillmap {
+
+/// What the map should hold and what not, from labelled scans at known poses: 0.2 m voxels, each
+/// with the label that most of its points have.
+class MapTruth {
+ public:
+  explicit MapTruth(double voxel_size_m = 0.2);
+
+  /// Adds points of the map frame [m] with their original SemanticKITTI ids; unlabeled (0) and
+  /// outlier (1) points are left out. Throws std::invalid_argument when lengths differ.
+  void add(std::span<const Eigen::Vector3f> points_map,
+           std::span<const std::uint16_t> original_ids);
+
+  struct Voxel {
+    /// Mean of the points in it.
+    Eigen::Vector3f mean_map = Eigen::Vector3f::Zero();
+    std::uint32_t moving_points = 0;
+    /// Points of vehicles and people that stand still.
+    std::uint32_t parked_points = 0;
+    std::uint32_t fixed_points = 0;
+  };
+  [[nodiscard]] std::vector<Voxel> voxels() const;
+  [[nodiscard]] double voxel_size_m() const { return voxel_size_m_; }
+
+ private:
+  double voxel_size_m_;
+  std::unordered_map<std::uint64_t, Voxel> voxels_;
+};
+
+/// Preservation and rejection rate of a cleaned map (H. Lim et al., ERASOR, RA-L 2021): a true
+/// voxel is kept when a map point lies within half the voxel's diagonal of it.
+struct MapCleaningScore {
+  std::uint64_t fixed_voxels = 0, fixed_kept = 0;
+  std::uint64_t parked_voxels = 0, parked_kept = 0;
+  std::uint64_t moving_voxels = 0, moving_kept = 0;
+
+  /// Kept share of what is fixed. Our planning map leaves parked vehicles out on purpose (paper
+  /// II-C.2), so they do not count here.
+  [[nodiscard]] std::optional<double> preservation_rate() const;
+  /// As ERASOR counts: parked vehicles are static as well.
+  [[nodiscard]] std::optional<double> preservation_rate_with_parked() const;
+  /// Share of moving voxels that is not in the map.
+  [[nodiscard]] std::optional<double> rejection_rate() const;
+};
+
+[[nodiscard]] MapCleaningScore map_cleaning_score(const MapTruth& truth,
+                                                  std::span<const Eigen::Vector3f> points_map);
+
+}  // namespace stillmap

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "core/lidar/motion.hpp"
+
+namespace stillmap {
+
+/// How well moving points are told from the rest. Rates are empty where they would divide by zero.
+struct MovingScore {
+  std::uint64_t true_positives = 0;
+  std::uint64_t false_positives = 0;
+  std::uint64_t false_negatives = 0;
+
+  [[nodiscard]] std::optional<double> precision() const;
+  [[nodiscard]] std::optional<double> recall() const;
+  [[nodiscard]] std::optional<double> iou() const;
+
+  MovingScore& operator+=(const MovingScore& other);
+};
+
+/// Scores Motion::highly_dynamic against SemanticKITTI's moving ids 252..259. Points whose truth is
+/// unlabeled (0) or outlier (1) do not count. Throws std::invalid_argument when lengths differ.
+[[nodiscard]] MovingScore moving_score(std::span<const Motion> motion,
+                                       std::span<const std::uint16_t> original_ids);
+
+}  // namespace stillmap
