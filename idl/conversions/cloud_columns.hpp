@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstring>
+#include <string>
+#include <utility>
+
+#include "idl/conversions/header.hpp"
+#include "idl/conversions/point_field.hpp"
+#include "sensor_msgs.h"
+
+namespace stillmap::wire {
+
+/// Builds an unordered cloud: declare the fields, give it its size, fill column by column.
+class CloudColumns {
+ public:
+  CloudColumns(std::int64_t stamp_ns, const std::string& frame) {
+    cloud_.header(to_header(stamp_ns, frame));
+  }
+
+  /// Appends a field; returns its offset.
+  std::uint32_t add_field(const std::string& name, FieldType type) {
+    sensor_msgs::msg::PointField field;
+    field.name(name);
+    field.offset(cloud_.point_step());
+    field.datatype(static_cast<std::uint8_t>(type));
+    field.count(1);
+    cloud_.fields().push_back(field);
+    cloud_.point_step(cloud_.point_step() + static_cast<std::uint32_t>(size_of(type)));
+    return field.offset();
+  }
+
+  /// After the last field, before the first value.
+  void resize(std::size_t points) {
+    cloud_.height(1);
+    cloud_.width(static_cast<std::uint32_t>(points));
+    cloud_.row_step(cloud_.width() * cloud_.point_step());
+    cloud_.data().resize(cloud_.row_step());
+  }
+
+  /// Writes `value(i)` for every point. The value's type must be the field's.
+  template <typename Value>
+  void fill(std::uint32_t offset, Value value) {
+    std::uint8_t* at = cloud_.data().data() + offset;
+    for (std::size_t i = 0; i < cloud_.width(); ++i, at += cloud_.point_step()) {
+      const auto one = value(i);
+      std::memcpy(at, &one, sizeof one);
+    }
+  }
+
+  [[nodiscard]] sensor_msgs::msg::PointCloud2 take() { return std::move(cloud_); }
+
+ private:
+  sensor_msgs::msg::PointCloud2 cloud_;
+};
+
+}  // namespace stillmap::wire

@@ -1,0 +1,119 @@
+#include "idl/conversions/cloud_to_scan.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/lidar/point_time.hpp"
+#include "idl/conversions/header.hpp"
+#include "sensor_msgs.h"
+
+namespace stillmap::wire {
+namespace {
+
+using sensor_msgs::msg::PointCloud2;
+
+// Floating-point times beyond this cannot be seconds (30 million years): some drivers write
+// nanoseconds since the epoch into a double.
+constexpr double largest_plausible_s = 1e15;
+constexpr double s_per_ns = 1e-9;
+
+/// Calls `use(i, value)` for the column's value in every point, rows in order.
+template <typename Use>
+void for_each_value(const PointCloud2& cloud, const CloudLayout& layout, const PointColumn& column,
+                    Use use) {
+  with_type(column.type, [&]<typename T>(T) {
+    std::size_t i = 0;
+    for (std::size_t row = 0; row < layout.height; ++row) {
+      const std::uint8_t* at = cloud.data().data() + row * layout.row_step + column.offset;
+      for (std::size_t in_row = 0; in_row < layout.width; ++in_row, ++i) {
+        use(i, load<T>(at + in_row * layout.point_step, layout.swap_bytes));
+      }
+    }
+  });
+}
+
+std::vector<Eigen::Vector3f> read_points(const PointCloud2& cloud, const CloudLayout& layout) {
+  std::vector<Eigen::Vector3f> points_lidar(layout.points());
+  const auto read_axis = [&](const PointColumn& column, int axis) {
+    for_each_value(cloud, layout, column, [&](std::size_t i, auto value) {
+      points_lidar[i][axis] = static_cast<float>(value);
+    });
+  };
+  read_axis(layout.x, 0);
+  read_axis(layout.y, 1);
+  read_axis(layout.z, 2);
+  return points_lidar;
+}
+
+std::vector<float> read_intensity(const PointCloud2& cloud, const CloudLayout& layout,
+                                  float scale) {
+  if (!layout.intensity) return {};
+  std::vector<float> intensity(layout.points());
+  for_each_value(cloud, layout, *layout.intensity, [&](std::size_t i, auto value) {
+    intensity[i] = static_cast<float>(value) * scale;
+  });
+  return intensity;
+}
+
+std::vector<std::uint16_t> read_ring(const PointCloud2& cloud, const CloudLayout& layout) {
+  if (!layout.ring) return {};
+  std::vector<std::uint16_t> ring(layout.points());
+  for_each_value(cloud, layout, *layout.ring, [&](std::size_t i, auto value) {
+    ring[i] = static_cast<std::uint16_t>(std::clamp<double>(value, 0.0, 65535.0));
+  });
+  return ring;
+}
+
+std::vector<float> read_time(const PointCloud2& cloud, const CloudLayout& layout,
+                             std::int64_t stamp) {
+  if (!layout.time) return {};
+  std::vector<double> times_s(layout.points());
+  const bool integers = is_integer(layout.time->type);
+  for_each_value(cloud, layout, *layout.time, [&](std::size_t i, auto value) {
+    const auto time = static_cast<double>(value);
+    times_s[i] = integers || std::abs(time) > largest_plausible_s ? time * s_per_ns : time;
+  });
+  return time_offsets_from_seconds(times_s, stamp);
+}
+
+SemanticClass class_of(std::uint32_t value, bool is_class) {
+  if (!is_class) {
+    // The upper half of a SemanticKITTI label is the instance.
+    return class_from_semantic_kitti(static_cast<std::uint16_t>(value & 0xFFFFU));
+  }
+  return value < semantic_class_count ? static_cast<SemanticClass>(value)
+                                      : SemanticClass::unlabeled;
+}
+
+std::vector<SemanticClass> read_labels(const PointCloud2& cloud, const CloudLayout& layout,
+                                       bool are_classes) {
+  if (!layout.label) return {};
+  std::vector<SemanticClass> labels(layout.points());
+  for_each_value(cloud, layout, *layout.label, [&](std::size_t i, auto value) {
+    labels[i] = class_of(static_cast<std::uint32_t>(value), are_classes);
+  });
+  return labels;
+}
+
+}  // namespace
+
+ScanFromCloud to_scan(const PointCloud2& cloud, const CloudReading& reading) {
+  const auto stamp = stamp_ns(cloud.header().stamp());
+  if (!stamp) {
+    return {.scan = std::nullopt,
+            .fault = {"bad_stamp", "header.stamp.nanosec is " +
+                                       std::to_string(cloud.header().stamp().nanosec()) +
+                                       ", a second or more"}};
+  }
+  const auto [layout, fault] = check_layout(cloud, reading.fields);
+  if (!layout) return {.scan = std::nullopt, .fault = fault};
+  return {.scan = Scan{.stamp_ns = *stamp,
+                       .points_lidar = read_points(cloud, *layout),
+                       .intensity = read_intensity(cloud, *layout, reading.intensity_scale),
+                       .time_offset_s = read_time(cloud, *layout, *stamp),
+                       .ring = read_ring(cloud, *layout),
+                       .labels = read_labels(cloud, *layout, reading.labels_are_classes)},
+          .fault = {}};
+}
+
+}  // namespace stillmap::wire

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <optional>
+
+#include "core/lidar/scan.hpp"
+#include "idl/conversions/cloud_layout.hpp"
+
+namespace stillmap::wire {
+
+/// How the fields of incoming clouds are to be understood.
+struct CloudReading {
+  PointFieldCandidates fields;
+  /// Brings the sensor's intensity to 0..1.
+  float intensity_scale = 1.0F;
+  /// The label field holds classes 0..19; otherwise original SemanticKITTI ids, of which only the
+  /// class is kept (moving-car becomes car).
+  bool labels_are_classes = false;
+};
+
+/// Either a scan or a fault.
+struct ScanFromCloud {
+  std::optional<Scan> scan;
+  CloudFault fault;
+};
+
+/// Reads a cloud of any field types and byte order; any input is fine. Points that are not finite
+/// stay in. Times: integers are nanoseconds, floats seconds, either relative or absolute.
+[[nodiscard]] ScanFromCloud to_scan(const sensor_msgs::msg::PointCloud2& cloud,
+                                    const CloudReading& reading);
+
+}  // namespace stillmap::wire

@@ -1,0 +1,44 @@
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/map/map_query.hpp"
+#include "stillmap_msgs.h"
+
+namespace stillmap::wire {
+
+/// Codes of stillmap_msgs/ReplyStatus; the first three are QueryStatus's.
+enum class ReplyCode : std::uint8_t {
+  ok = 0,
+  invalid_request = 1,
+  stale_continuation = 2,
+  failed = 3,
+};
+
+[[nodiscard]] stillmap_msgs::msg::ReplyStatus to_reply_status(ReplyCode code,
+                                                              const std::string& reason,
+                                                              std::uint64_t map_version,
+                                                              std::uint64_t map_id);
+
+/// Why a request of this format version cannot be understood; nothing when it can.
+[[nodiscard]] std::optional<std::string> version_fault(std::uint8_t format_version);
+
+[[nodiscard]] stillmap_msgs::srv::GetStaticMap_Request to_request(const MapQuery& query);
+
+/// Either a query or what is wrong with the request. Whether the box makes sense is for
+/// query_map to say.
+struct QueryFromRequest {
+  std::optional<MapQuery> query;
+  std::string fault;
+};
+[[nodiscard]] QueryFromRequest from_request(
+    const stillmap_msgs::srv::GetStaticMap_Request& request);
+
+[[nodiscard]] stillmap_msgs::srv::GetStaticMap_Response to_response(const MapQueryResult& result);
+
+/// Nothing when the arrays of the response do not fit each other.
+[[nodiscard]] std::optional<MapQueryResult> from_response(
+    const stillmap_msgs::srv::GetStaticMap_Response& response);
+
+}  // namespace stillmap::wire

@@ -1,0 +1,52 @@
+#include "idl/conversions/map_to_cloud.hpp"
+
+#include <vector>
+
+#include "idl/conversions/cloud_columns.hpp"
+
+namespace stillmap::wire {
+namespace {
+
+std::vector<const Voxel*> voxels_in(const MapView& view, const Eigen::AlignedBox2f& window_map) {
+  std::vector<const Voxel*> inside;
+  for (const auto& tile : view.tiles) {
+    const auto& bounds = tile->info.bounds_map;
+    const Eigen::AlignedBox2f footprint(bounds.min().head<2>(), bounds.max().head<2>());
+    if (!window_map.intersects(footprint)) continue;
+    for (const Voxel& voxel : tile->voxels) {
+      if (window_map.contains(voxel.mean_map.head<2>())) inside.push_back(&voxel);
+    }
+  }
+  return inside;
+}
+
+std::uint32_t packed(Rgb colour) {
+  return (std::uint32_t{colour.r} << 16U) | (std::uint32_t{colour.g} << 8U) | colour.b;
+}
+
+}  // namespace
+
+sensor_msgs::msg::PointCloud2 to_cloud(const MapView& view, const Eigen::AlignedBox2f& window_map,
+                                       std::int64_t stamp_ns, const std::string& map_frame) {
+  const auto voxels = voxels_in(view, window_map);
+  CloudColumns columns(stamp_ns, map_frame);
+  const auto x = columns.add_field("x", FieldType::float32);
+  const auto y = columns.add_field("y", FieldType::float32);
+  const auto z = columns.add_field("z", FieldType::float32);
+  // RViz2 wants the packed colour declared as a float.
+  const auto rgb = columns.add_field("rgb", FieldType::float32);
+  const auto confidence = columns.add_field("confidence", FieldType::float32);
+  const auto label = columns.add_field("label", FieldType::uint8);
+  columns.resize(voxels.size());
+  columns.fill(x, [&](std::size_t i) { return voxels[i]->mean_map.x(); });
+  columns.fill(y, [&](std::size_t i) { return voxels[i]->mean_map.y(); });
+  columns.fill(z, [&](std::size_t i) { return voxels[i]->mean_map.z(); });
+  columns.fill(rgb, [&](std::size_t i) { return packed(colour(voxels[i]->evidence.winner())); });
+  columns.fill(confidence, [&](std::size_t i) { return voxels[i]->evidence.share(); });
+  columns.fill(label, [&](std::size_t i) {
+    return static_cast<std::uint8_t>(voxels[i]->evidence.winner());
+  });
+  return columns.take();
+}
+
+}  // namespace stillmap::wire

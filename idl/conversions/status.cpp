@@ -1,0 +1,86 @@
+#include "idl/conversions/status.hpp"
+
+#include "idl/conversions/header.hpp"
+#include "idl/topics.hpp"
+
+namespace stillmap::wire {
+namespace {
+
+void add_lists(const ServerStatus& status, stillmap_msgs::msg::Status& message) {
+  for (const NamedCounter& counter : status.counters) {
+    auto& out = message.counters().emplace_back();
+    out.name(counter.name);
+    out.value(counter.value);
+  }
+  for (const StageLatency& latency : status.latencies) {
+    auto& out = message.latencies().emplace_back();
+    out.stage(latency.stage);
+    out.p50_ms(latency.p50_ms);
+    out.p99_ms(latency.p99_ms);
+    out.max_ms(latency.max_ms);
+    out.samples(latency.samples);
+  }
+}
+
+void add_lists(const stillmap_msgs::msg::Status& message, ServerStatus& status) {
+  for (const auto& counter : message.counters()) {
+    status.counters.push_back({.name = counter.name(), .value = counter.value()});
+  }
+  for (const auto& latency : message.latencies()) {
+    status.latencies.push_back({.stage = latency.stage(),
+                                .p50_ms = latency.p50_ms(),
+                                .p99_ms = latency.p99_ms(),
+                                .max_ms = latency.max_ms(),
+                                .samples = latency.samples()});
+  }
+}
+
+}  // namespace
+
+stillmap_msgs::msg::Status to_wire(const ServerStatus& status) {
+  stillmap_msgs::msg::Status message;
+  message.format_version(wire_format_version);
+  message.stamp(to_stamp(status.stamp_ns));
+  message.software_version(status.software_version);
+  message.uptime_s(status.uptime_s);
+  message.delivery(static_cast<std::uint8_t>(status.delivery));
+  message.label_source(status.label_source);
+  message.health(static_cast<std::uint8_t>(status.health));
+  message.reason(status.reason);
+  message.received_hz(status.received_hz);
+  message.mapped_hz(status.mapped_hz);
+  message.map_version(status.map_version);
+  message.map_id(status.map_id);
+  message.tile_count(status.tile_count);
+  message.voxel_count(status.voxel_count);
+  add_lists(status, message);
+  return message;
+}
+
+std::optional<ServerStatus> from_wire(const stillmap_msgs::msg::Status& message) {
+  const auto stamp = stamp_ns(message.stamp());
+  if (message.format_version() != wire_format_version || !stamp ||
+      message.delivery() > static_cast<std::uint8_t>(DeliveryMode::every) ||
+      message.health() > static_cast<std::uint8_t>(OdometryHealth::lost)) {
+    return std::nullopt;
+  }
+  ServerStatus status{.stamp_ns = *stamp,
+                      .software_version = message.software_version(),
+                      .uptime_s = message.uptime_s(),
+                      .delivery = static_cast<DeliveryMode>(message.delivery()),
+                      .label_source = message.label_source(),
+                      .health = static_cast<OdometryHealth>(message.health()),
+                      .reason = message.reason(),
+                      .received_hz = message.received_hz(),
+                      .mapped_hz = message.mapped_hz(),
+                      .map_version = message.map_version(),
+                      .map_id = message.map_id(),
+                      .tile_count = message.tile_count(),
+                      .voxel_count = message.voxel_count(),
+                      .counters = {},
+                      .latencies = {}};
+  add_lists(message, status);
+  return status;
+}
+
+}  // namespace stillmap::wire

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "core/map/tile.hpp"
+#include "idl/map_identity.hpp"
+#include "stillmap_msgs.h"
+
+namespace stillmap::wire {
+
+[[nodiscard]] MapIdentity identity_of(const MapView& view);
+[[nodiscard]] stillmap_msgs::msg::MapIdentity to_wire(const MapIdentity& identity);
+[[nodiscard]] MapIdentity from_wire(const stillmap_msgs::msg::MapIdentity& identity);
+
+[[nodiscard]] stillmap_msgs::msg::TileInfo to_wire(const TileInfo& info,
+                                                   const MapIdentity& identity);
+/// Nothing for a format version that is not ours.
+[[nodiscard]] std::optional<TileInfo> from_wire(const stillmap_msgs::msg::TileInfo& message);
+
+[[nodiscard]] stillmap_msgs::msg::MapTile to_wire(const Tile& tile, const MapIdentity& identity);
+/// Of a voxel's evidence only the winner comes back, its weight being the confidence; times do not
+/// come back. Nothing for another format version, or arrays of different lengths.
+[[nodiscard]] std::optional<Tile> from_wire(const stillmap_msgs::msg::MapTile& message);
+
+/// Gives all arrays this length.
+void resize(stillmap_msgs::msg::Voxels& voxels, std::size_t count);
+
+/// True when all arrays have one length and all classes exist.
+[[nodiscard]] bool consistent(const stillmap_msgs::msg::Voxels& voxels);
+
+}  // namespace stillmap::wire

@@ -1,0 +1,131 @@
+#include "idl/dds/participant.hpp"
+
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/Topic.hpp>
+#include <string_view>
+
+#include "idl/dds/ros_graph.hpp"
+#include "idl/dds/transports.hpp"
+
+namespace stillmap {
+namespace {
+
+using namespace eprosima::fastdds::dds;
+
+// The largest domain whose ports fit into 16 bits.
+constexpr std::uint32_t largest_domain_id = 232;
+
+DomainParticipantQos participant_qos(const DdsOptions& options) {
+  DomainParticipantQos qos;
+  qos.name(options.node_name.empty() ? "stillmap" : options.node_name);
+  // ROS 2 ignores participants without it.
+  constexpr std::string_view enclave = "enclave=/;";
+  qos.user_data().assign(enclave.begin(), enclave.end());
+  qos.transport().use_builtin_transports = false;
+  qos.transport().user_transports = make_transports(options);
+  auto& builtin = qos.wire_protocol().builtin;
+  builtin.readerHistoryMemoryPolicy = builtin.writerHistoryMemoryPolicy =
+      eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  // A peer that was killed is forgotten after 10 s, not 20; one whose first announcements got lost
+  // is found after 1 s, not 3.
+  builtin.discovery_config.leaseDuration = to_duration(std::chrono::seconds(10));
+  builtin.discovery_config.leaseDuration_announcementperiod = to_duration(std::chrono::seconds(1));
+  return qos;
+}
+
+}  // namespace
+
+Participant::Participant(const DdsOptions& options)
+    : options_(options),
+      factory_(DomainParticipantFactory::get_shared_instance()),
+      handle_(join()),
+      publisher_(handle_->create_publisher(PUBLISHER_QOS_DEFAULT)),
+      subscriber_(handle_->create_subscriber(SUBSCRIBER_QOS_DEFAULT)) {
+  if (publisher_ == nullptr || subscriber_ == nullptr) throw failure("cannot make endpoints");
+  if (!options_.node_name.empty()) {
+    // The announcing writer itself is no part of the node, so no graph exists while it is made.
+    auto graph = std::make_unique<RosGraph>(*this, handle_->guid());
+    graph_ = std::move(graph);
+  }
+}
+
+Participant::~Participant() {
+  // Out of reach first: the graph's own writer must not be announced as removed from it.
+  const auto graph = std::move(graph_);
+}
+
+Participant::Handle Participant::join() const {
+  if (options_.domain_id > largest_domain_id) {
+    throw failure("domain ids go from 0 to 232");
+  }
+  DomainParticipant* const made = factory_->create_participant(
+      static_cast<DomainId_t>(options_.domain_id), participant_qos(options_));
+  if (made == nullptr) {
+    throw failure("Fast DDS made no participant; check that the interfaces exist on this machine " +
+                  std::string("(`ip address`) and that /dev/shm can be written"));
+  }
+  const auto leave = [factory = factory_](DomainParticipant* participant) {
+    participant->delete_contained_entities();
+    factory->delete_participant(participant);
+  };
+  return Handle(made, leave);
+}
+
+DdsError Participant::failure(const std::string& what) const {
+  std::string text = "DDS domain " + std::to_string(options_.domain_id);
+  for (const std::string& address : options_.interfaces) text += ", interface " + address;
+  return DdsError(text + ": " + what);
+}
+
+Topic* Participant::topic(const std::string& name, TypeSupport type) {
+  if (const auto known = topics_.find(name); known != topics_.end()) {
+    if (known->second->get_type_name() != type.get_type_name()) {
+      throw failure("topic " + name + " has type " + known->second->get_type_name() + ", not " +
+                    type.get_type_name());
+    }
+    return known->second;
+  }
+  type.register_type(handle_.get());
+  Topic* const made = handle_->create_topic(name, type.get_type_name(), TOPIC_QOS_DEFAULT);
+  if (made == nullptr) throw failure("cannot make topic " + name);
+  topics_.emplace(name, made);
+  return made;
+}
+
+Participant::WriterHandle Participant::make_writer(const std::string& name, TypeSupport type,
+                                                   const TopicQos& qos,
+                                                   DataWriterListener* listener) {
+  const std::scoped_lock lock(mutex_);
+  DataWriter* const made =
+      publisher_->create_datawriter(topic(name, type), writer_qos(qos), listener);
+  if (made == nullptr) throw failure("cannot write topic " + name);
+  const auto remove = [this](DataWriter* writer) {
+    const std::scoped_lock remove_lock(mutex_);
+    if (graph_) graph_->remove(writer->guid());
+    publisher_->delete_datawriter(writer);
+  };
+  WriterHandle handle(made, remove);
+  if (graph_) graph_->add_writer(made->guid());
+  return handle;
+}
+
+Participant::ReaderHandle Participant::make_reader(const std::string& name, TypeSupport type,
+                                                   const TopicQos& qos,
+                                                   DataReaderListener* listener) {
+  const std::scoped_lock lock(mutex_);
+  DataReader* const made =
+      subscriber_->create_datareader(topic(name, type), reader_qos(qos), listener);
+  if (made == nullptr) throw failure("cannot read topic " + name);
+  const auto remove = [this](DataReader* reader) {
+    const std::scoped_lock remove_lock(mutex_);
+    if (graph_) graph_->remove(reader->guid());
+    subscriber_->delete_datareader(reader);
+  };
+  ReaderHandle handle(made, remove);
+  if (graph_) graph_->add_reader(made->guid());
+  return handle;
+}
+
+}  // namespace stillmap

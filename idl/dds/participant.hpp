@@ -1,0 +1,69 @@
+#pragma once
+
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/topic/TypeSupport.hpp>
+#include <functional>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "idl/dds/dds_error.hpp"
+#include "idl/dds/dds_options.hpp"
+#include "idl/dds/qos.hpp"
+
+namespace stillmap {
+
+class RosGraph;
+
+/// This process in a DDS domain, and the makings of its readers and writers. A ROS 2 node to ROS 2
+/// tools when it has a node name. Endpoints must not outlive it. Thread-safe.
+class Participant {
+ public:
+  /// Joins the domain. Throws DdsError; nothing is left behind then.
+  explicit Participant(const DdsOptions& options);
+  ~Participant();
+  Participant(const Participant&) = delete;
+  Participant& operator=(const Participant&) = delete;
+
+  [[nodiscard]] const DdsOptions& options() const { return options_; }
+
+  /// Endpoints that leave the domain with their owner.
+  using WriterHandle = std::unique_ptr<eprosima::fastdds::dds::DataWriter,
+                                       std::function<void(eprosima::fastdds::dds::DataWriter*)>>;
+  using ReaderHandle = std::unique_ptr<eprosima::fastdds::dds::DataReader,
+                                       std::function<void(eprosima::fastdds::dds::DataReader*)>>;
+
+  /// `topic` is the DDS name ("rt/points"). Throws DdsError naming topic and type.
+  [[nodiscard]] WriterHandle make_writer(const std::string& topic,
+                                         eprosima::fastdds::dds::TypeSupport type,
+                                         const TopicQos& qos,
+                                         eprosima::fastdds::dds::DataWriterListener* listener);
+  [[nodiscard]] ReaderHandle make_reader(const std::string& topic,
+                                         eprosima::fastdds::dds::TypeSupport type,
+                                         const TopicQos& qos,
+                                         eprosima::fastdds::dds::DataReaderListener* listener);
+
+ private:
+  using Handle = std::unique_ptr<eprosima::fastdds::dds::DomainParticipant,
+                                 std::function<void(eprosima::fastdds::dds::DomainParticipant*)>>;
+
+  [[nodiscard]] Handle join() const;
+  [[nodiscard]] eprosima::fastdds::dds::Topic* topic(const std::string& name,
+                                                     eprosima::fastdds::dds::TypeSupport type);
+  [[nodiscard]] DdsError failure(const std::string& what) const;
+
+  DdsOptions options_;
+  std::mutex mutex_;
+  // Held so that the factory outlives this participant even in a process that is ending.
+  std::shared_ptr<eprosima::fastdds::dds::DomainParticipantFactory> factory_;
+  Handle handle_;
+  eprosima::fastdds::dds::Publisher* publisher_ = nullptr;
+  eprosima::fastdds::dds::Subscriber* subscriber_ = nullptr;
+  std::map<std::string, eprosima::fastdds::dds::Topic*> topics_;
+  std::unique_ptr<RosGraph> graph_;
+};
+
+}  // namespace stillmap

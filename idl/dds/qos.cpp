@@ -1,0 +1,59 @@
+#include "idl/dds/qos.hpp"
+
+#include <algorithm>
+
+namespace stillmap {
+namespace {
+
+using namespace eprosima::fastdds::dds;
+
+// What readers and writers share. Payloads may grow (clouds of any size); data-sharing cannot work
+// with unbounded types.
+template <typename Qos>
+void set_common(Qos& out, const TopicQos& qos) {
+  out.reliability().kind = qos.reliable ? RELIABLE_RELIABILITY_QOS : BEST_EFFORT_RELIABILITY_QOS;
+  out.reliability().max_blocking_time = to_duration(qos.max_blocking);
+  out.durability().kind =
+      qos.transient_local ? TRANSIENT_LOCAL_DURABILITY_QOS : VOLATILE_DURABILITY_QOS;
+  out.history().kind = qos.keep_all ? KEEP_ALL_HISTORY_QOS : KEEP_LAST_HISTORY_QOS;
+  out.history().depth = qos.depth;
+  out.endpoint().history_memory_policy =
+      eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
+  out.data_sharing().off();
+  auto& limits = out.resource_limits();
+  limits.allocated_samples = std::min(qos.depth, 4);
+  if (qos.keep_all) {
+    limits.max_samples = qos.depth;
+    limits.max_instances = 1;
+    limits.max_samples_per_instance = qos.depth;
+  } else {
+    // 0 is "no limit": the history's depth is the limit.
+    limits.max_samples = 0;
+    limits.max_instances = qos.max_keys;
+    limits.max_samples_per_instance = 0;
+  }
+}
+
+}  // namespace
+
+eprosima::fastrtps::Duration_t to_duration(std::chrono::milliseconds time) {
+  return eprosima::fastrtps::Duration_t(std::chrono::duration<double>(time).count());
+}
+
+DataWriterQos writer_qos(const TopicQos& qos) {
+  DataWriterQos out;
+  set_common(out, qos);
+  // The default of 3 s makes the repair of one lost fragment of a large sample take seconds.
+  out.reliable_writer_qos().times.heartbeatPeriod = to_duration(std::chrono::milliseconds(50));
+  // Asynchronous writers lose KEEP_LAST samples.
+  out.publish_mode().kind = SYNCHRONOUS_PUBLISH_MODE;
+  return out;
+}
+
+DataReaderQos reader_qos(const TopicQos& qos) {
+  DataReaderQos out;
+  set_common(out, qos);
+  return out;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <chrono>
+#include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
+#include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
+
+namespace stillmap {
+
+/// Quality of service of one end of a topic, as far as Stillmap needs it.
+struct TopicQos {
+  bool reliable = true;
+  /// A late joiner gets what the writer still holds.
+  bool transient_local = false;
+  /// Samples kept, per key on a keyed topic.
+  int depth = 10;
+  /// Keep every sample, up to `depth` of them: a full writer waits, a full reliable reader makes
+  /// the writer wait.
+  bool keep_all = false;
+  /// Keys a keyed topic may have.
+  int max_keys = 1;
+  /// Longest wait of one write for room in a keep_all history.
+  std::chrono::milliseconds max_blocking{100};
+};
+
+[[nodiscard]] eprosima::fastdds::dds::DataWriterQos writer_qos(const TopicQos& qos);
+[[nodiscard]] eprosima::fastdds::dds::DataReaderQos reader_qos(const TopicQos& qos);
+
+/// A span of time in Fast DDS's own type.
+[[nodiscard]] eprosima::fastrtps::Duration_t to_duration(std::chrono::milliseconds time);
+
+}  // namespace stillmap

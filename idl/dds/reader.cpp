@@ -1,0 +1,67 @@
+#include "idl/dds/reader.hpp"
+
+namespace stillmap {
+
+using namespace eprosima::fastdds::dds;
+using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
+
+void ReaderEvents::wait_for_data(const std::stop_token& stop, std::chrono::milliseconds timeout) {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, stop, timeout, [this] { return data_arrived_; });
+  data_arrived_ = false;
+}
+
+int ReaderEvents::matched_writers() const {
+  const std::scoped_lock lock(mutex_);
+  return matched_writers_;
+}
+
+bool ReaderEvents::wait_for_writer(std::chrono::milliseconds timeout) const {
+  std::unique_lock lock(mutex_);
+  return changed_.wait_for(lock, timeout, [this] { return matched_writers_ > 0; });
+}
+
+int ReaderEvents::incompatible_writers() const {
+  const std::scoped_lock lock(mutex_);
+  return incompatible_writers_;
+}
+
+void ReaderEvents::on_data_available(DataReader*) {
+  const std::scoped_lock lock(mutex_);
+  data_arrived_ = true;
+  changed_.notify_all();
+}
+
+void ReaderEvents::on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) {
+  const std::scoped_lock lock(mutex_);
+  matched_writers_ = status.current_count;
+  changed_.notify_all();
+}
+
+void ReaderEvents::on_requested_incompatible_qos(DataReader*,
+                                                 const RequestedIncompatibleQosStatus& status) {
+  const std::scoped_lock lock(mutex_);
+  incompatible_writers_ = static_cast<int>(status.total_count);
+}
+
+UntypedReader::UntypedReader(Participant& participant, const std::string& topic,
+                             const TypeSupport& type, const TopicQos& qos)
+    : reader_(participant.make_reader(topic, type, qos, &events_)) {}
+
+bool UntypedReader::take_untyped(void* sample, SampleInfo& info, const std::stop_token& stop,
+                                 std::chrono::milliseconds timeout) {
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  while (!stop.stop_requested()) {
+    // Samples without data only say that a key or a writer is gone.
+    while (reader_->take_next_sample(sample, &info) == ReturnCode::RETCODE_OK) {
+      if (info.valid_data) return true;
+    }
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+    if (left.count() <= 0) return false;
+    events_.wait_for_data(stop, left);
+  }
+  return false;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,85 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <fastdds/dds/subscriber/DataReaderListener.hpp>
+#include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <mutex>
+#include <stop_token>
+#include <string>
+
+#include "idl/dds/participant.hpp"
+#include "idl/dds/type_support.hpp"
+
+namespace stillmap {
+
+/// What happened to a reader. Only wakes whoever waits: work inside a Fast DDS callback would hold
+/// up every other reader of the process.
+class ReaderEvents : public eprosima::fastdds::dds::DataReaderListener {
+ public:
+  /// Returns at new data, a requested stop, or after `timeout`.
+  void wait_for_data(const std::stop_token& stop, std::chrono::milliseconds timeout);
+
+  [[nodiscard]] int matched_writers() const;
+  [[nodiscard]] bool wait_for_writer(std::chrono::milliseconds timeout) const;
+  /// Writers on this topic whose quality of service does not fit ours, as a best-effort writer for
+  /// a reliable reader.
+  [[nodiscard]] int incompatible_writers() const;
+
+ private:
+  void on_data_available(eprosima::fastdds::dds::DataReader* reader) override;
+  void on_subscription_matched(
+      eprosima::fastdds::dds::DataReader* reader,
+      const eprosima::fastdds::dds::SubscriptionMatchedStatus& status) override;
+  void on_requested_incompatible_qos(
+      eprosima::fastdds::dds::DataReader* reader,
+      const eprosima::fastdds::dds::RequestedIncompatibleQosStatus& status) override;
+
+  mutable std::mutex mutex_;
+  mutable std::condition_variable_any changed_;
+  bool data_arrived_ = false;
+  int matched_writers_ = 0;
+  int incompatible_writers_ = 0;
+};
+
+/// What Reader<T> does without knowing T.
+class UntypedReader {
+ public:
+  UntypedReader(Participant& participant, const std::string& topic,
+                const eprosima::fastdds::dds::TypeSupport& type, const TopicQos& qos);
+
+  [[nodiscard]] const ReaderEvents& events() const { return events_; }
+  [[nodiscard]] eprosima::fastrtps::rtps::GUID_t guid() const { return reader_->guid(); }
+
+ protected:
+  [[nodiscard]] bool take_untyped(void* sample, eprosima::fastdds::dds::SampleInfo& info,
+                                  const std::stop_token& stop, std::chrono::milliseconds timeout);
+
+ private:
+  ReaderEvents events_;
+  Participant::ReaderHandle reader_;
+};
+
+/// Reads samples of a generated type T from one topic. One thread takes.
+template <typename T>
+class Reader : public UntypedReader {
+ public:
+  /// Throws DdsError. The participant must outlive the reader.
+  Reader(Participant& participant, const std::string& topic, const TopicQos& qos)
+      : UntypedReader(participant, topic, type_support<T>(), qos) {}
+
+  /// Waits for the next sample and moves it into `sample`, whose memory is used again. False after
+  /// `timeout` or when a stop was requested.
+  [[nodiscard]] bool take(T& sample, eprosima::fastdds::dds::SampleInfo& info,
+                          const std::stop_token& stop, std::chrono::milliseconds timeout) {
+    return take_untyped(&sample, info, stop, timeout);
+  }
+
+  [[nodiscard]] bool take(T& sample, const std::stop_token& stop,
+                          std::chrono::milliseconds timeout) {
+    eprosima::fastdds::dds::SampleInfo info;
+    return take_untyped(&sample, info, stop, timeout);
+  }
+};
+
+}  // namespace stillmap

@@ -1,0 +1,113 @@
+#include "idl/dds/type_support.hpp"
+
+#include <memory>
+
+#include "nav_msgsPubSubTypes.h"
+#include "rmw_dds_commonPubSubTypes.h"
+#include "rmw_dds_common_ironPubSubTypes.h"
+#include "sensor_msgsPubSubTypes.h"
+#include "stillmap_msgsPubSubTypes.h"
+#include "tf2_msgsPubSubTypes.h"
+
+namespace stillmap {
+namespace {
+
+using eprosima::fastdds::dds::TypeSupport;
+
+/// TypeSupport takes ownership of the pointer.
+template <typename PubSubType>
+TypeSupport make() {
+  return TypeSupport(std::make_unique<PubSubType>().release());
+}
+
+}  // namespace
+
+template <>
+TypeSupport type_support<sensor_msgs::msg::PointCloud2>() {
+  return make<sensor_msgs::msg::PointCloud2PubSubType>();
+}
+template <>
+TypeSupport type_support<nav_msgs::msg::Odometry>() {
+  return make<nav_msgs::msg::OdometryPubSubType>();
+}
+template <>
+TypeSupport type_support<nav_msgs::msg::Path>() {
+  return make<nav_msgs::msg::PathPubSubType>();
+}
+template <>
+TypeSupport type_support<tf2_msgs::msg::TFMessage>() {
+  return make<tf2_msgs::msg::TFMessagePubSubType>();
+}
+template <>
+TypeSupport type_support<rmw_dds_common::msg::ParticipantEntitiesInfo>() {
+  return make<rmw_dds_common::msg::ParticipantEntitiesInfoPubSubType>();
+}
+template <>
+TypeSupport type_support<rmw_dds_common_iron::msg::ParticipantEntitiesInfo>() {
+  TypeSupport type = make<rmw_dds_common_iron::msg::ParticipantEntitiesInfoPubSubType>();
+  // Two layouts of one ROS 2 type: on the wire both have its name.
+  type->setName("rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_");
+  return type;
+}
+template <>
+TypeSupport type_support<stillmap_msgs::msg::TileInfo>() {
+  return make<stillmap_msgs::msg::TileInfoPubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::msg::MapTile>() {
+  return make<stillmap_msgs::msg::MapTilePubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::msg::Status>() {
+  return make<stillmap_msgs::msg::StatusPubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::GetStaticMap_Request>() {
+  return make<stillmap_msgs::srv::GetStaticMap_RequestPubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::GetStaticMap_Response>() {
+  return make<stillmap_msgs::srv::GetStaticMap_ResponsePubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::GetTileVersions_Request>() {
+  return make<stillmap_msgs::srv::GetTileVersions_RequestPubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::GetTileVersions_Response>() {
+  return make<stillmap_msgs::srv::GetTileVersions_ResponsePubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::GetTiles_Request>() {
+  return make<stillmap_msgs::srv::GetTiles_RequestPubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::GetTiles_Response>() {
+  return make<stillmap_msgs::srv::GetTiles_ResponsePubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::GetStatus_Request>() {
+  return make<stillmap_msgs::srv::GetStatus_RequestPubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::GetStatus_Response>() {
+  return make<stillmap_msgs::srv::GetStatus_ResponsePubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::SaveMap_Request>() {
+  return make<stillmap_msgs::srv::SaveMap_RequestPubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::SaveMap_Response>() {
+  return make<stillmap_msgs::srv::SaveMap_ResponsePubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::Reset_Request>() {
+  return make<stillmap_msgs::srv::Reset_RequestPubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::Reset_Response>() {
+  return make<stillmap_msgs::srv::Reset_ResponsePubSubType>();
+}
+
+}  // namespace stillmap

@@ -1,0 +1,78 @@
+#include "idl/dds/writer.hpp"
+
+#include <algorithm>
+
+#include "idl/dds/dds_error.hpp"
+
+namespace stillmap {
+
+using namespace eprosima::fastdds::dds;
+using eprosima::fastrtps::rtps::WriteParams;
+using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
+
+namespace {
+
+// Fast DDS only reads the sample, but says so nowhere.
+void* mutable_sample(const void* sample) { return const_cast<void*>(sample); }
+
+}  // namespace
+
+int MatchedReaders::count() const {
+  const std::scoped_lock lock(mutex_);
+  return static_cast<int>(readers_.size());
+}
+
+bool MatchedReaders::wait_for_any(std::chrono::milliseconds timeout) const {
+  std::unique_lock lock(mutex_);
+  return changed_.wait_for(lock, timeout, [this] { return !readers_.empty(); });
+}
+
+bool MatchedReaders::wait_for(const Guid& reader, std::chrono::milliseconds timeout) const {
+  std::unique_lock lock(mutex_);
+  return changed_.wait_for(lock, timeout, [&] { return readers_.contains(reader); });
+}
+
+bool MatchedReaders::wait_for_peer(const Guid& endpoint, std::chrono::milliseconds timeout) const {
+  const auto is_peer = [&](const Guid& reader) { return reader.guidPrefix == endpoint.guidPrefix; };
+  std::unique_lock lock(mutex_);
+  return changed_.wait_for(lock, timeout, [&] { return std::ranges::any_of(readers_, is_peer); });
+}
+
+void MatchedReaders::on_publication_matched(DataWriter*, const PublicationMatchedStatus& status) {
+  const Guid reader = eprosima::fastrtps::rtps::iHandle2GUID(status.last_subscription_handle);
+  const std::scoped_lock lock(mutex_);
+  if (status.current_count_change > 0) {
+    readers_.insert(reader);
+  } else {
+    readers_.erase(reader);
+  }
+  changed_.notify_all();
+}
+
+UntypedWriter::UntypedWriter(Participant& participant, const std::string& topic,
+                             const TypeSupport& type, const TopicQos& qos)
+    : topic_(topic), writer_(participant.make_writer(topic, type, qos, &readers_)) {}
+
+bool UntypedWriter::wait_for_acknowledgements(std::chrono::milliseconds timeout) {
+  return writer_->wait_for_acknowledgments(to_duration(timeout)) == ReturnCode::RETCODE_OK;
+}
+
+bool UntypedWriter::write_untyped(const void* sample) {
+  const ReturnCode code = writer_->write(mutable_sample(sample), HANDLE_NIL);
+  if (code == ReturnCode::RETCODE_OK) return true;
+  if (code == ReturnCode::RETCODE_TIMEOUT || code == ReturnCode::RETCODE_OUT_OF_RESOURCES) {
+    return false;
+  }
+  throw DdsError("cannot write topic " + topic_ + ": Fast DDS return code " +
+                 std::to_string(code()));
+}
+
+bool UntypedWriter::write_untyped(const void* sample, WriteParams& params) {
+  return writer_->write(mutable_sample(sample), params);
+}
+
+void UntypedWriter::dispose_untyped(const void* sample) {
+  writer_->dispose(mutable_sample(sample), HANDLE_NIL);
+}
+
+}  // namespace stillmap

@@ -1,0 +1,83 @@
+#pragma once
+
+#include <fastdds/rtps/common/WriteParams.h>
+
+#include <chrono>
+#include <condition_variable>
+#include <fastdds/dds/publisher/DataWriterListener.hpp>
+#include <mutex>
+#include <set>
+#include <string>
+
+#include "idl/dds/participant.hpp"
+#include "idl/dds/type_support.hpp"
+
+namespace stillmap {
+
+/// The readers that a writer has found.
+class MatchedReaders : public eprosima::fastdds::dds::DataWriterListener {
+ public:
+  using Guid = eprosima::fastrtps::rtps::GUID_t;
+
+  [[nodiscard]] int count() const;
+  [[nodiscard]] bool wait_for_any(std::chrono::milliseconds timeout) const;
+  /// Waits for this reader.
+  [[nodiscard]] bool wait_for(const Guid& reader, std::chrono::milliseconds timeout) const;
+  /// Waits for a reader in the process that `endpoint` belongs to.
+  [[nodiscard]] bool wait_for_peer(const Guid& endpoint, std::chrono::milliseconds timeout) const;
+
+ private:
+  void on_publication_matched(
+      eprosima::fastdds::dds::DataWriter* writer,
+      const eprosima::fastdds::dds::PublicationMatchedStatus& status) override;
+
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  std::set<Guid> readers_;
+};
+
+/// What Writer<T> does without knowing T.
+class UntypedWriter {
+ public:
+  UntypedWriter(Participant& participant, const std::string& topic,
+                const eprosima::fastdds::dds::TypeSupport& type, const TopicQos& qos);
+
+  [[nodiscard]] const MatchedReaders& readers() const { return readers_; }
+
+  /// True once every matched reliable reader has everything written; false after `timeout`.
+  [[nodiscard]] bool wait_for_acknowledgements(std::chrono::milliseconds timeout);
+
+ protected:
+  /// False when there was no room: nothing was written.
+  [[nodiscard]] bool write_untyped(const void* sample);
+  [[nodiscard]] bool write_untyped(const void* sample,
+                                   eprosima::fastrtps::rtps::WriteParams& params);
+  void dispose_untyped(const void* sample);
+
+ private:
+  std::string topic_;
+  MatchedReaders readers_;
+  Participant::WriterHandle writer_;
+};
+
+/// Writes samples of a generated type T to one topic. Thread-safe.
+template <typename T>
+class Writer : public UntypedWriter {
+ public:
+  /// Throws DdsError. The participant must outlive the writer.
+  Writer(Participant& participant, const std::string& topic, const TopicQos& qos)
+      : UntypedWriter(participant, topic, type_support<T>(), qos) {}
+
+  /// False when a keep_all history had no room within its `max_blocking`: nothing was written.
+  [[nodiscard]] bool write(const T& sample) { return write_untyped(&sample); }
+
+  /// The same with identities for request and reply; `params` gets the sample's own identity.
+  [[nodiscard]] bool write(const T& sample, eprosima::fastrtps::rtps::WriteParams& params) {
+    return write_untyped(&sample, params);
+  }
+
+  /// Tells readers that the instance with the sample's key is gone.
+  void dispose(const T& sample) { dispose_untyped(&sample); }
+};
+
+}  // namespace stillmap

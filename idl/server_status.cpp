@@ -1,0 +1,20 @@
+#include "idl/server_status.hpp"
+
+#include <algorithm>
+#include <numeric>
+
+namespace stillmap {
+
+std::uint64_t ServerStatus::counter(std::string_view counter_name) const {
+  const auto found = std::ranges::find(counters, counter_name, &NamedCounter::name);
+  return found == counters.end() ? 0 : found->value;
+}
+
+std::uint64_t ServerStatus::dropped() const {
+  return std::accumulate(counters.begin(), counters.end(), std::uint64_t{0},
+                         [](std::uint64_t sum, const NamedCounter& counter) {
+                           return counter.name.starts_with("dropped_") ? sum + counter.value : sum;
+                         });
+}
+
+}  // namespace stillmap

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/odometry/odometry_state.hpp"
+
+namespace stillmap {
+
+/// What the server does with scans that come faster than it maps them.
+enum class DeliveryMode : std::uint8_t {
+  /// The newest scans count: the oldest waiting one is dropped and counted.
+  latest = 0,
+  /// Every scan counts: a full queue makes a reliable publisher wait.
+  every = 1,
+};
+
+[[nodiscard]] constexpr const char* name(DeliveryMode mode) {
+  return mode == DeliveryMode::every ? "every" : "latest";
+}
+
+/// An event of the server's life and how often it happened, as "scans_mapped" or
+/// "dropped_queue_full".
+struct NamedCounter {
+  std::string name;
+  std::uint64_t value = 0;
+};
+
+/// How long a stage of the pipeline took over the last scans.
+struct StageLatency {
+  std::string stage;
+  double p50_ms = 0.0;
+  double p99_ms = 0.0;
+  double max_ms = 0.0;
+  /// Scans that the figures stand for.
+  std::uint32_t samples = 0;
+};
+
+/// State of a running server.
+struct ServerStatus {
+  /// The server's clock, nanoseconds since the Unix epoch.
+  std::int64_t stamp_ns = 0;
+  std::string software_version;
+  double uptime_s = 0.0;
+  DeliveryMode delivery = DeliveryMode::latest;
+  /// "stream", "none", or the model's name.
+  std::string label_source;
+  /// Of the last mapped scan.
+  OdometryHealth health = OdometryHealth::initialised;
+  /// Why nothing happens, or what goes wrong, in words; empty when all is well.
+  std::string reason;
+  /// Scans a second over the last seconds, received and mapped.
+  double received_hz = 0.0;
+  double mapped_hz = 0.0;
+  std::uint64_t map_version = 0;
+  std::uint64_t map_id = 0;
+  std::uint64_t tile_count = 0;
+  std::uint64_t voxel_count = 0;
+  /// "scans_received", "scans_mapped", and "dropped_<reason>" for every reason that occurred.
+  std::vector<NamedCounter> counters;
+  /// In the order of the pipeline: wait in the queue, its stages, and "total".
+  std::vector<StageLatency> latencies;
+
+  /// Value of a counter; 0 when it never counted.
+  [[nodiscard]] std::uint64_t counter(std::string_view counter_name) const;
+  /// Sum of all "dropped_" counters.
+  [[nodiscard]] std::uint64_t dropped() const;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,42 @@
+#pragma once
+
+// The generated types by name. Who needs their fields includes the generated header, as
+// "sensor_msgs.h".
+
+namespace sensor_msgs::msg {
+class PointCloud2;
+}
+namespace std_msgs::msg {
+class Header;
+}
+namespace geometry_msgs::msg {
+class Pose;
+}
+namespace nav_msgs::msg {
+class Odometry;
+class Path;
+}  // namespace nav_msgs::msg
+namespace tf2_msgs::msg {
+class TFMessage;
+}
+namespace stillmap_msgs::msg {
+class TileInfo;
+class MapTile;
+class MapIdentity;
+class Status;
+class Voxels;
+}  // namespace stillmap_msgs::msg
+namespace stillmap_msgs::srv {
+class GetStaticMap_Request;
+class GetStaticMap_Response;
+class GetTileVersions_Request;
+class GetTileVersions_Response;
+class GetTiles_Request;
+class GetTiles_Response;
+class GetStatus_Request;
+class GetStatus_Response;
+class SaveMap_Request;
+class SaveMap_Response;
+class Reset_Request;
+class Reset_Response;
+}  // namespace stillmap_msgs::srv

@@ -1,0 +1,221 @@
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+#include "idl/conversions/cloud_to_scan.hpp"
+#include "idl/conversions/map_to_cloud.hpp"
+#include "idl/conversions/scan_to_cloud.hpp"
+#include "tests/idl/cloud_fixture.hpp"
+
+namespace stillmap::wire {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::FloatNear;
+using ::testing::Pointwise;
+
+Scan random_scan(std::size_t points) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> coordinate(-80.0F, 80.0F);
+  std::uniform_int_distribution<int> label(0, 19);
+  Scan scan;
+  scan.stamp_ns = 1'234'567'890'123'456'789;
+  for (std::size_t i = 0; i < points; ++i) {
+    scan.points_lidar.emplace_back(coordinate(random), coordinate(random), coordinate(random));
+    scan.intensity.push_back(std::abs(coordinate(random)) / 80.0F);
+    scan.time_offset_s.push_back(0.1F * static_cast<float>(i) / static_cast<float>(points));
+    scan.ring.push_back(static_cast<std::uint16_t>(i % 64));
+    scan.labels.push_back(static_cast<SemanticClass>(label(random)));
+  }
+  return scan;
+}
+
+TEST(CloudToScan, GivesBackWhatScanToCloudWrote) {
+  const Scan scan = random_scan(1000);
+  const ScanFromCloud back = to_scan(to_cloud(scan, {}, "lidar"), {});
+  ASSERT_TRUE(back.scan) << back.fault.reason;
+  EXPECT_EQ(back.scan->stamp_ns, scan.stamp_ns);
+  EXPECT_EQ(back.scan->points_lidar, scan.points_lidar);
+  EXPECT_EQ(back.scan->intensity, scan.intensity);
+  EXPECT_THAT(back.scan->time_offset_s, Pointwise(FloatNear(1e-6F), scan.time_offset_s));
+  EXPECT_EQ(back.scan->ring, scan.ring);
+  EXPECT_EQ(back.scan->labels, scan.labels);
+}
+
+TEST(CloudToScan, LeavesOutWhatTheScanDoesNotHave) {
+  Scan scan = random_scan(10);
+  scan.intensity.clear();
+  scan.time_offset_s.clear();
+  scan.ring.clear();
+  scan.labels.clear();
+  const ScanFromCloud back = to_scan(to_cloud(scan, {}, "lidar"), {});
+  ASSERT_TRUE(back.scan);
+  EXPECT_EQ(back.scan->size(), 10U);
+  EXPECT_TRUE(back.scan->intensity.empty());
+  EXPECT_TRUE(back.scan->time_offset_s.empty());
+  EXPECT_TRUE(back.scan->ring.empty());
+  EXPECT_TRUE(back.scan->labels.empty());
+}
+
+TEST(CloudToScan, ReducesRawLabelsSoThatMovingObjectsGiveNothingAway) {
+  Scan scan = random_scan(3);
+  // moving-car with instance 5, car, moving-person.
+  const std::vector<std::uint32_t> raw = {(5U << 16U) | 252U, 10U, 254U};
+  const ScanFromCloud back = to_scan(to_cloud(scan, raw, "lidar"), {});
+  ASSERT_TRUE(back.scan);
+  EXPECT_THAT(back.scan->labels,
+              ElementsAre(SemanticClass::car, SemanticClass::car, SemanticClass::person));
+}
+
+TEST(CloudToScan, TakesClassNumbersWhenToldSo) {
+  const auto cloud = three_points_with<std::uint8_t>("label", FieldType::uint8, {1, 19, 200});
+  const ScanFromCloud back = to_scan(cloud, {.fields = {}, .labels_are_classes = true});
+  ASSERT_TRUE(back.scan);
+  EXPECT_THAT(back.scan->labels, ElementsAre(SemanticClass::car, SemanticClass::traffic_sign,
+                                             SemanticClass::unlabeled));
+}
+
+TEST(CloudToScan, ReadsLabelsOf16Bits) {
+  const auto cloud = three_points_with<std::uint16_t>("label", FieldType::uint16, {40, 50, 70});
+  const ScanFromCloud back = to_scan(cloud, {});
+  ASSERT_TRUE(back.scan);
+  EXPECT_THAT(back.scan->labels,
+              ElementsAre(SemanticClass::road, SemanticClass::building, SemanticClass::vegetation));
+}
+
+TEST(CloudToScan, TakesTheFirstCandidateNameThatIsThere) {
+  const auto cloud =
+      three_points_with<float>("reflectivity", FieldType::float32, {10.0F, 20.0F, 255.0F});
+  const ScanFromCloud back = to_scan(
+      cloud, {.fields = {.intensity = {"intensity", "reflectivity"}}, .intensity_scale = 0.1F});
+  ASSERT_TRUE(back.scan);
+  EXPECT_THAT(back.scan->intensity, Pointwise(FloatNear(1e-5F), {1.0F, 2.0F, 25.5F}));
+}
+
+template <typename T>
+void expect_coordinates_of_type(FieldType type) {
+  CloudColumns columns(0, "lidar");
+  const auto x = columns.add_field("x", type);
+  const auto y = columns.add_field("y", type);
+  const auto z = columns.add_field("z", type);
+  columns.resize(1);
+  columns.fill(x, [](std::size_t) { return static_cast<T>(1); });
+  columns.fill(y, [](std::size_t) { return static_cast<T>(2); });
+  columns.fill(z, [](std::size_t) { return static_cast<T>(100); });
+  const CloudReading as_it_is;
+  const ScanFromCloud back = to_scan(columns.take(), as_it_is);
+  ASSERT_TRUE(back.scan);
+  EXPECT_EQ(back.scan->points_lidar.front(), Eigen::Vector3f(1.0F, 2.0F, 100.0F));
+}
+
+TEST(CloudToScan, ReadsCoordinatesOfEveryType) {
+  expect_coordinates_of_type<std::int8_t>(FieldType::int8);
+  expect_coordinates_of_type<std::uint8_t>(FieldType::uint8);
+  expect_coordinates_of_type<std::int16_t>(FieldType::int16);
+  expect_coordinates_of_type<std::uint16_t>(FieldType::uint16);
+  expect_coordinates_of_type<std::int32_t>(FieldType::int32);
+  expect_coordinates_of_type<std::uint32_t>(FieldType::uint32);
+  expect_coordinates_of_type<float>(FieldType::float32);
+  expect_coordinates_of_type<double>(FieldType::float64);
+}
+
+TEST(CloudToScan, ReadsTimesInNanosecondsAndInAbsoluteSeconds) {
+  const auto offsets_ns =
+      three_points_with<std::uint32_t>("time", FieldType::uint32, {0, 50'000'000, 100'000'000});
+  // The cloud's stamp is 1.5 s.
+  const auto absolute_s = three_points_with<double>("time", FieldType::float64, {1.5, 1.55, 1.6});
+  auto far_cloud =
+      three_points_with<double>("time", FieldType::float64, {1.7e9, 1.7e9 + 0.05, 1.7e9 + 0.1});
+  far_cloud.header(to_header(1'700'000'000'000'000'000, "lidar"));
+  auto far_ns_cloud =
+      three_points_with<double>("time", FieldType::float64, {1.7e18, 1.7e18 + 5e7, 1.7e18 + 1e8});
+  far_ns_cloud.header(far_cloud.header());
+  for (const auto& cloud : {offsets_ns, far_cloud, far_ns_cloud}) {
+    const ScanFromCloud back = to_scan(cloud, {});
+    ASSERT_TRUE(back.scan);
+    EXPECT_THAT(back.scan->time_offset_s, Pointwise(FloatNear(1e-5F), {0.0F, 0.05F, 0.1F}));
+  }
+}
+
+TEST(CloudToScan, ReadsBigEndianClouds) {
+  auto cloud = three_points();
+  auto& data = cloud.data();
+  for (std::size_t i = 0; i < data.size(); i += 4) {
+    std::reverse(data.begin() + static_cast<std::ptrdiff_t>(i),
+                 data.begin() + static_cast<std::ptrdiff_t>(i + 4));
+  }
+  cloud.is_bigendian(true);
+  const ScanFromCloud back = to_scan(cloud, {});
+  ASSERT_TRUE(back.scan);
+  EXPECT_EQ(back.scan->points_lidar[2], Eigen::Vector3f(7.0F, 8.0F, 9.0F));
+}
+
+TEST(CloudToScan, SkipsThePaddingOfRows) {
+  auto cloud = three_points();
+  // Three rows of one point, each with 5 bytes of padding.
+  const std::vector<std::uint8_t> packed = cloud.data();
+  std::vector<std::uint8_t> padded;
+  for (std::size_t row = 0; row < 3; ++row) {
+    const auto begin = packed.begin() + static_cast<std::ptrdiff_t>(row * 12);
+    padded.insert(padded.end(), begin, begin + 12);
+    padded.resize(padded.size() + 5, 0xFF);
+  }
+  cloud.width(1);
+  cloud.height(3);
+  cloud.row_step(17);
+  cloud.data(padded);
+  const ScanFromCloud back = to_scan(cloud, {});
+  ASSERT_TRUE(back.scan);
+  EXPECT_EQ(back.scan->points_lidar[1], Eigen::Vector3f(4.0F, 5.0F, 6.0F));
+  EXPECT_EQ(back.scan->points_lidar[2], Eigen::Vector3f(7.0F, 8.0F, 9.0F));
+}
+
+TEST(CloudToScan, KeepsPointsThatAreNotFinite) {
+  Scan scan = random_scan(3);
+  scan.points_lidar[1].x() = std::numeric_limits<float>::quiet_NaN();
+  scan.points_lidar[2].z() = std::numeric_limits<float>::infinity();
+  const ScanFromCloud back = to_scan(to_cloud(scan, {}, "lidar"), {});
+  ASSERT_TRUE(back.scan);
+  EXPECT_EQ(back.scan->size(), 3U);
+  EXPECT_TRUE(std::isnan(back.scan->points_lidar[1].x()));
+  EXPECT_TRUE(std::isinf(back.scan->points_lidar[2].z()));
+}
+
+TEST(LabelledScanToCloud, CarriesClassConfidenceAndMotion) {
+  LabelledScan labelled{
+      .scan = random_scan(2),
+      .labels = {.classes = {SemanticClass::car, SemanticClass::road}, .confidence = {0.5F, 1.0F}},
+      .motion = {Motion::highly_dynamic, Motion::stationary}};
+  const auto cloud = to_cloud(labelled, "lidar");
+  const ScanFromCloud back = to_scan(
+      cloud,
+      {.fields = {.intensity = {"confidence"}, .ring = {"motion"}}, .labels_are_classes = true});
+  ASSERT_TRUE(back.scan);
+  EXPECT_EQ(back.scan->points_lidar, labelled.scan.points_lidar);
+  EXPECT_EQ(back.scan->labels, labelled.labels.classes);
+  EXPECT_EQ(back.scan->intensity, labelled.labels.confidence);
+  EXPECT_THAT(back.scan->ring, ElementsAre(2, 0));
+}
+
+TEST(MapToCloud, ShowsTheVoxelsInTheWindow) {
+  Voxel inside{.index = {}, .point_count = 3, .mean_map = {1.0F, 2.0F, 3.0F}, .evidence = {}};
+  inside.evidence.add(SemanticClass::building, 1.0F);
+  Voxel outside{.index = {}, .point_count = 3, .mean_map = {15.0F, 2.0F, 3.0F}, .evidence = {}};
+  Tile tile;
+  tile.voxels = {inside, outside};
+  tile.info.bounds_map.extend(inside.mean_map);
+  tile.info.bounds_map.extend(outside.mean_map);
+  const MapView view{.version = 1, .tiles = {std::make_shared<const Tile>(tile)}};
+  const auto cloud =
+      to_cloud(view, {Eigen::Vector2f(-10.0F, -10.0F), Eigen::Vector2f(10.0F, 10.0F)}, 5, "map");
+  const ScanFromCloud back = to_scan(cloud, {.fields = {}, .labels_are_classes = true});
+  ASSERT_TRUE(back.scan);
+  EXPECT_THAT(back.scan->points_lidar, ElementsAre(inside.mean_map));
+  EXPECT_THAT(back.scan->labels, ElementsAre(SemanticClass::building));
+}
+
+}  // namespace
+}  // namespace stillmap::wire

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <fastrtps/xmlparser/XMLProfileManager.h>
+#include <unistd.h>
+
+#include <cstdint>
+
+#include "idl/dds/dds_options.hpp"
+
+namespace stillmap {
+
+/// A domain that other tests on this machine hardly use: ctest runs every test in a process of its
+/// own. Domain 0 stays free for people.
+inline std::uint32_t test_domain_id() {
+  constexpr std::uint32_t domains = 200;
+  return 20 + static_cast<std::uint32_t>(::getpid()) % domains;
+}
+
+/// Makes two participants of one process talk as two processes do. Otherwise Fast DDS hands samples
+/// over directly, past every transport, and never offers a rejected sample again.
+inline void talk_over_transports() {
+  eprosima::fastrtps::LibrarySettingsAttributes settings;
+  settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
+  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
+}
+
+/// Only this machine, over UDP or with shared memory as well.
+inline DdsOptions loopback(bool shared_memory) {
+  talk_over_transports();
+  DdsOptions options;
+  options.domain_id = test_domain_id();
+  options.shared_memory = shared_memory;
+  options.interfaces = {"127.0.0.1"};
+  return options;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,196 @@
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "idl/conversions/pose.hpp"
+#include "idl/conversions/tile.hpp"
+#include "idl/dds/dds_error.hpp"
+#include "idl/dds/reader.hpp"
+#include "idl/dds/transports.hpp"
+#include "idl/dds/writer.hpp"
+#include "idl/topics.hpp"
+#include "nav_msgs.h"
+#include "rmw_dds_common.h"
+#include "rmw_dds_common_iron.h"
+#include "sensor_msgs.h"
+#include "stillmap_msgs.h"
+#include "tests/idl/dds_fixture.hpp"
+
+namespace stillmap {
+namespace {
+
+using namespace std::chrono_literals;
+using sensor_msgs::msg::PointCloud2;
+
+constexpr auto patience = 20s;
+
+PointCloud2 cloud_of(std::size_t bytes, std::uint32_t number) {
+  PointCloud2 cloud;
+  cloud.width(number);
+  cloud.data().assign(bytes, static_cast<std::uint8_t>(number));
+  return cloud;
+}
+
+TileInfo tile_info(TileId id, std::uint64_t revision) {
+  TileInfo info;
+  info.id = id;
+  info.revision = revision;
+  return info;
+}
+
+class OverTransport : public testing::TestWithParam<bool> {
+ protected:
+  Participant here_{loopback(GetParam())};
+  Participant there_{loopback(GetParam())};
+};
+
+TEST_P(OverTransport, CarriesLargeCloudsWhole) {
+  const TopicQos qos{.depth = 10};
+  Writer<PointCloud2> writer(here_, "rt/points", qos);
+  Reader<PointCloud2> reader(there_, "rt/points", qos);
+  ASSERT_TRUE(writer.readers().wait_for_any(patience));
+  for (std::uint32_t i = 1; i <= 5; ++i) {
+    ASSERT_TRUE(writer.write(cloud_of(3'000'000, i)));
+    PointCloud2 got;
+    ASSERT_TRUE(reader.take(got, {}, patience));
+    EXPECT_EQ(got.width(), i);
+    EXPECT_EQ(got.data().size(), 3'000'000U);
+    EXPECT_EQ(got.data().back(), i);
+  }
+}
+
+TEST_P(OverTransport, LosesAndReordersNothingWhenEverySampleCounts) {
+  const auto topic = points_topic("points", DeliveryMode::every, 4);
+  Writer<PointCloud2> writer(here_, topic.dds_name, topic.writer);
+  Reader<PointCloud2> reader(there_, topic.dds_name, topic.reader);
+  ASSERT_TRUE(writer.readers().wait_for_any(patience));
+  constexpr std::uint32_t clouds = 40;
+  const std::jthread sender([&](const std::stop_token& stop) {
+    for (std::uint32_t i = 0; i < clouds; ++i) {
+      while (!stop.stop_requested() && !writer.write(cloud_of(500'000, i))) {
+      }
+    }
+  });
+  for (std::uint32_t i = 0; i < clouds; ++i) {
+    PointCloud2 got;
+    ASSERT_TRUE(reader.take(got, {}, patience)) << "after " << i << " clouds";
+    ASSERT_EQ(got.width(), i);
+    std::this_thread::sleep_for(20ms);
+  }
+}
+
+TEST_P(OverTransport, GivesALateJoinerTheNewestOfEveryKey) {
+  const auto topic = Topics::in("stillmap").tile_index;
+  Writer<stillmap_msgs::msg::TileInfo> writer(here_, topic.dds_name, topic.writer);
+  constexpr int tiles = 300;
+  for (std::uint64_t revision = 1; revision <= 2; ++revision) {
+    for (int x = 0; x < tiles; ++x) {
+      ASSERT_TRUE(writer.write(wire::to_wire(tile_info({x, -x}, revision), {})));
+    }
+  }
+  writer.dispose(wire::to_wire(tile_info({0, 0}, 0), {}));
+
+  Reader<stillmap_msgs::msg::TileInfo> reader(there_, topic.dds_name, topic.reader);
+  std::map<std::int32_t, std::uint64_t> revisions;
+  stillmap_msgs::msg::TileInfo message;
+  while (revisions.size() < tiles - 1 && reader.take(message, {}, patience)) {
+    revisions[message.tile_x()] = message.state().revision();
+  }
+  EXPECT_EQ(revisions.size(), static_cast<std::size_t>(tiles - 1));
+  EXPECT_FALSE(revisions.contains(0));
+  for (const auto& [x, revision] : revisions) EXPECT_EQ(revision, 2U) << "tile " << x;
+}
+
+INSTANTIATE_TEST_SUITE_P(Dds, OverTransport, testing::Values(false, true),
+                         [](const auto& info) { return info.param ? "SharedMemory" : "Udp"; });
+
+TEST(Reader, StopsWaitingWhenAsked) {
+  Participant participant(loopback(false));
+  Reader<PointCloud2> reader(participant, "rt/points", {});
+  std::stop_source stop;
+  const auto began = std::chrono::steady_clock::now();
+  const std::jthread stopper([&] {
+    std::this_thread::sleep_for(50ms);
+    stop.request_stop();
+  });
+  PointCloud2 cloud;
+  EXPECT_FALSE(reader.take(cloud, stop.get_token(), 60s));
+  EXPECT_LT(std::chrono::steady_clock::now() - began, 10s);
+}
+
+TEST(Reader, TellsOfPublishersThatDoNotFit) {
+  Participant participant(loopback(false));
+  Reader<PointCloud2> reader(participant, "rt/points", {.reliable = true});
+  Writer<PointCloud2> writer(participant, "rt/points", {.reliable = false});
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (reader.events().incompatible_writers() == 0 &&
+         std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(10ms);
+  }
+  EXPECT_EQ(reader.events().incompatible_writers(), 1);
+  EXPECT_EQ(reader.events().matched_writers(), 0);
+}
+
+TEST(Participant, NamesWhatCannotWork) {
+  DdsOptions options = loopback(false);
+  options.domain_id = 233;
+  try {
+    const Participant participant(options);
+    FAIL() << "domain 233 was accepted";
+  } catch (const DdsError& error) {
+    EXPECT_NE(std::string(error.what()).find("233"), std::string::npos);
+  }
+}
+
+TEST(Participant, RefusesOneTopicWithTwoTypes) {
+  Participant participant(loopback(false));
+  const Writer<PointCloud2> writer(participant, "rt/points", {});
+  EXPECT_THROW(Reader<nav_msgs::msg::Path>(participant, "rt/points", {}), DdsError);
+}
+
+TEST(Participant, CanBeMadeAgainAfterAFailureHalfWay) {
+  const auto fail = [] {
+    Participant participant(loopback(true));
+    const Writer<PointCloud2> writer(participant, "rt/points", {});
+    const Writer<nav_msgs::msg::Path> wrong(participant, "rt/points", {});
+  };
+  for (int i = 0; i < 3; ++i) EXPECT_THROW(fail(), DdsError);
+}
+
+template <typename Info>
+Info announced_by(const DdsOptions& options) {
+  Participant node(options);
+  const Writer<PointCloud2> writer(node, "rt/points", {});
+  Participant watcher(loopback(false));
+  Reader<Info> reader(watcher, "ros_discovery_info", {.transient_local = true, .depth = 1});
+  Info info;
+  do {
+    EXPECT_TRUE(reader.take(info, {}, patience));
+  } while (!testing::Test::HasFailure() &&
+           info.node_entities_info_seq()[0].writer_gid_seq().empty());
+  return info;
+}
+
+TEST(RosGraph, ShowsTheNodeAndItsEndpoints) {
+  DdsOptions options = loopback(false);
+  options.node_name = "stillmap_server";
+  const auto humble = announced_by<rmw_dds_common::msg::ParticipantEntitiesInfo>(options);
+  ASSERT_EQ(humble.node_entities_info_seq().size(), 1U);
+  const auto& node = humble.node_entities_info_seq()[0];
+  EXPECT_EQ(std::string(node.node_name().c_str()), "stillmap_server");
+  EXPECT_EQ(node.writer_gid_seq().size(), 1U);
+  EXPECT_EQ(node.reader_gid_seq().size(), 0U);
+
+  options.ros_gid_bytes = 16;
+  const auto iron = announced_by<rmw_dds_common_iron::msg::ParticipantEntitiesInfo>(options);
+  EXPECT_EQ(iron.node_entities_info_seq()[0].writer_gid_seq().size(), 1U);
+}
+
+TEST(Transports, TellTheBufferThatTheKernelGrants) {
+  EXPECT_GE(granted_socket_buffer_bytes(65536), 65536U);
+  // More than any kernel's limit by default.
+  EXPECT_LT(granted_socket_buffer_bytes(1U << 30U), 1U << 30U);
+}
+
+}  // namespace
+}  // namespace stillmap
