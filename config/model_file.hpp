@@ -1,0 +1,20 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "config/config_error.hpp"
+#include "config/server_config.hpp"
+#include "core/segmentation/label_source.hpp"
+#include "core/segmentation/model_description.hpp"
+
+namespace stillmap {
+
+/// Reads model.yaml of a model folder; the network is model.onnx beside it. Throws ConfigError
+/// with every fault.
+[[nodiscard]] ModelDescription load_model_description(const std::filesystem::path& folder);
+
+/// The label source that the configuration asks for. Throws ConfigError or ModelError.
+[[nodiscard]] std::unique_ptr<LabelSource> open_label_source(const LabelsConfig& labels);
+
+}  // namespace stillmap

@@ -1,0 +1,144 @@
+#include "config/server_config.hpp"
+
+#include <arpa/inet.h>
+
+#include "config/mapper_section.hpp"
+#include "config/sensor_file.hpp"
+#include "config/yaml_section.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr Range periods_s{0.01, 86400};
+
+void read_sensor_name(YamlSection& file, const fs::path& folder, SensorModel& sensor) {
+  std::string name = "hdl_64e";
+  file.text("sensor", name);
+  try {
+    sensor = load_sensor(name, folder);
+  } catch (const ConfigError& error) {
+    for (const std::string& fault : error.faults()) file.fault("sensor", fault);
+  }
+}
+
+void read_labels(YamlSection section, LabelsConfig& labels) {
+  section.choice<LabelOrigin>("source", labels.source,
+                              {{"stream", LabelOrigin::stream},
+                               {"model", LabelOrigin::model},
+                               {"none", LabelOrigin::none}});
+  section.path("model", labels.model);
+  if (labels.source == LabelOrigin::model && labels.model.empty()) {
+    section.fault("model", "is empty, but source is 'model'; give the model's folder");
+  }
+}
+
+void read_frames(YamlSection section, FramesConfig& frames) {
+  section.text("map", frames.map);
+  section.text("odom", frames.odom);
+  section.text("lidar", frames.lidar);
+  if (frames.map.empty()) section.fault("map", "is empty; a frame needs a name");
+  if (frames.odom.empty()) section.fault("odom", "is empty; a frame needs a name");
+}
+
+void read_dds(YamlSection section, DdsConfig& dds) {
+  section.whole("domain_id", dds.domain_id, {0, 232});
+  section.flag("shared_memory", dds.shared_memory);
+  section.text_list("interfaces", dds.interfaces);
+  for (const std::string& address : dds.interfaces) {
+    in6_addr parsed{};
+    if (inet_pton(AF_INET, address.c_str(), &parsed) == 1) continue;
+    if (inet_pton(AF_INET6, address.c_str(), &parsed) == 1) continue;
+    section.fault("interfaces", "'" + address + "' is not an IP address such as 192.168.0.5");
+  }
+  section.whole("socket_buffer_bytes", dds.socket_buffer_bytes, {65536, 1U << 30U});
+  section.text("participant_name", dds.participant_name);
+  section.whole("ros_gid_bytes", dds.ros_gid_bytes, {16, 24});
+  if (dds.ros_gid_bytes != 16 && dds.ros_gid_bytes != 24) {
+    section.fault("ros_gid_bytes", "must be 24 (ROS 2 up to Humble) or 16 (from Iron)");
+  }
+}
+
+bool is_topic_name(const std::string& name) {
+  constexpr const char* allowed =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_/";
+  return !name.empty() && name.find_first_not_of(allowed) == std::string::npos &&
+         name.front() != '/' && name.back() != '/' && name.find("//") == std::string::npos;
+}
+
+void read_topics(YamlSection section, TopicsConfig& topics) {
+  section.text("points", topics.points);
+  section.text("namespace", topics.name_space);
+  section.text("odometry_prior", topics.odometry_prior);
+  const std::string rule = "; ROS 2 names have letters, digits, '_', and '/' inside";
+  if (!is_topic_name(topics.points)) section.fault("points", "'" + topics.points + "'" + rule);
+  if (!is_topic_name(topics.name_space)) {
+    section.fault("namespace", "'" + topics.name_space + "'" + rule);
+  }
+  if (!topics.odometry_prior.empty() && !is_topic_name(topics.odometry_prior)) {
+    section.fault("odometry_prior", "'" + topics.odometry_prior + "'" + rule);
+  }
+}
+
+void read_fields(YamlSection section, PointFieldNames& fields) {
+  section.text_list("intensity", fields.intensity);
+  section.text_list("ring", fields.ring);
+  section.text_list("time", fields.time);
+  section.text_list("label", fields.label);
+}
+
+void read_input(YamlSection section, InputConfig& input) {
+  section.choice<Delivery>("delivery", input.delivery,
+                           {{"latest", Delivery::latest}, {"every", Delivery::every}});
+  section.whole("queue_length", input.queue_length, {1, 1000});
+  read_fields(section.section("fields"), input.fields);
+  section.choice<LabelKind>(
+      "label_kind", input.label_kind,
+      {{"semantic_kitti", LabelKind::semantic_kitti}, {"classes", LabelKind::classes}});
+}
+
+void read_publish(YamlSection section, PublishConfig& publish) {
+  section.number("path_period_s", publish.path_period_s, periods_s);
+  section.number("cloud_period_s", publish.cloud_period_s, periods_s);
+  section.number("cloud_window_m", publish.cloud_window_m, {1, 1000});
+  section.number("tiles_period_s", publish.tiles_period_s, periods_s);
+  section.number("status_period_s", publish.status_period_s, periods_s);
+  section.flag("scan", publish.scan);
+}
+
+void read_map(YamlSection section, MapFileConfig& map) {
+  section.path("file", map.file);
+  section.number("save_period_s", map.save_period_s, {0.1, 86400});
+  section.flag("load_at_start", map.load_at_start);
+}
+
+void read_server(YamlSection file, const fs::path& folder, ServerConfig& config) {
+  read_sensor_name(file, folder, config.mapper.sensor);
+  read_mapper(file, config.mapper);
+  read_labels(file.section("labels"), config.labels);
+  read_frames(file.section("frames"), config.frames);
+  read_dds(file.section("dds"), config.dds);
+  read_topics(file.section("topics"), config.topics);
+  read_input(file.section("input"), config.input);
+  read_publish(file.section("publish"), config.publish);
+  read_map(file.section("map"), config.map);
+}
+
+}  // namespace
+
+ServerConfig load_server_config(const fs::path& file) {
+  ConfigReport report;
+  return load_server_config(file, report);
+}
+
+ServerConfig load_server_config(const fs::path& file, ConfigReport& report) {
+  YamlFile yaml = open_yaml(file);
+  ServerConfig config;
+  read_server(YamlSection(yaml), file.parent_path(), config);
+  yaml.require_no_faults();
+  report = std::move(yaml.report);
+  return config;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,132 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "config/config_error.hpp"
+#include "config/config_report.hpp"
+#include "core/lidar/sensor_model.hpp"
+#include "core/mapper.hpp"
+
+namespace stillmap {
+
+/// Where the class of a point comes from.
+enum class LabelOrigin {
+  /// The label field of the incoming cloud where it is there, else none.
+  stream,
+  /// A network, `LabelsConfig::model`.
+  model,
+  /// Pure geometry.
+  none,
+};
+
+struct LabelsConfig {
+  LabelOrigin source = LabelOrigin::stream;
+  /// Folder with model.onnx and model.yaml; used when source is `model`.
+  std::filesystem::path model;
+};
+
+/// Names of the coordinate frames in everything that is published.
+struct FramesConfig {
+  std::string map = "map";
+  std::string odom = "odom";
+  /// Empty: the frame that the incoming clouds name.
+  std::string lidar = "lidar";
+};
+
+struct DdsConfig {
+  /// 0..232, as DDS defines it; ROS_DOMAIN_ID of the ROS 2 peers.
+  std::uint32_t domain_id = 0;
+  /// Off: UDP only. Shared memory does not reach across users or containers, and says so nowhere.
+  bool shared_memory = true;
+  /// IP addresses of the network interfaces that may be used; empty: all.
+  std::vector<std::string> interfaces;
+  /// Asked of the kernel for each UDP socket; net.core.rmem_max caps it.
+  std::uint32_t socket_buffer_bytes = 4U << 20U;
+  std::string participant_name = "stillmap_server";
+  /// Length of a GID in ros_discovery_info: 24 up to ROS 2 Humble, 16 from Iron.
+  std::uint32_t ros_gid_bytes = 24;
+};
+
+/// ROS 2 topic names, without the prefixes that DDS sees.
+struct TopicsConfig {
+  std::string points = "points";
+  /// Put before the name of everything that the server offers: stillmap/odometry.
+  std::string name_space = "stillmap";
+  /// A nav_msgs/Odometry whose motion predicts the next pose; empty: constant velocity.
+  std::string odometry_prior = "odom_prior";
+};
+
+enum class Delivery {
+  /// Best-effort reader and a queue that drops the oldest scan: live sensors.
+  latest,
+  /// Reliable KEEP_ALL reader with back-pressure: the sender waits, nothing is lost. Replays.
+  every,
+};
+
+/// What the numbers in a cloud's label field are.
+enum class LabelKind {
+  /// Original SemanticKITTI ids (10 = car); moving ids are reduced to their class.
+  semantic_kitti,
+  /// Stillmap's classes, 0..19.
+  classes,
+};
+
+/// Names under which a point field may appear in a cloud; the first that is there is taken.
+struct PointFieldNames {
+  std::vector<std::string> intensity = {"intensity", "i", "reflectivity"};
+  std::vector<std::string> ring = {"ring", "channel"};
+  std::vector<std::string> time = {"time", "t", "timestamp", "offset_time"};
+  std::vector<std::string> label = {"label"};
+};
+
+struct InputConfig {
+  Delivery delivery = Delivery::latest;
+  /// Scans that may wait for the mapper.
+  std::uint32_t queue_length = 3;
+  PointFieldNames fields;
+  LabelKind label_kind = LabelKind::semantic_kitti;
+};
+
+struct PublishConfig {
+  double path_period_s = 1.0;
+  double cloud_period_s = 1.0;
+  /// Edge of the square round the robot that static_cloud shows.
+  double cloud_window_m = 60.0;
+  double tiles_period_s = 0.5;
+  double status_period_s = 1.0;
+  /// Publish every labelled scan (stillmap/scan).
+  bool scan = true;
+};
+
+struct MapFileConfig {
+  /// Empty: the map is not saved.
+  std::filesystem::path file;
+  double save_period_s = 30.0;
+  /// Go on with the map in `file` when it exists; else start empty.
+  bool load_at_start = true;
+};
+
+/// Everything that stillmap-server can be told. Works as it is, with a 64-beam sensor and no file.
+struct ServerConfig {
+  MapperConfig mapper{.sensor = hdl_64e(), .prepare = {}, .odometry = {}, .static_map = {}};
+  LabelsConfig labels;
+  FramesConfig frames;
+  DdsConfig dds;
+  TopicsConfig topics;
+  InputConfig input;
+  PublishConfig publish;
+  MapFileConfig map;
+};
+
+/// Reads a server file (config/server/default.yaml shows every field). What the file leaves out
+/// keeps its default; relative paths start at the file's folder. Throws ConfigError with every
+/// fault at once; a name that is not known is a fault.
+[[nodiscard]] ServerConfig load_server_config(const std::filesystem::path& file);
+/// The same, and tells which fields the file leaves out and which it changes.
+[[nodiscard]] ServerConfig load_server_config(const std::filesystem::path& file,
+                                              ConfigReport& report);
+
+}  // namespace stillmap

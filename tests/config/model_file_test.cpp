@@ -1,0 +1,105 @@
+#include "config/model_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "core/segmentation/model_error.hpp"
+#include "tests/config/config_files.hpp"
+
+namespace stillmap {
+namespace {
+
+using test::refusal;
+using test::write_file;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+const std::string sound = R"(
+name: tiny
+licence: MIT
+sensor: HDL-64E
+training: by hand
+accuracy: unknown
+image: {rows: 64, columns: 512, fov_up_deg: 3, fov_down_deg: -25}
+statistics:
+  range: {mean: 12.12, deviation: 12.32}
+  x: {mean: 10.88, deviation: 11.47}
+  y: {mean: 0.23, deviation: 6.91}
+  z: {mean: -1.04, deviation: 0.86}
+  remission: {mean: 0.21, deviation: 0.16}
+classes: {0: unlabeled, 1: car, 2: road}
+knn: {neighbours: 7}
+)";
+
+ModelDescription load(const std::string& yaml) {
+  return load_model_description(write_file("model.yaml", yaml).parent_path());
+}
+
+std::string refusal_of(std::string yaml, const std::string& from, const std::string& to) {
+  EXPECT_NE(yaml.find(from), std::string::npos);
+  yaml.replace(yaml.find(from), from.size(), to);
+  return refusal([&] { (void)load(yaml); });
+}
+
+TEST(ModelFile, ReadsADescriptionThatCanBeUsed) {
+  const ModelDescription model = load(sound);
+  EXPECT_EQ(model.faults(), "");
+  EXPECT_EQ(model.name, "tiny");
+  EXPECT_EQ(model.columns, 512);
+  EXPECT_NEAR(model.fov_down, -25.0 * std::numbers::pi / 180.0, 1e-12);
+  EXPECT_FLOAT_EQ(model.statistics.mean[3], -1.04F);
+  EXPECT_FLOAT_EQ(model.statistics.deviation[4], 0.16F);
+  EXPECT_EQ(model.classes,
+            (std::vector{SemanticClass::unlabeled, SemanticClass::car, SemanticClass::road}));
+  EXPECT_EQ(model.knn->neighbours, 7);
+  EXPECT_EQ(model.network_file, test::test_folder() / "model.onnx");
+}
+
+TEST(ModelFile, CanSwitchTheVotesOff) {
+  std::string yaml = sound;
+  yaml.replace(yaml.find("{neighbours: 7}"), 15, "{use: false}");
+  EXPECT_FALSE(load(yaml).knn.has_value());
+}
+
+TEST(ModelFile, RefusesHolesInTheClassMap) {
+  EXPECT_THAT(refusal_of(sound, "1: car", "5: car"), HasSubstr("output 1 has no class"));
+  EXPECT_THAT(refusal_of(sound, "1: car", "1: cat"), HasSubstr("did you mean 'car'"));
+  EXPECT_THAT(refusal_of(sound, "classes: {0: unlabeled, 1: car, 2: road}", "classes: {}"),
+              HasSubstr("classes"));
+}
+
+TEST(ModelFile, NamesWhatIsMissingOrWrong) {
+  EXPECT_THAT(refusal_of(sound, "licence: MIT\n", ""), HasSubstr("licence: is missing"));
+  EXPECT_THAT(refusal_of(sound, "  z: {mean: -1.04, deviation: 0.86}\n", ""),
+              AllOf(HasSubstr("statistics.z: is missing")));
+  EXPECT_THAT(refusal_of(sound, "deviation: 0.86", "deviation: 0"),
+              HasSubstr("statistics.z.deviation"));
+  EXPECT_THAT(refusal_of(sound, "rows: 64", "rows: -64"), HasSubstr("image.rows: '-64'"));
+  EXPECT_THAT(refusal_of(sound, "fov_up_deg: 3", "fov_up_deg: -30"), HasSubstr("below"));
+  EXPECT_THAT(refusal_of(sound, "neighbours: 7", "window: 4"), HasSubstr("odd"));
+}
+
+TEST(ModelFile, RefusesAFolderThatIsNotThere) {
+  EXPECT_THAT(refusal([] { (void)load_model_description(test::test_folder() / "none"); }),
+              HasSubstr("is not a folder"));
+}
+
+TEST(LabelSource, IsTheOneAskedFor) {
+  EXPECT_EQ(open_label_source({.source = LabelOrigin::stream, .model = {}})->name(), "stream");
+  EXPECT_EQ(open_label_source({.source = LabelOrigin::none, .model = {}})->name(), "none");
+}
+
+TEST(LabelSource, NamesTheNetworkFileThatIsMissing) {
+  const auto folder = write_file("model.yaml", sound).parent_path();
+  try {
+    (void)open_label_source({.source = LabelOrigin::model, .model = folder});
+    FAIL() << "a model without a network was opened";
+  } catch (const ModelError& error) {
+    EXPECT_THAT(error.what(), HasSubstr("model.onnx"));
+  }
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,64 @@
+#include "config/sensor_file.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/config/config_files.hpp"
+
+namespace stillmap {
+namespace {
+
+using test::refusal;
+using test::shipped;
+using test::write_file;
+using ::testing::HasSubstr;
+
+void expect_same(const SensorModel& a, const SensorModel& b) {
+  EXPECT_EQ(a.name, b.name);
+  EXPECT_EQ(a.rings, b.rings);
+  EXPECT_NEAR(a.fov_up, b.fov_up, 1e-12);
+  EXPECT_NEAR(a.fov_down, b.fov_down, 1e-12);
+  EXPECT_THAT(a.beam_elevations,
+              ::testing::Pointwise(::testing::DoubleNear(1e-12), b.beam_elevations));
+  EXPECT_EQ(a.columns, b.columns);
+  EXPECT_EQ(a.min_range_m, b.min_range_m);
+  EXPECT_EQ(a.max_range_m, b.max_range_m);
+  EXPECT_EQ(a.period_s, b.period_s);
+  EXPECT_EQ(a.ring_source, b.ring_source);
+  EXPECT_EQ(a.intensity_scale, b.intensity_scale);
+}
+
+TEST(SensorFile, ShippedFilesEqualTheBuiltInSensors) {
+  for (const std::string name : {"hdl_64e", "hdl_32e", "vlp_16"}) {
+    SCOPED_TRACE(name);
+    expect_same(load_sensor(shipped("sensors/" + name + ".yaml").string()), load_sensor(name));
+  }
+}
+
+TEST(SensorFile, ShippedExampleCanBeUsed) {
+  const SensorModel sensor = load_sensor(shipped("sensors/generic_example.yaml").string());
+  EXPECT_EQ(sensor.rings, 128);
+  EXPECT_EQ(sensor.faults(), "");
+}
+
+TEST(SensorFile, DemandsWhatHasNoDefault) {
+  const std::string text =
+      refusal([] { (void)load_sensor(write_file("a.yaml", "name: x").string()); });
+  for (const char* field : {"rings", "fov_up_deg", "fov_down_deg"}) {
+    EXPECT_THAT(text, HasSubstr(field + std::string(": is missing")));
+  }
+}
+
+TEST(SensorFile, WantsOneElevationForEachRing) {
+  const auto file = write_file("a.yaml",
+                               "{name: x, rings: 3, fov_up_deg: 5, fov_down_deg: -5, "
+                               "beam_elevations_deg: [1, 0]}");
+  EXPECT_THAT(refusal([&] { (void)load_sensor(file.string()); }), HasSubstr("beam_elevations"));
+}
+
+TEST(SensorFile, NamesTheBuiltInSensorsWhenThereIsNoSuchOne) {
+  EXPECT_THAT(refusal([] { (void)load_sensor("ouster"); }), HasSubstr("hdl_32e, hdl_64e, vlp_16"));
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,142 @@
+#include "config/server_config.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/config/config_files.hpp"
+
+namespace stillmap {
+namespace {
+
+using test::refusal;
+using test::shipped;
+using test::write_file;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::UnorderedElementsAre;
+
+ServerConfig load(const std::string& yaml) {
+  return load_server_config(write_file("server.yaml", yaml));
+}
+
+std::string refusal_of(const std::string& yaml) {
+  return refusal([&] { (void)load(yaml); });
+}
+
+TEST(ServerConfig, ShippedDefaultFileShowsEveryFieldWithItsDefault) {
+  ConfigReport report;
+  (void)load_server_config(shipped("server/default.yaml"), report);
+  EXPECT_THAT(report.left_out, IsEmpty());
+  EXPECT_THAT(report.changed, IsEmpty());
+}
+
+TEST(ServerConfig, ShippedReplayFileLosesNoScan) {
+  const ServerConfig config = load_server_config(shipped("server/replay_lossless.yaml"));
+  EXPECT_EQ(config.input.delivery, Delivery::every);
+}
+
+TEST(ServerConfig, ReportsWhatAFileChanges) {
+  ConfigReport report;
+  (void)load_server_config(
+      write_file("server.yaml", "publish: {scan: false, path_period_s: 1.0}\nsensor: vlp_16\n"),
+      report);
+  EXPECT_THAT(report.changed, UnorderedElementsAre("publish.scan", "sensor"));
+}
+
+TEST(ServerConfig, ReadsFieldsOfEveryKind) {
+  const ServerConfig config = load(R"(
+sensor: vlp_16
+labels: {source: none}
+dds: {domain_id: 42, shared_memory: false, interfaces: [127.0.0.1, "fe80::1"], ros_gid_bytes: 16}
+topics: {odometry_prior: ""}
+input: {fields: {label: [label, class]}, label_kind: classes}
+prepare: {ego_hull_lidar_m: [-1, -0.5, -1, 1, 0.5, 0]}
+odometry: {weighting: geometric, registration: {max_iterations: 7}}
+static_map: {min_points: 5}
+)");
+  EXPECT_EQ(config.mapper.sensor.rings, 16);
+  EXPECT_EQ(config.labels.source, LabelOrigin::none);
+  EXPECT_EQ(config.dds.domain_id, 42U);
+  EXPECT_FALSE(config.dds.shared_memory);
+  EXPECT_THAT(config.dds.interfaces, ::testing::ElementsAre("127.0.0.1", "fe80::1"));
+  EXPECT_EQ(config.dds.ros_gid_bytes, 16U);
+  EXPECT_EQ(config.topics.odometry_prior, "");
+  EXPECT_THAT(config.input.fields.label, ::testing::ElementsAre("label", "class"));
+  EXPECT_EQ(config.input.label_kind, LabelKind::classes);
+  EXPECT_TRUE(config.mapper.prepare.ego_hull_lidar.contains(Eigen::Vector3d(0.9, 0.4, -0.9)));
+  EXPECT_FALSE(config.mapper.prepare.ego_hull_lidar.contains(Eigen::Vector3d(0.9, 0.6, -0.9)));
+  EXPECT_EQ(config.mapper.odometry.weighting, Weighting::geometric);
+  EXPECT_EQ(config.mapper.odometry.registration.max_iterations, 7);
+  EXPECT_EQ(config.mapper.static_map.min_points, 5U);
+}
+
+TEST(ServerConfig, TakesRelativePathsFromTheFilesFolder) {
+  (void)write_file("my_sensor.yaml", "{name: mine, rings: 8, fov_up_deg: 10, fov_down_deg: -10}");
+  const ServerConfig config =
+      load("sensor: my_sensor.yaml\nmap: {file: out/a.stillmap}\nlabels: {model: /models/a}\n");
+  EXPECT_EQ(config.mapper.sensor.rings, 8);
+  EXPECT_EQ(config.map.file, test::test_folder() / "out/a.stillmap");
+  EXPECT_EQ(config.labels.model, "/models/a");
+}
+
+TEST(ServerConfig, KeepsDefaultsOfASectionThatIsCommentedOut) {
+  EXPECT_EQ(load("publish:\n  # scan: false\n").publish.scan, true);
+}
+
+TEST(ServerConfig, FindsEveryFaultAtOnceWithItsLine) {
+  const std::string text =
+      refusal_of("publish:\n  path_period_s: -1\n  scan: maybe\ndds:\n  domain_id: 500\nfoo: 1\n");
+  EXPECT_THAT(text, AllOf(HasSubstr("server.yaml:2: publish.path_period_s: '-1'"),
+                          HasSubstr("server.yaml:3: publish.scan: 'maybe'"),
+                          HasSubstr("server.yaml:5: dds.domain_id: '500'"), HasSubstr("0 to 232"),
+                          HasSubstr("server.yaml:6: foo")));
+}
+
+TEST(ServerConfig, SuggestsTheNameThatWasMeant) {
+  EXPECT_THAT(refusal_of("publish: {path_period: 2}"), HasSubstr("did you mean 'path_period_s'"));
+  EXPECT_THAT(refusal_of("odometri: {alpha: 0.1}"), HasSubstr("did you mean 'odometry'"));
+  EXPECT_THAT(refusal_of("sensor: hdl64e"), HasSubstr("did you mean 'hdl_64e'"));
+  EXPECT_THAT(refusal_of("input: {delivery: reliable}"), HasSubstr("known are: latest, every"));
+}
+
+TEST(ServerConfig, RefusesValuesOfTheWrongKind) {
+  for (const char* value : {".nan", "nan", "inf", "1 m", "[1]", "{a: 1}", "''", "1e999", "~"}) {
+    EXPECT_THAT(refusal_of("publish: {path_period_s: " + std::string(value) + "}"),
+                HasSubstr("publish.path_period_s"))
+        << value;
+  }
+  EXPECT_THAT(refusal_of("input: {queue_length: 2.5}"), HasSubstr("a whole number"));
+  EXPECT_THAT(refusal_of("input: {queue_length: 99999999999999999999}"), HasSubstr("whole"));
+  EXPECT_THAT(refusal_of("publish: 7"), HasSubstr("a section with fields"));
+  EXPECT_THAT(refusal_of("publish: [1, 2]"), HasSubstr("a section with fields"));
+  EXPECT_THAT(refusal_of("dds: {interfaces: eth0}"), HasSubstr("a list"));
+  EXPECT_THAT(refusal_of("dds: {interfaces: [[1]]}"), HasSubstr("a list"));
+  EXPECT_THAT(refusal_of("labels: {model: [a]}"), HasSubstr("a text"));
+}
+
+TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
+  EXPECT_THAT(refusal_of("labels: {source: model}"), HasSubstr("give the model's folder"));
+  EXPECT_THAT(refusal_of("prepare: {min_range_m: 200}"), HasSubstr("above min_range_m"));
+  EXPECT_THAT(refusal_of("prepare: {ego_hull_lidar_m: [1, 2]}"), HasSubstr("has 2 numbers"));
+  EXPECT_THAT(refusal_of("prepare: {ego_hull_lidar_m: [1, 1, 1, 0, 0, 0]}"),
+              HasSubstr("minimum above"));
+  EXPECT_THAT(refusal_of("static_map: {tile_size_m: 20.1}"), HasSubstr("static_map"));
+  EXPECT_THAT(refusal_of("dds: {ros_gid_bytes: 20}"), HasSubstr("must be 24"));
+  EXPECT_THAT(refusal_of("dds: {interfaces: [eth0]}"), HasSubstr("not an IP address"));
+  EXPECT_THAT(refusal_of("topics: {points: 'a b'}"), HasSubstr("topics.points"));
+  EXPECT_THAT(refusal_of("frames: {map: ''}"), HasSubstr("frames.map"));
+}
+
+TEST(ServerConfig, RefusesANameThatIsWrittenTwice) {
+  EXPECT_THAT(refusal_of("publish: {scan: true}\npublish: {scan: false}\n"), HasSubstr("twice"));
+}
+
+TEST(ServerConfig, ShowsTheFaultsOfASensorFile) {
+  (void)write_file("broken.yaml", "{name: x, rings: 0, fov_up_deg: 10, fov_down_deg: 20}");
+  EXPECT_THAT(refusal_of("sensor: broken.yaml"),
+              AllOf(HasSubstr("broken.yaml:1: rings"), HasSubstr("below fov_up")));
+}
+
+}  // namespace
+}  // namespace stillmap
