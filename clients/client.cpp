@@ -1,0 +1,149 @@
+#include "clients/client.hpp"
+
+#include <limits>
+#include <utility>
+
+#include "clients/connection.hpp"
+#include "idl/conversions/status.hpp"
+#include "idl/conversions/tile.hpp"
+
+namespace stillmap {
+
+using namespace stillmap_msgs::srv;
+
+namespace {
+
+// A map that changes so fast that its pages are forgotten three times over is not worth waiting
+// for.
+constexpr int attempts_at_whole_map = 3;
+
+ServiceError malformed(const std::string& service) {
+  return ServiceError("the answer of " + service +
+                      " cannot be understood; client and server must have the same version");
+}
+
+Eigen::AlignedBox3d everything() {
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  return {Eigen::Vector3d::Constant(-infinite), Eigen::Vector3d::Constant(infinite)};
+}
+
+std::vector<stillmap_msgs::msg::TileId> to_wire(std::span<const TileId> ids) {
+  std::vector<stillmap_msgs::msg::TileId> out(ids.size());
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    out[i].x(ids[i].x);
+    out[i].y(ids[i].y);
+  }
+  return out;
+}
+
+void append_page(const MapQueryResult& page, MapQueryResult& whole) {
+  whole.status = page.status;
+  whole.reason = page.reason;
+  whole.continuation = page.continuation;
+  whole.voxels.insert(whole.voxels.end(), page.voxels.begin(), page.voxels.end());
+}
+
+void add_tiles(const GetTiles_Response& reply, TileSet& set) {
+  for (const auto& message : reply.tiles()) {
+    auto tile = wire::from_wire(message);
+    if (!tile) throw malformed("get_tiles");
+    set.tiles.push_back(*std::move(tile));
+  }
+  for (const auto& id : reply.missing()) set.missing.push_back({id.x(), id.y()});
+}
+
+}  // namespace
+
+Client::Client(const ClientOptions& options) : connection_(std::make_unique<Connection>(options)) {}
+Client::~Client() = default;
+Client::Client(Client&&) noexcept = default;
+Client& Client::operator=(Client&&) noexcept = default;
+
+void Client::wait_for_server(std::chrono::milliseconds timeout) {
+  static_cast<void>(connection_->ask(connection_->get_status, connection_->names.get_status,
+                                     GetStatus_Request(), timeout));
+}
+
+ServerStatus Client::status() {
+  const auto reply = connection_->ask_ok(connection_->get_status, connection_->names.get_status,
+                                         GetStatus_Request());
+  auto status = wire::from_wire(reply.server());
+  if (!status) throw malformed(connection_->names.get_status);
+  return *std::move(status);
+}
+
+MapQueryResult Client::get_static_map(const MapQuery& query) {
+  const auto reply =
+      connection_->ask(connection_->get_static_map, connection_->names.get_static_map,
+                       wire::to_request(query), connection_->options.request_timeout);
+  auto result = wire::from_response(reply);
+  if (!result) throw malformed(connection_->names.get_static_map);
+  return *std::move(result);
+}
+
+MapQueryResult Client::get_whole_static_map(
+    MapQuery query, const std::function<void(std::uint64_t, std::uint64_t)>& page_arrived) {
+  for (int attempt = 1;; ++attempt) {
+    query.continuation.clear();
+    MapQueryResult whole = get_static_map(query);
+    if (page_arrived) page_arrived(whole.voxels.size(), whole.total_voxels);
+    while (whole.status == QueryStatus::ok && !whole.continuation.empty()) {
+      query.continuation = whole.continuation;
+      append_page(get_static_map(query), whole);
+      if (page_arrived) page_arrived(whole.voxels.size(), whole.total_voxels);
+    }
+    if (whole.status != QueryStatus::stale_continuation || attempt == attempts_at_whole_map) {
+      return whole;
+    }
+  }
+}
+
+TileVersions Client::get_tile_versions(const Eigen::AlignedBox3d& box_map) {
+  GetTileVersions_Request request;
+  request.min_x(box_map.min().x());
+  request.min_y(box_map.min().y());
+  request.max_x(box_map.max().x());
+  request.max_y(box_map.max().y());
+  const auto reply = connection_->ask_ok(connection_->get_tile_versions,
+                                         connection_->names.get_tile_versions, std::move(request));
+  TileVersions versions{.map = wire::from_wire(reply.identity()), .tiles = {}};
+  for (const auto& message : reply.tiles()) {
+    const auto info = wire::from_wire(message);
+    if (!info) throw malformed(connection_->names.get_tile_versions);
+    versions.tiles.push_back(*info);
+  }
+  return versions;
+}
+
+TileVersions Client::get_tile_versions() { return get_tile_versions(everything()); }
+
+TileSet Client::get_tiles(std::span<const TileId> ids) {
+  TileSet set;
+  auto wanted = to_wire(ids);
+  while (!wanted.empty()) {
+    GetTiles_Request request;
+    request.ids(wanted);
+    const auto reply = connection_->ask_ok(connection_->get_tiles, connection_->names.get_tiles,
+                                           std::move(request));
+    if (reply.left_out().size() >= wanted.size()) throw malformed(connection_->names.get_tiles);
+    set.map = wire::from_wire(reply.identity());
+    add_tiles(reply, set);
+    wanted = reply.left_out();
+  }
+  return set;
+}
+
+std::string Client::save_map(const std::string& file) {
+  SaveMap_Request request;
+  request.file(file);
+  return connection_->ask_ok(connection_->save_map, connection_->names.save_map, std::move(request))
+      .file();
+}
+
+std::uint64_t Client::reset() {
+  return connection_->ask_ok(connection_->reset, connection_->names.reset, Reset_Request())
+      .status()
+      .map_id();
+}
+
+}  // namespace stillmap

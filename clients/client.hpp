@@ -1,0 +1,127 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "clients/subscription.hpp"
+#include "core/map/map_query.hpp"
+#include "core/map/tile.hpp"
+#include "core/odometry/trajectory.hpp"
+#include "idl/dds/dds_options.hpp"
+#include "idl/map_identity.hpp"
+#include "idl/server_status.hpp"
+
+namespace stillmap {
+
+/// No answer, no server, or a server that refuses. The text names the service, the domain and what
+/// to check.
+class ServiceError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Nobody answered in time.
+class ServiceTimeout : public ServiceError {
+ public:
+  using ServiceError::ServiceError;
+};
+
+struct ClientOptions {
+  DdsOptions dds;
+  /// First part of the server's topic and service names.
+  std::string server_name = "stillmap";
+  /// Longest wait for an answer, discovery and retries included.
+  std::chrono::milliseconds request_timeout{5000};
+};
+
+/// A pose of the lidar as the server estimated it. How healthy the odometry is, is in
+/// ServerStatus::health.
+struct OdometryUpdate {
+  StampedPose pose;
+  /// Of (translation [m], rotation [rad]) in the map frame.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
+struct TileVersions {
+  MapIdentity map;
+  std::vector<TileInfo> tiles;
+};
+
+struct TileSet {
+  MapIdentity map;
+  std::vector<Tile> tiles;
+  /// Tiles asked for that the map does not have.
+  std::vector<TileId> missing;
+};
+
+/// A client of one stillmap-server. Requests may come from any thread and block until the answer is
+/// there; they throw ServiceTimeout when nobody answers within `request_timeout` and ServiceError
+/// when the server refuses.
+class Client {
+ public:
+  /// Joins the domain. Throws DdsError when the domain or an interface cannot be used.
+  explicit Client(const ClientOptions& options = {});
+  ~Client();
+  Client(Client&&) noexcept;
+  Client& operator=(Client&&) noexcept;
+
+  /// Returns when a server answers; throws ServiceTimeout after `timeout`.
+  void wait_for_server(std::chrono::milliseconds timeout);
+
+  [[nodiscard]] ServerStatus status();
+
+  /// One page of a region of the static map. Hand `continuation` back in the query for the next
+  /// page. A refused query is a result with its status and reason, not an exception.
+  [[nodiscard]] MapQueryResult get_static_map(const MapQuery& query);
+
+  /// All pages of the answer, all of one map version. Starts over when the map changed too far
+  /// under it. `page_arrived(voxels so far, total)` may be empty.
+  [[nodiscard]] MapQueryResult get_whole_static_map(
+      MapQuery query, const std::function<void(std::uint64_t, std::uint64_t)>& page_arrived = {});
+
+  /// Revision and hash of every tile whose footprint meets the box (map frame [m]); infinite faces
+  /// are allowed.
+  [[nodiscard]] TileVersions get_tile_versions(const Eigen::AlignedBox3d& box_map);
+  /// Of the whole map.
+  [[nodiscard]] TileVersions get_tile_versions();
+
+  /// These tiles with their voxels. Asks as often as the server's answer size needs. Voxels come
+  /// without the runner-up classes' evidence.
+  [[nodiscard]] TileSet get_tiles(std::span<const TileId> ids);
+
+  /// Has the server save its map; returns the file's name on the server's machine. An empty name
+  /// means the configured file.
+  std::string save_map(const std::string& file = {});
+
+  /// Has the server forget poses and map; returns the id of the new map.
+  std::uint64_t reset();
+
+  /// Calls back for every pose. Each subscription has its own thread, and its calls never overlap;
+  /// it ends with the Subscription, which must not outlive the client.
+  [[nodiscard]] Subscription subscribe_odometry(
+      std::function<void(const OdometryUpdate&)> pose_arrived);
+  /// Once a second, and when the health changes.
+  [[nodiscard]] Subscription subscribe_status(
+      std::function<void(const ServerStatus&)> status_arrived);
+  /// The whole path since the map began, at most once a second.
+  [[nodiscard]] Subscription subscribe_path(std::function<void(const Trajectory&)> path_arrived);
+  /// The newest version of every tile, first those that exist already.
+  [[nodiscard]] Subscription subscribe_tiles(
+      std::function<void(const MapIdentity&, const Tile&)> tile_arrived);
+  /// As subscribe_tiles, without the voxels.
+  [[nodiscard]] Subscription subscribe_tile_index(
+      std::function<void(const MapIdentity&, const TileInfo&)> info_arrived);
+
+ private:
+  struct Connection;
+  std::unique_ptr<Connection> connection_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,43 @@
+#include "clients/commands/client_arguments.hpp"
+
+namespace stillmap {
+
+std::chrono::milliseconds ClientArguments::timeout() const {
+  return std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * timeout_s));
+}
+
+DdsOptions ClientArguments::dds() const {
+  DdsOptions options;
+  options.domain_id = domain;
+  options.shared_memory = !udp_only;
+  if (!interface.empty()) options.interfaces = {interface};
+  return options;
+}
+
+ClientOptions ClientArguments::client() const {
+  return {.dds = dds(), .server_name = server_name, .request_timeout = timeout()};
+}
+
+void add_client_options(CommandHandle command, ClientArguments& arguments) {
+  command.option("--domain", arguments.domain, "DDS domain of the server")
+      .from_environment("ROS_DOMAIN_ID")
+      .between(0, 232)
+      .with_default();
+  command.option("--interface", arguments.interface,
+                 "Use only the network interface with this address (127.0.0.1: this machine)");
+  command.option("--server", arguments.server_name, "First part of the server's topic names")
+      .with_default();
+  command.flag("--udp-only", arguments.udp_only,
+               "No shared memory: the server runs as another user or in a container");
+  command.option("--timeout", arguments.timeout_s, "Longest wait for the server [s]")
+      .above_zero()
+      .with_default();
+}
+
+Client connect(const ClientArguments& arguments) {
+  Client client(arguments.client());
+  client.wait_for_server(arguments.timeout());
+  return client;
+}
+
+}  // namespace stillmap

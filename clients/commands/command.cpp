@@ -1,0 +1,42 @@
+#include "clients/commands/command.hpp"
+
+#include <iostream>
+#include <stdexcept>
+
+#include "clients/client.hpp"
+#include "config/config_error.hpp"
+#include "core/dataset/dataset_error.hpp"
+#include "core/map/map_file.hpp"
+#include "core/segmentation/model_error.hpp"
+
+namespace stillmap {
+namespace {
+
+ExitCode report(const std::exception& error, ExitCode code) {
+  std::cerr << "stillmap: " << error.what() << "\n";
+  return code;
+}
+
+}  // namespace
+
+ExitCode run_action(const Action& action) {
+  try {
+    return action();
+  } catch (const ServiceTimeout& error) {
+    return report(error, ExitCode::no_server);
+  } catch (const DatasetError& error) {
+    return report(error, ExitCode::bad_input);
+  } catch (const ConfigError& error) {
+    return report(error, ExitCode::bad_input);
+  } catch (const ModelError& error) {
+    return report(error, ExitCode::bad_input);
+  } catch (const MapFileError& error) {
+    return report(error, ExitCode::bad_input);
+  } catch (const std::invalid_argument& error) {
+    return report(error, ExitCode::bad_input);
+  } catch (const std::exception& error) {
+    return report(error, ExitCode::failed);
+  }
+}
+
+}  // namespace stillmap

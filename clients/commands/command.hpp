@@ -1,0 +1,43 @@
+#pragma once
+
+#include <functional>
+
+#include "clients/terminal/command_line.hpp"
+
+namespace stillmap {
+
+/// What the shell gets to know.
+enum class ExitCode {
+  ok = 0,
+  /// The run failed.
+  failed = 1,
+  /// Wrong usage, or input that cannot be used.
+  bad_input = 2,
+  /// No server, or no answer in time.
+  no_server = 3,
+};
+
+/// The chosen command with its options, ready to run. Set while the command line is parsed.
+using Action = std::function<ExitCode()>;
+
+// Each adds one subcommand to the program; when it is chosen, it sets `action`.
+void add_map_command(CommandHandle program, Action& action);
+void add_replay_command(CommandHandle program, Action& action);
+void add_watch_command(CommandHandle program, Action& action);
+void add_query_command(CommandHandle program, Action& action);
+void add_status_command(CommandHandle program, Action& action);
+void add_save_command(CommandHandle program, Action& action);
+void add_reset_command(CommandHandle program, Action& action);
+void add_evaluate_command(CommandHandle program, Action& action);
+void add_simulate_command(CommandHandle program, Action& action);
+
+// Subcommands of evaluate.
+void add_evaluate_trajectory_command(CommandHandle evaluate, Action& action);
+void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action);
+void add_evaluate_map_command(CommandHandle evaluate, Action& action);
+void add_evaluate_weightings_command(CommandHandle evaluate, Action& action);
+
+/// Runs the action; an exception becomes a line on stderr and its exit code.
+[[nodiscard]] ExitCode run_action(const Action& action);
+
+}  // namespace stillmap

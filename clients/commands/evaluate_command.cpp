@@ -1,0 +1,17 @@
+
+#include "clients/commands/command.hpp"
+
+namespace stillmap {
+
+void add_evaluate_command(CommandHandle program, Action& action) {
+  CommandHandle evaluate =
+      program.command("evaluate", "Compare trajectories, labels or maps with the truth");
+  evaluate.require_command();
+  add_evaluate_trajectory_command(evaluate, action);
+  add_evaluate_segmentation_command(evaluate, action);
+  add_evaluate_map_command(evaluate, action);
+  add_evaluate_weightings_command(evaluate, action);
+  evaluate.explain("'stillmap evaluate WHAT --help' shows options and examples.");
+}
+
+}  // namespace stillmap

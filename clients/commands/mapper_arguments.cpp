@@ -1,0 +1,71 @@
+#include "clients/commands/mapper_arguments.hpp"
+
+#include <stdexcept>
+
+#include "config/model_file.hpp"
+#include "config/sensor_file.hpp"
+#include "config/server_config.hpp"
+
+namespace stillmap {
+
+void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
+  command.option("--config", arguments.config_file,
+                 "Server file (config/server/*.yaml); its mapper settings are used");
+  command.option("--sensor", arguments.sensor,
+                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the recording suggests");
+  command
+      .option("--labels", arguments.labels,
+              "Where classes come from: auto (the recording's, if it has any), files (must "
+              "have them), none (pure geometry), or a folder with a model")
+      .with_default();
+  command
+      .option("--weighting", arguments.weighting,
+              "What a correspondence counts, the rows of the paper's Table I: none, "
+              "geometric, semantic; default: as configured")
+      .one_of({"none", "geometric", "semantic"});
+}
+
+Weighting weighting_from_name(const std::string& weighting_name) {
+  if (weighting_name == "none") return Weighting::none;
+  if (weighting_name == "geometric") return Weighting::geometric;
+  if (weighting_name == "semantic") return Weighting::semantic;
+  throw std::invalid_argument("weighting '" + weighting_name +
+                              "' is not known; there are none, geometric and semantic");
+}
+
+MapperConfig mapper_config(const MapperArguments& arguments, const SensorModel& suggested_sensor) {
+  MapperConfig config;
+  if (arguments.config_file.empty()) {
+    config.sensor = suggested_sensor;
+  } else {
+    config = load_server_config(arguments.config_file).mapper;
+  }
+  if (!arguments.sensor.empty()) config.sensor = load_sensor(arguments.sensor);
+  if (!arguments.weighting.empty()) {
+    config.odometry.weighting = weighting_from_name(arguments.weighting);
+  }
+  return config;
+}
+
+std::unique_ptr<LabelSource> label_source(const MapperArguments& arguments,
+                                          const ScanDataset& dataset) {
+  const bool labelled = dataset.has_labels(0);
+  LabelsConfig labels;
+  if (arguments.labels == "none") {
+    labels.source = LabelOrigin::none;
+  } else if (arguments.labels == "files") {
+    if (!labelled) {
+      throw std::invalid_argument(dataset.file(0).string() +
+                                  " has no labels: use --labels none or a model folder");
+    }
+  } else if (arguments.labels != "auto") {
+    labels = {.source = LabelOrigin::model, .model = arguments.labels};
+  } else if (!arguments.config_file.empty()) {
+    labels = load_server_config(arguments.config_file).labels;
+  } else if (!labelled) {
+    labels.source = LabelOrigin::none;
+  }
+  return open_label_source(labels);
+}
+
+}  // namespace stillmap

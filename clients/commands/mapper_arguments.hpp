@@ -1,0 +1,36 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "clients/terminal/command_line.hpp"
+#include "core/dataset/scan_dataset.hpp"
+#include "core/mapper.hpp"
+
+namespace stillmap {
+
+/// How a command line asks for a mapper.
+struct MapperArguments {
+  /// Server file whose mapper and labels sections are taken; empty: the defaults.
+  std::string config_file;
+  /// Name or file; empty: that of `config_file`, else as the dataset suggests.
+  std::string sensor;
+  /// "auto", "files", "none", or a model folder.
+  std::string labels = "auto";
+  /// "none", "geometric", "semantic"; empty: as configured.
+  std::string weighting;
+};
+
+/// Adds --config, --sensor, --labels and --weighting.
+void add_mapper_options(CommandHandle command, MapperArguments& arguments);
+
+[[nodiscard]] Weighting weighting_from_name(const std::string& weighting_name);
+
+/// Throws ConfigError or std::invalid_argument.
+[[nodiscard]] MapperConfig mapper_config(const MapperArguments& arguments,
+                                         const SensorModel& suggested_sensor);
+/// Throws ConfigError, ModelError or std::invalid_argument.
+[[nodiscard]] std::unique_ptr<LabelSource> label_source(const MapperArguments& arguments,
+                                                        const ScanDataset& dataset);
+
+}  // namespace stillmap

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <string>
+#include <utility>
+
+#include "clients/client.hpp"
+#include "idl/conversions/map_query.hpp"
+#include "idl/dds/service_client.hpp"
+#include "idl/topics.hpp"
+#include "stillmap_msgs.h"
+
+namespace stillmap {
+
+/// The client's participant and its ends of the services.
+struct Client::Connection {
+  explicit Connection(const ClientOptions& client_options);
+
+  /// The server's reply; throws ServiceTimeout when there is none.
+  template <typename Request, typename Reply>
+  [[nodiscard]] Reply ask(ServiceClient<Request, Reply>& service, const std::string& name,
+                          Request request, std::chrono::milliseconds timeout) {
+    request.format_version(wire_format_version);
+    auto reply = service.ask(request, timeout);
+    if (!reply) {
+      throw no_answer(name, timeout, service.wait_for_server(std::chrono::milliseconds(0)));
+    }
+    return *std::move(reply);
+  }
+
+  /// As `ask` within the usual time; throws ServiceError when the server refuses.
+  template <typename Request, typename Reply>
+  [[nodiscard]] Reply ask_ok(ServiceClient<Request, Reply>& service, const std::string& name,
+                             Request request) {
+    Reply reply = ask(service, name, std::move(request), options.request_timeout);
+    if (reply.status().code() != static_cast<std::uint8_t>(wire::ReplyCode::ok)) {
+      throw ServiceError(name + " was refused: " + reply.status().reason());
+    }
+    return reply;
+  }
+
+  [[nodiscard]] ServiceTimeout no_answer(const std::string& name, std::chrono::milliseconds timeout,
+                                         bool found) const;
+
+  ClientOptions options;
+  Topics topics;
+  Services names;
+  Participant participant;
+  ServiceClient<stillmap_msgs::srv::GetStaticMap_Request, stillmap_msgs::srv::GetStaticMap_Response>
+      get_static_map;
+  ServiceClient<stillmap_msgs::srv::GetTileVersions_Request,
+                stillmap_msgs::srv::GetTileVersions_Response>
+      get_tile_versions;
+  ServiceClient<stillmap_msgs::srv::GetTiles_Request, stillmap_msgs::srv::GetTiles_Response>
+      get_tiles;
+  ServiceClient<stillmap_msgs::srv::GetStatus_Request, stillmap_msgs::srv::GetStatus_Response>
+      get_status;
+  ServiceClient<stillmap_msgs::srv::SaveMap_Request, stillmap_msgs::srv::SaveMap_Response> save_map;
+  ServiceClient<stillmap_msgs::srv::Reset_Request, stillmap_msgs::srv::Reset_Response> reset;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,150 @@
+#!/usr/bin/env bash
+# The main job, end to end, in processes of their own that only share DDS: a replay publishes the
+# lidar scans of a simulated city, stillmap-server maps them, a planning client follows the poses
+# and asks for regions of the map. Then all of it is checked against the truth.
+#
+# BUILD                build folder (build/release)
+# STILLMAP_DEMO_DIR    where recording and results go (./demo)
+# STILLMAP_DEMO_SCANS  length of the drive (300)
+set -euo pipefail
+
+bin=${BUILD:-build/release}/bin
+demo=${STILLMAP_DEMO_DIR:-demo}
+scans=${STILLMAP_DEMO_SCANS:-300}
+config=$(dirname "$0")/../config/server/replay_lossless.yaml
+city=$demo/city_$scans
+out=$demo/result
+query_size_m=50
+max_ate_m=1.0
+children=()
+
+fail() {
+  echo "demo: FAILED: $*" >&2
+  [ -f "$out/server.log" ] && tail -n 5 "$out/server.log" >&2
+  exit 1
+}
+
+stop_children() {
+  for pid in "${children[@]}"; do kill "$pid" 2>/dev/null || true; done
+  wait 2>/dev/null || true
+}
+trap stop_children EXIT
+trap 'exit 130' INT TERM
+
+# A domain whose discovery port (7400 + 250 * domain) nobody on this machine has open.
+free_domain() {
+  local domain port
+  for domain in $(seq 60 99 | shuf); do
+    printf -v port '%04X' $((7400 + 250 * domain))
+    grep -qi ":$port " /proc/net/udp || { echo "$domain"; return; }
+  done
+  return 1
+}
+
+# value FILE KEY: a value of a JSON file with one key a line, as --json prints.
+value() {
+  sed -n "s/^ *\"$2\": \"\{0,1\}\([^\",]*\)\"\{0,1\},\{0,1\}$/\1/p" "$1" | head -n 1
+}
+
+# rounded FILE KEY DECIMALS
+rounded() { printf "%.$3f" "$(value "$1" "$2")"; }
+
+is_below() { awk -v a="$1" -v b="$2" 'BEGIN { exit !(a != "" && a + 0 < b + 0) }'; }
+
+make_city() {
+  [ -f "$city/complete" ] && return
+  rm -rf "$city"
+  "$bin/stillmap" simulate "$city" --preset quiet --scans "$scans" --seed 1
+  touch "$city/complete"
+}
+
+start_server() {
+  "$bin/stillmap-server" --config "$config" --domain "$domain" \
+    --map-file "$out/map.stillmap" > "$out/server.log" 2>&1 &
+  server=$!
+  children+=("$server")
+  "$bin/stillmap" status --domain "$domain" --timeout 30 > /dev/null || fail "the server does not answer"
+}
+
+# Follows the poses in one process, asks for the robot's surroundings in others, again and again.
+start_planning_client() {
+  "$bin/stillmap" watch --domain "$domain" --json --out "$out/watched.tum" \
+    > "$out/watch.jsonl" 2> "$out/watch.log" &
+  watch=$!
+  children+=("$watch")
+  while [ ! -e "$out/replayed" ]; do
+    "$bin/stillmap" query --domain "$domain" --around-robot "$query_size_m" --json \
+      >> "$out/queries_while_mapping.json" 2>> "$out/queries.log" || true
+    sleep 1
+  done &
+  planner=$!
+  children+=("$planner")
+}
+
+stop_planning_client() {
+  touch "$out/replayed"
+  wait "$planner"
+  kill "$watch" || fail "the planning client ended too early: $(cat "$out/watch.log")"
+  wait "$watch" || fail "the planning client ended with an error: $(cat "$out/watch.log")"
+}
+
+stop_server() {
+  kill "$server"
+  wait "$server" || fail "the server did not stop in order (exit code $?)"
+  children=()
+}
+
+check() {
+  local mapped dropped watched
+  mapped=$(value "$out/replay.json" mapped)
+  dropped=$(value "$out/replay.json" dropped)
+  [ "$mapped" = "$scans" ] || fail "$mapped of $scans scans were mapped"
+  [ "$dropped" = 0 ] || fail "$dropped scans were dropped"
+  watched=$(grep -vc '^#' "$out/watched.tum" || true)
+  [ "$watched" -ge $((scans / 2)) ] || fail "the planning client got $watched of $scans poses"
+  grep -q '"road"' "$out/queries_while_mapping.json" || fail "no query saw a road while mapping went on"
+  grep -q '"road"' "$out/query.json" || fail "the last query saw no road"
+  is_below "$(value "$out/accuracy.json" ate_rmse_m)" "$max_ate_m" ||
+    fail "pose error (ATE) is $(value "$out/accuracy.json" ate_rmse_m) m, wanted is below $max_ate_m m"
+  for file in map.stillmap query.ply map.png trajectory.png trajectory_error.png; do
+    [ -s "$out/$file" ] || fail "$out/$file was not written"
+  done
+}
+
+summary() {
+  local answers
+  answers=$(grep -c '"map_version"' "$out/queries_while_mapping.json")
+  cat <<TEXT
+
+Stillmap demo: a simulated city, three processes over DDS domain $domain
+  scans         $(value "$out/replay.json" published) sent, $(value "$out/replay.json" mapped) mapped, $(value "$out/replay.json" dropped) dropped, in $(rounded "$out/replay.json" seconds 1) s
+  pose error    ATE $(rounded "$out/accuracy.json" ate_rmse_m 3) m over $(rounded "$out/accuracy.json" path_m 1) m
+  map           $(value "$out/status.json" voxels) voxels in $(value "$out/status.json" tiles) tiles, $(du -h "$out/map.stillmap" | cut -f1) on disk
+  while mapping $(grep -vc '^#' "$out/watched.tum") poses followed, $answers region queries answered
+  at the end    $(value "$out/query.json" voxels) voxels within $query_size_m m in $(rounded "$out/query.json" ms 1) ms
+  look at       $out/map.png (map, path, queried region), $out/trajectory.png, $out/trajectory_error.png
+  also          $out/map.stillmap $out/query.ply $out/poses_lidar.txt $out/server.log
+TEXT
+}
+
+for program in stillmap stillmap-server; do
+  [ -x "$bin/$program" ] || fail "$bin/$program is missing: run 'make build', or set BUILD"
+done
+rm -rf "$out"
+mkdir -p "$out"
+domain=$(free_domain) || fail "no free DDS domain between 60 and 99"
+
+make_city
+start_server
+start_planning_client
+"$bin/stillmap" replay "$city" --domain "$domain" --lossless --out "$out/poses_lidar.txt" --json \
+  > "$out/replay.json" || fail "the replay ended with exit code $?"
+"$bin/stillmap" query --domain "$domain" --around-robot "$query_size_m" --json \
+  --out "$out/query.ply" --picture "$out/map.png" > "$out/query.json" || fail "the query failed"
+"$bin/stillmap" status --domain "$domain" --json > "$out/status.json"
+stop_planning_client
+stop_server
+"$bin/stillmap" evaluate trajectory --truth "$city/poses.txt" --truth-calib "$city/calib.txt" \
+  --estimate "$out/poses_lidar.txt" --pictures "$out" --json > "$out/accuracy.json"
+check
+summary

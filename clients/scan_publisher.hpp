@@ -1,0 +1,59 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "core/lidar/scan.hpp"
+#include "idl/dds/dds_options.hpp"
+
+namespace stillmap {
+
+struct ScanPublisherOptions {
+  DdsOptions dds;
+  /// ROS 2 name of the topic, without "rt/".
+  std::string points_topic = "points";
+  /// header.frame_id of the clouds.
+  std::string lidar_frame = "lidar";
+  /// Keep every scan until the server took it (needs a server with `delivery: every`); otherwise a
+  /// newer scan may overtake an untaken one.
+  bool lossless = false;
+  /// Scans that may be under way in lossless mode before publish() waits.
+  int scans_under_way = 4;
+};
+
+/// Publishes scans as sensor_msgs/PointCloud2, as a lidar driver does. One thread uses it.
+class ScanPublisher {
+ public:
+  /// Joins the domain. Throws DdsError when the domain or an interface cannot be used.
+  explicit ScanPublisher(const ScanPublisherOptions& options = {});
+  ~ScanPublisher();
+  ScanPublisher(ScanPublisher&&) noexcept;
+  ScanPublisher& operator=(ScanPublisher&&) noexcept;
+
+  /// True once a subscriber matched; false after `timeout`.
+  [[nodiscard]] bool wait_for_subscriber(std::chrono::milliseconds timeout);
+
+  /// Subscribers matched now.
+  [[nodiscard]] int subscribers() const;
+
+  /// Writes one scan; fields x y z intensity, and time, ring, label where the scan has them.
+  /// `raw_labels` (original SemanticKITTI ids, as in a .label file) goes out as field `label`
+  /// instead of the scan's reduced classes; empty or as long as the scan.
+  /// Lossless: waits until there is room. Returns false when the server took nothing for `timeout`:
+  /// nothing was written, and the caller may ask again.
+  [[nodiscard]] bool publish(const Scan& scan, std::span<const std::uint32_t> raw_labels = {},
+                             std::chrono::milliseconds timeout = std::chrono::seconds(10));
+
+  /// True once every subscriber acknowledged every scan written; false after `timeout`.
+  [[nodiscard]] bool wait_for_all_acknowledged(std::chrono::milliseconds timeout);
+
+ private:
+  struct Connection;
+  std::unique_ptr<Connection> connection_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,123 @@
+#include "clients/terminal/command_line.hpp"
+
+#include <CLI/App.hpp>
+#include <CLI/Config.hpp>
+#include <CLI/Formatter.hpp>
+
+namespace stillmap {
+
+OptionHandle OptionHandle::required() {
+  option_->required();
+  return *this;
+}
+
+OptionHandle OptionHandle::with_default() {
+  option_->capture_default_str();
+  return *this;
+}
+
+OptionHandle OptionHandle::one_of(const std::vector<std::string>& values) {
+  option_->check(CLI::IsMember(values));
+  return *this;
+}
+
+OptionHandle OptionHandle::above_zero() {
+  option_->check(CLI::PositiveNumber);
+  return *this;
+}
+
+OptionHandle OptionHandle::between(int low, int high) {
+  option_->check(CLI::Range(low, high));
+  return *this;
+}
+
+OptionHandle OptionHandle::exactly(int values) {
+  option_->expected(values);
+  return *this;
+}
+
+OptionHandle OptionHandle::comma_separated() {
+  option_->delimiter(',');
+  return *this;
+}
+
+OptionHandle OptionHandle::from_environment(const std::string& variable) {
+  option_->envname(variable);
+  return *this;
+}
+
+OptionHandle OptionHandle::excludes(const OptionHandle& other) {
+  option_->excludes(other.option_);
+  return *this;
+}
+
+OptionHandle CommandHandle::option(const std::string& names, std::string& value,
+                                   const std::string& help) {
+  return OptionHandle(*app_->add_option(names, value, help));
+}
+
+OptionHandle CommandHandle::option(const std::string& names, double& value,
+                                   const std::string& help) {
+  return OptionHandle(*app_->add_option(names, value, help));
+}
+
+OptionHandle CommandHandle::option(const std::string& names, int& value, const std::string& help) {
+  return OptionHandle(*app_->add_option(names, value, help));
+}
+
+OptionHandle CommandHandle::option(const std::string& names, std::uint32_t& value,
+                                   const std::string& help) {
+  return OptionHandle(*app_->add_option(names, value, help));
+}
+
+OptionHandle CommandHandle::option(const std::string& names, std::uint64_t& value,
+                                   const std::string& help) {
+  return OptionHandle(*app_->add_option(names, value, help));
+}
+
+OptionHandle CommandHandle::option(const std::string& names, std::vector<std::string>& values,
+                                   const std::string& help) {
+  return OptionHandle(*app_->add_option(names, values, help));
+}
+
+OptionHandle CommandHandle::option(const std::string& names, std::vector<double>& values,
+                                   const std::string& help) {
+  return OptionHandle(*app_->add_option(names, values, help));
+}
+
+void CommandHandle::flag(const std::string& names, bool& value, const std::string& help) {
+  app_->add_flag(names, value, help);
+}
+
+void CommandHandle::explain(const std::string& text) { app_->footer(text); }
+
+CommandHandle CommandHandle::command(const std::string& name, const std::string& help) {
+  return CommandHandle(*app_->add_subcommand(name, help));
+}
+
+void CommandHandle::require_command() { app_->require_subcommand(1); }
+
+void CommandHandle::on_chosen(const std::function<void()>& chosen) { app_->callback(chosen); }
+
+CommandLine::CommandLine(const std::string& program, const std::string& version,
+                         const std::string& help)
+    : app_(std::make_unique<CLI::App>(help, program)) {
+  app_->set_version_flag("--version", version);
+  app_->get_formatter()->column_width(36);
+}
+
+CommandLine::~CommandLine() = default;
+
+CommandHandle CommandLine::root() { return CommandHandle(*app_); }
+
+CommandLine::Parsed CommandLine::parse(int argc, char** argv) {
+  try {
+    app_->parse(argc, argv);
+    return Parsed::command;
+  } catch (const CLI::ParseError& error) {
+    // Help and version arrive as errors, too, with code 0.
+    return app_->exit(error) == 0 ? Parsed::answered : Parsed::wrong_usage;
+  }
+}
+
+}  // namespace stillmap

@@ -1,0 +1,95 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+namespace stillmap {
+
+// CLI11 is a large header: behind these handles it is compiled once instead of in every command.
+
+/// An option that was added to a command, to be refined. Values outside what is allowed are wrong
+/// usage.
+class OptionHandle {
+ public:
+  explicit OptionHandle(CLI::Option& option) : option_(&option) {}
+
+  OptionHandle required();
+  /// The help shows the value that the variable has now.
+  OptionHandle with_default();
+  OptionHandle one_of(const std::vector<std::string>& values);
+  OptionHandle above_zero();
+  OptionHandle between(int low, int high);
+  /// A list of exactly so many values.
+  OptionHandle exactly(int values);
+  /// A list may be written as one word: a,b,c.
+  OptionHandle comma_separated();
+  /// The environment variable that counts when the option is not given.
+  OptionHandle from_environment(const std::string& variable);
+  /// Both cannot be given.
+  OptionHandle excludes(const OptionHandle& other);
+
+ private:
+  CLI::Option* option_;
+};
+
+/// A command and its options. Variables must outlive the command line.
+class CommandHandle {
+ public:
+  explicit CommandHandle(CLI::App& app) : app_(&app) {}
+
+  /// `names` as "--count,-c", or "NAME" for a value by its place.
+  OptionHandle option(const std::string& names, std::string& value, const std::string& help);
+  OptionHandle option(const std::string& names, double& value, const std::string& help);
+  OptionHandle option(const std::string& names, int& value, const std::string& help);
+  OptionHandle option(const std::string& names, std::uint32_t& value, const std::string& help);
+  OptionHandle option(const std::string& names, std::uint64_t& value, const std::string& help);
+  OptionHandle option(const std::string& names, std::vector<std::string>& values,
+                      const std::string& help);
+  OptionHandle option(const std::string& names, std::vector<double>& values,
+                      const std::string& help);
+  /// "--labels,!--no-labels" has a name for each state.
+  void flag(const std::string& names, bool& value, const std::string& help);
+
+  /// Text under the options.
+  void explain(const std::string& text);
+  CommandHandle command(const std::string& name, const std::string& help);
+  /// One of the commands below it must be named.
+  void require_command();
+  /// Called when this is the command that was named.
+  void on_chosen(const std::function<void()>& chosen);
+
+ private:
+  CLI::App* app_;
+};
+
+/// The command line of a program.
+class CommandLine {
+ public:
+  CommandLine(const std::string& program, const std::string& version, const std::string& help);
+  ~CommandLine();
+
+  [[nodiscard]] CommandHandle root();
+
+  enum class Parsed {
+    /// A command was chosen.
+    command,
+    /// Help or version was printed.
+    answered,
+    /// What is wrong was printed.
+    wrong_usage,
+  };
+  [[nodiscard]] Parsed parse(int argc, char** argv);
+
+ private:
+  std::unique_ptr<CLI::App> app_;
+};
+
+}  // namespace stillmap

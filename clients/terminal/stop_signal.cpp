@@ -1,0 +1,31 @@
+#include "clients/terminal/stop_signal.hpp"
+
+#include <poll.h>
+#include <signal.h>
+#include <sys/signalfd.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
+namespace stillmap {
+
+StopSignal::StopSignal() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  signal_fd_ = signalfd(-1, &signals, SFD_CLOEXEC | SFD_NONBLOCK);
+  if (signal_fd_ < 0) throw std::system_error(errno, std::generic_category(), "signalfd");
+}
+
+StopSignal::~StopSignal() { close(signal_fd_); }
+
+bool StopSignal::wait_for(std::chrono::milliseconds timeout) {
+  // The signal is never read, so it stays pending and every later question gets the same answer.
+  pollfd waiting{.fd = signal_fd_, .events = POLLIN, .revents = 0};
+  return poll(&waiting, 1, static_cast<int>(timeout.count())) > 0;
+}
+
+}  // namespace stillmap

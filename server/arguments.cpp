@@ -1,0 +1,59 @@
+#include "server/arguments.hpp"
+
+#include <CLI/CLI.hpp>
+#include <map>
+#include <string>
+
+namespace stillmap {
+namespace {
+
+constexpr const char* footer =
+    "Scans come in as sensor_msgs/PointCloud2 on rt/points; poses, tiles, clouds and the status "
+    "go\n"
+    "out under rt/stillmap/, as ROS 2 topics.\n"
+    "\n"
+    "Examples:\n"
+    "  stillmap-server                                    a 64-beam sensor, domain 0, map not "
+    "kept\n"
+    "  stillmap-server --config config/server/default.yaml --map-file city.stillmap\n"
+    "  stillmap-server --delivery every                   for 'stillmap replay --lossless'\n"
+    "Then, elsewhere: stillmap replay DATASET, stillmap watch, stillmap query, stillmap status.\n"
+    "SIGINT and SIGTERM save the map and end the server with exit code 0.";
+
+constexpr int bad_usage = 2;
+
+}  // namespace
+
+Arguments read_arguments(int argc, char** argv) {
+  CLI::App program{"Turns lidar scans on DDS into poses and a queryable static semantic map.",
+                   "stillmap-server"};
+  program.set_version_flag("--version", std::string("stillmap-server ") + STILLMAP_VERSION);
+  program.footer(footer);
+  std::string config_file;
+  std::optional<std::uint32_t> domain_id;
+  std::optional<std::string> map_file;
+  std::optional<Delivery> delivery;
+  program.add_option("--config", config_file, "YAML file; config/server/default.yaml explains it")
+      ->check(CLI::ExistingFile);
+  program.add_option("--domain", domain_id, "DDS domain, instead of the file's")
+      ->check(CLI::Range(0, 232));
+  program.add_option("--map-file", map_file, "Where the map is kept, instead of the file's");
+  program
+      .add_option("--delivery", delivery,
+                  "latest: drop scans that are too many; every: let the sender wait")
+      ->option_text("latest|every")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Delivery>{
+          {"latest", Delivery::latest}, {"every", Delivery::every}}));
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return {.config = std::nullopt, .exit_code = program.exit(error) == 0 ? 0 : bad_usage};
+  }
+  ServerConfig config = config_file.empty() ? ServerConfig() : load_server_config(config_file);
+  if (domain_id) config.dds.domain_id = *domain_id;
+  if (map_file) config.map.file = *map_file;
+  if (delivery) config.input.delivery = *delivery;
+  return {.config = config};
+}
+
+}  // namespace stillmap

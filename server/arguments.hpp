@@ -1,0 +1,20 @@
+#pragma once
+
+#include <optional>
+
+#include "config/server_config.hpp"
+
+namespace stillmap {
+
+/// The configuration that the command line asks for; nothing when it only asked for help or the
+/// version, which were printed then.
+struct Arguments {
+  std::optional<ServerConfig> config;
+  /// For the shell, when there is no configuration.
+  int exit_code = 0;
+};
+
+/// Throws ConfigError.
+[[nodiscard]] Arguments read_arguments(int argc, char** argv);
+
+}  // namespace stillmap

@@ -1,0 +1,51 @@
+#include <pthread.h>
+#include <spdlog/spdlog.h>
+
+#include <csignal>
+#include <exception>
+
+#include "config/model_file.hpp"
+#include "server/arguments.hpp"
+#include "server/server.hpp"
+
+namespace {
+
+constexpr int failed = 1;
+constexpr int bad_input = 2;
+
+/// Blocked before any thread starts, so that all threads inherit it and sigwait gets the signal.
+sigset_t block_stop_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  return signals;
+}
+
+void serve(const stillmap::ServerConfig& config) {
+  const sigset_t signals = block_stop_signals();
+  stillmap::Server server(config, stillmap::open_label_source(config.labels));
+  spdlog::info("ready: scans from rt/{}, domain {}", config.topics.points, config.dds.domain_id);
+  int signal = 0;
+  sigwait(&signals, &signal);
+  spdlog::info("stopping");
+  server.stop();
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  try {
+    const stillmap::Arguments arguments = stillmap::read_arguments(argc, argv);
+    if (!arguments.config) return arguments.exit_code;
+    serve(*arguments.config);
+    return 0;
+  } catch (const stillmap::ConfigError& error) {
+    spdlog::critical("{}", error.what());
+    return bad_input;
+  } catch (const std::exception& error) {
+    spdlog::critical("{}", error.what());
+    return failed;
+  }
+}

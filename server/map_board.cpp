@@ -1,0 +1,64 @@
+#include "server/map_board.hpp"
+
+#include <algorithm>
+#include <functional>
+#include <utility>
+
+namespace stillmap {
+
+void MapBoard::begin(std::shared_ptr<const MapView> view, Trajectory trajectory) {
+  const std::scoped_lock lock(mutex_);
+  view_ = std::move(view);
+  trajectory_ = std::move(trajectory);
+  health_ = OdometryHealth::initialised;
+}
+
+void MapBoard::show(std::shared_ptr<const MapView> view) {
+  const std::scoped_lock lock(mutex_);
+  view_ = std::move(view);
+}
+
+void MapBoard::add_pose(const StampedPose& pose, OdometryHealth health,
+                        const std::string& label_source) {
+  const std::scoped_lock lock(mutex_);
+  const auto is_later = [&](const StampedPose& known) { return known.stamp_ns >= pose.stamp_ns; };
+  const auto later =
+      std::ranges::find_if(trajectory_.rbegin(), trajectory_.rend(), std::not_fn(is_later));
+  trajectory_.erase(later.base(), trajectory_.end());
+  trajectory_.push_back(pose);
+  ++poses_added_;
+  health_ = health;
+  label_source_ = label_source;
+}
+
+std::shared_ptr<const MapView> MapBoard::view() const {
+  const std::scoped_lock lock(mutex_);
+  return view_;
+}
+
+Trajectory MapBoard::trajectory() const {
+  const std::scoped_lock lock(mutex_);
+  return trajectory_;
+}
+
+StampedPose MapBoard::newest_pose() const {
+  const std::scoped_lock lock(mutex_);
+  return trajectory_.empty() ? StampedPose{} : trajectory_.back();
+}
+
+std::uint64_t MapBoard::poses_added() const {
+  const std::scoped_lock lock(mutex_);
+  return poses_added_;
+}
+
+OdometryHealth MapBoard::health() const {
+  const std::scoped_lock lock(mutex_);
+  return health_;
+}
+
+std::string MapBoard::label_source() const {
+  const std::scoped_lock lock(mutex_);
+  return label_source_;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "core/map/tile.hpp"
+#include "core/odometry/odometry_state.hpp"
+#include "core/odometry/trajectory.hpp"
+
+namespace stillmap {
+
+/// What the mapper's thread shows to all others: immutable views, so that nobody waits for
+/// anybody. Thread-safe.
+class MapBoard {
+ public:
+  /// A new map begins: its first view, and the poses that led to it.
+  void begin(std::shared_ptr<const MapView> view, Trajectory trajectory);
+  void show(std::shared_ptr<const MapView> view);
+  /// Poses at later times give way: a recording that is played again replaces its old path.
+  void add_pose(const StampedPose& pose, OdometryHealth health, const std::string& label_source);
+
+  /// Never null once `begin` was called.
+  [[nodiscard]] std::shared_ptr<const MapView> view() const;
+  [[nodiscard]] Trajectory trajectory() const;
+  /// The newest pose; the origin before the first.
+  [[nodiscard]] StampedPose newest_pose() const;
+  /// Poses added so far, over all maps: changes with every scan.
+  [[nodiscard]] std::uint64_t poses_added() const;
+  [[nodiscard]] OdometryHealth health() const;
+  [[nodiscard]] std::string label_source() const;
+
+ private:
+  mutable std::mutex mutex_;
+  std::shared_ptr<const MapView> view_;
+  Trajectory trajectory_;
+  std::uint64_t poses_added_ = 0;
+  OdometryHealth health_ = OdometryHealth::initialised;
+  std::string label_source_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,130 @@
+#include "server/mapping_thread.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+namespace stillmap {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// How long a request to reset, or the last view of a drive, may wait while no scan comes.
+constexpr std::chrono::milliseconds idle_period{50};
+
+double milliseconds(Clock::duration time) {
+  return std::chrono::duration<double, std::milli>(time).count();
+}
+
+// Ids must differ from those of maps that earlier runs made: the wall clock sees to that.
+std::uint64_t new_map_id() {
+  return static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
+}
+
+// Where a scan is expected in a map that was loaded: where the robot was at that time, if it is a
+// recording played again, else where it stood last. Nothing without a stored path.
+std::optional<Eigen::Isometry3d> pose_in_restored_map(const Trajectory& stored,
+                                                      std::int64_t stamp_ns) {
+  if (stored.empty()) return std::nullopt;
+  const auto then = std::ranges::lower_bound(stored, stamp_ns, {}, &StampedPose::stamp_ns);
+  return then == stored.end() ? stored.back().T_map_lidar : then->T_map_lidar;
+}
+
+}  // namespace
+
+MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSource> label_source,
+                             const std::optional<StoredMap>& stored, ScanQueue& queue,
+                             Statistics& statistics, MapBoard& board, const MappingOutputs& outputs)
+    : lidar_frame_(config.frames.lidar),
+      view_period_(config.publish.tiles_period_s),
+      queue_(queue),
+      statistics_(statistics),
+      board_(board),
+      outputs_(outputs),
+      mapper_(config.mapper, std::move(label_source),
+              [this](std::string_view stage) { stage_ended(stage); }) {
+  if (stored && !stored->view.tiles.empty()) {
+    mapper_.restore(stored->view);
+    board_.begin(mapper_.map_view(), stored->trajectory);
+  } else {
+    mapper_.reset(new_map_id());
+    board_.begin(mapper_.map_view(), {});
+  }
+  thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+}
+
+std::uint64_t MappingThread::reset() {
+  std::future<std::uint64_t> map_id;
+  {
+    const std::scoped_lock lock(reset_mutex_);
+    map_id = reset_asked_.emplace().get_future();
+  }
+  return map_id.get();
+}
+
+void MappingThread::work(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    auto queued = queue_.pop(stop, idle_period);
+    reset_if_asked();
+    const bool idle = !queued;
+    if (queued) map(*std::move(queued));
+    if (idle || Clock::now() - view_shown_ >= view_period_) show_view();
+  }
+  show_view();
+  reset_if_asked();
+}
+
+void MappingThread::map(QueuedScan queued) {
+  const auto began = Clock::now();
+  stage_began_ = began;
+  statistics_.add_latency("queue", milliseconds(began - queued.received));
+  const std::int64_t stamp_ns = queued.scan.stamp_ns;
+  auto mapped = mapper_.process(std::move(queued.scan), prior_for(stamp_ns));
+  if (!mapped) {
+    const ScanRejection& rejection = mapper_.last_rejection();
+    statistics_.scans_dropped(rejection.counter, 1, rejection.reason);
+    warnings_.warn(rejection.counter, "scan dropped: " + rejection.reason);
+    return;
+  }
+  const std::string& frame = lidar_frame_.empty() ? queued.frame : lidar_frame_;
+  if (outputs_.poses != nullptr) outputs_.poses->publish(stamp_ns, mapped->odometry, frame);
+  const bool unlabelled = mapped->labelled.labels.empty();
+  board_.add_pose({stamp_ns, mapped->odometry.T_map_lidar}, mapped->odometry.health,
+                  unlabelled ? "none" : mapper_.label_source());
+  statistics_.scan_mapped();
+  statistics_.add_latency("total", milliseconds(Clock::now() - queued.received));
+  if (outputs_.scans != nullptr) outputs_.scans->publish(std::move(mapped->labelled), frame);
+}
+
+std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) const {
+  if (mapper_.trajectory().empty()) {
+    return pose_in_restored_map(board_.trajectory(), stamp_ns);
+  }
+  if (outputs_.prior == nullptr) return std::nullopt;
+  return outputs_.prior->predict(mapper_.trajectory().back(), stamp_ns);
+}
+
+void MappingThread::stage_ended(std::string_view stage) {
+  const auto now = Clock::now();
+  statistics_.add_latency(std::string(stage), milliseconds(now - stage_began_));
+  stage_began_ = now;
+}
+
+void MappingThread::show_view() {
+  board_.show(mapper_.map_view());
+  view_shown_ = Clock::now();
+}
+
+void MappingThread::reset_if_asked() {
+  const std::scoped_lock lock(reset_mutex_);
+  if (!reset_asked_) return;
+  const std::uint64_t map_id = new_map_id();
+  mapper_.reset(map_id);
+  board_.begin(mapper_.map_view(), {});
+  spdlog::info("reset: map {} begins", map_id);
+  reset_asked_->set_value(map_id);
+  reset_asked_.reset();
+}
+
+}  // namespace stillmap

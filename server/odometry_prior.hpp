@@ -1,0 +1,53 @@
+#pragma once
+
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "core/odometry/trajectory.hpp"
+#include "idl/dds/reader.hpp"
+#include "nav_msgs.h"
+
+namespace stillmap {
+
+/// Poses from another odometry (wheels, GNSS), by time. Only their motion is used, so their origin
+/// does not matter; their child frame must be the lidar's.
+class PosesByTime {
+ public:
+  /// Out-of-order poses are left out.
+  void add(const StampedPose& pose);
+
+  /// Motion of the lidar from one time to another, interpolated; nothing when the poses do not
+  /// reach that far.
+  [[nodiscard]] std::optional<Eigen::Isometry3d> motion(std::int64_t from_ns,
+                                                        std::int64_t to_ns) const;
+
+ private:
+  [[nodiscard]] std::optional<Eigen::Isometry3d> pose_at(std::int64_t stamp_ns) const;
+
+  std::deque<StampedPose> poses_;
+};
+
+/// Listens to the odometry prior.
+class OdometryPrior {
+ public:
+  OdometryPrior(Participant& participant, const std::string& ros_topic);
+
+  /// Where a scan at `stamp_ns` should be, given where the last one was; nothing when the prior
+  /// does not know.
+  [[nodiscard]] std::optional<Eigen::Isometry3d> predict(const StampedPose& last,
+                                                         std::int64_t stamp_ns) const;
+
+ private:
+  void receive(const std::stop_token& stop);
+
+  mutable std::mutex mutex_;
+  PosesByTime poses_;
+  Reader<nav_msgs::msg::Odometry> reader_;
+  // Last: stops before what it uses is gone.
+  std::jthread thread_;
+};
+
+}  // namespace stillmap

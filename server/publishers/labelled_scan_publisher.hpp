@@ -1,0 +1,41 @@
+#pragma once
+
+#include <condition_variable>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "core/lidar/labelled_scan.hpp"
+#include "idl/dds/writer.hpp"
+#include "idl/topics.hpp"
+#include "sensor_msgs.h"
+
+namespace stillmap {
+
+/// Publishes labelled scans from its own thread; while one is being written, only the newest of
+/// the next ones is kept.
+class LabelledScanPublisher {
+ public:
+  LabelledScanPublisher(Participant& participant, const Topics& topics);
+
+  /// Returns at once.
+  void publish(LabelledScan labelled, const std::string& lidar_frame);
+
+ private:
+  struct Job {
+    LabelledScan labelled;
+    std::string lidar_frame;
+  };
+
+  void work(const std::stop_token& stop);
+
+  std::mutex mutex_;
+  std::condition_variable_any changed_;
+  std::optional<Job> newest_;
+  Writer<sensor_msgs::msg::PointCloud2> writer_;
+  // Last: stops before what it uses is gone.
+  std::jthread thread_;
+};
+
+}  // namespace stillmap

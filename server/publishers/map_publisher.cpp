@@ -1,0 +1,43 @@
+#include "server/publishers/map_publisher.hpp"
+
+#include "idl/conversions/map_to_cloud.hpp"
+#include "idl/conversions/pose.hpp"
+
+namespace stillmap {
+
+MapPublisher::MapPublisher(Participant& participant, const Topics& topics,
+                           const ServerConfig& config, const MapBoard& board)
+    : board_(board),
+      map_frame_(config.frames.map),
+      half_window_m_(static_cast<float>(config.publish.cloud_window_m / 2.0)),
+      tiles_(participant, topics),
+      path_(participant, topics.path.dds_name, topics.path.writer),
+      cloud_(participant, topics.static_cloud.dds_name, topics.static_cloud.writer),
+      tile_thread_(std::chrono::duration<double>(config.publish.tiles_period_s),
+                   [this] { tiles_.publish(*board_.view()); }),
+      path_thread_(std::chrono::duration<double>(config.publish.path_period_s),
+                   [this] { publish_path(); }),
+      cloud_thread_(std::chrono::duration<double>(config.publish.cloud_period_s),
+                    [this] { publish_cloud(); }) {}
+
+void MapPublisher::publish_path() {
+  const std::uint64_t poses = board_.poses_added();
+  if (poses == path_poses_) return;
+  path_poses_ = poses;
+  // Keep-last writers always have room.
+  static_cast<void>(path_.write(wire::to_path(board_.trajectory(), map_frame_)));
+}
+
+void MapPublisher::publish_cloud() {
+  const std::uint64_t poses = board_.poses_added();
+  if (poses == cloud_poses_) return;
+  cloud_poses_ = poses;
+  const StampedPose pose = board_.newest_pose();
+  const Eigen::Vector2f centre_map = pose.T_map_lidar.translation().head<2>().cast<float>();
+  const Eigen::Vector2f half = Eigen::Vector2f::Constant(half_window_m_);
+  const Eigen::AlignedBox2f window_map(centre_map - half, centre_map + half);
+  static_cast<void>(
+      cloud_.write(wire::to_cloud(*board_.view(), window_map, pose.stamp_ns, map_frame_)));
+}
+
+}  // namespace stillmap

@@ -1,0 +1,41 @@
+#pragma once
+
+#include <string>
+
+#include "config/server_config.hpp"
+#include "idl/dds/writer.hpp"
+#include "idl/topics.hpp"
+#include "nav_msgs.h"
+#include "sensor_msgs.h"
+#include "server/map_board.hpp"
+#include "server/publishers/periodic_thread.hpp"
+#include "server/publishers/tile_publisher.hpp"
+
+namespace stillmap {
+
+/// Publishes what is heavy and not urgent, each from its own thread and only when it changed:
+/// tiles, the path, and the static map round the robot.
+class MapPublisher {
+ public:
+  MapPublisher(Participant& participant, const Topics& topics, const ServerConfig& config,
+               const MapBoard& board);
+
+ private:
+  void publish_path();
+  void publish_cloud();
+
+  const MapBoard& board_;
+  std::string map_frame_;
+  float half_window_m_;
+  std::uint64_t path_poses_ = 0;
+  std::uint64_t cloud_poses_ = 0;
+  TilePublisher tiles_;
+  Writer<nav_msgs::msg::Path> path_;
+  Writer<sensor_msgs::msg::PointCloud2> cloud_;
+  // Last: they stop before what they use is gone.
+  PeriodicThread tile_thread_;
+  PeriodicThread path_thread_;
+  PeriodicThread cloud_thread_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <string>
+
+namespace stillmap {
+
+/// Logs a warning of one kind at most every few seconds and says how many were left out, so that a
+/// fault of every scan does not flood the log. One thread uses it.
+class RareWarnings {
+ public:
+  void warn(const std::string& kind, const std::string& text);
+
+ private:
+  struct Kind {
+    std::chrono::steady_clock::time_point last;
+    std::uint64_t left_out = 0;
+  };
+  std::map<std::string, Kind> kinds_;
+};
+
+}  // namespace stillmap

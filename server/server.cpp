@@ -1,0 +1,103 @@
+#include "server/server.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include "idl/dds/transports.hpp"
+
+namespace stillmap {
+namespace {
+
+DdsOptions dds_options(const DdsConfig& config) {
+  return {.domain_id = config.domain_id,
+          .shared_memory = config.shared_memory,
+          .interfaces = config.interfaces,
+          .socket_buffer_bytes = config.socket_buffer_bytes,
+          .node_name = config.participant_name,
+          .ros_gid_bytes = config.ros_gid_bytes};
+}
+
+std::map<std::string, std::string> file_metadata(const ServerConfig& config,
+                                                 const LabelSource& labels) {
+  return {{"software", std::string("stillmap ") + STILLMAP_VERSION},
+          {"sensor", config.mapper.sensor.name},
+          {"label_source", labels.name()}};
+}
+
+/// What is wrong with this machine, in words; empty when nothing is.
+std::string socket_trouble(const DdsConfig& config) {
+  const std::uint32_t granted = granted_socket_buffer_bytes(config.socket_buffer_bytes);
+  if (granted >= config.socket_buffer_bytes) return {};
+  const std::string trouble = "UDP receive buffers have " + std::to_string(granted) +
+                              " bytes instead of " + std::to_string(config.socket_buffer_bytes) +
+                              ", so large clouds over UDP can get lost: sudo sysctl "
+                              "net.core.rmem_max=" +
+                              std::to_string(config.socket_buffer_bytes);
+  spdlog::warn("{}", trouble);
+  return trouble;
+}
+
+std::optional<StoredMap> stored_map(MapSaver& saver, const MapFileConfig& config) {
+  if (!config.load_at_start) return std::nullopt;
+  auto stored = saver.load();
+  if (stored && !stored->view.tiles.empty()) {
+    spdlog::info("going on with {}: {} tiles, {} poses", config.file.string(),
+                 stored->view.tiles.size(), stored->trajectory.size());
+  }
+  return stored;
+}
+
+}  // namespace
+
+Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_source)
+    : topics_(Topics::in(config.topics.name_space)),
+      queue_(config.input.queue_length),
+      saver_(board_, config.map.file, file_metadata(config, *label_source)),
+      participant_(dds_options(config.dds)),
+      poses_(participant_, topics_, config.frames),
+      report_(delivery_mode(config.input.delivery), label_source->name(),
+              socket_trouble(config.dds), board_, statistics_,
+              [this] { return receiver_->why_nothing_arrives(); }) {
+  if (config.publish.scan) scans_.emplace(participant_, topics_);
+  if (!config.topics.odometry_prior.empty()) {
+    prior_.emplace(participant_, config.topics.odometry_prior);
+  }
+  const MappingOutputs outputs{
+      .poses = &poses_, .scans = scans_ ? &*scans_ : nullptr, .prior = prior_ ? &*prior_ : nullptr};
+  mapping_ = std::make_unique<MappingThread>(config, std::move(label_source),
+                                             stored_map(saver_, config.map), queue_, statistics_,
+                                             board_, outputs);
+  receiver_ = std::make_unique<ScanReceiver>(participant_, config, queue_, statistics_);
+  map_publisher_ = std::make_unique<MapPublisher>(participant_, topics_, config, board_);
+  const auto status = [this] { return report_.status(); };
+  services_ = std::make_unique<ServiceDesk>(
+      participant_, Services::in(config.topics.name_space),
+      ServiceContext{.board = board_, .saver = saver_, .status = status, .reset = [this] {
+                       return mapping_->reset();
+                     }});
+  status_publisher_ = std::make_unique<StatusPublisher>(participant_, topics_,
+                                                        config.publish.status_period_s, status);
+  autosave_ = std::make_unique<PeriodicThread>(
+      std::chrono::duration<double>(config.map.save_period_s), [this] { save_in_background(); });
+}
+
+Server::~Server() = default;
+
+void Server::stop() {
+  // Who asks goes first, then who brings, then who maps: nobody waits for somebody gone.
+  autosave_.reset();
+  services_.reset();
+  status_publisher_.reset();
+  receiver_.reset();
+  mapping_.reset();
+  saver_.save_if_changed();
+}
+
+void Server::save_in_background() {
+  try {
+    saver_.save_if_changed();
+  } catch (const MapFileError& error) {
+    spdlog::error("the map was not saved: {}", error.what());
+  }
+}
+
+}  // namespace stillmap

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "config/server_config.hpp"
+#include "idl/topics.hpp"
+#include "server/map_board.hpp"
+#include "server/map_saver.hpp"
+#include "server/mapping_thread.hpp"
+#include "server/publishers/map_publisher.hpp"
+#include "server/publishers/status_publisher.hpp"
+#include "server/scan_receiver.hpp"
+#include "server/server_report.hpp"
+#include "server/services/service_desk.hpp"
+
+namespace stillmap {
+
+/// A running stillmap-server: scans on DDS in; poses, the map and answers out.
+class Server {
+ public:
+  /// Starts everything. Throws DdsError, MapFileError, std::invalid_argument, or what the label
+  /// source throws.
+  Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_source);
+  ~Server();
+
+  /// Ends mapping after the scan in work, and saves the map. Throws MapFileError.
+  void stop();
+
+ private:
+  void save_in_background();
+
+  // In the order of construction; what comes later uses what comes before.
+  Topics topics_;
+  Statistics statistics_;
+  MapBoard board_;
+  ScanQueue queue_;
+  MapSaver saver_;
+  Participant participant_;
+  PosePublisher poses_;
+  std::optional<LabelledScanPublisher> scans_;
+  std::optional<OdometryPrior> prior_;
+  std::unique_ptr<MappingThread> mapping_;
+  std::unique_ptr<ScanReceiver> receiver_;
+  ServerReport report_;
+  std::unique_ptr<MapPublisher> map_publisher_;
+  std::unique_ptr<ServiceDesk> services_;
+  std::unique_ptr<StatusPublisher> status_publisher_;
+  std::unique_ptr<PeriodicThread> autosave_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,54 @@
+#include "server/server_report.hpp"
+
+#include <numeric>
+#include <utility>
+
+namespace stillmap {
+
+ServerReport::ServerReport(DeliveryMode delivery, std::string label_source,
+                           std::string lasting_trouble, const MapBoard& board,
+                           const Statistics& statistics,
+                           std::function<std::string()> why_nothing_arrives)
+    : delivery_(delivery),
+      label_source_(std::move(label_source)),
+      lasting_trouble_(std::move(lasting_trouble)),
+      board_(board),
+      statistics_(statistics),
+      why_nothing_arrives_(std::move(why_nothing_arrives)) {}
+
+ServerStatus ServerReport::status() const {
+  const auto view = board_.view();
+  const std::string live_labels = board_.label_source();
+  const auto wall_clock = std::chrono::system_clock::now().time_since_epoch();
+  const auto uptime = std::chrono::steady_clock::now() - started_;
+  ServerStatus status;
+  status.stamp_ns = std::chrono::nanoseconds(wall_clock).count();
+  status.software_version = STILLMAP_VERSION;
+  status.uptime_s = std::chrono::duration<double>(uptime).count();
+  status.delivery = delivery_;
+  status.label_source = live_labels.empty() ? label_source_ : live_labels;
+  status.health = board_.health();
+  status.map_version = view->version;
+  status.map_id = view->map_id;
+  status.tile_count = view->tiles.size();
+  status.voxel_count = std::accumulate(
+      view->tiles.begin(), view->tiles.end(), std::uint64_t{0},
+      [](std::uint64_t sum, const auto& tile) { return sum + tile->info.voxel_count; });
+  statistics_.report_to(status);
+  status.reason = reason(status);
+  return status;
+}
+
+std::string ServerReport::reason(const ServerStatus& status) const {
+  if (const std::string why = why_nothing_arrives_(); !why.empty()) return why;
+  if (const std::string drop = statistics_.last_drop(); !drop.empty()) {
+    return "the last scan was dropped: " + drop;
+  }
+  if (status.health == OdometryHealth::lost) {
+    return "the odometry is lost: the last scan does not fit the map";
+  }
+  if (status.received_hz == 0.0) return "no scan for the last seconds";
+  return lasting_trouble_;
+}
+
+}  // namespace stillmap

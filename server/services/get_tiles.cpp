@@ -1,0 +1,42 @@
+#include "server/services/get_tiles.hpp"
+
+#include <algorithm>
+
+#include "idl/conversions/tile.hpp"
+
+namespace stillmap {
+namespace {
+
+// About 5 MB at 27 bytes a voxel. At least one tile is always sent.
+constexpr std::size_t most_voxels = 200'000;
+
+const Tile* find_tile(const MapView& view, TileId id) {
+  const auto found =
+      std::ranges::lower_bound(view.tiles, id, {}, [](const auto& tile) { return tile->info.id; });
+  return found != view.tiles.end() && (*found)->info.id == id ? found->get() : nullptr;
+}
+
+}  // namespace
+
+stillmap_msgs::srv::GetTiles_Response get_tiles(
+    const ServiceContext& context, const stillmap_msgs::srv::GetTiles_Request& request) {
+  using Response = stillmap_msgs::srv::GetTiles_Response;
+  return answer<Response>(context, request, [&](const MapView& view, Response& response) {
+    const MapIdentity identity = wire::identity_of(view);
+    response.identity(wire::to_wire(identity));
+    std::size_t voxels = 0;
+    for (const auto& id : request.ids()) {
+      const Tile* const tile = find_tile(view, {id.x(), id.y()});
+      if (tile == nullptr) {
+        response.missing().push_back(id);
+      } else if (voxels > 0 && voxels + tile->voxels.size() > most_voxels) {
+        response.left_out().push_back(id);
+      } else {
+        voxels += tile->voxels.size();
+        response.tiles().push_back(wire::to_wire(*tile, identity));
+      }
+    }
+  });
+}
+
+}  // namespace stillmap

@@ -1,0 +1,13 @@
+#include "server/services/save_map.hpp"
+
+namespace stillmap {
+
+stillmap_msgs::srv::SaveMap_Response save_map(const ServiceContext& context,
+                                              const stillmap_msgs::srv::SaveMap_Request& request) {
+  using Response = stillmap_msgs::srv::SaveMap_Response;
+  return answer<Response>(context, request, [&](const MapView&, Response& response) {
+    response.file(context.saver.save_as(request.file()).string());
+  });
+}
+
+}  // namespace stillmap

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <exception>
+#include <functional>
+#include <stdexcept>
+
+#include "idl/conversions/map_query.hpp"
+#include "idl/server_status.hpp"
+#include "server/map_board.hpp"
+#include "server/map_saver.hpp"
+
+namespace stillmap {
+
+/// What the services answer from.
+struct ServiceContext {
+  const MapBoard& board;
+  MapSaver& saver;
+  std::function<ServerStatus()> status;
+  /// Returns the new map's id.
+  std::function<std::uint64_t()> reset;
+};
+
+/// Status of a reply about this view.
+[[nodiscard]] inline stillmap_msgs::msg::ReplyStatus reply_status(
+    const MapView& view, wire::ReplyCode code = wire::ReplyCode::ok,
+    const std::string& reason = {}) {
+  return wire::to_reply_status(code, reason, view.version, view.map_id);
+}
+
+/// The reply that `fill` completes, or one that says why not: a format version that is not ours, or
+/// what `fill` threw.
+template <typename Reply, typename Request, typename Fill>
+[[nodiscard]] Reply answer(const ServiceContext& context, const Request& request, Fill fill) {
+  Reply reply;
+  const auto view = context.board.view();
+  if (const auto fault = wire::version_fault(request.format_version())) {
+    reply.status(reply_status(*view, wire::ReplyCode::invalid_request, *fault));
+    return reply;
+  }
+  try {
+    reply.status(reply_status(*view));
+    fill(*view, reply);
+  } catch (const std::invalid_argument& fault) {
+    reply.status(reply_status(*view, wire::ReplyCode::invalid_request, fault.what()));
+  } catch (const std::exception& fault) {
+    reply.status(reply_status(*view, wire::ReplyCode::failed, fault.what()));
+  }
+  return reply;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,30 @@
+#include "server/services/service_desk.hpp"
+
+#include <utility>
+
+#include "server/services/get_status.hpp"
+#include "server/services/get_tile_versions.hpp"
+#include "server/services/get_tiles.hpp"
+#include "server/services/reset.hpp"
+#include "server/services/save_map.hpp"
+
+namespace stillmap {
+
+ServiceDesk::ServiceDesk(Participant& participant, const Services& names, ServiceContext context)
+    : context_(std::move(context)),
+      static_map_(context_),
+      get_static_map_(participant, names.get_static_map,
+                      [this](const auto& request) { return static_map_(request); }),
+      get_tile_versions_(
+          participant, names.get_tile_versions,
+          [this](const auto& request) { return get_tile_versions(context_, request); }),
+      get_tiles_(participant, names.get_tiles,
+                 [this](const auto& request) { return get_tiles(context_, request); }),
+      get_status_(participant, names.get_status,
+                  [this](const auto& request) { return get_status(context_, request); }),
+      save_map_(participant, names.save_map,
+                [this](const auto& request) { return save_map(context_, request); }),
+      reset_(participant, names.reset,
+             [this](const auto& request) { return stillmap::reset(context_, request); }) {}
+
+}  // namespace stillmap

@@ -1,0 +1,167 @@
+#include <sstream>
+
+#include "tests/clients/command_test.hpp"
+
+namespace stillmap::test {
+namespace {
+
+// Poses along one axis of the sensor, KITTI form.
+std::string straight_path(int poses, double step_m, int axis = 0) {
+  std::ostringstream text;
+  for (int i = 0; i < poses; ++i) {
+    for (int row = 0; row < 3; ++row) {
+      for (int column = 0; column < 3; ++column) text << (row == column ? "1 " : "0 ");
+      text << (row == axis ? step_m * i : 0.0) << (row == 2 ? "\n" : " ");
+    }
+  }
+  return text.str();
+}
+
+class EvaluateCommandTest : public CommandTest {
+ protected:
+  [[nodiscard]] ProcessResult compare(const std::string& more = "") const {
+    return run("evaluate trajectory --truth " + path("truth.txt") + " --estimate " +
+               path("estimate.txt") + " " + more);
+  }
+};
+
+TEST_F(EvaluateCommandTest, PrintsTheFiguresOfAKnownError) {
+  write("truth.txt", straight_path(300, 1.0));
+  write("estimate.txt", straight_path(300, 1.01));
+  const ProcessResult result = compare("--json --pictures " + path("pictures"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(json.at("poses"), 300);
+  EXPECT_NEAR(json.at("final_drift_m"), 2.99, 1e-6);
+  EXPECT_NEAR(json.at("relative").at("mean_translation_m"), 0.01, 1e-6);
+  EXPECT_NEAR(json.at("kitti").at("translation_percent"), 1.0, 0.02);
+  EXPECT_TRUE(exists("pictures/trajectory.png"));
+  EXPECT_TRUE(exists("pictures/trajectory_error.png"));
+  EXPECT_EQ(json.at("warning"), "");
+}
+
+TEST_F(EvaluateCommandTest, ShowsPeopleATableAndTheFrame) {
+  write("truth.txt", straight_path(20, 1.0));
+  write("estimate.txt", straight_path(20, 1.0));
+  const ProcessResult result = compare();
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(result.out, AllOf(HasSubstr("Frame of both: lidar"), HasSubstr("best rigid fit"),
+                                HasSubstr("shorter than 100 m")));
+}
+
+TEST_F(EvaluateCommandTest, WarnsWhenTheFramesSeemToDiffer) {
+  write("truth.txt", straight_path(20, 1.0, 2));
+  write("estimate.txt", straight_path(20, 1.0, 0));
+  const ProcessResult result = compare("--json");
+  EXPECT_THAT(result.err, HasSubstr("camera frame"));
+  EXPECT_NE(nlohmann::json::parse(result.out).at("warning"), "");
+}
+
+TEST_F(EvaluateCommandTest, ConvertsACameraTruth) {
+  simulate("city", 4);
+  ASSERT_EQ(run("map " + path("city") + " --out " + path("out")).exit_code, 0);
+  const ProcessResult result =
+      run("evaluate trajectory --json --truth " + path("city/poses.txt") + " --truth-calib " +
+          path("city/calib.txt") + " --estimate " + path("out/poses_lidar.txt"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(json.at("frame"), "lidar");
+  const nlohmann::json report = nlohmann::json::parse(content("out/report.json"));
+  EXPECT_NEAR(json.at("ate_rmse_m").get<double>(),
+              report.at("accuracy").at("ate_rmse_m").get<double>(), 1e-4);
+}
+
+TEST_F(EvaluateCommandTest, PairsByStampWhereBothFilesHaveStamps) {
+  write("truth.txt", "# remark\n1.0 0 0 0 0 0 0 1\n2.0 1 0 0 0 0 0 1\n3.0 2 0 0 0 0 0 1\n");
+  write("estimate.txt", "1.0 0 0 0 0 0 0 1\n3.01 2 0 0 0 0 0 1\n");
+  const ProcessResult result = compare("--json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(nlohmann::json::parse(result.out).at("poses"), 2);
+  EXPECT_NEAR(nlohmann::json::parse(result.out).at("ate_rmse_m"), 0.0, 1e-9);
+}
+
+TEST_F(EvaluateCommandTest, RefusesPoseFilesItCannotUse) {
+  write("truth.txt", straight_path(3, 1.0));
+  const std::vector<std::pair<std::string, std::string>> faults{
+      {"", "estimate.txt"},
+      {straight_path(2, 1.0), "3"},
+      {"1 2 3\n", "estimate.txt"},
+      {straight_path(2, 1.0) + "1 0 0 nan 0 1 0 0 0 0 1 0\n", "3"},
+      {straight_path(2, 1.0) + "5 0 0 0 0 5 0 0 0 0 5 0\n", "3"},
+      {"x 0 0 0 0 0 0 1\n", "line 1"},
+      {"1.0 0 0 0 0 0 0 9\n", "line 1"},
+      {std::string("\x00\xff\xfe rubbish", 11), "estimate.txt"}};
+  for (const auto& [text, message] : faults) {
+    write("estimate.txt", text);
+    const ProcessResult result = compare();
+    EXPECT_EQ(result.exit_code, 2) << text;
+    EXPECT_THAT(result.err, HasSubstr(message)) << text;
+  }
+  std::filesystem::remove(folder_ / "estimate.txt");
+  EXPECT_EQ(compare().exit_code, 2);
+}
+
+TEST_F(EvaluateCommandTest, ScoresSegmentationAgainstItself) {
+  simulate("city", 2);
+  const ProcessResult result = run("evaluate segmentation --json --truth " + path("city") +
+                                   " --predictions " + path("city/labels"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json json = nlohmann::json::parse(result.out);
+  EXPECT_DOUBLE_EQ(json.at("miou_present"), 1.0);
+  EXPECT_DOUBLE_EQ(json.at("iou").at("road"), 1.0);
+  EXPECT_LT(json.at("miou"), 1.0);
+}
+
+TEST_F(EvaluateCommandTest, RefusesPredictionsThatDoNotFit) {
+  simulate("city", 2);
+  const std::string command =
+      "evaluate segmentation --truth " + path("city") + " --predictions " + path("predictions");
+  EXPECT_EQ(run(command).exit_code, 2);
+  std::filesystem::create_directories(folder_ / "predictions");
+  EXPECT_EQ(run(command).exit_code, 2);
+  write("predictions/000001.label", "1234");
+  const ProcessResult too_short = run(command);
+  EXPECT_EQ(too_short.exit_code, 2);
+  EXPECT_THAT(too_short.err, HasSubstr("000001.label"));
+  std::filesystem::rename(folder_ / "predictions/000001.label", folder_ / "predictions/9.label");
+  EXPECT_THAT(run(command).err, HasSubstr("9.label"));
+}
+
+TEST_F(EvaluateCommandTest, ScoresAMapAgainstTheRecordingItWasMadeFrom) {
+  simulate("city");
+  ASSERT_EQ(run("map " + path("city") + " --out " + path("out")).exit_code, 0);
+  const ProcessResult result =
+      run("evaluate map --json --truth " + path("city") + " --map " + path("out/map.stillmap"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json json = nlohmann::json::parse(result.out);
+  EXPECT_GT(json.at("preservation_rate"), 0.3);
+  EXPECT_LE(json.at("preservation_rate"), 1.0);
+  EXPECT_GT(json.at("fixed_voxels"), 1000);
+}
+
+TEST_F(EvaluateCommandTest, RefusesMapsThatAreNone) {
+  simulate("city", 2);
+  write("no_map", "this is no database");
+  const std::string command = "evaluate map --truth " + path("city") + " --map ";
+  EXPECT_EQ(run(command + path("missing")).exit_code, 2);
+  EXPECT_FALSE(exists("missing"));
+  const ProcessResult result = run(command + path("no_map"));
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("no_map"));
+}
+
+TEST_F(EvaluateCommandTest, ComparesTheThreeWeightings) {
+  simulate("city", 4);
+  const ProcessResult result = run("evaluate weightings --json " + path("city"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json rows = nlohmann::json::parse(result.out);
+  ASSERT_EQ(rows.size(), 3U);
+  EXPECT_EQ(rows.at(0).at("weighting"), "none");
+  EXPECT_EQ(rows.at(2).at("weighting"), "semantic");
+  EXPECT_DOUBLE_EQ(rows.at(0).at("times_better_than_none"), 1.0);
+  std::filesystem::remove(folder_ / "city/poses.txt");
+  EXPECT_EQ(run("evaluate weightings " + path("city")).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace stillmap::test

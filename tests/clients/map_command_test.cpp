@@ -1,0 +1,121 @@
+#include "tests/clients/command_test.hpp"
+
+namespace stillmap::test {
+namespace {
+
+class MapCommandTest : public CommandTest {
+ protected:
+  [[nodiscard]] ProcessResult map_city(const std::string& more = "") const {
+    return run("map " + path("city") + " --out " + path("out") + " " + more);
+  }
+  void truncate(const std::string& name, std::uintmax_t bytes) const {
+    std::filesystem::resize_file(folder_ / name, bytes);
+  }
+};
+
+TEST_F(MapCommandTest, WritesPosesMapPicturesAndReport) {
+  simulate("city");
+  const ProcessResult result = map_city();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  for (const char* file : {"poses_lidar.txt", "poses_tum.txt", "map.stillmap", "map.ply", "map.pcd",
+                           "map.png", "trajectory.png", "trajectory_error.png", "report.json"}) {
+    EXPECT_TRUE(exists(std::string("out/") + file)) << file;
+  }
+  EXPECT_EQ(line_count("out/poses_lidar.txt"), 6U);
+  EXPECT_THAT(result.out, AllOf(HasSubstr("6 scans"), HasSubstr("lidar frame")));
+}
+
+TEST_F(MapCommandTest, ReportHoldsTimingMemoryAndAccuracy) {
+  simulate("city");
+  const ProcessResult result = map_city("--json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json report = nlohmann::json::parse(result.out);
+  EXPECT_EQ(report, nlohmann::json::parse(content("out/report.json")));
+  EXPECT_EQ(report.at("scans"), 6);
+  EXPECT_EQ(report.at("label_source"), "stream");
+  EXPECT_GT(report.at("median_ms"), 0.0);
+  EXPECT_GE(report.at("p95_ms"), report.at("median_ms"));
+  EXPECT_GT(report.at("stages").at("odometry").at("median_ms"), 0.0);
+  EXPECT_GT(report.at("peak_memory_mb"), 1.0);
+  EXPECT_GT(report.at("voxels"), 100);
+  EXPECT_LT(report.at("accuracy").at("ate_rmse_m"), 0.5);
+}
+
+TEST_F(MapCommandTest, TakesThePartOfTheRecordingThatIsAskedFor) {
+  simulate("city");
+  ASSERT_EQ(map_city("--start 2 --scans 3 --labels none").exit_code, 0);
+  EXPECT_EQ(line_count("out/poses_lidar.txt"), 3U);
+  EXPECT_EQ(nlohmann::json::parse(content("out/report.json")).at("label_source"), "none");
+}
+
+TEST_F(MapCommandTest, DoesNotWriteOverAMapUnlessForced) {
+  simulate("city", 3);
+  ASSERT_EQ(map_city().exit_code, 0);
+  const std::string before = content("out/map.stillmap");
+  const ProcessResult again = map_city("--scans 2");
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_THAT(again.err, AllOf(HasSubstr("map.stillmap"), HasSubstr("--force")));
+  EXPECT_EQ(content("out/map.stillmap"), before);
+  ASSERT_EQ(map_city("--scans 2 --force").exit_code, 0);
+  EXPECT_EQ(line_count("out/poses_lidar.txt"), 2U);
+}
+
+TEST_F(MapCommandTest, NamesADamagedFileAndGoesOn) {
+  simulate("city", 4);
+  truncate("city/velodyne/000001.bin", 1001);
+  const ProcessResult result = map_city();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("000001.bin"));
+  EXPECT_EQ(line_count("out/poses_lidar.txt"), 3U);
+  const nlohmann::json report = nlohmann::json::parse(content("out/report.json"));
+  EXPECT_EQ(report.at("skipped").at(0).at("scan"), 1);
+  EXPECT_EQ(report.at("skipped").at(0).at("counter"), "unreadable");
+}
+
+TEST_F(MapCommandTest, StopsAtADamagedFileWhenStrict) {
+  simulate("city", 3);
+  truncate("city/labels/000001.label", 10);
+  const ProcessResult result = map_city("--strict");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("000001.label"));
+  EXPECT_FALSE(exists("out/map.stillmap"));
+}
+
+TEST_F(MapCommandTest, LeavesOutAnEmptyScanAndSaysSo) {
+  simulate("city", 3);
+  truncate("city/velodyne/000002.bin", 0);
+  truncate("city/labels/000002.label", 0);
+  const ProcessResult result = map_city();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("000002.bin"));
+  EXPECT_EQ(line_count("out/poses_lidar.txt"), 2U);
+}
+
+TEST_F(MapCommandTest, RefusesInputItCannotUse) {
+  simulate("city", 2);
+  const auto refusal = [&](const std::string& arguments) {
+    const ProcessResult result = run("map " + arguments + " --out " + path("out"));
+    EXPECT_EQ(result.exit_code, 2) << arguments;
+    return result.err;
+  };
+  EXPECT_THAT(refusal(path("nowhere")), HasSubstr(path("nowhere")));
+  std::filesystem::create_directories(folder_ / "empty");
+  EXPECT_THAT(refusal(path("empty")), HasSubstr(path("empty")));
+  EXPECT_THAT(refusal(path("city") + " --sensor vlp_17"), HasSubstr("vlp_17"));
+  EXPECT_THAT(refusal(path("city") + " --labels " + path("no_model")), HasSubstr("no_model"));
+  EXPECT_THAT(refusal(path("city") + " --weighting heavy"), HasSubstr("heavy"));
+  EXPECT_THAT(refusal(path("city") + " --start 9"), HasSubstr("has 2"));
+  EXPECT_THAT(refusal(path("city") + " --config " + path("no.yaml")), HasSubstr("no.yaml"));
+}
+
+TEST_F(MapCommandTest, RefusesFileLabelsWhereThereAreNone) {
+  simulate("city", 2);
+  std::filesystem::remove_all(folder_ / "city/labels");
+  const ProcessResult result = map_city("--labels files");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("has no labels"));
+  EXPECT_EQ(map_city().exit_code, 0);
+}
+
+}  // namespace
+}  // namespace stillmap::test

@@ -1,0 +1,79 @@
+#include "tests/clients/process.hpp"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+#include <random>
+#include <sstream>
+#include <stdexcept>
+#include <vector>
+
+namespace stillmap::test {
+namespace {
+
+std::string content(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+int exit_code_of(int wait_status) { return WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : -1; }
+
+// Whether some socket of this machine has the UDP port, as /proc/net/udp lists them.
+bool is_used(int port) {
+  std::ostringstream end_of_address;
+  end_of_address << ":" << std::hex << std::uppercase << port << " ";
+  return content("/proc/net/udp").find(end_of_address.str()) != std::string::npos;
+}
+
+}  // namespace
+
+ProcessResult run_stillmap(const std::string& arguments, const std::filesystem::path& folder) {
+  const std::filesystem::path out = folder / "stdout.txt";
+  const std::filesystem::path err = folder / "stderr.txt";
+  const std::string command = std::string(STILLMAP_PROGRAM) + " " + arguments + " >" +
+                              out.string() + " 2>" + err.string() + " </dev/null";
+  const int wait_status = std::system(command.c_str());
+  return {exit_code_of(wait_status), content(out), content(err)};
+}
+
+ServerProcess::ServerProcess(const std::string& arguments, const std::filesystem::path& log_file) {
+  const std::string command = "exec " + std::string(STILLMAP_SERVER_PROGRAM) + " " + arguments +
+                              " >" + log_file.string() + " 2>&1";
+  std::string shell = "sh", option = "-c", text = command;
+  std::vector<char*> argv{shell.data(), option.data(), text.data(), nullptr};
+  if (posix_spawnp(&pid_, "sh", nullptr, nullptr, argv.data(), environ) != 0) {
+    throw std::runtime_error("cannot start " + command);
+  }
+}
+
+ServerProcess::~ServerProcess() {
+  if (pid_ > 0) {
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+  }
+}
+
+int ServerProcess::stop() {
+  kill(pid_, SIGTERM);
+  int wait_status = 0;
+  waitpid(pid_, &wait_status, 0);
+  pid_ = -1;
+  return exit_code_of(wait_status);
+}
+
+int free_domain() {
+  std::mt19937 random(std::random_device{}());
+  for (int attempt = 0; attempt < 1000; ++attempt) {
+    const int domain = std::uniform_int_distribution(100, 200)(random);
+    if (!is_used(7400 + 250 * domain)) return domain;
+  }
+  throw std::runtime_error("no free DDS domain between 100 and 200");
+}
+
+}  // namespace stillmap::test

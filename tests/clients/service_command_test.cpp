@@ -1,0 +1,90 @@
+#include <vector>
+
+#include "tests/clients/command_test.hpp"
+
+namespace stillmap::test {
+namespace {
+
+class ServiceCommandTest : public CommandTest {
+ protected:
+  [[nodiscard]] std::string on_domain() const { return " --domain " + std::to_string(domain_); }
+
+  int domain_ = free_domain();
+};
+
+TEST_F(ServiceCommandTest, WithoutAServerIsExitCodeThree) {
+  simulate("city", 1);
+  for (const std::string& command :
+       {std::string("status"), std::string("query"), std::string("save"), std::string("reset"),
+        std::string("watch"), "replay " + path("city")}) {
+    const ProcessResult result = run(command + on_domain() + " --timeout 0.5");
+    EXPECT_EQ(result.exit_code, 3) << command;
+    EXPECT_THAT(result.err, HasSubstr(std::to_string(domain_))) << command;
+  }
+}
+
+TEST_F(ServiceCommandTest, RefusesWrongRegionsClassesAndFilesBeforeAsking) {
+  const std::string query = "query" + on_domain() + " --timeout 0.5 ";
+  EXPECT_EQ(run(query + "--box 1 2 3").exit_code, 2);
+  EXPECT_EQ(run(query + "--box 0 0 0 1 1 1 --around 0 0 5").exit_code, 2);
+  EXPECT_EQ(run(query + "--around-robot -5").exit_code, 2);
+  EXPECT_EQ(run(query + "--out map.las").exit_code, 2);
+  const ProcessResult result = run(query + "--classes road,house");
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("house"), HasSubstr("building")));
+  EXPECT_EQ(run("status --domain 500").exit_code, 2);
+}
+
+TEST_F(ServiceCommandTest, ReplayOverDdsGivesThePosesThatMapGives) {
+  simulate("city", 8);
+  ServerProcess server("--delivery every --map-file " + path("server.stillmap") + on_domain(),
+                       folder_ / "server.log");
+  const ProcessResult replay = run("replay " + path("city") + " --lossless --json --timeout 30" +
+                                   on_domain() + " --out " + path("replayed.txt"));
+  ASSERT_EQ(replay.exit_code, 0) << replay.err << content("server.log");
+  const nlohmann::json json = nlohmann::json::parse(replay.out);
+  EXPECT_EQ(json.at("published"), 8);
+  EXPECT_EQ(json.at("mapped"), 8);
+  EXPECT_EQ(json.at("dropped"), 0);
+  ASSERT_EQ(run("map " + path("city") + " --sensor hdl_64e --out " + path("out")).exit_code, 0);
+  const ProcessResult same =
+      run("evaluate trajectory --json --truth " + path("out/poses_lidar.txt") + " --estimate " +
+          path("replayed.txt"));
+  ASSERT_EQ(same.exit_code, 0) << same.err;
+  EXPECT_LT(nlohmann::json::parse(same.out).at("ate_unaligned_rmse_m"), 1e-6);
+  EXPECT_EQ(server.stop(), 0) << content("server.log");
+  EXPECT_TRUE(exists("server.stillmap"));
+}
+
+TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
+  simulate("city", 5);
+  ServerProcess server("--delivery every --map-file " + path("server.stillmap") + on_domain(),
+                       folder_ / "server.log");
+  ASSERT_EQ(run("replay " + path("city") + " --lossless --timeout 30" + on_domain()).exit_code, 0)
+      << content("server.log");
+
+  const nlohmann::json status = nlohmann::json::parse(run("status --json" + on_domain()).out);
+  EXPECT_EQ(status.at("counters").at("scans_mapped"), 5);
+  EXPECT_GT(status.at("voxels"), 100);
+
+  const ProcessResult query = run("query --around-robot 30 --json" + on_domain() + " --out " +
+                                  path("near.ply") + " --picture " + path("near.png"));
+  ASSERT_EQ(query.exit_code, 0) << query.err;
+  EXPECT_GT(nlohmann::json::parse(query.out).at("voxels"), 100);
+  EXPECT_TRUE(exists("near.ply"));
+  EXPECT_TRUE(exists("near.png"));
+
+  const ProcessResult roads = run("query --classes road --json" + on_domain());
+  EXPECT_EQ(nlohmann::json::parse(roads.out).at("classes").size(), 1U);
+  EXPECT_EQ(run("query --box 5 0 0 -5 1 1" + on_domain()).exit_code, 2);
+
+  EXPECT_EQ(run("save saved.stillmap" + on_domain()).exit_code, 0);
+  EXPECT_TRUE(exists("saved.stillmap"));
+  EXPECT_EQ(run("reset" + on_domain()).exit_code, 0);
+  const nlohmann::json empty = nlohmann::json::parse(run("status --json" + on_domain()).out);
+  EXPECT_EQ(empty.at("voxels"), 0);
+  EXPECT_NE(empty.at("map_id"), status.at("map_id"));
+}
+
+}  // namespace
+}  // namespace stillmap::test

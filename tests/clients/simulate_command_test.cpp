@@ -1,0 +1,58 @@
+#include "tests/clients/command_test.hpp"
+
+namespace stillmap::test {
+namespace {
+
+class SimulateCommandTest : public CommandTest {};
+
+TEST_F(SimulateCommandTest, WritesASequenceWithTruth) {
+  simulate("city", 3);
+  for (const char* file : {"city/velodyne/000002.bin", "city/labels/000002.label", "city/times.txt",
+                           "city/calib.txt", "city/poses.txt"}) {
+    EXPECT_TRUE(exists(file)) << file;
+  }
+  EXPECT_FALSE(exists("city/velodyne/000003.bin"));
+  EXPECT_EQ(line_count("city/poses.txt"), 3U);
+}
+
+TEST_F(SimulateCommandTest, IsTheSameForTheSameSeedOnly) {
+  const std::string common = " --preset yard --sensor vlp16 --scans 1 --seed ";
+  ASSERT_EQ(run("simulate " + path("a") + common + "1").exit_code, 0);
+  ASSERT_EQ(run("simulate " + path("b") + common + "1").exit_code, 0);
+  ASSERT_EQ(run("simulate " + path("c") + common + "2").exit_code, 0);
+  EXPECT_EQ(content("a/velodyne/000000.bin"), content("b/velodyne/000000.bin"));
+  EXPECT_NE(content("a/velodyne/000000.bin"), content("c/velodyne/000000.bin"));
+}
+
+TEST_F(SimulateCommandTest, PrintsJsonWhenAsked) {
+  const ProcessResult result = run("simulate " + path("city") +
+                                   " --preset yard --sensor vlp16 --scans 1 --traffic 0 --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json json = nlohmann::json::parse(result.out);
+  EXPECT_EQ(json.at("scans"), 1);
+  EXPECT_GT(json.at("points"), 1000);
+}
+
+TEST_F(SimulateCommandTest, DoesNotWriteOverARecording) {
+  simulate("city", 1);
+  const ProcessResult again = run("simulate " + path("city") + " --preset yard --scans 1");
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_THAT(again.err, HasSubstr(path("city")));
+}
+
+TEST_F(SimulateCommandTest, RefusesWhatItDoesNotKnow) {
+  const std::string out = "simulate " + path("city");
+  EXPECT_EQ(run(out + " --scans 0").exit_code, 2);
+  EXPECT_EQ(run(out + " --scans -5").exit_code, 2);
+  EXPECT_EQ(run(out + " --traffic -1").exit_code, 2);
+  const ProcessResult preset = run(out + " --preset moon");
+  EXPECT_EQ(preset.exit_code, 2);
+  EXPECT_THAT(preset.err, HasSubstr("moon"));
+  const ProcessResult sensor = run(out + " --sensor hdl_65");
+  EXPECT_EQ(sensor.exit_code, 2);
+  EXPECT_THAT(sensor.err, HasSubstr("hdl_65"));
+  EXPECT_FALSE(exists("city"));
+}
+
+}  // namespace
+}  // namespace stillmap::test

@@ -1,0 +1,111 @@
+#include <gmock/gmock.h>
+
+#include <limits>
+
+#include "idl/conversions/scan_to_cloud.hpp"
+#include "idl/dds/writer.hpp"
+#include "idl/topics.hpp"
+#include "tests/server/room_scans.hpp"
+#include "tests/server/server_process.hpp"
+
+namespace stillmap::test {
+namespace {
+
+using sensor_msgs::msg::PointCloud2;
+
+class HostileInput : public testing::Test {
+ protected:
+  HostileInput() : setup_("every"), server_(setup_.server_arguments()), client_(setup_.client()) {
+    EXPECT_TRUE(clouds_.readers().wait_for_any(patience));
+  }
+
+  void send(const PointCloud2& cloud) {
+    ASSERT_TRUE(eventually([&] { return clouds_.write(cloud); }));
+    ++sent_;
+  }
+  void send(const Scan& scan) { send(wire::to_cloud(scan, {}, "lidar")); }
+
+  /// After the server dealt with everything sent.
+  ServerStatus status() {
+    EXPECT_TRUE(wait_for_scans(client_, sent_));
+    return client_.status();
+  }
+
+  ServiceSetup setup_;
+  ServerProcess server_;
+  Client client_;
+  Participant participant_{setup_.dds()};
+  TopicSpec<PointCloud2> topic_ = points_topic("points", DeliveryMode::every, 4);
+  Writer<PointCloud2> clouds_{participant_, topic_.dds_name, topic_.writer};
+  std::uint64_t sent_ = 0;
+};
+
+TEST_F(HostileInput, BadCloudsAreCountedAndServiceGoesOn) {
+  send(room_scan(0));
+  EXPECT_EQ(status().counter("scans_mapped"), 1U);
+  PointCloud2 cloud = wire::to_cloud(room_scan(1), {}, "lidar");
+  PointCloud2 too_wide = cloud;
+  too_wide.width(cloud.width() + 1);
+  send(too_wide);
+  PointCloud2 no_z = cloud;
+  no_z.fields()[2].name("height");
+  send(no_z);
+  PointCloud2 bad_type = cloud;
+  bad_type.fields()[0].datatype(99);
+  send(bad_type);
+  send(PointCloud2());
+  ServerStatus now = status();
+  EXPECT_EQ(now.counter("dropped_bad_cloud_size_mismatch"), 1U);
+  EXPECT_EQ(now.counter("dropped_bad_cloud_no_xyz"), 1U);
+  EXPECT_EQ(now.counter("dropped_bad_cloud_bad_field"), 1U);
+  EXPECT_EQ(now.counter("dropped_bad_cloud_no_points"), 1U);
+  EXPECT_THAT(now.reason, testing::HasSubstr("width 0"));
+
+  send(room_scan(1));
+  now = status();
+  EXPECT_EQ(now.counter("scans_mapped"), 2U);
+  EXPECT_THAT(now.reason, testing::Not(testing::HasSubstr("dropped")));
+}
+
+TEST_F(HostileInput, ScansOutOfOrderOrRepeatedAreDropped) {
+  for (const int index : {0, 1, 3, 2, 3, 4}) send(room_scan(index));
+  const ServerStatus now = status();
+  EXPECT_EQ(now.counter("scans_mapped"), 4U);
+  EXPECT_EQ(now.counter("dropped_out_of_order"), 2U);
+}
+
+TEST_F(HostileInput, ScansWithoutAUsablePointAreDropped) {
+  Scan nan = room_scan(0);
+  for (auto& point : nan.points_lidar) point.setConstant(std::numeric_limits<float>::quiet_NaN());
+  Scan infinite = room_scan(1);
+  for (auto& point : infinite.points_lidar) {
+    point.setConstant(std::numeric_limits<float>::infinity());
+  }
+  Scan zero = room_scan(2);
+  for (auto& point : zero.points_lidar) point.setZero();
+  for (const Scan& scan : {nan, infinite, zero}) send(scan);
+  send(room_scan(3));
+  const ServerStatus now = status();
+  EXPECT_EQ(now.dropped(), 3U);
+  EXPECT_EQ(now.counter("scans_mapped"), 1U);
+}
+
+TEST_F(HostileInput, ScansWithAllPointsEqualOrHalfNanDoNoHarm) {
+  send(room_scan(0));
+  Scan equal = room_scan(1);
+  for (auto& point : equal.points_lidar) point = {5.0F, 1.0F, 0.0F};
+  send(equal);
+  Scan half = room_scan(2);
+  for (std::size_t i = 0; i < half.size(); i += 2) {
+    half.points_lidar[i].setConstant(std::numeric_limits<float>::quiet_NaN());
+  }
+  for (auto& value : half.intensity) value = 0.0F;
+  send(half);
+  for (int index = 3; index < 6; ++index) send(room_scan(index));
+  const ServerStatus now = status();
+  EXPECT_GE(now.counter("scans_mapped"), 5U);
+  EXPECT_EQ(now.health, OdometryHealth::good);
+}
+
+}  // namespace
+}  // namespace stillmap::test

@@ -1,0 +1,83 @@
+#include "server/map_saver.hpp"
+
+#include <gtest/gtest.h>
+
+#include <stdexcept>
+
+#include "core/map/static_map.hpp"
+#include "tests/map/temporary_folder.hpp"
+
+namespace stillmap {
+namespace {
+
+LabelledScan scan_of(float x) {
+  LabelledScan labelled;
+  labelled.scan.points_lidar.assign(5, Eigen::Vector3f(x, 1.0F, 1.0F));
+  labelled.motion.assign(5, Motion::stationary);
+  return labelled;
+}
+
+class MapSaverTest : public testing::Test {
+ protected:
+  MapSaverTest() { board_.begin(map_.view(), {}); }
+
+  /// As the mapper's thread does with a scan.
+  void map_scan(float x) {
+    map_.insert(scan_of(x), Eigen::Isometry3d::Identity());
+    board_.show(map_.view());
+    board_.add_pose({.stamp_ns = static_cast<std::int64_t>(x)}, OdometryHealth::good, "none");
+  }
+
+  test::TemporaryFolder folder_;
+  StaticMap map_{StaticMapConfig()};
+  MapBoard board_;
+};
+
+TEST_F(MapSaverTest, SavesWhatTheBoardShows) {
+  MapSaver saver(board_, folder_ / "map.stillmap", {{"sensor", "vlp_16"}});
+  for (const float x : {5.0F, 50.0F}) {
+    map_scan(x);
+    saver.save_if_changed();
+  }
+  const auto stored = MapSaver(board_, folder_ / "map.stillmap", {}).load();
+  ASSERT_TRUE(stored);
+  EXPECT_EQ(stored->view.version, map_.view()->version);
+  EXPECT_EQ(stored->view.tiles.size(), 2U);
+  EXPECT_EQ(stored->trajectory.size(), 2U);
+  EXPECT_EQ(stored->metadata.at("sensor"), "vlp_16");
+}
+
+TEST_F(MapSaverTest, LeavesTheFileAloneUntilSomethingWasMapped) {
+  map_scan(5.0F);
+  MapSaver(board_, folder_ / "map.stillmap", {}).save_as("");
+  MapBoard empty;
+  empty.begin(StaticMap(StaticMapConfig()).view(), {});
+  MapSaver saver(empty, folder_ / "map.stillmap", {});
+  saver.save_if_changed();
+  EXPECT_EQ(saver.load()->view.tiles.size(), 1U);
+}
+
+TEST_F(MapSaverTest, SavesUnderAnotherNameBesideTheConfiguredFile) {
+  map_scan(5.0F);
+  MapSaver saver(board_, folder_ / "map.stillmap", {});
+  EXPECT_EQ(saver.save_as("copy.stillmap"), folder_ / "copy.stillmap");
+  EXPECT_EQ(open_map_file(folder_ / "copy.stillmap")->load().view.tiles.size(), 1U);
+  EXPECT_EQ(saver.save_as(""), folder_ / "map.stillmap");
+}
+
+TEST_F(MapSaverTest, LetsNobodyChooseAnotherFolder) {
+  MapSaver saver(board_, folder_ / "map.stillmap", {});
+  for (const char* name : {"../map", "/etc/passwd", "a/b", ".", ".."}) {
+    EXPECT_THROW(saver.save_as(name), std::invalid_argument) << name;
+  }
+}
+
+TEST_F(MapSaverTest, NeedsAFileToSaveTo) {
+  MapSaver saver(board_, {}, {});
+  EXPECT_FALSE(saver.load());
+  EXPECT_NO_THROW(saver.save_if_changed());
+  EXPECT_THROW(saver.save_as(""), std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,57 @@
+#include "server/odometry_prior.hpp"
+
+#include <gtest/gtest.h>
+
+namespace stillmap {
+namespace {
+
+constexpr std::int64_t ms = 1'000'000;
+
+Eigen::Isometry3d at(double x, double yaw) {
+  return Eigen::Isometry3d(Eigen::Translation3d(x, 5.0, 0.0) *
+                           Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
+}
+
+PosesByTime drive() {
+  PosesByTime poses;
+  for (int i = 0; i <= 10; ++i) poses.add({i * 100 * ms, at(i, 0.0)});
+  return poses;
+}
+
+TEST(PosesByTime, InterpolatesTheMotion) {
+  const auto motion = drive().motion(150 * ms, 420 * ms);
+  ASSERT_TRUE(motion);
+  EXPECT_TRUE(motion->translation().isApprox(Eigen::Vector3d(2.7, 0.0, 0.0), 1e-9));
+}
+
+TEST(PosesByTime, TurnsTheMotionIntoTheFirstPosesFrame) {
+  PosesByTime poses;
+  poses.add({0, at(0.0, EIGEN_PI / 2)});
+  poses.add({100 * ms, at(1.0, EIGEN_PI / 2)});
+  const auto motion = poses.motion(0, 100 * ms);
+  ASSERT_TRUE(motion);
+  EXPECT_TRUE(motion->translation().isApprox(Eigen::Vector3d(0.0, -1.0, 0.0), 1e-9));
+}
+
+TEST(PosesByTime, KnowsNothingOfOtherTimes) {
+  EXPECT_FALSE(drive().motion(-1, 100 * ms));
+  EXPECT_FALSE(drive().motion(500 * ms, 1101 * ms));
+  EXPECT_FALSE(PosesByTime().motion(0, 1));
+}
+
+TEST(PosesByTime, StretchesTheNewestPoseALittle) {
+  const auto motion = drive().motion(900 * ms, 1050 * ms);
+  ASSERT_TRUE(motion);
+  EXPECT_TRUE(motion->translation().isApprox(Eigen::Vector3d(1.0, 0.0, 0.0), 1e-9));
+}
+
+TEST(PosesByTime, LeavesOutWhatComesOutOfOrder) {
+  PosesByTime poses = drive();
+  poses.add({500 * ms, at(1000.0, 0.0)});
+  EXPECT_TRUE(poses.motion(400 * ms, 600 * ms)
+                  ->translation()
+                  .isApprox(Eigen::Vector3d(2.0, 0.0, 0.0), 1e-9));
+}
+
+}  // namespace
+}  // namespace stillmap

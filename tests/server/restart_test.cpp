@@ -1,0 +1,105 @@
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <fstream>
+
+#include "core/map/map_file.hpp"
+#include "tests/server/server_process.hpp"
+
+namespace stillmap::test {
+namespace {
+
+/// Maps scans `first` .. `last` - 1 with a fresh server process; `end` finishes it.
+template <typename End>
+void run_server(const ServiceSetup& setup, int first, int last, End end) {
+  ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  ScanPublisher publisher(setup.publisher(true));
+  drive(publisher, first, last);
+  ASSERT_TRUE(wait_for_scans(client, static_cast<std::uint64_t>(last - first)));
+  end(server, client);
+}
+
+void terminate(ServerProcess& server, Client&) {
+  server.send(SIGTERM);
+  EXPECT_EQ(server.wait_for_exit(patience), 0);
+}
+
+TEST(Restart, SigtermSavesTheMapAndTheNextServerServesIt) {
+  const ServiceSetup setup("every");
+  run_server(setup, 0, 8, terminate);
+  const StoredMap stored = open_map_file(setup.map_file())->load();
+  EXPECT_EQ(stored.trajectory.size(), 8U);
+  ASSERT_FALSE(stored.view.tiles.empty());
+
+  const ServerProcess next(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  const TileVersions served = client.get_tile_versions();
+  EXPECT_EQ(served.map.map_id, stored.view.map_id);
+  ASSERT_EQ(served.tiles.size(), stored.view.tiles.size());
+  for (std::size_t i = 0; i < served.tiles.size(); ++i) {
+    EXPECT_EQ(served.tiles[i].content_hash, stored.view.tiles[i]->info.content_hash);
+  }
+}
+
+TEST(Restart, GoesOnWithMapAndPath) {
+  const ServiceSetup setup("every");
+  run_server(setup, 0, 8, terminate);
+  run_server(setup, 8, 14, terminate);
+  const StoredMap stored = open_map_file(setup.map_file())->load();
+  ASSERT_EQ(stored.trajectory.size(), 14U);
+  const Eigen::Vector3d step = stored.trajectory[8].T_map_lidar.translation() -
+                               stored.trajectory[7].T_map_lidar.translation();
+  EXPECT_LT(step.norm(), 0.5);
+}
+
+TEST(Restart, SigintEndsAServerWithoutScans) {
+  const ServiceSetup setup("latest");
+  ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  server.send(SIGINT);
+  EXPECT_EQ(server.wait_for_exit(patience), 0);
+}
+
+TEST(Restart, KillBetweenTwoSavesLosesNothingSaved) {
+  const ServiceSetup setup("every");
+  run_server(setup, 0, 10, [&](ServerProcess& server, Client& client) {
+    client.save_map();
+    ScanPublisher more(setup.publisher(true));
+    drive(more, 10, 14);
+    EXPECT_TRUE(wait_for_scans(client, 14));
+    server.send(SIGKILL);
+    EXPECT_EQ(server.wait_for_exit(patience), -1);
+  });
+  const StoredMap stored = open_map_file(setup.map_file())->load();
+  EXPECT_EQ(stored.trajectory.size(), 10U);
+  EXPECT_FALSE(stored.view.tiles.empty());
+
+  const ServerProcess next(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  EXPECT_EQ(client.get_tile_versions().tiles.size(), stored.view.tiles.size());
+}
+
+TEST(Startup, RefusesWhatCannotWorkWithAnExitCode) {
+  const TemporaryFolder folder;
+  std::ofstream(folder / "wrong.yaml") << "no_such_field: 1\n";
+  ServerProcess wrong_config({"--config", (folder / "wrong.yaml").string()});
+  EXPECT_EQ(wrong_config.wait_for_exit(patience), 2);
+
+  ServerProcess wrong_option({"--no-such-option"});
+  EXPECT_EQ(wrong_option.wait_for_exit(patience), 2);
+
+  std::ofstream(folder / "text.stillmap") << "this is no database, and must stay as it is";
+  ServerProcess wrong_file({"--map-file", (folder / "text.stillmap").string(), "--domain", "231"});
+  EXPECT_EQ(wrong_file.wait_for_exit(patience), 1);
+
+  ServerProcess help({"--help"});
+  EXPECT_EQ(help.wait_for_exit(patience), 0);
+}
+
+}  // namespace
+}  // namespace stillmap::test

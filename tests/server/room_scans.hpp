@@ -1,0 +1,14 @@
+#pragma once
+
+#include "core/lidar/scan.hpp"
+#include "core/odometry/trajectory.hpp"
+
+namespace stillmap::test {
+
+/// True pose of the lidar at scan `index` of a slow drive through a hall with pillars.
+[[nodiscard]] StampedPose room_pose(int index);
+
+/// What a 16-beam lidar sees there: ground (road), walls (building), pillars (pole).
+[[nodiscard]] Scan room_scan(int index);
+
+}  // namespace stillmap::test

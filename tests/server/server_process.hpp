@@ -1,0 +1,61 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "clients/client.hpp"
+#include "clients/scan_publisher.hpp"
+#include "tests/map/temporary_folder.hpp"
+
+namespace stillmap::test {
+
+/// A running stillmap-server, killed when this goes.
+class ServerProcess {
+ public:
+  explicit ServerProcess(const std::vector<std::string>& arguments);
+  ~ServerProcess();
+  ServerProcess(const ServerProcess&) = delete;
+  ServerProcess& operator=(const ServerProcess&) = delete;
+
+  void send(int signal) const;
+  /// Its exit code; -1 when a signal ended it, -2 when it still runs after `timeout`.
+  [[nodiscard]] int wait_for_exit(std::chrono::seconds timeout);
+
+ private:
+  pid_t pid_ = 0;
+};
+
+/// Files and options of one test's server and clients, in a domain of their own.
+class ServiceSetup {
+ public:
+  /// `delivery`: "latest" or "every".
+  explicit ServiceSetup(const std::string& delivery);
+
+  [[nodiscard]] std::vector<std::string> server_arguments() const;
+  [[nodiscard]] DdsOptions dds() const;
+  [[nodiscard]] ClientOptions client() const;
+  [[nodiscard]] ScanPublisherOptions publisher(bool lossless) const;
+  [[nodiscard]] std::filesystem::path map_file() const { return folder_ / "map.stillmap"; }
+
+ private:
+  TemporaryFolder folder_;
+};
+
+/// The longest that a loaded machine may need for anything here.
+inline constexpr std::chrono::seconds patience{60};
+
+/// Waits until `condition` holds; false after `patience`.
+[[nodiscard]] bool eventually(const std::function<bool()>& condition);
+
+/// Publishes scans `first` .. `last` - 1 of the room without losing one.
+void drive(ScanPublisher& publisher, int first, int last);
+
+/// Waits until the server dealt with this many scans, by mapping or dropping them.
+[[nodiscard]] bool wait_for_scans(Client& client, std::uint64_t scans);
+
+}  // namespace stillmap::test
