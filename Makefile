@@ -1,0 +1,52 @@
+# Two commands do everything on a bare Debian 12: `make demo` and `make test`.
+SHELL := /bin/bash
+PRESET ?= release
+BUILD := build/$(PRESET)
+JOBS ?= $(shell nproc)
+PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
+
+.PHONY: help packages build demo test test-dev test-tsan bench table1 format format-check clean
+
+help: ## Show this list
+	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
+
+packages: ## Install the Debian packages that are missing
+	@missing=$$(for p in $(PACKAGES); do \
+	    dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'ok installed' || echo $$p; done); \
+	if [ -n "$$missing" ]; then \
+	  echo "Installing:" $$missing; \
+	  sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \
+	  $$sudo apt-get update -q && \
+	  DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -yq --no-install-recommends $$missing; \
+	fi
+
+build: packages ## Build everything in build/release (PRESET=dev, tsan for others)
+	cmake --preset $(PRESET)
+	cmake --build --preset $(PRESET) -j $(JOBS)
+
+demo: build ## Run the main job: simulated city, replay over DDS, server, planning client
+	BUILD=$(BUILD) clients/demo.sh
+
+test: build ## Build and run the tests
+	ctest --preset $(PRESET) -j $(JOBS)
+
+test-dev: ## The tests under ASan and UBSan, warnings as errors
+	$(MAKE) test PRESET=dev
+
+test-tsan: ## The tests under ThreadSanitizer
+	$(MAKE) test PRESET=tsan
+
+bench: build ## Benchmarks of every stage
+	@for b in $(BUILD)/tests/bench/*_bench; do echo "== $$b"; $$b || exit 1; done
+
+table1: build ## The paper's Table I on simulated streets, crowded and quiet
+	$(BUILD)/bin/stillmap evaluate --weightings sim:crowd sim:quiet
+
+format: ## Format the code
+	git ls-files '*.cpp' '*.hpp' | xargs clang-format -i
+
+format-check: ## Fail if the code is not formatted
+	git ls-files '*.cpp' '*.hpp' | xargs clang-format --dry-run -Werror
+
+clean: ## Remove what was built and demonstrated
+	rm -rf build demo
