@@ -108,14 +108,16 @@ std::vector<Motion> split_by_motion(const Scan& scan, const PointLabels& labels,
                                     const OdometryConfig& config) {
   std::vector<Motion> motion(scan.size(), Motion::stationary);
   if (labels.empty()) return motion;
-  const std::vector<bool> inconsistent =
-      inconsistent_objects(scan, labels, objects, T_map_lidar, map, config);
+  std::vector<bool> moves(objects.count);
+  if (config.motion.use_past_views) {
+    for (std::size_t k = 0; k < objects.count; ++k) moves[k] = verdicts[k] == ObjectVerdict::moving;
+  } else {
+    moves = inconsistent_objects(scan, labels, objects, T_map_lidar, map, config);
+  }
   for (std::size_t i = 0; i < scan.size(); ++i) {
     if (objects.of_point[i] == Objects::none) continue;
     const auto object = static_cast<std::size_t>(objects.of_point[i]);
-    const bool moves = verdicts[object] == ObjectVerdict::moving ||
-                       (verdicts[object] == ObjectVerdict::undecided && inconsistent[object]);
-    motion[i] = moves ? Motion::highly_dynamic : Motion::semi_static;
+    motion[i] = moves[object] ? Motion::highly_dynamic : Motion::semi_static;
   }
   return motion;
 }

@@ -28,8 +28,10 @@ enum class ObjectVerdict : std::uint8_t {
                                                        const MotionConfig& config);
 
 /// Motion of every point (paper II-C.2). Points of classes that cannot move are stationary;
-/// movable ones are highly dynamic where their object moves or, while past views have not shown
-/// it parked, where eq. (9) finds c > c_th against the local map; semi-static otherwise.
+/// movable ones are highly dynamic where past views show their object moving, semi-static
+/// otherwise. Without past views eq. (9) decides: c > c_th against the local map, voted by object.
+/// It is not used beside them, since it takes every parked car that comes into sight over known
+/// road for a moving one (precision 0.36 instead of 0.94 in the simulated quiet city).
 [[nodiscard]] std::vector<Motion> split_by_motion(const Scan& scan, const PointLabels& labels,
                                                   const Objects& objects,
                                                   std::span<const ObjectVerdict> verdicts,

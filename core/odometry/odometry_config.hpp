@@ -67,7 +67,8 @@ struct RegistrationConfig {
 
 /// What moves (paper II-C.2, and past views).
 struct MotionConfig {
-  /// Semantic inconsistency, eq. (9), above which a movable point can be highly dynamic.
+  /// c_th: semantic inconsistency, eq. (9), above which a movable object is highly dynamic. Decides
+  /// where `use_past_views` is off.
   double inconsistency_threshold = 0.6;
   /// Take movable objects out whose place an earlier scan saw free; not in the paper.
   bool use_past_views = true;

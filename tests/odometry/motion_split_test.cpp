@@ -118,11 +118,13 @@ struct SplitCase {
     labels.confidence.push_back(1.0F);
   }
   /// Motion of the car's points; the road's must be stationary.
-  [[nodiscard]] Motion car_motion(ObjectVerdict verdict) const {
+  [[nodiscard]] Motion car_motion(ObjectVerdict verdict, bool use_past_views = true) const {
+    OdometryConfig config;
+    config.motion.use_past_views = use_past_views;
     const Objects objects = find_objects(scan.points_lidar, labels.classes, 0.5);
     EXPECT_EQ(objects.count, 1U);
     const auto motion = split_by_motion(scan, labels, objects, std::vector<ObjectVerdict>{verdict},
-                                        Eigen::Isometry3d::Identity(), map, OdometryConfig{});
+                                        Eigen::Isometry3d::Identity(), map, config);
     EXPECT_EQ(motion.size(), scan.size());
     EXPECT_EQ(motion.back(), Motion::stationary);
     for (std::size_t i = 0; i + 1 < motion.size(); ++i) EXPECT_EQ(motion[i], motion[0]);
@@ -139,13 +141,18 @@ TEST(SplitByMotion, VerdictDecidesWhereThereIsOne) {
   }
 }
 
-TEST(SplitByMotion, UndecidedObjectIsHighlyDynamicWhereTheMapContradicts) {
+TEST(SplitByMotion, UndecidedObjectIsSemiStatic) {
   EXPECT_EQ(SplitCase(SemanticClass::road).car_motion(ObjectVerdict::undecided),
-            Motion::highly_dynamic);
-  EXPECT_EQ(SplitCase(SemanticClass::car).car_motion(ObjectVerdict::undecided),
             Motion::semi_static);
-  EXPECT_EQ(SplitCase(SemanticClass::unlabeled).car_motion(ObjectVerdict::undecided),
-            Motion::semi_static);
+}
+
+TEST(SplitByMotion, WithoutPastViewsTheMapDecides) {
+  const auto motion_beside = [](SemanticClass map_label) {
+    return SplitCase(map_label).car_motion(ObjectVerdict::undecided, false);
+  };
+  EXPECT_EQ(motion_beside(SemanticClass::road), Motion::highly_dynamic);
+  EXPECT_EQ(motion_beside(SemanticClass::car), Motion::semi_static);
+  EXPECT_EQ(motion_beside(SemanticClass::unlabeled), Motion::semi_static);
 }
 
 TEST(SplitByMotion, WithoutLabelsAllIsStationary) {
