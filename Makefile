@@ -40,7 +40,7 @@ bench: build ## Benchmarks of every stage
 	@for b in $(BUILD)/tests/bench/*_bench; do echo "== $$b"; $$b || exit 1; done
 
 table1: build ## The paper's Table I on simulated streets, crowded and quiet
-	$(BUILD)/bin/stillmap evaluate --weightings sim:crowd sim:quiet
+	$(BUILD)/bin/stillmap evaluate weightings sim:crowd sim:quiet
 
 format: ## Format the code
 	git ls-files '*.cpp' '*.hpp' | xargs clang-format -i

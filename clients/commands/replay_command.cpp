@@ -1,6 +1,7 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
 #include "clients/commands/client_arguments.hpp"
 #include "clients/commands/command.hpp"
@@ -39,6 +40,13 @@ void require_subscriber(ScanPublisher& publisher, const Arguments& arguments) {
                        "': is that its topics.points?");
 }
 
+void require_lossless(const ServerStatus& status) {
+  if (status.delivery == DeliveryMode::every) return;
+  throw std::invalid_argument(
+      "the server drops scans when they come too fast (input delivery: latest), so the replay "
+      "cannot be lossless: start it with --delivery every");
+}
+
 ReplayOptions replay_options(const Arguments& arguments) {
   ReplayOptions options = arguments.replay;
   options.rate = arguments.rate > 0.0 ? arguments.rate : arguments.lossless ? 0.0 : 1.0;
@@ -68,6 +76,7 @@ Outcome replay(const Arguments& arguments, StopSignal& stop) {
                            .lossless = arguments.lossless});
   require_subscriber(publisher, arguments);
   const ServerStatus before = client.status();
+  if (arguments.lossless) require_lossless(before);
   Outcome outcome;
   outcome.replay = publish_with_progress(dataset, arguments, publisher, stop);
   const std::vector<std::int64_t>& stamps_ns = outcome.replay.published_stamps_ns;

@@ -33,34 +33,42 @@ bool is_used(int port) {
 
 }  // namespace
 
+std::string stillmap_program() { return STILLMAP_PROGRAM; }
+
+std::string stillmap_server_program() { return STILLMAP_SERVER_PROGRAM; }
+
 ProcessResult run_stillmap(const std::string& arguments, const std::filesystem::path& folder) {
   const std::filesystem::path out = folder / "stdout.txt";
   const std::filesystem::path err = folder / "stderr.txt";
-  const std::string command = std::string(STILLMAP_PROGRAM) + " " + arguments + " >" +
-                              out.string() + " 2>" + err.string() + " </dev/null";
+  const std::string command = stillmap_program() + " " + arguments + " >" + out.string() + " 2>" +
+                              err.string() + " </dev/null";
   const int wait_status = std::system(command.c_str());
   return {exit_code_of(wait_status), content(out), content(err)};
 }
 
-ServerProcess::ServerProcess(const std::string& arguments, const std::filesystem::path& log_file) {
-  const std::string command = "exec " + std::string(STILLMAP_SERVER_PROGRAM) + " " + arguments +
-                              " >" + log_file.string() + " 2>&1";
-  std::string shell = "sh", option = "-c", text = command;
+BackgroundProcess::BackgroundProcess(const std::string& command,
+                                     const std::filesystem::path& log_file) {
+  std::string shell = "sh", option = "-c";
+  std::string text = "exec " + command + " >" + log_file.string() + " 2>&1";
   std::vector<char*> argv{shell.data(), option.data(), text.data(), nullptr};
   if (posix_spawnp(&pid_, "sh", nullptr, nullptr, argv.data(), environ) != 0) {
     throw std::runtime_error("cannot start " + command);
   }
 }
 
-ServerProcess::~ServerProcess() {
+BackgroundProcess::~BackgroundProcess() {
   if (pid_ > 0) {
     kill(pid_, SIGKILL);
     waitpid(pid_, nullptr, 0);
   }
 }
 
-int ServerProcess::stop() {
+int BackgroundProcess::stop() {
   kill(pid_, SIGTERM);
+  return wait();
+}
+
+int BackgroundProcess::wait() {
   int wait_status = 0;
   waitpid(pid_, &wait_status, 0);
   pid_ = -1;

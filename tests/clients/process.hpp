@@ -18,21 +18,27 @@ struct ProcessResult {
 [[nodiscard]] ProcessResult run_stillmap(const std::string& arguments,
                                          const std::filesystem::path& folder);
 
-/// stillmap-server in a process of its own, until the object goes out of scope.
-class ServerProcess {
+/// A program that runs beside the test, until the object goes out of scope.
+class BackgroundProcess {
  public:
-  /// Starts it with these arguments; its log goes to `log_file`.
-  ServerProcess(const std::string& arguments, const std::filesystem::path& log_file);
-  ~ServerProcess();
-  ServerProcess(const ServerProcess&) = delete;
-  ServerProcess& operator=(const ServerProcess&) = delete;
+  /// Starts it; what it prints goes to `log_file`.
+  BackgroundProcess(const std::string& command, const std::filesystem::path& log_file);
+  ~BackgroundProcess();
+  BackgroundProcess(const BackgroundProcess&) = delete;
+  BackgroundProcess& operator=(const BackgroundProcess&) = delete;
 
-  /// SIGTERM; returns its exit code.
+  /// Waits for its end; returns its exit code.
+  int wait();
+  /// SIGTERM, and wait().
   int stop();
 
  private:
   int pid_ = -1;
 };
+
+/// Of the programs under test.
+[[nodiscard]] std::string stillmap_program();
+[[nodiscard]] std::string stillmap_server_program();
 
 /// A DDS domain that no process on this machine uses.
 [[nodiscard]] int free_domain();

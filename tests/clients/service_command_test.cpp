@@ -9,6 +9,11 @@ class ServiceCommandTest : public CommandTest {
  protected:
   [[nodiscard]] std::string on_domain() const { return " --domain " + std::to_string(domain_); }
 
+  [[nodiscard]] std::string server_command(const std::string& more = "") const {
+    return stillmap_server_program() + " --map-file " + path("server.stillmap") + on_domain() +
+           " " + more;
+  }
+
   int domain_ = free_domain();
 };
 
@@ -37,8 +42,7 @@ TEST_F(ServiceCommandTest, RefusesWrongRegionsClassesAndFilesBeforeAsking) {
 
 TEST_F(ServiceCommandTest, ReplayOverDdsGivesThePosesThatMapGives) {
   simulate("city", 8);
-  ServerProcess server("--delivery every --map-file " + path("server.stillmap") + on_domain(),
-                       folder_ / "server.log");
+  BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
   const ProcessResult replay = run("replay " + path("city") + " --lossless --json --timeout 30" +
                                    on_domain() + " --out " + path("replayed.txt"));
   ASSERT_EQ(replay.exit_code, 0) << replay.err << content("server.log");
@@ -56,10 +60,34 @@ TEST_F(ServiceCommandTest, ReplayOverDdsGivesThePosesThatMapGives) {
   EXPECT_TRUE(exists("server.stillmap"));
 }
 
+TEST_F(ServiceCommandTest, WatchFollowsThePosesOfAReplay) {
+  simulate("city", 8);
+  BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
+  ASSERT_EQ(run("status --timeout 30" + on_domain()).exit_code, 0) << content("server.log");
+  BackgroundProcess watch(stillmap_program() + " watch --json --count 4 --duration 60 --out " +
+                              path("watched.tum") + on_domain(),
+                          folder_ / "watch.log");
+  while (content("watch.log").find("\"status\"") == std::string::npos) {
+    ASSERT_EQ(run("status" + on_domain()).exit_code, 0);
+  }
+  ASSERT_EQ(run("replay " + path("city") + " --rate 4" + on_domain()).exit_code, 0);
+  EXPECT_EQ(watch.wait(), 0) << content("watch.log");
+  EXPECT_EQ(line_count("watched.tum"), 1U + 4U);
+  EXPECT_THAT(content("watch.log"), HasSubstr("\"quaternion_xyzw\""));
+}
+
+TEST_F(ServiceCommandTest, LosslessReplayRefusesAServerThatDropsScans) {
+  simulate("city", 2);
+  BackgroundProcess server(server_command("--delivery latest"), folder_ / "server.log");
+  const ProcessResult replay =
+      run("replay " + path("city") + " --lossless --timeout 30" + on_domain());
+  EXPECT_EQ(replay.exit_code, 2);
+  EXPECT_THAT(replay.err, HasSubstr("--delivery every"));
+}
+
 TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
   simulate("city", 5);
-  ServerProcess server("--delivery every --map-file " + path("server.stillmap") + on_domain(),
-                       folder_ / "server.log");
+  BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
   ASSERT_EQ(run("replay " + path("city") + " --lossless --timeout 30" + on_domain()).exit_code, 0)
       << content("server.log");
 
