@@ -36,10 +36,8 @@ void read_labels(YamlSection section, LabelsConfig& labels) {
 
 void read_frames(YamlSection section, FramesConfig& frames) {
   section.text("map", frames.map);
-  section.text("odom", frames.odom);
   section.text("lidar", frames.lidar);
   if (frames.map.empty()) section.fault("map", "is empty; a frame needs a name");
-  if (frames.odom.empty()) section.fault("odom", "is empty; a frame needs a name");
 }
 
 void read_dds(YamlSection section, DdsConfig& dds) {

@@ -31,7 +31,6 @@ struct LabelsConfig {
 /// Names of the coordinate frames in everything that is published.
 struct FramesConfig {
   std::string map = "map";
-  std::string odom = "odom";
   /// Empty: the frame that the incoming clouds name.
   std::string lidar = "lidar";
 };
