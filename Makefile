@@ -40,7 +40,8 @@ bench: build ## Benchmarks of every stage
 	@for b in $(BUILD)/tests/bench/*_bench; do echo "== $$b"; $$b || exit 1; done
 
 table1: build ## The paper's Table I on simulated streets, crowded and quiet
-	$(BUILD)/bin/stillmap evaluate weightings sim:crowd sim:quiet
+	$(BUILD)/bin/stillmap evaluate weightings sim:crowd --seed 2 --scans 480
+	$(BUILD)/bin/stillmap evaluate weightings sim:quiet --seed 1 --scans 500
 
 format: ## Format the code
 	git ls-files '*.cpp' '*.hpp' | xargs clang-format -i
