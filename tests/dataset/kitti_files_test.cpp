@@ -8,7 +8,7 @@
 #include <random>
 
 #include "core/dataset/dataset_error.hpp"
-#include "tests/dataset/scratch_folder.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace stillmap {
 namespace {

@@ -7,7 +7,7 @@
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
 #include "core/dataset/point_cloud_files.hpp"
-#include "tests/dataset/scratch_folder.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace stillmap {
 namespace {

@@ -5,7 +5,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/point_cloud_files.hpp"
 #include "tests/map/map_worlds.hpp"
-#include "tests/map/temporary_folder.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace stillmap {
 namespace {
@@ -24,7 +24,7 @@ void expect_points_of(const MapView& view, const CloudFile& cloud) {
 }
 
 TEST(MapExport, FilesHoldEveryVoxelWithItsClass) {
-  const test::TemporaryFolder folder;
+  const ScratchFolder folder;
   const auto view = test::street_map(1, 200).view();
   export_pcd(*view, folder / "map.pcd");
   expect_points_of(*view, read_point_cloud(folder / "map.pcd", 0));
@@ -33,7 +33,7 @@ TEST(MapExport, FilesHoldEveryVoxelWithItsClass) {
 }
 
 TEST(MapExport, FolderThatIsMissingIsNamed) {
-  const test::TemporaryFolder folder;
+  const ScratchFolder folder;
   EXPECT_THROW(export_ply(MapView{}, folder / "no" / "map.ply"), DatasetError);
 }
 

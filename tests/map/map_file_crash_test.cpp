@@ -7,7 +7,7 @@
 #include <random>
 
 #include "tests/map/stored_maps.hpp"
-#include "tests/map/temporary_folder.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace stillmap {
 namespace {
@@ -47,7 +47,7 @@ int last_save_before_kill(const std::filesystem::path& file, const std::vector<S
 }
 
 TEST(MapFileCrash, KilledWhileSavingTheLastSaveOrTheNextOneIsThere) {
-  const test::TemporaryFolder folder;
+  const ScratchFolder folder;
   const std::filesystem::path file = folder / "city.stillmap";
   std::vector<StoredMap> maps;
   for (int i = 0; i < states; ++i) maps.push_back(test::stored_map(i));

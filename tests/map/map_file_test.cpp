@@ -9,7 +9,7 @@
 #include <random>
 
 #include "tests/map/stored_maps.hpp"
-#include "tests/map/temporary_folder.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace stillmap {
 namespace {
@@ -44,7 +44,7 @@ class MapFileTest : public testing::Test {
     SQLite::Database(file_.string(), SQLite::OPEN_READWRITE).exec(sql);
   }
 
-  test::TemporaryFolder folder_;
+  ScratchFolder folder_;
   fs::path file_ = folder_ / "city.stillmap";
 };
 

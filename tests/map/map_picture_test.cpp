@@ -6,7 +6,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "tests/map/map_worlds.hpp"
-#include "tests/map/temporary_folder.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace stillmap {
 namespace {
@@ -27,7 +27,7 @@ int count_pixels(const cv::Mat& picture, const cv::Vec3b& bgr) {
 }
 
 TEST(MapPicture, ShowsTheMapTheDriveAndTheBoxAtASensibleSize) {
-  const test::TemporaryFolder folder;
+  const ScratchFolder folder;
   const auto view = test::street_map(5, 300).view();
   MapPictureOptions options;
   options.max_side_px = 900;
@@ -49,13 +49,13 @@ TEST(MapPicture, ShowsTheMapTheDriveAndTheBoxAtASensibleSize) {
 }
 
 TEST(MapPicture, EmptyMapStillGivesAPicture) {
-  const test::TemporaryFolder folder;
+  const ScratchFolder folder;
   write_map_picture(folder / "empty.png", MapView{}, {});
   EXPECT_FALSE(cv::imread((folder / "empty.png").string()).empty());
 }
 
 TEST(MapPicture, PosesThatAreNoNumbersDoNoHarm) {
-  const test::TemporaryFolder folder;
+  const ScratchFolder folder;
   Trajectory trajectory = drive(3);
   trajectory[1].T_map_lidar.translation().x() = std::numeric_limits<double>::quiet_NaN();
   write_map_picture(folder / "nan.png", MapView{}, trajectory);
@@ -63,7 +63,7 @@ TEST(MapPicture, PosesThatAreNoNumbersDoNoHarm) {
 }
 
 TEST(MapPicture, FileThatCannotBeWrittenIsNamed) {
-  const test::TemporaryFolder folder;
+  const ScratchFolder folder;
   EXPECT_THAT([&] { write_map_picture(folder / "no" / "map.png", MapView{}, {}); },
               testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr("no/map.png")));
   EXPECT_THROW(write_map_picture(folder / "map.unknown", MapView{}, {}), std::runtime_error);

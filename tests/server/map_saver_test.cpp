@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "core/map/static_map.hpp"
-#include "tests/map/temporary_folder.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace stillmap {
 namespace {
@@ -28,7 +28,7 @@ class MapSaverTest : public testing::Test {
     board_.add_pose({.stamp_ns = static_cast<std::int64_t>(x)}, OdometryHealth::good, "none");
   }
 
-  test::TemporaryFolder folder_;
+  ScratchFolder folder_;
   StaticMap map_{StaticMapConfig()};
   MapBoard board_;
 };

@@ -85,7 +85,7 @@ TEST(Restart, KillBetweenTwoSavesLosesNothingSaved) {
 }
 
 TEST(Startup, RefusesWhatCannotWorkWithAnExitCode) {
-  const TemporaryFolder folder;
+  const ScratchFolder folder;
   std::ofstream(folder / "wrong.yaml") << "no_such_field: 1\n";
   ServerProcess wrong_config({"--config", (folder / "wrong.yaml").string()});
   EXPECT_EQ(wrong_config.wait_for_exit(patience), 2);

@@ -10,7 +10,7 @@
 
 #include "clients/client.hpp"
 #include "clients/scan_publisher.hpp"
-#include "tests/map/temporary_folder.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace stillmap::test {
 
@@ -43,7 +43,7 @@ class ServiceSetup {
   [[nodiscard]] std::filesystem::path map_file() const { return folder_ / "map.stillmap"; }
 
  private:
-  TemporaryFolder folder_;
+  ScratchFolder folder_;
 };
 
 /// The longest that a loaded machine may need for anything here.

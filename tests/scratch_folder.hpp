@@ -27,6 +27,9 @@ class ScratchFolder {
   ScratchFolder& operator=(const ScratchFolder&) = delete;
 
   [[nodiscard]] const std::filesystem::path& path() const { return folder_; }
+  [[nodiscard]] std::filesystem::path operator/(const std::string& name) const {
+    return folder_ / name;
+  }
 
   /// Writes a file, making its folders, and returns its path.
   [[nodiscard]] std::filesystem::path file(const std::string& name,
