@@ -1,6 +1,12 @@
 #include "config/sensor_file.hpp"
 
+#include <yaml-cpp/emitter.h>
+
+#include <cassert>
+#include <fstream>
 #include <map>
+#include <numbers>
+#include <stdexcept>
 #include <vector>
 
 #include "config/closest_name.hpp"
@@ -21,6 +27,22 @@ bool is_file_name(const std::string& text) {
   return text.find('/') != std::string::npos || text.ends_with(".yaml") || text.ends_with(".yml");
 }
 
+const std::vector<YamlSection::Choice<RingSource>>& ring_sources() {
+  static const std::vector<YamlSection::Choice<RingSource>> sources{
+      {"field", RingSource::field},
+      {"order", RingSource::order},
+      {"elevation", RingSource::elevation}};
+  return sources;
+}
+
+std::string ring_source_name(RingSource wanted) {
+  for (const YamlSection::Choice<RingSource>& source : ring_sources()) {
+    if (source.value == wanted) return source.name;
+  }
+  assert(false);
+  return {};
+}
+
 void read_sensor(YamlSection& file, SensorModel& sensor) {
   file.require({"name", "rings", "fov_up_deg", "fov_down_deg"});
   file.text("name", sensor.name);
@@ -32,15 +54,33 @@ void read_sensor(YamlSection& file, SensorModel& sensor) {
   file.number("min_range_m", sensor.min_range_m, {0, 1000});
   file.number("max_range_m", sensor.max_range_m, {0.1, 10000});
   file.number("period_s", sensor.period_s, {0.001, 60});
-  file.choice<RingSource>("ring_source", sensor.ring_source,
-                          {{"field", RingSource::field},
-                           {"order", RingSource::order},
-                           {"elevation", RingSource::elevation}});
+  file.choice<RingSource>("ring_source", sensor.ring_source, ring_sources());
   file.number("intensity_scale", sensor.intensity_scale, {1e-9, 1e9});
   file.faults(sensor.faults());
 }
 
 }  // namespace
+
+void save_sensor(const SensorModel& sensor, const fs::path& file) {
+  constexpr double degree = std::numbers::pi / 180.0;
+  YAML::Emitter yaml;
+  yaml << YAML::BeginMap << YAML::Key << "name" << YAML::Value << sensor.name;
+  yaml << YAML::Key << "rings" << YAML::Value << sensor.rings;
+  yaml << YAML::Key << "fov_up_deg" << YAML::Value << sensor.fov_up / degree;
+  yaml << YAML::Key << "fov_down_deg" << YAML::Value << sensor.fov_down / degree;
+  yaml << YAML::Key << "beam_elevations_deg" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (const double elevation : sensor.beam_elevations) yaml << elevation / degree;
+  yaml << YAML::EndSeq;
+  yaml << YAML::Key << "columns" << YAML::Value << sensor.columns;
+  yaml << YAML::Key << "min_range_m" << YAML::Value << sensor.min_range_m;
+  yaml << YAML::Key << "max_range_m" << YAML::Value << sensor.max_range_m;
+  yaml << YAML::Key << "period_s" << YAML::Value << sensor.period_s;
+  yaml << YAML::Key << "ring_source" << YAML::Value << ring_source_name(sensor.ring_source);
+  yaml << YAML::Key << "intensity_scale" << YAML::Value << sensor.intensity_scale << YAML::EndMap;
+  std::ofstream out(file);
+  out << yaml.c_str() << '\n';
+  if (!out.flush()) throw std::runtime_error(file.string() + ": cannot be written");
+}
 
 SensorModel load_sensor(const std::string& name_or_file, const fs::path& folder) {
   const auto built_in = built_in_sensors().find(name_or_file);

@@ -13,4 +13,8 @@ namespace stillmap {
 [[nodiscard]] SensorModel load_sensor(const std::string& name_or_file,
                                       const std::filesystem::path& folder = {});
 
+/// Writes a sensor file that `load_sensor` reads back as the same sensor.
+/// @throws std::runtime_error that names the file when it cannot be written.
+void save_sensor(const SensorModel& sensor, const std::filesystem::path& file);
+
 }  // namespace stillmap

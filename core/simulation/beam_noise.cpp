@@ -33,7 +33,12 @@ std::optional<BeamReturn> beam_return(const BeamNoise& noise, float range_m, flo
   // The sensor corrects its intensity for range, not perfectly.
   const double falloff = 1.0 / (1.0 + range_m * range_m / (70.0 * 70.0));
   const double intensity = 0.85 * reflected * falloff + noise.intensity_sigma * random.normal();
-  const double range = range_m + noise.range_sigma_m * random.normal();
+  double range = range_m + noise.range_sigma_m * random.normal();
+  if (surface.pile_m > 0.0F) {
+    constexpr double deepest_m = 0.5;
+    const double way_m = surface.pile_m / std::max(static_cast<double>(cos_incidence), 0.05);
+    range -= std::min(way_m, deepest_m) * random.uniform();
+  }
   return BeamReturn{static_cast<float>(range), static_cast<float>(std::clamp(intensity, 0.0, 1.0))};
 }
 

@@ -8,7 +8,7 @@ namespace {
 using Eigen::Vector3f;
 
 constexpr float floor_m = 3.0F;
-constexpr float foundation_m = 1.5F;
+constexpr float foundation_m = 3.0F;
 
 // A vertical wall as a frame: `across` along it, `out` towards the observer.
 struct Wall {
@@ -79,6 +79,10 @@ void add_facade(Mesh& mesh, const Wall& wall, const BuildingPlan& plan, Random& 
       const bool is_door = level == 0 && static_cast<std::size_t>(i) == door;
       const float sill = is_door ? 0.1F : 0.9F;
       const Opening hole{left + 0.28F * bay_m, left + 0.72F * bay_m, bottom + sill, bottom + 2.4F};
+      if (!is_door && plan.share_windows < 1.0F && !random.chance(plan.share_windows)) {
+        add_plate(mesh, wall, bay, 0, plan.wall);
+        continue;
+      }
       add_pierced_bay(mesh, wall, bay, hole, is_door ? 0.5F : recess, plan.wall,
                       is_door ? Surface::brick : Surface::window);
       if (balcony && level > 0) add_balcony(mesh, wall, bay);
@@ -142,6 +146,7 @@ Mesh make_building(const BuildingPlan& plan, Random random) {
   } else {
     add_flat_roof(mesh, x, y, height, random);
   }
+  if (plan.outbuildings) add_outbuildings(mesh, plan, random);
   return mesh;
 }
 

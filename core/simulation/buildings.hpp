@@ -12,10 +12,17 @@ struct BuildingPlan {
   bool gabled;
   bool balconies;
   Surface wall;
+  /// Share of bays that have a window.
+  float share_windows = 1.0F;
+  /// Porches, bay windows, garages and steps in front.
+  bool outbuildings = false;
 };
 
 /// Walls with recessed windows, doors, pilasters, sills and balconies; a gabled roof or a flat one
-/// with a parapet. Reaches 1.5 m below the ground, so that it stands on slopes.
+/// with a parapet. Reaches 3 m below the ground, so that it stands on slopes.
 [[nodiscard]] Mesh make_building(const BuildingPlan& plan, Random random);
+
+/// What is built onto the front of a house: steps and a porch, a bay window, a garage.
+void add_outbuildings(Mesh& house, const BuildingPlan& plan, Random& random);
 
 }  // namespace stillmap

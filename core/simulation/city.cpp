@@ -17,6 +17,7 @@ City build_city(const GroundShape& ground, std::uint64_t seed) {
   add_ground(city.fixed, ground);
   add_lane_markings(city.fixed, ground);
   fill_blocks(city, ground, Random(seed, 21));
+  park_vehicles(city, ground, Random(seed, 23));
   furnish_streets(city, ground, Random(seed, 22));
   return city;
 }

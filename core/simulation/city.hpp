@@ -41,7 +41,9 @@ struct City {
 
 /// Houses, gardens and what encloses them, in the blocks between the streets.
 void fill_blocks(City& city, const GroundShape& ground, Random random);
-/// Parked vehicles, trees, lights and signs along the streets.
+/// Vehicles that stand in bays and on car parks.
+void park_vehicles(City& city, const GroundShape& ground, Random random);
+/// Trees, lights and signs along the streets.
 void furnish_streets(City& city, const GroundShape& ground, Random random);
 
 }  // namespace stillmap

@@ -3,8 +3,7 @@
 
 #include "core/simulation/buildings.hpp"
 #include "core/simulation/city.hpp"
-#include "core/simulation/street_furniture.hpp"
-#include "core/simulation/vegetation.hpp"
+#include "core/simulation/garden_shapes.hpp"
 
 namespace stillmap {
 namespace {
@@ -54,27 +53,46 @@ std::vector<Frontage> frontages(const Interval& u, const Interval& v) {
 /// Fills one block, side after side.
 class BlockFiller {
  public:
-  BlockFiller(City& city, const GroundShape& ground, std::size_t first_plant, Random random)
-      : city_(city), ground_(ground), first_plant_(first_plant), random_(random) {}
+  BlockFiller(City& city, const GroundShape& ground, const GardenShapes& shapes, Random random)
+      : city_(city), ground_(ground), shapes_(shapes), random_(random) {}
 
   void fill(const Interval& u, const Interval& v) {
+    const BlockPlan& plan = ground_.plan().blocks;
     block_ = AlignedBox2d(Vector2d(u.low, v.low), Vector2d(u.high, v.high));
     houses_.clear();
+    double draw =
+        plan.share_open + plan.share_wood + plan.share_halls > 0.0 ? random_.uniform() : 1.0;
+    const auto falls_to = [&](double share) { return (draw -= share) < 0.0; };
+    const bool open = falls_to(plan.share_open);
+    const bool wood = !open && falls_to(plan.share_wood);
+    halls_ = !open && !wood && falls_to(plan.share_halls);
     const std::vector<Frontage> sides = frontages(u, v);
-    for (const Frontage& side : sides) add_lots(side);
-    for (const Frontage& side : sides) add_garden(side);
+    for (const Frontage& side : sides) {
+      if (open || wood) {
+        if (random_.chance(0.4)) enclose(side, 0.0, side.length_m);
+      } else {
+        add_lots(side);
+      }
+    }
+    for (const Frontage& side : sides) {
+      if (wood) {
+        scatter(side, random_.uniform(50.0, 140.0), random_.uniform(0.5, 6.0), 25.0);
+        scatter(side, random_.uniform(0.0, 25.0), 0.5, 3.0);
+      } else if (open) {
+        scatter(side, random_.uniform(0.0, 10.0), 1.5, 40.0);
+      } else {
+        scatter(side, plan.garden_trees_per_100m, 1.3, plan.setback_max_m + 4.0);
+      }
+    }
   }
-
-  static constexpr std::size_t trees = 8;
-  static constexpr std::size_t bushes = 4;
-  static constexpr std::size_t hedges = 3;
 
  private:
   void add_lots(const Frontage& side) {
     const BlockPlan& plan = ground_.plan().blocks;
     double at = random_.uniform(0.0, 2.0);
     while (at + 8.0 < side.length_m) {
-      const double width = std::min(random_.uniform(9.0, 19.0), side.length_m - at);
+      const double wish = halls_ ? random_.uniform(18.0, 40.0) : random_.uniform(9.0, 19.0);
+      const double width = std::min(wish, side.length_m - at);
       add_house(side, at, width);
       enclose(side, at, width);
       at += width + random_.uniform(plan.gap_min_m, plan.gap_max_m);
@@ -84,55 +102,70 @@ class BlockFiller {
   void add_house(const Frontage& side, double at, double width) {
     const BlockPlan& plan = ground_.plan().blocks;
     const double setback = random_.uniform(plan.setback_min_m, plan.setback_max_m);
-    const double depth = random_.uniform(8.0, 12.0);
+    const double depth = halls_ ? random_.uniform(12.0, 20.0) : random_.uniform(8.0, 12.0);
     AlignedBox2d foot;
     foot.extend(side.at(at, setback)).extend(side.at(at + width, setback + depth));
-    const bool taken = std::ranges::any_of(
-        houses_, [&](const AlignedBox2d& house) { return house.intersects(foot); });
+    const bool taken =
+        std::ranges::any_of(houses_,
+                            [&](const AlignedBox2d& house) { return house.intersects(foot); }) ||
+        std::ranges::any_of(ground_.plan().patches, [&](const GroundPatch& patch) {
+          return patch.area_plan.intersects(foot);
+        });
     if (taken || !block_.contains(foot)) return;
     houses_.push_back(foot);
+    place(make_building(drawn_house(width, depth), Random(random_.index(1U << 30U))), foot.center(),
+          side.heading());
+  }
+
+  BuildingPlan drawn_house(double width, double depth) {
+    const BlockPlan& plan = ground_.plan().blocks;
     const auto spread = static_cast<std::size_t>(plan.floors_max - plan.floors_min + 1);
-    const BuildingPlan house{.width_m = static_cast<float>(width - 0.2),
-                             .depth_m = static_cast<float>(depth),
-                             .floors = plan.floors_min + static_cast<int>(random_.index(spread)),
-                             .gabled = random_.chance(0.5),
-                             .balconies = random_.chance(0.45),
-                             .wall = random_.chance(0.6) ? Surface::plaster : Surface::brick};
-    place(make_building(house, Random(random_.index(1U << 30U))), foot.center(), side.heading());
+    BuildingPlan house{.width_m = static_cast<float>(width - 0.2),
+                       .depth_m = static_cast<float>(depth),
+                       .floors = plan.floors_min + static_cast<int>(random_.index(spread)),
+                       .gabled = random_.chance(0.5),
+                       .balconies = random_.chance(0.45),
+                       .wall = random_.chance(0.6) ? Surface::plaster : Surface::brick};
+    if (!ground_.plan().many_shapes) return house;
+    house.outbuildings = !halls_;
+    house.share_windows =
+        static_cast<float>(halls_ ? random_.uniform(0.0, 0.3) : random_.uniform(0.3, 1.0));
+    house.balconies = house.balconies && !halls_;
+    return house;
   }
 
   // Fence, hedge or wall between the sidewalk and the lot, with a gate.
   void enclose(const Frontage& side, double at, double width) {
     const BlockPlan& plan = ground_.plan().blocks;
     const double kind = random_.uniform();
-    const bool railing = random_.chance(0.5);
-    constexpr double field = 3.0;
+    const std::size_t fence = shapes_.fences.draw(random_);
     const double gate = at + random_.uniform(0.2, 0.8) * width;
-    for (double x = at; x + field <= at + width; x += field) {
-      if (gate > x - 0.2 && gate < x + field) continue;
+    for (double x = at; x + enclosure_field_m <= at + width; x += enclosure_field_m) {
+      if (gate > x - 0.2 && gate < x + enclosure_field_m) continue;
       const Vector2d spot = side.at(x, 0.45);
+      if (ground_.zone(side.at(x + 1.5, 1.0)) != Zone::lot) continue;
       if (kind < plan.share_fence) {
-        place(railing ? make_railing(field) : make_wooden_fence(field), spot, side.heading());
+        plant(fence, spot, side.heading());
       } else if (kind < plan.share_fence + plan.share_hedge) {
-        plant(trees + bushes + random_.index(hedges), spot, side.heading());
+        plant(shapes_.hedges.draw(random_), spot, side.heading());
       } else if (kind < plan.share_fence + plan.share_hedge + plan.share_wall) {
-        place(make_garden_wall(field), spot, side.heading());
+        plant(shapes_.walls.first + fence % shapes_.walls.count, spot, side.heading());
       }
     }
   }
 
-  void add_garden(const Frontage& side) {
-    const BlockPlan& plan = ground_.plan().blocks;
-    const auto wanted = static_cast<int>(plan.garden_trees_per_100m * side.length_m / 100.0);
+  // Trees and twice as many bushes, `from_m` to `to_m` behind the street.
+  void scatter(const Frontage& side, double trees_per_100m, double from_m, double to_m) {
+    const auto wanted = static_cast<int>(trees_per_100m * side.length_m / 100.0);
     for (int i = 0; i < 3 * wanted; ++i) {
       const bool tree = i < wanted;
-      const Vector2d spot = side.at(random_.uniform(2.0, side.length_m - 2.0),
-                                    random_.uniform(1.3, plan.setback_max_m + 4.0));
+      const Vector2d spot =
+          side.at(random_.uniform(2.0, side.length_m - 2.0), random_.uniform(from_m, to_m));
       const double clear = tree ? 1.2 : 0.6;
       const bool blocked = std::ranges::any_of(
           houses_, [&](const AlignedBox2d& house) { return house.exteriorDistance(spot) < clear; });
-      if (blocked || !block_.contains(spot)) continue;
-      plant(tree ? random_.index(trees) : trees + random_.index(bushes), spot,
+      if (blocked || !block_.contains(spot) || ground_.zone(spot) != Zone::lot) continue;
+      plant(tree ? shapes_.trees.draw(random_) : shapes_.bushes.draw(random_), spot,
             random_.uniform(0.0, 6.28));
     }
   }
@@ -141,38 +174,25 @@ class BlockFiller {
     city_.fixed.append(mesh, ground_.frame_at(spot, heading).cast<float>());
   }
 
-  void plant(std::size_t variant, const Vector2d& spot, double heading) {
-    city_.bodies.push_back(
-        {.shape = first_plant_ + variant, .T_map_body = ground_.frame_at(spot, heading)});
+  void plant(std::size_t shape, const Vector2d& spot, double heading) {
+    city_.bodies.push_back({.shape = shape, .T_map_body = ground_.frame_at(spot, heading)});
   }
 
   City& city_;
   const GroundShape& ground_;
-  std::size_t first_plant_;
+  const GardenShapes& shapes_;
   Random random_;
   AlignedBox2d block_;
   std::vector<AlignedBox2d> houses_;
+  bool halls_ = false;
 };
-
-void add_plant_shapes(City& city, Random& random) {
-  const auto fork = [&] { return Random(random.index(1U << 30U)); };
-  for (std::size_t i = 0; i < BlockFiller::trees; ++i) city.shapes.push_back(make_tree(fork()));
-  for (std::size_t i = 0; i < BlockFiller::bushes; ++i) {
-    city.shapes.push_back(make_bush(static_cast<float>(random.uniform(0.7, 1.6)), fork()));
-  }
-  for (std::size_t i = 0; i < BlockFiller::hedges; ++i) {
-    const auto height = static_cast<float>(random.uniform(0.9, 1.7));
-    city.shapes.push_back(make_hedge(3.0F, height, 0.7F, fork()));
-  }
-}
 
 }  // namespace
 
 void fill_blocks(City& city, const GroundShape& ground, Random random) {
-  const std::size_t first_plant = city.shapes.size();
-  add_plant_shapes(city, random);
-  BlockFiller filler(city, ground, first_plant, random);
   const CityPlan& plan = ground.plan();
+  const GardenShapes shapes = add_garden_shapes(city, plan.many_shapes, random);
+  BlockFiller filler(city, ground, shapes, random);
   for (const Interval& u : block_intervals(plan.streets_along_v, plan.margin_m)) {
     for (const Interval& v : block_intervals(plan.streets_along_u, plan.margin_m)) {
       filler.fill(u, v);

@@ -54,6 +54,11 @@ std::string traffic_faults(const TrafficPlan& traffic, const std::string& name) 
   check(traffic.vehicles_per_km, 0, 80, "vehicles_per_km");
   check(traffic.share_trucks, 0, 1, "share_trucks");
   check(traffic.share_buses, 0, 1 - traffic.share_trucks, "share_buses");
+  const double larger = traffic.share_trucks + traffic.share_buses;
+  check(traffic.share_motorcyclists, 0, 1 - larger, "share_motorcyclists");
+  check(traffic.share_other_vehicles, 0, 1 - larger - traffic.share_motorcyclists,
+        "share_other_vehicles");
+  check(traffic.groups_per_100m, 0, 50, "groups_per_100m");
   check(traffic.cyclists_per_km, 0, 100, "cyclists_per_km");
   check(traffic.pedestrians_per_km, 0, 200, "pedestrians_per_km");
   check(traffic.crossing_pedestrians, 0, 100, "crossing_pedestrians");
@@ -97,6 +102,12 @@ std::string CityPlan::faults() const {
   }
   if (!(hill_length_m > 0.0 && std::abs(hill_m) <= 0.15 * hill_length_m)) {
     out += name + ": hill_m must be at most 0.15 hill_length_m\n";
+  }
+  const bool rare = traffic.share_motorcyclists + traffic.share_other_vehicles > 0.0 ||
+                    parking.share_trucks + parking.share_buses + parking.share_other_vehicles > 0.0;
+  if (!many_shapes && (rare || traffic.groups_per_100m > 0.0)) {
+    out += name + ": motorcyclists, other vehicles, parked trucks and buses and groups of people " +
+           "need many_shapes\n";
   }
   if (turn_radius_m - route_profile.bike_centre_m() < 2.0) {
     out += name + ": turn_radius_m is too small for the width of the route\n";

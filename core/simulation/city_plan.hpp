@@ -1,10 +1,20 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
 #include <string>
 #include <vector>
 
 namespace stillmap {
+
+/// What a spot of ground is.
+enum class Zone : std::uint8_t { road, parking, median, verge, sidewalk, lot, other };
+
+/// A rectangle of the plan between the streets that is no garden: a car park, a gravel yard.
+struct GroundPatch {
+  Eigen::AlignedBox2d area_plan;
+  Zone zone = Zone::other;
+};
 
 /// Cross-section of a street from its centre line outwards, the same on both sides [m].
 struct StreetProfile {
@@ -57,6 +67,19 @@ struct TrafficPlan {
   double light_period_s = 60.0;
   double light_red_s = 10.0;
   int parked_per_100m = 9;
+  /// Of the moving vehicles, as share_trucks.
+  double share_motorcyclists = 0.0;
+  double share_other_vehicles = 0.0;
+  /// People who stand and talk, in groups on the sidewalks.
+  double groups_per_100m = 0.0;
+};
+
+/// What stands in the parking bays; the rest are cars.
+struct ParkingPlan {
+  double share_motorcycles = 0.06;
+  double share_trucks = 0.0, share_buses = 0.0, share_other_vehicles = 0.0;
+  /// Bays that have a bicycle beside them.
+  double share_bicycles = 0.08;
 };
 
 /// How the blocks between the streets are filled.
@@ -68,6 +91,8 @@ struct BlockPlan {
   double garden_trees_per_100m = 6.0;
   /// Share of lots behind a fence, behind a hedge, behind a wall; the rest is open.
   double share_fence = 0.35, share_hedge = 0.25, share_wall = 0.15;
+  /// Share of blocks that are open land, wood, or halls behind yards; the rest have houses.
+  double share_open = 0.0, share_wood = 0.0, share_halls = 0.0;
 };
 
 /// A city of streets on a grid in flat plan coordinates (u, v) [m]; `GroundShape` bends it into
@@ -97,8 +122,19 @@ struct CityPlan {
   double hill_m = 1.2;
   double hill_length_m = 45.0;
   double kerb_m = 0.13;
+  /// Share of house fronts with a drive, where the kerb is lowered.
+  double share_drives = 0.0;
+  /// Height of the slopes behind the streets, and of the tufts of grass [m].
+  double embankment_m = 0.0;
+  double tufts_m = 0.0;
+  /// Medians of stone instead of grass.
+  bool paved_medians = false;
+  std::vector<GroundPatch> patches;
+  /// Everything in many shapes (plants, fences, furniture, houses) instead of a few plain ones.
+  bool many_shapes = false;
   BlockPlan blocks;
   TrafficPlan traffic;
+  ParkingPlan parking;
 
   /// Every fault in words, one a line; empty when a city can be built.
   [[nodiscard]] std::string faults() const;

@@ -4,6 +4,8 @@
 
 #include "core/simulation/city.hpp"
 #include "core/simulation/street_furniture.hpp"
+#include "core/simulation/street_objects.hpp"
+#include "core/simulation/street_side.hpp"
 #include "core/simulation/vegetation.hpp"
 
 namespace stillmap {
@@ -11,85 +13,118 @@ namespace {
 
 using Eigen::Vector2d;
 
-constexpr std::size_t tree_shapes = 6;
-constexpr std::size_t car_shapes = 14;
 constexpr double quarter_turn = 0.5 * std::numbers::pi;
-
-// One side of a street, seen in the direction in which its traffic goes.
-struct StreetSide {
-  const StreetProfile& profile;
-  Vector2d start, along;
-  double length_m;
-
-  [[nodiscard]] Vector2d at(double along_m, double right_m) const {
-    return start + along_m * along + right_m * Vector2d(along.y(), -along.x());
-  }
-  [[nodiscard]] double heading() const { return std::atan2(along.y(), along.x()); }
-};
 
 /// Lines one side of a street after the other.
 class StreetFurnisher {
  public:
   StreetFurnisher(City& city, const GroundShape& ground, Random random)
-      : city_(city), ground_(ground), random_(random), first_tree_(city.shapes.size()) {
-    for (std::size_t i = 0; i < tree_shapes; ++i) city.shapes.push_back(make_tree(fork()));
-    for (std::size_t i = 0; i < car_shapes; ++i) add_shape(ObjectKind::car);
-    add_shape(ObjectKind::motorcycle);
-    add_shape(ObjectKind::bicycle);
+      : city_(city),
+        ground_(ground),
+        many_(ground.plan().many_shapes),
+        random_(random),
+        first_tree_(city.shapes.size()) {
+    for (std::size_t i = 0; i < tree_shapes; ++i) {
+      city.shapes.push_back(many_ ? make_any_tree(fork()) : make_tree(fork()));
+    }
+    if (!many_) return;
+    first_bush_ = city.shapes.size();
+    for (std::size_t i = 0; i < bush_shapes; ++i) city.shapes.push_back(make_any_bush(fork()));
+    first_person_ = city.shapes.size();
+    for (std::size_t i = 0; i < person_shapes; ++i) {
+      city.shapes.push_back(make_object(ObjectKind::person, fork()).mesh);
+    }
   }
 
   void furnish(const StreetSide& side) {
-    park(side);
     light_and_sign(side);
     if (side.profile.verge_m > 1.0) plant_trees(side);
+    if (many_) add_objects(side);
+    if (many_ && random_.chance(0.4)) plant_bushes(side);
+    if (ground_.plan().traffic.groups_per_100m > 0.0) add_groups(side);
   }
 
   void equip_crossing(const StreetSide& side) {
     const double kerb = side.profile.half_road_m() + 0.45;
     const double facing = side.heading() + std::numbers::pi - quarter_turn;
     place(make_traffic_light(), side.at(-3.4, kerb), facing);
-    place(make_sign(fork()), side.at(-2.2, kerb), facing);
+    place(many_ ? make_any_sign(fork()) : make_sign(fork()), side.at(-2.2, kerb), facing);
     for (const double at : {-4.6, 3.0, 4.6}) place(make_bollard(), side.at(at, kerb), facing);
   }
 
  private:
-  void park(const StreetSide& side) {
-    const double middle = side.profile.half_driven_m() + 0.5 * side.profile.parking_m;
-    const double chance = 0.065 * ground_.plan().traffic.parked_per_100m;
-    for (double at = 2.0; at < side.length_m; at += random_.uniform(6.0, 6.8)) {
-      const Vector2d front = side.at(at + 2.9, middle);
-      const Vector2d rear = side.at(at - 2.9, middle);
-      const bool bay = ground_.zone(front) == Zone::parking && ground_.zone(rear) == Zone::parking;
-      if (!bay || is_crossing(side.at(at, 0.0)) || !random_.chance(chance)) continue;
-      const double askew = random_.uniform(-0.03, 0.03);
-      const double turned = random_.chance(0.15) ? std::numbers::pi : 0.0;
-      const Vector2d spot = side.at(at, middle + random_.uniform(-0.1, 0.12));
-      if (random_.chance(0.06)) {
-        leave(ObjectKind::motorcycle, car_shapes, spot, side.heading() + 1.1, 1.3);
-      } else {
-        leave(ObjectKind::car, random_.index(car_shapes), spot, side.heading() + askew + turned,
-              2.6);
-      }
-      if (random_.chance(0.08)) {
-        const Vector2d stand = side.at(at, side.profile.half_road_m() + 0.35);
-        leave(ObjectKind::bicycle, car_shapes + 1, stand, side.heading() + askew, 1.0);
-      }
-    }
-  }
+  static constexpr std::size_t tree_shapes = 6;
+  static constexpr std::size_t bush_shapes = 4;
+  static constexpr std::size_t person_shapes = 6;
 
   void light_and_sign(const StreetSide& side) {
     const double kerb = side.profile.half_road_m() + 0.4;
     for (double at = random_.uniform(4.0, 16.0); at < side.length_m;
          at += random_.uniform(24.0, 30.0)) {
       if (!is_pavement(side.at(at, kerb))) continue;
-      place(make_street_light(), side.at(at, kerb), side.heading() + quarter_turn);
+      place(many_ ? make_any_street_light(fork()) : make_street_light(), side.at(at, kerb),
+            side.heading() + quarter_turn);
     }
+    const double spread = many_ ? 0.8 : 0.1;
     for (double at = random_.uniform(8.0, 25.0); at < side.length_m;
-         at += random_.uniform(18.0, 40.0)) {
+         at += many_ ? random_.uniform(6.0, 30.0) : random_.uniform(18.0, 40.0)) {
       if (!is_pavement(side.at(at, kerb))) continue;
-      place(make_sign(fork()), side.at(at, kerb),
-            side.heading() + quarter_turn + random_.uniform(-0.1, 0.1));
+      place(many_ ? make_any_sign(fork()) : make_sign(fork()), side.at(at, kerb),
+            side.heading() + quarter_turn + random_.uniform(-spread, spread));
     }
+  }
+
+  // Poles in rows, bins, benches, shelters.
+  void add_objects(const StreetSide& side) {
+    const double kerb = side.profile.half_road_m() + 0.35;
+    const double back = side.profile.half_street_m() - 0.5;
+    for (double at = random_.uniform(2.0, 20.0); at < side.length_m;
+         at += random_.uniform(4.0, 25.0)) {
+      const double heading = side.heading() + quarter_turn;
+      const double kind = random_.uniform();
+      if (kind < 0.45) {
+        add_pole_row(side, at, random_.chance(0.7) ? kerb : back);
+      } else if (kind < 0.9) {
+        place_on_pavement(make_street_object(fork()), side.at(at, back), heading);
+      } else if (side.profile.sidewalk_m > 2.5) {
+        place_on_pavement(make_shelter(fork()), side.at(at, back - 0.6), heading);
+      }
+    }
+  }
+
+  void add_pole_row(const StreetSide& side, double at, double right_m) {
+    const Mesh pole = make_any_pole(fork());
+    const std::size_t count = 1 + random_.index(5);
+    const double step = random_.uniform(1.2, 2.5);
+    for (std::size_t i = 0; i < count; ++i) {
+      place_on_pavement(pole, side.at(at + static_cast<double>(i) * step, right_m), 0.0);
+    }
+  }
+
+  // People who face each other.
+  void add_groups(const StreetSide& side) {
+    const double spacing = 100.0 / ground_.plan().traffic.groups_per_100m;
+    for (double at = spacing * random_.uniform(); at < side.length_m;
+         at += spacing * random_.uniform(0.5, 1.5)) {
+      const double low = side.profile.half_road_m() + 0.5;
+      const double right = random_.uniform(low, std::max(low, side.profile.half_street_m() - 0.5));
+      const std::size_t people = 1 + random_.index(5);
+      for (std::size_t i = 0; i < people; ++i) {
+        const double angle =
+            2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(people);
+        const Vector2d spot =
+            side.at(at, right) + 0.55 * Vector2d(std::cos(angle), std::sin(angle));
+        if (is_pavement(spot)) stand(spot, angle + std::numbers::pi);
+      }
+    }
+  }
+
+  void stand(const Vector2d& spot, double heading) {
+    city_.bodies.push_back({.shape = first_person_ + random_.index(person_shapes),
+                            .T_map_body = ground_.frame_at(spot, heading),
+                            .label = standing_label(ObjectKind::person),
+                            .instance = city_.next_instance(),
+                            .brightness = static_cast<float>(random_.uniform(0.25, 1.5))});
   }
 
   void plant_trees(const StreetSide& side) {
@@ -103,52 +138,45 @@ class StreetFurnisher {
     }
   }
 
-  void leave(ObjectKind kind, std::size_t variant, const Vector2d& spot, double heading,
-             double wheelbase_m) {
-    city_.bodies.push_back({.shape = first_tree_ + tree_shapes + variant,
-                            .T_map_body = ground_.leaning_frame_at(spot, heading, wheelbase_m),
-                            .label = standing_label(kind),
-                            .instance = city_.next_instance(),
-                            .brightness = static_cast<float>(random_.uniform(0.25, 1.5))});
+  // On the verge, or in beds at the back of the sidewalk.
+  void plant_bushes(const StreetSide& side) {
+    const StreetProfile& profile = side.profile;
+    const bool verge = profile.verge_m > 1.0;
+    const double right =
+        verge ? profile.half_road_m() + 0.6 * profile.verge_m : profile.half_street_m() + 0.3;
+    for (double at = random_.uniform(0.0, 10.0); at < side.length_m;
+         at += random_.chance(0.1) ? random_.uniform(5.0, 30.0) : random_.uniform(0.6, 2.0)) {
+      const Vector2d spot = side.at(at, right + random_.uniform(-0.3, 0.3));
+      if (ground_.zone(spot) != (verge ? Zone::verge : Zone::lot)) continue;
+      city_.bodies.push_back({.shape = first_bush_ + random_.index(bush_shapes),
+                              .T_map_body = ground_.frame_at(spot, random_.uniform(0.0, 6.28))});
+    }
+  }
+
+  void place_on_pavement(const Mesh& mesh, const Vector2d& spot, double heading) {
+    if (is_pavement(spot)) place(mesh, spot, heading);
   }
 
   void place(const Mesh& mesh, const Vector2d& spot, double heading) {
     city_.fixed.append(mesh, ground_.frame_at(spot, heading).cast<float>());
   }
 
+  // Off the road: where no sidewalk is, what belongs there stands on the grass beside it.
   [[nodiscard]] bool is_pavement(const Vector2d& spot) const {
     const Zone zone = ground_.zone(spot);
-    return zone == Zone::sidewalk || zone == Zone::verge;
+    return zone == Zone::sidewalk || zone == Zone::verge || (many_ && zone == Zone::lot);
   }
 
-  // Nobody parks where people cross.
-  [[nodiscard]] bool is_crossing(const Vector2d& middle) const {
-    return std::ranges::any_of(ground_.plan().crossings, [&](const Vector2d& crossing) {
-      return (crossing - middle).norm() < 8.0;
-    });
-  }
-
-  void add_shape(ObjectKind kind) { city_.shapes.push_back(make_object(kind, fork()).mesh); }
   Random fork() { return Random(random_.index(1U << 30U)); }
 
   City& city_;
   const GroundShape& ground_;
+  bool many_;
   Random random_;
   std::size_t first_tree_;
+  std::size_t first_bush_ = 0;
+  std::size_t first_person_ = 0;
 };
-
-// From margin to margin, there on one side and back on the other.
-std::array<StreetSide, 2> sides_of(const StreetPlan& street, const std::vector<StreetPlan>& across,
-                                   double margin, bool along_u) {
-  const double low = across.front().position_m - margin;
-  const double high = across.back().position_m + margin;
-  const auto point = [&](double along) {
-    return along_u ? Vector2d(along, street.position_m) : Vector2d(street.position_m, along);
-  };
-  const Vector2d way = along_u ? Vector2d(1, 0) : Vector2d(0, 1);
-  return {{{street.profile, point(low), way, high - low},
-           {street.profile, point(high), -way, high - low}}};
-}
 
 Vector2d direction_at(const CityPlan& plan, const Vector2d& crossing) {
   for (const StreetPlan& street : plan.streets_along_u) {
@@ -162,15 +190,7 @@ Vector2d direction_at(const CityPlan& plan, const Vector2d& crossing) {
 void furnish_streets(City& city, const GroundShape& ground, Random random) {
   const CityPlan& plan = ground.plan();
   StreetFurnisher furnisher(city, ground, random);
-  const auto furnish = [&](const auto& streets, const auto& across, bool along_u) {
-    for (const StreetPlan& street : streets) {
-      for (const StreetSide& side : sides_of(street, across, plan.margin_m, along_u)) {
-        furnisher.furnish(side);
-      }
-    }
-  };
-  furnish(plan.streets_along_u, plan.streets_along_v, true);
-  furnish(plan.streets_along_v, plan.streets_along_u, false);
+  for (const StreetSide& side : street_sides(plan)) furnisher.furnish(side);
   for (const Vector2d& crossing : plan.crossings) {
     const Vector2d along = direction_at(plan, crossing);
     for (const Vector2d& way : {along, Vector2d(-along)}) {

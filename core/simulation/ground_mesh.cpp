@@ -41,7 +41,7 @@ std::vector<double> axis_lines(const std::vector<StreetPlan>& streets, double ma
   return subdivide(break_lines(streets, low.position_m - margin, high.position_m + margin));
 }
 
-Surface surface_of(Zone zone) {
+Surface surface_of(Zone zone, const CityPlan& plan) {
   switch (zone) {
     case Zone::road:
       return Surface::asphalt;
@@ -49,9 +49,19 @@ Surface surface_of(Zone zone) {
       return Surface::parking_bay;
     case Zone::sidewalk:
       return Surface::pavement;
+    case Zone::other:
+      return Surface::gravel;
+    case Zone::median:
+      return plan.paved_medians ? Surface::gravel : Surface::grass;
     default:
       return Surface::grass;
   }
+}
+
+// Roads without a sidewalk end in grass, not at a kerb of stone.
+bool is_country_edge(Zone left, Zone right) {
+  const auto is_lot = [](Zone zone) { return zone == Zone::lot || zone == Zone::other; };
+  return (is_lot(left) && right != Zone::sidewalk) || (is_lot(right) && left != Zone::sidewalk);
 }
 
 // The step between two neighbouring zones along the edge a-b: a kerb, or nothing.
@@ -60,7 +70,7 @@ void add_step(Mesh& mesh, const GroundShape& ground, const Eigen::Vector2d& a,
   if (left == right) return;
   mesh.add_quad(ground.on_ground(a, left).cast<float>(), ground.on_ground(b, left).cast<float>(),
                 ground.on_ground(b, right).cast<float>(), ground.on_ground(a, right).cast<float>(),
-                Surface::kerb);
+                is_country_edge(left, right) ? Surface::grass : Surface::kerb);
 }
 
 }  // namespace
@@ -78,7 +88,7 @@ void add_ground(Mesh& mesh, const GroundShape& ground) {
       const auto corner = [&](std::size_t di, std::size_t dj) -> Eigen::Vector3f {
         return ground.on_ground({us[i + di], vs[j + dj]}, zone).cast<float>();
       };
-      mesh.add_quad(corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1), surface_of(zone));
+      mesh.add_quad(corner(0, 0), corner(1, 0), corner(1, 1), corner(0, 1), surface_of(zone, plan));
       const Eigen::Vector2d far(us[i + 1], vs[j + 1]);
       if (i + 2 < us.size()) {
         add_step(mesh, ground, {far.x(), vs[j]}, far, zone, zone_of(i + 1, j));

@@ -48,6 +48,21 @@ Zone zone_by(const NearestStreet& street, const NearestStreet& other) {
   return verge && clear > bay_clearance_m ? Zone::verge : Zone::sidewalk;
 }
 
+Zone lot_zone(const std::vector<GroundPatch>& patches, const Eigen::Vector2d& spot_plan) {
+  for (const GroundPatch& patch : patches) {
+    if (patch.area_plan.contains(spot_plan)) return patch.zone;
+  }
+  return Zone::lot;
+}
+
+// Height of a bed of tufts between 0 and 1, the same for the same spot.
+double tuft(const Eigen::Vector2d& spot_plan) {
+  const auto cell = [](double x) {
+    return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(x * 4.0)));
+  };
+  return Random(61, cell(spot_plan.x()), cell(spot_plan.y())).uniform();
+}
+
 bool is_driven(Zone zone) { return zone == Zone::road || zone == Zone::parking; }
 
 }  // namespace
@@ -70,7 +85,8 @@ Zone GroundShape::zone(const Eigen::Vector2d& spot_plan) const {
     if (is_driven(zone) || zone == Zone::median) return zone;
   }
   if (first == Zone::sidewalk || second == Zone::sidewalk) return Zone::sidewalk;
-  return first == Zone::lot ? second : first;
+  const Zone zone = first == Zone::lot ? second : first;
+  return zone == Zone::lot ? lot_zone(plan_.patches, spot_plan) : zone;
 }
 
 double GroundShape::height(const Eigen::Vector2d& spot_plan, Zone zone) const {
@@ -82,9 +98,51 @@ double GroundShape::height(const Eigen::Vector2d& spot_plan, Zone zone) const {
   const double off_centre = std::min({nearest(plan_.streets_along_v, u).distance_m,
                                       nearest(plan_.streets_along_u, v).distance_m, 6.0});
   height -= 0.02 * off_centre;
-  if (!is_driven(zone)) height += plan_.kerb_m;
+  if (!is_driven(zone)) height += kerb(spot_plan);
+  height += embankment(spot_plan);
   if (zone == Zone::lot || zone == Zone::verge || zone == Zone::median) height += bump(spot_plan);
   return height;
+}
+
+// Rises or falls away behind the street, in waves along it.
+double GroundShape::embankment(const Eigen::Vector2d& spot_plan) const {
+  if (plan_.embankment_m == 0.0) return 0.0;
+  double behind_m = std::numeric_limits<double>::infinity();
+  const auto come_nearer = [&](const std::vector<StreetPlan>& streets, double position) {
+    const NearestStreet street = nearest(streets, position);
+    if (street.profile == nullptr) return;
+    behind_m = std::min(behind_m, street.distance_m - street.profile->half_street_m());
+  };
+  come_nearer(plan_.streets_along_v, spot_plan.x());
+  come_nearer(plan_.streets_along_u, spot_plan.y());
+  const double part = std::clamp(behind_m / 7.0, 0.0, 1.0);
+  const double wave =
+      std::sin(spot_plan.x() / 21.0 + phase_[5]) * std::sin(spot_plan.y() / 17.0 + phase_[6]);
+  return plan_.embankment_m * wave * part * part * (3.0 - 2.0 * part);
+}
+
+// Height of the kerb, which is lowered at drives.
+double GroundShape::kerb(const Eigen::Vector2d& spot_plan) const {
+  if (plan_.share_drives == 0.0) return plan_.kerb_m;
+  constexpr double pitch_m = 11.0;
+  constexpr double drive_m = 3.75;
+  const auto is_drive = [&](double along, std::uint64_t axis) {
+    const double cell = std::floor(along / pitch_m);
+    const bool has_drive =
+        Random(62, static_cast<std::uint64_t>(static_cast<std::int64_t>(cell)), axis)
+            .chance(plan_.share_drives);
+    return has_drive && along - cell * pitch_m < drive_m;
+  };
+  const NearestStreet by_u = nearest(plan_.streets_along_v, spot_plan.x());
+  const NearestStreet by_v = nearest(plan_.streets_along_u, spot_plan.y());
+  const auto behind = [](const NearestStreet& street) {
+    return street.profile == nullptr ? std::numeric_limits<double>::infinity()
+                                     : street.distance_m - street.profile->half_road_m();
+  };
+  const bool beside_u = behind(by_u) < behind(by_v);
+  if (!is_drive(beside_u ? spot_plan.y() : spot_plan.x(), beside_u ? 1 : 0)) return plan_.kerb_m;
+  const double part = std::clamp((beside_u ? behind(by_u) : behind(by_v)) / 1.5, 0.15, 1.0);
+  return part * plan_.kerb_m;
 }
 
 // Uneven grass, a few centimetres.
@@ -92,7 +150,8 @@ double GroundShape::bump(const Eigen::Vector2d& spot_plan) const {
   const double u = spot_plan.x();
   const double v = spot_plan.y();
   return 0.03 * std::sin(u * 1.3 + phase_[4]) * std::sin(v * 1.1 + phase_[5]) +
-         0.03 * std::sin(u * 0.41 + v * 0.3 + phase_[6]);
+         0.03 * std::sin(u * 0.41 + v * 0.3 + phase_[6]) +
+         (plan_.tufts_m > 0.0 ? plan_.tufts_m * tuft(spot_plan) : 0.0);
 }
 
 Eigen::Vector2d GroundShape::to_map(const Eigen::Vector2d& spot_plan) const {

@@ -7,9 +7,6 @@
 
 namespace stillmap {
 
-/// What a spot of ground is.
-enum class Zone : std::uint8_t { road, parking, median, verge, sidewalk, lot };
-
 /// The city's ground: from flat plan coordinates (u, v) to the map frame, with hills, crowned
 /// roads, kerbs and rough grass.
 class GroundShape {
@@ -32,6 +29,8 @@ class GroundShape {
                                                    double heading_plan, double wheelbase_m) const;
 
  private:
+  [[nodiscard]] double embankment(const Eigen::Vector2d& spot_plan) const;
+  [[nodiscard]] double kerb(const Eigen::Vector2d& spot_plan) const;
   [[nodiscard]] double bump(const Eigen::Vector2d& spot_plan) const;
 
   CityPlan plan_;

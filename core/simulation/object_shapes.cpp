@@ -19,24 +19,26 @@ ObjectShape measured(ObjectKind kind, Mesh mesh) {
   return {kind, length, width, std::move(mesh)};
 }
 
-Mesh mesh_of(ObjectKind kind, Random& random) {
+Mesh mesh_of(ObjectKind kind, Variety variety, Random& random) {
   switch (kind) {
     case ObjectKind::car:
       return make_car(random);
     case ObjectKind::truck:
-      return make_truck(random);
+      return variety == Variety::plain ? make_lorry(random) : make_truck(random);
     case ObjectKind::bus:
-      return make_bus();
+      return variety == Variety::plain ? make_city_bus() : make_bus(random);
     case ObjectKind::bicycle:
-      return make_bicycle();
+      return make_bicycle(random);
     case ObjectKind::motorcycle:
-      return make_motorcycle();
+      return make_motorcycle(random);
     case ObjectKind::bicyclist:
-      return make_bicyclist();
+      return make_bicyclist(random);
     case ObjectKind::motorcyclist:
-      return make_motorcyclist();
+      return make_motorcyclist(random);
     case ObjectKind::person:
       return make_person(random);
+    case ObjectKind::other_vehicle:
+      return make_other_vehicle(random);
   }
   assert(false);
   return {};
@@ -45,17 +47,17 @@ Mesh mesh_of(ObjectKind kind, Random& random) {
 }  // namespace
 
 std::uint16_t standing_label(ObjectKind kind) {
-  constexpr std::array<std::uint16_t, 8> ids{10, 18, 13, 11, 15, 31, 32, 30};
+  constexpr std::array<std::uint16_t, 9> ids{10, 18, 13, 11, 15, 31, 32, 30, 20};
   return ids[static_cast<std::size_t>(kind)];
 }
 
 std::uint16_t moving_label(ObjectKind kind) {
-  constexpr std::array<std::uint16_t, 8> ids{252, 258, 257, 11, 15, 253, 255, 254};
+  constexpr std::array<std::uint16_t, 9> ids{252, 258, 257, 11, 15, 253, 255, 254, 259};
   return ids[static_cast<std::size_t>(kind)];
 }
 
-ObjectShape make_object(ObjectKind kind, Random random) {
-  return measured(kind, mesh_of(kind, random));
+ObjectShape make_object(ObjectKind kind, Random random, Variety variety) {
+  return measured(kind, mesh_of(kind, variety, random));
 }
 
 }  // namespace stillmap

@@ -18,6 +18,8 @@ enum class ObjectKind : std::uint8_t {
   bicyclist,
   motorcyclist,
   person,
+  /// Caravans, trailers, tractors, diggers.
+  other_vehicle,
 };
 
 /// SemanticKITTI id of an object that stands, and of one that moves (252..259; things nobody
@@ -32,7 +34,11 @@ struct ObjectShape {
   Mesh mesh;
 };
 
+/// Lorries and buses of about one size, or anything that counts as a truck or a bus.
+enum class Variety : std::uint8_t { plain, any };
+
 /// A shape of that kind: body type and size vary with `random`.
-[[nodiscard]] ObjectShape make_object(ObjectKind kind, Random random);
+[[nodiscard]] ObjectShape make_object(ObjectKind kind, Random random,
+                                      Variety variety = Variety::plain);
 
 }  // namespace stillmap

@@ -7,9 +7,9 @@ namespace stillmap {
 
 /// People and two-wheelers on the ground, centred on the origin, front along +x.
 [[nodiscard]] Mesh make_person(Random& random);
-[[nodiscard]] Mesh make_bicycle();
-[[nodiscard]] Mesh make_motorcycle();
-[[nodiscard]] Mesh make_bicyclist();
-[[nodiscard]] Mesh make_motorcyclist();
+[[nodiscard]] Mesh make_bicycle(Random& random);
+[[nodiscard]] Mesh make_motorcycle(Random& random);
+[[nodiscard]] Mesh make_bicyclist(Random& random);
+[[nodiscard]] Mesh make_motorcyclist(Random& random);
 
 }  // namespace stillmap

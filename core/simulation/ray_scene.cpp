@@ -3,6 +3,8 @@
 #include <embree3/rtcore.h>
 
 #include <algorithm>
+#include <array>
+#include <cassert>
 #include <cmath>
 #include <memory>
 #include <stdexcept>
@@ -52,6 +54,20 @@ Geometry instance(RTCDevice device, RTCScene mesh, std::span<const Eigen::Isomet
   return geometry;
 }
 
+void put(const Ray& ray, std::size_t i, RTCRayHit16& packet) {
+  packet.ray.org_x[i] = ray.origin_map.x();
+  packet.ray.org_y[i] = ray.origin_map.y();
+  packet.ray.org_z[i] = ray.origin_map.z();
+  packet.ray.dir_x[i] = ray.direction_map.x();
+  packet.ray.dir_y[i] = ray.direction_map.y();
+  packet.ray.dir_z[i] = ray.direction_map.z();
+  packet.ray.tfar[i] = ray.max_range_m;
+  packet.ray.time[i] = ray.time;
+  packet.ray.mask[i] = ~0U;
+  packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+  packet.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+}
+
 }  // namespace
 
 struct RayScene::Trees {
@@ -68,6 +84,18 @@ struct RaySnapshot::Bodies {
   Scene scene;
   std::vector<std::size_t> mesh;
   std::vector<Eigen::Matrix3f> rotation;
+
+  [[nodiscard]] std::optional<RayHit> hit(const RTCRayHit16& packet, std::size_t i,
+                                          const Ray& ray) const {
+    if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+    const std::size_t body = packet.hit.instID[0][i];
+    const Eigen::Vector3f normal_mesh(packet.hit.Ng_x[i], packet.hit.Ng_y[i], packet.hit.Ng_z[i]);
+    const Eigen::Vector3f normal_map = rotation[body] * normal_mesh.normalized();
+    return RayHit{.range_m = packet.ray.tfar[i],
+                  .cos_incidence = std::abs(normal_map.dot(ray.direction_map)),
+                  .surface = meshes[mesh[body]]->surfaces[packet.hit.primID[i]],
+                  .body = body};
+  }
 };
 
 RayScene::RayScene(std::vector<const Mesh*> meshes, std::span<const StandingMesh> standing)
@@ -113,34 +141,24 @@ RaySnapshot::RaySnapshot(RaySnapshot&&) noexcept = default;
 RaySnapshot::~RaySnapshot() = default;
 
 std::optional<RayHit> RaySnapshot::cast(const Ray& ray) const {
-  RTCRayHit query{};
-  query.ray = {.org_x = ray.origin_map.x(),
-               .org_y = ray.origin_map.y(),
-               .org_z = ray.origin_map.z(),
-               .tnear = 0.0F,
-               .dir_x = ray.direction_map.x(),
-               .dir_y = ray.direction_map.y(),
-               .dir_z = ray.direction_map.z(),
-               .time = ray.time,
-               .tfar = ray.max_range_m,
-               .mask = ~0U,
-               .id = 0,
-               .flags = 0};
-  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  std::optional<RayHit> hit;
+  cast(std::span(&ray, 1), std::span(&hit, 1));
+  return hit;
+}
+
+void RaySnapshot::cast(std::span<const Ray> rays, std::span<std::optional<RayHit>> hits) const {
+  assert(rays.size() == hits.size() && rays.size() <= most_rays);
+  alignas(64) std::array<int, most_rays> valid{};
+  RTCRayHit16 packet{};
+  for (std::size_t i = 0; i < rays.size(); ++i) {
+    valid[i] = -1;
+    put(rays[i], i, packet);
+  }
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
   context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcIntersect1(bodies_->scene.get(), &context, &query);
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  const std::size_t body = query.hit.instID[0];
-  const Eigen::Vector3f normal_mesh =
-      Eigen::Vector3f(query.hit.Ng_x, query.hit.Ng_y, query.hit.Ng_z).normalized();
-  const Eigen::Vector3f normal_map = bodies_->rotation[body] * normal_mesh;
-  return RayHit{.range_m = query.ray.tfar,
-                .cos_incidence = std::abs(normal_map.dot(ray.direction_map)),
-                .surface = bodies_->meshes[bodies_->mesh[body]]->surfaces[query.hit.primID],
-                .body = body};
+  rtcIntersect16(valid.data(), bodies_->scene.get(), &context, &packet);
+  for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = bodies_->hit(packet, i, rays[i]);
 }
 
 }  // namespace stillmap

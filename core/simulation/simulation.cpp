@@ -1,6 +1,5 @@
 #include "core/simulation/simulation.hpp"
 
-#include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
 
 #include <cassert>
@@ -19,16 +18,6 @@ namespace {
 int firings_of(const SimulationConfig& config) {
   if (config.firings > 0) return config.firings;
   return config.sensor.rings > 32 ? 2083 : config.sensor.rings > 16 ? 2170 : 1800;
-}
-
-std::vector<double> elevations_of(const SensorModel& sensor) {
-  if (!sensor.beam_elevations.empty()) return sensor.beam_elevations;
-  std::vector<double> out;
-  for (int ring = 0; ring < sensor.rings; ++ring) {
-    const double part = sensor.rings > 1 ? static_cast<double>(ring) / (sensor.rings - 1) : 0.0;
-    out.push_back(sensor.fov_up + part * (sensor.fov_down - sensor.fov_up));
-  }
-  return out;
 }
 
 // What one beam saw in one firing; range 0: nothing.
@@ -62,15 +51,21 @@ struct Simulation::World {
                 city.instances),
         scene(all_meshes(city, traffic), standing_meshes(city)),
         firings(firings_of(config)) {
-    for (const double elevation : elevations_of(config.sensor)) {
+    for (int ring = 0; ring < config.sensor.rings; ++ring) {
+      const double error = config.flaws.beam(static_cast<std::size_t>(ring)).elevation_error;
+      const double elevation = config.sensor.beam_elevation(ring) + error;
       beams.emplace_back(std::cos(elevation), std::sin(elevation));
     }
     for (int firing = 0; firing < firings; ++firing) {
-      const double azimuth = 2.0 * std::numbers::pi * firing / firings;
+      const double azimuth = azimuth_of(firing);
       azimuths.emplace_back(std::cos(azimuth), std::sin(azimuth));
     }
     static_bodies.emplace_back();
     static_bodies.insert(static_bodies.end(), city.bodies.begin(), city.bodies.end());
+  }
+
+  [[nodiscard]] double azimuth_of(int firing) const {
+    return 2.0 * std::numbers::pi * firing / firings;
   }
 
   /// All bodies at a time: the standing ones as the scene counts them, then the movers.
@@ -97,28 +92,31 @@ struct Simulation::World {
     const double nod =
         -0.006 * (traffic.ego_speed_at(time_s + dt) - traffic.ego_speed_at(time_s - dt)) / (2 * dt);
     const double shake = 0.0015 * std::min(1.0, v / 5.0);
-    const double pitch = nod + shake * std::sin(7.3 * time_s);
-    const double roll = shake * std::sin(5.1 * time_s + 1.0);
+    const double pitch = config.flaws.pitch + nod + shake * std::sin(7.3 * time_s);
+    const double roll = config.flaws.roll + shake * std::sin(5.1 * time_s + 1.0);
     Eigen::Isometry3d T_map_lidar = traffic.T_map_ego_at(time_s);
     T_map_lidar.rotate(Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
                        Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()));
     return T_map_lidar * Eigen::Translation3d(0, 0, config.lidar_height_m);
   }
 
-  [[nodiscard]] Pixel fire(const RaySnapshot& snapshot, const std::vector<Body>& bodies,
-                           const Ray& ray, Random random) const {
-    const std::optional<RayHit> hit = snapshot.cast(ray);
-    if (!hit) return {};
-    const Body& body = bodies[hit->body];
-    const SurfaceFacts facts = facts_of(hit->surface);
+  [[nodiscard]] Pixel pixel_of(const RayHit& hit, const std::vector<Body>& bodies, const Ray& ray,
+                               std::size_t ring, Random random) const {
+    const Body& body = bodies[hit.body];
+    const Eigen::Vector3f spot_map = ray.origin_map + hit.range_m * ray.direction_map;
+    const SurfaceFacts facts = config.materials.at(hit.surface, spot_map);
+    // What moves carries its own paint along; only what stands has patches.
+    const float patch = body.instance != 0 ? 1.0F : config.materials.patch(spot_map);
+    BeamNoise noise = config.noise;
+    noise.weakest_return /= config.flaws.beam(ring).gain;
     const auto seen =
-        beam_return(config.noise, hit->range_m, hit->cos_incidence, facts, body.brightness, random);
+        beam_return(noise, hit.range_m, hit.cos_incidence, facts, patch * body.brightness, random);
     if (!seen || seen->range_m < config.sensor.min_range_m ||
         seen->range_m > config.sensor.max_range_m) {
       return {};
     }
     const std::uint32_t label = facts.label != 0 ? facts.label : body.label;
-    return {seen->range_m, seen->intensity,
+    return {seen->range_m, config.flaws.reported_intensity(seen->intensity, ring),
             label | static_cast<std::uint32_t>(body.instance) << 16U};
   }
 
@@ -129,7 +127,13 @@ struct Simulation::World {
     return {beam.x() * level.x(), beam.x() * level.y(), beam.y()};
   }
 
+  /// Where the beams of a ring start, in the lidar's frame.
+  [[nodiscard]] Eigen::Vector3f beam_origin(std::size_t ring) const {
+    return {0.0F, 0.0F, static_cast<float>(config.flaws.beam(ring).height_m)};
+  }
+
   [[nodiscard]] std::vector<Pixel> turn(int index) const;
+  void mix_edges(int index, std::vector<Pixel>& pixels) const;
   [[nodiscard]] SimulatedScan collect(int index, const std::vector<Pixel>& pixels) const;
 
   SimulationConfig config;
@@ -149,24 +153,54 @@ std::vector<Pixel> Simulation::World::turn(int index) const {
   const std::vector<Body> bodies = bodies_at(start_s);
   const RaySnapshot snapshot = scene.with(motions(start_s, start_s + period_s));
   std::vector<Pixel> pixels(beams.size() * static_cast<std::size_t>(firings));
-  const Eigen::Isometry3d T_map_start = T_map_lidar_at(start_s);
-  const auto fire_column = [&](int firing) {
-    const double part = static_cast<double>(firing) / firings;
-    const Eigen::Isometry3f T_map_lidar =
-        (config.rolling ? T_map_lidar_at(start_s + part * period_s) : T_map_start).cast<float>();
-    for (std::size_t ring = 0; ring < beams.size(); ++ring) {
-      const std::size_t pixel =
+  const Eigen::Isometry3f T_map_start = T_map_lidar_at(start_s).cast<float>();
+  // A few firings of one ring at a time: their beams lie close together.
+  const auto fire_some = [&](std::size_t ring, int first, int last) {
+    std::array<Ray, RaySnapshot::most_rays> rays;
+    std::array<std::size_t, RaySnapshot::most_rays> targets{};
+    std::array<std::optional<RayHit>, RaySnapshot::most_rays> hits;
+    std::size_t count = 0;
+    for (int firing = first; firing < last; ++firing) {
+      const double elevation = std::asin(static_cast<double>(beams[ring].y()));
+      if (config.flaws.is_blind(azimuth_of(firing), elevation, ring)) continue;
+      const double part = static_cast<double>(firing) / firings;
+      const Eigen::Isometry3f T_map_lidar =
+          config.rolling ? T_map_lidar_at(start_s + part * period_s).cast<float>() : T_map_start;
+      rays[count] = {T_map_lidar * beam_origin(ring),
+                     T_map_lidar.linear() * direction(ring, firing),
+                     static_cast<float>(config.sensor.max_range_m), static_cast<float>(part)};
+      targets[count++] =
           ring * static_cast<std::size_t>(firings) + static_cast<std::size_t>(firing);
-      const Ray ray{T_map_lidar.translation(), T_map_lidar.linear() * direction(ring, firing),
-                    static_cast<float>(config.sensor.max_range_m), static_cast<float>(part)};
-      pixels[pixel] = fire(snapshot, bodies, ray,
-                           Random(config.seed, 41, static_cast<std::uint64_t>(index), pixel));
+    }
+    snapshot.cast(std::span(rays).first(count), std::span(hits).first(count));
+    for (std::size_t i = 0; i < count; ++i) {
+      const Random random(config.seed, 41, static_cast<std::uint64_t>(index), targets[i]);
+      if (hits[i]) pixels[targets[i]] = pixel_of(*hits[i], bodies, rays[i], ring, random);
     }
   };
-  tbb::parallel_for(tbb::blocked_range<int>(0, firings, 32), [&](const auto& range) {
-    for (int firing = range.begin(); firing < range.end(); ++firing) fire_column(firing);
+  constexpr int some = RaySnapshot::most_rays;
+  tbb::parallel_for(0, (firings + some - 1) / some, [&](int block) {
+    for (std::size_t ring = 0; ring < beams.size(); ++ring) {
+      fire_some(ring, some * block, std::min(firings, some * (block + 1)));
+    }
   });
+  mix_edges(index, pixels);
   return pixels;
+}
+
+// A beam that two surfaces share reports a range between them.
+void Simulation::World::mix_edges(int index, std::vector<Pixel>& pixels) const {
+  if (config.flaws.mixed_share == 0.0) return;
+  constexpr float least_step_m = 0.3F;
+  constexpr float longest_step_m = 3.0F;
+  for (std::size_t i = 0; i + 1 < pixels.size(); ++i) {
+    const float step_m = pixels[i + 1].range_m - pixels[i].range_m;
+    const bool is_edge = std::abs(step_m) > least_step_m && std::abs(step_m) < longest_step_m;
+    if (!is_edge || pixels[i].range_m == 0.0F || pixels[i + 1].range_m == 0.0F) continue;
+    Random random(config.seed, 42, static_cast<std::uint64_t>(index), i);
+    if (!random.chance(config.flaws.mixed_share)) continue;
+    pixels[i].range_m += static_cast<float>(random.uniform()) * step_m;
+  }
 }
 
 SimulatedScan Simulation::World::collect(int index, const std::vector<Pixel>& pixels) const {
@@ -180,7 +214,7 @@ SimulatedScan Simulation::World::collect(int index, const std::vector<Pixel>& pi
     if (pixel.range_m <= 0.0F) continue;
     const std::size_t ring = i / static_cast<std::size_t>(firings);
     const auto firing = static_cast<int>(i % static_cast<std::size_t>(firings));
-    out.scan.points_lidar.emplace_back(pixel.range_m * direction(ring, firing));
+    out.scan.points_lidar.emplace_back(pixel.range_m * direction(ring, firing) + beam_origin(ring));
     out.scan.intensity.push_back(pixel.intensity);
     out.scan.ring.push_back(static_cast<std::uint16_t>(ring));
     out.scan.labels.push_back(
@@ -195,7 +229,7 @@ SimulatedScan Simulation::World::collect(int index, const std::vector<Pixel>& pi
 }
 
 std::string SimulationConfig::faults() const {
-  std::string out = plan.faults() + sensor.faults() + noise.faults();
+  std::string out = plan.faults() + sensor.faults() + noise.faults() + flaws.faults(sensor);
   const auto check = [&](double value, double low, double high, const char* field) {
     if (value >= low && value <= high) return;
     out += std::string("simulation.") + field + " is " + std::to_string(value) + ", must be " +

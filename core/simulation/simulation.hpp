@@ -10,6 +10,8 @@
 #include "core/lidar/sensor_model.hpp"
 #include "core/simulation/beam_noise.hpp"
 #include "core/simulation/city_plan.hpp"
+#include "core/simulation/lidar_flaws.hpp"
+#include "core/simulation/materials.hpp"
 
 namespace stillmap {
 
@@ -27,6 +29,8 @@ struct SimulationConfig {
   bool rolling = false;
   double lidar_height_m = 1.73;
   BeamNoise noise;
+  LidarFlaws flaws;
+  Materials materials = usual_materials();
 
   /// Every fault in words, one a line; empty when it can be simulated.
   [[nodiscard]] std::string faults() const;

@@ -6,7 +6,7 @@ namespace stillmap {
 namespace {
 
 // In the order of the enumeration.
-constexpr std::array<SurfaceFacts, 25> table{{
+constexpr std::array<SurfaceFacts, surface_count> table{{
     {40, 0.20F},        // asphalt
     {60, 0.60F},        // lane_marking
     {44, 0.26F},        // parking_bay
@@ -26,6 +26,10 @@ constexpr std::array<SurfaceFacts, 25> table{{
     {80, 0.40F},        // pole
     {81, 2.00F},        // sign_face
     {81, 0.35F},        // sign_back
+    {49, 0.30F},        // gravel
+    {51, 0.30F},        // fence_mesh
+    {99, 0.40F},        // street_object
+    {52, 0.40F},        // other_structure
     {0, 0.50F},         // paint
     {0, 0.07F, 0.6F},   // glass
     {0, 0.10F},         // tyre

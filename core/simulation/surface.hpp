@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 
 namespace stillmap {
@@ -25,6 +26,12 @@ enum class Surface : std::uint8_t {
   pole,
   sign_face,
   sign_back,
+  gravel,
+  fence_mesh,
+  /// Bins, boxes, benches: a class of their own that the networks do not know.
+  street_object,
+  /// Stairs, shelters, rails of stairs: neither.
+  other_structure,
   // From here on parts of objects: their class is the object's.
   paint,
   glass,
@@ -41,7 +48,11 @@ struct SurfaceFacts {
   float reflectivity;
   /// Share of beams that never come back: mirrored away or let through.
   float lost = 0.0F;
+  /// Of blades, twigs or cloth that stand over the surface and return some beams early [m].
+  float pile_m = 0.0F;
 };
+
+inline constexpr std::size_t surface_count = static_cast<std::size_t>(Surface::skin) + 1;
 
 [[nodiscard]] SurfaceFacts facts_of(Surface surface);
 

@@ -28,6 +28,8 @@ double wheelbase(ObjectKind kind) {
       return 5.0;
     case ObjectKind::car:
       return 2.6;
+    case ObjectKind::other_vehicle:
+      return 2.0;
     default:
       return 1.0;
   }
@@ -83,14 +85,18 @@ Traffic::Traffic(const GroundShape& ground, std::uint64_t seed, TimeSpan span,
 }
 
 void Traffic::add_shapes(Random& random) {
-  constexpr std::array<std::pair<ObjectKind, int>, 5> variants{{{ObjectKind::car, 12},
-                                                                {ObjectKind::truck, 4},
-                                                                {ObjectKind::bus, 1},
-                                                                {ObjectKind::bicyclist, 1},
-                                                                {ObjectKind::person, 8}}};
+  const Variety variety = ground_.plan().many_shapes ? Variety::any : Variety::plain;
+  const bool any = variety == Variety::any;
+  const std::vector<std::pair<ObjectKind, int>> variants{{ObjectKind::car, 12},
+                                                         {ObjectKind::truck, 4},
+                                                         {ObjectKind::bus, any ? 2 : 1},
+                                                         {ObjectKind::bicyclist, any ? 4 : 1},
+                                                         {ObjectKind::person, 8},
+                                                         {ObjectKind::motorcyclist, any ? 3 : 0},
+                                                         {ObjectKind::other_vehicle, any ? 3 : 0}};
   for (const auto& [kind, count] : variants) {
     for (int i = 0; i < count; ++i) {
-      shapes_.push_back(make_object(kind, Random(random.index(1U << 30U))));
+      shapes_.push_back(make_object(kind, Random(random.index(1U << 30U)), variety));
     }
   }
 }
@@ -104,9 +110,12 @@ std::size_t Traffic::random_shape(ObjectKind kind, Random& random) const {
 
 ObjectKind Traffic::random_vehicle(Random& random) const {
   const TrafficPlan& traffic = ground_.plan().traffic;
-  const double kind = random.uniform();
-  if (kind < traffic.share_trucks) return ObjectKind::truck;
-  return kind < traffic.share_trucks + traffic.share_buses ? ObjectKind::bus : ObjectKind::car;
+  double draw = random.uniform();
+  const auto falls_to = [&](double share) { return (draw -= share) < 0.0; };
+  if (falls_to(traffic.share_trucks)) return ObjectKind::truck;
+  if (falls_to(traffic.share_buses)) return ObjectKind::bus;
+  if (falls_to(traffic.share_motorcyclists)) return ObjectKind::motorcyclist;
+  return falls_to(traffic.share_other_vehicles) ? ObjectKind::other_vehicle : ObjectKind::car;
 }
 
 void Traffic::add_mover(std::size_t shape, std::size_t path, Track track, Random& random) {

@@ -3,34 +3,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/simulation/leaves.hpp"
+
 namespace stillmap {
 namespace {
 
 using Eigen::Vector3f;
-
-Vector3f random_direction(Random& random) {
-  const double z = random.uniform(-1.0, 1.0);
-  const double angle = random.uniform(0.0, 2.0 * std::numbers::pi);
-  const double ring = std::sqrt(1.0 - z * z);
-  return Eigen::Vector3d(ring * std::cos(angle), ring * std::sin(angle), z).cast<float>();
-}
-
-void add_leaf(Mesh& mesh, const Vector3f& centre, float size_m, Random& random, Surface surface) {
-  const Vector3f u = random_direction(random);
-  const Vector3f v = u.unitOrthogonal();
-  mesh.add_triangle(centre + size_m * u, centre - 0.5F * size_m * u + 0.8F * size_m * v,
-                    centre - 0.5F * size_m * u - 0.8F * size_m * v, surface);
-}
-
-// Leaves thicken towards the outside, as they do on a real crown.
-void add_leaf_ball(Mesh& mesh, const Vector3f& centre, const Vector3f& radii, int leaves,
-                   float leaf_m, Random& random) {
-  for (int i = 0; i < leaves; ++i) {
-    const auto depth = static_cast<float>(std::pow(random.uniform(), 0.4));
-    add_leaf(mesh, centre + depth * radii.cwiseProduct(random_direction(random)), leaf_m, random,
-             Surface::leaves);
-  }
-}
 
 }  // namespace
 
@@ -49,7 +27,7 @@ Mesh make_tree(Random random) {
     const Vector3f blob = fork + spread_m * reach.cast<float>();
     add_tube(mesh, {fork, blob, 0.4F * radius_m, 0.1F * radius_m, 5}, Surface::bark);
     const auto size = static_cast<float>(random.uniform(0.6, 0.85)) * spread_m;
-    add_leaf_ball(mesh, blob, {size, size, 0.8F * size}, 260, 0.16F, random);
+    add_leaf_ball(mesh, blob, {size, size, 0.8F * size}, {}, random);
   }
   return mesh;
 }
@@ -57,8 +35,8 @@ Mesh make_tree(Random random) {
 Mesh make_bush(float size_m, Random random) {
   Mesh mesh;
   const Vector3f radii(0.5F * size_m, 0.5F * size_m, 0.45F * size_m);
-  add_leaf_ball(mesh, {0, 0, 0.4F * size_m}, radii, static_cast<int>(260.0F * size_m), 0.12F,
-                random);
+  add_leaf_ball(mesh, {0, 0, 0.4F * size_m}, radii,
+                {.leaves = static_cast<int>(260.0F * size_m), .leaf_m = 0.12F}, random);
   return mesh;
 }
 

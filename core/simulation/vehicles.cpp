@@ -1,7 +1,8 @@
 #include "core/simulation/vehicles.hpp"
 
+#include "core/simulation/vehicle_parts.hpp"
+
 namespace stillmap {
-namespace {
 
 void add_axle(Mesh& mesh, float x, float half_width, float radius) {
   for (const float side : {-1.0F, 1.0F}) {
@@ -11,11 +12,13 @@ void add_axle(Mesh& mesh, float x, float half_width, float radius) {
   }
 }
 
-void add_plates(Mesh& mesh, float front, float rear) {
+void add_licence_plates(Mesh& mesh, float front, float rear) {
   for (const float x : {front, rear}) {
     add_box(mesh, {x - 0.01F, -0.26F, 0.45F}, {x + 0.01F, 0.26F, 0.56F}, Surface::licence_plate);
   }
 }
+
+namespace {
 
 // Measures of a passenger car; the cabin's x positions run from the rear.
 struct CarBody {
@@ -23,12 +26,28 @@ struct CarBody {
   float cabin_rear, roof_rear, roof_front;
 };
 
-constexpr std::array<CarBody, 4> car_bodies{{
-    {4.6F, 0.90F, 1.44F, 0.92F, 0.78F, 1.35F, 0.75F, 1.35F, 2.0F},  // saloon
-    {4.0F, 0.86F, 1.48F, 0.92F, 0.82F, 0.95F, 0.05F, 0.35F, 1.6F},  // hatchback
-    {4.7F, 0.95F, 1.75F, 1.08F, 1.00F, 1.20F, 0.05F, 0.35F, 1.9F},  // off-roader
-    {5.4F, 1.00F, 2.40F, 1.25F, 1.05F, 0.75F, 0.02F, 0.08F, 1.2F},  // delivery van
+constexpr std::array<CarBody, 8> car_bodies{{
+    {4.6F, 0.90F, 1.44F, 0.92F, 0.78F, 1.35F, 0.75F, 1.35F, 2.0F},   // saloon
+    {4.0F, 0.86F, 1.48F, 0.92F, 0.82F, 0.95F, 0.05F, 0.35F, 1.6F},   // hatchback
+    {4.7F, 0.95F, 1.75F, 1.08F, 1.00F, 1.20F, 0.05F, 0.35F, 1.9F},   // off-roader
+    {4.6F, 0.88F, 1.46F, 0.92F, 0.80F, 1.25F, 0.05F, 0.45F, 1.9F},   // estate
+    {3.5F, 0.82F, 1.50F, 0.94F, 0.86F, 0.70F, 0.05F, 0.25F, 1.25F},  // small car
+    {4.3F, 0.90F, 1.62F, 1.00F, 0.92F, 0.80F, 0.05F, 0.25F, 1.7F},   // family van
+    {4.9F, 0.96F, 1.95F, 1.10F, 1.02F, 0.75F, 0.03F, 0.12F, 1.4F},   // minibus
+    {5.4F, 1.00F, 2.40F, 1.25F, 1.05F, 0.75F, 0.02F, 0.08F, 1.2F},   // delivery van
 }};
+
+// No two cars of a kind are alike; the bonnet stays below the cabin and the roof inside it.
+CarBody varied(CarBody car, Random& random) {
+  const auto factor = [&] { return static_cast<float>(random.uniform(0.94, 1.06)); };
+  car.length *= factor();
+  car.half_width *= factor();
+  car.height *= factor();
+  car.bonnet_length *= factor();
+  car.roof_rear *= factor();
+  car.roof_front *= factor();
+  return car;
+}
 
 Mesh make_car(const CarBody& car) {
   Mesh mesh;
@@ -53,7 +72,7 @@ Mesh make_car(const CarBody& car) {
   const float radius = car.height > 1.6F ? 0.36F : 0.31F;
   add_axle(mesh, front - 0.85F, car.half_width + 0.01F, radius);
   add_axle(mesh, rear + 0.8F, car.half_width + 0.01F, radius);
-  add_plates(mesh, front, rear);
+  add_licence_plates(mesh, front, rear);
   for (const float y : {-1.0F, 1.0F}) {
     const float mirror = y * (car.half_width + 0.1F);
     add_box(mesh, {front - car.bonnet_length - 0.35F, mirror - 0.08F, car.belt},
@@ -66,13 +85,14 @@ Mesh make_car(const CarBody& car) {
 
 Mesh make_car(Random& random) {
   // Vans are rarer than cars.
-  CarBody car = car_bodies[random.chance(0.12) ? 3 : random.index(3)];
-  const auto scale = static_cast<float>(random.uniform(0.95, 1.05));
-  car.length *= scale;
-  return make_car(car);
+  constexpr std::size_t vans = 2;
+  const bool van = random.chance(0.2);
+  const std::size_t body =
+      van ? car_bodies.size() - 1 - random.index(vans) : random.index(car_bodies.size() - vans);
+  return make_car(varied(car_bodies[body], random));
 }
 
-Mesh make_truck(Random& random) {
+Mesh make_lorry(Random& random) {
   Mesh mesh;
   const float front = static_cast<float>(random.uniform(3.6, 4.6));
   const bool tank = random.chance(0.2);
@@ -89,26 +109,81 @@ Mesh make_truck(Random& random) {
     add_box(mesh, {-front, -1.22F, 1.0F}, {cab_rear - 0.25F, 1.22F, 3.4F}, Surface::paint);
   }
   for (const float x : {front - 1.2F, -front + 1.2F, -front + 2.4F}) add_axle(mesh, x, 1.22F, 0.5F);
-  add_plates(mesh, front, -front);
+  add_licence_plates(mesh, front, -front);
   return mesh;
 }
 
-Mesh make_bus() {
+namespace {
+
+// A driver's cab like a van's and a body of its own behind it.
+Mesh make_small_truck(Random& random) {
   Mesh mesh;
-  const float front = 5.2F;
-  const float half = 1.27F;
-  add_box(mesh, {-front, -half, 0.35F}, {front, half, 1.25F}, Surface::paint);
-  add_box(mesh, {-front + 0.1F, -half + 0.04F, 1.25F}, {front - 0.06F, half - 0.04F, 2.5F},
-          Surface::glass);
-  for (float x = -front; x < front; x += 1.45F) {
-    add_box(mesh, {x, -half, 1.25F}, {x + 0.16F, half, 2.5F}, Surface::paint);
+  const auto front = static_cast<float>(random.uniform(2.5, 3.2));
+  const float cab_rear = front - 1.9F;
+  const auto half = static_cast<float>(random.uniform(0.92, 1.05));
+  add_frustum(mesh, {cab_rear, front, half, 0.35F}, {cab_rear, front - 0.25F, half, 1.1F},
+              Surface::paint, Surface::paint);
+  add_frustum(mesh, {cab_rear, front - 0.8F, half - 0.03F, 1.1F},
+              {cab_rear + 0.1F, front - 1.3F, half - 0.15F, 1.95F}, Surface::glass, Surface::paint);
+  add_box(mesh, {-front, -0.4F, 0.45F}, {cab_rear, 0.4F, 0.7F}, Surface::tyre);
+  const double kind = random.uniform();
+  const float body_front = cab_rear - 0.1F;
+  if (kind < 0.5) {
+    const auto top = static_cast<float>(random.uniform(2.5, 3.1));
+    add_box(mesh, {-front, -half - 0.1F, 0.8F}, {body_front, half + 0.1F, top}, Surface::paint);
+  } else {
+    const auto rim = static_cast<float>(random.uniform(1.05, 1.4));
+    add_box(mesh, {-front, -half, 0.75F}, {body_front, half, 0.85F}, Surface::paint);
+    for (const float y : {-half, half}) {
+      add_box(mesh, {-front, y - 0.03F, 0.85F}, {body_front, y + 0.03F, rim}, Surface::paint);
+    }
+    add_box(mesh, {-front, -half, 0.85F}, {-front + 0.05F, half, rim}, Surface::paint);
   }
-  add_box(mesh, {-front, -half, 2.5F}, {front, half, 3.05F}, Surface::paint);
+  add_axle(mesh, front - 0.8F, half + 0.01F, 0.36F);
+  add_axle(mesh, -front + 1.0F, half + 0.01F, 0.36F);
+  add_licence_plates(mesh, front, -front);
+  return mesh;
+}
+
+struct BusBody {
+  float front = 5.2F, sill = 1.25F, roof = 2.5F;
+  /// Trams hide their wheels behind skirts.
+  bool tram = false;
+};
+
+Mesh make_bus(const BusBody& bus) {
+  Mesh mesh;
+  const float front = bus.front;
+  const float half = 1.27F;
+  const float floor = bus.tram ? 0.08F : 0.35F;
+  add_box(mesh, {-front, -half, floor}, {front, half, bus.sill}, Surface::paint);
+  add_box(mesh, {-front + 0.1F, -half + 0.04F, bus.sill}, {front - 0.06F, half - 0.04F, bus.roof},
+          Surface::glass);
+  for (float x = -front; x < front - 0.2F; x += 1.45F) {
+    add_box(mesh, {x, -half, bus.sill}, {x + 0.16F, half, bus.roof}, Surface::paint);
+  }
+  add_box(mesh, {-front, -half, bus.roof}, {front, half, 3.05F}, Surface::paint);
   add_box(mesh, {-2.5F, -0.8F, 3.05F}, {0.5F, 0.8F, 3.25F}, Surface::paint);
+  if (bus.tram) return mesh;
   add_axle(mesh, front - 2.6F, half + 0.01F, 0.48F);
   add_axle(mesh, -front + 3.0F, half + 0.01F, 0.48F);
-  add_plates(mesh, front, -front);
+  add_licence_plates(mesh, front, -front);
   return mesh;
+}
+
+}  // namespace
+
+Mesh make_truck(Random& random) {
+  return random.chance(0.5) ? make_lorry(random) : make_small_truck(random);
+}
+
+Mesh make_city_bus() { return make_bus(BusBody{}); }
+
+Mesh make_bus(Random& random) {
+  return make_bus(BusBody{.front = static_cast<float>(random.uniform(4.0, 5.2)),
+                          .sill = static_cast<float>(random.uniform(1.0, 1.35)),
+                          .roof = static_cast<float>(random.uniform(2.3, 2.6)),
+                          .tram = random.chance(0.25)});
 }
 
 }  // namespace stillmap

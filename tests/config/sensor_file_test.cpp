@@ -41,6 +41,23 @@ TEST(SensorFile, ShippedExampleCanBeUsed) {
   EXPECT_EQ(sensor.faults(), "");
 }
 
+TEST(SensorFile, WhatIsSavedIsReadBack) {
+  SensorModel sensor = hdl_64e();
+  sensor.name = "a name: with {yaml} in it";
+  sensor.max_range_m = 77.25;
+  sensor.ring_source = RingSource::field;
+  sensor.intensity_scale = 1.0F / 255.0F;
+  const auto file = write_file("saved.yaml", "");
+  save_sensor(sensor, file);
+  expect_same(load_sensor(file.string()), sensor);
+  save_sensor(vlp_16(), file);
+  expect_same(load_sensor(file.string()), vlp_16());
+}
+
+TEST(SensorFile, CannotBeSavedWhereNoFileCanBe) {
+  EXPECT_THROW(save_sensor(vlp_16(), "/dev/null/sensor.yaml"), std::runtime_error);
+}
+
 TEST(SensorFile, DemandsWhatHasNoDefault) {
   const std::string text =
       refusal([] { (void)load_sensor(write_file("a.yaml", "name: x").string()); });

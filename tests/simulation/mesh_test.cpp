@@ -65,7 +65,8 @@ class EveryObject : public testing::TestWithParam<ObjectKind> {};
 
 TEST_P(EveryObject, StandsOnTheGroundInItsFootprint) {
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
-    const ObjectShape object = make_object(GetParam(), Random(seed));
+    const Variety variety = seed % 2 == 0 ? Variety::plain : Variety::any;
+    const ObjectShape object = make_object(GetParam(), Random(seed), variety);
     const Eigen::AlignedBox3f box = bounds(object.mesh);
     EXPECT_GT(box.min().z(), -0.05F);
     EXPECT_LT(box.min().z(), 0.1F);
@@ -82,7 +83,7 @@ INSTANTIATE_TEST_SUITE_P(Kinds, EveryObject,
                          testing::Values(ObjectKind::car, ObjectKind::truck, ObjectKind::bus,
                                          ObjectKind::bicycle, ObjectKind::motorcycle,
                                          ObjectKind::bicyclist, ObjectKind::motorcyclist,
-                                         ObjectKind::person));
+                                         ObjectKind::person, ObjectKind::other_vehicle));
 
 TEST(Building, HasReliefDeeperThanTheLidarsNoise) {
   const BuildingPlan plan{.width_m = 12,

@@ -1,0 +1,105 @@
+#include "core/simulation/lidar_flaws.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
+namespace stillmap {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+
+// The HDL-64E's lasers sit in two blocks above the origin; a smaller sensor's in one point.
+double block_height(std::size_t ring, std::size_t rings, double upper_m, double lower_m) {
+  return 2 * ring < rings ? upper_m : lower_m;
+}
+
+std::vector<BeamFlaw> drawn_beams(const SensorModel& sensor, Random& random) {
+  const auto rings = static_cast<std::size_t>(sensor.rings);
+  const bool two_blocks = sensor.rings > 32 && !sensor.beam_elevations.empty();
+  const double error =
+      (two_blocks ? random.uniform(0.04, 0.1) : random.uniform(0.0, 0.06)) * degree;
+  const double spread = random.uniform(0.0, 0.3);
+  const double upper_m = two_blocks ? random.uniform(0.05, 0.17) : 0.0;
+  const double lower_m = two_blocks ? random.uniform(0.02, 0.14) : 0.0;
+  const double share_weak = random.uniform(0.0, 0.12);
+  std::vector<BeamFlaw> beams;
+  for (std::size_t ring = 0; ring < rings; ++ring) {
+    const double weak = random.chance(share_weak) ? random.uniform(0.1, 0.5) : 1.0;
+    beams.push_back({.elevation_error = error * random.normal(),
+                     .height_m = block_height(ring, rings, upper_m, lower_m),
+                     .gain = weak * std::exp(spread * random.normal())});
+  }
+  return beams;
+}
+
+std::vector<BlindSpot> drawn_blind_spots(const SensorModel& sensor, Random& random) {
+  std::vector<BlindSpot> spots;
+  if (random.chance(0.35)) return spots;
+  const std::size_t count = 1 + random.index(7);
+  for (std::size_t i = 0; i < count; ++i) {
+    spots.push_back({.azimuth = random.uniform(-std::numbers::pi, std::numbers::pi),
+                     .elevation = sensor.fov_down + random.uniform(-0.04, 0.12),
+                     .half_width = random.uniform(0.03, 0.5),
+                     .half_height = random.uniform(0.03, 0.13)});
+  }
+  return spots;
+}
+
+}  // namespace
+
+BeamFlaw LidarFlaws::beam(std::size_t ring) const {
+  return beams.empty() ? BeamFlaw{} : beams[ring];
+}
+
+bool LidarFlaws::is_blind(double azimuth, double elevation, std::size_t ring) const {
+  return std::ranges::any_of(blind_spots, [&](const BlindSpot& spot) {
+    const double up = (elevation - spot.elevation) / spot.half_height;
+    if (std::abs(up) >= 1.0) return false;
+    const double turn = std::remainder(azimuth - spot.azimuth, 2.0 * std::numbers::pi);
+    const double ragged =
+        Random(81, ring, static_cast<std::uint64_t>(turn > 0)).uniform(0.75, 1.15);
+    const double across = turn / (ragged * spot.half_width);
+    return across * across + up * up < 1.0;
+  });
+}
+
+float LidarFlaws::reported_intensity(float intensity, std::size_t ring) const {
+  const double bright = beam(ring).gain * intensity_gain * std::pow(intensity, intensity_gamma);
+  double reported = std::clamp(bright + intensity_offset, 0.0, 1.0);
+  if (intensity_step > 0.0) reported = intensity_step * std::round(reported / intensity_step);
+  return static_cast<float>(std::min(reported, 1.0));
+}
+
+std::string LidarFlaws::faults(const SensorModel& sensor) const {
+  std::ostringstream out;
+  if (!beams.empty() && beams.size() != static_cast<std::size_t>(sensor.rings)) {
+    out << "flaws.beams has " << beams.size() << " entries for " << sensor.rings << " rings\n";
+  }
+  if (!(mixed_share >= 0.0 && mixed_share <= 1.0)) {
+    out << "flaws.mixed_share is " << mixed_share << ", must be 0 to 1\n";
+  }
+  if (!(intensity_gain > 0.0 && intensity_gamma > 0.0 && intensity_step >= 0.0)) {
+    out << "flaws.intensity_gain and intensity_gamma must be above 0, intensity_step 0 or more\n";
+  }
+  return out.str();
+}
+
+LidarFlaws drawn_flaws(const SensorModel& sensor, Random random) {
+  LidarFlaws flaws;
+  flaws.beams = drawn_beams(sensor, random);
+  flaws.blind_spots = drawn_blind_spots(sensor, random);
+  flaws.roll = 0.7 * degree * random.normal();
+  flaws.pitch = 0.7 * degree * random.normal();
+  // Some sensors level bright and dark, others spread them; a middling surface (0.25) is reported
+  // as 0.12 to 0.45.
+  flaws.intensity_gamma = random.uniform(0.3, 1.2);
+  flaws.intensity_gain = random.uniform(0.12, 0.45) / std::pow(0.25, flaws.intensity_gamma);
+  flaws.intensity_offset = random.uniform(-0.1, 0.05);
+  flaws.intensity_step = random.chance(0.5) ? 0.01 : 1.0 / 255.0;
+  flaws.mixed_share = random.uniform(0.0, 0.4);
+  return flaws;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,88 @@
+#include "core/simulation/materials.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stillmap {
+namespace {
+
+// 0..1, the same in each cube of that size.
+double shade(const Eigen::Vector3f& spot_map, double size_m) {
+  const auto cell = [&](float x) {
+    return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(x / size_m)));
+  };
+  return Random(71, cell(spot_map.x()), cell(spot_map.y()), cell(spot_map.z())).uniform();
+}
+
+void draw_pile(Materials& materials, Surface surface, double least_m, double most_m,
+               Random& random) {
+  materials.facts[static_cast<std::size_t>(surface)].pile_m =
+      static_cast<float>(random.uniform(least_m, most_m));
+}
+
+void draw_lost(Materials& materials, Surface surface, double least, double most, Random& random) {
+  materials.facts[static_cast<std::size_t>(surface)].lost =
+      static_cast<float>(random.uniform(least, most));
+}
+
+// Water mirrors most beams away.
+void wet(Materials& materials, Random& random) {
+  for (const Surface surface : {Surface::asphalt, Surface::parking_bay, Surface::lane_marking}) {
+    SurfaceFacts& facts = materials.facts[static_cast<std::size_t>(surface)];
+    facts.lost = static_cast<float>(random.uniform(0.05, 0.35));
+    facts.reflectivity *= static_cast<float>(random.uniform(0.3, 0.8));
+  }
+}
+
+}  // namespace
+
+float Materials::patch(const Eigen::Vector3f& spot_map) const {
+  if (patchiness == 0.0) return 1.0F;
+  const double mixed = 0.6 * shade(spot_map, patch_m) + 0.4 * shade(spot_map, 0.1 * patch_m);
+  return static_cast<float>(1.0 + patchiness * (2.0 * mixed - 1.0));
+}
+
+SurfaceFacts Materials::at(Surface surface, const Eigen::Vector3f& spot_map) const {
+  SurfaceFacts facts = of(surface);
+  if (!lost_in_panes || facts.lost == 0.0F) return facts;
+  constexpr double pane_m = 0.6;
+  facts.lost = shade(spot_map, pane_m) < facts.lost ? 0.93F : 0.07F;
+  return facts;
+}
+
+Materials usual_materials() {
+  Materials materials;
+  for (std::size_t i = 0; i < surface_count; ++i) {
+    materials.facts[i] = facts_of(static_cast<Surface>(i));
+  }
+  return materials;
+}
+
+Materials drawn_materials(Random random) {
+  Materials materials = usual_materials();
+  for (SurfaceFacts& facts : materials.facts) {
+    facts.reflectivity *= static_cast<float>(std::exp(random.uniform(-0.7, 0.8)));
+  }
+  // Often the bays are of the road's own asphalt.
+  if (random.chance(0.5)) {
+    materials.facts[static_cast<std::size_t>(Surface::parking_bay)].reflectivity =
+        materials.of(Surface::asphalt).reflectivity;
+  }
+  draw_pile(materials, Surface::grass, 0.0, 0.09, random);
+  draw_pile(materials, Surface::leaves, 0.0, 0.25, random);
+  draw_pile(materials, Surface::hedge, 0.02, 0.3, random);
+  draw_pile(materials, Surface::gravel, 0.0, 0.03, random);
+  draw_pile(materials, Surface::cloth, 0.0, 0.03, random);
+  draw_pile(materials, Surface::bark, 0.0, 0.04, random);
+  draw_lost(materials, Surface::window, 0.1, 0.9, random);
+  draw_lost(materials, Surface::glass, 0.3, 0.95, random);
+  draw_lost(materials, Surface::tyre, 0.0, 0.5, random);
+  draw_lost(materials, Surface::fence_mesh, 0.0, 0.4, random);
+  if (random.chance(0.15)) wet(materials, random);
+  materials.lost_in_panes = true;
+  materials.patchiness = random.uniform(0.0, 0.6);
+  materials.patch_m = random.uniform(2.0, 12.0);
+  return materials;
+}
+
+}  // namespace stillmap

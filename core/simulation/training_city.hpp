@@ -1,0 +1,22 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "core/simulation/simulation.hpp"
+
+namespace stillmap {
+
+/// A small city of no particular place: streets, slopes, blocks, traffic and what stands about are
+/// all drawn, and rare things (two-wheelers, buses, signs) are more frequent than in life.
+[[nodiscard]] CityPlan training_plan(Random random);
+
+/// A drive for training: `training_plan`, drawn materials, and a drawn lidar with drawn flaws
+/// (60 % HDL-64E, 20 % VLP-16, 10 % HDL-32E, 10 % sensors that nobody builds). The same seed gives
+/// the same drive.
+[[nodiscard]] SimulationConfig training_drive(std::uint64_t seed);
+
+/// Up to `count` scans of the drive, spread over the route and at least 8 m apart.
+[[nodiscard]] std::vector<int> spread_scans(const Simulation& drive, int count);
+
+}  // namespace stillmap

@@ -1,0 +1,130 @@
+#include "core/simulation/lidar_flaws.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "core/simulation/simulation.hpp"
+
+namespace stillmap {
+namespace {
+
+SimulationConfig clean_yard() {
+  SimulationConfig config;
+  config.plan = test_yard();
+  config.sensor = vlp_16();
+  config.scans = 3;
+  config.noise = {.range_sigma_m = 0, .drop_share = 0, .intensity_sigma = 0, .weakest_return = 0};
+  return config;
+}
+
+TEST(LidarFlaws, NoneChangeNothing) {
+  const LidarFlaws none;
+  EXPECT_EQ(none.beam(5).gain, 1.0);
+  EXPECT_FALSE(none.is_blind(1.0, -0.2, 5));
+  for (const float intensity : {0.0F, 0.3F, 1.0F}) {
+    EXPECT_FLOAT_EQ(none.reported_intensity(intensity, 5), intensity);
+  }
+}
+
+TEST(LidarFlaws, BeamErrorsTiltTheBeams) {
+  SimulationConfig config = clean_yard();
+  config.flaws.beams.assign(16, {});
+  config.flaws.beams[15].elevation_error = 0.02;
+  const Scan scan = Simulation(config).scan(0).scan;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const Eigen::Vector3f& p = scan.points_lidar[i];
+    const double error = scan.ring[i] == 15 ? 0.02 : 0.0;
+    EXPECT_NEAR(std::atan2(p.z(), p.head<2>().norm()),
+                config.sensor.beam_elevation(scan.ring[i]) + error, 1e-4);
+  }
+}
+
+TEST(LidarFlaws, RaisedBeamsSeeTheSameGround) {
+  SimulationConfig config = clean_yard();
+  const auto lowest = [](const SimulatedScan& out) {
+    double sum = 0.0;
+    int count = 0;
+    for (std::size_t i = 0; i < out.scan.size(); ++i) {
+      if (out.scan.labels[i] != SemanticClass::road || out.scan.ring[i] != 15) continue;
+      sum += static_cast<double>(out.scan.points_lidar[i].z());
+      ++count;
+    }
+    return sum / count;
+  };
+  const double plain = lowest(Simulation(config).scan(0));
+  config.flaws.beams.assign(16, {.height_m = 0.2});
+  EXPECT_NEAR(lowest(Simulation(config).scan(0)), plain, 0.03);
+}
+
+TEST(LidarFlaws, BlindSpotsAreEmptyAndTheRestIsNot) {
+  SimulationConfig config = clean_yard();
+  config.flaws.blind_spots = {
+      {.azimuth = 1.0, .elevation = -0.2, .half_width = 0.4, .half_height = 0.1}};
+  const Scan scan = Simulation(config).scan(0).scan;
+  int inside = 0, beside = 0;
+  for (const Eigen::Vector3f& p : scan.points_lidar) {
+    const double elevation = std::atan2(p.z(), p.head<2>().norm());
+    if (std::abs(elevation + 0.2) > 0.03) continue;
+    const double azimuth = std::atan2(p.y(), p.x());
+    inside += std::abs(azimuth - 1.0) < 0.25 ? 1 : 0;
+    beside += std::abs(azimuth + 1.0) < 0.25 ? 1 : 0;
+  }
+  EXPECT_EQ(inside, 0);
+  EXPECT_GT(beside, 50);
+}
+
+TEST(LidarFlaws, IntensityIsMappedAndRounded) {
+  LidarFlaws flaws;
+  flaws.intensity_gain = 0.5;
+  flaws.intensity_gamma = 2.0;
+  flaws.intensity_offset = 0.1;
+  EXPECT_FLOAT_EQ(flaws.reported_intensity(0.4F, 0), 0.18F);
+  flaws.intensity_step = 0.05;
+  EXPECT_FLOAT_EQ(flaws.reported_intensity(0.4F, 0), 0.2F);
+  flaws.intensity_offset = -0.5;
+  EXPECT_EQ(flaws.reported_intensity(0.4F, 0), 0.0F);
+}
+
+TEST(LidarFlaws, MixedReturnsLieBetweenTheSurfaces) {
+  SimulationConfig config = clean_yard();
+  const SimulatedScan clean = Simulation(config).scan(0);
+  config.flaws.mixed_share = 1.0;
+  const SimulatedScan mixed = Simulation(config).scan(0);
+  ASSERT_EQ(mixed.scan.size(), clean.scan.size());
+  int changed = 0;
+  for (std::size_t i = 0; i + 1 < clean.scan.size(); ++i) {
+    const float before = clean.scan.points_lidar[i].norm();
+    const float now = mixed.scan.points_lidar[i].norm();
+    if (std::abs(now - before) < 1e-3F) continue;
+    const float next = clean.scan.points_lidar[i + 1].norm();
+    EXPECT_GE(now, std::min(before, next) - 1e-3F);
+    EXPECT_LE(now, std::max(before, next) + 1e-3F);
+    ++changed;
+  }
+  EXPECT_GT(changed, 50);
+}
+
+TEST(LidarFlaws, DrawnOnesFitTheirSensor) {
+  for (std::uint64_t seed = 0; seed < 100; ++seed) {
+    for (const SensorModel& sensor : {hdl_64e(), hdl_32e(), vlp_16()}) {
+      const LidarFlaws flaws = drawn_flaws(sensor, Random(seed));
+      EXPECT_EQ(flaws.faults(sensor), "");
+      EXPECT_EQ(flaws.beams.size(), static_cast<std::size_t>(sensor.rings));
+    }
+  }
+}
+
+TEST(LidarFlaws, NamesItsFaults) {
+  SimulationConfig config = clean_yard();
+  config.flaws.beams.assign(3, {});
+  config.flaws.mixed_share = 2.0;
+  config.flaws.intensity_gain = 0.0;
+  const std::string faults = config.faults();
+  for (const char* field : {"beams", "mixed_share", "intensity_gain"}) {
+    EXPECT_THAT(faults, testing::HasSubstr(field));
+  }
+}
+
+}  // namespace
+}  // namespace stillmap

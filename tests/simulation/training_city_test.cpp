@@ -1,0 +1,151 @@
+#include "core/simulation/training_city.hpp"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+
+namespace stillmap {
+namespace {
+
+constexpr std::uint64_t first_seed = 4000;
+
+// Fewer firings: the same things are seen, sooner.
+SimulationConfig quick_drive(std::uint64_t seed) {
+  SimulationConfig config = training_drive(seed);
+  config.firings = 500;
+  return config;
+}
+
+TEST(TrainingPlan, IsWithoutFaultWhateverIsDrawn) {
+  for (std::uint64_t seed = 0; seed < 3000; ++seed) {
+    ASSERT_EQ(training_drive(seed).faults(), "") << seed;
+  }
+}
+
+TEST(TrainingPlan, VariesEverything) {
+  std::set<int> lanes;
+  std::map<std::string, int> sensors;
+  int without_sidewalk = 0, without_kerb = 0, sloped = 0, with_car_park = 0;
+  constexpr int drives = 600;
+  for (std::uint64_t seed = 0; seed < drives; ++seed) {
+    const SimulationConfig drive = training_drive(seed);
+    lanes.insert(drive.plan.route_profile.lanes);
+    ++sensors[drive.sensor.name];
+    without_sidewalk += drive.plan.route_profile.sidewalk_m == 0.0 ? 1 : 0;
+    without_kerb += drive.plan.kerb_m == 0.0 ? 1 : 0;
+    sloped += drive.plan.embankment_m > 1.0 ? 1 : 0;
+    with_car_park += drive.plan.patches.empty() ? 0 : 1;
+  }
+  EXPECT_EQ(lanes, (std::set{1, 2, 3}));
+  EXPECT_NEAR(sensors["HDL-64E"], 0.6 * drives, 0.08 * drives);
+  EXPECT_NEAR(sensors["VLP-16"], 0.2 * drives, 0.06 * drives);
+  EXPECT_NEAR(sensors["HDL-32E"], 0.1 * drives, 0.05 * drives);
+  EXPECT_EQ(sensors.size(), 4U);
+  for (const int count : {without_sidewalk, without_kerb, sloped, with_car_park}) {
+    EXPECT_GT(count, drives / 20);
+    EXPECT_LT(count, drives);
+  }
+}
+
+TEST(TrainingDrive, SameSeedGivesTheSameBits) {
+  const SimulatedScan a = Simulation(quick_drive(first_seed)).scan(40);
+  const SimulatedScan b = Simulation(quick_drive(first_seed)).scan(40);
+  EXPECT_EQ(a.scan.points_lidar, b.scan.points_lidar);
+  EXPECT_EQ(a.scan.intensity, b.scan.intensity);
+  EXPECT_EQ(a.raw_labels, b.raw_labels);
+  EXPECT_NE(a.scan.points_lidar,
+            Simulation(quick_drive(first_seed + 1)).scan(40).scan.points_lidar);
+}
+
+TEST(TrainingDrive, ScansAreFarApartAndAsManyAsWanted) {
+  for (std::uint64_t seed = first_seed; seed < first_seed + 4; ++seed) {
+    const Simulation drive(quick_drive(seed));
+    const std::vector<int> scans = spread_scans(drive, 8);
+    ASSERT_EQ(scans.size(), 8U) << seed;
+    for (std::size_t i = 1; i < scans.size(); ++i) {
+      const double period_s = drive.config().sensor.period_s;
+      const Eigen::Vector3d step = drive.T_map_lidar_at(scans[i] * period_s).translation() -
+                                   drive.T_map_lidar_at(scans[i - 1] * period_s).translation();
+      // Along the way it is 8 m; a turn lies between some.
+      EXPECT_GT(step.norm(), 4.0) << seed;
+    }
+  }
+}
+
+/// Some scans of several cities.
+class TrainingScans : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    scans_ = new std::vector<SimulatedScan>;
+    heights_m_ = new std::vector<double>;
+    for (std::uint64_t seed = first_seed; seed < first_seed + cities; ++seed) {
+      const Simulation drive(quick_drive(seed));
+      for (const int index : spread_scans(drive, 4)) {
+        scans_->push_back(drive.scan(index));
+        heights_m_->push_back(drive.config().lidar_height_m);
+      }
+    }
+  }
+  static void TearDownTestSuite() {
+    delete scans_;
+    delete heights_m_;
+  }
+
+  static constexpr std::uint64_t cities = 16;
+  static std::vector<SimulatedScan>* scans_;
+  static std::vector<double>* heights_m_;
+};
+std::vector<SimulatedScan>* TrainingScans::scans_ = nullptr;
+std::vector<double>* TrainingScans::heights_m_ = nullptr;
+
+TEST_F(TrainingScans, ShowEveryClass) {
+  std::map<SemanticClass, int> seen;
+  for (const SimulatedScan& scan : *scans_) {
+    for (const SemanticClass label : scan.scan.labels) ++seen[label];
+  }
+  for (std::size_t label = 0; label < semantic_class_count; ++label) {
+    const auto one = static_cast<SemanticClass>(label);
+    EXPECT_GT(seen[one], 200) << name(one);
+  }
+}
+
+TEST_F(TrainingScans, AreSaneInEveryPoint) {
+  for (const SimulatedScan& scan : *scans_) {
+    ASSERT_GT(scan.scan.size(), 1500U);
+    for (std::size_t i = 0; i < scan.scan.size(); ++i) {
+      ASSERT_TRUE(scan.scan.points_lidar[i].allFinite());
+      ASSERT_GE(scan.scan.intensity[i], 0.0F);
+      ASSERT_LE(scan.scan.intensity[i], 1.0F);
+      ASSERT_EQ(scan.raw_labels[i] >> 16U != 0, is_movable(scan.scan.labels[i]));
+    }
+  }
+}
+
+// Lowest and highest of the points within 12 m, over the ground under the lidar.
+std::pair<float, float> heights_of(const SimulatedScan& scan, double lidar_height_m,
+                                   SemanticClass label) {
+  std::pair<float, float> out{0.0F, 0.0F};
+  for (std::size_t i = 0; i < scan.scan.size(); ++i) {
+    if (scan.scan.labels[i] != label || scan.scan.points_lidar[i].norm() > 12.0F) continue;
+    const Eigen::Vector3d up = scan.T_map_lidar.linear() * scan.scan.points_lidar[i].cast<double>();
+    const auto height = static_cast<float>(up.z() + lidar_height_m);
+    out = {std::min(out.first, height), std::max(out.second, height)};
+  }
+  return out;
+}
+
+TEST_F(TrainingScans, RoadsLieBelowAndPeopleAreAsTallAsPeople) {
+  for (std::size_t i = 0; i < scans_->size(); ++i) {
+    const SimulatedScan& scan = (*scans_)[i];
+    const double height_m = (*heights_m_)[i];
+    const auto road = heights_of(scan, height_m, SemanticClass::road);
+    EXPECT_GT(road.first, -1.6F);
+    EXPECT_LT(road.second, 1.6F);
+    EXPECT_LT(heights_of(scan, height_m, SemanticClass::person).second, 4.0F);
+  }
+}
+
+}  // namespace
+}  // namespace stillmap
