@@ -33,14 +33,22 @@ std::uint64_t ConfusionMatrix::total() const {
 }
 
 std::optional<double> ConfusionMatrix::iou(SemanticClass label) const {
-  const std::size_t k = index(label);
-  std::uint64_t seen_or_predicted = 0;
-  for (std::size_t other = 0; other < semantic_class_count; ++other) {
-    seen_or_predicted += counts_[k][other];
-    if (other != k) seen_or_predicted += counts_[other][k];
+  return iou(std::span(&label, 1));
+}
+
+std::optional<double> ConfusionMatrix::iou(std::span<const SemanticClass> group) const {
+  std::uint64_t seen = 0, predicted = 0, hits = 0;
+  for (const SemanticClass label : group) {
+    const std::size_t k = index(label);
+    for (std::size_t other = 0; other < semantic_class_count; ++other) {
+      seen += counts_[k][other];
+      predicted += counts_[other][k];
+    }
+    for (const SemanticClass other : group) hits += counts_[k][index(other)];
   }
+  const std::uint64_t seen_or_predicted = seen + predicted - hits;
   if (seen_or_predicted == 0) return std::nullopt;
-  return static_cast<double>(counts_[k][k]) / static_cast<double>(seen_or_predicted);
+  return static_cast<double>(hits) / static_cast<double>(seen_or_predicted);
 }
 
 double ConfusionMatrix::mean_iou() const {

@@ -22,6 +22,8 @@ class ConfusionMatrix {
 
   /// TP / (TP + FP + FN); nothing for a class that was neither seen nor predicted.
   [[nodiscard]] std::optional<double> iou(SemanticClass label) const;
+  /// The same, with the classes of the group taken for one. They are all different.
+  [[nodiscard]] std::optional<double> iou(std::span<const SemanticClass> group) const;
   /// Mean over all 19 classes; one that never occurs counts 0, as in semantic-kitti-api.
   [[nodiscard]] double mean_iou() const;
   /// Mean over the classes that were seen or predicted; nothing when there are none.

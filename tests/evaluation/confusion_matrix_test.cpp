@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <stdexcept>
 #include <vector>
+
+#include "core/evaluation/class_groups.hpp"
 
 namespace stillmap {
 namespace {
@@ -27,6 +31,22 @@ TEST(ConfusionMatrix, CountsHitsMissesAndFalseAlarms) {
   EXPECT_DOUBLE_EQ(matrix.iou(car).value(), 2.0 / 4.0);
   EXPECT_DOUBLE_EQ(matrix.iou(road).value(), 0.0);
   EXPECT_DOUBLE_EQ(matrix.accuracy().value(), 0.5);
+}
+
+TEST(ConfusionMatrix, TakesTheClassesOfAGroupForOne) {
+  ConfusionMatrix matrix;
+  matrix.add(Classes{car, truck, car, road}, Classes{truck, car, road, car});
+  const std::array vehicles{car, truck};
+  EXPECT_DOUBLE_EQ(matrix.iou(vehicles).value(), 2.0 / 4.0);
+}
+
+TEST(CoarseGroups, HoldEveryClassOnce) {
+  std::array<int, semantic_class_count> times{};
+  for (const ClassGroup& group : coarse_groups()) {
+    for (const SemanticClass label : group.classes) times[static_cast<std::size_t>(label)] += 1;
+  }
+  EXPECT_EQ(times[0], 0);
+  EXPECT_EQ(std::count(times.begin() + 1, times.end(), 1), 19);
 }
 
 TEST(ConfusionMatrix, LeavesUnlabeledTruthOutButCountsUnlabeledPredictionsAsMisses) {
