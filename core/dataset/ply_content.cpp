@@ -59,7 +59,9 @@ void take_line(const std::filesystem::path& file, const Words& words, CloudConte
   }
 }
 
-CloudContent ply_header(const std::filesystem::path& file, std::istream& in) {
+}  // namespace
+
+CloudContent read_ply_header(const std::filesystem::path& file, std::istream& in) {
   std::string line;
   if (!std::getline(in, line) || words_of(line) != Words{"ply"}) {
     throw DatasetError(file, "does not begin with \"ply\"; the file is of another kind");
@@ -75,12 +77,10 @@ CloudContent ply_header(const std::filesystem::path& file, std::istream& in) {
   throw DatasetError(file, "has no \"end_header\"; the file is damaged");
 }
 
-}  // namespace
-
 CloudContent read_ply_content(const std::filesystem::path& file) {
   static_cast<void>(scan_file_size(file));
   std::ifstream in(file, std::ios::binary);
-  CloudContent content = ply_header(file, in);
+  CloudContent content = read_ply_header(file, in);
   content.body.assign(std::istreambuf_iterator<char>(in), {});
   if (content.encoding == "ascii") {
     check_room(file, content,

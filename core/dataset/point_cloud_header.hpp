@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <iosfwd>
 #include <string>
 #include <vector>
 
@@ -32,6 +33,9 @@ struct CloudContent {
 };
 
 [[nodiscard]] CloudContent read_pcd_content(const std::filesystem::path& file);
+
+/// A PLY file's header, read up to the first point; `body` stays empty.
+[[nodiscard]] CloudContent read_ply_header(const std::filesystem::path& file, std::istream& in);
 
 /// Of a PLY file whose first element is `vertex`; other elements stay in the body, unread.
 [[nodiscard]] CloudContent read_ply_content(const std::filesystem::path& file);

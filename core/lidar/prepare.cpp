@@ -86,30 +86,28 @@ class ScrewMotion {
 
 }  // namespace
 
-Scan drop_unusable_points(Scan scan, const PrepareConfig& config) {
+std::vector<std::uint32_t> usable_points(const Scan& scan, const PrepareConfig& config) {
   const Usable usable(config);
-  std::size_t kept = 0;
-  const auto move_down = [&kept](auto& values, std::size_t from) {
-    if (!values.empty()) values[kept] = values[from];
-  };
-  const std::size_t points = scan.size();
-  for (std::size_t i = 0; i < points; ++i) {
-    if (!usable(scan.points_lidar[i])) continue;
-    move_down(scan.points_lidar, i);
-    move_down(scan.intensity, i);
-    move_down(scan.time_offset_s, i);
-    move_down(scan.ring, i);
-    move_down(scan.labels, i);
-    ++kept;
+  std::vector<std::uint32_t> indices;
+  indices.reserve(scan.size());
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    if (usable(scan.points_lidar[i])) indices.push_back(static_cast<std::uint32_t>(i));
   }
-  const auto cut = [kept](auto& values) {
-    if (!values.empty()) values.resize(kept);
+  return indices;
+}
+
+Scan drop_unusable_points(Scan scan, const PrepareConfig& config) {
+  const std::vector<std::uint32_t> kept = usable_points(scan, config);
+  const auto keep = [&kept](auto& values) {
+    if (values.empty()) return;
+    for (std::size_t i = 0; i < kept.size(); ++i) values[i] = values[kept[i]];
+    values.resize(kept.size());
   };
-  cut(scan.points_lidar);
-  cut(scan.intensity);
-  cut(scan.time_offset_s);
-  cut(scan.ring);
-  cut(scan.labels);
+  keep(scan.points_lidar);
+  keep(scan.intensity);
+  keep(scan.time_offset_s);
+  keep(scan.ring);
+  keep(scan.labels);
   std::ranges::transform(scan.intensity, scan.intensity.begin(), repaired_intensity);
   return scan;
 }

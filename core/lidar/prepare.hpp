@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstdint>
+#include <vector>
 
 #include "core/lidar/scan.hpp"
 
@@ -14,6 +16,10 @@ struct PrepareConfig {
   /// Undo the motion during the revolution when points carry their time.
   bool compensate_motion = true;
 };
+
+/// Indices of the points that drop_unusable_points() keeps, in the scan's order.
+[[nodiscard]] std::vector<std::uint32_t> usable_points(const Scan& scan,
+                                                       const PrepareConfig& config);
 
 /// The scan without points that are not finite, too near, too far or on the robot itself. All
 /// per-point vectors stay aligned.

@@ -174,5 +174,15 @@ TEST(CompensateMotion, LeavesPointsOfBrokenClocksWhereTheyAre) {
   EXPECT_EQ(compensate_motion(scan, T, 0.1).points_lidar, scan.points_lidar);
 }
 
+TEST(UsablePoints, AreThoseThatAreKept) {
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  Scan scan;
+  scan.points_lidar = {{0.1F, 0, 0}, {5, 0, 0}, {nan, 0, 0}, {0, 7, 0}, {500, 0, 0}};
+  const std::vector<std::uint32_t> indices = usable_points(scan, PrepareConfig{});
+  EXPECT_EQ(indices, (std::vector<std::uint32_t>{1, 3}));
+  EXPECT_EQ(drop_unusable_points(scan, PrepareConfig{}).points_lidar,
+            (std::vector<Eigen::Vector3f>{{5, 0, 0}, {0, 7, 0}}));
+}
+
 }  // namespace
 }  // namespace stillmap
