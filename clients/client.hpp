@@ -11,9 +11,11 @@
 #include <vector>
 
 #include "clients/subscription.hpp"
+#include "core/lidar/scan.hpp"
 #include "core/map/map_query.hpp"
 #include "core/map/tile.hpp"
 #include "core/odometry/trajectory.hpp"
+#include "idl/conversions/cloud_to_scan.hpp"
 #include "idl/dds/dds_options.hpp"
 #include "idl/map_identity.hpp"
 #include "idl/server_status.hpp"
@@ -118,6 +120,17 @@ class Client {
   /// As subscribe_tiles, without the voxels.
   [[nodiscard]] Subscription subscribe_tile_index(
       std::function<void(const MapIdentity&, const TileInfo&)> info_arrived);
+
+  /// Scans of the sensor's topic (ROS 2 name), as the server gets them; those that cannot be read
+  /// are passed over. `delivery` is the server's: with `every`, a lossless sender waits for this
+  /// subscription, too.
+  [[nodiscard]] Subscription subscribe_points(const std::string& ros_topic, DeliveryMode delivery,
+                                              const wire::CloudReading& reading,
+                                              std::function<void(const Scan&)> scan_arrived);
+  /// Prepared scans with the classes that the server gave them: the usable points only,
+  /// motion-compensated, in the order of the sensor's scan of the same stamp. Best effort.
+  [[nodiscard]] Subscription subscribe_labelled_scans(
+      std::function<void(const Scan&)> scan_arrived);
 
  private:
   struct Connection;

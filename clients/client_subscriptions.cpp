@@ -6,6 +6,7 @@
 #include "idl/conversions/pose.hpp"
 #include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"
+#include "sensor_msgs.h"
 
 namespace stillmap {
 namespace {
@@ -42,6 +43,29 @@ Subscription subscribe(Participant& participant, const TopicSpec<T>& topic,
 }
 
 }  // namespace
+
+Subscription Client::subscribe_points(const std::string& ros_topic, DeliveryMode delivery,
+                                      const wire::CloudReading& reading,
+                                      std::function<void(const Scan&)> scan_arrived) {
+  constexpr int scans_waiting = 10;
+  return subscribe<sensor_msgs::msg::PointCloud2>(
+      connection_->participant, points_topic(ros_topic, delivery, scans_waiting),
+      [reading, arrived = std::move(scan_arrived)](const sensor_msgs::msg::PointCloud2& message) {
+        const auto read = wire::to_scan(message, reading);
+        if (read.scan) arrived(*read.scan);
+      });
+}
+
+Subscription Client::subscribe_labelled_scans(std::function<void(const Scan&)> scan_arrived) {
+  TopicSpec<sensor_msgs::msg::PointCloud2> topic = connection_->topics.scan;
+  topic.reader.depth = 10;
+  return subscribe<sensor_msgs::msg::PointCloud2>(
+      connection_->participant, topic,
+      [arrived = std::move(scan_arrived)](const sensor_msgs::msg::PointCloud2& message) {
+        const auto read = wire::to_scan(message, {.fields = {}, .labels_are_classes = true});
+        if (read.scan) arrived(*read.scan);
+      });
+}
 
 Subscription Client::subscribe_odometry(std::function<void(const OdometryUpdate&)> pose_arrived) {
   return subscribe<nav_msgs::msg::Odometry>(

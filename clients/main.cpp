@@ -23,6 +23,9 @@ void add_commands(stillmap::CommandHandle program, stillmap::Action& action) {
   stillmap::add_reset_command(program, action);
   stillmap::add_evaluate_command(program, action);
   stillmap::add_simulate_command(program, action);
+  stillmap::add_simulate_training_command(program, action);
+  stillmap::add_dataset_command(program, action);
+  stillmap::add_model_command(program, action);
 }
 
 }  // namespace

@@ -5,8 +5,11 @@
 #include <vector>
 
 #include "config/class_names.hpp"
+#include "config/int8_file.hpp"
+#include "config/model_folder.hpp"
 #include "config/yaml_section.hpp"
 #include "core/segmentation/network_labels.hpp"
+#include "core/segmentation/stream_first_labels.hpp"
 #include "core/segmentation/stream_labels.hpp"
 
 namespace stillmap {
@@ -20,6 +23,7 @@ void read_image(YamlSection section, ModelDescription& model) {
   section.whole("columns", model.columns, {1, 8192});
   section.degrees("fov_up_deg", model.fov_up, {-90, 90});
   section.degrees("fov_down_deg", model.fov_down, {-90, 90});
+  section.flag("follow_sensor", model.follow_sensor);
   section.flag("mask_first_point", model.mask_first_point);
 }
 
@@ -84,6 +88,12 @@ void read_model(YamlSection file, ModelDescription& model) {
   if (model.fov_up <= model.fov_down) file.fault("image", "fov_down_deg must be below fov_up_deg");
 }
 
+std::unique_ptr<LabelSource> open_network_labels(const LabelsConfig& labels,
+                                                 const SensorModel& sensor) {
+  const ModelDescription model = load_model_description(find_model(labels.model));
+  return open_model(for_sensor(model, sensor), labels.engine);
+}
+
 }  // namespace
 
 ModelDescription load_model_description(const fs::path& folder) {
@@ -96,13 +106,17 @@ ModelDescription load_model_description(const fs::path& folder) {
   model.network_file = folder / "model.onnx";
   read_model(YamlSection(yaml), model);
   yaml.require_no_faults();
+  model.int8 = load_int8_calibration(folder / "int8.yaml");
   return model;
 }
 
-std::unique_ptr<LabelSource> open_label_source(const LabelsConfig& labels) {
+std::unique_ptr<LabelSource> open_label_source(const LabelsConfig& labels,
+                                               const SensorModel& sensor) {
   switch (labels.source) {
+    case LabelOrigin::automatic:
+      return std::make_unique<StreamFirstLabels>(open_network_labels(labels, sensor));
     case LabelOrigin::model:
-      return open_model(load_model_description(labels.model));
+      return open_network_labels(labels, sensor);
     case LabelOrigin::stream:
       return std::make_unique<StreamLabels>();
     case LabelOrigin::none:

@@ -10,11 +10,13 @@
 
 namespace stillmap {
 
-/// Reads model.yaml of a model folder; the network is model.onnx beside it. Throws ConfigError
-/// with every fault.
+/// Reads model.yaml of a model folder, and int8.yaml where it is; the network is model.onnx beside
+/// them. Throws ConfigError with every fault.
 [[nodiscard]] ModelDescription load_model_description(const std::filesystem::path& folder);
 
-/// The label source that the configuration asks for. Throws ConfigError or ModelError.
-[[nodiscard]] std::unique_ptr<LabelSource> open_label_source(const LabelsConfig& labels);
+/// The label source that the configuration asks for, for scans of this sensor. Throws ConfigError
+/// or ModelError.
+[[nodiscard]] std::unique_ptr<LabelSource> open_label_source(const LabelsConfig& labels,
+                                                             const SensorModel& sensor);
 
 }  // namespace stillmap

@@ -23,15 +23,33 @@ void read_sensor_name(YamlSection& file, const fs::path& folder, SensorModel& se
   }
 }
 
+// A bare name stays one; a path starts at the file's folder.
+void read_model_name(YamlSection& section, fs::path& model) {
+  std::string name = model.string();
+  section.text("model", name);
+  if (name.empty()) section.fault("model", "is empty; give a model's name or folder");
+  if (name == model) return;
+  model = name;
+  if (model.has_parent_path()) section.path("model", model);
+}
+
 void read_labels(YamlSection section, LabelsConfig& labels) {
   section.choice<LabelOrigin>("source", labels.source,
-                              {{"stream", LabelOrigin::stream},
+                              {{"auto", LabelOrigin::automatic},
+                               {"stream", LabelOrigin::stream},
                                {"model", LabelOrigin::model},
                                {"none", LabelOrigin::none}});
-  section.path("model", labels.model);
-  if (labels.source == LabelOrigin::model && labels.model.empty()) {
-    section.fault("model", "is empty, but source is 'model'; give the model's folder");
-  }
+  read_model_name(section, labels.model);
+  using Engine = EngineChoice::Engine;
+  section.choice<Engine>(
+      "engine", labels.engine.engine,
+      {{"auto", Engine::automatic}, {"onednn", Engine::onednn}, {"opencv", Engine::opencv}});
+  using Numbers = EngineChoice::Numbers;
+  section.choice<Numbers>(
+      "precision", labels.engine.precision,
+      {{"auto", Numbers::automatic}, {"fp32", Numbers::fp32}, {"int8", Numbers::int8}});
+  section.whole("threads", labels.engine.threads, {0, 1024});
+  section.whole("budget_ms", labels.budget_ms, {0, 60'000});
 }
 
 void read_frames(YamlSection section, FramesConfig& frames) {

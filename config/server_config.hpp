@@ -9,11 +9,14 @@
 #include "config/config_report.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/mapper.hpp"
+#include "core/segmentation/open_network.hpp"
 
 namespace stillmap {
 
 /// Where the class of a point comes from.
 enum class LabelOrigin {
+  /// The label field of the incoming cloud where it is there, else the network.
+  automatic,
   /// The label field of the incoming cloud where it is there, else none.
   stream,
   /// A network, `LabelsConfig::model`.
@@ -23,9 +26,14 @@ enum class LabelOrigin {
 };
 
 struct LabelsConfig {
-  LabelOrigin source = LabelOrigin::stream;
-  /// Folder with model.onnx and model.yaml; used when source is `model`.
-  std::filesystem::path model;
+  LabelOrigin source = LabelOrigin::automatic;
+  /// Name of a model that comes with Stillmap, or folder of one; see find_model().
+  std::filesystem::path model = "street";
+  /// What runs the network.
+  EngineChoice engine;
+  /// Longest wait of a scan for the network's labels; then it goes on with labels carried from the
+  /// map and earlier scans. 0: as long as it takes, as with input delivery `every`.
+  std::uint32_t budget_ms = 60;
 };
 
 /// Names of the coordinate frames in everything that is published.

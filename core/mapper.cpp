@@ -24,8 +24,13 @@ MapperConfig checked(const MapperConfig& config) {
 
 Mapper::Mapper(const MapperConfig& config, std::unique_ptr<LabelSource> label_source,
                StageListener stage_ended)
+    : Mapper(config, std::make_unique<PatientFeed>(std::move(label_source)),
+             std::move(stage_ended)) {}
+
+Mapper::Mapper(const MapperConfig& config, std::unique_ptr<LabelFeed> label_feed,
+               StageListener stage_ended)
     : config_(checked(config)),
-      label_source_(std::move(label_source)),
+      label_feed_(std::move(label_feed)),
       stage_ended_(std::move(stage_ended)),
       odometry_(config.odometry, config.sensor),
       static_map_(config.static_map) {}
@@ -40,23 +45,100 @@ std::optional<MappedScan> Mapper::process(
   if (!has_enough_points(scan)) return std::nullopt;
   end_stage("prepare");
 
-  // Class of every point.
-  PointLabels labels = label_source_->label(scan);
-  end_stage("segment");
-
-  // Pose, and what moves.
+  // Class of every point, if it is known in time.
+  LabelFeed::Answer answer = label_feed_->offer(scan);
+  auto own_labels = take_finished(std::move(answer.finished), scan.stamp_ns);
   if (config_.prepare.compensate_motion)
     scan = compensate_motion(std::move(scan), odometry_.motion_during(config_.sensor.period_s),
                              config_.sensor.period_s);
-  Odometry::Step step = odometry_.add(scan, labels, T_map_lidar_prior);
+  Labels known = labels_for(scan, std::move(own_labels),
+                            T_map_lidar_prior.value_or(odometry_.predict(scan.stamp_ns)));
+  end_stage("segment");
+
+  // Pose, and what moves.
+  Odometry::Step step = odometry_.add(scan, known.labels, T_map_lidar_prior);
   end_stage("odometry");
 
   // The static map takes what stands still.
-  MappedScan mapped{step.result, {std::move(scan), std::move(labels), std::move(step.motion)}};
-  static_map_.insert(mapped.labelled, step.result.T_map_lidar);
+  MappedScan mapped{step.result,
+                    known.labelling,
+                    {std::move(scan), std::move(known.labels), std::move(step.motion)}};
+  if (answer.pending) {
+    pending_ = PlacedScan{mapped.labelled, step.result.T_map_lidar};
+  } else {
+    insert(mapped, known.evidence);
+  }
   trajectory_.push_back({mapped.labelled.scan.stamp_ns, step.result.T_map_lidar});
   end_stage("static_map");
   return mapped;
+}
+
+std::optional<PointLabels> Mapper::take_finished(std::vector<ScanLabels> finished,
+                                                 std::int64_t stamp_ns) {
+  std::optional<PointLabels> own;
+  for (auto& [labelled_stamp_ns, labels] : finished) {
+    if (labelled_stamp_ns == stamp_ns) {
+      own = std::move(labels);
+    } else if (pending_ && pending_->labelled.scan.stamp_ns == labelled_stamp_ns) {
+      insert_late(std::move(labels));
+    }
+  }
+  return own;
+}
+
+Mapper::Labels Mapper::labels_for(const Scan& scan, std::optional<PointLabels> own,
+                                  const Eigen::Isometry3d& T_map_lidar_predicted) {
+  if (own && (!own->empty() || !label_feed_->may_skip_scans())) {
+    const auto labelling = own->empty() ? Labelling::none : Labelling::fresh;
+    return {labelling, *std::move(own), std::nullopt};
+  }
+  if (last_labelled_ && !last_view_) {
+    const LabelledScan& last = last_labelled_->labelled;
+    last_view_.emplace(last.scan, last.labels, last_labelled_->T_map_lidar, config_.sensor);
+  }
+  CarriedLabels carried = carry_labels(scan, T_map_lidar_predicted, static_map_, last_view_);
+  if (std::ranges::count(carried.carrier, LabelCarrier::nothing) == std::ssize(carried.carrier)) {
+    return {};
+  }
+  PointLabels evidence = new_evidence(carried);
+  return {Labelling::carried, std::move(carried.labels), std::move(evidence)};
+}
+
+void Mapper::insert(const MappedScan& mapped, const std::optional<PointLabels>& evidence) {
+  const LabelledScan& labelled = mapped.labelled;
+  const Eigen::Isometry3d& T_map_lidar = mapped.odometry.T_map_lidar;
+  if (mapped.labelling == Labelling::carried) {
+    LabelledScan known{labelled.scan, *evidence, labelled.motion};
+    // What nobody knows may be a mover that came into sight: it makes no voxels.
+    for (std::size_t i = 0; i < known.motion.size(); ++i) {
+      if (known.label(i) == SemanticClass::unlabeled) known.motion[i] = Motion::highly_dynamic;
+    }
+    static_map_.insert(known, T_map_lidar);
+    return;
+  }
+  // Where labels are on their way, a scan without any is not worth the movers in it.
+  if (mapped.labelling == Labelling::none && pending_) return;
+  static_map_.insert(labelled, T_map_lidar);
+  if (mapped.labelling == Labelling::fresh && label_feed_->may_skip_scans()) {
+    last_labelled_ = PlacedScan{labelled, T_map_lidar};
+    last_view_.reset();
+  }
+}
+
+void Mapper::insert_late(PointLabels labels) {
+  PlacedScan late = *std::exchange(pending_, std::nullopt);
+  late.labelled.labels = std::move(labels);
+  LabelledScan& labelled = late.labelled;
+  // Whether it moved was not asked with these labels: no movable thing makes voxels.
+  for (std::size_t i = 0; i < labelled.motion.size(); ++i) {
+    const bool movable = is_movable(labelled.label(i));
+    if (labelled.motion[i] == Motion::highly_dynamic && movable) continue;
+    labelled.motion[i] = movable ? Motion::semi_static : Motion::stationary;
+  }
+  static_map_.insert(labelled, late.T_map_lidar);
+  if (labelled.labels.empty()) return;
+  last_labelled_ = std::move(late);
+  last_view_.reset();
 }
 
 bool Mapper::accepts(const Scan& scan) {
@@ -97,6 +179,9 @@ void Mapper::restore(const MapView& view) { static_map_.restore(view); }
 void Mapper::reset(std::uint64_t map_id) {
   odometry_.reset();
   static_map_.reset(map_id);
+  pending_.reset();
+  last_labelled_.reset();
+  last_view_.reset();
   trajectory_.clear();
 }
 

@@ -6,14 +6,15 @@
 #include <string>
 #include <string_view>
 
+#include "core/label_feed.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/lidar/sensor_model.hpp"
+#include "core/map/carried_labels.hpp"
 #include "core/map/static_map.hpp"
 #include "core/odometry/odometry.hpp"
 #include "core/odometry/odometry_state.hpp"
 #include "core/odometry/trajectory.hpp"
-#include "core/segmentation/label_source.hpp"
 
 namespace stillmap {
 
@@ -30,6 +31,7 @@ struct MapperConfig {
 /// What became of one scan.
 struct MappedScan {
   OdometryResult odometry;
+  Labelling labelling = Labelling::none;
   /// The prepared scan (lidar frame) with labels and motion of every point.
   LabelledScan labelled;
 };
@@ -46,11 +48,16 @@ struct ScanRejection {
 using StageListener = std::function<void(std::string_view stage)>;
 
 /// The way of a scan through the product: prepare, segment, register, split by motion, map. One
-/// thread calls it; nothing in it waits, reads a clock or owns a thread.
+/// thread calls it; nothing in it waits, reads a clock or owns a thread. With a label source (or a
+/// PatientFeed) the result depends on the scans alone.
 class Mapper {
  public:
   /// Throws std::invalid_argument with `config.faults()`.
   Mapper(const MapperConfig& config, std::unique_ptr<LabelSource> label_source,
+         StageListener stage_ended = {});
+  /// With labels that may come late: scans without their own get carried ones, and late ones still
+  /// tell the map what it is made of.
+  Mapper(const MapperConfig& config, std::unique_ptr<LabelFeed> label_feed,
          StageListener stage_ended = {});
 
   /// Maps one scan. `T_map_lidar_prior` replaces the constant-velocity prediction. A scan that
@@ -60,7 +67,7 @@ class Mapper {
 
   [[nodiscard]] const ScanRejection& last_rejection() const { return last_rejection_; }
   [[nodiscard]] const Trajectory& trajectory() const { return trajectory_; }
-  [[nodiscard]] std::string label_source() const { return label_source_->name(); }
+  [[nodiscard]] std::string label_source() const { return label_feed_->name(); }
   [[nodiscard]] std::shared_ptr<const MapView> map_view() { return static_map_.view(); }
 
   /// Takes over a stored static map; the next scans extend it. The lidar starts at the map's
@@ -76,13 +83,37 @@ class Mapper {
 
   [[nodiscard]] bool accepts(const Scan& scan);
   [[nodiscard]] bool has_enough_points(const Scan& scan);
+  /// What a scan is mapped with.
+  struct Labels {
+    Labelling labelling = Labelling::none;
+    PointLabels labels;
+    /// What they tell the map, where that is less.
+    std::optional<PointLabels> evidence;
+  };
+  [[nodiscard]] Labels labels_for(const Scan& scan, std::optional<PointLabels> own,
+                                  const Eigen::Isometry3d& T_map_lidar_predicted);
+  /// Takes over the labels of earlier scans; returns those of this one.
+  [[nodiscard]] std::optional<PointLabels> take_finished(std::vector<ScanLabels> finished,
+                                                         std::int64_t stamp_ns);
+  void insert_late(PointLabels labels);
+  void insert(const MappedScan& mapped, const std::optional<PointLabels>& evidence);
   void end_stage(std::string_view stage) const;
 
+  struct PlacedScan {
+    LabelledScan labelled;
+    Eigen::Isometry3d T_map_lidar;
+  };
+
   MapperConfig config_;
-  std::unique_ptr<LabelSource> label_source_;
+  std::unique_ptr<LabelFeed> label_feed_;
   StageListener stage_ended_;
   Odometry odometry_;
   StaticMap static_map_;
+  /// Its labels are still to come; the static map takes it with them.
+  std::optional<PlacedScan> pending_;
+  /// The newest scan with labels of its own, and once labels are carried from it, its view.
+  std::optional<PlacedScan> last_labelled_;
+  std::optional<LabelledView> last_view_;
   Trajectory trajectory_;
   ScanRejection last_rejection_;
 };

@@ -5,6 +5,16 @@
 
 namespace stillmap {
 
+std::string every_nth_scan(std::uint32_t n) {
+  if (n <= 1) return "every scan";
+  const bool teen = n % 100 / 10 == 1;
+  const char* ending = "th";
+  if (!teen && n % 10 == 1) ending = "st";
+  if (!teen && n % 10 == 2) ending = "nd";
+  if (!teen && n % 10 == 3) ending = "rd";
+  return "every " + std::to_string(n).append(ending).append(" scan");
+}
+
 std::uint64_t ServerStatus::counter(std::string_view counter_name) const {
   const auto found = std::ranges::find(counters, counter_name, &NamedCounter::name);
   return found == counters.end() ? 0 : found->value;

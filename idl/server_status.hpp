@@ -28,6 +28,22 @@ struct NamedCounter {
   std::uint64_t value = 0;
 };
 
+/// How segmentation keeps up with the scans.
+struct SegmentationStatus {
+  /// Every n-th scan is segmented; those between get labels from the map and the last labelled
+  /// scan.
+  std::uint32_t every = 1;
+  /// Median time of the label source over the last scans; 0 before the first.
+  double network_ms = 0.0;
+  /// Shares of the last scans: with labels of their own, carried ones, none.
+  double fresh_share = 0.0;
+  double carried_share = 0.0;
+  double unlabelled_share = 0.0;
+};
+
+/// "every scan", "every 2nd scan", "every 13th scan"; n >= 1.
+[[nodiscard]] std::string every_nth_scan(std::uint32_t n);
+
 /// How long a stage of the pipeline took over the last scans.
 struct StageLatency {
   std::string stage;
@@ -58,7 +74,9 @@ struct ServerStatus {
   std::uint64_t map_id = 0;
   std::uint64_t tile_count = 0;
   std::uint64_t voxel_count = 0;
-  /// "scans_received", "scans_mapped", and "dropped_<reason>" for every reason that occurred.
+  SegmentationStatus segmentation;
+  /// "scans_received", "scans_mapped", "label_failures" once there are any, and "dropped_<reason>"
+  /// for every reason that occurred.
   std::vector<NamedCounter> counters;
   /// In the order of the pipeline: wait in the queue, its stages, and "total".
   std::vector<StageLatency> latencies;

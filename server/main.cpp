@@ -25,7 +25,11 @@ sigset_t block_stop_signals() {
 
 void serve(const stillmap::ServerConfig& config) {
   const sigset_t signals = block_stop_signals();
-  stillmap::Server server(config, stillmap::open_label_source(config.labels));
+  auto labels = stillmap::open_label_source(config.labels, config.mapper.sensor);
+  if (const std::string details = labels->details(); !details.empty()) {
+    spdlog::info("labels by {}: {}", labels->name(), details);
+  }
+  stillmap::Server server(config, std::move(labels));
   spdlog::info("ready: scans from rt/{}, domain {}", config.topics.points, config.dds.domain_id);
   int signal = 0;
   sigwait(&signals, &signal);

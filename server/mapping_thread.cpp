@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "server/paced_labels.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -42,8 +44,10 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSo
       statistics_(statistics),
       board_(board),
       outputs_(outputs),
-      mapper_(config.mapper, std::move(label_source),
-              [this](std::string_view stage) { stage_ended(stage); }) {
+      mapper_(
+          config.mapper,
+          std::make_unique<PacedLabels>(std::move(label_source), label_budget(config), statistics),
+          [this](std::string_view stage) { stage_ended(stage); }) {
   if (stored && !stored->view.tiles.empty()) {
     mapper_.restore(stored->view);
     board_.begin(mapper_.map_view(), stored->trajectory);
@@ -92,7 +96,7 @@ void MappingThread::map(QueuedScan queued) {
   const bool unlabelled = mapped->labelled.labels.empty();
   board_.add_pose({stamp_ns, mapped->odometry.T_map_lidar}, mapped->odometry.health,
                   unlabelled ? "none" : mapper_.label_source());
-  statistics_.scan_mapped();
+  statistics_.scan_mapped(mapped->labelling);
   statistics_.add_latency("total", milliseconds(Clock::now() - queued.received));
   if (outputs_.scans != nullptr) outputs_.scans->publish(std::move(mapped->labelled), frame);
 }

@@ -47,7 +47,14 @@ std::string ServerReport::reason(const ServerStatus& status) const {
   if (status.health == OdometryHealth::lost) {
     return "the odometry is lost: the last scan does not fit the map";
   }
+  if (const std::string failure = statistics_.last_label_failure(); !failure.empty()) {
+    return "the last scan could not be segmented: " + failure;
+  }
   if (status.received_hz == 0.0) return "no scan for the last seconds";
+  if (status.segmentation.every > 1) {
+    return "segmentation cannot keep the sensor's rate: " +
+           every_nth_scan(status.segmentation.every) + " is segmented, labels are carried between";
+  }
   return lasting_trouble_;
 }
 

@@ -6,6 +6,7 @@ namespace stillmap {
 namespace {
 
 constexpr std::chrono::seconds rate_window{5};
+constexpr std::size_t labelling_window = 100;
 
 }  // namespace
 
@@ -24,17 +25,46 @@ double RateWindow::rate_hz(Clock::time_point now) const {
   return count / std::max(span_s, 1e-3);
 }
 
+void LabellingWindow::add(Labelling labelling) {
+  last_.push_back(labelling);
+  if (last_.size() > labelling_window) last_.pop_front();
+}
+
+double LabellingWindow::share(Labelling labelling) const {
+  if (last_.empty()) return 0.0;
+  return static_cast<double>(std::ranges::count(last_, labelling)) /
+         static_cast<double>(last_.size());
+}
+
 void Statistics::scan_received() {
   const std::scoped_lock lock(mutex_);
   ++received_;
   received_rate_.add(RateWindow::Clock::now());
 }
 
-void Statistics::scan_mapped() {
+void Statistics::scan_mapped(Labelling labelling) {
   const std::scoped_lock lock(mutex_);
+  labellings_.add(labelling);
   ++mapped_;
   mapped_rate_.add(RateWindow::Clock::now());
   last_drop_.clear();
+}
+
+void Statistics::segmenting(std::uint32_t every, double network_ms) {
+  const std::scoped_lock lock(mutex_);
+  segmentation_.every = every;
+  segmentation_.network_ms = network_ms;
+}
+
+void Statistics::labels_failed(const std::string& detail) {
+  const std::scoped_lock lock(mutex_);
+  ++label_failures_;
+  last_label_failure_ = detail;
+}
+
+void Statistics::labels_worked() {
+  const std::scoped_lock lock(mutex_);
+  last_label_failure_.clear();
 }
 
 void Statistics::scans_dropped(const std::string& reason, std::size_t count,
@@ -65,7 +95,14 @@ void Statistics::report_to(ServerStatus& status) const {
   status.mapped_hz = mapped_rate_.rate_hz(now);
   status.counters = {{.name = "scans_received", .value = received_},
                      {.name = "scans_mapped", .value = mapped_}};
+  if (label_failures_ > 0) {
+    status.counters.push_back({.name = "label_failures", .value = label_failures_});
+  }
   status.counters.insert(status.counters.end(), dropped_.begin(), dropped_.end());
+  status.segmentation = segmentation_;
+  status.segmentation.fresh_share = labellings_.share(Labelling::fresh);
+  status.segmentation.carried_share = labellings_.share(Labelling::carried);
+  status.segmentation.unlabelled_share = labellings_.share(Labelling::none);
   status.latencies.clear();
   for (const auto& [stage, window] : latencies_) status.latencies.push_back(window.summary(stage));
 }
@@ -75,9 +112,20 @@ std::uint64_t Statistics::received() const {
   return received_;
 }
 
+double Statistics::receive_period_ms() const {
+  const std::scoped_lock lock(mutex_);
+  const double rate_hz = received_rate_.rate_hz(RateWindow::Clock::now());
+  return rate_hz > 0.0 ? 1000.0 / rate_hz : 0.0;
+}
+
 std::string Statistics::last_drop() const {
   const std::scoped_lock lock(mutex_);
   return last_drop_;
+}
+
+std::string Statistics::last_label_failure() const {
+  const std::scoped_lock lock(mutex_);
+  return last_label_failure_;
 }
 
 }  // namespace stillmap

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/label_feed.hpp"
 #include "idl/server_status.hpp"
 #include "server/latency_window.hpp"
 
@@ -23,21 +24,41 @@ class RateWindow {
   std::deque<Clock::time_point> events_;
 };
 
+/// Where the labels of the last scans came from.
+class LabellingWindow {
+ public:
+  void add(Labelling labelling);
+  /// 0 before the first.
+  [[nodiscard]] double share(Labelling labelling) const;
+
+ private:
+  std::deque<Labelling> last_;
+};
+
 /// What the server counts and times. Thread-safe.
 class Statistics {
  public:
   void scan_received();
-  void scan_mapped();
+  void scan_mapped(Labelling labelling);
+  /// Every n-th scan is segmented, which takes so long.
+  void segmenting(std::uint32_t every, double network_ms);
+  /// The label source failed; `detail` is told in the status until it works again.
+  void labels_failed(const std::string& detail);
+  void labels_worked();
   /// Counts "dropped_<reason>"; the last `detail` is told in the status.
   void scans_dropped(const std::string& reason, std::size_t count, const std::string& detail);
   void add_latency(const std::string& stage, double milliseconds);
 
-  /// Fills in counters, rates and latencies.
+  /// Fills in counters, rates, latencies and segmentation.
   void report_to(ServerStatus& status) const;
 
   [[nodiscard]] std::uint64_t received() const;
+  /// Mean time from scan to scan over the last seconds; 0 without scans.
+  [[nodiscard]] double receive_period_ms() const;
   /// Why the last scan was dropped; empty once a later one was mapped.
   [[nodiscard]] std::string last_drop() const;
+  /// Why the last segmentation failed; empty once a later one worked.
+  [[nodiscard]] std::string last_label_failure() const;
 
  private:
   mutable std::mutex mutex_;
@@ -49,6 +70,10 @@ class Statistics {
   RateWindow received_rate_;
   RateWindow mapped_rate_;
   std::string last_drop_;
+  LabellingWindow labellings_;
+  SegmentationStatus segmentation_;
+  std::uint64_t label_failures_ = 0;
+  std::string last_label_failure_;
 };
 
 }  // namespace stillmap

@@ -30,12 +30,27 @@ void add_save_command(CommandHandle program, Action& action);
 void add_reset_command(CommandHandle program, Action& action);
 void add_evaluate_command(CommandHandle program, Action& action);
 void add_simulate_command(CommandHandle program, Action& action);
+void add_simulate_training_command(CommandHandle program, Action& action);
+void add_dataset_command(CommandHandle program, Action& action);
+void add_model_command(CommandHandle program, Action& action);
 
 // Subcommands of evaluate.
 void add_evaluate_trajectory_command(CommandHandle evaluate, Action& action);
 void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action);
 void add_evaluate_map_command(CommandHandle evaluate, Action& action);
 void add_evaluate_weightings_command(CommandHandle evaluate, Action& action);
+
+// Subcommands of dataset.
+void add_dataset_export_command(CommandHandle dataset, Action& action);
+void add_dataset_aggregate_command(CommandHandle dataset, Action& action);
+void add_dataset_scatter_command(CommandHandle dataset, Action& action);
+
+// Subcommands of model.
+void add_model_info_command(CommandHandle model, Action& action);
+void add_model_calibrate_command(CommandHandle model, Action& action);
+void add_model_agree_command(CommandHandle model, Action& action);
+void add_model_speed_command(CommandHandle model, Action& action);
+void add_model_run_command(CommandHandle model, Action& action);
 
 /// Runs the action; an exception becomes a line on stderr and its exit code.
 [[nodiscard]] ExitCode run_action(const Action& action);

@@ -5,17 +5,24 @@
 #include <stdexcept>
 
 #include "clients/commands/command.hpp"
+#include "clients/commands/mapper_arguments.hpp"
+#include "clients/commands/segmentation_report.hpp"
+#include "clients/commands/segmentation_run.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/text.hpp"
 #include "core/dataset/binary_file.hpp"
 #include "core/dataset/kitti_files.hpp"
+#include "core/evaluation/class_groups.hpp"
 #include "core/evaluation/confusion_matrix.hpp"
+#include "core/evaluation/segmentation_picture.hpp"
 
 namespace stillmap {
 namespace {
 
 struct Arguments {
-  std::string truth, predictions;
+  std::string truth, predictions, picture;
+  MapperArguments mapper;
+  ScanRange range;
   bool json = false;
 };
 
@@ -34,7 +41,7 @@ std::vector<std::filesystem::path> label_files(const std::filesystem::path& fold
   return files;
 }
 
-ConfusionMatrix compare(const Arguments& arguments) {
+ConfusionMatrix compare_files(const Arguments& arguments) {
   const auto predictions = label_files(arguments.predictions, "predictions");
   const std::filesystem::path truth_folder =
       label_files(arguments.truth, "labels").front().parent_path();
@@ -54,41 +61,41 @@ ConfusionMatrix compare(const Arguments& arguments) {
   return matrix;
 }
 
-nlohmann::json to_json(const ConfusionMatrix& matrix) {
-  nlohmann::json by_class = nlohmann::json::object();
-  for (std::size_t k = 1; k < semantic_class_count; ++k) {
-    const auto label = static_cast<SemanticClass>(k);
-    const std::optional<double> iou = matrix.iou(label);
-    by_class[std::string(name(label))] = iou ? nlohmann::json(*iou) : nlohmann::json(nullptr);
-  }
-  return {{"points", matrix.total()},
-          {"miou", matrix.mean_iou()},
-          {"miou_present", matrix.mean_iou_of_present().value_or(0.0)},
-          {"accuracy", matrix.accuracy().value_or(0.0)},
-          {"iou", by_class}};
+// Truth above prediction, of the first scan that was taken.
+void write_picture(const Arguments& arguments, const ScanDataset& dataset, LabelSource& labels) {
+  DatasetFrame frame = dataset.read(arguments.range.first);
+  const std::vector<SemanticClass> truth = reduced_classes(frame.raw_labels);
+  frame.scan.labels.clear();
+  const std::vector<SemanticClass> found = labels.label(frame.scan).classes;
+  const RangeImage image(frame.scan.points_lidar, projection_model(dataset.suggested_sensor()));
+  std::vector<std::span<const SemanticClass>> strips;
+  if (!truth.empty()) strips.emplace_back(truth);
+  if (!found.empty()) strips.emplace_back(found);
+  write_segmentation_picture(arguments.picture, image, strips);
 }
 
-void print(const ConfusionMatrix& matrix) {
-  Table table({"class", "IoU %"});
-  for (std::size_t k = 1; k < semantic_class_count; ++k) {
-    const auto label = static_cast<SemanticClass>(k);
-    const std::optional<double> iou = matrix.iou(label);
-    table.add({std::string(name(label)), iou ? fixed(100.0 * *iou, 2) : "-"});
-  }
-  table.add({"mean of 19", fixed(100.0 * matrix.mean_iou(), 2)});
-  table.add({"mean of those seen", fixed(100.0 * matrix.mean_iou_of_present().value_or(0.0), 2)});
-  table.add({"accuracy", fixed(100.0 * matrix.accuracy().value_or(0.0), 2)});
-  std::cout << table.text() << matrix.total()
-            << " labelled points; unlabeled truth is left out, as in semantic-kitti-api\n";
+ConfusionMatrix run_model(const Arguments& arguments) {
+  const ScanDataset dataset(arguments.truth);
+  const std::size_t scans = arguments.range.end(dataset) - arguments.range.first;
+  const std::unique_ptr<LabelSource> labels = label_source(arguments.mapper, dataset);
+  Progress progress("segment", "scans", scans);
+  const SegmentationResult result =
+      segment_dataset(dataset, arguments.range, *labels, [&](std::size_t seen) {
+        progress.update(seen);
+        return true;
+      });
+  if (result.scans == 0) throw DatasetError(dataset.file(arguments.range.first), "has no labels");
+  if (!arguments.picture.empty()) write_picture(arguments, dataset, *labels);
+  std::cerr << labels->name() << ": " << result.scans << " scans, from scan to classes "
+            << fixed(result.median_ms, 1) << " ms (median), " << fixed(result.p99_ms, 1)
+            << " ms (p99)\n";
+  return result.points;
 }
 
 ExitCode run(const Arguments& arguments) {
-  const ConfusionMatrix matrix = compare(arguments);
-  if (arguments.json) {
-    std::cout << to_json(matrix).dump(2) << "\n";
-  } else {
-    print(matrix);
-  }
+  const ConfusionMatrix matrix =
+      arguments.predictions.empty() ? run_model(arguments) : compare_files(arguments);
+  std::cout << (arguments.json ? to_json(matrix).dump(2) + "\n" : describe(matrix));
   return ExitCode::ok;
 }
 
@@ -96,19 +103,34 @@ ExitCode run(const Arguments& arguments) {
 
 void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
   auto arguments = std::make_shared<Arguments>();
+  arguments->mapper.labels = "model";
   CommandHandle command = evaluate.command("segmentation", "IoU of every class and their mean");
-  command.option("--truth", arguments->truth, "Folder with true .label files, or a sequence")
-      .required();
   command
-      .option("--predictions", arguments->predictions,
-              "Folder with predicted .label files (original ids)")
+      .option("--truth", arguments->truth,
+              "A recording with labels, or a folder with true .label files")
       .required();
+  const OptionHandle predictions =
+      command.option("--predictions", arguments->predictions,
+                     "Folder with predicted .label files (original ids); without it a model runs");
+  command
+      .option("--model", arguments->mapper.labels,
+              "Folder of the model to run; 'model' is the one that comes with Stillmap")
+      .with_default()
+      .excludes(predictions);
+  command.option("--sensor", arguments->mapper.sensor,
+                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the recording suggests");
+  add_engine_options(command, arguments->mapper.engine);
+  command.option("--start", arguments->range.first, "Number of the first scan");
+  command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
+  command.option("--picture", arguments->picture,
+                 "PNG of the first scan's range image: true classes above those found");
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
-      "Example:\n"
+      "Examples:\n"
       "  stillmap evaluate segmentation --truth sequences/08 --predictions my_net/08\n"
-      "Files pair by name. Every prediction needs its truth; scans without a prediction do not "
-      "count.");
+      "  stillmap evaluate segmentation --truth city --picture city.png\n"
+      "Predictions pair with the truth by name, and every one needs its truth; scans without a\n"
+      "prediction do not count. A model runs as in the server, votes of the neighbours included.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

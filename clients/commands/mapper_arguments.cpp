@@ -15,14 +15,16 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
                  "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the recording suggests");
   command
       .option("--labels", arguments.labels,
-              "Where classes come from: auto (the recording's, if it has any), files (must "
-              "have them), none (pure geometry), or a folder with a model")
+              "Where classes come from: auto (the recording's, if it has any, else the model's), "
+              "files (must have them), model (the one that comes with Stillmap), none (pure "
+              "geometry), or a folder with a model")
       .with_default();
   command
       .option("--weighting", arguments.weighting,
               "What a correspondence counts, the rows of the paper's Table I: none, "
               "geometric, semantic; default: as configured")
       .one_of({"none", "geometric", "semantic"});
+  add_engine_options(command, arguments.engine);
 }
 
 Weighting weighting_from_name(const std::string& weighting_name) {
@@ -49,23 +51,26 @@ MapperConfig mapper_config(const MapperArguments& arguments, const SensorModel& 
 
 std::unique_ptr<LabelSource> label_source(const MapperArguments& arguments,
                                           const ScanDataset& dataset) {
-  const bool labelled = dataset.has_labels(0);
   LabelsConfig labels;
+  if (!arguments.config_file.empty()) labels = load_server_config(arguments.config_file).labels;
   if (arguments.labels == "none") {
     labels.source = LabelOrigin::none;
   } else if (arguments.labels == "files") {
-    if (!labelled) {
+    if (!dataset.has_labels(0)) {
       throw std::invalid_argument(dataset.file(0).string() +
-                                  " has no labels: use --labels none or a model folder");
+                                  " has no labels: use --labels model or none");
     }
+    labels.source = LabelOrigin::stream;
+  } else if (arguments.labels == "model") {
+    labels.source = LabelOrigin::model;
   } else if (arguments.labels != "auto") {
-    labels = {.source = LabelOrigin::model, .model = arguments.labels};
-  } else if (!arguments.config_file.empty()) {
-    labels = load_server_config(arguments.config_file).labels;
-  } else if (!labelled) {
-    labels.source = LabelOrigin::none;
+    labels.source = LabelOrigin::model;
+    labels.model = arguments.labels;
+  } else if (labels.source == LabelOrigin::automatic) {
+    labels.source = dataset.has_labels(0) ? LabelOrigin::stream : LabelOrigin::model;
   }
-  return open_label_source(labels);
+  set_engine(arguments.engine, labels.engine);
+  return open_label_source(labels, mapper_config(arguments, dataset.suggested_sensor()).sensor);
 }
 
 }  // namespace stillmap

@@ -3,6 +3,7 @@
 #include <memory>
 #include <string>
 
+#include "clients/commands/engine_arguments.hpp"
 #include "clients/terminal/command_line.hpp"
 #include "core/dataset/scan_dataset.hpp"
 #include "core/mapper.hpp"
@@ -15,13 +16,14 @@ struct MapperArguments {
   std::string config_file;
   /// Name or file; empty: that of `config_file`, else as the dataset suggests.
   std::string sensor;
-  /// "auto", "files", "none", or a model folder.
+  /// "auto", "files", "model" (the default one), "none", or a model folder.
   std::string labels = "auto";
   /// "none", "geometric", "semantic"; empty: as configured.
   std::string weighting;
+  EngineArguments engine;
 };
 
-/// Adds --config, --sensor, --labels and --weighting.
+/// Adds --config, --sensor, --labels, --weighting, --engine, --precision and --threads.
 void add_mapper_options(CommandHandle command, MapperArguments& arguments);
 
 [[nodiscard]] Weighting weighting_from_name(const std::string& weighting_name);

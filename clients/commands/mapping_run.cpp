@@ -1,7 +1,6 @@
 #include "clients/commands/mapping_run.hpp"
 
 #include <algorithm>
-#include <numeric>
 #include <stdexcept>
 #include <utility>
 
@@ -10,18 +9,13 @@
 namespace stillmap {
 namespace {
 
-// The true ids of the points that the mapper will keep: the scan is prepared once more with the
-// points' numbers in the place of their times.
+/// The true ids of the points that the mapper will keep.
 std::vector<std::uint16_t> true_ids_of_kept_points(const DatasetFrame& frame,
                                                    const PrepareConfig& prepare) {
   if (frame.raw_labels.empty()) return {};
-  Scan numbered;
-  numbered.points_lidar = frame.scan.points_lidar;
-  numbered.time_offset_s.resize(frame.scan.size());
-  std::iota(numbered.time_offset_s.begin(), numbered.time_offset_s.end(), 0.0F);
   std::vector<std::uint16_t> ids;
-  for (const float number : drop_unusable_points(std::move(numbered), prepare).time_offset_s) {
-    ids.push_back(static_cast<std::uint16_t>(frame.raw_labels[static_cast<std::size_t>(number)]));
+  for (const std::uint32_t i : usable_points(frame.scan, prepare)) {
+    ids.push_back(static_cast<std::uint16_t>(frame.raw_labels[i]));
   }
   return ids;
 }

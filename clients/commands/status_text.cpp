@@ -12,6 +12,12 @@ std::string describe(const ServerStatus& status) {
   text += "health     " + std::string(name(status.health)) +
           (status.reason.empty() ? "" : ": " + status.reason) + "\n";
   text += "labels     " + status.label_source + "\n";
+  const SegmentationStatus& segmentation = status.segmentation;
+  text += "           " + every_nth_scan(segmentation.every) + " segmented, " +
+          fixed(segmentation.network_ms, 1) + " ms each; of the last scans " +
+          fixed(100.0 * segmentation.fresh_share, 0) + " % with labels of their own, " +
+          fixed(100.0 * segmentation.carried_share, 0) + " % with carried ones, " +
+          fixed(100.0 * segmentation.unlabelled_share, 0) + " % with none\n";
   text += "scans      " + fixed(status.received_hz, 1) + "/s in, " + fixed(status.mapped_hz, 1) +
           "/s mapped; delivery: " + name(status.delivery) + "\n";
   text += "map        id " + std::to_string(status.map_id) + ", version " +
@@ -48,6 +54,12 @@ nlohmann::json to_json(const ServerStatus& status) {
           {"reason", status.reason},
           {"received_hz", status.received_hz},
           {"mapped_hz", status.mapped_hz},
+          {"segmentation",
+           {{"every", status.segmentation.every},
+            {"network_ms", status.segmentation.network_ms},
+            {"fresh_share", status.segmentation.fresh_share},
+            {"carried_share", status.segmentation.carried_share},
+            {"unlabelled_share", status.segmentation.unlabelled_share}}},
           {"map_version", status.map_version},
           {"map_id", status.map_id},
           {"tiles", status.tile_count},

@@ -58,6 +58,11 @@ LiveTile::LiveVoxel* LiveTile::find(const TilePoint& point) {
   return &voxels_[slot->second];
 }
 
+ClassEvidence LiveTile::evidence(std::uint32_t voxel_key) const {
+  const auto known = position_.find(voxel_key);
+  return known == position_.end() ? ClassEvidence() : voxels_[known->second].evidence;
+}
+
 void LiveTile::insert(std::span<const TilePoint> points, std::int64_t stamp_ns) {
   LiveVoxel* voxel = nullptr;
   for (const TilePoint& point : points) {

@@ -37,6 +37,9 @@ class LiveTile {
 
   void insert(std::span<const TilePoint> points, std::int64_t stamp_ns);
 
+  /// Of the voxel; without votes when there is none.
+  [[nodiscard]] ClassEvidence evidence(std::uint32_t voxel_key) const;
+
   /// Publishes the voxels hit `min_points` times that are not of a movable class. False, and the
   /// published tile stays, when the content is the same as before.
   [[nodiscard]] bool publish(std::uint64_t revision, std::uint32_t min_points,

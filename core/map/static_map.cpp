@@ -125,6 +125,14 @@ void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_
   state_->touched.insert(state_->touched.end(), hit.begin(), hit.end());
 }
 
+ClassEvidence StaticMap::evidence_at(const Eigen::Vector3d& position_map) const {
+  if (!state_->grid.holds(position_map)) return {};
+  const VoxelGrid::Place place = state_->grid.place(position_map);
+  const auto tile = state_->tiles.find(place.tile);
+  return tile == state_->tiles.end() ? ClassEvidence()
+                                     : tile->second->evidence(voxel_key(place.voxel));
+}
+
 std::shared_ptr<const MapView> StaticMap::view() {
   std::vector<LiveTile*> touched = std::exchange(state_->touched, {});
   std::ranges::sort(touched);

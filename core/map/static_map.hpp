@@ -38,6 +38,10 @@ class StaticMap {
   /// scan. The result does not depend on the number of threads.
   void insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar);
 
+  /// What a place (map frame [m]) was seen as so far, shown in a view or not; without votes where
+  /// nothing was seen. Thread-safe beside itself.
+  [[nodiscard]] ClassEvidence evidence_at(const Eigen::Vector3d& position_map) const;
+
   /// The planning view as it is now: voxels hit `min_points` times whose class is not a movable
   /// one. Tiles whose content (tile_content.hpp) did not change since the last view are shared
   /// with it, with their counts and times of then; where nothing changed, so is the whole view.

@@ -14,6 +14,9 @@ class LabelSource {
   /// Name for the status: "stream", "none", or the model's name.
   [[nodiscard]] virtual std::string name() const = 0;
 
+  /// How it works, in words for a log; empty when there is nothing to say.
+  [[nodiscard]] virtual std::string details() const { return {}; }
+
   /// Classes of the scan's points; empty when this source has none for this scan.
   [[nodiscard]] virtual PointLabels label(const Scan& scan) = 0;
 };

@@ -52,4 +52,12 @@ std::string ModelDescription::faults() const {
   return faults;
 }
 
+ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor) {
+  if (!model.follow_sensor) return model;
+  model.rows = sensor.rings;
+  model.fov_up = sensor.fov_up;
+  model.fov_down = sensor.fov_down;
+  return model;
+}
+
 }  // namespace stillmap

@@ -7,7 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "core/lidar/range_image.hpp"
 #include "core/lidar/semantic_class.hpp"
+#include "core/lidar/sensor_model.hpp"
+#include "core/segmentation/int8_calibration.hpp"
 #include "core/segmentation/knn_postprocess.hpp"
 
 namespace stillmap {
@@ -39,6 +42,9 @@ struct ModelDescription {
   /// Upper and lower edge of the image [rad]; points beyond are squeezed into the edge rows.
   double fov_up = 0.0;
   double fov_down = 0.0;
+  /// Was trained for many sensors: it takes an image of the rows and the field of view of the
+  /// sensor at hand. See for_sensor().
+  bool follow_sensor = false;
   InputStatistics statistics;
 
   /// Entry n is the class of the network's output n.
@@ -47,9 +53,18 @@ struct ModelDescription {
   std::optional<KnnConfig> knn;
   /// Leave the scan's point 0 out of the image, as lidar-bonnetal's mask does. For parity tests.
   bool mask_first_point = false;
+  /// Absent: it cannot be run in 8-bit integers.
+  std::optional<Int8Calibration> int8;
 
+  [[nodiscard]] ProjectionModel projection() const {
+    return {.rows = rows, .columns = columns, .fov_up = fov_up, .fov_down = fov_down};
+  }
   /// Every fault in words, one a line; empty when the description can be used.
   [[nodiscard]] std::string faults() const;
 };
+
+/// The model with the image that it takes of a sensor: as it was trained, or with follow_sensor the
+/// sensor's rings as rows over its field of view.
+[[nodiscard]] ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor);
 
 }  // namespace stillmap

@@ -13,4 +13,9 @@ class ModelError : public std::runtime_error {
       : std::runtime_error(file.string() + ": " + fault) {}
 };
 
+/// A sound model with something in it that this engine does not run; another one may.
+class UnsupportedModel : public ModelError {
+  using ModelError::ModelError;
+};
+
 }  // namespace stillmap

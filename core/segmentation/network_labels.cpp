@@ -7,10 +7,17 @@
 
 #include "core/lidar/range_image.hpp"
 #include "core/segmentation/network_input.hpp"
-#include "core/segmentation/opencv_network.hpp"
 
 namespace stillmap {
 namespace {
+
+PointLabels labels_of_own_pixel(const RangeImage& image, const PixelLabels& pixels) {
+  return {.classes = unproject(image, std::span<const SemanticClass>(pixels.classes),
+                               SemanticClass::unlabeled),
+          .confidence = unproject(image, std::span<const float>(pixels.confidence), 0.0F)};
+}
+
+}  // namespace
 
 PixelLabels pixel_labels(PixelOutputs&& outputs, const ModelDescription& model) {
   PixelLabels pixels{.classes = std::vector<SemanticClass>(outputs.output.size()),
@@ -21,32 +28,29 @@ PixelLabels pixel_labels(PixelOutputs&& outputs, const ModelDescription& model) 
   return pixels;
 }
 
-PointLabels labels_of_own_pixel(const RangeImage& image, const PixelLabels& pixels) {
-  return {.classes = unproject(image, std::span<const SemanticClass>(pixels.classes),
-                               SemanticClass::unlabeled),
-          .confidence = unproject(image, std::span<const float>(pixels.confidence), 0.0F)};
+NetworkLabels::NetworkLabels(ModelDescription model, std::unique_ptr<SegmentationNetwork> network,
+                             std::string remark)
+    : model_(std::move(model)), network_(std::move(network)), remark_(std::move(remark)) {
+  assert(network_ && model_.faults().empty());
 }
 
-}  // namespace
-
-NetworkLabels::NetworkLabels(ModelDescription model, std::unique_ptr<SegmentationNetwork> network)
-    : model_(std::move(model)), network_(std::move(network)) {
-  assert(network_ && model_.faults().empty());
+std::string NetworkLabels::details() const {
+  const std::string image = std::to_string(model_.rows) + "x" + std::to_string(model_.columns);
+  return network_->engine() + ", image " + image + (remark_.empty() ? "" : "; ") + remark_;
 }
 
 PointLabels NetworkLabels::label(const Scan& scan) {
   if (scan.empty()) return {};
-  const RangeImage image(scan.points_lidar, {.rows = model_.rows,
-                                             .columns = model_.columns,
-                                             .fov_up = model_.fov_up,
-                                             .fov_down = model_.fov_down});
+  const RangeImage image(scan.points_lidar, model_.projection());
   PixelOutputs outputs = network_->run(make_network_input(scan, image, model_));
   const PixelLabels pixels = pixel_labels(std::move(outputs), model_);
   return model_.knn ? knn_labels(image, pixels, *model_.knn) : labels_of_own_pixel(image, pixels);
 }
 
-std::unique_ptr<LabelSource> open_model(const ModelDescription& model) {
-  return std::make_unique<NetworkLabels>(model, std::make_unique<OpenCvNetwork>(model));
+std::unique_ptr<LabelSource> open_model(const ModelDescription& model, const EngineChoice& choice) {
+  OpenedNetwork opened = open_network(model, choice);
+  return std::make_unique<NetworkLabels>(model, std::move(opened.network),
+                                         std::move(opened.remark));
 }
 
 }  // namespace stillmap

@@ -3,24 +3,21 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
-#include <cmath>
-#include <fstream>
-#include <iterator>
 #include <opencv2/dnn.hpp>
 #include <string>
 #include <vector>
 
 #include "core/segmentation/model_error.hpp"
-#include "core/segmentation/onnx_input.hpp"
+#include "core/segmentation/onnx/onnx_file.hpp"
 #include "core/segmentation/pixel_scores.hpp"
+#include "core/segmentation/trial_input.hpp"
 
 namespace stillmap {
 namespace {
 
 namespace fs = std::filesystem;
 
-cv::dnn::Net read_network(const fs::path& file) {
-  if (!fs::is_regular_file(file)) throw ModelError(file, "is not a file that can be read");
+cv::dnn::Net read_with_opencv(const fs::path& file) {
   try {
     cv::dnn::Net net = cv::dnn::readNetFromONNX(file.string());
     if (net.empty()) throw ModelError(file, "holds no network");
@@ -35,23 +32,6 @@ cv::dnn::Net read_network(const fs::path& file) {
   }
 }
 
-void require_finite_weights(const cv::dnn::Net& net, const fs::path& file) {
-  for (const std::string& layer_name : net.getLayerNames()) {
-    const cv::Ptr<cv::dnn::Layer> layer = net.getLayer(net.getLayerId(layer_name));
-    for (const cv::Mat& weights : layer->blobs) {
-      if (weights.depth() != CV_32F || cv::checkRange(weights)) continue;
-      throw ModelError(file, "weights of layer " + layer_name + " are not all finite numbers");
-    }
-  }
-}
-
-/// Some image of plausible scores: numbers of both signs that differ from pixel to pixel.
-std::vector<float> trial_input(std::size_t size) {
-  std::vector<float> input(size);
-  for (std::size_t i = 0; i < size; ++i) input[i] = std::sin(0.37F * static_cast<float>(i % 9973));
-  return input;
-}
-
 template <typename Sizes>
 std::string shape_text(const Sizes& sizes) {
   std::string text;
@@ -60,22 +40,6 @@ std::string shape_text(const Sizes& sizes) {
     text += std::to_string(size);
   }
   return text;
-}
-
-std::string read_bytes(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
-}
-
-void require_input_shape(const fs::path& file, std::span<const int> wanted) {
-  const std::vector<std::int64_t> declared = declared_input_shape(read_bytes(file));
-  const auto fits = [](std::int64_t size, int wanted_size) {
-    return size == 0 || size == wanted_size;
-  };
-  if (declared.empty() || std::ranges::equal(declared, wanted, fits)) return;
-  throw ModelError(file, "wants an input of " + shape_text(declared) +
-                             ", but its description has " + shape_text(wanted) +
-                             " (1 x 5 x rows x columns)");
 }
 
 }  // namespace
@@ -99,24 +63,22 @@ struct OpenCvNetwork::State {
   }
 
   /// Runs the network once, so that a model that does not fit is found at the start.
-  void try_once(const fs::path& file);
+  void try_once(const ModelDescription& model);
   void require_output_shape(const cv::Mat& output, const fs::path& file) const;
 };
 
-void OpenCvNetwork::State::try_once(const fs::path& file) {
-  const std::vector<float> input =
-      trial_input(input_channels * static_cast<std::size_t>(input_shape[2] * input_shape[3]));
+void OpenCvNetwork::State::try_once(const ModelDescription& model) {
+  const std::vector<float> input = trial_input(model);
   cv::Mat output;
   try {
     output = forward(input);
   } catch (const cv::Exception& error) {
-    throw ModelError(file, "does not run on an input of " + shape_text(input_shape) +
-                               " (1 x 5 x rows x columns of its description): " + error.err);
+    throw ModelError(model.network_file,
+                     "does not run on an input of " + shape_text(input_shape) +
+                         " (1 x 5 x rows x columns of its description): " + error.err);
   }
-  require_output_shape(output, file);
-  if (!cv::checkRange(output)) {
-    throw ModelError(file, "gives scores that are not finite numbers");
-  }
+  require_output_shape(output, model.network_file);
+  require_finite_scores(model, scores(output));
   kind = score_kind(scores(output), static_cast<std::size_t>(output_shape[1]));
 }
 
@@ -130,16 +92,14 @@ void OpenCvNetwork::State::require_output_shape(const cv::Mat& output, const fs:
 }
 
 OpenCvNetwork::OpenCvNetwork(const ModelDescription& model) : state_(std::make_unique<State>()) {
-  if (const std::string faults = model.faults(); !faults.empty()) {
-    throw ModelError(model.network_file, "has a description that cannot be used:\n" + faults);
-  }
-  const auto classes = static_cast<int>(model.classes.size());
-  state_->net = read_network(model.network_file);
-  state_->input_shape = {1, static_cast<int>(input_channels), model.rows, model.columns};
-  state_->output_shape = {1, classes, model.rows, model.columns};
-  require_input_shape(model.network_file, state_->input_shape);
-  require_finite_weights(state_->net, model.network_file);
-  state_->try_once(model.network_file);
+  require_sound(model);
+  constexpr auto channels = static_cast<int>(input_channels);
+  // OpenCV neither looks whether a file makes sense nor for which images it was made.
+  require_input_shape(OnnxFile(model.network_file), channels, model.rows, model.columns);
+  state_->net = read_with_opencv(model.network_file);
+  state_->input_shape = {1, channels, model.rows, model.columns};
+  state_->output_shape = {1, static_cast<int>(model.classes.size()), model.rows, model.columns};
+  state_->try_once(model);
 }
 
 OpenCvNetwork::~OpenCvNetwork() = default;
@@ -150,6 +110,12 @@ PixelOutputs OpenCvNetwork::run(std::span<const float> input) {
   const cv::Mat output = state_->forward(input);
   return most_probable(state_->scores(output), static_cast<std::size_t>(state_->output_shape[1]),
                        state_->kind);
+}
+
+std::vector<float> OpenCvNetwork::probabilities(std::span<const float> input) {
+  const cv::Mat output = state_->forward(input);
+  return probabilities_of(state_->scores(output), static_cast<std::size_t>(state_->output_shape[1]),
+                          state_->kind);
 }
 
 }  // namespace stillmap

@@ -16,6 +16,8 @@ class OpenCvNetwork final : public SegmentationNetwork {
   ~OpenCvNetwork() override;
 
   [[nodiscard]] PixelOutputs run(std::span<const float> input) override;
+  [[nodiscard]] std::vector<float> probabilities(std::span<const float> input) override;
+  [[nodiscard]] std::string engine() const override { return "OpenCV"; }
 
  private:
   struct State;

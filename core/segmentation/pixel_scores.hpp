@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <span>
+#include <vector>
 
 #include "core/segmentation/segmentation_network.hpp"
 
@@ -10,13 +11,21 @@ namespace stillmap {
 /// What the last layer of a network gives.
 enum class ScoreKind { probabilities, logits };
 
-/// Probabilities when every pixel's scores lie in 0..1 and sum to 1, else logits. `scores` is
-/// outputs x pixels.
-[[nodiscard]] ScoreKind score_kind(std::span<const float> scores, std::size_t outputs);
+/// How the scores of an image lie in memory: outputs x pixels, or pixels x outputs.
+enum class ScoreLayout { planes, pixels };
+
+/// Probabilities when every pixel's scores lie in 0..1 and sum to 1, else logits.
+[[nodiscard]] ScoreKind score_kind(std::span<const float> scores, std::size_t outputs,
+                                   ScoreLayout layout = ScoreLayout::planes);
 
 /// The most probable output of each pixel (ties: the lowest) and its probability; of logits, the
-/// soft-max. `scores` is outputs x pixels.
+/// soft-max.
 [[nodiscard]] PixelOutputs most_probable(std::span<const float> scores, std::size_t outputs,
-                                         ScoreKind kind);
+                                         ScoreKind kind, ScoreLayout layout = ScoreLayout::planes);
+
+/// The probabilities, outputs x pixels.
+[[nodiscard]] std::vector<float> probabilities_of(std::span<const float> scores,
+                                                  std::size_t outputs, ScoreKind kind,
+                                                  ScoreLayout layout = ScoreLayout::planes);
 
 }  // namespace stillmap

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 namespace stillmap {
@@ -19,14 +20,22 @@ struct PixelOutputs {
   std::vector<float> confidence;
 };
 
-/// An engine with a network in it: a normalised range image in, the most probable output of every
-/// pixel out.
+/// An engine with a network in it: a normalised range image in, classes out. One thread uses it at
+/// a time.
 class SegmentationNetwork {
  public:
   virtual ~SegmentationNetwork() = default;
 
-  /// `input` is 5 x rows x columns, as make_network_input() gives it.
+  /// The most probable output of every pixel. `input` is 5 x rows x columns, as
+  /// make_network_input() gives it.
   [[nodiscard]] virtual PixelOutputs run(std::span<const float> input) = 0;
+
+  /// The probabilities of all outputs, outputs x rows x columns. Not finite where the network's
+  /// scores are not.
+  [[nodiscard]] virtual std::vector<float> probabilities(std::span<const float> input) = 0;
+
+  /// What runs it, in words for a log: "oneDNN int8, 2 threads".
+  [[nodiscard]] virtual std::string engine() const = 0;
 };
 
 }  // namespace stillmap

@@ -35,6 +35,22 @@ void add_lists(const stillmap_msgs::msg::Status& message, ServerStatus& status) 
   }
 }
 
+void to_wire(const SegmentationStatus& status, stillmap_msgs::msg::SegmentationStatus& message) {
+  message.every(status.every);
+  message.network_ms(status.network_ms);
+  message.fresh_share(status.fresh_share);
+  message.carried_share(status.carried_share);
+  message.unlabelled_share(status.unlabelled_share);
+}
+
+SegmentationStatus from_wire(const stillmap_msgs::msg::SegmentationStatus& message) {
+  return {.every = message.every(),
+          .network_ms = message.network_ms(),
+          .fresh_share = message.fresh_share(),
+          .carried_share = message.carried_share(),
+          .unlabelled_share = message.unlabelled_share()};
+}
+
 }  // namespace
 
 stillmap_msgs::msg::Status to_wire(const ServerStatus& status) {
@@ -53,6 +69,7 @@ stillmap_msgs::msg::Status to_wire(const ServerStatus& status) {
   message.map_id(status.map_id);
   message.tile_count(status.tile_count);
   message.voxel_count(status.voxel_count);
+  to_wire(status.segmentation, message.segmentation());
   add_lists(status, message);
   return message;
 }
@@ -77,6 +94,7 @@ std::optional<ServerStatus> from_wire(const stillmap_msgs::msg::Status& message)
                       .map_id = message.map_id(),
                       .tile_count = message.tile_count(),
                       .voxel_count = message.voxel_count(),
+                      .segmentation = from_wire(message.segmentation()),
                       .counters = {},
                       .latencies = {}};
   add_lists(message, status);

@@ -13,10 +13,19 @@ constexpr std::array commands{"map",
                               "save",
                               "reset",
                               "simulate",
+                              "simulate-training",
                               "evaluate trajectory",
                               "evaluate segmentation",
                               "evaluate map",
-                              "evaluate weightings"};
+                              "evaluate weightings",
+                              "dataset export",
+                              "dataset aggregate",
+                              "dataset scatter",
+                              "model info",
+                              "model calibrate",
+                              "model agree",
+                              "model speed",
+                              "model run"};
 
 class HelpTest : public CommandTest {};
 
@@ -32,7 +41,8 @@ TEST_F(HelpTest, EveryCommandTeachesWithAnExample) {
 TEST_F(HelpTest, TheProgramListsItsCommandsAndExitCodes) {
   const ProcessResult result = run("--help");
   EXPECT_EQ(result.exit_code, 0);
-  for (const std::string command : {"map", "replay", "watch", "query", "evaluate", "simulate"}) {
+  for (const std::string command :
+       {"map", "replay", "watch", "query", "evaluate", "simulate", "dataset"}) {
     EXPECT_THAT(result.out, HasSubstr("\n  " + command + " "));
   }
   EXPECT_THAT(result.out, HasSubstr("Exit codes"));

@@ -87,14 +87,18 @@ TEST(ModelFile, RefusesAFolderThatIsNotThere) {
 }
 
 TEST(LabelSource, IsTheOneAskedFor) {
-  EXPECT_EQ(open_label_source({.source = LabelOrigin::stream, .model = {}})->name(), "stream");
-  EXPECT_EQ(open_label_source({.source = LabelOrigin::none, .model = {}})->name(), "none");
+  const auto name = [](LabelOrigin source) {
+    return open_label_source({.source = source, .model = {}, .engine = {}}, hdl_64e())->name();
+  };
+  EXPECT_EQ(name(LabelOrigin::stream), "stream");
+  EXPECT_EQ(name(LabelOrigin::none), "none");
 }
 
 TEST(LabelSource, NamesTheNetworkFileThatIsMissing) {
   const auto folder = write_file("model.yaml", sound).parent_path();
   try {
-    (void)open_label_source({.source = LabelOrigin::model, .model = folder});
+    (void)open_label_source({.source = LabelOrigin::model, .model = folder, .engine = {}},
+                            hdl_64e());
     FAIL() << "a model without a network was opened";
   } catch (const ModelError& error) {
     EXPECT_THAT(error.what(), HasSubstr("model.onnx"));

@@ -116,7 +116,7 @@ TEST(ServerConfig, RefusesValuesOfTheWrongKind) {
 }
 
 TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
-  EXPECT_THAT(refusal_of("labels: {source: model}"), HasSubstr("give the model's folder"));
+  EXPECT_THAT(refusal_of("labels: {model: \"\"}"), HasSubstr("give a model's name"));
   EXPECT_THAT(refusal_of("prepare: {min_range_m: 200}"), HasSubstr("above min_range_m"));
   EXPECT_THAT(refusal_of("prepare: {ego_hull_lidar_m: [1, 2]}"), HasSubstr("has 2 numbers"));
   EXPECT_THAT(refusal_of("prepare: {ego_hull_lidar_m: [1, 1, 1, 0, 0, 0]}"),

@@ -80,6 +80,11 @@ TEST(StatusConversion, KeepsEverything) {
                       .map_id = 4,
                       .tile_count = 5,
                       .voxel_count = 6,
+                      .segmentation = {.every = 3,
+                                       .network_ms = 210.0,
+                                       .fresh_share = 0.25,
+                                       .carried_share = 0.5,
+                                       .unlabelled_share = 0.125},
                       .counters = {{"scans_received", 8}, {"dropped_empty", 2}},
                       .latencies = {{"odometry", 1.0, 2.0, 3.0, 4}}};
   const auto back = from_wire(to_wire(status));
@@ -90,6 +95,11 @@ TEST(StatusConversion, KeepsEverything) {
   EXPECT_EQ(back->label_source, "stream");
   EXPECT_EQ(back->health, OdometryHealth::degenerate);
   EXPECT_EQ(back->reason, "why");
+  EXPECT_EQ(back->segmentation.every, 3U);
+  EXPECT_EQ(back->segmentation.network_ms, 210.0);
+  EXPECT_EQ(back->segmentation.fresh_share, 0.25);
+  EXPECT_EQ(back->segmentation.carried_share, 0.5);
+  EXPECT_EQ(back->segmentation.unlabelled_share, 0.125);
   EXPECT_EQ(back->mapped_hz, 9.0);
   EXPECT_EQ(back->voxel_count, 6U);
   EXPECT_EQ(back->counter("scans_received"), 8U);

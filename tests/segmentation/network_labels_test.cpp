@@ -127,6 +127,8 @@ class HalfBlind final : public SegmentationNetwork {
     }
     return outputs;
   }
+  std::vector<float> probabilities(std::span<const float> /*input*/) override { return {}; }
+  [[nodiscard]] std::string engine() const override { return "half blind"; }
 };
 
 TEST(NetworkLabels, LeavesPointsUnlabeledWhereTheNetworkFails) {

@@ -47,6 +47,44 @@ TEST(MostProbable, AppliesTheSoftMaxToLogits) {
   }
 }
 
+/// The same scores, pixel by pixel.
+std::vector<float> by_pixels(const std::vector<float>& planes, std::size_t outputs) {
+  const std::size_t pixels = planes.size() / outputs;
+  std::vector<float> turned(planes.size());
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    turned[i % pixels * outputs + i / pixels] = planes[i];
+  }
+  return turned;
+}
+
+TEST(MostProbable, DoesNotCareHowScoresLieInMemory) {
+  std::mt19937 random(4);
+  std::normal_distribution<float> score(0.0F, 5.0F);
+  for (const std::size_t outputs : {1UL, 3UL, 20UL, 255UL}) {
+    std::vector<float> scores(outputs * 77);
+    for (float& value : scores) value = score(random);
+    const std::vector<float> turned = by_pixels(scores, outputs);
+    const PixelOutputs a = most_probable(scores, outputs, ScoreKind::logits);
+    const PixelOutputs b = most_probable(turned, outputs, ScoreKind::logits, ScoreLayout::pixels);
+    EXPECT_EQ(a.output, b.output);
+    EXPECT_EQ(a.confidence, b.confidence);
+    EXPECT_EQ(probabilities_of(scores, outputs, ScoreKind::logits),
+              probabilities_of(turned, outputs, ScoreKind::logits, ScoreLayout::pixels));
+  }
+}
+
+TEST(ProbabilitiesOf, AreTheSoftMaxOfLogitsAndProbabilitiesAsTheyAre) {
+  const std::vector<float> soft = probabilities_of(logits, 3, ScoreKind::logits);
+  for (std::size_t p = 0; p < 2; ++p) {
+    double sum = 0.0;
+    for (std::size_t n = 0; n < 3; ++n) sum += std::exp(double{logits[2 * n + p]});
+    for (std::size_t n = 0; n < 3; ++n) {
+      EXPECT_NEAR(soft[2 * n + p], std::exp(double{logits[2 * n + p]}) / sum, 1e-6);
+    }
+  }
+  EXPECT_EQ(probabilities_of(probabilities, 3, ScoreKind::probabilities), probabilities);
+}
+
 TEST(MostProbable, SurvivesLogitsThatOverflowAnExponential) {
   const PixelOutputs result =
       most_probable(std::vector<float>{1000.0F, 900.0F}, 2, ScoreKind::logits);

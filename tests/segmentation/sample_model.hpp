@@ -8,20 +8,23 @@
 
 namespace stillmap::test {
 
-/// Fits `network`; output n is class n.
-inline ModelDescription describe(const TinyNetwork& network) {
+/// Fits a network for images of this size; output n is class n.
+inline ModelDescription describe_family(int rows, int columns, int outputs) {
   ModelDescription model;
   model.name = "tiny";
-  model.rows = network.rows;
-  model.columns = network.columns;
+  model.rows = rows;
+  model.columns = columns;
   model.fov_up = 0.2;
   model.fov_down = -0.4;
   model.statistics = {.mean = {12.0F, 10.0F, 0.2F, -1.0F, 0.2F},
                       .deviation = {12.0F, 11.0F, 7.0F, 0.9F, 0.2F}};
-  for (std::size_t i = 0; i < network.bias.size(); ++i) {
-    model.classes.push_back(static_cast<SemanticClass>(i));
-  }
+  for (int i = 0; i < outputs; ++i) model.classes.push_back(static_cast<SemanticClass>(i));
   return model;
+}
+
+/// Fits `network`; output n is class n.
+inline ModelDescription describe(const TinyNetwork& network) {
+  return describe_family(network.rows, network.columns, static_cast<int>(network.bias.size()));
 }
 
 /// Points in all directions, several a pixel of a small image, with intensity.
@@ -39,11 +42,21 @@ inline Scan random_scan(std::size_t points, unsigned seed) {
 }
 
 inline RangeImage project(const Scan& scan, const ModelDescription& model) {
-  return {scan.points_lidar,
-          {.rows = model.rows,
-           .columns = model.columns,
-           .fov_up = model.fov_up,
-           .fov_down = model.fov_down}};
+  return {scan.points_lidar, model.projection()};
+}
+
+/// Numbers about as large as those of a normalised range image, some pixels empty.
+inline std::vector<float> random_image(const ModelDescription& model, unsigned seed) {
+  std::mt19937 random(seed);
+  std::normal_distribution<float> any(0.0F, 1.0F);
+  const auto pixels =
+      static_cast<std::size_t>(model.rows) * static_cast<std::size_t>(model.columns);
+  std::vector<float> image(input_channels * pixels);
+  for (float& value : image) value = any(random);
+  for (std::size_t i = 0; i < image.size(); ++i) {
+    if (i % pixels % 7 == 3) image[i] = 0.0F;
+  }
+  return image;
 }
 
 }  // namespace stillmap::test

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
+
+#include "core/segmentation/stream_first_labels.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -27,6 +31,24 @@ TEST(StreamLabels, HasNoneForAScanWithoutLabels) {
 TEST(NoLabels, IgnoresLabelsThatAreThere) {
   EXPECT_TRUE(NoLabels().label(labelled_scan()).empty());
   EXPECT_EQ(NoLabels().name(), "none");
+}
+
+class AllCars final : public LabelSource {
+ public:
+  [[nodiscard]] std::string name() const override { return "all cars"; }
+  [[nodiscard]] PointLabels label(const Scan& scan) override {
+    return {.classes = std::vector(scan.size(), SemanticClass::car),
+            .confidence = std::vector(scan.size(), 0.5F)};
+  }
+};
+
+TEST(StreamFirstLabels, AsksTheOtherSourceOnlyAboutScansWithoutLabels) {
+  StreamFirstLabels labels(std::make_unique<AllCars>());
+  EXPECT_EQ(labels.name(), "stream, else all cars");
+  EXPECT_EQ(labels.label(labelled_scan()).classes, labelled_scan().labels);
+  Scan scan = labelled_scan();
+  scan.labels.clear();
+  EXPECT_EQ(labels.label(scan).classes[1], SemanticClass::car);
 }
 
 }  // namespace

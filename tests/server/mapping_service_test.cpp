@@ -39,7 +39,7 @@ TEST_F(MappingService, SaysWhyNothingHappens) {
   const ServerStatus status = client_.status();
   EXPECT_THAT(status.reason, HasSubstr("no scan received on rt/points yet"));
   EXPECT_EQ(status.delivery, DeliveryMode::every);
-  EXPECT_EQ(status.label_source, "stream");
+  EXPECT_EQ(status.label_source, "stream, else street");
   EXPECT_EQ(status.voxel_count, 0U);
   EXPECT_FALSE(status.software_version.empty());
 }

@@ -56,7 +56,7 @@ TEST(Statistics, CountsDropsByReason) {
   EXPECT_EQ(status.counter("dropped_queue_full"), 3U);
   EXPECT_EQ(status.counter("dropped_empty"), 1U);
   EXPECT_EQ(status.dropped(), 4U);
-  statistics.scan_mapped();
+  statistics.scan_mapped(Labelling::fresh);
   EXPECT_TRUE(statistics.last_drop().empty());
 }
 

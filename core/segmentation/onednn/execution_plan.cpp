@@ -1,0 +1,203 @@
+#include "core/segmentation/onednn/execution_plan.hpp"
+
+#include <algorithm>
+#include <array>
+
+#include "core/segmentation/onednn/layer_precision.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr float largest_s8 = 127.0F;
+
+std::size_t bytes_of(ValueType type) { return type == ValueType::s8 ? 1 : sizeof(float); }
+
+/// The sums that a convolution took in, none to two.
+std::vector<AddTensor> sums_of(const Layer& layer) {
+  std::vector<AddTensor> sums;
+  for (const FollowUp& step : layer.follow_ups) {
+    if (const auto* const add = std::get_if<AddTensor>(&step)) sums.push_back(*add);
+  }
+  return sums;
+}
+
+class Planner {
+ public:
+  Planner(const NetworkGraph& graph, const Int8Calibration* calibration)
+      : graph_(graph),
+        calibration_(calibration),
+        precision_(layer_precision(graph, calibration)),
+        versions_(graph.tensors.size()) {
+    plan_.scale_of_tensor.assign(graph.tensors.size(), 1.0F);
+  }
+
+  ExecutionPlan plan() {
+    add_step(LoadInput{.to = new_place(graph_.input, ValueType::f32)});
+    for (std::size_t i = 0; i < graph_.layers.size(); ++i) plan_layer(i);
+    plan_.output = version(graph_.output, ValueType::f32);
+    plan_.buffers[plan_.output.buffer].last_step = plan_.steps.size();
+    return std::move(plan_);
+  }
+
+ private:
+  void plan_layer(std::size_t index) {
+    const Layer& layer = graph_.layers[index];
+    if (std::holds_alternative<Convolution>(layer.operation)) {
+      plan_convolution(index);
+    } else if (const auto* const activation = std::get_if<LeakyRelu>(&layer.operation)) {
+      const Place from = version(layer.inputs.front(), ValueType::f32);
+      add_step(Activate{from, new_place(layer.output, ValueType::f32), activation->slope});
+    } else if (std::holds_alternative<Add>(layer.operation)) {
+      const Place first = version(layer.inputs[0], ValueType::f32);
+      const Place second = version(layer.inputs[1], ValueType::f32);
+      add_step(Sum{first, second, new_place(layer.output, ValueType::f32)});
+    } else {
+      throw UnsupportedLayer("layer '" + layer.name +
+                             "' is a batch norm that does not follow a convolution alone, or a "
+                             "soft-max that is not the last layer: neither is supported");
+    }
+  }
+
+  void plan_convolution(std::size_t index) {
+    const Layer& layer = graph_.layers[index];
+    if (std::get<Convolution>(layer.operation).widen.rows > 1) {
+      plan_row_widening(index);
+      return;
+    }
+    const ValueType type = precision_.of_tensor[layer.output];
+    const Place from = version(layer.inputs.front(), precision_.of_layer[index]);
+    const std::vector<AddTensor> sums = sums_of(layer);
+    std::optional<Place> added;
+    if (sums.size() > 1) added = version(sums[1].other, type);
+    const auto [to, sum_scale] = result_place(index, from, type);
+    // oneDNN can do both sums of a convolution in integers only.
+    if (added && precision_.of_layer[index] == ValueType::f32) {
+      const Place first_sum{sums[1].own, type, to.buffer};
+      add_step(Convolve{index, from, first_sum, sum_scale, {}});
+      add_step(Sum{first_sum, *added, to});
+    } else {
+      add_step(Convolve{index, from, to, sum_scale, added});
+    }
+  }
+
+  void plan_row_widening(std::size_t index) {
+    const Layer& layer = graph_.layers[index];
+    const ValueType type = precision_.of_tensor[layer.output];
+    const Place from = version(layer.inputs.front(), precision_.of_layer[index]);
+    const std::vector<AddTensor> sums = sums_of(layer);
+    const Place phases = new_place(sums.empty() ? layer.output : sums.front().own, type);
+    add_step(Convolve{index, from, phases, {}, {}});
+    const auto [to, sum_scale] = result_place(index, phases, type);
+    std::optional<float> sum_factor;
+    if (sum_scale) sum_factor = *sum_scale / scale_of(to);
+    add_step(LayOutRows{index, phases, to, scale_of(phases) / scale_of(to), sum_factor});
+  }
+
+  struct Result {
+    Place place;
+    std::optional<float> sum_scale;
+  };
+
+  /// Where the result of a convolution goes: onto what it is added to, or into memory of its own.
+  /// `from` is read while it is written.
+  Result result_place(std::size_t index, const Place& from, ValueType type) {
+    const Layer& layer = graph_.layers[index];
+    const std::vector<AddTensor> sums = sums_of(layer);
+    if (sums.empty()) return {new_place(layer.output, type), std::nullopt};
+    const TensorId summand = sums.front().other;
+    Place other = version(summand, type);
+    const bool added_twice = sums.size() > 1 && sums[1].other == summand;
+    if (!is_last_reader(index, summand) || other.buffer == from.buffer || added_twice) {
+      const Place copy{summand, type, new_buffer(summand, type)};
+      add_step(Convert{other, copy, 1.0F});
+      other = copy;
+    }
+    const Place to{layer.output, type, other.buffer};
+    set_scale(to);
+    versions_[to.tensor][static_cast<std::size_t>(type)] = to;
+    return {to, scale_of(other)};
+  }
+
+  [[nodiscard]] bool is_last_reader(std::size_t layer, TensorId tensor) const {
+    return tensor != graph_.output && graph_.readers(tensor).back() == layer;
+  }
+
+  /// A tensor in the type that is wanted; converted when it is not there yet.
+  Place version(TensorId tensor, ValueType type) {
+    std::optional<Place>& wanted = versions_[tensor][static_cast<std::size_t>(type)];
+    if (wanted) return *wanted;
+    const ValueType there = type == ValueType::f32 ? ValueType::s8 : ValueType::f32;
+    const Place from = *versions_[tensor][static_cast<std::size_t>(there)];
+    const Place to = new_place(tensor, type);
+    const float scale = plan_.scale_of_tensor[tensor];
+    add_step(Convert{from, to, type == ValueType::f32 ? scale : 1.0F / scale});
+    return to;
+  }
+
+  Place new_place(TensorId tensor, ValueType type) {
+    const Place place{tensor, type, new_buffer(tensor, type)};
+    versions_[tensor][static_cast<std::size_t>(type)] = place;
+    set_scale(place);
+    return place;
+  }
+
+  BufferId new_buffer(TensorId tensor, ValueType type) {
+    const std::size_t now = plan_.steps.size();
+    const std::size_t bytes = graph_.tensors[tensor].shape.size() * bytes_of(type);
+    plan_.buffers.push_back({.bytes = bytes, .first_step = now, .last_step = now});
+    return plan_.buffers.size() - 1;
+  }
+
+  void set_scale(const Place& place) {
+    if (place.type != ValueType::s8) return;
+    const std::string& name = graph_.tensors[place.tensor].name;
+    const auto range = calibration_->range_of_tensor.find(name);
+    if (range == calibration_->range_of_tensor.end()) {
+      throw GraphFault("its int8 calibration has no range for tensor '" + name +
+                       "': it is another network's; calibrate again");
+    }
+    // A tensor that was 0 in every scan has a range of 0.
+    plan_.scale_of_tensor[place.tensor] = range->second > 0.0F ? range->second / largest_s8 : 1.0F;
+  }
+
+  /// What a stored value must be multiplied with.
+  [[nodiscard]] float scale_of(const Place& place) const {
+    return place.type == ValueType::s8 ? plan_.scale_of_tensor[place.tensor] : 1.0F;
+  }
+
+  void add_step(const Step& step) {
+    const std::size_t number = plan_.steps.size();
+    const auto use = [&](const Place& place) { plan_.buffers[place.buffer].last_step = number; };
+    use(target(step));
+    std::visit(
+        [&](const auto& s) {
+          if constexpr (requires { s.from; }) use(s.from);
+          if constexpr (requires { s.first; }) use(s.first);
+          if constexpr (requires { s.second; }) use(s.second);
+          if constexpr (requires { s.added; }) {
+            if (s.added) use(*s.added);
+          }
+        },
+        step);
+    plan_.steps.push_back(step);
+  }
+
+  const NetworkGraph& graph_;
+  const Int8Calibration* calibration_;
+  LayerPrecision precision_;
+  /// Of each tensor, by type.
+  std::vector<std::array<std::optional<Place>, 2>> versions_;
+  ExecutionPlan plan_;
+};
+
+}  // namespace
+
+const Place& target(const Step& step) {
+  return std::visit([](const auto& s) -> const Place& { return s.to; }, step);
+}
+
+ExecutionPlan plan_execution(const NetworkGraph& graph, const Int8Calibration* calibration) {
+  return Planner(graph, calibration).plan();
+}
+
+}  // namespace stillmap

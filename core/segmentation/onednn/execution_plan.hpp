@@ -1,0 +1,90 @@
+#pragma once
+
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/segmentation/graph/network_graph.hpp"
+#include "core/segmentation/int8_calibration.hpp"
+
+namespace stillmap {
+
+/// How a number of a tensor is stored; s8 stands for `scale` times it.
+enum class ValueType { f32, s8 };
+
+/// Number of a piece of memory in its plan.
+using BufferId = std::size_t;
+
+/// One tensor in one type, rows x columns x channels in memory.
+struct Place {
+  TensorId tensor = 0;
+  ValueType type = ValueType::f32;
+  BufferId buffer = 0;
+};
+
+/// The network's input, channels x rows x columns as it comes, laid out in a buffer.
+struct LoadInput {
+  Place to;
+};
+/// The values of a buffer in another type, times `factor`; or a copy.
+struct Convert {
+  Place from, to;
+  float factor = 1.0F;
+};
+/// A convolution with its activations. With `sum_scale`, what lies in the target, of values of that
+/// scale, is added; and then what lies in `added`.
+struct Convolve {
+  std::size_t layer = 0;
+  Place from, to;
+  std::optional<float> sum_scale = {};
+  std::optional<Place> added = {};
+};
+/// Lays the row phases of a widening convolution's result out, times `factor`. With `sum_factor`,
+/// what lies in the target times it is added.
+struct LayOutRows {
+  std::size_t layer = 0;
+  Place from, to;
+  float factor = 1.0F;
+  std::optional<float> sum_factor = {};
+};
+/// An activation that no convolution could take in.
+struct Activate {
+  Place from, to;
+  float slope = 0.0F;
+};
+/// A sum that no convolution could take in.
+struct Sum {
+  Place first, second, to;
+};
+
+using Step = std::variant<LoadInput, Convert, Convolve, LayOutRows, Activate, Sum>;
+
+/// Where a step writes.
+[[nodiscard]] const Place& target(const Step& step);
+
+struct Buffer {
+  std::size_t bytes = 0;
+  /// Steps in which it holds something that is still needed, both included.
+  std::size_t first_step = 0;
+  std::size_t last_step = 0;
+};
+
+/// What is done in which order in which memory. Sums happen in place.
+struct ExecutionPlan {
+  std::vector<Step> steps;
+  std::vector<Buffer> buffers;
+  /// The network's output, in f32.
+  Place output;
+  /// Factor of the s8 values of each tensor; 1 for those that have none.
+  std::vector<float> scale_of_tensor;
+};
+
+/// Plans a graph whose shapes are known. With a calibration, convolutions run in 8-bit integers but
+/// for the first, the last, and `float_layers`. Throws UnsupportedLayer for layers that have to be
+/// replaced before, GraphFault when the calibration is not the network's.
+[[nodiscard]] ExecutionPlan plan_execution(const NetworkGraph& graph,
+                                           const Int8Calibration* calibration);
+
+}  // namespace stillmap

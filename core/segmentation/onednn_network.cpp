@@ -1,0 +1,94 @@
+#include "core/segmentation/onednn_network.hpp"
+
+#include <cassert>
+
+#include "core/segmentation/model_error.hpp"
+#include "core/segmentation/onednn/compiled_plan.hpp"
+#include "core/segmentation/onednn/execution_plan.hpp"
+#include "core/segmentation/onednn/prepare_network.hpp"
+#include "core/segmentation/pixel_scores.hpp"
+#include "core/segmentation/trial_input.hpp"
+
+namespace stillmap {
+namespace {
+
+const Int8Calibration* calibration_for(const ModelDescription& model, Precision precision) {
+  if (precision == Precision::fp32) return nullptr;
+  if (model.int8) return &*model.int8;
+  throw ModelError(model.network_file,
+                   "has no int8.yaml beside it; make it with 'stillmap model calibrate', or use "
+                   "precision: fp32");
+}
+
+PreparedNetwork load(const ModelDescription& model) {
+  require_sound(model);
+  const OnnxFile file(model.network_file);
+  require_input_shape(file, static_cast<int>(input_channels), model.rows, model.columns);
+  return prepare_network(file, model);
+}
+
+}  // namespace
+
+struct OneDnnNetwork::State {
+  std::vector<std::string> tensor_names;
+  std::size_t outputs = 0;
+  ScoreKind kind = ScoreKind::logits;
+  Precision precision = Precision::fp32;
+  double giga_operations = 0.0;
+  std::unique_ptr<CompiledPlan> plan;
+};
+
+OneDnnNetwork::OneDnnNetwork(const ModelDescription& model, Precision precision, int threads)
+    : state_(std::make_unique<State>()) {
+  try {
+    const PreparedNetwork network = load(model);
+    const NetworkGraph& graph = network.graph;
+    for (const Tensor& tensor : graph.tensors) state_->tensor_names.push_back(tensor.name);
+    state_->outputs = model.classes.size();
+    state_->precision = precision;
+    state_->giga_operations = network.giga_operations;
+    const ExecutionPlan plan = plan_execution(graph, calibration_for(model, precision));
+    state_->plan = std::make_unique<CompiledPlan>(graph, plan, threads);
+    const std::span<const float> scores = state_->plan->run(trial_input(model));
+    require_finite_scores(model, scores);
+    if (!network.had_softmax) {
+      state_->kind = score_kind(scores, state_->outputs, ScoreLayout::pixels);
+    }
+  } catch (const UnsupportedLayer& fault) {
+    throw UnsupportedModel(model.network_file, std::string(fault.what()) +
+                                                   ": the oneDNN engine cannot run it; 'engine: "
+                                                   "opencv' runs any ONNX network, slower");
+  } catch (const GraphFault& fault) {
+    throw ModelError(model.network_file, fault.what());
+  }
+}
+
+OneDnnNetwork::~OneDnnNetwork() = default;
+
+PixelOutputs OneDnnNetwork::run(std::span<const float> input) {
+  return most_probable(state_->plan->run(input), state_->outputs, state_->kind,
+                       ScoreLayout::pixels);
+}
+
+std::vector<float> OneDnnNetwork::probabilities(std::span<const float> input) {
+  return probabilities_of(state_->plan->run(input), state_->outputs, state_->kind,
+                          ScoreLayout::pixels);
+}
+
+std::string OneDnnNetwork::engine() const {
+  const int threads = state_->plan->threads();
+  return std::string("oneDNN ") + (state_->precision == Precision::int8 ? "int8, " : "fp32, ") +
+         std::to_string(threads) + (threads == 1 ? " thread" : " threads");
+}
+
+void OneDnnNetwork::observe(std::span<const float> input, const Observer& observer) {
+  state_->plan->run(input, [&](TensorId tensor, std::span<const float> values) {
+    observer(state_->tensor_names[tensor], values);
+  });
+}
+
+double OneDnnNetwork::giga_operations() const { return state_->giga_operations; }
+std::size_t OneDnnNetwork::memory_bytes() const { return state_->plan->memory_bytes(); }
+std::vector<std::string> OneDnnNetwork::steps() const { return state_->plan->steps(); }
+
+}  // namespace stillmap

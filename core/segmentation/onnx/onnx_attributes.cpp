@@ -1,0 +1,83 @@
+#include "core/segmentation/onnx/onnx_attributes.hpp"
+
+#include <onnx/onnx_pb.h>
+
+#include <algorithm>
+
+namespace stillmap {
+namespace {
+
+/// No kernel, stride or padding of a sound network is as large.
+constexpr std::int64_t max_number = 4096;
+
+}  // namespace
+
+std::string layer_name(const onnx::NodeProto& node) {
+  if (!node.name().empty()) return node.name();
+  return node.output().empty() ? node.op_type() : node.output(0);
+}
+
+const onnx::AttributeProto* OnnxAttributes::find(const std::string& name) const {
+  const auto found = std::ranges::find_if(
+      node_.attribute(), [&name](const auto& attribute) { return attribute.name() == name; });
+  return found == node_.attribute().end() ? nullptr : &*found;
+}
+
+void OnnxAttributes::refuse(const std::string& name, const std::string& fault) const {
+  throw GraphFault("layer '" + layer_name(node_) + "': " + name + " " + fault);
+}
+
+float OnnxAttributes::real(const std::string& name, float otherwise) const {
+  const onnx::AttributeProto* const attribute = find(name);
+  return attribute == nullptr ? otherwise : attribute->f();
+}
+
+std::int64_t OnnxAttributes::whole(const std::string& name, std::int64_t otherwise) const {
+  const onnx::AttributeProto* const attribute = find(name);
+  return attribute == nullptr ? otherwise : attribute->i();
+}
+
+std::string OnnxAttributes::text(const std::string& name) const {
+  const onnx::AttributeProto* const attribute = find(name);
+  return attribute == nullptr ? std::string() : attribute->s();
+}
+
+std::vector<std::int64_t> OnnxAttributes::whole_numbers(const std::string& name) const {
+  const onnx::AttributeProto* const attribute = find(name);
+  if (attribute == nullptr) return {};
+  return {attribute->ints().begin(), attribute->ints().end()};
+}
+
+std::vector<int> OnnxAttributes::small_numbers(const std::string& name, int least,
+                                               std::vector<int> otherwise) const {
+  const std::vector<std::int64_t> written = whole_numbers(name);
+  if (written.empty()) return otherwise;
+  if (written.size() != otherwise.size()) {
+    refuse(name, "has " + std::to_string(written.size()) + " numbers where " +
+                     std::to_string(otherwise.size()) + " are wanted: not an image?");
+  }
+  for (std::size_t i = 0; i < written.size(); ++i) {
+    if (written[i] < least || written[i] > max_number) {
+      refuse(name, "is " + std::to_string(written[i]) + ", but must be " + std::to_string(least) +
+                       ".." + std::to_string(max_number));
+    }
+    otherwise[i] = static_cast<int>(written[i]);
+  }
+  return otherwise;
+}
+
+RowsColumns OnnxAttributes::pair(const std::string& name, int least, RowsColumns otherwise) const {
+  const std::vector<int> pair = small_numbers(name, least, {otherwise.rows, otherwise.columns});
+  return {.rows = pair[0], .columns = pair[1]};
+}
+
+Padding OnnxAttributes::padding() const {
+  if (const std::string how = text("auto_pad"); !how.empty() && how != "NOTSET") {
+    throw UnsupportedLayer("layer '" + layer_name(node_) + "': auto_pad " + how +
+                           " is not supported");
+  }
+  const std::vector<int> pads = small_numbers("pads", 0, {0, 0, 0, 0});
+  return {.top = pads[0], .left = pads[1], .bottom = pads[2], .right = pads[3]};
+}
+
+}  // namespace stillmap

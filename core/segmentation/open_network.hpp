@@ -1,0 +1,41 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "core/segmentation/model_description.hpp"
+#include "core/segmentation/segmentation_network.hpp"
+
+namespace stillmap {
+
+/// How a network is to be run.
+struct EngineChoice {
+  enum class Engine {
+    /// oneDNN where it can run the network, else OpenCV.
+    automatic,
+    onednn,
+    opencv,
+  };
+  enum class Numbers {
+    /// int8 where the model has a calibration for it and oneDNN runs it, else fp32.
+    automatic,
+    fp32,
+    int8,
+  };
+
+  Engine engine = Engine::automatic;
+  Numbers precision = Numbers::automatic;
+  /// Threads of oneDNN for one image; 0: all cores.
+  int threads = 0;
+};
+
+struct OpenedNetwork {
+  std::unique_ptr<SegmentationNetwork> network;
+  /// Why it is slower than it could be; empty when it is not.
+  std::string remark;
+};
+
+/// Loads the network that `model` describes into the engine that was chosen. Throws ModelError.
+[[nodiscard]] OpenedNetwork open_network(const ModelDescription& model, const EngineChoice& choice);
+
+}  // namespace stillmap

@@ -1,0 +1,20 @@
+#include "core/segmentation/stream_first_labels.hpp"
+
+#include <utility>
+
+#include "core/segmentation/stream_labels.hpp"
+
+namespace stillmap {
+
+StreamFirstLabels::StreamFirstLabels(std::unique_ptr<LabelSource> otherwise)
+    : otherwise_(std::move(otherwise)) {}
+
+std::string StreamFirstLabels::name() const {
+  return StreamLabels().name() + ", else " + otherwise_->name();
+}
+
+PointLabels StreamFirstLabels::label(const Scan& scan) {
+  return scan.labels.empty() ? otherwise_->label(scan) : StreamLabels().label(scan);
+}
+
+}  // namespace stillmap

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <memory>
+
+#include "core/segmentation/label_source.hpp"
+
+namespace stillmap {
+
+/// The labels that come with a scan where it has any; else those of another source. So recordings
+/// with true labels keep them, and all other scans get semantics from the network.
+class StreamFirstLabels final : public LabelSource {
+ public:
+  explicit StreamFirstLabels(std::unique_ptr<LabelSource> otherwise);
+
+  [[nodiscard]] std::string name() const override;
+  [[nodiscard]] std::string details() const override { return otherwise_->details(); }
+  [[nodiscard]] PointLabels label(const Scan& scan) override;
+
+ private:
+  std::unique_ptr<LabelSource> otherwise_;
+};
+
+}  // namespace stillmap

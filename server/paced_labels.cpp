@@ -1,0 +1,102 @@
+#include "server/paced_labels.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <exception>
+#include <utility>
+
+namespace stillmap {
+namespace {
+
+double milliseconds(std::chrono::steady_clock::duration time) {
+  return std::chrono::duration<double, std::milli>(time).count();
+}
+
+}  // namespace
+
+std::chrono::milliseconds label_budget(const ServerConfig& config) {
+  const bool every_scan_counts = config.input.delivery == Delivery::every;
+  const LabelOrigin source = config.labels.source;
+  const bool takes_no_time = source == LabelOrigin::stream || source == LabelOrigin::none;
+  return std::chrono::milliseconds(every_scan_counts || takes_no_time ? 0U
+                                                                      : config.labels.budget_ms);
+}
+
+PacedLabels::PacedLabels(std::unique_ptr<LabelSource> source, std::chrono::milliseconds budget,
+                         Statistics& statistics)
+    : source_(std::move(source)), name_(source_->name()), budget_(budget), statistics_(statistics) {
+  if (!may_skip_scans()) return;
+  thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+}
+
+PacedLabels::~PacedLabels() = default;
+
+LabelFeed::Answer PacedLabels::offer(const Scan& scan) {
+  Answer answer;
+  if (!may_skip_scans()) {
+    answer.finished.push_back(segment(scan));
+    return answer;
+  }
+  std::unique_lock lock(mutex_);
+  if (is_due()) {
+    job_ = scan;
+    busy_ = true;
+    offers_since_taken_ = 0;
+    changed_.notify_all();
+    // A source that is known to need longer is not worth the wait.
+    const bool can_be_in_time = cadence_.network_ms() <= milliseconds(budget_);
+    if (can_be_in_time) changed_.wait_for(lock, budget_, [this] { return !busy_; });
+    answer.pending = busy_;
+  }
+  answer.finished = std::exchange(finished_, {});
+  return answer;
+}
+
+bool PacedLabels::is_due() {
+  ++offers_since_taken_;
+  return !busy_ && offers_since_taken_ >= cadence_.every();
+}
+
+void PacedLabels::work(const std::stop_token& stop) {
+  while (true) {
+    std::unique_lock lock(mutex_);
+    if (!changed_.wait(lock, stop, [this] { return job_.has_value(); })) return;
+    const Scan scan = *std::exchange(job_, std::nullopt);
+    lock.unlock();
+    ScanLabels labels = segment(scan);
+    lock.lock();
+    finished_.push_back(std::move(labels));
+    busy_ = false;
+    changed_.notify_all();
+  }
+}
+
+ScanLabels PacedLabels::segment(const Scan& scan) {
+  const auto began = Clock::now();
+  try {
+    ScanLabels labels{scan.stamp_ns, source_->label(scan)};
+    statistics_.labels_worked();
+    segmented(milliseconds(Clock::now() - began));
+    return labels;
+  } catch (const std::exception& error) {
+    statistics_.labels_failed(error.what());
+    warnings_.warn("label_failure", std::string("segmentation failed: ") + error.what());
+    return {scan.stamp_ns, {}};
+  }
+}
+
+void PacedLabels::segmented(double network_ms) {
+  statistics_.add_latency("network", network_ms);
+  const std::scoped_lock lock(mutex_);
+  const std::uint32_t before = cadence_.every();
+  // Of the sensor, not of the scans that are offered: an overloaded server drops scans.
+  cadence_.scan_segmented(network_ms, statistics_.receive_period_ms());
+  const std::uint32_t now = cadence_.every();
+  statistics_.segmenting(now, cadence_.network_ms());
+  if (now == before) return;
+  const auto level = now > before ? spdlog::level::warn : spdlog::level::info;
+  spdlog::log(level, "{} is segmented now: that takes {:.0f} ms, and scans come every {:.0f} ms",
+              every_nth_scan(now), cadence_.network_ms(), cadence_.period_ms());
+}
+
+}  // namespace stillmap

@@ -1,0 +1,209 @@
+#include <algorithm>
+#include <cstring>
+#include <sstream>
+#include <vector>
+
+#include "tests/clients/command_test.hpp"
+
+namespace stillmap::test {
+namespace {
+
+class DatasetCommandTest : public CommandTest {
+ protected:
+  [[nodiscard]] nlohmann::json run_json(const std::string& arguments) const {
+    const ProcessResult result = run(arguments + " --json");
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(result.out, nullptr, false);
+  }
+  /// Compared without printing megabytes when they differ.
+  [[nodiscard]] bool same(const std::string& a, const std::string& b) const {
+    return content(a) == content(b) && !content(a).empty();
+  }
+  [[nodiscard]] std::vector<std::string> lines(const std::string& name) const {
+    std::istringstream text(content(name));
+    std::vector<std::string> lines;
+    for (std::string line; std::getline(text, line);) lines.push_back(line);
+    return lines;
+  }
+  /// Name of a scan's files.
+  static std::string stem(std::size_t number) {
+    const std::string digits = std::to_string(number);
+    return std::string(6 - digits.size(), '0') + digits;
+  }
+  /// The same coordinates bit by bit; the intensity went through the sensor's units.
+  void expect_same_points(const std::string& a, const std::string& b) const {
+    const auto read = [&](const std::string& name) {
+      const std::string bytes = content(name);
+      std::vector<float> values(bytes.size() / sizeof(float));
+      std::memcpy(values.data(), bytes.data(), values.size() * sizeof(float));
+      return values;
+    };
+    const std::vector<float> values_a = read(a), values_b = read(b);
+    ASSERT_EQ(values_a.size(), values_b.size());
+    for (std::size_t i = 0; i < values_a.size(); ++i) {
+      ASSERT_NEAR(values_a[i], values_b[i], i % 4 == 3 ? 1e-6 : 0.0) << i;
+    }
+  }
+  void remove(const std::string& name) const { std::filesystem::remove_all(folder_ / name); }
+};
+
+TEST_F(DatasetCommandTest, ALabelledRecordingGoesThroughAllStepsWithoutLoss) {
+  simulate("city", 4);
+  const nlohmann::json exported = run_json("dataset export " + path("city") + " " + path("copy"));
+  EXPECT_EQ(exported.at("scans"), 4);
+  EXPECT_EQ(exported.at("label_source"), "stream");
+  for (const char* file : {"velodyne/000003.bin", "labels/000003.label", "times.txt"}) {
+    EXPECT_TRUE(same(std::string("copy/") + file, std::string("city/") + file)) << file;
+  }
+  EXPECT_EQ(line_count("copy/poses.txt"), 4U);
+  EXPECT_THAT(content("copy/calib.txt"), HasSubstr("Tr: "));
+
+  const std::string cloud = path("city.ply");
+  const nlohmann::json merged = run_json("dataset aggregate " + path("copy") + " " + cloud);
+  EXPECT_EQ(merged.at("points"), exported.at("points"));
+  const nlohmann::json scattered = run_json("dataset scatter " + cloud + " " + path("copy"));
+  EXPECT_EQ(scattered.at("points_in_cloud"), exported.at("points"));
+  EXPECT_EQ(scattered.at("labels_changed"), 0);
+  EXPECT_TRUE(same("copy/labels/000002.label", "city/labels/000002.label"));
+  EXPECT_FALSE(exists("copy/labels.bak"));
+}
+
+TEST_F(DatasetCommandTest, LabelsComeBackFromTheCloudAlone) {
+  simulate("city", 2);
+  ASSERT_EQ(run("dataset aggregate " + path("city") + " " + path("city.ply")).exit_code, 0);
+  const std::string before = content("city/labels/000001.label");
+  remove("city/labels");
+  const ProcessResult result = run("dataset scatter " + path("city.ply") + " " + path("city"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("labels changed in 2 scans"));
+  EXPECT_TRUE(content("city/labels/000001.label") == before);
+}
+
+TEST_F(DatasetCommandTest, PosesAreOurOdometrysInTheCameraFrame) {
+  simulate("city", 5);
+  ASSERT_EQ(run("dataset export " + path("city") + " " + path("copy")).exit_code, 0);
+  EXPECT_NE(content("copy/poses.txt"), content("city/poses.txt"));
+  const nlohmann::json error = run_json("evaluate trajectory --truth " + path("city/poses.txt") +
+                                        " --estimate " + path("copy/poses.txt"));
+  EXPECT_LT(error.at("ate_unaligned_rmse_m"), 0.3);
+}
+
+TEST_F(DatasetCommandTest, WithoutLabelsEveryPointIsUnlabeled) {
+  simulate("city", 2);
+  remove("city/labels");
+  const nlohmann::json exported =
+      run_json("dataset export " + path("city") + " " + path("copy") + " --labels none");
+  EXPECT_EQ(exported.at("labelled_points"), 0);
+  const std::string labels = content("copy/labels/000001.label");
+  EXPECT_EQ(labels.size() * 4, content("copy/velodyne/000001.bin").size());
+  EXPECT_EQ(labels.find_first_not_of('\0'), std::string::npos);
+}
+
+TEST_F(DatasetCommandTest, TheModelGuessesTheLabelsOfARecordingWithoutAny) {
+  simulate("city", 2);
+  remove("city/labels");
+  const nlohmann::json exported = run_json("dataset export " + path("city") + " " + path("copy"));
+  EXPECT_EQ(exported.at("label_source"), "street");
+  EXPECT_GT(exported.at("labelled_points"), 1000);
+}
+
+TEST_F(DatasetCommandTest, EveryScanAndPointIsWrittenEvenWhenOdometryCannotUseThem) {
+  simulate("city", 3);
+  std::filesystem::resize_file(folder_ / "city/velodyne/000001.bin", 16 * 20);
+  std::filesystem::resize_file(folder_ / "city/labels/000001.label", 4 * 20);
+  std::filesystem::resize_file(folder_ / "city/rings/000001.bin", 2 * 20);
+  const ProcessResult result = run("dataset export " + path("city") + " " + path("copy"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("000001.bin"));
+  EXPECT_THAT(result.out, HasSubstr("1 scans with the pose of the scan before"));
+  EXPECT_TRUE(same("copy/velodyne/000001.bin", "city/velodyne/000001.bin"));
+  EXPECT_EQ(line_count("copy/poses.txt"), 3U);
+}
+
+TEST_F(DatasetCommandTest, DoesNotWriteOverAnythingUnlessForced) {
+  simulate("city", 2);
+  const std::string to_copy = "dataset export " + path("city") + " " + path("copy");
+  ASSERT_EQ(run(to_copy).exit_code, 0);
+  write("copy/notes.txt", "mine");
+  const ProcessResult again = run(to_copy + " --scans 1");
+  EXPECT_EQ(again.exit_code, 2);
+  EXPECT_THAT(again.err, AllOf(HasSubstr(path("copy")), HasSubstr("--force")));
+  ASSERT_EQ(run(to_copy + " --scans 1 --force").exit_code, 0);
+  EXPECT_FALSE(exists("copy/velodyne/000001.bin"));
+  EXPECT_FALSE(exists("copy/labels/000001.label"));
+  EXPECT_EQ(content("copy/notes.txt"), "mine");
+  EXPECT_EQ(run("dataset export " + path("city") + " " + path("city") + " --force").exit_code, 2);
+  EXPECT_TRUE(exists("city/velodyne/000001.bin"));
+
+  const std::string to_cloud = "dataset aggregate " + path("city") + " " + path("city.ply");
+  ASSERT_EQ(run(to_cloud).exit_code, 0);
+  EXPECT_EQ(run(to_cloud).exit_code, 2);
+  EXPECT_EQ(run(to_cloud + " --force").exit_code, 0);
+}
+
+TEST_F(DatasetCommandTest, NamesWhatItCannotUse) {
+  simulate("city", 2);
+  const auto refusal = [&](const std::string& arguments) {
+    const ProcessResult result = run("dataset " + arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments;
+    return result.err;
+  };
+  EXPECT_THAT(refusal("export " + path("nowhere") + " " + path("out")), HasSubstr("nowhere"));
+  EXPECT_THAT(refusal("aggregate " + path("city") + " " + path("c.ply") + " --from 7"),
+              HasSubstr("from 7"));
+  write("foreign.ply",
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n1\n");
+  EXPECT_THAT(refusal("scatter " + path("foreign.ply") + " " + path("city")),
+              AllOf(HasSubstr("foreign.ply"), HasSubstr("\"label\"")));
+  EXPECT_THAT(refusal("scatter " + path("gone.ply") + " " + path("city")), HasSubstr("gone.ply"));
+}
+
+TEST_F(DatasetCommandTest, ALiveTopicBecomesASequence) {
+  simulate("city", 12);
+  const std::string on_domain = " --domain " + std::to_string(free_domain());
+  BackgroundProcess server(stillmap_server_program() + " --delivery every" + on_domain,
+                           folder_ / "server.log");
+  BackgroundProcess exporting(stillmap_program() + " dataset export topic:points " + path("live") +
+                                  " --silence 3 --sensor vlp_16 --json --timeout 30" + on_domain,
+                              folder_ / "export.log");
+  while (content("export.log").find("waiting for scans") == std::string::npos) {
+    ASSERT_EQ(run("status --timeout 30" + on_domain).exit_code, 0) << content("server.log");
+  }
+  ASSERT_EQ(run("replay " + path("city") + " --rate 0.5" + on_domain).exit_code, 0);
+  ASSERT_EQ(exporting.wait(), 0) << content("export.log");
+  const std::vector<std::string> live_times = lines("live/times.txt");
+  const std::vector<std::string> city_times = lines("city/times.txt");
+  // The first scans may be gone before all three have found one another.
+  ASSERT_GE(live_times.size(), 6U) << content("export.log");
+  for (std::size_t k = 0; k < live_times.size(); ++k) {
+    const auto found = std::ranges::find(city_times, live_times[k]);
+    ASSERT_NE(found, city_times.end());
+    const auto number = static_cast<std::size_t>(found - city_times.begin());
+    expect_same_points("live/velodyne/" + stem(k) + ".bin",
+                       "city/velodyne/" + stem(number) + ".bin");
+    EXPECT_EQ(content("live/labels/" + stem(k) + ".label").size(),
+              content("city/labels/" + stem(number) + ".label").size());
+  }
+  EXPECT_EQ(line_count("live/poses.txt"), live_times.size());
+  // What the server took from the stream comes back as its labels.
+  const std::string log = content("export.log");
+  EXPECT_GT(nlohmann::json::parse(log.substr(log.find("\n{"))).at("labelled_points"), 10'000);
+}
+
+TEST_F(DatasetCommandTest, ALiveExportThatGetsNoPosesSaysSo) {
+  simulate("city", 3);
+  const std::string on_domain = " --domain " + std::to_string(free_domain());
+  BackgroundProcess server(stillmap_server_program() + on_domain, folder_ / "server.log");
+  BackgroundProcess exporting(stillmap_program() + " dataset export topic:other " + path("live") +
+                                  " --silence 1 --timeout 30" + on_domain,
+                              folder_ / "export.log");
+  while (content("export.log").find("waiting for scans") == std::string::npos) {
+    ASSERT_EQ(run("status --timeout 30" + on_domain).exit_code, 0) << content("server.log");
+  }
+  ASSERT_EQ(run("replay " + path("city") + " --topic other" + on_domain).exit_code, 0);
+  EXPECT_EQ(exporting.wait(), 1);
+  EXPECT_THAT(content("export.log"), HasSubstr("the server did not map"));
+}
+
+}  // namespace
+}  // namespace stillmap::test

@@ -1,0 +1,187 @@
+// What the mapper makes of labels that come late, seldom or not at all.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <deque>
+
+#include "core/mapper.hpp"
+#include "core/segmentation/stream_labels.hpp"
+#include "tests/odometry/box_drive.hpp"
+#include "tests/odometry/poses.hpp"
+
+namespace stillmap {
+namespace {
+
+using test::BoxDrive;
+
+/// Takes every n-th scan and hands its labels in `delay` scans later.
+class SlowFeed final : public LabelFeed {
+ public:
+  SlowFeed(int every, int delay) : every_(every), delay_(delay) {}
+
+  [[nodiscard]] std::string name() const override { return "slow"; }
+  [[nodiscard]] bool may_skip_scans() const override { return true; }
+  [[nodiscard]] Answer offer(const Scan& scan) override {
+    Answer answer;
+    const int now = offers_++;
+    if (now % every_ == 0) {
+      jobs_.push_back({now + delay_, {scan.stamp_ns, StreamLabels().label(scan)}});
+      answer.pending = delay_ > 0;
+    }
+    while (!jobs_.empty() && jobs_.front().due <= now) {
+      answer.finished.push_back(jobs_.front().labels);
+      jobs_.pop_front();
+    }
+    return answer;
+  }
+
+ private:
+  struct Job {
+    int due;
+    ScanLabels labels;
+  };
+  int every_;
+  int delay_;
+  int offers_ = 0;
+  std::deque<Job> jobs_;
+};
+
+/// Hands in empty labels, as after a failure.
+class FailingFeed final : public LabelFeed {
+ public:
+  [[nodiscard]] std::string name() const override { return "failing"; }
+  [[nodiscard]] bool may_skip_scans() const override { return true; }
+  [[nodiscard]] Answer offer(const Scan& scan) override {
+    return {.finished = {{scan.stamp_ns, {}}}, .pending = false};
+  }
+};
+
+MapperConfig box_config() {
+  MapperConfig config;
+  config.sensor = test::test_lidar();
+  return config;
+}
+
+const BoxDrive& traffic_drive() {
+  static const BoxDrive drive(test::street_with_traffic(), 30);
+  return drive;
+}
+
+std::size_t voxels_in(const MapView& view) {
+  std::size_t count = 0;
+  for (const auto& tile : view.tiles) count += tile->voxels.size();
+  return count;
+}
+
+/// Share of the voxels that are of the class that most votes of a reference map give them.
+double share_of_agreeing_voxels(const MapView& view, const MapView& reference) {
+  std::size_t common = 0, agreeing = 0;
+  for (const auto& tile : view.tiles) {
+    const auto other = std::ranges::find(reference.tiles, tile->info.id,
+                                         [](const auto& shared) { return shared->info.id; });
+    if (other == reference.tiles.end()) continue;
+    for (const Voxel& voxel : tile->voxels) {
+      const auto same = std::ranges::lower_bound((*other)->voxels, voxel.index, {}, &Voxel::index);
+      if (same == (*other)->voxels.end() || same->index != voxel.index) continue;
+      ++common;
+      agreeing += same->evidence.winner() == voxel.evidence.winner() ? 1U : 0U;
+    }
+  }
+  return static_cast<double>(agreeing) / static_cast<double>(common);
+}
+
+/// Points whose label is the true one.
+struct RightLabels {
+  std::size_t right = 0;
+  std::size_t points = 0;
+
+  void add(const LabelledScan& labelled) {
+    points += labelled.scan.size();
+    for (std::size_t i = 0; i < labelled.scan.size(); ++i) {
+      right += labelled.label(i) == labelled.scan.labels[i] ? 1U : 0U;
+    }
+  }
+  [[nodiscard]] double share() const {
+    return static_cast<double>(right) / static_cast<double>(points);
+  }
+};
+
+struct Rhythm {
+  int every;
+  int delay;
+  /// Share of right labels to be reached; the drive is fast, and much of a scan is new ground.
+  double right;
+};
+
+class LateLabels : public testing::TestWithParam<Rhythm> {};
+
+TEST_P(LateLabels, MapAndPosesAreNearlyThoseOfLabelsInTime) {
+  const auto [every, delay, right_share] = GetParam();
+  RightLabels carried;
+  Mapper in_time(box_config(), std::make_unique<StreamLabels>());
+  Mapper late(box_config(), std::make_unique<SlowFeed>(every, delay));
+  for (std::size_t k = 0; k < traffic_drive().scans.size(); ++k) {
+    ASSERT_TRUE(in_time.process(traffic_drive().scans[k].scan));
+    const auto mapped = late.process(traffic_drive().scans[k].scan);
+    ASSERT_TRUE(mapped);
+    test::expect_near(mapped->odometry.T_map_lidar, traffic_drive().T_map_lidar[k], 0.2, 0.01);
+    const bool fresh = delay == 0 && k % static_cast<std::size_t>(every) == 0;
+    if (fresh) {
+      EXPECT_EQ(mapped->labelling, Labelling::fresh) << k;
+    } else if (k >= static_cast<std::size_t>(every + delay)) {
+      EXPECT_EQ(mapped->labelling, Labelling::carried) << k;
+      carried.add(mapped->labelled);
+    }
+  }
+  EXPECT_GT(carried.share(), right_share);
+  const auto reference = in_time.map_view(), view = late.map_view();
+  EXPECT_GT(voxels_in(*view), voxels_in(*reference) * 7 / 10);
+  EXPECT_GT(share_of_agreeing_voxels(*view, *reference), 0.98);
+  for (const auto& tile : view->tiles) {
+    for (const Voxel& voxel : tile->voxels) ASSERT_FALSE(is_movable(voxel.evidence.winner()));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Mapper, LateLabels,
+                         testing::Values(Rhythm{1, 1, 0.9}, Rhythm{2, 0, 0.9}, Rhythm{3, 0, 0.87},
+                                         Rhythm{3, 2, 0.83}, Rhythm{5, 4, 0.75}),
+                         [](const auto& info) {
+                           return "Every" + std::to_string(info.param.every) + "Late" +
+                                  std::to_string(info.param.delay);
+                         });
+
+TEST(MapperLabels, CarriedOnesCountLessThanFreshOnes) {
+  Mapper mapper(box_config(), std::make_unique<SlowFeed>(2, 0));
+  ASSERT_TRUE(mapper.process(traffic_drive().scans[0].scan));
+  const auto mapped = mapper.process(traffic_drive().scans[1].scan);
+  ASSERT_TRUE(mapped);
+  ASSERT_EQ(mapped->labelling, Labelling::carried);
+  for (const float confidence : mapped->labelled.labels.confidence) {
+    ASSERT_LE(confidence, 0.5F);
+  }
+}
+
+TEST(MapperLabels, AFeedThatFailsGivesPureGeometry) {
+  Mapper mapper(box_config(), std::make_unique<FailingFeed>());
+  for (std::size_t k = 0; k < 5; ++k) {
+    const auto mapped = mapper.process(traffic_drive().scans[k].scan);
+    ASSERT_TRUE(mapped);
+    EXPECT_EQ(mapped->labelling, Labelling::none);
+    EXPECT_TRUE(mapped->labelled.labels.empty());
+    test::expect_near(mapped->odometry.T_map_lidar, traffic_drive().T_map_lidar[k], 0.2, 0.02);
+  }
+  EXPECT_GT(voxels_in(*mapper.map_view()), 1000U);
+}
+
+TEST(MapperLabels, ResetForgetsWhatWasPending) {
+  Mapper mapper(box_config(), std::make_unique<SlowFeed>(2, 1));
+  for (std::size_t k = 0; k < 3; ++k) ASSERT_TRUE(mapper.process(traffic_drive().scans[k].scan));
+  mapper.reset(5);
+  // Only now the labels of scan 2 come.
+  const auto mapped = mapper.process(traffic_drive().scans[10].scan);
+  ASSERT_TRUE(mapped);
+  EXPECT_EQ(mapped->labelling, Labelling::none);
+}
+
+}  // namespace
+}  // namespace stillmap

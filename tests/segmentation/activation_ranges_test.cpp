@@ -1,0 +1,44 @@
+#include "core/segmentation/activation_ranges.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace stillmap {
+namespace {
+
+TEST(ActivationRanges, FindTheLargestMagnitudeOfAllImages) {
+  ActivationRanges ranges;
+  ranges.add("a", std::vector<float>{1.0F, -3.5F});
+  ranges.add("a", std::vector<float>{2.0F});
+  ranges.add("b", std::vector<float>{0.0F});
+  EXPECT_EQ(ranges.ranges(1.0), (std::map<std::string, float>{{"a", 3.5F}, {"b", 0.0F}}));
+}
+
+TEST(ActivationRanges, LeaveOutTheShareThatMayBeCutOff) {
+  std::mt19937 random(3);
+  std::normal_distribution<float> any(0.0F, 2.0F);
+  std::vector<float> values(100000);
+  for (float& value : values) value = any(random);
+  ActivationRanges ranges;
+  ranges.add("x", values);
+  for (float& value : values) value = std::abs(value);
+  std::ranges::sort(values);
+  for (const double share : {0.5, 0.99, 0.9999}) {
+    const float exact = values[static_cast<std::size_t>(share * 100000.0) - 1];
+    EXPECT_NEAR(ranges.ranges(share).at("x"), exact, 0.01 * exact);
+  }
+}
+
+TEST(ActivationRanges, DoNotCountWhatIsNoNumber) {
+  ActivationRanges ranges;
+  ranges.add("x", std::vector<float>{std::numeric_limits<float>::quiet_NaN(), 1.0F,
+                                     std::numeric_limits<float>::infinity()});
+  EXPECT_EQ(ranges.ranges(1.0).at("x"), 1.0F);
+}
+
+}  // namespace
+}  // namespace stillmap

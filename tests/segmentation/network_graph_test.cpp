@@ -1,0 +1,255 @@
+#include "core/segmentation/graph/network_graph.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "core/segmentation/graph/fold_batch_norm.hpp"
+#include "core/segmentation/graph/fuse_follow_ups.hpp"
+#include "core/segmentation/graph/infer_shapes.hpp"
+#include "core/segmentation/graph/replace_transposed.hpp"
+#include "tests/segmentation/plain_network.hpp"
+
+namespace stillmap {
+namespace {
+
+using test::PlainTensor;
+using test::run_plainly;
+using ::testing::HasSubstr;
+
+constexpr ImageShape image{.channels = 3, .rows = 4, .columns = 6};
+
+std::vector<float> random_values(std::size_t count, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> any(-1.0F, 1.0F);
+  std::vector<float> values(count);
+  for (float& value : values) value = any(random);
+  return values;
+}
+
+/// Builds graphs layer by layer; tensor 0 is the input.
+struct GraphBuilder {
+  NetworkGraph graph{.tensors = {{.name = "input"}}, .layers = {}};
+
+  TensorId add(Operation operation, std::vector<TensorId> inputs) {
+    const TensorId output = graph.tensors.size();
+    graph.tensors.push_back({.name = "t" + std::to_string(output)});
+    graph.layers.push_back({.name = "layer" + std::to_string(output),
+                            .operation = std::move(operation),
+                            .inputs = std::move(inputs),
+                            .output = output});
+    return graph.output = output;
+  }
+};
+
+Convolution convolution(int inputs, int outputs, RowsColumns stride = {}) {
+  const auto count = static_cast<std::size_t>(inputs * outputs * 9);
+  return {.outputs = outputs,
+          .inputs = inputs,
+          .kernel = {.rows = 3, .columns = 3},
+          .stride = stride,
+          .dilation = {},
+          .padding = {.top = 1, .left = 1, .bottom = 1, .right = 1},
+          .weights = random_values(count, 5),
+          .bias = random_values(static_cast<std::size_t>(outputs), 6),
+          .widen = {}};
+}
+
+TransposedConvolution transposed(RowsColumns kernel, RowsColumns stride, Padding padding = {},
+                                 RowsColumns extra = {.rows = 0, .columns = 0}) {
+  constexpr int outputs = 2;
+  const auto count =
+      static_cast<std::size_t>(image.channels * outputs * kernel.rows * kernel.columns);
+  return {.inputs = image.channels,
+          .outputs = outputs,
+          .kernel = kernel,
+          .stride = stride,
+          .padding = padding,
+          .extra = extra,
+          .weights = random_values(count, 7),
+          .bias = random_values(outputs, 8)};
+}
+
+BatchNorm batch_norm(std::size_t channels) {
+  return {.scale = random_values(channels, 9), .offset = random_values(channels, 10)};
+}
+
+PlainTensor run(const NetworkGraph& graph) {
+  return run_plainly(graph, image, random_values(image.size(), 1));
+}
+
+void expect_same(const PlainTensor& a, const PlainTensor& b) {
+  EXPECT_EQ(a.shape, b.shape);
+  ASSERT_EQ(a.values.size(), b.values.size());
+  for (std::size_t i = 0; i < a.values.size(); ++i) EXPECT_NEAR(a.values[i], b.values[i], 1e-5);
+}
+
+TEST(FoldBatchNorms, LeavesTheResultOfConvolutionsAsItWas) {
+  GraphBuilder builder;
+  const TensorId narrow = builder.add(convolution(3, 5), {0});
+  const TensorId normed = builder.add(batch_norm(5), {narrow});
+  TransposedConvolution widening = transposed({.rows = 1, .columns = 4}, {.rows = 1, .columns = 2},
+                                              {.top = 0, .left = 1, .bottom = 0, .right = 1});
+  widening.inputs = 5;
+  widening.weights = random_values(5 * 2 * 4, 3);
+  builder.add(batch_norm(2), {builder.add(widening, {normed})});
+  NetworkGraph folded = builder.graph;
+  fold_batch_norms(folded);
+  EXPECT_EQ(folded.layers.size(), 2U);
+  expect_same(run(folded), run(builder.graph));
+}
+
+TEST(FoldBatchNorms, LeavesANormAloneWhoseInputIsReadElsewhere) {
+  GraphBuilder builder;
+  const TensorId c = builder.add(convolution(3, 5), {0});
+  builder.add(Add{}, {builder.add(batch_norm(5), {c}), c});
+  NetworkGraph folded = builder.graph;
+  fold_batch_norms(folded);
+  EXPECT_EQ(folded.layers.size(), 3U);
+  expect_same(run(folded), run(builder.graph));
+}
+
+struct Widening {
+  RowsColumns kernel, stride;
+  Padding padding = {};
+  RowsColumns extra = {.rows = 0, .columns = 0};
+};
+
+class ReplaceTransposed : public ::testing::TestWithParam<Widening> {};
+
+TEST_P(ReplaceTransposed, GivesTheSame) {
+  const Widening& w = GetParam();
+  GraphBuilder builder;
+  builder.add(transposed(w.kernel, w.stride, w.padding, w.extra), {0});
+  NetworkGraph replaced = builder.graph;
+  replace_transposed_convolutions(replaced);
+  EXPECT_TRUE(std::holds_alternative<Convolution>(replaced.layers.front().operation));
+  expect_same(run(replaced), run(builder.graph));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Widenings, ReplaceTransposed,
+    ::testing::Values(
+        // DarkNet's decoder.
+        Widening{{1, 4}, {1, 2}, {0, 1, 0, 1}},
+        // Kernel = stride.
+        Widening{{1, 2}, {1, 2}}, Widening{{2, 2}, {2, 2}}, Widening{{2, 1}, {2, 1}},
+        Widening{{3, 4}, {3, 4}},
+        // A head that widens both ways.
+        Widening{{2, 4}, {2, 2}, {0, 1, 0, 1}}, Widening{{4, 4}, {2, 2}, {1, 1, 1, 1}},
+        // Odd kernels, unequal sides, places that no tap reaches.
+        Widening{{3, 3}, {2, 2}, {1, 1, 0, 0}}, Widening{{3, 3}, {2, 2}, {1, 1, 1, 1}, {1, 1}},
+        Widening{{3, 3}, {1, 1}, {1, 1, 1, 1}}, Widening{{1, 1}, {2, 2}, {0, 0, 0, 0}, {1, 1}}));
+
+TEST(ReplaceTransposed, TurnsDarkNetsIntoOneByThreeOfTwiceTheOutputs) {
+  GraphBuilder builder;
+  builder.add(transposed({1, 4}, {1, 2}, {0, 1, 0, 1}), {0});
+  replace_transposed_convolutions(builder.graph);
+  const auto& c = std::get<Convolution>(builder.graph.layers.front().operation);
+  EXPECT_EQ(c.kernel, (RowsColumns{.rows = 1, .columns = 3}));
+  EXPECT_EQ(c.outputs, 4);
+}
+
+TEST(ReplaceTransposed, RefusesWhatIsNoMultipleOfTheInput) {
+  GraphBuilder builder;
+  builder.add(transposed({3, 3}, {2, 2}), {0});
+  EXPECT_THROW(replace_transposed_convolutions(builder.graph), UnsupportedLayer);
+}
+
+TEST(FuseFollowUps, MakesADarkNetBlockTwoLayersWithTheSameResult) {
+  GraphBuilder builder;
+  const TensorId x = builder.add(LeakyRelu{0.1F}, {builder.add(convolution(3, 4), {0})});
+  const TensorId narrow = builder.add(LeakyRelu{0.1F}, {builder.add(convolution(4, 2), {x})});
+  const TensorId wide = builder.add(LeakyRelu{0.1F}, {builder.add(convolution(2, 4), {narrow})});
+  builder.add(convolution(4, 3), {builder.add(Add{}, {wide, x})});
+  NetworkGraph fused = builder.graph;
+  fuse_follow_ups(fused);
+  EXPECT_EQ(fused.layers.size(), 4U);
+  EXPECT_EQ(fused.layers[2].follow_ups.size(), 2U);
+  expect_same(run(fused), run(builder.graph));
+}
+
+TEST(FuseFollowUps, KeepsWhatSomeoneElseReads) {
+  GraphBuilder builder;
+  const TensorId c = builder.add(convolution(3, 3), {0});
+  builder.add(Add{}, {builder.add(LeakyRelu{0.2F}, {c}), c});
+  NetworkGraph fused = builder.graph;
+  fuse_follow_ups(fused);
+  EXPECT_EQ(fused.layers.size(), 3U);
+  expect_same(run(fused), run(builder.graph));
+}
+
+TEST(FuseFollowUps, TakesASumIntoTheLaterOfItsLayers) {
+  GraphBuilder builder;
+  const TensorId first = builder.add(convolution(3, 4), {0});
+  const TensorId second = builder.add(convolution(3, 4), {0});
+  builder.add(LeakyRelu{0.3F}, {builder.add(Add{}, {first, second})});
+  NetworkGraph fused = builder.graph;
+  fuse_follow_ups(fused);
+  ASSERT_EQ(fused.layers.size(), 2U);
+  EXPECT_TRUE(fused.layers[0].follow_ups.empty());
+  EXPECT_EQ(fused.layers[1].follow_ups.size(), 2U);
+  expect_same(run(fused), run(builder.graph));
+}
+
+TEST(FuseFollowUps, LeavesATensorThatIsAddedToItself) {
+  GraphBuilder builder;
+  const TensorId c = builder.add(convolution(3, 4), {0});
+  builder.add(Add{}, {c, c});
+  NetworkGraph fused = builder.graph;
+  fuse_follow_ups(fused);
+  EXPECT_EQ(fused.layers.size(), 2U);
+  expect_same(run(fused), run(builder.graph));
+}
+
+TEST(DropFinalSoftmax, TakesOffOnlyOneThatMakesTheOutput) {
+  GraphBuilder builder;
+  const TensorId scores = builder.add(convolution(3, 4), {0});
+  builder.add(Softmax{}, {scores});
+  EXPECT_TRUE(drop_final_softmax(builder.graph));
+  EXPECT_EQ(builder.graph.output, scores);
+  EXPECT_FALSE(drop_final_softmax(builder.graph));
+}
+
+TEST(NetworkStride, IsWhatTheImageIsNarrowedByAtMost) {
+  GraphBuilder builder;
+  TensorId x = builder.add(convolution(3, 3, {.rows = 1, .columns = 2}), {0});
+  x = builder.add(convolution(3, 3, {.rows = 2, .columns = 2}), {x});
+  x = builder.add(transposed({2, 2}, {2, 2}), {x});
+  EXPECT_EQ(network_stride(builder.graph), (RowsColumns{.rows = 2, .columns = 4}));
+}
+
+std::string shape_fault(NetworkGraph graph, const ImageShape& shape) {
+  try {
+    infer_shapes(graph, shape);
+    return {};
+  } catch (const GraphFault& fault) {
+    return fault.what();
+  }
+}
+
+TEST(InferShapes, SaysWhereLayersDoNotFit) {
+  GraphBuilder builder;
+  const TensorId narrow = builder.add(convolution(3, 3, {.rows = 2, .columns = 2}), {0});
+  EXPECT_EQ(shape_fault(builder.graph, image), "");
+  EXPECT_THAT(shape_fault(builder.graph, {.channels = 5, .rows = 4, .columns = 6}),
+              HasSubstr("weights for 3 channels, but its input is 5x4x6"));
+  builder.add(Add{}, {0, narrow});
+  EXPECT_THAT(shape_fault(builder.graph, image),
+              HasSubstr("cannot add tensors of 3x4x6 and 3x2x3"));
+}
+
+TEST(InferShapes, RefusesTensorsThatAreEmptyOrAbsurd) {
+  GraphBuilder builder;
+  Convolution large = convolution(3, 3);
+  large.padding = {};
+  builder.add(large, {0});
+  EXPECT_THAT(shape_fault(builder.graph, {.channels = 3, .rows = 2, .columns = 6}),
+              HasSubstr("leaves nothing"));
+  EXPECT_THAT(shape_fault(builder.graph, {.channels = 3, .rows = 1 << 20, .columns = 1 << 20}),
+              HasSubstr("absurd"));
+}
+
+}  // namespace
+}  // namespace stillmap

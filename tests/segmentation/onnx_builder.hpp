@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "tests/segmentation/onnx_message.hpp"
+
+namespace stillmap::test {
+
+/// Rows and columns of a kernel, its stride, and the zeros on each side.
+struct Window {
+  Sizes kernel{1, 1};
+  Sizes stride{1, 1};
+  Sizes padding{0, 0};
+};
+
+/// How an exporter writes a soft-max over the channels.
+enum class SoftmaxStyle { whole, in_parts, between_transposes };
+
+/// Writes ONNX networks layer by layer, with random weights from a fixed seed. Each function takes
+/// names of tensors and returns its output's.
+class OnnxBuilder {
+ public:
+  /// A size of 0 is left open.
+  OnnxBuilder(int channels, int rows, int columns);
+
+  std::string convolve(const std::string& input, int outputs, const Window& window,
+                       bool bias = false);
+  std::string transpose(const std::string& input, int outputs, const Window& window,
+                        bool bias = false);
+  std::string normalise(const std::string& input);
+  std::string activate(const std::string& input);
+  std::string add(const std::string& first, const std::string& second);
+  std::string softmax(const std::string& input, SoftmaxStyle style = SoftmaxStyle::whole);
+  /// Any other node; `channels` of its output.
+  std::string node(const std::string& operation, const std::vector<std::string>& inputs,
+                   int channels, const std::vector<Message>& attributes = {});
+  /// Weights by hand.
+  std::string weights(const Message& tensor, const std::string& name);
+
+  /// The file, whose output is this tensor.
+  [[nodiscard]] std::string bytes(const std::string& output) const;
+  [[nodiscard]] int channels(const std::string& tensor) const { return channels_.at(tensor); }
+
+ private:
+  std::string float_weights(const Sizes& shape, float spread, float middle = 0.0F);
+  std::string fresh_name() { return "t" + std::to_string(++names_); }
+  std::string windowed(const std::string& operation, const std::string& input, int outputs,
+                       const Window& window, bool bias);
+
+  std::mt19937 random_{11};
+  Sizes input_shape_;
+  Message graph_;
+  std::map<std::string, int> channels_;
+  int names_ = 0;
+  int operator_set_ = 13;
+};
+
+/// DarkNet21 or DarkNet53 as lidar-bonnetal defines it, but with `stem` channels where it has 32.
+[[nodiscard]] std::string darknet_bytes(int layers, int stem, int rows, int columns, int classes);
+
+/// A light member of the family: stem of stride (1, 2), stages of strides (1, 2), (2, 2) and (2,
+/// 1), transposed convolutions with kernel = stride, head (1, 4) over (1, 2).
+[[nodiscard]] std::string light_bytes(int stem, int rows, int columns, int classes);
+
+}  // namespace stillmap::test

@@ -1,0 +1,72 @@
+#include "server/label_cadence.hpp"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "idl/server_status.hpp"
+
+namespace stillmap {
+namespace {
+
+/// What n becomes when scans come every 100 ms and the network takes so long, for ten scans.
+std::uint32_t settled(LabelCadence& cadence, double network_ms) {
+  for (int i = 0; i < 10; ++i) {
+    cadence.scan_segmented(network_ms, 100.0);
+  }
+  return cadence.every();
+}
+
+TEST(LabelCadence, TakesTheSmallestNThatTheNetworkCanKeep) {
+  for (const auto& [network_ms, every] :
+       {std::pair{5.0, 1U}, {90.0, 1U}, {130.0, 2U}, {190.0, 2U}, {240.0, 3U}, {950.0, 10U}}) {
+    LabelCadence cadence;
+    EXPECT_EQ(settled(cadence, network_ms), every) << network_ms;
+  }
+}
+
+TEST(LabelCadence, RecoversWhenTheNetworkIsFastAgain) {
+  LabelCadence cadence;
+  EXPECT_EQ(settled(cadence, 450.0), 5U);
+  EXPECT_EQ(settled(cadence, 210.0), 3U);
+  EXPECT_EQ(settled(cadence, 20.0), 1U);
+}
+
+TEST(LabelCadence, DoesNotSwingAtTheBorderOfTwoN) {
+  LabelCadence cadence;
+  (void)settled(cadence, 230.0);
+  std::set<std::uint32_t> seen;
+  for (int i = 0; i < 200; ++i) {
+    cadence.scan_segmented(i / 10 % 2 == 0 ? 192.0 : 208.0, 100.0);
+    seen.insert(cadence.every());
+  }
+  EXPECT_EQ(seen.size(), 1U);
+}
+
+TEST(LabelCadence, OneSlowRunAndOnePauseOfTheSensorChangeNothing) {
+  LabelCadence cadence;
+  EXPECT_EQ(settled(cadence, 50.0), 1U);
+  cadence.scan_segmented(5000.0, 100.0);
+  EXPECT_EQ(cadence.every(), 1U);
+  EXPECT_EQ(settled(cadence, 240.0), 3U);
+  cadence.scan_segmented(240.0, 60'000.0);
+  EXPECT_EQ(cadence.every(), 3U);
+}
+
+TEST(LabelCadence, BeforeTheRateIsKnownEveryScanIsDue) {
+  LabelCadence cadence;
+  cadence.scan_segmented(400.0, 0.0);
+  EXPECT_EQ(cadence.every(), 1U);
+}
+
+TEST(EveryNthScan, IsPlainEnglish) {
+  EXPECT_EQ(every_nth_scan(1), "every scan");
+  EXPECT_EQ(every_nth_scan(2), "every 2nd scan");
+  EXPECT_EQ(every_nth_scan(3), "every 3rd scan");
+  EXPECT_EQ(every_nth_scan(4), "every 4th scan");
+  EXPECT_EQ(every_nth_scan(12), "every 12th scan");
+  EXPECT_EQ(every_nth_scan(21), "every 21st scan");
+}
+
+}  // namespace
+}  // namespace stillmap
