@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+"""Makes a model folder of a training run: model.onnx, model.yaml, int8.yaml.
+
+  export.py runs/mine config/models/mine --calibrate data/validation/sequences/0001 ...
+
+int8.yaml is made, and the engines are checked against PyTorch, by the program `stillmap`.
+"""
+
+import argparse
+import subprocess
+import tempfile
+from pathlib import Path
+
+import torch
+
+from model_folder import check_engines, class_names, describe, random_images, write_model
+from networks import make_network
+
+
+def load_run(folder):
+    """The best network of a run, and its state."""
+    state = torch.load(folder / "best.pt", map_location="cpu")
+    network = make_network(state["config"]["network"], len(class_names()))
+    network.load_state_dict(state["averaged"])
+    return network.eval(), state
+
+
+def describe_run(arguments, state):
+    config = state["config"]
+    best = max(entry["miou"] for entry in state["history"])
+    words = {
+        "name": arguments.name or arguments.folder.name,
+        "licence": arguments.licence,
+        "sensor": arguments.sensor,
+        "training": arguments.training or f"{state['epoch']} epochs; see config.yaml of the run",
+        "accuracy": arguments.accuracy or f"validation mIoU {100 * best:.1f} % of pixels",
+    }
+    return describe(
+        words,
+        config["image"],
+        config["mean"],
+        config["deviation"],
+        class_names(),
+        config["knn"],
+        config["follow_sensor"],
+    )
+
+
+def read_arguments():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("run", type=Path, help="folder of train.py")
+    parser.add_argument("folder", type=Path, help="the model folder to write")
+    parser.add_argument("--name", help="default: the folder's name")
+    parser.add_argument("--licence", default="MIT")
+    parser.add_argument("--sensor", default="spinning lidars of 16 to 64 beams")
+    parser.add_argument("--training", help="how it was trained, in words")
+    parser.add_argument("--accuracy", help="how well it does, in words")
+    parser.add_argument("--calibrate", nargs="*", default=[], help="recordings for int8.yaml")
+    parser.add_argument("--stillmap", type=Path, default="build/release/bin/stillmap")
+    return parser.parse_args()
+
+
+def main():
+    arguments = read_arguments()
+    network, state = load_run(arguments.run)
+    description = describe_run(arguments, state)
+    write_model(arguments.folder, network, description)
+    engines = [("opencv", "fp32"), ("onednn", "fp32")]
+    if arguments.calibrate:
+        command = [arguments.stillmap, "model", "calibrate", arguments.folder]
+        subprocess.run([*map(str, command), *arguments.calibrate], check=True)
+        engines.append(("onednn", "int8"))
+    image = description["image"]
+    images = random_images(2, image["rows"], image["columns"])
+    with tempfile.TemporaryDirectory() as scratch:
+        check_engines(
+            arguments.stillmap, arguments.folder, network, images, Path(scratch), engines
+        )
+
+
+if __name__ == "__main__":
+    main()

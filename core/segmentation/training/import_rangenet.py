@@ -1,0 +1,190 @@
+#!/usr/bin/env python3
+"""Turns a model folder of lidar-bonnetal (RangeNet++) into one of Stillmap's.
+
+  import_rangenet.py darknet53-1024 config/models/darknet53_1024
+
+The folder holds arch_cfg.yaml, data_cfg.yaml, backbone, segmentation_decoder and segmentation_head,
+in PyTorch's old format or the new one. The same input then goes through PyTorch and Stillmap's
+engines; exit code 1 if they do not agree. Weights that were trained on SemanticKITTI keep its
+licence, CC BY-NC-SA: not for commercial use.
+"""
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import torch
+import yaml
+
+from model_folder import check_engines, describe, random_images, write_model
+from networks import RangeNet
+from scans import CLASS_NAMES, CLASS_OF_ID
+
+LARGEST_DIFFERENCE = 1e-4
+LEAST_AGREEMENT = 0.9999
+
+
+class ImportFault(Exception):
+    """A model folder that cannot be imported; names the file and the fault."""
+
+
+def read_yaml(file):
+    try:
+        content = yaml.safe_load(file.read_text())
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as fault:
+        raise ImportFault(f"{file}: cannot be read: {fault}") from fault
+    if not isinstance(content, dict):
+        raise ImportFault(f"{file}: holds no fields")
+    return content
+
+
+def value_at(content, file, *names):
+    """A nested field; the fault names the way to it."""
+    for depth, name in enumerate(names, 1):
+        if not isinstance(content, dict) or name not in content:
+            raise ImportFault(f"{file}: has no field {'.'.join(map(str, names[:depth]))}")
+        content = content[name]
+    return content
+
+
+def read_weights(file):
+    """A checkpoint's tensors. Only tensors are read: a file cannot run code."""
+    try:
+        state = torch.load(file, map_location="cpu", weights_only=True)
+    except FileNotFoundError as fault:
+        raise ImportFault(f"{file}: is missing") from fault
+    # Of a damaged file PyTorch raises whatever its reader stumbles over.
+    except Exception as fault:  # noqa: BLE001
+        raise ImportFault(f"{file}: is no checkpoint of PyTorch: {fault}") from fault
+    if not isinstance(state, dict) or not all(torch.is_tensor(t) for t in state.values()):
+        raise ImportFault(f"{file}: does not hold tensors by name")
+    # Written from a network on several GPUs.
+    return {name.removeprefix("module."): tensor for name, tensor in state.items()}
+
+
+def load_part(part, file):
+    state = read_weights(file)
+    for name, tensor in state.items():
+        if tensor.is_floating_point() and not torch.isfinite(tensor).all():
+            raise ImportFault(f"{file}: {name} holds numbers that are not finite")
+    try:
+        part.load_state_dict(state)
+    except RuntimeError as fault:
+        raise ImportFault(f"{file}: does not fit arch_cfg.yaml: {fault}") from fault
+
+
+def read_classes(folder):
+    """Name of our class of each output. Labels that our task does not know are unlabeled."""
+    file = folder / "data_cfg.yaml"
+    original = value_at(read_yaml(file), file, "learning_map_inv")
+    missing = [n for n in range(max(original, default=0) + 1) if n not in original]
+    if missing:
+        raise ImportFault(f"{file}: learning_map_inv has no entry {missing[0]}")
+    return [CLASS_NAMES[CLASS_OF_ID.get(original[n], 0)] for n in range(len(original))]
+
+
+def read_network(folder):
+    file = folder / "arch_cfg.yaml"
+    arch = read_yaml(file)
+    for part in ("backbone", "decoder"):
+        kind = value_at(arch, file, part, "name")
+        if kind != "darknet":
+            raise ImportFault(f"{file}: {part}.name is '{kind}'; only darknet can be imported")
+    if arch.get("post", {}).get("CRF", {}).get("use"):
+        raise ImportFault(f"{file}: post.CRF.use is true; networks with a CRF cannot be imported")
+    inputs = value_at(arch, file, "backbone", "input_depth")
+    if not all(inputs.get(channel) for channel in ("range", "xyz", "remission")):
+        raise ImportFault(f"{file}: backbone.input_depth must take range, xyz and remission")
+    layers = value_at(arch, file, "backbone", "extra", "layers")
+    if layers not in (21, 53):
+        raise ImportFault(f"{file}: backbone.extra.layers is {layers}; 21 and 53 can be imported")
+    outputs = len(read_classes(folder))
+    network = RangeNet(layers, outputs, value_at(arch, file, "backbone", "OS"))
+    load_part(network.backbone, folder / "backbone")
+    load_part(network.decoder, folder / "segmentation_decoder")
+    load_part(network.head, folder / "segmentation_head")
+    return network.eval(), arch, layers
+
+
+def read_knn(arch):
+    """The post-processing that every published ++ figure has, with the folder's parameters."""
+    written = arch.get("post", {}).get("KNN", {}).get("params", {})
+    return {
+        "neighbours": int(written.get("knn", 5)),
+        "window": int(written.get("search", 5)),
+        "sigma": float(written.get("sigma", 1.0)),
+        "cutoff_m": float(written.get("cutoff", 1.0)),
+    }
+
+
+def describe_folder(folder, arch, layers, arguments):
+    file = folder / "arch_cfg.yaml"
+    sensor = value_at(arch, file, "dataset", "sensor")
+    size = value_at(sensor, file, "img_prop")
+    image = {
+        "rows": int(size["height"]),
+        "columns": int(size["width"]),
+        "fov_up_deg": float(sensor["fov_up"]),
+        "fov_down_deg": float(sensor["fov_down"]),
+    }
+    words = {
+        "name": arguments.name or folder.name,
+        "licence": arguments.licence,
+        "sensor": str(sensor.get("name", "unknown")),
+        "training": f"RangeNet{layers} of lidar-bonnetal, imported from {folder.name}",
+        "accuracy": arguments.accuracy,
+    }
+    means, deviations = (
+        value_at(arch, file, "dataset", "sensor", name) for name in ("img_means", "img_stds")
+    )
+    return describe(words, image, means, deviations, read_classes(folder), read_knn(arch))
+
+
+def read_arguments():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("source", type=Path, help="lidar-bonnetal's model folder")
+    parser.add_argument("folder", type=Path, help="the model folder to write")
+    parser.add_argument("--name", help="default: the source's name")
+    parser.add_argument("--licence", default="CC-BY-NC-SA-4.0 (trained on SemanticKITTI)")
+    parser.add_argument("--accuracy", default="see the publication", help="in words")
+    parser.add_argument("--stillmap", type=Path, default="build/release/bin/stillmap")
+    parser.add_argument("--no-check", action="store_true", help="do not compare the engines")
+    return parser.parse_args()
+
+
+def agree(results):
+    """The bar for engines that calculate with the same precision."""
+    return all(d <= LARGEST_DIFFERENCE and a >= LEAST_AGREEMENT for _, _, d, a in results)
+
+
+def main():
+    arguments = read_arguments()
+    torch.set_num_threads(torch.multiprocessing.cpu_count())
+    try:
+        network, arch, layers = read_network(arguments.source)
+        description = describe_folder(arguments.source, arch, layers, arguments)
+        write_model(arguments.folder, network, description)
+    except ImportFault as fault:
+        sys.exit(f"import_rangenet: {fault}")
+    print(f"{arguments.folder}: model.onnx and model.yaml written")
+    if arguments.no_check:
+        return
+    images = random_images(1, description["image"]["rows"], description["image"]["columns"])
+    with tempfile.TemporaryDirectory() as scratch:
+        results = check_engines(
+            arguments.stillmap,
+            arguments.folder,
+            network,
+            images,
+            Path(scratch),
+            [("opencv", "fp32"), ("onednn", "fp32")],
+        )
+    if not agree(results):
+        sys.exit("import_rangenet: the engines do not agree with PyTorch; do not use this model")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,99 @@
+"""Model folders: model.onnx and the model.yaml that describes it, as the C++ side reads them."""
+
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import torch
+import yaml
+
+from networks import WithSoftmax
+from scans import CLASS_NAMES
+
+CHANNELS = ("range", "x", "y", "z", "remission")
+
+
+def export_onnx(network, file, rows, columns, free_size):
+    """Writes the network with a soft-max. `free_size` leaves rows and columns open."""
+    axes = {2: "rows", 3: "columns"}
+    torch.onnx.export(
+        WithSoftmax(network).cpu().eval(),
+        torch.zeros(1, 5, rows, columns),
+        str(file),
+        opset_version=13,
+        input_names=["range_image"],
+        output_names=["probabilities"],
+        dynamic_axes={"range_image": axes, "probabilities": axes} if free_size else None,
+    )
+
+
+def describe(words, image, mean, deviation, classes, knn, follow_sensor=False):
+    """The content of model.yaml. `words`: name, licence, sensor, training, accuracy; `classes`: name
+    of the class of each output; `knn`: None, or neighbours, window, sigma, cutoff_m."""
+    return {
+        **words,
+        "image": {**image, "follow_sensor": follow_sensor},
+        "statistics": {
+            name: {"mean": float(m), "deviation": float(d)}
+            for name, m, d in zip(CHANNELS, mean, deviation)
+        },
+        "classes": dict(enumerate(classes)),
+        "knn": {"use": knn is not None, **(knn or {})},
+    }
+
+
+def write_model(folder, network, description):
+    folder = Path(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    image = description["image"]
+    export_onnx(
+        network, folder / "model.onnx", image["rows"], image["columns"], image["follow_sensor"]
+    )
+    text = yaml.safe_dump(description, sort_keys=False, width=100, allow_unicode=True)
+    (folder / "model.yaml").write_text(text)
+
+
+def run_engine(stillmap, folder, images, engine, precision, scratch):
+    """Probabilities (n x classes x rows x columns) of `images` by one of Stillmap's engines."""
+    inputs, outputs = scratch / "input.f32", scratch / f"{engine}_{precision}.f32"
+    images.astype("<f4").tofile(inputs)
+    command = [stillmap, "model", "run", folder, "--engine", engine, "--precision", precision]
+    subprocess.run([*map(str, command), "--input", inputs, "--output", outputs], check=True)
+    n, _, rows, columns = images.shape
+    return np.fromfile(outputs, "<f4").reshape(n, -1, rows, columns)
+
+
+def compare(reference, other):
+    """Largest difference, and the share of pixels with the same most probable class."""
+    same = reference.argmax(1) == other.argmax(1)
+    return float(np.abs(reference - other).max()), float(same.mean())
+
+
+def check_engines(stillmap, folder, network, images, scratch, engines):
+    """Runs the same images through PyTorch and `engines` [(engine, precision)]; prints how they
+    agree, and returns [(engine, precision, largest difference, agreement)]."""
+    with torch.no_grad():
+        network = WithSoftmax(network).eval()
+        reference = np.concatenate([network(torch.from_numpy(i[None])).numpy() for i in images])
+    results = []
+    for engine, precision in engines:
+        found = run_engine(stillmap, folder, images, engine, precision, scratch)
+        difference, agreement = compare(reference, found)
+        results.append((engine, precision, difference, agreement))
+        print(
+            f"{engine:8} {precision:5} largest difference of probabilities {difference:.2e}, "
+            f"same class in {100 * agreement:.3f} % of {reference[:, 0].size} pixels"
+        )
+    return results
+
+
+def random_images(count, rows, columns, seed=1):
+    """Images with empty pixels, of about the spread of normalised scans."""
+    random = np.random.default_rng(seed)
+    images = random.normal(0, 1, (count, 5, rows, columns)).astype(np.float32)
+    images *= random.random((count, 1, rows, columns)) > 0.2
+    return images
+
+
+def class_names(count=len(CLASS_NAMES)):
+    return CLASS_NAMES[:count]

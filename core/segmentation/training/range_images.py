@@ -1,0 +1,59 @@
+"""Range images of lidar scans: the projection and normalisation that the C++ engine uses."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class ImageModel:
+    """Size and vertical field of view of a range image."""
+
+    rows: int
+    columns: int
+    fov_up_deg: float
+    fov_down_deg: float
+
+
+@dataclass(frozen=True)
+class RangeImage:
+    """`channels`: 5 x rows x columns (range, x, y, z, remission), 0 where empty. `point` is the
+    index of each pixel's nearest point, or -1; `pixel` the flat pixel of each point."""
+
+    channels: np.ndarray
+    point: np.ndarray
+    pixel: np.ndarray
+
+
+def project(points, remission, model):
+    """Spherical projection; of several points in a pixel the nearest one stays.
+
+    `points`: n x 3 in the lidar's frame [m], all finite and none at the origin.
+    """
+    x, y, z = points[:, 0], points[:, 1], points[:, 2]
+    depth = np.sqrt(x * x + y * y + z * z)
+    down = np.radians(model.fov_down_deg)
+    fov = np.radians(model.fov_up_deg) - down
+    u = 0.5 * (1.0 - np.arctan2(y, x) / np.pi) * model.columns
+    v = (1.0 - (np.arcsin(z / depth) - down) / fov) * model.rows
+    column = np.clip(np.floor(u), 0, model.columns - 1).astype(np.int32)
+    row = np.clip(np.floor(v), 0, model.rows - 1).astype(np.int32)
+    pixel = row * model.columns + column
+    # The last one written stays: the nearest.
+    order = np.argsort(-depth, kind="stable")
+    point = np.full(model.rows * model.columns, -1, np.int32)
+    point[pixel[order]] = order
+    seen = point >= 0
+    chosen = point[seen]
+    channels = np.zeros((5, point.size), np.float32)
+    for channel, values in zip(channels, (depth, x, y, z, remission)):
+        channel[seen] = values[chosen]
+    shape = (model.rows, model.columns)
+    return RangeImage(channels.reshape(5, *shape), point.reshape(shape), pixel)
+
+
+def normalise(image, mean, deviation):
+    """(value - mean) / deviation, and 0 in all channels of an empty pixel."""
+    mean = np.asarray(mean, np.float32)[:, None, None]
+    deviation = np.asarray(deviation, np.float32)[:, None, None]
+    return (image.channels - mean) / deviation * (image.point >= 0)

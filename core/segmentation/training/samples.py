@@ -1,0 +1,82 @@
+"""Training and validation samples, and batches of them."""
+
+import numpy as np
+import torch
+
+from augmentation import augment_points, crop, drop_beams
+from range_images import ImageModel, normalise, project
+from scans import IGNORED, ScanFiles
+
+
+def open_scans(config, part):
+    data = config["data"]
+    default = ImageModel(**config["image"])
+    return ScanFiles(data[part], data[f"{part}_sequences"], default)
+
+
+def _target(image, classes):
+    return np.where(image.point >= 0, classes[image.point], IGNORED).astype(np.int64)
+
+
+def _network_input(image, remission, config):
+    channels = normalise(image, config["mean"], config["deviation"])
+    if remission is None:
+        channels[4] = 0
+    return channels
+
+
+def plain_sample(scans, index, config):
+    """Input (5 x rows x columns) and classes (rows x columns) of a scan as it is."""
+    points, remission, classes = scans.read(index)
+    image = project(points, remission, scans.images[index])
+    return _network_input(image, remission, config), _target(image, classes)
+
+
+class TrainingSamples(torch.utils.data.Dataset):
+    """Augmented parts of range images; another draw every time."""
+
+    def __init__(self, scans, config):
+        self.scans, self.config = scans, config
+
+    def __len__(self):
+        return len(self.scans)
+
+    def __getitem__(self, key):
+        index, seed = key
+        random = np.random.default_rng(seed)
+        settings = self.config["augmentation"]
+        points, remission, classes = augment_points(*self.scans.read(index), settings, random)
+        known = remission if remission is not None else np.zeros(len(points), np.float32)
+        image = project(points, known, self.scans.images[index])
+        drop_beams(image, settings, random)
+        channels = _network_input(image, remission, self.config)
+        channels, target = crop(
+            channels, _target(image, classes), settings["crop_columns"], random
+        )
+        return torch.from_numpy(channels), torch.from_numpy(target)
+
+
+class BatchesBySensor(torch.utils.data.Sampler):
+    """Batches in random order, each of scans with the same number of rows. The order and all
+    random draws depend on the seed and the epoch alone, so that a resumed run goes on alike."""
+
+    def __init__(self, scans, batch, seed):
+        self.scans, self.batch, self.seed, self.epoch = scans, batch, seed, 0
+
+    def batches(self):
+        random = np.random.default_rng([self.seed, self.epoch])
+        rows = np.array([image.rows for image in self.scans.images])
+        for group in np.unique(rows):
+            members = random.permutation(np.flatnonzero(rows == group))
+            for begin in range(0, len(members) - self.batch + 1, self.batch):
+                chosen = members[begin : begin + self.batch]
+                yield [(int(i), int(random.integers(2**31))) for i in chosen]
+
+    def __iter__(self):
+        batches = list(self.batches())
+        random = np.random.default_rng([self.seed, self.epoch, 1])
+        random.shuffle(batches)
+        return iter(batches)
+
+    def __len__(self):
+        return sum(1 for _ in self.batches())

@@ -1,0 +1,94 @@
+"""SemanticKITTI folders as a training set: scans, their classes, their sensors."""
+
+from pathlib import Path
+
+import numpy as np
+import yaml
+
+from range_images import ImageModel
+
+IGNORED = 0
+
+# learning_map of the single-scan task: original id to network class.
+CLASS_OF_ID = {
+    10: 1, 252: 1, 11: 2, 15: 3, 18: 4, 258: 4, 13: 5, 16: 5, 20: 5, 256: 5, 257: 5, 259: 5,
+    30: 6, 254: 6, 31: 7, 253: 7, 32: 8, 255: 8, 40: 9, 60: 9, 44: 10, 48: 11, 49: 12, 50: 13,
+    51: 14, 70: 15, 71: 16, 72: 17, 80: 18, 81: 19,
+}  # fmt: skip
+
+CLASS_NAMES = (
+    "unlabeled car bicycle motorcycle truck other-vehicle person bicyclist motorcyclist road "
+    "parking sidewalk other-ground building fence vegetation trunk terrain pole traffic-sign"
+).split()
+
+CLASS_COLOURS = np.array(
+    [
+        (0, 0, 0), (100, 150, 245), (100, 230, 245), (30, 60, 150), (80, 30, 180), (0, 0, 255),
+        (255, 30, 30), (255, 40, 200), (150, 30, 90), (255, 0, 255), (255, 150, 255), (75, 0, 75),
+        (175, 0, 75), (255, 200, 0), (255, 120, 50), (0, 175, 0), (135, 60, 0), (150, 240, 80),
+        (255, 240, 150), (255, 0, 0),
+    ],
+    np.uint8,
+)  # fmt: skip
+
+_CLASSES = np.zeros(65536, np.uint8)
+for _id, _class in CLASS_OF_ID.items():
+    _CLASSES[_id] = _class
+
+
+def classes_of(raw_labels):
+    """Network classes of raw labels (instance id in the high 16 bits)."""
+    return _CLASSES[raw_labels & 0xFFFF]
+
+
+def sensor_image(sequence, default):
+    """The range image of a sequence: its sensor.yaml's rings and field of view, or `default`."""
+    file = sequence / "sensor.yaml"
+    if not file.exists():
+        return default
+    sensor = yaml.safe_load(file.read_text())
+    return ImageModel(
+        int(sensor["rings"]), default.columns, sensor["fov_up_deg"], sensor["fov_down_deg"]
+    )
+
+
+class ScanFiles:
+    """The labelled scans of one or more SemanticKITTI folders."""
+
+    def __init__(self, folders, sequences, default_image):
+        self.files, self.images = [], []
+        for folder in map(Path, folders):
+            for sequence in sorted((folder / "sequences").iterdir()):
+                # A name with a dot is a sequence that is still being written.
+                if sequence.suffix or (sequences and sequence.name not in sequences):
+                    continue
+                image = sensor_image(sequence, default_image)
+                for scan in sorted((sequence / "velodyne").glob("*.bin")):
+                    label = sequence / "labels" / (scan.stem + ".label")
+                    if label.exists():
+                        self.files.append((scan, label))
+                        self.images.append(image)
+        if not self.files:
+            raise FileNotFoundError(f"no labelled scan in {folders} (sequences: {sequences or 'all'})")
+
+    def __len__(self):
+        return len(self.files)
+
+    def read(self, index):
+        """Points (n x 3), remission (n) and class (n); points that cannot be projected left out."""
+        scan_file, label_file = self.files[index]
+        scan = np.fromfile(scan_file, np.float32)
+        labels = np.fromfile(label_file, np.uint32)
+        if scan.size != 4 * labels.size:
+            raise ValueError(f"{label_file}: {labels.size} labels for {scan.size / 4} points")
+        scan = scan.reshape(-1, 4)
+        usable = np.isfinite(scan).all(axis=1) & (np.abs(scan[:, :3]).max(axis=1) > 1e-3)
+        scan = scan[usable]
+        return scan[:, :3], scan[:, 3], classes_of(labels[usable])
+
+    def class_shares(self, scans=200):
+        """Share of every class among all points, from scans spread over the set."""
+        counts = np.zeros(len(CLASS_NAMES))
+        for index in np.unique(np.linspace(0, len(self) - 1, scans).astype(int)):
+            counts += np.bincount(self.read(index)[2], minlength=counts.size)
+        return counts / counts.sum()

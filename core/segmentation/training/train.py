@@ -1,0 +1,223 @@
+#!/usr/bin/env python3
+"""Trains a network of the RangeNet family on SemanticKITTI folders.
+
+  train.py training.yaml runs/mine --set data.train=[/data/kitti/dataset] --set network.kind=darknet53
+
+Writes into the run's folder: config.yaml, last.pt (a run that was stopped goes on from there when
+it is started again), best.pt (highest validation mIoU), curves.png and labels_*.png.
+"""
+
+import argparse
+import copy
+import math
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import torch
+import yaml
+
+from losses import class_weights, weighted_cross_entropy
+from metrics import Confusion
+from networks import make_network
+from pictures import save_curves, save_labelled_images
+from samples import BatchesBySensor, TrainingSamples, open_scans, plain_sample
+from scans import CLASS_NAMES
+
+
+def read_config(file, changes):
+    """The configuration with `a.b=value` changes; a name that does not exist is an error."""
+    config = yaml.safe_load(Path(file).read_text())
+    for change in changes:
+        name, _, value = change.partition("=")
+        *sections, field = name.split(".")
+        place = config
+        for section in sections:
+            place = place.get(section, {})
+        if field not in place and sections != ["network"]:
+            raise SystemExit(f"--set {change}: {file} has no field '{name}'")
+        place[field] = yaml.safe_load(value)
+    return config
+
+
+class Rate:
+    """Learning rate as a factor of the highest, by step."""
+
+    def __init__(self, settings, steps_per_epoch):
+        self.settings = settings
+        self.steps_per_epoch = steps_per_epoch
+        self.warmup = max(1, round(settings["warmup_epochs"] * steps_per_epoch))
+        self.total = settings["epochs"] * steps_per_epoch
+
+    def __call__(self, step):
+        if step < self.warmup:
+            return (step + 1) / self.warmup
+        if self.settings["schedule"] == "exponential":
+            return self.settings["decay"] ** ((step - self.warmup) / self.steps_per_epoch)
+        share = (step - self.warmup) / max(1, self.total - self.warmup)
+        return 0.5 * (1 + math.cos(math.pi * min(1.0, share)))
+
+
+class Run:
+    """One training run: network, optimiser, where it stands, and its files."""
+
+    def __init__(self, config, folder, device):
+        self.config, self.folder, self.device = config, folder, device
+        self.scans = open_scans(config, "train")
+        self.validation = open_scans(config, "validation")
+        settings = config["optimiser"]
+        self.sampler = BatchesBySensor(self.scans, settings["batch"], config["seed"])
+        torch.manual_seed(config["seed"])
+        self.network = make_network(config["network"], len(CLASS_NAMES)).to(device)
+        self.network = self.network.to(memory_format=torch.channels_last)
+        self.averaged = copy.deepcopy(self.network).eval()
+        self.optimiser = torch.optim.SGD(
+            self.network.parameters(),
+            settings["rate"],
+            settings["momentum"],
+            weight_decay=settings["weight_decay"],
+        )
+        rate = Rate(settings, len(self.sampler))
+        self.schedule = torch.optim.lr_scheduler.LambdaLR(self.optimiser, rate)
+        self.epoch, self.step, self.history = 0, 0, []
+        self.shares = self.scans.class_shares()
+        self.weights = class_weights(self.shares, config["loss"]["weights"]).to(device)
+
+    def start_from(self, file):
+        """Takes over the weights that another run found best."""
+        self.averaged.load_state_dict(torch.load(file, map_location=self.device)["averaged"])
+        self.network.load_state_dict(self.averaged.state_dict())
+
+    def resume(self):
+        file = self.folder / "last.pt"
+        if not file.exists():
+            if self.config["start_from"]:
+                self.start_from(self.config["start_from"])
+            return
+        state = torch.load(file, map_location=self.device)
+        self.network.load_state_dict(state["network"])
+        self.averaged.load_state_dict(state["averaged"])
+        self.optimiser.load_state_dict(state["optimiser"])
+        self.schedule.load_state_dict(state["schedule"])
+        self.epoch, self.step, self.history = state["epoch"], state["step"], state["history"]
+        print(f"{file}: goes on after epoch {self.epoch}")
+
+    def save(self):
+        state = {
+            "config": self.config,
+            "network": self.network.state_dict(),
+            "averaged": self.averaged.state_dict(),
+            "optimiser": self.optimiser.state_dict(),
+            "schedule": self.schedule.state_dict(),
+            "epoch": self.epoch,
+            "step": self.step,
+            "history": self.history,
+        }
+        write_whole(state, self.folder / "last.pt")
+        if self.history[-1]["miou"] >= max(entry["miou"] for entry in self.history):
+            best = {key: state[key] for key in ("config", "averaged", "epoch", "history")}
+            write_whole(best, self.folder / "best.pt")
+
+    def average(self):
+        """Follows the network's weights with a running mean, shorter in the beginning."""
+        wanted = self.config["optimiser"]["averaged_steps"]
+        share = 1 / min(wanted, 1 + self.step / 3)
+        with torch.no_grad():
+            for mean, now in zip(
+                self.averaged.state_dict().values(), self.network.state_dict().values()
+            ):
+                if mean.dtype.is_floating_point:
+                    mean.lerp_(now, share)
+                else:
+                    mean.copy_(now)
+
+    def train_epoch(self):
+        self.network.train()
+        self.sampler.epoch = self.epoch
+        batches = torch.utils.data.DataLoader(
+            TrainingSamples(self.scans, self.config), batch_sampler=self.sampler, num_workers=1
+        )
+        began, losses = time.time(), []
+        for done, (channels, target) in enumerate(batches, 1):
+            channels = channels.to(self.device, memory_format=torch.channels_last)
+            loss = weighted_cross_entropy(
+                self.network(channels), target.to(self.device), self.weights
+            )
+            if not torch.isfinite(loss):
+                raise SystemExit("the loss is not finite; lower optimiser.rate")
+            self.optimiser.zero_grad()
+            loss.backward()
+            self.optimiser.step()
+            self.schedule.step()
+            self.step += 1
+            self.average()
+            losses.append(loss.item())
+            if done % 10 == 0 or done == len(self.sampler):
+                show_progress(self.epoch, done, len(self.sampler), np.mean(losses[-50:]), began)
+        return float(np.mean(losses))
+
+    def validate(self):
+        confusion = Confusion()
+        wanted = min(self.config["data"]["validation_scans"], len(self.validation))
+        chosen = np.unique(np.linspace(0, len(self.validation) - 1, wanted).astype(int))
+        for index in chosen:
+            channels, target = plain_sample(self.validation, index, self.config)
+            confusion.add(target.ravel(), predict(self.averaged, channels, self.device).ravel())
+        return confusion
+
+
+def predict(network, channels, device):
+    """The most probable class of every pixel."""
+    with torch.no_grad():
+        return network(torch.from_numpy(channels)[None].to(device)).argmax(1)[0].cpu().numpy()
+
+
+def write_whole(state, file):
+    """Never leaves half a file."""
+    torch.save(state, file.with_suffix(".part"))
+    file.with_suffix(".part").replace(file)
+
+
+def show_progress(epoch, done, total, loss, began):
+    left = (time.time() - began) / done * (total - done)
+    line = f"epoch {epoch + 1}  {done}/{total}  loss {loss:.3f}  {left / 60:.1f} min left"
+    print(line, end="\r" if done < total and sys.stdout.isatty() else "\n", flush=True)
+
+
+def read_arguments():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("config", help="such as training.yaml beside this file")
+    parser.add_argument("folder", type=Path, help="of the run; a run that it holds goes on")
+    parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
+    parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
+    return parser.parse_args()
+
+
+def main():
+    arguments = read_arguments()
+    config = read_config(arguments.config, arguments.set)
+    torch.set_num_threads(config["threads"])
+    arguments.folder.mkdir(parents=True, exist_ok=True)
+    (arguments.folder / "config.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
+    run = Run(config, arguments.folder, arguments.device)
+    run.resume()
+    parameters = sum(p.numel() for p in run.network.parameters())
+    print(f"{parameters / 1e6:.2f} M parameters, {len(run.scans)} scans, {arguments.device}")
+    while run.epoch < config["optimiser"]["epochs"]:
+        loss = run.train_epoch()
+        confusion = run.validate()
+        run.epoch += 1
+        miou = confusion.mean_iou()
+        run.history.append({"epoch": run.epoch, "loss": loss, "miou": miou})
+        print(f"epoch {run.epoch}: loss {loss:.4f}, validation mIoU {100 * miou:.1f}")
+        print("  " + confusion.table(), flush=True)
+        run.save()
+        save_curves(run.history, run.folder / "curves.png")
+        save_labelled_images(run)
+
+
+if __name__ == "__main__":
+    main()

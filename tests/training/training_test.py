@@ -1,0 +1,160 @@
+"""A small network learns from a simulated recording, and a run that was stopped goes on."""
+
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+import torch
+
+from augmentation import augment_points, crop, drop_beams
+from losses import class_weights, weighted_cross_entropy
+from metrics import Confusion
+from range_images import ImageModel, normalise, project
+
+STILLMAP = os.environ["STILLMAP"]
+TRAINING = Path(os.environ["STILLMAP_TRAINING"])
+
+SMALL = [
+    "network.stem=8",
+    "network.stages=[[16, [1, 2], 1], [24, [2, 2], 1]]",
+    "optimiser.batch=2",
+    "optimiser.averaged_steps=5",
+    "augmentation.crop_columns=128",
+    "image.columns=256",
+    "data.validation_scans=3",
+]
+
+
+class Projection(unittest.TestCase):
+    model = ImageModel(rows=4, columns=8, fov_up_deg=10, fov_down_deg=-30)
+
+    def test_puts_forward_in_the_middle_and_left_into_the_left_half(self):
+        points = np.array([[5, -0.01, 0], [0, 5, 0], [0, -5, 0]], np.float32)
+        image = project(points, np.zeros(3, np.float32), self.model)
+        self.assertEqual([p % 8 for p in image.pixel], [4, 2, 6])
+
+    def test_keeps_the_nearest_point_of_a_pixel(self):
+        points = np.array([[9, 0, 0], [4, 0, 0], [7, 0, 0]], np.float32)
+        image = project(points, np.zeros(3, np.float32), self.model)
+        self.assertEqual(image.point[image.point >= 0].tolist(), [1])
+
+    def test_squeezes_what_is_above_into_the_first_row(self):
+        image = project(np.array([[1, 0, 5]], np.float32), np.zeros(1, np.float32), self.model)
+        self.assertLess(image.pixel[0], 8)
+
+    def test_leaves_empty_pixels_zero(self):
+        image = project(np.array([[5, 0, 0]], np.float32), np.ones(1, np.float32), self.model)
+        channels = normalise(image, [1, 2, 3, 4, 5], [2, 2, 2, 2, 2])
+        self.assertEqual(np.count_nonzero(channels[0]), 1)
+        self.assertEqual(channels[0].max(), 2)
+
+
+class Loss(unittest.TestCase):
+    def test_weighs_rare_classes_more(self):
+        shares = [0.1, 0.7, 0.2]
+        for kind in ("log", "inverse"):
+            weights = class_weights(shares, kind)
+            self.assertEqual(weights[0], 0)
+            self.assertGreater(weights[2], weights[1])
+        self.assertAlmostEqual(class_weights(shares, "inverse")[1].item(), 1 / 0.701, places=5)
+        self.assertAlmostEqual(class_weights(shares, "log")[1].item(), 1 / math.log(1.72), places=5)
+
+    def test_leaves_pixels_without_a_class_out(self):
+        weights = torch.tensor([0.0, 2.0, 1.0])
+        scores = torch.randn(1, 3, 1, 4)
+        target = torch.tensor([[[1, 2, 0, 0]]])
+        loss = weighted_cross_entropy(scores, target, weights)
+        logs = torch.log_softmax(scores, 1)[0, :, 0]
+        expected = -(2 * logs[1, 0] + logs[2, 1]) / 3
+        torch.testing.assert_close(loss, expected)
+
+
+class Metric(unittest.TestCase):
+    def test_counts_as_the_benchmark_does(self):
+        confusion = Confusion(3)
+        confusion.add(np.array([1, 1, 2, 2, 0]), np.array([1, 2, 2, 0, 1]))
+        self.assertEqual(confusion.iou()[1:].tolist(), [1 / 2, 1 / 3])
+
+
+class Augmentation(unittest.TestCase):
+    settings = {
+        "rotate": True, "flip": True, "tilt_deg": 0, "scale": 0, "lift_m": 0,
+        "range_noise_m": 0, "drop_points": 0, "max_range_m": 120, "drop_beams": 0,
+        "halve_beams": 1, "remission_jitter": 0.3, "remission_dropout": 0,
+    }  # fmt: skip
+
+    def test_turning_and_mirroring_keep_ranges_and_heights(self):
+        random = np.random.default_rng(1)
+        points = random.normal(0, 10, (50, 3)).astype(np.float32)
+        moved, remission, classes = augment_points(
+            points, np.full(50, 0.5, np.float32), np.arange(50), self.settings, random
+        )
+        ranges = np.linalg.norm(points, axis=1)
+        np.testing.assert_allclose(np.linalg.norm(moved, axis=1), ranges, rtol=1e-5)
+        np.testing.assert_allclose(moved[:, 2], points[:, 2], rtol=1e-5)
+        self.assertFalse(np.allclose(moved, points))
+        self.assertEqual(classes.tolist(), list(range(50)))
+        self.assertTrue(((remission >= 0) & (remission <= 1)).all())
+
+    def test_loses_every_other_beam(self):
+        random = np.random.default_rng(2)
+        points = random.normal(0, 10, (5000, 3)).astype(np.float32)
+        image = project(points, np.zeros(5000, np.float32), ImageModel(8, 16, 20, -20))
+        drop_beams(image, self.settings, random)
+        self.assertEqual(sum((row >= 0).any() for row in image.point), 4)
+
+    def test_crops_over_the_seam_together(self):
+        channels = np.tile(np.arange(8.0), (5, 2, 1))
+        for seed in range(20):
+            part, target = crop(channels, channels[0], 6, np.random.default_rng(seed))
+            self.assertEqual(part.shape, (5, 2, 6))
+            np.testing.assert_array_equal(part[0], target)
+
+
+class Training(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        scratch = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(scratch.cleanup)
+        cls.root = Path(scratch.name)
+        cls.data = cls.root / "data"
+        sequence = cls.data / "sequences" / "00"
+        command = [STILLMAP, "simulate", sequence, "--preset", "yard", "--scans", "8"]
+        subprocess.run([*map(str, command), "--sensor", "vlp_16"], check=True, capture_output=True)
+
+    def train(self, epochs):
+        settings = [*SMALL, f"optimiser.epochs={epochs}", f"data.train=[{self.data}]"]
+        settings.append(f"data.validation=[{self.data}]")
+        command = [sys.executable, TRAINING / "train.py", TRAINING / "training.yaml"]
+        command += [self.root / "run"]
+        for setting in settings:
+            command += ["--set", setting]
+        result = subprocess.run([*map(str, command)], capture_output=True, text=True)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        return result.stdout
+
+    def test_learns_goes_on_and_exports(self):
+        self.train(2)
+        output = self.train(6)
+        self.assertIn("goes on after epoch 2", output)
+        history = torch.load(self.root / "run" / "last.pt")["history"]
+        self.assertEqual([entry["epoch"] for entry in history], [1, 2, 3, 4, 5, 6])
+        self.assertLess(history[-1]["loss"], history[0]["loss"])
+        for picture in ("curves.png", "labels_0.png"):
+            self.assertGreater((self.root / "run" / picture).stat().st_size, 1000)
+        sequence = self.data / "sequences" / "00"
+        command = [sys.executable, TRAINING / "export.py", self.root / "run", self.root / "model"]
+        command += ["--stillmap", STILLMAP, "--calibrate", sequence]
+        result = subprocess.run([*map(str, command)], capture_output=True, text=True)
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertIn("onednn   int8", result.stdout)
+        self.assertTrue((self.root / "model" / "int8.yaml").exists())
+
+
+if __name__ == "__main__":
+    unittest.main()
