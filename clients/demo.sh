@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # The main job, end to end, in processes of their own that only share DDS: a replay publishes the
-# lidar scans of a simulated city, stillmap-server maps them, a planning client follows the poses
-# and asks for regions of the map. Then all of it is checked against the truth.
+# lidar scans of a simulated city, stillmap-server segments and maps them, a planning client follows
+# the poses and asks for regions of the map. Then all of it is checked against the truth; how well
+# the first scans were segmented, too.
 #
 # BUILD                build folder (build/release)
 # STILLMAP_DEMO_DIR    where recording and results go (./demo)
@@ -106,7 +107,7 @@ check() {
   grep -q '"road"' "$out/query.json" || fail "the last query saw no road"
   is_below "$(value "$out/accuracy.json" ate_rmse_m)" "$max_ate_m" ||
     fail "pose error (ATE) is $(value "$out/accuracy.json" ate_rmse_m) m, wanted is below $max_ate_m m"
-  for file in map.stillmap query.ply map.png trajectory.png trajectory_error.png; do
+  for file in map.stillmap query.ply segmentation.png map.png trajectory.png trajectory_error.png; do
     [ -s "$out/$file" ] || fail "$out/$file was not written"
   done
 }
@@ -118,11 +119,12 @@ summary() {
 
 Stillmap demo: a simulated city, three processes over DDS domain $domain
   scans         $(value "$out/replay.json" published) sent, $(value "$out/replay.json" mapped) mapped, $(value "$out/replay.json" dropped) dropped, in $(rounded "$out/replay.json" seconds 1) s
+  segmentation  $(awk "BEGIN { printf \"%.1f\", 100 * $(value "$out/segmentation.json" accuracy) }") % of the points right, by the network alone
   pose error    ATE $(rounded "$out/accuracy.json" ate_rmse_m 3) m over $(rounded "$out/accuracy.json" path_m 1) m
   map           $(value "$out/status.json" voxels) voxels in $(value "$out/status.json" tiles) tiles, $(du -h "$out/map.stillmap" | cut -f1) on disk
   while mapping $(grep -vc '^#' "$out/watched.tum") poses followed, $answers region queries answered
   at the end    $(value "$out/query.json" voxels) voxels within $query_size_m m in $(rounded "$out/query.json" ms 1) ms
-  look at       $out/map.png (map, path, queried region), $out/trajectory.png, $out/trajectory_error.png
+  look at       $out/map.png (map, path, queried region), $out/segmentation.png (truth, found), $out/trajectory.png, $out/trajectory_error.png
   also          $out/map.stillmap $out/query.ply $out/poses_lidar.txt $out/server.log
 TEXT
 }
@@ -137,7 +139,7 @@ domain=$(free_domain) || fail "no free DDS domain between 60 and 99"
 make_city
 start_server
 start_planning_client
-"$bin/stillmap" replay "$city" --domain "$domain" --lossless --out "$out/poses_lidar.txt" --json \
+"$bin/stillmap" replay "$city" --domain "$domain" --no-labels --lossless --out "$out/poses_lidar.txt" --json \
   > "$out/replay.json" || fail "the replay ended with exit code $?"
 "$bin/stillmap" query --domain "$domain" --around-robot "$query_size_m" --json \
   --out "$out/query.ply" --picture "$out/map.png" > "$out/query.json" || fail "the query failed"
@@ -146,5 +148,7 @@ stop_planning_client
 stop_server
 "$bin/stillmap" evaluate trajectory --truth "$city/poses.txt" --truth-calib "$city/calib.txt" \
   --estimate "$out/poses_lidar.txt" --pictures "$out" --json > "$out/accuracy.json"
+"$bin/stillmap" evaluate segmentation --truth "$city" --scans 20 --picture "$out/segmentation.png" \
+  --json > "$out/segmentation.json" || fail "the segmentation could not be evaluated"
 check
 summary
