@@ -8,6 +8,9 @@
 namespace stillmap {
 namespace {
 
+constexpr std::uint32_t misses_until_too_slow = 3;
+constexpr std::uint32_t unwaited_until_next_try = 10;
+
 double milliseconds(std::chrono::steady_clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
 }
@@ -43,9 +46,10 @@ LabelFeed::Answer PacedLabels::offer(const Scan& scan) {
     busy_ = true;
     offers_since_taken_ = 0;
     changed_.notify_all();
-    // A source that is known to need longer is not worth the wait.
-    const bool can_be_in_time = cadence_.network_ms() <= milliseconds(budget_);
-    if (can_be_in_time) changed_.wait_for(lock, budget_, [this] { return !busy_; });
+    if (is_worth_the_wait()) {
+      const bool in_time = changed_.wait_for(lock, budget_, [this] { return !busy_; });
+      misses_ = in_time ? 0 : misses_ + 1;
+    }
     answer.pending = busy_;
   }
   answer.finished = std::exchange(finished_, {});
@@ -55,6 +59,12 @@ LabelFeed::Answer PacedLabels::offer(const Scan& scan) {
 bool PacedLabels::is_due() {
   ++offers_since_taken_;
   return !busy_ && offers_since_taken_ >= cadence_.every();
+}
+
+// A source that was late several times is too slow. But one that runs beside the odometry takes
+// longer than one that is waited for, so it gets another chance now and then.
+bool PacedLabels::is_worth_the_wait() {
+  return misses_ < misses_until_too_slow || ++unwaited_ % unwaited_until_next_try == 0;
 }
 
 void PacedLabels::work(const std::stop_token& stop) {

@@ -45,6 +45,7 @@ class PacedLabels final : public LabelFeed {
   void segmented(double network_ms);
   /// Whether the thread is to take the scan that is offered now.
   [[nodiscard]] bool is_due();
+  [[nodiscard]] bool is_worth_the_wait();
 
   std::unique_ptr<LabelSource> source_;
   std::string name_;
@@ -57,6 +58,9 @@ class PacedLabels final : public LabelFeed {
   std::condition_variable_any changed_;
   LabelCadence cadence_;
   std::uint32_t offers_since_taken_ = 0;
+  /// Scans in a row whose labels came after the budget; scans since then that did not wait.
+  std::uint32_t misses_ = 0;
+  std::uint32_t unwaited_ = 0;
   /// Taken from here by the thread, which is busy until it hands in the result.
   std::optional<Scan> job_;
   bool busy_ = false;
