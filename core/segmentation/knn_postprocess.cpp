@@ -5,14 +5,19 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cassert>
 #include <cmath>
 #include <cstdint>
-#include <limits>
+#include <span>
 #include <sstream>
+#include <type_traits>
 
 namespace stillmap {
 namespace {
+
+/// Farther than all points are, and than any cutoff.
+constexpr float nowhere_m = 1e30F;
 
 struct Decision {
   SemanticClass label = SemanticClass::unlabeled;
@@ -57,7 +62,7 @@ class PaddedImage {
   [[nodiscard]] std::size_t corner(std::size_t pixel) const {
     return pixel / image_columns_ * columns_ + pixel % image_columns_;
   }
-  /// Infinite where no point is.
+  /// `nowhere_m` where no point is.
   [[nodiscard]] const float* range_m() const { return range_m_.data(); }
   [[nodiscard]] SemanticClass label(std::size_t place) const { return labels_[place]; }
   [[nodiscard]] float confidence(std::size_t place) const { return confidence_[place]; }
@@ -68,7 +73,7 @@ class PaddedImage {
     const std::size_t to = (row + half_) * columns_ + half_;
     for (std::size_t i = 0; i < image_columns_; ++i) {
       const float range_m = image.range_m()[from + i];
-      range_m_[to + i] = range_m < 0.0F ? std::numeric_limits<float>::infinity() : range_m;
+      range_m_[to + i] = range_m < 0.0F ? nowhere_m : range_m;
       labels_[to + i] = pixels.classes[from + i];
       confidence_[to + i] = pixels.confidence[from + i];
     }
@@ -80,55 +85,71 @@ class PaddedImage {
   std::vector<float> confidence_;
 };
 
-/// Points that are worked on at once. The compiler must be told to make vectors of loops over them.
-constexpr std::size_t lanes = 16;
-template <class T>
-using Lanes = std::array<T, lanes>;
+/// Points that are worked on at once, in one register: a loop over arrays would go through memory.
+constexpr std::size_t lanes = 4;
+using Floats = float __attribute__((vector_size(lanes * sizeof(float))));
+using Words = std::uint64_t __attribute__((vector_size(lanes * sizeof(std::uint64_t))));
+using Numbers = std::int32_t __attribute__((vector_size(lanes * sizeof(std::int32_t))));
+
+/// Distances and the number of a pixel in the window as one number each, which sorts by distance
+/// and then by pixel: a float's digits leave 29 bits of a double free.
+using Keys = double __attribute__((vector_size(lanes * sizeof(double))));
+constexpr std::uint64_t pixel_bits = 0xFFFF;
+static_assert(KnnConfig::max_window * KnnConfig::max_window <= pixel_bits);
+
+Keys keys_of(Floats distance_m, std::uint64_t pixel) {
+  return std::bit_cast<Keys>(std::bit_cast<Words>(__builtin_convertvector(distance_m, Keys)) |
+                             pixel);
+}
 
 /// Of each of a few points the pixels nearest in range, in rising order of distance; equal ones in
-/// the order in which they came.
+/// the order of their numbers.
+template <std::size_t kept_pixels>
 class NearestPixels {
  public:
-  explicit NearestPixels(int wanted) : wanted_(static_cast<std::size_t>(wanted)) {
-    for (std::size_t k = 0; k < wanted_; ++k) {
-      distance_m_[k].fill(std::numeric_limits<float>::infinity());
-      place_[k].fill(0);
+  NearestPixels() { kept_.fill(keys_of(Floats{} + nowhere_m, 0)); }
+
+  /// A pixel of each point's window.
+  void add(Keys keys) {
+    // Each place takes what fits between the one before it and itself. No place waits for another.
+    for (std::size_t k = kept_pixels - 1; k > 0; --k) {
+      const Keys after_previous = kept_[k - 1] > keys ? kept_[k - 1] : keys;
+      kept_[k] = after_previous < kept_[k] ? after_previous : kept_[k];
     }
+    kept_[0] = keys < kept_[0] ? keys : kept_[0];
   }
 
-  /// A pixel of each point's window, by its number there. `distance_m` is used up.
-  void add(Lanes<float>& distance_m, std::int32_t place) {
-    Lanes<std::int32_t> moving, place_moving;
-    moving.fill(0);
-    place_moving.fill(place);
-    for (std::size_t k = 0; k < wanted_; ++k) {
-      Lanes<float>& kept_m = distance_m_[k];
-      Lanes<std::int32_t>& kept_place = place_[k];
-      // From the first that is farther all move one place on.
-#pragma omp simd
-      for (std::size_t p = 0; p < lanes; ++p) {
-        const float old_m = kept_m[p];
-        const std::int32_t old_place = kept_place[p];
-        const bool move = (moving[p] | static_cast<std::int32_t>(distance_m[p] < old_m)) != 0;
-        moving[p] = move ? 1 : 0;
-        kept_m[p] = move ? distance_m[p] : old_m;
-        kept_place[p] = move ? place_moving[p] : old_place;
-        distance_m[p] = move ? old_m : distance_m[p];
-        place_moving[p] = move ? old_place : place_moving[p];
-      }
-    }
+  [[nodiscard]] float distance_m(std::size_t k, std::size_t p) const {
+    return static_cast<float>(std::bit_cast<double>(bits(k, p) & ~pixel_bits));
   }
-
-  [[nodiscard]] float distance_m(std::size_t k, std::size_t p) const { return distance_m_[k][p]; }
   [[nodiscard]] std::size_t place(std::size_t k, std::size_t p) const {
-    return static_cast<std::size_t>(place_[k][p]);
+    return bits(k, p) & pixel_bits;
   }
 
  private:
-  std::array<Lanes<float>, KnnConfig::max_neighbours> distance_m_;
-  std::array<Lanes<std::int32_t>, KnnConfig::max_neighbours> place_;
-  std::size_t wanted_;
+  [[nodiscard]] std::uint64_t bits(std::size_t k, std::size_t p) const {
+    return std::bit_cast<std::uint64_t>(static_cast<double>(kept_[k][p]));
+  }
+
+  std::array<Keys, kept_pixels> kept_;
 };
+
+/// The class with most votes, of equals the lowest; `unlabeled` without a vote for another one.
+SemanticClass most_frequent(std::span<const SemanticClass> voted) {
+  SemanticClass winner = SemanticClass::unlabeled;
+  std::ptrdiff_t most = 0;
+  for (std::size_t i = 0; i < voted.size(); ++i) {
+    const SemanticClass label = voted[i];
+    if (label == SemanticClass::unlabeled || label == winner) continue;
+    const std::ptrdiff_t count = std::count(voted.begin(), voted.end(), label);
+    if (count > most || (count == most && label < winner)) {
+      winner = label;
+      most = count;
+    }
+    if (2 * most > std::ssize(voted)) break;
+  }
+  return winner;
+}
 
 class Poll {
  public:
@@ -146,18 +167,20 @@ class Poll {
     factors_[factors_.size() / 2] = 0.0F;
   }
 
-  /// Decides about the points from `first` on, at most as many as there are lanes.
+  /// Decides about the points from `first` on, at most as many as there are lanes. `kept_pixels`
+  /// is at least the number of neighbours.
+  template <std::size_t kept_pixels>
   void decide(std::size_t first, PointLabels& labels) const {
     const std::size_t count = std::min(lanes, image_.point_count() - first);
-    Lanes<std::int32_t> corner{};
-    Lanes<float> range_m{};
+    Numbers corner{};
+    Floats range_m{};
     for (std::size_t p = 0; p < count; ++p) {
       const std::int32_t pixel = image_.pixel_of_point()[first + p];
       if (pixel == RangeImage::none) continue;
       corner[p] = static_cast<std::int32_t>(padded_.corner(static_cast<std::size_t>(pixel)));
       range_m[p] = image_.range_of_point_m()[first + p];
     }
-    const NearestPixels nearest = ask(corner, range_m);
+    const auto nearest = ask<kept_pixels>(corner, range_m);
     for (std::size_t p = 0; p < count; ++p) {
       const Decision decision = decide_one(nearest, p, static_cast<std::size_t>(corner[p]),
                                            image_.pixel_of_point()[first + p]);
@@ -167,23 +190,21 @@ class Poll {
   }
 
  private:
-  [[nodiscard]] NearestPixels ask(const Lanes<std::int32_t>& corner,
-                                  const Lanes<float>& range_m) const {
-    NearestPixels nearest(config_.neighbours);
+  template <std::size_t kept_pixels>
+  [[nodiscard]] NearestPixels<kept_pixels> ask(Numbers corner, Floats range_m) const {
+    NearestPixels<kept_pixels> nearest;
     for (std::size_t i = 0; i < offsets_.size(); ++i) {
       const float* const ranges_m = padded_.range_m() + offsets_[i];
-      const float factor = factors_[i];
-      Lanes<float> distance_m;
-#pragma omp simd
-      for (std::size_t p = 0; p < lanes; ++p) {
-        distance_m[p] = std::abs(ranges_m[corner[p]] - range_m[p]) * factor;
-      }
-      nearest.add(distance_m, static_cast<std::int32_t>(i));
+      Floats difference_m;
+      for (std::size_t p = 0; p < lanes; ++p) difference_m[p] = ranges_m[corner[p]] - range_m[p];
+      const Floats distance_m = difference_m < 0.0F ? -difference_m : difference_m;
+      nearest.add(keys_of(distance_m * factors_[i], i));
     }
     return nearest;
   }
 
-  [[nodiscard]] Decision decide_one(const NearestPixels& nearest, std::size_t p, std::size_t corner,
+  template <class Nearest>
+  [[nodiscard]] Decision decide_one(const Nearest& nearest, std::size_t p, std::size_t corner,
                                     std::int32_t pixel) const {
     if (pixel == RangeImage::none) return {};
     const Decision decision = count_votes(nearest, p, corner);
@@ -193,27 +214,24 @@ class Poll {
     return {.label = pixels_.classes[own], .confidence = pixels_.confidence[own]};
   }
 
-  [[nodiscard]] Decision count_votes(const NearestPixels& nearest, std::size_t p,
+  template <class Nearest>
+  [[nodiscard]] Decision count_votes(const Nearest& nearest, std::size_t p,
                                      std::size_t corner) const {
-    struct Tally {
-      int votes = 0;
-      float confidence = 0.0F;
-    };
-    std::array<Tally, semantic_class_count> tallies{};
+    std::array<SemanticClass, KnnConfig::max_neighbours> voted;
     const auto wanted = static_cast<std::size_t>(config_.neighbours);
     const auto cutoff_m = static_cast<float>(config_.cutoff_m);
     std::size_t votes = 0;
     for (; votes < wanted && nearest.distance_m(votes, p) <= cutoff_m; ++votes) {
-      const std::size_t place = corner + offsets_[nearest.place(votes, p)];
-      Tally& tally = tallies[static_cast<std::size_t>(padded_.label(place))];
-      ++tally.votes;
-      tally.confidence += padded_.confidence(place);
+      voted[votes] = padded_.label(corner + offsets_[nearest.place(votes, p)]);
     }
-    tallies[0] = {};  // unlabeled
-    const auto winner = std::ranges::max_element(tallies, {}, &Tally::votes);
-    if (winner->votes == 0) return {};
-    return {.label = static_cast<SemanticClass>(winner - tallies.begin()),
-            .confidence = winner->confidence / static_cast<float>(votes)};
+    const SemanticClass winner = most_frequent(std::span(voted).first(votes));
+    if (winner == SemanticClass::unlabeled) return {};
+    float confidence = 0.0F;
+    for (std::size_t k = 0; k < votes; ++k) {
+      if (voted[k] != winner) continue;
+      confidence += padded_.confidence(corner + offsets_[nearest.place(k, p)]);
+    }
+    return {.label = winner, .confidence = confidence / static_cast<float>(votes)};
   }
 
   const RangeImage& image_;
@@ -252,10 +270,23 @@ PointLabels knn_labels(const RangeImage& image, const PixelLabels& pixels,
   PointLabels labels;
   labels.classes.resize(image.point_count());
   labels.confidence.resize(image.point_count());
-  const tbb::blocked_range<std::size_t> all(0, (image.point_count() + lanes - 1) / lanes, 128);
-  tbb::parallel_for(all, [&](const auto& some) {
-    for (std::size_t i = some.begin(); i < some.end(); ++i) poll.decide(i * lanes, labels);
-  });
+  const auto decide_all = [&]<std::size_t kept_pixels>(
+                              std::integral_constant<std::size_t, kept_pixels>) {
+    const tbb::blocked_range<std::size_t> all(0, (image.point_count() + lanes - 1) / lanes, 512);
+    tbb::parallel_for(all, [&](const auto& some) {
+      for (std::size_t i = some.begin(); i < some.end(); ++i) {
+        poll.decide<kept_pixels>(i * lanes, labels);
+      }
+    });
+  };
+  // So few that they stay in registers, if they are enough.
+  constexpr std::integral_constant<std::size_t, 5> usual;
+  constexpr std::integral_constant<std::size_t, KnnConfig::max_neighbours> all;
+  if (config.neighbours <= static_cast<int>(usual)) {
+    decide_all(usual);
+  } else {
+    decide_all(all);
+  }
   return labels;
 }
 
