@@ -45,8 +45,11 @@ struct Odometry::State {
         map{FeatureMap(odometry_config.local_map), FeatureMap(odometry_config.local_map)},
         past(odometry_config.motion) {}
 
-  [[nodiscard]] std::vector<ObjectVerdict> judge(const Scan& scan, const PointLabels& labels,
-                                                 const Objects& objects,
+  /// The scan as later ones look back on it; nothing where they do not.
+  [[nodiscard]] std::optional<RangeView> view_of(const Scan& scan, const PointLabels& labels,
+                                                 const Eigen::Isometry3d& T_map_lidar) const;
+  [[nodiscard]] std::vector<ObjectVerdict> judge(const Scan& scan, const Objects& objects,
+                                                 const std::optional<RangeView>& now,
                                                  const Eigen::Isometry3d& T_map_lidar) const;
   /// Whether the last velocity says where a scan of this time is.
   [[nodiscard]] bool knows_velocity(std::int64_t stamp_ns) const;
@@ -55,7 +58,8 @@ struct Odometry::State {
   [[nodiscard]] OdometryResult registered(const FeatureSets& features,
                                           Eigen::Isometry3d T_map_lidar_predicted,
                                           bool prediction_is_good) const;
-  void remember(const Scan& scan, const PointLabels& labels, const Eigen::Isometry3d& T_map_lidar);
+  void remember(std::int64_t stamp_ns, std::optional<RangeView> view,
+                const Eigen::Isometry3d& T_map_lidar);
 
   OdometryConfig config;
   SensorModel sensor;
@@ -106,13 +110,17 @@ LocalMap coarse_map(const FeatureSets& features, const Eigen::Isometry3d& T_map_
 
 }  // namespace
 
-std::vector<ObjectVerdict> Odometry::State::judge(const Scan& scan, const PointLabels& labels,
-                                                  const Objects& objects,
+std::optional<RangeView> Odometry::State::view_of(const Scan& scan, const PointLabels& labels,
                                                   const Eigen::Isometry3d& T_map_lidar) const {
-  if (!config.motion.use_past_views || objects.count == 0)
-    return std::vector<ObjectVerdict>(objects.count, ObjectVerdict::undecided);
-  const RangeView now(scan, labels.classes, sensor, T_map_lidar);
-  return judge_objects(scan, objects, T_map_lidar, past, now, config.motion);
+  if (labels.empty() || !config.motion.use_past_views) return std::nullopt;
+  return RangeView(scan, labels.classes, sensor, T_map_lidar);
+}
+
+std::vector<ObjectVerdict> Odometry::State::judge(const Scan& scan, const Objects& objects,
+                                                  const std::optional<RangeView>& now,
+                                                  const Eigen::Isometry3d& T_map_lidar) const {
+  if (!now) return std::vector<ObjectVerdict>(objects.count, ObjectVerdict::undecided);
+  return judge_objects(scan, objects, T_map_lidar, past, *now, config.motion);
 }
 
 bool Odometry::State::knows_velocity(std::int64_t stamp_ns) const {
@@ -141,21 +149,23 @@ OdometryResult Odometry::State::registered(const FeatureSets& features,
   return register_features(features, map, T_map_lidar_predicted, config);
 }
 
-void Odometry::State::remember(const Scan& scan, const PointLabels& labels,
+void Odometry::State::remember(std::int64_t stamp_ns, std::optional<RangeView> view,
                                const Eigen::Isometry3d& T_map_lidar_now) {
   if (started) {
     last_motion = T_map_lidar.inverse() * T_map_lidar_now;
-    last_interval_s = seconds(scan.stamp_ns - last_stamp_ns);
+    last_interval_s = seconds(stamp_ns - last_stamp_ns);
   }
   started = true;
-  last_stamp_ns = scan.stamp_ns;
+  last_stamp_ns = stamp_ns;
   T_map_lidar = T_map_lidar_now;
-  if (labels.empty() || !config.motion.use_past_views) return;
-  RangeView now(scan, labels.classes, sensor, T_map_lidar);
-  const auto is_gone = [&](const Eigen::Vector3f& p_map) { return past.sees_through(now, p_map); };
+  if (!view) return;
+  view->move_to(T_map_lidar);
+  const auto is_gone = [&](const Eigen::Vector3f& p_map) {
+    return past.sees_through(*view, p_map);
+  };
   map.edges.remove_movable_if(is_gone);
   map.planes.remove_movable_if(is_gone);
-  past.add(std::move(now));
+  past.add(*std::move(view));
 }
 
 namespace {
@@ -254,7 +264,8 @@ Odometry::Step Odometry::add(const Scan& scan, const PointLabels& labels,
   const Features features = extract_features(scan, config.features);
   const Objects objects =
       find_objects(scan.points_lidar, labels.classes, config.motion.object_gap_m);
-  const auto verdicts = state.judge(scan, labels, objects, T_map_lidar_predicted);
+  auto view = state.view_of(scan, labels, T_map_lidar_predicted);
+  const auto verdicts = state.judge(scan, objects, view, T_map_lidar_predicted);
   const UsablePoints usable(config, objects, verdicts);
   FeatureSets sets = feature_sets(scan, labels, features, usable);
 
@@ -268,7 +279,7 @@ Odometry::Step Odometry::add(const Scan& scan, const PointLabels& labels,
   step.motion = split_by_motion(scan, labels, objects, verdicts, T_map_lidar, state.map, config);
   if (state.may_extend_map(step.result.health))
     extend_local_map(state.map, scan, labels, features, usable, step.motion, T_map_lidar);
-  state.remember(scan, labels, T_map_lidar);
+  state.remember(scan.stamp_ns, std::move(view), T_map_lidar);
   state.last_features = std::move(sets);
   return step;
 }

@@ -1,7 +1,11 @@
 #include "core/odometry/past_views.hpp"
 
+#include <tbb/blocked_range.h>
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -12,6 +16,7 @@ namespace {
 constexpr int max_columns = 1024;
 /// A surface is the same one within this distance along the ray [m].
 constexpr float same_surface_m = 0.3F;
+constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
 /// What stood farther before the point than this was another object [m].
 constexpr float max_gone_gap_m = 3.0F;
 
@@ -23,17 +28,31 @@ RangeView::RangeView(const Scan& scan, std::span<const SemanticClass> labels,
       columns_(std::min(sensor.columns, max_columns)),
       fov_up_(static_cast<float>(sensor.fov_up)),
       rows_per_rad_(static_cast<float>(sensor.rings / (sensor.fov_up - sensor.fov_down))),
-      T_lidar_map_(T_map_lidar.inverse().cast<float>()),
-      origin_map_(T_map_lidar.translation().cast<float>()),
       pixels_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_), 0.0F) {
-  for (std::size_t i = 0; i < scan.size(); ++i) {
-    const float range = scan.points_lidar[i].norm();
-    const auto pixel = pixel_of(scan.points_lidar[i], range);
-    if (!pixel) continue;
-    float& old = pixels_[*pixel];
-    if (old != 0.0F && std::abs(old) <= range) continue;
-    old = !labels.empty() && is_movable(labels[i]) ? range : -range;
+  move_to(T_map_lidar);
+  struct Return {
+    std::size_t pixel = none;
+    float range_m = 0.0F;
+  };
+  std::vector<Return> returns(scan.size());
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scan.size(), 4096), [&](const auto& block) {
+    for (std::size_t i = block.begin(); i != block.end(); ++i) {
+      const float range_m = scan.points_lidar[i].norm();
+      returns[i] = {pixel_of(scan.points_lidar[i], range_m).value_or(none), range_m};
+    }
+  });
+  for (std::size_t i = 0; i < returns.size(); ++i) {
+    const auto [pixel, range_m] = returns[i];
+    if (pixel == none) continue;
+    float& old = pixels_[pixel];
+    if (old != 0.0F && std::abs(old) <= range_m) continue;
+    old = !labels.empty() && is_movable(labels[i]) ? range_m : -range_m;
   }
+}
+
+void RangeView::move_to(const Eigen::Isometry3d& T_map_lidar) {
+  T_lidar_map_ = T_map_lidar.inverse().cast<float>();
+  origin_map_ = T_map_lidar.translation().cast<float>();
 }
 
 std::optional<std::size_t> RangeView::pixel_of(const Eigen::Vector3f& point_lidar,

@@ -45,6 +45,9 @@ class RangeView {
 
   [[nodiscard]] const Eigen::Vector3f& origin_map() const { return origin_map_; }
 
+  /// The scan was taken from here.
+  void move_to(const Eigen::Isometry3d& T_map_lidar);
+
  private:
   [[nodiscard]] std::optional<std::size_t> pixel_of(const Eigen::Vector3f& point_lidar,
                                                     float range_m) const;
