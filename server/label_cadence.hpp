@@ -1,30 +1,19 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
-#include <deque>
+
+#include "server/recent_median.hpp"
 
 namespace stillmap {
 
-/// Median of the last few values, which single outliers do not move.
-class RecentMedian {
- public:
-  explicit RecentMedian(std::size_t window) : window_(window) {}
-  void add(double value);
-  /// 0 before the first value.
-  [[nodiscard]] double value() const;
-
- private:
-  std::size_t window_;
-  std::deque<double> last_;
-};
-
-/// Which scans are segmented: every n-th, n the smallest that the label source can keep. It grows
-/// at once and shrinks with some room to spare, so that it does not swing.
+/// Which scans are segmented: every n-th, n the smallest with which the label source and all else
+/// that is done with a scan keep the sensor's rate. It grows at once and shrinks with some room to
+/// spare, so that it does not swing.
 class LabelCadence {
  public:
-  /// A scan took so long while scans came so fast; 0: not known.
-  void scan_segmented(double network_ms, double period_ms);
+  /// A scan took so long, `besides_ms` is what else is done with each, and scans come so fast (0:
+  /// not known).
+  void scan_segmented(double network_ms, double besides_ms, double period_ms);
 
   /// Never 0.
   [[nodiscard]] std::uint32_t every() const { return every_; }

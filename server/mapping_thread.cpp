@@ -12,7 +12,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How long a request to reset, or the last view of a drive, may wait while no scan comes.
+// How long a request, or the last view of a drive, may wait while no scan comes.
 constexpr std::chrono::milliseconds idle_period{50};
 
 double milliseconds(Clock::duration time) {
@@ -44,10 +44,10 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSo
       statistics_(statistics),
       board_(board),
       outputs_(outputs),
-      mapper_(
-          config.mapper,
-          std::make_unique<PacedLabels>(std::move(label_source), label_budget(config), statistics),
-          [this](std::string_view stage) { stage_ended(stage); }) {
+      mapper_(config.mapper,
+              std::make_unique<PacedLabels>(std::move(label_source), label_budget(config), queue,
+                                            statistics),
+              [this](std::string_view stage) { stage_ended(stage); }) {
   if (stored && !stored->view.tiles.empty()) {
     mapper_.restore(stored->view);
     board_.begin(mapper_.map_view(), stored->trajectory);
@@ -59,29 +59,44 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSo
 }
 
 std::uint64_t MappingThread::reset() {
-  std::future<std::uint64_t> map_id;
+  const std::uint64_t map_id = new_map_id();
+  between_scans([this, map_id] {
+    mapper_.reset(map_id);
+    board_.begin(mapper_.map_view(), {});
+    spdlog::info("reset: map {} begins", map_id);
+  });
+  return map_id;
+}
+
+void MappingThread::show_now() {
+  between_scans([this] { show_view(); });
+}
+
+void MappingThread::between_scans(std::function<void()> action) {
+  std::future<void> done;
   {
-    const std::scoped_lock lock(reset_mutex_);
-    map_id = reset_asked_.emplace().get_future();
+    const std::scoped_lock lock(asked_mutex_);
+    done = asked_.emplace_back(std::move(action)).get_future();
   }
-  return map_id.get();
+  done.get();
 }
 
 void MappingThread::work(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     auto queued = queue_.pop(stop, idle_period);
-    reset_if_asked();
+    run_asked();
     const bool idle = !queued;
     if (queued) map(*std::move(queued));
     if (idle || Clock::now() - view_shown_ >= view_period_) show_view();
   }
   show_view();
-  reset_if_asked();
+  run_asked();
 }
 
 void MappingThread::map(QueuedScan queued) {
   const auto began = Clock::now();
   stage_began_ = began;
+  labels_ms_ = 0.0;
   statistics_.add_latency("queue", milliseconds(began - queued.received));
   const std::int64_t stamp_ns = queued.scan.stamp_ns;
   auto mapped = mapper_.process(std::move(queued.scan), prior_for(stamp_ns));
@@ -99,6 +114,7 @@ void MappingThread::map(QueuedScan queued) {
   statistics_.scan_mapped(mapped->labelling);
   statistics_.add_latency("total", milliseconds(Clock::now() - queued.received));
   if (outputs_.scans != nullptr) outputs_.scans->publish(std::move(mapped->labelled), frame);
+  statistics_.scan_took_besides_labels(milliseconds(Clock::now() - began) - labels_ms_);
 }
 
 std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) const {
@@ -111,7 +127,9 @@ std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns)
 
 void MappingThread::stage_ended(std::string_view stage) {
   const auto now = Clock::now();
-  statistics_.add_latency(std::string(stage), milliseconds(now - stage_began_));
+  const double ms = milliseconds(now - stage_began_);
+  statistics_.add_latency(std::string(stage), ms);
+  if (stage == "segment") labels_ms_ = ms;
   stage_began_ = now;
 }
 
@@ -120,15 +138,9 @@ void MappingThread::show_view() {
   view_shown_ = Clock::now();
 }
 
-void MappingThread::reset_if_asked() {
-  const std::scoped_lock lock(reset_mutex_);
-  if (!reset_asked_) return;
-  const std::uint64_t map_id = new_map_id();
-  mapper_.reset(map_id);
-  board_.begin(mapper_.map_view(), {});
-  spdlog::info("reset: map {} begins", map_id);
-  reset_asked_->set_value(map_id);
-  reset_asked_.reset();
+void MappingThread::run_asked() {
+  const std::scoped_lock lock(asked_mutex_);
+  for (std::packaged_task<void()>& task : std::exchange(asked_, {})) task();
 }
 
 }  // namespace stillmap

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <functional>
 #include <future>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "config/server_config.hpp"
 #include "core/map/map_file.hpp"
@@ -39,6 +41,8 @@ class MappingThread {
 
   /// Forgets poses and map, after the scan in work; returns the id of the new map.
   [[nodiscard]] std::uint64_t reset();
+  /// Shows on the board what was mapped so far, the scan in work included.
+  void show_now();
 
  private:
   void work(const std::stop_token& stop);
@@ -46,7 +50,9 @@ class MappingThread {
   void stage_ended(std::string_view stage);
   [[nodiscard]] std::optional<Eigen::Isometry3d> prior_for(std::int64_t stamp_ns) const;
   void show_view();
-  void reset_if_asked();
+  /// Runs it in the thread that maps, after the scan in work, and waits for that.
+  void between_scans(std::function<void()> action);
+  void run_asked();
 
   std::string lidar_frame_;
   std::chrono::duration<double> view_period_;
@@ -57,9 +63,10 @@ class MappingThread {
   Mapper mapper_;
   RareWarnings warnings_;
   std::chrono::steady_clock::time_point stage_began_;
+  double labels_ms_ = 0.0;
   std::chrono::steady_clock::time_point view_shown_;
-  std::mutex reset_mutex_;
-  std::optional<std::promise<std::uint64_t>> reset_asked_;
+  std::mutex asked_mutex_;
+  std::vector<std::packaged_task<void()>> asked_;
   // Last: stops before what it uses is gone.
   std::jthread thread_;
 };

@@ -10,6 +10,8 @@ namespace {
 
 constexpr std::uint32_t misses_until_too_slow = 3;
 constexpr std::uint32_t unwaited_until_next_try = 10;
+/// A scan that is due is put off by at most so many others while the mapper lags behind.
+constexpr std::uint32_t most_put_off = 10;
 
 double milliseconds(std::chrono::steady_clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
@@ -26,8 +28,12 @@ std::chrono::milliseconds label_budget(const ServerConfig& config) {
 }
 
 PacedLabels::PacedLabels(std::unique_ptr<LabelSource> source, std::chrono::milliseconds budget,
-                         Statistics& statistics)
-    : source_(std::move(source)), name_(source_->name()), budget_(budget), statistics_(statistics) {
+                         const ScanQueue& queue, Statistics& statistics)
+    : source_(std::move(source)),
+      name_(source_->name()),
+      budget_(budget),
+      queue_(queue),
+      statistics_(statistics) {
   if (!may_skip_scans()) return;
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
@@ -58,7 +64,8 @@ LabelFeed::Answer PacedLabels::offer(const Scan& scan) {
 
 bool PacedLabels::is_due() {
   ++offers_since_taken_;
-  return !busy_ && offers_since_taken_ >= cadence_.every();
+  if (busy_ || offers_since_taken_ < cadence_.every()) return false;
+  return queue_.waiting() == 0 || offers_since_taken_ >= cadence_.every() + most_put_off;
 }
 
 // A source that was late several times is too slow. But one that runs beside the odometry takes
@@ -100,13 +107,17 @@ void PacedLabels::segmented(double network_ms) {
   const std::scoped_lock lock(mutex_);
   const std::uint32_t before = cadence_.every();
   // Of the sensor, not of the scans that are offered: an overloaded server drops scans.
-  cadence_.scan_segmented(network_ms, statistics_.receive_period_ms());
+  cadence_.scan_segmented(network_ms, statistics_.besides_labels_ms(),
+                          statistics_.receive_period_ms());
   const std::uint32_t now = cadence_.every();
   statistics_.segmenting(now, cadence_.network_ms());
   if (now == before) return;
   const auto level = now > before ? spdlog::level::warn : spdlog::level::info;
-  spdlog::log(level, "{} is segmented now: that takes {:.0f} ms, and scans come every {:.0f} ms",
-              every_nth_scan(now), cadence_.network_ms(), cadence_.period_ms());
+  spdlog::log(level,
+              "{} is segmented now: that takes {:.0f} ms, all else {:.0f} ms, and scans come every "
+              "{:.0f} ms",
+              every_nth_scan(now), cadence_.network_ms(), statistics_.besides_labels_ms(),
+              cadence_.period_ms());
 }
 
 }  // namespace stillmap

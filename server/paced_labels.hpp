@@ -13,6 +13,7 @@
 #include "core/label_feed.hpp"
 #include "server/label_cadence.hpp"
 #include "server/rare_warnings.hpp"
+#include "server/scan_queue.hpp"
 #include "server/statistics.hpp"
 
 namespace stillmap {
@@ -21,14 +22,15 @@ namespace stillmap {
 [[nodiscard]] std::chrono::milliseconds label_budget(const ServerConfig& config);
 
 /// A label source that may be slower than the sensor: it runs in a thread of its own, takes every
-/// n-th scan, and nobody waits for it longer than the budget, or at all when it lately took longer
-/// than that. Its exceptions are counted and leave a scan without labels. The mapping thread calls
-/// it.
+/// n-th scan, none while others wait to be mapped, and nobody waits for it longer than the budget,
+/// or at all when it lately took longer than that. Its exceptions are counted and leave a scan
+/// without labels. The mapping thread calls it.
 class PacedLabels final : public LabelFeed {
  public:
-  /// With a budget of 0 the source runs in the caller's thread and gets every scan.
+  /// With a budget of 0 the source runs in the caller's thread and gets every scan. The queue is
+  /// that of the scans to come.
   PacedLabels(std::unique_ptr<LabelSource> source, std::chrono::milliseconds budget,
-              Statistics& statistics);
+              const ScanQueue& queue, Statistics& statistics);
   /// Waits for the scan in work.
   ~PacedLabels() override;
 
@@ -50,6 +52,7 @@ class PacedLabels final : public LabelFeed {
   std::unique_ptr<LabelSource> source_;
   std::string name_;
   std::chrono::milliseconds budget_;
+  const ScanQueue& queue_;
   Statistics& statistics_;
   /// Used where the source runs.
   RareWarnings warnings_;

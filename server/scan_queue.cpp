@@ -32,4 +32,9 @@ std::optional<QueuedScan> ScanQueue::pop(const std::stop_token& stop,
   return scan;
 }
 
+std::size_t ScanQueue::waiting() const {
+  const std::scoped_lock lock(mutex_);
+  return scans_.size();
+}
+
 }  // namespace stillmap

@@ -37,9 +37,12 @@ class ScanQueue {
   [[nodiscard]] std::optional<QueuedScan> pop(const std::stop_token& stop,
                                               std::chrono::milliseconds timeout);
 
+  /// How many scans wait to be taken.
+  [[nodiscard]] std::size_t waiting() const;
+
  private:
   const std::size_t capacity_;
-  std::mutex mutex_;
+  mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<QueuedScan> scans_;
 };

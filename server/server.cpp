@@ -69,11 +69,13 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
   receiver_ = std::make_unique<ScanReceiver>(participant_, config, queue_, statistics_);
   map_publisher_ = std::make_unique<MapPublisher>(participant_, topics_, config, board_);
   const auto status = [this] { return report_.status(); };
-  services_ = std::make_unique<ServiceDesk>(
-      participant_, Services::in(config.topics.name_space),
-      ServiceContext{.board = board_, .saver = saver_, .status = status, .reset = [this] {
-                       return mapping_->reset();
-                     }});
+  services_ =
+      std::make_unique<ServiceDesk>(participant_, Services::in(config.topics.name_space),
+                                    ServiceContext{.board = board_,
+                                                   .saver = saver_,
+                                                   .status = status,
+                                                   .reset = [this] { return mapping_->reset(); },
+                                                   .show_now = [this] { mapping_->show_now(); }});
   status_publisher_ = std::make_unique<StatusPublisher>(participant_, topics_,
                                                         config.publish.status_period_s, status);
   autosave_ = std::make_unique<PeriodicThread>(

@@ -88,6 +88,11 @@ void Statistics::add_latency(const std::string& stage, double milliseconds) {
   known->second.add(milliseconds);
 }
 
+void Statistics::scan_took_besides_labels(double milliseconds) {
+  const std::scoped_lock lock(mutex_);
+  besides_labels_ms_.add(milliseconds);
+}
+
 void Statistics::report_to(ServerStatus& status) const {
   const std::scoped_lock lock(mutex_);
   const auto now = RateWindow::Clock::now();
@@ -116,6 +121,11 @@ double Statistics::receive_period_ms() const {
   const std::scoped_lock lock(mutex_);
   const double rate_hz = received_rate_.rate_hz(RateWindow::Clock::now());
   return rate_hz > 0.0 ? 1000.0 / rate_hz : 0.0;
+}
+
+double Statistics::besides_labels_ms() const {
+  const std::scoped_lock lock(mutex_);
+  return besides_labels_ms_.value();
 }
 
 std::string Statistics::last_drop() const {

@@ -10,6 +10,7 @@
 #include "core/label_feed.hpp"
 #include "idl/server_status.hpp"
 #include "server/latency_window.hpp"
+#include "server/recent_median.hpp"
 
 namespace stillmap {
 
@@ -48,6 +49,8 @@ class Statistics {
   /// Counts "dropped_<reason>"; the last `detail` is told in the status.
   void scans_dropped(const std::string& reason, std::size_t count, const std::string& detail);
   void add_latency(const std::string& stage, double milliseconds);
+  /// All that was done with a scan, without its labels, took so long.
+  void scan_took_besides_labels(double milliseconds);
 
   /// Fills in counters, rates, latencies and segmentation.
   void report_to(ServerStatus& status) const;
@@ -55,6 +58,8 @@ class Statistics {
   [[nodiscard]] std::uint64_t received() const;
   /// Mean time from scan to scan over the last seconds; 0 without scans.
   [[nodiscard]] double receive_period_ms() const;
+  /// Median over the last scans of what is done with each but its labels; 0 before the first.
+  [[nodiscard]] double besides_labels_ms() const;
   /// Why the last scan was dropped; empty once a later one was mapped.
   [[nodiscard]] std::string last_drop() const;
   /// Why the last segmentation failed; empty once a later one worked.
@@ -71,6 +76,7 @@ class Statistics {
   RateWindow mapped_rate_;
   std::string last_drop_;
   LabellingWindow labellings_;
+  RecentMedian besides_labels_ms_{9};
   SegmentationStatus segmentation_;
   std::uint64_t label_failures_ = 0;
   std::string last_label_failure_;

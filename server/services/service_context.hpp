@@ -18,6 +18,8 @@ struct ServiceContext {
   std::function<ServerStatus()> status;
   /// Returns the new map's id.
   std::function<std::uint64_t()> reset;
+  /// Puts on the board what was mapped until now.
+  std::function<void()> show_now;
 };
 
 /// Status of a reply about this view.

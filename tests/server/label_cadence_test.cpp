@@ -10,9 +10,9 @@ namespace stillmap {
 namespace {
 
 /// What n becomes when scans come every 100 ms and the network takes so long, for ten scans.
-std::uint32_t settled(LabelCadence& cadence, double network_ms) {
+std::uint32_t settled(LabelCadence& cadence, double network_ms, double besides_ms = 0.0) {
   for (int i = 0; i < 10; ++i) {
-    cadence.scan_segmented(network_ms, 100.0);
+    cadence.scan_segmented(network_ms, besides_ms, 100.0);
   }
   return cadence.every();
 }
@@ -22,6 +22,14 @@ TEST(LabelCadence, TakesTheSmallestNThatTheNetworkCanKeep) {
        {std::pair{5.0, 1U}, {90.0, 1U}, {130.0, 2U}, {190.0, 2U}, {240.0, 3U}, {950.0, 10U}}) {
     LabelCadence cadence;
     EXPECT_EQ(settled(cadence, network_ms), every) << network_ms;
+  }
+}
+
+TEST(LabelCadence, LeavesRoomForAllElseThatIsDoneWithAScan) {
+  for (const auto& [network_ms, besides_ms, every] :
+       {std::tuple{45.0, 50.0, 1U}, {60.0, 50.0, 2U}, {45.0, 80.0, 3U}, {60.0, 150.0, 6U}}) {
+    LabelCadence cadence;
+    EXPECT_EQ(settled(cadence, network_ms, besides_ms), every) << network_ms << " " << besides_ms;
   }
 }
 
@@ -37,7 +45,7 @@ TEST(LabelCadence, DoesNotSwingAtTheBorderOfTwoN) {
   (void)settled(cadence, 230.0);
   std::set<std::uint32_t> seen;
   for (int i = 0; i < 200; ++i) {
-    cadence.scan_segmented(i / 10 % 2 == 0 ? 192.0 : 208.0, 100.0);
+    cadence.scan_segmented(i / 10 % 2 == 0 ? 192.0 : 208.0, 0.0, 100.0);
     seen.insert(cadence.every());
   }
   EXPECT_EQ(seen.size(), 1U);
@@ -46,16 +54,16 @@ TEST(LabelCadence, DoesNotSwingAtTheBorderOfTwoN) {
 TEST(LabelCadence, OneSlowRunAndOnePauseOfTheSensorChangeNothing) {
   LabelCadence cadence;
   EXPECT_EQ(settled(cadence, 50.0), 1U);
-  cadence.scan_segmented(5000.0, 100.0);
+  cadence.scan_segmented(5000.0, 0.0, 100.0);
   EXPECT_EQ(cadence.every(), 1U);
   EXPECT_EQ(settled(cadence, 240.0), 3U);
-  cadence.scan_segmented(240.0, 60'000.0);
+  cadence.scan_segmented(240.0, 0.0, 60'000.0);
   EXPECT_EQ(cadence.every(), 3U);
 }
 
 TEST(LabelCadence, BeforeTheRateIsKnownEveryScanIsDue) {
   LabelCadence cadence;
-  cadence.scan_segmented(400.0, 0.0);
+  cadence.scan_segmented(400.0, 0.0, 0.0);
   EXPECT_EQ(cadence.every(), 1U);
 }
 

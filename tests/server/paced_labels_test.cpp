@@ -23,7 +23,7 @@ class PacedLabelsTest : public testing::Test {
  protected:
   [[nodiscard]] std::unique_ptr<PacedLabels> feed(std::chrono::milliseconds budget) {
     return std::make_unique<PacedLabels>(std::make_unique<test::SlowLabels>(source_), budget,
-                                         statistics_);
+                                         queue_, statistics_);
   }
   [[nodiscard]] ServerStatus status() const {
     ServerStatus status;
@@ -32,6 +32,7 @@ class PacedLabelsTest : public testing::Test {
   }
 
   test::SlowLabels::Behaviour source_;
+  ScanQueue queue_{3};
   Statistics statistics_;
 };
 
@@ -61,6 +62,16 @@ TEST_F(PacedLabelsTest, NobodyWaitsLongerThanTheBudgetAndLateLabelsComeWithALate
   const auto third = labels->offer(scan_at(3));
   ASSERT_GE(third.finished.size(), 1U);
   EXPECT_EQ(third.finished[0].stamp_ns, 1);
+}
+
+TEST_F(PacedLabelsTest, CatchingUpComesFirstButNotForEver) {
+  const auto labels = feed(5s);
+  EXPECT_EQ(queue_.push_dropping_oldest({scan_at(100), "lidar", Clock::now()}), 0U);
+  int segmented = 0;
+  for (int k = 0; k < 33; ++k) segmented += labels->offer(scan_at(k)).finished.empty() ? 0 : 1;
+  EXPECT_EQ(segmented, 3);
+  ASSERT_TRUE(queue_.pop({}, 0ms).has_value());
+  EXPECT_FALSE(labels->offer(scan_at(33)).finished.empty());
 }
 
 TEST_F(PacedLabelsTest, WithoutABudgetEveryScanGetsItsLabels) {

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstddef>
+#include <deque>
+
+namespace stillmap {
+
+/// Median of the last few values, which single outliers do not move.
+class RecentMedian {
+ public:
+  explicit RecentMedian(std::size_t window) : window_(window) {}
+  void add(double value);
+  /// 0 before the first value.
+  [[nodiscard]] double value() const;
+
+ private:
+  std::size_t window_;
+  std::deque<double> last_;
+};
+
+}  // namespace stillmap
