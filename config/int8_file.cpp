@@ -11,9 +11,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-void read_ranges(YamlSection section, std::map<std::string, float>& range_of_tensor) {
+void read_ranges(YamlSection section,
+                 std::map<std::string, std::vector<float>>& range_of_channels) {
   for (const std::string& tensor : section.names()) {
-    section.number(tensor, range_of_tensor[tensor], {0, 1e9});
+    std::vector<double> ranges;
+    section.number_list(tensor, ranges, {0, 1e9});
+    range_of_channels[tensor].assign(ranges.begin(), ranges.end());
   }
 }
 
@@ -28,7 +31,7 @@ std::optional<Int8Calibration> load_int8_calibration(const fs::path& file) {
     section.require({"ranges"});
     section.text("made", calibration.made);
     section.text_list("float_layers", calibration.float_layers);
-    read_ranges(section.section("ranges"), calibration.range_of_tensor);
+    read_ranges(section.section("ranges"), calibration.range_of_channels);
   }
   yaml.require_no_faults();
   return calibration;
@@ -42,10 +45,11 @@ void save_int8_calibration(const Int8Calibration& calibration, const fs::path& f
   for (const std::string& layer : calibration.float_layers) text << YAML::DoubleQuoted << layer;
   text << YAML::EndSeq;
   text << YAML::Comment("these run in floating point, besides the first and the last layer");
-  text << YAML::Key << "ranges" << YAML::Comment("largest magnitude that each tensor may have")
-       << YAML::Value << YAML::BeginMap;
-  for (const auto& [tensor, range] : calibration.range_of_tensor) {
-    text << YAML::Key << YAML::DoubleQuoted << tensor << YAML::Value << range;
+  text << YAML::Key << "ranges"
+       << YAML::Comment("largest magnitude that each channel of each tensor may have")
+       << YAML::Value << YAML::BeginMap << YAML::FloatPrecision(5);
+  for (const auto& [tensor, ranges] : calibration.range_of_channels) {
+    text << YAML::Key << YAML::DoubleQuoted << tensor << YAML::Value << YAML::Flow << ranges;
   }
   text << YAML::EndMap << YAML::EndMap;
   std::ofstream stream(file, std::ios::trunc);

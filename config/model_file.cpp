@@ -96,7 +96,7 @@ std::unique_ptr<LabelSource> open_network_labels(const LabelsConfig& labels,
 
 }  // namespace
 
-ModelDescription load_model_description(const fs::path& folder) {
+ModelDescription load_uncalibrated_model(const fs::path& folder) {
   if (!fs::is_directory(folder)) {
     throw ConfigError({folder.string() +
                        ": is not a folder; a model is a folder with model.onnx and model.yaml"});
@@ -106,6 +106,11 @@ ModelDescription load_model_description(const fs::path& folder) {
   model.network_file = folder / "model.onnx";
   read_model(YamlSection(yaml), model);
   yaml.require_no_faults();
+  return model;
+}
+
+ModelDescription load_model_description(const fs::path& folder) {
+  ModelDescription model = load_uncalibrated_model(folder);
   model.int8 = load_int8_calibration(folder / "int8.yaml");
   return model;
 }

@@ -10,8 +10,10 @@
 
 namespace stillmap {
 
-/// Reads model.yaml of a model folder, and int8.yaml where it is; the network is model.onnx beside
-/// them. Throws ConfigError with every fault.
+/// Reads model.yaml of a model folder; the network is model.onnx beside it. Throws ConfigError with
+/// every fault.
+[[nodiscard]] ModelDescription load_uncalibrated_model(const std::filesystem::path& folder);
+/// The same with its calibration, where there is an int8.yaml.
 [[nodiscard]] ModelDescription load_model_description(const std::filesystem::path& folder);
 
 /// The label source that the configuration asks for, for scans of this sensor. Throws ConfigError

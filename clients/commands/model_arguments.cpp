@@ -14,6 +14,21 @@ namespace {
 constexpr int default_rows = 64;
 constexpr int default_columns = 1024;
 
+template <class Load>
+ModelDescription load_by(const ModelArguments& arguments, Load load) {
+  const auto rows = static_cast<int>(arguments.rows);
+  const auto columns = static_cast<int>(arguments.columns);
+  const std::filesystem::path model_path = arguments.model;
+  if (model_path.extension() == ".onnx") {
+    return describe_bare_network(model_path, rows > 0 ? rows : default_rows,
+                                 columns > 0 ? columns : default_columns);
+  }
+  ModelDescription model = load(find_model(model_path));
+  if (rows > 0) model.rows = rows;
+  if (columns > 0) model.columns = columns;
+  return model;
+}
+
 }  // namespace
 
 void add_model_options(CommandHandle command, ModelArguments& arguments) {
@@ -30,17 +45,12 @@ void add_model_options(CommandHandle command, ModelArguments& arguments) {
 }
 
 ModelDescription load_model(const ModelArguments& arguments) {
-  const auto rows = static_cast<int>(arguments.rows);
-  const auto columns = static_cast<int>(arguments.columns);
-  const std::filesystem::path model_path = arguments.model;
-  if (model_path.extension() == ".onnx") {
-    return describe_bare_network(model_path, rows > 0 ? rows : default_rows,
-                                 columns > 0 ? columns : default_columns);
-  }
-  ModelDescription model = load_model_description(find_model(model_path));
-  if (rows > 0) model.rows = rows;
-  if (columns > 0) model.columns = columns;
-  return model;
+  return load_by(arguments, load_model_description);
+}
+
+ModelDescription load_uncalibrated_model(const ModelArguments& arguments) {
+  return load_by(arguments,
+                 [](const std::filesystem::path& f) { return load_uncalibrated_model(f); });
 }
 
 std::vector<ScanSample> choose_scans(const std::vector<ScanDataset>& datasets, std::size_t count) {

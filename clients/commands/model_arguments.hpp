@@ -25,6 +25,8 @@ void add_model_options(CommandHandle command, ModelArguments& arguments);
 /// The model in a folder, or a network file without a description. Throws ConfigError or
 /// ModelError.
 [[nodiscard]] ModelDescription load_model(const ModelArguments& arguments);
+/// The same without its int8.yaml, which may be faulty then.
+[[nodiscard]] ModelDescription load_uncalibrated_model(const ModelArguments& arguments);
 
 /// Scans of several recordings, evenly chosen.
 struct ScanSample {

@@ -16,7 +16,7 @@ struct Arguments {
   ModelArguments model;
   std::vector<std::string> datasets;
   std::uint64_t scans = 32;
-  double share = 1.0;
+  double share = 0.9995;
   std::vector<std::string> float_layers;
 };
 
@@ -39,8 +39,8 @@ ActivationRanges watch(const ModelDescription& model, const std::vector<ScanSamp
         networks.try_emplace(sample.dataset, model, sample.dataset->suggested_sensor())
             .first->second;
     fitted.network.observe(input_of(sample, fitted.model),
-                           [&ranges](const std::string& tensor, std::span<const float> values) {
-                             ranges.add(tensor, values);
+                           [&ranges](const std::string& tensor, auto values, std::size_t channels) {
+                             ranges.add(tensor, values, channels);
                            });
     progress.update(++done);
   }
@@ -48,7 +48,7 @@ ActivationRanges watch(const ModelDescription& model, const std::vector<ScanSamp
 }
 
 ExitCode run(const Arguments& arguments) {
-  const ModelDescription model = load_model(arguments.model);
+  const ModelDescription model = load_uncalibrated_model(arguments.model);
   std::vector<ScanDataset> datasets;
   for (const std::string& folder : arguments.datasets) datasets.emplace_back(folder);
   const std::vector<ScanSample> samples = choose_scans(datasets, arguments.scans);
@@ -56,11 +56,11 @@ ExitCode run(const Arguments& arguments) {
   Int8Calibration calibration;
   calibration.made = std::to_string(samples.size()) + " scans of " +
                      std::to_string(datasets.size()) + " recordings";
-  calibration.range_of_tensor = ranges.ranges(arguments.share);
+  calibration.range_of_channels = ranges.ranges(arguments.share);
   calibration.float_layers = arguments.float_layers;
   const std::filesystem::path file = model.network_file.parent_path() / "int8.yaml";
   save_int8_calibration(calibration, file);
-  std::cout << file.string() << ": " << calibration.range_of_tensor.size() << " tensors, "
+  std::cout << file.string() << ": " << calibration.range_of_channels.size() << " tensors, "
             << calibration.made << "\n";
   return ExitCode::ok;
 }
@@ -79,7 +79,7 @@ void add_model_calibrate_command(CommandHandle model, Action& action) {
   command.option("--scans", arguments->scans, "Scans to look at, evenly chosen").with_default();
   command
       .option("--share", arguments->share,
-              "Share of a tensor's values that must not be cut off, 0..1; 1: none is")
+              "Share of a channel's values that must not be cut off, 0..1; 1: none is")
       .above_zero()
       .with_default();
   command

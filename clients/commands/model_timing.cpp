@@ -27,10 +27,10 @@ double ms_of(const std::function<void()>& work) {
 Int8Calibration calibrate_on(const ModelDescription& model, const std::vector<float>& input) {
   ActivationRanges ranges;
   OneDnnNetwork(model, Precision::fp32)
-      .observe(input, [&ranges](const std::string& tensor, std::span<const float> values) {
-        ranges.add(tensor, values);
+      .observe(input, [&ranges](const std::string& tensor, auto values, std::size_t channels) {
+        ranges.add(tensor, values, channels);
       });
-  return {.made = "one scan", .range_of_tensor = ranges.ranges(1.0), .float_layers = {}};
+  return {.made = "one scan", .range_of_channels = ranges.ranges(1.0), .float_layers = {}};
 }
 
 }  // namespace

@@ -10,9 +10,9 @@ namespace stillmap {
 struct Int8Calibration {
   /// From what, in words.
   std::string made;
-  /// Largest magnitude that counts of each tensor; larger values are cut off. By the tensor's name
-  /// in the network's file.
-  std::map<std::string, float> range_of_tensor;
+  /// Largest magnitude that counts of each channel of each tensor; larger values are cut off. By
+  /// the tensor's name in the network's file.
+  std::map<std::string, std::vector<float>> range_of_channels;
   /// Layers that stay in floating point, besides the first and the last.
   std::vector<std::string> float_layers;
 };

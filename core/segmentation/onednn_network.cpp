@@ -2,6 +2,7 @@
 
 #include <cassert>
 
+#include "core/segmentation/graph/equalise_channels.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/onednn/compiled_plan.hpp"
 #include "core/segmentation/onednn/execution_plan.hpp"
@@ -12,12 +13,16 @@
 namespace stillmap {
 namespace {
 
-const Int8Calibration* calibration_for(const ModelDescription& model, Precision precision) {
-  if (precision == Precision::fp32) return nullptr;
-  if (model.int8) return &*model.int8;
-  throw ModelError(model.network_file,
-                   "has no int8.yaml beside it; make it with 'stillmap model calibrate', or use "
-                   "precision: fp32");
+/// The plan in these numbers; for int8 the graph's channels are made equal first.
+ExecutionPlan plan_in(Precision precision, NetworkGraph& graph, const ModelDescription& model) {
+  if (precision == Precision::fp32) return plan_execution(graph, nullptr);
+  if (!model.int8) {
+    throw ModelError(model.network_file,
+                     "has no int8.yaml beside it; make it with 'stillmap model calibrate', or use "
+                     "precision: fp32");
+  }
+  const Int8Calibration equalised = equalise_channels(graph, *model.int8);
+  return plan_execution(graph, &equalised);
 }
 
 PreparedNetwork load(const ModelDescription& model) {
@@ -30,7 +35,7 @@ PreparedNetwork load(const ModelDescription& model) {
 }  // namespace
 
 struct OneDnnNetwork::State {
-  std::vector<std::string> tensor_names;
+  std::vector<Tensor> tensors;
   std::size_t outputs = 0;
   ScoreKind kind = ScoreKind::logits;
   Precision precision = Precision::fp32;
@@ -41,13 +46,13 @@ struct OneDnnNetwork::State {
 OneDnnNetwork::OneDnnNetwork(const ModelDescription& model, Precision precision, int threads)
     : state_(std::make_unique<State>()) {
   try {
-    const PreparedNetwork network = load(model);
-    const NetworkGraph& graph = network.graph;
-    for (const Tensor& tensor : graph.tensors) state_->tensor_names.push_back(tensor.name);
+    PreparedNetwork network = load(model);
+    NetworkGraph& graph = network.graph;
+    state_->tensors = graph.tensors;
     state_->outputs = model.classes.size();
     state_->precision = precision;
     state_->giga_operations = network.giga_operations;
-    const ExecutionPlan plan = plan_execution(graph, calibration_for(model, precision));
+    const ExecutionPlan plan = plan_in(precision, graph, model);
     state_->plan = std::make_unique<CompiledPlan>(graph, plan, threads);
     const std::span<const float> scores = state_->plan->run(trial_input(model));
     require_finite_scores(model, scores);
@@ -83,7 +88,8 @@ std::string OneDnnNetwork::engine() const {
 
 void OneDnnNetwork::observe(std::span<const float> input, const Observer& observer) {
   state_->plan->run(input, [&](TensorId tensor, std::span<const float> values) {
-    observer(state_->tensor_names[tensor], values);
+    const Tensor& of = state_->tensors[tensor];
+    observer(of.name, values, static_cast<std::size_t>(of.shape.channels));
   });
 }
 

@@ -30,8 +30,9 @@ class OneDnnNetwork final : public SegmentationNetwork {
   [[nodiscard]] std::vector<float> probabilities(std::span<const float> input) override;
   [[nodiscard]] std::string engine() const override;
 
-  /// Runs the network and shows each tensor that it stores in floating point: its name and values.
-  using Observer = std::function<void(const std::string&, std::span<const float>)>;
+  /// Runs the network and shows each tensor that it stores in floating point: its name, its values
+  /// as rows x columns x channels, and how many channels it has.
+  using Observer = std::function<void(const std::string&, std::span<const float>, std::size_t)>;
   void observe(std::span<const float> input, const Observer& observer);
 
   /// Multiplications and additions a run, in 10^9.

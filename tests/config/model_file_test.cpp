@@ -57,6 +57,20 @@ TEST(ModelFile, ReadsADescriptionThatCanBeUsed) {
   EXPECT_EQ(model.network_file, test::test_folder() / "model.onnx");
 }
 
+TEST(ModelFile, ReadsItsCalibrationAndWhetherItFollowsTheSensor) {
+  // Of a run before.
+  std::filesystem::remove(test::test_folder() / "int8.yaml");
+  EXPECT_FALSE(load(sound).int8.has_value());
+  EXPECT_FALSE(load(sound).follow_sensor);
+  std::string yaml = sound;
+  yaml.replace(yaml.find("fov_down_deg: -25}"), 18, "fov_down_deg: -25, follow_sensor: true}");
+  (void)write_file("int8.yaml", "ranges: {a: [2, 3]}\n");
+  const ModelDescription model = load(yaml);
+  EXPECT_TRUE(model.follow_sensor);
+  ASSERT_TRUE(model.int8.has_value());
+  EXPECT_EQ(model.int8->range_of_channels.at("a"), (std::vector{2.0F, 3.0F}));
+}
+
 TEST(ModelFile, CanSwitchTheVotesOff) {
   std::string yaml = sound;
   yaml.replace(yaml.find("{neighbours: 7}"), 15, "{use: false}");

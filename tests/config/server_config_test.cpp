@@ -47,7 +47,7 @@ TEST(ServerConfig, ReportsWhatAFileChanges) {
 TEST(ServerConfig, ReadsFieldsOfEveryKind) {
   const ServerConfig config = load(R"(
 sensor: vlp_16
-labels: {source: none}
+labels: {source: none, engine: onednn, precision: int8, threads: 3}
 dds: {domain_id: 42, shared_memory: false, interfaces: [127.0.0.1, "fe80::1"], ros_gid_bytes: 16}
 topics: {odometry_prior: ""}
 input: {fields: {label: [label, class]}, label_kind: classes}
@@ -57,6 +57,9 @@ static_map: {min_points: 5}
 )");
   EXPECT_EQ(config.mapper.sensor.rings, 16);
   EXPECT_EQ(config.labels.source, LabelOrigin::none);
+  EXPECT_EQ(config.labels.engine.engine, EngineChoice::Engine::onednn);
+  EXPECT_EQ(config.labels.engine.precision, EngineChoice::Numbers::int8);
+  EXPECT_EQ(config.labels.engine.threads, 3);
   EXPECT_EQ(config.dds.domain_id, 42U);
   EXPECT_FALSE(config.dds.shared_memory);
   EXPECT_THAT(config.dds.interfaces, ::testing::ElementsAre("127.0.0.1", "fe80::1"));

@@ -27,7 +27,7 @@ NetworkGraph light() { return prepared(test::light_bytes(4, 8, 32, 4), 8, 32); }
 Int8Calibration calibration_of(const NetworkGraph& graph) {
   Int8Calibration calibration;
   for (std::size_t i = 0; i < graph.tensors.size(); ++i) {
-    calibration.range_of_tensor[graph.tensors[i].name] = 1.0F + static_cast<float>(i);
+    calibration.range_of_channels[graph.tensors[i].name] = {1.0F + static_cast<float>(i)};
   }
   return calibration;
 }
@@ -105,7 +105,7 @@ TEST(ExecutionPlan, KeepsTheFirstAndTheLastLayerInFloatingPoint) {
 TEST(ExecutionPlan, RefusesAnotherNetworksCalibration) {
   const NetworkGraph graph = light();
   const Int8Calibration other{
-      .made = "", .range_of_tensor = {{"someone", 1.0F}}, .float_layers = {}};
+      .made = "", .range_of_channels = {{"someone", {1.0F}}}, .float_layers = {}};
   EXPECT_THROW((void)plan_execution(graph, &other), GraphFault);
 }
 

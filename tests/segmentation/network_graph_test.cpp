@@ -5,6 +5,7 @@
 
 #include <random>
 
+#include "core/segmentation/graph/equalise_channels.hpp"
 #include "core/segmentation/graph/fold_batch_norm.hpp"
 #include "core/segmentation/graph/fuse_follow_ups.hpp"
 #include "core/segmentation/graph/infer_shapes.hpp"
@@ -201,6 +202,61 @@ TEST(FuseFollowUps, LeavesATensorThatIsAddedToItself) {
   fuse_follow_ups(fused);
   EXPECT_EQ(fused.layers.size(), 2U);
   expect_same(run(fused), run(builder.graph));
+}
+
+/// A network whose tensors are tied by a sum, with a wide tensor that is laid out.
+NetworkGraph tied() {
+  GraphBuilder builder;
+  const TensorId x = builder.add(LeakyRelu{0.1F}, {builder.add(convolution(3, 4), {0})});
+  const TensorId y = builder.add(LeakyRelu{0.1F}, {builder.add(convolution(4, 4), {x})});
+  const TensorId sum = builder.add(Add{}, {y, x});
+  TransposedConvolution widening = transposed({1, 2}, {1, 2});
+  widening.inputs = 4;
+  widening.weights = random_values(4 * 2 * 2, 3);
+  const TensorId wide = builder.add(LeakyRelu{0.1F}, {builder.add(widening, {sum})});
+  builder.add(convolution(2, 3), {wide});
+  replace_transposed_convolutions(builder.graph);
+  fuse_follow_ups(builder.graph);
+  infer_shapes(builder.graph, image);
+  return builder.graph;
+}
+
+TEST(EqualiseChannels, MakesRangesEqualAndLeavesTheResult) {
+  const NetworkGraph before = tied();
+  Int8Calibration calibration;
+  float range = 0.5F;
+  for (const Tensor& tensor : before.tensors) {
+    auto& ranges = calibration.range_of_channels[tensor.name];
+    for (int c = 0; c < tensor.shape.channels; ++c) ranges.push_back(range *= 1.4F);
+  }
+  NetworkGraph graph = before;
+  const Int8Calibration equalised = equalise_channels(graph, calibration);
+  const PlainTensor expected = run(before);
+  const PlainTensor result = run(graph);
+  for (std::size_t i = 0; i < expected.values.size(); ++i) {
+    EXPECT_NEAR(result.values[i], expected.values[i], 1e-4 * (1.0 + std::abs(expected.values[i])));
+  }
+  const std::string last_sum = graph.tensors[graph.layers[1].output].name;
+  for (const float equal : equalised.range_of_channels.at(last_sum)) {
+    EXPECT_NEAR(equal, equalised.range_of_channels.at(last_sum).front(), 1e-3F);
+  }
+  // The input and the output keep their channels.
+  for (const TensorId end : {graph.input, graph.output}) {
+    const std::string& name = graph.tensors[end].name;
+    EXPECT_EQ(equalised.range_of_channels.at(name), calibration.range_of_channels.at(name));
+  }
+}
+
+TEST(EqualiseChannels, LeavesChannelsThatAreAlwaysZero) {
+  NetworkGraph graph = tied();
+  Int8Calibration calibration;
+  for (const Tensor& tensor : graph.tensors) {
+    calibration.range_of_channels[tensor.name].assign(
+        static_cast<std::size_t>(tensor.shape.channels), 0.0F);
+  }
+  const PlainTensor before = run(graph);
+  (void)equalise_channels(graph, calibration);
+  expect_same(run(graph), before);
 }
 
 TEST(DropFinalSoftmax, TakesOffOnlyOneThatMakesTheOutput) {

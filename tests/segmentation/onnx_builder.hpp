@@ -47,7 +47,7 @@ class OnnxBuilder {
 
  private:
   std::string float_weights(const Sizes& shape, float spread, float middle = 0.0F);
-  std::string fresh_name() { return "t" + std::to_string(++names_); }
+  std::string fresh_name() { return std::string("t").append(std::to_string(++names_)); }
   std::string windowed(const std::string& operation, const std::string& input, int outputs,
                        const Window& window, bool bias);
 

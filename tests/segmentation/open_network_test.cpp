@@ -27,9 +27,11 @@ ModelDescription calibrated() {
   ActivationRanges ranges;
   OneDnnNetwork(model, Precision::fp32)
       .observe(test::random_image(model, 1),
-               [&](const std::string& name, auto values) { ranges.add(name, values); });
+               [&](const std::string& name, auto values, std::size_t channels) {
+                 ranges.add(name, values, channels);
+               });
   model.int8 =
-      Int8Calibration{.made = "", .range_of_tensor = ranges.ranges(1.0), .float_layers = {}};
+      Int8Calibration{.made = "", .range_of_channels = ranges.ranges(1.0), .float_layers = {}};
   return model;
 }
 

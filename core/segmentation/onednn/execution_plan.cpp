@@ -151,13 +151,14 @@ class Planner {
   void set_scale(const Place& place) {
     if (place.type != ValueType::s8) return;
     const std::string& name = graph_.tensors[place.tensor].name;
-    const auto range = calibration_->range_of_tensor.find(name);
-    if (range == calibration_->range_of_tensor.end()) {
+    const auto ranges = calibration_->range_of_channels.find(name);
+    if (ranges == calibration_->range_of_channels.end() || ranges->second.empty()) {
       throw GraphFault("its int8 calibration has no range for tensor '" + name +
                        "': it is another network's; calibrate again");
     }
     // A tensor that was 0 in every scan has a range of 0.
-    plan_.scale_of_tensor[place.tensor] = range->second > 0.0F ? range->second / largest_s8 : 1.0F;
+    const float range = std::ranges::max(ranges->second);
+    plan_.scale_of_tensor[place.tensor] = range > 0.0F ? range / largest_s8 : 1.0F;
   }
 
   /// What a stored value must be multiplied with.
