@@ -5,7 +5,7 @@ BUILD := build/$(PRESET)
 JOBS ?= $(shell nproc)
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages build demo test test-dev test-tsan bench table1 format format-check clean
+.PHONY: help packages build demo test test-dev test-tsan bench table1 parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -42,6 +42,10 @@ bench: build ## Benchmarks of every stage
 table1: build ## The paper's Table I on simulated streets, crowded and quiet
 	$(BUILD)/bin/stillmap evaluate weightings sim:crowd --seed 2 --scans 480
 	$(BUILD)/bin/stillmap evaluate weightings sim:quiet --seed 1 --scans 500
+
+parity: build ## Our engines against PyTorch, every RangeNet++ network and size
+	PYTHONPATH=core/segmentation/training STILLMAP_TRAINING=core/segmentation/training \
+	  STILLMAP=$(BUILD)/bin/stillmap /usr/bin/python3 tests/training/parity.py
 
 format: ## Format the code
 	git ls-files '*.cpp' '*.hpp' | xargs clang-format -i

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
 constexpr double least_apart_m = 8.0;
+constexpr double share_of_plain_drives = 0.4;
 // Of a drive; long enough to come round the longest route.
 constexpr int drive_scans = 900;
 
@@ -36,10 +37,21 @@ BeamNoise drawn_noise(Random& random) {
           .weakest_return = 1.2e-5 * std::exp(random.uniform(-1.0, 1.4))};
 }
 
+// A drive as `stillmap simulate` makes it by default.
+SimulationConfig plain_drive(std::uint64_t seed, Random& random) {
+  SimulationConfig config;
+  config.plan = random.chance(0.5) ? quiet_city() : crowded_avenue();
+  config.seed = seed;
+  config.sensor = random.chance(0.75) ? hdl_64e() : vlp_16();
+  config.scans = drive_scans;
+  return config;
+}
+
 }  // namespace
 
 SimulationConfig training_drive(std::uint64_t seed) {
   Random random(seed, 91);
+  if (random.chance(share_of_plain_drives)) return plain_drive(seed, random);
   SimulationConfig config;
   config.plan = training_plan(Random(seed, 92));
   config.seed = seed;

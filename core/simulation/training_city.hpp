@@ -12,8 +12,8 @@ namespace stillmap {
 [[nodiscard]] CityPlan training_plan(Random random);
 
 /// A drive for training: `training_plan`, drawn materials, and a drawn lidar with drawn flaws
-/// (60 % HDL-64E, 20 % VLP-16, 10 % HDL-32E, 10 % sensors that nobody builds). The same seed gives
-/// the same drive.
+/// (60 % HDL-64E, 20 % VLP-16, 10 % HDL-32E, 10 % sensors that nobody builds). Four drives of ten
+/// are plain ones through `quiet_city` or `crowded_avenue`. The same seed gives the same drive.
 [[nodiscard]] SimulationConfig training_drive(std::uint64_t seed);
 
 /// Up to `count` scans of the drive, spread over the route and at least 8 m apart.

@@ -10,9 +10,9 @@ using Eigen::Vector2d;
 StreetProfile drawn_profile(Random& random) {
   StreetProfile profile;
   const double size = random.uniform();
-  profile.lanes = size < 0.82 ? 1 : size < 0.97 ? 2 : 3;
+  profile.lanes = size < 0.9 ? 1 : size < 0.98 ? 2 : 3;
   profile.half_median_m = random.chance(0.2) ? random.uniform(0.5, 3.0) : 0.0;
-  profile.lane_width_m = random.uniform(2.2, 3.5);
+  profile.lane_width_m = random.uniform(2.2, 3.2);
   profile.bike_lane_m = random.chance(0.3) ? random.uniform(1.0, 1.8) : random.uniform(0.0, 0.5);
   const double parking = random.uniform();
   profile.parking_m = 0.0;
@@ -87,29 +87,29 @@ void draw_blocks(CityPlan& plan, Random& random) {
   blocks.gap_max_m = suburb ? random.uniform(2.0, 18.0) : random.uniform(0.0, 4.0);
   blocks.floors_min = 1 + static_cast<int>(random.index(2));
   blocks.floors_max = blocks.floors_min + static_cast<int>(random.index(suburb ? 3 : 5));
-  blocks.trees_per_100m = random.uniform(5.0, 22.0);
-  blocks.garden_trees_per_100m = random.uniform(4.0, 60.0);
-  blocks.share_fence = random.uniform(0.15, 0.6);
+  blocks.trees_per_100m = random.uniform(5.0, 30.0);
+  blocks.garden_trees_per_100m = random.uniform(10.0, 90.0);
+  blocks.share_fence = random.uniform(0.2, 0.75);
   blocks.share_hedge = random.uniform(0.0, 0.95 - blocks.share_fence);
   blocks.share_wall = 0.95 - blocks.share_fence - blocks.share_hedge;
   if (random.chance(0.5)) blocks.share_wall *= random.uniform();
   blocks.share_open = random.chance(0.5) ? random.uniform(0.0, 0.4) : 0.05;
-  blocks.share_wood = random.chance(0.6) ? random.uniform(0.1, 0.6) : 0.05;
+  blocks.share_wood = random.chance(0.7) ? random.uniform(0.1, 0.6) : 0.05;
   blocks.share_halls = random.chance(0.3) ? random.uniform(0.0, 0.2) : 0.0;
 }
 
 void draw_traffic(CityPlan& plan, Random& random) {
   plan.traffic = {
       .vehicles_per_km = random.uniform(0.0, 35.0),
-      .share_trucks = random.uniform(0.0, 0.25),
-      .share_buses = random.uniform(0.0, 0.2),
+      .share_trucks = random.uniform(0.0, 0.2),
+      .share_buses = random.uniform(0.0, 0.15),
       .cyclists_per_km = random.uniform(0.0, 35.0),
       .pedestrians_per_km = random.uniform(0.0, 60.0),
       .crossing_pedestrians = static_cast<int>(random.index(8)),
       .speed_mps = random.uniform(7.0, 13.0),
       .light_red_s = random.uniform(4.0, 12.0),
       .parked_per_100m = random.chance(0.15) ? 0 : 4 + static_cast<int>(random.index(12)),
-      .share_motorcyclists = random.uniform(0.0, 0.25),
+      .share_motorcyclists = random.uniform(0.0, 0.5),
       .share_other_vehicles = random.uniform(0.0, 0.12),
       .groups_per_100m = random.uniform(0.0, 5.0)};
   plan.parking = {.share_motorcycles = random.uniform(0.0, 0.2),

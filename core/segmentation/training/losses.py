@@ -1,4 +1,4 @@
-"""The weighted cross-entropy, equation (3) of the paper."""
+"""The weighted cross-entropy, equation (3) of the paper, and the Lovasz-softmax loss."""
 
 import torch
 from torch.nn import functional
@@ -26,3 +26,29 @@ def class_weights(shares, kind):
 def weighted_cross_entropy(scores, target, weights):
     """Mean over the pixels that have a class, each by its class's weight."""
     return functional.cross_entropy(scores, target, weights, ignore_index=IGNORED)
+
+
+def lovasz_softmax(scores, target, pixels=32768):
+    """A smooth stand-in for 1 - mIoU (Berman et al., CVPR 2018): mean over the classes that are
+    there of the Lovasz extension of the Jaccard loss. On at most `pixels` pixels, drawn at random,
+    since it sorts all of them for every class."""
+    known = torch.nonzero(target.flatten() != IGNORED).flatten()
+    if known.numel() > pixels:
+        known = known[torch.randint(known.numel(), (pixels,), device=known.device)]
+    target = target.flatten()[known]
+    scores = scores.permute(0, 2, 3, 1).reshape(-1, scores.shape[1])[known]
+    probabilities = scores.softmax(1)
+    losses = []
+    for label in torch.unique(target):
+        truth = (target == label).float()
+        errors, order = torch.sort((truth - probabilities[:, label]).abs(), descending=True)
+        losses.append(errors @ _jaccard_gradient(truth[order]))
+    return torch.stack(losses).mean() if losses else scores.sum()
+
+
+def _jaccard_gradient(truth):
+    """How much each pixel, in the order of falling errors, adds to the Jaccard loss."""
+    left = truth.sum() - truth.cumsum(0)
+    union = truth.sum() + (1 - truth).cumsum(0)
+    jaccard = 1 - left / union
+    return torch.cat([jaccard[:1], jaccard[1:] - jaccard[:-1]])

@@ -18,7 +18,7 @@ import numpy as np
 import torch
 import yaml
 
-from losses import class_weights, weighted_cross_entropy
+from losses import class_weights, lovasz_softmax, weighted_cross_entropy
 from metrics import Confusion
 from networks import make_network
 from pictures import save_curves, save_labelled_images
@@ -132,6 +132,11 @@ class Run:
                 else:
                     mean.copy_(now)
 
+    def loss(self, scores, target):
+        loss = weighted_cross_entropy(scores, target, self.weights)
+        share = self.config["loss"]["lovasz"]
+        return loss + share * lovasz_softmax(scores, target) if share else loss
+
     def train_epoch(self):
         self.network.train()
         self.sampler.epoch = self.epoch
@@ -141,9 +146,7 @@ class Run:
         began, losses = time.time(), []
         for done, (channels, target) in enumerate(batches, 1):
             channels = channels.to(self.device, memory_format=torch.channels_last)
-            loss = weighted_cross_entropy(
-                self.network(channels), target.to(self.device), self.weights
-            )
+            loss = self.loss(self.network(channels), target.to(self.device))
             if not torch.isfinite(loss):
                 raise SystemExit("the loss is not finite; lower optimiser.rate")
             self.optimiser.zero_grad()
