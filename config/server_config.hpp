@@ -33,7 +33,7 @@ struct LabelsConfig {
   EngineChoice engine;
   /// Longest wait of a scan for the network's labels; then it goes on with labels carried from the
   /// map and earlier scans. 0: as long as it takes, as with input delivery `every`.
-  std::uint32_t budget_ms = 60;
+  std::uint32_t budget_ms = 90;
 };
 
 /// Names of the coordinate frames in everything that is published.

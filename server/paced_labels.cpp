@@ -9,7 +9,7 @@ namespace stillmap {
 namespace {
 
 constexpr std::uint32_t misses_until_too_slow = 3;
-constexpr std::uint32_t unwaited_until_next_try = 10;
+constexpr std::uint32_t unwaited_until_next_try = 4;
 /// A scan that is due is put off by at most so many others while the mapper lags behind.
 constexpr std::uint32_t most_put_off = 10;
 

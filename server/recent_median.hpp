@@ -10,6 +10,7 @@ class RecentMedian {
  public:
   explicit RecentMedian(std::size_t window) : window_(window) {}
   void add(double value);
+  [[nodiscard]] std::size_t size() const { return last_.size(); }
   /// 0 before the first value.
   [[nodiscard]] double value() const;
 

@@ -4,10 +4,10 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
-#include <stdexcept>
 
 #include "clients/commands/command.hpp"
 #include "clients/commands/simulate_training.hpp"
+#include "clients/commands/simulation_arguments.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 
@@ -21,17 +21,8 @@ struct Arguments {
   bool json = false;
 };
 
-// A negative number that was typed comes as one near 2^64.
-void check(const TrainingSetPlan& plan) {
-  constexpr std::uint64_t last_seed = 1'000'000'000'000;
-  if (plan.first_seed <= last_seed) return;
-  throw std::invalid_argument("--first-seed " + std::to_string(plan.first_seed) +
-                              " is negative or too large; it may be 0 to " +
-                              std::to_string(last_seed));
-}
-
 ExitCode run(const Arguments& arguments) {
-  check(arguments.plan);
+  check_seed("--first-seed", arguments.plan.first_seed);
   StopSignal stop;
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(arguments.jobs));

@@ -52,7 +52,16 @@ std::string sensor_name(const std::string& written) {
 
 }  // namespace
 
+void check_seed(const std::string& option, std::uint64_t seed) {
+  constexpr std::uint64_t last_seed = 1'000'000'000'000;
+  if (seed <= last_seed) return;
+  throw std::invalid_argument(option + " " + std::to_string(seed) +
+                              " is negative or too large; it may be 0 to " +
+                              std::to_string(last_seed));
+}
+
 SimulationConfig simulation_config(const SimulationArguments& arguments) {
+  check_seed("--seed", arguments.seed);
   SimulationConfig config;
   config.plan = plan_of(arguments);
   config.seed = arguments.seed;

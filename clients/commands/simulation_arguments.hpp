@@ -18,6 +18,10 @@ struct SimulationArguments {
   bool rolling = false;
 };
 
+/// A negative number that was typed comes as one near 2^64. Throws std::invalid_argument naming
+/// the option.
+void check_seed(const std::string& option, std::uint64_t seed);
+
 /// Throws std::invalid_argument or ConfigError naming the value.
 [[nodiscard]] SimulationConfig simulation_config(const SimulationArguments& arguments);
 

@@ -44,6 +44,7 @@ TEST_F(SimulateCommandTest, RefusesWhatItDoesNotKnow) {
   const std::string out = "simulate " + path("city");
   EXPECT_EQ(run(out + " --scans 0").exit_code, 2);
   EXPECT_EQ(run(out + " --scans -5").exit_code, 2);
+  EXPECT_THAT(run(out + " --seed -1").err, HasSubstr("--seed"));
   EXPECT_EQ(run(out + " --traffic -1").exit_code, 2);
   const ProcessResult preset = run(out + " --preset moon");
   EXPECT_EQ(preset.exit_code, 2);

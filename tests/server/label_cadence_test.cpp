@@ -61,9 +61,16 @@ TEST(LabelCadence, OneSlowRunAndOnePauseOfTheSensorChangeNothing) {
   EXPECT_EQ(cadence.every(), 3U);
 }
 
+TEST(LabelCadence, TheFirstRunIsNoMeasure) {
+  LabelCadence cadence;
+  cadence.scan_segmented(500.0, 0.0, 100.0);
+  EXPECT_EQ(cadence.every(), 1U);
+  EXPECT_EQ(settled(cadence, 30.0), 1U);
+}
+
 TEST(LabelCadence, BeforeTheRateIsKnownEveryScanIsDue) {
   LabelCadence cadence;
-  cadence.scan_segmented(400.0, 0.0, 0.0);
+  for (int i = 0; i < 5; ++i) cadence.scan_segmented(400.0, 0.0, 0.0);
   EXPECT_EQ(cadence.every(), 1U);
 }
 
