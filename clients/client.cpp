@@ -17,23 +17,9 @@ namespace {
 // for.
 constexpr int attempts_at_whole_map = 3;
 
-ServiceError malformed(const std::string& service) {
-  return ServiceError("the answer of " + service +
-                      " cannot be understood; client and server must have the same version");
-}
-
 Eigen::AlignedBox3d everything() {
   constexpr double infinite = std::numeric_limits<double>::infinity();
   return {Eigen::Vector3d::Constant(-infinite), Eigen::Vector3d::Constant(infinite)};
-}
-
-std::vector<stillmap_msgs::msg::TileId> to_wire(std::span<const TileId> ids) {
-  std::vector<stillmap_msgs::msg::TileId> out(ids.size());
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    out[i].x(ids[i].x);
-    out[i].y(ids[i].y);
-  }
-  return out;
 }
 
 void append_page(const MapQueryResult& page, MapQueryResult& whole) {
@@ -41,15 +27,6 @@ void append_page(const MapQueryResult& page, MapQueryResult& whole) {
   whole.reason = page.reason;
   whole.continuation = page.continuation;
   whole.voxels.insert(whole.voxels.end(), page.voxels.begin(), page.voxels.end());
-}
-
-void add_tiles(const GetTiles_Response& reply, TileSet& set) {
-  for (const auto& message : reply.tiles()) {
-    auto tile = wire::from_wire(message);
-    if (!tile) throw malformed("get_tiles");
-    set.tiles.push_back(*std::move(tile));
-  }
-  for (const auto& id : reply.missing()) set.missing.push_back({id.x(), id.y()});
 }
 
 }  // namespace
@@ -117,21 +94,7 @@ TileVersions Client::get_tile_versions(const Eigen::AlignedBox3d& box_map) {
 
 TileVersions Client::get_tile_versions() { return get_tile_versions(everything()); }
 
-TileSet Client::get_tiles(std::span<const TileId> ids) {
-  TileSet set;
-  auto wanted = to_wire(ids);
-  while (!wanted.empty()) {
-    GetTiles_Request request;
-    request.ids(wanted);
-    const auto reply = connection_->ask_ok(connection_->get_tiles, connection_->names.get_tiles,
-                                           std::move(request));
-    if (reply.left_out().size() >= wanted.size()) throw malformed(connection_->names.get_tiles);
-    set.map = wire::from_wire(reply.identity());
-    add_tiles(reply, set);
-    wanted = reply.left_out();
-  }
-  return set;
-}
+TileSet Client::get_tiles(std::span<const TileId> ids) { return connection_->fetch_tiles(ids); }
 
 std::string Client::save_map(const std::string& file) {
   SaveMap_Request request;

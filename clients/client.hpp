@@ -63,6 +63,14 @@ struct TileSet {
   std::vector<TileId> missing;
 };
 
+/// What happened in a region since the last news. Tiles are whole, also what of them lies outside.
+struct RegionNews {
+  MapIdentity map;
+  std::vector<Tile> appeared;
+  std::vector<Tile> changed;
+  std::vector<TileId> removed;
+};
+
 /// A client of one stillmap-server. Requests may come from any thread and block until the answer is
 /// there; they throw ServiceTimeout when nobody answers within `request_timeout` and ServiceError
 /// when the server refuses.
@@ -83,8 +91,8 @@ class Client {
   /// page. A refused query is a result with its status and reason, not an exception.
   [[nodiscard]] MapQueryResult get_static_map(const MapQuery& query);
 
-  /// All pages of the answer, all of one map version. Starts over when the map changed too far
-  /// under it. `page_arrived(voxels so far, total)` may be empty.
+  /// All pages of the answer, all of one map version: `tiles` and `voxels` of all of them. Starts
+  /// over when the map changed too far under it. `page_arrived(voxels so far, total)` may be empty.
   [[nodiscard]] MapQueryResult get_whole_static_map(
       MapQuery query, const std::function<void(std::uint64_t, std::uint64_t)>& page_arrived = {});
 
@@ -117,9 +125,17 @@ class Client {
   /// The newest version of every tile, first those that exist already.
   [[nodiscard]] Subscription subscribe_tiles(
       std::function<void(const MapIdentity&, const Tile&)> tile_arrived);
-  /// As subscribe_tiles, without the voxels.
+  /// As subscribe_tiles, without the voxels; a tile without any is gone.
   [[nodiscard]] Subscription subscribe_tile_index(
       std::function<void(const MapIdentity&, const TileInfo&)> info_arrived);
+
+  /// The tiles whose footprint meets the region: first those that exist, then what changes. Tiles
+  /// of other places do not come over the network, except from the region's bounding box their
+  /// entries in the index. When another map begins, the tiles of the last one are removed. Throws
+  /// std::invalid_argument for a region with faults, and as a request does: it asks for the size of
+  /// tiles, so a server that comes back with another size needs a new subscription.
+  [[nodiscard]] Subscription subscribe_region(const Region& region,
+                                              std::function<void(const RegionNews&)> news_arrived);
 
   /// Scans of the sensor's topic (ROS 2 name), as the server gets them; those that cannot be read
   /// are passed over. `delivery` is the server's: with `every`, a lossless sender waits for this

@@ -1,6 +1,37 @@
 #include "clients/connection.hpp"
 
+#include "idl/conversions/tile.hpp"
+
 namespace stillmap {
+
+using namespace stillmap_msgs::srv;
+
+namespace {
+
+std::vector<stillmap_msgs::msg::TileId> to_wire(std::span<const TileId> ids) {
+  std::vector<stillmap_msgs::msg::TileId> out(ids.size());
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    out[i].x(ids[i].x);
+    out[i].y(ids[i].y);
+  }
+  return out;
+}
+
+void add_tiles(const GetTiles_Response& reply, TileSet& set) {
+  for (const auto& message : reply.tiles()) {
+    auto tile = wire::from_wire(message);
+    if (!tile) throw malformed("get_tiles");
+    set.tiles.push_back(*std::move(tile));
+  }
+  for (const auto& id : reply.missing()) set.missing.push_back({id.x(), id.y()});
+}
+
+}  // namespace
+
+ServiceError malformed(const std::string& service) {
+  return ServiceError("the answer of " + service +
+                      " cannot be understood; client and server must have the same version");
+}
 
 Client::Connection::Connection(const ClientOptions& client_options)
     : options(client_options),
@@ -13,6 +44,21 @@ Client::Connection::Connection(const ClientOptions& client_options)
       get_status(participant, names.get_status),
       save_map(participant, names.save_map),
       reset(participant, names.reset) {}
+
+TileSet Client::Connection::fetch_tiles(std::span<const TileId> ids) {
+  TileSet set;
+  auto wanted = to_wire(ids);
+  while (!wanted.empty()) {
+    GetTiles_Request request;
+    request.ids(wanted);
+    const auto reply = ask_ok(get_tiles, names.get_tiles, std::move(request));
+    if (reply.left_out().size() >= wanted.size()) throw malformed(names.get_tiles);
+    set.map = wire::from_wire(reply.identity());
+    add_tiles(reply, set);
+    wanted = reply.left_out();
+  }
+  return set;
+}
 
 ServiceTimeout Client::Connection::no_answer(const std::string& name,
                                              std::chrono::milliseconds timeout, bool found) const {

@@ -11,6 +11,9 @@
 
 namespace stillmap {
 
+/// Of an answer that makes no sense.
+[[nodiscard]] ServiceError malformed(const std::string& service);
+
 /// The client's participant and its ends of the services.
 struct Client::Connection {
   explicit Connection(const ClientOptions& client_options);
@@ -37,6 +40,9 @@ struct Client::Connection {
     }
     return reply;
   }
+
+  /// These tiles with their voxels, in as many requests as the server's answers need.
+  [[nodiscard]] TileSet fetch_tiles(std::span<const TileId> ids);
 
   [[nodiscard]] ServiceTimeout no_answer(const std::string& name, std::chrono::milliseconds timeout,
                                          bool found) const;

@@ -21,6 +21,8 @@ class TFMessage;
 }
 namespace stillmap_msgs::msg {
 class TileInfo;
+class Region;
+class TileChange;
 class MapTile;
 class MapIdentity;
 class Status;

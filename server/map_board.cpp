@@ -7,15 +7,21 @@
 namespace stillmap {
 
 void MapBoard::begin(std::shared_ptr<const MapView> view, Trajectory trajectory) {
+  auto history = std::make_shared<const TileHistory>(history_from(*view));
   const std::scoped_lock lock(mutex_);
-  view_ = std::move(view);
+  state_ = {std::move(view), std::move(history)};
   trajectory_ = std::move(trajectory);
   health_ = OdometryHealth::initialised;
 }
 
 void MapBoard::show(std::shared_ptr<const MapView> view) {
+  // Only the mapper's thread shows views, so the state cannot change between the two locks.
+  const MapState before = state();
+  if (before.view == view) return;
+  auto history = std::make_shared<const TileHistory>(
+      before.history ? history_with(*before.history, *view) : history_from(*view));
   const std::scoped_lock lock(mutex_);
-  view_ = std::move(view);
+  state_ = {std::move(view), std::move(history)};
 }
 
 void MapBoard::add_pose(const StampedPose& pose, OdometryHealth health,
@@ -33,7 +39,12 @@ void MapBoard::add_pose(const StampedPose& pose, OdometryHealth health,
 
 std::shared_ptr<const MapView> MapBoard::view() const {
   const std::scoped_lock lock(mutex_);
-  return view_;
+  return state_.view;
+}
+
+MapState MapBoard::state() const {
+  const std::scoped_lock lock(mutex_);
+  return state_;
 }
 
 Trajectory MapBoard::trajectory() const {

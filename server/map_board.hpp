@@ -5,6 +5,7 @@
 #include <string>
 
 #include "core/map/tile.hpp"
+#include "core/map/tile_changes.hpp"
 #include "core/odometry/odometry_state.hpp"
 #include "core/odometry/trajectory.hpp"
 
@@ -22,6 +23,8 @@ class MapBoard {
 
   /// Never null once `begin` was called.
   [[nodiscard]] std::shared_ptr<const MapView> view() const;
+  /// The view and the history that ends with it.
+  [[nodiscard]] MapState state() const;
   [[nodiscard]] Trajectory trajectory() const;
   /// The newest pose; the origin before the first.
   [[nodiscard]] StampedPose newest_pose() const;
@@ -32,7 +35,7 @@ class MapBoard {
 
  private:
   mutable std::mutex mutex_;
-  std::shared_ptr<const MapView> view_;
+  MapState state_;
   Trajectory trajectory_;
   std::uint64_t poses_added_ = 0;
   OdometryHealth health_ = OdometryHealth::initialised;

@@ -24,6 +24,7 @@ using Action = std::function<ExitCode()>;
 void add_map_command(CommandHandle program, Action& action);
 void add_replay_command(CommandHandle program, Action& action);
 void add_watch_command(CommandHandle program, Action& action);
+void add_watch_tiles_command(CommandHandle program, Action& action);
 void add_query_command(CommandHandle program, Action& action);
 void add_status_command(CommandHandle program, Action& action);
 void add_save_command(CommandHandle program, Action& action);

@@ -1,6 +1,5 @@
-#include <cmath>
 #include <iostream>
-#include <map>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
@@ -9,21 +8,26 @@
 #include "clients/commands/client_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/map_snapshot.hpp"
-#include "clients/commands/query_region.hpp"
-#include "clients/commands/stage_times.hpp"
+#include "clients/commands/query_report.hpp"
+#include "clients/commands/region_arguments.hpp"
 #include "clients/terminal/progress.hpp"
-#include "clients/terminal/text.hpp"
 #include "core/dataset/point_cloud_files.hpp"
 #include "core/map/map_picture.hpp"
+#include "core/map/region_shape.hpp"
 
 namespace stillmap {
 namespace {
+
+constexpr std::uint64_t not_given = std::numeric_limits<std::uint64_t>::max();
 
 struct Arguments {
   ClientArguments client;
   RegionArguments region;
   std::vector<std::string> classes;
   double resolution_m = 0.0;
+  std::uint64_t since_version = not_given;
+  /// 0: the server's map of now.
+  std::uint64_t since_map = 0;
   std::string out;
   std::string picture;
   std::uint64_t repeat = 1;
@@ -60,33 +64,33 @@ void write_cloud(const std::string& file, const std::vector<QueryVoxel>& voxels)
   file.ends_with(".pcd") ? write_pcd(file, points) : write_ply(file, points);
 }
 
-// The whole map with the path and the outline of what was asked for.
-void draw_query(const std::string& file, Client& client, const Eigen::AlignedBox3d& box_map,
+// The whole map with the path and the box round what was asked for.
+void draw_query(const std::string& file, Client& client, const Region& region,
                 std::chrono::milliseconds timeout) {
   MapPictureOptions options;
-  options.query_box_map = box_map;
+  options.query_box_map = RegionShape(region).bounds_map();
   write_map_picture(file, fetch_map(client), newest_path(client, timeout), options);
 }
 
-struct Answer {
-  Eigen::AlignedBox3d box_map;
-  MapQueryResult result;
-  /// Of every time it was asked, all pages together.
-  StageTime times;
-};
+std::optional<KnownVersion> since_of(const Arguments& arguments, Client& client) {
+  if (arguments.since_version == not_given) return std::nullopt;
+  const std::uint64_t map_id =
+      arguments.since_map == 0 ? client.status().map_id : arguments.since_map;
+  return KnownVersion{.map_id = map_id, .version = arguments.since_version};
+}
 
-Answer ask(Client& client, const Arguments& arguments,
-           const std::bitset<semantic_class_count>& classes) {
-  MapQuery query;
-  query.box_map = box_of(arguments.region, client, arguments.client.timeout());
-  query.classes = classes;
-  query.resolution_m = arguments.resolution_m;
-  Answer answer{query.box_map, {}, {.stage = "query", .ms = {}}};
+QueryAnswer ask(Client& client, const Arguments& arguments,
+                const std::bitset<semantic_class_count>& classes) {
+  QueryAnswer answer{{}, {}, {.stage = "query", .ms = {}}};
+  answer.query.region = region_of(arguments.region, client, arguments.client.timeout());
+  answer.query.classes = classes;
+  answer.query.resolution_m = arguments.resolution_m;
+  answer.query.since = since_of(arguments, client);
   Progress progress("query", "voxels", 0);
   while (answer.times.ms.size() < arguments.repeat) {
     const auto began = std::chrono::steady_clock::now();
     answer.result =
-        client.get_whole_static_map(query, [&](std::uint64_t arrived, std::uint64_t total) {
+        client.get_whole_static_map(answer.query, [&](std::uint64_t arrived, std::uint64_t total) {
           progress.update(arrived, "of " + std::to_string(total));
         });
     const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
@@ -96,58 +100,15 @@ Answer ask(Client& client, const Arguments& arguments,
   return answer;
 }
 
-std::map<SemanticClass, std::uint64_t> count_by_class(const std::vector<QueryVoxel>& voxels) {
-  std::map<SemanticClass, std::uint64_t> counts;
-  for (const QueryVoxel& voxel : voxels) counts[voxel.label] += 1;
-  return counts;
-}
-
-nlohmann::json to_json(const Answer& answer) {
-  nlohmann::json by_class = nlohmann::json::object();
-  for (const auto& [label, count] : count_by_class(answer.result.voxels)) {
-    by_class[std::string(name(label))] = count;
-  }
-  const auto corner = [](const Eigen::Vector3d& p) {
-    nlohmann::json json = nlohmann::json::array();
-    for (const double value : p) {
-      json.push_back(std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr));
-    }
-    return json;
-  };
-  return {
-      {"voxels", answer.result.voxels.size()},
-      {"classes", by_class},
-      {"map_id", answer.result.map_id},
-      {"map_version", answer.result.map_version},
-      {"box_map", {{"min", corner(answer.box_map.min())}, {"max", corner(answer.box_map.max())}}},
-      {"ms", answer.times.quantile(0.5)},
-      {"p99_ms", answer.times.quantile(0.99)},
-      {"asked", answer.times.ms.size()}};
-}
-
-std::string describe(const Answer& answer) {
-  Table table({"class", "voxels"});
-  for (const auto& [label, count] : count_by_class(answer.result.voxels)) {
-    table.add({std::string(name(label)), std::to_string(count)});
-  }
-  return table.text() + std::to_string(answer.result.voxels.size()) + " voxels of map " +
-         std::to_string(answer.result.map_id) + " version " +
-         std::to_string(answer.result.map_version) + " in " + fixed(answer.times.quantile(0.5), 1) +
-         " ms" +
-         (answer.times.ms.size() == 1
-              ? std::string("\n")
-              : " (median of " + std::to_string(answer.times.ms.size()) + "; p99 " +
-                    fixed(answer.times.quantile(0.99), 1) + " ms)\n");
-}
-
 ExitCode run(const Arguments& arguments) {
   check_out_name(arguments.out);
+  check_region(arguments.region);
   const auto classes = classes_of(arguments.classes);
   Client client = connect(arguments.client);
-  const Answer answer = ask(client, arguments, classes);
+  const QueryAnswer answer = ask(client, arguments, classes);
   if (!arguments.out.empty()) write_cloud(arguments.out, answer.result.voxels);
   if (!arguments.picture.empty()) {
-    draw_query(arguments.picture, client, answer.box_map, arguments.client.timeout());
+    draw_query(arguments.picture, client, answer.query.region, arguments.client.timeout());
   }
   std::cout << (arguments.json ? to_json(answer).dump(2) + "\n" : describe(answer));
   if (!arguments.json && !arguments.out.empty()) {
@@ -166,6 +127,10 @@ void add_query_command(CommandHandle program, Action& action) {
       .comma_separated();
   command.option("--resolution", arguments->resolution_m,
                  "Voxel size of the answer [m]; default: the map's own");
+  command.option("--since-version", arguments->since_version,
+                 "Only tiles that appeared or changed since this version; names those removed");
+  command.option("--since-map", arguments->since_map,
+                 "Id of the map that the version is of; default: the server's map of now");
   command.option("--out", arguments->out, "Write the voxels to FILE.pcd or FILE.ply");
   command.option("--picture", arguments->picture,
                  "Draw the whole map from above, the path and the region, to FILE.png");
@@ -177,8 +142,11 @@ void add_query_command(CommandHandle program, Action& action) {
       "Examples:\n"
       "  stillmap query --around-robot 50\n"
       "  stillmap query --box -20 -20 -3 20 20 5 --classes road,sidewalk --out ground.ply\n"
+      "  stillmap query --polygon 0 0 30 0 30 20 --min-z -3 --max-z 2\n"
+      "  stillmap query --corridor path.txt --width 4 --out way.ply\n"
       "  stillmap query --resolution 1 --json | jq .classes\n"
-      "Without a region, the whole map. Boxes are in the map frame [m].");
+      "  stillmap query --around-robot 50 --since-version 120\n"
+      "Without a region, the whole map. Coordinates are in the map frame [m].");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

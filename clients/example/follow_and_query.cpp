@@ -23,8 +23,7 @@ int main() try {
     {
       const std::scoped_lock lock(mutex);
       const Eigen::Vector3d robot_map = newest.T_map_lidar.translation();
-      query.box_map.extend(robot_map - Eigen::Vector3d::Constant(25.0));
-      query.box_map.extend(robot_map + Eigen::Vector3d::Constant(25.0));
+      query.region = stillmap::SphereRegion{.centre_map = robot_map, .radius_m = 25.0};
     }
     const auto answer = client.get_whole_static_map(query);
     std::printf("map version %lu: %zu voxels within 25 m\n", answer.map_version,

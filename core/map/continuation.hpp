@@ -10,7 +10,7 @@ namespace stillmap {
 struct Continuation {
   std::uint64_t map_id = 0;
   std::uint64_t map_version = 0;
-  /// Hash of box, classes and resolution; the page size may change from page to page.
+  /// Hash of everything that the query asks for; the page size may change from page to page.
   std::uint64_t query_fingerprint = 0;
   /// Voxels of the whole answer.
   std::uint64_t total_voxels = 0;

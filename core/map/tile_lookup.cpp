@@ -7,6 +7,9 @@
 namespace stillmap {
 namespace {
 
+/// Of a float at 100 km.
+constexpr double float_step_m = 0.01;
+
 struct IdRange {
   std::int32_t first;
   std::int32_t last;
@@ -29,6 +32,22 @@ bool is_usable(const Eigen::AlignedBox3d& box) {
 }
 
 }  // namespace
+
+TileRange tile_range(const Eigen::AlignedBox3d& box_map, double tile_size_m) {
+  const auto id = [&](double m) { return clamped_id(m / tile_size_m); };
+  const Eigen::Vector3d& low = box_map.min();
+  const Eigen::Vector3d& high = box_map.max();
+  return {.first = {id(low.x() - float_step_m), id(low.y() - float_step_m)},
+          .last = {id(high.x() + float_step_m), id(high.y() + float_step_m)}};
+}
+
+Eigen::AlignedBox3d tile_footprint(TileId id, double tile_size_m) {
+  constexpr double everywhere = std::numeric_limits<double>::infinity();
+  const Eigen::Vector2d corner(id.x * tile_size_m, id.y * tile_size_m);
+  return {Eigen::Vector3d(corner.x() - float_step_m, corner.y() - float_step_m, -everywhere),
+          Eigen::Vector3d(corner.x() + tile_size_m + float_step_m,
+                          corner.y() + tile_size_m + float_step_m, everywhere)};
+}
 
 std::vector<std::size_t> tiles_in_box(const MapView& view, const Eigen::AlignedBox3d& box_map) {
   std::vector<std::size_t> found;

@@ -1,8 +1,10 @@
 #include "idl/conversions/map_query.hpp"
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
+#include "idl/conversions/region.hpp"
 #include "idl/conversions/tile.hpp"
 #include "idl/topics.hpp"
 
@@ -10,6 +12,66 @@ namespace stillmap::wire {
 
 using stillmap_msgs::srv::GetStaticMap_Request;
 using stillmap_msgs::srv::GetStaticMap_Response;
+
+namespace {
+
+template <std::size_t N>
+std::vector<std::uint8_t> numbers_of(const std::bitset<N>& set) {
+  std::vector<std::uint8_t> numbers;
+  for (std::uint8_t number = 0; number < N; ++number) {
+    if (set[number]) numbers.push_back(number);
+  }
+  return numbers;
+}
+
+/// What is wrong with the field; empty when all its numbers exist.
+template <std::size_t N>
+std::string set_numbers(const std::string& field, const std::vector<std::uint8_t>& numbers,
+                        std::bitset<N>& set) {
+  for (const std::uint8_t number : numbers) {
+    if (number >= N) {
+      return field + " contains " + std::to_string(number) + "; they are 0.." +
+             std::to_string(N - 1);
+    }
+    set.set(number);
+  }
+  return {};
+}
+
+stillmap_msgs::msg::TileChange to_wire(const TileChange& tile) {
+  stillmap_msgs::msg::TileChange message;
+  message.id().x(tile.id.x);
+  message.id().y(tile.id.y);
+  message.change(static_cast<std::uint8_t>(tile.kind));
+  message.revision(tile.revision);
+  message.voxel_count(tile.voxel_count);
+  return message;
+}
+
+bool is_known_change(const stillmap_msgs::msg::TileChange& tile) {
+  return tile.change() <= static_cast<std::uint8_t>(TileChangeKind::removed);
+}
+
+TileChange from_wire(const stillmap_msgs::msg::TileChange& message) {
+  return {.id = {message.id().x(), message.id().y()},
+          .kind = static_cast<TileChangeKind>(message.change()),
+          .revision = message.revision(),
+          .voxel_count = message.voxel_count()};
+}
+
+std::vector<QueryVoxel> voxels_of(const stillmap_msgs::msg::Voxels& voxels) {
+  std::vector<QueryVoxel> out;
+  out.reserve(voxels.x().size());
+  for (std::size_t i = 0; i < voxels.x().size(); ++i) {
+    out.push_back({.position_map = {voxels.x()[i], voxels.y()[i], voxels.z()[i]},
+                   .label = static_cast<SemanticClass>(voxels.label()[i]),
+                   .confidence = voxels.confidence()[i],
+                   .point_count = voxels.point_count()[i]});
+  }
+  return out;
+}
+
+}  // namespace
 
 stillmap_msgs::msg::ReplyStatus to_reply_status(ReplyCode code, const std::string& reason,
                                                 std::uint64_t map_version, std::uint64_t map_id) {
@@ -30,41 +92,36 @@ std::optional<std::string> version_fault(std::uint8_t format_version) {
 GetStaticMap_Request to_request(const MapQuery& query) {
   GetStaticMap_Request request;
   request.format_version(wire_format_version);
-  const auto& low = query.box_map.min();
-  const auto& high = query.box_map.max();
-  request.min_x(low.x());
-  request.min_y(low.y());
-  request.min_z(low.z());
-  request.max_x(high.x());
-  request.max_y(high.y());
-  request.max_z(high.z());
-  std::vector<std::uint8_t> classes;
-  classes.reserve(query.classes.size());
-  for (std::uint8_t label = 0; label < query.classes.size(); ++label) {
-    if (query.classes[label]) classes.push_back(label);
-  }
-  request.classes(std::move(classes));
+  request.region(to_wire(query.region));
+  request.classes(numbers_of(query.classes));
+  request.motions(numbers_of(query.motions));
   request.resolution_m(query.resolution_m);
   request.max_bytes(query.max_bytes);
+  if (query.since) {
+    request.since_map_id(query.since->map_id);
+    request.since_version(query.since->version);
+  }
   request.continuation(query.continuation);
   return request;
 }
 
 QueryFromRequest from_request(const GetStaticMap_Request& request) {
   if (const auto fault = version_fault(request.format_version())) return {{}, *fault};
+  auto [region, region_fault] = from_wire(request.region());
+  if (!region) return {{}, std::move(region_fault)};
   MapQuery query;
-  query.box_map.min() = {request.min_x(), request.min_y(), request.min_z()};
-  query.box_map.max() = {request.max_x(), request.max_y(), request.max_z()};
-  for (const std::uint8_t label : request.classes()) {
-    if (label >= semantic_class_count) {
-      return {{}, "classes contains " + std::to_string(label) + "; classes are 0..19"};
-    }
-    query.classes.set(label);
+  query.region = *std::move(region);
+  if (auto fault = set_numbers("classes", request.classes(), query.classes); !fault.empty()) {
+    return {{}, std::move(fault)};
+  }
+  if (auto fault = set_numbers("motions", request.motions(), query.motions); !fault.empty()) {
+    return {{}, std::move(fault)};
   }
   query.resolution_m = request.resolution_m();
   query.max_bytes = request.max_bytes();
+  if (request.since_map_id() != 0) query.since = {request.since_map_id(), request.since_version()};
   query.continuation = request.continuation();
-  return {query, {}};
+  return {std::move(query), {}};
 }
 
 GetStaticMap_Response to_response(const MapQueryResult& result) {
@@ -83,6 +140,7 @@ GetStaticMap_Response to_response(const MapQueryResult& result) {
     voxels.point_count()[i] = voxel.point_count;
   }
   response.total_voxels(result.total_voxels);
+  for (const TileChange& tile : result.tiles) response.tiles().push_back(to_wire(tile));
   response.continuation(result.continuation);
   return response;
 }
@@ -90,8 +148,8 @@ GetStaticMap_Response to_response(const MapQueryResult& result) {
 std::optional<MapQueryResult> from_response(const GetStaticMap_Response& response) {
   const auto& status = response.status();
   const auto& voxels = response.voxels();
-  if (status.code() > static_cast<std::uint8_t>(QueryStatus::stale_continuation) ||
-      !consistent(voxels)) {
+  if (status.code() > static_cast<std::uint8_t>(QueryStatus::changes_unknown) ||
+      !consistent(voxels) || !std::ranges::all_of(response.tiles(), is_known_change)) {
     return std::nullopt;
   }
   MapQueryResult result;
@@ -101,13 +159,9 @@ std::optional<MapQueryResult> from_response(const GetStaticMap_Response& respons
   result.map_id = status.map_id();
   result.total_voxels = response.total_voxels();
   result.continuation = response.continuation();
-  result.voxels.reserve(voxels.x().size());
-  for (std::size_t i = 0; i < voxels.x().size(); ++i) {
-    result.voxels.push_back({.position_map = {voxels.x()[i], voxels.y()[i], voxels.z()[i]},
-                             .label = static_cast<SemanticClass>(voxels.label()[i]),
-                             .confidence = voxels.confidence()[i],
-                             .point_count = voxels.point_count()[i]});
-  }
+  result.voxels = voxels_of(voxels);
+  result.tiles.reserve(response.tiles().size());
+  for (const auto& tile : response.tiles()) result.tiles.push_back(from_wire(tile));
   return result;
 }
 

@@ -8,12 +8,13 @@
 
 namespace stillmap::wire {
 
-/// Codes of stillmap_msgs/ReplyStatus; the first three are QueryStatus's.
+/// Codes of stillmap_msgs/ReplyStatus, those of QueryStatus.
 enum class ReplyCode : std::uint8_t {
   ok = 0,
   invalid_request = 1,
   stale_continuation = 2,
   failed = 3,
+  changes_unknown = 4,
 };
 
 [[nodiscard]] stillmap_msgs::msg::ReplyStatus to_reply_status(ReplyCode code,
@@ -26,8 +27,8 @@ enum class ReplyCode : std::uint8_t {
 
 [[nodiscard]] stillmap_msgs::srv::GetStaticMap_Request to_request(const MapQuery& query);
 
-/// Either a query or what is wrong with the request. Whether the box makes sense is for
-/// query_map to say.
+/// Either a query or what is wrong with the request. Whether the region makes sense is
+/// for query_map to say.
 struct QueryFromRequest {
   std::optional<MapQuery> query;
   std::string fault;

@@ -118,13 +118,35 @@ Participant::ReaderHandle Participant::make_reader(const std::string& name, Type
   DataReader* const made =
       subscriber_->create_datareader(topic(name, type), reader_qos(qos), listener);
   if (made == nullptr) throw failure("cannot read topic " + name);
-  const auto remove = [this](DataReader* reader) {
-    const std::scoped_lock remove_lock(mutex_);
+  return own(*made, nullptr);
+}
+
+Participant::ReaderHandle Participant::make_reader(const std::string& name, TypeSupport type,
+                                                   const TopicQos& qos, const ContentFilter& filter,
+                                                   DataReaderListener* listener) {
+  const std::scoped_lock lock(mutex_);
+  Topic* const whole = topic(name, type);
+  ContentFilteredTopic* const filtered =
+      handle_->create_contentfilteredtopic(name + "_filtered_" + std::to_string(filters_made_++),
+                                           whole, filter.expression, filter.parameters);
+  if (filtered == nullptr) throw failure("cannot filter topic " + name + ": " + filter.expression);
+  DataReader* const made = subscriber_->create_datareader(filtered, reader_qos(qos), listener);
+  if (made == nullptr) {
+    handle_->delete_contentfilteredtopic(filtered);
+    throw failure("cannot read topic " + name);
+  }
+  return own(*made, filtered);
+}
+
+Participant::ReaderHandle Participant::own(DataReader& made, ContentFilteredTopic* filtered) {
+  const auto remove = [this, filtered](DataReader* reader) {
+    const std::scoped_lock lock(mutex_);
     if (graph_) graph_->remove(reader->guid());
     subscriber_->delete_datareader(reader);
+    if (filtered != nullptr) handle_->delete_contentfilteredtopic(filtered);
   };
-  ReaderHandle handle(made, remove);
-  if (graph_) graph_->add_reader(made->guid());
+  ReaderHandle handle(&made, remove);
+  if (graph_) graph_->add_reader(made.guid());
   return handle;
 }
 

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstdint>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
+#include <fastdds/dds/topic/ContentFilteredTopic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <functional>
 #include <map>
@@ -10,6 +12,7 @@
 #include <mutex>
 #include <string>
 
+#include "idl/dds/content_filter.hpp"
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/dds_options.hpp"
 #include "idl/dds/qos.hpp"
@@ -45,6 +48,12 @@ class Participant {
                                          eprosima::fastdds::dds::TypeSupport type,
                                          const TopicQos& qos,
                                          eprosima::fastdds::dds::DataReaderListener* listener);
+  /// Gets only the samples that the filter lets pass, and no word of keys that are gone. Throws
+  /// DdsError for a filter that does not fit the type.
+  [[nodiscard]] ReaderHandle make_reader(const std::string& topic,
+                                         eprosima::fastdds::dds::TypeSupport type,
+                                         const TopicQos& qos, const ContentFilter& filter,
+                                         eprosima::fastdds::dds::DataReaderListener* listener);
 
  private:
   using Handle = std::unique_ptr<eprosima::fastdds::dds::DomainParticipant,
@@ -53,6 +62,8 @@ class Participant {
   [[nodiscard]] Handle join() const;
   [[nodiscard]] eprosima::fastdds::dds::Topic* topic(const std::string& name,
                                                      eprosima::fastdds::dds::TypeSupport type);
+  [[nodiscard]] ReaderHandle own(eprosima::fastdds::dds::DataReader& reader,
+                                 eprosima::fastdds::dds::ContentFilteredTopic* filtered);
   [[nodiscard]] DdsError failure(const std::string& what) const;
 
   DdsOptions options_;
@@ -63,6 +74,7 @@ class Participant {
   eprosima::fastdds::dds::Publisher* publisher_ = nullptr;
   eprosima::fastdds::dds::Subscriber* subscriber_ = nullptr;
   std::map<std::string, eprosima::fastdds::dds::Topic*> topics_;
+  std::uint64_t filters_made_ = 0;
   std::unique_ptr<RosGraph> graph_;
 };
 

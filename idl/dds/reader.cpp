@@ -48,6 +48,11 @@ UntypedReader::UntypedReader(Participant& participant, const std::string& topic,
                              const TypeSupport& type, const TopicQos& qos)
     : reader_(participant.make_reader(topic, type, qos, &events_)) {}
 
+UntypedReader::UntypedReader(Participant& participant, const std::string& topic,
+                             const TypeSupport& type, const TopicQos& qos,
+                             const ContentFilter& filter)
+    : reader_(participant.make_reader(topic, type, qos, filter, &events_)) {}
+
 bool UntypedReader::take_untyped(void* sample, SampleInfo& info, const std::stop_token& stop,
                                  std::chrono::milliseconds timeout) {
   const auto deadline = std::chrono::steady_clock::now() + timeout;

@@ -47,6 +47,9 @@ class UntypedReader {
  public:
   UntypedReader(Participant& participant, const std::string& topic,
                 const eprosima::fastdds::dds::TypeSupport& type, const TopicQos& qos);
+  UntypedReader(Participant& participant, const std::string& topic,
+                const eprosima::fastdds::dds::TypeSupport& type, const TopicQos& qos,
+                const ContentFilter& filter);
 
   [[nodiscard]] const ReaderEvents& events() const { return events_; }
   [[nodiscard]] eprosima::fastrtps::rtps::GUID_t guid() const { return reader_->guid(); }
@@ -67,6 +70,10 @@ class Reader : public UntypedReader {
   /// Throws DdsError. The participant must outlive the reader.
   Reader(Participant& participant, const std::string& topic, const TopicQos& qos)
       : UntypedReader(participant, topic, type_support<T>(), qos) {}
+  /// Takes only what the filter lets pass. Throws DdsError, also for a filter that does not fit T.
+  Reader(Participant& participant, const std::string& topic, const TopicQos& qos,
+         const ContentFilter& filter)
+      : UntypedReader(participant, topic, type_support<T>(), qos, filter) {}
 
   /// Waits for the next sample and moves it into `sample`, whose memory is used again. False after
   /// `timeout` or when a stop was requested.

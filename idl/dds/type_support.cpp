@@ -2,12 +2,14 @@
 
 #include <memory>
 
+#include "idl/dds/described_type.hpp"
 #include "nav_msgsPubSubTypes.h"
 #include "rmw_dds_commonPubSubTypes.h"
 #include "rmw_dds_common_ironPubSubTypes.h"
 #include "sensor_msgsPubSubTypes.h"
 #include "stillmap_msgsPubSubTypes.h"
 #include "tf2_msgsPubSubTypes.h"
+#include "tile_indexPubSubTypes.h"
 
 namespace stillmap {
 namespace {
@@ -51,7 +53,9 @@ TypeSupport type_support<rmw_dds_common_iron::msg::ParticipantEntitiesInfo>() {
 }
 template <>
 TypeSupport type_support<stillmap_msgs::msg::TileInfo>() {
-  return make<stillmap_msgs::msg::TileInfoPubSubType>();
+  TypeSupport type = make<stillmap_msgs::msg::TileInfoPubSubType>();
+  describe_tile_info(type);
+  return type;
 }
 template <>
 TypeSupport type_support<stillmap_msgs::msg::MapTile>() {

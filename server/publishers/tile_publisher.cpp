@@ -13,8 +13,8 @@ TilePublisher::TilePublisher(Participant& participant, const Topics& topics)
 void TilePublisher::publish(const MapView& view) {
   const bool same_map = view.map_id == map_id_;
   if (same_map && view.version == version_) return;
-  take_back_missing(view);
   const MapIdentity identity = wire::identity_of(view);
+  take_back_missing(view, identity);
   for (const auto& tile : view.tiles) {
     const auto known = published_.find(tile->info.id);
     const bool current =
@@ -32,7 +32,7 @@ void TilePublisher::publish_tile(const Tile& tile, const MapIdentity& identity) 
   published_[tile.info.id] = tile.info.revision;
 }
 
-void TilePublisher::take_back_missing(const MapView& view) {
+void TilePublisher::take_back_missing(const MapView& view, const MapIdentity& identity) {
   const auto is_gone = [&](const auto& entry) {
     const auto found = std::ranges::lower_bound(view.tiles, entry.first, {},
                                                 [](const auto& tile) { return tile->info.id; });
@@ -40,10 +40,11 @@ void TilePublisher::take_back_missing(const MapView& view) {
   };
   std::erase_if(published_, [&](const auto& entry) {
     if (!is_gone(entry)) return false;
-    Tile key_only;
-    key_only.info.id = entry.first;
-    tiles_.dispose(wire::to_wire(key_only, {}));
-    index_.dispose(wire::to_wire(key_only.info, {}));
+    Tile gone;
+    gone.info = {.id = entry.first, .revision = view.version, .bounds_map = {}};
+    tiles_.dispose(wire::to_wire(gone, identity));
+    // Disposed samples do not pass content filters: the index says it with an empty tile.
+    static_cast<void>(index_.write(wire::to_wire(gone.info, identity)));
     return true;
   });
 }

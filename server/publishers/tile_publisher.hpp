@@ -13,7 +13,7 @@
 namespace stillmap {
 
 /// Publishes every tile that changed, first its voxels and then its entry in the index, and takes
-/// back tiles that are gone.
+/// back tiles that are gone: their voxels are disposed, their entry says that nothing is left.
 class TilePublisher {
  public:
   TilePublisher(Participant& participant, const Topics& topics);
@@ -22,7 +22,7 @@ class TilePublisher {
 
  private:
   void publish_tile(const Tile& tile, const MapIdentity& identity);
-  void take_back_missing(const MapView& view);
+  void take_back_missing(const MapView& view, const MapIdentity& identity);
 
   Writer<stillmap_msgs::msg::MapTile> tiles_;
   Writer<stillmap_msgs::msg::TileInfo> index_;

@@ -19,18 +19,18 @@ stillmap_msgs::srv::GetStaticMap_Response GetStaticMap::operator()(
     auto [query, fault] = wire::from_request(request);
     if (!query) throw std::invalid_argument(fault);
     query->max_bytes = std::min(query->max_bytes, largest_page_bytes);
-    const auto view = view_for(*query);
-    const MapQueryResult result = query_map(*view, *query);
-    if (!result.continuation.empty()) keep(view);
+    const MapState state = state_for(*query);
+    const MapQueryResult result = query_map(*state.view, *query, state.history.get());
+    if (!result.continuation.empty()) keep(state.view);
     response = wire::to_response(result);
   });
 }
 
-std::shared_ptr<const MapView> GetStaticMap::view_for(const MapQuery& query) const {
+MapState GetStaticMap::state_for(const MapQuery& query) const {
   const auto version = continuation_version(query.continuation);
   const auto is_it = [&](const auto& view) { return version && view->version == *version; };
   const auto kept = std::ranges::find_if(paged_views_, is_it);
-  return kept == paged_views_.end() ? context_.board.view() : *kept;
+  return kept == paged_views_.end() ? context_.board.state() : MapState{*kept, nullptr};
 }
 
 void GetStaticMap::keep(const std::shared_ptr<const MapView>& view) {

@@ -17,7 +17,8 @@ class GetStaticMap {
       const stillmap_msgs::srv::GetStaticMap_Request& request);
 
  private:
-  [[nodiscard]] std::shared_ptr<const MapView> view_for(const MapQuery& query) const;
+  /// A page after the first needs no history.
+  [[nodiscard]] MapState state_for(const MapQuery& query) const;
   void keep(const std::shared_ptr<const MapView>& view);
 
   const ServiceContext& context_;

@@ -79,7 +79,8 @@ const Drive& drive() {
 /// All voxels in 50 m x 50 m around the middle of the drive, in one page.
 void query_50_m(benchmark::State& state) {
   MapQuery query;
-  query.box_map = Eigen::AlignedBox3d(Eigen::Vector3d(175, -25, -10), Eigen::Vector3d(225, 25, 10));
+  query.region = BoxRegion{
+      .box_map = Eigen::AlignedBox3d(Eigen::Vector3d(175, -25, -10), Eigen::Vector3d(225, 25, 10))};
   query.max_bytes = 100'000'000;
   query.resolution_m = static_cast<double>(state.range(0)) / 10.0;
   const MapView& view = drive().stored.view;

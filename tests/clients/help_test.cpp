@@ -8,6 +8,7 @@ namespace {
 constexpr std::array commands{"map",
                               "replay",
                               "watch",
+                              "watch-tiles",
                               "query",
                               "status",
                               "save",

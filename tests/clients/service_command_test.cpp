@@ -34,6 +34,17 @@ TEST_F(ServiceCommandTest, RefusesWrongRegionsClassesAndFilesBeforeAsking) {
   EXPECT_EQ(run(query + "--box 0 0 0 1 1 1 --around 0 0 5").exit_code, 2);
   EXPECT_EQ(run(query + "--around-robot -5").exit_code, 2);
   EXPECT_EQ(run(query + "--out map.las").exit_code, 2);
+  for (const auto& [region, named] :
+       {std::pair("--polygon 0 0 9 9 9 0 0 9", "polygon edges 0"),
+        std::pair("--polygon 0 0 9", "give an x and a y"),
+        std::pair("--corridor no_such_file --width 3", "no_such_file"),
+        std::pair("--corridor 0 0 9 9", "--width"),
+        std::pair("--sphere 0 0 0 -4", "sphere radius_m is -4"),
+        std::pair("--box -1e9 -1e9 -1e9 1e9 1e9 1e9", "within 1000000 m")}) {
+    const ProcessResult refused = run(query + region);
+    EXPECT_EQ(refused.exit_code, 2) << region;
+    EXPECT_THAT(refused.err, HasSubstr(named));
+  }
   const ProcessResult result = run(query + "--classes road,house");
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.err, AllOf(HasSubstr("house"), HasSubstr("building")));
@@ -105,6 +116,26 @@ TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
   const ProcessResult roads = run("query --classes road --json" + on_domain());
   EXPECT_EQ(nlohmann::json::parse(roads.out).at("classes").size(), 1U);
   EXPECT_EQ(run("query --box 5 0 0 -5 1 1" + on_domain()).exit_code, 2);
+
+  write("way.txt", "# metres\n-30 0\n30, 0.5\n");
+  const nlohmann::json way = nlohmann::json::parse(
+      run("query --corridor " + path("way.txt") + " --width 6 --max-z 3 --json" + on_domain()).out);
+  EXPECT_GT(way.at("voxels"), 10);
+  EXPECT_EQ(way.at("box_map").at("max").at(2), 3.0);
+  EXPECT_GT(way.at("tiles").size(), 0U);
+  const std::string version = way.at("map_version").dump();
+  const nlohmann::json unchanged =
+      nlohmann::json::parse(run("query --json --since-version " + version + on_domain()).out);
+  EXPECT_EQ(unchanged.at("voxels"), 0);
+  const ProcessResult unknown = run("query --since-map 1 --since-version 1" + on_domain());
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_THAT(unknown.err, HasSubstr("ask for everything"));
+
+  const std::string tiles = std::to_string(way.at("tiles").size());
+  const ProcessResult watched = run("watch-tiles --json --duration 30 --count " + tiles +
+                                    " --corridor " + path("way.txt") + " --width 6" + on_domain());
+  EXPECT_EQ(watched.exit_code, 0) << watched.err;
+  EXPECT_THAT(watched.out, HasSubstr("\"change\":\"appeared\""));
 
   EXPECT_EQ(run("save saved.stillmap" + on_domain()).exit_code, 0);
   EXPECT_TRUE(exists("saved.stillmap"));

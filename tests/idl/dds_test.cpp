@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <set>
 #include <thread>
 
 #include "idl/conversions/pose.hpp"
@@ -56,6 +57,48 @@ TEST_P(OverTransport, CarriesLargeCloudsWhole) {
     EXPECT_EQ(got.width(), i);
     EXPECT_EQ(got.data().size(), 3'000'000U);
     EXPECT_EQ(got.data().back(), i);
+  }
+}
+
+TEST_P(OverTransport, FilteredReadersGetTheirTilesOnly) {
+  const auto topic = Topics::in("stillmap").tile_index;
+  const ContentFilter filter{.expression = "tile_x BETWEEN %0 AND %1 AND tile_y BETWEEN %2 AND %3",
+                             .parameters = {"-2", "1", "-7", "-1"}};
+  Writer<stillmap_msgs::msg::TileInfo> writer(here_, topic.dds_name, topic.writer);
+  const auto write_all = [&](std::uint64_t revision) {
+    for (std::int32_t x = -4; x <= 4; ++x) {
+      for (std::int32_t y = -4; y <= 4; ++y) {
+        ASSERT_TRUE(writer.write(wire::to_wire(tile_info({x, y}, revision), MapIdentity())));
+      }
+    }
+  };
+  const auto expect_region = [&](Reader<stillmap_msgs::msg::TileInfo>& reader,
+                                 std::uint64_t revision) {
+    std::set<TileId> got;
+    stillmap_msgs::msg::TileInfo message;
+    while (got.size() < 16 && reader.take(message, {}, patience)) {
+      EXPECT_EQ(message.state().revision(), revision);
+      got.insert({message.tile_x(), message.tile_y()});
+    }
+    EXPECT_EQ(got.size(), 16U);
+    for (const TileId id : got) {
+      EXPECT_TRUE(id.x >= -2 && id.x <= 1 && id.y >= -4 && id.y <= -1) << id.x << " " << id.y;
+    }
+  };
+  write_all(1);
+  // Comes late, and gets what the writer kept; then what is new.
+  Reader<stillmap_msgs::msg::TileInfo> reader(there_, topic.dds_name, topic.reader, filter);
+  expect_region(reader, 1);
+  write_all(2);
+  expect_region(reader, 2);
+}
+
+TEST_P(OverTransport, RefusesFiltersThatDoNotFitTheType) {
+  const auto topic = Topics::in("stillmap").tile_index;
+  using FilteredReader = Reader<stillmap_msgs::msg::TileInfo>;
+  for (const char* const expression : {"tile_q = 1", "tile_x BETWEEN", "tile_x = 'a'"}) {
+    EXPECT_THROW(FilteredReader(here_, topic.dds_name, topic.reader, {expression, {}}), DdsError)
+        << expression;
   }
 }
 

@@ -9,27 +9,42 @@ namespace {
 
 TEST(QueryConversion, KeepsTheQuery) {
   MapQuery query;
-  query.box_map.min() = {-std::numeric_limits<double>::infinity(), -2.0, -3.0};
-  query.box_map.max() = {1.0, 2.0, std::numeric_limits<double>::infinity()};
+  query.region = SphereRegion{.centre_map = {1.0, 2.0, 3.0}, .radius_m = 4.0};
   query.classes.set(0);
   query.classes.set(19);
+  query.motions.set(0);
+  query.motions.set(2);
+  query.since = {.map_id = 77, .version = 0};
   query.resolution_m = 0.4;
   query.max_bytes = 1234;
   query.continuation = "where the last page ended";
   const QueryFromRequest back = from_request(to_request(query));
   ASSERT_TRUE(back.query) << back.fault;
-  EXPECT_EQ(back.query->box_map.min(), query.box_map.min());
-  EXPECT_EQ(back.query->box_map.max(), query.box_map.max());
+  const auto& sphere = std::get<SphereRegion>(back.query->region);
+  EXPECT_EQ(sphere.centre_map, Eigen::Vector3d(1.0, 2.0, 3.0));
+  EXPECT_EQ(sphere.radius_m, 4.0);
+  EXPECT_EQ(back.query->motions, query.motions);
+  ASSERT_TRUE(back.query->since);
+  EXPECT_EQ(back.query->since->map_id, 77U);
+  EXPECT_EQ(back.query->since->version, 0U);
   EXPECT_EQ(back.query->classes, query.classes);
   EXPECT_EQ(back.query->resolution_m, query.resolution_m);
   EXPECT_EQ(back.query->max_bytes, query.max_bytes);
   EXPECT_EQ(back.query->continuation, query.continuation);
 }
 
+TEST(QueryConversion, WithoutAKnownVersionAsksForEverything) {
+  EXPECT_FALSE(from_request(to_request(MapQuery{})).query->since);
+}
+
 TEST(QueryConversion, RefusesUnknownClassesAndVersions) {
   auto request = to_request(MapQuery{});
   request.classes({3, 20});
   EXPECT_NE(from_request(request).fault.find("20"), std::string::npos);
+  request = to_request(MapQuery{});
+  request.motions({3});
+  EXPECT_NE(from_request(request).fault.find("motions contains 3; they are 0..2"),
+            std::string::npos);
   request = to_request(MapQuery{});
   request.format_version(9);
   EXPECT_NE(from_request(request).fault.find("format_version is 9"), std::string::npos);
@@ -47,6 +62,9 @@ TEST(QueryConversion, KeepsTheResult) {
                     .label = SemanticClass::pole,
                     .confidence = 0.5F,
                     .point_count = 9}};
+  result.tiles = {
+      {.id = {-3, 4}, .kind = TileChangeKind::changed, .revision = 8, .voxel_count = 1},
+      {.id = {5, -6}, .kind = TileChangeKind::removed, .revision = 7, .voxel_count = 0}};
   const auto back = from_response(to_response(result));
   ASSERT_TRUE(back);
   EXPECT_EQ(back->status, result.status);
@@ -55,11 +73,23 @@ TEST(QueryConversion, KeepsTheResult) {
   EXPECT_EQ(back->map_id, 6U);
   EXPECT_EQ(back->total_voxels, 70U);
   EXPECT_EQ(back->continuation, "next");
+  EXPECT_EQ(back->tiles, result.tiles);
   ASSERT_EQ(back->voxels.size(), 1U);
   EXPECT_EQ(back->voxels[0].position_map, result.voxels[0].position_map);
   EXPECT_EQ(back->voxels[0].label, SemanticClass::pole);
   EXPECT_EQ(back->voxels[0].confidence, 0.5F);
   EXPECT_EQ(back->voxels[0].point_count, 9U);
+}
+
+TEST(QueryConversion, RefusesCodesThatDoNotExist) {
+  MapQueryResult result;
+  result.tiles.resize(1);
+  auto response = to_response(result);
+  response.tiles()[0].change(3);
+  EXPECT_FALSE(from_response(response));
+  response = to_response({});
+  response.status().code(5);
+  EXPECT_FALSE(from_response(response));
 }
 
 TEST(QueryConversion, RefusesArraysThatDoNotFit) {

@@ -53,7 +53,7 @@ TEST(TileConversion, KeepsEverythingButTheLosersOfTheVote) {
 TEST(TileConversion, RefusesWhatItDoesNotUnderstand) {
   const auto message = to_wire(some_tile(), identity);
   auto other_version = message;
-  other_version.format_version(2);
+  other_version.format_version(99);
   EXPECT_FALSE(from_wire(other_version));
   auto short_array = message;
   short_array.voxels().confidence().pop_back();

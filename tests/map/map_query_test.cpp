@@ -8,6 +8,7 @@
 #include <random>
 #include <tuple>
 
+#include "core/map/region_shape.hpp"
 #include "tests/map/map_worlds.hpp"
 
 namespace stillmap {
@@ -18,7 +19,12 @@ using Eigen::Vector3d;
 
 constexpr double infinity = std::numeric_limits<double>::infinity();
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-const AlignedBox3d everywhere(Vector3d::Constant(-infinity), Vector3d::Constant(infinity));
+
+BoxRegion box_region(const AlignedBox3d& box_map) {
+  BoxRegion region;
+  region.box_map = box_map;
+  return region;
+}
 
 using Row = std::tuple<float, float, float, SemanticClass, std::uint32_t>;
 
@@ -26,20 +32,16 @@ Row row(const QueryVoxel& v) {
   return {v.position_map.x(), v.position_map.y(), v.position_map.z(), v.label, v.point_count};
 }
 
-bool is_asked_for(const MapQuery& query, const Voxel& voxel) {
-  const Vector3d p = voxel.mean_map.cast<double>();
-  return (p.array() >= query.box_map.min().array()).all() &&
-         (p.array() <= query.box_map.max().array()).all() &&
-         (query.classes.none() || query.classes[static_cast<std::size_t>(voxel.evidence.winner())]);
-}
-
 /// Every voxel of the map looked at.
 std::vector<Row> oracle(const MapView& view, const MapQuery& query) {
+  const RegionShape region(query.region);
   std::vector<Row> rows;
   for (const auto& tile : view.tiles) {
     for (const Voxel& voxel : tile->voxels) {
-      if (!is_asked_for(query, voxel)) continue;
-      rows.push_back(row({voxel.mean_map, voxel.evidence.winner(), 0.0F, voxel.point_count}));
+      const SemanticClass label = voxel.evidence.winner();
+      const bool is_wanted = query.classes.none() || query.classes[static_cast<std::size_t>(label)];
+      if (!is_wanted || !region.contains(voxel.mean_map.cast<double>())) continue;
+      rows.push_back(row({voxel.mean_map, label, 0.0F, voxel.point_count}));
     }
   }
   return rows;
@@ -70,12 +72,6 @@ class MapQueryTest : public testing::Test {
   static void TearDownTestSuite() { view_.reset(); }
   static const MapView& view() { return *view_; }
 
-  static MapQuery everything() {
-    MapQuery query;
-    query.box_map = everywhere;
-    return query;
-  }
-
  private:
   static inline std::shared_ptr<const MapView> view_;
 };
@@ -84,11 +80,12 @@ TEST_F(MapQueryTest, AgreesWithBruteForceOnRandomBoxesAndClasses) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> coordinate(-70.0, 70.0);
   for (int i = 0; i < 200; ++i) {
-    MapQuery query;
+    AlignedBox3d box_map;
     for (int corner = 0; corner < 2; ++corner) {
-      query.box_map.extend(
-          Vector3d(coordinate(random), coordinate(random), coordinate(random) / 10.0));
+      box_map.extend(Vector3d(coordinate(random), coordinate(random), coordinate(random) / 10.0));
     }
+    MapQuery query;
+    query.region = box_region(box_map);
     if (i % 3 == 0) query.classes = random();
     query.max_bytes = 10'000'000;
     int pages = 0;
@@ -96,9 +93,31 @@ TEST_F(MapQueryTest, AgreesWithBruteForceOnRandomBoxesAndClasses) {
   }
 }
 
+TEST_F(MapQueryTest, AgreesWithBruteForceOnEveryKindOfRegion) {
+  const HeightRange heights{.min_m = -1.0, .max_m = 2.0};
+  for (const Region& region :
+       {Region(SphereRegion{.centre_map = {4, 2, 1}, .radius_m = 9.0}),
+        Region(PolygonRegion{.corners_map = {{-9, -9}, {21, -6}, {25, 13}, {6, 1}, {-5, 14}},
+        .heights = heights}),
+        Region(CorridorRegion{
+            .path_map = {{-20, -9}, {5, 0}, {22, 11}}, .half_width_m = 2.5, .heights = heights})}) {
+    for (const bool some_classes : {false, true}) {
+      MapQuery query;
+      query.region = region;
+      query.max_bytes = 30'000;
+      query.motions.set(static_cast<std::size_t>(Motion::stationary));
+      if (some_classes) query.classes.set(static_cast<std::size_t>(SemanticClass::road));
+      int pages = 0;
+      const std::vector<Row> rows = all_pages(view(), query, pages);
+      EXPECT_GT(rows.size(), 100U);
+      EXPECT_EQ(rows, oracle(view(), query));
+    }
+  }
+}
+
 TEST_F(MapQueryTest, PagesTogetherAreTheWholeAnswer) {
   for (const std::uint32_t max_bytes : {7'777U, 20'000U, 1'000'000'000U}) {
-    MapQuery query = everything();
+    MapQuery query;
     query.max_bytes = max_bytes;
     query.classes.set(static_cast<std::size_t>(SemanticClass::building));
     int pages = 0;
@@ -108,13 +127,13 @@ TEST_F(MapQueryTest, PagesTogetherAreTheWholeAnswer) {
 }
 
 TEST_F(MapQueryTest, PageSizeMayChangeBetweenPages) {
-  MapQuery query = everything();
+  MapQuery query;
   query.max_bytes = 1000;
   const MapQueryResult first = query_map(view(), query);
   query.continuation = first.continuation;
   query.max_bytes = 1'000'000'000;
   const MapQueryResult rest = query_map(view(), query);
-  EXPECT_EQ(first.voxels.size() + rest.voxels.size(), oracle(view(), everything()).size());
+  EXPECT_EQ(first.voxels.size() + rest.voxels.size(), oracle(view(), MapQuery()).size());
   EXPECT_EQ(rest.total_voxels, first.total_voxels);
 }
 
@@ -136,7 +155,7 @@ TEST_F(MapQueryTest, CoarseCellsAreWeightedMeansOfTheirVoxels) {
         for (const auto& vote : voxel.evidence.votes) sum.evidence[vote.label] += vote.weight;
       }
     }
-    MapQuery query = everything();
+    MapQuery query;
     query.resolution_m = resolution_m;
     query.max_bytes = 100'000'000;
     const MapQueryResult result = query_map(view(), query);
@@ -158,7 +177,7 @@ TEST_F(MapQueryTest, CoarseCellsAreWeightedMeansOfTheirVoxels) {
 }
 
 TEST_F(MapQueryTest, ResolutionThatCameAsFloatIsTheMapsOwn) {
-  MapQuery query = everything();
+  MapQuery query;
   query.max_bytes = 100'000'000;
   const std::size_t own = query_map(view(), query).voxels.size();
   query.resolution_m = 0.2F;
@@ -167,14 +186,14 @@ TEST_F(MapQueryTest, ResolutionThatCameAsFloatIsTheMapsOwn) {
 
 TEST_F(MapQueryTest, NothingThereIsAFineAnswer) {
   MapQuery query;
-  query.box_map = AlignedBox3d(Vector3d::Constant(5000.0), Vector3d::Constant(5001.0));
+  query.region = box_region({Vector3d::Constant(5000.0), Vector3d::Constant(5001.0)});
   MapQueryResult result = query_map(view(), query);
   EXPECT_EQ(result.status, QueryStatus::ok);
   EXPECT_TRUE(result.voxels.empty());
   EXPECT_TRUE(result.continuation.empty());
-  query.box_map = AlignedBox3d(Vector3d::Constant(1e308), Vector3d::Constant(infinity));
+  query.region = box_region({Vector3d::Constant(9e5), Vector3d::Constant(infinity)});
   EXPECT_EQ(query_map(view(), query).total_voxels, 0U);
-  EXPECT_EQ(query_map(MapView{}, everything()).status, QueryStatus::ok);
+  EXPECT_EQ(query_map(MapView{}, MapQuery()).status, QueryStatus::ok);
   query.resolution_m = 1.0;
   EXPECT_EQ(query_map(MapView{}, query).status, QueryStatus::ok);
 }
@@ -186,32 +205,32 @@ TEST_F(MapQueryTest, RefusesWhatCannotBeAnsweredAndNamesIt) {
     EXPECT_THAT(result.reason, testing::HasSubstr(named));
     EXPECT_TRUE(result.voxels.empty());
   };
-  expect_refused(MapQuery{}, "box x is from");
-  MapQuery query = everything();
-  query.box_map.min().y() = nan;
-  expect_refused(query, "box y is from nan");
-  query = everything();
-  query.box_map.min().z() = 3.0;
-  query.box_map.max().z() = 2.0;
-  expect_refused(query, "box z is from 3 to 2");
+  MapQuery query;
+  query.region = box_region(AlignedBox3d());
+  expect_refused(query, "box x is from");
+  query.region = SphereRegion{};
+  expect_refused(query, "sphere radius_m is 0");
+  query = MapQuery();
+  query.motions.set(static_cast<std::size_t>(Motion::semi_static));
+  expect_refused(query, "motions has no 0 (stationary)");
   for (const double resolution_m : {-1.0, 0.1, nan, infinity, -infinity}) {
-    query = everything();
+    query = MapQuery();
     query.resolution_m = resolution_m;
     expect_refused(query, "resolution_m is");
   }
-  query = everything();
+  query = MapQuery();
   query.max_bytes = query_voxel_bytes - 1;
   expect_refused(query, "max_bytes is 20; must be at least 21");
 }
 
 TEST_F(MapQueryTest, HugeResolutionGivesFewCells) {
-  MapQuery query = everything();
+  MapQuery query;
   query.resolution_m = 1e300;
   EXPECT_LE(query_map(view(), query).total_voxels, 8U);
 }
 
 TEST_F(MapQueryTest, ContinuationOfAnotherVersionOrMapIsStale) {
-  MapQuery query = everything();
+  MapQuery query;
   query.max_bytes = 1000;
   query.continuation = query_map(view(), query).continuation;
   EXPECT_EQ(continuation_version(query.continuation), view().version);
@@ -227,17 +246,17 @@ TEST_F(MapQueryTest, ContinuationOfAnotherVersionOrMapIsStale) {
 }
 
 TEST_F(MapQueryTest, ContinuationOfAnotherQueryIsRefused) {
-  MapQuery query = everything();
+  MapQuery query;
   query.max_bytes = 1000;
   query.continuation = query_map(view(), query).continuation;
-  query.box_map.max().x() = 10.0;
+  query.region = SphereRegion{.centre_map = Vector3d::Zero(), .radius_m = 10.0};
   const MapQueryResult result = query_map(view(), query);
   EXPECT_EQ(result.status, QueryStatus::invalid_request);
   EXPECT_THAT(result.reason, testing::HasSubstr("another query"));
 }
 
 TEST_F(MapQueryTest, DamagedContinuationsAreRefused) {
-  MapQuery query = everything();
+  MapQuery query;
   query.max_bytes = 1000;
   const std::string token = query_map(view(), query).continuation;
   std::vector<std::string> damaged{"x", token + "0", std::string(token.size(), 'f'),

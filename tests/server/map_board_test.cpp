@@ -47,5 +47,35 @@ TEST(MapBoard, BeginsANewPathWithANewMap) {
   EXPECT_EQ(board.newest_pose().stamp_ns, 0);
 }
 
+std::shared_ptr<const MapView> view_of(std::uint64_t map_id, std::uint64_t version,
+                                       const std::vector<TileId>& ids) {
+  MapView view{.version = version, .map_id = map_id, .tiles = {}};
+  for (const TileId id : ids) {
+    Tile tile;
+    tile.info.id = id;
+    tile.info.revision = version;
+    view.tiles.push_back(std::make_shared<const Tile>(std::move(tile)));
+  }
+  return std::make_shared<const MapView>(std::move(view));
+}
+
+TEST(MapBoard, KeepsTheHistoryThatEndsWithItsView) {
+  MapBoard board;
+  board.begin(view_of(1, 3, {{0, 0}}), {});
+  EXPECT_EQ(board.state().history->known_since, 3U);
+  const auto next = view_of(1, 4, {{0, 1}});
+  board.show(next);
+  const MapState state = board.state();
+  EXPECT_EQ(state.view, next);
+  EXPECT_EQ(state.history->version, 4U);
+  ASSERT_EQ(state.history->gone.size(), 1U);
+  EXPECT_EQ(state.history->gone.front(), (TileHistory::Event{{0, 0}, 4}));
+  // The same view again changes nothing, not even the history.
+  board.show(next);
+  EXPECT_EQ(board.state().history, state.history);
+  board.begin(view_of(2, 0, {}), {});
+  EXPECT_TRUE(board.state().history->gone.empty());
+}
+
 }  // namespace
 }  // namespace stillmap

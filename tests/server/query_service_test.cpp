@@ -1,7 +1,10 @@
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <limits>
 
+#include "core/map/continuation.hpp"
+#include "core/map/region_shape.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {
@@ -9,12 +12,13 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double infinite = std::numeric_limits<double>::infinity();
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-MapQuery whole_world() {
-  MapQuery query;
-  query.box_map = {Eigen::Vector3d::Constant(-infinite), Eigen::Vector3d::Constant(infinite)};
-  return query;
+BoxRegion box(const Eigen::Vector3d& min, const Eigen::Vector3d& max) {
+  BoxRegion region;
+  region.box_map.min() = min;
+  region.box_map.max() = max;
+  return region;
 }
 
 class QueryService : public testing::Test {
@@ -33,13 +37,14 @@ class QueryService : public testing::Test {
 };
 
 TEST_F(QueryService, AnswersByRegionAndClass) {
-  const MapQueryResult all = client_.get_whole_static_map(whole_world());
+  const MapQueryResult all = client_.get_whole_static_map({});
   ASSERT_EQ(all.status, QueryStatus::ok) << all.reason;
   EXPECT_GT(all.voxels.size(), 0U);
   EXPECT_EQ(all.voxels.size(), all.total_voxels);
 
-  MapQuery poles = whole_world();
-  poles.box_map = {Eigen::Vector3d(0.0, -10.0, -5.0), Eigen::Vector3d(30.0, 10.0, 5.0)};
+  MapQuery poles;
+  const BoxRegion near = box({0.0, -10.0, -5.0}, {30.0, 10.0, 5.0});
+  poles.region = near;
   poles.classes.set(static_cast<std::size_t>(SemanticClass::pole));
   const MapQueryResult some = client_.get_whole_static_map(poles);
   ASSERT_EQ(some.status, QueryStatus::ok) << some.reason;
@@ -47,12 +52,12 @@ TEST_F(QueryService, AnswersByRegionAndClass) {
   EXPECT_LT(some.voxels.size(), all.voxels.size());
   for (const QueryVoxel& voxel : some.voxels) {
     EXPECT_EQ(voxel.label, SemanticClass::pole);
-    EXPECT_TRUE(poles.box_map.contains(voxel.position_map.cast<double>()));
+    EXPECT_TRUE(near.box_map.contains(voxel.position_map.cast<double>()));
   }
 }
 
 TEST_F(QueryService, KeepsPagesOfOneMapWhileTheMapChanges) {
-  MapQuery query = whole_world();
+  MapQuery query;
   query.max_bytes = 20'000;
   const MapQueryResult first = client_.get_static_map(query);
   ASSERT_FALSE(first.continuation.empty());
@@ -72,36 +77,127 @@ TEST_F(QueryService, KeepsPagesOfOneMapWhileTheMapChanges) {
   EXPECT_EQ(voxels, first.total_voxels);
 }
 
-TEST_F(QueryService, RefusesAbsurdRegionsInWords) {
-  MapQuery inside_out = whole_world();
-  inside_out.box_map.min().x() = 5.0;
-  inside_out.box_map.max().x() = -5.0;
-  MapQuery nan = whole_world();
-  nan.box_map.min().y() = std::numeric_limits<double>::quiet_NaN();
-  MapQuery negative = whole_world();
-  negative.resolution_m = -1.0;
-  for (const MapQuery& query : {inside_out, nan, negative}) {
-    const MapQueryResult result = client_.get_static_map(query);
-    EXPECT_EQ(result.status, QueryStatus::invalid_request);
-    EXPECT_FALSE(result.reason.empty());
-    EXPECT_TRUE(result.voxels.empty());
+TEST_F(QueryService, AnswersEveryKindOfRegion) {
+  const MapQueryResult all = client_.get_whole_static_map({});
+  for (const Region& region :
+       {Region(SphereRegion{.centre_map = {5, 0, 0}, .radius_m = 12.0}),
+        Region(PolygonRegion{.corners_map = {{-10, -20}, {20, -20}, {5, 20}}, .heights = {-3, 3}}),
+        Region(CorridorRegion{
+            .path_map = {{-20, -10}, {0, 0}, {20, 10}}, .half_width_m = 3.0, .heights = {}})}) {
+    MapQuery query;
+    query.region = region;
+    const MapQueryResult some = client_.get_whole_static_map(query);
+    ASSERT_EQ(some.status, QueryStatus::ok) << some.reason;
+    const RegionShape shape(region);
+    const auto inside = std::ranges::count_if(all.voxels, [&](const QueryVoxel& voxel) {
+      return shape.contains(voxel.position_map.cast<double>());
+    });
+    EXPECT_GT(inside, 0);
+    EXPECT_EQ(some.voxels.size(), static_cast<std::size_t>(inside));
   }
-  MapQuery garbage = whole_world();
-  garbage.continuation = "no such page";
-  EXPECT_NE(client_.get_static_map(garbage).status, QueryStatus::ok);
-  EXPECT_THROW(static_cast<void>(client_.get_tile_versions(inside_out.box_map)), ServiceError);
-  EXPECT_THROW(static_cast<void>(client_.get_tile_versions(nan.box_map)), ServiceError);
-  // And goes on.
-  EXPECT_EQ(client_.get_static_map(whole_world()).status, QueryStatus::ok);
+}
+
+TEST_F(QueryService, TellsWhatChangedSinceAVersion) {
+  const MapQueryResult before = client_.get_whole_static_map({});
+  drive(publisher_, 8, 20);
+  ASSERT_TRUE(eventually([&] { return client_.status().map_version > before.map_version; }));
+  MapQuery query;
+  query.since = {.map_id = before.map_id, .version = before.map_version};
+  const MapQueryResult changes = client_.get_whole_static_map(query);
+  ASSERT_EQ(changes.status, QueryStatus::ok) << changes.reason;
+  EXPECT_GT(changes.map_version, before.map_version);
+  ASSERT_FALSE(changes.tiles.empty());
+  std::size_t voxels = 0;
+  for (const TileChange& tile : changes.tiles) {
+    EXPECT_GT(tile.revision, before.map_version);
+    EXPECT_NE(tile.kind, TileChangeKind::removed);
+    voxels += tile.voxel_count;
+  }
+  EXPECT_EQ(voxels, changes.voxels.size());
+
+  static_cast<void>(client_.reset());
+  const MapQueryResult other = client_.get_static_map(query);
+  EXPECT_EQ(other.status, QueryStatus::changes_unknown);
+  EXPECT_THAT(other.reason, HasSubstr("ask for everything"));
+}
+
+struct HostileQuery {
+  MapQuery query;
+  std::string named;
+};
+
+MapQuery of_region(const Region& region) {
+  MapQuery query;
+  query.region = region;
+  return query;
+}
+
+std::vector<HostileQuery> hostile_queries() {
+  std::vector<HostileQuery> all{
+      {of_region(box({5, 0, 0}, {-5, 1, 1})), "box x is from 5 to -5"},
+      {of_region(box({0, nan, 0}, {1, 1, 1})), "box y is from nan"},
+      {of_region(box({-1e9, -1e9, -1e9}, {1e9, 1e9, 1e9})), "box x is from -1e+09 to 1e+09"},
+      {of_region(SphereRegion{.centre_map = {nan, 0, 0}, .radius_m = 1.0}), "sphere centre"},
+      {of_region(SphereRegion{}), "sphere radius_m is 0"},
+      {of_region(PolygonRegion{.corners_map = {{0, 0}, {9, 9}, {9, 0}, {0, 9}}, .heights = {}}),
+       "polygon edges 0 (from 0, 0 to 9, 9) and 2"},
+      {of_region(PolygonRegion{}), "polygon has 0 corners"},
+      {of_region(CorridorRegion{.path_map = {}, .half_width_m = 1.0, .heights = {}}),
+       "corridor path has 0 points"},
+      {of_region(CorridorRegion{.path_map = {{1, 1}}, .half_width_m = 1.0, .heights = {}}),
+       "corridor path has 1 points"}};
+  for (const double resolution_m : {-1.0, 1e-9, nan}) {
+    all.push_back({{}, "resolution_m is"});
+    all.back().query.resolution_m = resolution_m;
+  }
+  all.push_back({{}, "max_bytes is 0"});
+  all.back().query.max_bytes = 0;
+  all.push_back({{}, "continuation is damaged"});
+  all.back().query.continuation = "no such page";
+  all.push_back({{}, "motions has no 0"});
+  all.back().query.motions.set(1);
+  return all;
+}
+
+TEST_F(QueryService, RefusesHostileQueriesWithTheirReasonAndGoesOn) {
+  for (const auto& [query, named] : hostile_queries()) {
+    const MapQueryResult result = client_.get_static_map(query);
+    EXPECT_EQ(result.status, QueryStatus::invalid_request) << named;
+    EXPECT_THAT(result.reason, HasSubstr(named));
+    EXPECT_TRUE(result.voxels.empty());
+    EXPECT_EQ(client_.get_static_map({}).status, QueryStatus::ok);
+  }
+  for (const BoxRegion& region : {box({5, 0, 0}, {-5, 1, 1}), box({0, nan, 0}, {1, 1, 1})}) {
+    EXPECT_THROW(static_cast<void>(client_.get_tile_versions(region.box_map)), ServiceError);
+  }
+}
+
+TEST_F(QueryService, RefusesTheContinuationOfAnotherMapOrQuery) {
+  MapQuery query;
+  query.max_bytes = 1000;
+  query.continuation = client_.get_static_map(query).continuation;
+  ASSERT_FALSE(query.continuation.empty());
+  MapQuery other = query;
+  other.region = SphereRegion{.centre_map = {0, 0, 0}, .radius_m = 5.0};
+  EXPECT_EQ(client_.get_static_map(other).status, QueryStatus::invalid_request);
+  // Of a state that the server does not have any more.
+  auto token = from_token(query.continuation);
+  ASSERT_TRUE(token);
+  token->map_version += 1000;
+  query.continuation = to_token(*token);
+  const MapQueryResult stale = client_.get_static_map(query);
+  EXPECT_EQ(stale.status, QueryStatus::stale_continuation);
+  EXPECT_THAT(stale.reason, HasSubstr("ask again without continuation"));
 }
 
 TEST_F(QueryService, FindsNothingWhereNothingIs) {
-  MapQuery far = whole_world();
-  far.box_map = {Eigen::Vector3d::Constant(1e7), Eigen::Vector3d::Constant(1e8)};
+  MapQuery far;
+  const BoxRegion region = box(Eigen::Vector3d::Constant(1e5), Eigen::Vector3d::Constant(9e5));
+  far.region = region;
   const MapQueryResult result = client_.get_whole_static_map(far);
   EXPECT_EQ(result.status, QueryStatus::ok) << result.reason;
   EXPECT_TRUE(result.voxels.empty());
-  EXPECT_TRUE(client_.get_tile_versions(far.box_map).tiles.empty());
+  EXPECT_TRUE(client_.get_tile_versions(region.box_map).tiles.empty());
 }
 
 TEST_F(QueryService, HandsOutTilesById) {

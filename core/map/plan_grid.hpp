@@ -1,0 +1,61 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace stillmap {
+
+/// A position in plan in steps of 2^-20 m, about a micrometre: on whole numbers, which side of a
+/// line a point lies on has an exact answer, at 100 km from the origin as at 1 m.
+struct GridPoint {
+  std::int64_t x = 0;
+  std::int64_t y = 0;
+  friend bool operator==(const GridPoint&, const GridPoint&) = default;
+};
+
+inline constexpr double grid_steps_per_m = 1 << 20;
+
+/// Positions farther than 2000 km from the origin in an axis are moved there; not for NaN.
+[[nodiscard]] inline GridPoint to_grid(const Eigen::Vector2d& p_map) {
+  constexpr double farthest_m = 2e6;
+  const auto steps = [&](double value_m) {
+    return std::llround(std::clamp(value_m, -farthest_m, farthest_m) * grid_steps_per_m);
+  };
+  return {steps(p_map.x()), steps(p_map.y())};
+}
+
+/// +1 when a, b, c turn left, -1 when they turn right, 0 when they lie on one line.
+[[nodiscard]] inline int turn(GridPoint a, GridPoint b, GridPoint c) {
+  // Differences have at most 43 bits, their products 86.
+  __extension__ using Wide = __int128;
+  const Wide left = static_cast<Wide>(b.x - a.x) * (c.y - a.y);
+  const Wide right = static_cast<Wide>(b.y - a.y) * (c.x - a.x);
+  return left > right ? 1 : (left < right ? -1 : 0);
+}
+
+/// A straight edge on the grid.
+struct GridEdge {
+  GridPoint a;
+  GridPoint b;
+
+  [[nodiscard]] std::int64_t min_x() const { return std::min(a.x, b.x); }
+  [[nodiscard]] std::int64_t max_x() const { return std::max(a.x, b.x); }
+  [[nodiscard]] std::int64_t min_y() const { return std::min(a.y, b.y); }
+  [[nodiscard]] std::int64_t max_y() const { return std::max(a.y, b.y); }
+};
+
+/// Whether the boxes round two edges share a point.
+[[nodiscard]] inline bool boxes_meet(const GridEdge& s, const GridEdge& t) {
+  return s.min_x() <= t.max_x() && t.min_x() <= s.max_x() && s.min_y() <= t.max_y() &&
+         t.min_y() <= s.max_y();
+}
+
+/// Whether two edges share a point.
+[[nodiscard]] inline bool edges_meet(const GridEdge& s, const GridEdge& t) {
+  return boxes_meet(s, t) && turn(s.a, s.b, t.a) * turn(s.a, s.b, t.b) <= 0 &&
+         turn(t.a, t.b, s.a) * turn(t.a, t.b, s.b) <= 0;
+}
+
+}  // namespace stillmap

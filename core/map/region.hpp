@@ -1,0 +1,55 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <limits>
+#include <string>
+#include <variant>
+#include <vector>
+
+namespace stillmap {
+
+// Parts of the map that can be asked for. Map frame, metres; boundaries belong to their region.
+
+/// Heights of a region; either end may be infinite.
+struct HeightRange {
+  double min_m = -std::numeric_limits<double>::infinity();
+  double max_m = std::numeric_limits<double>::infinity();
+};
+
+/// Along the map's axes; faces may be infinite. As it stands, the whole map.
+struct BoxRegion {
+  Eigen::AlignedBox3d box_map{Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity()),
+                              Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity())};
+};
+
+struct SphereRegion {
+  Eigen::Vector3d centre_map = Eigen::Vector3d::Zero();
+  double radius_m = 0.0;
+};
+
+/// What stands on a simple polygon. Corners go round the outline, in either direction; the first
+/// may be repeated at the end.
+struct PolygonRegion {
+  std::vector<Eigen::Vector2d> corners_map;
+  HeightRange heights;
+};
+
+/// Everything not farther than `half_width_m` from a path, in plan. The path may cross itself.
+struct CorridorRegion {
+  std::vector<Eigen::Vector2d> path_map;
+  double half_width_m = 0.0;
+  HeightRange heights;
+};
+
+using Region = std::variant<BoxRegion, SphereRegion, PolygonRegion, CorridorRegion>;
+
+/// Finite coordinates and lengths of a region are at most this: ten times as far as the map goes.
+inline constexpr double max_region_coordinate_m = 1e6;
+/// Most corners of a polygon, most points of a path.
+inline constexpr std::size_t max_region_points = 4096;
+
+/// Why the region cannot be used: field, value, and what would do. Empty when it can.
+[[nodiscard]] std::string region_faults(const Region& region);
+
+}  // namespace stillmap

@@ -1,0 +1,125 @@
+#include <gmock/gmock.h>
+
+#include <map>
+#include <mutex>
+
+#include "core/map/region_shape.hpp"
+#include "core/map/tile_lookup.hpp"
+#include "tests/server/server_process.hpp"
+
+namespace stillmap::test {
+namespace {
+
+/// A corner of the room: of its tiles, one or two are near.
+const CorridorRegion corner{
+    .path_map = {{-24.0, -19.5}, {-21.0, -1.0}}, .half_width_m = 0.5, .heights = {}};
+
+/// What a subscriber holds: its copy of the region.
+class RegionCopy {
+ public:
+  void add(const RegionNews& news) {
+    const std::scoped_lock lock(mutex_);
+    for (const Tile& tile : news.appeared) {
+      EXPECT_TRUE(hashes_.emplace(tile.info.id, tile.info.content_hash).second);
+      seen_.insert_or_assign(tile.info.id, true);
+    }
+    for (const Tile& tile : news.changed) {
+      EXPECT_TRUE(hashes_.contains(tile.info.id));
+      hashes_[tile.info.id] = tile.info.content_hash;
+    }
+    for (const TileId id : news.removed) EXPECT_EQ(hashes_.erase(id), 1U);
+    map_id_ = news.map.map_id;
+  }
+  [[nodiscard]] std::map<TileId, std::uint64_t> hashes() const {
+    const std::scoped_lock lock(mutex_);
+    return hashes_;
+  }
+  /// All tiles that ever came.
+  [[nodiscard]] std::map<TileId, bool> seen() const {
+    const std::scoped_lock lock(mutex_);
+    return seen_;
+  }
+  [[nodiscard]] std::uint64_t map_id() const {
+    const std::scoped_lock lock(mutex_);
+    return map_id_;
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::map<TileId, std::uint64_t> hashes_;
+  std::map<TileId, bool> seen_;
+  std::uint64_t map_id_ = 0;
+};
+
+class RegionSubscription : public testing::Test {
+ protected:
+  RegionSubscription()
+      : setup_("every"), server_(setup_.server_arguments()), client_(setup_.client()) {
+    client_.wait_for_server(patience);
+  }
+
+  /// What the server has of the region, and how many tiles it has elsewhere.
+  [[nodiscard]] std::pair<std::map<TileId, std::uint64_t>, std::size_t> served() {
+    const TileVersions versions = client_.get_tile_versions();
+    std::map<TileId, std::uint64_t> inside;
+    for (const TileInfo& info : versions.tiles) {
+      if (shape_.may_meet(tile_footprint(info.id, versions.map.tile_size_m))) {
+        inside[info.id] = info.content_hash;
+      }
+    }
+    return {inside, versions.tiles.size() - inside.size()};
+  }
+
+  void expect_only_the_region(const RegionCopy& copy) {
+    ASSERT_TRUE(eventually([&] {
+      const auto inside = served().first;
+      return !inside.empty() && copy.hashes() == inside;
+    }));
+    const auto [inside, outside] = served();
+    EXPECT_GT(outside, 1U);
+    for (const auto& [id, seen] : copy.seen()) {
+      EXPECT_TRUE(inside.contains(id)) << id.x << " " << id.y;
+    }
+  }
+
+  ServiceSetup setup_;
+  ServerProcess server_;
+  Client client_;
+  ScanPublisher publisher_{setup_.publisher(true)};
+  RegionShape shape_{Region(corner)};
+};
+
+TEST_F(RegionSubscription, FollowsItsRegionAndReceivesNothingElse) {
+  RegionCopy copy;
+  const auto subscription =
+      client_.subscribe_region(corner, [&](const RegionNews& news) { copy.add(news); });
+  drive(publisher_, 0, 6);
+  expect_only_the_region(copy);
+  drive(publisher_, 6, 12);
+  ASSERT_TRUE(wait_for_scans(client_, 12));
+  expect_only_the_region(copy);
+}
+
+TEST_F(RegionSubscription, ComesLateAndSeesAResetTakeItsTiles) {
+  drive(publisher_, 0, 6);
+  ASSERT_TRUE(wait_for_scans(client_, 6));
+  RegionCopy copy;
+  Client late(setup_.client());
+  const auto subscription =
+      late.subscribe_region(corner, [&](const RegionNews& news) { copy.add(news); });
+  expect_only_the_region(copy);
+  const std::uint64_t new_map = client_.reset();
+  EXPECT_TRUE(eventually([&] { return copy.hashes().empty() && copy.map_id() == new_map; }));
+  drive(publisher_, 0, 6);
+  ASSERT_TRUE(wait_for_scans(client_, 12));
+  expect_only_the_region(copy);
+}
+
+TEST_F(RegionSubscription, RefusesARegionWithFaults) {
+  const auto ignore = [](const RegionNews&) {};
+  EXPECT_THROW(static_cast<void>(client_.subscribe_region(SphereRegion{}, ignore)),
+               std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace stillmap::test
