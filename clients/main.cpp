@@ -15,6 +15,7 @@ void add_commands(stillmap::CommandHandle program, stillmap::Action& action) {
   program.require_command();
   program.explain(introduction);
   stillmap::add_map_command(program, action);
+  stillmap::add_traversable_command(program, action);
   stillmap::add_replay_command(program, action);
   stillmap::add_watch_command(program, action);
   stillmap::add_watch_tiles_command(program, action);

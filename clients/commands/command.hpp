@@ -22,6 +22,7 @@ using Action = std::function<ExitCode()>;
 
 // Each adds one subcommand to the program; when it is chosen, it sets `action`.
 void add_map_command(CommandHandle program, Action& action);
+void add_traversable_command(CommandHandle program, Action& action);
 void add_replay_command(CommandHandle program, Action& action);
 void add_watch_command(CommandHandle program, Action& action);
 void add_watch_tiles_command(CommandHandle program, Action& action);
@@ -39,6 +40,7 @@ void add_model_command(CommandHandle program, Action& action);
 void add_evaluate_trajectory_command(CommandHandle evaluate, Action& action);
 void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action);
 void add_evaluate_map_command(CommandHandle evaluate, Action& action);
+void add_evaluate_traversable_command(CommandHandle evaluate, Action& action);
 void add_evaluate_weightings_command(CommandHandle evaluate, Action& action);
 
 // Subcommands of dataset.

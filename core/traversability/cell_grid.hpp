@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cassert>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+namespace stillmap {
+
+/// A rectangle of cells, row after row from the lowest y.
+template <typename T>
+class CellGrid {
+ public:
+  CellGrid() = default;
+  CellGrid(int width, int height, const T& value = T{})
+      : width_(width),
+        height_(height),
+        cells_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), value) {}
+
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] bool contains(int x, int y) const {
+    return x >= 0 && y >= 0 && x < width_ && y < height_;
+  }
+  [[nodiscard]] std::size_t index(int x, int y) const {
+    assert(contains(x, y));
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width_) +
+           static_cast<std::size_t>(x);
+  }
+  /// @pre contains(x, y)
+  [[nodiscard]] T& operator()(int x, int y) { return cells_[index(x, y)]; }
+  [[nodiscard]] const T& operator()(int x, int y) const { return cells_[index(x, y)]; }
+  [[nodiscard]] std::span<const T> cells() const { return cells_; }
+
+  friend bool operator==(const CellGrid&, const CellGrid&) = default;
+
+ private:
+  int width_ = 0;
+  int height_ = 0;
+  std::vector<T> cells_;
+};
+
+/// Calls `visit(x, y)` for every cell, in the order in which cells are stored.
+template <typename T, typename Visit>
+void for_each_cell(const CellGrid<T>& grid, const Visit& visit) {
+  for (int y = 0; y < grid.height(); ++y) {
+    for (int x = 0; x < grid.width(); ++x) visit(x, y);
+  }
+}
+
+}  // namespace stillmap

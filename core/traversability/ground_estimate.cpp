@@ -1,0 +1,192 @@
+#include "core/traversability/ground_estimate.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+namespace stillmap {
+namespace {
+
+constexpr float nan = std::numeric_limits<float>::quiet_NaN();
+/// Edge of the squares whose low parts give the level of the ground [m].
+constexpr double block_m = 2.0;
+/// Ground of a ground class lies within this of the level: below for what falls away, above for
+/// banks and walls, not as high as a bridge or the leaves of a tree [m].
+constexpr float labelled_below_m = 1.5F;
+constexpr float labelled_above_m = 2.5F;
+/// Without classes a car's bonnet must not pass for ground [m].
+constexpr float unlabelled_off_m = 0.5F;
+/// Voxels above the lowest one that still belong to the same surface, from that one [m].
+constexpr float labelled_run_m = 0.30F;
+constexpr float unlabelled_run_m = 0.15F;
+/// A cell off the median of its neighbours by more than this is no ground [m].
+constexpr float outlier_m = 0.4F;
+
+bool is_ground_voxel(const ColumnVoxel& voxel) { return is_ground(voxel.label); }
+bool is_unlabelled_voxel(const ColumnVoxel& voxel) {
+  return voxel.label == SemanticClass::unlabeled;
+}
+
+/// The lowest voxel that may be ground.
+const ColumnVoxel* lowest_candidate(Column column) {
+  const auto ground = std::ranges::find_if(column, is_ground_voxel);
+  if (ground != column.end()) return &*ground;
+  if (!column.empty() && is_unlabelled_voxel(column.front())) return &column.front();
+  return nullptr;
+}
+
+float low_part(std::vector<float>& heights_m) {
+  if (heights_m.empty()) return nan;
+  // Not the lowest: reflections put single voxels under the ground.
+  const auto tenth = heights_m.begin() + static_cast<std::ptrdiff_t>(heights_m.size() / 10);
+  std::nth_element(heights_m.begin(), tenth, heights_m.end());
+  return *tenth;
+}
+
+float block_level(const ColumnGrid& columns, int x0, int y0, int size) {
+  std::vector<float> labelled_m;
+  std::vector<float> unlabelled_m;
+  for (int y = y0; y < std::min(y0 + size, columns.height()); ++y) {
+    for (int x = x0; x < std::min(x0 + size, columns.width()); ++x) {
+      const ColumnVoxel* candidate = lowest_candidate(columns(x, y));
+      if (candidate == nullptr) continue;
+      (is_ground_voxel(*candidate) ? labelled_m : unlabelled_m).push_back(candidate->height_m);
+    }
+  }
+  return low_part(labelled_m.empty() ? unlabelled_m : labelled_m);
+}
+
+/// Median of the blocks around; a canopy's block is overruled by the road beside it.
+float median_around(const CellGrid<float>& blocks_m, int x0, int y0) {
+  std::array<float, 9> heights_m{};
+  std::size_t count = 0;
+  for (int y = std::max(0, y0 - 1); y <= std::min(y0 + 1, blocks_m.height() - 1); ++y) {
+    for (int x = std::max(0, x0 - 1); x <= std::min(x0 + 1, blocks_m.width() - 1); ++x) {
+      if (!std::isnan(blocks_m(x, y))) heights_m.at(count++) = blocks_m(x, y);
+    }
+  }
+  if (count == 0) return nan;
+  const auto middle = heights_m.begin() + static_cast<std::ptrdiff_t>((count - 1) / 2);
+  std::nth_element(heights_m.begin(), middle,
+                   heights_m.begin() + static_cast<std::ptrdiff_t>(count));
+  return *middle;
+}
+
+/// The surface that begins with the voxel at `first`.
+template <typename Belongs>
+GroundCell surface_from(Column column, std::size_t first, float run_m, const Belongs& belongs) {
+  double weighted_m = 0.0;
+  double weight = 0.0;
+  const float lowest_m = column[first].height_m;
+  GroundCell cell;
+  for (const ColumnVoxel& voxel : column.subspan(first)) {
+    if (voxel.height_m - lowest_m > run_m) break;
+    if (!belongs(voxel)) continue;
+    weighted_m += static_cast<double>(voxel.points) * voxel.height_m;
+    weight += static_cast<double>(voxel.points);
+    cell.top_m = voxel.height_m;
+  }
+  cell.height_m = weight > 0.0 ? static_cast<float>(weighted_m / weight) : lowest_m;
+  cell.top_m = std::max(cell.top_m, cell.height_m);
+  cell.label = column[first].label;
+  cell.origin = GroundOrigin::seen;
+  return cell;
+}
+
+GroundCell ground_of(Column column, float level_m) {
+  for (std::size_t i = 0; i < column.size(); ++i) {
+    if (!is_ground_voxel(column[i])) continue;
+    const float above_m = column[i].height_m - level_m;
+    if (above_m < -labelled_below_m) continue;
+    if (above_m > labelled_above_m) return {};
+    return surface_from(column, i, labelled_run_m, is_ground_voxel);
+  }
+  if (column.empty() || !is_unlabelled_voxel(column.front())) return {};
+  if (!(std::abs(column.front().height_m - level_m) <= unlabelled_off_m)) return {};
+  return surface_from(column, 0, unlabelled_run_m, is_unlabelled_voxel);
+}
+
+/// Whether the seen ground within two cells says that this cell's is none.
+bool is_outlier(const GroundGrid& ground, int x0, int y0) {
+  const float here_m = ground(x0, y0).height_m;
+  std::array<float, 25> heights_m{};
+  std::size_t count = 0;
+  float farthest_m = 0.0F;
+  for (int y = std::max(0, y0 - 2); y <= std::min(y0 + 2, ground.height() - 1); ++y) {
+    for (int x = std::max(0, x0 - 2); x <= std::min(x0 + 2, ground.width() - 1); ++x) {
+      if (ground(x, y).origin != GroundOrigin::seen) continue;
+      heights_m.at(count++) = ground(x, y).height_m;
+      farthest_m = std::max(farthest_m, std::abs(ground(x, y).height_m - here_m));
+    }
+  }
+  constexpr std::size_t enough = 5;
+  if (count < enough || farthest_m <= outlier_m) return false;
+  const auto middle = heights_m.begin() + static_cast<std::ptrdiff_t>(count / 2);
+  std::nth_element(heights_m.begin(), middle,
+                   heights_m.begin() + static_cast<std::ptrdiff_t>(count));
+  return std::abs(here_m - *middle) > outlier_m;
+}
+
+GroundGrid without_outliers(const GroundGrid& ground) {
+  GroundGrid kept = ground;
+  for_each_cell(ground, [&](int x, int y) {
+    if (ground(x, y).origin == GroundOrigin::seen && is_outlier(ground, x, y)) kept(x, y) = {};
+  });
+  return kept;
+}
+
+/// The class that most of the cell and its neighbours have; its own when others are no more.
+SemanticClass smoothed_label(const GroundGrid& ground, int x0, int y0) {
+  std::array<int, semantic_class_count> votes{};
+  for (int y = std::max(0, y0 - 1); y <= std::min(y0 + 1, ground.height() - 1); ++y) {
+    for (int x = std::max(0, x0 - 1); x <= std::min(x0 + 1, ground.width() - 1); ++x) {
+      if (ground(x, y).origin == GroundOrigin::seen) {
+        ++votes.at(static_cast<std::size_t>(ground(x, y).label));
+      }
+    }
+  }
+  SemanticClass winner = ground(x0, y0).label;
+  for (std::size_t i = 0; i < votes.size(); ++i) {
+    if (votes.at(i) > votes.at(static_cast<std::size_t>(winner))) {
+      winner = static_cast<SemanticClass>(i);
+    }
+  }
+  return winner;
+}
+
+}  // namespace
+
+GroundLevel::GroundLevel(const ColumnGrid& columns, double cell_m)
+    : cells_per_block_(std::max(1, static_cast<int>(std::lround(block_m / cell_m)))) {
+  const auto blocks_along = [this](int cells) {
+    return (cells + cells_per_block_ - 1) / cells_per_block_;
+  };
+  CellGrid<float> low_m(blocks_along(columns.width()), blocks_along(columns.height()), nan);
+  for_each_cell(low_m, [&](int x, int y) {
+    low_m(x, y) =
+        block_level(columns, x * cells_per_block_, y * cells_per_block_, cells_per_block_);
+  });
+  blocks_m_ = low_m;
+  for_each_cell(low_m, [&](int x, int y) { blocks_m_(x, y) = median_around(low_m, x, y); });
+}
+
+float GroundLevel::at(int x, int y) const {
+  return blocks_m_(x / cells_per_block_, y / cells_per_block_);
+}
+
+GroundGrid seen_ground(const ColumnGrid& columns, const GroundLevel& level) {
+  GroundGrid ground(columns.width(), columns.height());
+  for_each_cell(columns, [&](int x, int y) {
+    if (!columns(x, y).empty()) ground(x, y) = ground_of(columns(x, y), level.at(x, y));
+  });
+  const GroundGrid kept = without_outliers(ground);
+  GroundGrid smoothed = kept;
+  for_each_cell(kept, [&](int x, int y) {
+    if (kept(x, y).origin == GroundOrigin::seen) smoothed(x, y).label = smoothed_label(kept, x, y);
+  });
+  return smoothed;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,239 @@
+#include "core/traversability/ground_fill.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+namespace stillmap {
+namespace {
+
+/// Gaps up to this need no third witness [m].
+constexpr double max_bare_gap_m = 1.6;
+/// A third witness is no farther than this [m].
+constexpr double max_witness_m = 2.4;
+/// The far end may be off the line of the slopes by this and by this share of the gap [m].
+constexpr double step_m = 0.06;
+constexpr double slope_doubt = 0.01;
+/// A third witness may be off by its distance times this, and `step_m`: it lies across the line,
+/// where a road's crown falls off.
+constexpr double cross_slope = 0.06;
+/// Lines that differ by more disagree [m].
+constexpr double disagreement_m = 0.10;
+/// The slope at an end is taken over so many cells.
+constexpr int slope_cells = 5;
+/// What stands in a gap: something from here to here above the ground [m].
+constexpr float standing_from_m = 0.25F;
+constexpr float standing_to_m = 2.0F;
+
+struct Direction {
+  int dx;
+  int dy;
+  [[nodiscard]] double length() const { return dx != 0 && dy != 0 ? std::sqrt(2.0) : 1.0; }
+};
+
+/// Four lines; the opposite of i is i + 4.
+constexpr std::array<Direction, 8> directions{
+    {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
+constexpr std::size_t line_count = 4;
+
+/// Where a look from a hole in one direction ends: so many cells on, or nowhere (0).
+using Reach = std::int16_t;
+
+/// Classes that lie at one level and may meet in a gap.
+int group_of(SemanticClass label) {
+  const bool is_driven = label == SemanticClass::road || label == SemanticClass::parking ||
+                         label == SemanticClass::other_ground;
+  return static_cast<int>(is_driven ? SemanticClass::road : label);
+}
+
+bool stands_in(Column column, float ground_m) {
+  return std::ranges::any_of(column, [ground_m](const ColumnVoxel& voxel) {
+    const float above_m = voxel.height_m - ground_m;
+    return above_m > standing_from_m && above_m < standing_to_m;
+  });
+}
+
+/// What every hole sees of the ground around it.
+class Holes {
+ public:
+  Holes(const GroundGrid& seen, const ColumnGrid& columns, double cell_m)
+      : seen_(seen), columns_(columns), cell_m_(cell_m) {
+    for (std::size_t i = 0; i < directions.size(); ++i) look(i);
+  }
+
+  /// Ground that follows for the hole, if any.
+  [[nodiscard]] std::optional<GroundCell> inferred(int x, int y) const;
+  /// Height of the nearest ground that the hole sees.
+  [[nodiscard]] std::optional<float> nearest_height(int x, int y) const;
+
+ private:
+  struct End {
+    double distance_m;
+    const GroundCell* cell;
+    int x, y;
+  };
+  struct Line {
+    double gap_m;
+    GroundCell cell;
+  };
+
+  void look(std::size_t direction);
+  [[nodiscard]] Reach reach_from(int x, int y, std::size_t direction) const;
+  [[nodiscard]] std::optional<End> end(int x, int y, std::size_t direction) const;
+  [[nodiscard]] std::optional<double> slope_at(const End& end, Direction outwards) const;
+  [[nodiscard]] bool is_one_surface(const End& a, const End& b, std::size_t direction) const;
+  [[nodiscard]] std::optional<Line> line_through(int x, int y, std::size_t direction) const;
+  [[nodiscard]] bool has_witness(int x, int y, std::size_t direction, const GroundCell& cell) const;
+
+  const GroundGrid& seen_;
+  const ColumnGrid& columns_;
+  double cell_m_;
+  std::array<CellGrid<Reach>, directions.size()> reach_;
+};
+
+/// Looks in one direction from all holes, the nearest to the far end first: each needs its
+/// neighbour's answer only.
+void Holes::look(std::size_t direction) {
+  const Direction d = directions.at(direction);
+  reach_.at(direction) = CellGrid<Reach>(seen_.width(), seen_.height(), 0);
+  for (int row = 0; row < seen_.height(); ++row) {
+    const int y = d.dy > 0 ? seen_.height() - 1 - row : row;
+    for (int column = 0; column < seen_.width(); ++column) {
+      const int x = d.dx > 0 ? seen_.width() - 1 - column : column;
+      if (!seen_(x, y).is_known()) reach_.at(direction)(x, y) = reach_from(x, y, direction);
+    }
+  }
+}
+
+Reach Holes::reach_from(int x, int y, std::size_t direction) const {
+  const Direction d = directions.at(direction);
+  const int next_x = x + d.dx;
+  const int next_y = y + d.dy;
+  if (!seen_.contains(next_x, next_y)) return 0;
+  int cells = 1;
+  if (!seen_(next_x, next_y).is_known()) {
+    const Reach further = reach_.at(direction)(next_x, next_y);
+    if (further == 0) return 0;
+    cells += further;
+  }
+  if (cells * d.length() * cell_m_ > max_filled_gap_m) return 0;
+  const GroundCell& end = seen_(x + cells * d.dx, y + cells * d.dy);
+  return stands_in(columns_(x, y), end.height_m) ? Reach{0} : static_cast<Reach>(cells);
+}
+
+std::optional<Holes::End> Holes::end(int x, int y, std::size_t direction) const {
+  const Reach cells = reach_.at(direction)(x, y);
+  if (cells == 0) return std::nullopt;
+  const Direction d = directions.at(direction);
+  const int end_x = x + cells * d.dx;
+  const int end_y = y + cells * d.dy;
+  return End{cells * d.length() * cell_m_, &seen_(end_x, end_y), end_x, end_y};
+}
+
+/// Rise a metre towards the hole, from the ground farther out.
+std::optional<double> Holes::slope_at(const End& end, Direction outwards) const {
+  for (int cells = slope_cells; cells >= 2; --cells) {
+    const int x = end.x + cells * outwards.dx;
+    const int y = end.y + cells * outwards.dy;
+    if (!seen_.contains(x, y) || !seen_(x, y).is_known()) continue;
+    if (group_of(seen_(x, y).label) != group_of(end.cell->label)) continue;
+    return (end.cell->height_m - seen_(x, y).height_m) / (cells * outwards.length() * cell_m_);
+  }
+  return std::nullopt;
+}
+
+bool Holes::is_one_surface(const End& a, const End& b, std::size_t direction) const {
+  if (group_of(a.cell->label) != group_of(b.cell->label)) return false;
+  const std::optional<double> slope_a = slope_at(a, directions.at(direction));
+  const std::optional<double> slope_b = slope_at(b, directions.at(direction + line_count));
+  double slope = 0.0;
+  if (slope_a && slope_b) {
+    slope = 0.5 * (*slope_a - *slope_b);
+  } else if (slope_a || slope_b) {
+    slope = slope_a ? *slope_a : -*slope_b;
+  }
+  const double gap_m = a.distance_m + b.distance_m;
+  const double off_m = b.cell->height_m - (a.cell->height_m + slope * gap_m);
+  return std::abs(off_m) <= step_m + slope_doubt * gap_m;
+}
+
+std::optional<Holes::Line> Holes::line_through(int x, int y, std::size_t direction) const {
+  const std::optional<End> a = end(x, y, direction);
+  const std::optional<End> b = end(x, y, direction + line_count);
+  if (!a || !b || a->distance_m + b->distance_m > max_filled_gap_m) return std::nullopt;
+  if (!is_one_surface(*a, *b, direction)) return std::nullopt;
+  Line line;
+  line.gap_m = a->distance_m + b->distance_m;
+  const double share = a->distance_m / line.gap_m;
+  const double height_m = (1.0 - share) * a->cell->height_m + share * b->cell->height_m;
+  line.cell.height_m = line.cell.top_m = static_cast<float>(height_m);
+  line.cell.origin = GroundOrigin::inferred;
+  line.cell.label = a->distance_m <= b->distance_m ? a->cell->label : b->cell->label;
+  if (line.gap_m > max_bare_gap_m && !has_witness(x, y, direction, line.cell)) return std::nullopt;
+  return line;
+}
+
+bool Holes::has_witness(int x, int y, std::size_t direction, const GroundCell& cell) const {
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    if (i % line_count == direction) continue;
+    const std::optional<End> witness = end(x, y, i);
+    if (!witness || witness->distance_m > max_witness_m) continue;
+    if (group_of(witness->cell->label) != group_of(cell.label)) continue;
+    const double off_m = std::abs(witness->cell->height_m - cell.height_m);
+    if (off_m <= step_m + cross_slope * witness->distance_m) return true;
+  }
+  return false;
+}
+
+std::optional<GroundCell> Holes::inferred(int x, int y) const {
+  std::optional<Line> best;
+  for (std::size_t i = 0; i < line_count; ++i) {
+    const std::optional<Line> line = line_through(x, y, i);
+    if (!line) continue;
+    if (best && std::abs(best->cell.height_m - line->cell.height_m) > disagreement_m) return {};
+    if (!best || line->gap_m < best->gap_m) best = line;
+  }
+  if (!best) return std::nullopt;
+  return best->cell;
+}
+
+std::optional<float> Holes::nearest_height(int x, int y) const {
+  std::optional<End> nearest;
+  for (std::size_t i = 0; i < directions.size(); ++i) {
+    const std::optional<End> one = end(x, y, i);
+    if (one && (!nearest || one->distance_m < nearest->distance_m)) nearest = one;
+  }
+  if (!nearest) return std::nullopt;
+  return nearest->cell->height_m;
+}
+
+GroundCell assumed_at(float height_m) {
+  return {height_m, height_m, GroundOrigin::assumed, SemanticClass::unlabeled};
+}
+
+}  // namespace
+
+GroundGrid fill_holes(const GroundGrid& seen, const ColumnGrid& columns, const GroundLevel& level,
+                      double cell_m, int border) {
+  const Holes holes(seen, columns, cell_m);
+  GroundGrid filled = seen;
+  for_each_cell(seen, [&](int x, int y) {
+    if (seen(x, y).is_known() || !seen.contains(x - border, y - border) ||
+        !seen.contains(x + border, y + border)) {
+      return;
+    }
+    if (const std::optional<GroundCell> ground = holes.inferred(x, y)) {
+      filled(x, y) = *ground;
+    } else if (!columns(x, y).empty()) {
+      const float level_m =
+          std::isnan(level.at(x, y)) ? columns(x, y).front().height_m : level.at(x, y);
+      filled(x, y) = assumed_at(holes.nearest_height(x, y).value_or(level_m));
+    }
+  });
+  return filled;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,62 @@
+#include "core/traversability/nav2_map.hpp"
+
+#include <fstream>
+#include <stdexcept>
+#include <vector>
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+// map_server takes p = (255 - shade) / 255 for occupied above occupied_thresh, for free below
+// free_thresh, else for unknown: 205 must not fall below the latter, so 0.196 and not 0.25.
+constexpr char occupied_shade = '\x00';
+constexpr char unknown_shade = '\xCD';
+constexpr char free_shade = '\xFE';
+constexpr const char* thresholds = "occupied_thresh: 0.65\nfree_thresh: 0.196\n";
+
+char shade_of(std::int8_t value) {
+  if (value == occupancy_unknown) return unknown_shade;
+  return value == occupancy_lethal ? occupied_shade : free_shade;
+}
+
+void write_file(const fs::path& file, const std::string& content) {
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  out.write(content.data(), static_cast<std::streamsize>(content.size()));
+  out.close();
+  if (!out) {
+    throw std::runtime_error(file.string() + ": cannot be written; check folder and space left");
+  }
+}
+
+std::string image_of(const OccupancyGrid& grid) {
+  std::string image =
+      "P5\n" + std::to_string(grid.width) + " " + std::to_string(grid.height) + "\n255\n";
+  // The picture's first row is the highest y.
+  for (std::uint32_t row = grid.height; row-- > 0;) {
+    for (std::uint32_t x = 0; x < grid.width; ++x) image.push_back(shade_of(grid.at(x, row)));
+  }
+  return image;
+}
+
+std::string description_of(const OccupancyGrid& grid) {
+  std::string text = "image: map.pgm\nmode: trinary\nresolution: ";
+  text.append(std::to_string(grid.resolution_m)).append("\norigin: [");
+  text.append(std::to_string(grid.origin_map.x())).append(", ");
+  text.append(std::to_string(grid.origin_map.y())).append(", 0]\nnegate: 0\n");
+  return text.append(thresholds);
+}
+
+}  // namespace
+
+void write_nav2_map(const fs::path& folder, const OccupancyGrid& grid) {
+  if (grid.status != AreaStatus::ok) throw std::invalid_argument("no map to write: " + grid.reason);
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw std::runtime_error(folder.string() + ": cannot be made: " + error.message());
+  write_file(folder / "map.pgm", image_of(grid));
+  write_file(folder / "map.yaml", description_of(grid));
+}
+
+}  // namespace stillmap

@@ -1,0 +1,151 @@
+#include "core/traversability/path_check.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <sstream>
+
+namespace stillmap {
+namespace {
+
+/// The turn from one heading to another, the shorter way round.
+double turn(double from_rad, double to_rad) {
+  return std::remainder(to_rad - from_rad, 2.0 * std::numbers::pi);
+}
+
+PlanarPose between(const PlanarPose& a, const PlanarPose& b, double share) {
+  return {(1.0 - share) * a.position_map + share * b.position_map,
+          a.heading_rad + share * turn(a.heading_rad, b.heading_rad)};
+}
+
+std::string fault_of(const TraversabilityView& view, const PlanarPose& pose, std::size_t index) {
+  std::ostringstream text;
+  if (!std::isfinite(pose.heading_rad) || std::abs(pose.heading_rad) > 1e6) {
+    text << "pose " << index << " has heading " << pose.heading_rad << "; must be finite [rad]";
+  } else if (!view.cell_of(pose.position_map)) {
+    text << "pose " << index << " is at (" << pose.position_map.x() << ", " << pose.position_map.y()
+         << "); must be finite and within 100 km of the map's origin";
+  }
+  return text.str();
+}
+
+PathCheck refused(AreaStatus status, const std::string& reason) {
+  PathCheck check;
+  check.status = status;
+  check.reason = reason;
+  return check;
+}
+
+/// Steps from one pose to the next in which no part of the robot moves more than half a cell.
+int steps_between(const TraversabilityView& view, const PlanarPose& a, const PlanarPose& b) {
+  const double moved_m =
+      (b.position_map - a.position_map).norm() +
+      std::abs(turn(a.heading_rad, b.heading_rad)) * view.profile.circumscribed_radius_m();
+  return std::max(1, static_cast<int>(std::ceil(moved_m / (0.5 * view.cell_m))));
+}
+
+/// Cells under the footprint, summed over all steps.
+double cells_to_look_at(const TraversabilityView& view, std::span<const PlanarPose> path_map) {
+  double steps = 1.0;
+  for (std::size_t i = 0; i + 1 < path_map.size(); ++i) {
+    steps += steps_between(view, path_map[i], path_map[i + 1]);
+  }
+  return steps * (view.profile.length_m / view.cell_m + 1.0) *
+         (view.profile.width_m / view.cell_m + 1.0);
+}
+
+std::optional<PathCheck> refusal(const TraversabilityView& view,
+                                 std::span<const PlanarPose> path_map) {
+  if (path_map.empty()) return refused(AreaStatus::invalid_request, "the path has no poses");
+  if (path_map.size() > max_path_poses) {
+    return refused(AreaStatus::too_large, "the path has " + std::to_string(path_map.size()) +
+                                              " poses; at most " + std::to_string(max_path_poses) +
+                                              " are checked at once");
+  }
+  if (view.tiles.empty()) return refused(AreaStatus::not_found, "the map is empty");
+  for (std::size_t i = 0; i < path_map.size(); ++i) {
+    const std::string fault = fault_of(view, path_map[i], i);
+    if (!fault.empty()) return refused(AreaStatus::invalid_request, fault);
+  }
+  if (cells_to_look_at(view, path_map) > max_path_cells) {
+    return refused(AreaStatus::too_large,
+                   "the path is too long or turns too much to be checked at once; ask for parts");
+  }
+  return std::nullopt;
+}
+
+/// Walks along the path and keeps the account.
+class Walk {
+ public:
+  explicit Walk(const TraversabilityView& view) : view_(view), lookup_(view) {
+    check_.map_version = view.version;
+    check_.clearance_m = clearance_limit_m(view.profile);
+  }
+
+  /// Goes on to `pose`, `moved_m` from the last one; false when the robot cannot stand there.
+  bool step_to(const PlanarPose& pose, double moved_m, std::size_t segment) {
+    check_.checked_m += moved_m;
+    bool is_inferred = false;
+    std::optional<PathConflict> conflict;
+    visit_footprint(view_, pose, [&](CellIndex index) {
+      const TraversabilityCell cell = lookup_.at(index).cell;
+      check_.clearance_m = std::min(check_.clearance_m, static_cast<double>(cell.clearance_m));
+      is_inferred = is_inferred || cell.inferred;
+      const BlockReason reason = conflict_with(cell);
+      if (reason == BlockReason::none || says_more_already(conflict, reason)) return;
+      conflict = {segment, check_.checked_m, pose, view_.centre_of(index), reason};
+    });
+    if (is_inferred) check_.inferred_m += moved_m;
+    check_.conflict = conflict;
+    return !conflict;
+  }
+
+  [[nodiscard]] PathCheck result() {
+    check_.is_free = !check_.conflict;
+    return check_;
+  }
+
+ private:
+  [[nodiscard]] BlockReason conflict_with(const TraversabilityCell& cell) const {
+    if (cell.is_lethal_itself()) return cell.reason;
+    const bool is_closed =
+        cell.state == CellState::unknown && view_.profile.unknown == UnknownGround::blocked;
+    return is_closed ? BlockReason::unknown : BlockReason::none;
+  }
+  /// What is known to be there says more than what nobody knows.
+  static bool says_more_already(const std::optional<PathConflict>& conflict, BlockReason reason) {
+    return conflict && (conflict->reason != BlockReason::unknown || reason == BlockReason::unknown);
+  }
+
+  const TraversabilityView& view_;
+  CellLookup lookup_;
+  PathCheck check_;
+};
+
+}  // namespace
+
+std::string_view name(AreaStatus status) {
+  constexpr std::array<std::string_view, 4> names{"ok", "invalid request", "too large",
+                                                  "not found"};
+  return names.at(static_cast<std::size_t>(status));
+}
+
+PathCheck check_path(const TraversabilityView& view, std::span<const PlanarPose> path_map) {
+  if (const auto refusal_of_path = refusal(view, path_map)) return *refusal_of_path;
+  Walk walk(view);
+  if (!walk.step_to(path_map.front(), 0.0, 0)) return walk.result();
+  for (std::size_t i = 0; i + 1 < path_map.size(); ++i) {
+    const PlanarPose& a = path_map[i];
+    const PlanarPose& b = path_map[i + 1];
+    const int steps = steps_between(view, a, b);
+    const double moved_m = (b.position_map - a.position_map).norm() / steps;
+    for (int step = 1; step <= steps; ++step) {
+      const PlanarPose pose = between(a, b, static_cast<double>(step) / steps);
+      if (!walk.step_to(pose, moved_m, i)) return walk.result();
+    }
+  }
+  return walk.result();
+}
+
+}  // namespace stillmap

@@ -1,0 +1,56 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "core/traversability/column_tile.hpp"
+#include "core/traversability/ground_estimate.hpp"
+#include "core/traversability/surface_shape.hpp"
+#include "core/traversability/tile_neighbourhood.hpp"
+
+namespace stillmap {
+
+/// What a cell is like, whoever wants to drive there.
+struct SurfaceCell {
+  GroundCell ground;
+  /// Of known ground only.
+  SurfaceShape shape;
+
+  friend bool operator==(const SurfaceCell&, const SurfaceCell&) = default;
+};
+
+/// The ground of a tile and what stands on it; the same for all robots.
+struct SurfaceTile {
+  /// Cells along a side.
+  int side = 0;
+  /// Row after row from the lowest y.
+  std::vector<SurfaceCell> cells;
+  /// Of every cell, where its things begin in `things_m`; one more for the end.
+  std::vector<std::uint32_t> begin;
+  /// Heights of what is not ground above the ground of its cell, from the lowest up [m].
+  std::vector<float> things_m;
+
+  /// A cell with what stands in it.
+  struct View {
+    const SurfaceCell* cell = nullptr;
+    std::span<const float> things_m;
+  };
+  [[nodiscard]] View at(int x, int y) const {
+    const std::size_t i =
+        static_cast<std::size_t>(y) * static_cast<std::size_t>(side) + static_cast<std::size_t>(x);
+    return {&cells[i], std::span(things_m).subspan(begin[i], begin[i + 1] - begin[i])};
+  }
+  friend bool operator==(const SurfaceTile&, const SurfaceTile&) = default;
+};
+
+/// Things higher above the ground than this are above every robot [m].
+inline constexpr float max_thing_m = 12.0F;
+
+/// The surface of the middle tile. What is farther from it than its neighbours reach, or than
+/// `surface_reach_m`, does not count.
+[[nodiscard]] SurfaceTile make_surface(const TileNeighbourhood<ColumnTile>& columns, double cell_m);
+
+inline constexpr double surface_reach_m = 8.0;
+
+}  // namespace stillmap

@@ -1,0 +1,252 @@
+#include "core/traversability/traversability_map.hpp"
+
+#include <tbb/parallel_for.h>
+
+#include <cmath>
+#include <map>
+#include <set>
+#include <stdexcept>
+#include <utility>
+
+#include "core/map/voxel_grid.hpp"
+#include "core/traversability/changed_cells.hpp"
+#include "core/traversability/column_tile.hpp"
+
+namespace stillmap {
+namespace {
+
+/// All that is known of a tile.
+struct TileState {
+  /// Identify the map tile that the columns were made from.
+  std::uint64_t revision = 0;
+  std::uint64_t content_hash = 0;
+  std::shared_ptr<const ColumnTile> columns;
+  std::shared_ptr<const SurfaceTile> surface;
+  /// One a profile.
+  std::vector<std::shared_ptr<const TraversabilityTile>> judged;
+};
+
+using TileStates = std::map<TileId, TileState>;
+
+int checked_side(const MapView& map) {
+  const double side = std::round(map.tile_size_m / map.voxel_size_m);
+  if (!(map.voxel_size_m > 0.0) || !(side >= 1.0 && side <= VoxelGrid::max_columns) ||
+      std::abs(side * map.voxel_size_m - map.tile_size_m) > 1e-6 * map.tile_size_m) {
+    throw std::invalid_argument("a map with tiles of " + std::to_string(map.tile_size_m) +
+                                " m and voxels of " + std::to_string(map.voxel_size_m) +
+                                " m has no cells; tiles must be 1 to 256 whole voxels");
+  }
+  return static_cast<int>(side);
+}
+
+/// A tile's state and its neighbours', of one kind.
+template <typename TileT, typename Member>
+TileNeighbourhood<TileT> neighbourhood(const TileStates& states, TileId id, int side,
+                                       Member member) {
+  TileNeighbourhood<TileT> around;
+  around.side = side;
+  for (int i = 0; i < 9; ++i) {
+    const auto found = states.find({id.x + i % 3 - 1, id.y + i / 3 - 1});
+    if (found != states.end()) {
+      around.tiles.at(static_cast<std::size_t>(i)) = (found->second.*member).get();
+    }
+  }
+  return around;
+}
+
+std::vector<TileId> existing(const std::set<TileId>& ids, const TileStates& states) {
+  std::vector<TileId> found;
+  for (const TileId& id : ids) {
+    if (states.contains(id)) found.push_back(id);
+  }
+  return found;
+}
+
+int margin_cells(double reach_m, double cell_m, int side) {
+  return std::min(side, static_cast<int>(std::ceil(reach_m / cell_m)));
+}
+
+}  // namespace
+
+struct TraversabilityMap::State {
+  std::vector<RobotProfile> profiles;
+  TileStates tiles;
+  std::uint64_t version = 0;
+  std::uint64_t map_id = 0;
+  double tile_size_m = 0.0;
+  double cell_m = 0.0;
+  int side = 0;
+  std::vector<std::shared_ptr<const TraversabilityView>> views;
+
+  void take_sizes(const MapView& map);
+  [[nodiscard]] ChangedCells update_columns(const MapView& map);
+  [[nodiscard]] std::vector<const Tile*> renewed_tiles(const MapView& map) const;
+  void drop_missing(const MapView& map, ChangedCells& changes);
+  [[nodiscard]] ChangedCells update_surfaces(const ChangedCells& columns,
+                                             TraversabilityUpdate& report);
+  void judge_all(const ChangedCells& surfaces, TraversabilityUpdate& report);
+  void judge_one(TileState& state, TileId id, std::size_t profile) const;
+  void publish();
+};
+
+/// A map of another id or size shares nothing with the last one.
+void TraversabilityMap::State::take_sizes(const MapView& map) {
+  const int new_side = map.tiles.empty() ? 0 : checked_side(map);
+  const bool is_same = map.map_id == map_id && map.tile_size_m == tile_size_m &&
+                       map.voxel_size_m == cell_m && new_side == side;
+  if (!is_same) tiles.clear();
+  side = new_side;
+  version = map.version;
+  map_id = map.map_id;
+  tile_size_m = map.tile_size_m;
+  cell_m = map.voxel_size_m;
+}
+
+std::vector<const Tile*> TraversabilityMap::State::renewed_tiles(const MapView& map) const {
+  std::vector<const Tile*> renewed;
+  for (const auto& tile : map.tiles) {
+    const auto known = tiles.find(tile->info.id);
+    if (known == tiles.end() || known->second.revision != tile->info.revision ||
+        known->second.content_hash != tile->info.content_hash) {
+      renewed.push_back(tile.get());
+    }
+  }
+  return renewed;
+}
+
+void TraversabilityMap::State::drop_missing(const MapView& map, ChangedCells& changes) {
+  std::set<TileId> present;
+  for (const auto& tile : map.tiles) present.insert(tile->info.id);
+  std::erase_if(tiles, [&](const auto& entry) {
+    if (present.contains(entry.first)) return false;
+    note_change(changes, entry.first, entry.second.columns.get(), nullptr);
+    return true;
+  });
+}
+
+ChangedCells TraversabilityMap::State::update_columns(const MapView& map) {
+  ChangedCells changes;
+  drop_missing(map, changes);
+  const std::vector<const Tile*> renewed = renewed_tiles(map);
+  std::vector<std::shared_ptr<const ColumnTile>> columns(renewed.size());
+  tbb::parallel_for(std::size_t{0}, renewed.size(), [&](std::size_t i) {
+    columns[i] = std::make_shared<const ColumnTile>(make_columns(*renewed[i], side));
+  });
+  for (std::size_t i = 0; i < renewed.size(); ++i) {
+    const TileInfo& info = renewed[i]->info;
+    TileState& state = tiles[info.id];
+    note_change(changes, info.id, state.columns.get(), columns[i].get());
+    state.columns = columns[i];
+    state.revision = info.revision;
+    state.content_hash = info.content_hash;
+  }
+  return changes;
+}
+
+ChangedCells TraversabilityMap::State::update_surfaces(const ChangedCells& columns,
+                                                       TraversabilityUpdate& report) {
+  const int margin = margin_cells(surface_reach_m, cell_m, side);
+  const std::vector<TileId> ids = existing(affected_tiles(columns, side, margin), tiles);
+  std::vector<std::shared_ptr<const SurfaceTile>> surfaces(ids.size());
+  tbb::parallel_for(std::size_t{0}, ids.size(), [&](std::size_t i) {
+    const auto around = neighbourhood<ColumnTile>(tiles, ids[i], side, &TileState::columns);
+    surfaces[i] = std::make_shared<const SurfaceTile>(make_surface(around, cell_m));
+  });
+  ChangedCells changes;
+  // A tile that went away took its lethal cells along.
+  for (const auto& [id, box] : columns) {
+    if (!tiles.contains(id)) changes[id] = box;
+  }
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    TileState& state = tiles.at(ids[i]);
+    note_change(changes, ids[i], state.surface.get(), surfaces[i].get());
+    // What is the same stays the same object: those who hold it need not look again.
+    if (changes.contains(ids[i])) state.surface = surfaces[i];
+  }
+  report.surfaces = ids.size();
+  return changes;
+}
+
+void TraversabilityMap::State::judge_one(TileState& state, TileId id, std::size_t profile) const {
+  const auto around = neighbourhood<SurfaceTile>(tiles, id, side, &TileState::surface);
+  TraversabilityTile judged{.id = id,
+                            .revision = version,
+                            .side = side,
+                            .cells = judge_tile(around, profiles[profile], cell_m),
+                            .surface = state.surface};
+  const auto& before = state.judged[profile];
+  if (before && before->cells == judged.cells && before->surface == judged.surface) return;
+  state.judged[profile] = std::make_shared<const TraversabilityTile>(std::move(judged));
+}
+
+void TraversabilityMap::State::judge_all(const ChangedCells& surfaces,
+                                         TraversabilityUpdate& report) {
+  for (std::size_t profile = 0; profile < profiles.size(); ++profile) {
+    const int margin = margin_cells(clearance_limit_m(profiles[profile]), cell_m, side);
+    const std::vector<TileId> ids = existing(affected_tiles(surfaces, side, margin), tiles);
+    for (const TileId& id : ids) tiles.at(id).judged.resize(profiles.size());
+    tbb::parallel_for(std::size_t{0}, ids.size(),
+                      [&](std::size_t i) { judge_one(tiles.at(ids[i]), ids[i], profile); });
+    report.judged += ids.size();
+  }
+}
+
+void TraversabilityMap::State::publish() {
+  for (std::size_t i = 0; i < profiles.size(); ++i) {
+    auto view = std::make_shared<TraversabilityView>();
+    view->version = version;
+    view->map_id = map_id;
+    view->tile_size_m = tile_size_m;
+    view->cell_m = cell_m;
+    view->profile = profiles[i];
+    for (const auto& [id, state] : tiles) view->tiles.push_back(state.judged[i]);
+    views[i] = std::move(view);
+  }
+}
+
+TraversabilityMap::TraversabilityMap(std::vector<RobotProfile> profiles)
+    : state_(std::make_unique<State>()) {
+  std::set<std::string> names;
+  for (const RobotProfile& profile : profiles) {
+    const std::string faults = profile.faults();
+    if (!faults.empty()) {
+      throw std::invalid_argument("robot profile '" + profile.name + "': " + faults);
+    }
+    if (!names.insert(profile.name).second) {
+      throw std::invalid_argument("two robot profiles are called '" + profile.name +
+                                  "'; clients ask for them by name");
+    }
+  }
+  state_->views.resize(profiles.size());
+  state_->profiles = std::move(profiles);
+  state_->publish();
+}
+
+TraversabilityMap::~TraversabilityMap() = default;
+TraversabilityMap::TraversabilityMap(TraversabilityMap&&) noexcept = default;
+TraversabilityMap& TraversabilityMap::operator=(TraversabilityMap&&) noexcept = default;
+
+TraversabilityUpdate TraversabilityMap::update(const MapView& map) {
+  state_->take_sizes(map);
+  TraversabilityUpdate report;
+  if (!map.tiles.empty()) {
+    const ChangedCells columns = state_->update_columns(map);
+    report.map_tiles = columns.size();
+    const ChangedCells surfaces = state_->update_surfaces(columns, report);
+    state_->judge_all(surfaces, report);
+  }
+  state_->publish();
+  return report;
+}
+
+const std::vector<RobotProfile>& TraversabilityMap::profiles() const { return state_->profiles; }
+
+std::shared_ptr<const TraversabilityView> TraversabilityMap::view(
+    const std::string& profile) const {
+  for (std::size_t i = 0; i < state_->profiles.size(); ++i) {
+    if (state_->profiles[i].name == profile) return state_->views[i];
+  }
+  return nullptr;
+}
+
+}  // namespace stillmap

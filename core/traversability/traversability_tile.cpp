@@ -1,0 +1,141 @@
+#include "core/traversability/traversability_tile.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+
+#include "core/traversability/distance_transform.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr double highest_free_cost = 98.0;
+constexpr std::uint8_t inflation_cost = 99;
+constexpr std::uint8_t lethal_cost = 100;
+/// Cost at the inscribed radius; it falls to 0 at the circumscribed one.
+constexpr double near_cost = 80.0;
+/// Cost of ground as steep, or as rough, as the robot can just bear.
+constexpr double effort_cost = 0.5;
+
+/// The lowest thing that the robot cannot drive over and that is lower than it is high.
+const float* thing_in_the_way(std::span<const float> things_m, const RobotProfile& profile) {
+  const auto thing =
+      std::ranges::upper_bound(things_m, static_cast<float>(profile.obstacle_height_m()));
+  return thing != things_m.end() && *thing < profile.height_m ? &*thing : nullptr;
+}
+
+BlockReason reason_of_ground(const SurfaceCell& cell, const RobotProfile& profile) {
+  if (cell.shape.step_m > profile.max_step_m) return BlockReason::step;
+  if (cell.shape.slope > profile.max_slope_deg * std::numbers::pi / 180.0) {
+    return BlockReason::slope;
+  }
+  if (cell.shape.roughness_m > profile.max_roughness_m) return BlockReason::roughness;
+  if (!profile.class_cost.at(static_cast<std::size_t>(cell.ground.label))) {
+    return BlockReason::ground_class;
+  }
+  return BlockReason::none;
+}
+
+BlockReason reason_of(const SurfaceTile::View& surface, const RobotProfile& profile) {
+  if (const float* thing_m = thing_in_the_way(surface.things_m, profile)) {
+    // What begins in the upper half of the robot hangs from somewhere else.
+    return *thing_m < 0.5 * profile.height_m ? BlockReason::obstacle : BlockReason::low_headroom;
+  }
+  return surface.cell->ground.is_known() ? reason_of_ground(*surface.cell, profile)
+                                         : BlockReason::none;
+}
+
+std::uint8_t free_cost(const SurfaceCell& cell, const RobotProfile& profile) {
+  const double of_class =
+      profile.class_cost.at(static_cast<std::size_t>(cell.ground.label)).value_or(1.0);
+  const double steep = cell.shape.slope / (profile.max_slope_deg * std::numbers::pi / 180.0);
+  const double rough = cell.shape.roughness_m / profile.max_roughness_m;
+  // Squared: a little slope is no effort.
+  const double effort = effort_cost * std::max(steep * steep, rough * rough);
+  const bool is_inferred = cell.ground.origin == GroundOrigin::inferred;
+  const double cost = std::max(of_class, effort) + (is_inferred ? profile.inferred_cost : 0.0);
+  return static_cast<std::uint8_t>(std::lround(highest_free_cost * std::min(cost, 1.0)));
+}
+
+TraversabilityCell make_lethal(TraversabilityCell cell, BlockReason reason, std::uint8_t cost) {
+  cell.state = CellState::lethal;
+  cell.reason = reason;
+  cell.cost = cost;
+  return cell;
+}
+
+/// Adds the footprint's margin to a cell at this distance from the nearest lethal one.
+TraversabilityCell with_margin(TraversabilityCell cell, double distance_m,
+                               const RobotProfile& profile) {
+  cell.clearance_m = static_cast<float>(std::min(distance_m, clearance_limit_m(profile)));
+  if (cell.state != CellState::free) return cell;
+  const double inscribed_m = profile.inscribed_radius_m();
+  const double circumscribed_m = profile.circumscribed_radius_m();
+  if (distance_m <= inscribed_m) return make_lethal(cell, BlockReason::inflation, inflation_cost);
+  if (distance_m < circumscribed_m) {
+    const double share = (circumscribed_m - distance_m) / (circumscribed_m - inscribed_m);
+    cell.cost = std::max(cell.cost, static_cast<std::uint8_t>(std::lround(near_cost * share)));
+  }
+  return cell;
+}
+
+}  // namespace
+
+std::string_view name(CellState state) {
+  constexpr std::array<std::string_view, 3> names{"unknown", "free", "lethal"};
+  return names.at(static_cast<std::size_t>(state));
+}
+
+std::string_view name(BlockReason reason) {
+  constexpr std::array<std::string_view, block_reason_count> names{
+      "none",      "obstacle", "low head-room", "step",   "slope",
+      "roughness", "class",    "inflation",     "unknown"};
+  return names.at(static_cast<std::size_t>(reason));
+}
+
+double clearance_limit_m(const RobotProfile& profile) {
+  constexpr double least_m = 2.0;
+  return std::max(least_m, profile.circumscribed_radius_m());
+}
+
+TraversabilityCell judge(const SurfaceTile::View& surface, const RobotProfile& profile) {
+  TraversabilityCell cell;
+  cell.clearance_m = static_cast<float>(clearance_limit_m(profile));
+  if (surface.cell == nullptr) return cell;
+  cell.inferred = surface.cell->ground.origin == GroundOrigin::inferred;
+  const BlockReason reason = reason_of(surface, profile);
+  if (reason != BlockReason::none) {
+    cell.clearance_m = 0.0F;
+    return make_lethal(cell, reason, lethal_cost);
+  }
+  if (surface.cell->ground.is_known()) {
+    cell.state = CellState::free;
+    cell.cost = free_cost(*surface.cell, profile);
+  }
+  return cell;
+}
+
+std::vector<TraversabilityCell> judge_tile(const TileNeighbourhood<SurfaceTile>& surfaces,
+                                           const RobotProfile& profile, double cell_m) {
+  const int margin =
+      std::min(surfaces.side, static_cast<int>(std::ceil(clearance_limit_m(profile) / cell_m)));
+  const auto window = surfaces.window<SurfaceTile::View>(margin, {});
+  CellGrid<TraversabilityCell> judged(window.width(), window.height());
+  CellGrid<std::uint8_t> lethal(window.width(), window.height());
+  for_each_cell(window, [&](int x, int y) {
+    judged(x, y) = judge(window(x, y), profile);
+    lethal(x, y) = judged(x, y).state == CellState::lethal ? 1 : 0;
+  });
+  const CellGrid<std::int32_t> squared = squared_distances(lethal);
+  std::vector<TraversabilityCell> cells;
+  for (int y = margin; y < margin + surfaces.side; ++y) {
+    for (int x = margin; x < margin + surfaces.side; ++x) {
+      const double distance_m = cell_m * std::sqrt(static_cast<double>(squared(x, y)));
+      cells.push_back(with_margin(judged(x, y), distance_m, profile));
+    }
+  }
+  return cells;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,113 @@
+#include "core/traversability/ground_fill.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/traversability/voxel_world.hpp"
+
+namespace stillmap {
+namespace {
+
+using enum SemanticClass;
+using test::area_of;
+using test::look;
+using test::square_robot;
+using test::VoxelWorld;
+
+const SurfaceCell& surface_at(const TraversabilityView& view, double x_m, double y_m) {
+  return *look(view, x_m, y_m).surface;
+}
+
+/// A street along x from -8 to 8: road between y -4 and 2, a pavement 0.13 m higher beside it.
+VoxelWorld street() {
+  VoxelWorld world;
+  world.ground(-8, -4, 8, 2, road);
+  world.ground(-8, 2, 8, 5, sidewalk, [](double, double) { return 0.23; });
+  return world;
+}
+
+TEST(GroundFill, PlaceOfARemovedCarBecomesInferredRoad) {
+  VoxelWorld world = street();
+  world.clear(-2.2, -1.0, 2.2, 0.8);
+  const auto view = area_of(world.view(), square_robot());
+  for (const double x_m : {-2.1, 0.1, 2.1}) {
+    EXPECT_EQ(surface_at(*view, x_m, 0.1).ground.origin, GroundOrigin::inferred) << x_m;
+    EXPECT_NEAR(surface_at(*view, x_m, 0.1).ground.height_m, 0.1, 1e-5);
+    EXPECT_EQ(surface_at(*view, x_m, 0.1).ground.label, road);
+    EXPECT_EQ(look(*view, x_m, 0.1).cell.state, CellState::free);
+    EXPECT_TRUE(look(*view, x_m, 0.1).cell.inferred);
+  }
+}
+
+TEST(GroundFill, AHoleThatHidesTheKerbIsFilledAlongItAndNeverAcross) {
+  VoxelWorld world = street();
+  world.clear(-2.2, 0.4, 2.2, 3.0);  // a car and its shadow over the kerb
+  const auto view = area_of(world.view(), square_robot());
+  for (double y_m = 0.5; y_m < 3.0; y_m += 0.2) {
+    const GroundCell& ground = surface_at(*view, 0.1, y_m).ground;
+    if (ground.origin != GroundOrigin::inferred) continue;
+    const double true_m = y_m < 2.0 ? 0.1 : 0.23;
+    EXPECT_NEAR(ground.height_m, true_m, 0.02) << "y " << y_m;
+    EXPECT_EQ(ground.label, y_m < 2.0 ? road : sidewalk) << "y " << y_m;
+  }
+}
+
+TEST(GroundFill, NotAcrossAStepEvenWithinOneClass) {
+  VoxelWorld world;
+  world.ground(-6, -6, 0, 6, road);
+  world.ground(1, -6, 6, 6, road, [](double, double) { return 0.3; });
+  const auto view = area_of(world.view(), square_robot());
+  EXPECT_EQ(surface_at(*view, 0.5, 0.1).ground.origin, GroundOrigin::none);
+  EXPECT_EQ(look(*view, 0.5, 0.1).cell.state, CellState::unknown);
+}
+
+TEST(GroundFill, AlongASlopeTheGapRisesWithIt) {
+  VoxelWorld world;
+  const auto slope = [](double x_m, double) { return 0.12 * x_m; };
+  world.ground(-6, -6, 6, 6, road, slope);
+  world.clear(-1, -1, 1, 1);
+  const auto view = area_of(world.view(), square_robot());
+  for (const double x_m : {-0.9, 0.1, 0.9}) {
+    EXPECT_EQ(surface_at(*view, x_m, 0.1).ground.origin, GroundOrigin::inferred);
+    EXPECT_NEAR(surface_at(*view, x_m, 0.1).ground.height_m, slope(x_m, 0.1), 0.01);
+  }
+}
+
+TEST(GroundFill, NotOverMoreThanTheLongestGap) {
+  VoxelWorld world;
+  world.ground(-10, -10, 10, 10, road);
+  world.clear(-5, -5, 5, 5);
+  const auto view = area_of(world.view(), square_robot());
+  EXPECT_EQ(look(*view, 0.1, 0.1).cell.state, CellState::unknown);
+  // On lines across a corner the gap is short enough.
+  EXPECT_EQ(look(*view, 4.9, 4.9).cell.state, CellState::free);
+}
+
+TEST(GroundFill, NotThroughWhatStandsInTheGap) {
+  VoxelWorld world;
+  world.ground(-6, -6, 6, 6, road);
+  world.clear(-1, -6, 1, 6);
+  world.block(-0.2, -6, 0.2, 6, 0.2, 2.5, building);  // a wall on ground that nobody saw
+  const auto view = area_of(world.view(), square_robot());
+  EXPECT_NE(surface_at(*view, 0.7, 0.1).ground.origin, GroundOrigin::inferred);
+  EXPECT_EQ(look(*view, 0.1, 0.1).cell.reason, BlockReason::obstacle);
+  EXPECT_EQ(look(*view, 0.7, 0.1).cell.state, CellState::unknown);
+}
+
+TEST(GroundFill, BridgesTheGapsBetweenRings) {
+  VoxelWorld world;
+  for (double x_m = -6; x_m < 6; x_m += 1.0) world.ground(x_m, -6, x_m + 0.2, 6, road);
+  const auto view = area_of(world.view(), square_robot());
+  for (double x_m = -3.9; x_m < 4; x_m += 0.2) {
+    EXPECT_EQ(look(*view, x_m, 0.1).cell.state, CellState::free) << x_m;
+  }
+}
+
+TEST(GroundFill, NothingIsInferredBeyondTheEdgeOfWhatWasSeen) {
+  VoxelWorld world;
+  world.ground(-4, -4, 2.1, 4, road);
+  const auto view = area_of(world.view(), square_robot());
+  EXPECT_EQ(look(*view, 2.5, 0.1).cell.state, CellState::unknown);
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,71 @@
+#include "core/traversability/nearest_traversable.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/traversability/voxel_world.hpp"
+
+namespace stillmap {
+namespace {
+
+using enum SemanticClass;
+using test::area_of;
+using test::square_robot;
+using test::VoxelWorld;
+using ::testing::HasSubstr;
+
+VoxelWorld road_with_a_house() {
+  VoxelWorld world;
+  world.ground(-10, -10, 10, 10, road);
+  world.block(-3, -3, 3, 3, 0.3, 4.0, building);
+  return world;
+}
+
+double by_brute_force(const TraversabilityView& view, const Eigen::Vector2d& p_map) {
+  double best_m = std::numeric_limits<double>::infinity();
+  CellLookup lookup(view);
+  for (int y = -60; y < 60; ++y) {
+    for (int x = -60; x < 60; ++x) {
+      if (lookup.at({x, y}).cell.state != CellState::free) continue;
+      best_m = std::min(best_m, (view.centre_of({x, y}) - p_map).norm());
+    }
+  }
+  return best_m;
+}
+
+TEST(NearestTraversable, EqualsBruteForce) {
+  const auto view = area_of(road_with_a_house().view(), square_robot());
+  for (const Eigen::Vector2d& p_map : {Eigen::Vector2d(0, 0), Eigen::Vector2d(2.5, -1),
+                                       Eigen::Vector2d(-11.5, 4), Eigen::Vector2d(7.03, 7.03)}) {
+    const NearestTraversable nearest = nearest_traversable(*view, p_map);
+    ASSERT_EQ(nearest.status, AreaStatus::ok);
+    EXPECT_DOUBLE_EQ(nearest.distance_m, by_brute_force(*view, p_map));
+    EXPECT_NEAR((nearest.position_map - p_map).norm(), nearest.distance_m, 1e-12);
+    EXPECT_EQ(nearest.cell.state, CellState::free);
+    EXPECT_NEAR(nearest.height_m, 0.1, 1e-6);
+  }
+}
+
+TEST(NearestTraversable, RespectsTheLongestWay) {
+  const auto view = area_of(road_with_a_house().view(), square_robot());
+  const NearestTraversable nearest = nearest_traversable(*view, {0, 0}, 2.0);
+  EXPECT_EQ(nearest.status, AreaStatus::not_found);
+  EXPECT_THAT(nearest.reason, HasSubstr("within 2 m"));
+}
+
+TEST(NearestTraversable, HostilePlacesGetAStatusAndAReason) {
+  const auto view = area_of(road_with_a_house().view(), square_robot());
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  using enum AreaStatus;
+  EXPECT_EQ(nearest_traversable(*view, {nan, 0}).status, invalid_request);
+  EXPECT_EQ(nearest_traversable(*view, {0, 1e12}).status, invalid_request);
+  EXPECT_EQ(nearest_traversable(*view, {0, 0}, nan).status, invalid_request);
+  EXPECT_EQ(nearest_traversable(*view, {0, 0}, -1.0).status, invalid_request);
+  EXPECT_EQ(nearest_traversable(*view, {9e4, 0}).status, not_found);
+  EXPECT_EQ(nearest_traversable(*area_of(MapView{}, square_robot()), {0, 0}).status, not_found);
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,102 @@
+#include "core/traversability/surface_shape.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <random>
+
+namespace stillmap {
+namespace {
+
+constexpr double cell_m = 0.2;
+constexpr int middle = 10;
+
+GroundGrid ground_of(const std::function<double(double, double)>& height_m,
+                     SemanticClass label = SemanticClass::road) {
+  GroundGrid ground(2 * middle + 1, 2 * middle + 1);
+  for_each_cell(ground, [&](int x, int y) {
+    GroundCell& cell = ground(x, y);
+    cell.height_m = static_cast<float>(height_m((x - middle) * cell_m, (y - middle) * cell_m));
+    cell.origin = GroundOrigin::seen;
+    cell.label = label;
+  });
+  return ground;
+}
+
+SurfaceShape shape_in_the_middle(const GroundGrid& ground) {
+  return shape_at(ground, middle, middle, cell_m);
+}
+
+TEST(SurfaceShape, APlaneHasItsSlopeAndNoStep) {
+  const double degree = std::numbers::pi / 180.0;
+  for (const double slope_deg : {0.0, 5.0, 20.0, 40.0}) {
+    const double rise = std::tan(slope_deg * degree);
+    const SurfaceShape shape = shape_in_the_middle(
+        ground_of([&](double x, double y) { return rise * (0.6 * x + 0.8 * y); }));
+    EXPECT_NEAR(shape.slope, slope_deg * degree, 1e-4) << slope_deg;
+    EXPECT_NEAR(shape.step_m, 0.0, 1e-5) << slope_deg;
+    EXPECT_NEAR(shape.roughness_m, 0.0, 1e-4) << slope_deg;
+  }
+}
+
+TEST(SurfaceShape, AnEdgeIsAStepOnBothItsSides) {
+  const GroundGrid ground = ground_of([](double x, double) { return x < 0.1 ? 0.0 : 0.13; });
+  EXPECT_NEAR(shape_at(ground, middle, middle, cell_m).step_m, 0.13, 1e-5);
+  EXPECT_NEAR(shape_at(ground, middle + 1, middle, cell_m).step_m, 0.13, 1e-5);
+  EXPECT_NEAR(shape_at(ground, middle + 3, middle, cell_m).step_m, 0.0, 1e-5);
+}
+
+TEST(SurfaceShape, AnEdgeBlurredOverOneCellIsStillItsWholeStep) {
+  const GroundGrid ground =
+      ground_of([](double x, double) { return std::clamp((x + 0.2) / 0.4, 0.0, 1.0) * 0.13; });
+  EXPECT_NEAR(shape_in_the_middle(ground).step_m, 0.13, 1e-5);
+}
+
+TEST(SurfaceShape, AnEdgeOnASlopeIsTheStepAlone) {
+  const GroundGrid ground =
+      ground_of([](double x, double) { return 0.2 * x + (x < 0.1 ? 0.0 : 0.13); });
+  EXPECT_NEAR(shape_in_the_middle(ground).step_m, 0.13, 1e-4);
+}
+
+TEST(SurfaceShape, TheFootOfARampIsNoStep) {
+  const GroundGrid ground = ground_of([](double x, double) { return x > 0.0 ? 0.25 * x : 0.0; });
+  EXPECT_LT(shape_in_the_middle(ground).step_m, 0.01);
+}
+
+TEST(SurfaceShape, AKerbOfAnotherClassDoesNotTiltThePlane) {
+  GroundGrid ground = ground_of([](double x, double) { return x < 0.1 ? 0.0 : 0.13; });
+  for_each_cell(ground, [&](int x, int y) {
+    if (x > middle) ground(x, y).label = SemanticClass::sidewalk;
+  });
+  EXPECT_NEAR(shape_in_the_middle(ground).slope, 0.0, 1e-6);
+}
+
+TEST(SurfaceShape, RoughnessIsTheDeviationOfTheNoise) {
+  std::mt19937 random(2);
+  std::normal_distribution<double> noise_m(0.0, 0.03);
+  const GroundGrid ground = ground_of([&](double, double) { return noise_m(random); });
+  double sum = 0.0;
+  for (int x = 5; x < 15; ++x) {
+    for (int y = 5; y < 15; ++y) sum += shape_at(ground, x, y, cell_m).roughness_m;
+  }
+  EXPECT_NEAR(sum / 100.0, 0.03, 0.005);
+}
+
+TEST(SurfaceShape, ACellAloneIsFlat) {
+  GroundGrid ground(5, 5);
+  ground(2, 2).origin = GroundOrigin::seen;
+  EXPECT_EQ(shape_at(ground, 2, 2, cell_m), SurfaceShape{});
+}
+
+TEST(SurfaceShape, ANeighbourWithoutGroundLeavesTheOtherSide) {
+  GroundGrid ground = ground_of([](double x, double) { return x < 0.1 ? 0.0 : 0.2; });
+  for_each_cell(ground, [&](int x, int y) {
+    if (x == middle - 1) ground(x, y) = {};
+  });
+  EXPECT_NEAR(shape_in_the_middle(ground).step_m, 0.2, 1e-5);
+}
+
+}  // namespace
+}  // namespace stillmap
