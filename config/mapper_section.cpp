@@ -97,6 +97,12 @@ void read_static_map(YamlSection section, StaticMapConfig& static_map) {
   section.number("tile_size_m", static_map.tile_size_m, {0.1, 1000});
   section.number("max_range_m", static_map.max_range_m, {1, 10000});
   section.whole("min_points", static_map.min_points, {1, 1000000});
+  section.whole("look_every", static_map.look_every, {1, 1000});
+  section.whole("passes", static_map.passes, {1, 1000});
+  section.whole("passes_per_hit", static_map.passes_per_hit, {1, 1000});
+  section.number("clear_range_m", static_map.clear_range_m, {0, 1000});
+  section.number("clear_margin_m", static_map.clear_margin_m, {0.01, 100});
+  section.number("clear_margin_share", static_map.clear_margin_share, {0, 1});
   section.faults(static_map.faults());
 }
 

@@ -113,16 +113,23 @@ void Mapper::insert(const MappedScan& mapped, const std::optional<PointLabels>& 
     for (std::size_t i = 0; i < known.motion.size(); ++i) {
       if (known.label(i) == SemanticClass::unlabeled) known.motion[i] = Motion::highly_dynamic;
     }
-    static_map_.insert(known, T_map_lidar);
+    insert(known, T_map_lidar);
     return;
   }
   // Where labels are on their way, a scan without any is not worth the movers in it.
   if (mapped.labelling == Labelling::none && pending_) return;
-  static_map_.insert(labelled, T_map_lidar);
+  insert(labelled, T_map_lidar);
   if (mapped.labelling == Labelling::fresh && label_feed_->may_skip_scans()) {
     last_labelled_ = PlacedScan{labelled, T_map_lidar};
     last_view_.reset();
   }
+}
+
+void Mapper::insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar) {
+  static_map_.insert(labelled, T_map_lidar);
+  if (!static_map_.wants_look()) return;
+  const RangeView view(labelled.scan, {}, config_.sensor, T_map_lidar);
+  static_map_.look_through(view, labelled.scan.stamp_ns);
 }
 
 void Mapper::insert_late(PointLabels labels) {
@@ -135,7 +142,7 @@ void Mapper::insert_late(PointLabels labels) {
     if (labelled.motion[i] == Motion::highly_dynamic && movable) continue;
     labelled.motion[i] = movable ? Motion::semi_static : Motion::stationary;
   }
-  static_map_.insert(labelled, late.T_map_lidar);
+  insert(labelled, late.T_map_lidar);
   if (labelled.labels.empty()) return;
   last_labelled_ = std::move(late);
   last_view_.reset();

@@ -97,6 +97,8 @@ class Mapper {
                                                          std::int64_t stamp_ns);
   void insert_late(PointLabels labels);
   void insert(const MappedScan& mapped, const std::optional<PointLabels>& evidence);
+  /// Into the static map: what the scan hit, and what it looked through.
+  void insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar);
   void end_stage(std::string_view stage) const;
 
   struct PlacedScan {

@@ -13,6 +13,8 @@ namespace {
 constexpr double offset_steps = 1024.0;
 /// The mean stands still after so many points: their sum would outgrow 32 bits.
 constexpr std::uint32_t max_mean_points = 1U << 22;
+/// Scans that looked through a voxel are counted so far.
+constexpr std::uint16_t most_passes = 1000;
 constexpr int layer_bias = 1 << 15;
 
 }  // namespace
@@ -33,6 +35,8 @@ LiveTile::LiveTile(std::shared_ptr<const Tile> published, const VoxelGrid& grid)
   for (const Voxel& known : published_->voxels) {
     LiveVoxel live{voxel_key(known.index), known.point_count,   {},
                    known.evidence,         known.first_seen_ns, known.last_seen_ns};
+    live.hits = 1;
+    live.was_shown = true;
     const Eigen::Vector3d offset =
         (known.mean_map.cast<double>() - grid.corner_map(id_, known.index)) / grid.voxel_size_m();
     const double points = std::min(known.point_count, max_mean_points);
@@ -48,13 +52,16 @@ LiveTile::LiveTile(std::shared_ptr<const Tile> published, const VoxelGrid& grid)
 }
 
 LiveTile::LiveVoxel* LiveTile::find(const TilePoint& point) {
-  if (point.only_evidence) {
+  if (point.motion != Motion::stationary) {
     const auto known = position_.find(point.voxel_key);
     return known == position_.end() ? nullptr : &voxels_[known->second];
   }
   const auto [slot, is_new] =
       position_.try_emplace(point.voxel_key, static_cast<std::uint32_t>(voxels_.size()));
-  if (is_new) voxels_.emplace_back().key = point.voxel_key;
+  if (is_new) {
+    voxels_.emplace_back().key = point.voxel_key;
+    excluded_.erase(point.voxel_key);
+  }
   return &voxels_[slot->second];
 }
 
@@ -68,16 +75,70 @@ void LiveTile::insert(std::span<const TilePoint> points, std::int64_t stamp_ns) 
   for (const TilePoint& point : points) {
     // Neighbours on a beam mostly share a voxel: no look-up for them.
     if (voxel == nullptr || voxel->key != point.voxel_key) voxel = find(point);
-    if (voxel == nullptr) continue;
-    voxel->evidence.add(point.label, point.confidence);
-    voxel->last_seen_ns = stamp_ns;
-    if (point.only_evidence) continue;
-    if (voxel->point_count == 0) voxel->first_seen_ns = stamp_ns;
-    if (voxel->point_count < max_mean_points) {
-      for (std::size_t axis = 0; axis < 3; ++axis) voxel->offset_sum[axis] += point.offset[axis];
+    if (voxel == nullptr) {
+      exclude(point, stamp_ns);
+    } else {
+      hit(*voxel, point, stamp_ns);
     }
-    if (voxel->point_count < std::numeric_limits<std::uint32_t>::max()) ++voxel->point_count;
   }
+}
+
+void LiveTile::hit(LiveVoxel& voxel, const TilePoint& point, std::int64_t stamp_ns) {
+  // What moves past a place says nothing of what stands there.
+  if (point.motion == Motion::highly_dynamic) return;
+  if (voxel.point_count == 0) voxel.first_seen_ns = stamp_ns;
+  const bool is_new_scan = voxel.point_count == 0 || voxel.last_seen_ns != stamp_ns;
+  voxel.evidence.add(point.label, point.confidence);
+  voxel.last_seen_ns = stamp_ns;
+  if (point.motion == Motion::semi_static) return;
+  if (is_new_scan && voxel.hits < std::numeric_limits<std::uint16_t>::max()) ++voxel.hits;
+  if (voxel.point_count < max_mean_points) {
+    for (std::size_t axis = 0; axis < 3; ++axis) voxel.offset_sum[axis] += point.offset[axis];
+  }
+  if (voxel.point_count < std::numeric_limits<std::uint32_t>::max()) ++voxel.point_count;
+}
+
+void LiveTile::exclude(const TilePoint& point, std::int64_t stamp_ns) {
+  Excluded& excluded = excluded_[point.voxel_key];
+  excluded.label = point.label;
+  excluded.was_moving |= point.motion == Motion::highly_dynamic;
+  excluded.last_seen_ns = stamp_ns;
+}
+
+bool LiveTile::look_through(const std::function<bool(const Eigen::Vector3f&)>& is_free,
+                            std::int64_t stamp_ns, const VisibilityRule& rule,
+                            const VoxelGrid& grid) {
+  bool hides_one = false;
+  for (LiveVoxel& voxel : voxels_) {
+    if (voxel.last_seen_ns == stamp_ns || voxel.is_restored) continue;
+    if (!is_free(mean_map(voxel, grid))) continue;
+    if (voxel.passes >= most_passes) {
+      // So that a thing that is put where long nothing was can still come into view.
+      voxel.passes /= 2;
+      voxel.hits /= 2;
+    }
+    const bool was_hidden = is_seen_through(voxel, rule);
+    ++voxel.passes;
+    hides_one |= !was_hidden && is_seen_through(voxel, rule);
+  }
+  return hides_one;
+}
+
+bool LiveTile::is_seen_through(const LiveVoxel& voxel, const VisibilityRule& rule) {
+  return !voxel.is_restored && voxel.passes >= rule.passes &&
+         voxel.passes > rule.passes_per_hit * voxel.hits;
+}
+
+bool LiveTile::is_shown(const LiveVoxel& voxel, const VisibilityRule& rule) {
+  if (voxel.is_restored) return true;
+  return voxel.point_count >= rule.min_points && !is_movable(voxel.evidence.winner()) &&
+         !is_seen_through(voxel, rule);
+}
+
+std::optional<RemovalReason> LiveTile::removal(const LiveVoxel& voxel, const VisibilityRule& rule) {
+  if (is_shown(voxel, rule) || voxel.point_count < rule.min_points) return std::nullopt;
+  if (!is_movable(voxel.evidence.winner())) return RemovalReason::seen_through;
+  return voxel.was_shown ? RemovalReason::relabelled : RemovalReason::semi_static;
 }
 
 void LiveTile::sort_new_voxels() {
@@ -92,41 +153,103 @@ void LiveTile::sort_new_voxels() {
   std::inplace_merge(sorted_.begin(), middle, sorted_.end(), by_key);
 }
 
+Eigen::Vector3f LiveTile::mean_map(const LiveVoxel& live, const VoxelGrid& grid) const {
+  const Eigen::Vector3d sum(live.offset_sum[0], live.offset_sum[1], live.offset_sum[2]);
+  const Eigen::Vector3d steps =
+      (sum / std::min(live.point_count, max_mean_points)).array() + 0.5;  // a step's middle
+  return (grid.corner_map(id_, voxel_index(live.key)) +
+          steps * (grid.voxel_size_m() / offset_steps))
+      .cast<float>();
+}
+
 Voxel LiveTile::voxel(const LiveVoxel& live, const VoxelGrid& grid) const {
   Voxel voxel;
   voxel.index = voxel_index(live.key);
   voxel.point_count = live.point_count;
-  const Eigen::Vector3d sum(live.offset_sum[0], live.offset_sum[1], live.offset_sum[2]);
-  const Eigen::Vector3d steps =
-      (sum / std::min(live.point_count, max_mean_points)).array() + 0.5;  // a step's middle
-  voxel.mean_map =
-      (grid.corner_map(id_, voxel.index) + steps * (grid.voxel_size_m() / offset_steps))
-          .cast<float>();
+  voxel.mean_map = mean_map(live, grid);
   voxel.evidence = live.evidence;
   voxel.first_seen_ns = live.first_seen_ns;
   voxel.last_seen_ns = live.last_seen_ns;
   return voxel;
 }
 
-std::vector<Voxel> LiveTile::visible_voxels(std::uint32_t min_points, const VoxelGrid& grid) const {
+std::vector<Voxel> LiveTile::visible_voxels(const VisibilityRule& rule, const VoxelGrid& grid) {
   std::vector<Voxel> visible;
   visible.reserve(sorted_.size());
   for (const std::uint32_t position : sorted_) {
-    const LiveVoxel& live = voxels_[position];
-    if (live.point_count < min_points || is_movable(live.evidence.winner())) continue;
+    LiveVoxel& live = voxels_[position];
+    if (!is_shown(live, rule)) continue;
+    live.was_shown = true;
     visible.push_back(voxel(live, grid));
   }
   return visible;
 }
 
-bool LiveTile::publish(std::uint64_t revision, std::uint32_t min_points, const VoxelGrid& grid) {
+bool LiveTile::publish(std::uint64_t revision, const VisibilityRule& rule, const VoxelGrid& grid) {
   sort_new_voxels();
-  Tile next = make_tile(id_, revision, visible_voxels(min_points, grid), grid);
+  Tile next = make_tile(id_, revision, visible_voxels(rule, grid), grid);
   if (next.voxels.empty()) return std::exchange(published_, nullptr) != nullptr;
   if (published_ && published_->info.content_hash == next.info.content_hash) return false;
   next.voxels.shrink_to_fit();
   published_ = std::make_shared<const Tile>(std::move(next));
   return true;
+}
+
+std::vector<RemovedVoxel> LiveTile::removed(const VisibilityRule& rule,
+                                            const VoxelGrid& grid) const {
+  std::vector<RemovedVoxel> removed;
+  for (const LiveVoxel& voxel : voxels_) {
+    const auto reason = removal(voxel, rule);
+    if (!reason) continue;
+    removed.push_back(
+        {mean_map(voxel, grid), voxel.evidence.winner(), *reason, voxel.last_seen_ns});
+  }
+  for (const auto& [key, excluded] : excluded_) {
+    removed.push_back(
+        {centre_map(key, grid), excluded.label, reason_of(excluded), excluded.last_seen_ns});
+  }
+  return removed;
+}
+
+std::size_t LiveTile::restore(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
+                              const VisibilityRule& rule, const VoxelGrid& grid) {
+  std::size_t restored = restore_excluded(reason, box_map, rule, grid);
+  for (LiveVoxel& voxel : voxels_) {
+    if (removal(voxel, rule) != reason) continue;
+    if (!box_map.contains(mean_map(voxel, grid).cast<double>())) continue;
+    voxel.is_restored = true;
+    ++restored;
+  }
+  return restored;
+}
+
+std::size_t LiveTile::restore_excluded(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
+                                       const VisibilityRule& rule, const VoxelGrid& grid) {
+  std::vector<std::uint32_t> restored;
+  for (const auto& [key, excluded] : excluded_) {
+    if (reason_of(excluded) != reason) continue;
+    if (!box_map.contains(centre_map(key, grid).cast<double>())) continue;
+    LiveVoxel& voxel = voxels_.emplace_back();
+    voxel.key = key;
+    voxel.point_count = rule.min_points;
+    voxel.offset_sum.fill(rule.min_points * static_cast<std::uint32_t>(offset_steps / 2));
+    voxel.evidence.add(excluded.label, 1.0F);
+    voxel.first_seen_ns = voxel.last_seen_ns = excluded.last_seen_ns;
+    voxel.is_restored = true;
+    position_.emplace(key, static_cast<std::uint32_t>(voxels_.size() - 1));
+    restored.push_back(key);
+  }
+  for (const std::uint32_t key : restored) excluded_.erase(key);
+  return restored.size();
+}
+
+Eigen::Vector3f LiveTile::centre_map(std::uint32_t key, const VoxelGrid& grid) const {
+  const Eigen::Vector3d corner = grid.corner_map(id_, voxel_index(key));
+  return (corner.array() + 0.5 * grid.voxel_size_m()).matrix().cast<float>();
+}
+
+RemovalReason LiveTile::reason_of(const Excluded& excluded) {
+  return excluded.was_moving ? RemovalReason::moving : RemovalReason::semi_static;
 }
 
 }  // namespace stillmap

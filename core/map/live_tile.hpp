@@ -4,10 +4,14 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
+#include "core/lidar/motion.hpp"
+#include "core/map/removed_voxel.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/voxel_grid.hpp"
 
@@ -23,9 +27,18 @@ struct TilePoint {
   /// From the voxel's lowest corner, in 1/1024 voxel.
   std::array<std::uint16_t, 3> offset{};
   SemanticClass label = SemanticClass::unlabeled;
-  /// Semi-static: says what a known voxel is, and makes none.
-  bool only_evidence = false;
+  /// Semi-static: says what a known voxel is, and makes none. Highly dynamic: only remembered.
+  Motion motion = Motion::stationary;
   float confidence = 0.0F;
+};
+
+/// When a voxel is shown.
+struct VisibilityRule {
+  /// Points that it was hit by.
+  std::uint32_t min_points = 2;
+  /// It is not, once so many scans looked through it, and so many for each that hit it.
+  std::uint32_t passes = 4;
+  std::uint32_t passes_per_hit = 2;
 };
 
 /// The mutable side of a tile: everything seen so far, also what is not yet in any view.
@@ -37,13 +50,27 @@ class LiveTile {
 
   void insert(std::span<const TilePoint> points, std::int64_t stamp_ns);
 
+  /// Counts the scan against each voxel whose place it looked through, to something behind.
+  /// `is_free` tells that of a place (map frame). True when a voxel will be hidden for it.
+  [[nodiscard]] bool look_through(const std::function<bool(const Eigen::Vector3f&)>& is_free,
+                                  std::int64_t stamp_ns, const VisibilityRule& rule,
+                                  const VoxelGrid& grid);
+
   /// Of the voxel; without votes when there is none.
   [[nodiscard]] ClassEvidence evidence(std::uint32_t voxel_key) const;
 
-  /// Publishes the voxels hit `min_points` times that are not of a movable class. False, and the
+  /// Publishes the voxels that the rule shows and whose class is not a movable one. False, and the
   /// published tile stays, when the content is the same as before.
-  [[nodiscard]] bool publish(std::uint64_t revision, std::uint32_t min_points,
+  [[nodiscard]] bool publish(std::uint64_t revision, const VisibilityRule& rule,
                              const VoxelGrid& grid);
+
+  /// What was hit and is not shown, by key.
+  [[nodiscard]] std::vector<RemovedVoxel> removed(const VisibilityRule& rule,
+                                                  const VoxelGrid& grid) const;
+  /// Shows the voxels that are hidden for this reason, whatever is seen of them later. Returns how
+  /// many.
+  std::size_t restore(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
+                      const VisibilityRule& rule, const VoxelGrid& grid);
 
   [[nodiscard]] TileId id() const { return id_; }
   /// What views share; null while there is nothing to show.
@@ -58,6 +85,17 @@ class LiveTile {
     ClassEvidence evidence;
     std::int64_t first_seen_ns = 0;
     std::int64_t last_seen_ns = 0;
+    /// Scans that hit it, and scans that looked through it.
+    std::uint16_t hits = 0;
+    std::uint16_t passes = 0;
+    bool was_shown = false;
+    bool is_restored = false;
+  };
+  /// A place that only movable things hit.
+  struct Excluded {
+    SemanticClass label = SemanticClass::unlabeled;
+    bool was_moving = false;
+    std::int64_t last_seen_ns = 0;
   };
   struct KeyHash {
     /// Fibonacci hashing: neighbours in space spread over the table.
@@ -67,14 +105,27 @@ class LiveTile {
   };
 
   [[nodiscard]] LiveVoxel* find(const TilePoint& point);
+  static void hit(LiveVoxel& voxel, const TilePoint& point, std::int64_t stamp_ns);
+  void exclude(const TilePoint& point, std::int64_t stamp_ns);
+  std::size_t restore_excluded(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
+                               const VisibilityRule& rule, const VoxelGrid& grid);
+  [[nodiscard]] static bool is_seen_through(const LiveVoxel& voxel, const VisibilityRule& rule);
+  [[nodiscard]] static bool is_shown(const LiveVoxel& voxel, const VisibilityRule& rule);
+  /// Nothing for voxels that are shown, or were hit too rarely to be.
+  [[nodiscard]] static std::optional<RemovalReason> removal(const LiveVoxel& voxel,
+                                                            const VisibilityRule& rule);
+  [[nodiscard]] Eigen::Vector3f mean_map(const LiveVoxel& live, const VoxelGrid& grid) const;
+  [[nodiscard]] Eigen::Vector3f centre_map(std::uint32_t key, const VoxelGrid& grid) const;
+  [[nodiscard]] static RemovalReason reason_of(const Excluded& excluded);
   void sort_new_voxels();
   [[nodiscard]] Voxel voxel(const LiveVoxel& live, const VoxelGrid& grid) const;
-  [[nodiscard]] std::vector<Voxel> visible_voxels(std::uint32_t min_points,
-                                                  const VoxelGrid& grid) const;
+  [[nodiscard]] std::vector<Voxel> visible_voxels(const VisibilityRule& rule,
+                                                  const VoxelGrid& grid);
 
   TileId id_;
   std::vector<LiveVoxel> voxels_;
   tsl::robin_map<std::uint32_t, std::uint32_t, KeyHash> position_;
+  tsl::robin_map<std::uint32_t, Excluded, KeyHash> excluded_;
   /// Positions of voxels in order of their keys; those added since the last publication are not
   /// in it yet.
   std::vector<std::uint32_t> sorted_;

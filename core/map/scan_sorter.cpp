@@ -55,7 +55,6 @@ void ScanSorter::place_points(const LabelledScan& scan, const Eigen::Isometry3d&
 void ScanSorter::place_point(std::size_t i, const LabelledScan& scan,
                              const Eigen::Isometry3d& T_map_lidar, const Window& window) {
   window_places_[i] = no_tile;
-  if (scan.motion[i] == Motion::highly_dynamic) return;
   const Eigen::Vector3d p_lidar = scan.scan.points_lidar[i].cast<double>();
   if (!(p_lidar.squaredNorm() <= max_range_m_ * max_range_m_)) return;
   const Eigen::Vector3d p_map = T_map_lidar * p_lidar;
@@ -70,7 +69,7 @@ void ScanSorter::place_point(std::size_t i, const LabelledScan& scan,
   placed_[i] = {voxel_key(voxel),
                 {offset_step(offset.x()), offset_step(offset.y()), offset_step(offset.z())},
                 scan.label(i),
-                scan.motion[i] == Motion::semi_static,
+                scan.motion[i],
                 confidence(scan.labels, i)};
 }
 

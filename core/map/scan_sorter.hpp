@@ -22,8 +22,8 @@ class ScanSorter {
     std::span<const TilePoint> points;
   };
 
-  /// Tiles hit by points that are mapped: finite, within range, not highly dynamic. The batches
-  /// are valid until the next call.
+  /// Tiles hit by points that are mapped: finite, and within range. The batches are valid until the
+  /// next call.
   [[nodiscard]] std::span<const Batch> sort(const LabelledScan& scan,
                                             const Eigen::Isometry3d& T_map_lidar);
 

@@ -60,6 +60,23 @@ std::string StaticMapConfig::faults() const {
     faults << "max_range_m = " << max_range_m << "; must be above 0 and at most " << max_range_tiles
            << " tiles (" << max_range_tiles * tile_size_m << ")\n";
   }
+  if (!(clear_range_m >= 0.0 && clear_range_m <= 1000.0)) {
+    faults << "clear_range_m = " << clear_range_m << "; must be 0 (off) to 1000\n";
+  }
+  if (!(clear_margin_m >= voxel_size_m && clear_margin_m <= 100.0)) {
+    faults << "clear_margin_m = " << clear_margin_m << "; must be at least voxel_size_m ("
+           << voxel_size_m << ") and at most 100\n";
+  }
+  if (!(clear_margin_share >= 0.0 && clear_margin_share <= 1.0)) {
+    faults << "clear_margin_share = " << clear_margin_share << "; must be 0 to 1\n";
+  }
+  if (look_every == 0 || look_every > 1000) {
+    faults << "look_every = " << look_every << "; must be 1 to 1000\n";
+  }
+  if (passes == 0 || passes > 1000) faults << "passes = " << passes << "; must be 1 to 1000\n";
+  if (passes_per_hit == 0 || passes_per_hit > 1000) {
+    faults << "passes_per_hit = " << passes_per_hit << "; must be 1 to 1000\n";
+  }
   if (min_points == 0) faults << "min_points = 0; must be at least 1\n";
   return faults.str();
 }
@@ -73,6 +90,7 @@ struct StaticMap::State {
   void clear(std::uint64_t map_id) {
     tiles.clear();
     touched.clear();
+    inserted = 0;
     MapView empty;
     empty.map_id = map_id;
     empty.tile_size_m = config.tile_size_m;
@@ -84,6 +102,25 @@ struct StaticMap::State {
     std::unique_ptr<LiveTile>& known = tiles[id];
     if (!known) known = std::make_unique<LiveTile>(id);
     return *known;
+  }
+
+  [[nodiscard]] VisibilityRule rule() const {
+    return {config.min_points, config.passes, config.passes_per_hit};
+  }
+
+  /// Tiles whose footprint comes this near.
+  [[nodiscard]] std::vector<LiveTile*> tiles_near(const Eigen::Vector3f& position_map,
+                                                  double range_m) const {
+    std::vector<LiveTile*> near;
+    for (const auto& [id, live] : tiles) {
+      const Eigen::Vector2d low = Eigen::Vector2d(id.x, id.y) * grid.tile_size_m();
+      const Eigen::AlignedBox2d footprint(low, low.array() + grid.tile_size_m());
+      const Eigen::Vector2d position = position_map.head<2>().cast<double>();
+      if (footprint.squaredExteriorDistance(position) <= range_m * range_m) {
+        near.push_back(live.get());
+      }
+    }
+    return near;
   }
 
   [[nodiscard]] std::vector<std::shared_ptr<const Tile>> published_tiles() const {
@@ -102,6 +139,8 @@ struct StaticMap::State {
   tsl::robin_map<TileId, std::unique_ptr<LiveTile>, TileIdHash> tiles;
   /// Tiles with points since the last view; each once, as publishing forgets them all.
   std::vector<LiveTile*> touched;
+  /// Scans so far.
+  std::uint64_t inserted = 0;
   /// The last view.
   std::shared_ptr<const MapView> current;
 };
@@ -123,6 +162,48 @@ void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_
   tbb::parallel_for(std::size_t{0}, hit.size(),
                     [&](std::size_t i) { hit[i]->insert(batches[i].points, scan.scan.stamp_ns); });
   state_->touched.insert(state_->touched.end(), hit.begin(), hit.end());
+  ++state_->inserted;
+}
+
+bool StaticMap::wants_look() const {
+  return state_->config.clear_range_m > 0.0 && state_->inserted % state_->config.look_every == 0;
+}
+
+void StaticMap::look_through(const RangeView& view, std::int64_t stamp_ns) {
+  const StaticMapConfig& config = state_->config;
+  const auto is_free = [&](const Eigen::Vector3f& position_map) {
+    const double range_m = (position_map - view.origin_map()).norm();
+    if (range_m > config.clear_range_m) return false;
+    const auto sight = view.look_at(position_map);
+    return sight &&
+           sight->nearest_m > range_m + config.clear_margin_m + config.clear_margin_share * range_m;
+  };
+  const std::vector<LiveTile*> near = state_->tiles_near(view.origin_map(), config.clear_range_m);
+  std::vector<std::uint8_t> hides(near.size());
+  tbb::parallel_for(std::size_t{0}, near.size(), [&](std::size_t i) {
+    hides[i] = near[i]->look_through(is_free, stamp_ns, state_->rule(), state_->grid) ? 1 : 0;
+  });
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    if (hides[i] != 0) state_->touched.push_back(near[i]);
+  }
+}
+
+std::vector<RemovedVoxel> StaticMap::removed() const {
+  std::vector<RemovedVoxel> all;
+  for (const auto& [id, live] : state_->tiles) {
+    const std::vector<RemovedVoxel> removed = live->removed(state_->rule(), state_->grid);
+    all.insert(all.end(), removed.begin(), removed.end());
+  }
+  return all;
+}
+
+std::size_t StaticMap::restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map) {
+  std::size_t restored = 0;
+  for (const auto& [id, live] : state_->tiles) {
+    restored += live->restore(reason, box_map, state_->rule(), state_->grid);
+    state_->touched.push_back(live.get());
+  }
+  return restored;
 }
 
 ClassEvidence StaticMap::evidence_at(const Eigen::Vector3d& position_map) const {
@@ -141,7 +222,7 @@ std::shared_ptr<const MapView> StaticMap::view() {
   const std::uint64_t version = state_->current->version + 1;
   std::vector<std::uint8_t> changed(touched.size());
   tbb::parallel_for(std::size_t{0}, touched.size(), [&](std::size_t i) {
-    changed[i] = touched[i]->publish(version, state_->config.min_points, state_->grid) ? 1 : 0;
+    changed[i] = touched[i]->publish(version, state_->rule(), state_->grid) ? 1 : 0;
   });
   if (std::ranges::find(changed, 1) == changed.end()) return state_->current;
 

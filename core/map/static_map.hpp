@@ -3,8 +3,11 @@
 #include <Eigen/Geometry>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
+#include "core/lidar/range_view.hpp"
+#include "core/map/removed_voxel.hpp"
 #include "core/map/tile.hpp"
 
 namespace stillmap {
@@ -17,6 +20,17 @@ struct StaticMapConfig {
   double max_range_m = 60.0;
   /// A voxel enters the view once it was hit this often.
   std::uint32_t min_points = 2;
+  /// Every so many scans one is asked what it looked through: all of them would tell the same.
+  std::uint32_t look_every = 3;
+  /// A voxel leaves the view once so many of those looked through it, and so many for each scan
+  /// that hit it.
+  std::uint32_t passes = 4;
+  std::uint32_t passes_per_hit = 2;
+  /// Within this range of the lidar; 0: voxels stay whatever looks through them.
+  double clear_range_m = 25.0;
+  /// A ray passed through where it went on for so much, and for this share of the range.
+  double clear_margin_m = 0.5;
+  double clear_margin_share = 0.02;
 
   /// Every fault in words, one a line; empty when the configuration can be used.
   [[nodiscard]] std::string faults() const;
@@ -33,10 +47,22 @@ class StaticMap {
   StaticMap& operator=(StaticMap&&) noexcept;
 
   /// Adds the stationary points of the scan. Semi-static points add evidence to voxels that exist
-  /// and make none; highly dynamic points are left out, as are points that are not finite, beyond
-  /// `max_range_m`, or farther than 100 km from the map's origin. `scan.motion` is as long as the
-  /// scan. The result does not depend on the number of threads.
+  /// and make none; of highly dynamic ones only the place is remembered. Points that are not
+  /// finite, beyond `max_range_m`, or farther than 100 km from the map's origin are left out.
+  /// `scan.motion` is as long as the scan. The result does not depend on the number of threads.
   void insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar);
+
+  /// Whether the scan inserted last is one to be asked what it looked through.
+  [[nodiscard]] bool wants_look() const;
+  /// Counts that scan against the voxels that it looked through: what stood there before is not
+  /// part of the still world, whatever its class.
+  void look_through(const RangeView& view, std::int64_t stamp_ns);
+
+  /// What is kept out of the planning view, and why; in no order.
+  [[nodiscard]] std::vector<RemovedVoxel> removed() const;
+  /// Shows again what was removed for this reason in this part of the map (map frame [m]); it stays
+  /// until a reset. Returns how many voxels.
+  std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map);
 
   /// What a place (map frame [m]) was seen as so far, shown in a view or not; without votes where
   /// nothing was seen. Thread-safe beside itself.
