@@ -44,7 +44,9 @@ free_domain() {
 
 # value FILE KEY: a value of a JSON file with one key a line, as --json prints.
 value() {
-  sed -n "s/^ *\"$2\": \"\{0,1\}\([^\",]*\)\"\{0,1\},\{0,1\}$/\1/p" "$1" | head -n 1
+  # The outermost of that name.
+  { sed -n "s/^  \"$2\": \"\{0,1\}\([^\",]*\)\"\{0,1\},\{0,1\}$/\1/p" "$1"
+    sed -n "s/^ *\"$2\": \"\{0,1\}\([^\",]*\)\"\{0,1\},\{0,1\}$/\1/p" "$1"; } | head -n 1
 }
 
 # rounded FILE KEY DECIMALS
