@@ -35,7 +35,9 @@ LiveTile::LiveTile(std::shared_ptr<const Tile> published, const VoxelGrid& grid)
   for (const Voxel& known : published_->voxels) {
     LiveVoxel live{voxel_key(known.index), known.point_count,   {},
                    known.evidence,         known.first_seen_ns, known.last_seen_ns};
-    live.hits = 1;
+    // How many scans they came from is not stored: take the most, so that nothing is lost for it.
+    live.hits = static_cast<std::uint16_t>(
+        std::min<std::uint32_t>(known.point_count, std::numeric_limits<std::uint16_t>::max()));
     live.was_shown = true;
     const Eigen::Vector3d offset =
         (known.mean_map.cast<double>() - grid.corner_map(id_, known.index)) / grid.voxel_size_m();

@@ -64,7 +64,7 @@ class LiveTile {
   [[nodiscard]] bool publish(std::uint64_t revision, const VisibilityRule& rule,
                              const VoxelGrid& grid);
 
-  /// What was hit and is not shown, by key.
+  /// What was hit and is not shown, in no order.
   [[nodiscard]] std::vector<RemovedVoxel> removed(const VisibilityRule& rule,
                                                   const VoxelGrid& grid) const;
   /// Shows the voxels that are hidden for this reason, whatever is seen of them later. Returns how

@@ -140,6 +140,17 @@ TEST_F(LookThrough, RemovedThingsCanBeShownAgain) {
   EXPECT_EQ(shown(car), static_cast<int>(restored));
 }
 
+TEST_F(LookThrough, AStoredMapKeepsItsWeight) {
+  see(ghost, 10);
+  const auto stored = map_.view();
+  map_ = StaticMap(StaticMapConfig{});
+  map_.restore(*stored);
+  const int before = shown(fence);
+  ASSERT_GT(before, 50);
+  see(wall, 5);
+  EXPECT_EQ(shown(fence), before);
+}
+
 TEST_F(LookThrough, OffItLeavesEverything) {
   StaticMapConfig config;
   config.clear_range_m = 0.0;

@@ -12,7 +12,7 @@ import numpy as np
 import torch
 
 from augmentation import augment_points, crop, drop_beams
-from losses import class_weights, weighted_cross_entropy
+from losses import class_weights, lovasz_softmax, weighted_cross_entropy
 from metrics import Confusion
 from range_images import ImageModel, normalise, project
 
@@ -28,6 +28,32 @@ SMALL = [
     "image.columns=256",
     "data.validation_scans=3",
 ]
+
+
+class LovaszSoftmax(unittest.TestCase):
+    def scores_of(self, classes):
+        """So sure of these classes (rows x columns) that the probabilities are 0 and 1."""
+        return 1000.0 * torch.nn.functional.one_hot(classes, 20).permute(2, 0, 1)[None].float()
+
+    def test_of_sure_predictions_is_one_less_the_mean_iou(self):
+        truth = torch.randint(1, 6, (16, 64), generator=torch.manual_seed(1))
+        found = torch.where(torch.rand(16, 64) < 0.6, truth, truth % 5 + 1)
+        iou = [
+            ((found == c) & (truth == c)).sum() / ((found == c) | (truth == c)).sum()
+            for c in range(1, 6)
+        ]
+        loss = lovasz_softmax(self.scores_of(found), truth[None])
+        self.assertAlmostEqual(float(loss), 1 - float(torch.stack(iou).mean()), places=5)
+
+    def test_leaves_out_pixels_without_a_class(self):
+        truth = torch.tensor([[1, 0, 2, 0]])
+        loss = lovasz_softmax(self.scores_of(torch.tensor([[1, 5, 2, 1]])), truth[None])
+        self.assertAlmostEqual(float(loss), 0.0, places=5)
+
+    def test_is_a_number_without_any_class(self):
+        scores = torch.randn(1, 20, 2, 4, requires_grad=True)
+        lovasz_softmax(scores, torch.zeros(1, 2, 4, dtype=torch.long)).backward()
+        self.assertTrue(torch.isfinite(scores.grad).all())
 
 
 class Projection(unittest.TestCase):
