@@ -24,13 +24,14 @@ std::string sequence_name(std::uint64_t seed) {
 }
 
 // One city, written aside and then put in its place.
-TrainingSetCount write_city(const fs::path& sequence, std::uint64_t seed, int scans) {
+TrainingSetCount write_city(const fs::path& sequence, std::uint64_t seed,
+                            const TrainingSetPlan& plan) {
   const fs::path unfinished = fs::path(sequence).concat(".unfinished");
   fs::remove_all(unfinished);
-  const Simulation drive(training_drive(seed));
+  const Simulation drive(training_drive(seed, plan.share_of_plain));
   KittiSequenceWriter writer(unfinished);
   TrainingSetCount count{.cities = 1};
-  for (const int index : spread_scans(drive, scans)) {
+  for (const int index : spread_scans(drive, plan.scans_per_city)) {
     const SimulatedScan scan = drive.scan(index);
     writer.add(scan.scan, scan.raw_labels, scan.T_map_lidar);
     count.scans += 1;
@@ -64,7 +65,7 @@ TrainingSetCount write_training_set(
     const std::uint64_t seed = plan.first_seed + static_cast<std::uint64_t>(index);
     const fs::path sequence = plan.folder / "sequences" / sequence_name(seed);
     add(fs::exists(sequence) ? TrainingSetCount{.cities = 1, .skipped = 1}
-                             : write_city(sequence, seed, plan.scans_per_city));
+                             : write_city(sequence, seed, plan));
   };
   tbb::parallel_for(0, plan.cities, write, tbb::simple_partitioner(), run);
   return total;

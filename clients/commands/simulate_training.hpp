@@ -12,6 +12,8 @@ struct TrainingSetPlan {
   int cities = 200;
   std::uint64_t first_seed = 1000;
   int scans_per_city = 8;
+  /// Of the drives, as `training_drive` has it.
+  double share_of_plain = 0.4;
 };
 
 struct TrainingSetCount {

@@ -4,6 +4,8 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <string>
 
 #include "clients/commands/command.hpp"
 #include "clients/commands/simulate_training.hpp"
@@ -23,6 +25,10 @@ struct Arguments {
 
 ExitCode run(const Arguments& arguments) {
   check_seed("--first-seed", arguments.plan.first_seed);
+  if (const double share = arguments.plan.share_of_plain; !(share >= 0.0 && share <= 1.0)) {
+    throw std::invalid_argument("--plain-share " + std::to_string(share) +
+                                " is no share; it may be 0 to 1");
+  }
   StopSignal stop;
   const tbb::global_control threads(tbb::global_control::max_allowed_parallelism,
                                     static_cast<std::size_t>(arguments.jobs));
@@ -69,6 +75,10 @@ void add_simulate_training_command(CommandHandle program, Action& action) {
       .option("--scans-per-city", arguments->plan.scans_per_city,
               "Scans of each city, at least 8 m apart; fewer where its route is short")
       .above_zero()
+      .with_default();
+  command
+      .option("--plain-share", arguments->plan.share_of_plain,
+              "Share of drives through the cities of `stillmap simulate` instead, 0..1")
       .with_default();
   command.option("--jobs", arguments->jobs, "Threads").above_zero().with_default();
   command.flag("--json", arguments->json, "Print JSON");

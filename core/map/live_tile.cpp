@@ -10,9 +10,6 @@
 namespace stillmap {
 namespace {
 
-constexpr double offset_steps = 1024.0;
-/// The mean stands still after so many points: their sum would outgrow 32 bits.
-constexpr std::uint32_t max_mean_points = 1U << 22;
 /// Scans that looked through a voxel are counted so far.
 constexpr std::uint16_t most_passes = 1000;
 constexpr int layer_bias = 1 << 15;
@@ -27,30 +24,6 @@ std::uint32_t voxel_key(VoxelIndex index) {
 VoxelIndex voxel_index(std::uint32_t key) {
   return {static_cast<std::uint16_t>(key >> 24), static_cast<std::uint16_t>(key >> 16 & 0xFFU),
           static_cast<std::int16_t>(static_cast<int>(key & 0xFFFFU) - layer_bias)};
-}
-
-LiveTile::LiveTile(std::shared_ptr<const Tile> published, const VoxelGrid& grid)
-    : id_(published->info.id), published_(std::move(published)) {
-  voxels_.reserve(published_->voxels.size());
-  for (const Voxel& known : published_->voxels) {
-    LiveVoxel live{voxel_key(known.index), known.point_count,   {},
-                   known.evidence,         known.first_seen_ns, known.last_seen_ns};
-    // How many scans they came from is not stored: take the most, so that nothing is lost for it.
-    live.hits = static_cast<std::uint16_t>(
-        std::min<std::uint32_t>(known.point_count, std::numeric_limits<std::uint16_t>::max()));
-    live.was_shown = true;
-    const Eigen::Vector3d offset =
-        (known.mean_map.cast<double>() - grid.corner_map(id_, known.index)) / grid.voxel_size_m();
-    const double points = std::min(known.point_count, max_mean_points);
-    for (int axis = 0; axis < 3; ++axis) {
-      const double steps = std::clamp(offset[axis] * offset_steps - 0.5, 0.0, offset_steps - 1.0);
-      live.offset_sum.at(static_cast<std::size_t>(axis)) =
-          static_cast<std::uint32_t>(std::lround(steps * points));
-    }
-    position_.emplace(live.key, static_cast<std::uint32_t>(voxels_.size()));
-    voxels_.push_back(live);
-  }
-  sort_new_voxels();
 }
 
 LiveTile::LiveVoxel* LiveTile::find(const TilePoint& point) {
@@ -93,7 +66,7 @@ void LiveTile::hit(LiveVoxel& voxel, const TilePoint& point, std::int64_t stamp_
   voxel.evidence.add(point.label, point.confidence);
   voxel.last_seen_ns = stamp_ns;
   if (point.motion == Motion::semi_static) return;
-  if (is_new_scan && voxel.hits < std::numeric_limits<std::uint16_t>::max()) ++voxel.hits;
+  if (is_new_scan && voxel.past.hits < std::numeric_limits<std::uint16_t>::max()) ++voxel.past.hits;
   if (voxel.point_count < max_mean_points) {
     for (std::size_t axis = 0; axis < 3; ++axis) voxel.offset_sum[axis] += point.offset[axis];
   }
@@ -112,27 +85,27 @@ bool LiveTile::look_through(const std::function<bool(const Eigen::Vector3f&)>& i
                             const VoxelGrid& grid) {
   bool hides_one = false;
   for (LiveVoxel& voxel : voxels_) {
-    if (voxel.last_seen_ns == stamp_ns || voxel.is_restored) continue;
+    if (voxel.last_seen_ns == stamp_ns || voxel.past.is_restored) continue;
     if (!is_free(mean_map(voxel, grid))) continue;
-    if (voxel.passes >= most_passes) {
+    if (voxel.past.passes >= most_passes) {
       // So that a thing that is put where long nothing was can still come into view.
-      voxel.passes /= 2;
-      voxel.hits /= 2;
+      voxel.past.passes /= 2;
+      voxel.past.hits /= 2;
     }
     const bool was_hidden = is_seen_through(voxel, rule);
-    ++voxel.passes;
+    ++voxel.past.passes;
     hides_one |= !was_hidden && is_seen_through(voxel, rule);
   }
   return hides_one;
 }
 
 bool LiveTile::is_seen_through(const LiveVoxel& voxel, const VisibilityRule& rule) {
-  return !voxel.is_restored && voxel.passes >= rule.passes &&
-         voxel.passes > rule.passes_per_hit * voxel.hits;
+  return !voxel.past.is_restored && voxel.past.passes >= rule.passes &&
+         voxel.past.passes > rule.passes_per_hit * voxel.past.hits;
 }
 
 bool LiveTile::is_shown(const LiveVoxel& voxel, const VisibilityRule& rule) {
-  if (voxel.is_restored) return true;
+  if (voxel.past.is_restored) return true;
   return voxel.point_count >= rule.min_points && !is_movable(voxel.evidence.winner()) &&
          !is_seen_through(voxel, rule);
 }
@@ -140,7 +113,7 @@ bool LiveTile::is_shown(const LiveVoxel& voxel, const VisibilityRule& rule) {
 std::optional<RemovalReason> LiveTile::removal(const LiveVoxel& voxel, const VisibilityRule& rule) {
   if (is_shown(voxel, rule) || voxel.point_count < rule.min_points) return std::nullopt;
   if (!is_movable(voxel.evidence.winner())) return RemovalReason::seen_through;
-  return voxel.was_shown ? RemovalReason::relabelled : RemovalReason::semi_static;
+  return voxel.past.was_shown ? RemovalReason::relabelled : RemovalReason::semi_static;
 }
 
 void LiveTile::sort_new_voxels() {
@@ -181,7 +154,7 @@ std::vector<Voxel> LiveTile::visible_voxels(const VisibilityRule& rule, const Vo
   for (const std::uint32_t position : sorted_) {
     LiveVoxel& live = voxels_[position];
     if (!is_shown(live, rule)) continue;
-    live.was_shown = true;
+    live.past.was_shown = true;
     visible.push_back(voxel(live, grid));
   }
   return visible;
@@ -219,7 +192,7 @@ std::size_t LiveTile::restore(RemovalReason reason, const Eigen::AlignedBox3d& b
   for (LiveVoxel& voxel : voxels_) {
     if (removal(voxel, rule) != reason) continue;
     if (!box_map.contains(mean_map(voxel, grid).cast<double>())) continue;
-    voxel.is_restored = true;
+    voxel.past.is_restored = true;
     ++restored;
   }
   return restored;
@@ -237,7 +210,7 @@ std::size_t LiveTile::restore_excluded(RemovalReason reason, const Eigen::Aligne
     voxel.offset_sum.fill(rule.min_points * static_cast<std::uint32_t>(offset_steps / 2));
     voxel.evidence.add(excluded.label, 1.0F);
     voxel.first_seen_ns = voxel.last_seen_ns = excluded.last_seen_ns;
-    voxel.is_restored = true;
+    voxel.past.is_restored = true;
     position_.emplace(key, static_cast<std::uint32_t>(voxels_.size() - 1));
     restored.push_back(key);
   }

@@ -13,6 +13,7 @@
 #include "core/lidar/motion.hpp"
 #include "core/map/removed_voxel.hpp"
 #include "core/map/tile.hpp"
+#include "core/map/tile_memory.hpp"
 #include "core/map/voxel_grid.hpp"
 
 namespace stillmap {
@@ -45,8 +46,8 @@ struct VisibilityRule {
 class LiveTile {
  public:
   explicit LiveTile(TileId id) : id_(id) {}
-  /// Goes on from a published tile.
-  LiveTile(std::shared_ptr<const Tile> published, const VoxelGrid& grid);
+  /// Goes on from what is known of a tile.
+  LiveTile(TileId id, const TileRecord& record, const VoxelGrid& grid);
 
   void insert(std::span<const TilePoint> points, std::int64_t stamp_ns);
 
@@ -72,11 +73,22 @@ class LiveTile {
   std::size_t restore(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
                       const VisibilityRule& rule, const VoxelGrid& grid);
 
+  /// All of it, to be gone on from later. Requires that nothing happened since `publish`.
+  [[nodiscard]] TileRecord record(const VisibilityRule& rule, const VoxelGrid& grid) const;
+
+  /// What it takes in memory, its published tile included.
+  [[nodiscard]] std::size_t memory_bytes() const;
+
   [[nodiscard]] TileId id() const { return id_; }
   /// What views share; null while there is nothing to show.
   [[nodiscard]] const std::shared_ptr<const Tile>& published() const { return published_; }
 
  private:
+  /// Steps of a point's offset in a voxel.
+  static constexpr double offset_steps = 1024.0;
+  /// The mean stands still after so many points: their sum would outgrow 32 bits.
+  static constexpr std::uint32_t max_mean_points = 1U << 22;
+
   /// Sums are whole numbers, so that the mean does not depend on the order of points.
   struct LiveVoxel {
     std::uint32_t key = 0;
@@ -85,11 +97,7 @@ class LiveTile {
     ClassEvidence evidence;
     std::int64_t first_seen_ns = 0;
     std::int64_t last_seen_ns = 0;
-    /// Scans that hit it, and scans that looked through it.
-    std::uint16_t hits = 0;
-    std::uint16_t passes = 0;
-    bool was_shown = false;
-    bool is_restored = false;
+    VoxelPast past;
   };
   /// A place that only movable things hit.
   struct Excluded {
@@ -104,6 +112,7 @@ class LiveTile {
     }
   };
 
+  void add(const Voxel& known, const VoxelPast& past, const VoxelGrid& grid);
   [[nodiscard]] LiveVoxel* find(const TilePoint& point);
   static void hit(LiveVoxel& voxel, const TilePoint& point, std::int64_t stamp_ns);
   void exclude(const TilePoint& point, std::int64_t stamp_ns);

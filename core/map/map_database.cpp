@@ -13,6 +13,7 @@
 #include <system_error>
 
 #include "core/map/map_file.hpp"
+#include "core/map/tile_codec.hpp"
 
 namespace stillmap {
 namespace {
@@ -20,7 +21,8 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::uint32_t application_id = 0x53744D70;  // "StMp"
-constexpr std::uint32_t schema_version = 1;
+constexpr std::uint32_t schema_version = 2;
+constexpr std::uint32_t oldest_schema_version = 1;
 constexpr int busy_timeout_ms = 5000;
 
 constexpr const char* schema = R"sql(
@@ -32,12 +34,20 @@ constexpr const char* schema = R"sql(
     x INTEGER NOT NULL, y INTEGER NOT NULL,
     revision INTEGER NOT NULL, content_hash INTEGER NOT NULL,
     encoded BLOB NOT NULL,
+    voxel_count INTEGER NOT NULL DEFAULT 0,
+    min_x REAL, min_y REAL, min_z REAL, max_x REAL, max_y REAL, max_z REAL,
     PRIMARY KEY (x, y));
   CREATE TABLE trajectory (
     position INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL,
     x REAL NOT NULL, y REAL NOT NULL, z REAL NOT NULL,
     qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL, qw REAL NOT NULL);
   CREATE TABLE metadata (key TEXT PRIMARY KEY, value TEXT NOT NULL);
+)sql";
+
+constexpr const char* memories_table = R"sql(
+  CREATE TABLE memories (
+    x INTEGER NOT NULL, y INTEGER NOT NULL, encoded BLOB NOT NULL,
+    PRIMARY KEY (x, y));
 )sql";
 
 fs::path beside(const fs::path& file, const char* suffix) {
@@ -72,7 +82,7 @@ void check_header(const fs::path& file) {
                                  ", this one knows " + std::to_string(schema_version) +
                                  "); update this program");
   }
-  if (version != schema_version) {
+  if (version < oldest_schema_version) {
     throw MapFileError(file, "is damaged: it has schema " + std::to_string(version));
   }
 }
@@ -91,6 +101,7 @@ void create(const fs::path& file) {
     database.exec("PRAGMA application_id = " + std::to_string(application_id));
     database.exec("PRAGMA user_version = " + std::to_string(schema_version));
     database.exec(schema);
+    database.exec(memories_table);
     transaction.commit();
     database.exec("PRAGMA journal_mode = WAL");
   }
@@ -121,7 +132,46 @@ SQLite::Database open_or_create(const fs::path& file) {
   return database;
 }
 
+/// A stored tile's counts and bounds, for its new columns.
+void fill_in_infos(SQLite::Database& database) {
+  SQLite::Statement row(database, "SELECT x, y, encoded FROM tiles");
+  SQLite::Statement update(database,
+                           "UPDATE tiles SET voxel_count = ?, min_x = ?, min_y = ?, min_z = ?, "
+                           "max_x = ?, max_y = ?, max_z = ? WHERE x = ? AND y = ?");
+  while (row.executeStep()) {
+    const SQLite::Column blob = row.getColumn(2);
+    const TileInfo info = decode_tile({static_cast<const std::uint8_t*>(blob.getBlob()),
+                                       static_cast<std::size_t>(blob.getBytes())})
+                              .info;
+    update.bind(1, info.voxel_count);
+    for (int axis = 0; axis < 3; ++axis) {
+      update.bind(2 + axis, static_cast<double>(info.bounds_map.min()[axis]));
+      update.bind(5 + axis, static_cast<double>(info.bounds_map.max()[axis]));
+    }
+    update.bind(8, row.getColumn(0).getInt());
+    update.bind(9, row.getColumn(1).getInt());
+    update.exec();
+    update.reset();
+  }
+}
+
 }  // namespace
+
+bool has_first_schema(SQLite::Database& database) {
+  return database.execAndGet("PRAGMA user_version").getInt() == oldest_schema_version;
+}
+
+void upgrade_schema(SQLite::Database& database) {
+  SQLite::Transaction transaction(database, SQLite::TransactionBehavior::IMMEDIATE);
+  database.exec("ALTER TABLE tiles ADD COLUMN voxel_count INTEGER NOT NULL DEFAULT 0");
+  for (const char* column : {"min_x", "min_y", "min_z", "max_x", "max_y", "max_z"}) {
+    database.exec(std::string("ALTER TABLE tiles ADD COLUMN ") + column + " REAL");
+  }
+  database.exec(memories_table);
+  fill_in_infos(database);
+  database.exec("PRAGMA user_version = " + std::to_string(schema_version));
+  transaction.commit();
+}
 
 SQLite::Database open_map_database(const fs::path& file) {
   try {

@@ -7,8 +7,15 @@
 namespace stillmap {
 
 /// Opens the SQLite database of a map file, made with an empty schema when there is no file yet.
-/// A file that is not a sound map file of this schema is refused (MapFileError) before anything
-/// could write to it.
+/// A file that is not a sound map file of this schema or the one before is refused (MapFileError)
+/// before anything could write to it.
 [[nodiscard]] SQLite::Database open_map_database(const std::filesystem::path& file);
+
+/// Whether the tables are those of the first schema, which knows of tiles only what they show.
+[[nodiscard]] bool has_first_schema(SQLite::Database& database);
+
+/// Makes them those of this one, in one transaction. Throws SQLite::Exception, or TileCodecError
+/// for a tile that cannot be read.
+void upgrade_schema(SQLite::Database& database);
 
 }  // namespace stillmap

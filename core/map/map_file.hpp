@@ -6,7 +6,9 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/map/static_map.hpp"
 #include "core/map/tile.hpp"
+#include "core/map/tile_shelf.hpp"
 #include "core/odometry/trajectory.hpp"
 
 namespace stillmap {
@@ -19,10 +21,12 @@ class MapFileError : public std::runtime_error {
       : std::runtime_error(file.string() + ": " + fault) {}
 };
 
-/// What a map file holds. Of the map that is the planning view: what was seen too rarely, or as a
-/// movable class, starts anew after a restart.
+/// What a map file holds.
 struct StoredMap {
   MapView view;
+  /// Empty for files of Stillmap's first format: what was seen too rarely, or as a movable class,
+  /// starts anew.
+  TileMemories memories;
   Trajectory trajectory;
   /// Free key-value pairs: "sensor", "label_source", "software".
   std::map<std::string, std::string> metadata;
@@ -34,15 +38,30 @@ class TileStore {
  public:
   virtual ~TileStore() = default;
   /// Brings the store to this state in one transaction: after a crash the store holds either the
-  /// last save or this one. Tiles that did not change are not written again.
+  /// last save or this one. Tiles that did not change are not written again. Tiles that are away
+  /// (tile_shelf.hpp) stay as they are stored. A tile that is written without its memory loses the
+  /// one that was stored.
   virtual void save(const StoredMap& map) = 0;
   /// The last saved state; an empty map when nothing was saved yet.
   [[nodiscard]] virtual StoredMap load() = 0;
+  /// The same, with all tiles away: of a size that does not depend on what is in them.
+  [[nodiscard]] virtual StoredMap load_shelved() = 0;
+  /// Where those tiles are; may be used beside the store, and after it.
+  [[nodiscard]] virtual std::shared_ptr<TileShelf> shelf() = 0;
+  /// Gives the stored map another id: its next save goes on from it.
+  virtual void rename_map(std::uint64_t map_id) = 0;
+  /// Writes the last saved state to another file, in the place of what is there. Throws
+  /// MapFileError.
+  virtual void copy_to(const std::filesystem::path& file) = 0;
 };
 
 /// Opens or makes an SQLite map file (WAL; the file alone is complete after each save and may be
 /// copied). Throws MapFileError: no database, another program's, written by a newer version,
 /// damaged, or in a folder that cannot be written. Such a file is left untouched.
 [[nodiscard]] std::unique_ptr<TileStore> open_map_file(const std::filesystem::path& file);
+
+/// A store that is gone with the program, for a map that is not to be kept but does not fit into
+/// memory. Throws MapFileError when the folder for temporary files cannot be written.
+[[nodiscard]] std::unique_ptr<TileStore> open_scratch_map();
 
 }  // namespace stillmap

@@ -1,14 +1,17 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <map>
 #include <memory>
-#include <span>
+#include <string>
 #include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/range_view.hpp"
 #include "core/map/removed_voxel.hpp"
 #include "core/map/tile.hpp"
+#include "core/map/tile_memory.hpp"
+#include "core/map/tile_shelf.hpp"
 
 namespace stillmap {
 
@@ -36,6 +39,25 @@ struct StaticMapConfig {
   [[nodiscard]] std::string faults() const;
 };
 
+/// What tiles of a map know beside what they show. Null: it is on the shelf, as all of the tile is.
+using TileMemories = std::map<TileId, std::shared_ptr<const TileMemory>>;
+
+/// A state of the map to be stored.
+struct MapCheckpoint {
+  std::shared_ptr<const MapView> view;
+  /// How far it goes; to be told to `checkpoint_stored`.
+  std::uint64_t step = 0;
+  /// All of the tiles that changed since what is stored.
+  std::map<TileId, TileRecord> records;
+};
+
+struct MemoryUse {
+  std::size_t bytes = 0;
+  /// Tiles in memory, and on the shelf.
+  std::size_t resident_tiles = 0;
+  std::size_t away_tiles = 0;
+};
+
 /// The planning map: stationary points only, as labelled voxels in tiles (paper II-C.2). One
 /// thread writes; views are immutable and may be read from any thread.
 class StaticMap {
@@ -58,10 +80,11 @@ class StaticMap {
   /// part of the still world, whatever its class.
   void look_through(const RangeView& view, std::int64_t stamp_ns);
 
-  /// What is kept out of the planning view, and why; in no order.
-  [[nodiscard]] std::vector<RemovedVoxel> removed() const;
-  /// Shows again what was removed for this reason in this part of the map (map frame [m]); it stays
-  /// until a reset. Returns how many voxels.
+  /// What is kept out of the planning view in this part of the map (map frame [m]), and why; in no
+  /// order. Throws as the shelf does.
+  [[nodiscard]] std::vector<RemovedVoxel> removed(const Eigen::AlignedBox3d& box_map) const;
+  /// Shows again what was removed for this reason in this part of the map; it stays until a reset.
+  /// Returns how many voxels.
   std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map);
 
   /// What a place (map frame [m]) was seen as so far, shown in a view or not; without votes where
@@ -73,10 +96,27 @@ class StaticMap {
   /// with it, with their counts and times of then; where nothing changed, so is the whole view.
   [[nodiscard]] std::shared_ptr<const MapView> view();
 
-  /// Takes over a stored view; later scans extend it. Give it a new `map_id`: the map may have
-  /// been at a later version than the one stored. Throws std::invalid_argument when its voxel or
-  /// tile size is not the configured one.
-  void restore(const MapView& view);
+  /// Takes over a stored map; later scans extend it. Tiles without their voxels are taken to be on
+  /// the shelf. Give it a new `map_id`: the map may have been at a later version than the one
+  /// stored. Throws std::invalid_argument when its voxel or tile size is not the configured one.
+  void restore(const MapView& view, const TileMemories& memories = {});
+
+  /// Where tiles may go that are far away. What is there must be what checkpoints brought there.
+  void use_shelf(std::shared_ptr<TileShelf> shelf);
+  /// The map as it is now, with all of every tile that changed since what was stored last; with
+  /// `everything`, of every tile in memory.
+  [[nodiscard]] MapCheckpoint checkpoint(bool everything = false);
+  /// This checkpoint, and all before, are on the shelf.
+  void checkpoint_stored(std::uint64_t step);
+  /// Lets tiles that are stored and out of the lidar's reach go, farthest first, until the map
+  /// takes no more than this. Returns how many. They come back by themselves.
+  std::size_t shelve(const Eigen::Vector3d& position_map, std::size_t limit_bytes);
+  /// Has tiles from the shelf in memory, nearest first, as many as fit.
+  void take_back_near(const Eigen::Vector3d& position_map, std::size_t limit_bytes);
+  /// What the tiles take, published ones included.
+  [[nodiscard]] MemoryUse memory_use() const;
+  /// Tiles that the shelf could not give back, with the reason: they stay as they are stored.
+  [[nodiscard]] std::vector<std::string> unreadable_tiles() const;
 
   /// Empties the map; `map_id` tells clients that it is another one now.
   void reset(std::uint64_t map_id);

@@ -9,7 +9,6 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
 constexpr double least_apart_m = 8.0;
-constexpr double share_of_plain_drives = 0.4;
 // Of a drive; long enough to come round the longest route.
 constexpr int drive_scans = 900;
 
@@ -49,9 +48,9 @@ SimulationConfig plain_drive(std::uint64_t seed, Random& random) {
 
 }  // namespace
 
-SimulationConfig training_drive(std::uint64_t seed) {
+SimulationConfig training_drive(std::uint64_t seed, double share_of_plain) {
   Random random(seed, 91);
-  if (random.chance(share_of_plain_drives)) return plain_drive(seed, random);
+  if (random.chance(share_of_plain)) return plain_drive(seed, random);
   SimulationConfig config;
   config.plan = training_plan(Random(seed, 92));
   config.seed = seed;

@@ -12,9 +12,10 @@ namespace stillmap {
 [[nodiscard]] CityPlan training_plan(Random random);
 
 /// A drive for training: `training_plan`, drawn materials, and a drawn lidar with drawn flaws
-/// (60 % HDL-64E, 20 % VLP-16, 10 % HDL-32E, 10 % sensors that nobody builds). Four drives of ten
-/// are plain ones through `quiet_city` or `crowded_avenue`. The same seed gives the same drive.
-[[nodiscard]] SimulationConfig training_drive(std::uint64_t seed);
+/// (60 % HDL-64E, 20 % VLP-16, 10 % HDL-32E, 10 % sensors that nobody builds). This share of all
+/// drives are plain ones through `quiet_city` or `crowded_avenue`. The same seed and share give the
+/// same drive.
+[[nodiscard]] SimulationConfig training_drive(std::uint64_t seed, double share_of_plain = 0.4);
 
 /// Up to `count` scans of the drive, spread over the route and at least 8 m apart.
 [[nodiscard]] std::vector<int> spread_scans(const Simulation& drive, int count);

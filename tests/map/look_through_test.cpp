@@ -80,7 +80,7 @@ class LookThrough : public testing::Test {
     return count;
   }
   [[nodiscard]] int removed(RemovalReason reason) const {
-    const std::vector<RemovedVoxel> all = map_.removed();
+    const std::vector<RemovedVoxel> all = map_.removed(test::everywhere());
     return static_cast<int>(std::ranges::count(all, reason, &RemovedVoxel::reason));
   }
 

@@ -124,8 +124,8 @@ TEST_F(MapFileTest, RefusesAnotherProgramsDatabase) {
 
 TEST_F(MapFileTest, RefusesANewerSchema) {
   open_map_file(file_)->save(stored_map(1));
-  alter("PRAGMA user_version = 2");
-  expect_refused("newer Stillmap (schema 2");
+  alter("PRAGMA user_version = 3");
+  expect_refused("newer Stillmap (schema 3");
 }
 
 TEST_F(MapFileTest, RefusesATruncatedFile) {

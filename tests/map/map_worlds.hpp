@@ -16,6 +16,12 @@ inline void add_point(LabelledScan& scan, const Eigen::Vector3f& p_lidar, Semant
   scan.motion.push_back(motion);
 }
 
+/// A box without faces.
+[[nodiscard]] inline Eigen::AlignedBox3d everywhere() {
+  constexpr double far_m = 1e9;
+  return {Eigen::Vector3d::Constant(-far_m), Eigen::Vector3d::Constant(far_m)};
+}
+
 /// A scan of an HDL-64E's shape in a street: ground, two house fronts with depth, poles and trees.
 /// `columns` times 64 points.
 [[nodiscard]] LabelledScan street_scan(std::uint32_t seed, int columns = 1875);

@@ -1,0 +1,58 @@
+#include <cmath>
+#include <sstream>
+
+#include "core/map/static_map.hpp"
+#include "core/map/voxel_grid.hpp"
+
+namespace stillmap {
+namespace {
+
+std::string tile_size_fault(const StaticMapConfig& config) {
+  const double columns = config.tile_size_m / config.voxel_size_m;
+  // 20.0 / 0.2 is not exactly 100.
+  if (columns >= 1.0 - 1e-6 && columns <= VoxelGrid::max_columns + 1e-6 &&
+      std::abs(columns - std::round(columns)) < 1e-6 * columns) {
+    return {};
+  }
+  std::ostringstream fault;
+  fault << "tile_size_m = " << config.tile_size_m << "; must be 1 to " << VoxelGrid::max_columns
+        << " whole voxels of voxel_size_m (" << config.voxel_size_m << ")\n";
+  return fault.str();
+}
+
+}  // namespace
+
+std::string StaticMapConfig::faults() const {
+  constexpr double min_voxel_size_m = 0.01;
+  constexpr double max_range_tiles = 100.0;
+  std::ostringstream faults;
+  if (!(voxel_size_m >= min_voxel_size_m && voxel_size_m <= 10.0)) {
+    faults << "voxel_size_m = " << voxel_size_m << "; must be 0.01 to 10\n";
+  }
+  faults << tile_size_fault(*this);
+  if (!(max_range_m > 0.0 && max_range_m <= max_range_tiles * tile_size_m)) {
+    faults << "max_range_m = " << max_range_m << "; must be above 0 and at most " << max_range_tiles
+           << " tiles (" << max_range_tiles * tile_size_m << ")\n";
+  }
+  if (!(clear_range_m >= 0.0 && clear_range_m <= 1000.0)) {
+    faults << "clear_range_m = " << clear_range_m << "; must be 0 (off) to 1000\n";
+  }
+  if (!(clear_margin_m >= voxel_size_m && clear_margin_m <= 100.0)) {
+    faults << "clear_margin_m = " << clear_margin_m << "; must be at least voxel_size_m ("
+           << voxel_size_m << ") and at most 100\n";
+  }
+  if (!(clear_margin_share >= 0.0 && clear_margin_share <= 1.0)) {
+    faults << "clear_margin_share = " << clear_margin_share << "; must be 0 to 1\n";
+  }
+  if (look_every == 0 || look_every > 1000) {
+    faults << "look_every = " << look_every << "; must be 1 to 1000\n";
+  }
+  if (passes == 0 || passes > 1000) faults << "passes = " << passes << "; must be 1 to 1000\n";
+  if (passes_per_hit == 0 || passes_per_hit > 1000) {
+    faults << "passes_per_hit = " << passes_per_hit << "; must be 1 to 1000\n";
+  }
+  if (min_points == 0) faults << "min_points = 0; must be at least 1\n";
+  return faults.str();
+}
+
+}  // namespace stillmap

@@ -1,0 +1,21 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <vector>
+
+namespace stillmap {
+
+/// A version byte, then a zstd frame with checksum: how everything of a tile is stored.
+/// Throws TileCodecError for content beyond 256 MiB.
+[[nodiscard]] std::vector<std::uint8_t> to_frame(std::uint8_t format_version,
+                                                 std::span<const std::uint8_t> content);
+
+/// The content again. Throws TileCodecError for another version, for what is no such frame or is
+/// damaged, and for less than `least_bytes` of content.
+[[nodiscard]] std::vector<std::uint8_t> from_frame(std::uint8_t format_version,
+                                                   std::span<const std::uint8_t> frame,
+                                                   std::size_t least_bytes);
+
+}  // namespace stillmap

@@ -1,0 +1,261 @@
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "core/lidar/range_view.hpp"
+#include "core/map/map_file.hpp"
+#include "core/map/static_map.hpp"
+#include "tests/map/map_worlds.hpp"
+#include "tests/scratch_folder.hpp"
+
+namespace stillmap {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+
+StoredMap to_store(const MapCheckpoint& checkpoint) {
+  StoredMap map{*checkpoint.view, {}, {}, {}};
+  for (const auto& [id, record] : checkpoint.records) map.memories.emplace(id, record.memory);
+  for (auto& tile : map.view.tiles) {
+    const auto record = checkpoint.records.find(tile->info.id);
+    if (record != checkpoint.records.end()) tile = record->second.tile;
+  }
+  return map;
+}
+
+/// Drives along x and back, twelve metres a scan, with a car that stands at every hundredth metre
+/// on the way out and is gone on the way back.
+class Drive {
+ public:
+  static constexpr int scans = 160;
+
+  explicit Drive(StaticMap& map) : map_(map) {}
+
+  [[nodiscard]] static double x_of(int scan) {
+    return 12.0 * (scan < scans / 2 ? scan : scans - 1 - scan);
+  }
+  void see(int scan) {
+    LabelledScan seen = test::street_scan(static_cast<std::uint32_t>(scan % 5), 60);
+    seen.scan.stamp_ns = scan + 1;
+    const bool is_way_out = scan < scans / 2;
+    for (int i = 0; i < 20; ++i) {
+      const float x = 4.0F + 0.1F * static_cast<float>(i);
+      if (is_way_out) {
+        test::add_point(seen, {x, 2.0F, 0.3F}, SemanticClass::car, Motion::semi_static);
+        test::add_point(seen, {x, 3.0F, 0.3F}, SemanticClass::car, Motion::highly_dynamic);
+      }
+    }
+    const Isometry3d T_map_lidar(Eigen::Translation3d(x_of(scan), 0.0, 0.0));
+    map_.insert(seen, T_map_lidar);
+    map_.look_through(RangeView(seen.scan, {}, hdl_64e(), T_map_lidar), seen.scan.stamp_ns);
+  }
+
+ private:
+  StaticMap& map_;
+};
+
+/// A map in little memory, and its store.
+class PagedMap {
+ public:
+  static constexpr std::size_t limit_bytes = 11'000'000;
+
+  explicit PagedMap(std::unique_ptr<TileStore> store = open_scratch_map())
+      : store_(std::move(store)) {
+    map_.reset(7);
+    map_.use_shelf(store_->shelf());
+  }
+  void drive() {
+    Drive drive(map_);
+    for (int scan = 0; scan < Drive::scans; ++scan) {
+      drive.see(scan);
+      if (scan % 4 != 3) continue;
+      const MapCheckpoint checkpoint = map_.checkpoint();
+      store_->save(to_store(checkpoint));
+      map_.checkpoint_stored(checkpoint.step);
+      shelved_ += map_.shelve(Vector3d(Drive::x_of(scan), 0.0, 0.0), limit_bytes);
+      peak_bytes_ = std::max(peak_bytes_, map_.memory_use().bytes);
+    }
+  }
+  /// Everything, whether in memory or not.
+  [[nodiscard]] StoredMap whole() {
+    store_->save(to_store(map_.checkpoint()));
+    return store_->load();
+  }
+
+  StaticMap map_{StaticMapConfig{}};
+  std::unique_ptr<TileStore> store_;
+  std::size_t shelved_ = 0;
+  std::size_t peak_bytes_ = 0;
+};
+
+using Key = std::pair<TileId, VoxelIndex>;
+
+std::map<Key, const Voxel*> voxels_of(const MapView& view) {
+  std::map<Key, const Voxel*> voxels;
+  for (const auto& tile : view.tiles) {
+    for (const Voxel& voxel : tile->voxels) voxels[{tile->info.id, voxel.index}] = &voxel;
+  }
+  return voxels;
+}
+
+std::multiset<std::tuple<int, float, float, float>> places(const std::vector<RemovedVoxel>& all) {
+  std::multiset<std::tuple<int, float, float, float>> places;
+  for (const RemovedVoxel& voxel : all) {
+    const Eigen::Vector3f p = (voxel.position_map * 100.0F).array().round();
+    places.emplace(static_cast<int>(voxel.reason), p.x(), p.y(), p.z());
+  }
+  return places;
+}
+
+TEST(MapPaging, AMapThatDoesNotFitBecomesTheSameMap) {
+  StaticMap plain{StaticMapConfig{}};
+  plain.reset(7);
+  Drive drive(plain);
+  for (int scan = 0; scan < Drive::scans; ++scan) drive.see(scan);
+  PagedMap paged;
+  paged.drive();
+  ASSERT_GT(paged.shelved_, 50U);
+
+  const auto expected = voxels_of(*plain.view());
+  const StoredMap stored = paged.whole();
+  const auto got = voxels_of(stored.view);
+  ASSERT_EQ(got.size(), expected.size());
+  for (const auto& [key, voxel] : expected) {
+    const auto other = got.find(key);
+    ASSERT_NE(other, got.end());
+    EXPECT_EQ(other->second->point_count, voxel->point_count);
+    EXPECT_EQ(other->second->evidence, voxel->evidence);
+    EXPECT_TRUE(other->second->mean_map.isApprox(voxel->mean_map, 1e-4F));
+  }
+  const auto removed = places(plain.removed(test::everywhere()));
+  EXPECT_GT(removed.size(), 500U);
+  EXPECT_EQ(places(paged.map_.removed(test::everywhere())), removed);
+}
+
+TEST(MapPaging, MemoryStaysBelowTheLimitOnADriveThatNeedsManyTimesIt) {
+  StaticMap plain{StaticMapConfig{}};
+  Drive drive(plain);
+  for (int scan = 0; scan < Drive::scans; ++scan) drive.see(scan);
+  ASSERT_GT(plain.memory_use().bytes, 3 * PagedMap::limit_bytes);
+  PagedMap paged;
+  paged.drive();
+  EXPECT_LE(paged.peak_bytes_, PagedMap::limit_bytes);
+}
+
+TEST(MapPaging, ViewsNameEveryTileAndSayWhichAreAway) {
+  PagedMap paged;
+  paged.drive();
+  const auto view = paged.map_.view();
+  const auto away = std::ranges::count_if(view->tiles, [](const auto& t) { return is_away(*t); });
+  EXPECT_GT(away, 10);
+  EXPECT_EQ(view->tiles.size(), paged.whole().view.tiles.size());
+}
+
+TEST(MapPaging, TilesThatAreNotStoredYetStay) {
+  PagedMap paged;
+  Drive drive(paged.map_);
+  for (int scan = 0; scan < Drive::scans / 2; ++scan) drive.see(scan);
+  EXPECT_EQ(paged.map_.shelve(Vector3d::Zero(), 0), 0U);
+}
+
+TEST(MapPaging, ARestartGoesOnWithWhatWasHidden) {
+  const ScratchFolder folder;
+  PagedMap before(open_map_file(folder / "map.stillmap"));
+  before.drive();
+  static_cast<void>(before.whole());
+  const auto removed = places(before.map_.removed(test::everywhere()));
+
+  const auto store = open_map_file(folder / "map.stillmap");
+  StaticMap after{StaticMapConfig{}};
+  after.use_shelf(store->shelf());
+  const StoredMap shelved = store->load_shelved();
+  after.restore(shelved.view, shelved.memories);
+  EXPECT_EQ(after.memory_use().resident_tiles, 0U);
+  EXPECT_EQ(places(after.removed(test::everywhere())), removed);
+  after.take_back_near(Vector3d::Zero(), PagedMap::limit_bytes);
+  EXPECT_LE(after.memory_use().bytes, PagedMap::limit_bytes);
+  EXPECT_GT(after.memory_use().resident_tiles, 5U);
+  EXPECT_EQ(after.view()->tiles.size(), shelved.view.tiles.size());
+  EXPECT_GT(after.restore_removed(RemovalReason::moving, test::everywhere()), 100U);
+}
+
+/// Has lost one tile.
+class FaultyShelf : public TileShelf {
+ public:
+  FaultyShelf(std::shared_ptr<TileShelf> sound, TileId lost)
+      : sound_(std::move(sound)), lost_(lost) {}
+  TileRecord take(TileId id) override {
+    if (id == lost_) throw std::runtime_error("the disk is broken");
+    return sound_->take(id);
+  }
+
+ private:
+  std::shared_ptr<TileShelf> sound_;
+  TileId lost_;
+};
+
+TEST(MapPaging, ATileThatCannotBeReadStaysAsItIsStored) {
+  const ScratchFolder folder;
+  PagedMap before(open_map_file(folder / "map.stillmap"));
+  before.drive();
+  const StoredMap whole = before.whole();
+
+  const auto store = open_map_file(folder / "map.stillmap");
+  StaticMap after{StaticMapConfig{}};
+  after.use_shelf(std::make_shared<FaultyShelf>(store->shelf(), TileId{2, 0}));
+  const StoredMap shelved = store->load_shelved();
+  after.restore(shelved.view, shelved.memories);
+  Drive drive(after);
+  for (int scan = 0; scan < 10; ++scan) drive.see(scan);
+  EXPECT_THAT(after.unreadable_tiles(), testing::ElementsAre("tile (2, 0): the disk is broken"));
+  store->save(to_store(after.checkpoint()));
+  const auto tile_of = [](const StoredMap& map) {
+    return *std::ranges::find(map.view.tiles, TileId{2, 0},
+                              [](const auto& tile) { return tile->info.id; });
+  };
+  EXPECT_EQ(tile_of(store->load())->info.content_hash, tile_of(whole)->info.content_hash);
+}
+
+TEST(MapPaging, AFileOfTheFirstFormatIsReadAndUpgradedByTheFirstSave) {
+  const ScratchFolder folder;
+  const auto file = folder / "old.stillmap";
+  StaticMap map = test::street_map(3, 100);
+  const StoredMap stored{*map.view(), {}, {}, {{"sensor", "HDL-64E"}}};
+  open_map_file(file)->save(stored);
+  {
+    SQLite::Database database(file.string(), SQLite::OPEN_READWRITE);
+    database.exec("CREATE TABLE t AS SELECT x, y, revision, content_hash, encoded FROM tiles");
+    database.exec("DROP TABLE tiles; DROP TABLE memories");
+    database.exec(
+        "CREATE TABLE tiles (x INTEGER NOT NULL, y INTEGER NOT NULL, revision INTEGER NOT NULL, "
+        "content_hash INTEGER NOT NULL, encoded BLOB NOT NULL, PRIMARY KEY (x, y))");
+    database.exec("INSERT INTO tiles SELECT * FROM t; DROP TABLE t; PRAGMA user_version = 1");
+  }
+  const auto store = open_map_file(file);
+  EXPECT_EQ(voxels_of(store->load().view).size(), voxels_of(stored.view).size());
+  const StoredMap shelved = store->load_shelved();
+  ASSERT_EQ(shelved.view.tiles.size(), stored.view.tiles.size());
+  for (std::size_t i = 0; i < stored.view.tiles.size(); ++i) {
+    EXPECT_EQ(shelved.view.tiles[i]->info.voxel_count, stored.view.tiles[i]->info.voxel_count);
+    EXPECT_TRUE(shelved.view.tiles[i]->info.bounds_map.isApprox(
+        stored.view.tiles[i]->info.bounds_map, 1e-6F));
+  }
+  EXPECT_EQ(voxels_of(store->load().view).size(), voxels_of(stored.view).size());
+}
+
+TEST(MapPaging, ACopyHoldsEverything) {
+  const ScratchFolder folder;
+  PagedMap paged;
+  paged.drive();
+  const StoredMap whole = paged.whole();
+  paged.store_->copy_to(folder / "copy.stillmap");
+  const StoredMap copy = open_map_file(folder / "copy.stillmap")->load();
+  EXPECT_EQ(voxels_of(copy.view).size(), voxels_of(whole.view).size());
+  EXPECT_EQ(copy.memories.size(), whole.memories.size());
+}
+
+}  // namespace
+}  // namespace stillmap
