@@ -5,7 +5,7 @@ BUILD := build/$(PRESET)
 JOBS ?= $(shell nproc)
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages build demo test test-dev test-tsan bench table1 parity format format-check clean
+.PHONY: help packages build demo test test-dev test-tsan test-kill bench table1 parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -35,6 +35,9 @@ test-dev: ## The tests under ASan and UBSan, warnings as errors
 
 test-tsan: ## The tests under ThreadSanitizer
 	$(MAKE) test PRESET=tsan
+
+test-kill: build ## Kill the server at 50 random moments of mapping, and look at what is stored
+	STILLMAP_KILLS=50 $(BUILD)/tests/server/kill_test
 
 bench: build ## Benchmarks of every stage
 	@for b in $(BUILD)/tests/bench/*_bench; do echo "== $$b"; $$b || exit 1; done

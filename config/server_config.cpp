@@ -126,6 +126,7 @@ void read_publish(YamlSection section, PublishConfig& publish) {
 void read_map(YamlSection section, MapFileConfig& map) {
   section.path("file", map.file);
   section.number("save_period_s", map.save_period_s, {0.1, 86400});
+  section.whole("memory_limit_mib", map.memory_limit_mib, {0, 1 << 20});
   section.flag("load_at_start", map.load_at_start);
 }
 

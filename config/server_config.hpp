@@ -111,7 +111,11 @@ struct PublishConfig {
 struct MapFileConfig {
   /// Empty: the map is not saved.
   std::filesystem::path file;
-  double save_period_s = 30.0;
+  /// Between checkpoints: a server that is killed loses no more than this.
+  double save_period_s = 5.0;
+  /// Of the static map, its copies for readers and for queries. What is far away is on disk. 0: all
+  /// of the map stays in memory.
+  std::uint32_t memory_limit_mib = 2048;
   /// Go on with the map in `file` when it exists; else start empty.
   bool load_at_start = true;
 };

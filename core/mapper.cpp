@@ -181,7 +181,9 @@ bool Mapper::has_enough_points(const Scan& scan) {
   return false;
 }
 
-void Mapper::restore(const MapView& view) { static_map_.restore(view); }
+void Mapper::restore(const MapView& view, const TileMemories& memories) {
+  static_map_.restore(view, memories);
+}
 
 void Mapper::reset(std::uint64_t map_id) {
   odometry_.reset();

@@ -70,9 +70,12 @@ class Mapper {
   [[nodiscard]] std::string label_source() const { return label_feed_->name(); }
   [[nodiscard]] std::shared_ptr<const MapView> map_view() { return static_map_.view(); }
 
+  /// What is stored of it, what of it is in memory, and what was removed from it.
+  [[nodiscard]] StaticMap& static_map() { return static_map_; }
+
   /// Takes over a stored static map; the next scans extend it. The lidar starts at the map's
   /// origin.
-  void restore(const MapView& view);
+  void restore(const MapView& view, const TileMemories& memories = {});
 
   /// Forgets poses and maps; the next scan starts map `map_id` at the origin.
   void reset(std::uint64_t map_id);

@@ -1,10 +1,16 @@
 #include "server/map_board.hpp"
 
 #include <algorithm>
+#include <chrono>
 #include <functional>
 #include <utility>
 
 namespace stillmap {
+
+// The wall clock sees to it that it differs.
+std::uint64_t new_map_id() {
+  return static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
+}
 
 void MapBoard::begin(std::shared_ptr<const MapView> view, Trajectory trajectory) {
   auto history = std::make_shared<const TileHistory>(history_from(*view));

@@ -11,6 +11,9 @@
 
 namespace stillmap {
 
+/// An id that no map of an earlier run has.
+[[nodiscard]] std::uint64_t new_map_id();
+
 /// What the mapper's thread shows to all others: immutable views, so that nobody waits for
 /// anybody. Thread-safe.
 class MapBoard {

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <limits>
 #include <utility>
 
 #include "server/paced_labels.hpp"
@@ -19,9 +20,10 @@ double milliseconds(Clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
 }
 
-// Ids must differ from those of maps that earlier runs made: the wall clock sees to that.
-std::uint64_t new_map_id() {
-  return static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
+// The rest is for copies: in the writers' histories, and for queries.
+std::size_t map_share_bytes(const MapFileConfig& config) {
+  if (config.memory_limit_mib == 0) return std::numeric_limits<std::size_t>::max();
+  return (std::size_t{config.memory_limit_mib} << 20) / 4 * 3;
 }
 
 // Where a scan is expected in a map that was loaded: where the robot was at that time, if it is a
@@ -36,9 +38,11 @@ std::optional<Eigen::Isometry3d> pose_in_restored_map(const Trajectory& stored,
 }  // namespace
 
 MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSource> label_source,
-                             const std::optional<StoredMap>& stored, ScanQueue& queue,
+                             const std::optional<StoredMap>& stored,
+                             std::shared_ptr<TileShelf> shelf, ScanQueue& queue,
                              Statistics& statistics, MapBoard& board, const MappingOutputs& outputs)
-    : lidar_frame_(config.frames.lidar),
+    : map_limit_bytes_(map_share_bytes(config.map)),
+      lidar_frame_(config.frames.lidar),
       view_period_(config.publish.tiles_period_s),
       queue_(queue),
       statistics_(statistics),
@@ -48,9 +52,14 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSo
               std::make_unique<PacedLabels>(std::move(label_source), label_budget(config), queue,
                                             statistics),
               [this](std::string_view stage) { stage_ended(stage); }) {
+  mapper_.static_map().use_shelf(std::move(shelf));
   if (stored && !stored->view.tiles.empty()) {
-    mapper_.restore(stored->view);
-    board_.begin(mapper_.map_view(), stored->trajectory);
+    mapper_.restore(stored->view, stored->memories);
+    const Trajectory& path = stored->trajectory;
+    const Eigen::Vector3d last_map =
+        path.empty() ? Eigen::Vector3d(0.0, 0.0, 0.0) : path.back().T_map_lidar.translation();
+    mapper_.static_map().take_back_near(last_map, map_limit_bytes_);
+    board_.begin(mapper_.map_view(), path);
   } else {
     mapper_.reset(new_map_id());
     board_.begin(mapper_.map_view(), {});
@@ -72,10 +81,51 @@ void MappingThread::show_now() {
   between_scans([this] { show_view(); });
 }
 
+void MappingThread::stop() {
+  thread_ = {};
+  const std::scoped_lock lock(asked_mutex_);
+  has_stopped_ = true;
+  for (std::packaged_task<void()>& task : std::exchange(asked_, {})) task();
+}
+
+RunCheckpoint MappingThread::checkpoint(bool everything) {
+  MapCheckpoint map;
+  Trajectory trajectory;
+  between_scans([&] {
+    const auto began = Clock::now();
+    map = mapper_.static_map().checkpoint(everything);
+    board_.show(map.view);
+    trajectory = board_.trajectory();
+    statistics_.add_latency("checkpoint", milliseconds(Clock::now() - began));
+  });
+  RunCheckpoint checkpoint{stored_state(map), map.step};
+  checkpoint.map.trajectory = std::move(trajectory);
+  return checkpoint;
+}
+
+void MappingThread::checkpoint_stored(std::uint64_t step) {
+  between_scans([&] {
+    StaticMap& map = mapper_.static_map();
+    map.checkpoint_stored(step);
+    map.shelve(board_.newest_pose().T_map_lidar.translation(), map_limit_bytes_);
+    for (const std::string& fault : map.unreadable_tiles()) {
+      warnings_.warn("tiles_unreadable", "not mapped there: " + fault);
+    }
+    statistics_.map_takes(map.memory_use(), map.unreadable_tiles().size());
+  });
+}
+
+MemoryUse MappingThread::memory_use() {
+  MemoryUse use;
+  between_scans([&] { use = mapper_.static_map().memory_use(); });
+  return use;
+}
+
 void MappingThread::between_scans(std::function<void()> action) {
   std::future<void> done;
   {
     const std::scoped_lock lock(asked_mutex_);
+    if (has_stopped_) return action();
     done = asked_.emplace_back(std::move(action)).get_future();
   }
   done.get();

@@ -13,6 +13,7 @@
 #include "core/map/map_file.hpp"
 #include "core/mapper.hpp"
 #include "server/map_board.hpp"
+#include "server/map_saver.hpp"
 #include "server/odometry_prior.hpp"
 #include "server/publishers/labelled_scan_publisher.hpp"
 #include "server/publishers/pose_publisher.hpp"
@@ -34,15 +35,27 @@ struct MappingOutputs {
 class MappingThread {
  public:
   /// Throws std::invalid_argument for a mapper configuration with faults. Goes on with `stored`
-  /// when there is one: its map is extended, and the first scan is expected where it ended.
+  /// when there is one: its map is extended, and the first scan is expected where it ended. Tiles
+  /// that are away come from `shelf`, to which they may go when it is not null.
   MappingThread(const ServerConfig& config, std::unique_ptr<LabelSource> label_source,
-                const std::optional<StoredMap>& stored, ScanQueue& queue, Statistics& statistics,
-                MapBoard& board, const MappingOutputs& outputs);
+                const std::optional<StoredMap>& stored, std::shared_ptr<TileShelf> shelf,
+                ScanQueue& queue, Statistics& statistics, MapBoard& board,
+                const MappingOutputs& outputs);
+
+  /// Maps no more. What follows is done in the caller's thread.
+  void stop();
 
   /// Forgets poses and map, after the scan in work; returns the id of the new map.
   [[nodiscard]] std::uint64_t reset();
   /// Shows on the board what was mapped so far, the scan in work included.
   void show_now();
+
+  /// What changed since what was stored last, or everything, and the path to it; it is on the
+  /// board, too.
+  [[nodiscard]] RunCheckpoint checkpoint(bool everything);
+  /// Everything up to this step of a checkpoint is stored: far tiles may leave memory.
+  void checkpoint_stored(std::uint64_t step);
+  [[nodiscard]] MemoryUse memory_use();
 
  private:
   void work(const std::stop_token& stop);
@@ -54,6 +67,8 @@ class MappingThread {
   void between_scans(std::function<void()> action);
   void run_asked();
 
+  /// For what the map itself takes.
+  std::size_t map_limit_bytes_;
   std::string lidar_frame_;
   std::chrono::duration<double> view_period_;
   ScanQueue& queue_;
@@ -66,6 +81,7 @@ class MappingThread {
   double labels_ms_ = 0.0;
   std::chrono::steady_clock::time_point view_shown_;
   std::mutex asked_mutex_;
+  bool has_stopped_ = false;
   std::vector<std::packaged_task<void()>> asked_;
   // Last: stops before what it uses is gone.
   std::jthread thread_;

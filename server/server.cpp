@@ -51,7 +51,9 @@ std::optional<StoredMap> stored_map(MapSaver& saver, const MapFileConfig& config
 Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_source)
     : topics_(Topics::in(config.topics.name_space)),
       queue_(config.input.queue_length),
-      saver_(board_, config.map.file, file_metadata(config, *label_source)),
+      saver_(board_, config.map.file, file_metadata(config, *label_source),
+             config.map.memory_limit_mib),
+      tiles_(saver_.shelf(), (std::size_t{config.map.memory_limit_mib} << 20) / 8),
       participant_(dds_options(config.dds)),
       poses_(participant_, topics_, config.frames),
       report_(delivery_mode(config.input.delivery), label_source->name(),
@@ -64,14 +66,18 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
   const MappingOutputs outputs{
       .poses = &poses_, .scans = scans_ ? &*scans_ : nullptr, .prior = prior_ ? &*prior_ : nullptr};
   mapping_ = std::make_unique<MappingThread>(config, std::move(label_source),
-                                             stored_map(saver_, config.map), queue_, statistics_,
-                                             board_, outputs);
+                                             stored_map(saver_, config.map), saver_.shelf(), queue_,
+                                             statistics_, board_, outputs);
+  saver_.follow({.take = [this](bool everything) { return mapping_->checkpoint(everything); },
+                 .stored = [this](std::uint64_t step) { mapping_->checkpoint_stored(step); },
+                 .map_bytes = [this] { return mapping_->memory_use().bytes; }});
   receiver_ = std::make_unique<ScanReceiver>(participant_, config, queue_, statistics_);
   map_publisher_ = std::make_unique<MapPublisher>(participant_, topics_, config, board_);
   const auto status = [this] { return report_.status(); };
   services_ =
       std::make_unique<ServiceDesk>(participant_, Services::in(config.topics.name_space),
                                     ServiceContext{.board = board_,
+                                                   .tiles = tiles_,
                                                    .saver = saver_,
                                                    .status = status,
                                                    .reset = [this] { return mapping_->reset(); },
@@ -90,8 +96,8 @@ void Server::stop() {
   services_.reset();
   status_publisher_.reset();
   receiver_.reset();
-  mapping_.reset();
-  saver_.save_if_changed();
+  mapping_->stop();
+  saver_.save_at_end();
 }
 
 void Server::save_in_background() {

@@ -36,6 +36,7 @@ class Server {
   MapBoard board_;
   ScanQueue queue_;
   MapSaver saver_;
+  TileReader tiles_;
   Participant participant_;
   PosePublisher poses_;
   std::optional<LabelledScanPublisher> scans_;

@@ -93,6 +93,12 @@ void Statistics::scan_took_besides_labels(double milliseconds) {
   besides_labels_ms_.add(milliseconds);
 }
 
+void Statistics::map_takes(const MemoryUse& memory, std::size_t unreadable_tiles) {
+  const std::scoped_lock lock(mutex_);
+  map_memory_ = memory;
+  unreadable_tiles_ = unreadable_tiles;
+}
+
 void Statistics::report_to(ServerStatus& status) const {
   const std::scoped_lock lock(mutex_);
   const auto now = RateWindow::Clock::now();
@@ -100,6 +106,13 @@ void Statistics::report_to(ServerStatus& status) const {
   status.mapped_hz = mapped_rate_.rate_hz(now);
   status.counters = {{.name = "scans_received", .value = received_},
                      {.name = "scans_mapped", .value = mapped_}};
+  if (map_memory_.bytes > 0) {
+    status.counters.push_back({.name = "map_memory_kib", .value = map_memory_.bytes >> 10});
+    status.counters.push_back({.name = "map_tiles_away", .value = map_memory_.away_tiles});
+  }
+  if (unreadable_tiles_ > 0) {
+    status.counters.push_back({.name = "map_tiles_unreadable", .value = unreadable_tiles_});
+  }
   if (label_failures_ > 0) {
     status.counters.push_back({.name = "label_failures", .value = label_failures_});
   }

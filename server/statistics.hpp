@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/label_feed.hpp"
+#include "core/map/static_map.hpp"
 #include "idl/server_status.hpp"
 #include "server/latency_window.hpp"
 #include "server/recent_median.hpp"
@@ -52,6 +53,9 @@ class Statistics {
   /// All that was done with a scan, without its labels, took so long.
   void scan_took_besides_labels(double milliseconds);
 
+  /// What the static map takes now, and how many of its tiles cannot be read.
+  void map_takes(const MemoryUse& memory, std::size_t unreadable_tiles);
+
   /// Fills in counters, rates, latencies and segmentation.
   void report_to(ServerStatus& status) const;
 
@@ -79,6 +83,8 @@ class Statistics {
   RecentMedian besides_labels_ms_{9};
   SegmentationStatus segmentation_;
   std::uint64_t label_failures_ = 0;
+  MemoryUse map_memory_;
+  std::size_t unreadable_tiles_ = 0;
   std::string last_label_failure_;
 };
 

@@ -131,11 +131,14 @@ class SqliteTileStore : public TileStore {
     return std::make_shared<SqliteShelf>(file_, folder_);
   }
 
-  void rename_map(std::uint64_t map_id) override {
+  void begin_run(std::uint64_t map_id) override {
     writing([&] {
       SQLite::Statement rename(database_, "UPDATE map SET map_id = ?");
       rename.bind(1, static_cast<std::int64_t>(map_id));
       rename.exec();
+      SQLite::Statement reopen(database_, "DELETE FROM metadata WHERE key = ?");
+      reopen.bind(1, map_ended_key);
+      reopen.exec();
     });
   }
 
@@ -181,6 +184,16 @@ class SqliteTileStore : public TileStore {
 };
 
 }  // namespace
+
+StoredMap stored_state(const MapCheckpoint& checkpoint) {
+  StoredMap map{*checkpoint.view, {}, {}, {}};
+  for (const auto& [id, record] : checkpoint.records) map.memories.emplace(id, record.memory);
+  for (auto& tile : map.view.tiles) {
+    const auto record = checkpoint.records.find(tile->info.id);
+    if (record != checkpoint.records.end() && record->second.tile) tile = record->second.tile;
+  }
+  return map;
+}
 
 std::unique_ptr<TileStore> open_map_file(const fs::path& file) {
   return std::make_unique<SqliteTileStore>(file);

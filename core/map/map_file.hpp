@@ -21,6 +21,10 @@ class MapFileError : public std::runtime_error {
       : std::runtime_error(file.string() + ": " + fault) {}
 };
 
+/// Key of the metadata that says that the map was saved when its run ended: versions of it that a
+/// client may have seen are all stored.
+inline constexpr const char* map_ended_key = "ended";
+
 /// What a map file holds.
 struct StoredMap {
   MapView view;
@@ -31,6 +35,9 @@ struct StoredMap {
   /// Free key-value pairs: "sensor", "label_source", "software".
   std::map<std::string, std::string> metadata;
 };
+
+/// A checkpoint as it is stored.
+[[nodiscard]] StoredMap stored_state(const MapCheckpoint& checkpoint);
 
 /// Where tiles are kept between runs. The narrow waist behind which SQLite may one day be another
 /// database.
@@ -48,8 +55,8 @@ class TileStore {
   [[nodiscard]] virtual StoredMap load_shelved() = 0;
   /// Where those tiles are; may be used beside the store, and after it.
   [[nodiscard]] virtual std::shared_ptr<TileShelf> shelf() = 0;
-  /// Gives the stored map another id: its next save goes on from it.
-  virtual void rename_map(std::uint64_t map_id) = 0;
+  /// Mapping goes on from what is stored: under this id from now on, and not ended.
+  virtual void begin_run(std::uint64_t map_id) = 0;
   /// Writes the last saved state to another file, in the place of what is there. Throws
   /// MapFileError.
   virtual void copy_to(const std::filesystem::path& file) = 0;

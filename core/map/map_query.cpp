@@ -20,6 +20,7 @@ struct Selection {
   const MapQuery& query;
   RegionShape region;
   std::vector<std::size_t> tiles;
+  TileReader& reader;
 };
 
 /// A page of the map's own voxels, from `position` on, which moves on to the next page's first
@@ -28,7 +29,8 @@ bool fill_page(const Selection& from, Continuation& position, std::vector<QueryV
   const std::size_t page_size = from.query.max_bytes / query_voxel_bytes;
   for (const std::size_t i : from.tiles) {
     if (i < position.tile) continue;
-    const Tile& tile = *from.view.tiles[i];
+    const auto read = from.reader.whole(from.view.tiles[i]);
+    const Tile& tile = *read;
     const VoxelFilter filter(from.query, from.region, tile);
     for (std::size_t v = i == position.tile ? position.voxel : 0; v < tile.voxels.size(); ++v) {
       if (!filter.takes(tile.voxels[v])) continue;
@@ -49,9 +51,9 @@ bool fill_coarse_page(const Selection& from, Continuation& position,
                       std::vector<QueryVoxel>& page) {
   CoarseCells cells(from.query.resolution_m);
   for (const std::size_t i : from.tiles) {
-    const Tile& tile = *from.view.tiles[i];
-    const VoxelFilter filter(from.query, from.region, tile);
-    for (const Voxel& voxel : tile.voxels) {
+    const auto tile = from.reader.whole(from.view.tiles[i]);
+    const VoxelFilter filter(from.query, from.region, *tile);
+    for (const Voxel& voxel : tile->voxels) {
       if (filter.takes(voxel)) cells.add(voxel);
     }
   }
@@ -95,19 +97,20 @@ Start start_of(const MapView& view, const MapQuery& query, const TileHistory* hi
 /// Tiles and total of an answer, for its first page.
 void describe(const Selection& selection, const TileHistory* history, Continuation& position,
               MapQueryResult& result) {
-  result.tiles =
-      tile_changes(selection.view, selection.query, selection.region, selection.tiles, history);
+  result.tiles = tile_changes(selection.view, selection.query, selection.region, selection.tiles,
+                              history, selection.reader);
   for (const TileChange& tile : result.tiles) position.total_voxels += tile.voxel_count;
 }
 
 }  // namespace
 
-MapQueryResult query_map(const MapView& view, const MapQuery& query, const TileHistory* history) {
+MapQueryResult query_map(const MapView& view, const MapQuery& query, const TileHistory* history,
+                         TileReader& reader) {
   auto [position, refusal] = start_of(view, query, history);
   if (refusal) return result_of(view, refusal->status, std::move(refusal->reason));
 
   const RegionShape region(query.region);
-  const Selection selection{view, query, region, selected_tiles(view, query, region)};
+  const Selection selection{view, query, region, selected_tiles(view, query, region), reader};
   const bool is_coarse = wants_coarse(view, query.resolution_m);
   MapQueryResult result = result_of(view, QueryStatus::ok, {});
   if (!is_coarse && query.continuation.empty()) describe(selection, history, position, result);
@@ -116,6 +119,11 @@ MapQueryResult query_map(const MapView& view, const MapQuery& query, const TileH
   result.total_voxels = position.total_voxels;
   if (has_more) result.continuation = to_token(position);
   return result;
+}
+
+MapQueryResult query_map(const MapView& view, const MapQuery& query, const TileHistory* history) {
+  TileReader reader;
+  return query_map(view, query, history, reader);
 }
 
 std::optional<std::uint64_t> continuation_version(const std::string& continuation) {

@@ -20,15 +20,13 @@ TileChangeKind kind_of(const TileInfo& info, const MapQuery& query, const TileHi
 
 VoxelFilter::VoxelFilter(const MapQuery& query, const RegionShape& region, const Tile& tile)
     : query_(query),
-      tile_(tile),
       is_inside_(region.covers(tile.info.bounds_map.cast<double>())),
       takes_all_classes_(query.classes.none() || query.classes.all()),
       near_(region.near(tile.info.bounds_map.cast<double>())) {}
 
-std::uint32_t VoxelFilter::count() const {
-  if (takes_all()) return static_cast<std::uint32_t>(tile_.voxels.size());
+std::uint32_t VoxelFilter::count(const Tile& tile) const {
   return static_cast<std::uint32_t>(
-      std::ranges::count_if(tile_.voxels, [&](const Voxel& voxel) { return takes(voxel); }));
+      std::ranges::count_if(tile.voxels, [&](const Voxel& voxel) { return takes(voxel); }));
 }
 
 std::vector<std::size_t> selected_tiles(const MapView& view, const MapQuery& query,
@@ -53,13 +51,15 @@ std::vector<std::size_t> selected_tiles(const MapView& view, const MapQuery& que
 std::vector<TileChange> tile_changes(const MapView& view, const MapQuery& query,
                                      const RegionShape& region,
                                      const std::vector<std::size_t>& selected,
-                                     const TileHistory* history) {
+                                     const TileHistory* history, TileReader& reader) {
   std::vector<TileChange> changes;
   changes.reserve(selected.size());
   for (const std::size_t i : selected) {
-    const Tile& tile = *view.tiles[i];
-    changes.push_back({tile.info.id, kind_of(tile.info, query, history), tile.info.revision,
-                       VoxelFilter(query, region, tile).count()});
+    const TileInfo& info = view.tiles[i]->info;
+    const VoxelFilter filter(query, region, *view.tiles[i]);
+    const std::uint32_t count =
+        filter.takes_all() ? info.voxel_count : filter.count(*reader.whole(view.tiles[i]));
+    changes.push_back({info.id, kind_of(info, query, history), info.revision, count});
   }
   if (!query.since || history == nullptr) return changes;
   for (const auto& [id, version] : history->gone) {

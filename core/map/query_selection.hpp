@@ -5,12 +5,14 @@
 
 #include "core/map/map_query.hpp"
 #include "core/map/region_shape.hpp"
+#include "core/map/tile_reader.hpp"
 
 namespace stillmap {
 
 /// Which voxels of a tile are asked for.
 class VoxelFilter {
  public:
+  /// The tile may be away: its info tells whether all of it is taken.
   VoxelFilter(const MapQuery& query, const RegionShape& region, const Tile& tile);
 
   [[nodiscard]] bool takes_all() const { return is_inside_ && takes_all_classes_; }
@@ -19,12 +21,11 @@ class VoxelFilter {
            (takes_all_classes_ ||
             query_.classes.test(static_cast<std::size_t>(voxel.evidence.winner())));
   }
-  /// How many voxels of the tile it takes.
-  [[nodiscard]] std::uint32_t count() const;
+  /// How many of the tile's voxels it takes.
+  [[nodiscard]] std::uint32_t count(const Tile& tile) const;
 
  private:
   const MapQuery& query_;
-  const Tile& tile_;
   bool is_inside_;
   bool takes_all_classes_;
   RegionShape near_;
@@ -40,6 +41,6 @@ class VoxelFilter {
 [[nodiscard]] std::vector<TileChange> tile_changes(const MapView& view, const MapQuery& query,
                                                    const RegionShape& region,
                                                    const std::vector<std::size_t>& selected,
-                                                   const TileHistory* history);
+                                                   const TileHistory* history, TileReader& reader);
 
 }  // namespace stillmap

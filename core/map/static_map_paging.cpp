@@ -1,4 +1,6 @@
 // What of the static map is in memory, and what is stored.
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -56,9 +58,18 @@ void StaticMap::use_shelf(std::shared_ptr<TileShelf> shelf) { state_->shelf = st
 
 MapCheckpoint StaticMap::checkpoint(bool everything) {
   MapCheckpoint checkpoint{view(), state_->step++, {}};
+  std::vector<const LiveTile*> changed;
   for (const auto& [id, resident] : state_->tiles) {
-    if (!everything && resident.changed_at <= state_->stored_step) continue;
-    checkpoint.records.emplace(id, resident.live->record(state_->rule(), state_->grid));
+    if (everything || resident.changed_at > state_->stored_step) {
+      changed.push_back(resident.live.get());
+    }
+  }
+  std::vector<TileRecord> records(changed.size());
+  tbb::parallel_for(std::size_t{0}, changed.size(), [&](std::size_t i) {
+    records[i] = changed[i]->record(state_->rule(), state_->grid);
+  });
+  for (std::size_t i = 0; i < changed.size(); ++i) {
+    checkpoint.records.emplace(changed[i]->id(), std::move(records[i]));
   }
   return checkpoint;
 }

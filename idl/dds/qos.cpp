@@ -47,6 +47,12 @@ DataWriterQos writer_qos(const TopicQos& qos) {
   out.reliable_writer_qos().times.heartbeatPeriod = to_duration(std::chrono::milliseconds(50));
   // Asynchronous writers lose KEEP_LAST samples.
   out.publish_mode().kind = SYNCHRONOUS_PUBLISH_MODE;
+  // Instances of many sizes come and go: what is forgotten is to be free.
+  if (qos.max_keys > 1) {
+    out.endpoint().history_memory_policy = eprosima::fastrtps::rtps::DYNAMIC_RESERVE_MEMORY_MODE;
+  }
+  // Who has an instance that is forgotten here, keeps it.
+  out.writer_data_lifecycle().autodispose_unregistered_instances = false;
   return out;
 }
 

@@ -75,4 +75,8 @@ void UntypedWriter::dispose_untyped(const void* sample) {
   writer_->dispose(mutable_sample(sample), HANDLE_NIL);
 }
 
+void UntypedWriter::forget_untyped(const void* sample) {
+  writer_->unregister_instance(mutable_sample(sample), HANDLE_NIL);
+}
+
 }  // namespace stillmap

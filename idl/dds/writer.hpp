@@ -53,6 +53,7 @@ class UntypedWriter {
   [[nodiscard]] bool write_untyped(const void* sample,
                                    eprosima::fastrtps::rtps::WriteParams& params);
   void dispose_untyped(const void* sample);
+  void forget_untyped(const void* sample);
 
  private:
   std::string topic_;
@@ -78,6 +79,9 @@ class Writer : public UntypedWriter {
 
   /// Tells readers that the instance with the sample's key is gone.
   void dispose(const T& sample) { dispose_untyped(&sample); }
+
+  /// Keeps the instance with the sample's key for late joiners no more; who has it keeps it.
+  void forget(const T& sample) { forget_untyped(&sample); }
 };
 
 }  // namespace stillmap

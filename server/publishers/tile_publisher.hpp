@@ -13,23 +13,30 @@
 namespace stillmap {
 
 /// Publishes every tile that changed, first its voxels and then its entry in the index, and takes
-/// back tiles that are gone: their voxels are disposed, their entry says that nothing is left.
+/// back tiles that are gone: their voxels are disposed, their entry says that nothing is left. Of
+/// tiles that left memory, late joiners get the entry alone.
 class TilePublisher {
  public:
   TilePublisher(Participant& participant, const Topics& topics);
 
-  void publish(const MapView& view);
+  void publish(const std::shared_ptr<const MapView>& shown);
 
  private:
   void publish_tile(const Tile& tile, const MapIdentity& identity);
+  void forget_voxels(const Tile& tile, const MapIdentity& identity);
   void take_back_missing(const MapView& view, const MapIdentity& identity);
 
   Writer<stillmap_msgs::msg::MapTile> tiles_;
   Writer<stillmap_msgs::msg::TileInfo> index_;
   std::uint64_t map_id_ = 0;
-  std::uint64_t version_ = 0;
-  /// What readers have: revision of every tile.
-  std::map<TileId, std::uint64_t> published_;
+  std::shared_ptr<const MapView> last_view_;
+  /// What readers have of a tile.
+  struct Published {
+    std::uint64_t revision = 0;
+    /// A late joiner gets the voxels, too.
+    bool has_voxels = false;
+  };
+  std::map<TileId, Published> published_;
 };
 
 }  // namespace stillmap

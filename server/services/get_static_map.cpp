@@ -20,7 +20,8 @@ stillmap_msgs::srv::GetStaticMap_Response GetStaticMap::operator()(
     if (!query) throw std::invalid_argument(fault);
     query->max_bytes = std::min(query->max_bytes, largest_page_bytes);
     const MapState state = state_for(*query);
-    const MapQueryResult result = query_map(*state.view, *query, state.history.get());
+    const MapQueryResult result =
+        query_map(*state.view, *query, state.history.get(), context_.tiles);
     if (!result.continuation.empty()) keep(state.view);
     response = wire::to_response(result);
   });

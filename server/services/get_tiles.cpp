@@ -10,10 +10,10 @@ namespace {
 // About 5 MB at 27 bytes a voxel. At least one tile is always sent.
 constexpr std::size_t most_voxels = 200'000;
 
-const Tile* find_tile(const MapView& view, TileId id) {
+std::shared_ptr<const Tile> find_tile(const MapView& view, TileId id) {
   const auto found =
       std::ranges::lower_bound(view.tiles, id, {}, [](const auto& tile) { return tile->info.id; });
-  return found != view.tiles.end() && (*found)->info.id == id ? found->get() : nullptr;
+  return found != view.tiles.end() && (*found)->info.id == id ? *found : nullptr;
 }
 
 }  // namespace
@@ -26,14 +26,14 @@ stillmap_msgs::srv::GetTiles_Response get_tiles(
     response.identity(wire::to_wire(identity));
     std::size_t voxels = 0;
     for (const auto& id : request.ids()) {
-      const Tile* const tile = find_tile(view, {id.x(), id.y()});
-      if (tile == nullptr) {
+      const auto known = find_tile(view, {id.x(), id.y()});
+      if (known == nullptr) {
         response.missing().push_back(id);
-      } else if (voxels > 0 && voxels + tile->voxels.size() > most_voxels) {
+      } else if (voxels > 0 && voxels + known->info.voxel_count > most_voxels) {
         response.left_out().push_back(id);
       } else {
-        voxels += tile->voxels.size();
-        response.tiles().push_back(wire::to_wire(*tile, identity));
+        voxels += known->info.voxel_count;
+        response.tiles().push_back(wire::to_wire(*context.tiles.whole(known), identity));
       }
     }
   });

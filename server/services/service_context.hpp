@@ -4,6 +4,7 @@
 #include <functional>
 #include <stdexcept>
 
+#include "core/map/tile_reader.hpp"
 #include "idl/conversions/map_query.hpp"
 #include "idl/server_status.hpp"
 #include "server/map_board.hpp"
@@ -14,6 +15,8 @@ namespace stillmap {
 /// What the services answer from.
 struct ServiceContext {
   const MapBoard& board;
+  /// For what is not in memory.
+  TileReader& tiles;
   MapSaver& saver;
   std::function<ServerStatus()> status;
   /// Returns the new map's id.
@@ -42,6 +45,8 @@ template <typename Reply, typename Request, typename Fill>
   try {
     reply.status(reply_status(*view));
     fill(*view, reply);
+  } catch (const TileChanged& fault) {
+    reply.status(reply_status(*view, wire::ReplyCode::stale_continuation, fault.what()));
   } catch (const std::invalid_argument& fault) {
     reply.status(reply_status(*view, wire::ReplyCode::invalid_request, fault.what()));
   } catch (const std::exception& fault) {

@@ -16,16 +16,6 @@ namespace {
 using Eigen::Isometry3d;
 using Eigen::Vector3d;
 
-StoredMap to_store(const MapCheckpoint& checkpoint) {
-  StoredMap map{*checkpoint.view, {}, {}, {}};
-  for (const auto& [id, record] : checkpoint.records) map.memories.emplace(id, record.memory);
-  for (auto& tile : map.view.tiles) {
-    const auto record = checkpoint.records.find(tile->info.id);
-    if (record != checkpoint.records.end()) tile = record->second.tile;
-  }
-  return map;
-}
-
 /// Drives along x and back, twelve metres a scan, with a car that stands at every hundredth metre
 /// on the way out and is gone on the way back.
 class Drive {
@@ -73,7 +63,7 @@ class PagedMap {
       drive.see(scan);
       if (scan % 4 != 3) continue;
       const MapCheckpoint checkpoint = map_.checkpoint();
-      store_->save(to_store(checkpoint));
+      store_->save(stored_state(checkpoint));
       map_.checkpoint_stored(checkpoint.step);
       shelved_ += map_.shelve(Vector3d(Drive::x_of(scan), 0.0, 0.0), limit_bytes);
       peak_bytes_ = std::max(peak_bytes_, map_.memory_use().bytes);
@@ -81,7 +71,7 @@ class PagedMap {
   }
   /// Everything, whether in memory or not.
   [[nodiscard]] StoredMap whole() {
-    store_->save(to_store(map_.checkpoint()));
+    store_->save(stored_state(map_.checkpoint()));
     return store_->load();
   }
 
@@ -211,7 +201,7 @@ TEST(MapPaging, ATileThatCannotBeReadStaysAsItIsStored) {
   Drive drive(after);
   for (int scan = 0; scan < 10; ++scan) drive.see(scan);
   EXPECT_THAT(after.unreadable_tiles(), testing::ElementsAre("tile (2, 0): the disk is broken"));
-  store->save(to_store(after.checkpoint()));
+  store->save(stored_state(after.checkpoint()));
   const auto tile_of = [](const StoredMap& map) {
     return *std::ranges::find(map.view.tiles, TileId{2, 0},
                               [](const auto& tile) { return tile->info.id; });

@@ -84,6 +84,51 @@ TEST(Restart, KillBetweenTwoSavesLosesNothingSaved) {
   EXPECT_EQ(client.get_tile_versions().tiles.size(), stored.view.tiles.size());
 }
 
+TEST(Restart, WhatDoesNotFitIntoMemoryIsServedFromTheFile) {
+  const ServiceSetup setup("every", "save_period_s: 0.2, memory_limit_mib: 1");
+  run_server(setup, 0, 30, terminate);
+  const StoredMap stored = open_map_file(setup.map_file())->load();
+
+  const ServerProcess next(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  const MapQueryResult all = client.get_whole_static_map(MapQuery{});
+  std::size_t voxels = 0;
+  std::vector<TileId> ids;
+  for (const auto& tile : stored.view.tiles) {
+    voxels += tile->voxels.size();
+    ids.push_back(tile->info.id);
+  }
+  EXPECT_EQ(all.voxels.size(), voxels);
+  const TileSet tiles = client.get_tiles(ids);
+  ASSERT_EQ(tiles.tiles.size(), ids.size());
+  std::size_t in_tiles = 0;
+  for (const Tile& tile : tiles.tiles) in_tiles += tile.voxels.size();
+  EXPECT_EQ(in_tiles, voxels);
+
+  // And mapping goes on in it.
+  ScanPublisher publisher(setup.publisher(true));
+  drive(publisher, 30, 34);
+  EXPECT_TRUE(wait_for_scans(client, 4));
+  EXPECT_EQ(client.status().counter("map_tiles_unreadable"), 0U);
+}
+
+TEST(Restart, OnlyAMapThatWasSavedAtTheEndKeepsItsId) {
+  const ServiceSetup setup("every");
+  run_server(setup, 0, 6, terminate);
+  const auto stored_id = [&] { return open_map_file(setup.map_file())->load().view.map_id; };
+  const std::uint64_t first = stored_id();
+  run_server(setup, 6, 8, [](ServerProcess& server, Client& client) {
+    client.save_map();
+    server.send(SIGKILL);
+    EXPECT_EQ(server.wait_for_exit(patience), -1);
+  });
+  EXPECT_EQ(stored_id(), first);
+  // What clients saw of the map after the save is not in the file: versions would be given twice.
+  run_server(setup, 8, 9, terminate);
+  EXPECT_NE(stored_id(), first);
+}
+
 TEST(Startup, RefusesWhatCannotWorkWithAnExitCode) {
   const ScratchFolder folder;
   std::ofstream(folder / "wrong.yaml") << "no_such_field: 1\n";

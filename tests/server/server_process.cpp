@@ -48,14 +48,14 @@ int ServerProcess::wait_for_exit(std::chrono::seconds timeout) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-ServiceSetup::ServiceSetup(const std::string& delivery) {
+ServiceSetup::ServiceSetup(const std::string& delivery, const std::string& map_options) {
   std::ofstream(folder_ / "server.yaml")
       << "sensor: vlp_16\n"
       << "dds: {domain_id: " << test_domain_id() << ", interfaces: [127.0.0.1]}\n"
       << "input: {delivery: " << delivery << ", queue_length: 3}\n"
       << "publish: {path_period_s: 0.1, cloud_period_s: 0.1, tiles_period_s: 0.1, "
       << "status_period_s: 0.2}\n"
-      << "map: {file: map.stillmap, save_period_s: 3600}\n";
+      << "map: {file: map.stillmap, " << map_options << "}\n";
 }
 
 std::vector<std::string> ServiceSetup::server_arguments() const {

@@ -33,8 +33,9 @@ class ServerProcess {
 /// Files and options of one test's server and clients, in a domain of their own.
 class ServiceSetup {
  public:
-  /// `delivery`: "latest" or "every".
-  explicit ServiceSetup(const std::string& delivery);
+  /// `delivery`: "latest" or "every". `map_options`: fields of the section `map`.
+  explicit ServiceSetup(const std::string& delivery,
+                        const std::string& map_options = "save_period_s: 3600");
 
   [[nodiscard]] std::vector<std::string> server_arguments() const;
   [[nodiscard]] DdsOptions dds() const;

@@ -63,7 +63,7 @@ class SlowNetwork : public testing::Test {
 TEST_F(SlowNetwork, DelaysNoPoseBeyondTheBudgetAndIsUsedForEveryNthScan) {
   source_.delay_ms = 200;
   MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
-                        queue_, statistics_, board_, {});
+                        nullptr, queue_, statistics_, board_, {});
   drive(30);
   const ServerStatus slow = status();
   EXPECT_EQ(slow.counter("scans_mapped"), 30U);
@@ -88,7 +88,7 @@ TEST_F(SlowNetwork, DelaysNoPoseBeyondTheBudgetAndIsUsedForEveryNthScan) {
 TEST_F(SlowNetwork, ThatFailsLeavesPosesAndMap) {
   source_.fails = true;
   MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
-                        queue_, statistics_, board_, {});
+                        nullptr, queue_, statistics_, board_, {});
   drive(8);
   const ServerStatus failing = status();
   EXPECT_EQ(failing.counter("scans_mapped"), 8U);
@@ -107,7 +107,7 @@ TEST_F(SlowNetwork, DoesNotHoldUpTheEnd) {
   const auto began = Clock::now();
   {
     MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
-                          queue_, statistics_, board_, {});
+                          nullptr, queue_, statistics_, board_, {});
     drive(2);
   }
   EXPECT_LT(Clock::now() - began, 2s);
