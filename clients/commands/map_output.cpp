@@ -36,10 +36,12 @@ PosePairs pairs_of(const Trajectory& truth, const Trajectory& estimate) {
 void save_map(const std::filesystem::path& file, const MappingResult& result,
               const MapperConfig& config) {
   open_map_file(file)->save({.view = *result.view,
+                             .memories = result.memories,
                              .trajectory = result.trajectory,
                              .metadata = {{"sensor", config.sensor.name},
                                           {"label_source", result.label_source},
-                                          {"software", "stillmap " STILLMAP_VERSION}}});
+                                          {"software", "stillmap " STILLMAP_VERSION},
+                                          {map_ended_key, "yes"}}});
 }
 
 }  // namespace

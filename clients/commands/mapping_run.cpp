@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "core/dataset/dataset_error.hpp"
+#include "core/map/map_file.hpp"
 
 namespace stillmap {
 namespace {
@@ -51,7 +52,9 @@ class MappingRun {
 
   MappingResult finish(bool stopped) {
     result_.trajectory = mapper_.trajectory();
-    result_.view = mapper_.map_view();
+    StoredMap map = stored_state(mapper_.static_map().checkpoint(true));
+    result_.view = std::make_shared<const MapView>(std::move(map.view));
+    result_.memories = std::move(map.memories);
     result_.label_source = mapper_.label_source();
     result_.stages = times_.stages();
     result_.stopped = stopped;

@@ -38,6 +38,8 @@ struct MappingResult {
   /// Index in the recording of each pose of the trajectory.
   std::vector<std::size_t> scan_of_pose;
   std::shared_ptr<const MapView> view;
+  /// What the tiles know beside what they show.
+  TileMemories memories;
   std::string label_source;
   std::vector<SkippedScan> skipped;
   std::map<OdometryHealth, std::size_t> health;

@@ -84,7 +84,8 @@ MemoryUse StaticMap::memory_use() const {
 
 std::size_t StaticMap::shelve(const Eigen::Vector3d& position_map, std::size_t limit_bytes) {
   std::size_t bytes = state_->memory_bytes();
-  if (state_->shelf == nullptr || bytes <= limit_bytes) return 0;
+  // Before it is reached: the map goes on growing until the next checkpoint.
+  if (state_->shelf == nullptr || bytes <= limit_bytes - limit_bytes / 8) return 0;
   // Farther than scans reach, and than a turn would bring back at once.
   const double near_m = state_->config.max_range_m + 2.0 * state_->config.tile_size_m;
   std::vector<std::pair<double, TileId>> candidates;
@@ -96,7 +97,7 @@ std::size_t StaticMap::shelve(const Eigen::Vector3d& position_map, std::size_t l
   }
   std::ranges::sort(candidates, std::greater<>());
   // Some more than needed, so that not every scan has to shelve a tile.
-  const std::size_t wanted_bytes = limit_bytes - limit_bytes / 8;
+  const std::size_t wanted_bytes = limit_bytes - limit_bytes / 4;
   std::size_t shelved_tiles = 0;
   for (const auto& [distance_m, id] : candidates) {
     if (bytes <= wanted_bytes) break;
@@ -203,7 +204,7 @@ void StaticMap::take_back_near(const Eigen::Vector3d& position_map, std::size_t 
   std::ranges::sort(nearest);
   std::size_t bytes = state_->memory_bytes();
   for (const auto& [distance_m, id] : nearest) {
-    if (bytes >= limit_bytes - limit_bytes / 8) return;
+    if (bytes >= limit_bytes - limit_bytes / 4) return;
     if (state_->take_back(id)) bytes += state_->tiles.find(id)->second.live->memory_bytes();
   }
 }
