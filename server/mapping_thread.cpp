@@ -68,6 +68,18 @@ std::uint64_t MappingThread::reset() {
   return map_id;
 }
 
+void MappingThread::load(StoredMap stored) {
+  // Clients must not compare versions of what ran before with those of this map, even if it is the
+  // same map at an earlier time.
+  stored.view.map_id = new_map_id();
+  between_scans([this, &stored] {
+    mapper_.restore(stored.view);
+    board_.begin(mapper_.map_view(), std::move(stored.trajectory));
+    spdlog::info("loaded: going on with {} tiles as map {}", stored.view.tiles.size(),
+                 stored.view.map_id);
+  });
+}
+
 void MappingThread::show_now() {
   between_scans([this] { show_view(); });
 }

@@ -41,6 +41,10 @@ class MappingThread {
 
   /// Forgets poses and map, after the scan in work; returns the id of the new map.
   [[nodiscard]] std::uint64_t reset();
+  /// Goes on with this map, after the scan in work and under a new id: the next scan is expected
+  /// where its path ended. Throws std::invalid_argument when its voxels or tiles are not of the
+  /// configured size; then nothing changed.
+  void load(StoredMap stored);
   /// Shows on the board what was mapped so far, the scan in work included.
   void show_now();
 
