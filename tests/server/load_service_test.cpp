@@ -1,5 +1,6 @@
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <fstream>
 
 #include "core/map/map_file.hpp"
@@ -29,6 +30,8 @@ class LoadService : public testing::Test {
   }
   /// Why the server does not load `name`; it must go on as if nothing had been asked.
   std::string refusal(const std::string& name) {
+    // A save shows what was mapped until now: then nothing changes by itself.
+    client_.save_map("shown.stillmap");
     const ServerStatus before = client_.status();
     std::string why;
     try {
@@ -63,6 +66,10 @@ TEST_F(LoadService, GoesOnWhereTheLoadedPathEnded) {
   const StoredMap hall = open_map_file(beside("hall.stillmap"))->load();
   EXPECT_EQ(loaded.tile_count, hall.view.tiles.size());
   EXPECT_EQ(client_.status().map_id, loaded.map_id);
+  std::atomic<std::size_t> path_poses = 0;
+  const Subscription path =
+      client_.subscribe_path([&](const Trajectory& now) { path_poses = now.size(); });
+  EXPECT_TRUE(eventually([&] { return path_poses == 8U; })) << "the loaded path is shown";
   const TileVersions served = client_.get_tile_versions();
   ASSERT_EQ(served.tiles.size(), hall.view.tiles.size());
   for (std::size_t i = 0; i < served.tiles.size(); ++i) {
