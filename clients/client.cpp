@@ -103,6 +103,17 @@ std::string Client::save_map(const std::string& file) {
       .file();
 }
 
+LoadedMap Client::load_map(const std::string& file) {
+  LoadMap_Request request;
+  request.file(file);
+  const auto reply =
+      connection_->ask_ok(connection_->load_map, connection_->names.load_map, std::move(request));
+  return {.file = reply.file(),
+          .map_id = reply.status().map_id(),
+          .tile_count = reply.tile_count(),
+          .pose_count = reply.pose_count()};
+}
+
 std::uint64_t Client::reset() {
   return connection_->ask_ok(connection_->reset, connection_->names.reset, Reset_Request())
       .status()

@@ -63,6 +63,16 @@ struct TileSet {
   std::vector<TileId> missing;
 };
 
+/// A map file that a server went on with.
+struct LoadedMap {
+  /// On the server's machine.
+  std::string file;
+  /// The map's new id.
+  std::uint64_t map_id = 0;
+  std::uint64_t tile_count = 0;
+  std::uint64_t pose_count = 0;
+};
+
 /// What happened in a region since the last news. Tiles are whole, also what of them lies outside.
 struct RegionNews {
   MapIdentity map;
@@ -109,6 +119,11 @@ class Client {
   /// Has the server save its map; returns the file's name on the server's machine. An empty name
   /// means the configured file.
   std::string save_map(const std::string& file = {});
+
+  /// Has the server save its map, and go on with one that was saved before, and in its file. `file`
+  /// is a plain name beside the configured map file. A map that is missing, damaged, newer or of
+  /// another voxel size is refused, and the running map goes on.
+  LoadedMap load_map(const std::string& file);
 
   /// Has the server forget poses and map; returns the id of the new map.
   std::uint64_t reset();

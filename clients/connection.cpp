@@ -43,6 +43,7 @@ Client::Connection::Connection(const ClientOptions& client_options)
       get_tiles(participant, names.get_tiles),
       get_status(participant, names.get_status),
       save_map(participant, names.save_map),
+      load_map(participant, names.load_map),
       reset(participant, names.reset) {}
 
 TileSet Client::Connection::fetch_tiles(std::span<const TileId> ids) {

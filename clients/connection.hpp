@@ -61,6 +61,7 @@ struct Client::Connection {
   ServiceClient<stillmap_msgs::srv::GetStatus_Request, stillmap_msgs::srv::GetStatus_Response>
       get_status;
   ServiceClient<stillmap_msgs::srv::SaveMap_Request, stillmap_msgs::srv::SaveMap_Response> save_map;
+  ServiceClient<stillmap_msgs::srv::LoadMap_Request, stillmap_msgs::srv::LoadMap_Response> load_map;
   ServiceClient<stillmap_msgs::srv::Reset_Request, stillmap_msgs::srv::Reset_Response> reset;
 };
 

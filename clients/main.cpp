@@ -22,7 +22,12 @@ void add_commands(stillmap::CommandHandle program, stillmap::Action& action) {
   stillmap::add_query_command(program, action);
   stillmap::add_status_command(program, action);
   stillmap::add_save_command(program, action);
+  stillmap::add_load_command(program, action);
   stillmap::add_reset_command(program, action);
+  stillmap::add_map_info_command(program, action);
+  stillmap::add_map_check_command(program, action);
+  stillmap::add_map_diff_command(program, action);
+  stillmap::add_map_export_command(program, action);
   stillmap::add_evaluate_command(program, action);
   stillmap::add_simulate_command(program, action);
   stillmap::add_simulate_training_command(program, action);

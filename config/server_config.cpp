@@ -2,9 +2,12 @@
 
 #include <arpa/inet.h>
 
+#include <stdexcept>
+
 #include "config/mapper_section.hpp"
 #include "config/sensor_file.hpp"
 #include "config/yaml_section.hpp"
+#include "core/map/datum.hpp"
 
 namespace stillmap {
 namespace {
@@ -128,6 +131,13 @@ void read_map(YamlSection section, MapFileConfig& map) {
   section.number("save_period_s", map.save_period_s, {0.1, 86400});
   section.whole("memory_limit_mib", map.memory_limit_mib, {0, 1 << 20});
   section.flag("load_at_start", map.load_at_start);
+  section.text("datum", map.datum);
+  if (map.datum.empty()) return;
+  try {
+    static_cast<void>(datum_from_text(map.datum));
+  } catch (const std::invalid_argument& fault) {
+    section.fault("datum", fault.what());
+  }
 }
 
 void read_server(YamlSection file, const fs::path& folder, ServerConfig& config) {

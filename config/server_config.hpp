@@ -118,6 +118,9 @@ struct MapFileConfig {
   std::uint32_t memory_limit_mib = 2048;
   /// Go on with the map in `file` when it exists; else start empty.
   bool load_at_start = true;
+  /// Where the map's origin lies, as datum_from_text() reads it; goes into the map file. Empty: not
+  /// known.
+  std::string datum;
 };
 
 /// Everything that stillmap-server can be told. Works as it is, with a 64-beam sensor and no file.

@@ -182,12 +182,18 @@ bool Mapper::has_enough_points(const Scan& scan) {
 }
 
 void Mapper::restore(const MapView& view, const TileMemories& memories) {
+  // First what may refuse the view.
   static_map_.restore(view, memories);
+  forget_scans();
 }
 
 void Mapper::reset(std::uint64_t map_id) {
-  odometry_.reset();
   static_map_.reset(map_id);
+  forget_scans();
+}
+
+void Mapper::forget_scans() {
+  odometry_.reset();
   pending_.reset();
   last_labelled_.reset();
   last_view_.reset();

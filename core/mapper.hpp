@@ -73,8 +73,9 @@ class Mapper {
   /// What is stored of it, what of it is in memory, and what was removed from it.
   [[nodiscard]] StaticMap& static_map() { return static_map_; }
 
-  /// Takes over a stored static map; the next scans extend it. The lidar starts at the map's
-  /// origin.
+  /// Forgets poses and takes over a stored static map; the next scans extend it. The lidar starts
+  /// at the map's origin, or where the next scan's prior says. Throws std::invalid_argument for
+  /// voxels or tiles of another size than configured, and is then as it was.
   void restore(const MapView& view, const TileMemories& memories = {});
 
   /// Forgets poses and maps; the next scan starts map `map_id` at the origin.
@@ -84,6 +85,8 @@ class Mapper {
   /// Fewer points give no pose.
   static constexpr std::size_t min_usable_points = 100;
 
+  /// All but the static map.
+  void forget_scans();
   [[nodiscard]] bool accepts(const Scan& scan);
   [[nodiscard]] bool has_enough_points(const Scan& scan);
   /// What a scan is mapped with.

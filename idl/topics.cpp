@@ -51,6 +51,7 @@ Services Services::in(const std::string& name_space) {
           .get_tiles = prefix + "get_tiles",
           .get_status = prefix + "get_status",
           .save_map = prefix + "save_map",
+          .load_map = prefix + "load_map",
           .reset = prefix + "reset"};
 }
 

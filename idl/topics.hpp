@@ -53,6 +53,7 @@ struct Services {
   std::string get_tiles;
   std::string get_status;
   std::string save_map;
+  std::string load_map;
   std::string reset;
 
   [[nodiscard]] static Services in(const std::string& name_space);

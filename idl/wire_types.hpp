@@ -39,6 +39,8 @@ class GetStatus_Request;
 class GetStatus_Response;
 class SaveMap_Request;
 class SaveMap_Response;
+class LoadMap_Request;
+class LoadMap_Response;
 class Reset_Request;
 class Reset_Response;
 }  // namespace stillmap_msgs::srv

@@ -1,9 +1,28 @@
 #include "server/map_saver.hpp"
 
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 namespace stillmap {
+namespace {
+
+constexpr const char* no_map_yet = "holds no map yet; name a file that a map was saved to";
+
+/// Opens a file that is there: open_map_file would make one that is not.
+std::unique_ptr<TileStore> open_filled(const std::filesystem::path& file) {
+  std::error_code error;
+  if (!std::filesystem::exists(file, error)) {
+    throw MapFileError(file, "is not there; it must lie beside the configured map file");
+  }
+  if (std::filesystem::is_regular_file(file, error) &&
+      std::filesystem::file_size(file, error) == 0) {
+    throw MapFileError(file, no_map_yet);
+  }
+  return open_map_file(file);
+}
+
+}  // namespace
 
 MapSaver::MapSaver(const MapBoard& board, std::filesystem::path file,
                    std::map<std::string, std::string> metadata, std::uint32_t memory_limit_mib)
@@ -28,13 +47,18 @@ MapSaver::MapSaver(const MapBoard& board, std::filesystem::path file,
 std::optional<StoredMap> MapSaver::load() {
   const std::scoped_lock lock(mutex_);
   if (file_.empty()) return std::nullopt;
-  StoredMap map = memory_limit_bytes_ > 0 ? store_->load_shelved() : store_->load();
+  StoredMap map = read(*store_);
   // Clients may have seen later versions than the one that is stored: versions of what follows
   // must not be taken for those.
   if (!map.metadata.contains(map_ended_key)) map.view.map_id = new_map_id();
   store_->begin_run(map.view.map_id);
   saved_map_id_ = map.view.map_id;
+  remember_metadata(map);
   return map;
+}
+
+StoredMap MapSaver::read(TileStore& store) const {
+  return memory_limit_bytes_ > 0 ? store.load_shelved() : store.load();
 }
 
 std::shared_ptr<TileShelf> MapSaver::shelf() {
@@ -75,12 +99,21 @@ void MapSaver::save(bool has_ended) {
   if (has_ended) checkpoint.map.metadata[map_ended_key] = "yes";
   store_->save(checkpoint.map);
   source_.stored(checkpoint.step);
-  saved_map_id_ = checkpoint.map.view.map_id;
-  saved_version_ = checkpoint.map.view.version;
+  remember_as_saved(checkpoint.map.view, poses);
+}
+
+void MapSaver::remember_as_saved(const MapView& view, std::uint64_t poses) {
+  saved_map_id_ = view.map_id;
+  saved_version_ = view.version;
   saved_poses_ = poses;
 }
 
-std::filesystem::path MapSaver::save_as(const std::string& name) {
+void MapSaver::remember_metadata(const StoredMap& map) {
+  stored_metadata_ = map.metadata;
+  stored_metadata_.erase(map_ended_key);
+}
+
+std::filesystem::path MapSaver::file_named(const std::string& name) const {
   if (file_.empty() && name.empty()) {
     throw std::invalid_argument(
         "no map file is configured; set map.file in the server's configuration or --map-file");
@@ -89,23 +122,45 @@ std::filesystem::path MapSaver::save_as(const std::string& name) {
   // Requests come over the network: they must not choose any file of this machine.
   if (plain.has_parent_path() || name == "." || name == "..") {
     throw std::invalid_argument("file '" + name +
-                                "' must be a plain name; it is put beside the configured map file");
+                                "' must be a plain name; it is looked for beside the configured "
+                                "map file");
   }
+  return name.empty() ? file_ : file_.parent_path() / plain;
+}
+
+std::filesystem::path MapSaver::save_as(const std::string& name) {
   const std::scoped_lock lock(mutex_);
+  const std::filesystem::path target = file_named(name);
   if (store_) save(false);
-  if (name.empty() || plain == file_.filename()) return std::filesystem::absolute(file_);
-  const std::filesystem::path target = file_.parent_path() / plain;
-  if (store_) {
-    store_->copy_to(target);
-  } else {
-    open_map_file(target)->save(take(true).map);
-  }
+  if (store_ && target != file_) store_->copy_to(target);
+  if (!store_) open_map_file(target)->save(take(true).map);
+  return std::filesystem::absolute(target);
+}
+
+std::filesystem::path MapSaver::go_on_in(const std::string& name,
+                                         const ReplaceRunning& replace_running) {
+  const std::scoped_lock lock(mutex_);
+  const std::filesystem::path target = file_named(name);
+  auto store = open_filled(target);
+  StoredMap map = read(*store);
+  if (map.view.tiles.empty()) throw MapFileError(target, no_map_yet);
+  if (target != file_ && !file_.empty() && board_.poses_added() > 0) save(false);
+  map.view.map_id = new_map_id();
+  replace_running(map, memory_limit_bytes_ > 0 ? store->shelf() : nullptr);
+  store->begin_run(map.view.map_id);
+  // Where another map lies, its own file says.
+  if (target != file_) metadata_.erase("datum");
+  file_ = target;
+  store_ = std::move(store);
+  remember_metadata(map);
+  remember_as_saved(*board_.view(), board_.poses_added());
   return std::filesystem::absolute(target);
 }
 
 RunCheckpoint MapSaver::take(bool everything) const {
   RunCheckpoint checkpoint = source_.take(everything);
   checkpoint.map.metadata = metadata_;
+  checkpoint.map.metadata.insert(stored_metadata_.begin(), stored_metadata_.end());
   return checkpoint;
 }
 

@@ -39,7 +39,7 @@ std::optional<Eigen::Isometry3d> pose_in_restored_map(const Trajectory& stored,
 
 MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSource> label_source,
                              const std::optional<StoredMap>& stored,
-                             std::shared_ptr<TileShelf> shelf, ScanQueue& queue,
+                             const std::shared_ptr<TileShelf>& shelf, ScanQueue& queue,
                              Statistics& statistics, MapBoard& board, const MappingOutputs& outputs)
     : map_limit_bytes_(map_share_bytes(config.map)),
       lidar_frame_(config.frames.lidar),
@@ -52,15 +52,10 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSo
               std::make_unique<PacedLabels>(std::move(label_source), label_budget(config), queue,
                                             statistics),
               [this](std::string_view stage) { stage_ended(stage); }) {
-  mapper_.static_map().use_shelf(std::move(shelf));
   if (stored && !stored->view.tiles.empty()) {
-    mapper_.restore(stored->view, stored->memories);
-    const Trajectory& path = stored->trajectory;
-    const Eigen::Vector3d last_map =
-        path.empty() ? Eigen::Vector3d(0.0, 0.0, 0.0) : path.back().T_map_lidar.translation();
-    mapper_.static_map().take_back_near(last_map, map_limit_bytes_);
-    board_.begin(mapper_.map_view(), path);
+    go_on_with(*stored, shelf);
   } else {
+    mapper_.static_map().use_shelf(shelf);
     mapper_.reset(new_map_id());
     board_.begin(mapper_.map_view(), {});
   }
@@ -75,6 +70,25 @@ std::uint64_t MappingThread::reset() {
     spdlog::info("reset: map {} begins", map_id);
   });
   return map_id;
+}
+
+void MappingThread::load(const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf) {
+  between_scans([&] {
+    go_on_with(stored, shelf);
+    spdlog::info("loaded: going on with {} tiles as map {}", stored.view.tiles.size(),
+                 stored.view.map_id);
+  });
+}
+
+void MappingThread::go_on_with(const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf) {
+  // First what may refuse the map.
+  mapper_.restore(stored.view, stored.memories);
+  const Trajectory& path = stored.trajectory;
+  const Eigen::Vector3d last_map =
+      path.empty() ? Eigen::Vector3d(0.0, 0.0, 0.0) : path.back().T_map_lidar.translation();
+  mapper_.static_map().use_shelf(shelf);
+  mapper_.static_map().take_back_near(last_map, map_limit_bytes_);
+  board_.begin(mapper_.map_view(), path);
 }
 
 void MappingThread::show_now() {

@@ -38,7 +38,7 @@ class MappingThread {
   /// when there is one: its map is extended, and the first scan is expected where it ended. Tiles
   /// that are away come from `shelf`, to which they may go when it is not null.
   MappingThread(const ServerConfig& config, std::unique_ptr<LabelSource> label_source,
-                const std::optional<StoredMap>& stored, std::shared_ptr<TileShelf> shelf,
+                const std::optional<StoredMap>& stored, const std::shared_ptr<TileShelf>& shelf,
                 ScanQueue& queue, Statistics& statistics, MapBoard& board,
                 const MappingOutputs& outputs);
 
@@ -47,6 +47,10 @@ class MappingThread {
 
   /// Forgets poses and map, after the scan in work; returns the id of the new map.
   [[nodiscard]] std::uint64_t reset();
+  /// Goes on with this map, after the scan in work: the next scan is expected where its path ended.
+  /// Tiles that are away come from `shelf`. Throws std::invalid_argument when its voxels or tiles
+  /// are not of the configured size; then nothing changed.
+  void load(const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf);
   /// Shows on the board what was mapped so far, the scan in work included.
   void show_now();
 
@@ -61,6 +65,8 @@ class MappingThread {
   void work(const std::stop_token& stop);
   void map(QueuedScan queued);
   void stage_ended(std::string_view stage);
+  /// In the thread that maps.
+  void go_on_with(const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf);
   [[nodiscard]] std::optional<Eigen::Isometry3d> prior_for(std::int64_t stamp_ns) const;
   void show_view();
   /// Runs it in the thread that maps, after the scan in work, and waits for that.

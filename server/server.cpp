@@ -18,9 +18,12 @@ DdsOptions dds_options(const DdsConfig& config) {
 
 std::map<std::string, std::string> file_metadata(const ServerConfig& config,
                                                  const LabelSource& labels) {
-  return {{"software", std::string("stillmap ") + STILLMAP_VERSION},
-          {"sensor", config.mapper.sensor.name},
-          {"label_source", labels.name()}};
+  std::map<std::string, std::string> metadata{
+      {"software", std::string("stillmap ") + STILLMAP_VERSION},
+      {"sensor", config.mapper.sensor.name},
+      {"label_source", labels.name()}};
+  if (!config.map.datum.empty()) metadata["datum"] = config.map.datum;
+  return metadata;
 }
 
 /// What is wrong with this machine, in words; empty when nothing is.
@@ -74,14 +77,19 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
   receiver_ = std::make_unique<ScanReceiver>(participant_, config, queue_, statistics_);
   map_publisher_ = std::make_unique<MapPublisher>(participant_, topics_, config, board_);
   const auto status = [this] { return report_.status(); };
-  services_ =
-      std::make_unique<ServiceDesk>(participant_, Services::in(config.topics.name_space),
-                                    ServiceContext{.board = board_,
-                                                   .tiles = tiles_,
-                                                   .saver = saver_,
-                                                   .status = status,
-                                                   .reset = [this] { return mapping_->reset(); },
-                                                   .show_now = [this] { mapping_->show_now(); }});
+  services_ = std::make_unique<ServiceDesk>(
+      participant_, Services::in(config.topics.name_space),
+      ServiceContext{.board = board_,
+                     .tiles = tiles_,
+                     .saver = saver_,
+                     .status = status,
+                     .reset = [this] { return mapping_->reset(); },
+                     .load =
+                         [this](const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf) {
+                           mapping_->load(stored, shelf);
+                           tiles_.use_shelf(shelf);
+                         },
+                     .show_now = [this] { mapping_->show_now(); }});
   status_publisher_ = std::make_unique<StatusPublisher>(participant_, topics_,
                                                         config.publish.status_period_s, status);
   autosave_ = std::make_unique<PeriodicThread>(

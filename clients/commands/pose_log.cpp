@@ -6,13 +6,18 @@ namespace stillmap {
 
 PoseLog::PoseLog(Client& client)
     : odometry_(client.subscribe_odometry([this](const OdometryUpdate& update) {
-        add(update.pose);
+        take(update.pose);
         added_.notify_one();
       })),
       path_(client.subscribe_path([this](const Trajectory& path) {
         for (const StampedPose& pose : path) add(pose);
         added_.notify_one();
       })) {}
+
+void PoseLog::take(const StampedPose& pose) {
+  const std::lock_guard lock(mutex_);
+  T_map_lidar_.insert_or_assign(pose.stamp_ns, pose.T_map_lidar);
+}
 
 void PoseLog::add(const StampedPose& pose) {
   const std::lock_guard lock(mutex_);

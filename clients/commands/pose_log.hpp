@@ -25,6 +25,9 @@ class PoseLog {
   [[nodiscard]] Trajectory poses_of(const std::vector<std::int64_t>& stamps_ns) const;
 
  private:
+  /// From the odometry topic: a scan that is sent again gets a new pose.
+  void take(const StampedPose& pose);
+  /// From the path, which may still be that of another time.
   void add(const StampedPose& pose);
 
   mutable std::mutex mutex_;

@@ -5,13 +5,14 @@
 #include <stdexcept>
 #include <utility>
 
+#include "clients/commands/class_arguments.hpp"
 #include "clients/commands/client_arguments.hpp"
+#include "clients/commands/cloud_output.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/map_snapshot.hpp"
 #include "clients/commands/query_report.hpp"
 #include "clients/commands/region_arguments.hpp"
 #include "clients/terminal/progress.hpp"
-#include "core/dataset/point_cloud_files.hpp"
 #include "core/map/map_picture.hpp"
 #include "core/map/region_shape.hpp"
 
@@ -24,6 +25,7 @@ struct Arguments {
   ClientArguments client;
   RegionArguments region;
   std::vector<std::string> classes;
+  std::vector<std::string> motions;
   double resolution_m = 0.0;
   std::uint64_t since_version = not_given;
   /// 0: the server's map of now.
@@ -34,34 +36,9 @@ struct Arguments {
   bool json = false;
 };
 
-std::bitset<semantic_class_count> classes_of(const std::vector<std::string>& names) {
-  std::bitset<semantic_class_count> classes;
-  for (const std::string& class_name : names) {
-    const std::optional<SemanticClass> label = class_from_name(class_name);
-    if (!label) {
-      std::string known;
-      for (std::size_t k = 0; k < semantic_class_count; ++k) {
-        known.append(" ").append(name(static_cast<SemanticClass>(k)));
-      }
-      throw std::invalid_argument("class '" + class_name + "' is not known; there are:" + known);
-    }
-    classes.set(static_cast<std::size_t>(*label));
-  }
-  return classes;
-}
-
 void check_out_name(const std::string& file) {
-  if (file.empty() || file.ends_with(".pcd") || file.ends_with(".ply")) return;
+  if (file.empty() || is_cloud_name(file)) return;
   throw std::invalid_argument("--out " + file + ": the name must end in .pcd or .ply");
-}
-
-void write_cloud(const std::string& file, const std::vector<QueryVoxel>& voxels) {
-  std::vector<ColouredPoint> points;
-  points.reserve(voxels.size());
-  for (const QueryVoxel& voxel : voxels) {
-    points.push_back({voxel.position_map, voxel.label, voxel.confidence});
-  }
-  file.ends_with(".pcd") ? write_pcd(file, points) : write_ply(file, points);
 }
 
 // The whole map with the path and the box round what was asked for.
@@ -79,12 +56,18 @@ std::optional<KnownVersion> since_of(const Arguments& arguments, Client& client)
   return KnownVersion{.map_id = map_id, .version = arguments.since_version};
 }
 
-QueryAnswer ask(Client& client, const Arguments& arguments,
-                const std::bitset<semantic_class_count>& classes) {
-  QueryAnswer answer{{}, {}, {.stage = "query", .ms = {}}};
+/// What is asked for, without what only a server knows.
+MapQuery filters_of(const Arguments& arguments) {
+  MapQuery query;
+  query.classes = classes_of(arguments.classes);
+  query.motions = motions_of(arguments.motions);
+  query.resolution_m = arguments.resolution_m;
+  return query;
+}
+
+QueryAnswer ask(Client& client, const Arguments& arguments, const MapQuery& filters) {
+  QueryAnswer answer{filters, {}, {.stage = "query", .ms = {}}};
   answer.query.region = region_of(arguments.region, client, arguments.client.timeout());
-  answer.query.classes = classes;
-  answer.query.resolution_m = arguments.resolution_m;
   answer.query.since = since_of(arguments, client);
   Progress progress("query", "voxels", 0);
   while (answer.times.ms.size() < arguments.repeat) {
@@ -103,9 +86,9 @@ QueryAnswer ask(Client& client, const Arguments& arguments,
 ExitCode run(const Arguments& arguments) {
   check_out_name(arguments.out);
   check_region(arguments.region);
-  const auto classes = classes_of(arguments.classes);
+  const MapQuery filters = filters_of(arguments);
   Client client = connect(arguments.client);
-  const QueryAnswer answer = ask(client, arguments, classes);
+  const QueryAnswer answer = ask(client, arguments, filters);
   if (!arguments.out.empty()) write_cloud(arguments.out, answer.result.voxels);
   if (!arguments.picture.empty()) {
     draw_query(arguments.picture, client, answer.query.region, arguments.client.timeout());
@@ -124,6 +107,11 @@ void add_query_command(CommandHandle program, Action& action) {
   CommandHandle command = program.command("query", "Ask the server for a region of its static map");
   add_region_options(command, arguments->region);
   command.option("--classes", arguments->classes, "Only these: road,building,traffic-sign")
+      .comma_separated();
+  command
+      .option("--motions", arguments->motions,
+              "Only these: stationary,semi-static,highly-dynamic; the static map keeps what is "
+              "stationary, and is asked for that")
       .comma_separated();
   command.option("--resolution", arguments->resolution_m,
                  "Voxel size of the answer [m]; default: the map's own");

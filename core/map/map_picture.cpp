@@ -4,9 +4,7 @@
 #include <array>
 #include <iomanip>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <sstream>
-#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,11 +20,7 @@ const cv::Scalar truth_colour(255, 210, 60);
 
 Eigen::AlignedBox2d extent(const MapView& view, const Trajectory& estimate,
                            const MapPictureOptions& options) {
-  Eigen::AlignedBox2d box;
-  for (const auto& tile : view.tiles) {
-    box.extend(tile->info.bounds_map.min().head<2>().cast<double>());
-    box.extend(tile->info.bounds_map.max().head<2>().cast<double>());
-  }
+  Eigen::AlignedBox2d box = plan_extent(view);
   const auto extend_by = [&box](const Trajectory& trajectory) {
     for (const StampedPose& pose : trajectory) {
       const Eigen::Vector2d p = pose.T_map_lidar.translation().head<2>();
@@ -37,19 +31,6 @@ Eigen::AlignedBox2d extent(const MapView& view, const Trajectory& estimate,
   if (options.truth) extend_by(*options.truth);
   if (box.isEmpty()) box.extend(Eigen::Vector2d::Zero());
   return box;
-}
-
-PictureFrame fit(const Eigen::AlignedBox2d& box, const MapPictureOptions& options) {
-  constexpr double margin_m = 4.0;
-  constexpr double max_px_per_m = 15.0;
-  const Eigen::Vector2d size_m = box.sizes() + Eigen::Vector2d::Constant(2.0 * margin_m);
-  PictureFrame frame;
-  frame.px_per_m = std::min(max_px_per_m, options.max_side_px / size_m.maxCoeff());
-  // The legend needs some width; a narrow map stands in its middle.
-  const Eigen::Vector2d size_px = (size_m * frame.px_per_m).cwiseMax(Eigen::Vector2d(640.0, 200.0));
-  frame.size = {cvCeil(size_px.x()), cvCeil(size_px.y())};
-  frame.corner_map = box.center() - size_px / (2.0 * frame.px_per_m);
-  return frame;
 }
 
 double length_m(const Trajectory& trajectory) {
@@ -119,7 +100,7 @@ std::vector<LegendEntry> legend_entries(const MapView& view, const Trajectory& e
 
 void write_map_picture(const std::filesystem::path& file, const MapView& view,
                        const Trajectory& estimate, const MapPictureOptions& options) {
-  const PictureFrame frame = fit(extent(view, estimate, options), options);
+  const PictureFrame frame = fit_frame(extent(view, estimate, options), options.max_side_px);
   cv::Mat picture = draw_voxels(view, frame);
   if (options.query_box_map) draw_box(picture, frame, *options.query_box_map);
   if (options.truth) draw_trajectory(picture, frame, *options.truth, truth_colour);
@@ -131,16 +112,7 @@ void write_map_picture(const std::filesystem::path& file, const MapView& view,
       picture,
       draw_legend(picture.cols, title(view, estimate), legend_entries(view, estimate, options)),
       picture);
-  bool is_written = false;
-  try {
-    is_written = cv::imwrite(file.string(), picture);
-  } catch (const cv::Exception&) {  // an unknown ending
-  }
-  if (!is_written) {
-    throw std::runtime_error(file.string() +
-                             ": cannot be written; its folder must exist and be writable, its name "
-                             "end in .png");
-  }
+  write_png(file, picture);
 }
 
 }  // namespace stillmap

@@ -1,7 +1,9 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <opencv2/core/types.hpp>
+
+#include "core/map/tile.hpp"
 
 namespace stillmap {
 
@@ -17,5 +19,12 @@ struct PictureFrame {
     return {p.x(), size.height - p.y()};
   }
 };
+
+/// Round all voxels, in plan; empty for an empty map. Map frame [m].
+[[nodiscard]] Eigen::AlignedBox2d plan_extent(const MapView& view);
+
+/// A picture with this box (map frame [m], not empty) in its middle, with a margin; its longest
+/// side about `max_side_px`, and wide enough for a legend.
+[[nodiscard]] PictureFrame fit_frame(const Eigen::AlignedBox2d& box_map, int max_side_px);
 
 }  // namespace stillmap

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <filesystem>
 #include <opencv2/core/mat.hpp>
 #include <string>
 #include <vector>
@@ -31,5 +32,8 @@ struct LegendEntry {
 /// A strip as wide as the picture: a title line and the entries, as many rows as they need.
 [[nodiscard]] cv::Mat draw_legend(int width_px, const std::string& title,
                                   const std::vector<LegendEntry>& entries);
+
+/// Throws std::runtime_error naming the file when it cannot be written.
+void write_png(const std::filesystem::path& file, const cv::Mat& picture);
 
 }  // namespace stillmap

@@ -20,11 +20,24 @@ bool is_state(const TileInfo& a, const TileInfo& b) {
 TileReader::TileReader(std::shared_ptr<TileShelf> shelf, std::size_t kept_bytes)
     : shelf_(std::move(shelf)), kept_bytes_(kept_bytes) {}
 
+void TileReader::use_shelf(std::shared_ptr<TileShelf> shelf) {
+  const std::scoped_lock lock(mutex_);
+  shelf_ = std::move(shelf);
+  kept_.clear();
+  bytes_ = 0;
+}
+
+std::shared_ptr<TileShelf> TileReader::shelf() {
+  const std::scoped_lock lock(mutex_);
+  return shelf_;
+}
+
 std::shared_ptr<const Tile> TileReader::whole(const std::shared_ptr<const Tile>& tile) {
   if (!is_away(*tile)) return tile;
   const TileInfo& wanted = tile->info;
   if (auto known = kept(wanted)) return known;
-  auto read = shelf_ == nullptr ? nullptr : shelf_->take(wanted.id).tile;
+  const auto from = shelf();
+  auto read = from == nullptr ? nullptr : from->take(wanted.id).tile;
   if (read == nullptr || !is_state(read->info, wanted)) {
     throw TileChanged("tile (" + std::to_string(wanted.id.x) + ", " + std::to_string(wanted.id.y) +
                       ") changed while it was asked for; ask again");

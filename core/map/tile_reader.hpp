@@ -23,6 +23,9 @@ class TileReader {
   /// Without a shelf, every tile must have its voxels. Keeps about `kept_bytes`.
   explicit TileReader(std::shared_ptr<TileShelf> shelf = nullptr, std::size_t kept_bytes = 0);
 
+  /// From now on they come from there.
+  void use_shelf(std::shared_ptr<TileShelf> shelf);
+
   /// The tile with its voxels. Throws TileChanged, or as the shelf does.
   [[nodiscard]] std::shared_ptr<const Tile> whole(const std::shared_ptr<const Tile>& tile);
 
@@ -30,6 +33,7 @@ class TileReader {
   [[nodiscard]] MapView with_voxels(const MapView& view, const std::vector<std::size_t>& tiles);
 
  private:
+  [[nodiscard]] std::shared_ptr<TileShelf> shelf();
   [[nodiscard]] std::shared_ptr<const Tile> kept(const TileInfo& wanted);
   void keep(std::shared_ptr<const Tile> tile);
 

@@ -106,6 +106,14 @@ TypeSupport type_support<stillmap_msgs::srv::SaveMap_Response>() {
   return make<stillmap_msgs::srv::SaveMap_ResponsePubSubType>();
 }
 template <>
+TypeSupport type_support<stillmap_msgs::srv::LoadMap_Request>() {
+  return make<stillmap_msgs::srv::LoadMap_RequestPubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::LoadMap_Response>() {
+  return make<stillmap_msgs::srv::LoadMap_ResponsePubSubType>();
+}
+template <>
 TypeSupport type_support<stillmap_msgs::srv::Reset_Request>() {
   return make<stillmap_msgs::srv::Reset_RequestPubSubType>();
 }

@@ -20,18 +20,21 @@ MapPublisher::MapPublisher(Participant& participant, const Topics& topics,
       cloud_thread_(std::chrono::duration<double>(config.publish.cloud_period_s),
                     [this] { publish_cloud(); }) {}
 
+bool MapPublisher::is_news(PathState& shown) const {
+  const PathState now{.map_id = board_.view()->map_id, .poses = board_.poses_added()};
+  if (now == shown || board_.trajectory().empty()) return false;
+  shown = now;
+  return true;
+}
+
 void MapPublisher::publish_path() {
-  const std::uint64_t poses = board_.poses_added();
-  if (poses == path_poses_) return;
-  path_poses_ = poses;
+  if (!is_news(shown_path_)) return;
   // Keep-last writers always have room.
   static_cast<void>(path_.write(wire::to_path(board_.trajectory(), map_frame_)));
 }
 
 void MapPublisher::publish_cloud() {
-  const std::uint64_t poses = board_.poses_added();
-  if (poses == cloud_poses_) return;
-  cloud_poses_ = poses;
+  if (!is_news(shown_cloud_)) return;
   const StampedPose pose = board_.newest_pose();
   const Eigen::Vector2f centre_map = pose.T_map_lidar.translation().head<2>().cast<float>();
   const Eigen::Vector2f half = Eigen::Vector2f::Constant(half_window_m_);

@@ -21,14 +21,23 @@ class MapPublisher {
                const MapBoard& board);
 
  private:
+  /// Changes with every pose, and when a map was loaded.
+  struct PathState {
+    std::uint64_t map_id = 0;
+    std::uint64_t poses = 0;
+    friend bool operator==(const PathState&, const PathState&) = default;
+  };
+  /// Whether there is a path, and another one than `shown`, which then becomes it.
+  [[nodiscard]] bool is_news(PathState& shown) const;
+
   void publish_path();
   void publish_cloud();
 
   const MapBoard& board_;
   std::string map_frame_;
   float half_window_m_;
-  std::uint64_t path_poses_ = 0;
-  std::uint64_t cloud_poses_ = 0;
+  PathState shown_path_;
+  PathState shown_cloud_;
   TilePublisher tiles_;
   Writer<nav_msgs::msg::Path> path_;
   Writer<sensor_msgs::msg::PointCloud2> cloud_;

@@ -21,6 +21,9 @@ struct ServiceContext {
   std::function<ServerStatus()> status;
   /// Returns the new map's id.
   std::function<std::uint64_t()> reset;
+  /// Goes on with this map, and the tiles that are away come from there. Throws
+  /// std::invalid_argument when it does not fit the configuration; then nothing changed.
+  std::function<void(const StoredMap&, const std::shared_ptr<TileShelf>&)> load;
   /// Puts on the board what was mapped until now.
   std::function<void()> show_now;
 };

@@ -5,6 +5,7 @@
 #include "server/services/get_status.hpp"
 #include "server/services/get_tile_versions.hpp"
 #include "server/services/get_tiles.hpp"
+#include "server/services/load_map.hpp"
 #include "server/services/reset.hpp"
 #include "server/services/save_map.hpp"
 
@@ -24,6 +25,8 @@ ServiceDesk::ServiceDesk(Participant& participant, const Services& names, Servic
                   [this](const auto& request) { return get_status(context_, request); }),
       save_map_(participant, names.save_map,
                 [this](const auto& request) { return save_map(context_, request); }),
+      load_map_(participant, names.load_map,
+                [this](const auto& request) { return load_map(context_, request); }),
       reset_(participant, names.reset,
              [this](const auto& request) { return stillmap::reset(context_, request); }) {}
 

@@ -28,6 +28,8 @@ class ServiceDesk {
       get_status_;
   ServiceServer<stillmap_msgs::srv::SaveMap_Request, stillmap_msgs::srv::SaveMap_Response>
       save_map_;
+  ServiceServer<stillmap_msgs::srv::LoadMap_Request, stillmap_msgs::srv::LoadMap_Response>
+      load_map_;
   ServiceServer<stillmap_msgs::srv::Reset_Request, stillmap_msgs::srv::Reset_Response> reset_;
 };
 

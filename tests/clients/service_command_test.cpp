@@ -139,6 +139,13 @@ TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
 
   EXPECT_EQ(run("save saved.stillmap" + on_domain()).exit_code, 0);
   EXPECT_TRUE(exists("saved.stillmap"));
+  const nlohmann::json loaded =
+      nlohmann::json::parse(run("load saved.stillmap --json" + on_domain()).out);
+  EXPECT_EQ(loaded.at("poses"), 5);
+  EXPECT_EQ(loaded.at("tiles"), status.at("tiles"));
+  const ProcessResult not_there = run("load nothing.stillmap" + on_domain());
+  EXPECT_EQ(not_there.exit_code, 1);
+  EXPECT_THAT(not_there.err, HasSubstr("is not there"));
   EXPECT_EQ(run("reset" + on_domain()).exit_code, 0);
   const nlohmann::json empty = nlohmann::json::parse(run("status --json" + on_domain()).out);
   EXPECT_EQ(empty.at("voxels"), 0);

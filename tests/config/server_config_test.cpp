@@ -129,6 +129,7 @@ TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
   EXPECT_THAT(refusal_of("dds: {interfaces: [eth0]}"), HasSubstr("not an IP address"));
   EXPECT_THAT(refusal_of("topics: {points: 'a b'}"), HasSubstr("topics.points"));
   EXPECT_THAT(refusal_of("frames: {map: ''}"), HasSubstr("frames.map"));
+  EXPECT_THAT(refusal_of("map: {datum: '48'}"), HasSubstr("latitude,longitude"));
 }
 
 TEST(ServerConfig, RefusesANameThatIsWrittenTwice) {

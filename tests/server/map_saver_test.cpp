@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+#include <fstream>
 #include <stdexcept>
 
 #include "core/map/static_map.hpp"
@@ -70,6 +72,55 @@ TEST_F(MapSaverTest, LetsNobodyChooseAnotherFolder) {
   for (const char* name : {"../map", "/etc/passwd", "a/b", ".", ".."}) {
     EXPECT_THROW(saver.save_as(name), std::invalid_argument) << name;
   }
+}
+
+/// A map of one other voxel, saved as `file`.
+void save_far_map(const std::filesystem::path& file) {
+  StaticMap other{StaticMapConfig()};
+  other.insert(scan_of(50.0F), Eigen::Isometry3d::Identity());
+  StoredMap stored{.view = *other.view(), .trajectory = {StampedPose{}}, .metadata = {}};
+  stored.metadata = {{"sensor", "another"}, {"datum", "48,11"}};
+  open_map_file(file)->save(stored);
+}
+
+TEST_F(MapSaverTest, GoesOnInAnotherFileAndLeavesTheRunningMapInItsOwn) {
+  map_scan(5.0F);
+  save_far_map(folder_ / "far.stillmap");
+  MapSaver saver(board_, folder_ / "map.stillmap", {{"sensor", "vlp_16"}, {"datum", "1,2"}});
+  const auto file = saver.go_on_in(
+      "far.stillmap", [&](const StoredMap& stored, const std::shared_ptr<TileShelf>&) {
+        board_.begin(std::make_shared<const MapView>(stored.view), stored.trajectory);
+      });
+  EXPECT_EQ(file, folder_ / "far.stillmap");
+  board_.add_pose({.stamp_ns = 1}, OdometryHealth::good, "none");
+  saver.save_if_changed();
+  const StoredMap own = open_map_file(folder_ / "map.stillmap")->load();
+  EXPECT_EQ(own.view.tiles.at(0)->info.id.x, 0);
+  const StoredMap far = open_map_file(folder_ / "far.stillmap")->load();
+  EXPECT_EQ(far.trajectory.size(), 2U);
+  EXPECT_EQ(far.metadata.at("sensor"), "vlp_16");
+  EXPECT_EQ(own.metadata.at("datum"), "1,2");
+  EXPECT_EQ(far.metadata.at("datum"), "48,11") << "a map stays where it is";
+}
+
+TEST_F(MapSaverTest, StaysInItsFileWhenAnotherCannotBeLoaded) {
+  map_scan(5.0F);
+  save_far_map(folder_ / "far.stillmap");
+  MapSaver saver(board_, folder_ / "map.stillmap", {});
+  const auto refuse = [](const StoredMap&, const std::shared_ptr<TileShelf>&) {
+    throw std::invalid_argument("another voxel size");
+  };
+  EXPECT_THROW(saver.go_on_in("far.stillmap", refuse), std::invalid_argument);
+  std::ofstream(folder_ / "text") << "no database";
+  std::ofstream(folder_ / "empty");
+  std::filesystem::create_directory(folder_ / "folder");
+  for (const char* name : {"text", "empty", "folder", "missing"}) {
+    EXPECT_THROW(saver.go_on_in(name, refuse), MapFileError) << name;
+  }
+  EXPECT_EQ(std::filesystem::file_size(folder_ / "empty"), 0U);
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "missing"));
+  EXPECT_THROW(saver.go_on_in("../map", refuse), std::invalid_argument);
+  EXPECT_EQ(saver.save_as(""), folder_ / "map.stillmap");
 }
 
 TEST_F(MapSaverTest, NeedsAFileToSaveTo) {

@@ -1,0 +1,96 @@
+#include "core/map/map_diff_picture.hpp"
+
+#include <algorithm>
+#include <array>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "core/map/picture_frame.hpp"
+#include "core/map/picture_overlay.hpp"
+#include "core/map/picture_raster.hpp"
+
+namespace stillmap {
+namespace {
+
+const cv::Scalar stayed_colour(105, 100, 95);
+
+struct ChangeStyle {
+  VoxelChange change;
+  const char* text;
+  cv::Scalar colour;
+};
+
+/// In the order in which they are painted: what is rarer in most maps comes last.
+std::array<ChangeStyle, 3> change_styles() {
+  return {{{VoxelChange::relabelled, "another class", {40, 210, 240}},
+           {VoxelChange::gone, "gone", {60, 60, 235}},
+           {VoxelChange::appeared, "appeared", {80, 215, 60}}}};
+}
+
+/// A voxel's square, `least_px` wide at least.
+void paint(cv::Mat& picture, const PictureFrame& frame, const Eigen::Vector3f& p_map,
+           double voxel_size_m, double least_px, const cv::Scalar& colour) {
+  const cv::Point2d centre = frame.pixel(p_map.head<2>().cast<double>());
+  const double half = std::max(voxel_size_m * frame.px_per_m, least_px) / 2.0;
+  cv::rectangle(picture, cv::Point2d(centre.x - half, centre.y - half),
+                cv::Point2d(centre.x + half, centre.y + half), colour, cv::FILLED);
+}
+
+void paint_map(cv::Mat& picture, const PictureFrame& frame, const MapView& view) {
+  for (const auto& tile : view.tiles) {
+    for (const Voxel& voxel : tile->voxels) {
+      paint(picture, frame, voxel.mean_map, view.voxel_size_m, 1.0, stayed_colour);
+    }
+  }
+}
+
+std::uint64_t count(const DifferenceCounts& counts, VoxelChange change) {
+  switch (change) {
+    case VoxelChange::appeared:
+      return counts.appeared;
+    case VoxelChange::gone:
+      return counts.gone;
+    case VoxelChange::relabelled:
+      return counts.relabelled;
+  }
+  return 0;
+}
+
+void paint_changes(cv::Mat& picture, const PictureFrame& frame, const MapDiff& diff,
+                   double voxel_size_m) {
+  // A single voxel must be found on the picture of a whole town.
+  constexpr double least_px = 2.0;
+  for (const ChangeStyle& style : change_styles()) {
+    for (const VoxelDifference& voxel : diff.voxels) {
+      if (voxel.change != style.change) continue;
+      paint(picture, frame, voxel.position_map, voxel_size_m, least_px, style.colour);
+    }
+  }
+}
+
+}  // namespace
+
+void write_diff_picture(const std::filesystem::path& file, const MapView& before,
+                        const MapView& after, const MapDiff& diff, int max_side_px) {
+  Eigen::AlignedBox2d box = plan_extent(before).merged(plan_extent(after));
+  if (box.isEmpty()) box.extend(Eigen::Vector2d::Zero());
+  const PictureFrame frame = fit_frame(box, max_side_px);
+  cv::Mat picture(frame.size, CV_8UC3, background());
+  paint_map(picture, frame, before);
+  paint_map(picture, frame, after);
+  const MapView& filled = before.tiles.empty() ? after : before;
+  paint_changes(picture, frame, diff, filled.voxel_size_m);
+  draw_scale_bar(picture, frame.px_per_m);
+
+  std::vector<LegendEntry> entries{{"as before", stayed_colour}};
+  for (const ChangeStyle& style : change_styles()) {
+    const std::string voxels = std::to_string(count(diff.counts, style.change));
+    entries.push_back({std::string(style.text) + ": " + voxels, style.colour});
+  }
+  const std::string title = diff.counts.sum() == 0 ? "Nothing changed." : "What changed, in voxels";
+  cv::vconcat(picture, draw_legend(picture.cols, title, entries), picture);
+  write_png(file, picture);
+}
+
+}  // namespace stillmap
