@@ -1,8 +1,9 @@
 #!/usr/bin/env bash
 # The main job, end to end, in processes of their own that only share DDS: a replay publishes the
-# lidar scans of a simulated city, stillmap-server segments and maps them, a planning client follows
-# the poses and asks for regions of the map. Then all of it is checked against the truth; how well
-# the first scans were segmented, too.
+# lidar scans of a simulated city, stillmap-server segments and maps them, a planning client keeps
+# the map's traversable area and a path from the robot back to its start, others follow the poses
+# and ask for regions of the map. Then all of it is checked against the truth; how well the first
+# scans were segmented, too.
 #
 # BUILD                build folder (build/release)
 # STILLMAP_DEMO_DIR    where recording and results go (./demo)
@@ -46,7 +47,7 @@ free_domain() {
 value() {
   # The outermost of that name.
   { sed -n "s/^  \"$2\": \"\{0,1\}\([^\",]*\)\"\{0,1\},\{0,1\}$/\1/p" "$1"
-    sed -n "s/^ *\"$2\": \"\{0,1\}\([^\",]*\)\"\{0,1\},\{0,1\}$/\1/p" "$1"; } | head -n 1
+    sed -n "s/^ *\"$2\": \"\{0,1\}\([^\",]*\)\"\{0,1\},\{0,1\}$/\1/p" "$1"; } | sed -n 1p  # reads to the end: a reader that leaves early fails the pipe
 }
 
 # rounded FILE KEY DECIMALS
@@ -69,8 +70,13 @@ start_server() {
   "$bin/stillmap" status --domain "$domain" --timeout 30 > /dev/null || fail "the server does not answer"
 }
 
-# Follows the poses in one process, asks for the robot's surroundings in others, again and again.
-start_planning_client() {
+# Plans the way home in one process, anew whenever the map asks for it; follows the poses in a second
+# one, and asks for the robot's surroundings in others, again and again.
+start_clients() {
+  "$bin/stillmap" plan --domain "$domain" --to 0,0 --profile car --follow --json --timeout 60 \
+    --output "$out/path.json" --picture "$out/path.png" > "$out/plan.jsonl" 2> "$out/plan.log" &
+  planner=$!
+  children+=("$planner")
   "$bin/stillmap" watch --domain "$domain" --json --out "$out/watched.tum" \
     > "$out/watch.jsonl" 2> "$out/watch.log" &
   watch=$!
@@ -80,15 +86,18 @@ start_planning_client() {
       >> "$out/queries_while_mapping.json" 2>> "$out/queries.log" || true
     sleep 1
   done &
-  planner=$!
-  children+=("$planner")
+  asker=$!
+  children+=("$asker")
 }
 
-stop_planning_client() {
+stop_clients() {
   touch "$out/replayed"
-  wait "$planner"
-  kill "$watch" || fail "the planning client ended too early: $(cat "$out/watch.log")"
-  wait "$watch" || fail "the planning client ended with an error: $(cat "$out/watch.log")"
+  wait "$asker"
+  kill "$watch" || fail "the client that follows ended too early: $(cat "$out/watch.log")"
+  wait "$watch" || fail "the client that follows ended with an error: $(cat "$out/watch.log")"
+  kill "$planner" || fail "the planning client ended too early: $(cat "$out/plan.log")"
+  wait "$planner" ||
+    fail "the planning client has no path home: $(cat "$out/plan.log"; tail -n 1 "$out/plan.jsonl")"
 }
 
 stop_server() {
@@ -104,29 +113,31 @@ check() {
   [ "$mapped" = "$scans" ] || fail "$mapped of $scans scans were mapped"
   [ "$dropped" = 0 ] || fail "$dropped scans were dropped"
   watched=$(grep -vc '^#' "$out/watched.tum" || true)
-  [ "$watched" -ge $((scans / 2)) ] || fail "the planning client got $watched of $scans poses"
+  [ "$watched" -ge $((scans / 2)) ] || fail "the client that follows got $watched of $scans poses"
   grep -q '"road"' "$out/queries_while_mapping.json" || fail "no query saw a road while mapping went on"
   grep -q '"road"' "$out/query.json" || fail "the last query saw no road"
   is_below "$(value "$out/accuracy.json" ate_rmse_m)" "$max_ate_m" ||
     fail "pose error (ATE) is $(value "$out/accuracy.json" ate_rmse_m) m, wanted is below $max_ate_m m"
-  for file in map.stillmap query.ply segmentation.png map.png trajectory.png trajectory_error.png; do
+  for file in map.stillmap query.ply segmentation.png map.png path.json path.png trajectory.png trajectory_error.png; do
     [ -s "$out/$file" ] || fail "$out/$file was not written"
   done
 }
 
 summary() {
-  local answers
+  local answers plans
+  plans=$(grep -c '"status":"found"' "$out/plan.jsonl")
   answers=$(grep -c '"map_version"' "$out/queries_while_mapping.json")
   cat <<TEXT
 
-Stillmap demo: a simulated city, three processes over DDS domain $domain
+Stillmap demo: a simulated city, its clients and its server over DDS domain $domain
   scans         $(value "$out/replay.json" published) sent, $(value "$out/replay.json" mapped) mapped, $(value "$out/replay.json" dropped) dropped, in $(rounded "$out/replay.json" seconds 1) s
   segmentation  $(awk "BEGIN { printf \"%.1f\", 100 * $(value "$out/segmentation.json" accuracy) }") % of the points right, by the network alone
   pose error    ATE $(rounded "$out/accuracy.json" ate_rmse_m 3) m over $(rounded "$out/accuracy.json" path_m 1) m
   map           $(value "$out/status.json" voxels) voxels in $(value "$out/status.json" tiles) tiles, $(du -h "$out/map.stillmap" | cut -f1) on disk
   while mapping $(grep -vc '^#' "$out/watched.tum") poses followed, $answers region queries answered
+  the way home  planned $plans times while the map grew; now $(rounded "$out/path.json" length_m 1) m, clearance $(rounded "$out/path.json" clearance_m 1) m, in $(rounded "$out/path.json" plan_ms 0) ms
   at the end    $(value "$out/query.json" voxels) voxels within $query_size_m m in $(rounded "$out/query.json" ms 1) ms
-  look at       $out/map.png (map, path, queried region), $out/segmentation.png (truth, found), $out/trajectory.png, $out/trajectory_error.png
+  look at       $out/map.png (map, path, queried region), $out/path.png (area, way home), $out/segmentation.png (truth, found), $out/trajectory.png, $out/trajectory_error.png
   also          $out/map.stillmap $out/query.ply $out/poses_lidar.txt $out/server.log
 TEXT
 }
@@ -140,13 +151,13 @@ domain=$(free_domain) || fail "no free DDS domain between 60 and 99"
 
 make_city
 start_server
-start_planning_client
+start_clients
 "$bin/stillmap" replay "$city" --domain "$domain" --no-labels --lossless --out "$out/poses_lidar.txt" --json \
   > "$out/replay.json" || fail "the replay ended with exit code $?"
 "$bin/stillmap" query --domain "$domain" --around-robot "$query_size_m" --json \
   --out "$out/query.ply" --picture "$out/map.png" > "$out/query.json" || fail "the query failed"
 "$bin/stillmap" status --domain "$domain" --json > "$out/status.json"
-stop_planning_client
+stop_clients
 stop_server
 "$bin/stillmap" evaluate trajectory --truth "$city/poses.txt" --truth-calib "$city/calib.txt" \
   --estimate "$out/poses_lidar.txt" --pictures "$out" --json > "$out/accuracy.json"

@@ -9,13 +9,15 @@ constexpr const char* introduction =
     "  stillmap replay city                       or send it to a running stillmap-server\n"
     "  stillmap query --around-robot 50           and ask that server for its map\n"
     "'stillmap COMMAND --help' shows a command's options and examples.\n"
-    "Exit codes: 0 well; 1 the run failed; 2 wrong usage or input; 3 no server or no answer.";
+    "Exit codes: 0 well; 1 the run failed; 2 wrong usage or input; 3 no server or no answer;\n"
+    "4 'plan' found no path.";
 
 void add_commands(stillmap::CommandHandle program, stillmap::Action& action) {
   program.require_command();
   program.explain(introduction);
   stillmap::add_map_command(program, action);
   stillmap::add_traversable_command(program, action);
+  stillmap::add_plan_command(program, action);
   stillmap::add_replay_command(program, action);
   stillmap::add_watch_command(program, action);
   stillmap::add_watch_tiles_command(program, action);

@@ -51,6 +51,7 @@ void read_profile(YamlSection file, RobotProfile& profile) {
   file.number("length_m", profile.length_m, {0.05, 20});
   file.number("width_m", profile.width_m, {0.05, 20});
   file.number("centre_ahead_m", profile.centre_ahead_m, {-10, 10});
+  file.number("min_turning_radius_m", profile.min_turning_radius_m, {0, 50});
   file.number("ground_clearance_m", profile.ground_clearance_m, {0, 2});
   file.number("height_m", profile.height_m, {0.05, 10});
   file.number("max_step_m", profile.max_step_m, {0.01, 2});

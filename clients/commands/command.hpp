@@ -15,6 +15,8 @@ enum class ExitCode {
   bad_input = 2,
   /// No server, or no answer in time.
   no_server = 3,
+  /// There is no path to plan.
+  no_path = 4,
 };
 
 /// The chosen command with its options, ready to run. Set while the command line is parsed.
@@ -23,6 +25,7 @@ using Action = std::function<ExitCode()>;
 // Each adds one subcommand to the program; when it is chosen, it sets `action`.
 void add_map_command(CommandHandle program, Action& action);
 void add_traversable_command(CommandHandle program, Action& action);
+void add_plan_command(CommandHandle program, Action& action);
 void add_replay_command(CommandHandle program, Action& action);
 void add_watch_command(CommandHandle program, Action& action);
 void add_watch_tiles_command(CommandHandle program, Action& action);

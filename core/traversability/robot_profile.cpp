@@ -64,6 +64,7 @@ std::string RobotProfile::faults() const {
   std::ostringstream faults;
   if (name.empty()) faults << "name is empty; clients ask for the profile by it\n";
   check_footprint(*this, faults);
+  check(faults, "min_turning_radius_m", min_turning_radius_m, 0.0, 50.0);
   check(faults, "height_m", height_m, 0.05, 10.0);
   check(faults, "ground_clearance_m", ground_clearance_m, 0.0, 2.0);
   check(faults, "max_step_m", max_step_m, 0.01, 2.0);

@@ -26,6 +26,8 @@ struct RobotProfile {
   /// The rectangle's centre lies this far ahead of the point that poses speak of (a car's rear
   /// axle) [m].
   double centre_ahead_m = 0.0;
+  /// Tightest curve that it drives [m]; 0 for a robot that turns on the spot.
+  double min_turning_radius_m = 0.0;
   /// From the ground to the robot's belly, and to its highest point [m].
   double ground_clearance_m = 0.1;
   double height_m = 1.0;

@@ -83,6 +83,7 @@ void draw_path(cv::Mat& picture, const PictureFrame& frame, std::span<const Plan
     line.push_back(stamped);
   }
   draw_trajectory(picture, frame, line, path_colour);
+  draw_ends(picture, frame, line);
 }
 
 std::string square_metres(std::uint64_t cells, double cell_m) {

@@ -6,6 +6,7 @@ namespace stillmap::test {
 namespace {
 
 constexpr std::array commands{"map",
+                              "plan",
                               "replay",
                               "watch",
                               "watch-tiles",

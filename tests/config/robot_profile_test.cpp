@@ -18,7 +18,8 @@ using ::testing::HasSubstr;
 using ::testing::IsSupersetOf;
 
 constexpr const char* whole_file =
-    "name: cart\nlength_m: 2\nwidth_m: 1\ncentre_ahead_m: 0.5\nground_clearance_m: 0.12\n"
+    "name: cart\nlength_m: 2\nwidth_m: 1\ncentre_ahead_m: 0.5\nmin_turning_radius_m: "
+    "3.5\nground_clearance_m: 0.12\n"
     "height_m: 1.8\nmax_step_m: 0.07\nmax_slope_deg: 12\nmax_roughness_m: 0.04\n"
     "inferred_cost: 0.25\nunknown: allowed\n"
     "class_cost: {road: 0.5, parking: 0.25, sidewalk: 0, other-ground: 1, terrain: lethal, "
@@ -34,6 +35,7 @@ TEST(RobotProfileFile, EveryFieldIsRead) {
   EXPECT_EQ(robot.length_m, 2.0);
   EXPECT_EQ(robot.width_m, 1.0);
   EXPECT_EQ(robot.centre_ahead_m, 0.5);
+  EXPECT_EQ(robot.min_turning_radius_m, 3.5);
   EXPECT_EQ(robot.ground_clearance_m, 0.12);
   EXPECT_EQ(robot.height_m, 1.8);
   EXPECT_EQ(robot.max_step_m, 0.07);
@@ -57,6 +59,8 @@ TEST(RobotProfileFile, ShippedRobotsCanBeUsedAndDifferWhereTheyMust) {
   EXPECT_LT(cost(delivery, SemanticClass::sidewalk), cost(delivery, SemanticClass::road));
   EXPECT_TRUE(cost(tracked, SemanticClass::terrain).has_value());
   EXPECT_GT(tracked.max_step_m, car.max_step_m);
+  EXPECT_GT(car.min_turning_radius_m, 2.0);
+  EXPECT_EQ(tracked.min_turning_radius_m, 0.0);
 }
 
 TEST(RobotProfileFile, ShippedFilesBearTheNamesOfTheirRobots) {

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <optional>
+#include <string>
+
+#include "core/planning/path_plan.hpp"
+
+namespace stillmap {
+
+/// A plan and how long it took.
+struct TimedPlan {
+  PathPlan plan;
+  /// Bringing the traversable area up to date [ms].
+  double area_ms = 0.0;
+  double plan_ms = 0.0;
+  /// Until the search had its first path [ms]; unknown of planners that do not tell.
+  std::optional<double> first_ms;
+  /// Why it was made, when it replaces another one.
+  std::string cause;
+};
+
+/// `with_poses`: every pose of the path, too.
+[[nodiscard]] nlohmann::json to_json(const TimedPlan& timed, bool with_poses);
+
+/// What a person wants to know, with the path in steps of some metres.
+[[nodiscard]] std::string describe(const TimedPlan& timed);
+
+/// One line, for a plan among many.
+[[nodiscard]] std::string one_line(const TimedPlan& timed);
+
+/// Writes the path: all of it to FILE.json, or one pose a line to FILE.csv. Throws
+/// std::invalid_argument for another ending, std::runtime_error when it cannot be written.
+void write_plan(const std::filesystem::path& file, const TimedPlan& timed);
+
+/// Throws std::invalid_argument when write_plan would refuse the name.
+void check_plan_file(const std::filesystem::path& file);
+
+}  // namespace stillmap

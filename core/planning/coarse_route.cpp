@@ -1,0 +1,138 @@
+#include "core/planning/coarse_route.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <queue>
+
+namespace stillmap {
+namespace {
+
+constexpr double min_step_m = 0.4;
+constexpr float blocked = std::numeric_limits<float>::infinity();
+
+struct Step {
+  int x = 0;
+  int y = 0;
+  double cells = 1.0;
+};
+constexpr double diagonal = std::numbers::sqrt2;
+constexpr std::array<Step, 8> steps{
+    Step{1, 0, 1.0},      Step{-1, 0, 1.0},      Step{0, 1, 1.0},       Step{0, -1, 1.0},
+    Step{1, 1, diagonal}, Step{1, -1, diagonal}, Step{-1, 1, diagonal}, Step{-1, -1, diagonal}};
+
+/// A* over squares of cells; a square is as good as its best cell, so that no gap is closed.
+class Squares {
+ public:
+  Squares(const PlanningGrid& grid, int cells)
+      : grid_(grid),
+        cells_(cells),
+        factors_((grid.width() + cells - 1) / cells, (grid.height() + cells - 1) / cells, blocked),
+        costs_(factors_.width(), factors_.height(), blocked),
+        from_(factors_.width(), factors_.height(), std::int8_t{-1}) {
+    for (int y = 0; y < grid.height(); ++y) {
+      for (int x = 0; x < grid.width(); ++x) {
+        if (!grid.may_stand_in({x, y})) continue;
+        float& factor = factors_(x / cells_, y / cells_);
+        factor = std::min(factor, static_cast<float>(grid.cost_factor({x, y})));
+      }
+    }
+  }
+
+  /// From the start to a square that the search has reached [squares].
+  [[nodiscard]] double cost_to(CellIndex square) const { return costs_(square.x, square.y); }
+
+  [[nodiscard]] CellIndex square_of(const Eigen::Vector2d& position_map) const {
+    const CellIndex cell = grid_.cell_of(position_map);
+    return {cell.x / cells_, cell.y / cells_};
+  }
+
+  /// Whether the goal was reached.
+  bool search(CellIndex start, CellIndex goal) {
+    if (factor(start) == blocked || factor(goal) == blocked) return false;
+    costs_(start.x, start.y) = 0.0F;
+    open_.push({estimate(start, goal), 0.0F, start});
+    while (!open_.empty()) {
+      const Entry entry = open_.top();
+      open_.pop();
+      if (entry.square == goal) return true;
+      if (entry.cost <= costs_(entry.square.x, entry.square.y)) expand(entry, goal);
+    }
+    return false;
+  }
+
+  /// Centres of the squares on the way. @pre search() was true
+  [[nodiscard]] std::vector<Eigen::Vector2d> way(CellIndex start, CellIndex goal) const {
+    std::vector<Eigen::Vector2d> points_map;
+    for (CellIndex square = goal; square != start;) {
+      points_map.push_back(centre_of(square));
+      const Step& step = steps.at(static_cast<std::size_t>(from_(square.x, square.y)));
+      square = {square.x - step.x, square.y - step.y};
+    }
+    std::ranges::reverse(points_map);
+    return points_map;
+  }
+
+ private:
+  struct Entry {
+    float total = 0.0F;
+    float cost = 0.0F;
+    CellIndex square;
+    bool operator<(const Entry& other) const { return total > other.total; }
+  };
+
+  [[nodiscard]] float factor(CellIndex square) const { return factors_(square.x, square.y); }
+  [[nodiscard]] static float estimate(CellIndex a, CellIndex b) {
+    return static_cast<float>(std::hypot(a.x - b.x, a.y - b.y));
+  }
+  [[nodiscard]] Eigen::Vector2d centre_of(CellIndex square) const {
+    const Eigen::Vector2d corner_map = grid_.centre_of({square.x * cells_, square.y * cells_});
+    return corner_map + Eigen::Vector2d::Constant(0.5 * (cells_ - 1) * grid_.cell_m());
+  }
+
+  void expand(const Entry& entry, CellIndex goal) {
+    for (std::size_t i = 0; i < steps.size(); ++i) {
+      const CellIndex next{entry.square.x + steps.at(i).x, entry.square.y + steps.at(i).y};
+      if (!factors_.contains(next.x, next.y) || factor(next) == blocked) continue;
+      const float mean = 0.5F * (factor(entry.square) + factor(next));
+      const float cost = entry.cost + static_cast<float>(steps.at(i).cells) * mean;
+      if (cost >= costs_(next.x, next.y)) continue;
+      costs_(next.x, next.y) = cost;
+      from_(next.x, next.y) = static_cast<std::int8_t>(i);
+      open_.push({cost + estimate(next, goal), cost, next});
+    }
+  }
+
+  const PlanningGrid& grid_;
+  int cells_;
+  CellGrid<float> factors_;
+  CellGrid<float> costs_;
+  CellGrid<std::int8_t> from_;
+  std::priority_queue<Entry> open_;
+};
+
+}  // namespace
+
+std::optional<CoarseRoute> find_coarse_route(const PlanningGrid& grid,
+                                             const Eigen::Vector2d& start_map,
+                                             const Eigen::Vector2d& goal_map) {
+  const int cells = std::max(2, static_cast<int>(std::ceil(min_step_m / grid.cell_m() - 1e-9)));
+  Squares squares(grid, cells);
+  const CellIndex start = squares.square_of(start_map);
+  const CellIndex goal = squares.square_of(goal_map);
+  if (!squares.search(start, goal)) return std::nullopt;
+  CoarseRoute route;
+  route.step_m = cells * grid.cell_m();
+  route.cost = squares.cost_to(goal) * route.step_m;
+  route.points_map = squares.way(start, goal);
+  route.points_map.insert(route.points_map.begin(), start_map);
+  route.points_map.push_back(goal_map);
+  for (std::size_t i = 1; i < route.points_map.size(); ++i) {
+    route.length_m += (route.points_map[i] - route.points_map[i - 1]).norm();
+  }
+  return route;
+}
+
+}  // namespace stillmap

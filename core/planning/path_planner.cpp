@@ -1,0 +1,225 @@
+#include "core/planning/path_planner.hpp"
+
+#include <cmath>
+#include <numbers>
+#include <sstream>
+#include <stdexcept>
+
+#include "core/planning/best_path.hpp"
+#include "core/planning/coarse_route.hpp"
+#include "core/planning/path_polish.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+PathPlan failed(const TraversabilityView& view, PlanStatus status, const std::string& reason) {
+  PathPlan plan;
+  plan.status = status;
+  plan.reason = reason;
+  plan.map_version = view.version;
+  return plan;
+}
+
+std::string text_of(const Eigen::Vector2d& position_map) {
+  std::ostringstream text;
+  text << "(" << position_map.x() << ", " << position_map.y() << ")";
+  return text.str();
+}
+
+std::string fault_of(const TraversabilityView& view, const PlanPlace& place) {
+  std::ostringstream text;
+  if (!view.cell_of(place.position_map)) {
+    text << "position " << text_of(place.position_map)
+         << "; must be finite and within 100 km of the map's origin";
+  } else if (place.heading_rad && !(std::abs(*place.heading_rad) <= 1e6)) {
+    text << "heading " << *place.heading_rad << "; must be finite [rad]";
+  }
+  return text.str();
+}
+
+/// The poses at a place at which the robot is free: all headings asked for.
+struct Stand {
+  std::vector<PlanarPose> poses;
+  /// Of the first heading, when none is free.
+  std::optional<PathConflict> conflict;
+};
+
+Stand stand_at(const TraversabilityView& view, const PlanPlace& place) {
+  constexpr int any_headings = 16;
+  const int headings = place.heading_rad ? 1 : any_headings;
+  Stand stand;
+  for (int i = 0; i < headings; ++i) {
+    const PlanarPose pose{place.position_map,
+                          place.heading_rad.value_or(2.0 * pi * i / any_headings)};
+    const PathCheck check = check_path(view, std::span(&pose, 1));
+    if (check.is_free) stand.poses.push_back(pose);
+    if (!stand.conflict) stand.conflict = check.conflict;
+  }
+  return stand;
+}
+
+PathPlan blocked(const TraversabilityView& view, PlanStatus status, const PlanPlace& place,
+                 const Stand& stand) {
+  PathPlan plan = failed(view, status, "");
+  std::ostringstream text;
+  text << "'" << view.profile.name << "' cannot stand at " << text_of(place.position_map);
+  if (stand.conflict) {
+    plan.conflict = stand.conflict;
+    text << ": " << name(stand.conflict->reason) << " at " << text_of(stand.conflict->place_map);
+  }
+  const NearestTraversable nearby = nearest_traversable(view, place.position_map);
+  if (nearby.status == AreaStatus::ok) {
+    plan.nearby = nearby;
+    text << "; the nearest free place is " << text_of(nearby.position_map) << ", "
+         << nearby.distance_m << " m away";
+  }
+  plan.reason = text.str();
+  return plan;
+}
+
+/// Everything that a search may need: the map, and both ends where unknown ground is allowed.
+Eigen::AlignedBox2d search_box(const TraversabilityView& view, const PlanPlace& from,
+                               const PlanPlace& to) {
+  Eigen::AlignedBox2d box = view.bounds_map();
+  box.extend(from.position_map);
+  box.extend(to.position_map);
+  return box;
+}
+
+double height_at(CellLookup& lookup, const TraversabilityView& view, const PlanarPose& pose) {
+  const auto cell = view.cell_of(pose.position_map);
+  const SurfaceCell* surface = cell ? lookup.at(*cell).surface : nullptr;
+  return surface != nullptr && surface->ground.is_known() ? surface->ground.height_m : 0.0;
+}
+
+void set_poses(const TraversabilityView& view, std::span<const DrivenPose> path, PathPlan& plan) {
+  CellLookup lookup(view);
+  plan.poses.clear();
+  plan.length_m = plan.reverse_m = 0.0;
+  for (const DrivenPose& driven : path) {
+    plan.length_m += driven.at.step_m;
+    if (driven.at.is_reverse) plan.reverse_m += driven.at.step_m;
+    plan.poses.push_back({driven.at.pose, height_at(lookup, view, driven.at.pose), plan.length_m,
+                          driven.at.is_reverse});
+  }
+  plan.cost = path.back().cost;
+}
+
+/// Fills in the path if check_path finds it free, thinned out where that stays free.
+bool take_path(const TraversabilityView& view, const std::vector<DrivenPose>& path,
+               PathPlan& plan) {
+  constexpr double spacing_m = 0.25;
+  for (const std::vector<DrivenPose>& candidate : {thinned(path, spacing_m), path}) {
+    set_poses(view, candidate, plan);
+    const PathCheck check = check_path(view, plan.path_map());
+    if (!check.is_free) continue;
+    plan.clearance_m = check.clearance_m;
+    plan.inferred_m = check.inferred_m;
+    return true;
+  }
+  plan.poses.clear();
+  return false;
+}
+
+/// One search between two ends at which the robot can stand.
+class Search {
+ public:
+  Search(const TraversabilityView& view, const PlanPlace& from, const PlanPlace& to,
+         const PlanningConfig& config)
+      : view_(view),
+        config_(config),
+        from_(from),
+        to_(to),
+        grid_(view, search_box(view, from, to), config.cost_weight),
+        drive_(grid_, config.reverse_factor) {}
+
+  [[nodiscard]] PathPlan run(std::span<const PlanarPose> starts,
+                             std::span<const PlanarPose> goals) const {
+    const auto route = find_coarse_route(grid_, from_.position_map, to_.position_map);
+    if (!route) {
+      return failed(view_, PlanStatus::no_way,
+                    "no known way from " + text_of(from_.position_map) + " to " +
+                        text_of(to_.position_map) + " is wide enough for '" + view_.profile.name +
+                        "'; map more, or allow unknown ground");
+    }
+    PathPlan plan = failed(view_, PlanStatus::out_of_time, "");
+    plan.route_m = route->length_m;
+    const auto best = find_best_path(drive_, *route, starts, goals, config_, plan.work);
+    if (best && take_path(view_, best->poses, plan) && best->reaches_goal) {
+      plan.status = PlanStatus::found;
+    } else {
+      plan.reason = reason_for(plan, goals);
+    }
+    return plan;
+  }
+
+ private:
+  [[nodiscard]] std::string reason_for(const PathPlan& plan,
+                                       std::span<const PlanarPose> goals) const {
+    std::ostringstream text;
+    text << "no path to " << text_of(goals.front().position_map) << " was found in " << plan.work
+         << " steps";
+    if (!plan.poses.empty()) {
+      const Eigen::Vector2d& end = plan.poses.back().pose.position_map;
+      text << "; the nearest place reached is " << text_of(end) << ", "
+           << (end - goals.front().position_map).norm() << " m from it";
+    }
+    text << "; allow more time or steps";
+    return text.str();
+  }
+
+  const TraversabilityView& view_;
+  const PlanningConfig& config_;
+  const PlanPlace& from_;
+  const PlanPlace& to_;
+  PlanningGrid grid_;
+  DriveCheck drive_;
+};
+
+/// Whether the robot is there already.
+bool is_same_place(const PlanarPose& start, const PlanPlace& to) {
+  constexpr double same_m = 1e-3;
+  constexpr double same_rad = 1e-3;
+  if ((start.position_map - to.position_map).norm() > same_m) return false;
+  return !to.heading_rad ||
+         std::abs(std::remainder(start.heading_rad - *to.heading_rad, 2.0 * pi)) <= same_rad;
+}
+
+std::optional<PathPlan> refusal(const TraversabilityView& view, const PlanPlace& from,
+                                const PlanPlace& to) {
+  using enum PlanStatus;
+  if (view.tiles.empty()) return failed(view, no_way, "the map is empty");
+  const std::string from_fault = fault_of(view, from);
+  if (!from_fault.empty()) return failed(view, invalid_request, "start: " + from_fault);
+  const std::string to_fault = fault_of(view, to);
+  if (!to_fault.empty()) return failed(view, invalid_request, "goal: " + to_fault);
+  const double cells = PlanningGrid::cells_for(search_box(view, from, to), view.cell_m);
+  if (cells <= PlanningGrid::max_cells) return std::nullopt;
+  std::ostringstream text;
+  text << "start, goal and map span " << cells << " cells; at most " << PlanningGrid::max_cells
+       << " can be searched";
+  return failed(view, invalid_request, text.str());
+}
+
+}  // namespace
+
+PathPlan plan_path(const TraversabilityView& view, const PlanPlace& from, const PlanPlace& to,
+                   const PlanningConfig& config) {
+  const std::string faults = config.faults();
+  if (!faults.empty()) throw std::invalid_argument("planning: " + faults);
+  if (auto refused = refusal(view, from, to)) return *std::move(refused);
+  const Stand start = stand_at(view, from);
+  if (start.poses.empty()) return blocked(view, PlanStatus::start_blocked, from, start);
+  const Stand goal = stand_at(view, to);
+  if (goal.poses.empty()) return blocked(view, PlanStatus::goal_blocked, to, goal);
+  if (is_same_place(start.poses.front(), to)) {
+    PathPlan plan = failed(view, PlanStatus::found, "");
+    (void)take_path(view, {{{start.poses.front(), 0.0, false}, 0.0}}, plan);
+    return plan;
+  }
+  return Search(view, from, to, config).run(start.poses, goal.poses);
+}
+
+}  // namespace stillmap

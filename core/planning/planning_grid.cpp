@@ -1,0 +1,141 @@
+#include "core/planning/planning_grid.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/traversability/distance_transform.hpp"
+
+namespace stillmap {
+namespace {
+
+// From a cell's centre to its corner, in cells.
+constexpr double half_diagonal = 0.7072;
+
+bool is_closed(const TraversabilityCell& cell, UnknownGround unknown) {
+  return cell.is_lethal_itself() ||
+         (cell.state == CellState::unknown && unknown == UnknownGround::blocked);
+}
+
+/// Share of the highest cost: unknown ground that may be entered is as unwanted as a narrow place.
+double share_of(const TraversabilityCell& cell) {
+  constexpr double highest_cost = 100.0;
+  return cell.state == CellState::unknown ? 1.0 : cell.cost / highest_cost;
+}
+
+CellIndex floor_cell(const Eigen::Vector2d& position_map, double cell_m) {
+  const Eigen::Vector2d cell = (position_map / cell_m).array().floor();
+  return {static_cast<std::int32_t>(cell.x()), static_cast<std::int32_t>(cell.y())};
+}
+
+/// Calls `visit(x, y, cell)` for the cells of a tile that the grid has, too.
+template <typename Visit>
+void visit_shared(const TraversabilityTile& tile, CellIndex origin,
+                  const CellGrid<std::uint8_t>& grid, const Visit& visit) {
+  const CellIndex corner{tile.id.x * tile.side - origin.x, tile.id.y * tile.side - origin.y};
+  for (int y = std::max(0, -corner.y); y < std::min(tile.side, grid.height() - corner.y); ++y) {
+    for (int x = std::max(0, -corner.x); x < std::min(tile.side, grid.width() - corner.x); ++x) {
+      visit(corner.x + x, corner.y + y, tile.at(x, y));
+    }
+  }
+}
+
+}  // namespace
+
+double PlanningGrid::cells_for(const Eigen::AlignedBox2d& box_map, double cell_m) {
+  return box_map.sizes().prod() / (cell_m * cell_m);
+}
+
+PlanningGrid::PlanningGrid(const TraversabilityView& view, const Eigen::AlignedBox2d& box_map,
+                           double cost_weight)
+    : cell_m_(view.cell_m), profile_(view.profile), bounds_map_(box_map) {
+  const int margin =
+      2 + static_cast<int>(std::ceil(profile_.circumscribed_radius_m() / cell_m_ + half_diagonal));
+  const CellIndex low = floor_cell(box_map.min(), cell_m_);
+  const CellIndex high = floor_cell(box_map.max(), cell_m_);
+  origin_ = {low.x - margin, low.y - margin};
+  const int columns = high.x - low.x + 1 + 2 * margin;
+  const int rows = high.y - low.y + 1 + 2 * margin;
+  // Where there is no tile, nothing is known.
+  const TraversabilityCell nothing;
+  CellGrid<std::uint8_t> closed(columns, rows, is_closed(nothing, profile_.unknown) ? 1 : 0);
+  factors_ =
+      CellGrid<float>(columns, rows, static_cast<float>(1.0 + cost_weight * share_of(nothing)));
+  for (const auto& tile : view.tiles) {
+    visit_shared(*tile, origin_, closed, [&](int x, int y, const TraversabilityCell& cell) {
+      closed(x, y) = is_closed(cell, profile_.unknown) ? 1 : 0;
+      factors_(x, y) = static_cast<float>(1.0 + cost_weight * share_of(cell));
+    });
+  }
+  const CellGrid<std::int32_t> squared = squared_distances(closed);
+  distances_m_ = CellGrid<float>(columns, rows);
+  for_each_cell(squared, [&](int x, int y) {
+    distances_m_(x, y) =
+        static_cast<float>(cell_m_ * std::sqrt(static_cast<double>(squared(x, y))));
+  });
+  low_ = cell_of(box_map.min());
+  high_ = cell_of(box_map.max());
+  const int discs =
+      std::max(1, static_cast<int>(std::lround(profile_.length_m / profile_.width_m)));
+  const double piece_m = profile_.length_m / discs;
+  for (int i = 0; i < discs; ++i) {
+    disc_ahead_m_.push_back(profile_.centre_ahead_m + (i + 0.5 - 0.5 * discs) * piece_m);
+  }
+  disc_radius_m_ = std::hypot(0.5 * (piece_m + cell_m_), 0.5 * (profile_.width_m + cell_m_)) +
+                   half_diagonal * cell_m_;
+}
+
+CellIndex PlanningGrid::cell_of(const Eigen::Vector2d& position_map) const {
+  const CellIndex cell = floor_cell(position_map, cell_m_);
+  return {cell.x - origin_.x, cell.y - origin_.y};
+}
+
+Eigen::Vector2d PlanningGrid::centre_of(CellIndex cell) const {
+  return cell_m_ * Eigen::Vector2d(origin_.x + cell.x + 0.5, origin_.y + cell.y + 0.5);
+}
+
+double PlanningGrid::distance_m(const Eigen::Vector2d& position_map) const {
+  const CellIndex cell = cell_of(position_map);
+  return distances_m_(cell.x, cell.y);
+}
+
+bool PlanningGrid::may_stand_in(CellIndex cell) const {
+  if (cell.x < low_.x || cell.y < low_.y || cell.x > high_.x || cell.y > high_.y) return false;
+  return distances_m_(cell.x, cell.y) + half_diagonal * cell_m_ >= profile_.inscribed_radius_m();
+}
+
+bool PlanningGrid::is_free(const PlanarPose& pose) const {
+  if (!bounds_map_.contains(pose.position_map)) return false;
+  if (distance_m(pose.position_map) + half_diagonal * cell_m_ < profile_.inscribed_radius_m()) {
+    return false;
+  }
+  const Eigen::Vector2d ahead(std::cos(pose.heading_rad), std::sin(pose.heading_rad));
+  const bool is_clear = std::ranges::all_of(disc_ahead_m_, [&](double ahead_m) {
+    return distance_m(pose.position_map + ahead_m * ahead) > disc_radius_m_;
+  });
+  return is_clear || !is_closed_under(pose);
+}
+
+/// The cells of visit_footprint; the quick answers before it decide most poses.
+bool PlanningGrid::is_closed_under(const PlanarPose& pose) const {
+  const Eigen::Vector2d ahead(std::cos(pose.heading_rad), std::sin(pose.heading_rad));
+  const Eigen::Vector2d left(-ahead.y(), ahead.x());
+  const Eigen::Vector2d centre_map = pose.position_map + profile_.centre_ahead_m * ahead;
+  const double half_length_m = 0.5 * (profile_.length_m + cell_m_);
+  const double half_width_m = 0.5 * (profile_.width_m + cell_m_);
+  const Eigen::Vector2d reach_m = half_length_m * ahead.cwiseAbs() + half_width_m * left.cwiseAbs();
+  const CellIndex low = cell_of(centre_map - reach_m);
+  const CellIndex high = cell_of(centre_map + reach_m);
+  for (int y = low.y; y <= high.y; ++y) {
+    for (int x = low.x; x <= high.x; ++x) {
+      if (distances_m_(x, y) > 0.0F) continue;
+      const Eigen::Vector2d offset_m = centre_of({x, y}) - centre_map;
+      if (std::abs(offset_m.dot(ahead)) <= half_length_m &&
+          std::abs(offset_m.dot(left)) <= half_width_m) {
+        return true;
+      }
+    }
+  }
+  return false;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "core/traversability/cell_grid.hpp"
+#include "core/traversability/footprint.hpp"
+#include "core/traversability/traversability_view.hpp"
+
+namespace stillmap {
+
+/// The area of a robot as one dense grid, made for one search: where a pose is free and what it
+/// costs to be there. A cell is closed when check_path would not let the footprint touch it.
+class PlanningGrid {
+ public:
+  /// Covers the box (map frame [m], not empty) and a footprint more on every side. One metre over
+  /// a cell costs 1 + `cost_weight` * its cost, from 0 to 1.
+  /// @pre the box is small enough, cells_for(box, cell) <= max_cells
+  PlanningGrid(const TraversabilityView& view, const Eigen::AlignedBox2d& box_map,
+               double cost_weight);
+
+  static constexpr double max_cells = 50e6;
+  [[nodiscard]] static double cells_for(const Eigen::AlignedBox2d& box_map, double cell_m);
+
+  [[nodiscard]] double cell_m() const { return cell_m_; }
+  [[nodiscard]] int width() const { return factors_.width(); }
+  [[nodiscard]] int height() const { return factors_.height(); }
+  [[nodiscard]] const RobotProfile& profile() const { return profile_; }
+  /// Box in which poses may lie, map frame [m].
+  [[nodiscard]] const Eigen::AlignedBox2d& bounds_map() const { return bounds_map_; }
+
+  /// The cell that holds a place within the bounds.
+  [[nodiscard]] CellIndex cell_of(const Eigen::Vector2d& position_map) const;
+  [[nodiscard]] Eigen::Vector2d centre_of(CellIndex cell) const;
+
+  /// Whether the footprint at the pose touches no closed cell; the same answer as check_path's for
+  /// that one pose. False outside the bounds.
+  [[nodiscard]] bool is_free(const PlanarPose& pose) const;
+  /// Whether a robot whose pose lies in the cell can be free with any heading at all: false only
+  /// when it cannot.
+  [[nodiscard]] bool may_stand_in(CellIndex cell) const;
+  /// Cost of a metre in the cell, 1 or more.
+  [[nodiscard]] double cost_factor(CellIndex cell) const { return factors_(cell.x, cell.y); }
+
+ private:
+  [[nodiscard]] double distance_m(const Eigen::Vector2d& position_map) const;
+  [[nodiscard]] bool is_closed_under(const PlanarPose& pose) const;
+
+  double cell_m_;
+  RobotProfile profile_;
+  CellIndex origin_;
+  Eigen::AlignedBox2d bounds_map_;
+  /// Of the bounds' corners.
+  CellIndex low_;
+  CellIndex high_;
+  /// Closed cells have distance 0.
+  CellGrid<float> distances_m_;
+  CellGrid<float> factors_;
+  /// Discs along the robot's axis that hold the footprint and what of the cells it touches.
+  std::vector<double> disc_ahead_m_;
+  double disc_radius_m_ = 0.0;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,189 @@
+#include "core/planning/path_planner.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <numbers>
+
+#include "tests/traversability/voxel_world.hpp"
+
+namespace stillmap {
+namespace {
+
+using enum SemanticClass;
+using test::area_of;
+using test::square_robot;
+using test::VoxelWorld;
+using ::testing::HasSubstr;
+
+constexpr double pi = std::numbers::pi;
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+/// Two lanes of 5 m, 60 m long, with a wall between them that ends 10 m before their end.
+VoxelWorld two_lanes() {
+  VoxelWorld world;
+  world.ground(0, -6, 60, 6, road);
+  world.block(0, -0.6, 46, 0.6, 0.3, 2.0, building);
+  return world;
+}
+
+RobotProfile small_car() {
+  RobotProfile robot = square_robot();
+  robot.name = "small_car";
+  robot.length_m = 4.0;
+  robot.width_m = 1.8;
+  robot.min_turning_radius_m = 4.0;
+  return robot;
+}
+
+void expect_drivable(const TraversabilityView& view, const PathPlan& plan) {
+  ASSERT_EQ(plan.status, PlanStatus::found) << plan.reason;
+  EXPECT_TRUE(check_path(view, plan.path_map()).is_free);
+  const double radius_m = view.profile.min_turning_radius_m;
+  for (std::size_t i = 1; i < plan.poses.size() && radius_m > 0.0; ++i) {
+    const double turned = std::remainder(
+        plan.poses[i].pose.heading_rad - plan.poses[i - 1].pose.heading_rad, 2.0 * pi);
+    const double driven_m = plan.poses[i].along_m - plan.poses[i - 1].along_m;
+    EXPECT_LE(std::abs(turned), driven_m / radius_m + 1e-6);
+  }
+}
+
+TEST(PathPlanner, ACarTurnsRoundTheEndOfTheWall) {
+  const auto view = area_of(two_lanes().view(), small_car());
+  const PathPlan plan = plan_path(*view, {{5, -3}, 0.0}, {{5, 3}, pi});
+  expect_drivable(*view, plan);
+  EXPECT_EQ(plan.poses.front().pose.position_map, Eigen::Vector2d(5, -3));
+  EXPECT_EQ(plan.poses.back().pose.position_map, Eigen::Vector2d(5, 3));
+  EXPECT_NEAR(std::cos(plan.poses.back().pose.heading_rad), -1.0, 1e-9);
+  EXPECT_GT(plan.length_m, 82.0);
+  EXPECT_LT(plan.length_m, 110.0);
+  EXPECT_GE(plan.cost, plan.length_m - 1e-6);
+  EXPECT_NEAR(plan.poses.back().along_m, plan.length_m, 1e-9);
+  EXPECT_NEAR(plan.poses.front().height_m, 0.1, 0.05);
+}
+
+TEST(PathPlanner, EveryPlannerFindsTheWay) {
+  const auto view = area_of(two_lanes().view(), square_robot());
+  for (std::size_t i = 0; i < planner_kind_count; ++i) {
+    PlanningConfig config;
+    config.planner = static_cast<PlannerKind>(i);
+    config.max_work = 200'000;
+    bool has_path = false;
+    config.improved = [&](double) { has_path = true; };
+    config.should_stop = [&] { return has_path; };
+    const PathPlan plan = plan_path(*view, {{30, -3}, std::nullopt}, {{30, 3}, {}}, config);
+    EXPECT_EQ(plan.status, PlanStatus::found) << name(config.planner) << ": " << plan.reason;
+    expect_drivable(*view, plan);
+  }
+}
+
+TEST(PathPlanner, TheSameSeedGivesTheSamePath) {
+  const auto view = area_of(two_lanes().view(), small_car());
+  const auto plan = [&](std::uint32_t seed) {
+    PlanningConfig config;
+    config.seed = seed;
+    return plan_path(*view, {{5, -3}, 0.0}, {{5, 3}, pi}, config);
+  };
+  const PathPlan first = plan(3);
+  const PathPlan again = plan(3);
+  ASSERT_EQ(first.poses.size(), again.poses.size());
+  EXPECT_EQ(first.cost, again.cost);
+  EXPECT_NE(first.cost, plan(4).cost);
+}
+
+TEST(PathPlanner, ABlockedStartOrGoalSaysWhyAndOffersAPlace) {
+  VoxelWorld world = two_lanes();
+  const auto view = area_of(world.view(), square_robot());
+  const PathPlan on_wall = plan_path(*view, {{30, 0}, {}}, {{30, 3}, {}});
+  EXPECT_EQ(on_wall.status, PlanStatus::start_blocked);
+  ASSERT_TRUE(on_wall.conflict);
+  EXPECT_EQ(on_wall.conflict->reason, BlockReason::obstacle);
+  ASSERT_TRUE(on_wall.nearby);
+  EXPECT_LT(on_wall.nearby->distance_m, 2.5);
+  EXPECT_THAT(on_wall.reason, HasSubstr("obstacle"));
+  const PathPlan to_unknown = plan_path(*view, {{30, 3}, {}}, {{30, 20}, {}});
+  EXPECT_EQ(to_unknown.status, PlanStatus::goal_blocked);
+  EXPECT_THAT(to_unknown.reason, HasSubstr("unknown"));
+}
+
+TEST(PathPlanner, WithoutAWayItSaysSoAtOnce) {
+  VoxelWorld world = two_lanes();
+  world.block(40, -6, 41, 6, 0.3, 2.0, building);
+  const auto view = area_of(world.view(), square_robot());
+  const PathPlan plan = plan_path(*view, {{30, -3}, {}}, {{50, -3}, {}});
+  EXPECT_EQ(plan.status, PlanStatus::no_way);
+  EXPECT_EQ(plan.work, 0U);
+  EXPECT_TRUE(plan.poses.empty());
+}
+
+TEST(PathPlanner, DrivesOnUnknownGroundOnlyIfItMay) {
+  VoxelWorld world = two_lanes();
+  world.clear(46, -6, 60, 6);
+  RobotProfile robot = square_robot();
+  const MapView map = world.view();
+  EXPECT_EQ(plan_path(*area_of(map, robot), {{30, -3}, {}}, {{30, 3}, {}}).status,
+            PlanStatus::no_way);
+  robot.unknown = UnknownGround::allowed;
+  const auto view = area_of(map, robot);
+  const PathPlan plan = plan_path(*view, {{30, -3}, {}}, {{30, 3}, {}});
+  expect_drivable(*view, plan);
+  // Also to a place that no tile covers.
+  expect_drivable(*view, plan_path(*view, {{30, -3}, {}}, {{80, -3}, {}}));
+}
+
+TEST(PathPlanner, WhereItIsAlreadyItNeedNotGo) {
+  const auto view = area_of(two_lanes().view(), small_car());
+  const PathPlan plan = plan_path(*view, {{30, -3}, 0.0}, {{30, -3}, {}});
+  EXPECT_EQ(plan.status, PlanStatus::found);
+  EXPECT_EQ(plan.poses.size(), 1U);
+  EXPECT_EQ(plan.length_m, 0.0);
+  // But to face the other way, a car has to turn.
+  const PathPlan turned = plan_path(*view, {{52, 0}, 0.0}, {{52, 0}, pi});
+  expect_drivable(*view, turned);
+  EXPECT_GT(turned.length_m, pi * 4.0 * 0.9);
+}
+
+TEST(PathPlanner, StoppedEarlyItHasNoPathAndSaysSo) {
+  const auto view = area_of(two_lanes().view(), small_car());
+  PlanningConfig config;
+  config.should_stop = [] { return true; };
+  const PathPlan plan = plan_path(*view, {{5, -3}, 0.0}, {{5, 3}, pi}, config);
+  EXPECT_EQ(plan.status, PlanStatus::out_of_time);
+  EXPECT_THAT(plan.reason, HasSubstr("allow more"));
+}
+
+TEST(PathPlanner, HostileQuestionsGetAReason) {
+  const auto view = area_of(two_lanes().view(), square_robot());
+  const auto reason = [&](const PlanPlace& from, const PlanPlace& to) {
+    const PathPlan plan = plan_path(*view, from, to);
+    EXPECT_EQ(plan.status, PlanStatus::invalid_request);
+    EXPECT_TRUE(plan.poses.empty());
+    return plan.reason;
+  };
+  EXPECT_THAT(reason({{nan, 0}, {}}, {{30, 3}, {}}), HasSubstr("start: position"));
+  EXPECT_THAT(reason({{30, 3}, {}}, {{1e9, 0}, {}}), HasSubstr("goal: position"));
+  EXPECT_THAT(reason({{30, 3}, nan}, {{30, -3}, {}}), HasSubstr("heading nan"));
+  EXPECT_THAT(reason({{30, 3}, {}}, {{9e4, 9e4}, {}}), HasSubstr("cells"));
+  const auto nothing = area_of(MapView{}, square_robot());
+  EXPECT_EQ(plan_path(*nothing, {{0, 0}, {}}, {{1, 1}, {}}).status, PlanStatus::no_way);
+}
+
+TEST(PathPlanner, RefusesAConfigurationWithFaults) {
+  const auto view = area_of(two_lanes().view(), square_robot());
+  PlanningConfig config;
+  config.reverse_factor = 0.5;
+  config.cost_weight = nan;
+  config.seed = 0;
+  try {
+    (void)plan_path(*view, {{30, 3}, {}}, {{40, 3}, {}}, config);
+    FAIL();
+  } catch (const std::invalid_argument& error) {
+    for (const char* field : {"reverse_factor", "cost_weight", "seed"}) {
+      EXPECT_THAT(error.what(), HasSubstr(field));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace stillmap
