@@ -19,16 +19,4 @@ RayWalk::RayWalk(const Eigen::Vector3d& start, const Eigen::Vector3d& direction)
   choose_axis();
 }
 
-void RayWalk::step() {
-  entered_at_ = next_at_[axis_];
-  voxel_[axis_] += step_[axis_];
-  next_at_[axis_] += voxel_length_[axis_];
-  choose_axis();
-}
-
-void RayWalk::choose_axis() {
-  axis_ = next_at_[0] <= next_at_[1] ? 0 : 1;
-  if (next_at_[2] < next_at_[axis_]) axis_ = 2;
-}
-
 }  // namespace stillmap

@@ -16,10 +16,18 @@ class RayWalk {
   [[nodiscard]] double entered_at() const { return entered_at_; }
   /// How far along the line the next voxel begins.
   [[nodiscard]] double next_at() const { return next_at_[axis_]; }
-  void step();
+  void step() {
+    entered_at_ = next_at_[axis_];
+    voxel_[axis_] += step_[axis_];
+    next_at_[axis_] += voxel_length_[axis_];
+    choose_axis();
+  }
 
  private:
-  void choose_axis();
+  void choose_axis() {
+    axis_ = next_at_[0] <= next_at_[1] ? 0 : 1;
+    if (next_at_[2] < next_at_[axis_]) axis_ = 2;
+  }
 
   VoxelKey voxel_;
   VoxelKey step_;

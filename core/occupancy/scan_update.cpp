@@ -42,9 +42,9 @@ class Gathering {
     if (!in_octree(end)) return;
     const VoxelKey end_voxel = end.array().floor().cast<std::int32_t>();
     VoxelBrick& brick = bricks_.brick_of(end_voxel);
-    const std::uint64_t bit = VoxelBricks::bit_of(end_voxel);
-    if ((brick.ray_ends & bit) != 0) return;
-    brick.ray_ends |= bit;
+    const std::uint64_t octant = VoxelBricks::octant_of(end_voxel);
+    if ((brick.ray_ends & octant) != 0) return;
+    brick.ray_ends |= octant;
     for (RayWalk ray(lidar_, direction); ray.entered_at() < length; ray.step()) {
       bricks_.brick_of(ray.voxel()).misses |= VoxelBricks::bit_of(ray.voxel());
     }

@@ -11,8 +11,8 @@ namespace stillmap {
 
 /// Gathers what a scan tells: the voxels of its stationary points, and, where it clears, those that
 /// its rays pass within the clearing range, points of movable things included. One ray for each
-/// voxel that rays end in. Points that are not finite, or outside the octree, tell nothing; nor
-/// does a scan whose lidar is outside.
+/// cube of 2 x 2 x 2 voxels that rays end in. Points that are not finite, or outside the octree,
+/// tell nothing; nor does a scan whose lidar is outside.
 void gather_scan(const OccupancyConfig& config, const LabelledScan& scan,
                  const Eigen::Isometry3d& T_map_lidar, const ScanUse& use, VoxelBricks& bricks);
 

@@ -5,8 +5,6 @@
 namespace stillmap {
 namespace {
 
-constexpr std::uint64_t no_key = ~std::uint64_t{0};
-
 /// Puts two zero bits between the bits of a 14-bit number.
 std::uint64_t spread(std::uint64_t bits) {
   bits = (bits | bits << 16U) & 0x030000FF0000FFULL;
@@ -15,13 +13,10 @@ std::uint64_t spread(std::uint64_t bits) {
   return (bits | bits << 2U) & 0x09249249249249ULL;
 }
 
-std::uint64_t part(std::int32_t coordinate) { return static_cast<std::uint64_t>(coordinate) >> 2U; }
-
-/// Octant or child: one bit of each coordinate.
-unsigned corner(const VoxelKey& voxel, unsigned bit) {
-  return (static_cast<unsigned>(voxel.x()) >> bit & 1U) |
-         (static_cast<unsigned>(voxel.y()) >> bit & 1U) << 1U |
-         (static_cast<unsigned>(voxel.z()) >> bit & 1U) << 2U;
+/// Of a brick's key: x, y and z, 14 bits each.
+std::uint64_t order_of(std::uint64_t key) {
+  constexpr std::uint64_t all = (1U << 14U) - 1U;
+  return spread(key >> 28U) | spread(key >> 14U & all) << 1U | spread(key & all) << 2U;
 }
 
 }  // namespace
@@ -32,22 +27,12 @@ void VoxelBricks::clear() {
   last_key_ = no_key;
 }
 
-VoxelBrick& VoxelBricks::brick_of(const VoxelKey& voxel) {
-  const std::uint64_t key = part(voxel.x()) << 28U | part(voxel.y()) << 14U | part(voxel.z());
-  if (key == last_key_) return bricks_[last_];
+VoxelBrick& VoxelBricks::find_or_make(std::uint64_t key) {
   const auto [entry, is_new] = index_.try_emplace(key, static_cast<std::uint32_t>(bricks_.size()));
-  if (is_new) {
-    const std::uint64_t order =
-        spread(part(voxel.x())) | spread(part(voxel.y())) << 1U | spread(part(voxel.z())) << 2U;
-    bricks_.push_back({.order = order});
-  }
+  if (is_new) bricks_.push_back({.order = order_of(key)});
   last_key_ = key;
   last_ = entry->second;
   return bricks_[last_];
-}
-
-std::uint64_t VoxelBricks::bit_of(const VoxelKey& voxel) {
-  return std::uint64_t{1} << (8U * corner(voxel, 1) + corner(voxel, 0));
 }
 
 std::span<const VoxelBrick> VoxelBricks::sorted() {

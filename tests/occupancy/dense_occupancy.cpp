@@ -15,6 +15,11 @@ DenseOccupancy::Key DenseOccupancy::key_of(const Eigen::Vector3d& p_map) const {
   return {key.x(), key.y(), key.z()};
 }
 
+DenseOccupancy::Key DenseOccupancy::octant_of(const Eigen::Vector3d& p_map) const {
+  const Eigen::Vector3i key = (p_map / (2.0 * config_.resolution_m)).array().floor().cast<int>();
+  return {key.x(), key.y(), key.z()};
+}
+
 Eigen::Vector3d DenseOccupancy::centre_map(const Key& key) const {
   return config_.resolution_m * Eigen::Vector3d(key[0] + 0.5, key[1] + 0.5, key[2] + 0.5);
 }
@@ -55,7 +60,7 @@ void DenseOccupancy::insert(const PlacedScan& placed, const ScanUse& use) {
                  config_.clear_range_m);
     if (!clears || cleared_m <= 0.0) continue;
     const Eigen::Vector3d end_map = lidar_map + cleared_m / range_m * (p_map - lidar_map);
-    if (ends.insert(key_of(end_map)).second) add_passed(lidar_map, end_map, passed);
+    if (ends.insert(octant_of(end_map)).second) add_passed(lidar_map, end_map, passed);
   }
   for (const Key& key : hits) change(key, config_.hit_probability);
   for (const Key& key : passed) {

@@ -25,6 +25,8 @@ class DenseOccupancy {
 
  private:
   [[nodiscard]] Key key_of(const Eigen::Vector3d& p_map) const;
+  /// The cube of 2 x 2 x 2 voxels.
+  [[nodiscard]] Key octant_of(const Eigen::Vector3d& p_map) const;
   void add_passed(const Eigen::Vector3d& from_map, const Eigen::Vector3d& to_map,
                   std::set<Key>& passed) const;
   void change(const Key& key, double probability);
