@@ -13,6 +13,7 @@
 #include "core/map/map_file.hpp"
 #include "core/mapper.hpp"
 #include "server/map_board.hpp"
+#include "server/occupancy_thread.hpp"
 #include "server/odometry_prior.hpp"
 #include "server/publishers/labelled_scan_publisher.hpp"
 #include "server/publishers/pose_publisher.hpp"
@@ -27,6 +28,7 @@ struct MappingOutputs {
   PosePublisher* poses = nullptr;
   LabelledScanPublisher* scans = nullptr;
   const OdometryPrior* prior = nullptr;
+  OccupancyThread* occupancy = nullptr;
 };
 
 /// The one thread that maps: takes scans from the queue, runs the mapper, and shows what became of
@@ -47,6 +49,9 @@ class MappingThread {
  private:
   void work(const std::stop_token& stop);
   void map(QueuedScan queued);
+  /// Shows a new map, and has the octree begin with it.
+  void begin_map(Trajectory trajectory);
+  void hand_on(MappedScan mapped, const std::string& frame);
   void stage_ended(std::string_view stage);
   [[nodiscard]] std::optional<Eigen::Isometry3d> prior_for(std::int64_t stamp_ns) const;
   void show_view();

@@ -125,6 +125,21 @@ RayOccupancy OccupancyMap::along_ray(const RayQuery& ray) const {
   return ray_in(state_->octree, ray);
 }
 
+OccupancyAnswers OccupancyMap::answer(const OccupancyQuery& query) const {
+  if (const std::string faults = query.faults(); !faults.empty()) {
+    throw std::invalid_argument(faults);
+  }
+  OccupancyAnswers answers{.resolution_m = resolution_m(), .points = {}, .boxes = {}, .rays = {}};
+  for (const Eigen::Vector3d& p_map : query.points_map) answers.points.push_back(at_point(p_map));
+  std::size_t voxels_left = query.max_voxels;
+  for (const Eigen::AlignedBox3d& box_map : query.boxes_map) {
+    answers.boxes.push_back(in_box(box_map, voxels_left));
+    voxels_left -= answers.boxes.back().occupied_map.size();
+  }
+  for (const RayQuery& ray : query.rays) answers.rays.push_back(along_ray(ray));
+  return answers;
+}
+
 OctomapData OccupancyMap::encode(bool binary) const {
   std::ostringstream out;
   if (binary) {

@@ -46,6 +46,9 @@ class OccupancyMap {
                                     std::size_t max_voxels) const;
   [[nodiscard]] RayOccupancy along_ray(const RayQuery& ray) const;
 
+  /// Throws std::invalid_argument with `query.faults()`.
+  [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) const;
+
   /// As OctoMap encodes it; binary data is pruned to the fewest nodes.
   [[nodiscard]] OctomapData encode(bool binary) const;
 

@@ -58,4 +58,29 @@ struct RayOccupancy {
   std::string fault;
 };
 
+/// Questions of one request.
+struct OccupancyQuery {
+  std::vector<Eigen::Vector3d> points_map;
+  std::vector<Eigen::AlignedBox3d> boxes_map;
+  std::vector<RayQuery> rays;
+  /// Of occupied voxels listed, all boxes together.
+  std::uint32_t max_voxels = 1000;
+
+  static constexpr std::size_t most_points = 10'000;
+  static constexpr std::size_t most_boxes = 100;
+  static constexpr std::size_t most_rays = 1000;
+  static constexpr std::uint32_t most_voxels = 100'000;
+
+  /// Why so much is not answered at once, one reason a line; empty when it is.
+  [[nodiscard]] std::string faults() const;
+};
+
+/// In the order of the questions.
+struct OccupancyAnswers {
+  double resolution_m = 0.0;
+  std::vector<PointOccupancy> points;
+  std::vector<BoxOccupancy> boxes;
+  std::vector<RayOccupancy> rays;
+};
+
 }  // namespace stillmap
