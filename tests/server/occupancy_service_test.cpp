@@ -27,11 +27,24 @@ class OccupancyService : public testing::Test {
       : setup_("every"), server_(setup_.server_arguments()), client_(setup_.client()) {
     drive(publisher_, 0, 8);
     EXPECT_TRUE(wait_for_scans(client_, 8));
-    EXPECT_TRUE(eventually([&] { return voxels().occupied > 1000 && voxels().free > 1000; }));
+    EXPECT_TRUE(eventually([&] { return scans_in_octree() == 8; }));
+    EXPECT_GT(voxels().occupied, 1000U);
+    EXPECT_GT(voxels().free, 1000U);
+  }
+
+  /// The octree follows the map within a moment.
+  [[nodiscard]] std::uint32_t scans_in_octree() {
+    for (const StageLatency& stage : client_.status().latencies) {
+      if (stage.stage == "occupancy") return stage.samples;
+    }
+    return 0;
   }
 
   [[nodiscard]] BoxOccupancy voxels() {
-    return client_.query_occupancy({.boxes_map = {everything()}, .max_voxels = 0}).boxes.at(0);
+    OccupancyQuery query;
+    query.boxes_map = {everything()};
+    query.max_voxels = 0;
+    return client_.query_occupancy(query).boxes.at(0);
   }
 
   ServiceSetup setup_;

@@ -34,7 +34,9 @@ class OccupancyThreadTest : public testing::Test {
   }
   [[nodiscard]] static BoxOccupancy all_of(const OccupancyThread& thread) {
     const Eigen::Vector3d far = Eigen::Vector3d::Constant(500.0);
-    const OccupancyQuery query{.boxes_map = {{-far, far}}, .max_voxels = 0};
+    OccupancyQuery query;
+    query.boxes_map.emplace_back(-far, far);
+    query.max_voxels = 0;
     return thread.answer(query).boxes.at(0);
   }
   Statistics statistics_;
