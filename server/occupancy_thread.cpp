@@ -1,9 +1,21 @@
 #include "server/occupancy_thread.hpp"
 
+#include <sys/resource.h>
+#include <unistd.h>
+
 #include <chrono>
 #include <utility>
 
 namespace stillmap {
+namespace {
+
+/// On a busy machine the mapper's threads come first. Linux keeps a nice value for each thread.
+void step_back() {
+  constexpr int nice_value = 15;
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), nice_value);
+}
+
+}  // namespace
 
 OccupancyThread::OccupancyThread(const OccupancyServing& config, Statistics& statistics)
     : config_(config.map),
@@ -32,6 +44,7 @@ void OccupancyThread::add(OccupancyScan scan) {
 }
 
 void OccupancyThread::work(const std::stop_token& stop) {
+  step_back();
   while (true) {
     Job job;
     bool keeps_up = true;

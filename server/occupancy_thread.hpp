@@ -27,7 +27,8 @@ struct EncodedOctree {
   std::int64_t stamp_ns = 0;
 };
 
-/// Keeps the octree on a thread of its own, so that the mapper never waits for it. Who cannot keep
+/// Keeps the octree on a thread of its own and of low priority, so that the mapper never waits for
+/// it. Who cannot keep
 /// up leaves out clearing first ("occupancy_not_cleared" in the status), then scans
 /// ("occupancy_scans_left_out"). Thread-safe.
 class OccupancyThread {
