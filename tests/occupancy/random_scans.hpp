@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstdint>
 
 #include "core/lidar/labelled_scan.hpp"
