@@ -14,6 +14,8 @@
 #include "core/lidar/scan.hpp"
 #include "core/map/map_query.hpp"
 #include "core/map/tile.hpp"
+#include "core/occupancy/occupancy_query.hpp"
+#include "core/occupancy/octomap_data.hpp"
 #include "core/odometry/trajectory.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
 #include "idl/dds/dds_options.hpp"
@@ -116,6 +118,13 @@ class Client {
   /// without the runner-up classes' evidence.
   [[nodiscard]] TileSet get_tiles(std::span<const TileId> ids);
 
+  /// The server's octree of occupied, free and unknown space, checked: with probabilities if
+  /// `full`.
+  [[nodiscard]] OctomapData octomap(bool full);
+  /// Points, boxes and rays at once. Each answer has its own fault; throws ServiceError when the
+  /// query as a whole is refused.
+  [[nodiscard]] OccupancyAnswers query_occupancy(const OccupancyQuery& query);
+
   /// Has the server save its map; returns the file's name on the server's machine. An empty name
   /// means the configured file.
   std::string save_map(const std::string& file = {});
@@ -143,6 +152,10 @@ class Client {
   /// As subscribe_tiles, without the voxels; a tile without any is gone.
   [[nodiscard]] Subscription subscribe_tile_index(
       std::function<void(const MapIdentity&, const TileInfo&)> info_arrived);
+
+  /// The octree (binary) when it changed, as often as the server publishes it.
+  [[nodiscard]] Subscription subscribe_octomap(
+      std::function<void(const OctomapData&)> octomap_arrived);
 
   /// The tiles whose footprint meets the region: first those that exist, then what changes. Tiles
   /// of other places do not come over the network, except from the region's bounding box their

@@ -3,6 +3,8 @@
 #include <utility>
 
 #include "clients/connection.hpp"
+#include "core/occupancy/octomap_check.hpp"
+#include "idl/conversions/octomap.hpp"
 #include "idl/conversions/pose.hpp"
 #include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"
@@ -82,6 +84,15 @@ Subscription Client::subscribe_status(std::function<void(const ServerStatus&)> s
       [arrived = std::move(status_arrived)](const stillmap_msgs::msg::Status& message) {
         const auto status = wire::from_wire(message);
         if (status) arrived(*status);
+      });
+}
+
+Subscription Client::subscribe_octomap(std::function<void(const OctomapData&)> octomap_arrived) {
+  return subscribe<octomap_msgs::msg::Octomap>(
+      connection_->participant, connection_->topics.octomap,
+      [arrived = std::move(octomap_arrived)](const octomap_msgs::msg::Octomap& message) {
+        const auto data = wire::from_octomap(message);
+        if (data && check_octomap(*data).fault.empty()) arrived(*data);
       });
 }
 

@@ -7,7 +7,9 @@
 #include "idl/conversions/map_query.hpp"
 #include "idl/dds/service_client.hpp"
 #include "idl/topics.hpp"
+#include "octomap_msgs.h"
 #include "stillmap_msgs.h"
+#include "stillmap_occupancy.h"
 
 namespace stillmap {
 
@@ -63,6 +65,13 @@ struct Client::Connection {
   ServiceClient<stillmap_msgs::srv::SaveMap_Request, stillmap_msgs::srv::SaveMap_Response> save_map;
   ServiceClient<stillmap_msgs::srv::LoadMap_Request, stillmap_msgs::srv::LoadMap_Response> load_map;
   ServiceClient<stillmap_msgs::srv::Reset_Request, stillmap_msgs::srv::Reset_Response> reset;
+  using GetOctomap =
+      ServiceClient<octomap_msgs::srv::GetOctomap_Request, octomap_msgs::srv::GetOctomap_Response>;
+  GetOctomap octomap_binary;
+  GetOctomap octomap_full;
+  ServiceClient<stillmap_msgs::srv::QueryOccupancy_Request,
+                stillmap_msgs::srv::QueryOccupancy_Response>
+      query_occupancy;
 };
 
 }  // namespace stillmap

@@ -140,6 +140,21 @@ void read_map(YamlSection section, MapFileConfig& map) {
   }
 }
 
+void read_occupancy(YamlSection section, OccupancyServing& occupancy) {
+  OccupancyConfig& map = occupancy.map;
+  section.flag("enabled", occupancy.enabled);
+  section.number("resolution_m", map.resolution_m, {0.02, 10});
+  section.number("max_range_m", map.max_range_m, {1, 300});
+  section.number("clear_range_m", map.clear_range_m, {0, 300});
+  section.whole("clear_every", map.clear_every, {1, 1000});
+  section.number("clear_margin_m", map.clear_margin_m, {0, 100});
+  section.number("clear_margin_share", map.clear_margin_share, {0, 0.9});
+  section.number("hit_probability", map.hit_probability, {0.501, 0.99});
+  section.number("miss_probability", map.miss_probability, {0.01, 0.499});
+  section.whole("queue_length", occupancy.queue_length, {1, 1000});
+  section.number("publish_period_s", occupancy.publish_period_s, periods_s);
+}
+
 void read_server(YamlSection file, const fs::path& folder, ServerConfig& config) {
   read_sensor_name(file, folder, config.mapper.sensor);
   read_mapper(file, config.mapper);
@@ -150,6 +165,7 @@ void read_server(YamlSection file, const fs::path& folder, ServerConfig& config)
   read_input(file.section("input"), config.input);
   read_publish(file.section("publish"), config.publish);
   read_map(file.section("map"), config.map);
+  read_occupancy(file.section("occupancy"), config.occupancy);
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "config/config_report.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/mapper.hpp"
+#include "core/occupancy/occupancy_config.hpp"
 #include "core/segmentation/open_network.hpp"
 
 namespace stillmap {
@@ -123,6 +124,16 @@ struct MapFileConfig {
   std::string datum;
 };
 
+/// The octree of occupied, free and unknown space that is kept beside the static map.
+struct OccupancyServing {
+  bool enabled = true;
+  OccupancyConfig map;
+  /// Scans that may wait for it; those too many are left out.
+  std::uint32_t queue_length = 16;
+  /// Shortest time between two octrees on stillmap/octomap.
+  double publish_period_s = 5.0;
+};
+
 /// Everything that stillmap-server can be told. Works as it is, with a 64-beam sensor and no file.
 struct ServerConfig {
   MapperConfig mapper{.sensor = hdl_64e(), .prepare = {}, .odometry = {}, .static_map = {}};
@@ -133,6 +144,7 @@ struct ServerConfig {
   InputConfig input;
   PublishConfig publish;
   MapFileConfig map;
+  OccupancyServing occupancy;
 };
 
 /// Reads a server file (config/server/default.yaml shows every field). What the file leaves out

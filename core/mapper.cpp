@@ -62,7 +62,9 @@ std::optional<MappedScan> Mapper::process(
   // The static map takes what stands still.
   MappedScan mapped{step.result,
                     known.labelling,
-                    {std::move(scan), std::move(known.labels), std::move(step.motion)}};
+                    {std::move(scan), std::move(known.labels), std::move(step.motion)},
+                    known.labelling == Labelling::carried ||
+                        (known.labelling == Labelling::none && answer.pending)};
   if (answer.pending) {
     pending_ = PlacedScan{mapped.labelled, step.result.T_map_lidar};
   } else {

@@ -34,6 +34,8 @@ struct MappedScan {
   Labelling labelling = Labelling::none;
   /// The prepared scan (lidar frame) with labels and motion of every point.
   LabelledScan labelled;
+  /// Points without a class may be movers that came into sight: they make no voxels.
+  bool unknown_may_move = false;
 };
 
 /// Why a scan was not mapped.

@@ -76,9 +76,10 @@ struct ServerStatus {
   std::uint64_t voxel_count = 0;
   SegmentationStatus segmentation;
   /// "scans_received", "scans_mapped", "label_failures" once there are any, and "dropped_<reason>"
-  /// for every reason that occurred.
+  /// for every reason that occurred; then events beside mapping, as "occupancy_not_cleared".
   std::vector<NamedCounter> counters;
-  /// In the order of the pipeline: wait in the queue, its stages, and "total".
+  /// In the order of the pipeline: wait in the queue, its stages, and "total"; then
+  /// what runs beside it, as "occupancy".
   std::vector<StageLatency> latencies;
 
   /// Value of a counter; 0 when it never counted.

@@ -29,6 +29,7 @@ Topics Topics::in(const std::string& name_space) {
       .tile_index = symmetric<stillmap_msgs::msg::TileInfo>(prefix + "tile_index", keyed),
       .tiles = symmetric<stillmap_msgs::msg::MapTile>(prefix + "tiles", keyed),
       .status = symmetric<stillmap_msgs::msg::Status>(prefix + "status", latched),
+      .octomap = symmetric<octomap_msgs::msg::Octomap>(prefix + "octomap", latched),
   };
 }
 
@@ -52,7 +53,10 @@ Services Services::in(const std::string& name_space) {
           .get_status = prefix + "get_status",
           .save_map = prefix + "save_map",
           .load_map = prefix + "load_map",
-          .reset = prefix + "reset"};
+          .reset = prefix + "reset",
+          .octomap_binary = prefix + "octomap_binary",
+          .octomap_full = prefix + "octomap_full",
+          .query_occupancy = prefix + "query_occupancy"};
 }
 
 }  // namespace stillmap

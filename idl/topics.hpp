@@ -32,6 +32,7 @@ struct Topics {
   TopicSpec<stillmap_msgs::msg::TileInfo> tile_index;
   TopicSpec<stillmap_msgs::msg::MapTile> tiles;
   TopicSpec<stillmap_msgs::msg::Status> status;
+  TopicSpec<octomap_msgs::msg::Octomap> octomap;
 
   /// `name_space` is the first part of all names but tf's: "stillmap" gives rt/stillmap/odometry.
   [[nodiscard]] static Topics in(const std::string& name_space);
@@ -55,6 +56,10 @@ struct Services {
   std::string save_map;
   std::string load_map;
   std::string reset;
+  /// octomap_msgs/srv/GetOctomap, as octomap_server names them.
+  std::string octomap_binary;
+  std::string octomap_full;
+  std::string query_occupancy;
 
   [[nodiscard]] static Services in(const std::string& name_space);
 };

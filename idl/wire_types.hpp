@@ -16,6 +16,15 @@ namespace nav_msgs::msg {
 class Odometry;
 class Path;
 }  // namespace nav_msgs::msg
+namespace octomap_msgs {
+namespace msg {
+class Octomap;
+}
+namespace srv {
+class GetOctomap_Request;
+class GetOctomap_Response;
+}  // namespace srv
+}  // namespace octomap_msgs
 namespace tf2_msgs::msg {
 class TFMessage;
 }
@@ -43,4 +52,6 @@ class LoadMap_Request;
 class LoadMap_Response;
 class Reset_Request;
 class Reset_Response;
+class QueryOccupancy_Request;
+class QueryOccupancy_Response;
 }  // namespace stillmap_msgs::srv

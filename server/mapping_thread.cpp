@@ -57,7 +57,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSo
   } else {
     mapper_.static_map().use_shelf(shelf);
     mapper_.reset(new_map_id());
-    board_.begin(mapper_.map_view(), {});
+    begin_map({});
   }
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
@@ -66,7 +66,7 @@ std::uint64_t MappingThread::reset() {
   const std::uint64_t map_id = new_map_id();
   between_scans([this, map_id] {
     mapper_.reset(map_id);
-    board_.begin(mapper_.map_view(), {});
+    begin_map({});
     spdlog::info("reset: map {} begins", map_id);
   });
   return map_id;
@@ -88,7 +88,12 @@ void MappingThread::go_on_with(const StoredMap& stored, const std::shared_ptr<Ti
       path.empty() ? Eigen::Vector3d(0.0, 0.0, 0.0) : path.back().T_map_lidar.translation();
   mapper_.static_map().use_shelf(shelf);
   mapper_.static_map().take_back_near(last_map, map_limit_bytes_);
-  board_.begin(mapper_.map_view(), path);
+  begin_map(path);
+}
+
+void MappingThread::begin_map(Trajectory trajectory) {
+  board_.begin(mapper_.map_view(), std::move(trajectory));
+  if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(board_.view());
 }
 
 void MappingThread::show_now() {
@@ -177,8 +182,16 @@ void MappingThread::map(QueuedScan queued) {
                   unlabelled ? "none" : mapper_.label_source());
   statistics_.scan_mapped(mapped->labelling);
   statistics_.add_latency("total", milliseconds(Clock::now() - queued.received));
-  if (outputs_.scans != nullptr) outputs_.scans->publish(std::move(mapped->labelled), frame);
+  hand_on(*std::move(mapped), frame);
   statistics_.scan_took_besides_labels(milliseconds(Clock::now() - began) - labels_ms_);
+}
+
+void MappingThread::hand_on(MappedScan mapped, const std::string& frame) {
+  const auto labelled = std::make_shared<const LabelledScan>(std::move(mapped.labelled));
+  if (outputs_.occupancy != nullptr) {
+    outputs_.occupancy->add({labelled, mapped.odometry.T_map_lidar, !mapped.unknown_may_move});
+  }
+  if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frame);
 }
 
 std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) const {

@@ -14,6 +14,7 @@
 #include "core/mapper.hpp"
 #include "server/map_board.hpp"
 #include "server/map_saver.hpp"
+#include "server/occupancy_thread.hpp"
 #include "server/odometry_prior.hpp"
 #include "server/publishers/labelled_scan_publisher.hpp"
 #include "server/publishers/pose_publisher.hpp"
@@ -28,6 +29,7 @@ struct MappingOutputs {
   PosePublisher* poses = nullptr;
   LabelledScanPublisher* scans = nullptr;
   const OdometryPrior* prior = nullptr;
+  OccupancyThread* occupancy = nullptr;
 };
 
 /// The one thread that maps: takes scans from the queue, runs the mapper, and shows what became of
@@ -64,6 +66,9 @@ class MappingThread {
  private:
   void work(const std::stop_token& stop);
   void map(QueuedScan queued);
+  /// Shows a new map, and has the octree begin with it.
+  void begin_map(Trajectory trajectory);
+  void hand_on(MappedScan mapped, const std::string& frame);
   void stage_ended(std::string_view stage);
   /// In the thread that maps.
   void go_on_with(const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf);

@@ -66,8 +66,12 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
   if (!config.topics.odometry_prior.empty()) {
     prior_.emplace(participant_, config.topics.odometry_prior);
   }
-  const MappingOutputs outputs{
-      .poses = &poses_, .scans = scans_ ? &*scans_ : nullptr, .prior = prior_ ? &*prior_ : nullptr};
+  if (config.occupancy.enabled) occupancy_.emplace(config.occupancy, statistics_);
+  OccupancyThread* const occupancy = occupancy_ ? &*occupancy_ : nullptr;
+  const MappingOutputs outputs{.poses = &poses_,
+                               .scans = scans_ ? &*scans_ : nullptr,
+                               .prior = prior_ ? &*prior_ : nullptr,
+                               .occupancy = occupancy};
   mapping_ = std::make_unique<MappingThread>(config, std::move(label_source),
                                              stored_map(saver_, config.map), saver_.shelf(), queue_,
                                              statistics_, board_, outputs);
@@ -76,20 +80,27 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
                  .map_bytes = [this] { return mapping_->memory_use().bytes; }});
   receiver_ = std::make_unique<ScanReceiver>(participant_, config, queue_, statistics_);
   map_publisher_ = std::make_unique<MapPublisher>(participant_, topics_, config, board_);
+  if (occupancy != nullptr) {
+    octomap_publisher_ =
+        std::make_unique<OctomapPublisher>(participant_, topics_, config, *occupancy);
+  }
   const auto status = [this] { return report_.status(); };
-  services_ = std::make_unique<ServiceDesk>(
-      participant_, Services::in(config.topics.name_space),
-      ServiceContext{.board = board_,
-                     .tiles = tiles_,
-                     .saver = saver_,
-                     .status = status,
-                     .reset = [this] { return mapping_->reset(); },
-                     .load =
-                         [this](const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf) {
-                           mapping_->load(stored, shelf);
-                           tiles_.use_shelf(shelf);
-                         },
-                     .show_now = [this] { mapping_->show_now(); }});
+  const ServiceContext context{
+      .board = board_,
+      .tiles = tiles_,
+      .saver = saver_,
+      .status = status,
+      .reset = [this] { return mapping_->reset(); },
+      .load =
+          [this](const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf) {
+            mapping_->load(stored, shelf);
+            tiles_.use_shelf(shelf);
+          },
+      .show_now = [this] { mapping_->show_now(); }};
+  const Services names = Services::in(config.topics.name_space);
+  services_ = std::make_unique<ServiceDesk>(participant_, names, context);
+  occupancy_services_ =
+      std::make_unique<OccupancyDesk>(participant_, names, context, occupancy, config.frames.map);
   status_publisher_ = std::make_unique<StatusPublisher>(participant_, topics_,
                                                         config.publish.status_period_s, status);
   autosave_ = std::make_unique<PeriodicThread>(
@@ -102,6 +113,8 @@ void Server::stop() {
   // Who asks goes first, then who brings, then who maps: nobody waits for somebody gone.
   autosave_.reset();
   services_.reset();
+  occupancy_services_.reset();
+  octomap_publisher_.reset();
   status_publisher_.reset();
   receiver_.reset();
   mapping_->stop();

@@ -8,10 +8,13 @@
 #include "server/map_board.hpp"
 #include "server/map_saver.hpp"
 #include "server/mapping_thread.hpp"
+#include "server/occupancy_thread.hpp"
 #include "server/publishers/map_publisher.hpp"
+#include "server/publishers/octomap_publisher.hpp"
 #include "server/publishers/status_publisher.hpp"
 #include "server/scan_receiver.hpp"
 #include "server/server_report.hpp"
+#include "server/services/occupancy_desk.hpp"
 #include "server/services/service_desk.hpp"
 
 namespace stillmap {
@@ -41,11 +44,14 @@ class Server {
   PosePublisher poses_;
   std::optional<LabelledScanPublisher> scans_;
   std::optional<OdometryPrior> prior_;
+  std::optional<OccupancyThread> occupancy_;
   std::unique_ptr<MappingThread> mapping_;
   std::unique_ptr<ScanReceiver> receiver_;
   ServerReport report_;
   std::unique_ptr<MapPublisher> map_publisher_;
+  std::unique_ptr<OctomapPublisher> octomap_publisher_;
   std::unique_ptr<ServiceDesk> services_;
+  std::unique_ptr<OccupancyDesk> occupancy_services_;
   std::unique_ptr<StatusPublisher> status_publisher_;
   std::unique_ptr<PeriodicThread> autosave_;
 };

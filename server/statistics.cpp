@@ -78,6 +78,12 @@ void Statistics::scans_dropped(const std::string& reason, std::size_t count,
   last_drop_ = detail;
 }
 
+void Statistics::count(const std::string& event) {
+  const std::scoped_lock lock(mutex_);
+  const auto known = std::ranges::find(events_, event, &NamedCounter::name);
+  (known == events_.end() ? events_.emplace_back(NamedCounter{.name = event}) : *known).value += 1;
+}
+
 void Statistics::add_latency(const std::string& stage, double milliseconds) {
   const std::scoped_lock lock(mutex_);
   auto known = std::ranges::find(latencies_, stage, &std::pair<std::string, LatencyWindow>::first);
@@ -117,6 +123,7 @@ void Statistics::report_to(ServerStatus& status) const {
     status.counters.push_back({.name = "label_failures", .value = label_failures_});
   }
   status.counters.insert(status.counters.end(), dropped_.begin(), dropped_.end());
+  status.counters.insert(status.counters.end(), events_.begin(), events_.end());
   status.segmentation = segmentation_;
   status.segmentation.fresh_share = labellings_.share(Labelling::fresh);
   status.segmentation.carried_share = labellings_.share(Labelling::carried);

@@ -49,6 +49,8 @@ class Statistics {
   void labels_worked();
   /// Counts "dropped_<reason>"; the last `detail` is told in the status.
   void scans_dropped(const std::string& reason, std::size_t count, const std::string& detail);
+  /// Counts an event that has nothing more to tell.
+  void count(const std::string& event);
   void add_latency(const std::string& stage, double milliseconds);
   /// All that was done with a scan, without its labels, took so long.
   void scan_took_besides_labels(double milliseconds);
@@ -75,6 +77,7 @@ class Statistics {
   std::uint64_t mapped_ = 0;
   // In the order of first occurrence.
   std::vector<NamedCounter> dropped_;
+  std::vector<NamedCounter> events_;
   std::vector<std::pair<std::string, LatencyWindow>> latencies_;
   RateWindow received_rate_;
   RateWindow mapped_rate_;

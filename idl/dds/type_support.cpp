@@ -4,10 +4,12 @@
 
 #include "idl/dds/described_type.hpp"
 #include "nav_msgsPubSubTypes.h"
+#include "octomap_msgsPubSubTypes.h"
 #include "rmw_dds_commonPubSubTypes.h"
 #include "rmw_dds_common_ironPubSubTypes.h"
 #include "sensor_msgsPubSubTypes.h"
 #include "stillmap_msgsPubSubTypes.h"
+#include "stillmap_occupancyPubSubTypes.h"
 #include "tf2_msgsPubSubTypes.h"
 #include "tile_indexPubSubTypes.h"
 
@@ -120,6 +122,26 @@ TypeSupport type_support<stillmap_msgs::srv::Reset_Request>() {
 template <>
 TypeSupport type_support<stillmap_msgs::srv::Reset_Response>() {
   return make<stillmap_msgs::srv::Reset_ResponsePubSubType>();
+}
+template <>
+TypeSupport type_support<octomap_msgs::msg::Octomap>() {
+  return make<octomap_msgs::msg::OctomapPubSubType>();
+}
+template <>
+TypeSupport type_support<octomap_msgs::srv::GetOctomap_Request>() {
+  return make<octomap_msgs::srv::GetOctomap_RequestPubSubType>();
+}
+template <>
+TypeSupport type_support<octomap_msgs::srv::GetOctomap_Response>() {
+  return make<octomap_msgs::srv::GetOctomap_ResponsePubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::QueryOccupancy_Request>() {
+  return make<stillmap_msgs::srv::QueryOccupancy_RequestPubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::QueryOccupancy_Response>() {
+  return make<stillmap_msgs::srv::QueryOccupancy_ResponsePubSubType>();
 }
 
 }  // namespace stillmap

@@ -10,8 +10,9 @@ LabelledScanPublisher::LabelledScanPublisher(Participant& participant, const Top
     : writer_(participant, topics.scan.dds_name, topics.scan.writer),
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
-void LabelledScanPublisher::publish(LabelledScan labelled, const std::string& lidar_frame) {
-  // Nobody listens: not worth a copy of megabytes.
+void LabelledScanPublisher::publish(std::shared_ptr<const LabelledScan> labelled,
+                                    const std::string& lidar_frame) {
+  // Nobody listens: not worth a message of megabytes.
   if (writer_.readers().count() == 0) return;
   const std::scoped_lock lock(mutex_);
   newest_ = Job{std::move(labelled), lidar_frame};
@@ -27,7 +28,7 @@ void LabelledScanPublisher::work(const std::stop_token& stop) {
       job = *std::exchange(newest_, std::nullopt);
     }
     // Best effort, newest only: there is always room.
-    static_cast<void>(writer_.write(wire::to_cloud(job.labelled, job.lidar_frame)));
+    static_cast<void>(writer_.write(wire::to_cloud(*job.labelled, job.lidar_frame)));
   }
 }
 

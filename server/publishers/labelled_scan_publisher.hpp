@@ -1,6 +1,7 @@
 #pragma once
 
 #include <condition_variable>
+#include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
@@ -20,11 +21,11 @@ class LabelledScanPublisher {
   LabelledScanPublisher(Participant& participant, const Topics& topics);
 
   /// Returns at once.
-  void publish(LabelledScan labelled, const std::string& lidar_frame);
+  void publish(std::shared_ptr<const LabelledScan> labelled, const std::string& lidar_frame);
 
  private:
   struct Job {
-    LabelledScan labelled;
+    std::shared_ptr<const LabelledScan> labelled;
     std::string lidar_frame;
   };
 

@@ -1,0 +1,164 @@
+#include "core/occupancy/occupancy_map.hpp"
+
+#include <octomap/OcTree.h>
+
+#include <sstream>
+#include <stdexcept>
+
+#include "core/map/voxel_grid.hpp"
+#include "core/occupancy/octomap_check.hpp"
+#include "core/occupancy/octree_query.hpp"
+#include "core/occupancy/octree_update.hpp"
+#include "core/occupancy/scan_update.hpp"
+
+namespace stillmap {
+
+struct OccupancyMap::State {
+  explicit State(const OccupancyConfig& occupancy_config)
+      : config(occupancy_config), octree(occupancy_config.resolution_m) {
+    octree.setProbHit(config.hit_probability);
+    octree.setProbMiss(config.miss_probability);
+    octree.setClampingThresMin(OccupancyConfig::min_probability);
+    octree.setClampingThresMax(OccupancyConfig::max_probability);
+  }
+
+  OccupancyConfig config;
+  octomap::OcTree octree;
+  VoxelBricks bricks;
+  std::uint64_t version = 0;
+  std::uint64_t scans = 0;
+};
+
+namespace {
+
+const OccupancyConfig& checked(const OccupancyConfig& config) {
+  if (const std::string faults = config.faults(); !faults.empty()) {
+    throw std::invalid_argument(faults);
+  }
+  return config;
+}
+
+OccupancyConfig config_of(const OctomapData& data) {
+  if (const OctomapCheck check = check_octomap(data); !check.fault.empty()) {
+    throw std::invalid_argument("octomap data is damaged: " + check.fault);
+  }
+  OccupancyConfig config;
+  config.resolution_m = data.resolution_m;
+  return config;
+}
+
+/// All voxels of the octree that a cube touches with more than its faces; none outside.
+void add_cube(const Eigen::Vector3d& centre_map, double side_m, double resolution_m,
+              VoxelBricks& bricks) {
+  const Eigen::Vector3d centre = (centre_map / resolution_m).array() + octree_origin;
+  // A little smaller, so that cubes as large as voxels are one of them.
+  const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.49 * side_m / resolution_m);
+  if (!in_octree(centre - half) || !in_octree(centre + half)) return;
+  const VoxelKey first = (centre - half).array().floor().cast<std::int32_t>();
+  const VoxelKey last = (centre + half).array().floor().cast<std::int32_t>();
+  for (VoxelKey v = first; v.x() <= last.x(); ++v.x()) {
+    for (v.y() = first.y(); v.y() <= last.y(); ++v.y()) {
+      for (v.z() = first.z(); v.z() <= last.z(); ++v.z()) {
+        bricks.brick_of(v).hits |= VoxelBricks::bit_of(v);
+      }
+    }
+  }
+}
+
+}  // namespace
+
+OccupancyMap::OccupancyMap(const OccupancyConfig& config)
+    : state_(std::make_unique<State>(checked(config))) {}
+
+OccupancyMap::OccupancyMap(const OctomapData& data) : OccupancyMap(config_of(data)) {
+  if (data.bytes.empty()) return;
+  std::istringstream in(data.bytes);
+  data.binary ? state_->octree.readBinaryData(in) : state_->octree.readData(in);
+}
+
+OccupancyMap::~OccupancyMap() = default;
+OccupancyMap::OccupancyMap(OccupancyMap&&) noexcept = default;
+OccupancyMap& OccupancyMap::operator=(OccupancyMap&&) noexcept = default;
+
+void OccupancyMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+                          const ScanUse& use) {
+  ScanUse this_one = use;
+  const bool is_due = state_->scans++ % state_->config.clear_every == 0;
+  this_one.clears = use.clears && is_due && state_->config.clear_range_m > 0.0;
+  state_->bricks.clear();
+  gather_scan(state_->config, scan, T_map_lidar, this_one, state_->bricks);
+  update_octree(state_->octree, state_->bricks.sorted(),
+                {state_->octree.getProbHitLog(), state_->octree.getProbMissLog()});
+  ++state_->version;
+}
+
+void OccupancyMap::insert(const MapView& view) {
+  if (view.tiles.empty()) return;
+  const VoxelGrid grid(view.voxel_size_m, view.tile_size_m);
+  const Eigen::Vector3d half = Eigen::Vector3d::Constant(view.voxel_size_m / 2.0);
+  // Finer voxels fill the static map's; coarser ones are those that hold its points.
+  const bool is_finer = state_->config.resolution_m <= view.voxel_size_m;
+  const double side_m = is_finer ? view.voxel_size_m : 0.0;
+  state_->bricks.clear();
+  for (const auto& tile : view.tiles) {
+    for (const Voxel& voxel : tile->voxels) {
+      const Eigen::Vector3d centre_map = grid.corner_map(tile->info.id, voxel.index) + half;
+      add_cube(is_finer ? centre_map : voxel.mean_map.cast<double>(), side_m,
+               state_->config.resolution_m, state_->bricks);
+    }
+  }
+  const float surest = state_->octree.getClampingThresMaxLog();
+  update_octree(state_->octree, state_->bricks.sorted(), {2.0F * surest, 0.0F});
+  ++state_->version;
+}
+
+PointOccupancy OccupancyMap::at_point(const Eigen::Vector3d& p_map) const {
+  return point_in(state_->octree, p_map);
+}
+
+BoxOccupancy OccupancyMap::in_box(const Eigen::AlignedBox3d& box_map,
+                                  std::size_t max_voxels) const {
+  return box_in(state_->octree, box_map, max_voxels);
+}
+
+RayOccupancy OccupancyMap::along_ray(const RayQuery& ray) const {
+  return ray_in(state_->octree, ray);
+}
+
+OccupancyAnswers OccupancyMap::answer(const OccupancyQuery& query) const {
+  if (const std::string faults = query.faults(); !faults.empty()) {
+    throw std::invalid_argument(faults);
+  }
+  OccupancyAnswers answers{.resolution_m = resolution_m(), .points = {}, .boxes = {}, .rays = {}};
+  for (const Eigen::Vector3d& p_map : query.points_map) answers.points.push_back(at_point(p_map));
+  std::size_t voxels_left = query.max_voxels;
+  for (const Eigen::AlignedBox3d& box_map : query.boxes_map) {
+    answers.boxes.push_back(in_box(box_map, voxels_left));
+    voxels_left -= answers.boxes.back().occupied_map.size();
+  }
+  for (const RayQuery& ray : query.rays) answers.rays.push_back(along_ray(ray));
+  return answers;
+}
+
+OctomapData OccupancyMap::encode(bool binary) const {
+  std::ostringstream out;
+  if (binary) {
+    octomap::OcTree likeliest(state_->octree);
+    likeliest.toMaxLikelihood();
+    likeliest.prune();
+    likeliest.writeBinaryData(out);
+  } else {
+    state_->octree.writeData(out);
+  }
+  return {binary, state_->config.resolution_m, std::move(out).str()};
+}
+
+std::uint64_t OccupancyMap::version() const { return state_->version; }
+
+double OccupancyMap::resolution_m() const { return state_->config.resolution_m; }
+
+OccupancySize OccupancyMap::size() const {
+  return {state_->octree.size(), state_->octree.memoryUsage()};
+}
+
+}  // namespace stillmap

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace stillmap {
+
+/// What is known of a place.
+enum class Occupancy : std::uint8_t { unknown = 0, free = 1, occupied = 2 };
+
+[[nodiscard]] constexpr const char* name(Occupancy occupancy) {
+  if (occupancy == Occupancy::unknown) return "unknown";
+  return occupancy == Occupancy::free ? "free" : "occupied";
+}
+
+struct PointOccupancy {
+  Occupancy occupancy = Occupancy::unknown;
+  /// That it is occupied, 0..1; 0.5 where nothing is known.
+  float probability = 0.5F;
+  /// Why the point cannot be asked for, in words; empty when it can.
+  std::string fault;
+};
+
+/// Voxels that a box touches.
+struct BoxOccupancy {
+  std::uint64_t occupied = 0;
+  std::uint64_t free = 0;
+  std::uint64_t unknown = 0;
+  /// Centres of occupied voxels, map frame [m], as many as were asked for.
+  std::vector<Eigen::Vector3f> occupied_map;
+  std::string fault;
+
+  [[nodiscard]] bool any_occupied() const { return occupied > 0; }
+};
+
+/// A ray through the map.
+struct RayQuery {
+  Eigen::Vector3d origin_map = Eigen::Vector3d::Zero();
+  /// Of any length but 0.
+  Eigen::Vector3d direction_map = Eigen::Vector3d::UnitX();
+  double max_range_m = 100.0;
+  /// Goes on through what is unknown instead of ending there.
+  bool passes_unknown = false;
+
+  /// A ray may not be longer.
+  static constexpr double longest_m = 1000.0;
+};
+
+/// How a ray ended: at its full range or the map's edge (free), at an occupied voxel, or at an
+/// unknown one.
+struct RayOccupancy {
+  Occupancy end = Occupancy::unknown;
+  /// Where the ray enters that voxel, or ends; map frame [m].
+  Eigen::Vector3d end_map = Eigen::Vector3d::Zero();
+  double length_m = 0.0;
+  std::string fault;
+};
+
+/// Questions of one request.
+struct OccupancyQuery {
+  std::vector<Eigen::Vector3d> points_map;
+  std::vector<Eigen::AlignedBox3d> boxes_map;
+  std::vector<RayQuery> rays;
+  /// Of occupied voxels listed, all boxes together.
+  std::uint32_t max_voxels = 1000;
+
+  static constexpr std::size_t most_points = 10'000;
+  static constexpr std::size_t most_boxes = 100;
+  static constexpr std::size_t most_rays = 1000;
+  static constexpr std::uint32_t most_voxels = 100'000;
+
+  /// Why so much is not answered at once, one reason a line; empty when it is.
+  [[nodiscard]] std::string faults() const;
+};
+
+/// In the order of the questions.
+struct OccupancyAnswers {
+  double resolution_m = 0.0;
+  std::vector<PointOccupancy> points;
+  std::vector<BoxOccupancy> boxes;
+  std::vector<RayOccupancy> rays;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,13 @@
+#pragma once
+
+namespace stillmap {
+
+/// What of a scan counts for the occupancy map.
+struct ScanUse {
+  /// Its rays clear what they pass, if it is one of those that do.
+  bool clears = true;
+  /// Points of no known class are solid; false where they may be movers that came into sight.
+  bool unknown_is_solid = true;
+};
+
+}  // namespace stillmap

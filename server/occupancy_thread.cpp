@@ -1,0 +1,105 @@
+#include "server/occupancy_thread.hpp"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <utility>
+
+namespace stillmap {
+namespace {
+
+/// On a busy machine the mapper's threads come first. Linux keeps a nice value for each thread.
+void step_back() {
+  constexpr int nice_value = 15;
+  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), nice_value);
+}
+
+}  // namespace
+
+OccupancyThread::OccupancyThread(const OccupancyServing& config, Statistics& statistics)
+    : config_(config.map),
+      capacity_(config.queue_length),
+      statistics_(statistics),
+      map_(config.map),
+      thread_([this](const std::stop_token& stop) { work(stop); }) {}
+
+void OccupancyThread::begin(std::shared_ptr<const MapView> view) {
+  const std::scoped_lock lock(queue_mutex_);
+  queue_.clear();
+  queue_.push_back({std::move(view), {}});
+  queue_changed_.notify_one();
+}
+
+void OccupancyThread::add(OccupancyScan scan) {
+  const std::scoped_lock lock(queue_mutex_);
+  if (queue_.size() >= capacity_) {
+    // A map that begins stays at the front.
+    const auto oldest = queue_.begin() + (queue_.front().first_view ? 1 : 0);
+    if (oldest != queue_.end()) queue_.erase(oldest);
+    statistics_.count("occupancy_scans_left_out");
+  }
+  queue_.push_back({nullptr, std::move(scan)});
+  queue_changed_.notify_one();
+}
+
+void OccupancyThread::work(const std::stop_token& stop) {
+  step_back();
+  while (true) {
+    Job job;
+    bool keeps_up = true;
+    {
+      std::unique_lock lock(queue_mutex_);
+      if (!queue_changed_.wait(lock, stop, [this] { return !queue_.empty(); })) return;
+      if (stop.stop_requested()) return;
+      job = std::move(queue_.front());
+      queue_.pop_front();
+      keeps_up = queue_.size() <= capacity_ / 2;
+    }
+    if (job.first_view) {
+      begin_map(*job.first_view);
+    } else {
+      insert(job.scan, keeps_up);
+    }
+  }
+}
+
+void OccupancyThread::begin_map(const MapView& view) {
+  OccupancyMap fresh(config_);
+  fresh.insert(view);
+  const std::scoped_lock lock(map_mutex_);
+  map_ = std::move(fresh);
+  ++changes_;
+}
+
+void OccupancyThread::insert(const OccupancyScan& scan, bool clears) {
+  using Clock = std::chrono::steady_clock;
+  const auto began = Clock::now();
+  if (!clears) statistics_.count("occupancy_not_cleared");
+  {
+    const std::scoped_lock lock(map_mutex_);
+    map_.insert(*scan.labelled, scan.T_map_lidar,
+                {.clears = clears, .unknown_is_solid = scan.unknown_is_solid});
+    stamp_ns_ = scan.labelled->scan.stamp_ns;
+    ++changes_;
+  }
+  const std::chrono::duration<double, std::milli> took = Clock::now() - began;
+  statistics_.add_latency("occupancy", took.count());
+}
+
+OccupancyAnswers OccupancyThread::answer(const OccupancyQuery& query) const {
+  const std::scoped_lock lock(map_mutex_);
+  return map_.answer(query);
+}
+
+EncodedOctree OccupancyThread::encode(bool binary) const {
+  const std::scoped_lock lock(map_mutex_);
+  return {map_.encode(binary), stamp_ns_};
+}
+
+std::uint64_t OccupancyThread::changes() const {
+  const std::scoped_lock lock(map_mutex_);
+  return changes_;
+}
+
+}  // namespace stillmap

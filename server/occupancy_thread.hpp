@@ -1,0 +1,73 @@
+#pragma once
+
+#include <condition_variable>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <thread>
+
+#include "config/server_config.hpp"
+#include "core/occupancy/occupancy_map.hpp"
+#include "server/statistics.hpp"
+
+namespace stillmap {
+
+/// A mapped scan on its way into the octree, shared with whoever else uses it.
+struct OccupancyScan {
+  std::shared_ptr<const LabelledScan> labelled;
+  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+  /// Points of no known class are solid.
+  bool unknown_is_solid = true;
+};
+
+/// The octree as it was when asked for.
+struct EncodedOctree {
+  OctomapData data;
+  /// Stamp of the newest scan in it.
+  std::int64_t stamp_ns = 0;
+};
+
+/// Keeps the octree on a thread of its own and of low priority, so that the mapper never waits for
+/// it. Who cannot keep
+/// up leaves out clearing first ("occupancy_not_cleared" in the status), then scans
+/// ("occupancy_scans_left_out"). Thread-safe.
+class OccupancyThread {
+ public:
+  OccupancyThread(const OccupancyServing& config, Statistics& statistics);
+
+  /// A new map begins, with the voxels of this view. Returns at once, as `add` does.
+  void begin(std::shared_ptr<const MapView> view);
+  void add(OccupancyScan scan);
+
+  /// Throws std::invalid_argument for a query that asks for too much.
+  [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) const;
+  [[nodiscard]] EncodedOctree encode(bool binary) const;
+  /// Grows with every change, over all maps.
+  [[nodiscard]] std::uint64_t changes() const;
+
+ private:
+  /// Either a new map or a scan.
+  struct Job {
+    std::shared_ptr<const MapView> first_view;
+    OccupancyScan scan;
+  };
+
+  void work(const std::stop_token& stop);
+  void begin_map(const MapView& view);
+  void insert(const OccupancyScan& scan, bool clears);
+
+  OccupancyConfig config_;
+  std::size_t capacity_;
+  Statistics& statistics_;
+  mutable std::mutex queue_mutex_;
+  std::condition_variable_any queue_changed_;
+  std::deque<Job> queue_;
+  mutable std::mutex map_mutex_;
+  OccupancyMap map_;
+  std::uint64_t changes_ = 0;
+  std::int64_t stamp_ns_ = 0;
+  // Last: stops before what it uses is gone.
+  std::jthread thread_;
+};
+
+}  // namespace stillmap

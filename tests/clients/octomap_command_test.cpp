@@ -1,0 +1,66 @@
+#include "tests/clients/command_test.hpp"
+
+namespace stillmap::test {
+namespace {
+
+class OctomapCommandTest : public CommandTest {
+ protected:
+  void SetUp() override {
+    CommandTest::SetUp();
+    simulate("city");
+    ASSERT_EQ(run("map " + path("city") + " --out " + path("out")).exit_code, 0);
+  }
+  [[nodiscard]] ProcessResult octomap(const std::string& more) const {
+    return run("octomap --map " + path("out/map.stillmap") + " " + more);
+  }
+};
+
+TEST_F(OctomapCommandTest, WritesBothKindsOfAStoredMapAndReadsThemBack) {
+  for (const std::string file : {"map.bt", "map.ot"}) {
+    const ProcessResult written = octomap("--json --output " + path(file));
+    ASSERT_EQ(written.exit_code, 0) << written.err;
+    const ProcessResult read = run("octomap --json --map " + path(file));
+    ASSERT_EQ(read.exit_code, 0) << read.err;
+    const nlohmann::json before = nlohmann::json::parse(written.out).at("octomap");
+    const nlohmann::json after = nlohmann::json::parse(read.out).at("octomap");
+    EXPECT_GT(before.at("occupied"), 1000);
+    EXPECT_EQ(after.at("occupied"), before.at("occupied"));
+    EXPECT_EQ(after.at("free"), 0);
+  }
+}
+
+TEST_F(OctomapCommandTest, AnswersPointsBoxesAndRays) {
+  const ProcessResult result = octomap(
+      "--point -5,0,30 --point 1,2,3 --box -50,-50,-5,50,50,15 --ray 0,0,0.2,0,0,-1 "
+      "--through-unknown --max-voxels 3 --json");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json answers = nlohmann::json::parse(result.out).at("answers");
+  EXPECT_EQ(answers.at("points").size(), 2U);
+  EXPECT_EQ(answers.at("points").at(0).at("occupancy"), "unknown");
+  EXPECT_GT(answers.at("boxes").at(0).at("occupied"), 1000);
+  EXPECT_EQ(answers.at("boxes").at(0).at("occupied_voxels").size(), 3U);
+  EXPECT_EQ(answers.at("rays").size(), 1U);
+  EXPECT_THAT(octomap("--point nan,0,0 --point 1,1,1").out,
+              AllOf(HasSubstr("cannot be asked: point is nan"), HasSubstr("1.00, 1.00, 1.00: ")));
+}
+
+TEST_F(OctomapCommandTest, RefusesWhatItCannotUse) {
+  const auto refusal = [&](const std::string& arguments) {
+    const ProcessResult result = run("octomap " + arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments;
+    return result.err;
+  };
+  EXPECT_THAT(refusal("--map " + path("none.stillmap")), HasSubstr("none.stillmap"));
+  EXPECT_FALSE(exists("none.stillmap"));
+  const std::string map = "--map " + path("out/map.stillmap");
+  EXPECT_THAT(refusal(map + " --output map.ply"), HasSubstr("must end in .bt"));
+  EXPECT_THAT(refusal(map + " --output " + path("no/map.bt")), HasSubstr("cannot be written"));
+  EXPECT_THAT(refusal(map + " --point 1,2"), HasSubstr("--point has 2 numbers"));
+  EXPECT_THAT(refusal(map + " --resolution 0"), HasSubstr("occupancy.resolution_m"));
+  write("broken.bt", "# Octomap OcTree binary file\nid OcTree\nsize 9\nres 0.2\ndata\nxx");
+  EXPECT_THAT(refusal("--map " + path("broken.bt")),
+              AllOf(HasSubstr("broken.bt"), HasSubstr("damaged")));
+}
+
+}  // namespace
+}  // namespace stillmap::test

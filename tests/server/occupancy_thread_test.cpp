@@ -1,0 +1,93 @@
+#include "server/occupancy_thread.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/server/room_scans.hpp"
+
+namespace stillmap::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+OccupancyScan room(int index) {
+  auto labelled = std::make_shared<LabelledScan>();
+  labelled->scan = room_scan(index);
+  labelled->motion.resize(labelled->scan.size());
+  return {labelled, room_pose(index).T_map_lidar, true};
+}
+
+std::uint64_t counted(const Statistics& statistics, const char* event) {
+  ServerStatus status;
+  statistics.report_to(status);
+  return status.counter(event);
+}
+
+class OccupancyThreadTest : public testing::Test {
+ protected:
+  /// Waits until the thread has done so many jobs.
+  [[nodiscard]] static bool done(const OccupancyThread& thread, std::uint64_t jobs) {
+    const auto deadline = std::chrono::steady_clock::now() + 60s;
+    while (thread.changes() < jobs && std::chrono::steady_clock::now() < deadline) {
+      std::this_thread::sleep_for(5ms);
+    }
+    return thread.changes() == jobs;
+  }
+  [[nodiscard]] static BoxOccupancy all_of(const OccupancyThread& thread) {
+    const Eigen::Vector3d far = Eigen::Vector3d::Constant(500.0);
+    OccupancyQuery query;
+    query.boxes_map.emplace_back(-far, far);
+    query.max_voxels = 0;
+    return thread.answer(query).boxes.at(0);
+  }
+  Statistics statistics_;
+};
+
+TEST_F(OccupancyThreadTest, MakesWhatTheMapWouldMake) {
+  OccupancyThread thread(OccupancyServing{}, statistics_);
+  OccupancyMap map(OccupancyConfig{});
+  for (int i = 0; i < 4; ++i) {
+    const OccupancyScan scan = room(i);
+    map.insert(*scan.labelled, scan.T_map_lidar);
+    thread.add(scan);
+    ASSERT_TRUE(done(thread, static_cast<std::uint64_t>(i) + 1));
+  }
+  const EncodedOctree octree = thread.encode(false);
+  EXPECT_EQ(octree.data.bytes, map.encode(false).bytes);
+  EXPECT_EQ(octree.stamp_ns, room_scan(3).stamp_ns);
+  EXPECT_EQ(counted(statistics_, "occupancy_not_cleared"), 0U);
+}
+
+TEST_F(OccupancyThreadTest, LeavesOutClearingAndThenScansWhenItCannotKeepUp) {
+  OccupancyServing config;
+  config.queue_length = 4;
+  OccupancyThread thread(config, statistics_);
+  const OccupancyScan scan = room(0);
+  constexpr std::uint64_t scans = 400;
+  for (std::uint64_t i = 0; i < scans; ++i) thread.add(scan);
+  const std::uint64_t left_out = counted(statistics_, "occupancy_scans_left_out");
+  EXPECT_GT(left_out, 0U);
+  ASSERT_TRUE(done(thread, scans - left_out));
+  EXPECT_GT(counted(statistics_, "occupancy_not_cleared"), 0U);
+  EXPECT_GT(all_of(thread).occupied, 100U);
+}
+
+TEST_F(OccupancyThreadTest, BeginsAnotherMapWithItsViewAndForgetsScansOfTheOldOne) {
+  OccupancyThread thread(OccupancyServing{}, statistics_);
+  thread.add(room(0));
+  ASSERT_TRUE(done(thread, 1));
+  EXPECT_GT(all_of(thread).free, 100U);
+
+  StaticMap map{StaticMapConfig{}};
+  map.insert(*room(5).labelled, room_pose(5).T_map_lidar);
+  const auto view = map.view();
+  std::uint64_t voxels = 0;
+  for (const auto& tile : view->tiles) voxels += tile->voxels.size();
+  ASSERT_GT(voxels, 0U);
+  thread.begin(view);
+  ASSERT_TRUE(done(thread, 2));
+  EXPECT_EQ(all_of(thread).occupied, voxels);
+  EXPECT_EQ(all_of(thread).free, 0U);
+}
+
+}  // namespace
+}  // namespace stillmap::test
