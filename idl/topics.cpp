@@ -29,6 +29,7 @@ Topics Topics::in(const std::string& name_space) {
       .tile_index = symmetric<stillmap_msgs::msg::TileInfo>(prefix + "tile_index", keyed),
       .tiles = symmetric<stillmap_msgs::msg::MapTile>(prefix + "tiles", keyed),
       .status = symmetric<stillmap_msgs::msg::Status>(prefix + "status", latched),
+      .traversability = symmetric<nav_msgs::msg::OccupancyGrid>(prefix + "traversability", latched),
   };
 }
 
@@ -51,7 +52,11 @@ Services Services::in(const std::string& name_space) {
           .get_tiles = prefix + "get_tiles",
           .get_status = prefix + "get_status",
           .save_map = prefix + "save_map",
-          .reset = prefix + "reset"};
+          .reset = prefix + "reset",
+          .get_traversable_area = prefix + "get_traversable_area",
+          .check_path = prefix + "check_path",
+          .nearest_traversable = prefix + "nearest_traversable",
+          .get_map = prefix + "get_map"};
 }
 
 }  // namespace stillmap
