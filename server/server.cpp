@@ -56,7 +56,8 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
       poses_(participant_, topics_, config.frames),
       report_(delivery_mode(config.input.delivery), label_source->name(),
               socket_trouble(config.dds), board_, statistics_,
-              [this] { return receiver_->why_nothing_arrives(); }) {
+              [this] { return receiver_->why_nothing_arrives(); }),
+      planning_grid_(config.areas, config.frames.map, board_, area_board_) {
   if (config.publish.scan) scans_.emplace(participant_, topics_);
   if (!config.topics.odometry_prior.empty()) {
     prior_.emplace(participant_, config.topics.odometry_prior);
@@ -68,6 +69,7 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
                                              board_, outputs);
   receiver_ = std::make_unique<ScanReceiver>(participant_, config, queue_, statistics_);
   map_publisher_ = std::make_unique<MapPublisher>(participant_, topics_, config, board_);
+  start_areas(config);
   const auto status = [this] { return report_.status(); };
   services_ =
       std::make_unique<ServiceDesk>(participant_, Services::in(config.topics.name_space),
@@ -75,7 +77,9 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
                                                    .saver = saver_,
                                                    .status = status,
                                                    .reset = [this] { return mapping_->reset(); },
-                                                   .show_now = [this] { mapping_->show_now(); }});
+                                                   .show_now = [this] { mapping_->show_now(); },
+                                                   .areas = area_board_,
+                                                   .planning_grid = planning_grid_});
   status_publisher_ = std::make_unique<StatusPublisher>(participant_, topics_,
                                                         config.publish.status_period_s, status);
   autosave_ = std::make_unique<PeriodicThread>(
@@ -88,10 +92,25 @@ void Server::stop() {
   // Who asks goes first, then who brings, then who maps: nobody waits for somebody gone.
   autosave_.reset();
   services_.reset();
+  areas_.reset();
   status_publisher_.reset();
   receiver_.reset();
   mapping_.reset();
   saver_.save_if_changed();
+}
+
+void Server::start_areas(const ServerConfig& config) {
+  std::vector<RobotProfile> robots = robots_of(config.areas);
+  if (robots.empty()) return;
+  if (!config.areas.grid_profile.empty()) {
+    area_publisher_ = std::make_unique<AreaPublisher>(participant_, topics_, planning_grid_);
+  }
+  const auto publish = [this] {
+    if (area_publisher_) area_publisher_->publish();
+  };
+  areas_ = std::make_unique<AreaThread>(std::move(robots),
+                                        std::chrono::duration<double>(config.areas.update_period_s),
+                                        board_, area_board_, statistics_, publish);
 }
 
 void Server::save_in_background() {

@@ -5,9 +5,12 @@
 
 #include "config/server_config.hpp"
 #include "idl/topics.hpp"
+#include "server/area_thread.hpp"
 #include "server/map_board.hpp"
 #include "server/map_saver.hpp"
 #include "server/mapping_thread.hpp"
+#include "server/planning_grid.hpp"
+#include "server/publishers/area_publisher.hpp"
 #include "server/publishers/map_publisher.hpp"
 #include "server/publishers/status_publisher.hpp"
 #include "server/scan_receiver.hpp"
@@ -28,6 +31,7 @@ class Server {
   void stop();
 
  private:
+  void start_areas(const ServerConfig& config);
   void save_in_background();
 
   // In the order of construction; what comes later uses what comes before.
@@ -44,6 +48,10 @@ class Server {
   std::unique_ptr<ScanReceiver> receiver_;
   ServerReport report_;
   std::unique_ptr<MapPublisher> map_publisher_;
+  AreaBoard area_board_;
+  PlanningGrid planning_grid_;
+  std::unique_ptr<AreaPublisher> area_publisher_;
+  std::unique_ptr<AreaThread> areas_;
   std::unique_ptr<ServiceDesk> services_;
   std::unique_ptr<StatusPublisher> status_publisher_;
   std::unique_ptr<PeriodicThread> autosave_;

@@ -6,8 +6,10 @@
 
 #include "idl/conversions/map_query.hpp"
 #include "idl/server_status.hpp"
+#include "server/area_board.hpp"
 #include "server/map_board.hpp"
 #include "server/map_saver.hpp"
+#include "server/planning_grid.hpp"
 
 namespace stillmap {
 
@@ -20,6 +22,8 @@ struct ServiceContext {
   std::function<std::uint64_t()> reset;
   /// Puts on the board what was mapped until now.
   std::function<void()> show_now;
+  const AreaBoard& areas;
+  const PlanningGrid& planning_grid;
 };
 
 /// Status of a reply about this view.
