@@ -15,6 +15,9 @@
 #include "core/map/map_query.hpp"
 #include "core/map/tile.hpp"
 #include "core/odometry/trajectory.hpp"
+#include "core/traversability/area_query.hpp"
+#include "core/traversability/nearest_traversable.hpp"
+#include "core/traversability/path_query.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
 #include "idl/dds/dds_options.hpp"
 #include "idl/map_identity.hpp"
@@ -106,6 +109,17 @@ class Client {
   /// without the runner-up classes' evidence.
   [[nodiscard]] TileSet get_tiles(std::span<const TileId> ids);
 
+  /// Where a robot can go in a region. A refused query is a result with its status and reason.
+  [[nodiscard]] AreaAnswer get_traversable_area(const AreaQuery& query);
+  /// Whether a robot can follow a path, or the first place where it cannot. The same.
+  [[nodiscard]] PathCheck check_path(const PathQuery& query);
+  /// The free cell nearest to a place (map frame [m]). The same.
+  [[nodiscard]] NearestTraversable nearest_traversable(const std::string& profile,
+                                                       const Eigen::Vector2d& position_map,
+                                                       double max_distance_m = 100.0);
+  /// The grid of the server's planning robot, as Nav2 gets it; of no size when there is none.
+  [[nodiscard]] OccupancyGrid planning_grid();
+
   /// Has the server save its map; returns the file's name on the server's machine. An empty name
   /// means the configured file.
   std::string save_map(const std::string& file = {});
@@ -128,6 +142,10 @@ class Client {
   /// As subscribe_tiles, without the voxels; a tile without any is gone.
   [[nodiscard]] Subscription subscribe_tile_index(
       std::function<void(const MapIdentity&, const TileInfo&)> info_arrived);
+
+  /// The grid of the server's planning robot, whenever it changes.
+  [[nodiscard]] Subscription subscribe_planning_grid(
+      std::function<void(const OccupancyGrid&)> grid_arrived);
 
   /// The tiles whose footprint meets the region: first those that exist, then what changes. Tiles
   /// of other places do not come over the network, except from the region's bounding box their

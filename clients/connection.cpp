@@ -43,7 +43,11 @@ Client::Connection::Connection(const ClientOptions& client_options)
       get_tiles(participant, names.get_tiles),
       get_status(participant, names.get_status),
       save_map(participant, names.save_map),
-      reset(participant, names.reset) {}
+      reset(participant, names.reset),
+      get_traversable_area(participant, names.get_traversable_area),
+      check_path(participant, names.check_path),
+      nearest_traversable(participant, names.nearest_traversable),
+      get_map(participant, names.get_map) {}
 
 TileSet Client::Connection::fetch_tiles(std::span<const TileId> ids) {
   TileSet set;

@@ -23,6 +23,8 @@ using Action = std::function<ExitCode()>;
 // Each adds one subcommand to the program; when it is chosen, it sets `action`.
 void add_map_command(CommandHandle program, Action& action);
 void add_traversable_command(CommandHandle program, Action& action);
+void add_check_path_command(CommandHandle program, Action& action);
+void add_nearest_command(CommandHandle program, Action& action);
 void add_replay_command(CommandHandle program, Action& action);
 void add_watch_command(CommandHandle program, Action& action);
 void add_watch_tiles_command(CommandHandle program, Action& action);
