@@ -100,6 +100,7 @@ TEST_F(TraversableCommandTest, RefusesPathsAndPlacesThatAreNone) {
   EXPECT_THAT(refusal("nearest " + map + " --to nan 1"), HasSubstr("nan"));
   EXPECT_THAT(refusal("traversable " + map + " --sphere 9000 0 0 3"), HasSubstr("outside the map"));
   EXPECT_THAT(refusal("traversable " + map + " --corridor 0 0 9 9"), HasSubstr("--width"));
+  EXPECT_THAT(refusal("traversable " + map + " --min-z 1"), HasSubstr("--min-z"));
 }
 
 TEST_F(TraversableCommandTest, RefusesInputItCannotUse) {
