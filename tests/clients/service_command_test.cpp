@@ -138,6 +138,26 @@ TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
   EXPECT_EQ(watched.exit_code, 0) << watched.err;
   EXPECT_THAT(watched.out, HasSubstr("\"change\":\"appeared\""));
 
+  EXPECT_EQ(run("save saved.stillmap" + on_domain()).exit_code, 0);
+  EXPECT_TRUE(exists("saved.stillmap"));
+  EXPECT_EQ(run("reset" + on_domain()).exit_code, 0);
+  const nlohmann::json empty = nlohmann::json::parse(run("status --json" + on_domain()).out);
+  EXPECT_EQ(empty.at("voxels"), 0);
+  EXPECT_NE(empty.at("map_id"), status.at("map_id"));
+}
+
+TEST_F(ServiceCommandTest, AsksARunningServerWhereARobotCanGo) {
+  simulate("city", 5);
+  BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
+  ASSERT_EQ(run("replay " + path("city") + " --lossless --timeout 30" + on_domain()).exit_code, 0)
+      << content("server.log");
+  // The area follows the map within a moment.
+  ProcessResult nearest;
+  for (int i = 0; i < 60 && nearest.exit_code != 0; ++i) {
+    nearest = run("nearest --to 3 0 --json" + on_domain());
+  }
+  ASSERT_EQ(nearest.exit_code, 0) << nearest.err;
+  EXPECT_GE(nlohmann::json::parse(nearest.out).at("distance_m"), 0.0);
   const ProcessResult area =
       run("traversable --around-robot 30 --json" + on_domain() + " --out " + path("nav2") +
           " --picture " + path("area.png") + " --outlines " + path("area.json"));
@@ -146,21 +166,12 @@ TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
   for (const std::string file : {"nav2/map.yaml", "area.png", "area.json"}) {
     EXPECT_TRUE(exists(file)) << file;
   }
-  const ProcessResult nearest = run("nearest --to 3 0 --json" + on_domain());
-  EXPECT_EQ(nearest.exit_code, 0) << nearest.err;
   const ProcessResult blocked = run("check-path --path 3 0 300 0" + on_domain());
   EXPECT_EQ(blocked.exit_code, 1) << blocked.err;
   EXPECT_THAT(blocked.out, HasSubstr("blocked for car"));
   const ProcessResult nobody = run("traversable --profile submarine" + on_domain());
   EXPECT_EQ(nobody.exit_code, 2);
   EXPECT_THAT(nobody.err, AllOf(HasSubstr("submarine"), HasSubstr("car, delivery_robot")));
-
-  EXPECT_EQ(run("save saved.stillmap" + on_domain()).exit_code, 0);
-  EXPECT_TRUE(exists("saved.stillmap"));
-  EXPECT_EQ(run("reset" + on_domain()).exit_code, 0);
-  const nlohmann::json empty = nlohmann::json::parse(run("status --json" + on_domain()).out);
-  EXPECT_EQ(empty.at("voxels"), 0);
-  EXPECT_NE(empty.at("map_id"), status.at("map_id"));
 }
 
 }  // namespace
