@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "idl/conversions/area_query.hpp"
@@ -112,7 +113,7 @@ TEST(AreaConversion, KeepsEveryStatusAndRefusesOthers) {
     EXPECT_EQ(back->grid.reason, "why");
   }
   auto response = to_response(two_cells());
-  for (const std::uint8_t code : {2, 3, 4, 7, 255}) {
+  for (const std::uint8_t code : std::array<std::uint8_t, 5>{2, 3, 4, 7, 255}) {
     response.status().code(code);
     EXPECT_FALSE(from_response(response)) << int{code};
   }
