@@ -17,6 +17,9 @@
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"
 #include "core/odometry/trajectory.hpp"
+#include "core/traversability/area_query.hpp"
+#include "core/traversability/nearest_traversable.hpp"
+#include "core/traversability/path_query.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
 #include "idl/dds/dds_options.hpp"
 #include "idl/map_identity.hpp"
@@ -124,6 +127,16 @@ class Client {
   /// Points, boxes and rays at once. Each answer has its own fault; throws ServiceError when the
   /// query as a whole is refused.
   [[nodiscard]] OccupancyAnswers query_occupancy(const OccupancyQuery& query);
+  /// Where a robot can go in a region. A refused query is a result with its status and reason.
+  [[nodiscard]] AreaAnswer get_traversable_area(const AreaQuery& query);
+  /// Whether a robot can follow a path, or the first place where it cannot. The same.
+  [[nodiscard]] PathCheck check_path(const PathQuery& query);
+  /// The free cell nearest to a place (map frame [m]). The same.
+  [[nodiscard]] NearestTraversable nearest_traversable(const std::string& profile,
+                                                       const Eigen::Vector2d& position_map,
+                                                       double max_distance_m = 100.0);
+  /// The grid of the server's planning robot, as Nav2 gets it; of no size when there is none.
+  [[nodiscard]] OccupancyGrid planning_grid();
 
   /// Has the server save its map; returns the file's name on the server's machine. An empty name
   /// means the configured file.
@@ -156,6 +169,9 @@ class Client {
   /// The octree (binary) when it changed, as often as the server publishes it.
   [[nodiscard]] Subscription subscribe_octomap(
       std::function<void(const OctomapData&)> octomap_arrived);
+  /// The grid of the server's planning robot, whenever it changes.
+  [[nodiscard]] Subscription subscribe_planning_grid(
+      std::function<void(const OccupancyGrid&)> grid_arrived);
 
   /// The tiles whose footprint meets the region: first those that exist, then what changes. Tiles
   /// of other places do not come over the network, except from the region's bounding box their

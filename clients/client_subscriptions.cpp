@@ -5,6 +5,7 @@
 #include "clients/connection.hpp"
 #include "core/occupancy/octomap_check.hpp"
 #include "idl/conversions/octomap.hpp"
+#include "idl/conversions/occupancy_grid.hpp"
 #include "idl/conversions/pose.hpp"
 #include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"
@@ -101,6 +102,16 @@ Subscription Client::subscribe_path(std::function<void(const Trajectory&)> path_
       connection_->participant, connection_->topics.path,
       [arrived = std::move(path_arrived)](const nav_msgs::msg::Path& message) {
         arrived(wire::from_path(message));
+      });
+}
+
+Subscription Client::subscribe_planning_grid(
+    std::function<void(const OccupancyGrid&)> grid_arrived) {
+  return subscribe<nav_msgs::msg::OccupancyGrid>(
+      connection_->participant, connection_->topics.traversability,
+      [arrived = std::move(grid_arrived)](const nav_msgs::msg::OccupancyGrid& message) {
+        const auto grid = wire::from_message(message);
+        if (grid) arrived(*grid);
       });
 }
 

@@ -44,10 +44,14 @@ Client::Connection::Connection(const ClientOptions& client_options)
       get_status(participant, names.get_status),
       save_map(participant, names.save_map),
       load_map(participant, names.load_map),
-            reset(participant, names.reset),
+      reset(participant, names.reset),
       octomap_binary(participant, names.octomap_binary),
       octomap_full(participant, names.octomap_full),
-      query_occupancy(participant, names.query_occupancy) {}
+      query_occupancy(participant, names.query_occupancy),
+      get_traversable_area(participant, names.get_traversable_area),
+      check_path(participant, names.check_path),
+      nearest_traversable(participant, names.nearest_traversable),
+      get_map(participant, names.get_map) {}
 
 TileSet Client::Connection::fetch_tiles(std::span<const TileId> ids) {
   TileSet set;

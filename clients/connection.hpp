@@ -7,9 +7,11 @@
 #include "idl/conversions/map_query.hpp"
 #include "idl/dds/service_client.hpp"
 #include "idl/topics.hpp"
+#include "nav_msgs.h"
 #include "octomap_msgs.h"
 #include "stillmap_msgs.h"
 #include "stillmap_occupancy.h"
+#include "traversable_area.h"
 
 namespace stillmap {
 
@@ -24,7 +26,9 @@ struct Client::Connection {
   template <typename Request, typename Reply>
   [[nodiscard]] Reply ask(ServiceClient<Request, Reply>& service, const std::string& name,
                           Request request, std::chrono::milliseconds timeout) {
-    request.format_version(wire_format_version);
+    if constexpr (requires { request.format_version(wire_format_version); }) {
+      request.format_version(wire_format_version);
+    }
     auto reply = service.ask(request, timeout);
     if (!reply) {
       throw no_answer(name, timeout, service.wait_for_server(std::chrono::milliseconds(0)));
@@ -72,6 +76,15 @@ struct Client::Connection {
   ServiceClient<stillmap_msgs::srv::QueryOccupancy_Request,
                 stillmap_msgs::srv::QueryOccupancy_Response>
       query_occupancy;
+  ServiceClient<stillmap_msgs::srv::GetTraversableArea_Request,
+                stillmap_msgs::srv::GetTraversableArea_Response>
+      get_traversable_area;
+  ServiceClient<stillmap_msgs::srv::CheckPath_Request, stillmap_msgs::srv::CheckPath_Response>
+      check_path;
+  ServiceClient<stillmap_msgs::srv::NearestTraversable_Request,
+                stillmap_msgs::srv::NearestTraversable_Response>
+      nearest_traversable;
+  ServiceClient<nav_msgs::srv::GetMap_Request, nav_msgs::srv::GetMap_Response> get_map;
 };
 
 }  // namespace stillmap

@@ -18,6 +18,8 @@ void add_commands(stillmap::CommandHandle program, stillmap::Action& action) {
   stillmap::add_map_command(program, action);
   stillmap::add_traversable_command(program, action);
   stillmap::add_plan_command(program, action);
+  stillmap::add_check_path_command(program, action);
+  stillmap::add_nearest_command(program, action);
   stillmap::add_replay_command(program, action);
   stillmap::add_watch_command(program, action);
   stillmap::add_watch_tiles_command(program, action);

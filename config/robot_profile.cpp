@@ -5,7 +5,6 @@
 #include <cstdlib>
 #include <set>
 
-#include "config/closest_name.hpp"
 #include "config/yaml_section.hpp"
 
 namespace stillmap {
@@ -81,6 +80,12 @@ bool is_file_name(const std::string& text) {
   return text.find('/') != std::string::npos || text.ends_with(".yaml") || text.ends_with(".yml");
 }
 
+std::string list_of(const std::vector<std::string>& names) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  return list;
+}
+
 }  // namespace
 
 RobotProfile read_robot_profile(const fs::path& file) {
@@ -102,6 +107,10 @@ std::vector<std::string> known_robots() {
   return {names.begin(), names.end()};
 }
 
+std::string robot_from(const fs::path& folder, const std::string& name_or_file) {
+  return is_file_name(name_or_file) ? (folder / name_or_file).string() : name_or_file;
+}
+
 RobotProfile load_robot_profile(const std::string& name_or_file) {
   if (is_file_name(name_or_file)) return read_robot_profile(name_or_file);
   for (const fs::path& folder : robot_folders()) {
@@ -110,8 +119,8 @@ RobotProfile load_robot_profile(const std::string& name_or_file) {
   }
   throw ConfigError({"robot '" + name_or_file +
                      "' is neither known nor a .yaml file; STILLMAP_ROBOTS may name a folder of "
-                     "robots" +
-                     did_you_mean(name_or_file, known_robots())});
+                     "robots; known are: " +
+                     list_of(known_robots())});
 }
 
 }  // namespace stillmap

@@ -16,6 +16,10 @@ namespace stillmap {
 /// by its file. Throws ConfigError with every fault, or with the names that there are.
 [[nodiscard]] RobotProfile load_robot_profile(const std::string& name_or_file);
 
+/// As load_robot_profile takes it: a file's relative name then starts at `folder`.
+[[nodiscard]] std::string robot_from(const std::filesystem::path& folder,
+                                     const std::string& name_or_file);
+
 /// Names of the robots that are found without a folder, sorted.
 [[nodiscard]] std::vector<std::string> known_robots();
 

@@ -2,9 +2,11 @@
 
 #include <arpa/inet.h>
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "config/mapper_section.hpp"
+#include "config/robot_profile.hpp"
 #include "config/sensor_file.hpp"
 #include "config/yaml_section.hpp"
 #include "core/map/datum.hpp"
@@ -155,6 +157,23 @@ void read_occupancy(YamlSection section, OccupancyServing& occupancy) {
   section.number("publish_period_s", occupancy.publish_period_s, periods_s);
 }
 
+void read_areas(YamlSection section, const fs::path& folder, AreasConfig& areas) {
+  section.text_list("profiles", areas.profiles);
+  section.number("update_period_s", areas.update_period_s, periods_s);
+  section.text("grid_profile", areas.grid_profile);
+  section.number("grid_window_m", areas.grid_window_m, {0, 100'000});
+  for (std::string& profile : areas.profiles) profile = robot_from(folder, profile);
+  try {
+    const std::vector<RobotProfile> robots = robots_of(areas);
+    if (areas.grid_profile.empty() || robots.empty()) return;
+    if (std::ranges::find(robots, areas.grid_profile, &RobotProfile::name) != robots.end()) return;
+    section.fault("grid_profile",
+                  "'" + areas.grid_profile + "' is not one of areas.profiles; empty: no grid");
+  } catch (const ConfigError& error) {
+    for (const std::string& fault : error.faults()) section.fault("profiles", fault);
+  }
+}
+
 void read_server(YamlSection file, const fs::path& folder, ServerConfig& config) {
   read_sensor_name(file, folder, config.mapper.sensor);
   read_mapper(file, config.mapper);
@@ -166,9 +185,28 @@ void read_server(YamlSection file, const fs::path& folder, ServerConfig& config)
   read_publish(file.section("publish"), config.publish);
   read_map(file.section("map"), config.map);
   read_occupancy(file.section("occupancy"), config.occupancy);
+  read_areas(file.section("areas"), folder, config.areas);
 }
 
 }  // namespace
+
+std::vector<RobotProfile> robots_of(const AreasConfig& areas) {
+  std::vector<RobotProfile> robots;
+  std::vector<std::string> faults;
+  for (const std::string& profile : areas.profiles) {
+    try {
+      RobotProfile robot = load_robot_profile(profile);
+      if (std::ranges::find(robots, robot.name, &RobotProfile::name) != robots.end()) {
+        faults.push_back("two robots are called '" + robot.name + "'; clients ask by name");
+      }
+      robots.push_back(std::move(robot));
+    } catch (const ConfigError& error) {
+      faults.insert(faults.end(), error.faults().begin(), error.faults().end());
+    }
+  }
+  if (!faults.empty()) throw ConfigError(faults);
+  return robots;
+}
 
 ServerConfig load_server_config(const fs::path& file) {
   ConfigReport report;

@@ -11,6 +11,7 @@
 #include "core/mapper.hpp"
 #include "core/occupancy/occupancy_config.hpp"
 #include "core/segmentation/open_network.hpp"
+#include "core/traversability/robot_profile.hpp"
 
 namespace stillmap {
 
@@ -134,6 +135,22 @@ struct OccupancyServing {
   double publish_period_s = 5.0;
 };
 
+/// Where robots can go, kept up to date with the map.
+struct AreasConfig {
+  /// Robots by name or file, as load_robot_profile takes them; empty: no areas.
+  std::vector<std::string> profiles = {"car", "delivery_robot"};
+  /// Shortest time from update to update; nothing is done while the map stays as it is.
+  double update_period_s = 1.0;
+  /// The robot whose area is published as a grid; empty: none.
+  std::string grid_profile = "car";
+  /// Edge of the square round the robot that the grid shows; 0: the whole map.
+  double grid_window_m = 0.0;
+};
+
+/// The robots that areas are kept for. Throws ConfigError with every fault: robots that do not
+/// exist (with those that do), or two of one name.
+[[nodiscard]] std::vector<RobotProfile> robots_of(const AreasConfig& areas);
+
 /// Everything that stillmap-server can be told. Works as it is, with a 64-beam sensor and no file.
 struct ServerConfig {
   MapperConfig mapper{.sensor = hdl_64e(), .prepare = {}, .odometry = {}, .static_map = {}};
@@ -145,6 +162,7 @@ struct ServerConfig {
   PublishConfig publish;
   MapFileConfig map;
   OccupancyServing occupancy;
+  AreasConfig areas;
 };
 
 /// Reads a server file (config/server/default.yaml shows every field). What the file leaves out

@@ -30,6 +30,7 @@ Topics Topics::in(const std::string& name_space) {
       .tiles = symmetric<stillmap_msgs::msg::MapTile>(prefix + "tiles", keyed),
       .status = symmetric<stillmap_msgs::msg::Status>(prefix + "status", latched),
       .octomap = symmetric<octomap_msgs::msg::Octomap>(prefix + "octomap", latched),
+      .traversability = symmetric<nav_msgs::msg::OccupancyGrid>(prefix + "traversability", latched),
   };
 }
 
@@ -56,7 +57,11 @@ Services Services::in(const std::string& name_space) {
           .reset = prefix + "reset",
           .octomap_binary = prefix + "octomap_binary",
           .octomap_full = prefix + "octomap_full",
-          .query_occupancy = prefix + "query_occupancy"};
+          .query_occupancy = prefix + "query_occupancy",
+          .get_traversable_area = prefix + "get_traversable_area",
+          .check_path = prefix + "check_path",
+          .nearest_traversable = prefix + "nearest_traversable",
+          .get_map = prefix + "get_map"};
 }
 
 }  // namespace stillmap

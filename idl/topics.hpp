@@ -33,6 +33,8 @@ struct Topics {
   TopicSpec<stillmap_msgs::msg::MapTile> tiles;
   TopicSpec<stillmap_msgs::msg::Status> status;
   TopicSpec<octomap_msgs::msg::Octomap> octomap;
+  /// Where the robot of `areas.grid_profile` can go.
+  TopicSpec<nav_msgs::msg::OccupancyGrid> traversability;
 
   /// `name_space` is the first part of all names but tf's: "stillmap" gives rt/stillmap/odometry.
   [[nodiscard]] static Topics in(const std::string& name_space);
@@ -60,6 +62,11 @@ struct Services {
   std::string octomap_binary;
   std::string octomap_full;
   std::string query_occupancy;
+  std::string get_traversable_area;
+  std::string check_path;
+  std::string nearest_traversable;
+  /// nav_msgs/srv/GetMap.
+  std::string get_map;
 
   [[nodiscard]] static Services in(const std::string& name_space);
 };

@@ -13,6 +13,7 @@ namespace geometry_msgs::msg {
 class Pose;
 }
 namespace nav_msgs::msg {
+class OccupancyGrid;
 class Odometry;
 class Path;
 }  // namespace nav_msgs::msg

@@ -16,6 +16,8 @@ void MapBoard::begin(std::shared_ptr<const MapView> view, Trajectory trajectory)
   auto history = std::make_shared<const TileHistory>(history_from(*view));
   const std::scoped_lock lock(mutex_);
   state_ = {std::move(view), std::move(history)};
+  shown_ = std::chrono::steady_clock::now();
+  changed_.notify_all();
   trajectory_ = std::move(trajectory);
   health_ = OdometryHealth::initialised;
 }
@@ -28,6 +30,8 @@ void MapBoard::show(std::shared_ptr<const MapView> view) {
       before.history ? history_with(*before.history, *view) : history_from(*view));
   const std::scoped_lock lock(mutex_);
   state_ = {std::move(view), std::move(history)};
+  shown_ = std::chrono::steady_clock::now();
+  changed_.notify_all();
 }
 
 void MapBoard::add_pose(const StampedPose& pose, OdometryHealth health,
@@ -46,6 +50,16 @@ void MapBoard::add_pose(const StampedPose& pose, OdometryHealth health,
 std::shared_ptr<const MapView> MapBoard::view() const {
   const std::scoped_lock lock(mutex_);
   return state_.view;
+}
+
+std::optional<MapBoard::News> MapBoard::wait_for_news(const std::shared_ptr<const MapView>& known,
+                                                      const std::stop_token& stop,
+                                                      std::chrono::milliseconds timeout) const {
+  std::unique_lock lock(mutex_);
+  const bool is_new =
+      changed_.wait_for(lock, stop, timeout, [&] { return state_.view && state_.view != known; });
+  if (!is_new) return std::nullopt;
+  return News{state_.view, shown_};
 }
 
 MapState MapBoard::state() const {

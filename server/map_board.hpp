@@ -1,7 +1,11 @@
 #pragma once
 
+#include <chrono>
+#include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
+#include <stop_token>
 #include <string>
 
 #include "core/map/tile.hpp"
@@ -26,6 +30,15 @@ class MapBoard {
 
   /// Never null once `begin` was called.
   [[nodiscard]] std::shared_ptr<const MapView> view() const;
+  /// A view, and when it came.
+  struct News {
+    std::shared_ptr<const MapView> view;
+    std::chrono::steady_clock::time_point shown;
+  };
+  /// Waits for another view than `known`. Nothing after `timeout` or when a stop was requested.
+  [[nodiscard]] std::optional<News> wait_for_news(const std::shared_ptr<const MapView>& known,
+                                                  const std::stop_token& stop,
+                                                  std::chrono::milliseconds timeout) const;
   /// The view and the history that ends with it.
   [[nodiscard]] MapState state() const;
   [[nodiscard]] Trajectory trajectory() const;
@@ -38,7 +51,9 @@ class MapBoard {
 
  private:
   mutable std::mutex mutex_;
+  mutable std::condition_variable_any changed_;
   MapState state_;
+  std::chrono::steady_clock::time_point shown_;
   Trajectory trajectory_;
   std::uint64_t poses_added_ = 0;
   OdometryHealth health_ = OdometryHealth::initialised;

@@ -61,7 +61,8 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
       poses_(participant_, topics_, config.frames),
       report_(delivery_mode(config.input.delivery), label_source->name(),
               socket_trouble(config.dds), board_, statistics_,
-              [this] { return receiver_->why_nothing_arrives(); }) {
+              [this] { return receiver_->why_nothing_arrives(); }),
+      planning_grid_(config.areas, config.frames.map, board_, area_board_) {
   if (config.publish.scan) scans_.emplace(participant_, topics_);
   if (!config.topics.odometry_prior.empty()) {
     prior_.emplace(participant_, config.topics.odometry_prior);
@@ -84,6 +85,7 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
     octomap_publisher_ =
         std::make_unique<OctomapPublisher>(participant_, topics_, config, *occupancy);
   }
+  start_areas(config);
   const auto status = [this] { return report_.status(); };
   const ServiceContext context{
       .board = board_,
@@ -96,7 +98,9 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
             mapping_->load(stored, shelf);
             tiles_.use_shelf(shelf);
           },
-      .show_now = [this] { mapping_->show_now(); }};
+      .show_now = [this] { mapping_->show_now(); },
+      .areas = area_board_,
+      .planning_grid = planning_grid_};
   const Services names = Services::in(config.topics.name_space);
   services_ = std::make_unique<ServiceDesk>(participant_, names, context);
   occupancy_services_ =
@@ -115,10 +119,25 @@ void Server::stop() {
   services_.reset();
   occupancy_services_.reset();
   octomap_publisher_.reset();
+  areas_.reset();
   status_publisher_.reset();
   receiver_.reset();
   mapping_->stop();
   saver_.save_at_end();
+}
+
+void Server::start_areas(const ServerConfig& config) {
+  std::vector<RobotProfile> robots = robots_of(config.areas);
+  if (robots.empty()) return;
+  if (!config.areas.grid_profile.empty()) {
+    area_publisher_ = std::make_unique<AreaPublisher>(participant_, topics_, planning_grid_);
+  }
+  const auto publish = [this] {
+    if (area_publisher_) area_publisher_->publish();
+  };
+  areas_ = std::make_unique<AreaThread>(std::move(robots),
+                                        std::chrono::duration<double>(config.areas.update_period_s),
+                                        board_, area_board_, statistics_, publish);
 }
 
 void Server::save_in_background() {

@@ -5,10 +5,13 @@
 
 #include "config/server_config.hpp"
 #include "idl/topics.hpp"
+#include "server/area_thread.hpp"
 #include "server/map_board.hpp"
 #include "server/map_saver.hpp"
 #include "server/mapping_thread.hpp"
 #include "server/occupancy_thread.hpp"
+#include "server/planning_grid.hpp"
+#include "server/publishers/area_publisher.hpp"
 #include "server/publishers/map_publisher.hpp"
 #include "server/publishers/octomap_publisher.hpp"
 #include "server/publishers/status_publisher.hpp"
@@ -31,6 +34,7 @@ class Server {
   void stop();
 
  private:
+  void start_areas(const ServerConfig& config);
   void save_in_background();
 
   // In the order of construction; what comes later uses what comes before.
@@ -50,6 +54,10 @@ class Server {
   ServerReport report_;
   std::unique_ptr<MapPublisher> map_publisher_;
   std::unique_ptr<OctomapPublisher> octomap_publisher_;
+  AreaBoard area_board_;
+  PlanningGrid planning_grid_;
+  std::unique_ptr<AreaPublisher> area_publisher_;
+  std::unique_ptr<AreaThread> areas_;
   std::unique_ptr<ServiceDesk> services_;
   std::unique_ptr<OccupancyDesk> occupancy_services_;
   std::unique_ptr<StatusPublisher> status_publisher_;

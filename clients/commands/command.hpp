@@ -26,6 +26,8 @@ using Action = std::function<ExitCode()>;
 void add_map_command(CommandHandle program, Action& action);
 void add_traversable_command(CommandHandle program, Action& action);
 void add_plan_command(CommandHandle program, Action& action);
+void add_check_path_command(CommandHandle program, Action& action);
+void add_nearest_command(CommandHandle program, Action& action);
 void add_replay_command(CommandHandle program, Action& action);
 void add_watch_command(CommandHandle program, Action& action);
 void add_watch_tiles_command(CommandHandle program, Action& action);

@@ -96,15 +96,28 @@ Region chosen_region(const RegionArguments& region, const Eigen::Vector2d& robot
   return everything;
 }
 
-Region checked_region(const RegionArguments& arguments, const Eigen::Vector2d& robot_map) {
-  if (!arguments.corridor.empty() && arguments.width_m == 0.0) {
-    throw std::invalid_argument("--corridor needs --width, the corridor's whole width [m]");
+/// The options that name heights themselves.
+struct Kinds {
+  OptionHandle box;
+  OptionHandle sphere;
+};
+
+Kinds add_kinds(CommandHandle command, RegionArguments& region) {
+  std::array kinds{
+      command.option("--box", region.box, "x_min y_min z_min x_max y_max z_max").exactly(6),
+      command.option("--around", region.around, "x y SIZE: a square").exactly(3),
+      command.option("--around-robot", region.around_robot_m, "SIZE: a square round the robot")
+          .above_zero(),
+      command.option("--sphere", region.sphere, "x y z RADIUS").exactly(4),
+      command.option("--polygon", region.polygon,
+                     "x y x y ...: corners round an outline; or FILE with a corner a line"),
+      command.option("--corridor", region.corridor,
+                     "x y x y ...: all within --width of a path; or FILE with a point a line")};
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    for (std::size_t j = i + 1; j < kinds.size(); ++j) kinds.at(i).excludes(kinds.at(j));
   }
-  Region region = chosen_region(arguments, robot_map);
-  if (const std::string faults = region_faults(region); !faults.empty()) {
-    throw std::invalid_argument(faults);
-  }
-  return region;
+  command.option("--width", region.width_m, "Whole width of the corridor [m]").above_zero();
+  return {.box = kinds[0], .sphere = kinds[3]};
 }
 
 }  // namespace
@@ -127,33 +140,33 @@ std::vector<Eigen::Vector2d> plan_points(const std::string& option,
   return points;
 }
 
+void add_plan_region_options(CommandHandle command, RegionArguments& region) {
+  static_cast<void>(add_kinds(command, region));
+}
+
 void add_region_options(CommandHandle command, RegionArguments& region) {
-  std::array kinds{
-      command.option("--box", region.box, "x_min y_min z_min x_max y_max z_max").exactly(6),
-      command.option("--around", region.around, "x y SIZE: a square").exactly(3),
-      command.option("--around-robot", region.around_robot_m, "SIZE: a square round the robot")
-          .above_zero(),
-      command.option("--sphere", region.sphere, "x y z RADIUS").exactly(4),
-      command.option("--polygon", region.polygon,
-                     "x y x y ...: corners round an outline; or FILE with a corner a line"),
-      command.option("--corridor", region.corridor,
-                     "x y x y ...: all within --width of a path; or FILE with a point a line")};
-  for (std::size_t i = 0; i < kinds.size(); ++i) {
-    for (std::size_t j = i + 1; j < kinds.size(); ++j) kinds.at(i).excludes(kinds.at(j));
-  }
-  command.option("--width", region.width_m, "Whole width of the corridor [m]").above_zero();
-  OptionHandle box = kinds[0];
-  OptionHandle sphere = kinds[3];
+  const Kinds kinds = add_kinds(command, region);
   command.option("--min-z", region.min_z_m, "Lowest height [m]; not with --box, --sphere")
-      .excludes(box)
-      .excludes(sphere);
+      .excludes(kinds.box)
+      .excludes(kinds.sphere);
   command.option("--max-z", region.max_z_m, "Greatest height [m]; not with --box, --sphere")
-      .excludes(box)
-      .excludes(sphere);
+      .excludes(kinds.box)
+      .excludes(kinds.sphere);
+}
+
+Region region_at(const RegionArguments& arguments, const Eigen::Vector2d& robot_map) {
+  if (!arguments.corridor.empty() && arguments.width_m == 0.0) {
+    throw std::invalid_argument("--corridor needs --width, the corridor's whole width [m]");
+  }
+  Region region = chosen_region(arguments, robot_map);
+  if (const std::string faults = region_faults(region); !faults.empty()) {
+    throw std::invalid_argument(faults);
+  }
+  return region;
 }
 
 void check_region(const RegionArguments& region) {
-  static_cast<void>(checked_region(region, Eigen::Vector2d::Zero()));
+  static_cast<void>(region_at(region, Eigen::Vector2d::Zero()));
 }
 
 Region region_round(const RegionArguments& region, const Eigen::Vector2d& robot_map) {
@@ -165,7 +178,7 @@ Region region_of(const RegionArguments& region, Client& client, std::chrono::mil
   if (region.around_robot_m > 0.0) {
     robot_map = newest_path(client, timeout).back().T_map_lidar.translation().head<2>();
   }
-  return checked_region(region, robot_map);
+  return region_at(region, robot_map);
 }
 
 }  // namespace stillmap

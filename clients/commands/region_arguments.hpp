@@ -34,8 +34,14 @@ struct RegionArguments {
 /// given, and --width, --min-z and --max-z.
 void add_region_options(CommandHandle command, RegionArguments& region);
 
+/// The same without --min-z and --max-z, for regions that are seen from above.
+void add_plan_region_options(CommandHandle command, RegionArguments& region);
+
 /// Throws std::invalid_argument for what is no region, wherever the robot is.
 void check_region(const RegionArguments& region);
+
+/// The region of a robot that stands here. Throws as check_region does.
+[[nodiscard]] Region region_at(const RegionArguments& region, const Eigen::Vector2d& robot_map);
 
 /// Throws as check_region does, and ServiceTimeout when the robot's pose is needed and does not
 /// arrive in time.

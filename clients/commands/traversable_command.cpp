@@ -1,14 +1,15 @@
 #include <chrono>
-#include <filesystem>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <stdexcept>
 
+#include "clients/commands/area_files.hpp"
+#include "clients/commands/area_source.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/region_arguments.hpp"
 #include "clients/commands/traversable_report.hpp"
-#include "config/robot_profile.hpp"
-#include "core/dataset/dataset_error.hpp"
-#include "core/map/map_file.hpp"
+#include "core/traversability/area_view.hpp"
 #include "core/traversability/nav2_map.hpp"
 #include "core/traversability/traversability_picture.hpp"
 
@@ -16,38 +17,45 @@ namespace stillmap {
 namespace {
 
 struct Arguments {
-  std::string map;
-  std::string profile = "car";
+  AreaSourceArguments source;
+  RegionArguments region;
   std::string out;
   std::string picture;
+  std::string outlines;
+  double min_outline_area_m2 = 1.0;
   bool json = false;
 };
 
-TraversableReport update(TraversabilityMap& area, const MapView& map) {
-  const auto start = std::chrono::steady_clock::now();
-  TraversableReport report;
-  report.work = area.update(map);
-  report.milliseconds =
-      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
-  return report;
+AreaAnswer ask(AreaSource& source, const Arguments& arguments) {
+  AreaQuery query;
+  query.region = region_of(arguments.region, source);
+  query.wants_outlines = !arguments.outlines.empty();
+  query.min_outline_area_m2 = arguments.min_outline_area_m2;
+  AreaAnswer answer = source.area(query);
+  if (answer.grid.status != AreaStatus::ok) throw std::invalid_argument(answer.grid.reason);
+  return answer;
+}
+
+void draw(const std::string& file, const TraversabilityView& view, AreaSource& source) {
+  TraversabilityPictureOptions options;
+  options.trajectory = source.trajectory();
+  write_traversability_picture(file, view, options);
 }
 
 ExitCode run(const Arguments& arguments) {
-  const RobotProfile profile = load_robot_profile(arguments.profile);
-  if (!std::filesystem::exists(arguments.map)) {
-    throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
+  check_region(arguments.region);
+  const auto began = std::chrono::steady_clock::now();
+  const std::unique_ptr<AreaSource> source = open_area_source(arguments.source);
+  const AreaAnswer answer = ask(*source, arguments);
+  const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
+  const TraversabilityView view = area_view(answer, source->robot());
+  const TraversableReport report{
+      .summary = summarize(answer), .work = source->work(), .milliseconds = took.count()};
+  if (!arguments.out.empty()) write_nav2_map(arguments.out, answer.grid);
+  if (!arguments.outlines.empty()) {
+    write_outlines(arguments.outlines, answer, view.profile.name);
   }
-  const StoredMap map = open_map_file(arguments.map)->load();
-  TraversabilityMap area({profile});
-  TraversableReport report = update(area, map.view);
-  const TraversabilityView& view = *area.view(profile.name);
-  report.summary = summarize(view);
-  if (!arguments.out.empty()) write_nav2_map(arguments.out, occupancy_grid(view, everywhere()));
-  if (!arguments.picture.empty()) {
-    TraversabilityPictureOptions options;
-    options.trajectory = map.trajectory;
-    write_traversability_picture(arguments.picture, view, options);
-  }
+  if (!arguments.picture.empty()) draw(arguments.picture, view, *source);
   std::cout << (arguments.json ? to_json(view, report).dump(2) + "\n" : describe(view, report));
   return ExitCode::ok;
 }
@@ -57,21 +65,27 @@ ExitCode run(const Arguments& arguments) {
 void add_traversable_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   CommandHandle command = program.command(
-      "traversable", "Where a robot can drive on a stored map, and why not elsewhere");
-  command.option("MAPFILE", arguments->map, "Map file (map.stillmap of 'stillmap map')").required();
-  command
-      .option("--profile", arguments->profile,
-              "The robot: car, delivery_robot, tracked, or a file like config/robots/car.yaml")
-      .with_default();
+      "traversable", "Where a robot can drive, of a server or on a stored map, and why not");
+  add_area_source_options(command, arguments->source);
+  add_plan_region_options(command, arguments->region);
   command.option("--out", arguments->out,
                  "Folder for Nav2's map_server: map.yaml and map.pgm; made if need be");
   command.option("--picture", arguments->picture, "Draw the area and its reasons to FILE.png");
+  command.option("--outlines", arguments->outlines,
+                 "Write the outlines of free areas, with holes, to FILE.json (as GeoJSON, in [m])");
+  command
+      .option("--min-outline-area", arguments->min_outline_area_m2,
+              "Leave out smaller pieces of the outlines [m2]")
+      .with_default();
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"
-      "  stillmap traversable city_map/map.stillmap --picture car.png\n"
+      "  stillmap traversable --around-robot 60 --picture car.png\n"
+      "  stillmap traversable --corridor path.txt --width 10 --outlines way.json\n"
       "  stillmap traversable city_map/map.stillmap --profile delivery_robot --out nav2\n"
       "  stillmap traversable city_map/map.stillmap --profile my_robot.yaml --json\n"
+      "Without MAPFILE, the server is asked, which keeps the areas of the robots that its\n"
+      "configuration names. Regions are seen from above: heights do not count.\n"
       "A cell is free, lethal for a reason (obstacle, low head-room, step, slope, roughness,\n"
       "class, or inflation: too near to such a cell), or unknown. 'Inferred' ground was not seen\n"
       "and follows from what lies around: between the lidar's rings, under removed cars.");

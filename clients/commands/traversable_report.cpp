@@ -1,5 +1,6 @@
 #include "clients/commands/traversable_report.hpp"
 
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "clients/terminal/text.hpp"
@@ -12,9 +13,7 @@ double square_metres(const TraversabilityView& view, std::uint64_t cells) {
 }
 
 double ms_per_tile(const TraversableReport& report) {
-  return report.work.surfaces == 0
-             ? 0.0
-             : report.milliseconds / static_cast<double>(report.work.surfaces);
+  return report.milliseconds / static_cast<double>(std::max<std::size_t>(1, report.work->surfaces));
 }
 
 }  // namespace
@@ -26,16 +25,20 @@ nlohmann::json to_json(const TraversabilityView& view, const TraversableReport& 
     if (reason == BlockReason::none || reason == BlockReason::unknown) continue;
     lethal[std::string(name(reason))] = square_metres(view, report.summary.lethal.at(i));
   }
-  return {{"profile", view.profile.name},
-          {"map_version", view.version},
-          {"cell_m", view.cell_m},
-          {"tiles", view.tiles.size()},
-          {"free_m2", square_metres(view, report.summary.free)},
-          {"inferred_m2", square_metres(view, report.summary.inferred)},
-          {"unknown_m2", square_metres(view, report.summary.unknown)},
-          {"lethal_m2", lethal},
-          {"ms", report.milliseconds},
-          {"ms_per_tile", ms_per_tile(report)}};
+  nlohmann::json json = {{"profile", view.profile.name},
+                         {"map_id", view.map_id},
+                         {"map_version", view.version},
+                         {"cell_m", view.cell_m},
+                         {"free_m2", square_metres(view, report.summary.free)},
+                         {"inferred_m2", square_metres(view, report.summary.inferred)},
+                         {"unknown_m2", square_metres(view, report.summary.unknown)},
+                         {"lethal_m2", lethal},
+                         {"ms", report.milliseconds}};
+  if (report.work) {
+    json["tiles"] = report.work->map_tiles;
+    json["ms_per_tile"] = ms_per_tile(report);
+  }
+  return json;
 }
 
 std::string describe(const TraversabilityView& view, const TraversableReport& report) {
@@ -49,9 +52,13 @@ std::string describe(const TraversabilityView& view, const TraversableReport& re
                area(report.summary.lethal.at(i))});
   }
   table.add({"unknown", area(report.summary.unknown)});
-  return table.text() + std::to_string(view.tiles.size()) + " tiles, cells of " +
-         fixed(view.cell_m, 2) + " m, in " + fixed(report.milliseconds, 0) + " ms (" +
-         fixed(ms_per_tile(report), 1) + " ms a tile)\n";
+  std::string work;
+  if (report.work) {
+    work.append(" (").append(std::to_string(report.work->map_tiles)).append(" tiles, ");
+    work.append(fixed(ms_per_tile(report), 1)).append(" ms each)");
+  }
+  return table.text() + "map version " + std::to_string(view.version) + ", cells of " +
+         fixed(view.cell_m, 2) + " m, in " + fixed(report.milliseconds, 0) + " ms" + work + "\n";
 }
 
 }  // namespace stillmap

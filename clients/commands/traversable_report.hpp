@@ -1,6 +1,7 @@
 #pragma once
 
 #include <nlohmann/json_fwd.hpp>
+#include <optional>
 #include <string>
 
 #include "core/traversability/area_summary.hpp"
@@ -11,11 +12,13 @@ namespace stillmap {
 /// What there is to say of an area.
 struct TraversableReport {
   AreaSummary summary;
-  TraversabilityUpdate work;
-  /// For the whole map, all tiles from scratch.
+  /// Of a map file, whose area is computed from scratch.
+  std::optional<TraversabilityUpdate> work;
+  /// From the question to the answer.
   double milliseconds = 0.0;
 };
 
+/// `view` is of the answer.
 [[nodiscard]] nlohmann::json to_json(const TraversabilityView& view,
                                      const TraversableReport& report);
 [[nodiscard]] std::string describe(const TraversabilityView& view, const TraversableReport& report);

@@ -2,6 +2,7 @@
 
 #include <array>
 
+#include "core/traversability/area_query.hpp"
 #include "core/traversability/traversability_view.hpp"
 
 namespace stillmap {
@@ -11,7 +12,7 @@ struct AreaSummary {
   std::uint64_t free = 0;
   /// Of the free ones.
   std::uint64_t inferred = 0;
-  /// Unknown cells of the tiles; most of them lie behind walls.
+  /// Unknown cells of the tiles, or of an answer's grid; most of them lie behind walls.
   std::uint64_t unknown = 0;
   /// By `BlockReason`.
   std::array<std::uint64_t, block_reason_count> lethal{};
@@ -20,5 +21,7 @@ struct AreaSummary {
 };
 
 [[nodiscard]] AreaSummary summarize(const TraversabilityView& view);
+/// Of an answer with a grid.
+[[nodiscard]] AreaSummary summarize(const AreaAnswer& answer);
 
 }  // namespace stillmap

@@ -1,7 +1,7 @@
 #include "core/traversability/occupancy_grid.hpp"
 
+#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <sstream>
 
 namespace stillmap {
@@ -25,14 +25,14 @@ std::int8_t value_of(const TraversabilityCell& cell) {
   return cell.state == CellState::unknown ? occupancy_unknown : static_cast<std::int8_t>(cell.cost);
 }
 
-/// The cells that the region's box touches.
-struct CellRange {
+/// The cells that a box touches, as many as there may be.
+struct WideRange {
   CellIndex first;
   std::uint64_t width;
   std::uint64_t height;
 };
 
-CellRange range_of(const TraversabilityView& view, const Eigen::AlignedBox2d& box_map) {
+WideRange range_of(const TraversabilityView& view, const Eigen::AlignedBox2d& box_map) {
   // An edge between two cells must not take in one more because of the last digit.
   constexpr double slack = 1e-6;
   const Eigen::Vector2d low = (box_map.min().array() / view.cell_m + slack).floor();
@@ -42,29 +42,34 @@ CellRange range_of(const TraversabilityView& view, const Eigen::AlignedBox2d& bo
           static_cast<std::uint64_t>(std::max(1.0, high.y() - low.y()))};
 }
 
-void fill(OccupancyGrid& grid, const TraversabilityView& view, CellIndex first,
-          const AreaRegion& region) {
+std::string too_many(const Eigen::AlignedBox2d& box_map, const WideRange& range, double cell_m,
+                     std::uint64_t max_cells) {
+  std::ostringstream text;
+  text << shown(box_map) << " has " << range.width << " x " << range.height << " cells of "
+       << cell_m << " m; at most " << max_cells
+       << " are given at once: ask for a smaller box, or part by part";
+  return text.str();
+}
+
+void fill(OccupancyGrid& grid, const TraversabilityView& view, const AreaRegion& region) {
   CellLookup lookup(view);
-  grid.data.reserve(static_cast<std::size_t>(grid.width) * grid.height);
-  for (std::uint32_t y = 0; y < grid.height; ++y) {
-    for (std::uint32_t x = 0; x < grid.width; ++x) {
-      const CellIndex index{first.x + static_cast<std::int32_t>(x),
-                            first.y + static_cast<std::int32_t>(y)};
-      const bool is_inside = !region.contains || region.contains(view.centre_of(index));
-      grid.data.push_back(is_inside ? value_of(lookup.at(index).cell) : occupancy_unknown);
-    }
-  }
+  grid.data.assign(static_cast<std::size_t>(grid.width) * grid.height, occupancy_unknown);
+  visit_cells(view, region, range_of(grid), [&](std::size_t i, CellIndex cell) {
+    grid.data[i] = value_of(lookup.at(cell).cell);
+  });
 }
 
 }  // namespace
 
-AreaRegion everywhere() {
-  const Eigen::Vector2d infinite =
-      Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
-  return {Eigen::AlignedBox2d(-infinite, infinite), {}};
+CellRange range_of(const OccupancyGrid& grid) {
+  const Eigen::Vector2d first = (grid.origin_map / grid.resolution_m).array().round();
+  return {{static_cast<std::int32_t>(first.x()), static_cast<std::int32_t>(first.y())},
+          grid.width,
+          grid.height};
 }
 
-OccupancyGrid occupancy_grid(const TraversabilityView& view, const AreaRegion& region) {
+OccupancyGrid occupancy_grid(const TraversabilityView& view, const AreaRegion& region,
+                             std::uint64_t max_cells) {
   const Eigen::AlignedBox2d& asked = region.box_map;
   // Written so that NaN fails.
   if (!(asked.min().array() <= asked.max().array()).all()) {
@@ -77,11 +82,9 @@ OccupancyGrid occupancy_grid(const TraversabilityView& view, const AreaRegion& r
     return refused(AreaStatus::not_found,
                    shown(asked) + " lies outside the map: " + shown(view.bounds_map()));
   }
-  const CellRange range = range_of(view, box_map);
-  if (range.width * range.height > max_grid_cells) {
-    return refused(AreaStatus::too_large, shown(box_map) + " has more than " +
-                                              std::to_string(max_grid_cells) +
-                                              " cells; ask for a smaller box");
+  const WideRange range = range_of(view, box_map);
+  if (range.width * range.height > max_cells) {
+    return refused(AreaStatus::too_large, too_many(box_map, range, view.cell_m, max_cells));
   }
   OccupancyGrid grid;
   grid.origin_map = view.cell_m * Eigen::Vector2d(range.first.x, range.first.y);
@@ -89,7 +92,7 @@ OccupancyGrid occupancy_grid(const TraversabilityView& view, const AreaRegion& r
   grid.width = static_cast<std::uint32_t>(range.width);
   grid.height = static_cast<std::uint32_t>(range.height);
   grid.map_version = view.version;
-  fill(grid, view, range.first, region);
+  fill(grid, view, region);
   return grid;
 }
 

@@ -2,25 +2,14 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
-#include <functional>
 #include <string>
 #include <vector>
 
+#include "core/traversability/area_region.hpp"
 #include "core/traversability/path_check.hpp"
 #include "core/traversability/traversability_view.hpp"
 
 namespace stillmap {
-
-/// Part of the map from above. `contains`, where given, takes cells out whose centre (map frame
-/// [m]) it refuses.
-struct AreaRegion {
-  /// Map frame [m]; infinite faces end at the map's edge.
-  Eigen::AlignedBox2d box_map;
-  std::function<bool(const Eigen::Vector2d&)> contains;
-};
-
-/// The whole map.
-[[nodiscard]] AreaRegion everywhere();
 
 /// A grid as nav_msgs/OccupancyGrid has it: row after row from the lowest y, -1 unknown, 0 free
 /// and wanted, 1..98 free at a cost, 99 too near to something lethal, 100 lethal.
@@ -47,9 +36,13 @@ inline constexpr std::int8_t occupancy_lethal = 100;
 /// Largest grid [cells].
 inline constexpr std::uint64_t max_grid_cells = 100'000'000;
 
-/// The cells of a region. A box that is empty or has NaN is an invalid request, one outside the
-/// map is not found.
-[[nodiscard]] OccupancyGrid occupancy_grid(const TraversabilityView& view,
-                                           const AreaRegion& region);
+/// The cells of a region; those of its box that do not belong to it are unknown. A box that is
+/// empty or has NaN is an invalid request, one outside the map is not found, one of more than
+/// `max_cells` too large.
+[[nodiscard]] OccupancyGrid occupancy_grid(const TraversabilityView& view, const AreaRegion& region,
+                                           std::uint64_t max_cells = max_grid_cells);
+
+/// The view's cells that a grid of it is made of. @pre grid.status is ok
+[[nodiscard]] CellRange range_of(const OccupancyGrid& grid);
 
 }  // namespace stillmap

@@ -8,13 +8,15 @@
 
 namespace stillmap::wire {
 
-/// Codes of stillmap_msgs/ReplyStatus, those of QueryStatus.
+/// Codes of stillmap_msgs/ReplyStatus; the first are those of QueryStatus.
 enum class ReplyCode : std::uint8_t {
   ok = 0,
   invalid_request = 1,
   stale_continuation = 2,
   failed = 3,
   changes_unknown = 4,
+  too_large = 5,
+  not_found = 6,
 };
 
 [[nodiscard]] stillmap_msgs::msg::ReplyStatus to_reply_status(ReplyCode code,

@@ -2,10 +2,14 @@
 
 #include <utility>
 
+#include "server/services/check_path.hpp"
+#include "server/services/get_map.hpp"
 #include "server/services/get_status.hpp"
 #include "server/services/get_tile_versions.hpp"
 #include "server/services/get_tiles.hpp"
 #include "server/services/load_map.hpp"
+#include "server/services/get_traversable_area.hpp"
+#include "server/services/nearest_traversable.hpp"
 #include "server/services/reset.hpp"
 #include "server/services/save_map.hpp"
 
@@ -28,6 +32,15 @@ ServiceDesk::ServiceDesk(Participant& participant, const Services& names, Servic
       load_map_(participant, names.load_map,
                 [this](const auto& request) { return load_map(context_, request); }),
       reset_(participant, names.reset,
-             [this](const auto& request) { return stillmap::reset(context_, request); }) {}
+             [this](const auto& request) { return stillmap::reset(context_, request); }),
+      get_traversable_area_(
+          participant, names.get_traversable_area,
+          [this](const auto& request) { return get_traversable_area(context_, request); }),
+      check_path_(participant, names.check_path,
+                  [this](const auto& request) { return check_path(context_, request); }),
+      nearest_traversable_(
+          participant, names.nearest_traversable,
+          [this](const auto& request) { return nearest_traversable(context_, request); }),
+      get_map_(participant, names.get_map, [this](const auto&) { return get_map(context_); }) {}
 
 }  // namespace stillmap

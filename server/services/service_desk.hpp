@@ -5,6 +5,7 @@
 #include "server/services/get_static_map.hpp"
 #include "server/services/service_context.hpp"
 #include "stillmap_msgs.h"
+#include "traversable_area.h"
 
 namespace stillmap {
 
@@ -31,6 +32,15 @@ class ServiceDesk {
   ServiceServer<stillmap_msgs::srv::LoadMap_Request, stillmap_msgs::srv::LoadMap_Response>
       load_map_;
   ServiceServer<stillmap_msgs::srv::Reset_Request, stillmap_msgs::srv::Reset_Response> reset_;
+  ServiceServer<stillmap_msgs::srv::GetTraversableArea_Request,
+                stillmap_msgs::srv::GetTraversableArea_Response>
+      get_traversable_area_;
+  ServiceServer<stillmap_msgs::srv::CheckPath_Request, stillmap_msgs::srv::CheckPath_Response>
+      check_path_;
+  ServiceServer<stillmap_msgs::srv::NearestTraversable_Request,
+                stillmap_msgs::srv::NearestTraversable_Response>
+      nearest_traversable_;
+  ServiceServer<nav_msgs::srv::GetMap_Request, nav_msgs::srv::GetMap_Response> get_map_;
 };
 
 }  // namespace stillmap

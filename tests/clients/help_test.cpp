@@ -6,6 +6,9 @@ namespace stillmap::test {
 namespace {
 
 constexpr std::array commands{"map",
+                              "traversable",
+                              "check-path",
+                              "nearest",
                               "plan",
                               "replay",
                               "watch",

@@ -21,7 +21,8 @@ TEST_F(ServiceCommandTest, WithoutAServerIsExitCodeThree) {
   simulate("city", 1);
   for (const std::string& command :
        {std::string("status"), std::string("query"), std::string("save"), std::string("reset"),
-        std::string("watch"), "replay " + path("city")}) {
+        std::string("watch"), std::string("traversable"), std::string("nearest --to 0 0"),
+        std::string("check-path --path 0 0 1 0"), "replay " + path("city")}) {
     const ProcessResult result = run(command + on_domain() + " --timeout 0.5");
     EXPECT_EQ(result.exit_code, 3) << command;
     EXPECT_THAT(result.err, HasSubstr(std::to_string(domain_))) << command;
@@ -150,6 +151,34 @@ TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
   const nlohmann::json empty = nlohmann::json::parse(run("status --json" + on_domain()).out);
   EXPECT_EQ(empty.at("voxels"), 0);
   EXPECT_NE(empty.at("map_id"), status.at("map_id"));
+}
+
+TEST_F(ServiceCommandTest, AsksARunningServerWhereARobotCanGo) {
+  simulate("city", 5);
+  BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
+  ASSERT_EQ(run("replay " + path("city") + " --lossless --timeout 30" + on_domain()).exit_code, 0)
+      << content("server.log");
+  // The area follows the map within a moment.
+  ProcessResult nearest;
+  for (int i = 0; i < 60 && nearest.exit_code != 0; ++i) {
+    nearest = run("nearest --to 3 0 --json" + on_domain());
+  }
+  ASSERT_EQ(nearest.exit_code, 0) << nearest.err;
+  EXPECT_GE(nlohmann::json::parse(nearest.out).at("distance_m"), 0.0);
+  const ProcessResult area =
+      run("traversable --around-robot 30 --json" + on_domain() + " --out " + path("nav2") +
+          " --picture " + path("area.png") + " --outlines " + path("area.json"));
+  ASSERT_EQ(area.exit_code, 0) << area.err;
+  EXPECT_GT(nlohmann::json::parse(area.out).at("free_m2"), 10.0);
+  for (const std::string file : {"nav2/map.yaml", "area.png", "area.json"}) {
+    EXPECT_TRUE(exists(file)) << file;
+  }
+  const ProcessResult blocked = run("check-path --path 3 0 300 0" + on_domain());
+  EXPECT_EQ(blocked.exit_code, 1) << blocked.err;
+  EXPECT_THAT(blocked.out, HasSubstr("blocked for car"));
+  const ProcessResult nobody = run("traversable --profile submarine" + on_domain());
+  EXPECT_EQ(nobody.exit_code, 2);
+  EXPECT_THAT(nobody.err, AllOf(HasSubstr("submarine"), HasSubstr("car, delivery_robot")));
 }
 
 }  // namespace

@@ -132,6 +132,22 @@ TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
   EXPECT_THAT(refusal_of("map: {datum: '48'}"), HasSubstr("latitude,longitude"));
 }
 
+TEST(ServerConfig, FindsTheRobotsOfItsAreas) {
+  const ServerConfig config = load("areas: {profiles: [tracked], grid_profile: tracked}");
+  ASSERT_EQ(robots_of(config.areas).size(), 1U);
+  EXPECT_EQ(robots_of(config.areas)[0].name, "tracked");
+  EXPECT_TRUE(robots_of(load("areas: {profiles: []}").areas).empty());
+  EXPECT_THAT(refusal_of("areas: {profiles: [car, submarine]}"),
+              AllOf(HasSubstr("server.yaml:1: areas.profiles"), HasSubstr("'submarine'"),
+                    HasSubstr("car, delivery_robot, tracked")));
+  EXPECT_THAT(refusal_of("areas: {profiles: [car, car]}"),
+              HasSubstr("two robots are called 'car'"));
+  EXPECT_THAT(refusal_of("areas: {profiles: [tracked]}"),
+              AllOf(HasSubstr("areas.grid_profile"), HasSubstr("'car' is not one of")));
+  EXPECT_THAT(refusal_of("areas: {profiles: [mine/my_robot.yaml]}"),
+              HasSubstr((test::test_folder() / "mine/my_robot.yaml").string()));
+}
+
 TEST(ServerConfig, RefusesANameThatIsWrittenTwice) {
   EXPECT_THAT(refusal_of("publish: {scan: true}\npublish: {scan: false}\n"), HasSubstr("twice"));
 }

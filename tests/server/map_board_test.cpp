@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <thread>
+
 namespace stillmap {
 namespace {
 
@@ -75,6 +77,29 @@ TEST(MapBoard, KeepsTheHistoryThatEndsWithItsView) {
   EXPECT_EQ(board.state().history, state.history);
   board.begin(view_of(2, 0, {}), {});
   EXPECT_TRUE(board.state().history->gone.empty());
+}
+
+TEST(MapBoard, WakesWhoWaitsForAnotherView) {
+  using namespace std::chrono_literals;
+  MapBoard board;
+  EXPECT_FALSE(board.wait_for_news(nullptr, {}, 0ms));
+  const auto first = std::make_shared<const MapView>();
+  board.begin(first, {});
+  EXPECT_EQ(board.wait_for_news(nullptr, {}, 0ms)->view, first);
+  EXPECT_FALSE(board.wait_for_news(first, {}, 1ms));
+  const auto second = std::make_shared<const MapView>();
+  const std::jthread mapper([&] { board.show(second); });
+  const auto news = board.wait_for_news(first, {}, 60s);
+  ASSERT_TRUE(news);
+  EXPECT_EQ(news->view, second);
+  EXPECT_LE(news->shown, std::chrono::steady_clock::now());
+}
+
+TEST(MapBoard, LetsGoWhoWaitsWhenAStopIsRequested) {
+  MapBoard board;
+  std::stop_source stop;
+  stop.request_stop();
+  EXPECT_FALSE(board.wait_for_news(nullptr, stop.get_token(), std::chrono::seconds(60)));
 }
 
 }  // namespace

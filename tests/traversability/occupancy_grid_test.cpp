@@ -64,10 +64,12 @@ TEST(OccupancyGrid, EveryCellIsTheViews) {
 }
 
 TEST(OccupancyGrid, AnotherShapeThanABoxTakesCellsOut) {
-  const auto in_circle = [](const Eigen::Vector2d& p_map) { return p_map.norm() < 3.0; };
-  const OccupancyGrid grid = occupancy_grid(*area(), {box(-4, -4, 4, 4), in_circle});
+  const AreaRegion circle =
+      area_region(SphereRegion{.centre_map = {0.0, 0.0, 99.0}, .radius_m = 3.0});
+  const OccupancyGrid grid = occupancy_grid(*area(), circle);
+  EXPECT_EQ(grid.width, 30U);
   EXPECT_EQ(grid.at(0, 0), occupancy_unknown);
-  EXPECT_EQ(grid.at(20, 10), 0);
+  EXPECT_EQ(grid.at(15, 5), 0);
 }
 
 TEST(OccupancyGrid, BoxesBeyondTheMapEndAtItsEdge) {
@@ -97,6 +99,13 @@ TEST(OccupancyGrid, TwoFarTilesDoNotMakeAnEndlessGrid) {
   const OccupancyGrid grid = occupancy_grid(*area_of(world.view(), square_robot()), everywhere());
   EXPECT_EQ(grid.status, AreaStatus::too_large);
   EXPECT_THAT(grid.reason, HasSubstr("smaller box"));
+}
+
+TEST(OccupancyGrid, KeepsToTheCellsThatAreAllowed) {
+  EXPECT_EQ(occupancy_grid(*area(), everywhere(), 6400).status, AreaStatus::ok);
+  const OccupancyGrid grid = occupancy_grid(*area(), everywhere(), 6399);
+  EXPECT_EQ(grid.status, AreaStatus::too_large);
+  EXPECT_THAT(grid.reason, HasSubstr("80 x 80 cells of 0.2 m; at most 6399"));
 }
 
 }  // namespace

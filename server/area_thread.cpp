@@ -1,0 +1,83 @@
+#include "server/area_thread.hpp"
+
+#include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <tbb/task_arena.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <utility>
+
+namespace stillmap {
+namespace {
+
+// So much nicer than the other threads: on busy cores they get about ten times as much time.
+constexpr int nicer_by = 10;
+// How long a thread without work sleeps; a change or a stop wakes it.
+constexpr std::chrono::seconds idle_period{1};
+
+/// Of this thread only, as Linux has it.
+void lower_priority() {
+  const auto thread = static_cast<id_t>(gettid());
+  errno = 0;
+  const int niceness = getpriority(PRIO_PROCESS, thread);
+  if (errno != 0 || setpriority(PRIO_PROCESS, thread, niceness + nicer_by) != 0) {
+    spdlog::warn("areas are computed at full priority: {}", std::strerror(errno));
+  }
+}
+
+}  // namespace
+
+AreaThread::AreaThread(std::vector<RobotProfile> robots, std::chrono::duration<double> period,
+                       const MapBoard& maps, AreaBoard& areas, Statistics& statistics,
+                       std::function<void()> updated)
+    : period_(period),
+      maps_(maps),
+      areas_(areas),
+      statistics_(statistics),
+      updated_(std::move(updated)),
+      traversability_(std::move(robots)) {
+  show();
+  thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+}
+
+void AreaThread::work(const std::stop_token& stop) {
+  lower_priority();
+  std::shared_ptr<const MapView> known;
+  Clock::time_point next_update;
+  while (!stop.stop_requested()) {
+    const auto news = maps_.wait_for_news(known, stop, idle_period);
+    if (!news) continue;
+    wait_until(next_update, stop);
+    if (stop.stop_requested()) return;
+    next_update = Clock::now() + std::chrono::duration_cast<Clock::duration>(period_);
+    known = maps_.view();
+    update(*known);
+    const std::chrono::duration<double, std::milli> latency = Clock::now() - news->shown;
+    statistics_.add_latency("areas", latency.count());
+  }
+}
+
+void AreaThread::update(const MapView& map) {
+  // One core only: its loops must not run on threads that keep their full priority.
+  tbb::task_arena this_thread(1);
+  this_thread.execute([&] { static_cast<void>(traversability_.update(map)); });
+  show();
+  updated_();
+}
+
+void AreaThread::show() {
+  AreaBoard::Views views;
+  for (const RobotProfile& robot : traversability_.profiles()) {
+    views.push_back(traversability_.view(robot.name));
+  }
+  areas_.show(std::move(views));
+}
+
+void AreaThread::wait_until(Clock::time_point time, const std::stop_token& stop) {
+  std::unique_lock lock(pause_mutex_);
+  pause_.wait_until(lock, stop, time, [] { return false; });
+}
+
+}  // namespace stillmap
