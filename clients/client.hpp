@@ -13,6 +13,7 @@
 #include "clients/subscription.hpp"
 #include "core/lidar/scan.hpp"
 #include "core/map/map_query.hpp"
+#include "core/map/removed_voxel.hpp"
 #include "core/map/tile.hpp"
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"
@@ -78,6 +79,12 @@ struct LoadedMap {
   std::uint64_t pose_count = 0;
 };
 
+struct RemovedVoxels {
+  std::vector<RemovedVoxel> voxels;
+  /// Of the region, also those that did not come.
+  std::uint64_t total = 0;
+};
+
 /// What happened in a region since the last news. Tiles are whole, also what of them lies outside.
 struct RegionNews {
   MapIdentity map;
@@ -137,6 +144,12 @@ class Client {
                                                        double max_distance_m = 100.0);
   /// The grid of the server's planning robot, as Nav2 gets it; of no size when there is none.
   [[nodiscard]] OccupancyGrid planning_grid();
+
+  /// What the server keeps out of its static map in a region, and why: all of it, up to
+  /// `max_voxels` (the server brings at most 300,000).
+  [[nodiscard]] RemovedVoxels get_removed(const Region& region, std::uint32_t max_voxels = 300'000);
+  /// Has the server show again what was removed for this reason in a box; returns how many voxels.
+  std::uint64_t restore_removed(RemovalReason reason, const BoxRegion& box);
 
   /// Has the server save its map; returns the file's name on the server's machine. An empty name
   /// means the configured file.

@@ -4,8 +4,8 @@
 
 #include "clients/connection.hpp"
 #include "core/occupancy/octomap_check.hpp"
-#include "idl/conversions/octomap.hpp"
 #include "idl/conversions/occupancy_grid.hpp"
+#include "idl/conversions/octomap.hpp"
 #include "idl/conversions/pose.hpp"
 #include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"

@@ -51,6 +51,8 @@ Client::Connection::Connection(const ClientOptions& client_options)
       get_traversable_area(participant, names.get_traversable_area),
       check_path(participant, names.check_path),
       nearest_traversable(participant, names.nearest_traversable),
+      get_removed(participant, names.get_removed),
+      restore_removed(participant, names.restore_removed),
       get_map(participant, names.get_map) {}
 
 TileSet Client::Connection::fetch_tiles(std::span<const TileId> ids) {

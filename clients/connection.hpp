@@ -9,6 +9,7 @@
 #include "idl/topics.hpp"
 #include "nav_msgs.h"
 #include "octomap_msgs.h"
+#include "removed_voxels.h"
 #include "stillmap_msgs.h"
 #include "stillmap_occupancy.h"
 #include "traversable_area.h"
@@ -84,6 +85,11 @@ struct Client::Connection {
   ServiceClient<stillmap_msgs::srv::NearestTraversable_Request,
                 stillmap_msgs::srv::NearestTraversable_Response>
       nearest_traversable;
+  ServiceClient<stillmap_msgs::srv::GetRemoved_Request, stillmap_msgs::srv::GetRemoved_Response>
+      get_removed;
+  ServiceClient<stillmap_msgs::srv::RestoreRemoved_Request,
+                stillmap_msgs::srv::RestoreRemoved_Response>
+      restore_removed;
   ServiceClient<nav_msgs::srv::GetMap_Request, nav_msgs::srv::GetMap_Response> get_map;
 };
 

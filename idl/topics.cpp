@@ -57,6 +57,8 @@ Services Services::in(const std::string& name_space) {
           .reset = prefix + "reset",
           .octomap_binary = prefix + "octomap_binary",
           .octomap_full = prefix + "octomap_full",
+          .get_removed = prefix + "get_removed",
+          .restore_removed = prefix + "restore_removed",
           .query_occupancy = prefix + "query_occupancy",
           .get_traversable_area = prefix + "get_traversable_area",
           .check_path = prefix + "check_path",

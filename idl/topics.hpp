@@ -61,6 +61,8 @@ struct Services {
   /// octomap_msgs/srv/GetOctomap, as octomap_server names them.
   std::string octomap_binary;
   std::string octomap_full;
+  std::string get_removed;
+  std::string restore_removed;
   std::string query_occupancy;
   std::string get_traversable_area;
   std::string check_path;

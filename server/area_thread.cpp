@@ -5,9 +5,12 @@
 #include <tbb/task_arena.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <utility>
+
+#include "core/map/tile_shelf.hpp"
 
 namespace stillmap {
 namespace {
@@ -25,6 +28,13 @@ void lower_priority() {
   if (errno != 0 || setpriority(PRIO_PROCESS, thread, niceness + nicer_by) != 0) {
     spdlog::warn("areas are computed at full priority: {}", std::strerror(errno));
   }
+}
+
+/// Areas take memory as the map does: where that is on disk, they are worked out when asked for.
+MapView in_memory(const MapView& map) {
+  MapView resident = map;
+  std::erase_if(resident.tiles, [](const auto& tile) { return is_away(*tile); });
+  return resident;
 }
 
 }  // namespace
@@ -53,7 +63,7 @@ void AreaThread::work(const std::stop_token& stop) {
     if (stop.stop_requested()) return;
     next_update = Clock::now() + std::chrono::duration_cast<Clock::duration>(period_);
     known = maps_.view();
-    update(*known);
+    update(in_memory(*known));
     const std::chrono::duration<double, std::milli> latency = Clock::now() - news->shown;
     statistics_.add_latency("areas", latency.count());
   }

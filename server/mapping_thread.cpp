@@ -140,6 +140,19 @@ MemoryUse MappingThread::memory_use() {
   return use;
 }
 
+std::vector<RemovedVoxel> MappingThread::removed(const Eigen::AlignedBox3d& box_map) {
+  std::vector<RemovedVoxel> removed;
+  between_scans([&] { removed = mapper_.static_map().removed(box_map); });
+  return removed;
+}
+
+std::size_t MappingThread::restore_removed(RemovalReason reason,
+                                           const Eigen::AlignedBox3d& box_map) {
+  std::size_t restored = 0;
+  between_scans([&] { restored = mapper_.static_map().restore_removed(reason, box_map); });
+  return restored;
+}
+
 void MappingThread::between_scans(std::function<void()> action) {
   std::future<void> done;
   {

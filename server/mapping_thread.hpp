@@ -63,6 +63,10 @@ class MappingThread {
   void checkpoint_stored(std::uint64_t step);
   [[nodiscard]] MemoryUse memory_use();
 
+  /// As StaticMap has them.
+  [[nodiscard]] std::vector<RemovedVoxel> removed(const Eigen::AlignedBox3d& box_map);
+  std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map);
+
  private:
   void work(const std::stop_token& stop);
   void map(QueuedScan queued);

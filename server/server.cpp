@@ -62,6 +62,7 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
       report_(delivery_mode(config.input.delivery), label_source->name(),
               socket_trouble(config.dds), board_, statistics_,
               [this] { return receiver_->why_nothing_arrives(); }),
+      atlas_(area_board_, board_, tiles_),
       planning_grid_(config.areas, config.frames.map, board_, area_board_) {
   if (config.publish.scan) scans_.emplace(participant_, topics_);
   if (!config.topics.odometry_prior.empty()) {
@@ -99,12 +100,19 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
             tiles_.use_shelf(shelf);
           },
       .show_now = [this] { mapping_->show_now(); },
-      .areas = area_board_,
+      .areas = atlas_,
       .planning_grid = planning_grid_};
   const Services names = Services::in(config.topics.name_space);
   services_ = std::make_unique<ServiceDesk>(participant_, names, context);
   occupancy_services_ =
       std::make_unique<OccupancyDesk>(participant_, names, context, occupancy, config.frames.map);
+  const RemovedSource removed{
+      .removed = [this](const Eigen::AlignedBox3d& box_map) { return mapping_->removed(box_map); },
+      .restore =
+          [this](RemovalReason reason, const Eigen::AlignedBox3d& box_map) {
+            return mapping_->restore_removed(reason, box_map);
+          }};
+  removed_services_ = std::make_unique<RemovedDesk>(participant_, names, context, removed);
   status_publisher_ = std::make_unique<StatusPublisher>(participant_, topics_,
                                                         config.publish.status_period_s, status);
   autosave_ = std::make_unique<PeriodicThread>(
@@ -118,6 +126,7 @@ void Server::stop() {
   autosave_.reset();
   services_.reset();
   occupancy_services_.reset();
+  removed_services_.reset();
   octomap_publisher_.reset();
   areas_.reset();
   status_publisher_.reset();

@@ -18,6 +18,7 @@
 #include "server/scan_receiver.hpp"
 #include "server/server_report.hpp"
 #include "server/services/occupancy_desk.hpp"
+#include "server/services/removed_desk.hpp"
 #include "server/services/service_desk.hpp"
 
 namespace stillmap {
@@ -55,11 +56,13 @@ class Server {
   std::unique_ptr<MapPublisher> map_publisher_;
   std::unique_ptr<OctomapPublisher> octomap_publisher_;
   AreaBoard area_board_;
+  AreaAtlas atlas_;
   PlanningGrid planning_grid_;
   std::unique_ptr<AreaPublisher> area_publisher_;
   std::unique_ptr<AreaThread> areas_;
   std::unique_ptr<ServiceDesk> services_;
   std::unique_ptr<OccupancyDesk> occupancy_services_;
+  std::unique_ptr<RemovedDesk> removed_services_;
   std::unique_ptr<StatusPublisher> status_publisher_;
   std::unique_ptr<PeriodicThread> autosave_;
 };

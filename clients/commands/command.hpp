@@ -28,6 +28,7 @@ void add_traversable_command(CommandHandle program, Action& action);
 void add_plan_command(CommandHandle program, Action& action);
 void add_check_path_command(CommandHandle program, Action& action);
 void add_nearest_command(CommandHandle program, Action& action);
+void add_removed_command(CommandHandle program, Action& action);
 void add_replay_command(CommandHandle program, Action& action);
 void add_watch_command(CommandHandle program, Action& action);
 void add_watch_tiles_command(CommandHandle program, Action& action);

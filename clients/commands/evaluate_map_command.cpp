@@ -86,6 +86,8 @@ nlohmann::json to_json(const MapCleaningScore& score, const Arguments& arguments
   return {{"preservation_rate", number(score.preservation_rate())},
           {"preservation_rate_with_parked", number(score.preservation_rate_with_parked())},
           {"rejection_rate", number(score.rejection_rate())},
+          {"parked_rejection_rate", number(score.parked_rejection_rate())},
+          {"f1", number(score.f1())},
           {"fixed_voxels", score.fixed_voxels},
           {"parked_voxels", score.parked_voxels},
           {"moving_voxels", score.moving_voxels},
@@ -108,7 +110,9 @@ std::string describe(const MapCleaningScore& score) {
              std::to_string(score.fixed_kept + score.parked_kept),
              percent(score.preservation_rate_with_parked())});
   table.add({"moving", std::to_string(score.moving_voxels), std::to_string(score.moving_kept), ""});
-  return table.text() + "rejection rate: " + percent(score.rejection_rate()) + " %\n";
+  return table.text() + "rejection rate: moving " + percent(score.rejection_rate()) +
+         " %, parked " + percent(score.parked_rejection_rate()) +
+         " %; F1 of preservation and rejection of what moves: " + percent(score.f1()) + " %\n";
 }
 
 ExitCode run(const Arguments& arguments) {

@@ -40,7 +40,7 @@ MapQuery query_of(const Arguments& arguments, const StoredMap& map) {
           ? Eigen::Vector2d(Eigen::Vector2d::Zero())
           : Eigen::Vector2d(map.trajectory.back().T_map_lidar.translation().head<2>());
   MapQuery query;
-  query.region = region_round(arguments.region, robot_map);
+  query.region = region_at(arguments.region, robot_map);
   query.classes = classes_of(arguments.classes);
   query.resolution_m = arguments.resolution_m;
   return query;

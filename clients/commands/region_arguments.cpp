@@ -169,10 +169,6 @@ void check_region(const RegionArguments& region) {
   static_cast<void>(region_at(region, Eigen::Vector2d::Zero()));
 }
 
-Region region_round(const RegionArguments& region, const Eigen::Vector2d& robot_map) {
-  return checked_region(region, robot_map);
-}
-
 Region region_of(const RegionArguments& region, Client& client, std::chrono::milliseconds timeout) {
   Eigen::Vector2d robot_map = Eigen::Vector2d::Zero();
   if (region.around_robot_m > 0.0) {

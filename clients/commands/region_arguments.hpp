@@ -48,9 +48,6 @@ void check_region(const RegionArguments& region);
 [[nodiscard]] Region region_of(const RegionArguments& region, Client& client,
                                std::chrono::milliseconds timeout);
 
-/// The region, the robot standing at `robot_map` (x, y). Throws as check_region does.
-[[nodiscard]] Region region_round(const RegionArguments& region, const Eigen::Vector2d& robot_map);
-
 /// Positions in plan: numbers two by two, or the name of a text file with a position a line (x y,
 /// separated by blanks or commas; # begins a comment). `option` is for what it throws:
 /// std::invalid_argument, naming option, file and line.

@@ -108,6 +108,16 @@ std::optional<double> MapCleaningScore::rejection_rate() const {
   return ratio(moving_voxels - moving_kept, moving_voxels);
 }
 
+std::optional<double> MapCleaningScore::parked_rejection_rate() const {
+  return ratio(parked_voxels - parked_kept, parked_voxels);
+}
+
+std::optional<double> MapCleaningScore::f1() const {
+  const auto preserved = preservation_rate(), rejected = rejection_rate();
+  if (!preserved || !rejected || *preserved + *rejected == 0.0) return std::nullopt;
+  return 2.0 * *preserved * *rejected / (*preserved + *rejected);
+}
+
 MapCleaningScore map_cleaning_score(const MapTruth& truth,
                                     std::span<const Eigen::Vector3f> points_map) {
   const NearPoints map_points(points_map, std::numbers::sqrt3 / 2.0 * truth.voxel_size_m());

@@ -50,6 +50,10 @@ struct MapCleaningScore {
   [[nodiscard]] std::optional<double> preservation_rate_with_parked() const;
   /// Share of moving voxels that is not in the map.
   [[nodiscard]] std::optional<double> rejection_rate() const;
+  /// The same of parked vehicles.
+  [[nodiscard]] std::optional<double> parked_rejection_rate() const;
+  /// Harmonic mean of preservation and rejection rate.
+  [[nodiscard]] std::optional<double> f1() const;
 };
 
 [[nodiscard]] MapCleaningScore map_cleaning_score(const MapTruth& truth,

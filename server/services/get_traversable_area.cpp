@@ -1,5 +1,6 @@
 #include "server/services/get_traversable_area.hpp"
 
+#include "core/map/region_shape.hpp"
 #include "idl/conversions/area_query.hpp"
 
 namespace stillmap {
@@ -10,7 +11,13 @@ stillmap_msgs::srv::GetTraversableArea_Response get_traversable_area(
   return answer<Response>(context, request, [&](const MapView&, Response& response) {
     const auto [query, fault] = wire::from_request(request);
     if (!query) throw std::invalid_argument(fault);
-    response = wire::to_response(answer_area(*context.areas.view(query->profile), *query));
+    // A region with faults is answered with them.
+    Eigen::AlignedBox2d box_map(Eigen::Vector2d(0.0, 0.0));
+    if (region_faults(query->region).empty()) {
+      const Eigen::AlignedBox3d bounds = RegionShape(query->region).bounds_map();
+      box_map = {Eigen::Vector2d(bounds.min().head<2>()), Eigen::Vector2d(bounds.max().head<2>())};
+    }
+    response = wire::to_response(answer_area(*context.areas.view(query->profile, box_map), *query));
   });
 }
 

@@ -7,7 +7,7 @@
 #include "core/map/tile_reader.hpp"
 #include "idl/conversions/map_query.hpp"
 #include "idl/server_status.hpp"
-#include "server/area_board.hpp"
+#include "server/area_atlas.hpp"
 #include "server/map_board.hpp"
 #include "server/map_saver.hpp"
 #include "server/planning_grid.hpp"
@@ -28,7 +28,7 @@ struct ServiceContext {
   std::function<void(const StoredMap&, const std::shared_ptr<TileShelf>&)> load;
   /// Puts on the board what was mapped until now.
   std::function<void()> show_now;
-  const AreaBoard& areas;
+  const AreaAtlas& areas;
   const PlanningGrid& planning_grid;
 };
 

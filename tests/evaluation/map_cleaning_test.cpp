@@ -59,6 +59,8 @@ TEST(MapCleaningScore, RatesWhatIsKeptOfEachKind) {
   EXPECT_DOUBLE_EQ(score.preservation_rate().value(), 0.5);
   EXPECT_DOUBLE_EQ(score.preservation_rate_with_parked().value(), 1.0 / 3.0);
   EXPECT_DOUBLE_EQ(score.rejection_rate().value(), 0.0);
+  EXPECT_DOUBLE_EQ(score.f1().value(), 0.0);
+  EXPECT_DOUBLE_EQ(score.parked_rejection_rate().value(), 1.0);
 }
 
 TEST(MapCleaningScore, AnEmptyMapRejectsEverythingAndPreservesNothing) {

@@ -1,0 +1,36 @@
+#include <memory>
+
+#include "idl/dds/type_support.hpp"
+#include "removed_voxelsPubSubTypes.h"
+
+namespace stillmap {
+namespace {
+
+using eprosima::fastdds::dds::TypeSupport;
+
+/// TypeSupport takes ownership of the pointer.
+template <typename PubSubType>
+TypeSupport make() {
+  return TypeSupport(std::make_unique<PubSubType>().release());
+}
+
+}  // namespace
+
+template <>
+TypeSupport type_support<stillmap_msgs::srv::GetRemoved_Request>() {
+  return make<stillmap_msgs::srv::GetRemoved_RequestPubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::GetRemoved_Response>() {
+  return make<stillmap_msgs::srv::GetRemoved_ResponsePubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::RestoreRemoved_Request>() {
+  return make<stillmap_msgs::srv::RestoreRemoved_RequestPubSubType>();
+}
+template <>
+TypeSupport type_support<stillmap_msgs::srv::RestoreRemoved_Response>() {
+  return make<stillmap_msgs::srv::RestoreRemoved_ResponsePubSubType>();
+}
+
+}  // namespace stillmap
