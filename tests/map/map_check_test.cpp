@@ -7,6 +7,7 @@
 #include <random>
 
 #include "core/map/map_file_copy.hpp"
+#include "core/map/tile_codec.hpp"
 #include "tests/map/stored_maps.hpp"
 #include "tests/scratch_folder.hpp"
 
@@ -168,8 +169,11 @@ TEST_F(MapCheckTest, NamesEveryTruncation) {
 TEST_F(MapCheckTest, ReadsWhatIsLeftOfADamagedFile) {
   const std::string sound = content_of(file_);
   std::string bytes = sound;
-  // The second half of one tile's pages.
-  bytes.replace(bytes.size() / 2, 2000, std::string(2000, '\x55'));
+  // A part of one tile's bytes, within a page.
+  const auto blob = encode_tile(*saved_.view.tiles.front());
+  const std::size_t at = bytes.find(std::string(blob.begin() + 200, blob.begin() + 400));
+  ASSERT_NE(at, std::string::npos);
+  bytes.replace(at, 200, std::string(200, '\x55'));
   write(bytes);
   const MapCheck check = check_map_file(file_);
   EXPECT_FALSE(check.is_sound());
