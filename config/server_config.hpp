@@ -113,7 +113,7 @@ struct PublishConfig {
 struct MapFileConfig {
   /// Empty: the map is not saved.
   std::filesystem::path file;
-  /// Between checkpoints: a server that is killed loses no more than this.
+  /// Between checkpoints; a server that is killed loses up to this and the time of a save.
   double save_period_s = 5.0;
   /// Of the static map, its copies for readers and for queries. What is far away is on disk. 0: all
   /// of the map stays in memory.

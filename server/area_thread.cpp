@@ -1,34 +1,19 @@
 #include "server/area_thread.hpp"
 
 #include <spdlog/spdlog.h>
-#include <sys/resource.h>
 #include <tbb/task_arena.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <utility>
 
 #include "core/map/tile_shelf.hpp"
+#include "server/background_thread.hpp"
 
 namespace stillmap {
 namespace {
 
-// So much nicer than the other threads: on busy cores they get about ten times as much time.
-constexpr int nicer_by = 10;
 // How long a thread without work sleeps; a change or a stop wakes it.
 constexpr std::chrono::seconds idle_period{1};
-
-/// Of this thread only, as Linux has it.
-void lower_priority() {
-  const auto thread = static_cast<id_t>(gettid());
-  errno = 0;
-  const int niceness = getpriority(PRIO_PROCESS, thread);
-  if (errno != 0 || setpriority(PRIO_PROCESS, thread, niceness + nicer_by) != 0) {
-    spdlog::warn("areas are computed at full priority: {}", std::strerror(errno));
-  }
-}
 
 /// Areas take memory as the map does: where that is on disk, they are worked out when asked for.
 MapView in_memory(const MapView& map) {
@@ -53,7 +38,7 @@ AreaThread::AreaThread(std::vector<RobotProfile> robots, std::chrono::duration<d
 }
 
 void AreaThread::work(const std::stop_token& stop) {
-  lower_priority();
+  if (!run_in_background()) spdlog::warn("areas are computed at full priority");
   std::shared_ptr<const MapView> known;
   Clock::time_point next_update;
   while (!stop.stop_requested()) {

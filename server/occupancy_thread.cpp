@@ -1,22 +1,11 @@
 #include "server/occupancy_thread.hpp"
 
-#include <sys/resource.h>
-#include <unistd.h>
-
 #include <chrono>
 #include <utility>
 
+#include "server/background_thread.hpp"
+
 namespace stillmap {
-namespace {
-
-/// On a busy machine the mapper's threads come first. Linux keeps a nice value for each thread.
-void step_back() {
-  constexpr int nice_value = 15;
-  setpriority(PRIO_PROCESS, static_cast<id_t>(gettid()), nice_value);
-}
-
-}  // namespace
-
 OccupancyThread::OccupancyThread(const OccupancyServing& config, Statistics& statistics)
     : config_(config.map),
       capacity_(config.queue_length),
@@ -44,7 +33,7 @@ void OccupancyThread::add(OccupancyScan scan) {
 }
 
 void OccupancyThread::work(const std::stop_token& stop) {
-  step_back();
+  static_cast<void>(run_in_background());
   while (true) {
     Job job;
     bool keeps_up = true;

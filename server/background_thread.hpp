@@ -1,0 +1,9 @@
+#pragma once
+
+namespace stillmap {
+
+/// Gives the calling thread only the time that no other thread wants: on busy cores the mapper and
+/// its network come first, whatever is done in the background. False where the system refuses.
+bool run_in_background();
+
+}  // namespace stillmap
