@@ -30,6 +30,7 @@ class MapToolsTest : public CommandTest {
     map.insert(scan, Eigen::Isometry3d::Identity());
     open_map_file(path(file))
         ->save({.view = *map.view(),
+                .memories = {},
                 .trajectory = {StampedPose{}, {.stamp_ns = 1'000'000'000}},
                 .metadata = {{"sensor", "by hand"}}});
   }

@@ -149,7 +149,7 @@ TEST_F(LoadService, RefusesAMapOfAnotherVoxelSize) {
   map.insert(scan, Eigen::Isometry3d::Identity());
   ASSERT_FALSE(map.view()->tiles.empty());
   open_map_file(beside("coarse.stillmap"))
-      ->save({.view = *map.view(), .trajectory = {}, .metadata = {}});
+      ->save({.view = *map.view(), .memories = {}, .trajectory = {}, .metadata = {}});
   EXPECT_THAT(refusal("coarse.stillmap"), HasSubstr("voxel_size_m"));
 }
 

@@ -78,7 +78,8 @@ TEST_F(MapSaverTest, LetsNobodyChooseAnotherFolder) {
 void save_far_map(const std::filesystem::path& file) {
   StaticMap other{StaticMapConfig()};
   other.insert(scan_of(50.0F), Eigen::Isometry3d::Identity());
-  StoredMap stored{.view = *other.view(), .trajectory = {StampedPose{}}, .metadata = {}};
+  StoredMap stored{
+      .view = *other.view(), .memories = {}, .trajectory = {StampedPose{}}, .metadata = {}};
   stored.metadata = {{"sensor", "another"}, {"datum", "48,11"}};
   open_map_file(file)->save(stored);
 }

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numbers>
+
 namespace stillmap {
 namespace {
 
@@ -26,8 +28,8 @@ TEST(PosesByTime, InterpolatesTheMotion) {
 
 TEST(PosesByTime, TurnsTheMotionIntoTheFirstPosesFrame) {
   PosesByTime poses;
-  poses.add({0, at(0.0, EIGEN_PI / 2)});
-  poses.add({100 * ms, at(1.0, EIGEN_PI / 2)});
+  poses.add({0, at(0.0, std::numbers::pi / 2)});
+  poses.add({100 * ms, at(1.0, std::numbers::pi / 2)});
   const auto motion = poses.motion(0, 100 * ms);
   ASSERT_TRUE(motion);
   EXPECT_TRUE(motion->translation().isApprox(Eigen::Vector3d(0.0, -1.0, 0.0), 1e-9));

@@ -61,7 +61,7 @@ TEST_F(RemovedService, ParkedCarsAreRememberedAndCanBeBroughtBack) {
 }
 
 TEST_F(RemovedService, RefusesWhatMakesNoSenseAndGoesOn) {
-  const PolygonRegion crossed{.corners_map = {{0, 0}, {9, 9}, {9, 0}, {0, 9}}};
+  const PolygonRegion crossed{.corners_map = {{0, 0}, {9, 9}, {9, 0}, {0, 9}}, .heights = {}};
   EXPECT_THAT(refusal([&] { static_cast<void>(client_.get_removed(crossed)); }),
               HasSubstr("cross"));
   EXPECT_THAT(refusal([&] { client_.restore_removed(static_cast<RemovalReason>(9), BoxRegion{}); }),
