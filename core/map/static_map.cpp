@@ -77,8 +77,8 @@ std::vector<std::shared_ptr<const Tile>> StaticMap::State::published_tiles() con
   for (const auto& [id, resident] : tiles) {
     if (resident.live->published()) published.push_back(resident.live->published());
   }
-  for (const auto& [id, stub] : away) {
-    if (stub) published.push_back(stub);
+  for (const auto& [id, shown] : away) {
+    if (shown) published.push_back(shown);
   }
   std::ranges::sort(published, {}, [](const auto& shared) { return shared->info.id; });
   return published;

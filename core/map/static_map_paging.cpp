@@ -15,7 +15,7 @@ namespace stillmap {
 namespace {
 
 /// A tile without its voxels weighs this in views and indices.
-constexpr std::size_t stub_bytes = sizeof(Tile) + 64;
+constexpr std::size_t shelved_tile_bytes = sizeof(Tile) + 64;
 
 bool is_same_size(double a_m, double b_m) { return std::abs(a_m - b_m) <= 1e-9; }
 
@@ -49,7 +49,7 @@ bool StaticMap::State::take_back(TileId id) {
 }
 
 std::size_t StaticMap::State::memory_bytes() const {
-  std::size_t bytes = away.size() * stub_bytes;
+  std::size_t bytes = away.size() * shelved_tile_bytes;
   for (const auto& [id, resident] : tiles) bytes += resident.live->memory_bytes();
   return bytes;
 }
@@ -57,13 +57,16 @@ std::size_t StaticMap::State::memory_bytes() const {
 void StaticMap::use_shelf(std::shared_ptr<TileShelf> shelf) { state_->shelf = std::move(shelf); }
 
 MapCheckpoint StaticMap::checkpoint(bool everything) {
-  MapCheckpoint checkpoint{view(), state_->step++, {}};
-  std::vector<const LiveTile*> changed;
+  std::vector<LiveTile*> changed;
   for (const auto& [id, resident] : state_->tiles) {
     if (everything || resident.changed_at > state_->stored_step) {
       changed.push_back(resident.live.get());
     }
   }
+  // What is stored is what is shown: also where only other rules, or the rounding of a mean on its
+  // way through the file, changed it.
+  state_->touched.insert(state_->touched.end(), changed.begin(), changed.end());
+  MapCheckpoint checkpoint{view(), state_->step++, {}};
   std::vector<TileRecord> records(changed.size());
   tbb::parallel_for(std::size_t{0}, changed.size(), [&](std::size_t i) {
     records[i] = changed[i]->record(state_->rule(), state_->grid);
@@ -134,7 +137,7 @@ std::vector<RemovedVoxel> StaticMap::removed(const Eigen::AlignedBox3d& box_map)
   for (const auto& [id, resident] : state_->tiles) {
     if (meets(id)) add(resident.live->removed(state_->rule(), state_->grid));
   }
-  for (const auto& [id, stub] : state_->away) {
+  for (const auto& [id, shown] : state_->away) {
     if (!meets(id) || state_->shelf == nullptr) continue;
     const TileRecord record = state_->shelf->take(id);
     if (record.memory == nullptr) continue;
@@ -148,7 +151,7 @@ std::size_t StaticMap::restore_removed(RemovalReason reason, const Eigen::Aligne
     return box_map.intersects(tile_footprint(id, state_->grid.tile_size_m()));
   };
   std::vector<TileId> wanted;
-  for (const auto& [id, stub] : state_->away) {
+  for (const auto& [id, shown] : state_->away) {
     if (meets(id)) wanted.push_back(id);
   }
   for (const TileId id : wanted) state_->take_back(id);
@@ -198,7 +201,7 @@ void StaticMap::restore(const MapView& view, const TileMemories& memories) {
 
 void StaticMap::take_back_near(const Eigen::Vector3d& position_map, std::size_t limit_bytes) {
   std::vector<std::pair<double, TileId>> nearest;
-  for (const auto& [id, stub] : state_->away) {
+  for (const auto& [id, shown] : state_->away) {
     nearest.emplace_back(state_->distance_m(id, position_map.head<2>()), id);
   }
   std::ranges::sort(nearest);

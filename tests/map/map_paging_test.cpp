@@ -22,7 +22,7 @@ class Drive {
  public:
   static constexpr int scans = 160;
 
-  explicit Drive(StaticMap& map) : map_(map) {}
+  explicit Drive(StaticMap& map, double start_m = 0.0) : map_(map), start_m_(start_m) {}
 
   [[nodiscard]] static double x_of(int scan) {
     return 12.0 * (scan < scans / 2 ? scan : scans - 1 - scan);
@@ -38,13 +38,14 @@ class Drive {
         test::add_point(seen, {x, 3.0F, 0.3F}, SemanticClass::car, Motion::highly_dynamic);
       }
     }
-    const Isometry3d T_map_lidar(Eigen::Translation3d(x_of(scan), 0.0, 0.0));
+    const Isometry3d T_map_lidar(Eigen::Translation3d(start_m_ + x_of(scan), 0.0, 0.0));
     map_.insert(seen, T_map_lidar);
     map_.look_through(RangeView(seen.scan, {}, hdl_64e(), T_map_lidar), seen.scan.stamp_ns);
   }
 
  private:
   StaticMap& map_;
+  double start_m_;
 };
 
 /// A map in little memory, and its store.
@@ -57,15 +58,15 @@ class PagedMap {
     map_.reset(7);
     map_.use_shelf(store_->shelf());
   }
-  void drive() {
-    Drive drive(map_);
+  void drive(double start_m = 0.0) {
+    Drive drive(map_, start_m);
     for (int scan = 0; scan < Drive::scans; ++scan) {
       drive.see(scan);
       if (scan % 4 != 3) continue;
       const MapCheckpoint checkpoint = map_.checkpoint();
       store_->save(stored_state(checkpoint));
       map_.checkpoint_stored(checkpoint.step);
-      shelved_ += map_.shelve(Vector3d(Drive::x_of(scan), 0.0, 0.0), limit_bytes);
+      shelved_ += map_.shelve(Vector3d(start_m + Drive::x_of(scan), 0.0, 0.0), limit_bytes);
       peak_bytes_ = std::max(peak_bytes_, map_.memory_use().bytes);
     }
   }
@@ -133,6 +134,27 @@ TEST(MapPaging, MemoryStaysBelowTheLimitOnADriveThatNeedsManyTimesIt) {
   PagedMap paged;
   paged.drive();
   EXPECT_LE(paged.peak_bytes_, PagedMap::limit_bytes);
+}
+
+TEST(MapPaging, FarFromTheOriginWhereFloatsAreCoarseTheFileStaysReadable) {
+  PagedMap paged;
+  paged.drive(60'000.0);
+  ASSERT_GT(paged.shelved_, 50U);
+  EXPECT_NO_THROW(static_cast<void>(paged.whole()));
+}
+
+TEST(MapPaging, AMapThatIsShownByOtherRulesIsStoredAsItIsShown) {
+  const auto store = open_scratch_map();
+  StaticMap before{StaticMapConfig{}};
+  Drive(before).see(0);
+  store->save(stored_state(before.checkpoint()));
+  StaticMapConfig stricter;
+  stricter.min_points = 5;
+  StaticMap after{stricter};
+  const StoredMap stored = store->load();
+  after.restore(stored.view, stored.memories);
+  store->save(stored_state(after.checkpoint(true)));
+  EXPECT_LT(voxels_of(store->load().view).size(), voxels_of(stored.view).size());
 }
 
 TEST(MapPaging, ViewsNameEveryTileAndSayWhichAreAway) {
