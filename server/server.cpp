@@ -87,34 +87,7 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
         std::make_unique<OctomapPublisher>(participant_, topics_, config, *occupancy);
   }
   start_areas(config);
-  const auto status = [this] { return report_.status(); };
-  const ServiceContext context{
-      .board = board_,
-      .tiles = tiles_,
-      .saver = saver_,
-      .status = status,
-      .reset = [this] { return mapping_->reset(); },
-      .load =
-          [this](const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf) {
-            mapping_->load(stored, shelf);
-            tiles_.use_shelf(shelf);
-          },
-      .show_now = [this] { mapping_->show_now(); },
-      .areas = atlas_,
-      .planning_grid = planning_grid_};
-  const Services names = Services::in(config.topics.name_space);
-  services_ = std::make_unique<ServiceDesk>(participant_, names, context);
-  occupancy_services_ =
-      std::make_unique<OccupancyDesk>(participant_, names, context, occupancy, config.frames.map);
-  const RemovedSource removed{
-      .removed = [this](const Eigen::AlignedBox3d& box_map) { return mapping_->removed(box_map); },
-      .restore =
-          [this](RemovalReason reason, const Eigen::AlignedBox3d& box_map) {
-            return mapping_->restore_removed(reason, box_map);
-          }};
-  removed_services_ = std::make_unique<RemovedDesk>(participant_, names, context, removed);
-  status_publisher_ = std::make_unique<StatusPublisher>(participant_, topics_,
-                                                        config.publish.status_period_s, status);
+  start_services(config);
   autosave_ = std::make_unique<PeriodicThread>(
       std::chrono::duration<double>(config.map.save_period_s), [this] { save_in_background(); });
 }
@@ -133,6 +106,37 @@ void Server::stop() {
   receiver_.reset();
   mapping_->stop();
   saver_.save_at_end();
+}
+
+void Server::start_services(const ServerConfig& config) {
+  const auto status = [this] { return report_.status(); };
+  const ServiceContext context{
+      .board = board_,
+      .tiles = tiles_,
+      .saver = saver_,
+      .status = status,
+      .reset = [this] { return mapping_->reset(); },
+      .load =
+          [this](const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf) {
+            mapping_->load(stored, shelf);
+            tiles_.use_shelf(shelf);
+          },
+      .show_now = [this] { mapping_->show_now(); },
+      .areas = atlas_,
+      .planning_grid = planning_grid_};
+  const Services names = Services::in(config.topics.name_space);
+  services_ = std::make_unique<ServiceDesk>(participant_, names, context);
+  occupancy_services_ = std::make_unique<OccupancyDesk>(
+      participant_, names, context, occupancy_ ? &*occupancy_ : nullptr, config.frames.map);
+  const RemovedSource removed{
+      .removed = [this](const Eigen::AlignedBox3d& box_map) { return mapping_->removed(box_map); },
+      .restore =
+          [this](RemovalReason reason, const Eigen::AlignedBox3d& box_map) {
+            return mapping_->restore_removed(reason, box_map);
+          }};
+  removed_services_ = std::make_unique<RemovedDesk>(participant_, names, context, removed);
+  status_publisher_ = std::make_unique<StatusPublisher>(participant_, topics_,
+                                                        config.publish.status_period_s, status);
 }
 
 void Server::start_areas(const ServerConfig& config) {

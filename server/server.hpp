@@ -36,6 +36,7 @@ class Server {
 
  private:
   void start_areas(const ServerConfig& config);
+  void start_services(const ServerConfig& config);
   void save_in_background();
 
   // In the order of construction; what comes later uses what comes before.

@@ -1,5 +1,4 @@
-#include <memory>
-
+#include "idl/dds/made_type.hpp"
 #include "idl/dds/type_support.hpp"
 #include "removed_voxelsPubSubTypes.h"
 
@@ -7,12 +6,6 @@ namespace stillmap {
 namespace {
 
 using eprosima::fastdds::dds::TypeSupport;
-
-/// TypeSupport takes ownership of the pointer.
-template <typename PubSubType>
-TypeSupport make() {
-  return TypeSupport(std::make_unique<PubSubType>().release());
-}
 
 }  // namespace
 

@@ -1,8 +1,7 @@
 #include "idl/dds/type_support.hpp"
 
-#include <memory>
-
 #include "idl/dds/described_type.hpp"
+#include "idl/dds/made_type.hpp"
 #include "nav_msgsPubSubTypes.h"
 #include "octomap_msgsPubSubTypes.h"
 #include "rmw_dds_commonPubSubTypes.h"
@@ -17,12 +16,6 @@ namespace stillmap {
 namespace {
 
 using eprosima::fastdds::dds::TypeSupport;
-
-/// TypeSupport takes ownership of the pointer.
-template <typename PubSubType>
-TypeSupport make() {
-  return TypeSupport(std::make_unique<PubSubType>().release());
-}
 
 }  // namespace
 
