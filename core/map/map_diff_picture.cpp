@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "core/map/picture_frame.hpp"
@@ -28,19 +27,10 @@ std::array<ChangeStyle, 3> change_styles() {
            {VoxelChange::appeared, "appeared", {80, 215, 60}}}};
 }
 
-/// A voxel's square, `least_px` wide at least.
-void paint(cv::Mat& picture, const PictureFrame& frame, const Eigen::Vector3f& p_map,
-           double voxel_size_m, double least_px, const cv::Scalar& colour) {
-  const cv::Point2d centre = frame.pixel(p_map.head<2>().cast<double>());
-  const double half = std::max(voxel_size_m * frame.px_per_m, least_px) / 2.0;
-  cv::rectangle(picture, cv::Point2d(centre.x - half, centre.y - half),
-                cv::Point2d(centre.x + half, centre.y + half), colour, cv::FILLED);
-}
-
 void paint_map(cv::Mat& picture, const PictureFrame& frame, const MapView& view) {
   for (const auto& tile : view.tiles) {
     for (const Voxel& voxel : tile->voxels) {
-      paint(picture, frame, voxel.mean_map, view.voxel_size_m, 1.0, stayed_colour);
+      draw_voxel_square(picture, frame, voxel.mean_map, view.voxel_size_m, 1.0, stayed_colour);
     }
   }
 }
@@ -64,7 +54,7 @@ void paint_changes(cv::Mat& picture, const PictureFrame& frame, const MapDiff& d
   for (const ChangeStyle& style : change_styles()) {
     for (const VoxelDifference& voxel : diff.voxels) {
       if (voxel.change != style.change) continue;
-      paint(picture, frame, voxel.position_map, voxel_size_m, least_px, style.colour);
+      draw_voxel_square(picture, frame, voxel.position_map, voxel_size_m, least_px, style.colour);
     }
   }
 }

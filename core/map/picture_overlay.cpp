@@ -83,6 +83,14 @@ void draw_box(cv::Mat& picture, const PictureFrame& frame, const Eigen::AlignedB
   cv::rectangle(picture, low, high, query_box_colour(), 2, cv::LINE_AA, shift);
 }
 
+void draw_voxel_square(cv::Mat& picture, const PictureFrame& frame, const Eigen::Vector3f& p_map,
+                       double voxel_size_m, double least_px, const cv::Scalar& colour) {
+  const cv::Point2d centre = frame.pixel(p_map.head<2>().cast<double>());
+  const double half = std::max(voxel_size_m * frame.px_per_m, least_px) / 2.0;
+  cv::rectangle(picture, cv::Point2d(centre.x - half, centre.y - half),
+                cv::Point2d(centre.x + half, centre.y + half), colour, cv::FILLED);
+}
+
 void draw_scale_bar(cv::Mat& picture, double px_per_m) {
   const double length_m = round_length(picture.cols / px_per_m / 4.0);
   std::ostringstream text;

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <opencv2/core.hpp>
-#include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "core/map/picture_frame.hpp"
@@ -32,14 +31,6 @@ const std::array<ReasonStyle, removal_reason_count>& styles() {
   return all;
 }
 
-void paint(cv::Mat& picture, const PictureFrame& frame, const Eigen::Vector3f& p_map,
-           double voxel_size_m, double least_px, const cv::Scalar& colour) {
-  const cv::Point2d centre = frame.pixel(p_map.head<2>().cast<double>());
-  const double half = std::max(voxel_size_m * frame.px_per_m, least_px) / 2.0;
-  cv::rectangle(picture, cv::Point2d(centre.x - half, centre.y - half),
-                cv::Point2d(centre.x + half, centre.y + half), colour, cv::FILLED);
-}
-
 }  // namespace
 
 std::string_view name(RemovalReason reason) {
@@ -57,7 +48,7 @@ void write_removed_picture(const std::filesystem::path& file, const MapView& vie
   cv::Mat picture(frame.size, CV_8UC3, background());
   for (const auto& tile : view.tiles) {
     for (const Voxel& voxel : tile->voxels) {
-      paint(picture, frame, voxel.mean_map, view.voxel_size_m, 1.0, shown_colour);
+      draw_voxel_square(picture, frame, voxel.mean_map, view.voxel_size_m, 1.0, shown_colour);
     }
   }
   std::vector<LegendEntry> entries{{"static map", shown_colour}};
@@ -65,7 +56,7 @@ void write_removed_picture(const std::filesystem::path& file, const MapView& vie
     for (const RemovedVoxel& voxel : removed) {
       if (voxel.reason != style.reason) continue;
       // A single voxel must be found on the picture of a whole town.
-      paint(picture, frame, voxel.position_map, view.voxel_size_m, 2.0, style.colour);
+      draw_voxel_square(picture, frame, voxel.position_map, view.voxel_size_m, 2.0, style.colour);
     }
     const auto count = std::ranges::count(removed, style.reason, &RemovedVoxel::reason);
     entries.push_back({std::string(style.text) + ": " + std::to_string(count), style.colour});
