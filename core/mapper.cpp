@@ -7,6 +7,12 @@
 #include "core/lidar/rings.hpp"
 
 namespace stillmap {
+namespace {
+
+/// The lidar sees farther than it moves until it is told of its surroundings again [m].
+constexpr double recall_every_m = 20.0;
+
+}  // namespace
 
 std::string MapperConfig::faults() const {
   return sensor.faults() + odometry.faults() + static_map.faults();
@@ -51,11 +57,13 @@ std::optional<MappedScan> Mapper::process(
   if (config_.prepare.compensate_motion)
     scan = compensate_motion(std::move(scan), odometry_.motion_during(config_.sensor.period_s),
                              config_.sensor.period_s);
-  Labels known = labels_for(scan, std::move(own_labels),
-                            T_map_lidar_prior.value_or(odometry_.predict(scan.stamp_ns)));
+  const Eigen::Isometry3d T_map_lidar_expected =
+      T_map_lidar_prior.value_or(odometry_.predict(scan.stamp_ns));
+  Labels known = labels_for(scan, std::move(own_labels), T_map_lidar_expected);
   end_stage("segment");
 
   // Pose, and what moves.
+  recall_map_near(T_map_lidar_expected.translation());
   Odometry::Step step = odometry_.add(scan, known.labels, T_map_lidar_prior);
   end_stage("odometry");
 
@@ -187,6 +195,7 @@ void Mapper::restore(const MapView& view, const TileMemories& memories) {
   // First what may refuse the view.
   static_map_.restore(view, memories);
   forget_scans();
+  for (const auto& tile : view.tiles) restored_tiles_.insert(tile->info.id);
 }
 
 void Mapper::reset(std::uint64_t map_id) {
@@ -200,6 +209,25 @@ void Mapper::forget_scans() {
   last_labelled_.reset();
   last_view_.reset();
   trajectory_.clear();
+  restored_tiles_.clear();
+  recalled_near_map_.reset();
+}
+
+void Mapper::recall_map_near(const Eigen::Vector3d& position_map) {
+  if (restored_tiles_.empty()) return;
+  if (recalled_near_map_ && (position_map - *recalled_near_map_).norm() < recall_every_m) return;
+  recalled_near_map_ = position_map;
+  const auto view = static_map_.view();
+  std::vector<LabelledPoint> points_map;
+  for (const auto& tile : view->tiles) {
+    if (!restored_tiles_.contains(tile->info.id)) continue;
+    const Eigen::AlignedBox3d bounds_map = tile->info.bounds_map.cast<double>();
+    if (bounds_map.exteriorDistance(position_map) > config_.static_map.max_range_m) continue;
+    for (const Voxel& voxel : tile->voxels) {
+      points_map.push_back({voxel.mean_map, voxel.evidence.winner()});
+    }
+  }
+  odometry_.know(points_map);
 }
 
 void Mapper::end_stage(std::string_view stage) const {

@@ -3,6 +3,7 @@
 #include <functional>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -75,8 +76,9 @@ class Mapper {
   /// What is stored of it, what of it is in memory, and what was removed from it.
   [[nodiscard]] StaticMap& static_map() { return static_map_; }
 
-  /// Forgets poses and takes over a stored static map; the next scans extend it. The lidar starts
-  /// at the map's origin, or where the next scan's prior says. Throws std::invalid_argument for
+  /// Forgets poses and takes over a stored static map; the next scans extend it. The next scan is
+  /// looked for in it, round its prior or the map's origin, and all register against what is stored
+  /// near them. Throws std::invalid_argument for
   /// voxels or tiles of another size than configured, and is then as it was.
   void restore(const MapView& view, const TileMemories& memories = {});
 
@@ -89,6 +91,8 @@ class Mapper {
 
   /// All but the static map.
   void forget_scans();
+  /// Tells the odometry what a restored map holds near there, if it does not know yet.
+  void recall_map_near(const Eigen::Vector3d& position_map);
   [[nodiscard]] bool accepts(const Scan& scan);
   [[nodiscard]] bool has_enough_points(const Scan& scan);
   /// What a scan is mapped with.
@@ -119,6 +123,9 @@ class Mapper {
   StageListener stage_ended_;
   Odometry odometry_;
   StaticMap static_map_;
+  /// Tiles of a restored map, and where the odometry was last told of those nearby.
+  std::set<TileId> restored_tiles_;
+  std::optional<Eigen::Vector3d> recalled_near_map_;
   /// Its labels are still to come; the static map takes it with them.
   std::optional<PlacedScan> pending_;
   /// The newest scan with labels of its own, and once labels are carried from it, its view.

@@ -6,7 +6,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/odometry/coarse_registration.hpp"
 #include "core/odometry/features.hpp"
+#include "core/odometry/localisation.hpp"
 #include "core/odometry/motion_split.hpp"
 #include "core/odometry/objects.hpp"
 #include "core/odometry/past_views.hpp"
@@ -18,9 +20,6 @@ namespace {
 
 /// A gap in time beyond which the last velocity says nothing any more [s].
 constexpr double max_prediction_s = 1.0;
-/// Reach of the coarse alignment [m]: 30 m/s at 10 scans a second.
-constexpr double coarse_reach_m = 3.0;
-constexpr double coarse_robust_scale_m = 0.5;
 /// After so many scans without a pose the local map starts anew where the prediction is.
 constexpr int max_lost_scans = 10;
 
@@ -64,6 +63,8 @@ struct Odometry::State {
   OdometryConfig config;
   SensorModel sensor;
   LocalMap map;
+  /// Points of a map made earlier, until the first scan has its place in it.
+  std::vector<LabelledPoint> known_map;
   PastViews past;
   bool started = false;
   /// Scans in a row that could not be registered.
@@ -79,23 +80,8 @@ struct Odometry::State {
 
 namespace {
 
-/// Registration that finds a motion of up to `coarse_reach_m` from no idea of it. Eq. (10) has no
-/// weight for residuals above 1 m: the robust kernel alone decides.
-OdometryConfig coarse(OdometryConfig config) {
-  config.weighting = Weighting::none;
-  config.registration.robust_scale_m = coarse_robust_scale_m;
-  config.registration.max_neighbour_distance_m = coarse_reach_m;
-  config.registration.max_residual_m = coarse_reach_m;
-  config.registration.max_iterations = 50;
-  config.registration.step_translation_m = 0.01;
-  config.registration.step_rotation_rad = 0.001;
-  return config;
-}
-
-LocalMap coarse_map(const FeatureSets& features, const Eigen::Isometry3d& T_map_lidar) {
-  const LocalMapConfig config{
-      .voxel_size_m = coarse_reach_m, .max_points_per_voxel = 32, .min_spacing_m = 0.5};
-  LocalMap map{FeatureMap(config), FeatureMap(config)};
+LocalMap coarse_map_of(const FeatureSets& features, const Eigen::Isometry3d& T_map_lidar) {
+  LocalMap map = coarse_map();
   const Eigen::Isometry3f T = T_map_lidar.cast<float>();
   const auto fill = [&](const std::vector<FeaturePoint>& from, FeatureMap& to) {
     std::vector<LabelledPoint> points;
@@ -140,9 +126,12 @@ bool Odometry::State::may_extend_map(OdometryHealth health) {
 OdometryResult Odometry::State::registered(const FeatureSets& features,
                                            Eigen::Isometry3d T_map_lidar_predicted,
                                            bool prediction_is_good) const {
-  if (!started) return OdometryResult{.T_map_lidar = T_map_lidar_predicted};
+  if (!started) {
+    if (known_map.empty()) return OdometryResult{.T_map_lidar = T_map_lidar_predicted};
+    return localise(features, known_map, map, T_map_lidar_predicted, config);
+  }
   if (!prediction_is_good) {
-    const LocalMap last_scan = coarse_map(last_features, T_map_lidar);
+    const LocalMap last_scan = coarse_map_of(last_features, T_map_lidar);
     T_map_lidar_predicted =
         register_features(features, last_scan, T_map_lidar_predicted, coarse(config)).T_map_lidar;
   }
@@ -156,6 +145,7 @@ void Odometry::State::remember(std::int64_t stamp_ns, std::optional<RangeView> v
     last_interval_s = seconds(stamp_ns - last_stamp_ns);
   }
   started = true;
+  known_map = {};
   last_stamp_ns = stamp_ns;
   T_map_lidar = T_map_lidar_now;
   if (!view) return;
@@ -282,6 +272,12 @@ Odometry::Step Odometry::add(const Scan& scan, const PointLabels& labels,
   state.remember(scan.stamp_ns, std::move(view), T_map_lidar);
   state.last_features = std::move(sets);
   return step;
+}
+
+void Odometry::know(std::span<const LabelledPoint> points_map) {
+  State& state = *state_;
+  insert_known(points_map, state.map);
+  if (!state.started) state.known_map.assign(points_map.begin(), points_map.end());
 }
 
 void Odometry::reset() { *state_ = State(state_->config, state_->sensor); }

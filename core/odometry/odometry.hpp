@@ -3,11 +3,13 @@
 #include <Eigen/Geometry>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/sensor_model.hpp"
+#include "core/odometry/feature_map.hpp"
 #include "core/odometry/odometry_config.hpp"
 #include "core/odometry/odometry_state.hpp"
 
@@ -40,6 +42,10 @@ class Odometry {
   /// `scan.ring` must be known.
   [[nodiscard]] Step add(const Scan& scan, const PointLabels& labels,
                          const std::optional<Eigen::Isometry3d>& T_map_lidar_prior);
+
+  /// Adds points of a map made earlier (map frame) to the local map. Before the first scan, that is
+  /// then looked for in them, round its prior (see localise).
+  void know(std::span<const LabelledPoint> points_map);
 
   /// Forgets poses and local map.
   void reset();

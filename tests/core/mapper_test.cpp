@@ -14,6 +14,7 @@ namespace stillmap {
 namespace {
 
 using test::BoxDrive;
+using test::BoxWorld;
 using ::testing::Each;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -127,6 +128,52 @@ TEST(MapperRestore, ExtendsAStoredMap) {
   EXPECT_EQ(voxels_in(*after.map_view()), voxels_in(*stored));
   for (std::size_t k = 0; k < 10; ++k) ASSERT_TRUE(after.process(traffic_drive().scans[k].scan));
   EXPECT_GT(voxels_in(*after.map_view()), voxels_in(*stored));
+}
+
+std::shared_ptr<const MapView> stored_street() {
+  static const std::shared_ptr<const MapView> stored = [] {
+    Mapper mapper = box_mapper();
+    for (const auto& scan : traffic_drive().scans) (void)mapper.process(scan.scan);
+    return mapper.map_view();
+  }();
+  return stored;
+}
+
+/// Goes on in the stored street from a place that is only roughly known.
+void expect_found_from(double x, double y, double yaw) {
+  constexpr std::size_t first = 12;
+  const BoxDrive& drive = traffic_drive();
+  Mapper mapper = box_mapper();
+  mapper.restore(*stored_street());
+  const Eigen::Isometry3d T_first_guess = test::level_pose(x, y, yaw);
+  for (std::size_t k = first; k < drive.scans.size(); ++k) {
+    const auto prior =
+        k == first ? std::optional(drive.T_map_lidar[first] * T_first_guess) : std::nullopt;
+    const auto mapped = mapper.process(drive.scans[k].scan, prior);
+    ASSERT_TRUE(mapped) << mapper.last_rejection().reason;
+    EXPECT_EQ(mapped->odometry.health, OdometryHealth::good);
+    test::expect_near(mapped->odometry.T_map_lidar, drive.T_map_lidar[k], 0.2, 0.01);
+  }
+}
+
+TEST(MapperRestore, FindsItsPlaceInTheStoredMap) {
+  expect_found_from(0.0, 0.0, 0.0);
+  expect_found_from(1.5, -1.0, 0.2);
+  expect_found_from(-4.0, 3.0, 2.5);
+}
+
+TEST(MapperRestore, SaysThatItIsLostWhereTheScanDoesNotFit) {
+  BoxWorld yard;
+  for (int k = 0; k < 12; ++k) {
+    yard.stand(6.0 * (k % 4) - 9.0, 7.0 * (k / 4) - 9.0, {1.5, 0.8, 3.0}, SemanticClass::building);
+  }
+  Mapper mapper = box_mapper();
+  mapper.restore(*stored_street());
+  const Eigen::Isometry3d T_guess = test::level_pose(3.0, 0.5, 0.1);
+  const auto mapped = mapper.process(yard.scan(test::test_lidar(), T_guess, 100.0).scan, T_guess);
+  ASSERT_TRUE(mapped);
+  EXPECT_EQ(mapped->odometry.health, OdometryHealth::lost);
+  test::expect_near(mapped->odometry.T_map_lidar, T_guess, 1e-9, 1e-7);
 }
 
 TEST(MapperConfig, FaultsOfEveryPartAreThrown) {
