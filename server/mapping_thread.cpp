@@ -20,9 +20,11 @@ double milliseconds(Clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
 }
 
+constexpr std::size_t no_limit = std::numeric_limits<std::size_t>::max();
+
 // The rest is for copies: in the writers' histories, and for queries.
 std::size_t map_share_bytes(const MapFileConfig& config) {
-  if (config.memory_limit_mib == 0) return std::numeric_limits<std::size_t>::max();
+  if (config.memory_limit_mib == 0) return no_limit;
   return (std::size_t{config.memory_limit_mib} << 20) / 4 * 3;
 }
 
@@ -109,16 +111,14 @@ void MappingThread::stop() {
 
 RunCheckpoint MappingThread::checkpoint(bool everything) {
   MapCheckpoint map;
-  Trajectory trajectory;
   between_scans([&] {
     const auto began = Clock::now();
     map = mapper_.static_map().checkpoint(everything);
     board_.show(map.view);
-    trajectory = board_.trajectory();
     statistics_.add_latency("checkpoint", milliseconds(Clock::now() - began));
   });
   RunCheckpoint checkpoint{stored_state(map), map.step};
-  checkpoint.map.trajectory = std::move(trajectory);
+  checkpoint.map.trajectory = board_.trajectory();
   return checkpoint;
 }
 
@@ -226,6 +226,9 @@ void MappingThread::stage_ended(std::string_view stage) {
 void MappingThread::show_view() {
   board_.show(mapper_.map_view());
   view_shown_ = Clock::now();
+  if (outputs_.occupancy != nullptr && map_limit_bytes_ != no_limit) {
+    outputs_.occupancy->follow(board_.view());
+  }
 }
 
 void MappingThread::run_asked() {

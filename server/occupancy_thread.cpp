@@ -16,7 +16,8 @@ OccupancyThread::OccupancyThread(const OccupancyServing& config, Statistics& sta
 void OccupancyThread::begin(std::shared_ptr<const MapView> view) {
   const std::scoped_lock lock(queue_mutex_);
   queue_.clear();
-  queue_.push_back({std::move(view), {}});
+  to_follow_ = nullptr;
+  queue_.push_back({std::move(view), nullptr, {}});
   queue_changed_.notify_one();
 }
 
@@ -28,7 +29,15 @@ void OccupancyThread::add(OccupancyScan scan) {
     if (oldest != queue_.end()) queue_.erase(oldest);
     statistics_.count("occupancy_scans_left_out");
   }
-  queue_.push_back({nullptr, std::move(scan)});
+  queue_.push_back({nullptr, nullptr, std::move(scan)});
+  queue_changed_.notify_one();
+}
+
+void OccupancyThread::follow(std::shared_ptr<const MapView> view) {
+  const std::scoped_lock lock(queue_mutex_);
+  if (view == followed_) return;
+  followed_ = view;
+  to_follow_ = std::move(view);
   queue_changed_.notify_one();
 }
 
@@ -39,23 +48,40 @@ void OccupancyThread::work(const std::stop_token& stop) {
     bool keeps_up = true;
     {
       std::unique_lock lock(queue_mutex_);
-      if (!queue_changed_.wait(lock, stop, [this] { return !queue_.empty(); })) return;
+      if (!queue_changed_.wait(lock, stop, [this] { return !queue_.empty() || to_follow_; })) {
+        return;
+      }
       if (stop.stop_requested()) return;
-      job = std::move(queue_.front());
-      queue_.pop_front();
+      job = next_job();
       keeps_up = queue_.size() <= capacity_ / 2;
     }
     if (job.first_view) {
       begin_map(*job.first_view);
+    } else if (job.next_view) {
+      follow_now(*job.next_view);
     } else {
       insert(job.scan, keeps_up);
     }
   }
 }
 
+OccupancyThread::Job OccupancyThread::next_job() {
+  const bool begins = !queue_.empty() && queue_.front().first_view;
+  if (to_follow_ && !begins) return {nullptr, std::exchange(to_follow_, nullptr), {}};
+  Job job = std::move(queue_.front());
+  queue_.pop_front();
+  return job;
+}
+
+void OccupancyThread::follow_now(const MapView& view) {
+  const std::scoped_lock lock(map_mutex_);
+  if (map_.follow(view)) ++changes_;
+}
+
 void OccupancyThread::begin_map(const MapView& view) {
   OccupancyMap fresh(config_);
   fresh.insert(view);
+  fresh.follow(view);
   const std::scoped_lock lock(map_mutex_);
   map_ = std::move(fresh);
   ++changes_;

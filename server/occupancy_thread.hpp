@@ -28,8 +28,8 @@ struct EncodedOctree {
 };
 
 /// Keeps the octree on a thread of its own and of low priority, so that the mapper never waits for
-/// it. Who cannot keep
-/// up leaves out clearing first ("occupancy_not_cleared" in the status), then scans
+/// it. Who cannot keep up leaves out clearing first ("occupancy_not_cleared" in the status), then
+/// scans
 /// ("occupancy_scans_left_out"). Thread-safe.
 class OccupancyThread {
  public:
@@ -38,6 +38,8 @@ class OccupancyThread {
   /// A new map begins, with the voxels of this view. Returns at once, as `add` does.
   void begin(std::shared_ptr<const MapView> view);
   void add(OccupancyScan scan);
+  /// Tiles left memory, or came back.
+  void follow(std::shared_ptr<const MapView> view);
 
   /// Throws std::invalid_argument for a query that asks for too much.
   [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) const;
@@ -46,14 +48,18 @@ class OccupancyThread {
   [[nodiscard]] std::uint64_t changes() const;
 
  private:
-  /// Either a new map or a scan.
+  /// Either a new map or a scan, or the newest view to be followed.
   struct Job {
     std::shared_ptr<const MapView> first_view;
+    std::shared_ptr<const MapView> next_view;
     OccupancyScan scan;
   };
 
   void work(const std::stop_token& stop);
+  /// Under the queue's lock.
+  [[nodiscard]] Job next_job();
   void begin_map(const MapView& view);
+  void follow_now(const MapView& view);
   void insert(const OccupancyScan& scan, bool clears);
 
   OccupancyConfig config_;
@@ -62,6 +68,9 @@ class OccupancyThread {
   mutable std::mutex queue_mutex_;
   std::condition_variable_any queue_changed_;
   std::deque<Job> queue_;
+  std::shared_ptr<const MapView> to_follow_;
+  /// The last view that was to be followed.
+  std::shared_ptr<const MapView> followed_;
   mutable std::mutex map_mutex_;
   OccupancyMap map_;
   std::uint64_t changes_ = 0;

@@ -7,6 +7,7 @@
 
 #include "core/map/voxel_grid.hpp"
 #include "core/occupancy/octomap_check.hpp"
+#include "core/occupancy/octree_columns.hpp"
 #include "core/occupancy/octree_query.hpp"
 #include "core/occupancy/octree_update.hpp"
 #include "core/occupancy/scan_update.hpp"
@@ -27,6 +28,8 @@ struct OccupancyMap::State {
   VoxelBricks bricks;
   std::uint64_t version = 0;
   std::uint64_t scans = 0;
+  /// Columns that are forgotten until their tiles come back.
+  std::set<OctreeColumn> away;
 };
 
 namespace {
@@ -110,6 +113,24 @@ void OccupancyMap::insert(const MapView& view) {
   const float surest = state_->octree.getClampingThresMaxLog();
   update_octree(state_->octree, state_->bricks.sorted(), {2.0F * surest, 0.0F});
   ++state_->version;
+}
+
+bool OccupancyMap::follow(const MapView& view) {
+  std::set<OctreeColumn> gone;
+  MapView back{view.version, view.map_id, view.tile_size_m, view.voxel_size_m, {}};
+  for (const auto& [column, tiles] : columns_of(view, state_->config.resolution_m)) {
+    const bool is_gone = tiles.has_away && tiles.resident.empty();
+    if (is_gone && state_->away.insert(column).second) gone.insert(column);
+    if (!is_gone && state_->away.erase(column) > 0) {
+      back.tiles.insert(back.tiles.end(), tiles.resident.begin(), tiles.resident.end());
+    }
+  }
+  if (!gone.empty()) {
+    forget_columns(state_->octree, gone);
+    ++state_->version;
+  }
+  insert(back);
+  return !gone.empty() || !back.tiles.empty();
 }
 
 PointOccupancy OccupancyMap::at_point(const Eigen::Vector3d& p_map) const {

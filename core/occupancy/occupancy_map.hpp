@@ -40,6 +40,11 @@ class OccupancyMap {
   /// Takes the voxels of a static map for occupied, as sure as can be.
   void insert(const MapView& view);
 
+  /// Where the static map's tiles are on the shelf, nothing stays in memory here either; where they
+  /// came back, their voxels are occupied again, and free space is to be seen anew. Returns whether
+  /// that changed anything.
+  bool follow(const MapView& view);
+
   [[nodiscard]] PointOccupancy at_point(const Eigen::Vector3d& p_map) const;
   /// At most `max_voxels` occupied voxels are listed; all are counted.
   [[nodiscard]] BoxOccupancy in_box(const Eigen::AlignedBox3d& box_map,

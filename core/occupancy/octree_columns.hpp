@@ -1,0 +1,41 @@
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <set>
+#include <vector>
+
+#include "core/map/tile.hpp"
+
+namespace octomap {
+class OcTree;
+}
+
+namespace stillmap {
+
+/// A square column of the octree, of all heights: so many voxels to a side that it is a whole
+/// number of the octree's inner nodes.
+struct OctreeColumn {
+  static constexpr std::int32_t side_voxels = 128;
+  std::int32_t x = 0;
+  std::int32_t y = 0;
+  friend auto operator<=>(const OctreeColumn&, const OctreeColumn&) = default;
+};
+
+/// What the static map has of a column.
+struct ColumnTiles {
+  /// Those in memory.
+  std::vector<std::shared_ptr<const Tile>> resident;
+  bool has_away = false;
+};
+
+/// The columns that tiles of the view touch.
+[[nodiscard]] std::map<OctreeColumn, ColumnTiles> columns_of(const MapView& view,
+                                                             double resolution_m);
+
+/// Makes all of these columns unknown, at the cost of a copy of what is left.
+void forget_columns(octomap::OcTree& octree, const std::set<OctreeColumn>& columns);
+
+}  // namespace stillmap
