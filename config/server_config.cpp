@@ -121,6 +121,7 @@ void read_input(YamlSection section, InputConfig& input) {
 
 void read_publish(YamlSection section, PublishConfig& publish) {
   section.number("path_period_s", publish.path_period_s, periods_s);
+  section.whole("path_poses", publish.path_poses, {2, 1000000});
   section.number("cloud_period_s", publish.cloud_period_s, periods_s);
   section.number("cloud_window_m", publish.cloud_window_m, {1, 1000});
   section.number("tiles_period_s", publish.tiles_period_s, periods_s);

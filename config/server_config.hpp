@@ -101,6 +101,8 @@ struct InputConfig {
 
 struct PublishConfig {
   double path_period_s = 1.0;
+  /// A longer path is published with every 2nd, 4th, ... pose.
+  std::size_t path_poses = 5000;
   double cloud_period_s = 1.0;
   /// Edge of the square round the robot that static_cloud shows.
   double cloud_window_m = 60.0;

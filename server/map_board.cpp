@@ -77,6 +77,18 @@ StampedPose MapBoard::newest_pose() const {
   return trajectory_.empty() ? StampedPose{} : trajectory_.back();
 }
 
+Trajectory MapBoard::trajectory(std::size_t max_poses) const {
+  const std::scoped_lock lock(mutex_);
+  if (trajectory_.empty()) return {};
+  const std::size_t last = trajectory_.size() - 1;
+  std::size_t stride = 1;
+  while ((last + stride - 1) / stride + 1 > max_poses) stride *= 2;
+  Trajectory chosen;
+  for (std::size_t i = 0; i < last; i += stride) chosen.push_back(trajectory_[i]);
+  chosen.push_back(trajectory_.back());
+  return chosen;
+}
+
 std::uint64_t MapBoard::poses_added() const {
   const std::scoped_lock lock(mutex_);
   return poses_added_;

@@ -42,6 +42,9 @@ class MapBoard {
   /// The view and the history that ends with it.
   [[nodiscard]] MapState state() const;
   [[nodiscard]] Trajectory trajectory() const;
+  /// So many of its poses (2 or more) at most, evenly chosen, the newest always among them. The
+  /// ones that are chosen stay the same until there are twice as many.
+  [[nodiscard]] Trajectory trajectory(std::size_t max_poses) const;
   /// The newest pose; the origin before the first.
   [[nodiscard]] StampedPose newest_pose() const;
   /// Poses added so far, over all maps: changes with every scan.

@@ -88,7 +88,7 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
   }
   start_areas(config);
   start_services(config);
-  autosave_ = std::make_unique<PeriodicThread>(
+  autosave_ = std::make_unique<CheckpointThread>(
       std::chrono::duration<double>(config.map.save_period_s), [this] { save_in_background(); });
 }
 

@@ -6,6 +6,7 @@
 #include "config/server_config.hpp"
 #include "idl/topics.hpp"
 #include "server/area_thread.hpp"
+#include "server/checkpoint_thread.hpp"
 #include "server/map_board.hpp"
 #include "server/map_saver.hpp"
 #include "server/mapping_thread.hpp"
@@ -65,7 +66,7 @@ class Server {
   std::unique_ptr<OccupancyDesk> occupancy_services_;
   std::unique_ptr<RemovedDesk> removed_services_;
   std::unique_ptr<StatusPublisher> status_publisher_;
-  std::unique_ptr<PeriodicThread> autosave_;
+  std::unique_ptr<CheckpointThread> autosave_;
 };
 
 }  // namespace stillmap

@@ -9,6 +9,7 @@ MapPublisher::MapPublisher(Participant& participant, const Topics& topics,
                            const ServerConfig& config, const MapBoard& board)
     : board_(board),
       map_frame_(config.frames.map),
+      path_poses_(config.publish.path_poses),
       half_window_m_(static_cast<float>(config.publish.cloud_window_m / 2.0)),
       tiles_(participant, topics),
       path_(participant, topics.path.dds_name, topics.path.writer),
@@ -22,7 +23,7 @@ MapPublisher::MapPublisher(Participant& participant, const Topics& topics,
 
 bool MapPublisher::is_news(PathState& shown) const {
   const PathState now{.map_id = board_.view()->map_id, .poses = board_.poses_added()};
-  if (now == shown || board_.trajectory().empty()) return false;
+  if (now == shown || (now.poses == 0 && board_.view()->tiles.empty())) return false;
   shown = now;
   return true;
 }
@@ -30,7 +31,7 @@ bool MapPublisher::is_news(PathState& shown) const {
 void MapPublisher::publish_path() {
   if (!is_news(shown_path_)) return;
   // Keep-last writers always have room.
-  static_cast<void>(path_.write(wire::to_path(board_.trajectory(), map_frame_)));
+  static_cast<void>(path_.write(wire::to_path(board_.trajectory(path_poses_), map_frame_)));
 }
 
 void MapPublisher::publish_cloud() {

@@ -35,6 +35,7 @@ class MapPublisher {
 
   const MapBoard& board_;
   std::string map_frame_;
+  std::size_t path_poses_;
   float half_window_m_;
   PathState shown_path_;
   PathState shown_cloud_;

@@ -79,6 +79,21 @@ TEST(MapBoard, KeepsTheHistoryThatEndsWithItsView) {
   EXPECT_TRUE(board.state().history->gone.empty());
 }
 
+TEST(MapBoard, ThinsALongPathEvenlyAndKeepsItsEnd) {
+  MapBoard board;
+  EXPECT_TRUE(board.trajectory(10).empty());
+  for (std::int64_t k = 0; k < 100; ++k) {
+    board.add_pose({k, Eigen::Isometry3d::Identity()}, OdometryHealth::good, "none");
+  }
+  EXPECT_EQ(board.trajectory(1000).size(), 100U);
+  const Trajectory thin = board.trajectory(20);
+  ASSERT_EQ(thin.size(), 14U);
+  EXPECT_EQ(thin[1].stamp_ns, 8);
+  EXPECT_EQ(thin[12].stamp_ns, 96);
+  EXPECT_EQ(thin.back().stamp_ns, 99);
+  EXPECT_LE(board.trajectory(2).size(), 2U);
+}
+
 TEST(MapBoard, WakesWhoWaitsForAnotherView) {
   using namespace std::chrono_literals;
   MapBoard board;
