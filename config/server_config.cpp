@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "config/listening_address.hpp"
 #include "config/mapper_section.hpp"
 #include "config/robot_profile.hpp"
 #include "config/sensor_file.hpp"
@@ -174,6 +175,21 @@ void read_areas(YamlSection section, const fs::path& folder, AreasConfig& areas)
   }
 }
 
+void read_log(YamlSection section, LogConfig& log) {
+  section.choice<LogLevel>("level", log.level,
+                           {{"debug", LogLevel::debug},
+                            {"info", LogLevel::info},
+                            {"warning", LogLevel::warning},
+                            {"error", LogLevel::error}});
+}
+
+void read_metrics(YamlSection section, MetricsConfig& metrics) {
+  section.text("address", metrics.address);
+  if (metrics.address.empty()) return;
+  const std::string fault = listening_address_fault(metrics.address);
+  if (!fault.empty()) section.fault("address", fault);
+}
+
 void read_server(YamlSection file, const fs::path& folder, ServerConfig& config) {
   read_sensor_name(file, folder, config.mapper.sensor);
   read_mapper(file, config.mapper);
@@ -186,6 +202,8 @@ void read_server(YamlSection file, const fs::path& folder, ServerConfig& config)
   read_map(file.section("map"), config.map);
   read_occupancy(file.section("occupancy"), config.occupancy);
   read_areas(file.section("areas"), folder, config.areas);
+  read_log(file.section("log"), config.log);
+  read_metrics(file.section("metrics"), config.metrics);
 }
 
 }  // namespace

@@ -147,6 +147,19 @@ struct AreasConfig {
   double grid_window_m = 0.0;
 };
 
+enum class LogLevel { debug, info, warning, error };
+
+/// What goes to stderr.
+struct LogConfig {
+  LogLevel level = LogLevel::info;
+};
+
+/// Figures for Prometheus over HTTP.
+struct MetricsConfig {
+  /// Where it listens, as address:port; port 0 takes a free one. Empty: nowhere.
+  std::string address;
+};
+
 /// The robots that areas are kept for. Throws ConfigError with every fault: robots that do not
 /// exist (with those that do), or two of one name.
 [[nodiscard]] std::vector<RobotProfile> robots_of(const AreasConfig& areas);
@@ -163,6 +176,8 @@ struct ServerConfig {
   MapFileConfig map;
   OccupancyServing occupancy;
   AreasConfig areas;
+  LogConfig log;
+  MetricsConfig metrics;
 };
 
 /// Reads a server file (config/server/default.yaml shows every field). What the file leaves out

@@ -90,12 +90,14 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
   start_services(config);
   autosave_ = std::make_unique<PeriodicThread>(
       std::chrono::duration<double>(config.map.save_period_s), [this] { save_in_background(); });
+  start_metrics(config.metrics);
 }
 
 Server::~Server() = default;
 
 void Server::stop() {
   // Who asks goes first, then who brings, then who maps: nobody waits for somebody gone.
+  metrics_.reset();
   autosave_.reset();
   services_.reset();
   occupancy_services_.reset();
@@ -123,7 +125,8 @@ void Server::start_services(const ServerConfig& config) {
           },
       .show_now = [this] { mapping_->show_now(); },
       .areas = atlas_,
-      .planning_grid = planning_grid_};
+      .planning_grid = planning_grid_,
+      .log = service_log_};
   const Services names = Services::in(config.topics.name_space);
   services_ = std::make_unique<ServiceDesk>(participant_, names, context);
   occupancy_services_ = std::make_unique<OccupancyDesk>(
@@ -153,11 +156,24 @@ void Server::start_areas(const ServerConfig& config) {
                                         board_, area_board_, statistics_, publish);
 }
 
+void Server::start_metrics(const MetricsConfig& config) {
+  if (config.address.empty()) return;
+  metrics_ = std::make_unique<MetricsEndpoint>(config.address, [this]() -> MetricsSnapshot {
+    return {.status = report_.status(),
+            .stages = statistics_.stage_times(),
+            .services = service_log_.services(),
+            .checkpoints = saver_.checkpoints(),
+            .map_memory = statistics_.map_memory(),
+            .process = process_use()};
+  });
+  spdlog::info("metrics: http://{}/metrics", metrics_->address());
+}
+
 void Server::save_in_background() {
   try {
     saver_.save_if_changed();
   } catch (const MapFileError& error) {
-    spdlog::error("the map was not saved: {}", error.what());
+    save_warnings_.error("save", std::string("the map was not saved: ") + error.what());
   }
 }
 

@@ -34,6 +34,7 @@ void add_watch_command(CommandHandle program, Action& action);
 void add_watch_tiles_command(CommandHandle program, Action& action);
 void add_query_command(CommandHandle program, Action& action);
 void add_status_command(CommandHandle program, Action& action);
+void add_health_command(CommandHandle program, Action& action);
 void add_octomap_command(CommandHandle program, Action& action);
 void add_save_command(CommandHandle program, Action& action);
 void add_load_command(CommandHandle program, Action& action);
