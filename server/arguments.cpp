@@ -22,6 +22,37 @@ constexpr const char* footer =
 
 constexpr int bad_usage = 2;
 
+/// What is said of the network instead of the file's.
+struct NetworkArguments {
+  std::optional<std::string> profile;
+  std::vector<std::string> peers;
+  std::optional<std::string> discovery_server;
+
+  void apply_to(DdsChoice& network) const {
+    if (profile) network.profile = *profile;
+    if (!peers.empty()) network.peers = peers;
+    if (discovery_server) network.discovery_server = *discovery_server;
+    static_cast<void>(dds_options(network, DdsRole::server));
+  }
+};
+
+void add_network_options(CLI::App& program, NetworkArguments& network) {
+  program
+      .add_option("--dds-profile", network.profile,
+                  "Kind of network, instead of the file's: host, lan, wifi, wan, no_multicast, or "
+                  "a profile's file")
+      ->envname("STILLMAP_DDS_PROFILE");
+  program
+      .add_option("--peer", network.peers,
+                  "Where to look for other processes, as HOST or HOST:PORT, without multicast")
+      ->delimiter(',')
+      ->envname("STILLMAP_PEERS");
+  program
+      .add_option("--discovery-server", network.discovery_server,
+                  "Find everybody through the discovery server at HOST or HOST:PORT")
+      ->envname("STILLMAP_DISCOVERY_SERVER");
+}
+
 }  // namespace
 
 Arguments read_arguments(int argc, char** argv) {
@@ -31,12 +62,14 @@ Arguments read_arguments(int argc, char** argv) {
   program.footer(footer);
   std::string config_file;
   std::optional<std::uint32_t> domain_id;
+  NetworkArguments network;
   std::optional<std::string> map_file;
   std::optional<Delivery> delivery;
   program.add_option("--config", config_file, "YAML file; config/server/default.yaml explains it")
       ->check(CLI::ExistingFile);
   program.add_option("--domain", domain_id, "DDS domain, instead of the file's")
       ->check(CLI::Range(0, 232));
+  add_network_options(program, network);
   program.add_option("--map-file", map_file, "Where the map is kept, instead of the file's");
   program
       .add_option("--delivery", delivery,
@@ -51,6 +84,7 @@ Arguments read_arguments(int argc, char** argv) {
   }
   ServerConfig config = config_file.empty() ? ServerConfig() : load_server_config(config_file);
   if (domain_id) config.dds.domain_id = *domain_id;
+  network.apply_to(config.dds.network);
   if (map_file) config.map.file = *map_file;
   if (delivery) config.input.delivery = *delivery;
   return {.config = config};
