@@ -7,6 +7,7 @@
 
 #include "config/config_error.hpp"
 #include "config/config_report.hpp"
+#include "config/dds_profile.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/mapper.hpp"
 #include "core/occupancy/occupancy_config.hpp"
@@ -48,12 +49,8 @@ struct FramesConfig {
 struct DdsConfig {
   /// 0..232, as DDS defines it; ROS_DOMAIN_ID of the ROS 2 peers.
   std::uint32_t domain_id = 0;
-  /// Off: UDP only. Shared memory does not reach across users or containers, and says so nowhere.
-  bool shared_memory = true;
-  /// IP addresses of the network interfaces that may be used; empty: all.
-  std::vector<std::string> interfaces;
-  /// Asked of the kernel for each UDP socket; net.core.rmem_max caps it.
-  std::uint32_t socket_buffer_bytes = 4U << 20U;
+  /// Transports, discovery and pacing, for the kind of network; what is set on top of it.
+  DdsChoice network;
   std::string participant_name = "stillmap_server";
   /// Length of a GID in ros_discovery_info: 24 up to ROS 2 Humble, 16 from Iron.
   std::uint32_t ros_gid_bytes = 24;

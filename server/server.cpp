@@ -7,13 +7,12 @@
 namespace stillmap {
 namespace {
 
-DdsOptions dds_options(const DdsConfig& config) {
-  return {.domain_id = config.domain_id,
-          .shared_memory = config.shared_memory,
-          .interfaces = config.interfaces,
-          .socket_buffer_bytes = config.socket_buffer_bytes,
-          .node_name = config.participant_name,
-          .ros_gid_bytes = config.ros_gid_bytes};
+DdsOptions server_options(const DdsConfig& config) {
+  DdsOptions options = dds_options(config.network, DdsRole::server);
+  options.domain_id = config.domain_id;
+  options.node_name = config.participant_name;
+  options.ros_gid_bytes = config.ros_gid_bytes;
+  return options;
 }
 
 std::map<std::string, std::string> file_metadata(const ServerConfig& config,
@@ -27,14 +26,14 @@ std::map<std::string, std::string> file_metadata(const ServerConfig& config,
 }
 
 /// What is wrong with this machine, in words; empty when nothing is.
-std::string socket_trouble(const DdsConfig& config) {
-  const std::uint32_t granted = granted_socket_buffer_bytes(config.socket_buffer_bytes);
-  if (granted >= config.socket_buffer_bytes) return {};
+std::string socket_trouble(std::uint32_t wanted_bytes) {
+  const std::uint32_t granted = granted_socket_buffer_bytes(wanted_bytes);
+  if (granted >= wanted_bytes) return {};
   const std::string trouble = "UDP receive buffers have " + std::to_string(granted) +
-                              " bytes instead of " + std::to_string(config.socket_buffer_bytes) +
+                              " bytes instead of " + std::to_string(wanted_bytes) +
                               ", so large clouds over UDP can get lost: sudo sysctl "
                               "net.core.rmem_max=" +
-                              std::to_string(config.socket_buffer_bytes);
+                              std::to_string(wanted_bytes);
   spdlog::warn("{}", trouble);
   return trouble;
 }
@@ -57,10 +56,10 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
       saver_(board_, config.map.file, file_metadata(config, *label_source),
              config.map.memory_limit_mib),
       tiles_(saver_.shelf(), (std::size_t{config.map.memory_limit_mib} << 20) / 8),
-      participant_(dds_options(config.dds)),
+      participant_(server_options(config.dds)),
       poses_(participant_, topics_, config.frames),
       report_(delivery_mode(config.input.delivery), label_source->name(),
-              socket_trouble(config.dds), board_, statistics_,
+              socket_trouble(participant_.options().socket_buffer_bytes), board_, statistics_,
               [this] { return receiver_->why_nothing_arrives(); }),
       atlas_(area_board_, board_, tiles_),
       planning_grid_(config.areas, config.frames.map, board_, area_board_) {

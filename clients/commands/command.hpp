@@ -36,6 +36,7 @@ void add_query_command(CommandHandle program, Action& action);
 void add_status_command(CommandHandle program, Action& action);
 void add_health_command(CommandHandle program, Action& action);
 void add_octomap_command(CommandHandle program, Action& action);
+void add_discovery_server_command(CommandHandle program, Action& action);
 void add_save_command(CommandHandle program, Action& action);
 void add_load_command(CommandHandle program, Action& action);
 void add_reset_command(CommandHandle program, Action& action);
