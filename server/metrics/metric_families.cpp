@@ -41,7 +41,7 @@ class Family {
     return *this;
   }
 
-  operator MetricFamily() && { return std::move(family_); }
+  operator MetricFamily() const { return family_; }
 
  private:
   MetricFamily family_;
@@ -73,7 +73,7 @@ MetricFamily drops(const ServerStatus& status) {
     family.add(static_cast<double>(dropped.value),
                {{"reason", dropped.name.substr(drop_prefix.size())}});
   }
-  return std::move(family);
+  return family;
 }
 
 MetricFamily events(const ServerStatus& status) {
@@ -83,7 +83,7 @@ MetricFamily events(const ServerStatus& status) {
     if (std::ranges::find(own_family, event.name) != own_family.end()) continue;
     family.add(static_cast<double>(event.value), {{"event", event.name}});
   }
-  return std::move(family);
+  return family;
 }
 
 MetricFamily odometry_health(const ServerStatus& status) {
@@ -92,7 +92,7 @@ MetricFamily odometry_health(const ServerStatus& status) {
   for (const OdometryHealth health : {initialised, good, degenerate, lost}) {
     family.add(status.health == health ? 1.0 : 0.0, {{"state", name(health)}});
   }
-  return std::move(family);
+  return family;
 }
 
 MetricFamily label_shares(const SegmentationStatus& segmentation) {
@@ -105,7 +105,7 @@ MetricFamily label_shares(const SegmentationStatus& segmentation) {
 MetricFamily stages(const std::vector<StageTimes>& stages) {
   Family family = histogram("stage_duration_seconds", "Time that a stage took for a scan");
   for (const StageTimes& times : stages) family.add(times.all, {{"stage", times.stage}});
-  return std::move(family);
+  return family;
 }
 
 MetricFamily answers(const MetricsSnapshot& snapshot) {
@@ -115,7 +115,7 @@ MetricFamily answers(const MetricsSnapshot& snapshot) {
       family.add(static_cast<double>(answered), {{"service", service}, {"code", name(code)}});
     }
   }
-  return std::move(family);
+  return family;
 }
 
 MetricFamily answer_times(const MetricsSnapshot& snapshot) {
@@ -123,7 +123,7 @@ MetricFamily answer_times(const MetricsSnapshot& snapshot) {
   for (const auto& [service, log] : snapshot.services) {
     family.add(log.times, {{"service", service}});
   }
-  return std::move(family);
+  return family;
 }
 
 double unix_seconds(const CheckpointLog::Record& checkpoints) {
