@@ -5,7 +5,7 @@ BUILD := build/$(PRESET)
 JOBS ?= $(shell nproc)
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages build demo test test-dev test-tsan test-kill bench table1 parity format format-check clean
+.PHONY: help packages build deb demo test test-dev test-tsan test-kill test-docker image bench table1 parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -21,8 +21,13 @@ packages: ## Install the Debian packages that are missing
 	fi
 
 build: packages ## Build everything in build/release (PRESET=dev, tsan for others)
-	cmake --preset $(PRESET)
+	cmake --preset $(PRESET) $(CMAKE_OPTIONS)
 	cmake --build --preset $(PRESET) -j $(JOBS)
+
+deb: build ## Debian packages in build/release/packages
+	cpack --config $(BUILD)/CPackConfig.cmake -B $(BUILD)/packages -G DEB
+	rm -rf $(BUILD)/packages/_CPack_Packages
+	@ls -lh $(BUILD)/packages
 
 demo: build ## Run the main job: simulated city, replay over DDS, server, planning client
 	BUILD=$(BUILD) clients/demo.sh
@@ -38,6 +43,12 @@ test-tsan: ## The tests under ThreadSanitizer
 
 test-kill: build ## Kill the server at 50 random moments of mapping, and look at what is stored
 	STILLMAP_KILLS=50 $(BUILD)/tests/server/kill_test
+
+image: ## Docker image stillmap, from source
+	DOCKER_BUILDKIT=1 docker build -f docker/Dockerfile --build-arg JOBS=$(JOBS) -t stillmap .
+
+test-docker: ## Docker: the image, and the deployments of docker/ end to end (root where no dockerd runs)
+	docker/test.sh
 
 bench: build ## Benchmarks of every stage
 	@for b in $(BUILD)/tests/bench/*_bench; do echo "== $$b"; $$b || exit 1; done

@@ -2,9 +2,8 @@
 
 #include <array>
 #include <charconv>
-#include <cstdlib>
-#include <set>
 
+#include "config/named_file.hpp"
 #include "config/yaml_section.hpp"
 
 namespace stillmap {
@@ -64,26 +63,11 @@ void read_profile(YamlSection file, RobotProfile& profile) {
   file.faults(profile.faults());
 }
 
-std::vector<fs::path> robot_folders() {
-  std::vector<fs::path> folders;
-  if (const char* folder = std::getenv("STILLMAP_ROBOTS")) folders.emplace_back(folder);
-  std::error_code none;
-  const fs::path program = fs::read_symlink("/proc/self/exe", none);
-  if (!program.empty()) {
-    folders.push_back(program.parent_path().parent_path() / "share/stillmap/robots");
-  }
-  folders.emplace_back(STILLMAP_ROBOT_SOURCES);
-  return folders;
-}
-
-bool is_file_name(const std::string& text) {
-  return text.find('/') != std::string::npos || text.ends_with(".yaml") || text.ends_with(".yml");
-}
-
-std::string list_of(const std::vector<std::string>& names) {
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list;
+NamedFilePlaces robot_places() {
+  return {.kind = "robot",
+          .variable = "STILLMAP_ROBOTS",
+          .share = "robots",
+          .sources = STILLMAP_ROBOT_SOURCES};
 }
 
 }  // namespace
@@ -96,31 +80,14 @@ RobotProfile read_robot_profile(const fs::path& file) {
   return profile;
 }
 
-std::vector<std::string> known_robots() {
-  std::set<std::string> names;
-  for (const fs::path& folder : robot_folders()) {
-    std::error_code none;
-    for (const auto& entry : fs::directory_iterator(folder, none)) {
-      if (entry.path().extension() == ".yaml") names.insert(entry.path().stem().string());
-    }
-  }
-  return {names.begin(), names.end()};
-}
+std::vector<std::string> known_robots() { return known_names(robot_places()); }
 
 std::string robot_from(const fs::path& folder, const std::string& name_or_file) {
   return is_file_name(name_or_file) ? (folder / name_or_file).string() : name_or_file;
 }
 
 RobotProfile load_robot_profile(const std::string& name_or_file) {
-  if (is_file_name(name_or_file)) return read_robot_profile(name_or_file);
-  for (const fs::path& folder : robot_folders()) {
-    const fs::path file = folder / (name_or_file + ".yaml");
-    if (fs::exists(file)) return read_robot_profile(file);
-  }
-  throw ConfigError({"robot '" + name_or_file +
-                     "' is neither known nor a .yaml file; STILLMAP_ROBOTS may name a folder of "
-                     "robots; known are: " +
-                     list_of(known_robots())});
+  return read_robot_profile(find_named_file(robot_places(), name_or_file));
 }
 
 }  // namespace stillmap

@@ -1,11 +1,11 @@
 #include "config/server_config.hpp"
 
-#include <arpa/inet.h>
-
 #include <algorithm>
 #include <stdexcept>
 
+#include "config/listening_address.hpp"
 #include "config/mapper_section.hpp"
+#include "config/named_file.hpp"
 #include "config/robot_profile.hpp"
 #include "config/sensor_file.hpp"
 #include "config/yaml_section.hpp"
@@ -63,17 +63,26 @@ void read_frames(YamlSection section, FramesConfig& frames) {
   if (frames.map.empty()) section.fault("map", "is empty; a frame needs a name");
 }
 
-void read_dds(YamlSection section, DdsConfig& dds) {
-  section.whole("domain_id", dds.domain_id, {0, 232});
-  section.flag("shared_memory", dds.shared_memory);
-  section.text_list("interfaces", dds.interfaces);
-  for (const std::string& address : dds.interfaces) {
-    in6_addr parsed{};
-    if (inet_pton(AF_INET, address.c_str(), &parsed) == 1) continue;
-    if (inet_pton(AF_INET6, address.c_str(), &parsed) == 1) continue;
-    section.fault("interfaces", "'" + address + "' is not an IP address such as 192.168.0.5");
+void read_network(YamlSection& section, const fs::path& folder, DdsChoice& network) {
+  section.text("profile", network.profile);
+  if (is_file_name(network.profile)) network.profile = (folder / network.profile).string();
+  section.choice<std::optional<bool>>(
+      "shared_memory", network.shared_memory,
+      {{"profile", std::nullopt}, {"true", true}, {"false", false}});
+  section.text_list("interfaces", network.interfaces);
+  section.text_list("peers", network.peers);
+  section.text("discovery_server", network.discovery_server);
+  section.whole("socket_buffer_bytes", network.socket_buffer_bytes, {0, 1U << 30U});
+  try {
+    static_cast<void>(dds_options(network, DdsRole::server));
+  } catch (const ConfigError& error) {
+    for (const std::string& fault : error.faults()) section.faults(fault);
   }
-  section.whole("socket_buffer_bytes", dds.socket_buffer_bytes, {65536, 1U << 30U});
+}
+
+void read_dds(YamlSection section, const fs::path& folder, DdsConfig& dds) {
+  section.whole("domain_id", dds.domain_id, {0, 232});
+  read_network(section, folder, dds.network);
   section.text("participant_name", dds.participant_name);
   section.whole("ros_gid_bytes", dds.ros_gid_bytes, {16, 24});
   if (dds.ros_gid_bytes != 16 && dds.ros_gid_bytes != 24) {
@@ -175,18 +184,35 @@ void read_areas(YamlSection section, const fs::path& folder, AreasConfig& areas)
   }
 }
 
+void read_log(YamlSection section, LogConfig& log) {
+  section.choice<LogLevel>("level", log.level,
+                           {{"debug", LogLevel::debug},
+                            {"info", LogLevel::info},
+                            {"warning", LogLevel::warning},
+                            {"error", LogLevel::error}});
+}
+
+void read_metrics(YamlSection section, MetricsConfig& metrics) {
+  section.text("address", metrics.address);
+  if (metrics.address.empty()) return;
+  const std::string fault = listening_address_fault(metrics.address);
+  if (!fault.empty()) section.fault("address", fault);
+}
+
 void read_server(YamlSection file, const fs::path& folder, ServerConfig& config) {
   read_sensor_name(file, folder, config.mapper.sensor);
   read_mapper(file, config.mapper);
   read_labels(file.section("labels"), config.labels);
   read_frames(file.section("frames"), config.frames);
-  read_dds(file.section("dds"), config.dds);
+  read_dds(file.section("dds"), folder, config.dds);
   read_topics(file.section("topics"), config.topics);
   read_input(file.section("input"), config.input);
   read_publish(file.section("publish"), config.publish);
   read_map(file.section("map"), config.map);
   read_occupancy(file.section("occupancy"), config.occupancy);
   read_areas(file.section("areas"), folder, config.areas);
+  read_log(file.section("log"), config.log);
+  read_metrics(file.section("metrics"), config.metrics);
 }
 
 }  // namespace

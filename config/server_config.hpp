@@ -7,6 +7,7 @@
 
 #include "config/config_error.hpp"
 #include "config/config_report.hpp"
+#include "config/dds_profile.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/mapper.hpp"
 #include "core/occupancy/occupancy_config.hpp"
@@ -48,12 +49,8 @@ struct FramesConfig {
 struct DdsConfig {
   /// 0..232, as DDS defines it; ROS_DOMAIN_ID of the ROS 2 peers.
   std::uint32_t domain_id = 0;
-  /// Off: UDP only. Shared memory does not reach across users or containers, and says so nowhere.
-  bool shared_memory = true;
-  /// IP addresses of the network interfaces that may be used; empty: all.
-  std::vector<std::string> interfaces;
-  /// Asked of the kernel for each UDP socket; net.core.rmem_max caps it.
-  std::uint32_t socket_buffer_bytes = 4U << 20U;
+  /// Transports, discovery and pacing, for the kind of network; what is set on top of it.
+  DdsChoice network;
   std::string participant_name = "stillmap_server";
   /// Length of a GID in ros_discovery_info: 24 up to ROS 2 Humble, 16 from Iron.
   std::uint32_t ros_gid_bytes = 24;
@@ -149,6 +146,19 @@ struct AreasConfig {
   double grid_window_m = 0.0;
 };
 
+enum class LogLevel { debug, info, warning, error };
+
+/// What goes to stderr.
+struct LogConfig {
+  LogLevel level = LogLevel::info;
+};
+
+/// Figures for Prometheus over HTTP.
+struct MetricsConfig {
+  /// Where it listens, as address:port; port 0 takes a free one. Empty: nowhere.
+  std::string address;
+};
+
 /// The robots that areas are kept for. Throws ConfigError with every fault: robots that do not
 /// exist (with those that do), or two of one name.
 [[nodiscard]] std::vector<RobotProfile> robots_of(const AreasConfig& areas);
@@ -165,6 +175,8 @@ struct ServerConfig {
   MapFileConfig map;
   OccupancyServing occupancy;
   AreasConfig areas;
+  LogConfig log;
+  MetricsConfig metrics;
 };
 
 /// Reads a server file (config/server/default.yaml shows every field). What the file leaves out

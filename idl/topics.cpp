@@ -16,21 +16,24 @@ TopicSpec<T> symmetric(const std::string& dds_name, const TopicQos& qos) {
 Topics Topics::in(const std::string& name_space) {
   const std::string prefix = "rt/" + name_space + "/";
   const TopicQos latched{.transient_local = true, .depth = 1};
+  const TopicQos large{.transient_local = true, .depth = 1, .bulky = true};
   const TopicQos keyed{.transient_local = true, .depth = 1, .max_keys = max_tiles};
+  const TopicQos large_keyed{
+      .transient_local = true, .depth = 1, .max_keys = max_tiles, .bulky = true};
   // Deep, so that a client that stalls for a minute still gets every pose.
   const TopicQos every_pose{.depth = 1000};
-  const TopicQos newest{.reliable = false, .depth = 1};
+  const TopicQos newest{.reliable = false, .depth = 1, .bulky = true};
   return {
       .odometry = symmetric<nav_msgs::msg::Odometry>(prefix + "odometry", every_pose),
       .tf = symmetric<tf2_msgs::msg::TFMessage>("rt/tf", {.depth = 100}),
-      .path = symmetric<nav_msgs::msg::Path>(prefix + "path", latched),
+      .path = symmetric<nav_msgs::msg::Path>(prefix + "path", large),
       .scan = symmetric<sensor_msgs::msg::PointCloud2>(prefix + "scan", newest),
-      .static_cloud = symmetric<sensor_msgs::msg::PointCloud2>(prefix + "static_cloud", latched),
+      .static_cloud = symmetric<sensor_msgs::msg::PointCloud2>(prefix + "static_cloud", large),
       .tile_index = symmetric<stillmap_msgs::msg::TileInfo>(prefix + "tile_index", keyed),
-      .tiles = symmetric<stillmap_msgs::msg::MapTile>(prefix + "tiles", keyed),
+      .tiles = symmetric<stillmap_msgs::msg::MapTile>(prefix + "tiles", large_keyed),
       .status = symmetric<stillmap_msgs::msg::Status>(prefix + "status", latched),
-      .octomap = symmetric<octomap_msgs::msg::Octomap>(prefix + "octomap", latched),
-      .traversability = symmetric<nav_msgs::msg::OccupancyGrid>(prefix + "traversability", latched),
+      .octomap = symmetric<octomap_msgs::msg::Octomap>(prefix + "octomap", large),
+      .traversability = symmetric<nav_msgs::msg::OccupancyGrid>(prefix + "traversability", large),
   };
 }
 

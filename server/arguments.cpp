@@ -1,8 +1,12 @@
 #include "server/arguments.hpp"
 
 #include <CLI/CLI.hpp>
+#include <iostream>
 #include <map>
 #include <string>
+
+#include "config/listening_address.hpp"
+#include "config/model_file.hpp"
 
 namespace stillmap {
 namespace {
@@ -17,10 +21,79 @@ constexpr const char* footer =
     "kept\n"
     "  stillmap-server --config config/server/default.yaml --map-file city.stillmap\n"
     "  stillmap-server --delivery every                   for 'stillmap replay --lossless'\n"
+    "  stillmap-server --check-config my_server.yaml      every fault of a file, or none\n"
     "Then, elsewhere: stillmap replay DATASET, stillmap watch, stillmap query, stillmap status.\n"
     "SIGINT and SIGTERM save the map and end the server with exit code 0.";
 
 constexpr int bad_usage = 2;
+
+/// What is said of logs and metrics instead of the file's.
+struct OperationArguments {
+  std::optional<LogLevel> log_level;
+  std::optional<std::string> metrics_address;
+
+  void apply_to(ServerConfig& config) const {
+    if (log_level) config.log.level = *log_level;
+    if (metrics_address) config.metrics.address = *metrics_address;
+  }
+};
+
+void add_operation_options(CLI::App& program, OperationArguments& operation) {
+  const std::map<std::string, LogLevel> levels{{"debug", LogLevel::debug},
+                                               {"info", LogLevel::info},
+                                               {"warning", LogLevel::warning},
+                                               {"error", LogLevel::error}};
+  program
+      .add_option("--log-level", operation.log_level,
+                  "Least important lines to log, instead of the file's")
+      ->option_text("debug|info|warning|error")
+      ->envname("STILLMAP_LOG_LEVEL")
+      ->transform(CLI::CheckedTransformer(levels));
+  program
+      .add_option("--metrics", operation.metrics_address,
+                  "Where Prometheus finds the metrics, instead of the file's; 127.0.0.1:9464")
+      ->option_text("ADDRESS:PORT")
+      ->check(listening_address_fault);
+}
+
+/// Throws ConfigError with every fault, or ModelError.
+Arguments check_config(const std::string& file) {
+  const ServerConfig config = load_server_config(file);
+  const auto labels = open_label_source(config.labels, config.mapper.sensor);
+  std::cout << file << " can be used; labels by " << labels->name() << "\n";
+  return {.config = std::nullopt};
+}
+
+/// What is said of the network instead of the file's.
+struct NetworkArguments {
+  std::optional<std::string> profile;
+  std::vector<std::string> peers;
+  std::optional<std::string> discovery_server;
+
+  void apply_to(DdsChoice& network) const {
+    if (profile) network.profile = *profile;
+    if (!peers.empty()) network.peers = peers;
+    if (discovery_server) network.discovery_server = *discovery_server;
+    static_cast<void>(dds_options(network, DdsRole::server));
+  }
+};
+
+void add_network_options(CLI::App& program, NetworkArguments& network) {
+  program
+      .add_option("--dds-profile", network.profile,
+                  "Kind of network, instead of the file's: host, lan, wifi, wan, no_multicast, or "
+                  "a profile's file")
+      ->envname("STILLMAP_DDS_PROFILE");
+  program
+      .add_option("--peer", network.peers,
+                  "Where to look for other processes, as HOST or HOST:PORT, without multicast")
+      ->delimiter(',')
+      ->envname("STILLMAP_PEERS");
+  program
+      .add_option("--discovery-server", network.discovery_server,
+                  "Find everybody through the discovery server at HOST or HOST:PORT")
+      ->envname("STILLMAP_DISCOVERY_SERVER");
+}
 
 }  // namespace
 
@@ -31,12 +104,16 @@ Arguments read_arguments(int argc, char** argv) {
   program.footer(footer);
   std::string config_file;
   std::optional<std::uint32_t> domain_id;
+  NetworkArguments network;
   std::optional<std::string> map_file;
   std::optional<Delivery> delivery;
+  OperationArguments operation;
+  std::string checked_file;
   program.add_option("--config", config_file, "YAML file; config/server/default.yaml explains it")
       ->check(CLI::ExistingFile);
   program.add_option("--domain", domain_id, "DDS domain, instead of the file's")
       ->check(CLI::Range(0, 232));
+  add_network_options(program, network);
   program.add_option("--map-file", map_file, "Where the map is kept, instead of the file's");
   program
       .add_option("--delivery", delivery,
@@ -44,15 +121,23 @@ Arguments read_arguments(int argc, char** argv) {
       ->option_text("latest|every")
       ->transform(CLI::CheckedTransformer(std::map<std::string, Delivery>{
           {"latest", Delivery::latest}, {"every", Delivery::every}}));
+  add_operation_options(program, operation);
+  program
+      .add_option("--check-config", checked_file,
+                  "Only say whether this file, and the model it names, can be used")
+      ->check(CLI::ExistingFile);
   try {
     program.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return {.config = std::nullopt, .exit_code = program.exit(error) == 0 ? 0 : bad_usage};
   }
+  if (!checked_file.empty()) return check_config(checked_file);
   ServerConfig config = config_file.empty() ? ServerConfig() : load_server_config(config_file);
   if (domain_id) config.dds.domain_id = *domain_id;
+  network.apply_to(config.dds.network);
   if (map_file) config.map.file = *map_file;
   if (delivery) config.input.delivery = *delivery;
+  operation.apply_to(config);
   return {.config = config};
 }
 

@@ -6,6 +6,8 @@
 
 #include "config/model_file.hpp"
 #include "server/arguments.hpp"
+#include "server/operation/log_setup.hpp"
+#include "server/operation/service_manager.hpp"
 #include "server/server.hpp"
 
 namespace {
@@ -31,18 +33,22 @@ void serve(const stillmap::ServerConfig& config) {
   }
   stillmap::Server server(config, std::move(labels));
   spdlog::info("ready: scans from rt/{}, domain {}", config.topics.points, config.dds.domain_id);
+  stillmap::tell_service_manager("READY=1");
   int signal = 0;
   sigwait(&signals, &signal);
   spdlog::info("stopping");
+  stillmap::tell_service_manager("STOPPING=1");
   server.stop();
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  stillmap::start_log(stillmap::LogLevel::info);
   try {
     const stillmap::Arguments arguments = stillmap::read_arguments(argc, argv);
     if (!arguments.config) return arguments.exit_code;
+    stillmap::set_log_level(arguments.config->log.level);
     serve(*arguments.config);
     return 0;
   } catch (const stillmap::ConfigError& error) {

@@ -92,6 +92,7 @@ bool MapSaver::is_saved() const {
 }
 
 void MapSaver::save(bool has_ended) {
+  CheckpointLog::Attempt attempt(checkpoints_);
   const std::uint64_t poses = board_.poses_added();
   RunCheckpoint checkpoint = take(false);
   // Of another map than the stored one, all is new.
@@ -100,6 +101,7 @@ void MapSaver::save(bool has_ended) {
   store_->save(checkpoint.map);
   source_.stored(checkpoint.step);
   remember_as_saved(checkpoint.map.view, poses);
+  attempt.stored();
 }
 
 void MapSaver::remember_as_saved(const MapView& view, std::uint64_t poses) {

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "core/map/map_file.hpp"
+#include "server/checkpoint_log.hpp"
 #include "server/map_board.hpp"
 
 namespace stillmap {
@@ -68,6 +69,9 @@ class MapSaver {
   /// one that it was.
   std::filesystem::path go_on_in(const std::string& name, const ReplaceRunning& replace_running);
 
+  /// Saves to the current file so far.
+  [[nodiscard]] CheckpointLog::Record checkpoints() const { return checkpoints_.record(); }
+
  private:
   [[nodiscard]] StoredMap read(TileStore& store) const;
   [[nodiscard]] bool is_saved() const;
@@ -85,6 +89,7 @@ class MapSaver {
   std::map<std::string, std::string> stored_metadata_;
   std::size_t memory_limit_bytes_;
   CheckpointSource source_;
+  CheckpointLog checkpoints_;
   std::mutex mutex_;
   std::unique_ptr<TileStore> store_;
   std::uint64_t saved_map_id_ = 0;

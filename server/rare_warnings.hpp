@@ -7,13 +7,17 @@
 
 namespace stillmap {
 
-/// Logs a warning of one kind at most every few seconds and says how many were left out, so that a
-/// fault of every scan does not flood the log. One thread uses it.
+/// Logs a warning or an error of one kind at most every few seconds and says how many were left
+/// out, so that a fault of every scan does not flood the log. One thread uses it.
 class RareWarnings {
  public:
   void warn(const std::string& kind, const std::string& text);
+  void error(const std::string& kind, const std::string& text);
 
  private:
+  /// What to log of it now; empty: nothing.
+  [[nodiscard]] std::string due(const std::string& kind, const std::string& text);
+
   struct Kind {
     std::chrono::steady_clock::time_point last;
     std::uint64_t left_out = 0;

@@ -7,13 +7,12 @@
 namespace stillmap {
 namespace {
 
-DdsOptions dds_options(const DdsConfig& config) {
-  return {.domain_id = config.domain_id,
-          .shared_memory = config.shared_memory,
-          .interfaces = config.interfaces,
-          .socket_buffer_bytes = config.socket_buffer_bytes,
-          .node_name = config.participant_name,
-          .ros_gid_bytes = config.ros_gid_bytes};
+DdsOptions server_options(const DdsConfig& config) {
+  DdsOptions options = dds_options(config.network, DdsRole::server);
+  options.domain_id = config.domain_id;
+  options.node_name = config.participant_name;
+  options.ros_gid_bytes = config.ros_gid_bytes;
+  return options;
 }
 
 std::map<std::string, std::string> file_metadata(const ServerConfig& config,
@@ -27,14 +26,14 @@ std::map<std::string, std::string> file_metadata(const ServerConfig& config,
 }
 
 /// What is wrong with this machine, in words; empty when nothing is.
-std::string socket_trouble(const DdsConfig& config) {
-  const std::uint32_t granted = granted_socket_buffer_bytes(config.socket_buffer_bytes);
-  if (granted >= config.socket_buffer_bytes) return {};
+std::string socket_trouble(std::uint32_t wanted_bytes) {
+  const std::uint32_t granted = granted_socket_buffer_bytes(wanted_bytes);
+  if (granted >= wanted_bytes) return {};
   const std::string trouble = "UDP receive buffers have " + std::to_string(granted) +
-                              " bytes instead of " + std::to_string(config.socket_buffer_bytes) +
+                              " bytes instead of " + std::to_string(wanted_bytes) +
                               ", so large clouds over UDP can get lost: sudo sysctl "
                               "net.core.rmem_max=" +
-                              std::to_string(config.socket_buffer_bytes);
+                              std::to_string(wanted_bytes);
   spdlog::warn("{}", trouble);
   return trouble;
 }
@@ -57,10 +56,10 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
       saver_(board_, config.map.file, file_metadata(config, *label_source),
              config.map.memory_limit_mib),
       tiles_(saver_.shelf(), (std::size_t{config.map.memory_limit_mib} << 20) / 8),
-      participant_(dds_options(config.dds)),
+      participant_(server_options(config.dds)),
       poses_(participant_, topics_, config.frames),
       report_(delivery_mode(config.input.delivery), label_source->name(),
-              socket_trouble(config.dds), board_, statistics_,
+              socket_trouble(participant_.options().socket_buffer_bytes), board_, statistics_,
               [this] { return receiver_->why_nothing_arrives(); }),
       atlas_(area_board_, board_, tiles_),
       planning_grid_(config.areas, config.frames.map, board_, area_board_) {
@@ -90,12 +89,14 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
   start_services(config);
   autosave_ = std::make_unique<CheckpointThread>(
       std::chrono::duration<double>(config.map.save_period_s), [this] { save_in_background(); });
+  start_metrics(config.metrics);
 }
 
 Server::~Server() = default;
 
 void Server::stop() {
   // Who asks goes first, then who brings, then who maps: nobody waits for somebody gone.
+  metrics_.reset();
   autosave_.reset();
   services_.reset();
   occupancy_services_.reset();
@@ -123,7 +124,8 @@ void Server::start_services(const ServerConfig& config) {
           },
       .show_now = [this] { mapping_->show_now(); },
       .areas = atlas_,
-      .planning_grid = planning_grid_};
+      .planning_grid = planning_grid_,
+      .log = service_log_};
   const Services names = Services::in(config.topics.name_space);
   services_ = std::make_unique<ServiceDesk>(participant_, names, context);
   occupancy_services_ = std::make_unique<OccupancyDesk>(
@@ -153,11 +155,24 @@ void Server::start_areas(const ServerConfig& config) {
                                         board_, area_board_, statistics_, publish);
 }
 
+void Server::start_metrics(const MetricsConfig& config) {
+  if (config.address.empty()) return;
+  metrics_ = std::make_unique<MetricsEndpoint>(config.address, [this]() -> MetricsSnapshot {
+    return {.status = report_.status(),
+            .stages = statistics_.stage_times(),
+            .services = service_log_.services(),
+            .checkpoints = saver_.checkpoints(),
+            .map_memory = statistics_.map_memory(),
+            .process = process_use()};
+  });
+  spdlog::info("metrics: http://{}/metrics", metrics_->address());
+}
+
 void Server::save_in_background() {
   try {
     saver_.save_if_changed();
   } catch (const MapFileError& error) {
-    spdlog::error("the map was not saved: {}", error.what());
+    save_warnings_.error("save", std::string("the map was not saved: ") + error.what());
   }
 }
 

@@ -10,12 +10,14 @@
 #include "server/map_board.hpp"
 #include "server/map_saver.hpp"
 #include "server/mapping_thread.hpp"
+#include "server/metrics/metrics_endpoint.hpp"
 #include "server/occupancy_thread.hpp"
 #include "server/planning_grid.hpp"
 #include "server/publishers/area_publisher.hpp"
 #include "server/publishers/map_publisher.hpp"
 #include "server/publishers/octomap_publisher.hpp"
 #include "server/publishers/status_publisher.hpp"
+#include "server/rare_warnings.hpp"
 #include "server/scan_receiver.hpp"
 #include "server/server_report.hpp"
 #include "server/services/occupancy_desk.hpp"
@@ -39,10 +41,12 @@ class Server {
   void start_areas(const ServerConfig& config);
   void start_services(const ServerConfig& config);
   void save_in_background();
+  void start_metrics(const MetricsConfig& config);
 
   // In the order of construction; what comes later uses what comes before.
   Topics topics_;
   Statistics statistics_;
+  ServiceLog service_log_;
   MapBoard board_;
   ScanQueue queue_;
   MapSaver saver_;
@@ -66,7 +70,9 @@ class Server {
   std::unique_ptr<OccupancyDesk> occupancy_services_;
   std::unique_ptr<RemovedDesk> removed_services_;
   std::unique_ptr<StatusPublisher> status_publisher_;
+  RareWarnings save_warnings_;
   std::unique_ptr<CheckpointThread> autosave_;
+  std::unique_ptr<MetricsEndpoint> metrics_;
 };
 
 }  // namespace stillmap

@@ -86,12 +86,11 @@ void Statistics::count(const std::string& event) {
 
 void Statistics::add_latency(const std::string& stage, double milliseconds) {
   const std::scoped_lock lock(mutex_);
-  auto known = std::ranges::find(latencies_, stage, &std::pair<std::string, LatencyWindow>::first);
-  if (known == latencies_.end()) {
-    latencies_.emplace_back(stage, LatencyWindow());
-    known = std::prev(latencies_.end());
-  }
-  known->second.add(milliseconds);
+  const auto known = std::ranges::find(stages_, stage, &StageTimes::stage);
+  StageTimes& times =
+      known == stages_.end() ? stages_.emplace_back(StageTimes{stage, {}, {}}) : *known;
+  times.recent.add(milliseconds);
+  times.all.add(milliseconds / 1000.0);
 }
 
 void Statistics::scan_took_besides_labels(double milliseconds) {
@@ -129,7 +128,19 @@ void Statistics::report_to(ServerStatus& status) const {
   status.segmentation.carried_share = labellings_.share(Labelling::carried);
   status.segmentation.unlabelled_share = labellings_.share(Labelling::none);
   status.latencies.clear();
-  for (const auto& [stage, window] : latencies_) status.latencies.push_back(window.summary(stage));
+  for (const StageTimes& times : stages_) {
+    status.latencies.push_back(times.recent.summary(times.stage));
+  }
+}
+
+std::vector<StageTimes> Statistics::stage_times() const {
+  const std::scoped_lock lock(mutex_);
+  return stages_;
+}
+
+MemoryUse Statistics::map_memory() const {
+  const std::scoped_lock lock(mutex_);
+  return map_memory_;
 }
 
 std::uint64_t Statistics::received() const {

@@ -10,6 +10,7 @@
 #include "core/label_feed.hpp"
 #include "core/map/static_map.hpp"
 #include "idl/server_status.hpp"
+#include "server/duration_histogram.hpp"
 #include "server/latency_window.hpp"
 #include "server/recent_median.hpp"
 
@@ -37,6 +38,13 @@ class LabellingWindow {
   std::deque<Labelling> last_;
 };
 
+/// How long a stage took, over the last scans and since the start.
+struct StageTimes {
+  std::string stage;
+  LatencyWindow recent;
+  DurationHistogram all;
+};
+
 /// What the server counts and times. Thread-safe.
 class Statistics {
  public:
@@ -61,6 +69,10 @@ class Statistics {
   /// Fills in counters, rates, latencies and segmentation.
   void report_to(ServerStatus& status) const;
 
+  /// In the order of first occurrence.
+  [[nodiscard]] std::vector<StageTimes> stage_times() const;
+  [[nodiscard]] MemoryUse map_memory() const;
+
   [[nodiscard]] std::uint64_t received() const;
   /// Mean time from scan to scan over the last seconds; 0 without scans.
   [[nodiscard]] double receive_period_ms() const;
@@ -78,7 +90,7 @@ class Statistics {
   // In the order of first occurrence.
   std::vector<NamedCounter> dropped_;
   std::vector<NamedCounter> events_;
-  std::vector<std::pair<std::string, LatencyWindow>> latencies_;
+  std::vector<StageTimes> stages_;
   RateWindow received_rate_;
   RateWindow mapped_rate_;
   std::string last_drop_;

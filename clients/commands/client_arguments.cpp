@@ -7,10 +7,10 @@ std::chrono::milliseconds ClientArguments::timeout() const {
 }
 
 DdsOptions ClientArguments::dds() const {
-  DdsOptions options;
+  DdsChoice choice = network;
+  if (udp_only) choice.shared_memory = false;
+  DdsOptions options = dds_options(choice, DdsRole::client);
   options.domain_id = domain;
-  options.shared_memory = !udp_only;
-  if (!interface.empty()) options.interfaces = {interface};
   return options;
 }
 
@@ -18,13 +18,32 @@ ClientOptions ClientArguments::client() const {
   return {.dds = dds(), .server_name = server_name, .request_timeout = timeout()};
 }
 
+void add_network_options(CommandHandle command, DdsChoice& network) {
+  command
+      .option("--dds-profile", network.profile,
+              "Kind of network: host, lan, wifi, wan, "
+              "no_multicast, or a file")
+      .from_environment("STILLMAP_DDS_PROFILE")
+      .with_default();
+  command.option("--interface", network.interfaces,
+                 "Use only the network interface with this address (127.0.0.1: this machine)");
+  command
+      .option("--peer", network.peers,
+              "Where to look for the server, as HOST or HOST:PORT, without multicast")
+      .from_environment("STILLMAP_PEERS")
+      .comma_separated();
+  command
+      .option("--discovery-server", network.discovery_server,
+              "Find everybody through the discovery server at HOST or HOST:PORT")
+      .from_environment("STILLMAP_DISCOVERY_SERVER");
+}
+
 void add_client_options(CommandHandle command, ClientArguments& arguments) {
   command.option("--domain", arguments.domain, "DDS domain of the server")
       .from_environment("ROS_DOMAIN_ID")
       .between(0, 232)
       .with_default();
-  command.option("--interface", arguments.interface,
-                 "Use only the network interface with this address (127.0.0.1: this machine)");
+  add_network_options(command, arguments.network);
   command.option("--server", arguments.server_name, "First part of the server's topic names")
       .with_default();
   command.flag("--udp-only", arguments.udp_only,

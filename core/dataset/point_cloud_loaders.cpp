@@ -1,8 +1,6 @@
 #include "core/dataset/point_cloud_loaders.hpp"
 
 #include <pcl/PCLPointCloud2.h>
-#include <pcl/console/print.h>
-#include <pcl/io/pcd_io.h>
 
 #include <algorithm>
 #include <cmath>
@@ -13,6 +11,8 @@
 #include <string>
 
 #include "core/dataset/dataset_error.hpp"
+#include "core/dataset/optional_part.hpp"
+#include "core/dataset/pcd_part.hpp"
 #include "core/dataset/point_cloud_header.hpp"
 
 namespace stillmap {
@@ -44,27 +44,6 @@ std::string clean_header(const CloudContent& content) {
          << content.height << "\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " << content.points() << "\nDATA "
          << content.encoding << '\n';
   return header.str();
-}
-
-/// PCL's reader over a header and a body in memory; false when it is not content.
-bool read_with_pcl(const CloudContent& content, pcl::PCLPointCloud2& cloud) {
-  // What PCL would print on the console is in our exception.
-  pcl::console::setVerbosityLevel(pcl::console::L_ALWAYS);
-  pcl::PCDReader reader;
-  std::istringstream header(clean_header(content));
-  Eigen::Vector4f origin;
-  Eigen::Quaternionf orientation;
-  int version = 0, data_type = 0;
-  unsigned int data_start = 0;
-  if (reader.readHeader(header, cloud, origin, orientation, version, data_type, data_start) < 0) {
-    return false;
-  }
-  if (content.encoding == "ascii") {
-    std::istringstream body(content.body);
-    return reader.readBodyASCII(body, cloud, version) >= 0;
-  }
-  return reader.readBodyBinary(reinterpret_cast<const unsigned char*>(content.body.data()), cloud,
-                               version, content.encoding == "binary_compressed", 0) >= 0;
 }
 
 template <class T>
@@ -144,8 +123,9 @@ pcl::PCLPointCloud2 load_pcd(const std::filesystem::path& file) {
     cloud.point_step = static_cast<std::uint32_t>(content.point_bytes());
     return cloud;
   }
+  auto* const read_with_pcl = part_function<ReadPcd>("pcd", read_pcd_name, "PCD files are read");
   try {
-    if (read_with_pcl(content, cloud) &&
+    if (read_with_pcl(clean_header(content), content.encoding, content.body, cloud) &&
         cloud.data.size() >= std::size_t{cloud.width} * cloud.height * cloud.point_step) {
       return cloud;
     }

@@ -1,8 +1,8 @@
 #include "core/evaluation/segmentation_picture.hpp"
 
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <stdexcept>
+
+#include "core/picture/png_file.hpp"
 
 namespace stillmap {
 namespace {
@@ -34,15 +34,7 @@ void write_segmentation_picture(const std::filesystem::path& file, const RangeIm
   }
   cv::Mat tall;
   cv::resize(picture, tall, {}, 1.0, pixel_height, cv::INTER_NEAREST);
-  bool written = false;
-  try {
-    written = cv::imwrite(file.string(), tall);
-  } catch (const cv::Exception&) {
-    written = false;
-  }
-  if (!written) {
-    throw std::runtime_error(file.string() + ": the picture cannot be written; check the folder");
-  }
+  write_png(file, tall);
 }
 
 }  // namespace stillmap

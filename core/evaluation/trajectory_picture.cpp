@@ -4,11 +4,12 @@
 #include <array>
 #include <cmath>
 #include <iomanip>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
+
+#include "core/picture/png_file.hpp"
 
 namespace stillmap {
 namespace {
@@ -114,19 +115,6 @@ cv::Mat draw(const Frame& frame, std::span<const Line> lines, std::span<const st
   return picture;
 }
 
-void write(const std::filesystem::path& file, const cv::Mat& picture) {
-  bool written = false;
-  try {
-    written = cv::imwrite(file.string(), picture);
-  } catch (const cv::Exception&) {
-    written = false;  // OpenCV throws for a name that ends in no picture format.
-  }
-  if (!written) {
-    throw std::runtime_error("cannot write the picture " + file.string() +
-                             ": its folder must exist and its name end in .png");
-  }
-}
-
 Line flattened(std::span<const Eigen::Vector3d> path, GroundPlane plane) {
   Line line;
   line.reserve(path.size());
@@ -157,7 +145,7 @@ void write_path_picture(const std::filesystem::path& file, std::span<const Eigen
       "truth", "estimate", plane == GroundPlane::xy ? "(x, y in m)" : "(x, z of the camera in m)"};
   cv::Mat picture = draw(frame, lines, titles);
   if (!lines[0].empty()) cv::circle(picture, frame.pixel(lines[0].front()), 6, ink, 2, cv::LINE_AA);
-  write(file, picture);
+  write_png(file, picture);
 }
 
 void write_chart(const std::filesystem::path& file, const std::string& x_title,
@@ -177,7 +165,7 @@ void write_chart(const std::filesystem::path& file, const std::string& x_title,
   frame.area.width = std::max(frame.area.width, 1e-3);
   frame.px_per_x = 1000.0 / frame.area.width;
   frame.px_per_y = 400.0 / frame.area.height;
-  write(file, draw(frame, drawn, titles));
+  write_png(file, draw(frame, drawn, titles));
 }
 
 }  // namespace stillmap

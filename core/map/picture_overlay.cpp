@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <stdexcept>
@@ -128,19 +127,6 @@ cv::Mat draw_legend(int width_px, const std::string& title,
     put_text(strip, entries[i].text, places[i] + cv::Point(swatch + 8, 0), {210, 210, 210});
   }
   return strip;
-}
-
-void write_png(const std::filesystem::path& file, const cv::Mat& picture) {
-  bool is_written = false;
-  try {
-    is_written = cv::imwrite(file.string(), picture);
-  } catch (const cv::Exception&) {  // an unknown ending
-  }
-  if (!is_written) {
-    throw std::runtime_error(file.string() +
-                             ": cannot be written; its folder must exist and be writable, its name "
-                             "end in .png");
-  }
 }
 
 }  // namespace stillmap

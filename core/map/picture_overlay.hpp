@@ -37,7 +37,4 @@ struct LegendEntry {
 [[nodiscard]] cv::Mat draw_legend(int width_px, const std::string& title,
                                   const std::vector<LegendEntry>& entries);
 
-/// Throws std::runtime_error naming the file when it cannot be written.
-void write_png(const std::filesystem::path& file, const cv::Mat& picture);
-
 }  // namespace stillmap

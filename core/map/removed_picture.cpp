@@ -8,6 +8,7 @@
 #include "core/map/picture_frame.hpp"
 #include "core/map/picture_overlay.hpp"
 #include "core/map/picture_raster.hpp"
+#include "core/picture/png_file.hpp"
 
 namespace stillmap {
 namespace {

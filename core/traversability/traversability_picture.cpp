@@ -4,13 +4,13 @@
 #include <array>
 #include <cmath>
 #include <iomanip>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <stdexcept>
 
 #include "core/map/picture_overlay.hpp"
 #include "core/map/picture_raster.hpp"
+#include "core/picture/png_file.hpp"
 #include "core/traversability/area_summary.hpp"
 
 namespace stillmap {
@@ -121,18 +121,6 @@ std::vector<LegendEntry> legend_of(const TraversabilityView& view, const AreaSum
   return entries;
 }
 
-void write_picture(const std::filesystem::path& file, const cv::Mat& picture) {
-  bool is_written = false;
-  try {
-    is_written = cv::imwrite(file.string(), picture);
-  } catch (const cv::Exception&) {  // an unknown ending
-  }
-  if (is_written) return;
-  throw std::runtime_error(file.string() +
-                           ": cannot be written; its folder must exist and be writable, its name "
-                           "end in .png");
-}
-
 }  // namespace
 
 void write_traversability_picture(const std::filesystem::path& file, const TraversabilityView& view,
@@ -152,7 +140,7 @@ void write_traversability_picture(const std::filesystem::path& file, const Trave
   cv::vconcat(picture,
               draw_legend(picture.cols, title(view, summary), legend_of(view, summary, options)),
               picture);
-  write_picture(file, picture);
+  write_png(file, picture);
 }
 
 }  // namespace stillmap

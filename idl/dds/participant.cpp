@@ -6,6 +6,7 @@
 #include <fastdds/dds/topic/Topic.hpp>
 #include <string_view>
 
+#include "idl/dds/discovery.hpp"
 #include "idl/dds/ros_graph.hpp"
 #include "idl/dds/transports.hpp"
 
@@ -22,9 +23,10 @@ DomainParticipantQos participant_qos(const DdsOptions& options) {
   qos.name(options.node_name.empty() ? "stillmap" : options.node_name);
   // ROS 2 ignores participants without it.
   constexpr std::string_view enclave = "enclave=/;";
-  qos.user_data().assign(enclave.begin(), enclave.end());
-  qos.transport().use_builtin_transports = false;
-  qos.transport().user_transports = make_transports(options);
+  qos.user_data().setValue({enclave.begin(), enclave.end()});
+  set_transports(options, qos);
+  set_discovery(options, qos);
+  set_pacing(options, qos);
   auto& builtin = qos.wire_protocol().builtin;
   builtin.readerHistoryMemoryPolicy = builtin.writerHistoryMemoryPolicy =
       eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
@@ -64,7 +66,8 @@ Participant::Handle Participant::join() const {
       static_cast<DomainId_t>(options_.domain_id), participant_qos(options_));
   if (made == nullptr) {
     throw failure("Fast DDS made no participant; check that the interfaces exist on this machine " +
-                  std::string("(`ip address`) and that /dev/shm can be written"));
+                  std::string("(`ip address`), that /dev/shm can be written, and that no other ") +
+                  "process listens at a port that was given");
   }
   const auto leave = [factory = factory_](DomainParticipant* participant) {
     participant->delete_contained_entities();
@@ -76,6 +79,7 @@ Participant::Handle Participant::join() const {
 DdsError Participant::failure(const std::string& what) const {
   std::string text = "DDS domain " + std::to_string(options_.domain_id);
   for (const std::string& address : options_.interfaces) text += ", interface " + address;
+  if (options_.listening_port != 0) text += ", port " + std::to_string(options_.listening_port);
   return DdsError(text + ": " + what);
 }
 
@@ -99,7 +103,7 @@ Participant::WriterHandle Participant::make_writer(const std::string& name, Type
                                                    DataWriterListener* listener) {
   const std::scoped_lock lock(mutex_);
   DataWriter* const made =
-      publisher_->create_datawriter(topic(name, type), writer_qos(qos), listener);
+      publisher_->create_datawriter(topic(name, type), writer_qos(qos, options_), listener);
   if (made == nullptr) throw failure("cannot write topic " + name);
   const auto remove = [this](DataWriter* writer) {
     const std::scoped_lock remove_lock(mutex_);
@@ -116,7 +120,7 @@ Participant::ReaderHandle Participant::make_reader(const std::string& name, Type
                                                    DataReaderListener* listener) {
   const std::scoped_lock lock(mutex_);
   DataReader* const made =
-      subscriber_->create_datareader(topic(name, type), reader_qos(qos), listener);
+      subscriber_->create_datareader(topic(name, type), reader_qos(qos, options_), listener);
   if (made == nullptr) throw failure("cannot read topic " + name);
   return own(*made, nullptr);
 }
@@ -130,7 +134,8 @@ Participant::ReaderHandle Participant::make_reader(const std::string& name, Type
       handle_->create_contentfilteredtopic(name + "_filtered_" + std::to_string(filters_made_++),
                                            whole, filter.expression, filter.parameters);
   if (filtered == nullptr) throw failure("cannot filter topic " + name + ": " + filter.expression);
-  DataReader* const made = subscriber_->create_datareader(filtered, reader_qos(qos), listener);
+  DataReader* const made =
+      subscriber_->create_datareader(filtered, reader_qos(qos, options_), listener);
   if (made == nullptr) {
     handle_->delete_contentfilteredtopic(filtered);
     throw failure("cannot read topic " + name);

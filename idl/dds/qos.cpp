@@ -1,11 +1,21 @@
 #include "idl/dds/qos.hpp"
 
 #include <algorithm>
+#include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
+#include <memory>
 
 namespace stillmap {
 namespace {
 
 using namespace eprosima::fastdds::dds;
+
+constexpr const char* bulk_pace = "stillmap_bulk";
+// Short, so that what is small gets through between two portions.
+constexpr std::uint32_t portions_per_s = 20;
+
+std::chrono::milliseconds milliseconds(std::uint32_t count) {
+  return std::chrono::milliseconds(count);
+}
 
 // What readers and writers share. Payloads may grow (clouds of any size); data-sharing cannot work
 // with unbounded types.
@@ -40,13 +50,20 @@ eprosima::fastrtps::Duration_t to_duration(std::chrono::milliseconds time) {
   return eprosima::fastrtps::Duration_t(std::chrono::duration<double>(time).count());
 }
 
-DataWriterQos writer_qos(const TopicQos& qos) {
+DataWriterQos writer_qos(const TopicQos& qos, const DdsOptions& options) {
   DataWriterQos out;
   set_common(out, qos);
   // The default of 3 s makes the repair of one lost fragment of a large sample take seconds.
-  out.reliable_writer_qos().times.heartbeatPeriod = to_duration(std::chrono::milliseconds(50));
-  // Asynchronous writers lose KEEP_LAST samples.
+  auto& times = out.reliable_writer_qos().times;
+  times.heartbeatPeriod = to_duration(milliseconds(options.heartbeat_ms));
+  times.nackResponseDelay = to_duration(milliseconds(options.repair_delay_ms));
+  // Asynchronous writers lose KEEP_LAST samples: those that newer ones replace before they are
+  // sent. Of what is bulky, on a slow network, that is wanted.
   out.publish_mode().kind = SYNCHRONOUS_PUBLISH_MODE;
+  if (qos.bulky && options.bulk_bytes_per_s > 0) {
+    out.publish_mode().kind = ASYNCHRONOUS_PUBLISH_MODE;
+    out.publish_mode().flow_controller_name = bulk_pace;
+  }
   // Instances of many sizes come and go: what is forgotten is to be free.
   if (qos.max_keys > 1) {
     out.endpoint().history_memory_policy = eprosima::fastrtps::rtps::DYNAMIC_RESERVE_MEMORY_MODE;
@@ -56,10 +73,22 @@ DataWriterQos writer_qos(const TopicQos& qos) {
   return out;
 }
 
-DataReaderQos reader_qos(const TopicQos& qos) {
+DataReaderQos reader_qos(const TopicQos& qos, const DdsOptions& options) {
   DataReaderQos out;
   set_common(out, qos);
+  out.reliable_reader_qos().times.heartbeatResponseDelay =
+      to_duration(milliseconds(options.repair_delay_ms));
   return out;
+}
+
+void set_pacing(const DdsOptions& options, DomainParticipantQos& qos) {
+  if (options.bulk_bytes_per_s == 0) return;
+  using eprosima::fastdds::rtps::FlowControllerDescriptor;
+  const auto pace = std::make_shared<FlowControllerDescriptor>();
+  pace->name = bulk_pace;
+  pace->max_bytes_per_period = static_cast<std::int32_t>(options.bulk_bytes_per_s / portions_per_s);
+  pace->period_ms = 1000 / portions_per_s;
+  qos.flow_controllers().push_back(pace);
 }
 
 }  // namespace stillmap

@@ -1,8 +1,11 @@
 #pragma once
 
 #include <chrono>
+#include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 #include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
+
+#include "idl/dds/dds_options.hpp"
 
 namespace stillmap {
 
@@ -18,12 +21,19 @@ struct TopicQos {
   bool keep_all = false;
   /// Keys a keyed topic may have.
   int max_keys = 1;
+  /// Large samples: they keep to DdsOptions::bulk_bytes_per_s, and a write does not wait for that.
+  bool bulky = false;
   /// Longest wait of one write for room in a keep_all history.
   std::chrono::milliseconds max_blocking{100};
 };
 
-[[nodiscard]] eprosima::fastdds::dds::DataWriterQos writer_qos(const TopicQos& qos);
-[[nodiscard]] eprosima::fastdds::dds::DataReaderQos reader_qos(const TopicQos& qos);
+[[nodiscard]] eprosima::fastdds::dds::DataWriterQos writer_qos(const TopicQos& qos,
+                                                               const DdsOptions& options);
+[[nodiscard]] eprosima::fastdds::dds::DataReaderQos reader_qos(const TopicQos& qos,
+                                                               const DdsOptions& options);
+
+/// Prepares the participant for bulky writers.
+void set_pacing(const DdsOptions& options, eprosima::fastdds::dds::DomainParticipantQos& qos);
 
 /// A span of time in Fast DDS's own type.
 [[nodiscard]] eprosima::fastrtps::Duration_t to_duration(std::chrono::milliseconds time);

@@ -10,7 +10,7 @@ std::string request_topic(const std::string& service) { return "rq/" + service +
 
 std::string reply_topic(const std::string& service) { return "rr/" + service + "Reply"; }
 
-TopicQos service_qos() { return {.depth = 100}; }
+TopicQos service_qos() { return {.depth = 100, .bulky = true}; }
 
 SampleIdentity reply_identity(const SampleInfo& request) {
   SampleIdentity identity = request.sample_identity;

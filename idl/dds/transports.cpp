@@ -1,5 +1,6 @@
 #include "idl/dds/transports.hpp"
 
+#include <fastdds/rtps/transport/TCPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <sys/socket.h>
@@ -7,6 +8,7 @@
 
 #include <cerrno>
 #include <cstring>
+#include <memory>
 #include <string>
 
 #include "idl/dds/dds_error.hpp"
@@ -15,21 +17,44 @@ namespace stillmap {
 
 using namespace eprosima::fastdds::rtps;
 
-std::vector<std::shared_ptr<TransportDescriptorInterface>> make_transports(
-    const DdsOptions& options) {
-  std::vector<std::shared_ptr<TransportDescriptorInterface>> transports;
+namespace {
+
+// Of a peer without a port, as many processes are looked for.
+constexpr std::uint32_t processes_of_peer = 16;
+
+std::shared_ptr<TransportDescriptorInterface> udp_transport(const DdsOptions& options) {
   const auto udp = std::make_shared<UDPv4TransportDescriptor>();
   udp->sendBufferSize = udp->receiveBufferSize = options.socket_buffer_bytes;
+  udp->maxMessageSize = options.max_datagram_bytes;
+  udp->maxInitialPeersRange = processes_of_peer;
   udp->interfaceWhiteList = options.interfaces;
-  transports.push_back(udp);
-  if (options.shared_memory) {
-    // Room for many clouds under way; the default 512 KB loses them.
-    constexpr std::uint32_t segment_bytes = 64U << 20U;
-    const auto shared_memory = std::make_shared<SharedMemTransportDescriptor>();
-    shared_memory->segment_size(segment_bytes);
-    transports.push_back(shared_memory);
-  }
-  return transports;
+  return udp;
+}
+
+std::shared_ptr<TransportDescriptorInterface> tcp_transport(const DdsOptions& options) {
+  const auto tcp = std::make_shared<TCPv4TransportDescriptor>();
+  tcp->sendBufferSize = tcp->receiveBufferSize = options.socket_buffer_bytes;
+  tcp->maxMessageSize = options.max_datagram_bytes;
+  tcp->interfaceWhiteList = options.interfaces;
+  // Each message would wait for the acknowledgement of the one before.
+  tcp->enable_tcp_nodelay = true;
+  // TCP has checksums of its own.
+  tcp->calculate_crc = tcp->check_crc = false;
+  if (options.listening_port != 0) tcp->add_listener_port(options.listening_port);
+  return tcp;
+}
+
+}  // namespace
+
+void set_transports(const DdsOptions& options, eprosima::fastdds::dds::DomainParticipantQos& qos) {
+  qos.transport().use_builtin_transports = false;
+  auto& transports = qos.transport().user_transports;
+  const bool udp = options.transport == NetworkTransport::udp;
+  transports.push_back(udp ? udp_transport(options) : tcp_transport(options));
+  if (!options.shared_memory) return;
+  const auto shared_memory = std::make_shared<SharedMemTransportDescriptor>();
+  shared_memory->segment_size(options.shared_memory_mib << 20U);
+  transports.push_back(shared_memory);
 }
 
 std::uint32_t granted_socket_buffer_bytes(std::uint32_t wanted_bytes) {

@@ -1,18 +1,15 @@
 #pragma once
 
-#include <fastdds/rtps/transport/TransportDescriptorInterface.h>
-
 #include <cstdint>
-#include <memory>
-#include <vector>
+#include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 
 #include "idl/dds/dds_options.hpp"
 
 namespace stillmap {
 
-/// UDP with large socket buffers, and shared memory unless it is switched off.
-[[nodiscard]] std::vector<std::shared_ptr<eprosima::fastdds::rtps::TransportDescriptorInterface>>
-make_transports(const DdsOptions& options);
+/// Sets what carries the participant's messages: UDP with large socket buffers or TCP, and shared
+/// memory unless it is switched off.
+void set_transports(const DdsOptions& options, eprosima::fastdds::dds::DomainParticipantQos& qos);
 
 /// Receive buffer that the kernel really gives to a UDP socket asking for `wanted_bytes`
 /// (net.core.rmem_max caps it). Below 4 MB, large samples get lost over UDP. Throws DdsError when

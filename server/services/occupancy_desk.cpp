@@ -14,12 +14,15 @@ OccupancyDesk::OccupancyDesk(Participant& participant, const Services& names,
       occupancy_(occupancy),
       map_frame_(std::move(map_frame)),
       octomap_binary_(participant, names.octomap_binary,
-                      [this](const auto&) { return octomap(true); }),
+                      counted(context_.log, names.octomap_binary,
+                              [this](const auto&) { return octomap(true); })),
       octomap_full_(participant, names.octomap_full,
-                    [this](const auto&) { return octomap(false); }),
-      query_occupancy_(participant, names.query_occupancy, [this](const auto& request) {
-        return query_occupancy(context_, occupancy_, request);
-      }) {}
+                    counted(context_.log, names.octomap_full,
+                            [this](const auto&) { return octomap(false); })),
+      query_occupancy_(participant, names.query_occupancy,
+                       counted(context_.log, names.query_occupancy, [this](const auto& request) {
+                         return query_occupancy(context_, occupancy_, request);
+                       })) {}
 
 octomap_msgs::srv::GetOctomap_Response OccupancyDesk::octomap(bool binary) const {
   octomap_msgs::srv::GetOctomap_Response response;

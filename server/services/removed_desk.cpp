@@ -47,9 +47,11 @@ RemovedDesk::RemovedDesk(Participant& participant, const Services& names, Servic
     : context_(std::move(context)),
       source_(std::move(source)),
       get_removed_(participant, names.get_removed,
-                   [this](const auto& request) { return removed(request); }),
+                   counted(context_.log, names.get_removed,
+                           [this](const auto& request) { return removed(request); })),
       restore_removed_(participant, names.restore_removed,
-                       [this](const auto& request) { return restore(request); }) {}
+                       counted(context_.log, names.restore_removed,
+                               [this](const auto& request) { return restore(request); })) {}
 
 stillmap_msgs::srv::GetRemoved_Response RemovedDesk::removed(
     const stillmap_msgs::srv::GetRemoved_Request& request) const {

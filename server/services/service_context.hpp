@@ -11,6 +11,7 @@
 #include "server/map_board.hpp"
 #include "server/map_saver.hpp"
 #include "server/planning_grid.hpp"
+#include "server/services/service_log.hpp"
 
 namespace stillmap {
 
@@ -30,6 +31,7 @@ struct ServiceContext {
   std::function<void()> show_now;
   const AreaAtlas& areas;
   const PlanningGrid& planning_grid;
+  ServiceLog& log;
 };
 
 /// Status of a reply about this view.

@@ -48,7 +48,9 @@ TEST(ServerConfig, ReadsFieldsOfEveryKind) {
   const ServerConfig config = load(R"(
 sensor: vlp_16
 labels: {source: none, engine: onednn, precision: int8, threads: 3}
-dds: {domain_id: 42, shared_memory: false, interfaces: [127.0.0.1, "fe80::1"], ros_gid_bytes: 16}
+dds: {domain_id: 42, shared_memory: false, interfaces: [127.0.0.1],
+      profile: wifi, peers: [a, "b:1"], discovery_server: c, socket_buffer_bytes: 99999,
+      ros_gid_bytes: 16}
 topics: {odometry_prior: ""}
 input: {fields: {label: [label, class]}, label_kind: classes}
 prepare: {ego_hull_lidar_m: [-1, -0.5, -1, 1, 0.5, 0]}
@@ -61,8 +63,12 @@ static_map: {min_points: 5}
   EXPECT_EQ(config.labels.engine.precision, EngineChoice::Numbers::int8);
   EXPECT_EQ(config.labels.engine.threads, 3);
   EXPECT_EQ(config.dds.domain_id, 42U);
-  EXPECT_FALSE(config.dds.shared_memory);
-  EXPECT_THAT(config.dds.interfaces, ::testing::ElementsAre("127.0.0.1", "fe80::1"));
+  EXPECT_EQ(config.dds.network.shared_memory, std::optional<bool>(false));
+  EXPECT_THAT(config.dds.network.interfaces, ::testing::ElementsAre("127.0.0.1"));
+  EXPECT_EQ(config.dds.network.profile, "wifi");
+  EXPECT_THAT(config.dds.network.peers, ::testing::ElementsAre("a", "b:1"));
+  EXPECT_EQ(config.dds.network.discovery_server, "c");
+  EXPECT_EQ(config.dds.network.socket_buffer_bytes, 99999U);
   EXPECT_EQ(config.dds.ros_gid_bytes, 16U);
   EXPECT_EQ(config.topics.odometry_prior, "");
   EXPECT_THAT(config.input.fields.label, ::testing::ElementsAre("label", "class"));
@@ -126,7 +132,8 @@ TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
               HasSubstr("minimum above"));
   EXPECT_THAT(refusal_of("static_map: {tile_size_m: 20.1}"), HasSubstr("static_map"));
   EXPECT_THAT(refusal_of("dds: {ros_gid_bytes: 20}"), HasSubstr("must be 24"));
-  EXPECT_THAT(refusal_of("dds: {interfaces: [eth0]}"), HasSubstr("not an IP address"));
+  EXPECT_THAT(refusal_of("dds: {interfaces: [eth0]}"), HasSubstr("not an IPv4 address"));
+  EXPECT_THAT(refusal_of("dds: {profile: ether}"), HasSubstr("DDS profile 'ether'"));
   EXPECT_THAT(refusal_of("topics: {points: 'a b'}"), HasSubstr("topics.points"));
   EXPECT_THAT(refusal_of("frames: {map: ''}"), HasSubstr("frames.map"));
   EXPECT_THAT(refusal_of("map: {datum: '48'}"), HasSubstr("latitude,longitude"));

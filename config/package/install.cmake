@@ -1,0 +1,32 @@
+# `cmake --install`: what a user needs, under the prefix. Programs find it from where they lie
+# themselves. Components become Debian packages (deb.cmake).
+install(TARGETS stillmap-server RUNTIME DESTINATION bin COMPONENT server)
+install(TARGETS stillmap RUNTIME DESTINATION bin COMPONENT tools)
+install(TARGETS stillmap_part_pcd stillmap_part_geotiff
+  LIBRARY DESTINATION ${STILLMAP_PART_FOLDER} COMPONENT formats)
+
+foreach(folder models robots sensors labels server dds ros)
+  if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/config/${folder})
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/config/${folder} DESTINATION share/stillmap COMPONENT data)
+  endif()
+endforeach()
+install(DIRECTORY ${PROJECT_SOURCE_DIR}/idl/msg/ DESTINATION share/stillmap/idl COMPONENT data
+  FILES_MATCHING PATTERN "*.idl")
+
+install(FILES ${PROJECT_SOURCE_DIR}/README.md DESTINATION share/doc/stillmap COMPONENT tools)
+install(FILES ${PROJECT_SOURCE_DIR}/clients/example/follow_and_query.cpp
+  DESTINATION share/doc/stillmap/examples COMPONENT tools)
+foreach(package server:stillmap-server tools:stillmap data:stillmap-data formats:stillmap-formats)
+  string(REPLACE ":" ";" package ${package})
+  list(GET package 0 component)
+  list(GET package 1 name)
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION share/doc/${name} RENAME copyright
+    COMPONENT ${component})
+endforeach()
+
+install(FILES ${CMAKE_CURRENT_LIST_DIR}/60-stillmap.conf DESTINATION lib/sysctl.d COMPONENT server)
+# The prefix is known when installing; /usr keeps its configuration in /etc.
+set(STILLMAP_PACKAGE_SOURCES ${CMAKE_CURRENT_LIST_DIR})
+configure_file(${CMAKE_CURRENT_LIST_DIR}/install_service.cmake.in
+  ${PROJECT_BINARY_DIR}/install_service.cmake @ONLY)
+install(SCRIPT ${PROJECT_BINARY_DIR}/install_service.cmake COMPONENT server)

@@ -1,0 +1,24 @@
+// Compiled for any x86-64, whatever the rest is compiled for: says why the program cannot run
+// before an instruction that the processor lacks would end it without a word.
+#include <unistd.h>
+
+#include <cstring>
+
+namespace {
+
+void say(const char* text) {
+  // Nothing is to be done where even stderr is gone.
+  if (write(STDERR_FILENO, text, std::strlen(text)) < 0) _exit(1);
+}
+
+/// Before every other initialisation of this program, which may use such instructions.
+__attribute__((constructor(101))) void check_processor() {
+  __builtin_cpu_init();
+  if (__builtin_cpu_supports(STILLMAP_ARCH) != 0) return;
+  say("this program was built for " STILLMAP_ARCH
+      " processors (AVX2; x86 since 2013), and this one is older; build it from source with "
+      "cmake -DSTILLMAP_ARCH=\n");
+  _exit(1);
+}
+
+}  // namespace

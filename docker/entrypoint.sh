@@ -1,0 +1,14 @@
+#!/bin/sh
+# `docker run IMAGE` is the server, `docker run IMAGE replay /dataset` a command of stillmap, and
+# `docker run IMAGE sh` a shell. ROS_DOMAIN_ID holds for all of them.
+set -eu
+case ${1-stillmap-server} in
+  stillmap-server)
+    [ $# -eq 0 ] || shift
+    set -- stillmap-server --config "${STILLMAP_CONFIG:-/etc/stillmap/server.yaml}" "$@"
+    [ -z "${ROS_DOMAIN_ID-}" ] || set -- "$@" --domain "$ROS_DOMAIN_ID"
+    ;;
+  stillmap | sh | bash | /*) ;;
+  *) set -- stillmap "$@" ;;
+esac
+exec "$@"

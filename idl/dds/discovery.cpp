@@ -1,0 +1,149 @@
+#include "idl/dds/discovery.hpp"
+
+#include <arpa/inet.h>
+#include <fastrtps/utils/IPLocator.h>
+#include <netdb.h>
+#include <netinet/in.h>
+
+#include <array>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "idl/dds/dds_error.hpp"
+#include "idl/dds/qos.hpp"
+
+namespace stillmap {
+namespace {
+
+using eprosima::fastdds::dds::DomainParticipantQos;
+using eprosima::fastrtps::rtps::BuiltinAttributes;
+using eprosima::fastrtps::rtps::GuidPrefix_t;
+using eprosima::fastrtps::rtps::IPLocator;
+using eprosima::fastrtps::rtps::Locator_t;
+using eprosima::fastrtps::rtps::RemoteServerAttributes;
+
+constexpr const char* this_machine = "127.0.0.1";
+
+std::string ipv4_of(const std::string& host) {
+  addrinfo wanted{};
+  wanted.ai_family = AF_INET;
+  addrinfo* found = nullptr;
+  const int error = ::getaddrinfo(host.c_str(), nullptr, &wanted, &found);
+  if (error != 0) {
+    throw DdsError("no IPv4 address is known for '" + host + "': " + ::gai_strerror(error));
+  }
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(found, &::freeaddrinfo);
+  std::array<char, INET_ADDRSTRLEN> text{};
+  const auto* address = reinterpret_cast<const sockaddr_in*>(found->ai_addr);
+  ::inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size());
+  return text.data();
+}
+
+/// Port 0 stands for the usual ones.
+Locator_t udp_locator(const NetworkAddress& address) {
+  Locator_t locator(address.port);
+  locator.kind = LOCATOR_KIND_UDPv4;
+  if (!address.host.empty()) IPLocator::setIPv4(locator, ipv4_of(address.host));
+  return locator;
+}
+
+Locator_t tcp_locator(const NetworkAddress& address) {
+  Locator_t locator;
+  locator.kind = LOCATOR_KIND_TCPv4;
+  IPLocator::setIPv4(locator, ipv4_of(address.host));
+  // The logical port stays 0: the usual ones are tried.
+  IPLocator::setPhysicalPort(locator, address.port);
+  return locator;
+}
+
+/// The multicast address where DDS processes of a domain announce themselves.
+Locator_t domain_multicast(std::uint32_t domain_id) {
+  const auto port = static_cast<std::uint16_t>(7400 + 250 * domain_id);
+  return udp_locator({.host = "239.255.0.1", .port = port});
+}
+
+/// This process at a port of the interfaces that it may use.
+std::vector<Locator_t> own_locators(const DdsOptions& options, std::uint16_t port) {
+  std::vector<Locator_t> locators;
+  for (const std::string& address : options.interfaces) {
+    locators.push_back(udp_locator({.host = address, .port = port}));
+  }
+  if (locators.empty()) locators.push_back(udp_locator({.host = {}, .port = port}));
+  return locators;
+}
+
+void listen_at(const DdsOptions& options, DomainParticipantQos& qos) {
+  BuiltinAttributes& builtin = qos.wire_protocol().builtin;
+  auto& data = qos.wire_protocol().default_unicast_locator_list;
+  // Where anything is listed, nothing is added: without multicast addresses, there is none.
+  for (const Locator_t& own : own_locators(options, options.listening_port)) {
+    builtin.metatrafficUnicastLocatorList.push_back(own);
+    if (options.listening_port != 0) data.push_back(own);
+  }
+  if (options.multicast) {
+    builtin.metatrafficMulticastLocatorList.push_back(domain_multicast(options.domain_id));
+  }
+  if (options.listening_port == 0 || !options.shared_memory) return;
+  Locator_t shared_memory;
+  shared_memory.kind = LOCATOR_KIND_SHM;
+  data.push_back(shared_memory);
+}
+
+void look_for_peers(const DdsOptions& options, BuiltinAttributes& builtin) {
+  const bool tcp = options.transport == NetworkTransport::tcp;
+  auto& peers = builtin.initialPeersList;
+  for (const NetworkAddress& peer : options.peers) {
+    peers.push_back(tcp ? tcp_locator(peer) : udp_locator(peer));
+  }
+  if (tcp) return;
+  if (!options.multicast) peers.push_back(udp_locator({.host = this_machine, .port = 0}));
+  // Where peers are listed, multicast is used only when it is listed as well.
+  if (options.multicast && !options.peers.empty()) {
+    peers.push_back(domain_multicast(options.domain_id));
+  }
+}
+
+/// What ROS 2 and `fastdds discovery` call server 0.
+GuidPrefix_t server_prefix() {
+  GuidPrefix_t prefix;
+  std::istringstream("44.53.00.5f.45.50.52.4f.53.49.4d.41") >> prefix;
+  return prefix;
+}
+
+void be_discovery_server(const DdsOptions& options, DomainParticipantQos& qos) {
+  BuiltinAttributes& builtin = qos.wire_protocol().builtin;
+  qos.wire_protocol().prefix = server_prefix();
+  builtin.discovery_config.discoveryProtocol =
+      eprosima::fastrtps::rtps::DiscoveryProtocol_t::SERVER;
+  for (const Locator_t& own : own_locators(options, options.discovery_port)) {
+    builtin.metatrafficUnicastLocatorList.push_back(own);
+  }
+}
+
+void register_with(const NetworkAddress& server, BuiltinAttributes& builtin) {
+  RemoteServerAttributes remote;
+  remote.guidPrefix = server_prefix();
+  remote.metatrafficUnicastLocatorList.push_back(udp_locator(server));
+  builtin.discovery_config.discoveryProtocol =
+      eprosima::fastrtps::rtps::DiscoveryProtocol_t::CLIENT;
+  builtin.discovery_config.m_DiscoveryServers.push_back(remote);
+}
+
+}  // namespace
+
+void set_discovery(const DdsOptions& options, DomainParticipantQos& qos) {
+  BuiltinAttributes& builtin = qos.wire_protocol().builtin;
+  if (options.discovery_port != 0) return be_discovery_server(options, qos);
+  const bool udp = options.transport == NetworkTransport::udp;
+  // TCP peers look for the domain's first process at a port.
+  if (!udp && options.listening_port != 0) qos.wire_protocol().participant_id = 0;
+  if (udp && (!options.multicast || options.listening_port != 0)) listen_at(options, qos);
+  if (!options.discovery_server.host.empty()) {
+    return register_with(options.discovery_server, builtin);
+  }
+  look_for_peers(options, builtin);
+}
+
+}  // namespace stillmap

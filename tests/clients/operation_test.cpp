@@ -1,0 +1,208 @@
+// The real programs as those see them who operate them.
+#include <sys/socket.h>
+#include <sys/un.h>
+
+#include <chrono>
+#include <map>
+#include <regex>
+#include <sstream>
+
+#include "tests/clients/command_test.hpp"
+#include "tests/clients/http_get.hpp"
+
+namespace stillmap::test {
+namespace {
+
+class OperationTest : public CommandTest {
+ protected:
+  [[nodiscard]] std::string on_domain() const { return " --domain " + std::to_string(domain_); }
+
+  [[nodiscard]] std::string server_command(const std::string& more = "") const {
+    return stillmap_server_program() + " --map-file " + path("server.stillmap") + on_domain() +
+           " " + more;
+  }
+
+  [[nodiscard]] bool answers() const {
+    return run("status --timeout 30" + on_domain()).exit_code == 0;
+  }
+
+  int domain_ = free_domain();
+};
+
+/// Samples of an exposition by name and labels as they are written. Fails the test for a line that
+/// is none, or whose family has no type.
+std::map<std::string, double> samples_of(const std::string& exposition) {
+  static const std::regex sample(
+      R"re(([a-zA-Z_:][a-zA-Z0-9_:]*)(\{[a-z_]+="[^"\\]*"(,[a-z_]+="[^"\\]*")*\})? (\S+))re");
+  static const std::regex type(R"(# TYPE (\S+) (counter|gauge|histogram))");
+  std::map<std::string, double> samples;
+  std::map<std::string, std::string> types;
+  std::istringstream lines(exposition);
+  for (std::string line; std::getline(lines, line);) {
+    std::smatch match;
+    if (std::regex_match(line, match, type)) {
+      types[match[1]] = match[2];
+    } else if (!line.starts_with("# HELP ")) {
+      EXPECT_TRUE(std::regex_match(line, match, sample)) << line;
+      const std::string family =
+          std::regex_replace(match[1].str(), std::regex("_(bucket|sum|count)$"), "");
+      EXPECT_TRUE(types.contains(match[1]) || types.contains(family)) << line;
+      samples[match[1].str() + match[2].str()] = std::stod(match[4]);
+    }
+  }
+  return samples;
+}
+
+TEST_F(OperationTest, MetricsMoveWithScansAndRequests) {
+  simulate("city", 8);
+  const int port = HeldPort().number();
+  BackgroundProcess server(
+      server_command("--delivery every --metrics 127.0.0.1:" + std::to_string(port)),
+      folder_ / "server.log");
+  ASSERT_TRUE(answers()) << content("server.log");
+  auto before = samples_of(http_get(port, "/metrics"));
+  EXPECT_EQ(before.at("stillmap_scans_mapped_total"), 0.0);
+  ASSERT_EQ(run("replay " + path("city") + " --lossless --timeout 30" + on_domain()).exit_code, 0);
+  ASSERT_EQ(run("save" + on_domain()).exit_code, 0);
+  auto after = samples_of(http_get(port, "/metrics"));
+  EXPECT_EQ(after.at("stillmap_scans_received_total"), 8.0);
+  EXPECT_EQ(after.at("stillmap_scans_mapped_total"), 8.0);
+  EXPECT_EQ(after.at(R"(stillmap_stage_duration_seconds_bucket{stage="total",le="+Inf"})"), 8.0);
+  EXPECT_EQ(after.at(R"(stillmap_stage_duration_seconds_count{stage="register"})"), 8.0);
+  EXPECT_GT(after.at(R"(stillmap_stage_duration_seconds_sum{stage="total"})"), 0.0);
+  const std::string status_answers =
+      R"(stillmap_service_requests_total{service="stillmap/get_status",code="ok"})";
+  EXPECT_GT(after.at(status_answers), before.at(status_answers));
+  EXPECT_EQ(after.at(R"(stillmap_service_requests_total{service="stillmap/save_map",code="ok"})"),
+            1.0);
+  EXPECT_GE(after.at("stillmap_checkpoint_duration_seconds_count"), 1.0);
+  EXPECT_GT(after.at("stillmap_checkpoint_last_success_timestamp_seconds"), 1.6e9);
+  EXPECT_GT(after.at("stillmap_map_voxels"), 0.0);
+  EXPECT_GT(after.at("process_resident_memory_bytes"), 1e7);
+  EXPECT_EQ(http_get(port, "/elsewhere"), "");
+  EXPECT_EQ(server.stop(), 0) << content("server.log");
+  EXPECT_EQ(http_get(port, "/metrics"), "");
+}
+
+TEST_F(OperationTest, AMetricsPortThatIsTakenIsNamed) {
+  const HeldPort held;
+  const std::string address = "127.0.0.1:" + std::to_string(held.number());
+  BackgroundProcess server(server_command("--metrics " + address), folder_ / "server.log");
+  EXPECT_EQ(server.wait(), 1);
+  EXPECT_THAT(content("server.log"), AllOf(HasSubstr(address), HasSubstr("taken")));
+  BackgroundProcess nonsense(server_command("--metrics everywhere"), folder_ / "nonsense.log");
+  EXPECT_EQ(nonsense.wait(), 2);
+  EXPECT_THAT(content("nonsense.log"), HasSubstr("'everywhere' is not an IP address"));
+}
+
+TEST_F(OperationTest, HealthSaysWhetherTheServerAnswersAndMaps) {
+  const ProcessResult nobody = run("health --timeout 0.5" + on_domain());
+  EXPECT_EQ(nobody.exit_code, 1);
+  EXPECT_THAT(nobody.out, AllOf(HasSubstr("unhealthy: "), HasSubstr(std::to_string(domain_))));
+  BackgroundProcess server(server_command(), folder_ / "server.log");
+  const ProcessResult alive = run("health --timeout 30" + on_domain());
+  EXPECT_EQ(alive.exit_code, 0) << alive.out;
+  EXPECT_THAT(alive.out, testing::StartsWith("healthy: "));
+  const ProcessResult idle = run("health --mapping --timeout 30" + on_domain());
+  EXPECT_EQ(idle.exit_code, 1);
+  EXPECT_THAT(idle.out, HasSubstr("unhealthy: no scans arrive"));
+  EXPECT_EQ(server.stop(), 0);
+}
+
+TEST_F(OperationTest, ChecksAConfigurationWithoutStarting) {
+  write("good.yaml", "sensor: vlp_16\nlabels: {source: none}\n");
+  write("bad.yaml",
+        "sensor: vlp_61\nmap: {save_period_s: -1}\nmetrics: {address: x}\nlog: {level: all}\n");
+  write("no_model.yaml", "labels: {model: missing}\n");
+  const auto check = [&](const std::string& file) {
+    BackgroundProcess server(stillmap_server_program() + " --check-config " + path(file),
+                             folder_ / "check.log");
+    return server.wait();
+  };
+  EXPECT_EQ(check("good.yaml"), 0) << content("check.log");
+  EXPECT_THAT(content("check.log"), HasSubstr("can be used"));
+  EXPECT_EQ(check("bad.yaml"), 2);
+  EXPECT_THAT(content("check.log"), AllOf(HasSubstr("vlp_61"), HasSubstr("save_period_s"),
+                                          HasSubstr("metrics.address"), HasSubstr("log.level")));
+  EXPECT_EQ(check("no_model.yaml"), 2);
+  EXPECT_THAT(content("check.log"), HasSubstr("missing"));
+}
+
+TEST_F(OperationTest, LogsByLevelAndForTheJournalWithoutASecondClock) {
+  const auto log_of = [&](const std::string& environment, const std::string& options) {
+    write("server.log", "");
+    BackgroundProcess server("env " + environment + " " + server_command(options),
+                             folder_ / "server.log");
+    EXPECT_TRUE(answers());
+    EXPECT_EQ(server.stop(), 0);
+    return content("server.log");
+  };
+  const std::string plain = log_of("-u JOURNAL_STREAM", "");
+  EXPECT_THAT(plain, testing::ContainsRegex("20[0-9]+-[0-9]+-[0-9]+T[0-9:.+]+ info ready: "));
+  const std::string journal =
+      log_of("JOURNAL_STREAM=$(stat -c %d:%i " + path("server.log") + ")", "");
+  EXPECT_THAT(journal, testing::ContainsRegex("(^|\n)<6>ready: "));
+  EXPECT_THAT(journal, testing::Not(HasSubstr(" info ")));
+  EXPECT_THAT(log_of("-u JOURNAL_STREAM", "--log-level debug"), HasSubstr("get_status: ok in "));
+  const std::string quiet = log_of("STILLMAP_LOG_LEVEL=error", "");
+  EXPECT_THAT(quiet, testing::Not(HasSubstr("ready")));
+  EXPECT_THAT(log_of("STILLMAP_LOG_LEVEL=error", "--log-level info"), HasSubstr("ready"));
+}
+
+TEST_F(OperationTest, SavesTheMapWithinWhatDockerWaits) {
+  simulate("city", 30);
+  BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
+  ASSERT_TRUE(answers()) << content("server.log");
+  BackgroundProcess replay(
+      stillmap_program() + " replay " + path("city") + " --lossless --timeout 30" + on_domain(),
+      folder_ / "replay.log");
+  while (run("health --mapping" + on_domain()).exit_code != 0) {
+  }
+  const auto began = std::chrono::steady_clock::now();
+  EXPECT_EQ(server.stop(), 0) << content("server.log");
+  EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(10));
+  const ProcessResult info = run("map-info --json " + path("server.stillmap"));
+  ASSERT_EQ(info.exit_code, 0) << info.err;
+  EXPECT_THAT(content("server.log"), HasSubstr("stopping"));
+}
+
+/// Where systemd would listen.
+class NotifySocket {
+ public:
+  explicit NotifySocket(const std::string& file)
+      : socket_(socket(AF_UNIX, SOCK_DGRAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_un address{};
+    address.sun_family = AF_UNIX;
+    file.copy(address.sun_path, sizeof address.sun_path - 1);
+    EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
+    const timeval patience{.tv_sec = 60, .tv_usec = 0};
+    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+  }
+  ~NotifySocket() { close(socket_); }
+  NotifySocket(const NotifySocket&) = delete;
+  NotifySocket& operator=(const NotifySocket&) = delete;
+
+  [[nodiscard]] std::string next() const {
+    std::array<char, 256> text{};
+    const ssize_t got = recv(socket_, text.data(), text.size(), 0);
+    return got < 0 ? "nothing" : std::string(text.data(), static_cast<std::size_t>(got));
+  }
+
+ private:
+  int socket_;
+};
+
+TEST_F(OperationTest, TellsSystemdThatItIsReadyAndThatItStops) {
+  // A socket's name has room for 107 characters.
+  const std::string name = "/tmp/stillmap_notify_" + std::to_string(getpid());
+  const NotifySocket systemd(name);
+  BackgroundProcess server("env NOTIFY_SOCKET=" + name + " " + server_command(),
+                           folder_ / "server.log");
+  EXPECT_EQ(systemd.next(), "READY=1") << content("server.log");
+  EXPECT_EQ(server.stop(), 0);
+  EXPECT_EQ(systemd.next(), "STOPPING=1");
+  std::filesystem::remove(name);
+}
+
+}  // namespace
+}  // namespace stillmap::test

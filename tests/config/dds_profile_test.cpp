@@ -1,0 +1,151 @@
+#include "config/dds_profile.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "tests/config/config_files.hpp"
+
+namespace stillmap {
+namespace {
+
+using test::refusal;
+using test::shipped;
+using test::write_file;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsSupersetOf;
+
+constexpr const char* whole_file =
+    "transport: udp\nserver_port: 7500\nshared_memory: false\nshared_memory_mib: 8\n"
+    "multicast: false\ninterfaces: [10.0.0.1]\npeers: [10.0.0.2, 'there:7412']\n"
+    "discovery_server: 10.0.0.3\nsocket_buffer_bytes: 100000\nmax_datagram_bytes: 1400\n"
+    "heartbeat_ms: 70\nrepair_delay_ms: 9\nbulk_bytes_per_s: 500000\n";
+
+TEST(DdsProfileFile, EveryFieldIsRead) {
+  const DdsProfile profile = read_dds_profile(write_file("radio.yaml", whole_file));
+  EXPECT_EQ(profile.server_port, 7500);
+  const DdsOptions& options = profile.options;
+  EXPECT_EQ(options.transport, NetworkTransport::udp);
+  EXPECT_FALSE(options.shared_memory);
+  EXPECT_EQ(options.shared_memory_mib, 8U);
+  EXPECT_FALSE(options.multicast);
+  EXPECT_THAT(options.interfaces, ElementsAre("10.0.0.1"));
+  EXPECT_THAT(options.peers,
+              ElementsAre(NetworkAddress{"10.0.0.2", 0}, NetworkAddress{"there", 7412}));
+  EXPECT_EQ(options.discovery_server, (NetworkAddress{"10.0.0.3", 0}));
+  EXPECT_EQ(options.socket_buffer_bytes, 100000U);
+  EXPECT_EQ(options.max_datagram_bytes, 1400U);
+  EXPECT_EQ(options.heartbeat_ms, 70U);
+  EXPECT_EQ(options.repair_delay_ms, 9U);
+  EXPECT_EQ(options.bulk_bytes_per_s, 500000U);
+}
+
+TEST(DdsProfileFile, LanIsWhatHoldsWithoutAnyFile) {
+  const DdsOptions lan = load_dds_profile("lan").options;
+  const DdsOptions built_in;
+  EXPECT_EQ(lan.transport, built_in.transport);
+  EXPECT_EQ(load_dds_profile("lan").server_port, built_in.listening_port);
+  EXPECT_EQ(lan.shared_memory, built_in.shared_memory);
+  EXPECT_EQ(lan.shared_memory_mib, built_in.shared_memory_mib);
+  EXPECT_EQ(lan.multicast, built_in.multicast);
+  EXPECT_EQ(lan.interfaces, built_in.interfaces);
+  EXPECT_EQ(lan.peers, built_in.peers);
+  EXPECT_EQ(lan.discovery_server, built_in.discovery_server);
+  EXPECT_EQ(lan.socket_buffer_bytes, built_in.socket_buffer_bytes);
+  EXPECT_EQ(lan.max_datagram_bytes, built_in.max_datagram_bytes);
+  EXPECT_EQ(lan.heartbeat_ms, built_in.heartbeat_ms);
+  EXPECT_EQ(lan.repair_delay_ms, built_in.repair_delay_ms);
+  EXPECT_EQ(lan.bulk_bytes_per_s, built_in.bulk_bytes_per_s);
+}
+
+TEST(DdsProfileFile, ShippedProfilesAreWhatTheirNamesSay) {
+  EXPECT_THAT(known_dds_profiles(), IsSupersetOf({"host", "lan", "no_multicast", "wan", "wifi"}));
+  EXPECT_THAT(load_dds_profile("host").options.interfaces, ElementsAre("127.0.0.1"));
+  EXPECT_LE(load_dds_profile("wifi").options.max_datagram_bytes, 1472U);
+  EXPECT_GT(load_dds_profile("wifi").options.bulk_bytes_per_s, 0U);
+  EXPECT_EQ(load_dds_profile("wan").options.transport, NetworkTransport::tcp);
+  EXPECT_FALSE(load_dds_profile("no_multicast").options.multicast);
+}
+
+TEST(DdsProfileFile, TellsAllFaultsAtOnce) {
+  const auto file = write_file("bad.yaml",
+                               "transport: pigeon\nmulticast: maybe\ninterfaces: [eth0]\n"
+                               "peers: ['a b', 'c:99999']\nheartbeat_ms: 0\nspeed: 3\n");
+  EXPECT_THAT(refusal([&] { (void)read_dds_profile(file); }),
+              AllOf(HasSubstr("bad.yaml:1: transport"), HasSubstr("multicast: 'maybe'"),
+                    HasSubstr("'eth0'"), HasSubstr("'a b'"), HasSubstr("'c:99999'"),
+                    HasSubstr("heartbeat_ms"), HasSubstr("speed: there is no such field")));
+}
+
+TEST(DdsProfileFile, RefusesWhatDoesNotFitTogether) {
+  const auto refusal_of = [](const std::string& text) {
+    return refusal([&] { (void)read_dds_profile(write_file("bad.yaml", text)); });
+  };
+  EXPECT_THAT(refusal_of("transport: tcp\n"), HasSubstr("server_port"));
+  EXPECT_THAT(refusal_of("transport: tcp\nserver_port: 1\ndiscovery_server: a\n"),
+              HasSubstr("UDP only"));
+  EXPECT_THAT(refusal_of("bulk_bytes_per_s: 1000\n"), HasSubstr("20 datagrams"));
+}
+
+TEST(DdsProfileFile, IsFoundInTheFolderOfTheEnvironmentFirst) {
+  const auto file = write_file("lan.yaml", "heartbeat_ms: 77\n");
+  setenv("STILLMAP_DDS_PROFILES", file.parent_path().c_str(), 1);
+  EXPECT_EQ(load_dds_profile("lan").options.heartbeat_ms, 77U);
+  unsetenv("STILLMAP_DDS_PROFILES");
+  EXPECT_EQ(load_dds_profile("lan").options.heartbeat_ms, 50U);
+  EXPECT_THAT(refusal([] { (void)load_dds_profile("carrier_pigeon"); }),
+              AllOf(HasSubstr("carrier_pigeon"), HasSubstr("no_multicast")));
+}
+
+TEST(NetworkAddressText, IsHostOrHostAndPort) {
+  EXPECT_EQ(network_address_from("robot.local"), (NetworkAddress{"robot.local", 0}));
+  EXPECT_EQ(network_address_from("10.1.2.3:80"), (NetworkAddress{"10.1.2.3", 80}));
+  for (const char* text : {"", ":80", "a:", "a:0", "a:x", "a:70000", "a:-1", "::1", "a b", "a/b"}) {
+    EXPECT_EQ(network_address_from(text), std::nullopt) << text;
+  }
+}
+
+TEST(DdsChoiceOptions, ADeploymentOverridesItsProfile) {
+  const DdsChoice choice{.profile = write_file("radio.yaml", whole_file).string(),
+                         .shared_memory = true,
+                         .interfaces = {"10.0.0.9"},
+                         .peers = {"a", "b:1"},
+                         .discovery_server = "c:2",
+                         .socket_buffer_bytes = 70000};
+  const DdsOptions client = dds_options(choice, DdsRole::client);
+  EXPECT_TRUE(client.shared_memory);
+  EXPECT_THAT(client.interfaces, ElementsAre("10.0.0.9"));
+  EXPECT_THAT(client.peers, ElementsAre(NetworkAddress{"a", 7500}, NetworkAddress{"b", 1}));
+  EXPECT_EQ(client.discovery_server, (NetworkAddress{"c", 2}));
+  EXPECT_EQ(client.socket_buffer_bytes, 70000U);
+  EXPECT_EQ(client.listening_port, 0);
+  EXPECT_EQ(dds_options(choice, DdsRole::server).listening_port, 7500);
+}
+
+TEST(DdsChoiceOptions, WhatIsNotGivenStaysAsTheProfileHasIt) {
+  DdsChoice choice;
+  choice.profile = write_file("radio.yaml", whole_file).string();
+  const DdsOptions options = dds_options(choice, DdsRole::client);
+  EXPECT_FALSE(options.shared_memory);
+  EXPECT_THAT(options.interfaces, ElementsAre("10.0.0.1"));
+  EXPECT_EQ(options.peers.size(), 2U);
+  EXPECT_EQ(options.discovery_server, (NetworkAddress{"10.0.0.3", 11811}));
+  EXPECT_EQ(options.socket_buffer_bytes, 100000U);
+}
+
+TEST(DdsChoiceOptions, TellsAllFaultsAtOnce) {
+  DdsChoice choice;
+  choice.profile = "wan";
+  choice.interfaces = {"eth0"};
+  choice.peers = {"a:b"};
+  choice.discovery_server = "c:d";
+  EXPECT_THAT(
+      refusal([&] { (void)dds_options(choice, DdsRole::client); }),
+      AllOf(HasSubstr("'eth0'"), HasSubstr("'a:b'"), HasSubstr("'c:d'"), HasSubstr("over TCP")));
+}
+
+}  // namespace
+}  // namespace stillmap

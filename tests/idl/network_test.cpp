@@ -1,0 +1,220 @@
+#include <fastdds/rtps/transport/TCPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
+#include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
+#include <thread>
+
+#include "idl/dds/discovery.hpp"
+#include "idl/dds/qos.hpp"
+#include "idl/dds/reader.hpp"
+#include "idl/dds/transports.hpp"
+#include "idl/dds/writer.hpp"
+#include "sensor_msgs.h"
+#include "tests/idl/dds_fixture.hpp"
+
+namespace stillmap {
+namespace {
+
+using namespace std::chrono_literals;
+using namespace eprosima::fastdds::rtps;
+using eprosima::fastdds::dds::DomainParticipantQos;
+using sensor_msgs::msg::PointCloud2;
+
+constexpr auto patience = 20s;
+
+PointCloud2 cloud_of(std::size_t bytes, std::uint32_t number) {
+  PointCloud2 cloud;
+  cloud.width(number);
+  cloud.data().assign(bytes, static_cast<std::uint8_t>(number));
+  return cloud;
+}
+
+/// Of this process, so that tests beside each other do not meet.
+std::uint16_t test_port() { return static_cast<std::uint16_t>(20000 + ::getpid() % 20000); }
+
+bool finds(Participant& a, Participant& b, std::chrono::milliseconds timeout = patience) {
+  Writer<PointCloud2> writer(a, "rt/points", {});
+  Reader<PointCloud2> reader(b, "rt/points", {});
+  return writer.readers().wait_for_any(timeout) && reader.events().wait_for_writer(timeout);
+}
+
+void expect_large_clouds_arrive(Participant& a, Participant& b) {
+  Writer<PointCloud2> writer(a, "rt/points", {});
+  Reader<PointCloud2> reader(b, "rt/points", {});
+  ASSERT_TRUE(writer.readers().wait_for_any(patience));
+  for (std::uint32_t i = 1; i <= 3; ++i) {
+    ASSERT_TRUE(writer.write(cloud_of(2'000'000, i)));
+    PointCloud2 got;
+    ASSERT_TRUE(reader.take(got, {}, patience));
+    EXPECT_EQ(got.width(), i);
+    EXPECT_EQ(got.data().size(), 2'000'000U);
+  }
+}
+
+DdsOptions without_multicast() {
+  DdsOptions options = loopback(false);
+  options.multicast = false;
+  return options;
+}
+
+TEST(Network, WithoutMulticastProcessesOfOneMachineFindEachOther) {
+  Participant a(without_multicast());
+  Participant b(without_multicast());
+  expect_large_clouds_arrive(a, b);
+}
+
+TEST(Network, WithoutMulticastNobodyIsFoundWhoIsNotLookedFor) {
+  // Only a listens for multicast; b neither sends it nor knows a's port.
+  DdsOptions deaf = without_multicast();
+  deaf.listening_port = test_port();
+  Participant a(deaf);
+  DdsOptions other = without_multicast();
+  other.listening_port = static_cast<std::uint16_t>(test_port() + 1);
+  Participant b(other);
+  EXPECT_FALSE(finds(a, b, 3s));
+}
+
+TEST(Network, APeerIsFoundAtItsPort) {
+  DdsOptions server = without_multicast();
+  server.listening_port = test_port();
+  DdsOptions client = without_multicast();
+  client.peers = {{"localhost", server.listening_port}};
+  Participant a(server);
+  Participant b(client);
+  expect_large_clouds_arrive(a, b);
+  expect_large_clouds_arrive(b, a);
+}
+
+TEST(Network, AServerWithAPortOfItsOwnUsesMulticastAndSharedMemory) {
+  DdsOptions server = loopback(true);
+  server.listening_port = test_port();
+  Participant a(server);
+  Participant b(loopback(true));
+  expect_large_clouds_arrive(a, b);
+}
+
+TEST(Network, PeersAreLookedForBesideMulticast) {
+  DdsOptions options = loopback(false);
+  options.peers = {{"127.0.0.1", 9}};
+  Participant a(options);
+  Participant b(loopback(false));
+  EXPECT_TRUE(finds(a, b));
+}
+
+TEST(Network, TcpClientsFindTheServer) {
+  DdsOptions server = loopback(false);
+  server.transport = NetworkTransport::tcp;
+  server.listening_port = test_port();
+  DdsOptions client = server;
+  client.listening_port = 0;
+  client.peers = {{"127.0.0.1", server.listening_port}};
+  Participant a(server);
+  Participant b(client);
+  expect_large_clouds_arrive(a, b);
+  expect_large_clouds_arrive(b, a);
+}
+
+TEST(Network, ADiscoveryServerIntroducesItsClients) {
+  DdsOptions registry = loopback(false);
+  registry.discovery_port = test_port();
+  DdsOptions client = without_multicast();
+  client.discovery_server = {"127.0.0.1", registry.discovery_port};
+  Participant a(client);
+  Participant b(client);
+  EXPECT_FALSE(finds(a, b, 1s)) << "before there is a discovery server";
+  const Participant introducer(registry);
+  expect_large_clouds_arrive(a, b);
+}
+
+TEST(Network, RefusesAPortThatIsTaken) {
+  DdsOptions registry = loopback(false);
+  registry.discovery_port = test_port();
+  const Participant first(registry);
+  EXPECT_THROW(Participant second(registry), DdsError);
+}
+
+TEST(Network, RefusesAPeerWhoseNameIsNotKnown) {
+  DdsOptions options = loopback(false);
+  options.peers = {{"no-such-host.invalid", 0}};
+  EXPECT_THROW(Participant participant(options), DdsError);
+}
+
+TEST(Network, BulkKeepsToItsRateAndSmallMessagesOvertakeIt) {
+  DdsOptions options = loopback(false);
+  options.max_datagram_bytes = 1400;
+  options.bulk_bytes_per_s = 1'000'000;
+  Participant a(options);
+  Participant b(loopback(false));
+  Writer<PointCloud2> bulk(a, "rt/bulk", {.bulky = true});
+  Writer<PointCloud2> small(a, "rt/small", {});
+  Reader<PointCloud2> bulk_reader(b, "rt/bulk", {});
+  Reader<PointCloud2> small_reader(b, "rt/small", {});
+  ASSERT_TRUE(bulk.readers().wait_for_any(patience) && small.readers().wait_for_any(patience));
+  const auto began = std::chrono::steady_clock::now();
+  ASSERT_TRUE(bulk.write(cloud_of(2'000'000, 1)));
+  EXPECT_LT(std::chrono::steady_clock::now() - began, 500ms) << "a write does not wait";
+  ASSERT_TRUE(small.write(cloud_of(100, 2)));
+  PointCloud2 got;
+  ASSERT_TRUE(small_reader.take(got, {}, patience));
+  EXPECT_LT(std::chrono::steady_clock::now() - began, 1s);
+  ASSERT_TRUE(bulk_reader.take(got, {}, patience));
+  EXPECT_EQ(got.data().size(), 2'000'000U);
+  const auto took = std::chrono::steady_clock::now() - began;
+  EXPECT_GT(took, 1500ms);
+  EXPECT_LT(took, 5s);
+}
+
+TEST(NetworkSettings, ReachFastDds) {
+  DdsOptions options;
+  options.socket_buffer_bytes = 123456;
+  options.max_datagram_bytes = 1400;
+  options.shared_memory_mib = 7;
+  options.interfaces = {"127.0.0.1"};
+  DomainParticipantQos qos;
+  set_transports(options, qos);
+  ASSERT_EQ(qos.transport().user_transports.size(), 2U);
+  const auto udp =
+      std::dynamic_pointer_cast<UDPv4TransportDescriptor>(qos.transport().user_transports[0]);
+  ASSERT_NE(udp, nullptr);
+  EXPECT_EQ(udp->receiveBufferSize, 123456U);
+  EXPECT_EQ(udp->sendBufferSize, 123456U);
+  EXPECT_EQ(udp->maxMessageSize, 1400U);
+  EXPECT_EQ(udp->interfaceWhiteList, options.interfaces);
+  const auto memory =
+      std::dynamic_pointer_cast<SharedMemTransportDescriptor>(qos.transport().user_transports[1]);
+  ASSERT_NE(memory, nullptr);
+  EXPECT_EQ(memory->segment_size(), 7U << 20U);
+}
+
+TEST(NetworkSettings, TcpNeitherWaitsNorSumsUp) {
+  DdsOptions options;
+  options.transport = NetworkTransport::tcp;
+  options.listening_port = 5100;
+  options.shared_memory = false;
+  DomainParticipantQos qos;
+  set_transports(options, qos);
+  ASSERT_EQ(qos.transport().user_transports.size(), 1U);
+  const auto tcp =
+      std::dynamic_pointer_cast<TCPv4TransportDescriptor>(qos.transport().user_transports[0]);
+  ASSERT_NE(tcp, nullptr);
+  EXPECT_TRUE(tcp->enable_tcp_nodelay);
+  EXPECT_FALSE(tcp->calculate_crc);
+  EXPECT_EQ(tcp->listening_ports, std::vector<std::uint16_t>{5100});
+}
+
+TEST(NetworkSettings, HeartbeatsAndRepairsFollowTheProfile) {
+  DdsOptions options;
+  options.heartbeat_ms = 250;
+  options.repair_delay_ms = 40;
+  const auto writer = writer_qos({}, options).reliable_writer_qos().times;
+  EXPECT_EQ(writer.heartbeatPeriod, to_duration(250ms));
+  EXPECT_EQ(writer.nackResponseDelay, to_duration(40ms));
+  EXPECT_EQ(reader_qos({}, options).reliable_reader_qos().times.heartbeatResponseDelay,
+            to_duration(40ms));
+}
+
+}  // namespace
+}  // namespace stillmap

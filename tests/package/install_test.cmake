@@ -1,0 +1,44 @@
+# cmake -DBUILD=FOLDER -DPREFIX=FOLDER -P install_test.cmake: installs to PREFIX and lets the programs
+# find there what they need. PREFIX is removed before and afterwards.
+function(run expected_code wanted)
+  execute_process(COMMAND ${ARGN} RESULT_VARIABLE code OUTPUT_VARIABLE out ERROR_VARIABLE out)
+  if(NOT code EQUAL expected_code OR NOT out MATCHES "${wanted}")
+    message(FATAL_ERROR "${ARGN}\ngave ${code} instead of ${expected_code}, or not '${wanted}':\n${out}")
+  endif()
+endfunction()
+
+file(REMOVE_RECURSE ${PREFIX})
+run(0 "" ${CMAKE_COMMAND} --install ${BUILD} --prefix ${PREFIX})
+foreach(file bin/stillmap bin/stillmap-server lib/stillmap/stillmap_pcd.so lib/stillmap/stillmap_geotiff.so
+        lib/systemd/system/stillmap-server.service etc/stillmap/server.yaml
+        share/stillmap/models/street/model.onnx share/stillmap/server/default.yaml
+        share/stillmap/idl/stillmap_msgs.idl share/doc/stillmap/README.md
+        share/doc/stillmap/examples/follow_and_query.cpp)
+  if(NOT EXISTS ${PREFIX}/${file})
+    message(FATAL_ERROR "${file} was not installed")
+  endif()
+endforeach()
+
+run(0 "stillmap-server [0-9.]+" ${PREFIX}/bin/stillmap-server --version)
+run(0 "can be used" ${PREFIX}/bin/stillmap-server --check-config ${PREFIX}/etc/stillmap/server.yaml)
+
+# Only the installation has this robot.
+file(READ ${PREFIX}/share/stillmap/robots/car.yaml robot)
+file(WRITE ${PREFIX}/share/stillmap/robots/only_installed.yaml "${robot}")
+file(WRITE ${PREFIX}/robot.yaml "labels: {source: none}\nareas: {profiles: [only_installed]}\n")
+run(0 "can be used" ${PREFIX}/bin/stillmap-server --check-config ${PREFIX}/robot.yaml)
+run(2 "only_installed" ${BUILD}/bin/stillmap-server --check-config ${PREFIX}/robot.yaml)
+
+# The unit names the places that were installed to.
+file(READ ${PREFIX}/lib/systemd/system/stillmap-server.service unit)
+string(FIND "${unit}" "ExecStart=${PREFIX}/bin/stillmap-server --config ${PREFIX}/etc/stillmap/server.yaml" at)
+if(at EQUAL -1 OR unit MATCHES "@")
+  message(FATAL_ERROR "the unit does not start what was installed:\n${unit}")
+endif()
+
+# Without the parts of stillmap-formats, a PCD file says which package it takes.
+file(WRITE ${PREFIX}/scans/0.pcd "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\n"
+  "HEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 1\nDATA ascii\n1 2 3\n")
+file(REMOVE_RECURSE ${PREFIX}/lib/stillmap)
+run(1 "stillmap-formats" ${PREFIX}/bin/stillmap map ${PREFIX}/scans --sensor vlp_16 --out ${PREFIX}/out)
+file(REMOVE_RECURSE ${PREFIX})
