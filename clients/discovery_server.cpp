@@ -6,6 +6,8 @@ namespace stillmap {
 
 // A participant that serves discovery is all there is to it.
 struct DiscoveryServer::Registry {
+  explicit Registry(const DdsOptions& options) : participant(options) {}
+
   Participant participant;
 };
 
