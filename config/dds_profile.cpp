@@ -82,6 +82,7 @@ void read_profile(YamlSection file, DdsProfile& profile) {
   file.whole("max_datagram_bytes", options.max_datagram_bytes, {1000, 65500});
   file.whole("heartbeat_ms", options.heartbeat_ms, {1, 10'000});
   file.whole("repair_delay_ms", options.repair_delay_ms, {0, 1000});
+  file.whole("lease_s", options.lease_s, {3, 3600});
   file.whole("bulk_bytes_per_s", options.bulk_bytes_per_s, {0, 2e9});
   check_together(file, profile);
 }

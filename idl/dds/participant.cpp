@@ -30,9 +30,8 @@ DomainParticipantQos participant_qos(const DdsOptions& options) {
   auto& builtin = qos.wire_protocol().builtin;
   builtin.readerHistoryMemoryPolicy = builtin.writerHistoryMemoryPolicy =
       eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
-  // A peer that was killed is forgotten after 10 s, not 20; one whose first announcements got lost
-  // is found after 1 s, not 3.
-  builtin.discovery_config.leaseDuration = to_duration(std::chrono::seconds(10));
+  // One whose first announcements got lost is found after 1 s, not 3.
+  builtin.discovery_config.leaseDuration = to_duration(std::chrono::seconds(options.lease_s));
   builtin.discovery_config.leaseDuration_announcementperiod = to_duration(std::chrono::seconds(1));
   return qos;
 }

@@ -3,38 +3,57 @@
 #include <cstdint>
 #include <map>
 #include <memory>
+#include <vector>
 
 #include "core/map/tile.hpp"
 #include "idl/dds/writer.hpp"
 #include "idl/map_identity.hpp"
 #include "idl/topics.hpp"
+#include "server/publishers/byte_allowance.hpp"
 #include "stillmap_msgs.h"
 
 namespace stillmap {
 
 /// Publishes every tile that changed, first its voxels and then its entry in the index, and takes
 /// back tiles that are gone: their voxels are disposed, their entry says that nothing is left. Of
-/// tiles that left memory, late joiners get the entry alone.
+/// tiles that left memory, late joiners get the entry alone. Where the participant's options limit
+/// what is bulky, new tiles take half of that: those go first that were sent longest ago, and what
+/// changes while it waits is sent once, as it is then.
 class TilePublisher {
  public:
   TilePublisher(Participant& participant, const Topics& topics);
 
+  /// Publishes what of the view is new and may be sent now; called again with the same view, it
+  /// goes on.
   void publish(const std::shared_ptr<const MapView>& shown);
+  /// Tiles of the last view that are not published yet.
+  [[nodiscard]] std::size_t waiting() const { return waiting_; }
 
  private:
+  using TilePointers = std::vector<std::shared_ptr<const Tile>>;
+
+  /// What readers do not have of the view; what they know longest goes first.
+  [[nodiscard]] TilePointers news(const MapView& view) const;
+  void publish_news(const TilePointers& tiles, const MapIdentity& identity);
   void publish_tile(const Tile& tile, const MapIdentity& identity);
+  void forget_voxels_away(const MapView& view, const MapIdentity& identity);
   void forget_voxels(const Tile& tile, const MapIdentity& identity);
   void take_back_missing(const MapView& view, const MapIdentity& identity);
 
   Writer<stillmap_msgs::msg::MapTile> tiles_;
   Writer<stillmap_msgs::msg::TileInfo> index_;
+  ByteAllowance allowance_;
   std::uint64_t map_id_ = 0;
+  std::size_t waiting_ = 0;
+  std::uint64_t publications_ = 0;
   std::shared_ptr<const MapView> last_view_;
   /// What readers have of a tile.
   struct Published {
     std::uint64_t revision = 0;
     /// A late joiner gets the voxels, too.
     bool has_voxels = false;
+    /// Number of the publication that brought it.
+    std::uint64_t publication = 0;
   };
   std::map<TileId, Published> published_;
 };

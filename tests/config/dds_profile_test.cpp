@@ -22,7 +22,7 @@ constexpr const char* whole_file =
     "transport: udp\nserver_port: 7500\nshared_memory: false\nshared_memory_mib: 8\n"
     "multicast: false\ninterfaces: [10.0.0.1]\npeers: [10.0.0.2, 'there:7412']\n"
     "discovery_server: 10.0.0.3\nsocket_buffer_bytes: 100000\nmax_datagram_bytes: 1400\n"
-    "heartbeat_ms: 70\nrepair_delay_ms: 9\nbulk_bytes_per_s: 500000\n";
+    "heartbeat_ms: 70\nrepair_delay_ms: 9\nlease_s: 33\nbulk_bytes_per_s: 500000\n";
 
 TEST(DdsProfileFile, EveryFieldIsRead) {
   const DdsProfile profile = read_dds_profile(write_file("radio.yaml", whole_file));
@@ -40,6 +40,7 @@ TEST(DdsProfileFile, EveryFieldIsRead) {
   EXPECT_EQ(options.max_datagram_bytes, 1400U);
   EXPECT_EQ(options.heartbeat_ms, 70U);
   EXPECT_EQ(options.repair_delay_ms, 9U);
+  EXPECT_EQ(options.lease_s, 33U);
   EXPECT_EQ(options.bulk_bytes_per_s, 500000U);
 }
 
@@ -58,6 +59,7 @@ TEST(DdsProfileFile, LanIsWhatHoldsWithoutAnyFile) {
   EXPECT_EQ(lan.max_datagram_bytes, built_in.max_datagram_bytes);
   EXPECT_EQ(lan.heartbeat_ms, built_in.heartbeat_ms);
   EXPECT_EQ(lan.repair_delay_ms, built_in.repair_delay_ms);
+  EXPECT_EQ(lan.lease_s, built_in.lease_s);
   EXPECT_EQ(lan.bulk_bytes_per_s, built_in.bulk_bytes_per_s);
 }
 

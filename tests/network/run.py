@@ -1,0 +1,121 @@
+"""Plays what may happen on networks, in network namespaces, and prints a table of figures.
+
+Every tile must arrive in the end, poses stay fresh, the server's memory stay bounded, and the
+mapper be as fast as on an undisturbed network. Exit code 1 when one of these does not hold, 77
+where the machine permits no network namespaces.
+"""
+import argparse
+import os
+import subprocess
+import sys
+
+import lab
+import scenarios
+
+# The machine may be busy; what is looked for are stalls of seconds, not milliseconds.
+FRESH_MS = 1000.0
+MEMORY_GROWTH_MB = 100.0
+SLOWER_MS = 50.0
+OUTAGE_S = 10.0
+
+# Name, scenario, longest gap between two poses [s]; None where none are taken.
+ALL = [
+    ("undisturbed LAN", scenarios.undisturbed, 2.0),
+    ("1 % loss, wifi", scenarios.losses(0.01), 2.0),
+    ("5 % loss, wifi", scenarios.losses(0.05), 2.0),
+    ("10 Mbit/s, wifi", scenarios.slow_link, 2.0),
+    ("10 s outage, wifi", scenarios.outage, OUTAGE_S + 5.0),
+    ("no multicast, peers", scenarios.peers_without_multicast, 2.0),
+    ("no multicast, discovery server", scenarios.discovery_server, 2.0),
+    ("TCP only, 1 % loss, wan", scenarios.tcp_only, 2.0),
+    ("dead planner, shared memory", scenarios.dead_over_shared_memory, 2.0),
+    ("dead planner, UDP", scenarios.dead_over_udp, 2.0),
+    ("dead planner, TCP", scenarios.dead_over_tcp, 2.0),
+    ("slow planner, shared memory", scenarios.slow_planner, 2.0),
+    ("50 late joiners, LAN", scenarios.late_joiners(50), None),
+]
+SHORT = ("undisturbed LAN", "5 % loss, wifi", "no multicast, discovery server")
+
+
+def faults_of(figures, longest_gap_s, undisturbed):
+    """What does not hold, in words."""
+    faults = []
+    if figures["tiles"] == 0 or figures["lacking"] > 0:
+        faults.append(f"{figures['lacking']} of {figures['tiles']} tiles did not arrive")
+    if figures["mapped"] < 0.9 * figures["published"]:
+        faults.append(f"only {figures['mapped']} of {figures['published']} scans were mapped")
+    if longest_gap_s is not None:
+        poses = figures["poses"]
+        if poses["count"] == 0:
+            return faults + ["no poses arrived"]
+        if poses["p50_ms"] > FRESH_MS or poses["last_ms"] > FRESH_MS:
+            faults.append("poses are old")
+        if poses["longest_gap_s"] > longest_gap_s:
+            faults.append(f"no pose for {poses['longest_gap_s']:.1f} s")
+    if undisturbed:
+        if figures["memory_mb"] > undisturbed["memory_mb"] + MEMORY_GROWTH_MB:
+            faults.append("the server's memory grew")
+        if figures["mapper"]["p50_ms"] > 1.5 * undisturbed["mapper"]["p50_ms"] + SLOWER_MS:
+            faults.append("the mapper became slower")
+    return faults
+
+
+HEAD = ("scenario", "tiles", "lacking", "all after", "poses", "age p50", "p99", "longest gap",
+        "server", "mapper p50", "p99", "scans")
+
+
+def row_of(name, figures):
+    poses = figures["poses"]
+    ages = ["-"] * 4 if poses["count"] == 0 else [
+        str(poses["count"]), f"{poses['p50_ms']:.0f} ms", f"{poses['p99_ms']:.0f} ms",
+        f"{poses['longest_gap_s']:.1f} s"]
+    return [name, str(figures["tiles"]), str(figures["lacking"]), f"{figures['settled_s']:.1f} s",
+            *ages, f"{figures['memory_mb']:.0f} MB", f"{figures['mapper']['p50_ms']:.0f} ms",
+            f"{figures['mapper']['p99_ms']:.0f} ms",
+            f"{figures['mapped']}/{figures['published']}"]
+
+
+def print_row(cells):
+    print("| " + " | ".join(cells) + " |", flush=True)
+
+
+def record_drive(stillmap, folder, scans):
+    """The recording that all drives play; made once."""
+    recording = os.path.join(folder, f"city_{scans}")
+    if not os.path.isdir(recording):
+        subprocess.run([stillmap, "simulate", recording, "--sensor", "vlp_16", "--scans",
+                        str(scans), "--seed", "5"], check=True, capture_output=True)
+    return recording
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--programs", required=True, help="folder of stillmap, stillmap-server")
+    parser.add_argument("--lab", required=True, help="folder of lab_robot, lab_clients")
+    parser.add_argument("--short", action="store_true", help="a few scenarios, short drives")
+    parser.add_argument("--only", help="scenarios whose name has this text")
+    arguments = parser.parse_args()
+    lab.enter_namespaces([sys.executable, *sys.argv])
+    scans = 60 if arguments.short else 200
+    recording = record_drive(os.path.join(arguments.programs, "stillmap"), arguments.lab,
+                             min(scans, 100))
+    setup = scenarios.Setup(arguments.programs, arguments.lab, recording, scans)
+    print_row(HEAD)
+    print_row(["---"] * len(HEAD))
+    undisturbed, failed = None, False
+    for name, scenario, longest_gap_s in ALL:
+        if arguments.short and name not in SHORT:
+            continue
+        if arguments.only and arguments.only not in name:
+            continue
+        figures = scenario(setup)
+        undisturbed = undisturbed or figures
+        print_row(row_of(name, figures))
+        for fault in faults_of(figures, longest_gap_s, undisturbed):
+            failed = True
+            print(f"  FAILED: {name}: {fault}", flush=True)
+    raise SystemExit(1 if failed else 0)
+
+
+if __name__ == "__main__":
+    main()
