@@ -4,6 +4,7 @@
 
 #include "clients/connection.hpp"
 #include "core/occupancy/octomap_check.hpp"
+#include "idl/conversions/cloud_reader.hpp"
 #include "idl/conversions/occupancy_grid.hpp"
 #include "idl/conversions/octomap.hpp"
 #include "idl/conversions/pose.hpp"
@@ -53,9 +54,10 @@ Subscription Client::subscribe_points(const std::string& ros_topic, DeliveryMode
   constexpr int scans_waiting = 10;
   return subscribe<sensor_msgs::msg::PointCloud2>(
       connection_->participant, points_topic(ros_topic, delivery, scans_waiting),
-      [reading, arrived = std::move(scan_arrived)](const sensor_msgs::msg::PointCloud2& message) {
-        const auto read = wire::to_scan(message, reading);
-        if (read.scan) arrived(*read.scan);
+      [reader = wire::CloudReader(reading),
+       arrived = std::move(scan_arrived)](const sensor_msgs::msg::PointCloud2& message) mutable {
+        const auto read = reader.read(message);
+        if (read.from_cloud.scan) arrived(*read.from_cloud.scan);
       });
 }
 

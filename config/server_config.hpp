@@ -82,9 +82,9 @@ enum class LabelKind {
 
 /// Names under which a point field may appear in a cloud; the first that is there is taken.
 struct PointFieldNames {
-  std::vector<std::string> intensity = {"intensity", "i", "reflectivity"};
+  std::vector<std::string> intensity = {"reflectivity", "intensity", "i"};
   std::vector<std::string> ring = {"ring", "channel"};
-  std::vector<std::string> time = {"time", "t", "timestamp", "offset_time"};
+  std::vector<std::string> time = {"time", "t", "timestamp", "time_stamp", "offset_time"};
   std::vector<std::string> label = {"label"};
 };
 

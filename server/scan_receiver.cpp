@@ -1,8 +1,11 @@
 #include "server/scan_receiver.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <utility>
 
+#include "core/lidar/sensor_fit.hpp"
 #include "idl/topics.hpp"
 
 namespace stillmap {
@@ -10,6 +13,8 @@ namespace {
 
 // A reliable KEEP_ALL reader of fewer samples stalls while it assembles fragments.
 constexpr int fewest_samples = 4;
+// The sensor does not change from scan to scan.
+constexpr std::uint64_t scans_between_checks = 100;
 
 TopicSpec<sensor_msgs::msg::PointCloud2> points_of(const ServerConfig& config) {
   const int waiting = std::max(static_cast<int>(config.input.queue_length), fewest_samples);
@@ -37,7 +42,8 @@ ScanReceiver::ScanReceiver(Participant& participant, const ServerConfig& config,
     : topic_(points_of(config).dds_name),
       domain_id_(config.dds.domain_id),
       delivery_(delivery_mode(config.input.delivery)),
-      reading_(reading_of(config)),
+      sensor_(config.mapper.sensor),
+      cloud_reader_(reading_of(config)),
       queue_(queue),
       statistics_(statistics),
       reader_(participant, topic_, points_of(config).reader),
@@ -53,8 +59,10 @@ void ScanReceiver::receive(const std::stop_token& stop) {
 void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop) {
   const auto received = std::chrono::steady_clock::now();
   statistics_.scan_received();
-  auto [scan, fault] = wire::to_scan(cloud, reading_);
+  auto [from_cloud, news] = cloud_reader_.read(cloud);
+  auto& [scan, fault, understood] = from_cloud;
   if (!scan) return drop("bad_cloud_" + fault.counter, 1, "bad cloud: " + fault.reason);
+  report(news, *scan);
   QueuedScan queued{*std::move(scan), cloud.header().frame_id(), received};
   if (delivery_ == DeliveryMode::every) {
     if (!queue_.push_when_free(std::move(queued), stop)) {
@@ -66,6 +74,17 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
   if (dropped > 0) {
     drop("queue_full", dropped, "scans arrive faster than they can be mapped");
   }
+}
+
+void ScanReceiver::report(const std::string& news, const Scan& scan) {
+  if (!news.empty()) spdlog::info("clouds on {}: {}", topic_, news);
+  if (scans_read_++ % scans_between_checks != 0) return;
+  const std::string misfit = sensor_misfit(scan, sensor_);
+  if (misfit.empty()) return;
+  statistics_.count("scans_of_another_sensor");
+  warnings_.warn("sensor", misfit +
+                               ": set 'sensor' in the configuration ('stillmap dataset sensor' "
+                               "makes a sensor file from a recording)");
 }
 
 void ScanReceiver::drop(const std::string& reason, std::size_t count, const std::string& detail) {

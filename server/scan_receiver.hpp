@@ -5,7 +5,8 @@
 #include <thread>
 
 #include "config/server_config.hpp"
-#include "idl/conversions/cloud_to_scan.hpp"
+#include "core/lidar/sensor_model.hpp"
+#include "idl/conversions/cloud_reader.hpp"
 #include "idl/dds/reader.hpp"
 #include "sensor_msgs.h"
 #include "server/rare_warnings.hpp"
@@ -28,12 +29,16 @@ class ScanReceiver {
  private:
   void receive(const std::stop_token& stop);
   void accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop);
+  /// Tells what is new about the clouds, and now and then whether they can be the sensor's.
+  void report(const std::string& news, const Scan& scan);
   void drop(const std::string& reason, std::size_t count, const std::string& detail);
 
   std::string topic_;
   std::uint32_t domain_id_;
   DeliveryMode delivery_;
-  wire::CloudReading reading_;
+  SensorModel sensor_;
+  wire::CloudReader cloud_reader_;
+  std::uint64_t scans_read_ = 0;
   ScanQueue& queue_;
   Statistics& statistics_;
   RareWarnings warnings_;

@@ -19,8 +19,8 @@ struct CloudFile {
 
 /// Reads a PCD (ascii, binary, compressed) or PLY (ascii, binary) file by the names of its fields:
 /// x y z (required), intensity | reflectivity | remission, ring | channel,
-/// time | t | timestamp | time_offset (whole numbers are nanoseconds, others seconds; see
-/// time_offsets_from_seconds()), label (original SemanticKITTI id, instance in the high bits).
+/// time | t | timestamp | time_stamp | offset_time | time_offset (in whatever unit: see
+/// point_times()), label (original SemanticKITTI id, instance in the high bits).
 /// Fields of other names, padding too, are passed over. Intensity comes as the file has it (0..255
 /// from many). `stamp_ns` becomes the scan's stamp. Throws DatasetError for whatever is not such a
 /// file.

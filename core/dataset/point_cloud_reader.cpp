@@ -71,9 +71,6 @@ struct Column {
   std::uint8_t datatype = 0;
   std::vector<double> values;
 
-  [[nodiscard]] bool is_integer() const {
-    return datatype != PCLPointField::FLOAT32 && datatype != PCLPointField::FLOAT64;
-  }
   [[nodiscard]] bool all_within(double least, double most) const {
     return std::ranges::all_of(values, [&](double v) { return v >= least && v <= most; });
   }
@@ -129,16 +126,13 @@ std::vector<float> intensity_of(const pcl::PCLPointCloud2& cloud) {
 }
 
 std::vector<float> time_offsets_of(const pcl::PCLPointCloud2& cloud, std::int64_t stamp_ns) {
-  auto time = column(cloud, {"time", "t", "timestamp", "time_offset"});
+  const auto time =
+      column(cloud, {"time", "t", "timestamp", "time_stamp", "offset_time", "time_offset"});
   if (!time) return {};
-  // Livox writes nanoseconds since 1970 into a double; no such number is one of seconds.
-  const bool nanoseconds = time->is_integer() || std::ranges::any_of(time->values, [](double t) {
-                             return std::abs(t) > 1e15;
-                           });
-  if (nanoseconds) {
-    for (double& t : time->values) t *= 1e-9;
-  }
-  return time_offsets_from_seconds(time->values, stamp_ns);
+  TimeType type = TimeType::whole;
+  if (time->datatype == PCLPointField::FLOAT32) type = TimeType::float32;
+  if (time->datatype == PCLPointField::FLOAT64) type = TimeType::float64;
+  return point_times(time->values, type, stamp_ns).offsets_s;
 }
 
 /// A column of whole numbers that all fit into T, else empty.

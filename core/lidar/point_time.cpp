@@ -1,34 +1,137 @@
 #include "core/lidar/point_time.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
+#include <optional>
 
 namespace stillmap {
 namespace {
 
 constexpr double longest_offset_s = 10.0;
+/// Shorter or longer than this is no scan, and another unit is tried.
+constexpr double shortest_scan_s = 1e-3;
+constexpr double longest_scan_s = 5.0;
+/// What another unit must make of it.
+constexpr double shortest_revolution_s = 5e-3;
+/// Absolute times lie between 1990 and 2100, in any unit.
+constexpr double earliest_epoch_s = 6.3e8;
+constexpr double latest_epoch_s = 4.1e9;
+/// So many points tell what the numbers of all mean.
+constexpr std::size_t most_asked = 4096;
+
+struct Unit {
+  const char* name;
+  double seconds;
+};
+constexpr std::array<Unit, 4> units = {{{"s", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}}};
+
+/// Some thousand finite times from all over the scan. Not the zeros, which also stand for points
+/// that were not measured, unless there is nothing else.
+std::vector<double> sample_of(std::span<const double> times) {
+  std::vector<double> sample;
+  bool zeros = false;
+  const std::size_t step = times.size() / most_asked + 1;
+  for (std::size_t i = 0; i < times.size(); i += step) {
+    if (times[i] == 0.0) zeros = true;
+    if (std::isfinite(times[i]) && times[i] != 0.0) sample.push_back(times[i]);
+  }
+  if (sample.empty() && zeros) sample.push_back(0.0);
+  return sample;
+}
+
+double middle_of(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+/// From the 5th to the 95th of a hundred, so that a few broken times do not count; in the times'
+/// own unit.
+double span_of(std::vector<double>& values) {
+  const auto at = [&](std::size_t percent) {
+    const auto place = values.begin() + static_cast<std::ptrdiff_t>(values.size() * percent / 100);
+    std::ranges::nth_element(values, place);
+    return *place;
+  };
+  const double low = at(5);
+  return at(95) - low;
+}
+
+/// The unit that makes a double a time between 1990 and 2100.
+std::optional<Unit> unit_by_magnitude(double middle, double span) {
+  for (const Unit& unit : units) {
+    const double middle_s = std::abs(middle) * unit.seconds;
+    const bool plausible = middle_s >= earliest_epoch_s && middle_s <= latest_epoch_s;
+    if (plausible && span * unit.seconds <= longest_scan_s) return unit;
+  }
+  return std::nullopt;
+}
+
+Unit unit_of(double middle, double span, TimeType type) {
+  const Unit& usual = type == TimeType::whole ? units[3] : units[0];
+  if (type == TimeType::float64) {
+    if (const auto unit = unit_by_magnitude(middle, span)) return *unit;
+  }
+  const double usual_span_s = span * usual.seconds;
+  if (span == 0.0 || (usual_span_s >= shortest_scan_s && usual_span_s <= longest_scan_s)) {
+    return usual;
+  }
+  for (const Unit& unit : units) {
+    const double span_s = span * unit.seconds;
+    if (span_s >= shortest_revolution_s && span_s < longest_scan_s) return unit;
+  }
+  return usual;
+}
+
+/// Offsets from `reference`, not finite where a time lies too far from `middle`.
+std::vector<float> offsets_from(double reference, double middle, std::span<const double> times_s) {
+  std::vector<float> offsets;
+  offsets.reserve(times_s.size());
+  for (const double t : times_s) {
+    const bool near = std::abs(t - middle) <= longest_offset_s;
+    offsets.push_back(near ? static_cast<float>(t - reference) : NAN);
+  }
+  return offsets;
+}
+
+double earliest_near(double middle, std::span<const double> times_s) {
+  double earliest = middle;
+  for (const double t : times_s) {
+    if (middle - t <= longest_offset_s) earliest = std::min(earliest, t);
+  }
+  return earliest;
+}
 
 }  // namespace
 
-std::vector<float> time_offsets_from_seconds(std::span<const double> times_s,
-                                             std::int64_t stamp_ns) {
-  double earliest = INFINITY, latest = -INFINITY;
-  for (const double t : times_s) {
-    if (!std::isfinite(t)) continue;
-    earliest = std::min(earliest, t);
-    latest = std::max(latest, t);
+PointTimes point_times(std::span<const double> times, TimeType type, std::int64_t stamp_ns) {
+  std::vector<double> sample = sample_of(times);
+  if (sample.empty()) return {{}, "no finite time"};
+  const double middle = middle_of(sample);
+  if (type == TimeType::float32 && std::abs(middle) >= earliest_epoch_s) {
+    return {{}, "times since 1970 do not fit into 32-bit floats"};
   }
+  const double span = span_of(sample);
+  const Unit unit = unit_of(middle, span, type);
+  if (span * unit.seconds > longest_scan_s) {
+    return {{},
+            "times of one scan are " + std::to_string(span) + " apart, in no unit a revolution"};
+  }
+  std::vector<double> times_s(times.begin(), times.end());
+  for (double& t : times_s) t *= unit.seconds;
+  const double middle_s = middle * unit.seconds;
   const double stamp_s = static_cast<double>(stamp_ns) * 1e-9;
-  const auto all_near = [&](double reference) {
-    return std::abs(earliest - reference) <= longest_offset_s &&
-           std::abs(latest - reference) <= longest_offset_s;
-  };
-  const double reference = all_near(0.0) ? 0.0 : (all_near(stamp_s) ? stamp_s : earliest);
-
-  std::vector<float> offsets;
-  offsets.reserve(times_s.size());
-  for (const double t : times_s) offsets.push_back(static_cast<float>(t - reference));
-  return offsets;
+  const std::string name = unit.name;
+  if (std::abs(middle_s) <= longest_offset_s) {
+    return {offsets_from(0.0, middle_s, times_s), name + " from the stamp"};
+  }
+  if (std::abs(middle_s - stamp_s) <= longest_offset_s) {
+    return {offsets_from(stamp_s, middle_s, times_s), name + " on the stamp's clock"};
+  }
+  return {offsets_from(earliest_near(middle_s, times_s), middle_s, times_s),
+          name + " on another clock than the stamp's, counted from the earliest point"};
 }
 
 }  // namespace stillmap

@@ -36,7 +36,7 @@ PointColumn checked_column(const PointField& field, std::size_t point_step) {
     refuse("bad_field", name + " ends at byte " + number(field.offset() + size_of(*type)) +
                             ", beyond point_step " + number(point_step));
   }
-  return {.offset = field.offset(), .type = *type};
+  return {.offset = field.offset(), .type = *type, .name = field.name()};
 }
 
 std::optional<PointColumn> find_column(const PointCloud2& cloud,
@@ -99,7 +99,8 @@ CloudLayout layout_of(const PointCloud2& cloud, const PointFieldCandidates& cand
           .y = coordinate(cloud, "y"),
           .z = coordinate(cloud, "z"),
           .intensity = find_column(cloud, candidates.intensity),
-          .ring = find_integer_column(cloud, candidates.ring),
+          // Some simulators number the rings in floats.
+          .ring = find_column(cloud, candidates.ring),
           .time = find_column(cloud, candidates.time),
           .label = find_integer_column(cloud, candidates.label)};
 }

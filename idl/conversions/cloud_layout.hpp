@@ -13,13 +13,18 @@ namespace stillmap::wire {
 struct PointColumn {
   std::size_t offset = 0;
   FieldType type = FieldType::float32;
+  /// As the cloud calls it.
+  std::string name;
 };
 
-/// Names under which the fields of a cloud may appear; the first that is there is taken.
+/// Names under which the fields of a cloud may appear; the first that is there is taken. The
+/// defaults are those of the drivers of Velodyne, Ouster, Hesai, Livox, RoboSense and Nebula. An
+/// Ouster's `intensity` counts photons and its `reflectivity` is calibrated, so that comes first; a
+/// Livox's `line` is no ring, as its beams do not keep their elevation.
 struct PointFieldCandidates {
-  std::vector<std::string> intensity = {"intensity"};
-  std::vector<std::string> ring = {"ring"};
-  std::vector<std::string> time = {"time"};
+  std::vector<std::string> intensity = {"reflectivity", "intensity", "i"};
+  std::vector<std::string> ring = {"ring", "channel"};
+  std::vector<std::string> time = {"time", "t", "timestamp", "time_stamp", "offset_time"};
   std::vector<std::string> label = {"label"};
 };
 

@@ -1,7 +1,7 @@
 #include "idl/conversions/cloud_to_scan.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <utility>
 
 #include "core/lidar/point_time.hpp"
 #include "idl/conversions/header.hpp"
@@ -11,11 +11,6 @@ namespace stillmap::wire {
 namespace {
 
 using sensor_msgs::msg::PointCloud2;
-
-// Floating-point times beyond this cannot be seconds (30 million years): some drivers write
-// nanoseconds since the epoch into a double.
-constexpr double largest_plausible_s = 1e15;
-constexpr double s_per_ns = 1e-9;
 
 /// Calls `use(i, value)` for the column's value in every point, rows in order.
 template <typename Use>
@@ -59,21 +54,24 @@ std::vector<std::uint16_t> read_ring(const PointCloud2& cloud, const CloudLayout
   if (!layout.ring) return {};
   std::vector<std::uint16_t> ring(layout.points());
   for_each_value(cloud, layout, *layout.ring, [&](std::size_t i, auto value) {
-    ring[i] = static_cast<std::uint16_t>(std::clamp<double>(value, 0.0, 65535.0));
+    const auto number = static_cast<double>(value);
+    // Written so that NaN becomes 0.
+    ring[i] = number > 0.0 ? static_cast<std::uint16_t>(std::min(number, 65535.0)) : 0;
   });
   return ring;
 }
 
-std::vector<float> read_time(const PointCloud2& cloud, const CloudLayout& layout,
-                             std::int64_t stamp) {
+TimeType time_type(FieldType type) {
+  if (is_integer(type)) return TimeType::whole;
+  return type == FieldType::float32 ? TimeType::float32 : TimeType::float64;
+}
+
+PointTimes read_time(const PointCloud2& cloud, const CloudLayout& layout, std::int64_t stamp) {
   if (!layout.time) return {};
-  std::vector<double> times_s(layout.points());
-  const bool integers = is_integer(layout.time->type);
-  for_each_value(cloud, layout, *layout.time, [&](std::size_t i, auto value) {
-    const auto time = static_cast<double>(value);
-    times_s[i] = integers || std::abs(time) > largest_plausible_s ? time * s_per_ns : time;
-  });
-  return time_offsets_from_seconds(times_s, stamp);
+  std::vector<double> times(layout.points());
+  for_each_value(cloud, layout, *layout.time,
+                 [&](std::size_t i, auto value) { times[i] = static_cast<double>(value); });
+  return point_times(times, time_type(layout.time->type), stamp);
 }
 
 SemanticClass class_of(std::uint32_t value, bool is_class) {
@@ -95,6 +93,21 @@ std::vector<SemanticClass> read_labels(const PointCloud2& cloud, const CloudLayo
   return labels;
 }
 
+/// "intensity from reflectivity (uint16)", or what goes without it.
+std::string source_of(const char* what, const std::optional<PointColumn>& column,
+                      const std::string& remark = {}) {
+  if (!column) return std::string("no ").append(what);
+  std::string text = std::string(what).append(" from ").append(column->name).append(" (");
+  text.append(name_of(column->type));
+  if (!remark.empty()) text.append(": ").append(remark);
+  return text.append(")");
+}
+
+std::string describe(const CloudLayout& layout, const PointTimes& times) {
+  return source_of("intensity", layout.intensity) + ", " +
+         source_of("time", layout.time, times.remark) + ", " + source_of("ring", layout.ring);
+}
+
 }  // namespace
 
 ScanFromCloud to_scan(const PointCloud2& cloud, const CloudReading& reading) {
@@ -103,17 +116,21 @@ ScanFromCloud to_scan(const PointCloud2& cloud, const CloudReading& reading) {
     return {.scan = std::nullopt,
             .fault = {"bad_stamp", "header.stamp.nanosec is " +
                                        std::to_string(cloud.header().stamp().nanosec()) +
-                                       ", a second or more"}};
+                                       ", a second or more"},
+            .understood = {}};
   }
   const auto [layout, fault] = check_layout(cloud, reading.fields);
-  if (!layout) return {.scan = std::nullopt, .fault = fault};
+  if (!layout) return {.scan = std::nullopt, .fault = fault, .understood = {}};
+  PointTimes times = read_time(cloud, *layout, *stamp);
+  std::string understood = describe(*layout, times);
   return {.scan = Scan{.stamp_ns = *stamp,
                        .points_lidar = read_points(cloud, *layout),
                        .intensity = read_intensity(cloud, *layout, reading.intensity_scale),
-                       .time_offset_s = read_time(cloud, *layout, *stamp),
+                       .time_offset_s = std::move(times.offsets_s),
                        .ring = read_ring(cloud, *layout),
                        .labels = read_labels(cloud, *layout, reading.labels_are_classes)},
-          .fault = {}};
+          .fault = {},
+          .understood = std::move(understood)};
 }
 
 }  // namespace stillmap::wire

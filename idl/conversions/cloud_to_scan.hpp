@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "core/lidar/scan.hpp"
 #include "idl/conversions/cloud_layout.hpp"
@@ -21,10 +22,13 @@ struct CloudReading {
 struct ScanFromCloud {
   std::optional<Scan> scan;
   CloudFault fault;
+  /// How the cloud was understood, for people: "intensity from reflectivity (uint16), time from t
+  /// (uint32: ns from the stamp), ring from ring (uint8)".
+  std::string understood;
 };
 
 /// Reads a cloud of any field types and byte order; any input is fine. Points that are not finite
-/// stay in. Times: integers are nanoseconds, floats seconds, either relative or absolute.
+/// stay in. Times of any unit, relative or absolute: see point_times().
 [[nodiscard]] ScanFromCloud to_scan(const sensor_msgs::msg::PointCloud2& cloud,
                                     const CloudReading& reading);
 

@@ -1,5 +1,7 @@
 #include "idl/conversions/point_field.hpp"
 
+#include <array>
+
 namespace stillmap::wire {
 
 std::optional<FieldType> field_type(std::uint8_t datatype) {
@@ -13,6 +15,12 @@ std::size_t size_of(FieldType type) {
   std::size_t bytes = 0;
   with_type(type, [&](auto value) { bytes = sizeof value; });
   return bytes;
+}
+
+const char* name_of(FieldType type) {
+  constexpr std::array names = {"int8",  "uint8",  "int16",   "uint16",
+                                "int32", "uint32", "float32", "float64"};
+  return names.at(static_cast<std::size_t>(type) - 1);
 }
 
 }  // namespace stillmap::wire

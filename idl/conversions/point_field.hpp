@@ -24,6 +24,9 @@ enum class FieldType : std::uint8_t {
 
 [[nodiscard]] std::size_t size_of(FieldType type);
 
+/// "uint16".
+[[nodiscard]] const char* name_of(FieldType type);
+
 [[nodiscard]] constexpr bool is_integer(FieldType type) { return type < FieldType::float32; }
 
 /// A value at any address, its bytes reversed if they are the other way round than this machine's.

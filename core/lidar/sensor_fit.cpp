@@ -1,0 +1,194 @@
+#include "core/lidar/sensor_fit.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <functional>
+#include <numbers>
+#include <utility>
+#include <vector>
+
+namespace stillmap {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+constexpr std::size_t fewest_points = 1000;
+constexpr std::size_t fewest_on_ring = 10;
+/// Beams of one kind of sensor differ by less from its data sheet, apart from mounting and wear.
+constexpr double largest_difference = 0.5 * degree;
+/// Two rings at one elevation are laid apart by this: beams must fall strictly.
+constexpr double smallest_step = 0.01 * degree;
+/// Bands of a sensor without rings: of 1 to 2 degrees, as its points lie.
+constexpr int bands = 40;
+/// A sensor's points lie inside its field of view but for noise and mounting.
+constexpr double margin = 1.0 * degree;
+constexpr std::size_t most_asked = 8192;
+
+double elevation_of(const Eigen::Vector3f& p) {
+  const double across = std::hypot(static_cast<double>(p.x()), static_cast<double>(p.y()));
+  const double elevation = std::atan2(static_cast<double>(p.z()), across);
+  // Points at the origin were not measured.
+  return p.squaredNorm() > 0.01F ? elevation : NAN;
+}
+
+double middle_of(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+/// Median elevation of every ring, NAN for rings with too few points, in the field's own order.
+std::vector<double> ring_elevations(const Scan& scan) {
+  const std::size_t rings = std::size_t{*std::ranges::max_element(scan.ring)} + 1;
+  std::vector<std::vector<double>> of_ring(rings);
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const double elevation = elevation_of(scan.points_lidar[i]);
+    if (std::isfinite(elevation)) of_ring[scan.ring[i]].push_back(elevation);
+  }
+  std::vector<double> elevations;
+  for (auto& values : of_ring) {
+    elevations.push_back(values.size() < fewest_on_ring ? NAN : middle_of(values));
+  }
+  return elevations;
+}
+
+/// Fills the rings that saw nothing between or beyond their neighbours.
+bool complete(std::vector<double>& elevations) {
+  const std::ptrdiff_t known = std::ranges::count_if(elevations, [](double e) { return e == e; });
+  if (known < 2) return false;
+  std::vector<std::size_t> seen;
+  for (std::size_t i = 0; i < elevations.size(); ++i) {
+    if (std::isfinite(elevations[i])) seen.push_back(i);
+  }
+  for (std::size_t i = 0; i < elevations.size(); ++i) {
+    if (std::isfinite(elevations[i])) continue;
+    const auto after = std::ranges::lower_bound(seen, i);
+    const std::size_t b =
+        std::clamp<std::size_t>(static_cast<std::size_t>(after - seen.begin()), 1, seen.size() - 1);
+    const double low = elevations[seen[b - 1]], high = elevations[seen[b]];
+    const auto part = (static_cast<double>(i) - static_cast<double>(seen[b - 1])) /
+                      static_cast<double>(seen[b] - seen[b - 1]);
+    elevations[i] = low + part * (high - low);
+  }
+  return true;
+}
+
+/// Whether the elevations of a scan, from the highest, are the built-in sensor's beams.
+bool is_built_in(const std::vector<double>& elevations, const SensorModel& sensor) {
+  if (elevations.size() != static_cast<std::size_t>(sensor.rings)) return false;
+  double sum = 0.0;
+  for (std::size_t i = 0; i < elevations.size(); ++i) {
+    sum += std::abs(elevations[i] - sensor.beam_elevation(static_cast<int>(i)));
+  }
+  return sum / static_cast<double>(elevations.size()) <= largest_difference;
+}
+
+std::optional<SensorModel> built_in(const std::vector<double>& elevations) {
+  for (SensorModel sensor : {vlp_16(), hdl_32e(), hdl_64e()}) {
+    if (is_built_in(elevations, sensor)) return sensor;
+  }
+  return std::nullopt;
+}
+
+SensorModel of_beams(std::vector<double> elevations) {
+  for (std::size_t i = 1; i < elevations.size(); ++i) {
+    elevations[i] = std::min(elevations[i], elevations[i - 1] - smallest_step);
+  }
+  SensorModel sensor;
+  sensor.rings = static_cast<int>(elevations.size());
+  sensor.name = std::to_string(sensor.rings) + " rings as seen in the data";
+  const double half_step =
+      (elevations.front() - elevations.back()) / (2.0 * static_cast<double>(sensor.rings - 1));
+  constexpr double quarter_turn = std::numbers::pi / 2.0;
+  sensor.fov_up = std::min(elevations.front() + half_step, quarter_turn);
+  sensor.fov_down = std::max(elevations.back() - half_step, -quarter_turn);
+  sensor.beam_elevations = std::move(elevations);
+  sensor.max_range_m = 200.0;
+  return sensor;
+}
+
+std::optional<SensorModel> fit_rings(const Scan& scan) {
+  std::vector<double> elevations = ring_elevations(scan);
+  // A field of more rings than a sensor can have is something else.
+  if (elevations.size() < 4 || elevations.size() > 256 || !complete(elevations)) {
+    return std::nullopt;
+  }
+  std::ranges::sort(elevations, std::greater<>{});
+  if (auto sensor = built_in(elevations)) return sensor;
+  SensorModel sensor = of_beams(std::move(elevations));
+  return sensor.faults().empty() ? std::optional(std::move(sensor)) : std::nullopt;
+}
+
+/// Elevations from all over the scan, sorted.
+std::vector<double> sorted_elevations(const Scan& scan) {
+  std::vector<double> elevations;
+  const std::size_t step = scan.size() / most_asked + 1;
+  for (std::size_t i = 0; i < scan.size(); i += step) {
+    const double elevation = elevation_of(scan.points_lidar[i]);
+    if (std::isfinite(elevation)) elevations.push_back(elevation);
+  }
+  std::ranges::sort(elevations);
+  return elevations;
+}
+
+/// The edges of the share of the elevations that a few broken points do not move.
+std::pair<double, double> edges_of(const std::vector<double>& sorted) {
+  const std::size_t cut = sorted.size() / 1000;
+  return {sorted[cut], sorted[sorted.size() - 1 - cut]};
+}
+
+std::optional<SensorModel> fit_bands(const Scan& scan) {
+  const std::vector<double> elevations = sorted_elevations(scan);
+  if (elevations.size() < fewest_points / 2) return std::nullopt;
+  const auto [low, high] = edges_of(elevations);
+  if (std::abs(high - 15.0 * degree) < largest_difference &&
+      std::abs(low + 15.0 * degree) < largest_difference) {
+    return vlp_16();
+  }
+  if (high < 5.0 * degree && low < -20.0 * degree && low > -27.0 * degree) return hdl_64e();
+  if (high - low < 1.0 * degree) return std::nullopt;
+  SensorModel sensor;
+  sensor.name = "bands of a scan without rings";
+  sensor.rings = bands;
+  sensor.fov_up = high;
+  sensor.fov_down = low;
+  sensor.max_range_m = 200.0;
+  return sensor;
+}
+
+std::string in_degrees(double angle) {
+  return std::to_string(static_cast<int>(std::lround(angle / degree)));
+}
+
+}  // namespace
+
+std::optional<SensorModel> fit_sensor(const Scan& scan) {
+  if (scan.size() < fewest_points) return std::nullopt;
+  if (!scan.ring.empty()) {
+    if (auto sensor = fit_rings(scan)) return sensor;
+  }
+  return fit_bands(scan);
+}
+
+std::string sensor_misfit(const Scan& scan, const SensorModel& sensor) {
+  if (!scan.ring.empty()) {
+    const int highest = *std::ranges::max_element(scan.ring);
+    if (highest >= sensor.rings) {
+      return "the cloud's ring field reaches " + std::to_string(highest) + ", but sensor " +
+             sensor.name + " has only " + std::to_string(sensor.rings) + " rings";
+    }
+  }
+  const std::vector<double> elevations = sorted_elevations(scan);
+  if (elevations.size() < fewest_points / 10) return {};
+  const auto outside = std::ranges::count_if(elevations, [&](double elevation) {
+    return elevation > sensor.fov_up + margin || elevation < sensor.fov_down - margin;
+  });
+  if (outside * 5 <= std::ssize(elevations)) return {};
+  const auto [low, high] = edges_of(elevations);
+  return "the cloud's points lie between " + in_degrees(low) + " and " + in_degrees(high) +
+         " degrees of elevation, but sensor " + sensor.name + " sees from " +
+         in_degrees(sensor.fov_down) + " to " + in_degrees(sensor.fov_up);
+}
+
+}  // namespace stillmap

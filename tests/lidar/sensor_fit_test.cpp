@@ -1,0 +1,108 @@
+#include "core/lidar/sensor_fit.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+namespace stillmap {
+namespace {
+
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+constexpr double degree = std::numbers::pi / 180.0;
+
+void add_point(double elevation, double azimuth, double range_m, Scan& scan) {
+  scan.points_lidar.push_back(
+      (range_m * Eigen::Vector3d(std::cos(elevation) * std::cos(azimuth),
+                                 std::cos(elevation) * std::sin(azimuth), std::sin(elevation)))
+          .cast<float>());
+}
+
+/// All beams of a sensor, 200 points each; rings counted from the bottom, as Velodyne's do.
+Scan scan_of(const SensorModel& sensor, bool with_rings) {
+  std::mt19937 random(2);
+  std::uniform_real_distribution<double> range_m(2.0, 50.0);
+  Scan scan;
+  for (int ring = 0; ring < sensor.rings; ++ring) {
+    for (int column = 0; column < 200; ++column) {
+      add_point(sensor.beam_elevation(ring), 0.0314 * column, range_m(random), scan);
+      if (with_rings) scan.ring.push_back(static_cast<std::uint16_t>(sensor.rings - 1 - ring));
+    }
+  }
+  return scan;
+}
+
+TEST(FitSensor, FindsTheBuiltInSensorsByTheirRings) {
+  for (const SensorModel& sensor : {vlp_16(), hdl_32e(), hdl_64e()}) {
+    const auto fitted = fit_sensor(scan_of(sensor, true));
+    ASSERT_TRUE(fitted);
+    EXPECT_EQ(fitted->name, sensor.name);
+  }
+  EXPECT_EQ(fit_sensor(scan_of(vlp_16(), false))->name, "VLP-16");
+}
+
+TEST(FitSensor, MakesASensorOfTheRingsOfAnUnknownOne) {
+  SensorModel ouster;
+  ouster.rings = 64;
+  ouster.fov_up = 22.5 * degree;
+  ouster.fov_down = -22.5 * degree;
+  Scan scan = scan_of(ouster, true);
+  // One ring saw nothing at all, and points that were not measured lie at the origin.
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    if (scan.ring[i] == 20) scan.points_lidar[i].setZero();
+  }
+  const auto fitted = fit_sensor(scan);
+  ASSERT_TRUE(fitted);
+  EXPECT_THAT(fitted->faults(), IsEmpty());
+  ASSERT_EQ(fitted->rings, 64);
+  for (int ring = 0; ring < 64; ++ring) {
+    EXPECT_NEAR(fitted->beam_elevation(ring), ouster.beam_elevation(ring), 0.01 * degree) << ring;
+  }
+  EXPECT_THAT(sensor_misfit(scan, *fitted), IsEmpty());
+}
+
+TEST(FitSensor, GivesALidarWithoutRingsBands) {
+  // As of a Livox Mid-360: anywhere between -7 and 52 degrees.
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> elevation(-7.0 * degree, 52.0 * degree),
+      azimuth(-3.1, 3.1);
+  Scan scan;
+  for (int i = 0; i < 20'000; ++i) add_point(elevation(random), azimuth(random), 9.0, scan);
+  const auto fitted = fit_sensor(scan);
+  ASSERT_TRUE(fitted);
+  EXPECT_THAT(fitted->faults(), IsEmpty());
+  EXPECT_EQ(fitted->rings, 40);
+  EXPECT_NEAR(fitted->fov_up, 52.0 * degree, 0.2 * degree);
+  EXPECT_NEAR(fitted->fov_down, -7.0 * degree, 0.2 * degree);
+}
+
+TEST(FitSensor, MakesNothingOfNothing) {
+  EXPECT_FALSE(fit_sensor({}));
+  Scan scan;
+  for (int i = 0; i < 5000; ++i) scan.points_lidar.emplace_back(NAN, 1.0F, INFINITY);
+  EXPECT_FALSE(fit_sensor(scan));
+  for (auto& p : scan.points_lidar) p.setZero();
+  scan.ring.assign(scan.size(), 65535);
+  EXPECT_FALSE(fit_sensor(scan));
+  for (auto& p : scan.points_lidar) p = {5.0F, 1.0F, 0.0F};
+  EXPECT_FALSE(fit_sensor(scan));
+}
+
+TEST(SensorMisfit, NamesWhatDoesNotFit) {
+  SensorModel wide;
+  wide.rings = 128;
+  wide.fov_up = 45.0 * degree;
+  wide.fov_down = -45.0 * degree;
+  EXPECT_THAT(sensor_misfit(scan_of(wide, true), hdl_64e()), HasSubstr("ring field reaches 127"));
+  EXPECT_THAT(sensor_misfit(scan_of(wide, false), hdl_64e()), HasSubstr("between -4"));
+  EXPECT_THAT(sensor_misfit(scan_of(hdl_64e(), true), hdl_64e()), IsEmpty());
+  EXPECT_THAT(sensor_misfit({}, hdl_64e()), IsEmpty());
+}
+
+}  // namespace
+}  // namespace stillmap
