@@ -5,7 +5,7 @@ BUILD := build/$(PRESET)
 JOBS ?= $(shell nproc)
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages build deb demo test test-dev test-tsan test-kill test-docker image bench table1 parity format format-check clean
+.PHONY: help packages build deb demo test test-dev test-tsan test-kill test-docker image bench table1 ros-messages parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -56,6 +56,9 @@ bench: build ## Benchmarks of every stage
 table1: build ## The paper's Table I on simulated streets, crowded and quiet
 	$(BUILD)/bin/stillmap evaluate weightings sim:crowd --seed 2 --scans 480
 	$(BUILD)/bin/stillmap evaluate weightings sim:quiet --seed 1 --scans 500
+
+ros-messages: ## Write config/ros/stillmap_msgs from idl/msg
+	/usr/bin/python3 config/ros/write_package.py idl/msg
 
 parity: build ## Our engines against PyTorch, every RangeNet++ network and size
 	PYTHONPATH=core/segmentation/training STILLMAP_TRAINING=core/segmentation/training \

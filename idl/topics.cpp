@@ -27,7 +27,10 @@ Topics Topics::in(const std::string& name_space) {
       .odometry = symmetric<nav_msgs::msg::Odometry>(prefix + "odometry", every_pose),
       .tf = symmetric<tf2_msgs::msg::TFMessage>("rt/tf", {.depth = 100}),
       .path = symmetric<nav_msgs::msg::Path>(prefix + "path", large),
-      .scan = symmetric<sensor_msgs::msg::PointCloud2>(prefix + "scan", newest),
+      // RViz2 asks for reliable clouds unless it is told otherwise.
+      .scan = {.dds_name = prefix + "scan",
+               .writer = {.depth = 1, .bulky = true},
+               .reader = newest},
       .static_cloud = symmetric<sensor_msgs::msg::PointCloud2>(prefix + "static_cloud", large),
       .tile_index = symmetric<stillmap_msgs::msg::TileInfo>(prefix + "tile_index", keyed),
       .tiles = symmetric<stillmap_msgs::msg::MapTile>(prefix + "tiles", large_keyed),

@@ -110,7 +110,7 @@ void Server::stop() {
 }
 
 void Server::start_services(const ServerConfig& config) {
-  const auto status = [this] { return report_.status(); };
+  const auto status = [this] { return this->status(); };
   const ServiceContext context{
       .board = board_,
       .tiles = tiles_,
@@ -139,6 +139,14 @@ void Server::start_services(const ServerConfig& config) {
   removed_services_ = std::make_unique<RemovedDesk>(participant_, names, context, removed);
   status_publisher_ = std::make_unique<StatusPublisher>(participant_, topics_,
                                                         config.publish.status_period_s, status);
+}
+
+ServerStatus Server::status() const {
+  ServerStatus status = report_.status();
+  for (const auto& [name, value] : participant_.service_faults().counts()) {
+    status.counters.push_back({.name = name, .value = value});
+  }
+  return status;
 }
 
 void Server::start_areas(const ServerConfig& config) {

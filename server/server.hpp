@@ -38,6 +38,7 @@ class Server {
   void stop();
 
  private:
+  [[nodiscard]] ServerStatus status() const;
   void start_areas(const ServerConfig& config);
   void start_services(const ServerConfig& config);
   void save_in_background();

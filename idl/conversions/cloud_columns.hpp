@@ -4,11 +4,21 @@
 #include <string>
 #include <utility>
 
+#include "core/lidar/semantic_class.hpp"
 #include "idl/conversions/header.hpp"
 #include "idl/conversions/point_field.hpp"
 #include "sensor_msgs.h"
 
 namespace stillmap::wire {
+
+/// The class's colour as RViz2 and PCL pack it into the field rgb, which they want declared as a
+/// float32. Points without a class are grey: black would vanish on RViz2's background.
+[[nodiscard]] inline std::uint32_t packed_colour(SemanticClass label) {
+  constexpr std::uint32_t grey = 0x909090;
+  if (label == SemanticClass::unlabeled) return grey;
+  const Rgb rgb = colour(label);
+  return (std::uint32_t{rgb.r} << 16U) | (std::uint32_t{rgb.g} << 8U) | rgb.b;
+}
 
 /// Builds an unordered cloud: declare the fields, give it its size, fill column by column.
 class CloudColumns {
@@ -29,8 +39,11 @@ class CloudColumns {
     return field.offset();
   }
 
-  /// After the last field, before the first value.
+  /// After the last field, before the first value. Points begin at multiples of 4 bytes: readers
+  /// look at their floats in place.
   void resize(std::size_t points) {
+    constexpr std::uint32_t alignment = 4;
+    cloud_.point_step((cloud_.point_step() + alignment - 1) / alignment * alignment);
     cloud_.height(1);
     cloud_.width(static_cast<std::uint32_t>(points));
     cloud_.row_step(cloud_.width() * cloud_.point_step());
@@ -46,6 +59,9 @@ class CloudColumns {
       std::memcpy(at, &one, sizeof one);
     }
   }
+
+  /// Of a cloud without points that are not finite.
+  void set_dense() { cloud_.is_dense(true); }
 
   [[nodiscard]] sensor_msgs::msg::PointCloud2 take() { return std::move(cloud_); }
 

@@ -20,10 +20,6 @@ std::vector<const Voxel*> voxels_in(const MapView& view, const Eigen::AlignedBox
   return inside;
 }
 
-std::uint32_t packed(Rgb colour) {
-  return (std::uint32_t{colour.r} << 16U) | (std::uint32_t{colour.g} << 8U) | colour.b;
-}
-
 }  // namespace
 
 sensor_msgs::msg::PointCloud2 to_cloud(const MapView& view, const Eigen::AlignedBox2f& window_map,
@@ -33,7 +29,6 @@ sensor_msgs::msg::PointCloud2 to_cloud(const MapView& view, const Eigen::Aligned
   const auto x = columns.add_field("x", FieldType::float32);
   const auto y = columns.add_field("y", FieldType::float32);
   const auto z = columns.add_field("z", FieldType::float32);
-  // RViz2 wants the packed colour declared as a float.
   const auto rgb = columns.add_field("rgb", FieldType::float32);
   const auto confidence = columns.add_field("confidence", FieldType::float32);
   const auto label = columns.add_field("label", FieldType::uint8);
@@ -41,11 +36,12 @@ sensor_msgs::msg::PointCloud2 to_cloud(const MapView& view, const Eigen::Aligned
   columns.fill(x, [&](std::size_t i) { return voxels[i]->mean_map.x(); });
   columns.fill(y, [&](std::size_t i) { return voxels[i]->mean_map.y(); });
   columns.fill(z, [&](std::size_t i) { return voxels[i]->mean_map.z(); });
-  columns.fill(rgb, [&](std::size_t i) { return packed(colour(voxels[i]->evidence.winner())); });
+  columns.fill(rgb, [&](std::size_t i) { return packed_colour(voxels[i]->evidence.winner()); });
   columns.fill(confidence, [&](std::size_t i) { return voxels[i]->evidence.share(); });
   columns.fill(label, [&](std::size_t i) {
     return static_cast<std::uint8_t>(voxels[i]->evidence.winner());
   });
+  columns.set_dense();
   return columns.take();
 }
 

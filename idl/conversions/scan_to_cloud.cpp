@@ -63,6 +63,7 @@ sensor_msgs::msg::PointCloud2 to_cloud(const LabelledScan& labelled,
   CloudColumns columns(scan.stamp_ns, lidar_frame);
   const auto position = add_position(columns);
   const auto intensity = columns.add_field("intensity", FieldType::float32);
+  const auto rgb = columns.add_field("rgb", FieldType::float32);
   const auto confidence = columns.add_field("confidence", FieldType::float32);
   const auto label = columns.add_field("label", FieldType::uint8);
   const auto motion = columns.add_field("motion", FieldType::uint8);
@@ -70,12 +71,14 @@ sensor_msgs::msg::PointCloud2 to_cloud(const LabelledScan& labelled,
   fill_position(columns, position, scan);
   columns.fill(intensity,
                [&](std::size_t i) { return scan.intensity.empty() ? 0.0F : scan.intensity[i]; });
+  columns.fill(rgb, [&](std::size_t i) { return packed_colour(labelled.label(i)); });
   columns.fill(confidence, [&](std::size_t i) {
     return labelled.labels.empty() ? 0.0F : labelled.labels.confidence[i];
   });
   columns.fill(label, [&](std::size_t i) { return static_cast<std::uint8_t>(labelled.label(i)); });
   columns.fill(motion,
                [&](std::size_t i) { return static_cast<std::uint8_t>(labelled.motion[i]); });
+  columns.set_dense();
   return columns.take();
 }
 

@@ -16,8 +16,9 @@ namespace stillmap::wire {
                                                      std::span<const std::uint32_t> raw_labels,
                                                      const std::string& lidar_frame);
 
-/// What became of a scan: x y z intensity confidence (float32), label (class 0..19) and motion
-/// (0 stationary, 1 semi-static, 2 highly dynamic) as uint8.
+/// What became of a scan: x y z intensity (float32), rgb (the class's colour, packed as RViz2
+/// expects it), confidence (float32), label (class 0..19) and motion (0 stationary, 1 semi-static,
+/// 2 highly dynamic) as uint8.
 [[nodiscard]] sensor_msgs::msg::PointCloud2 to_cloud(const LabelledScan& labelled,
                                                      const std::string& lidar_frame);
 

@@ -5,6 +5,7 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <string_view>
+#include <typeinfo>
 
 #include "idl/dds/discovery.hpp"
 #include "idl/dds/ros_graph.hpp"
@@ -87,6 +88,12 @@ Topic* Participant::topic(const std::string& name, TypeSupport type) {
     if (known->second->get_type_name() != type.get_type_name()) {
       throw failure("topic " + name + " has type " + known->second->get_type_name() + ", not " +
                     type.get_type_name());
+    }
+    const TypeSupport registered = handle_->find_type(type.get_type_name());
+    const auto& registered_form = *registered;
+    const auto& wanted_form = *type;
+    if (typeid(registered_form) != typeid(wanted_form)) {
+      throw failure("topic " + name + " is used here both as messages and as unread bytes");
     }
     return known->second;
   }

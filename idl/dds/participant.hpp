@@ -16,6 +16,7 @@
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/dds_options.hpp"
 #include "idl/dds/qos.hpp"
+#include "idl/dds/service_faults.hpp"
 
 namespace stillmap {
 
@@ -32,6 +33,10 @@ class Participant {
   Participant& operator=(const Participant&) = delete;
 
   [[nodiscard]] const DdsOptions& options() const { return options_; }
+
+  /// What went wrong in the services that this process offers.
+  [[nodiscard]] ServiceFaults& service_faults() { return service_faults_; }
+  [[nodiscard]] const ServiceFaults& service_faults() const { return service_faults_; }
 
   /// Endpoints that leave the domain with their owner.
   using WriterHandle = std::unique_ptr<eprosima::fastdds::dds::DataWriter,
@@ -67,6 +72,7 @@ class Participant {
   [[nodiscard]] DdsError failure(const std::string& what) const;
 
   DdsOptions options_;
+  ServiceFaults service_faults_;
   std::mutex mutex_;
   // Held so that the factory outlives this participant even in a process that is ending.
   std::shared_ptr<eprosima::fastdds::dds::DomainParticipantFactory> factory_;

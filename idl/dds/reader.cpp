@@ -1,5 +1,7 @@
 #include "idl/dds/reader.hpp"
 
+#include <algorithm>
+
 namespace stillmap {
 
 using namespace eprosima::fastdds::dds;
@@ -13,12 +15,22 @@ void ReaderEvents::wait_for_data(const std::stop_token& stop, std::chrono::milli
 
 int ReaderEvents::matched_writers() const {
   const std::scoped_lock lock(mutex_);
-  return matched_writers_;
+  return static_cast<int>(writers_.size());
+}
+
+bool ReaderEvents::has_writer(const Guid& writer) const {
+  const std::scoped_lock lock(mutex_);
+  return writers_.contains(writer);
+}
+
+int ReaderEvents::writers_of_peer(const Guid& endpoint) const {
+  const std::scoped_lock lock(mutex_);
+  return static_cast<int>(std::ranges::count(writers_, endpoint.guidPrefix, &Guid::guidPrefix));
 }
 
 bool ReaderEvents::wait_for_writer(std::chrono::milliseconds timeout) const {
   std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, timeout, [this] { return matched_writers_ > 0; });
+  return changed_.wait_for(lock, timeout, [this] { return !writers_.empty(); });
 }
 
 int ReaderEvents::incompatible_writers() const {
@@ -33,8 +45,13 @@ void ReaderEvents::on_data_available(DataReader*) {
 }
 
 void ReaderEvents::on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) {
+  const Guid writer = eprosima::fastrtps::rtps::iHandle2GUID(status.last_publication_handle);
   const std::scoped_lock lock(mutex_);
-  matched_writers_ = status.current_count;
+  if (status.current_count_change > 0) {
+    writers_.insert(writer);
+  } else {
+    writers_.erase(writer);
+  }
   changed_.notify_all();
 }
 

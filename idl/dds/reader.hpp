@@ -5,6 +5,7 @@
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <mutex>
+#include <set>
 #include <stop_token>
 #include <string>
 
@@ -20,7 +21,12 @@ class ReaderEvents : public eprosima::fastdds::dds::DataReaderListener {
   /// Returns at new data, a requested stop, or after `timeout`.
   void wait_for_data(const std::stop_token& stop, std::chrono::milliseconds timeout);
 
+  using Guid = eprosima::fastrtps::rtps::GUID_t;
+
   [[nodiscard]] int matched_writers() const;
+  [[nodiscard]] bool has_writer(const Guid& writer) const;
+  /// Matched writers in the process that `endpoint` belongs to.
+  [[nodiscard]] int writers_of_peer(const Guid& endpoint) const;
   [[nodiscard]] bool wait_for_writer(std::chrono::milliseconds timeout) const;
   /// Writers on this topic whose quality of service does not fit ours, as a best-effort writer for
   /// a reliable reader.
@@ -38,7 +44,7 @@ class ReaderEvents : public eprosima::fastdds::dds::DataReaderListener {
   mutable std::mutex mutex_;
   mutable std::condition_variable_any changed_;
   bool data_arrived_ = false;
-  int matched_writers_ = 0;
+  std::set<Guid> writers_;
   int incompatible_writers_ = 0;
 };
 

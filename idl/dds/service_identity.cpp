@@ -1,5 +1,8 @@
 #include "idl/dds/service_identity.hpp"
 
+#include <algorithm>
+#include <cassert>
+
 namespace stillmap {
 
 using eprosima::fastdds::dds::SampleInfo;
@@ -22,6 +25,33 @@ SampleIdentity reply_identity(const SampleInfo& request) {
 
 bool names_reply_reader(const SampleInfo& request) {
   return request.related_sample_identity.writer_guid() != GUID_t::unknown();
+}
+
+bool has_correlation_header(const GUID_t& request_writer) {
+  // A participant's GUID begins with its vendor's id.
+  constexpr std::array<std::uint8_t, 2> cyclone = {0x01, 0x10};
+  return std::equal(cyclone.begin(), cyclone.end(), request_writer.guidPrefix.value);
+}
+
+std::optional<CorrelationHeader> take_correlation_header(SampleBytes& request) {
+  CorrelationHeader header{};
+  if (request.size() < encapsulation_bytes + header.size()) return std::nullopt;
+  const auto begin = request.begin() + encapsulation_bytes;
+  const auto end = begin + static_cast<std::ptrdiff_t>(header.size());
+  std::copy(begin, end, header.begin());
+  const bool is_little_endian = (request[1] & 1U) != 0;
+  if (!is_little_endian) {
+    const auto middle = header.begin() + header.size() / 2;
+    std::reverse(header.begin(), middle);
+    std::reverse(middle, header.end());
+  }
+  request.erase(begin, end);
+  return header;
+}
+
+void put_correlation_header(const CorrelationHeader& header, SampleBytes& reply) {
+  assert(reply.size() >= encapsulation_bytes + header.size());
+  std::ranges::copy(header, reply.begin() + encapsulation_bytes);
 }
 
 }  // namespace stillmap

@@ -5,13 +5,21 @@
 #include <thread>
 #include <utility>
 
-#include "idl/dds/reader.hpp"
-#include "idl/dds/service_identity.hpp"
-#include "idl/dds/writer.hpp"
+#include "idl/dds/service_port.hpp"
+#include "idl/dds/type_support.hpp"
 
 namespace stillmap {
 
-/// Answers the requests of one ROS 2 service, one at a time, on its own thread.
+/// A reply that can say in words why there is no answer.
+template <typename Reply>
+concept CarriesRefusal = requires(Reply reply) {
+  reply.status().code(std::uint8_t{});
+  reply.status().reason(std::string());
+};
+
+/// Answers the requests of one ROS 2 service, one at a time, on its own thread, whether they come
+/// from rmw_fastrtps or from rmw_cyclonedds. Requests that cannot be read are counted
+/// (Participant::service_faults) and refused, where the reply has a status.
 template <typename Request, typename Reply>
 class ServiceServer {
  public:
@@ -19,36 +27,37 @@ class ServiceServer {
   ServiceServer(Participant& participant, const std::string& service,
                 std::function<Reply(const Request&)> answer)
       : answer_(std::move(answer)),
-        replies_(participant, reply_topic(service), service_qos()),
-        requests_(participant, request_topic(service), service_qos()),
+        port_(participant, service, type_support<Request>(), type_support<Reply>()),
         thread_([this](const std::stop_token& stop) { serve(stop); }) {}
 
  private:
   void serve(const std::stop_token& stop) {
     Request request;
-    eprosima::fastdds::dds::SampleInfo info;
     while (!stop.stop_requested()) {
-      if (requests_.take(request, info, stop, std::chrono::seconds(1))) reply(request, info);
+      const auto call = port_.take(&request, stop, std::chrono::seconds(1));
+      if (!call) continue;
+      if (call->is_readable) {
+        const Reply reply = answer_(request);
+        port_.answer(*call, &reply);
+      } else if constexpr (CarriesRefusal<Reply>) {
+        const Reply reply = refusal();
+        port_.answer(*call, &reply);
+      }
     }
   }
 
-  void reply(const Request& request, const eprosima::fastdds::dds::SampleInfo& info) {
-    const Reply answer = answer_(request);
-    eprosima::fastrtps::rtps::WriteParams params;
-    params.related_sample_identity() = reply_identity(info);
-    // A reply written before the client's reader is known never reaches it. A client that left
-    // does not match any more; its answer goes to nobody.
-    const auto& readers = replies_.readers();
-    const auto& client = params.related_sample_identity().writer_guid();
-    const bool found = names_reply_reader(info)
-                           ? readers.wait_for(client, reply_match_timeout)
-                           : readers.wait_for_peer(client, reply_match_timeout);
-    if (found) static_cast<void>(replies_.write(answer, params));
+  static Reply refusal() {
+    Reply reply;
+    // An invalid request, as stillmap_msgs/ReplyStatus numbers it.
+    reply.status().code(1);
+    reply.status().reason("the request cannot be read as a " +
+                          type_support<Request>().get_type_name() +
+                          "; client and server must have the same version of stillmap_msgs");
+    return reply;
   }
 
   std::function<Reply(const Request&)> answer_;
-  Writer<Reply> replies_;
-  Reader<Request> requests_;
+  ServicePort port_;
   // Last: stops before what it uses is gone.
   std::jthread thread_;
 };

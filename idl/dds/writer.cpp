@@ -27,15 +27,14 @@ bool MatchedReaders::wait_for_any(std::chrono::milliseconds timeout) const {
   return changed_.wait_for(lock, timeout, [this] { return !readers_.empty(); });
 }
 
-bool MatchedReaders::wait_for(const Guid& reader, std::chrono::milliseconds timeout) const {
-  std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, timeout, [&] { return readers_.contains(reader); });
+bool MatchedReaders::has(const Guid& reader) const {
+  const std::scoped_lock lock(mutex_);
+  return readers_.contains(reader);
 }
 
-bool MatchedReaders::wait_for_peer(const Guid& endpoint, std::chrono::milliseconds timeout) const {
-  const auto is_peer = [&](const Guid& reader) { return reader.guidPrefix == endpoint.guidPrefix; };
-  std::unique_lock lock(mutex_);
-  return changed_.wait_for(lock, timeout, [&] { return std::ranges::any_of(readers_, is_peer); });
+int MatchedReaders::count_of_peer(const Guid& endpoint) const {
+  const std::scoped_lock lock(mutex_);
+  return static_cast<int>(std::ranges::count(readers_, endpoint.guidPrefix, &Guid::guidPrefix));
 }
 
 void MatchedReaders::on_publication_matched(DataWriter*, const PublicationMatchedStatus& status) {

@@ -21,10 +21,9 @@ class MatchedReaders : public eprosima::fastdds::dds::DataWriterListener {
 
   [[nodiscard]] int count() const;
   [[nodiscard]] bool wait_for_any(std::chrono::milliseconds timeout) const;
-  /// Waits for this reader.
-  [[nodiscard]] bool wait_for(const Guid& reader, std::chrono::milliseconds timeout) const;
-  /// Waits for a reader in the process that `endpoint` belongs to.
-  [[nodiscard]] bool wait_for_peer(const Guid& endpoint, std::chrono::milliseconds timeout) const;
+  [[nodiscard]] bool has(const Guid& reader) const;
+  /// Readers in the process that `endpoint` belongs to.
+  [[nodiscard]] int count_of_peer(const Guid& endpoint) const;
 
  private:
   void on_publication_matched(

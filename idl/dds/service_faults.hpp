@@ -1,0 +1,28 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <mutex>
+#include <string>
+
+namespace stillmap {
+
+/// Counts the requests that a process could not answer. Thread-safe.
+class ServiceFaults {
+ public:
+  /// A request that is none of the service's type: another version of it, or damaged.
+  void unreadable_request(const std::string& service);
+  /// A reply that went to nobody: its client was never found, or left.
+  void undelivered_reply(const std::string& service);
+
+  /// How often each occurred: "unreadable_request_stillmap/get_status".
+  [[nodiscard]] std::map<std::string, std::uint64_t> counts() const;
+
+ private:
+  void count(const std::string& name);
+
+  mutable std::mutex mutex_;
+  std::map<std::string, std::uint64_t> counts_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,233 @@
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <set>
+#include <thread>
+
+#include "idl/dds/service_client.hpp"
+#include "idl/dds/service_server.hpp"
+#include "stillmap_msgs.h"
+#include "tests/idl/dds_fixture.hpp"
+#include "tests/idl/vendor_peer.hpp"
+
+// Services, asked by processes of other vendors.
+
+namespace stillmap {
+namespace {
+
+using namespace std::chrono_literals;
+using stillmap_msgs::srv::SaveMap_Request;
+using stillmap_msgs::srv::SaveMap_Response;
+using ::testing::HasSubstr;
+
+constexpr auto patience = 20s;
+constexpr auto service = "stillmap/save_map";
+constexpr auto type_stem = "stillmap_msgs::srv::dds_::SaveMap";
+
+SaveMap_Response echo(const SaveMap_Request& request) {
+  SaveMap_Response reply;
+  reply.file("saved " + request.file());
+  return reply;
+}
+
+SampleBytes request_for(const std::string& file, std::size_t gap_bytes) {
+  SaveMap_Request request;
+  request.file(file);
+  return to_bytes(type_support<SaveMap_Request>(), &request, gap_bytes);
+}
+
+CorrelationHeader header_of(std::uint8_t client, std::uint8_t number) {
+  return {client, 2, 3, 4, 5, 6, 7, 8, number, 0, 0, 0, 0, 0, 0, 0};
+}
+
+SampleBytes cyclone_request(const CorrelationHeader& header, const std::string& file) {
+  SampleBytes bytes = request_for(file, header.size());
+  put_correlation_header(header, bytes);
+  return bytes;
+}
+
+std::optional<SaveMap_Response> read_reply(SampleBytes bytes) {
+  SaveMap_Response reply;
+  if (!from_bytes(type_support<SaveMap_Response>(), bytes, &reply)) return std::nullopt;
+  return reply;
+}
+
+class ForeignService : public testing::Test {
+ protected:
+  [[nodiscard]] std::uint64_t faults(const std::string& kind) const {
+    const auto counts = server_side_.service_faults().counts();
+    const auto found = counts.find(kind + "_" + service);
+    return found == counts.end() ? 0 : found->second;
+  }
+
+  Participant server_side_{loopback(false)};
+  ServiceServer<SaveMap_Request, SaveMap_Response> server_{server_side_, service, echo};
+};
+
+/// The reply to the request with this header, among replies to all.
+std::optional<SaveMap_Response> reply_to(ByteClient& client, const CorrelationHeader& header) {
+  const auto deadline = std::chrono::steady_clock::now() + patience;
+  while (std::chrono::steady_clock::now() < deadline) {
+    auto reply = client.receive(patience);
+    if (!reply) return std::nullopt;
+    if (take_correlation_header(reply->bytes) == header) return read_reply(reply->bytes);
+  }
+  return std::nullopt;
+}
+
+TEST_F(ForeignService, AnswersCycloneWithTheHeaderOfItsRequest) {
+  VendorPeer peer(eclipse_cyclone);
+  ByteClient client(peer, service, type_stem);
+  ASSERT_TRUE(client.wait_for_server());
+  const auto header = header_of(1, 77);
+  client.ask(cyclone_request(header, "x"));
+  const auto reply = reply_to(client, header);
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->file(), "saved x");
+}
+
+TEST_F(ForeignService, AnswersCycloneOnABigEndianMachine) {
+  VendorPeer peer(eclipse_cyclone);
+  ByteClient client(peer, service, type_stem);
+  ASSERT_TRUE(client.wait_for_server());
+  // Client 0x0102030405060708, request 9, format version 0, string of 2 bytes "x".
+  client.ask({0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 0,   0, 0, 0,
+              0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 0, 2, 'x', 0, 0, 0});
+  const auto reply = reply_to(client, {8, 7, 6, 5, 4, 3, 2, 1, 9, 0, 0, 0, 0, 0, 0, 0});
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->file(), "saved x");
+}
+
+TEST_F(ForeignService, AnswersOtherVendorsByTheIdentityOfTheirRequest) {
+  VendorPeer peer(rti_connext);
+  ByteClient client(peer, service, type_stem);
+  ASSERT_TRUE(client.wait_for_server());
+  const auto identity = client.ask(request_for("y", 0));
+  auto reply = client.receive(patience);
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->answered, identity);
+  const auto read = read_reply(reply->bytes);
+  ASSERT_TRUE(read);
+  EXPECT_EQ(read->file(), "saved y");
+}
+
+TEST_F(ForeignService, AnswersManyClientsOfBothKindsAtOnce) {
+  constexpr int requests = 20;
+  std::atomic<int> fast_right = 0;
+  std::atomic<int> cyclone_right = 0;
+  {
+    std::vector<std::jthread> clients;
+    for (int c = 0; c < 3; ++c) {
+      clients.emplace_back([&fast_right, c] {
+        Participant side(loopback(false));
+        ServiceClient<SaveMap_Request, SaveMap_Response> client(side, service);
+        for (int i = 0; i < requests; ++i) {
+          SaveMap_Request request;
+          request.file(std::to_string(100 * c + i));
+          const auto reply = client.ask(request, patience);
+          if (reply && reply->file() == "saved " + request.file()) ++fast_right;
+        }
+      });
+      clients.emplace_back([&cyclone_right, c] {
+        VendorPeer peer(eclipse_cyclone);
+        ByteClient client(peer, service, type_stem);
+        if (!client.wait_for_server()) return;
+        for (int i = 0; i < requests; ++i) {
+          const auto header = header_of(static_cast<std::uint8_t>(c), static_cast<std::uint8_t>(i));
+          const std::string file = std::to_string(1000 * c + i);
+          client.ask(cyclone_request(header, file));
+          const auto reply = reply_to(client, header);
+          if (reply && reply->file() == "saved " + file) ++cyclone_right;
+        }
+      });
+    }
+  }
+  EXPECT_EQ(fast_right, 3 * requests);
+  EXPECT_EQ(cyclone_right, 3 * requests);
+  EXPECT_EQ(faults("undelivered_reply"), 0U);
+}
+
+struct HostileBytes {
+  std::string name;
+  SampleBytes bytes;
+};
+
+std::vector<HostileBytes> hostile_requests(std::size_t header_bytes) {
+  const SampleBytes good = request_for("file", header_bytes);
+  std::vector<HostileBytes> all;
+  for (std::size_t length = encapsulation_bytes; length < good.size(); length += 5) {
+    all.push_back({"cut at " + std::to_string(length),
+                   SampleBytes(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(length))});
+  }
+  // PL_CDR and XCDR2's, and what is none at all.
+  for (const int kind : {2, 3, 6, 7, 10, 200}) {
+    all.push_back({"encapsulation " + std::to_string(kind), good});
+    all.back().bytes[1] = static_cast<std::uint8_t>(kind);
+  }
+  all.push_back({"endless string", good});
+  std::fill_n(all.back().bytes.begin() + static_cast<std::ptrdiff_t>(8 + header_bytes), 4, 0xFF);
+  return all;
+}
+
+TEST_F(ForeignService, OutlivesHostileRequestsAndCountsThem) {
+  VendorPeer cyclone(eclipse_cyclone);
+  ByteClient cyclone_client(cyclone, service, type_stem);
+  VendorPeer other(rti_connext);
+  ByteClient other_client(other, service, type_stem);
+  ASSERT_TRUE(cyclone_client.wait_for_server() && other_client.wait_for_server());
+  std::uint64_t sent = 0;
+  for (const auto& [name, bytes] : hostile_requests(sizeof(CorrelationHeader))) {
+    cyclone_client.ask(bytes);
+    ++sent;
+  }
+  for (const auto& [name, bytes] : hostile_requests(0)) {
+    other_client.ask(bytes);
+    ++sent;
+  }
+  const auto header = header_of(9, 9);
+  cyclone_client.ask(cyclone_request(header, "still here"));
+  const auto reply = reply_to(cyclone_client, header);
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->file(), "saved still here");
+  // PL_CDR differs from CDR in its parameter lists alone, and Fast CDR reads it as CDR.
+  EXPECT_GE(faults("unreadable_request"), sent - 4);
+  EXPECT_LE(faults("unreadable_request"), sent);
+}
+
+TEST_F(ForeignService, RefusesARequestThatItCannotReadInWords) {
+  VendorPeer peer(eclipse_cyclone);
+  ByteClient client(peer, service, type_stem);
+  ASSERT_TRUE(client.wait_for_server());
+  const auto header = header_of(3, 4);
+  SampleBytes request = cyclone_request(header, "file");
+  request.resize(request.size() - 3);
+  client.ask(request);
+  const auto reply = reply_to(client, header);
+  ASSERT_TRUE(reply);
+  EXPECT_EQ(reply->status().code(), 1);
+  EXPECT_THAT(reply->status().reason(), HasSubstr("SaveMap_Request_"));
+  EXPECT_THAT(reply->status().reason(), HasSubstr("same version"));
+}
+
+TEST_F(ForeignService, IsNotHeldUpByClientsThatNeverListen) {
+  VendorPeer deaf(eclipse_cyclone);
+  ByteClient deaf_client(deaf, service, type_stem, false);
+  Participant side(loopback(false));
+  ServiceClient<SaveMap_Request, SaveMap_Response> client(side, service);
+  ASSERT_TRUE(deaf_client.wait_for_server() && client.wait_for_server(patience));
+  constexpr int deaf_requests = 10;
+  for (int i = 0; i < deaf_requests; ++i) deaf_client.ask(cyclone_request(header_of(1, 1), "deaf"));
+  const auto began = std::chrono::steady_clock::now();
+  SaveMap_Request request;
+  request.file("quick");
+  EXPECT_TRUE(client.ask(request, patience));
+  // One after the other, the deaf ones would take 5 s.
+  EXPECT_LT(std::chrono::steady_clock::now() - began, 2s);
+  for (int i = 0; i < 500 && faults("undelivered_reply") < deaf_requests; ++i) {
+    std::this_thread::sleep_for(10ms);
+  }
+  EXPECT_EQ(faults("undelivered_reply"), deaf_requests);
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,52 @@
+// A program of another DDS vendor's (Eclipse Cyclone DDS), which knows Stillmap only by the types
+// that ROS 2's generators would make of config/ros/stillmap_msgs and of ROS 2's own messages.
+
+#include <cstdlib>
+#include <exception>
+#include <iostream>
+#include <map>
+#include <string>
+
+#include "tests/ros/cyclone_peer/commands.hpp"
+
+namespace {
+
+using stillmap::peer::Place;
+
+// On this machine only, and without multicast, which containers may lack.
+constexpr auto loopback = R"(<CycloneDDS><Domain>
+  <General><AllowMulticast>false</AllowMulticast>
+    <Interfaces><NetworkInterface address="127.0.0.1"/></Interfaces></General>
+  <Discovery><ParticipantIndex>auto</ParticipantIndex>
+    <MaxAutoParticipantIndex>40</MaxAutoParticipantIndex>
+    <Peers><Peer address="127.0.0.1"/></Peers></Discovery>
+</Domain></CycloneDDS>)";
+
+int run(const std::string& command, const Place& place, const std::string& argument) {
+  using namespace stillmap::peer;
+  if (command == "drive") return drive(place, argument);
+  if (command == "late") return join_late(place);
+  if (command == "graph") return watch_graph(place, argument);
+  if (command == "services") return ask_services(place);
+  if (command == "clients") return come_and_go(place, std::stoi(argument));
+  throw std::invalid_argument("no command " + command);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 3) {
+    std::cerr
+        << "usage: cyclone_peer drive|late|graph|services|clients DOMAIN [RECORDING|NODE|COUNT]\n";
+    return 2;
+  }
+  setenv("CYCLONEDDS_URI", loopback, 0);
+  try {
+    std::cout << std::boolalpha;
+    const Place place{.domain_id = static_cast<std::uint32_t>(std::stoul(argv[2]))};
+    return run(argv[1], place, argc > 3 ? argv[3] : "");
+  } catch (const std::exception& error) {
+    std::cerr << "cyclone_peer: " << error.what() << "\n";
+    return 1;
+  }
+}
