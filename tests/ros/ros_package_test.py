@@ -9,8 +9,13 @@ import unittest
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
-from interfaces import (Structure, read_definitions, read_idl, read_message, read_package,
+from interfaces import (Field, Structure, read_definitions, read_idl, read_message, read_package,
                         read_service)
+
+try:
+    import rosidl_adapter.parser as rosidl
+except ImportError:
+    rosidl = None
 
 SOURCE = Path(os.environ["STILLMAP_SOURCE"])
 PACKAGE = SOURCE / "config/ros/stillmap_msgs"
@@ -116,6 +121,30 @@ class RosPackageTest(unittest.TestCase):
         project = (SOURCE / "CMakeLists.txt").read_text()
         version = re.search(r"project\(stillmap VERSION (\S+)", project)[1]
         self.assertEqual(xml.parse(PACKAGE / "package.xml").getroot().findtext("version"), version)
+
+
+@unittest.skipUnless(rosidl, "python3-rosidl is not installed")
+class RosidlTest(unittest.TestCase):
+    """ROS 2's own reader of .msg and .srv takes the package, and reads what we read."""
+
+    @staticmethod
+    def structure(kind: str, name: str, specification) -> Structure:
+        return Structure(PACKAGE.name, kind, name, fields=[
+            Field(str(field.type), field.name) for field in specification.fields])
+
+    def test_it_reads_the_same_fields(self):
+        theirs = [self.structure("msg", file.stem, rosidl.parse_message_string(
+            PACKAGE.name, file.stem, file.read_text())) for file in PACKAGE.glob("msg/*.msg")]
+        for file in PACKAGE.glob("srv/*.srv"):
+            service = rosidl.parse_service_string(PACKAGE.name, file.stem, file.read_text())
+            theirs += [self.structure("srv", f"{file.stem}_Request", service.request),
+                       self.structure("srv", f"{file.stem}_Response", service.response)]
+        ours = read_package(PACKAGE)
+        for made in ours:
+            for field in made.fields:
+                field.is_key = False
+        self.assertEqual(differences(ours, theirs), [])
+        self.assertEqual(differences(theirs, ours), [])
 
 
 class DifferencesTest(unittest.TestCase):
