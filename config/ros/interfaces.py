@@ -119,7 +119,9 @@ def _ros_type(words: list[str]) -> str:
     return ROS_OF_IDL[name]
 
 
-_ROS_FIELD = re.compile(r"^(?P<type>[\w/]+(?:<=\d+)?)(?P<array>\[[^\]]*\])?\s+(?P<name>\w+)(?:\s+(?P<default>\S+))?$")
+# A type, how many of it, a name, a default.
+_ROS_FIELD = re.compile(
+    r"^(?P<type>[\w/]+(?:<=\d+)?)(?P<array>\[[^\]]*\])?\s+(?P<name>\w+)(?:\s+\S+)?$")
 
 
 def _is_basic(type_name: str) -> bool:

@@ -37,6 +37,18 @@ DomainParticipantQos participant_qos(const DdsOptions& options) {
   return qos;
 }
 
+// Fast DDS would hand a sample of one form to a reader of the other.
+void check_form(const DomainParticipant& participant, const TypeSupport& type) {
+  const TypeSupport registered = participant.find_type(type.get_type_name());
+  if (registered.empty()) return;
+  const auto& known_form = *registered;
+  const auto& wanted_form = *type;
+  if (typeid(known_form) != typeid(wanted_form)) {
+    throw DdsError("type " + type.get_type_name() +
+                   " is used in one process both as messages and as unread bytes");
+  }
+}
+
 }  // namespace
 
 Participant::Participant(const DdsOptions& options)
@@ -84,16 +96,11 @@ DdsError Participant::failure(const std::string& what) const {
 }
 
 Topic* Participant::topic(const std::string& name, TypeSupport type) {
+  check_form(*handle_, type);
   if (const auto known = topics_.find(name); known != topics_.end()) {
     if (known->second->get_type_name() != type.get_type_name()) {
       throw failure("topic " + name + " has type " + known->second->get_type_name() + ", not " +
                     type.get_type_name());
-    }
-    const TypeSupport registered = handle_->find_type(type.get_type_name());
-    const auto& registered_form = *registered;
-    const auto& wanted_form = *type;
-    if (typeid(registered_form) != typeid(wanted_form)) {
-      throw failure("topic " + name + " is used here both as messages and as unread bytes");
     }
     return known->second;
   }

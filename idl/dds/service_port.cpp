@@ -16,7 +16,7 @@ constexpr auto look_period = 5ms;
 // client has found us when it asks, and our heartbeats are 50 ms apart.
 constexpr auto cyclone_settle_time = 150ms;
 // Replies that wait for their readers; what comes on top pushes the oldest out.
-constexpr std::size_t most_waiting = 100;
+constexpr std::size_t most_waiting = 30;
 
 }  // namespace
 

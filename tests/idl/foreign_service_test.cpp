@@ -111,6 +111,20 @@ TEST_F(ForeignService, AnswersOtherVendorsByTheIdentityOfTheirRequest) {
   EXPECT_EQ(read->file(), "saved y");
 }
 
+TEST_F(ForeignService, AnswersEveryClientOfOneProcess) {
+  VendorPeer peer(eclipse_cyclone);
+  ByteClient first(peer, service, type_stem);
+  ByteClient second(peer, service, type_stem);
+  ASSERT_TRUE(first.wait_for_server() && second.wait_for_server());
+  first.ask(cyclone_request(header_of(1, 1), "first"));
+  second.ask(cyclone_request(header_of(2, 1), "second"));
+  const auto to_first = reply_to(first, header_of(1, 1));
+  const auto to_second = reply_to(second, header_of(2, 1));
+  ASSERT_TRUE(to_first && to_second);
+  EXPECT_EQ(to_first->file(), "saved first");
+  EXPECT_EQ(to_second->file(), "saved second");
+}
+
 TEST_F(ForeignService, AnswersManyClientsOfBothKindsAtOnce) {
   constexpr int requests = 20;
   std::atomic<int> fast_right = 0;

@@ -35,6 +35,14 @@ std::vector<SampleBytes> hostile_clouds() {
   return all;
 }
 
+TEST(UnreadSample, IsNoFormOfATypeThatIsReadInTheSameProcess) {
+  Participant participant(loopback(false));
+  const Reader<PointCloud2> reader(participant, "rt/points", {});
+  const std::string type_name = type_support<PointCloud2>().get_type_name();
+  EXPECT_THROW(UnreadReader(participant, "rt/points", type_name, {}), DdsError);
+  EXPECT_THROW(UnreadReader(participant, "rt/other_points", type_name, {}), DdsError);
+}
+
 TEST(HostileSample, IsPassedOverByAReaderThatGoesOn) {
   Participant here(loopback(false));
   Participant there(loopback(false));

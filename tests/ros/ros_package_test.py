@@ -9,8 +9,13 @@ import unittest
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
-from interfaces import (Structure, read_definitions, read_idl, read_message, read_package,
+from interfaces import (Field, Structure, read_definitions, read_idl, read_message, read_package,
                         read_service)
+
+try:
+    import rosidl_adapter.parser as rosidl
+except ImportError:
+    rosidl = None
 
 SOURCE = Path(os.environ["STILLMAP_SOURCE"])
 PACKAGE = SOURCE / "config/ros/stillmap_msgs"
@@ -56,7 +61,15 @@ def field_differences(made: Structure, other: Structure) -> list[str]:
     return faults
 
 
-class RosPackageTest(unittest.TestCase):
+class ComparisonTest(unittest.TestCase):
+
+    def assert_same(self, ours: list[Structure], theirs: list[Structure]):
+        faults = differences(ours, theirs)
+        if faults:
+            self.fail("\n" + "\n".join(faults))
+
+
+class RosPackageTest(ComparisonTest):
 
     @classmethod
     def setUpClass(cls):
@@ -66,17 +79,17 @@ class RosPackageTest(unittest.TestCase):
 
     def test_package_has_every_type_of_our_idl_field_by_field(self):
         self.assertGreater(len(self.own_idl), 30)
-        self.assertEqual(differences(self.own_idl, self.package), [])
+        self.assert_same(self.own_idl, self.package)
 
     def test_package_has_nothing_that_our_idl_has_not(self):
-        self.assertEqual(differences(self.package, self.own_idl), [])
+        self.assert_same(self.package, self.own_idl)
 
     def test_standard_messages_of_our_idl_are_those_of_ros(self):
         ros = read_definitions((SOURCE / "tests/ros/ros2_definitions.txt").read_text())
         mirrored = [made for made in self.idl
                     if made.package not in ("stillmap_msgs", "rmw_dds_common_iron")]
-        self.assertEqual(differences(mirrored, ros), [])
-        self.assertEqual(differences(ros, mirrored), [])
+        self.assert_same(mirrored, ros)
+        self.assert_same(ros, mirrored)
 
     def test_longer_gids_are_the_only_difference_before_iron(self):
         humble = [made for made in self.idl if made.package == "rmw_dds_common"]
@@ -116,6 +129,30 @@ class RosPackageTest(unittest.TestCase):
         project = (SOURCE / "CMakeLists.txt").read_text()
         version = re.search(r"project\(stillmap VERSION (\S+)", project)[1]
         self.assertEqual(xml.parse(PACKAGE / "package.xml").getroot().findtext("version"), version)
+
+
+@unittest.skipUnless(rosidl, "python3-rosidl is not installed")
+class RosidlTest(ComparisonTest):
+    """ROS 2's own reader of .msg and .srv takes the package, and reads what we read."""
+
+    @staticmethod
+    def structure(kind: str, name: str, specification) -> Structure:
+        return Structure(PACKAGE.name, kind, name, fields=[
+            Field(str(field.type), field.name) for field in specification.fields])
+
+    def test_it_reads_the_same_fields(self):
+        theirs = [self.structure("msg", file.stem, rosidl.parse_message_string(
+            PACKAGE.name, file.stem, file.read_text())) for file in PACKAGE.glob("msg/*.msg")]
+        for file in PACKAGE.glob("srv/*.srv"):
+            service = rosidl.parse_service_string(PACKAGE.name, file.stem, file.read_text())
+            theirs += [self.structure("srv", f"{file.stem}_Request", service.request),
+                       self.structure("srv", f"{file.stem}_Response", service.response)]
+        ours = read_package(PACKAGE)
+        for made in ours:
+            for field in made.fields:
+                field.is_key = False
+        self.assert_same(ours, theirs)
+        self.assert_same(theirs, ours)
 
 
 class DifferencesTest(unittest.TestCase):

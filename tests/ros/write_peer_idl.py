@@ -34,7 +34,9 @@ def idl_member(field_type: str, name: str) -> str:
     array = re.search(r"\[(.*)\]", field_type)
     if not array:
         return f"{element} {escaped};"
-    return f"sequence<{element}> {escaped};" if not array[1] else f"{element} {escaped}[{array[1]}];"
+    if array[1]:
+        return f"{element} {escaped}[{array[1]}];"
+    return f"sequence<{element}> {escaped};"
 
 
 def idl_structure(made: Structure) -> str:

@@ -1,14 +1,11 @@
-#include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <set>
-#include <vector>
 
 #include "tests/ros/cyclone_peer/commands.hpp"
 #include "tests/ros/cyclone_peer/endpoints.hpp"
+#include "tests/ros/cyclone_peer/lidar.hpp"
 #include "tests/ros/cyclone_peer/report.hpp"
 
 namespace stillmap::peer {
@@ -18,85 +15,10 @@ using namespace std::chrono_literals;
 using Cloud = sensor_msgs_msg_dds__PointCloud2_;
 using Odometry = nav_msgs_msg_dds__Odometry_;
 using Transforms = tf2_msgs_msg_dds__TFMessage_;
-using Field = sensor_msgs_msg_dds__PointField_;
 using Stamp = builtin_interfaces_msg_dds__Time_;
 
 constexpr auto scan_period = 100ms;
 constexpr auto patience = 60s;
-constexpr std::size_t recorded_point_bytes = 16;
-constexpr std::size_t label_bytes = 4;
-
-std::vector<std::uint8_t> content(const std::filesystem::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) throw std::runtime_error("cannot read " + file.string());
-  return {std::istreambuf_iterator<char>(stream), {}};
-}
-
-/// x y z intensity of the recording, then its label, for each point.
-std::vector<std::uint8_t> with_labels(const std::vector<std::uint8_t>& points,
-                                      const std::vector<std::uint8_t>& labels) {
-  const std::size_t count = points.size() / recorded_point_bytes;
-  if (labels.size() != count * label_bytes) throw std::runtime_error("labels do not fit the scan");
-  std::vector<std::uint8_t> data;
-  data.reserve(points.size() + labels.size());
-  for (std::size_t i = 0; i < count; ++i) {
-    const auto* const point = points.data() + i * recorded_point_bytes;
-    const auto* const label = labels.data() + i * label_bytes;
-    data.insert(data.end(), point, point + recorded_point_bytes);
-    data.insert(data.end(), label, label + label_bytes);
-  }
-  return data;
-}
-
-/// Publishes scans as a lidar driver of ROS 2 does.
-class Lidar {
- public:
-  Lidar(const Participant& participant, const std::filesystem::path& recording)
-      : recording_(recording), writer_(participant, "rt/points", {.depth = 1, .keep_all = true}) {
-    for (const auto& entry : std::filesystem::directory_iterator(recording / "velodyne")) {
-      names_.push_back(entry.path().stem());
-    }
-    std::ranges::sort(names_);
-  }
-
-  [[nodiscard]] std::size_t scans() const { return names_.size(); }
-  [[nodiscard]] bool is_matched() const { return writer_.is_matched(); }
-
-  void publish(std::size_t scan) {
-    std::filesystem::path points = recording_ / "velodyne" / names_[scan];
-    std::filesystem::path labels = recording_ / "labels" / names_[scan];
-    auto data = with_labels(content(points += ".bin"), content(labels += ".label"));
-    std::array<std::string, 5> names = {"x", "y", "z", "intensity", "label"};
-    std::array<Field, 5> fields{};
-    for (std::uint32_t i = 0; i < fields.size(); ++i) {
-      constexpr std::uint8_t float32 = 7;
-      constexpr std::uint8_t uint32 = 6;
-      fields[i] = {.name = names[i].data(),
-                   .offset = 4 * i,
-                   .datatype = i < 4 ? float32 : uint32,
-                   .count = 1};
-    }
-    Cloud cloud{};
-    std::string frame = "velodyne";
-    const auto stamp_ms = static_cast<std::int32_t>(100 * scan);
-    cloud.header.stamp = {.sec = 1'700'000'000 + stamp_ms / 1000,
-                          .nanosec = static_cast<std::uint32_t>(stamp_ms % 1000) * 1'000'000U};
-    cloud.header.frame_id = frame.data();
-    cloud.height = 1;
-    cloud.point_step = recorded_point_bytes + label_bytes;
-    cloud.row_step = static_cast<std::uint32_t>(data.size());
-    cloud.width = cloud.row_step / cloud.point_step;
-    cloud.is_dense = true;
-    lend(cloud.fields, fields);
-    lend(cloud.data, data);
-    writer_.write(cloud);
-  }
-
- private:
-  std::filesystem::path recording_;
-  std::vector<std::filesystem::path> names_;
-  Writer<Cloud> writer_;
-};
 
 struct Place3 {
   double x = 0.0, y = 0.0, z = 0.0;
@@ -168,7 +90,8 @@ void add(Scans& scans, const Cloud& cloud) {
   scans.points = cloud.width * cloud.height;
   scans.fields.clear();
   for (const auto& field : elements(cloud.fields)) {
-    scans.fields += (scans.fields.empty() ? "" : ",") + std::string(field.name);
+    if (!scans.fields.empty()) scans.fields += ',';
+    scans.fields += field.name;
     if (std::string(field.name) != "rgb") continue;
     for (std::size_t at = field.offset; at + 4 <= cloud.data._length; at += cloud.point_step) {
       std::uint32_t colour = 0;
@@ -178,50 +101,75 @@ void add(Scans& scans, const Cloud& cloud) {
   }
 }
 
+/// What the server sends while it maps, taken as rviz2 and tf2_ros ask for it.
+class Listener {
+ public:
+  Listener(const Participant& participant, const std::string& server)
+      : prefix_("rt/" + server + "/"),
+        odometry_(participant, prefix_ + "odometry", {.depth = 1000}),
+        tf_(participant, "rt/tf", {.depth = 100}),
+        scan_(participant, prefix_ + "scan", {.depth = 5}) {}
+
+  [[nodiscard]] bool is_matched() const {
+    return odometry_.is_matched() && tf_.is_matched() && scan_.is_matched();
+  }
+
+  void take() {
+    odometry_.take([this](const Odometry& sample) { add(from_odometry_, sample); });
+    tf_.take([this](const Transforms& sample) { add(from_tf_, sample); });
+    scan_.take([this](const Cloud& sample) { add(scans_, sample); });
+  }
+
+  [[nodiscard]] bool has_poses(std::size_t count) const {
+    return from_odometry_.by_stamp.size() >= count && from_tf_.by_stamp.size() >= count;
+  }
+
+  void print() const {
+    from_odometry_.print(prefix_ + "odometry");
+    from_tf_.print("rt/tf");
+    Line("tf").add("is_odometry", from_tf_.by_stamp == from_odometry_.by_stamp);
+    scans_.print(prefix_ + "scan");
+  }
+
+ private:
+  std::string prefix_;
+  Reader<Odometry> odometry_;
+  Reader<Transforms> tf_;
+  Reader<Cloud> scan_;
+  Poses from_odometry_, from_tf_;
+  Scans scans_;
+};
+
+void publish_all(Lidar& lidar, Listener& listener) {
+  auto next = std::chrono::steady_clock::now();
+  for (std::size_t scan = 0; scan < lidar.scans(); ++scan) {
+    lidar.publish(scan);
+    next += scan_period;
+    while (std::chrono::steady_clock::now() < next) {
+      listener.take();
+      std::this_thread::sleep_for(5ms);
+    }
+  }
+}
+
 }  // namespace
 
 int drive(const Place& place, const std::filesystem::path& recording) {
   const Participant participant(place.domain_id);
   Lidar lidar(participant, recording);
-  // As rviz2 and tf2_ros ask for them.
-  Reader<Odometry> odometry(participant, "rt/" + place.server + "/odometry", {.depth = 1000});
-  Reader<Transforms> tf(participant, "rt/tf", {.depth = 100});
-  Reader<Cloud> scan(participant, "rt/" + place.server + "/scan", {.depth = 5});
-  Poses from_odometry, from_tf;
-  Scans scans;
-  const auto take = [&] {
-    odometry.take([&](const Odometry& sample) { add(from_odometry, sample); });
-    tf.take([&](const Transforms& sample) { add(from_tf, sample); });
-    scan.take([&](const Cloud& sample) { add(scans, sample); });
-  };
-  const bool is_found = wait_until(
-      [&] {
-        return lidar.is_matched() && odometry.is_matched() && tf.is_matched() && scan.is_matched();
-      },
-      patience);
-  if (!is_found) throw std::runtime_error("no server found");
-  auto next = std::chrono::steady_clock::now();
-  for (std::size_t i = 0; i < lidar.scans(); ++i) {
-    lidar.publish(i);
-    next += scan_period;
-    while (std::chrono::steady_clock::now() < next) {
-      take();
-      std::this_thread::sleep_for(5ms);
-    }
+  Listener listener(participant, place.server);
+  if (!wait_until([&] { return lidar.is_matched() && listener.is_matched(); }, patience)) {
+    throw std::runtime_error("no server found");
   }
-  const bool is_complete = wait_until(
-      [&] {
-        take();
-        return from_odometry.by_stamp.size() >= lidar.scans() &&
-               from_tf.by_stamp.size() >= lidar.scans();
-      },
-      patience);
+  publish_all(lidar, listener);
+  const auto is_complete = [&] {
+    listener.take();
+    return listener.has_poses(lidar.scans());
+  };
+  const bool has_all = wait_until(is_complete, patience);
   Line("rt/points").add("published", lidar.scans());
-  from_odometry.print("rt/" + place.server + "/odometry");
-  from_tf.print("rt/tf");
-  Line("tf").add("is_odometry", from_tf.by_stamp == from_odometry.by_stamp);
-  scans.print("rt/" + place.server + "/scan");
-  return is_complete ? 0 : 1;
+  listener.print();
+  return has_all ? 0 : 1;
 }
 
 }  // namespace stillmap::peer

@@ -25,7 +25,8 @@ constexpr Qos latched{.transient_local = true, .depth = 1};
 void print(const std::string& topic, const Cloud& cloud) {
   std::string fields;
   for (const auto& field : elements(cloud.fields)) {
-    fields += (fields.empty() ? "" : ",") + std::string(field.name);
+    if (!fields.empty()) fields += ',';
+    fields += field.name;
   }
   Line(topic)
       .add("frame_id", cloud.header.frame_id)
