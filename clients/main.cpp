@@ -22,6 +22,7 @@ void add_commands(stillmap::CommandHandle program, stillmap::Action& action) {
   stillmap::add_nearest_command(program, action);
   stillmap::add_removed_command(program, action);
   stillmap::add_replay_command(program, action);
+  stillmap::add_record_command(program, action);
   stillmap::add_watch_command(program, action);
   stillmap::add_watch_tiles_command(program, action);
   stillmap::add_query_command(program, action);

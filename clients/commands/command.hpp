@@ -19,6 +19,13 @@ enum class ExitCode {
   no_path = 4,
 };
 
+/// What can be named as a recording, and how a bag's topic is chosen; for help texts.
+inline constexpr const char* recording_kinds =
+    "A KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag (folder "
+    "or .db3)";
+inline constexpr const char* topic_in_help =
+    "The bag's topic to read; needed when it has several with scans";
+
 /// The chosen command with its options, ready to run. Set while the command line is parsed.
 using Action = std::function<ExitCode()>;
 
@@ -30,6 +37,7 @@ void add_check_path_command(CommandHandle program, Action& action);
 void add_nearest_command(CommandHandle program, Action& action);
 void add_removed_command(CommandHandle program, Action& action);
 void add_replay_command(CommandHandle program, Action& action);
+void add_record_command(CommandHandle program, Action& action);
 void add_watch_command(CommandHandle program, Action& action);
 void add_watch_tiles_command(CommandHandle program, Action& action);
 void add_query_command(CommandHandle program, Action& action);
@@ -61,6 +69,7 @@ void add_evaluate_weightings_command(CommandHandle evaluate, Action& action);
 void add_dataset_export_command(CommandHandle dataset, Action& action);
 void add_dataset_aggregate_command(CommandHandle dataset, Action& action);
 void add_dataset_scatter_command(CommandHandle dataset, Action& action);
+void add_dataset_sensor_command(CommandHandle dataset, Action& action);
 
 // Subcommands of model.
 void add_model_info_command(CommandHandle model, Action& action);

@@ -3,13 +3,15 @@
 namespace stillmap {
 
 void add_dataset_command(CommandHandle program, Action& action) {
-  CommandHandle dataset = program.command(
-      "dataset",
-      "Make a labelled data set: export scans, label them as one cloud, take labels back");
+  CommandHandle dataset = program.command("dataset",
+                                          "Make a labelled data set: export scans, label them as "
+                                          "one cloud, take labels back; or find out "
+                                          "a recording's sensor");
   dataset.require_command();
   add_dataset_export_command(dataset, action);
   add_dataset_aggregate_command(dataset, action);
   add_dataset_scatter_command(dataset, action);
+  add_dataset_sensor_command(dataset, action);
   dataset.explain(
       "The way from a drive to a SemanticKITTI sequence with labels:\n"
       "  stillmap dataset export my_pcds campus --labels my_model   scans, poses, first guesses\n"

@@ -9,6 +9,7 @@
 #include "clients/commands/mapper_arguments.hpp"
 #include "clients/commands/recording_export.hpp"
 #include "clients/terminal/progress.hpp"
+#include "idl/bag/bag_scans.hpp"
 
 namespace stillmap {
 namespace {
@@ -17,6 +18,7 @@ constexpr std::string_view topic_prefix = "topic:";
 
 struct Arguments {
   std::string source;
+  std::string topic_in;
   std::string out;
   MapperArguments mapper;
   ScanRange range;
@@ -54,7 +56,7 @@ std::string describe(const Arguments& arguments, const ExportSummary& summary) {
 }
 
 ExportSummary export_from_recording(const Arguments& arguments, StopSignal& stop) {
-  const ScanDataset dataset(arguments.source);
+  const ScanDataset dataset = open_recording(arguments.source, arguments.topic_in);
   std::error_code ignored;
   if (std::filesystem::equivalent(arguments.source, arguments.out, ignored)) {
     throw std::invalid_argument(arguments.out + " is the recording itself; name another folder");
@@ -115,10 +117,12 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
   CommandHandle command =
       dataset.command("export", "Write a recording or a live topic as a SemanticKITTI sequence");
   command
-      .option("SOURCE", arguments->source,
-              "A KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or "
-              "topic:NAME of a sensor that a running stillmap-server listens to")
+      .option(
+          "SOURCE", arguments->source,
+          "A KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, a ROS 2 bag "
+          "(folder or .db3), or topic:NAME of a sensor that a running stillmap-server listens to")
       .required();
+  command.option("--topic-in", arguments->topic_in, topic_in_help);
   command.option("OUT", arguments->out, "New folder for the sequence").required();
   add_mapper_options(command, arguments->mapper);
   command.option("--start", arguments->range.first, "Number of the recording's first scan");

@@ -9,12 +9,14 @@
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "idl/bag/bag_scans.hpp"
 
 namespace stillmap {
 namespace {
 
 struct Arguments {
   std::string dataset;
+  std::string topic_in;
   std::string out = "stillmap_out";
   MapperArguments mapper;
   ScanRange range;
@@ -48,7 +50,7 @@ void write_report(const std::filesystem::path& file, const nlohmann::json& repor
 
 ExitCode run(const Arguments& arguments) {
   StopSignal stop;
-  const ScanDataset dataset(arguments.dataset);
+  const ScanDataset dataset = open_recording(arguments.dataset, arguments.topic_in);
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   prepare_output_folder(arguments.out, arguments.force);
   const MappingResult result = map_with_progress(dataset, arguments, config, stop);
@@ -71,11 +73,8 @@ void add_map_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   CommandHandle command =
       program.command("map", "Map a recording in this process: the server's mapper without DDS");
-  command
-      .option("DATASET", arguments->dataset,
-              "A KITTI sequence (folder with velodyne/), a folder of .bin, .pcd or .ply "
-              "files, or one such file")
-      .required();
+  command.option("DATASET", arguments->dataset, recording_kinds).required();
+  command.option("--topic-in", arguments->topic_in, topic_in_help);
   command.option("--out", arguments->out, "Folder for the results").with_default();
   add_mapper_options(command, arguments->mapper);
   command.option("--start", arguments->range.first, "Number of the first scan");

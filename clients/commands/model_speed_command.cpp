@@ -9,6 +9,7 @@
 #include "clients/commands/speed_scan.hpp"
 #include "clients/terminal/text.hpp"
 #include "core/segmentation/model_error.hpp"
+#include "idl/bag/bag_scans.hpp"
 
 namespace stillmap {
 namespace {
@@ -58,7 +59,7 @@ void time_model(const ModelDescription& model, const Scan& scan, const Arguments
 
 ExitCode run(const Arguments& arguments) {
   const Scan scan =
-      arguments.dataset.empty() ? speed_scan() : ScanDataset(arguments.dataset).read(0).scan;
+      arguments.dataset.empty() ? speed_scan() : open_recording(arguments.dataset).read(0).scan;
   Table table({"network", "image", "engine", "project ms", "network ms", "k-NN ms", "total ms",
                "Gop/s", "peak", "%", "MB"});
   for (const std::string& model_path : arguments.models) {

@@ -11,12 +11,14 @@
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/text.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "idl/bag/bag_scans.hpp"
 
 namespace stillmap {
 namespace {
 
 struct Arguments {
   std::string dataset;
+  std::string topic_in;
   ClientArguments client;
   ReplayOptions replay;
   /// 0: not given.
@@ -67,7 +69,7 @@ ReplayResult publish_with_progress(const ScanDataset& dataset, const Arguments& 
 }
 
 Outcome replay(const Arguments& arguments, StopSignal& stop) {
-  const ScanDataset dataset(arguments.dataset);
+  const ScanDataset dataset = open_recording(arguments.dataset, arguments.topic_in);
   (void)arguments.replay.range.end(dataset);
   Client client = connect(arguments.client);
   PoseLog poses(client);
@@ -139,10 +141,8 @@ void add_replay_command(CommandHandle program, Action& action) {
   ReplayOptions& replay = arguments->replay;
   CommandHandle command =
       program.command("replay", "Publish a recording on DDS, as a lidar driver would");
-  command
-      .option("DATASET", arguments->dataset,
-              "A KITTI sequence, a folder of .bin, .pcd or .ply files, or one such file")
-      .required();
+  command.option("DATASET", arguments->dataset, recording_kinds).required();
+  command.option("--topic-in", arguments->topic_in, topic_in_help);
   command
       .option("--rate", arguments->rate,
               "Times real time; default 1, with --lossless as fast as the server takes them")

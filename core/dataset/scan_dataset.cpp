@@ -13,6 +13,8 @@
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/point_cloud_files.hpp"
 #include "core/dataset/recording_time.hpp"
+#include "core/lidar/intensity_scale.hpp"
+#include "core/lidar/sensor_fit.hpp"
 
 namespace stillmap {
 namespace {
@@ -48,7 +50,9 @@ std::vector<fs::path> scans_of(const fs::path& path) {
     const bool known =
         is_scan_file(path, ".bin") || is_scan_file(path, ".pcd") || is_scan_file(path, ".ply");
     if (known) return {path};
-    throw DatasetError(path, "is no recording; give a .bin, .pcd or .ply file or a folder of them");
+    throw DatasetError(path,
+                       "is no recording; give a .bin, .pcd or .ply file, a folder "
+                       "of them, or a bag");
   }
   const fs::path velodyne = path / "velodyne";
   const bool sequence = fs::is_directory(velodyne, error);
@@ -113,15 +117,6 @@ std::vector<std::int64_t> stamps_from_names(const std::vector<fs::path>& files) 
   return stamps_ns;
 }
 
-/// A percentile that a few bright or broken values do not move.
-float bright_intensity(std::vector<float> intensity) {
-  std::erase_if(intensity, [](float value) { return !std::isfinite(value); });
-  if (intensity.empty()) return 0.0F;
-  const auto middle = intensity.begin() + static_cast<std::ptrdiff_t>(intensity.size() * 99 / 100);
-  std::ranges::nth_element(intensity, middle);
-  return *middle;
-}
-
 double highest_elevation(const Scan& scan) {
   double highest = 0.0;
   for (const auto& p : scan.points_lidar) {
@@ -132,6 +127,9 @@ double highest_elevation(const Scan& scan) {
 }
 
 SensorModel guess_sensor(const Scan& scan, bool kitti_file) {
+  if (!kitti_file || !scan.ring.empty()) {
+    if (auto sensor = fit_sensor(scan)) return *std::move(sensor);
+  }
   if (!scan.ring.empty()) {
     const int rings = *std::ranges::max_element(scan.ring) + 1;
     return rings <= 16 ? vlp_16() : (rings <= 32 ? hdl_32e() : hdl_64e());
@@ -156,10 +154,22 @@ ScanDataset::ScanDataset(const fs::path& path) : files_(scans_of(path)), lines_(
   } else {
     stamps_ns_ = stamps_from_names(files_);
   }
+  learn_from_first_scan();
+}
+
+ScanDataset::ScanDataset(std::shared_ptr<const ScanSource> source) : source_(std::move(source)) {
+  for (std::size_t i = 0; i < source_->size(); ++i) {
+    files_.push_back(source_->name(i));
+    stamps_ns_.push_back(source_->stamp_ns(i));
+  }
+  learn_from_first_scan();
+}
+
+void ScanDataset::learn_from_first_scan() {
   const Scan first = read_unscaled(0).scan;
-  // Half above full scale: a recording in 0..1 may overshoot a little.
-  if (bright_intensity(first.intensity) > 1.5F) intensity_scale_ = 1.0F / 255.0F;
-  suggested_sensor_ = guess_sensor(first, files_.front().extension() == ".bin");
+  intensity_scale_ = 1.0F / intensity_full_scale(first.intensity);
+  const auto known = source_ ? source_->sensor() : std::nullopt;
+  suggested_sensor_ = known ? *known : guess_sensor(first, files_.front().extension() == ".bin");
 }
 
 fs::path ScanDataset::beside(std::size_t i, const char* folder, const char* extension) const {
@@ -173,6 +183,7 @@ bool ScanDataset::has_labels(std::size_t i) const {
 }
 
 DatasetFrame ScanDataset::read_unscaled(std::size_t i) const {
+  if (source_) return source_->read(i);
   if (file(i).extension() != ".bin") {
     auto [scan, raw_labels] = read_point_cloud(file(i), stamp_ns(i));
     return {std::move(scan), std::move(raw_labels)};

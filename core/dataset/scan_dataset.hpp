@@ -3,35 +3,32 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <vector>
 
+#include "core/dataset/scan_source.hpp"
 #include "core/lidar/scan.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/odometry/trajectory.hpp"
 
 namespace stillmap {
 
-/// One scan of a recording and its truth.
-struct DatasetFrame {
-  /// With the labels reduced to the network's classes, where the recording has labels.
-  Scan scan;
-  /// Original SemanticKITTI labels: moving ids in the low, instances in the high 16 bits. Truth for
-  /// evaluation only. Empty without labels.
-  std::vector<std::uint32_t> raw_labels;
-};
-
 /// A recording on disk, read scan by scan:
 /// - a SemanticKITTI sequence: velodyne/*.bin, and where present labels/*.label, times.txt,
 ///   calib.txt and poses.txt (camera frame) or poses_lidar.txt (lidar frame), and our own
 ///   time_offsets/ and rings/ (see KittiSequenceWriter);
 /// - a folder of .bin, .pcd or .ply files, in natural order ("2" before "10");
-/// - a single such file.
+/// - a single such file;
+/// - any ScanSource, such as a bag's topic.
 /// Intensity is brought to 0..1: as the first scan decides, for the whole recording.
 class ScanDataset {
  public:
   /// Throws DatasetError when there is no scan to be found. Reads the first scan.
   explicit ScanDataset(const std::filesystem::path& path);
+
+  /// Throws DatasetError when there is no scan, or the first cannot be read.
+  explicit ScanDataset(std::shared_ptr<const ScanSource> source);
 
   [[nodiscard]] std::size_t size() const { return files_.size(); }
   [[nodiscard]] const std::filesystem::path& file(std::size_t i) const { return files_.at(i); }
@@ -57,6 +54,11 @@ class ScanDataset {
   [[nodiscard]] std::filesystem::path beside(std::size_t i, const char* folder,
                                              const char* extension) const;
 
+  /// Takes scale and sensor from the first scan.
+  void learn_from_first_scan();
+
+  /// Where the scans come from, when they are not in files of their own.
+  std::shared_ptr<const ScanSource> source_;
   /// Where velodyne/ lies; empty for other recordings.
   std::filesystem::path sequence_;
   std::vector<std::filesystem::path> files_;

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+
+#include "core/dataset/dataset_frame.hpp"
+#include "core/lidar/sensor_model.hpp"
+
+namespace stillmap {
+
+/// The messages of which scans can be made.
+enum class ScanMessage {
+  /// sensor_msgs/msg/PointCloud2.
+  point_cloud,
+  /// velodyne_msgs/msg/VelodyneScan: the packets of one revolution.
+  velodyne_packets,
+  /// livox_ros_driver2/msg/CustomMsg (and livox_ros_driver's).
+  livox_points,
+};
+
+/// By the ROS 2 name of its type; nothing for other types.
+[[nodiscard]] std::optional<ScanMessage> scan_message(std::string_view type);
+
+struct ScanOfMessage {
+  /// Intensity in the sensor's own numbers.
+  DatasetFrame frame;
+  /// Where the message says which it was.
+  std::optional<SensorModel> sensor;
+};
+
+/// Makes a scan of a serialized message. Throws CdrError in words for bytes that are not such a
+/// message, or give no scan.
+[[nodiscard]] ScanOfMessage scan_of_message(ScanMessage kind,
+                                            std::span<const std::uint8_t> message);
+
+/// The stamp of a message that begins with a std_msgs/Header; 12 bytes are enough. Nothing when
+/// there is none.
+[[nodiscard]] std::optional<std::int64_t> header_stamp_ns(std::span<const std::uint8_t> message);
+
+}  // namespace stillmap

@@ -1,0 +1,126 @@
+#include <algorithm>
+#include <cstdlib>
+#include <thread>
+
+#include "core/dataset/scan_dataset.hpp"
+#include "idl/bag/bag.hpp"
+#include "idl/bag/bag_scans.hpp"
+#include "tests/clients/command_test.hpp"
+
+namespace stillmap::test {
+namespace {
+
+using namespace std::chrono_literals;
+
+class RecordTest : public CommandTest {
+ protected:
+  [[nodiscard]] std::string on_domain() const { return " --domain " + std::to_string(domain_); }
+
+  /// Runs until its folder is there, so that it listens.
+  void wait_for_bag(const std::string& name) const {
+    for (int i = 0; i < 600 && !exists(name + "/metadata.yaml"); ++i) {
+      std::this_thread::sleep_for(50ms);
+    }
+    ASSERT_TRUE(exists(name + "/metadata.yaml"));
+    // Discovery of what publishes already.
+    std::this_thread::sleep_for(1500ms);
+  }
+
+  [[nodiscard]] nlohmann::json replay(const std::string& source, const std::string& out) const {
+    const ProcessResult result = run("replay " + source + " --lossless --json --timeout 30" +
+                                     on_domain() + " --out " + path(out));
+    EXPECT_EQ(result.exit_code, 0) << result.err << content("server.log");
+    return nlohmann::json::parse(result.out, nullptr, false);
+  }
+
+  [[nodiscard]] std::string server_command() const {
+    write("server.yaml", "sensor: vlp_16\ninput: {delivery: every}\n");
+    return stillmap_server_program() + " --config " + path("server.yaml") + on_domain();
+  }
+
+  int domain_ = free_domain();
+};
+
+std::uint64_t messages_of(const Bag& bag, const std::string& topic) {
+  const auto found = std::ranges::find(bag.topics(), topic, &BagTopic::name);
+  return found == bag.topics().end() ? 0 : found->messages;
+}
+
+TEST_F(RecordTest, ARecordedReplayIsTheRecordingAgain) {
+  constexpr int scans = 8;
+  simulate("city", scans);
+  {
+    BackgroundProcess server(server_command(), folder_ / "server.log");
+    ASSERT_EQ(run("status --timeout 30" + on_domain()).exit_code, 0) << content("server.log");
+    BackgroundProcess record(stillmap_program() + " record " + path("bag") + on_domain(),
+                             folder_ / "record.log");
+    wait_for_bag("bag");
+    EXPECT_EQ(replay(path("city"), "first.txt").at("mapped"), scans);
+    std::this_thread::sleep_for(1500ms);
+    EXPECT_EQ(record.stop(), 0) << content("record.log");
+  }
+  const Bag bag(path("bag"));
+  EXPECT_EQ(messages_of(bag, "/stillmap/odometry"), static_cast<std::uint64_t>(scans));
+  for (const char* topic : {"/tf", "/stillmap/path", "/stillmap/tiles", "/stillmap/tile_index",
+                            "/stillmap/static_cloud", "/stillmap/status"}) {
+    EXPECT_GT(messages_of(bag, topic), 0U) << topic << content("record.log");
+  }
+  EXPECT_THAT(content("record.log"), testing::Not(HasSubstr("lost")));
+
+  const ScanDataset original(path("city"));
+  const ScanDataset recorded = open_recording(path("bag"), "points");
+  ASSERT_EQ(recorded.size(), original.size());
+  for (std::size_t i = 0; i < original.size(); ++i) {
+    const Scan a = original.read(i).scan, b = recorded.read(i).scan;
+    EXPECT_EQ(b.stamp_ns, a.stamp_ns);
+    EXPECT_TRUE(b.points_lidar == a.points_lidar) << i;
+    EXPECT_EQ(b.ring, a.ring);
+    ASSERT_EQ(b.intensity.size(), a.intensity.size());
+    for (std::size_t k = 0; k < a.size(); ++k) ASSERT_NEAR(b.intensity[k], a.intensity[k], 1e-6);
+  }
+
+  // A new server makes the same of what was recorded.
+  BackgroundProcess server(server_command(), folder_ / "server.log");
+  ASSERT_EQ(run("status --timeout 30" + on_domain()).exit_code, 0) << content("server.log");
+  EXPECT_EQ(replay(path("bag") + " --topic-in points", "second.txt").at("mapped"), scans);
+  EXPECT_EQ(content("second.txt"), content("first.txt"));
+}
+
+TEST_F(RecordTest, WithNothingToRecordItSaysSo) {
+  const ProcessResult result = run("record " + path("bag") + " --for 0.5" + on_domain());
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.out, HasSubstr("/stillmap/odometry: 0 (nobody publishes it)"));
+  EXPECT_THAT(result.err, HasSubstr(std::to_string(domain_)));
+  EXPECT_EQ(run("record " + path("bag") + " --for 0.5" + on_domain()).exit_code, 2);
+}
+
+TEST_F(RecordTest, RefusesATopicThatItDoesNotKnow) {
+  const ProcessResult result = run("record " + path("bag") + " --topics imu" + on_domain());
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, AllOf(HasSubstr("'imu'"), HasSubstr("/stillmap/tiles")));
+  EXPECT_FALSE(exists("bag"));
+}
+
+TEST_F(RecordTest, TheSensorOfARecordingIsFoundAndWritten) {
+  simulate("city", 1);
+  const ProcessResult result =
+      run("dataset sensor " + path("city") + " --out " + path("sensor.yaml"));
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.out, HasSubstr("VLP-16"));
+  EXPECT_EQ(
+      run("map " + path("city") + " --sensor " + path("sensor.yaml") + " --out " + path("out"))
+          .exit_code,
+      0);
+}
+
+TEST_F(RecordTest, PacketsOfARealBagAreMapped) {
+  const char* recordings = std::getenv("STILLMAP_TEST_DATA");
+  if (recordings == nullptr) GTEST_SKIP() << "STILLMAP_TEST_DATA names no folder of recordings";
+  const std::string bag = std::string(recordings) + "/vlp16_packets/1673400471837873222";
+  const ProcessResult result = run("map " + bag + " --labels none --json --out " + path("out"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_EQ(line_count("out/poses_lidar.txt"), 4U);
+}
+
+}  // namespace
+}  // namespace stillmap::test

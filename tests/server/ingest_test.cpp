@@ -1,0 +1,113 @@
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <map>
+#include <mutex>
+#include <random>
+#include <thread>
+
+#include "idl/conversions/scan_to_cloud.hpp"
+#include "idl/dds/writer.hpp"
+#include "idl/topics.hpp"
+#include "tests/server/room_scans.hpp"
+#include "tests/server/server_process.hpp"
+
+namespace stillmap::test {
+namespace {
+
+using sensor_msgs::msg::PointCloud2;
+using namespace std::chrono_literals;
+
+struct PublisherCase {
+  const char* name;
+  const char* delivery;
+  TopicQos offered;
+  bool matches;
+};
+
+class ScanPublishers : public testing::TestWithParam<PublisherCase> {};
+
+// A lidar driver, as others write it: some are reliable, some best effort ("sensor data").
+TEST_P(ScanPublishers, ReachTheServerOrItSaysWhyNot) {
+  const auto& [name, delivery, offered, matches] = GetParam();
+  const ServiceSetup setup(delivery);
+  const ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  Participant participant(setup.dds());
+  Writer<PointCloud2> clouds(participant, "rt/points", offered);
+  if (!matches) {
+    EXPECT_TRUE(eventually([&] {
+      return client.status().reason.find("best-effort") != std::string::npos;
+    })) << client.status().reason;
+    return;
+  }
+  ASSERT_TRUE(clouds.readers().wait_for_any(patience));
+  int next = 0;
+  ASSERT_TRUE(eventually([&] {
+    (void)clouds.write(wire::to_cloud(room_scan(next++), {}, "lidar"));
+    std::this_thread::sleep_for(100ms);
+    return client.status().counter("scans_mapped") >= 5;
+  }));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    All, ScanPublishers,
+    testing::Values(
+        PublisherCase{"ReliableToLatest", "latest", {.depth = 5}, true},
+        PublisherCase{"BestEffortToLatest", "latest", {.reliable = false, .depth = 5}, true},
+        PublisherCase{"LatchedToLatest", "latest", {.transient_local = true, .depth = 1}, true},
+        PublisherCase{"ReliableToEvery", "every", {.depth = 5}, true},
+        PublisherCase{"BestEffortToEvery", "every", {.reliable = false, .depth = 5}, false}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+/// The poses that come back for the first scans of the room, when `change` was done to each.
+template <typename Change>
+std::map<std::int64_t, Eigen::Isometry3d> poses_with(Change change, int scans) {
+  const ServiceSetup setup("every");
+  const ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  std::mutex mutex;
+  std::map<std::int64_t, Eigen::Isometry3d> poses;
+  const auto subscription = client.subscribe_odometry([&](const OdometryUpdate& update) {
+    const std::scoped_lock lock(mutex);
+    poses.emplace(update.pose.stamp_ns, update.pose.T_map_lidar);
+  });
+  ScanPublisher publisher(setup.publisher(true));
+  EXPECT_TRUE(publisher.wait_for_subscriber(patience));
+  for (int i = 0; i < scans; ++i) {
+    Scan scan = room_scan(i);
+    change(scan);
+    EXPECT_TRUE(publisher.publish(scan, {}, patience));
+  }
+  EXPECT_TRUE(eventually([&] {
+    const std::scoped_lock lock(mutex);
+    return poses.size() >= static_cast<std::size_t>(scans);
+  }));
+  const std::scoped_lock lock(mutex);
+  return poses;
+}
+
+// Livox and others number no rings and send points in no order of rings: they are found from the
+// elevation by the sensor's description.
+TEST(ScanWithoutRings, IsMappedByTheElevationOfItsPoints) {
+  constexpr int scans = 12;
+  std::mt19937 random(1);
+  const auto poses = poses_with(
+      [&](Scan& scan) {
+        scan.ring.clear();
+        scan.labels.clear();
+        std::ranges::shuffle(scan.points_lidar, random);
+      },
+      scans);
+  for (int i = 0; i < scans; ++i) {
+    const StampedPose truth = room_pose(i);
+    const auto pose = poses.find(truth.stamp_ns);
+    ASSERT_NE(pose, poses.end()) << i;
+    EXPECT_LT((pose->second.translation() - truth.T_map_lidar.translation()).norm(), 0.1) << i;
+  }
+}
+
+}  // namespace
+}  // namespace stillmap::test
