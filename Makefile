@@ -5,7 +5,7 @@ BUILD := build/$(PRESET)
 JOBS ?= $(shell nproc)
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages build demo test test-dev test-tsan test-kill bench table1 parity format format-check clean
+.PHONY: help packages build demo test test-dev test-tsan test-kill test-network bench table1 parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -38,6 +38,9 @@ test-tsan: ## The tests under ThreadSanitizer
 
 test-kill: build ## Kill the server at 50 random moments of mapping, and look at what is stored
 	STILLMAP_KILLS=50 $(BUILD)/tests/server/kill_test
+
+test-network: build ## Loss, slow links, outages, TCP, dead and late subscribers, in network namespaces
+	/usr/bin/python3 tests/network/run.py --programs $(BUILD)/bin --lab $(BUILD)/tests/network
 
 bench: build ## Benchmarks of every stage
 	@for b in $(BUILD)/tests/bench/*_bench; do echo "== $$b"; $$b || exit 1; done
