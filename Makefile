@@ -5,7 +5,7 @@ BUILD := build/$(PRESET)
 JOBS ?= $(shell nproc)
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages build deb demo test test-dev test-tsan test-kill test-docker image bench table1 ros-messages parity format format-check clean
+.PHONY: help packages build deb demo test test-dev test-tsan test-kill test-network test-docker image bench table1 ros-messages parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -43,6 +43,9 @@ test-tsan: ## The tests under ThreadSanitizer
 
 test-kill: build ## Kill the server at 50 random moments of mapping, and look at what is stored
 	STILLMAP_KILLS=50 $(BUILD)/tests/server/kill_test
+
+test-network: build ## Loss, slow links, outages, TCP, dead and late subscribers, in network namespaces
+	/usr/bin/python3 tests/network/run.py --programs $(BUILD)/bin --lab $(BUILD)/tests/network
 
 image: ## Docker image stillmap, from source
 	DOCKER_BUILDKIT=1 docker build -f docker/Dockerfile --build-arg JOBS=$(JOBS) -t stillmap .

@@ -9,6 +9,7 @@
 
 #include "idl/dds/discovery.hpp"
 #include "idl/dds/ros_graph.hpp"
+#include "idl/dds/stalled_peers.hpp"
 #include "idl/dds/transports.hpp"
 
 namespace stillmap {
@@ -18,6 +19,9 @@ using namespace eprosima::fastdds::dds;
 
 // The largest domain whose ports fit into 16 bits.
 constexpr std::uint32_t largest_domain_id = 232;
+
+// Of a TCP peer that takes nothing, while all others wait.
+constexpr std::chrono::seconds longest_stall{5};
 
 DomainParticipantQos participant_qos(const DdsOptions& options) {
   DomainParticipantQos qos;
@@ -80,6 +84,9 @@ Participant::Handle Participant::join() const {
     throw failure("Fast DDS made no participant; check that the interfaces exist on this machine " +
                   std::string("(`ip address`), that /dev/shm can be written, and that no other ") +
                   "process listens at a port that was given");
+  }
+  if (options_.transport == NetworkTransport::tcp && options_.listening_port != 0) {
+    drop_stalled_peers(options_.listening_port, longest_stall);
   }
   const auto leave = [factory = factory_](DomainParticipant* participant) {
     participant->delete_contained_entities();

@@ -55,12 +55,18 @@ class Host:
     def inside(self, *words):
         run("ip", "netns", "exec", self.name, *words)
 
+    def drop(self, *what):
+        """Packets on their way in; before the kernel puts fragments together."""
+        self.inside("iptables", "-t", "raw", "-A", "PREROUTING", "!", "-i", "lo", *what,
+                    "-j", "DROP")
+
     def lose(self, share):
-        """Of the packets in either direction."""
-        for chain in ("INPUT", "OUTPUT"):
-            self.inside("iptables", "-A", chain, "!", "-i" if chain == "INPUT" else "-o", "lo",
-                        "-m", "statistic", "--mode", "random", "--probability", str(share),
-                        "-j", "DROP")
+        """Of the packets in either direction, without a word to who sends them."""
+        chance = ("-m", "statistic", "--mode", "random", "--probability", str(share))
+        self.drop(*chance)
+        for other in self.lab.hosts.values():
+            if other is not self:
+                other.drop("-s", self.address, *chance)
 
     def limit(self, mbit_per_s):
         """The rate of the cable in both directions; a router's queue holds 50 ms."""
@@ -75,20 +81,19 @@ class Host:
         run("ip", "link", "set", self.port, "master", "switch")
 
     def refuse_multicast(self):
-        for chain in ("INPUT", "OUTPUT"):
-            self.inside("iptables", "-A", chain, "-d", "224.0.0.0/4", "-j", "DROP")
+        self.drop("-d", "224.0.0.0/4")
 
     def refuse_udp(self):
-        for chain, side in (("INPUT", "-i"), ("OUTPUT", "-o")):
-            self.inside("iptables", "-A", chain, "!", side, "lo", "-p", "udp", "-j", "DROP")
+        self.drop("-p", "udp")
 
     def traffic_bytes(self):
         """Sent to this host so far."""
-        with open(f"/sys/class/net/{self.port}/statistics/tx_bytes") as file:
-            return int(file.read())
+        shown = subprocess.run(["ip", "-s", "-j", "link", "show", self.port], check=True,
+                               capture_output=True, text=True)
+        return json.loads(shown.stdout)[0]["stats64"]["tx"]["bytes"]
 
-    def start(self, *words, **options):
-        return self.lab.start(["ip", "netns", "exec", self.name, *words], **options)
+    def start(self, *words):
+        return self.lab.start(["ip", "netns", "exec", self.name, *words])
 
 
 class Program:
@@ -98,7 +103,11 @@ class Program:
         self.log = log
         self.out = open(log, "w")
         self.err = open(str(log) + ".err", "w")
-        self.process = subprocess.Popen(words, stdout=self.out, stderr=self.err, env=environment)
+        self.process = subprocess.Popen(words, stdin=subprocess.PIPE, stdout=self.out,
+                                        stderr=self.err, env=environment)
+
+    def end_input(self):
+        self.process.stdin.close()
 
     def signal(self, number):
         self.process.send_signal(number)
@@ -131,11 +140,12 @@ class Program:
         return json.loads(lines[-1])
 
     def resident_mb(self):
+        """None once it has ended."""
         with open(f"/proc/{self.process.pid}/status") as status:
             for line in status:
                 if line.startswith("VmRSS"):
                     return int(line.split()[1]) / 1024
-        raise RuntimeError(f"{self.log} has ended:\n{self.text()}")
+        return None
 
     def end(self):
         if self.process.poll() is None:

@@ -1,5 +1,5 @@
 // Planners for network tests: each takes all tiles and all poses, and in the end compares what it
-// has with what the server says that there is. Prints a JSON line.
+// has with what the server says that there is. Prints a JSON line, with the server's own figures.
 #include <algorithm>
 #include <chrono>
 #include <deque>
@@ -8,6 +8,7 @@
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -24,9 +25,7 @@ using Seconds = std::chrono::duration<double>;
 struct Arguments {
   ClientArguments client;
   int count = 1;
-  /// Time to look on while the robot drives.
-  double watch_s = 10.0;
-  /// Longest time from then until all tiles must have come.
+  /// Longest time, from the end of the drive, until all tiles must have come.
   double settle_s = 30.0;
   /// A client that takes so long for each sample.
   double busy_ms = 0.0;
@@ -151,6 +150,24 @@ Settled settle(Planners& planners, double longest_s) {
   return settled;
 }
 
+/// What the server says of its work.
+nlohmann::json mapper_report(const ServerStatus& status) {
+  nlohmann::json report{{"mapped", status.counter("scans_mapped")}};
+  for (const StageLatency& stage : status.latencies) {
+    if (stage.stage != "total") continue;
+    report["p50_ms"] = stage.p50_ms;
+    report["p99_ms"] = stage.p99_ms;
+  }
+  return report;
+}
+
+/// It ends when the drive does.
+void wait_for_end_of_input() {
+  std::string line;
+  while (std::getline(std::cin, line)) {
+  }
+}
+
 ExitCode watch(const Arguments& arguments) {
   Planners planners;
   for (int i = 0; i < arguments.count; ++i) {
@@ -158,12 +175,13 @@ ExitCode watch(const Arguments& arguments) {
   }
   planners.front().client().wait_for_server(arguments.client.timeout());
   std::cerr << "ready" << std::endl;
-  std::this_thread::sleep_for(Seconds(arguments.watch_s));
+  wait_for_end_of_input();
   const auto poses = planners.front().poses().report();
   const Settled settled = settle(planners, arguments.settle_s);
   std::cout << nlohmann::json{{"tiles", settled.tiles},
                               {"lacking", settled.lacking},
                               {"settled_s", settled.took_s},
+                              {"mapper", mapper_report(planners.front().client().status())},
                               {"poses", poses}}
             << std::endl;
   return settled.tiles > 0 && settled.lacking == 0 ? ExitCode::ok : ExitCode::failed;
@@ -177,8 +195,7 @@ int main(int argc, char** argv) {
   stillmap::Arguments arguments;
   auto root = line.root();
   root.option("--count", arguments.count, "Planners");
-  root.option("--watch", arguments.watch_s, "Look on for so long [s]");
-  root.option("--settle", arguments.settle_s, "Then wait so long for all tiles [s]");
+  root.option("--settle", arguments.settle_s, "Wait so long for all tiles in the end [s]");
   root.option("--busy-ms", arguments.busy_ms, "Take so long for each sample");
   root.flag("--poses,!--no-poses", arguments.with_poses, "Take poses, too (default)");
   stillmap::add_client_options(root, arguments.client);

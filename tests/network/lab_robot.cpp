@@ -56,6 +56,7 @@ ExitCode drive(const Arguments& arguments) {
                               std::chrono::system_clock::now().time_since_epoch())
                               .count();
     if (publisher.publish(frame.scan, frame.raw_labels)) ++sent;
+    if (sent == 1) std::fprintf(stderr, "driving\n");
     std::this_thread::sleep_until(began + sent * period);
   }
   std::printf("{\"published\": %d}\n", sent);

@@ -42,8 +42,8 @@ def faults_of(figures, longest_gap_s, undisturbed):
     faults = []
     if figures["tiles"] == 0 or figures["lacking"] > 0:
         faults.append(f"{figures['lacking']} of {figures['tiles']} tiles did not arrive")
-    if figures["mapped"] < 0.9 * figures["published"]:
-        faults.append(f"only {figures['mapped']} of {figures['published']} scans were mapped")
+    if figures["mapper"]["mapped"] < 0.9 * figures["published"]:
+        faults.append(f"only {figures['mapper']['mapped']} of {figures['published']} scans were mapped")
     if longest_gap_s is not None:
         poses = figures["poses"]
         if poses["count"] == 0:
@@ -72,7 +72,7 @@ def row_of(name, figures):
     return [name, str(figures["tiles"]), str(figures["lacking"]), f"{figures['settled_s']:.1f} s",
             *ages, f"{figures['memory_mb']:.0f} MB", f"{figures['mapper']['p50_ms']:.0f} ms",
             f"{figures['mapper']['p99_ms']:.0f} ms",
-            f"{figures['mapped']}/{figures['published']}"]
+            f"{figures['mapper']['mapped']}/{figures['published']}"]
 
 
 def print_row(cells):

@@ -1,8 +1,6 @@
 """What may happen on a network, played with real processes; each scenario returns its figures."""
-import json
 import os
 import signal
-import subprocess
 import threading
 import time
 
@@ -39,9 +37,10 @@ class Watch(threading.Thread):
 
     def run(self):
         while not self.done.wait(0.25):
-            if self.program.process.poll() is not None:
+            now_mb = self.program.resident_mb()
+            if now_mb is None:
                 return
-            self.peak_mb = max(self.peak_mb, self.program.resident_mb())
+            self.peak_mb = max(self.peak_mb, now_mb)
 
     def stop(self):
         self.done.set()
@@ -64,10 +63,9 @@ class Drive:
         self.server.wait_for_text("ready", 30)
         self.memory = Watch(self.server)
 
-    def planners(self, host, *words, flags=None, watch_s=None, settle_s=60.0, ready=True):
-        watch_s = self.setup.drive_s + 3.0 if watch_s is None else watch_s
+    def planners(self, host, *words, flags=None, settle_s=60.0, ready=True):
         planners = host.start(self.setup.clients, "--domain", DOMAIN, "--timeout", "60",
-                              "--watch", str(watch_s), "--settle", str(settle_s),
+                              "--settle", str(settle_s),
                               *(self.flags if flags is None else flags), *words)
         if ready:
             planners.wait_for_text("ready", 90)
@@ -78,27 +76,16 @@ class Drive:
                                      str(self.setup.scans), "--rate", str(RATE_HZ), "--domain",
                                      DOMAIN, "--timeout", "60",
                                      *(self.flags if flags is None else flags))
+        self.robot.wait_for_text("driving", 60)
 
     def end_robot(self):
         return self.robot.result(self.setup.drive_s + 90)["published"]
 
-    def status(self, flags=None):
-        words = ["ip", "netns", "exec", self.home.name, self.setup.stillmap, "status", "--json",
-                 "--domain", DOMAIN, "--timeout", "30",
-                 *(self.flags if flags is None else flags)]
-        done = subprocess.run(words, capture_output=True, text=True, env=self.lab.environment)
-        if done.returncode != 0:
-            raise RuntimeError(f"no status: {done.stderr}")
-        return json.loads(done.stdout)
-
-    def figures(self, planners, published, status):
+    def figures(self, planners, published):
         """Of a drive that has ended."""
+        planners.end_input()
         result = planners.result(300)
-        return {"tiles": result["tiles"], "lacking": result["lacking"],
-                "settled_s": result["settled_s"], "poses": result["poses"],
-                "memory_mb": self.memory.stop(), "published": published,
-                "mapped": status["counters"].get("scans_mapped", 0),
-                "mapper": status["latencies"]["total"]}
+        return {**result, "memory_mb": self.memory.stop(), "published": published}
 
 
 def drive(setup, flags, hinder=None, during=None, client_flags=None, prepare=None, local=None):
@@ -114,8 +101,7 @@ def drive(setup, flags, hinder=None, during=None, client_flags=None, prepare=Non
         play.start_robot(local)
         if during:
             during(play, office)
-        published = play.end_robot()
-        return play.figures(planners, published, play.status(local))
+        return play.figures(planners, play.end_robot())
 
 
 def undisturbed(setup):
@@ -164,6 +150,7 @@ def discovery_server(setup):
 
 def tcp_only(setup):
     def hinder(home, office):
+        home.refuse_udp()
         office.refuse_udp()
         office.lose(0.01)
     flags = ["--dds-profile", "wan"]
@@ -180,9 +167,7 @@ def beside(setup, flags, make_other, client_flags=None, local=None):
         planners = play.planners(office, flags=client_flags)
         other = make_other(play, lab, client_flags)
         play.start_robot(local)
-        published = play.end_robot()
-        status = play.status(local)
-        figures = play.figures(planners, published, status)
+        figures = play.figures(planners, play.end_robot())
         other.signal(signal.SIGCONT)
         return figures
 
@@ -228,13 +213,9 @@ def late_joiners(count):
             office = lab.host("office")
             began = time.monotonic()
             planners = play.planners(office, "--count", str(count), "--no-poses", "--udp-only",
-                                     watch_s=0.0, settle_s=120.0, ready=False)
-            result = planners.result(240)
-            figures = {"tiles": result["tiles"], "lacking": result["lacking"],
-                       "settled_s": time.monotonic() - began, "poses": {"count": 0},
-                       "published": published, "sent_mb": office.traffic_bytes() / 1e6}
-            status = play.status()
-            figures.update(memory_mb=play.memory.stop(), mapper=status["latencies"]["total"],
-                           mapped=status["counters"]["scans_mapped"])
+                                     settle_s=120.0, ready=False)
+            figures = play.figures(planners, published)
+            figures.update(settled_s=time.monotonic() - began,
+                           sent_mb=office.traffic_bytes() / 1e6)
             return figures
     return scenario

@@ -1,0 +1,71 @@
+#include "tests/bench/dds_roles.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <iostream>
+
+#include "idl/dds/reader.hpp"
+#include "idl/dds/service_server.hpp"
+#include "idl/topics.hpp"
+#include "sensor_msgs.h"
+#include "stillmap_msgs.h"
+#include "tests/bench/dds_samples.hpp"
+
+namespace stillmap::bench {
+
+using namespace std::chrono_literals;
+using stillmap_msgs::srv::GetStaticMap_Request;
+using stillmap_msgs::srv::GetStaticMap_Response;
+
+std::vector<Network> networks() {
+  DdsChoice host;
+  host.profile = "host";
+  DdsChoice lan;
+  lan.shared_memory = false;
+  lan.interfaces = {"127.0.0.1"};
+  DdsChoice wifi = lan;
+  wifi.profile = "wifi";
+  DdsChoice wan = lan;
+  wan.profile = "wan";
+  DdsChoice wan_client = wan;
+  wan_client.peers = {"127.0.0.1"};
+  return {{"host", host, host},
+          {"lan, UDP", lan, lan},
+          {"wifi, UDP", wifi, wifi},
+          {"wan, TCP", wan, wan_client}};
+}
+
+DdsOptions options_of(const Network& network, DdsRole role, std::uint32_t domain_id) {
+  const bool server = role == DdsRole::server;
+  DdsOptions options = dds_options(server ? network.choice : network.client_choice, role);
+  options.domain_id = domain_id;
+  return options;
+}
+
+void subscribe(const DdsOptions& options) {
+  Participant participant(options);
+  const auto topic = points_topic("points", DeliveryMode::latest, 3);
+  Reader<sensor_msgs::msg::PointCloud2> reader(participant, topic.dds_name, topic.reader);
+  sensor_msgs::msg::PointCloud2 cloud;
+  std::vector<double> latencies_ms;
+  auto patience = 60s;
+  while (reader.take(cloud, {}, patience)) {
+    if (is_last(cloud)) break;
+    latencies_ms.push_back(age_ms(cloud));
+    patience = 3s;
+  }
+  for (const double latency : latencies_ms) std::printf("%f\n", latency);
+}
+
+void answer(const DdsOptions& options) {
+  Participant participant(options);
+  const ServiceServer<GetStaticMap_Request, GetStaticMap_Response> server(
+      participant, "bench/get_static_map",
+      [](const GetStaticMap_Request& request) { return map_of(request.max_bytes()); });
+  std::string line;
+  while (std::getline(std::cin, line)) {
+  }
+}
+
+}  // namespace stillmap::bench

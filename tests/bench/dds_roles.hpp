@@ -1,0 +1,31 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "config/dds_profile.hpp"
+
+namespace stillmap::bench {
+
+/// A kind of network that one machine can play, and what is said on top of its profile.
+struct Network {
+  std::string name;
+  DdsChoice choice;
+  DdsChoice client_choice;
+};
+
+/// host, lan over loopback UDP, wifi's settings over loopback UDP, and wan's TCP.
+[[nodiscard]] std::vector<Network> networks();
+
+/// The options of one end. All of a run share a domain.
+[[nodiscard]] DdsOptions options_of(const Network& network, DdsRole role, std::uint32_t domain_id);
+
+/// A subscriber process: prints each scan's latency [ms], a line each. Ends with the last scan, or
+/// a second after nothing comes any more.
+void subscribe(const DdsOptions& options);
+
+/// A server process that answers region queries with as many voxels as they ask bytes for, until
+/// its standard input ends.
+void answer(const DdsOptions& options);
+
+}  // namespace stillmap::bench
