@@ -20,6 +20,8 @@ ExitCode run(const Arguments& arguments) {
   DdsOptions options = dds_options(arguments.network, DdsRole::client);
   options.domain_id = arguments.domain;
   options.discovery_port = static_cast<std::uint16_t>(arguments.port);
+  // It carries no data.
+  options.shared_memory = false;
   const DiscoveryServer server(options);
   std::cout << "discovery server on UDP port " << arguments.port << std::endl;
   while (!stop.wait_for(std::chrono::seconds(60))) {

@@ -18,8 +18,8 @@ set(same_version "stillmap-data (= ${PROJECT_VERSION})")
 set(CPACK_DEBIAN_DATA_PACKAGE_NAME stillmap-data)
 set(CPACK_DEBIAN_DATA_PACKAGE_ARCHITECTURE all)
 set(CPACK_DEBIAN_DATA_PACKAGE_SHLIBDEPS OFF)
-set(CPACK_COMPONENT_DATA_DESCRIPTION "Semantic lidar map service: models, sensors, robots
- The default network, and descriptions of lidars, robots and label sets.")
+set(CPACK_COMPONENT_DATA_DESCRIPTION
+  "Data: the default network, and descriptions of lidars, robots, label sets and networks.")
 
 set(CPACK_DEBIAN_SERVER_PACKAGE_NAME stillmap-server)
 set(CPACK_DEBIAN_SERVER_PACKAGE_DEPENDS "${same_version}")
@@ -27,17 +27,17 @@ set(CPACK_DEBIAN_SERVER_PACKAGE_RECOMMENDS stillmap)
 set(CPACK_DEBIAN_SERVER_PACKAGE_CONTROL_EXTRA
   ${CMAKE_CURRENT_LIST_DIR}/conffiles ${CMAKE_CURRENT_LIST_DIR}/postinst
   ${CMAKE_CURRENT_LIST_DIR}/prerm ${CMAKE_CURRENT_LIST_DIR}/postrm)
-set(CPACK_COMPONENT_SERVER_DESCRIPTION "Semantic lidar map service: the server
- Scans on DDS in; poses, a static labelled map and answers to planners out.")
+set(CPACK_COMPONENT_SERVER_DESCRIPTION
+  "The server: scans on DDS in; poses, a static labelled map and answers to planners out.")
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME stillmap)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "${same_version}")
 set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS stillmap-formats)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SUGGESTS stillmap-server)
-set(CPACK_COMPONENT_TOOLS_DESCRIPTION "Semantic lidar map service: the command line
- Replays recordings, asks for maps, plans paths, watches the server, simulates a city.")
+set(CPACK_COMPONENT_TOOLS_DESCRIPTION
+  "The command line: replays recordings, asks for maps, plans paths, simulates a city.")
 
 set(CPACK_DEBIAN_FORMATS_PACKAGE_NAME stillmap-formats)
-set(CPACK_COMPONENT_FORMATS_DESCRIPTION "Semantic lidar map service: PCD files and GeoTIFF
- Reads PCD through PCL and writes GeoTIFF through GDAL, for the command line.")
+set(CPACK_COMPONENT_FORMATS_DESCRIPTION
+  "For the command line: PCD files through PCL, GeoTIFF through GDAL.")
 include(CPack)

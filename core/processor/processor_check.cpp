@@ -11,8 +11,7 @@ void say(const char* text) {
   if (write(STDERR_FILENO, text, std::strlen(text)) < 0) _exit(1);
 }
 
-/// Before every other initialisation of this program, which may use such instructions.
-__attribute__((constructor(101))) void check_processor() {
+void check_processor() {
   __builtin_cpu_init();
   if (__builtin_cpu_supports(STILLMAP_ARCH) != 0) return;
   say("this program was built for " STILLMAP_ARCH
@@ -20,5 +19,9 @@ __attribute__((constructor(101))) void check_processor() {
       "cmake -DSTILLMAP_ARCH=\n");
   _exit(1);
 }
+
+// Called before shared libraries are initialised: they already use our copies of the templates that
+// both instantiate.
+[[gnu::section(".preinit_array"), gnu::used]] void (*const run_first)() = check_processor;
 
 }  // namespace

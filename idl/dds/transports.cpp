@@ -4,6 +4,7 @@
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
 #include <sys/socket.h>
+#include <sys/statvfs.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -18,6 +19,21 @@ namespace stillmap {
 using namespace eprosima::fastdds::rtps;
 
 namespace {
+
+/// Without room for it, a process that writes into its segment ends with a bus error.
+void require_shared_memory_room(std::uint64_t segment_mib) {
+  // Beside the segment: the ports' queues.
+  constexpr std::uint64_t margin_mib = 4;
+  struct statvfs room {};
+  if (statvfs("/dev/shm", &room) != 0) return;
+  const std::uint64_t free_mib = (std::uint64_t{room.f_bavail} * room.f_frsize) >> 20U;
+  if (free_mib >= segment_mib + margin_mib) return;
+  throw DdsError("/dev/shm has " + std::to_string(free_mib) + " MiB free, shared memory takes " +
+                 std::to_string(segment_mib + margin_mib) +
+                 ": remove stale /dev/shm/fastrtps_* files, give a container more (docker run "
+                 "--shm-size 256m), or switch it off with a DDS profile that says shared_memory: "
+                 "false");
+}
 
 // Of a peer without a port, as many processes are looked for.
 constexpr std::uint32_t processes_of_peer = 16;
@@ -52,6 +68,7 @@ void set_transports(const DdsOptions& options, eprosima::fastdds::dds::DomainPar
   const bool udp = options.transport == NetworkTransport::udp;
   transports.push_back(udp ? udp_transport(options) : tcp_transport(options));
   if (!options.shared_memory) return;
+  require_shared_memory_room(options.shared_memory_mib);
   const auto shared_memory = std::make_shared<SharedMemTransportDescriptor>();
   shared_memory->segment_size(options.shared_memory_mib << 20U);
   transports.push_back(shared_memory);

@@ -34,7 +34,7 @@ class OperationTest : public CommandTest {
 std::map<std::string, double> samples_of(const std::string& exposition) {
   static const std::regex sample(
       R"re(([a-zA-Z_:][a-zA-Z0-9_:]*)(\{[a-z_]+="[^"\\]*"(,[a-z_]+="[^"\\]*")*\})? (\S+))re");
-  static const std::regex type(R"(# TYPE (\S+) (counter|gauge|histogram))");
+  static const std::regex type(R"(# TYPE (\S+) (counter|gauge|histogram|summary))");
   std::map<std::string, double> samples;
   std::map<std::string, std::string> types;
   std::istringstream lines(exposition);
