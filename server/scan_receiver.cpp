@@ -78,7 +78,8 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
 
 void ScanReceiver::report(const std::string& news, const Scan& scan) {
   if (!news.empty()) spdlog::info("clouds on {}: {}", topic_, news);
-  if (scans_read_++ % scans_between_checks != 0) return;
+  const bool due = scans_read_++ % scans_between_checks == 0;
+  if (!due && news.empty()) return;
   const std::string misfit = sensor_misfit(scan, sensor_);
   if (misfit.empty()) return;
   statistics_.count("scans_of_another_sensor");
