@@ -115,7 +115,7 @@ check_image() {
 # The packages themselves, where they are given, on the bare base image.
 test_packages() {
   [ -n "${STILLMAP_PACKAGES-}" ] || return 0
-  "$docker" run --rm --network host -e ROS_DOMAIN_ID=55 -v "$(realpath "$STILLMAP_PACKAGES"):/packages:ro" \
+  "$docker" run --rm --network host --shm-size 256m -e ROS_DOMAIN_ID=55 -v "$(realpath "$STILLMAP_PACKAGES"):/packages:ro" \
     -v "$PWD/tests/package/bare_debian_test.sh:/test.sh:ro" debian:bookworm-slim sh /test.sh /packages ||
     fail "the packages do not do what they are for on a bare Debian"
 }

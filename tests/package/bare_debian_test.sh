@@ -34,7 +34,12 @@ check "a server that is alive" stillmap health --timeout 30
 check "a replay through the server" stillmap replay city --lossless --timeout 30
 check "every scan mapped" sh -c "stillmap status --json | grep -q '\"scans_mapped\": 20'"
 kill "$server"
-check "a server that stops in order" sh -c "while kill -0 $server 2> /dev/null; do sleep 0.1; done"
+if ! wait "$server"; then
+  echo "package test: FAILED: the server ended with an error:" >&2
+  tail -n 5 server.log >&2
+  exit 1
+fi
+echo "ok   packages: a server that stops in order"
 check "its map on disk" stillmap map-check map.stillmap
 check "a GeoTIFF through GDAL" stillmap map-export map.stillmap -o map.tif --datum 48.1,11.5
 mkdir pcd
