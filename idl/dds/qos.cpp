@@ -76,9 +76,6 @@ DataWriterQos writer_qos(const TopicQos& qos, const DdsOptions& options) {
 DataReaderQos reader_qos(const TopicQos& qos, const DdsOptions& options) {
   DataReaderQos out;
   set_common(out, qos);
-  // Without the key beside each fragment, Fast DDS 2.9 reads it out of whichever fragment comes
-  // first: when the first one is lost, out of memory that is not written yet, and then it aborts.
-  out.expects_inline_qos(qos.max_keys > 1);
   out.reliable_reader_qos().times.heartbeatResponseDelay =
       to_duration(milliseconds(options.repair_delay_ms));
   return out;

@@ -25,7 +25,8 @@ std::size_t message_bytes(const Tile& tile) {
 TilePublisher::TilePublisher(Participant& participant, const Topics& topics)
     : tiles_(participant, topics.tiles.dds_name, topics.tiles.writer),
       index_(participant, topics.tile_index.dds_name, topics.tile_index.writer),
-      allowance_(participant.options().bulk_bytes_per_s / share_of_news) {}
+      allowance_(participant.options().bulk_bytes_per_s / share_of_news),
+      longest_wait_(participant.options().lease_s) {}
 
 void TilePublisher::publish(const std::shared_ptr<const MapView>& shown) {
   allowance_.refill(ByteAllowance::Clock::now());
@@ -60,12 +61,19 @@ TilePublisher::TilePointers TilePublisher::news(const MapView& view) const {
 
 void TilePublisher::publish_news(const TilePointers& tiles, const MapIdentity& identity) {
   waiting_ = tiles.size();
+  if (tiles.empty() || !last_news_arrived()) return;
+  last_news_ = std::chrono::steady_clock::now();
   for (const auto& tile : tiles) {
     if (!allowance_.allows()) return;
     publish_tile(*tile, identity);
     allowance_.spend(message_bytes(*tile));
     --waiting_;
   }
+}
+
+bool TilePublisher::last_news_arrived() {
+  return tiles_.wait_for_acknowledgements(std::chrono::milliseconds(0)) ||
+         std::chrono::steady_clock::now() - last_news_ > longest_wait_;
 }
 
 void TilePublisher::publish_tile(const Tile& tile, const MapIdentity& identity) {

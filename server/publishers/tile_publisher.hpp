@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <map>
 #include <memory>
@@ -19,6 +20,10 @@ namespace stillmap {
 /// tiles that left memory, late joiners get the entry alone. Where the participant's options limit
 /// what is bulky, new tiles take half of that: those go first that were sent longest ago, and what
 /// changes while it waits is sent once, as it is then.
+///
+/// A tile is never replaced while a reader is still getting it (unless that takes longer than a
+/// lease): Fast DDS 2.9 readers abort when they have some fragments of a keyed sample and are then
+/// told that the rest will not come.
 class TilePublisher {
  public:
   TilePublisher(Participant& participant, const Topics& topics);
@@ -34,6 +39,8 @@ class TilePublisher {
 
   /// What readers do not have of the view; what they know longest goes first.
   [[nodiscard]] TilePointers news(const MapView& view) const;
+  /// All readers have what was sent, or one of them takes longer than a lease.
+  [[nodiscard]] bool last_news_arrived();
   void publish_news(const TilePointers& tiles, const MapIdentity& identity);
   void publish_tile(const Tile& tile, const MapIdentity& identity);
   void forget_voxels_away(const MapView& view, const MapIdentity& identity);
@@ -43,6 +50,8 @@ class TilePublisher {
   Writer<stillmap_msgs::msg::MapTile> tiles_;
   Writer<stillmap_msgs::msg::TileInfo> index_;
   ByteAllowance allowance_;
+  std::chrono::seconds longest_wait_;
+  std::chrono::steady_clock::time_point last_news_;
   std::uint64_t map_id_ = 0;
   std::size_t waiting_ = 0;
   std::uint64_t publications_ = 0;

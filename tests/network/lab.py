@@ -141,10 +141,13 @@ class Program:
 
     def resident_mb(self):
         """None once it has ended."""
-        with open(f"/proc/{self.process.pid}/status") as status:
-            for line in status:
-                if line.startswith("VmRSS"):
-                    return int(line.split()[1]) / 1024
+        try:
+            with open(f"/proc/{self.process.pid}/status") as status:
+                for line in status:
+                    if line.startswith("VmRSS"):
+                        return int(line.split()[1]) / 1024
+        except FileNotFoundError:
+            pass
         return None
 
     def end(self):
