@@ -75,6 +75,7 @@ void read_dds(YamlSection section, DdsConfig& dds) {
   }
   section.whole("socket_buffer_bytes", dds.socket_buffer_bytes, {65536, 1U << 30U});
   section.text("participant_name", dds.participant_name);
+  section.path("security", dds.security);
   section.whole("ros_gid_bytes", dds.ros_gid_bytes, {16, 24});
   if (dds.ros_gid_bytes != 16 && dds.ros_gid_bytes != 24) {
     section.fault("ros_gid_bytes", "must be 24 (ROS 2 up to Humble) or 16 (from Iron)");

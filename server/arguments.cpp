@@ -37,6 +37,11 @@ Arguments read_arguments(int argc, char** argv) {
       ->check(CLI::ExistingFile);
   program.add_option("--domain", domain_id, "DDS domain, instead of the file's")
       ->check(CLI::Range(0, 232));
+  std::string security;
+  program
+      .add_option("--security", security,
+                  "Folder of the server's identity in a secured domain, instead of the file's")
+      ->envname("STILLMAP_SECURITY");
   program.add_option("--map-file", map_file, "Where the map is kept, instead of the file's");
   program
       .add_option("--delivery", delivery,
@@ -51,6 +56,7 @@ Arguments read_arguments(int argc, char** argv) {
   }
   ServerConfig config = config_file.empty() ? ServerConfig() : load_server_config(config_file);
   if (domain_id) config.dds.domain_id = *domain_id;
+  if (!security.empty()) config.dds.security = security;
   if (map_file) config.map.file = *map_file;
   if (delivery) config.input.delivery = *delivery;
   return {.config = config};

@@ -13,7 +13,8 @@ DdsOptions dds_options(const DdsConfig& config) {
           .interfaces = config.interfaces,
           .socket_buffer_bytes = config.socket_buffer_bytes,
           .node_name = config.participant_name,
-          .ros_gid_bytes = config.ros_gid_bytes};
+          .ros_gid_bytes = config.ros_gid_bytes,
+          .security = config.security};
 }
 
 std::map<std::string, std::string> file_metadata(const ServerConfig& config,
@@ -26,17 +27,30 @@ std::map<std::string, std::string> file_metadata(const ServerConfig& config,
   return metadata;
 }
 
-/// What is wrong with this machine, in words; empty when nothing is.
-std::string socket_trouble(const DdsConfig& config) {
+void log(const Finding& finding) {
+  spdlog::warn("{}: {}; {}", finding.what, finding.evidence, finding.way_out);
+}
+
+/// What is wrong with this machine.
+std::vector<Finding> troubles(const DdsConfig& config) {
   const std::uint32_t granted = granted_socket_buffer_bytes(config.socket_buffer_bytes);
   if (granted >= config.socket_buffer_bytes) return {};
-  const std::string trouble = "UDP receive buffers have " + std::to_string(granted) +
-                              " bytes instead of " + std::to_string(config.socket_buffer_bytes) +
-                              ", so large clouds over UDP can get lost: sudo sysctl "
-                              "net.core.rmem_max=" +
-                              std::to_string(config.socket_buffer_bytes);
-  spdlog::warn("{}", trouble);
-  return trouble;
+  const Finding trouble{
+      .severity = Severity::advice,
+      .what = "UDP buffers are too small: large clouds over UDP can get lost",
+      .evidence = "they have " + std::to_string(granted) + " bytes instead of " +
+                  std::to_string(config.socket_buffer_bytes),
+      .way_out = "sudo sysctl net.core.rmem_max=" + std::to_string(config.socket_buffer_bytes)};
+  log(trouble);
+  return {trouble};
+}
+
+ServerTraits traits(const ServerConfig& config, const LabelSource& labels) {
+  return {.delivery = delivery_mode(config.input.delivery),
+          .label_source = labels.name(),
+          .sensor = config.mapper.sensor.name,
+          .points_topic = config.topics.points,
+          .troubles = troubles(config.dds)};
 }
 
 std::optional<StoredMap> stored_map(MapSaver& saver, const MapFileConfig& config) {
@@ -59,9 +73,11 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
       tiles_(saver_.shelf(), (std::size_t{config.map.memory_limit_mib} << 20) / 8),
       participant_(dds_options(config.dds)),
       poses_(participant_, topics_, config.frames),
-      report_(delivery_mode(config.input.delivery), label_source->name(),
-              socket_trouble(config.dds), board_, statistics_,
-              [this] { return receiver_->why_nothing_arrives(); }),
+      peer_report_(participant_, log),
+      report_(
+          traits(config, *label_source), board_, statistics_,
+          [this] { return peer_report_.findings(); },
+          [this] { return receiver_->why_nothing_arrives(); }),
       atlas_(area_board_, board_, tiles_),
       planning_grid_(config.areas, config.frames.map, board_, area_board_) {
   if (config.publish.scan) scans_.emplace(participant_, topics_);

@@ -13,6 +13,8 @@ struct ClientArguments {
   std::string interface;
   std::string server_name = "stillmap";
   bool udp_only = false;
+  /// Folder of our identity in a secured domain; empty: no security.
+  std::string security;
   double timeout_s = 10.0;
 
   [[nodiscard]] std::chrono::milliseconds timeout() const;
@@ -20,8 +22,8 @@ struct ClientArguments {
   [[nodiscard]] ClientOptions client() const;
 };
 
-/// Adds --domain (else from ROS_DOMAIN_ID), --interface, --udp-only, --server
-/// and --timeout.
+/// Adds --domain (else from ROS_DOMAIN_ID), --interface, --udp-only, --security
+/// (else from STILLMAP_SECURITY), --server and --timeout.
 void add_client_options(CommandHandle command, ClientArguments& arguments);
 
 /// A client whose server answers. Throws ServiceTimeout after the timeout.
