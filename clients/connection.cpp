@@ -1,6 +1,7 @@
 #include "clients/connection.hpp"
 
 #include "idl/conversions/tile.hpp"
+#include "idl/peer_findings.hpp"
 
 namespace stillmap {
 
@@ -76,8 +77,16 @@ ServiceTimeout Client::Connection::no_answer(const std::string& name,
                      std::to_string(options.dds.domain_id) + " within " +
                      std::to_string(timeout.count()) + " ms: ";
   if (found) return ServiceTimeout(text + "a server is there but too busy, or it was just killed");
-  text += "no server found. Check that stillmap-server runs, in this domain, with topic name " +
-          options.server_name + ", reachable over the same network interfaces";
+  // Where security keeps both apart, nothing else is to be looked for.
+  const auto findings = security_findings(participant.self(), participant.peers());
+  if (!findings.empty()) {
+    return ServiceTimeout(text + findings.front().what + ": " + findings.front().evidence + "; " +
+                          findings.front().way_out);
+  }
+  text +=
+      "no server found ('stillmap doctor' looks for the reason). Check that stillmap-server runs, "
+      "in this domain, with topic name " +
+      options.server_name + ", reachable over the same network interfaces";
   if (options.dds.shared_memory) {
     text += "; if it runs as another user or in a container, switch shared memory off";
   }

@@ -30,6 +30,7 @@ struct Client::Connection {
     if constexpr (requires { request.format_version(wire_format_version); }) {
       request.format_version(wire_format_version);
     }
+    if (!service.refusal().empty()) throw ServiceError(name + ": " + service.refusal());
     auto reply = service.ask(request, timeout);
     if (!reply) {
       throw no_answer(name, timeout, service.wait_for_server(std::chrono::milliseconds(0)));

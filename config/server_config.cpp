@@ -84,6 +84,7 @@ void read_dds(YamlSection section, const fs::path& folder, DdsConfig& dds) {
   section.whole("domain_id", dds.domain_id, {0, 232});
   read_network(section, folder, dds.network);
   section.text("participant_name", dds.participant_name);
+  section.path("security", dds.security);
   section.whole("ros_gid_bytes", dds.ros_gid_bytes, {16, 24});
   if (dds.ros_gid_bytes != 16 && dds.ros_gid_bytes != 24) {
     section.fault("ros_gid_bytes", "must be 24 (ROS 2 up to Humble) or 16 (from Iron)");

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/odometry/odometry_state.hpp"
+#include "idl/finding.hpp"
 
 namespace stillmap {
 
@@ -82,6 +83,19 @@ struct ServerStatus {
   /// In the order of the pipeline: wait in the queue, its stages, and "total"; then
   /// what runs beside it, as "occupancy".
   std::vector<StageLatency> latencies;
+  /// Name of the server's machine.
+  std::string host;
+  /// The sensor that the server is set up for.
+  std::string sensor;
+  /// ROS 2 name of the topic that scans are read from.
+  std::string points_topic;
+  /// Frame that the last cloud named; empty before the first.
+  std::string scan_frame;
+  /// The server's clock when the last cloud arrived, minus the cloud's stamp; years for a
+  /// recording.
+  double scan_delay_s = 0.0;
+  /// What is wrong with the server's peers and its machine.
+  std::vector<Finding> findings;
 
   /// Value of a counter; 0 when it never counted.
   [[nodiscard]] std::uint64_t counter(std::string_view counter_name) const;

@@ -114,6 +114,11 @@ Arguments read_arguments(int argc, char** argv) {
   program.add_option("--domain", domain_id, "DDS domain, instead of the file's")
       ->check(CLI::Range(0, 232));
   add_network_options(program, network);
+  std::string security;
+  program
+      .add_option("--security", security,
+                  "Folder of the server's identity in a secured domain, instead of the file's")
+      ->envname("STILLMAP_SECURITY");
   program.add_option("--map-file", map_file, "Where the map is kept, instead of the file's");
   program
       .add_option("--delivery", delivery,
@@ -135,6 +140,7 @@ Arguments read_arguments(int argc, char** argv) {
   ServerConfig config = config_file.empty() ? ServerConfig() : load_server_config(config_file);
   if (domain_id) config.dds.domain_id = *domain_id;
   network.apply_to(config.dds.network);
+  if (!security.empty()) config.dds.security = security;
   if (map_file) config.map.file = *map_file;
   if (delivery) config.input.delivery = *delivery;
   operation.apply_to(config);

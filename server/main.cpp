@@ -5,6 +5,7 @@
 #include <exception>
 
 #include "config/model_file.hpp"
+#include "idl/security/security_error.hpp"
 #include "server/arguments.hpp"
 #include "server/operation/log_setup.hpp"
 #include "server/operation/service_manager.hpp"
@@ -52,6 +53,9 @@ int main(int argc, char** argv) {
     serve(*arguments.config);
     return 0;
   } catch (const stillmap::ConfigError& error) {
+    spdlog::critical("{}", error.what());
+    return bad_input;
+  } catch (const stillmap::SecurityError& error) {
     spdlog::critical("{}", error.what());
     return bad_input;
   } catch (const std::exception& error) {

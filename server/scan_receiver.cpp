@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/lidar/sensor_fit.hpp"
+#include "idl/conversions/header.hpp"
 #include "idl/topics.hpp"
 
 namespace stillmap {
@@ -29,6 +30,13 @@ wire::CloudReading reading_of(const ServerConfig& config) {
                      .label = names.label},
           .intensity_scale = config.mapper.sensor.intensity_scale,
           .labels_are_classes = config.input.label_kind == LabelKind::classes};
+}
+
+// By this machine's clock; a stamp that cannot be read is as good as now.
+double seconds_since(const builtin_interfaces::msg::Time& stamp) {
+  const auto now = std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch());
+  const std::int64_t stamp_ns = wire::stamp_ns(stamp).value_or(now.count());
+  return 1e-9 * static_cast<double>(now.count() - stamp_ns);
 }
 
 }  // namespace
@@ -59,6 +67,7 @@ void ScanReceiver::receive(const std::stop_token& stop) {
 void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop) {
   const auto received = std::chrono::steady_clock::now();
   statistics_.scan_received();
+  statistics_.scan_told(cloud.header().frame_id(), seconds_since(cloud.header().stamp()));
   auto [from_cloud, news] = cloud_reader_.read(cloud);
   auto& [scan, fault, understood] = from_cloud;
   if (!scan) return drop("bad_cloud_" + fault.counter, 1, "bad cloud: " + fault.reason);

@@ -12,6 +12,7 @@ DdsOptions server_options(const DdsConfig& config) {
   options.domain_id = config.domain_id;
   options.node_name = config.participant_name;
   options.ros_gid_bytes = config.ros_gid_bytes;
+  options.security = config.security;
   return options;
 }
 
@@ -25,17 +26,31 @@ std::map<std::string, std::string> file_metadata(const ServerConfig& config,
   return metadata;
 }
 
-/// What is wrong with this machine, in words; empty when nothing is.
-std::string socket_trouble(std::uint32_t wanted_bytes) {
+void log(const Finding& finding) {
+  spdlog::warn("{}: {}; {}", finding.what, finding.evidence, finding.way_out);
+}
+
+/// What is wrong with this machine.
+std::vector<Finding> troubles(std::uint32_t wanted_bytes) {
   const std::uint32_t granted = granted_socket_buffer_bytes(wanted_bytes);
   if (granted >= wanted_bytes) return {};
-  const std::string trouble = "UDP receive buffers have " + std::to_string(granted) +
-                              " bytes instead of " + std::to_string(wanted_bytes) +
-                              ", so large clouds over UDP can get lost: sudo sysctl "
-                              "net.core.rmem_max=" +
-                              std::to_string(wanted_bytes);
-  spdlog::warn("{}", trouble);
-  return trouble;
+  const Finding trouble{
+      .severity = Severity::advice,
+      .what = "UDP buffers are too small: large clouds over UDP can get lost",
+      .evidence = "they have " + std::to_string(granted) + " bytes instead of " +
+                  std::to_string(wanted_bytes),
+      .way_out = "sudo sysctl net.core.rmem_max=" + std::to_string(wanted_bytes)};
+  log(trouble);
+  return {trouble};
+}
+
+ServerTraits traits(const ServerConfig& config, const LabelSource& labels,
+                    const DdsOptions& options) {
+  return {.delivery = delivery_mode(config.input.delivery),
+          .label_source = labels.name(),
+          .sensor = config.mapper.sensor.name,
+          .points_topic = config.topics.points,
+          .troubles = troubles(options.socket_buffer_bytes)};
 }
 
 std::optional<StoredMap> stored_map(MapSaver& saver, const MapFileConfig& config) {
@@ -58,9 +73,11 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
       tiles_(saver_.shelf(), (std::size_t{config.map.memory_limit_mib} << 20) / 8),
       participant_(server_options(config.dds)),
       poses_(participant_, topics_, config.frames),
-      report_(delivery_mode(config.input.delivery), label_source->name(),
-              socket_trouble(participant_.options().socket_buffer_bytes), board_, statistics_,
-              [this] { return receiver_->why_nothing_arrives(); }),
+      peer_report_(participant_, log),
+      report_(
+          traits(config, *label_source, participant_.options()), board_, statistics_,
+          [this] { return peer_report_.findings(); },
+          [this] { return receiver_->why_nothing_arrives(); }),
       atlas_(area_board_, board_, tiles_),
       planning_grid_(config.areas, config.frames.map, board_, area_board_) {
   if (config.publish.scan) scans_.emplace(participant_, topics_);

@@ -12,6 +12,7 @@
 #include "server/mapping_thread.hpp"
 #include "server/metrics/metrics_endpoint.hpp"
 #include "server/occupancy_thread.hpp"
+#include "server/peer_report.hpp"
 #include "server/planning_grid.hpp"
 #include "server/publishers/area_publisher.hpp"
 #include "server/publishers/map_publisher.hpp"
@@ -59,6 +60,7 @@ class Server {
   std::optional<OccupancyThread> occupancy_;
   std::unique_ptr<MappingThread> mapping_;
   std::unique_ptr<ScanReceiver> receiver_;
+  PeerReport peer_report_;
   ServerReport report_;
   std::unique_ptr<MapPublisher> map_publisher_;
   std::unique_ptr<OctomapPublisher> octomap_publisher_;

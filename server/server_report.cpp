@@ -1,19 +1,31 @@
 #include "server/server_report.hpp"
 
+#include <unistd.h>
+
+#include <array>
 #include <numeric>
 #include <utility>
 
 namespace stillmap {
 
-ServerReport::ServerReport(DeliveryMode delivery, std::string label_source,
-                           std::string lasting_trouble, const MapBoard& board,
-                           const Statistics& statistics,
+namespace {
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
+}  // namespace
+
+ServerReport::ServerReport(ServerTraits traits, const MapBoard& board, const Statistics& statistics,
+                           std::function<std::vector<Finding>()> peer_findings,
                            std::function<std::string()> why_nothing_arrives)
-    : delivery_(delivery),
-      label_source_(std::move(label_source)),
-      lasting_trouble_(std::move(lasting_trouble)),
+    : traits_(std::move(traits)),
+      host_(host_name()),
       board_(board),
       statistics_(statistics),
+      peer_findings_(std::move(peer_findings)),
       why_nothing_arrives_(std::move(why_nothing_arrives)) {}
 
 ServerStatus ServerReport::status() const {
@@ -25,8 +37,11 @@ ServerStatus ServerReport::status() const {
   status.stamp_ns = std::chrono::nanoseconds(wall_clock).count();
   status.software_version = STILLMAP_VERSION;
   status.uptime_s = std::chrono::duration<double>(uptime).count();
-  status.delivery = delivery_;
-  status.label_source = live_labels.empty() ? label_source_ : live_labels;
+  status.delivery = traits_.delivery;
+  status.label_source = live_labels.empty() ? traits_.label_source : live_labels;
+  status.host = host_;
+  status.sensor = traits_.sensor;
+  status.points_topic = traits_.points_topic;
   status.health = board_.health();
   status.map_version = view->version;
   status.map_id = view->map_id;
@@ -35,6 +50,8 @@ ServerStatus ServerReport::status() const {
       view->tiles.begin(), view->tiles.end(), std::uint64_t{0},
       [](std::uint64_t sum, const auto& tile) { return sum + tile->info.voxel_count; });
   statistics_.report_to(status);
+  status.findings = peer_findings_();
+  status.findings.insert(status.findings.end(), traits_.troubles.begin(), traits_.troubles.end());
   status.reason = reason(status);
   return status;
 }
@@ -55,7 +72,7 @@ std::string ServerReport::reason(const ServerStatus& status) const {
     return "segmentation cannot keep the sensor's rate: " +
            every_nth_scan(status.segmentation.every) + " is segmented, labels are carried between";
   }
-  return lasting_trouble_;
+  return status.findings.empty() ? std::string() : status.findings.front().what;
 }
 
 }  // namespace stillmap

@@ -42,6 +42,12 @@ void Statistics::scan_received() {
   received_rate_.add(RateWindow::Clock::now());
 }
 
+void Statistics::scan_told(const std::string& frame, double delay_s) {
+  const std::scoped_lock lock(mutex_);
+  scan_frame_ = frame;
+  scan_delay_s_ = delay_s;
+}
+
 void Statistics::scan_mapped(Labelling labelling) {
   const std::scoped_lock lock(mutex_);
   labellings_.add(labelling);
@@ -109,6 +115,8 @@ void Statistics::report_to(ServerStatus& status) const {
   const auto now = RateWindow::Clock::now();
   status.received_hz = received_rate_.rate_hz(now);
   status.mapped_hz = mapped_rate_.rate_hz(now);
+  status.scan_frame = scan_frame_;
+  status.scan_delay_s = scan_delay_s_;
   status.counters = {{.name = "scans_received", .value = received_},
                      {.name = "scans_mapped", .value = mapped_}};
   if (map_memory_.bytes > 0) {

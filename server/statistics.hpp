@@ -49,6 +49,8 @@ struct StageTimes {
 class Statistics {
  public:
   void scan_received();
+  /// The last cloud named this frame, and came so much later than its stamp says.
+  void scan_told(const std::string& frame, double delay_s);
   void scan_mapped(Labelling labelling);
   /// Every n-th scan is segmented, which takes so long.
   void segmenting(std::uint32_t every, double network_ms);
@@ -94,6 +96,8 @@ class Statistics {
   RateWindow received_rate_;
   RateWindow mapped_rate_;
   std::string last_drop_;
+  std::string scan_frame_;
+  double scan_delay_s_ = 0.0;
   LabellingWindow labellings_;
   RecentMedian besides_labels_ms_{9};
   SegmentationStatus segmentation_;

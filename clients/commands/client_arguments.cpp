@@ -11,6 +11,7 @@ DdsOptions ClientArguments::dds() const {
   if (udp_only) choice.shared_memory = false;
   DdsOptions options = dds_options(choice, DdsRole::client);
   options.domain_id = domain;
+  options.security = security;
   return options;
 }
 
@@ -48,6 +49,10 @@ void add_client_options(CommandHandle command, ClientArguments& arguments) {
       .with_default();
   command.flag("--udp-only", arguments.udp_only,
                "No shared memory: the server runs as another user or in a container");
+  command
+      .option("--security", arguments.security,
+              "Folder of our identity in a secured domain (stillmap security init)")
+      .from_environment("STILLMAP_SECURITY");
   command.option("--timeout", arguments.timeout_s, "Longest wait for the server [s]")
       .above_zero()
       .with_default();

@@ -14,6 +14,8 @@ struct ClientArguments {
   std::string server_name = "stillmap";
   bool udp_only = false;
   DdsChoice network;
+  /// Folder of our identity in a secured domain; empty: no security.
+  std::string security;
   double timeout_s = 10.0;
 
   [[nodiscard]] std::chrono::milliseconds timeout() const;
@@ -25,8 +27,8 @@ struct ClientArguments {
 /// Adds --dds-profile, --interface, --peer and --discovery-server, and their environment variables.
 void add_network_options(CommandHandle command, DdsChoice& network);
 
-/// Adds --domain (else from ROS_DOMAIN_ID), --dds-profile with what overrides it, --server and
-/// --timeout.
+/// Adds --domain (else from ROS_DOMAIN_ID), --dds-profile with what overrides it, --security (else
+/// from STILLMAP_SECURITY), --server and --timeout.
 void add_client_options(CommandHandle command, ClientArguments& arguments);
 
 /// A client whose server answers. Throws ServiceTimeout after the timeout.

@@ -8,6 +8,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/map/map_file.hpp"
 #include "core/segmentation/model_error.hpp"
+#include "idl/security/security_error.hpp"
 
 namespace stillmap {
 namespace {
@@ -31,6 +32,8 @@ ExitCode run_action(const Action& action) {
   } catch (const ModelError& error) {
     return report(error, ExitCode::bad_input);
   } catch (const MapFileError& error) {
+    return report(error, ExitCode::bad_input);
+  } catch (const SecurityError& error) {
     return report(error, ExitCode::bad_input);
   } catch (const std::invalid_argument& error) {
     return report(error, ExitCode::bad_input);

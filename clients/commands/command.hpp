@@ -41,6 +41,7 @@ void add_record_command(CommandHandle program, Action& action);
 void add_watch_command(CommandHandle program, Action& action);
 void add_watch_tiles_command(CommandHandle program, Action& action);
 void add_query_command(CommandHandle program, Action& action);
+void add_security_command(CommandHandle program, Action& action);
 void add_status_command(CommandHandle program, Action& action);
 void add_health_command(CommandHandle program, Action& action);
 void add_octomap_command(CommandHandle program, Action& action);
@@ -77,6 +78,11 @@ void add_model_calibrate_command(CommandHandle model, Action& action);
 void add_model_agree_command(CommandHandle model, Action& action);
 void add_model_speed_command(CommandHandle model, Action& action);
 void add_model_run_command(CommandHandle model, Action& action);
+
+// Subcommands of security.
+void add_security_init_command(CommandHandle security, Action& action);
+void add_security_add_command(CommandHandle security, Action& action);
+void add_security_check_command(CommandHandle security, Action& action);
 
 /// Runs the action; an exception becomes a line on stderr and its exit code.
 [[nodiscard]] ExitCode run_action(const Action& action);

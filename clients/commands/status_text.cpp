@@ -23,6 +23,10 @@ std::string describe(const ServerStatus& status) {
   text += "map        id " + std::to_string(status.map_id) + ", version " +
           std::to_string(status.map_version) + ": " + std::to_string(status.voxel_count) +
           " voxels in " + std::to_string(status.tile_count) + " tiles\n";
+  for (const Finding& finding : status.findings) {
+    text += std::string(finding.severity == Severity::problem ? "problem    " : "advice     ") +
+            finding.what + "; " + finding.way_out + "\n";
+  }
   Table counters({"counter", "value"});
   for (const NamedCounter& counter : status.counters) {
     counters.add({counter.name, std::to_string(counter.value)});
@@ -45,6 +49,13 @@ nlohmann::json to_json(const ServerStatus& status) {
                               {"max_ms", stage.max_ms},
                               {"samples", stage.samples}};
   }
+  nlohmann::json findings = nlohmann::json::array();
+  for (const Finding& finding : status.findings) {
+    findings.push_back({{"severity", finding.severity == Severity::problem ? "problem" : "advice"},
+                        {"what", finding.what},
+                        {"evidence", finding.evidence},
+                        {"way_out", finding.way_out}});
+  }
   return {{"stamp_ns", status.stamp_ns},
           {"software_version", status.software_version},
           {"uptime_s", status.uptime_s},
@@ -66,7 +77,13 @@ nlohmann::json to_json(const ServerStatus& status) {
           {"voxels", status.voxel_count},
           {"dropped", status.dropped()},
           {"counters", counters},
-          {"latencies", latencies}};
+          {"latencies", latencies},
+          {"host", status.host},
+          {"sensor", status.sensor},
+          {"points_topic", status.points_topic},
+          {"scan_frame", status.scan_frame},
+          {"scan_delay_s", status.scan_delay_s},
+          {"findings", findings}};
 }
 
 }  // namespace stillmap

@@ -22,6 +22,26 @@ void add_lists(const ServerStatus& status, stillmap_msgs::msg::Status& message) 
   }
 }
 
+void add_findings(const ServerStatus& status, stillmap_msgs::msg::Status& message) {
+  for (const Finding& finding : status.findings) {
+    auto& out = message.findings().emplace_back();
+    out.severity(static_cast<std::uint8_t>(finding.severity));
+    out.what(finding.what);
+    out.evidence(finding.evidence);
+    out.way_out(finding.way_out);
+  }
+}
+
+void add_findings(const stillmap_msgs::msg::Status& message, ServerStatus& status) {
+  for (const auto& finding : message.findings()) {
+    const bool is_advice = finding.severity() == static_cast<std::uint8_t>(Severity::advice);
+    status.findings.push_back({.severity = is_advice ? Severity::advice : Severity::problem,
+                               .what = finding.what(),
+                               .evidence = finding.evidence(),
+                               .way_out = finding.way_out()});
+  }
+}
+
 void add_lists(const stillmap_msgs::msg::Status& message, ServerStatus& status) {
   for (const auto& counter : message.counters()) {
     status.counters.push_back({.name = counter.name(), .value = counter.value()});
@@ -70,7 +90,13 @@ stillmap_msgs::msg::Status to_wire(const ServerStatus& status) {
   message.tile_count(status.tile_count);
   message.voxel_count(status.voxel_count);
   to_wire(status.segmentation, message.segmentation());
+  message.host(status.host);
+  message.sensor(status.sensor);
+  message.points_topic(status.points_topic);
+  message.scan_frame(status.scan_frame);
+  message.scan_delay_s(status.scan_delay_s);
   add_lists(status, message);
+  add_findings(status, message);
   return message;
 }
 
@@ -96,8 +122,15 @@ std::optional<ServerStatus> from_wire(const stillmap_msgs::msg::Status& message)
                       .voxel_count = message.voxel_count(),
                       .segmentation = from_wire(message.segmentation()),
                       .counters = {},
-                      .latencies = {}};
+                      .latencies = {},
+                      .host = message.host(),
+                      .sensor = message.sensor(),
+                      .points_topic = message.points_topic(),
+                      .scan_frame = message.scan_frame(),
+                      .scan_delay_s = message.scan_delay_s(),
+                      .findings = {}};
   add_lists(message, status);
+  add_findings(message, status);
   return status;
 }
 

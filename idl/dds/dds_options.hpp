@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -63,6 +64,8 @@ struct DdsOptions {
   std::string node_name;
   /// Length of a GID in ros_discovery_info: 24 up to ROS 2 Humble, 16 from Iron.
   std::uint32_t ros_gid_bytes = 24;
+  /// Folder of the identity that this process has in a secured domain; empty: no security.
+  std::filesystem::path security;
 };
 
 }  // namespace stillmap

@@ -4,13 +4,17 @@
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
+#include <sstream>
 #include <string_view>
 #include <typeinfo>
 
 #include "idl/dds/discovery.hpp"
+#include "idl/dds/peer_watch.hpp"
 #include "idl/dds/ros_graph.hpp"
+#include "idl/dds/secure_properties.hpp"
 #include "idl/dds/stalled_peers.hpp"
 #include "idl/dds/transports.hpp"
+#include "idl/security/identity.hpp"
 
 namespace stillmap {
 namespace {
@@ -38,6 +42,10 @@ DomainParticipantQos participant_qos(const DdsOptions& options) {
   // One whose first announcements got lost is found after 1 s, not 3.
   builtin.discovery_config.leaseDuration = to_duration(std::chrono::seconds(options.lease_s));
   builtin.discovery_config.leaseDuration_announcementperiod = to_duration(std::chrono::seconds(1));
+  // Tells others where we run: host, user and process.
+  qos.properties().properties().emplace_back(parameter_policy_physical_data_host, "");
+  qos.properties().properties().emplace_back(parameter_policy_physical_data_user, "");
+  qos.properties().properties().emplace_back(parameter_policy_physical_data_process, "");
   return qos;
 }
 
@@ -53,10 +61,17 @@ void check_form(const DomainParticipant& participant, const TypeSupport& type) {
   }
 }
 
+std::unique_ptr<const Identity> identity_of(const DdsOptions& options) {
+  if (options.security.empty()) return nullptr;
+  return std::make_unique<const Identity>(load_identity(options.security));
+}
+
 }  // namespace
 
 Participant::Participant(const DdsOptions& options)
     : options_(options),
+      identity_(identity_of(options)),
+      watch_(std::make_unique<PeerWatch>(identity_ != nullptr)),
       factory_(DomainParticipantFactory::get_shared_instance()),
       handle_(join()),
       publisher_(handle_->create_publisher(PUBLISHER_QOS_DEFAULT)),
@@ -79,7 +94,7 @@ Participant::Handle Participant::join() const {
     throw failure("domain ids go from 0 to 232");
   }
   DomainParticipant* const made = factory_->create_participant(
-      static_cast<DomainId_t>(options_.domain_id), participant_qos(options_));
+      static_cast<DomainId_t>(options_.domain_id), qos(), watch_.get(), StatusMask::none());
   if (made == nullptr) {
     throw failure("Fast DDS made no participant; check that the interfaces exist on this machine " +
                   std::string("(`ip address`), that /dev/shm can be written, and that no other ") +
@@ -93,6 +108,36 @@ Participant::Handle Participant::join() const {
     factory->delete_participant(participant);
   };
   return Handle(made, leave);
+}
+
+DomainParticipantQos Participant::qos() const {
+  DomainParticipantQos qos = participant_qos(options_);
+  if (identity_) add_security(identity_->folder, qos.properties());
+  return qos;
+}
+
+std::vector<Peer> Participant::peers() const { return watch_->peers(); }
+
+Peer Participant::self() const {
+  Peer self;
+  std::ostringstream guid;
+  guid << handle_->guid().guidPrefix;
+  self.guid = guid.str();
+  self.name = handle_->get_qos().name().to_string();
+  self.is_on_this_host = true;
+  self.uses_shared_memory = options_.shared_memory;
+  self.is_secured = identity_ != nullptr;
+  self.endpoints = watch_->own_endpoints();
+  return self;
+}
+
+void Participant::require_permission(const std::string& topic, bool to_write) const {
+  if (!identity_) return;
+  const Access& access = identity_->access;
+  if (to_write ? access.may_publish(topic) : access.may_subscribe(topic)) return;
+  std::string text = "refused by the permissions of this domain: identity '" + identity_->name;
+  text += "' (role " + identity_->role + ") may not " + (to_write ? "write " : "read ") + topic;
+  throw NotPermitted(text);
 }
 
 DdsError Participant::failure(const std::string& what) const {
@@ -121,6 +166,7 @@ Topic* Participant::topic(const std::string& name, TypeSupport type) {
 Participant::WriterHandle Participant::make_writer(const std::string& name, TypeSupport type,
                                                    const TopicQos& qos,
                                                    DataWriterListener* listener) {
+  require_permission(name, true);
   const std::scoped_lock lock(mutex_);
   DataWriter* const made =
       publisher_->create_datawriter(topic(name, type), writer_qos(qos, options_), listener);
@@ -128,9 +174,11 @@ Participant::WriterHandle Participant::make_writer(const std::string& name, Type
   const auto remove = [this](DataWriter* writer) {
     const std::scoped_lock remove_lock(mutex_);
     if (graph_) graph_->remove(writer->guid());
+    watch_->remove_own(writer->guid());
     publisher_->delete_datawriter(writer);
   };
   WriterHandle handle(made, remove);
+  watch_->add_own(made->guid(), name, type.get_type_name(), type->m_isGetKeyDefined, true, qos);
   if (graph_) graph_->add_writer(made->guid());
   return handle;
 }
@@ -138,16 +186,19 @@ Participant::WriterHandle Participant::make_writer(const std::string& name, Type
 Participant::ReaderHandle Participant::make_reader(const std::string& name, TypeSupport type,
                                                    const TopicQos& qos,
                                                    DataReaderListener* listener) {
+  require_permission(name, false);
   const std::scoped_lock lock(mutex_);
   DataReader* const made =
       subscriber_->create_datareader(topic(name, type), reader_qos(qos, options_), listener);
   if (made == nullptr) throw failure("cannot read topic " + name);
+  watch_->add_own(made->guid(), name, type.get_type_name(), type->m_isGetKeyDefined, false, qos);
   return own(*made, nullptr);
 }
 
 Participant::ReaderHandle Participant::make_reader(const std::string& name, TypeSupport type,
                                                    const TopicQos& qos, const ContentFilter& filter,
                                                    DataReaderListener* listener) {
+  require_permission(name, false);
   const std::scoped_lock lock(mutex_);
   Topic* const whole = topic(name, type);
   ContentFilteredTopic* const filtered =
@@ -160,6 +211,7 @@ Participant::ReaderHandle Participant::make_reader(const std::string& name, Type
     handle_->delete_contentfilteredtopic(filtered);
     throw failure("cannot read topic " + name);
   }
+  watch_->add_own(made->guid(), name, type.get_type_name(), type->m_isGetKeyDefined, false, qos);
   return own(*made, filtered);
 }
 
@@ -167,6 +219,7 @@ Participant::ReaderHandle Participant::own(DataReader& made, ContentFilteredTopi
   const auto remove = [this, filtered](DataReader* reader) {
     const std::scoped_lock lock(mutex_);
     if (graph_) graph_->remove(reader->guid());
+    watch_->remove_own(reader->guid());
     subscriber_->delete_datareader(reader);
     if (filtered != nullptr) handle_->delete_contentfilteredtopic(filtered);
   };

@@ -15,12 +15,15 @@
 #include "idl/dds/content_filter.hpp"
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/dds_options.hpp"
+#include "idl/dds/peers.hpp"
 #include "idl/dds/qos.hpp"
 #include "idl/dds/service_faults.hpp"
 
 namespace stillmap {
 
+class PeerWatch;
 class RosGraph;
+struct Identity;
 
 /// This process in a DDS domain, and the makings of its readers and writers. A ROS 2 node to ROS 2
 /// tools when it has a node name. Endpoints must not outlive it. Thread-safe.
@@ -38,13 +41,19 @@ class Participant {
   [[nodiscard]] ServiceFaults& service_faults() { return service_faults_; }
   [[nodiscard]] const ServiceFaults& service_faults() const { return service_faults_; }
 
+  /// Everybody else in the domain, as discovery knows them now. Discovery takes a few seconds.
+  [[nodiscard]] std::vector<Peer> peers() const;
+  /// This participant, in the same terms.
+  [[nodiscard]] Peer self() const;
+
   /// Endpoints that leave the domain with their owner.
   using WriterHandle = std::unique_ptr<eprosima::fastdds::dds::DataWriter,
                                        std::function<void(eprosima::fastdds::dds::DataWriter*)>>;
   using ReaderHandle = std::unique_ptr<eprosima::fastdds::dds::DataReader,
                                        std::function<void(eprosima::fastdds::dds::DataReader*)>>;
 
-  /// `topic` is the DDS name ("rt/points"). Throws DdsError naming topic and type.
+  /// `topic` is the DDS name ("rt/points"). Throws DdsError naming topic and type; NotPermitted
+  /// where our identity's permissions forbid it.
   [[nodiscard]] WriterHandle make_writer(const std::string& topic,
                                          eprosima::fastdds::dds::TypeSupport type,
                                          const TopicQos& qos,
@@ -70,10 +79,16 @@ class Participant {
   [[nodiscard]] ReaderHandle own(eprosima::fastdds::dds::DataReader& reader,
                                  eprosima::fastdds::dds::ContentFilteredTopic* filtered);
   [[nodiscard]] DdsError failure(const std::string& what) const;
+  void require_permission(const std::string& topic, bool to_write) const;
+  [[nodiscard]] eprosima::fastdds::dds::DomainParticipantQos qos() const;
 
   DdsOptions options_;
   ServiceFaults service_faults_;
   std::mutex mutex_;
+  // Who we are in a secured domain; nothing without security.
+  std::unique_ptr<const Identity> identity_;
+  // Hears from the participant until that is gone.
+  std::unique_ptr<PeerWatch> watch_;
   // Held so that the factory outlives this participant even in a process that is ending.
   std::shared_ptr<eprosima::fastdds::dds::DomainParticipantFactory> factory_;
   Handle handle_;

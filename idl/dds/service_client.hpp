@@ -6,6 +6,7 @@
 
 #include "idl/dds/service_asker.hpp"
 #include "idl/dds/type_support.hpp"
+#include "idl/security/security_error.hpp"
 
 namespace stillmap {
 
@@ -13,28 +14,42 @@ namespace stillmap {
 template <typename Request, typename Reply>
 class ServiceClient {
  public:
-  /// Throws DdsError when the topics cannot be made.
-  ServiceClient(Participant& participant, const std::string& service)
-      : asker_(participant, service, type_support<Request>(), type_support<Reply>()) {}
-
-  /// True once both of the server's ends are discovered; false after `timeout`.
-  [[nodiscard]] bool wait_for_server(std::chrono::milliseconds timeout) const {
-    return asker_.wait_for_server(timeout);
+  /// Throws DdsError when the topics cannot be made. A service that our permissions forbid is known
+  /// by refusal(); only asking it fails.
+  ServiceClient(Participant& participant, const std::string& service) {
+    try {
+      asker_.emplace(participant, service, type_support<Request>(), type_support<Reply>());
+    } catch (const NotPermitted& error) {
+      refusal_ = error.what();
+    }
   }
 
-  /// The answer; nothing after `timeout`. A request is sent again at half time: a server that was
-  /// just restarted may have lost the first, and the first answer that comes is taken.
+  /// Why this service must not be asked; empty when it may be.
+  [[nodiscard]] const std::string& refusal() const { return refusal_; }
+
+  /// True once both of the server's ends are discovered; false after `timeout`. Throws
+  /// NotPermitted.
+  [[nodiscard]] bool wait_for_server(std::chrono::milliseconds timeout) const {
+    if (!refusal_.empty()) throw NotPermitted(refusal_);
+    return asker_->wait_for_server(timeout);
+  }
+
+  /// Throws NotPermitted for a service that our permissions forbid. The answer; nothing after
+  /// `timeout`. A request is sent again at half time: a server that was just restarted may have
+  /// lost the first, and the first answer that comes is taken.
   [[nodiscard]] std::optional<Reply> ask(const Request& request,
                                          std::chrono::milliseconds timeout) {
     const std::scoped_lock lock(mutex_);
+    if (!refusal_.empty()) throw NotPermitted(refusal_);
     Reply reply;
-    if (!asker_.ask(&request, &reply, timeout)) return std::nullopt;
+    if (!asker_->ask(&request, &reply, timeout)) return std::nullopt;
     return reply;
   }
 
  private:
   std::mutex mutex_;
-  ServiceAsker asker_;
+  std::string refusal_;
+  std::optional<ServiceAsker> asker_;
 };
 
 }  // namespace stillmap

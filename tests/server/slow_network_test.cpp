@@ -41,8 +41,9 @@ class SlowNetwork : public testing::Test {
     }
   }
   [[nodiscard]] ServerStatus status() const {
-    return ServerReport(DeliveryMode::latest, "slow", "", board_, statistics_,
-                        [] { return std::string(); })
+    return ServerReport(
+               {.label_source = "slow", .sensor = {}, .points_topic = {}, .troubles = {}}, board_,
+               statistics_, [] { return std::vector<Finding>(); }, [] { return std::string(); })
         .status();
   }
   [[nodiscard]] double median_ms(const std::string& stage) const {

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace stillmap {
+
+/// How long a sample outlives its writing, weakest first, as DDS numbers them.
+enum class Durability : std::uint8_t { volatile_, transient_local, transient, persistent };
+
+/// The policies that decide whether a writer and a reader find together.
+struct EndpointQos {
+  bool reliable = false;
+  Durability durability = Durability::volatile_;
+  /// Longest time from sample to sample; nothing: no promise.
+  std::optional<std::chrono::nanoseconds> deadline;
+  /// 0 automatic, 1 manual by participant, 2 manual by topic.
+  int liveliness_kind = 0;
+  std::optional<std::chrono::nanoseconds> liveliness_lease;
+  bool exclusive_ownership = false;
+  /// None is the partition without a name.
+  std::vector<std::string> partitions;
+};
+
+/// A reader or writer somewhere in the domain.
+struct Endpoint {
+  std::string guid;
+  /// DDS names ("rt/points", "sensor_msgs::msg::dds_::PointCloud2_").
+  std::string topic;
+  std::string type;
+  bool is_writer = false;
+  bool is_keyed = false;
+  EndpointQos qos;
+};
+
+/// Another process in the domain, as it announces itself.
+struct Peer {
+  /// Prefix of the guids of its endpoints.
+  std::string guid;
+  std::string name;
+  /// "Fast DDS", "Cyclone DDS", or "vendor 1.7".
+  std::string vendor;
+  /// Empty when it does not tell.
+  std::string host;
+  std::string user;
+  std::string process;
+  /// IPv4 addresses where it wants data.
+  std::vector<std::string> addresses;
+  bool uses_shared_memory = false;
+  bool is_on_this_host = false;
+  /// It announces an identity of DDS Security.
+  bool is_secured = false;
+  /// Ours or its identity was refused.
+  bool refused = false;
+  std::vector<Endpoint> endpoints;
+};
+
+/// "host, process 12, user robot, 192.168.0.5": what is known of where a peer runs.
+[[nodiscard]] std::string whereabouts(const Peer& peer);
+
+/// "stillmap_server (this host, process 12, user robot)".
+[[nodiscard]] std::string describe(const Peer& peer);
+
+/// "reliable, transient local": what people ask for first.
+[[nodiscard]] std::string describe(const EndpointQos& qos);
+
+}  // namespace stillmap

@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace stillmap {
+
+/// How much a finding matters.
+enum class Severity : std::uint8_t {
+  /// It works, but may not for long, or not as fast as it could.
+  advice = 0,
+  /// It keeps data from flowing.
+  problem = 1,
+};
+
+/// Something that is wrong, with what shows it and what would help.
+struct Finding {
+  Severity severity = Severity::problem;
+  /// One line: "no scans: nobody publishes rt/points".
+  std::string what;
+  /// What was seen.
+  std::string evidence;
+  /// What to do.
+  std::string way_out;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,209 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <fstream>
+#include <thread>
+
+#include "idl/dds/reader.hpp"
+#include "idl/roles.hpp"
+#include "idl/security/authority.hpp"
+#include "idl/security/security_error.hpp"
+#include "sensor_msgs.h"
+#include "tests/clients/process.hpp"
+#include "tests/scratch_folder.hpp"
+#include "tests/server/room_scans.hpp"
+#include "tests/server/server_process.hpp"
+
+namespace stillmap::test {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::Field;
+using ::testing::HasSubstr;
+
+/// A server in a secured domain, and identities of all roles.
+class SecuredDomain : public testing::Test {
+ protected:
+  [[nodiscard]] std::filesystem::path identity(const std::string& name) const {
+    return folder_ / "keys" / name;
+  }
+
+  [[nodiscard]] DdsOptions dds(const std::filesystem::path& security) const {
+    DdsOptions options = setup_.dds();
+    options.security = security;
+    return options;
+  }
+
+  [[nodiscard]] Client client(const std::filesystem::path& security,
+                              std::chrono::milliseconds timeout = patience) const {
+    ClientOptions options = setup_.client();
+    options.dds.security = security;
+    options.request_timeout = timeout;
+    return Client(options);
+  }
+
+  [[nodiscard]] ScanPublisher publisher(const std::filesystem::path& security) const {
+    return ScanPublisher({.dds = dds(security), .lossless = true});
+  }
+
+  /// `stillmap ARGUMENTS` in the server's domain.
+  [[nodiscard]] ProcessResult run(const std::string& arguments) const {
+    return run_stillmap(
+        arguments + " --interface 127.0.0.1 --domain " + std::to_string(setup_.dds().domain_id),
+        folder_.path());
+  }
+
+  [[nodiscard]] std::string server_command(const std::filesystem::path& security) const {
+    std::string command = stillmap_server_program();
+    for (const std::string& word : setup_.server_arguments()) command += " " + word;
+    return command + " --security " + security.string();
+  }
+
+  void start_server() {
+    server_.emplace(server_command(identity("server")), folder_ / "server.log");
+  }
+
+  /// An identity of an authority that the server does not know.
+  [[nodiscard]] std::filesystem::path stranger() const {
+    const Authority other = Authority::make(folder_ / "other", 10);
+    return other.add("planner", "planner", access_of(Role::planner, {}),
+                     Validity::days_from_now(5));
+  }
+
+  ScratchFolder folder_;
+  ServiceSetup setup_{"every"};
+  ProcessResult made_ =
+      run_stillmap("security init " + (folder_ / "keys").string(), folder_.path());
+  std::optional<BackgroundProcess> server_;
+};
+
+/// Counts what comes on a topic.
+class Listener {
+ public:
+  Listener(const DdsOptions& dds, const std::string& topic)
+      : participant_(dds), reader_(participant_, topic, {.reliable = false}) {}
+
+  [[nodiscard]] int samples() {
+    sensor_msgs::msg::PointCloud2 cloud;
+    while (reader_.take(cloud, {}, 0ms)) ++samples_;
+    return samples_;
+  }
+
+ private:
+  Participant participant_;
+  Reader<sensor_msgs::msg::PointCloud2> reader_;
+  int samples_ = 0;
+};
+
+TEST_F(SecuredDomain, IsDeafAndMuteToAnOutsider) {
+  ASSERT_EQ(made_.exit_code, 0) << made_.err;
+  start_server();
+  constexpr int scans = 6;
+  const std::string labelled = Topics::in("stillmap").scan.dds_name;
+  Listener outside(dds({}), labelled), inside(dds(identity("planner")), labelled);
+  Listener outside_points(dds({}), "rt/points"),
+      inside_points(dds(identity("planner")), "rt/points");
+  Client planner = client(identity("planner"));
+  planner.wait_for_server(patience);
+  const std::uint64_t map_id = planner.status().map_id;
+
+  // The outsider sends first, so that it has all the time there is.
+  ScanPublisher intruder(ScanPublisherOptions{.dds = dds({})});
+  ScanPublisher sensor = publisher(identity("sensor"));
+  Client intruding = client({}, 1500ms);
+  ASSERT_TRUE(intruder.publish(room_scan(0)));
+  EXPECT_THAT(message_of<ServiceTimeout>([&] { (void)intruding.reset(); }),
+              AllOf(HasSubstr("is secured"), HasSubstr("--security")));
+  ASSERT_TRUE(intruder.publish(room_scan(1)));
+  EXPECT_EQ(intruder.subscribers(), 0);
+
+  drive(sensor, 0, scans);
+  ASSERT_TRUE(wait_for_scans(planner, scans));
+  EXPECT_TRUE(eventually([&] { return inside.samples() > 0 && inside_points.samples() > 0; }));
+  EXPECT_EQ(outside.samples(), 0);
+  // It hears the other outsider, and nobody else.
+  EXPECT_LE(outside_points.samples(), 2);
+  const ServerStatus status = planner.status();
+  EXPECT_EQ(status.counter("scans_received"), static_cast<std::uint64_t>(scans));
+  EXPECT_EQ(status.map_id, map_id);
+  EXPECT_THAT(status.findings,
+              Contains(Field(&Finding::what, HasSubstr("is not secured and is ignored"))));
+}
+
+TEST_F(SecuredDomain, LetsAPlannerAskAndAnOperatorCommand) {
+  start_server();
+  ScanPublisher sensor = publisher(identity("sensor"));
+  drive(sensor, 0, 4);
+  Client planner = client(identity("planner"));
+  ASSERT_TRUE(wait_for_scans(planner, 4));
+  EXPECT_TRUE(eventually([&] { return !planner.get_static_map({}).voxels.empty(); }));
+  const std::uint64_t map_id = planner.status().map_id;
+  EXPECT_THAT(
+      message_of<ServiceError>([&] { (void)planner.reset(); }),
+      AllOf(HasSubstr("stillmap/reset"), HasSubstr("refused by the permissions of this domain"),
+            HasSubstr("'planner' (role planner)")));
+  EXPECT_THROW((void)planner.save_map(), ServiceError);
+  EXPECT_EQ(planner.status().map_id, map_id);
+
+  const ProcessResult refused = run("reset --security " + identity("planner").string());
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("refused by the permissions of this domain"));
+  const ProcessResult reset = run("reset --security " + identity("operator").string());
+  EXPECT_EQ(reset.exit_code, 0) << reset.err;
+  EXPECT_NE(planner.status().map_id, map_id);
+}
+
+TEST_F(SecuredDomain, LetsNobodyButASensorSendScans) {
+  for (const std::string name : {"planner", "operator"}) {
+    EXPECT_THAT(message_of<NotPermitted>([&] { (void)publisher(identity(name)); }),
+                AllOf(HasSubstr("may not write rt/points"), HasSubstr(name)));
+  }
+  EXPECT_NO_THROW((void)publisher(identity("sensor")));
+}
+
+TEST_F(SecuredDomain, RefusesAnotherAuthorityAndSaysSoOnBothSides) {
+  start_server();
+  const std::filesystem::path foreign = stranger();
+  Client planner = client(identity("planner"));
+  planner.wait_for_server(patience);
+  Client intruder = client(foreign, 3s);
+  EXPECT_THAT(message_of<ServiceTimeout>([&] { (void)intruder.status(); }),
+              HasSubstr("refuse each other"));
+  EXPECT_TRUE(eventually([&] {
+    const std::string log = content_of(folder_ / "server.log");
+    return log.find("refuse each other") != std::string::npos;
+  }));
+  EXPECT_THAT(planner.status().findings,
+              Contains(Field(&Finding::evidence, HasSubstr("another authority"))));
+}
+
+TEST_F(SecuredDomain, DoesNotStartWithAnIdentityThatExpired) {
+  const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
+  const Validity past{.from = now - std::chrono::days(9), .to = now - std::chrono::days(2)};
+  const Authority authority = Authority::open(folder_ / "keys");
+  for (const Role role : {Role::server, Role::planner}) {
+    (void)authority.add(std::string(name(role)), std::string(name(role)), access_of(role, {}), past,
+                        true);
+  }
+  start_server();
+  EXPECT_EQ(server_->wait(), 2);
+  EXPECT_THAT(content_of(folder_ / "server.log"),
+              AllOf(HasSubstr("server/cert.pem expired on"), HasSubstr("security add")));
+  const ProcessResult asked = run("status --security " + identity("planner").string());
+  EXPECT_EQ(asked.exit_code, 2);
+  EXPECT_THAT(asked.err, HasSubstr("planner/cert.pem expired on"));
+  const ProcessResult checked =
+      run_stillmap("security check " + (folder_ / "keys").string(), folder_.path());
+  EXPECT_EQ(checked.exit_code, 1);
+  EXPECT_THAT(checked.out, AllOf(HasSubstr("FAULT   "), HasSubstr("operator: well")));
+  const ProcessResult renewed = run_stillmap(
+      "security add " + (folder_ / "keys").string() + " server --replace", folder_.path());
+  EXPECT_EQ(renewed.exit_code, 0) << renewed.err;
+  EXPECT_THAT(renewed.out, HasSubstr("a server, valid until"));
+}
+
+}  // namespace
+}  // namespace stillmap::test
