@@ -22,8 +22,8 @@ class ServiceClient {
   /// by refusal(); only asking it fails.
   ServiceClient(Participant& participant, const std::string& service) {
     try {
-      replies_.emplace(participant, reply_topic(service), service_qos());
       requests_.emplace(participant, request_topic(service), service_qos());
+      replies_.emplace(participant, reply_topic(service), service_qos());
     } catch (const NotPermitted& error) {
       refusal_ = error.what();
     }
