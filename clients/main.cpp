@@ -31,6 +31,7 @@ void add_commands(stillmap::CommandHandle program, stillmap::Action& action) {
   stillmap::add_health_command(program, action);
   stillmap::add_discovery_server_command(program, action);
   stillmap::add_security_command(program, action);
+  stillmap::add_doctor_command(program, action);
   stillmap::add_save_command(program, action);
   stillmap::add_load_command(program, action);
   stillmap::add_reset_command(program, action);

@@ -41,6 +41,7 @@ void add_record_command(CommandHandle program, Action& action);
 void add_watch_command(CommandHandle program, Action& action);
 void add_watch_tiles_command(CommandHandle program, Action& action);
 void add_query_command(CommandHandle program, Action& action);
+void add_doctor_command(CommandHandle program, Action& action);
 void add_security_command(CommandHandle program, Action& action);
 void add_status_command(CommandHandle program, Action& action);
 void add_health_command(CommandHandle program, Action& action);

@@ -3,8 +3,10 @@
 #include <fastdds/rtps/participant/ParticipantDiscoveryInfo.h>
 #include <fastdds/rtps/reader/ReaderDiscoveryInfo.h>
 #include <fastdds/rtps/writer/WriterDiscoveryInfo.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <sstream>
 
@@ -60,8 +62,17 @@ void add_locators(const RemoteLocatorList& locators, Peer& peer) {
   }
 }
 
-// Fast DDS writes a number of the machine into every guid.
-bool same_host(const GuidPrefix_t& ours, const VendorId_t& vendor, const GuidPrefix_t& theirs) {
+std::string host_name() {
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
+// Fast DDS writes a number of the machine into every guid, but not into that of a secured
+// participant, which belongs to its certificate. Such a one tells its host in words.
+bool same_host(const GuidPrefix_t& ours, const VendorId_t& vendor, const GuidPrefix_t& theirs,
+               const Peer& peer) {
+  if (!peer.host.empty() && peer.host.starts_with(host_name() + ":")) return true;
   const bool is_fast_dds = vendor[0] == 1 && vendor[1] == 15;
   return is_fast_dds && std::equal(&ours.value[2], &ours.value[4], &theirs.value[2]);
 }
@@ -75,7 +86,7 @@ Peer peer_from(const ParticipantProxyData& data, const GuidPrefix_t& ours) {
   peer.user = property(data, eprosima::fastdds::dds::parameter_policy_physical_data_user);
   peer.process = property(data, eprosima::fastdds::dds::parameter_policy_physical_data_process);
   add_locators(data.default_locators, peer);
-  peer.is_on_this_host = same_host(ours, data.m_VendorId, data.m_guid.guidPrefix);
+  peer.is_on_this_host = same_host(ours, data.m_VendorId, data.m_guid.guidPrefix, peer);
   peer.is_secured = !data.identity_token_.class_id().empty();
   return peer;
 }

@@ -17,8 +17,8 @@ ServiceAsker::ServiceAsker(Participant& participant, const std::string& service,
                            TypeSupport request_type, TypeSupport reply_type)
     : request_type_(std::move(request_type)),
       reply_type_(std::move(reply_type)),
-      replies_(participant, reply_topic(service), reply_type_.get_type_name(), service_qos()),
-      requests_(participant, request_topic(service), request_type_.get_type_name(), service_qos()) {
+      requests_(participant, request_topic(service), request_type_.get_type_name(), service_qos()),
+      replies_(participant, reply_topic(service), reply_type_.get_type_name(), service_qos()) {
 }
 
 bool ServiceAsker::wait_for_server(std::chrono::milliseconds timeout) const {

@@ -32,8 +32,9 @@ class ServiceAsker {
   TypeSupport request_type_;
   TypeSupport reply_type_;
   std::vector<eprosima::fastrtps::rtps::SampleIdentity> sent_;
-  UnreadReader replies_;
+  // First: where permissions forbid a service, they are refused for its requests.
   UnreadWriter requests_;
+  UnreadReader replies_;
 };
 
 }  // namespace stillmap

@@ -118,13 +118,14 @@ TEST_F(SecuredDomain, IsDeafAndMuteToAnOutsider) {
   EXPECT_THAT(message_of<ServiceTimeout>([&] { (void)intruding.reset(); }),
               AllOf(HasSubstr("is secured"), HasSubstr("--security")));
   ASSERT_TRUE(intruder.publish(room_scan(1)));
-  EXPECT_EQ(intruder.subscribers(), 0);
+  // The other outsider listens, and nobody else.
+  EXPECT_LE(intruder.subscribers(), 1);
 
   drive(sensor, 0, scans);
   ASSERT_TRUE(wait_for_scans(planner, scans));
   EXPECT_TRUE(eventually([&] { return inside.samples() > 0 && inside_points.samples() > 0; }));
   EXPECT_EQ(outside.samples(), 0);
-  // It hears the other outsider, and nobody else.
+  // It hears the two scans of the other outsider at most.
   EXPECT_LE(outside_points.samples(), 2);
   const ServerStatus status = planner.status();
   EXPECT_EQ(status.counter("scans_received"), static_cast<std::uint64_t>(scans));

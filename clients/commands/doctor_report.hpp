@@ -1,0 +1,17 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "clients/doctor/checks.hpp"
+
+namespace stillmap {
+
+/// Who is there, and what is wrong: for people. `endpoints`: every reader and writer, too.
+[[nodiscard]] std::string doctor_text(const Evidence& evidence, const Findings& findings,
+                                      bool endpoints);
+
+/// The same with everything that was seen.
+[[nodiscard]] nlohmann::json doctor_json(const Evidence& evidence, const Findings& findings);
+
+}  // namespace stillmap

@@ -1,0 +1,101 @@
+#include "clients/doctor/host_facts.hpp"
+
+#include <arpa/inet.h>
+#include <net/if.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <fstream>
+#include <sstream>
+#include <system_error>
+
+#include "clients/doctor/shared_segments.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::optional<std::uint32_t> number_in(const fs::path& file) {
+  std::ifstream in(file);
+  std::uint32_t value = 0;
+  if (in >> value) return value;
+  return std::nullopt;
+}
+
+NetworkInterface interface_at(const fs::path& folder) {
+  std::ifstream in(folder / "flags");
+  unsigned flags = 0;
+  in >> std::hex >> flags;
+  return {.name = folder.filename().string(),
+          .is_up = (flags & IFF_UP) != 0,
+          .is_loopback = (flags & IFF_LOOPBACK) != 0,
+          .has_multicast = (flags & IFF_MULTICAST) != 0};
+}
+
+std::vector<NetworkInterface> interfaces_in(const fs::path& folder) {
+  std::vector<NetworkInterface> interfaces;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    if (entry.is_directory()) interfaces.push_back(interface_at(entry.path()));
+  }
+  std::ranges::sort(interfaces, {}, &NetworkInterface::name);
+  return interfaces;
+}
+
+// Lines of /proc/net/route: interface, destination, gateway, four numbers, mask; addresses as the
+// machine holds them, in hexadecimal.
+bool takes_multicast(const fs::path& route_file) {
+  const std::uint32_t group = inet_addr("239.255.0.1");
+  std::ifstream in(route_file);
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    std::istringstream words(line);
+    std::string interface, skipped;
+    std::uint32_t destination = 0, mask = 0;
+    words >> interface >> std::hex >> destination >> skipped >> skipped >> skipped >> skipped >>
+        skipped >> mask;
+    if (words && (group & mask) == destination) return true;
+  }
+  return false;
+}
+
+// Lines of /proc/net/udp: number, address:port in hexadecimal, and more.
+std::vector<std::uint16_t> ports_in(const fs::path& udp_file) {
+  std::vector<std::uint16_t> ports;
+  std::ifstream in(udp_file);
+  std::string line;
+  std::getline(in, line);
+  while (std::getline(in, line)) {
+    std::istringstream words(line);
+    std::string number, local;
+    words >> number >> local;
+    const std::size_t colon = local.find(':');
+    if (colon == std::string::npos) continue;
+    ports.push_back(static_cast<std::uint16_t>(std::stoul(local.substr(colon + 1), nullptr, 16)));
+  }
+  return ports;
+}
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
+}  // namespace
+
+HostFacts read_host_facts(const fs::path& root) {
+  return {.name = host_name(),
+          .user = ::geteuid(),
+          .largest_receive_buffer = number_in(root / "proc/sys/net/core/rmem_max"),
+          .shared_memory_fault = write_fault(root / "dev/shm"),
+          .segments = shared_segments(root / "dev/shm"),
+          .interfaces = interfaces_in(root / "sys/class/net"),
+          .has_multicast_route = takes_multicast(root / "proc/net/route"),
+          .udp_ports = ports_in(root / "proc/net/udp")};
+}
+
+}  // namespace stillmap

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace stillmap {
+
+/// A segment of Fast DDS in /dev/shm.
+struct SharedSegment {
+  std::string name;
+  std::uint64_t bytes = 0;
+  std::uint32_t owner = 0;
+  /// Nobody holds its lock: the process that made it is gone.
+  bool is_stale = false;
+};
+
+struct NetworkInterface {
+  std::string name;
+  bool is_up = false;
+  bool is_loopback = false;
+  bool has_multicast = false;
+};
+
+/// What this machine gives to DDS.
+struct HostFacts {
+  std::string name;
+  std::uint32_t user = 0;
+  /// net.core.rmem_max; nothing where it cannot be read.
+  std::optional<std::uint32_t> largest_receive_buffer;
+  /// Why /dev/shm cannot be used; empty when it can.
+  std::string shared_memory_fault;
+  std::vector<SharedSegment> segments;
+  std::vector<NetworkInterface> interfaces;
+  /// Some route takes multicast packets.
+  bool has_multicast_route = false;
+  /// Local UDP ports in use.
+  std::vector<std::uint16_t> udp_ports;
+};
+
+/// Reads /proc, /sys and /dev/shm under `root`: "/" for the machine itself.
+[[nodiscard]] HostFacts read_host_facts(const std::filesystem::path& root);
+
+/// Removes the stale segments with their locks, where that is allowed; returns how many.
+int remove_stale_segments(const std::filesystem::path& root);
+
+}  // namespace stillmap
