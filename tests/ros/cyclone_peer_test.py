@@ -126,13 +126,6 @@ class CyclonePeerTest(unittest.TestCase):
         cls.watch.end()
         cls.folder.cleanup()
 
-    def count(self, counter: str) -> int:
-        status = subprocess.run(
-            [os.environ["STILLMAP"], "status", "--domain", str(self.domain), "--interface",
-             "127.0.0.1", "--json"], check=True, capture_output=True, text=True).stdout
-        found = re.search(rf'"{re.escape(counter)}":\s*(\d+)', status)
-        return int(found[1]) if found else 0
-
     def test_1_every_scan_comes_back_as_a_pose(self):
         self.assertEqual(self.drive.one("rt/points")["published"], str(SCANS))
         odometry = self.drive.one("rt/stillmap/odometry")
@@ -205,7 +198,6 @@ class CyclonePeerTest(unittest.TestCase):
         for process in fast:
             process.communicate(timeout=120)
             self.assertEqual(process.returncode, 0)
-        self.assertEqual(self.count("unreadable_request_stillmap/get_status"), 0)
 
     def test_2_the_first_request_of_a_new_client_is_answered(self):
         clients = 30

@@ -61,7 +61,15 @@ def field_differences(made: Structure, other: Structure) -> list[str]:
     return faults
 
 
-class RosPackageTest(unittest.TestCase):
+class ComparisonTest(unittest.TestCase):
+
+    def assert_same(self, ours: list[Structure], theirs: list[Structure]):
+        faults = differences(ours, theirs)
+        if faults:
+            self.fail("\n" + "\n".join(faults))
+
+
+class RosPackageTest(ComparisonTest):
 
     @classmethod
     def setUpClass(cls):
@@ -71,17 +79,17 @@ class RosPackageTest(unittest.TestCase):
 
     def test_package_has_every_type_of_our_idl_field_by_field(self):
         self.assertGreater(len(self.own_idl), 30)
-        self.assertEqual(differences(self.own_idl, self.package), [])
+        self.assert_same(self.own_idl, self.package)
 
     def test_package_has_nothing_that_our_idl_has_not(self):
-        self.assertEqual(differences(self.package, self.own_idl), [])
+        self.assert_same(self.package, self.own_idl)
 
     def test_standard_messages_of_our_idl_are_those_of_ros(self):
         ros = read_definitions((SOURCE / "tests/ros/ros2_definitions.txt").read_text())
         mirrored = [made for made in self.idl
                     if made.package not in ("stillmap_msgs", "rmw_dds_common_iron")]
-        self.assertEqual(differences(mirrored, ros), [])
-        self.assertEqual(differences(ros, mirrored), [])
+        self.assert_same(mirrored, ros)
+        self.assert_same(ros, mirrored)
 
     def test_longer_gids_are_the_only_difference_before_iron(self):
         humble = [made for made in self.idl if made.package == "rmw_dds_common"]
@@ -124,7 +132,7 @@ class RosPackageTest(unittest.TestCase):
 
 
 @unittest.skipUnless(rosidl, "python3-rosidl is not installed")
-class RosidlTest(unittest.TestCase):
+class RosidlTest(ComparisonTest):
     """ROS 2's own reader of .msg and .srv takes the package, and reads what we read."""
 
     @staticmethod
@@ -143,8 +151,8 @@ class RosidlTest(unittest.TestCase):
         for made in ours:
             for field in made.fields:
                 field.is_key = False
-        self.assertEqual(differences(ours, theirs), [])
-        self.assertEqual(differences(theirs, ours), [])
+        self.assert_same(ours, theirs)
+        self.assert_same(theirs, ours)
 
 
 class DifferencesTest(unittest.TestCase):
