@@ -1,3 +1,4 @@
+#include <chrono>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
@@ -25,6 +26,7 @@ struct Arguments {
   double rate = 0.0;
   std::string topic = "points";
   std::string out;
+  std::uint32_t subscribers = 1;
   bool lossless = false;
   bool json = false;
 };
@@ -35,11 +37,19 @@ struct Outcome {
   Trajectory poses;
 };
 
-void require_subscriber(ScanPublisher& publisher, const Arguments& arguments) {
-  if (publisher.wait_for_subscriber(arguments.client.timeout())) return;
-  throw ServiceTimeout("a server answers in DDS domain " + std::to_string(arguments.client.domain) +
-                       ", but nobody takes scans from topic '" + arguments.topic +
-                       "': is that its topics.points?");
+void require_subscribers(ScanPublisher& publisher, const Arguments& arguments, StopSignal& stop) {
+  const auto deadline = std::chrono::steady_clock::now() + arguments.client.timeout();
+  const auto wanted = static_cast<int>(arguments.subscribers);
+  while (publisher.subscribers() < wanted && std::chrono::steady_clock::now() < deadline) {
+    if (stop.wait_for(std::chrono::milliseconds(10))) return;
+  }
+  const int there = publisher.subscribers();
+  if (there >= wanted) return;
+  throw ServiceTimeout(
+      "a server answers in DDS domain " + std::to_string(arguments.client.domain) + ", but " +
+      (there == 0 ? "nobody takes"
+                  : "only " + std::to_string(there) + " of " + std::to_string(wanted) + " take") +
+      " scans from topic '" + arguments.topic + "': is that its topics.points?");
 }
 
 void require_lossless(const ServerStatus& status) {
@@ -76,7 +86,7 @@ Outcome replay(const Arguments& arguments, StopSignal& stop) {
   ScanPublisher publisher({.dds = arguments.client.dds(),
                            .points_topic = arguments.topic,
                            .lossless = arguments.lossless});
-  require_subscriber(publisher, arguments);
+  require_subscribers(publisher, arguments, stop);
   const ServerStatus before = client.status();
   if (arguments.lossless) require_lossless(before);
   Outcome outcome;
@@ -158,6 +168,11 @@ void add_replay_command(CommandHandle program, Action& action) {
                "Send the recording's labels, where it has any (default)");
   command.flag("--strict", replay.range.strict, "Stop at the first damaged file");
   command.option("--topic", arguments->topic, "ROS 2 name of the topic").with_default();
+  command
+      .option("--subscribers", arguments->subscribers,
+              "Begin when so many take the scans: the server, and 'stillmap record', say")
+      .between(1, 1000)
+      .with_default();
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(

@@ -26,9 +26,12 @@ class RecordTest : public CommandTest {
     std::this_thread::sleep_for(1500ms);
   }
 
-  [[nodiscard]] nlohmann::json replay(const std::string& source, const std::string& out) const {
-    const ProcessResult result = run("replay " + source + " --lossless --json --timeout 30" +
-                                     on_domain() + " --out " + path(out));
+  /// Begins when the server and, where there is one, the recorder listen.
+  [[nodiscard]] nlohmann::json replay(const std::string& source, int subscribers,
+                                      const std::string& out) const {
+    const ProcessResult result =
+        run("replay " + source + " --lossless --json --timeout 30" + " --subscribers " +
+            std::to_string(subscribers) + on_domain() + " --out " + path(out));
     EXPECT_EQ(result.exit_code, 0) << result.err << content("server.log");
     return nlohmann::json::parse(result.out, nullptr, false);
   }
@@ -55,7 +58,7 @@ TEST_F(RecordTest, ARecordedReplayIsTheRecordingAgain) {
     BackgroundProcess record(stillmap_program() + " record " + path("bag") + on_domain(),
                              folder_ / "record.log");
     wait_for_bag("bag");
-    EXPECT_EQ(replay(path("city"), "first.txt").at("mapped"), scans);
+    EXPECT_EQ(replay(path("city"), 2, "first.txt").at("mapped"), scans);
     std::this_thread::sleep_for(1500ms);
     EXPECT_EQ(record.stop(), 0) << content("record.log");
   }
@@ -82,7 +85,7 @@ TEST_F(RecordTest, ARecordedReplayIsTheRecordingAgain) {
   // A new server makes the same of what was recorded.
   BackgroundProcess server(server_command(), folder_ / "server.log");
   ASSERT_EQ(run("status --timeout 30" + on_domain()).exit_code, 0) << content("server.log");
-  EXPECT_EQ(replay(path("bag") + " --topic-in points", "second.txt").at("mapped"), scans);
+  EXPECT_EQ(replay(path("bag") + " --topic-in points", 1, "second.txt").at("mapped"), scans);
   EXPECT_EQ(content("second.txt"), content("first.txt"));
 }
 
