@@ -88,6 +88,7 @@ void add_network_options(CLI::App& program, NetworkArguments& network) {
       .add_option("--peer", network.peers,
                   "Where to look for other processes, as HOST or HOST:PORT, without multicast")
       ->delimiter(',')
+      ->allow_extra_args(false)
       ->envname("STILLMAP_PEERS");
   program
       .add_option("--discovery-server", network.discovery_server,

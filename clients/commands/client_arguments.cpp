@@ -26,13 +26,16 @@ void add_network_options(CommandHandle command, DdsChoice& network) {
               "no_multicast, or a file")
       .from_environment("STILLMAP_DDS_PROFILE")
       .with_default();
-  command.option("--interface", network.interfaces,
-                 "Use only the network interface with this address (127.0.0.1: this machine)");
+  command
+      .option("--interface", network.interfaces,
+              "Use only the network interface with this address (127.0.0.1: this machine)")
+      .one_at_a_time();
   command
       .option("--peer", network.peers,
               "Where to look for the server, as HOST or HOST:PORT, without multicast")
       .from_environment("STILLMAP_PEERS")
-      .comma_separated();
+      .comma_separated()
+      .one_at_a_time();
   command
       .option("--discovery-server", network.discovery_server,
               "Find everybody through the discovery server at HOST or HOST:PORT")

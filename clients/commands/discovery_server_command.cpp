@@ -42,8 +42,10 @@ void add_discovery_server_command(CommandHandle program, Action& action) {
       .from_environment("ROS_DOMAIN_ID")
       .between(0, 232)
       .with_default();
-  command.option("--interface", arguments->network.interfaces,
-                 "Use only the network interface with this address");
+  command
+      .option("--interface", arguments->network.interfaces,
+              "Use only the network interface with this address")
+      .one_at_a_time();
   command.explain(
       "Examples:\n"
       "  stillmap discovery-server\n"

@@ -41,6 +41,11 @@ OptionHandle OptionHandle::comma_separated() {
   return *this;
 }
 
+OptionHandle OptionHandle::one_at_a_time() {
+  option_->allow_extra_args(false);
+  return *this;
+}
+
 OptionHandle OptionHandle::from_environment(const std::string& variable) {
   option_->envname(variable);
   return *this;

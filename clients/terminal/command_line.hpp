@@ -31,6 +31,8 @@ class OptionHandle {
   OptionHandle exactly(int values);
   /// A list may be written as one word: a,b,c.
   OptionHandle comma_separated();
+  /// Each value of a list has the option's name before it, so that what follows is not taken, too.
+  OptionHandle one_at_a_time();
   /// The environment variable that counts when the option is not given.
   OptionHandle from_environment(const std::string& variable);
   /// Both cannot be given.

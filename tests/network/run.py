@@ -12,8 +12,10 @@ import sys
 import lab
 import scenarios
 
-# The machine may be busy; what is looked for are stalls of seconds, not milliseconds.
-FRESH_MS = 1000.0
+# The machine may be busy, so the network's part is looked at: a pose's age without the mapper's time,
+# and the mapper's time against that on the undisturbed network. Stalls are seconds, not milliseconds.
+FRESH_MS = 300.0
+FRESH_AT_THE_END_MS = 1000.0
 MEMORY_GROWTH_MB = 100.0
 SLOWER_MS = 50.0
 OUTAGE_S = 10.0
@@ -37,26 +39,34 @@ ALL = [
 SHORT = ("undisturbed LAN", "5 % loss, wifi", "no multicast, discovery server")
 
 
+def pose_faults(poses, mapper, longest_gap_s):
+    if poses["count"] == 0:
+        return ["no poses arrived"]
+    faults = []
+    if poses["p50_ms"] > mapper["p50_ms"] + FRESH_MS:
+        faults.append("poses are old")
+    if poses["last_ms"] > mapper["p99_ms"] + FRESH_AT_THE_END_MS:
+        faults.append(f"the last pose was {poses['last_ms']:.0f} ms old")
+    if poses["longest_gap_s"] > longest_gap_s:
+        faults.append(f"no pose for {poses['longest_gap_s']:.1f} s")
+    return faults
+
+
 def faults_of(figures, longest_gap_s, undisturbed):
     """What does not hold, in words."""
     faults = []
+    mapper = figures["mapper"]
     if figures["tiles"] == 0 or figures["lacking"] > 0:
         faults.append(f"{figures['lacking']} of {figures['tiles']} tiles did not arrive")
-    if figures["mapper"]["mapped"] < 0.9 * figures["published"]:
-        faults.append(f"only {figures['mapper']['mapped']} of {figures['published']} scans were mapped")
-    if longest_gap_s is not None:
-        poses = figures["poses"]
-        if poses["count"] == 0:
-            return faults + ["no poses arrived"]
-        if poses["p50_ms"] > FRESH_MS or poses["last_ms"] > FRESH_MS:
-            faults.append("poses are old")
-        if poses["longest_gap_s"] > longest_gap_s:
-            faults.append(f"no pose for {poses['longest_gap_s']:.1f} s")
-    if undisturbed:
-        if figures["memory_mb"] > undisturbed["memory_mb"] + MEMORY_GROWTH_MB:
-            faults.append("the server's memory grew")
-        if figures["mapper"]["p50_ms"] > 1.5 * undisturbed["mapper"]["p50_ms"] + SLOWER_MS:
-            faults.append("the mapper became slower")
+    if figures["memory_mb"] > undisturbed["memory_mb"] + MEMORY_GROWTH_MB:
+        faults.append("the server's memory grew")
+    if longest_gap_s is None:
+        return faults  # Nobody was there while the robot drove.
+    faults += pose_faults(figures["poses"], mapper, longest_gap_s)
+    if mapper["p50_ms"] > 1.5 * undisturbed["mapper"]["p50_ms"] + SLOWER_MS:
+        faults.append("the mapper became slower")
+    if mapper["mapped"] < 0.7 * undisturbed["mapper"]["mapped"]:
+        faults.append(f"only {mapper['mapped']} of {figures['published']} scans were mapped")
     return faults
 
 
