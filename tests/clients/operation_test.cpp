@@ -68,7 +68,7 @@ TEST_F(OperationTest, MetricsMoveWithScansAndRequests) {
   EXPECT_EQ(after.at("stillmap_scans_received_total"), 8.0);
   EXPECT_EQ(after.at("stillmap_scans_mapped_total"), 8.0);
   EXPECT_EQ(after.at(R"(stillmap_stage_duration_seconds_bucket{stage="total",le="+Inf"})"), 8.0);
-  EXPECT_EQ(after.at(R"(stillmap_stage_duration_seconds_count{stage="register"})"), 8.0);
+  EXPECT_EQ(after.at(R"(stillmap_stage_duration_seconds_count{stage="odometry"})"), 8.0);
   EXPECT_GT(after.at(R"(stillmap_stage_duration_seconds_sum{stage="total"})"), 0.0);
   const std::string status_answers =
       R"(stillmap_service_requests_total{service="stillmap/get_status",code="ok"})";

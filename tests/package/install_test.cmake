@@ -32,7 +32,7 @@ run(2 "only_installed" ${BUILD}/bin/stillmap-server --check-config ${PREFIX}/rob
 # The unit names the places that were installed to.
 file(READ ${PREFIX}/lib/systemd/system/stillmap-server.service unit)
 string(FIND "${unit}" "ExecStart=${PREFIX}/bin/stillmap-server --config ${PREFIX}/etc/stillmap/server.yaml" at)
-if(at EQUAL -1 OR unit MATCHES "@")
+if(at EQUAL -1 OR unit MATCHES "@(prefix|etc)@")
   message(FATAL_ERROR "the unit does not start what was installed:\n${unit}")
 endif()
 
