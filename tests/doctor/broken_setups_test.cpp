@@ -19,6 +19,7 @@ namespace {
 using nlohmann::json;
 using sensor_msgs::msg::PointCloud2;
 using ::testing::AllOf;
+using ::testing::AnyOf;
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -94,8 +95,10 @@ TEST_F(BrokenSetup, IsTheLastThingThatAHealthyOneIs) {
 TEST_F(BrokenSetup, WithoutAPublisher) {
   start_server();
   const auto found = problems();
+  // Elsewhere on this machine somebody may publish scans: then that is the way out.
   EXPECT_THAT(found, Contains(AllOf(field("what", "nobody publishes rt/points"),
-                                    field("way_out", "stillmap replay"))));
+                                    AnyOf(field("way_out", "stillmap replay"),
+                                          field("way_out", "into one domain")))));
   EXPECT_EQ(exit_code_, 1);
 }
 

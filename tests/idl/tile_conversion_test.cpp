@@ -86,7 +86,14 @@ TEST(StatusConversion, KeepsEverything) {
                                        .carried_share = 0.5,
                                        .unlabelled_share = 0.125},
                       .counters = {{"scans_received", 8}, {"dropped_empty", 2}},
-                      .latencies = {{"odometry", 1.0, 2.0, 3.0, 4}}};
+                      .latencies = {{"odometry", 1.0, 2.0, 3.0, 4}},
+                      .host = "robot",
+                      .sensor = "vlp_16",
+                      .points_topic = "lidar/points",
+                      .scan_frame = "velodyne",
+                      .scan_delay_s = 0.25,
+                      .findings = {{Severity::advice, "what", "evidence", "way out"},
+                                   {Severity::problem, "worse", "", ""}}};
   const auto back = from_wire(to_wire(status));
   ASSERT_TRUE(back);
   EXPECT_EQ(back->stamp_ns, status.stamp_ns);
@@ -95,6 +102,17 @@ TEST(StatusConversion, KeepsEverything) {
   EXPECT_EQ(back->label_source, "stream");
   EXPECT_EQ(back->health, OdometryHealth::degenerate);
   EXPECT_EQ(back->reason, "why");
+  EXPECT_EQ(back->host, "robot");
+  EXPECT_EQ(back->sensor, "vlp_16");
+  EXPECT_EQ(back->points_topic, "lidar/points");
+  EXPECT_EQ(back->scan_frame, "velodyne");
+  EXPECT_EQ(back->scan_delay_s, 0.25);
+  ASSERT_EQ(back->findings.size(), 2U);
+  EXPECT_EQ(back->findings[0].severity, Severity::advice);
+  EXPECT_EQ(back->findings[0].what, "what");
+  EXPECT_EQ(back->findings[0].evidence, "evidence");
+  EXPECT_EQ(back->findings[0].way_out, "way out");
+  EXPECT_EQ(back->findings[1].severity, Severity::problem);
   EXPECT_EQ(back->segmentation.every, 3U);
   EXPECT_EQ(back->segmentation.network_ms, 210.0);
   EXPECT_EQ(back->segmentation.fresh_share, 0.25);
