@@ -54,8 +54,8 @@ struct DdsOptions {
   std::uint32_t heartbeat_ms = 50;
   /// How long losses are gathered before they are asked for, and again before they are sent.
   std::uint32_t repair_delay_ms = 5;
-  /// A process that was not heard of for so long is forgotten, and has to be found anew: longer than
-  /// the outages to be lived through, at least 3.
+  /// A process that was not heard of for so long is forgotten, and has to be found anew: longer
+  /// than the outages to be lived through, at least 3.
   std::uint32_t lease_s = 10;
   /// Limit for everything bulky that this process sends: tiles, clouds, grids and large answers, to
   /// all receivers together, repairs included. Poses and the status overtake them. 0: no limit.

@@ -29,7 +29,7 @@ constexpr auto patience = 20s;
 class LossySender {
  public:
   LossySender() {
-    DomainParticipantQos qos;
+    DomainParticipantQos qos = eprosima::fastdds::dds::PARTICIPANT_QOS_DEFAULT;
     qos.transport().use_builtin_transports = false;
     const auto lossy = std::make_shared<test_UDPv4TransportDescriptor>();
     lossy->maxMessageSize = 1400;
