@@ -135,7 +135,11 @@ std::string describe(const MapFileInfo& info) {
   }
   for (const auto& [key, value] : map.metadata)
     text << "metadata  " << key << ": " << value << "\n";
-  text << (map.voxels > 0 ? "\n" + class_bars(map) : "the map is empty\n");
+  if (map.voxels > 0) {
+    text << "\n" << class_bars(map);
+  } else {
+    text << "the map is empty\n";
+  }
   return text.str();
 }
 

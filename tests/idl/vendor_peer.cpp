@@ -58,13 +58,13 @@ Topic* VendorPeer::topic(const std::string& name, const std::string& type_name) 
 DataWriter& VendorPeer::make_writer(const std::string& name, const std::string& type_name,
                                     const TopicQos& qos) {
   Publisher* const publisher = participant_->create_publisher(PUBLISHER_QOS_DEFAULT);
-  return *publisher->create_datawriter(topic(name, type_name), writer_qos(qos));
+  return *publisher->create_datawriter(topic(name, type_name), writer_qos(qos, DdsOptions{}));
 }
 
 DataReader& VendorPeer::make_reader(const std::string& name, const std::string& type_name,
                                     const TopicQos& qos) {
   Subscriber* const subscriber = participant_->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
-  return *subscriber->create_datareader(topic(name, type_name), reader_qos(qos));
+  return *subscriber->create_datareader(topic(name, type_name), reader_qos(qos, DdsOptions{}));
 }
 
 ByteClient::ByteClient(VendorPeer& peer, const std::string& service, const std::string& type_stem,
