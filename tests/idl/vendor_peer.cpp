@@ -51,6 +51,9 @@ VendorPeer::~VendorPeer() {
 }
 
 Topic* VendorPeer::topic(const std::string& name, const std::string& type_name) {
+  if (TopicDescription* const known = participant_->lookup_topicdescription(name)) {
+    return static_cast<Topic*>(known);
+  }
   unread_type(type_name).register_type(participant_);
   return participant_->create_topic(name, type_name, TOPIC_QOS_DEFAULT);
 }
