@@ -2,6 +2,7 @@
 // what is inside their frames, with the content hash that fits where there is one.
 
 #include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Exception.h>
 #include <SQLiteCpp/Statement.h>
 
 #include <cstring>
@@ -97,13 +98,15 @@ void write_metadata(SQLite::Database& database, ByteSource& source) {
   insert.exec();
 }
 
-void write_row(SQLite::Database& database, ByteSource& source) {
+/// What the tables themselves refuse, as NaN where they want a number, is in no file.
+void write_row(SQLite::Database& database, ByteSource& source) try {
   const auto row = static_cast<Row>(source.byte() % rows);
   if (row == sizes) write_sizes(database, source);
   if (row == pose) write_pose(database, source);
   if (row == tile) write_tile(database, source);
   if (row == memory) write_memory(database, source);
   if (row == metadata) write_metadata(database, source);
+} catch (const SQLite::Exception&) {
 }
 
 /// An empty map of the street's sizes, as bytes of a file.
