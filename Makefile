@@ -3,9 +3,12 @@ SHELL := /bin/bash
 PRESET ?= release
 BUILD := build/$(PRESET)
 JOBS ?= $(shell nproc)
+JOBS_FUZZ ?= 2
+SECONDS ?= 600
+MINUTES ?= 30
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages build deb demo test test-dev test-tsan test-kill test-network test-docker image bench table1 ros-messages parity format format-check clean
+.PHONY: help packages build deb demo test test-dev test-tsan test-kill test-network test-docker image fuzz soak bench table1 ros-messages parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -52,6 +55,12 @@ image: ## Docker image stillmap, from source
 
 test-docker: ## Docker: the image, and the deployments of docker/ end to end (root where no dockerd runs)
 	docker/test.sh
+
+fuzz: ## Fuzz all that takes bytes from outside, SECONDS=600 each, JOBS_FUZZ=2 at a time (needs clang)
+	@JOBS=$(JOBS_FUZZ) tests/fuzz/fuzz.sh $(SECONDS)
+
+soak: build ## A server at 10 Hz for MINUTES=30, clients coming and going, dying and hanging: memory flat
+	@python3 tests/soak/soak.py --bin $(BUILD)/bin --drive $(BUILD)/tests/soak/soak_drive --minutes $(MINUTES)
 
 bench: build ## Benchmarks of every stage
 	@for b in $(BUILD)/tests/bench/*_bench; do echo "== $$b"; $$b || exit 1; done

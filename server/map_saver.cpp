@@ -1,5 +1,6 @@
 #include "server/map_saver.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <system_error>
 #include <utility>
@@ -20,6 +21,17 @@ std::unique_ptr<TileStore> open_filled(const std::filesystem::path& file) {
     throw MapFileError(file, no_map_yet);
   }
   return open_map_file(file);
+}
+
+/// Requests come over the network: they must not choose any file of this machine, nor one of those
+/// that SQLite keeps beside the map file while it is open.
+bool is_plain_name(const std::string& name) {
+  const std::filesystem::path plain(name);
+  const auto is_control = [](unsigned char c) { return c < ' '; };
+  const auto ends_as = [&](const char* ending) { return name.ends_with(ending); };
+  return !plain.has_parent_path() && name != "." && name != ".." &&
+         std::ranges::none_of(name, is_control) && !ends_as("-wal") && !ends_as("-shm") &&
+         !ends_as("-journal");
 }
 
 }  // namespace
@@ -120,14 +132,12 @@ std::filesystem::path MapSaver::file_named(const std::string& name) const {
     throw std::invalid_argument(
         "no map file is configured; set map.file in the server's configuration or --map-file");
   }
-  const std::filesystem::path plain(name);
-  // Requests come over the network: they must not choose any file of this machine.
-  if (plain.has_parent_path() || name == "." || name == "..") {
+  if (!is_plain_name(name)) {
     throw std::invalid_argument("file '" + name +
                                 "' must be a plain name; it is looked for beside the configured "
                                 "map file");
   }
-  return name.empty() ? file_ : file_.parent_path() / plain;
+  return name.empty() ? file_ : file_.parent_path() / name;
 }
 
 std::filesystem::path MapSaver::save_as(const std::string& name) {

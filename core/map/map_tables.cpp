@@ -31,8 +31,18 @@ std::string name_of(TileId id) {
   return "tile (" + std::to_string(id.x) + ", " + std::to_string(id.y) + ") ";
 }
 
+/// Of a tile farther out, numbers of cells, at most 256 along its side, would not fit 31 bits; maps
+/// end long before (VoxelGrid::max_coordinate_m).
+constexpr int farthest_tile = 1 << 22;
+
+bool is_near(int index) { return index >= -farthest_tile && index <= farthest_tile; }
+
 TileId column_tile_id(const SQLite::Statement& row) {
-  return {row.getColumn(0).getInt(), row.getColumn(1).getInt()};
+  const TileId id{row.getColumn(0).getInt(), row.getColumn(1).getInt()};
+  if (!is_near(id.x) || !is_near(id.y)) {
+    throw TileCodecError(name_of(id) + "lies farther out than any map goes");
+  }
+  return id;
 }
 
 TileState column_state(const SQLite::Statement& row) {

@@ -10,6 +10,9 @@ template <typename... Functions>
 struct Cases : Functions... {
   using Functions::operator()...;
 };
+// Compilers before C++20's deduction for aggregates need it said.
+template <typename... Functions>
+Cases(Functions...) -> Cases<Functions...>;
 
 Eigen::AlignedBox2d in_plan(const Eigen::AlignedBox3d& box) {
   return {box.min().head<2>(), box.max().head<2>()};

@@ -145,7 +145,7 @@ ClassEvidence StaticMap::evidence_at(const Eigen::Vector3d& position_map) const 
 std::shared_ptr<const MapView> StaticMap::view() {
   std::vector<LiveTile*> touched = std::exchange(state_->touched, {});
   std::ranges::sort(touched);
-  touched.erase(std::ranges::unique(touched).begin(), touched.end());
+  touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
 
   const std::uint64_t version = state_->current->version + 1;
   std::vector<std::uint8_t> changed(touched.size());

@@ -69,6 +69,10 @@ BagScans::BagScans(const fs::path& path, const std::string& topic)
     throw DatasetError(path, "topic " + topic_.name + " is serialized as '" +
                                  topic_.serialization_format + "'; only cdr is read");
   }
+  if (messages_.empty()) {
+    throw DatasetError(path, "the messages of topic " + topic_.name +
+                                 " cannot be found by its name: the bag is damaged");
+  }
   bool stamped = false;
   for (std::size_t i = 0; i < messages_.size(); ++i) {
     std::optional<std::int64_t> stamp_ns;

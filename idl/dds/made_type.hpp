@@ -1,21 +1,21 @@
 #pragma once
 
-#include <fastcdr/exceptions/Exception.h>
-
+#include <exception>
 #include <fastdds/dds/topic/TypeSupport.hpp>
 #include <memory>
 
 namespace stillmap {
 
-/// A generated PubSubType that survives every sample: generated code lets the faults of an unknown
-/// encapsulation or of a boolean that is neither 0 nor 1 through, out of the thread that reads.
+/// A generated type that anybody may send bytes for. Generated code lets all exceptions but one
+/// out, and Fast DDS does not catch them either: a sample of an unknown encapsulation, or with a
+/// boolean that is neither 0 nor 1, would end the program that reads it.
 template <typename PubSubType>
-class Guarded : public PubSubType {
+class GuardedType final : public PubSubType {
  public:
-  bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* sample) override {
+  bool deserialize(eprosima::fastrtps::rtps::SerializedPayload_t* payload, void* data) override {
     try {
-      return PubSubType::deserialize(payload, sample);
-    } catch (const eprosima::fastcdr::exception::Exception&) {
+      return PubSubType::deserialize(payload, data);
+    } catch (const std::exception&) {
       return false;
     }
   }
@@ -24,7 +24,7 @@ class Guarded : public PubSubType {
 /// Of a generated PubSubType. TypeSupport takes ownership of the pointer.
 template <typename PubSubType>
 [[nodiscard]] eprosima::fastdds::dds::TypeSupport make() {
-  return eprosima::fastdds::dds::TypeSupport(std::make_unique<Guarded<PubSubType>>().release());
+  return eprosima::fastdds::dds::TypeSupport(std::make_unique<GuardedType<PubSubType>>().release());
 }
 
 }  // namespace stillmap

@@ -1,22 +1,10 @@
 #pragma once
 
-#include <functional>
-#include <vector>
-
-#include "core/map/removed_voxel.hpp"
 #include "idl/dds/service_server.hpp"
 #include "idl/topics.hpp"
-#include "removed_voxels.h"
-#include "server/services/service_context.hpp"
+#include "server/services/removed.hpp"
 
 namespace stillmap {
-
-/// Who keeps what was removed. Both are done between two scans.
-struct RemovedSource {
-  std::function<std::vector<RemovedVoxel>(const Eigen::AlignedBox3d& box_map)> removed;
-  /// Returns how many voxels.
-  std::function<std::size_t(RemovalReason reason, const Eigen::AlignedBox3d& box_map)> restore;
-};
 
 /// What was kept out of the static map, and the way back into it.
 class RemovedDesk {

@@ -1,5 +1,6 @@
 #include "idl/bag/bag.hpp"
 
+#include <SQLiteCpp/Database.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <zstd.h>
@@ -315,6 +316,19 @@ TEST(BagWriter, MetadataCountsWhatIsThere) {
                     HasSubstr("nanoseconds_since_epoch: 1700000000150000000"),
                     HasSubstr("- bag_0.db3"), HasSubstr("type: sensor_msgs/msg/PointCloud2")));
   EXPECT_FALSE(fs::exists(folder / "bag" / "bag_0.db3-wal"));
+}
+
+TEST(BagScans, SaysThatATopicsMessagesCannotBeFound) {
+  const ScratchFolder folder;
+  write_bag(folder / "bag", {bag_message(0)});
+  for (const auto& entry : std::filesystem::directory_iterator(folder / "bag")) {
+    if (entry.path().extension() != ".db3") continue;
+    // Not text any more, and so equal to no text.
+    SQLite::Database(entry.path().string(), SQLite::OPEN_READWRITE)
+        .exec("UPDATE topics SET name = CAST(name AS BLOB)");
+  }
+  EXPECT_NE(message_of<DatasetError>([&] { BagScans(folder / "bag", ""); }).find("damaged"),
+            std::string::npos);
 }
 
 }  // namespace

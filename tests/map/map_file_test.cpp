@@ -165,6 +165,16 @@ TEST_F(MapFileTest, RefusesATileThatIsNotTheStoredOne) {
   expect_refused("content hash");
 }
 
+TEST_F(MapFileTest, RefusesATileBeyondTheEndOfAnyMap) {
+  open_map_file(file_)->save(stored_map(1));
+  alter("UPDATE tiles SET x = 2147483647 WHERE rowid = (SELECT min(rowid) FROM tiles)");
+  const auto store = open_map_file(file_);
+  for (const auto load : {&TileStore::load, &TileStore::load_shelved}) {
+    EXPECT_THAT([&] { (void)((*store).*load)(); },
+                testing::ThrowsMessage<MapFileError>(HasSubstr("farther out than any map")));
+  }
+}
+
 TEST_F(MapFileTest, RefusesImpossibleSizes) {
   open_map_file(file_)->save(stored_map(1));
   alter("UPDATE map SET voxel_size_m = 0");

@@ -131,5 +131,20 @@ TEST_F(MapSaverTest, NeedsAFileToSaveTo) {
   EXPECT_THROW(saver.save_as(""), std::invalid_argument);
 }
 
+TEST_F(MapSaverTest, NamesOfOtherFilesAreRefused) {
+  map_scan(5.0F);
+  MapSaver saver(board_, folder_ / "map.stillmap", {});
+  // With a NUL inside, two names mean one file.
+  const std::string cut_off("map.stillmap\0.other", 19);
+  for (const std::string& name :
+       {std::string("../other.stillmap"), std::string("map.stillmap-wal"),
+        std::string("map.stillmap-shm"), std::string("map.stillmap-journal"), cut_off}) {
+    EXPECT_THROW(saver.save_as(name), std::invalid_argument) << name;
+  }
+  map_scan(50.0F);
+  saver.save_if_changed();
+  EXPECT_EQ(MapSaver(board_, folder_ / "map.stillmap", {}).load()->view.tiles.size(), 2U);
+}
+
 }  // namespace
 }  // namespace stillmap

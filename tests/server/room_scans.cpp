@@ -66,8 +66,9 @@ StampedPose room_pose(int index) {
               Eigen::AngleAxisd(0.01 * index, Eigen::Vector3d::UnitZ()))};
 }
 
-Scan room_scan(int index) {
-  const StampedPose pose = room_pose(index);
+Scan room_scan(int index) { return seen_in_room(room_pose(index)); }
+
+Scan seen_in_room(const StampedPose& pose) {
   const SensorModel sensor = vlp_16();
   Scan scan;
   scan.stamp_ns = pose.stamp_ns;

@@ -11,4 +11,7 @@ namespace stillmap::test {
 /// What a 16-beam lidar sees there: ground (road), walls (building), pillars (pole).
 [[nodiscard]] Scan room_scan(int index);
 
+/// The same from any pose in the hall.
+[[nodiscard]] Scan seen_in_room(const StampedPose& pose);
+
 }  // namespace stillmap::test

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "core/map/map_file.hpp"
+
+namespace stillmap::fuzz {
+
+/// A map of four small tiles with ground, a wall, a pole and something that was taken out; with the
+/// memories of its tiles, a few poses and metadata. Small, for it is mutated and loaded again and
+/// again.
+[[nodiscard]] StoredMap small_street();
+
+/// The sizes of its tiles and voxels.
+[[nodiscard]] StaticMapConfig street_config();
+
+}  // namespace stillmap::fuzz

@@ -1,0 +1,68 @@
+// A number that says which kind of file, then its YAML: server, sensor, robot, label map.
+
+#include "config/label_map.hpp"
+#include "config/robot_profile.hpp"
+#include "config/sensor_file.hpp"
+#include "config/server_config.hpp"
+#include "core/occupancy/occupancy_map.hpp"
+#include "tests/fuzz/byte_source.hpp"
+#include "tests/fuzz/memory_folder.hpp"
+#include "tests/fuzz/promise.hpp"
+
+namespace stillmap::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+
+enum Kind : std::uint8_t { server, sensor, robot, labels, kinds };
+
+/// What the server makes of its configuration before it opens anything.
+void read_server(const fs::path& file) {
+  ConfigReport report;
+  const ServerConfig config = load_server_config(file, report);
+  require(config.mapper.static_map.faults().empty(), "a map can be made");
+  require(config.occupancy.map.faults().empty(), "an octree can be made");
+  static_cast<void>(robots_of(config.areas));
+}
+
+void read(Kind kind, const fs::path& file) {
+  if (kind == server) read_server(file);
+  if (kind == sensor) static_cast<void>(load_sensor(file.string()));
+  if (kind == robot) {
+    require(read_robot_profile(file).faults().empty(), "a robot that was read can be used");
+  }
+  if (kind == labels) static_cast<void>(load_label_map(file));
+}
+
+void run(Bytes bytes) {
+  ByteSource source(bytes);
+  const auto kind = static_cast<Kind>(source.byte() % kinds);
+  const auto file = MemoryFolder::of_this_process().file("file.yaml", source.rest());
+  try {
+    read(kind, file);
+  } catch (const ConfigError& error) {
+    require(!error.faults().empty(), "a refusal says why");
+  }
+}
+
+void add_files(Kind kind, const char* folder, std::vector<Seed>& all) {
+  for (const auto& entry : fs::directory_iterator(fs::path(STILLMAP_CONFIG_FOLDER) / folder)) {
+    if (entry.path().extension() != ".yaml") continue;
+    all.push_back({entry.path().stem().string(), with_choice(kind, content_of(entry.path()))});
+  }
+}
+
+std::vector<Seed> seeds() {
+  std::vector<Seed> all;
+  add_files(server, "server", all);
+  add_files(sensor, "sensors", all);
+  add_files(robot, "robots", all);
+  add_files(labels, "labels", all);
+  return all;
+}
+
+}  // namespace
+
+const Target config_file_target{"config_file", run, seeds};
+
+}  // namespace stillmap::fuzz

@@ -1,0 +1,123 @@
+// A number that says which message, then what comes over DDS: what the server reads beside scans
+// and requests, and all that a client reads.
+
+#include <variant>
+
+#include "idl/conversions/area_query.hpp"
+#include "idl/conversions/map_query.hpp"
+#include "idl/conversions/occupancy_query.hpp"
+#include "idl/conversions/path_query.hpp"
+#include "idl/conversions/pose.hpp"
+#include "idl/conversions/removed_voxels.hpp"
+#include "idl/conversions/status.hpp"
+#include "idl/conversions/tile.hpp"
+#include "idl/topics.hpp"
+#include "tests/fuzz/byte_source.hpp"
+#include "tests/fuzz/cdr.hpp"
+#include "tests/fuzz/promise.hpp"
+#include "tests/fuzz/street_map.hpp"
+
+namespace stillmap::fuzz {
+namespace {
+
+using namespace stillmap_msgs::srv;
+
+template <typename Message, typename Read>
+void read_as(Bytes bytes, const Read& read) {
+  if (const auto message = from_cdr<Message>(bytes)) read(*message);
+}
+
+template <typename Response>
+void read_response(Bytes bytes) {
+  read_as<Response>(
+      bytes, [](const Response& response) { static_cast<void>(wire::from_response(response)); });
+}
+
+void read_odometry(Bytes bytes) {
+  read_as<nav_msgs::msg::Odometry>(bytes, [](const auto& message) {
+    const auto odometry = wire::from_odometry(message);
+    require(!odometry || odometry->pose.T_map_lidar.matrix().allFinite(), "a pose is finite");
+  });
+}
+
+void read_path(Bytes bytes) {
+  read_as<nav_msgs::msg::Path>(
+      bytes, [](const auto& message) { static_cast<void>(wire::from_path(message)); });
+}
+
+void read_tile(Bytes bytes) {
+  read_as<stillmap_msgs::msg::MapTile>(bytes, [](const auto& message) {
+    const auto tile = wire::from_wire(message);
+    require(!tile || tile->voxels.size() == message.voxels().x().size(), "voxels are all there");
+  });
+}
+
+void read_tile_info(Bytes bytes) {
+  read_as<stillmap_msgs::msg::TileInfo>(
+      bytes, [](const auto& message) { static_cast<void>(wire::from_wire(message)); });
+}
+
+void read_status(Bytes bytes) {
+  read_as<stillmap_msgs::msg::Status>(
+      bytes, [](const auto& message) { static_cast<void>(wire::from_wire(message)); });
+}
+
+constexpr std::array<void (*)(Bytes), 11> readers = {
+    read_odometry,
+    read_path,
+    read_tile,
+    read_tile_info,
+    read_status,
+    read_response<GetStaticMap_Response>,
+    read_response<GetTraversableArea_Response>,
+    read_response<CheckPath_Response>,
+    read_response<NearestTraversable_Response>,
+    read_response<QueryOccupancy_Response>,
+    read_response<GetRemoved_Response>,
+};
+
+void run(Bytes bytes) {
+  ByteSource source(bytes);
+  const std::size_t kind = source.byte() % readers.size();
+  readers.at(kind)(source.rest());
+}
+
+RemovedVoxel removed_voxel() {
+  return {Eigen::Vector3f(1, 2, 3), SemanticClass::car, RemovalReason::semi_static, 99};
+}
+
+std::vector<Seed> seeds() {
+  const MapView view = small_street().view;
+  const MapIdentity identity = wire::identity_of(view);
+  const StampedPose pose{1'500'000'000, Eigen::Isometry3d::Identity()};
+  MapQuery query;
+  query.max_bytes = 250;
+  GetRemoved_Response removed;
+  wire::write_removed({removed_voxel()}, removed);
+  QueryOccupancy_Response occupancy;
+  wire::write_answers({0.2, {PointOccupancy{}}, {BoxOccupancy{}}, {RayOccupancy{}}}, occupancy);
+  Tile tile = *view.tiles.front();
+  tile.voxels.resize(4);
+  ServerStatus status;
+  status.counters.push_back({"scans_mapped", 3});
+  return {
+      {"odometry", with_choice(0, to_cdr(wire::to_odometry(
+                                      pose, Eigen::Matrix<double, 6, 6>::Identity(), "map", "l")))},
+      {"path", with_choice(1, to_cdr(wire::to_path({pose, pose}, "map")))},
+      {"tile", with_choice(2, to_cdr(wire::to_wire(tile, identity)))},
+      {"tile_info", with_choice(3, to_cdr(wire::to_wire(tile.info, identity)))},
+      {"status", with_choice(4, to_cdr(wire::to_wire(status)))},
+      {"static_map", with_choice(5, to_cdr(wire::to_response(query_map(view, query))))},
+      {"area", with_choice(6, to_cdr(wire::to_response(AreaAnswer{})))},
+      {"path_check", with_choice(7, to_cdr(wire::to_response(PathCheck{}, 7)))},
+      {"nearest", with_choice(8, to_cdr(wire::to_response(NearestTraversable{}, 7)))},
+      {"occupancy", with_choice(9, to_cdr(occupancy))},
+      {"removed", with_choice(10, to_cdr(removed))},
+  };
+}
+
+}  // namespace
+
+const Target message_target{"message", run, seeds};
+
+}  // namespace stillmap::fuzz
