@@ -51,7 +51,8 @@ ServedWorld::ServedWorld()
                    },
                .show_now = [this] { board_.show(map_.view()); },
                .areas = atlas_,
-               .planning_grid = grid_} {
+               .planning_grid = grid_,
+               .log = log_} {
   begin_again();
 }
 

@@ -35,6 +35,7 @@ class ServedWorld {
   PlanningGrid grid_{areas_config_, "map", board_, areas_};
   OccupancyMap octree_{OccupancyConfig{}};
   RemovedSource removed_;
+  ServiceLog log_;
   ServiceContext context_;
   GetStaticMap static_map_{context_};
 };
