@@ -20,7 +20,7 @@ if ! echo 'extern "C" int LLVMFuzzerTestOneInput(const char*, long) { return 0; 
   exit 2
 fi
 if [ -z "${STILLMAP_FUZZ_BUILT:-}" ]; then
-  (cd "$root" && cmake --preset fuzz >/dev/null && cmake --build --preset fuzz -j "$(nproc)") || exit 2
+  (cd "$root" && cmake --preset fuzz >/dev/null && cmake --build --preset fuzz --target fuzz_targets -j "$(nproc)") || exit 2
 fi
 targets=("$@")
 if [ ${#targets[@]} = 0 ]; then
