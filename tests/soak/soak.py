@@ -169,7 +169,12 @@ class Soak:
     def status(self):
         answer = subprocess.run([self.stillmap, "status", *self.here(), "--json", "--timeout", "30"],
                                 capture_output=True, text=True)
-        return json.loads(answer.stdout) if answer.returncode == 0 else None
+        try:
+            return json.loads(answer.stdout)
+        except json.JSONDecodeError:
+            print(f"soak: no status: exit code {answer.returncode}, {len(answer.stdout)} characters; "
+                  f"{answer.stderr.strip()}", flush=True)
+            return None
 
     def start_server(self):
         config = self.out / "server.yaml"
