@@ -1,4 +1,5 @@
 #include "clients/commands/command.hpp"
+#include "idl/dds/dds_log.hpp"
 
 namespace {
 
@@ -49,6 +50,7 @@ void add_commands(stillmap::CommandHandle program, stillmap::Action& action) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  stillmap::log_dds_to_stderr();
   stillmap::CommandLine command_line("stillmap", STILLMAP_VERSION,
                                      "Lidar scans in, poses and a static semantic map out.");
   stillmap::Action action;

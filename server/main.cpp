@@ -5,6 +5,7 @@
 #include <exception>
 
 #include "config/model_file.hpp"
+#include "idl/dds/dds_log.hpp"
 #include "idl/security/security_error.hpp"
 #include "server/arguments.hpp"
 #include "server/operation/log_setup.hpp"
@@ -46,6 +47,7 @@ void serve(const stillmap::ServerConfig& config) {
 
 int main(int argc, char** argv) {
   stillmap::start_log(stillmap::LogLevel::info);
+  stillmap::log_dds_to_stderr();
   try {
     const stillmap::Arguments arguments = stillmap::read_arguments(argc, argv);
     if (!arguments.config) return arguments.exit_code;
