@@ -4,8 +4,10 @@
 #include <fastrtps/utils/IPLocator.h>
 #include <netdb.h>
 #include <netinet/in.h>
+#include <unistd.h>
 
 #include <array>
+#include <atomic>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -131,6 +133,15 @@ void register_with(const NetworkAddress& server, BuiltinAttributes& builtin) {
   builtin.discovery_config.m_DiscoveryServers.push_back(remote);
 }
 
+/// Ports of its own, as far as that goes. By default a process gets those of the last one that was
+/// killed, and who still has that one's shared memory open does not reach the new one.
+std::int32_t fresh_participant_id() {
+  // As many as have ports in the highest domain, too.
+  constexpr std::int32_t ids = 60;
+  static std::atomic<std::int32_t> made_here{0};
+  return (::getpid() + made_here++) % ids;
+}
+
 }  // namespace
 
 void set_discovery(const DdsOptions& options, DomainParticipantQos& qos) {
@@ -139,7 +150,11 @@ void set_discovery(const DdsOptions& options, DomainParticipantQos& qos) {
   const bool udp = options.transport == NetworkTransport::udp;
   // TCP peers look for the domain's first process at a port.
   if (!udp && options.listening_port != 0) qos.wire_protocol().participant_id = 0;
-  if (udp && (!options.multicast || options.listening_port != 0)) listen_at(options, qos);
+  if (udp && (!options.multicast || options.listening_port != 0)) {
+    listen_at(options, qos);
+  } else if (udp && options.discovery_server.host.empty()) {
+    qos.wire_protocol().participant_id = fresh_participant_id();
+  }
   if (!options.discovery_server.host.empty()) {
     return register_with(options.discovery_server, builtin);
   }
