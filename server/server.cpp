@@ -34,12 +34,11 @@ void log(const Finding& finding) {
 std::vector<Finding> troubles(std::uint32_t wanted_bytes) {
   const std::uint32_t granted = granted_socket_buffer_bytes(wanted_bytes);
   if (granted >= wanted_bytes) return {};
-  const Finding trouble{
-      .severity = Severity::advice,
-      .what = "UDP buffers are too small: large clouds over UDP can get lost",
-      .evidence = "they have " + std::to_string(granted) + " bytes instead of " +
-                  std::to_string(wanted_bytes),
-      .way_out = "sudo sysctl net.core.rmem_max=" + std::to_string(wanted_bytes)};
+  const Finding trouble{.severity = Severity::advice,
+                        .what = "UDP buffers are too small: large clouds over UDP can get lost",
+                        .evidence = "they have " + std::to_string(granted) + " bytes instead of " +
+                                    std::to_string(wanted_bytes),
+                        .way_out = "sudo sysctl net.core.rmem_max=" + std::to_string(wanted_bytes)};
   log(trouble);
   return {trouble};
 }

@@ -18,8 +18,7 @@ ServiceAsker::ServiceAsker(Participant& participant, const std::string& service,
     : request_type_(std::move(request_type)),
       reply_type_(std::move(reply_type)),
       requests_(participant, request_topic(service), request_type_.get_type_name(), service_qos()),
-      replies_(participant, reply_topic(service), reply_type_.get_type_name(), service_qos()) {
-}
+      replies_(participant, reply_topic(service), reply_type_.get_type_name(), service_qos()) {}
 
 bool ServiceAsker::wait_for_server(std::chrono::milliseconds timeout) const {
   const auto deadline = Clock::now() + timeout;
