@@ -8,9 +8,11 @@
 
 #include <array>
 #include <atomic>
+#include <filesystem>
 #include <memory>
 #include <sstream>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "idl/dds/dds_error.hpp"
@@ -133,13 +135,31 @@ void register_with(const NetworkAddress& server, BuiltinAttributes& builtin) {
   builtin.discovery_config.m_DiscoveryServers.push_back(remote);
 }
 
-/// Ports of its own, as far as that goes. By default a process gets those of the last one that was
-/// killed, and who still has that one's shared memory open does not reach the new one.
-std::int32_t fresh_participant_id() {
+/// Whether shared memory at one of the participant's ports belongs to a process, living or killed.
+bool is_taken(std::uint32_t domain_id, std::int32_t participant_id) {
+  // Ports as the standard maps them: discovery, and data.
+  const std::int32_t first = 7400 + 250 * static_cast<std::int32_t>(domain_id) + 10;
+  for (const std::int32_t port : {first + 2 * participant_id, first + 2 * participant_id + 1}) {
+    std::error_code unreadable;
+    const std::string file = "/dev/shm/fastrtps_port" + std::to_string(port);
+    if (std::filesystem::exists(file, unreadable)) return true;
+  }
+  return false;
+}
+
+/// Ports that nobody had, as far as there are any. By default a process gets those of the last one
+/// that was killed, and who still has that one's shared memory open does not reach the new one.
+std::int32_t fresh_participant_id(std::uint32_t domain_id) {
   // As many as have ports in the highest domain, too.
   constexpr std::int32_t ids = 60;
   static std::atomic<std::int32_t> made_here{0};
-  return (::getpid() + made_here++) % ids;
+  std::int32_t id = 0;
+  for (int tried = 0; tried < ids; ++tried) {
+    // Never the same one twice in a row: two of one process must differ.
+    id = (::getpid() + made_here++) % ids;
+    if (!is_taken(domain_id, id)) break;
+  }
+  return id;
 }
 
 }  // namespace
@@ -152,8 +172,9 @@ void set_discovery(const DdsOptions& options, DomainParticipantQos& qos) {
   if (!udp && options.listening_port != 0) qos.wire_protocol().participant_id = 0;
   if (udp && (!options.multicast || options.listening_port != 0)) {
     listen_at(options, qos);
-  } else if (udp && options.discovery_server.host.empty()) {
-    qos.wire_protocol().participant_id = fresh_participant_id();
+  } else if (udp && options.discovery_server.host.empty() && options.node_name.empty()) {
+    // A service keeps the usual ports: that is where others look who list it as a peer.
+    qos.wire_protocol().participant_id = fresh_participant_id(options.domain_id);
   }
   if (!options.discovery_server.host.empty()) {
     return register_with(options.discovery_server, builtin);
