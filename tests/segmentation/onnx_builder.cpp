@@ -63,10 +63,10 @@ std::string OnnxBuilder::transpose(const std::string& input, int outputs, const 
   return windowed("ConvTranspose", input, outputs, window, bias);
 }
 
-std::string OnnxBuilder::normalise(const std::string& input) {
+std::string OnnxBuilder::normalise(const std::string& input, float scale) {
   const std::int64_t size = channels(input);
   return node("BatchNormalization",
-              {input, float_weights({size}, 0.3F, 1.0F), float_weights({size}, 0.3F),
+              {input, float_weights({size}, 0.3F * scale, scale), float_weights({size}, 0.3F),
                float_weights({size}, 0.3F), float_weights({size}, 0.3F, 1.0F)},
               channels(input), {real_attribute("epsilon", 1e-5F)});
 }
@@ -111,16 +111,18 @@ const Window one_by_one{};
 const Window three_by_three{.kernel = {3, 3}, .padding = {1, 1}};
 const Window one_by_four{.kernel = {1, 4}, .stride = {1, 2}, .padding = {0, 1}};
 
-std::string layer(OnnxBuilder& network, const std::string& input, int outputs,
-                  const Window& window) {
-  return network.activate(network.normalise(network.convolve(input, outputs, window)));
+std::string layer(OnnxBuilder& network, const std::string& input, int outputs, const Window& window,
+                  float scale = 1.0F) {
+  return network.activate(network.normalise(network.convolve(input, outputs, window), scale));
 }
 
 /// The sum stands after the second activation.
 std::string block(OnnxBuilder& network, const std::string& input, int middle) {
   const int outputs = network.channels(input);
+  // As trained networks have it: with whole sums, values would double from block to block.
+  constexpr float share = 0.2F;
   const std::string narrow = layer(network, input, middle, one_by_one);
-  return network.add(layer(network, narrow, outputs, three_by_three), input);
+  return network.add(layer(network, narrow, outputs, three_by_three, share), input);
 }
 
 std::string widen(OnnxBuilder& network, const std::string& input, int outputs,

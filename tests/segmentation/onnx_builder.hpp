@@ -31,7 +31,8 @@ class OnnxBuilder {
                        bool bias = false);
   std::string transpose(const std::string& input, int outputs, const Window& window,
                         bool bias = false);
-  std::string normalise(const std::string& input);
+  /// `scale`: about what the channels are multiplied by.
+  std::string normalise(const std::string& input, float scale = 1.0F);
   std::string activate(const std::string& input);
   std::string add(const std::string& first, const std::string& second);
   std::string softmax(const std::string& input, SoftmaxStyle style = SoftmaxStyle::whole);
