@@ -4,10 +4,12 @@
 #include <fastrtps/utils/IPLocator.h>
 #include <netdb.h>
 #include <netinet/in.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <array>
 #include <atomic>
+#include <cerrno>
 #include <filesystem>
 #include <memory>
 #include <sstream>
@@ -135,14 +137,26 @@ void register_with(const NetworkAddress& server, BuiltinAttributes& builtin) {
   builtin.discovery_config.m_DiscoveryServers.push_back(remote);
 }
 
-/// Whether shared memory at one of the participant's ports belongs to a process, living or killed.
+bool is_udp_port_used(std::int32_t port) {
+  const int probe = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  if (probe < 0) return false;
+  sockaddr_in any{};
+  any.sin_family = AF_INET;
+  any.sin_port = htons(static_cast<std::uint16_t>(port));
+  const bool bound = ::bind(probe, reinterpret_cast<const sockaddr*>(&any), sizeof any) == 0;
+  const bool used = !bound && errno == EADDRINUSE;
+  ::close(probe);
+  return used;
+}
+
+/// Whether a process has one of the participant's ports, or was killed and left its shared memory.
 bool is_taken(std::uint32_t domain_id, std::int32_t participant_id) {
   // Ports as the standard maps them: discovery, and data.
   const std::int32_t first = 7400 + 250 * static_cast<std::int32_t>(domain_id) + 10;
   for (const std::int32_t port : {first + 2 * participant_id, first + 2 * participant_id + 1}) {
     std::error_code unreadable;
     const std::string file = "/dev/shm/fastrtps_port" + std::to_string(port);
-    if (std::filesystem::exists(file, unreadable)) return true;
+    if (std::filesystem::exists(file, unreadable) || is_udp_port_used(port)) return true;
   }
   return false;
 }
@@ -150,13 +164,17 @@ bool is_taken(std::uint32_t domain_id, std::int32_t participant_id) {
 /// Ports that nobody had, as far as there are any. By default a process gets those of the last one
 /// that was killed, and who still has that one's shared memory open does not reach the new one.
 std::int32_t fresh_participant_id(std::uint32_t domain_id) {
-  // As many as have ports in the highest domain, too.
-  constexpr std::int32_t ids = 60;
+  // Fast DDS numbers those who do not ask from 0; no two of one process may have the same number,
+  // not even in different domains.
+  constexpr std::int32_t first = 20;
+  // The highest domain's ports end at 65535, those of others where the next domain's begin.
+  constexpr std::uint32_t highest_domain = 232;
+  const std::int32_t ids = (domain_id == highest_domain ? 60 : 120) - first;
   static std::atomic<std::int32_t> made_here{0};
   std::int32_t id = 0;
   for (int tried = 0; tried < ids; ++tried) {
     // Never the same one twice in a row: two of one process must differ.
-    id = (::getpid() + made_here++) % ids;
+    id = first + (::getpid() + made_here++) % ids;
     if (!is_taken(domain_id, id)) break;
   }
   return id;

@@ -3,11 +3,25 @@
 #include <fastrtps/xmlparser/XMLProfileManager.h>
 #include <unistd.h>
 
+#include <chrono>
+#include <cstddef>
 #include <cstdint>
 
 #include "idl/dds/dds_options.hpp"
+#include "sensor_msgs.h"
 
 namespace stillmap {
+
+/// How long what must happen may take on a busy machine.
+inline constexpr std::chrono::seconds patience{20};
+
+/// A message of a size, told from others by its width and its bytes.
+inline sensor_msgs::msg::PointCloud2 cloud_of(std::size_t bytes, std::uint32_t number) {
+  sensor_msgs::msg::PointCloud2 cloud;
+  cloud.width(number);
+  cloud.data().assign(bytes, static_cast<std::uint8_t>(number));
+  return cloud;
+}
 
 /// A domain that other tests on this machine hardly use: ctest runs every test in a process of its
 /// own. Domain 0 stays free for people.

@@ -23,15 +23,6 @@ namespace {
 using namespace std::chrono_literals;
 using sensor_msgs::msg::PointCloud2;
 
-constexpr auto patience = 20s;
-
-PointCloud2 cloud_of(std::size_t bytes, std::uint32_t number) {
-  PointCloud2 cloud;
-  cloud.width(number);
-  cloud.data().assign(bytes, static_cast<std::uint8_t>(number));
-  return cloud;
-}
-
 TileInfo tile_info(TileId id, std::uint64_t revision) {
   TileInfo info;
   info.id = id;

@@ -20,7 +20,6 @@ using stillmap_msgs::srv::SaveMap_Request;
 using stillmap_msgs::srv::SaveMap_Response;
 using ::testing::HasSubstr;
 
-constexpr auto patience = 20s;
 constexpr auto service = "stillmap/save_map";
 constexpr auto type_stem = "stillmap_msgs::srv::dds_::SaveMap";
 

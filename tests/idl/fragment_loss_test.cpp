@@ -23,8 +23,6 @@ using eprosima::fastdds::dds::DomainParticipantQos;
 using eprosima::fastdds::rtps::test_UDPv4TransportDescriptor;
 using stillmap_msgs::msg::MapTile;
 
-constexpr auto patience = 20s;
-
 /// A process whose network loses every tenth fragment that it sends.
 class LossySender {
  public:

@@ -13,8 +13,6 @@ namespace {
 using namespace std::chrono_literals;
 using sensor_msgs::msg::PointCloud2;
 
-constexpr auto patience = 20s;
-
 SampleBytes cloud_bytes(std::uint32_t width) {
   PointCloud2 cloud;
   cloud.width(width);

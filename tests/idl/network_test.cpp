@@ -23,15 +23,6 @@ using namespace eprosima::fastdds::rtps;
 using eprosima::fastdds::dds::DomainParticipantQos;
 using sensor_msgs::msg::PointCloud2;
 
-constexpr auto patience = 20s;
-
-PointCloud2 cloud_of(std::size_t bytes, std::uint32_t number) {
-  PointCloud2 cloud;
-  cloud.width(number);
-  cloud.data().assign(bytes, static_cast<std::uint8_t>(number));
-  return cloud;
-}
-
 /// Of this process, so that tests beside each other do not meet.
 std::uint16_t test_port() { return static_cast<std::uint16_t>(20000 + ::getpid() % 20000); }
 
@@ -58,6 +49,18 @@ DdsOptions without_multicast() {
   DdsOptions options = loopback(false);
   options.multicast = false;
   return options;
+}
+
+// Fast DDS numbers the participants of a process, and ends the process over a number used twice.
+TEST(ManyParticipants, OfOneProcessGetAlong) {
+  DdsOptions node = loopback(false);
+  node.node_name = "node";
+  const Participant first(node);
+  const Participant stays(loopback(false));
+  for (int i = 0; i < 130; ++i) {
+    const Participant passes(loopback(false));
+    ASSERT_NE(passes.self().guid, stays.self().guid);
+  }
 }
 
 TEST(Network, WithoutMulticastProcessesOfOneMachineFindEachOther) {

@@ -17,8 +17,6 @@ using namespace std::chrono_literals;
 using rmw_dds_common::msg::ParticipantEntitiesInfo;
 using sensor_msgs::msg::PointCloud2;
 
-constexpr auto patience = 20s;
-
 class RosGraphOfANode : public testing::Test {
  protected:
   static DdsOptions node_options() {

@@ -17,8 +17,6 @@ using stillmap_msgs::srv::SaveMap_Response;
 using Server = ServiceServer<SaveMap_Request, SaveMap_Response>;
 using Client = ServiceClient<SaveMap_Request, SaveMap_Response>;
 
-constexpr auto patience = 20s;
-
 SaveMap_Response echo(const SaveMap_Request& request) {
   SaveMap_Response reply;
   reply.file("saved " + request.file());

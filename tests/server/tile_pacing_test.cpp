@@ -17,7 +17,6 @@ using namespace std::chrono_literals;
 using stillmap_msgs::msg::MapTile;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto patience = 20s;
 constexpr std::size_t tile_voxels = 1000;
 
 std::shared_ptr<const Tile> tile_of(TileId id, std::uint64_t revision) {
