@@ -3,9 +3,13 @@
 #include <sys/un.h>
 
 #include <chrono>
+#include <csignal>
 #include <map>
+#include <memory>
 #include <regex>
 #include <sstream>
+#include <thread>
+#include <vector>
 
 #include "tests/clients/command_test.hpp"
 #include "tests/clients/http_get.hpp"
@@ -20,6 +24,15 @@ class OperationTest : public CommandTest {
   [[nodiscard]] std::string server_command(const std::string& more = "") const {
     return stillmap_server_program() + " --map-file " + path("server.stillmap") + on_domain() +
            " " + more;
+  }
+
+  /// Waits until the program that logs there printed the text.
+  [[nodiscard]] bool comes_to_say(const std::string& text, const std::string& log_file) const {
+    for (int tenths = 0; tenths < 300; ++tenths) {
+      if (content(log_file).find(text) != std::string::npos) return true;
+      std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    }
+    return false;
   }
 
   [[nodiscard]] bool answers() const {
@@ -82,6 +95,29 @@ TEST_F(OperationTest, MetricsMoveWithScansAndRequests) {
   EXPECT_EQ(http_get(port, "/elsewhere"), "");
   EXPECT_EQ(server.stop(), 0) << content("server.log");
   EXPECT_EQ(http_get(port, "/metrics"), "");
+}
+
+// A client that hangs has the server's messages pile up in shared memory; killed, it leaves that
+// behind, and Fast DDS gives the next client the same ports.
+TEST_F(OperationTest, AnswersNewClientsAfterOthersHungAndWereKilled) {
+  BackgroundProcess server(server_command("--log-level warning"), folder_ / "server.log");
+  ASSERT_TRUE(answers()) << content("server.log");
+  for (int round = 0; round < 2; ++round) {
+    std::vector<std::unique_ptr<BackgroundProcess>> clients;
+    for (int i = 0; i < 4; ++i) {
+      const std::string name = "watch" + std::to_string(i) + ".log";
+      clients.push_back(std::make_unique<BackgroundProcess>(
+          stillmap_program() + " watch --json" + on_domain(), folder_ / name));
+      ASSERT_TRUE(comes_to_say("\"status\"", name)) << round;
+    }
+    for (const auto& client : clients) client->send(SIGSTOP);
+    std::this_thread::sleep_for(std::chrono::seconds(4));
+    for (const auto& client : clients) client->send(SIGKILL);
+    for (const auto& client : clients) EXPECT_EQ(client->wait(), -1);
+    EXPECT_TRUE(answers()) << round;
+  }
+  EXPECT_EQ(server.stop(), 0) << content("server.log");
+  static_cast<void>(run("doctor --clean --listen 1" + on_domain()));
 }
 
 TEST_F(OperationTest, AMetricsPortThatIsTakenIsNamed) {

@@ -63,8 +63,10 @@ BackgroundProcess::~BackgroundProcess() {
   }
 }
 
+void BackgroundProcess::send(int signal) const { kill(pid_, signal); }
+
 int BackgroundProcess::stop() {
-  kill(pid_, SIGTERM);
+  send(SIGTERM);
   return wait();
 }
 

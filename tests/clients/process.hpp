@@ -27,7 +27,8 @@ class BackgroundProcess {
   BackgroundProcess(const BackgroundProcess&) = delete;
   BackgroundProcess& operator=(const BackgroundProcess&) = delete;
 
-  /// Waits for its end; returns its exit code.
+  void send(int signal) const;
+  /// Waits for its end; returns its exit code, -1 when a signal ended it.
   int wait();
   /// SIGTERM, and wait().
   int stop();
