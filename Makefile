@@ -3,8 +3,8 @@ SHELL := /bin/bash
 PRESET ?= release
 BUILD := build/$(PRESET)
 JOBS ?= $(shell nproc)
-JOBS_FUZZ ?= 2
-SECONDS ?= 600
+FUZZ_JOBS ?= 2
+FUZZ_SECONDS ?= 600
 MINUTES ?= 30
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
@@ -56,8 +56,8 @@ image: ## Docker image stillmap, from source
 test-docker: ## Docker: the image, and the deployments of docker/ end to end (root where no dockerd runs)
 	docker/test.sh
 
-fuzz: ## Fuzz all that takes bytes from outside, SECONDS=600 each, JOBS_FUZZ=2 at a time (needs clang)
-	@JOBS=$(JOBS_FUZZ) tests/fuzz/fuzz.sh $(SECONDS)
+fuzz: ## Fuzz all that takes bytes from outside, FUZZ_SECONDS=600 each, FUZZ_JOBS=2 at a time (needs clang)
+	@JOBS=$(FUZZ_JOBS) tests/fuzz/fuzz.sh $(FUZZ_SECONDS)
 
 soak: build ## A server at 10 Hz for MINUTES=30, clients coming and going, dying and hanging: memory flat
 	@python3 tests/soak/soak.py --bin $(BUILD)/bin --drive $(BUILD)/tests/soak/soak_drive --minutes $(MINUTES)

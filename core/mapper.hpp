@@ -78,8 +78,8 @@ class Mapper {
 
   /// Forgets poses and takes over a stored static map; the next scans extend it. The next scan is
   /// looked for in it, round its prior or the map's origin, and all register against what is stored
-  /// near them. Throws std::invalid_argument for
-  /// voxels or tiles of another size than configured, and is then as it was.
+  /// near them. Throws std::invalid_argument for voxels or tiles of another size than configured,
+  /// and is then as it was.
   void restore(const MapView& view, const TileMemories& memories = {});
 
   /// Forgets poses and maps; the next scan starts map `map_id` at the origin.

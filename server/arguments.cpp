@@ -96,6 +96,37 @@ void add_network_options(CLI::App& program, NetworkArguments& network) {
       ->envname("STILLMAP_DISCOVERY_SERVER");
 }
 
+/// What is said of the map, the input and the domain instead of the file's.
+struct ServerArguments {
+  std::optional<std::uint32_t> domain_id;
+  std::optional<std::string> security;
+  std::optional<std::string> map_file;
+  std::optional<Delivery> delivery;
+
+  void apply_to(ServerConfig& config) const {
+    if (domain_id) config.dds.domain_id = *domain_id;
+    if (security) config.dds.security = *security;
+    if (map_file) config.map.file = *map_file;
+    if (delivery) config.input.delivery = *delivery;
+  }
+};
+
+void add_server_options(CLI::App& program, ServerArguments& server) {
+  program.add_option("--domain", server.domain_id, "DDS domain, instead of the file's")
+      ->check(CLI::Range(0, 232));
+  program
+      .add_option("--security", server.security,
+                  "Folder of the server's identity in a secured domain, instead of the file's")
+      ->envname("STILLMAP_SECURITY");
+  program.add_option("--map-file", server.map_file, "Where the map is kept, instead of the file's");
+  program
+      .add_option("--delivery", server.delivery,
+                  "latest: drop scans that are too many; every: let the sender wait")
+      ->option_text("latest|every")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Delivery>{
+          {"latest", Delivery::latest}, {"every", Delivery::every}}));
+}
+
 }  // namespace
 
 Arguments read_arguments(int argc, char** argv) {
@@ -104,29 +135,14 @@ Arguments read_arguments(int argc, char** argv) {
   program.set_version_flag("--version", std::string("stillmap-server ") + STILLMAP_VERSION);
   program.footer(footer);
   std::string config_file;
-  std::optional<std::uint32_t> domain_id;
-  NetworkArguments network;
-  std::optional<std::string> map_file;
-  std::optional<Delivery> delivery;
-  OperationArguments operation;
   std::string checked_file;
+  ServerArguments server;
+  NetworkArguments network;
+  OperationArguments operation;
   program.add_option("--config", config_file, "YAML file; config/server/default.yaml explains it")
       ->check(CLI::ExistingFile);
-  program.add_option("--domain", domain_id, "DDS domain, instead of the file's")
-      ->check(CLI::Range(0, 232));
+  add_server_options(program, server);
   add_network_options(program, network);
-  std::string security;
-  program
-      .add_option("--security", security,
-                  "Folder of the server's identity in a secured domain, instead of the file's")
-      ->envname("STILLMAP_SECURITY");
-  program.add_option("--map-file", map_file, "Where the map is kept, instead of the file's");
-  program
-      .add_option("--delivery", delivery,
-                  "latest: drop scans that are too many; every: let the sender wait")
-      ->option_text("latest|every")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Delivery>{
-          {"latest", Delivery::latest}, {"every", Delivery::every}}));
   add_operation_options(program, operation);
   program
       .add_option("--check-config", checked_file,
@@ -139,11 +155,8 @@ Arguments read_arguments(int argc, char** argv) {
   }
   if (!checked_file.empty()) return check_config(checked_file);
   ServerConfig config = config_file.empty() ? ServerConfig() : load_server_config(config_file);
-  if (domain_id) config.dds.domain_id = *domain_id;
+  server.apply_to(config);
   network.apply_to(config.dds.network);
-  if (!security.empty()) config.dds.security = security;
-  if (map_file) config.map.file = *map_file;
-  if (delivery) config.input.delivery = *delivery;
   operation.apply_to(config);
   return {.config = config};
 }
