@@ -21,8 +21,9 @@ const TraversabilityTile* find_tile(const TraversabilityView& view, TileId id) {
 }  // namespace
 
 std::optional<CellIndex> TraversabilityView::cell_of(const Eigen::Vector2d& position_map) const {
-  // Written so that NaN fails.
-  if (!(position_map.cwiseAbs().maxCoeff() <= VoxelGrid::max_coordinate_m) || !(cell_m > 0.0)) {
+  // Each by itself: the largest of NaN and a number may be the number.
+  const bool is_near = (position_map.array().abs() <= VoxelGrid::max_coordinate_m).all();
+  if (!is_near || !(cell_m > 0.0)) {
     return std::nullopt;
   }
   const Eigen::Vector2d cell = (position_map / cell_m).array().floor();

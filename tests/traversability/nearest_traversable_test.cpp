@@ -60,6 +60,8 @@ TEST(NearestTraversable, HostilePlacesGetAStatusAndAReason) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   using enum AreaStatus;
   EXPECT_EQ(nearest_traversable(*view, {nan, 0}).status, invalid_request);
+  EXPECT_EQ(nearest_traversable(*view, {0, nan}).status, invalid_request);
+  EXPECT_EQ(nearest_traversable(*view, {-nan, nan}).status, invalid_request);
   EXPECT_EQ(nearest_traversable(*view, {0, 1e12}).status, invalid_request);
   EXPECT_EQ(nearest_traversable(*view, {0, 0}, nan).status, invalid_request);
   EXPECT_EQ(nearest_traversable(*view, {0, 0}, -1.0).status, invalid_request);
