@@ -41,8 +41,14 @@ class ServiceTimeout : public ServiceError {
   using ServiceError::ServiceError;
 };
 
+/// As the profile `lan` has it for clients: config/dds/lan.yaml says why.
+[[nodiscard]] inline DdsOptions without_shared_memory(DdsOptions options = {}) {
+  options.shared_memory = false;
+  return options;
+}
+
 struct ClientOptions {
-  DdsOptions dds;
+  DdsOptions dds = without_shared_memory();
   /// First part of the server's topic and service names.
   std::string server_name = "stillmap";
   /// Longest wait for an answer, discovery and retries included.

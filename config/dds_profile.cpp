@@ -73,6 +73,7 @@ void read_profile(YamlSection file, DdsProfile& profile) {
                                 {{"udp", NetworkTransport::udp}, {"tcp", NetworkTransport::tcp}});
   file.whole("server_port", profile.server_port, ports);
   file.flag("shared_memory", options.shared_memory);
+  file.flag("client_shared_memory", profile.client_shared_memory);
   file.whole("shared_memory_mib", options.shared_memory_mib, {1, 1024});
   file.flag("multicast", options.multicast);
   read_interfaces(file, options.interfaces);
@@ -159,6 +160,7 @@ std::vector<std::string> known_dds_profiles() { return known_names(profile_place
 DdsOptions dds_options(const DdsChoice& choice, DdsRole role) {
   const DdsProfile profile = load_dds_profile(choice.profile);
   DdsOptions options = profile.options;
+  if (role == DdsRole::client && !profile.client_shared_memory) options.shared_memory = false;
   apply(choice, options);
   if (role == DdsRole::server) options.listening_port = profile.server_port;
   for (NetworkAddress& peer : options.peers) {

@@ -17,6 +17,8 @@ struct DdsProfile {
   /// Port of stillmap-server: it listens there, and peers without a port are looked for there. 0:
   /// the ports that DDS counts from domain and process.
   std::uint16_t server_port = 0;
+  /// Whether clients use shared memory too, or only server and sensors do.
+  bool client_shared_memory = false;
 };
 
 /// Reads a profile such as config/dds/lan.yaml. Throws ConfigError with every fault.
@@ -47,7 +49,8 @@ struct DdsChoice {
   std::uint32_t socket_buffer_bytes = 0;
 };
 
-enum class DdsRole { server, client };
+/// A sensor publishes scans or records them, a client asks for maps and listens to poses.
+enum class DdsRole { server, sensor, client };
 
 /// The options that a deployment chooses. Throws ConfigError with every fault.
 [[nodiscard]] DdsOptions dds_options(const DdsChoice& choice, DdsRole role);

@@ -6,17 +6,17 @@ std::chrono::milliseconds ClientArguments::timeout() const {
   return std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * timeout_s));
 }
 
-DdsOptions ClientArguments::dds() const {
+DdsOptions ClientArguments::dds(DdsRole role) const {
   DdsChoice choice = network;
   if (udp_only) choice.shared_memory = false;
-  DdsOptions options = dds_options(choice, DdsRole::client);
+  DdsOptions options = dds_options(choice, role);
   options.domain_id = domain;
   options.security = security;
   return options;
 }
 
 ClientOptions ClientArguments::client() const {
-  return {.dds = dds(), .server_name = server_name, .request_timeout = timeout()};
+  return {.dds = dds(DdsRole::client), .server_name = server_name, .request_timeout = timeout()};
 }
 
 void add_network_options(CommandHandle command, DdsChoice& network) {

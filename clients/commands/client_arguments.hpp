@@ -20,7 +20,7 @@ struct ClientArguments {
 
   [[nodiscard]] std::chrono::milliseconds timeout() const;
   /// Throws ConfigError for a profile or an address that cannot be used.
-  [[nodiscard]] DdsOptions dds() const;
+  [[nodiscard]] DdsOptions dds(DdsRole role) const;
   [[nodiscard]] ClientOptions client() const;
 };
 

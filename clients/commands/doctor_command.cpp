@@ -22,7 +22,8 @@ struct Arguments {
 };
 
 DoctorOptions options_of(const Arguments& arguments) {
-  return {.dds = arguments.client.dds(),
+  // As a sensor: shared memory is looked at, too.
+  return {.dds = arguments.client.dds(DdsRole::sensor),
           .server_name = arguments.client.server_name,
           .points_topic = arguments.points,
           .timeout = arguments.client.timeout(),

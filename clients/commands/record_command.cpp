@@ -31,7 +31,7 @@ struct Arguments {
 
 RecorderOptions recorder_options(const Arguments& arguments) {
   RecorderOptions options = arguments.recorder;
-  options.dds = arguments.client.dds();
+  options.dds = arguments.client.dds(DdsRole::sensor);
   options.server_name = arguments.client.server_name;
   options.folder = arguments.out;
   return options;

@@ -190,7 +190,8 @@ void set_discovery(const DdsOptions& options, DomainParticipantQos& qos) {
   if (!udp && options.listening_port != 0) qos.wire_protocol().participant_id = 0;
   if (udp && (!options.multicast || options.listening_port != 0)) {
     listen_at(options, qos);
-  } else if (udp && options.discovery_server.host.empty() && options.node_name.empty()) {
+  } else if (udp && options.shared_memory && options.discovery_server.host.empty() &&
+             options.node_name.empty()) {
     // A service keeps the usual ports: that is where others look who list it as a peer.
     qos.wire_protocol().participant_id = fresh_participant_id(options.domain_id);
   }

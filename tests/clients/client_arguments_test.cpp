@@ -41,7 +41,7 @@ TEST(ClientArguments, PeersAndInterfacesDoNotTakeWhatFollowsThem) {
 TEST(ClientArguments, OverrideTheProfile) {
   const DdsOptions options = parse({"--dds-profile", "wan", "--peer", "robot", "--udp-only",
                                     "--interface", "10.0.0.1", "--domain", "7"})
-                                 .client.dds();
+                                 .client.dds(DdsRole::client);
   EXPECT_EQ(options.transport, NetworkTransport::tcp);
   EXPECT_THAT(options.peers, ElementsAre(NetworkAddress{"robot", 5100}));
   EXPECT_FALSE(options.shared_memory);
@@ -53,7 +53,7 @@ TEST(ClientArguments, TakeTheNetworkFromTheEnvironment) {
   setenv("STILLMAP_DDS_PROFILE", "no_multicast", 1);
   setenv("STILLMAP_PEERS", "a,b:1", 1);
   setenv("STILLMAP_DISCOVERY_SERVER", "c", 1);
-  const DdsOptions options = parse({}).client.dds();
+  const DdsOptions options = parse({}).client.dds(DdsRole::client);
   unsetenv("STILLMAP_DDS_PROFILE");
   unsetenv("STILLMAP_PEERS");
   unsetenv("STILLMAP_DISCOVERY_SERVER");
@@ -63,7 +63,7 @@ TEST(ClientArguments, TakeTheNetworkFromTheEnvironment) {
 }
 
 TEST(ClientArguments, RefuseAProfileThatDoesNotExist) {
-  EXPECT_THROW((void)parse({"--dds-profile", "pigeon"}).client.dds(), ConfigError);
+  EXPECT_THROW((void)parse({"--dds-profile", "pigeon"}).client.dds(DdsRole::client), ConfigError);
 }
 
 }  // namespace

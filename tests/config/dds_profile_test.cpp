@@ -20,6 +20,7 @@ using ::testing::IsSupersetOf;
 
 constexpr const char* whole_file =
     "transport: udp\nserver_port: 7500\nshared_memory: false\nshared_memory_mib: 8\n"
+    "client_shared_memory: true\n"
     "multicast: false\ninterfaces: [10.0.0.1]\npeers: [10.0.0.2, 'there:7412']\n"
     "discovery_server: 10.0.0.3\nsocket_buffer_bytes: 100000\nmax_datagram_bytes: 1400\n"
     "heartbeat_ms: 70\nrepair_delay_ms: 9\nlease_s: 33\nbulk_bytes_per_s: 500000\n";
@@ -27,6 +28,7 @@ constexpr const char* whole_file =
 TEST(DdsProfileFile, EveryFieldIsRead) {
   const DdsProfile profile = read_dds_profile(write_file("radio.yaml", whole_file));
   EXPECT_EQ(profile.server_port, 7500);
+  EXPECT_TRUE(profile.client_shared_memory);
   const DdsOptions& options = profile.options;
   EXPECT_EQ(options.transport, NetworkTransport::udp);
   EXPECT_FALSE(options.shared_memory);
@@ -125,6 +127,18 @@ TEST(DdsChoiceOptions, ADeploymentOverridesItsProfile) {
   EXPECT_EQ(client.socket_buffer_bytes, 70000U);
   EXPECT_EQ(client.listening_port, 0);
   EXPECT_EQ(dds_options(choice, DdsRole::server).listening_port, 7500);
+}
+
+TEST(DdsChoiceOptions, OnlySensorsAndTheServerShareMemoryWhereClientsMayHang) {
+  DdsChoice lan;
+  EXPECT_TRUE(dds_options(lan, DdsRole::server).shared_memory);
+  EXPECT_TRUE(dds_options(lan, DdsRole::sensor).shared_memory);
+  EXPECT_FALSE(dds_options(lan, DdsRole::client).shared_memory);
+  lan.shared_memory = true;
+  EXPECT_TRUE(dds_options(lan, DdsRole::client).shared_memory);
+  DdsChoice host;
+  host.profile = "host";
+  EXPECT_TRUE(dds_options(host, DdsRole::client).shared_memory);
 }
 
 TEST(DdsChoiceOptions, WhatIsNotGivenStaysAsTheProfileHasIt) {

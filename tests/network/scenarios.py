@@ -8,6 +8,8 @@ from lab import Lab
 
 DOMAIN = "41"
 RATE_HZ = 10.0
+SHARED_MEMORY = ["--dds-profile",
+                 os.path.join(os.path.dirname(os.path.abspath(__file__)), "shared_memory.yaml")]
 
 
 class Setup:
@@ -180,7 +182,8 @@ def stopped(program):
 
 def dead_over_shared_memory(setup):
     return beside(setup, ["--dds-profile", "lan"],
-                  lambda play, lab, flags: stopped(play.planners(play.home, settle_s=1)))
+                  lambda play, lab, flags: stopped(play.planners(play.home, flags=SHARED_MEMORY,
+                                                                 settle_s=1)))
 
 
 def dead_over_udp(setup):
@@ -200,7 +203,7 @@ def dead_over_tcp(setup):
 def slow_planner(setup):
     return beside(setup, ["--dds-profile", "lan"],
                   lambda play, lab, flags: play.planners(play.home, "--busy-ms", "300",
-                                                         settle_s=1))
+                                                         flags=SHARED_MEMORY, settle_s=1))
 
 
 def late_joiners(count):
@@ -212,7 +215,7 @@ def late_joiners(count):
             published = play.end_robot()
             office = lab.host("office")
             began = time.monotonic()
-            planners = play.planners(office, "--count", str(count), "--no-poses", "--udp-only",
+            planners = play.planners(office, "--count", str(count), "--no-poses",
                                      settle_s=120.0, ready=False)
             figures = play.figures(planners, published)
             figures.update(settled_s=time.monotonic() - began,
