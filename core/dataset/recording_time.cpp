@@ -64,8 +64,11 @@ std::optional<std::int64_t> stamp_ns_from_name(std::string_view stem) {
                                  digits_in_front(stem.substr(whole + 1)) == stem.size() - whole - 1;
     return decimals_follow ? ns_from_seconds(stem) : std::nullopt;
   }
+  // What comes later does not fit into 64 bits.
+  constexpr std::string_view latest = "9200000000000000000";
+  if (stem >= latest.substr(0, whole)) return std::nullopt;
   if (whole == 16) return value_of(stem) * 1000;
-  if (whole == 19 && stem < "9200000000000000000") {
+  if (whole == 19) {
     return value_of(stem.substr(0, 10)) * ns_per_s + value_of(stem.substr(10));
   }
   return std::nullopt;

@@ -64,8 +64,8 @@ DataWriterQos writer_qos(const TopicQos& qos, const DdsOptions& options) {
     out.publish_mode().kind = ASYNCHRONOUS_PUBLISH_MODE;
     out.publish_mode().flow_controller_name = bulk_pace;
   }
-  // Instances of many sizes come and go: what is forgotten is to be free.
-  if (qos.max_keys > 1) {
+  // Of many sizes: each place for a sample would keep the room of the largest that it ever had.
+  if (qos.max_keys > 1 || qos.bulky) {
     out.endpoint().history_memory_policy = eprosima::fastrtps::rtps::DYNAMIC_RESERVE_MEMORY_MODE;
   }
   // Who has an instance that is forgotten here, keeps it.
