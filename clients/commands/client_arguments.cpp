@@ -50,8 +50,10 @@ void add_client_options(CommandHandle command, ClientArguments& arguments) {
   add_network_options(command, arguments.network);
   command.option("--server", arguments.server_name, "First part of the server's topic names")
       .with_default();
-  command.flag("--udp-only", arguments.udp_only,
-               "No shared memory: the server runs as another user or in a container");
+  command.flag(
+      "--udp-only", arguments.udp_only,
+      "No shared memory, where the profile has it: the server runs as another user or in a "
+      "container");
   command
       .option("--security", arguments.security,
               "Folder of our identity in a secured domain (stillmap security init)")
