@@ -68,6 +68,10 @@ DataWriterQos writer_qos(const TopicQos& qos, const DdsOptions& options) {
   if (qos.max_keys > 1 || qos.bulky) {
     out.endpoint().history_memory_policy = eprosima::fastrtps::rtps::DYNAMIC_RESERVE_MEMORY_MODE;
   }
+  // Readers filter for themselves: Fast DDS's writers crash when a reader with a filter goes while
+  // they write (its issue 4878).
+  out.writer_resource_limits().reader_filters_allocation.initial = 0;
+  out.writer_resource_limits().reader_filters_allocation.maximum = 0;
   // Who has an instance that is forgotten here, keeps it.
   out.writer_data_lifecycle().autodispose_unregistered_instances = false;
   return out;

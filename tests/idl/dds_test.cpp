@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <set>
 #include <thread>
+#include <vector>
 
 #include "idl/conversions/pose.hpp"
 #include "idl/conversions/tile.hpp"
@@ -82,6 +84,28 @@ TEST_P(OverTransport, FilteredReadersGetTheirTilesOnly) {
   expect_region(reader, 1);
   write_all(2);
   expect_region(reader, 2);
+}
+
+// With the filters at work in the writer, Fast DDS crashed here within a second.
+TEST_P(OverTransport, OutlivesFilteredReadersThatComeAndGo) {
+  const auto topic = Topics::in("stillmap").tile_index;
+  const ContentFilter filter{.expression = "tile_x BETWEEN %0 AND %1", .parameters = {"-2", "1"}};
+  Writer<stillmap_msgs::msg::TileInfo> writer(here_, topic.dds_name, topic.writer);
+  std::jthread writing([&](const std::stop_token& stop) {
+    for (std::uint64_t i = 0; !stop.stop_requested(); ++i) {
+      const TileId id{static_cast<std::int32_t>(i % 8) - 4, 0};
+      static_cast<void>(writer.write(wire::to_wire(tile_info(id, i), MapIdentity())));
+    }
+  });
+  stillmap_msgs::msg::TileInfo message;
+  for (int i = 0; i < 40; ++i) {
+    std::vector<std::unique_ptr<Reader<stillmap_msgs::msg::TileInfo>>> readers;
+    for (int k = 0; k < 4; ++k) {
+      readers.push_back(std::make_unique<Reader<stillmap_msgs::msg::TileInfo>>(
+          there_, topic.dds_name, topic.reader, filter));
+    }
+    EXPECT_TRUE(readers.front()->take(message, {}, patience));
+  }
 }
 
 TEST_P(OverTransport, RefusesFiltersThatDoNotFitTheType) {
