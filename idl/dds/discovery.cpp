@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <sstream>
 #include <string>
 #include <system_error>
@@ -149,16 +150,27 @@ bool is_udp_port_used(std::int32_t port) {
   return used;
 }
 
-/// Whether a process has one of the participant's ports, or was killed and left its shared memory.
-bool is_taken(std::uint32_t domain_id, std::int32_t participant_id) {
-  // Ports as the standard maps them: discovery, and data.
-  const std::int32_t first = 7400 + 250 * static_cast<std::int32_t>(domain_id) + 10;
-  for (const std::int32_t port : {first + 2 * participant_id, first + 2 * participant_id + 1}) {
-    std::error_code unreadable;
-    const std::string file = "/dev/shm/fastrtps_port" + std::to_string(port);
-    if (std::filesystem::exists(file, unreadable) || is_udp_port_used(port)) return true;
-  }
-  return false;
+bool has_shared_memory(std::int32_t port) {
+  std::error_code unreadable;
+  return std::filesystem::exists("/dev/shm/fastrtps_port" + std::to_string(port), unreadable);
+}
+
+/// What is known of a participant's two ports.
+enum class Ports {
+  fresh,
+  /// A process that was killed, or that the server outlived, left its shared memory.
+  left,
+  /// By a living process, which may be this one.
+  used
+};
+
+Ports ports_of(std::uint32_t domain_id, std::int32_t participant_id) {
+  // As the standard maps them: discovery, and data.
+  const std::int32_t discovery =
+      7400 + 250 * static_cast<std::int32_t>(domain_id) + 10 + 2 * participant_id;
+  const std::int32_t data = discovery + 1;
+  if (is_udp_port_used(discovery) || is_udp_port_used(data)) return Ports::used;
+  return has_shared_memory(discovery) || has_shared_memory(data) ? Ports::left : Ports::fresh;
 }
 
 /// Ports that nobody had, as far as there are any. By default a process gets those of the last one
@@ -171,13 +183,16 @@ std::int32_t fresh_participant_id(std::uint32_t domain_id) {
   constexpr std::uint32_t highest_domain = 232;
   const std::int32_t ids = (domain_id == highest_domain ? 60 : 120) - first;
   static std::atomic<std::int32_t> made_here{0};
-  std::int32_t id = 0;
+  std::optional<std::int32_t> left;
   for (int tried = 0; tried < ids; ++tried) {
     // Never the same one twice in a row: two of one process must differ.
-    id = first + (::getpid() + made_here++) % ids;
-    if (!is_taken(domain_id, id)) break;
+    const std::int32_t id = first + (::getpid() + made_here++) % ids;
+    const Ports ports = ports_of(domain_id, id);
+    if (ports == Ports::fresh) return id;
+    if (ports == Ports::left) left = id;
   }
-  return id;
+  constexpr std::int32_t as_fast_dds_likes = -1;
+  return left.value_or(as_fast_dds_likes);
 }
 
 }  // namespace
