@@ -28,6 +28,16 @@ ScanPublisher::ScanPublisher(ScanPublisher&&) noexcept = default;
 ScanPublisher& ScanPublisher::operator=(ScanPublisher&&) noexcept = default;
 
 bool ScanPublisher::wait_for_subscriber(std::chrono::milliseconds timeout) {
+  const ScanPublisherOptions options = connection_->options;
+  if (options.dds.transport == NetworkTransport::tcp) {
+    // With Fast DDS 2.9, one of twenty processes never finds the other over TCP; a new one does.
+    constexpr std::chrono::milliseconds first_try{4000};
+    for (auto patience = first_try; 2 * patience <= timeout; timeout -= patience, patience *= 2) {
+      if (connection_->writer.readers().wait_for_any(patience)) return true;
+      connection_.reset();
+      connection_ = std::make_unique<Connection>(options);
+    }
+  }
   return connection_->writer.readers().wait_for_any(timeout);
 }
 

@@ -34,7 +34,7 @@ class ScanPublisher {
   ScanPublisher(ScanPublisher&&) noexcept;
   ScanPublisher& operator=(ScanPublisher&&) noexcept;
 
-  /// True once a subscriber matched; false after `timeout`.
+  /// True once a subscriber matched; false after `timeout`. Over TCP it may join the domain anew.
   [[nodiscard]] bool wait_for_subscriber(std::chrono::milliseconds timeout);
 
   /// Subscribers matched now.

@@ -69,7 +69,8 @@ class PoseAges {
 class Planner {
  public:
   Planner(const Arguments& arguments, const ClientOptions& options)
-      : client_(options),
+      : client_(options.dds.transport == NetworkTransport::tcp ? connect(arguments.client)
+                                                               : Client(options)),
         busy_(arguments.busy_ms),
         tiles_subscription_(client_.subscribe_tiles(
             [this](const MapIdentity&, const Tile& tile) { note(tile.info); })) {
