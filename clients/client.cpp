@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "clients/connection.hpp"
+#include "clients/tcp_patience.hpp"
 #include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"
 
@@ -31,7 +32,25 @@ void append_page(const MapQueryResult& page, MapQueryResult& whole) {
 
 }  // namespace
 
-Client::Client(const ClientOptions& options) : connection_(std::make_unique<Connection>(options)) {}
+std::unique_ptr<Client::Connection> Client::connect(const ClientOptions& options) {
+  auto connection = std::make_unique<Connection>(options);
+  if (options.dds.transport != NetworkTransport::tcp) return connection;
+  // Before anything subscribes through the connection, another can take its place.
+  TcpPatience patience(options.dds);
+  const auto deadline = TcpPatience::Clock::now() + options.request_timeout;
+  while (connection->get_status.refusal().empty()) {
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(deadline - TcpPatience::Clock::now());
+    if (connection->get_status.ask(GetStatus_Request(), patience.wait(left))) break;
+    if (TcpPatience::Clock::now() >= deadline) break;
+    if (!patience.is_over()) continue;
+    connection.reset();
+    connection = std::make_unique<Connection>(options);
+  }
+  return connection;
+}
+
+Client::Client(const ClientOptions& options) : connection_(connect(options)) {}
 Client::~Client() = default;
 Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;

@@ -104,7 +104,9 @@ struct RegionNews {
 /// when the server refuses.
 class Client {
  public:
-  /// Joins the domain. Throws DdsError when the domain or an interface cannot be used.
+  /// Joins the domain; over TCP it also waits for the server, up to `request_timeout`, and joins
+  /// anew after 4, 8, 16 s without one. Throws DdsError when the domain or an interface cannot be
+  /// used.
   explicit Client(const ClientOptions& options = {});
   ~Client();
   Client(Client&&) noexcept;
@@ -212,7 +214,10 @@ class Client {
       std::function<void(const Scan&)> scan_arrived);
 
  private:
+  friend class ScanPublisher;
   struct Connection;
+  [[nodiscard]] static std::unique_ptr<Connection> connect(const ClientOptions& options);
+
   std::unique_ptr<Connection> connection_;
 };
 

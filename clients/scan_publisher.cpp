@@ -1,5 +1,6 @@
 #include "clients/scan_publisher.hpp"
 
+#include "clients/connection.hpp"
 #include "idl/conversions/scan_to_cloud.hpp"
 #include "idl/dds/writer.hpp"
 #include "idl/topics.hpp"
@@ -9,36 +10,54 @@ namespace stillmap {
 struct ScanPublisher::Connection {
   explicit Connection(const ScanPublisherOptions& publisher_options)
       : options(publisher_options),
-        participant(options.dds),
-        topic(points_topic(options.points_topic,
-                           options.lossless ? DeliveryMode::every : DeliveryMode::latest,
-                           options.scans_under_way)),
-        writer(participant, topic.dds_name, topic.writer) {}
+        own(std::make_unique<Participant>(options.dds)),
+        topic(topic_of(options)),
+        writer(*own, topic.dds_name, topic.writer) {}
+
+  Connection(Participant& shared, const ScanPublisherOptions& publisher_options)
+      : options(publisher_options),
+        topic(topic_of(options)),
+        writer(shared, topic.dds_name, topic.writer) {}
+
+  static TopicSpec<sensor_msgs::msg::PointCloud2> topic_of(const ScanPublisherOptions& options) {
+    return points_topic(options.points_topic,
+                        options.lossless ? DeliveryMode::every : DeliveryMode::latest,
+                        options.scans_under_way);
+  }
 
   ScanPublisherOptions options;
-  Participant participant;
+  std::unique_ptr<Participant> own;
   TopicSpec<sensor_msgs::msg::PointCloud2> topic;
   Writer<sensor_msgs::msg::PointCloud2> writer;
 };
 
 ScanPublisher::ScanPublisher(const ScanPublisherOptions& options)
-    : connection_(std::make_unique<Connection>(options)) {}
+    : connection_(std::make_unique<Connection>(options)), patience_(options.dds) {}
+
+ScanPublisher::ScanPublisher(Client& client, const ScanPublisherOptions& options)
+    : connection_(options.dds.transport == NetworkTransport::tcp
+                      ? std::make_unique<Connection>(client.connection_->participant, options)
+                      : std::make_unique<Connection>(options)),
+      patience_(options.dds) {}
+
 ScanPublisher::~ScanPublisher() = default;
 ScanPublisher::ScanPublisher(ScanPublisher&&) noexcept = default;
 ScanPublisher& ScanPublisher::operator=(ScanPublisher&&) noexcept = default;
 
 bool ScanPublisher::wait_for_subscriber(std::chrono::milliseconds timeout) {
-  const ScanPublisherOptions options = connection_->options;
-  if (options.dds.transport == NetworkTransport::tcp) {
-    // With Fast DDS 2.9, one of twenty processes never finds the other over TCP; a new one does.
-    constexpr std::chrono::milliseconds first_try{4000};
-    for (auto patience = first_try; 2 * patience <= timeout; timeout -= patience, patience *= 2) {
-      if (connection_->writer.readers().wait_for_any(patience)) return true;
-      connection_.reset();
-      connection_ = std::make_unique<Connection>(options);
-    }
+  // A client's connection has been found to work.
+  if (!connection_->own) return connection_->writer.readers().wait_for_any(timeout);
+  const auto deadline = TcpPatience::Clock::now() + timeout;
+  while (true) {
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(deadline - TcpPatience::Clock::now());
+    if (connection_->writer.readers().wait_for_any(patience_.wait(left))) return true;
+    if (TcpPatience::Clock::now() >= deadline) return false;
+    if (!patience_.is_over()) continue;
+    const ScanPublisherOptions options = connection_->options;
+    connection_.reset();
+    connection_ = std::make_unique<Connection>(options);
   }
-  return connection_->writer.readers().wait_for_any(timeout);
 }
 
 int ScanPublisher::subscribers() const { return connection_->writer.readers().count(); }

@@ -7,10 +7,13 @@
 #include <span>
 #include <string>
 
+#include "clients/tcp_patience.hpp"
 #include "core/lidar/scan.hpp"
 #include "idl/dds/dds_options.hpp"
 
 namespace stillmap {
+
+class Client;
 
 struct ScanPublisherOptions {
   DdsOptions dds;
@@ -30,11 +33,16 @@ class ScanPublisher {
  public:
   /// Joins the domain. Throws DdsError when the domain or an interface cannot be used.
   explicit ScanPublisher(const ScanPublisherOptions& options = {});
+
+  /// The same; over TCP it shares the connection of a client, who must outlive it.
+  ScanPublisher(Client& client, const ScanPublisherOptions& options);
+
   ~ScanPublisher();
   ScanPublisher(ScanPublisher&&) noexcept;
   ScanPublisher& operator=(ScanPublisher&&) noexcept;
 
-  /// True once a subscriber matched; false after `timeout`. Over TCP it may join the domain anew.
+  /// True once a subscriber matched; false after `timeout`. Over TCP, without a client's
+  /// connection, it joins the domain anew when it has found nobody for 4 s, then 8 s, 16 s.
   [[nodiscard]] bool wait_for_subscriber(std::chrono::milliseconds timeout);
 
   /// Subscribers matched now.
@@ -54,6 +62,7 @@ class ScanPublisher {
  private:
   struct Connection;
   std::unique_ptr<Connection> connection_;
+  TcpPatience patience_;
 };
 
 }  // namespace stillmap

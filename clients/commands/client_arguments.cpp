@@ -1,19 +1,8 @@
 #include "clients/commands/client_arguments.hpp"
 
+#include <algorithm>
+
 namespace stillmap {
-namespace {
-
-// With Fast DDS 2.9, one of twenty processes never finds the other over TCP; a new one does.
-constexpr std::chrono::milliseconds first_tcp_try{4000};
-
-bool answers_within(Client& client, std::chrono::milliseconds patience) try {
-  client.wait_for_server(patience);
-  return true;
-} catch (const ServiceTimeout&) {
-  return false;
-}
-
-}  // namespace
 
 std::chrono::milliseconds ClientArguments::timeout() const {
   return std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * timeout_s));
@@ -77,16 +66,13 @@ void add_client_options(CommandHandle command, ClientArguments& arguments) {
 }
 
 Client connect(const ClientArguments& arguments) {
-  const ClientOptions options = arguments.client();
-  std::chrono::milliseconds left = arguments.timeout();
-  if (options.dds.transport == NetworkTransport::tcp) {
-    for (auto patience = first_tcp_try; 2 * patience <= left; left -= patience, patience *= 2) {
-      Client client(options);
-      if (answers_within(client, patience)) return client;
-    }
-  }
-  Client client(options);
-  client.wait_for_server(left);
+  const auto began = std::chrono::steady_clock::now();
+  Client client(arguments.client());
+  // Over TCP it has waited already.
+  const auto waited =
+      std::chrono::floor<std::chrono::milliseconds>(std::chrono::steady_clock::now() - began);
+  constexpr std::chrono::milliseconds shortest{500};
+  client.wait_for_server(std::max(arguments.timeout() - waited, shortest));
   return client;
 }
 

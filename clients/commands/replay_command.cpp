@@ -83,9 +83,9 @@ Outcome replay(const Arguments& arguments, StopSignal& stop) {
   (void)arguments.replay.range.end(dataset);
   Client client = connect(arguments.client);
   PoseLog poses(client);
-  ScanPublisher publisher({.dds = arguments.client.dds(DdsRole::sensor),
-                           .points_topic = arguments.topic,
-                           .lossless = arguments.lossless});
+  ScanPublisher publisher(client, {.dds = arguments.client.dds(DdsRole::sensor),
+                                   .points_topic = arguments.topic,
+                                   .lossless = arguments.lossless});
   require_subscribers(publisher, arguments, stop);
   const ServerStatus before = client.status();
   if (arguments.lossless) require_lossless(before);

@@ -3,6 +3,7 @@
 #include <fastdds/rtps/transport/TCPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/UDPv4TransportDescriptor.h>
 #include <fastdds/rtps/transport/shared_mem/SharedMemTransportDescriptor.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -47,6 +48,26 @@ std::shared_ptr<TransportDescriptorInterface> udp_transport(const DdsOptions& op
   return udp;
 }
 
+/// One that nobody listens at now; 0 when there is none.
+std::uint16_t free_tcp_port() {
+  const int probe = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  auto* const any_address = reinterpret_cast<sockaddr*>(&address);
+  socklen_t length = sizeof address;
+  const bool found = probe >= 0 && ::bind(probe, any_address, length) == 0 &&
+                     ::getsockname(probe, any_address, &length) == 0;
+  if (probe >= 0) ::close(probe);
+  return found ? ntohs(address.sin_port) : std::uint16_t{0};
+}
+
+/// What tells a participant from all others at its address. Fast DDS would take the process's
+/// number: the same one for two participants of a process, and for processes in containers of
+/// different machines, whose answers then go to one of them.
+std::uint16_t tcp_port_of(const DdsOptions& options) {
+  return options.listening_port != 0 ? options.listening_port : free_tcp_port();
+}
+
 std::shared_ptr<TransportDescriptorInterface> tcp_transport(const DdsOptions& options) {
   const auto tcp = std::make_shared<TCPv4TransportDescriptor>();
   tcp->sendBufferSize = tcp->receiveBufferSize = options.socket_buffer_bytes;
@@ -56,7 +77,7 @@ std::shared_ptr<TransportDescriptorInterface> tcp_transport(const DdsOptions& op
   tcp->enable_tcp_nodelay = true;
   // TCP has checksums of its own.
   tcp->calculate_crc = tcp->check_crc = false;
-  if (options.listening_port != 0) tcp->add_listener_port(options.listening_port);
+  if (const std::uint16_t port = tcp_port_of(options); port != 0) tcp->add_listener_port(port);
   return tcp;
 }
 

@@ -109,6 +109,7 @@ bool wait_for_readers(const MatchedReaders& readers, int count) {
 
 void run_scans(const Network& network, int rate_hz, int count) {
   Participant participant(options_of(network, DdsRole::server, domain_id));
+  const auto confirming = confirm_connections(participant);
   const auto topic = points_topic("points", DeliveryMode::latest, 3);
   Writer<PointCloud2> writer(participant, topic.dds_name, topic.writer);
   std::vector<std::unique_ptr<Child>> subscribers;
@@ -134,8 +135,8 @@ void run_scans(const Network& network, int rate_hz, int count) {
 
 void run_queries(const Network& network, const char* name, std::uint32_t bytes, int count) {
   const Child server("--answer", network.name, "w");
-  Participant participant(options_of(network, DdsRole::client, domain_id));
-  ServiceClient<GetStaticMap_Request, GetStaticMap_Response> client(participant,
+  const auto participant = join(options_of(network, DdsRole::client, domain_id));
+  ServiceClient<GetStaticMap_Request, GetStaticMap_Response> client(*participant,
                                                                     "bench/get_static_map");
   GetStaticMap_Request request;
   request.max_bytes(bytes);

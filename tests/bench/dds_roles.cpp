@@ -7,11 +7,11 @@
 #include <cstdio>
 #include <iostream>
 
+#include "clients/tcp_patience.hpp"
 #include "idl/dds/reader.hpp"
-#include "idl/dds/service_server.hpp"
+#include "idl/dds/service_client.hpp"
 #include "idl/topics.hpp"
 #include "sensor_msgs.h"
-#include "stillmap_msgs.h"
 #include "tests/bench/dds_samples.hpp"
 
 namespace stillmap::bench {
@@ -19,6 +19,14 @@ namespace stillmap::bench {
 using namespace std::chrono_literals;
 using stillmap_msgs::srv::GetStaticMap_Request;
 using stillmap_msgs::srv::GetStaticMap_Response;
+using stillmap_msgs::srv::GetStatus_Request;
+using stillmap_msgs::srv::GetStatus_Response;
+
+namespace {
+
+constexpr const char* is_connected = "bench/is_connected";
+
+}  // namespace
 
 std::vector<Network> networks() {
   DdsChoice host;
@@ -45,11 +53,29 @@ DdsOptions options_of(const Network& network, DdsRole role, std::uint32_t domain
   return options;
 }
 
+std::unique_ptr<IsConnectedService> confirm_connections(Participant& participant) {
+  return std::make_unique<IsConnectedService>(
+      participant, is_connected, [](const GetStatus_Request&) { return GetStatus_Response(); });
+}
+
+std::unique_ptr<Participant> join(const DdsOptions& options) {
+  TcpPatience patience(options);
+  while (true) {
+    auto participant = std::make_unique<Participant>(options);
+    if (options.transport != NetworkTransport::tcp) return participant;
+    ServiceClient<GetStatus_Request, GetStatus_Response> client(*participant, is_connected);
+    while (!patience.is_over()) {
+      if (client.ask(GetStatus_Request(), patience.wait(1h))) return participant;
+    }
+  }
+}
+
 void subscribe(const DdsOptions& options) {
   // Over TCP, Fast DDS 2.9 may neither connect nor end; the run goes on without this subscriber.
   constexpr unsigned int longest_life_s = 90;
   ::alarm(longest_life_s);
-  Participant participant(options);
+  const std::unique_ptr<Participant> joined = join(options);
+  Participant& participant = *joined;
   const auto topic = points_topic("points", DeliveryMode::latest, 3);
   Reader<sensor_msgs::msg::PointCloud2> reader(participant, topic.dds_name, topic.reader);
   sensor_msgs::msg::PointCloud2 cloud;
@@ -65,6 +91,7 @@ void subscribe(const DdsOptions& options) {
 
 void answer(const DdsOptions& options) {
   Participant participant(options);
+  const auto confirming = confirm_connections(participant);
   const ServiceServer<GetStaticMap_Request, GetStaticMap_Response> server(
       participant, "bench/get_static_map",
       [](const GetStaticMap_Request& request) { return map_of(request.max_bytes()); });

@@ -1,9 +1,12 @@
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "config/dds_profile.hpp"
+#include "idl/dds/service_server.hpp"
+#include "stillmap_msgs.h"
 
 namespace stillmap::bench {
 
@@ -19,6 +22,14 @@ struct Network {
 
 /// The options of one end. All of a run share a domain.
 [[nodiscard]] DdsOptions options_of(const Network& network, DdsRole role, std::uint32_t domain_id);
+
+/// Answers `is_connected`.
+using IsConnectedService =
+    ServiceServer<stillmap_msgs::srv::GetStatus_Request, stillmap_msgs::srv::GetStatus_Response>;
+[[nodiscard]] std::unique_ptr<IsConnectedService> confirm_connections(Participant& participant);
+
+/// A client's participant; over TCP one to whom the server's process has answered, as Client is.
+[[nodiscard]] std::unique_ptr<Participant> join(const DdsOptions& options);
 
 /// A subscriber process: prints each scan's latency [ms], a line each. Ends with the last scan, or
 /// a second after nothing comes any more.

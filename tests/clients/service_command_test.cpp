@@ -72,6 +72,17 @@ TEST_F(ServiceCommandTest, ReplayOverDdsGivesThePosesThatMapGives) {
   EXPECT_TRUE(exists("server.stillmap"));
 }
 
+TEST_F(ServiceCommandTest, ReplayWorksOverTcp) {
+  simulate("city", 4);
+  std::ofstream(path("wan.yaml")) << "transport: tcp\nserver_port: " << 20000 + domain_ << "\n";
+  const std::string over_tcp = " --dds-profile " + path("wan.yaml");
+  BackgroundProcess server(server_command("--delivery every") + over_tcp, folder_ / "server.log");
+  const ProcessResult replay = run("replay " + path("city") + " --lossless --json --timeout 60" +
+                                   over_tcp + " --peer 127.0.0.1" + on_domain());
+  ASSERT_EQ(replay.exit_code, 0) << replay.err << content("server.log");
+  EXPECT_EQ(nlohmann::json::parse(replay.out).at("mapped"), 4);
+}
+
 TEST_F(ServiceCommandTest, WatchFollowsThePosesOfAReplay) {
   simulate("city", 8);
   BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");

@@ -147,6 +147,22 @@ TEST(Network, TcpClientsFindTheServer) {
   expect_large_clouds_arrive(b, a);
 }
 
+TEST(Network, TcpClientsOfOneProcessAreToldApart) {
+  DdsOptions server = loopback(false);
+  server.transport = NetworkTransport::tcp;
+  server.listening_port = test_port();
+  DdsOptions client = server;
+  client.listening_port = 0;
+  client.peers = {{"127.0.0.1", server.listening_port}};
+  Participant a(server);
+  Participant b(client);
+  Participant c(client);
+  expect_large_clouds_arrive(a, b);
+  expect_large_clouds_arrive(c, a);
+  expect_large_clouds_arrive(a, c);
+  expect_large_clouds_arrive(b, a);
+}
+
 TEST(Network, ADiscoveryServerIntroducesItsClients) {
   DdsOptions registry = loopback(false);
   registry.discovery_port = test_port();

@@ -69,8 +69,7 @@ class PoseAges {
 class Planner {
  public:
   Planner(const Arguments& arguments, const ClientOptions& options)
-      : client_(options.dds.transport == NetworkTransport::tcp ? connect(arguments.client)
-                                                               : Client(options)),
+      : client_(options),
         busy_(arguments.busy_ms),
         tiles_subscription_(client_.subscribe_tiles(
             [this](const MapIdentity&, const Tile& tile) { note(tile.info); })) {

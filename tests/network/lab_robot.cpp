@@ -5,6 +5,7 @@
 #include <thread>
 #include <vector>
 
+#include "clients/client.hpp"
 #include "clients/commands/client_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/scan_publisher.hpp"
@@ -45,7 +46,8 @@ std::size_t to_and_fro(std::size_t step, std::size_t frames) {
 ExitCode drive(const Arguments& arguments) {
   StopSignal stop;
   std::vector<DatasetFrame> frames = read_frames(arguments);
-  ScanPublisher publisher({.dds = arguments.client.dds(DdsRole::sensor)});
+  Client client(arguments.client.client());
+  ScanPublisher publisher(client, {.dds = arguments.client.dds(DdsRole::sensor)});
   if (!publisher.wait_for_subscriber(arguments.client.timeout())) return ExitCode::no_server;
   const auto period = std::chrono::duration<double>(1.0 / arguments.rate_hz);
   const auto began = Clock::now();
