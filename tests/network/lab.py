@@ -177,8 +177,11 @@ class Lab:
     def __exit__(self, *_):
         for program in reversed(self.programs):
             program.end()
-        for name in self.hosts:
-            subprocess.run(["ip", "netns", "del", name], capture_output=True)
+        for host in self.hosts.values():
+            # The kernel removes a namespace and its cable some time later; the next lab's has the
+            # same name.
+            subprocess.run(["ip", "link", "del", host.port], capture_output=True)
+            subprocess.run(["ip", "netns", "del", host.name], capture_output=True)
         run("ip", "link", "del", "switch")
         shutil.rmtree(self.folder)
 

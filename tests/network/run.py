@@ -118,7 +118,12 @@ def main():
             continue
         if arguments.only and arguments.only not in name:
             continue
-        figures = scenario(setup)
+        try:
+            figures = scenario(setup)
+        except (RuntimeError, OSError, subprocess.CalledProcessError) as error:
+            failed = True
+            print(f"  FAILED: {name}: {error}", flush=True)
+            continue
         undisturbed = undisturbed or figures
         print_row(row_of(name, figures))
         for fault in faults_of(figures, longest_gap_s, undisturbed):
