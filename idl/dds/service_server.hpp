@@ -23,10 +23,13 @@ concept CarriesRefusal = requires(Reply reply) {
 template <typename Request, typename Reply>
 class ServiceServer {
  public:
-  /// `answer` must not throw. Throws DdsError when the topics cannot be made.
-  ServiceServer(Participant& participant, const std::string& service,
-                std::function<Reply(const Request&)> answer)
+  /// `answer` and `idle`, called once a second while nobody asks, must not throw. Throws DdsError
+  /// when the topics cannot be made.
+  ServiceServer(
+      Participant& participant, const std::string& service,
+      std::function<Reply(const Request&)> answer, std::function<void()> idle = [] {})
       : answer_(std::move(answer)),
+        idle_(std::move(idle)),
         port_(participant, service, type_support<Request>(), type_support<Reply>()),
         thread_([this](const std::stop_token& stop) { serve(stop); }) {}
 
@@ -35,7 +38,10 @@ class ServiceServer {
     Request request;
     while (!stop.stop_requested()) {
       const auto call = port_.take(&request, stop, std::chrono::seconds(1));
-      if (!call) continue;
+      if (!call) {
+        idle_();
+        continue;
+      }
       if (call->is_readable) {
         const Reply reply = answer_(request);
         port_.answer(*call, &reply);
@@ -57,6 +63,7 @@ class ServiceServer {
   }
 
   std::function<Reply(const Request&)> answer_;
+  std::function<void()> idle_;
   ServicePort port_;
   // Last: stops before what it uses is gone.
   std::jthread thread_;

@@ -1,12 +1,11 @@
 #include "server/services/get_static_map.hpp"
 
 #include <algorithm>
+#include <utility>
 
 namespace stillmap {
 namespace {
 
-// Clients that page through the map at the same time. Views share what did not change.
-constexpr std::size_t most_paged_views = 16;
 // Larger pages take too long on a slow network; a client that wants more gets more pages.
 constexpr std::uint32_t largest_page_bytes = 8'000'000;
 
@@ -22,22 +21,29 @@ stillmap_msgs::srv::GetStaticMap_Response GetStaticMap::operator()(
     const MapState state = state_for(*query);
     const MapQueryResult result =
         query_map(*state.view, *query, state.history.get(), context_.tiles);
-    if (!result.continuation.empty()) keep(state.view);
+    note(*query, result, state.view);
     response = wire::to_response(result);
   });
 }
 
 MapState GetStaticMap::state_for(const MapQuery& query) const {
   const auto version = continuation_version(query.continuation);
-  const auto is_it = [&](const auto& view) { return version && view->version == *version; };
-  const auto kept = std::ranges::find_if(paged_views_, is_it);
-  return kept == paged_views_.end() ? context_.board.state() : MapState{*kept, nullptr};
+  auto view = version ? paged_views_.find(*version) : nullptr;
+  return view ? MapState{std::move(view), nullptr} : context_.board.state();
 }
 
-void GetStaticMap::keep(const std::shared_ptr<const MapView>& view) {
-  std::erase(paged_views_, view);
-  paged_views_.push_front(view);
-  if (paged_views_.size() > most_paged_views) paged_views_.pop_back();
+void GetStaticMap::note(const MapQuery& query, const MapQueryResult& result,
+                        const PagedViews::View& view) {
+  const auto now = PagedViews::Clock::now();
+  const bool is_first = query.continuation.empty();
+  if (result.continuation.empty()) {
+    if (!is_first) paged_views_.end(view);
+  } else if (is_first) {
+    paged_views_.begin(view, now);
+  } else {
+    paged_views_.go_on(view, now);
+  }
+  paged_views_.forget_abandoned(now);
 }
 
 }  // namespace stillmap

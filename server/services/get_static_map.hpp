@@ -1,14 +1,12 @@
 #pragma once
 
-#include <deque>
-#include <memory>
-
+#include "server/services/paged_views.hpp"
 #include "server/services/service_context.hpp"
 
 namespace stillmap {
 
 /// A region of the static map, in pages. All pages of an answer show the map as it was at the
-/// first: the views of the last unfinished answers are kept.
+/// first.
 class GetStaticMap {
  public:
   explicit GetStaticMap(const ServiceContext& context) : context_(context) {}
@@ -16,14 +14,16 @@ class GetStaticMap {
   [[nodiscard]] stillmap_msgs::srv::GetStaticMap_Response operator()(
       const stillmap_msgs::srv::GetStaticMap_Request& request);
 
+  /// To be called now and then when nobody asks.
+  void forget_abandoned() { paged_views_.forget_abandoned(PagedViews::Clock::now()); }
+
  private:
   /// A page after the first needs no history.
   [[nodiscard]] MapState state_for(const MapQuery& query) const;
-  void keep(const std::shared_ptr<const MapView>& view);
+  void note(const MapQuery& query, const MapQueryResult& result, const PagedViews::View& view);
 
   const ServiceContext& context_;
-  // Most recently used first.
-  std::deque<std::shared_ptr<const MapView>> paged_views_;
+  PagedViews paged_views_;
 };
 
 }  // namespace stillmap

@@ -20,7 +20,8 @@ ServiceDesk::ServiceDesk(Participant& participant, const Services& names, Servic
       static_map_(context_),
       get_static_map_(participant, names.get_static_map,
                       counted(context_.log, names.get_static_map,
-                              [this](const auto& request) { return static_map_(request); })),
+                              [this](const auto& request) { return static_map_(request); }),
+                      [this] { static_map_.forget_abandoned(); }),
       get_tile_versions_(
           participant, names.get_tile_versions,
           counted(context_.log, names.get_tile_versions,

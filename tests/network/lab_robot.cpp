@@ -1,7 +1,9 @@
 // A robot for network tests: publishes the scans of a recording again and again as a lidar driver
 // does, stamped with the time at which they leave.
 #include <chrono>
+#include <cmath>
 #include <cstdio>
+#include <numbers>
 #include <thread>
 #include <vector>
 
@@ -36,11 +38,13 @@ std::vector<DatasetFrame> read_frames(const Arguments& arguments) {
   return frames;
 }
 
-/// There and back, so that a recording of any length is a drive without a jump.
+/// There and back, so that a recording of any length is a drive without a jump; slowly at both
+/// ends, as no robot turns round at full speed between two scans.
 std::size_t to_and_fro(std::size_t step, std::size_t frames) {
+  const auto last = static_cast<double>(frames - 1);
   if (frames < 2) return 0;
-  const std::size_t place = step % (2 * frames - 2);
-  return place < frames ? place : 2 * frames - 2 - place;
+  const double phase = std::numbers::pi * static_cast<double>(step) / last;
+  return static_cast<std::size_t>(std::lround(0.5 * last * (1.0 - std::cos(phase))));
 }
 
 ExitCode drive(const Arguments& arguments) {
