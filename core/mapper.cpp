@@ -29,15 +29,15 @@ MapperConfig checked(const MapperConfig& config) {
 }  // namespace
 
 Mapper::Mapper(const MapperConfig& config, std::unique_ptr<LabelSource> label_source,
-               StageListener stage_ended)
-    : Mapper(config, std::make_unique<PatientFeed>(std::move(label_source)),
-             std::move(stage_ended)) {}
+               MapperListeners listeners)
+    : Mapper(config, std::make_unique<PatientFeed>(std::move(label_source)), std::move(listeners)) {
+}
 
 Mapper::Mapper(const MapperConfig& config, std::unique_ptr<LabelFeed> label_feed,
-               StageListener stage_ended)
+               MapperListeners listeners)
     : config_(checked(config)),
       label_feed_(std::move(label_feed)),
-      stage_ended_(std::move(stage_ended)),
+      listeners_(std::move(listeners)),
       odometry_(config.odometry, config.sensor),
       static_map_(config.static_map) {}
 
@@ -66,6 +66,7 @@ std::optional<MappedScan> Mapper::process(
   recall_map_near(T_map_lidar_expected.translation());
   Odometry::Step step = odometry_.add(scan, known.labels, T_map_lidar_prior);
   end_stage("odometry");
+  if (listeners_.pose_found) listeners_.pose_found(scan.stamp_ns, step.result);
 
   // The static map takes what stands still.
   MappedScan mapped{step.result,
@@ -231,7 +232,7 @@ void Mapper::recall_map_near(const Eigen::Vector3d& position_map) {
 }
 
 void Mapper::end_stage(std::string_view stage) const {
-  if (stage_ended_) stage_ended_(stage);
+  if (listeners_.stage_ended) listeners_.stage_ended(stage);
 }
 
 }  // namespace stillmap

@@ -50,6 +50,13 @@ struct ScanRejection {
 /// "static_map". The caller owns the clock.
 using StageListener = std::function<void(std::string_view stage)>;
 
+/// Who is told of a scan while it is in work; may be empty.
+struct MapperListeners {
+  StageListener stage_ended;
+  /// Its pose is known; the static map does not have it yet.
+  std::function<void(std::int64_t stamp_ns, const OdometryResult& odometry)> pose_found;
+};
+
 /// The way of a scan through the product: prepare, segment, register, split by motion, map. One
 /// thread calls it; nothing in it waits, reads a clock or owns a thread. With a label source (or a
 /// PatientFeed) the result depends on the scans alone.
@@ -57,11 +64,11 @@ class Mapper {
  public:
   /// Throws std::invalid_argument with `config.faults()`.
   Mapper(const MapperConfig& config, std::unique_ptr<LabelSource> label_source,
-         StageListener stage_ended = {});
+         MapperListeners listeners = {});
   /// With labels that may come late: scans without their own get carried ones, and late ones still
   /// tell the map what it is made of.
   Mapper(const MapperConfig& config, std::unique_ptr<LabelFeed> label_feed,
-         StageListener stage_ended = {});
+         MapperListeners listeners = {});
 
   /// Maps one scan. `T_map_lidar_prior` replaces the constant-velocity prediction. A scan that
   /// cannot be mapped leaves the mapper as it was and returns nothing; `last_rejection()` says why.
@@ -120,7 +127,7 @@ class Mapper {
 
   MapperConfig config_;
   std::unique_ptr<LabelFeed> label_feed_;
-  StageListener stage_ended_;
+  MapperListeners listeners_;
   Odometry odometry_;
   StaticMap static_map_;
   /// Tiles of a restored map, and where the odometry was last told of those nearby.

@@ -26,12 +26,13 @@ MapView in_memory(const MapView& map) {
 
 AreaThread::AreaThread(std::vector<RobotProfile> robots, std::chrono::duration<double> period,
                        const MapBoard& maps, AreaBoard& areas, Statistics& statistics,
-                       std::function<void()> updated)
+                       std::function<void()> updated, Pause pause)
     : period_(period),
       maps_(maps),
       areas_(areas),
       statistics_(statistics),
       updated_(std::move(updated)),
+      give_way_(std::move(pause)),
       traversability_(std::move(robots)) {
   show();
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
@@ -57,7 +58,7 @@ void AreaThread::work(const std::stop_token& stop) {
 void AreaThread::update(const MapView& map) {
   // One core only: its loops must not run on threads that keep their full priority.
   tbb::task_arena this_thread(1);
-  this_thread.execute([&] { static_cast<void>(traversability_.update(map)); });
+  this_thread.execute([&] { static_cast<void>(traversability_.update(map, give_way_)); });
   show();
   updated_();
 }

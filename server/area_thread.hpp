@@ -23,7 +23,7 @@ class AreaThread {
   /// at once. Throws std::invalid_argument for a robot with faults, or two of one name.
   AreaThread(std::vector<RobotProfile> robots, std::chrono::duration<double> period,
              const MapBoard& maps, AreaBoard& areas, Statistics& statistics,
-             std::function<void()> updated);
+             std::function<void()> updated, Pause pause = {});
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -38,6 +38,7 @@ class AreaThread {
   AreaBoard& areas_;
   Statistics& statistics_;
   std::function<void()> updated_;
+  Pause give_way_;
   TraversabilityMap traversability_;
   std::mutex pause_mutex_;
   std::condition_variable_any pause_;

@@ -53,7 +53,11 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSo
       mapper_(config.mapper,
               std::make_unique<PacedLabels>(std::move(label_source), label_budget(config), queue,
                                             statistics),
-              [this](std::string_view stage) { stage_ended(stage); }) {
+              {.stage_ended = [this](std::string_view stage) { stage_ended(stage); },
+               .pose_found =
+                   [this](std::int64_t stamp_ns, const OdometryResult& odometry) {
+                     pose_found(stamp_ns, odometry);
+                   }}) {
   if (stored && !stored->view.tiles.empty()) {
     go_on_with(*stored, shelf);
   } else {
@@ -176,9 +180,13 @@ void MappingThread::work(const std::stop_token& stop) {
 }
 
 void MappingThread::map(QueuedScan queued) {
+  std::optional<ScanTraffic::InWork> in_work;
+  if (outputs_.traffic != nullptr) in_work.emplace(*outputs_.traffic);
   const auto began = Clock::now();
   stage_began_ = began;
   labels_ms_ = 0.0;
+  frame_ = lidar_frame_.empty() ? queued.frame : lidar_frame_;
+  received_ = queued.received;
   statistics_.add_latency("queue", milliseconds(began - queued.received));
   const std::int64_t stamp_ns = queued.scan.stamp_ns;
   auto mapped = mapper_.process(std::move(queued.scan), prior_for(stamp_ns));
@@ -188,23 +196,21 @@ void MappingThread::map(QueuedScan queued) {
     warnings_.warn(rejection.counter, "scan dropped: " + rejection.reason);
     return;
   }
-  const std::string& frame = lidar_frame_.empty() ? queued.frame : lidar_frame_;
-  if (outputs_.poses != nullptr) outputs_.poses->publish(stamp_ns, mapped->odometry, frame);
   const bool unlabelled = mapped->labelled.labels.empty();
   board_.add_pose({stamp_ns, mapped->odometry.T_map_lidar}, mapped->odometry.health,
                   unlabelled ? "none" : mapper_.label_source());
   statistics_.scan_mapped(mapped->labelling);
   statistics_.add_latency("total", milliseconds(Clock::now() - queued.received));
-  hand_on(*std::move(mapped), frame);
+  hand_on(*std::move(mapped));
   statistics_.scan_took_besides_labels(milliseconds(Clock::now() - began) - labels_ms_);
 }
 
-void MappingThread::hand_on(MappedScan mapped, const std::string& frame) {
+void MappingThread::hand_on(MappedScan mapped) {
   const auto labelled = std::make_shared<const LabelledScan>(std::move(mapped.labelled));
   if (outputs_.occupancy != nullptr) {
     outputs_.occupancy->add({labelled, mapped.odometry.T_map_lidar, !mapped.unknown_may_move});
   }
-  if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frame);
+  if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frame_);
 }
 
 std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) const {
@@ -221,6 +227,11 @@ void MappingThread::stage_ended(std::string_view stage) {
   statistics_.add_latency(std::string(stage), ms);
   if (stage == "segment") labels_ms_ = ms;
   stage_began_ = now;
+}
+
+void MappingThread::pose_found(std::int64_t stamp_ns, const OdometryResult& odometry) {
+  if (outputs_.poses != nullptr) outputs_.poses->publish(stamp_ns, odometry, frame_);
+  statistics_.add_latency("pose", milliseconds(Clock::now() - received_));
 }
 
 void MappingThread::show_view() {

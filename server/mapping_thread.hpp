@@ -20,6 +20,7 @@
 #include "server/publishers/pose_publisher.hpp"
 #include "server/rare_warnings.hpp"
 #include "server/scan_queue.hpp"
+#include "server/scan_traffic.hpp"
 #include "server/statistics.hpp"
 
 namespace stillmap {
@@ -30,6 +31,7 @@ struct MappingOutputs {
   LabelledScanPublisher* scans = nullptr;
   const OdometryPrior* prior = nullptr;
   OccupancyThread* occupancy = nullptr;
+  ScanTraffic* traffic = nullptr;
 };
 
 /// The one thread that maps: takes scans from the queue, runs the mapper, and shows what became of
@@ -72,8 +74,10 @@ class MappingThread {
   void map(QueuedScan queued);
   /// Shows a new map, and has the octree begin with it.
   void begin_map(Trajectory trajectory);
-  void hand_on(MappedScan mapped, const std::string& frame);
+  void hand_on(MappedScan mapped);
   void stage_ended(std::string_view stage);
+  /// At once, before the map takes the scan: clients wait for it.
+  void pose_found(std::int64_t stamp_ns, const OdometryResult& odometry);
   /// In the thread that maps.
   void go_on_with(const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf);
   [[nodiscard]] std::optional<Eigen::Isometry3d> prior_for(std::int64_t stamp_ns) const;
@@ -92,6 +96,9 @@ class MappingThread {
   MappingOutputs outputs_;
   Mapper mapper_;
   RareWarnings warnings_;
+  /// Of the scan in work.
+  std::string frame_;
+  std::chrono::steady_clock::time_point received_;
   std::chrono::steady_clock::time_point stage_began_;
   double labels_ms_ = 0.0;
   std::chrono::steady_clock::time_point view_shown_;

@@ -6,10 +6,12 @@
 #include "server/background_thread.hpp"
 
 namespace stillmap {
-OccupancyThread::OccupancyThread(const OccupancyServing& config, Statistics& statistics)
+OccupancyThread::OccupancyThread(const OccupancyServing& config, Statistics& statistics,
+                                 Pause pause)
     : config_(config.map),
       capacity_(config.queue_length),
       statistics_(statistics),
+      pause_(std::move(pause)),
       map_(config.map),
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
@@ -94,7 +96,7 @@ void OccupancyThread::insert(const OccupancyScan& scan, bool clears) {
   {
     const std::scoped_lock lock(map_mutex_);
     map_.insert(*scan.labelled, scan.T_map_lidar,
-                {.clears = clears, .unknown_is_solid = scan.unknown_is_solid});
+                {.clears = clears, .unknown_is_solid = scan.unknown_is_solid}, pause_);
     stamp_ns_ = scan.labelled->scan.stamp_ns;
     ++changes_;
   }

@@ -33,7 +33,7 @@ struct EncodedOctree {
 /// ("occupancy_scans_left_out"). Thread-safe.
 class OccupancyThread {
  public:
-  OccupancyThread(const OccupancyServing& config, Statistics& statistics);
+  OccupancyThread(const OccupancyServing& config, Statistics& statistics, Pause pause = {});
 
   /// A new map begins, with the voxels of this view. Returns at once, as `add` does.
   void begin(std::shared_ptr<const MapView> view);
@@ -65,6 +65,7 @@ class OccupancyThread {
   OccupancyConfig config_;
   std::size_t capacity_;
   Statistics& statistics_;
+  Pause pause_;
   mutable std::mutex queue_mutex_;
   std::condition_variable_any queue_changed_;
   std::deque<Job> queue_;

@@ -83,12 +83,14 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
   if (!config.topics.odometry_prior.empty()) {
     prior_.emplace(participant_, config.topics.odometry_prior);
   }
-  if (config.occupancy.enabled) occupancy_.emplace(config.occupancy, statistics_);
+  if (config.occupancy.enabled)
+    occupancy_.emplace(config.occupancy, statistics_, give_way_to(scan_traffic_));
   OccupancyThread* const occupancy = occupancy_ ? &*occupancy_ : nullptr;
   const MappingOutputs outputs{.poses = &poses_,
                                .scans = scans_ ? &*scans_ : nullptr,
                                .prior = prior_ ? &*prior_ : nullptr,
-                               .occupancy = occupancy};
+                               .occupancy = occupancy,
+                               .traffic = &scan_traffic_};
   mapping_ = std::make_unique<MappingThread>(config, std::move(label_source),
                                              stored_map(saver_, config.map), saver_.shelf(), queue_,
                                              statistics_, board_, outputs);
@@ -174,9 +176,9 @@ void Server::start_areas(const ServerConfig& config) {
   const auto publish = [this] {
     if (area_publisher_) area_publisher_->publish();
   };
-  areas_ = std::make_unique<AreaThread>(std::move(robots),
-                                        std::chrono::duration<double>(config.areas.update_period_s),
-                                        board_, area_board_, statistics_, publish);
+  areas_ = std::make_unique<AreaThread>(
+      std::move(robots), std::chrono::duration<double>(config.areas.update_period_s), board_,
+      area_board_, statistics_, publish, give_way_to(scan_traffic_));
 }
 
 void Server::start_metrics(const MetricsConfig& config) {

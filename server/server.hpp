@@ -20,6 +20,7 @@
 #include "server/publishers/status_publisher.hpp"
 #include "server/rare_warnings.hpp"
 #include "server/scan_receiver.hpp"
+#include "server/scan_traffic.hpp"
 #include "server/server_report.hpp"
 #include "server/services/occupancy_desk.hpp"
 #include "server/services/removed_desk.hpp"
@@ -51,6 +52,7 @@ class Server {
   ServiceLog service_log_;
   MapBoard board_;
   ScanQueue queue_;
+  ScanTraffic scan_traffic_;
   MapSaver saver_;
   TileReader tiles_;
   Participant participant_;

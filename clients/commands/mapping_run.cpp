@@ -31,7 +31,8 @@ class MappingRun {
         scan_skipped_(scan_skipped),
         prepare_(config.prepare),
         mapper_(config, std::move(labels),
-                [this](std::string_view stage) { times_.end_stage(stage); }) {}
+                {.stage_ended = [this](std::string_view stage) { times_.end_stage(stage); },
+                 .pose_found = {}}) {}
 
   void map_scan(std::size_t index) {
     std::optional<DatasetFrame> frame = read(index);

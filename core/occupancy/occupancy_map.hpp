@@ -8,6 +8,7 @@
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"
 #include "core/occupancy/scan_use.hpp"
+#include "core/pause.hpp"
 
 namespace stillmap {
 
@@ -35,7 +36,7 @@ class OccupancyMap {
   /// rays of all its points pass becomes free. A voxel changes once a scan, and a hit counts before
   /// what passed. `scan.motion` is as long as the scan.
   void insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
-              const ScanUse& use = {});
+              const ScanUse& use = {}, const Pause& pause = {});
 
   /// Takes the voxels of a static map for occupied, as sure as can be.
   void insert(const MapView& view);

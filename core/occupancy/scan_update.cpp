@@ -5,6 +5,8 @@
 namespace stillmap {
 namespace {
 
+constexpr std::size_t points_between_pauses = 64;
+
 bool is_solid(const LabelledScan& scan, std::size_t i, const ScanUse& use) {
   if (scan.motion[i] != Motion::stationary) return false;
   return use.unknown_is_solid || scan.label(i) != SemanticClass::unlabeled;
@@ -69,10 +71,12 @@ bool in_octree(const Eigen::Vector3d& p_voxels) {
 }
 
 void gather_scan(const OccupancyConfig& config, const LabelledScan& scan,
-                 const Eigen::Isometry3d& T_map_lidar, const ScanUse& use, VoxelBricks& bricks) {
+                 const Eigen::Isometry3d& T_map_lidar, const ScanUse& use, VoxelBricks& bricks,
+                 const Pause& pause) {
   Gathering gathering(config, T_map_lidar, bricks);
   if (!gathering.lidar_is_inside()) return;
   for (std::size_t i = 0; i < scan.scan.size(); ++i) {
+    if (pause && i % points_between_pauses == 0) pause();
     const Eigen::Vector3d p_lidar = scan.scan.points_lidar[i].cast<double>();
     if (is_solid(scan, i, use)) gathering.hit(p_lidar);
     if (use.clears) gathering.clear_towards(p_lidar);

@@ -6,6 +6,7 @@
 #include "core/occupancy/occupancy_config.hpp"
 #include "core/occupancy/scan_use.hpp"
 #include "core/occupancy/voxel_bricks.hpp"
+#include "core/pause.hpp"
 
 namespace stillmap {
 
@@ -14,7 +15,8 @@ namespace stillmap {
 /// cube of 2 x 2 x 2 voxels that rays end in. Points that are not finite, or outside the octree,
 /// tell nothing; nor does a scan whose lidar is outside.
 void gather_scan(const OccupancyConfig& config, const LabelledScan& scan,
-                 const Eigen::Isometry3d& T_map_lidar, const ScanUse& use, VoxelBricks& bricks);
+                 const Eigen::Isometry3d& T_map_lidar, const ScanUse& use, VoxelBricks& bricks,
+                 const Pause& pause = {});
 
 /// Whether a position, in voxels from the octree's corner, lies in the octree. False for NaN.
 [[nodiscard]] bool in_octree(const Eigen::Vector3d& p_voxels);

@@ -79,12 +79,12 @@ struct TraversabilityMap::State {
   std::vector<std::shared_ptr<const TraversabilityView>> views;
 
   void take_sizes(const MapView& map);
-  [[nodiscard]] ChangedCells update_columns(const MapView& map);
+  [[nodiscard]] ChangedCells update_columns(const MapView& map, const Pause& pause);
   [[nodiscard]] std::vector<const Tile*> renewed_tiles(const MapView& map) const;
   void drop_missing(const MapView& map, ChangedCells& changes);
   [[nodiscard]] ChangedCells update_surfaces(const ChangedCells& columns,
-                                             TraversabilityUpdate& report);
-  void judge_all(const ChangedCells& surfaces, TraversabilityUpdate& report);
+                                             TraversabilityUpdate& report, const Pause& pause);
+  void judge_all(const ChangedCells& surfaces, TraversabilityUpdate& report, const Pause& pause);
   void judge_one(TileState& state, TileId id, std::size_t profile) const;
   void publish();
 };
@@ -124,12 +124,13 @@ void TraversabilityMap::State::drop_missing(const MapView& map, ChangedCells& ch
   });
 }
 
-ChangedCells TraversabilityMap::State::update_columns(const MapView& map) {
+ChangedCells TraversabilityMap::State::update_columns(const MapView& map, const Pause& pause) {
   ChangedCells changes;
   drop_missing(map, changes);
   const std::vector<const Tile*> renewed = renewed_tiles(map);
   std::vector<std::shared_ptr<const ColumnTile>> columns(renewed.size());
   tbb::parallel_for(std::size_t{0}, renewed.size(), [&](std::size_t i) {
+    if (pause) pause();
     columns[i] = std::make_shared<const ColumnTile>(make_columns(*renewed[i], side));
   });
   for (std::size_t i = 0; i < renewed.size(); ++i) {
@@ -144,11 +145,13 @@ ChangedCells TraversabilityMap::State::update_columns(const MapView& map) {
 }
 
 ChangedCells TraversabilityMap::State::update_surfaces(const ChangedCells& columns,
-                                                       TraversabilityUpdate& report) {
+                                                       TraversabilityUpdate& report,
+                                                       const Pause& pause) {
   const int margin = margin_cells(surface_reach_m, cell_m, side);
   const std::vector<TileId> ids = existing(affected_tiles(columns, side, margin), tiles);
   std::vector<std::shared_ptr<const SurfaceTile>> surfaces(ids.size());
   tbb::parallel_for(std::size_t{0}, ids.size(), [&](std::size_t i) {
+    if (pause) pause();
     const auto around = neighbourhood<ColumnTile>(tiles, ids[i], side, &TileState::columns);
     surfaces[i] = std::make_shared<const SurfaceTile>(make_surface(around, cell_m));
   });
@@ -179,14 +182,16 @@ void TraversabilityMap::State::judge_one(TileState& state, TileId id, std::size_
   state.judged[profile] = std::make_shared<const TraversabilityTile>(std::move(judged));
 }
 
-void TraversabilityMap::State::judge_all(const ChangedCells& surfaces,
-                                         TraversabilityUpdate& report) {
+void TraversabilityMap::State::judge_all(const ChangedCells& surfaces, TraversabilityUpdate& report,
+                                         const Pause& pause) {
   for (std::size_t profile = 0; profile < profiles.size(); ++profile) {
     const int margin = margin_cells(clearance_limit_m(profiles[profile]), cell_m, side);
     const std::vector<TileId> ids = existing(affected_tiles(surfaces, side, margin), tiles);
     for (const TileId& id : ids) tiles.at(id).judged.resize(profiles.size());
-    tbb::parallel_for(std::size_t{0}, ids.size(),
-                      [&](std::size_t i) { judge_one(tiles.at(ids[i]), ids[i], profile); });
+    tbb::parallel_for(std::size_t{0}, ids.size(), [&](std::size_t i) {
+      if (pause) pause();
+      judge_one(tiles.at(ids[i]), ids[i], profile);
+    });
     report.judged += ids.size();
   }
 }
@@ -226,14 +231,14 @@ TraversabilityMap::~TraversabilityMap() = default;
 TraversabilityMap::TraversabilityMap(TraversabilityMap&&) noexcept = default;
 TraversabilityMap& TraversabilityMap::operator=(TraversabilityMap&&) noexcept = default;
 
-TraversabilityUpdate TraversabilityMap::update(const MapView& map) {
+TraversabilityUpdate TraversabilityMap::update(const MapView& map, const Pause& pause) {
   state_->take_sizes(map);
   TraversabilityUpdate report;
   if (!map.tiles.empty()) {
-    const ChangedCells columns = state_->update_columns(map);
+    const ChangedCells columns = state_->update_columns(map, pause);
     report.map_tiles = columns.size();
-    const ChangedCells surfaces = state_->update_surfaces(columns, report);
-    state_->judge_all(surfaces, report);
+    const ChangedCells surfaces = state_->update_surfaces(columns, report, pause);
+    state_->judge_all(surfaces, report, pause);
   }
   state_->publish();
   return report;

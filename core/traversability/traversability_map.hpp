@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/map/tile.hpp"
+#include "core/pause.hpp"
 #include "core/traversability/robot_profile.hpp"
 #include "core/traversability/traversability_view.hpp"
 
@@ -34,7 +35,7 @@ class TraversabilityMap {
 
   /// Brings all profiles to this state of the map. Throws std::invalid_argument when the map's
   /// tiles are not whole numbers of voxels.
-  TraversabilityUpdate update(const MapView& map);
+  TraversabilityUpdate update(const MapView& map, const Pause& pause = {});
 
   [[nodiscard]] const std::vector<RobotProfile>& profiles() const;
   /// The area of the profile as of the last update; null when there is no such profile.

@@ -25,8 +25,8 @@ MapperConfig box_config() {
   return config;
 }
 
-Mapper box_mapper(StageListener stage_ended = {}) {
-  return {box_config(), std::make_unique<StreamLabels>(), std::move(stage_ended)};
+Mapper box_mapper(MapperListeners listeners = {}) {
+  return {box_config(), std::make_unique<StreamLabels>(), std::move(listeners)};
 }
 
 const BoxDrive& traffic_drive() {
@@ -82,9 +82,11 @@ TEST(MapperDrive, WithoutLabelsAllIsStationary) {
 
 TEST(MapperDrive, StagesEndInTheOrderOfAScan) {
   std::vector<std::string> stages;
-  Mapper mapper = box_mapper([&](std::string_view stage) { stages.emplace_back(stage); });
+  Mapper mapper = box_mapper(
+      {.stage_ended = [&](std::string_view stage) { stages.emplace_back(stage); },
+       .pose_found = [&](std::int64_t, const OdometryResult&) { stages.emplace_back("pose"); }});
   ASSERT_TRUE(mapper.process(traffic_drive().scans[0].scan));
-  EXPECT_THAT(stages, ElementsAre("prepare", "segment", "odometry", "static_map"));
+  EXPECT_THAT(stages, ElementsAre("prepare", "segment", "odometry", "pose", "static_map"));
 }
 
 TEST(MapperDrive, PointsThatAreNoMeasurementsAreDropped) {

@@ -49,6 +49,19 @@ TEST(OccupancyMap, AgreesWithAPlainSlowReference) {
   EXPECT_EQ(all.occupied + all.free, reference.log_odds().size());
 }
 
+TEST(OccupancyMap, CanBeHeldUpWhileItTakesAScan) {
+  OccupancyMap map(small_config());
+  OccupancyMap undisturbed(small_config());
+  int pauses = 0;
+  for (std::uint32_t seed = 0; seed < 2; ++seed) {
+    const PlacedScan placed = random_scan(seed, 300, 3.0);
+    map.insert(placed.scan, placed.T_map_lidar, {}, [&] { ++pauses; });
+    undisturbed.insert(placed.scan, placed.T_map_lidar);
+  }
+  EXPECT_GE(pauses, 2 * 300 / 64);
+  EXPECT_EQ(map.encode(false).bytes, undisturbed.encode(false).bytes);
+}
+
 TEST(OccupancyMap, MovingAndMovableThingsAreNotSolidButTheWayToThemIsFree) {
   for (const Motion motion : {Motion::semi_static, Motion::highly_dynamic}) {
     OccupancyMap map(OccupancyConfig{});

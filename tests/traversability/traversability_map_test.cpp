@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <random>
 
 #include "tests/traversability/voxel_world.hpp"
@@ -79,6 +80,15 @@ TEST_P(TileSides, IncrementalUpdatesEqualAFullOneBitByBit) {
 }
 
 INSTANTIATE_TEST_SUITE_P(TraversabilityMap, TileSides, ::testing::Values(20, 60));
+
+TEST(TraversabilityMap, CanBeHeldUpBetweenTiles) {
+  VoxelWorld world(20);
+  world.ground(-18, -18, 18, 18, road);
+  TraversabilityMap map({square_robot()});
+  std::atomic<int> pauses = 0;
+  const TraversabilityUpdate update = map.update(world.view(), [&] { ++pauses; });
+  EXPECT_EQ(pauses, update.map_tiles + update.surfaces + update.judged);
+}
 
 TEST(TraversabilityMap, AChangeReachesOnlyTheNeighboursNearIt) {
   VoxelWorld world(100);

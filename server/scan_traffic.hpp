@@ -1,0 +1,38 @@
+#pragma once
+
+#include <atomic>
+
+#include "core/pause.hpp"
+
+namespace stillmap {
+
+/// Whether a scan is in work, so that what is done in the background waits for a gap. Two cores
+/// share caches, memory and often one core's arithmetic: a thread that gets only the time that
+/// nobody else wants slows the others down all the same. Thread-safe; nobody waits for a lock that
+/// a background thread holds.
+class ScanTraffic {
+ public:
+  /// While it lives, a scan is in work.
+  class InWork {
+   public:
+    explicit InWork(ScanTraffic& traffic) : traffic_(traffic) { ++traffic_.in_work_; }
+    ~InWork() { --traffic_.in_work_; }
+    InWork(const InWork&) = delete;
+    InWork& operator=(const InWork&) = delete;
+
+   private:
+    ScanTraffic& traffic_;
+  };
+
+  [[nodiscard]] bool is_quiet() const { return in_work_ == 0; }
+
+ private:
+  std::atomic<int> in_work_ = 0;
+};
+
+/// For one background thread: waits for a gap between scans. Where there are no gaps, because scans
+/// come as fast as they can be mapped, the thread still gets a tenth of the time: old areas are
+/// better than none. `traffic` must outlive it.
+[[nodiscard]] Pause give_way_to(const ScanTraffic& traffic);
+
+}  // namespace stillmap
