@@ -170,9 +170,10 @@ void MappingThread::between_scans(std::function<void()> action) {
 void MappingThread::work(const std::stop_token& stop) {
   while (!stop.stop_requested()) {
     auto queued = queue_.pop(stop, idle_period);
-    run_asked();
     const bool idle = !queued;
     if (queued) map(*std::move(queued));
+    // Afterwards: the scan's pose is waited for.
+    run_asked();
     if (idle || Clock::now() - view_shown_ >= view_period_) show_view();
   }
   show_view();

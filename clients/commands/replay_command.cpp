@@ -138,7 +138,11 @@ ExitCode run(const Arguments& arguments) {
   const std::size_t published = outcome.replay.published_stamps_ns.size();
   const bool complete = outcome.server.mapped >= published && outcome.poses.size() == published;
   if (arguments.lossless && !complete && !outcome.replay.stopped) {
-    std::cerr << "stillmap: the replay was to be lossless, but not every scan has its pose\n";
+    std::cerr << "stillmap: the replay was to be lossless, but the server mapped "
+              << outcome.server.mapped << " of " << published << " scans, and "
+              << outcome.poses.size()
+              << " poses came back; 'stillmap status' counts why. A server takes no scan twice: "
+                 "'stillmap reset' makes it begin anew\n";
     return ExitCode::failed;
   }
   return outcome.replay.stopped ? ExitCode::failed : ExitCode::ok;
