@@ -1,5 +1,6 @@
 #include "clients/client.hpp"
 
+#include <algorithm>
 #include <limits>
 #include <utility>
 
@@ -36,17 +37,15 @@ std::unique_ptr<Client::Connection> Client::connect(const ClientOptions& options
   auto connection = std::make_unique<Connection>(options);
   if (options.dds.transport != NetworkTransport::tcp) return connection;
   // Before anything subscribes through the connection, another can take its place.
-  TcpPatience patience(options.dds);
-  const auto deadline = TcpPatience::Clock::now() + options.request_timeout;
-  while (connection->get_status.refusal().empty()) {
-    const auto left =
-        std::chrono::ceil<std::chrono::milliseconds>(deadline - TcpPatience::Clock::now());
-    if (connection->get_status.ask(GetStatus_Request(), patience.wait(left))) break;
-    if (TcpPatience::Clock::now() >= deadline) break;
-    if (!patience.is_over()) continue;
-    connection.reset();
-    connection = std::make_unique<Connection>(options);
+  const auto began = connection->began;
+  GetStatus_Request request;
+  request.format_version(wire_format_version);
+  TcpPatience patience(options.dds, options.request_timeout);
+  while (connection->get_status.refusal().empty() &&
+         !connection->get_status.ask(request, patience.wait()) && !patience.is_over()) {
+    if (patience.is_due()) connection = std::make_unique<Connection>(options);
   }
+  connection->began = began;
   return connection;
 }
 
@@ -56,8 +55,15 @@ Client::Client(Client&&) noexcept = default;
 Client& Client::operator=(Client&&) noexcept = default;
 
 void Client::wait_for_server(std::chrono::milliseconds timeout) {
+  std::chrono::milliseconds waited{};
+  if (connection_->options.dds.transport == NetworkTransport::tcp) {
+    // Of the timeout, something is left for the answer of a server that was found.
+    const auto since = std::chrono::floor<std::chrono::milliseconds>(
+        std::chrono::steady_clock::now() - connection_->began);
+    waited = std::min(since, timeout / 2);
+  }
   static_cast<void>(connection_->ask(connection_->get_status, connection_->names.get_status,
-                                     GetStatus_Request(), timeout));
+                                     GetStatus_Request(), timeout - waited, waited));
 }
 
 ServerStatus Client::status() {

@@ -105,14 +105,15 @@ struct RegionNews {
 class Client {
  public:
   /// Joins the domain; over TCP it also waits for the server, up to `request_timeout`, and joins
-  /// anew after 4, 8, 16 s without one. Throws DdsError when the domain or an interface cannot be
-  /// used.
+  /// anew after 4, 12, 28 s without one, but never later. Throws DdsError when the domain or an
+  /// interface cannot be used.
   explicit Client(const ClientOptions& options = {});
   ~Client();
   Client(Client&&) noexcept;
   Client& operator=(Client&&) noexcept;
 
-  /// Returns when a server answers; throws ServiceTimeout after `timeout`.
+  /// Returns when a server answers; throws ServiceTimeout after `timeout`, of which over TCP up to
+  /// half may have passed since the client was made.
   void wait_for_server(std::chrono::milliseconds timeout);
 
   [[nodiscard]] ServerStatus status();

@@ -23,17 +23,20 @@ namespace stillmap {
 struct Client::Connection {
   explicit Connection(const ClientOptions& client_options);
 
-  /// The server's reply; throws ServiceTimeout when there is none.
+  /// The server's reply; throws ServiceTimeout when there is none, which tells of what was `waited`
+  /// before, too.
   template <typename Request, typename Reply>
   [[nodiscard]] Reply ask(ServiceClient<Request, Reply>& service, const std::string& name,
-                          Request request, std::chrono::milliseconds timeout) {
+                          Request request, std::chrono::milliseconds timeout,
+                          std::chrono::milliseconds waited = {}) {
     if constexpr (requires { request.format_version(wire_format_version); }) {
       request.format_version(wire_format_version);
     }
     if (!service.refusal().empty()) throw ServiceError(name + ": " + service.refusal());
     auto reply = service.ask(request, timeout);
     if (!reply) {
-      throw no_answer(name, timeout, service.wait_for_server(std::chrono::milliseconds(0)));
+      throw no_answer(name, timeout + waited,
+                      service.wait_for_server(std::chrono::milliseconds(0)));
     }
     return *std::move(reply);
   }
@@ -56,6 +59,8 @@ struct Client::Connection {
                                          bool found) const;
 
   ClientOptions options;
+  /// When the client that it is for began to look for the server.
+  std::chrono::steady_clock::time_point began = std::chrono::steady_clock::now();
   Topics topics;
   Services names;
   Participant participant;

@@ -1,6 +1,7 @@
 #include "clients/scan_publisher.hpp"
 
 #include "clients/connection.hpp"
+#include "clients/tcp_patience.hpp"
 #include "idl/conversions/scan_to_cloud.hpp"
 #include "idl/dds/writer.hpp"
 #include "idl/topics.hpp"
@@ -26,38 +27,37 @@ struct ScanPublisher::Connection {
   }
 
   ScanPublisherOptions options;
+  bool has_written = false;
   std::unique_ptr<Participant> own;
   TopicSpec<sensor_msgs::msg::PointCloud2> topic;
   Writer<sensor_msgs::msg::PointCloud2> writer;
 };
 
 ScanPublisher::ScanPublisher(const ScanPublisherOptions& options)
-    : connection_(std::make_unique<Connection>(options)), patience_(options.dds) {}
+    : connection_(std::make_unique<Connection>(options)) {}
 
-ScanPublisher::ScanPublisher(Client& client, const ScanPublisherOptions& options)
-    : connection_(options.dds.transport == NetworkTransport::tcp
-                      ? std::make_unique<Connection>(client.connection_->participant, options)
-                      : std::make_unique<Connection>(options)),
-      patience_(options.dds) {}
+ScanPublisher::ScanPublisher(Client& client, const ScanPublisherOptions& options) {
+  Client::Connection& shared = *client.connection_;
+  const bool shares = shared.options.dds.transport == NetworkTransport::tcp;
+  connection_ = shares ? std::make_unique<Connection>(shared.participant, options)
+                       : std::make_unique<Connection>(options);
+}
 
 ScanPublisher::~ScanPublisher() = default;
 ScanPublisher::ScanPublisher(ScanPublisher&&) noexcept = default;
 ScanPublisher& ScanPublisher::operator=(ScanPublisher&&) noexcept = default;
 
 bool ScanPublisher::wait_for_subscriber(std::chrono::milliseconds timeout) {
-  // A client's connection has been found to work.
-  if (!connection_->own) return connection_->writer.readers().wait_for_any(timeout);
-  const auto deadline = TcpPatience::Clock::now() + timeout;
-  while (true) {
-    const auto left =
-        std::chrono::ceil<std::chrono::milliseconds>(deadline - TcpPatience::Clock::now());
-    if (connection_->writer.readers().wait_for_any(patience_.wait(left))) return true;
-    if (TcpPatience::Clock::now() >= deadline) return false;
-    if (!patience_.is_over()) continue;
-    const ScanPublisherOptions options = connection_->options;
-    connection_.reset();
-    connection_ = std::make_unique<Connection>(options);
+  TcpPatience patience(connection_->options.dds, timeout);
+  while (!connection_->writer.readers().wait_for_any(patience.wait())) {
+    if (patience.is_over()) return false;
+    // A client's connection has been found to work, and what was written must not be lost.
+    const bool may_begin_anew = connection_->own && !connection_->has_written;
+    if (patience.is_due() && may_begin_anew) {
+      connection_ = std::make_unique<Connection>(connection_->options);
+    }
   }
+  return true;
 }
 
 int ScanPublisher::subscribers() const { return connection_->writer.readers().count(); }
@@ -66,6 +66,7 @@ bool ScanPublisher::publish(const Scan& scan, std::span<const std::uint32_t> raw
                             std::chrono::milliseconds timeout) {
   const auto cloud = wire::to_cloud(scan, raw_labels, connection_->options.lidar_frame);
   const auto deadline = std::chrono::steady_clock::now() + timeout;
+  connection_->has_written = true;
   // A write waits only a moment for room, so that the caller's timeout is kept.
   while (!connection_->writer.write(cloud)) {
     if (std::chrono::steady_clock::now() >= deadline) return false;

@@ -7,7 +7,6 @@
 #include <span>
 #include <string>
 
-#include "clients/tcp_patience.hpp"
 #include "core/lidar/scan.hpp"
 #include "idl/dds/dds_options.hpp"
 
@@ -34,15 +33,17 @@ class ScanPublisher {
   /// Joins the domain. Throws DdsError when the domain or an interface cannot be used.
   explicit ScanPublisher(const ScanPublisherOptions& options = {});
 
-  /// The same; over TCP it shares the connection of a client, who must outlive it.
+  /// The same; where the client is one over TCP, it shares the client's connection (`options.dds`
+  /// is not used then), and the client must outlive it.
   ScanPublisher(Client& client, const ScanPublisherOptions& options);
 
   ~ScanPublisher();
   ScanPublisher(ScanPublisher&&) noexcept;
   ScanPublisher& operator=(ScanPublisher&&) noexcept;
 
-  /// True once a subscriber matched; false after `timeout`. Over TCP, without a client's
-  /// connection, it joins the domain anew when it has found nobody for 4 s, then 8 s, 16 s.
+  /// True once a subscriber matched; false after `timeout`. Over TCP, with a connection of its own
+  /// and before the first scan, it joins the domain anew when it has found nobody for 4, 12, 28 s,
+  /// and then throws as the constructor does.
   [[nodiscard]] bool wait_for_subscriber(std::chrono::milliseconds timeout);
 
   /// Subscribers matched now.
@@ -62,7 +63,6 @@ class ScanPublisher {
  private:
   struct Connection;
   std::unique_ptr<Connection> connection_;
-  TcpPatience patience_;
 };
 
 }  // namespace stillmap

@@ -56,7 +56,8 @@ void AreaThread::work(const std::stop_token& stop) {
 }
 
 void AreaThread::update(const MapView& map) {
-  // One core only: its loops must not run on threads that keep their full priority.
+  // One core only: its loops must not run on threads that keep their full priority, and only this
+  // thread gives way.
   tbb::task_arena this_thread(1);
   this_thread.execute([&] { static_cast<void>(traversability_.update(map, give_way_)); });
   show();

@@ -93,10 +93,12 @@ void OccupancyThread::insert(const OccupancyScan& scan, bool clears) {
   using Clock = std::chrono::steady_clock;
   const auto began = Clock::now();
   if (!clears) statistics_.count("occupancy_not_cleared");
+  // Only this thread changes the map.
+  map_.gather(*scan.labelled, scan.T_map_lidar,
+              {.clears = clears, .unknown_is_solid = scan.unknown_is_solid}, pause_);
   {
     const std::scoped_lock lock(map_mutex_);
-    map_.insert(*scan.labelled, scan.T_map_lidar,
-                {.clears = clears, .unknown_is_solid = scan.unknown_is_solid}, pause_);
+    map_.take_gathered();
     stamp_ns_ = scan.labelled->scan.stamp_ns;
     ++changes_;
   }

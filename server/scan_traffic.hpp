@@ -8,8 +8,8 @@ namespace stillmap {
 
 /// Whether a scan is in work, so that what is done in the background waits for a gap. Two cores
 /// share caches, memory and often one core's arithmetic: a thread that gets only the time that
-/// nobody else wants slows the others down all the same. Thread-safe; nobody waits for a lock that
-/// a background thread holds.
+/// nobody else wants slows the others down all the same. Thread-safe, without locks: the mapper
+/// never waits for a thread that it holds up.
 class ScanTraffic {
  public:
   /// While it lives, a scan is in work.
@@ -24,15 +24,19 @@ class ScanTraffic {
     ScanTraffic& traffic_;
   };
 
-  [[nodiscard]] bool is_quiet() const { return in_work_ == 0; }
+  [[nodiscard]] bool is_quiet() const { return in_work_ == 0 || has_ended_; }
+
+  /// Holds up nobody any more: the server ends, and background work is to be finished.
+  void end() { has_ended_ = true; }
 
  private:
+  std::atomic<bool> has_ended_ = false;
   std::atomic<int> in_work_ = 0;
 };
 
 /// For one background thread: waits for a gap between scans. Where there are no gaps, because scans
-/// come as fast as they can be mapped, the thread still gets a tenth of the time: old areas are
-/// better than none. `traffic` must outlive it.
+/// come as fast as they can be mapped, the thread still works a tenth of the time, if it gets it:
+/// old areas are better than none. `traffic` must outlive it.
 [[nodiscard]] Pause give_way_to(const ScanTraffic& traffic);
 
 }  // namespace stillmap

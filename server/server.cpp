@@ -83,8 +83,7 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
   if (!config.topics.odometry_prior.empty()) {
     prior_.emplace(participant_, config.topics.odometry_prior);
   }
-  if (config.occupancy.enabled)
-    occupancy_.emplace(config.occupancy, statistics_, give_way_to(scan_traffic_));
+  if (config.occupancy.enabled) occupancy_.emplace(config.occupancy, statistics_, give_way(config));
   OccupancyThread* const occupancy = occupancy_ ? &*occupancy_ : nullptr;
   const MappingOutputs outputs{.poses = &poses_,
                                .scans = scans_ ? &*scans_ : nullptr,
@@ -112,7 +111,14 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
 
 Server::~Server() = default;
 
+Pause Server::give_way(const ServerConfig& config) const {
+  // Where every scan counts, poses may come later, so that octree and areas keep up.
+  if (config.input.delivery == Delivery::every) return {};
+  return give_way_to(scan_traffic_);
+}
+
 void Server::stop() {
+  scan_traffic_.end();
   // Who asks goes first, then who brings, then who maps: nobody waits for somebody gone.
   metrics_.reset();
   autosave_.reset();
@@ -178,7 +184,7 @@ void Server::start_areas(const ServerConfig& config) {
   };
   areas_ = std::make_unique<AreaThread>(
       std::move(robots), std::chrono::duration<double>(config.areas.update_period_s), board_,
-      area_board_, statistics_, publish, give_way_to(scan_traffic_));
+      area_board_, statistics_, publish, give_way(config));
 }
 
 void Server::start_metrics(const MetricsConfig& config) {

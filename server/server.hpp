@@ -43,6 +43,8 @@ class Server {
   [[nodiscard]] ServerStatus status() const;
   void start_areas(const ServerConfig& config);
   void start_services(const ServerConfig& config);
+  /// For what is done in the background.
+  [[nodiscard]] Pause give_way(const ServerConfig& config) const;
   void save_in_background();
   void start_metrics(const MetricsConfig& config);
 

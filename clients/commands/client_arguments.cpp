@@ -1,7 +1,5 @@
 #include "clients/commands/client_arguments.hpp"
 
-#include <algorithm>
-
 namespace stillmap {
 
 std::chrono::milliseconds ClientArguments::timeout() const {
@@ -66,13 +64,8 @@ void add_client_options(CommandHandle command, ClientArguments& arguments) {
 }
 
 Client connect(const ClientArguments& arguments) {
-  const auto began = std::chrono::steady_clock::now();
   Client client(arguments.client());
-  // Over TCP it has waited already.
-  const auto waited =
-      std::chrono::floor<std::chrono::milliseconds>(std::chrono::steady_clock::now() - began);
-  constexpr std::chrono::milliseconds shortest{500};
-  client.wait_for_server(std::max(arguments.timeout() - waited, shortest));
+  client.wait_for_server(arguments.timeout());
   return client;
 }
 

@@ -84,14 +84,23 @@ OccupancyMap::OccupancyMap(OccupancyMap&&) noexcept = default;
 OccupancyMap& OccupancyMap::operator=(OccupancyMap&&) noexcept = default;
 
 void OccupancyMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+                          const ScanUse& use) {
+  gather(scan, T_map_lidar, use);
+  take_gathered();
+}
+
+void OccupancyMap::gather(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
                           const ScanUse& use, const Pause& pause) {
   ScanUse this_one = use;
   const bool is_due = state_->scans++ % state_->config.clear_every == 0;
   this_one.clears = use.clears && is_due && state_->config.clear_range_m > 0.0;
   state_->bricks.clear();
   gather_scan(state_->config, scan, T_map_lidar, this_one, state_->bricks, pause);
+}
+
+void OccupancyMap::take_gathered() {
   update_octree(state_->octree, state_->bricks.sorted(),
-                {state_->octree.getProbHitLog(), state_->octree.getProbMissLog()}, pause);
+                {state_->octree.getProbHitLog(), state_->octree.getProbMissLog()});
   ++state_->version;
 }
 

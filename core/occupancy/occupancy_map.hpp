@@ -36,7 +36,13 @@ class OccupancyMap {
   /// rays of all its points pass becomes free. A voxel changes once a scan, and a hit counts before
   /// what passed. `scan.motion` is as long as the scan.
   void insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
-              const ScanUse& use = {}, const Pause& pause = {});
+              const ScanUse& use = {});
+
+  /// The two halves of it: the first, which takes longer and may be held up, changes nothing that
+  /// readers see, and needs no lock against them.
+  void gather(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar, const ScanUse& use,
+              const Pause& pause = {});
+  void take_gathered();
 
   /// Takes the voxels of a static map for occupied, as sure as can be.
   void insert(const MapView& view);

@@ -14,8 +14,6 @@ using octomap::OcTreeNode;
 /// Depth of the nodes that are bricks: two levels above the voxels.
 constexpr unsigned brick_depth = 14;
 
-constexpr std::size_t bricks_between_pauses = 256;
-
 struct Child {
   OcTreeNode* node;
   bool is_new;
@@ -23,14 +21,12 @@ struct Child {
 
 class BatchUpdate {
  public:
-  BatchUpdate(OcTree& octree, const LogOddsSteps& steps, const Pause& pause)
-      : octree_(octree), steps_(steps), pause_(pause) {}
+  BatchUpdate(OcTree& octree, const LogOddsSteps& steps) : octree_(octree), steps_(steps) {}
 
   void update(OcTreeNode& node, bool is_new, unsigned depth, std::span<const VoxelBrick> bricks) {
     if (!is_new && stays_as_it_is(node, bricks)) return;
     open(node, is_new);
     if (depth == brick_depth) {
-      if (pause_ && ++bricks_done_ % bricks_between_pauses == 0) pause_();
       update_octants(node, bricks.front());
     } else {
       const unsigned shift = 3 * (brick_depth - 1 - depth);
@@ -105,8 +101,6 @@ class BatchUpdate {
 
   OcTree& octree_;
   LogOddsSteps steps_;
-  const Pause& pause_;
-  std::size_t bricks_done_ = 0;
 };
 
 /// Only OctoMap itself can: here it reads an octree of nothing else, log-odds and no children.
@@ -117,8 +111,7 @@ void make_root(OcTree& octree) {
 
 }  // namespace
 
-void update_octree(OcTree& octree, std::span<const VoxelBrick> bricks, const LogOddsSteps& steps,
-                   const Pause& pause) {
+void update_octree(OcTree& octree, std::span<const VoxelBrick> bricks, const LogOddsSteps& steps) {
   std::vector<VoxelBrick> touched;
   for (const VoxelBrick& brick : bricks) {
     if ((brick.hits | brick.misses) != 0) touched.push_back(brick);
@@ -126,7 +119,7 @@ void update_octree(OcTree& octree, std::span<const VoxelBrick> bricks, const Log
   if (touched.empty()) return;
   const bool is_new = octree.getRoot() == nullptr;
   if (is_new) make_root(octree);
-  BatchUpdate(octree, steps, pause).update(*octree.getRoot(), is_new, 0, touched);
+  BatchUpdate(octree, steps).update(*octree.getRoot(), is_new, 0, touched);
 }
 
 }  // namespace stillmap

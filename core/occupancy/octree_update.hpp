@@ -3,7 +3,6 @@
 #include <span>
 
 #include "core/occupancy/voxel_bricks.hpp"
-#include "core/pause.hpp"
 
 namespace octomap {
 class OcTree;
@@ -21,6 +20,6 @@ struct LogOddsSteps {
 /// many voxels below it change. `bricks` are in the octree's order. The result is what OctoMap's
 /// updateNode() makes of the voxels one by one.
 void update_octree(octomap::OcTree& octree, std::span<const VoxelBrick> bricks,
-                   const LogOddsSteps& steps, const Pause& pause = {});
+                   const LogOddsSteps& steps);
 
 }  // namespace stillmap

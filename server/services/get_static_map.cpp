@@ -21,7 +21,7 @@ stillmap_msgs::srv::GetStaticMap_Response GetStaticMap::operator()(
     const MapState state = state_for(*query);
     const MapQueryResult result =
         query_map(*state.view, *query, state.history.get(), context_.tiles);
-    note(*query, result, state.view);
+    note(result, state.view);
     response = wire::to_response(result);
   });
 }
@@ -32,16 +32,11 @@ MapState GetStaticMap::state_for(const MapQuery& query) const {
   return view ? MapState{std::move(view), nullptr} : context_.board.state();
 }
 
-void GetStaticMap::note(const MapQuery& query, const MapQueryResult& result,
-                        const PagedViews::View& view) {
+void GetStaticMap::note(const MapQueryResult& result, const PagedViews::View& view) {
   const auto now = PagedViews::Clock::now();
-  const bool is_first = query.continuation.empty();
-  if (result.continuation.empty()) {
-    if (!is_first) paged_views_.end(view);
-  } else if (is_first) {
-    paged_views_.begin(view, now);
-  } else {
-    paged_views_.go_on(view, now);
+  if (result.status == QueryStatus::ok) {
+    const bool is_last = result.continuation.empty();
+    is_last ? paged_views_.end(view, now) : paged_views_.keep(view, now);
   }
   paged_views_.forget_abandoned(now);
 }

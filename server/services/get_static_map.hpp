@@ -20,7 +20,7 @@ class GetStaticMap {
  private:
   /// A page after the first needs no history.
   [[nodiscard]] MapState state_for(const MapQuery& query) const;
-  void note(const MapQuery& query, const MapQueryResult& result, const PagedViews::View& view);
+  void note(const MapQueryResult& result, const PagedViews::View& view);
 
   const ServiceContext& context_;
   PagedViews paged_views_;

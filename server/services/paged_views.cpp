@@ -10,30 +10,19 @@ PagedViews::View PagedViews::find(std::uint64_t version) const {
   return found == under_way_.end() ? nullptr : found->view;
 }
 
-void PagedViews::begin(const View& view, Clock::time_point now) {
-  auto entry = entry_of(view);
-  if (entry == under_way_.end()) entry = under_way_.insert(under_way_.begin(), {view, 0, now});
-  ++entry->answers;
-  go_on(view, now);
-}
-
-void PagedViews::go_on(const View& view, Clock::time_point now) {
-  const auto entry = entry_of(view);
-  // It was given up, but is the newest view all the same.
-  if (entry == under_way_.end()) return begin(view, now);
-  entry->last_asked = now;
-  under_way_.splice(under_way_.begin(), under_way_, entry);
+void PagedViews::keep(const View& view, Clock::time_point now) {
+  if (const auto entry = entry_of(view); entry != under_way_.end()) under_way_.erase(entry);
+  under_way_.push_front({view, now + longest_pause});
   if (under_way_.size() > most_views) under_way_.pop_back();
 }
 
-void PagedViews::end(const View& view) {
+void PagedViews::end(const View& view, Clock::time_point now) {
   const auto entry = entry_of(view);
-  if (entry != under_way_.end() && --entry->answers <= 0) under_way_.erase(entry);
+  if (entry != under_way_.end()) entry->until = now + last_page_repeats;
 }
 
 void PagedViews::forget_abandoned(Clock::time_point now) {
-  std::erase_if(under_way_,
-                [&](const UnderWay& entry) { return now - entry.last_asked > longest_pause; });
+  std::erase_if(under_way_, [&](const UnderWay& entry) { return now > entry.until; });
 }
 
 std::list<PagedViews::UnderWay>::iterator PagedViews::entry_of(const View& view) {

@@ -8,6 +8,7 @@
 #include <iostream>
 
 #include "clients/tcp_patience.hpp"
+#include "idl/dds/dds_error.hpp"
 #include "idl/dds/reader.hpp"
 #include "idl/dds/service_client.hpp"
 #include "idl/topics.hpp"
@@ -59,14 +60,15 @@ std::unique_ptr<IsConnectedService> confirm_connections(Participant& participant
 }
 
 std::unique_ptr<Participant> join(const DdsOptions& options) {
-  TcpPatience patience(options);
+  TcpPatience patience(options, 60s);
   while (true) {
     auto participant = std::make_unique<Participant>(options);
     if (options.transport != NetworkTransport::tcp) return participant;
     ServiceClient<GetStatus_Request, GetStatus_Response> client(*participant, is_connected);
-    while (!patience.is_over()) {
-      if (client.ask(GetStatus_Request(), patience.wait(1h))) return participant;
-    }
+    do {
+      if (client.ask(GetStatus_Request(), patience.wait())) return participant;
+      if (patience.is_over()) throw DdsError("nobody was found over TCP within 60 s");
+    } while (!patience.is_due());
   }
 }
 

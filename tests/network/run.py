@@ -123,6 +123,8 @@ def main():
         except (RuntimeError, OSError, subprocess.CalledProcessError) as error:
             failed = True
             print(f"  FAILED: {name}: {error}", flush=True)
+            if undisturbed is None:
+                break  # The others are compared with it.
             continue
         undisturbed = undisturbed or figures
         print_row(row_of(name, figures))

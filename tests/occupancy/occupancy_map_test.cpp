@@ -55,7 +55,8 @@ TEST(OccupancyMap, CanBeHeldUpWhileItTakesAScan) {
   int pauses = 0;
   for (std::uint32_t seed = 0; seed < 2; ++seed) {
     const PlacedScan placed = random_scan(seed, 300, 3.0);
-    map.insert(placed.scan, placed.T_map_lidar, {}, [&] { ++pauses; });
+    map.gather(placed.scan, placed.T_map_lidar, {}, [&] { ++pauses; });
+    map.take_gathered();
     undisturbed.insert(placed.scan, placed.T_map_lidar);
   }
   EXPECT_GE(pauses, 2 * 300 / 64);
