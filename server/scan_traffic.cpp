@@ -2,6 +2,7 @@
 
 #include <time.h>
 
+#include <algorithm>
 #include <chrono>
 #include <thread>
 
@@ -12,7 +13,9 @@ using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
 constexpr auto work_between_pauses = 2ms;
-constexpr auto longest_pause = 9 * work_between_pauses;
+/// Longest pause, in times of the work before it.
+constexpr int rest = 9;
+constexpr std::chrono::nanoseconds longest_pause = 1s;
 constexpr auto look_period = 1ms;
 
 /// The time that the calling thread has worked; one that gives way to others may get none for long.
@@ -26,9 +29,10 @@ std::chrono::nanoseconds worked() {
 
 Pause give_way_to(const ScanTraffic& traffic) {
   return [&traffic, last = std::chrono::nanoseconds(0)]() mutable {
-    if (worked() - last < work_between_pauses) return;
-    const auto began = Clock::now();
-    while (!traffic.is_quiet() && Clock::now() - began < longest_pause) {
+    const auto work = worked() - last;
+    if (work < work_between_pauses) return;
+    const auto until = Clock::now() + std::min(rest * work, longest_pause);
+    while (!traffic.is_quiet() && Clock::now() < until) {
       std::this_thread::sleep_for(look_period);
     }
     last = worked();
