@@ -79,28 +79,12 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
           [this] { return receiver_->why_nothing_arrives(); }),
       atlas_(area_board_, board_, tiles_),
       planning_grid_(config.areas, config.frames.map, board_, area_board_) {
-  if (config.publish.scan) scans_.emplace(participant_, topics_);
-  if (!config.topics.odometry_prior.empty()) {
-    prior_.emplace(participant_, config.topics.odometry_prior);
-  }
-  if (config.occupancy.enabled) occupancy_.emplace(config.occupancy, statistics_, give_way(config));
-  OccupancyThread* const occupancy = occupancy_ ? &*occupancy_ : nullptr;
-  const MappingOutputs outputs{.poses = &poses_,
-                               .scans = scans_ ? &*scans_ : nullptr,
-                               .prior = prior_ ? &*prior_ : nullptr,
-                               .occupancy = occupancy,
-                               .traffic = &scan_traffic_};
-  mapping_ = std::make_unique<MappingThread>(config, std::move(label_source),
-                                             stored_map(saver_, config.map), saver_.shelf(), queue_,
-                                             statistics_, board_, outputs);
-  saver_.follow({.take = [this](bool everything) { return mapping_->checkpoint(everything); },
-                 .stored = [this](std::uint64_t step) { mapping_->checkpoint_stored(step); },
-                 .map_bytes = [this] { return mapping_->memory_use().bytes; }});
+  start_mapping(config, std::move(label_source));
   receiver_ = std::make_unique<ScanReceiver>(participant_, config, queue_, statistics_);
   map_publisher_ = std::make_unique<MapPublisher>(participant_, topics_, config, board_);
-  if (occupancy != nullptr) {
+  if (occupancy_) {
     octomap_publisher_ =
-        std::make_unique<OctomapPublisher>(participant_, topics_, config, *occupancy);
+        std::make_unique<OctomapPublisher>(participant_, topics_, config, *occupancy_);
   }
   start_areas(config);
   start_services(config);
@@ -131,6 +115,25 @@ void Server::stop() {
   receiver_.reset();
   mapping_->stop();
   saver_.save_at_end();
+}
+
+void Server::start_mapping(const ServerConfig& config, std::unique_ptr<LabelSource> label_source) {
+  if (config.publish.scan) scans_.emplace(participant_, topics_);
+  if (!config.topics.odometry_prior.empty()) {
+    prior_.emplace(participant_, config.topics.odometry_prior);
+  }
+  if (config.occupancy.enabled) occupancy_.emplace(config.occupancy, statistics_, give_way(config));
+  const MappingOutputs outputs{.poses = &poses_,
+                               .scans = scans_ ? &*scans_ : nullptr,
+                               .prior = prior_ ? &*prior_ : nullptr,
+                               .occupancy = occupancy_ ? &*occupancy_ : nullptr,
+                               .traffic = &scan_traffic_};
+  mapping_ = std::make_unique<MappingThread>(config, std::move(label_source),
+                                             stored_map(saver_, config.map), saver_.shelf(), queue_,
+                                             statistics_, board_, outputs);
+  saver_.follow({.take = [this](bool everything) { return mapping_->checkpoint(everything); },
+                 .stored = [this](std::uint64_t step) { mapping_->checkpoint_stored(step); },
+                 .map_bytes = [this] { return mapping_->memory_use().bytes; }});
 }
 
 void Server::start_services(const ServerConfig& config) {

@@ -41,6 +41,7 @@ class Server {
 
  private:
   [[nodiscard]] ServerStatus status() const;
+  void start_mapping(const ServerConfig& config, std::unique_ptr<LabelSource> label_source);
   void start_areas(const ServerConfig& config);
   void start_services(const ServerConfig& config);
   /// For what is done in the background.

@@ -74,7 +74,7 @@ TEST_F(ServiceCommandTest, ReplayOverDdsGivesThePosesThatMapGives) {
 
 TEST_F(ServiceCommandTest, ReplayWorksOverTcp) {
   simulate("city", 4);
-  std::ofstream(path("wan.yaml")) << "transport: tcp\nserver_port: " << 20000 + domain_ << "\n";
+  std::ofstream(path("wan.yaml")) << "transport: tcp\nserver_port: " << 31000 + domain_ << "\n";
   const std::string over_tcp = " --dds-profile " + path("wan.yaml");
   BackgroundProcess server(server_command("--delivery every") + over_tcp, folder_ / "server.log");
   const ProcessResult replay = run("replay " + path("city") + " --lossless --json --timeout 60" +
