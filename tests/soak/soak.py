@@ -78,7 +78,7 @@ class Poses(threading.Thread):
 
     def run(self):
         for line in self.process.stdout:
-            if '"pose"' not in line:
+            if '"type":"pose"' not in line:
                 continue
             now = time.monotonic()
             if self.last is not None:
