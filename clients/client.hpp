@@ -196,10 +196,10 @@ class Client {
       std::function<void(const OccupancyGrid&)> grid_arrived);
 
   /// The tiles whose footprint meets the region: first those that exist, then what changes. Tiles
-  /// of other places do not come over the network, except from the region's bounding box their
-  /// entries in the index. When another map begins, the tiles of the last one are removed. Throws
-  /// std::invalid_argument for a region with faults, and as a request does: it asks for the size of
-  /// tiles, so a server that comes back with another size needs a new subscription.
+  /// of other places do not come over the network, only their entries in the index (some 100
+  /// bytes), which this process passes over. When another map begins, the tiles of the last one are
+  /// removed. Throws std::invalid_argument for a region with faults, and as a request does: it asks
+  /// for the size of tiles, so a server that comes back with another size needs a new subscription.
   [[nodiscard]] Subscription subscribe_region(const Region& region,
                                               std::function<void(const RegionNews&)> news_arrived);
 
