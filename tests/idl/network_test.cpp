@@ -66,6 +66,20 @@ std::unique_ptr<Participant> connected(Participant& server, const DdsOptions& op
   return nullptr;
 }
 
+DdsOptions tcp_server() {
+  DdsOptions options = loopback(false);
+  options.transport = NetworkTransport::tcp;
+  options.listening_port = test_port();
+  return options;
+}
+
+DdsOptions tcp_client() {
+  DdsOptions options = tcp_server();
+  options.peers = {{"127.0.0.1", options.listening_port}};
+  options.listening_port = 0;
+  return options;
+}
+
 DdsOptions without_multicast() {
   DdsOptions options = loopback(false);
   options.multicast = false;
@@ -152,30 +166,18 @@ TEST(Network, PeersAreLookedForBesideMulticast) {
 }
 
 TEST(Network, TcpClientsFindTheServer) {
-  DdsOptions server = loopback(false);
-  server.transport = NetworkTransport::tcp;
-  server.listening_port = test_port();
-  DdsOptions client = server;
-  client.listening_port = 0;
-  client.peers = {{"127.0.0.1", server.listening_port}};
-  Participant a(server);
-  const auto b = connected(a, client);
+  Participant a(tcp_server());
+  const auto b = connected(a, tcp_client());
   ASSERT_TRUE(b);
   expect_large_clouds_arrive(a, *b);
   expect_large_clouds_arrive(*b, a);
 }
 
 TEST(Network, TcpClientsOfOneProcessAreToldApart) {
-  DdsOptions server = loopback(false);
-  server.transport = NetworkTransport::tcp;
-  server.listening_port = test_port();
-  DdsOptions client = server;
-  client.listening_port = 0;
-  client.peers = {{"127.0.0.1", server.listening_port}};
-  Participant a(server);
-  const auto b = connected(a, client);
+  Participant a(tcp_server());
+  const auto b = connected(a, tcp_client());
   ASSERT_TRUE(b);
-  const auto c = connected(a, client);
+  const auto c = connected(a, tcp_client());
   ASSERT_TRUE(c);
   expect_large_clouds_arrive(a, *b);
   expect_large_clouds_arrive(*c, a);
