@@ -6,6 +6,13 @@
 #include "server/background_thread.hpp"
 
 namespace stillmap {
+namespace {
+
+/// Work of about a millisecond.
+constexpr std::size_t bricks_at_once = 512;
+
+}  // namespace
+
 OccupancyThread::OccupancyThread(const OccupancyServing& config, Statistics& statistics,
                                  Pause pause)
     : config_(config.map),
@@ -19,7 +26,7 @@ void OccupancyThread::begin(std::shared_ptr<const MapView> view) {
   const std::scoped_lock lock(queue_mutex_);
   queue_.clear();
   to_follow_ = nullptr;
-  queue_.push_back({std::move(view), nullptr, {}});
+  queue_.push_back({std::move(view), nullptr, {}, {}});
   queue_changed_.notify_one();
 }
 
@@ -31,7 +38,7 @@ void OccupancyThread::add(OccupancyScan scan) {
     if (oldest != queue_.end()) queue_.erase(oldest);
     statistics_.count("occupancy_scans_left_out");
   }
-  queue_.push_back({nullptr, nullptr, std::move(scan)});
+  queue_.push_back({nullptr, nullptr, std::move(scan), {}});
   queue_changed_.notify_one();
 }
 
@@ -50,26 +57,34 @@ void OccupancyThread::work(const std::stop_token& stop) {
     bool keeps_up = true;
     {
       std::unique_lock lock(queue_mutex_);
-      if (!queue_changed_.wait(lock, stop, [this] { return !queue_.empty() || to_follow_; })) {
-        return;
-      }
+      if (!queue_changed_.wait(lock, stop, [this] { return has_work(); })) return;
       if (stop.stop_requested()) return;
       job = next_job();
       keeps_up = queue_.size() <= capacity_ / 2;
     }
-    if (job.first_view) {
-      begin_map(*job.first_view);
-    } else if (job.next_view) {
-      follow_now(*job.next_view);
-    } else {
-      insert(job.scan, keeps_up);
-    }
+    work_on(std::move(job), keeps_up);
+  }
+}
+
+void OccupancyThread::work_on(Job job, bool keeps_up) {
+  pause();
+  if (job.first_view) {
+    begin_map(*job.first_view);
+  } else if (job.next_view) {
+    follow_now(*job.next_view);
+  } else if (job.encoded) {
+    job.encoded->set_value(encode(true));
+  } else {
+    insert(job.scan, keeps_up);
   }
 }
 
 OccupancyThread::Job OccupancyThread::next_job() {
   const bool begins = !queue_.empty() && queue_.front().first_view;
-  if (to_follow_ && !begins) return {nullptr, std::exchange(to_follow_, nullptr), {}};
+  if (to_follow_ && !begins) return {nullptr, std::exchange(to_follow_, nullptr), {}, {}};
+  if (to_encode_ && !begins) {
+    return {nullptr, nullptr, {}, std::exchange(to_encode_, std::nullopt)};
+  }
   Job job = std::move(queue_.front());
   queue_.pop_front();
   return job;
@@ -82,7 +97,7 @@ void OccupancyThread::follow_now(const MapView& view) {
 
 void OccupancyThread::begin_map(const MapView& view) {
   OccupancyMap fresh(config_);
-  fresh.insert(view);
+  fresh.insert(view, pause_);
   fresh.follow(view);
   const std::scoped_lock lock(map_mutex_);
   map_ = std::move(fresh);
@@ -93,17 +108,26 @@ void OccupancyThread::insert(const OccupancyScan& scan, bool clears) {
   using Clock = std::chrono::steady_clock;
   const auto began = Clock::now();
   if (!clears) statistics_.count("occupancy_not_cleared");
-  // Only this thread changes the map.
+  // Only this thread changes the map; who asks waits for a portion at most.
   map_.gather(*scan.labelled, scan.T_map_lidar,
               {.clears = clears, .unknown_is_solid = scan.unknown_is_solid}, pause_);
+  while (take_portion()) pause();
   {
     const std::scoped_lock lock(map_mutex_);
-    map_.take_gathered();
     stamp_ns_ = scan.labelled->scan.stamp_ns;
     ++changes_;
   }
   const std::chrono::duration<double, std::milli> took = Clock::now() - began;
   statistics_.add_latency("occupancy", took.count());
+}
+
+bool OccupancyThread::take_portion() {
+  const std::scoped_lock lock(map_mutex_);
+  return map_.take_gathered(bricks_at_once);
+}
+
+void OccupancyThread::pause() const {
+  if (pause_) pause_();
 }
 
 OccupancyAnswers OccupancyThread::answer(const OccupancyQuery& query) const {
@@ -114,6 +138,13 @@ OccupancyAnswers OccupancyThread::answer(const OccupancyQuery& query) const {
 EncodedOctree OccupancyThread::encode(bool binary) const {
   const std::scoped_lock lock(map_mutex_);
   return {map_.encode(binary), stamp_ns_};
+}
+
+std::future<EncodedOctree> OccupancyThread::encode_in_background() {
+  const std::scoped_lock lock(queue_mutex_);
+  std::future<EncodedOctree> encoded = to_encode_.emplace().get_future();
+  queue_changed_.notify_one();
+  return encoded;
 }
 
 std::uint64_t OccupancyThread::changes() const {

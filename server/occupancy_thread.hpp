@@ -2,8 +2,10 @@
 
 #include <condition_variable>
 #include <deque>
+#include <future>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "config/server_config.hpp"
@@ -43,24 +45,34 @@ class OccupancyThread {
 
   /// Throws std::invalid_argument for a query that asks for too much.
   [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) const;
+  /// At once, on the calling thread.
   [[nodiscard]] EncodedOctree encode(bool binary) const;
+  /// On this object's thread, when that comes to it; one at a time. The future throws
+  /// std::future_error where the thread ends before.
+  [[nodiscard]] std::future<EncodedOctree> encode_in_background();
   /// Grows with every change, over all maps.
   [[nodiscard]] std::uint64_t changes() const;
 
  private:
-  /// Either a new map or a scan, or the newest view to be followed.
+  /// Either a new map or a scan, or the newest view to be followed, or an octree to be encoded.
   struct Job {
     std::shared_ptr<const MapView> first_view;
     std::shared_ptr<const MapView> next_view;
     OccupancyScan scan;
+    std::optional<std::promise<EncodedOctree>> encoded;
   };
 
   void work(const std::stop_token& stop);
+  void work_on(Job job, bool keeps_up);
   /// Under the queue's lock.
+  [[nodiscard]] bool has_work() const { return !queue_.empty() || to_follow_ || to_encode_; }
   [[nodiscard]] Job next_job();
   void begin_map(const MapView& view);
   void follow_now(const MapView& view);
   void insert(const OccupancyScan& scan, bool clears);
+  /// Of what was gathered; true while more is left.
+  bool take_portion();
+  void pause() const;
 
   OccupancyConfig config_;
   std::size_t capacity_;
@@ -70,6 +82,7 @@ class OccupancyThread {
   std::condition_variable_any queue_changed_;
   std::deque<Job> queue_;
   std::shared_ptr<const MapView> to_follow_;
+  std::optional<std::promise<EncodedOctree>> to_encode_;
   /// The last view that was to be followed.
   std::shared_ptr<const MapView> followed_;
   mutable std::mutex map_mutex_;

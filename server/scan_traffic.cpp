@@ -15,7 +15,7 @@ using Clock = std::chrono::steady_clock;
 constexpr auto work_between_pauses = 2ms;
 /// Longest pause, in times of the work before it.
 constexpr int rest = 9;
-constexpr std::chrono::nanoseconds longest_pause = 1s;
+constexpr std::chrono::nanoseconds longest_rest = 1s;
 constexpr auto look_period = 1ms;
 
 /// The time that the calling thread has worked; one that gives way to others may get none for long.
@@ -27,11 +27,13 @@ std::chrono::nanoseconds worked() {
 
 }  // namespace
 
-Pause give_way_to(const ScanTraffic& traffic) {
-  return [&traffic, last = std::chrono::nanoseconds(0)]() mutable {
+Pause give_way_to(const ScanTraffic& traffic, WithoutGaps without_gaps) {
+  return [&traffic, without_gaps, last = std::chrono::nanoseconds(0)]() mutable {
     const auto work = worked() - last;
     if (work < work_between_pauses) return;
-    const auto until = Clock::now() + std::min(rest * work, longest_pause);
+    const auto until = without_gaps == WithoutGaps::wait
+                           ? Clock::time_point::max()
+                           : Clock::now() + std::min(rest * work, longest_rest);
     while (!traffic.is_quiet() && Clock::now() < until) {
       std::this_thread::sleep_for(look_period);
     }

@@ -34,9 +34,14 @@ class ScanTraffic {
   std::atomic<int> in_work_ = 0;
 };
 
-/// For one background thread: waits for a gap between scans. Where there are no gaps, because scans
-/// come as fast as they can be mapped, the thread still works a tenth of the time, if it gets it:
-/// old areas are better than none. `traffic` must outlive it.
-[[nodiscard]] Pause give_way_to(const ScanTraffic& traffic);
+/// What a background thread does where scans come as fast as they can be mapped and leave no gaps.
+enum class WithoutGaps {
+  wait,
+  /// It still works a tenth of the time, if it gets it.
+  work_a_tenth,
+};
+
+/// For one background thread: waits for a gap between scans. `traffic` must outlive it.
+[[nodiscard]] Pause give_way_to(const ScanTraffic& traffic, WithoutGaps without_gaps);
 
 }  // namespace stillmap

@@ -93,12 +93,12 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
   start_metrics(config.metrics);
 }
 
-Server::~Server() = default;
+Server::~Server() { scan_traffic_.end(); }
 
-Pause Server::give_way(const ServerConfig& config) const {
+Pause Server::give_way(const ServerConfig& config, WithoutGaps without_gaps) const {
   // Where every scan counts, poses may come later, so that octree and areas keep up.
   if (config.input.delivery == Delivery::every) return {};
-  return give_way_to(scan_traffic_);
+  return give_way_to(scan_traffic_, without_gaps);
 }
 
 void Server::stop() {
@@ -122,7 +122,10 @@ void Server::start_mapping(const ServerConfig& config, std::unique_ptr<LabelSour
   if (!config.topics.odometry_prior.empty()) {
     prior_.emplace(participant_, config.topics.odometry_prior);
   }
-  if (config.occupancy.enabled) occupancy_.emplace(config.occupancy, statistics_, give_way(config));
+  if (config.occupancy.enabled) {
+    // An octree that misses scans is better than late poses.
+    occupancy_.emplace(config.occupancy, statistics_, give_way(config, WithoutGaps::wait));
+  }
   const MappingOutputs outputs{.poses = &poses_,
                                .scans = scans_ ? &*scans_ : nullptr,
                                .prior = prior_ ? &*prior_ : nullptr,
@@ -187,7 +190,7 @@ void Server::start_areas(const ServerConfig& config) {
   };
   areas_ = std::make_unique<AreaThread>(
       std::move(robots), std::chrono::duration<double>(config.areas.update_period_s), board_,
-      area_board_, statistics_, publish, give_way(config));
+      area_board_, statistics_, publish, give_way(config, WithoutGaps::work_a_tenth));
 }
 
 void Server::start_metrics(const MetricsConfig& config) {

@@ -45,7 +45,7 @@ class Server {
   void start_areas(const ServerConfig& config);
   void start_services(const ServerConfig& config);
   /// For what is done in the background.
-  [[nodiscard]] Pause give_way(const ServerConfig& config) const;
+  [[nodiscard]] Pause give_way(const ServerConfig& config, WithoutGaps without_gaps) const;
   void save_in_background();
   void start_metrics(const MetricsConfig& config);
 

@@ -2,6 +2,8 @@
 
 #include <octomap/OcTree.h>
 
+#include <algorithm>
+#include <span>
 #include <sstream>
 #include <stdexcept>
 
@@ -13,6 +15,12 @@
 #include "core/occupancy/scan_update.hpp"
 
 namespace stillmap {
+namespace {
+
+/// Work of about a millisecond.
+constexpr std::size_t bricks_between_pauses = 512;
+
+}  // namespace
 
 struct OccupancyMap::State {
   explicit State(const OccupancyConfig& occupancy_config)
@@ -25,7 +33,19 @@ struct OccupancyMap::State {
 
   OccupancyConfig config;
   octomap::OcTree octree;
+  /// Takes at most so many of the bricks that are left; false when all are taken.
+  bool take(std::size_t max_bricks, const LogOddsSteps& steps) {
+    const auto portion = gathered.first(std::min(max_bricks, gathered.size()));
+    update_octree(octree, portion, steps);
+    gathered = gathered.subspan(portion.size());
+    if (!gathered.empty()) return true;
+    ++version;
+    return false;
+  }
+
   VoxelBricks bricks;
+  /// Of `bricks`, what the octree has not taken yet.
+  std::span<const VoxelBrick> gathered;
   std::uint64_t version = 0;
   std::uint64_t scans = 0;
   /// Columns that are forgotten until their tiles come back.
@@ -96,15 +116,15 @@ void OccupancyMap::gather(const LabelledScan& scan, const Eigen::Isometry3d& T_m
   this_one.clears = use.clears && is_due && state_->config.clear_range_m > 0.0;
   state_->bricks.clear();
   gather_scan(state_->config, scan, T_map_lidar, this_one, state_->bricks, pause);
+  state_->gathered = state_->bricks.sorted();
 }
 
-void OccupancyMap::take_gathered() {
-  update_octree(state_->octree, state_->bricks.sorted(),
-                {state_->octree.getProbHitLog(), state_->octree.getProbMissLog()});
-  ++state_->version;
+bool OccupancyMap::take_gathered(std::size_t max_bricks) {
+  return state_->take(max_bricks,
+                      {state_->octree.getProbHitLog(), state_->octree.getProbMissLog()});
 }
 
-void OccupancyMap::insert(const MapView& view) {
+void OccupancyMap::insert(const MapView& view, const Pause& pause) {
   if (view.tiles.empty()) return;
   const VoxelGrid grid(view.voxel_size_m, view.tile_size_m);
   const Eigen::Vector3d half = Eigen::Vector3d::Constant(view.voxel_size_m / 2.0);
@@ -113,15 +133,18 @@ void OccupancyMap::insert(const MapView& view) {
   const double side_m = is_finer ? view.voxel_size_m : 0.0;
   state_->bricks.clear();
   for (const auto& tile : view.tiles) {
+    if (pause) pause();
     for (const Voxel& voxel : tile->voxels) {
       const Eigen::Vector3d centre_map = grid.corner_map(tile->info.id, voxel.index) + half;
       add_cube(is_finer ? centre_map : voxel.mean_map.cast<double>(), side_m,
                state_->config.resolution_m, state_->bricks);
     }
   }
+  state_->gathered = state_->bricks.sorted();
   const float surest = state_->octree.getClampingThresMaxLog();
-  update_octree(state_->octree, state_->bricks.sorted(), {2.0F * surest, 0.0F});
-  ++state_->version;
+  while (state_->take(bricks_between_pauses, {2.0F * surest, 0.0F})) {
+    if (pause) pause();
+  }
 }
 
 bool OccupancyMap::follow(const MapView& view) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 
 #include "core/lidar/labelled_scan.hpp"
@@ -39,13 +40,14 @@ class OccupancyMap {
               const ScanUse& use = {});
 
   /// The two halves of it: the first, which takes longer and may be held up, changes nothing that
-  /// readers see, and needs no lock against them.
+  /// readers see, and needs no lock against them. The second can be done in portions, with readers
+  /// between them; it returns whether more is left.
   void gather(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar, const ScanUse& use,
               const Pause& pause = {});
-  void take_gathered();
+  bool take_gathered(std::size_t max_bricks = std::numeric_limits<std::size_t>::max());
 
   /// Takes the voxels of a static map for occupied, as sure as can be.
-  void insert(const MapView& view);
+  void insert(const MapView& view, const Pause& pause = {});
 
   /// Where the static map's tiles are on the shelf, nothing stays in memory here either; where they
   /// came back, their voxels are occupied again, and free space is to be seen anew. Returns whether

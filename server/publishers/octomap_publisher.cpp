@@ -5,7 +5,7 @@
 namespace stillmap {
 
 OctomapPublisher::OctomapPublisher(Participant& participant, const Topics& topics,
-                                   const ServerConfig& config, const OccupancyThread& occupancy)
+                                   const ServerConfig& config, OccupancyThread& occupancy)
     : occupancy_(occupancy),
       map_frame_(config.frames.map),
       writer_(participant, topics.octomap.dds_name, topics.octomap.writer),
@@ -18,7 +18,8 @@ void OctomapPublisher::publish() {
   const std::uint64_t changes = occupancy_.changes();
   if (changes == published_) return;
   published_ = changes;
-  const EncodedOctree octree = occupancy_.encode(true);
+  // Encoding takes long, and poses come first.
+  const EncodedOctree octree = occupancy_.encode_in_background().get();
   // Keep-last writers always have room.
   static_cast<void>(writer_.write(wire::to_octomap(octree.data, octree.stamp_ns, map_frame_)));
 }

@@ -16,12 +16,12 @@ namespace stillmap {
 class OctomapPublisher {
  public:
   OctomapPublisher(Participant& participant, const Topics& topics, const ServerConfig& config,
-                   const OccupancyThread& occupancy);
+                   OccupancyThread& occupancy);
 
  private:
   void publish();
 
-  const OccupancyThread& occupancy_;
+  OccupancyThread& occupancy_;
   std::string map_frame_;
   std::uint64_t published_ = 0;
   Writer<octomap_msgs::msg::Octomap> writer_;

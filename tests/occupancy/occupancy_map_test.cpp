@@ -53,13 +53,15 @@ TEST(OccupancyMap, CanBeHeldUpWhileItTakesAScan) {
   OccupancyMap map(small_config());
   OccupancyMap undisturbed(small_config());
   int pauses = 0;
+  int portions = 0;
   for (std::uint32_t seed = 0; seed < 2; ++seed) {
     const PlacedScan placed = random_scan(seed, 300, 3.0);
     map.gather(placed.scan, placed.T_map_lidar, {}, [&] { ++pauses; });
-    map.take_gathered();
+    while (map.take_gathered(7)) ++portions;
     undisturbed.insert(placed.scan, placed.T_map_lidar);
   }
   EXPECT_GE(pauses, 2 * 300 / 64);
+  EXPECT_GT(portions, 10);
   EXPECT_EQ(map.encode(false).bytes, undisturbed.encode(false).bytes);
 }
 

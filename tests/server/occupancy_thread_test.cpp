@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
+
 #include "tests/server/room_scans.hpp"
 
 namespace stillmap::test {
@@ -55,6 +57,35 @@ TEST_F(OccupancyThreadTest, MakesWhatTheMapWouldMake) {
   EXPECT_EQ(octree.data.bytes, map.encode(false).bytes);
   EXPECT_EQ(octree.stamp_ns, room_scan(3).stamp_ns);
   EXPECT_EQ(counted(statistics_, "occupancy_not_cleared"), 0U);
+}
+
+TEST_F(OccupancyThreadTest, EncodesInTheBackgroundWhatItEncodesAtOnce) {
+  OccupancyThread thread(OccupancyServing{}, statistics_);
+  thread.add(room(0));
+  ASSERT_TRUE(done(thread, 1));
+  for (int i = 0; i < 2; ++i) {
+    std::future<EncodedOctree> encoded = thread.encode_in_background();
+    ASSERT_EQ(encoded.wait_for(60s), std::future_status::ready);
+    const EncodedOctree octree = encoded.get();
+    EXPECT_TRUE(octree.data.binary);
+    EXPECT_EQ(octree.data.bytes, thread.encode(true).data.bytes);
+    EXPECT_EQ(octree.stamp_ns, room_scan(0).stamp_ns);
+  }
+}
+
+TEST_F(OccupancyThreadTest, WaitsForGapsBetweenScansAndLosesNoneThatItHas) {
+  std::atomic<bool> is_quiet = false;
+  OccupancyThread thread(OccupancyServing{}, statistics_, [&] {
+    while (!is_quiet) std::this_thread::sleep_for(1ms);
+  });
+  thread.add(room(0));
+  std::future<EncodedOctree> encoded = thread.encode_in_background();
+  EXPECT_EQ(encoded.wait_for(300ms), std::future_status::timeout);
+  EXPECT_EQ(all_of(thread).occupied, 0U) << "who asks does not wait for gaps";
+  is_quiet = true;
+  EXPECT_TRUE(done(thread, 1));
+  EXPECT_EQ(encoded.wait_for(60s), std::future_status::ready);
+  EXPECT_GT(all_of(thread).occupied, 100U);
 }
 
 TEST_F(OccupancyThreadTest, LeavesOutClearingAndThenScansWhenItCannotKeepUp) {

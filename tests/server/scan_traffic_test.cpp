@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <optional>
 #include <thread>
@@ -27,15 +28,37 @@ Clock::duration longest_pause(const Pause& pause, Clock::duration duration) {
 
 TEST(ScanTraffic, HoldsUpBackgroundWorkWhileAScanIsInWork) {
   ScanTraffic traffic;
-  const Pause pause = give_way_to(traffic);
+  const Pause pause = give_way_to(traffic, WithoutGaps::work_a_tenth);
   const ScanTraffic::InWork scan(traffic);
   EXPECT_FALSE(traffic.is_quiet());
   EXPECT_GE(longest_pause(pause, 200ms), 15ms);
 }
 
+TEST(ScanTraffic, LeavesNoTimeWhereScansNeverEndToWhoWaits) {
+  ScanTraffic traffic;
+  std::optional<ScanTraffic::InWork> scan(traffic);
+  std::atomic<std::uint64_t> rounds = 0;
+  std::jthread background(
+      [&, pause = give_way_to(traffic, WithoutGaps::wait)](const std::stop_token& stop) {
+        for (; !stop.stop_requested(); ++rounds) pause();
+      });
+  // It may take a while to work at all; then it rests for longer than who works a tenth of the
+  // time.
+  const auto deadline = Clock::now() + 60s;
+  std::uint64_t before = 0;
+  do {
+    before = rounds;
+    std::this_thread::sleep_for(1200ms);
+  } while ((rounds == 0 || rounds != before) && Clock::now() < deadline);
+  EXPECT_EQ(rounds, before);
+  scan.reset();
+  while (rounds == before && Clock::now() < deadline) std::this_thread::sleep_for(1ms);
+  EXPECT_GT(rounds, before);
+}
+
 TEST(ScanTraffic, LeavesSomeTimeWhereScansNeverEnd) {
   ScanTraffic traffic;
-  const Pause pause = give_way_to(traffic);
+  const Pause pause = give_way_to(traffic, WithoutGaps::work_a_tenth);
   const ScanTraffic::InWork scan(traffic);
   // Else it would not return at all.
   EXPECT_LT(longest_pause(pause, 200ms), 10s);
@@ -43,7 +66,7 @@ TEST(ScanTraffic, LeavesSomeTimeWhereScansNeverEnd) {
 
 TEST(ScanTraffic, LetsBackgroundWorkGoOnWhenTheScanIsDone) {
   ScanTraffic traffic;
-  const Pause pause = give_way_to(traffic);
+  const Pause pause = give_way_to(traffic, WithoutGaps::work_a_tenth);
   std::optional<ScanTraffic::InWork> scan(traffic);
   static_cast<void>(longest_pause(pause, 50ms));
   scan.reset();
