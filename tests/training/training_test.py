@@ -15,6 +15,7 @@ from augmentation import augment_points, crop, drop_beams
 from losses import class_weights, lovasz_softmax, weighted_cross_entropy
 from metrics import Confusion
 from range_images import ImageModel, normalise, project
+from samples import TrainingSamples
 
 STILLMAP = os.environ["STILLMAP"]
 TRAINING = Path(os.environ["STILLMAP_TRAINING"])
@@ -25,6 +26,7 @@ SMALL = [
     "optimiser.batch=2",
     "optimiser.averaged_steps=5",
     "augmentation.crop_columns=128",
+    "augmentation.image_columns=[128,256]",
     "image.columns=256",
     "data.validation_scans=3",
 ]
@@ -142,6 +144,36 @@ class Augmentation(unittest.TestCase):
             np.testing.assert_array_equal(part[0], target)
 
 
+class FewScans:
+    """One scan of a wall all round, of a sensor with four rings."""
+
+    images = [ImageModel(4, 64, 10, -10)]
+
+    def read(self, index):
+        azimuth = np.linspace(-np.pi, np.pi, 2000)
+        points = [10 * np.cos(azimuth), 10 * np.sin(azimuth), np.tile([-1, 0, 0.5, 1], 500)]
+        points = np.stack(points, 1).astype(np.float32)
+        return points, np.full(2000, 0.5, np.float32), np.full(2000, 13)
+
+
+class Widths(unittest.TestCase):
+    def filled_columns(self, widths):
+        """Of crops of scans that are drawn `widths` wide: how many columns have a point."""
+        settings = {**Augmentation.settings, "crop_columns": 32, "image_columns": widths}
+        settings["halve_beams"] = 0
+        config = {"mean": [0] * 5, "deviation": [1] * 5, "augmentation": settings}
+        samples = TrainingSamples(FewScans(), config)
+        targets = [samples[0, seed][1] for seed in range(8)]
+        self.assertEqual({target.shape for target in targets}, {(4, 32)})
+        return {int((target > 0).any(0).sum()) for target in targets}
+
+    def test_are_drawn_for_each_scan(self):
+        self.assertEqual(self.filled_columns([]), {32})
+        # So wide that most columns get no point.
+        self.assertLess(max(self.filled_columns([16384])), 20)
+        self.assertGreater(len(self.filled_columns([64, 16384])), 1)
+
+
 class Training(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -170,7 +202,11 @@ class Training(unittest.TestCase):
         self.assertIn("goes on after epoch 2", output)
         history = torch.load(self.root / "run" / "last.pt")["history"]
         self.assertEqual([entry["epoch"] for entry in history], [1, 2, 3, 4, 5, 6])
-        self.assertLess(history[-1]["loss"], history[0]["loss"])
+        self.assertLess(history[1]["loss"], history[0]["loss"])
+        # It goes on in the longer run's schedule: in that of the first, the rate would be nothing.
+        self.assertLess(history[-1]["loss"], 0.95 * history[1]["loss"])
+        rate = torch.load(self.root / "run" / "last.pt")["schedule"]["lr_lambdas"][0]
+        self.assertEqual(rate["settings"]["epochs"], 6)
         for picture in ("curves.png", "labels_0.png"):
             self.assertGreater((self.root / "run" / picture).stat().st_size, 1000)
         sequence = self.data / "sequences" / "00"

@@ -28,7 +28,7 @@ def weighted_cross_entropy(scores, target, weights):
     return functional.cross_entropy(scores, target, weights, ignore_index=IGNORED)
 
 
-def lovasz_softmax(scores, target, pixels=32768):
+def lovasz_softmax(scores, target, pixels=16384):
     """A smooth stand-in for 1 - mIoU (Berman et al., CVPR 2018): mean over the classes that are
     there of the Lovasz extension of the Jaccard loss. On at most `pixels` pixels, drawn at random,
     since it sorts all of them for every class."""

@@ -1,5 +1,7 @@
 """Training and validation samples, and batches of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 
@@ -32,6 +34,11 @@ def plain_sample(scans, index, config):
     return _network_input(image, remission, config), _target(image, classes)
 
 
+def _drawn_width(image, settings, random):
+    widths = settings.get("image_columns")
+    return replace(image, columns=int(random.choice(widths))) if widths else image
+
+
 class TrainingSamples(torch.utils.data.Dataset):
     """Augmented parts of range images; another draw every time."""
 
@@ -47,7 +54,8 @@ class TrainingSamples(torch.utils.data.Dataset):
         settings = self.config["augmentation"]
         points, remission, classes = augment_points(*self.scans.read(index), settings, random)
         known = remission if remission is not None else np.zeros(len(points), np.float32)
-        image = project(points, known, self.scans.images[index])
+        model = _drawn_width(self.scans.images[index], settings, random)
+        image = project(points, known, model)
         drop_beams(image, settings, random)
         channels = _network_input(image, remission, self.config)
         channels, target = crop(

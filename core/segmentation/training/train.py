@@ -99,7 +99,9 @@ class Run:
         self.network.load_state_dict(state["network"])
         self.averaged.load_state_dict(state["averaged"])
         self.optimiser.load_state_dict(state["optimiser"])
-        self.schedule.load_state_dict(state["schedule"])
+        # Where it stands in the schedule; rate and length are this configuration's.
+        fresh = {"base_lrs": self.schedule.base_lrs, "lr_lambdas": [None]}
+        self.schedule.load_state_dict({**state["schedule"], **fresh})
         self.epoch, self.step, self.history = state["epoch"], state["step"], state["history"]
         print(f"{file}: goes on after epoch {self.epoch}")
 
