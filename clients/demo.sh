@@ -36,9 +36,13 @@ trap 'exit 130' INT TERM
 # A domain whose discovery port (7400 + 250 * domain) nobody on this machine has open.
 free_domain() {
   local domain port
-  for domain in $(seq 60 99 | shuf); do
-    printf -v port '%04X' $((7400 + 250 * domain))
-    grep -qi ":$port " /proc/net/udp || { echo "$domain"; return; }
+  for _ in {1..10}; do
+    for domain in $(seq 60 99 | shuf); do
+      printf -v port '%04X' $((7400 + 250 * domain))
+      grep -qi ":$port " /proc/net/udp || { echo "$domain"; return; }
+    done
+    # For a second or so `stillmap doctor` listens to all domains at once.
+    sleep 1
   done
   return 1
 }

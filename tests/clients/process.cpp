@@ -6,12 +6,14 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
 #include <random>
 #include <sstream>
 #include <stdexcept>
+#include <thread>
 #include <vector>
 
 namespace stillmap::test {
@@ -82,6 +84,8 @@ int free_domain() {
   for (int attempt = 0; attempt < 1000; ++attempt) {
     const int domain = std::uniform_int_distribution(100, 200)(random);
     if (!is_used(7400 + 250 * domain)) return domain;
+    // For a second or so `stillmap doctor` listens to all domains at once.
+    std::this_thread::sleep_for(std::chrono::milliseconds(20));
   }
   throw std::runtime_error("no free DDS domain between 100 and 200");
 }
