@@ -8,6 +8,7 @@
 #include "config/int8_file.hpp"
 #include "config/model_folder.hpp"
 #include "config/yaml_section.hpp"
+#include "core/segmentation/model_error.hpp"
 #include "core/segmentation/network_labels.hpp"
 #include "core/segmentation/stream_first_labels.hpp"
 #include "core/segmentation/stream_labels.hpp"
@@ -90,8 +91,15 @@ void read_model(YamlSection file, ModelDescription& model) {
 
 std::unique_ptr<LabelSource> open_network_labels(const LabelsConfig& labels,
                                                  const SensorModel& sensor) {
-  const ModelDescription model = load_model_description(find_model(labels.model));
-  return open_model(for_sensor(model, sensor), labels.engine);
+  ModelDescription model = load_model_description(find_model(labels.model));
+  if (labels.image_columns == 0) return open_model(for_sensor(model, sensor), labels.engine);
+  model.columns = labels.image_columns;
+  try {
+    return open_model(for_sensor(model, sensor), labels.engine);
+  } catch (const ModelError& error) {
+    throw ModelError("with " + std::to_string(labels.image_columns) + " image columns",
+                     error.what());
+  }
 }
 
 }  // namespace

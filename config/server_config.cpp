@@ -45,6 +45,11 @@ void read_labels(YamlSection section, LabelsConfig& labels) {
                                {"model", LabelOrigin::model},
                                {"none", LabelOrigin::none}});
   read_model_name(section, labels.model);
+  section.whole("image_columns", labels.image_columns, {0, 8192});
+  if (labels.image_columns > 0 && labels.image_columns < 16) {
+    section.fault("image_columns", "is " + std::to_string(labels.image_columns) +
+                                       ", but must be 0 (as the model says) or 16..8192");
+  }
   using Engine = EngineChoice::Engine;
   section.choice<Engine>(
       "engine", labels.engine.engine,

@@ -32,6 +32,8 @@ struct LabelsConfig {
   LabelOrigin source = LabelOrigin::automatic;
   /// Name of a model that comes with Stillmap, or folder of one; see find_model().
   std::filesystem::path model = "street";
+  /// Columns of the range image that the network gets; 0: as the model says.
+  int image_columns = 0;
   /// What runs the network.
   EngineChoice engine;
   /// Longest wait of a scan for the network's labels; then it goes on with labels carried from the

@@ -119,7 +119,7 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
       .excludes(predictions);
   command.option("--sensor", arguments->mapper.sensor,
                  "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the recording suggests");
-  add_engine_options(command, arguments->mapper.engine);
+  add_segmentation_options(command, arguments->mapper);
   command.option("--start", arguments->range.first, "Number of the first scan");
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
   command.option("--picture", arguments->picture,

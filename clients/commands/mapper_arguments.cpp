@@ -8,6 +8,16 @@
 
 namespace stillmap {
 
+void add_segmentation_options(CommandHandle command, MapperArguments& arguments) {
+  command
+      .option(
+          "--columns", arguments.columns,
+          "Columns of the range image of a model that runs; default: as configured, else as the "
+          "model says")
+      .between(16, 8192);
+  add_engine_options(command, arguments.engine);
+}
+
 void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
   command.option("--config", arguments.config_file,
                  "Server file (config/server/*.yaml); its mapper settings are used");
@@ -24,7 +34,7 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
               "What a correspondence counts, the rows of the paper's Table I: none, "
               "geometric, semantic; default: as configured")
       .one_of({"none", "geometric", "semantic"});
-  add_engine_options(command, arguments.engine);
+  add_segmentation_options(command, arguments);
 }
 
 Weighting weighting_from_name(const std::string& weighting_name) {
@@ -69,6 +79,7 @@ std::unique_ptr<LabelSource> label_source(const MapperArguments& arguments,
   } else if (labels.source == LabelOrigin::automatic) {
     labels.source = dataset.has_labels(0) ? LabelOrigin::stream : LabelOrigin::model;
   }
+  if (arguments.columns > 0) labels.image_columns = static_cast<int>(arguments.columns);
   set_engine(arguments.engine, labels.engine);
   return open_label_source(labels, mapper_config(arguments, dataset.suggested_sensor()).sensor);
 }

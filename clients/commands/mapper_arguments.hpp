@@ -20,10 +20,14 @@ struct MapperArguments {
   std::string labels = "auto";
   /// "none", "geometric", "semantic"; empty: as configured.
   std::string weighting;
+  /// Of the network's range image; 0: as configured.
+  std::uint32_t columns = 0;
   EngineArguments engine;
 };
 
-/// Adds --config, --sensor, --labels, --weighting, --engine, --precision and --threads.
+/// Adds --columns, --engine, --precision and --threads.
+void add_segmentation_options(CommandHandle command, MapperArguments& arguments);
+/// Adds these and --config, --sensor, --labels, --weighting.
 void add_mapper_options(CommandHandle command, MapperArguments& arguments);
 
 [[nodiscard]] Weighting weighting_from_name(const std::string& weighting_name);

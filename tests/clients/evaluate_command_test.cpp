@@ -112,6 +112,24 @@ TEST_F(EvaluateCommandTest, ScoresSegmentationAgainstItself) {
   EXPECT_LT(json.at("miou"), 1.0);
 }
 
+TEST_F(EvaluateCommandTest, RunsTheNetworkOnAnImageOfTheWidthAskedFor) {
+  simulate("city", 1);
+  const std::string command = "evaluate segmentation --json --truth " + path("city");
+  const auto accuracy = [&](const std::string& more) {
+    const ProcessResult result = run(command + more);
+    EXPECT_EQ(result.exit_code, 0) << result.err;
+    return nlohmann::json::parse(result.out).at("accuracy").get<double>();
+  };
+  const double wide = accuracy(" --columns 1024");
+  EXPECT_EQ(accuracy(" --columns 1024"), wide);
+  EXPECT_NE(accuracy(" --columns 128"), wide);
+  EXPECT_GT(wide, 0.3);
+  const ProcessResult odd = run(command + " --columns 1001");
+  EXPECT_EQ(odd.exit_code, 2);
+  EXPECT_THAT(odd.err, HasSubstr("1001"));
+  EXPECT_EQ(run(command + " --columns 9000").exit_code, 2);
+}
+
 TEST_F(EvaluateCommandTest, RefusesPredictionsThatDoNotFit) {
   simulate("city", 2);
   const std::string command =

@@ -102,7 +102,9 @@ TEST(ModelFile, RefusesAFolderThatIsNotThere) {
 
 TEST(LabelSource, IsTheOneAskedFor) {
   const auto name = [](LabelOrigin source) {
-    return open_label_source({.source = source, .model = {}, .engine = {}}, hdl_64e())->name();
+    return open_label_source({.source = source, .model = {}, .image_columns = 0, .engine = {}},
+                             hdl_64e())
+        ->name();
   };
   EXPECT_EQ(name(LabelOrigin::stream), "stream");
   EXPECT_EQ(name(LabelOrigin::none), "none");
@@ -111,8 +113,9 @@ TEST(LabelSource, IsTheOneAskedFor) {
 TEST(LabelSource, NamesTheNetworkFileThatIsMissing) {
   const auto folder = write_file("model.yaml", sound).parent_path();
   try {
-    (void)open_label_source({.source = LabelOrigin::model, .model = folder, .engine = {}},
-                            hdl_64e());
+    (void)open_label_source(
+        {.source = LabelOrigin::model, .model = folder, .image_columns = 0, .engine = {}},
+        hdl_64e());
     FAIL() << "a model without a network was opened";
   } catch (const ModelError& error) {
     EXPECT_THAT(error.what(), HasSubstr("model.onnx"));

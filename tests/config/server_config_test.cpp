@@ -47,7 +47,7 @@ TEST(ServerConfig, ReportsWhatAFileChanges) {
 TEST(ServerConfig, ReadsFieldsOfEveryKind) {
   const ServerConfig config = load(R"(
 sensor: vlp_16
-labels: {source: none, engine: onednn, precision: int8, threads: 3}
+labels: {source: none, engine: onednn, precision: int8, threads: 3, image_columns: 512}
 dds: {domain_id: 42, shared_memory: false, interfaces: [127.0.0.1],
       profile: wifi, peers: [a, "b:1"], discovery_server: c, socket_buffer_bytes: 99999,
       ros_gid_bytes: 16}
@@ -62,6 +62,7 @@ static_map: {min_points: 5}
   EXPECT_EQ(config.labels.engine.engine, EngineChoice::Engine::onednn);
   EXPECT_EQ(config.labels.engine.precision, EngineChoice::Numbers::int8);
   EXPECT_EQ(config.labels.engine.threads, 3);
+  EXPECT_EQ(config.labels.image_columns, 512);
   EXPECT_EQ(config.dds.domain_id, 42U);
   EXPECT_EQ(config.dds.network.shared_memory, std::optional<bool>(false));
   EXPECT_THAT(config.dds.network.interfaces, ::testing::ElementsAre("127.0.0.1"));
