@@ -6,12 +6,6 @@
 #include "server/background_thread.hpp"
 
 namespace stillmap {
-namespace {
-
-/// Work of about a millisecond.
-constexpr std::size_t bricks_at_once = 512;
-
-}  // namespace
 
 OccupancyThread::OccupancyThread(const OccupancyServing& config, Statistics& statistics,
                                  Pause pause)
@@ -27,6 +21,7 @@ void OccupancyThread::begin(std::shared_ptr<const MapView> view) {
   queue_.clear();
   to_follow_ = nullptr;
   queue_.push_back({std::move(view), nullptr, {}, {}});
+  has_old_map_ = true;
   queue_changed_.notify_one();
 }
 
@@ -53,27 +48,28 @@ void OccupancyThread::follow(std::shared_ptr<const MapView> view) {
 void OccupancyThread::work(const std::stop_token& stop) {
   static_cast<void>(run_in_background());
   while (true) {
-    Job job;
-    bool keeps_up = true;
-    {
-      std::unique_lock lock(queue_mutex_);
-      if (!queue_changed_.wait(lock, stop, [this] { return has_work(); })) return;
-      if (stop.stop_requested()) return;
-      job = next_job();
-      keeps_up = queue_.size() <= capacity_ / 2;
-    }
+    std::unique_lock lock(queue_mutex_);
+    if (!queue_changed_.wait(lock, stop, [this] { return has_work(); })) return;
+    lock.unlock();
+    // First, so that the job is what there is to do then.
+    pause();
+    lock.lock();
+    if (stop.stop_requested()) return;
+    Job job = next_job();
+    const bool keeps_up = queue_.size() <= capacity_ / 2;
+    lock.unlock();
     work_on(std::move(job), keeps_up);
   }
 }
 
 void OccupancyThread::work_on(Job job, bool keeps_up) {
-  pause();
   if (job.first_view) {
     begin_map(*job.first_view);
   } else if (job.next_view) {
     follow_now(*job.next_view);
   } else if (job.encoded) {
-    job.encoded->set_value(encode(true));
+    // Only this thread changes the map: who asks need not wait.
+    job.encoded->set_value({map_.encode(true), stamp_ns_});
   } else {
     insert(job.scan, keeps_up);
   }
@@ -99,8 +95,11 @@ void OccupancyThread::begin_map(const MapView& view) {
   OccupancyMap fresh(config_);
   fresh.insert(view, pause_);
   fresh.follow(view);
-  const std::scoped_lock lock(map_mutex_);
+  const std::scoped_lock lock(map_mutex_, queue_mutex_);
   map_ = std::move(fresh);
+  stamp_ns_ = 0;
+  // Unless yet another one is to begin.
+  has_old_map_ = !queue_.empty() && queue_.front().first_view;
   ++changes_;
 }
 
@@ -123,7 +122,7 @@ void OccupancyThread::insert(const OccupancyScan& scan, bool clears) {
 
 bool OccupancyThread::take_portion() {
   const std::scoped_lock lock(map_mutex_);
-  return map_.take_gathered(bricks_at_once);
+  return map_.take_gathered(OccupancyMap::portion_bricks);
 }
 
 void OccupancyThread::pause() const {
@@ -131,11 +130,13 @@ void OccupancyThread::pause() const {
 }
 
 OccupancyAnswers OccupancyThread::answer(const OccupancyQuery& query) const {
+  if (has_old_map_) return OccupancyMap(config_).answer(query);
   const std::scoped_lock lock(map_mutex_);
   return map_.answer(query);
 }
 
 EncodedOctree OccupancyThread::encode(bool binary) const {
+  if (has_old_map_) return {OccupancyMap(config_).encode(binary), 0};
   const std::scoped_lock lock(map_mutex_);
   return {map_.encode(binary), stamp_ns_};
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <atomic>
 #include <condition_variable>
 #include <deque>
 #include <future>
@@ -25,7 +26,7 @@ struct OccupancyScan {
 /// The octree as it was when asked for.
 struct EncodedOctree {
   OctomapData data;
-  /// Stamp of the newest scan in it.
+  /// Stamp of the newest scan that is in it as a whole; 0: none.
   std::int64_t stamp_ns = 0;
 };
 
@@ -37,7 +38,8 @@ class OccupancyThread {
  public:
   OccupancyThread(const OccupancyServing& config, Statistics& statistics, Pause pause = {});
 
-  /// A new map begins, with the voxels of this view. Returns at once, as `add` does.
+  /// A new map begins, with the voxels of this view; until they are there, answers are those of an
+  /// empty one. Returns at once, as `add` does.
   void begin(std::shared_ptr<const MapView> view);
   void add(OccupancyScan scan);
   /// Tiles left memory, or came back.
@@ -87,6 +89,8 @@ class OccupancyThread {
   std::shared_ptr<const MapView> followed_;
   mutable std::mutex map_mutex_;
   OccupancyMap map_;
+  /// The one before that which is to begin.
+  std::atomic<bool> has_old_map_ = false;
   std::uint64_t changes_ = 0;
   std::int64_t stamp_ns_ = 0;
   // Last: stops before what it uses is gone.

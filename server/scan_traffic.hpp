@@ -34,6 +34,18 @@ class ScanTraffic {
   std::atomic<int> in_work_ = 0;
 };
 
+/// Ends the traffic when it goes, so that threads that wait for gaps can go, too.
+class TrafficEnd {
+ public:
+  explicit TrafficEnd(ScanTraffic& traffic) : traffic_(traffic) {}
+  ~TrafficEnd() { traffic_.end(); }
+  TrafficEnd(const TrafficEnd&) = delete;
+  TrafficEnd& operator=(const TrafficEnd&) = delete;
+
+ private:
+  ScanTraffic& traffic_;
+};
+
 /// What a background thread does where scans come as fast as they can be mapped and leave no gaps.
 enum class WithoutGaps {
   wait,

@@ -93,7 +93,7 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
   start_metrics(config.metrics);
 }
 
-Server::~Server() { scan_traffic_.end(); }
+Server::~Server() = default;
 
 Pause Server::give_way(const ServerConfig& config, WithoutGaps without_gaps) const {
   // Where every scan counts, poses may come later, so that octree and areas keep up.
@@ -109,10 +109,11 @@ void Server::stop() {
   services_.reset();
   occupancy_services_.reset();
   removed_services_.reset();
-  octomap_publisher_.reset();
-  areas_.reset();
   status_publisher_.reset();
   receiver_.reset();
+  // They get little time while scans come.
+  octomap_publisher_.reset();
+  areas_.reset();
   mapping_->stop();
   saver_.save_at_end();
 }

@@ -81,6 +81,7 @@ class Server {
   RareWarnings save_warnings_;
   std::unique_ptr<CheckpointThread> autosave_;
   std::unique_ptr<MetricsEndpoint> metrics_;
+  TrafficEnd traffic_end_{scan_traffic_};
 };
 
 }  // namespace stillmap

@@ -15,13 +15,6 @@
 #include "core/occupancy/scan_update.hpp"
 
 namespace stillmap {
-namespace {
-
-/// Work of about a millisecond.
-constexpr std::size_t bricks_between_pauses = 512;
-
-}  // namespace
-
 struct OccupancyMap::State {
   explicit State(const OccupancyConfig& occupancy_config)
       : config(occupancy_config), octree(occupancy_config.resolution_m) {
@@ -31,8 +24,11 @@ struct OccupancyMap::State {
     octree.setClampingThresMax(OccupancyConfig::max_probability);
   }
 
-  OccupancyConfig config;
-  octomap::OcTree octree;
+  void begin_to_gather() {
+    gathered = {};
+    bricks.clear();
+  }
+
   /// Takes at most so many of the bricks that are left; false when all are taken.
   bool take(std::size_t max_bricks, const LogOddsSteps& steps) {
     const auto portion = gathered.first(std::min(max_bricks, gathered.size()));
@@ -43,6 +39,8 @@ struct OccupancyMap::State {
     return false;
   }
 
+  OccupancyConfig config;
+  octomap::OcTree octree;
   VoxelBricks bricks;
   /// Of `bricks`, what the octree has not taken yet.
   std::span<const VoxelBrick> gathered;
@@ -114,7 +112,7 @@ void OccupancyMap::gather(const LabelledScan& scan, const Eigen::Isometry3d& T_m
   ScanUse this_one = use;
   const bool is_due = state_->scans++ % state_->config.clear_every == 0;
   this_one.clears = use.clears && is_due && state_->config.clear_range_m > 0.0;
-  state_->bricks.clear();
+  state_->begin_to_gather();
   gather_scan(state_->config, scan, T_map_lidar, this_one, state_->bricks, pause);
   state_->gathered = state_->bricks.sorted();
 }
@@ -131,7 +129,7 @@ void OccupancyMap::insert(const MapView& view, const Pause& pause) {
   // Finer voxels fill the static map's; coarser ones are those that hold its points.
   const bool is_finer = state_->config.resolution_m <= view.voxel_size_m;
   const double side_m = is_finer ? view.voxel_size_m : 0.0;
-  state_->bricks.clear();
+  state_->begin_to_gather();
   for (const auto& tile : view.tiles) {
     if (pause) pause();
     for (const Voxel& voxel : tile->voxels) {
@@ -142,7 +140,7 @@ void OccupancyMap::insert(const MapView& view, const Pause& pause) {
   }
   state_->gathered = state_->bricks.sorted();
   const float surest = state_->octree.getClampingThresMaxLog();
-  while (state_->take(bricks_between_pauses, {2.0F * surest, 0.0F})) {
+  while (state_->take(portion_bricks, {2.0F * surest, 0.0F})) {
     if (pause) pause();
   }
 }

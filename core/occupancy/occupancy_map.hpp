@@ -41,10 +41,12 @@ class OccupancyMap {
 
   /// The two halves of it: the first, which takes longer and may be held up, changes nothing that
   /// readers see, and needs no lock against them. The second can be done in portions, with readers
-  /// between them; it returns whether more is left.
+  /// between them; it returns whether more is left. Nothing else may be inserted before that.
   void gather(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar, const ScanUse& use,
               const Pause& pause = {});
   bool take_gathered(std::size_t max_bricks = std::numeric_limits<std::size_t>::max());
+  /// A portion that takes about a millisecond.
+  static constexpr std::size_t portion_bricks = 512;
 
   /// Takes the voxels of a static map for occupied, as sure as can be.
   void insert(const MapView& view, const Pause& pause = {});

@@ -73,19 +73,76 @@ TEST_F(OccupancyThreadTest, EncodesInTheBackgroundWhatItEncodesAtOnce) {
   }
 }
 
-TEST_F(OccupancyThreadTest, WaitsForGapsBetweenScansAndLosesNoneThatItHas) {
-  std::atomic<bool> is_quiet = false;
-  OccupancyThread thread(OccupancyServing{}, statistics_, [&] {
-    while (!is_quiet) std::this_thread::sleep_for(1ms);
-  });
-  thread.add(room(0));
-  std::future<EncodedOctree> encoded = thread.encode_in_background();
-  EXPECT_EQ(encoded.wait_for(300ms), std::future_status::timeout);
+/// Holds the thread up where it looks for a gap.
+class GatedOccupancyThreadTest : public OccupancyThreadTest {
+ protected:
+  Pause gate() {
+    return [this] {
+      is_waiting_ = !is_open_;
+      while (!is_open_) std::this_thread::sleep_for(1ms);
+      is_waiting_ = false;
+    };
+  }
+  [[nodiscard]] bool waits() const {
+    const auto deadline = std::chrono::steady_clock::now() + 60s;
+    while (!is_waiting_ && std::chrono::steady_clock::now() < deadline) {
+      std::this_thread::sleep_for(1ms);
+    }
+    return is_waiting_;
+  }
+  std::atomic<bool> is_open_ = true;
+  std::atomic<bool> is_waiting_ = false;
+};
+
+TEST_F(GatedOccupancyThreadTest, WaitsForGapsBetweenScansAndTakesThemThen) {
+  OccupancyThread thread(OccupancyServing{}, statistics_, gate());
+  is_open_ = false;
+  for (int i = 0; i < 4; ++i) thread.add(room(i));
+  ASSERT_TRUE(waits());
+  EXPECT_EQ(thread.changes(), 0U);
   EXPECT_EQ(all_of(thread).occupied, 0U) << "who asks does not wait for gaps";
-  is_quiet = true;
-  EXPECT_TRUE(done(thread, 1));
-  EXPECT_EQ(encoded.wait_for(60s), std::future_status::ready);
+  is_open_ = true;
+  EXPECT_TRUE(done(thread, 4));
   EXPECT_GT(all_of(thread).occupied, 100U);
+}
+
+TEST_F(GatedOccupancyThreadTest, EncodesInAGap) {
+  OccupancyThread thread(OccupancyServing{}, statistics_, gate());
+  thread.add(room(0));
+  ASSERT_TRUE(done(thread, 1));
+  is_open_ = false;
+  std::future<EncodedOctree> encoded = thread.encode_in_background();
+  ASSERT_TRUE(waits());
+  EXPECT_EQ(encoded.wait_for(0s), std::future_status::timeout);
+  is_open_ = true;
+  EXPECT_EQ(encoded.wait_for(60s), std::future_status::ready);
+}
+
+TEST_F(GatedOccupancyThreadTest, ShowsNothingOfTheOldMapWhileANewOneWaitsForAGap) {
+  OccupancyThread thread(OccupancyServing{}, statistics_, gate());
+  thread.add(room(0));
+  ASSERT_TRUE(done(thread, 1));
+  is_open_ = false;
+  StaticMap map{StaticMapConfig{}};
+  thread.begin(map.view());
+  ASSERT_TRUE(waits());
+  EXPECT_EQ(all_of(thread).occupied, 0U);
+  EXPECT_EQ(thread.encode(true).data.bytes, OccupancyMap(OccupancyConfig{}).encode(true).bytes);
+  is_open_ = true;
+  EXPECT_TRUE(done(thread, 2));
+  EXPECT_EQ(all_of(thread).occupied, 0U);
+}
+
+TEST_F(GatedOccupancyThreadTest, EndsWithAnEncodingUnderWay) {
+  std::future<EncodedOctree> encoded;
+  {
+    OccupancyThread thread(OccupancyServing{}, statistics_, gate());
+    is_open_ = false;
+    encoded = thread.encode_in_background();
+    ASSERT_TRUE(waits());
+    is_open_ = true;
+  }
+  EXPECT_EQ(encoded.wait_for(0s), std::future_status::ready) << "with an octree or an exception";
 }
 
 TEST_F(OccupancyThreadTest, LeavesOutClearingAndThenScansWhenItCannotKeepUp) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <memory>
 #include <optional>
 #include <thread>
 
@@ -36,7 +37,7 @@ TEST(ScanTraffic, HoldsUpBackgroundWorkWhileAScanIsInWork) {
 
 TEST(ScanTraffic, LeavesNoTimeWhereScansNeverEndToWhoWaits) {
   ScanTraffic traffic;
-  std::optional<ScanTraffic::InWork> scan(traffic);
+  auto scan = std::make_unique<ScanTraffic::InWork>(traffic);
   std::atomic<std::uint64_t> rounds = 0;
   std::jthread background(
       [&, pause = give_way_to(traffic, WithoutGaps::wait)](const std::stop_token& stop) {
