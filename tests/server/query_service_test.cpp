@@ -1,8 +1,10 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cstdio>
 #include <limits>
+#include <thread>
 
 #include "core/map/continuation.hpp"
 #include "core/map/region_shape.hpp"
@@ -27,8 +29,14 @@ class QueryService : public testing::Test {
   QueryService() : setup_("every"), server_(setup_.server_arguments()), client_(setup_.client()) {
     drive(publisher_, 0, 8);
     EXPECT_TRUE(wait_for_scans(client_, 8));
-    // The view that queries see follows within a moment.
-    EXPECT_TRUE(eventually([&] { return client_.status().voxel_count > 0; }));
+    EXPECT_TRUE(eventually([&] { return shows_all_it_mapped(); }));
+  }
+
+  /// The view that queries see follows the last scan within a moment.
+  [[nodiscard]] bool shows_all_it_mapped() {
+    const ServerStatus before = client_.status();
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    return before.voxel_count > 0 && client_.status().map_version == before.map_version;
   }
 
   ServiceSetup setup_;
