@@ -107,6 +107,8 @@ TEST(ServerConfig, SuggestsTheNameThatWasMeant) {
   EXPECT_THAT(refusal_of("publish: {path_period: 2}"), HasSubstr("did you mean 'path_period_s'"));
   EXPECT_THAT(refusal_of("odometri: {alpha: 0.1}"), HasSubstr("did you mean 'odometry'"));
   EXPECT_THAT(refusal_of("sensor: hdl64e"), HasSubstr("did you mean 'hdl_64e'"));
+  EXPECT_THAT(refusal_of("labels: {image_columns: 15}"), HasSubstr("image_columns"));
+  EXPECT_THAT(refusal_of("labels: {image_columns: 8193}"), HasSubstr("image_columns"));
   EXPECT_THAT(refusal_of("input: {delivery: reliable}"), HasSubstr("known are: latest, every"));
 }
 
