@@ -22,6 +22,7 @@ void read_image(YamlSection section, ModelDescription& model) {
   section.require({"rows", "columns", "fov_up_deg", "fov_down_deg"});
   section.whole("rows", model.rows, {1, 512});
   section.whole("columns", model.columns, {1, 8192});
+  section.whole("least_columns", model.least_columns, {0, static_cast<double>(model.columns)});
   section.degrees("fov_up_deg", model.fov_up, {-90, 90});
   section.degrees("fov_down_deg", model.fov_down, {-90, 90});
   section.flag("follow_sensor", model.follow_sensor);
@@ -92,7 +93,9 @@ void read_model(YamlSection file, ModelDescription& model) {
 std::unique_ptr<LabelSource> open_network_labels(const LabelsConfig& labels,
                                                  const SensorModel& sensor) {
   ModelDescription model = load_model_description(find_model(labels.model));
-  if (labels.image_columns == 0) return open_model(for_sensor(model, sensor), labels.engine);
+  if (labels.image_columns == 0) {
+    return open_model_of_many_widths(for_sensor(model, sensor), labels.engine);
+  }
   model.columns = labels.image_columns;
   try {
     return open_model(for_sensor(model, sensor), labels.engine);

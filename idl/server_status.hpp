@@ -36,6 +36,10 @@ struct SegmentationStatus {
   std::uint32_t every = 1;
   /// Median time of the label source over the last scans; 0 before the first.
   double network_ms = 0.0;
+  /// Width of the range images that it looks at, and what that is on a machine that is fast enough;
+  /// 0: it looks at none.
+  std::uint32_t image_columns = 0;
+  std::uint32_t full_columns = 0;
   /// Shares of the last scans: with labels of their own, carried ones, none.
   double fresh_share = 0.0;
   double carried_share = 0.0;

@@ -6,10 +6,10 @@
 namespace stillmap {
 namespace {
 
-/// n grows when the network takes more than the room in its n periods by this much: scans do not
-/// come to the millisecond.
+/// The pace slows when the network takes more than the room in its n periods by this much: scans do
+/// not come to the millisecond.
 constexpr double late_share = 1.05;
-/// n shrinks when the network would need no more than this share of the room in fewer.
+/// It quickens to one at which the network would need no more than this share of the room.
 constexpr double spare_share = 0.85;
 /// The first run of all takes longer than the others: memory and threads are new.
 constexpr std::size_t fewest_runs = 3;
@@ -25,17 +25,26 @@ std::uint32_t periods(double ms, double room_ms) {
 }  // namespace
 
 void LabelCadence::scan_segmented(double network_ms, double besides_ms, double period_ms) {
-  network_ms_.add(network_ms);
+  finest_ms_.add(network_ms / cost(pace_.coarseness));
   if (period_ms > 0.0) period_ms_.add(period_ms);
-  const double ms = network_ms_.value();
   const double usual_period_ms = period_ms_.value();
-  if (usual_period_ms <= 0.0 || network_ms_.size() < fewest_runs) return;
+  if (usual_period_ms <= 0.0 || finest_ms_.size() < fewest_runs) return;
   const double room_ms = std::max(usual_period_ms - besides_ms, least_room * usual_period_ms);
-  if (ms > late_share * every_ * room_ms) {
-    every_ = periods(ms / late_share, room_ms);
-  } else if (ms < spare_share * (every_ - 1) * room_ms) {
-    every_ = periods(ms / spare_share, room_ms);
+  if (finest_ms_.value() * cost(pace_.coarseness) > late_share * pace_.every * room_ms) {
+    pace_ = first_within(late_share, room_ms);
+  } else {
+    pace_ = std::min(pace_, first_within(spare_share, room_ms));
   }
+}
+
+LabelCadence::Pace LabelCadence::first_within(double share, double room_ms) const {
+  const auto fits = [&](double cost) { return finest_ms_.value() * cost <= share * room_ms; };
+  const auto found = std::ranges::find_if(costs_, fits);
+  if (found != costs_.end()) {
+    return {.coarseness = static_cast<std::size_t>(found - costs_.begin()), .every = 1};
+  }
+  return {.coarseness = costs_.size() - 1,
+          .every = periods(finest_ms_.value() * costs_.back() / share, room_ms)};
 }
 
 }  // namespace stillmap

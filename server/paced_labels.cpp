@@ -31,9 +31,11 @@ PacedLabels::PacedLabels(std::unique_ptr<LabelSource> source, std::chrono::milli
                          const ScanQueue& queue, Statistics& statistics)
     : source_(std::move(source)),
       name_(source_->name()),
+      full_columns_(source_->image_columns()),
       budget_(budget),
       queue_(queue),
-      statistics_(statistics) {
+      statistics_(statistics),
+      cadence_(source_->costs()) {
   if (!may_skip_scans()) return;
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
@@ -105,19 +107,31 @@ ScanLabels PacedLabels::segment(const Scan& scan) {
 void PacedLabels::segmented(double network_ms) {
   statistics_.add_latency("network", network_ms);
   const std::scoped_lock lock(mutex_);
-  const std::uint32_t before = cadence_.every();
-  // Of the sensor, not of the scans that are offered: an overloaded server drops scans.
+  const std::pair before(cadence_.coarseness(), cadence_.every());
+  // Of the sensor, not of the scans that are offered: an overloaded server drops scans. Where every
+  // scan gets its labels, none comes too fast.
   cadence_.scan_segmented(network_ms, statistics_.besides_labels_ms(),
-                          statistics_.receive_period_ms());
-  const std::uint32_t now = cadence_.every();
-  statistics_.segmenting(now, cadence_.network_ms());
-  if (now == before) return;
-  const auto level = now > before ? spdlog::level::warn : spdlog::level::info;
-  spdlog::log(level,
-              "{} is segmented now: that takes {:.0f} ms, all else {:.0f} ms, and scans come every "
-              "{:.0f} ms",
-              every_nth_scan(now), cadence_.network_ms(), statistics_.besides_labels_ms(),
-              cadence_.period_ms());
+                          may_skip_scans() ? statistics_.receive_period_ms() : 0.0);
+  const std::pair now(cadence_.coarseness(), cadence_.every());
+  source_->set_coarseness(now.first);
+  const int columns = source_->image_columns();
+  statistics_.segmenting({.every = now.second,
+                          .network_ms = cadence_.network_ms(),
+                          .image_columns = static_cast<std::uint32_t>(columns),
+                          .full_columns = static_cast<std::uint32_t>(full_columns_),
+                          .fresh_share = 0.0,
+                          .carried_share = 0.0,
+                          .unlabelled_share = 0.0});
+  if (now != before) tell_of_pace(now > before, columns);
+}
+
+void PacedLabels::tell_of_pace(bool is_slower, int columns) const {
+  spdlog::log(is_slower ? spdlog::level::warn : spdlog::level::info,
+              "{} is segmented now{}: that takes {:.0f} ms, all else {:.0f} ms, and scans come "
+              "every {:.0f} ms",
+              every_nth_scan(cadence_.every()),
+              columns > 0 ? " in " + std::to_string(columns) + " columns" : "",
+              cadence_.network_ms(), statistics_.besides_labels_ms(), cadence_.period_ms());
 }
 
 }  // namespace stillmap

@@ -21,10 +21,10 @@ namespace stillmap {
 /// How long a scan of this server may wait for its labels; 0: as long as it takes.
 [[nodiscard]] std::chrono::milliseconds label_budget(const ServerConfig& config);
 
-/// A label source that may be slower than the sensor: it runs in a thread of its own, takes every
-/// n-th scan, none while others wait to be mapped, and nobody waits for it longer than the budget,
-/// or at all when it lately took longer than that. Its exceptions are counted and leave a scan
-/// without labels. The mapping thread calls it.
+/// A label source that may be slower than the sensor: it runs in a thread of its own, looks as
+/// coarsely as it must and then takes every n-th scan, none while others wait to be mapped, and
+/// nobody waits for it longer than the budget, or at all when it lately took longer than that. Its
+/// exceptions are counted and leave a scan without labels. The mapping thread calls it.
 class PacedLabels final : public LabelFeed {
  public:
   /// With a budget of 0 the source runs in the caller's thread and gets every scan. The queue is
@@ -45,12 +45,14 @@ class PacedLabels final : public LabelFeed {
   /// The scan's labels, none after a failure.
   [[nodiscard]] ScanLabels segment(const Scan& scan);
   void segmented(double network_ms);
+  void tell_of_pace(bool is_slower, int columns) const;
   /// Whether the thread is to take the scan that is offered now.
   [[nodiscard]] bool is_due();
   [[nodiscard]] bool is_worth_the_wait();
 
   std::unique_ptr<LabelSource> source_;
   std::string name_;
+  int full_columns_;
   std::chrono::milliseconds budget_;
   const ScanQueue& queue_;
   Statistics& statistics_;

@@ -56,6 +56,24 @@ ServerStatus ServerReport::status() const {
   return status;
 }
 
+namespace {
+
+/// What segmentation does less than it would on a faster machine; empty when nothing.
+std::string reduced_pace(const SegmentationStatus& segmentation) {
+  std::string what;
+  if (segmentation.every > 1) {
+    what = every_nth_scan(segmentation.every) + " is segmented, labels are carried between";
+  }
+  if (segmentation.image_columns < segmentation.full_columns) {
+    what += (what.empty() ? "" : "; ") + std::string("range images are ") +
+            std::to_string(segmentation.image_columns) + " columns wide instead of " +
+            std::to_string(segmentation.full_columns);
+  }
+  return what.empty() ? what : "segmentation cannot keep the sensor's rate: " + what;
+}
+
+}  // namespace
+
 std::string ServerReport::reason(const ServerStatus& status) const {
   if (const std::string why = why_nothing_arrives_(); !why.empty()) return why;
   if (const std::string drop = statistics_.last_drop(); !drop.empty()) {
@@ -68,10 +86,7 @@ std::string ServerReport::reason(const ServerStatus& status) const {
     return "the last scan could not be segmented: " + failure;
   }
   if (status.received_hz == 0.0) return "no scan for the last seconds";
-  if (status.segmentation.every > 1) {
-    return "segmentation cannot keep the sensor's rate: " +
-           every_nth_scan(status.segmentation.every) + " is segmented, labels are carried between";
-  }
+  if (const std::string pace = reduced_pace(status.segmentation); !pace.empty()) return pace;
   return status.findings.empty() ? std::string() : status.findings.front().what;
 }
 

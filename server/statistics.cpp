@@ -56,10 +56,9 @@ void Statistics::scan_mapped(Labelling labelling) {
   last_drop_.clear();
 }
 
-void Statistics::segmenting(std::uint32_t every, double network_ms) {
+void Statistics::segmenting(const SegmentationStatus& pace) {
   const std::scoped_lock lock(mutex_);
-  segmentation_.every = every;
-  segmentation_.network_ms = network_ms;
+  segmentation_ = pace;
 }
 
 void Statistics::labels_failed(const std::string& detail) {

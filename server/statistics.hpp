@@ -52,8 +52,8 @@ class Statistics {
   /// The last cloud named this frame, and came so much later than its stamp says.
   void scan_told(const std::string& frame, double delay_s);
   void scan_mapped(Labelling labelling);
-  /// Every n-th scan is segmented, which takes so long.
-  void segmenting(std::uint32_t every, double network_ms);
+  /// How scans are segmented from now on; the shares are not looked at.
+  void segmenting(const SegmentationStatus& pace);
   /// The label source failed; `detail` is told in the status until it works again.
   void labels_failed(const std::string& detail);
   void labels_worked();

@@ -24,7 +24,9 @@ void print_description(const ModelDescription& model) {
   line("sensor    ", model.sensor);
   line("training  ", model.training);
   line("accuracy  ", model.accuracy);
+  const std::string least = std::to_string(model.least_columns);
   line("image     ", std::to_string(model.rows) + "x" + std::to_string(model.columns) +
+                         (model.least_columns > 0 ? ", down to " + least + " columns" : "") +
                          (model.follow_sensor ? ", rows as the sensor has rings" : ""));
   line("outputs   ", std::to_string(model.classes.size()));
   line("int8      ", model.int8 ? "calibrated: " + model.int8->made : "not calibrated");

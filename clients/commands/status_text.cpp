@@ -13,7 +13,9 @@ std::string describe(const ServerStatus& status) {
           (status.reason.empty() ? "" : ": " + status.reason) + "\n";
   text += "labels     " + status.label_source + "\n";
   const SegmentationStatus& segmentation = status.segmentation;
-  text += "           " + every_nth_scan(segmentation.every) + " segmented, " +
+  const std::string columns = std::to_string(segmentation.image_columns);
+  text += "           " + every_nth_scan(segmentation.every) + " segmented" +
+          (segmentation.image_columns > 0 ? " in " + columns + " columns, " : ", ") +
           fixed(segmentation.network_ms, 1) + " ms each; of the last scans " +
           fixed(100.0 * segmentation.fresh_share, 0) + " % with labels of their own, " +
           fixed(100.0 * segmentation.carried_share, 0) + " % with carried ones, " +
@@ -68,6 +70,8 @@ nlohmann::json to_json(const ServerStatus& status) {
           {"segmentation",
            {{"every", status.segmentation.every},
             {"network_ms", status.segmentation.network_ms},
+            {"image_columns", status.segmentation.image_columns},
+            {"full_columns", status.segmentation.full_columns},
             {"fresh_share", status.segmentation.fresh_share},
             {"carried_share", status.segmentation.carried_share},
             {"unlabelled_share", status.segmentation.unlabelled_share}}},

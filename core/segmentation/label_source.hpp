@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
+#include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
 
@@ -16,6 +18,14 @@ class LabelSource {
 
   /// How it works, in words for a log; empty when there is nothing to say.
   [[nodiscard]] virtual std::string details() const { return {}; }
+
+  /// Time that a scan takes at each coarseness that this source knows, as a share of the finest's,
+  /// which comes first; the others are less, each less than the one before.
+  [[nodiscard]] virtual std::vector<double> costs() const { return {1.0}; }
+  /// How coarsely to look at the next scans: an index of costs().
+  virtual void set_coarseness(std::size_t /*coarseness*/) {}
+  /// Width of the range images that it looks at now; 0: it looks at none.
+  [[nodiscard]] virtual int image_columns() const { return 0; }
 
   /// Classes of the scan's points; empty when this source has none for this scan.
   [[nodiscard]] virtual PointLabels label(const Scan& scan) = 0;

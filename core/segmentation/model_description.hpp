@@ -39,6 +39,9 @@ struct ModelDescription {
   /// Range image that the network wants.
   int rows = 64;
   int columns = 1024;
+  /// The narrowest image that it was trained for, for machines that are too slow for the usual one;
+  /// 0: it knows one width.
+  int least_columns = 0;
   /// Upper and lower edge of the image [rad]; points beyond are squeezed into the edge rows.
   double fov_up = 0.0;
   double fov_down = 0.0;

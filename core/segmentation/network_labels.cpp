@@ -30,19 +30,41 @@ PixelLabels pixel_labels(PixelOutputs&& outputs, const ModelDescription& model) 
 
 NetworkLabels::NetworkLabels(ModelDescription model, std::unique_ptr<SegmentationNetwork> network,
                              std::string remark)
-    : model_(std::move(model)), network_(std::move(network)), remark_(std::move(remark)) {
-  assert(network_ && model_.faults().empty());
+    : model_(std::move(model)), remark_(std::move(remark)) {
+  assert(network && model_.faults().empty());
+  widths_.push_back({.columns = model_.columns, .network = std::move(network)});
+}
+
+void NetworkLabels::add_coarser(int columns, std::unique_ptr<SegmentationNetwork> network) {
+  assert(network && columns > 0 && columns < widths_.back().columns);
+  widths_.push_back({.columns = columns, .network = std::move(network)});
+}
+
+// All that is done with a scan, but for some of the projection and the votes, is done by pixel.
+std::vector<double> NetworkLabels::costs() const {
+  std::vector<double> costs;
+  for (const Width& width : widths_) {
+    costs.push_back(static_cast<double>(width.columns) / widths_.front().columns);
+  }
+  return costs;
+}
+
+void NetworkLabels::set_coarseness(std::size_t coarseness) {
+  in_use_ = std::min(coarseness, widths_.size() - 1);
+  model_.columns = widths_[in_use_].columns;
 }
 
 std::string NetworkLabels::details() const {
-  const std::string image = std::to_string(model_.rows) + "x" + std::to_string(model_.columns);
-  return network_->engine() + ", image " + image + (remark_.empty() ? "" : "; ") + remark_;
+  std::string text = widths_.front().network->engine() + ", image " + std::to_string(model_.rows) +
+                     "x" + std::to_string(widths_.front().columns);
+  if (widths_.size() > 1) text += " down to " + std::to_string(widths_.back().columns);
+  return text + (remark_.empty() ? "" : "; ") + remark_;
 }
 
 PointLabels NetworkLabels::label(const Scan& scan) {
   if (scan.empty()) return {};
   const RangeImage image(scan.points_lidar, model_.projection());
-  PixelOutputs outputs = network_->run(make_network_input(scan, image, model_));
+  PixelOutputs outputs = widths_[in_use_].network->run(make_network_input(scan, image, model_));
   const PixelLabels pixels = pixel_labels(std::move(outputs), model_);
   return model_.knn ? knn_labels(image, pixels, *model_.knn) : labels_of_own_pixel(image, pixels);
 }
@@ -51,6 +73,19 @@ std::unique_ptr<LabelSource> open_model(const ModelDescription& model, const Eng
   OpenedNetwork opened = open_network(model, choice);
   return std::make_unique<NetworkLabels>(model, std::move(opened.network),
                                          std::move(opened.remark));
+}
+
+std::unique_ptr<LabelSource> open_model_of_many_widths(const ModelDescription& model,
+                                                       const EngineChoice& choice) {
+  OpenedNetwork opened = open_network(model, choice);
+  auto labels =
+      std::make_unique<NetworkLabels>(model, std::move(opened.network), std::move(opened.remark));
+  if (model.least_columns > 0 && model.least_columns < model.columns) {
+    ModelDescription narrow = model;
+    narrow.columns = model.least_columns;
+    labels->add_coarser(narrow.columns, open_network(narrow, choice).network);
+  }
+  return labels;
 }
 
 }  // namespace stillmap

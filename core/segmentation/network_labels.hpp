@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "core/segmentation/label_source.hpp"
 #include "core/segmentation/model_description.hpp"
@@ -20,18 +21,34 @@ class NetworkLabels final : public LabelSource {
   NetworkLabels(ModelDescription model, std::unique_ptr<SegmentationNetwork> network,
                 std::string remark = {});
 
+  /// Makes it able to look more coarsely: the same model with fewer columns than all so far.
+  void add_coarser(int columns, std::unique_ptr<SegmentationNetwork> network);
+
   [[nodiscard]] std::string name() const override { return model_.name; }
   [[nodiscard]] std::string details() const override;
+  [[nodiscard]] std::vector<double> costs() const override;
+  void set_coarseness(std::size_t coarseness) override;
+  [[nodiscard]] int image_columns() const override { return model_.columns; }
   [[nodiscard]] PointLabels label(const Scan& scan) override;
 
  private:
+  struct Width {
+    int columns = 0;
+    std::unique_ptr<SegmentationNetwork> network;
+  };
+
+  /// With the columns of the width in use.
   ModelDescription model_;
-  std::unique_ptr<SegmentationNetwork> network_;
+  std::vector<Width> widths_;
+  std::size_t in_use_ = 0;
   std::string remark_;
 };
 
 /// Loads the network that `model` describes. Throws ModelError naming the file and the fault.
 [[nodiscard]] std::unique_ptr<LabelSource> open_model(const ModelDescription& model,
                                                       const EngineChoice& choice = {});
+/// The same, able to look as coarsely as the model was trained for.
+[[nodiscard]] std::unique_ptr<LabelSource> open_model_of_many_widths(
+    const ModelDescription& model, const EngineChoice& choice = {});
 
 }  // namespace stillmap

@@ -14,6 +14,9 @@ class StreamFirstLabels final : public LabelSource {
 
   [[nodiscard]] std::string name() const override;
   [[nodiscard]] std::string details() const override { return otherwise_->details(); }
+  [[nodiscard]] std::vector<double> costs() const override { return otherwise_->costs(); }
+  void set_coarseness(std::size_t coarseness) override { otherwise_->set_coarseness(coarseness); }
+  [[nodiscard]] int image_columns() const override { return otherwise_->image_columns(); }
   [[nodiscard]] PointLabels label(const Scan& scan) override;
 
  private:

@@ -58,6 +58,8 @@ void add_lists(const stillmap_msgs::msg::Status& message, ServerStatus& status) 
 void to_wire(const SegmentationStatus& status, stillmap_msgs::msg::SegmentationStatus& message) {
   message.every(status.every);
   message.network_ms(status.network_ms);
+  message.image_columns(status.image_columns);
+  message.full_columns(status.full_columns);
   message.fresh_share(status.fresh_share);
   message.carried_share(status.carried_share);
   message.unlabelled_share(status.unlabelled_share);
@@ -66,6 +68,8 @@ void to_wire(const SegmentationStatus& status, stillmap_msgs::msg::SegmentationS
 SegmentationStatus from_wire(const stillmap_msgs::msg::SegmentationStatus& message) {
   return {.every = message.every(),
           .network_ms = message.network_ms(),
+          .image_columns = message.image_columns(),
+          .full_columns = message.full_columns(),
           .fresh_share = message.fresh_share(),
           .carried_share = message.carried_share(),
           .unlabelled_share = message.unlabelled_share()};

@@ -143,6 +143,8 @@ void add_scans(std::vector<MetricFamily>& all, const ServerStatus& status) {
                     .add(count(status, "label_failures")));
   all.push_back(gauge("segmentation_every_scans", "n, when every n-th scan is segmented")
                     .add(status.segmentation.every));
+  all.push_back(gauge("segmentation_image_columns", "Width of the range images; 0: none")
+                    .add(status.segmentation.image_columns));
   all.push_back(label_shares(status.segmentation));
 }
 

@@ -13,17 +13,20 @@ class ModelCommandTest : public CommandTest {
     CommandTest::SetUp();
     std::filesystem::create_directories(folder_ / "model");
     std::ofstream(folder_ / "model/model.onnx", std::ios::binary) << light_bytes(8, 0, 0, 20);
+    write("model/model.yaml", with_image("columns: 64"));
+  }
+  /// model.yaml; `width` is what it says of the columns.
+  [[nodiscard]] static std::string with_image(const std::string& width) {
     std::string classes = "0: unlabeled";
     for (int i = 1; i < 20; ++i) classes += ", " + std::to_string(i) + ": car";
-    write("model/model.yaml",
-          "name: tiny\nlicence: MIT\n"
-          "image: {rows: 16, columns: 64, fov_up_deg: 16, fov_down_deg: -16, follow_sensor: true}\n"
-          "statistics:\n"
-          "  range: {mean: 12, deviation: 12}\n  x: {mean: 10, deviation: 11}\n"
-          "  y: {mean: 0, deviation: 7}\n  z: {mean: -1, deviation: 1}\n"
-          "  remission: {mean: 0.2, deviation: 0.2}\n"
-          "classes: {" +
-              classes + "}\n");
+    return "name: tiny\nlicence: MIT\nimage: {rows: 16, " + width +
+           ", fov_up_deg: 16, fov_down_deg: -16, follow_sensor: true}\n"
+           "statistics:\n"
+           "  range: {mean: 12, deviation: 12}\n  x: {mean: 10, deviation: 11}\n"
+           "  y: {mean: 0, deviation: 7}\n  z: {mean: -1, deviation: 1}\n"
+           "  remission: {mean: 0.2, deviation: 0.2}\n"
+           "classes: {" +
+           classes + "}\n";
   }
   [[nodiscard]] ProcessResult model(const std::string& arguments) const {
     return run("model " + arguments);
@@ -99,6 +102,27 @@ TEST_F(ModelCommandTest, MapsWithTheModelThatIsNamed) {
                                    " --engine onednn --out " + path("out") + " --json");
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_EQ(nlohmann::json::parse(result.out).at("label_source"), "tiny");
+}
+
+TEST_F(ModelCommandTest, TellsOfItsNarrowestImageAndTakesNoneThatIsWider) {
+  const auto with_least = [&](const std::string& least) {
+    write("model/model.yaml", with_image("columns: 64, least_columns: " + least));
+    return model("info " + path("model"));
+  };
+  EXPECT_THAT(with_least("32").out, HasSubstr("16x64, down to 32 columns"));
+  const ProcessResult wider = with_least("128");
+  EXPECT_EQ(wider.exit_code, 2);
+  EXPECT_THAT(wider.err, AllOf(HasSubstr("least_columns"), HasSubstr("128")));
+}
+
+TEST_F(ModelCommandTest, ANetworkOfOneSizeTakesNoOtherWidth) {
+  simulate("city", 1);
+  std::ofstream(folder_ / "model/model.onnx", std::ios::binary) << light_bytes(8, 16, 64, 20);
+  const std::string map = "map " + path("city") + " --labels " + path("model") + " --columns ";
+  const ProcessResult other = run(map + "128");
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, AllOf(HasSubstr("with 128 image columns"), HasSubstr("model.onnx")));
+  EXPECT_EQ(run(map + "64").exit_code, 0);
 }
 
 TEST_F(ModelCommandTest, BadModelsAreBadInput) {

@@ -82,6 +82,8 @@ TEST(StatusConversion, KeepsEverything) {
                       .voxel_count = 6,
                       .segmentation = {.every = 3,
                                        .network_ms = 210.0,
+                                       .image_columns = 1024,
+                                       .full_columns = 1536,
                                        .fresh_share = 0.25,
                                        .carried_share = 0.5,
                                        .unlabelled_share = 0.125},
@@ -115,6 +117,8 @@ TEST(StatusConversion, KeepsEverything) {
   EXPECT_EQ(back->findings[1].severity, Severity::problem);
   EXPECT_EQ(back->segmentation.every, 3U);
   EXPECT_EQ(back->segmentation.network_ms, 210.0);
+  EXPECT_EQ(back->segmentation.image_columns, 1024U);
+  EXPECT_EQ(back->segmentation.full_columns, 1536U);
   EXPECT_EQ(back->segmentation.fresh_share, 0.25);
   EXPECT_EQ(back->segmentation.carried_share, 0.5);
   EXPECT_EQ(back->segmentation.unlabelled_share, 0.125);

@@ -131,6 +131,38 @@ class HalfBlind final : public SegmentationNetwork {
   [[nodiscard]] std::string engine() const override { return "half blind"; }
 };
 
+/// Sees one class everywhere in images of this many pixels.
+class OneClass final : public SegmentationNetwork {
+ public:
+  OneClass(std::size_t pixels, std::uint8_t output) : pixels_(pixels), output_(output) {}
+  PixelOutputs run(std::span<const float> input) override {
+    EXPECT_EQ(input.size(), pixels_ * input_channels);
+    return {.output = std::vector(pixels_, output_), .confidence = std::vector(pixels_, 1.0F)};
+  }
+  std::vector<float> probabilities(std::span<const float> /*input*/) override { return {}; }
+  [[nodiscard]] std::string engine() const override { return "one class"; }
+
+ private:
+  std::size_t pixels_;
+  std::uint8_t output_;
+};
+
+TEST(NetworkLabels, LooksAsCoarselyAsItIsTold) {
+  NetworkLabels labels(describe(random_network(2, 32, 20)), std::make_unique<OneClass>(64U, 9));
+  EXPECT_EQ(labels.costs(), std::vector{1.0});
+  labels.add_coarser(16, std::make_unique<OneClass>(32U, 1));
+  EXPECT_EQ(labels.costs(), (std::vector{1.0, 0.5}));
+  EXPECT_EQ(labels.details(), "one class, image 2x32 down to 16");
+  const Scan scan = random_scan(5, 2);
+  EXPECT_EQ(labels.image_columns(), 32);
+  EXPECT_EQ(labels.label(scan).classes, std::vector(5, SemanticClass::road));
+  labels.set_coarseness(1);
+  EXPECT_EQ(labels.image_columns(), 16);
+  EXPECT_EQ(labels.label(scan).classes, std::vector(5, SemanticClass::car));
+  labels.set_coarseness(0);
+  EXPECT_EQ(labels.label(scan).classes, std::vector(5, SemanticClass::road));
+}
+
 TEST(NetworkLabels, LeavesPointsUnlabeledWhereTheNetworkFails) {
   const ModelDescription model = describe(random_network(1, 2, 20));
   NetworkLabels labels(model, std::make_unique<HalfBlind>());

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <set>
+#include <vector>
 
 #include "idl/server_status.hpp"
 
@@ -31,6 +32,30 @@ TEST(LabelCadence, LeavesRoomForAllElseThatIsDoneWithAScan) {
     LabelCadence cadence;
     EXPECT_EQ(settled(cadence, network_ms, besides_ms), every) << network_ms << " " << besides_ms;
   }
+}
+
+TEST(LabelCadence, LooksMoreCoarselyBeforeItLeavesScansOut) {
+  const std::vector<double> costs{1.0, 0.75, 0.5};
+  for (const auto& [finest_ms, coarseness, every] :
+       {std::tuple{90.0, 0U, 1U}, {130.0, 1U, 1U}, {190.0, 2U, 1U}, {230.0, 2U, 2U}}) {
+    LabelCadence cadence(costs);
+    for (int i = 0; i < 10; ++i) {
+      cadence.scan_segmented(finest_ms * costs[cadence.coarseness()], 0.0, 100.0);
+    }
+    EXPECT_EQ(cadence.coarseness(), coarseness) << finest_ms;
+    EXPECT_EQ(cadence.every(), every) << finest_ms;
+    EXPECT_NEAR(cadence.network_ms(), finest_ms * costs[coarseness], 1e-9);
+  }
+}
+
+TEST(LabelCadence, LooksCloselyAgainWithRoomToSpare) {
+  LabelCadence cadence({1.0, 0.5});
+  (void)settled(cadence, 190.0);
+  EXPECT_EQ(cadence.coarseness(), 1U);
+  EXPECT_EQ(settled(cadence, 46.0), 1U);
+  EXPECT_EQ(cadence.coarseness(), 1U);
+  EXPECT_EQ(settled(cadence, 40.0), 1U);
+  EXPECT_EQ(cadence.coarseness(), 0U);
 }
 
 TEST(LabelCadence, RecoversWhenTheNetworkIsFastAgain) {

@@ -86,6 +86,20 @@ TEST_F(PacedLabelsTest, WithoutABudgetEveryScanGetsItsLabels) {
   }
 }
 
+TEST_F(PacedLabelsTest, WithoutABudgetEveryScanIsLookedAtClosely) {
+  source_.delay_ms = 20;
+  source_.costs = {1.0, 0.5};
+  const auto labels = feed(0ms);
+  for (int k = 0; k < 12; ++k) {
+    statistics_.scan_received();
+    (void)labels->offer(scan_at(k));
+  }
+  const SegmentationStatus pace = status().segmentation;
+  EXPECT_EQ(pace.every, 1U);
+  EXPECT_EQ(pace.image_columns, 2000U);
+  EXPECT_GE(pace.network_ms, 20.0);
+}
+
 TEST_F(PacedLabelsTest, FailuresAreCountedAndGiveNoLabels) {
   for (const auto budget : {0ms, 5000ms}) {
     const auto labels = feed(budget);

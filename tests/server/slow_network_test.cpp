@@ -85,6 +85,24 @@ TEST_F(SlowNetwork, DelaysNoPoseBeyondTheBudgetAndIsUsedForEveryNthScan) {
   EXPECT_EQ(fast.reason, "");
 }
 
+TEST_F(SlowNetwork, LooksMoreCoarselyBeforeScansAreLeftOut) {
+  source_.delay_ms = 150;
+  source_.costs = {1.0, 0.3};
+  MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
+                        nullptr, queue_, statistics_, board_, {});
+  drive(20);
+  const ServerStatus slow = status();
+  EXPECT_EQ(slow.segmentation.image_columns, 600U);
+  EXPECT_EQ(slow.segmentation.full_columns, 2000U);
+  EXPECT_LT(slow.segmentation.network_ms, 150.0);
+  EXPECT_THAT(slow.reason, HasSubstr("600 columns wide instead of 2000"));
+
+  source_.delay_ms = 0;
+  drive(20);
+  EXPECT_EQ(status().segmentation.image_columns, 2000U);
+  EXPECT_EQ(status().reason, "");
+}
+
 TEST_F(SlowNetwork, ThatFailsLeavesPosesAndMap) {
   source_.fails = true;
   MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
