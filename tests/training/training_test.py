@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import torch
+import yaml
 
-from augmentation import augment_points, crop, drop_beams
+from augmentation import aim, augment_points, crop, draw_motion, drop_beams, in_sector
 from losses import class_weights, lovasz_softmax, weighted_cross_entropy
 from metrics import Confusion
 from range_images import ImageModel, normalise, project
@@ -52,10 +53,12 @@ class LovaszSoftmax(unittest.TestCase):
         loss = lovasz_softmax(self.scores_of(torch.tensor([[1, 5, 2, 1]])), truth[None])
         self.assertAlmostEqual(float(loss), 0.0, places=5)
 
-    def test_is_a_number_without_any_class(self):
+    def test_teaches_nothing_without_any_class(self):
         scores = torch.randn(1, 20, 2, 4, requires_grad=True)
-        lovasz_softmax(scores, torch.zeros(1, 2, 4, dtype=torch.long)).backward()
-        self.assertTrue(torch.isfinite(scores.grad).all())
+        nothing = torch.zeros(1, 2, 4, dtype=torch.long)
+        lovasz_softmax(scores, nothing).backward()
+        weighted_cross_entropy(scores, nothing, torch.ones(20)).backward()
+        self.assertEqual(scores.grad.abs().max(), 0)
 
 
 class Projection(unittest.TestCase):
@@ -113,14 +116,15 @@ class Augmentation(unittest.TestCase):
     settings = {
         "rotate": True, "flip": True, "tilt_deg": 0, "scale": 0, "lift_m": 0,
         "range_noise_m": 0, "drop_points": 0, "max_range_m": 120, "drop_beams": 0,
-        "halve_beams": 1, "remission_jitter": 0.3, "remission_dropout": 0,
+        "halve_beams": 1, "remission_jitter": 0.3, "remission_dropout": 0, "aim_at_classes": 0,
     }  # fmt: skip
 
     def test_turning_and_mirroring_keep_ranges_and_heights(self):
         random = np.random.default_rng(1)
         points = random.normal(0, 10, (50, 3)).astype(np.float32)
+        motion = draw_motion(self.settings, random)
         moved, remission, classes = augment_points(
-            points, np.full(50, 0.5, np.float32), np.arange(50), self.settings, random
+            points, np.full(50, 0.5, np.float32), np.arange(50), motion, self.settings, random
         )
         ranges = np.linalg.norm(points, axis=1)
         np.testing.assert_allclose(np.linalg.norm(moved, axis=1), ranges, rtol=1e-5)
@@ -138,10 +142,44 @@ class Augmentation(unittest.TestCase):
 
     def test_crops_over_the_seam_together(self):
         channels = np.tile(np.arange(8.0), (5, 2, 1))
-        for seed in range(20):
-            part, target = crop(channels, channels[0], 6, np.random.default_rng(seed))
+        for azimuth in np.linspace(-np.pi, np.pi, 20):
+            part, target = crop(channels, channels[0], 6, azimuth)
             self.assertEqual(part.shape, (5, 2, 6))
             np.testing.assert_array_equal(part[0], target)
+            off = part[0, 0, 3] - 4 * (1 - azimuth / np.pi)
+            self.assertLess(abs((off + 4) % 8 - 4), 0.51)
+
+
+class Aim(unittest.TestCase):
+    def scan(self):
+        """A wall all round, and one point of something rare."""
+        azimuth = np.linspace(-np.pi, np.pi, 721)
+        points = np.stack([10 * np.cos(azimuth), 10 * np.sin(azimuth), 0 * azimuth], 1)
+        classes = np.full(721, 13, np.uint8)
+        classes[500] = 6
+        return points.astype(np.float32), classes
+
+    def test_takes_rare_classes_as_often_as_others(self):
+        points, classes = self.scan()
+        width, random = np.radians(30), np.random.default_rng(1)
+        held = {0.0: 0, 1.0: 0}
+        for share in held:
+            for _ in range(200):
+                middle = aim(points, classes, width, share, random)
+                held[share] += in_sector(points, middle, width)[500]
+        self.assertLess(held[0.0], 40)
+        self.assertGreater(held[1.0], 85)
+
+    def test_a_sector_is_as_wide_as_asked_for(self):
+        points, _ = self.scan()
+        for middle in (-3.1, 0.0, 2.0):
+            self.assertAlmostEqual(in_sector(points, middle, np.pi / 2).sum(), 181, delta=2)
+            self.assertTrue(in_sector(points, middle, 7.0).all())
+
+    def test_finds_somewhere_in_a_scan_without_classes(self):
+        points, classes = self.scan()
+        azimuth = aim(points, 0 * classes, 1.0, 1.0, np.random.default_rng(1))
+        self.assertTrue(np.isfinite(azimuth))
 
 
 class FewScans:
@@ -157,12 +195,14 @@ class FewScans:
 
 
 class Widths(unittest.TestCase):
-    def filled_columns(self, widths):
-        """Of crops of scans that are drawn `widths` wide: how many columns have a point."""
+    def config(self, widths):
         settings = {**Augmentation.settings, "crop_columns": 32, "image_columns": widths}
         settings["halve_beams"] = 0
-        config = {"mean": [0] * 5, "deviation": [1] * 5, "augmentation": settings}
-        samples = TrainingSamples(FewScans(), config)
+        return {"mean": [0] * 5, "deviation": [1] * 5, "augmentation": settings}
+
+    def filled_columns(self, widths):
+        """Of crops of scans that are drawn `widths` wide: how many columns have a point."""
+        samples = TrainingSamples(FewScans(), self.config(widths))
         targets = [samples[0, seed][1] for seed in range(8)]
         self.assertEqual({target.shape for target in targets}, {(4, 32)})
         return {int((target > 0).any(0).sum()) for target in targets}
@@ -172,6 +212,13 @@ class Widths(unittest.TestCase):
         # So wide that most columns get no point.
         self.assertLess(max(self.filled_columns([16384])), 20)
         self.assertGreater(len(self.filled_columns([64, 16384])), 1)
+
+    def test_a_part_without_points_is_empty(self):
+        samples = TrainingSamples(FewScans(), self.config([]))
+        far = np.full((1, 3), 500, np.float32)
+        samples.scans.read = lambda _: (far, np.ones(1), np.ones(1, int))
+        channels, target = samples[0, 1]
+        self.assertEqual((channels.abs().max(), target.max()), (0, 0))
 
 
 class Training(unittest.TestCase):
@@ -185,11 +232,11 @@ class Training(unittest.TestCase):
         command = [STILLMAP, "simulate", sequence, "--preset", "yard", "--scans", "8"]
         subprocess.run([*map(str, command), "--sensor", "vlp_16"], check=True, capture_output=True)
 
-    def train(self, epochs):
+    def train(self, epochs, run="run", *more):
         settings = [*SMALL, f"optimiser.epochs={epochs}", f"data.train=[{self.data}]"]
-        settings.append(f"data.validation=[{self.data}]")
+        settings += [f"data.validation=[{self.data}]", *more]
         command = [sys.executable, TRAINING / "train.py", TRAINING / "training.yaml"]
-        command += [self.root / "run"]
+        command += [self.root / run]
         for setting in settings:
             command += ["--set", setting]
         result = subprocess.run([*map(str, command)], capture_output=True, text=True)
@@ -216,6 +263,12 @@ class Training(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("onednn   int8", result.stdout)
         self.assertTrue((self.root / "model" / "int8.yaml").exists())
+        image = yaml.safe_load((self.root / "model" / "model.yaml").read_text())["image"]
+        self.assertEqual((image["columns"], image["least_columns"]), (256, 128))
+        # A run from that model begins where this one ended, in 16 bits too.
+        self.train(1, "next", f"start_from={self.root / 'model'}", "optimiser.bfloat16=true")
+        first = torch.load(self.root / "next" / "last.pt")["history"][0]
+        self.assertLess(first["loss"], 0.95 * history[1]["loss"])
 
 
 if __name__ == "__main__":

@@ -2,20 +2,43 @@
 
 import numpy as np
 
+from scans import IGNORED
 
-def _move(points, settings, random):
-    """Turns about the vertical, mirrors, tilts, stretches and lifts the scan."""
+
+def aim(points, classes, width_rad, share, random):
+    """Azimuth [rad] of the middle of a crop of this width: anywhere or, in this share of draws, so
+    that it holds a point of a class that is drawn evenly among those of the scan."""
+    present = np.flatnonzero(np.bincount(classes))
+    present = present[present != IGNORED]
+    if random.random() >= share or not present.size:
+        return random.uniform(-np.pi, np.pi)
+    members = np.flatnonzero(classes == random.choice(present))
+    x, y, _ = points[random.choice(members)]
+    return np.arctan2(y, x) + width_rad * random.uniform(-0.5, 0.5)
+
+
+def in_sector(points, middle_rad, width_rad):
+    """Which points lie in a sector about the vertical, at most the whole circle wide."""
+    middle = np.array([np.cos(middle_rad), np.sin(middle_rad)], np.float32)
+    distance = np.hypot(points[:, 0], points[:, 1])
+    return points[:, :2] @ middle >= np.cos(min(width_rad / 2, np.pi)) * distance - 1e-3
+
+
+def draw_motion(settings, random):
+    """A 3 x 3 matrix for points in rows, that turns about the vertical, mirrors, tilts and
+    stretches."""
+    motion = np.eye(3)
     if settings["rotate"]:
         angle = random.uniform(-np.pi, np.pi)
         c, s = np.cos(angle), np.sin(angle)
-        points = points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]], np.float32)
+        motion = motion @ [[c, s, 0], [-s, c, 0], [0, 0, 1]]
     if settings["flip"] and random.random() < 0.5:
-        points = points * np.array([1, -1, 1], np.float32)
+        motion = motion @ np.diag([1, -1, 1])
     if settings["tilt_deg"]:
         roll, pitch = np.radians(random.normal(0, settings["tilt_deg"], 2))
-        points = points @ np.array([[1, 0, -pitch], [0, 1, -roll], [pitch, roll, 1]], np.float32)
-    points = points * np.float32(random.uniform(1 - settings["scale"], 1 + settings["scale"]))
-    return points + np.array([0, 0, random.normal(0, settings["lift_m"])], np.float32)
+        motion = motion @ [[1, 0, -pitch], [0, 1, -roll], [pitch, roll, 1]]
+    motion = motion * random.uniform(1 - settings["scale"], 1 + settings["scale"])
+    return motion.astype(np.float32)
 
 
 def _change_remission(remission, settings, random):
@@ -29,13 +52,15 @@ def _change_remission(remission, settings, random):
     return np.clip(changed, 0, 1).astype(np.float32)
 
 
-def augment_points(points, remission, classes, settings, random):
-    """A scan as another sensor might have seen it. Remission becomes None when it is left out."""
+def augment_points(points, remission, classes, motion, settings, random):
+    """A scan as another sensor might have seen it, from where draw_motion() puts it. Remission
+    becomes None when it is left out."""
     keep = random.random(len(points)) >= random.uniform(0, settings["drop_points"])
     far = random.uniform(settings["max_range_m"], 120)
     keep &= (points**2).sum(axis=1) < far**2
     points, remission, classes = points[keep], remission[keep], classes[keep]
-    points = _move(points, settings, random)
+    lift = np.array([0, 0, random.normal(0, settings["lift_m"])], np.float32)
+    points = points @ motion + lift
     noise = random.normal(0, random.uniform(0, settings["range_noise_m"]), len(points))
     depth = np.sqrt((points**2).sum(axis=1))
     points = points * (1 + noise / depth).astype(np.float32)[:, None]
@@ -51,8 +76,8 @@ def drop_beams(image, settings, random):
     image.channels[:, lost] = 0
 
 
-def crop(channels, target, columns, random):
-    """A part of the image, `columns` wide, that may run over its seam."""
-    start = random.integers(channels.shape[2])
+def crop(channels, target, columns, azimuth_rad):
+    """A part of the image, `columns` wide, about this azimuth; it may run over the image's seam."""
+    start = round(0.5 * (1 - azimuth_rad / np.pi) * channels.shape[2] - columns / 2)
     chosen = np.arange(start, start + columns) % channels.shape[2]
     return channels[:, :, chosen], target[:, chosen]

@@ -27,6 +27,10 @@ def load_run(folder):
 
 def describe_run(arguments, state):
     config = state["config"]
+    image = {**config["image"], "columns": arguments.columns or config["image"]["columns"]}
+    widths = config["augmentation"]["image_columns"]
+    if widths and min(widths) < image["columns"]:
+        image["least_columns"] = min(widths)
     best = max(entry["miou"] for entry in state["history"])
     words = {
         "name": arguments.name or arguments.folder.name,
@@ -37,7 +41,7 @@ def describe_run(arguments, state):
     }
     return describe(
         words,
-        config["image"],
+        image,
         config["mean"],
         config["deviation"],
         class_names(),
@@ -53,6 +57,7 @@ def read_arguments():
     parser.add_argument("run", type=Path, help="folder of train.py")
     parser.add_argument("folder", type=Path, help="the model folder to write")
     parser.add_argument("--name", help="default: the folder's name")
+    parser.add_argument("--columns", type=int, help="of its images, if not those of the run")
     parser.add_argument("--licence", default="MIT")
     parser.add_argument("--sensor", default="spinning lidars of 16 to 64 beams")
     parser.add_argument("--training", help="how it was trained, in words")

@@ -24,7 +24,9 @@ def class_weights(shares, kind):
 
 
 def weighted_cross_entropy(scores, target, weights):
-    """Mean over the pixels that have a class, each by its class's weight."""
+    """Mean over the pixels that have a class, each by its class's weight; 0 without any."""
+    if not (target != IGNORED).any():
+        return 0 * scores.sum()
     return functional.cross_entropy(scores, target, weights, ignore_index=IGNORED)
 
 
@@ -43,7 +45,7 @@ def lovasz_softmax(scores, target, pixels=16384):
         truth = (target == label).float()
         errors, order = torch.sort((truth - probabilities[:, label]).abs(), descending=True)
         losses.append(errors @ _jaccard_gradient(truth[order]))
-    return torch.stack(losses).mean() if losses else scores.sum()
+    return torch.stack(losses).mean() if losses else 0 * scores.sum()
 
 
 def _jaccard_gradient(truth):

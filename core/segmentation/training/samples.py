@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from augmentation import augment_points, crop, drop_beams
+from augmentation import aim, augment_points, crop, draw_motion, drop_beams, in_sector
 from range_images import ImageModel, normalise, project
 from scans import IGNORED, ScanFiles
 
@@ -17,7 +17,10 @@ def open_scans(config, part):
 
 
 def _target(image, classes):
-    return np.where(image.point >= 0, classes[image.point], IGNORED).astype(np.int64)
+    target = np.full(image.point.shape, IGNORED, np.int64)
+    seen = image.point >= 0
+    target[seen] = classes[image.point[seen]]
+    return target
 
 
 def _network_input(image, remission, config):
@@ -39,6 +42,21 @@ def _drawn_width(image, settings, random):
     return replace(image, columns=int(random.choice(widths))) if widths else image
 
 
+# Tilting moves points to other azimuths, few of them far.
+MARGIN_RAD = np.radians(4)
+
+
+def _part(scan, model, settings, motion, random):
+    """What of a scan a crop can show, since every point costs time, and the azimuth of the crop's
+    middle after the motion."""
+    points, _, classes = scan
+    width_rad = 2 * np.pi * settings["crop_columns"] / model.columns
+    middle_rad = aim(points, classes, width_rad, settings["aim_at_classes"], random)
+    chosen = in_sector(points, middle_rad, width_rad + 2 * MARGIN_RAD)
+    x, y, _ = np.array([np.cos(middle_rad), np.sin(middle_rad), 0], np.float32) @ motion
+    return [values[chosen] for values in scan], np.arctan2(y, x)
+
+
 class TrainingSamples(torch.utils.data.Dataset):
     """Augmented parts of range images; another draw every time."""
 
@@ -52,15 +70,16 @@ class TrainingSamples(torch.utils.data.Dataset):
         index, seed = key
         random = np.random.default_rng(seed)
         settings = self.config["augmentation"]
-        points, remission, classes = augment_points(*self.scans.read(index), settings, random)
-        known = remission if remission is not None else np.zeros(len(points), np.float32)
         model = _drawn_width(self.scans.images[index], settings, random)
+        motion = draw_motion(settings, random)
+        scan, azimuth_rad = _part(self.scans.read(index), model, settings, motion, random)
+        points, remission, classes = augment_points(*scan, motion, settings, random)
+        known = remission if remission is not None else np.zeros(len(points), np.float32)
         image = project(points, known, model)
         drop_beams(image, settings, random)
         channels = _network_input(image, remission, self.config)
-        channels, target = crop(
-            channels, _target(image, classes), settings["crop_columns"], random
-        )
+        columns = settings["crop_columns"]
+        channels, target = crop(channels, _target(image, classes), columns, azimuth_rad)
         return torch.from_numpy(channels), torch.from_numpy(target)
 
 

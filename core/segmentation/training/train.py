@@ -24,6 +24,7 @@ from networks import make_network
 from pictures import save_curves, save_labelled_images
 from samples import BatchesBySensor, TrainingSamples, open_scans, plain_sample
 from scans import CLASS_NAMES
+from warm_start import load_weights
 
 
 def read_config(file, changes):
@@ -85,9 +86,12 @@ class Run:
         self.weights = class_weights(self.shares, config["loss"]["weights"]).to(device)
 
     def start_from(self, file):
-        """Takes over the weights that another run found best."""
-        self.averaged.load_state_dict(torch.load(file, map_location=self.device)["averaged"])
-        self.network.load_state_dict(self.averaged.state_dict())
+        """Takes over the weights that another run found best, or those of a model folder."""
+        samples = TrainingSamples(self.scans, self.config)
+        chosen = np.linspace(0, len(samples) - 1, 32).astype(int)
+        images = (samples[index, 0][0][None].to(self.device) for index in chosen)
+        load_weights(self.network, file, images)
+        self.averaged.load_state_dict(self.network.state_dict())
 
     def resume(self):
         file = self.folder / "last.pt"
@@ -134,6 +138,11 @@ class Run:
                 else:
                     mean.copy_(now)
 
+    def scores(self, channels):
+        reduced = self.config["optimiser"]["bfloat16"]
+        with torch.autocast(torch.device(self.device).type, torch.bfloat16, enabled=reduced):
+            return self.network(channels).float()
+
     def loss(self, scores, target):
         loss = weighted_cross_entropy(scores, target, self.weights)
         share = self.config["loss"]["lovasz"]
@@ -148,7 +157,7 @@ class Run:
         began, losses = time.time(), []
         for done, (channels, target) in enumerate(batches, 1):
             channels = channels.to(self.device, memory_format=torch.channels_last)
-            loss = self.loss(self.network(channels), target.to(self.device))
+            loss = self.loss(self.scores(channels), target.to(self.device))
             if not torch.isfinite(loss):
                 raise SystemExit("the loss is not finite; lower optimiser.rate")
             self.optimiser.zero_grad()

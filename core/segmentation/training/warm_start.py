@@ -1,0 +1,140 @@
+"""Weights to start a training from: another run's, or those of a model folder.
+
+In a model.onnx the batch norms are folded into the convolutions. To train on they are taken out
+again: each gets the mean and the variance that its convolution gives on training images, and the
+scale and the offset that leave the network what it was.
+"""
+
+from pathlib import Path
+
+import onnx
+import torch
+from onnx import numpy_helper
+from torch import nn
+
+# Squared length of a filter that PyTorch draws at random. A batch norm after it takes away any
+# length, but not the pace: the longer a filter, the slower it turns.
+SQUARED_LENGTH = 1 / 3
+
+
+def load_weights(network, file, images):
+    """Gives `network` the weights of `file`: best.pt of a run, or a model folder. `images`:
+    iterable of training inputs (n x 5 x rows x columns), for the batch norms of a model folder."""
+    file = Path(file)
+    if file.is_dir():
+        file = file / "model.onnx"
+    if file.suffix == ".onnx":
+        _unfold_batch_norms(network, _load_onnx(network, file), images)
+    else:
+        network.load_state_dict(torch.load(file, map_location="cpu")["averaged"])
+
+
+def _load_onnx(network, file):
+    """Copies the tensors of an exported network; returns the biases that stand for batch norms,
+    by the convolution's name."""
+    graph = onnx.load(str(file)).graph
+    tensors = {t.name: numpy_helper.to_array(t) for t in graph.initializer}
+    for node in graph.node:
+        # Equal tensors are stored once.
+        if node.op_type == "Identity" and node.input[0] in tensors:
+            tensors[node.output[0]] = tensors[node.input[0]]
+    parts = dict(network.named_modules())
+    offsets, missing = {}, {n for n, p in parts.items() if isinstance(p, _KINDS)}
+    for node in graph.node:
+        name = _part_of(node.name)
+        if node.op_type not in ("Conv", "ConvTranspose", "BatchNormalization"):
+            continue
+        if name not in parts:
+            raise ValueError(f"{file}: the network of this configuration has no part '{name}'")
+        part, values = parts[name], [torch.tensor(tensors[i]) for i in node.input[1:]]
+        fields = _BATCH_NORM if isinstance(part, nn.BatchNorm2d) else ("weight", "bias")
+        for field, value in zip(fields, values):
+            if field == "bias" and part.bias is None:
+                offsets[name] = value
+                missing.discard(_batch_norm_of(name))
+                continue
+            place = getattr(part, field)
+            if place.shape != value.shape:
+                raise ValueError(
+                    f"{file}: {name}.{field} is {tuple(value.shape)}, "
+                    f"in this configuration {tuple(place.shape)}"
+                )
+            place.data.copy_(value)
+        missing.discard(name)
+    if missing:
+        raise ValueError(f"{file} has nothing for {', '.join(sorted(missing))}")
+    return offsets
+
+
+def _part_of(node_name):
+    """The network's part that a node stands for: /network/encoder.0/conv/Conv is encoder.0.conv;
+    members of a sequence repeat its name, as in /network/head/head.1/Conv."""
+    steps = []
+    for step in node_name.split("/")[2:-1]:
+        if steps and step.startswith(steps[-1] + "."):
+            steps.pop()
+        steps.append(step)
+    return ".".join(steps)
+
+
+_KINDS = (nn.Conv2d, nn.ConvTranspose2d, nn.BatchNorm2d)
+_BATCH_NORM = ("weight", "bias", "running_mean", "running_var")
+
+
+def _batch_norm_of(convolution):
+    """conv1 is followed by bn1, encoder.0.conv by encoder.0.bn."""
+    place, _, name = convolution.rpartition(".")
+    return f"{place}.{name.replace('conv', 'bn')}" if place else name.replace("conv", "bn")
+
+
+def _unfold_batch_norms(network, offsets, images):
+    parts = dict(network.named_modules())
+    statistics = {name: _Spread() for name in offsets}
+    for name, offset in offsets.items():
+        norm = parts[_batch_norm_of(name)]
+        norm.reset_running_stats()
+        norm.weight.data.fill_((1 + norm.eps) ** 0.5)
+        norm.bias.data.copy_(offset)
+    hooks = [
+        parts[name].register_forward_hook(lambda _, __, y, s=spread: s.add(y))
+        for name, spread in statistics.items()
+    ]
+    training = network.training
+    network.eval()
+    with torch.no_grad():
+        for image in images:
+            network(image)
+    network.train(training)
+    for hook in hooks:
+        hook.remove()
+    for name, spread in statistics.items():
+        _normalise(parts[name], parts[_batch_norm_of(name)], spread)
+
+
+class _Spread:
+    """Mean and variance of each channel over all pixels of all images."""
+
+    def __init__(self):
+        self.count, self.sum, self.squares = 0, 0, 0
+
+    def add(self, y):
+        y = y.double()
+        self.count += y.numel() // y.shape[1]
+        self.sum += y.sum((0, 2, 3))
+        self.squares += (y * y).sum((0, 2, 3))
+
+    def mean(self):
+        return (self.sum / self.count).float()
+
+    def variance(self):
+        return (self.squares / self.count - (self.sum / self.count) ** 2).clamp(min=0).float()
+
+
+def _normalise(convolution, norm, spread):
+    lengths = convolution.weight.data.square().sum((1, 2, 3))
+    scale = (SQUARED_LENGTH / lengths.clamp(min=1e-12)).sqrt()
+    convolution.weight.data *= scale[:, None, None, None]
+    norm.running_mean.copy_(scale * spread.mean())
+    norm.running_var.copy_(scale**2 * spread.variance())
+    norm.weight.data.copy_((norm.running_var + norm.eps).sqrt() / scale)
+    norm.bias.data += spread.mean()
