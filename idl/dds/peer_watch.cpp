@@ -54,7 +54,8 @@ void add_locators(const RemoteLocatorList& locators, Peer& peer) {
     const auto* bytes = &locator.address[12];
     std::string address;
     for (int i = 0; i < 4; ++i) {
-      address += (i == 0 ? "" : ".") + std::to_string(bytes[i]);
+      if (i > 0) address += '.';
+      address += std::to_string(bytes[i]);
     }
     if (std::ranges::find(peer.addresses, address) == peer.addresses.end()) {
       peer.addresses.push_back(address);
