@@ -21,7 +21,7 @@ namespace fs = std::filesystem;
 void read_image(YamlSection section, ModelDescription& model) {
   section.require({"rows", "columns", "fov_up_deg", "fov_down_deg"});
   section.whole("rows", model.rows, {1, 512});
-  section.whole("columns", model.columns, {1, 8192});
+  section.whole("columns", model.columns, {1, most_image_columns});
   section.whole("least_columns", model.least_columns, {0, static_cast<double>(model.columns)});
   section.degrees("fov_up_deg", model.fov_up, {-90, 90});
   section.degrees("fov_down_deg", model.fov_down, {-90, 90});
@@ -91,10 +91,12 @@ void read_model(YamlSection file, ModelDescription& model) {
 }
 
 std::unique_ptr<LabelSource> open_network_labels(const LabelsConfig& labels,
-                                                 const SensorModel& sensor) {
+                                                 const SensorModel& sensor, bool may_narrow) {
   ModelDescription model = load_model_description(find_model(labels.model));
   if (labels.image_columns == 0) {
-    return open_model_of_many_widths(for_sensor(model, sensor), labels.engine);
+    model = for_sensor(model, sensor);
+    return may_narrow ? open_model_of_many_widths(model, labels.engine)
+                      : open_model(model, labels.engine);
   }
   model.columns = labels.image_columns;
   try {
@@ -127,12 +129,12 @@ ModelDescription load_model_description(const fs::path& folder) {
 }
 
 std::unique_ptr<LabelSource> open_label_source(const LabelsConfig& labels,
-                                               const SensorModel& sensor) {
+                                               const SensorModel& sensor, bool may_narrow) {
   switch (labels.source) {
     case LabelOrigin::automatic:
-      return std::make_unique<StreamFirstLabels>(open_network_labels(labels, sensor));
+      return std::make_unique<StreamFirstLabels>(open_network_labels(labels, sensor, may_narrow));
     case LabelOrigin::model:
-      return open_network_labels(labels, sensor);
+      return open_network_labels(labels, sensor, may_narrow);
     case LabelOrigin::stream:
       return std::make_unique<StreamLabels>();
     case LabelOrigin::none:

@@ -10,6 +10,7 @@
 #include "config/sensor_file.hpp"
 #include "config/yaml_section.hpp"
 #include "core/map/datum.hpp"
+#include "core/segmentation/model_description.hpp"
 
 namespace stillmap {
 namespace {
@@ -45,10 +46,12 @@ void read_labels(YamlSection section, LabelsConfig& labels) {
                                {"model", LabelOrigin::model},
                                {"none", LabelOrigin::none}});
   read_model_name(section, labels.model);
-  section.whole("image_columns", labels.image_columns, {0, 8192});
-  if (labels.image_columns > 0 && labels.image_columns < 16) {
+  section.whole("image_columns", labels.image_columns, {0, most_image_columns});
+  if (labels.image_columns > 0 && labels.image_columns < least_image_columns) {
     section.fault("image_columns", "is " + std::to_string(labels.image_columns) +
-                                       ", but must be 0 (as the model says) or 16..8192");
+                                       ", but must be 0 (as the model says) or " +
+                                       std::to_string(least_image_columns) + ".." +
+                                       std::to_string(most_image_columns));
   }
   using Engine = EngineChoice::Engine;
   section.choice<Engine>(

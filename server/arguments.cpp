@@ -59,7 +59,7 @@ void add_operation_options(CLI::App& program, OperationArguments& operation) {
 /// Throws ConfigError with every fault, or ModelError.
 Arguments check_config(const std::string& file) {
   const ServerConfig config = load_server_config(file);
-  const auto labels = open_label_source(config.labels, config.mapper.sensor);
+  const auto labels = open_label_source(config.labels, config.mapper.sensor, true);
   std::cout << file << " can be used; labels by " << labels->name() << "\n";
   return {.config = std::nullopt};
 }

@@ -27,11 +27,15 @@ class LabelCadence {
   [[nodiscard]] std::uint32_t every() const { return pace_.every; }
   /// An index of the source's costs.
   [[nodiscard]] std::size_t coarseness() const { return pace_.coarseness; }
-  [[nodiscard]] double network_ms() const { return finest_ms_.value() * cost(pace_.coarseness); }
+  /// What a scan takes at the present pace; before the first run at it what it should.
+  [[nodiscard]] double network_ms() const;
   /// Time from scan to scan as the sensor sends them.
   [[nodiscard]] double period_ms() const { return period_ms_.value(); }
 
  private:
+  static constexpr std::size_t runs_looked_at = 5;
+  static constexpr int least_patience = 10;
+
   /// In the order in which they are to be preferred.
   struct Pace {
     std::size_t coarseness = 0;
@@ -39,15 +43,23 @@ class LabelCadence {
     auto operator<=>(const Pace&) const = default;
   };
 
-  [[nodiscard]] double cost(std::size_t coarseness) const { return costs_[coarseness]; }
+  /// What a scan takes at the finest, or would take.
+  [[nodiscard]] double finest_ms() const { return network_ms() / costs_[pace_.coarseness]; }
   /// The first with which the network takes this share of the room that it has, or less.
   [[nodiscard]] Pace first_within(double share, double room_ms) const;
+  void change_to(Pace pace);
 
   std::vector<double> costs_;
-  /// What a scan takes, or would take, at the finest.
-  RecentMedian finest_ms_{5};
+  /// At the present coarseness.
+  RecentMedian network_ms_{runs_looked_at};
   RecentMedian period_ms_{9};
   Pace pace_;
+  /// What a scan should take at it, by what it took at the one before.
+  double expected_ms_ = 0.0;
+  /// Scans looked at since the coarseness changed, and how many it takes before a closer look is
+  /// tried: more each time that one did not last.
+  int runs_ = 0;
+  int patience_ = least_patience;
 };
 
 }  // namespace stillmap

@@ -10,6 +10,7 @@
 #include "server/arguments.hpp"
 #include "server/operation/log_setup.hpp"
 #include "server/operation/service_manager.hpp"
+#include "server/paced_labels.hpp"
 #include "server/server.hpp"
 
 namespace {
@@ -29,7 +30,8 @@ sigset_t block_stop_signals() {
 
 void serve(const stillmap::ServerConfig& config) {
   const sigset_t signals = block_stop_signals();
-  auto labels = stillmap::open_label_source(config.labels, config.mapper.sensor);
+  const bool may_narrow = stillmap::label_budget(config).count() > 0;
+  auto labels = stillmap::open_label_source(config.labels, config.mapper.sensor, may_narrow);
   if (const std::string details = labels->details(); !details.empty()) {
     spdlog::info("labels by {}: {}", labels->name(), details);
   }

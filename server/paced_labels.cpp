@@ -36,6 +36,7 @@ PacedLabels::PacedLabels(std::unique_ptr<LabelSource> source, std::chrono::milli
       queue_(queue),
       statistics_(statistics),
       cadence_(source_->costs()) {
+  show_pace();
   if (!may_skip_scans()) return;
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
@@ -114,18 +115,22 @@ void PacedLabels::segmented(double network_ms) {
                           may_skip_scans() ? statistics_.receive_period_ms() : 0.0);
   const std::pair now(cadence_.coarseness(), cadence_.every());
   source_->set_coarseness(now.first);
-  const int columns = source_->image_columns();
-  statistics_.segmenting({.every = now.second,
+  show_pace();
+  if (now != before) tell_of_pace(now > before);
+}
+
+void PacedLabels::show_pace() {
+  statistics_.segmenting({.every = cadence_.every(),
                           .network_ms = cadence_.network_ms(),
-                          .image_columns = static_cast<std::uint32_t>(columns),
+                          .image_columns = static_cast<std::uint32_t>(source_->image_columns()),
                           .full_columns = static_cast<std::uint32_t>(full_columns_),
                           .fresh_share = 0.0,
                           .carried_share = 0.0,
                           .unlabelled_share = 0.0});
-  if (now != before) tell_of_pace(now > before, columns);
 }
 
-void PacedLabels::tell_of_pace(bool is_slower, int columns) const {
+void PacedLabels::tell_of_pace(bool is_slower) const {
+  const int columns = source_->image_columns();
   spdlog::log(is_slower ? spdlog::level::warn : spdlog::level::info,
               "{} is segmented now{}: that takes {:.0f} ms, all else {:.0f} ms, and scans come "
               "every {:.0f} ms",

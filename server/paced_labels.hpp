@@ -45,7 +45,9 @@ class PacedLabels final : public LabelFeed {
   /// The scan's labels, none after a failure.
   [[nodiscard]] ScanLabels segment(const Scan& scan);
   void segmented(double network_ms);
-  void tell_of_pace(bool is_slower, int columns) const;
+  /// In the status, and in the log.
+  void show_pace();
+  void tell_of_pace(bool is_slower) const;
   /// Whether the thread is to take the scan that is offered now.
   [[nodiscard]] bool is_due();
   [[nodiscard]] bool is_worth_the_wait();

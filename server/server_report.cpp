@@ -64,7 +64,7 @@ std::string reduced_pace(const SegmentationStatus& segmentation) {
   if (segmentation.every > 1) {
     what = every_nth_scan(segmentation.every) + " is segmented, labels are carried between";
   }
-  if (segmentation.image_columns < segmentation.full_columns) {
+  if (segmentation.image_columns > 0 && segmentation.image_columns < segmentation.full_columns) {
     what += (what.empty() ? "" : "; ") + std::string("range images are ") +
             std::to_string(segmentation.image_columns) + " columns wide instead of " +
             std::to_string(segmentation.full_columns);

@@ -14,7 +14,7 @@ void add_segmentation_options(CommandHandle command, MapperArguments& arguments)
           "--columns", arguments.columns,
           "Columns of the range image of a model that runs; default: as configured, else as the "
           "model says")
-      .between(16, 8192);
+      .between(least_image_columns, most_image_columns);
   add_engine_options(command, arguments.engine);
 }
 

@@ -25,7 +25,10 @@ ModelDescription load_by(const ModelArguments& arguments, Load load) {
   }
   ModelDescription model = load(find_model(model_path));
   if (rows > 0) model.rows = rows;
-  if (columns > 0) model.columns = columns;
+  if (columns > 0) {
+    model.columns = columns;
+    model.least_columns = 0;
+  }
   return model;
 }
 
@@ -41,7 +44,7 @@ void add_model_options(CommandHandle command, ModelArguments& arguments) {
       .between(1, 512);
   command
       .option("--columns", arguments.columns, "Columns of the image; default: as model.yaml says")
-      .between(1, 8192);
+      .between(1, most_image_columns);
 }
 
 ModelDescription load_model(const ModelArguments& arguments) {

@@ -12,7 +12,6 @@ namespace {
 constexpr std::array<std::string_view, input_channels> channel_names{"range", "x", "y", "z",
                                                                      "remission"};
 constexpr int max_rows = 512;
-constexpr int max_columns = 8192;
 
 std::string statistics_faults(const InputStatistics& statistics) {
   std::string faults;
@@ -38,7 +37,8 @@ std::string between(const char* field, int value, int max) {
 }  // namespace
 
 std::string ModelDescription::faults() const {
-  std::string faults = between("rows", rows, max_rows) + between("columns", columns, max_columns);
+  std::string faults =
+      between("rows", rows, max_rows) + between("columns", columns, most_image_columns);
   if (!(fov_down < fov_up && std::abs(fov_up) < std::numbers::pi / 2 &&
         std::abs(fov_down) < std::numbers::pi / 2)) {
     faults += "fov_down must be below fov_up, both within -90..90 degrees\n";

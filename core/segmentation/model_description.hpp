@@ -18,6 +18,10 @@ namespace stillmap {
 /// Channels of the network's input, in this order: range, x, y, z [m], remission (0..1).
 inline constexpr std::size_t input_channels = 5;
 
+/// Widths of range images that can be asked for; a model's own may be less than the least.
+inline constexpr int least_image_columns = 16;
+inline constexpr int most_image_columns = 8192;
+
 /// Mean and standard deviation of each input channel over the training set.
 struct InputStatistics {
   std::array<float, input_channels> mean{};

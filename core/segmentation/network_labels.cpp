@@ -6,10 +6,29 @@
 #include <utility>
 
 #include "core/lidar/range_image.hpp"
+#include "core/segmentation/model_error.hpp"
 #include "core/segmentation/network_input.hpp"
 
 namespace stillmap {
 namespace {
+
+/// RangeNet++ halves the width of its image five times.
+constexpr int usual_stride = 32;
+
+/// Half way from the least width that the model knows to the usual one.
+int width_between(const ModelDescription& model) {
+  return (model.columns + model.least_columns) / 2 / usual_stride * usual_stride;
+}
+
+std::unique_ptr<SegmentationNetwork> open_in_width(ModelDescription model, int columns,
+                                                   const EngineChoice& choice) {
+  model.columns = columns;
+  try {
+    return open_network(model, choice).network;
+  } catch (const ModelError& error) {
+    throw ModelError("with " + std::to_string(columns) + " image columns", error.what());
+  }
+}
 
 PointLabels labels_of_own_pixel(const RangeImage& image, const PixelLabels& pixels) {
   return {.classes = unproject(image, std::span<const SemanticClass>(pixels.classes),
@@ -40,7 +59,8 @@ void NetworkLabels::add_coarser(int columns, std::unique_ptr<SegmentationNetwork
   widths_.push_back({.columns = columns, .network = std::move(network)});
 }
 
-// All that is done with a scan, but for some of the projection and the votes, is done by pixel.
+// By pixel, as nearly all that is done with a scan. In truth narrow images cost somewhat more: the
+// default model's take 0.7 and 0.54 of the time at 0.75 and 0.5 of the columns.
 std::vector<double> NetworkLabels::costs() const {
   std::vector<double> costs;
   for (const Width& width : widths_) {
@@ -80,11 +100,16 @@ std::unique_ptr<LabelSource> open_model_of_many_widths(const ModelDescription& m
   OpenedNetwork opened = open_network(model, choice);
   auto labels =
       std::make_unique<NetworkLabels>(model, std::move(opened.network), std::move(opened.remark));
-  if (model.least_columns > 0 && model.least_columns < model.columns) {
-    ModelDescription narrow = model;
-    narrow.columns = model.least_columns;
-    labels->add_coarser(narrow.columns, open_network(narrow, choice).network);
+  const int least = model.least_columns;
+  if (least == 0 || least >= model.columns) return labels;
+  if (const int between = width_between(model); between > least) {
+    try {
+      labels->add_coarser(between, open_in_width(model, between, choice));
+    } catch (const ModelError&) {
+      // Nobody asked for it: a network of another stride does without.
+    }
   }
+  labels->add_coarser(least, open_in_width(model, least, choice));
   return labels;
 }
 

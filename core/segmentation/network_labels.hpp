@@ -47,7 +47,7 @@ class NetworkLabels final : public LabelSource {
 /// Loads the network that `model` describes. Throws ModelError naming the file and the fault.
 [[nodiscard]] std::unique_ptr<LabelSource> open_model(const ModelDescription& model,
                                                       const EngineChoice& choice = {});
-/// The same, able to look as coarsely as the model was trained for.
+/// The same, able to look more coarsely, down to the model's least_columns.
 [[nodiscard]] std::unique_ptr<LabelSource> open_model_of_many_widths(
     const ModelDescription& model, const EngineChoice& choice = {});
 

@@ -14,7 +14,8 @@ std::string StreamFirstLabels::name() const {
 }
 
 PointLabels StreamFirstLabels::label(const Scan& scan) {
-  return scan.labels.empty() ? otherwise_->label(scan) : StreamLabels().label(scan);
+  uses_stream_ = !scan.labels.empty();
+  return uses_stream_ ? StreamLabels().label(scan) : otherwise_->label(scan);
 }
 
 }  // namespace stillmap

@@ -118,7 +118,8 @@ TEST_F(ModelCommandTest, TellsOfItsNarrowestImageAndTakesNoneThatIsWider) {
 TEST_F(ModelCommandTest, ANetworkOfOneSizeTakesNoOtherWidth) {
   simulate("city", 1);
   std::ofstream(folder_ / "model/model.onnx", std::ios::binary) << light_bytes(8, 16, 64, 20);
-  const std::string map = "map " + path("city") + " --labels " + path("model") + " --columns ";
+  const std::string map = "map " + path("city") + " --labels " + path("model") + " --out " +
+                          path("out") + " --columns ";
   const ProcessResult other = run(map + "128");
   EXPECT_EQ(other.exit_code, 2);
   EXPECT_THAT(other.err, AllOf(HasSubstr("with 128 image columns"), HasSubstr("model.onnx")));

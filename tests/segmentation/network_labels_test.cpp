@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/lidar/range_image.hpp"
+#include "tests/segmentation/onnx_builder.hpp"
 #include "tests/segmentation/sample_model.hpp"
 
 namespace stillmap {
@@ -161,6 +162,22 @@ TEST(NetworkLabels, LooksAsCoarselyAsItIsTold) {
   EXPECT_EQ(labels.label(scan).classes, std::vector(5, SemanticClass::car));
   labels.set_coarseness(0);
   EXPECT_EQ(labels.label(scan).classes, std::vector(5, SemanticClass::road));
+}
+
+TEST(NetworkLabels, OpensAModelInTheWidthsThatItKnows) {
+  ModelDescription model = test::describe_family(16, 128, 20);
+  model.network_file = write_model(test::light_bytes(8, 0, 0, 20));
+  EXPECT_EQ(open_model_of_many_widths(model)->costs(), std::vector{1.0});
+  model.least_columns = 32;
+  const auto labels = open_model_of_many_widths(model);
+  EXPECT_EQ(labels->costs(), (std::vector{1.0, 0.5, 0.25}));
+  const Scan scan = random_scan(600, 4);
+  labels->set_coarseness(1);
+  ModelDescription narrow = model;
+  narrow.columns = 64;
+  EXPECT_EQ(labels->label(scan).classes, open_model(narrow)->label(scan).classes);
+  model.least_columns = 112;
+  EXPECT_EQ(open_model_of_many_widths(model)->costs(), (std::vector{1.0, 0.875}));
 }
 
 TEST(NetworkLabels, LeavesPointsUnlabeledWhereTheNetworkFails) {

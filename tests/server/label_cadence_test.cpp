@@ -58,6 +58,22 @@ TEST(LabelCadence, LooksCloselyAgainWithRoomToSpare) {
   EXPECT_EQ(cadence.coarseness(), 0U);
 }
 
+TEST(LabelCadence, TriesACloserLookThatDoesNotLastLessAndLessOften) {
+  // The source says that a coarse look costs half, and it costs a third: by what it says there
+  // would be room for a closer one.
+  LabelCadence cadence({1.0, 0.5});
+  const auto closer_looks = [&](int scans) {
+    int closer = 0;
+    for (int i = 0; i < scans; ++i) {
+      cadence.scan_segmented(cadence.coarseness() == 0 ? 120.0 : 40.0, 0.0, 100.0);
+      closer += cadence.coarseness() == 0 ? 1 : 0;
+    }
+    return closer;
+  };
+  EXPECT_LT(closer_looks(1000), 40);
+  EXPECT_LT(closer_looks(6000), 40);
+}
+
 TEST(LabelCadence, RecoversWhenTheNetworkIsFastAgain) {
   LabelCadence cadence;
   EXPECT_EQ(settled(cadence, 450.0), 5U);

@@ -91,7 +91,8 @@ TEST_F(PacedLabelsTest, WithoutABudgetEveryScanIsLookedAtClosely) {
   source_.costs = {1.0, 0.5};
   const auto labels = feed(0ms);
   for (int k = 0; k < 12; ++k) {
-    statistics_.scan_received();
+    // The sensor is four times as fast as the source.
+    for (int i = 0; i < 4; ++i) statistics_.scan_received();
     (void)labels->offer(scan_at(k));
   }
   const SegmentationStatus pace = status().segmentation;

@@ -98,7 +98,7 @@ TEST_F(SlowNetwork, LooksMoreCoarselyBeforeScansAreLeftOut) {
   EXPECT_THAT(slow.reason, HasSubstr("600 columns wide instead of 2000"));
 
   source_.delay_ms = 0;
-  drive(20);
+  drive(40);
   EXPECT_EQ(status().segmentation.image_columns, 2000U);
   EXPECT_EQ(status().reason, "");
 }

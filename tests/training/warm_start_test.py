@@ -5,10 +5,11 @@ import unittest
 from pathlib import Path
 
 import torch
+import yaml
 
-from model_folder import export_onnx
+from model_folder import class_names, describe, export_onnx
 from networks import LightRangeNet, RangeNet
-from warm_start import load_weights
+from warm_start import check_description, load_weights
 
 STAGES = [[16, [1, 2], 1], [24, [2, 2], 1]]
 
@@ -38,7 +39,7 @@ class WarmStart(unittest.TestCase):
         return self.folder
 
     def test_gives_what_the_model_gives(self):
-        for kind in (lambda: LightRangeNet(8, STAGES), lambda: RangeNet(21)):
+        for kind in (lambda: LightRangeNet(8, STAGES), lambda: RangeNet(21, output_stride=16)):
             network, other = used(kind(), 1), kind()
             images = [torch.randn(4, 5, 16, 64) for _ in range(4)]
             load_weights(other, self.exported(network), images)
@@ -66,6 +67,22 @@ class WarmStart(unittest.TestCase):
             load_weights(LightRangeNet(8, [[16, [1, 2], 1], [24, [2, 2], 2]]), folder, [])
         with self.assertRaisesRegex(ValueError, "has no part 'conv1'"):
             load_weights(RangeNet(21), folder, [])
+
+    def test_refuses_a_model_that_sees_or_names_otherwise(self):
+        image = {"rows": 16, "columns": 64, "fov_up_deg": 3, "fov_down_deg": -25}
+        config = {"mean": [12, 11, 0, -1, 0.2], "deviation": [12, 11, 7, 1, 0.2]}
+
+        def check(mean, classes):
+            text = describe({}, image, mean, config["deviation"], classes, None)
+            (self.folder / "model.yaml").write_text(yaml.safe_dump(text, sort_keys=False))
+            check_description(self.folder, config)
+
+        check(config["mean"], class_names())
+        with self.assertRaisesRegex(ValueError, "model.yaml: mean is .*11.7"):
+            check([11.7, 11, 0, -1, 0.2], class_names())
+        with self.assertRaisesRegex(ValueError, "model.yaml: its classes"):
+            check(config["mean"], class_names()[::-1])
+        check_description(self.folder / "best.pt", config)
 
     def test_takes_the_best_of_a_run(self):
         network, other = used(LightRangeNet(8, STAGES), 3), LightRangeNet(8, STAGES)

@@ -27,9 +27,12 @@ def load_run(folder):
 
 def describe_run(arguments, state):
     config = state["config"]
-    image = {**config["image"], "columns": arguments.columns or config["image"]["columns"]}
-    widths = config["augmentation"]["image_columns"]
-    if widths and min(widths) < image["columns"]:
+    image = {**config["image"]}
+    if arguments.columns:
+        image["columns"] = arguments.columns
+    widths = config["augmentation"].get("image_columns")
+    # A network whose image does not follow the sensor is written for one size.
+    if config["follow_sensor"] and widths and min(widths) < image["columns"]:
         image["least_columns"] = min(widths)
     best = max(entry["miou"] for entry in state["history"])
     words = {
@@ -64,7 +67,10 @@ def read_arguments():
     parser.add_argument("--accuracy", help="how well it does, in words")
     parser.add_argument("--calibrate", nargs="*", default=[], help="recordings for int8.yaml")
     parser.add_argument("--stillmap", type=Path, default="build/release/bin/stillmap")
-    return parser.parse_args()
+    arguments = parser.parse_args()
+    if arguments.columns is not None and (arguments.columns < 32 or arguments.columns % 32):
+        parser.error(f"--columns {arguments.columns} is no multiple of 32")
+    return arguments
 
 
 def main():

@@ -51,7 +51,7 @@ def _part(scan, model, settings, motion, random):
     middle after the motion."""
     points, _, classes = scan
     width_rad = 2 * np.pi * settings["crop_columns"] / model.columns
-    middle_rad = aim(points, classes, width_rad, settings["aim_at_classes"], random)
+    middle_rad = aim(points, classes, width_rad, settings.get("aim_at_classes", 0), random)
     chosen = in_sector(points, middle_rad, width_rad + 2 * MARGIN_RAD)
     x, y, _ = np.array([np.cos(middle_rad), np.sin(middle_rad), 0], np.float32) @ motion
     return [values[chosen] for values in scan], np.arctan2(y, x)

@@ -24,7 +24,6 @@ from networks import make_network
 from pictures import save_curves, save_labelled_images
 from samples import BatchesBySensor, TrainingSamples, open_scans, plain_sample
 from scans import CLASS_NAMES
-from warm_start import load_weights
 
 
 def read_config(file, changes):
@@ -87,6 +86,10 @@ class Run:
 
     def start_from(self, file):
         """Takes over the weights that another run found best, or those of a model folder."""
+        # Here, since a run from random weights needs no ONNX.
+        from warm_start import check_description, load_weights
+
+        check_description(file, self.config)
         samples = TrainingSamples(self.scans, self.config)
         chosen = np.linspace(0, len(samples) - 1, 32).astype(int)
         images = (samples[index, 0][0][None].to(self.device) for index in chosen)
@@ -139,7 +142,7 @@ class Run:
                     mean.copy_(now)
 
     def scores(self, channels):
-        reduced = self.config["optimiser"]["bfloat16"]
+        reduced = self.config["optimiser"].get("bfloat16", False)
         with torch.autocast(torch.device(self.device).type, torch.bfloat16, enabled=reduced):
             return self.network(channels).float()
 

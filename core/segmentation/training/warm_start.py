@@ -7,14 +7,32 @@ scale and the offset that leave the network what it was.
 
 from pathlib import Path
 
+import numpy as np
 import onnx
 import torch
+import yaml
 from onnx import numpy_helper
 from torch import nn
+
+from model_folder import CHANNELS, class_names
 
 # Squared length of a filter that PyTorch draws at random. A batch norm after it takes away any
 # length, but not the pace: the longer a filter, the slower it turns.
 SQUARED_LENGTH = 1 / 3
+
+
+def check_description(file, config):
+    """A model folder must see images, and name classes, as this configuration does."""
+    file = Path(file) / "model.yaml"
+    if not file.exists():
+        return
+    model = yaml.safe_load(file.read_text())
+    for field in ("mean", "deviation"):
+        values = [model["statistics"][channel][field] for channel in CHANNELS]
+        if not np.allclose(values, config[field]):
+            raise ValueError(f"{file}: {field} is {values}, in this configuration {config[field]}")
+    if list(model["classes"].values()) != class_names():
+        raise ValueError(f"{file}: its classes are not those that are trained here")
 
 
 def load_weights(network, file, images):
@@ -39,6 +57,7 @@ def _load_onnx(network, file):
         if node.op_type == "Identity" and node.input[0] in tensors:
             tensors[node.output[0]] = tensors[node.input[0]]
     parts = dict(network.named_modules())
+    kept = {_part_of(n.name) for n in graph.node if n.op_type == "BatchNormalization"}
     offsets, missing = {}, {n for n, p in parts.items() if isinstance(p, _KINDS)}
     for node in graph.node:
         name = _part_of(node.name)
@@ -49,9 +68,12 @@ def _load_onnx(network, file):
         part, values = parts[name], [torch.tensor(tensors[i]) for i in node.input[1:]]
         fields = _BATCH_NORM if isinstance(part, nn.BatchNorm2d) else ("weight", "bias")
         for field, value in zip(fields, values):
-            if field == "bias" and part.bias is None:
+            norm = _batch_norm_of(name)
+            if field == "bias" and norm != name and norm in parts and norm not in kept:
                 offsets[name] = value
-                missing.discard(_batch_norm_of(name))
+                missing.discard(norm)
+                if part.bias is not None:
+                    part.bias.data.zero_()
                 continue
             place = getattr(part, field)
             if place.shape != value.shape:

@@ -13,7 +13,7 @@ int come_and_go(const Place& place, int clients) {
   using Request = stillmap_msgs_srv_dds__GetStatus_Request_;
   using Reply = stillmap_msgs_srv_dds__GetStatus_Response_;
   Request request{};
-  request.format_version = 2;
+  request.format_version = 4;
   std::vector<double> times_ms;
   for (int i = 0; i < clients; ++i) {
     const Participant participant(place.domain_id);
