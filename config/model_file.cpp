@@ -92,15 +92,14 @@ void read_model(YamlSection file, ModelDescription& model) {
 
 std::unique_ptr<LabelSource> open_network_labels(const LabelsConfig& labels,
                                                  const SensorModel& sensor, bool may_narrow) {
-  ModelDescription model = load_model_description(find_model(labels.model));
+  ModelDescription model = for_sensor(load_model_description(find_model(labels.model)), sensor);
   if (labels.image_columns == 0) {
-    model = for_sensor(model, sensor);
     return may_narrow ? open_model_of_many_widths(model, labels.engine)
                       : open_model(model, labels.engine);
   }
   model.columns = labels.image_columns;
   try {
-    return open_model(for_sensor(model, sensor), labels.engine);
+    return open_model(model, labels.engine);
   } catch (const ModelError& error) {
     throw ModelError("with " + std::to_string(labels.image_columns) + " image columns",
                      error.what());

@@ -1,5 +1,6 @@
 #include "core/segmentation/model_description.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <string_view>
@@ -12,6 +13,10 @@ namespace {
 constexpr std::array<std::string_view, input_channels> channel_names{"range", "x", "y", "z",
                                                                      "remission"};
 constexpr int max_rows = 512;
+/// Lidars of few beams fire some 1800 times a turn (VLP-16 at 10 Hz), others 2100 times and more.
+/// An image of more columns than that has gaps all over, which no network knows.
+constexpr int few_beams = 16;
+constexpr int columns_of_few_beams = 1536;
 
 std::string statistics_faults(const InputStatistics& statistics) {
   std::string faults;
@@ -57,6 +62,7 @@ ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor) {
   model.rows = sensor.rings;
   model.fov_up = sensor.fov_up;
   model.fov_down = sensor.fov_down;
+  if (sensor.rings <= few_beams) model.columns = std::min(model.columns, columns_of_few_beams);
   return model;
 }
 

@@ -20,6 +20,16 @@ TEST(ForSensor, GivesOnlyAModelThatFollowsTheSensorsRowsAndFieldOfView) {
   EXPECT_EQ(fitted.fov_down, vlp_16().fov_down);
 }
 
+TEST(ForSensor, TakesNoMoreColumnsThanASensorOfFewBeamsFills) {
+  ModelDescription model = test::describe_family(64, 2048, 20);
+  model.follow_sensor = true;
+  EXPECT_EQ(for_sensor(model, vlp_16()).columns, 1536);
+  EXPECT_EQ(for_sensor(model, hdl_32e()).columns, 2048);
+  EXPECT_EQ(for_sensor(model, hdl_64e()).columns, 2048);
+  model.columns = 512;
+  EXPECT_EQ(for_sensor(model, vlp_16()).columns, 512);
+}
+
 TEST(ForSensor, LetsOneNetworkLabelScansOfDifferentSensors) {
   ModelDescription model = test::describe_family(64, 64, 20);
   model.follow_sensor = true;
