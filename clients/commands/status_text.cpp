@@ -41,6 +41,20 @@ std::string describe(const ServerStatus& status) {
   return text + "\n" + counters.text() + "\n" + latencies.text();
 }
 
+namespace {
+
+nlohmann::json to_json(const SegmentationStatus& segmentation) {
+  return {{"every", segmentation.every},
+          {"network_ms", segmentation.network_ms},
+          {"image_columns", segmentation.image_columns},
+          {"full_columns", segmentation.full_columns},
+          {"fresh_share", segmentation.fresh_share},
+          {"carried_share", segmentation.carried_share},
+          {"unlabelled_share", segmentation.unlabelled_share}};
+}
+
+}  // namespace
+
 nlohmann::json to_json(const ServerStatus& status) {
   nlohmann::json counters = nlohmann::json::object();
   for (const NamedCounter& counter : status.counters) counters[counter.name] = counter.value;
@@ -67,14 +81,7 @@ nlohmann::json to_json(const ServerStatus& status) {
           {"reason", status.reason},
           {"received_hz", status.received_hz},
           {"mapped_hz", status.mapped_hz},
-          {"segmentation",
-           {{"every", status.segmentation.every},
-            {"network_ms", status.segmentation.network_ms},
-            {"image_columns", status.segmentation.image_columns},
-            {"full_columns", status.segmentation.full_columns},
-            {"fresh_share", status.segmentation.fresh_share},
-            {"carried_share", status.segmentation.carried_share},
-            {"unlabelled_share", status.segmentation.unlabelled_share}}},
+          {"segmentation", to_json(status.segmentation)},
           {"map_version", status.map_version},
           {"map_id", status.map_id},
           {"tiles", status.tile_count},

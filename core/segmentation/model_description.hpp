@@ -71,8 +71,8 @@ struct ModelDescription {
 };
 
 /// The model with the image that it takes of a sensor: as it was trained, or with follow_sensor the
-/// sensor's rings as rows over its field of view, and no more columns than a sensor of so many rings
-/// fills.
+/// sensor's rings as rows over its field of view, and no more columns than a sensor of so many
+/// rings fills.
 [[nodiscard]] ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor);
 
 }  // namespace stillmap

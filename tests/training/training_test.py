@@ -7,6 +7,7 @@ import sys
 import tempfile
 import unittest
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import torch
@@ -16,14 +17,17 @@ from augmentation import aim, augment_points, crop, draw_motion, drop_beams, in_
 from losses import class_weights, lovasz_softmax, weighted_cross_entropy
 from metrics import Confusion
 from range_images import ImageModel, normalise, project
+from networks import make_network
 from samples import TrainingSamples
+from train import Run
 
 STILLMAP = os.environ["STILLMAP"]
 TRAINING = Path(os.environ["STILLMAP_TRAINING"])
 
+STAGES = [[16, [1, 2], 1], [24, [2, 2], 1]]
 SMALL = [
     "network.stem=8",
-    "network.stages=[[16, [1, 2], 1], [24, [2, 2], 1]]",
+    f"network.stages={STAGES}",
     "optimiser.batch=2",
     "optimiser.averaged_steps=5",
     "augmentation.crop_columns=128",
@@ -221,6 +225,24 @@ class Widths(unittest.TestCase):
         self.assertEqual((channels.abs().max(), target.max()), (0, 0))
 
 
+class Numbers(unittest.TestCase):
+    def test_are_of_16_bits_where_asked_for(self):
+        torch.manual_seed(1)
+        network = make_network({"kind": "light", "stem": 8, "stages": STAGES}, 20)
+        image = torch.randn(1, 5, 16, 64)
+
+        def scores(settings):
+            config = {"optimiser": settings}
+            run = SimpleNamespace(config=config, device="cpu", network=network.eval())
+            return Run.scores(run, image)
+
+        exact, reduced = scores({}), scores({"bfloat16": True})
+        self.assertEqual(reduced.dtype, torch.float32)
+        difference = (reduced - exact).abs().max() / exact.abs().max()
+        self.assertGreater(difference, 1e-5)
+        self.assertLess(difference, 0.1)
+
+
 class Training(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
@@ -265,8 +287,8 @@ class Training(unittest.TestCase):
         self.assertTrue((self.root / "model" / "int8.yaml").exists())
         image = yaml.safe_load((self.root / "model" / "model.yaml").read_text())["image"]
         self.assertEqual((image["columns"], image["least_columns"]), (256, 128))
-        # A run from that model begins where this one ended, in 16 bits too.
-        self.train(1, "next", f"start_from={self.root / 'model'}", "optimiser.bfloat16=true")
+        # A run from that model begins where this one ended.
+        self.train(1, "next", f"start_from={self.root / 'model'}")
         first = torch.load(self.root / "next" / "last.pt")["history"][0]
         self.assertLess(first["loss"], 0.95 * history[1]["loss"])
 

@@ -89,11 +89,14 @@ class Run:
         # Here, since a run from random weights needs no ONNX.
         from warm_start import check_description, load_weights
 
-        check_description(file, self.config)
         samples = TrainingSamples(self.scans, self.config)
         chosen = np.linspace(0, len(samples) - 1, 32).astype(int)
         images = (samples[index, 0][0][None].to(self.device) for index in chosen)
-        load_weights(self.network, file, images)
+        try:
+            check_description(file, self.config)
+            load_weights(self.network, file, images)
+        except (ValueError, OSError) as error:
+            raise SystemExit(f"start_from: {error}") from None
         self.averaged.load_state_dict(self.network.state_dict())
 
     def resume(self):

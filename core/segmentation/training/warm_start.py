@@ -23,7 +23,8 @@ SQUARED_LENGTH = 1 / 3
 
 def check_description(file, config):
     """A model folder must see images, and name classes, as this configuration does."""
-    file = Path(file) / "model.yaml"
+    file = Path(file)
+    file = (file.parent if file.suffix == ".onnx" else file) / "model.yaml"
     if not file.exists():
         return
     model = yaml.safe_load(file.read_text())
