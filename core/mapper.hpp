@@ -7,11 +7,11 @@
 #include <string>
 #include <string_view>
 
-#include "core/label_feed.hpp"
+#include "core/segmentation_pipeline.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/lidar/sensor_model.hpp"
-#include "core/map/carried_labels.hpp"
+#include "core/map/label_propagation.hpp"
 #include "core/map/static_map.hpp"
 #include "core/odometry/odometry.hpp"
 #include "core/odometry/odometry_state.hpp"

@@ -5,8 +5,8 @@
 #include <map>
 #include <string>
 
-#include "config/listening_address.hpp"
-#include "config/model_file.hpp"
+#include "config/loaders/listening_address.hpp"
+#include "config/loaders/model_file.hpp"
 
 namespace stillmap {
 namespace {

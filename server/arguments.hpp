@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "config/server_config.hpp"
+#include "config/loaders/server_config.hpp"
 
 namespace stillmap {
 

@@ -4,13 +4,13 @@
 #include <csignal>
 #include <exception>
 
-#include "config/model_file.hpp"
+#include "config/loaders/model_file.hpp"
 #include "idl/dds/dds_log.hpp"
-#include "idl/security/security_error.hpp"
+#include "idl/dds/security/security_error.hpp"
 #include "server/arguments.hpp"
-#include "server/operation/log_setup.hpp"
-#include "server/operation/service_manager.hpp"
-#include "server/paced_labels.hpp"
+#include "server/monitoring/log_setup.hpp"
+#include "server/monitoring/systemd_notify.hpp"
+#include "server/mapping/async_segmenter.hpp"
 #include "server/server.hpp"
 
 namespace {

@@ -3,12 +3,12 @@
 #include <iostream>
 #include <stdexcept>
 
-#include "clients/client.hpp"
-#include "config/config_error.hpp"
+#include "clients/library/client.hpp"
+#include "config/loaders/config_error.hpp"
 #include "core/dataset/dataset_error.hpp"
-#include "core/map/map_file.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "core/segmentation/model_error.hpp"
-#include "idl/security/security_error.hpp"
+#include "idl/dds/security/security_error.hpp"
 
 namespace stillmap {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "clients/doctor/evidence.hpp"
-#include "idl/finding.hpp"
+#include "clients/doctor/system_snapshot.hpp"
+#include "idl/interface/diagnostic.hpp"
 
 namespace stillmap {
 

@@ -1,8 +1,8 @@
 #include <algorithm>
 
 #include "clients/doctor/checks.hpp"
-#include "idl/peer_findings.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/participant_diagnostics.hpp"
+#include "idl/interface/topics.hpp"
 
 namespace stillmap {
 namespace {

@@ -10,7 +10,7 @@
 #include <sstream>
 #include <system_error>
 
-#include "clients/doctor/shared_segments.hpp"
+#include "clients/doctor/shared_memory_segments.hpp"
 
 namespace stillmap {
 namespace {

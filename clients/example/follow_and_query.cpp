@@ -4,7 +4,7 @@
 #include <mutex>
 #include <thread>
 
-#include "clients/client.hpp"
+#include "clients/library/client.hpp"
 
 int main() try {
   stillmap::Client client;  // domain 0, server "stillmap"

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <utility>
 
-#include "clients/terminal/text.hpp"
+#include "clients/terminal/table.hpp"
 
 namespace stillmap {
 namespace {

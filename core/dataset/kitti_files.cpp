@@ -11,7 +11,7 @@
 #include <system_error>
 
 #include "core/dataset/binary_file.hpp"
-#include "core/dataset/recording_time.hpp"
+#include "core/dataset/file_stamp.hpp"
 
 namespace stillmap {
 namespace {

@@ -11,8 +11,8 @@
 #include <string>
 
 #include "core/dataset/dataset_error.hpp"
-#include "core/dataset/optional_part.hpp"
-#include "core/dataset/pcd_part.hpp"
+#include "core/dataset/plugin.hpp"
+#include "core/dataset/pcd_plugin.hpp"
 #include "core/dataset/point_cloud_header.hpp"
 
 namespace stillmap {

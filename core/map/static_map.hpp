@@ -7,11 +7,11 @@
 #include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
-#include "core/lidar/range_view.hpp"
+#include "core/lidar/range_image_view.hpp"
 #include "core/map/removed_voxel.hpp"
 #include "core/map/tile.hpp"
-#include "core/map/tile_memory.hpp"
-#include "core/map/tile_shelf.hpp"
+#include "core/map/tile_evidence.hpp"
+#include "core/map/tile_store.hpp"
 
 namespace stillmap {
 

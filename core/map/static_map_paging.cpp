@@ -9,7 +9,7 @@
 
 #include "core/map/static_map_state.hpp"
 #include "core/map/tile_lookup.hpp"
-#include "core/map/tile_shelf.hpp"
+#include "core/map/tile_store.hpp"
 
 namespace stillmap {
 namespace {

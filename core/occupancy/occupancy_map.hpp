@@ -8,8 +8,8 @@
 #include "core/occupancy/occupancy_config.hpp"
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"
-#include "core/occupancy/scan_use.hpp"
-#include "core/pause.hpp"
+#include "core/occupancy/scan_update_options.hpp"
+#include "core/throttle_callback.hpp"
 
 namespace stillmap {
 

@@ -2,7 +2,7 @@
 
 #include <filesystem>
 
-#include "core/map/map_file.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "core/occupancy/octomap_data.hpp"
 
 namespace stillmap {

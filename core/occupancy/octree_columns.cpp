@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/map/tile_shelf.hpp"
+#include "core/map/tile_store.hpp"
 #include "core/occupancy/voxel_bricks.hpp"
 
 namespace stillmap {

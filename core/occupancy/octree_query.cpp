@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "core/occupancy/ray_walk.hpp"
+#include "core/occupancy/ray_iterator.hpp"
 #include "core/occupancy/scan_update.hpp"
 
 namespace stillmap {

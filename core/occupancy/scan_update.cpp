@@ -1,6 +1,6 @@
 #include "core/occupancy/scan_update.hpp"
 
-#include "core/occupancy/ray_walk.hpp"
+#include "core/occupancy/ray_iterator.hpp"
 
 namespace stillmap {
 namespace {

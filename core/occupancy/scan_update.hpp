@@ -4,9 +4,9 @@
 
 #include "core/lidar/labelled_scan.hpp"
 #include "core/occupancy/occupancy_config.hpp"
-#include "core/occupancy/scan_use.hpp"
+#include "core/occupancy/scan_update_options.hpp"
 #include "core/occupancy/voxel_bricks.hpp"
-#include "core/pause.hpp"
+#include "core/throttle_callback.hpp"
 
 namespace stillmap {
 

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <span>
 
-#include "core/odometry/thinning.hpp"
+#include "core/odometry/voxel_downsample.hpp"
 
 namespace stillmap {
 namespace {

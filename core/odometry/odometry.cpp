@@ -8,10 +8,10 @@
 
 #include "core/odometry/coarse_registration.hpp"
 #include "core/odometry/features.hpp"
-#include "core/odometry/localisation.hpp"
-#include "core/odometry/motion_split.hpp"
-#include "core/odometry/objects.hpp"
-#include "core/odometry/past_views.hpp"
+#include "core/odometry/relocalization.hpp"
+#include "core/odometry/motion_classification.hpp"
+#include "core/odometry/object_clusters.hpp"
+#include "core/odometry/range_image_history.hpp"
 #include "core/odometry/registration.hpp"
 #include "core/odometry/se3.hpp"
 

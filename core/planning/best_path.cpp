@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "core/planning/path_polish.hpp"
+#include "core/planning/path_smoother.hpp"
 
 namespace stillmap {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/planning/coarse_route.hpp"
-#include "core/planning/drive_check.hpp"
+#include "core/planning/collision_checker.hpp"
 #include "core/planning/planning_config.hpp"
 
 namespace stillmap {

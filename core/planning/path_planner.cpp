@@ -7,7 +7,7 @@
 
 #include "core/planning/best_path.hpp"
 #include "core/planning/coarse_route.hpp"
-#include "core/planning/path_polish.hpp"
+#include "core/planning/path_smoother.hpp"
 
 namespace stillmap {
 namespace {

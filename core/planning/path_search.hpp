@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/planning/drive_check.hpp"
+#include "core/planning/collision_checker.hpp"
 #include "core/planning/pose_sampler.hpp"
 
 namespace stillmap {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/traversability/area_region.hpp"
+#include "core/traversability/traversability_region.hpp"
 #include "core/traversability/path_check.hpp"
 #include "core/traversability/traversability_view.hpp"
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/map/tile.hpp"
-#include "core/pause.hpp"
+#include "core/throttle_callback.hpp"
 #include "core/traversability/robot_profile.hpp"
 #include "core/traversability/traversability_view.hpp"
 

@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "core/dataset/dataset_error.hpp"
-#include "core/dataset/recording_time.hpp"
+#include "core/dataset/file_stamp.hpp"
 
 namespace stillmap {
 namespace {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "idl/bag/bag_file.hpp"
-#include "idl/bag/zstd_content.hpp"
+#include "idl/bag/zstd_decompression.hpp"
 
 namespace stillmap {
 

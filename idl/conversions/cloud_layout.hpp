@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "idl/conversions/point_field.hpp"
-#include "idl/wire_types.hpp"
+#include "idl/msg/wire_types.hpp"
 
 namespace stillmap::wire {
 

@@ -6,7 +6,7 @@
 
 #include "idl/conversions/region.hpp"
 #include "idl/conversions/tile.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 
 namespace stillmap::wire {
 

@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "core/map/map_query.hpp"
+#include "core/map/query/map_query.hpp"
 #include "stillmap_msgs.h"
 
 namespace stillmap::wire {

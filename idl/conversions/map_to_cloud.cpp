@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "idl/conversions/cloud_columns.hpp"
+#include "idl/conversions/point_cloud2_builder.hpp"
 
 namespace stillmap::wire {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 
 namespace stillmap::wire {
 namespace {

@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "idl/conversions/area_status.hpp"
-#include "idl/topics.hpp"
+#include "idl/conversions/traversability_status.hpp"
+#include "idl/interface/topics.hpp"
 
 namespace stillmap::wire {
 

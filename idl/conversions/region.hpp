@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "core/map/region.hpp"
+#include "core/map/query/region.hpp"
 #include "stillmap_msgs.h"
 
 namespace stillmap::wire {

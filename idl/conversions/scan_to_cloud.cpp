@@ -3,7 +3,7 @@
 #include <cassert>
 #include <optional>
 
-#include "idl/conversions/cloud_columns.hpp"
+#include "idl/conversions/point_cloud2_builder.hpp"
 
 namespace stillmap::wire {
 namespace {

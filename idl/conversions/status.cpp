@@ -1,7 +1,7 @@
 #include "idl/conversions/status.hpp"
 
 #include "idl/conversions/header.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 
 namespace stillmap::wire {
 namespace {

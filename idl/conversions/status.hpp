@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "idl/server_status.hpp"
+#include "idl/interface/server_status.hpp"
 #include "stillmap_msgs.h"
 
 namespace stillmap::wire {

@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "core/map/tile.hpp"
-#include "idl/map_identity.hpp"
+#include "idl/interface/map_identity.hpp"
 #include "stillmap_msgs.h"
 
 namespace stillmap::wire {

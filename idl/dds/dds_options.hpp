@@ -19,7 +19,7 @@ struct NetworkAddress {
 };
 
 /// How a process takes part in a DDS domain. The defaults suit one machine or a quiet network; for
-/// others there are profiles (config/dds_profile.hpp).
+/// others there are profiles (config/loaders/dds_profile.hpp).
 struct DdsOptions {
   /// DDS domain, 0..232; ROS 2 calls it ROS_DOMAIN_ID.
   std::uint32_t domain_id = 0;

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "idl/dds/peers.hpp"
+#include "idl/dds/remote_participant.hpp"
 
 namespace stillmap {
 

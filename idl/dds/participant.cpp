@@ -9,12 +9,12 @@
 #include <typeinfo>
 
 #include "idl/dds/discovery.hpp"
-#include "idl/dds/peer_watch.hpp"
+#include "idl/dds/discovery_monitor.hpp"
 #include "idl/dds/ros_graph.hpp"
 #include "idl/dds/secure_properties.hpp"
-#include "idl/dds/stalled_peers.hpp"
+#include "idl/dds/tcp_user_timeout.hpp"
 #include "idl/dds/transports.hpp"
-#include "idl/security/identity.hpp"
+#include "idl/dds/security/identity.hpp"
 
 namespace stillmap {
 namespace {

@@ -15,7 +15,7 @@
 #include "idl/dds/content_filter.hpp"
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/dds_options.hpp"
-#include "idl/dds/peers.hpp"
+#include "idl/dds/remote_participant.hpp"
 #include "idl/dds/qos.hpp"
 #include "idl/dds/service_faults.hpp"
 

@@ -1,4 +1,4 @@
-#include "idl/dds/made_type.hpp"
+#include "idl/dds/bounded_type_support.hpp"
 #include "idl/dds/type_support.hpp"
 #include "removed_voxelsPubSubTypes.h"
 

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "idl/security/identity.hpp"
+#include "idl/dds/security/identity.hpp"
 
 namespace stillmap {
 

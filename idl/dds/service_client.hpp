@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
-#include "idl/dds/service_asker.hpp"
+#include "idl/dds/untyped_service_client.hpp"
 #include "idl/dds/type_support.hpp"
-#include "idl/security/security_error.hpp"
+#include "idl/dds/security/security_error.hpp"
 
 namespace stillmap {
 

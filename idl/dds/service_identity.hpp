@@ -6,7 +6,7 @@
 #include <string>
 
 #include "idl/dds/qos.hpp"
-#include "idl/dds/unread_sample.hpp"
+#include "idl/dds/serialized_sample.hpp"
 
 namespace stillmap {
 

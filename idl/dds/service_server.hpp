@@ -5,7 +5,7 @@
 #include <thread>
 #include <utility>
 
-#include "idl/dds/service_port.hpp"
+#include "idl/dds/untyped_service_server.hpp"
 #include "idl/dds/type_support.hpp"
 
 namespace stillmap {

@@ -1,7 +1,7 @@
 #include "idl/dds/type_support.hpp"
 
-#include "idl/dds/described_type.hpp"
-#include "idl/dds/made_type.hpp"
+#include "idl/dds/dynamic_type.hpp"
+#include "idl/dds/bounded_type_support.hpp"
 #include "nav_msgsPubSubTypes.h"
 #include "octomap_msgsPubSubTypes.h"
 #include "rmw_dds_commonPubSubTypes.h"

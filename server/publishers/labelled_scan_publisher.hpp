@@ -9,7 +9,7 @@
 
 #include "core/lidar/labelled_scan.hpp"
 #include "idl/dds/writer.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 #include "sensor_msgs.h"
 
 namespace stillmap {

@@ -2,12 +2,12 @@
 
 #include <string>
 
-#include "config/server_config.hpp"
+#include "config/loaders/server_config.hpp"
 #include "idl/dds/writer.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 #include "nav_msgs.h"
 #include "sensor_msgs.h"
-#include "server/map_board.hpp"
+#include "server/publishers/latest_map.hpp"
 #include "server/publishers/periodic_thread.hpp"
 #include "server/publishers/tile_publisher.hpp"
 

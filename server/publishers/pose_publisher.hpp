@@ -6,9 +6,9 @@
 #include <string>
 #include <thread>
 
-#include "config/server_config.hpp"
+#include "config/loaders/server_config.hpp"
 #include "idl/dds/writer.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 #include "nav_msgs.h"
 #include "tf2_msgs.h"
 

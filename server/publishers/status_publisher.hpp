@@ -3,7 +3,7 @@
 #include <functional>
 
 #include "idl/dds/writer.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 #include "server/publishers/periodic_thread.hpp"
 #include "stillmap_msgs.h"
 

@@ -8,9 +8,9 @@
 
 #include "core/map/tile.hpp"
 #include "idl/dds/writer.hpp"
-#include "idl/map_identity.hpp"
-#include "idl/topics.hpp"
-#include "server/publishers/byte_allowance.hpp"
+#include "idl/interface/map_identity.hpp"
+#include "idl/interface/topics.hpp"
+#include "server/publishers/token_bucket.hpp"
 #include "stillmap_msgs.h"
 
 namespace stillmap {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "server/services/paged_views.hpp"
+#include "server/services/paged_snapshots.hpp"
 #include "server/services/service_context.hpp"
 
 namespace stillmap {

@@ -1,7 +1,7 @@
 #include "server/services/get_traversable_area.hpp"
 
-#include "core/map/region_shape.hpp"
-#include "idl/conversions/area_query.hpp"
+#include "core/map/query/region_shape.hpp"
+#include "idl/conversions/traversability_query.hpp"
 
 namespace stillmap {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "server/occupancy_thread.hpp"
+#include "server/occupancy/occupancy_thread.hpp"
 #include "server/services/service_context.hpp"
 #include "stillmap_occupancy.h"
 

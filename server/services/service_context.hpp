@@ -4,14 +4,14 @@
 #include <functional>
 #include <stdexcept>
 
-#include "core/map/tile_reader.hpp"
+#include "core/map/query/tile_reader.hpp"
 #include "idl/conversions/map_query.hpp"
-#include "idl/server_status.hpp"
-#include "server/area_atlas.hpp"
-#include "server/map_board.hpp"
-#include "server/map_saver.hpp"
-#include "server/planning_grid.hpp"
-#include "server/services/service_log.hpp"
+#include "idl/interface/server_status.hpp"
+#include "server/traversability/traversability_cache.hpp"
+#include "server/publishers/latest_map.hpp"
+#include "server/mapping/map_saver.hpp"
+#include "server/traversability/traversability_grid_provider.hpp"
+#include "server/monitoring/service_log.hpp"
 
 namespace stillmap {
 

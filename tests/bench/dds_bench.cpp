@@ -13,7 +13,7 @@
 #include <vector>
 
 #include "idl/dds/service_client.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 #include "tests/bench/dds_roles.hpp"
 #include "tests/bench/dds_samples.hpp"
 

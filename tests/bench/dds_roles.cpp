@@ -7,11 +7,11 @@
 #include <cstdio>
 #include <iostream>
 
-#include "clients/tcp_patience.hpp"
+#include "clients/library/tcp_rejoin_backoff.hpp"
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/reader.hpp"
 #include "idl/dds/service_client.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 #include "sensor_msgs.h"
 #include "tests/bench/dds_samples.hpp"
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "config/dds_profile.hpp"
+#include "config/loaders/dds_profile.hpp"
 #include "idl/dds/service_server.hpp"
 #include "stillmap_msgs.h"
 

@@ -5,8 +5,8 @@
 #include <fstream>
 #include <vector>
 
-#include "core/map/map_file.hpp"
-#include "core/map/map_query.hpp"
+#include "core/map/storage/map_file.hpp"
+#include "core/map/query/map_query.hpp"
 #include "core/map/static_map.hpp"
 #include "tests/map/map_worlds.hpp"
 

@@ -10,11 +10,11 @@
 #include <optional>
 
 #include "core/dataset/scan_dataset.hpp"
-#include "core/map/map_file.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "core/mapper.hpp"
 #include "core/occupancy/occupancy_map.hpp"
 #include "core/occupancy/octomap_file.hpp"
-#include "core/segmentation/stream_labels.hpp"
+#include "core/segmentation/passthrough_segmenter.hpp"
 #include "core/simulation/simulation.hpp"
 
 // One drive, mapped into the static map and into an octree at the same time. STILLMAP_BENCH_DATA

@@ -8,7 +8,7 @@
 #include <functional>
 #include <vector>
 
-#include "core/map/map_file.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "core/map/static_map.hpp"
 #include "tests/map/map_worlds.hpp"
 

@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/map/map_query.hpp"
+#include "core/map/query/map_query.hpp"
 #include "core/map/static_map.hpp"
 #include "tests/map/map_worlds.hpp"
 

@@ -4,7 +4,7 @@
 #include <fstream>
 #include <random>
 
-#include "clients/commands/speed_scan.hpp"
+#include "clients/commands/model/benchmark_scan.hpp"
 #include "core/segmentation/activation_ranges.hpp"
 #include "core/segmentation/bare_model.hpp"
 #include "core/segmentation/network_input.hpp"

@@ -1,11 +1,11 @@
-#include "clients/commands/client_arguments.hpp"
+#include "clients/commands/arguments/client_arguments.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cstdlib>
 
-#include "config/config_error.hpp"
+#include "config/loaders/config_error.hpp"
 
 namespace stillmap {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/map/map_file.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "core/map/static_map.hpp"
 #include "tests/clients/command_test.hpp"
 

@@ -4,7 +4,7 @@
 
 #include "core/dataset/scan_dataset.hpp"
 #include "idl/bag/bag.hpp"
-#include "idl/bag/bag_scans.hpp"
+#include "idl/bag/bag_scan_source.hpp"
 #include "tests/clients/command_test.hpp"
 
 namespace stillmap::test {

@@ -1,4 +1,4 @@
-#include "clients/commands/region_arguments.hpp"
+#include "clients/commands/query/region_arguments.hpp"
 
 #include <fstream>
 

@@ -1,6 +1,6 @@
 #include <filesystem>
 
-#include "config/sensor_file.hpp"
+#include "config/loaders/sensor_file.hpp"
 #include "tests/clients/command_test.hpp"
 
 namespace stillmap::test {

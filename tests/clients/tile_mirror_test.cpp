@@ -1,4 +1,4 @@
-#include "clients/tile_mirror.hpp"
+#include "clients/library/tile_mirror.hpp"
 
 #include <gmock/gmock.h>
 

@@ -6,7 +6,7 @@
 #include <fstream>
 #include <string>
 
-#include "config/config_error.hpp"
+#include "config/loaders/config_error.hpp"
 
 namespace stillmap::test {
 

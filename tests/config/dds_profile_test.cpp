@@ -1,4 +1,4 @@
-#include "config/dds_profile.hpp"
+#include "config/loaders/dds_profile.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -3,10 +3,10 @@
 
 #include <random>
 
-#include "config/label_map.hpp"
-#include "config/model_file.hpp"
-#include "config/sensor_file.hpp"
-#include "config/server_config.hpp"
+#include "config/loaders/label_map.hpp"
+#include "config/loaders/model_file.hpp"
+#include "config/loaders/sensor_file.hpp"
+#include "config/loaders/server_config.hpp"
 #include "tests/config/config_files.hpp"
 
 namespace stillmap {

@@ -1,4 +1,4 @@
-#include "config/int8_file.hpp"
+#include "config/loaders/int8_file.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "config/label_map.hpp"
+#include "config/loaders/label_map.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

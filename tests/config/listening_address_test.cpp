@@ -1,9 +1,9 @@
-#include "config/listening_address.hpp"
+#include "config/loaders/listening_address.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "config/server_config.hpp"
+#include "config/loaders/server_config.hpp"
 #include "tests/config/config_files.hpp"
 
 namespace stillmap {

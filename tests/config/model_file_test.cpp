@@ -1,4 +1,4 @@
-#include "config/model_file.hpp"
+#include "config/loaders/model_file.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "config/robot_profile.hpp"
+#include "config/loaders/robot_profile.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "config/sensor_file.hpp"
+#include "config/loaders/sensor_file.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

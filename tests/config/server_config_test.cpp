@@ -1,4 +1,4 @@
-#include "config/server_config.hpp"
+#include "config/loaders/server_config.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

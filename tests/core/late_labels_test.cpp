@@ -5,8 +5,8 @@
 #include <deque>
 
 #include "core/mapper.hpp"
-#include "core/segmentation/stream_labels.hpp"
-#include "tests/odometry/box_drive.hpp"
+#include "core/segmentation/passthrough_segmenter.hpp"
+#include "tests/odometry/box_sequence.hpp"
 #include "tests/odometry/poses.hpp"
 
 namespace stillmap {

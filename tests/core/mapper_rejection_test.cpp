@@ -4,8 +4,8 @@
 #include <limits>
 
 #include "core/mapper.hpp"
-#include "core/segmentation/stream_labels.hpp"
-#include "tests/odometry/box_drive.hpp"
+#include "core/segmentation/passthrough_segmenter.hpp"
+#include "tests/odometry/box_sequence.hpp"
 
 namespace stillmap {
 namespace {

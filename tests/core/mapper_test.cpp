@@ -6,8 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
-#include "core/segmentation/stream_labels.hpp"
-#include "tests/odometry/box_drive.hpp"
+#include "core/segmentation/passthrough_segmenter.hpp"
+#include "tests/odometry/box_sequence.hpp"
 #include "tests/odometry/poses.hpp"
 
 namespace stillmap {

@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "clients/scan_publisher.hpp"
+#include "clients/library/scan_publisher.hpp"
 #include "idl/dds/writer.hpp"
 #include "nav_msgs.h"
 #include "sensor_msgs.h"

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "tests/doctor/ends.hpp"
+#include "tests/doctor/make_endpoint.hpp"
 
 namespace stillmap {
 namespace {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/evaluation/relative_error.hpp"
+#include "core/evaluation/relative_pose_error.hpp"
 #include "tests/evaluation/simple_paths.hpp"
 
 namespace stillmap {

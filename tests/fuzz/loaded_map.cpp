@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-#include "core/map/map_query.hpp"
+#include "core/map/query/map_query.hpp"
 #include "core/occupancy/occupancy_map.hpp"
 #include "core/traversability/traversability_map.hpp"
 #include "tests/fuzz/street_map.hpp"

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "core/map/map_file.hpp"
+#include "core/map/storage/map_file.hpp"
 
 namespace stillmap::fuzz {
 

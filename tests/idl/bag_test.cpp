@@ -9,7 +9,7 @@
 #include <random>
 
 #include "core/dataset/dataset_error.hpp"
-#include "idl/bag/bag_scans.hpp"
+#include "idl/bag/bag_scan_source.hpp"
 #include "idl/bag/cdr_reader.hpp"
 #include "tests/idl/bag_fixture.hpp"
 #include "tests/scratch_folder.hpp"

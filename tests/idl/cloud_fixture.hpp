@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "idl/conversions/cloud_columns.hpp"
+#include "idl/conversions/point_cloud2_builder.hpp"
 #include "sensor_msgs.h"
 
 namespace stillmap::wire {

@@ -11,7 +11,7 @@
 #include "idl/dds/reader.hpp"
 #include "idl/dds/transports.hpp"
 #include "idl/dds/writer.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 #include "nav_msgs.h"
 #include "rmw_dds_common.h"
 #include "rmw_dds_common_iron.h"

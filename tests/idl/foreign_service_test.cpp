@@ -8,7 +8,7 @@
 #include "idl/dds/service_server.hpp"
 #include "stillmap_msgs.h"
 #include "tests/idl/dds_fixture.hpp"
-#include "tests/idl/vendor_peer.hpp"
+#include "tests/idl/vendor_participant.hpp"
 
 // Services, asked by processes of other vendors.
 

@@ -11,7 +11,7 @@
 
 #include "idl/dds/qos.hpp"
 #include "idl/dds/reader.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 #include "stillmap_msgs.h"
 #include "tests/idl/dds_fixture.hpp"
 

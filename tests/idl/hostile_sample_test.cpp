@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "idl/dds/reader.hpp"
-#include "idl/dds/unread_sample.hpp"
+#include "idl/dds/serialized_sample.hpp"
 #include "sensor_msgs.h"
 #include "tests/idl/dds_fixture.hpp"
 

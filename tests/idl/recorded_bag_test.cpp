@@ -10,7 +10,7 @@
 #include <tuple>
 
 #include "core/dataset/point_cloud_files.hpp"
-#include "idl/bag/bag_scans.hpp"
+#include "idl/bag/bag_scan_source.hpp"
 #include "tests/idl/bag_fixture.hpp"
 #include "tests/scratch_folder.hpp"
 

@@ -2,8 +2,8 @@
 
 #include <map>
 
-#include "core/map/map_query.hpp"
-#include "core/map/region_shape.hpp"
+#include "core/map/query/map_query.hpp"
+#include "core/map/query/region_shape.hpp"
 #include "core/map/tile_content.hpp"
 #include "core/map/tile_lookup.hpp"
 #include "tests/map/map_worlds.hpp"

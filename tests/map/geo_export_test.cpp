@@ -1,4 +1,4 @@
-#include "core/map/geo_export.hpp"
+#include "core/map/tools/geo_export.hpp"
 
 #include <gdal.h>
 #include <gmock/gmock.h>
@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "core/dataset/dataset_error.hpp"
-#include "core/map/top_view.hpp"
+#include "core/map/tools/top_view.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {

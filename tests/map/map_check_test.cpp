@@ -1,4 +1,4 @@
-#include "core/map/map_check.hpp"
+#include "core/map/tools/map_check.hpp"
 
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gmock/gmock.h>
@@ -6,9 +6,9 @@
 #include <fstream>
 #include <random>
 
-#include "core/map/map_file_copy.hpp"
-#include "core/map/tile_codec.hpp"
-#include "tests/map/stored_maps.hpp"
+#include "core/map/storage/map_file_copy.hpp"
+#include "core/map/storage/tile_codec.hpp"
+#include "tests/map/saved_maps.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {

@@ -1,4 +1,4 @@
-#include "core/map/map_diff.hpp"
+#include "core/map/tools/map_diff.hpp"
 
 #include <gmock/gmock.h>
 
@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-#include "core/map/map_diff_picture.hpp"
+#include "core/picture/map_diff_picture.hpp"
 #include "core/map/tile_content.hpp"
 #include "tests/scratch_folder.hpp"
 

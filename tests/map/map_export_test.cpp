@@ -1,4 +1,4 @@
-#include "core/map/map_export.hpp"
+#include "core/map/tools/map_export.hpp"
 
 #include <gmock/gmock.h>
 

@@ -1,12 +1,12 @@
-#include "core/map/map_file_copy.hpp"
+#include "core/map/storage/map_file_copy.hpp"
 
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gmock/gmock.h>
 
 #include <fstream>
 
-#include "core/map/map_info.hpp"
-#include "tests/map/stored_maps.hpp"
+#include "core/map/tools/map_info.hpp"
+#include "tests/map/saved_maps.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {

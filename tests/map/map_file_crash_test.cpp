@@ -6,7 +6,7 @@
 
 #include <random>
 
-#include "tests/map/stored_maps.hpp"
+#include "tests/map/saved_maps.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {

@@ -1,4 +1,4 @@
-#include "core/map/map_file.hpp"
+#include "core/map/storage/map_file.hpp"
 
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gmock/gmock.h>
@@ -8,7 +8,7 @@
 #include <iterator>
 #include <random>
 
-#include "tests/map/stored_maps.hpp"
+#include "tests/map/saved_maps.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {

@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "core/lidar/range_view.hpp"
-#include "core/map/map_file.hpp"
+#include "core/lidar/range_image_view.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "core/map/static_map.hpp"
 #include "tests/map/map_worlds.hpp"
 #include "tests/scratch_folder.hpp"

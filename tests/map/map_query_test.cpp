@@ -1,4 +1,4 @@
-#include "core/map/map_query.hpp"
+#include "core/map/query/map_query.hpp"
 
 #include <gmock/gmock.h>
 
@@ -8,7 +8,7 @@
 #include <random>
 #include <tuple>
 
-#include "core/map/region_shape.hpp"
+#include "core/map/query/region_shape.hpp"
 #include "tests/map/map_worlds.hpp"
 
 namespace stillmap {

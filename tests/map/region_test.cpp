@@ -1,4 +1,4 @@
-#include "core/map/region.hpp"
+#include "core/map/query/region.hpp"
 
 #include <gmock/gmock.h>
 
@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "core/map/region_shape.hpp"
+#include "core/map/query/region_shape.hpp"
 
 namespace stillmap {
 namespace {

@@ -1,4 +1,4 @@
-#include "core/map/tile_codec.hpp"
+#include "core/map/storage/tile_codec.hpp"
 
 #include <gmock/gmock.h>
 

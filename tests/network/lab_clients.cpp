@@ -12,8 +12,8 @@
 #include <thread>
 #include <vector>
 
-#include "clients/client.hpp"
-#include "clients/commands/client_arguments.hpp"
+#include "clients/library/client.hpp"
+#include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
 
 namespace stillmap {

@@ -7,10 +7,10 @@
 #include <thread>
 #include <vector>
 
-#include "clients/client.hpp"
-#include "clients/commands/client_arguments.hpp"
+#include "clients/library/client.hpp"
+#include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/scan_publisher.hpp"
+#include "clients/library/scan_publisher.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "core/dataset/scan_dataset.hpp"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <stdexcept>
 
-#include "tests/odometry/box_drive.hpp"
+#include "tests/odometry/box_sequence.hpp"
 #include "tests/odometry/poses.hpp"
 
 namespace stillmap {

@@ -1,10 +1,10 @@
-#include "idl/security/certificate.hpp"
+#include "idl/dds/security/certificate.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include "idl/security/signed_document.hpp"
+#include "idl/dds/security/signed_document.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {

@@ -1,4 +1,4 @@
-#include "idl/security/documents.hpp"
+#include "idl/dds/security/documents.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

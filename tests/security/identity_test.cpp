@@ -1,11 +1,11 @@
-#include "idl/security/identity.hpp"
+#include "idl/dds/security/identity.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "idl/security/authority.hpp"
-#include "idl/security/documents.hpp"
-#include "idl/security/signed_document.hpp"
+#include "idl/dds/security/authority.hpp"
+#include "idl/dds/security/documents.hpp"
+#include "idl/dds/security/signed_document.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {

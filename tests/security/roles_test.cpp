@@ -1,4 +1,4 @@
-#include "idl/roles.hpp"
+#include "idl/interface/roles.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,9 +6,9 @@
 #include <thread>
 
 #include "idl/dds/reader.hpp"
-#include "idl/roles.hpp"
-#include "idl/security/authority.hpp"
-#include "idl/security/security_error.hpp"
+#include "idl/interface/roles.hpp"
+#include "idl/dds/security/authority.hpp"
+#include "idl/dds/security/security_error.hpp"
 #include "sensor_msgs.h"
 #include "tests/clients/process.hpp"
 #include "tests/scratch_folder.hpp"

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "core/segmentation/network_labels.hpp"
+#include "core/segmentation/network_segmenter.hpp"
 #include "tests/segmentation/onnx_builder.hpp"
 #include "tests/segmentation/sample_model.hpp"
 

@@ -7,7 +7,7 @@
 
 #include "core/segmentation/graph/equalise_channels.hpp"
 #include "core/segmentation/graph/fold_batch_norm.hpp"
-#include "core/segmentation/graph/fuse_follow_ups.hpp"
+#include "core/segmentation/graph/fuse_post_ops.hpp"
 #include "core/segmentation/graph/infer_shapes.hpp"
 #include "core/segmentation/graph/replace_transposed.hpp"
 #include "tests/segmentation/plain_network.hpp"

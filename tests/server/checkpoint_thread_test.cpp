@@ -1,4 +1,4 @@
-#include "server/checkpoint_thread.hpp"
+#include "server/mapping/checkpoint_thread.hpp"
 
 #include <gtest/gtest.h>
 

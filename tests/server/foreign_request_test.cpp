@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "tests/idl/vendor_peer.hpp"
+#include "tests/idl/vendor_participant.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {

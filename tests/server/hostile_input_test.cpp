@@ -4,7 +4,7 @@
 
 #include "idl/conversions/scan_to_cloud.hpp"
 #include "idl/dds/writer.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 #include "tests/server/room_scans.hpp"
 #include "tests/server/server_process.hpp"
 

@@ -9,7 +9,7 @@
 #include <random>
 #include <thread>
 
-#include "core/map/map_file.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "tests/server/room_scans.hpp"
 #include "tests/server/server_process.hpp"
 

@@ -3,7 +3,7 @@
 #include <atomic>
 #include <fstream>
 
-#include "core/map/map_file.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "core/map/static_map.hpp"
 #include "tests/server/room_scans.hpp"
 #include "tests/server/server_process.hpp"

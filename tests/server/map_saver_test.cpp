@@ -1,4 +1,4 @@
-#include "server/map_saver.hpp"
+#include "server/mapping/map_saver.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "server/occupancy_thread.hpp"
+#include "server/occupancy/occupancy_thread.hpp"
 
 #include <gtest/gtest.h>
 

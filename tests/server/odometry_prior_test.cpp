@@ -1,4 +1,4 @@
-#include "server/odometry_prior.hpp"
+#include "server/mapping/odometry_prior.hpp"
 
 #include <gtest/gtest.h>
 

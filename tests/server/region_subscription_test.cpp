@@ -3,7 +3,7 @@
 #include <map>
 #include <mutex>
 
-#include "core/map/region_shape.hpp"
+#include "core/map/query/region_shape.hpp"
 #include "core/map/tile_lookup.hpp"
 #include "tests/server/server_process.hpp"
 

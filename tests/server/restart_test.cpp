@@ -3,7 +3,7 @@
 
 #include <fstream>
 
-#include "core/map/map_file.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {

@@ -1,4 +1,4 @@
-#include "server/scan_queue.hpp"
+#include "server/mapping/scan_queue.hpp"
 
 #include <gtest/gtest.h>
 

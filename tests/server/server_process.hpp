@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "clients/client.hpp"
-#include "clients/scan_publisher.hpp"
+#include "clients/library/client.hpp"
+#include "clients/library/scan_publisher.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap::test {

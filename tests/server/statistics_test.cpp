@@ -1,8 +1,8 @@
-#include "server/statistics.hpp"
+#include "server/monitoring/statistics.hpp"
 
 #include <gtest/gtest.h>
 
-#include "server/latency_window.hpp"
+#include "server/monitoring/latency_window.hpp"
 
 namespace stillmap {
 namespace {

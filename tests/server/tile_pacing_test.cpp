@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "idl/dds/reader.hpp"
-#include "server/publishers/byte_allowance.hpp"
+#include "server/publishers/token_bucket.hpp"
 #include "server/publishers/tile_publisher.hpp"
 #include "tests/idl/dds_fixture.hpp"
 

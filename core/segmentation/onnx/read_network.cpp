@@ -8,7 +8,7 @@
 #include "core/segmentation/onnx/onnx_check.hpp"
 #include "core/segmentation/onnx/onnx_operations.hpp"
 #include "core/segmentation/onnx/onnx_weights.hpp"
-#include "core/segmentation/onnx/softmax_parts.hpp"
+#include "core/segmentation/onnx/softmax_matcher.hpp"
 
 namespace stillmap {
 namespace {

@@ -2,9 +2,9 @@
 // or a compressed message or file.
 
 #include "core/dataset/dataset_error.hpp"
-#include "idl/bag/bag_scans.hpp"
+#include "idl/bag/bag_scan_source.hpp"
 #include "idl/bag/cdr_reader.hpp"
-#include "idl/bag/zstd_content.hpp"
+#include "idl/bag/zstd_decompression.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/memory_folder.hpp"
 #include "tests/idl/bag_fixture.hpp"

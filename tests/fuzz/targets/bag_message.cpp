@@ -5,7 +5,7 @@
 #include "idl/bag/cdr_reader.hpp"
 #include "idl/bag/scan_messages.hpp"
 #include "tests/fuzz/byte_source.hpp"
-#include "tests/fuzz/promise.hpp"
+#include "tests/fuzz/invariant.hpp"
 #include "tests/idl/bag_fixture.hpp"
 
 namespace stillmap::fuzz {

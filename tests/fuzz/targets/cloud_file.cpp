@@ -9,7 +9,7 @@
 #include "core/dataset/scan_dataset.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/memory_folder.hpp"
-#include "tests/fuzz/promise.hpp"
+#include "tests/fuzz/invariant.hpp"
 
 namespace stillmap::fuzz {
 namespace {

@@ -1,13 +1,13 @@
 // A number that says which kind of file, then its YAML: server, sensor, robot, label map.
 
-#include "config/label_map.hpp"
-#include "config/robot_profile.hpp"
-#include "config/sensor_file.hpp"
-#include "config/server_config.hpp"
+#include "config/loaders/label_map.hpp"
+#include "config/loaders/robot_profile.hpp"
+#include "config/loaders/sensor_file.hpp"
+#include "config/loaders/server_config.hpp"
 #include "core/occupancy/occupancy_map.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/memory_folder.hpp"
-#include "tests/fuzz/promise.hpp"
+#include "tests/fuzz/invariant.hpp"
 
 namespace stillmap::fuzz {
 namespace {

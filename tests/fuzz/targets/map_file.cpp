@@ -1,7 +1,7 @@
 // A whole map file: an SQLite database.
 
-#include "core/map/map_check.hpp"
-#include "core/map/map_info.hpp"
+#include "core/map/tools/map_check.hpp"
+#include "core/map/tools/map_info.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/loaded_map.hpp"
 #include "tests/fuzz/memory_folder.hpp"

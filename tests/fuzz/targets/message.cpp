@@ -3,7 +3,7 @@
 
 #include <variant>
 
-#include "idl/conversions/area_query.hpp"
+#include "idl/conversions/traversability_query.hpp"
 #include "idl/conversions/map_query.hpp"
 #include "idl/conversions/occupancy_query.hpp"
 #include "idl/conversions/path_query.hpp"
@@ -11,10 +11,10 @@
 #include "idl/conversions/removed_voxels.hpp"
 #include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"
-#include "tests/fuzz/promise.hpp"
+#include "tests/fuzz/invariant.hpp"
 #include "tests/fuzz/street_map.hpp"
 
 namespace stillmap::fuzz {

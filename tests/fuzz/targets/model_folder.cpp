@@ -2,11 +2,11 @@
 
 #include <filesystem>
 
-#include "config/int8_file.hpp"
-#include "config/model_file.hpp"
+#include "config/loaders/int8_file.hpp"
+#include "config/loaders/model_file.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/memory_folder.hpp"
-#include "tests/fuzz/promise.hpp"
+#include "tests/fuzz/invariant.hpp"
 
 namespace stillmap::fuzz {
 namespace {

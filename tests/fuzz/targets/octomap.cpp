@@ -11,7 +11,7 @@
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"
 #include "tests/fuzz/memory_folder.hpp"
-#include "tests/fuzz/promise.hpp"
+#include "tests/fuzz/invariant.hpp"
 #include "tests/fuzz/street_map.hpp"
 
 namespace stillmap::fuzz {

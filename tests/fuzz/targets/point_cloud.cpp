@@ -9,7 +9,7 @@
 #include "sensor_msgs.h"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"
-#include "tests/fuzz/promise.hpp"
+#include "tests/fuzz/invariant.hpp"
 #include "tests/idl/driver_clouds.hpp"
 
 namespace stillmap::fuzz {

@@ -3,10 +3,10 @@
 
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/kitti_files.hpp"
-#include "core/dataset/recording_time.hpp"
+#include "core/dataset/file_stamp.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/memory_folder.hpp"
-#include "tests/fuzz/promise.hpp"
+#include "tests/fuzz/invariant.hpp"
 
 namespace stillmap::fuzz {
 namespace {

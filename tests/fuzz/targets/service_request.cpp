@@ -5,12 +5,12 @@
 #include <memory>
 #include <stdexcept>
 
-#include "idl/conversions/area_query.hpp"
+#include "idl/conversions/traversability_query.hpp"
 #include "idl/conversions/map_query.hpp"
 #include "idl/conversions/occupancy_query.hpp"
 #include "idl/conversions/path_query.hpp"
 #include "idl/conversions/region.hpp"
-#include "idl/topics.hpp"
+#include "idl/interface/topics.hpp"
 #include "server/services/check_path.hpp"
 #include "server/services/get_tile_versions.hpp"
 #include "server/services/get_tiles.hpp"
@@ -21,8 +21,8 @@
 #include "server/services/save_map.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"
-#include "tests/fuzz/promise.hpp"
-#include "tests/fuzz/served_world.hpp"
+#include "tests/fuzz/invariant.hpp"
+#include "tests/fuzz/service_fixture.hpp"
 
 namespace stillmap::fuzz {
 namespace {

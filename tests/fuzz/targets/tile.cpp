@@ -1,11 +1,11 @@
 // A number that says how the bytes are meant: an encoded tile or memory as it is stored, or what is
 // inside the zstd frame, whose checksum would keep any change from being looked at.
 
-#include "core/map/tile_codec.hpp"
-#include "core/map/tile_frame.hpp"
-#include "core/map/tile_memory.hpp"
+#include "core/map/storage/tile_codec.hpp"
+#include "core/map/storage/tile_frame.hpp"
+#include "core/map/tile_evidence.hpp"
 #include "tests/fuzz/byte_source.hpp"
-#include "tests/fuzz/promise.hpp"
+#include "tests/fuzz/invariant.hpp"
 #include "tests/fuzz/street_map.hpp"
 
 namespace stillmap::fuzz {

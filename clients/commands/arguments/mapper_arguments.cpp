@@ -1,0 +1,87 @@
+#include "clients/commands/arguments/mapper_arguments.hpp"
+
+#include <stdexcept>
+
+#include "config/loaders/model_file.hpp"
+#include "config/loaders/sensor_file.hpp"
+#include "config/loaders/server_config.hpp"
+
+namespace stillmap {
+
+void add_segmentation_options(CommandHandle command, MapperArguments& arguments) {
+  command
+      .option(
+          "--columns", arguments.columns,
+          "Columns of the range image of a model that runs; default: as configured, else as the "
+          "model says")
+      .between(least_image_columns, most_image_columns);
+  add_engine_options(command, arguments.engine);
+}
+
+void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
+  command.option("--config", arguments.config_file,
+                 "Server file (config/server/*.yaml); its mapper settings are used");
+  command.option("--sensor", arguments.sensor,
+                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the recording suggests");
+  command
+      .option("--labels", arguments.labels,
+              "Where classes come from: auto (the recording's, if it has any, else the model's), "
+              "files (must have them), model (the one that comes with Stillmap), none (pure "
+              "geometry), or a folder with a model")
+      .with_default();
+  command
+      .option("--weighting", arguments.weighting,
+              "What a correspondence counts, the rows of the paper's Table I: none, "
+              "geometric, semantic; default: as configured")
+      .one_of({"none", "geometric", "semantic"});
+  add_segmentation_options(command, arguments);
+}
+
+Weighting weighting_from_name(const std::string& weighting_name) {
+  if (weighting_name == "none") return Weighting::none;
+  if (weighting_name == "geometric") return Weighting::geometric;
+  if (weighting_name == "semantic") return Weighting::semantic;
+  throw std::invalid_argument("weighting '" + weighting_name +
+                              "' is not known; there are none, geometric and semantic");
+}
+
+MapperConfig mapper_config(const MapperArguments& arguments, const SensorModel& suggested_sensor) {
+  MapperConfig config;
+  if (arguments.config_file.empty()) {
+    config.sensor = suggested_sensor;
+  } else {
+    config = load_server_config(arguments.config_file).mapper;
+  }
+  if (!arguments.sensor.empty()) config.sensor = load_sensor(arguments.sensor);
+  if (!arguments.weighting.empty()) {
+    config.odometry.weighting = weighting_from_name(arguments.weighting);
+  }
+  return config;
+}
+
+std::unique_ptr<LabelSource> label_source(const MapperArguments& arguments,
+                                          const ScanDataset& dataset) {
+  LabelsConfig labels;
+  if (!arguments.config_file.empty()) labels = load_server_config(arguments.config_file).labels;
+  if (arguments.labels == "none") {
+    labels.source = LabelOrigin::none;
+  } else if (arguments.labels == "files") {
+    if (!dataset.has_labels(0)) {
+      throw std::invalid_argument(dataset.file(0).string() +
+                                  " has no labels: use --labels model or none");
+    }
+    labels.source = LabelOrigin::stream;
+  } else if (arguments.labels == "model") {
+    labels.source = LabelOrigin::model;
+  } else if (arguments.labels != "auto") {
+    labels.source = LabelOrigin::model;
+    labels.model = arguments.labels;
+  } else if (labels.source == LabelOrigin::automatic) {
+    labels.source = dataset.has_labels(0) ? LabelOrigin::stream : LabelOrigin::model;
+  }
+  if (arguments.columns > 0) labels.image_columns = static_cast<int>(arguments.columns);
+  set_engine(arguments.engine, labels.engine);
+  return open_label_source(labels, mapper_config(arguments, dataset.suggested_sensor()).sensor);
+}
+
+}  // namespace stillmap

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "clients/commands/arguments/engine_arguments.hpp"
+#include "clients/terminal/command_line.hpp"
+#include "core/dataset/scan_dataset.hpp"
+#include "core/mapper.hpp"
+
+namespace stillmap {
+
+/// How a command line asks for a mapper.
+struct MapperArguments {
+  /// Server file whose mapper and labels sections are taken; empty: the defaults.
+  std::string config_file;
+  /// Name or file; empty: that of `config_file`, else as the dataset suggests.
+  std::string sensor;
+  /// "auto", "files", "model" (the default one), "none", or a model folder.
+  std::string labels = "auto";
+  /// "none", "geometric", "semantic"; empty: as configured.
+  std::string weighting;
+  /// Of the network's range image; 0: as configured.
+  std::uint32_t columns = 0;
+  EngineArguments engine;
+};
+
+/// Adds --columns, --engine, --precision and --threads.
+void add_segmentation_options(CommandHandle command, MapperArguments& arguments);
+/// Adds these and --config, --sensor, --labels, --weighting.
+void add_mapper_options(CommandHandle command, MapperArguments& arguments);
+
+[[nodiscard]] Weighting weighting_from_name(const std::string& weighting_name);
+
+/// Throws ConfigError or std::invalid_argument.
+[[nodiscard]] MapperConfig mapper_config(const MapperArguments& arguments,
+                                         const SensorModel& suggested_sensor);
+/// Throws ConfigError, ModelError or std::invalid_argument.
+[[nodiscard]] std::unique_ptr<LabelSource> label_source(const MapperArguments& arguments,
+                                                        const ScanDataset& dataset);
+
+}  // namespace stillmap

@@ -1,0 +1,77 @@
+#include "clients/commands/arguments/simulation_arguments.hpp"
+
+#include <cmath>
+#include <optional>
+#include <stdexcept>
+
+#include "config/loaders/sensor_file.hpp"
+
+namespace stillmap {
+namespace {
+
+void scale(TrafficPlan& traffic, double factor) {
+  traffic.vehicles_per_km *= factor;
+  traffic.cyclists_per_km *= factor;
+  traffic.pedestrians_per_km *= factor;
+  traffic.crossing_pedestrians =
+      static_cast<int>(std::lround(factor * traffic.crossing_pedestrians));
+}
+
+// The factor that the text is, nothing if it is a word.
+std::optional<double> number_in(const std::string& text) {
+  try {
+    std::size_t read = 0;
+    const double number = std::stod(text, &read);
+    if (read == text.size()) return number;
+  } catch (const std::logic_error&) {
+    return std::nullopt;  // No number at all, or one beyond all doubles.
+  }
+  return std::nullopt;
+}
+
+CityPlan plan_of(const SimulationArguments& arguments) {
+  if (arguments.traffic.empty()) return city_plan(arguments.preset);
+  const std::optional<double> factor = number_in(arguments.traffic);
+  if (!factor) return city_plan(arguments.traffic);
+  if (!(*factor >= 0.0 && *factor <= 10.0)) {
+    throw std::invalid_argument("traffic '" + arguments.traffic +
+                                "' is not a factor from 0 to 10 or the name of a preset");
+  }
+  CityPlan plan = city_plan(arguments.preset);
+  scale(plan.traffic, *factor);
+  return plan;
+}
+
+// hdl64 and vlp16 are what people type.
+std::string sensor_name(const std::string& written) {
+  if (written == "hdl64") return "hdl_64e";
+  if (written == "hdl32") return "hdl_32e";
+  if (written == "vlp16") return "vlp_16";
+  return written;
+}
+
+}  // namespace
+
+void check_seed(const std::string& option, std::uint64_t seed) {
+  constexpr std::uint64_t last_seed = 1'000'000'000'000;
+  if (seed <= last_seed) return;
+  throw std::invalid_argument(option + " " + std::to_string(seed) +
+                              " is negative or too large; it may be 0 to " +
+                              std::to_string(last_seed));
+}
+
+SimulationConfig simulation_config(const SimulationArguments& arguments) {
+  check_seed("--seed", arguments.seed);
+  SimulationConfig config;
+  config.plan = plan_of(arguments);
+  config.seed = arguments.seed;
+  config.sensor = load_sensor(sensor_name(arguments.sensor));
+  config.scans = arguments.scans;
+  config.rolling = arguments.rolling;
+  if (const std::string faults = config.faults(); !faults.empty()) {
+    throw std::invalid_argument(faults);
+  }
+  return config;
+}
+
+}  // namespace stillmap

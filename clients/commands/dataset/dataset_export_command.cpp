@@ -1,0 +1,157 @@
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "clients/commands/arguments/client_arguments.hpp"
+#include "clients/commands/command.hpp"
+#include "clients/commands/dataset/live_export.hpp"
+#include "clients/commands/arguments/mapper_arguments.hpp"
+#include "clients/commands/dataset/sequence_export.hpp"
+#include "clients/terminal/progress.hpp"
+#include "idl/bag/bag_scan_source.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr std::string_view topic_prefix = "topic:";
+
+struct Arguments {
+  std::string source;
+  std::string topic_in;
+  std::string out;
+  MapperArguments mapper;
+  ScanRange range;
+  ClientArguments client;
+  double silence_s = 10.0;
+  bool force = false;
+  bool json = false;
+};
+
+nlohmann::json to_json(const Arguments& arguments, const ExportSummary& summary) {
+  nlohmann::json remarks = nlohmann::json::array();
+  for (const auto& [scans, text] : summary.remarks) {
+    remarks.push_back({{"scans", scans}, {"remark", text}});
+  }
+  return {{"folder", arguments.out},
+          {"scans", summary.scans},
+          {"points", summary.points},
+          {"labelled_points", summary.labelled_points},
+          {"label_source", summary.label_source},
+          {"poses_frame", "camera of calib.txt: scan k into scan 0; its lidar frame is Tr^-1 T Tr"},
+          {"remarks", remarks},
+          {"stopped", summary.stopped}};
+}
+
+std::string describe(const Arguments& arguments, const ExportSummary& summary) {
+  std::string text = std::to_string(summary.scans) + " scans, " + std::to_string(summary.points) +
+                     " points (" + std::to_string(summary.labelled_points) +
+                     " with a label from '" + summary.label_source + "'): " + arguments.out +
+                     "/ (SemanticKITTI sequence; poses.txt is in the camera frame of calib.txt, as "
+                     "KITTI's)\n";
+  for (const auto& [scans, remark] : summary.remarks) {
+    text.append(std::to_string(scans)).append(" ").append(remark).append("\n");
+  }
+  return text;
+}
+
+ExportSummary export_from_recording(const Arguments& arguments, StopSignal& stop) {
+  const ScanDataset dataset = open_recording(arguments.source, arguments.topic_in);
+  std::error_code ignored;
+  if (std::filesystem::equivalent(arguments.source, arguments.out, ignored)) {
+    throw std::invalid_argument(arguments.out + " is the recording itself; name another folder");
+  }
+  const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
+  const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
+  auto labels = label_source(arguments.mapper, dataset);
+  prepare_sequence_folder(arguments.out, arguments.force);
+  Progress progress("export", "scans", total);
+  return export_recording(
+      dataset, arguments.range, config, std::move(labels), arguments.out,
+      [&](std::size_t seen) {
+        progress.update(seen);
+        return !stop.requested();
+      },
+      [&](const SkippedScan& scan) { progress.say("stillmap: " + scan.reason); });
+}
+
+ExportSummary export_from_topic(const Arguments& arguments, StopSignal& stop) {
+  ServerConfig config;
+  if (!arguments.mapper.config_file.empty()) {
+    config = load_server_config(arguments.mapper.config_file);
+  }
+  config.mapper = mapper_config(arguments.mapper, config.mapper.sensor);
+  Client client = connect(arguments.client);
+  prepare_sequence_folder(arguments.out, arguments.force);
+  const LiveExportOptions options{.topic = arguments.source.substr(topic_prefix.size()),
+                                  .scans = arguments.range.count,
+                                  .silence = std::chrono::milliseconds(
+                                      static_cast<std::int64_t>(1000.0 * arguments.silence_s))};
+  const bool known_end = options.scans != SIZE_MAX;
+  Progress progress("export", "scans", known_end ? options.scans : 0);
+  progress.say("stillmap: waiting for scans on '" + options.topic + "'; Ctrl-C ends the sequence");
+  ExportSummary summary = export_live(client, options, config, arguments.out, stop,
+                                      [&](std::size_t scans) { progress.update(scans); });
+  summary.label_source = client.status().label_source;
+  summary.stopped = known_end && summary.scans < options.scans;
+  return summary;
+}
+
+ExitCode run(const Arguments& arguments) {
+  StopSignal stop;
+  const ExportSummary summary = arguments.source.starts_with(topic_prefix)
+                                    ? export_from_topic(arguments, stop)
+                                    : export_from_recording(arguments, stop);
+  std::cout << (arguments.json ? to_json(arguments, summary).dump(2) + "\n"
+                               : describe(arguments, summary));
+  if (summary.stopped) {
+    std::cerr << "stillmap: ended early; the sequence is complete up to there\n";
+  }
+  return summary.stopped || summary.scans == 0 ? ExitCode::failed : ExitCode::ok;
+}
+
+}  // namespace
+
+void add_dataset_export_command(CommandHandle dataset, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  CommandHandle command =
+      dataset.command("export", "Write a recording or a live topic as a SemanticKITTI sequence");
+  command
+      .option(
+          "SOURCE", arguments->source,
+          "A KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, a ROS 2 bag "
+          "(folder or .db3), or topic:NAME of a sensor that a running stillmap-server listens to")
+      .required();
+  command.option("--topic-in", arguments->topic_in, topic_in_help);
+  command.option("OUT", arguments->out, "New folder for the sequence").required();
+  add_mapper_options(command, arguments->mapper);
+  command.option("--start", arguments->range.first, "Number of the recording's first scan");
+  command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
+  command.flag("--strict", arguments->range.strict,
+               "Stop at the first damaged file instead of leaving it out");
+  command.flag("--force", arguments->force,
+               "Replace a sequence that is there already, with its labels");
+  command.flag("--json", arguments->json, "Print JSON");
+  command
+      .option("--silence", arguments->silence_s,
+              "Live: end when the scans that came are followed by none for so long [s]")
+      .above_zero()
+      .with_default();
+  add_client_options(command, arguments->client);
+  command.explain(
+      "Examples:\n"
+      "  stillmap dataset export my_pcds campus --labels my_model --sensor vlp_16\n"
+      "  stillmap dataset export topic:points campus --config server.yaml --scans 600\n"
+      "Writes velodyne/*.bin (every scan and point in the recording's order; intensity 0..1),\n"
+      "labels/*.label (the recording's own, else the first guess of --labels, of the running\n"
+      "server, or 0), times.txt, calib.txt, and poses.txt from our odometry: camera frame of scan\n"
+      "k into camera frame of scan 0, where calib.txt's Tr takes lidar to camera (a camera that\n"
+      "looks forward from the lidar's place). Point times and rings go to time_offsets/ and "
+      "rings/.\n"
+      "Ctrl-C leaves a shorter sequence that is complete in itself; a new run begins anew, as "
+      "poses\n"
+      "follow from all scans before. Live, give the server's own file with --config.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

@@ -1,0 +1,131 @@
+#include "clients/commands/dataset/live_export.hpp"
+
+#include <mutex>
+#include <optional>
+#include <utility>
+
+#include "clients/commands/dataset/live_scan_synchronizer.hpp"
+
+namespace stillmap {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds poll_period{20};
+/// How long poses and labels of the last scans may be under way.
+constexpr std::chrono::milliseconds last_news{1000};
+
+wire::CloudReading reading_of(const ServerConfig& config) {
+  const PointFieldNames& names = config.input.fields;
+  return {.fields = {.intensity = names.intensity,
+                     .ring = names.ring,
+                     .time = names.time,
+                     .label = names.label},
+          .intensity_scale = config.mapper.sensor.intensity_scale};
+}
+
+/// The subscriptions, and what came from them: each has its own thread.
+class LiveInput {
+ public:
+  LiveInput(Client& client, const std::string& topic, const ServerConfig& config)
+      : poses_(client.subscribe_odometry(
+            [this](const OdometryUpdate& update) { locked().second.add_pose(update.pose); })),
+        labels_(client.subscribe_labelled_scans([this](const Scan& labelled) {
+          locked().second.add_labels(labelled.stamp_ns, labelled.labels);
+        })),
+        points_(client.subscribe_points(topic, client.status().delivery, reading_of(config),
+                                        [this](const Scan& scan) {
+                                          const std::scoped_lock lock(mutex_);
+                                          scans_.add_scan(scan);
+                                          last_scan_ = Clock::now();
+                                        })) {}
+
+  [[nodiscard]] std::optional<LiveScan> take() { return locked().second.take(); }
+  [[nodiscard]] std::optional<LiveScan> take_last() { return locked().second.take_last(); }
+  /// Whether scans came, and then none for so long.
+  [[nodiscard]] bool silent_for(std::chrono::milliseconds silence) {
+    const std::scoped_lock lock(mutex_);
+    return last_scan_ && Clock::now() - *last_scan_ > silence;
+  }
+  [[nodiscard]] std::size_t without_pose() { return locked().second.without_pose(); }
+
+  void stop_listening() { points_.end(); }
+
+ private:
+  [[nodiscard]] std::pair<std::unique_lock<std::mutex>, LiveScans&> locked() {
+    return {std::unique_lock(mutex_), scans_};
+  }
+
+  std::mutex mutex_;
+  LiveScans scans_;
+  std::optional<Clock::time_point> last_scan_;
+  // Last: end before what they use is gone.
+  Subscription poses_;
+  Subscription labels_;
+  Subscription points_;
+};
+
+class LiveExport {
+ public:
+  LiveExport(const ServerConfig& config, const std::filesystem::path& folder)
+      : prepare_(config.mapper.prepare), output_(folder) {}
+
+  void write(const LiveScan& live) {
+    std::vector<std::uint32_t> raw_labels;
+    if (!live.classes) {
+      ++labels_lost_;
+    } else if (!live.classes->empty()) {
+      const bool fits = usable_points(live.scan, prepare_).size() == live.classes->size();
+      labels_misfit_ += fits ? 0U : 1U;
+      raw_labels = labels_of_all_points(live.scan, *live.classes, prepare_);
+    }
+    output_.add(live.scan, std::move(raw_labels), live.T_map_lidar);
+  }
+
+  [[nodiscard]] std::size_t scans() const { return output_.scans(); }
+
+  [[nodiscard]] ExportSummary finish(std::size_t without_pose) const {
+    ExportSummary summary = output_.finish();
+    const auto remark = [&](std::size_t scans, const char* text) {
+      if (scans > 0) summary.remarks.push_back({scans, text});
+    };
+    remark(without_pose,
+           "scans left out, as the server did not map them; a server with delivery 'every' maps "
+           "all");
+    remark(labels_lost_, "scans without the server's labels, which were lost on their way");
+    remark(labels_misfit_,
+           "scans whose labels do not fit: give the server's own file with --config");
+    return summary;
+  }
+
+ private:
+  PrepareConfig prepare_;
+  SequenceOutput output_;
+  std::size_t labels_lost_ = 0;
+  std::size_t labels_misfit_ = 0;
+};
+
+}  // namespace
+
+ExportSummary export_live(Client& client, const LiveExportOptions& options,
+                          const ServerConfig& config, const std::filesystem::path& folder,
+                          StopSignal& stop, const std::function<void(std::size_t)>& scan_done) {
+  LiveExport output(config, folder);
+  LiveInput input(client, options.topic, config);
+  bool stopped = false;
+  while (!stopped && output.scans() < options.scans && !input.silent_for(options.silence)) {
+    stopped = stop.wait_for(poll_period);
+    while (const auto live = output.scans() < options.scans ? input.take() : std::nullopt) {
+      output.write(*live);
+      scan_done(output.scans());
+    }
+  }
+  if (output.scans() < options.scans) {
+    input.stop_listening();
+    (void)stop.wait_for(last_news);
+    while (const auto live = input.take_last()) output.write(*live);
+  }
+  return output.finish(input.without_pose());
+}
+
+}  // namespace stillmap

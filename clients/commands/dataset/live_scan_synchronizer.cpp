@@ -1,0 +1,54 @@
+#include "clients/commands/dataset/live_scan_synchronizer.hpp"
+
+#include <iterator>
+#include <utility>
+
+namespace stillmap {
+
+void LiveScans::add_scan(const Scan& scan) {
+  waiting_.push_back(scan);
+  if (waiting_.size() <= most_waiting) return;
+  waiting_.pop_front();
+  ++without_pose_;
+}
+
+void LiveScans::add_pose(const StampedPose& pose) {
+  T_map_lidar_.insert_or_assign(pose.stamp_ns, pose.T_map_lidar);
+  if (T_map_lidar_.size() > 2 * most_waiting) T_map_lidar_.erase(T_map_lidar_.begin());
+}
+
+void LiveScans::add_labels(std::int64_t stamp_ns, std::vector<SemanticClass> classes) {
+  classes_.insert_or_assign(stamp_ns, std::move(classes));
+  if (classes_.size() > most_waiting) classes_.erase(classes_.begin());
+}
+
+std::optional<LiveScan> LiveScans::take() { return take_if(false); }
+
+std::optional<LiveScan> LiveScans::take_last() { return take_if(true); }
+
+std::optional<LiveScan> LiveScans::take_if(bool all_arrived) {
+  while (!waiting_.empty()) {
+    const std::int64_t stamp_ns = waiting_.front().stamp_ns;
+    const auto pose = T_map_lidar_.find(stamp_ns);
+    const auto later = T_map_lidar_.upper_bound(stamp_ns);
+    if (pose == T_map_lidar_.end()) {
+      if (later == T_map_lidar_.end() && !all_arrived) return std::nullopt;
+      waiting_.pop_front();
+      ++without_pose_;
+      continue;
+    }
+    const auto labels = classes_.find(stamp_ns);
+    const auto later_poses = static_cast<std::size_t>(std::distance(later, T_map_lidar_.end()));
+    if (labels == classes_.end() && later_poses < labels_patience && !all_arrived) {
+      return std::nullopt;
+    }
+    LiveScan live{
+        .scan = std::move(waiting_.front()), .T_map_lidar = pose->second, .classes = std::nullopt};
+    if (labels != classes_.end()) live.classes = std::move(labels->second);
+    waiting_.pop_front();
+    return live;
+  }
+  return std::nullopt;
+}
+
+}  // namespace stillmap

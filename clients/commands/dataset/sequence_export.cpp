@@ -1,0 +1,91 @@
+#include "clients/commands/dataset/sequence_export.hpp"
+
+#include <utility>
+
+#include "core/dataset/dataset_error.hpp"
+
+namespace stillmap {
+namespace {
+
+class RecordingExport {
+ public:
+  RecordingExport(const ScanDataset& dataset, bool strict, const MapperConfig& config,
+                  std::unique_ptr<LabelSource> labels, const std::filesystem::path& folder,
+                  const ScanSkipped& scan_skipped)
+      : dataset_(dataset),
+        strict_(strict),
+        scan_skipped_(scan_skipped),
+        prepare_(config.prepare),
+        mapper_(config, std::move(labels)),
+        output_(folder) {}
+
+  void export_scan(std::size_t index) {
+    const std::optional<DatasetFrame> frame = read(index);
+    if (!frame) return;
+    const std::optional<MappedScan> mapped = mapper_.process(frame->scan);
+    std::vector<std::uint32_t> raw_labels = frame->raw_labels;
+    if (mapped) {
+      T_map_lidar_ = mapped->odometry.T_map_lidar;
+      if (raw_labels.empty()) {
+        raw_labels = labels_of_all_points(frame->scan, mapped->labelled.labels.classes, prepare_);
+      }
+    } else {
+      ++without_pose_;
+      scan_skipped_({index, mapper_.last_rejection().counter,
+                     dataset_.file(index).string() +
+                         " takes the pose of the scan before: " + mapper_.last_rejection().reason});
+    }
+    output_.add(frame->scan, std::move(raw_labels), T_map_lidar_);
+  }
+
+  ExportSummary finish(bool stopped) {
+    ExportSummary summary = output_.finish();
+    summary.label_source = mapper_.label_source();
+    summary.stopped = stopped;
+    if (damaged_ > 0) summary.remarks.push_back({damaged_, "damaged files left out"});
+    if (without_pose_ > 0) {
+      summary.remarks.push_back({without_pose_, "scans with the pose of the scan before them"});
+    }
+    return summary;
+  }
+
+ private:
+  std::optional<DatasetFrame> read(std::size_t index) {
+    try {
+      return dataset_.read(index);
+    } catch (const DatasetError& error) {
+      if (strict_) throw;
+      ++damaged_;
+      scan_skipped_({index, "unreadable", std::string("left out: ") + error.what()});
+      return std::nullopt;
+    }
+  }
+
+  const ScanDataset& dataset_;
+  bool strict_;
+  const ScanSkipped& scan_skipped_;
+  PrepareConfig prepare_;
+  Mapper mapper_;
+  SequenceOutput output_;
+  Eigen::Isometry3d T_map_lidar_ = Eigen::Isometry3d::Identity();
+  std::size_t damaged_ = 0;
+  std::size_t without_pose_ = 0;
+};
+
+}  // namespace
+
+ExportSummary export_recording(const ScanDataset& dataset, const ScanRange& range,
+                               const MapperConfig& config, std::unique_ptr<LabelSource> labels,
+                               const std::filesystem::path& folder, const ScanDone& scan_done,
+                               const ScanSkipped& scan_skipped) {
+  const std::size_t end = range.end(dataset);
+  RecordingExport run(dataset, range.strict, config, std::move(labels), folder, scan_skipped);
+  bool go_on = true;
+  for (std::size_t index = range.first; index < end && go_on; ++index) {
+    run.export_scan(index);
+    go_on = scan_done(index + 1 - range.first);
+  }
+  return run.finish(!go_on);
+}
+
+}  // namespace stillmap

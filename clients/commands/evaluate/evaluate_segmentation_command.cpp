@@ -1,0 +1,137 @@
+#include <algorithm>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "clients/commands/command.hpp"
+#include "clients/commands/arguments/mapper_arguments.hpp"
+#include "clients/commands/evaluate/segmentation_report.hpp"
+#include "clients/commands/evaluate/segmentation_run.hpp"
+#include "clients/terminal/progress.hpp"
+#include "clients/terminal/table.hpp"
+#include "core/dataset/binary_file.hpp"
+#include "core/dataset/kitti_files.hpp"
+#include "core/evaluation/class_groups.hpp"
+#include "core/evaluation/confusion_matrix.hpp"
+#include "core/picture/segmentation_picture.hpp"
+
+namespace stillmap {
+namespace {
+
+struct Arguments {
+  std::string truth, predictions, picture;
+  MapperArguments mapper;
+  ScanRange range;
+  bool json = false;
+};
+
+// The .label files of the folder itself, or of the subfolder that the data set's layout has.
+std::vector<std::filesystem::path> label_files(const std::filesystem::path& folder,
+                                               const char* subfolder) {
+  const std::filesystem::path inner = folder / subfolder;
+  const std::filesystem::path& place = std::filesystem::is_directory(inner) ? inner : folder;
+  if (!std::filesystem::is_directory(place)) throw DatasetError(place, "is not a folder");
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::directory_iterator(place)) {
+    if (entry.path().extension() == ".label") files.push_back(entry.path());
+  }
+  if (files.empty()) throw DatasetError(place, "holds no .label files");
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+ConfusionMatrix compare_files(const Arguments& arguments) {
+  const auto predictions = label_files(arguments.predictions, "predictions");
+  const std::filesystem::path truth_folder =
+      label_files(arguments.truth, "labels").front().parent_path();
+  Progress progress("compare", "scans", predictions.size());
+  ConfusionMatrix matrix;
+  std::uint64_t done = 0;
+  for (const std::filesystem::path& prediction : predictions) {
+    const auto predicted = read_values<std::uint32_t>(prediction);
+    const std::filesystem::path truth = truth_folder / prediction.filename();
+    if (!std::filesystem::exists(truth)) {
+      throw DatasetError(truth, "is missing: there is a prediction for it");
+    }
+    matrix.add(reduced_classes(read_kitti_labels(truth, predicted.size())),
+               reduced_classes(predicted));
+    progress.update(++done);
+  }
+  return matrix;
+}
+
+// Truth above prediction, of the first scan that was taken.
+void write_picture(const Arguments& arguments, const ScanDataset& dataset, LabelSource& labels) {
+  DatasetFrame frame = dataset.read(arguments.range.first);
+  const std::vector<SemanticClass> truth = reduced_classes(frame.raw_labels);
+  frame.scan.labels.clear();
+  const std::vector<SemanticClass> found = labels.label(frame.scan).classes;
+  const RangeImage image(frame.scan.points_lidar, projection_model(dataset.suggested_sensor()));
+  std::vector<std::span<const SemanticClass>> strips;
+  if (!truth.empty()) strips.emplace_back(truth);
+  if (!found.empty()) strips.emplace_back(found);
+  write_segmentation_picture(arguments.picture, image, strips);
+}
+
+ConfusionMatrix run_model(const Arguments& arguments) {
+  const ScanDataset dataset(arguments.truth);
+  const std::size_t scans = arguments.range.end(dataset) - arguments.range.first;
+  const std::unique_ptr<LabelSource> labels = label_source(arguments.mapper, dataset);
+  Progress progress("segment", "scans", scans);
+  const SegmentationResult result =
+      segment_dataset(dataset, arguments.range, *labels, [&](std::size_t seen) {
+        progress.update(seen);
+        return true;
+      });
+  if (result.scans == 0) throw DatasetError(dataset.file(arguments.range.first), "has no labels");
+  if (!arguments.picture.empty()) write_picture(arguments, dataset, *labels);
+  std::cerr << labels->name() << ": " << result.scans << " scans, from scan to classes "
+            << fixed(result.median_ms, 1) << " ms (median), " << fixed(result.p99_ms, 1)
+            << " ms (p99)\n";
+  return result.points;
+}
+
+ExitCode run(const Arguments& arguments) {
+  const ConfusionMatrix matrix =
+      arguments.predictions.empty() ? run_model(arguments) : compare_files(arguments);
+  std::cout << (arguments.json ? to_json(matrix).dump(2) + "\n" : describe(matrix));
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  arguments->mapper.labels = "model";
+  CommandHandle command = evaluate.command("segmentation", "IoU of every class and their mean");
+  command
+      .option("--truth", arguments->truth,
+              "A recording with labels, or a folder with true .label files")
+      .required();
+  const OptionHandle predictions =
+      command.option("--predictions", arguments->predictions,
+                     "Folder with predicted .label files (original ids); without it a model runs");
+  command
+      .option("--model", arguments->mapper.labels,
+              "Folder of the model to run; 'model' is the one that comes with Stillmap")
+      .with_default()
+      .excludes(predictions);
+  command.option("--sensor", arguments->mapper.sensor,
+                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the recording suggests");
+  add_segmentation_options(command, arguments->mapper);
+  command.option("--start", arguments->range.first, "Number of the first scan");
+  command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
+  command.option("--picture", arguments->picture,
+                 "PNG of the first scan's range image: true classes above those found");
+  command.flag("--json", arguments->json, "Print JSON");
+  command.explain(
+      "Examples:\n"
+      "  stillmap evaluate segmentation --truth sequences/08 --predictions my_net/08\n"
+      "  stillmap evaluate segmentation --truth city --picture city.png\n"
+      "Predictions pair with the truth by name, and every one needs its truth; scans without a\n"
+      "prediction do not count. A model runs as in the server, votes of the neighbours included.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

@@ -1,0 +1,114 @@
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "clients/commands/command.hpp"
+#include "clients/commands/mapping/pose_files.hpp"
+#include "clients/commands/mapping/trajectory_report.hpp"
+#include "core/dataset/kitti_files.hpp"
+
+namespace stillmap {
+namespace {
+
+struct Arguments {
+  std::string truth, estimate;
+  std::string truth_calib, estimate_calib;
+  std::string frame = "lidar";
+  double max_difference_s = 0.05;
+  std::string pictures;
+  bool json = false;
+};
+
+PoseFile read_in_frame(const std::string& file, const std::string& calib) {
+  PoseFile poses = read_pose_file(file);
+  if (!calib.empty()) {
+    poses.poses = lidar_poses_from_camera(poses.poses, read_kitti_calibration(calib));
+  }
+  return poses;
+}
+
+// Axis of the sensor, 0 = x, along which it mostly travels.
+int travel_axis(const std::vector<Eigen::Isometry3d>& poses) {
+  Eigen::Vector3d travelled = Eigen::Vector3d::Zero();
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    travelled += (poses[i - 1].inverse() * poses[i].translation()).cwiseAbs();
+  }
+  Eigen::Index axis = 0;
+  travelled.maxCoeff(&axis);
+  return static_cast<int>(axis);
+}
+
+// Camera and lidar frames mixed up give figures that look like bad odometry.
+std::string frame_warning(const PosePairs& pairs) {
+  const int truth = travel_axis(pairs.truth);
+  const int estimate = travel_axis(pairs.estimate);
+  if (truth == estimate) return {};
+  const std::string axes = "xyz";
+  return std::string("the true sensor travels along its ") + axes[static_cast<std::size_t>(truth)] +
+         " axis and the estimated one along " + axes[static_cast<std::size_t>(estimate)] +
+         ": one file may be in the camera frame (give --truth-calib or --estimate-calib)";
+}
+
+ExitCode run(const Arguments& arguments) {
+  const PoseFile truth = read_in_frame(arguments.truth, arguments.truth_calib);
+  const PoseFile estimate = read_in_frame(arguments.estimate, arguments.estimate_calib);
+  const bool converted = !arguments.truth_calib.empty() || !arguments.estimate_calib.empty();
+  const std::string frame = converted ? "lidar" : arguments.frame;
+  const PosePairs pairs =
+      pair_poses(truth, estimate, static_cast<std::int64_t>(1e9 * arguments.max_difference_s));
+  const TrajectoryReport report = report_trajectory(pairs);
+  const std::string warning = frame_warning(pairs);
+  if (!warning.empty()) std::cerr << "stillmap: warning: " << warning << "\n";
+  if (!arguments.pictures.empty()) {
+    std::filesystem::create_directories(arguments.pictures);
+    draw_trajectories(arguments.pictures, pairs, report,
+                      frame == "camera" ? GroundPlane::xz : GroundPlane::xy);
+  }
+  if (arguments.json) {
+    nlohmann::json json = to_json(report);
+    json["frame"] = frame;
+    json["warning"] = warning;
+    std::cout << json.dump(2) << "\n";
+  } else {
+    std::cout << "Frame of both: " << frame << (converted ? " (converted from camera)" : "") << "\n"
+              << describe(report);
+  }
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_evaluate_trajectory_command(CommandHandle evaluate, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  CommandHandle command = evaluate.command(
+      "trajectory",
+      "Errors of an estimated trajectory: ATE, relative error a frame, KITTI odometry metric");
+  command.option("--truth", arguments->truth, "True poses, KITTI (3x4) or TUM form").required();
+  command.option("--estimate", arguments->estimate, "Estimated poses, KITTI or TUM form")
+      .required();
+  command.option("--truth-calib", arguments->truth_calib,
+                 "The truth is in the camera frame: convert with Tr of this calib.txt");
+  command.option("--estimate-calib", arguments->estimate_calib, "The same for the estimate");
+  command
+      .option("--frame", arguments->frame,
+              "Frame of both files when nothing is converted: lidar or camera")
+      .one_of({"lidar", "camera"})
+      .with_default();
+  command
+      .option("--max-difference", arguments->max_difference_s,
+              "Poses with stamps pair when at most this far apart [s]")
+      .with_default();
+  command.option("--pictures", arguments->pictures,
+                 "Folder for trajectory.png and trajectory_error.png");
+  command.flag("--json", arguments->json, "Print JSON");
+  command.explain(
+      "Examples:\n"
+      "  stillmap evaluate trajectory --truth city/poses.txt --truth-calib city/calib.txt \\\n"
+      "      --estimate city_map/poses_lidar.txt --pictures city_map\n"
+      "  stillmap evaluate trajectory --truth 05_truth.txt --estimate 05.txt --frame camera "
+      "--json\n"
+      "Files in TUM form pair by stamp, others line by line.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

@@ -1,0 +1,166 @@
+#include <cmath>
+#include <deque>
+#include <iostream>
+#include <memory>
+#include <mutex>
+#include <nlohmann/json.hpp>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "clients/commands/arguments/client_arguments.hpp"
+#include "clients/commands/command.hpp"
+#include "clients/commands/mapping/pose_files.hpp"
+#include "clients/commands/server_control/status_report.hpp"
+#include "clients/terminal/stop_signal.hpp"
+#include "clients/terminal/table.hpp"
+
+namespace stillmap {
+namespace {
+
+struct Arguments {
+  ClientArguments client;
+  /// 0: no limit.
+  std::size_t count = 0;
+  double duration_s = 0.0;
+  std::string out;
+  bool json = false;
+};
+
+/// News from the server, handed from its subscriptions' threads to the one that prints.
+class News {
+ public:
+  void add(const StampedPose& pose) {
+    const std::lock_guard lock(mutex_);
+    poses_.push_back(pose);
+  }
+  void add(const ServerStatus& status) {
+    const std::lock_guard lock(mutex_);
+    status_ = status;
+  }
+  std::deque<StampedPose> take_poses() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(poses_, {});
+  }
+  std::optional<ServerStatus> take_status() {
+    const std::lock_guard lock(mutex_);
+    return std::exchange(status_, std::nullopt);
+  }
+
+ private:
+  std::mutex mutex_;
+  std::deque<StampedPose> poses_;
+  std::optional<ServerStatus> status_;
+};
+
+double yaw_deg(const Eigen::Isometry3d& T) {
+  return std::atan2(T.linear()(1, 0), T.linear()(0, 0)) * 180.0 / std::numbers::pi;
+}
+
+nlohmann::json pose_json(const StampedPose& pose) {
+  const Eigen::Vector3d t = pose.T_map_lidar.translation();
+  const Eigen::Quaterniond q(pose.T_map_lidar.linear());
+  return {{"type", "pose"},
+          {"stamp_ns", pose.stamp_ns},
+          {"frame", "lidar in map"},
+          {"position_m", {t.x(), t.y(), t.z()}},
+          {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
+}
+
+// One line a second: the newest pose, and how the server is.
+std::string status_line(const ServerStatus& status, const Trajectory& poses) {
+  std::string line;
+  if (poses.empty()) {
+    line = "no pose yet";
+  } else {
+    const Eigen::Isometry3d& T = poses.back().T_map_lidar;
+    line = "x " + fixed(T.translation().x(), 2) + "  y " + fixed(T.translation().y(), 2) + "  z " +
+           fixed(T.translation().z(), 2) + " m  yaw " + fixed(yaw_deg(T), 1) + " deg";
+  }
+  line += "  " + std::string(name(status.health)) + "  in " + fixed(status.received_hz, 1) +
+          "/s  mapped " + fixed(status.mapped_hz, 1) + "/s  dropped " +
+          std::to_string(status.dropped()) + "  voxels " + std::to_string(status.voxel_count);
+  return line + (status.reason.empty() ? "" : "  (" + status.reason + ")");
+}
+
+/// Prints news until the limits are reached; keeps the poses.
+class Watch {
+ public:
+  explicit Watch(const Arguments& arguments) : arguments_(arguments) {}
+
+  void print(News& news) {
+    for (const StampedPose& pose : news.take_poses()) {
+      if (enough_poses()) break;
+      poses_.push_back(pose);
+      if (arguments_.json) std::cout << pose_json(pose).dump() << "\n";
+    }
+    if (const std::optional<ServerStatus> status = news.take_status()) {
+      if (arguments_.json) {
+        nlohmann::json json = to_json(*status);
+        json["type"] = "status";
+        std::cout << json.dump() << "\n";
+      } else {
+        std::cout << status_line(*status, poses_) << "\n";
+      }
+    }
+    std::cout.flush();
+  }
+
+  [[nodiscard]] bool enough_poses() const {
+    return arguments_.count > 0 && poses_.size() >= arguments_.count;
+  }
+  [[nodiscard]] const Trajectory& poses() const { return poses_; }
+
+ private:
+  const Arguments& arguments_;
+  Trajectory poses_;
+};
+
+ExitCode run(const Arguments& arguments) {
+  StopSignal stop;
+  Client client = connect(arguments.client);
+  News news;
+  const Subscription odometry =
+      client.subscribe_odometry([&](const OdometryUpdate& update) { news.add(update.pose); });
+  const Subscription status =
+      client.subscribe_status([&](const ServerStatus& update) { news.add(update); });
+  Watch watch(arguments);
+  const auto began = std::chrono::steady_clock::now();
+  bool time_is_up = false;
+  while (!stop.wait_for(std::chrono::milliseconds(50)) && !watch.enough_poses() && !time_is_up) {
+    watch.print(news);
+    const std::chrono::duration<double> watched = std::chrono::steady_clock::now() - began;
+    time_is_up = arguments.duration_s > 0.0 && watched.count() >= arguments.duration_s;
+  }
+  watch.print(news);
+  if (!arguments.out.empty()) {
+    write_poses_as_named(arguments.out, watch.poses());
+    std::cerr << watch.poses().size() << " poses written to " << arguments.out
+              << " (lidar frame; the map is the lidar frame of the server's first scan)\n";
+  }
+  const bool too_few = arguments.count > 0 && !watch.enough_poses() && time_is_up;
+  return too_few ? ExitCode::no_server : ExitCode::ok;
+}
+
+}  // namespace
+
+void add_watch_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  CommandHandle command =
+      program.command("watch", "Poses, health and rates of a server as they come");
+  command.option("--count", arguments->count, "End after as many poses");
+  command.option("--duration", arguments->duration_s, "End after as many seconds").above_zero();
+  command.option("--out", arguments->out, "Write the poses: KITTI 3x4, or with stamps to FILE.tum");
+  command.flag("--json", arguments->json, "Print a JSON line for every pose and status");
+  add_client_options(command, arguments->client);
+  command.explain(
+      "Examples:\n"
+      "  stillmap watch\n"
+      "  stillmap watch --count 100 --out poses.tum\n"
+      "  stillmap watch --json | jq 'select(.type == \"pose\").position_m'\n"
+      "Ends with Ctrl-C. Exit code 3 when no server answers, or when --duration ends before\n"
+      "--count poses came.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

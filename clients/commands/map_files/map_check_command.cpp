@@ -1,0 +1,88 @@
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "clients/commands/command.hpp"
+#include "clients/terminal/progress.hpp"
+#include "core/map/tools/map_check.hpp"
+
+namespace stillmap {
+namespace {
+
+struct Arguments {
+  std::string file;
+  bool json = false;
+};
+
+MapCheck check_with_progress(const std::string& file) {
+  std::optional<Progress> progress;
+  return check_map_file(file, [&](std::size_t done, std::size_t total) {
+    if (!progress) progress.emplace("check", "tiles", total);
+    progress->update(done);
+  });
+}
+
+nlohmann::json fault_json(const MapFault& fault) {
+  nlohmann::json json{{"place", fault.place}, {"what", fault.what}};
+  if (fault.tile) json["tile"] = {fault.tile->x, fault.tile->y};
+  return json;
+}
+
+nlohmann::json to_json(const MapCheck& check) {
+  nlohmann::json faults = nlohmann::json::array();
+  for (const MapFault& fault : check.faults) faults.push_back(fault_json(fault));
+  return {{"sound", check.is_sound()},
+          {"tiles", check.tiles},
+          {"sound_tiles", check.sound_tiles},
+          {"voxels", check.voxels},
+          {"hidden_voxels", check.hidden_voxels},
+          {"poses", check.poses},
+          {"faults", faults}};
+}
+
+std::string describe(const MapFault& fault) {
+  std::string text = fault.place;
+  if (fault.tile) {
+    text += " (" + std::to_string(fault.tile->x) + ", " + std::to_string(fault.tile->y) + ")";
+  }
+  return text + (fault.tile ? " " : ": ") + fault.what;
+}
+
+std::string describe(const MapCheck& check) {
+  std::string text;
+  for (const MapFault& fault : check.faults) text += describe(fault) + "\n";
+  const std::string looked_at = std::to_string(check.tiles) + " tiles, " +
+                                std::to_string(check.voxels) + " voxels, " +
+                                std::to_string(check.poses) + " poses";
+  if (check.is_sound()) return "sound: " + looked_at + "\n";
+  return text + "damaged: " + std::to_string(check.faults.size()) + " faults in " + looked_at +
+         "; " + std::to_string(check.sound_tiles) +
+         " tiles are sound. Restore a copy, or map again.\n";
+}
+
+ExitCode run(const Arguments& arguments) {
+  const MapCheck check = check_with_progress(arguments.file);
+  std::cout << (arguments.json ? to_json(check).dump(2) + "\n" : describe(check));
+  return check.is_sound() ? ExitCode::ok : ExitCode::failed;
+}
+
+}  // namespace
+
+void add_map_check_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  CommandHandle command =
+      program.command("map-check", "Verify a map file: its database, every tile's hash, the path");
+  command.option("FILE", arguments->file, "A map file; it is only read").required();
+  command.flag("--json", arguments->json, "Print JSON");
+  command.explain(
+      "Examples:\n"
+      "  stillmap map-check city.stillmap\n"
+      "  stillmap map-check backup.stillmap --json | jq '.faults[] | select(.tile)'\n"
+      "Exit code 0: sound; 1: damaged, each fault is named with its tile; 2: no map file that "
+      "this\n"
+      "version can read.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

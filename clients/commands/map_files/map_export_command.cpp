@@ -1,0 +1,134 @@
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "clients/commands/query/class_arguments.hpp"
+#include "clients/commands/query/cloud_output.hpp"
+#include "clients/commands/command.hpp"
+#include "clients/commands/query/region_arguments.hpp"
+#include "core/map/tools/geo_export.hpp"
+#include "core/map/storage/map_file_copy.hpp"
+
+namespace stillmap {
+namespace {
+
+struct Arguments {
+  std::string file;
+  std::string output;
+  RegionArguments region;
+  std::vector<std::string> classes;
+  double resolution_m = 0.0;
+  std::string datum;
+  bool json = false;
+};
+
+bool is_raster_name(const std::string& file) {
+  return file.ends_with(".tif") || file.ends_with(".tiff");
+}
+
+void check_output_name(const std::string& file) {
+  if (is_cloud_name(file) || is_raster_name(file)) return;
+  const bool is_octree = file.ends_with(".bt") || file.ends_with(".ot");
+  throw std::invalid_argument("--output " + file + ": the name must end in .pcd, .ply or .tif" +
+                              (is_octree ? "; OctoMap files come from stillmap octomap" : ""));
+}
+
+MapQuery query_of(const Arguments& arguments, const StoredMap& map) {
+  const Eigen::Vector2d robot_map =
+      map.trajectory.empty()
+          ? Eigen::Vector2d(Eigen::Vector2d::Zero())
+          : Eigen::Vector2d(map.trajectory.back().T_map_lidar.translation().head<2>());
+  MapQuery query;
+  query.region = region_at(arguments.region, robot_map);
+  query.classes = classes_of(arguments.classes);
+  query.resolution_m = arguments.resolution_m;
+  return query;
+}
+
+std::vector<QueryVoxel> voxels_of(const MapView& view, MapQuery query) {
+  std::vector<QueryVoxel> voxels;
+  do {
+    const MapQueryResult page = query_map(view, query);
+    if (page.status != QueryStatus::ok) throw std::invalid_argument(page.reason);
+    voxels.insert(voxels.end(), page.voxels.begin(), page.voxels.end());
+    query.continuation = page.continuation;
+  } while (!query.continuation.empty());
+  return voxels;
+}
+
+Datum datum_of(const Arguments& arguments, const StoredMap& map) {
+  if (!arguments.datum.empty()) return datum_from_text(arguments.datum);
+  const auto stored = map.metadata.find("datum");
+  if (stored != map.metadata.end()) return datum_from_text(stored->second);
+  throw std::invalid_argument(
+      "a GeoTIFF needs to know where the map lies: give --datum "
+      "latitude,longitude[,altitude_m[,azimuth_deg]] of the map's origin, as --datum "
+      "48.137,11.575,519,90");
+}
+
+void write(const Arguments& arguments, const StoredMap& map,
+           const std::vector<QueryVoxel>& voxels) {
+  if (is_cloud_name(arguments.output)) {
+    write_cloud(arguments.output, voxels);
+    return;
+  }
+  const double cell_size_m =
+      arguments.resolution_m == 0.0 ? map.view.voxel_size_m : arguments.resolution_m;
+  export_geotiff(voxels, cell_size_m, datum_of(arguments, map), arguments.output);
+}
+
+ExitCode run(const Arguments& arguments) {
+  check_output_name(arguments.output);
+  check_region(arguments.region);
+  const StoredMap map = read_map_file(arguments.file);
+  const std::vector<QueryVoxel> voxels = voxels_of(map.view, query_of(arguments, map));
+  write(arguments, map, voxels);
+  std::vector<std::string> files{arguments.output};
+  if (is_raster_name(arguments.output)) files.push_back(height_file_of(arguments.output).string());
+  if (arguments.json) {
+    std::cout << nlohmann::json{{"voxels", voxels.size()}, {"files", files}}.dump(2) << "\n";
+    return ExitCode::ok;
+  }
+  std::cout << voxels.size() << " voxels written to";
+  for (const std::string& file : files) std::cout << " " << file;
+  std::cout << "\n";
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_map_export_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  CommandHandle command =
+      program.command("map-export", "Write a map file, or a part of it, as PCD, PLY or GeoTIFF");
+  command.option("FILE", arguments->file, "A map file; it is only read").required();
+  command
+      .option("--output,-o", arguments->output,
+              "FILE.pcd or FILE.ply: a point a voxel, with class and colour; FILE.tif: from above, "
+              "classes there and heights in FILE_height.tif")
+      .required();
+  add_region_options(command, arguments->region);
+  command.option("--classes", arguments->classes, "Only these: road,building,traffic-sign")
+      .comma_separated();
+  command.option("--resolution", arguments->resolution_m,
+                 "Voxel size of the export [m]; default: the map's own");
+  command.option("--datum", arguments->datum,
+                 "Of a GeoTIFF: LATITUDE,LONGITUDE[,ALTITUDE[,AZIMUTH]] of the map's origin and "
+                 "where its x axis points, clockwise from north (90, east); default: the file's "
+                 "own datum");
+  command.flag("--json", arguments->json, "Print JSON");
+  command.explain(
+      "Examples:\n"
+      "  stillmap map-export city.stillmap --output city.ply\n"
+      "  stillmap map-export city.stillmap -o poles.pcd --classes pole,traffic-sign\n"
+      "  stillmap map-export city.stillmap -o way.ply --corridor path.txt --width 6 --max-z 2\n"
+      "  stillmap map-export city.stillmap -o city.tif --datum 49.011,8.417,115,35\n"
+      "Points are in the map frame [m]. --around-robot is round the end of the stored path. The\n"
+      "GeoTIFF is in the transverse Mercator projection at the datum (WGS 84), which any GIS "
+      "reads\n"
+      "from the file.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

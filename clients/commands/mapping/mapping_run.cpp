@@ -1,0 +1,117 @@
+#include "clients/commands/mapping/mapping_run.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+#include <utility>
+
+#include "core/dataset/dataset_error.hpp"
+#include "core/map/storage/map_file.hpp"
+
+namespace stillmap {
+namespace {
+
+/// The true ids of the points that the mapper will keep.
+std::vector<std::uint16_t> true_ids_of_kept_points(const DatasetFrame& frame,
+                                                   const PrepareConfig& prepare) {
+  if (frame.raw_labels.empty()) return {};
+  std::vector<std::uint16_t> ids;
+  for (const std::uint32_t i : usable_points(frame.scan, prepare)) {
+    ids.push_back(static_cast<std::uint16_t>(frame.raw_labels[i]));
+  }
+  return ids;
+}
+
+/// One run over a recording: keeps what is reported at its end.
+class MappingRun {
+ public:
+  MappingRun(const ScanDataset& dataset, bool strict, const MapperConfig& config,
+             std::unique_ptr<LabelSource> labels, const ScanSkipped& scan_skipped)
+      : dataset_(dataset),
+        strict_(strict),
+        scan_skipped_(scan_skipped),
+        prepare_(config.prepare),
+        mapper_(config, std::move(labels),
+                {.stage_ended = [this](std::string_view stage) { times_.end_stage(stage); },
+                 .pose_found = {}}) {}
+
+  void map_scan(std::size_t index) {
+    std::optional<DatasetFrame> frame = read(index);
+    if (!frame) return;
+    const std::vector<std::uint16_t> true_ids = true_ids_of_kept_points(*frame, prepare_);
+    times_.begin();
+    const std::optional<MappedScan> mapped = mapper_.process(std::move(frame->scan));
+    if (!mapped) {
+      skip({index, mapper_.last_rejection().counter,
+            dataset_.file(index).string() + ": " + mapper_.last_rejection().reason});
+      return;
+    }
+    times_.end();
+    result_.scan_of_pose.push_back(index);
+    result_.health[mapped->odometry.health] += 1;
+    if (!true_ids.empty()) result_.moving += moving_score(mapped->labelled.motion, true_ids);
+  }
+
+  MappingResult finish(bool stopped) {
+    result_.trajectory = mapper_.trajectory();
+    StoredMap map = stored_state(mapper_.static_map().checkpoint(true));
+    result_.view = std::make_shared<const MapView>(std::move(map.view));
+    result_.memories = std::move(map.memories);
+    result_.label_source = mapper_.label_source();
+    result_.stages = times_.stages();
+    result_.stopped = stopped;
+    return std::move(result_);
+  }
+
+ private:
+  std::optional<DatasetFrame> read(std::size_t index) {
+    try {
+      return dataset_.read(index);
+    } catch (const DatasetError& error) {
+      if (strict_) throw;
+      skip({index, "unreadable", error.what()});
+      return std::nullopt;
+    }
+  }
+
+  void skip(SkippedScan scan) {
+    if (scan_skipped_) scan_skipped_(scan);
+    result_.skipped.push_back(std::move(scan));
+  }
+
+  const ScanDataset& dataset_;
+  bool strict_;
+  const ScanSkipped& scan_skipped_;
+  PrepareConfig prepare_;
+  StageTimes times_;
+  Mapper mapper_;
+  MappingResult result_;
+};
+
+}  // namespace
+
+std::size_t ScanRange::end(const ScanDataset& dataset) const {
+  if (first >= dataset.size() || count == 0) {
+    throw std::invalid_argument("no scan to take: the recording has " +
+                                std::to_string(dataset.size()) + ", asked for are " +
+                                std::to_string(count) + " from number " + std::to_string(first));
+  }
+  return first + std::min(count, dataset.size() - first);
+}
+
+MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
+                          const MapperConfig& config, std::unique_ptr<LabelSource> labels,
+                          const ScanDone& scan_done, const ScanSkipped& scan_skipped) {
+  const std::size_t end = range.end(dataset);
+  MappingRun run(dataset, range.strict, config, std::move(labels), scan_skipped);
+  const auto began = std::chrono::steady_clock::now();
+  bool go_on = true;
+  for (std::size_t index = range.first; index < end && go_on; ++index) {
+    run.map_scan(index);
+    go_on = !scan_done || scan_done(index + 1 - range.first);
+  }
+  MappingResult result = run.finish(!go_on);
+  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  return result;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,66 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "clients/commands/stage_stopwatch.hpp"
+#include "core/dataset/scan_dataset.hpp"
+#include "core/evaluation/moving_score.hpp"
+#include "core/mapper.hpp"
+
+namespace stillmap {
+
+/// Which scans of a recording, and what to do about damaged ones.
+struct ScanRange {
+  std::size_t first = 0;
+  /// As many as this, or as there are.
+  std::size_t count = SIZE_MAX;
+  /// A damaged file ends the run instead of being left out.
+  bool strict = false;
+
+  /// One past the last scan. Throws std::invalid_argument when no scan is in the range.
+  [[nodiscard]] std::size_t end(const ScanDataset& dataset) const;
+};
+
+/// A scan that was left out, and why.
+struct SkippedScan {
+  std::size_t index = 0;
+  std::string counter;
+  std::string reason;
+};
+
+struct MappingResult {
+  Trajectory trajectory;
+  /// Index in the recording of each pose of the trajectory.
+  std::vector<std::size_t> scan_of_pose;
+  std::shared_ptr<const MapView> view;
+  /// What the tiles know beside what they show.
+  TileMemories memories;
+  std::string label_source;
+  std::vector<SkippedScan> skipped;
+  std::map<OdometryHealth, std::size_t> health;
+  /// Against the recording's moving ids, where it has labels.
+  MovingScore moving;
+  std::vector<StageTime> stages;
+  double seconds = 0.0;
+  /// It ended early because it was told to.
+  bool stopped = false;
+};
+
+/// Called after every scan with the number of scans seen; returning false ends the run.
+using ScanDone = std::function<bool(std::size_t seen)>;
+/// Called for every scan that is left out.
+using ScanSkipped = std::function<void(const SkippedScan&)>;
+
+/// Maps a recording in this process.
+[[nodiscard]] MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
+                                        const MapperConfig& config,
+                                        std::unique_ptr<LabelSource> labels,
+                                        const ScanDone& scan_done = {},
+                                        const ScanSkipped& scan_skipped = {});
+
+}  // namespace stillmap

@@ -1,0 +1,107 @@
+#include "clients/commands/mapping/trajectory_report.hpp"
+
+#include <algorithm>
+#include <array>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "clients/terminal/table.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr double deg_per_rad = 180.0 / std::numbers::pi;
+
+void add_absolute(Table& table, const std::string& alignment, const AbsoluteError& error) {
+  table.add({"ATE, aligned: " + alignment, fixed(error.rmse_m, 3) + " m",
+             fixed(error.mean_m, 3) + " m", fixed(error.max_m, 3) + " m"});
+}
+
+}  // namespace
+
+TrajectoryReport report_trajectory(const PosePairs& pairs) {
+  return {.poses = pairs.size(),
+          .path_m = distance_travelled(pairs.truth).back(),
+          .unaligned = absolute_error(pairs, Alignment::none),
+          .first_aligned = absolute_error(pairs, Alignment::first_pose),
+          .rigid_aligned = absolute_error(pairs, Alignment::rigid),
+          .relative = relative_error(pairs),
+          .kitti = kitti_odometry_error(pairs)};
+}
+
+std::string describe(const TrajectoryReport& report) {
+  Table table({std::to_string(report.poses) + " poses, " + fixed(report.path_m, 1) + " m", "RMSE",
+               "mean", "max"});
+  add_absolute(table, "not", report.unaligned);
+  add_absolute(table, "first pose", report.first_aligned);
+  add_absolute(table, "best rigid fit", report.rigid_aligned);
+  if (report.relative) {
+    const RelativeError& step = *report.relative;
+    table.add({"motion from pose to pose", fixed(100.0 * step.rmse_translation_m, 2) + " cm",
+               fixed(100.0 * step.mean_translation_m, 2) + " cm",
+               fixed(100.0 * step.max_translation_m, 2) + " cm"});
+    table.add({"turn from pose to pose", "",
+               fixed(deg_per_rad * step.mean_rotation_rad, 4) + " deg",
+               fixed(deg_per_rad * step.max_rotation_rad, 4) + " deg"});
+  }
+  std::string text = table.text();
+  if (!report.kitti) return text + "KITTI odometry: the path is shorter than 100 m\n";
+  text += "KITTI odometry: " + fixed(report.kitti->translation_percent, 3) + " % and " +
+          fixed(report.kitti->rotation_deg_per_100m, 3) + " deg/100 m over " +
+          std::to_string(report.kitti->segments) + " segments of 100..800 m\n";
+  return text;
+}
+
+nlohmann::json to_json(const TrajectoryReport& report) {
+  nlohmann::json json = {{"poses", report.poses},
+                         {"path_m", report.path_m},
+                         {"ate_rmse_m", report.rigid_aligned.rmse_m},
+                         {"ate_max_m", report.rigid_aligned.max_m},
+                         {"ate_first_pose_rmse_m", report.first_aligned.rmse_m},
+                         {"ate_unaligned_rmse_m", report.unaligned.rmse_m},
+                         {"final_drift_m", report.first_aligned.final_m},
+                         {"relative", nullptr},
+                         {"kitti", nullptr}};
+  if (report.relative) {
+    json["relative"] = {{"mean_translation_m", report.relative->mean_translation_m},
+                        {"rmse_translation_m", report.relative->rmse_translation_m},
+                        {"max_translation_m", report.relative->max_translation_m},
+                        {"mean_rotation_deg", deg_per_rad * report.relative->mean_rotation_rad},
+                        {"max_rotation_deg", deg_per_rad * report.relative->max_rotation_rad}};
+  }
+  if (report.kitti) {
+    nlohmann::json by_length = nlohmann::json::array();
+    for (const KittiLengthError& length : report.kitti->by_length) {
+      by_length.push_back({{"length_m", length.length_m},
+                           {"segments", length.segments},
+                           {"translation_percent", length.translation_percent},
+                           {"rotation_deg_per_100m", length.rotation_deg_per_100m}});
+    }
+    json["kitti"] = {{"translation_percent", report.kitti->translation_percent},
+                     {"rotation_deg_per_100m", report.kitti->rotation_deg_per_100m},
+                     {"segments", report.kitti->segments},
+                     {"by_length", by_length}};
+  }
+  return json;
+}
+
+std::vector<std::filesystem::path> draw_trajectories(const std::filesystem::path& folder,
+                                                     const PosePairs& pairs,
+                                                     const TrajectoryReport& report,
+                                                     GroundPlane plane) {
+  std::vector<Eigen::Vector3d> truth, estimate;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    truth.push_back(pairs.truth[i].translation());
+    estimate.push_back(report.rigid_aligned.T_truth_estimate * pairs.estimate[i].translation());
+  }
+  const std::filesystem::path paths = folder / "trajectory.png";
+  const std::filesystem::path errors = folder / "trajectory_error.png";
+  write_path_picture(paths, truth, estimate, plane);
+  const std::array<ChartLine, 2> lines{
+      ChartLine{"error in m, best rigid fit", report.rigid_aligned.per_pose_m},
+      ChartLine{"error in m, first poses aligned", report.first_aligned.per_pose_m}};
+  write_chart(errors, "distance in m", distance_travelled(pairs.truth), lines);
+  return {paths, errors};
+}
+
+}  // namespace stillmap

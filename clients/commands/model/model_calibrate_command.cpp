@@ -1,0 +1,96 @@
+#include <iostream>
+#include <map>
+#include <memory>
+
+#include "clients/commands/command.hpp"
+#include "clients/commands/model/model_arguments.hpp"
+#include "clients/terminal/progress.hpp"
+#include "config/loaders/int8_file.hpp"
+#include "core/segmentation/activation_ranges.hpp"
+#include "core/segmentation/onednn_network.hpp"
+
+namespace stillmap {
+namespace {
+
+struct Arguments {
+  ModelArguments model;
+  std::vector<std::string> datasets;
+  std::uint64_t scans = 32;
+  double share = 0.9995;
+  std::vector<std::string> float_layers;
+};
+
+/// A model and its network for one recording's sensor.
+struct FittedNetwork {
+  ModelDescription model;
+  OneDnnNetwork network;
+
+  FittedNetwork(const ModelDescription& any, const SensorModel& sensor)
+      : model(for_sensor(any, sensor)), network(model, Precision::fp32) {}
+};
+
+ActivationRanges watch(const ModelDescription& model, const std::vector<ScanSample>& samples) {
+  std::map<const ScanDataset*, FittedNetwork> networks;
+  ActivationRanges ranges;
+  Progress progress("calibrate", "scans", samples.size());
+  std::uint64_t done = 0;
+  for (const ScanSample& sample : samples) {
+    FittedNetwork& fitted =
+        networks.try_emplace(sample.dataset, model, sample.dataset->suggested_sensor())
+            .first->second;
+    fitted.network.observe(input_of(sample, fitted.model),
+                           [&ranges](const std::string& tensor, auto values, std::size_t channels) {
+                             ranges.add(tensor, values, channels);
+                           });
+    progress.update(++done);
+  }
+  return ranges;
+}
+
+ExitCode run(const Arguments& arguments) {
+  const ModelDescription model = load_uncalibrated_model(arguments.model);
+  std::vector<ScanDataset> datasets;
+  for (const std::string& folder : arguments.datasets) datasets.emplace_back(folder);
+  const std::vector<ScanSample> samples = choose_scans(datasets, arguments.scans);
+  const ActivationRanges ranges = watch(model, samples);
+  Int8Calibration calibration;
+  calibration.made = std::to_string(samples.size()) + " scans of " +
+                     std::to_string(datasets.size()) + " recordings";
+  calibration.range_of_channels = ranges.ranges(arguments.share);
+  calibration.float_layers = arguments.float_layers;
+  const std::filesystem::path file = model.network_file.parent_path() / "int8.yaml";
+  save_int8_calibration(calibration, file);
+  std::cout << file.string() << ": " << calibration.range_of_channels.size() << " tensors, "
+            << calibration.made << "\n";
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_model_calibrate_command(CommandHandle model, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  CommandHandle command =
+      model.command("calibrate", "Make int8.yaml, with which a model runs in 8-bit integers");
+  add_model_options(command, arguments->model);
+  command
+      .option("DATASET", arguments->datasets,
+              "Recordings like those on which the network will work; no labels are needed")
+      .required();
+  command.option("--scans", arguments->scans, "Scans to look at, evenly chosen").with_default();
+  command
+      .option("--share", arguments->share,
+              "Share of a channel's values that must not be cut off, 0..1; 1: none is")
+      .above_zero()
+      .with_default();
+  command
+      .option("--float-layers", arguments->float_layers,
+              "Layers to keep in floating point, besides the first and the last")
+      .comma_separated();
+  command.explain(
+      "Example:\n"
+      "  stillmap model calibrate my_model sequences/00 sequences/01 --scans 32\n"
+      "'stillmap model agree' then shows what int8 changes.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

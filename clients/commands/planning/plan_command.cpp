@@ -1,0 +1,245 @@
+#include <charconv>
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <numbers>
+
+#include "clients/commands/arguments/client_arguments.hpp"
+#include "clients/commands/command.hpp"
+#include "clients/commands/planning/replanner.hpp"
+#include "clients/terminal/stop_signal.hpp"
+#include "config/loaders/robot_profile.hpp"
+#include "core/dataset/dataset_error.hpp"
+#include "core/map/storage/map_file.hpp"
+#include "core/picture/traversability_picture.hpp"
+
+namespace stillmap {
+namespace {
+
+struct Arguments {
+  ClientArguments client;
+  std::string map;
+  std::string from;
+  std::string to;
+  std::string profile = "car";
+  bool through_unknown = false;
+  double time_s = 2.0;
+  std::uint64_t steps = PlanningConfig{}.max_work;
+  std::uint32_t seed = 1;
+  std::string planner = std::string(name(PlannerKind::rrt_connect));
+  std::string sampling = "route";
+  std::string output;
+  std::string picture;
+  bool follow = false;
+  double duration_s = 0.0;
+  /// 0: no limit.
+  std::uint64_t count = 0;
+  bool json = false;
+};
+
+/// "x,y" or "x,y,heading": metres and degrees.
+PlanPlace place_of(const std::string& option, const std::string& text) {
+  std::vector<double> values;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  while (at <= end) {
+    double value = 0.0;
+    const auto [stop, error] = std::from_chars(at, end, value);
+    const bool is_last = stop == end;
+    if (error != std::errc{} || (!is_last && *stop != ',')) break;
+    values.push_back(value);
+    at = is_last ? end + 1 : stop + 1;
+  }
+  if (at != end + 1 || values.size() < 2 || values.size() > 3) {
+    throw std::invalid_argument(option + " " + text +
+                                ": must be x,y or x,y,heading in metres and degrees of the map "
+                                "frame, as 12.5,-3 or 12.5,-3,90");
+  }
+  PlanPlace place{{values[0], values[1]}, std::nullopt};
+  if (values.size() == 3) place.heading_rad = values[2] * std::numbers::pi / 180.0;
+  return place;
+}
+
+PlannerKind planner_of(const std::string& text) {
+  std::size_t i = 0;
+  while (name(static_cast<PlannerKind>(i)) != text) ++i;
+  return static_cast<PlannerKind>(i);
+}
+
+std::vector<std::string> planner_names() {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < planner_kind_count; ++i) {
+    names.emplace_back(name(static_cast<PlannerKind>(i)));
+  }
+  return names;
+}
+
+PlanTask task_of(const Arguments& arguments) {
+  PlanTask task;
+  task.profile = load_robot_profile(arguments.profile);
+  if (arguments.through_unknown) task.profile.unknown = UnknownGround::allowed;
+  if (!arguments.from.empty()) task.from = place_of("--from", arguments.from);
+  task.to = place_of("--to", arguments.to);
+  task.config.planner = planner_of(arguments.planner);
+  task.config.route_guided = arguments.sampling == "route";
+  task.config.max_work = arguments.steps;
+  task.config.seed = arguments.seed;
+  task.time_limit_s = arguments.time_s;
+  const std::string faults = task.config.faults();
+  if (!faults.empty()) throw std::invalid_argument(faults);
+  return task;
+}
+
+/// A name without an ending that can be written is wrong usage, before the work and not after it.
+void check_files(const Arguments& arguments) {
+  if (!arguments.output.empty()) check_plan_file(arguments.output);
+  if (arguments.picture.empty() || arguments.picture.ends_with(".png")) return;
+  throw std::invalid_argument("--picture " + arguments.picture + ": must end in .png");
+}
+
+void print(const Arguments& arguments, const TimedPlan& timed) {
+  if (arguments.json) {
+    std::cout << to_json(timed, !arguments.follow).dump(arguments.follow ? -1 : 2) << std::endl;
+  } else {
+    std::cout << (arguments.follow ? one_line(timed) : describe(timed)) << std::flush;
+  }
+}
+
+void show(const Arguments& arguments, const PlanRun& run) {
+  print(arguments, run.last());
+  if (!arguments.output.empty()) write_plan(arguments.output, run.last());
+  if (arguments.picture.empty()) return;
+  const std::vector<PlanarPose> path_map = run.last().plan.path_map();
+  TraversabilityPictureOptions options;
+  options.path_map = path_map;
+  write_traversability_picture(arguments.picture, run.area(), options);
+}
+
+ExitCode code_of(const TimedPlan& timed) {
+  if (timed.plan.status == PlanStatus::invalid_request) return ExitCode::bad_input;
+  return timed.plan.is_found() ? ExitCode::ok : ExitCode::no_path;
+}
+
+ExitCode plan_on_file(const Arguments& arguments) {
+  if (arguments.follow) {
+    throw std::invalid_argument(
+        "--follow: a map file does not change; leave out --map to follow "
+        "a server's map");
+  }
+  PlanTask task = task_of(arguments);
+  if (!std::filesystem::exists(arguments.map)) {
+    throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
+  }
+  const StoredMap map = open_map_file(arguments.map)->load();
+  if (!task.from) {
+    throw std::invalid_argument("--from: a stored map has no robot; give x,y or x,y,heading");
+  }
+  PlanRun run(std::move(task));
+  (void)run.plan(map.view, std::nullopt);
+  show(arguments, run);
+  return code_of(run.last());
+}
+
+/// Plans again whenever the map asks for it, until the limits are reached.
+void follow(const Arguments& arguments, PlanRun& run, const TileMirror& mirror,
+            std::shared_ptr<const MapView> map, const std::optional<RobotPlace>& robot,
+            StopSignal& stop) {
+  const auto began = std::chrono::steady_clock::now();
+  const auto is_over = [&](std::uint64_t plans) {
+    const std::chrono::duration<double> followed = std::chrono::steady_clock::now() - began;
+    return (arguments.duration_s > 0.0 && followed.count() >= arguments.duration_s) ||
+           (arguments.count > 0 && plans >= arguments.count);
+  };
+  for (std::uint64_t plans = 1; !is_over(plans) && !stop.requested();) {
+    const auto newest = mirror.wait_for_change(map, std::chrono::milliseconds(50));
+    if (newest == map) continue;
+    map = newest;
+    if (!run.follow(*map, robot ? std::optional(robot->now()) : std::nullopt)) continue;
+    ++plans;
+    show(arguments, run);
+  }
+}
+
+ExitCode plan_on_server(const Arguments& arguments) {
+  PlanTask task = task_of(arguments);
+  StopSignal stop;
+  Client client = connect(arguments.client);
+  TileMirror mirror;
+  const Subscription tiles =
+      client.subscribe_region(BoxRegion{}, [&](const RegionNews& news) { mirror.apply(news); });
+  wait_for_whole_map(client, mirror, arguments.client.timeout());
+  std::optional<RobotPlace> robot;
+  if (!task.from) robot.emplace(client, arguments.client.timeout());
+  PlanRun run(std::move(task));
+  const auto map = mirror.view();
+  (void)run.plan(*map, robot ? std::optional(robot->now()) : std::nullopt);
+  show(arguments, run);
+  if (arguments.follow) follow(arguments, run, mirror, map, robot, stop);
+  return code_of(run.last());
+}
+
+ExitCode run(const Arguments& arguments) {
+  check_files(arguments);
+  return arguments.map.empty() ? plan_on_server(arguments) : plan_on_file(arguments);
+}
+
+void add_search_options(CommandHandle command, Arguments& arguments) {
+  command.option("--time", arguments.time_s, "Longest search [s]").above_zero().with_default();
+  command
+      .option("--steps", arguments.steps,
+              "Longest search in steps, which are the same on every machine")
+      .with_default();
+  command.option("--seed", arguments.seed, "Seed of the search, 1 or more").with_default();
+  command.option("--planner", arguments.planner, "Planner of OMPL")
+      .one_of(planner_names())
+      .with_default();
+  command
+      .option("--sampling", arguments.sampling,
+              "Where the search looks: beside the coarse route that A* finds, or everywhere alike")
+      .one_of({"route", "uniform"})
+      .with_default();
+}
+
+}  // namespace
+
+void add_plan_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  CommandHandle command =
+      program.command("plan", "A path that a robot can drive, on a server's map or a stored one");
+  command.option("--to", arguments->to, "Goal: x,y or x,y,heading, metres and degrees, map frame")
+      .required();
+  command.option("--from", arguments->from,
+                 "Start, as --to; without it the robot's newest pose (of a server's map)");
+  command
+      .option("--profile", arguments->profile,
+              "The robot: car, delivery_robot, tracked, or a file like config/robots/car.yaml")
+      .with_default();
+  command.flag("--through-unknown", arguments->through_unknown,
+               "Unknown ground may be driven on; without it as the profile says");
+  command.option("--map", arguments->map, "Plan on a map file instead of a server's map");
+  command.option("--output", arguments->output, "Write the path to FILE.json or FILE.csv");
+  command.option("--picture", arguments->picture, "Draw area and path to FILE.png");
+  command.flag("--follow", arguments->follow,
+               "Stay subscribed and plan anew when the path is not free any more or its way "
+               "changes, saying why");
+  command.option("--duration", arguments->duration_s, "End --follow after as many seconds")
+      .above_zero();
+  command.option("--count", arguments->count, "End --follow after as many plans");
+  command.flag("--json", arguments->json, "Print JSON; with --follow a line for every plan");
+  add_search_options(command, *arguments);
+  add_client_options(command, arguments->client);
+  command.explain(
+      "Examples:\n"
+      "  stillmap plan --map city_map/map.stillmap --from 0,0,0 --to 80,-3 --picture path.png\n"
+      "  stillmap plan --to 80,-3,180 --output path.csv       from where the robot is\n"
+      "  stillmap plan --to 0,0 --follow --picture path.png   until Ctrl-C\n"
+      "The path keeps the robot's whole footprint on free cells and its turning radius\n"
+      "(min_turning_radius_m of the profile); driving backwards costs three times as much.\n"
+      "Exit code 4 when there is no path: start or goal is blocked, no way is known, or the\n"
+      "search ran out of time; with --follow, of the last plan.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

@@ -1,0 +1,177 @@
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+
+#include "clients/commands/arguments/client_arguments.hpp"
+#include "clients/commands/command.hpp"
+#include "clients/commands/query/octomap_report.hpp"
+#include "core/map/storage/map_file.hpp"
+#include "core/occupancy/occupancy_map.hpp"
+#include "core/occupancy/octomap_file.hpp"
+
+namespace stillmap {
+namespace {
+
+struct Arguments {
+  ClientArguments client;
+  /// Instead of a server.
+  std::string map;
+  double resolution_m = 0.2;
+  std::string output;
+  std::vector<double> points;
+  std::vector<double> boxes;
+  std::vector<double> rays;
+  double max_range_m = 100.0;
+  bool through_unknown = false;
+  std::uint32_t max_voxels = 1000;
+  bool json = false;
+};
+
+/// The numbers in groups of `size`.
+std::vector<Eigen::VectorXd> groups(const std::string& option, const std::vector<double>& numbers,
+                                    std::size_t size) {
+  if (numbers.size() % size != 0) {
+    throw std::invalid_argument(option + " has " + std::to_string(numbers.size()) +
+                                " numbers; it takes " + std::to_string(size));
+  }
+  std::vector<Eigen::VectorXd> all;
+  for (std::size_t i = 0; i < numbers.size(); i += size) {
+    all.emplace_back(
+        Eigen::Map<const Eigen::VectorXd>(numbers.data() + i, static_cast<Eigen::Index>(size)));
+  }
+  return all;
+}
+
+OccupancyQuery query_of(const Arguments& arguments) {
+  OccupancyQuery query;
+  query.max_voxels = arguments.max_voxels;
+  for (const auto& point : groups("--point", arguments.points, 3)) {
+    query.points_map.emplace_back(point);
+  }
+  for (const auto& box : groups("--box", arguments.boxes, 6)) {
+    Eigen::AlignedBox3d& box_map = query.boxes_map.emplace_back();
+    box_map.min() = box.head<3>();
+    box_map.max() = box.tail<3>();
+  }
+  for (const auto& ray : groups("--ray", arguments.rays, 6)) {
+    query.rays.push_back({.origin_map = ray.head<3>(),
+                          .direction_map = ray.tail<3>(),
+                          .max_range_m = arguments.max_range_m,
+                          .passes_unknown = arguments.through_unknown});
+  }
+  return query;
+}
+
+/// The octree of a stored static map, or of a file of OctoMap's.
+OccupancyMap open_map(const Arguments& arguments) {
+  const std::filesystem::path file = arguments.map;
+  if (file.extension() == ".bt" || file.extension() == ".ot") {
+    return OccupancyMap(read_octomap_file(file));
+  }
+  if (!std::filesystem::exists(file)) {
+    throw MapFileError(file, "does not exist; 'stillmap map' writes map files");
+  }
+  OccupancyConfig config;
+  config.resolution_m = arguments.resolution_m;
+  OccupancyMap map(config);
+  map.insert(open_map_file(file)->load().view);
+  return map;
+}
+
+/// Where octree and answers come from.
+class Source {
+ public:
+  explicit Source(const Arguments& arguments) {
+    if (arguments.map.empty()) {
+      client_.emplace(connect(arguments.client));
+    } else {
+      map_.emplace(open_map(arguments));
+    }
+  }
+  [[nodiscard]] OctomapData octomap(bool binary) {
+    return map_ ? map_->encode(binary) : client_->octomap(!binary);
+  }
+  [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) {
+    return map_ ? map_->answer(query) : client_->query_occupancy(query);
+  }
+
+ private:
+  std::optional<OccupancyMap> map_;
+  std::optional<Client> client_;
+};
+
+ExitCode run(const Arguments& arguments) {
+  const OccupancyQuery query = query_of(arguments);
+  const bool asks =
+      !arguments.points.empty() || !arguments.boxes.empty() || !arguments.rays.empty();
+  const bool binary = arguments.output.empty() || is_binary_octomap(arguments.output);
+  Source source(arguments);
+  nlohmann::json report;
+  std::string text;
+  if (asks) {
+    const OccupancyAnswers answers = source.answer(query);
+    report["answers"] = to_json(answers);
+    text += describe(query, answers);
+  }
+  if (!asks || !arguments.output.empty()) {
+    const OctomapData data = source.octomap(binary);
+    const OctomapSummary summary = summarize(data);
+    report["octomap"] = to_json(summary);
+    text += describe(summary);
+    if (!arguments.output.empty()) {
+      write_octomap_file(arguments.output, data);
+      text += "written to " + arguments.output + "\n";
+    }
+  }
+  std::cout << (arguments.json ? report.dump(2) + "\n" : text);
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_octomap_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  CommandHandle command = program.command(
+      "octomap", "Occupied, free and unknown space: questions, and files for octovis");
+  command.option("--output", arguments->output,
+                 "Write the octree to FILE.bt (occupied and free) or FILE.ot (probabilities)");
+  command.option("--map", arguments->map,
+                 "Take a stored map (.stillmap: its static voxels are occupied, all else is "
+                 "unknown) or an OctoMap file (.bt, .ot) instead of a server");
+  command.option("--resolution", arguments->resolution_m, "Voxel size for a .stillmap map [m]")
+      .with_default();
+  command.option("--point", arguments->points, "x,y,z: occupied, free or unknown?")
+      .comma_separated();
+  command
+      .option("--box", arguments->boxes,
+              "x_min,y_min,z_min,x_max,y_max,z_max: how many voxels are what")
+      .comma_separated();
+  command
+      .option("--ray", arguments->rays,
+              "x,y,z,dx,dy,dz: what a ray from there in that direction meets first")
+      .comma_separated();
+  command.option("--max-range", arguments->max_range_m, "Length of rays [m], at most 1000")
+      .with_default();
+  command.flag("--through-unknown", arguments->through_unknown,
+               "Rays go on through unknown space instead of ending there");
+  command
+      .option("--max-voxels", arguments->max_voxels,
+              "Occupied voxels that --json lists for all boxes together")
+      .with_default();
+  add_client_options(command, arguments->client);
+  command.flag("--json", arguments->json, "Print JSON");
+  command.explain(
+      "Examples:\n"
+      "  stillmap octomap --output city.bt                     then: octovis city.bt\n"
+      "  stillmap octomap --map city_map/map.stillmap --output city.ot\n"
+      "  stillmap octomap --point 5,0,0.5 --ray 0,0,0,1,0,0 --max-range 30\n"
+      "  stillmap octomap --map city.bt --box -2,-2,0,2,2,2 --json\n"
+      "Coordinates are in the map frame [m]. --point, --box and --ray may be given several times;\n"
+      "without any, what the octree holds is printed. Free is only what a ray passed.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

@@ -1,0 +1,141 @@
+#include <iostream>
+#include <limits>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "clients/commands/query/class_arguments.hpp"
+#include "clients/commands/arguments/client_arguments.hpp"
+#include "clients/commands/query/cloud_output.hpp"
+#include "clients/commands/command.hpp"
+#include "clients/commands/query/fetch_map.hpp"
+#include "clients/commands/query/query_report.hpp"
+#include "clients/commands/query/region_arguments.hpp"
+#include "clients/terminal/progress.hpp"
+#include "core/picture/map_picture.hpp"
+#include "core/map/query/region_shape.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr std::uint64_t not_given = std::numeric_limits<std::uint64_t>::max();
+
+struct Arguments {
+  ClientArguments client;
+  RegionArguments region;
+  std::vector<std::string> classes;
+  std::vector<std::string> motions;
+  double resolution_m = 0.0;
+  std::uint64_t since_version = not_given;
+  /// 0: the server's map of now.
+  std::uint64_t since_map = 0;
+  std::string out;
+  std::string picture;
+  std::uint64_t repeat = 1;
+  bool json = false;
+};
+
+void check_out_name(const std::string& file) {
+  if (file.empty() || is_cloud_name(file)) return;
+  throw std::invalid_argument("--out " + file + ": the name must end in .pcd or .ply");
+}
+
+// The whole map with the path and the box round what was asked for.
+void draw_query(const std::string& file, Client& client, const Region& region,
+                std::chrono::milliseconds timeout) {
+  MapPictureOptions options;
+  options.query_box_map = RegionShape(region).bounds_map();
+  write_map_picture(file, fetch_map(client), newest_path(client, timeout), options);
+}
+
+std::optional<KnownVersion> since_of(const Arguments& arguments, Client& client) {
+  if (arguments.since_version == not_given) return std::nullopt;
+  const std::uint64_t map_id =
+      arguments.since_map == 0 ? client.status().map_id : arguments.since_map;
+  return KnownVersion{.map_id = map_id, .version = arguments.since_version};
+}
+
+/// What is asked for, without what only a server knows.
+MapQuery filters_of(const Arguments& arguments) {
+  MapQuery query;
+  query.classes = classes_of(arguments.classes);
+  query.motions = motions_of(arguments.motions);
+  query.resolution_m = arguments.resolution_m;
+  return query;
+}
+
+QueryAnswer ask(Client& client, const Arguments& arguments, const MapQuery& filters) {
+  QueryAnswer answer{filters, {}, {.stage = "query", .ms = {}}};
+  answer.query.region = region_of(arguments.region, client, arguments.client.timeout());
+  answer.query.since = since_of(arguments, client);
+  Progress progress("query", "voxels", 0);
+  while (answer.times.ms.size() < arguments.repeat) {
+    const auto began = std::chrono::steady_clock::now();
+    answer.result =
+        client.get_whole_static_map(answer.query, [&](std::uint64_t arrived, std::uint64_t total) {
+          progress.update(arrived, "of " + std::to_string(total));
+        });
+    const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
+    if (answer.result.status != QueryStatus::ok) throw std::invalid_argument(answer.result.reason);
+    answer.times.ms.push_back(took.count());
+  }
+  return answer;
+}
+
+ExitCode run(const Arguments& arguments) {
+  check_out_name(arguments.out);
+  check_region(arguments.region);
+  const MapQuery filters = filters_of(arguments);
+  Client client = connect(arguments.client);
+  const QueryAnswer answer = ask(client, arguments, filters);
+  if (!arguments.out.empty()) write_cloud(arguments.out, answer.result.voxels);
+  if (!arguments.picture.empty()) {
+    draw_query(arguments.picture, client, answer.query.region, arguments.client.timeout());
+  }
+  std::cout << (arguments.json ? to_json(answer).dump(2) + "\n" : describe(answer));
+  if (!arguments.json && !arguments.out.empty()) {
+    std::cout << "written to " << arguments.out << " (map frame)\n";
+  }
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_query_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  CommandHandle command = program.command("query", "Ask the server for a region of its static map");
+  add_region_options(command, arguments->region);
+  command.option("--classes", arguments->classes, "Only these: road,building,traffic-sign")
+      .comma_separated();
+  command
+      .option("--motions", arguments->motions,
+              "Only these: stationary,semi-static,highly-dynamic; the static map keeps what is "
+              "stationary, and is asked for that")
+      .comma_separated();
+  command.option("--resolution", arguments->resolution_m,
+                 "Voxel size of the answer [m]; default: the map's own");
+  command.option("--since-version", arguments->since_version,
+                 "Only tiles that appeared or changed since this version; names those removed");
+  command.option("--since-map", arguments->since_map,
+                 "Id of the map that the version is of; default: the server's map of now");
+  command.option("--out", arguments->out, "Write the voxels to FILE.pcd or FILE.ply");
+  command.option("--picture", arguments->picture,
+                 "Draw the whole map from above, the path and the region, to FILE.png");
+  command.option("--repeat", arguments->repeat, "Ask so many times; says median and p99")
+      .above_zero();
+  add_client_options(command, arguments->client);
+  command.flag("--json", arguments->json, "Print JSON");
+  command.explain(
+      "Examples:\n"
+      "  stillmap query --around-robot 50\n"
+      "  stillmap query --box -20 -20 -3 20 20 5 --classes road,sidewalk --out ground.ply\n"
+      "  stillmap query --polygon 0 0 30 0 30 20 --min-z -3 --max-z 2\n"
+      "  stillmap query --corridor path.txt --width 4 --out way.ply\n"
+      "  stillmap query --resolution 1 --json | jq .classes\n"
+      "  stillmap query --around-robot 50 --since-version 120\n"
+      "Without a region, the whole map. Coordinates are in the map frame [m].");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

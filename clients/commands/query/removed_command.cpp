@@ -1,0 +1,151 @@
+#include <algorithm>
+#include <array>
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+
+#include "clients/commands/arguments/client_arguments.hpp"
+#include "clients/commands/command.hpp"
+#include "clients/commands/query/fetch_map.hpp"
+#include "clients/commands/query/region_arguments.hpp"
+#include "core/map/storage/map_file_copy.hpp"
+#include "core/map/query/region_shape.hpp"
+#include "core/picture/removed_picture.hpp"
+
+namespace stillmap {
+namespace {
+
+struct Arguments {
+  std::string map_file;
+  ClientArguments client;
+  RegionArguments region;
+  std::string picture;
+  std::string restore;
+  bool json = false;
+};
+
+/// What was found, and the map that it was removed from.
+struct Found {
+  std::vector<RemovedVoxel> voxels;
+  std::uint64_t total = 0;
+  MapView view;
+};
+
+constexpr std::array reasons{RemovalReason::moving, RemovalReason::semi_static,
+                             RemovalReason::seen_through, RemovalReason::relabelled};
+
+Found found_in_file(const Arguments& arguments) {
+  StoredMap map = read_map_file(arguments.map_file);
+  const Eigen::Vector3d last_map = map.trajectory.empty()
+                                       ? Eigen::Vector3d(0.0, 0.0, 0.0)
+                                       : map.trajectory.back().T_map_lidar.translation();
+  const RegionShape region(region_at(arguments.region, last_map.head<2>()));
+  Found found;
+  for (const auto& [id, memory] : map.memories) {
+    for (const RemovedVoxel& voxel :
+         removed_voxels(*memory, map.view.voxel_size_m, map.view.tile_size_m)) {
+      if (region.contains(voxel.position_map.cast<double>())) found.voxels.push_back(voxel);
+    }
+  }
+  found.total = found.voxels.size();
+  found.view = std::move(map.view);
+  return found;
+}
+
+Found found_by_server(Client& client, const Arguments& arguments) {
+  const Region region = region_of(arguments.region, client, arguments.client.timeout());
+  RemovedVoxels removed = client.get_removed(region);
+  Found found{std::move(removed.voxels), removed.total, {}};
+  if (!arguments.picture.empty()) found.view = fetch_map(client);
+  return found;
+}
+
+nlohmann::json to_json(const Found& found) {
+  nlohmann::json counts;
+  for (const RemovalReason reason : reasons) {
+    counts[std::string(name(reason))] =
+        std::ranges::count(found.voxels, reason, &RemovedVoxel::reason);
+  }
+  return {{"total", found.total}, {"shown", found.voxels.size()}, {"reasons", counts}};
+}
+
+std::string describe(const Found& found) {
+  std::string text = std::to_string(found.total) + " voxels are kept out of the static map";
+  if (found.total > found.voxels.size()) {
+    text.append("; of the first ").append(std::to_string(found.voxels.size()));
+  }
+  for (const RemovalReason reason : reasons) {
+    const auto count = std::ranges::count(found.voxels, reason, &RemovedVoxel::reason);
+    text.append("\n  ").append(name(reason)).append(": ").append(std::to_string(count));
+  }
+  return text + "\n";
+}
+
+RemovalReason reason_named(const std::string& text) {
+  for (const RemovalReason reason : reasons) {
+    if (name(reason) == text) return reason;
+  }
+  throw std::invalid_argument("--restore '" + text +
+                              "' is no reason; it may be moving, semi-static, 'seen through' or "
+                              "relabelled");
+}
+
+ExitCode restore(Client& client, const Arguments& arguments) {
+  const RemovalReason reason = reason_named(arguments.restore);
+  const Region region = region_of(arguments.region, client, arguments.client.timeout());
+  const auto* const box = std::get_if<BoxRegion>(&region);
+  if (box == nullptr) throw std::invalid_argument("--restore takes a --box or --around");
+  const std::uint64_t restored = client.restore_removed(reason, *box);
+  if (arguments.json) {
+    std::cout << nlohmann::json{{"restored", restored}}.dump(2) << "\n";
+  } else {
+    std::cout << restored << " voxels are shown again\n";
+  }
+  return ExitCode::ok;
+}
+
+ExitCode run(const Arguments& arguments) {
+  check_region(arguments.region);
+  std::optional<Client> client;
+  if (arguments.map_file.empty()) client.emplace(connect(arguments.client));
+  if (!arguments.restore.empty()) {
+    if (!client) throw std::invalid_argument("--restore needs a server; leave MAPFILE out");
+    return restore(*client, arguments);
+  }
+  const Found found = client ? found_by_server(*client, arguments) : found_in_file(arguments);
+  if (!arguments.picture.empty()) {
+    write_removed_picture(arguments.picture, found.view, found.voxels);
+  }
+  std::cout << (arguments.json ? to_json(found).dump(2) + "\n" : describe(found));
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_removed_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  CommandHandle command =
+      program.command("removed", "What is kept out of the static map, and why; and bring it back");
+  command.option("MAPFILE", arguments->map_file, "A map file instead of a server");
+  add_region_options(command, arguments->region);
+  command.option("--picture", arguments->picture,
+                 "Write a PNG: the map in grey, what was removed by reason");
+  command.option("--restore", arguments->restore,
+                 "Have the server show again what was removed for this reason in the box: moving, "
+                 "semi-static, 'seen through' or relabelled");
+  add_client_options(command, arguments->client);
+  command.flag("--json", arguments->json, "Print JSON");
+  command.explain(
+      "moving: only things that were seen moving were there. semi-static: things that stood, but\n"
+      "can move. seen through: shown once, but rays keep passing through it. relabelled: shown\n"
+      "once, but later scans took it for something that can move.\n"
+      "Examples:\n"
+      "  stillmap removed city_map/map.stillmap --picture removed.png\n"
+      "  stillmap removed --around-robot 60 --json\n"
+      "  stillmap removed --box 10 -5 -2 20 5 3 --restore 'seen through'");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

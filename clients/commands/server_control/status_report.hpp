@@ -1,0 +1,14 @@
+#pragma once
+
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+#include "idl/interface/server_status.hpp"
+
+namespace stillmap {
+
+/// The status for people: a few lines and the latencies as a table.
+[[nodiscard]] std::string describe(const ServerStatus& status);
+[[nodiscard]] nlohmann::json to_json(const ServerStatus& status);
+
+}  // namespace stillmap

@@ -1,0 +1,96 @@
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "clients/commands/command.hpp"
+#include "clients/commands/arguments/simulation_arguments.hpp"
+#include "clients/terminal/progress.hpp"
+#include "clients/terminal/stop_signal.hpp"
+#include "core/dataset/kitti_sequence_writer.hpp"
+
+namespace stillmap {
+namespace {
+
+struct Arguments {
+  std::string out;
+  SimulationArguments simulation;
+  bool json = false;
+};
+
+struct Written {
+  int scans = 0;
+  std::uint64_t points = 0;
+};
+
+Written write_sequence(const std::string& folder, const Simulation& simulation, StopSignal& stop) {
+  KittiSequenceWriter writer(folder);
+  const int scans = simulation.config().scans;
+  Progress progress("simulate", "scans", static_cast<std::uint64_t>(scans));
+  Written written;
+  while (written.scans < scans && !stop.requested()) {
+    const SimulatedScan scan = simulation.scan(written.scans);
+    writer.add(scan.scan, scan.raw_labels, scan.T_map_lidar);
+    written.scans += 1;
+    written.points += scan.scan.size();
+    progress.update(static_cast<std::uint64_t>(written.scans));
+  }
+  writer.finish();
+  return written;
+}
+
+ExitCode run(const Arguments& arguments) {
+  StopSignal stop;
+  const SimulationConfig config = simulation_config(arguments.simulation);
+  const Simulation simulation(config);
+  const Written written = write_sequence(arguments.out, simulation, stop);
+  if (arguments.json) {
+    std::cout << nlohmann::json{{"folder", arguments.out},      {"city", config.plan.name},
+                                {"sensor", config.sensor.name}, {"seed", config.seed},
+                                {"scans", written.scans},       {"points", written.points},
+                                {"rolling", config.rolling}}
+                     .dump(2)
+              << "\n";
+  } else {
+    std::cout << written.scans << " scans, " << written.points << " points of a "
+              << config.sensor.name << " in city '" << config.plan.name << "', seed " << config.seed
+              << ": " << arguments.out
+              << "/ (SemanticKITTI sequence; poses.txt is in the camera frame, as "
+              << "KITTI's)\n";
+  }
+  return written.scans == config.scans ? ExitCode::ok : ExitCode::failed;
+}
+
+}  // namespace
+
+void add_simulate_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  SimulationArguments& simulation = arguments->simulation;
+  CommandHandle command = program.command(
+      "simulate", "Make a recording: a drive through a made-up city, with labels and true poses");
+  command.option("OUT", arguments->out, "New folder for the sequence").required();
+  command.option("--preset", simulation.preset, "City: quiet, crowd or yard (one small block)")
+      .with_default();
+  command.option("--traffic", simulation.traffic,
+                 "Factor on everything that moves (0: an empty city), or a preset's name");
+  command
+      .option("--sensor", simulation.sensor,
+              "hdl_64e (hdl64), hdl_32e, vlp_16 (vlp16) or a sensor file")
+      .with_default();
+  command.option("--seed", simulation.seed, "Another seed is another city and other traffic")
+      .with_default();
+  command.option("--scans", simulation.scans, "Scans to write, ten a second of driving")
+      .above_zero()
+      .with_default();
+  command.flag("--rolling", simulation.rolling,
+               "The lidar moves while it turns; every point has its time");
+  command.flag("--json", arguments->json, "Print JSON");
+  command.explain(
+      "Examples:\n"
+      "  stillmap simulate city --scans 300\n"
+      "  stillmap simulate avenue --preset crowd --seed 7 --sensor vlp_16\n"
+      "  stillmap simulate empty --traffic 0 --scans 50 --rolling\n"
+      "The same options give the same files, bit by bit.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

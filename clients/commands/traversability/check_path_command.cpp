@@ -1,0 +1,59 @@
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+#include <stdexcept>
+
+#include "clients/commands/traversability/traversability_source.hpp"
+#include "clients/commands/command.hpp"
+#include "clients/commands/traversability/path_report.hpp"
+#include "clients/commands/query/region_arguments.hpp"
+
+namespace stillmap {
+namespace {
+
+struct Arguments {
+  AreaSourceArguments source;
+  std::vector<std::string> path;
+  std::vector<double> headings_rad;
+  bool json = false;
+};
+
+ExitCode run(const Arguments& arguments) {
+  PathQuery query;
+  query.positions_map = plan_points("--path", arguments.path);
+  query.headings_rad = arguments.headings_rad;
+  const std::unique_ptr<AreaSource> source = open_area_source(arguments.source);
+  const PathCheck check = source->check(query);
+  require_answer(check.status, check.reason);
+  const std::string profile = source->robot().name;
+  std::cout << (arguments.json ? to_json(check, profile).dump(2) + "\n" : describe(check, profile));
+  return check.is_free ? ExitCode::ok : ExitCode::failed;
+}
+
+}  // namespace
+
+void add_check_path_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  CommandHandle command =
+      program.command("check-path", "Whether a robot can follow a path, or what is in its way");
+  add_area_source_options(command, arguments->source);
+  command
+      .option("--path", arguments->path,
+              "x y x y ...: positions [m]; or FILE with a position a line")
+      .required();
+  command.option("--headings", arguments->headings_rad,
+                 "One a position [rad], from x towards y; without, the robot drives straight from "
+                 "position to position and turns on the spot");
+  command.flag("--json", arguments->json, "Print JSON");
+  command.explain(
+      "Examples:\n"
+      "  stillmap check-path --path 0 0 12 0.5 20 4\n"
+      "  stillmap check-path --profile delivery_robot --path way.txt --json\n"
+      "  stillmap check-path city_map/map.stillmap --path 0 0 --headings 1.57\n"
+      "Without MAPFILE, the server is asked. The robot's oriented footprint is moved along the\n"
+      "path; the first cell that it must not touch is named with its place and reason.\n"
+      "Exit code 0: free; 1: blocked, or nothing is mapped there yet.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

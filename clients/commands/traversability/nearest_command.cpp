@@ -1,0 +1,51 @@
+#include <iostream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "clients/commands/traversability/traversability_source.hpp"
+#include "clients/commands/command.hpp"
+#include "clients/commands/traversability/path_report.hpp"
+
+namespace stillmap {
+namespace {
+
+struct Arguments {
+  AreaSourceArguments source;
+  std::vector<double> position_map;
+  double max_distance_m = 100.0;
+  bool json = false;
+};
+
+ExitCode run(const Arguments& arguments) {
+  const std::unique_ptr<AreaSource> source = open_area_source(arguments.source);
+  const NearestTraversable nearest = source->nearest(
+      {arguments.position_map[0], arguments.position_map[1]}, arguments.max_distance_m);
+  require_answer(nearest.status, nearest.reason);
+  const std::string profile = source->robot().name;
+  std::cout << (arguments.json ? to_json(nearest, profile).dump(2) + "\n"
+                               : describe(nearest, profile));
+  return nearest.status == AreaStatus::ok ? ExitCode::ok : ExitCode::failed;
+}
+
+}  // namespace
+
+void add_nearest_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<Arguments>();
+  CommandHandle command = program.command("nearest", "The nearest place where a robot can stand");
+  add_area_source_options(command, arguments->source);
+  command.option("--to", arguments->position_map, "x y: the place [m]").exactly(2).required();
+  command.option("--max-distance", arguments->max_distance_m, "Search no farther than this [m]")
+      .above_zero()
+      .with_default();
+  command.flag("--json", arguments->json, "Print JSON");
+  command.explain(
+      "Examples:\n"
+      "  stillmap nearest --to 12 -3.5\n"
+      "  stillmap nearest city_map/map.stillmap --profile delivery_robot --to 12 -3.5 --json\n"
+      "Without MAPFILE, the server is asked. A free cell keeps the robot's inscribed radius from\n"
+      "everything lethal; with some heading, the robot can stand there.\n"
+      "Exit code 1: there is none so near.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap

@@ -1,0 +1,118 @@
+#include "clients/commands/traversability/traversability_source.hpp"
+
+#include <filesystem>
+#include <stdexcept>
+#include <utility>
+
+#include "clients/commands/query/fetch_map.hpp"
+#include "config/loaders/config_error.hpp"
+#include "config/loaders/robot_profile.hpp"
+#include "core/dataset/dataset_error.hpp"
+
+namespace stillmap {
+namespace {
+
+StoredMap stored_map(const std::string& file) {
+  if (!std::filesystem::exists(file)) {
+    throw DatasetError(file, "does not exist; 'stillmap map' writes map files");
+  }
+  return open_map_file(file)->load();
+}
+
+class FileSource final : public AreaSource {
+ public:
+  explicit FileSource(const AreaSourceArguments& arguments)
+      : area_({load_robot_profile(arguments.profile)}), map_(stored_map(arguments.map_file)) {
+    work_ = area_.update(map_.view);
+  }
+
+  [[nodiscard]] RobotProfile robot() const override { return area_.profiles().front(); }
+  [[nodiscard]] AreaAnswer area(AreaQuery query) override { return answer_area(view(), query); }
+  [[nodiscard]] PathCheck check(PathQuery query) override { return check_path(view(), query); }
+  [[nodiscard]] NearestTraversable nearest(const Eigen::Vector2d& position_map,
+                                           double max_distance_m) override {
+    return nearest_traversable(view(), position_map, max_distance_m);
+  }
+  [[nodiscard]] Trajectory trajectory() override { return map_.trajectory; }
+  [[nodiscard]] std::optional<TraversabilityUpdate> work() const override { return work_; }
+
+ private:
+  [[nodiscard]] const TraversabilityView& view() const { return *area_.view(robot().name); }
+
+  TraversabilityMap area_;
+  StoredMap map_;
+  TraversabilityUpdate work_;
+};
+
+class ServerSource final : public AreaSource {
+ public:
+  explicit ServerSource(const AreaSourceArguments& arguments)
+      : profile_(arguments.profile),
+        timeout_(arguments.client.timeout()),
+        client_(connect(arguments.client)) {}
+
+  [[nodiscard]] RobotProfile robot() const override {
+    try {
+      return load_robot_profile(profile_);
+    } catch (const ConfigError&) {
+      RobotProfile named;
+      named.name = profile_;
+      return named;
+    }
+  }
+  [[nodiscard]] AreaAnswer area(AreaQuery query) override {
+    query.profile = profile_;
+    return client_.get_traversable_area(query);
+  }
+  [[nodiscard]] PathCheck check(PathQuery query) override {
+    query.profile = profile_;
+    return client_.check_path(query);
+  }
+  [[nodiscard]] NearestTraversable nearest(const Eigen::Vector2d& position_map,
+                                           double max_distance_m) override {
+    return client_.nearest_traversable(profile_, position_map, max_distance_m);
+  }
+  [[nodiscard]] Trajectory trajectory() override { return newest_path(client_, timeout_); }
+  [[nodiscard]] std::optional<TraversabilityUpdate> work() const override { return std::nullopt; }
+
+ private:
+  std::string profile_;
+  std::chrono::milliseconds timeout_;
+  Client client_;
+};
+
+}  // namespace
+
+void add_area_source_options(CommandHandle command, AreaSourceArguments& arguments) {
+  command.option("MAPFILE", arguments.map_file,
+                 "Map file (map.stillmap of 'stillmap map'); without it, a server is asked");
+  command
+      .option("--profile", arguments.profile,
+              "The robot: car, delivery_robot, tracked; with a map file also a file like "
+              "config/robots/car.yaml")
+      .with_default();
+  add_client_options(command, arguments.client);
+}
+
+std::unique_ptr<AreaSource> open_area_source(const AreaSourceArguments& arguments) {
+  if (arguments.map_file.empty()) return std::make_unique<ServerSource>(arguments);
+  return std::make_unique<FileSource>(arguments);
+}
+
+Region region_of(const RegionArguments& region, AreaSource& source) {
+  Eigen::Vector2d robot_map = Eigen::Vector2d::Zero();
+  if (region.around_robot_m > 0.0) {
+    const Trajectory trajectory = source.trajectory();
+    if (trajectory.empty())
+      throw std::invalid_argument("--around-robot: the map has no trajectory");
+    robot_map = trajectory.back().T_map_lidar.translation().head<2>();
+  }
+  return region_at(region, robot_map);
+}
+
+void require_answer(AreaStatus status, const std::string& reason) {
+  if (status == AreaStatus::ok || status == AreaStatus::not_found) return;
+  throw std::invalid_argument(reason);
+}
+
+}  // namespace stillmap

@@ -1,0 +1,84 @@
+#include "clients/doctor/shared_memory_segments.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <system_error>
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A file beside the segment, which the living process holds locked: "_el" by its owner, "_sl" by
+// those who use it.
+bool is_locked(const fs::path& lock_file) {
+  const int descriptor = ::open(lock_file.c_str(), O_RDONLY | O_CLOEXEC);
+  // What cannot be looked at may be alive.
+  if (descriptor < 0) return errno != ENOENT;
+  const bool was_free = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+  ::close(descriptor);
+  return !was_free;
+}
+
+bool is_segment_name(const std::string& name) {
+  return name.starts_with("fastrtps_") && !name.ends_with("_el") && !name.ends_with("_sl");
+}
+
+fs::path beside(const fs::path& file, const std::string& ending) { return file.string() + ending; }
+
+void remove_file(const fs::path& file) {
+  std::error_code ignored;
+  fs::remove(file, ignored);
+}
+
+void remove_segment(const fs::path& folder, const std::string& name) {
+  const fs::path file = folder / name;
+  remove_file(file);
+  remove_file(beside(file, "_el"));
+  remove_file(beside(file, "_sl"));
+  remove_file(folder / ("sem." + name + "_mutex"));
+}
+
+}  // namespace
+
+std::vector<SharedSegment> shared_segments(const fs::path& folder) {
+  std::vector<SharedSegment> segments;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    struct stat facts {};
+    if (!is_segment_name(name) || ::stat(entry.path().c_str(), &facts) != 0) continue;
+    segments.push_back({.name = name,
+                        .bytes = static_cast<std::uint64_t>(facts.st_size),
+                        .owner = facts.st_uid,
+                        .is_stale = !is_locked(beside(entry.path(), "_el")) &&
+                                    !is_locked(beside(entry.path(), "_sl"))});
+  }
+  return segments;
+}
+
+std::string write_fault(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) return folder.string() + " does not exist";
+  if (::access(folder.c_str(), W_OK | X_OK) == 0) return {};
+  const std::string reason = std::strerror(errno);
+  return folder.string() + ": " + reason;
+}
+
+int remove_stale_segments(const fs::path& root) {
+  const fs::path folder = root / "dev/shm";
+  int removed = 0;
+  for (const SharedSegment& segment : shared_segments(folder)) {
+    if (!segment.is_stale) continue;
+    remove_segment(folder, segment.name);
+    if (!fs::exists(folder / segment.name)) ++removed;
+  }
+  return removed;
+}
+
+}  // namespace stillmap

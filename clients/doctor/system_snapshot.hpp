@@ -1,0 +1,64 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "clients/doctor/host_facts.hpp"
+#include "idl/dds/dds_options.hpp"
+#include "idl/dds/remote_participant.hpp"
+#include "idl/interface/server_status.hpp"
+
+namespace stillmap {
+
+/// A server that the domain shows, and what it answered.
+struct ServerSeen {
+  /// First part of its topic names.
+  std::string name_space;
+  /// Participants that answer under this name.
+  std::vector<Peer> peers;
+  std::optional<ServerStatus> status;
+  /// Why there is no status.
+  std::string fault;
+  /// This machine's clock in the middle of the question, nanoseconds since the Unix epoch.
+  std::int64_t asked_ns = 0;
+  /// How long question and answer took.
+  std::int64_t round_trip_ns = 0;
+};
+
+/// What goes on in another domain.
+struct OtherDomain {
+  std::uint32_t id = 0;
+  std::set<std::string> senders;
+  std::vector<Peer> peers;
+};
+
+/// Everything that the checks look at.
+struct Evidence {
+  DdsOptions dds;
+  /// First part of the topic names of the server that is asked for.
+  std::string server_name;
+  /// ROS 2 name of the sensor's topic.
+  std::string points_topic;
+  /// Ourselves, with the ends that a client has.
+  Peer self;
+  std::vector<Peer> peers;
+  std::vector<ServerSeen> servers;
+  std::vector<OtherDomain> other_domains;
+  /// Frames that tf and tf_static named in the meantime.
+  std::set<std::string> frames;
+  HostFacts host;
+  /// Bytes that the kernel gives to a UDP socket.
+  std::uint32_t granted_buffer_bytes = 0;
+};
+
+/// The server of the name asked for that answered; nothing when none did.
+[[nodiscard]] const ServerSeen* answering_server(const Evidence& evidence);
+
+/// The sensor's topic as DDS names it: the server's word counts where there is one.
+[[nodiscard]] std::string points_topic_of(const Evidence& evidence);
+
+}  // namespace stillmap

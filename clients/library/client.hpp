@@ -1,0 +1,225 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <chrono>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <span>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "clients/library/subscription.hpp"
+#include "core/lidar/scan.hpp"
+#include "core/map/query/map_query.hpp"
+#include "core/map/removed_voxel.hpp"
+#include "core/map/tile.hpp"
+#include "core/occupancy/occupancy_query.hpp"
+#include "core/occupancy/octomap_data.hpp"
+#include "core/odometry/trajectory.hpp"
+#include "core/traversability/traversability_query.hpp"
+#include "core/traversability/nearest_traversable.hpp"
+#include "core/traversability/path_query.hpp"
+#include "idl/conversions/cloud_to_scan.hpp"
+#include "idl/dds/dds_options.hpp"
+#include "idl/interface/map_identity.hpp"
+#include "idl/interface/server_status.hpp"
+
+namespace stillmap {
+
+/// No answer, no server, or a server that refuses. The text names the service, the domain and what
+/// to check.
+class ServiceError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Nobody answered in time.
+class ServiceTimeout : public ServiceError {
+ public:
+  using ServiceError::ServiceError;
+};
+
+/// As the profile `lan` has it for clients: config/dds/lan.yaml says why.
+[[nodiscard]] inline DdsOptions without_shared_memory(DdsOptions options = {}) {
+  options.shared_memory = false;
+  return options;
+}
+
+struct ClientOptions {
+  DdsOptions dds = without_shared_memory();
+  /// First part of the server's topic and service names.
+  std::string server_name = "stillmap";
+  /// Longest wait for an answer, discovery and retries included.
+  std::chrono::milliseconds request_timeout{5000};
+};
+
+/// A pose of the lidar as the server estimated it. How healthy the odometry is, is in
+/// ServerStatus::health.
+struct OdometryUpdate {
+  StampedPose pose;
+  /// Of (translation [m], rotation [rad]) in the map frame.
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
+};
+
+struct TileVersions {
+  MapIdentity map;
+  std::vector<TileInfo> tiles;
+};
+
+struct TileSet {
+  MapIdentity map;
+  std::vector<Tile> tiles;
+  /// Tiles asked for that the map does not have.
+  std::vector<TileId> missing;
+};
+
+/// A map file that a server went on with.
+struct LoadedMap {
+  /// On the server's machine.
+  std::string file;
+  /// The map's new id.
+  std::uint64_t map_id = 0;
+  std::uint64_t tile_count = 0;
+  std::uint64_t pose_count = 0;
+};
+
+struct RemovedVoxels {
+  std::vector<RemovedVoxel> voxels;
+  /// Of the region, also those that did not come.
+  std::uint64_t total = 0;
+};
+
+/// What happened in a region since the last news. Tiles are whole, also what of them lies outside.
+struct RegionNews {
+  MapIdentity map;
+  std::vector<Tile> appeared;
+  std::vector<Tile> changed;
+  std::vector<TileId> removed;
+};
+
+/// A client of one stillmap-server. Requests may come from any thread and block until the answer is
+/// there; they throw ServiceTimeout when nobody answers within `request_timeout` and ServiceError
+/// when the server refuses.
+class Client {
+ public:
+  /// Joins the domain; over TCP it also waits for the server, up to `request_timeout`, and joins
+  /// anew after 4, 12, 28 s without one, but never later. Throws DdsError when the domain or an
+  /// interface cannot be used.
+  explicit Client(const ClientOptions& options = {});
+  ~Client();
+  Client(Client&&) noexcept;
+  Client& operator=(Client&&) noexcept;
+
+  /// Returns when a server answers; throws ServiceTimeout after `timeout`, of which over TCP up to
+  /// half may have passed since the client was made.
+  void wait_for_server(std::chrono::milliseconds timeout);
+
+  [[nodiscard]] ServerStatus status();
+
+  /// One page of a region of the static map. Hand `continuation` back in the query for the next
+  /// page. A refused query is a result with its status and reason, not an exception.
+  [[nodiscard]] MapQueryResult get_static_map(const MapQuery& query);
+
+  /// All pages of the answer, all of one map version: `tiles` and `voxels` of all of them. Starts
+  /// over when the map changed too far under it. `page_arrived(voxels so far, total)` may be empty.
+  [[nodiscard]] MapQueryResult get_whole_static_map(
+      MapQuery query, const std::function<void(std::uint64_t, std::uint64_t)>& page_arrived = {});
+
+  /// Revision and hash of every tile whose footprint meets the box (map frame [m]); infinite faces
+  /// are allowed.
+  [[nodiscard]] TileVersions get_tile_versions(const Eigen::AlignedBox3d& box_map);
+  /// Of the whole map.
+  [[nodiscard]] TileVersions get_tile_versions();
+
+  /// These tiles with their voxels. Asks as often as the server's answer size needs. Voxels come
+  /// without the runner-up classes' evidence.
+  [[nodiscard]] TileSet get_tiles(std::span<const TileId> ids);
+
+  /// The server's octree of occupied, free and unknown space, checked: with probabilities if
+  /// `full`.
+  [[nodiscard]] OctomapData octomap(bool full);
+  /// Points, boxes and rays at once. Each answer has its own fault; throws ServiceError when the
+  /// query as a whole is refused.
+  [[nodiscard]] OccupancyAnswers query_occupancy(const OccupancyQuery& query);
+  /// Where a robot can go in a region. A refused query is a result with its status and reason.
+  [[nodiscard]] AreaAnswer get_traversable_area(const AreaQuery& query);
+  /// Whether a robot can follow a path, or the first place where it cannot. The same.
+  [[nodiscard]] PathCheck check_path(const PathQuery& query);
+  /// The free cell nearest to a place (map frame [m]). The same.
+  [[nodiscard]] NearestTraversable nearest_traversable(const std::string& profile,
+                                                       const Eigen::Vector2d& position_map,
+                                                       double max_distance_m = 100.0);
+  /// The grid of the server's planning robot, as Nav2 gets it; of no size when there is none.
+  [[nodiscard]] OccupancyGrid planning_grid();
+
+  /// What the server keeps out of its static map in a region, and why: all of it, up to
+  /// `max_voxels` (the server brings at most 300,000).
+  [[nodiscard]] RemovedVoxels get_removed(const Region& region, std::uint32_t max_voxels = 300'000);
+  /// Has the server show again what was removed for this reason in a box; returns how many voxels.
+  std::uint64_t restore_removed(RemovalReason reason, const BoxRegion& box);
+
+  /// Has the server save its map; returns the file's name on the server's machine. An empty name
+  /// means the configured file.
+  std::string save_map(const std::string& file = {});
+
+  /// Has the server save its map, and go on with one that was saved before, and in its file. `file`
+  /// is a plain name beside the configured map file. A map that is missing, damaged, newer or of
+  /// another voxel size is refused, and the running map goes on.
+  LoadedMap load_map(const std::string& file);
+
+  /// Has the server forget poses and map; returns the id of the new map.
+  std::uint64_t reset();
+
+  /// Calls back for every pose. Each subscription has its own thread, and its calls never overlap;
+  /// it ends with the Subscription, which must not outlive the client.
+  [[nodiscard]] Subscription subscribe_odometry(
+      std::function<void(const OdometryUpdate&)> pose_arrived);
+  /// Once a second, and when the health changes.
+  [[nodiscard]] Subscription subscribe_status(
+      std::function<void(const ServerStatus&)> status_arrived);
+  /// The whole path since the map began, at most once a second.
+  [[nodiscard]] Subscription subscribe_path(std::function<void(const Trajectory&)> path_arrived);
+  /// The newest version of every tile, first those that exist already.
+  [[nodiscard]] Subscription subscribe_tiles(
+      std::function<void(const MapIdentity&, const Tile&)> tile_arrived);
+  /// As subscribe_tiles, without the voxels; a tile without any is gone.
+  [[nodiscard]] Subscription subscribe_tile_index(
+      std::function<void(const MapIdentity&, const TileInfo&)> info_arrived);
+
+  /// The octree (binary) when it changed, as often as the server publishes it.
+  [[nodiscard]] Subscription subscribe_octomap(
+      std::function<void(const OctomapData&)> octomap_arrived);
+  /// The grid of the server's planning robot, whenever it changes.
+  [[nodiscard]] Subscription subscribe_planning_grid(
+      std::function<void(const OccupancyGrid&)> grid_arrived);
+
+  /// The tiles whose footprint meets the region: first those that exist, then what changes. Tiles
+  /// of other places do not come over the network, only their entries in the index (some 100
+  /// bytes), which this process passes over. When another map begins, the tiles of the last one are
+  /// removed. Throws std::invalid_argument for a region with faults, and as a request does: it asks
+  /// for the size of tiles, so a server that comes back with another size needs a new subscription.
+  [[nodiscard]] Subscription subscribe_region(const Region& region,
+                                              std::function<void(const RegionNews&)> news_arrived);
+
+  /// Scans of the sensor's topic (ROS 2 name), as the server gets them; those that cannot be read
+  /// are passed over. `delivery` is the server's: with `every`, a lossless sender waits for this
+  /// subscription, too.
+  [[nodiscard]] Subscription subscribe_points(const std::string& ros_topic, DeliveryMode delivery,
+                                              const wire::CloudReading& reading,
+                                              std::function<void(const Scan&)> scan_arrived);
+  /// Prepared scans with the classes that the server gave them: the usable points only,
+  /// motion-compensated, in the order of the sensor's scan of the same stamp. Best effort.
+  [[nodiscard]] Subscription subscribe_labelled_scans(
+      std::function<void(const Scan&)> scan_arrived);
+
+ private:
+  friend class ScanPublisher;
+  struct Connection;
+  [[nodiscard]] static std::unique_ptr<Connection> connect(const ClientOptions& options);
+
+  std::unique_ptr<Connection> connection_;
+};
+
+}  // namespace stillmap

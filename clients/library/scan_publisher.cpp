@@ -1,0 +1,81 @@
+#include "clients/library/scan_publisher.hpp"
+
+#include "clients/library/connection.hpp"
+#include "clients/library/tcp_rejoin_backoff.hpp"
+#include "idl/conversions/scan_to_cloud.hpp"
+#include "idl/dds/writer.hpp"
+#include "idl/interface/topics.hpp"
+
+namespace stillmap {
+
+struct ScanPublisher::Connection {
+  explicit Connection(const ScanPublisherOptions& publisher_options)
+      : options(publisher_options),
+        own(std::make_unique<Participant>(options.dds)),
+        topic(topic_of(options)),
+        writer(*own, topic.dds_name, topic.writer) {}
+
+  Connection(Participant& shared, const ScanPublisherOptions& publisher_options)
+      : options(publisher_options),
+        topic(topic_of(options)),
+        writer(shared, topic.dds_name, topic.writer) {}
+
+  static TopicSpec<sensor_msgs::msg::PointCloud2> topic_of(const ScanPublisherOptions& options) {
+    return points_topic(options.points_topic,
+                        options.lossless ? DeliveryMode::every : DeliveryMode::latest,
+                        options.scans_under_way);
+  }
+
+  ScanPublisherOptions options;
+  bool has_written = false;
+  std::unique_ptr<Participant> own;
+  TopicSpec<sensor_msgs::msg::PointCloud2> topic;
+  Writer<sensor_msgs::msg::PointCloud2> writer;
+};
+
+ScanPublisher::ScanPublisher(const ScanPublisherOptions& options)
+    : connection_(std::make_unique<Connection>(options)) {}
+
+ScanPublisher::ScanPublisher(Client& client, const ScanPublisherOptions& options) {
+  Client::Connection& shared = *client.connection_;
+  const bool shares = shared.options.dds.transport == NetworkTransport::tcp;
+  connection_ = shares ? std::make_unique<Connection>(shared.participant, options)
+                       : std::make_unique<Connection>(options);
+}
+
+ScanPublisher::~ScanPublisher() = default;
+ScanPublisher::ScanPublisher(ScanPublisher&&) noexcept = default;
+ScanPublisher& ScanPublisher::operator=(ScanPublisher&&) noexcept = default;
+
+bool ScanPublisher::wait_for_subscriber(std::chrono::milliseconds timeout) {
+  TcpPatience patience(connection_->options.dds, timeout);
+  while (!connection_->writer.readers().wait_for_any(patience.wait())) {
+    if (patience.is_over()) return false;
+    // A client's connection has been found to work, and what was written must not be lost.
+    const bool may_begin_anew = connection_->own && !connection_->has_written;
+    if (patience.is_due() && may_begin_anew) {
+      connection_ = std::make_unique<Connection>(connection_->options);
+    }
+  }
+  return true;
+}
+
+int ScanPublisher::subscribers() const { return connection_->writer.readers().count(); }
+
+bool ScanPublisher::publish(const Scan& scan, std::span<const std::uint32_t> raw_labels,
+                            std::chrono::milliseconds timeout) {
+  const auto cloud = wire::to_cloud(scan, raw_labels, connection_->options.lidar_frame);
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  connection_->has_written = true;
+  // A write waits only a moment for room, so that the caller's timeout is kept.
+  while (!connection_->writer.write(cloud)) {
+    if (std::chrono::steady_clock::now() >= deadline) return false;
+  }
+  return true;
+}
+
+bool ScanPublisher::wait_for_all_acknowledged(std::chrono::milliseconds timeout) {
+  return connection_->writer.wait_for_acknowledgements(timeout);
+}
+
+}  // namespace stillmap

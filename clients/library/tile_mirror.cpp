@@ -1,0 +1,82 @@
+#include "clients/library/tile_mirror.hpp"
+
+#include <algorithm>
+
+namespace stillmap {
+
+TileMirror::TileMirror() : view_(std::make_shared<const MapView>()) {}
+
+void TileMirror::apply(const RegionNews& news) {
+  {
+    const std::lock_guard lock(mutex_);
+    if (news.map.map_id != view_->map_id) tiles_.clear();
+    for (const TileId id : news.removed) tiles_.erase(id);
+    for (const std::vector<Tile>* arrived : {&news.appeared, &news.changed}) {
+      for (const Tile& tile : *arrived) {
+        std::shared_ptr<const Tile>& held = tiles_[tile.info.id];
+        if (held && held->info.revision >= tile.info.revision) continue;
+        held = std::make_shared<const Tile>(tile);
+      }
+    }
+    view_ = make_view(news.map);
+  }
+  changed_.notify_all();
+}
+
+std::shared_ptr<const MapView> TileMirror::make_view(const MapIdentity& map) const {
+  auto view = std::make_shared<MapView>();
+  view->map_id = map.map_id;
+  view->tile_size_m = map.tile_size_m;
+  view->voxel_size_m = map.voxel_size_m;
+  view->version = map.version;
+  // A tile that was fetched may be newer than what the news say.
+  for (const auto& [id, tile] : tiles_) {
+    view->version = std::max(view->version, tile->info.revision);
+    view->tiles.push_back(tile);
+  }
+  return view;
+}
+
+std::shared_ptr<const MapView> TileMirror::view() const {
+  const std::lock_guard lock(mutex_);
+  return view_;
+}
+
+std::shared_ptr<const MapView> TileMirror::wait_for_change(
+    const std::shared_ptr<const MapView>& known, std::chrono::milliseconds timeout) const {
+  std::unique_lock lock(mutex_);
+  changed_.wait_for(lock, timeout, [&] { return view_ != known; });
+  return view_;
+}
+
+bool TileMirror::holds(const TileVersions& versions) const {
+  const std::lock_guard lock(mutex_);
+  if (versions.tiles.empty()) return true;
+  return versions.map.map_id == view_->map_id &&
+         std::ranges::all_of(versions.tiles, [&](const TileInfo& info) {
+           const auto held = tiles_.find(info.id);
+           return held != tiles_.end() && held->second->info.revision >= info.revision;
+         });
+}
+
+void wait_for_whole_map(Client& client, const TileMirror& mirror,
+                        std::chrono::milliseconds timeout) {
+  // Asked for again now and then: tiles of an older answer may be gone by now.
+  constexpr std::chrono::milliseconds patience(1000);
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  while (std::chrono::steady_clock::now() < deadline) {
+    const TileVersions versions = client.get_tile_versions();
+    const auto until = std::chrono::steady_clock::now() + patience;
+    while (std::chrono::steady_clock::now() < until) {
+      const auto seen = mirror.view();
+      if (mirror.holds(versions)) return;
+      (void)mirror.wait_for_change(seen, std::chrono::milliseconds(50));
+    }
+  }
+  throw ServiceTimeout(
+      "the server's map did not arrive: " + std::to_string(mirror.view()->tiles.size()) +
+      " tiles of it within " + std::to_string(timeout.count()) +
+      " ms; allow more with --timeout, or look at the network's load");
+}
+
+}  // namespace stillmap

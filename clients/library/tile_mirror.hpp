@@ -1,0 +1,48 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <mutex>
+
+#include "clients/library/client.hpp"
+
+namespace stillmap {
+
+/// A client's own copy of a map, or of a region of it: news of a region subscription in, immutable
+/// views out. Safe to use from any thread.
+class TileMirror {
+ public:
+  TileMirror();
+
+  /// Takes the news over. Another map replaces what there was; a tile that is older than the one
+  /// held is left out.
+  void apply(const RegionNews& news);
+
+  /// The tiles as they are now; never null.
+  [[nodiscard]] std::shared_ptr<const MapView> view() const;
+
+  /// Waits until the mirror holds another view than `known`, at most `timeout`; returns the view.
+  [[nodiscard]] std::shared_ptr<const MapView> wait_for_change(
+      const std::shared_ptr<const MapView>& known, std::chrono::milliseconds timeout) const;
+
+  /// Whether it holds all these tiles, as new or newer.
+  [[nodiscard]] bool holds(const TileVersions& versions) const;
+
+ private:
+  [[nodiscard]] std::shared_ptr<const MapView> make_view(const MapIdentity& map) const;
+
+  mutable std::mutex mutex_;
+  mutable std::condition_variable changed_;
+  std::map<TileId, std::shared_ptr<const Tile>> tiles_;
+  std::shared_ptr<const MapView> view_;
+};
+
+/// Returns when the mirror holds all tiles that the server's map has. Throws ServiceTimeout saying
+/// how many are missing.
+void wait_for_whole_map(Client& client, const TileMirror& mirror,
+                        std::chrono::milliseconds timeout);
+
+}  // namespace stillmap

@@ -1,0 +1,117 @@
+#include "config/loaders/mapper_section.hpp"
+
+#include <array>
+#include <vector>
+
+namespace stillmap {
+namespace {
+
+constexpr Range lengths_m{0.001, 10000};
+constexpr Range shares{0, 1};
+
+/// Written as [x_min, y_min, z_min, x_max, y_max, z_max]; an empty list is an empty box.
+void read_box(YamlSection& section, const std::string& name, Eigen::AlignedBox3d& box) {
+  std::vector<double> faces;
+  if (!box.isEmpty()) {
+    faces.insert(faces.end(), box.min().begin(), box.min().end());
+    faces.insert(faces.end(), box.max().begin(), box.max().end());
+  }
+  section.number_list(name, faces, {-1000, 1000});
+  box.setEmpty();
+  if (faces.empty()) return;
+  if (faces.size() != 6) {
+    section.fault(name, "has " + std::to_string(faces.size()) +
+                            " numbers; wanted are none, or x_min, y_min, z_min, x_max, y_max, "
+                            "z_max");
+    return;
+  }
+  box.min() = Eigen::Map<const Eigen::Vector3d>(faces.data());
+  box.max() = Eigen::Map<const Eigen::Vector3d>(faces.data() + 3);
+  if (box.isEmpty()) section.fault(name, "has a minimum above its maximum");
+}
+
+void read_prepare(YamlSection section, PrepareConfig& prepare) {
+  section.number("min_range_m", prepare.min_range_m, {0, 1000});
+  section.number("max_range_m", prepare.max_range_m, {0.1, 10000});
+  read_box(section, "ego_hull_lidar_m", prepare.ego_hull_lidar);
+  section.flag("compensate_motion", prepare.compensate_motion);
+  if (!(prepare.min_range_m < prepare.max_range_m)) {
+    section.fault("max_range_m", "must be above min_range_m");
+  }
+}
+
+void read_features(YamlSection section, FeatureConfig& features) {
+  section.number("edge_curvature_m2", features.edge_curvature_m2, {0, 1000});
+  section.number("plane_curvature_m2", features.plane_curvature_m2, {0, 1000});
+  section.whole("edges_per_sector", features.edges_per_sector, {1, 1000});
+  section.number("edge_spacing_m", features.edge_spacing_m, lengths_m);
+  section.number("map_plane_spacing_m", features.map_plane_spacing_m, lengths_m);
+  section.number("plane_spacing_m", features.plane_spacing_m, lengths_m);
+}
+
+void read_local_map(YamlSection section, LocalMapConfig& local_map) {
+  section.number("voxel_size_m", local_map.voxel_size_m, lengths_m);
+  section.whole("max_points_per_voxel", local_map.max_points_per_voxel, {1, 10000});
+  section.number("min_spacing_m", local_map.min_spacing_m, {0, 100});
+  section.number("radius_m", local_map.radius_m, {1, 10000});
+}
+
+void read_registration(YamlSection section, RegistrationConfig& registration) {
+  section.whole("neighbours", registration.neighbours, {3, 100});
+  section.number("max_neighbour_distance_m", registration.max_neighbour_distance_m, lengths_m);
+  section.number("max_residual_m", registration.max_residual_m, lengths_m);
+  section.whole("max_iterations", registration.max_iterations, {1, 1000});
+  section.number("step_translation_m", registration.step_translation_m, {1e-9, 1});
+  section.number("step_rotation_rad", registration.step_rotation_rad, {1e-9, 1});
+  section.number("robust_scale_m", registration.robust_scale_m, {0, 100});
+  section.whole("min_correspondences", registration.min_correspondences, {6, 100000});
+  section.number("min_observability", registration.min_observability, shares);
+}
+
+void read_motion(YamlSection section, MotionConfig& motion) {
+  section.number("inconsistency_threshold", motion.inconsistency_threshold, shares);
+  section.flag("use_past_views", motion.use_past_views);
+  section.whole("past_views", motion.past_views, {1, 100});
+  section.whole("past_view_interval", motion.past_view_interval, {1, 1000});
+  section.number("free_margin_m", motion.free_margin_m, {0, 100});
+  section.number("free_margin_share", motion.free_margin_share, shares);
+  section.number("moving_share", motion.moving_share, shares);
+  section.number("object_gap_m", motion.object_gap_m, lengths_m);
+}
+
+void read_odometry(YamlSection section, OdometryConfig& odometry) {
+  section.choice<Weighting>("weighting", odometry.weighting,
+                            {{"none", Weighting::none},
+                             {"geometric", Weighting::geometric},
+                             {"semantic", Weighting::semantic}});
+  section.number("alpha", odometry.alpha, shares);
+  read_features(section.section("features"), odometry.features);
+  read_local_map(section.section("local_map"), odometry.local_map);
+  read_registration(section.section("registration"), odometry.registration);
+  read_motion(section.section("motion"), odometry.motion);
+  section.faults(odometry.faults());
+}
+
+void read_static_map(YamlSection section, StaticMapConfig& static_map) {
+  section.number("voxel_size_m", static_map.voxel_size_m, {0.01, 10});
+  section.number("tile_size_m", static_map.tile_size_m, {0.1, 1000});
+  section.number("max_range_m", static_map.max_range_m, {1, 10000});
+  section.whole("min_points", static_map.min_points, {1, 1000000});
+  section.whole("look_every", static_map.look_every, {1, 1000});
+  section.whole("passes", static_map.passes, {1, 1000});
+  section.whole("passes_per_hit", static_map.passes_per_hit, {1, 1000});
+  section.number("clear_range_m", static_map.clear_range_m, {0, 1000});
+  section.number("clear_margin_m", static_map.clear_margin_m, {0.01, 100});
+  section.number("clear_margin_share", static_map.clear_margin_share, {0, 1});
+  section.faults(static_map.faults());
+}
+
+}  // namespace
+
+void read_mapper(YamlSection& file, MapperConfig& mapper) {
+  read_prepare(file.section("prepare"), mapper.prepare);
+  read_odometry(file.section("odometry"), mapper.odometry);
+  read_static_map(file.section("static_map"), mapper.static_map);
+}
+
+}  // namespace stillmap

@@ -1,0 +1,145 @@
+#include "config/loaders/model_file.hpp"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "config/loaders/class_names.hpp"
+#include "config/loaders/int8_file.hpp"
+#include "config/loaders/model_folder.hpp"
+#include "config/loaders/yaml_section.hpp"
+#include "core/segmentation/model_error.hpp"
+#include "core/segmentation/network_segmenter.hpp"
+#include "core/segmentation/fallback_segmenter.hpp"
+#include "core/segmentation/passthrough_segmenter.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+void read_image(YamlSection section, ModelDescription& model) {
+  section.require({"rows", "columns", "fov_up_deg", "fov_down_deg"});
+  section.whole("rows", model.rows, {1, 512});
+  section.whole("columns", model.columns, {1, most_image_columns});
+  section.whole("least_columns", model.least_columns, {0, static_cast<double>(model.columns)});
+  section.degrees("fov_up_deg", model.fov_up, {-90, 90});
+  section.degrees("fov_down_deg", model.fov_down, {-90, 90});
+  section.flag("follow_sensor", model.follow_sensor);
+  section.flag("mask_first_point", model.mask_first_point);
+}
+
+void read_channel(YamlSection section, InputStatistics& statistics, std::size_t channel) {
+  section.require({"mean", "deviation"});
+  section.number("mean", statistics.mean[channel], {-1e6, 1e6});
+  section.number("deviation", statistics.deviation[channel], {1e-6, 1e6});
+}
+
+void read_statistics(YamlSection section, InputStatistics& statistics) {
+  const std::vector<std::string> channels{"range", "x", "y", "z", "remission"};
+  section.require(channels);
+  for (std::size_t i = 0; i < channels.size(); ++i) {
+    read_channel(section.section(channels[i]), statistics, i);
+  }
+}
+
+/// Lines of 'output: class', from 0 without a gap.
+void read_classes(YamlSection section, std::vector<SemanticClass>& classes) {
+  const std::vector<std::string> written = section.names();
+  if (written.empty() || written.size() > PixelOutputs::max_outputs) {
+    section.faults("has " + std::to_string(written.size()) + " outputs; 1 to " +
+                   std::to_string(PixelOutputs::max_outputs) + " can be used");
+    return;
+  }
+  classes.assign(written.size(), SemanticClass::unlabeled);
+  for (std::size_t i = 0; i < classes.size(); ++i) {
+    const std::string output = std::to_string(i);
+    if (std::ranges::find(written, output) == written.end()) {
+      section.faults("output " + output + " has no class; outputs are numbered from 0 to " +
+                     std::to_string(classes.size() - 1) + " without a gap");
+    } else {
+      read_class(section, output, classes[i]);
+    }
+  }
+}
+
+void read_knn(YamlSection section, std::optional<KnnConfig>& knn) {
+  bool use = true;
+  KnnConfig read;
+  section.flag("use", use);
+  section.whole("neighbours", read.neighbours, {1, KnnConfig::max_neighbours});
+  section.whole("window", read.window, {1, KnnConfig::max_window});
+  section.number("sigma", read.sigma, {1e-3, 1e3});
+  section.number("cutoff_m", read.cutoff_m, {1e-3, 1e3});
+  section.flag("car_without_votes", read.car_without_votes);
+  section.faults(read.faults());
+  if (use) knn = read;
+}
+
+void read_model(YamlSection file, ModelDescription& model) {
+  file.require({"name", "licence", "image", "statistics", "classes"});
+  file.text("name", model.name);
+  file.text("licence", model.licence);
+  file.text("sensor", model.sensor);
+  file.text("training", model.training);
+  file.text("accuracy", model.accuracy);
+  read_image(file.section("image"), model);
+  read_statistics(file.section("statistics"), model.statistics);
+  read_classes(file.section("classes"), model.classes);
+  read_knn(file.section("knn"), model.knn);
+  if (model.fov_up <= model.fov_down) file.fault("image", "fov_down_deg must be below fov_up_deg");
+}
+
+std::unique_ptr<LabelSource> open_network_labels(const LabelsConfig& labels,
+                                                 const SensorModel& sensor, bool may_narrow) {
+  ModelDescription model = for_sensor(load_model_description(find_model(labels.model)), sensor);
+  if (labels.image_columns == 0) {
+    return may_narrow ? open_model_of_many_widths(model, labels.engine)
+                      : open_model(model, labels.engine);
+  }
+  model.columns = labels.image_columns;
+  try {
+    return open_model(model, labels.engine);
+  } catch (const ModelError& error) {
+    throw ModelError("with " + std::to_string(labels.image_columns) + " image columns",
+                     error.what());
+  }
+}
+
+}  // namespace
+
+ModelDescription load_uncalibrated_model(const fs::path& folder) {
+  if (!fs::is_directory(folder)) {
+    throw ConfigError({folder.string() +
+                       ": is not a folder; a model is a folder with model.onnx and model.yaml"});
+  }
+  YamlFile yaml = open_yaml(folder / "model.yaml");
+  ModelDescription model;
+  model.network_file = folder / "model.onnx";
+  read_model(YamlSection(yaml), model);
+  yaml.require_no_faults();
+  return model;
+}
+
+ModelDescription load_model_description(const fs::path& folder) {
+  ModelDescription model = load_uncalibrated_model(folder);
+  model.int8 = load_int8_calibration(folder / "int8.yaml");
+  return model;
+}
+
+std::unique_ptr<LabelSource> open_label_source(const LabelsConfig& labels,
+                                               const SensorModel& sensor, bool may_narrow) {
+  switch (labels.source) {
+    case LabelOrigin::automatic:
+      return std::make_unique<StreamFirstLabels>(open_network_labels(labels, sensor, may_narrow));
+    case LabelOrigin::model:
+      return open_network_labels(labels, sensor, may_narrow);
+    case LabelOrigin::stream:
+      return std::make_unique<StreamLabels>();
+    case LabelOrigin::none:
+      break;
+  }
+  return std::make_unique<NoLabels>();
+}
+
+}  // namespace stillmap

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <filesystem>
+#include <memory>
+
+#include "config/loaders/config_error.hpp"
+#include "config/loaders/server_config.hpp"
+#include "core/segmentation/segmenter.hpp"
+#include "core/segmentation/model_description.hpp"
+
+namespace stillmap {
+
+/// Reads model.yaml of a model folder; the network is model.onnx beside it. Throws ConfigError with
+/// every fault.
+[[nodiscard]] ModelDescription load_uncalibrated_model(const std::filesystem::path& folder);
+/// The same with its calibration, where there is an int8.yaml.
+[[nodiscard]] ModelDescription load_model_description(const std::filesystem::path& folder);
+
+/// The label source that the configuration asks for, for scans of this sensor. `may_narrow`: able
+/// to look more coarsely, where the model can and the configuration does not say how finely. Throws
+/// ConfigError or ModelError.
+[[nodiscard]] std::unique_ptr<LabelSource> open_label_source(const LabelsConfig& labels,
+                                                             const SensorModel& sensor,
+                                                             bool may_narrow = false);
+
+}  // namespace stillmap

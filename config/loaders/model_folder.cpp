@@ -1,0 +1,41 @@
+#include "config/loaders/model_folder.hpp"
+
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "config/loaders/config_error.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> model_places() {
+  std::vector<fs::path> places;
+  if (const char* folder = std::getenv("STILLMAP_MODELS")) places.emplace_back(folder);
+  std::error_code none;
+  const fs::path program = fs::read_symlink("/proc/self/exe", none);
+  if (!program.empty()) {
+    places.push_back(program.parent_path().parent_path() / "share/stillmap/models");
+  }
+  places.emplace_back(STILLMAP_MODEL_SOURCES);
+  return places;
+}
+
+}  // namespace
+
+fs::path find_model(const fs::path& model) {
+  if (model.has_parent_path() || fs::is_directory(model)) return model;
+  std::string tried;
+  for (const fs::path& place : model_places()) {
+    if (fs::exists(place / model / "model.yaml")) return place / model;
+    tried.append("\n  ").append(place.string());
+  }
+  throw ConfigError({"model '" + model.string() +
+                     "' is not known; give a model's folder, or set STILLMAP_MODELS to the folder "
+                     "that holds it. Looked in:" +
+                     tried});
+}
+
+}  // namespace stillmap

@@ -1,0 +1,104 @@
+#include "config/loaders/sensor_file.hpp"
+
+#include <yaml-cpp/emitter.h>
+
+#include <cassert>
+#include <fstream>
+#include <map>
+#include <numbers>
+#include <stdexcept>
+#include <vector>
+
+#include "config/loaders/closest_name.hpp"
+#include "config/loaders/yaml_section.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::map<std::string, SensorModel (*)()>& built_in_sensors() {
+  static const std::map<std::string, SensorModel (*)()> sensors{
+      {"hdl_64e", hdl_64e}, {"hdl_32e", hdl_32e}, {"vlp_16", vlp_16}};
+  return sensors;
+}
+
+bool is_file_name(const std::string& text) {
+  return text.find('/') != std::string::npos || text.ends_with(".yaml") || text.ends_with(".yml");
+}
+
+const std::vector<YamlSection::Choice<RingSource>>& ring_sources() {
+  static const std::vector<YamlSection::Choice<RingSource>> sources{
+      {"field", RingSource::field},
+      {"order", RingSource::order},
+      {"elevation", RingSource::elevation}};
+  return sources;
+}
+
+std::string ring_source_name(RingSource wanted) {
+  for (const YamlSection::Choice<RingSource>& source : ring_sources()) {
+    if (source.value == wanted) return source.name;
+  }
+  assert(false);
+  return {};
+}
+
+void read_sensor(YamlSection& file, SensorModel& sensor) {
+  file.require({"name", "rings", "fov_up_deg", "fov_down_deg"});
+  file.text("name", sensor.name);
+  file.whole("rings", sensor.rings, {1, 1024});
+  file.degrees("fov_up_deg", sensor.fov_up, {-90, 90});
+  file.degrees("fov_down_deg", sensor.fov_down, {-90, 90});
+  file.degrees_list("beam_elevations_deg", sensor.beam_elevations, {-90, 90});
+  file.whole("columns", sensor.columns, {16, 65536});
+  file.number("min_range_m", sensor.min_range_m, {0, 1000});
+  file.number("max_range_m", sensor.max_range_m, {0.1, 10000});
+  file.number("period_s", sensor.period_s, {0.001, 60});
+  file.choice<RingSource>("ring_source", sensor.ring_source, ring_sources());
+  file.number("intensity_scale", sensor.intensity_scale, {1e-9, 1e9});
+  file.faults(sensor.faults());
+}
+
+}  // namespace
+
+void save_sensor(const SensorModel& sensor, const fs::path& file) {
+  constexpr double degree = std::numbers::pi / 180.0;
+  YAML::Emitter yaml;
+  yaml << YAML::BeginMap << YAML::Key << "name" << YAML::Value << sensor.name;
+  yaml << YAML::Key << "rings" << YAML::Value << sensor.rings;
+  yaml << YAML::Key << "fov_up_deg" << YAML::Value << sensor.fov_up / degree;
+  yaml << YAML::Key << "fov_down_deg" << YAML::Value << sensor.fov_down / degree;
+  yaml << YAML::Key << "beam_elevations_deg" << YAML::Value << YAML::Flow << YAML::BeginSeq;
+  for (const double elevation : sensor.beam_elevations) yaml << elevation / degree;
+  yaml << YAML::EndSeq;
+  yaml << YAML::Key << "columns" << YAML::Value << sensor.columns;
+  yaml << YAML::Key << "min_range_m" << YAML::Value << sensor.min_range_m;
+  yaml << YAML::Key << "max_range_m" << YAML::Value << sensor.max_range_m;
+  yaml << YAML::Key << "period_s" << YAML::Value << sensor.period_s;
+  yaml << YAML::Key << "ring_source" << YAML::Value << ring_source_name(sensor.ring_source);
+  yaml << YAML::Key << "intensity_scale" << YAML::Value << sensor.intensity_scale << YAML::EndMap;
+  std::ofstream out(file);
+  out << yaml.c_str() << '\n';
+  if (!out.flush()) throw std::runtime_error(file.string() + ": cannot be written");
+}
+
+SensorModel load_sensor(const std::string& name_or_file, const fs::path& folder) {
+  const auto built_in = built_in_sensors().find(name_or_file);
+  if (built_in != built_in_sensors().end()) return built_in->second();
+  if (!is_file_name(name_or_file)) {
+    std::vector<std::string> names;
+    for (const auto& [name, make] : built_in_sensors()) names.push_back(name);
+    throw ConfigError({"sensor '" + name_or_file + "' is neither built in nor a .yaml file" +
+                       did_you_mean(name_or_file, names)});
+  }
+  YamlFile yaml = open_yaml(folder / name_or_file);
+  SensorModel sensor;
+  {
+    YamlSection file(yaml);
+    read_sensor(file, sensor);
+  }
+  yaml.require_no_faults();
+  return sensor;
+}
+
+}  // namespace stillmap

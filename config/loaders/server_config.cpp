@@ -1,0 +1,261 @@
+#include "config/loaders/server_config.hpp"
+
+#include <algorithm>
+#include <stdexcept>
+
+#include "config/loaders/listening_address.hpp"
+#include "config/loaders/mapper_section.hpp"
+#include "config/loaders/named_file.hpp"
+#include "config/loaders/robot_profile.hpp"
+#include "config/loaders/sensor_file.hpp"
+#include "config/loaders/yaml_section.hpp"
+#include "core/map/datum.hpp"
+#include "core/segmentation/model_description.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr Range periods_s{0.01, 86400};
+
+void read_sensor_name(YamlSection& file, const fs::path& folder, SensorModel& sensor) {
+  std::string name = "hdl_64e";
+  file.text("sensor", name);
+  try {
+    sensor = load_sensor(name, folder);
+  } catch (const ConfigError& error) {
+    for (const std::string& fault : error.faults()) file.fault("sensor", fault);
+  }
+}
+
+// A bare name stays one; a path starts at the file's folder.
+void read_model_name(YamlSection& section, fs::path& model) {
+  std::string name = model.string();
+  section.text("model", name);
+  if (name.empty()) section.fault("model", "is empty; give a model's name or folder");
+  if (name == model) return;
+  model = name;
+  if (model.has_parent_path()) section.path("model", model);
+}
+
+void read_labels(YamlSection section, LabelsConfig& labels) {
+  section.choice<LabelOrigin>("source", labels.source,
+                              {{"auto", LabelOrigin::automatic},
+                               {"stream", LabelOrigin::stream},
+                               {"model", LabelOrigin::model},
+                               {"none", LabelOrigin::none}});
+  read_model_name(section, labels.model);
+  section.whole("image_columns", labels.image_columns, {0, most_image_columns});
+  if (labels.image_columns > 0 && labels.image_columns < least_image_columns) {
+    section.fault("image_columns", "is " + std::to_string(labels.image_columns) +
+                                       ", but must be 0 (as the model says) or " +
+                                       std::to_string(least_image_columns) + ".." +
+                                       std::to_string(most_image_columns));
+  }
+  using Engine = EngineChoice::Engine;
+  section.choice<Engine>(
+      "engine", labels.engine.engine,
+      {{"auto", Engine::automatic}, {"onednn", Engine::onednn}, {"opencv", Engine::opencv}});
+  using Numbers = EngineChoice::Numbers;
+  section.choice<Numbers>(
+      "precision", labels.engine.precision,
+      {{"auto", Numbers::automatic}, {"fp32", Numbers::fp32}, {"int8", Numbers::int8}});
+  section.whole("threads", labels.engine.threads, {0, 1024});
+  section.whole("budget_ms", labels.budget_ms, {0, 60'000});
+}
+
+void read_frames(YamlSection section, FramesConfig& frames) {
+  section.text("map", frames.map);
+  section.text("lidar", frames.lidar);
+  if (frames.map.empty()) section.fault("map", "is empty; a frame needs a name");
+}
+
+void read_network(YamlSection& section, const fs::path& folder, DdsChoice& network) {
+  section.text("profile", network.profile);
+  if (is_file_name(network.profile)) network.profile = (folder / network.profile).string();
+  section.choice<std::optional<bool>>(
+      "shared_memory", network.shared_memory,
+      {{"profile", std::nullopt}, {"true", true}, {"false", false}});
+  section.text_list("interfaces", network.interfaces);
+  section.text_list("peers", network.peers);
+  section.text("discovery_server", network.discovery_server);
+  section.whole("socket_buffer_bytes", network.socket_buffer_bytes, {0, 1U << 30U});
+  try {
+    static_cast<void>(dds_options(network, DdsRole::server));
+  } catch (const ConfigError& error) {
+    for (const std::string& fault : error.faults()) section.faults(fault);
+  }
+}
+
+void read_dds(YamlSection section, const fs::path& folder, DdsConfig& dds) {
+  section.whole("domain_id", dds.domain_id, {0, 232});
+  read_network(section, folder, dds.network);
+  section.text("participant_name", dds.participant_name);
+  section.path("security", dds.security);
+  section.whole("ros_gid_bytes", dds.ros_gid_bytes, {16, 24});
+  if (dds.ros_gid_bytes != 16 && dds.ros_gid_bytes != 24) {
+    section.fault("ros_gid_bytes", "must be 24 (ROS 2 up to Humble) or 16 (from Iron)");
+  }
+}
+
+bool is_topic_name(const std::string& name) {
+  constexpr const char* allowed =
+      "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_/";
+  return !name.empty() && name.find_first_not_of(allowed) == std::string::npos &&
+         name.front() != '/' && name.back() != '/' && name.find("//") == std::string::npos;
+}
+
+void read_topics(YamlSection section, TopicsConfig& topics) {
+  section.text("points", topics.points);
+  section.text("namespace", topics.name_space);
+  section.text("odometry_prior", topics.odometry_prior);
+  const std::string rule = "; ROS 2 names have letters, digits, '_', and '/' inside";
+  if (!is_topic_name(topics.points)) section.fault("points", "'" + topics.points + "'" + rule);
+  if (!is_topic_name(topics.name_space)) {
+    section.fault("namespace", "'" + topics.name_space + "'" + rule);
+  }
+  if (!topics.odometry_prior.empty() && !is_topic_name(topics.odometry_prior)) {
+    section.fault("odometry_prior", "'" + topics.odometry_prior + "'" + rule);
+  }
+}
+
+void read_fields(YamlSection section, PointFieldNames& fields) {
+  section.text_list("intensity", fields.intensity);
+  section.text_list("ring", fields.ring);
+  section.text_list("time", fields.time);
+  section.text_list("label", fields.label);
+}
+
+void read_input(YamlSection section, InputConfig& input) {
+  section.choice<Delivery>("delivery", input.delivery,
+                           {{"latest", Delivery::latest}, {"every", Delivery::every}});
+  section.whole("queue_length", input.queue_length, {1, 1000});
+  read_fields(section.section("fields"), input.fields);
+  section.choice<LabelKind>(
+      "label_kind", input.label_kind,
+      {{"semantic_kitti", LabelKind::semantic_kitti}, {"classes", LabelKind::classes}});
+}
+
+void read_publish(YamlSection section, PublishConfig& publish) {
+  section.number("path_period_s", publish.path_period_s, periods_s);
+  section.whole("path_poses", publish.path_poses, {2, 1000000});
+  section.number("cloud_period_s", publish.cloud_period_s, periods_s);
+  section.number("cloud_window_m", publish.cloud_window_m, {1, 1000});
+  section.number("tiles_period_s", publish.tiles_period_s, periods_s);
+  section.number("status_period_s", publish.status_period_s, periods_s);
+  section.flag("scan", publish.scan);
+}
+
+void read_map(YamlSection section, MapFileConfig& map) {
+  section.path("file", map.file);
+  section.number("save_period_s", map.save_period_s, {0.1, 86400});
+  section.whole("memory_limit_mib", map.memory_limit_mib, {0, 1 << 20});
+  section.flag("load_at_start", map.load_at_start);
+  section.text("datum", map.datum);
+  if (map.datum.empty()) return;
+  try {
+    static_cast<void>(datum_from_text(map.datum));
+  } catch (const std::invalid_argument& fault) {
+    section.fault("datum", fault.what());
+  }
+}
+
+void read_occupancy(YamlSection section, OccupancyServing& occupancy) {
+  OccupancyConfig& map = occupancy.map;
+  section.flag("enabled", occupancy.enabled);
+  section.number("resolution_m", map.resolution_m, {0.02, 10});
+  section.number("max_range_m", map.max_range_m, {1, 300});
+  section.number("clear_range_m", map.clear_range_m, {0, 300});
+  section.whole("clear_every", map.clear_every, {1, 1000});
+  section.number("clear_margin_m", map.clear_margin_m, {0, 100});
+  section.number("clear_margin_share", map.clear_margin_share, {0, 0.9});
+  section.number("hit_probability", map.hit_probability, {0.501, 0.99});
+  section.number("miss_probability", map.miss_probability, {0.01, 0.499});
+  section.whole("queue_length", occupancy.queue_length, {1, 1000});
+  section.number("publish_period_s", occupancy.publish_period_s, periods_s);
+}
+
+void read_areas(YamlSection section, const fs::path& folder, AreasConfig& areas) {
+  section.text_list("profiles", areas.profiles);
+  section.number("update_period_s", areas.update_period_s, periods_s);
+  section.text("grid_profile", areas.grid_profile);
+  section.number("grid_window_m", areas.grid_window_m, {0, 100'000});
+  for (std::string& profile : areas.profiles) profile = robot_from(folder, profile);
+  try {
+    const std::vector<RobotProfile> robots = robots_of(areas);
+    if (areas.grid_profile.empty() || robots.empty()) return;
+    if (std::ranges::find(robots, areas.grid_profile, &RobotProfile::name) != robots.end()) return;
+    section.fault("grid_profile",
+                  "'" + areas.grid_profile + "' is not one of areas.profiles; empty: no grid");
+  } catch (const ConfigError& error) {
+    for (const std::string& fault : error.faults()) section.fault("profiles", fault);
+  }
+}
+
+void read_log(YamlSection section, LogConfig& log) {
+  section.choice<LogLevel>("level", log.level,
+                           {{"debug", LogLevel::debug},
+                            {"info", LogLevel::info},
+                            {"warning", LogLevel::warning},
+                            {"error", LogLevel::error}});
+}
+
+void read_metrics(YamlSection section, MetricsConfig& metrics) {
+  section.text("address", metrics.address);
+  if (metrics.address.empty()) return;
+  const std::string fault = listening_address_fault(metrics.address);
+  if (!fault.empty()) section.fault("address", fault);
+}
+
+void read_server(YamlSection file, const fs::path& folder, ServerConfig& config) {
+  read_sensor_name(file, folder, config.mapper.sensor);
+  read_mapper(file, config.mapper);
+  read_labels(file.section("labels"), config.labels);
+  read_frames(file.section("frames"), config.frames);
+  read_dds(file.section("dds"), folder, config.dds);
+  read_topics(file.section("topics"), config.topics);
+  read_input(file.section("input"), config.input);
+  read_publish(file.section("publish"), config.publish);
+  read_map(file.section("map"), config.map);
+  read_occupancy(file.section("occupancy"), config.occupancy);
+  read_areas(file.section("areas"), folder, config.areas);
+  read_log(file.section("log"), config.log);
+  read_metrics(file.section("metrics"), config.metrics);
+}
+
+}  // namespace
+
+std::vector<RobotProfile> robots_of(const AreasConfig& areas) {
+  std::vector<RobotProfile> robots;
+  std::vector<std::string> faults;
+  for (const std::string& profile : areas.profiles) {
+    try {
+      RobotProfile robot = load_robot_profile(profile);
+      if (std::ranges::find(robots, robot.name, &RobotProfile::name) != robots.end()) {
+        faults.push_back("two robots are called '" + robot.name + "'; clients ask by name");
+      }
+      robots.push_back(std::move(robot));
+    } catch (const ConfigError& error) {
+      faults.insert(faults.end(), error.faults().begin(), error.faults().end());
+    }
+  }
+  if (!faults.empty()) throw ConfigError(faults);
+  return robots;
+}
+
+ServerConfig load_server_config(const fs::path& file) {
+  ConfigReport report;
+  return load_server_config(file, report);
+}
+
+ServerConfig load_server_config(const fs::path& file, ConfigReport& report) {
+  YamlFile yaml = open_yaml(file);
+  ServerConfig config;
+  read_server(YamlSection(yaml), file.parent_path(), config);
+  yaml.require_no_faults();
+  report = std::move(yaml.report);
+  return config;
+}
+
+}  // namespace stillmap

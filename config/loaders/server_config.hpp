@@ -1,0 +1,194 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "config/loaders/config_error.hpp"
+#include "config/loaders/config_report.hpp"
+#include "config/loaders/dds_profile.hpp"
+#include "core/lidar/sensor_model.hpp"
+#include "core/mapper.hpp"
+#include "core/occupancy/occupancy_config.hpp"
+#include "core/segmentation/open_network.hpp"
+#include "core/traversability/robot_profile.hpp"
+
+namespace stillmap {
+
+/// Where the class of a point comes from.
+enum class LabelOrigin {
+  /// The label field of the incoming cloud where it is there, else the network.
+  automatic,
+  /// The label field of the incoming cloud where it is there, else none.
+  stream,
+  /// A network, `LabelsConfig::model`.
+  model,
+  /// Pure geometry.
+  none,
+};
+
+struct LabelsConfig {
+  LabelOrigin source = LabelOrigin::automatic;
+  /// Name of a model that comes with Stillmap, or folder of one; see find_model().
+  std::filesystem::path model = "street";
+  /// Columns of the range image that the network gets; 0: as the model says.
+  int image_columns = 0;
+  /// What runs the network.
+  EngineChoice engine;
+  /// Longest wait of a scan for the network's labels; then it goes on with labels carried from the
+  /// map and earlier scans. 0: as long as it takes, as with input delivery `every`.
+  std::uint32_t budget_ms = 90;
+};
+
+/// Names of the coordinate frames in everything that is published.
+struct FramesConfig {
+  std::string map = "map";
+  /// Empty: the frame that the incoming clouds name.
+  std::string lidar = "lidar";
+};
+
+struct DdsConfig {
+  /// 0..232, as DDS defines it; ROS_DOMAIN_ID of the ROS 2 peers.
+  std::uint32_t domain_id = 0;
+  /// Transports, discovery and pacing, for the kind of network; what is set on top of it.
+  DdsChoice network;
+  std::string participant_name = "stillmap_server";
+  /// Length of a GID in ros_discovery_info: 24 up to ROS 2 Humble, 16 from Iron.
+  std::uint32_t ros_gid_bytes = 24;
+  /// Folder of the server's identity in a secured domain; empty: no security.
+  std::filesystem::path security;
+};
+
+/// ROS 2 topic names, without the prefixes that DDS sees.
+struct TopicsConfig {
+  std::string points = "points";
+  /// Put before the name of everything that the server offers: stillmap/odometry.
+  std::string name_space = "stillmap";
+  /// A nav_msgs/Odometry whose motion predicts the next pose; empty: constant velocity.
+  std::string odometry_prior = "odom_prior";
+};
+
+enum class Delivery {
+  /// Best-effort reader and a queue that drops the oldest scan: live sensors.
+  latest,
+  /// Reliable KEEP_ALL reader with back-pressure: the sender waits, nothing is lost. Replays.
+  every,
+};
+
+/// What the numbers in a cloud's label field are.
+enum class LabelKind {
+  /// Original SemanticKITTI ids (10 = car); moving ids are reduced to their class.
+  semantic_kitti,
+  /// Stillmap's classes, 0..19.
+  classes,
+};
+
+/// Names under which a point field may appear in a cloud; the first that is there is taken.
+struct PointFieldNames {
+  std::vector<std::string> intensity = {"reflectivity", "intensity", "i"};
+  std::vector<std::string> ring = {"ring", "channel"};
+  std::vector<std::string> time = {"time", "t", "timestamp", "time_stamp", "offset_time"};
+  std::vector<std::string> label = {"label"};
+};
+
+struct InputConfig {
+  Delivery delivery = Delivery::latest;
+  /// Scans that may wait for the mapper.
+  std::uint32_t queue_length = 3;
+  PointFieldNames fields;
+  LabelKind label_kind = LabelKind::semantic_kitti;
+};
+
+struct PublishConfig {
+  double path_period_s = 1.0;
+  /// A longer path is published with every 2nd, 4th, ... pose.
+  std::size_t path_poses = 5000;
+  double cloud_period_s = 1.0;
+  /// Edge of the square round the robot that static_cloud shows.
+  double cloud_window_m = 60.0;
+  double tiles_period_s = 0.5;
+  double status_period_s = 1.0;
+  /// Publish every labelled scan (stillmap/scan).
+  bool scan = true;
+};
+
+struct MapFileConfig {
+  /// Empty: the map is not saved.
+  std::filesystem::path file;
+  /// Between checkpoints; a server that is killed loses up to this and the time of a save.
+  double save_period_s = 5.0;
+  /// Of the static map, its copies for readers and for queries. What is far away is on disk. 0: all
+  /// of the map stays in memory.
+  std::uint32_t memory_limit_mib = 2048;
+  /// Go on with the map in `file` when it exists; else start empty.
+  bool load_at_start = true;
+  /// Where the map's origin lies, as datum_from_text() reads it; goes into the map file. Empty: not
+  /// known.
+  std::string datum;
+};
+
+/// The octree of occupied, free and unknown space that is kept beside the static map.
+struct OccupancyServing {
+  bool enabled = true;
+  OccupancyConfig map;
+  /// Scans that may wait for it; those too many are left out.
+  std::uint32_t queue_length = 16;
+  /// Shortest time between two octrees on stillmap/octomap.
+  double publish_period_s = 5.0;
+};
+
+/// Where robots can go, kept up to date with the map.
+struct AreasConfig {
+  /// Robots by name or file, as load_robot_profile takes them; empty: no areas.
+  std::vector<std::string> profiles = {"car", "delivery_robot"};
+  /// Shortest time from update to update; nothing is done while the map stays as it is.
+  double update_period_s = 1.0;
+  /// The robot whose area is published as a grid; empty: none.
+  std::string grid_profile = "car";
+  /// Edge of the square round the robot that the grid shows; 0: the whole map.
+  double grid_window_m = 0.0;
+};
+
+enum class LogLevel { debug, info, warning, error };
+
+/// What goes to stderr.
+struct LogConfig {
+  LogLevel level = LogLevel::info;
+};
+
+/// Figures for Prometheus over HTTP.
+struct MetricsConfig {
+  /// Where it listens, as address:port; port 0 takes a free one. Empty: nowhere.
+  std::string address;
+};
+
+/// The robots that areas are kept for. Throws ConfigError with every fault: robots that do not
+/// exist (with those that do), or two of one name.
+[[nodiscard]] std::vector<RobotProfile> robots_of(const AreasConfig& areas);
+
+/// Everything that stillmap-server can be told. Works as it is, with a 64-beam sensor and no file.
+struct ServerConfig {
+  MapperConfig mapper{.sensor = hdl_64e(), .prepare = {}, .odometry = {}, .static_map = {}};
+  LabelsConfig labels;
+  FramesConfig frames;
+  DdsConfig dds;
+  TopicsConfig topics;
+  InputConfig input;
+  PublishConfig publish;
+  MapFileConfig map;
+  OccupancyServing occupancy;
+  AreasConfig areas;
+  LogConfig log;
+  MetricsConfig metrics;
+};
+
+/// Reads a server file (config/server/default.yaml shows every field). What the file leaves out
+/// keeps its default; relative paths start at the file's folder. Throws ConfigError with every
+/// fault at once; a name that is not known is a fault.
+[[nodiscard]] ServerConfig load_server_config(const std::filesystem::path& file);
+/// The same, and tells which fields the file leaves out and which it changes.
+[[nodiscard]] ServerConfig load_server_config(const std::filesystem::path& file,
+                                              ConfigReport& report);
+
+}  // namespace stillmap

@@ -1,0 +1,102 @@
+#include "core/dataset/file_stamp.hpp"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <system_error>
+
+namespace stillmap {
+namespace {
+
+constexpr std::int64_t ns_per_s = 1'000'000'000;
+/// Whole seconds that fit into 64 bits of nanoseconds.
+constexpr std::size_t most_digits_of_seconds = 10;
+constexpr double most_seconds = 9.2e9;
+
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
+/// Length of the digits at the front of the text.
+std::size_t digits_in_front(std::string_view text) {
+  return static_cast<std::size_t>(std::ranges::find_if_not(text, is_digit) - text.begin());
+}
+
+/// Value of up to 18 digits.
+std::int64_t value_of(std::string_view digits) {
+  std::int64_t value = 0;
+  for (const char digit : digits) value = 10 * value + (digit - '0');
+  return value;
+}
+
+std::optional<std::int64_t> from_floating_point(std::string_view text) {
+  double seconds = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
+  if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
+  if (!(std::abs(seconds) < most_seconds)) return std::nullopt;
+  return std::llround(seconds * static_cast<double>(ns_per_s));
+}
+
+}  // namespace
+
+std::optional<std::int64_t> ns_from_seconds(std::string_view text) {
+  const bool negative = text.starts_with('-');
+  const std::string_view number = text.substr(negative ? 1 : 0);
+  const std::size_t whole = digits_in_front(number);
+  std::string_view decimals = number.substr(whole);
+  if (decimals.starts_with('.')) decimals.remove_prefix(1);
+  if (whole == 0 || whole > most_digits_of_seconds || digits_in_front(decimals) < decimals.size()) {
+    return from_floating_point(text);
+  }
+  const std::int64_t seconds = value_of(number.substr(0, whole));
+  if (static_cast<double>(seconds) >= most_seconds) return std::nullopt;
+  std::int64_t fraction_ns = 0;
+  for (std::size_t i = 0; i < 9; ++i) {
+    fraction_ns = 10 * fraction_ns + (i < decimals.size() ? decimals[i] - '0' : 0);
+  }
+  const std::int64_t ns = seconds * ns_per_s + fraction_ns;
+  return negative ? -ns : ns;
+}
+
+std::optional<std::int64_t> stamp_ns_from_name(std::string_view stem) {
+  const std::size_t whole = digits_in_front(stem);
+  if (whole == 0) return std::nullopt;
+  if (whole < stem.size()) {
+    const bool decimals_follow = stem[whole] == '.' && whole + 1 < stem.size() &&
+                                 digits_in_front(stem.substr(whole + 1)) == stem.size() - whole - 1;
+    return decimals_follow ? ns_from_seconds(stem) : std::nullopt;
+  }
+  // What comes later does not fit into 64 bits.
+  constexpr std::string_view latest = "9200000000000000000";
+  if (stem >= latest.substr(0, whole)) return std::nullopt;
+  if (whole == 16) return value_of(stem) * 1000;
+  if (whole == 19) {
+    return value_of(stem.substr(0, 10)) * ns_per_s + value_of(stem.substr(10));
+  }
+  return std::nullopt;
+}
+
+bool natural_less(std::string_view a, std::string_view b) {
+  const std::string_view whole_a = a, whole_b = b;
+  while (!a.empty() && !b.empty()) {
+    std::size_t digits_a = digits_in_front(a), digits_b = digits_in_front(b);
+    if (digits_a == 0 || digits_b == 0) {
+      if (a.front() != b.front()) return a.front() < b.front();
+      a.remove_prefix(1);
+      b.remove_prefix(1);
+      continue;
+    }
+    const auto zeros = [](std::string_view text, std::size_t digits) {
+      return std::min(text.find_first_not_of('0'), digits);
+    };
+    std::string_view number_a = a.substr(zeros(a, digits_a), digits_a - zeros(a, digits_a));
+    std::string_view number_b = b.substr(zeros(b, digits_b), digits_b - zeros(b, digits_b));
+    if (number_a.size() != number_b.size()) return number_a.size() < number_b.size();
+    if (number_a != number_b) return number_a < number_b;
+    a.remove_prefix(digits_a);
+    b.remove_prefix(digits_b);
+  }
+  // Equal but for leading zeros: any fixed order will do.
+  if (a.empty() && b.empty()) return whole_a < whole_b;
+  return a.empty();
+}
+
+}  // namespace stillmap

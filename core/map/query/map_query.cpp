@@ -1,0 +1,135 @@
+#include "core/map/query/map_query.hpp"
+
+#include <algorithm>
+
+#include "core/map/query/coarse_cells.hpp"
+#include "core/map/query/continuation.hpp"
+#include "core/map/query/query_checks.hpp"
+#include "core/map/query/query_selection.hpp"
+
+namespace stillmap {
+namespace {
+
+QueryVoxel query_voxel(const Voxel& voxel) {
+  return {voxel.mean_map, voxel.evidence.winner(), voxel.evidence.share(), voxel.point_count};
+}
+
+/// A query that was found fine, and where its answer comes from.
+struct Selection {
+  const MapView& view;
+  const MapQuery& query;
+  RegionShape region;
+  std::vector<std::size_t> tiles;
+  TileReader& reader;
+};
+
+/// A page of the map's own voxels, from `position` on, which moves on to the next page's first
+/// voxel. True when there is one.
+bool fill_page(const Selection& from, Continuation& position, std::vector<QueryVoxel>& page) {
+  const std::size_t page_size = from.query.max_bytes / query_voxel_bytes;
+  for (const std::size_t i : from.tiles) {
+    if (i < position.tile) continue;
+    const auto read = from.reader.whole(from.view.tiles[i]);
+    const Tile& tile = *read;
+    const VoxelFilter filter(from.query, from.region, tile);
+    for (std::size_t v = i == position.tile ? position.voxel : 0; v < tile.voxels.size(); ++v) {
+      if (!filter.takes(tile.voxels[v])) continue;
+      if (page.size() == page_size) {
+        position.tile = i;
+        position.voxel = v;
+        return true;
+      }
+      page.push_back(query_voxel(tile.voxels[v]));
+    }
+  }
+  return false;
+}
+
+/// A page of a coarser answer. Every page merges the whole region anew: the service keeps nothing
+/// between requests.
+bool fill_coarse_page(const Selection& from, Continuation& position,
+                      std::vector<QueryVoxel>& page) {
+  CoarseCells cells(from.query.resolution_m);
+  for (const std::size_t i : from.tiles) {
+    const auto tile = from.reader.whole(from.view.tiles[i]);
+    const VoxelFilter filter(from.query, from.region, *tile);
+    for (const Voxel& voxel : tile->voxels) {
+      if (filter.takes(voxel)) cells.add(voxel);
+    }
+  }
+  const std::vector<QueryVoxel> all = cells.sorted();
+  const std::size_t begin = std::min<std::size_t>(position.voxel, all.size());
+  const std::size_t end = std::min(all.size(), begin + from.query.max_bytes / query_voxel_bytes);
+  page.assign(all.begin() + static_cast<std::ptrdiff_t>(begin),
+              all.begin() + static_cast<std::ptrdiff_t>(end));
+  position.total_voxels = all.size();
+  position.voxel = end;
+  return end < all.size();
+}
+
+MapQueryResult result_of(const MapView& view, QueryStatus status, std::string reason) {
+  MapQueryResult result;
+  result.status = status;
+  result.reason = std::move(reason);
+  result.map_version = view.version;
+  result.map_id = view.map_id;
+  return result;
+}
+
+/// Where the answer goes on, or why it does not.
+struct Start {
+  Continuation position;
+  std::optional<Refusal> refusal;
+};
+
+Start start_of(const MapView& view, const MapQuery& query, const TileHistory* history) {
+  if (std::string faults = query_faults(view, query); !faults.empty()) {
+    return {{}, Refusal{QueryStatus::invalid_request, std::move(faults)}};
+  }
+  if (query.continuation.empty()) {
+    return {{view.map_id, view.version, fingerprint(query), 0, 0, 0},
+            query.since ? since_refusal(view, *query.since, history) : std::nullopt};
+  }
+  const std::optional<Continuation> token = from_token(query.continuation);
+  return {token.value_or(Continuation()), token_refusal(view, query, token)};
+}
+
+/// Tiles and total of an answer, for its first page.
+void describe(const Selection& selection, const TileHistory* history, Continuation& position,
+              MapQueryResult& result) {
+  result.tiles = tile_changes(selection.view, selection.query, selection.region, selection.tiles,
+                              history, selection.reader);
+  for (const TileChange& tile : result.tiles) position.total_voxels += tile.voxel_count;
+}
+
+}  // namespace
+
+MapQueryResult query_map(const MapView& view, const MapQuery& query, const TileHistory* history,
+                         TileReader& reader) {
+  auto [position, refusal] = start_of(view, query, history);
+  if (refusal) return result_of(view, refusal->status, std::move(refusal->reason));
+
+  const RegionShape region(query.region);
+  const Selection selection{view, query, region, selected_tiles(view, query, region), reader};
+  const bool is_coarse = wants_coarse(view, query.resolution_m);
+  MapQueryResult result = result_of(view, QueryStatus::ok, {});
+  if (!is_coarse && query.continuation.empty()) describe(selection, history, position, result);
+  const bool has_more = is_coarse ? fill_coarse_page(selection, position, result.voxels)
+                                  : fill_page(selection, position, result.voxels);
+  result.total_voxels = position.total_voxels;
+  if (has_more) result.continuation = to_token(position);
+  return result;
+}
+
+MapQueryResult query_map(const MapView& view, const MapQuery& query, const TileHistory* history) {
+  TileReader reader;
+  return query_map(view, query, history, reader);
+}
+
+std::optional<std::uint64_t> continuation_version(const std::string& continuation) {
+  const std::optional<Continuation> token = from_token(continuation);
+  if (!token) return std::nullopt;
+  return token->map_version;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <bitset>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/lidar/motion.hpp"
+#include "core/map/query/region.hpp"
+#include "core/map/tile.hpp"
+#include "core/map/query/tile_history.hpp"
+#include "core/map/query/tile_reader.hpp"
+
+namespace stillmap {
+
+/// A state of a map that a client has already.
+struct KnownVersion {
+  std::uint64_t map_id = 0;
+  std::uint64_t version = 0;
+};
+
+/// A region of the static map.
+struct MapQuery {
+  Region region = BoxRegion{};
+  /// Classes wanted; none set means all. Taken before voxels are merged: a pole next to a wall is
+  /// still found at a coarse resolution.
+  std::bitset<semantic_class_count> classes;
+  /// Kinds of motion wanted, by the values of Motion; none set means stationary. The static map
+  /// keeps stationary voxels only: a query without them is refused.
+  std::bitset<3> motions;
+  /// Voxel size of the answer [m]; 0 is the map's own. Finer than the map's own is refused.
+  double resolution_m = 0.0;
+  /// Largest size of a page's voxels in bytes; at least one voxel's.
+  std::uint32_t max_bytes = 1'000'000;
+  /// Only tiles that changed since, at the map's own resolution.
+  std::optional<KnownVersion> since;
+  /// Where the last page ended; empty for the first page.
+  std::string continuation;
+};
+
+struct QueryVoxel {
+  Eigen::Vector3f position_map;
+  SemanticClass label = SemanticClass::unlabeled;
+  /// Share of the evidence that speaks for the label, 0..1.
+  float confidence = 0.0F;
+  std::uint32_t point_count = 0;
+};
+
+enum class TileChangeKind : std::uint8_t {
+  /// Was not there at `since`; without `since`, every tile.
+  appeared = 0,
+  changed = 1,
+  /// Has nothing to show any more, in any region.
+  removed = 2,
+};
+
+/// A tile of an answer. Who holds an older answer forgets the tile's voxels and takes these.
+struct TileChange {
+  TileId id;
+  TileChangeKind kind = TileChangeKind::appeared;
+  /// Version of the map in which it last changed, or went.
+  std::uint64_t revision = 0;
+  /// Voxels of the answer that are the tile's. An answer's voxels are in the order of its tiles.
+  std::uint32_t voxel_count = 0;
+  friend bool operator==(const TileChange&, const TileChange&) = default;
+};
+
+enum class QueryStatus : std::uint8_t {
+  ok = 0,
+  invalid_request = 1,
+  stale_continuation = 2,
+  /// The server could not answer.
+  failed = 3,
+  /// `since` is of another map, or older than what the server remembers: ask for everything.
+  changes_unknown = 4,
+};
+
+struct MapQueryResult {
+  QueryStatus status = QueryStatus::ok;
+  /// Why it is not ok: names the field, its value and what would do.
+  std::string reason;
+  /// Version of the map that every page of this query shows.
+  std::uint64_t map_version = 0;
+  std::uint64_t map_id = 0;
+  std::vector<QueryVoxel> voxels;
+  /// Voxels of the whole answer, all pages.
+  std::uint64_t total_voxels = 0;
+  /// Tiles of the whole answer, on its first page: those that stand there first, then those that
+  /// were removed. Empty at a coarser resolution, whose cells are not the tiles'.
+  std::vector<TileChange> tiles;
+  /// Hand back for the next page; empty after the last one.
+  std::string continuation;
+};
+
+/// Bytes of one QueryVoxel on the wire; what `max_bytes` counts.
+inline constexpr std::size_t query_voxel_bytes = 3 * sizeof(float) + 1 + sizeof(float) + 4;
+
+/// Answers `query` from one view. A voxel is in the region when its position is. A continuation
+/// made from another map or version is stale; a damaged one, or one of another query, is invalid.
+/// `history` ends with this view; only the first page of a query with `since` needs it, and is
+/// refused without. Tiles that are away come through `reader`, one after the other; throws as that
+/// does.
+[[nodiscard]] MapQueryResult query_map(const MapView& view, const MapQuery& query,
+                                       const TileHistory* history, TileReader& reader);
+/// Of a view that has all its voxels.
+[[nodiscard]] MapQueryResult query_map(const MapView& view, const MapQuery& query,
+                                       const TileHistory* history = nullptr);
+
+/// The map version that a continuation wants, to find the view it was made from.
+[[nodiscard]] std::optional<std::uint64_t> continuation_version(const std::string& continuation);
+
+}  // namespace stillmap

@@ -1,0 +1,114 @@
+#include "core/map/query/polygon_shape.hpp"
+
+#include <numeric>
+
+namespace stillmap {
+namespace {
+
+/// The grid points round a box, so that the box is inside.
+GridEdge diagonal_round(const Eigen::AlignedBox2d& box_map) {
+  const GridPoint low = to_grid(box_map.min());
+  const GridPoint high = to_grid(box_map.max());
+  return {{low.x - 1, low.y - 1}, {high.x + 1, high.y + 1}};
+}
+
+/// Whether an edge has a point in the box with this diagonal: it does unless one of the box's axes
+/// or the edge's own line keeps them apart.
+bool meets_box(const GridEdge& edge, const GridEdge& box) {
+  if (!boxes_meet(edge, box)) return false;
+  const int low_left = turn(edge.a, edge.b, box.a);
+  const auto other_side = [&](GridPoint corner) {
+    return turn(edge.a, edge.b, corner) != low_left;
+  };
+  return low_left == 0 || other_side({box.b.x, box.a.y}) || other_side(box.b) ||
+         other_side({box.a.x, box.b.y});
+}
+
+/// Edges with one common corner: whether the second goes back along the first.
+bool folds_back(const GridEdge& first, const GridEdge& second) {
+  if (turn(first.a, first.b, second.b) != 0) return false;
+  return first.a.x != first.b.x ? (first.a.x < first.b.x) != (second.a.x < second.b.x)
+                                : (first.a.y < first.b.y) != (second.a.y < second.b.y);
+}
+
+}  // namespace
+
+PolygonShape::PolygonShape(const std::vector<Eigen::Vector2d>& corners_map) {
+  for (std::size_t i = 0; i < corners_map.size(); ++i) {
+    const GridEdge edge{to_grid(corners_map[i]),
+                        to_grid(corners_map[(i + 1) % corners_map.size()])};
+    if (edge.a == edge.b) continue;
+    edges_.push_back(edge);
+    first_corner_.push_back(i);
+  }
+}
+
+bool PolygonShape::may_meet(std::size_t i, std::size_t j) const {
+  const std::size_t count = edges_.size();
+  if ((i + 1) % count == j) return !folds_back(edges_[i], edges_[j]);
+  if ((j + 1) % count == i) return !folds_back(edges_[j], edges_[i]);
+  return false;
+}
+
+std::optional<std::pair<std::size_t, std::size_t>> PolygonShape::crossing() const {
+  // Swept from left to right: an edge is compared with those that begin before it ends.
+  std::vector<std::size_t> order(edges_.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::ranges::sort(order, {}, [&](std::size_t i) { return edges_[i].min_x(); });
+  for (auto s = order.begin(); s != order.end(); ++s) {
+    for (auto t = s + 1; t != order.end() && edges_[*t].min_x() <= edges_[*s].max_x(); ++t) {
+      if (!edges_meet(edges_[*s], edges_[*t]) || may_meet(*s, *t)) continue;
+      const auto [first, second] = std::minmax(*s, *t);
+      return std::pair(first_corner_[first], first_corner_[second]);
+    }
+  }
+  return std::nullopt;
+}
+
+bool PolygonShape::has_area() const {
+  return std::ranges::any_of(edges_, [&](const GridEdge& edge) {
+    return turn(edges_.front().a, edges_.front().b, edge.b) != 0;
+  });
+}
+
+bool PolygonShape::contains(const Eigen::Vector2d& p_map) const {
+  const GridPoint p = to_grid(p_map);
+  bool is_inside = false;
+  for (const GridEdge& edge : edges_) {
+    if (p.y < edge.min_y() || p.y > edge.max_y() || p.x > edge.max_x()) continue;
+    const int side = turn(edge.a, edge.b, p);
+    if (side == 0 && p.x >= edge.min_x()) return true;
+    // A ray towards +x; an edge owns its lower end only.
+    const bool is_crossed = (edge.a.y <= p.y) != (edge.b.y <= p.y);
+    if (is_crossed && (edge.b.y > edge.a.y) == (side > 0)) is_inside = !is_inside;
+  }
+  return is_inside;
+}
+
+bool PolygonShape::outline_meets(const Eigen::AlignedBox2d& box_map) const {
+  const GridEdge box = diagonal_round(box_map);
+  return std::ranges::any_of(edges_, [&](const GridEdge& edge) { return meets_box(edge, box); });
+}
+
+bool PolygonShape::meets(const Eigen::AlignedBox2d& box_map) const {
+  return outline_meets(box_map) || contains(box_map.min());
+}
+
+bool PolygonShape::covers(const Eigen::AlignedBox2d& box_map) const {
+  return !outline_meets(box_map) && contains(box_map.min());
+}
+
+PolygonShape PolygonShape::near(const Eigen::AlignedBox2d& box_map) const {
+  const GridEdge box = diagonal_round(box_map);
+  PolygonShape part;
+  for (std::size_t i = 0; i < edges_.size(); ++i) {
+    const GridEdge& edge = edges_[i];
+    // Only these can be met by a ray towards +x from a point in the box.
+    if (edge.max_x() < box.a.x || edge.max_y() < box.a.y || edge.min_y() > box.b.y) continue;
+    part.edges_.push_back(edge);
+    part.first_corner_.push_back(first_corner_[i]);
+  }
+  return part;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <list>
+#include <memory>
+#include <mutex>
+#include <stdexcept>
+
+#include "core/map/tile.hpp"
+#include "core/map/tile_store.hpp"
+
+namespace stillmap {
+
+/// The shelf has another state of the tile than the view that names it: ask of a newer view.
+class TileChanged : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+/// Reads tiles of views, wherever their voxels are, and keeps those that it brought last, so that
+/// a region that is asked for again and again is read once. Thread-safe.
+class TileReader {
+ public:
+  /// Without a shelf, every tile must have its voxels. Keeps about `kept_bytes`.
+  explicit TileReader(std::shared_ptr<TileShelf> shelf = nullptr, std::size_t kept_bytes = 0);
+
+  /// From now on they come from there.
+  void use_shelf(std::shared_ptr<TileShelf> shelf);
+
+  /// The tile with its voxels. Throws TileChanged, or as the shelf does.
+  [[nodiscard]] std::shared_ptr<const Tile> whole(const std::shared_ptr<const Tile>& tile);
+
+  /// The view with the voxels of these tiles of it (positions in `tiles`), all at once.
+  [[nodiscard]] MapView with_voxels(const MapView& view, const std::vector<std::size_t>& tiles);
+
+ private:
+  [[nodiscard]] std::shared_ptr<TileShelf> shelf();
+  [[nodiscard]] std::shared_ptr<const Tile> kept(const TileInfo& wanted);
+  void keep(std::shared_ptr<const Tile> tile);
+
+  std::shared_ptr<TileShelf> shelf_;
+  std::size_t kept_bytes_;
+  std::mutex mutex_;
+  /// Most recently used first.
+  std::list<std::shared_ptr<const Tile>> kept_;
+  std::size_t bytes_ = 0;
+};
+
+}  // namespace stillmap

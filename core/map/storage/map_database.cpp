@@ -1,0 +1,192 @@
+#include "core/map/storage/map_database.hpp"
+
+#include <SQLiteCpp/Exception.h>
+#include <SQLiteCpp/Statement.h>
+#include <SQLiteCpp/Transaction.h>
+#include <sqlite3.h>
+
+#include <array>
+#include <cstdint>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "core/map/storage/map_file.hpp"
+#include "core/map/storage/tile_codec.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::uint32_t application_id = 0x53744D70;  // "StMp"
+constexpr std::uint32_t schema_version = 2;
+constexpr std::uint32_t oldest_schema_version = 1;
+constexpr int busy_timeout_ms = 5000;
+
+constexpr const char* schema = R"sql(
+  CREATE TABLE map (
+    only_row INTEGER PRIMARY KEY CHECK (only_row = 0),
+    map_id INTEGER NOT NULL, version INTEGER NOT NULL,
+    tile_size_m REAL NOT NULL, voxel_size_m REAL NOT NULL);
+  CREATE TABLE tiles (
+    x INTEGER NOT NULL, y INTEGER NOT NULL,
+    revision INTEGER NOT NULL, content_hash INTEGER NOT NULL,
+    encoded BLOB NOT NULL,
+    voxel_count INTEGER NOT NULL DEFAULT 0,
+    min_x REAL, min_y REAL, min_z REAL, max_x REAL, max_y REAL, max_z REAL,
+    PRIMARY KEY (x, y));
+  CREATE TABLE trajectory (
+    position INTEGER PRIMARY KEY, stamp_ns INTEGER NOT NULL,
+    x REAL NOT NULL, y REAL NOT NULL, z REAL NOT NULL,
+    qx REAL NOT NULL, qy REAL NOT NULL, qz REAL NOT NULL, qw REAL NOT NULL);
+  CREATE TABLE metadata (key TEXT PRIMARY KEY, value TEXT NOT NULL);
+)sql";
+
+constexpr const char* memories_table = R"sql(
+  CREATE TABLE memories (
+    x INTEGER NOT NULL, y INTEGER NOT NULL, encoded BLOB NOT NULL,
+    PRIMARY KEY (x, y));
+)sql";
+
+fs::path beside(const fs::path& file, const char* suffix) {
+  fs::path path = file;
+  path += suffix;
+  return path;
+}
+
+/// SQLite's file header has its numbers big-endian.
+std::uint32_t big_endian(std::string_view bytes) {
+  std::uint32_t value = 0;
+  for (const char byte : bytes) value = value << 8 | static_cast<std::uint8_t>(byte);
+  return value;
+}
+
+/// Reads the header as plain bytes: SQLite itself might already repair or create something.
+void check_header(const fs::path& file) {
+  constexpr std::string_view magic("SQLite format 3\0", 16);
+  std::array<char, 100> bytes{};
+  std::ifstream stream(file, std::ios::binary);
+  stream.read(bytes.data(), bytes.size());
+  const std::string_view header(bytes.data(), static_cast<std::size_t>(stream.gcount()));
+  if (header.size() < bytes.size() || !header.starts_with(magic)) {
+    throw MapFileError(file, "is not a map file (no SQLite database); name another file");
+  }
+  if (big_endian(header.substr(68, 4)) != application_id) {
+    throw MapFileError(file, "is a database of another program; name another file");
+  }
+  const std::uint32_t version = big_endian(header.substr(60, 4));
+  if (version > schema_version) {
+    throw MapFileError(file, "was written by a newer Stillmap (schema " + std::to_string(version) +
+                                 ", this one knows " + std::to_string(schema_version) +
+                                 "); update this program");
+  }
+  if (version < oldest_schema_version) {
+    throw MapFileError(file, "is damaged: it has schema " + std::to_string(version));
+  }
+}
+
+/// Makes the file under another name first, so that no half-made file ever bears this one.
+void create(const fs::path& file) {
+  const fs::path fresh = beside(file, ".new");
+  for (const fs::path& leftover :
+       {fresh, beside(fresh, "-journal"), beside(file, "-wal"), beside(file, "-shm")}) {
+    std::error_code none_there;
+    fs::remove(leftover, none_there);
+  }
+  {
+    SQLite::Database database(fresh.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    SQLite::Transaction transaction(database);
+    database.exec("PRAGMA application_id = " + std::to_string(application_id));
+    database.exec("PRAGMA user_version = " + std::to_string(schema_version));
+    database.exec(schema);
+    database.exec(memories_table);
+    transaction.commit();
+    database.exec("PRAGMA journal_mode = WAL");
+  }
+  fs::rename(fresh, file);
+}
+
+void check_pages(SQLite::Database& database, const fs::path& file) {
+  // A log left by a crash must not be written into a file that turns out to be damaged.
+  const bool has_log = fs::exists(beside(file, "-wal"));
+  sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, has_log ? 1 : 0,
+                    nullptr);
+  SQLite::Statement check(database, "PRAGMA quick_check(1)");
+  check.executeStep();
+  if (const std::string verdict = check.getColumn(0).getString(); verdict != "ok") {
+    throw MapFileError(file, "is damaged (" + verdict + "); restore a copy or name another file");
+  }
+  sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
+}
+
+SQLite::Database open_or_create(const fs::path& file) {
+  if (!fs::exists(file) || (fs::is_regular_file(file) && fs::file_size(file) == 0)) create(file);
+  if (!fs::is_regular_file(file)) throw MapFileError(file, "is not a file; name another one");
+  check_header(file);
+  SQLite::Database database(file.string(), SQLite::OPEN_READWRITE, busy_timeout_ms);
+  check_pages(database, file);
+  // FULL: a save that returned survives a power cut, not only a crash.
+  database.exec("PRAGMA synchronous = FULL");
+  return database;
+}
+
+/// A stored tile's counts and bounds, for its new columns.
+void fill_in_infos(SQLite::Database& database) {
+  SQLite::Statement row(database, "SELECT x, y, encoded FROM tiles");
+  SQLite::Statement update(database,
+                           "UPDATE tiles SET voxel_count = ?, min_x = ?, min_y = ?, min_z = ?, "
+                           "max_x = ?, max_y = ?, max_z = ? WHERE x = ? AND y = ?");
+  while (row.executeStep()) {
+    const SQLite::Column blob = row.getColumn(2);
+    const TileInfo info = decode_tile({static_cast<const std::uint8_t*>(blob.getBlob()),
+                                       static_cast<std::size_t>(blob.getBytes())})
+                              .info;
+    update.bind(1, info.voxel_count);
+    for (int axis = 0; axis < 3; ++axis) {
+      update.bind(2 + axis, static_cast<double>(info.bounds_map.min()[axis]));
+      update.bind(5 + axis, static_cast<double>(info.bounds_map.max()[axis]));
+    }
+    update.bind(8, row.getColumn(0).getInt());
+    update.bind(9, row.getColumn(1).getInt());
+    update.exec();
+    update.reset();
+  }
+}
+
+}  // namespace
+
+bool has_first_schema(SQLite::Database& database) {
+  return database.execAndGet("PRAGMA user_version").getInt() == oldest_schema_version;
+}
+
+void upgrade_schema(SQLite::Database& database) {
+  SQLite::Transaction transaction(database, SQLite::TransactionBehavior::IMMEDIATE);
+  database.exec("ALTER TABLE tiles ADD COLUMN voxel_count INTEGER NOT NULL DEFAULT 0");
+  for (const char* column : {"min_x", "min_y", "min_z", "max_x", "max_y", "max_z"}) {
+    database.exec(std::string("ALTER TABLE tiles ADD COLUMN ") + column + " REAL");
+  }
+  database.exec(memories_table);
+  fill_in_infos(database);
+  database.exec("PRAGMA user_version = " + std::to_string(schema_version));
+  transaction.commit();
+}
+
+SQLite::Database open_map_database(const fs::path& file) {
+  try {
+    return open_or_create(file);
+  } catch (const SQLite::Exception& error) {
+    const bool is_damaged =
+        error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB;
+    throw MapFileError(file, is_damaged ? std::string("is damaged (") + error.what() +
+                                              "); restore a copy or name another file"
+                                        : std::string("cannot be opened (") + error.what() +
+                                              "); its folder must exist and be writable");
+  } catch (const fs::filesystem_error& error) {
+    throw MapFileError(file, std::string("cannot be opened (") + error.what() +
+                                 "); its folder must exist and be writable");
+  }
+}
+
+}  // namespace stillmap

@@ -1,0 +1,208 @@
+#include "core/map/storage/map_file.hpp"
+
+#include <SQLiteCpp/Backup.h>
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Exception.h>
+#include <SQLiteCpp/Statement.h>
+#include <SQLiteCpp/Transaction.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <mutex>
+#include <optional>
+#include <system_error>
+#include <utility>
+
+#include "core/map/storage/map_database.hpp"
+#include "core/map/storage/map_tables.hpp"
+#include "core/map/storage/tile_codec.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Poses that both paths begin with.
+std::size_t common_poses(const Trajectory& a, const Trajectory& b) {
+  const auto is_same = [](const StampedPose& p, const StampedPose& q) {
+    return p.stamp_ns == q.stamp_ns && p.T_map_lidar.matrix() == q.T_map_lidar.matrix();
+  };
+  return static_cast<std::size_t>(std::ranges::mismatch(a, b, is_same).in1 - a.begin());
+}
+
+MapFileError unreadable(const fs::path& file, const std::runtime_error& error) {
+  return {file, std::string("cannot be read (") + error.what() +
+                    "); restore a copy or name another file"};
+}
+
+/// A folder that is gone with its last user.
+class ScratchMapFolder {
+ public:
+  ScratchMapFolder() {
+    std::string pattern = (fs::temp_directory_path() / "stillmap-XXXXXX").string();
+    if (::mkdtemp(pattern.data()) == nullptr) {
+      throw MapFileError(pattern, "cannot be made; set TMPDIR to a folder that can be written");
+    }
+    path_ = pattern;
+  }
+  ~ScratchMapFolder() {
+    std::error_code nothing_to_do;
+    fs::remove_all(path_, nothing_to_do);
+  }
+  ScratchMapFolder(const ScratchMapFolder&) = delete;
+  ScratchMapFolder& operator=(const ScratchMapFolder&) = delete;
+
+  [[nodiscard]] const fs::path& path() const { return path_; }
+
+ private:
+  fs::path path_;
+};
+
+/// Reads through a connection of its own: nobody waits for a save.
+class SqliteShelf : public TileShelf {
+ public:
+  SqliteShelf(const fs::path& file, std::shared_ptr<const ScratchMapFolder> folder)
+      : folder_(std::move(folder)), file_(file), database_(open_map_database(file)) {}
+
+  TileRecord take(TileId id) override {
+    const std::scoped_lock lock(mutex_);
+    try {
+      const SQLite::Transaction one_state(database_);
+      return read_record(database_, id, read_map_row(database_));
+    } catch (const std::runtime_error& error) {
+      throw unreadable(file_, error);
+    }
+  }
+
+ private:
+  std::shared_ptr<const ScratchMapFolder> folder_;
+  fs::path file_;
+  std::mutex mutex_;
+  SQLite::Database database_;
+};
+
+class SqliteTileStore : public TileStore {
+ public:
+  explicit SqliteTileStore(const fs::path& file,
+                           std::shared_ptr<const ScratchMapFolder> folder = nullptr)
+      : folder_(std::move(folder)), file_(file), database_(open_map_database(file)) {}
+
+  void save(const StoredMap& map) override {
+    writing([&] {
+      if (has_first_schema(database_)) upgrade_schema(database_);
+      if (!saved_trajectory_) saved_trajectory_ = read_trajectory(database_);
+      SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
+      const bool is_another_map = read_map_row(database_).map_id != map.view.map_id;
+      write_tiles(database_, map);
+      write_memories(database_, map.memories, is_another_map);
+      write_trajectory(database_, map.trajectory, common_poses(*saved_trajectory_, map.trajectory));
+      write_metadata(database_, map);
+      transaction.commit();
+      saved_trajectory_ = map.trajectory;
+      // The log's content into the file, so that a copy of the file alone is a copy of the map.
+      database_.exec("PRAGMA wal_checkpoint(TRUNCATE)");
+    });
+  }
+
+  StoredMap load() override {
+    return reading([this] {
+      StoredMap map{
+          read_map_row(database_), {}, read_trajectory(database_), read_metadata(database_)};
+      map.view.tiles = read_tiles(database_, map.view);
+      if (!has_first_schema(database_)) map.memories = read_memories(database_);
+      check_agreement(map);
+      return map;
+    });
+  }
+
+  StoredMap load_shelved() override {
+    writing([this] {
+      if (has_first_schema(database_)) upgrade_schema(database_);
+    });
+    return reading([this] {
+      StoredMap map{read_map_row(database_), read_memory_ids(database_), read_trajectory(database_),
+                    read_metadata(database_)};
+      map.view.tiles = read_tile_infos(database_);
+      return map;
+    });
+  }
+
+  std::shared_ptr<TileShelf> shelf() override {
+    return std::make_shared<SqliteShelf>(file_, folder_);
+  }
+
+  void begin_run(std::uint64_t map_id) override {
+    writing([&] {
+      SQLite::Statement rename(database_, "UPDATE map SET map_id = ?");
+      rename.bind(1, static_cast<std::int64_t>(map_id));
+      rename.exec();
+      SQLite::Statement reopen(database_, "DELETE FROM metadata WHERE key = ?");
+      reopen.bind(1, map_ended_key);
+      reopen.exec();
+    });
+  }
+
+  void copy_to(const fs::path& file) override {
+    // What is there must be a map, or nothing: another program's file is not overwritten.
+    static_cast<void>(open_map_database(file));
+    try {
+      SQLite::Database target(file.string(), SQLite::OPEN_READWRITE);
+      SQLite::Backup(target, database_).executeStep(-1);
+    } catch (const SQLite::Exception& error) {
+      throw MapFileError(file, std::string("cannot be written (") + error.what() + ")");
+    }
+  }
+
+ private:
+  template <typename Action>
+  void writing(Action action) {
+    try {
+      action();
+    } catch (const SQLite::Exception& error) {
+      throw MapFileError(file_, std::string("cannot be saved (") + error.what() +
+                                    "); the last save is still there");
+    } catch (const TileCodecError& error) {
+      throw MapFileError(file_, std::string("cannot be saved: ") + error.what());
+    }
+  }
+
+  template <typename Read>
+  StoredMap reading(Read read) {
+    try {
+      const SQLite::Transaction one_state(database_);
+      return read();
+    } catch (const std::runtime_error& error) {
+      throw unreadable(file_, error);
+    }
+  }
+
+  std::shared_ptr<const ScratchMapFolder> folder_;
+  fs::path file_;
+  SQLite::Database database_;
+  /// What the trajectory's rows hold, once known.
+  std::optional<Trajectory> saved_trajectory_;
+};
+
+}  // namespace
+
+StoredMap stored_state(const MapCheckpoint& checkpoint) {
+  StoredMap map{*checkpoint.view, {}, {}, {}};
+  for (const auto& [id, record] : checkpoint.records) map.memories.emplace(id, record.memory);
+  for (auto& tile : map.view.tiles) {
+    const auto record = checkpoint.records.find(tile->info.id);
+    if (record != checkpoint.records.end() && record->second.tile) tile = record->second.tile;
+  }
+  return map;
+}
+
+std::unique_ptr<TileStore> open_map_file(const fs::path& file) {
+  return std::make_unique<SqliteTileStore>(file);
+}
+
+std::unique_ptr<TileStore> open_scratch_map() {
+  auto folder = std::make_shared<const ScratchMapFolder>();
+  const fs::path file = folder->path() / "map.stillmap";
+  return std::make_unique<SqliteTileStore>(file, std::move(folder));
+}
+
+}  // namespace stillmap

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <stdexcept>
+#include <string>
+
+#include "core/map/static_map.hpp"
+#include "core/map/tile.hpp"
+#include "core/map/tile_store.hpp"
+#include "core/odometry/trajectory.hpp"
+
+namespace stillmap {
+
+/// A map file that cannot be opened, read or written. The text names the file, the fault and the
+/// way out.
+class MapFileError : public std::runtime_error {
+ public:
+  MapFileError(const std::filesystem::path& file, const std::string& fault)
+      : std::runtime_error(file.string() + ": " + fault) {}
+};
+
+/// Key of the metadata that says that the map was saved when its run ended: versions of it that a
+/// client may have seen are all stored.
+inline constexpr const char* map_ended_key = "ended";
+
+/// What a map file holds.
+struct StoredMap {
+  MapView view;
+  /// Empty for files of Stillmap's first format: what was seen too rarely, or as a movable class,
+  /// starts anew.
+  TileMemories memories;
+  Trajectory trajectory;
+  /// Free key-value pairs: "sensor", "label_source", "software".
+  std::map<std::string, std::string> metadata;
+};
+
+/// A checkpoint as it is stored.
+[[nodiscard]] StoredMap stored_state(const MapCheckpoint& checkpoint);
+
+/// Where tiles are kept between runs. The narrow waist behind which SQLite may one day be another
+/// database.
+class TileStore {
+ public:
+  virtual ~TileStore() = default;
+  /// Brings the store to this state in one transaction: after a crash the store holds either the
+  /// last save or this one. Tiles that did not change are not written again. Tiles that are away
+  /// (tile_shelf.hpp) stay as they are stored. A tile that is written without its memory loses the
+  /// one that was stored.
+  virtual void save(const StoredMap& map) = 0;
+  /// The last saved state; an empty map when nothing was saved yet.
+  [[nodiscard]] virtual StoredMap load() = 0;
+  /// The same, with all tiles away: of a size that does not depend on what is in them.
+  [[nodiscard]] virtual StoredMap load_shelved() = 0;
+  /// Where those tiles are; may be used beside the store, and after it.
+  [[nodiscard]] virtual std::shared_ptr<TileShelf> shelf() = 0;
+  /// Mapping goes on from what is stored: under this id from now on, and not ended.
+  virtual void begin_run(std::uint64_t map_id) = 0;
+  /// Writes the last saved state to another file, in the place of what is there. Throws
+  /// MapFileError.
+  virtual void copy_to(const std::filesystem::path& file) = 0;
+};
+
+/// Opens or makes an SQLite map file (WAL; the file alone is complete after each save and may be
+/// copied). Throws MapFileError: no database, another program's, written by a newer version,
+/// damaged, or in a folder that cannot be written. Such a file is left untouched.
+[[nodiscard]] std::unique_ptr<TileStore> open_map_file(const std::filesystem::path& file);
+
+/// A store that is gone with the program, for a map that is not to be kept but does not fit into
+/// memory. Throws MapFileError when the folder for temporary files cannot be written.
+[[nodiscard]] std::unique_ptr<TileStore> open_scratch_map();
+
+}  // namespace stillmap

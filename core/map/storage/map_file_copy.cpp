@@ -1,0 +1,117 @@
+#include "core/map/storage/map_file_copy.hpp"
+
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Exception.h>
+
+#include <cstdlib>
+#include <fstream>
+#include <memory>
+#include <string>
+#include <system_error>
+#include <utility>
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+fs::path beside(const fs::path& file, const char* suffix) {
+  fs::path path = file;
+  path += suffix;
+  return path;
+}
+
+void check_readable(const fs::path& file) {
+  std::error_code error;
+  if (!fs::exists(file, error)) throw MapFileError(file, "is not there; name a map file");
+  if (!fs::is_regular_file(file, error)) throw MapFileError(file, "is not a file; name a map file");
+  if (fs::file_size(file, error) == 0) throw MapFileError(file, "is empty; name a map file");
+  if (!std::ifstream(file, std::ios::binary)) {
+    throw MapFileError(file, "cannot be read; check its permissions");
+  }
+}
+
+fs::path fresh_folder(const fs::path& file) {
+  std::error_code error;
+  const fs::path parent = fs::temp_directory_path(error);
+  std::string name = (parent / "stillmap-read-XXXXXX").string();
+  if (error || mkdtemp(name.data()) == nullptr) {
+    throw MapFileError(file, "cannot be copied to the temporary folder '" + parent.string() +
+                                 "' to be read there; set TMPDIR to a folder that can be written");
+  }
+  return name;
+}
+
+/// A reader's hold on a file that a server may have open: as long as it lasts, nothing in the log
+/// is given up, so that file and log agree when they are copied one after the other. Nothing when
+/// SQLite will not have it: opening the copy will say why.
+std::unique_ptr<SQLite::Database> hold(const fs::path& file) {
+  if (!fs::exists(beside(file, "-wal")) || !fs::exists(beside(file, "-shm"))) return nullptr;
+  try {
+    constexpr int patience_ms = 5000;
+    auto database =
+        std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READONLY, patience_ms);
+    database->exec("BEGIN");
+    static_cast<void>(database->execAndGet("SELECT count(*) FROM sqlite_master").getInt());
+    return database;
+  } catch (const SQLite::Exception&) {
+    return nullptr;
+  }
+}
+
+void copy_with_log(const fs::path& file, const fs::path& copy) {
+  const std::unique_ptr<SQLite::Database> held = hold(file);
+  fs::copy_file(file, copy);
+  // A source that cannot be written must not make the copy so.
+  fs::permissions(copy, fs::perms::owner_read | fs::perms::owner_write, fs::perm_options::add);
+  const fs::path log = beside(file, "-wal");
+  if (fs::exists(log)) fs::copy_file(log, beside(copy, "-wal"));
+}
+
+/// The error of the copy as one of the file.
+MapFileError error_of(const fs::path& file, const fs::path& copy, const MapFileError& error) {
+  const std::string text = error.what();
+  const std::string name = copy.string() + ": ";
+  return {file, text.starts_with(name) ? text.substr(name.size()) : text};
+}
+
+}  // namespace
+
+MapFileCopy::MapFileCopy(fs::path file) : file_(std::move(file)) {
+  check_readable(file_);
+  folder_ = fresh_folder(file_);
+  copy_ = folder_ / "map.stillmap";
+  try {
+    copy_with_log(file_, copy_);
+  } catch (const fs::filesystem_error& error) {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
+    throw MapFileError(file_, std::string("cannot be copied to be read (") + error.what() +
+                                  "); make room there, or set TMPDIR to a folder with room");
+  }
+}
+
+MapFileCopy::~MapFileCopy() {
+  std::error_code ignored;
+  fs::remove_all(folder_, ignored);
+}
+
+void MapFileCopy::check_format() const {
+  try {
+    static_cast<void>(open_map_file(copy_));
+  } catch (const MapFileError& error) {
+    throw error_of(file_, copy_, error);
+  }
+}
+
+StoredMap MapFileCopy::load() const {
+  try {
+    return open_map_file(copy_)->load();
+  } catch (const MapFileError& error) {
+    throw error_of(file_, copy_, error);
+  }
+}
+
+StoredMap read_map_file(const fs::path& file) { return MapFileCopy(file).load(); }
+
+}  // namespace stillmap

@@ -1,0 +1,37 @@
+#pragma once
+
+#include <filesystem>
+
+#include "core/map/storage/map_file.hpp"
+
+namespace stillmap {
+
+/// A map file copied into the temporary folder, for what only reads: whatever SQLite does when it
+/// opens a file (it brings in the log that a crash left, for one), the file itself stays as it is,
+/// byte for byte. A server may be mapping in it: the copy is its last save.
+class MapFileCopy {
+ public:
+  /// Throws MapFileError: missing, empty, no file, not to be read, or no room for the copy.
+  explicit MapFileCopy(std::filesystem::path file);
+  ~MapFileCopy();
+  MapFileCopy(const MapFileCopy&) = delete;
+  MapFileCopy& operator=(const MapFileCopy&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& path() const { return copy_; }
+
+  /// Throws MapFileError naming the file, not its copy: not a map file, of a newer version,
+  /// damaged.
+  void check_format() const;
+  /// Throws as check_format does.
+  [[nodiscard]] StoredMap load() const;
+
+ private:
+  std::filesystem::path file_;
+  std::filesystem::path folder_;
+  std::filesystem::path copy_;
+};
+
+/// What a map file holds, the file left as it is. Throws MapFileError as MapFileCopy does.
+[[nodiscard]] StoredMap read_map_file(const std::filesystem::path& file);
+
+}  // namespace stillmap

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <SQLiteCpp/Database.h>
+
+#include "core/map/storage/map_file.hpp"
+
+namespace stillmap {
+
+// The tables of a map file, row by row. All throw SQLite::Exception, and TileCodecError for a tile
+// that is not what it should be.
+
+/// Writes the tiles that differ from their rows or have a memory given, without their memories, and
+/// takes rows of others away. Tiles that are away must be there as they are.
+void write_tiles(SQLite::Database& database, const StoredMap& map);
+/// Those that are given; with `forget_others`, takes away all others.
+void write_memories(SQLite::Database& database, const TileMemories& memories, bool forget_others);
+/// From this pose on; later rows are replaced.
+void write_trajectory(SQLite::Database& database, const Trajectory& trajectory, std::size_t from);
+void write_metadata(SQLite::Database& database, const StoredMap& map);
+
+/// Id, version and sizes of the map, without tiles.
+[[nodiscard]] MapView read_map_row(SQLite::Database& database);
+/// Of a map with these sizes; checked against their content hashes.
+[[nodiscard]] std::vector<std::shared_ptr<const Tile>> read_tiles(SQLite::Database& database,
+                                                                  const MapView& sizes);
+/// Without their voxels.
+[[nodiscard]] std::vector<std::shared_ptr<const Tile>> read_tile_infos(SQLite::Database& database);
+[[nodiscard]] TileMemories read_memories(SQLite::Database& database);
+/// Their tiles, with null for each.
+[[nodiscard]] TileMemories read_memory_ids(SQLite::Database& database);
+[[nodiscard]] Trajectory read_trajectory(SQLite::Database& database);
+[[nodiscard]] std::map<std::string, std::string> read_metadata(SQLite::Database& database);
+
+/// Every memory must be that of its tile.
+void check_agreement(const StoredMap& map);
+
+/// One tile of a map with these sizes, checked as read_tiles does.
+[[nodiscard]] TileRecord read_record(SQLite::Database& database, TileId id, const MapView& sizes);
+
+}  // namespace stillmap

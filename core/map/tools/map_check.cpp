@@ -1,0 +1,172 @@
+#include "core/map/tools/map_check.hpp"
+
+#include <SQLiteCpp/Database.h>
+#include <SQLiteCpp/Exception.h>
+#include <SQLiteCpp/Statement.h>
+#include <sqlite3.h>
+
+#include <span>
+#include <utility>
+
+#include "core/map/storage/map_database.hpp"
+#include "core/map/storage/map_file_copy.hpp"
+#include "core/map/tools/map_rows.hpp"
+#include "core/map/storage/tile_codec.hpp"
+#include "core/map/tile_evidence.hpp"
+
+namespace stillmap {
+namespace {
+
+/// Runs one part of the check; a database that gives up under it is a fault of its own.
+template <typename Part>
+void guarded(MapCheck& check, const std::string& place, Part part) {
+  try {
+    part();
+  } catch (const SQLite::Exception& error) {
+    check.faults.push_back(
+        {place, std::nullopt, std::string("cannot be read on: ") + error.what()});
+  }
+}
+
+/// SQLite's own faults: pages, indexes, order.
+void check_pages(const MapFileCopy& copy, MapCheck& check) {
+  try {
+    SQLite::Database database(copy.path().string());
+    SQLite::Statement row(database, "PRAGMA quick_check");
+    while (row.executeStep()) {
+      const std::string verdict = row.getColumn(0).getString();
+      if (verdict != "ok") check.faults.push_back({"file", std::nullopt, verdict});
+    }
+  } catch (const SQLite::Exception& error) {
+    if (error.getErrorCode() == SQLITE_NOTADB) copy.check_format();
+    check.faults.push_back({"file", std::nullopt, error.what()});
+  }
+}
+
+std::optional<MapRow> check_map_row(SQLite::Database& database, std::size_t tiles,
+                                    MapCheck& check) {
+  const auto fault = [&](const std::string& what) {
+    check.faults.push_back({"map", std::nullopt, what});
+  };
+  SQLite::Statement row(database, "SELECT version, tile_size_m, voxel_size_m FROM map");
+  if (!row.executeStep()) {
+    if (tiles > 0) fault("has tiles and does not say of which size");
+    return std::nullopt;
+  }
+  const MapRow map{.version = static_cast<std::uint64_t>(row.getColumn(0).getInt64()),
+                   .tile_size_m = row.getColumn(1).getDouble(),
+                   .voxel_size_m = row.getColumn(2).getDouble()};
+  if (tiles == 0 || has_usable_sizes(map)) return map;
+  fault("has tiles of " + std::to_string(map.tile_size_m) + " m with voxels of " +
+        std::to_string(map.voxel_size_m) + " m");
+  return std::nullopt;
+}
+
+TileRow tile_row(const SQLite::Statement& row) {
+  const auto* bytes = static_cast<const std::uint8_t*>(row.getColumn(4).getBlob());
+  const auto size = static_cast<std::size_t>(row.getColumn(4).getBytes());
+  return {.id = {row.getColumn(0).getInt(), row.getColumn(1).getInt()},
+          .revision = static_cast<std::uint64_t>(row.getColumn(2).getInt64()),
+          .content_hash = static_cast<std::uint64_t>(row.getColumn(3).getInt64()),
+          .encoded = std::span(bytes, bytes == nullptr ? 0 : size)};
+}
+
+void check_tile(const TileRow& row, const std::optional<MapRow>& map, MapCheck& check) {
+  try {
+    const Tile tile = decode_tile(row.encoded);
+    check.voxels += tile.voxels.size();
+    const std::vector<std::string> faults =
+        map ? tile_faults(tile, row, *map) : std::vector<std::string>();
+    for (const std::string& what : faults) check.faults.push_back({"tile", row.id, what});
+    if (map && faults.empty()) ++check.sound_tiles;
+  } catch (const TileCodecError& error) {
+    check.faults.push_back({"tile", row.id, error.what()});
+  }
+}
+
+void check_tiles(SQLite::Database& database, MapCheck& check, const CheckProgress& progress) {
+  const auto total =
+      static_cast<std::size_t>(database.execAndGet("SELECT count(*) FROM tiles").getInt64());
+  const std::optional<MapRow> map = check_map_row(database, total, check);
+  SQLite::Statement row(database,
+                        "SELECT x, y, revision, content_hash, encoded FROM tiles ORDER BY x, y");
+  while (row.executeStep()) {
+    check_tile(tile_row(row), map, check);
+    ++check.tiles;
+    if (progress) progress(check.tiles, total);
+  }
+}
+
+void check_memory(TileId id, std::span<const std::uint8_t> encoded, std::int64_t shown,
+                  MapCheck& check) {
+  const auto fault = [&](const std::string& what) { check.faults.push_back({"tile", id, what}); };
+  try {
+    const TileMemory memory = decode_memory(encoded);
+    check.hidden_voxels += memory.hidden.size() + memory.excluded.size();
+    if (memory.id != id) fault("has the memory of another tile");
+    if (std::ssize(memory.shown) != shown) {
+      fault("shows " + std::to_string(shown) + " voxels and has a memory of " +
+            std::to_string(memory.shown.size()));
+    }
+  } catch (const TileCodecError& error) {
+    fault(std::string("memory ") + error.what());
+  }
+}
+
+void check_memories(SQLite::Database& database, MapCheck& check) {
+  if (has_first_schema(database)) return;
+  SQLite::Statement row(database,
+                        "SELECT m.x, m.y, m.encoded, coalesce(t.voxel_count, 0) FROM memories m "
+                        "LEFT JOIN tiles t ON t.x = m.x AND t.y = m.y");
+  while (row.executeStep()) {
+    const SQLite::Column blob = row.getColumn(2);
+    const auto* bytes = static_cast<const std::uint8_t*>(blob.getBlob());
+    const auto size = static_cast<std::size_t>(blob.getBytes());
+    check_memory({row.getColumn(0).getInt(), row.getColumn(1).getInt()},
+                 std::span(bytes, bytes == nullptr ? 0 : size), row.getColumn(3).getInt64(), check);
+  }
+}
+
+void check_trajectory(SQLite::Database& database, MapCheck& check) {
+  SQLite::Statement row(
+      database, "SELECT stamp_ns, x, y, z, qx, qy, qz, qw FROM trajectory ORDER BY position");
+  std::optional<PoseRow> last;
+  while (row.executeStep()) {
+    PoseRow pose{.stamp_ns = row.getColumn(0).getInt64(), .values = {}};
+    for (int i = 0; i < 7; ++i) {
+      pose.values.at(static_cast<std::size_t>(i)) = row.getColumn(i + 1).getDouble();
+    }
+    for (const std::string& what : pose_faults(pose, last)) {
+      check.faults.push_back(
+          {"trajectory", std::nullopt, "pose " + std::to_string(check.poses) + " " + what});
+    }
+    ++check.poses;
+    last = pose;
+  }
+}
+
+}  // namespace
+
+MapCheck check_map_file(const std::filesystem::path& file, const CheckProgress& progress) {
+  const MapFileCopy copy(file);
+  MapCheck check;
+  check_pages(copy, check);
+  // Sound pages that are refused are not damaged but something else. Damaged ones are read as far
+  // as they go, to tell which tiles are left.
+  if (check.is_sound()) copy.check_format();
+  guarded(check, "tiles", [&] {
+    SQLite::Database database(copy.path().string());
+    check_tiles(database, check, progress);
+  });
+  guarded(check, "tiles", [&] {
+    SQLite::Database database(copy.path().string());
+    check_memories(database, check);
+  });
+  guarded(check, "trajectory", [&] {
+    SQLite::Database database(copy.path().string());
+    check_trajectory(database, check);
+  });
+  return check;
+}
+
+}  // namespace stillmap

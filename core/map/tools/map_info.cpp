@@ -1,0 +1,62 @@
+#include "core/map/tools/map_info.hpp"
+
+#include <SQLiteCpp/Database.h>
+
+#include <algorithm>
+
+#include "core/map/storage/map_file_copy.hpp"
+
+namespace stillmap {
+namespace {
+
+void count_voxel(const Voxel& voxel, MapInfo& info) {
+  const bool is_first = info.points == 0;
+  info.points += voxel.point_count;
+  ++info.voxels_of_class.at(static_cast<std::size_t>(voxel.evidence.winner()));
+  info.bounds_map.extend(voxel.mean_map.cast<double>());
+  info.seen.first_ns =
+      is_first ? voxel.first_seen_ns : std::min(info.seen.first_ns, voxel.first_seen_ns);
+  info.seen.last_ns =
+      is_first ? voxel.last_seen_ns : std::max(info.seen.last_ns, voxel.last_seen_ns);
+}
+
+void measure_path(const Trajectory& trajectory, MapInfo& info) {
+  info.poses = trajectory.size();
+  if (trajectory.empty()) return;
+  info.driven = {trajectory.front().stamp_ns, trajectory.back().stamp_ns};
+  for (std::size_t i = 1; i < trajectory.size(); ++i) {
+    const Eigen::Vector3d step =
+        trajectory[i].T_map_lidar.translation() - trajectory[i - 1].T_map_lidar.translation();
+    info.path_length_m += step.norm();
+  }
+}
+
+}  // namespace
+
+MapInfo describe_map(const StoredMap& map) {
+  MapInfo info;
+  info.map_id = map.view.map_id;
+  info.version = map.view.version;
+  info.tile_size_m = map.view.tile_size_m;
+  info.voxel_size_m = map.view.voxel_size_m;
+  info.tiles = map.view.tiles.size();
+  for (const auto& tile : map.view.tiles) {
+    info.voxels += tile->voxels.size();
+    for (const Voxel& voxel : tile->voxels) count_voxel(voxel, info);
+  }
+  measure_path(map.trajectory, info);
+  info.metadata = map.metadata;
+  return info;
+}
+
+MapFileInfo map_file_info(const std::filesystem::path& file) {
+  const MapFileCopy copy(file);
+  MapFileInfo info{.map = describe_map(copy.load()),
+                   .bytes = std::filesystem::file_size(copy.path()),
+                   .schema_version = 0};
+  SQLite::Database database(copy.path().string());
+  info.schema_version = database.execAndGet("PRAGMA user_version").getUInt();
+  return info;
+}
+
+}  // namespace stillmap

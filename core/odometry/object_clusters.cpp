@@ -1,0 +1,101 @@
+#include "core/odometry/object_clusters.hpp"
+
+#include <tsl/robin_map.h>
+
+#include <numeric>
+
+namespace stillmap {
+namespace {
+
+/// 0 vehicle, 1 person, 2 two-wheeler or its rider.
+std::uint64_t kind_of(SemanticClass label) {
+  switch (label) {
+    case SemanticClass::person:
+      return 1;
+    case SemanticClass::bicycle:
+    case SemanticClass::motorcycle:
+    case SemanticClass::bicyclist:
+    case SemanticClass::motorcyclist:
+      return 2;
+    default:
+      return 0;
+  }
+}
+
+struct Cube {
+  Eigen::Vector3i index;
+  std::uint64_t kind;
+};
+
+std::uint64_t key_of(const Eigen::Vector3i& index, std::uint64_t kind) {
+  constexpr std::uint64_t mask = (1U << 20) - 1;
+  const auto part = [](int v) { return static_cast<std::uint64_t>(v) & mask; };
+  return kind << 60 | part(index.x()) << 40 | part(index.y()) << 20 | part(index.z());
+}
+
+struct KeyHash {
+  std::size_t operator()(std::uint64_t key) const noexcept {
+    return (key * 0x9e3779b97f4a7c15ULL) >> 16;
+  }
+};
+
+/// Disjoint sets of cubes.
+class Sets {
+ public:
+  explicit Sets(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), 0U);
+  }
+  [[nodiscard]] std::uint32_t root(std::uint32_t i) {
+    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
+    return i;
+  }
+  void join(std::uint32_t a, std::uint32_t b) { parent_[root(b)] = root(a); }
+
+ private:
+  std::vector<std::uint32_t> parent_;
+};
+
+using CubeTable = tsl::robin_map<std::uint64_t, std::uint32_t, KeyHash>;
+
+void join_neighbours(const std::vector<Cube>& cubes, const CubeTable& table, Sets& sets) {
+  for (std::uint32_t c = 0; c < cubes.size(); ++c) {
+    // Half of the 26 neighbours: the other half finds this cube.
+    for (int n = 14; n < 27; ++n) {
+      const Eigen::Vector3i step(n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1);
+      const auto neighbour = table.find(key_of(cubes[c].index + step, cubes[c].kind));
+      if (neighbour != table.end()) sets.join(c, neighbour->second);
+    }
+  }
+}
+
+}  // namespace
+
+Objects find_objects(std::span<const Eigen::Vector3f> points_lidar,
+                     std::span<const SemanticClass> labels, double gap_m) {
+  Objects objects{std::vector<std::int32_t>(points_lidar.size(), Objects::none), 0};
+  if (labels.empty()) return objects;
+  const auto inverse_gap = static_cast<float>(1.0 / gap_m);
+  CubeTable table;
+  std::vector<Cube> cubes;
+  for (std::size_t i = 0; i < points_lidar.size(); ++i) {
+    if (!is_movable(labels[i])) continue;
+    const Cube cube{(points_lidar[i] * inverse_gap).array().floor().cast<int>(),
+                    kind_of(labels[i])};
+    const auto [entry, is_new] =
+        table.try_emplace(key_of(cube.index, cube.kind), static_cast<std::uint32_t>(cubes.size()));
+    if (is_new) cubes.push_back(cube);
+    objects.of_point[i] = static_cast<std::int32_t>(entry->second);
+  }
+  Sets sets(cubes.size());
+  join_neighbours(cubes, table, sets);
+  std::vector<std::int32_t> object_of_root(cubes.size(), Objects::none);
+  for (std::int32_t& object : objects.of_point) {
+    if (object == Objects::none) continue;
+    std::int32_t& number = object_of_root[sets.root(static_cast<std::uint32_t>(object))];
+    if (number == Objects::none) number = static_cast<std::int32_t>(objects.count++);
+    object = number;
+  }
+  return objects;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,135 @@
+#include "core/odometry/relocalization.hpp"
+
+#include <algorithm>
+#include <numbers>
+#include <vector>
+
+#include "core/odometry/coarse_registration.hpp"
+
+namespace stillmap {
+namespace {
+
+/// A point of the scan lies on the map when a point of it is as near as this [m].
+constexpr float match_distance_m = 0.25F;
+/// Share of such points that ends the search, and the least that is a place.
+constexpr double surely_matched = 0.85;
+constexpr double least_matched = 0.6;
+/// Places that are tried are so far apart that the coarse registration closes the gap.
+constexpr double place_spacing_m = 3.5;
+constexpr int headings = 12;
+constexpr double last_step_m = 0.6;
+
+bool is_thin(SemanticClass label) {
+  return label == SemanticClass::pole || label == SemanticClass::trunk ||
+         label == SemanticClass::traffic_sign;
+}
+
+/// This place and six in a ring round it.
+std::vector<Eigen::Vector3d> places_round(double radius_m) {
+  std::vector<Eigen::Vector3d> places{Eigen::Vector3d::Zero()};
+  for (int k = 0; k < 6; ++k) {
+    const double bearing = k * std::numbers::pi / 3.0;
+    places.emplace_back(radius_m * std::cos(bearing), radius_m * std::sin(bearing), 0.0);
+  }
+  return places;
+}
+
+/// The guess first, then all headings there, then those of the places round it.
+std::vector<Eigen::Isometry3d> guesses_round(const Eigen::Isometry3d& T_map_lidar) {
+  std::vector<Eigen::Isometry3d> guesses;
+  for (const Eigen::Vector3d& place : places_round(place_spacing_m)) {
+    for (int k = 0; k < headings; ++k) {
+      // 0, 1, -1, 2, ...: small turns first.
+      const int steps = k % 2 == 0 ? -k / 2 : (k + 1) / 2;
+      const double turn = steps * 2.0 * std::numbers::pi / headings;
+      guesses.push_back(Eigen::Translation3d(place) * T_map_lidar *
+                        Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()));
+    }
+  }
+  return guesses;
+}
+
+/// Ground matches wherever the map has any, and movable things may have gone.
+bool tells_the_place(SemanticClass label) { return !is_ground(label) && !is_movable(label); }
+
+double matched_share(const FeatureSets& features, const LocalMap& map,
+                     const Eigen::Isometry3d& T_map_lidar) {
+  const Eigen::Isometry3f T = T_map_lidar.cast<float>();
+  int telling = 0;
+  int matched = 0;
+  const auto count = [&](const std::vector<FeaturePoint>& points) {
+    for (const FeaturePoint& point : points) {
+      if (!tells_the_place(point.label)) continue;
+      const Eigen::Vector3f position_map = T * point.position_lidar;
+      ++telling;
+      matched += map.planes.nearest(position_map, 1, match_distance_m).count > 0 ||
+                         map.edges.nearest(position_map, 1, match_distance_m).count > 0
+                     ? 1
+                     : 0;
+    }
+  };
+  count(features.edges);
+  count(features.planes);
+  return telling > 0 ? static_cast<double>(matched) / telling : 0.0;
+}
+
+/// Registers a scan from many places, and keeps the pose that fits best.
+class Search {
+ public:
+  Search(const FeatureSets& features, const LocalMap& map, const OdometryConfig& config)
+      : features_(features), map_(map), config_(config) {}
+
+  void try_from(const Eigen::Isometry3d& T_map_lidar) {
+    const OdometryResult found = register_features(features_, map_, T_map_lidar, config_);
+    if (found.health == OdometryHealth::lost) return;
+    const double share = matched_share(features_, map_, found.T_map_lidar);
+    if (share <= share_) return;
+    share_ = share;
+    best_ = found;
+  }
+  [[nodiscard]] const OdometryResult& best() const { return best_; }
+  [[nodiscard]] double share() const { return share_; }
+
+ private:
+  const FeatureSets& features_;
+  const LocalMap& map_;
+  const OdometryConfig& config_;
+  OdometryResult best_;
+  double share_ = 0.0;
+};
+
+}  // namespace
+
+void insert_known(std::span<const LabelledPoint> points_map, LocalMap& map) {
+  std::vector<LabelledPoint> thin;
+  std::vector<LabelledPoint> flat;
+  for (const LabelledPoint& point : points_map) {
+    if (is_movable(point.label)) continue;
+    (is_thin(point.label) ? thin : flat).push_back(point);
+  }
+  map.edges.insert(thin);
+  map.planes.insert(flat);
+}
+
+OdometryResult localise(const FeatureSets& features, std::span<const LabelledPoint> known_map,
+                        const LocalMap& map, const Eigen::Isometry3d& T_map_lidar_guess,
+                        const OdometryConfig& config) {
+  LocalMap far = coarse_map();
+  insert_known(known_map, far);
+  Search search(features, map, config);
+  for (const Eigen::Isometry3d& guess : guesses_round(T_map_lidar_guess)) {
+    const OdometryResult rough = register_features(features, far, guess, coarse(config));
+    if (rough.health != OdometryHealth::lost) search.try_from(rough.T_map_lidar);
+    if (search.share() >= surely_matched) return search.best();
+  }
+  // Nearly there, perhaps: along a street the registration may stop a step too early.
+  const Eigen::Isometry3d T_map_lidar_nearly = search.best().T_map_lidar;
+  for (const Eigen::Vector3d& place : places_round(last_step_m)) {
+    search.try_from(Eigen::Translation3d(place) * T_map_lidar_nearly);
+  }
+  if (search.share() >= least_matched) return search.best();
+  // Against nothing, registration says what is known: nothing.
+  return register_features(features, coarse_map(), T_map_lidar_guess, config);
+}
+
+}  // namespace stillmap

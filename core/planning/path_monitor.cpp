@@ -1,0 +1,82 @@
+#include "core/planning/path_monitor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <sstream>
+
+namespace stillmap {
+namespace {
+
+std::string in_words(const PathConflict& conflict) {
+  std::ostringstream text;
+  text << "not free any more: " << name(conflict.reason) << " at (" << conflict.place_map.x()
+       << ", " << conflict.place_map.y() << "), " << conflict.along_m << " m along";
+  return text.str();
+}
+
+std::string in_words(TileId id, std::size_t count) {
+  std::ostringstream text;
+  text << "tile " << id.x << " " << id.y;
+  if (count > 1) text << " and " << count - 1 << " more";
+  text << " on the way changed";
+  return text.str();
+}
+
+}  // namespace
+
+PathWatch::PathWatch(const TraversabilityView& view, const PathPlan& plan)
+    : path_map_(plan.path_map()),
+      was_found_(plan.is_found()),
+      map_id_(view.map_id),
+      tiles_(view.tiles),
+      on_way_(tiles_on_way(view)) {}
+
+/// Those that the robot's circle touches at one of the poses.
+PathWatch::Tiles PathWatch::tiles_on_way(const TraversabilityView& view) const {
+  const double reach_m = view.profile.circumscribed_radius_m();
+  std::set<TileId> touched;
+  for (const PlanarPose& pose : path_map_) {
+    const Eigen::Vector2d low = ((pose.position_map.array() - reach_m) / view.tile_size_m).floor();
+    const Eigen::Vector2d high = ((pose.position_map.array() + reach_m) / view.tile_size_m).floor();
+    for (auto x = static_cast<std::int32_t>(low.x()); x <= static_cast<std::int32_t>(high.x());
+         ++x) {
+      for (auto y = static_cast<std::int32_t>(low.y()); y <= static_cast<std::int32_t>(high.y());
+           ++y) {
+        touched.insert({x, y});
+      }
+    }
+  }
+  Tiles tiles;
+  for (const auto& tile : view.tiles) {
+    if (touched.contains(tile->id)) tiles[tile->id] = tile;
+  }
+  return tiles;
+}
+
+std::optional<ReplanCause> PathWatch::look_at(const TraversabilityView& view) {
+  const bool is_other_map = view.map_id != map_id_;
+  if (!is_other_map && view.tiles == tiles_) return std::nullopt;
+  const bool was_empty = tiles_.empty();
+  map_id_ = view.map_id;
+  tiles_ = view.tiles;
+  if (was_empty) return ReplanCause{"the map was empty", std::nullopt};
+  if (is_other_map) return ReplanCause{"another map began", std::nullopt};
+  if (!was_found_) return ReplanCause{"there was no path, and the map changed", std::nullopt};
+  Tiles now = tiles_on_way(view);
+  std::vector<TileId> changed;
+  for (const auto& [id, tile] : now) {
+    const auto before = on_way_.find(id);
+    if (before == on_way_.end() || before->second != tile) changed.push_back(id);
+  }
+  for (const auto& [id, tile] : on_way_) {
+    if (!now.contains(id)) changed.push_back(id);
+  }
+  on_way_ = std::move(now);
+  if (changed.empty()) return std::nullopt;
+  const PathCheck check = check_path(view, path_map_);
+  if (check.conflict) return ReplanCause{in_words(*check.conflict), check.conflict};
+  return ReplanCause{in_words(changed.front(), changed.size()), std::nullopt};
+}
+
+}  // namespace stillmap

@@ -1,0 +1,127 @@
+#include "core/planning/path_smoother.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+
+namespace stillmap {
+namespace {
+
+/// Index of the pose about `way_m` after `from`.
+std::size_t index_after(std::span<const DrivenPose> path, std::size_t from, double way_m) {
+  std::size_t to = from;
+  for (double driven_m = 0.0; to + 1 < path.size() && driven_m < way_m;) {
+    driven_m += path[++to].at.step_m;
+  }
+  return to;
+}
+
+/// What lies between two poses, exchanged for `shortcut`, whose costs count from the first.
+void replace(std::vector<DrivenPose>& path, std::size_t from, std::size_t to,
+             std::vector<DrivenPose> shortcut) {
+  const double cost_at_start = path[from].cost;
+  for (DrivenPose& pose : shortcut) pose.cost += cost_at_start;
+  const double end_cost = shortcut.empty() ? cost_at_start : shortcut.back().cost;
+  const double saved = path[to].cost - end_cost;
+  for (std::size_t i = to + 1; i < path.size(); ++i) path[i].cost -= saved;
+  const auto first = path.begin() + static_cast<std::ptrdiff_t>(from) + 1;
+  const auto last = path.begin() + static_cast<std::ptrdiff_t>(to) + 1;
+  path.insert(path.erase(first, last), shortcut.begin(), shortcut.end());
+}
+
+std::optional<std::vector<DrivenPose>> drive_past(const DriveCheck& drive, const PlanarPose& a,
+                                                  const PlanarPose& middle, const PlanarPose& b) {
+  auto path = drive_through(drive, std::array{a, middle, b});
+  if (path) path->erase(path->begin());
+  return path;
+}
+
+/// Numbers of chance that are the same with every standard library.
+class Chance {
+ public:
+  explicit Chance(std::uint32_t seed) : random_(seed) {}
+
+  /// From 0 to below 1.
+  double uniform() { return static_cast<double>(random_() >> 11U) * 0x1.0p-53; }
+
+  /// From 0 to count - 1. @pre count > 0
+  std::size_t below(std::size_t count) {
+    return std::min(static_cast<std::size_t>(uniform() * static_cast<double>(count)), count - 1);
+  }
+
+  PlanarPose near(PlanarPose pose) {
+    constexpr double reach_m = 1.5;
+    constexpr double reach_rad = 0.3;
+    const double size = uniform();
+    pose.position_map += size * reach_m * Eigen::Vector2d(symmetric(), symmetric());
+    pose.heading_rad += size * reach_rad * symmetric();
+    return pose;
+  }
+
+ private:
+  double symmetric() { return 2.0 * uniform() - 1.0; }
+
+  std::mt19937_64 random_;
+};
+
+}  // namespace
+
+std::optional<std::vector<DrivenPose>> drive_through(const DriveCheck& drive,
+                                                     std::span<const PlanarPose> waypoints) {
+  std::vector<DrivenPose> path{{{waypoints.front(), 0.0, false}, 0.0}};
+  for (std::size_t i = 1; i < waypoints.size(); ++i) {
+    const auto driven = drive.drive(waypoints[i - 1], waypoints[i]);
+    if (!driven) return std::nullopt;
+    const double cost_so_far = path.back().cost;
+    for (DrivenPose pose : *driven) {
+      pose.cost += cost_so_far;
+      path.push_back(pose);
+    }
+  }
+  return path;
+}
+
+std::vector<DrivenPose> polish(const DriveCheck& drive, std::vector<DrivenPose> path,
+                               std::span<const PlanarPose> ends, int tries, std::uint32_t seed,
+                               const std::function<bool()>& should_stop) {
+  constexpr double shortest_m = 2.0;
+  constexpr double longest_m = 80.0;
+  constexpr double least_gain = 0.01;
+  Chance chance(seed);
+  for (int i = 0; i < tries && path.size() > 2; ++i) {
+    if (should_stop && should_stop()) break;
+    const std::size_t from = chance.below(path.size() - 1);
+    // Small wiggles need as many tries as large ones.
+    const double way_m = shortest_m * std::pow(longest_m / shortest_m, chance.uniform());
+    const std::size_t to = index_after(path, from, way_m);
+    const PlanarPose& a = path[from].at.pose;
+    const bool is_end = to + 1 == path.size() && !ends.empty();
+    const PlanarPose& b = is_end ? ends[chance.below(ends.size())] : path[to].at.pose;
+    // Straight on, or round the other way past what lies between.
+    auto shortcut = i % 2 == 0
+                        ? drive.drive(a, b)
+                        : drive_past(drive, a, chance.near(path[(from + to) / 2].at.pose), b);
+    if (!shortcut || shortcut->empty()) continue;
+    if (shortcut->back().cost + least_gain > path[to].cost - path[from].cost) continue;
+    replace(path, from, to, *std::move(shortcut));
+  }
+  return path;
+}
+
+std::vector<DrivenPose> thinned(std::span<const DrivenPose> path, double spacing_m) {
+  std::vector<DrivenPose> kept;
+  double since_last_m = 0.0;
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    since_last_m += path[i].at.step_m;
+    const bool is_end = i == 0 || i + 1 == path.size();
+    const bool turns_back = !is_end && path[i + 1].at.is_reverse != path[i].at.is_reverse && i > 0;
+    if (!is_end && !turns_back && since_last_m + path[i + 1].at.step_m <= spacing_m) continue;
+    kept.push_back(path[i]);
+    kept.back().at.step_m = since_last_m;
+    since_last_m = 0.0;
+  }
+  return kept;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,122 @@
+#include "idl/bag/bag_scan_source.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/dataset/dataset_error.hpp"
+#include "idl/bag/cdr_reader.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// Encapsulation, sec, nanosec.
+constexpr int header_bytes = 12;
+
+std::string listed(const std::vector<BagTopic>& topics) {
+  std::string text;
+  for (const BagTopic& topic : topics) {
+    text.append("\n  ").append(topic.name).append("  ").append(topic.type).append("  ");
+    text.append(std::to_string(topic.messages)).append(" messages");
+  }
+  return text.empty() ? " none" : text;
+}
+
+bool has_scans(const BagTopic& topic) {
+  return topic.messages > 0 && scan_message(topic.type).has_value();
+}
+
+BagTopic only_topic(const fs::path& path, const std::vector<BagTopic>& topics) {
+  std::vector<BagTopic> of_scans;
+  std::ranges::copy_if(topics, std::back_inserter(of_scans), has_scans);
+  if (of_scans.size() == 1) return of_scans.front();
+  if (of_scans.empty()) {
+    throw DatasetError(path,
+                       "has no topic of scans (sensor_msgs/msg/PointCloud2, "
+                       "velodyne_msgs/msg/VelodyneScan or Livox's CustomMsg) with messages; "
+                       "its topics are:" +
+                           listed(topics));
+  }
+  throw DatasetError(path,
+                     "has several topics of scans; choose one with --topic-in:" + listed(of_scans));
+}
+
+BagTopic named_topic(const fs::path& path, const std::vector<BagTopic>& topics,
+                     const std::string& topic) {
+  const std::string name = topic.starts_with('/') ? topic : "/" + topic;
+  const auto found = std::ranges::find_if(
+      topics, [&](const BagTopic& other) { return other.name == name || other.name == topic; });
+  if (found == topics.end()) {
+    throw DatasetError(path, "has no topic " + name + "; its topics are:" + listed(topics));
+  }
+  if (!has_scans(*found)) {
+    throw DatasetError(path,
+                       "topic " + name + " has no scans to read; its topics are:" + listed(topics));
+  }
+  return *found;
+}
+
+}  // namespace
+
+BagScans::BagScans(const fs::path& path, const std::string& topic)
+    : bag_(path),
+      topic_(topic.empty() ? only_topic(path, bag_.topics())
+                           : named_topic(path, bag_.topics(), topic)),
+      kind_(*scan_message(topic_.type)),
+      messages_(bag_.messages(topic_.name)) {
+  if (topic_.serialization_format != "cdr") {
+    throw DatasetError(path, "topic " + topic_.name + " is serialized as '" +
+                                 topic_.serialization_format + "'; only cdr is read");
+  }
+  if (messages_.empty()) {
+    throw DatasetError(path, "the messages of topic " + topic_.name +
+                                 " cannot be found by its name: the bag is damaged");
+  }
+  bool stamped = false;
+  for (std::size_t i = 0; i < messages_.size(); ++i) {
+    std::optional<std::int64_t> stamp_ns;
+    try {
+      stamp_ns = header_stamp_ns(bag_.first_bytes(messages_[i], header_bytes));
+    } catch (const CdrError&) {
+      // Read again, and reported then, when its turn comes.
+    }
+    stamped = stamped || stamp_ns.value_or(0) != 0;
+    stamps_ns_.push_back(stamp_ns.value_or(messages_[i].received_ns));
+  }
+  if (!stamped) {
+    std::ranges::transform(messages_, stamps_ns_.begin(), &BagMessage::received_ns);
+  }
+  sensor_ = read_message(0).sensor;
+}
+
+fs::path BagScans::name(std::size_t i) const {
+  return bag_.file_name(messages_.at(i).file) / fs::path(topic_.name).relative_path() /
+         std::to_string(i);
+}
+
+ScanOfMessage BagScans::read_message(std::size_t i) const {
+  try {
+    return scan_of_message(kind_, bag_.bytes(messages_.at(i)));
+  } catch (const CdrError& fault) {
+    throw DatasetError(name(i), "message " + std::to_string(messages_[i].row) + " of " +
+                                    topic_.name + " (" + topic_.type +
+                                    ") cannot be used: " + fault.what());
+  }
+}
+
+DatasetFrame BagScans::read(std::size_t i) const {
+  DatasetFrame frame = read_message(i).frame;
+  frame.scan.stamp_ns = stamp_ns(i);
+  return frame;
+}
+
+ScanDataset open_recording(const fs::path& path, const std::string& topic) {
+  if (is_bag(path)) return ScanDataset(std::make_shared<const BagScans>(path, topic));
+  if (!topic.empty()) {
+    throw DatasetError(path, "is no bag, and only bags have topics: leave --topic-in out");
+  }
+  return ScanDataset(path);
+}
+
+}  // namespace stillmap

@@ -1,0 +1,47 @@
+#include "idl/conversions/traversability_status.hpp"
+
+#include "idl/conversions/map_query.hpp"
+
+namespace stillmap::wire {
+namespace {
+
+ReplyCode code_of(AreaStatus status) {
+  switch (status) {
+    case AreaStatus::ok:
+      return ReplyCode::ok;
+    case AreaStatus::invalid_request:
+      return ReplyCode::invalid_request;
+    case AreaStatus::too_large:
+      return ReplyCode::too_large;
+    case AreaStatus::not_found:
+      return ReplyCode::not_found;
+  }
+  return ReplyCode::failed;
+}
+
+}  // namespace
+
+stillmap_msgs::msg::ReplyStatus to_reply_status(AreaStatus status, const std::string& reason,
+                                                std::uint64_t map_version, std::uint64_t map_id) {
+  return to_reply_status(code_of(status), reason, map_version, map_id);
+}
+
+std::optional<AreaStatus> area_status(const stillmap_msgs::msg::ReplyStatus& status) {
+  for (const AreaStatus candidate : {AreaStatus::ok, AreaStatus::invalid_request,
+                                     AreaStatus::too_large, AreaStatus::not_found}) {
+    if (status.code() == static_cast<std::uint8_t>(code_of(candidate))) return candidate;
+  }
+  return std::nullopt;
+}
+
+std::optional<CellState> cell_state(std::uint8_t number) {
+  if (number > static_cast<std::uint8_t>(CellState::lethal)) return std::nullopt;
+  return static_cast<CellState>(number);
+}
+
+std::optional<BlockReason> block_reason(std::uint8_t number) {
+  if (number >= block_reason_count) return std::nullopt;
+  return static_cast<BlockReason>(number);
+}
+
+}  // namespace stillmap::wire

@@ -1,0 +1,224 @@
+#include "idl/dds/discovery_monitor.hpp"
+
+#include <fastdds/rtps/participant/ParticipantDiscoveryInfo.h>
+#include <fastdds/rtps/reader/ReaderDiscoveryInfo.h>
+#include <fastdds/rtps/writer/WriterDiscoveryInfo.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <sstream>
+
+namespace stillmap {
+namespace {
+
+using namespace eprosima::fastrtps::rtps;
+using eprosima::fastdds::dds::DomainParticipant;
+
+// A handshake takes a fraction of a second.
+constexpr std::chrono::seconds time_to_authenticate{2};
+
+template <typename T>
+std::string streamed(const T& value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
+std::string vendor_name(const VendorId_t& vendor) {
+  struct Named {
+    int high, low;
+    const char* name;
+  };
+  constexpr Named known[] = {{1, 1, "RTI Connext"},  {1, 3, "OpenDDS"},    {1, 15, "Fast DDS"},
+                             {1, 16, "Cyclone DDS"}, {1, 2, "OpenSplice"}, {1, 10, "Connext Micro"},
+                             {1, 18, "RustDDS"}};
+  for (const Named& one : known) {
+    if (vendor[0] == one.high && vendor[1] == one.low) return one.name;
+  }
+  return "vendor " + std::to_string(vendor[0]) + "." + std::to_string(vendor[1]);
+}
+
+std::string property(const ParticipantProxyData& data, const std::string& name) {
+  for (const auto& pair : data.m_properties) {
+    if (pair.first() == name) return pair.second();
+  }
+  return {};
+}
+
+void add_locators(const RemoteLocatorList& locators, Peer& peer) {
+  for (const Locator_t& locator : locators.unicast) {
+    if (locator.kind == LOCATOR_KIND_SHM) peer.uses_shared_memory = true;
+    if (locator.kind != LOCATOR_KIND_UDPv4) continue;
+    const auto* bytes = &locator.address[12];
+    std::string address;
+    for (int i = 0; i < 4; ++i) {
+      if (i > 0) address += '.';
+      address += std::to_string(bytes[i]);
+    }
+    if (std::ranges::find(peer.addresses, address) == peer.addresses.end()) {
+      peer.addresses.push_back(address);
+    }
+  }
+}
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
+// Fast DDS writes a number of the machine into every guid, but not into that of a secured
+// participant, which belongs to its certificate. Such a one tells its host in words.
+bool same_host(const GuidPrefix_t& ours, const VendorId_t& vendor, const GuidPrefix_t& theirs,
+               const Peer& peer) {
+  if (!peer.host.empty() && peer.host.starts_with(host_name() + ":")) return true;
+  const bool is_fast_dds = vendor[0] == 1 && vendor[1] == 15;
+  return is_fast_dds && std::equal(&ours.value[2], &ours.value[4], &theirs.value[2]);
+}
+
+Peer peer_from(const ParticipantProxyData& data, const GuidPrefix_t& ours) {
+  Peer peer;
+  peer.guid = streamed(data.m_guid.guidPrefix);
+  peer.name = data.m_participantName.to_string();
+  peer.vendor = vendor_name(data.m_VendorId);
+  peer.host = property(data, eprosima::fastdds::dds::parameter_policy_physical_data_host);
+  peer.user = property(data, eprosima::fastdds::dds::parameter_policy_physical_data_user);
+  peer.process = property(data, eprosima::fastdds::dds::parameter_policy_physical_data_process);
+  add_locators(data.default_locators, peer);
+  peer.is_on_this_host = same_host(ours, data.m_VendorId, data.m_guid.guidPrefix, peer);
+  peer.is_secured = !data.identity_token_.class_id().empty();
+  return peer;
+}
+
+template <typename Time>
+std::optional<std::chrono::nanoseconds> finite(const Time& time) {
+  if (time == eprosima::fastrtps::c_TimeInfinite) return std::nullopt;
+  return std::chrono::nanoseconds(time.to_ns());
+}
+
+template <typename Qos>
+EndpointQos qos_from(const Qos& qos) {
+  using namespace eprosima::fastdds::dds;
+  EndpointQos out{.reliable = qos.m_reliability.kind == RELIABLE_RELIABILITY_QOS,
+                  .durability = static_cast<Durability>(qos.m_durability.kind),
+                  .deadline = finite(qos.m_deadline.period),
+                  .liveliness_kind = static_cast<int>(qos.m_liveliness.kind),
+                  .liveliness_lease = finite(qos.m_liveliness.lease_duration),
+                  .exclusive_ownership = qos.m_ownership.kind == EXCLUSIVE_OWNERSHIP_QOS,
+                  .partitions = {}};
+  for (auto it = qos.m_partition.begin(); it != qos.m_partition.end(); ++it) {
+    out.partitions.emplace_back(it->name());
+  }
+  return out;
+}
+
+template <typename ProxyData>
+Endpoint endpoint_from(ProxyData& data, bool is_writer) {
+  return {.guid = streamed(data.guid()),
+          .topic = data.topicName().to_string(),
+          .type = data.typeName().to_string(),
+          .is_writer = is_writer,
+          .is_keyed = data.topicKind() == WITH_KEY,
+          .qos = qos_from(data.m_qos)};
+}
+
+}  // namespace
+
+void PeerWatch::add_own(const Guid& guid, const std::string& topic, const std::string& type,
+                        bool is_keyed, bool is_writer, const TopicQos& qos) {
+  Endpoint endpoint{.guid = streamed(guid),
+                    .topic = topic,
+                    .type = type,
+                    .is_writer = is_writer,
+                    .is_keyed = is_keyed,
+                    .qos = {}};
+  endpoint.qos.reliable = qos.reliable;
+  if (qos.transient_local) endpoint.qos.durability = Durability::transient_local;
+  const std::scoped_lock lock(mutex_);
+  own_[guid] = std::move(endpoint);
+}
+
+void PeerWatch::remove_own(const Guid& guid) {
+  const std::scoped_lock lock(mutex_);
+  own_.erase(guid);
+}
+
+std::vector<Peer> PeerWatch::peers() const {
+  const std::scoped_lock lock(mutex_);
+  std::vector<Peer> out;
+  const auto now = Clock::now();
+  for (const auto& [prefix, known] : peers_) {
+    Peer peer = known.peer;
+    peer.refused = is_refused(known, now);
+    for (const auto& [guid, endpoint] : others_) {
+      if (guid.guidPrefix == prefix) peer.endpoints.push_back(endpoint);
+    }
+    out.push_back(std::move(peer));
+  }
+  return out;
+}
+
+std::vector<Endpoint> PeerWatch::own_endpoints() const {
+  const std::scoped_lock lock(mutex_);
+  std::vector<Endpoint> out;
+  for (const auto& [guid, endpoint] : own_) out.push_back(endpoint);
+  return out;
+}
+
+void PeerWatch::on_participant_discovery(DomainParticipant* participant,
+                                         ParticipantDiscoveryInfo&& info) {
+  const Prefix& prefix = info.info.m_guid.guidPrefix;
+  const std::scoped_lock lock(mutex_);
+  if (info.status == ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
+      info.status == ParticipantDiscoveryInfo::DROPPED_PARTICIPANT) {
+    peers_.erase(prefix);
+    std::erase_if(others_, [&](const auto& one) { return one.first.guidPrefix == prefix; });
+    return;
+  }
+  const auto [known, is_new] = peers_.try_emplace(prefix);
+  if (is_new) known->second.since = Clock::now();
+  const bool refused = known->second.peer.refused;
+  known->second.peer = peer_from(info.info, participant->guid().guidPrefix);
+  known->second.peer.refused = refused;
+}
+
+bool PeerWatch::is_refused(const Known& known, Clock::time_point now) const {
+  if (known.peer.refused) return true;
+  const bool must_authenticate = secured_ && known.peer.is_secured && !known.authenticated;
+  return must_authenticate && now - known.since > time_to_authenticate;
+}
+
+void PeerWatch::onParticipantAuthentication(DomainParticipant*,
+                                            ParticipantAuthenticationInfo&& info) {
+  const std::scoped_lock lock(mutex_);
+  const bool refused = info.status == ParticipantAuthenticationInfo::UNAUTHORIZED_PARTICIPANT;
+  // A guid alone is no peer: it was discovered before, or it is of no use.
+  const auto found = peers_.find(info.guid.guidPrefix);
+  if (found == peers_.end()) return;
+  found->second.peer.refused = refused;
+  found->second.authenticated = !refused;
+}
+
+void PeerWatch::on_subscriber_discovery(DomainParticipant*, ReaderDiscoveryInfo&& info) {
+  if (info.status == ReaderDiscoveryInfo::REMOVED_READER) return forget(info.info.guid());
+  keep(info.info.guid(), endpoint_from(info.info, false));
+}
+
+void PeerWatch::on_publisher_discovery(DomainParticipant*, WriterDiscoveryInfo&& info) {
+  if (info.status == WriterDiscoveryInfo::REMOVED_WRITER) return forget(info.info.guid());
+  keep(info.info.guid(), endpoint_from(info.info, true));
+}
+
+void PeerWatch::keep(const Guid& guid, Endpoint endpoint) {
+  const std::scoped_lock lock(mutex_);
+  others_[guid] = std::move(endpoint);
+}
+
+void PeerWatch::forget(const Guid& guid) {
+  const std::scoped_lock lock(mutex_);
+  others_.erase(guid);
+}
+
+}  // namespace stillmap

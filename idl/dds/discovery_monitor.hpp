@@ -1,0 +1,64 @@
+#pragma once
+
+#include <fastdds/rtps/common/Guid.h>
+
+#include <chrono>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <map>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "idl/dds/remote_participant.hpp"
+#include "idl/dds/qos.hpp"
+
+namespace stillmap {
+
+/// Keeps what discovery tells about the domain: who is there, with which ends, and who was refused;
+/// and our own ends beside them. Thread-safe.
+class PeerWatch : public eprosima::fastdds::dds::DomainParticipantListener {
+ public:
+  using Guid = eprosima::fastrtps::rtps::GUID_t;
+
+  /// `secured`: we have an identity, and peers are to authenticate themselves.
+  explicit PeerWatch(bool secured) : secured_(secured) {}
+
+  void add_own(const Guid& guid, const std::string& topic, const std::string& type, bool is_keyed,
+               bool is_writer, const TopicQos& qos);
+  void remove_own(const Guid& guid);
+
+  /// The others, in the order of their guids. Who was refused, or has not authenticated itself in
+  /// good time, counts as refused: often only one side is told why.
+  [[nodiscard]] std::vector<Peer> peers() const;
+  [[nodiscard]] std::vector<Endpoint> own_endpoints() const;
+
+ private:
+  using Prefix = eprosima::fastrtps::rtps::GuidPrefix_t;
+
+  void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant* participant,
+                                eprosima::fastrtps::rtps::ParticipantDiscoveryInfo&& info) override;
+  void onParticipantAuthentication(
+      eprosima::fastdds::dds::DomainParticipant* participant,
+      eprosima::fastrtps::rtps::ParticipantAuthenticationInfo&& info) override;
+  void on_subscriber_discovery(eprosima::fastdds::dds::DomainParticipant* participant,
+                               eprosima::fastrtps::rtps::ReaderDiscoveryInfo&& info) override;
+  void on_publisher_discovery(eprosima::fastdds::dds::DomainParticipant* participant,
+                              eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) override;
+  using Clock = std::chrono::steady_clock;
+  struct Known {
+    Peer peer;
+    Clock::time_point since;
+    bool authenticated = false;
+  };
+  [[nodiscard]] bool is_refused(const Known& known, Clock::time_point now) const;
+  void keep(const Guid& guid, Endpoint endpoint);
+  void forget(const Guid& guid);
+
+  bool secured_;
+  mutable std::mutex mutex_;
+  std::map<Prefix, Known> peers_;
+  std::map<Guid, Endpoint> others_;
+  std::map<Guid, Endpoint> own_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "idl/dds/security/access.hpp"
+#include "idl/interface/topics.hpp"
+
+namespace stillmap {
+
+/// What an identity of a secured domain is there for.
+enum class Role {
+  /// Everything that stillmap-server reads, publishes and answers.
+  server,
+  /// Publishes scans and the odometry prior, and sees how they are taken.
+  sensor,
+  /// Reads every topic, and asks whatever changes nothing.
+  planner,
+  /// A planner that may also reset, save, load and restore.
+  operator_of_server,
+};
+
+[[nodiscard]] std::string_view name(Role role);
+/// Nothing for a name that is no role's.
+[[nodiscard]] std::optional<Role> role_from_name(std::string_view name);
+/// "server, sensor, planner, operator".
+[[nodiscard]] const std::string& role_names();
+
+/// Names that a deployment chooses: ROS 2 names, as in the server's configuration.
+struct TopicNames {
+  std::string points = "points";
+  /// Empty: none.
+  std::string odometry_prior = "odom_prior";
+  std::string name_space = "stillmap";
+};
+
+/// DDS names of everything that the server publishes.
+[[nodiscard]] std::vector<std::string> published_topics(const std::string& name_space);
+
+/// ROS 2 names of the services, by what they do to the map.
+struct ServiceNames {
+  std::vector<std::string> reading;
+  std::vector<std::string> changing;
+};
+[[nodiscard]] ServiceNames service_names(const std::string& name_space);
+
+/// What a role may do. Derived from Topics and Services: a topic or service that is added there and
+/// not here does not compile.
+[[nodiscard]] Access access_of(Role role, const TopicNames& names);
+
+}  // namespace stillmap

@@ -1,0 +1,110 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/odometry/odometry_state.hpp"
+#include "idl/interface/diagnostic.hpp"
+
+namespace stillmap {
+
+/// What the server does with scans that come faster than it maps them.
+enum class DeliveryMode : std::uint8_t {
+  /// The newest scans count: the oldest waiting one is dropped and counted.
+  latest = 0,
+  /// Every scan counts: a full queue makes a reliable publisher wait.
+  every = 1,
+};
+
+[[nodiscard]] constexpr const char* name(DeliveryMode mode) {
+  return mode == DeliveryMode::every ? "every" : "latest";
+}
+
+/// An event of the server's life and how often it happened, as "scans_mapped" or
+/// "dropped_queue_full".
+struct NamedCounter {
+  std::string name;
+  std::uint64_t value = 0;
+};
+
+/// How segmentation keeps up with the scans.
+struct SegmentationStatus {
+  /// Every n-th scan is segmented; those between get labels from the map and the last labelled
+  /// scan.
+  std::uint32_t every = 1;
+  /// Median time of the label source over the last scans; 0 before the first.
+  double network_ms = 0.0;
+  /// Width of the range images that it looks at, and what that is on a machine that is fast enough;
+  /// 0: it looks at none.
+  std::uint32_t image_columns = 0;
+  std::uint32_t full_columns = 0;
+  /// Shares of the last scans: with labels of their own, carried ones, none.
+  double fresh_share = 0.0;
+  double carried_share = 0.0;
+  double unlabelled_share = 0.0;
+};
+
+/// "every scan", "every 2nd scan", "every 13th scan"; n >= 1.
+[[nodiscard]] std::string every_nth_scan(std::uint32_t n);
+
+/// How long a stage of the pipeline took over the last scans.
+struct StageLatency {
+  std::string stage;
+  double p50_ms = 0.0;
+  double p99_ms = 0.0;
+  double max_ms = 0.0;
+  /// Scans that the figures stand for.
+  std::uint32_t samples = 0;
+};
+
+/// State of a running server.
+struct ServerStatus {
+  /// The server's clock, nanoseconds since the Unix epoch.
+  std::int64_t stamp_ns = 0;
+  std::string software_version;
+  double uptime_s = 0.0;
+  DeliveryMode delivery = DeliveryMode::latest;
+  /// "stream", "none", or the model's name.
+  std::string label_source;
+  /// Of the last mapped scan.
+  OdometryHealth health = OdometryHealth::initialised;
+  /// Why nothing happens, or what goes wrong, in words; empty when all is well.
+  std::string reason;
+  /// Scans a second over the last seconds, received and mapped.
+  double received_hz = 0.0;
+  double mapped_hz = 0.0;
+  std::uint64_t map_version = 0;
+  std::uint64_t map_id = 0;
+  std::uint64_t tile_count = 0;
+  std::uint64_t voxel_count = 0;
+  SegmentationStatus segmentation;
+  /// "scans_received", "scans_mapped", "label_failures" once there are any, and "dropped_<reason>"
+  /// for every reason that occurred; then events beside mapping, as "occupancy_not_cleared", and
+  /// "unreadable_request_<service>" and "undelivered_reply_<service>" once there are any.
+  std::vector<NamedCounter> counters;
+  /// In the order of the pipeline: wait in the queue, its stages, and "total"; then
+  /// what runs beside it, as "occupancy".
+  std::vector<StageLatency> latencies;
+  /// Name of the server's machine.
+  std::string host;
+  /// The sensor that the server is set up for.
+  std::string sensor;
+  /// ROS 2 name of the topic that scans are read from.
+  std::string points_topic;
+  /// Frame that the last cloud named; empty before the first.
+  std::string scan_frame;
+  /// The server's clock when the last cloud arrived, minus the cloud's stamp; years for a
+  /// recording.
+  double scan_delay_s = 0.0;
+  /// What is wrong with the server's peers and its machine.
+  std::vector<Finding> findings;
+
+  /// Value of a counter; 0 when it never counted.
+  [[nodiscard]] std::uint64_t counter(std::string_view counter_name) const;
+  /// Sum of all "dropped_" counters.
+  [[nodiscard]] std::uint64_t dropped() const;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,75 @@
+#include "idl/interface/topics.hpp"
+
+namespace stillmap {
+namespace {
+
+// A map of 20 km by 20 km in tiles of 20 m would be a million; a drive touches some thousands.
+constexpr int max_tiles = 200'000;
+
+template <typename T>
+TopicSpec<T> symmetric(const std::string& dds_name, const TopicQos& qos) {
+  return {.dds_name = dds_name, .writer = qos, .reader = qos};
+}
+
+}  // namespace
+
+Topics Topics::in(const std::string& name_space) {
+  const std::string prefix = "rt/" + name_space + "/";
+  const TopicQos latched{.transient_local = true, .depth = 1};
+  const TopicQos large{.transient_local = true, .depth = 1, .bulky = true};
+  const TopicQos keyed{.transient_local = true, .depth = 1, .max_keys = max_tiles};
+  const TopicQos large_keyed{
+      .transient_local = true, .depth = 1, .max_keys = max_tiles, .bulky = true};
+  // Deep, so that a client that stalls for a minute still gets every pose.
+  const TopicQos every_pose{.depth = 1000};
+  const TopicQos newest{.reliable = false, .depth = 1, .bulky = true};
+  return {
+      .odometry = symmetric<nav_msgs::msg::Odometry>(prefix + "odometry", every_pose),
+      .tf = symmetric<tf2_msgs::msg::TFMessage>("rt/tf", {.depth = 100}),
+      .path = symmetric<nav_msgs::msg::Path>(prefix + "path", large),
+      // RViz2 asks for reliable clouds unless it is told otherwise.
+      .scan = {.dds_name = prefix + "scan",
+               .writer = {.depth = 1, .bulky = true},
+               .reader = newest},
+      .static_cloud = symmetric<sensor_msgs::msg::PointCloud2>(prefix + "static_cloud", large),
+      .tile_index = symmetric<stillmap_msgs::msg::TileInfo>(prefix + "tile_index", keyed),
+      .tiles = symmetric<stillmap_msgs::msg::MapTile>(prefix + "tiles", large_keyed),
+      .status = symmetric<stillmap_msgs::msg::Status>(prefix + "status", latched),
+      .octomap = symmetric<octomap_msgs::msg::Octomap>(prefix + "octomap", large),
+      .traversability = symmetric<nav_msgs::msg::OccupancyGrid>(prefix + "traversability", large),
+  };
+}
+
+TopicSpec<sensor_msgs::msg::PointCloud2> points_topic(const std::string& ros_name,
+                                                      DeliveryMode delivery, int scans_waiting) {
+  const bool every = delivery == DeliveryMode::every;
+  return {.dds_name = "rt/" + ros_name,
+          .writer = {.depth = scans_waiting, .keep_all = every},
+          .reader = {.reliable = every, .depth = scans_waiting, .keep_all = every}};
+}
+
+TopicSpec<nav_msgs::msg::Odometry> odometry_prior_topic(const std::string& ros_name) {
+  return symmetric<nav_msgs::msg::Odometry>("rt/" + ros_name, {.reliable = false, .depth = 100});
+}
+
+Services Services::in(const std::string& name_space) {
+  const std::string prefix = name_space + "/";
+  return {.get_static_map = prefix + "get_static_map",
+          .get_tile_versions = prefix + "get_tile_versions",
+          .get_tiles = prefix + "get_tiles",
+          .get_status = prefix + "get_status",
+          .save_map = prefix + "save_map",
+          .load_map = prefix + "load_map",
+          .reset = prefix + "reset",
+          .octomap_binary = prefix + "octomap_binary",
+          .octomap_full = prefix + "octomap_full",
+          .get_removed = prefix + "get_removed",
+          .restore_removed = prefix + "restore_removed",
+          .query_occupancy = prefix + "query_occupancy",
+          .get_traversable_area = prefix + "get_traversable_area",
+          .check_path = prefix + "check_path",
+          .nearest_traversable = prefix + "nearest_traversable",
+          .get_map = prefix + "get_map"};
+}
+
+}  // namespace stillmap

@@ -1,0 +1,76 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+#include "idl/dds/qos.hpp"
+#include "idl/interface/server_status.hpp"
+#include "idl/msg/wire_types.hpp"
+
+namespace stillmap {
+
+/// Version of every struct in stillmap_msgs.idl that carries one.
+inline constexpr std::uint8_t wire_format_version = 4;
+
+/// A topic: its name as DDS sees it, its type, and the quality of service of its two ends.
+template <typename T>
+struct TopicSpec {
+  std::string dds_name;
+  TopicQos writer;
+  TopicQos reader;
+};
+
+/// Every topic that carries data. ROS 2 names them without "rt/". Writers offer reliable delivery,
+/// which matches readers of both kinds; what a late joiner must know is transient local.
+struct Topics {
+  TopicSpec<nav_msgs::msg::Odometry> odometry;
+  TopicSpec<tf2_msgs::msg::TFMessage> tf;
+  TopicSpec<nav_msgs::msg::Path> path;
+  TopicSpec<sensor_msgs::msg::PointCloud2> scan;
+  TopicSpec<sensor_msgs::msg::PointCloud2> static_cloud;
+  /// Keyed by tile id, as `tiles`.
+  TopicSpec<stillmap_msgs::msg::TileInfo> tile_index;
+  TopicSpec<stillmap_msgs::msg::MapTile> tiles;
+  TopicSpec<stillmap_msgs::msg::Status> status;
+  TopicSpec<octomap_msgs::msg::Octomap> octomap;
+  /// Where the robot of `areas.grid_profile` can go.
+  TopicSpec<nav_msgs::msg::OccupancyGrid> traversability;
+
+  /// `name_space` is the first part of all names but tf's: "stillmap" gives rt/stillmap/odometry.
+  [[nodiscard]] static Topics in(const std::string& name_space);
+};
+
+/// Incoming scans as the server reads them: with `every`, a publisher must be reliable and waits
+/// when `scans_waiting` are not taken yet.
+[[nodiscard]] TopicSpec<sensor_msgs::msg::PointCloud2> points_topic(const std::string& ros_name,
+                                                                    DeliveryMode delivery,
+                                                                    int scans_waiting);
+
+/// The odometry prior (nav_msgs/Odometry) as the server reads it.
+[[nodiscard]] TopicSpec<nav_msgs::msg::Odometry> odometry_prior_topic(const std::string& ros_name);
+
+/// ROS 2 names of the services.
+struct Services {
+  std::string get_static_map;
+  std::string get_tile_versions;
+  std::string get_tiles;
+  std::string get_status;
+  std::string save_map;
+  std::string load_map;
+  std::string reset;
+  /// octomap_msgs/srv/GetOctomap, as octomap_server names them.
+  std::string octomap_binary;
+  std::string octomap_full;
+  std::string get_removed;
+  std::string restore_removed;
+  std::string query_occupancy;
+  std::string get_traversable_area;
+  std::string check_path;
+  std::string nearest_traversable;
+  /// nav_msgs/srv/GetMap.
+  std::string get_map;
+
+  [[nodiscard]] static Services in(const std::string& name_space);
+};
+
+}  // namespace stillmap

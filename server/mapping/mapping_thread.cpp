@@ -1,0 +1,251 @@
+#include "server/mapping/mapping_thread.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <limits>
+#include <utility>
+
+#include "server/mapping/async_segmenter.hpp"
+
+namespace stillmap {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+// How long a request, or the last view of a drive, may wait while no scan comes.
+constexpr std::chrono::milliseconds idle_period{50};
+
+double milliseconds(Clock::duration time) {
+  return std::chrono::duration<double, std::milli>(time).count();
+}
+
+constexpr std::size_t no_limit = std::numeric_limits<std::size_t>::max();
+
+// The rest is for copies: in the writers' histories, and for queries.
+std::size_t map_share_bytes(const MapFileConfig& config) {
+  if (config.memory_limit_mib == 0) return no_limit;
+  return (std::size_t{config.memory_limit_mib} << 20) / 4 * 3;
+}
+
+// Where a scan is expected in a map that was loaded: where the robot was at that time, if it is a
+// recording played again, else where it stood last. Nothing without a stored path.
+std::optional<Eigen::Isometry3d> pose_in_restored_map(const Trajectory& stored,
+                                                      std::int64_t stamp_ns) {
+  if (stored.empty()) return std::nullopt;
+  const auto then = std::ranges::lower_bound(stored, stamp_ns, {}, &StampedPose::stamp_ns);
+  return then == stored.end() ? stored.back().T_map_lidar : then->T_map_lidar;
+}
+
+}  // namespace
+
+MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSource> label_source,
+                             const std::optional<StoredMap>& stored,
+                             const std::shared_ptr<TileShelf>& shelf, ScanQueue& queue,
+                             Statistics& statistics, MapBoard& board, const MappingOutputs& outputs)
+    : map_limit_bytes_(map_share_bytes(config.map)),
+      lidar_frame_(config.frames.lidar),
+      view_period_(config.publish.tiles_period_s),
+      queue_(queue),
+      statistics_(statistics),
+      board_(board),
+      outputs_(outputs),
+      mapper_(config.mapper,
+              std::make_unique<PacedLabels>(std::move(label_source), label_budget(config), queue,
+                                            statistics),
+              {.stage_ended = [this](std::string_view stage) { stage_ended(stage); },
+               .pose_found =
+                   [this](std::int64_t stamp_ns, const OdometryResult& odometry) {
+                     pose_found(stamp_ns, odometry);
+                   }}) {
+  if (stored && !stored->view.tiles.empty()) {
+    go_on_with(*stored, shelf);
+  } else {
+    mapper_.static_map().use_shelf(shelf);
+    mapper_.reset(new_map_id());
+    begin_map({});
+  }
+  thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+}
+
+std::uint64_t MappingThread::reset() {
+  const std::uint64_t map_id = new_map_id();
+  between_scans([this, map_id] {
+    mapper_.reset(map_id);
+    begin_map({});
+    spdlog::info("reset: map {} begins", map_id);
+  });
+  return map_id;
+}
+
+void MappingThread::load(const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf) {
+  between_scans([&] {
+    go_on_with(stored, shelf);
+    spdlog::info("loaded: going on with {} tiles as map {}", stored.view.tiles.size(),
+                 stored.view.map_id);
+  });
+}
+
+void MappingThread::go_on_with(const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf) {
+  // First what may refuse the map.
+  mapper_.restore(stored.view, stored.memories);
+  const Trajectory& path = stored.trajectory;
+  const Eigen::Vector3d last_map =
+      path.empty() ? Eigen::Vector3d(0.0, 0.0, 0.0) : path.back().T_map_lidar.translation();
+  mapper_.static_map().use_shelf(shelf);
+  mapper_.static_map().take_back_near(last_map, map_limit_bytes_);
+  begin_map(path);
+}
+
+void MappingThread::begin_map(Trajectory trajectory) {
+  board_.begin(mapper_.map_view(), std::move(trajectory));
+  if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(board_.view());
+}
+
+void MappingThread::show_now() {
+  between_scans([this] { show_view(); });
+}
+
+void MappingThread::stop() {
+  thread_ = {};
+  const std::scoped_lock lock(asked_mutex_);
+  has_stopped_ = true;
+  for (std::packaged_task<void()>& task : std::exchange(asked_, {})) task();
+}
+
+RunCheckpoint MappingThread::checkpoint(bool everything) {
+  MapCheckpoint map;
+  between_scans([&] {
+    const auto began = Clock::now();
+    map = mapper_.static_map().checkpoint(everything);
+    board_.show(map.view);
+    statistics_.add_latency("checkpoint", milliseconds(Clock::now() - began));
+  });
+  RunCheckpoint checkpoint{stored_state(map), map.step};
+  checkpoint.map.trajectory = board_.trajectory();
+  return checkpoint;
+}
+
+void MappingThread::checkpoint_stored(std::uint64_t step) {
+  between_scans([&] {
+    StaticMap& map = mapper_.static_map();
+    map.checkpoint_stored(step);
+    map.shelve(board_.newest_pose().T_map_lidar.translation(), map_limit_bytes_);
+    for (const std::string& fault : map.unreadable_tiles()) {
+      warnings_.warn("tiles_unreadable", "not mapped there: " + fault);
+    }
+    statistics_.map_takes(map.memory_use(), map.unreadable_tiles().size());
+  });
+}
+
+MemoryUse MappingThread::memory_use() {
+  MemoryUse use;
+  between_scans([&] { use = mapper_.static_map().memory_use(); });
+  return use;
+}
+
+std::vector<RemovedVoxel> MappingThread::removed(const Eigen::AlignedBox3d& box_map) {
+  std::vector<RemovedVoxel> removed;
+  between_scans([&] { removed = mapper_.static_map().removed(box_map); });
+  return removed;
+}
+
+std::size_t MappingThread::restore_removed(RemovalReason reason,
+                                           const Eigen::AlignedBox3d& box_map) {
+  std::size_t restored = 0;
+  between_scans([&] { restored = mapper_.static_map().restore_removed(reason, box_map); });
+  return restored;
+}
+
+void MappingThread::between_scans(std::function<void()> action) {
+  std::future<void> done;
+  {
+    const std::scoped_lock lock(asked_mutex_);
+    if (has_stopped_) return action();
+    done = asked_.emplace_back(std::move(action)).get_future();
+  }
+  done.get();
+}
+
+void MappingThread::work(const std::stop_token& stop) {
+  while (!stop.stop_requested()) {
+    auto queued = queue_.pop(stop, idle_period);
+    const bool idle = !queued;
+    if (queued) map(*std::move(queued));
+    // Afterwards: the scan's pose is waited for.
+    run_asked();
+    if (idle || Clock::now() - view_shown_ >= view_period_) show_view();
+  }
+  show_view();
+  run_asked();
+}
+
+void MappingThread::map(QueuedScan queued) {
+  std::optional<ScanTraffic::InWork> in_work;
+  if (outputs_.traffic != nullptr) in_work.emplace(*outputs_.traffic);
+  const auto began = Clock::now();
+  stage_began_ = began;
+  labels_ms_ = 0.0;
+  frame_ = lidar_frame_.empty() ? queued.frame : lidar_frame_;
+  received_ = queued.received;
+  statistics_.add_latency("queue", milliseconds(began - queued.received));
+  const std::int64_t stamp_ns = queued.scan.stamp_ns;
+  auto mapped = mapper_.process(std::move(queued.scan), prior_for(stamp_ns));
+  if (!mapped) {
+    const ScanRejection& rejection = mapper_.last_rejection();
+    statistics_.scans_dropped(rejection.counter, 1, rejection.reason);
+    warnings_.warn(rejection.counter, "scan dropped: " + rejection.reason);
+    return;
+  }
+  const bool unlabelled = mapped->labelled.labels.empty();
+  board_.add_pose({stamp_ns, mapped->odometry.T_map_lidar}, mapped->odometry.health,
+                  unlabelled ? "none" : mapper_.label_source());
+  statistics_.scan_mapped(mapped->labelling);
+  statistics_.add_latency("total", milliseconds(Clock::now() - queued.received));
+  hand_on(*std::move(mapped));
+  statistics_.scan_took_besides_labels(milliseconds(Clock::now() - began) - labels_ms_);
+}
+
+void MappingThread::hand_on(MappedScan mapped) {
+  const auto labelled = std::make_shared<const LabelledScan>(std::move(mapped.labelled));
+  if (outputs_.occupancy != nullptr) {
+    outputs_.occupancy->add({labelled, mapped.odometry.T_map_lidar, !mapped.unknown_may_move});
+  }
+  if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frame_);
+}
+
+std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) const {
+  if (mapper_.trajectory().empty()) {
+    return pose_in_restored_map(board_.trajectory(), stamp_ns);
+  }
+  if (outputs_.prior == nullptr) return std::nullopt;
+  return outputs_.prior->predict(mapper_.trajectory().back(), stamp_ns);
+}
+
+void MappingThread::stage_ended(std::string_view stage) {
+  const auto now = Clock::now();
+  const double ms = milliseconds(now - stage_began_);
+  statistics_.add_latency(std::string(stage), ms);
+  if (stage == "segment") labels_ms_ = ms;
+  stage_began_ = now;
+}
+
+void MappingThread::pose_found(std::int64_t stamp_ns, const OdometryResult& odometry) {
+  if (outputs_.poses != nullptr) outputs_.poses->publish(stamp_ns, odometry, frame_);
+  statistics_.add_latency("pose", milliseconds(Clock::now() - received_));
+}
+
+void MappingThread::show_view() {
+  board_.show(mapper_.map_view());
+  view_shown_ = Clock::now();
+  if (outputs_.occupancy != nullptr && map_limit_bytes_ != no_limit) {
+    outputs_.occupancy->follow(board_.view());
+  }
+}
+
+void MappingThread::run_asked() {
+  const std::scoped_lock lock(asked_mutex_);
+  for (std::packaged_task<void()>& task : std::exchange(asked_, {})) task();
+}
+
+}  // namespace stillmap

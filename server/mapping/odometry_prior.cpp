@@ -1,0 +1,74 @@
+#include "server/mapping/odometry_prior.hpp"
+
+#include <algorithm>
+
+#include "idl/conversions/pose.hpp"
+#include "idl/interface/topics.hpp"
+
+namespace stillmap {
+namespace {
+
+// At 100 Hz, 10 s: more than any scan waits in the queue.
+constexpr std::size_t poses_kept = 1000;
+// A pose this much older than the scan still stands for it.
+constexpr std::int64_t longest_gap_ns = 100'000'000;
+
+}  // namespace
+
+void PosesByTime::add(const StampedPose& pose) {
+  if (!poses_.empty() && pose.stamp_ns <= poses_.back().stamp_ns) return;
+  poses_.push_back(pose);
+  if (poses_.size() > poses_kept) poses_.pop_front();
+}
+
+std::optional<Eigen::Isometry3d> PosesByTime::pose_at(std::int64_t stamp_ns) const {
+  const auto after = std::ranges::lower_bound(poses_, stamp_ns, {}, &StampedPose::stamp_ns);
+  if (after == poses_.end()) {
+    const bool near = !poses_.empty() && stamp_ns - poses_.back().stamp_ns <= longest_gap_ns;
+    return near ? std::optional(poses_.back().T_map_lidar) : std::nullopt;
+  }
+  if (after->stamp_ns == stamp_ns) return after->T_map_lidar;
+  if (after == poses_.begin()) return std::nullopt;
+  const auto before = std::prev(after);
+  const double share = static_cast<double>(stamp_ns - before->stamp_ns) /
+                       static_cast<double>(after->stamp_ns - before->stamp_ns);
+  const Eigen::Quaterniond q_before(before->T_map_lidar.rotation());
+  const Eigen::Quaterniond q_after(after->T_map_lidar.rotation());
+  const Eigen::Vector3d t_before = before->T_map_lidar.translation();
+  const Eigen::Vector3d t_after = after->T_map_lidar.translation();
+  return Eigen::Isometry3d(Eigen::Translation3d(t_before + share * (t_after - t_before)) *
+                           q_before.slerp(share, q_after));
+}
+
+std::optional<Eigen::Isometry3d> PosesByTime::motion(std::int64_t from_ns,
+                                                     std::int64_t to_ns) const {
+  const auto T_odom_from = pose_at(from_ns);
+  const auto T_odom_to = pose_at(to_ns);
+  if (!T_odom_from || !T_odom_to) return std::nullopt;
+  return T_odom_from->inverse() * *T_odom_to;
+}
+
+OdometryPrior::OdometryPrior(Participant& participant, const std::string& ros_topic)
+    : reader_(participant, odometry_prior_topic(ros_topic).dds_name,
+              odometry_prior_topic(ros_topic).reader),
+      thread_([this](const std::stop_token& stop) { receive(stop); }) {}
+
+std::optional<Eigen::Isometry3d> OdometryPrior::predict(const StampedPose& last,
+                                                        std::int64_t stamp_ns) const {
+  const std::scoped_lock lock(mutex_);
+  const auto T_last_now = poses_.motion(last.stamp_ns, stamp_ns);
+  if (!T_last_now) return std::nullopt;
+  return last.T_map_lidar * *T_last_now;
+}
+
+void OdometryPrior::receive(const std::stop_token& stop) {
+  nav_msgs::msg::Odometry message;
+  while (!stop.stop_requested()) {
+    if (!reader_.take(message, stop, std::chrono::seconds(1))) continue;
+    const auto odometry = wire::from_odometry(message);
+    const std::scoped_lock lock(mutex_);
+    if (odometry) poses_.add(odometry->pose);
+  }
+}
+
+}  // namespace stillmap

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "server/monitoring/metrics_snapshot.hpp"
+
+namespace stillmap {
+
+/// Answers Prometheus over HTTP at /metrics, from its own threads.
+class MetricsEndpoint {
+ public:
+  /// `take` is called for every request, also by several threads. Throws std::runtime_error that
+  /// names the address when it cannot be listened on.
+  MetricsEndpoint(const std::string& address, std::function<MetricsSnapshot()> take);
+  ~MetricsEndpoint();
+
+  /// Where it listens, with the port that was free for port 0.
+  [[nodiscard]] const std::string& address() const { return address_; }
+
+ private:
+  class Exposed;
+  std::shared_ptr<Exposed> exposed_;
+  std::unique_ptr<class MetricsListener> listener_;
+  std::string address_;
+};
+
+}  // namespace stillmap

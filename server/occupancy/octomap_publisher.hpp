@@ -1,0 +1,32 @@
+#pragma once
+
+#include <string>
+
+#include "config/loaders/server_config.hpp"
+#include "idl/dds/writer.hpp"
+#include "idl/interface/topics.hpp"
+#include "octomap_msgs.h"
+#include "server/occupancy/occupancy_thread.hpp"
+#include "server/publishers/periodic_thread.hpp"
+
+namespace stillmap {
+
+/// Publishes the octree (binary, as RViz2's plug-in and octomap_server's clients read it) when it
+/// changed and somebody listens.
+class OctomapPublisher {
+ public:
+  OctomapPublisher(Participant& participant, const Topics& topics, const ServerConfig& config,
+                   OccupancyThread& occupancy);
+
+ private:
+  void publish();
+
+  OccupancyThread& occupancy_;
+  std::string map_frame_;
+  std::uint64_t published_ = 0;
+  Writer<octomap_msgs::msg::Octomap> writer_;
+  // Last: stops before what it uses is gone.
+  PeriodicThread thread_;
+};
+
+}  // namespace stillmap

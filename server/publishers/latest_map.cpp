@@ -1,0 +1,107 @@
+#include "server/publishers/latest_map.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <functional>
+#include <utility>
+
+namespace stillmap {
+
+// The wall clock sees to it that it differs.
+std::uint64_t new_map_id() {
+  return static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
+}
+
+void MapBoard::begin(std::shared_ptr<const MapView> view, Trajectory trajectory) {
+  auto history = std::make_shared<const TileHistory>(history_from(*view));
+  const std::scoped_lock lock(mutex_);
+  state_ = {std::move(view), std::move(history)};
+  shown_ = std::chrono::steady_clock::now();
+  changed_.notify_all();
+  trajectory_ = std::move(trajectory);
+  health_ = OdometryHealth::initialised;
+}
+
+void MapBoard::show(std::shared_ptr<const MapView> view) {
+  // Only the mapper's thread shows views, so the state cannot change between the two locks.
+  const MapState before = state();
+  if (before.view == view) return;
+  auto history = std::make_shared<const TileHistory>(
+      before.history ? history_with(*before.history, *view) : history_from(*view));
+  const std::scoped_lock lock(mutex_);
+  state_ = {std::move(view), std::move(history)};
+  shown_ = std::chrono::steady_clock::now();
+  changed_.notify_all();
+}
+
+void MapBoard::add_pose(const StampedPose& pose, OdometryHealth health,
+                        const std::string& label_source) {
+  const std::scoped_lock lock(mutex_);
+  const auto is_later = [&](const StampedPose& known) { return known.stamp_ns >= pose.stamp_ns; };
+  const auto later =
+      std::ranges::find_if(trajectory_.rbegin(), trajectory_.rend(), std::not_fn(is_later));
+  trajectory_.erase(later.base(), trajectory_.end());
+  trajectory_.push_back(pose);
+  ++poses_added_;
+  health_ = health;
+  label_source_ = label_source;
+}
+
+std::shared_ptr<const MapView> MapBoard::view() const {
+  const std::scoped_lock lock(mutex_);
+  return state_.view;
+}
+
+std::optional<MapBoard::News> MapBoard::wait_for_news(const std::shared_ptr<const MapView>& known,
+                                                      const std::stop_token& stop,
+                                                      std::chrono::milliseconds timeout) const {
+  std::unique_lock lock(mutex_);
+  const bool is_new =
+      changed_.wait_for(lock, stop, timeout, [&] { return state_.view && state_.view != known; });
+  if (!is_new) return std::nullopt;
+  return News{state_.view, shown_};
+}
+
+MapState MapBoard::state() const {
+  const std::scoped_lock lock(mutex_);
+  return state_;
+}
+
+Trajectory MapBoard::trajectory() const {
+  const std::scoped_lock lock(mutex_);
+  return trajectory_;
+}
+
+StampedPose MapBoard::newest_pose() const {
+  const std::scoped_lock lock(mutex_);
+  return trajectory_.empty() ? StampedPose{} : trajectory_.back();
+}
+
+Trajectory MapBoard::trajectory(std::size_t max_poses) const {
+  const std::scoped_lock lock(mutex_);
+  if (trajectory_.empty()) return {};
+  const std::size_t last = trajectory_.size() - 1;
+  std::size_t stride = 1;
+  while ((last + stride - 1) / stride + 1 > max_poses) stride *= 2;
+  Trajectory chosen;
+  for (std::size_t i = 0; i < last; i += stride) chosen.push_back(trajectory_[i]);
+  chosen.push_back(trajectory_.back());
+  return chosen;
+}
+
+std::uint64_t MapBoard::poses_added() const {
+  const std::scoped_lock lock(mutex_);
+  return poses_added_;
+}
+
+OdometryHealth MapBoard::health() const {
+  const std::scoped_lock lock(mutex_);
+  return health_;
+}
+
+std::string MapBoard::label_source() const {
+  const std::scoped_lock lock(mutex_);
+  return label_source_;
+}
+
+}  // namespace stillmap

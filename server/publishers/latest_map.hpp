@@ -1,0 +1,66 @@
+#pragma once
+
+#include <chrono>
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "core/map/tile.hpp"
+#include "core/map/query/tile_history.hpp"
+#include "core/odometry/odometry_state.hpp"
+#include "core/odometry/trajectory.hpp"
+
+namespace stillmap {
+
+/// An id that no map of an earlier run has.
+[[nodiscard]] std::uint64_t new_map_id();
+
+/// What the mapper's thread shows to all others: immutable views, so that nobody waits for
+/// anybody. Thread-safe.
+class MapBoard {
+ public:
+  /// A new map begins: its first view, and the poses that led to it.
+  void begin(std::shared_ptr<const MapView> view, Trajectory trajectory);
+  void show(std::shared_ptr<const MapView> view);
+  /// Poses at later times give way: a recording that is played again replaces its old path.
+  void add_pose(const StampedPose& pose, OdometryHealth health, const std::string& label_source);
+
+  /// Never null once `begin` was called.
+  [[nodiscard]] std::shared_ptr<const MapView> view() const;
+  /// A view, and when it came.
+  struct News {
+    std::shared_ptr<const MapView> view;
+    std::chrono::steady_clock::time_point shown;
+  };
+  /// Waits for another view than `known`. Nothing after `timeout` or when a stop was requested.
+  [[nodiscard]] std::optional<News> wait_for_news(const std::shared_ptr<const MapView>& known,
+                                                  const std::stop_token& stop,
+                                                  std::chrono::milliseconds timeout) const;
+  /// The view and the history that ends with it.
+  [[nodiscard]] MapState state() const;
+  [[nodiscard]] Trajectory trajectory() const;
+  /// So many of its poses (2 or more) at most, evenly chosen, the newest always among them. The
+  /// ones that are chosen stay the same until there are twice as many.
+  [[nodiscard]] Trajectory trajectory(std::size_t max_poses) const;
+  /// The newest pose; the origin before the first.
+  [[nodiscard]] StampedPose newest_pose() const;
+  /// Poses added so far, over all maps: changes with every scan.
+  [[nodiscard]] std::uint64_t poses_added() const;
+  [[nodiscard]] OdometryHealth health() const;
+  [[nodiscard]] std::string label_source() const;
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::condition_variable_any changed_;
+  MapState state_;
+  std::chrono::steady_clock::time_point shown_;
+  Trajectory trajectory_;
+  std::uint64_t poses_added_ = 0;
+  OdometryHealth health_ = OdometryHealth::initialised;
+  std::string label_source_;
+};
+
+}  // namespace stillmap

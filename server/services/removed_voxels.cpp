@@ -1,0 +1,78 @@
+#include "server/services/removed_voxels.hpp"
+
+#include <algorithm>
+#include <bitset>
+
+#include "core/map/query/region_shape.hpp"
+#include "idl/conversions/region.hpp"
+#include "idl/conversions/removed_voxels.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr std::size_t most_voxels = 300'000;
+
+/// Throws std::invalid_argument for what is no region.
+Region region_of(const stillmap_msgs::msg::Region& message) {
+  auto [region, fault] = wire::from_wire(message);
+  if (!region) throw std::invalid_argument(fault);
+  if (std::string faults = region_faults(*region); !faults.empty()) {
+    throw std::invalid_argument(faults);
+  }
+  return *region;
+}
+
+RemovalReason reason_of(std::uint8_t number) {
+  if (const auto reason = wire::removal_reason(number)) return *reason;
+  throw std::invalid_argument("reason is " + std::to_string(number) +
+                              "; must be 0 (moving), 1 (semi-static), 2 (seen through) or 3 "
+                              "(relabelled)");
+}
+
+using Reasons = std::bitset<removal_reason_count>;
+
+Reasons reasons_of(const std::vector<std::uint8_t>& numbers) {
+  Reasons reasons;
+  for (const std::uint8_t number : numbers) {
+    reasons.set(static_cast<std::size_t>(reason_of(number)));
+  }
+  return reasons.none() ? reasons.set() : reasons;
+}
+
+}  // namespace
+
+stillmap_msgs::srv::GetRemoved_Response get_removed(
+    const ServiceContext& context, const RemovedSource& source,
+    const stillmap_msgs::srv::GetRemoved_Request& request) {
+  using Response = stillmap_msgs::srv::GetRemoved_Response;
+  return answer<Response>(context, request, [&](const MapView&, Response& response) {
+    const RegionShape region(region_of(request.region()));
+    const Reasons reasons = reasons_of(request.reasons());
+    std::vector<RemovedVoxel> removed = source.removed(region.bounds_map());
+    std::erase_if(removed, [&](const RemovedVoxel& voxel) {
+      return !reasons.test(static_cast<std::size_t>(voxel.reason)) ||
+             !region.contains(voxel.position_map.cast<double>());
+    });
+    response.total(removed.size());
+    const std::size_t wanted = std::min<std::size_t>(request.max_voxels(), most_voxels);
+    removed.resize(std::min(removed.size(), wanted));
+    wire::write_removed(removed, response);
+  });
+}
+
+stillmap_msgs::srv::RestoreRemoved_Response restore_removed(
+    const ServiceContext& context, const RemovedSource& source,
+    const stillmap_msgs::srv::RestoreRemoved_Request& request) {
+  using Response = stillmap_msgs::srv::RestoreRemoved_Response;
+  return answer<Response>(context, request, [&](const MapView&, Response& response) {
+    const Region region = region_of(request.region());
+    const auto* const box = std::get_if<BoxRegion>(&region);
+    if (box == nullptr) throw std::invalid_argument("only a box can be restored; ask for one");
+    const RegionShape shape(region);
+    response.restored(source.restore(reason_of(request.reason()), shape.bounds_map()));
+    context.show_now();
+    response.status(reply_status(*context.board.view()));
+  });
+}
+
+}  // namespace stillmap

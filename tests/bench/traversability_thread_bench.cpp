@@ -1,0 +1,167 @@
+#include <benchmark/benchmark.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <cstdlib>
+#include <ctime>
+#include <mutex>
+
+#include "core/map/storage/map_file.hpp"
+#include "core/traversability/traversability_query.hpp"
+#include "idl/conversions/occupancy_grid.hpp"
+#include "server/traversability/traversability_thread.hpp"
+#include "server/traversability/traversability_grid_provider.hpp"
+
+namespace stillmap {
+namespace {
+
+double thread_cpu_ms() {
+  timespec time{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
+}
+
+/// Counts updates with their work, and lets others wait for the next.
+class UpdateCount {
+ public:
+  /// Called by the thread that updates.
+  void add() {
+    const double cpu_ms = thread_cpu_ms();
+    const std::scoped_lock lock(mutex_);
+    last_work_ms_ = cpu_ms - last_cpu_ms_;
+    last_cpu_ms_ = cpu_ms;
+    ++count_;
+    changed_.notify_all();
+  }
+  /// Time on the processor of the last update.
+  double wait_for(std::uint64_t count) {
+    std::unique_lock lock(mutex_);
+    changed_.wait(lock, [&] { return count_ >= count; });
+    return last_work_ms_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::uint64_t count_ = 0;
+  double last_cpu_ms_ = 0.0;
+  double last_work_ms_ = 0.0;
+};
+
+/// The map file that STILLMAP_BENCH_MAP names; nothing, and why in the state, without.
+std::optional<MapView> bench_map(benchmark::State& state) {
+  if (const char* const file = std::getenv("STILLMAP_BENCH_MAP")) {
+    return open_map_file(file)->load().view;
+  }
+  state.SkipWithError("STILLMAP_BENCH_MAP must name a map file (stillmap map CITY --out FOLDER)");
+  return std::nullopt;
+}
+
+void report(std::vector<double> ms, const std::string& name, benchmark::State& state) {
+  if (ms.empty()) return;
+  std::ranges::sort(ms);
+  state.counters[name + "p50_ms"] = ms[ms.size() / 2];
+  state.counters[name + "p99_ms"] = ms[ms.size() * 99 / 100];
+}
+
+/// A map of which one tile after the other changes: it loses every second voxel, and has them all
+/// again at its next turn.
+class ChangingMap {
+ public:
+  explicit ChangingMap(MapView map)
+      : whole_(std::move(map)), now_(whole_), is_thin_(whole_.tiles.size(), false) {}
+
+  std::shared_ptr<const MapView> change() {
+    const std::size_t i = turn_++ * 7 % whole_.tiles.size();
+    Tile tile = *whole_.tiles[i];
+    is_thin_[i] = !is_thin_[i];
+    std::size_t n = 0;
+    if (is_thin_[i]) std::erase_if(tile.voxels, [&](const Voxel&) { return ++n % 2 == 0; });
+    tile.info.revision = ++now_.version;
+    now_.tiles[i] = std::make_shared<const Tile>(std::move(tile));
+    return std::make_shared<const MapView>(now_);
+  }
+
+ private:
+  MapView whole_;
+  MapView now_;
+  std::vector<bool> is_thin_;
+  std::size_t turn_ = 0;
+};
+
+/// A tile changes on the board of a server that keeps the areas of a car and a delivery robot,
+/// until both are shown and the grid of the whole map is ready to be sent; and what of it the
+/// thread, which has a low priority, spent on the processor.
+void tile_change_to_published_area(benchmark::State& state) {
+  const std::optional<MapView> map = bench_map(state);
+  if (!map) return;
+  const AreasConfig config;
+  MapBoard maps;
+  AreaBoard areas;
+  Statistics statistics;
+  UpdateCount updates;
+  const PlanningGrid planning_grid(config, "map", maps, areas);
+  maps.begin(std::make_shared<const MapView>(*map), {});
+  const AreaThread thread(robots_of(config), std::chrono::seconds(0), maps, areas, statistics, [&] {
+    benchmark::DoNotOptimize(planning_grid.message(planning_grid.grid()));
+    updates.add();
+  });
+  updates.wait_for(1);
+  std::vector<double> ms;
+  std::vector<double> cpu_ms;
+  ChangingMap changing(*map);
+  for (auto _ : state) {
+    const auto next = changing.change();
+    const auto began = std::chrono::steady_clock::now();
+    maps.show(next);
+    cpu_ms.push_back(updates.wait_for(2 + ms.size()));
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
+    state.SetIterationTime(took.count());
+    ms.push_back(1000.0 * took.count());
+  }
+  report(ms, "", state);
+  report(cpu_ms, "cpu_", state);
+  state.counters["tiles"] = static_cast<double>(map->tiles.size());
+}
+BENCHMARK(tile_change_to_published_area)
+    ->Unit(benchmark::kMillisecond)
+    ->UseManualTime()
+    ->Iterations(300);
+
+/// Grid with reasons and outlines round the map's middle; args: metres across, and which region
+/// (0 box, 1 sphere).
+void area_of_region(benchmark::State& state) {
+  const std::optional<MapView> map = bench_map(state);
+  if (!map) return;
+  TraversabilityMap areas(robots_of(AreasConfig{}));
+  static_cast<void>(areas.update(*map));
+  const TraversabilityView& view = *areas.view("car");
+  const double radius_m = 0.5 * static_cast<double>(state.range(0));
+  const Eigen::Vector2d centre = view.bounds_map().center();
+  AreaQuery query;
+  query.wants_outlines = true;
+  BoxRegion box;
+  box.box_map.min().head<2>() = centre - Eigen::Vector2d::Constant(radius_m);
+  box.box_map.max().head<2>() = centre + Eigen::Vector2d::Constant(radius_m);
+  query.region = box;
+  if (state.range(1) == 1) {
+    query.region = SphereRegion{.centre_map = {centre.x(), centre.y(), 0.0}, .radius_m = radius_m};
+  }
+  std::vector<double> cpu_ms;
+  std::size_t cells = 0;
+  for (auto _ : state) {
+    const double began_ms = thread_cpu_ms();
+    cells = answer_area(view, query).cells.size();
+    cpu_ms.push_back(thread_cpu_ms() - began_ms);
+  }
+  report(cpu_ms, "cpu_", state);
+  state.counters["cells"] = static_cast<double>(cells);
+}
+BENCHMARK(area_of_region)
+    ->ArgNames({"across_m", "region"})
+    ->ArgsProduct({{20, 50, 200}, {0, 1}})
+    ->Unit(benchmark::kMillisecond)
+    ->Iterations(200);
+
+}  // namespace
+}  // namespace stillmap

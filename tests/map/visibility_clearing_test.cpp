@@ -1,0 +1,165 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/lidar/range_image_view.hpp"
+#include "core/map/static_map.hpp"
+#include "tests/map/map_worlds.hpp"
+
+namespace stillmap {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Vector3f;
+using enum SemanticClass;
+using test::add_point;
+
+constexpr double degree = 0.017453292519943295;
+
+/// Rays of a 64-beam lidar ahead, each as far as `range_of` says.
+template <typename RangeOf>
+LabelledScan looking_ahead(std::int64_t stamp_ns, RangeOf range_of) {
+  LabelledScan scan;
+  scan.scan.stamp_ns = stamp_ns;
+  for (double elevation = -10.0; elevation < 2.0; elevation += 0.4) {
+    for (double azimuth = -10.0; azimuth < 10.0; azimuth += 0.2) {
+      const double e = elevation * degree, a = azimuth * degree;
+      const auto [range_m, label, motion] = range_of(azimuth, elevation);
+      const Vector3f direction(static_cast<float>(std::cos(e) * std::cos(a)),
+                               static_cast<float>(std::cos(e) * std::sin(a)),
+                               static_cast<float>(std::sin(e)));
+      add_point(scan, static_cast<float>(range_m) * direction, label, motion);
+    }
+  }
+  return scan;
+}
+
+struct Seen {
+  double range_m;
+  SemanticClass label;
+  Motion motion = Motion::stationary;
+};
+
+Seen wall(double, double) { return {20.0, building}; }
+/// Something 10 m ahead, two metres wide, taken for a fence.
+Seen ghost(double azimuth, double elevation) {
+  return std::abs(azimuth) < 6.0 && elevation < 0.0 ? Seen{10.0, fence} : wall(azimuth, elevation);
+}
+/// One column of rays in a hundred.
+Seen pole_before_wall(double azimuth, double elevation) {
+  return std::abs(azimuth) < 0.15 ? Seen{12.0, pole} : wall(azimuth, elevation);
+}
+Seen passing_car(double azimuth, double elevation) {
+  Seen seen = ghost(azimuth, elevation);
+  if (seen.label == fence) seen = {10.0, car, Motion::highly_dynamic};
+  return seen;
+}
+Seen parked_car(double azimuth, double elevation) {
+  Seen seen = passing_car(azimuth, elevation);
+  if (seen.label == car) seen.motion = Motion::semi_static;
+  return seen;
+}
+
+class LookThrough : public testing::Test {
+ protected:
+  template <typename World>
+  void see(World world, int scans) {
+    for (int i = 0; i < scans; ++i) {
+      const LabelledScan scan = looking_ahead(++stamp_ns_, world);
+      map_.insert(scan, Isometry3d::Identity());
+      map_.look_through(RangeView(scan.scan, {}, hdl_64e(), Isometry3d::Identity()), stamp_ns_);
+    }
+  }
+  [[nodiscard]] int shown(SemanticClass label) {
+    int count = 0;
+    for (const auto& tile : map_.view()->tiles) {
+      count += static_cast<int>(std::ranges::count_if(
+          tile->voxels, [label](const Voxel& voxel) { return voxel.evidence.winner() == label; }));
+    }
+    return count;
+  }
+  [[nodiscard]] int removed(RemovalReason reason) const {
+    const std::vector<RemovedVoxel> all = map_.removed(test::everywhere());
+    return static_cast<int>(std::ranges::count(all, reason, &RemovedVoxel::reason));
+  }
+
+  StaticMap map_{StaticMapConfig{}};
+  std::int64_t stamp_ns_ = 0;
+};
+
+TEST_F(LookThrough, WhatRaysKeepPassingThroughLeavesTheView) {
+  see(ghost, 2);
+  const int before = shown(fence);
+  ASSERT_GT(before, 50);
+  see(wall, 3);
+  EXPECT_EQ(shown(fence), before);
+  see(wall, 4);
+  EXPECT_LT(shown(fence), before / 10);
+  EXPECT_GT(removed(RemovalReason::seen_through), before * 9 / 10);
+  EXPECT_GT(shown(building), 100);
+}
+
+TEST_F(LookThrough, WhatComesToStandThereComesIntoViewAgain) {
+  see(ghost, 2);
+  const int before = shown(fence);
+  see(wall, 20);
+  ASSERT_LT(shown(fence), before / 10);
+  see(ghost, 20);
+  EXPECT_GE(shown(fence), before);
+}
+
+TEST_F(LookThrough, ThinThingsStay) {
+  see(pole_before_wall, 3);
+  const int before = shown(pole);
+  ASSERT_GT(before, 5);
+  see(pole_before_wall, 100);
+  EXPECT_GE(shown(pole), before);
+  EXPECT_EQ(removed(RemovalReason::seen_through), 0);
+}
+
+TEST_F(LookThrough, RemovedThingsAreRememberedWithTheirReason) {
+  see(passing_car, 1);
+  const int moving = removed(RemovalReason::moving);
+  EXPECT_GT(moving, 50);
+  see(parked_car, 3);
+  EXPECT_EQ(removed(RemovalReason::moving), moving);
+  EXPECT_EQ(shown(car), 0);
+}
+
+TEST_F(LookThrough, RemovedThingsCanBeShownAgain) {
+  see(parked_car, 3);
+  const int parked = removed(RemovalReason::semi_static);
+  ASSERT_GT(parked, 50);
+  const Eigen::AlignedBox3d left(Eigen::Vector3d(0, 0, -10), Eigen::Vector3d(30, 30, 10));
+  const auto restored = map_.restore_removed(RemovalReason::semi_static, left);
+  EXPECT_GT(restored, 10U);
+  EXPECT_EQ(shown(car), static_cast<int>(restored));
+  EXPECT_EQ(removed(RemovalReason::semi_static), parked - static_cast<int>(restored));
+  see(wall, 30);
+  EXPECT_EQ(shown(car), static_cast<int>(restored));
+}
+
+TEST_F(LookThrough, AStoredMapKeepsItsWeight) {
+  see(ghost, 10);
+  const auto stored = map_.view();
+  map_ = StaticMap(StaticMapConfig{});
+  map_.restore(*stored);
+  const int before = shown(fence);
+  ASSERT_GT(before, 50);
+  see(wall, 5);
+  EXPECT_EQ(shown(fence), before);
+}
+
+TEST_F(LookThrough, OffItLeavesEverything) {
+  StaticMapConfig config;
+  config.clear_range_m = 0.0;
+  map_ = StaticMap(config);
+  see(ghost, 2);
+  const int before = shown(fence);
+  see(wall, 30);
+  EXPECT_EQ(shown(fence), before);
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,90 @@
+#include <gtest/gtest.h>
+
+#include "core/map/tile_store.hpp"
+#include "core/occupancy/occupancy_map.hpp"
+#include "tests/map/map_worlds.hpp"
+
+namespace stillmap::test {
+namespace {
+
+/// A street of 300 m, seen and cleared along its way.
+class FollowedStreet : public testing::Test {
+ protected:
+  FollowedStreet() {
+    StaticMapConfig config;
+    StaticMap street(config);
+    for (int k = 0; k < 10; ++k) {
+      const LabelledScan scan = street_scan(static_cast<std::uint32_t>(k), 60);
+      const Eigen::Isometry3d T_map_lidar(Eigen::Translation3d(30.0 * k, 0.0, 0.0));
+      map_.insert(scan, T_map_lidar);
+      // Twice, so that voxels are shown.
+      street.insert(scan, T_map_lidar);
+      street.insert(scan, T_map_lidar);
+    }
+    view_ = *street.view();
+  }
+
+  /// The view when tiles behind this place have left memory.
+  [[nodiscard]] MapView without_tiles_before(double x_map) const {
+    MapView view = view_;
+    for (auto& tile : view.tiles) {
+      if ((tile->info.id.x + 1) * view.tile_size_m <= x_map) tile = shelved(*tile);
+    }
+    return view;
+  }
+  [[nodiscard]] BoxOccupancy between(double first_x_map, double last_x_map) const {
+    const Eigen::Vector3d low(first_x_map, -200.0, -200.0);
+    const Eigen::Vector3d high(last_x_map, 200.0, 200.0);
+    return map_.in_box({low, high}, 0);
+  }
+
+  OccupancyMap map_{OccupancyConfig{}};
+  MapView view_;
+};
+
+TEST_F(FollowedStreet, ForgetsWhatIsOnTheShelfAndNothingElse) {
+  const BoxOccupancy ahead = between(150.0, 400.0);
+  ASSERT_GT(between(0.0, 100.0).free, 1000U);
+  EXPECT_FALSE(map_.follow(view_));
+  EXPECT_TRUE(map_.follow(without_tiles_before(140.0)));
+  // Columns of 25.6 m that reach into tiles in memory stay.
+  EXPECT_EQ(between(-10.0, 100.0).free, 0U);
+  EXPECT_EQ(between(-10.0, 100.0).occupied, 0U);
+  EXPECT_EQ(between(150.0, 400.0).free, ahead.free);
+  EXPECT_EQ(between(150.0, 400.0).occupied, ahead.occupied);
+  EXPECT_FALSE(map_.follow(without_tiles_before(140.0))) << "nothing new";
+}
+
+TEST_F(FollowedStreet, CountsItsNodesRightly) {
+  const OccupancySize whole = map_.size();
+  map_.follow(without_tiles_before(140.0));
+  EXPECT_LT(map_.size().memory_bytes, whole.memory_bytes);
+  EXPECT_EQ(map_.size().nodes, OccupancyMap(map_.encode(false)).size().nodes);
+}
+
+TEST_F(FollowedStreet, TakesVoxelsOfTilesThatCameBackForOccupied) {
+  map_.follow(without_tiles_before(140.0));
+  EXPECT_TRUE(map_.follow(view_));
+  std::size_t voxels = 0;
+  for (const auto& tile : view_.tiles) {
+    if ((tile->info.id.x + 1) * view_.tile_size_m > 100.0) continue;
+    for (const Voxel& voxel : tile->voxels) {
+      ++voxels;
+      ASSERT_EQ(map_.at_point(voxel.mean_map.cast<double>()).occupancy, Occupancy::occupied);
+    }
+  }
+  EXPECT_GT(voxels, 100U);
+}
+
+TEST_F(FollowedStreet, KnowsFromItsFirstViewWhatIsAway) {
+  OccupancyMap map{OccupancyConfig{}};
+  const MapView stored = without_tiles_before(140.0);
+  map.insert(stored);
+  EXPECT_TRUE(map.follow(stored));
+  EXPECT_TRUE(map.follow(view_));
+  const Voxel& voxel = view_.tiles.front()->voxels.front();
+  EXPECT_EQ(map.at_point(voxel.mean_map.cast<double>()).occupancy, Occupancy::occupied);
+}
+
+}  // namespace
+}  // namespace stillmap::test

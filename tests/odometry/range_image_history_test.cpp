@@ -1,0 +1,139 @@
+#include "core/odometry/range_image_history.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/odometry/box_world.hpp"
+#include "tests/odometry/poses.hpp"
+
+namespace stillmap {
+namespace {
+
+using test::BoxWorld;
+using test::car_size_m;
+
+/// A wall across the view at 30 m.
+BoxWorld walled() {
+  BoxWorld world;
+  world.stand(30.5, 0.0, {1.0, 60.0, 8.0}, SemanticClass::building);
+  return world;
+}
+
+/// A car whose rear is `rear_x` ahead of the origin.
+BoxWorld with_car(double rear_x) {
+  BoxWorld world = walled();
+  world.stand(rear_x + 0.5 * car_size_m.x(), 0.0, car_size_m, SemanticClass::car);
+  return world;
+}
+
+RangeView view(const BoxWorld& world,
+               const Eigen::Isometry3d& T_map_lidar = Eigen::Isometry3d::Identity()) {
+  const test::BoxScan seen = world.scan(test::test_lidar(), T_map_lidar, 0.0);
+  return {seen.scan, seen.scan.labels, test::test_lidar(), T_map_lidar};
+}
+
+MotionConfig every_view() {
+  MotionConfig config;
+  config.past_views = 1;
+  config.past_view_interval = 1;
+  return config;
+}
+
+/// What one view of `before` says of a point that is seen in `now`.
+PastSight sight(const BoxWorld& before, const BoxWorld& now, const Eigen::Vector3f& p_map) {
+  PastViews past(every_view());
+  past.add(view(before));
+  return past.sight(0, p_map, view(now));
+}
+
+const Eigen::Vector3f rear_at_10m(10.0F, 0.0F, -0.8F);
+
+TEST(PastViews, PlaceThatARayPassedWasFree) {
+  EXPECT_EQ(sight(walled(), with_car(10.0), rear_at_10m), PastSight::free);
+}
+
+TEST(PastViews, PlaceOfTheSameCarIsTheSame) {
+  EXPECT_EQ(sight(with_car(10.0), with_car(10.0), rear_at_10m), PastSight::same);
+}
+
+TEST(PastViews, PlaceHiddenByAWallIsUnknown) {
+  BoxWorld hidden = walled();
+  hidden.stand(6.0, 0.0, {0.5, 10.0, 4.0}, SemanticClass::building);
+  EXPECT_EQ(sight(hidden, with_car(10.0), rear_at_10m), PastSight::unknown);
+}
+
+TEST(PastViews, PlaceBehindACarThatIsStillThereIsUnknown) {
+  BoxWorld both = with_car(10.0);
+  both.stand(7.0, 0.0, {1.0, 3.0, 1.6}, SemanticClass::car);
+  EXPECT_EQ(sight(both, both, rear_at_10m), PastSight::unknown);
+}
+
+TEST(PastViews, CarThatDroveOnAheadIsGoneFromBeforeItsRear) {
+  EXPECT_EQ(sight(with_car(8.5), with_car(10.0), rear_at_10m), PastSight::gone_before_it);
+}
+
+TEST(PastViews, AnotherCarFarBeforeItSaysNothing) {
+  EXPECT_EQ(sight(with_car(5.0), with_car(10.0), rear_at_10m), PastSight::unknown)
+      << "5 m in a scan is no motion of one car";
+}
+
+TEST(PastViews, DirectionWithoutReturnIsUnknown) {
+  const BoxWorld open;
+  EXPECT_EQ(sight(open, with_car(10.0), {10.0F, 0.0F, 0.8F}), PastSight::unknown);
+}
+
+TEST(PastViews, PlaceOutsideTheFieldOfViewIsUnknown) {
+  EXPECT_EQ(sight(walled(), walled(), {2.0F, 0.0F, 3.0F}), PastSight::unknown);
+  EXPECT_EQ(sight(walled(), walled(), {0.5F, 0.0F, -1.6F}), PastSight::unknown);
+  EXPECT_EQ(sight(walled(), walled(), {0.0F, 0.0F, 0.0F}), PastSight::unknown);
+}
+
+TEST(PastViews, LookFromAnotherPlaceAgrees) {
+  const Eigen::Isometry3d T_before = test::level_pose(-4.0, 1.5, 0.6);
+  PastViews past(every_view());
+  past.add(view(walled(), T_before));
+  EXPECT_EQ(past.sight(0, rear_at_10m, view(with_car(10.0))), PastSight::free);
+  past.add(view(with_car(10.0), T_before));
+  EXPECT_EQ(past.sight(0, rear_at_10m, view(with_car(10.0))), PastSight::same);
+}
+
+TEST(PastViews, MarginKeepsANearbySurfaceFromBeingFree) {
+  EXPECT_EQ(sight(with_car(10.3), with_car(10.0), rear_at_10m), PastSight::unknown);
+  EXPECT_EQ(sight(with_car(11.5), with_car(10.0), rear_at_10m), PastSight::free);
+}
+
+TEST(PastViews, KeepsOneViewEachInterval) {
+  MotionConfig config;
+  config.past_views = 2;
+  config.past_view_interval = 3;
+  PastViews past(config);
+  // The car comes a metre nearer in each view: 20 m in the first, 13 m in the last.
+  for (int k = 0; k < 8; ++k) {
+    EXPECT_EQ(past.size(), static_cast<std::size_t>(std::min(k / 3, 2)));
+    past.add(view(with_car(20.0 - k)));
+  }
+  const RangeView now = view(walled());
+  // Three views ago it stood at 15 m, six views ago at 18 m.
+  EXPECT_EQ(past.sight(0, {15.0F, 0.0F, -0.8F}, now), PastSight::same);
+  EXPECT_EQ(past.sight(1, {18.0F, 0.0F, -0.8F}, now), PastSight::same);
+  past.clear();
+  EXPECT_EQ(past.size(), 0U);
+}
+
+TEST(RangeView, SeesThePointsOfItsScan) {
+  const BoxWorld world = with_car(10.0);
+  const Eigen::Isometry3d T_map_lidar = test::level_pose(2.0, 1.0, -2.9);
+  const test::BoxScan seen = world.scan(test::test_lidar(), T_map_lidar, 0.0);
+  const RangeView from_here(seen.scan, seen.scan.labels, test::test_lidar(), T_map_lidar);
+  for (std::size_t i = 0; i < seen.scan.size(); ++i) {
+    const auto look = from_here.look_at(T_map_lidar.cast<float>() * seen.scan.points_lidar[i]);
+    ASSERT_TRUE(look) << i;
+    EXPECT_NEAR(look->range_m, look->point_range_m, 0.02F);
+    EXPECT_EQ(look->movable, seen.scan.labels[i] == SemanticClass::car);
+    EXPECT_LE(look->nearest_m, look->range_m);
+  }
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,193 @@
+#include "core/segmentation/network_segmenter.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "core/lidar/range_image.hpp"
+#include "tests/segmentation/onnx_builder.hpp"
+#include "tests/segmentation/sample_model.hpp"
+
+namespace stillmap {
+namespace {
+
+using test::describe;
+using test::onnx_bytes;
+using test::random_network;
+using test::random_scan;
+using test::TinyNetwork;
+using test::write_model;
+
+struct Expected {
+  std::size_t output;
+  double probability;
+};
+
+/// The tiny network by hand, on the point that a pixel shows.
+Expected by_hand(const Scan& scan, std::size_t point, const TinyNetwork& network,
+                 const InputStatistics& statistics) {
+  const Eigen::Vector3d p = scan.points_lidar[point].cast<double>();
+  const std::array<double, 5> raw{p.norm(), p.x(), p.y(), p.z(), scan.intensity[point]};
+  std::vector<double> scores;
+  for (std::size_t n = 0; n < network.bias.size(); ++n) {
+    scores.push_back(network.bias[n]);
+    for (std::size_t c = 0; c < 5; ++c) {
+      scores[n] +=
+          network.weights[n * 5 + c] * (raw[c] - statistics.mean[c]) / statistics.deviation[c];
+    }
+  }
+  const auto best = std::max_element(scores.begin(), scores.end());
+  double sum = 0.0;
+  for (const double score : scores) sum += std::exp(score - *best);
+  return {static_cast<std::size_t>(best - scores.begin()), 1.0 / sum};
+}
+
+/// The nearest of all points in the pixel of `point`.
+std::size_t shown_point(const Scan& scan, const RangeImage& image, std::size_t point) {
+  std::size_t nearest = point;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const bool same = image.pixel_of_point()[i] == image.pixel_of_point()[point];
+    if (same && scan.points_lidar[i].norm() < scan.points_lidar[nearest].norm()) nearest = i;
+  }
+  return nearest;
+}
+
+struct Fixture {
+  TinyNetwork network = random_network(8, 32, 20);
+  ModelDescription model = describe(network);
+  Fixture() { model.network_file = write_model(onnx_bytes(network)); }
+};
+
+TEST(NetworkLabels, GivesEveryPointTheClassThatItsPixelHasByHand) {
+  const Fixture fixture;
+  const Scan scan = random_scan(600, 4);
+  const PointLabels labels = open_model(fixture.model)->label(scan);
+  const RangeImage image = test::project(scan, fixture.model);
+  ASSERT_EQ(labels.classes.size(), scan.size());
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const Expected expected =
+        by_hand(scan, shown_point(scan, image, i), fixture.network, fixture.model.statistics);
+    EXPECT_EQ(static_cast<std::size_t>(labels.classes[i]), expected.output) << "point " << i;
+    EXPECT_NEAR(labels.confidence[i], expected.probability, 1e-4) << "point " << i;
+  }
+}
+
+TEST(NetworkLabels, MapsOutputsToClasses) {
+  Fixture fixture;
+  const Scan scan = random_scan(600, 4);
+  const PointLabels plain = open_model(fixture.model)->label(scan);
+  std::ranges::reverse(fixture.model.classes);
+  const PointLabels mapped = open_model(fixture.model)->label(scan);
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    EXPECT_EQ(static_cast<int>(mapped.classes[i]), 19 - static_cast<int>(plain.classes[i]));
+  }
+}
+
+TEST(NetworkLabels, LetsTheNeighboursVoteWhenAsked) {
+  Fixture fixture;
+  const Scan scan = random_scan(600, 4);
+  const RangeImage image = test::project(scan, fixture.model);
+  const PointLabels own = open_model(fixture.model)->label(scan);
+  PixelLabels pixels{.classes = std::vector(image.pixel_count(), SemanticClass::unlabeled),
+                     .confidence = std::vector(image.pixel_count(), 0.0F)};
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const auto pixel = static_cast<std::size_t>(image.pixel_of_point()[i]);
+    pixels.classes[pixel] = own.classes[i];
+    pixels.confidence[pixel] = own.confidence[i];
+  }
+  fixture.model.knn = KnnConfig{};
+  const PointLabels voted = open_model(fixture.model)->label(scan);
+  EXPECT_EQ(voted.classes, knn_labels(image, pixels, KnnConfig{}).classes);
+  EXPECT_NE(voted.classes, own.classes);
+}
+
+TEST(NetworkLabels, HasNothingToSayOfAnEmptyScan) {
+  EXPECT_TRUE(open_model(Fixture().model)->label({}).empty());
+}
+
+TEST(NetworkLabels, LeavesPointsThatCannotBeProjectedUnlabeled) {
+  Scan scan = random_scan(50, 2);
+  scan.points_lidar[3].x() = std::numeric_limits<float>::quiet_NaN();
+  scan.points_lidar[4].setZero();
+  const PointLabels labels = open_model(Fixture().model)->label(scan);
+  EXPECT_EQ(labels.classes[3], SemanticClass::unlabeled);
+  EXPECT_EQ(labels.classes[4], SemanticClass::unlabeled);
+  EXPECT_EQ(labels.confidence[3], 0.0F);
+}
+
+/// Has no finite scores for the left half of an image of two columns.
+class HalfBlind final : public SegmentationNetwork {
+ public:
+  PixelOutputs run(std::span<const float> input) override {
+    PixelOutputs outputs;
+    for (std::size_t i = 0; i < input.size() / input_channels; ++i) {
+      outputs.output.push_back(i % 2 == 0 ? PixelOutputs::no_output : 9);
+      outputs.confidence.push_back(i % 2 == 0 ? 0.0F : 1.0F);
+    }
+    return outputs;
+  }
+  std::vector<float> probabilities(std::span<const float> /*input*/) override { return {}; }
+  [[nodiscard]] std::string engine() const override { return "half blind"; }
+};
+
+/// Sees one class everywhere in images of this many pixels.
+class OneClass final : public SegmentationNetwork {
+ public:
+  OneClass(std::size_t pixels, std::uint8_t output) : pixels_(pixels), output_(output) {}
+  PixelOutputs run(std::span<const float> input) override {
+    EXPECT_EQ(input.size(), pixels_ * input_channels);
+    return {.output = std::vector(pixels_, output_), .confidence = std::vector(pixels_, 1.0F)};
+  }
+  std::vector<float> probabilities(std::span<const float> /*input*/) override { return {}; }
+  [[nodiscard]] std::string engine() const override { return "one class"; }
+
+ private:
+  std::size_t pixels_;
+  std::uint8_t output_;
+};
+
+TEST(NetworkLabels, LooksAsCoarselyAsItIsTold) {
+  NetworkLabels labels(describe(random_network(2, 32, 20)), std::make_unique<OneClass>(64U, 9));
+  EXPECT_EQ(labels.costs(), std::vector{1.0});
+  labels.add_coarser(16, std::make_unique<OneClass>(32U, 1));
+  EXPECT_EQ(labels.costs(), (std::vector{1.0, 0.5}));
+  EXPECT_EQ(labels.details(), "one class, image 2x32 down to 16");
+  const Scan scan = random_scan(5, 2);
+  EXPECT_EQ(labels.image_columns(), 32);
+  EXPECT_EQ(labels.label(scan).classes, std::vector(5, SemanticClass::road));
+  labels.set_coarseness(1);
+  EXPECT_EQ(labels.image_columns(), 16);
+  EXPECT_EQ(labels.label(scan).classes, std::vector(5, SemanticClass::car));
+  labels.set_coarseness(0);
+  EXPECT_EQ(labels.label(scan).classes, std::vector(5, SemanticClass::road));
+}
+
+TEST(NetworkLabels, OpensAModelInTheWidthsThatItKnows) {
+  ModelDescription model = test::describe_family(16, 128, 20);
+  model.network_file = write_model(test::light_bytes(8, 0, 0, 20));
+  EXPECT_EQ(open_model_of_many_widths(model)->costs(), std::vector{1.0});
+  model.least_columns = 32;
+  const auto labels = open_model_of_many_widths(model);
+  EXPECT_EQ(labels->costs(), (std::vector{1.0, 0.5, 0.25}));
+  const Scan scan = random_scan(600, 4);
+  labels->set_coarseness(1);
+  ModelDescription narrow = model;
+  narrow.columns = 64;
+  EXPECT_EQ(labels->label(scan).classes, open_model(narrow)->label(scan).classes);
+  model.least_columns = 112;
+  EXPECT_EQ(open_model_of_many_widths(model)->costs(), (std::vector{1.0, 0.875}));
+}
+
+TEST(NetworkLabels, LeavesPointsUnlabeledWhereTheNetworkFails) {
+  const ModelDescription model = describe(random_network(1, 2, 20));
+  NetworkLabels labels(model, std::make_unique<HalfBlind>());
+  Scan scan;
+  scan.points_lidar = {{0.0F, 5.0F, 0.0F}, {0.0F, -5.0F, 0.0F}};
+  EXPECT_EQ(labels.label(scan).classes,
+            (std::vector{SemanticClass::unlabeled, SemanticClass::road}));
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,55 @@
+#include "core/segmentation/passthrough_segmenter.hpp"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+#include "core/segmentation/fallback_segmenter.hpp"
+
+namespace stillmap {
+namespace {
+
+Scan labelled_scan() {
+  Scan scan;
+  scan.points_lidar.assign(2, Eigen::Vector3f::Ones());
+  scan.labels = {SemanticClass::road, SemanticClass::unlabeled};
+  return scan;
+}
+
+TEST(StreamLabels, HandsOnTheScansLabelsAndTrustsThem) {
+  const PointLabels labels = StreamLabels().label(labelled_scan());
+  EXPECT_EQ(labels.classes, labelled_scan().labels);
+  EXPECT_EQ(labels.confidence, (std::vector<float>{1.0F, 0.0F}));
+}
+
+TEST(StreamLabels, HasNoneForAScanWithoutLabels) {
+  Scan scan = labelled_scan();
+  scan.labels.clear();
+  EXPECT_TRUE(StreamLabels().label(scan).empty());
+}
+
+TEST(NoLabels, IgnoresLabelsThatAreThere) {
+  EXPECT_TRUE(NoLabels().label(labelled_scan()).empty());
+  EXPECT_EQ(NoLabels().name(), "none");
+}
+
+class AllCars final : public LabelSource {
+ public:
+  [[nodiscard]] std::string name() const override { return "all cars"; }
+  [[nodiscard]] PointLabels label(const Scan& scan) override {
+    return {.classes = std::vector(scan.size(), SemanticClass::car),
+            .confidence = std::vector(scan.size(), 0.5F)};
+  }
+};
+
+TEST(StreamFirstLabels, AsksTheOtherSourceOnlyAboutScansWithoutLabels) {
+  StreamFirstLabels labels(std::make_unique<AllCars>());
+  EXPECT_EQ(labels.name(), "stream, else all cars");
+  EXPECT_EQ(labels.label(labelled_scan()).classes, labelled_scan().labels);
+  Scan scan = labelled_scan();
+  scan.labels.clear();
+  EXPECT_EQ(labels.label(scan).classes[1], SemanticClass::car);
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,142 @@
+#include "server/mapping/async_segmenter.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/server/slow_segmenter.hpp"
+
+namespace stillmap {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+Scan scan_at(std::int64_t stamp_ns) {
+  Scan scan;
+  scan.stamp_ns = stamp_ns;
+  scan.points_lidar.emplace_back(1.0F, 2.0F, 3.0F);
+  scan.labels.push_back(SemanticClass::road);
+  return scan;
+}
+
+class PacedLabelsTest : public testing::Test {
+ protected:
+  [[nodiscard]] std::unique_ptr<PacedLabels> feed(std::chrono::milliseconds budget) {
+    return std::make_unique<PacedLabels>(std::make_unique<test::SlowLabels>(source_), budget,
+                                         queue_, statistics_);
+  }
+  [[nodiscard]] ServerStatus status() const {
+    ServerStatus status;
+    statistics_.report_to(status);
+    return status;
+  }
+
+  test::SlowLabels::Behaviour source_;
+  ScanQueue queue_{3};
+  Statistics statistics_;
+};
+
+TEST_F(PacedLabelsTest, AFastSourceAnswersInTime) {
+  const auto labels = feed(5s);
+  for (int k = 0; k < 5; ++k) {
+    const auto answer = labels->offer(scan_at(k));
+    ASSERT_EQ(answer.finished.size(), 1U);
+    EXPECT_EQ(answer.finished[0].stamp_ns, k);
+    EXPECT_EQ(answer.finished[0].labels.classes[0], SemanticClass::road);
+    EXPECT_FALSE(answer.pending);
+  }
+}
+
+TEST_F(PacedLabelsTest, NobodyWaitsLongerThanTheBudgetAndLateLabelsComeWithALaterScan) {
+  source_.delay_ms = 300;
+  const auto labels = feed(20ms);
+  const auto began = Clock::now();
+  const auto first = labels->offer(scan_at(1));
+  EXPECT_TRUE(first.pending);
+  EXPECT_TRUE(first.finished.empty());
+  const auto second = labels->offer(scan_at(2));
+  EXPECT_FALSE(second.pending);
+  EXPECT_LT(Clock::now() - began, 200ms);
+  std::this_thread::sleep_for(500ms);
+  source_.delay_ms = 0;
+  const auto third = labels->offer(scan_at(3));
+  ASSERT_GE(third.finished.size(), 1U);
+  EXPECT_EQ(third.finished[0].stamp_ns, 1);
+}
+
+TEST_F(PacedLabelsTest, CatchingUpComesFirstButNotForEver) {
+  const auto labels = feed(5s);
+  EXPECT_EQ(queue_.push_dropping_oldest({scan_at(100), "lidar", Clock::now()}), 0U);
+  int segmented = 0;
+  for (int k = 0; k < 33; ++k) segmented += labels->offer(scan_at(k)).finished.empty() ? 0 : 1;
+  EXPECT_EQ(segmented, 3);
+  ASSERT_TRUE(queue_.pop({}, 0ms).has_value());
+  EXPECT_FALSE(labels->offer(scan_at(33)).finished.empty());
+}
+
+TEST_F(PacedLabelsTest, WithoutABudgetEveryScanGetsItsLabels) {
+  source_.delay_ms = 30;
+  const auto labels = feed(0ms);
+  EXPECT_FALSE(labels->may_skip_scans());
+  for (int k = 0; k < 4; ++k) {
+    const auto answer = labels->offer(scan_at(k));
+    ASSERT_EQ(answer.finished.size(), 1U);
+    EXPECT_EQ(answer.finished[0].stamp_ns, k);
+    EXPECT_FALSE(answer.finished[0].labels.empty());
+  }
+}
+
+TEST_F(PacedLabelsTest, WithoutABudgetEveryScanIsLookedAtClosely) {
+  source_.delay_ms = 20;
+  source_.costs = {1.0, 0.5};
+  const auto labels = feed(0ms);
+  for (int k = 0; k < 12; ++k) {
+    // The sensor is four times as fast as the source.
+    for (int i = 0; i < 4; ++i) statistics_.scan_received();
+    (void)labels->offer(scan_at(k));
+  }
+  const SegmentationStatus pace = status().segmentation;
+  EXPECT_EQ(pace.every, 1U);
+  EXPECT_EQ(pace.image_columns, 2000U);
+  EXPECT_GE(pace.network_ms, 20.0);
+}
+
+TEST_F(PacedLabelsTest, FailuresAreCountedAndGiveNoLabels) {
+  for (const auto budget : {0ms, 5000ms}) {
+    const auto labels = feed(budget);
+    source_.fails = true;
+    const auto answer = labels->offer(scan_at(1));
+    ASSERT_EQ(answer.finished.size(), 1U);
+    EXPECT_TRUE(answer.finished[0].labels.empty());
+    EXPECT_EQ(statistics_.last_label_failure(), "the network is broken");
+    source_.fails = false;
+    EXPECT_FALSE(labels->offer(scan_at(2)).finished[0].labels.empty());
+    EXPECT_EQ(statistics_.last_label_failure(), "");
+  }
+  EXPECT_EQ(status().counter("label_failures"), 2U);
+}
+
+TEST_F(PacedLabelsTest, EndsWhileTheSourceWorks) {
+  source_.delay_ms = 200;
+  {
+    const auto labels = feed(1ms);
+    EXPECT_TRUE(labels->offer(scan_at(1)).pending);
+  }
+  EXPECT_EQ(source_.labelled, 1);
+}
+
+TEST(LabelBudget, CountsForALiveNetworkOnly) {
+  ServerConfig config;
+  config.labels.budget_ms = 70;
+  for (const auto source : {LabelOrigin::stream, LabelOrigin::none}) {
+    config.labels.source = source;
+    EXPECT_EQ(label_budget(config), 0ms);
+  }
+  config.labels.source = LabelOrigin::model;
+  EXPECT_EQ(label_budget(config), 70ms);
+  config.input.delivery = Delivery::every;
+  EXPECT_EQ(label_budget(config), 0ms);
+}
+
+}  // namespace
+}  // namespace stillmap

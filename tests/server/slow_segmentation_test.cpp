@@ -1,0 +1,135 @@
+// The mapping thread with a network that cannot keep the sensor's rate.
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "server/mapping/mapping_thread.hpp"
+#include "server/publishers/server_report.hpp"
+#include "tests/server/room_scans.hpp"
+#include "tests/server/slow_segmenter.hpp"
+
+namespace stillmap {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto period = 100ms;
+
+ServerConfig live_config() {
+  ServerConfig config;
+  config.mapper.sensor = vlp_16();
+  config.labels.source = LabelOrigin::model;
+  config.labels.budget_ms = 30;
+  config.input.queue_length = 20;
+  return config;
+}
+
+class SlowNetwork : public testing::Test {
+ protected:
+  /// Sends scans at 10 Hz, as a sensor does, and waits until they are worked off.
+  void drive(int scans) {
+    auto due = Clock::now();
+    for (int k = 0; k < scans; ++k, due += period) {
+      std::this_thread::sleep_until(due);
+      statistics_.scan_received();
+      queue_.push_dropping_oldest({test::room_scan(next_scan_++), "lidar", Clock::now()});
+    }
+    while (status().counter("scans_mapped") + status().dropped() <
+           static_cast<std::uint64_t>(next_scan_)) {
+      std::this_thread::sleep_for(5ms);
+    }
+  }
+  [[nodiscard]] ServerStatus status() const {
+    return ServerReport(
+               {.label_source = "slow", .sensor = {}, .points_topic = {}, .troubles = {}}, board_,
+               statistics_, [] { return std::vector<Finding>(); }, [] { return std::string(); })
+        .status();
+  }
+  [[nodiscard]] double median_ms(const std::string& stage) const {
+    for (const StageLatency& latency : status().latencies) {
+      if (latency.stage == stage) return latency.p50_ms;
+    }
+    ADD_FAILURE() << "no stage " << stage;
+    return 0.0;
+  }
+
+  test::SlowLabels::Behaviour source_;
+  ScanQueue queue_{20};
+  Statistics statistics_;
+  MapBoard board_;
+  int next_scan_ = 0;
+};
+
+TEST_F(SlowNetwork, DelaysNoPoseBeyondTheBudgetAndIsUsedForEveryNthScan) {
+  source_.delay_ms = 200;
+  MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
+                        nullptr, queue_, statistics_, board_, {});
+  drive(30);
+  const ServerStatus slow = status();
+  EXPECT_EQ(slow.counter("scans_mapped"), 30U);
+  EXPECT_GE(slow.segmentation.every, 2U);
+  EXPECT_GE(slow.segmentation.network_ms, 199.0);
+  EXPECT_EQ(slow.segmentation.fresh_share, 0.0);
+  EXPECT_GT(slow.segmentation.carried_share, 0.6);
+  EXPECT_THAT(slow.reason, HasSubstr(every_nth_scan(slow.segmentation.every)));
+  EXPECT_THAT(slow.reason, HasSubstr("carried"));
+  // The network's 200 ms do not show: the budget of 30 ms, and much room for a busy machine.
+  EXPECT_LT(median_ms("segment"), 190.0);
+
+  source_.delay_ms = 0;
+  drive(20);
+  const ServerStatus fast = status();
+  EXPECT_EQ(fast.segmentation.every, 1U);
+  EXPECT_GT(fast.segmentation.fresh_share, 0.0);
+  EXPECT_EQ(fast.reason, "");
+}
+
+TEST_F(SlowNetwork, LooksMoreCoarselyBeforeScansAreLeftOut) {
+  source_.delay_ms = 150;
+  source_.costs = {1.0, 0.3};
+  MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
+                        nullptr, queue_, statistics_, board_, {});
+  drive(20);
+  const ServerStatus slow = status();
+  EXPECT_EQ(slow.segmentation.image_columns, 600U);
+  EXPECT_EQ(slow.segmentation.full_columns, 2000U);
+  EXPECT_LT(slow.segmentation.network_ms, 150.0);
+  EXPECT_THAT(slow.reason, HasSubstr("600 columns wide instead of 2000"));
+
+  source_.delay_ms = 0;
+  drive(40);
+  EXPECT_EQ(status().segmentation.image_columns, 2000U);
+  EXPECT_EQ(status().reason, "");
+}
+
+TEST_F(SlowNetwork, ThatFailsLeavesPosesAndMap) {
+  source_.fails = true;
+  MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
+                        nullptr, queue_, statistics_, board_, {});
+  drive(8);
+  const ServerStatus failing = status();
+  EXPECT_EQ(failing.counter("scans_mapped"), 8U);
+  EXPECT_EQ(failing.counter("label_failures"), 8U);
+  EXPECT_EQ(failing.segmentation.unlabelled_share, 1.0);
+  EXPECT_EQ(failing.label_source, "none");
+  EXPECT_THAT(failing.reason, HasSubstr("the network is broken"));
+  source_.fails = false;
+  drive(3);
+  EXPECT_EQ(status().reason, "");
+  EXPECT_EQ(board_.trajectory().size(), 11U);
+}
+
+TEST_F(SlowNetwork, DoesNotHoldUpTheEnd) {
+  source_.delay_ms = 400;
+  const auto began = Clock::now();
+  {
+    MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
+                          nullptr, queue_, statistics_, board_, {});
+    drive(2);
+  }
+  EXPECT_LT(Clock::now() - began, 2s);
+}
+
+}  // namespace
+}  // namespace stillmap

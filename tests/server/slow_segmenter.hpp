@@ -1,0 +1,42 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <stdexcept>
+#include <thread>
+#include <vector>
+
+#include "core/segmentation/passthrough_segmenter.hpp"
+
+namespace stillmap::test {
+
+/// The scan's own labels, after a while that can be changed as it runs; in images of 2000 columns
+/// or a smaller share of them.
+class SlowLabels final : public LabelSource {
+ public:
+  struct Behaviour {
+    std::atomic<int> delay_ms{0};
+    std::atomic<bool> fails{false};
+    std::atomic<int> labelled{0};
+    std::vector<double> costs{1.0};
+  };
+  explicit SlowLabels(Behaviour& behaviour) : behaviour_(behaviour) {}
+
+  [[nodiscard]] std::string name() const override { return "slow"; }
+  [[nodiscard]] std::vector<double> costs() const override { return behaviour_.costs; }
+  void set_coarseness(std::size_t coarseness) override { cost_ = behaviour_.costs.at(coarseness); }
+  [[nodiscard]] int image_columns() const override { return static_cast<int>(2000 * cost_); }
+  [[nodiscard]] PointLabels label(const Scan& scan) override {
+    std::this_thread::sleep_for(
+        std::chrono::duration<double, std::milli>(behaviour_.delay_ms * cost_));
+    if (behaviour_.fails) throw std::runtime_error("the network is broken");
+    ++behaviour_.labelled;
+    return StreamLabels().label(scan);
+  }
+
+ private:
+  Behaviour& behaviour_;
+  double cost_ = 1.0;
+};
+
+}  // namespace stillmap::test

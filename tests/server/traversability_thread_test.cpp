@@ -1,0 +1,165 @@
+#include "server/traversability/traversability_thread.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+
+#include "server/traversability/traversability_grid_provider.hpp"
+#include "tests/traversability/voxel_world.hpp"
+
+namespace stillmap {
+namespace {
+
+using namespace std::chrono_literals;
+using enum SemanticClass;
+using test::square_robot;
+using test::VoxelWorld;
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+RobotProfile small_robot() {
+  RobotProfile robot = square_robot();
+  robot.name = "small";
+  robot.length_m = 0.4;
+  robot.width_m = 0.4;
+  return robot;
+}
+
+std::shared_ptr<const MapView> shared(const MapView& view) {
+  return std::make_shared<const MapView>(view);
+}
+
+/// A thread on a map of a road, 16 m by 16 m.
+class AreaThreadTest : public testing::Test {
+ protected:
+  AreaThreadTest() {
+    world_.ground(-8, -8, 8, 8, road);
+    maps_.begin(shared(world_.view()), {});
+  }
+
+  void start(std::chrono::duration<double> period) {
+    thread_.emplace(std::vector{square_robot(), small_robot()}, period, maps_, areas_, statistics_,
+                    [this] { ++updates_; });
+  }
+
+  [[nodiscard]] bool wait_for_version(std::uint64_t version) const {
+    const auto deadline = std::chrono::steady_clock::now() + 60s;
+    while (areas_.view("small")->version != version) {
+      if (std::chrono::steady_clock::now() > deadline) return false;
+      std::this_thread::sleep_for(1ms);
+    }
+    return true;
+  }
+
+  [[nodiscard]] double cost_at(const std::string& robot, double x_m, double y_m) const {
+    return test::look(*areas_.view(robot), x_m, y_m).cell.cost;
+  }
+
+  VoxelWorld world_;
+  MapBoard maps_;
+  AreaBoard areas_;
+  Statistics statistics_;
+  std::atomic<int> updates_ = 0;
+  std::optional<AreaThread> thread_;
+};
+
+TEST_F(AreaThreadTest, KeepsEveryRobotsAreaUpToDate) {
+  start(0s);
+  ASSERT_TRUE(wait_for_version(maps_.view()->version));
+  EXPECT_EQ(cost_at("small", 1.1, 1.1), 0);
+  world_.block(1, 1, 2, 2, 0.3, 2.0, building);
+  maps_.show(shared(world_.view()));
+  ASSERT_TRUE(wait_for_version(maps_.view()->version));
+  EXPECT_EQ(cost_at("small", 1.1, 1.1), 100);
+  for (const RobotProfile& robot : {square_robot(), small_robot()}) {
+    const auto fresh = test::area_of(*maps_.view(), robot);
+    const auto kept = areas_.view(robot.name);
+    ASSERT_EQ(kept->tiles.size(), fresh->tiles.size());
+    for (std::size_t i = 0; i < fresh->tiles.size(); ++i) {
+      EXPECT_EQ(kept->tiles[i]->cells, fresh->tiles[i]->cells);
+    }
+  }
+}
+
+TEST_F(AreaThreadTest, TellsHowLongAChangeTakes) {
+  start(0s);
+  ASSERT_TRUE(wait_for_version(maps_.view()->version));
+  thread_.reset();
+  EXPECT_EQ(updates_, 1);
+  ServerStatus status;
+  statistics_.report_to(status);
+  ASSERT_EQ(status.latencies.size(), 1U);
+  EXPECT_EQ(status.latencies[0].stage, "areas");
+  EXPECT_EQ(status.latencies[0].samples, 1U);
+  EXPECT_GT(status.latencies[0].p50_ms, 0.0);
+}
+
+TEST_F(AreaThreadTest, UpdatesOnceAPeriodHoweverOftenTheMapChanges) {
+  start(3600s);
+  ASSERT_TRUE(wait_for_version(maps_.view()->version));
+  const std::uint64_t first = areas_.view("small")->version;
+  for (int i = 0; i < 5; ++i) {
+    world_.block(1 + i, 1, 2 + i, 2, 0.3, 2.0, building);
+    maps_.show(shared(world_.view()));
+  }
+  std::this_thread::sleep_for(50ms);
+  EXPECT_EQ(areas_.view("small")->version, first);
+  // Destroying it must not take the hour.
+  thread_.reset();
+  EXPECT_EQ(updates_, 1);
+}
+
+TEST_F(AreaThreadTest, FollowsToAnotherMap) {
+  start(0s);
+  ASSERT_TRUE(wait_for_version(maps_.view()->version));
+  MapView other;
+  other.map_id = maps_.view()->map_id + 1;
+  other.version = 99;
+  maps_.begin(shared(other), {});
+  ASSERT_TRUE(wait_for_version(99));
+  EXPECT_TRUE(areas_.view("small")->tiles.empty());
+  EXPECT_EQ(areas_.view("small")->map_id, other.map_id);
+}
+
+TEST_F(AreaThreadTest, NamesTheRobotsThereAre) {
+  const auto refusal = [&](const std::string& profile) -> std::string {
+    try {
+      static_cast<void>(areas_.view(profile));
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "no refusal";
+  };
+  EXPECT_THAT(refusal("car"), HasSubstr("areas.profiles is empty"));
+  start(0s);
+  EXPECT_THAT(refusal("car"), AllOf(HasSubstr("'car'"), HasSubstr("small")));
+}
+
+TEST_F(AreaThreadTest, ThePlanningGridIsAWindowRoundTheRobot) {
+  AreasConfig config;
+  config.profiles = {"small"};
+  config.grid_profile = "small";
+  config.grid_window_m = 4.0;
+  const PlanningGrid window(config, "map", maps_, areas_);
+  start(0s);
+  ASSERT_TRUE(wait_for_version(maps_.view()->version));
+  StampedPose pose{.stamp_ns = 5'000'000'000};
+  pose.T_map_lidar.translation().x() = 4.0;
+  maps_.add_pose(pose, OdometryHealth::good, "");
+  const OccupancyGrid grid = window.grid();
+  ASSERT_EQ(grid.status, AreaStatus::ok) << grid.reason;
+  EXPECT_EQ(grid.width, 20U);
+  EXPECT_NEAR(grid.origin_map.x(), 2.0, 1e-9);
+  EXPECT_NEAR(grid.origin_map.y(), -2.0, 1e-9);
+  EXPECT_EQ(window.message(grid).header().stamp().sec(), 5);
+  EXPECT_EQ(window.message(grid).header().frame_id(), "map");
+  config.grid_window_m = 0.0;
+  EXPECT_EQ(PlanningGrid(config, "map", maps_, areas_).grid().width, 80U);
+  config.grid_profile = "";
+  EXPECT_EQ(PlanningGrid(config, "map", maps_, areas_).grid().status, AreaStatus::not_found);
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,162 @@
+#include "core/traversability/traversability_query.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "core/map/query/region_shape.hpp"
+#include "core/traversability/traversability_summary.hpp"
+#include "core/traversability/traversability_answer_view.hpp"
+#include "tests/traversability/voxel_world.hpp"
+
+namespace stillmap {
+namespace {
+
+using enum SemanticClass;
+using test::area_of;
+using test::square_robot;
+using test::VoxelWorld;
+using ::testing::HasSubstr;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+/// 16 m square with a house in it; (x, 7) was never seen.
+std::shared_ptr<const TraversabilityView> area() {
+  VoxelWorld world;
+  world.ground(-8, -8, 8, 6, road);
+  world.block(0, 0, 2, 2, 0.3, 2.0, building);
+  return area_of(world.view(), square_robot());
+}
+
+AreaQuery of(const Region& region) {
+  AreaQuery query;
+  query.region = region;
+  return query;
+}
+
+/// Many corners, so that the region is asked in parts.
+PolygonRegion star() {
+  PolygonRegion polygon{.corners_map = {}, .heights = {.min_m = 50.0, .max_m = 60.0}};
+  constexpr int corners = 400;
+  for (int i = 0; i < corners; ++i) {
+    const double angle = 2.0 * M_PI * i / corners;
+    const double radius_m = i % 2 == 0 ? 7.3 : 3.1;
+    polygon.corners_map.emplace_back(radius_m * std::cos(angle), radius_m * std::sin(angle));
+  }
+  return polygon;
+}
+
+TEST(AreaQuery, EveryCellOfARegionIsTheViewsAndNoOther) {
+  const auto view = area();
+  for (const Region& region :
+       {Region(star()), Region(SphereRegion{.centre_map = {1, -2, 30}, .radius_m = 5.5}),
+        Region(CorridorRegion{
+            .path_map = {{-7, -7}, {0, 0}, {7, -5}}, .half_width_m = 1.3, .heights = {}})}) {
+    const AreaAnswer answer = answer_area(*view, of(region));
+    ASSERT_EQ(answer.grid.status, AreaStatus::ok) << answer.grid.reason;
+    const RegionShape shape(region);
+    const double level_m = 0.5 * (shape.bounds_map().min().z() + shape.bounds_map().max().z());
+    CellLookup lookup(*view);
+    std::size_t inside = 0;
+    for (std::size_t i = 0; i < answer.cells.size(); ++i) {
+      const Eigen::Vector2d p_map =
+          answer.grid.origin_map +
+          0.2 * Eigen::Vector2d(static_cast<double>(i % answer.grid.width) + 0.5,
+                                static_cast<double>(i / answer.grid.width) + 0.5);
+      const bool is_inside =
+          shape.contains({p_map.x(), p_map.y(), std::isfinite(level_m) ? level_m : 0.0});
+      const auto found = lookup.at(*view->cell_of(p_map));
+      const TraversabilityCell expected = is_inside ? found.cell : TraversabilityCell{};
+      inside += is_inside ? 1 : 0;
+      EXPECT_EQ(answer.cells[i].state, expected.state);
+      EXPECT_EQ(answer.cells[i].reason, expected.reason);
+      EXPECT_EQ(answer.cells[i].inferred, expected.inferred);
+      const int value = expected.state == CellState::unknown ? -1 : expected.cost;
+      EXPECT_EQ(answer.grid.data[i], value);
+    }
+    EXPECT_GT(inside, 100U);
+    EXPECT_LT(inside, answer.cells.size());
+  }
+}
+
+TEST(AreaQuery, TellsTheGroundWhereItIsKnown) {
+  const AreaAnswer answer = answer_area(*area(), {});
+  const auto at = [&](double x_m, double y_m) {
+    return answer.cells[static_cast<std::size_t>((y_m + 8) / 0.2) * answer.grid.width +
+                        static_cast<std::size_t>((x_m + 8) / 0.2)];
+  };
+  EXPECT_NEAR(at(-5.1, -5.1).ground_z_m, 0.1, 0.1);
+  EXPECT_TRUE(std::isnan(at(1.1, 7.1).ground_z_m));
+  EXPECT_EQ(at(1.1, 1.1).reason, BlockReason::obstacle);
+  EXPECT_EQ(at(2.3, 1.1).reason, BlockReason::inflation);
+  EXPECT_EQ(answer.grid.map_version, area()->version);
+}
+
+TEST(AreaQuery, GivesOutlinesAloneWhenOnlyThoseAreWanted) {
+  AreaQuery query;
+  query.wants_grid = false;
+  query.wants_outlines = true;
+  const AreaAnswer answer = answer_area(*area(), query);
+  ASSERT_EQ(answer.outlines.size(), 1U);
+  EXPECT_EQ(answer.outlines[0].holes.size(), 1U);
+  EXPECT_TRUE(answer.grid.data.empty());
+  EXPECT_TRUE(answer.cells.empty());
+  query.min_outline_area_m2 = 1e4;
+  EXPECT_TRUE(answer_area(*area(), query).outlines.empty());
+}
+
+TEST(AreaQuery, HostileQueriesGetAStatusAndAReason) {
+  const auto expect = [view = area()](const AreaQuery& query, AreaStatus status,
+                                      const std::string& named) {
+    const AreaAnswer answer = answer_area(*view, query);
+    EXPECT_EQ(answer.grid.status, status) << named;
+    EXPECT_THAT(answer.grid.reason, HasSubstr(named));
+    EXPECT_TRUE(answer.cells.empty());
+  };
+  expect(of(PolygonRegion{.corners_map = {{0, 0}, {9, 9}, {9, 0}, {0, 9}}, .heights = {}}),
+         AreaStatus::invalid_request, "polygon edges 0");
+  expect(of(CorridorRegion{}), AreaStatus::invalid_request, "corridor path has 0 points");
+  expect(of(SphereRegion{.centre_map = {nan, 0, 0}, .radius_m = 1}), AreaStatus::invalid_request,
+         "sphere centre");
+  BoxRegion box;
+  box.box_map = {Eigen::Vector3d::Constant(-1e9), Eigen::Vector3d::Constant(1e9)};
+  expect(of(box), AreaStatus::invalid_request, "box x");
+  expect(of(SphereRegion{.centre_map = {900, 0, 0}, .radius_m = 1}), AreaStatus::not_found,
+         "outside the map");
+  AreaQuery query;
+  query.max_cells = 10;
+  expect(query, AreaStatus::too_large, "at most 10");
+  query.max_cells = 0;
+  expect(query, AreaStatus::invalid_request, "max_cells is 0");
+  query = {};
+  query.wants_grid = false;
+  expect(query, AreaStatus::invalid_request, "neither grid nor outlines");
+  query = {};
+  query.min_outline_area_m2 = nan;
+  expect(query, AreaStatus::invalid_request, "min_outline_area_m2");
+}
+
+TEST(AreaView, AnswersAsTheAnswerThatItWasMadeFrom) {
+  const AreaAnswer answer = answer_area(*area(), of(star()));
+  const TraversabilityView view = area_view(answer, square_robot());
+  BoxRegion box;
+  box.box_map.min().head<2>() = answer.grid.origin_map;
+  box.box_map.max().head<2>() =
+      answer.grid.origin_map + 0.2 * Eigen::Vector2d(answer.grid.width, answer.grid.height);
+  const AreaAnswer again = answer_area(view, of(box));
+  EXPECT_EQ(again.grid.data, answer.grid.data);
+  EXPECT_EQ(again.grid.origin_map, answer.grid.origin_map);
+  ASSERT_EQ(again.cells.size(), answer.cells.size());
+  for (std::size_t i = 0; i < again.cells.size(); ++i) {
+    EXPECT_EQ(again.cells[i].state, answer.cells[i].state);
+    EXPECT_EQ(again.cells[i].reason, answer.cells[i].reason);
+    EXPECT_EQ(again.cells[i].inferred, answer.cells[i].inferred);
+  }
+  EXPECT_EQ(summarize(answer).free, summarize(view).free);
+  EXPECT_EQ(summarize(answer).lethal, summarize(view).lethal);
+}
+
+}  // namespace
+}  // namespace stillmap
