@@ -10,7 +10,7 @@ namespace stillmap {
 namespace {
 
 /// The lidar sees farther than it moves until it is told of its surroundings again [m].
-constexpr double recall_every_m = 20.0;
+constexpr double prior_map_update_distance_m = 20.0;
 
 }  // namespace
 
@@ -28,15 +28,15 @@ MapperConfig checked(const MapperConfig& config) {
 
 }  // namespace
 
-Mapper::Mapper(const MapperConfig& config, std::unique_ptr<LabelSource> label_source,
+Mapper::Mapper(const MapperConfig& config, std::unique_ptr<Segmenter> label_source,
                MapperListeners listeners)
-    : Mapper(config, std::make_unique<PatientFeed>(std::move(label_source)), std::move(listeners)) {
-}
+    : Mapper(config, std::make_unique<BlockingSegmenter>(std::move(label_source)),
+             std::move(listeners)) {}
 
-Mapper::Mapper(const MapperConfig& config, std::unique_ptr<LabelFeed> label_feed,
+Mapper::Mapper(const MapperConfig& config, std::unique_ptr<SegmentationPipeline> segmentation,
                MapperListeners listeners)
     : config_(checked(config)),
-      label_feed_(std::move(label_feed)),
+      segmentation_(std::move(segmentation)),
       listeners_(std::move(listeners)),
       odometry_(config.odometry, config.sensor),
       static_map_(config.static_map) {}
@@ -52,30 +52,30 @@ std::optional<MappedScan> Mapper::process(
   end_stage("prepare");
 
   // Class of every point, if it is known in time.
-  LabelFeed::Answer answer = label_feed_->offer(scan);
-  auto own_labels = take_finished(std::move(answer.finished), scan.stamp_ns);
-  if (config_.prepare.compensate_motion)
-    scan = compensate_motion(std::move(scan), odometry_.motion_during(config_.sensor.period_s),
-                             config_.sensor.period_s);
+  SegmentationPipeline::Output segmentation = segmentation_->submit(scan);
+  auto own_labels = accept_finished_labels(std::move(segmentation.finished), scan.stamp_ns);
+  if (config_.prepare.deskew)
+    scan = deskew(std::move(scan), odometry_.motion_during(config_.sensor.period_s),
+                  config_.sensor.period_s);
   const Eigen::Isometry3d T_map_lidar_expected =
       T_map_lidar_prior.value_or(odometry_.predict(scan.stamp_ns));
   Labels known = labels_for(scan, std::move(own_labels), T_map_lidar_expected);
   end_stage("segment");
 
   // Pose, and what moves.
-  recall_map_near(T_map_lidar_expected.translation());
-  Odometry::Step step = odometry_.add(scan, known.labels, T_map_lidar_prior);
+  add_prior_map_near(T_map_lidar_expected.translation());
+  Odometry::Step step = odometry_.register_scan(scan, known.labels, T_map_lidar_prior);
   end_stage("odometry");
   if (listeners_.pose_found) listeners_.pose_found(scan.stamp_ns, step.result);
 
   // The static map takes what stands still.
   MappedScan mapped{step.result,
-                    known.labelling,
+                    known.label_provenance,
                     {std::move(scan), std::move(known.labels), std::move(step.motion)},
-                    known.labelling == Labelling::carried ||
-                        (known.labelling == Labelling::none && answer.pending)};
-  if (answer.pending) {
-    pending_ = PlacedScan{mapped.labelled, step.result.T_map_lidar};
+                    known.label_provenance == LabelProvenance::propagated ||
+                        (known.label_provenance == LabelProvenance::none && segmentation.pending)};
+  if (segmentation.pending) {
+    pending_ = PosedScan{mapped.labelled, step.result.T_map_lidar};
   } else {
     insert(mapped, known.evidence);
   }
@@ -84,14 +84,14 @@ std::optional<MappedScan> Mapper::process(
   return mapped;
 }
 
-std::optional<PointLabels> Mapper::take_finished(std::vector<ScanLabels> finished,
-                                                 std::int64_t stamp_ns) {
+std::optional<PointLabels> Mapper::accept_finished_labels(std::vector<ScanLabels> finished,
+                                                          std::int64_t stamp_ns) {
   std::optional<PointLabels> own;
   for (auto& [labelled_stamp_ns, labels] : finished) {
     if (labelled_stamp_ns == stamp_ns) {
       own = std::move(labels);
     } else if (pending_ && pending_->labelled.scan.stamp_ns == labelled_stamp_ns) {
-      insert_late(std::move(labels));
+      insert_late_labels(std::move(labels));
     }
   }
   return own;
@@ -99,26 +99,28 @@ std::optional<PointLabels> Mapper::take_finished(std::vector<ScanLabels> finishe
 
 Mapper::Labels Mapper::labels_for(const Scan& scan, std::optional<PointLabels> own,
                                   const Eigen::Isometry3d& T_map_lidar_predicted) {
-  if (own && (!own->empty() || !label_feed_->may_skip_scans())) {
-    const auto labelling = own->empty() ? Labelling::none : Labelling::fresh;
-    return {labelling, *std::move(own), std::nullopt};
+  if (own && (!own->empty() || !segmentation_->may_skip_scans())) {
+    const auto label_provenance = own->empty() ? LabelProvenance::none : LabelProvenance::fresh;
+    return {label_provenance, *std::move(own), std::nullopt};
   }
-  if (last_labelled_ && !last_view_) {
+  if (last_labelled_ && !last_labelled_image_) {
     const LabelledScan& last = last_labelled_->labelled;
-    last_view_.emplace(last.scan, last.labels, last_labelled_->T_map_lidar, config_.sensor);
+    last_labelled_image_.emplace(last.scan, last.labels, last_labelled_->T_map_lidar,
+                                 config_.sensor);
   }
-  CarriedLabels carried = carry_labels(scan, T_map_lidar_predicted, static_map_, last_view_);
-  if (std::ranges::count(carried.carrier, LabelCarrier::nothing) == std::ssize(carried.carrier)) {
+  PropagatedLabels propagated =
+      propagate_labels(scan, T_map_lidar_predicted, static_map_, last_labelled_image_);
+  if (std::ranges::count(propagated.origin, LabelOrigin::none) == std::ssize(propagated.origin)) {
     return {};
   }
-  PointLabels evidence = new_evidence(carried);
-  return {Labelling::carried, std::move(carried.labels), std::move(evidence)};
+  PointLabels evidence = new_evidence(propagated);
+  return {LabelProvenance::propagated, std::move(propagated.labels), std::move(evidence)};
 }
 
 void Mapper::insert(const MappedScan& mapped, const std::optional<PointLabels>& evidence) {
   const LabelledScan& labelled = mapped.labelled;
   const Eigen::Isometry3d& T_map_lidar = mapped.odometry.T_map_lidar;
-  if (mapped.labelling == Labelling::carried) {
+  if (mapped.label_provenance == LabelProvenance::propagated) {
     LabelledScan known{labelled.scan, *evidence, labelled.motion};
     // What nobody knows may be a mover that came into sight: it makes no voxels.
     for (std::size_t i = 0; i < known.motion.size(); ++i) {
@@ -128,23 +130,23 @@ void Mapper::insert(const MappedScan& mapped, const std::optional<PointLabels>& 
     return;
   }
   // Where labels are on their way, a scan without any is not worth the movers in it.
-  if (mapped.labelling == Labelling::none && pending_) return;
+  if (mapped.label_provenance == LabelProvenance::none && pending_) return;
   insert(labelled, T_map_lidar);
-  if (mapped.labelling == Labelling::fresh && label_feed_->may_skip_scans()) {
-    last_labelled_ = PlacedScan{labelled, T_map_lidar};
-    last_view_.reset();
+  if (mapped.label_provenance == LabelProvenance::fresh && segmentation_->may_skip_scans()) {
+    last_labelled_ = PosedScan{labelled, T_map_lidar};
+    last_labelled_image_.reset();
   }
 }
 
 void Mapper::insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar) {
   static_map_.insert(labelled, T_map_lidar);
-  if (!static_map_.wants_look()) return;
-  const RangeView view(labelled.scan, {}, config_.sensor, T_map_lidar);
-  static_map_.look_through(view, labelled.scan.stamp_ns);
+  if (!static_map_.clearing_due()) return;
+  const RangeImageView view(labelled.scan, {}, config_.sensor, T_map_lidar);
+  static_map_.clear_seen_through(view, labelled.scan.stamp_ns);
 }
 
-void Mapper::insert_late(PointLabels labels) {
-  PlacedScan late = *std::exchange(pending_, std::nullopt);
+void Mapper::insert_late_labels(PointLabels labels) {
+  PosedScan late = *std::exchange(pending_, std::nullopt);
   late.labelled.labels = std::move(labels);
   LabelledScan& labelled = late.labelled;
   // Whether it moved was not asked with these labels: no movable thing makes voxels.
@@ -156,7 +158,7 @@ void Mapper::insert_late(PointLabels labels) {
   insert(labelled, late.T_map_lidar);
   if (labelled.labels.empty()) return;
   last_labelled_ = std::move(late);
-  last_view_.reset();
+  last_labelled_image_.reset();
 }
 
 bool Mapper::accepts(const Scan& scan) {
@@ -192,43 +194,45 @@ bool Mapper::has_enough_points(const Scan& scan) {
   return false;
 }
 
-void Mapper::restore(const MapView& view, const TileMemories& memories) {
+void Mapper::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidence) {
   // First what may refuse the view.
-  static_map_.restore(view, memories);
-  forget_scans();
-  for (const auto& tile : view.tiles) restored_tiles_.insert(tile->info.id);
+  static_map_.resume(view, tile_evidence);
+  clear_scan_state();
+  for (const auto& tile : view.tiles) resumed_tiles_.insert(tile->info.id);
 }
 
 void Mapper::reset(std::uint64_t map_id) {
   static_map_.reset(map_id);
-  forget_scans();
+  clear_scan_state();
 }
 
-void Mapper::forget_scans() {
+void Mapper::clear_scan_state() {
   odometry_.reset();
   pending_.reset();
   last_labelled_.reset();
-  last_view_.reset();
+  last_labelled_image_.reset();
   trajectory_.clear();
-  restored_tiles_.clear();
-  recalled_near_map_.reset();
+  resumed_tiles_.clear();
+  prior_map_added_at_map_.reset();
 }
 
-void Mapper::recall_map_near(const Eigen::Vector3d& position_map) {
-  if (restored_tiles_.empty()) return;
-  if (recalled_near_map_ && (position_map - *recalled_near_map_).norm() < recall_every_m) return;
-  recalled_near_map_ = position_map;
+void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {
+  if (resumed_tiles_.empty()) return;
+  if (prior_map_added_at_map_ &&
+      (position_map - *prior_map_added_at_map_).norm() < prior_map_update_distance_m)
+    return;
+  prior_map_added_at_map_ = position_map;
   const auto view = static_map_.view();
   std::vector<LabelledPoint> points_map;
   for (const auto& tile : view->tiles) {
-    if (!restored_tiles_.contains(tile->info.id)) continue;
+    if (!resumed_tiles_.contains(tile->info.id)) continue;
     const Eigen::AlignedBox3d bounds_map = tile->info.bounds_map.cast<double>();
     if (bounds_map.exteriorDistance(position_map) > config_.static_map.max_range_m) continue;
     for (const Voxel& voxel : tile->voxels) {
       points_map.push_back({voxel.mean_map, voxel.evidence.winner()});
     }
   }
-  odometry_.know(points_map);
+  odometry_.add_prior_map(points_map);
 }
 
 void Mapper::end_stage(std::string_view stage) const {

@@ -7,15 +7,15 @@
 #include <string>
 #include <string_view>
 
-#include "core/segmentation_pipeline.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/lidar/sensor_model.hpp"
+#include "core/lidar/trajectory.hpp"
 #include "core/map/label_propagation.hpp"
 #include "core/map/static_map.hpp"
 #include "core/odometry/odometry.hpp"
 #include "core/odometry/odometry_state.hpp"
-#include "core/odometry/trajectory.hpp"
+#include "core/segmentation_pipeline.hpp"
 
 namespace stillmap {
 
@@ -32,11 +32,11 @@ struct MapperConfig {
 /// What became of one scan.
 struct MappedScan {
   OdometryResult odometry;
-  Labelling labelling = Labelling::none;
+  LabelProvenance label_provenance = LabelProvenance::none;
   /// The prepared scan (lidar frame) with labels and motion of every point.
   LabelledScan labelled;
   /// Points without a class may be movers that came into sight: they make no voxels.
-  bool unknown_may_move = false;
+  bool unlabelled_may_move = false;
 };
 
 /// Why a scan was not mapped.
@@ -59,15 +59,15 @@ struct MapperListeners {
 
 /// The way of a scan through the product: prepare, segment, register, split by motion, map. One
 /// thread calls it; nothing in it waits, reads a clock or owns a thread. With a label source (or a
-/// PatientFeed) the result depends on the scans alone.
+/// BlockingSegmenter) the result depends on the scans alone.
 class Mapper {
  public:
   /// Throws std::invalid_argument with `config.faults()`.
-  Mapper(const MapperConfig& config, std::unique_ptr<LabelSource> label_source,
+  Mapper(const MapperConfig& config, std::unique_ptr<Segmenter> label_source,
          MapperListeners listeners = {});
-  /// With labels that may come late: scans without their own get carried ones, and late ones still
-  /// tell the map what it is made of.
-  Mapper(const MapperConfig& config, std::unique_ptr<LabelFeed> label_feed,
+  /// With labels that may come late: scans without their own get propagated ones, and late ones
+  /// still tell the map what it is made of.
+  Mapper(const MapperConfig& config, std::unique_ptr<SegmentationPipeline> segmentation,
          MapperListeners listeners = {});
 
   /// Maps one scan. `T_map_lidar_prior` replaces the constant-velocity prediction. A scan that
@@ -77,8 +77,8 @@ class Mapper {
 
   [[nodiscard]] const ScanRejection& last_rejection() const { return last_rejection_; }
   [[nodiscard]] const Trajectory& trajectory() const { return trajectory_; }
-  [[nodiscard]] std::string label_source() const { return label_feed_->name(); }
-  [[nodiscard]] std::shared_ptr<const MapView> map_view() { return static_map_.view(); }
+  [[nodiscard]] std::string label_source() const { return segmentation_->name(); }
+  [[nodiscard]] std::shared_ptr<const MapSnapshot> map_snapshot() { return static_map_.view(); }
 
   /// What is stored of it, what of it is in memory, and what was removed from it.
   [[nodiscard]] StaticMap& static_map() { return static_map_; }
@@ -87,7 +87,7 @@ class Mapper {
   /// looked for in it, round its prior or the map's origin, and all register against what is stored
   /// near them. Throws std::invalid_argument for voxels or tiles of another size than configured,
   /// and is then as it was.
-  void restore(const MapView& view, const TileMemories& memories = {});
+  void resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidence = {});
 
   /// Forgets poses and maps; the next scan starts map `map_id` at the origin.
   void reset(std::uint64_t map_id);
@@ -97,14 +97,14 @@ class Mapper {
   static constexpr std::size_t min_usable_points = 100;
 
   /// All but the static map.
-  void forget_scans();
+  void clear_scan_state();
   /// Tells the odometry what a restored map holds near there, if it does not know yet.
-  void recall_map_near(const Eigen::Vector3d& position_map);
+  void add_prior_map_near(const Eigen::Vector3d& position_map);
   [[nodiscard]] bool accepts(const Scan& scan);
   [[nodiscard]] bool has_enough_points(const Scan& scan);
   /// What a scan is mapped with.
   struct Labels {
-    Labelling labelling = Labelling::none;
+    LabelProvenance label_provenance = LabelProvenance::none;
     PointLabels labels;
     /// What they tell the map, where that is less.
     std::optional<PointLabels> evidence;
@@ -112,32 +112,32 @@ class Mapper {
   [[nodiscard]] Labels labels_for(const Scan& scan, std::optional<PointLabels> own,
                                   const Eigen::Isometry3d& T_map_lidar_predicted);
   /// Takes over the labels of earlier scans; returns those of this one.
-  [[nodiscard]] std::optional<PointLabels> take_finished(std::vector<ScanLabels> finished,
-                                                         std::int64_t stamp_ns);
-  void insert_late(PointLabels labels);
+  [[nodiscard]] std::optional<PointLabels> accept_finished_labels(std::vector<ScanLabels> finished,
+                                                                  std::int64_t stamp_ns);
+  void insert_late_labels(PointLabels labels);
   void insert(const MappedScan& mapped, const std::optional<PointLabels>& evidence);
   /// Into the static map: what the scan hit, and what it looked through.
   void insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar);
   void end_stage(std::string_view stage) const;
 
-  struct PlacedScan {
+  struct PosedScan {
     LabelledScan labelled;
     Eigen::Isometry3d T_map_lidar;
   };
 
   MapperConfig config_;
-  std::unique_ptr<LabelFeed> label_feed_;
+  std::unique_ptr<SegmentationPipeline> segmentation_;
   MapperListeners listeners_;
   Odometry odometry_;
   StaticMap static_map_;
   /// Tiles of a restored map, and where the odometry was last told of those nearby.
-  std::set<TileId> restored_tiles_;
-  std::optional<Eigen::Vector3d> recalled_near_map_;
+  std::set<TileId> resumed_tiles_;
+  std::optional<Eigen::Vector3d> prior_map_added_at_map_;
   /// Its labels are still to come; the static map takes it with them.
-  std::optional<PlacedScan> pending_;
-  /// The newest scan with labels of its own, and once labels are carried from it, its view.
-  std::optional<PlacedScan> last_labelled_;
-  std::optional<LabelledView> last_view_;
+  std::optional<PosedScan> pending_;
+  /// The newest scan with labels of its own, and once labels are propagated from it, its view.
+  std::optional<PosedScan> last_labelled_;
+  std::optional<LabelledRangeImage> last_labelled_image_;
   Trajectory trajectory_;
   ScanRejection last_rejection_;
 };

@@ -11,13 +11,13 @@
 namespace stillmap {
 
 /// Where the labels of a scan come from.
-enum class Labelling : std::uint8_t {
+enum class LabelProvenance : std::uint8_t {
   /// No point has a class.
   none,
   /// From the label source, for this scan.
   fresh,
   /// From the map and the last labelled scan, as the label source was not ready in time.
-  carried,
+  propagated,
 };
 
 /// What a label source made of one scan.
@@ -28,41 +28,41 @@ struct ScanLabels {
 };
 
 /// Labels that may come later than a scan can wait for them.
-class LabelFeed {
+class SegmentationPipeline {
  public:
-  virtual ~LabelFeed() = default;
+  virtual ~SegmentationPipeline() = default;
 
   /// Name of the source, for the status.
   [[nodiscard]] virtual std::string name() const = 0;
 
-  /// False: every offer brings the labels of its scan, nothing ever has to be carried over.
+  /// False: every submit() returns the labels of its scan, none are ever propagated.
   [[nodiscard]] virtual bool may_skip_scans() const = 0;
 
-  struct Answer {
+  struct Output {
     /// Finished since the last call, oldest first; for this scan too, if it did not take too long.
     std::vector<ScanLabels> finished;
-    /// This scan's labels will be in a later answer.
+    /// This scan's labels will be in a later output.
     bool pending = false;
   };
-  /// Offers a prepared scan to be labelled.
-  [[nodiscard]] virtual Answer offer(const Scan& scan) = 0;
+  /// Submits a prepared scan for segmentation.
+  [[nodiscard]] virtual Output submit(const Scan& scan) = 0;
 };
 
 /// Every scan waits for its labels, however long that takes.
-class PatientFeed final : public LabelFeed {
+class BlockingSegmenter final : public SegmentationPipeline {
  public:
-  explicit PatientFeed(std::unique_ptr<LabelSource> source) : source_(std::move(source)) {}
+  explicit BlockingSegmenter(std::unique_ptr<Segmenter> source) : source_(std::move(source)) {}
 
   [[nodiscard]] std::string name() const override { return source_->name(); }
   [[nodiscard]] bool may_skip_scans() const override { return false; }
-  [[nodiscard]] Answer offer(const Scan& scan) override {
-    Answer answer;
-    answer.finished.push_back({scan.stamp_ns, source_->label(scan)});
-    return answer;
+  [[nodiscard]] Output submit(const Scan& scan) override {
+    Output output;
+    output.finished.push_back({scan.stamp_ns, source_->segment(scan)});
+    return output;
   }
 
  private:
-  std::unique_ptr<LabelSource> source_;
+  std::unique_ptr<Segmenter> source_;
 };
 
 }  // namespace stillmap

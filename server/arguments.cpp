@@ -8,7 +8,7 @@
 #include "config/loaders/listening_address.hpp"
 #include "config/loaders/model_file.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 constexpr const char* footer =
@@ -59,7 +59,7 @@ void add_operation_options(CLI::App& program, OperationArguments& operation) {
 /// Throws ConfigError with every fault, or ModelError.
 Arguments check_config(const std::string& file) {
   const ServerConfig config = load_server_config(file);
-  const auto labels = open_label_source(config.labels, config.mapper.sensor, true);
+  const auto labels = open_segmenter(config.labels, config.mapper.sensor, true);
   std::cout << file << " can be used; labels by " << labels->name() << "\n";
   return {.config = std::nullopt};
 }
@@ -70,7 +70,7 @@ struct NetworkArguments {
   std::vector<std::string> peers;
   std::optional<std::string> discovery_server;
 
-  void apply_to(DdsChoice& network) const {
+  void apply_to(DdsNetworkConfig& network) const {
     if (profile) network.profile = *profile;
     if (!peers.empty()) network.peers = peers;
     if (discovery_server) network.discovery_server = *discovery_server;
@@ -161,4 +161,4 @@ Arguments read_arguments(int argc, char** argv) {
   return {.config = config};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -4,7 +4,7 @@
 
 #include "config/loaders/server_config.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// The configuration that the command line asks for; nothing when it only asked for help, the
 /// version or a check, which were printed then.
@@ -17,4 +17,4 @@ struct Arguments {
 /// Throws ConfigError, and when a file is checked ModelError.
 [[nodiscard]] Arguments read_arguments(int argc, char** argv);
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -8,9 +8,9 @@
 #include "idl/dds/dds_log.hpp"
 #include "idl/dds/security/security_error.hpp"
 #include "server/arguments.hpp"
+#include "server/mapping/async_segmenter.hpp"
 #include "server/monitoring/log_setup.hpp"
 #include "server/monitoring/systemd_notify.hpp"
-#include "server/mapping/async_segmenter.hpp"
 #include "server/server.hpp"
 
 namespace {
@@ -30,36 +30,36 @@ sigset_t block_stop_signals() {
 
 void serve(const stillmap::ServerConfig& config) {
   const sigset_t signals = block_stop_signals();
-  const bool may_narrow = stillmap::label_budget(config).count() > 0;
-  auto labels = stillmap::open_label_source(config.labels, config.mapper.sensor, may_narrow);
+  const bool adaptive_width = stillmap::server::segmentation_budget(config).count() > 0;
+  auto labels = stillmap::open_segmenter(config.labels, config.mapper.sensor, adaptive_width);
   if (const std::string details = labels->details(); !details.empty()) {
     spdlog::info("labels by {}: {}", labels->name(), details);
   }
-  stillmap::Server server(config, std::move(labels));
+  stillmap::server::Server server(config, std::move(labels));
   spdlog::info("ready: scans from rt/{}, domain {}", config.topics.points, config.dds.domain_id);
-  stillmap::tell_service_manager("READY=1");
+  stillmap::server::notify_systemd("READY=1");
   int signal = 0;
   sigwait(&signals, &signal);
   spdlog::info("stopping");
-  stillmap::tell_service_manager("STOPPING=1");
+  stillmap::server::notify_systemd("STOPPING=1");
   server.stop();
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  stillmap::start_log(stillmap::LogLevel::info);
-  stillmap::log_dds_to_stderr();
+  stillmap::server::start_log(stillmap::LogLevel::info);
+  stillmap::dds::log_dds_to_stderr();
   try {
-    const stillmap::Arguments arguments = stillmap::read_arguments(argc, argv);
+    const stillmap::server::Arguments arguments = stillmap::server::read_arguments(argc, argv);
     if (!arguments.config) return arguments.exit_code;
-    stillmap::set_log_level(arguments.config->log.level);
+    stillmap::server::set_log_level(arguments.config->log.level);
     serve(*arguments.config);
     return 0;
   } catch (const stillmap::ConfigError& error) {
     spdlog::critical("{}", error.what());
     return bad_input;
-  } catch (const stillmap::SecurityError& error) {
+  } catch (const stillmap::dds::SecurityError& error) {
     spdlog::critical("{}", error.what());
     return bad_input;
   } catch (const std::exception& error) {

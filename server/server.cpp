@@ -4,11 +4,11 @@
 
 #include "idl/dds/transports.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
-DdsOptions server_options(const DdsConfig& config) {
-  DdsOptions options = dds_options(config.network, DdsRole::server);
+dds::DdsOptions server_options(const DdsConfig& config) {
+  dds::DdsOptions options = dds_options(config.network, DdsRole::server);
   options.domain_id = config.domain_id;
   options.node_name = config.participant_name;
   options.ros_gid_bytes = config.ros_gid_bytes;
@@ -17,7 +17,7 @@ DdsOptions server_options(const DdsConfig& config) {
 }
 
 std::map<std::string, std::string> file_metadata(const ServerConfig& config,
-                                                 const LabelSource& labels) {
+                                                 const Segmenter& labels) {
   std::map<std::string, std::string> metadata{
       {"software", std::string("stillmap ") + STILLMAP_VERSION},
       {"sensor", config.mapper.sensor.name},
@@ -26,33 +26,34 @@ std::map<std::string, std::string> file_metadata(const ServerConfig& config,
   return metadata;
 }
 
-void log(const Finding& finding) {
-  spdlog::warn("{}: {}; {}", finding.what, finding.evidence, finding.way_out);
+void log(const dds::Diagnostic& diagnostic) {
+  spdlog::warn("{}: {}; {}", diagnostic.what, diagnostic.evidence, diagnostic.hint);
 }
 
 /// What is wrong with this machine.
-std::vector<Finding> troubles(std::uint32_t wanted_bytes) {
-  const std::uint32_t granted = granted_socket_buffer_bytes(wanted_bytes);
+std::vector<dds::Diagnostic> host_diagnostics(std::uint32_t wanted_bytes) {
+  const std::uint32_t granted = dds::granted_socket_buffer_bytes(wanted_bytes);
   if (granted >= wanted_bytes) return {};
-  const Finding trouble{.severity = Severity::advice,
-                        .what = "UDP buffers are too small: large clouds over UDP can get lost",
-                        .evidence = "they have " + std::to_string(granted) + " bytes instead of " +
-                                    std::to_string(wanted_bytes),
-                        .way_out = "sudo sysctl net.core.rmem_max=" + std::to_string(wanted_bytes)};
-  log(trouble);
-  return {trouble};
+  const dds::Diagnostic diagnostic{
+      .severity = dds::Severity::advice,
+      .what = "UDP buffers are too small: large clouds over UDP can get lost",
+      .evidence = "they have " + std::to_string(granted) + " bytes instead of " +
+                  std::to_string(wanted_bytes),
+      .hint = "sudo sysctl net.core.rmem_max=" + std::to_string(wanted_bytes)};
+  log(diagnostic);
+  return {diagnostic};
 }
 
-ServerTraits traits(const ServerConfig& config, const LabelSource& labels,
-                    const DdsOptions& options) {
+ServerTraits traits(const ServerConfig& config, const Segmenter& labels,
+                    const dds::DdsOptions& options) {
   return {.delivery = delivery_mode(config.input.delivery),
           .label_source = labels.name(),
           .sensor = config.mapper.sensor.name,
           .points_topic = config.topics.points,
-          .troubles = troubles(options.socket_buffer_bytes)};
+          .host_diagnostics = host_diagnostics(options.socket_buffer_bytes)};
 }
 
-std::optional<StoredMap> stored_map(MapSaver& saver, const MapFileConfig& config) {
+std::optional<SavedMap> saved_map(MapSaver& saver, const MapFileConfig& config) {
   if (!config.load_at_start) return std::nullopt;
   auto stored = saver.load();
   if (stored && !stored->view.tiles.empty()) {
@@ -64,29 +65,30 @@ std::optional<StoredMap> stored_map(MapSaver& saver, const MapFileConfig& config
 
 }  // namespace
 
-Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_source)
-    : topics_(Topics::in(config.topics.name_space)),
+Server::Server(const ServerConfig& config, std::unique_ptr<Segmenter> label_source)
+    : topics_(dds::Topics::in(config.topics.name_space)),
       queue_(config.input.queue_length),
-      saver_(board_, config.map.file, file_metadata(config, *label_source),
+      saver_(latest_map_, config.map.file, file_metadata(config, *label_source),
              config.map.memory_limit_mib),
-      tiles_(saver_.shelf(), (std::size_t{config.map.memory_limit_mib} << 20) / 8),
+      tiles_(saver_.tile_store(), (std::size_t{config.map.memory_limit_mib} << 20) / 8),
       participant_(server_options(config.dds)),
       poses_(participant_, topics_, config.frames),
-      peer_report_(participant_, log),
+      discovery_diagnostics_(participant_, log),
       report_(
-          traits(config, *label_source, participant_.options()), board_, statistics_,
-          [this] { return peer_report_.findings(); },
-          [this] { return receiver_->why_nothing_arrives(); }),
-      atlas_(area_board_, board_, tiles_),
-      planning_grid_(config.areas, config.frames.map, board_, area_board_) {
+          traits(config, *label_source, participant_.options()), latest_map_, statistics_,
+          [this] { return discovery_diagnostics_.diagnostics(); },
+          [this] { return receiver_->no_input_reason(); }),
+      traversability_cache_(traversability_snapshot_, latest_map_, tiles_),
+      grid_provider_(config.traversability, config.frames.map, latest_map_,
+                     traversability_snapshot_) {
   start_mapping(config, std::move(label_source));
   receiver_ = std::make_unique<ScanReceiver>(participant_, config, queue_, statistics_);
-  map_publisher_ = std::make_unique<MapPublisher>(participant_, topics_, config, board_);
+  map_publisher_ = std::make_unique<MapPublisher>(participant_, topics_, config, latest_map_);
   if (occupancy_) {
     octomap_publisher_ =
         std::make_unique<OctomapPublisher>(participant_, topics_, config, *occupancy_);
   }
-  start_areas(config);
+  start_traversability(config);
   start_services(config);
   autosave_ = std::make_unique<CheckpointThread>(
       std::chrono::duration<double>(config.map.save_period_s), [this] { save_in_background(); });
@@ -95,14 +97,15 @@ Server::Server(const ServerConfig& config, std::unique_ptr<LabelSource> label_so
 
 Server::~Server() = default;
 
-Pause Server::give_way(const ServerConfig& config, WithoutGaps without_gaps) const {
+ThrottleCallback Server::throttle_callback(const ServerConfig& config,
+                                           SaturationPolicy saturation_policy) const {
   // Where every scan counts, poses may come later, so that octree and areas keep up.
   if (config.input.delivery == Delivery::every) return {};
-  return give_way_to(scan_traffic_, without_gaps);
+  return make_throttle_callback(throttle_, saturation_policy);
 }
 
 void Server::stop() {
-  scan_traffic_.end();
+  throttle_.release();
   // Who asks goes first, then who brings, then who maps: nobody waits for somebody gone.
   metrics_.reset();
   autosave_.reset();
@@ -113,53 +116,54 @@ void Server::stop() {
   receiver_.reset();
   // They get little time while scans come.
   octomap_publisher_.reset();
-  areas_.reset();
+  traversability_thread_.reset();
   mapping_->stop();
   saver_.save_at_end();
 }
 
-void Server::start_mapping(const ServerConfig& config, std::unique_ptr<LabelSource> label_source) {
+void Server::start_mapping(const ServerConfig& config, std::unique_ptr<Segmenter> label_source) {
   if (config.publish.scan) scans_.emplace(participant_, topics_);
   if (!config.topics.odometry_prior.empty()) {
     prior_.emplace(participant_, config.topics.odometry_prior);
   }
   if (config.occupancy.enabled) {
     // An octree that misses scans is better than late poses.
-    occupancy_.emplace(config.occupancy, statistics_, give_way(config, WithoutGaps::wait));
+    occupancy_.emplace(config.occupancy, statistics_,
+                       throttle_callback(config, SaturationPolicy::wait));
   }
   const MappingOutputs outputs{.poses = &poses_,
                                .scans = scans_ ? &*scans_ : nullptr,
                                .prior = prior_ ? &*prior_ : nullptr,
                                .occupancy = occupancy_ ? &*occupancy_ : nullptr,
-                               .traffic = &scan_traffic_};
+                               .throttle = &throttle_};
   mapping_ = std::make_unique<MappingThread>(config, std::move(label_source),
-                                             stored_map(saver_, config.map), saver_.shelf(), queue_,
-                                             statistics_, board_, outputs);
-  saver_.follow({.take = [this](bool everything) { return mapping_->checkpoint(everything); },
-                 .stored = [this](std::uint64_t step) { mapping_->checkpoint_stored(step); },
-                 .map_bytes = [this] { return mapping_->memory_use().bytes; }});
+                                             saved_map(saver_, config.map), saver_.tile_store(),
+                                             queue_, statistics_, latest_map_, outputs);
+  saver_.set_source({.take = [this](bool everything) { return mapping_->checkpoint(everything); },
+                     .stored = [this](std::uint64_t step) { mapping_->checkpoint_stored(step); },
+                     .map_bytes = [this] { return mapping_->memory_use().bytes; }});
 }
 
 void Server::start_services(const ServerConfig& config) {
   const auto status = [this] { return this->status(); };
   const ServiceContext context{
-      .board = board_,
+      .latest_map = latest_map_,
       .tiles = tiles_,
       .saver = saver_,
       .status = status,
       .reset = [this] { return mapping_->reset(); },
       .load =
-          [this](const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf) {
-            mapping_->load(stored, shelf);
-            tiles_.use_shelf(shelf);
+          [this](const SavedMap& stored, const std::shared_ptr<TileStore>& tile_store) {
+            mapping_->load(stored, tile_store);
+            tiles_.use_tile_store(tile_store);
           },
-      .show_now = [this] { mapping_->show_now(); },
-      .areas = atlas_,
-      .planning_grid = planning_grid_,
+      .publish_now = [this] { mapping_->publish_now(); },
+      .traversability = traversability_cache_,
+      .grid_provider = grid_provider_,
       .log = service_log_};
-  const Services names = Services::in(config.topics.name_space);
-  services_ = std::make_unique<ServiceDesk>(participant_, names, context);
-  occupancy_services_ = std::make_unique<OccupancyDesk>(
+  const dds::Services names = dds::Services::in(config.topics.name_space);
+  services_ = std::make_unique<MapServices>(participant_, names, context);
+  occupancy_services_ = std::make_unique<OccupancyServices>(
       participant_, names, context, occupancy_ ? &*occupancy_ : nullptr, config.frames.map);
   const RemovedSource removed{
       .removed = [this](const Eigen::AlignedBox3d& box_map) { return mapping_->removed(box_map); },
@@ -167,38 +171,40 @@ void Server::start_services(const ServerConfig& config) {
           [this](RemovalReason reason, const Eigen::AlignedBox3d& box_map) {
             return mapping_->restore_removed(reason, box_map);
           }};
-  removed_services_ = std::make_unique<RemovedDesk>(participant_, names, context, removed);
+  removed_services_ = std::make_unique<RemovedVoxelServices>(participant_, names, context, removed);
   status_publisher_ = std::make_unique<StatusPublisher>(participant_, topics_,
                                                         config.publish.status_period_s, status);
 }
 
-ServerStatus Server::status() const {
-  ServerStatus status = report_.status();
+dds::ServerStatus Server::status() const {
+  dds::ServerStatus status = report_.status();
   for (const auto& [name, value] : participant_.service_faults().counts()) {
     status.counters.push_back({.name = name, .value = value});
   }
   return status;
 }
 
-void Server::start_areas(const ServerConfig& config) {
-  std::vector<RobotProfile> robots = robots_of(config.areas);
+void Server::start_traversability(const ServerConfig& config) {
+  std::vector<RobotProfile> robots = load_robots(config.traversability);
   if (robots.empty()) return;
-  if (!config.areas.grid_profile.empty()) {
-    area_publisher_ = std::make_unique<AreaPublisher>(participant_, topics_, planning_grid_);
+  if (!config.traversability.grid_profile.empty()) {
+    traversability_publisher_ =
+        std::make_unique<TraversabilityPublisher>(participant_, topics_, grid_provider_);
   }
   const auto publish = [this] {
-    if (area_publisher_) area_publisher_->publish();
+    if (traversability_publisher_) traversability_publisher_->publish();
   };
-  areas_ = std::make_unique<AreaThread>(
-      std::move(robots), std::chrono::duration<double>(config.areas.update_period_s), board_,
-      area_board_, statistics_, publish, give_way(config, WithoutGaps::work_a_tenth));
+  traversability_thread_ = std::make_unique<TraversabilityThread>(
+      std::move(robots), std::chrono::duration<double>(config.traversability.update_period_s),
+      latest_map_, traversability_snapshot_, statistics_, publish,
+      throttle_callback(config, SaturationPolicy::run_at_ten_percent));
 }
 
 void Server::start_metrics(const MetricsConfig& config) {
   if (config.address.empty()) return;
   metrics_ = std::make_unique<MetricsEndpoint>(config.address, [this]() -> MetricsSnapshot {
     return {.status = report_.status(),
-            .stages = statistics_.stage_times(),
+            .stages = statistics_.stage_statistics(),
             .services = service_log_.services(),
             .checkpoints = saver_.checkpoints(),
             .map_memory = statistics_.map_memory(),
@@ -211,8 +217,8 @@ void Server::save_in_background() {
   try {
     saver_.save_if_changed();
   } catch (const MapFileError& error) {
-    save_warnings_.error("save", std::string("the map was not saved: ") + error.what());
+    save_log_.error("save", std::string("the map was not saved: ") + error.what());
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

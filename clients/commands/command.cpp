@@ -10,7 +10,7 @@
 #include "core/segmentation/model_error.hpp"
 #include "idl/dds/security/security_error.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 ExitCode report(const std::exception& error, ExitCode code) {
@@ -33,7 +33,7 @@ ExitCode run_action(const Action& action) {
     return report(error, ExitCode::bad_input);
   } catch (const MapFileError& error) {
     return report(error, ExitCode::bad_input);
-  } catch (const SecurityError& error) {
+  } catch (const dds::SecurityError& error) {
     return report(error, ExitCode::bad_input);
   } catch (const std::invalid_argument& error) {
     return report(error, ExitCode::bad_input);
@@ -42,4 +42,4 @@ ExitCode run_action(const Action& action) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,7 +4,7 @@
 
 #include "clients/terminal/command_line.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// What the shell gets to know.
 enum class ExitCode {
@@ -20,7 +20,7 @@ enum class ExitCode {
 };
 
 /// What can be named as a recording, and how a bag's topic is chosen; for help texts.
-inline constexpr const char* recording_kinds =
+inline constexpr const char* dataset_kinds =
     "A KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag (folder "
     "or .db3)";
 inline constexpr const char* topic_in_help =
@@ -88,4 +88,4 @@ void add_security_check_command(CommandHandle security, Action& action);
 /// Runs the action; an exception becomes a line on stderr and its exit code.
 [[nodiscard]] ExitCode run_action(const Action& action);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

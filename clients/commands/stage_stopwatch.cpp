@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 double ms_between(std::chrono::steady_clock::time_point from,
@@ -13,7 +13,7 @@ double ms_between(std::chrono::steady_clock::time_point from,
 
 }  // namespace
 
-double StageTime::quantile(double share) const {
+double StageDurations::quantile(double share) const {
   if (ms.empty()) return 0.0;
   std::vector<double> sorted = ms;
   std::sort(sorted.begin(), sorted.end());
@@ -22,12 +22,12 @@ double StageTime::quantile(double share) const {
   return sorted[std::min(index, sorted.size() - 1)];
 }
 
-void StageTimes::begin() { scan_began_ = stage_began_ = Clock::now(); }
+void StageStopwatch::begin() { scan_began_ = stage_began_ = Clock::now(); }
 
-void StageTimes::end_stage(std::string_view stage) {
+void StageStopwatch::end_stage(std::string_view stage) {
   const auto now = Clock::now();
   auto found = std::find_if(stages_.begin(), stages_.end(),
-                            [&](const StageTime& known) { return known.stage == stage; });
+                            [&](const StageDurations& known) { return known.stage == stage; });
   if (found == stages_.end()) {
     found = stages_.insert(stages_.end(), {.stage = std::string(stage), .ms = {}});
   }
@@ -35,12 +35,12 @@ void StageTimes::end_stage(std::string_view stage) {
   stage_began_ = now;
 }
 
-void StageTimes::end() { total_.ms.push_back(ms_between(scan_began_, Clock::now())); }
+void StageStopwatch::end() { total_.ms.push_back(ms_between(scan_began_, Clock::now())); }
 
-std::vector<StageTime> StageTimes::stages() const {
-  std::vector<StageTime> all = stages_;
+std::vector<StageDurations> StageStopwatch::stages() const {
+  std::vector<StageDurations> all = stages_;
   all.push_back(total_);
   return all;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -5,10 +5,10 @@
 #include <string_view>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// Milliseconds of many runs of one stage.
-struct StageTime {
+struct StageDurations {
   std::string stage;
   std::vector<double> ms;
 
@@ -17,7 +17,7 @@ struct StageTime {
 };
 
 /// Stopwatch of a pipeline: the time since the last call counts for the stage that just ended.
-class StageTimes {
+class StageStopwatch {
  public:
   void begin();
   void end_stage(std::string_view stage);
@@ -25,16 +25,16 @@ class StageTimes {
   void end();
 
   /// In the order in which stages first ended; "total" is last.
-  [[nodiscard]] std::vector<StageTime> stages() const;
-  [[nodiscard]] const StageTime& total() const { return total_; }
+  [[nodiscard]] std::vector<StageDurations> stages() const;
+  [[nodiscard]] const StageDurations& total() const { return total_; }
 
  private:
   using Clock = std::chrono::steady_clock;
 
   Clock::time_point scan_began_;
   Clock::time_point stage_began_;
-  std::vector<StageTime> stages_;
-  StageTime total_{.stage = "total", .ms = {}};
+  std::vector<StageDurations> stages_;
+  StageDurations total_{.stage = "total", .ms = {}};
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

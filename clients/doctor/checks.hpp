@@ -5,38 +5,38 @@
 #include "clients/doctor/system_snapshot.hpp"
 #include "idl/interface/diagnostic.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
-using Findings = std::vector<Finding>;
+using Diagnostics = std::vector<dds::Diagnostic>;
 
 // Each looks for one kind of trouble and knows nothing of the others.
 
 /// /dev/shm that cannot be written, segments of dead processes and of other users.
-[[nodiscard]] Findings check_shared_memory(const Evidence& evidence);
+[[nodiscard]] Diagnostics check_shared_memory(const SystemSnapshot& snapshot);
 /// UDP buffers too small for a scan.
-[[nodiscard]] Findings check_socket_buffers(const Evidence& evidence);
-/// Interfaces and routes that carry no multicast, by which peers find each other.
-[[nodiscard]] Findings check_multicast(const Evidence& evidence);
+[[nodiscard]] Diagnostics check_socket_buffers(const SystemSnapshot& snapshot);
+/// Interfaces and routes that carry no multicast, by which participants find each other.
+[[nodiscard]] Diagnostics check_multicast(const SystemSnapshot& snapshot);
 /// Nobody in this domain, and who is in others.
-[[nodiscard]] Findings check_domain(const Evidence& evidence);
+[[nodiscard]] Diagnostics check_domain(const SystemSnapshot& snapshot);
 /// Secured on one side only, or refused.
-[[nodiscard]] Findings check_security(const Evidence& evidence);
+[[nodiscard]] Diagnostics check_security(const SystemSnapshot& snapshot);
 /// Peers that are seen, but none of their topics.
-[[nodiscard]] Findings check_silent_peers(const Evidence& evidence);
+[[nodiscard]] Diagnostics check_silent_participants(const SystemSnapshot& snapshot);
 /// No server, one that does not answer, several of one name, another version.
-[[nodiscard]] Findings check_servers(const Evidence& evidence);
-/// Writers and readers of one topic that do not fit, of any two peers.
-[[nodiscard]] Findings check_endpoints(const Evidence& evidence);
+[[nodiscard]] Diagnostics check_servers(const SystemSnapshot& snapshot);
+/// Writers and readers of one topic that do not fit, of any two participants.
+[[nodiscard]] Diagnostics check_endpoints(const SystemSnapshot& snapshot);
 /// No scans, and because of what; scans that are dropped.
-[[nodiscard]] Findings check_scans(const Evidence& evidence);
+[[nodiscard]] Diagnostics check_scans(const SystemSnapshot& snapshot);
 /// Clouds without a frame, or with one that tf does not know.
-[[nodiscard]] Findings check_frames(const Evidence& evidence);
+[[nodiscard]] Diagnostics check_frames(const SystemSnapshot& snapshot);
 /// Clocks that differ between this machine, the server's and the sensor's.
-[[nodiscard]] Findings check_clocks(const Evidence& evidence);
+[[nodiscard]] Diagnostics check_clocks(const SystemSnapshot& snapshot);
 /// What the server itself found.
-[[nodiscard]] Findings check_server_findings(const Evidence& evidence);
+[[nodiscard]] Diagnostics check_server_diagnostics(const SystemSnapshot& snapshot);
 
 /// All of them, causes before their effects; what two of them say is there once.
-[[nodiscard]] Findings diagnose(const Evidence& evidence);
+[[nodiscard]] Diagnostics diagnose(const SystemSnapshot& snapshot);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

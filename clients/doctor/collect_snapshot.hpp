@@ -6,10 +6,10 @@
 
 #include "clients/doctor/system_snapshot.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 struct DoctorOptions {
-  DdsOptions dds;
+  dds::DdsOptions dds;
   std::string server_name = "stillmap";
   std::string points_topic = "points";
   /// Longest wait for a server's answer.
@@ -22,6 +22,6 @@ struct DoctorOptions {
 
 /// Takes part in the domain for a few seconds and looks at the machine. Throws DdsError where even
 /// that is not possible.
-[[nodiscard]] Evidence gather(const DoctorOptions& options);
+[[nodiscard]] SystemSnapshot collect_snapshot(const DoctorOptions& options);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,154 +4,157 @@
 #include "idl/interface/participant_diagnostics.hpp"
 #include "idl/interface/topics.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 constexpr const char* cloud_type = "sensor_msgs::msg::dds_::PointCloud2_";
 
-bool is_server(const Peer& peer) {
-  return std::ranges::any_of(peer.endpoints, [](const Endpoint& endpoint) {
+bool is_server(const dds::RemoteParticipant& participant) {
+  return std::ranges::any_of(participant.endpoints, [](const dds::Endpoint& endpoint) {
     return !endpoint.is_writer && endpoint.topic.ends_with("/get_statusRequest");
   });
 }
 
-bool sends_clouds(const Peer& peer) {
-  return std::ranges::any_of(peer.endpoints, [](const Endpoint& endpoint) {
+bool sends_clouds(const dds::RemoteParticipant& participant) {
+  return std::ranges::any_of(participant.endpoints, [](const dds::Endpoint& endpoint) {
     return endpoint.is_writer && endpoint.type == cloud_type;
   });
 }
 
 // Domains where a server or a sensor is, those first that matter more.
-std::string promising(const std::vector<OtherDomain>& domains) {
+std::string describe_candidate_domains(const std::vector<OtherDomain>& domains) {
   std::string text;
   for (const OtherDomain& domain : domains) {
-    for (const Peer& peer : domain.peers) {
-      const bool server = is_server(peer);
-      if (!server && !sends_clouds(peer)) continue;
+    for (const dds::RemoteParticipant& participant : domain.participants) {
+      const bool server = is_server(participant);
+      if (!server && !sends_clouds(participant)) continue;
       text.append(text.empty() ? "" : "; ")
           .append("domain " + std::to_string(domain.id))
           .append(server ? " has the server " : " has clouds of ")
-          .append(describe(peer));
+          .append(describe(participant));
     }
   }
   return text;
 }
 
-std::string inhabited(const std::vector<OtherDomain>& domains) {
+std::string describe_domains_in_use(const std::vector<OtherDomain>& domains) {
   std::string text;
   for (const OtherDomain& domain : domains) {
     text.append(text.empty() ? "" : ", ").append(std::to_string(domain.id));
   }
   return text.empty() ? "no other domain shows anybody either"
-                      : "there are peers in domain " + text;
+                      : "there are participants in domain " + text;
 }
 
-Finding nothing_here(const Evidence& evidence) {
-  const std::string better = promising(evidence.other_domains);
-  Finding finding{.severity = Severity::problem,
-                  .what = "nobody else is in domain " + std::to_string(evidence.dds.domain_id),
-                  .evidence = better.empty() ? inhabited(evidence.other_domains) : better,
-                  .way_out = {}};
+dds::Diagnostic empty_domain_diagnostic(const SystemSnapshot& snapshot) {
+  const std::string better = describe_candidate_domains(snapshot.other_domains);
+  dds::Diagnostic diagnostic{
+      .severity = dds::Severity::problem,
+      .what = "nobody else is in domain " + std::to_string(snapshot.dds.domain_id),
+      .evidence = better.empty() ? describe_domains_in_use(snapshot.other_domains) : better,
+      .hint = {}};
   if (!better.empty()) {
-    finding.way_out = "use that domain: --domain, ROS_DOMAIN_ID, dds.domain_id";
-  } else if (evidence.other_domains.empty()) {
-    finding.way_out =
+    diagnostic.hint = "use that domain: --domain, ROS_DOMAIN_ID, dds.domain_id";
+  } else if (snapshot.other_domains.empty()) {
+    diagnostic.hint =
         "start stillmap-server; if it runs, check that both machines share a network "
         "that carries multicast, and the interfaces that both use";
   } else {
-    finding.way_out = "compare --domain, ROS_DOMAIN_ID and dds.domain_id of all processes";
+    diagnostic.hint = "compare --domain, ROS_DOMAIN_ID and dds.domain_id of all processes";
   }
-  return finding;
+  return diagnostic;
 }
 
-Finding server_elsewhere(const Evidence& evidence) {
+dds::Diagnostic missing_server_diagnostic(const SystemSnapshot& snapshot) {
   std::string names;
-  for (const ServerSeen& server : evidence.servers) {
+  for (const DiscoveredServer& server : snapshot.servers) {
     names.append(names.empty() ? "" : ", ").append(server.name_space);
   }
-  const std::string better = promising(evidence.other_domains);
-  Finding finding{.severity = Severity::problem,
-                  .what = "no server '" + evidence.server_name + "' in domain " +
-                          std::to_string(evidence.dds.domain_id),
-                  .evidence = {},
-                  .way_out = {}};
+  const std::string better = describe_candidate_domains(snapshot.other_domains);
+  dds::Diagnostic diagnostic{.severity = dds::Severity::problem,
+                             .what = "no server '" + snapshot.server_name + "' in domain " +
+                                     std::to_string(snapshot.dds.domain_id),
+                             .evidence = {},
+                             .hint = {}};
   if (!names.empty()) {
-    finding.evidence = "there is '" + names + "'";
-    finding.way_out = "did you mean --server " + names + "?";
+    diagnostic.evidence = "there is '" + names + "'";
+    diagnostic.hint = "did you mean --server " + names + "?";
   } else if (!better.empty()) {
-    finding.evidence = better;
-    finding.way_out = "use that domain: --domain, ROS_DOMAIN_ID, dds.domain_id";
+    diagnostic.evidence = better;
+    diagnostic.hint = "use that domain: --domain, ROS_DOMAIN_ID, dds.domain_id";
   } else {
-    finding.evidence = "nobody here answers " + Services::in(evidence.server_name).get_status;
-    finding.way_out = "start stillmap-server --domain " + std::to_string(evidence.dds.domain_id);
+    diagnostic.evidence =
+        "nobody here answers " + dds::Services::in(snapshot.server_name).get_status;
+    diagnostic.hint = "start stillmap-server --domain " + std::to_string(snapshot.dds.domain_id);
   }
-  return finding;
+  return diagnostic;
 }
 
 // Ends that a client of that server would have, though we did not make them.
-Findings judge(const ServerSeen& server) {
-  Findings findings;
-  if (server.peers.size() > 1) {
+Diagnostics server_diagnostics(const DiscoveredServer& server) {
+  Diagnostics diagnostics;
+  if (server.participants.size() > 1) {
     std::string list;
-    for (const Peer& peer : server.peers) {
-      list.append(list.empty() ? "" : "; ").append(describe(peer));
+    for (const dds::RemoteParticipant& participant : server.participants) {
+      list.append(list.empty() ? "" : "; ").append(describe(participant));
     }
-    findings.push_back({.severity = Severity::problem,
-                        .what = std::to_string(server.peers.size()) + " servers are called '" +
-                                server.name_space + "'",
-                        .evidence = list + ": both map the same scans, and either may answer",
-                        .way_out = "stop one, or give it another topics.namespace or domain"});
+    diagnostics.push_back({.severity = dds::Severity::problem,
+                           .what = std::to_string(server.participants.size()) +
+                                   " servers are called '" + server.name_space + "'",
+                           .evidence = list + ": both map the same scans, and either may answer",
+                           .hint = "stop one, or give it another topics.namespace or domain"});
   }
   if (!server.status) {
-    findings.push_back({.severity = Severity::problem,
-                        .what = "server '" + server.name_space + "' gives no status",
-                        .evidence = server.fault,
-                        .way_out = "give client and server the same version of Stillmap; a server "
+    diagnostics.push_back({.severity = dds::Severity::problem,
+                           .what = "server '" + server.name_space + "' gives no status",
+                           .evidence = server.fault,
+                           .hint = "give client and server the same version of Stillmap; a server "
                                    "that hangs or is stopped has to be started again"});
   } else if (server.status->software_version != STILLMAP_VERSION) {
-    findings.push_back(
-        {.severity = Severity::advice,
+    diagnostics.push_back(
+        {.severity = dds::Severity::advice,
          .what = "server and client have different versions",
          .evidence = "server " + server.status->software_version + ", client " + STILLMAP_VERSION,
-         .way_out = "install the same version on both machines"});
+         .hint = "install the same version on both machines"});
   }
-  return findings;
+  return diagnostics;
 }
 
 }  // namespace
 
-Findings check_domain(const Evidence& evidence) {
-  if (!evidence.peers.empty()) return {};
-  return {nothing_here(evidence)};
+Diagnostics check_domain(const SystemSnapshot& snapshot) {
+  if (!snapshot.participants.empty()) return {};
+  return {empty_domain_diagnostic(snapshot)};
 }
 
-Findings check_security(const Evidence& evidence) {
-  return security_findings(evidence.self, evidence.peers);
+Diagnostics check_security(const SystemSnapshot& snapshot) {
+  return dds::security_diagnostics(snapshot.self, snapshot.participants);
 }
 
-Findings check_silent_peers(const Evidence& evidence) {
-  return silent_peer_findings(evidence.self, evidence.peers);
+Diagnostics check_silent_participants(const SystemSnapshot& snapshot) {
+  return dds::silent_participant_diagnostics(snapshot.self, snapshot.participants);
 }
 
-Findings check_servers(const Evidence& evidence) {
-  Findings findings;
+Diagnostics check_servers(const SystemSnapshot& snapshot) {
+  Diagnostics diagnostics;
   bool is_there = false;
-  for (const ServerSeen& server : evidence.servers) {
-    if (server.name_space != evidence.server_name) continue;
+  for (const DiscoveredServer& server : snapshot.servers) {
+    if (server.name_space != snapshot.server_name) continue;
     is_there = true;
-    const Findings more = judge(server);
-    findings.insert(findings.end(), more.begin(), more.end());
+    const Diagnostics more = server_diagnostics(server);
+    diagnostics.insert(diagnostics.end(), more.begin(), more.end());
   }
-  // With nobody there, check_domain() says it; a server may be behind a peer that ignores us.
-  const bool is_explained = evidence.peers.empty() || !check_security(evidence).empty();
-  if (!is_there && !is_explained) findings.push_back(server_elsewhere(evidence));
-  return findings;
+  // With nobody there, check_domain() says it; a server may be behind a participant that ignores
+  // us.
+  const bool is_explained = snapshot.participants.empty() || !check_security(snapshot).empty();
+  if (!is_there && !is_explained) diagnostics.push_back(missing_server_diagnostic(snapshot));
+  return diagnostics;
 }
 
-Findings check_endpoints(const Evidence& evidence) {
-  std::vector<Peer> everybody = evidence.peers;
-  everybody.push_back(evidence.self);
-  return mismatch_findings(mismatches(everybody));
+Diagnostics check_endpoints(const SystemSnapshot& snapshot) {
+  std::vector<dds::RemoteParticipant> everybody = snapshot.participants;
+  everybody.push_back(snapshot.self);
+  return dds::mismatch_diagnostics(dds::mismatches(everybody));
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 // RTPS 9.6.1.1: discovery by multicast in a domain goes to 239.255.0.1, port 7400 + 250 * id.
@@ -36,9 +36,9 @@ std::vector<in_addr> own_addresses() {
 }
 
 /// A socket that hears the announcements of one domain.
-class Ear {
+class MulticastListener {
  public:
-  Ear(std::uint32_t domain, std::span<const in_addr> interfaces)
+  MulticastListener(std::uint32_t domain, std::span<const in_addr> interfaces)
       : socket_(::socket(AF_INET, SOCK_DGRAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0)) {
     const int on = 1;
     ::setsockopt(socket_, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
@@ -53,11 +53,12 @@ class Ear {
       ::setsockopt(socket_, IPPROTO_IP, IP_ADD_MEMBERSHIP, &membership, sizeof membership);
     }
   }
-  ~Ear() {
+  ~MulticastListener() {
     if (socket_ >= 0) ::close(socket_);
   }
-  Ear(Ear&& other) noexcept : socket_(std::exchange(other.socket_, -1)) {}
-  Ear& operator=(Ear&&) = delete;
+  MulticastListener(MulticastListener&& other) noexcept
+      : socket_(std::exchange(other.socket_, -1)) {}
+  MulticastListener& operator=(MulticastListener&&) = delete;
 
   [[nodiscard]] int descriptor() const { return socket_; }
 
@@ -81,13 +82,13 @@ class Ear {
 
 }  // namespace
 
-DomainSenders listen_to_domains(std::chrono::milliseconds duration) {
+DomainSenders scan_domains(std::chrono::milliseconds duration) {
   const std::vector<in_addr> interfaces = own_addresses();
-  std::vector<Ear> ears;
+  std::vector<MulticastListener> listeners;
   std::vector<pollfd> waiting;
   for (std::uint32_t domain = 0; domain < domains; ++domain) {
-    const Ear& ear = ears.emplace_back(domain, interfaces);
-    waiting.push_back({.fd = ear.descriptor(), .events = POLLIN, .revents = 0});
+    const MulticastListener& listener = listeners.emplace_back(domain, interfaces);
+    waiting.push_back({.fd = listener.descriptor(), .events = POLLIN, .revents = 0});
   }
   DomainSenders found;
   const auto end = std::chrono::steady_clock::now() + duration;
@@ -97,7 +98,7 @@ DomainSenders listen_to_domains(std::chrono::milliseconds duration) {
     if (left.count() <= 0) return found;
     ::poll(waiting.data(), waiting.size(), static_cast<int>(left.count()));
     for (std::uint32_t domain = 0; domain < domains; ++domain) {
-      if ((waiting[domain].revents & POLLIN) != 0) ears[domain].take(found[domain]);
+      if ((waiting[domain].revents & POLLIN) != 0) listeners[domain].take(found[domain]);
     }
     std::erase_if(found, [](const auto& one) { return one.second.empty(); });
   }
@@ -113,4 +114,4 @@ std::set<std::uint32_t> domains_with_ports(std::span<const std::uint16_t> udp_po
   return used;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

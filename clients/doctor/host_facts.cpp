@@ -12,7 +12,7 @@
 
 #include "clients/doctor/shared_memory_segments.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 namespace fs = std::filesystem;
@@ -90,12 +90,12 @@ std::string host_name() {
 HostFacts read_host_facts(const fs::path& root) {
   return {.name = host_name(),
           .user = ::geteuid(),
-          .largest_receive_buffer = number_in(root / "proc/sys/net/core/rmem_max"),
+          .max_receive_buffer_bytes = number_in(root / "proc/sys/net/core/rmem_max"),
           .shared_memory_fault = write_fault(root / "dev/shm"),
-          .segments = shared_segments(root / "dev/shm"),
+          .segments = shared_memory_segments(root / "dev/shm"),
           .interfaces = interfaces_in(root / "sys/class/net"),
           .has_multicast_route = takes_multicast(root / "proc/net/route"),
           .udp_ports = ports_in(root / "proc/net/udp")};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// A segment of Fast DDS in /dev/shm.
-struct SharedSegment {
+struct SharedMemorySegment {
   std::string name;
   std::uint64_t bytes = 0;
   std::uint32_t owner = 0;
@@ -29,10 +29,10 @@ struct HostFacts {
   std::string name;
   std::uint32_t user = 0;
   /// net.core.rmem_max; nothing where it cannot be read.
-  std::optional<std::uint32_t> largest_receive_buffer;
+  std::optional<std::uint32_t> max_receive_buffer_bytes;
   /// Why /dev/shm cannot be used; empty when it can.
   std::string shared_memory_fault;
-  std::vector<SharedSegment> segments;
+  std::vector<SharedMemorySegment> segments;
   std::vector<NetworkInterface> interfaces;
   /// Some route takes multicast packets.
   bool has_multicast_route = false;
@@ -46,4 +46,4 @@ struct HostFacts {
 /// Removes the stale segments with their locks, where that is allowed; returns how many.
 int remove_stale_segments(const std::filesystem::path& root);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

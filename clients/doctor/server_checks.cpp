@@ -5,13 +5,13 @@
 
 #include "clients/doctor/checks.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 // What tf, and people, still take for one clock.
-constexpr double tolerable_s = 0.1;
+constexpr double max_clock_offset_s = 0.1;
 // Scans older than that are a recording's.
-constexpr double recording_s = 3600.0;
+constexpr double replayed_age_s = 3600.0;
 
 std::string seconds(double value) {
   std::array<char, 32> text{};
@@ -19,64 +19,64 @@ std::string seconds(double value) {
   return {text.data(), static_cast<std::size_t>(length)};
 }
 
-void compare_with_server(const ServerSeen& server, Findings& findings) {
+void compare_with_server(const DiscoveredServer& server, Diagnostics& diagnostics) {
   const double difference_s = 1e-9 * static_cast<double>(server.status->stamp_ns - server.asked_ns);
-  const double uncertain_s = 0.5e-9 * static_cast<double>(server.round_trip_ns);
-  if (std::abs(difference_s) <= tolerable_s + uncertain_s) return;
-  findings.push_back({.severity = Severity::problem,
-                      .what = "this machine's clock and the server's differ",
-                      .evidence = "the server's is " + seconds(std::abs(difference_s)) +
-                                  (difference_s > 0 ? " ahead" : " behind") + ", +- " +
-                                  seconds(uncertain_s),
-                      .way_out = "keep both by NTP or PTP (timedatectl set-ntp true; chrony)"});
+  const double uncertainty_s = 0.5e-9 * static_cast<double>(server.round_trip_ns);
+  if (std::abs(difference_s) <= max_clock_offset_s + uncertainty_s) return;
+  diagnostics.push_back({.severity = dds::Severity::problem,
+                         .what = "this machine's clock and the server's differ",
+                         .evidence = "the server's is " + seconds(std::abs(difference_s)) +
+                                     (difference_s > 0 ? " ahead" : " behind") + ", +- " +
+                                     seconds(uncertainty_s),
+                         .hint = "keep both by NTP or PTP (timedatectl set-ntp true; chrony)"});
 }
 
-void compare_with_sensor(const ServerStatus& status, Findings& findings) {
+void compare_with_sensor(const dds::ServerStatus& status, Diagnostics& diagnostics) {
   const double delay_s = status.scan_delay_s;
-  if (status.counter("scans_received") == 0 || delay_s > recording_s) return;
-  if (delay_s >= -tolerable_s && delay_s <= 1.0) return;
-  findings.push_back(
-      {.severity = Severity::advice,
+  if (status.counter("scans_received") == 0 || delay_s > replayed_age_s) return;
+  if (delay_s >= -max_clock_offset_s && delay_s <= 1.0) return;
+  diagnostics.push_back(
+      {.severity = dds::Severity::advice,
        .what = delay_s < 0 ? "scans come from the future" : "scans come late",
        .evidence = "the last scan's stamp is " + seconds(std::abs(delay_s)) +
                    (delay_s < 0 ? " ahead of" : " behind") + " the server's clock",
-       .way_out = "keep the sensor's clock and the server's by PTP or NTP, and let the driver take "
-                  "the sensor's time; a recording that is replayed has old stamps"});
+       .hint = "keep the sensor's clock and the server's by PTP or NTP, and let the driver take "
+               "the sensor's time; a recording that is replayed has old stamps"});
 }
 
-bool says_the_same(const Finding& a, const Finding& b) { return a.what == b.what; }
+bool is_same(const dds::Diagnostic& a, const dds::Diagnostic& b) { return a.what == b.what; }
 
 }  // namespace
 
-Findings check_clocks(const Evidence& evidence) {
-  Findings findings;
-  const ServerSeen* const server = answering_server(evidence);
-  if (server == nullptr) return findings;
-  compare_with_server(*server, findings);
-  compare_with_sensor(*server->status, findings);
-  return findings;
+Diagnostics check_clocks(const SystemSnapshot& snapshot) {
+  Diagnostics diagnostics;
+  const DiscoveredServer* const server = answering_server(snapshot);
+  if (server == nullptr) return diagnostics;
+  compare_with_server(*server, diagnostics);
+  compare_with_sensor(*server->status, diagnostics);
+  return diagnostics;
 }
 
-Findings check_server_findings(const Evidence& evidence) {
-  const ServerSeen* const server = answering_server(evidence);
-  return server == nullptr ? Findings() : server->status->findings;
+Diagnostics check_server_diagnostics(const SystemSnapshot& snapshot) {
+  const DiscoveredServer* const server = answering_server(snapshot);
+  return server == nullptr ? Diagnostics() : server->status->diagnostics;
 }
 
-Findings diagnose(const Evidence& evidence) {
+Diagnostics diagnose(const SystemSnapshot& snapshot) {
   constexpr std::array checks{check_shared_memory, check_socket_buffers, check_multicast,
-                              check_domain,        check_security,       check_silent_peers,
+                              check_domain,        check_security,       check_silent_participants,
                               check_servers,       check_endpoints,      check_scans,
-                              check_frames,        check_clocks,         check_server_findings};
-  Findings all;
+                              check_frames,        check_clocks,         check_server_diagnostics};
+  Diagnostics all;
   for (const auto check : checks) {
-    for (Finding& finding : check(evidence)) {
+    for (dds::Diagnostic& diagnostic : check(snapshot)) {
       const bool is_known = std::ranges::any_of(
-          all, [&](const Finding& known) { return says_the_same(known, finding); });
-      if (!is_known) all.push_back(std::move(finding));
+          all, [&](const dds::Diagnostic& known) { return is_same(known, diagnostic); });
+      if (!is_known) all.push_back(std::move(diagnostic));
     }
   }
-  std::ranges::stable_sort(all, std::ranges::greater(), &Finding::severity);
+  std::ranges::stable_sort(all, std::ranges::greater(), &dds::Diagnostic::severity);
   return all;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

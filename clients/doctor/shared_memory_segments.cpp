@@ -9,7 +9,7 @@
 #include <cstring>
 #include <system_error>
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 namespace fs = std::filesystem;
@@ -46,8 +46,8 @@ void remove_segment(const fs::path& folder, const std::string& name) {
 
 }  // namespace
 
-std::vector<SharedSegment> shared_segments(const fs::path& folder) {
-  std::vector<SharedSegment> segments;
+std::vector<SharedMemorySegment> shared_memory_segments(const fs::path& folder) {
+  std::vector<SharedMemorySegment> segments;
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
@@ -73,7 +73,7 @@ std::string write_fault(const fs::path& folder) {
 int remove_stale_segments(const fs::path& root) {
   const fs::path folder = root / "dev/shm";
   int removed = 0;
-  for (const SharedSegment& segment : shared_segments(folder)) {
+  for (const SharedMemorySegment& segment : shared_memory_segments(folder)) {
     if (!segment.is_stale) continue;
     remove_segment(folder, segment.name);
     if (!fs::exists(folder / segment.name)) ++removed;
@@ -81,4 +81,4 @@ int remove_stale_segments(const fs::path& root) {
   return removed;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

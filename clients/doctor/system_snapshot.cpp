@@ -2,19 +2,19 @@
 
 #include <algorithm>
 
-namespace stillmap {
+namespace stillmap::cli {
 
-const ServerSeen* answering_server(const Evidence& evidence) {
-  const auto found = std::ranges::find_if(evidence.servers, [&](const ServerSeen& server) {
-    return server.status && server.name_space == evidence.server_name;
+const DiscoveredServer* answering_server(const SystemSnapshot& snapshot) {
+  const auto found = std::ranges::find_if(snapshot.servers, [&](const DiscoveredServer& server) {
+    return server.status && server.name_space == snapshot.server_name;
   });
-  return found == evidence.servers.end() ? nullptr : &*found;
+  return found == snapshot.servers.end() ? nullptr : &*found;
 }
 
-std::string points_topic_of(const Evidence& evidence) {
-  const ServerSeen* const server = answering_server(evidence);
+std::string points_topic_of(const SystemSnapshot& snapshot) {
+  const DiscoveredServer* const server = answering_server(snapshot);
   const bool tells = server != nullptr && !server->status->points_topic.empty();
-  return "rt/" + (tells ? server->status->points_topic : evidence.points_topic);
+  return "rt/" + (tells ? server->status->points_topic : snapshot.points_topic);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -12,15 +12,15 @@
 #include "idl/dds/remote_participant.hpp"
 #include "idl/interface/server_status.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// A server that the domain shows, and what it answered.
-struct ServerSeen {
+struct DiscoveredServer {
   /// First part of its topic names.
   std::string name_space;
   /// Participants that answer under this name.
-  std::vector<Peer> peers;
-  std::optional<ServerStatus> status;
+  std::vector<dds::RemoteParticipant> participants;
+  std::optional<dds::ServerStatus> status;
   /// Why there is no status.
   std::string fault;
   /// This machine's clock in the middle of the question, nanoseconds since the Unix epoch.
@@ -33,20 +33,20 @@ struct ServerSeen {
 struct OtherDomain {
   std::uint32_t id = 0;
   std::set<std::string> senders;
-  std::vector<Peer> peers;
+  std::vector<dds::RemoteParticipant> participants;
 };
 
 /// Everything that the checks look at.
-struct Evidence {
-  DdsOptions dds;
+struct SystemSnapshot {
+  dds::DdsOptions dds;
   /// First part of the topic names of the server that is asked for.
   std::string server_name;
   /// ROS 2 name of the sensor's topic.
   std::string points_topic;
   /// Ourselves, with the ends that a client has.
-  Peer self;
-  std::vector<Peer> peers;
-  std::vector<ServerSeen> servers;
+  dds::RemoteParticipant self;
+  std::vector<dds::RemoteParticipant> participants;
+  std::vector<DiscoveredServer> servers;
   std::vector<OtherDomain> other_domains;
   /// Frames that tf and tf_static named in the meantime.
   std::set<std::string> frames;
@@ -56,9 +56,9 @@ struct Evidence {
 };
 
 /// The server of the name asked for that answered; nothing when none did.
-[[nodiscard]] const ServerSeen* answering_server(const Evidence& evidence);
+[[nodiscard]] const DiscoveredServer* answering_server(const SystemSnapshot& snapshot);
 
 /// The sensor's topic as DDS names it: the server's word counts where there is one.
-[[nodiscard]] std::string points_topic_of(const Evidence& evidence);
+[[nodiscard]] std::string points_topic_of(const SystemSnapshot& snapshot);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -12,15 +12,15 @@
 
 #include "clients/library/subscription.hpp"
 #include "core/lidar/scan.hpp"
+#include "core/lidar/trajectory.hpp"
 #include "core/map/query/map_query.hpp"
 #include "core/map/removed_voxel.hpp"
 #include "core/map/tile.hpp"
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"
-#include "core/odometry/trajectory.hpp"
-#include "core/traversability/traversability_query.hpp"
 #include "core/traversability/nearest_traversable.hpp"
 #include "core/traversability/path_query.hpp"
+#include "core/traversability/traversability_query.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
 #include "idl/dds/dds_options.hpp"
 #include "idl/interface/map_identity.hpp"
@@ -42,13 +42,13 @@ class ServiceTimeout : public ServiceError {
 };
 
 /// As the profile `lan` has it for clients: config/dds/lan.yaml says why.
-[[nodiscard]] inline DdsOptions without_shared_memory(DdsOptions options = {}) {
+[[nodiscard]] inline dds::DdsOptions without_shared_memory(dds::DdsOptions options = {}) {
   options.shared_memory = false;
   return options;
 }
 
 struct ClientOptions {
-  DdsOptions dds = without_shared_memory();
+  dds::DdsOptions dds = without_shared_memory();
   /// First part of the server's topic and service names.
   std::string server_name = "stillmap";
   /// Longest wait for an answer, discovery and retries included.
@@ -64,12 +64,12 @@ struct OdometryUpdate {
 };
 
 struct TileVersions {
-  MapIdentity map;
+  dds::MapIdentity map;
   std::vector<TileInfo> tiles;
 };
 
 struct TileSet {
-  MapIdentity map;
+  dds::MapIdentity map;
   std::vector<Tile> tiles;
   /// Tiles asked for that the map does not have.
   std::vector<TileId> missing;
@@ -91,9 +91,10 @@ struct RemovedVoxels {
   std::uint64_t total = 0;
 };
 
-/// What happened in a region since the last news. Tiles are whole, also what of them lies outside.
-struct RegionNews {
-  MapIdentity map;
+/// What happened in a region since the last update. Tiles are whole, also what of them lies
+/// outside.
+struct RegionUpdate {
+  dds::MapIdentity map;
   std::vector<Tile> appeared;
   std::vector<Tile> changed;
   std::vector<TileId> removed;
@@ -116,7 +117,7 @@ class Client {
   /// half may have passed since the client was made.
   void wait_for_server(std::chrono::milliseconds timeout);
 
-  [[nodiscard]] ServerStatus status();
+  [[nodiscard]] dds::ServerStatus status();
 
   /// One page of a region of the static map. Hand `continuation` back in the query for the next
   /// page. A refused query is a result with its status and reason, not an exception.
@@ -144,7 +145,7 @@ class Client {
   /// query as a whole is refused.
   [[nodiscard]] OccupancyAnswers query_occupancy(const OccupancyQuery& query);
   /// Where a robot can go in a region. A refused query is a result with its status and reason.
-  [[nodiscard]] AreaAnswer get_traversable_area(const AreaQuery& query);
+  [[nodiscard]] TraversabilityAnswer get_traversable_area(const TraversabilityQuery& query);
   /// Whether a robot can follow a path, or the first place where it cannot. The same.
   [[nodiscard]] PathCheck check_path(const PathQuery& query);
   /// The free cell nearest to a place (map frame [m]). The same.
@@ -178,15 +179,15 @@ class Client {
       std::function<void(const OdometryUpdate&)> pose_arrived);
   /// Once a second, and when the health changes.
   [[nodiscard]] Subscription subscribe_status(
-      std::function<void(const ServerStatus&)> status_arrived);
+      std::function<void(const dds::ServerStatus&)> status_arrived);
   /// The whole path since the map began, at most once a second.
   [[nodiscard]] Subscription subscribe_path(std::function<void(const Trajectory&)> path_arrived);
   /// The newest version of every tile, first those that exist already.
   [[nodiscard]] Subscription subscribe_tiles(
-      std::function<void(const MapIdentity&, const Tile&)> tile_arrived);
+      std::function<void(const dds::MapIdentity&, const Tile&)> tile_arrived);
   /// As subscribe_tiles, without the voxels; a tile without any is gone.
   [[nodiscard]] Subscription subscribe_tile_index(
-      std::function<void(const MapIdentity&, const TileInfo&)> info_arrived);
+      std::function<void(const dds::MapIdentity&, const TileInfo&)> info_arrived);
 
   /// The octree (binary) when it changed, as often as the server publishes it.
   [[nodiscard]] Subscription subscribe_octomap(
@@ -200,14 +201,15 @@ class Client {
   /// bytes), which this process passes over. When another map begins, the tiles of the last one are
   /// removed. Throws std::invalid_argument for a region with faults, and as a request does: it asks
   /// for the size of tiles, so a server that comes back with another size needs a new subscription.
-  [[nodiscard]] Subscription subscribe_region(const Region& region,
-                                              std::function<void(const RegionNews&)> news_arrived);
+  [[nodiscard]] Subscription subscribe_region(
+      const Region& region, std::function<void(const RegionUpdate&)> update_arrived);
 
   /// Scans of the sensor's topic (ROS 2 name), as the server gets them; those that cannot be read
   /// are passed over. `delivery` is the server's: with `every`, a lossless sender waits for this
   /// subscription, too.
-  [[nodiscard]] Subscription subscribe_points(const std::string& ros_topic, DeliveryMode delivery,
-                                              const wire::CloudReading& reading,
+  [[nodiscard]] Subscription subscribe_points(const std::string& ros_topic,
+                                              dds::DeliveryMode delivery,
+                                              const wire::CloudReadOptions& reading,
                                               std::function<void(const Scan&)> scan_arrived);
   /// Prepared scans with the classes that the server gave them: the usable points only,
   /// motion-compensated, in the order of the sensor's scan of the same stamp. Best effort.

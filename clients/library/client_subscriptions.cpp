@@ -19,7 +19,7 @@ namespace {
 template <typename T>
 class ReceiverThread final : public Subscription::Receiver {
  public:
-  ReceiverThread(Participant& participant, const TopicSpec<T>& topic,
+  ReceiverThread(dds::Participant& participant, const dds::TopicSpec<T>& topic,
                  std::function<void(const T&)> sample_arrived)
       : sample_arrived_(std::move(sample_arrived)),
         reader_(participant, topic.dds_name, topic.reader),
@@ -34,13 +34,13 @@ class ReceiverThread final : public Subscription::Receiver {
   }
 
   std::function<void(const T&)> sample_arrived_;
-  Reader<T> reader_;
+  dds::Reader<T> reader_;
   // Last: stops before what it uses is gone.
   std::jthread thread_;
 };
 
 template <typename T>
-Subscription subscribe(Participant& participant, const TopicSpec<T>& topic,
+Subscription subscribe(dds::Participant& participant, const dds::TopicSpec<T>& topic,
                        std::function<void(const T&)> sample_arrived) {
   return Subscription(
       std::make_unique<ReceiverThread<T>>(participant, topic, std::move(sample_arrived)));
@@ -48,12 +48,12 @@ Subscription subscribe(Participant& participant, const TopicSpec<T>& topic,
 
 }  // namespace
 
-Subscription Client::subscribe_points(const std::string& ros_topic, DeliveryMode delivery,
-                                      const wire::CloudReading& reading,
+Subscription Client::subscribe_points(const std::string& ros_topic, dds::DeliveryMode delivery,
+                                      const wire::CloudReadOptions& reading,
                                       std::function<void(const Scan&)> scan_arrived) {
-  constexpr int scans_waiting = 10;
+  constexpr int queue_length = 10;
   return subscribe<sensor_msgs::msg::PointCloud2>(
-      connection_->participant, points_topic(ros_topic, delivery, scans_waiting),
+      connection_->participant, dds::points_topic(ros_topic, delivery, queue_length),
       [reader = wire::CloudReader(reading),
        arrived = std::move(scan_arrived)](const sensor_msgs::msg::PointCloud2& message) mutable {
         const auto read = reader.read(message);
@@ -62,7 +62,7 @@ Subscription Client::subscribe_points(const std::string& ros_topic, DeliveryMode
 }
 
 Subscription Client::subscribe_labelled_scans(std::function<void(const Scan&)> scan_arrived) {
-  TopicSpec<sensor_msgs::msg::PointCloud2> topic = connection_->topics.scan;
+  dds::TopicSpec<sensor_msgs::msg::PointCloud2> topic = connection_->topics.scan;
   topic.reader.depth = 10;
   return subscribe<sensor_msgs::msg::PointCloud2>(
       connection_->participant, topic,
@@ -81,7 +81,8 @@ Subscription Client::subscribe_odometry(std::function<void(const OdometryUpdate&
       });
 }
 
-Subscription Client::subscribe_status(std::function<void(const ServerStatus&)> status_arrived) {
+Subscription Client::subscribe_status(
+    std::function<void(const dds::ServerStatus&)> status_arrived) {
   return subscribe<stillmap_msgs::msg::Status>(
       connection_->participant, connection_->topics.status,
       [arrived = std::move(status_arrived)](const stillmap_msgs::msg::Status& message) {
@@ -118,7 +119,7 @@ Subscription Client::subscribe_planning_grid(
 }
 
 Subscription Client::subscribe_tiles(
-    std::function<void(const MapIdentity&, const Tile&)> tile_arrived) {
+    std::function<void(const dds::MapIdentity&, const Tile&)> tile_arrived) {
   return subscribe<stillmap_msgs::msg::MapTile>(
       connection_->participant, connection_->topics.tiles,
       [arrived = std::move(tile_arrived)](const stillmap_msgs::msg::MapTile& message) {
@@ -128,7 +129,7 @@ Subscription Client::subscribe_tiles(
 }
 
 Subscription Client::subscribe_tile_index(
-    std::function<void(const MapIdentity&, const TileInfo&)> info_arrived) {
+    std::function<void(const dds::MapIdentity&, const TileInfo&)> info_arrived) {
   return subscribe<stillmap_msgs::msg::TileInfo>(
       connection_->participant, connection_->topics.tile_index,
       [arrived = std::move(info_arrived)](const stillmap_msgs::msg::TileInfo& message) {

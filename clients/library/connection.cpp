@@ -21,7 +21,7 @@ std::vector<stillmap_msgs::msg::TileId> to_wire(std::span<const TileId> ids) {
 void add_tiles(const GetTiles_Response& reply, TileSet& set) {
   for (const auto& message : reply.tiles()) {
     auto tile = wire::from_wire(message);
-    if (!tile) throw malformed("get_tiles");
+    if (!tile) throw malformed_reply("get_tiles");
     set.tiles.push_back(*std::move(tile));
   }
   for (const auto& id : reply.missing()) set.missing.push_back({id.x(), id.y()});
@@ -29,15 +29,15 @@ void add_tiles(const GetTiles_Response& reply, TileSet& set) {
 
 }  // namespace
 
-ServiceError malformed(const std::string& service) {
+ServiceError malformed_reply(const std::string& service) {
   return ServiceError("the answer of " + service +
                       " cannot be understood; client and server must have the same version");
 }
 
 Client::Connection::Connection(const ClientOptions& client_options)
     : options(client_options),
-      topics(Topics::in(options.server_name)),
-      names(Services::in(options.server_name)),
+      topics(dds::Topics::in(options.server_name)),
+      names(dds::Services::in(options.server_name)),
       participant(options.dds),
       get_static_map(participant, names.get_static_map),
       get_tile_versions(participant, names.get_tile_versions),
@@ -58,30 +58,32 @@ Client::Connection::Connection(const ClientOptions& client_options)
 
 TileSet Client::Connection::fetch_tiles(std::span<const TileId> ids) {
   TileSet set;
-  auto wanted = to_wire(ids);
-  while (!wanted.empty()) {
+  auto remaining = to_wire(ids);
+  while (!remaining.empty()) {
     GetTiles_Request request;
-    request.ids(wanted);
-    const auto reply = ask_ok(get_tiles, names.get_tiles, std::move(request));
-    if (reply.left_out().size() >= wanted.size()) throw malformed(names.get_tiles);
+    request.ids(remaining);
+    const auto reply = call_ok(get_tiles, names.get_tiles, std::move(request));
+    if (reply.left_out().size() >= remaining.size()) throw malformed_reply(names.get_tiles);
     set.map = wire::from_wire(reply.identity());
     add_tiles(reply, set);
-    wanted = reply.left_out();
+    remaining = reply.left_out();
   }
   return set;
 }
 
-ServiceTimeout Client::Connection::no_answer(const std::string& name,
-                                             std::chrono::milliseconds timeout, bool found) const {
+ServiceTimeout Client::Connection::timeout_error(const std::string& name,
+                                                 std::chrono::milliseconds timeout,
+                                                 bool found) const {
   std::string text = "no answer from service " + name + " in DDS domain " +
                      std::to_string(options.dds.domain_id) + " within " +
                      std::to_string(timeout.count()) + " ms: ";
   if (found) return ServiceTimeout(text + "a server is there but too busy, or it was just killed");
   // Where security keeps both apart, nothing else is to be looked for.
-  const auto findings = security_findings(participant.self(), participant.peers());
-  if (!findings.empty()) {
-    return ServiceTimeout(text + findings.front().what + ": " + findings.front().evidence + "; " +
-                          findings.front().way_out);
+  const auto diagnostics =
+      dds::security_diagnostics(participant.self(), participant.remote_participants());
+  if (!diagnostics.empty()) {
+    return ServiceTimeout(text + diagnostics.front().what + ": " + diagnostics.front().evidence +
+                          "; " + diagnostics.front().hint);
   }
   text +=
       "no server found ('stillmap doctor' looks for the reason). Check that stillmap-server runs, "

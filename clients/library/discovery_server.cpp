@@ -6,12 +6,12 @@ namespace stillmap {
 
 // A participant that serves discovery is all there is to it.
 struct DiscoveryServer::Registry {
-  explicit Registry(const DdsOptions& options) : participant(options) {}
+  explicit Registry(const dds::DdsOptions& options) : participant(options) {}
 
-  Participant participant;
+  dds::Participant participant;
 };
 
-DiscoveryServer::DiscoveryServer(const DdsOptions& options)
+DiscoveryServer::DiscoveryServer(const dds::DdsOptions& options)
     : registry_(std::make_unique<Registry>(options)) {}
 DiscoveryServer::~DiscoveryServer() = default;
 

@@ -10,7 +10,7 @@ namespace stillmap {
 class DiscoveryServer {
  public:
   /// Listens at `options.discovery_port`. Throws DdsError when the port is taken.
-  explicit DiscoveryServer(const DdsOptions& options);
+  explicit DiscoveryServer(const dds::DdsOptions& options);
   ~DiscoveryServer();
 
  private:

@@ -11,26 +11,28 @@ namespace stillmap {
 struct ScanPublisher::Connection {
   explicit Connection(const ScanPublisherOptions& publisher_options)
       : options(publisher_options),
-        own(std::make_unique<Participant>(options.dds)),
+        own(std::make_unique<dds::Participant>(options.dds)),
         topic(topic_of(options)),
         writer(*own, topic.dds_name, topic.writer) {}
 
-  Connection(Participant& shared, const ScanPublisherOptions& publisher_options)
+  Connection(dds::Participant& shared, const ScanPublisherOptions& publisher_options)
       : options(publisher_options),
         topic(topic_of(options)),
         writer(shared, topic.dds_name, topic.writer) {}
 
-  static TopicSpec<sensor_msgs::msg::PointCloud2> topic_of(const ScanPublisherOptions& options) {
-    return points_topic(options.points_topic,
-                        options.lossless ? DeliveryMode::every : DeliveryMode::latest,
-                        options.scans_under_way);
+  static dds::TopicSpec<sensor_msgs::msg::PointCloud2> topic_of(
+      const ScanPublisherOptions& options) {
+    return dds::points_topic(
+        options.points_topic,
+        options.lossless ? dds::DeliveryMode::every : dds::DeliveryMode::latest,
+        options.max_scans_in_flight);
   }
 
   ScanPublisherOptions options;
   bool has_written = false;
-  std::unique_ptr<Participant> own;
-  TopicSpec<sensor_msgs::msg::PointCloud2> topic;
-  Writer<sensor_msgs::msg::PointCloud2> writer;
+  std::unique_ptr<dds::Participant> own;
+  dds::TopicSpec<sensor_msgs::msg::PointCloud2> topic;
+  dds::Writer<sensor_msgs::msg::PointCloud2> writer;
 };
 
 ScanPublisher::ScanPublisher(const ScanPublisherOptions& options)
@@ -38,7 +40,7 @@ ScanPublisher::ScanPublisher(const ScanPublisherOptions& options)
 
 ScanPublisher::ScanPublisher(Client& client, const ScanPublisherOptions& options) {
   Client::Connection& shared = *client.connection_;
-  const bool shares = shared.options.dds.transport == NetworkTransport::tcp;
+  const bool shares = shared.options.dds.transport == dds::NetworkTransport::tcp;
   connection_ = shares ? std::make_unique<Connection>(shared.participant, options)
                        : std::make_unique<Connection>(options);
 }
@@ -48,12 +50,12 @@ ScanPublisher::ScanPublisher(ScanPublisher&&) noexcept = default;
 ScanPublisher& ScanPublisher::operator=(ScanPublisher&&) noexcept = default;
 
 bool ScanPublisher::wait_for_subscriber(std::chrono::milliseconds timeout) {
-  TcpPatience patience(connection_->options.dds, timeout);
-  while (!connection_->writer.readers().wait_for_any(patience.wait())) {
-    if (patience.is_over()) return false;
+  TcpRejoinBackoff backoff(connection_->options.dds, timeout);
+  while (!connection_->writer.readers().wait_for_any(backoff.next_wait())) {
+    if (backoff.timed_out()) return false;
     // A client's connection has been found to work, and what was written must not be lost.
-    const bool may_begin_anew = connection_->own && !connection_->has_written;
-    if (patience.is_due() && may_begin_anew) {
+    const bool may_rejoin = connection_->own && !connection_->has_written;
+    if (backoff.rejoin_due() && may_rejoin) {
       connection_ = std::make_unique<Connection>(connection_->options);
     }
   }

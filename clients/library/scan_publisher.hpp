@@ -15,7 +15,7 @@ namespace stillmap {
 class Client;
 
 struct ScanPublisherOptions {
-  DdsOptions dds;
+  dds::DdsOptions dds;
   /// ROS 2 name of the topic, without "rt/".
   std::string points_topic = "points";
   /// header.frame_id of the clouds.
@@ -24,7 +24,7 @@ struct ScanPublisherOptions {
   /// newer scan may overtake an untaken one.
   bool lossless = false;
   /// Scans that may be under way in lossless mode before publish() waits.
-  int scans_under_way = 4;
+  int max_scans_in_flight = 4;
 };
 
 /// Publishes scans as sensor_msgs/PointCloud2, as a lidar driver does. One thread uses it.

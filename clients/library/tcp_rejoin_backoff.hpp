@@ -10,36 +10,36 @@ namespace stillmap {
 /// A wait for somebody who may not be found: when to join the domain anew meanwhile. With Fast DDS
 /// 2.9, an answer over TCP that comes before its question is noted is lost, and with it the port
 /// that it opens, for good (TCPChannelResource::add_logical_port). Over UDP it is never time.
-class TcpPatience {
+class TcpRejoinBackoff {
  public:
   using Clock = std::chrono::steady_clock;
 
-  TcpPatience(const DdsOptions& options, std::chrono::milliseconds timeout)
-      : is_tcp_(options.transport == NetworkTransport::tcp),
+  TcpRejoinBackoff(const dds::DdsOptions& options, std::chrono::milliseconds timeout)
+      : is_tcp_(options.transport == dds::NetworkTransport::tcp),
         due_(Clock::now() + step_),
         deadline_(Clock::now() + timeout) {}
 
   /// How long to wait now.
-  [[nodiscard]] std::chrono::milliseconds wait() const {
-    const auto until = joins_again() ? std::min(due_, deadline_) : deadline_;
+  [[nodiscard]] std::chrono::milliseconds next_wait() const {
+    const auto until = may_rejoin() ? std::min(due_, deadline_) : deadline_;
     const auto left = std::chrono::ceil<std::chrono::milliseconds>(until - Clock::now());
     return std::max(left, std::chrono::milliseconds(0));
   }
 
   /// The timeout has passed.
-  [[nodiscard]] bool is_over() const { return Clock::now() >= deadline_; }
+  [[nodiscard]] bool timed_out() const { return Clock::now() >= deadline_; }
 
   /// True when it is time to join anew; the next time is then twice as far away. Never so late that
   /// the new try would be shorter than the last.
-  [[nodiscard]] bool is_due() {
-    if (!joins_again() || Clock::now() < due_) return false;
+  [[nodiscard]] bool rejoin_due() {
+    if (!may_rejoin() || Clock::now() < due_) return false;
     step_ *= 2;
     due_ = Clock::now() + step_;
     return true;
   }
 
  private:
-  [[nodiscard]] bool joins_again() const { return is_tcp_ && due_ + step_ <= deadline_; }
+  [[nodiscard]] bool may_rejoin() const { return is_tcp_ && due_ + step_ <= deadline_; }
 
   bool is_tcp_;
   std::chrono::milliseconds step_{4000};

@@ -4,32 +4,32 @@
 
 namespace stillmap {
 
-TileMirror::TileMirror() : view_(std::make_shared<const MapView>()) {}
+TileMirror::TileMirror() : snapshot_(std::make_shared<const MapSnapshot>()) {}
 
-void TileMirror::apply(const RegionNews& news) {
+void TileMirror::apply(const RegionUpdate& update) {
   {
     const std::lock_guard lock(mutex_);
-    if (news.map.map_id != view_->map_id) tiles_.clear();
-    for (const TileId id : news.removed) tiles_.erase(id);
-    for (const std::vector<Tile>* arrived : {&news.appeared, &news.changed}) {
+    if (update.map.map_id != snapshot_->map_id) tiles_.clear();
+    for (const TileId id : update.removed) tiles_.erase(id);
+    for (const std::vector<Tile>* arrived : {&update.appeared, &update.changed}) {
       for (const Tile& tile : *arrived) {
         std::shared_ptr<const Tile>& held = tiles_[tile.info.id];
         if (held && held->info.revision >= tile.info.revision) continue;
         held = std::make_shared<const Tile>(tile);
       }
     }
-    view_ = make_view(news.map);
+    snapshot_ = make_snapshot(update.map);
   }
   changed_.notify_all();
 }
 
-std::shared_ptr<const MapView> TileMirror::make_view(const MapIdentity& map) const {
-  auto view = std::make_shared<MapView>();
+std::shared_ptr<const MapSnapshot> TileMirror::make_snapshot(const dds::MapIdentity& map) const {
+  auto view = std::make_shared<MapSnapshot>();
   view->map_id = map.map_id;
   view->tile_size_m = map.tile_size_m;
   view->voxel_size_m = map.voxel_size_m;
   view->version = map.version;
-  // A tile that was fetched may be newer than what the news say.
+  // A tile that was fetched may be newer than what the update says.
   for (const auto& [id, tile] : tiles_) {
     view->version = std::max(view->version, tile->info.revision);
     view->tiles.push_back(tile);
@@ -37,22 +37,22 @@ std::shared_ptr<const MapView> TileMirror::make_view(const MapIdentity& map) con
   return view;
 }
 
-std::shared_ptr<const MapView> TileMirror::view() const {
+std::shared_ptr<const MapSnapshot> TileMirror::snapshot() const {
   const std::lock_guard lock(mutex_);
-  return view_;
+  return snapshot_;
 }
 
-std::shared_ptr<const MapView> TileMirror::wait_for_change(
-    const std::shared_ptr<const MapView>& known, std::chrono::milliseconds timeout) const {
+std::shared_ptr<const MapSnapshot> TileMirror::wait_for_change(
+    const std::shared_ptr<const MapSnapshot>& known, std::chrono::milliseconds timeout) const {
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, timeout, [&] { return view_ != known; });
-  return view_;
+  changed_.wait_for(lock, timeout, [&] { return snapshot_ != known; });
+  return snapshot_;
 }
 
 bool TileMirror::holds(const TileVersions& versions) const {
   const std::lock_guard lock(mutex_);
   if (versions.tiles.empty()) return true;
-  return versions.map.map_id == view_->map_id &&
+  return versions.map.map_id == snapshot_->map_id &&
          std::ranges::all_of(versions.tiles, [&](const TileInfo& info) {
            const auto held = tiles_.find(info.id);
            return held != tiles_.end() && held->second->info.revision >= info.revision;
@@ -62,19 +62,19 @@ bool TileMirror::holds(const TileVersions& versions) const {
 void wait_for_whole_map(Client& client, const TileMirror& mirror,
                         std::chrono::milliseconds timeout) {
   // Asked for again now and then: tiles of an older answer may be gone by now.
-  constexpr std::chrono::milliseconds patience(1000);
+  constexpr std::chrono::milliseconds recheck_period(1000);
   const auto deadline = std::chrono::steady_clock::now() + timeout;
   while (std::chrono::steady_clock::now() < deadline) {
     const TileVersions versions = client.get_tile_versions();
-    const auto until = std::chrono::steady_clock::now() + patience;
+    const auto until = std::chrono::steady_clock::now() + recheck_period;
     while (std::chrono::steady_clock::now() < until) {
-      const auto seen = mirror.view();
+      const auto seen = mirror.snapshot();
       if (mirror.holds(versions)) return;
       (void)mirror.wait_for_change(seen, std::chrono::milliseconds(50));
     }
   }
   throw ServiceTimeout(
-      "the server's map did not arrive: " + std::to_string(mirror.view()->tiles.size()) +
+      "the server's map did not arrive: " + std::to_string(mirror.snapshot()->tiles.size()) +
       " tiles of it within " + std::to_string(timeout.count()) +
       " ms; allow more with --timeout, or look at the network's load");
 }

@@ -11,33 +11,33 @@
 
 namespace stillmap {
 
-/// A client's own copy of a map, or of a region of it: news of a region subscription in, immutable
-/// views out. Safe to use from any thread.
+/// A client's own copy of a map, or of a region of it: updates of a region subscription in,
+/// immutable views out. Safe to use from any thread.
 class TileMirror {
  public:
   TileMirror();
 
-  /// Takes the news over. Another map replaces what there was; a tile that is older than the one
+  /// Applies the update. Another map replaces what there was; a tile that is older than the one
   /// held is left out.
-  void apply(const RegionNews& news);
+  void apply(const RegionUpdate& update);
 
   /// The tiles as they are now; never null.
-  [[nodiscard]] std::shared_ptr<const MapView> view() const;
+  [[nodiscard]] std::shared_ptr<const MapSnapshot> snapshot() const;
 
   /// Waits until the mirror holds another view than `known`, at most `timeout`; returns the view.
-  [[nodiscard]] std::shared_ptr<const MapView> wait_for_change(
-      const std::shared_ptr<const MapView>& known, std::chrono::milliseconds timeout) const;
+  [[nodiscard]] std::shared_ptr<const MapSnapshot> wait_for_change(
+      const std::shared_ptr<const MapSnapshot>& known, std::chrono::milliseconds timeout) const;
 
   /// Whether it holds all these tiles, as new or newer.
   [[nodiscard]] bool holds(const TileVersions& versions) const;
 
  private:
-  [[nodiscard]] std::shared_ptr<const MapView> make_view(const MapIdentity& map) const;
+  [[nodiscard]] std::shared_ptr<const MapSnapshot> make_snapshot(const dds::MapIdentity& map) const;
 
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
   std::map<TileId, std::shared_ptr<const Tile>> tiles_;
-  std::shared_ptr<const MapView> view_;
+  std::shared_ptr<const MapSnapshot> snapshot_;
 };
 
 /// Returns when the mirror holds all tiles that the server's map has. Throws ServiceTimeout saying

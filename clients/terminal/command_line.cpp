@@ -4,7 +4,7 @@
 #include <CLI/Config.hpp>
 #include <CLI/Formatter.hpp>
 
-namespace stillmap {
+namespace stillmap::cli {
 
 OptionHandle OptionHandle::required() {
   option_->required();
@@ -125,4 +125,4 @@ CommandLine::Parsed CommandLine::parse(int argc, char** argv) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -11,7 +11,7 @@ class App;
 class Option;
 }  // namespace CLI
 
-namespace stillmap {
+namespace stillmap::cli {
 
 // CLI11 is a large header: behind these handles it is compiled once instead of in every command.
 
@@ -94,4 +94,4 @@ class CommandLine {
   std::unique_ptr<CLI::App> app_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

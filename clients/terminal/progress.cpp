@@ -9,7 +9,7 @@
 
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 constexpr std::chrono::milliseconds bar_period{100};
@@ -81,4 +81,4 @@ void Progress::clear_bar() {
   bar_shown_ = false;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

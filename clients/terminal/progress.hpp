@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <string>
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// How far a long run is, on stderr: a bar that is drawn anew where stderr is a terminal, else a
 /// plain line every few seconds. One thread uses it.
@@ -37,4 +37,4 @@ class Progress {
   Clock::time_point drawn_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

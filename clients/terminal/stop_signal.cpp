@@ -8,7 +8,7 @@
 #include <cerrno>
 #include <system_error>
 
-namespace stillmap {
+namespace stillmap::cli {
 
 StopSignal::StopSignal() {
   sigset_t signals;
@@ -28,4 +28,4 @@ bool StopSignal::wait_for(std::chrono::milliseconds timeout) {
   return poll(&waiting, 1, static_cast<int>(timeout.count())) > 0;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// Turns SIGINT and SIGTERM into something to ask for, so that a run can end in order and keep
 /// what it has. Make it before any thread starts: threads inherit the blocked signals.
@@ -22,4 +22,4 @@ class StopSignal {
   int signal_fd_ = -1;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

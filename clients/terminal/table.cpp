@@ -5,7 +5,7 @@
 #include <sstream>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::cli {
 
 std::string fixed(double value, int decimals) {
   std::ostringstream text;
@@ -38,4 +38,4 @@ std::string Table::text() const {
   return text.str();
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// A number with this many decimals.
 [[nodiscard]] std::string fixed(double value, int decimals);
@@ -22,4 +22,4 @@ class Table {
   std::vector<std::vector<std::string>> rows_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -26,8 +26,8 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
 }  // namespace
 
 std::string closest_name(std::string_view written, std::span<const std::string> known) {
-  constexpr std::size_t longest_name = 64;
-  if (written.size() > longest_name) return {};
+  constexpr std::size_t max_name_length = 64;
+  if (written.size() > max_name_length) return {};
   std::string closest;
   std::size_t best = written.size() / 3 + 2;
   for (const std::string& name : known) {

@@ -17,7 +17,7 @@ constexpr Range ports{0, 65535};
 constexpr std::uint16_t usual_discovery_port = 11811;
 
 void read_address(YamlSection& file, const std::string& field, const std::string& text,
-                  NetworkAddress& address) {
+                  dds::NetworkAddress& address) {
   if (const auto read = network_address_from(text)) {
     address = *read;
   } else {
@@ -25,13 +25,13 @@ void read_address(YamlSection& file, const std::string& field, const std::string
   }
 }
 
-void read_peers(YamlSection& file, std::vector<NetworkAddress>& peers) {
+void read_peers(YamlSection& file, std::vector<dds::NetworkAddress>& peers) {
   std::vector<std::string> texts;
   file.text_list("peers", texts);
   for (const std::string& text : texts) read_address(file, "peers", text, peers.emplace_back());
 }
 
-void read_discovery_server(YamlSection& file, NetworkAddress& server) {
+void read_discovery_server(YamlSection& file, dds::NetworkAddress& server) {
   std::string text;
   file.text("discovery_server", text);
   if (!text.empty()) read_address(file, "discovery_server", text, server);
@@ -54,50 +54,52 @@ void read_interfaces(YamlSection& file, std::vector<std::string>& interfaces) {
 }
 
 void check_together(YamlSection& file, const DdsProfile& profile) {
-  const DdsOptions& options = profile.options;
-  const bool tcp = options.transport == NetworkTransport::tcp;
+  const dds::DdsOptions& options = profile.options;
+  const bool tcp = options.transport == dds::NetworkTransport::tcp;
   if (tcp && profile.server_port == 0) {
     file.fault("server_port", "is missing; over TCP clients connect to it");
   }
   if (tcp && !options.discovery_server.host.empty()) {
     file.fault("discovery_server", "works over UDP only; over TCP clients name the server as peer");
   }
-  if (options.bulk_bytes_per_s > 0 && options.bulk_bytes_per_s / 20 < options.max_datagram_bytes) {
+  if (options.large_message_bytes_per_s > 0 &&
+      options.large_message_bytes_per_s / 20 < options.max_datagram_bytes) {
     file.fault("bulk_bytes_per_s", "must let 20 datagrams of max_datagram_bytes pass a second");
   }
 }
 
 void read_profile(YamlSection file, DdsProfile& profile) {
-  DdsOptions& options = profile.options;
-  file.choice<NetworkTransport>("transport", options.transport,
-                                {{"udp", NetworkTransport::udp}, {"tcp", NetworkTransport::tcp}});
-  file.whole("server_port", profile.server_port, ports);
-  file.flag("shared_memory", options.shared_memory);
-  file.flag("client_shared_memory", profile.client_shared_memory);
-  file.whole("shared_memory_mib", options.shared_memory_mib, {1, 1024});
-  file.flag("multicast", options.multicast);
+  dds::DdsOptions& options = profile.options;
+  file.choice<dds::NetworkTransport>(
+      "transport", options.transport,
+      {{"udp", dds::NetworkTransport::udp}, {"tcp", dds::NetworkTransport::tcp}});
+  file.integer("server_port", profile.server_port, ports);
+  file.boolean("shared_memory", options.shared_memory);
+  file.boolean("client_shared_memory", profile.client_shared_memory);
+  file.integer("shared_memory_mib", options.shared_memory_mib, {1, 1024});
+  file.boolean("multicast", options.multicast);
   read_interfaces(file, options.interfaces);
   read_peers(file, options.peers);
   read_discovery_server(file, options.discovery_server);
-  file.whole("socket_buffer_bytes", options.socket_buffer_bytes, {65536, 1U << 30U});
-  file.whole("max_datagram_bytes", options.max_datagram_bytes, {1000, 65500});
-  file.whole("heartbeat_ms", options.heartbeat_ms, {1, 10'000});
-  file.whole("repair_delay_ms", options.repair_delay_ms, {0, 1000});
-  file.whole("lease_s", options.lease_s, {3, 3600});
-  file.whole("bulk_bytes_per_s", options.bulk_bytes_per_s, {0, 2e9});
+  file.integer("socket_buffer_bytes", options.socket_buffer_bytes, {65536, 1U << 30U});
+  file.integer("max_datagram_bytes", options.max_datagram_bytes, {1000, 65500});
+  file.integer("heartbeat_ms", options.heartbeat_ms, {1, 10'000});
+  file.integer("repair_delay_ms", options.repair_delay_ms, {0, 1000});
+  file.integer("lease_s", options.lease_s, {3, 3600});
+  file.integer("bulk_bytes_per_s", options.large_message_bytes_per_s, {0, 2e9});
   check_together(file, profile);
 }
 
-NamedFilePlaces profile_places() {
+NamedFileSearchPaths profile_search_paths() {
   return {.kind = "DDS profile",
           .variable = "STILLMAP_DDS_PROFILES",
           .share = "dds",
           .sources = STILLMAP_DDS_PROFILE_SOURCES};
 }
 
-std::vector<NetworkAddress> addresses(const std::vector<std::string>& texts, const char* what,
-                                      std::vector<std::string>& faults) {
-  std::vector<NetworkAddress> addresses;
+std::vector<dds::NetworkAddress> addresses(const std::vector<std::string>& texts, const char* what,
+                                           std::vector<std::string>& faults) {
+  std::vector<dds::NetworkAddress> addresses;
   for (const std::string& text : texts) {
     if (const auto address = network_address_from(text)) {
       addresses.push_back(*address);
@@ -108,20 +110,20 @@ std::vector<NetworkAddress> addresses(const std::vector<std::string>& texts, con
   return addresses;
 }
 
-void apply(const DdsChoice& choice, DdsOptions& options) {
+void apply(const DdsNetworkConfig& network, dds::DdsOptions& options) {
   std::vector<std::string> faults;
-  for (const std::string& fault : interface_faults(choice.interfaces)) {
+  for (const std::string& fault : interface_faults(network.interfaces)) {
     faults.push_back("interfaces: " + fault);
   }
-  if (choice.shared_memory) options.shared_memory = *choice.shared_memory;
-  if (!choice.interfaces.empty()) options.interfaces = choice.interfaces;
-  if (choice.socket_buffer_bytes > 0) options.socket_buffer_bytes = choice.socket_buffer_bytes;
-  if (!choice.peers.empty()) options.peers = addresses(choice.peers, "peer", faults);
-  if (!choice.discovery_server.empty()) {
-    const auto servers = addresses({choice.discovery_server}, "discovery server", faults);
+  if (network.shared_memory) options.shared_memory = *network.shared_memory;
+  if (!network.interfaces.empty()) options.interfaces = network.interfaces;
+  if (network.socket_buffer_bytes > 0) options.socket_buffer_bytes = network.socket_buffer_bytes;
+  if (!network.peers.empty()) options.peers = addresses(network.peers, "peer", faults);
+  if (!network.discovery_server.empty()) {
+    const auto servers = addresses({network.discovery_server}, "discovery server", faults);
     if (!servers.empty()) options.discovery_server = servers.front();
-    if (options.transport == NetworkTransport::tcp) {
-      faults.push_back("DDS profile '" + choice.profile +
+    if (options.transport == dds::NetworkTransport::tcp) {
+      faults.push_back("DDS profile '" + network.profile +
                        "' goes over TCP, where no discovery server works: give the server as peer");
     }
   }
@@ -130,9 +132,9 @@ void apply(const DdsChoice& choice, DdsOptions& options) {
 
 }  // namespace
 
-std::optional<NetworkAddress> network_address_from(const std::string& text) {
+std::optional<dds::NetworkAddress> network_address_from(const std::string& text) {
   const auto colon = text.rfind(':');
-  NetworkAddress address{.host = text.substr(0, colon), .port = 0};
+  dds::NetworkAddress address{.host = text.substr(0, colon), .port = 0};
   const bool is_host =
       !address.host.empty() && address.host.find_first_of(": \t/") == std::string::npos;
   if (!is_host) return std::nullopt;
@@ -152,18 +154,18 @@ DdsProfile read_dds_profile(const fs::path& file) {
 }
 
 DdsProfile load_dds_profile(const std::string& name_or_file) {
-  return read_dds_profile(find_named_file(profile_places(), name_or_file));
+  return read_dds_profile(find_named_file(profile_search_paths(), name_or_file));
 }
 
-std::vector<std::string> known_dds_profiles() { return known_names(profile_places()); }
+std::vector<std::string> known_dds_profiles() { return known_names(profile_search_paths()); }
 
-DdsOptions dds_options(const DdsChoice& choice, DdsRole role) {
-  const DdsProfile profile = load_dds_profile(choice.profile);
-  DdsOptions options = profile.options;
+dds::DdsOptions dds_options(const DdsNetworkConfig& network, DdsRole role) {
+  const DdsProfile profile = load_dds_profile(network.profile);
+  dds::DdsOptions options = profile.options;
   if (role == DdsRole::client && !profile.client_shared_memory) options.shared_memory = false;
-  apply(choice, options);
+  apply(network, options);
   if (role == DdsRole::server) options.listening_port = profile.server_port;
-  for (NetworkAddress& peer : options.peers) {
+  for (dds::NetworkAddress& peer : options.peers) {
     if (peer.port == 0) peer.port = profile.server_port;
   }
   if (options.discovery_server.port == 0) options.discovery_server.port = usual_discovery_port;

@@ -13,7 +13,7 @@ namespace stillmap {
 /// Settings of DDS for one kind of network, as the files in config/dds describe it.
 struct DdsProfile {
   /// What holds for every process. The defaults are those of `lan`.
-  DdsOptions options;
+  dds::DdsOptions options;
   /// Port of stillmap-server: it listens there, and peers without a port are looked for there. 0:
   /// the ports that DDS counts from domain and process.
   std::uint16_t server_port = 0;
@@ -33,10 +33,10 @@ struct DdsProfile {
 [[nodiscard]] std::vector<std::string> known_dds_profiles();
 
 /// "HOST" or "HOST:PORT"; nothing when it is neither.
-[[nodiscard]] std::optional<NetworkAddress> network_address_from(const std::string& text);
+[[nodiscard]] std::optional<dds::NetworkAddress> network_address_from(const std::string& text);
 
 /// What one deployment says: a profile, and what differs from it there.
-struct DdsChoice {
+struct DdsNetworkConfig {
   /// As load_dds_profile takes it.
   std::string profile = "lan";
   /// What is not given stays as the profile has it.
@@ -53,6 +53,6 @@ struct DdsChoice {
 enum class DdsRole { server, sensor, client };
 
 /// The options that a deployment chooses. Throws ConfigError with every fault.
-[[nodiscard]] DdsOptions dds_options(const DdsChoice& choice, DdsRole role);
+[[nodiscard]] dds::DdsOptions dds_options(const DdsNetworkConfig& network, DdsRole role);
 
 }  // namespace stillmap

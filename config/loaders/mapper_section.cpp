@@ -34,7 +34,7 @@ void read_prepare(YamlSection section, PrepareConfig& prepare) {
   section.number("min_range_m", prepare.min_range_m, {0, 1000});
   section.number("max_range_m", prepare.max_range_m, {0.1, 10000});
   read_box(section, "ego_hull_lidar_m", prepare.ego_hull_lidar);
-  section.flag("compensate_motion", prepare.compensate_motion);
+  section.boolean("compensate_motion", prepare.deskew);
   if (!(prepare.min_range_m < prepare.max_range_m)) {
     section.fault("max_range_m", "must be above min_range_m");
   }
@@ -43,7 +43,7 @@ void read_prepare(YamlSection section, PrepareConfig& prepare) {
 void read_features(YamlSection section, FeatureConfig& features) {
   section.number("edge_curvature_m2", features.edge_curvature_m2, {0, 1000});
   section.number("plane_curvature_m2", features.plane_curvature_m2, {0, 1000});
-  section.whole("edges_per_sector", features.edges_per_sector, {1, 1000});
+  section.integer("edges_per_sector", features.edges_per_sector, {1, 1000});
   section.number("edge_spacing_m", features.edge_spacing_m, lengths_m);
   section.number("map_plane_spacing_m", features.map_plane_spacing_m, lengths_m);
   section.number("plane_spacing_m", features.plane_spacing_m, lengths_m);
@@ -51,28 +51,28 @@ void read_features(YamlSection section, FeatureConfig& features) {
 
 void read_local_map(YamlSection section, LocalMapConfig& local_map) {
   section.number("voxel_size_m", local_map.voxel_size_m, lengths_m);
-  section.whole("max_points_per_voxel", local_map.max_points_per_voxel, {1, 10000});
+  section.integer("max_points_per_voxel", local_map.max_points_per_voxel, {1, 10000});
   section.number("min_spacing_m", local_map.min_spacing_m, {0, 100});
   section.number("radius_m", local_map.radius_m, {1, 10000});
 }
 
 void read_registration(YamlSection section, RegistrationConfig& registration) {
-  section.whole("neighbours", registration.neighbours, {3, 100});
+  section.integer("neighbours", registration.neighbours, {3, 100});
   section.number("max_neighbour_distance_m", registration.max_neighbour_distance_m, lengths_m);
   section.number("max_residual_m", registration.max_residual_m, lengths_m);
-  section.whole("max_iterations", registration.max_iterations, {1, 1000});
+  section.integer("max_iterations", registration.max_iterations, {1, 1000});
   section.number("step_translation_m", registration.step_translation_m, {1e-9, 1});
   section.number("step_rotation_rad", registration.step_rotation_rad, {1e-9, 1});
   section.number("robust_scale_m", registration.robust_scale_m, {0, 100});
-  section.whole("min_correspondences", registration.min_correspondences, {6, 100000});
+  section.integer("min_correspondences", registration.min_correspondences, {6, 100000});
   section.number("min_observability", registration.min_observability, shares);
 }
 
 void read_motion(YamlSection section, MotionConfig& motion) {
   section.number("inconsistency_threshold", motion.inconsistency_threshold, shares);
-  section.flag("use_past_views", motion.use_past_views);
-  section.whole("past_views", motion.past_views, {1, 100});
-  section.whole("past_view_interval", motion.past_view_interval, {1, 1000});
+  section.boolean("use_past_views", motion.use_range_image_history);
+  section.integer("past_views", motion.range_image_history_size, {1, 100});
+  section.integer("past_view_interval", motion.range_image_history_interval, {1, 1000});
   section.number("free_margin_m", motion.free_margin_m, {0, 100});
   section.number("free_margin_share", motion.free_margin_share, shares);
   section.number("moving_share", motion.moving_share, shares);
@@ -96,13 +96,13 @@ void read_static_map(YamlSection section, StaticMapConfig& static_map) {
   section.number("voxel_size_m", static_map.voxel_size_m, {0.01, 10});
   section.number("tile_size_m", static_map.tile_size_m, {0.1, 1000});
   section.number("max_range_m", static_map.max_range_m, {1, 10000});
-  section.whole("min_points", static_map.min_points, {1, 1000000});
-  section.whole("look_every", static_map.look_every, {1, 1000});
-  section.whole("passes", static_map.passes, {1, 1000});
-  section.whole("passes_per_hit", static_map.passes_per_hit, {1, 1000});
-  section.number("clear_range_m", static_map.clear_range_m, {0, 1000});
-  section.number("clear_margin_m", static_map.clear_margin_m, {0.01, 100});
-  section.number("clear_margin_share", static_map.clear_margin_share, {0, 1});
+  section.integer("min_points", static_map.min_points, {1, 1000000});
+  section.integer("look_every", static_map.clearing_interval, {1, 1000});
+  section.integer("passes", static_map.misses_to_clear, {1, 1000});
+  section.integer("passes_per_hit", static_map.misses_per_hit, {1, 1000});
+  section.number("clear_range_m", static_map.clearing_range_m, {0, 1000});
+  section.number("clear_margin_m", static_map.clearing_margin_m, {0.01, 100});
+  section.number("clear_margin_share", static_map.clearing_margin_share, {0, 1});
   section.faults(static_map.faults());
 }
 

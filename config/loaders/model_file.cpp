@@ -8,9 +8,9 @@
 #include "config/loaders/int8_file.hpp"
 #include "config/loaders/model_folder.hpp"
 #include "config/loaders/yaml_section.hpp"
+#include "core/segmentation/fallback_segmenter.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/network_segmenter.hpp"
-#include "core/segmentation/fallback_segmenter.hpp"
 #include "core/segmentation/passthrough_segmenter.hpp"
 
 namespace stillmap {
@@ -20,13 +20,13 @@ namespace fs = std::filesystem;
 
 void read_image(YamlSection section, ModelDescription& model) {
   section.require({"rows", "columns", "fov_up_deg", "fov_down_deg"});
-  section.whole("rows", model.rows, {1, 512});
-  section.whole("columns", model.columns, {1, most_image_columns});
-  section.whole("least_columns", model.least_columns, {0, static_cast<double>(model.columns)});
+  section.integer("rows", model.rows, {1, 512});
+  section.integer("columns", model.columns, {1, max_image_columns});
+  section.integer("least_columns", model.min_columns, {0, static_cast<double>(model.columns)});
   section.degrees("fov_up_deg", model.fov_up, {-90, 90});
   section.degrees("fov_down_deg", model.fov_down, {-90, 90});
-  section.flag("follow_sensor", model.follow_sensor);
-  section.flag("mask_first_point", model.mask_first_point);
+  section.boolean("follow_sensor", model.follow_sensor);
+  section.boolean("mask_first_point", model.mask_first_point);
 }
 
 void read_channel(YamlSection section, InputStatistics& statistics, std::size_t channel) {
@@ -66,12 +66,12 @@ void read_classes(YamlSection section, std::vector<SemanticClass>& classes) {
 void read_knn(YamlSection section, std::optional<KnnConfig>& knn) {
   bool use = true;
   KnnConfig read;
-  section.flag("use", use);
-  section.whole("neighbours", read.neighbours, {1, KnnConfig::max_neighbours});
-  section.whole("window", read.window, {1, KnnConfig::max_window});
+  section.boolean("use", use);
+  section.integer("neighbours", read.neighbours, {1, KnnConfig::max_neighbours});
+  section.integer("window", read.window, {1, KnnConfig::max_window});
   section.number("sigma", read.sigma, {1e-3, 1e3});
   section.number("cutoff_m", read.cutoff_m, {1e-3, 1e3});
-  section.flag("car_without_votes", read.car_without_votes);
+  section.boolean("car_without_votes", read.car_without_votes);
   section.faults(read.faults());
   if (use) knn = read;
 }
@@ -90,12 +90,12 @@ void read_model(YamlSection file, ModelDescription& model) {
   if (model.fov_up <= model.fov_down) file.fault("image", "fov_down_deg must be below fov_up_deg");
 }
 
-std::unique_ptr<LabelSource> open_network_labels(const LabelsConfig& labels,
-                                                 const SensorModel& sensor, bool may_narrow) {
+std::unique_ptr<Segmenter> open_network_labels(const LabelsConfig& labels,
+                                               const SensorModel& sensor, bool adaptive_width) {
   ModelDescription model = for_sensor(load_model_description(find_model(labels.model)), sensor);
   if (labels.image_columns == 0) {
-    return may_narrow ? open_model_of_many_widths(model, labels.engine)
-                      : open_model(model, labels.engine);
+    return adaptive_width ? open_multi_resolution_model(model, labels.engine)
+                          : open_model(model, labels.engine);
   }
   model.columns = labels.image_columns;
   try {
@@ -127,19 +127,20 @@ ModelDescription load_model_description(const fs::path& folder) {
   return model;
 }
 
-std::unique_ptr<LabelSource> open_label_source(const LabelsConfig& labels,
-                                               const SensorModel& sensor, bool may_narrow) {
+std::unique_ptr<Segmenter> open_segmenter(const LabelsConfig& labels, const SensorModel& sensor,
+                                          bool adaptive_width) {
   switch (labels.source) {
-    case LabelOrigin::automatic:
-      return std::make_unique<StreamFirstLabels>(open_network_labels(labels, sensor, may_narrow));
-    case LabelOrigin::model:
-      return open_network_labels(labels, sensor, may_narrow);
-    case LabelOrigin::stream:
-      return std::make_unique<StreamLabels>();
-    case LabelOrigin::none:
+    case LabelProvider::automatic:
+      return std::make_unique<FallbackSegmenter>(
+          open_network_labels(labels, sensor, adaptive_width));
+    case LabelProvider::model:
+      return open_network_labels(labels, sensor, adaptive_width);
+    case LabelProvider::stream:
+      return std::make_unique<PassthroughSegmenter>();
+    case LabelProvider::none:
       break;
   }
-  return std::make_unique<NoLabels>();
+  return std::make_unique<NullSegmenter>();
 }
 
 }  // namespace stillmap

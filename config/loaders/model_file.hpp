@@ -5,8 +5,8 @@
 
 #include "config/loaders/config_error.hpp"
 #include "config/loaders/server_config.hpp"
-#include "core/segmentation/segmenter.hpp"
 #include "core/segmentation/model_description.hpp"
+#include "core/segmentation/segmenter.hpp"
 
 namespace stillmap {
 
@@ -16,11 +16,11 @@ namespace stillmap {
 /// The same with its calibration, where there is an int8.yaml.
 [[nodiscard]] ModelDescription load_model_description(const std::filesystem::path& folder);
 
-/// The label source that the configuration asks for, for scans of this sensor. `may_narrow`: able
-/// to look more coarsely, where the model can and the configuration does not say how finely. Throws
-/// ConfigError or ModelError.
-[[nodiscard]] std::unique_ptr<LabelSource> open_label_source(const LabelsConfig& labels,
-                                                             const SensorModel& sensor,
-                                                             bool may_narrow = false);
+/// The label source that the configuration asks for, for scans of this sensor. `adaptive_width`:
+/// able to look more coarsely, where the model can and the configuration does not say how finely.
+/// Throws ConfigError or ModelError.
+[[nodiscard]] std::unique_ptr<Segmenter> open_segmenter(const LabelsConfig& labels,
+                                                        const SensorModel& sensor,
+                                                        bool adaptive_width = false);
 
 }  // namespace stillmap

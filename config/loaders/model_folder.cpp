@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<fs::path> model_places() {
+std::vector<fs::path> model_search_paths() {
   std::vector<fs::path> places;
   if (const char* folder = std::getenv("STILLMAP_MODELS")) places.emplace_back(folder);
   std::error_code none;
@@ -28,7 +28,7 @@ std::vector<fs::path> model_places() {
 fs::path find_model(const fs::path& model) {
   if (model.has_parent_path() || fs::is_directory(model)) return model;
   std::string tried;
-  for (const fs::path& place : model_places()) {
+  for (const fs::path& place : model_search_paths()) {
     if (fs::exists(place / model / "model.yaml")) return place / model;
     tried.append("\n  ").append(place.string());
   }

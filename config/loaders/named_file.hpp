@@ -7,7 +7,7 @@
 namespace stillmap {
 
 /// Where the YAML files of one kind that come with Stillmap are looked for, in this order.
-struct NamedFilePlaces {
+struct NamedFileSearchPaths {
   /// Of one file, in messages: "robot".
   std::string kind;
   /// The environment variable that may name a folder.
@@ -22,10 +22,10 @@ struct NamedFilePlaces {
 [[nodiscard]] bool is_file_name(const std::string& name_or_file);
 
 /// The file that the text means. Throws ConfigError with the names that there are.
-[[nodiscard]] std::filesystem::path find_named_file(const NamedFilePlaces& places,
+[[nodiscard]] std::filesystem::path find_named_file(const NamedFileSearchPaths& search_paths,
                                                     const std::string& name_or_file);
 
 /// Names that are found without a folder, sorted.
-[[nodiscard]] std::vector<std::string> known_names(const NamedFilePlaces& places);
+[[nodiscard]] std::vector<std::string> known_names(const NamedFileSearchPaths& search_paths);
 
 }  // namespace stillmap

@@ -63,7 +63,7 @@ void read_profile(YamlSection file, RobotProfile& profile) {
   file.faults(profile.faults());
 }
 
-NamedFilePlaces robot_places() {
+NamedFileSearchPaths robot_search_paths() {
   return {.kind = "robot",
           .variable = "STILLMAP_ROBOTS",
           .share = "robots",
@@ -80,14 +80,14 @@ RobotProfile read_robot_profile(const fs::path& file) {
   return profile;
 }
 
-std::vector<std::string> known_robots() { return known_names(robot_places()); }
+std::vector<std::string> known_robots() { return known_names(robot_search_paths()); }
 
 std::string robot_from(const fs::path& folder, const std::string& name_or_file) {
   return is_file_name(name_or_file) ? (folder / name_or_file).string() : name_or_file;
 }
 
 RobotProfile load_robot_profile(const std::string& name_or_file) {
-  return read_robot_profile(find_named_file(robot_places(), name_or_file));
+  return read_robot_profile(find_named_file(robot_search_paths(), name_or_file));
 }
 
 }  // namespace stillmap

@@ -46,11 +46,11 @@ std::string ring_source_name(RingSource wanted) {
 void read_sensor(YamlSection& file, SensorModel& sensor) {
   file.require({"name", "rings", "fov_up_deg", "fov_down_deg"});
   file.text("name", sensor.name);
-  file.whole("rings", sensor.rings, {1, 1024});
+  file.integer("rings", sensor.rings, {1, 1024});
   file.degrees("fov_up_deg", sensor.fov_up, {-90, 90});
   file.degrees("fov_down_deg", sensor.fov_down, {-90, 90});
   file.degrees_list("beam_elevations_deg", sensor.beam_elevations, {-90, 90});
-  file.whole("columns", sensor.columns, {16, 65536});
+  file.integer("columns", sensor.columns, {16, 65536});
   file.number("min_range_m", sensor.min_range_m, {0, 1000});
   file.number("max_range_m", sensor.max_range_m, {0.1, 10000});
   file.number("period_s", sensor.period_s, {0.001, 60});

@@ -40,29 +40,30 @@ void read_model_name(YamlSection& section, fs::path& model) {
 }
 
 void read_labels(YamlSection section, LabelsConfig& labels) {
-  section.choice<LabelOrigin>("source", labels.source,
-                              {{"auto", LabelOrigin::automatic},
-                               {"stream", LabelOrigin::stream},
-                               {"model", LabelOrigin::model},
-                               {"none", LabelOrigin::none}});
+  section.choice<LabelProvider>("source", labels.source,
+                                {{"auto", LabelProvider::automatic},
+                                 {"stream", LabelProvider::stream},
+                                 {"model", LabelProvider::model},
+                                 {"none", LabelProvider::none}});
   read_model_name(section, labels.model);
-  section.whole("image_columns", labels.image_columns, {0, most_image_columns});
-  if (labels.image_columns > 0 && labels.image_columns < least_image_columns) {
+  section.integer("image_columns", labels.image_columns, {0, max_image_columns});
+  if (labels.image_columns > 0 && labels.image_columns < min_image_columns) {
     section.fault("image_columns", "is " + std::to_string(labels.image_columns) +
                                        ", but must be 0 (as the model says) or " +
-                                       std::to_string(least_image_columns) + ".." +
-                                       std::to_string(most_image_columns));
+                                       std::to_string(min_image_columns) + ".." +
+                                       std::to_string(max_image_columns));
   }
-  using Engine = EngineChoice::Engine;
+  using Engine = EngineOptions::Engine;
   section.choice<Engine>(
       "engine", labels.engine.engine,
       {{"auto", Engine::automatic}, {"onednn", Engine::onednn}, {"opencv", Engine::opencv}});
-  using Numbers = EngineChoice::Numbers;
-  section.choice<Numbers>(
-      "precision", labels.engine.precision,
-      {{"auto", Numbers::automatic}, {"fp32", Numbers::fp32}, {"int8", Numbers::int8}});
-  section.whole("threads", labels.engine.threads, {0, 1024});
-  section.whole("budget_ms", labels.budget_ms, {0, 60'000});
+  using PrecisionMode = EngineOptions::PrecisionMode;
+  section.choice<PrecisionMode>("precision", labels.engine.precision,
+                                {{"auto", PrecisionMode::automatic},
+                                 {"fp32", PrecisionMode::fp32},
+                                 {"int8", PrecisionMode::int8}});
+  section.integer("threads", labels.engine.threads, {0, 1024});
+  section.integer("budget_ms", labels.budget_ms, {0, 60'000});
 }
 
 void read_frames(YamlSection section, FramesConfig& frames) {
@@ -71,7 +72,7 @@ void read_frames(YamlSection section, FramesConfig& frames) {
   if (frames.map.empty()) section.fault("map", "is empty; a frame needs a name");
 }
 
-void read_network(YamlSection& section, const fs::path& folder, DdsChoice& network) {
+void read_network(YamlSection& section, const fs::path& folder, DdsNetworkConfig& network) {
   section.text("profile", network.profile);
   if (is_file_name(network.profile)) network.profile = (folder / network.profile).string();
   section.choice<std::optional<bool>>(
@@ -80,7 +81,7 @@ void read_network(YamlSection& section, const fs::path& folder, DdsChoice& netwo
   section.text_list("interfaces", network.interfaces);
   section.text_list("peers", network.peers);
   section.text("discovery_server", network.discovery_server);
-  section.whole("socket_buffer_bytes", network.socket_buffer_bytes, {0, 1U << 30U});
+  section.integer("socket_buffer_bytes", network.socket_buffer_bytes, {0, 1U << 30U});
   try {
     static_cast<void>(dds_options(network, DdsRole::server));
   } catch (const ConfigError& error) {
@@ -89,11 +90,11 @@ void read_network(YamlSection& section, const fs::path& folder, DdsChoice& netwo
 }
 
 void read_dds(YamlSection section, const fs::path& folder, DdsConfig& dds) {
-  section.whole("domain_id", dds.domain_id, {0, 232});
+  section.integer("domain_id", dds.domain_id, {0, 232});
   read_network(section, folder, dds.network);
   section.text("participant_name", dds.participant_name);
   section.path("security", dds.security);
-  section.whole("ros_gid_bytes", dds.ros_gid_bytes, {16, 24});
+  section.integer("ros_gid_bytes", dds.ros_gid_bytes, {16, 24});
   if (dds.ros_gid_bytes != 16 && dds.ros_gid_bytes != 24) {
     section.fault("ros_gid_bytes", "must be 24 (ROS 2 up to Humble) or 16 (from Iron)");
   }
@@ -130,7 +131,7 @@ void read_fields(YamlSection section, PointFieldNames& fields) {
 void read_input(YamlSection section, InputConfig& input) {
   section.choice<Delivery>("delivery", input.delivery,
                            {{"latest", Delivery::latest}, {"every", Delivery::every}});
-  section.whole("queue_length", input.queue_length, {1, 1000});
+  section.integer("queue_length", input.queue_length, {1, 1000});
   read_fields(section.section("fields"), input.fields);
   section.choice<LabelKind>(
       "label_kind", input.label_kind,
@@ -139,19 +140,19 @@ void read_input(YamlSection section, InputConfig& input) {
 
 void read_publish(YamlSection section, PublishConfig& publish) {
   section.number("path_period_s", publish.path_period_s, periods_s);
-  section.whole("path_poses", publish.path_poses, {2, 1000000});
+  section.integer("path_poses", publish.path_poses, {2, 1000000});
   section.number("cloud_period_s", publish.cloud_period_s, periods_s);
   section.number("cloud_window_m", publish.cloud_window_m, {1, 1000});
   section.number("tiles_period_s", publish.tiles_period_s, periods_s);
   section.number("status_period_s", publish.status_period_s, periods_s);
-  section.flag("scan", publish.scan);
+  section.boolean("scan", publish.scan);
 }
 
 void read_map(YamlSection section, MapFileConfig& map) {
   section.path("file", map.file);
   section.number("save_period_s", map.save_period_s, {0.1, 86400});
-  section.whole("memory_limit_mib", map.memory_limit_mib, {0, 1 << 20});
-  section.flag("load_at_start", map.load_at_start);
+  section.integer("memory_limit_mib", map.memory_limit_mib, {0, 1 << 20});
+  section.boolean("load_at_start", map.load_at_start);
   section.text("datum", map.datum);
   if (map.datum.empty()) return;
   try {
@@ -161,33 +162,34 @@ void read_map(YamlSection section, MapFileConfig& map) {
   }
 }
 
-void read_occupancy(YamlSection section, OccupancyServing& occupancy) {
+void read_occupancy(YamlSection section, OccupancyServiceConfig& occupancy) {
   OccupancyConfig& map = occupancy.map;
-  section.flag("enabled", occupancy.enabled);
+  section.boolean("enabled", occupancy.enabled);
   section.number("resolution_m", map.resolution_m, {0.02, 10});
   section.number("max_range_m", map.max_range_m, {1, 300});
   section.number("clear_range_m", map.clear_range_m, {0, 300});
-  section.whole("clear_every", map.clear_every, {1, 1000});
+  section.integer("clear_every", map.clearing_interval, {1, 1000});
   section.number("clear_margin_m", map.clear_margin_m, {0, 100});
   section.number("clear_margin_share", map.clear_margin_share, {0, 0.9});
   section.number("hit_probability", map.hit_probability, {0.501, 0.99});
   section.number("miss_probability", map.miss_probability, {0.01, 0.499});
-  section.whole("queue_length", occupancy.queue_length, {1, 1000});
+  section.integer("queue_length", occupancy.queue_length, {1, 1000});
   section.number("publish_period_s", occupancy.publish_period_s, periods_s);
 }
 
-void read_areas(YamlSection section, const fs::path& folder, AreasConfig& areas) {
-  section.text_list("profiles", areas.profiles);
-  section.number("update_period_s", areas.update_period_s, periods_s);
-  section.text("grid_profile", areas.grid_profile);
-  section.number("grid_window_m", areas.grid_window_m, {0, 100'000});
-  for (std::string& profile : areas.profiles) profile = robot_from(folder, profile);
+void read_traversability(YamlSection section, const fs::path& folder,
+                         TraversabilityConfig& config) {
+  section.text_list("profiles", config.profiles);
+  section.number("update_period_s", config.update_period_s, periods_s);
+  section.text("grid_profile", config.grid_profile);
+  section.number("grid_window_m", config.grid_window_m, {0, 100'000});
+  for (std::string& profile : config.profiles) profile = robot_from(folder, profile);
   try {
-    const std::vector<RobotProfile> robots = robots_of(areas);
-    if (areas.grid_profile.empty() || robots.empty()) return;
-    if (std::ranges::find(robots, areas.grid_profile, &RobotProfile::name) != robots.end()) return;
+    const std::vector<RobotProfile> robots = load_robots(config);
+    if (config.grid_profile.empty() || robots.empty()) return;
+    if (std::ranges::find(robots, config.grid_profile, &RobotProfile::name) != robots.end()) return;
     section.fault("grid_profile",
-                  "'" + areas.grid_profile + "' is not one of areas.profiles; empty: no grid");
+                  "'" + config.grid_profile + "' is not one of areas.profiles; empty: no grid");
   } catch (const ConfigError& error) {
     for (const std::string& fault : error.faults()) section.fault("profiles", fault);
   }
@@ -219,17 +221,17 @@ void read_server(YamlSection file, const fs::path& folder, ServerConfig& config)
   read_publish(file.section("publish"), config.publish);
   read_map(file.section("map"), config.map);
   read_occupancy(file.section("occupancy"), config.occupancy);
-  read_areas(file.section("areas"), folder, config.areas);
+  read_traversability(file.section("areas"), folder, config.traversability);
   read_log(file.section("log"), config.log);
   read_metrics(file.section("metrics"), config.metrics);
 }
 
 }  // namespace
 
-std::vector<RobotProfile> robots_of(const AreasConfig& areas) {
+std::vector<RobotProfile> load_robots(const TraversabilityConfig& config) {
   std::vector<RobotProfile> robots;
   std::vector<std::string> faults;
-  for (const std::string& profile : areas.profiles) {
+  for (const std::string& profile : config.profiles) {
     try {
       RobotProfile robot = load_robot_profile(profile);
       if (std::ranges::find(robots, robot.name, &RobotProfile::name) != robots.end()) {

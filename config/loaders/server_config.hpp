@@ -17,7 +17,7 @@
 namespace stillmap {
 
 /// Where the class of a point comes from.
-enum class LabelOrigin {
+enum class LabelProvider {
   /// The label field of the incoming cloud where it is there, else the network.
   automatic,
   /// The label field of the incoming cloud where it is there, else none.
@@ -29,13 +29,13 @@ enum class LabelOrigin {
 };
 
 struct LabelsConfig {
-  LabelOrigin source = LabelOrigin::automatic;
+  LabelProvider source = LabelProvider::automatic;
   /// Name of a model that comes with Stillmap, or folder of one; see find_model().
   std::filesystem::path model = "street";
   /// Columns of the range image that the network gets; 0: as the model says.
   int image_columns = 0;
   /// What runs the network.
-  EngineChoice engine;
+  EngineOptions engine;
   /// Longest wait of a scan for the network's labels; then it goes on with labels carried from the
   /// map and earlier scans. 0: as long as it takes, as with input delivery `every`.
   std::uint32_t budget_ms = 90;
@@ -52,7 +52,7 @@ struct DdsConfig {
   /// 0..232, as DDS defines it; ROS_DOMAIN_ID of the ROS 2 peers.
   std::uint32_t domain_id = 0;
   /// Transports, discovery and pacing, for the kind of network; what is set on top of it.
-  DdsChoice network;
+  DdsNetworkConfig network;
   std::string participant_name = "stillmap_server";
   /// Length of a GID in ros_discovery_info: 24 up to ROS 2 Humble, 16 from Iron.
   std::uint32_t ros_gid_bytes = 24;
@@ -129,7 +129,7 @@ struct MapFileConfig {
 };
 
 /// The octree of occupied, free and unknown space that is kept beside the static map.
-struct OccupancyServing {
+struct OccupancyServiceConfig {
   bool enabled = true;
   OccupancyConfig map;
   /// Scans that may wait for it; those too many are left out.
@@ -139,7 +139,7 @@ struct OccupancyServing {
 };
 
 /// Where robots can go, kept up to date with the map.
-struct AreasConfig {
+struct TraversabilityConfig {
   /// Robots by name or file, as load_robot_profile takes them; empty: no areas.
   std::vector<std::string> profiles = {"car", "delivery_robot"};
   /// Shortest time from update to update; nothing is done while the map stays as it is.
@@ -165,7 +165,7 @@ struct MetricsConfig {
 
 /// The robots that areas are kept for. Throws ConfigError with every fault: robots that do not
 /// exist (with those that do), or two of one name.
-[[nodiscard]] std::vector<RobotProfile> robots_of(const AreasConfig& areas);
+[[nodiscard]] std::vector<RobotProfile> load_robots(const TraversabilityConfig& config);
 
 /// Everything that stillmap-server can be told. Works as it is, with a 64-beam sensor and no file.
 struct ServerConfig {
@@ -177,8 +177,8 @@ struct ServerConfig {
   InputConfig input;
   PublishConfig publish;
   MapFileConfig map;
-  OccupancyServing occupancy;
-  AreasConfig areas;
+  OccupancyServiceConfig occupancy;
+  TraversabilityConfig traversability;
   LogConfig log;
   MetricsConfig metrics;
 };

@@ -101,7 +101,7 @@ std::optional<double> YamlSection::read_number(const std::string& name, Range al
   return value;
 }
 
-std::optional<std::int64_t> YamlSection::read_whole(const std::string& name, Range allowed) {
+std::optional<std::int64_t> YamlSection::read_integer(const std::string& name, Range allowed) {
   const std::optional<YAML::Node> node = field(name);
   if (!node) return std::nullopt;
   const std::optional<std::int64_t> value = parsed<std::int64_t>(*node);
@@ -168,7 +168,7 @@ void YamlSection::degrees_list(const std::string& name, std::vector<double>& rad
   radians = std::move(read);
 }
 
-void YamlSection::flag(const std::string& name, bool& value) {
+void YamlSection::boolean(const std::string& name, bool& value) {
   const auto index = read_choice(name, {"false", "true"});
   if (index) assign(name, value, *index == 1);
 }

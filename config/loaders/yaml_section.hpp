@@ -41,15 +41,15 @@ class YamlSection {
     if (const auto read = read_number(name, allowed)) assign(name, value, static_cast<T>(*read));
   }
   template <std::integral T>
-  void whole(const std::string& name, T& value, Range allowed) {
-    if (const auto read = read_whole(name, allowed)) assign(name, value, static_cast<T>(*read));
+  void integer(const std::string& name, T& value, Range allowed) {
+    if (const auto read = read_integer(name, allowed)) assign(name, value, static_cast<T>(*read));
   }
   void number_list(const std::string& name, std::vector<double>& values, Range allowed);
   /// The file has degrees, `radians` does not; `allowed_deg` is in degrees.
   void degrees(const std::string& name, double& radians, Range allowed_deg);
   void degrees_list(const std::string& name, std::vector<double>& radians, Range allowed_deg);
   /// true or false.
-  void flag(const std::string& name, bool& value);
+  void boolean(const std::string& name, bool& value);
   void text(const std::string& name, std::string& value);
   void text_list(const std::string& name, std::vector<std::string>& values);
   /// A relative path starts at the file's folder; nothing written is the empty path.
@@ -82,7 +82,7 @@ class YamlSection {
   std::optional<YAML::Node> field(const std::string& name);
   [[nodiscard]] std::string path_of(const std::string& name) const;
   [[nodiscard]] std::optional<double> read_number(const std::string& name, Range allowed);
-  [[nodiscard]] std::optional<std::int64_t> read_whole(const std::string& name, Range allowed);
+  [[nodiscard]] std::optional<std::int64_t> read_integer(const std::string& name, Range allowed);
   [[nodiscard]] std::optional<std::size_t> read_choice(const std::string& name,
                                                        const std::vector<std::string>& words);
   [[nodiscard]] std::optional<std::vector<YAML::Node>> read_list(const std::string& name,

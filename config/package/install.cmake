@@ -2,8 +2,8 @@
 # themselves. Components become Debian packages (deb.cmake).
 install(TARGETS stillmap-server RUNTIME DESTINATION bin COMPONENT server)
 install(TARGETS stillmap RUNTIME DESTINATION bin COMPONENT tools)
-install(TARGETS stillmap_part_pcd stillmap_part_geotiff
-  LIBRARY DESTINATION ${STILLMAP_PART_FOLDER} COMPONENT formats)
+install(TARGETS stillmap_plugin_pcd stillmap_plugin_geotiff
+  LIBRARY DESTINATION ${STILLMAP_PLUGIN_FOLDER} COMPONENT formats)
 
 foreach(folder models robots sensors labels server dds ros)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/config/${folder})

@@ -10,8 +10,8 @@ namespace {
 
 constexpr std::int64_t ns_per_s = 1'000'000'000;
 /// Whole seconds that fit into 64 bits of nanoseconds.
-constexpr std::size_t most_digits_of_seconds = 10;
-constexpr double most_seconds = 9.2e9;
+constexpr std::size_t max_digits_of_seconds = 10;
+constexpr double max_seconds = 9.2e9;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
@@ -31,7 +31,7 @@ std::optional<std::int64_t> from_floating_point(std::string_view text) {
   double seconds = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), seconds);
   if (error != std::errc{} || end != text.data() + text.size()) return std::nullopt;
-  if (!(std::abs(seconds) < most_seconds)) return std::nullopt;
+  if (!(std::abs(seconds) < max_seconds)) return std::nullopt;
   return std::llround(seconds * static_cast<double>(ns_per_s));
 }
 
@@ -43,11 +43,11 @@ std::optional<std::int64_t> ns_from_seconds(std::string_view text) {
   const std::size_t whole = digits_in_front(number);
   std::string_view decimals = number.substr(whole);
   if (decimals.starts_with('.')) decimals.remove_prefix(1);
-  if (whole == 0 || whole > most_digits_of_seconds || digits_in_front(decimals) < decimals.size()) {
+  if (whole == 0 || whole > max_digits_of_seconds || digits_in_front(decimals) < decimals.size()) {
     return from_floating_point(text);
   }
   const std::int64_t seconds = value_of(number.substr(0, whole));
-  if (static_cast<double>(seconds) >= most_seconds) return std::nullopt;
+  if (static_cast<double>(seconds) >= max_seconds) return std::nullopt;
   std::int64_t fraction_ns = 0;
   for (std::size_t i = 0; i < 9; ++i) {
     fraction_ns = 10 * fraction_ns + (i < decimals.size() ? decimals[i] - '0' : 0);

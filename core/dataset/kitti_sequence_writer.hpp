@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "core/lidar/scan.hpp"
-#include "core/odometry/trajectory.hpp"
+#include "core/lidar/trajectory.hpp"
 
 namespace stillmap {
 

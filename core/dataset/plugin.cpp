@@ -16,7 +16,7 @@ std::vector<fs::path> places_of(const std::string& library) {
   std::error_code none;
   const fs::path program = fs::read_symlink("/proc/self/exe", none);
   for (fs::path root = program.parent_path(); places.size() < 3; root = root.parent_path()) {
-    places.push_back(root.parent_path() / STILLMAP_PART_FOLDER / library);
+    places.push_back(root.parent_path() / STILLMAP_PLUGIN_FOLDER / library);
   }
   return places;
 }
@@ -31,17 +31,17 @@ void* open_library(const std::string& library) {
 
 }  // namespace
 
-void* part_address(const std::string& part, const std::string& function,
-                   const std::string& purpose) {
+void* plugin_symbol(const std::string& part, const std::string& function,
+                    const std::string& purpose) {
   const std::string name = "stillmap_" + part + ".so";
   // Loading again what is loaded only counts it; it is never given back.
   void* const library = open_library(name);
   void* const address = library == nullptr ? nullptr : dlsym(library, function.c_str());
   if (address != nullptr) return address;
   const char* const fault = dlerror();
-  throw MissingPart(purpose + " by " + name + ", which cannot be loaded (" +
-                    (fault == nullptr ? "reason unknown" : fault) +
-                    "); it comes in the package stillmap-formats");
+  throw MissingPlugin(purpose + " by " + name + ", which cannot be loaded (" +
+                      (fault == nullptr ? "reason unknown" : fault) +
+                      "); it comes in the package stillmap-formats");
 }
 
 }  // namespace stillmap

@@ -27,8 +27,8 @@ std::vector<std::string> words_of(const std::string& line) {
 
 std::uint64_t header_count(const std::filesystem::path& file, const std::string& field,
                            const std::string& word) {
-  constexpr std::size_t most_digits = 9;
-  if (word.empty() || word.size() > most_digits ||
+  constexpr std::size_t max_digits = 9;
+  if (word.empty() || word.size() > max_digits ||
       word.find_first_not_of("0123456789") != std::string::npos) {
     throw DatasetError(file, field + " in the header is \"" + word.substr(0, 40) +
                                  "\", not a count that a scan can have");

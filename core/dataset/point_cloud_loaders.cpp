@@ -11,8 +11,8 @@
 #include <string>
 
 #include "core/dataset/dataset_error.hpp"
-#include "core/dataset/plugin.hpp"
 #include "core/dataset/pcd_plugin.hpp"
+#include "core/dataset/plugin.hpp"
 #include "core/dataset/point_cloud_header.hpp"
 
 namespace stillmap {
@@ -123,7 +123,7 @@ pcl::PCLPointCloud2 load_pcd(const std::filesystem::path& file) {
     cloud.point_step = static_cast<std::uint32_t>(content.point_bytes());
     return cloud;
   }
-  auto* const read_with_pcl = part_function<ReadPcd>("pcd", read_pcd_name, "PCD files are read");
+  auto* const read_with_pcl = plugin_function<ReadPcd>("pcd", read_pcd_name, "PCD files are read");
   try {
     if (read_with_pcl(clean_header(content), content.encoding, content.body, cloud) &&
         cloud.data.size() >= std::size_t{cloud.width} * cloud.height * cloud.point_step) {

@@ -129,7 +129,7 @@ std::vector<float> time_offsets_of(const pcl::PCLPointCloud2& cloud, std::int64_
   const auto time =
       column(cloud, {"time", "t", "timestamp", "time_stamp", "offset_time", "time_offset"});
   if (!time) return {};
-  TimeType type = TimeType::whole;
+  TimeType type = TimeType::integer;
   if (time->datatype == PCLPointField::FLOAT32) type = TimeType::float32;
   if (time->datatype == PCLPointField::FLOAT64) type = TimeType::float64;
   return point_times(time->values, type, stamp_ns).offsets_s;

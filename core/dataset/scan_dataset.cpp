@@ -10,9 +10,9 @@
 #include <utility>
 
 #include "core/dataset/binary_file.hpp"
+#include "core/dataset/file_stamp.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/point_cloud_files.hpp"
-#include "core/dataset/file_stamp.hpp"
 #include "core/lidar/intensity_scale.hpp"
 #include "core/lidar/sensor_fit.hpp"
 

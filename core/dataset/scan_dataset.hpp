@@ -10,7 +10,7 @@
 #include "core/dataset/scan_source.hpp"
 #include "core/lidar/scan.hpp"
 #include "core/lidar/sensor_model.hpp"
-#include "core/odometry/trajectory.hpp"
+#include "core/lidar/trajectory.hpp"
 
 namespace stillmap {
 

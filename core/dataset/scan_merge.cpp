@@ -52,8 +52,8 @@ Scan compensated(Scan scan, const Trajectory& poses, std::size_t index) {
   const auto& [start_ns, T_map_start] = poses[from];
   const auto& [end_ns, T_map_end] = poses[from + 1];
   if (end_ns <= start_ns) return scan;
-  return compensate_motion(std::move(scan), T_map_start.inverse() * T_map_end,
-                           static_cast<double>(end_ns - start_ns) / ns_per_s);
+  return deskew(std::move(scan), T_map_start.inverse() * T_map_end,
+                static_cast<double>(end_ns - start_ns) / ns_per_s);
 }
 
 /// The clouds that the points go to, one a tile.

@@ -16,10 +16,10 @@ constexpr double metres_per_count = 0.002;
 constexpr int full_turn = 36000;
 /// A head that turns at 20 Hz moves by 80 hundredths of a degree in a VLP-16's block; beyond this
 /// lies a gap, where packets or a sector are missing.
-constexpr int largest_step = 200;
+constexpr int max_step = 200;
 constexpr std::int64_t us_an_hour = 3'600'000'000;
 /// The host's and the sensor's clock differ by less within a scan, or one of them was set.
-constexpr std::int64_t longest_scan_us = 5'000'000;
+constexpr std::int64_t max_scan_us = 5'000'000;
 /// Where a packet says how returns are sent, and which sensor it is.
 constexpr std::size_t time_at = 1200, return_mode_at = 1204, product_at = 1205;
 constexpr std::uint8_t dual_return = 0x39;
@@ -125,7 +125,7 @@ class Decoder {
     if (!first_us_) {
       first_us_ = time_us;
       const std::int64_t from_stamp_us = (packet.stamp_ns - decoding_.scan.stamp_ns) / 1000;
-      if (packet.stamp_ns != 0 && std::abs(from_stamp_us) < longest_scan_us) {
+      if (packet.stamp_ns != 0 && std::abs(from_stamp_us) < max_scan_us) {
         first_from_stamp_us_ = from_stamp_us;
       }
       first_host_ns_ = packet.stamp_ns;
@@ -133,7 +133,7 @@ class Decoder {
     std::int64_t passed_us = (time_us - *first_us_) % us_an_hour;
     if (passed_us < -us_an_hour / 2) passed_us += us_an_hour;
     // The sensor's clock was set in the middle of a scan.
-    if (std::abs(passed_us) > longest_scan_us) {
+    if (std::abs(passed_us) > max_scan_us) {
       passed_us = (packet.stamp_ns - first_host_ns_) / 1000;
     }
     return 1e-6 * static_cast<double>(first_from_stamp_us_ + passed_us);
@@ -145,7 +145,7 @@ class Decoder {
     if (next < blocks) {
       const int step = step_between(uint16_at(bytes, block * block_bytes + 2),
                                     uint16_at(bytes, next * block_bytes + 2));
-      if (step <= largest_step) last_step_ = step;
+      if (step <= max_step) last_step_ = step;
     }
     return last_step_;
   }

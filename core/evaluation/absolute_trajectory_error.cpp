@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numeric>
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 // Least squares over rotations, Umeyama eq. 40-41 with scale 1. Poses on one line leave a turn
@@ -58,8 +58,8 @@ Eigen::Isometry3d find_alignment(const PosePairs& pairs, Alignment alignment) {
   return Eigen::Isometry3d::Identity();
 }
 
-AbsoluteError absolute_error(const PosePairs& pairs, Alignment alignment) {
-  AbsoluteError error;
+AbsoluteTrajectoryError absolute_trajectory_error(const PosePairs& pairs, Alignment alignment) {
+  AbsoluteTrajectoryError error;
   error.T_truth_estimate = find_alignment(pairs, alignment);
   error.per_pose_m.reserve(pairs.size());
   for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -75,4 +75,4 @@ AbsoluteError absolute_error(const PosePairs& pairs, Alignment alignment) {
   return error;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -7,7 +7,7 @@
 
 #include "core/evaluation/pose_pairs.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 
 /// How the estimate's world is laid over the truth's before they are compared.
 enum class Alignment {
@@ -26,7 +26,7 @@ enum class Alignment {
 [[nodiscard]] Eigen::Isometry3d find_alignment(const PosePairs& pairs, Alignment alignment);
 
 /// Absolute trajectory error (ATE) in translation, after alignment.
-struct AbsoluteError {
+struct AbsoluteTrajectoryError {
   double rmse_m = 0.0;
   double mean_m = 0.0;
   double max_m = 0.0;
@@ -36,6 +36,7 @@ struct AbsoluteError {
   Eigen::Isometry3d T_truth_estimate = Eigen::Isometry3d::Identity();
 };
 
-[[nodiscard]] AbsoluteError absolute_error(const PosePairs& pairs, Alignment alignment);
+[[nodiscard]] AbsoluteTrajectoryError absolute_trajectory_error(const PosePairs& pairs,
+                                                                Alignment alignment);
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

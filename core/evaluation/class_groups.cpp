@@ -1,6 +1,6 @@
 #include "core/evaluation/class_groups.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 using enum SemanticClass;
@@ -25,4 +25,4 @@ std::array<ClassGroup, 7> coarse_groups() {
            {"pole-like", pole_like}}};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -6,7 +6,7 @@
 
 #include "core/lidar/semantic_class.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 
 /// Classes that a user may well take for one thing.
 struct ClassGroup {
@@ -18,4 +18,4 @@ struct ClassGroup {
 /// SemanticKITTI's coarse task, which takes terrain for nature. Each of the 19 classes is in one.
 [[nodiscard]] std::array<ClassGroup, 7> coarse_groups();
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

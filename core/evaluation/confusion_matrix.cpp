@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 std::size_t index(SemanticClass label) { return static_cast<std::size_t>(label); }
@@ -79,4 +79,4 @@ std::optional<double> ConfusionMatrix::accuracy() const {
   return static_cast<double>(right) / static_cast<double>(counted);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

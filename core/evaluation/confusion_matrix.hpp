@@ -7,7 +7,7 @@
 
 #include "core/lidar/semantic_class.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 
 /// Counts of (true class, predicted class), as semantic-kitti-api counts them: points whose truth
 /// is `unlabeled` are left out, a labelled point that was predicted `unlabeled` is a miss.
@@ -35,4 +35,4 @@ class ConfusionMatrix {
   std::array<std::array<std::uint64_t, semantic_class_count>, semantic_class_count> counts_{};
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

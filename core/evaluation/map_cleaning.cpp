@@ -7,7 +7,7 @@
 
 #include "core/lidar/semantic_class.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 constexpr std::uint16_t outlier_id = 1;
@@ -138,4 +138,4 @@ MapCleaningScore map_cleaning_score(const MapTruth& truth,
   return score;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -7,7 +7,7 @@
 #include <unordered_map>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::evaluation {
 
 /// What the map should hold and what not, from labelled scans at known poses: 0.2 m voxels, each
 /// with the label that most of its points have.
@@ -59,4 +59,4 @@ struct MapCleaningScore {
 [[nodiscard]] MapCleaningScore map_cleaning_score(const MapTruth& truth,
                                                   std::span<const Eigen::Vector3f> points_map);
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -5,7 +5,7 @@
 
 #include "core/lidar/semantic_class.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 constexpr std::uint16_t outlier_id = 1;
@@ -54,4 +54,4 @@ MovingScore moving_score(std::span<const Motion> motion,
   return score;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -6,7 +6,7 @@
 
 #include "core/lidar/motion.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 
 /// How well moving points are told from the rest. Rates are empty where they would divide by zero.
 struct MovingScore {
@@ -26,4 +26,4 @@ struct MovingScore {
 [[nodiscard]] MovingScore moving_score(std::span<const Motion> motion,
                                        std::span<const std::uint16_t> original_ids);
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -4,7 +4,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 // Text files round to six digits or so; a matrix farther from a rotation than this is no pose.
@@ -90,4 +90,4 @@ double rotation_angle(const Eigen::Isometry3d& T) {
   return Eigen::AngleAxisd(Eigen::Quaterniond(T.linear()).normalized()).angle();
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
-#include "core/odometry/trajectory.hpp"
+#include "core/lidar/trajectory.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 
 /// True and estimated poses of the same moments, in step and in time order. Both take the same
 /// body frame (lidar or camera: the caller sees to it) to their own world frame; the two world
@@ -36,4 +36,4 @@ struct PosePairs {
 /// Angle of the rotation, 0..pi [rad].
 [[nodiscard]] double rotation_angle(const Eigen::Isometry3d& T);
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 constexpr std::array segment_lengths_m{100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0};
@@ -37,9 +37,9 @@ Eigen::Isometry3d motion_error(const PosePairs& pairs, std::size_t first, std::s
   return estimated.inverse() * true_motion;
 }
 
-std::optional<RelativeError> relative_error(const PosePairs& pairs) {
+std::optional<RelativePoseError> relative_pose_error(const PosePairs& pairs) {
   if (pairs.size() < 2) return std::nullopt;
-  RelativeError error;
+  RelativePoseError error;
   double squares = 0.0;
   for (std::size_t i = 1; i < pairs.size(); ++i) {
     const Eigen::Isometry3d step = motion_error(pairs, i - 1, i);
@@ -77,4 +77,4 @@ std::optional<KittiOdometryError> kitti_odometry_error(const PosePairs& pairs) {
   return error;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

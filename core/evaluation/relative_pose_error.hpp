@@ -5,10 +5,10 @@
 
 #include "core/evaluation/pose_pairs.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 
 /// Error of the motion from one pose to the next; independent of any alignment.
-struct RelativeError {
+struct RelativePoseError {
   double mean_translation_m = 0.0;
   double rmse_translation_m = 0.0;
   double max_translation_m = 0.0;
@@ -17,7 +17,7 @@ struct RelativeError {
 };
 
 /// Nothing when there is one pose only.
-[[nodiscard]] std::optional<RelativeError> relative_error(const PosePairs& pairs);
+[[nodiscard]] std::optional<RelativePoseError> relative_pose_error(const PosePairs& pairs);
 
 /// What is left of the true motion from pose `first` to pose `last` after the estimated one.
 [[nodiscard]] Eigen::Isometry3d motion_error(const PosePairs& pairs, std::size_t first,
@@ -45,4 +45,4 @@ struct KittiOdometryError {
 /// Nothing when the true path is shorter than 100 m.
 [[nodiscard]] std::optional<KittiOdometryError> kitti_odometry_error(const PosePairs& pairs);
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -9,14 +9,14 @@ namespace stillmap {
 namespace {
 
 /// So many points tell what the numbers of all mean.
-constexpr std::size_t most_asked = 8192;
+constexpr std::size_t max_samples = 8192;
 /// Full scale may be overshot a little.
 constexpr float overshoot = 1.5F;
 
 /// Some thousand finite values from all over the scan.
 std::vector<float> sample_of(std::span<const float> intensity) {
   std::vector<float> sample;
-  const std::size_t step = intensity.size() / most_asked + 1;
+  const std::size_t step = intensity.size() / max_samples + 1;
   for (std::size_t i = 0; i < intensity.size(); i += step) {
     if (std::isfinite(intensity[i])) sample.push_back(intensity[i]);
   }

@@ -9,17 +9,17 @@
 namespace stillmap {
 namespace {
 
-constexpr double longest_offset_s = 10.0;
+constexpr double max_offset_s = 10.0;
 /// Shorter or longer than this is no scan, and another unit is tried.
-constexpr double shortest_scan_s = 1e-3;
-constexpr double longest_scan_s = 5.0;
+constexpr double min_scan_s = 1e-3;
+constexpr double max_scan_s = 5.0;
 /// What another unit must make of it.
-constexpr double shortest_revolution_s = 5e-3;
+constexpr double min_revolution_s = 5e-3;
 /// Absolute times lie between 1990 and 2100, in any unit.
-constexpr double earliest_epoch_s = 6.3e8;
-constexpr double latest_epoch_s = 4.1e9;
+constexpr double min_epoch_s = 6.3e8;
+constexpr double max_epoch_s = 4.1e9;
 /// So many points tell what the numbers of all mean.
-constexpr std::size_t most_asked = 4096;
+constexpr std::size_t max_samples = 4096;
 
 struct Unit {
   const char* name;
@@ -32,7 +32,7 @@ constexpr std::array<Unit, 4> units = {{{"s", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, 
 std::vector<double> sample_of(std::span<const double> times) {
   std::vector<double> sample;
   bool zeros = false;
-  const std::size_t step = times.size() / most_asked + 1;
+  const std::size_t step = times.size() / max_samples + 1;
   for (std::size_t i = 0; i < times.size(); i += step) {
     if (times[i] == 0.0) zeros = true;
     if (std::isfinite(times[i]) && times[i] != 0.0) sample.push_back(times[i]);
@@ -41,7 +41,7 @@ std::vector<double> sample_of(std::span<const double> times) {
   return sample;
 }
 
-double middle_of(std::vector<double>& values) {
+double median_of(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
   return *middle;
@@ -63,24 +63,24 @@ double span_of(std::vector<double>& values) {
 std::optional<Unit> unit_by_magnitude(double middle, double span) {
   for (const Unit& unit : units) {
     const double middle_s = std::abs(middle) * unit.seconds;
-    const bool plausible = middle_s >= earliest_epoch_s && middle_s <= latest_epoch_s;
-    if (plausible && span * unit.seconds <= longest_scan_s) return unit;
+    const bool plausible = middle_s >= min_epoch_s && middle_s <= max_epoch_s;
+    if (plausible && span * unit.seconds <= max_scan_s) return unit;
   }
   return std::nullopt;
 }
 
 Unit unit_of(double middle, double span, TimeType type) {
-  const Unit& usual = type == TimeType::whole ? units[3] : units[0];
+  const Unit& usual = type == TimeType::integer ? units[3] : units[0];
   if (type == TimeType::float64) {
     if (const auto unit = unit_by_magnitude(middle, span)) return *unit;
   }
   const double usual_span_s = span * usual.seconds;
-  if (span == 0.0 || (usual_span_s >= shortest_scan_s && usual_span_s <= longest_scan_s)) {
+  if (span == 0.0 || (usual_span_s >= min_scan_s && usual_span_s <= max_scan_s)) {
     return usual;
   }
   for (const Unit& unit : units) {
     const double span_s = span * unit.seconds;
-    if (span_s >= shortest_revolution_s && span_s < longest_scan_s) return unit;
+    if (span_s >= min_revolution_s && span_s < max_scan_s) return unit;
   }
   return usual;
 }
@@ -90,7 +90,7 @@ std::vector<float> offsets_from(double reference, double middle, std::span<const
   std::vector<float> offsets;
   offsets.reserve(times_s.size());
   for (const double t : times_s) {
-    const bool near = std::abs(t - middle) <= longest_offset_s;
+    const bool near = std::abs(t - middle) <= max_offset_s;
     offsets.push_back(near ? static_cast<float>(t - reference) : NAN);
   }
   return offsets;
@@ -99,7 +99,7 @@ std::vector<float> offsets_from(double reference, double middle, std::span<const
 double earliest_near(double middle, std::span<const double> times_s) {
   double earliest = middle;
   for (const double t : times_s) {
-    if (middle - t <= longest_offset_s) earliest = std::min(earliest, t);
+    if (middle - t <= max_offset_s) earliest = std::min(earliest, t);
   }
   return earliest;
 }
@@ -109,13 +109,13 @@ double earliest_near(double middle, std::span<const double> times_s) {
 PointTimes point_times(std::span<const double> times, TimeType type, std::int64_t stamp_ns) {
   std::vector<double> sample = sample_of(times);
   if (sample.empty()) return {{}, "no finite time"};
-  const double middle = middle_of(sample);
-  if (type == TimeType::float32 && std::abs(middle) >= earliest_epoch_s) {
+  const double middle = median_of(sample);
+  if (type == TimeType::float32 && std::abs(middle) >= min_epoch_s) {
     return {{}, "times since 1970 do not fit into 32-bit floats"};
   }
   const double span = span_of(sample);
   const Unit unit = unit_of(middle, span, type);
-  if (span * unit.seconds > longest_scan_s) {
+  if (span * unit.seconds > max_scan_s) {
     return {{},
             "times of one scan are " + std::to_string(span) + " apart, in no unit a revolution"};
   }
@@ -124,10 +124,10 @@ PointTimes point_times(std::span<const double> times, TimeType type, std::int64_
   const double middle_s = middle * unit.seconds;
   const double stamp_s = static_cast<double>(stamp_ns) * 1e-9;
   const std::string name = unit.name;
-  if (std::abs(middle_s) <= longest_offset_s) {
+  if (std::abs(middle_s) <= max_offset_s) {
     return {offsets_from(0.0, middle_s, times_s), name + " from the stamp"};
   }
-  if (std::abs(middle_s - stamp_s) <= longest_offset_s) {
+  if (std::abs(middle_s - stamp_s) <= max_offset_s) {
     return {offsets_from(stamp_s, middle_s, times_s), name + " on the stamp's clock"};
   }
   return {offsets_from(earliest_near(middle_s, times_s), middle_s, times_s),

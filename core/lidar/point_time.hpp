@@ -8,7 +8,7 @@
 namespace stillmap {
 
 /// What a driver writes the time of a point in.
-enum class TimeType { whole, float32, float64 };
+enum class TimeType { integer, float32, float64 };
 
 /// Per-point times as `Scan::time_offset_s` has them, and how they were understood.
 struct PointTimes {

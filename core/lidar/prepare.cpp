@@ -112,7 +112,7 @@ Scan drop_unusable_points(Scan scan, const PrepareConfig& config) {
   return scan;
 }
 
-Scan compensate_motion(Scan scan, const Eigen::Isometry3d& T_start_end, double period_s) {
+Scan deskew(Scan scan, const Eigen::Isometry3d& T_start_end, double period_s) {
   assert(period_s > 0.0);
   if (scan.time_offset_s.empty()) return scan;
   assert(scan.time_offset_s.size() == scan.size());

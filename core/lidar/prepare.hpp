@@ -14,7 +14,7 @@ struct PrepareConfig {
   /// Points inside this box belong to the robot itself; empty by default. Lidar frame [m].
   Eigen::AlignedBox3d ego_hull_lidar;
   /// Undo the motion during the revolution when points carry their time.
-  bool compensate_motion = true;
+  bool deskew = true;
 };
 
 /// Indices of the points that drop_unusable_points() keeps, in the scan's order.
@@ -28,7 +28,6 @@ struct PrepareConfig {
 /// The scan as if taken in one instant, at `stamp_ns` (paper II-A, "jelly effect"). The lidar is
 /// taken to move steadily; `T_start_end` is its motion during `period_s`. Clears `time_offset_s`.
 /// A scan without times comes back as it is.
-[[nodiscard]] Scan compensate_motion(Scan scan, const Eigen::Isometry3d& T_start_end,
-                                     double period_s);
+[[nodiscard]] Scan deskew(Scan scan, const Eigen::Isometry3d& T_start_end, double period_s);
 
 }  // namespace stillmap

@@ -17,8 +17,8 @@ constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
 
 }  // namespace
 
-RangeView::RangeView(const Scan& scan, std::span<const SemanticClass> labels,
-                     const SensorModel& sensor, const Eigen::Isometry3d& T_map_lidar)
+RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> labels,
+                               const SensorModel& sensor, const Eigen::Isometry3d& T_map_lidar)
     : rows_(sensor.rings),
       columns_(std::min(sensor.columns, max_columns)),
       fov_up_(static_cast<float>(sensor.fov_up)),
@@ -45,13 +45,13 @@ RangeView::RangeView(const Scan& scan, std::span<const SemanticClass> labels,
   }
 }
 
-void RangeView::move_to(const Eigen::Isometry3d& T_map_lidar) {
+void RangeImageView::move_to(const Eigen::Isometry3d& T_map_lidar) {
   T_lidar_map_ = T_map_lidar.inverse().cast<float>();
   origin_map_ = T_map_lidar.translation().cast<float>();
 }
 
-std::optional<std::size_t> RangeView::pixel_of(const Eigen::Vector3f& point_lidar,
-                                               float range_m) const {
+std::optional<std::size_t> RangeImageView::pixel_of(const Eigen::Vector3f& point_lidar,
+                                                    float range_m) const {
   if (range_m <= 0.0F) return std::nullopt;
   const float elevation = std::asin(std::clamp(point_lidar.z() / range_m, -1.0F, 1.0F));
   const float row = (fov_up_ - elevation) * rows_per_rad_;
@@ -65,26 +65,27 @@ std::optional<std::size_t> RangeView::pixel_of(const Eigen::Vector3f& point_lida
          static_cast<std::size_t>(c);
 }
 
-std::optional<RangeView::Sight> RangeView::look_at(const Eigen::Vector3f& point_map) const {
+std::optional<RangeImageView::Observation> RangeImageView::observe(
+    const Eigen::Vector3f& point_map) const {
   const Eigen::Vector3f point_lidar = T_lidar_map_ * point_map;
-  Sight sight{};
-  sight.point_range_m = point_lidar.norm();
-  const auto pixel = pixel_of(point_lidar, sight.point_range_m);
+  Observation observation{};
+  observation.point_range_m = point_lidar.norm();
+  const auto pixel = pixel_of(point_lidar, observation.point_range_m);
   if (!pixel || pixels_[*pixel] == 0.0F) return std::nullopt;
-  sight.range_m = std::abs(pixels_[*pixel]);
-  sight.movable = pixels_[*pixel] > 0.0F;
-  sight.nearest_m = sight.range_m;
-  sight.direction_map = (point_map - origin_map_) / sight.point_range_m;
+  observation.range_m = std::abs(pixels_[*pixel]);
+  observation.movable = pixels_[*pixel] > 0.0F;
+  observation.nearest_m = observation.range_m;
+  observation.direction_map = (point_map - origin_map_) / observation.point_range_m;
   const int row = static_cast<int>(*pixel) / columns_;
   const int column = static_cast<int>(*pixel) % columns_;
   for (int r = std::max(0, row - 1); r <= std::min(rows_ - 1, row + 1); ++r) {
     for (int step = -1; step <= 1; ++step) {
       const int c = (column + step + columns_) % columns_;
       const float range = std::abs(pixels_[static_cast<std::size_t>(r * columns_ + c)]);
-      if (range > 0.0F) sight.nearest_m = std::min(sight.nearest_m, range);
+      if (range > 0.0F) observation.nearest_m = std::min(observation.nearest_m, range);
     }
   }
-  return sight;
+  return observation;
 }
 
 }  // namespace stillmap

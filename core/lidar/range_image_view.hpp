@@ -12,13 +12,13 @@
 namespace stillmap {
 
 /// A scan as ranges over direction, with the pose it was taken from.
-class RangeView {
+class RangeImageView {
  public:
-  RangeView(const Scan& scan, std::span<const SemanticClass> labels, const SensorModel& sensor,
-            const Eigen::Isometry3d& T_map_lidar);
+  RangeImageView(const Scan& scan, std::span<const SemanticClass> labels, const SensorModel& sensor,
+                 const Eigen::Isometry3d& T_map_lidar);
 
   /// What the view saw in the direction of a point.
-  struct Sight {
+  struct Observation {
     float range_m;
     /// Smallest range in the 3 x 3 pixels around.
     float nearest_m;
@@ -27,7 +27,7 @@ class RangeView {
     float point_range_m;
     Eigen::Vector3f direction_map;
   };
-  [[nodiscard]] std::optional<Sight> look_at(const Eigen::Vector3f& point_map) const;
+  [[nodiscard]] std::optional<Observation> observe(const Eigen::Vector3f& point_map) const;
 
   [[nodiscard]] const Eigen::Vector3f& origin_map() const { return origin_map_; }
 

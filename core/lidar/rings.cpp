@@ -15,7 +15,7 @@ namespace {
 constexpr float turn = 4.0F;
 /// Steps back up to this are jitter (real KITTI scans have some of 7 degrees), larger ones are the
 /// jump to the next ring: about 20 degrees.
-constexpr float largest_step_back = turn * 20.0F / 360.0F;
+constexpr float max_step_back = turn * 20.0F / 360.0F;
 
 /// Grows with the azimuth from 0 at +x to 4, at a fraction of atan2's cost.
 float diamond_angle(const Eigen::Vector3f& p) {
@@ -55,9 +55,9 @@ std::vector<float> unwrapped_azimuth(const Scan& scan) {
   for (float& entry : azimuth) {
     const float angle = sense > 0.0F ? entry : turn - entry;
     float step = angle - last;
-    if (step < -largest_step_back) step += turn;
+    if (step < -max_step_back) step += turn;
     // Also at the first point: a file may begin a little before the seam.
-    if (step >= turn - largest_step_back) step -= turn;
+    if (step >= turn - max_step_back) step -= turn;
     sum += step;
     last = angle;
     entry = static_cast<float>(sum);

@@ -13,17 +13,17 @@ namespace stillmap {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
-constexpr std::size_t fewest_points = 1000;
-constexpr std::size_t fewest_on_ring = 10;
+constexpr std::size_t min_points = 1000;
+constexpr std::size_t min_points_on_ring = 10;
 /// Beams of one kind of sensor differ by less from its data sheet, apart from mounting and wear.
-constexpr double largest_difference = 0.5 * degree;
+constexpr double max_elevation_difference = 0.5 * degree;
 /// Two rings at one elevation are laid apart by this: beams must fall strictly.
-constexpr double smallest_step = 0.01 * degree;
+constexpr double min_elevation_step = 0.01 * degree;
 /// Bands of a sensor without rings: of 1 to 2 degrees, as its points lie.
 constexpr int bands = 40;
 /// A sensor's points lie inside its field of view but for noise and mounting.
 constexpr double margin = 1.0 * degree;
-constexpr std::size_t most_asked = 8192;
+constexpr std::size_t max_samples = 8192;
 
 double elevation_of(const Eigen::Vector3f& p) {
   const double across = std::hypot(static_cast<double>(p.x()), static_cast<double>(p.y()));
@@ -32,7 +32,7 @@ double elevation_of(const Eigen::Vector3f& p) {
   return p.squaredNorm() > 0.01F ? elevation : NAN;
 }
 
-double middle_of(std::vector<double>& values) {
+double median_of(std::vector<double>& values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::ranges::nth_element(values, middle);
   return *middle;
@@ -48,7 +48,7 @@ std::vector<double> ring_elevations(const Scan& scan) {
   }
   std::vector<double> elevations;
   for (auto& values : of_ring) {
-    elevations.push_back(values.size() < fewest_on_ring ? NAN : middle_of(values));
+    elevations.push_back(values.size() < min_points_on_ring ? NAN : median_of(values));
   }
   return elevations;
 }
@@ -81,7 +81,7 @@ bool is_built_in(const std::vector<double>& elevations, const SensorModel& senso
   for (std::size_t i = 0; i < elevations.size(); ++i) {
     sum += std::abs(elevations[i] - sensor.beam_elevation(static_cast<int>(i)));
   }
-  return sum / static_cast<double>(elevations.size()) <= largest_difference;
+  return sum / static_cast<double>(elevations.size()) <= max_elevation_difference;
 }
 
 std::optional<SensorModel> built_in(const std::vector<double>& elevations) {
@@ -93,7 +93,7 @@ std::optional<SensorModel> built_in(const std::vector<double>& elevations) {
 
 SensorModel of_beams(std::vector<double> elevations) {
   for (std::size_t i = 1; i < elevations.size(); ++i) {
-    elevations[i] = std::min(elevations[i], elevations[i - 1] - smallest_step);
+    elevations[i] = std::min(elevations[i], elevations[i - 1] - min_elevation_step);
   }
   SensorModel sensor;
   sensor.rings = static_cast<int>(elevations.size());
@@ -123,7 +123,7 @@ std::optional<SensorModel> fit_rings(const Scan& scan) {
 /// Elevations from all over the scan, sorted.
 std::vector<double> sorted_elevations(const Scan& scan) {
   std::vector<double> elevations;
-  const std::size_t step = scan.size() / most_asked + 1;
+  const std::size_t step = scan.size() / max_samples + 1;
   for (std::size_t i = 0; i < scan.size(); i += step) {
     const double elevation = elevation_of(scan.points_lidar[i]);
     if (std::isfinite(elevation)) elevations.push_back(elevation);
@@ -140,10 +140,10 @@ std::pair<double, double> edges_of(const std::vector<double>& sorted) {
 
 std::optional<SensorModel> fit_bands(const Scan& scan) {
   const std::vector<double> elevations = sorted_elevations(scan);
-  if (elevations.size() < fewest_points / 2) return std::nullopt;
+  if (elevations.size() < min_points / 2) return std::nullopt;
   const auto [low, high] = edges_of(elevations);
-  if (std::abs(high - 15.0 * degree) < largest_difference &&
-      std::abs(low + 15.0 * degree) < largest_difference) {
+  if (std::abs(high - 15.0 * degree) < max_elevation_difference &&
+      std::abs(low + 15.0 * degree) < max_elevation_difference) {
     return vlp_16();
   }
   if (high < 5.0 * degree && low < -20.0 * degree && low > -27.0 * degree) return hdl_64e();
@@ -164,14 +164,14 @@ std::string in_degrees(double angle) {
 }  // namespace
 
 std::optional<SensorModel> fit_sensor(const Scan& scan) {
-  if (scan.size() < fewest_points) return std::nullopt;
+  if (scan.size() < min_points) return std::nullopt;
   if (!scan.ring.empty()) {
     if (auto sensor = fit_rings(scan)) return sensor;
   }
   return fit_bands(scan);
 }
 
-std::string sensor_misfit(const Scan& scan, const SensorModel& sensor) {
+std::string sensor_mismatch(const Scan& scan, const SensorModel& sensor) {
   if (!scan.ring.empty()) {
     const int highest = *std::ranges::max_element(scan.ring);
     if (highest >= sensor.rings) {
@@ -180,7 +180,7 @@ std::string sensor_misfit(const Scan& scan, const SensorModel& sensor) {
     }
   }
   const std::vector<double> elevations = sorted_elevations(scan);
-  if (elevations.size() < fewest_points / 10) return {};
+  if (elevations.size() < min_points / 10) return {};
   const auto outside = std::ranges::count_if(elevations, [&](double elevation) {
     return elevation > sensor.fov_up + margin || elevation < sensor.fov_down - margin;
   });

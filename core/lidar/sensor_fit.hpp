@@ -18,6 +18,6 @@ namespace stillmap {
 
 /// Why a scan cannot be this sensor's, in words: rings beyond the sensor's, or most points outside
 /// its field of view. Empty when it can.
-[[nodiscard]] std::string sensor_misfit(const Scan& scan, const SensorModel& sensor);
+[[nodiscard]] std::string sensor_mismatch(const Scan& scan, const SensorModel& sensor);
 
 }  // namespace stillmap

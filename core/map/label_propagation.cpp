@@ -27,8 +27,9 @@ int reach(double distance_m, double range_m, double rad_per_pixel) {
 
 }  // namespace
 
-LabelledView::LabelledView(const Scan& scan, const PointLabels& labels,
-                           const Eigen::Isometry3d& T_map_lidar, const SensorModel& sensor)
+LabelledRangeImage::LabelledRangeImage(const Scan& scan, const PointLabels& labels,
+                                       const Eigen::Isometry3d& T_map_lidar,
+                                       const SensorModel& sensor)
     : T_lidar_map_(T_map_lidar.inverse().cast<float>()), projection_(projection_model(sensor)) {
   assert(labels.classes.size() == scan.size());
   projection_.columns = view_columns;
@@ -42,11 +43,11 @@ LabelledView::LabelledView(const Scan& scan, const PointLabels& labels,
     pixels_[pixel].label = labels.classes[i];
     pixels_[pixel].confidence = labels.confidence[i];
   }
-  mark_movers();
+  mark_near_movable();
 }
 
 template <class Use>
-void LabelledView::for_ring(const Direction& centre, int ring, Use use) const {
+void LabelledRangeImage::for_ring(const Direction& centre, int ring, Use use) const {
   for (int down = -ring; down <= ring; ++down) {
     const int row = centre.row + down;
     if (row < 0 || row >= projection_.rows) continue;
@@ -59,18 +60,18 @@ void LabelledView::for_ring(const Direction& centre, int ring, Use use) const {
   }
 }
 
-void LabelledView::mark_movers() {
+void LabelledRangeImage::mark_near_movable() {
   for (std::size_t pixel = 0; pixel < pixels_.size(); ++pixel) {
     if (!is_movable(pixels_[pixel].label)) continue;
     const auto columns = static_cast<std::size_t>(projection_.columns);
     const Direction centre{static_cast<int>(pixel / columns), static_cast<int>(pixel % columns)};
     for (int ring = 0; ring <= max_reach; ++ring) {
-      for_ring(centre, ring, [this](std::size_t around) { pixels_[around].near_mover = true; });
+      for_ring(centre, ring, [this](std::size_t around) { pixels_[around].near_movable = true; });
     }
   }
 }
 
-LabelledView::Direction LabelledView::direction_of(const Eigen::Vector3f& p) const {
+LabelledRangeImage::Direction LabelledRangeImage::direction_of(const Eigen::Vector3f& p) const {
   const float range_m = p.norm();
   if (!(range_m > 0.0F && std::isfinite(range_m))) return {};
   const float elevation = std::asin(std::clamp(p.z() / range_m, -1.0F, 1.0F));
@@ -82,13 +83,13 @@ LabelledView::Direction LabelledView::direction_of(const Eigen::Vector3f& p) con
           range_m};
 }
 
-bool LabelledView::may_have_mover(const Eigen::Vector3d& point_map) const {
+bool LabelledRangeImage::may_be_near_movable(const Eigen::Vector3d& point_map) const {
   const Direction at = direction_of(T_lidar_map_ * point_map.cast<float>());
-  return pixels_[static_cast<std::size_t>(at.row * projection_.columns + at.column)].near_mover;
+  return pixels_[static_cast<std::size_t>(at.row * projection_.columns + at.column)].near_movable;
 }
 
-std::optional<LabelledView::Neighbour> LabelledView::nearest(const Eigen::Vector3d& point_map,
-                                                             double max_distance_m) const {
+std::optional<LabelledRangeImage::Neighbour> LabelledRangeImage::nearest(
+    const Eigen::Vector3d& point_map, double max_distance_m) const {
   const Eigen::Vector3f p = T_lidar_map_ * point_map.cast<float>();
   const Direction at = direction_of(p);
   if (!(at.range_m > 0.0F)) return std::nullopt;
@@ -118,57 +119,59 @@ std::optional<LabelledView::Neighbour> LabelledView::nearest(const Eigen::Vector
 
 namespace {
 
-struct Carried {
+struct PropagatedLabel {
   SemanticClass label = SemanticClass::unlabeled;
   float confidence = 0.0F;
-  LabelCarrier carrier = LabelCarrier::nothing;
+  LabelOrigin origin = LabelOrigin::none;
 };
 
-Carried carry(const Eigen::Vector3d& point_map, double range_m, const StaticMap& map,
-              const std::optional<LabelledView>& last_labelled, const CarryConfig& config) {
+PropagatedLabel propagate(const Eigen::Vector3d& point_map, double range_m, const StaticMap& map,
+                          const std::optional<LabelledRangeImage>& last_labelled,
+                          const LabelPropagationConfig& config) {
   const ClassEvidence evidence = map.evidence_at(point_map);
   const SemanticClass known = evidence.winner();
-  std::optional<LabelledView::Neighbour> neighbour;
+  std::optional<LabelledRangeImage::Neighbour> neighbour;
   if (last_labelled && known == SemanticClass::unlabeled) {
     neighbour = last_labelled->nearest(point_map,
                                        config.max_distance_m + config.max_distance_share * range_m);
-  } else if (last_labelled && last_labelled->may_have_mover(point_map)) {
-    neighbour = last_labelled->nearest(point_map, config.mover_distance_m);
+  } else if (last_labelled && last_labelled->may_be_near_movable(point_map)) {
+    neighbour = last_labelled->nearest(point_map, config.movable_distance_m);
   }
   if (neighbour && (known == SemanticClass::unlabeled || is_movable(neighbour->label))) {
     return {neighbour->label, config.confidence_factor * neighbour->confidence,
-            LabelCarrier::last_scan};
+            LabelOrigin::last_scan};
   }
   if (known == SemanticClass::unlabeled) return {};
-  return {known, config.confidence_factor * evidence.share(), LabelCarrier::map};
+  return {known, config.confidence_factor * evidence.share(), LabelOrigin::map};
 }
 
 }  // namespace
 
-CarriedLabels carry_labels(const Scan& scan, const Eigen::Isometry3d& T_map_lidar,
-                           const StaticMap& map, const std::optional<LabelledView>& last_labelled,
-                           const CarryConfig& config) {
-  CarriedLabels carried;
-  carried.labels.classes.resize(scan.size());
-  carried.labels.confidence.resize(scan.size());
-  carried.carrier.resize(scan.size());
+PropagatedLabels propagate_labels(const Scan& scan, const Eigen::Isometry3d& T_map_lidar,
+                                  const StaticMap& map,
+                                  const std::optional<LabelledRangeImage>& last_labelled,
+                                  const LabelPropagationConfig& config) {
+  PropagatedLabels propagated;
+  propagated.labels.classes.resize(scan.size());
+  propagated.labels.confidence.resize(scan.size());
+  propagated.origin.resize(scan.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scan.size(), 2048), [&](const auto& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
       const Eigen::Vector3d point_lidar = scan.points_lidar[i].cast<double>();
-      const Carried one =
-          carry(T_map_lidar * point_lidar, point_lidar.norm(), map, last_labelled, config);
-      carried.labels.classes[i] = one.label;
-      carried.labels.confidence[i] = one.confidence;
-      carried.carrier[i] = one.carrier;
+      const PropagatedLabel one =
+          propagate(T_map_lidar * point_lidar, point_lidar.norm(), map, last_labelled, config);
+      propagated.labels.classes[i] = one.label;
+      propagated.labels.confidence[i] = one.confidence;
+      propagated.origin[i] = one.origin;
     }
   });
-  return carried;
+  return propagated;
 }
 
-PointLabels new_evidence(const CarriedLabels& carried) {
-  PointLabels labels = carried.labels;
-  for (std::size_t i = 0; i < carried.carrier.size(); ++i) {
-    if (carried.carrier[i] != LabelCarrier::last_scan) labels.confidence[i] = 0.0F;
+PointLabels new_evidence(const PropagatedLabels& propagated) {
+  PointLabels labels = propagated.labels;
+  for (std::size_t i = 0; i < propagated.origin.size(); ++i) {
+    if (propagated.origin[i] != LabelOrigin::last_scan) labels.confidence[i] = 0.0F;
   }
   return labels;
 }

@@ -13,22 +13,22 @@
 
 namespace stillmap {
 
-struct CarryConfig {
+struct LabelPropagationConfig {
   /// A point takes the label of a point of the last labelled scan that is at most this far away,
   /// and this share of its range: rings lie far apart on distant ground.
   double max_distance_m = 1.0;
   double max_distance_share = 0.05;
   /// A movable thing within this distance counts more than what the map knows of the place.
-  double mover_distance_m = 0.4;
+  double movable_distance_m = 0.4;
   /// Factor on the confidence of labels that were not seen in this scan.
   float confidence_factor = 0.5F;
 };
 
 /// A scan with its labels, to be asked what was near a place.
-class LabelledView {
+class LabelledRangeImage {
  public:
-  LabelledView(const Scan& scan, const PointLabels& labels, const Eigen::Isometry3d& T_map_lidar,
-               const SensorModel& sensor);
+  LabelledRangeImage(const Scan& scan, const PointLabels& labels,
+                     const Eigen::Isometry3d& T_map_lidar, const SensorModel& sensor);
 
   struct Neighbour {
     SemanticClass label = SemanticClass::unlabeled;
@@ -41,14 +41,14 @@ class LabelledView {
                                                  double max_distance_m) const;
 
   /// False where nearest() finds no movable point.
-  [[nodiscard]] bool may_have_mover(const Eigen::Vector3d& point_map) const;
+  [[nodiscard]] bool may_be_near_movable(const Eigen::Vector3d& point_map) const;
 
  private:
   struct Pixel {
     Eigen::Vector3f point_lidar = Eigen::Vector3f::Zero();
     SemanticClass label = SemanticClass::unlabeled;
     /// A movable point is in the window round this pixel.
-    bool near_mover = false;
+    bool near_movable = false;
     float confidence = 0.0F;
   };
   struct Direction {
@@ -61,7 +61,7 @@ class LabelledView {
   void for_ring(const Direction& centre, int ring, Use use) const;
 
   [[nodiscard]] Direction direction_of(const Eigen::Vector3f& point_lidar) const;
-  void mark_movers();
+  void mark_near_movable();
 
   Eigen::Isometry3f T_lidar_map_;
   ProjectionModel projection_;
@@ -69,24 +69,24 @@ class LabelledView {
 };
 
 /// Where the label of a point comes from.
-enum class LabelCarrier : std::uint8_t { nothing, map, last_scan };
+enum class LabelOrigin : std::uint8_t { none, map, last_scan };
 
-struct CarriedLabels {
+struct PropagatedLabels {
   PointLabels labels;
   /// One a point.
-  std::vector<LabelCarrier> carrier;
+  std::vector<LabelOrigin> origin;
 };
 
 /// Labels for a scan that has none of its own: of the voxel that a point falls into, by the
 /// evidence of all scans before; for points at places that the map does not know (movers, new
 /// ground) and beside movable things, of the nearest point of the last labelled scan, where there
 /// is one. `T_map_lidar` may be a prediction.
-[[nodiscard]] CarriedLabels carry_labels(const Scan& scan, const Eigen::Isometry3d& T_map_lidar,
-                                         const StaticMap& map,
-                                         const std::optional<LabelledView>& last_labelled,
-                                         const CarryConfig& config = {});
+[[nodiscard]] PropagatedLabels propagate_labels(
+    const Scan& scan, const Eigen::Isometry3d& T_map_lidar, const StaticMap& map,
+    const std::optional<LabelledRangeImage>& last_labelled,
+    const LabelPropagationConfig& config = {});
 
-/// What the map may learn from carried labels: not what it said itself. Confidence 0 there.
-[[nodiscard]] PointLabels new_evidence(const CarriedLabels& carried);
+/// What the map may learn from propagated labels: not what it said itself. Confidence 0 there.
+[[nodiscard]] PointLabels new_evidence(const PropagatedLabels& propagated);
 
 }  // namespace stillmap

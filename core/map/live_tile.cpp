@@ -11,7 +11,7 @@ namespace stillmap {
 namespace {
 
 /// Scans that looked through a voxel are counted so far.
-constexpr std::uint16_t most_passes = 1000;
+constexpr std::uint16_t max_misses = 1000;
 constexpr int layer_bias = 1 << 15;
 
 }  // namespace
@@ -66,7 +66,8 @@ void LiveTile::hit(LiveVoxel& voxel, const TilePoint& point, std::int64_t stamp_
   voxel.evidence.add(point.label, point.confidence);
   voxel.last_seen_ns = stamp_ns;
   if (point.motion == Motion::semi_static) return;
-  if (is_new_scan && voxel.past.hits < std::numeric_limits<std::uint16_t>::max()) ++voxel.past.hits;
+  if (is_new_scan && voxel.history.hits < std::numeric_limits<std::uint16_t>::max())
+    ++voxel.history.hits;
   if (voxel.point_count < max_mean_points) {
     for (std::size_t axis = 0; axis < 3; ++axis) voxel.offset_sum[axis] += point.offset[axis];
   }
@@ -80,32 +81,32 @@ void LiveTile::exclude(const TilePoint& point, std::int64_t stamp_ns) {
   excluded.last_seen_ns = stamp_ns;
 }
 
-bool LiveTile::look_through(const std::function<bool(const Eigen::Vector3f&)>& is_free,
-                            std::int64_t stamp_ns, const VisibilityRule& rule,
-                            const VoxelGrid& grid) {
+bool LiveTile::clear_seen_through(const std::function<bool(const Eigen::Vector3f&)>& is_free,
+                                  std::int64_t stamp_ns, const VisibilityRule& rule,
+                                  const VoxelGrid& grid) {
   bool hides_one = false;
   for (LiveVoxel& voxel : voxels_) {
-    if (voxel.last_seen_ns == stamp_ns || voxel.past.is_restored) continue;
+    if (voxel.last_seen_ns == stamp_ns || voxel.history.is_restored) continue;
     if (!is_free(mean_map(voxel, grid))) continue;
-    if (voxel.past.passes >= most_passes) {
+    if (voxel.history.misses >= max_misses) {
       // So that a thing that is put where long nothing was can still come into view.
-      voxel.past.passes /= 2;
-      voxel.past.hits /= 2;
+      voxel.history.misses /= 2;
+      voxel.history.hits /= 2;
     }
     const bool was_hidden = is_seen_through(voxel, rule);
-    ++voxel.past.passes;
+    ++voxel.history.misses;
     hides_one |= !was_hidden && is_seen_through(voxel, rule);
   }
   return hides_one;
 }
 
 bool LiveTile::is_seen_through(const LiveVoxel& voxel, const VisibilityRule& rule) {
-  return !voxel.past.is_restored && voxel.past.passes >= rule.passes &&
-         voxel.past.passes > rule.passes_per_hit * voxel.past.hits;
+  return !voxel.history.is_restored && voxel.history.misses >= rule.misses_to_clear &&
+         voxel.history.misses > rule.misses_per_hit * voxel.history.hits;
 }
 
 bool LiveTile::is_shown(const LiveVoxel& voxel, const VisibilityRule& rule) {
-  if (voxel.past.is_restored) return true;
+  if (voxel.history.is_restored) return true;
   return voxel.point_count >= rule.min_points && !is_movable(voxel.evidence.winner()) &&
          !is_seen_through(voxel, rule);
 }
@@ -113,7 +114,7 @@ bool LiveTile::is_shown(const LiveVoxel& voxel, const VisibilityRule& rule) {
 std::optional<RemovalReason> LiveTile::removal(const LiveVoxel& voxel, const VisibilityRule& rule) {
   if (is_shown(voxel, rule) || voxel.point_count < rule.min_points) return std::nullopt;
   if (!is_movable(voxel.evidence.winner())) return RemovalReason::seen_through;
-  return voxel.past.was_shown ? RemovalReason::relabelled : RemovalReason::semi_static;
+  return voxel.history.was_shown ? RemovalReason::relabelled : RemovalReason::semi_static;
 }
 
 void LiveTile::sort_new_voxels() {
@@ -154,7 +155,7 @@ std::vector<Voxel> LiveTile::visible_voxels(const VisibilityRule& rule, const Vo
   for (const std::uint32_t position : sorted_) {
     LiveVoxel& live = voxels_[position];
     if (!is_shown(live, rule)) continue;
-    live.past.was_shown = true;
+    live.history.was_shown = true;
     visible.push_back(voxel(live, grid));
   }
   return visible;
@@ -192,7 +193,7 @@ std::size_t LiveTile::restore(RemovalReason reason, const Eigen::AlignedBox3d& b
   for (LiveVoxel& voxel : voxels_) {
     if (removal(voxel, rule) != reason) continue;
     if (!box_map.contains(mean_map(voxel, grid).cast<double>())) continue;
-    voxel.past.is_restored = true;
+    voxel.history.is_restored = true;
     ++restored;
   }
   return restored;
@@ -210,7 +211,7 @@ std::size_t LiveTile::restore_excluded(RemovalReason reason, const Eigen::Aligne
     voxel.offset_sum.fill(rule.min_points * static_cast<std::uint32_t>(offset_steps / 2));
     voxel.evidence.add(excluded.label, 1.0F);
     voxel.first_seen_ns = voxel.last_seen_ns = excluded.last_seen_ns;
-    voxel.past.is_restored = true;
+    voxel.history.is_restored = true;
     position_.emplace(key, static_cast<std::uint32_t>(voxels_.size() - 1));
     restored.push_back(key);
   }

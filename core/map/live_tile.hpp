@@ -38,8 +38,8 @@ struct VisibilityRule {
   /// Points that it was hit by.
   std::uint32_t min_points = 2;
   /// It is not, once so many scans looked through it, and so many for each that hit it.
-  std::uint32_t passes = 4;
-  std::uint32_t passes_per_hit = 2;
+  std::uint32_t misses_to_clear = 4;
+  std::uint32_t misses_per_hit = 2;
 };
 
 /// The mutable side of a tile: everything seen so far, also what is not yet in any view.
@@ -53,9 +53,9 @@ class LiveTile {
 
   /// Counts the scan against each voxel whose place it looked through, to something behind.
   /// `is_free` tells that of a place (map frame). True when a voxel will be hidden for it.
-  [[nodiscard]] bool look_through(const std::function<bool(const Eigen::Vector3f&)>& is_free,
-                                  std::int64_t stamp_ns, const VisibilityRule& rule,
-                                  const VoxelGrid& grid);
+  [[nodiscard]] bool clear_seen_through(const std::function<bool(const Eigen::Vector3f&)>& is_free,
+                                        std::int64_t stamp_ns, const VisibilityRule& rule,
+                                        const VoxelGrid& grid);
 
   /// Of the voxel; without votes when there is none.
   [[nodiscard]] ClassEvidence evidence(std::uint32_t voxel_key) const;
@@ -97,7 +97,7 @@ class LiveTile {
     ClassEvidence evidence;
     std::int64_t first_seen_ns = 0;
     std::int64_t last_seen_ns = 0;
-    VoxelPast past;
+    VoxelHistory history;
   };
   /// A place that only movable things hit.
   struct Excluded {
@@ -112,7 +112,7 @@ class LiveTile {
     }
   };
 
-  void add(const Voxel& known, const VoxelPast& past, const VoxelGrid& grid);
+  void add(const Voxel& known, const VoxelHistory& history, const VoxelGrid& grid);
   [[nodiscard]] LiveVoxel* find(const TilePoint& point);
   static void hit(LiveVoxel& voxel, const TilePoint& point, std::int64_t stamp_ns);
   void exclude(const TilePoint& point, std::int64_t stamp_ns);

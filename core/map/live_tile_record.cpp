@@ -12,7 +12,7 @@ namespace {
 
 /// How many scans a voxel's points came from is not known: the most, so that nothing is lost for
 /// it.
-VoxelPast past_of_shown(const Voxel& voxel) {
+VoxelHistory history_of_shown(const Voxel& voxel) {
   constexpr std::uint32_t most = std::numeric_limits<std::uint16_t>::max();
   return {.hits = static_cast<std::uint16_t>(std::min(voxel.point_count, most)), .was_shown = true};
 }
@@ -21,27 +21,27 @@ VoxelPast past_of_shown(const Voxel& voxel) {
 
 LiveTile::LiveTile(TileId id, const TileRecord& record, const VoxelGrid& grid)
     : id_(id), published_(record.tile) {
-  const TileMemory* const memory = record.memory.get();
+  const TileEvidence* const evidence = record.evidence.get();
   if (published_) {
-    voxels_.reserve(published_->voxels.size() + (memory ? memory->hidden.size() : 0));
+    voxels_.reserve(published_->voxels.size() + (evidence ? evidence->hidden.size() : 0));
     for (std::size_t i = 0; i < published_->voxels.size(); ++i) {
       const Voxel& voxel = published_->voxels[i];
-      add(voxel, memory ? memory->shown[i] : past_of_shown(voxel), grid);
+      add(voxel, evidence ? evidence->shown[i] : history_of_shown(voxel), grid);
     }
   }
-  if (memory) {
-    for (const HiddenVoxel& hidden : memory->hidden) add(hidden.voxel, hidden.past, grid);
-    for (const ExcludedPlace& place : memory->excluded) {
-      excluded_.emplace(voxel_key(place.index),
-                        Excluded{place.label, place.was_moving, place.last_seen_ns});
+  if (evidence) {
+    for (const HiddenVoxel& hidden : evidence->hidden) add(hidden.voxel, hidden.history, grid);
+    for (const ExcludedVoxel& voxel : evidence->excluded) {
+      excluded_.emplace(voxel_key(voxel.index),
+                        Excluded{voxel.label, voxel.was_moving, voxel.last_seen_ns});
     }
   }
   sort_new_voxels();
 }
 
-void LiveTile::add(const Voxel& known, const VoxelPast& past, const VoxelGrid& grid) {
-  LiveVoxel live{voxel_key(known.index), known.point_count,  {},  known.evidence,
-                 known.first_seen_ns,    known.last_seen_ns, past};
+void LiveTile::add(const Voxel& known, const VoxelHistory& history, const VoxelGrid& grid) {
+  LiveVoxel live{voxel_key(known.index), known.point_count,  {},     known.evidence,
+                 known.first_seen_ns,    known.last_seen_ns, history};
   const Eigen::Vector3d offset =
       (known.mean_map.cast<double>() - grid.corner_map(id_, known.index)) / grid.voxel_size_m();
   const double points = std::min(known.point_count, max_mean_points);
@@ -55,31 +55,31 @@ void LiveTile::add(const Voxel& known, const VoxelPast& past, const VoxelGrid& g
 }
 
 TileRecord LiveTile::record(const VisibilityRule& rule, const VoxelGrid& grid) const {
-  auto memory = std::make_shared<TileMemory>();
-  memory->id = id_;
+  auto evidence = std::make_shared<TileEvidence>();
+  evidence->id = id_;
   std::vector<Voxel> shown;
   for (const std::uint32_t position : sorted_) {
     const LiveVoxel& live = voxels_[position];
     if (is_shown(live, rule)) {
       shown.push_back(voxel(live, grid));
-      memory->shown.push_back(live.past);
+      evidence->shown.push_back(live.history);
     } else {
-      memory->hidden.push_back({voxel(live, grid), live.past, removal(live, rule)});
+      evidence->hidden.push_back({voxel(live, grid), live.history, removal(live, rule)});
     }
   }
-  memory->excluded.reserve(excluded_.size());
+  evidence->excluded.reserve(excluded_.size());
   for (const auto& [key, excluded] : excluded_) {
-    memory->excluded.push_back(
+    evidence->excluded.push_back(
         {voxel_index(key), excluded.label, excluded.was_moving, excluded.last_seen_ns});
   }
-  std::ranges::sort(memory->excluded, {}, &ExcludedPlace::index);
-  if (!published_) return {nullptr, std::move(memory)};
+  std::ranges::sort(evidence->excluded, {}, &ExcludedVoxel::index);
+  if (!published_) return {nullptr, std::move(evidence)};
   assert(shown.size() == published_->voxels.size());
   // As published, with the counts and times of now.
   auto tile = std::make_shared<Tile>(Tile{published_->info, std::move(shown)});
   tile->info.bounds_map.setEmpty();
   for (const Voxel& voxel : tile->voxels) tile->info.bounds_map.extend(voxel.mean_map);
-  return {std::move(tile), std::move(memory)};
+  return {std::move(tile), std::move(evidence)};
 }
 
 std::size_t LiveTile::memory_bytes() const {

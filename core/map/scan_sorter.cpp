@@ -33,39 +33,39 @@ std::span<const ScanSorter::Batch> ScanSorter::sort(const LabelledScan& scan,
   batches_.clear();
   const Eigen::Vector3d lidar_map = T_map_lidar.translation();
   if (!grid_.holds(lidar_map)) return {};
-  const TileId centre = grid_.place(lidar_map).tile;
+  const TileId centre = grid_.index(lidar_map).tile;
   const Window window{{centre.x - reach_tiles_, centre.y - reach_tiles_}, 2 * reach_tiles_ + 1};
-  place_points(scan, T_map_lidar, window);
+  index_points(scan, T_map_lidar, window);
   group_by_tile(window);
   return batches_;
 }
 
-void ScanSorter::place_points(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+void ScanSorter::index_points(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
                               const Window& window) {
-  window_places_.resize(scan.scan.size());
+  window_indices_.resize(scan.scan.size());
   placed_.resize(scan.scan.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scan.scan.size(), 4096),
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                        place_point(i, scan, T_map_lidar, window);
+                        index_point(i, scan, T_map_lidar, window);
                       }
                     });
 }
 
-void ScanSorter::place_point(std::size_t i, const LabelledScan& scan,
+void ScanSorter::index_point(std::size_t i, const LabelledScan& scan,
                              const Eigen::Isometry3d& T_map_lidar, const Window& window) {
-  window_places_[i] = no_tile;
+  window_indices_[i] = no_tile;
   const Eigen::Vector3d p_lidar = scan.scan.points_lidar[i].cast<double>();
   if (!(p_lidar.squaredNorm() <= max_range_m_ * max_range_m_)) return;
   const Eigen::Vector3d p_map = T_map_lidar * p_lidar;
   if (!grid_.holds(p_map)) return;
 
-  const auto [tile, voxel, offset] = grid_.place(p_map);
+  const auto [tile, voxel, offset] = grid_.index(p_map);
   const std::int32_t row = tile.x - window.first.x;
   const std::int32_t column = tile.y - window.first.y;
   // Only a transform that is no rigid one gets a point out of the window.
   if (row < 0 || row >= window.side || column < 0 || column >= window.side) return;
-  window_places_[i] = static_cast<std::uint32_t>(row * window.side + column);
+  window_indices_[i] = static_cast<std::uint32_t>(row * window.side + column);
   placed_[i] = {voxel_key(voxel),
                 {offset_step(offset.x()), offset_step(offset.y()), offset_step(offset.z())},
                 scan.label(i),
@@ -77,13 +77,13 @@ void ScanSorter::group_by_tile(const Window& window) {
   // Counting sort: stable, so that a tile sees its points in the order of the scan.
   begins_.assign(static_cast<std::size_t>(window.side) * static_cast<std::size_t>(window.side) + 1,
                  0);
-  for (const std::uint32_t place : window_places_) {
+  for (const std::uint32_t place : window_indices_) {
     if (place != no_tile) ++begins_[place + 1];
   }
   std::partial_sum(begins_.begin(), begins_.end(), begins_.begin());
   grouped_.resize(begins_.back());
-  for (std::size_t i = 0; i < window_places_.size(); ++i) {
-    if (window_places_[i] != no_tile) grouped_[begins_[window_places_[i]]++] = placed_[i];
+  for (std::size_t i = 0; i < window_indices_.size(); ++i) {
+    if (window_indices_[i] != no_tile) grouped_[begins_[window_indices_[i]]++] = placed_[i];
   }
   // Every begin has moved on to the end of its tile.
   std::uint32_t begin = 0;

@@ -34,9 +34,9 @@ class ScanSorter {
     std::int32_t side = 0;
   };
 
-  void place_points(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+  void index_points(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
                     const Window& window);
-  void place_point(std::size_t i, const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+  void index_point(std::size_t i, const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
                    const Window& window);
   void group_by_tile(const Window& window);
 
@@ -44,7 +44,7 @@ class ScanSorter {
   double max_range_m_;
   std::int32_t reach_tiles_;
   /// Of every point of the scan: its place in the window (`no_tile` when not mapped), its voxel.
-  std::vector<std::uint32_t> window_places_;
+  std::vector<std::uint32_t> window_indices_;
   std::vector<TilePoint> placed_;
   /// Where each tile of the window begins in `grouped_`, and one past the last.
   std::vector<std::uint32_t> begins_;

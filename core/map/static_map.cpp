@@ -29,22 +29,22 @@ StaticMap::State::State(const StaticMapConfig& map_config)
 
 void StaticMap::State::clear(std::uint64_t map_id) {
   tiles.clear();
-  away.clear();
+  non_resident.clear();
   unreadable.clear();
   touched.clear();
   inserted = 0;
   stored_step = step++;
-  MapView empty;
+  MapSnapshot empty;
   empty.map_id = map_id;
   empty.tile_size_m = config.tile_size_m;
   empty.voxel_size_m = config.voxel_size_m;
-  current = std::make_shared<const MapView>(std::move(empty));
+  current = std::make_shared<const MapSnapshot>(std::move(empty));
 }
 
 LiveTile* StaticMap::State::tile(TileId id) {
   if (const auto known = tiles.find(id); known != tiles.end()) return known->second.live.get();
-  if (away.contains(id)) {
-    return take_back(id) ? tiles.find(id)->second.live.get() : nullptr;
+  if (non_resident.contains(id)) {
+    return reload(id) ? tiles.find(id)->second.live.get() : nullptr;
   }
   Resident fresh{std::make_unique<LiveTile>(id), step};
   return tiles.emplace(id, std::move(fresh)).first->second.live.get();
@@ -73,11 +73,11 @@ std::vector<LiveTile*> StaticMap::State::tiles_near(const Eigen::Vector3f& posit
 
 std::vector<std::shared_ptr<const Tile>> StaticMap::State::published_tiles() const {
   std::vector<std::shared_ptr<const Tile>> published;
-  published.reserve(tiles.size() + away.size());
+  published.reserve(tiles.size() + non_resident.size());
   for (const auto& [id, resident] : tiles) {
     if (resident.live->published()) published.push_back(resident.live->published());
   }
-  for (const auto& [id, shown] : away) {
+  for (const auto& [id, shown] : non_resident) {
     if (shown) published.push_back(shown);
   }
   std::ranges::sort(published, {}, [](const auto& shared) { return shared->info.id; });
@@ -108,23 +108,25 @@ void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_
   ++state_->inserted;
 }
 
-bool StaticMap::wants_look() const {
-  return state_->config.clear_range_m > 0.0 && state_->inserted % state_->config.look_every == 0;
+bool StaticMap::clearing_due() const {
+  return state_->config.clearing_range_m > 0.0 &&
+         state_->inserted % state_->config.clearing_interval == 0;
 }
 
-void StaticMap::look_through(const RangeView& view, std::int64_t stamp_ns) {
+void StaticMap::clear_seen_through(const RangeImageView& view, std::int64_t stamp_ns) {
   const StaticMapConfig& config = state_->config;
   const auto is_free = [&](const Eigen::Vector3f& position_map) {
     const double range_m = (position_map - view.origin_map()).norm();
-    if (range_m > config.clear_range_m) return false;
-    const auto sight = view.look_at(position_map);
-    return sight &&
-           sight->nearest_m > range_m + config.clear_margin_m + config.clear_margin_share * range_m;
+    if (range_m > config.clearing_range_m) return false;
+    const auto observation = view.observe(position_map);
+    return observation && observation->nearest_m > range_m + config.clearing_margin_m +
+                                                       config.clearing_margin_share * range_m;
   };
-  const std::vector<LiveTile*> near = state_->tiles_near(view.origin_map(), config.clear_range_m);
+  const std::vector<LiveTile*> near =
+      state_->tiles_near(view.origin_map(), config.clearing_range_m);
   std::vector<std::uint8_t> hides(near.size());
   tbb::parallel_for(std::size_t{0}, near.size(), [&](std::size_t i) {
-    hides[i] = near[i]->look_through(is_free, stamp_ns, state_->rule(), state_->grid) ? 1 : 0;
+    hides[i] = near[i]->clear_seen_through(is_free, stamp_ns, state_->rule(), state_->grid) ? 1 : 0;
   });
   ++state_->step;
   for (std::size_t i = 0; i < near.size(); ++i) {
@@ -136,13 +138,13 @@ void StaticMap::look_through(const RangeView& view, std::int64_t stamp_ns) {
 
 ClassEvidence StaticMap::evidence_at(const Eigen::Vector3d& position_map) const {
   if (!state_->grid.holds(position_map)) return {};
-  const VoxelGrid::Place place = state_->grid.place(position_map);
-  const auto tile = state_->tiles.find(place.tile);
+  const VoxelGrid::Index index = state_->grid.index(position_map);
+  const auto tile = state_->tiles.find(index.tile);
   return tile == state_->tiles.end() ? ClassEvidence()
-                                     : tile->second.live->evidence(voxel_key(place.voxel));
+                                     : tile->second.live->evidence(voxel_key(index.voxel));
 }
 
-std::shared_ptr<const MapView> StaticMap::view() {
+std::shared_ptr<const MapSnapshot> StaticMap::view() {
   std::vector<LiveTile*> touched = std::exchange(state_->touched, {});
   std::ranges::sort(touched);
   touched.erase(std::unique(touched.begin(), touched.end()), touched.end());
@@ -153,13 +155,13 @@ std::shared_ptr<const MapView> StaticMap::view() {
     changed[i] = touched[i]->publish(version, state_->rule(), state_->grid) ? 1 : 0;
   });
   const bool has_changed = std::ranges::find(changed, 1) != changed.end();
-  if (!has_changed && !std::exchange(state_->moved, false)) return state_->current;
+  if (!has_changed && !std::exchange(state_->residency_changed, false)) return state_->current;
 
-  state_->moved = false;
-  MapView next = {has_changed ? version : state_->current->version, state_->current->map_id,
-                  state_->config.tile_size_m, state_->config.voxel_size_m,
-                  state_->published_tiles()};
-  state_->current = std::make_shared<const MapView>(std::move(next));
+  state_->residency_changed = false;
+  MapSnapshot next = {has_changed ? version : state_->current->version, state_->current->map_id,
+                      state_->config.tile_size_m, state_->config.voxel_size_m,
+                      state_->published_tiles()};
+  state_->current = std::make_shared<const MapSnapshot>(std::move(next));
   return state_->current;
 }
 

@@ -24,27 +24,28 @@ struct StaticMapConfig {
   /// A voxel enters the view once it was hit this often.
   std::uint32_t min_points = 2;
   /// Every so many scans one is asked what it looked through: all of them would tell the same.
-  std::uint32_t look_every = 3;
+  std::uint32_t clearing_interval = 3;
   /// A voxel leaves the view once so many of those looked through it, and so many for each scan
   /// that hit it.
-  std::uint32_t passes = 4;
-  std::uint32_t passes_per_hit = 2;
+  std::uint32_t misses_to_clear = 4;
+  std::uint32_t misses_per_hit = 2;
   /// Within this range of the lidar; 0: voxels stay whatever looks through them.
-  double clear_range_m = 25.0;
+  double clearing_range_m = 25.0;
   /// A ray passed through where it went on for so much, and for this share of the range.
-  double clear_margin_m = 0.5;
-  double clear_margin_share = 0.02;
+  double clearing_margin_m = 0.5;
+  double clearing_margin_share = 0.02;
 
   /// Every fault in words, one a line; empty when the configuration can be used.
   [[nodiscard]] std::string faults() const;
 };
 
-/// What tiles of a map know beside what they show. Null: it is on the shelf, as all of the tile is.
-using TileMemories = std::map<TileId, std::shared_ptr<const TileMemory>>;
+/// What tiles of a map know beside what they show. Null: it is in the tile store, as all of the
+/// tile is.
+using TileEvidenceMap = std::map<TileId, std::shared_ptr<const TileEvidence>>;
 
 /// A state of the map to be stored.
 struct MapCheckpoint {
-  std::shared_ptr<const MapView> view;
+  std::shared_ptr<const MapSnapshot> view;
   /// How far it goes; to be told to `checkpoint_stored`.
   std::uint64_t step = 0;
   /// All of the tiles that changed since what is stored.
@@ -53,9 +54,9 @@ struct MapCheckpoint {
 
 struct MemoryUse {
   std::size_t bytes = 0;
-  /// Tiles in memory, and on the shelf.
+  /// Tiles in memory, and in the tile store.
   std::size_t resident_tiles = 0;
-  std::size_t away_tiles = 0;
+  std::size_t non_resident_tiles = 0;
 };
 
 /// The planning map: stationary points only, as labelled voxels in tiles (paper II-C.2). One
@@ -75,13 +76,13 @@ class StaticMap {
   void insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar);
 
   /// Whether the scan inserted last is one to be asked what it looked through.
-  [[nodiscard]] bool wants_look() const;
+  [[nodiscard]] bool clearing_due() const;
   /// Counts that scan against the voxels that it looked through: what stood there before is not
   /// part of the still world, whatever its class.
-  void look_through(const RangeView& view, std::int64_t stamp_ns);
+  void clear_seen_through(const RangeImageView& view, std::int64_t stamp_ns);
 
   /// What is kept out of the planning view in this part of the map (map frame [m]), and why; in no
-  /// order. Throws as the shelf does.
+  /// order. Throws as the tile store does.
   [[nodiscard]] std::vector<RemovedVoxel> removed(const Eigen::AlignedBox3d& box_map) const;
   /// Shows again what was removed for this reason in this part of the map; it stays until a reset.
   /// Returns how many voxels.
@@ -94,28 +95,28 @@ class StaticMap {
   /// The planning view as it is now: voxels hit `min_points` times whose class is not a movable
   /// one. Tiles whose content (tile_content.hpp) did not change since the last view are shared
   /// with it, with their counts and times of then; where nothing changed, so is the whole view.
-  [[nodiscard]] std::shared_ptr<const MapView> view();
+  [[nodiscard]] std::shared_ptr<const MapSnapshot> view();
 
   /// Takes over a stored map; later scans extend it. Tiles without their voxels are taken to be on
-  /// the shelf. Give it a new `map_id`: the map may have been at a later version than the one
+  /// the tile store. Give it a new `map_id`: the map may have been at a later version than the one
   /// stored. Throws std::invalid_argument when its voxel or tile size is not the configured one.
-  void restore(const MapView& view, const TileMemories& memories = {});
+  void resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidence = {});
 
   /// Where tiles may go that are far away. What is there must be what checkpoints brought there.
-  void use_shelf(std::shared_ptr<TileShelf> shelf);
+  void use_tile_store(std::shared_ptr<TileStore> tile_store);
   /// The map as it is now, with all of every tile that changed since what was stored last; with
   /// `everything`, of every tile in memory.
   [[nodiscard]] MapCheckpoint checkpoint(bool everything = false);
-  /// This checkpoint, and all before, are on the shelf.
+  /// This checkpoint, and all before, are in the tile store.
   void checkpoint_stored(std::uint64_t step);
   /// Lets tiles that are stored and out of the lidar's reach go, farthest first, until the map
   /// takes no more than this. Returns how many. They come back by themselves.
-  std::size_t shelve(const Eigen::Vector3d& position_map, std::size_t limit_bytes);
-  /// Has tiles from the shelf in memory, nearest first, as many as fit.
-  void take_back_near(const Eigen::Vector3d& position_map, std::size_t limit_bytes);
+  std::size_t evict(const Eigen::Vector3d& position_map, std::size_t limit_bytes);
+  /// Has tiles from the tile store in memory, nearest first, as many as fit.
+  void reload_near(const Eigen::Vector3d& position_map, std::size_t limit_bytes);
   /// What the tiles take, published ones included.
   [[nodiscard]] MemoryUse memory_use() const;
-  /// Tiles that the shelf could not give back, with the reason: they stay as they are stored.
+  /// Tiles that the tile store could not give back, with the reason: they stay as they are stored.
   [[nodiscard]] std::vector<std::string> unreadable_tiles() const;
 
   /// Empties the map; `map_id` tells clients that it is another one now.

@@ -34,22 +34,23 @@ std::string StaticMapConfig::faults() const {
     faults << "max_range_m = " << max_range_m << "; must be above 0 and at most " << max_range_tiles
            << " tiles (" << max_range_tiles * tile_size_m << ")\n";
   }
-  if (!(clear_range_m >= 0.0 && clear_range_m <= 1000.0)) {
-    faults << "clear_range_m = " << clear_range_m << "; must be 0 (off) to 1000\n";
+  if (!(clearing_range_m >= 0.0 && clearing_range_m <= 1000.0)) {
+    faults << "clear_range_m = " << clearing_range_m << "; must be 0 (off) to 1000\n";
   }
-  if (!(clear_margin_m >= voxel_size_m && clear_margin_m <= 100.0)) {
-    faults << "clear_margin_m = " << clear_margin_m << "; must be at least voxel_size_m ("
+  if (!(clearing_margin_m >= voxel_size_m && clearing_margin_m <= 100.0)) {
+    faults << "clear_margin_m = " << clearing_margin_m << "; must be at least voxel_size_m ("
            << voxel_size_m << ") and at most 100\n";
   }
-  if (!(clear_margin_share >= 0.0 && clear_margin_share <= 1.0)) {
-    faults << "clear_margin_share = " << clear_margin_share << "; must be 0 to 1\n";
+  if (!(clearing_margin_share >= 0.0 && clearing_margin_share <= 1.0)) {
+    faults << "clear_margin_share = " << clearing_margin_share << "; must be 0 to 1\n";
   }
-  if (look_every == 0 || look_every > 1000) {
-    faults << "look_every = " << look_every << "; must be 1 to 1000\n";
+  if (clearing_interval == 0 || clearing_interval > 1000) {
+    faults << "look_every = " << clearing_interval << "; must be 1 to 1000\n";
   }
-  if (passes == 0 || passes > 1000) faults << "passes = " << passes << "; must be 1 to 1000\n";
-  if (passes_per_hit == 0 || passes_per_hit > 1000) {
-    faults << "passes_per_hit = " << passes_per_hit << "; must be 1 to 1000\n";
+  if (misses_to_clear == 0 || misses_to_clear > 1000)
+    faults << "passes = " << misses_to_clear << "; must be 1 to 1000\n";
+  if (misses_per_hit == 0 || misses_per_hit > 1000) {
+    faults << "passes_per_hit = " << misses_per_hit << "; must be 1 to 1000\n";
   }
   if (min_points == 0) faults << "min_points = 0; must be at least 1\n";
   return faults.str();

@@ -35,12 +35,14 @@ struct StaticMap::State {
 
   void clear(std::uint64_t map_id);
   [[nodiscard]] VisibilityRule rule() const {
-    return {config.min_points, config.passes, config.passes_per_hit};
+    return {config.min_points, config.misses_to_clear, config.misses_per_hit};
   }
-  /// A new tile, one in memory, or one from the shelf; null when the shelf cannot read it.
+  /// A new tile, one in memory, or one from the tile store; null when the tile store cannot read
+  /// it.
   [[nodiscard]] LiveTile* tile(TileId id);
-  /// Has the tile, which is away, in memory again; false when the shelf cannot read it.
-  bool take_back(TileId id);
+  /// Has the tile, which is non-resident, in memory again; false when the tile store cannot read
+  /// it.
+  bool reload(TileId id);
   /// The tile changed in this step.
   void touch(LiveTile& live);
   /// Tiles in memory whose footprint comes this near.
@@ -55,22 +57,22 @@ struct StaticMap::State {
   VoxelGrid grid;
   ScanSorter sorter;
   tsl::robin_map<TileId, Resident, TileIdHash> tiles;
-  /// On the shelf: what views show of them, null where that is nothing.
-  std::map<TileId, std::shared_ptr<const Tile>> away;
-  std::shared_ptr<TileShelf> shelf;
-  /// Why tiles that are away could not be read.
+  /// In the tile store: what views show of them, null where that is nothing.
+  std::map<TileId, std::shared_ptr<const Tile>> non_resident;
+  std::shared_ptr<TileStore> tile_store;
+  /// Why tiles that are non-resident could not be read.
   std::map<TileId, std::string> unreadable;
   /// Tiles with points since the last view; a tile may be named more than once.
   std::vector<LiveTile*> touched;
   /// Tiles left memory or came back since the last view.
-  bool moved = false;
+  bool residency_changed = false;
   /// Scans so far.
   std::uint64_t inserted = 0;
-  /// Counts everything that changes tiles, and how far of it is on the shelf.
+  /// Counts everything that changes tiles, and how far of it is in the tile store.
   std::uint64_t step = 1;
   std::uint64_t stored_step = 0;
   /// The last view.
-  std::shared_ptr<const MapView> current;
+  std::shared_ptr<const MapSnapshot> current;
 };
 
 }  // namespace stillmap

@@ -82,7 +82,7 @@ struct Tile {
 };
 
 /// An immutable state of the whole map; cheap to copy, safe to read from any thread.
-struct MapView {
+struct MapSnapshot {
   /// Grows with every change of the map; 0 is the empty map.
   std::uint64_t version = 0;
   /// Distinguishes maps: changes with reset and load, so that versions of different maps are never

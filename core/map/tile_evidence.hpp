@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "core/map/removed_voxel.hpp"
@@ -12,25 +11,25 @@
 namespace stillmap {
 
 /// How a voxel came to be shown or hidden.
-struct VoxelPast {
+struct VoxelHistory {
   /// Scans that hit it, and scans that looked through it.
   std::uint16_t hits = 0;
-  std::uint16_t passes = 0;
+  std::uint16_t misses = 0;
   bool was_shown = false;
   bool is_restored = false;
-  friend bool operator==(const VoxelPast&, const VoxelPast&) = default;
+  friend bool operator==(const VoxelHistory&, const VoxelHistory&) = default;
 };
 
 /// A voxel that is not in the planning view.
 struct HiddenVoxel {
   Voxel voxel;
-  VoxelPast past;
+  VoxelHistory history;
   /// Nothing: it was hit too rarely to be shown.
   std::optional<RemovalReason> reason;
 };
 
 /// A place that only movable things hit.
-struct ExcludedPlace {
+struct ExcludedVoxel {
   VoxelIndex index;
   SemanticClass label = SemanticClass::unlabeled;
   bool was_moving = false;
@@ -39,14 +38,14 @@ struct ExcludedPlace {
 
 /// What is known of a tile beside the voxels that it shows: with both, mapping goes on as if the
 /// tile had never left memory.
-struct TileMemory {
+struct TileEvidence {
   TileId id;
   /// Of the tile's voxels, in their order.
-  std::vector<VoxelPast> shown;
+  std::vector<VoxelHistory> shown;
   /// Sorted by index.
   std::vector<HiddenVoxel> hidden;
   /// Sorted by index.
-  std::vector<ExcludedPlace> excluded;
+  std::vector<ExcludedVoxel> excluded;
 };
 
 /// All of a tile.
@@ -54,18 +53,11 @@ struct TileRecord {
   /// Null when nothing of it is shown.
   std::shared_ptr<const Tile> tile;
   /// Null when no more is known than what is shown.
-  std::shared_ptr<const TileMemory> memory;
+  std::shared_ptr<const TileEvidence> evidence;
 };
 
-/// The places that the memory keeps out of the planning view, with their reasons.
-[[nodiscard]] std::vector<RemovedVoxel> removed_voxels(const TileMemory& memory,
+/// The places that the evidence keeps out of the planning view, with their reasons.
+[[nodiscard]] std::vector<RemovedVoxel> removed_voxels(const TileEvidence& evidence,
                                                        double voxel_size_m, double tile_size_m);
-
-/// A memory as bytes, nothing lost: a version byte, then a zstd frame (with checksum) of i32 x,
-/// i32 y, three u32 counts, and the three lists by byte planes. All little-endian.
-[[nodiscard]] std::vector<std::uint8_t> encode_memory(const TileMemory& memory);
-
-/// Throws TileCodecError for whatever encode_memory did not write; reads nothing beyond `bytes`.
-[[nodiscard]] TileMemory decode_memory(std::span<const std::uint8_t> bytes);
 
 }  // namespace stillmap

@@ -49,7 +49,7 @@ Eigen::AlignedBox3d tile_footprint(TileId id, double tile_size_m) {
                           corner.y() + tile_size_m + float_step_m, everywhere)};
 }
 
-std::vector<std::size_t> tiles_in_box(const MapView& view, const Eigen::AlignedBox3d& box_map) {
+std::vector<std::size_t> tiles_in_box(const MapSnapshot& view, const Eigen::AlignedBox3d& box_map) {
   std::vector<std::size_t> found;
   if (view.tiles.empty() || !is_usable(box_map)) return found;
   const IdRange xs = ids_between(box_map.min().x(), box_map.max().x(), view.tile_size_m);
@@ -73,13 +73,13 @@ std::vector<std::size_t> tiles_in_box(const MapView& view, const Eigen::AlignedB
   return found;
 }
 
-std::vector<TileInfo> tile_versions(const MapView& view, const Eigen::AlignedBox3d& box_map) {
+std::vector<TileInfo> tile_versions(const MapSnapshot& view, const Eigen::AlignedBox3d& box_map) {
   std::vector<TileInfo> infos;
   for (const std::size_t i : tiles_in_box(view, box_map)) infos.push_back(view.tiles[i]->info);
   return infos;
 }
 
-std::vector<std::shared_ptr<const Tile>> find_tiles(const MapView& view,
+std::vector<std::shared_ptr<const Tile>> find_tiles(const MapSnapshot& view,
                                                     std::span<const TileId> ids) {
   std::vector<std::shared_ptr<const Tile>> found;
   for (const TileId& id : ids) {

@@ -17,7 +17,7 @@ bool VoxelGrid::holds(const Eigen::Vector3d& p_map) const {
          std::abs(p_map.z()) <= max_z_m;
 }
 
-VoxelGrid::Place VoxelGrid::place(const Eigen::Vector3d& p_map) const {
+VoxelGrid::Index VoxelGrid::index(const Eigen::Vector3d& p_map) const {
   const Eigen::Vector3d in_voxels = p_map / voxel_size_m_;
   const Eigen::Vector3d whole = in_voxels.array().floor();
   const Eigen::Vector3i voxel = whole.cast<int>();

@@ -25,7 +25,7 @@ class VoxelGrid {
   [[nodiscard]] double voxel_size_m() const { return voxel_size_m_; }
   [[nodiscard]] double tile_size_m() const { return voxel_size_m_ * columns_; }
 
-  struct Place {
+  struct Index {
     TileId tile;
     VoxelIndex voxel;
     /// From the voxel's lowest corner, in voxels: 0..1.
@@ -36,7 +36,7 @@ class VoxelGrid {
   [[nodiscard]] bool holds(const Eigen::Vector3d& p_map) const;
 
   /// Requires holds(p_map).
-  [[nodiscard]] Place place(const Eigen::Vector3d& p_map) const;
+  [[nodiscard]] Index index(const Eigen::Vector3d& p_map) const;
 
   /// The voxel's lowest corner, map frame [m].
   [[nodiscard]] Eigen::Vector3d corner_map(TileId tile, VoxelIndex voxel) const;

@@ -14,7 +14,7 @@ struct OccupancyConfig {
   /// Rays clear what they pass up to this range; 0: nothing is ever cleared.
   double clear_range_m = 25.0;
   /// Every so many scans one clears: all of them would tell the same.
-  std::uint32_t clear_every = 3;
+  std::uint32_t clearing_interval = 3;
   /// A ray clears up to this much, and this share of its range, before its point: near its end a
   /// ray grazes the surface that it hits.
   double clear_margin_m = 0.5;

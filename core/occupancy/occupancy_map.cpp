@@ -47,7 +47,7 @@ struct OccupancyMap::State {
   std::uint64_t version = 0;
   std::uint64_t scans = 0;
   /// Columns that are forgotten until their tiles come back.
-  std::set<OctreeColumn> away;
+  std::set<OctreeColumn> nonresident;
 };
 
 namespace {
@@ -102,27 +102,27 @@ OccupancyMap::OccupancyMap(OccupancyMap&&) noexcept = default;
 OccupancyMap& OccupancyMap::operator=(OccupancyMap&&) noexcept = default;
 
 void OccupancyMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
-                          const ScanUse& use) {
-  gather(scan, T_map_lidar, use);
-  take_gathered();
+                          const ScanUpdateOptions& use) {
+  compute_update(scan, T_map_lidar, use);
+  apply_update();
 }
 
-void OccupancyMap::gather(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
-                          const ScanUse& use, const Pause& pause) {
-  ScanUse this_one = use;
-  const bool is_due = state_->scans++ % state_->config.clear_every == 0;
-  this_one.clears = use.clears && is_due && state_->config.clear_range_m > 0.0;
+void OccupancyMap::compute_update(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+                                  const ScanUpdateOptions& use, const ThrottleCallback& throttle) {
+  ScanUpdateOptions this_one = use;
+  const bool is_due = state_->scans++ % state_->config.clearing_interval == 0;
+  this_one.clear_free_space = use.clear_free_space && is_due && state_->config.clear_range_m > 0.0;
   state_->begin_to_gather();
-  gather_scan(state_->config, scan, T_map_lidar, this_one, state_->bricks, pause);
+  compute_scan_update(state_->config, scan, T_map_lidar, this_one, state_->bricks, throttle);
   state_->gathered = state_->bricks.sorted();
 }
 
-bool OccupancyMap::take_gathered(std::size_t max_bricks) {
+bool OccupancyMap::apply_update(std::size_t max_bricks) {
   return state_->take(max_bricks,
                       {state_->octree.getProbHitLog(), state_->octree.getProbMissLog()});
 }
 
-void OccupancyMap::insert(const MapView& view, const Pause& pause) {
+void OccupancyMap::insert(const MapSnapshot& view, const ThrottleCallback& throttle) {
   if (view.tiles.empty()) return;
   const VoxelGrid grid(view.voxel_size_m, view.tile_size_m);
   const Eigen::Vector3d half = Eigen::Vector3d::Constant(view.voxel_size_m / 2.0);
@@ -131,7 +131,7 @@ void OccupancyMap::insert(const MapView& view, const Pause& pause) {
   const double side_m = is_finer ? view.voxel_size_m : 0.0;
   state_->begin_to_gather();
   for (const auto& tile : view.tiles) {
-    if (pause) pause();
+    if (throttle) throttle();
     for (const Voxel& voxel : tile->voxels) {
       const Eigen::Vector3d centre_map = grid.corner_map(tile->info.id, voxel.index) + half;
       add_cube(is_finer ? centre_map : voxel.mean_map.cast<double>(), side_m,
@@ -141,22 +141,22 @@ void OccupancyMap::insert(const MapView& view, const Pause& pause) {
   state_->gathered = state_->bricks.sorted();
   const float surest = state_->octree.getClampingThresMaxLog();
   while (state_->take(portion_bricks, {2.0F * surest, 0.0F})) {
-    if (pause) pause();
+    if (throttle) throttle();
   }
 }
 
-bool OccupancyMap::follow(const MapView& view) {
+bool OccupancyMap::sync_residency(const MapSnapshot& view) {
   std::set<OctreeColumn> gone;
-  MapView back{view.version, view.map_id, view.tile_size_m, view.voxel_size_m, {}};
+  MapSnapshot back{view.version, view.map_id, view.tile_size_m, view.voxel_size_m, {}};
   for (const auto& [column, tiles] : columns_of(view, state_->config.resolution_m)) {
-    const bool is_gone = tiles.has_away && tiles.resident.empty();
-    if (is_gone && state_->away.insert(column).second) gone.insert(column);
-    if (!is_gone && state_->away.erase(column) > 0) {
+    const bool is_gone = tiles.has_nonresident && tiles.resident.empty();
+    if (is_gone && state_->nonresident.insert(column).second) gone.insert(column);
+    if (!is_gone && state_->nonresident.erase(column) > 0) {
       back.tiles.insert(back.tiles.end(), tiles.resident.begin(), tiles.resident.end());
     }
   }
   if (!gone.empty()) {
-    forget_columns(state_->octree, gone);
+    evict_columns(state_->octree, gone);
     ++state_->version;
   }
   insert(back);
@@ -164,16 +164,16 @@ bool OccupancyMap::follow(const MapView& view) {
 }
 
 PointOccupancy OccupancyMap::at_point(const Eigen::Vector3d& p_map) const {
-  return point_in(state_->octree, p_map);
+  return query_point(state_->octree, p_map);
 }
 
 BoxOccupancy OccupancyMap::in_box(const Eigen::AlignedBox3d& box_map,
                                   std::size_t max_voxels) const {
-  return box_in(state_->octree, box_map, max_voxels);
+  return query_box(state_->octree, box_map, max_voxels);
 }
 
 RayOccupancy OccupancyMap::along_ray(const RayQuery& ray) const {
-  return ray_in(state_->octree, ray);
+  return cast_ray(state_->octree, ray);
 }
 
 OccupancyAnswers OccupancyMap::answer(const OccupancyQuery& query) const {

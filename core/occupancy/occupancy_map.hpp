@@ -4,12 +4,12 @@
 #include <memory>
 
 #include "core/lidar/labelled_scan.hpp"
+#include "core/map/throttle_callback.hpp"
 #include "core/map/tile.hpp"
 #include "core/occupancy/occupancy_config.hpp"
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"
 #include "core/occupancy/scan_update_options.hpp"
-#include "core/throttle_callback.hpp"
 
 namespace stillmap {
 
@@ -37,24 +37,24 @@ class OccupancyMap {
   /// rays of all its points pass becomes free. A voxel changes once a scan, and a hit counts before
   /// what passed. `scan.motion` is as long as the scan.
   void insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
-              const ScanUse& use = {});
+              const ScanUpdateOptions& use = {});
 
   /// The two halves of it: the first, which takes longer and may be held up, changes nothing that
   /// readers see, and needs no lock against them. The second can be done in portions, with readers
   /// between them; it returns whether more is left. Nothing else may be inserted before that.
-  void gather(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar, const ScanUse& use,
-              const Pause& pause = {});
-  bool take_gathered(std::size_t max_bricks = std::numeric_limits<std::size_t>::max());
+  void compute_update(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+                      const ScanUpdateOptions& use, const ThrottleCallback& throttle = {});
+  bool apply_update(std::size_t max_bricks = std::numeric_limits<std::size_t>::max());
   /// A portion that takes about a millisecond.
   static constexpr std::size_t portion_bricks = 512;
 
   /// Takes the voxels of a static map for occupied, as sure as can be.
-  void insert(const MapView& view, const Pause& pause = {});
+  void insert(const MapSnapshot& view, const ThrottleCallback& throttle = {});
 
-  /// Where the static map's tiles are on the shelf, nothing stays in memory here either; where they
-  /// came back, their voxels are occupied again, and free space is to be seen anew. Returns whether
-  /// that changed anything.
-  bool follow(const MapView& view);
+  /// Where the static map's tiles are in the tile store, nothing stays in memory here either; where
+  /// they came back, their voxels are occupied again, and free space is to be seen anew. Returns
+  /// whether that changed anything.
+  bool sync_residency(const MapSnapshot& view);
 
   [[nodiscard]] PointOccupancy at_point(const Eigen::Vector3d& p_map) const;
   /// At most `max_voxels` occupied voxels are listed; all are counted.

@@ -13,10 +13,9 @@ std::string too_many(const char* what, std::size_t asked, std::size_t most) {
 }  // namespace
 
 std::string OccupancyQuery::faults() const {
-  return too_many("points", points_map.size(), most_points) +
-         too_many("boxes", boxes_map.size(), most_boxes) +
-         too_many("rays", rays.size(), most_rays) +
-         too_many("voxels (max_voxels)", max_voxels, most_voxels);
+  return too_many("points", points_map.size(), max_points) +
+         too_many("boxes", boxes_map.size(), max_boxes) + too_many("rays", rays.size(), max_rays) +
+         too_many("voxels (max_voxels)", max_voxels, max_listed_voxels);
 }
 
 }  // namespace stillmap

@@ -42,10 +42,10 @@ struct RayQuery {
   Eigen::Vector3d direction_map = Eigen::Vector3d::UnitX();
   double max_range_m = 100.0;
   /// Goes on through what is unknown instead of ending there.
-  bool passes_unknown = false;
+  bool ignore_unknown = false;
 
   /// A ray may not be longer.
-  static constexpr double longest_m = 1000.0;
+  static constexpr double max_length_m = 1000.0;
 };
 
 /// How a ray ended: at its full range or the map's edge (free), at an occupied voxel, or at an
@@ -66,10 +66,10 @@ struct OccupancyQuery {
   /// Of occupied voxels listed, all boxes together.
   std::uint32_t max_voxels = 1000;
 
-  static constexpr std::size_t most_points = 10'000;
-  static constexpr std::size_t most_boxes = 100;
-  static constexpr std::size_t most_rays = 1000;
-  static constexpr std::uint32_t most_voxels = 100'000;
+  static constexpr std::size_t max_points = 10'000;
+  static constexpr std::size_t max_boxes = 100;
+  static constexpr std::size_t max_rays = 1000;
+  static constexpr std::uint32_t max_listed_voxels = 100'000;
 
   /// Why so much is not answered at once, one reason a line; empty when it is.
   [[nodiscard]] std::string faults() const;

@@ -102,7 +102,7 @@ class Pruner {
 
 }  // namespace
 
-std::map<OctreeColumn, ColumnTiles> columns_of(const MapView& view, double resolution_m) {
+std::map<OctreeColumn, ColumnTiles> columns_of(const MapSnapshot& view, double resolution_m) {
   std::map<OctreeColumn, ColumnTiles> columns;
   // A hair inside, so that a tile does not touch the column beyond its far edge.
   const double far_side_m = view.tile_size_m - 0.5 * resolution_m;
@@ -115,8 +115,8 @@ std::map<OctreeColumn, ColumnTiles> columns_of(const MapView& view, double resol
     for (OctreeColumn at = first; at.x <= last.x; ++at.x) {
       for (at.y = first.y; at.y <= last.y; ++at.y) {
         ColumnTiles& column = columns[at];
-        if (is_away(*tile)) {
-          column.has_away = true;
+        if (is_non_resident(*tile)) {
+          column.has_nonresident = true;
         } else {
           column.resident.push_back(tile);
         }
@@ -126,7 +126,7 @@ std::map<OctreeColumn, ColumnTiles> columns_of(const MapView& view, double resol
   return columns;
 }
 
-void forget_columns(octomap::OcTree& octree, const std::set<OctreeColumn>& columns) {
+void evict_columns(octomap::OcTree& octree, const std::set<OctreeColumn>& columns) {
   OctreeCopy left(octree.getResolution());
   Pruner(octree, left, columns).copy_all();
   octree.swapContent(left);

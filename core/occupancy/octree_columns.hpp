@@ -28,14 +28,14 @@ struct OctreeColumn {
 struct ColumnTiles {
   /// Those in memory.
   std::vector<std::shared_ptr<const Tile>> resident;
-  bool has_away = false;
+  bool has_nonresident = false;
 };
 
 /// The columns that tiles of the view touch.
-[[nodiscard]] std::map<OctreeColumn, ColumnTiles> columns_of(const MapView& view,
+[[nodiscard]] std::map<OctreeColumn, ColumnTiles> columns_of(const MapSnapshot& view,
                                                              double resolution_m);
 
 /// Makes all of these columns unknown, at the cost of a copy of what is left.
-void forget_columns(octomap::OcTree& octree, const std::set<OctreeColumn>& columns);
+void evict_columns(octomap::OcTree& octree, const std::set<OctreeColumn>& columns);
 
 }  // namespace stillmap

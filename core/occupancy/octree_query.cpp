@@ -118,16 +118,16 @@ std::string ray_fault(const OcTree& octree, const RayQuery& ray) {
     return "ray's direction is " + text_of(ray.direction_map) +
            "; it must be finite and longer than 0";
   }
-  if (ray.max_range_m > 0.0 && ray.max_range_m <= RayQuery::longest_m) return {};
+  if (ray.max_range_m > 0.0 && ray.max_range_m <= RayQuery::max_length_m) return {};
   std::ostringstream text;
   text << "ray's max_range_m is " << ray.max_range_m << "; it must be above 0 and at most "
-       << RayQuery::longest_m;
+       << RayQuery::max_length_m;
   return text.str();
 }
 
 }  // namespace
 
-PointOccupancy point_in(const OcTree& octree, const Eigen::Vector3d& p_map) {
+PointOccupancy query_point(const OcTree& octree, const Eigen::Vector3d& p_map) {
   PointOccupancy result;
   result.fault = place_fault(octree, "point", p_map);
   if (!result.fault.empty()) return result;
@@ -138,8 +138,8 @@ PointOccupancy point_in(const OcTree& octree, const Eigen::Vector3d& p_map) {
   return result;
 }
 
-BoxOccupancy box_in(const OcTree& octree, const Eigen::AlignedBox3d& box_map,
-                    std::size_t max_voxels) {
+BoxOccupancy query_box(const OcTree& octree, const Eigen::AlignedBox3d& box_map,
+                       std::size_t max_voxels) {
   BoxOccupancy result;
   result.fault = box_fault(octree, box_map);
   if (!result.fault.empty()) return result;
@@ -154,14 +154,14 @@ BoxOccupancy box_in(const OcTree& octree, const Eigen::AlignedBox3d& box_map,
   return result;
 }
 
-RayOccupancy ray_in(const OcTree& octree, const RayQuery& query) {
+RayOccupancy cast_ray(const OcTree& octree, const RayQuery& query) {
   RayOccupancy result;
   result.fault = ray_fault(octree, query);
   if (!result.fault.empty()) return result;
   const double resolution_m = octree.getResolution();
   const double length = query.max_range_m / resolution_m;
   const Eigen::Vector3d direction = query.direction_map.stableNormalized();
-  RayWalk ray(in_voxels(octree, query.origin_map), direction);
+  RayIterator ray(in_voxels(octree, query.origin_map), direction);
   const auto inside = [&] {
     return (ray.voxel().array() >= 0).all() && (ray.voxel().array() < octree_side).all();
   };
@@ -171,10 +171,10 @@ RayOccupancy ray_in(const OcTree& octree, const RayQuery& query) {
     const Occupancy here =
         inside() ? occupancy_of(octree, octree.search(tree_key(ray.voxel()))) : Occupancy::unknown;
     const bool goes_on =
-        here == Occupancy::free || (here == Occupancy::unknown && query.passes_unknown && inside());
+        here == Occupancy::free || (here == Occupancy::unknown && query.ignore_unknown && inside());
     if (goes_on) continue;
     // Who passes what is unknown leaves the map at its edge as if through free space.
-    result.end = here == Occupancy::unknown && query.passes_unknown ? Occupancy::free : here;
+    result.end = here == Occupancy::unknown && query.ignore_unknown ? Occupancy::free : here;
     result.length_m = ray.entered_at() * resolution_m;
     break;
   }

@@ -4,7 +4,7 @@
 
 namespace stillmap {
 
-RayWalk::RayWalk(const Eigen::Vector3d& start, const Eigen::Vector3d& direction)
+RayIterator::RayIterator(const Eigen::Vector3d& start, const Eigen::Vector3d& direction)
     : voxel_(start.array().floor().cast<std::int32_t>()) {
   constexpr double never = std::numeric_limits<double>::infinity();
   for (Eigen::Index axis = 0; axis < 3; ++axis) {

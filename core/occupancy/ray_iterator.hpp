@@ -6,10 +6,10 @@ namespace stillmap {
 
 /// Walks along a line through a grid of unit cubes, from cube to neighbouring cube (Amanatides and
 /// Woo, 1987). Positions are in voxels.
-class RayWalk {
+class RayIterator {
  public:
   /// `direction` is of length 1. Requires a start of less than 2^30 voxels from the origin.
-  RayWalk(const Eigen::Vector3d& start, const Eigen::Vector3d& direction);
+  RayIterator(const Eigen::Vector3d& start, const Eigen::Vector3d& direction);
 
   [[nodiscard]] const VoxelKey& voxel() const { return voxel_; }
   /// How far along the line this voxel begins; 0 for the one where it starts.

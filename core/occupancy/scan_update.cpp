@@ -5,9 +5,9 @@
 namespace stillmap {
 namespace {
 
-constexpr std::size_t points_between_pauses = 64;
+constexpr std::size_t points_between_throttle_calls = 64;
 
-bool is_solid(const LabelledScan& scan, std::size_t i, const ScanUse& use) {
+bool is_solid(const LabelledScan& scan, std::size_t i, const ScanUpdateOptions& use) {
   if (scan.motion[i] != Motion::stationary) return false;
   return use.unknown_is_solid || scan.label(i) != SemanticClass::unlabeled;
 }
@@ -47,7 +47,7 @@ class Gathering {
     const std::uint64_t octant = VoxelBricks::octant_of(end_voxel);
     if ((brick.ray_ends & octant) != 0) return;
     brick.ray_ends |= octant;
-    for (RayWalk ray(lidar_, direction); ray.entered_at() < length; ray.step()) {
+    for (RayIterator ray(lidar_, direction); ray.entered_at() < length; ray.step()) {
       bricks_.brick_of(ray.voxel()).misses |= VoxelBricks::bit_of(ray.voxel());
     }
   }
@@ -70,16 +70,16 @@ bool in_octree(const Eigen::Vector3d& p_voxels) {
   return (p_voxels.array() >= 1.0).all() && (p_voxels.array() < octree_side - 1.0).all();
 }
 
-void gather_scan(const OccupancyConfig& config, const LabelledScan& scan,
-                 const Eigen::Isometry3d& T_map_lidar, const ScanUse& use, VoxelBricks& bricks,
-                 const Pause& pause) {
+void compute_scan_update(const OccupancyConfig& config, const LabelledScan& scan,
+                         const Eigen::Isometry3d& T_map_lidar, const ScanUpdateOptions& use,
+                         VoxelBricks& bricks, const ThrottleCallback& throttle) {
   Gathering gathering(config, T_map_lidar, bricks);
   if (!gathering.lidar_is_inside()) return;
   for (std::size_t i = 0; i < scan.scan.size(); ++i) {
-    if (pause && i % points_between_pauses == 0) pause();
+    if (throttle && i % points_between_throttle_calls == 0) throttle();
     const Eigen::Vector3d p_lidar = scan.scan.points_lidar[i].cast<double>();
     if (is_solid(scan, i, use)) gathering.hit(p_lidar);
-    if (use.clears) gathering.clear_towards(p_lidar);
+    if (use.clear_free_space) gathering.clear_towards(p_lidar);
   }
 }
 

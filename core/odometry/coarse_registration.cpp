@@ -7,7 +7,7 @@ constexpr double reach_m = 3.0;
 
 }  // namespace
 
-OdometryConfig coarse(OdometryConfig config) {
+OdometryConfig coarse_registration_config(OdometryConfig config) {
   config.weighting = Weighting::none;
   config.registration.robust_scale_m = 0.5;
   config.registration.max_neighbour_distance_m = reach_m;
@@ -18,7 +18,7 @@ OdometryConfig coarse(OdometryConfig config) {
   return config;
 }
 
-LocalMap coarse_map() {
+LocalMap make_coarse_map() {
   const LocalMapConfig config{
       .voxel_size_m = reach_m, .max_points_per_voxel = 32, .min_spacing_m = 0.5};
   return {FeatureMap(config), FeatureMap(config)};

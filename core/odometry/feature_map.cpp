@@ -29,7 +29,8 @@ constexpr std::array<std::array<int, 3>, 27> offsets_by_distance = [] {
 }();
 
 /// Keeps `neighbours` sorted and at most n long.
-void offer(Neighbours& neighbours, int n, const LabelledPoint& point, float squared_distance) {
+void insert_sorted(Neighbours& neighbours, int n, const LabelledPoint& point,
+                   float squared_distance) {
   int place = neighbours.count < n ? neighbours.count++ : n - 1;
   for (; place > 0; --place) {
     const auto k = static_cast<std::size_t>(place);
@@ -138,14 +139,14 @@ Neighbours FeatureMap::nearest(const Eigen::Vector3f& position_map, int n,
     }
     for (std::size_t i = 0; i < count; ++i) {
       if (squared[i] > limit) continue;
-      offer(found, n, {block.position(static_cast<int>(i)), block.label[i]}, squared[i]);
+      insert_sorted(found, n, {block.position(static_cast<int>(i)), block.label[i]}, squared[i]);
       if (found.count == n) limit = found.squared_distance[static_cast<std::size_t>(n - 1)];
     }
   }
   return found;
 }
 
-void FeatureMap::forget_far_from(const Eigen::Vector3f& centre_map) {
+void FeatureMap::remove_far_from(const Eigen::Vector3f& centre_map) {
   for (auto entry = index_.begin(); entry != index_.end();) {
     Block& block = blocks_[entry->second];
     if (block.count > 0 &&

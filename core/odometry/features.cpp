@@ -176,9 +176,10 @@ Features extract_features(const Scan& scan, const FeatureConfig& config) {
     planes.insert(planes.end(), ring.planes.begin(), ring.planes.end());
   }
   Features features;
-  features.edges = thin(scan.points_lidar, edges, config.edge_spacing_m);
-  features.planes = thin(scan.points_lidar, planes, config.map_plane_spacing_m);
-  features.registered_planes = thin(scan.points_lidar, features.planes, config.plane_spacing_m);
+  features.edges = voxel_downsample(scan.points_lidar, edges, config.edge_spacing_m);
+  features.planes = voxel_downsample(scan.points_lidar, planes, config.map_plane_spacing_m);
+  features.registered_planes =
+      voxel_downsample(scan.points_lidar, features.planes, config.plane_spacing_m);
   return features;
 }
 

@@ -11,8 +11,8 @@
 
 namespace stillmap {
 
-/// What past views say of an object.
-enum class ObjectVerdict : std::uint8_t {
+/// What earlier range images say of an object.
+enum class MotionClass : std::uint8_t {
   /// Not seen long enough to say.
   undecided,
   /// It stood here in the oldest kept view too.
@@ -21,22 +21,21 @@ enum class ObjectVerdict : std::uint8_t {
   moving,
 };
 
-/// One verdict an object. Undecided all when there are no past views.
-[[nodiscard]] std::vector<ObjectVerdict> judge_objects(const Scan& scan, const Objects& objects,
-                                                       const Eigen::Isometry3d& T_map_lidar,
-                                                       const PastViews& past, const RangeView& now,
-                                                       const MotionConfig& config);
+/// One class an object. Undecided all when there are no earlier range images.
+[[nodiscard]] std::vector<MotionClass> classify_motion(
+    const Scan& scan, const ObjectClusters& objects, const Eigen::Isometry3d& T_map_lidar,
+    const RangeImageHistory& history, const RangeImageView& now, const MotionConfig& config);
 
 /// Motion of every point (paper II-C.2). Points of classes that cannot move are stationary;
-/// movable ones are highly dynamic where past views show their object moving, semi-static
-/// otherwise. Without past views eq. (9) decides: c > c_th against the local map, voted by object.
-/// It is not used beside them, since it takes every parked car that comes into sight over known
-/// road for a moving one (precision 0.36 instead of 0.94 in the simulated quiet city).
-[[nodiscard]] std::vector<Motion> split_by_motion(const Scan& scan, const PointLabels& labels,
-                                                  const Objects& objects,
-                                                  std::span<const ObjectVerdict> verdicts,
-                                                  const Eigen::Isometry3d& T_map_lidar,
-                                                  const LocalMap& map,
-                                                  const OdometryConfig& config);
+/// movable ones are highly dynamic where earlier range images show their object moving, semi-static
+/// otherwise. Without earlier range images eq. (9) decides: c > c_th against the local map, voted
+/// by object. It is not used beside them, since it takes every parked car that comes into sight
+/// over known road for a moving one (precision 0.36 instead of 0.94 in the simulated quiet city).
+[[nodiscard]] std::vector<Motion> classify_point_motion(const Scan& scan, const PointLabels& labels,
+                                                        const ObjectClusters& objects,
+                                                        std::span<const MotionClass> motion_classes,
+                                                        const Eigen::Isometry3d& T_map_lidar,
+                                                        const LocalMap& map,
+                                                        const OdometryConfig& config);
 
 }  // namespace stillmap

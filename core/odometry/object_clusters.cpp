@@ -70,9 +70,9 @@ void join_neighbours(const std::vector<Cube>& cubes, const CubeTable& table, Set
 
 }  // namespace
 
-Objects find_objects(std::span<const Eigen::Vector3f> points_lidar,
-                     std::span<const SemanticClass> labels, double gap_m) {
-  Objects objects{std::vector<std::int32_t>(points_lidar.size(), Objects::none), 0};
+ObjectClusters cluster_objects(std::span<const Eigen::Vector3f> points_lidar,
+                               std::span<const SemanticClass> labels, double gap_m) {
+  ObjectClusters objects{std::vector<std::int32_t>(points_lidar.size(), ObjectClusters::none), 0};
   if (labels.empty()) return objects;
   const auto inverse_gap = static_cast<float>(1.0 / gap_m);
   CubeTable table;
@@ -88,11 +88,11 @@ Objects find_objects(std::span<const Eigen::Vector3f> points_lidar,
   }
   Sets sets(cubes.size());
   join_neighbours(cubes, table, sets);
-  std::vector<std::int32_t> object_of_root(cubes.size(), Objects::none);
+  std::vector<std::int32_t> object_of_root(cubes.size(), ObjectClusters::none);
   for (std::int32_t& object : objects.of_point) {
-    if (object == Objects::none) continue;
+    if (object == ObjectClusters::none) continue;
     std::int32_t& number = object_of_root[sets.root(static_cast<std::uint32_t>(object))];
-    if (number == Objects::none) number = static_cast<std::int32_t>(objects.count++);
+    if (number == ObjectClusters::none) number = static_cast<std::int32_t>(objects.count++);
     object = number;
   }
   return objects;

@@ -10,7 +10,7 @@
 namespace stillmap {
 
 /// Movable points of a scan, grouped into things that move as one.
-struct Objects {
+struct ObjectClusters {
   static constexpr std::int32_t none = -1;
   /// For every point of the scan its object, `none` for points that are not movable.
   std::vector<std::int32_t> of_point;
@@ -19,7 +19,7 @@ struct Objects {
 
 /// Groups movable points of the same kind (vehicles; people; two-wheelers and their riders) that
 /// touch: cubes of `gap_m` that are neighbours, also over a corner.
-[[nodiscard]] Objects find_objects(std::span<const Eigen::Vector3f> points_lidar,
-                                   std::span<const SemanticClass> labels, double gap_m);
+[[nodiscard]] ObjectClusters cluster_objects(std::span<const Eigen::Vector3f> points_lidar,
+                                             std::span<const SemanticClass> labels, double gap_m);
 
 }  // namespace stillmap

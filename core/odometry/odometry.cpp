@@ -8,11 +8,11 @@
 
 #include "core/odometry/coarse_registration.hpp"
 #include "core/odometry/features.hpp"
-#include "core/odometry/relocalization.hpp"
 #include "core/odometry/motion_classification.hpp"
 #include "core/odometry/object_clusters.hpp"
 #include "core/odometry/range_image_history.hpp"
 #include "core/odometry/registration.hpp"
+#include "core/odometry/relocalization.hpp"
 #include "core/odometry/se3.hpp"
 
 namespace stillmap {
@@ -42,30 +42,30 @@ struct Odometry::State {
       : config(without_unused_kernel(odometry_config)),
         sensor(sensor_model),
         map{FeatureMap(odometry_config.local_map), FeatureMap(odometry_config.local_map)},
-        past(odometry_config.motion) {}
+        history(odometry_config.motion) {}
 
   /// The scan as later ones look back on it; nothing where they do not.
-  [[nodiscard]] std::optional<RangeView> view_of(const Scan& scan, const PointLabels& labels,
-                                                 const Eigen::Isometry3d& T_map_lidar) const;
-  [[nodiscard]] std::vector<ObjectVerdict> judge(const Scan& scan, const Objects& objects,
-                                                 const std::optional<RangeView>& now,
-                                                 const Eigen::Isometry3d& T_map_lidar) const;
+  [[nodiscard]] std::optional<RangeImageView> view_of(const Scan& scan, const PointLabels& labels,
+                                                      const Eigen::Isometry3d& T_map_lidar) const;
+  [[nodiscard]] std::vector<MotionClass> classify(const Scan& scan, const ObjectClusters& objects,
+                                                  const std::optional<RangeImageView>& now,
+                                                  const Eigen::Isometry3d& T_map_lidar) const;
   /// Whether the last velocity says where a scan of this time is.
-  [[nodiscard]] bool knows_velocity(std::int64_t stamp_ns) const;
+  [[nodiscard]] bool has_velocity(std::int64_t stamp_ns) const;
   /// A scan without a pose stays out of the local map, unless the map is given up for good.
   [[nodiscard]] bool may_extend_map(OdometryHealth health);
-  [[nodiscard]] OdometryResult registered(const FeatureSets& features,
-                                          Eigen::Isometry3d T_map_lidar_predicted,
-                                          bool prediction_is_good) const;
-  void remember(std::int64_t stamp_ns, std::optional<RangeView> view,
-                const Eigen::Isometry3d& T_map_lidar);
+  [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
+                                             Eigen::Isometry3d T_map_lidar_predicted,
+                                             bool prediction_is_good) const;
+  void update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
+                    const Eigen::Isometry3d& T_map_lidar);
 
   OdometryConfig config;
   SensorModel sensor;
   LocalMap map;
   /// Points of a map made earlier, until the first scan has its place in it.
-  std::vector<LabelledPoint> known_map;
-  PastViews past;
+  std::vector<LabelledPoint> prior_map;
+  RangeImageHistory history;
   bool started = false;
   /// Scans in a row that could not be registered.
   int lost_scans = 0;
@@ -80,8 +80,8 @@ struct Odometry::State {
 
 namespace {
 
-LocalMap coarse_map_of(const FeatureSets& features, const Eigen::Isometry3d& T_map_lidar) {
-  LocalMap map = coarse_map();
+LocalMap coarse_map_of_scan(const FeatureSets& features, const Eigen::Isometry3d& T_map_lidar) {
+  LocalMap map = make_coarse_map();
   const Eigen::Isometry3f T = T_map_lidar.cast<float>();
   const auto fill = [&](const std::vector<FeaturePoint>& from, FeatureMap& to) {
     std::vector<LabelledPoint> points;
@@ -96,20 +96,20 @@ LocalMap coarse_map_of(const FeatureSets& features, const Eigen::Isometry3d& T_m
 
 }  // namespace
 
-std::optional<RangeView> Odometry::State::view_of(const Scan& scan, const PointLabels& labels,
-                                                  const Eigen::Isometry3d& T_map_lidar) const {
-  if (labels.empty() || !config.motion.use_past_views) return std::nullopt;
-  return RangeView(scan, labels.classes, sensor, T_map_lidar);
+std::optional<RangeImageView> Odometry::State::view_of(const Scan& scan, const PointLabels& labels,
+                                                       const Eigen::Isometry3d& T_map_lidar) const {
+  if (labels.empty() || !config.motion.use_range_image_history) return std::nullopt;
+  return RangeImageView(scan, labels.classes, sensor, T_map_lidar);
 }
 
-std::vector<ObjectVerdict> Odometry::State::judge(const Scan& scan, const Objects& objects,
-                                                  const std::optional<RangeView>& now,
-                                                  const Eigen::Isometry3d& T_map_lidar) const {
-  if (!now) return std::vector<ObjectVerdict>(objects.count, ObjectVerdict::undecided);
-  return judge_objects(scan, objects, T_map_lidar, past, *now, config.motion);
+std::vector<MotionClass> Odometry::State::classify(const Scan& scan, const ObjectClusters& objects,
+                                                   const std::optional<RangeImageView>& now,
+                                                   const Eigen::Isometry3d& T_map_lidar) const {
+  if (!now) return std::vector<MotionClass>(objects.count, MotionClass::undecided);
+  return classify_motion(scan, objects, T_map_lidar, history, *now, config.motion);
 }
 
-bool Odometry::State::knows_velocity(std::int64_t stamp_ns) const {
+bool Odometry::State::has_velocity(std::int64_t stamp_ns) const {
   return last_interval_s > 0.0 && lost_scans == 0 &&
          seconds(stamp_ns - last_stamp_ns) <= max_prediction_s;
 }
@@ -123,39 +123,40 @@ bool Odometry::State::may_extend_map(OdometryHealth health) {
   return true;
 }
 
-OdometryResult Odometry::State::registered(const FeatureSets& features,
-                                           Eigen::Isometry3d T_map_lidar_predicted,
-                                           bool prediction_is_good) const {
+OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
+                                              Eigen::Isometry3d T_map_lidar_predicted,
+                                              bool prediction_is_good) const {
   if (!started) {
-    if (known_map.empty()) return OdometryResult{.T_map_lidar = T_map_lidar_predicted};
-    return localise(features, known_map, map, T_map_lidar_predicted, config);
+    if (prior_map.empty()) return OdometryResult{.T_map_lidar = T_map_lidar_predicted};
+    return relocalize(features, prior_map, map, T_map_lidar_predicted, config);
   }
   if (!prediction_is_good) {
-    const LocalMap last_scan = coarse_map_of(last_features, T_map_lidar);
-    T_map_lidar_predicted =
-        register_features(features, last_scan, T_map_lidar_predicted, coarse(config)).T_map_lidar;
+    const LocalMap coarse_map = coarse_map_of_scan(last_features, T_map_lidar);
+    T_map_lidar_predicted = register_features(features, coarse_map, T_map_lidar_predicted,
+                                              coarse_registration_config(config))
+                                .T_map_lidar;
   }
   return register_features(features, map, T_map_lidar_predicted, config);
 }
 
-void Odometry::State::remember(std::int64_t stamp_ns, std::optional<RangeView> view,
-                               const Eigen::Isometry3d& T_map_lidar_now) {
+void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
+                                   const Eigen::Isometry3d& T_map_lidar_now) {
   if (started) {
     last_motion = T_map_lidar.inverse() * T_map_lidar_now;
     last_interval_s = seconds(stamp_ns - last_stamp_ns);
   }
   started = true;
-  known_map = {};
+  prior_map = {};
   last_stamp_ns = stamp_ns;
   T_map_lidar = T_map_lidar_now;
   if (!view) return;
   view->move_to(T_map_lidar);
   const auto is_gone = [&](const Eigen::Vector3f& p_map) {
-    return past.sees_through(*view, p_map);
+    return history.sees_through(*view, p_map);
   };
   map.edges.remove_movable_if(is_gone);
   map.planes.remove_movable_if(is_gone);
-  past.add(*std::move(view));
+  history.add(*std::move(view));
 }
 
 namespace {
@@ -165,20 +166,21 @@ SemanticClass label_of(const PointLabels& labels, std::size_t i) {
 }
 
 /// Points that registration and local map may use: with semantics, a movable point must belong to
-/// an object that past views have shown parked (or, without past views, pass eq. (9)).
+/// an object that earlier range images have shown parked (or, without earlier range images, pass
+/// eq. (9)).
 class UsablePoints {
  public:
-  UsablePoints(const OdometryConfig& config, const Objects& objects,
-               const std::vector<ObjectVerdict>& verdicts)
+  UsablePoints(const OdometryConfig& config, const ObjectClusters& objects,
+               const std::vector<MotionClass>& motion_classes)
       : semantic_(config.weighting == Weighting::semantic),
-        past_views_(config.motion.use_past_views),
+        uses_history_(config.motion.use_range_image_history),
         objects_(objects),
-        verdicts_(verdicts) {}
+        motion_classes_(motion_classes) {}
 
   [[nodiscard]] bool operator()(std::size_t i) const {
     const std::int32_t object = objects_.of_point[i];
-    if (!semantic_ || object == Objects::none || !past_views_) return true;
-    return verdicts_[static_cast<std::size_t>(object)] == ObjectVerdict::parked;
+    if (!semantic_ || object == ObjectClusters::none || !uses_history_) return true;
+    return motion_classes_[static_cast<std::size_t>(object)] == MotionClass::parked;
   }
   [[nodiscard]] bool operator()(std::size_t i, Motion motion) const {
     return (*this)(i) && !(semantic_ && motion == Motion::highly_dynamic);
@@ -186,9 +188,9 @@ class UsablePoints {
 
  private:
   bool semantic_;
-  bool past_views_;
-  const Objects& objects_;
-  const std::vector<ObjectVerdict>& verdicts_;
+  bool uses_history_;
+  const ObjectClusters& objects_;
+  const std::vector<MotionClass>& motion_classes_;
 };
 
 FeatureSets feature_sets(const Scan& scan, const PointLabels& labels, const Features& features,
@@ -214,7 +216,7 @@ void extend_local_map(LocalMap& map, const Scan& scan, const PointLabels& labels
     for (const std::uint32_t i : from)
       if (usable(i, motion[i])) points.push_back({T * scan.points_lidar[i], label_of(labels, i)});
     to.insert(points);
-    to.forget_far_from(T.translation());
+    to.remove_far_from(T.translation());
   };
   tbb::parallel_invoke([&] { extend(features.edges, map.edges); },
                        [&] { extend(features.planes, map.planes); });
@@ -242,8 +244,8 @@ Eigen::Isometry3d Odometry::motion_during(double period_s) const {
   return scaled_motion(state_->last_motion, period_s / state_->last_interval_s);
 }
 
-Odometry::Step Odometry::add(const Scan& scan, const PointLabels& labels,
-                             const std::optional<Eigen::Isometry3d>& T_map_lidar_prior) {
+Odometry::Step Odometry::register_scan(const Scan& scan, const PointLabels& labels,
+                                       const std::optional<Eigen::Isometry3d>& T_map_lidar_prior) {
   assert(labels.empty() || labels.classes.size() == scan.size());
   State& state = *state_;
   const OdometryConfig& config = state.config;
@@ -252,32 +254,33 @@ Odometry::Step Odometry::add(const Scan& scan, const PointLabels& labels,
 
   // Features F_e and F_p, without those on objects that may be moving.
   const Features features = extract_features(scan, config.features);
-  const Objects objects =
-      find_objects(scan.points_lidar, labels.classes, config.motion.object_gap_m);
+  const ObjectClusters objects =
+      cluster_objects(scan.points_lidar, labels.classes, config.motion.object_gap_m);
   auto view = state.view_of(scan, labels, T_map_lidar_predicted);
-  const auto verdicts = state.judge(scan, objects, view, T_map_lidar_predicted);
-  const UsablePoints usable(config, objects, verdicts);
+  const auto motion_classes = state.classify(scan, objects, view, T_map_lidar_predicted);
+  const UsablePoints usable(config, objects, motion_classes);
   FeatureSets sets = feature_sets(scan, labels, features, usable);
 
   // Pose against the local map, eq. (5)-(13).
   Step step;
-  const bool prediction_is_good = T_map_lidar_prior || state.knows_velocity(scan.stamp_ns);
-  step.result = state.registered(sets, T_map_lidar_predicted, prediction_is_good);
+  const bool prediction_is_good = T_map_lidar_prior || state.has_velocity(scan.stamp_ns);
+  step.result = state.estimate_pose(sets, T_map_lidar_predicted, prediction_is_good);
   const Eigen::Isometry3d& T_map_lidar = step.result.T_map_lidar;
 
   // What moves stays out of the local map, eq. (9) and c > c_th.
-  step.motion = split_by_motion(scan, labels, objects, verdicts, T_map_lidar, state.map, config);
+  step.motion =
+      classify_point_motion(scan, labels, objects, motion_classes, T_map_lidar, state.map, config);
   if (state.may_extend_map(step.result.health))
     extend_local_map(state.map, scan, labels, features, usable, step.motion, T_map_lidar);
-  state.remember(scan.stamp_ns, std::move(view), T_map_lidar);
+  state.update_state(scan.stamp_ns, std::move(view), T_map_lidar);
   state.last_features = std::move(sets);
   return step;
 }
 
-void Odometry::know(std::span<const LabelledPoint> points_map) {
+void Odometry::add_prior_map(std::span<const LabelledPoint> points_map) {
   State& state = *state_;
-  insert_known(points_map, state.map);
-  if (!state.started) state.known_map.assign(points_map.begin(), points_map.end());
+  insert_prior_map(points_map, state.map);
+  if (!state.started) state.prior_map.assign(points_map.begin(), points_map.end());
 }
 
 void Odometry::reset() { *state_ = State(state_->config, state_->sensor); }

@@ -40,12 +40,12 @@ class Odometry {
 
   /// Registers a prepared scan, splits its points by motion, and adds it to the local map.
   /// `scan.ring` must be known.
-  [[nodiscard]] Step add(const Scan& scan, const PointLabels& labels,
-                         const std::optional<Eigen::Isometry3d>& T_map_lidar_prior);
+  [[nodiscard]] Step register_scan(const Scan& scan, const PointLabels& labels,
+                                   const std::optional<Eigen::Isometry3d>& T_map_lidar_prior);
 
   /// Adds points of a map made earlier (map frame) to the local map. Before the first scan, that is
-  /// then looked for in them, round its prior (see localise).
-  void know(std::span<const LabelledPoint> points_map);
+  /// then looked for in them, round its prior (see relocalize).
+  void add_prior_map(std::span<const LabelledPoint> points_map);
 
   /// Forgets poses and local map.
   void reset();

@@ -65,16 +65,16 @@ struct RegistrationConfig {
   double min_observability = 0.005;
 };
 
-/// What moves (paper II-C.2, and past views).
+/// What moves (paper II-C.2, and earlier range images).
 struct MotionConfig {
   /// c_th: semantic inconsistency, eq. (9), above which a movable object is highly dynamic. Decides
-  /// where `use_past_views` is off.
+  /// where `use_range_image_history` is off.
   double inconsistency_threshold = 0.6;
   /// Take movable objects out whose place an earlier scan saw free; not in the paper.
-  bool use_past_views = true;
+  bool use_range_image_history = true;
   /// Earlier scans that are kept for it, and how many scans lie between two of them.
-  int past_views = 4;
-  int past_view_interval = 2;
+  int range_image_history_size = 4;
+  int range_image_history_interval = 2;
   /// An earlier ray must have gone this much farther than the point to have seen it free [m], and
   /// this share of the range.
   double free_margin_m = 0.4;

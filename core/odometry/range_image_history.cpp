@@ -13,39 +13,45 @@ constexpr float max_gone_gap_m = 3.0F;
 
 }  // namespace
 
-float PastViews::margin(float range_m) const {
+float RangeImageHistory::margin(float range_m) const {
   return static_cast<float>(config_.free_margin_m) +
          static_cast<float>(config_.free_margin_share) * range_m;
 }
 
-std::size_t PastViews::size() const {
-  return views_.size() / static_cast<std::size_t>(config_.past_view_interval);
+std::size_t RangeImageHistory::size() const {
+  return views_.size() / static_cast<std::size_t>(config_.range_image_history_interval);
 }
 
-PastSight PastViews::sight(std::size_t age, const Eigen::Vector3f& point_map,
-                           const RangeView& now) const {
-  const auto interval = static_cast<std::size_t>(config_.past_view_interval);
-  const RangeView& past = views_[views_.size() - (age + 1) * interval];
-  const auto sight = past.look_at(point_map);
-  if (!sight) return PastSight::unknown;
-  if (sight->nearest_m > sight->point_range_m + margin(sight->point_range_m))
-    return PastSight::free;
-  if (!sight->movable) return PastSight::unknown;
-  if (std::abs(sight->range_m - sight->point_range_m) < same_surface_m) return PastSight::same;
-  const float gap = sight->point_range_m - sight->range_m;
-  if (gap < margin(sight->range_m) || gap > max_gone_gap_m) return PastSight::unknown;
-  const Eigen::Vector3f surface_map = past.origin_map() + sight->range_m * sight->direction_map;
-  return sees_through(now, surface_map) ? PastSight::gone_before_it : PastSight::unknown;
+PastObservation RangeImageHistory::observation(std::size_t age, const Eigen::Vector3f& point_map,
+                                               const RangeImageView& now) const {
+  const auto interval = static_cast<std::size_t>(config_.range_image_history_interval);
+  const RangeImageView& past = views_[views_.size() - (age + 1) * interval];
+  const auto observation = past.observe(point_map);
+  if (!observation) return PastObservation::unknown;
+  if (observation->nearest_m > observation->point_range_m + margin(observation->point_range_m))
+    return PastObservation::free;
+  if (!observation->movable) return PastObservation::unknown;
+  if (std::abs(observation->range_m - observation->point_range_m) < same_surface_m)
+    return PastObservation::same;
+  const float gap = observation->point_range_m - observation->range_m;
+  if (gap < margin(observation->range_m) || gap > max_gone_gap_m) return PastObservation::unknown;
+  const Eigen::Vector3f surface_map =
+      past.origin_map() + observation->range_m * observation->direction_map;
+  return sees_through(now, surface_map) ? PastObservation::removed_in_front
+                                        : PastObservation::unknown;
 }
 
-bool PastViews::sees_through(const RangeView& view, const Eigen::Vector3f& point_map) const {
-  const auto sight = view.look_at(point_map);
-  return sight && sight->nearest_m > sight->point_range_m + margin(sight->point_range_m);
+bool RangeImageHistory::sees_through(const RangeImageView& view,
+                                     const Eigen::Vector3f& point_map) const {
+  const auto observation = view.observe(point_map);
+  return observation &&
+         observation->nearest_m > observation->point_range_m + margin(observation->point_range_m);
 }
 
-void PastViews::add(RangeView view) {
+void RangeImageHistory::add(RangeImageView view) {
   views_.push_back(std::move(view));
-  const auto kept = static_cast<std::size_t>(config_.past_views * config_.past_view_interval);
+  const auto kept = static_cast<std::size_t>(config_.range_image_history_size *
+                                             config_.range_image_history_interval);
   if (views_.size() > kept) views_.pop_front();
 }
 

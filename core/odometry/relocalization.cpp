@@ -12,20 +12,20 @@ namespace {
 /// A point of the scan lies on the map when a point of it is as near as this [m].
 constexpr float match_distance_m = 0.25F;
 /// Share of such points that ends the search, and the least that is a place.
-constexpr double surely_matched = 0.85;
-constexpr double least_matched = 0.6;
+constexpr double sure_match_ratio = 0.85;
+constexpr double min_match_ratio = 0.6;
 /// Places that are tried are so far apart that the coarse registration closes the gap.
-constexpr double place_spacing_m = 3.5;
+constexpr double guess_spacing_m = 3.5;
 constexpr int headings = 12;
-constexpr double last_step_m = 0.6;
+constexpr double refinement_radius_m = 0.6;
 
-bool is_thin(SemanticClass label) {
+bool is_pole_like(SemanticClass label) {
   return label == SemanticClass::pole || label == SemanticClass::trunk ||
          label == SemanticClass::traffic_sign;
 }
 
 /// This place and six in a ring round it.
-std::vector<Eigen::Vector3d> places_round(double radius_m) {
+std::vector<Eigen::Vector3d> offsets_around(double radius_m) {
   std::vector<Eigen::Vector3d> places{Eigen::Vector3d::Zero()};
   for (int k = 0; k < 6; ++k) {
     const double bearing = k * std::numbers::pi / 3.0;
@@ -35,9 +35,9 @@ std::vector<Eigen::Vector3d> places_round(double radius_m) {
 }
 
 /// The guess first, then all headings there, then those of the places round it.
-std::vector<Eigen::Isometry3d> guesses_round(const Eigen::Isometry3d& T_map_lidar) {
+std::vector<Eigen::Isometry3d> pose_guesses_around(const Eigen::Isometry3d& T_map_lidar) {
   std::vector<Eigen::Isometry3d> guesses;
-  for (const Eigen::Vector3d& place : places_round(place_spacing_m)) {
+  for (const Eigen::Vector3d& place : offsets_around(guess_spacing_m)) {
     for (int k = 0; k < headings; ++k) {
       // 0, 1, -1, 2, ...: small turns first.
       const int steps = k % 2 == 0 ? -k / 2 : (k + 1) / 2;
@@ -50,18 +50,18 @@ std::vector<Eigen::Isometry3d> guesses_round(const Eigen::Isometry3d& T_map_lida
 }
 
 /// Ground matches wherever the map has any, and movable things may have gone.
-bool tells_the_place(SemanticClass label) { return !is_ground(label) && !is_movable(label); }
+bool is_landmark(SemanticClass label) { return !is_ground(label) && !is_movable(label); }
 
-double matched_share(const FeatureSets& features, const LocalMap& map,
-                     const Eigen::Isometry3d& T_map_lidar) {
+double match_ratio(const FeatureSets& features, const LocalMap& map,
+                   const Eigen::Isometry3d& T_map_lidar) {
   const Eigen::Isometry3f T = T_map_lidar.cast<float>();
-  int telling = 0;
+  int landmarks = 0;
   int matched = 0;
   const auto count = [&](const std::vector<FeaturePoint>& points) {
     for (const FeaturePoint& point : points) {
-      if (!tells_the_place(point.label)) continue;
+      if (!is_landmark(point.label)) continue;
       const Eigen::Vector3f position_map = T * point.position_lidar;
-      ++telling;
+      ++landmarks;
       matched += map.planes.nearest(position_map, 1, match_distance_m).count > 0 ||
                          map.edges.nearest(position_map, 1, match_distance_m).count > 0
                      ? 1
@@ -70,7 +70,7 @@ double matched_share(const FeatureSets& features, const LocalMap& map,
   };
   count(features.edges);
   count(features.planes);
-  return telling > 0 ? static_cast<double>(matched) / telling : 0.0;
+  return landmarks > 0 ? static_cast<double>(matched) / landmarks : 0.0;
 }
 
 /// Registers a scan from many places, and keeps the pose that fits best.
@@ -82,7 +82,7 @@ class Search {
   void try_from(const Eigen::Isometry3d& T_map_lidar) {
     const OdometryResult found = register_features(features_, map_, T_map_lidar, config_);
     if (found.health == OdometryHealth::lost) return;
-    const double share = matched_share(features_, map_, found.T_map_lidar);
+    const double share = match_ratio(features_, map_, found.T_map_lidar);
     if (share <= share_) return;
     share_ = share;
     best_ = found;
@@ -100,36 +100,37 @@ class Search {
 
 }  // namespace
 
-void insert_known(std::span<const LabelledPoint> points_map, LocalMap& map) {
-  std::vector<LabelledPoint> thin;
-  std::vector<LabelledPoint> flat;
+void insert_prior_map(std::span<const LabelledPoint> points_map, LocalMap& map) {
+  std::vector<LabelledPoint> edges;
+  std::vector<LabelledPoint> planes;
   for (const LabelledPoint& point : points_map) {
     if (is_movable(point.label)) continue;
-    (is_thin(point.label) ? thin : flat).push_back(point);
+    (is_pole_like(point.label) ? edges : planes).push_back(point);
   }
-  map.edges.insert(thin);
-  map.planes.insert(flat);
+  map.edges.insert(edges);
+  map.planes.insert(planes);
 }
 
-OdometryResult localise(const FeatureSets& features, std::span<const LabelledPoint> known_map,
-                        const LocalMap& map, const Eigen::Isometry3d& T_map_lidar_guess,
-                        const OdometryConfig& config) {
-  LocalMap far = coarse_map();
-  insert_known(known_map, far);
+OdometryResult relocalize(const FeatureSets& features, std::span<const LabelledPoint> prior_map,
+                          const LocalMap& map, const Eigen::Isometry3d& T_map_lidar_guess,
+                          const OdometryConfig& config) {
+  LocalMap coarse_map = make_coarse_map();
+  insert_prior_map(prior_map, coarse_map);
   Search search(features, map, config);
-  for (const Eigen::Isometry3d& guess : guesses_round(T_map_lidar_guess)) {
-    const OdometryResult rough = register_features(features, far, guess, coarse(config));
+  for (const Eigen::Isometry3d& guess : pose_guesses_around(T_map_lidar_guess)) {
+    const OdometryResult rough =
+        register_features(features, coarse_map, guess, coarse_registration_config(config));
     if (rough.health != OdometryHealth::lost) search.try_from(rough.T_map_lidar);
-    if (search.share() >= surely_matched) return search.best();
+    if (search.share() >= sure_match_ratio) return search.best();
   }
   // Nearly there, perhaps: along a street the registration may stop a step too early.
-  const Eigen::Isometry3d T_map_lidar_nearly = search.best().T_map_lidar;
-  for (const Eigen::Vector3d& place : places_round(last_step_m)) {
-    search.try_from(Eigen::Translation3d(place) * T_map_lidar_nearly);
+  const Eigen::Isometry3d T_map_lidar_best = search.best().T_map_lidar;
+  for (const Eigen::Vector3d& place : offsets_around(refinement_radius_m)) {
+    search.try_from(Eigen::Translation3d(place) * T_map_lidar_best);
   }
-  if (search.share() >= least_matched) return search.best();
+  if (search.share() >= min_match_ratio) return search.best();
   // Against nothing, registration says what is known: nothing.
-  return register_features(features, coarse_map(), T_map_lidar_guess, config);
+  return register_features(features, make_coarse_map(), T_map_lidar_guess, config);
 }
 
 }  // namespace stillmap

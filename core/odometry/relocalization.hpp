@@ -8,15 +8,16 @@ namespace stillmap {
 
 /// Adds points of a map that was made earlier (map frame): what is thin and upright to the edges,
 /// all else to the planes. Movable things are left out.
-void insert_known(std::span<const LabelledPoint> points_map, LocalMap& map);
+void insert_prior_map(std::span<const LabelledPoint> points_map, LocalMap& map);
 
 /// Where a scan stands in a map that was made earlier: near `T_map_lidar_guess`, or, where the scan
 /// does not fit there, within some 6 m of it at any heading. `map` holds the same points as
-/// `known_map`, for the fine registration. The guess with health `lost` where it fits nowhere: less
+/// `prior_map`, for the fine registration. The guess with health `lost` where it fits nowhere: less
 /// than 60 % of what stands up in the scan lies on the map then.
-[[nodiscard]] OdometryResult localise(const FeatureSets& features,
-                                      std::span<const LabelledPoint> known_map, const LocalMap& map,
-                                      const Eigen::Isometry3d& T_map_lidar_guess,
-                                      const OdometryConfig& config);
+[[nodiscard]] OdometryResult relocalize(const FeatureSets& features,
+                                        std::span<const LabelledPoint> prior_map,
+                                        const LocalMap& map,
+                                        const Eigen::Isometry3d& T_map_lidar_guess,
+                                        const OdometryConfig& config);
 
 }  // namespace stillmap

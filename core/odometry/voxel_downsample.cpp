@@ -16,8 +16,9 @@ std::uint64_t cube_of(const Eigen::Vector3f& point, float inverse_spacing) {
 
 }  // namespace
 
-std::vector<std::uint32_t> thin(std::span<const Eigen::Vector3f> points,
-                                std::span<const std::uint32_t> chosen, double spacing_m) {
+std::vector<std::uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> points,
+                                            std::span<const std::uint32_t> chosen,
+                                            double spacing_m) {
   // An open-addressing set of its own: it is filled once and thrown away, so it needs neither
   // growth nor deletion.
   const std::size_t slots = std::bit_ceil(2 * chosen.size() + 1);

@@ -9,8 +9,8 @@ namespace stillmap {
 
 /// The first of the `chosen` points in every cube of `spacing_m`; indices into `points`, in their
 /// order. At 0.5 m a wall of 10 m x 3 m keeps about 120 points, however near it is.
-[[nodiscard]] std::vector<std::uint32_t> thin(std::span<const Eigen::Vector3f> points,
-                                              std::span<const std::uint32_t> chosen,
-                                              double spacing_m);
+[[nodiscard]] std::vector<std::uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> points,
+                                                          std::span<const std::uint32_t> chosen,
+                                                          double spacing_m);
 
 }  // namespace stillmap

@@ -28,7 +28,7 @@ std::array<ChangeStyle, 3> change_styles() {
            {VoxelChange::appeared, "appeared", {80, 215, 60}}}};
 }
 
-void paint_map(cv::Mat& picture, const PictureFrame& frame, const MapView& view) {
+void paint_map(cv::Mat& picture, const PictureFrame& frame, const MapSnapshot& view) {
   for (const auto& tile : view.tiles) {
     for (const Voxel& voxel : tile->voxels) {
       draw_voxel_square(picture, frame, voxel.mean_map, view.voxel_size_m, 1.0, stayed_colour);
@@ -51,26 +51,26 @@ std::uint64_t count(const DifferenceCounts& counts, VoxelChange change) {
 void paint_changes(cv::Mat& picture, const PictureFrame& frame, const MapDiff& diff,
                    double voxel_size_m) {
   // A single voxel must be found on the picture of a whole town.
-  constexpr double least_px = 2.0;
+  constexpr double min_px = 2.0;
   for (const ChangeStyle& style : change_styles()) {
     for (const VoxelDifference& voxel : diff.voxels) {
       if (voxel.change != style.change) continue;
-      draw_voxel_square(picture, frame, voxel.position_map, voxel_size_m, least_px, style.colour);
+      draw_voxel_square(picture, frame, voxel.position_map, voxel_size_m, min_px, style.colour);
     }
   }
 }
 
 }  // namespace
 
-void write_diff_picture(const std::filesystem::path& file, const MapView& before,
-                        const MapView& after, const MapDiff& diff, int max_side_px) {
-  Eigen::AlignedBox2d box = plan_extent(before).merged(plan_extent(after));
+void write_diff_picture(const std::filesystem::path& file, const MapSnapshot& before,
+                        const MapSnapshot& after, const MapDiff& diff, int max_side_px) {
+  Eigen::AlignedBox2d box = xy_bounds(before).merged(xy_bounds(after));
   if (box.isEmpty()) box.extend(Eigen::Vector2d::Zero());
   const PictureFrame frame = fit_frame(box, max_side_px);
   cv::Mat picture(frame.size, CV_8UC3, background());
   paint_map(picture, frame, before);
   paint_map(picture, frame, after);
-  const MapView& filled = before.tiles.empty() ? after : before;
+  const MapSnapshot& filled = before.tiles.empty() ? after : before;
   paint_changes(picture, frame, diff, filled.voxel_size_m);
   draw_scale_bar(picture, frame.px_per_m);
 

@@ -9,7 +9,7 @@ namespace stillmap {
 /// Writes a PNG of both maps from above, x to the right and y up: grey what stayed, green what
 /// appeared, red what is gone, yellow what is of another class; scale bar and legend. Throws
 /// std::runtime_error naming the file when it cannot be written.
-void write_diff_picture(const std::filesystem::path& file, const MapView& before,
-                        const MapView& after, const MapDiff& diff, int max_side_px = 1800);
+void write_diff_picture(const std::filesystem::path& file, const MapSnapshot& before,
+                        const MapSnapshot& after, const MapDiff& diff, int max_side_px = 1800);
 
 }  // namespace stillmap

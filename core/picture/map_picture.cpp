@@ -19,9 +19,9 @@ namespace {
 const cv::Scalar estimate_colour(255, 255, 255);
 const cv::Scalar truth_colour(255, 210, 60);
 
-Eigen::AlignedBox2d extent(const MapView& view, const Trajectory& estimate,
+Eigen::AlignedBox2d extent(const MapSnapshot& view, const Trajectory& estimate,
                            const MapPictureOptions& options) {
-  Eigen::AlignedBox2d box = plan_extent(view);
+  Eigen::AlignedBox2d box = xy_bounds(view);
   const auto extend_by = [&box](const Trajectory& trajectory) {
     for (const StampedPose& pose : trajectory) {
       const Eigen::Vector2d p = pose.T_map_lidar.translation().head<2>();
@@ -56,7 +56,7 @@ std::string with_thousands(std::size_t number) {
 
 using ClassCounts = std::array<std::size_t, semantic_class_count>;
 
-ClassCounts count_classes(const MapView& view) {
+ClassCounts count_classes(const MapSnapshot& view) {
   ClassCounts counts{};
   for (const auto& tile : view.tiles) {
     for (const Voxel& voxel : tile->voxels) {
@@ -66,7 +66,7 @@ ClassCounts count_classes(const MapView& view) {
   return counts;
 }
 
-std::string title(const MapView& view, const Trajectory& estimate) {
+std::string title(const MapSnapshot& view, const Trajectory& estimate) {
   if (view.tiles.empty()) return "The map is empty.";
   std::size_t voxels = 0;
   for (const auto& tile : view.tiles) voxels += tile->voxels.size();
@@ -79,7 +79,7 @@ std::string title(const MapView& view, const Trajectory& estimate) {
   return text.str();
 }
 
-std::vector<LegendEntry> legend_entries(const MapView& view, const Trajectory& estimate,
+std::vector<LegendEntry> legend_entries(const MapSnapshot& view, const Trajectory& estimate,
                                         const MapPictureOptions& options) {
   std::vector<LegendEntry> entries;
   if (!estimate.empty()) entries.push_back({"trajectory", estimate_colour});
@@ -99,7 +99,7 @@ std::vector<LegendEntry> legend_entries(const MapView& view, const Trajectory& e
 
 }  // namespace
 
-void write_map_picture(const std::filesystem::path& file, const MapView& view,
+void write_map_picture(const std::filesystem::path& file, const MapSnapshot& view,
                        const Trajectory& estimate, const MapPictureOptions& options) {
   const PictureFrame frame = fit_frame(extent(view, estimate, options), options.max_side_px);
   cv::Mat picture = draw_voxels(view, frame);

@@ -4,8 +4,8 @@
 #include <filesystem>
 #include <optional>
 
+#include "core/lidar/trajectory.hpp"
 #include "core/map/tile.hpp"
-#include "core/odometry/trajectory.hpp"
 
 namespace stillmap {
 
@@ -22,7 +22,7 @@ struct MapPictureOptions {
 /// (voxels without a class by their height above the ground), relief as brightness, the trajectory
 /// from its start (ring) to its end (disc), scale bar and legend. An empty map gives a picture that
 /// says so. Throws std::runtime_error naming the file when it cannot be written.
-void write_map_picture(const std::filesystem::path& file, const MapView& view,
+void write_map_picture(const std::filesystem::path& file, const MapSnapshot& view,
                        const Trajectory& estimate, const MapPictureOptions& options = {});
 
 }  // namespace stillmap

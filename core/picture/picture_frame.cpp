@@ -5,7 +5,7 @@
 
 namespace stillmap {
 
-Eigen::AlignedBox2d plan_extent(const MapView& view) {
+Eigen::AlignedBox2d xy_bounds(const MapSnapshot& view) {
   Eigen::AlignedBox2d box;
   for (const auto& tile : view.tiles) {
     box.extend(tile->info.bounds_map.min().head<2>().cast<double>());

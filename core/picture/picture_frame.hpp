@@ -21,7 +21,7 @@ struct PictureFrame {
 };
 
 /// Round all voxels, in plan; empty for an empty map. Map frame [m].
-[[nodiscard]] Eigen::AlignedBox2d plan_extent(const MapView& view);
+[[nodiscard]] Eigen::AlignedBox2d xy_bounds(const MapSnapshot& view);
 
 /// A picture with this box (map frame [m], not empty) in its middle, with a margin; its longest
 /// side about `max_side_px`, and wide enough for a legend.

@@ -39,10 +39,10 @@ int text_width(const std::string& text) {
   return cv::getTextSize(text, font, font_scale, 1, &baseline).width;
 }
 
-double round_length(double longest_m) {
-  const double power = std::pow(10.0, std::floor(std::log10(longest_m)));
+double round_length(double max_length_m) {
+  const double power = std::pow(10.0, std::floor(std::log10(max_length_m)));
   for (const double factor : {5.0, 2.0}) {
-    if (factor * power <= longest_m) return factor * power;
+    if (factor * power <= max_length_m) return factor * power;
   }
   return power;
 }
@@ -83,9 +83,9 @@ void draw_box(cv::Mat& picture, const PictureFrame& frame, const Eigen::AlignedB
 }
 
 void draw_voxel_square(cv::Mat& picture, const PictureFrame& frame, const Eigen::Vector3f& p_map,
-                       double voxel_size_m, double least_px, const cv::Scalar& colour) {
+                       double voxel_size_m, double min_px, const cv::Scalar& colour) {
   const cv::Point2d centre = frame.pixel(p_map.head<2>().cast<double>());
-  const double half = std::max(voxel_size_m * frame.px_per_m, least_px) / 2.0;
+  const double half = std::max(voxel_size_m * frame.px_per_m, min_px) / 2.0;
   cv::rectangle(picture, cv::Point2d(centre.x - half, centre.y - half),
                 cv::Point2d(centre.x + half, centre.y + half), colour, cv::FILLED);
 }

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "core/lidar/trajectory.hpp"
 #include "core/picture/picture_frame.hpp"
-#include "core/odometry/trajectory.hpp"
 
 namespace stillmap {
 
@@ -21,9 +21,9 @@ void draw_ends(cv::Mat& picture, const PictureFrame& frame, const Trajectory& tr
 [[nodiscard]] cv::Scalar query_box_colour();
 void draw_box(cv::Mat& picture, const PictureFrame& frame, const Eigen::AlignedBox3d& box_map);
 
-/// A voxel's square round its mean, `least_px` wide at least.
+/// A voxel's square round its mean, `min_px` wide at least.
 void draw_voxel_square(cv::Mat& picture, const PictureFrame& frame, const Eigen::Vector3f& p_map,
-                       double voxel_size_m, double least_px, const cv::Scalar& colour);
+                       double voxel_size_m, double min_px, const cv::Scalar& colour);
 
 /// A bar of a round length (1, 2 or 5 times a power of ten metres) in the lower left corner.
 void draw_scale_bar(cv::Mat& picture, double px_per_m);

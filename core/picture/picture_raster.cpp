@@ -38,7 +38,7 @@ cv::Rect pixels_of(const Eigen::Vector3d& corner_map, double voxel_size_m,
   return cell & cv::Rect({0, 0}, frame.size);
 }
 
-TopView look_from_above(const MapView& view, const PictureFrame& frame) {
+TopView rasterize_top_view(const MapSnapshot& view, const PictureFrame& frame) {
   TopView top{cv::Mat1f(frame.size, nothing), cv::Mat1f(frame.size, nothing),
               cv::Mat1b(frame.size, 0)};
   const VoxelGrid grid(view.voxel_size_m, view.tile_size_m);
@@ -63,7 +63,7 @@ TopView look_from_above(const MapView& view, const PictureFrame& frame) {
 
 /// Height of the ground under every pixel: the lowest voxel of each 6 m square, single squares that
 /// are too low (reflections) overruled by their neighbours, smoothly joined.
-cv::Mat1f ground_height(const MapView& view, const PictureFrame& frame) {
+cv::Mat1f ground_height(const MapSnapshot& view, const PictureFrame& frame) {
   constexpr double square_m = 6.0;
   const double scale = 1.0 / (square_m * frame.px_per_m);
   cv::Mat1f lowest(std::max(1, cvCeil(frame.size.height * scale)),
@@ -142,11 +142,11 @@ cv::Vec3f height_colour(float height) {
   return ramp.at(below) * (1.0F - share) + ramp.at(below + 1) * share;
 }
 
-cv::Mat draw_voxels(const MapView& view, const PictureFrame& frame) {
+cv::Mat draw_voxels(const MapSnapshot& view, const PictureFrame& frame) {
   cv::Mat3b picture(frame.size);
   picture.setTo(background());
   if (view.tiles.empty()) return picture;
-  const TopView top = look_from_above(view, frame);
+  const TopView top = rasterize_top_view(view, frame);
   cv::Mat1b is_seen;
   cv::compare(top.rank_m, nothing, is_seen, cv::CMP_GT);
   const cv::Mat1f ground_m = ground_height(view, frame);

@@ -2,14 +2,14 @@
 
 #include <opencv2/core/mat.hpp>
 
-#include "core/picture/picture_frame.hpp"
 #include "core/map/tile.hpp"
+#include "core/picture/picture_frame.hpp"
 
 namespace stillmap {
 
 /// The map's voxels from above as a BGR picture: the highest of each pixel, poles and signs before
 /// all others.
-[[nodiscard]] cv::Mat draw_voxels(const MapView& view, const PictureFrame& frame);
+[[nodiscard]] cv::Mat draw_voxels(const MapSnapshot& view, const PictureFrame& frame);
 
 /// The background of all map pictures, BGR.
 [[nodiscard]] cv::Scalar background();

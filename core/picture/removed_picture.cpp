@@ -38,9 +38,9 @@ std::string_view name(RemovalReason reason) {
   return std::ranges::find(styles(), reason, &ReasonStyle::reason)->text;
 }
 
-void write_removed_picture(const std::filesystem::path& file, const MapView& view,
+void write_removed_picture(const std::filesystem::path& file, const MapSnapshot& view,
                            const std::vector<RemovedVoxel>& removed, int max_side_px) {
-  Eigen::AlignedBox2d box = plan_extent(view);
+  Eigen::AlignedBox2d box = xy_bounds(view);
   for (const RemovedVoxel& voxel : removed) {
     box.extend(Eigen::Vector2d(voxel.position_map.head<2>().cast<double>()));
   }

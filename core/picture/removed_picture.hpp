@@ -14,7 +14,7 @@ namespace stillmap {
 
 /// Writes a PNG of the map from above in grey, and over it what was removed, coloured by reason,
 /// with a legend that counts. Throws std::runtime_error naming the file when it cannot be written.
-void write_removed_picture(const std::filesystem::path& file, const MapView& view,
+void write_removed_picture(const std::filesystem::path& file, const MapSnapshot& view,
                            const std::vector<RemovedVoxel>& removed, int max_side_px = 1800);
 
 }  // namespace stillmap

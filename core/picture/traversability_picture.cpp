@@ -59,7 +59,7 @@ PictureFrame fit(const TraversabilityView& view, const TraversabilityPictureOpti
   return frame;
 }
 
-void draw_area(cv::Mat3b& picture, const PictureFrame& frame, const TraversabilityView& view) {
+void draw_cells(cv::Mat3b& picture, const PictureFrame& frame, const TraversabilityView& view) {
   CellLookup lookup(view);
   const Eigen::AlignedBox2d bounds_map = view.bounds_map();
   for (int row = 0; row < picture.rows; ++row) {
@@ -93,7 +93,7 @@ std::string square_metres(std::uint64_t cells, double cell_m) {
   return text.str();
 }
 
-std::string title(const TraversabilityView& view, const AreaSummary& summary) {
+std::string title(const TraversabilityView& view, const TraversabilitySummary& summary) {
   if (view.tiles.empty()) return "The map is empty.";
   std::ostringstream text;
   text << "Traversable for '" << view.profile.name
@@ -103,7 +103,8 @@ std::string title(const TraversabilityView& view, const AreaSummary& summary) {
   return text.str();
 }
 
-std::vector<LegendEntry> legend_of(const TraversabilityView& view, const AreaSummary& summary,
+std::vector<LegendEntry> legend_of(const TraversabilityView& view,
+                                   const TraversabilitySummary& summary,
                                    const TraversabilityPictureOptions& options) {
   std::vector<LegendEntry> entries{
       {"free", scalar(free_colour)},
@@ -128,7 +129,7 @@ void write_traversability_picture(const std::filesystem::path& file, const Trave
   const PictureFrame frame = fit(view, options);
   cv::Mat3b area(frame.size);
   area.setTo(background());
-  draw_area(area, frame, view);
+  draw_cells(area, frame, view);
   cv::Mat picture = area;
   if (!options.trajectory.empty()) {
     draw_trajectory(picture, frame, options.trajectory, trajectory_colour);
@@ -136,7 +137,7 @@ void write_traversability_picture(const std::filesystem::path& file, const Trave
   }
   if (!options.path_map.empty()) draw_path(picture, frame, options.path_map);
   draw_scale_bar(picture, frame.px_per_m);
-  const AreaSummary summary = summarize(view);
+  const TraversabilitySummary summary = summarize(view);
   cv::vconcat(picture,
               draw_legend(picture.cols, title(view, summary), legend_of(view, summary, options)),
               picture);

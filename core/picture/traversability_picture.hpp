@@ -3,7 +3,7 @@
 #include <filesystem>
 #include <span>
 
-#include "core/odometry/trajectory.hpp"
+#include "core/lidar/trajectory.hpp"
 #include "core/traversability/footprint.hpp"
 #include "core/traversability/traversability_view.hpp"
 

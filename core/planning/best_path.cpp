@@ -21,47 +21,48 @@ bool is_better(const FoundPath& a, const FoundPath& b) {
   return a.poses.back().cost < b.poses.back().cost;
 }
 
-std::vector<DrivenPose> polished(const DriveCheck& drive, std::vector<DrivenPose> path,
-                                 std::span<const PlanarPose> goals, int tries,
-                                 const PlanningConfig& config) {
-  return polish(drive, std::move(path), goals, tries, config.seed, config.should_stop);
+std::vector<PathPoint> smoothed(const CollisionChecker& checker, std::vector<PathPoint> path,
+                                std::span<const PlanarPose> goals, int tries,
+                                const PlanningConfig& config) {
+  return smooth_path(checker, std::move(path), goals, tries, config.seed, config.should_stop);
 }
 
-std::optional<FoundPath> attempt(const DriveCheck& drive, const CoarseRoute& route,
+std::optional<FoundPath> attempt(const CollisionChecker& checker, const CoarseRoute& route,
                                  std::span<const PlanarPose> starts,
                                  std::span<const PlanarPose> goals, const PlanningConfig& config,
-                                 std::uint32_t seed, std::uint64_t& work) {
-  PoseSampler sampler(drive.grid(), route, config.route_guided, seed);
-  const SearchResult found = search_path(drive, sampler, starts, goals,
+                                 std::uint32_t seed, std::uint64_t& steps) {
+  PoseSampler sampler(checker.grid(), route, config.route_guided, seed);
+  const SearchResult found = search_path(checker, sampler, starts, goals,
                                          {.planner = config.planner,
-                                          .max_work = config.max_work - work,
+                                          .max_steps = config.max_steps - steps,
                                           .seed = seed,
                                           .should_stop = config.should_stop,
                                           .improved = config.improved});
-  work += found.work;
+  steps += found.steps;
   if (found.waypoints.empty()) return std::nullopt;
-  auto poses = drive_through(drive, found.waypoints);
+  auto poses = connect_waypoints(checker, found.waypoints);
   if (!poses) return std::nullopt;
   // Enough to compare it with others.
-  const int tries = found.reaches_goal ? config.polish_tries / 4 : 0;
-  return FoundPath{polished(drive, *std::move(poses), goals, tries, config), found.reaches_goal};
+  const int tries = found.reaches_goal ? config.smoothing_attempts / 4 : 0;
+  return FoundPath{smoothed(checker, *std::move(poses), goals, tries, config), found.reaches_goal};
 }
 
 }  // namespace
 
-std::optional<FoundPath> find_best_path(const DriveCheck& drive, const CoarseRoute& route,
+std::optional<FoundPath> find_best_path(const CollisionChecker& checker, const CoarseRoute& route,
                                         std::span<const PlanarPose> starts,
                                         std::span<const PlanarPose> goals,
-                                        const PlanningConfig& config, std::uint64_t& work) {
+                                        const PlanningConfig& config, std::uint64_t& steps) {
   std::optional<FoundPath> best;
-  for (std::uint32_t i = 0; i < config.max_attempts && work < config.max_work; ++i) {
-    auto path = attempt(drive, route, starts, goals, config, config.seed + i, work);
+  for (std::uint32_t i = 0; i < config.max_attempts && steps < config.max_steps; ++i) {
+    auto path = attempt(checker, route, starts, goals, config, config.seed + i, steps);
     if (path && (!best || is_better(*path, *best))) best = std::move(path);
-    if (best && is_good(*best, route, drive.grid().profile())) break;
+    if (best && is_good(*best, route, checker.grid().profile())) break;
     if (config.should_stop && config.should_stop()) break;
   }
   if (best && best->reaches_goal) {
-    best->poses = polished(drive, std::move(best->poses), goals, config.polish_tries, config);
+    best->poses =
+        smoothed(checker, std::move(best->poses), goals, config.smoothing_attempts, config);
   }
   return best;
 }

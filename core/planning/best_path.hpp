@@ -12,16 +12,16 @@
 namespace stillmap {
 
 struct FoundPath {
-  std::vector<DrivenPose> poses;
+  std::vector<PathPoint> poses;
   /// Else it leads to the place nearest to the goal that was reached.
   bool reaches_goal = false;
 };
 
-/// The cheapest of some searches with different seeds, polished: the first path that a search finds
+/// The cheapest of some searches with different seeds, smoothed: the first path that a search finds
 /// may drive half the way backwards. Stops when a path costs about as much as the coarse route.
-/// Adds the steps that it took to `work`.
+/// Adds the steps that it took to `steps`.
 [[nodiscard]] std::optional<FoundPath> find_best_path(
-    const DriveCheck& drive, const CoarseRoute& route, std::span<const PlanarPose> starts,
-    std::span<const PlanarPose> goals, const PlanningConfig& config, std::uint64_t& work);
+    const CollisionChecker& checker, const CoarseRoute& route, std::span<const PlanarPose> starts,
+    std::span<const PlanarPose> goals, const PlanningConfig& config, std::uint64_t& steps);
 
 }  // namespace stillmap

@@ -17,28 +17,28 @@ double curve_radius_m(const RobotProfile& profile, double cell_m) {
   return std::max(profile.min_turning_radius_m, 0.5 * cell_m);
 }
 
-DriveCheck::DriveCheck(const PlanningGrid& grid, double reverse_factor)
+CollisionChecker::CollisionChecker(const PlanningGrid& grid, double reverse_factor)
     : grid_(grid),
       curves_(curve_radius_m(grid.profile(), grid.cell_m())),
       reverse_factor_(reverse_factor) {}
 
-double DriveCheck::length_m(const PlanarPose& a, const PlanarPose& b) const {
+double CollisionChecker::length_m(const PlanarPose& a, const PlanarPose& b) const {
   return curves_.length_m(a, b);
 }
 
-void DriveCheck::visit(const PlanarPose& a, const PlanarPose& b,
-                       const std::function<bool(const CurvePose&)>& visit_pose) const {
+void CollisionChecker::visit(const PlanarPose& a, const PlanarPose& b,
+                             const std::function<bool(const CurvePose&)>& visit_pose) const {
   ++curves_seen_;
   curves_.visit_between(a, b, 0.5 * grid_.cell_m(), grid_.profile().circumscribed_radius_m(),
                         visit_pose);
 }
 
-double DriveCheck::step_cost(const CurvePose& pose) const {
+double CollisionChecker::step_cost(const CurvePose& pose) const {
   const double direction = pose.is_reverse ? reverse_factor_ : 1.0;
   return direction * pose.step_m * grid_.cost_factor(grid_.cell_of(pose.pose.position_map));
 }
 
-double DriveCheck::cost(const PlanarPose& a, const PlanarPose& b) const {
+double CollisionChecker::cost(const PlanarPose& a, const PlanarPose& b) const {
   if (last_ && is_same(last_->a, a) && is_same(last_->b, b)) return last_->cost;
   double sum = 0.0;
   visit(a, b, [&](const CurvePose& pose) {
@@ -50,9 +50,9 @@ double DriveCheck::cost(const PlanarPose& a, const PlanarPose& b) const {
   return sum;
 }
 
-std::optional<std::vector<DrivenPose>> DriveCheck::drive(const PlanarPose& a,
-                                                         const PlanarPose& b) const {
-  std::vector<DrivenPose> driven;
+std::optional<std::vector<PathPoint>> CollisionChecker::connect(const PlanarPose& a,
+                                                                const PlanarPose& b) const {
+  std::vector<PathPoint> driven;
   double sum = 0.0;
   bool is_free = true;
   visit(a, b, [&](const CurvePose& pose) {

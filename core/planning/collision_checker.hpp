@@ -11,7 +11,7 @@
 namespace stillmap {
 
 /// A pose of a path that a robot drives.
-struct DrivenPose {
+struct PathPoint {
   CurvePose at;
   /// From the path's start to here.
   double cost = 0.0;
@@ -20,10 +20,10 @@ struct DrivenPose {
 /// Whether and at what cost a robot drives from one pose to another on its shortest curve. Poses
 /// are looked at as close together as check_path looks at them, and answers agree with it. Not
 /// thread-safe.
-class DriveCheck {
+class CollisionChecker {
  public:
   /// A metre backwards costs as much as `reverse_factor` forwards. The grid must outlive it.
-  DriveCheck(const PlanningGrid& grid, double reverse_factor);
+  CollisionChecker(const PlanningGrid& grid, double reverse_factor);
 
   [[nodiscard]] const PlanningGrid& grid() const { return grid_; }
   /// Of the curve from a to b, whether free or not; never above its cost [m].
@@ -31,8 +31,8 @@ class DriveCheck {
   /// Of the curve: metres times the cost of the cells under the pose; infinite when it is not free.
   [[nodiscard]] double cost(const PlanarPose& a, const PlanarPose& b) const;
   /// The curve's poses after a, costs counted from a; nothing when it is not free.
-  [[nodiscard]] std::optional<std::vector<DrivenPose>> drive(const PlanarPose& a,
-                                                             const PlanarPose& b) const;
+  [[nodiscard]] std::optional<std::vector<PathPoint>> connect(const PlanarPose& a,
+                                                              const PlanarPose& b) const;
 
   /// Curves that were looked at so far: a measure of work that is the same on every machine.
   [[nodiscard]] std::uint64_t curves() const { return curves_seen_; }
@@ -43,7 +43,7 @@ class DriveCheck {
   [[nodiscard]] double step_cost(const CurvePose& pose) const;
 
   const PlanningGrid& grid_;
-  TurningCurves curves_;
+  ReedsSheppCurves curves_;
   double reverse_factor_;
   mutable std::uint64_t curves_seen_ = 0;
   /// Planners ask for a curve's cost and then whether it is free.

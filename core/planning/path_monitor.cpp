@@ -10,8 +10,8 @@ namespace {
 
 std::string in_words(const PathConflict& conflict) {
   std::ostringstream text;
-  text << "not free any more: " << name(conflict.reason) << " at (" << conflict.place_map.x()
-       << ", " << conflict.place_map.y() << "), " << conflict.along_m << " m along";
+  text << "not free any more: " << name(conflict.reason) << " at (" << conflict.cell_centre_map.x()
+       << ", " << conflict.cell_centre_map.y() << "), " << conflict.along_m << " m along";
   return text.str();
 }
 
@@ -25,15 +25,15 @@ std::string in_words(TileId id, std::size_t count) {
 
 }  // namespace
 
-PathWatch::PathWatch(const TraversabilityView& view, const PathPlan& plan)
+PathMonitor::PathMonitor(const TraversabilityView& view, const PathPlan& plan)
     : path_map_(plan.path_map()),
       was_found_(plan.is_found()),
       map_id_(view.map_id),
       tiles_(view.tiles),
-      on_way_(tiles_on_way(view)) {}
+      on_path_(tiles_on_path(view)) {}
 
 /// Those that the robot's circle touches at one of the poses.
-PathWatch::Tiles PathWatch::tiles_on_way(const TraversabilityView& view) const {
+PathMonitor::Tiles PathMonitor::tiles_on_path(const TraversabilityView& view) const {
   const double reach_m = view.profile.circumscribed_radius_m();
   std::set<TileId> touched;
   for (const PlanarPose& pose : path_map_) {
@@ -54,29 +54,29 @@ PathWatch::Tiles PathWatch::tiles_on_way(const TraversabilityView& view) const {
   return tiles;
 }
 
-std::optional<ReplanCause> PathWatch::look_at(const TraversabilityView& view) {
+std::optional<ReplanReason> PathMonitor::update(const TraversabilityView& view) {
   const bool is_other_map = view.map_id != map_id_;
   if (!is_other_map && view.tiles == tiles_) return std::nullopt;
   const bool was_empty = tiles_.empty();
   map_id_ = view.map_id;
   tiles_ = view.tiles;
-  if (was_empty) return ReplanCause{"the map was empty", std::nullopt};
-  if (is_other_map) return ReplanCause{"another map began", std::nullopt};
-  if (!was_found_) return ReplanCause{"there was no path, and the map changed", std::nullopt};
-  Tiles now = tiles_on_way(view);
+  if (was_empty) return ReplanReason{"the map was empty", std::nullopt};
+  if (is_other_map) return ReplanReason{"another map began", std::nullopt};
+  if (!was_found_) return ReplanReason{"there was no path, and the map changed", std::nullopt};
+  Tiles now = tiles_on_path(view);
   std::vector<TileId> changed;
   for (const auto& [id, tile] : now) {
-    const auto before = on_way_.find(id);
-    if (before == on_way_.end() || before->second != tile) changed.push_back(id);
+    const auto before = on_path_.find(id);
+    if (before == on_path_.end() || before->second != tile) changed.push_back(id);
   }
-  for (const auto& [id, tile] : on_way_) {
+  for (const auto& [id, tile] : on_path_) {
     if (!now.contains(id)) changed.push_back(id);
   }
-  on_way_ = std::move(now);
+  on_path_ = std::move(now);
   if (changed.empty()) return std::nullopt;
   const PathCheck check = check_path(view, path_map_);
-  if (check.conflict) return ReplanCause{in_words(*check.conflict), check.conflict};
-  return ReplanCause{in_words(changed.front(), changed.size()), std::nullopt};
+  if (check.conflict) return ReplanReason{in_words(*check.conflict), check.conflict};
+  return ReplanReason{in_words(changed.front(), changed.size()), std::nullopt};
 }
 
 }  // namespace stillmap

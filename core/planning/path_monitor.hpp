@@ -12,7 +12,7 @@
 namespace stillmap {
 
 /// Why a path should be planned anew.
-struct ReplanCause {
+struct ReplanReason {
   /// In words.
   std::string reason;
   /// Where the path is not free any more; nothing when only the way changed.
@@ -21,25 +21,25 @@ struct ReplanCause {
 
 /// Remembers a path and the tiles that it was planned on, and tells when a newer state of the map
 /// asks for another one.
-class PathWatch {
+class PathMonitor {
  public:
-  PathWatch(const TraversabilityView& view, const PathPlan& plan);
+  PathMonitor(const TraversabilityView& view, const PathPlan& plan);
 
   /// When the path is not free any more, or a tile under the robot's way appeared, went or has
   /// other cells than before; nothing when the path can stay. A later call compares with this view.
-  [[nodiscard]] std::optional<ReplanCause> look_at(const TraversabilityView& view);
+  [[nodiscard]] std::optional<ReplanReason> update(const TraversabilityView& view);
 
  private:
   using Tiles = std::map<TileId, std::shared_ptr<const TraversabilityTile>>;
 
-  [[nodiscard]] Tiles tiles_on_way(const TraversabilityView& view) const;
+  [[nodiscard]] Tiles tiles_on_path(const TraversabilityView& view) const;
 
   std::vector<PlanarPose> path_map_;
   bool was_found_;
   std::uint64_t map_id_;
   /// Of the last view: a tile that is the same object has the same cells.
   std::vector<std::shared_ptr<const TraversabilityTile>> tiles_;
-  Tiles on_way_;
+  Tiles on_path_;
 };
 
 }  // namespace stillmap

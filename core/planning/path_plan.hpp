@@ -20,7 +20,7 @@ enum class PlanStatus : std::uint8_t {
   /// As start_blocked, of the goal.
   goal_blocked,
   /// No way over known ground is wide enough: more time would not help.
-  no_way,
+  no_path,
   /// There may be a way; the search ended before one was found that the robot can drive. `poses`
   /// is the way to the nearest place reached.
   out_of_time,
@@ -62,7 +62,7 @@ struct PathPlan {
   /// Of the coarse route that guided the search [m].
   double route_m = 0.0;
   /// Steps of the search.
-  std::uint64_t work = 0;
+  std::uint64_t steps = 0;
   std::uint64_t map_version = 0;
 
   [[nodiscard]] bool is_found() const { return status == PlanStatus::found; }

@@ -28,7 +28,7 @@ std::string text_of(const Eigen::Vector2d& position_map) {
   return text.str();
 }
 
-std::string fault_of(const TraversabilityView& view, const PlanPlace& place) {
+std::string fault_of(const TraversabilityView& view, const Goal& place) {
   std::ostringstream text;
   if (!view.cell_of(place.position_map)) {
     text << "position " << text_of(place.position_map)
@@ -46,7 +46,7 @@ struct Stand {
   std::optional<PathConflict> conflict;
 };
 
-Stand stand_at(const TraversabilityView& view, const PlanPlace& place) {
+Stand stand_at(const TraversabilityView& view, const Goal& place) {
   constexpr int any_headings = 16;
   const int headings = place.heading_rad ? 1 : any_headings;
   Stand stand;
@@ -60,17 +60,18 @@ Stand stand_at(const TraversabilityView& view, const PlanPlace& place) {
   return stand;
 }
 
-PathPlan blocked(const TraversabilityView& view, PlanStatus status, const PlanPlace& place,
+PathPlan blocked(const TraversabilityView& view, PlanStatus status, const Goal& place,
                  const Stand& stand) {
   PathPlan plan = failed(view, status, "");
   std::ostringstream text;
   text << "'" << view.profile.name << "' cannot stand at " << text_of(place.position_map);
   if (stand.conflict) {
     plan.conflict = stand.conflict;
-    text << ": " << name(stand.conflict->reason) << " at " << text_of(stand.conflict->place_map);
+    text << ": " << name(stand.conflict->reason) << " at "
+         << text_of(stand.conflict->cell_centre_map);
   }
   const NearestTraversable nearby = nearest_traversable(view, place.position_map);
-  if (nearby.status == AreaStatus::ok) {
+  if (nearby.status == TraversabilityStatus::ok) {
     plan.nearby = nearby;
     text << "; the nearest free place is " << text_of(nearby.position_map) << ", "
          << nearby.distance_m << " m away";
@@ -80,8 +81,7 @@ PathPlan blocked(const TraversabilityView& view, PlanStatus status, const PlanPl
 }
 
 /// Everything that a search may need: the map, and both ends where unknown ground is allowed.
-Eigen::AlignedBox2d search_box(const TraversabilityView& view, const PlanPlace& from,
-                               const PlanPlace& to) {
+Eigen::AlignedBox2d search_box(const TraversabilityView& view, const Goal& from, const Goal& to) {
   Eigen::AlignedBox2d box = view.bounds_map();
   box.extend(from.position_map);
   box.extend(to.position_map);
@@ -94,11 +94,11 @@ double height_at(CellLookup& lookup, const TraversabilityView& view, const Plana
   return surface != nullptr && surface->ground.is_known() ? surface->ground.height_m : 0.0;
 }
 
-void set_poses(const TraversabilityView& view, std::span<const DrivenPose> path, PathPlan& plan) {
+void set_poses(const TraversabilityView& view, std::span<const PathPoint> path, PathPlan& plan) {
   CellLookup lookup(view);
   plan.poses.clear();
   plan.length_m = plan.reverse_m = 0.0;
-  for (const DrivenPose& driven : path) {
+  for (const PathPoint& driven : path) {
     plan.length_m += driven.at.step_m;
     if (driven.at.is_reverse) plan.reverse_m += driven.at.step_m;
     plan.poses.push_back({driven.at.pose, height_at(lookup, view, driven.at.pose), plan.length_m,
@@ -108,10 +108,9 @@ void set_poses(const TraversabilityView& view, std::span<const DrivenPose> path,
 }
 
 /// Fills in the path if check_path finds it free, thinned out where that stays free.
-bool take_path(const TraversabilityView& view, const std::vector<DrivenPose>& path,
-               PathPlan& plan) {
+bool take_path(const TraversabilityView& view, const std::vector<PathPoint>& path, PathPlan& plan) {
   constexpr double spacing_m = 0.25;
-  for (const std::vector<DrivenPose>& candidate : {thinned(path, spacing_m), path}) {
+  for (const std::vector<PathPoint>& candidate : {downsampled(path, spacing_m), path}) {
     set_poses(view, candidate, plan);
     const PathCheck check = check_path(view, plan.path_map());
     if (!check.is_free) continue;
@@ -126,27 +125,27 @@ bool take_path(const TraversabilityView& view, const std::vector<DrivenPose>& pa
 /// One search between two ends at which the robot can stand.
 class Search {
  public:
-  Search(const TraversabilityView& view, const PlanPlace& from, const PlanPlace& to,
+  Search(const TraversabilityView& view, const Goal& from, const Goal& to,
          const PlanningConfig& config)
       : view_(view),
         config_(config),
         from_(from),
         to_(to),
         grid_(view, search_box(view, from, to), config.cost_weight),
-        drive_(grid_, config.reverse_factor) {}
+        checker_(grid_, config.reverse_factor) {}
 
   [[nodiscard]] PathPlan run(std::span<const PlanarPose> starts,
                              std::span<const PlanarPose> goals) const {
     const auto route = find_coarse_route(grid_, from_.position_map, to_.position_map);
     if (!route) {
-      return failed(view_, PlanStatus::no_way,
+      return failed(view_, PlanStatus::no_path,
                     "no known way from " + text_of(from_.position_map) + " to " +
                         text_of(to_.position_map) + " is wide enough for '" + view_.profile.name +
                         "'; map more, or allow unknown ground");
     }
     PathPlan plan = failed(view_, PlanStatus::out_of_time, "");
     plan.route_m = route->length_m;
-    const auto best = find_best_path(drive_, *route, starts, goals, config_, plan.work);
+    const auto best = find_best_path(checker_, *route, starts, goals, config_, plan.steps);
     if (best && take_path(view_, best->poses, plan) && best->reaches_goal) {
       plan.status = PlanStatus::found;
     } else {
@@ -159,7 +158,7 @@ class Search {
   [[nodiscard]] std::string reason_for(const PathPlan& plan,
                                        std::span<const PlanarPose> goals) const {
     std::ostringstream text;
-    text << "no path to " << text_of(goals.front().position_map) << " was found in " << plan.work
+    text << "no path to " << text_of(goals.front().position_map) << " was found in " << plan.steps
          << " steps";
     if (!plan.poses.empty()) {
       const Eigen::Vector2d& end = plan.poses.back().pose.position_map;
@@ -172,14 +171,14 @@ class Search {
 
   const TraversabilityView& view_;
   const PlanningConfig& config_;
-  const PlanPlace& from_;
-  const PlanPlace& to_;
+  const Goal& from_;
+  const Goal& to_;
   PlanningGrid grid_;
-  DriveCheck drive_;
+  CollisionChecker checker_;
 };
 
 /// Whether the robot is there already.
-bool is_same_place(const PlanarPose& start, const PlanPlace& to) {
+bool is_same_place(const PlanarPose& start, const Goal& to) {
   constexpr double same_m = 1e-3;
   constexpr double same_rad = 1e-3;
   if ((start.position_map - to.position_map).norm() > same_m) return false;
@@ -187,10 +186,9 @@ bool is_same_place(const PlanarPose& start, const PlanPlace& to) {
          std::abs(std::remainder(start.heading_rad - *to.heading_rad, 2.0 * pi)) <= same_rad;
 }
 
-std::optional<PathPlan> refusal(const TraversabilityView& view, const PlanPlace& from,
-                                const PlanPlace& to) {
+std::optional<PathPlan> refusal(const TraversabilityView& view, const Goal& from, const Goal& to) {
   using enum PlanStatus;
-  if (view.tiles.empty()) return failed(view, no_way, "the map is empty");
+  if (view.tiles.empty()) return failed(view, no_path, "the map is empty");
   const std::string from_fault = fault_of(view, from);
   if (!from_fault.empty()) return failed(view, invalid_request, "start: " + from_fault);
   const std::string to_fault = fault_of(view, to);
@@ -205,7 +203,7 @@ std::optional<PathPlan> refusal(const TraversabilityView& view, const PlanPlace&
 
 }  // namespace
 
-PathPlan plan_path(const TraversabilityView& view, const PlanPlace& from, const PlanPlace& to,
+PathPlan plan_path(const TraversabilityView& view, const Goal& from, const Goal& to,
                    const PlanningConfig& config) {
   const std::string faults = config.faults();
   if (!faults.empty()) throw std::invalid_argument("planning: " + faults);

@@ -10,7 +10,7 @@
 namespace stillmap {
 
 /// A place to plan from or to.
-struct PlanPlace {
+struct Goal {
   Eigen::Vector2d position_map = Eigen::Vector2d::Zero();
   /// From x towards y; without one, any heading will do.
   std::optional<double> heading_rad;
@@ -23,7 +23,7 @@ struct PlanPlace {
 ///
 /// Not to be called by two threads at once: OMPL's seed is global.
 /// Throws std::invalid_argument for a configuration with faults.
-[[nodiscard]] PathPlan plan_path(const TraversabilityView& view, const PlanPlace& from,
-                                 const PlanPlace& to, const PlanningConfig& config = {});
+[[nodiscard]] PathPlan plan_path(const TraversabilityView& view, const Goal& from, const Goal& to,
+                                 const PlanningConfig& config = {});
 
 }  // namespace stillmap

@@ -46,10 +46,10 @@ class FreePose final : public ob::StateValidityChecker {
 
 class FreeCurve final : public ob::MotionValidator {
  public:
-  FreeCurve(const ob::SpaceInformationPtr& space, const DriveCheck& drive)
-      : MotionValidator(space), drive_(drive) {}
+  FreeCurve(const ob::SpaceInformationPtr& space, const CollisionChecker& checker)
+      : MotionValidator(space), checker_(checker) {}
   bool checkMotion(const ob::State* a, const ob::State* b) const override {
-    return std::isfinite(drive_.cost(pose_of(a), pose_of(b)));
+    return std::isfinite(checker_.cost(pose_of(a), pose_of(b)));
   }
   bool checkMotion(const ob::State* a, const ob::State* b,
                    std::pair<ob::State*, double>& last_valid) const override {
@@ -59,7 +59,7 @@ class FreeCurve final : public ob::MotionValidator {
   }
 
  private:
-  const DriveCheck& drive_;
+  const CollisionChecker& checker_;
 };
 
 /// Our poses for planners that ask for a plain sampler.
@@ -105,11 +105,11 @@ class InformedPoses final : public ob::InformedSampler {
   PoseSampler& poses_;
 };
 
-class DriveCost final : public ob::OptimizationObjective {
+class CurveCost final : public ob::OptimizationObjective {
  public:
-  DriveCost(const ob::SpaceInformationPtr& space, const DriveCheck& drive, PoseSampler& poses,
-            const Eigen::Vector2d& goal_map)
-      : OptimizationObjective(space), drive_(drive), poses_(poses) {
+  CurveCost(const ob::SpaceInformationPtr& space, const CollisionChecker& checker,
+            PoseSampler& poses, const Eigen::Vector2d& goal_map)
+      : OptimizationObjective(space), checker_(checker), poses_(poses) {
     description_ = "cost of driving";
     // All goals are one place with several headings.
     setCostToGoHeuristic([goal_map](const ob::State* state, const ob::Goal*) {
@@ -118,7 +118,7 @@ class DriveCost final : public ob::OptimizationObjective {
   }
   ob::Cost stateCost(const ob::State*) const override { return identityCost(); }
   ob::Cost motionCost(const ob::State* a, const ob::State* b) const override {
-    return ob::Cost(drive_.cost(pose_of(a), pose_of(b)));
+    return ob::Cost(checker_.cost(pose_of(a), pose_of(b)));
   }
   ob::Cost motionCostHeuristic(const ob::State* a, const ob::State* b) const override {
     return ob::Cost(si_->distance(a, b));
@@ -130,12 +130,12 @@ class DriveCost final : public ob::OptimizationObjective {
   }
 
  private:
-  const DriveCheck& drive_;
+  const CollisionChecker& checker_;
   PoseSampler& poses_;
 };
 
-ob::SpaceInformationPtr make_space(const DriveCheck& drive, PoseSampler& sampler) {
-  const PlanningGrid& grid = drive.grid();
+ob::SpaceInformationPtr make_space(const CollisionChecker& checker, PoseSampler& sampler) {
+  const PlanningGrid& grid = checker.grid();
   auto curves =
       std::make_shared<ob::ReedsSheppStateSpace>(curve_radius_m(grid.profile(), grid.cell_m()));
   ob::RealVectorBounds bounds(2);
@@ -149,13 +149,14 @@ ob::SpaceInformationPtr make_space(const DriveCheck& drive, PoseSampler& sampler
   });
   auto space = std::make_shared<ob::SpaceInformation>(curves);
   space->setStateValidityChecker(std::make_shared<FreePose>(space, grid));
-  space->setMotionValidator(std::make_shared<FreeCurve>(space, drive));
+  space->setMotionValidator(std::make_shared<FreeCurve>(space, checker));
   space->setup();
   return space;
 }
 
-ob::ProblemDefinitionPtr make_problem(const ob::SpaceInformationPtr& space, const DriveCheck& drive,
-                                      PoseSampler& sampler, std::span<const PlanarPose> starts,
+ob::ProblemDefinitionPtr make_problem(const ob::SpaceInformationPtr& space,
+                                      const CollisionChecker& checker, PoseSampler& sampler,
+                                      std::span<const PlanarPose> starts,
                                       std::span<const PlanarPose> goals) {
   auto problem = std::make_shared<ob::ProblemDefinition>(space);
   ob::ScopedState<> state(space);
@@ -170,22 +171,22 @@ ob::ProblemDefinitionPtr make_problem(const ob::SpaceInformationPtr& space, cons
   }
   problem->setGoal(goal_states);
   problem->setOptimizationObjective(
-      std::make_shared<DriveCost>(space, drive, sampler, goals.front().position_map));
+      std::make_shared<CurveCost>(space, checker, sampler, goals.front().position_map));
   return problem;
 }
 
 ob::PlannerPtr make_planner(PlannerKind kind, const ob::SpaceInformationPtr& space) {
   // Longer curves seldom stay on a street.
-  constexpr double longest_step_m = 15.0;
+  constexpr double max_step_m = 15.0;
   switch (kind) {
     case PlannerKind::rrt_star: {
       auto planner = std::make_shared<og::RRTstar>(space);
-      planner->setRange(longest_step_m);
+      planner->setRange(max_step_m);
       return planner;
     }
     case PlannerKind::rrt_connect: {
       auto planner = std::make_shared<og::RRTConnect>(space);
-      planner->setRange(longest_step_m);
+      planner->setRange(max_step_m);
       return planner;
     }
     case PlannerKind::bit_star:
@@ -213,27 +214,27 @@ std::string_view name(PlannerKind kind) {
   return names.at(static_cast<std::size_t>(kind));
 }
 
-SearchResult search_path(const DriveCheck& drive, PoseSampler& sampler,
+SearchResult search_path(const CollisionChecker& checker, PoseSampler& sampler,
                          std::span<const PlanarPose> starts, std::span<const PlanarPose> goals,
                          const SearchSettings& settings) {
   ompl::msg::noOutputHandler();
   ompl::RNG::setSeed(settings.seed);
-  const ob::SpaceInformationPtr space = make_space(drive, sampler);
-  const ob::ProblemDefinitionPtr problem = make_problem(space, drive, sampler, starts, goals);
+  const ob::SpaceInformationPtr space = make_space(checker, sampler);
+  const ob::ProblemDefinitionPtr problem = make_problem(space, checker, sampler, starts, goals);
   tell_of_improvements(*problem, settings.improved);
   const ob::PlannerPtr planner = make_planner(settings.planner, space);
   planner->setProblemDefinition(problem);
   planner->setup();
   std::uint64_t rounds = 0;
-  const std::uint64_t curves_before = drive.curves();
-  const auto work = [&] { return rounds + drive.curves() - curves_before; };
+  const std::uint64_t curves_before = checker.curves();
+  const auto steps = [&] { return rounds + checker.curves() - curves_before; };
   const ob::PlannerTerminationCondition is_over([&] {
     ++rounds;
-    return work() > settings.max_work || (settings.should_stop && settings.should_stop());
+    return steps() > settings.max_steps || (settings.should_stop && settings.should_stop());
   });
   (void)planner->solve(is_over);
   SearchResult result;
-  result.work = work();
+  result.steps = steps();
   if (!problem->hasSolution()) return result;
   result.reaches_goal = !problem->hasApproximateSolution();
   if (settings.improved && settings.planner == PlannerKind::rrt_connect && result.reaches_goal) {

@@ -9,7 +9,7 @@ namespace stillmap {
 namespace {
 
 /// Index of the pose about `way_m` after `from`.
-std::size_t index_after(std::span<const DrivenPose> path, std::size_t from, double way_m) {
+std::size_t index_after(std::span<const PathPoint> path, std::size_t from, double way_m) {
   std::size_t to = from;
   for (double driven_m = 0.0; to + 1 < path.size() && driven_m < way_m;) {
     driven_m += path[++to].at.step_m;
@@ -18,10 +18,10 @@ std::size_t index_after(std::span<const DrivenPose> path, std::size_t from, doub
 }
 
 /// What lies between two poses, exchanged for `shortcut`, whose costs count from the first.
-void replace(std::vector<DrivenPose>& path, std::size_t from, std::size_t to,
-             std::vector<DrivenPose> shortcut) {
+void replace(std::vector<PathPoint>& path, std::size_t from, std::size_t to,
+             std::vector<PathPoint> shortcut) {
   const double cost_at_start = path[from].cost;
-  for (DrivenPose& pose : shortcut) pose.cost += cost_at_start;
+  for (PathPoint& pose : shortcut) pose.cost += cost_at_start;
   const double end_cost = shortcut.empty() ? cost_at_start : shortcut.back().cost;
   const double saved = path[to].cost - end_cost;
   for (std::size_t i = to + 1; i < path.size(); ++i) path[i].cost -= saved;
@@ -30,9 +30,10 @@ void replace(std::vector<DrivenPose>& path, std::size_t from, std::size_t to,
   path.insert(path.erase(first, last), shortcut.begin(), shortcut.end());
 }
 
-std::optional<std::vector<DrivenPose>> drive_past(const DriveCheck& drive, const PlanarPose& a,
-                                                  const PlanarPose& middle, const PlanarPose& b) {
-  auto path = drive_through(drive, std::array{a, middle, b});
+std::optional<std::vector<PathPoint>> connect_via(const CollisionChecker& checker,
+                                                  const PlanarPose& a, const PlanarPose& middle,
+                                                  const PlanarPose& b) {
+  auto path = connect_waypoints(checker, std::array{a, middle, b});
   if (path) path->erase(path->begin());
   return path;
 }
@@ -67,14 +68,14 @@ class Chance {
 
 }  // namespace
 
-std::optional<std::vector<DrivenPose>> drive_through(const DriveCheck& drive,
-                                                     std::span<const PlanarPose> waypoints) {
-  std::vector<DrivenPose> path{{{waypoints.front(), 0.0, false}, 0.0}};
+std::optional<std::vector<PathPoint>> connect_waypoints(const CollisionChecker& checker,
+                                                        std::span<const PlanarPose> waypoints) {
+  std::vector<PathPoint> path{{{waypoints.front(), 0.0, false}, 0.0}};
   for (std::size_t i = 1; i < waypoints.size(); ++i) {
-    const auto driven = drive.drive(waypoints[i - 1], waypoints[i]);
+    const auto driven = checker.connect(waypoints[i - 1], waypoints[i]);
     if (!driven) return std::nullopt;
     const double cost_so_far = path.back().cost;
-    for (DrivenPose pose : *driven) {
+    for (PathPoint pose : *driven) {
       pose.cost += cost_so_far;
       path.push_back(pose);
     }
@@ -82,35 +83,36 @@ std::optional<std::vector<DrivenPose>> drive_through(const DriveCheck& drive,
   return path;
 }
 
-std::vector<DrivenPose> polish(const DriveCheck& drive, std::vector<DrivenPose> path,
-                               std::span<const PlanarPose> ends, int tries, std::uint32_t seed,
-                               const std::function<bool()>& should_stop) {
-  constexpr double shortest_m = 2.0;
-  constexpr double longest_m = 80.0;
-  constexpr double least_gain = 0.01;
+std::vector<PathPoint> smooth_path(const CollisionChecker& checker, std::vector<PathPoint> path,
+                                   std::span<const PlanarPose> ends, int tries, std::uint32_t seed,
+                                   const std::function<bool()>& should_stop) {
+  constexpr double min_shortcut_m = 2.0;
+  constexpr double max_shortcut_m = 80.0;
+  constexpr double min_gain = 0.01;
   Chance chance(seed);
   for (int i = 0; i < tries && path.size() > 2; ++i) {
     if (should_stop && should_stop()) break;
     const std::size_t from = chance.below(path.size() - 1);
     // Small wiggles need as many tries as large ones.
-    const double way_m = shortest_m * std::pow(longest_m / shortest_m, chance.uniform());
+    const double way_m =
+        min_shortcut_m * std::pow(max_shortcut_m / min_shortcut_m, chance.uniform());
     const std::size_t to = index_after(path, from, way_m);
     const PlanarPose& a = path[from].at.pose;
     const bool is_end = to + 1 == path.size() && !ends.empty();
     const PlanarPose& b = is_end ? ends[chance.below(ends.size())] : path[to].at.pose;
     // Straight on, or round the other way past what lies between.
     auto shortcut = i % 2 == 0
-                        ? drive.drive(a, b)
-                        : drive_past(drive, a, chance.near(path[(from + to) / 2].at.pose), b);
+                        ? checker.connect(a, b)
+                        : connect_via(checker, a, chance.near(path[(from + to) / 2].at.pose), b);
     if (!shortcut || shortcut->empty()) continue;
-    if (shortcut->back().cost + least_gain > path[to].cost - path[from].cost) continue;
+    if (shortcut->back().cost + min_gain > path[to].cost - path[from].cost) continue;
     replace(path, from, to, *std::move(shortcut));
   }
   return path;
 }
 
-std::vector<DrivenPose> thinned(std::span<const DrivenPose> path, double spacing_m) {
-  std::vector<DrivenPose> kept;
+std::vector<PathPoint> downsampled(std::span<const PathPoint> path, double spacing_m) {
+  std::vector<PathPoint> kept;
   double since_last_m = 0.0;
   for (std::size_t i = 0; i < path.size(); ++i) {
     since_last_m += path[i].at.step_m;

@@ -18,12 +18,12 @@ struct PlanningConfig {
   /// A metre backwards is as long as this many forwards; 1 or more.
   double reverse_factor = 3.0;
   /// Curves looked at and rounds of the planner, at most.
-  std::uint64_t max_work = 60'000;
+  std::uint64_t max_steps = 60'000;
   /// Searches with other seeds, at most, as long as the best path costs much more than the coarse
   /// route.
   std::uint32_t max_attempts = 8;
   /// Attempts to shorten the path that was found.
-  int polish_tries = 1000;
+  int smoothing_attempts = 1000;
   /// Same map, question, configuration and seed: same path, unless `should_stop` cut it short.
   std::uint32_t seed = 1;
   /// Asked all the time; when true, the best path so far is taken. May be empty.

@@ -60,10 +60,10 @@ PlanarPose PoseSampler::draw_near_an_end() {
 
 PlanarPose PoseSampler::draw_anywhere() {
   // Of a map most is no place to stand; a search can do with a useless pose now and then.
-  constexpr int most_tries = 200;
+  constexpr int max_tries = 200;
   const Eigen::AlignedBox2d& box_map = grid_.bounds_map();
   PlanarPose pose;
-  for (int i = 0; i < most_tries; ++i) {
+  for (int i = 0; i < max_tries; ++i) {
     pose.position_map = {uniform(box_map.min().x(), box_map.max().x()),
                          uniform(box_map.min().y(), box_map.max().y())};
     if (grid_.may_stand_in(grid_.cell_of(pose.position_map))) break;

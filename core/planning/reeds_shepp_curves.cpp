@@ -39,7 +39,7 @@ UnitPose moved(const UnitPose& from, Segment type, double t) {
 
 }  // namespace
 
-struct TurningCurves::Space {
+struct ReedsSheppCurves::Space {
   explicit Space(double radius_m) : curves(radius_m), a(&curves), b(&curves) {}
 
   [[nodiscard]] ob::ReedsSheppStateSpace::ReedsSheppPath path(const PlanarPose& from,
@@ -69,19 +69,19 @@ struct TurningCurves::Space {
   State b;
 };
 
-TurningCurves::TurningCurves(double radius_m)
+ReedsSheppCurves::ReedsSheppCurves(double radius_m)
     : space_(std::make_unique<Space>(radius_m)), radius_m_(radius_m) {}
-TurningCurves::~TurningCurves() = default;
-TurningCurves::TurningCurves(TurningCurves&&) noexcept = default;
-TurningCurves& TurningCurves::operator=(TurningCurves&&) noexcept = default;
+ReedsSheppCurves::~ReedsSheppCurves() = default;
+ReedsSheppCurves::ReedsSheppCurves(ReedsSheppCurves&&) noexcept = default;
+ReedsSheppCurves& ReedsSheppCurves::operator=(ReedsSheppCurves&&) noexcept = default;
 
-double TurningCurves::length_m(const PlanarPose& a, const PlanarPose& b) const {
+double ReedsSheppCurves::length_m(const PlanarPose& a, const PlanarPose& b) const {
   return radius_m_ * space_->path(a, b).length();
 }
 
-void TurningCurves::visit_between(const PlanarPose& a, const PlanarPose& b, double max_move_m,
-                                  double reach_m,
-                                  const std::function<bool(const CurvePose&)>& visit) const {
+void ReedsSheppCurves::visit_between(const PlanarPose& a, const PlanarPose& b, double max_move_m,
+                                     double reach_m,
+                                     const std::function<bool(const CurvePose&)>& visit) const {
   const auto path = space_->path(a, b);
   UnitPose from{0.0, 0.0, a.heading_rad};
   double left = path.length();

@@ -18,13 +18,13 @@ struct CurvePose {
 /// The shortest curves of a robot that drives forwards and backwards and cannot turn tighter than
 /// a radius (J. Reeds, L. Shepp, "Optimal paths for a car that goes both forwards and backwards",
 /// 1990). A robot that turns on the spot is one with a radius too small to matter.
-class TurningCurves {
+class ReedsSheppCurves {
  public:
   /// @pre radius_m > 0
-  explicit TurningCurves(double radius_m);
-  ~TurningCurves();
-  TurningCurves(TurningCurves&&) noexcept;
-  TurningCurves& operator=(TurningCurves&&) noexcept;
+  explicit ReedsSheppCurves(double radius_m);
+  ~ReedsSheppCurves();
+  ReedsSheppCurves(ReedsSheppCurves&&) noexcept;
+  ReedsSheppCurves& operator=(ReedsSheppCurves&&) noexcept;
 
   [[nodiscard]] double length_m(const PlanarPose& a, const PlanarPose& b) const;
 

@@ -6,16 +6,16 @@
 
 namespace stillmap {
 
-StreamFirstLabels::StreamFirstLabels(std::unique_ptr<LabelSource> otherwise)
-    : otherwise_(std::move(otherwise)) {}
+FallbackSegmenter::FallbackSegmenter(std::unique_ptr<Segmenter> fallback)
+    : fallback_(std::move(fallback)) {}
 
-std::string StreamFirstLabels::name() const {
-  return StreamLabels().name() + ", else " + otherwise_->name();
+std::string FallbackSegmenter::name() const {
+  return PassthroughSegmenter().name() + ", else " + fallback_->name();
 }
 
-PointLabels StreamFirstLabels::label(const Scan& scan) {
+PointLabels FallbackSegmenter::segment(const Scan& scan) {
   uses_stream_ = !scan.labels.empty();
-  return uses_stream_ ? StreamLabels().label(scan) : otherwise_->label(scan);
+  return uses_stream_ ? PassthroughSegmenter().segment(scan) : fallback_->segment(scan);
 }
 
 }  // namespace stillmap

@@ -8,21 +8,25 @@ namespace stillmap {
 
 /// The labels that come with a scan where it has any; else those of another source. So recordings
 /// with true labels keep them, and all other scans get semantics from the network.
-class StreamFirstLabels final : public LabelSource {
+class FallbackSegmenter final : public Segmenter {
  public:
-  explicit StreamFirstLabels(std::unique_ptr<LabelSource> otherwise);
+  explicit FallbackSegmenter(std::unique_ptr<Segmenter> fallback);
 
   [[nodiscard]] std::string name() const override;
-  [[nodiscard]] std::string details() const override { return otherwise_->details(); }
-  [[nodiscard]] std::vector<double> costs() const override { return otherwise_->costs(); }
-  void set_coarseness(std::size_t coarseness) override { otherwise_->set_coarseness(coarseness); }
-  [[nodiscard]] int image_columns() const override {
-    return uses_stream_ ? 0 : otherwise_->image_columns();
+  [[nodiscard]] std::string details() const override { return fallback_->details(); }
+  [[nodiscard]] std::vector<double> relative_costs() const override {
+    return fallback_->relative_costs();
   }
-  [[nodiscard]] PointLabels label(const Scan& scan) override;
+  void set_resolution_level(std::size_t resolution_level) override {
+    fallback_->set_resolution_level(resolution_level);
+  }
+  [[nodiscard]] int image_columns() const override {
+    return uses_stream_ ? 0 : fallback_->image_columns();
+  }
+  [[nodiscard]] PointLabels segment(const Scan& scan) override;
 
  private:
-  std::unique_ptr<LabelSource> otherwise_;
+  std::unique_ptr<Segmenter> fallback_;
   /// The last scan brought labels.
   bool uses_stream_ = false;
 };

@@ -135,7 +135,7 @@ class NearestPixels {
 };
 
 /// The class with most votes, of equals the lowest; `unlabeled` without a vote for another one.
-SemanticClass most_frequent(std::span<const SemanticClass> voted) {
+SemanticClass majority_class(std::span<const SemanticClass> voted) {
   SemanticClass winner = SemanticClass::unlabeled;
   std::ptrdiff_t most = 0;
   for (std::size_t i = 0; i < voted.size(); ++i) {
@@ -224,7 +224,7 @@ class Poll {
     for (; votes < wanted && nearest.distance_m(votes, p) <= cutoff_m; ++votes) {
       voted[votes] = padded_.label(corner + offsets_[nearest.place(votes, p)]);
     }
-    const SemanticClass winner = most_frequent(std::span(voted).first(votes));
+    const SemanticClass winner = majority_class(std::span(voted).first(votes));
     if (winner == SemanticClass::unlabeled) return {};
     float confidence = 0.0F;
     for (std::size_t k = 0; k < votes; ++k) {

@@ -43,7 +43,7 @@ std::string between(const char* field, int value, int max) {
 
 std::string ModelDescription::faults() const {
   std::string faults =
-      between("rows", rows, max_rows) + between("columns", columns, most_image_columns);
+      between("rows", rows, max_rows) + between("columns", columns, max_image_columns);
   if (!(fov_down < fov_up && std::abs(fov_up) < std::numbers::pi / 2 &&
         std::abs(fov_down) < std::numbers::pi / 2)) {
     faults += "fov_down must be below fov_up, both within -90..90 degrees\n";

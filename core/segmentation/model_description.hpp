@@ -19,8 +19,8 @@ namespace stillmap {
 inline constexpr std::size_t input_channels = 5;
 
 /// Widths of range images that can be asked for; a model's own may be less than the least.
-inline constexpr int least_image_columns = 16;
-inline constexpr int most_image_columns = 8192;
+inline constexpr int min_image_columns = 16;
+inline constexpr int max_image_columns = 8192;
 
 /// Mean and standard deviation of each input channel over the training set.
 struct InputStatistics {
@@ -45,7 +45,7 @@ struct ModelDescription {
   int columns = 1024;
   /// The narrowest image that it was trained for, for machines that are too slow for the usual one;
   /// 0: it knows one width.
-  int least_columns = 0;
+  int min_columns = 0;
   /// Upper and lower edge of the image [rad]; points beyond are squeezed into the edge rows.
   double fov_up = 0.0;
   double fov_down = 0.0;

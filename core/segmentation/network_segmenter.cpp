@@ -17,11 +17,11 @@ constexpr int usual_stride = 32;
 
 /// Half way from the least width that the model knows to the usual one.
 int width_between(const ModelDescription& model) {
-  return (model.columns + model.least_columns) / 2 / usual_stride * usual_stride;
+  return (model.columns + model.min_columns) / 2 / usual_stride * usual_stride;
 }
 
 std::unique_ptr<SegmentationNetwork> open_in_width(ModelDescription model, int columns,
-                                                   const EngineChoice& choice) {
+                                                   const EngineOptions& choice) {
   model.columns = columns;
   try {
     return open_network(model, choice).network;
@@ -47,21 +47,22 @@ PixelLabels pixel_labels(PixelOutputs&& outputs, const ModelDescription& model) 
   return pixels;
 }
 
-NetworkLabels::NetworkLabels(ModelDescription model, std::unique_ptr<SegmentationNetwork> network,
-                             std::string remark)
+NetworkSegmenter::NetworkSegmenter(ModelDescription model,
+                                   std::unique_ptr<SegmentationNetwork> network, std::string remark)
     : model_(std::move(model)), remark_(std::move(remark)) {
   assert(network && model_.faults().empty());
   widths_.push_back({.columns = model_.columns, .network = std::move(network)});
 }
 
-void NetworkLabels::add_coarser(int columns, std::unique_ptr<SegmentationNetwork> network) {
+void NetworkSegmenter::add_lower_resolution(int columns,
+                                            std::unique_ptr<SegmentationNetwork> network) {
   assert(network && columns > 0 && columns < widths_.back().columns);
   widths_.push_back({.columns = columns, .network = std::move(network)});
 }
 
 // By pixel, as nearly all that is done with a scan. In truth narrow images cost somewhat more: the
 // default model's take 0.7 and 0.54 of the time at 0.75 and 0.5 of the columns.
-std::vector<double> NetworkLabels::costs() const {
+std::vector<double> NetworkSegmenter::relative_costs() const {
   std::vector<double> costs;
   for (const Width& width : widths_) {
     costs.push_back(static_cast<double>(width.columns) / widths_.front().columns);
@@ -69,19 +70,19 @@ std::vector<double> NetworkLabels::costs() const {
   return costs;
 }
 
-void NetworkLabels::set_coarseness(std::size_t coarseness) {
-  in_use_ = std::min(coarseness, widths_.size() - 1);
+void NetworkSegmenter::set_resolution_level(std::size_t resolution_level) {
+  in_use_ = std::min(resolution_level, widths_.size() - 1);
   model_.columns = widths_[in_use_].columns;
 }
 
-std::string NetworkLabels::details() const {
+std::string NetworkSegmenter::details() const {
   std::string text = widths_.front().network->engine() + ", image " + std::to_string(model_.rows) +
                      "x" + std::to_string(widths_.front().columns);
   if (widths_.size() > 1) text += " down to " + std::to_string(widths_.back().columns);
   return text + (remark_.empty() ? "" : "; ") + remark_;
 }
 
-PointLabels NetworkLabels::label(const Scan& scan) {
+PointLabels NetworkSegmenter::segment(const Scan& scan) {
   if (scan.empty()) return {};
   const RangeImage image(scan.points_lidar, model_.projection());
   PixelOutputs outputs = widths_[in_use_].network->run(make_network_input(scan, image, model_));
@@ -89,27 +90,27 @@ PointLabels NetworkLabels::label(const Scan& scan) {
   return model_.knn ? knn_labels(image, pixels, *model_.knn) : labels_of_own_pixel(image, pixels);
 }
 
-std::unique_ptr<LabelSource> open_model(const ModelDescription& model, const EngineChoice& choice) {
+std::unique_ptr<Segmenter> open_model(const ModelDescription& model, const EngineOptions& choice) {
   OpenedNetwork opened = open_network(model, choice);
-  return std::make_unique<NetworkLabels>(model, std::move(opened.network),
-                                         std::move(opened.remark));
+  return std::make_unique<NetworkSegmenter>(model, std::move(opened.network),
+                                            std::move(opened.remark));
 }
 
-std::unique_ptr<LabelSource> open_model_of_many_widths(const ModelDescription& model,
-                                                       const EngineChoice& choice) {
+std::unique_ptr<Segmenter> open_multi_resolution_model(const ModelDescription& model,
+                                                       const EngineOptions& choice) {
   OpenedNetwork opened = open_network(model, choice);
-  auto labels =
-      std::make_unique<NetworkLabels>(model, std::move(opened.network), std::move(opened.remark));
-  const int least = model.least_columns;
-  if (least == 0 || least >= model.columns) return labels;
-  if (const int between = width_between(model); between > least) {
+  auto labels = std::make_unique<NetworkSegmenter>(model, std::move(opened.network),
+                                                   std::move(opened.remark));
+  const int min_columns = model.min_columns;
+  if (min_columns == 0 || min_columns >= model.columns) return labels;
+  if (const int between = width_between(model); between > min_columns) {
     try {
-      labels->add_coarser(between, open_in_width(model, between, choice));
+      labels->add_lower_resolution(between, open_in_width(model, between, choice));
     } catch (const ModelError&) {
       // Nobody asked for it: a network of another stride does without.
     }
   }
-  labels->add_coarser(least, open_in_width(model, least, choice));
+  labels->add_lower_resolution(min_columns, open_in_width(model, min_columns, choice));
   return labels;
 }
 

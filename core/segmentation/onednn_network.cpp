@@ -71,8 +71,8 @@ OneDnnNetwork::OneDnnNetwork(const ModelDescription& model, Precision precision,
 OneDnnNetwork::~OneDnnNetwork() = default;
 
 PixelOutputs OneDnnNetwork::run(std::span<const float> input) {
-  return most_probable(state_->plan->run(input), state_->outputs, state_->kind,
-                       ScoreLayout::pixels);
+  return argmax_outputs(state_->plan->run(input), state_->outputs, state_->kind,
+                        ScoreLayout::pixels);
 }
 
 std::vector<float> OneDnnNetwork::probabilities(std::span<const float> input) {

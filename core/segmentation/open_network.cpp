@@ -7,17 +7,17 @@
 namespace stillmap {
 namespace {
 
-using Engine = EngineChoice::Engine;
-using Numbers = EngineChoice::Numbers;
+using Engine = EngineOptions::Engine;
+using PrecisionMode = EngineOptions::PrecisionMode;
 
-Precision precision_of(const ModelDescription& model, Numbers wanted) {
-  if (wanted == Numbers::automatic) return model.int8 ? Precision::int8 : Precision::fp32;
-  return wanted == Numbers::int8 ? Precision::int8 : Precision::fp32;
+Precision precision_of(const ModelDescription& model, PrecisionMode wanted) {
+  if (wanted == PrecisionMode::automatic) return model.int8 ? Precision::int8 : Precision::fp32;
+  return wanted == PrecisionMode::int8 ? Precision::int8 : Precision::fp32;
 }
 
-OpenedNetwork open_with_onednn(const ModelDescription& model, const EngineChoice& choice) {
+OpenedNetwork open_with_onednn(const ModelDescription& model, const EngineOptions& choice) {
   const Precision precision = precision_of(model, choice.precision);
-  const bool could_be_faster = choice.precision == Numbers::automatic && !model.int8;
+  const bool could_be_faster = choice.precision == PrecisionMode::automatic && !model.int8;
   return {.network = std::make_unique<OneDnnNetwork>(model, precision, choice.threads),
           .remark = could_be_faster
                         ? "int8 would be faster, but the model is not calibrated for it: "
@@ -25,9 +25,9 @@ OpenedNetwork open_with_onednn(const ModelDescription& model, const EngineChoice
                         : ""};
 }
 
-OpenedNetwork open_with_opencv(const ModelDescription& model, const EngineChoice& choice,
+OpenedNetwork open_with_opencv(const ModelDescription& model, const EngineOptions& choice,
                                std::string remark) {
-  if (choice.precision == Numbers::int8) {
+  if (choice.precision == PrecisionMode::int8) {
     throw ModelError(model.network_file,
                      "cannot run in int8 on OpenCV; use precision: auto or fp32");
   }
@@ -36,9 +36,9 @@ OpenedNetwork open_with_opencv(const ModelDescription& model, const EngineChoice
 
 }  // namespace
 
-OpenedNetwork open_network(const ModelDescription& model, const EngineChoice& choice) {
+OpenedNetwork open_network(const ModelDescription& model, const EngineOptions& choice) {
   if (choice.engine == Engine::opencv) return open_with_opencv(model, choice, "");
-  if (choice.engine == Engine::onednn || choice.precision == Numbers::int8) {
+  if (choice.engine == Engine::onednn || choice.precision == PrecisionMode::int8) {
     return open_with_onednn(model, choice);
   }
   try {

@@ -9,14 +9,14 @@
 namespace stillmap {
 
 /// How a network is to be run.
-struct EngineChoice {
+struct EngineOptions {
   enum class Engine {
     /// oneDNN where it can run the network, else OpenCV.
     automatic,
     onednn,
     opencv,
   };
-  enum class Numbers {
+  enum class PrecisionMode {
     /// int8 where the model has a calibration for it and oneDNN runs it, else fp32.
     automatic,
     fp32,
@@ -24,7 +24,7 @@ struct EngineChoice {
   };
 
   Engine engine = Engine::automatic;
-  Numbers precision = Numbers::automatic;
+  PrecisionMode precision = PrecisionMode::automatic;
   /// Threads of oneDNN for one image; 0: all cores.
   int threads = 0;
 };
@@ -36,6 +36,7 @@ struct OpenedNetwork {
 };
 
 /// Loads the network that `model` describes into the engine that was chosen. Throws ModelError.
-[[nodiscard]] OpenedNetwork open_network(const ModelDescription& model, const EngineChoice& choice);
+[[nodiscard]] OpenedNetwork open_network(const ModelDescription& model,
+                                         const EngineOptions& choice);
 
 }  // namespace stillmap

@@ -108,8 +108,8 @@ PixelOutputs OpenCvNetwork::run(std::span<const float> input) {
   assert(input.size() == input_channels * static_cast<std::size_t>(state_->input_shape[2] *
                                                                    state_->input_shape[3]));
   const cv::Mat output = state_->forward(input);
-  return most_probable(state_->scores(output), static_cast<std::size_t>(state_->output_shape[1]),
-                       state_->kind);
+  return argmax_outputs(state_->scores(output), static_cast<std::size_t>(state_->output_shape[1]),
+                        state_->kind);
 }
 
 std::vector<float> OpenCvNetwork::probabilities(std::span<const float> input) {

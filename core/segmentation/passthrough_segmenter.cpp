@@ -5,7 +5,7 @@
 
 namespace stillmap {
 
-PointLabels StreamLabels::label(const Scan& scan) {
+PointLabels PassthroughSegmenter::segment(const Scan& scan) {
   assert(scan.labels.empty() || scan.labels.size() == scan.size());
   PointLabels labels{.classes = scan.labels, .confidence = {}};
   labels.confidence.resize(scan.labels.size());

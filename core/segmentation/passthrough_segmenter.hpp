@@ -6,17 +6,17 @@ namespace stillmap {
 
 /// Labels that came with the scan: a recording's, or a cloud's label field. Each counts in full
 /// (confidence 1), an unlabeled point not at all. A scan without labels stays without.
-class StreamLabels final : public LabelSource {
+class PassthroughSegmenter final : public Segmenter {
  public:
   [[nodiscard]] std::string name() const override { return "stream"; }
-  [[nodiscard]] PointLabels label(const Scan& scan) override;
+  [[nodiscard]] PointLabels segment(const Scan& scan) override;
 };
 
 /// Pure geometry: no point has a class, even if the scan brings labels.
-class NoLabels final : public LabelSource {
+class NullSegmenter final : public Segmenter {
  public:
   [[nodiscard]] std::string name() const override { return "none"; }
-  [[nodiscard]] PointLabels label(const Scan& /*scan*/) override { return {}; }
+  [[nodiscard]] PointLabels segment(const Scan& /*scan*/) override { return {}; }
 };
 
 }  // namespace stillmap

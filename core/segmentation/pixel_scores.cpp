@@ -23,9 +23,9 @@ template <class T>
 using Lanes = std::array<T, lanes>;
 
 /// Below it exp(x) is as good as 0.
-constexpr float least_exponent = -87.0F;
+constexpr float min_exponent = -87.0F;
 
-/// exp(x) for least_exponent <= x <= 0 to 2e-7 of its value, without branches: 2^n times Cephes'
+/// exp(x) for min_exponent <= x <= 0 to 2e-7 of its value, without branches: 2^n times Cephes'
 /// polynomial.
 inline float exp_of_negative(float x) {
   constexpr float log2_e = 1.44269504F, ln2_high = 0.693359375F, ln2_low = -2.12194440e-4F;
@@ -80,7 +80,7 @@ class Tile {
 #pragma omp simd
       for (std::size_t p = 0; p < lanes; ++p) {
         const float x = scores_[n][p] - best_[p];
-        scores_[n][p] = x > least_exponent ? x : least_exponent;
+        scores_[n][p] = x > min_exponent ? x : min_exponent;
       }
 #pragma omp simd
       for (std::size_t p = 0; p < lanes; ++p) {
@@ -146,8 +146,8 @@ ScoreKind score_kind(std::span<const float> scores, std::size_t outputs, ScoreLa
   return all_one ? ScoreKind::probabilities : ScoreKind::logits;
 }
 
-PixelOutputs most_probable(std::span<const float> scores, std::size_t outputs, ScoreKind kind,
-                           ScoreLayout layout) {
+PixelOutputs argmax_outputs(std::span<const float> scores, std::size_t outputs, ScoreKind kind,
+                            ScoreLayout layout) {
   const std::size_t pixels = scores.size() / outputs;
   PixelOutputs result{.output = std::vector<std::uint8_t>(pixels, PixelOutputs::no_output),
                       .confidence = std::vector<float>(pixels, 0.0F)};

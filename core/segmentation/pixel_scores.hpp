@@ -20,8 +20,8 @@ enum class ScoreLayout { planes, pixels };
 
 /// The most probable output of each pixel (ties: the lowest) and its probability; of logits, the
 /// soft-max.
-[[nodiscard]] PixelOutputs most_probable(std::span<const float> scores, std::size_t outputs,
-                                         ScoreKind kind, ScoreLayout layout = ScoreLayout::planes);
+[[nodiscard]] PixelOutputs argmax_outputs(std::span<const float> scores, std::size_t outputs,
+                                          ScoreKind kind, ScoreLayout layout = ScoreLayout::planes);
 
 /// The probabilities, outputs x pixels.
 [[nodiscard]] std::vector<float> probabilities_of(std::span<const float> scores,

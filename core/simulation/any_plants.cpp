@@ -6,7 +6,7 @@
 #include "core/simulation/leaves.hpp"
 #include "core/simulation/vegetation.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector3f;
@@ -23,7 +23,7 @@ struct TreePlan {
   bool conifer;
 };
 
-TreePlan drawn_tree(Random& random) {
+TreePlan random_tree(Random& random) {
   TreePlan tree{};
   tree.height_m = between(random, 3.0, random.chance(0.5) ? 16.0 : 9.0);
   tree.conifer = random.chance(0.15);
@@ -90,7 +90,7 @@ void add_conifer_crown(Mesh& mesh, const TreePlan& tree, const Vector3f& top, Ra
 
 Mesh make_any_tree(Random random) {
   Mesh mesh;
-  const TreePlan tree = drawn_tree(random);
+  const TreePlan tree = random_tree(random);
   const float lean = random.chance(0.3) ? 0.15F : 0.04F;
   const Vector3f top(between(random, -lean, lean) * tree.trunk_m,
                      between(random, -lean, lean) * tree.trunk_m, tree.trunk_m);
@@ -154,4 +154,4 @@ Mesh make_any_hedge(float length_m, Random random) {
   return mesh;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

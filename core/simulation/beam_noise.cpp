@@ -4,7 +4,7 @@
 #include <cmath>
 #include <sstream>
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 std::string BeamNoise::faults() const {
   std::ostringstream out;
@@ -15,19 +15,19 @@ std::string BeamNoise::faults() const {
   check(range_sigma_m, 1.0, "range_sigma_m");
   check(drop_share, 1.0, "drop_share");
   check(intensity_sigma, 1.0, "intensity_sigma");
-  check(weakest_return, 1.0, "weakest_return");
+  check(min_return, 1.0, "min_return");
   return out.str();
 }
 
 std::optional<BeamReturn> beam_return(const BeamNoise& noise, float range_m, float cos_incidence,
-                                      const SurfaceFacts& surface, float brightness,
+                                      const SurfaceProperties& surface, float brightness,
                                       Random& random) {
   if (random.chance(noise.drop_share) || random.chance(surface.lost)) return std::nullopt;
   // Rough surfaces send more back at grazing angles than Lambert's cosine has it.
   const double angle = std::sqrt(static_cast<double>(cos_incidence));
   const double reflected = surface.reflectivity * brightness * angle;
   const double received = reflected / (static_cast<double>(range_m) * range_m);
-  const double weakness = noise.weakest_return / std::max(received, 1e-12);
+  const double weakness = noise.min_return / std::max(received, 1e-12);
   const double faint = weakness * weakness * weakness;
   if (random.uniform() * (1.0 + faint) > 1.0) return std::nullopt;
   // The sensor corrects its intensity for range, not perfectly.
@@ -42,4 +42,4 @@ std::optional<BeamReturn> beam_return(const BeamNoise& noise, float range_m, flo
   return BeamReturn{static_cast<float>(range), static_cast<float>(std::clamp(intensity, 0.0, 1.0))};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

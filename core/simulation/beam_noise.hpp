@@ -6,7 +6,7 @@
 #include "core/simulation/random.hpp"
 #include "core/simulation/surface.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// How a real lidar's returns differ from geometry.
 struct BeamNoise {
@@ -15,7 +15,7 @@ struct BeamNoise {
   double drop_share = 0.01;
   double intensity_sigma = 0.015;
   /// reflectivity * sqrt(cos incidence) / range^2 at which half of the beams come back [1/m^2].
-  double weakest_return = 1.2e-5;
+  double min_return = 1.2e-5;
 
   /// Every fault in words, one a line.
   [[nodiscard]] std::string faults() const;
@@ -31,7 +31,7 @@ struct BeamReturn {
 /// @param brightness multiplies the surface's reflectivity.
 [[nodiscard]] std::optional<BeamReturn> beam_return(const BeamNoise& noise, float range_m,
                                                     float cos_incidence,
-                                                    const SurfaceFacts& surface, float brightness,
-                                                    Random& random);
+                                                    const SurfaceProperties& surface,
+                                                    float brightness, Random& random);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -3,7 +3,7 @@
 
 #include "core/simulation/buildings.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 float between(Random& random, double low, double high) {
@@ -88,4 +88,4 @@ void add_outbuildings(Mesh& house, const BuildingPlan& plan, Random& random) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector3f;
@@ -150,4 +150,4 @@ Mesh make_building(const BuildingPlan& plan, Random random) {
   return mesh;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

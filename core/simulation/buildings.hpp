@@ -3,7 +3,7 @@
 #include "core/simulation/mesh.hpp"
 #include "core/simulation/random.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// A house: its front looks along -y, its foot is centred on the origin [m].
 struct BuildingPlan {
@@ -25,4 +25,4 @@ struct BuildingPlan {
 /// What is built onto the front of a house: steps and a porch, a bay window, a garage.
 void add_outbuildings(Mesh& house, const BuildingPlan& plan, Random& random);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

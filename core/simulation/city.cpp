@@ -5,7 +5,7 @@
 
 #include "core/simulation/ground_mesh.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 std::uint16_t City::next_instance() {
   assert(instances < std::numeric_limits<std::uint16_t>::max());
@@ -22,4 +22,4 @@ City build_city(const GroundShape& ground, std::uint64_t seed) {
   return city;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -9,7 +9,7 @@
 #include "core/simulation/object_shapes.hpp"
 #include "core/simulation/random.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// A shape somewhere in the city.
 struct Body {
@@ -46,4 +46,4 @@ void park_vehicles(City& city, const GroundShape& ground, Random random);
 /// Trees, lights and signs along the streets.
 void furnish_streets(City& city, const GroundShape& ground, Random random);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -5,7 +5,7 @@
 #include "core/simulation/city.hpp"
 #include "core/simulation/garden_shapes.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::AlignedBox2d;
@@ -113,11 +113,11 @@ class BlockFiller {
         });
     if (taken || !block_.contains(foot)) return;
     houses_.push_back(foot);
-    place(make_building(drawn_house(width, depth), Random(random_.index(1U << 30U))), foot.center(),
-          side.heading());
+    place(make_building(random_house(width, depth), Random(random_.index(1U << 30U))),
+          foot.center(), side.heading());
   }
 
-  BuildingPlan drawn_house(double width, double depth) {
+  BuildingPlan random_house(double width, double depth) {
     const BlockPlan& plan = ground_.plan().blocks;
     const auto spread = static_cast<std::size_t>(plan.floors_max - plan.floors_min + 1);
     BuildingPlan house{.width_m = static_cast<float>(width - 0.2),
@@ -200,4 +200,4 @@ void fill_blocks(City& city, const GroundShape& ground, Random random) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

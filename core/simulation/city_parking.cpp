@@ -8,7 +8,7 @@
 #include "core/simulation/city.hpp"
 #include "core/simulation/street_side.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector2d;
@@ -37,8 +37,8 @@ class VehiclePark {
     const std::optional<Bays> bays = bays_of(side.profile);
     if (!bays) return;
     for (double at = 2.0; at < side.length_m;) {
-      const ObjectKind kind = drawn_kind();
-      const std::size_t shape = drawn_shape(kind);
+      const ObjectKind kind = random_kind();
+      const std::size_t shape = random_shape(kind);
       const double room_m = bays->across ? random_.uniform(2.5, 3.1) : lengthwise_room_m(shape);
       const double middle = at + 0.5 * (room_m - 6.0);
       if (random_.chance(share_taken()) && is_free(side, *bays, middle, 0.5 * room_m - 0.3)) {
@@ -57,7 +57,7 @@ class VehiclePark {
            u += random_.uniform(2.5, 3.0)) {
         if (!random_.chance(share_taken())) continue;
         const double turned = random_.chance(0.5) ? quarter_turn : -quarter_turn;
-        leave(ObjectKind::car, drawn_shape(ObjectKind::car), {u, v + 0.5 * row_m},
+        leave(ObjectKind::car, random_shape(ObjectKind::car), {u, v + 0.5 * row_m},
               turned + random_.uniform(-0.06, 0.06));
       }
       v += row_m + (aisle_next ? 6.0 : 0.6);
@@ -72,7 +72,7 @@ class VehiclePark {
     const double turn = random_.chance(0.5) ? quarter_turn : 0.9;
     for (std::size_t i = 0; i < count; ++i) {
       const double along = at + static_cast<double>(i) * random_.uniform(0.6, 0.9);
-      leave(kind, drawn_shape(kind), side.at(along, right_m), side.heading() + turn);
+      leave(kind, random_shape(kind), side.at(along, right_m), side.heading() + turn);
     }
   }
 
@@ -112,7 +112,7 @@ class VehiclePark {
     return std::min(1.0, 0.065 * ground_.plan().traffic.parked_per_100m);
   }
 
-  ObjectKind drawn_kind() {
+  ObjectKind random_kind() {
     const ParkingPlan& plan = ground_.plan().parking;
     double draw = random_.uniform();
     const auto falls_to = [&](double share) { return (draw -= share) < 0.0; };
@@ -123,7 +123,7 @@ class VehiclePark {
     return ObjectKind::car;
   }
 
-  std::size_t drawn_shape(ObjectKind kind) {
+  std::size_t random_shape(ObjectKind kind) {
     const Shapes& shapes = shapes_.at(kind);
     return shapes.first + random_.index(shapes.count);
   }
@@ -152,7 +152,7 @@ class VehiclePark {
     leave(kind, shape, spot,
           side.heading() + askew + turned + (bays.across ? quarter_turn : aslant));
     if (random_.chance(ground_.plan().parking.share_bicycles)) {
-      leave(ObjectKind::bicycle, drawn_shape(ObjectKind::bicycle),
+      leave(ObjectKind::bicycle, random_shape(ObjectKind::bicycle),
             side.at(at, side.profile.half_road_m() + 0.35), side.heading() + askew);
     }
   }
@@ -195,4 +195,4 @@ void park_vehicles(City& city, const GroundShape& ground, Random random) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -4,7 +4,7 @@
 #include <sstream>
 #include <stdexcept>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 bool is_on(const std::vector<StreetPlan>& streets, double position) {
@@ -198,4 +198,4 @@ CityPlan city_plan(const std::string& name) {
   throw std::invalid_argument("There is no city plan '" + name + "'; take quiet, crowd or yard.");
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// What a spot of ground is.
 enum class Zone : std::uint8_t { road, parking, median, verge, sidewalk, lot, other };
@@ -123,7 +123,7 @@ struct CityPlan {
   double hill_length_m = 45.0;
   double kerb_m = 0.13;
   /// Share of house fronts with a drive, where the kerb is lowered.
-  double share_drives = 0.0;
+  double share_driveways = 0.0;
   /// Height of the slopes behind the streets, and of the tufts of grass [m].
   double embankment_m = 0.0;
   double tufts_m = 0.0;
@@ -150,4 +150,4 @@ struct CityPlan {
 /// @throws std::invalid_argument with the names that exist.
 [[nodiscard]] CityPlan city_plan(const std::string& name);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

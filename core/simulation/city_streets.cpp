@@ -8,7 +8,7 @@
 #include "core/simulation/street_side.hpp"
 #include "core/simulation/vegetation.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector2d;
@@ -199,4 +199,4 @@ void furnish_streets(City& city, const GroundShape& ground, Random random) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

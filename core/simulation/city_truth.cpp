@@ -8,7 +8,7 @@
 #include "core/simulation/ground_shape.hpp"
 #include "core/simulation/ray_scene.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 std::vector<const Mesh*> meshes_of(const City& city) {
@@ -139,4 +139,4 @@ TrueGround CityTruth::at(const Eigen::Vector2d& spot_city, double edge_m, double
   return truth;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -7,7 +7,7 @@
 #include "core/lidar/semantic_class.hpp"
 #include "core/simulation/simulation.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// What stands over a spot of the city.
 enum class Standing : std::uint8_t {
@@ -48,4 +48,4 @@ class CityTruth {
   std::unique_ptr<World> world_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -3,7 +3,7 @@
 
 #include "core/simulation/traffic.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector2d;
@@ -68,4 +68,4 @@ void Traffic::add_crossing_people(Random& random) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -1,6 +1,6 @@
 #include "core/simulation/enclosures.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 constexpr float buried_m = -0.5F;
@@ -138,4 +138,4 @@ Mesh make_any_wall(float length_m, Random random) {
   return mesh;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -4,7 +4,7 @@
 #include "core/simulation/street_furniture.hpp"
 #include "core/simulation/vegetation.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 constexpr auto field_m = static_cast<float>(enclosure_field_m);
@@ -42,4 +42,4 @@ GardenShapes add_garden_shapes(City& city, bool many, Random& random) {
   return shapes;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

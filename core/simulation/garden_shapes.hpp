@@ -2,7 +2,7 @@
 
 #include "core/simulation/city.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// Shapes of one kind, one after the other in `City::shapes`.
 struct ShapeRange {
@@ -22,4 +22,4 @@ inline constexpr double enclosure_field_m = 3.0;
 /// Puts them into the city: few plain ones, or many of any kind.
 [[nodiscard]] GardenShapes add_garden_shapes(City& city, bool many, Random& random);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 constexpr double cell_m = 1.25;
@@ -100,4 +100,4 @@ void add_ground(Mesh& mesh, const GroundShape& ground) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -8,7 +8,7 @@
 
 #include "core/simulation/random.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 // Bays and verges end this far from the kerb of a crossing street, medians a little nearer.
@@ -123,14 +123,14 @@ double GroundShape::embankment(const Eigen::Vector2d& spot_plan) const {
 
 // Height of the kerb, which is lowered at drives.
 double GroundShape::kerb(const Eigen::Vector2d& spot_plan) const {
-  if (plan_.share_drives == 0.0) return plan_.kerb_m;
+  if (plan_.share_driveways == 0.0) return plan_.kerb_m;
   constexpr double pitch_m = 11.0;
   constexpr double drive_m = 3.75;
   const auto is_drive = [&](double along, std::uint64_t axis) {
     const double cell = std::floor(along / pitch_m);
     const bool has_drive =
         Random(62, static_cast<std::uint64_t>(static_cast<std::int64_t>(cell)), axis)
-            .chance(plan_.share_drives);
+            .chance(plan_.share_driveways);
     return has_drive && along - cell * pitch_m < drive_m;
   };
   const NearestStreet by_u = nearest(plan_.streets_along_v, spot_plan.x());
@@ -196,4 +196,4 @@ Eigen::Isometry3d GroundShape::leaning_frame_at(const Eigen::Vector2d& spot_plan
   return T_map_frame;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

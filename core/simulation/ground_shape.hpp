@@ -5,7 +5,7 @@
 
 #include "core/simulation/city_plan.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// The city's ground: from flat plan coordinates (u, v) to the map frame, with hills, crowned
 /// roads, kerbs and rough grass.
@@ -37,4 +37,4 @@ class GroundShape {
   Eigen::Array<double, 8, 1> phase_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

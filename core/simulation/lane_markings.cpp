@@ -2,7 +2,7 @@
 
 #include "core/simulation/ground_mesh.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 // One leg of the route: where it starts, and its directions along and to the left.
@@ -79,4 +79,4 @@ void add_lane_markings(Mesh& mesh, const GroundShape& ground) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 struct Mover {
@@ -14,12 +14,12 @@ struct Mover {
 // Speed that the curves ahead allow, every metre of the lane.
 class CurveLimit {
  public:
-  CurveLimit(const Path& lane, double side_acceleration_mps2) : lane_(lane) {
+  CurveLimit(const Path& lane, double lateral_acceleration_mps2) : lane_(lane) {
     const auto count = static_cast<std::size_t>(lane.length_m());
     limit_mps_.resize(count);
     for (std::size_t i = 0; i < count; ++i) {
       const double curvature = std::max(1e-4, lane.curvature(static_cast<double>(i)));
-      limit_mps_[i] = std::sqrt(side_acceleration_mps2 / curvature);
+      limit_mps_[i] = std::sqrt(lateral_acceleration_mps2 / curvature);
     }
     // Twice round backwards: v^2 = v_next^2 + 2 a s.
     constexpr double braking_mps2 = 0.9;
@@ -41,12 +41,13 @@ class CurveLimit {
 };
 
 // The driver model's acceleration with `gap_m` to something `ahead_mps` fast.
-double idm(const DriverModel& model, double speed, double wish, double gap_m, double ahead_mps) {
+double idm(const DriverModel& model, double speed, double desired_speed_mps, double gap_m,
+           double ahead_mps) {
   const double closing =
       speed * (speed - ahead_mps) / (2.0 * std::sqrt(model.acceleration_mps2 * model.braking_mps2));
   const double wanted_gap =
       model.standstill_gap_m + std::max(0.0, speed * model.headway_s + closing);
-  const double free = 1.0 - std::pow(speed / wish, 4);
+  const double free = 1.0 - std::pow(speed / desired_speed_mps, 4);
   const double follow = std::pow(wanted_gap / std::max(gap_m, 0.1), 2);
   return model.acceleration_mps2 * (free - follow);
 }
@@ -106,23 +107,25 @@ bool TrafficLight::is_red(double time_s) const {
 std::vector<Track> drive_lane(const Path& lane, const std::vector<LaneUser>& users,
                               const std::vector<StopLine>& stops, const DriverModel& model,
                               TimeSpan span) {
-  const CurveLimit curves(lane, model.side_acceleration_mps2);
+  const CurveLimit curves(lane, model.lateral_acceleration_mps2);
   std::vector<Track> tracks(users.size(), Track(span.from_s));
   std::vector<Mover> movers;
   for (const LaneUser& user : users) {
-    movers.push_back({user.start_m, std::min(0.6 * user.wish_mps, curves.at(user.start_m))});
+    movers.push_back(
+        {user.start_m, std::min(0.6 * user.desired_speed_mps, curves.at(user.start_m))});
   }
   const auto acceleration = [&](std::size_t i, double time_s) {
     const std::size_t next = (i + 1) % users.size();
     const Mover& mover = movers[i];
-    const double wish = std::min(users[i].wish_mps, curves.at(mover.position_m));
+    const double desired_speed_mps =
+        std::min(users[i].desired_speed_mps, curves.at(mover.position_m));
     const double apart = lane.wrapped(movers[next].position_m - mover.position_m);
     const double bodies = 0.5 * (users[i].length_m + users[next].length_m);
     const double gap = next == i ? std::numeric_limits<double>::infinity() : apart - bodies;
     const double red = gap_to_red(lane, mover, 0.5 * users[i].length_m, stops, time_s);
     // The front may come closer to the line than to a vehicle.
-    return std::min(idm(model, mover.speed_mps, wish, gap, movers[next].speed_mps),
-                    idm(model, mover.speed_mps, wish, red + 1.5, 0.0));
+    return std::min(idm(model, mover.speed_mps, desired_speed_mps, gap, movers[next].speed_mps),
+                    idm(model, mover.speed_mps, desired_speed_mps, red + 1.5, 0.0));
   };
   const auto steps = static_cast<int>(std::ceil((span.to_s - span.from_s) / Track::step_s)) + 1;
   std::vector<double> accelerations(users.size());
@@ -136,4 +139,4 @@ std::vector<Track> drive_lane(const Path& lane, const std::vector<LaneUser>& use
   return tracks;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -4,7 +4,7 @@
 
 #include "core/simulation/path.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// Positions of one mover along its path over time.
 class Track {
@@ -50,13 +50,13 @@ struct DriverModel {
   double braking_mps2 = 2.2;
   double headway_s = 0.8;
   double standstill_gap_m = 2.2;
-  double side_acceleration_mps2 = 2.0;
+  double lateral_acceleration_mps2 = 2.0;
 };
 
 struct LaneUser {
   double start_m;
   double length_m;
-  double wish_mps;
+  double desired_speed_mps;
 };
 
 struct TimeSpan {
@@ -69,4 +69,4 @@ struct TimeSpan {
                                             const std::vector<StopLine>& stops,
                                             const DriverModel& model, TimeSpan span);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

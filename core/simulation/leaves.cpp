@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector3f;
@@ -33,4 +33,4 @@ void add_leaf_ball(Mesh& mesh, const Vector3f& centre, const Vector3f& radii,
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -5,7 +5,7 @@
 #include "core/simulation/mesh.hpp"
 #include "core/simulation/random.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// Single leaves (triangles of any direction), `leaf_m` in size.
 struct Foliage {
@@ -24,4 +24,4 @@ void add_leaf(Mesh& mesh, const Eigen::Vector3f& centre, float leaf_m, Random& r
 void add_leaf_ball(Mesh& mesh, const Eigen::Vector3f& centre, const Eigen::Vector3f& radii,
                    const Foliage& foliage, Random& random);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

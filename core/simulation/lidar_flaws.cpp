@@ -5,7 +5,7 @@
 #include <numbers>
 #include <sstream>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
@@ -15,7 +15,7 @@ double block_height(std::size_t ring, std::size_t rings, double upper_m, double 
   return 2 * ring < rings ? upper_m : lower_m;
 }
 
-std::vector<BeamFlaw> drawn_beams(const SensorModel& sensor, Random& random) {
+std::vector<BeamFlaw> random_beams(const SensorModel& sensor, Random& random) {
   const auto rings = static_cast<std::size_t>(sensor.rings);
   const bool two_blocks = sensor.rings > 32 && !sensor.beam_elevations.empty();
   const double error =
@@ -34,7 +34,7 @@ std::vector<BeamFlaw> drawn_beams(const SensorModel& sensor, Random& random) {
   return beams;
 }
 
-std::vector<BlindSpot> drawn_blind_spots(const SensorModel& sensor, Random& random) {
+std::vector<BlindSpot> random_blind_spots(const SensorModel& sensor, Random& random) {
   std::vector<BlindSpot> spots;
   if (random.chance(0.35)) return spots;
   const std::size_t count = 1 + random.index(7);
@@ -86,10 +86,10 @@ std::string LidarFlaws::faults(const SensorModel& sensor) const {
   return out.str();
 }
 
-LidarFlaws drawn_flaws(const SensorModel& sensor, Random random) {
+LidarFlaws random_flaws(const SensorModel& sensor, Random random) {
   LidarFlaws flaws;
-  flaws.beams = drawn_beams(sensor, random);
-  flaws.blind_spots = drawn_blind_spots(sensor, random);
+  flaws.beams = random_beams(sensor, random);
+  flaws.blind_spots = random_blind_spots(sensor, random);
   flaws.roll = 0.7 * degree * random.normal();
   flaws.pitch = 0.7 * degree * random.normal();
   // Some sensors level bright and dark, others spread them; a middling surface (0.25) is reported
@@ -102,4 +102,4 @@ LidarFlaws drawn_flaws(const SensorModel& sensor, Random random) {
   return flaws;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -7,7 +7,7 @@
 #include "core/lidar/sensor_model.hpp"
 #include "core/simulation/random.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// How one beam differs from its data sheet.
 struct BeamFlaw {
@@ -45,6 +45,6 @@ struct LidarFlaws {
 };
 
 /// Flaws such as real sensors have, some of them strong.
-[[nodiscard]] LidarFlaws drawn_flaws(const SensorModel& sensor, Random random);
+[[nodiscard]] LidarFlaws random_flaws(const SensorModel& sensor, Random random);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 // 0..1, the same in each cube of that size.
@@ -14,23 +14,23 @@ double shade(const Eigen::Vector3f& spot_map, double size_m) {
   return Random(71, cell(spot_map.x()), cell(spot_map.y()), cell(spot_map.z())).uniform();
 }
 
-void draw_pile(Materials& materials, Surface surface, double least_m, double most_m,
-               Random& random) {
-  materials.facts[static_cast<std::size_t>(surface)].pile_m =
-      static_cast<float>(random.uniform(least_m, most_m));
+void draw_pile(Materials& materials, Surface surface, double min_m, double max_m, Random& random) {
+  materials.properties[static_cast<std::size_t>(surface)].pile_m =
+      static_cast<float>(random.uniform(min_m, max_m));
 }
 
-void draw_lost(Materials& materials, Surface surface, double least, double most, Random& random) {
-  materials.facts[static_cast<std::size_t>(surface)].lost =
-      static_cast<float>(random.uniform(least, most));
+void draw_lost(Materials& materials, Surface surface, double min_lost, double max_lost,
+               Random& random) {
+  materials.properties[static_cast<std::size_t>(surface)].lost =
+      static_cast<float>(random.uniform(min_lost, max_lost));
 }
 
 // Water mirrors most beams away.
 void wet(Materials& materials, Random& random) {
   for (const Surface surface : {Surface::asphalt, Surface::parking_bay, Surface::lane_marking}) {
-    SurfaceFacts& facts = materials.facts[static_cast<std::size_t>(surface)];
-    facts.lost = static_cast<float>(random.uniform(0.05, 0.35));
-    facts.reflectivity *= static_cast<float>(random.uniform(0.3, 0.8));
+    SurfaceProperties& properties = materials.properties[static_cast<std::size_t>(surface)];
+    properties.lost = static_cast<float>(random.uniform(0.05, 0.35));
+    properties.reflectivity *= static_cast<float>(random.uniform(0.3, 0.8));
   }
 }
 
@@ -42,30 +42,30 @@ float Materials::patch(const Eigen::Vector3f& spot_map) const {
   return static_cast<float>(1.0 + patchiness * (2.0 * mixed - 1.0));
 }
 
-SurfaceFacts Materials::at(Surface surface, const Eigen::Vector3f& spot_map) const {
-  SurfaceFacts facts = of(surface);
-  if (!lost_in_panes || facts.lost == 0.0F) return facts;
+SurfaceProperties Materials::at(Surface surface, const Eigen::Vector3f& spot_map) const {
+  SurfaceProperties properties = of(surface);
+  if (!lost_in_panes || properties.lost == 0.0F) return properties;
   constexpr double pane_m = 0.6;
-  facts.lost = shade(spot_map, pane_m) < facts.lost ? 0.93F : 0.07F;
-  return facts;
+  properties.lost = shade(spot_map, pane_m) < properties.lost ? 0.93F : 0.07F;
+  return properties;
 }
 
-Materials usual_materials() {
+Materials default_materials() {
   Materials materials;
   for (std::size_t i = 0; i < surface_count; ++i) {
-    materials.facts[i] = facts_of(static_cast<Surface>(i));
+    materials.properties[i] = properties_of(static_cast<Surface>(i));
   }
   return materials;
 }
 
-Materials drawn_materials(Random random) {
-  Materials materials = usual_materials();
-  for (SurfaceFacts& facts : materials.facts) {
-    facts.reflectivity *= static_cast<float>(std::exp(random.uniform(-0.7, 0.8)));
+Materials random_materials(Random random) {
+  Materials materials = default_materials();
+  for (SurfaceProperties& properties : materials.properties) {
+    properties.reflectivity *= static_cast<float>(std::exp(random.uniform(-0.7, 0.8)));
   }
   // Often the bays are of the road's own asphalt.
   if (random.chance(0.5)) {
-    materials.facts[static_cast<std::size_t>(Surface::parking_bay)].reflectivity =
+    materials.properties[static_cast<std::size_t>(Surface::parking_bay)].reflectivity =
         materials.of(Surface::asphalt).reflectivity;
   }
   draw_pile(materials, Surface::grass, 0.0, 0.09, random);
@@ -85,4 +85,4 @@ Materials drawn_materials(Random random) {
   return materials;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector3f;
@@ -119,4 +119,4 @@ void add_ellipsoid(Mesh& mesh, const Vector3f& centre, const Vector3f& radii, Su
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -8,7 +8,7 @@
 
 #include "core/simulation/surface.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// Triangles with a surface each. Both sides of a triangle reflect. Lengths in metres.
 struct Mesh {
@@ -52,4 +52,4 @@ void add_tube(Mesh& mesh, const Tube& tube, Surface surface);
 void add_ellipsoid(Mesh& mesh, const Eigen::Vector3f& centre, const Eigen::Vector3f& radii,
                    Surface surface);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

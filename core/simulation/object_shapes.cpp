@@ -7,7 +7,7 @@
 #include "core/simulation/people.hpp"
 #include "core/simulation/vehicles.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 ObjectShape measured(ObjectKind kind, Mesh mesh) {
@@ -60,4 +60,4 @@ ObjectShape make_object(ObjectKind kind, Random random, Variety variety) {
   return measured(kind, mesh_of(kind, variety, random));
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

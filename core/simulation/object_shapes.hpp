@@ -6,7 +6,7 @@
 #include "core/simulation/mesh.hpp"
 #include "core/simulation/random.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// What an object is; gives its SemanticKITTI ids.
 enum class ObjectKind : std::uint8_t {
@@ -41,4 +41,4 @@ enum class Variety : std::uint8_t { plain, any };
 [[nodiscard]] ObjectShape make_object(ObjectKind kind, Random random,
                                       Variety variety = Variety::plain);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

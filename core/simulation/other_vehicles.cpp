@@ -3,7 +3,7 @@
 #include "core/simulation/vehicle_parts.hpp"
 #include "core/simulation/vehicles.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 float between(Random& random, double low, double high) {
@@ -96,4 +96,4 @@ Mesh make_other_vehicle(Random& random) {
   return kind < 0.85 ? make_tractor(random) : make_digger(random);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector2d;
@@ -107,4 +107,4 @@ Path route_path(const GroundShape& ground, bool reversed, double offset_m,
   return {ground, points};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -6,7 +6,7 @@
 
 #include "core/simulation/ground_shape.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// A closed way on the ground. Positions are arc lengths in the map frame [m] and go round: any
 /// number is one.
@@ -44,4 +44,4 @@ class Path {
 [[nodiscard]] Path route_path(const GroundShape& ground, bool reversed, double offset_m,
                               std::optional<double> turn_radius_m = std::nullopt);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

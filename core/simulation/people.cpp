@@ -4,7 +4,7 @@
 #include <numbers>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector3f;
@@ -146,4 +146,4 @@ Mesh make_motorcyclist(Random& random) {
   return stretched(std::move(mesh), random);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

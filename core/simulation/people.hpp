@@ -3,7 +3,7 @@
 #include "core/simulation/mesh.hpp"
 #include "core/simulation/random.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// People and two-wheelers on the ground, centred on the origin, front along +x.
 [[nodiscard]] Mesh make_person(Random& random);
@@ -12,4 +12,4 @@ namespace stillmap {
 [[nodiscard]] Mesh make_bicyclist(Random& random);
 [[nodiscard]] Mesh make_motorcyclist(Random& random);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <numbers>
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// Numbers that depend on their keys only, never on the order in which others were drawn, so that
 /// any scan can be made first and by any thread.
@@ -41,4 +41,4 @@ class Random {
   std::uint64_t state_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

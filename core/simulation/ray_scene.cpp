@@ -11,7 +11,7 @@
 #include <type_traits>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 struct Release {
@@ -147,8 +147,8 @@ std::optional<RayHit> RaySnapshot::cast(const Ray& ray) const {
 }
 
 void RaySnapshot::cast(std::span<const Ray> rays, std::span<std::optional<RayHit>> hits) const {
-  assert(rays.size() == hits.size() && rays.size() <= most_rays);
-  alignas(64) std::array<int, most_rays> valid{};
+  assert(rays.size() == hits.size() && rays.size() <= max_rays);
+  alignas(64) std::array<int, max_rays> valid{};
   RTCRayHit16 packet{};
   for (std::size_t i = 0; i < rays.size(); ++i) {
     valid[i] = -1;
@@ -161,4 +161,4 @@ void RaySnapshot::cast(std::span<const Ray> rays, std::span<std::optional<RayHit
   for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = bodies_->hit(packet, i, rays[i]);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -8,7 +8,7 @@
 
 #include "core/simulation/mesh.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 struct Ray {
   Eigen::Vector3f origin_map = Eigen::Vector3f::Zero();
@@ -69,9 +69,9 @@ class RaySnapshot {
   /// The nearest hit, if any.
   [[nodiscard]] std::optional<RayHit> cast(const Ray& ray) const;
   /// The nearest hit of each ray. Quicker than one by one where they lie close together.
-  /// @pre rays.size() == hits.size() <= most_rays
+  /// @pre rays.size() == hits.size() <= max_rays
   void cast(std::span<const Ray> rays, std::span<std::optional<RayHit>> hits) const;
-  static constexpr std::size_t most_rays = 16;
+  static constexpr std::size_t max_rays = 16;
 
  private:
   friend class RayScene;
@@ -80,4 +80,4 @@ class RaySnapshot {
   std::unique_ptr<Bodies> bodies_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -12,7 +12,7 @@
 #include "core/simulation/ray_scene.hpp"
 #include "core/simulation/traffic.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 int firings_of(const SimulationConfig& config) {
@@ -104,18 +104,18 @@ struct Simulation::World {
                                std::size_t ring, Random random) const {
     const Body& body = bodies[hit.body];
     const Eigen::Vector3f spot_map = ray.origin_map + hit.range_m * ray.direction_map;
-    const SurfaceFacts facts = config.materials.at(hit.surface, spot_map);
+    const SurfaceProperties properties = config.materials.at(hit.surface, spot_map);
     // What moves carries its own paint along; only what stands has patches.
     const float patch = body.instance != 0 ? 1.0F : config.materials.patch(spot_map);
     BeamNoise noise = config.noise;
-    noise.weakest_return /= config.flaws.beam(ring).gain;
-    const auto seen =
-        beam_return(noise, hit.range_m, hit.cos_incidence, facts, patch * body.brightness, random);
+    noise.min_return /= config.flaws.beam(ring).gain;
+    const auto seen = beam_return(noise, hit.range_m, hit.cos_incidence, properties,
+                                  patch * body.brightness, random);
     if (!seen || seen->range_m < config.sensor.min_range_m ||
         seen->range_m > config.sensor.max_range_m) {
       return {};
     }
-    const std::uint32_t label = facts.label != 0 ? facts.label : body.label;
+    const std::uint32_t label = properties.label != 0 ? properties.label : body.label;
     return {seen->range_m, config.flaws.reported_intensity(seen->intensity, ring),
             label | static_cast<std::uint32_t>(body.instance) << 16U};
   }
@@ -156,9 +156,9 @@ std::vector<Pixel> Simulation::World::turn(int index) const {
   const Eigen::Isometry3f T_map_start = T_map_lidar_at(start_s).cast<float>();
   // A few firings of one ring at a time: their beams lie close together.
   const auto fire_some = [&](std::size_t ring, int first, int last) {
-    std::array<Ray, RaySnapshot::most_rays> rays;
-    std::array<std::size_t, RaySnapshot::most_rays> targets{};
-    std::array<std::optional<RayHit>, RaySnapshot::most_rays> hits;
+    std::array<Ray, RaySnapshot::max_rays> rays;
+    std::array<std::size_t, RaySnapshot::max_rays> targets{};
+    std::array<std::optional<RayHit>, RaySnapshot::max_rays> hits;
     std::size_t count = 0;
     for (int firing = first; firing < last; ++firing) {
       const double elevation = std::asin(static_cast<double>(beams[ring].y()));
@@ -178,7 +178,7 @@ std::vector<Pixel> Simulation::World::turn(int index) const {
       if (hits[i]) pixels[targets[i]] = pixel_of(*hits[i], bodies, rays[i], ring, random);
     }
   };
-  constexpr int some = RaySnapshot::most_rays;
+  constexpr int some = RaySnapshot::max_rays;
   tbb::parallel_for(0, (firings + some - 1) / some, [&](int block) {
     for (std::size_t ring = 0; ring < beams.size(); ++ring) {
       fire_some(ring, some * block, std::min(firings, some * (block + 1)));
@@ -191,11 +191,11 @@ std::vector<Pixel> Simulation::World::turn(int index) const {
 // A beam that two surfaces share reports a range between them.
 void Simulation::World::mix_edges(int index, std::vector<Pixel>& pixels) const {
   if (config.flaws.mixed_share == 0.0) return;
-  constexpr float least_step_m = 0.3F;
-  constexpr float longest_step_m = 3.0F;
+  constexpr float min_step_m = 0.3F;
+  constexpr float max_step_m = 3.0F;
   for (std::size_t i = 0; i + 1 < pixels.size(); ++i) {
     const float step_m = pixels[i + 1].range_m - pixels[i].range_m;
-    const bool is_edge = std::abs(step_m) > least_step_m && std::abs(step_m) < longest_step_m;
+    const bool is_edge = std::abs(step_m) > min_step_m && std::abs(step_m) < max_step_m;
     if (!is_edge || pixels[i].range_m == 0.0F || pixels[i + 1].range_m == 0.0F) continue;
     Random random(config.seed, 42, static_cast<std::uint64_t>(index), i);
     if (!random.chance(config.flaws.mixed_share)) continue;
@@ -261,4 +261,4 @@ Eigen::Isometry3d Simulation::T_map_lidar_at(double time_s) const {
   return world_->T_map_lidar_at(time_s);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

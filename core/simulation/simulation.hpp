@@ -13,7 +13,7 @@
 #include "core/simulation/lidar_flaws.hpp"
 #include "core/simulation/materials.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 struct SimulationConfig {
   CityPlan plan = quiet_city();
@@ -30,7 +30,7 @@ struct SimulationConfig {
   double lidar_height_m = 1.73;
   BeamNoise noise;
   LidarFlaws flaws;
-  Materials materials = usual_materials();
+  Materials materials = default_materials();
 
   /// Every fault in words, one a line; empty when it can be simulated.
   [[nodiscard]] std::string faults() const;
@@ -68,4 +68,4 @@ class Simulation {
   std::unique_ptr<World> world_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -1,6 +1,6 @@
 #include "core/simulation/street_furniture.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 constexpr float buried_m = -0.3F;
@@ -79,4 +79,4 @@ Mesh make_garden_wall(float length_m) {
   return mesh;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -3,7 +3,7 @@
 #include "core/simulation/mesh.hpp"
 #include "core/simulation/random.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// All stand on the origin; x is the direction in which they face the road.
 [[nodiscard]] Mesh make_street_light();
@@ -19,4 +19,4 @@ namespace stillmap {
 [[nodiscard]] Mesh make_railing(float length_m);
 [[nodiscard]] Mesh make_garden_wall(float length_m);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -1,6 +1,6 @@
 #include "core/simulation/street_objects.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 constexpr float buried_m = -0.3F;
@@ -154,4 +154,4 @@ Mesh make_shelter(Random random) {
   return mesh;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -3,7 +3,7 @@
 #include "core/simulation/mesh.hpp"
 #include "core/simulation/random.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 // All stand on the origin; x is the direction in which they face the road.
 
@@ -18,4 +18,4 @@ namespace stillmap {
 /// A bus shelter, open to the road: neither.
 [[nodiscard]] Mesh make_shelter(Random random);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -1,6 +1,6 @@
 #include "core/simulation/street_side.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector2d;
@@ -28,4 +28,4 @@ std::vector<StreetSide> street_sides(const CityPlan& plan) {
   return sides;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

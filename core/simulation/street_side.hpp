@@ -6,7 +6,7 @@
 
 #include "core/simulation/city_plan.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// One side of a street, seen in the direction in which its traffic goes; plan coordinates [m].
 struct StreetSide {
@@ -23,4 +23,4 @@ struct StreetSide {
 /// Both sides of every street, from margin to margin.
 [[nodiscard]] std::vector<StreetSide> street_sides(const CityPlan& plan);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

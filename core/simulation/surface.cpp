@@ -2,11 +2,11 @@
 
 #include <array>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 // In the order of the enumeration.
-constexpr std::array<SurfaceFacts, surface_count> table{{
+constexpr std::array<SurfaceProperties, surface_count> table{{
     {40, 0.20F},        // asphalt
     {60, 0.60F},        // lane_marking
     {44, 0.26F},        // parking_bay
@@ -40,6 +40,8 @@ constexpr std::array<SurfaceFacts, surface_count> table{{
 
 }  // namespace
 
-SurfaceFacts facts_of(Surface surface) { return table[static_cast<std::size_t>(surface)]; }
+SurfaceProperties properties_of(Surface surface) {
+  return table[static_cast<std::size_t>(surface)];
+}
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// What a triangle is made of.
 enum class Surface : std::uint8_t {
@@ -41,7 +41,7 @@ enum class Surface : std::uint8_t {
   skin,
 };
 
-struct SurfaceFacts {
+struct SurfaceProperties {
   /// SemanticKITTI id; 0: the class of the object it belongs to.
   std::uint16_t label;
   /// Share of light that comes back at right angles, 0..1; above 1: retroreflective.
@@ -54,6 +54,6 @@ struct SurfaceFacts {
 
 inline constexpr std::size_t surface_count = static_cast<std::size_t>(Surface::skin) + 1;
 
-[[nodiscard]] SurfaceFacts facts_of(Surface surface);
+[[nodiscard]] SurfaceProperties properties_of(Surface surface);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

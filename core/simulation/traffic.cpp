@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 constexpr float ego_length_m = 4.6F;
@@ -18,7 +18,7 @@ constexpr DriverModel walker{.acceleration_mps2 = 1.0,
                              .braking_mps2 = 1.5,
                              .headway_s = 0.4,
                              .standstill_gap_m = 0.6,
-                             .side_acceleration_mps2 = 1.5};
+                             .lateral_acceleration_mps2 = 1.5};
 
 double wheelbase(ObjectKind kind) {
   switch (kind) {
@@ -36,16 +36,17 @@ double wheelbase(ObjectKind kind) {
 }
 
 // One behind the other with uneven gaps, once round the lane.
-std::vector<LaneUser> spread_out(const LaneCrew& crew, double lane_m, double first_m,
-                                 Random& random) {
-  const std::vector<double>& lengths = crew.lengths_m;
+std::vector<LaneUser> spread_out(const LaneParticipants& participants, double lane_m,
+                                 double first_m, Random& random) {
+  const std::vector<double>& lengths = participants.lengths_m;
   const double occupied = std::accumulate(lengths.begin(), lengths.end(), 0.0);
   const double gap = (lane_m - occupied) / static_cast<double>(lengths.size());
   std::vector<LaneUser> users;
   double rear = first_m - 0.5 * lengths.front();
   for (std::size_t i = 0; i < lengths.size(); ++i) {
     const double shift = i == 0 ? 0.0 : 0.35 * gap * random.uniform(-1.0, 1.0);
-    users.push_back({rear + 0.5 * lengths[i] + shift, lengths[i], crew.wishes_mps[i]});
+    users.push_back(
+        {rear + 0.5 * lengths[i] + shift, lengths[i], participants.desired_speeds_mps[i]});
     rear += lengths[i] + gap;
   }
   return users;
@@ -53,10 +54,11 @@ std::vector<LaneUser> spread_out(const LaneCrew& crew, double lane_m, double fir
 
 }  // namespace
 
-void LaneCrew::add(std::optional<std::size_t> shape, double length_m, double wish_mps) {
+void LaneParticipants::add(std::optional<std::size_t> shape, double length_m,
+                           double desired_speed_mps) {
   shapes.push_back(shape);
   lengths_m.push_back(length_m);
-  wishes_mps.push_back(wish_mps);
+  desired_speeds_mps.push_back(desired_speed_mps);
 }
 
 Traffic::Traffic(const GroundShape& ground, std::uint64_t seed, TimeSpan span,
@@ -132,26 +134,26 @@ std::vector<StopLine> Traffic::stop_lines(const Path& path) const {
   return stops;
 }
 
-LaneCrew Traffic::vehicle_crew(const Path& lane, std::optional<ObjectKind> escort, bool with_ego,
-                               Random& random) const {
+LaneParticipants Traffic::vehicle_participants(const Path& lane, std::optional<ObjectKind> escort,
+                                               bool with_ego, Random& random) const {
   const TrafficPlan& traffic = ground_.plan().traffic;
-  LaneCrew crew;
-  if (with_ego) crew.add(std::nullopt, ego_length_m, traffic.speed_mps);
+  LaneParticipants participants;
+  if (with_ego) participants.add(std::nullopt, ego_length_m, traffic.speed_mps);
   if (escort) {
     const std::size_t shape = random_shape(*escort, random);
-    crew.add(shape, shapes_[shape].length_m, traffic.speed_mps);
+    participants.add(shape, shapes_[shape].length_m, traffic.speed_mps);
   }
   const auto wanted = static_cast<std::size_t>(traffic.vehicles_per_km * lane.length_m() / 1000.0);
   // Room for everybody at walking pace, whatever is drawn.
   double room_m = lane.length_m() - 40.0;
-  while (crew.shapes.size() < wanted) {
+  while (participants.shapes.size() < wanted) {
     const std::size_t shape = random_shape(random_vehicle(random), random);
     room_m -= shapes_[shape].length_m + 3.0;
     if (room_m < 0.0) break;
-    const double wish = 1.0 + traffic.speed_spread * random.uniform(-1.0, 1.0);
-    crew.add(shape, shapes_[shape].length_m, traffic.speed_mps * wish);
+    const double speed_factor = 1.0 + traffic.speed_spread * random.uniform(-1.0, 1.0);
+    participants.add(shape, shapes_[shape].length_m, traffic.speed_mps * speed_factor);
   }
-  return crew;
+  return participants;
 }
 
 Eigen::Vector2d Traffic::ego_start_plan() const {
@@ -169,39 +171,41 @@ void Traffic::add_vehicle_lane(bool reversed, int lane, Random& random) {
     escort = lane < plan.ego_lane ? ObjectKind::truck : ObjectKind::bus;
   }
   Path path = route_path(ground_, reversed, plan.route_profile.lane_centre_m(lane));
-  const LaneCrew crew = vehicle_crew(path, escort, with_ego, random);
+  const LaneParticipants participants = vehicle_participants(path, escort, with_ego, random);
   double first_m = random.uniform(0.0, path.length_m());
   if (with_ego) first_m = plan.ego_start_m;
   if (escort) first_m = path.nearest(ego_start_plan()) + random.uniform(-4.0, 4.0);
   const std::vector<StopLine> stops = stop_lines(path);
-  add_crew(crew, std::move(path), first_m, vehicle_driver, stops, random);
+  add_participants(participants, std::move(path), first_m, vehicle_driver, stops, random);
 }
 
-void Traffic::add_slow_lane(ObjectKind kind, bool reversed, double offset_m, double wish_mps,
-                            double per_km, Random& random) {
+void Traffic::add_slow_lane(ObjectKind kind, bool reversed, double offset_m,
+                            double desired_speed_mps, double per_km, Random& random) {
   const bool walks = kind == ObjectKind::person;
   Path path = walks ? route_path(ground_, reversed, offset_m, 1.0)
                     : route_path(ground_, reversed, offset_m);
   const auto count = static_cast<std::size_t>(per_km * path.length_m() / 1000.0);
-  LaneCrew crew;
+  LaneParticipants participants;
   for (std::size_t i = 0; i < count; ++i) {
     const std::size_t shape = random_shape(kind, random);
-    crew.add(shape, shapes_[shape].length_m, wish_mps * random.uniform(0.85, 1.15));
+    participants.add(shape, shapes_[shape].length_m,
+                     desired_speed_mps * random.uniform(0.85, 1.15));
   }
   const double first_m = random.uniform(0.0, path.length_m());
   const auto stops = walks ? std::vector<StopLine>{} : stop_lines(path);
-  add_crew(crew, std::move(path), first_m, walker, stops, random);
+  add_participants(participants, std::move(path), first_m, walker, stops, random);
 }
 
-void Traffic::add_crew(const LaneCrew& crew, Path lane, double first_m, const DriverModel& driver,
-                       const std::vector<StopLine>& stops, Random& random) {
-  if (crew.shapes.empty()) return;
-  const auto users = spread_out(crew, lane.length_m(), first_m, random);
+void Traffic::add_participants(const LaneParticipants& participants, Path lane, double first_m,
+                               const DriverModel& driver, const std::vector<StopLine>& stops,
+                               Random& random) {
+  if (participants.shapes.empty()) return;
+  const auto users = spread_out(participants, lane.length_m(), first_m, random);
   std::vector<Track> tracks = drive_lane(lane, users, stops, driver, span_);
   paths_.push_back(std::move(lane));
   for (std::size_t i = 0; i < tracks.size(); ++i) {
-    if (crew.shapes[i]) {
-      add_mover(*crew.shapes[i], paths_.size() - 1, std::move(tracks[i]), random);
+    if (participants.shapes[i]) {
+      add_mover(*participants.shapes[i], paths_.size() - 1, std::move(tracks[i]), random);
     } else {
       ego_.push_back({.path = paths_.size() - 1, .track = std::move(tracks[i])});
     }
@@ -230,4 +234,4 @@ Eigen::Isometry3d Traffic::T_map_ego_at(double time_s) const {
 
 double Traffic::ego_speed_at(double time_s) const { return ego_.front().track.speed_at(time_s); }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -9,7 +9,7 @@
 #include "core/simulation/object_shapes.hpp"
 #include "core/simulation/path.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// Somebody on a path.
 struct Mover {
@@ -22,11 +22,11 @@ struct Mover {
 };
 
 /// Those who share a lane, from the first one on. The ego vehicle has no shape: nobody sees it.
-struct LaneCrew {
+struct LaneParticipants {
   std::vector<std::optional<std::size_t>> shapes;
-  std::vector<double> lengths_m, wishes_mps;
+  std::vector<double> lengths_m, desired_speeds_mps;
 
-  void add(std::optional<std::size_t> shape, double length_m, double wish_mps);
+  void add(std::optional<std::size_t> shape, double length_m, double desired_speed_mps);
 };
 
 /// All that moves in the city, and the ego vehicle, over a span of time. Times count from the
@@ -49,18 +49,20 @@ class Traffic {
  private:
   void add_shapes(Random& random);
   void add_vehicle_lane(bool reversed, int lane, Random& random);
-  [[nodiscard]] LaneCrew vehicle_crew(const Path& lane, std::optional<ObjectKind> escort,
-                                      bool with_ego, Random& random) const;
+  [[nodiscard]] LaneParticipants vehicle_participants(const Path& lane,
+                                                      std::optional<ObjectKind> escort,
+                                                      bool with_ego, Random& random) const;
   [[nodiscard]] Eigen::Vector2d ego_start_plan() const;
-  void add_slow_lane(ObjectKind kind, bool reversed, double offset_m, double wish_mps,
+  void add_slow_lane(ObjectKind kind, bool reversed, double offset_m, double desired_speed_mps,
                      double per_km, Random& random);
   void add_crossing_people(Random& random);
   [[nodiscard]] std::vector<StopLine> stop_lines(const Path& path) const;
   [[nodiscard]] std::size_t random_shape(ObjectKind kind, Random& random) const;
   [[nodiscard]] ObjectKind random_vehicle(Random& random) const;
   void add_mover(std::size_t shape, std::size_t path, Track track, Random& random);
-  void add_crew(const LaneCrew& crew, Path lane, double first_m, const DriverModel& driver,
-                const std::vector<StopLine>& stops, Random& random);
+  void add_participants(const LaneParticipants& participants, Path lane, double first_m,
+                        const DriverModel& driver, const std::vector<StopLine>& stops,
+                        Random& random);
 
   const GroundShape& ground_;
   TimeSpan span_;
@@ -72,4 +74,4 @@ class Traffic {
   std::vector<Mover> ego_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

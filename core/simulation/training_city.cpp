@@ -4,16 +4,16 @@
 #include <cmath>
 #include <numbers>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
-constexpr double least_apart_m = 8.0;
+constexpr double min_spacing_m = 8.0;
 // Of a drive; long enough to come round the longest route.
 constexpr int drive_scans = 900;
 
 // Evenly spaced beams over a field of view that no sensor of ours has.
-SensorModel drawn_sensor(Random& random) {
+SensorModel random_sensor(Random& random) {
   SensorModel sensor;
   sensor.name = "evenly spaced";
   sensor.rings = random.chance(0.5) ? 64 : 32;
@@ -26,14 +26,14 @@ SensorModel any_sensor(Random& random) {
   const double kind = random.uniform();
   if (kind < 0.6) return hdl_64e();
   if (kind < 0.8) return vlp_16();
-  return kind < 0.9 ? hdl_32e() : drawn_sensor(random);
+  return kind < 0.9 ? hdl_32e() : random_sensor(random);
 }
 
-BeamNoise drawn_noise(Random& random) {
+BeamNoise random_noise(Random& random) {
   return {.range_sigma_m = random.uniform(0.005, 0.05),
           .drop_share = random.chance(0.3) ? random.uniform(0.0, 0.1) : random.uniform(0.0, 0.02),
           .intensity_sigma = random.uniform(0.005, 0.09),
-          .weakest_return = 1.2e-5 * std::exp(random.uniform(-1.0, 1.4))};
+          .min_return = 1.2e-5 * std::exp(random.uniform(-1.0, 1.4))};
 }
 
 // A drive as `stillmap simulate` makes it by default.
@@ -48,7 +48,7 @@ SimulationConfig plain_drive(std::uint64_t seed, Random& random) {
 
 }  // namespace
 
-SimulationConfig training_drive(std::uint64_t seed, double share_of_plain) {
+SimulationConfig training_sequence(std::uint64_t seed, double share_of_plain) {
   Random random(seed, 91);
   if (random.chance(share_of_plain)) return plain_drive(seed, random);
   SimulationConfig config;
@@ -60,24 +60,24 @@ SimulationConfig training_drive(std::uint64_t seed, double share_of_plain) {
   config.scans = drive_scans;
   const bool low_mount = config.sensor.rings <= 16;
   config.lidar_height_m = random.uniform(low_mount ? 0.4 : 1.4, 2.2);
-  config.noise = drawn_noise(random);
-  config.flaws = drawn_flaws(config.sensor, Random(seed, 93));
-  config.materials = drawn_materials(Random(seed, 94));
+  config.noise = random_noise(random);
+  config.flaws = random_flaws(config.sensor, Random(seed, 93));
+  config.materials = random_materials(Random(seed, 94));
   return config;
 }
 
-std::vector<int> spread_scans(const Simulation& drive, int count) {
-  const double period_s = drive.config().sensor.period_s;
+std::vector<int> spread_scans(const Simulation& sequence, int count) {
+  const double period_s = sequence.config().sensor.period_s;
   const auto place = [&](int scan) {
-    return Eigen::Vector3d(drive.T_map_lidar_at(scan * period_s).translation());
+    return Eigen::Vector3d(sequence.T_map_lidar_at(scan * period_s).translation());
   };
   double way_m = 0.0;
-  for (int scan = 1; scan < drive.config().scans; ++scan)
+  for (int scan = 1; scan < sequence.config().scans; ++scan)
     way_m += (place(scan) - place(scan - 1)).norm();
-  const double apart_m = std::max(least_apart_m, 0.95 * way_m / count);
+  const double apart_m = std::max(min_spacing_m, 0.95 * way_m / count);
   std::vector<int> chosen{0};
   double since_m = 0.0;
-  for (int scan = 1; scan < drive.config().scans && std::ssize(chosen) < count; ++scan) {
+  for (int scan = 1; scan < sequence.config().scans && std::ssize(chosen) < count; ++scan) {
     since_m += (place(scan) - place(scan - 1)).norm();
     if (since_m < apart_m) continue;
     chosen.push_back(scan);
@@ -86,4 +86,4 @@ std::vector<int> spread_scans(const Simulation& drive, int count) {
   return chosen;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -5,7 +5,7 @@
 
 #include "core/simulation/simulation.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// A small city of no particular place: streets, slopes, blocks, traffic and what stands about are
 /// all drawn, and rare things (two-wheelers, buses, signs) are more frequent than in life.
@@ -15,9 +15,9 @@ namespace stillmap {
 /// (60 % HDL-64E, 20 % VLP-16, 10 % HDL-32E, 10 % sensors that nobody builds). This share of all
 /// drives are plain ones through `quiet_city` or `crowded_avenue`. The same seed and share give the
 /// same drive.
-[[nodiscard]] SimulationConfig training_drive(std::uint64_t seed, double share_of_plain = 0.4);
+[[nodiscard]] SimulationConfig training_sequence(std::uint64_t seed, double share_of_plain = 0.4);
 
-/// Up to `count` scans of the drive, spread over the route and at least 8 m apart.
-[[nodiscard]] std::vector<int> spread_scans(const Simulation& drive, int count);
+/// Up to `count` scans of the sequence, spread over the route and at least 8 m apart.
+[[nodiscard]] std::vector<int> spread_scans(const Simulation& sequence, int count);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -2,12 +2,12 @@
 
 #include "core/simulation/training_city.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector2d;
 
-StreetProfile drawn_profile(Random& random) {
+StreetProfile random_profile(Random& random) {
   StreetProfile profile;
   const double size = random.uniform();
   profile.lanes = size < 0.9 ? 1 : size < 0.98 ? 2 : 3;
@@ -26,7 +26,7 @@ StreetProfile drawn_profile(Random& random) {
 
 // A block ring, and perhaps a side street of another kind that crosses it.
 void draw_streets(CityPlan& plan, Random& random) {
-  plan.route_profile = drawn_profile(random);
+  plan.route_profile = random_profile(random);
   const double half = plan.route_profile.half_street_m();
   plan.turn_radius_m = plan.route_profile.bike_centre_m() + 3.0;
   const double least = std::max(2.0 * plan.turn_radius_m + 30.0, 2.0 * half + 30.0);
@@ -35,7 +35,7 @@ void draw_streets(CityPlan& plan, Random& random) {
   plan.streets_along_v = {{0.0, plan.route_profile}, {width, plan.route_profile}};
   plan.streets_along_u = {{0.0, plan.route_profile}, {depth, plan.route_profile}};
   plan.route = {{0, 0}, {width, 0}, {width, depth}, {0, depth}};
-  StreetProfile side = drawn_profile(random);
+  StreetProfile side = random_profile(random);
   side.lanes = 1;
   side.half_median_m = 0.0;
   const double middle = width * random.uniform(0.4, 0.6);
@@ -54,7 +54,7 @@ void draw_ground(CityPlan& plan, Random& random) {
   plan.hill_length_m = random.uniform(40.0, 100.0);
   plan.hill_m = random.chance(0.3) ? 0.1 : random.uniform(0.0, 0.05) * plan.hill_length_m;
   plan.kerb_m = random.chance(0.15) ? 0.0 : random.uniform(0.02, 0.2);
-  plan.share_drives = random.chance(0.6) ? random.uniform(0.1, 0.8) : 0.0;
+  plan.share_driveways = random.chance(0.6) ? random.uniform(0.1, 0.8) : 0.0;
   plan.embankment_m = random.chance(0.5) ? random.uniform(0.3, 3.5) : 0.0;
   plan.tufts_m = random.uniform(0.0, 0.08);
   plan.paved_medians = random.chance(0.5);
@@ -135,4 +135,4 @@ CityPlan training_plan(Random random) {
   return plan;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -5,7 +5,7 @@
 
 #include "core/simulation/leaves.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector3f;
@@ -54,4 +54,4 @@ Mesh make_hedge(float length_m, float height_m, float depth_m, Random random) {
   return mesh;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -3,7 +3,7 @@
 #include "core/simulation/mesh.hpp"
 #include "core/simulation/random.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// A tree on the origin: trunk and limbs, and a crown of single leaf bundles with holes between
 /// them that rays pass.
@@ -25,4 +25,4 @@ namespace stillmap {
 /// A hedge as it grows, from the origin along x: uneven in height and depth.
 [[nodiscard]] Mesh make_any_hedge(float length_m, Random random);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

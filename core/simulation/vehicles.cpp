@@ -2,7 +2,7 @@
 
 #include "core/simulation/vehicle_parts.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 void add_axle(Mesh& mesh, float x, float half_width, float radius) {
   for (const float side : {-1.0F, 1.0F}) {
@@ -186,4 +186,4 @@ Mesh make_bus(Random& random) {
                           .tram = random.chance(0.25)});
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

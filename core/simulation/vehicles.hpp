@@ -3,7 +3,7 @@
 #include "core/simulation/mesh.hpp"
 #include "core/simulation/random.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 
 /// Bodies on the ground, centred on the origin, front along +x.
 /// Saloon, estate, hatchback, small car, off-roader or van, no two of the same measures.
@@ -17,4 +17,4 @@ namespace stillmap {
 /// Caravan, trailer, tractor or digger.
 [[nodiscard]] Mesh make_other_vehicle(Random& random);
 
-}  // namespace stillmap
+}  // namespace stillmap::simulation

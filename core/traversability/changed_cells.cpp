@@ -8,7 +8,7 @@ namespace {
 
 bool is_same(Column a, Column b) { return std::ranges::equal(a, b); }
 bool is_same(const SurfaceTile::View& a, const SurfaceTile::View& b) {
-  return *a.cell == *b.cell && std::ranges::equal(a.things_m, b.things_m);
+  return *a.cell == *b.cell && std::ranges::equal(a.object_heights_m, b.object_heights_m);
 }
 
 template <typename TileT>

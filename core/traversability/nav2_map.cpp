@@ -51,7 +51,8 @@ std::string description_of(const OccupancyGrid& grid) {
 }  // namespace
 
 void write_nav2_map(const fs::path& folder, const OccupancyGrid& grid) {
-  if (grid.status != AreaStatus::ok) throw std::invalid_argument("no map to write: " + grid.reason);
+  if (grid.status != TraversabilityStatus::ok)
+    throw std::invalid_argument("no map to write: " + grid.reason);
   std::error_code error;
   fs::create_directories(folder, error);
   if (error) throw std::runtime_error(folder.string() + ": cannot be made: " + error.message());

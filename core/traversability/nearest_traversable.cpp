@@ -6,7 +6,7 @@
 namespace stillmap {
 namespace {
 
-NearestTraversable refused(AreaStatus status, const std::string& reason) {
+NearestTraversable refused(TraversabilityStatus status, const std::string& reason) {
   NearestTraversable answer;
   answer.status = status;
   answer.reason = reason;
@@ -43,16 +43,16 @@ void search_tile(const TraversabilityView& view, const TraversabilityTile& tile,
 
 NearestTraversable nearest_traversable(const TraversabilityView& view,
                                        const Eigen::Vector2d& position_map, double max_distance_m) {
-  if (view.tiles.empty()) return refused(AreaStatus::not_found, "the map is empty");
+  if (view.tiles.empty()) return refused(TraversabilityStatus::not_found, "the map is empty");
   std::ostringstream text;
   if (!view.cell_of(position_map)) {
     text << "position (" << position_map.x() << ", " << position_map.y()
          << "); must be finite and within 100 km of the map's origin";
-    return refused(AreaStatus::invalid_request, text.str());
+    return refused(TraversabilityStatus::invalid_request, text.str());
   }
   if (!(max_distance_m > 0.0)) {
     text << "max_distance_m = " << max_distance_m << "; must be above 0";
-    return refused(AreaStatus::invalid_request, text.str());
+    return refused(TraversabilityStatus::invalid_request, text.str());
   }
   NearestTraversable best;
   best.map_version = view.version;
@@ -66,7 +66,7 @@ NearestTraversable nearest_traversable(const TraversabilityView& view,
   if (best.distance_m < beyond_m) return best;
   text << "no free cell for '" << view.profile.name << "' within " << max_distance_m << " m of ("
        << position_map.x() << ", " << position_map.y() << ")";
-  return refused(AreaStatus::not_found, text.str());
+  return refused(TraversabilityStatus::not_found, text.str());
 }
 
 }  // namespace stillmap

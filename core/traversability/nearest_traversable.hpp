@@ -8,7 +8,7 @@
 namespace stillmap {
 
 struct NearestTraversable {
-  AreaStatus status = AreaStatus::ok;
+  TraversabilityStatus status = TraversabilityStatus::ok;
   std::string reason;
   /// Centre of the nearest free cell, map frame [m].
   Eigen::Vector2d position_map = Eigen::Vector2d::Zero();

@@ -7,7 +7,7 @@
 namespace stillmap {
 namespace {
 
-OccupancyGrid refused(AreaStatus status, const std::string& reason) {
+OccupancyGrid refused(TraversabilityStatus status, const std::string& reason) {
   OccupancyGrid grid;
   grid.status = status;
   grid.reason = reason;
@@ -51,7 +51,7 @@ std::string too_many(const Eigen::AlignedBox2d& box_map, const WideRange& range,
   return text.str();
 }
 
-void fill(OccupancyGrid& grid, const TraversabilityView& view, const AreaRegion& region) {
+void fill(OccupancyGrid& grid, const TraversabilityView& view, const TraversabilityRegion& region) {
   CellLookup lookup(view);
   grid.data.assign(static_cast<std::size_t>(grid.width) * grid.height, occupancy_unknown);
   visit_cells(view, region, range_of(grid), [&](std::size_t i, CellIndex cell) {
@@ -68,23 +68,24 @@ CellRange range_of(const OccupancyGrid& grid) {
           grid.height};
 }
 
-OccupancyGrid occupancy_grid(const TraversabilityView& view, const AreaRegion& region,
+OccupancyGrid occupancy_grid(const TraversabilityView& view, const TraversabilityRegion& region,
                              std::uint64_t max_cells) {
   const Eigen::AlignedBox2d& asked = region.box_map;
   // Written so that NaN fails.
   if (!(asked.min().array() <= asked.max().array()).all()) {
-    return refused(AreaStatus::invalid_request,
+    return refused(TraversabilityStatus::invalid_request,
                    shown(asked) + ": each minimum must be a number not above its maximum");
   }
-  if (view.tiles.empty()) return refused(AreaStatus::not_found, "the map is empty");
+  if (view.tiles.empty()) return refused(TraversabilityStatus::not_found, "the map is empty");
   const Eigen::AlignedBox2d box_map = asked.intersection(view.bounds_map());
   if (box_map.isEmpty()) {
-    return refused(AreaStatus::not_found,
+    return refused(TraversabilityStatus::not_found,
                    shown(asked) + " lies outside the map: " + shown(view.bounds_map()));
   }
   const WideRange range = range_of(view, box_map);
   if (range.width * range.height > max_cells) {
-    return refused(AreaStatus::too_large, too_many(box_map, range, view.cell_m, max_cells));
+    return refused(TraversabilityStatus::too_large,
+                   too_many(box_map, range, view.cell_m, max_cells));
   }
   OccupancyGrid grid;
   grid.origin_map = view.cell_m * Eigen::Vector2d(range.first.x, range.first.y);

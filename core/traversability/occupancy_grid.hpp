@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "core/traversability/traversability_region.hpp"
 #include "core/traversability/path_check.hpp"
+#include "core/traversability/traversability_region.hpp"
 #include "core/traversability/traversability_view.hpp"
 
 namespace stillmap {
@@ -14,7 +14,7 @@ namespace stillmap {
 /// A grid as nav_msgs/OccupancyGrid has it: row after row from the lowest y, -1 unknown, 0 free
 /// and wanted, 1..98 free at a cost, 99 too near to something lethal, 100 lethal.
 struct OccupancyGrid {
-  AreaStatus status = AreaStatus::ok;
+  TraversabilityStatus status = TraversabilityStatus::ok;
   std::string reason;
   /// Lowest corner of the first cell, map frame [m].
   Eigen::Vector2d origin_map = Eigen::Vector2d::Zero();
@@ -30,7 +30,7 @@ struct OccupancyGrid {
 };
 
 inline constexpr std::int8_t occupancy_unknown = -1;
-inline constexpr std::int8_t occupancy_inflated = 99;
+inline constexpr std::int8_t occupancy_inscribed = 99;
 inline constexpr std::int8_t occupancy_lethal = 100;
 
 /// Largest grid [cells].
@@ -39,7 +39,8 @@ inline constexpr std::uint64_t max_grid_cells = 100'000'000;
 /// The cells of a region; those of its box that do not belong to it are unknown. A box that is
 /// empty or has NaN is an invalid request, one outside the map is not found, one of more than
 /// `max_cells` too large.
-[[nodiscard]] OccupancyGrid occupancy_grid(const TraversabilityView& view, const AreaRegion& region,
+[[nodiscard]] OccupancyGrid occupancy_grid(const TraversabilityView& view,
+                                           const TraversabilityRegion& region,
                                            std::uint64_t max_cells = max_grid_cells);
 
 /// The view's cells that a grid of it is made of. @pre grid.status is ok

@@ -30,7 +30,7 @@ std::string fault_of(const TraversabilityView& view, const PlanarPose& pose, std
   return text.str();
 }
 
-PathCheck refused(AreaStatus status, const std::string& reason) {
+PathCheck refused(TraversabilityStatus status, const std::string& reason) {
   PathCheck check;
   check.status = status;
   check.reason = reason;
@@ -57,19 +57,20 @@ double cells_to_look_at(const TraversabilityView& view, std::span<const PlanarPo
 
 std::optional<PathCheck> refusal(const TraversabilityView& view,
                                  std::span<const PlanarPose> path_map) {
-  if (path_map.empty()) return refused(AreaStatus::invalid_request, "the path has no poses");
+  if (path_map.empty())
+    return refused(TraversabilityStatus::invalid_request, "the path has no poses");
   if (path_map.size() > max_path_poses) {
-    return refused(AreaStatus::too_large, "the path has " + std::to_string(path_map.size()) +
-                                              " poses; at most " + std::to_string(max_path_poses) +
-                                              " are checked at once");
+    return refused(TraversabilityStatus::too_large,
+                   "the path has " + std::to_string(path_map.size()) + " poses; at most " +
+                       std::to_string(max_path_poses) + " are checked at once");
   }
-  if (view.tiles.empty()) return refused(AreaStatus::not_found, "the map is empty");
+  if (view.tiles.empty()) return refused(TraversabilityStatus::not_found, "the map is empty");
   for (std::size_t i = 0; i < path_map.size(); ++i) {
     const std::string fault = fault_of(view, path_map[i], i);
-    if (!fault.empty()) return refused(AreaStatus::invalid_request, fault);
+    if (!fault.empty()) return refused(TraversabilityStatus::invalid_request, fault);
   }
   if (cells_to_look_at(view, path_map) > max_path_cells) {
-    return refused(AreaStatus::too_large,
+    return refused(TraversabilityStatus::too_large,
                    "the path is too long or turns too much to be checked at once; ask for parts");
   }
   return std::nullopt;
@@ -125,7 +126,7 @@ class Walk {
 
 }  // namespace
 
-std::string_view name(AreaStatus status) {
+std::string_view name(TraversabilityStatus status) {
   constexpr std::array<std::string_view, 4> names{"ok", "invalid request", "too large",
                                                   "not found"};
   return names.at(static_cast<std::size_t>(status));

@@ -9,7 +9,7 @@
 
 namespace stillmap {
 
-enum class AreaStatus : std::uint8_t {
+enum class TraversabilityStatus : std::uint8_t {
   ok,
   /// The question makes no sense: `reason` names the value and what would do.
   invalid_request,
@@ -19,7 +19,7 @@ enum class AreaStatus : std::uint8_t {
   not_found,
 };
 
-[[nodiscard]] std::string_view name(AreaStatus status);
+[[nodiscard]] std::string_view name(TraversabilityStatus status);
 
 /// The first place where a robot cannot follow a path.
 struct PathConflict {
@@ -30,12 +30,12 @@ struct PathConflict {
   /// Where the robot would stand.
   PlanarPose pose;
   /// Centre of the cell that its footprint must not touch, map frame [m].
-  Eigen::Vector2d place_map = Eigen::Vector2d::Zero();
+  Eigen::Vector2d cell_centre_map = Eigen::Vector2d::Zero();
   BlockReason reason = BlockReason::none;
 };
 
 struct PathCheck {
-  AreaStatus status = AreaStatus::ok;
+  TraversabilityStatus status = TraversabilityStatus::ok;
   std::string reason;
   /// The whole path can be followed.
   bool is_free = false;

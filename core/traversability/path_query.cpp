@@ -61,7 +61,7 @@ std::vector<PlanarPose> straight_ahead(const std::vector<Eigen::Vector2d>& posit
   return poses;
 }
 
-PathCheck refused(AreaStatus status, const std::string& reason) {
+PathCheck refused(TraversabilityStatus status, const std::string& reason) {
   PathCheck check;
   check.status = status;
   check.reason = reason;
@@ -71,14 +71,16 @@ PathCheck refused(AreaStatus status, const std::string& reason) {
 }  // namespace
 
 PathCheck check_path(const TraversabilityView& view, const PathQuery& query) {
-  const std::size_t most = query.headings_rad.empty() ? max_path_poses / 2 : max_path_poses;
-  if (query.positions_map.size() > most) {
-    return refused(AreaStatus::too_large,
+  const std::size_t max_positions =
+      query.headings_rad.empty() ? max_path_poses / 2 : max_path_poses;
+  if (query.positions_map.size() > max_positions) {
+    return refused(TraversabilityStatus::too_large,
                    "the path has " + std::to_string(query.positions_map.size()) +
-                       " positions; at most " + std::to_string(most) + " are checked at once");
+                       " positions; at most " + std::to_string(max_positions) +
+                       " are checked at once");
   }
   if (const std::string fault = fault_of(query); !fault.empty()) {
-    return refused(AreaStatus::invalid_request, fault);
+    return refused(TraversabilityStatus::invalid_request, fault);
   }
   if (!query.headings_rad.empty()) return check_path(view, with_headings(query));
   PathCheck check = check_path(view, straight_ahead(query.positions_map));

@@ -13,7 +13,8 @@ static_assert(surface_reach_m > max_filled_gap_m + 1.0, "both ends of a gap need
 void add_things(SurfaceTile& tile, const GroundCell& ground, Column column) {
   for (const ColumnVoxel& voxel : column) {
     const float above_m = voxel.height_m - ground.height_m;
-    if (voxel.height_m > ground.top_m && above_m <= max_thing_m) tile.things_m.push_back(above_m);
+    if (voxel.height_m > ground.top_m && above_m <= max_object_height_m)
+      tile.object_heights_m.push_back(above_m);
   }
 }
 
@@ -33,11 +34,11 @@ SurfaceTile make_surface(const TileNeighbourhood<ColumnTile>& columns, double ce
       cell.ground = ground(x, y);
       if (cell.ground.is_known()) cell.shape = shape_at(ground, x, y, cell_m);
       tile.cells.push_back(cell);
-      tile.begin.push_back(static_cast<std::uint32_t>(tile.things_m.size()));
+      tile.begin.push_back(static_cast<std::uint32_t>(tile.object_heights_m.size()));
       if (cell.ground.origin != GroundOrigin::none) add_things(tile, cell.ground, window(x, y));
     }
   }
-  tile.begin.push_back(static_cast<std::uint32_t>(tile.things_m.size()));
+  tile.begin.push_back(static_cast<std::uint32_t>(tile.object_heights_m.size()));
   return tile;
 }
 

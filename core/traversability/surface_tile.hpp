@@ -26,26 +26,26 @@ struct SurfaceTile {
   int side = 0;
   /// Row after row from the lowest y.
   std::vector<SurfaceCell> cells;
-  /// Of every cell, where its things begin in `things_m`; one more for the end.
+  /// Of every cell, where its things begin in `object_heights_m`; one more for the end.
   std::vector<std::uint32_t> begin;
   /// Heights of what is not ground above the ground of its cell, from the lowest up [m].
-  std::vector<float> things_m;
+  std::vector<float> object_heights_m;
 
   /// A cell with what stands in it.
   struct View {
     const SurfaceCell* cell = nullptr;
-    std::span<const float> things_m;
+    std::span<const float> object_heights_m;
   };
   [[nodiscard]] View at(int x, int y) const {
     const std::size_t i =
         static_cast<std::size_t>(y) * static_cast<std::size_t>(side) + static_cast<std::size_t>(x);
-    return {&cells[i], std::span(things_m).subspan(begin[i], begin[i + 1] - begin[i])};
+    return {&cells[i], std::span(object_heights_m).subspan(begin[i], begin[i + 1] - begin[i])};
   }
   friend bool operator==(const SurfaceTile&, const SurfaceTile&) = default;
 };
 
 /// Things higher above the ground than this are above every robot [m].
-inline constexpr float max_thing_m = 12.0F;
+inline constexpr float max_object_height_m = 12.0F;
 
 /// The surface of the middle tile. What is farther from it than its neighbours reach, or than
 /// `surface_reach_m`, does not count.

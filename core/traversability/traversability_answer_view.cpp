@@ -32,7 +32,7 @@ NewTile empty_tile(TileId id, std::uint64_t version) {
   return tile;
 }
 
-void put(NewTile& tile, std::size_t i, const AreaCell& cell, std::int8_t value) {
+void put(NewTile& tile, std::size_t i, const TraversabilityCellInfo& cell, std::int8_t value) {
   tile.area.cells[i] = {.state = cell.state,
                         .reason = cell.reason,
                         .inferred = cell.inferred,
@@ -44,7 +44,7 @@ void put(NewTile& tile, std::size_t i, const AreaCell& cell, std::int8_t value) 
       .origin = cell.inferred ? GroundOrigin::inferred : GroundOrigin::seen};
 }
 
-std::map<TileId, NewTile> tiles_of(const AreaAnswer& answer) {
+std::map<TileId, NewTile> tiles_of(const TraversabilityAnswer& answer) {
   std::map<TileId, NewTile> tiles;
   const CellRange range = range_of(answer.grid);
   for (std::size_t i = 0; i < answer.cells.size(); ++i) {
@@ -64,8 +64,9 @@ std::map<TileId, NewTile> tiles_of(const AreaAnswer& answer) {
 
 }  // namespace
 
-TraversabilityView area_view(const AreaAnswer& answer, const RobotProfile& profile) {
-  assert(answer.grid.status == AreaStatus::ok && answer.cells.size() == answer.grid.data.size());
+TraversabilityView view_of_answer(const TraversabilityAnswer& answer, const RobotProfile& profile) {
+  assert(answer.grid.status == TraversabilityStatus::ok &&
+         answer.cells.size() == answer.grid.data.size());
   TraversabilityView view;
   view.version = answer.grid.map_version;
   view.map_id = answer.map_id;

@@ -23,12 +23,12 @@ struct TileState {
   std::shared_ptr<const ColumnTile> columns;
   std::shared_ptr<const SurfaceTile> surface;
   /// One a profile.
-  std::vector<std::shared_ptr<const TraversabilityTile>> judged;
+  std::vector<std::shared_ptr<const TraversabilityTile>> classified;
 };
 
 using TileStates = std::map<TileId, TileState>;
 
-int checked_side(const MapView& map) {
+int checked_side(const MapSnapshot& map) {
   const double side = std::round(map.tile_size_m / map.voxel_size_m);
   if (!(map.voxel_size_m > 0.0) || !(side >= 1.0 && side <= VoxelGrid::max_columns) ||
       std::abs(side * map.voxel_size_m - map.tile_size_m) > 1e-6 * map.tile_size_m) {
@@ -78,19 +78,22 @@ struct TraversabilityMap::State {
   int side = 0;
   std::vector<std::shared_ptr<const TraversabilityView>> views;
 
-  void take_sizes(const MapView& map);
-  [[nodiscard]] ChangedCells update_columns(const MapView& map, const Pause& pause);
-  [[nodiscard]] std::vector<const Tile*> renewed_tiles(const MapView& map) const;
-  void drop_missing(const MapView& map, ChangedCells& changes);
+  void take_sizes(const MapSnapshot& map);
+  [[nodiscard]] ChangedCells update_columns(const MapSnapshot& map,
+                                            const ThrottleCallback& throttle);
+  [[nodiscard]] std::vector<const Tile*> renewed_tiles(const MapSnapshot& map) const;
+  void drop_missing(const MapSnapshot& map, ChangedCells& changes);
   [[nodiscard]] ChangedCells update_surfaces(const ChangedCells& columns,
-                                             TraversabilityUpdate& report, const Pause& pause);
-  void judge_all(const ChangedCells& surfaces, TraversabilityUpdate& report, const Pause& pause);
-  void judge_one(TileState& state, TileId id, std::size_t profile) const;
+                                             TraversabilityUpdate& report,
+                                             const ThrottleCallback& throttle);
+  void classify_all(const ChangedCells& surfaces, TraversabilityUpdate& report,
+                    const ThrottleCallback& throttle);
+  void classify_one(TileState& state, TileId id, std::size_t profile) const;
   void publish();
 };
 
 /// A map of another id or size shares nothing with the last one.
-void TraversabilityMap::State::take_sizes(const MapView& map) {
+void TraversabilityMap::State::take_sizes(const MapSnapshot& map) {
   const int new_side = map.tiles.empty() ? 0 : checked_side(map);
   const bool is_same = map.map_id == map_id && map.tile_size_m == tile_size_m &&
                        map.voxel_size_m == cell_m && new_side == side;
@@ -102,7 +105,7 @@ void TraversabilityMap::State::take_sizes(const MapView& map) {
   cell_m = map.voxel_size_m;
 }
 
-std::vector<const Tile*> TraversabilityMap::State::renewed_tiles(const MapView& map) const {
+std::vector<const Tile*> TraversabilityMap::State::renewed_tiles(const MapSnapshot& map) const {
   std::vector<const Tile*> renewed;
   for (const auto& tile : map.tiles) {
     const auto known = tiles.find(tile->info.id);
@@ -114,7 +117,7 @@ std::vector<const Tile*> TraversabilityMap::State::renewed_tiles(const MapView& 
   return renewed;
 }
 
-void TraversabilityMap::State::drop_missing(const MapView& map, ChangedCells& changes) {
+void TraversabilityMap::State::drop_missing(const MapSnapshot& map, ChangedCells& changes) {
   std::set<TileId> present;
   for (const auto& tile : map.tiles) present.insert(tile->info.id);
   std::erase_if(tiles, [&](const auto& entry) {
@@ -124,13 +127,14 @@ void TraversabilityMap::State::drop_missing(const MapView& map, ChangedCells& ch
   });
 }
 
-ChangedCells TraversabilityMap::State::update_columns(const MapView& map, const Pause& pause) {
+ChangedCells TraversabilityMap::State::update_columns(const MapSnapshot& map,
+                                                      const ThrottleCallback& throttle) {
   ChangedCells changes;
   drop_missing(map, changes);
   const std::vector<const Tile*> renewed = renewed_tiles(map);
   std::vector<std::shared_ptr<const ColumnTile>> columns(renewed.size());
   tbb::parallel_for(std::size_t{0}, renewed.size(), [&](std::size_t i) {
-    if (pause) pause();
+    if (throttle) throttle();
     columns[i] = std::make_shared<const ColumnTile>(make_columns(*renewed[i], side));
   });
   for (std::size_t i = 0; i < renewed.size(); ++i) {
@@ -146,12 +150,12 @@ ChangedCells TraversabilityMap::State::update_columns(const MapView& map, const 
 
 ChangedCells TraversabilityMap::State::update_surfaces(const ChangedCells& columns,
                                                        TraversabilityUpdate& report,
-                                                       const Pause& pause) {
+                                                       const ThrottleCallback& throttle) {
   const int margin = margin_cells(surface_reach_m, cell_m, side);
   const std::vector<TileId> ids = existing(affected_tiles(columns, side, margin), tiles);
   std::vector<std::shared_ptr<const SurfaceTile>> surfaces(ids.size());
   tbb::parallel_for(std::size_t{0}, ids.size(), [&](std::size_t i) {
-    if (pause) pause();
+    if (throttle) throttle();
     const auto around = neighbourhood<ColumnTile>(tiles, ids[i], side, &TileState::columns);
     surfaces[i] = std::make_shared<const SurfaceTile>(make_surface(around, cell_m));
   });
@@ -170,29 +174,31 @@ ChangedCells TraversabilityMap::State::update_surfaces(const ChangedCells& colum
   return changes;
 }
 
-void TraversabilityMap::State::judge_one(TileState& state, TileId id, std::size_t profile) const {
+void TraversabilityMap::State::classify_one(TileState& state, TileId id,
+                                            std::size_t profile) const {
   const auto around = neighbourhood<SurfaceTile>(tiles, id, side, &TileState::surface);
-  TraversabilityTile judged{.id = id,
-                            .revision = version,
-                            .side = side,
-                            .cells = judge_tile(around, profiles[profile], cell_m),
-                            .surface = state.surface};
-  const auto& before = state.judged[profile];
-  if (before && before->cells == judged.cells && before->surface == judged.surface) return;
-  state.judged[profile] = std::make_shared<const TraversabilityTile>(std::move(judged));
+  TraversabilityTile classified{.id = id,
+                                .revision = version,
+                                .side = side,
+                                .cells = classify_tile(around, profiles[profile], cell_m),
+                                .surface = state.surface};
+  const auto& before = state.classified[profile];
+  if (before && before->cells == classified.cells && before->surface == classified.surface) return;
+  state.classified[profile] = std::make_shared<const TraversabilityTile>(std::move(classified));
 }
 
-void TraversabilityMap::State::judge_all(const ChangedCells& surfaces, TraversabilityUpdate& report,
-                                         const Pause& pause) {
+void TraversabilityMap::State::classify_all(const ChangedCells& surfaces,
+                                            TraversabilityUpdate& report,
+                                            const ThrottleCallback& throttle) {
   for (std::size_t profile = 0; profile < profiles.size(); ++profile) {
     const int margin = margin_cells(clearance_limit_m(profiles[profile]), cell_m, side);
     const std::vector<TileId> ids = existing(affected_tiles(surfaces, side, margin), tiles);
-    for (const TileId& id : ids) tiles.at(id).judged.resize(profiles.size());
+    for (const TileId& id : ids) tiles.at(id).classified.resize(profiles.size());
     tbb::parallel_for(std::size_t{0}, ids.size(), [&](std::size_t i) {
-      if (pause) pause();
-      judge_one(tiles.at(ids[i]), ids[i], profile);
+      if (throttle) throttle();
+      classify_one(tiles.at(ids[i]), ids[i], profile);
     });
-    report.judged += ids.size();
+    report.classified += ids.size();
   }
 }
 
@@ -204,7 +210,7 @@ void TraversabilityMap::State::publish() {
     view->tile_size_m = tile_size_m;
     view->cell_m = cell_m;
     view->profile = profiles[i];
-    for (const auto& [id, state] : tiles) view->tiles.push_back(state.judged[i]);
+    for (const auto& [id, state] : tiles) view->tiles.push_back(state.classified[i]);
     views[i] = std::move(view);
   }
 }
@@ -231,14 +237,15 @@ TraversabilityMap::~TraversabilityMap() = default;
 TraversabilityMap::TraversabilityMap(TraversabilityMap&&) noexcept = default;
 TraversabilityMap& TraversabilityMap::operator=(TraversabilityMap&&) noexcept = default;
 
-TraversabilityUpdate TraversabilityMap::update(const MapView& map, const Pause& pause) {
+TraversabilityUpdate TraversabilityMap::update(const MapSnapshot& map,
+                                               const ThrottleCallback& throttle) {
   state_->take_sizes(map);
   TraversabilityUpdate report;
   if (!map.tiles.empty()) {
-    const ChangedCells columns = state_->update_columns(map, pause);
+    const ChangedCells columns = state_->update_columns(map, throttle);
     report.map_tiles = columns.size();
-    const ChangedCells surfaces = state_->update_surfaces(columns, report, pause);
-    state_->judge_all(surfaces, report, pause);
+    const ChangedCells surfaces = state_->update_surfaces(columns, report, throttle);
+    state_->classify_all(surfaces, report, throttle);
   }
   state_->publish();
   return report;

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "core/map/throttle_callback.hpp"
 #include "core/map/tile.hpp"
-#include "core/throttle_callback.hpp"
 #include "core/traversability/robot_profile.hpp"
 #include "core/traversability/traversability_view.hpp"
 
@@ -17,8 +17,8 @@ struct TraversabilityUpdate {
   std::size_t map_tiles = 0;
   /// Tiles whose surface was computed anew: those and the ones that they reach into.
   std::size_t surfaces = 0;
-  /// Tiles judged anew, all profiles together.
-  std::size_t judged = 0;
+  /// Tiles classified anew, all profiles together.
+  std::size_t classified = 0;
 };
 
 /// The traversable area of a growing map, for several robots. The surface is computed once and
@@ -35,7 +35,7 @@ class TraversabilityMap {
 
   /// Brings all profiles to this state of the map. Throws std::invalid_argument when the map's
   /// tiles are not whole numbers of voxels.
-  TraversabilityUpdate update(const MapView& map, const Pause& pause = {});
+  TraversabilityUpdate update(const MapSnapshot& map, const ThrottleCallback& throttle = {});
 
   [[nodiscard]] const std::vector<RobotProfile>& profiles() const;
   /// The area of the profile as of the last update; null when there is no such profile.

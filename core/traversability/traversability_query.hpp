@@ -6,19 +6,19 @@
 #include <vector>
 
 #include "core/map/query/region.hpp"
-#include "core/traversability/traversable_outline.hpp"
 #include "core/traversability/occupancy_grid.hpp"
+#include "core/traversability/traversable_outline.hpp"
 
 namespace stillmap {
 
 /// Where can this robot go?
-struct AreaQuery {
+struct TraversabilityQuery {
   /// Name of the robot profile, for a server that keeps several.
   std::string profile;
   /// Seen from above: heights do not count, a sphere is its circle.
   Region region = BoxRegion{};
-  bool wants_grid = true;
-  bool wants_outlines = false;
+  bool include_grid = true;
+  bool include_outlines = false;
   /// Largest grid [cells], also where only outlines are wanted.
   std::uint64_t max_cells = max_grid_cells;
   /// Smaller pieces of free area are left out of the outlines [m^2].
@@ -26,7 +26,7 @@ struct AreaQuery {
 };
 
 /// What a planner gets to know of a cell besides its value in the grid.
-struct AreaCell {
+struct TraversabilityCellInfo {
   CellState state = CellState::unknown;
   BlockReason reason = BlockReason::none;
   bool inferred = false;
@@ -34,18 +34,19 @@ struct AreaCell {
   float ground_z_m = std::numeric_limits<float>::quiet_NaN();
 };
 
-struct AreaAnswer {
+struct TraversabilityAnswer {
   /// Its status and reason are the answer's. Without values where only outlines were wanted.
   OccupancyGrid grid;
   /// Of the map that it shows.
   std::uint64_t map_id = 0;
   /// One for each value of the grid.
-  std::vector<AreaCell> cells;
-  std::vector<AreaPolygon> outlines;
+  std::vector<TraversabilityCellInfo> cells;
+  std::vector<TraversablePolygon> outlines;
 };
 
 /// Answers `query` from the view, whatever profile it names. A region with faults is an invalid
 /// request.
-[[nodiscard]] AreaAnswer answer_area(const TraversabilityView& view, const AreaQuery& query);
+[[nodiscard]] TraversabilityAnswer query_traversability(const TraversabilityView& view,
+                                                        const TraversabilityQuery& query);
 
 }  // namespace stillmap

@@ -52,13 +52,13 @@ Eigen::AlignedBox3d box_of(const TraversabilityView& view, const CellRange& rang
 
 }  // namespace
 
-AreaRegion everywhere() {
+TraversabilityRegion whole_map_region() {
   const Eigen::Vector2d infinite =
       Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
   return {Eigen::AlignedBox2d(-infinite, infinite), {}};
 }
 
-AreaRegion area_region(const Region& region) {
+TraversabilityRegion traversability_region(const Region& region) {
   RegionShape shape(region);
   const Eigen::AlignedBox3d& bounds_map = shape.bounds_map();
   const Eigen::AlignedBox2d box_map(bounds_map.min().head<2>(), bounds_map.max().head<2>());
@@ -66,8 +66,8 @@ AreaRegion area_region(const Region& region) {
   return {box_map, std::move(shape)};
 }
 
-void visit_cells(const TraversabilityView& view, const AreaRegion& region, const CellRange& range,
-                 const std::function<void(std::size_t, CellIndex)>& visit) {
+void visit_cells(const TraversabilityView& view, const TraversabilityRegion& region,
+                 const CellRange& range, const std::function<void(std::size_t, CellIndex)>& visit) {
   if (!region.shape) {
     visit_block(range, {0, 0, range.width, range.height}, visit);
     return;
@@ -78,8 +78,8 @@ void visit_cells(const TraversabilityView& view, const AreaRegion& region, const
       const Block block{x, y, std::min(x + block_side, range.width),
                         std::min(y + block_side, range.height)};
       const Eigen::AlignedBox3d box_map = box_of(view, range, block, level_m);
-      if (!region.shape->may_meet(box_map)) continue;
-      const RegionShape near = region.shape->near(box_map);
+      if (!region.shape->may_intersect(box_map)) continue;
+      const RegionShape near = region.shape->restricted_to(box_map);
       visit_block(range, block, [&](std::size_t i, CellIndex cell) {
         if (near.contains(at_level(view.centre_of(cell), level_m))) visit(i, cell);
       });

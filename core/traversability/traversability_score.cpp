@@ -5,7 +5,7 @@
 namespace stillmap {
 namespace {
 
-FalseFree cause_of(const TraversabilityCell& cell, const TrueCell& truth) {
+FalseFree cause_of(const TraversabilityCell& cell, const CellTruth& truth) {
   if (truth.is_removed_vehicle) return FalseFree::removed_vehicle;
   if (truth.is_edge && truth.reason != BlockReason::obstacle) return FalseFree::edge;
   if (cell.inferred) return FalseFree::inferred;
@@ -13,7 +13,7 @@ FalseFree cause_of(const TraversabilityCell& cell, const TrueCell& truth) {
   return truth.reason == BlockReason::ground_class ? FalseFree::ground_class : FalseFree::obstacle;
 }
 
-void count(AreaScore& score, const TraversabilityCell& cell, const TrueCell& truth) {
+void count(TraversabilityScore& score, const TraversabilityCell& cell, const CellTruth& truth) {
   const bool is_truly_free = truth.reason == BlockReason::none;
   if (cell.is_lethal_itself()) {
     if (is_truly_free) {
@@ -41,27 +41,28 @@ std::string_view name(FalseFree cause) {
   return names.at(static_cast<std::size_t>(cause));
 }
 
-std::uint64_t AreaScore::all_false_free() const {
+std::uint64_t TraversabilityScore::all_false_free() const {
   return std::accumulate(false_free.begin(), false_free.end(), std::uint64_t{0});
 }
 
-std::uint64_t AreaScore::all_false_lethal() const {
+std::uint64_t TraversabilityScore::all_false_lethal() const {
   return std::accumulate(false_lethal.begin(), false_lethal.end(), std::uint64_t{0});
 }
 
-std::optional<double> AreaScore::precision(bool without_vehicles) const {
+std::optional<double> TraversabilityScore::precision(bool without_vehicles) const {
   const std::uint64_t vehicles =
       false_free.at(static_cast<std::size_t>(FalseFree::removed_vehicle));
   if (!without_vehicles) return share(free_and_truly_free, all_false_free());
   return share(free_and_truly_free + vehicles, all_false_free() - vehicles);
 }
 
-std::optional<double> AreaScore::recall() const {
+std::optional<double> TraversabilityScore::recall() const {
   return share(free_and_truly_free, all_false_lethal());
 }
 
-AreaScore score_area(const TraversabilityView& view, const AreaTruth& truth) {
-  AreaScore score;
+TraversabilityScore score_traversability(const TraversabilityView& view,
+                                         const TraversabilityTruth& truth) {
+  TraversabilityScore score;
   for (const auto& tile : view.tiles) {
     for (int y = 0; y < tile->side; ++y) {
       for (int x = 0; x < tile->side; ++x) {

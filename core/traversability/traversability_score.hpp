@@ -10,7 +10,7 @@
 namespace stillmap {
 
 /// What a cell truly is for the robot of an area.
-struct TrueCell {
+struct CellTruth {
   /// `none` where the robot may be.
   BlockReason reason = BlockReason::none;
   /// It is blocked only by a vehicle that stood there and is not part of a static map.
@@ -20,7 +20,7 @@ struct TrueCell {
 };
 
 /// The truth at a point on the ground, map frame [m].
-using AreaTruth = std::function<TrueCell(const Eigen::Vector3d& ground_map)>;
+using TraversabilityTruth = std::function<CellTruth(const Eigen::Vector3d& ground_map)>;
 
 /// Why a cell was called free that is not. The first that fits.
 enum class FalseFree : std::uint8_t {
@@ -40,7 +40,7 @@ inline constexpr std::size_t false_free_count = 6;
 
 /// An area held against the truth, cell by cell, over the cells that are not unknown. A cell of
 /// the safety margin counts by what it is in itself: free.
-struct AreaScore {
+struct TraversabilityScore {
   std::uint64_t free_and_truly_free = 0;
   std::uint64_t lethal_and_truly_lethal = 0;
   /// Called lethal, by the reason given.
@@ -56,6 +56,7 @@ struct AreaScore {
   [[nodiscard]] std::optional<double> recall() const;
 };
 
-[[nodiscard]] AreaScore score_area(const TraversabilityView& view, const AreaTruth& truth);
+[[nodiscard]] TraversabilityScore score_traversability(const TraversabilityView& view,
+                                                       const TraversabilityTruth& truth);
 
 }  // namespace stillmap

@@ -7,7 +7,7 @@ namespace {
 
 /// A cell of a tile or of an answer.
 template <typename Cell>
-void count(const Cell& cell, AreaSummary& summary) {
+void count(const Cell& cell, TraversabilitySummary& summary) {
   switch (cell.state) {
     case CellState::unknown:
       ++summary.unknown;
@@ -24,21 +24,21 @@ void count(const Cell& cell, AreaSummary& summary) {
 
 }  // namespace
 
-std::uint64_t AreaSummary::all_lethal() const {
+std::uint64_t TraversabilitySummary::all_lethal() const {
   return std::accumulate(lethal.begin(), lethal.end(), std::uint64_t{0});
 }
 
-AreaSummary summarize(const TraversabilityView& view) {
-  AreaSummary summary;
+TraversabilitySummary summarize(const TraversabilityView& view) {
+  TraversabilitySummary summary;
   for (const auto& tile : view.tiles) {
     for (const TraversabilityCell& cell : tile->cells) count(cell, summary);
   }
   return summary;
 }
 
-AreaSummary summarize(const AreaAnswer& answer) {
-  AreaSummary summary;
-  for (const AreaCell& cell : answer.cells) count(cell, summary);
+TraversabilitySummary summarize(const TraversabilityAnswer& answer) {
+  TraversabilitySummary summary;
+  for (const TraversabilityCellInfo& cell : answer.cells) count(cell, summary);
   return summary;
 }
 

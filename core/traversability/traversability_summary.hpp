@@ -8,7 +8,7 @@
 namespace stillmap {
 
 /// How much of an area is in which state [cells].
-struct AreaSummary {
+struct TraversabilitySummary {
   std::uint64_t free = 0;
   /// Of the free ones.
   std::uint64_t inferred = 0;
@@ -20,8 +20,8 @@ struct AreaSummary {
   [[nodiscard]] std::uint64_t all_lethal() const;
 };
 
-[[nodiscard]] AreaSummary summarize(const TraversabilityView& view);
+[[nodiscard]] TraversabilitySummary summarize(const TraversabilityView& view);
 /// Of an answer with a grid.
-[[nodiscard]] AreaSummary summarize(const AreaAnswer& answer);
+[[nodiscard]] TraversabilitySummary summarize(const TraversabilityAnswer& answer);
 
 }  // namespace stillmap

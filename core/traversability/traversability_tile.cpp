@@ -19,10 +19,10 @@ constexpr double near_cost = 80.0;
 constexpr double effort_cost = 0.5;
 
 /// The lowest thing that the robot cannot drive over and that is lower than it is high.
-const float* thing_in_the_way(std::span<const float> things_m, const RobotProfile& profile) {
-  const auto thing =
-      std::ranges::upper_bound(things_m, static_cast<float>(profile.obstacle_height_m()));
-  return thing != things_m.end() && *thing < profile.height_m ? &*thing : nullptr;
+const float* blocking_object(std::span<const float> object_heights_m, const RobotProfile& profile) {
+  const auto object =
+      std::ranges::upper_bound(object_heights_m, static_cast<float>(profile.obstacle_height_m()));
+  return object != object_heights_m.end() && *object < profile.height_m ? &*object : nullptr;
 }
 
 BlockReason reason_of_ground(const SurfaceCell& cell, const RobotProfile& profile) {
@@ -38,9 +38,10 @@ BlockReason reason_of_ground(const SurfaceCell& cell, const RobotProfile& profil
 }
 
 BlockReason reason_of(const SurfaceTile::View& surface, const RobotProfile& profile) {
-  if (const float* thing_m = thing_in_the_way(surface.things_m, profile)) {
+  if (const float* object_height_m = blocking_object(surface.object_heights_m, profile)) {
     // What begins in the upper half of the robot hangs from somewhere else.
-    return *thing_m < 0.5 * profile.height_m ? BlockReason::obstacle : BlockReason::low_headroom;
+    return *object_height_m < 0.5 * profile.height_m ? BlockReason::obstacle
+                                                     : BlockReason::low_headroom;
   }
   return surface.cell->ground.is_known() ? reason_of_ground(*surface.cell, profile)
                                          : BlockReason::none;
@@ -72,7 +73,7 @@ TraversabilityCell with_margin(TraversabilityCell cell, double distance_m,
   if (cell.state != CellState::free) return cell;
   const double inscribed_m = profile.inscribed_radius_m();
   const double circumscribed_m = profile.circumscribed_radius_m();
-  if (distance_m <= inscribed_m) return make_lethal(cell, BlockReason::inflation, inflation_cost);
+  if (distance_m <= inscribed_m) return make_lethal(cell, BlockReason::inscribed, inflation_cost);
   if (distance_m < circumscribed_m) {
     const double share = (circumscribed_m - distance_m) / (circumscribed_m - inscribed_m);
     cell.cost = std::max(cell.cost, static_cast<std::uint8_t>(std::lround(near_cost * share)));
@@ -95,11 +96,11 @@ std::string_view name(BlockReason reason) {
 }
 
 double clearance_limit_m(const RobotProfile& profile) {
-  constexpr double least_m = 2.0;
-  return std::max(least_m, profile.circumscribed_radius_m());
+  constexpr double min_limit_m = 2.0;
+  return std::max(min_limit_m, profile.circumscribed_radius_m());
 }
 
-TraversabilityCell judge(const SurfaceTile::View& surface, const RobotProfile& profile) {
+TraversabilityCell classify_cell(const SurfaceTile::View& surface, const RobotProfile& profile) {
   TraversabilityCell cell;
   cell.clearance_m = static_cast<float>(clearance_limit_m(profile));
   if (surface.cell == nullptr) return cell;
@@ -116,23 +117,23 @@ TraversabilityCell judge(const SurfaceTile::View& surface, const RobotProfile& p
   return cell;
 }
 
-std::vector<TraversabilityCell> judge_tile(const TileNeighbourhood<SurfaceTile>& surfaces,
-                                           const RobotProfile& profile, double cell_m) {
+std::vector<TraversabilityCell> classify_tile(const TileNeighbourhood<SurfaceTile>& surfaces,
+                                              const RobotProfile& profile, double cell_m) {
   const int margin =
       std::min(surfaces.side, static_cast<int>(std::ceil(clearance_limit_m(profile) / cell_m)));
   const auto window = surfaces.window<SurfaceTile::View>(margin, {});
-  CellGrid<TraversabilityCell> judged(window.width(), window.height());
+  CellGrid<TraversabilityCell> classified(window.width(), window.height());
   CellGrid<std::uint8_t> lethal(window.width(), window.height());
   for_each_cell(window, [&](int x, int y) {
-    judged(x, y) = judge(window(x, y), profile);
-    lethal(x, y) = judged(x, y).state == CellState::lethal ? 1 : 0;
+    classified(x, y) = classify_cell(window(x, y), profile);
+    lethal(x, y) = classified(x, y).state == CellState::lethal ? 1 : 0;
   });
   const CellGrid<std::int32_t> squared = squared_distances(lethal);
   std::vector<TraversabilityCell> cells;
   for (int y = margin; y < margin + surfaces.side; ++y) {
     for (int x = margin; x < margin + surfaces.side; ++x) {
       const double distance_m = cell_m * std::sqrt(static_cast<double>(squared(x, y)));
-      cells.push_back(with_margin(judged(x, y), distance_m, profile));
+      cells.push_back(with_margin(classified(x, y), distance_m, profile));
     }
   }
   return cells;

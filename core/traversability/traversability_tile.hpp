@@ -32,7 +32,7 @@ enum class BlockReason : std::uint8_t {
   /// Ground of a class that the robot must not enter.
   ground_class,
   /// Nearer to a lethal cell than the robot's inscribed radius; the cell itself has no fault.
-  inflation,
+  inscribed,
   /// Only in answers about paths: not lethal, but unknown.
   unknown,
 };
@@ -56,7 +56,7 @@ struct TraversabilityCell {
 
   /// Whether the cell is lethal for what is in it, not for what is near it.
   [[nodiscard]] bool is_lethal_itself() const {
-    return state == CellState::lethal && reason != BlockReason::inflation;
+    return state == CellState::lethal && reason != BlockReason::inscribed;
   }
   friend bool operator==(const TraversabilityCell&, const TraversabilityCell&) = default;
 };
@@ -83,12 +83,12 @@ struct TraversabilityTile {
 
 /// What one cell is in itself, without its neighbours: its clearance is 0 when it is lethal, else
 /// the limit.
-[[nodiscard]] TraversabilityCell judge(const SurfaceTile::View& surface,
-                                       const RobotProfile& profile);
+[[nodiscard]] TraversabilityCell classify_cell(const SurfaceTile::View& surface,
+                                               const RobotProfile& profile);
 
 /// The cells of the middle tile with the safety margin of the robot's footprint, which also comes
 /// from lethal cells of the tiles around it.
-[[nodiscard]] std::vector<TraversabilityCell> judge_tile(
+[[nodiscard]] std::vector<TraversabilityCell> classify_tile(
     const TileNeighbourhood<SurfaceTile>& surfaces, const RobotProfile& profile, double cell_m);
 
 }  // namespace stillmap

@@ -8,23 +8,23 @@
 namespace stillmap {
 
 /// One closed line; its last corner is joined to the first.
-using AreaRing = std::vector<Eigen::Vector2d>;
+using TraversableRing = std::vector<Eigen::Vector2d>;
 
 /// A piece of free area, map frame [m]: all inside `outer` and outside the holes.
-struct AreaPolygon {
+struct TraversablePolygon {
   /// Anticlockwise.
-  AreaRing outer;
+  TraversableRing outer;
   /// Clockwise.
-  std::vector<AreaRing> holes;
+  std::vector<TraversableRing> holes;
 };
 
 /// Outlines of what is free in a grid (values 0..98), the largest piece first. Lines run through
 /// the centres of the outermost free cells: nothing outside the free area is inside, and a strip
 /// one cell wide has no area. Pieces below `min_area_m2` are left out.
-[[nodiscard]] std::vector<AreaPolygon> free_outlines(const OccupancyGrid& grid,
-                                                     double min_area_m2 = 1.0);
+[[nodiscard]] std::vector<TraversablePolygon> free_outlines(const OccupancyGrid& grid,
+                                                            double min_area_m2 = 1.0);
 
 /// Area of a polygon without its holes [m^2].
-[[nodiscard]] double area_m2(const AreaPolygon& polygon);
+[[nodiscard]] double area_m2(const TraversablePolygon& polygon);
 
 }  // namespace stillmap

@@ -7,7 +7,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/file_stamp.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 namespace fs = std::filesystem;
@@ -26,7 +26,7 @@ std::vector<fs::path> files_with(const fs::path& folder, std::string_view ending
 }
 
 [[noreturn]] void refuse_mcap(const fs::path& file) {
-  throw DatasetError(file, "is MCAP, which is not read here: " + advice_to_convert());
+  throw DatasetError(file, "is MCAP, which is not read here: " + conversion_hint());
 }
 
 [[noreturn]] void refuse_ros_1(const fs::path& file) {
@@ -94,9 +94,9 @@ void Bag::open(const std::vector<fs::path>& files) {
     fs::path to_open = file;
     // The recorder packs a file once it is full: the last one may still be as it is.
     if (file.extension() == ".zstd") {
-      if (!unpacked_) unpacked_ = std::make_unique<TemporaryFolder>();
-      to_open = unpacked_->path() / file.stem();
-      unpack_file(file, to_open);
+      if (!decompressed_) decompressed_ = std::make_unique<TemporaryFolder>();
+      to_open = decompressed_->path() / file.stem();
+      decompress_file(file, to_open);
     }
     files_.emplace_back(to_open);
     names_.push_back(file);
@@ -127,7 +127,7 @@ std::vector<BagMessage> Bag::messages(const std::string& topic) const {
 
 std::vector<std::uint8_t> Bag::bytes(const BagMessage& message) const {
   std::vector<std::uint8_t> stored = files_.at(message.file).bytes(message.row);
-  return compression_ == BagCompression::of_messages ? unpacked(stored) : stored;
+  return compression_ == BagCompression::of_messages ? decompressed(stored) : stored;
 }
 
 std::vector<std::uint8_t> Bag::first_bytes(const BagMessage& message, int bytes) const {
@@ -135,4 +135,4 @@ std::vector<std::uint8_t> Bag::first_bytes(const BagMessage& message, int bytes)
   return files_.at(message.file).first_bytes(message.row, bytes);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

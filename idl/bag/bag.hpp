@@ -9,7 +9,7 @@
 #include "idl/bag/bag_file.hpp"
 #include "idl/bag/zstd_decompression.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Whether a path is meant as a bag: a .db3, .mcap or .bag file, or a folder with metadata.yaml or
 /// such a file.
@@ -44,10 +44,10 @@ class Bag {
 
   BagCompression compression_ = BagCompression::none;
   /// Of unpacked files; before what lies in it, so that it goes last.
-  std::unique_ptr<TemporaryFolder> unpacked_;
+  std::unique_ptr<TemporaryFolder> decompressed_;
   std::vector<BagFile> files_;
   std::vector<std::filesystem::path> names_;
   std::vector<BagTopic> topics_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -4,7 +4,7 @@
 
 #include "core/dataset/dataset_error.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 namespace fs = std::filesystem;
@@ -124,4 +124,4 @@ std::vector<std::uint8_t> BagFile::blob(const char* query_text, std::int64_t row
   });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

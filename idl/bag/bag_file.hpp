@@ -13,7 +13,7 @@ namespace SQLite {
 class Database;
 }
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// A message in a bag's file, without its bytes.
 struct BagMessage {
@@ -49,4 +49,4 @@ class BagFile {
   std::unique_ptr<SQLite::Database> database_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -6,7 +6,7 @@
 
 #include "core/dataset/dataset_error.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 namespace fs = std::filesystem;
@@ -21,7 +21,7 @@ BagCompression compression_of(const fs::path& file, const YAML::Node& bag) {
   }
   if (format != "zstd") {
     throw DatasetError(
-        file, "compression_format is '" + format + "'; only zstd is read: " + advice_to_convert());
+        file, "compression_format is '" + format + "'; only zstd is read: " + conversion_hint());
   }
   if (mode == "FILE" || mode == "file") return BagCompression::of_files;
   if (mode == "MESSAGE" || mode == "message") return BagCompression::of_messages;
@@ -34,7 +34,7 @@ BagMetadata metadata_of(const fs::path& file, const YAML::Node& document) {
   const auto storage = bag["storage_identifier"].as<std::string>("");
   if (storage != "sqlite3") {
     throw DatasetError(file, "storage_identifier is '" + storage +
-                                 "'; only sqlite3 is read: " + advice_to_convert());
+                                 "'; only sqlite3 is read: " + conversion_hint());
   }
   BagMetadata metadata;
   metadata.compression = compression_of(file, bag);
@@ -95,7 +95,7 @@ std::string to_yaml(const BagMetadata& metadata) {
 
 }  // namespace
 
-std::string advice_to_convert() {
+std::string conversion_hint() {
   return "with ROS 2, 'ros2 bag convert -i BAG -o out.yaml', where out.yaml says 'output_bags: "
          "[{uri: NEW_BAG, storage_id: sqlite3, all: true}]', makes one that is";
 }
@@ -122,4 +122,4 @@ void write_bag_metadata(const fs::path& file, const BagMetadata& metadata) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// A topic of a bag.
 struct BagTopic {
@@ -40,6 +40,6 @@ struct BagMetadata {
 void write_bag_metadata(const std::filesystem::path& file, const BagMetadata& metadata);
 
 /// How a bag in another format becomes one that can be read here.
-[[nodiscard]] std::string advice_to_convert();
+[[nodiscard]] std::string conversion_hint();
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

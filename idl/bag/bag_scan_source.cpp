@@ -6,7 +6,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "idl/bag/cdr_reader.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 namespace fs = std::filesystem;
@@ -24,7 +24,7 @@ std::string listed(const std::vector<BagTopic>& topics) {
 }
 
 bool has_scans(const BagTopic& topic) {
-  return topic.messages > 0 && scan_message(topic.type).has_value();
+  return topic.messages > 0 && scan_message_type(topic.type).has_value();
 }
 
 BagTopic only_topic(const fs::path& path, const std::vector<BagTopic>& topics) {
@@ -59,11 +59,11 @@ BagTopic named_topic(const fs::path& path, const std::vector<BagTopic>& topics,
 
 }  // namespace
 
-BagScans::BagScans(const fs::path& path, const std::string& topic)
+BagScanSource::BagScanSource(const fs::path& path, const std::string& topic)
     : bag_(path),
       topic_(topic.empty() ? only_topic(path, bag_.topics())
                            : named_topic(path, bag_.topics(), topic)),
-      kind_(*scan_message(topic_.type)),
+      kind_(*scan_message_type(topic_.type)),
       messages_(bag_.messages(topic_.name)) {
   if (topic_.serialization_format != "cdr") {
     throw DatasetError(path, "topic " + topic_.name + " is serialized as '" +
@@ -90,14 +90,14 @@ BagScans::BagScans(const fs::path& path, const std::string& topic)
   sensor_ = read_message(0).sensor;
 }
 
-fs::path BagScans::name(std::size_t i) const {
+fs::path BagScanSource::name(std::size_t i) const {
   return bag_.file_name(messages_.at(i).file) / fs::path(topic_.name).relative_path() /
          std::to_string(i);
 }
 
-ScanOfMessage BagScans::read_message(std::size_t i) const {
+DecodedScan BagScanSource::read_message(std::size_t i) const {
   try {
-    return scan_of_message(kind_, bag_.bytes(messages_.at(i)));
+    return decode_scan(kind_, bag_.bytes(messages_.at(i)));
   } catch (const CdrError& fault) {
     throw DatasetError(name(i), "message " + std::to_string(messages_[i].row) + " of " +
                                     topic_.name + " (" + topic_.type +
@@ -105,18 +105,18 @@ ScanOfMessage BagScans::read_message(std::size_t i) const {
   }
 }
 
-DatasetFrame BagScans::read(std::size_t i) const {
+DatasetFrame BagScanSource::read(std::size_t i) const {
   DatasetFrame frame = read_message(i).frame;
   frame.scan.stamp_ns = stamp_ns(i);
   return frame;
 }
 
-ScanDataset open_recording(const fs::path& path, const std::string& topic) {
-  if (is_bag(path)) return ScanDataset(std::make_shared<const BagScans>(path, topic));
+ScanDataset open_sequence(const fs::path& path, const std::string& topic) {
+  if (is_bag(path)) return ScanDataset(std::make_shared<const BagScanSource>(path, topic));
   if (!topic.empty()) {
     throw DatasetError(path, "is no bag, and only bags have topics: leave --topic-in out");
   }
   return ScanDataset(path);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -9,15 +9,15 @@
 #include "idl/bag/bag.hpp"
 #include "idl/bag/scan_messages.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// The scans of one topic of a bag: PointCloud2, or the packets of a Velodyne, or Livox's own
 /// points. Stamps are those of the messages' headers; where they have none, the times of reception.
-class BagScans final : public ScanSource {
+class BagScanSource final : public ScanSource {
  public:
   /// `topic` may be empty when the bag has only one topic of scans, and go without its slash.
   /// Throws DatasetError, which lists the topics.
-  BagScans(const std::filesystem::path& path, const std::string& topic);
+  BagScanSource(const std::filesystem::path& path, const std::string& topic);
 
   [[nodiscard]] const BagTopic& topic() const { return topic_; }
   [[nodiscard]] std::size_t size() const override { return messages_.size(); }
@@ -27,11 +27,11 @@ class BagScans final : public ScanSource {
   [[nodiscard]] std::optional<SensorModel> sensor() const override { return sensor_; }
 
  private:
-  [[nodiscard]] ScanOfMessage read_message(std::size_t i) const;
+  [[nodiscard]] DecodedScan read_message(std::size_t i) const;
 
   Bag bag_;
   BagTopic topic_;
-  ScanMessage kind_;
+  ScanMessageType kind_;
   std::vector<BagMessage> messages_;
   std::vector<std::int64_t> stamps_ns_;
   std::optional<SensorModel> sensor_;
@@ -39,7 +39,7 @@ class BagScans final : public ScanSource {
 
 /// A recording of whatever kind: a bag, or what ScanDataset reads. `topic` is for bags alone.
 /// Throws DatasetError.
-[[nodiscard]] ScanDataset open_recording(const std::filesystem::path& path,
-                                         const std::string& topic = {});
+[[nodiscard]] ScanDataset open_sequence(const std::filesystem::path& path,
+                                        const std::string& topic = {});
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -8,7 +8,7 @@
 
 #include "core/dataset/dataset_error.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 namespace fs = std::filesystem;
@@ -149,4 +149,4 @@ std::string offered_qos_yaml(bool reliable, bool transient_local, int depth) {
          "\n  avoid_ros_namespace_conventions: false";
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

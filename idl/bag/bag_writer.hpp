@@ -10,7 +10,7 @@
 
 #include "idl/bag/bag_metadata.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Writes a rosbag2 as ROS 2 Humble does: a folder with metadata.yaml and one .db3 file. What was
 /// committed survives the end of the process at any moment, in SQLite's write-ahead log, and is
@@ -51,4 +51,4 @@ class BagWriter {
 /// offers the same.
 [[nodiscard]] std::string offered_qos_yaml(bool reliable, bool transient_local, int depth);
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -1,6 +1,6 @@
 #include "idl/bag/cdr_reader.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 constexpr std::size_t encapsulation_bytes = 4;
@@ -34,10 +34,10 @@ std::span<const std::uint8_t> CdrReader::take(std::size_t bytes) {
   return taken;
 }
 
-std::size_t CdrReader::count(std::size_t fewest_bytes_each) {
+std::size_t CdrReader::count(std::size_t min_bytes_each) {
   const std::size_t elements = value<std::uint32_t>();
   const std::size_t left = at_ < body_.size() ? body_.size() - at_ : 0;
-  if (elements > left / fewest_bytes_each) {
+  if (elements > left / min_bytes_each) {
     throw CdrError("it is cut off: " + std::to_string(elements) +
                    " elements are announced at byte " + std::to_string(at_) + ", and " +
                    std::to_string(left) + " bytes are left");
@@ -55,4 +55,4 @@ std::string CdrReader::text() {
 
 std::span<const std::uint8_t> CdrReader::octets() { return take(count(1)); }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

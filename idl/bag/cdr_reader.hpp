@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <string>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Bytes that are not the message they are said to be.
 class CdrError : public std::runtime_error {
@@ -31,7 +31,7 @@ class CdrReader {
   }
   [[nodiscard]] std::string text();
   /// A sequence's length, checked to have room for elements of at least so many bytes.
-  [[nodiscard]] std::size_t count(std::size_t fewest_bytes_each);
+  [[nodiscard]] std::size_t count(std::size_t min_bytes_each);
   /// A sequence of octets, in place.
   [[nodiscard]] std::span<const std::uint8_t> octets();
   /// An array of octets, in place.
@@ -55,4 +55,4 @@ class CdrReader {
   bool swap_bytes_ = false;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -9,7 +9,7 @@
 #include "idl/conversions/cloud_to_scan.hpp"
 #include "sensor_msgs.h"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 constexpr std::int64_t ns_per_s = 1'000'000'000;
@@ -62,11 +62,11 @@ bool has_semantic_kitti_labels(const sensor_msgs::msg::PointCloud2& cloud) {
   return false;
 }
 
-ScanOfMessage from_cloud(CdrReader cdr) {
+DecodedScan from_cloud(CdrReader cdr) {
   const sensor_msgs::msg::PointCloud2 cloud = read_cloud(cdr);
   auto [scan, fault, understood] = wire::to_scan(cloud, {});
   if (!scan) throw CdrError(fault.reason);
-  ScanOfMessage read{.frame = {.scan = *std::move(scan), .raw_labels = {}}, .sensor = {}};
+  DecodedScan read{.frame = {.scan = *std::move(scan), .raw_labels = {}}, .sensor = {}};
   if (has_semantic_kitti_labels(cloud)) {
     for (const SemanticClass label : read.frame.scan.labels) {
       read.frame.raw_labels.push_back(semantic_kitti_id(label));
@@ -75,7 +75,7 @@ ScanOfMessage from_cloud(CdrReader cdr) {
   return read;
 }
 
-ScanOfMessage from_velodyne_packets(CdrReader cdr) {
+DecodedScan from_velodyne_packets(CdrReader cdr) {
   const std::int64_t stamp_ns = read_stamp_ns(cdr);
   (void)cdr.text();
   std::vector<VelodynePacket> packets(cdr.count(stamp_bytes + velodyne_packet_bytes));
@@ -93,8 +93,8 @@ ScanOfMessage from_velodyne_packets(CdrReader cdr) {
           .sensor = std::move(decoding.sensor)};
 }
 
-ScanOfMessage from_livox(CdrReader cdr) {
-  ScanOfMessage read;
+DecodedScan from_livox(CdrReader cdr) {
+  DecodedScan read;
   Scan& scan = read.frame.scan;
   scan.stamp_ns = read_stamp_ns(cdr);
   (void)cdr.text();
@@ -116,24 +116,24 @@ ScanOfMessage from_livox(CdrReader cdr) {
 
 }  // namespace
 
-std::optional<ScanMessage> scan_message(std::string_view type) {
-  if (type == "sensor_msgs/msg/PointCloud2") return ScanMessage::point_cloud;
-  if (type == "velodyne_msgs/msg/VelodyneScan") return ScanMessage::velodyne_packets;
+std::optional<ScanMessageType> scan_message_type(std::string_view type) {
+  if (type == "sensor_msgs/msg/PointCloud2") return ScanMessageType::point_cloud;
+  if (type == "velodyne_msgs/msg/VelodyneScan") return ScanMessageType::velodyne_packets;
   if (type == "livox_ros_driver2/msg/CustomMsg" || type == "livox_interfaces/msg/CustomMsg" ||
       type == "livox_ros_driver/msg/CustomMsg") {
-    return ScanMessage::livox_points;
+    return ScanMessageType::livox_points;
   }
   return std::nullopt;
 }
 
-ScanOfMessage scan_of_message(ScanMessage kind, std::span<const std::uint8_t> message) {
+DecodedScan decode_scan(ScanMessageType kind, std::span<const std::uint8_t> message) {
   const CdrReader cdr(message);
   switch (kind) {
-    case ScanMessage::point_cloud:
+    case ScanMessageType::point_cloud:
       return from_cloud(cdr);
-    case ScanMessage::velodyne_packets:
+    case ScanMessageType::velodyne_packets:
       return from_velodyne_packets(cdr);
-    case ScanMessage::livox_points:
+    case ScanMessageType::livox_points:
       return from_livox(cdr);
   }
   throw CdrError("it is of a kind that is not known");
@@ -148,4 +148,4 @@ std::optional<std::int64_t> header_stamp_ns(std::span<const std::uint8_t> messag
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

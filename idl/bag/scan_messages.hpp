@@ -8,10 +8,10 @@
 #include "core/dataset/dataset_frame.hpp"
 #include "core/lidar/sensor_model.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// The messages of which scans can be made.
-enum class ScanMessage {
+enum class ScanMessageType {
   /// sensor_msgs/msg/PointCloud2.
   point_cloud,
   /// velodyne_msgs/msg/VelodyneScan: the packets of one revolution.
@@ -21,9 +21,9 @@ enum class ScanMessage {
 };
 
 /// By the ROS 2 name of its type; nothing for other types.
-[[nodiscard]] std::optional<ScanMessage> scan_message(std::string_view type);
+[[nodiscard]] std::optional<ScanMessageType> scan_message_type(std::string_view type);
 
-struct ScanOfMessage {
+struct DecodedScan {
   /// Intensity in the sensor's own numbers.
   DatasetFrame frame;
   /// Where the message says which it was.
@@ -32,11 +32,10 @@ struct ScanOfMessage {
 
 /// Makes a scan of a serialized message. Throws CdrError in words for bytes that are not such a
 /// message, or give no scan.
-[[nodiscard]] ScanOfMessage scan_of_message(ScanMessage kind,
-                                            std::span<const std::uint8_t> message);
+[[nodiscard]] DecodedScan decode_scan(ScanMessageType kind, std::span<const std::uint8_t> message);
 
 /// The stamp of a message that begins with a std_msgs/Header; 12 bytes are enough. Nothing when
 /// there is none.
 [[nodiscard]] std::optional<std::int64_t> header_stamp_ns(std::span<const std::uint8_t> message);
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -10,10 +10,10 @@
 #include "core/dataset/dataset_error.hpp"
 #include "idl/bag/cdr_reader.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
-constexpr std::size_t most_message_bytes = std::size_t{1} << 30U;
+constexpr std::size_t max_message_bytes = std::size_t{1} << 30U;
 
 struct FreeStream {
   void operator()(ZSTD_DStream* stream) const { ZSTD_freeDStream(stream); }
@@ -21,12 +21,12 @@ struct FreeStream {
 
 }  // namespace
 
-std::vector<std::uint8_t> unpacked(std::span<const std::uint8_t> frame) {
+std::vector<std::uint8_t> decompressed(std::span<const std::uint8_t> frame) {
   const auto size = ZSTD_getFrameContentSize(frame.data(), frame.size());
   if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN) {
     throw CdrError("it is no zstd frame with its size, as the bag's compression mode says");
   }
-  if (size > most_message_bytes) {
+  if (size > max_message_bytes) {
     throw CdrError("it says that it unpacks to " + std::to_string(size) + " bytes");
   }
   std::vector<std::uint8_t> content(static_cast<std::size_t>(size));
@@ -38,7 +38,7 @@ std::vector<std::uint8_t> unpacked(std::span<const std::uint8_t> frame) {
   return content;
 }
 
-void unpack_file(const std::filesystem::path& from, const std::filesystem::path& to) {
+void decompress_file(const std::filesystem::path& from, const std::filesystem::path& to) {
   std::ifstream in(from, std::ios::binary);
   std::ofstream out(to, std::ios::binary | std::ios::trunc);
   if (!in) throw DatasetError(from, "cannot be read; check the path and its permissions");
@@ -74,4 +74,4 @@ TemporaryFolder::~TemporaryFolder() {
   std::filesystem::remove_all(path_, ignored);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -5,15 +5,15 @@
 #include <span>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// What is in one zstd frame. Throws CdrError for bytes that are no whole frame, or hold more than
 /// a message can (1 GiB).
-[[nodiscard]] std::vector<std::uint8_t> unpacked(std::span<const std::uint8_t> frame);
+[[nodiscard]] std::vector<std::uint8_t> decompressed(std::span<const std::uint8_t> frame);
 
 /// Unpacks a file, piece by piece. Throws DatasetError for a damaged file, or when `to` cannot be
 /// written.
-void unpack_file(const std::filesystem::path& from, const std::filesystem::path& to);
+void decompress_file(const std::filesystem::path& from, const std::filesystem::path& to);
 
 /// A folder of its own that goes away with this.
 class TemporaryFolder {
@@ -30,4 +30,4 @@ class TemporaryFolder {
   std::filesystem::path path_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

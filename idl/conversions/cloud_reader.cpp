@@ -4,20 +4,20 @@
 
 namespace stillmap::wire {
 
-CloudReader::CloudReader(const CloudReading& reading)
-    : reading_(reading), intensity_scale_(reading.intensity_scale) {
+CloudReader::CloudReader(const CloudReadOptions& options)
+    : options_(options), intensity_scale_(options.intensity_scale) {
   // The scale is applied here.
-  reading_.intensity_scale = 1.0F;
+  options_.intensity_scale = 1.0F;
 }
 
 CloudReader::Result CloudReader::read(const sensor_msgs::msg::PointCloud2& cloud) {
-  Result result{.from_cloud = to_scan(cloud, reading_), .news = {}};
+  Result result{.from_cloud = to_scan(cloud, options_), .format_change = {}};
   if (!result.from_cloud.scan) return result;
   const std::string corrected = intensity_scale_.apply(result.from_cloud.scan->intensity);
-  const std::string& understood = result.from_cloud.understood;
-  if (understood != understood_) result.news = understood_ = understood;
+  const std::string& format = result.from_cloud.format;
+  if (format != format_) result.format_change = format_ = format;
   if (!corrected.empty()) {
-    result.news.append(result.news.empty() ? "" : "; ").append(corrected);
+    result.format_change.append(result.format_change.empty() ? "" : "; ").append(corrected);
   }
   return result;
 }

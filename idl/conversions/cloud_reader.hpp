@@ -11,20 +11,20 @@ namespace stillmap::wire {
 /// description of the sensor does not fit. One thread uses it.
 class CloudReader {
  public:
-  explicit CloudReader(const CloudReading& reading);
+  explicit CloudReader(const CloudReadOptions& options);
 
   struct Result {
     ScanFromCloud from_cloud;
-    /// How clouds are understood from this one on, when that is news; else empty.
-    std::string news;
+    /// How clouds are understood from this one on, when that changed; else empty.
+    std::string format_change;
   };
   /// Intensity comes as 0..1. Any input is fine.
   [[nodiscard]] Result read(const sensor_msgs::msg::PointCloud2& cloud);
 
  private:
-  CloudReading reading_;
+  CloudReadOptions options_;
   IntensityScale intensity_scale_;
-  std::string understood_;
+  std::string format_;
 };
 
 }  // namespace stillmap::wire

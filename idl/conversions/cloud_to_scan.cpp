@@ -62,7 +62,7 @@ std::vector<std::uint16_t> read_ring(const PointCloud2& cloud, const CloudLayout
 }
 
 TimeType time_type(FieldType type) {
-  if (is_integer(type)) return TimeType::whole;
+  if (is_integer(type)) return TimeType::integer;
   return type == FieldType::float32 ? TimeType::float32 : TimeType::float64;
 }
 
@@ -110,27 +110,27 @@ std::string describe(const CloudLayout& layout, const PointTimes& times) {
 
 }  // namespace
 
-ScanFromCloud to_scan(const PointCloud2& cloud, const CloudReading& reading) {
+ScanFromCloud to_scan(const PointCloud2& cloud, const CloudReadOptions& options) {
   const auto stamp = stamp_ns(cloud.header().stamp());
   if (!stamp) {
     return {.scan = std::nullopt,
             .fault = {"bad_stamp", "header.stamp.nanosec is " +
                                        std::to_string(cloud.header().stamp().nanosec()) +
                                        ", a second or more"},
-            .understood = {}};
+            .format = {}};
   }
-  const auto [layout, fault] = check_layout(cloud, reading.fields);
-  if (!layout) return {.scan = std::nullopt, .fault = fault, .understood = {}};
+  const auto [layout, fault] = check_layout(cloud, options.fields);
+  if (!layout) return {.scan = std::nullopt, .fault = fault, .format = {}};
   PointTimes times = read_time(cloud, *layout, *stamp);
-  std::string understood = describe(*layout, times);
+  std::string format = describe(*layout, times);
   return {.scan = Scan{.stamp_ns = *stamp,
                        .points_lidar = read_points(cloud, *layout),
-                       .intensity = read_intensity(cloud, *layout, reading.intensity_scale),
+                       .intensity = read_intensity(cloud, *layout, options.intensity_scale),
                        .time_offset_s = std::move(times.offsets_s),
                        .ring = read_ring(cloud, *layout),
-                       .labels = read_labels(cloud, *layout, reading.labels_are_classes)},
+                       .labels = read_labels(cloud, *layout, options.labels_are_classes)},
           .fault = {},
-          .understood = std::move(understood)};
+          .format = std::move(format)};
 }
 
 }  // namespace stillmap::wire

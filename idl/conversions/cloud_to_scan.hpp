@@ -9,7 +9,7 @@
 namespace stillmap::wire {
 
 /// How the fields of incoming clouds are to be understood.
-struct CloudReading {
+struct CloudReadOptions {
   PointFieldCandidates fields;
   /// Brings the sensor's intensity to 0..1.
   float intensity_scale = 1.0F;
@@ -24,12 +24,12 @@ struct ScanFromCloud {
   CloudFault fault;
   /// How the cloud was understood, for people: "intensity from reflectivity (uint16), time from t
   /// (uint32: ns from the stamp), ring from ring (uint8)".
-  std::string understood;
+  std::string format;
 };
 
 /// Reads a cloud of any field types and byte order; any input is fine. Points that are not finite
 /// stay in. Times of any unit, relative or absolute: see point_times().
 [[nodiscard]] ScanFromCloud to_scan(const sensor_msgs::msg::PointCloud2& cloud,
-                                    const CloudReading& reading);
+                                    const CloudReadOptions& options);
 
 }  // namespace stillmap::wire

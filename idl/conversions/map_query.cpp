@@ -84,14 +84,14 @@ stillmap_msgs::msg::ReplyStatus to_reply_status(ReplyCode code, const std::strin
 }
 
 std::optional<std::string> version_fault(std::uint8_t format_version) {
-  if (format_version == wire_format_version) return std::nullopt;
+  if (format_version == dds::wire_format_version) return std::nullopt;
   return "format_version is " + std::to_string(format_version) + "; this server speaks " +
-         std::to_string(wire_format_version);
+         std::to_string(dds::wire_format_version);
 }
 
 GetStaticMap_Request to_request(const MapQuery& query) {
   GetStaticMap_Request request;
-  request.format_version(wire_format_version);
+  request.format_version(dds::wire_format_version);
   request.region(to_wire(query.region));
   request.classes(numbers_of(query.classes));
   request.motions(numbers_of(query.motions));

@@ -7,7 +7,8 @@
 namespace stillmap::wire {
 namespace {
 
-std::vector<const Voxel*> voxels_in(const MapView& view, const Eigen::AlignedBox2f& window_map) {
+std::vector<const Voxel*> voxels_in(const MapSnapshot& view,
+                                    const Eigen::AlignedBox2f& window_map) {
   std::vector<const Voxel*> inside;
   for (const auto& tile : view.tiles) {
     const auto& bounds = tile->info.bounds_map;
@@ -22,27 +23,28 @@ std::vector<const Voxel*> voxels_in(const MapView& view, const Eigen::AlignedBox
 
 }  // namespace
 
-sensor_msgs::msg::PointCloud2 to_cloud(const MapView& view, const Eigen::AlignedBox2f& window_map,
-                                       std::int64_t stamp_ns, const std::string& map_frame) {
+sensor_msgs::msg::PointCloud2 to_cloud(const MapSnapshot& view,
+                                       const Eigen::AlignedBox2f& window_map, std::int64_t stamp_ns,
+                                       const std::string& map_frame) {
   const auto voxels = voxels_in(view, window_map);
-  CloudColumns columns(stamp_ns, map_frame);
-  const auto x = columns.add_field("x", FieldType::float32);
-  const auto y = columns.add_field("y", FieldType::float32);
-  const auto z = columns.add_field("z", FieldType::float32);
-  const auto rgb = columns.add_field("rgb", FieldType::float32);
-  const auto confidence = columns.add_field("confidence", FieldType::float32);
-  const auto label = columns.add_field("label", FieldType::uint8);
-  columns.resize(voxels.size());
-  columns.fill(x, [&](std::size_t i) { return voxels[i]->mean_map.x(); });
-  columns.fill(y, [&](std::size_t i) { return voxels[i]->mean_map.y(); });
-  columns.fill(z, [&](std::size_t i) { return voxels[i]->mean_map.z(); });
-  columns.fill(rgb, [&](std::size_t i) { return packed_colour(voxels[i]->evidence.winner()); });
-  columns.fill(confidence, [&](std::size_t i) { return voxels[i]->evidence.share(); });
-  columns.fill(label, [&](std::size_t i) {
+  PointCloud2Builder builder(stamp_ns, map_frame);
+  const auto x = builder.add_field("x", FieldType::float32);
+  const auto y = builder.add_field("y", FieldType::float32);
+  const auto z = builder.add_field("z", FieldType::float32);
+  const auto rgb = builder.add_field("rgb", FieldType::float32);
+  const auto confidence = builder.add_field("confidence", FieldType::float32);
+  const auto label = builder.add_field("label", FieldType::uint8);
+  builder.resize(voxels.size());
+  builder.fill(x, [&](std::size_t i) { return voxels[i]->mean_map.x(); });
+  builder.fill(y, [&](std::size_t i) { return voxels[i]->mean_map.y(); });
+  builder.fill(z, [&](std::size_t i) { return voxels[i]->mean_map.z(); });
+  builder.fill(rgb, [&](std::size_t i) { return packed_colour(voxels[i]->evidence.winner()); });
+  builder.fill(confidence, [&](std::size_t i) { return voxels[i]->evidence.share(); });
+  builder.fill(label, [&](std::size_t i) {
     return static_cast<std::uint8_t>(voxels[i]->evidence.winner());
   });
-  columns.set_dense();
-  return columns.take();
+  builder.set_dense();
+  return builder.take();
 }
 
 }  // namespace stillmap::wire

@@ -35,7 +35,7 @@ stillmap_msgs::msg::OccupancyRay to_wire(const RayQuery& ray) {
   message.origin(to_wire(ray.origin_map));
   message.direction(to_wire(ray.direction_map));
   message.max_range_m(ray.max_range_m);
-  message.passes_unknown(ray.passes_unknown);
+  message.passes_unknown(ray.ignore_unknown);
   return message;
 }
 
@@ -43,7 +43,7 @@ RayQuery from_wire(const stillmap_msgs::msg::OccupancyRay& message) {
   return {.origin_map = from_wire(message.origin()),
           .direction_map = from_wire(message.direction()),
           .max_range_m = message.max_range_m(),
-          .passes_unknown = message.passes_unknown()};
+          .ignore_unknown = message.passes_unknown()};
 }
 
 stillmap_msgs::msg::OccupancyAtPoint to_wire(const PointOccupancy& point) {
@@ -107,7 +107,7 @@ bool makes_sense(const QueryOccupancy_Response& response) {
 
 QueryOccupancy_Request to_request(const OccupancyQuery& query) {
   QueryOccupancy_Request request;
-  request.format_version(wire_format_version);
+  request.format_version(dds::wire_format_version);
   for (const auto& p_map : query.points_map) request.points().push_back(to_wire(p_map));
   for (const auto& box_map : query.boxes_map) request.boxes().push_back(to_wire(box_map));
   for (const RayQuery& ray : query.rays) request.rays().push_back(to_wire(ray));

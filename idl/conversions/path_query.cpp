@@ -13,7 +13,7 @@ using stillmap_msgs::srv::NearestTraversable_Response;
 
 CheckPath_Request to_request(const PathQuery& query) {
   CheckPath_Request request;
-  request.format_version(wire_format_version);
+  request.format_version(dds::wire_format_version);
   request.profile(query.profile);
   request.x().reserve(query.positions_map.size());
   request.y().reserve(query.positions_map.size());
@@ -55,14 +55,14 @@ CheckPath_Response to_response(const PathCheck& check, std::uint64_t map_id) {
   response.conflict_x(conflict.pose.position_map.x());
   response.conflict_y(conflict.pose.position_map.y());
   response.conflict_heading_rad(conflict.pose.heading_rad);
-  response.place_x(conflict.place_map.x());
-  response.place_y(conflict.place_map.y());
+  response.place_x(conflict.cell_centre_map.x());
+  response.place_y(conflict.cell_centre_map.y());
   response.conflict_reason(static_cast<std::uint8_t>(conflict.reason));
   return response;
 }
 
 std::optional<PathCheck> from_response(const CheckPath_Response& response) {
-  const auto status = area_status(response.status());
+  const auto status = traversability_status(response.status());
   const auto reason = block_reason(response.conflict_reason());
   if (!status || !reason) return std::nullopt;
   PathCheck check;
@@ -73,12 +73,12 @@ std::optional<PathCheck> from_response(const CheckPath_Response& response) {
   check.clearance_m = response.clearance_m();
   check.checked_m = response.checked_m();
   check.inferred_m = response.inferred_m();
-  if (check.is_free || check.status != AreaStatus::ok) return check;
+  if (check.is_free || check.status != TraversabilityStatus::ok) return check;
   check.conflict = {.segment = response.conflict_segment(),
                     .along_m = response.conflict_along_m(),
                     .pose = {.position_map = {response.conflict_x(), response.conflict_y()},
                              .heading_rad = response.conflict_heading_rad()},
-                    .place_map = {response.place_x(), response.place_y()},
+                    .cell_centre_map = {response.place_x(), response.place_y()},
                     .reason = *reason};
   return check;
 }
@@ -97,13 +97,13 @@ NearestTraversable_Response to_response(const NearestTraversable& nearest, std::
 }
 
 std::optional<NearestTraversable> from_response(const NearestTraversable_Response& response) {
-  const auto status = area_status(response.status());
+  const auto status = traversability_status(response.status());
   if (!status) return std::nullopt;
   NearestTraversable nearest;
   nearest.status = *status;
   nearest.reason = response.status().reason();
   nearest.map_version = response.status().map_version();
-  if (nearest.status != AreaStatus::ok) return nearest;
+  if (nearest.status != TraversabilityStatus::ok) return nearest;
   nearest.position_map = {response.x(), response.y()};
   nearest.height_m = response.ground_z();
   nearest.distance_m = response.distance_m();

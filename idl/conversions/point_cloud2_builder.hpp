@@ -21,9 +21,9 @@ namespace stillmap::wire {
 }
 
 /// Builds an unordered cloud: declare the fields, give it its size, fill column by column.
-class CloudColumns {
+class PointCloud2Builder {
  public:
-  CloudColumns(std::int64_t stamp_ns, const std::string& frame) {
+  PointCloud2Builder(std::int64_t stamp_ns, const std::string& frame) {
     cloud_.header(to_header(stamp_ns, frame));
   }
 

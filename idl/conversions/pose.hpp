@@ -4,8 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "core/lidar/trajectory.hpp"
 #include "core/odometry/odometry_state.hpp"
-#include "core/odometry/trajectory.hpp"
 #include "nav_msgs.h"
 #include "tf2_msgs.h"
 

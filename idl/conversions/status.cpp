@@ -6,13 +6,13 @@
 namespace stillmap::wire {
 namespace {
 
-void add_lists(const ServerStatus& status, stillmap_msgs::msg::Status& message) {
-  for (const NamedCounter& counter : status.counters) {
+void add_lists(const dds::ServerStatus& status, stillmap_msgs::msg::Status& message) {
+  for (const dds::NamedCounter& counter : status.counters) {
     auto& out = message.counters().emplace_back();
     out.name(counter.name);
     out.value(counter.value);
   }
-  for (const StageLatency& latency : status.latencies) {
+  for (const dds::StageLatency& latency : status.latencies) {
     auto& out = message.latencies().emplace_back();
     out.stage(latency.stage);
     out.p50_ms(latency.p50_ms);
@@ -22,27 +22,29 @@ void add_lists(const ServerStatus& status, stillmap_msgs::msg::Status& message) 
   }
 }
 
-void add_findings(const ServerStatus& status, stillmap_msgs::msg::Status& message) {
-  for (const Finding& finding : status.findings) {
+void add_diagnostics(const dds::ServerStatus& status, stillmap_msgs::msg::Status& message) {
+  for (const dds::Diagnostic& diagnostic : status.diagnostics) {
     auto& out = message.findings().emplace_back();
-    out.severity(static_cast<std::uint8_t>(finding.severity));
-    out.what(finding.what);
-    out.evidence(finding.evidence);
-    out.way_out(finding.way_out);
+    out.severity(static_cast<std::uint8_t>(diagnostic.severity));
+    out.what(diagnostic.what);
+    out.evidence(diagnostic.evidence);
+    out.way_out(diagnostic.hint);
   }
 }
 
-void add_findings(const stillmap_msgs::msg::Status& message, ServerStatus& status) {
-  for (const auto& finding : message.findings()) {
-    const bool is_advice = finding.severity() == static_cast<std::uint8_t>(Severity::advice);
-    status.findings.push_back({.severity = is_advice ? Severity::advice : Severity::problem,
-                               .what = finding.what(),
-                               .evidence = finding.evidence(),
-                               .way_out = finding.way_out()});
+void add_diagnostics(const stillmap_msgs::msg::Status& message, dds::ServerStatus& status) {
+  for (const auto& diagnostic : message.findings()) {
+    const bool is_advice =
+        diagnostic.severity() == static_cast<std::uint8_t>(dds::Severity::advice);
+    status.diagnostics.push_back(
+        {.severity = is_advice ? dds::Severity::advice : dds::Severity::problem,
+         .what = diagnostic.what(),
+         .evidence = diagnostic.evidence(),
+         .hint = diagnostic.way_out()});
   }
 }
 
-void add_lists(const stillmap_msgs::msg::Status& message, ServerStatus& status) {
+void add_lists(const stillmap_msgs::msg::Status& message, dds::ServerStatus& status) {
   for (const auto& counter : message.counters()) {
     status.counters.push_back({.name = counter.name(), .value = counter.value()});
   }
@@ -55,31 +57,32 @@ void add_lists(const stillmap_msgs::msg::Status& message, ServerStatus& status) 
   }
 }
 
-void to_wire(const SegmentationStatus& status, stillmap_msgs::msg::SegmentationStatus& message) {
+void to_wire(const dds::SegmentationStatus& status,
+             stillmap_msgs::msg::SegmentationStatus& message) {
   message.every(status.every);
   message.network_ms(status.network_ms);
   message.image_columns(status.image_columns);
   message.full_columns(status.full_columns);
   message.fresh_share(status.fresh_share);
-  message.carried_share(status.carried_share);
+  message.carried_share(status.propagated_share);
   message.unlabelled_share(status.unlabelled_share);
 }
 
-SegmentationStatus from_wire(const stillmap_msgs::msg::SegmentationStatus& message) {
+dds::SegmentationStatus from_wire(const stillmap_msgs::msg::SegmentationStatus& message) {
   return {.every = message.every(),
           .network_ms = message.network_ms(),
           .image_columns = message.image_columns(),
           .full_columns = message.full_columns(),
           .fresh_share = message.fresh_share(),
-          .carried_share = message.carried_share(),
+          .propagated_share = message.carried_share(),
           .unlabelled_share = message.unlabelled_share()};
 }
 
 }  // namespace
 
-stillmap_msgs::msg::Status to_wire(const ServerStatus& status) {
+stillmap_msgs::msg::Status to_wire(const dds::ServerStatus& status) {
   stillmap_msgs::msg::Status message;
-  message.format_version(wire_format_version);
+  message.format_version(dds::wire_format_version);
   message.stamp(to_stamp(status.stamp_ns));
   message.software_version(status.software_version);
   message.uptime_s(status.uptime_s);
@@ -100,41 +103,41 @@ stillmap_msgs::msg::Status to_wire(const ServerStatus& status) {
   message.scan_frame(status.scan_frame);
   message.scan_delay_s(status.scan_delay_s);
   add_lists(status, message);
-  add_findings(status, message);
+  add_diagnostics(status, message);
   return message;
 }
 
-std::optional<ServerStatus> from_wire(const stillmap_msgs::msg::Status& message) {
+std::optional<dds::ServerStatus> from_wire(const stillmap_msgs::msg::Status& message) {
   const auto stamp = stamp_ns(message.stamp());
-  if (message.format_version() != wire_format_version || !stamp ||
-      message.delivery() > static_cast<std::uint8_t>(DeliveryMode::every) ||
+  if (message.format_version() != dds::wire_format_version || !stamp ||
+      message.delivery() > static_cast<std::uint8_t>(dds::DeliveryMode::every) ||
       message.health() > static_cast<std::uint8_t>(OdometryHealth::lost)) {
     return std::nullopt;
   }
-  ServerStatus status{.stamp_ns = *stamp,
-                      .software_version = message.software_version(),
-                      .uptime_s = message.uptime_s(),
-                      .delivery = static_cast<DeliveryMode>(message.delivery()),
-                      .label_source = message.label_source(),
-                      .health = static_cast<OdometryHealth>(message.health()),
-                      .reason = message.reason(),
-                      .received_hz = message.received_hz(),
-                      .mapped_hz = message.mapped_hz(),
-                      .map_version = message.map_version(),
-                      .map_id = message.map_id(),
-                      .tile_count = message.tile_count(),
-                      .voxel_count = message.voxel_count(),
-                      .segmentation = from_wire(message.segmentation()),
-                      .counters = {},
-                      .latencies = {},
-                      .host = message.host(),
-                      .sensor = message.sensor(),
-                      .points_topic = message.points_topic(),
-                      .scan_frame = message.scan_frame(),
-                      .scan_delay_s = message.scan_delay_s(),
-                      .findings = {}};
+  dds::ServerStatus status{.stamp_ns = *stamp,
+                           .software_version = message.software_version(),
+                           .uptime_s = message.uptime_s(),
+                           .delivery = static_cast<dds::DeliveryMode>(message.delivery()),
+                           .label_source = message.label_source(),
+                           .health = static_cast<OdometryHealth>(message.health()),
+                           .reason = message.reason(),
+                           .received_hz = message.received_hz(),
+                           .mapped_hz = message.mapped_hz(),
+                           .map_version = message.map_version(),
+                           .map_id = message.map_id(),
+                           .tile_count = message.tile_count(),
+                           .voxel_count = message.voxel_count(),
+                           .segmentation = from_wire(message.segmentation()),
+                           .counters = {},
+                           .latencies = {},
+                           .host = message.host(),
+                           .sensor = message.sensor(),
+                           .points_topic = message.points_topic(),
+                           .scan_frame = message.scan_frame(),
+                           .scan_delay_s = message.scan_delay_s(),
+                           .diagnostics = {}};
   add_lists(message, status);
-  add_findings(message, status);
+  add_diagnostics(message, status);
   return status;
 }
 

@@ -7,9 +7,9 @@
 
 namespace stillmap::wire {
 
-[[nodiscard]] stillmap_msgs::msg::Status to_wire(const ServerStatus& status);
+[[nodiscard]] stillmap_msgs::msg::Status to_wire(const dds::ServerStatus& status);
 
 /// Nothing for a format version that is not ours, or numbers that stand for nothing.
-[[nodiscard]] std::optional<ServerStatus> from_wire(const stillmap_msgs::msg::Status& message);
+[[nodiscard]] std::optional<dds::ServerStatus> from_wire(const stillmap_msgs::msg::Status& message);
 
 }  // namespace stillmap::wire

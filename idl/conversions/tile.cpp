@@ -56,14 +56,14 @@ Voxel voxel_at(const stillmap_msgs::msg::MapTile& message, std::size_t i) {
 
 }  // namespace
 
-MapIdentity identity_of(const MapView& view) {
+dds::MapIdentity identity_of(const MapSnapshot& view) {
   return {.version = view.version,
           .map_id = view.map_id,
           .tile_size_m = view.tile_size_m,
           .voxel_size_m = view.voxel_size_m};
 }
 
-stillmap_msgs::msg::MapIdentity to_wire(const MapIdentity& identity) {
+stillmap_msgs::msg::MapIdentity to_wire(const dds::MapIdentity& identity) {
   stillmap_msgs::msg::MapIdentity message;
   message.map_id(identity.map_id);
   message.map_version(identity.version);
@@ -72,16 +72,16 @@ stillmap_msgs::msg::MapIdentity to_wire(const MapIdentity& identity) {
   return message;
 }
 
-MapIdentity from_wire(const stillmap_msgs::msg::MapIdentity& identity) {
+dds::MapIdentity from_wire(const stillmap_msgs::msg::MapIdentity& identity) {
   return {.version = identity.map_version(),
           .map_id = identity.map_id(),
           .tile_size_m = identity.tile_size_m(),
           .voxel_size_m = identity.voxel_size_m()};
 }
 
-stillmap_msgs::msg::TileInfo to_wire(const TileInfo& info, const MapIdentity& identity) {
+stillmap_msgs::msg::TileInfo to_wire(const TileInfo& info, const dds::MapIdentity& identity) {
   stillmap_msgs::msg::TileInfo message;
-  message.format_version(wire_format_version);
+  message.format_version(dds::wire_format_version);
   message.tile_x(info.id.x);
   message.tile_y(info.id.y);
   message.identity(to_wire(identity));
@@ -90,13 +90,13 @@ stillmap_msgs::msg::TileInfo to_wire(const TileInfo& info, const MapIdentity& id
 }
 
 std::optional<TileInfo> from_wire(const stillmap_msgs::msg::TileInfo& message) {
-  if (message.format_version() != wire_format_version) return std::nullopt;
+  if (message.format_version() != dds::wire_format_version) return std::nullopt;
   return from_state({message.tile_x(), message.tile_y()}, message.state());
 }
 
-stillmap_msgs::msg::MapTile to_wire(const Tile& tile, const MapIdentity& identity) {
+stillmap_msgs::msg::MapTile to_wire(const Tile& tile, const dds::MapIdentity& identity) {
   stillmap_msgs::msg::MapTile message;
-  message.format_version(wire_format_version);
+  message.format_version(dds::wire_format_version);
   message.tile_x(tile.info.id.x);
   message.tile_y(tile.info.id.y);
   message.identity(to_wire(identity));
@@ -112,7 +112,7 @@ stillmap_msgs::msg::MapTile to_wire(const Tile& tile, const MapIdentity& identit
 
 std::optional<Tile> from_wire(const stillmap_msgs::msg::MapTile& message) {
   const std::size_t count = message.voxels().x().size();
-  if (message.format_version() != wire_format_version || !consistent(message.voxels()) ||
+  if (message.format_version() != dds::wire_format_version || !consistent(message.voxels()) ||
       message.index_x().size() != count || message.index_y().size() != count ||
       message.index_z().size() != count) {
     return std::nullopt;

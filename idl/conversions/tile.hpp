@@ -9,16 +9,17 @@
 
 namespace stillmap::wire {
 
-[[nodiscard]] MapIdentity identity_of(const MapView& view);
-[[nodiscard]] stillmap_msgs::msg::MapIdentity to_wire(const MapIdentity& identity);
-[[nodiscard]] MapIdentity from_wire(const stillmap_msgs::msg::MapIdentity& identity);
+[[nodiscard]] dds::MapIdentity identity_of(const MapSnapshot& view);
+[[nodiscard]] stillmap_msgs::msg::MapIdentity to_wire(const dds::MapIdentity& identity);
+[[nodiscard]] dds::MapIdentity from_wire(const stillmap_msgs::msg::MapIdentity& identity);
 
 [[nodiscard]] stillmap_msgs::msg::TileInfo to_wire(const TileInfo& info,
-                                                   const MapIdentity& identity);
+                                                   const dds::MapIdentity& identity);
 /// Nothing for a format version that is not ours.
 [[nodiscard]] std::optional<TileInfo> from_wire(const stillmap_msgs::msg::TileInfo& message);
 
-[[nodiscard]] stillmap_msgs::msg::MapTile to_wire(const Tile& tile, const MapIdentity& identity);
+[[nodiscard]] stillmap_msgs::msg::MapTile to_wire(const Tile& tile,
+                                                  const dds::MapIdentity& identity);
 /// Of a voxel's evidence only the winner comes back, its weight being the confidence; times do not
 /// come back. Nothing for another format version, or arrays of different lengths.
 [[nodiscard]] std::optional<Tile> from_wire(const stillmap_msgs::msg::MapTile& message);

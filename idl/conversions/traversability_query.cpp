@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "idl/conversions/traversability_status.hpp"
 #include "idl/conversions/region.hpp"
+#include "idl/conversions/traversability_status.hpp"
 #include "idl/interface/topics.hpp"
 
 namespace stillmap::wire {
@@ -14,7 +14,7 @@ using stillmap_msgs::srv::GetTraversableArea_Response;
 
 namespace {
 
-stillmap_msgs::msg::AreaRing to_wire(const AreaRing& ring) {
+stillmap_msgs::msg::AreaRing to_wire(const TraversableRing& ring) {
   stillmap_msgs::msg::AreaRing message;
   for (const Eigen::Vector2d& corner : ring) {
     message.x().push_back(corner.x());
@@ -23,9 +23,9 @@ stillmap_msgs::msg::AreaRing to_wire(const AreaRing& ring) {
   return message;
 }
 
-std::optional<AreaRing> from_wire(const stillmap_msgs::msg::AreaRing& message) {
+std::optional<TraversableRing> from_wire(const stillmap_msgs::msg::AreaRing& message) {
   if (message.x().size() != message.y().size()) return std::nullopt;
-  AreaRing ring;
+  TraversableRing ring;
   ring.reserve(message.x().size());
   for (std::size_t i = 0; i < message.x().size(); ++i) {
     ring.emplace_back(message.x()[i], message.y()[i]);
@@ -33,17 +33,17 @@ std::optional<AreaRing> from_wire(const stillmap_msgs::msg::AreaRing& message) {
   return ring;
 }
 
-stillmap_msgs::msg::AreaPolygon to_wire(const AreaPolygon& polygon) {
+stillmap_msgs::msg::AreaPolygon to_wire(const TraversablePolygon& polygon) {
   stillmap_msgs::msg::AreaPolygon message;
   message.outer(to_wire(polygon.outer));
-  for (const AreaRing& hole : polygon.holes) message.holes().push_back(to_wire(hole));
+  for (const TraversableRing& hole : polygon.holes) message.holes().push_back(to_wire(hole));
   return message;
 }
 
-std::optional<AreaPolygon> from_wire(const stillmap_msgs::msg::AreaPolygon& message) {
+std::optional<TraversablePolygon> from_wire(const stillmap_msgs::msg::AreaPolygon& message) {
   auto outer = from_wire(message.outer());
   if (!outer) return std::nullopt;
-  AreaPolygon polygon{.outer = *std::move(outer), .holes = {}};
+  TraversablePolygon polygon{.outer = *std::move(outer), .holes = {}};
   for (const auto& hole_message : message.holes()) {
     auto hole = from_wire(hole_message);
     if (!hole) return std::nullopt;
@@ -52,7 +52,7 @@ std::optional<AreaPolygon> from_wire(const stillmap_msgs::msg::AreaPolygon& mess
   return polygon;
 }
 
-void fill(const AreaAnswer& answer, stillmap_msgs::msg::AreaGrid& message) {
+void fill(const TraversabilityAnswer& answer, stillmap_msgs::msg::AreaGrid& message) {
   const OccupancyGrid& grid = answer.grid;
   message.origin_x(grid.origin_map.x());
   message.origin_y(grid.origin_map.y());
@@ -66,7 +66,7 @@ void fill(const AreaAnswer& answer, stillmap_msgs::msg::AreaGrid& message) {
   message.inferred().resize(cells);
   message.ground_z().resize(cells);
   for (std::size_t i = 0; i < cells; ++i) {
-    const AreaCell& cell = answer.cells[i];
+    const TraversabilityCellInfo& cell = answer.cells[i];
     message.state()[i] = static_cast<std::uint8_t>(cell.state);
     message.reason()[i] = static_cast<std::uint8_t>(cell.reason);
     message.inferred()[i] = cell.inferred ? 1 : 0;
@@ -83,18 +83,19 @@ bool is_consistent(const stillmap_msgs::msg::AreaGrid& message) {
          message.ground_z().size() == cells;
 }
 
-std::optional<AreaCell> cell_of(const stillmap_msgs::msg::AreaGrid& message, std::size_t i) {
+std::optional<TraversabilityCellInfo> cell_of(const stillmap_msgs::msg::AreaGrid& message,
+                                              std::size_t i) {
   const auto state = cell_state(message.state()[i]);
   const auto reason = block_reason(message.reason()[i]);
   if (!state || !reason) return std::nullopt;
-  return AreaCell{.state = *state,
-                  .reason = *reason,
-                  .inferred = message.inferred()[i] != 0,
-                  .ground_z_m = message.ground_z()[i]};
+  return TraversabilityCellInfo{.state = *state,
+                                .reason = *reason,
+                                .inferred = message.inferred()[i] != 0,
+                                .ground_z_m = message.ground_z()[i]};
 }
 
 /// False when the message makes no sense.
-bool read_grid(const stillmap_msgs::msg::AreaGrid& message, AreaAnswer& answer) {
+bool read_grid(const stillmap_msgs::msg::AreaGrid& message, TraversabilityAnswer& answer) {
   if (!is_consistent(message)) return false;
   OccupancyGrid& grid = answer.grid;
   grid.origin_map = {message.origin_x(), message.origin_y()};
@@ -113,48 +114,48 @@ bool read_grid(const stillmap_msgs::msg::AreaGrid& message, AreaAnswer& answer) 
 
 }  // namespace
 
-GetTraversableArea_Request to_request(const AreaQuery& query) {
+GetTraversableArea_Request to_request(const TraversabilityQuery& query) {
   GetTraversableArea_Request request;
-  request.format_version(wire_format_version);
+  request.format_version(dds::wire_format_version);
   request.profile(query.profile);
   request.region(to_wire(query.region));
-  request.wants_grid(query.wants_grid);
-  request.wants_outlines(query.wants_outlines);
+  request.wants_grid(query.include_grid);
+  request.wants_outlines(query.include_outlines);
   request.max_cells(
       static_cast<std::uint32_t>(std::min<std::uint64_t>(query.max_cells, max_answered_cells)));
   request.min_outline_area_m2(query.min_outline_area_m2);
   return request;
 }
 
-AreaQueryFromRequest from_request(const GetTraversableArea_Request& request) {
+TraversabilityQueryFromRequest from_request(const GetTraversableArea_Request& request) {
   auto [region, fault] = from_wire(request.region());
   if (!region) return {{}, std::move(fault)};
-  AreaQuery query;
+  TraversabilityQuery query;
   query.profile = request.profile();
   query.region = *std::move(region);
-  query.wants_grid = request.wants_grid();
-  query.wants_outlines = request.wants_outlines();
+  query.include_grid = request.wants_grid();
+  query.include_outlines = request.wants_outlines();
   query.max_cells = max_answered_cells;
   if (request.max_cells() != 0) query.max_cells = std::min(max_answered_cells, request.max_cells());
   query.min_outline_area_m2 = request.min_outline_area_m2();
   return {std::move(query), {}};
 }
 
-GetTraversableArea_Response to_response(const AreaAnswer& answer) {
+GetTraversableArea_Response to_response(const TraversabilityAnswer& answer) {
   GetTraversableArea_Response response;
   response.status(to_reply_status(answer.grid.status, answer.grid.reason, answer.grid.map_version,
                                   answer.map_id));
   fill(answer, response.grid());
-  for (const AreaPolygon& outline : answer.outlines) {
+  for (const TraversablePolygon& outline : answer.outlines) {
     response.outlines().push_back(to_wire(outline));
   }
   return response;
 }
 
-std::optional<AreaAnswer> from_response(const GetTraversableArea_Response& response) {
-  const auto status = area_status(response.status());
+std::optional<TraversabilityAnswer> from_response(const GetTraversableArea_Response& response) {
+  const auto status = traversability_status(response.status());
   if (!status) return std::nullopt;
-  AreaAnswer answer;
+  TraversabilityAnswer answer;
   if (!read_grid(response.grid(), answer)) return std::nullopt;
   answer.grid.status = *status;
   answer.grid.reason = response.status().reason();

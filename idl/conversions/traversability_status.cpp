@@ -5,15 +5,15 @@
 namespace stillmap::wire {
 namespace {
 
-ReplyCode code_of(AreaStatus status) {
+ReplyCode code_of(TraversabilityStatus status) {
   switch (status) {
-    case AreaStatus::ok:
+    case TraversabilityStatus::ok:
       return ReplyCode::ok;
-    case AreaStatus::invalid_request:
+    case TraversabilityStatus::invalid_request:
       return ReplyCode::invalid_request;
-    case AreaStatus::too_large:
+    case TraversabilityStatus::too_large:
       return ReplyCode::too_large;
-    case AreaStatus::not_found:
+    case TraversabilityStatus::not_found:
       return ReplyCode::not_found;
   }
   return ReplyCode::failed;
@@ -21,14 +21,17 @@ ReplyCode code_of(AreaStatus status) {
 
 }  // namespace
 
-stillmap_msgs::msg::ReplyStatus to_reply_status(AreaStatus status, const std::string& reason,
+stillmap_msgs::msg::ReplyStatus to_reply_status(TraversabilityStatus status,
+                                                const std::string& reason,
                                                 std::uint64_t map_version, std::uint64_t map_id) {
   return to_reply_status(code_of(status), reason, map_version, map_id);
 }
 
-std::optional<AreaStatus> area_status(const stillmap_msgs::msg::ReplyStatus& status) {
-  for (const AreaStatus candidate : {AreaStatus::ok, AreaStatus::invalid_request,
-                                     AreaStatus::too_large, AreaStatus::not_found}) {
+std::optional<TraversabilityStatus> traversability_status(
+    const stillmap_msgs::msg::ReplyStatus& status) {
+  for (const TraversabilityStatus candidate :
+       {TraversabilityStatus::ok, TraversabilityStatus::invalid_request,
+        TraversabilityStatus::too_large, TraversabilityStatus::not_found}) {
     if (status.code() == static_cast<std::uint8_t>(code_of(candidate))) return candidate;
   }
   return std::nullopt;

@@ -2,7 +2,7 @@
 
 #include <stdexcept>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// DDS set-up that cannot work: the text names the domain, topic or setting and what to check.
 class DdsError : public std::runtime_error {
@@ -10,4 +10,4 @@ class DdsError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -4,7 +4,7 @@
 #include <memory>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 void log_dds_to_stderr() {
   using eprosima::fastdds::dds::Log;
@@ -14,4 +14,4 @@ void log_dds_to_stderr() {
   Log::RegisterConsumer(std::move(consumer));
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// What carries data from machine to machine. TCP passes firewalls and lossy long links; it needs
 /// the address of one side.
@@ -57,9 +57,9 @@ struct DdsOptions {
   /// A process that was not heard of for so long is forgotten, and has to be found anew: longer
   /// than the outages to be lived through, at least 3.
   std::uint32_t lease_s = 10;
-  /// Limit for everything bulky that this process sends: tiles, clouds, grids and large answers, to
-  /// all receivers together, repairs included. Poses and the status overtake them. 0: no limit.
-  std::uint32_t bulk_bytes_per_s = 0;
+  /// Limit for all large messages that this process sends: tiles, clouds, grids and large answers,
+  /// to all receivers together, repairs included. Poses and the status overtake them. 0: no limit.
+  std::uint32_t large_message_bytes_per_s = 0;
   /// Name of the participant, and of the node that ROS 2 tools show; empty: no ROS 2 node.
   std::string node_name;
   /// Length of a GID in ros_discovery_info: 24 up to ROS 2 Humble, 16 from Iron.
@@ -68,4 +68,4 @@ struct DdsOptions {
   std::filesystem::path security;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -21,7 +21,7 @@
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/qos.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using eprosima::fastdds::dds::DomainParticipantQos;
@@ -81,7 +81,7 @@ std::vector<Locator_t> own_locators(const DdsOptions& options, std::uint16_t por
   return locators;
 }
 
-void listen_at(const DdsOptions& options, DomainParticipantQos& qos) {
+void set_listening_locators(const DdsOptions& options, DomainParticipantQos& qos) {
   BuiltinAttributes& builtin = qos.wire_protocol().builtin;
   auto& data = qos.wire_protocol().default_unicast_locator_list;
   // Where anything is listed, nothing is added: without multicast addresses, there is none.
@@ -98,7 +98,7 @@ void listen_at(const DdsOptions& options, DomainParticipantQos& qos) {
   data.push_back(shared_memory);
 }
 
-void look_for_peers(const DdsOptions& options, BuiltinAttributes& builtin) {
+void add_initial_peers(const DdsOptions& options, BuiltinAttributes& builtin) {
   const bool tcp = options.transport == NetworkTransport::tcp;
   auto& peers = builtin.initialPeersList;
   for (const NetworkAddress& peer : options.peers) {
@@ -119,7 +119,7 @@ GuidPrefix_t server_prefix() {
   return prefix;
 }
 
-void be_discovery_server(const DdsOptions& options, DomainParticipantQos& qos) {
+void configure_discovery_server(const DdsOptions& options, DomainParticipantQos& qos) {
   BuiltinAttributes& builtin = qos.wire_protocol().builtin;
   qos.wire_protocol().prefix = server_prefix();
   builtin.discovery_config.discoveryProtocol =
@@ -129,7 +129,7 @@ void be_discovery_server(const DdsOptions& options, DomainParticipantQos& qos) {
   }
 }
 
-void register_with(const NetworkAddress& server, BuiltinAttributes& builtin) {
+void configure_discovery_client(const NetworkAddress& server, BuiltinAttributes& builtin) {
   RemoteServerAttributes remote;
   remote.guidPrefix = server_prefix();
   remote.metatrafficUnicastLocatorList.push_back(udp_locator(server));
@@ -180,40 +180,40 @@ std::int32_t fresh_participant_id(std::uint32_t domain_id) {
   // not even in different domains.
   constexpr std::int32_t first = 20;
   // The highest domain's ports end at 65535, those of others where the next domain's begin.
-  constexpr std::uint32_t highest_domain = 232;
-  const std::int32_t ids = (domain_id == highest_domain ? 60 : 120) - first;
-  static std::atomic<std::int32_t> made_here{0};
+  constexpr std::uint32_t max_domain_id = 232;
+  const std::int32_t ids = (domain_id == max_domain_id ? 60 : 120) - first;
+  static std::atomic<std::int32_t> participants_made{0};
   std::optional<std::int32_t> left;
   for (int tried = 0; tried < ids; ++tried) {
     // Never the same one twice in a row: two of one process must differ.
-    const std::int32_t id = first + (::getpid() + made_here++) % ids;
+    const std::int32_t id = first + (::getpid() + participants_made++) % ids;
     const Ports ports = ports_of(domain_id, id);
     if (ports == Ports::fresh) return id;
     if (ports == Ports::left) left = id;
   }
-  constexpr std::int32_t as_fast_dds_likes = -1;
-  return left.value_or(as_fast_dds_likes);
+  constexpr std::int32_t chosen_by_fast_dds = -1;
+  return left.value_or(chosen_by_fast_dds);
 }
 
 }  // namespace
 
 void set_discovery(const DdsOptions& options, DomainParticipantQos& qos) {
   BuiltinAttributes& builtin = qos.wire_protocol().builtin;
-  if (options.discovery_port != 0) return be_discovery_server(options, qos);
+  if (options.discovery_port != 0) return configure_discovery_server(options, qos);
   const bool udp = options.transport == NetworkTransport::udp;
   // TCP peers look for the domain's first process at a port.
   if (!udp && options.listening_port != 0) qos.wire_protocol().participant_id = 0;
   if (udp && (!options.multicast || options.listening_port != 0)) {
-    listen_at(options, qos);
+    set_listening_locators(options, qos);
   } else if (udp && options.shared_memory && options.discovery_server.host.empty() &&
              options.node_name.empty()) {
     // A service keeps the usual ports: that is where others look who list it as a peer.
     qos.wire_protocol().participant_id = fresh_participant_id(options.domain_id);
   }
   if (!options.discovery_server.host.empty()) {
-    return register_with(options.discovery_server, builtin);
+    return configure_discovery_client(options.discovery_server, builtin);
   }
-  look_for_peers(options, builtin);
+  add_initial_peers(options, builtin);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

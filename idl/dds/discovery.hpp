@@ -4,10 +4,10 @@
 
 #include "idl/dds/dds_options.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Sets how the participant finds others and is found: by multicast, at known addresses, or through
 /// a discovery server. Throws DdsError for the name of a host that cannot be found.
 void set_discovery(const DdsOptions& options, eprosima::fastdds::dds::DomainParticipantQos& qos);
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

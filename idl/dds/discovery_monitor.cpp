@@ -10,7 +10,7 @@
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <sstream>
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using namespace eprosima::fastrtps::rtps;
@@ -47,7 +47,7 @@ std::string property(const ParticipantProxyData& data, const std::string& name) 
   return {};
 }
 
-void add_locators(const RemoteLocatorList& locators, Peer& peer) {
+void add_locators(const RemoteLocatorList& locators, RemoteParticipant& peer) {
   for (const Locator_t& locator : locators.unicast) {
     if (locator.kind == LOCATOR_KIND_SHM) peer.uses_shared_memory = true;
     if (locator.kind != LOCATOR_KIND_UDPv4) continue;
@@ -72,14 +72,15 @@ std::string host_name() {
 // Fast DDS writes a number of the machine into every guid, but not into that of a secured
 // participant, which belongs to its certificate. Such a one tells its host in words.
 bool same_host(const GuidPrefix_t& ours, const VendorId_t& vendor, const GuidPrefix_t& theirs,
-               const Peer& peer) {
+               const RemoteParticipant& peer) {
   if (!peer.host.empty() && peer.host.starts_with(host_name() + ":")) return true;
   const bool is_fast_dds = vendor[0] == 1 && vendor[1] == 15;
   return is_fast_dds && std::equal(&ours.value[2], &ours.value[4], &theirs.value[2]);
 }
 
-Peer peer_from(const ParticipantProxyData& data, const GuidPrefix_t& ours) {
-  Peer peer;
+RemoteParticipant remote_participant_from(const ParticipantProxyData& data,
+                                          const GuidPrefix_t& ours) {
+  RemoteParticipant peer;
   peer.guid = streamed(data.m_guid.guidPrefix);
   peer.name = data.m_participantName.to_string();
   peer.vendor = vendor_name(data.m_VendorId);
@@ -126,8 +127,9 @@ Endpoint endpoint_from(ProxyData& data, bool is_writer) {
 
 }  // namespace
 
-void PeerWatch::add_own(const Guid& guid, const std::string& topic, const std::string& type,
-                        bool is_keyed, bool is_writer, const TopicQos& qos) {
+void DiscoveryMonitor::add_local_endpoint(const Guid& guid, const std::string& topic,
+                                          const std::string& type, bool is_keyed, bool is_writer,
+                                          const TopicQos& qos) {
   Endpoint endpoint{.guid = streamed(guid),
                     .topic = topic,
                     .type = type,
@@ -137,22 +139,22 @@ void PeerWatch::add_own(const Guid& guid, const std::string& topic, const std::s
   endpoint.qos.reliable = qos.reliable;
   if (qos.transient_local) endpoint.qos.durability = Durability::transient_local;
   const std::scoped_lock lock(mutex_);
-  own_[guid] = std::move(endpoint);
+  local_endpoints_[guid] = std::move(endpoint);
 }
 
-void PeerWatch::remove_own(const Guid& guid) {
+void DiscoveryMonitor::remove_local_endpoint(const Guid& guid) {
   const std::scoped_lock lock(mutex_);
-  own_.erase(guid);
+  local_endpoints_.erase(guid);
 }
 
-std::vector<Peer> PeerWatch::peers() const {
+std::vector<RemoteParticipant> DiscoveryMonitor::remote_participants() const {
   const std::scoped_lock lock(mutex_);
-  std::vector<Peer> out;
+  std::vector<RemoteParticipant> out;
   const auto now = Clock::now();
-  for (const auto& [prefix, known] : peers_) {
-    Peer peer = known.peer;
+  for (const auto& [prefix, known] : participants_) {
+    RemoteParticipant peer = known.peer;
     peer.refused = is_refused(known, now);
-    for (const auto& [guid, endpoint] : others_) {
+    for (const auto& [guid, endpoint] : remote_endpoints_) {
       if (guid.guidPrefix == prefix) peer.endpoints.push_back(endpoint);
     }
     out.push_back(std::move(peer));
@@ -160,65 +162,68 @@ std::vector<Peer> PeerWatch::peers() const {
   return out;
 }
 
-std::vector<Endpoint> PeerWatch::own_endpoints() const {
+std::vector<Endpoint> DiscoveryMonitor::local_endpoints() const {
   const std::scoped_lock lock(mutex_);
   std::vector<Endpoint> out;
-  for (const auto& [guid, endpoint] : own_) out.push_back(endpoint);
+  for (const auto& [guid, endpoint] : local_endpoints_) out.push_back(endpoint);
   return out;
 }
 
-void PeerWatch::on_participant_discovery(DomainParticipant* participant,
-                                         ParticipantDiscoveryInfo&& info) {
+void DiscoveryMonitor::on_participant_discovery(DomainParticipant* participant,
+                                                ParticipantDiscoveryInfo&& info) {
   const Prefix& prefix = info.info.m_guid.guidPrefix;
   const std::scoped_lock lock(mutex_);
   if (info.status == ParticipantDiscoveryInfo::REMOVED_PARTICIPANT ||
       info.status == ParticipantDiscoveryInfo::DROPPED_PARTICIPANT) {
-    peers_.erase(prefix);
-    std::erase_if(others_, [&](const auto& one) { return one.first.guidPrefix == prefix; });
+    participants_.erase(prefix);
+    std::erase_if(remote_endpoints_,
+                  [&](const auto& one) { return one.first.guidPrefix == prefix; });
     return;
   }
-  const auto [known, is_new] = peers_.try_emplace(prefix);
+  const auto [known, is_new] = participants_.try_emplace(prefix);
   if (is_new) known->second.since = Clock::now();
   const bool refused = known->second.peer.refused;
-  known->second.peer = peer_from(info.info, participant->guid().guidPrefix);
+  known->second.peer = remote_participant_from(info.info, participant->guid().guidPrefix);
   known->second.peer.refused = refused;
 }
 
-bool PeerWatch::is_refused(const Known& known, Clock::time_point now) const {
+bool DiscoveryMonitor::is_refused(const Known& known, Clock::time_point now) const {
   if (known.peer.refused) return true;
   const bool must_authenticate = secured_ && known.peer.is_secured && !known.authenticated;
   return must_authenticate && now - known.since > time_to_authenticate;
 }
 
-void PeerWatch::onParticipantAuthentication(DomainParticipant*,
-                                            ParticipantAuthenticationInfo&& info) {
+void DiscoveryMonitor::onParticipantAuthentication(DomainParticipant*,
+                                                   ParticipantAuthenticationInfo&& info) {
   const std::scoped_lock lock(mutex_);
   const bool refused = info.status == ParticipantAuthenticationInfo::UNAUTHORIZED_PARTICIPANT;
   // A guid alone is no peer: it was discovered before, or it is of no use.
-  const auto found = peers_.find(info.guid.guidPrefix);
-  if (found == peers_.end()) return;
+  const auto found = participants_.find(info.guid.guidPrefix);
+  if (found == participants_.end()) return;
   found->second.peer.refused = refused;
   found->second.authenticated = !refused;
 }
 
-void PeerWatch::on_subscriber_discovery(DomainParticipant*, ReaderDiscoveryInfo&& info) {
-  if (info.status == ReaderDiscoveryInfo::REMOVED_READER) return forget(info.info.guid());
-  keep(info.info.guid(), endpoint_from(info.info, false));
+void DiscoveryMonitor::on_subscriber_discovery(DomainParticipant*, ReaderDiscoveryInfo&& info) {
+  if (info.status == ReaderDiscoveryInfo::REMOVED_READER)
+    return remove_remote_endpoint(info.info.guid());
+  add_remote_endpoint(info.info.guid(), endpoint_from(info.info, false));
 }
 
-void PeerWatch::on_publisher_discovery(DomainParticipant*, WriterDiscoveryInfo&& info) {
-  if (info.status == WriterDiscoveryInfo::REMOVED_WRITER) return forget(info.info.guid());
-  keep(info.info.guid(), endpoint_from(info.info, true));
+void DiscoveryMonitor::on_publisher_discovery(DomainParticipant*, WriterDiscoveryInfo&& info) {
+  if (info.status == WriterDiscoveryInfo::REMOVED_WRITER)
+    return remove_remote_endpoint(info.info.guid());
+  add_remote_endpoint(info.info.guid(), endpoint_from(info.info, true));
 }
 
-void PeerWatch::keep(const Guid& guid, Endpoint endpoint) {
+void DiscoveryMonitor::add_remote_endpoint(const Guid& guid, Endpoint endpoint) {
   const std::scoped_lock lock(mutex_);
-  others_[guid] = std::move(endpoint);
+  remote_endpoints_[guid] = std::move(endpoint);
 }
 
-void PeerWatch::forget(const Guid& guid) {
+void DiscoveryMonitor::remove_remote_endpoint(const Guid& guid) {
   const std::scoped_lock lock(mutex_);
-  others_.erase(guid);
+  remote_endpoints_.erase(guid);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

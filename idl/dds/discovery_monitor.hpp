@@ -9,28 +9,28 @@
 #include <string>
 #include <vector>
 
-#include "idl/dds/remote_participant.hpp"
 #include "idl/dds/qos.hpp"
+#include "idl/dds/remote_participant.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
-/// Keeps what discovery tells about the domain: who is there, with which ends, and who was refused;
-/// and our own ends beside them. Thread-safe.
-class PeerWatch : public eprosima::fastdds::dds::DomainParticipantListener {
+/// Keeps what discovery tells about the domain: who is there, with which endpoints, and who was
+/// refused; and our own endpoints beside them. Thread-safe.
+class DiscoveryMonitor : public eprosima::fastdds::dds::DomainParticipantListener {
  public:
   using Guid = eprosima::fastrtps::rtps::GUID_t;
 
   /// `secured`: we have an identity, and peers are to authenticate themselves.
-  explicit PeerWatch(bool secured) : secured_(secured) {}
+  explicit DiscoveryMonitor(bool secured) : secured_(secured) {}
 
-  void add_own(const Guid& guid, const std::string& topic, const std::string& type, bool is_keyed,
-               bool is_writer, const TopicQos& qos);
-  void remove_own(const Guid& guid);
+  void add_local_endpoint(const Guid& guid, const std::string& topic, const std::string& type,
+                          bool is_keyed, bool is_writer, const TopicQos& qos);
+  void remove_local_endpoint(const Guid& guid);
 
   /// The others, in the order of their guids. Who was refused, or has not authenticated itself in
   /// good time, counts as refused: often only one side is told why.
-  [[nodiscard]] std::vector<Peer> peers() const;
-  [[nodiscard]] std::vector<Endpoint> own_endpoints() const;
+  [[nodiscard]] std::vector<RemoteParticipant> remote_participants() const;
+  [[nodiscard]] std::vector<Endpoint> local_endpoints() const;
 
  private:
   using Prefix = eprosima::fastrtps::rtps::GuidPrefix_t;
@@ -46,19 +46,19 @@ class PeerWatch : public eprosima::fastdds::dds::DomainParticipantListener {
                               eprosima::fastrtps::rtps::WriterDiscoveryInfo&& info) override;
   using Clock = std::chrono::steady_clock;
   struct Known {
-    Peer peer;
+    RemoteParticipant peer;
     Clock::time_point since;
     bool authenticated = false;
   };
   [[nodiscard]] bool is_refused(const Known& known, Clock::time_point now) const;
-  void keep(const Guid& guid, Endpoint endpoint);
-  void forget(const Guid& guid);
+  void add_remote_endpoint(const Guid& guid, Endpoint endpoint);
+  void remove_remote_endpoint(const Guid& guid);
 
   bool secured_;
   mutable std::mutex mutex_;
-  std::map<Prefix, Known> peers_;
-  std::map<Guid, Endpoint> others_;
-  std::map<Guid, Endpoint> own_;
+  std::map<Prefix, Known> participants_;
+  std::map<Guid, Endpoint> remote_endpoints_;
+  std::map<Guid, Endpoint> local_endpoints_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

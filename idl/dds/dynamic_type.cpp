@@ -4,9 +4,9 @@
 
 #include "tile_indexTypeObject.h"
 
-namespace stillmap {
+namespace stillmap::dds {
 
-void describe_tile_info(eprosima::fastdds::dds::TypeSupport& type) {
+void register_tile_info_type(eprosima::fastdds::dds::TypeSupport& type) {
   auto* const factory = eprosima::fastrtps::types::TypeObjectFactory::get_instance();
   for (const bool is_complete : {true, false}) {
     // Filters look for the name that the type has on the wire; generated code uses another one.
@@ -19,4 +19,4 @@ void describe_tile_info(eprosima::fastdds::dds::TypeSupport& type) {
   type->auto_fill_type_information(false);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -6,7 +6,7 @@
 #include <map>
 #include <string_view>
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using Reasons = std::vector<std::string>;
@@ -55,7 +55,8 @@ void compare_types(const Endpoint& writer, const Endpoint& reader, Reasons& reas
   }
 }
 
-void compare_delivery(const EndpointQos& writer, const EndpointQos& reader, Reasons& reasons) {
+void compare_reliability_and_durability(const EndpointQos& writer, const EndpointQos& reader,
+                                        Reasons& reasons) {
   if (reader.reliable && !writer.reliable) {
     reasons.push_back(offer("reliability", "best effort", "reliable"));
   }
@@ -104,10 +105,10 @@ std::string in_quotes(const Reasons& partitions) {
 
 }  // namespace
 
-std::vector<std::string> obstacles(const Endpoint& writer, const Endpoint& reader) {
+std::vector<std::string> incompatible_policies(const Endpoint& writer, const Endpoint& reader) {
   Reasons reasons;
   compare_types(writer, reader, reasons);
-  compare_delivery(writer.qos, reader.qos, reasons);
+  compare_reliability_and_durability(writer.qos, reader.qos, reasons);
   compare_times(writer.qos, reader.qos, reasons);
   if (writer.qos.exclusive_ownership != reader.qos.exclusive_ownership) {
     reasons.push_back(writer.qos.exclusive_ownership ? offer("ownership", "exclusive", "shared")
@@ -120,37 +121,37 @@ std::vector<std::string> obstacles(const Endpoint& writer, const Endpoint& reade
   return reasons;
 }
 
-std::vector<Mismatch> mismatches(const std::vector<Peer>& participants) {
-  struct End {
-    const Peer* peer;
+std::vector<Mismatch> mismatches(const std::vector<RemoteParticipant>& participants) {
+  struct Match {
+    const RemoteParticipant* peer;
     const Endpoint* endpoint;
   };
-  std::multimap<std::string, End> readers;
-  for (const Peer& peer : participants) {
+  std::multimap<std::string, Match> readers;
+  for (const RemoteParticipant& peer : participants) {
     for (const Endpoint& endpoint : peer.endpoints) {
-      if (!endpoint.is_writer) readers.emplace(endpoint.topic, End{&peer, &endpoint});
+      if (!endpoint.is_writer) readers.emplace(endpoint.topic, Match{&peer, &endpoint});
     }
   }
   std::vector<Mismatch> found;
-  for (const Peer& peer : participants) {
+  for (const RemoteParticipant& peer : participants) {
     for (const Endpoint& writer : peer.endpoints) {
       if (!writer.is_writer) continue;
       const auto [begin, end] = readers.equal_range(writer.topic);
       for (auto it = begin; it != end; ++it) {
-        const End& reader = it->second;
+        const Match& reader = it->second;
         if (reader.peer == &peer) continue;
-        auto reasons = obstacles(writer, *reader.endpoint);
+        auto reasons = incompatible_policies(writer, *reader.endpoint);
         if (reasons.empty()) continue;
         found.push_back({.topic = writer.topic,
                          .writer = writer,
                          .reader = *reader.endpoint,
-                         .writer_peer = peer,
-                         .reader_peer = *reader.peer,
-                         .obstacles = std::move(reasons)});
+                         .writer_participant = peer,
+                         .reader_participant = *reader.peer,
+                         .incompatible_policies = std::move(reasons)});
       }
     }
   }
   return found;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

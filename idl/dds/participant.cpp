@@ -12,20 +12,20 @@
 #include "idl/dds/discovery_monitor.hpp"
 #include "idl/dds/ros_graph.hpp"
 #include "idl/dds/secure_properties.hpp"
+#include "idl/dds/security/identity.hpp"
 #include "idl/dds/tcp_user_timeout.hpp"
 #include "idl/dds/transports.hpp"
-#include "idl/dds/security/identity.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using namespace eprosima::fastdds::dds;
 
 // The largest domain whose ports fit into 16 bits.
-constexpr std::uint32_t largest_domain_id = 232;
+constexpr std::uint32_t max_domain_id = 232;
 
 // Of a TCP peer that takes nothing, while all others wait.
-constexpr std::chrono::seconds longest_stall{5};
+constexpr std::chrono::seconds tcp_user_timeout{5};
 
 DomainParticipantQos participant_qos(const DdsOptions& options) {
   DomainParticipantQos qos;
@@ -35,7 +35,7 @@ DomainParticipantQos participant_qos(const DdsOptions& options) {
   qos.user_data().setValue({enclave.begin(), enclave.end()});
   set_transports(options, qos);
   set_discovery(options, qos);
-  set_pacing(options, qos);
+  set_flow_controllers(options, qos);
   auto& builtin = qos.wire_protocol().builtin;
   builtin.readerHistoryMemoryPolicy = builtin.writerHistoryMemoryPolicy =
       eprosima::fastrtps::rtps::PREALLOCATED_WITH_REALLOC_MEMORY_MODE;
@@ -50,14 +50,14 @@ DomainParticipantQos participant_qos(const DdsOptions& options) {
 }
 
 // Fast DDS would hand a sample of one form to a reader of the other.
-void check_form(const DomainParticipant& participant, const TypeSupport& type) {
+void check_type_support(const DomainParticipant& participant, const TypeSupport& type) {
   const TypeSupport registered = participant.find_type(type.get_type_name());
   if (registered.empty()) return;
-  const auto& known_form = *registered;
-  const auto& wanted_form = *type;
-  if (typeid(known_form) != typeid(wanted_form)) {
+  const auto& registered_type = *registered;
+  const auto& wanted_type = *type;
+  if (typeid(registered_type) != typeid(wanted_type)) {
     throw DdsError("type " + type.get_type_name() +
-                   " is used in one process both as messages and as unread bytes");
+                   " is used in one process both as messages and as serialized bytes");
   }
 }
 
@@ -71,7 +71,7 @@ std::unique_ptr<const Identity> identity_of(const DdsOptions& options) {
 Participant::Participant(const DdsOptions& options)
     : options_(options),
       identity_(identity_of(options)),
-      watch_(std::make_unique<PeerWatch>(identity_ != nullptr)),
+      monitor_(std::make_unique<DiscoveryMonitor>(identity_ != nullptr)),
       factory_(DomainParticipantFactory::get_shared_instance()),
       handle_(join()),
       publisher_(handle_->create_publisher(PUBLISHER_QOS_DEFAULT)),
@@ -90,18 +90,18 @@ Participant::~Participant() {
 }
 
 Participant::Handle Participant::join() const {
-  if (options_.domain_id > largest_domain_id) {
+  if (options_.domain_id > max_domain_id) {
     throw failure("domain ids go from 0 to 232");
   }
   DomainParticipant* const made = factory_->create_participant(
-      static_cast<DomainId_t>(options_.domain_id), qos(), watch_.get(), StatusMask::none());
+      static_cast<DomainId_t>(options_.domain_id), qos(), monitor_.get(), StatusMask::none());
   if (made == nullptr) {
     throw failure("Fast DDS made no participant; check that the interfaces exist on this machine " +
                   std::string("(`ip address`), that /dev/shm can be written, and that no other ") +
                   "process listens at a port that was given");
   }
   if (options_.transport == NetworkTransport::tcp && options_.listening_port != 0) {
-    drop_stalled_peers(options_.listening_port, longest_stall);
+    set_tcp_user_timeout(options_.listening_port, tcp_user_timeout);
   }
   const auto leave = [factory = factory_](DomainParticipant* participant) {
     participant->delete_contained_entities();
@@ -116,10 +116,12 @@ DomainParticipantQos Participant::qos() const {
   return qos;
 }
 
-std::vector<Peer> Participant::peers() const { return watch_->peers(); }
+std::vector<RemoteParticipant> Participant::remote_participants() const {
+  return monitor_->remote_participants();
+}
 
-Peer Participant::self() const {
-  Peer self;
+RemoteParticipant Participant::self() const {
+  RemoteParticipant self;
   std::ostringstream guid;
   guid << handle_->guid().guidPrefix;
   self.guid = guid.str();
@@ -127,7 +129,7 @@ Peer Participant::self() const {
   self.is_on_this_host = true;
   self.uses_shared_memory = options_.shared_memory;
   self.is_secured = identity_ != nullptr;
-  self.endpoints = watch_->own_endpoints();
+  self.endpoints = monitor_->local_endpoints();
   return self;
 }
 
@@ -148,7 +150,7 @@ DdsError Participant::failure(const std::string& what) const {
 }
 
 Topic* Participant::topic(const std::string& name, TypeSupport type) {
-  check_form(*handle_, type);
+  check_type_support(*handle_, type);
   if (const auto known = topics_.find(name); known != topics_.end()) {
     if (known->second->get_type_name() != type.get_type_name()) {
       throw failure("topic " + name + " has type " + known->second->get_type_name() + ", not " +
@@ -174,11 +176,12 @@ Participant::WriterHandle Participant::make_writer(const std::string& name, Type
   const auto remove = [this](DataWriter* writer) {
     const std::scoped_lock remove_lock(mutex_);
     if (graph_) graph_->remove(writer->guid());
-    watch_->remove_own(writer->guid());
+    monitor_->remove_local_endpoint(writer->guid());
     publisher_->delete_datawriter(writer);
   };
   WriterHandle handle(made, remove);
-  watch_->add_own(made->guid(), name, type.get_type_name(), type->m_isGetKeyDefined, true, qos);
+  monitor_->add_local_endpoint(made->guid(), name, type.get_type_name(), type->m_isGetKeyDefined,
+                               true, qos);
   if (graph_) graph_->add_writer(made->guid());
   return handle;
 }
@@ -191,7 +194,8 @@ Participant::ReaderHandle Participant::make_reader(const std::string& name, Type
   DataReader* const made =
       subscriber_->create_datareader(topic(name, type), reader_qos(qos, options_), listener);
   if (made == nullptr) throw failure("cannot read topic " + name);
-  watch_->add_own(made->guid(), name, type.get_type_name(), type->m_isGetKeyDefined, false, qos);
+  monitor_->add_local_endpoint(made->guid(), name, type.get_type_name(), type->m_isGetKeyDefined,
+                               false, qos);
   return own(*made, nullptr);
 }
 
@@ -211,7 +215,8 @@ Participant::ReaderHandle Participant::make_reader(const std::string& name, Type
     handle_->delete_contentfilteredtopic(filtered);
     throw failure("cannot read topic " + name);
   }
-  watch_->add_own(made->guid(), name, type.get_type_name(), type->m_isGetKeyDefined, false, qos);
+  monitor_->add_local_endpoint(made->guid(), name, type.get_type_name(), type->m_isGetKeyDefined,
+                               false, qos);
   return own(*made, filtered);
 }
 
@@ -219,7 +224,7 @@ Participant::ReaderHandle Participant::own(DataReader& made, ContentFilteredTopi
   const auto remove = [this, filtered](DataReader* reader) {
     const std::scoped_lock lock(mutex_);
     if (graph_) graph_->remove(reader->guid());
-    watch_->remove_own(reader->guid());
+    monitor_->remove_local_endpoint(reader->guid());
     subscriber_->delete_datareader(reader);
     if (filtered != nullptr) handle_->delete_contentfilteredtopic(filtered);
   };
@@ -228,4 +233,4 @@ Participant::ReaderHandle Participant::own(DataReader& made, ContentFilteredTopi
   return handle;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

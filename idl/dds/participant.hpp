@@ -15,13 +15,13 @@
 #include "idl/dds/content_filter.hpp"
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/dds_options.hpp"
-#include "idl/dds/remote_participant.hpp"
 #include "idl/dds/qos.hpp"
+#include "idl/dds/remote_participant.hpp"
 #include "idl/dds/service_faults.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
-class PeerWatch;
+class DiscoveryMonitor;
 class RosGraph;
 struct Identity;
 
@@ -42,9 +42,9 @@ class Participant {
   [[nodiscard]] const ServiceFaults& service_faults() const { return service_faults_; }
 
   /// Everybody else in the domain, as discovery knows them now. Discovery takes a few seconds.
-  [[nodiscard]] std::vector<Peer> peers() const;
+  [[nodiscard]] std::vector<RemoteParticipant> remote_participants() const;
   /// This participant, in the same terms.
-  [[nodiscard]] Peer self() const;
+  [[nodiscard]] RemoteParticipant self() const;
 
   /// Endpoints that leave the domain with their owner.
   using WriterHandle = std::unique_ptr<eprosima::fastdds::dds::DataWriter,
@@ -88,7 +88,7 @@ class Participant {
   // Who we are in a secured domain; nothing without security.
   std::unique_ptr<const Identity> identity_;
   // Hears from the participant until that is gone.
-  std::unique_ptr<PeerWatch> watch_;
+  std::unique_ptr<DiscoveryMonitor> monitor_;
   // Held so that the factory outlives this participant even in a process that is ending.
   std::shared_ptr<eprosima::fastdds::dds::DomainParticipantFactory> factory_;
   Handle handle_;
@@ -99,4 +99,4 @@ class Participant {
   std::unique_ptr<RosGraph> graph_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -4,12 +4,12 @@
 #include <fastdds/rtps/flowcontrol/FlowControllerDescriptor.hpp>
 #include <memory>
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using namespace eprosima::fastdds::dds;
 
-constexpr const char* bulk_pace = "stillmap_bulk";
+constexpr const char* rate_limiter = "stillmap_large_messages";
 // Short, so that what is small gets through between two portions.
 constexpr std::uint32_t portions_per_s = 20;
 
@@ -58,14 +58,14 @@ DataWriterQos writer_qos(const TopicQos& qos, const DdsOptions& options) {
   times.heartbeatPeriod = to_duration(milliseconds(options.heartbeat_ms));
   times.nackResponseDelay = to_duration(milliseconds(options.repair_delay_ms));
   // Asynchronous writers lose KEEP_LAST samples: those that newer ones replace before they are
-  // sent. Of what is bulky, on a slow network, that is wanted.
+  // sent. Of large messages, on a slow network, that is wanted.
   out.publish_mode().kind = SYNCHRONOUS_PUBLISH_MODE;
-  if (qos.bulky && options.bulk_bytes_per_s > 0) {
+  if (qos.large_messages && options.large_message_bytes_per_s > 0) {
     out.publish_mode().kind = ASYNCHRONOUS_PUBLISH_MODE;
-    out.publish_mode().flow_controller_name = bulk_pace;
+    out.publish_mode().flow_controller_name = rate_limiter;
   }
   // Of many sizes: each place for a sample would keep the room of the largest that it ever had.
-  if (qos.max_keys > 1 || qos.bulky) {
+  if (qos.max_keys > 1 || qos.large_messages) {
     out.endpoint().history_memory_policy = eprosima::fastrtps::rtps::DYNAMIC_RESERVE_MEMORY_MODE;
   }
   // Readers filter for themselves: Fast DDS's writers crash when a reader with a filter goes while
@@ -85,14 +85,15 @@ DataReaderQos reader_qos(const TopicQos& qos, const DdsOptions& options) {
   return out;
 }
 
-void set_pacing(const DdsOptions& options, DomainParticipantQos& qos) {
-  if (options.bulk_bytes_per_s == 0) return;
+void set_flow_controllers(const DdsOptions& options, DomainParticipantQos& qos) {
+  if (options.large_message_bytes_per_s == 0) return;
   using eprosima::fastdds::rtps::FlowControllerDescriptor;
   const auto pace = std::make_shared<FlowControllerDescriptor>();
-  pace->name = bulk_pace;
-  pace->max_bytes_per_period = static_cast<std::int32_t>(options.bulk_bytes_per_s / portions_per_s);
+  pace->name = rate_limiter;
+  pace->max_bytes_per_period =
+      static_cast<std::int32_t>(options.large_message_bytes_per_s / portions_per_s);
   pace->period_ms = 1000 / portions_per_s;
   qos.flow_controllers().push_back(pace);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

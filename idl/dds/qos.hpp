@@ -7,7 +7,7 @@
 
 #include "idl/dds/dds_options.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Quality of service of one end of a topic, as far as Stillmap needs it.
 struct TopicQos {
@@ -21,8 +21,9 @@ struct TopicQos {
   bool keep_all = false;
   /// Keys a keyed topic may have.
   int max_keys = 1;
-  /// Large samples: they keep to DdsOptions::bulk_bytes_per_s, and a write does not wait for that.
-  bool bulky = false;
+  /// Large samples: they keep to DdsOptions::large_message_bytes_per_s, and a write does not wait
+  /// for that.
+  bool large_messages = false;
   /// Longest wait of one write for room in a keep_all history.
   std::chrono::milliseconds max_blocking{100};
 };
@@ -32,10 +33,11 @@ struct TopicQos {
 [[nodiscard]] eprosima::fastdds::dds::DataReaderQos reader_qos(const TopicQos& qos,
                                                                const DdsOptions& options);
 
-/// Prepares the participant for bulky writers.
-void set_pacing(const DdsOptions& options, eprosima::fastdds::dds::DomainParticipantQos& qos);
+/// Prepares the participant for rate-limited writers.
+void set_flow_controllers(const DdsOptions& options,
+                          eprosima::fastdds::dds::DomainParticipantQos& qos);
 
 /// A span of time in Fast DDS's own type.
 [[nodiscard]] eprosima::fastrtps::Duration_t to_duration(std::chrono::milliseconds time);
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 using namespace eprosima::fastdds::dds;
 using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
@@ -23,7 +23,7 @@ bool ReaderEvents::has_writer(const Guid& writer) const {
   return writers_.contains(writer);
 }
 
-int ReaderEvents::writers_of_peer(const Guid& endpoint) const {
+int ReaderEvents::writers_of_participant(const Guid& endpoint) const {
   const std::scoped_lock lock(mutex_);
   return static_cast<int>(std::ranges::count(writers_, endpoint.guidPrefix, &Guid::guidPrefix));
 }
@@ -86,4 +86,4 @@ bool UntypedReader::take_untyped(void* sample, SampleInfo& info, const std::stop
   return false;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

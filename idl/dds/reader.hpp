@@ -12,7 +12,7 @@
 #include "idl/dds/participant.hpp"
 #include "idl/dds/type_support.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// What happened to a reader. Only wakes whoever waits: work inside a Fast DDS callback would hold
 /// up every other reader of the process.
@@ -26,7 +26,7 @@ class ReaderEvents : public eprosima::fastdds::dds::DataReaderListener {
   [[nodiscard]] int matched_writers() const;
   [[nodiscard]] bool has_writer(const Guid& writer) const;
   /// Matched writers in the process that `endpoint` belongs to.
-  [[nodiscard]] int writers_of_peer(const Guid& endpoint) const;
+  [[nodiscard]] int writers_of_participant(const Guid& endpoint) const;
   [[nodiscard]] bool wait_for_writer(std::chrono::milliseconds timeout) const;
   /// Writers on this topic whose quality of service does not fit ours, as a best-effort writer for
   /// a reliable reader.
@@ -95,4 +95,4 @@ class Reader : public UntypedReader {
   }
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -1,6 +1,6 @@
 #include "idl/dds/remote_participant.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 void add_part(std::string& text, const std::string& part) {
@@ -11,7 +11,7 @@ void add_part(std::string& text, const std::string& part) {
 
 }  // namespace
 
-std::string whereabouts(const Peer& peer) {
+std::string describe_location(const RemoteParticipant& peer) {
   std::string text = peer.is_on_this_host ? "this host" : peer.host;
   if (!peer.process.empty()) add_part(text, "process " + peer.process);
   if (!peer.user.empty()) add_part(text, "user " + peer.user);
@@ -19,9 +19,9 @@ std::string whereabouts(const Peer& peer) {
   return text;
 }
 
-std::string describe(const Peer& peer) {
+std::string describe(const RemoteParticipant& peer) {
   const std::string name = peer.name.empty() ? "a participant without a name" : peer.name;
-  const std::string where = whereabouts(peer);
+  const std::string where = describe_location(peer);
   return where.empty() ? name : name + " (" + where + ")";
 }
 
@@ -35,4 +35,4 @@ std::string describe(const EndpointQos& qos) {
   return text;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// How long a sample outlives its writing, weakest first, as DDS numbers them.
 enum class Durability : std::uint8_t { volatile_, transient_local, transient, persistent };
@@ -37,7 +37,7 @@ struct Endpoint {
 };
 
 /// Another process in the domain, as it announces itself.
-struct Peer {
+struct RemoteParticipant {
   /// Prefix of the guids of its endpoints.
   std::string guid;
   std::string name;
@@ -59,12 +59,12 @@ struct Peer {
 };
 
 /// "host, process 12, user robot, 192.168.0.5": what is known of where a peer runs.
-[[nodiscard]] std::string whereabouts(const Peer& peer);
+[[nodiscard]] std::string describe_location(const RemoteParticipant& peer);
 
 /// "stillmap_server (this host, process 12, user robot)".
-[[nodiscard]] std::string describe(const Peer& peer);
+[[nodiscard]] std::string describe(const RemoteParticipant& peer);
 
 /// "reliable, transient local": what people ask for first.
 [[nodiscard]] std::string describe(const EndpointQos& qos);
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -2,7 +2,7 @@
 #include "idl/dds/type_support.hpp"
 #include "removed_voxelsPubSubTypes.h"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using eprosima::fastdds::dds::TypeSupport;
@@ -11,19 +11,19 @@ using eprosima::fastdds::dds::TypeSupport;
 
 template <>
 TypeSupport type_support<stillmap_msgs::srv::GetRemoved_Request>() {
-  return make<stillmap_msgs::srv::GetRemoved_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::GetRemoved_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::GetRemoved_Response>() {
-  return make<stillmap_msgs::srv::GetRemoved_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::GetRemoved_ResponsePubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::RestoreRemoved_Request>() {
-  return make<stillmap_msgs::srv::RestoreRemoved_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::RestoreRemoved_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::RestoreRemoved_Response>() {
-  return make<stillmap_msgs::srv::RestoreRemoved_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::RestoreRemoved_ResponsePubSubType>();
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -7,7 +7,7 @@
 #include "rmw_dds_common.h"
 #include "rmw_dds_common_iron.h"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using HumbleInfo = rmw_dds_common::msg::ParticipantEntitiesInfo;
@@ -77,4 +77,4 @@ void RosGraph::announce_as() {
   writer_->write(&info);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -6,7 +6,7 @@
 
 #include "idl/dds/participant.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Tells ROS 2 which readers and writers belong to this node (topic ros_discovery_info), so that
 /// `ros2 node info` shows them. Not thread-safe; the participant guards it.
@@ -34,4 +34,4 @@ class RosGraph {
   Participant::WriterHandle writer_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

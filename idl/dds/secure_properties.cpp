@@ -4,7 +4,7 @@
 
 #include "idl/dds/security/identity.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 void add_security(const std::filesystem::path& identity_folder,
                   eprosima::fastrtps::rtps::PropertyPolicy& properties) {
@@ -28,4 +28,4 @@ void add_security(const std::filesystem::path& identity_folder,
   add("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -4,10 +4,10 @@
 
 #include <filesystem>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Adds what switches DDS Security on with the identity in this folder.
 void add_security(const std::filesystem::path& identity_folder,
                   eprosima::fastrtps::rtps::PropertyPolicy& properties);
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -5,7 +5,7 @@
 #include <memory>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using eprosima::fastdds::dds::TypeSupport;
@@ -13,16 +13,16 @@ using eprosima::fastrtps::rtps::InstanceHandle_t;
 using eprosima::fastrtps::rtps::SerializedPayload_t;
 
 /// Keeps samples of another type as bytes.
-class RawType final : public eprosima::fastdds::dds::TopicDataType {
+class SerializedMessageType final : public eprosima::fastdds::dds::TopicDataType {
  public:
-  explicit RawType(TypeSupport type) : type_(std::move(type)) {
+  explicit SerializedMessageType(TypeSupport type) : type_(std::move(type)) {
     m_typeSize = type_->m_typeSize;
     m_isGetKeyDefined = type_->m_isGetKeyDefined;
     setName(type_->getName());
   }
 
   bool serialize(void* data, SerializedPayload_t* payload) override {
-    const auto& bytes = static_cast<RawSample*>(data)->bytes;
+    const auto& bytes = static_cast<SerializedMessage*>(data)->bytes;
     if (bytes.size() > payload->max_size) return false;
     std::ranges::copy(bytes, payload->data);
     payload->length = static_cast<std::uint32_t>(bytes.size());
@@ -31,23 +31,25 @@ class RawType final : public eprosima::fastdds::dds::TopicDataType {
   }
 
   bool deserialize(SerializedPayload_t* payload, void* data) override {
-    static_cast<RawSample*>(data)->bytes.assign(payload->data, payload->data + payload->length);
+    static_cast<SerializedMessage*>(data)->bytes.assign(payload->data,
+                                                        payload->data + payload->length);
     return true;
   }
 
   std::function<std::uint32_t()> getSerializedSizeProvider(void* data) override {
-    return
-        [data] { return static_cast<std::uint32_t>(static_cast<RawSample*>(data)->bytes.size()); };
+    return [data] {
+      return static_cast<std::uint32_t>(static_cast<SerializedMessage*>(data)->bytes.size());
+    };
   }
 
-  void* createData() override { return std::make_unique<RawSample>().release(); }
+  void* createData() override { return std::make_unique<SerializedMessage>().release(); }
   void deleteData(void* data) override {
-    const std::unique_ptr<RawSample> gone(static_cast<RawSample*>(data));
+    const std::unique_ptr<SerializedMessage> gone(static_cast<SerializedMessage*>(data));
   }
 
   /// Only asked where a writer sends no hash of the key: the type itself knows the key then.
   bool getKey(void* data, InstanceHandle_t* handle, bool force_md5) override {
-    auto& bytes = static_cast<RawSample*>(data)->bytes;
+    auto& bytes = static_cast<SerializedMessage*>(data)->bytes;
     SerializedPayload_t payload;
     payload.data = bytes.data();
     payload.length = payload.max_size = static_cast<std::uint32_t>(bytes.size());
@@ -66,8 +68,8 @@ class RawType final : public eprosima::fastdds::dds::TopicDataType {
 
 }  // namespace
 
-TypeSupport raw_type(const TypeSupport& type) {
-  return TypeSupport(std::make_unique<RawType>(type).release());
+TypeSupport serialized_message_type(const TypeSupport& type) {
+  return TypeSupport(std::make_unique<SerializedMessageType>(type).release());
 }
 
 std::string ros_type_name(const TypeSupport& type) {
@@ -83,4 +85,4 @@ std::string ros_type_name(const TypeSupport& type) {
   return name;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -7,16 +7,16 @@
 
 #include "idl/dds/dds_error.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using eprosima::fastdds::dds::TypeSupport;
 using eprosima::fastrtps::rtps::InstanceHandle_t;
 using eprosima::fastrtps::rtps::SerializedPayload_t;
 
-class UnreadType : public eprosima::fastdds::dds::TopicDataType {
+class SerializedSampleType : public eprosima::fastdds::dds::TopicDataType {
  public:
-  explicit UnreadType(const std::string& type_name) {
+  explicit SerializedSampleType(const std::string& type_name) {
     setName(type_name.c_str());
     // To begin with; payloads grow as they need.
     constexpr std::uint32_t usual_bytes = 256;
@@ -27,7 +27,7 @@ class UnreadType : public eprosima::fastdds::dds::TopicDataType {
   }
 
   bool serialize(void* sample, SerializedPayload_t* payload) override {
-    const auto& bytes = *static_cast<const SampleBytes*>(sample);
+    const auto& bytes = *static_cast<const SerializedSample*>(sample);
     if (payload->max_size < bytes.size()) return false;
     std::ranges::copy(bytes, payload->data);
     payload->length = static_cast<std::uint32_t>(bytes.size());
@@ -36,19 +36,19 @@ class UnreadType : public eprosima::fastdds::dds::TopicDataType {
   }
 
   bool deserialize(SerializedPayload_t* payload, void* sample) override {
-    static_cast<SampleBytes*>(sample)->assign(payload->data, payload->data + payload->length);
+    static_cast<SerializedSample*>(sample)->assign(payload->data, payload->data + payload->length);
     return true;
   }
 
   std::function<std::uint32_t()> getSerializedSizeProvider(void* sample) override {
-    const auto& bytes = *static_cast<const SampleBytes*>(sample);
+    const auto& bytes = *static_cast<const SerializedSample*>(sample);
     return [&bytes] { return static_cast<std::uint32_t>(bytes.size()); };
   }
 
-  void* createData() override { return std::make_unique<SampleBytes>().release(); }
+  void* createData() override { return std::make_unique<SerializedSample>().release(); }
 
   void deleteData(void* sample) override {
-    const std::unique_ptr<SampleBytes> owned(static_cast<SampleBytes*>(sample));
+    const std::unique_ptr<SerializedSample> owned(static_cast<SerializedSample*>(sample));
   }
 
   bool getKey(void*, InstanceHandle_t*, bool) override { return false; }
@@ -70,15 +70,15 @@ class BorrowedPayload : public SerializedPayload_t {
 
 }  // namespace
 
-TypeSupport unread_type(const std::string& type_name) {
-  return TypeSupport(std::make_unique<UnreadType>(type_name).release());
+TypeSupport serialized_sample_type(const std::string& type_name) {
+  return TypeSupport(std::make_unique<SerializedSampleType>(type_name).release());
 }
 
-SampleBytes to_bytes(TypeSupport type, const void* sample, std::size_t gap_bytes) {
+SerializedSample to_bytes(TypeSupport type, const void* sample, std::size_t gap_bytes) {
   assert(gap_bytes % 8 == 0);
   // Fast DDS only reads the sample, but says so nowhere.
   void* const mutable_sample = const_cast<void*>(sample);
-  SampleBytes bytes(gap_bytes + type->getSerializedSizeProvider(mutable_sample)());
+  SerializedSample bytes(gap_bytes + type->getSerializedSizeProvider(mutable_sample)());
   BorrowedPayload payload(std::span<std::uint8_t>(bytes).subspan(gap_bytes));
   if (!type->serialize(mutable_sample, &payload)) {
     throw DdsError("a sample of " + type.get_type_name() + " cannot be put into bytes");
@@ -95,4 +95,4 @@ bool from_bytes(TypeSupport type, std::span<std::uint8_t> bytes, void* sample) {
   return type->deserialize(&payload, sample);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

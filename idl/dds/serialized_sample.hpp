@@ -8,52 +8,53 @@
 #include "idl/dds/reader.hpp"
 #include "idl/dds/writer.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// A sample as it lies on the wire: `encapsulation_bytes`, then its fields in CDR.
-using SampleBytes = std::vector<std::uint8_t>;
+using SerializedSample = std::vector<std::uint8_t>;
 
 inline constexpr std::size_t encapsulation_bytes = 4;
 
 /// Carries samples of a type as bytes, under its name: for topics whose samples can be read only
 /// once it is known who wrote them.
-[[nodiscard]] eprosima::fastdds::dds::TypeSupport unread_type(const std::string& type_name);
+[[nodiscard]] eprosima::fastdds::dds::TypeSupport serialized_sample_type(
+    const std::string& type_name);
 
 /// The sample with `gap_bytes` (a multiple of 8, so that nothing shifts) zeros between the
 /// encapsulation and its fields. `type` must be the sample's.
-[[nodiscard]] SampleBytes to_bytes(eprosima::fastdds::dds::TypeSupport type, const void* sample,
-                                   std::size_t gap_bytes);
+[[nodiscard]] SerializedSample to_bytes(eprosima::fastdds::dds::TypeSupport type,
+                                        const void* sample, std::size_t gap_bytes);
 
 /// False when the bytes are no sample of this type. `bytes` may be anything; they are not changed.
 [[nodiscard]] bool from_bytes(eprosima::fastdds::dds::TypeSupport type,
                               std::span<std::uint8_t> bytes, void* sample);
 
 /// Writes samples that are bytes already. Thread-safe.
-class UnreadWriter : public UntypedWriter {
+class SerializedSampleWriter : public UntypedWriter {
  public:
-  UnreadWriter(Participant& participant, const std::string& topic, const std::string& type_name,
-               const TopicQos& qos)
-      : UntypedWriter(participant, topic, unread_type(type_name), qos) {}
+  SerializedSampleWriter(Participant& participant, const std::string& topic,
+                         const std::string& type_name, const TopicQos& qos)
+      : UntypedWriter(participant, topic, serialized_sample_type(type_name), qos) {}
 
   /// False when there was no room. `params` gets the sample's own identity.
-  [[nodiscard]] bool write(const SampleBytes& sample,
+  [[nodiscard]] bool write(const SerializedSample& sample,
                            eprosima::fastrtps::rtps::WriteParams& params) {
     return write_untyped(&sample, params);
   }
 };
 
 /// Takes samples as bytes. One thread takes.
-class UnreadReader : public UntypedReader {
+class SerializedSampleReader : public UntypedReader {
  public:
-  UnreadReader(Participant& participant, const std::string& topic, const std::string& type_name,
-               const TopicQos& qos)
-      : UntypedReader(participant, topic, unread_type(type_name), qos) {}
+  SerializedSampleReader(Participant& participant, const std::string& topic,
+                         const std::string& type_name, const TopicQos& qos)
+      : UntypedReader(participant, topic, serialized_sample_type(type_name), qos) {}
 
   /// As Reader::take.
-  [[nodiscard]] bool take(SampleBytes& sample, eprosima::fastdds::dds::SampleInfo& info,
+  [[nodiscard]] bool take(SerializedSample& sample, eprosima::fastdds::dds::SampleInfo& info,
                           const std::stop_token& stop, std::chrono::milliseconds timeout) {
     return take_untyped(&sample, info, stop, timeout);
   }
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -4,11 +4,11 @@
 #include <optional>
 #include <string>
 
-#include "idl/dds/untyped_service_client.hpp"
-#include "idl/dds/type_support.hpp"
 #include "idl/dds/security/security_error.hpp"
+#include "idl/dds/type_support.hpp"
+#include "idl/dds/untyped_service_client.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Asks one ROS 2 service. Thread-safe: requests wait for each other.
 template <typename Request, typename Reply>
@@ -18,7 +18,7 @@ class ServiceClient {
   /// by refusal(); only asking it fails.
   ServiceClient(Participant& participant, const std::string& service) {
     try {
-      asker_.emplace(participant, service, type_support<Request>(), type_support<Reply>());
+      client_.emplace(participant, service, type_support<Request>(), type_support<Reply>());
     } catch (const NotPermitted& error) {
       refusal_ = error.what();
     }
@@ -31,25 +31,25 @@ class ServiceClient {
   /// NotPermitted.
   [[nodiscard]] bool wait_for_server(std::chrono::milliseconds timeout) const {
     if (!refusal_.empty()) throw NotPermitted(refusal_);
-    return asker_->wait_for_server(timeout);
+    return client_->wait_for_server(timeout);
   }
 
   /// Throws NotPermitted for a service that our permissions forbid. The answer; nothing after
   /// `timeout`. A request is sent again at half time: a server that was just restarted may have
   /// lost the first, and the first answer that comes is taken.
-  [[nodiscard]] std::optional<Reply> ask(const Request& request,
-                                         std::chrono::milliseconds timeout) {
+  [[nodiscard]] std::optional<Reply> call(const Request& request,
+                                          std::chrono::milliseconds timeout) {
     const std::scoped_lock lock(mutex_);
     if (!refusal_.empty()) throw NotPermitted(refusal_);
     Reply reply;
-    if (!asker_->ask(&request, &reply, timeout)) return std::nullopt;
+    if (!client_->call(&request, &reply, timeout)) return std::nullopt;
     return reply;
   }
 
  private:
   std::mutex mutex_;
   std::string refusal_;
-  std::optional<ServiceAsker> asker_;
+  std::optional<UntypedServiceClient> client_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

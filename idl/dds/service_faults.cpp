@@ -1,6 +1,6 @@
 #include "idl/dds/service_faults.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 void ServiceFaults::unreadable_request(const std::string& service) {
   count("unreadable_request_" + service);
@@ -20,4 +20,4 @@ void ServiceFaults::count(const std::string& name) {
   ++counts_[name];
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -5,7 +5,7 @@
 #include <mutex>
 #include <string>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Counts the requests that a process could not answer. Thread-safe.
 class ServiceFaults {
@@ -25,4 +25,4 @@ class ServiceFaults {
   std::map<std::string, std::uint64_t> counts_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

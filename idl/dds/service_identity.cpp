@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cassert>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 using eprosima::fastdds::dds::SampleInfo;
 using eprosima::fastrtps::rtps::GUID_t;
@@ -13,7 +13,7 @@ std::string request_topic(const std::string& service) { return "rq/" + service +
 
 std::string reply_topic(const std::string& service) { return "rr/" + service + "Reply"; }
 
-TopicQos service_qos() { return {.depth = 100, .bulky = true}; }
+TopicQos service_qos() { return {.depth = 100, .large_messages = true}; }
 
 SampleIdentity reply_identity(const SampleInfo& request) {
   SampleIdentity identity = request.sample_identity;
@@ -33,7 +33,7 @@ bool has_correlation_header(const GUID_t& request_writer) {
   return std::equal(cyclone.begin(), cyclone.end(), request_writer.guidPrefix.value);
 }
 
-std::optional<CorrelationHeader> take_correlation_header(SampleBytes& request) {
+std::optional<CorrelationHeader> take_correlation_header(SerializedSample& request) {
   CorrelationHeader header{};
   if (request.size() < encapsulation_bytes + header.size()) return std::nullopt;
   const auto begin = request.begin() + encapsulation_bytes;
@@ -49,9 +49,9 @@ std::optional<CorrelationHeader> take_correlation_header(SampleBytes& request) {
   return header;
 }
 
-void put_correlation_header(const CorrelationHeader& header, SampleBytes& reply) {
+void put_correlation_header(const CorrelationHeader& header, SerializedSample& reply) {
   assert(reply.size() >= encapsulation_bytes + header.size());
   std::ranges::copy(header, reply.begin() + encapsulation_bytes);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

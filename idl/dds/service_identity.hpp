@@ -8,7 +8,7 @@
 #include "idl/dds/qos.hpp"
 #include "idl/dds/serialized_sample.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// DDS names of a ROS 2 service's two topics; `service` as in "stillmap/get_status".
 [[nodiscard]] std::string request_topic(const std::string& service);
@@ -34,9 +34,9 @@ using CorrelationHeader = std::array<std::uint8_t, 16>;
 [[nodiscard]] bool has_correlation_header(const eprosima::fastrtps::rtps::GUID_t& request_writer);
 
 /// Takes the header out of the request. Nothing when the request is too short for one.
-[[nodiscard]] std::optional<CorrelationHeader> take_correlation_header(SampleBytes& request);
+[[nodiscard]] std::optional<CorrelationHeader> take_correlation_header(SerializedSample& request);
 
 /// Puts the header into a reply that has a gap for it (see to_bytes).
-void put_correlation_header(const CorrelationHeader& header, SampleBytes& reply);
+void put_correlation_header(const CorrelationHeader& header, SerializedSample& reply);
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

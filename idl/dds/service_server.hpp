@@ -5,10 +5,10 @@
 #include <thread>
 #include <utility>
 
-#include "idl/dds/untyped_service_server.hpp"
 #include "idl/dds/type_support.hpp"
+#include "idl/dds/untyped_service_server.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// A reply that can say in words why there is no answer.
 template <typename Reply>
@@ -30,24 +30,24 @@ class ServiceServer {
       std::function<Reply(const Request&)> answer, std::function<void()> idle = [] {})
       : answer_(std::move(answer)),
         idle_(std::move(idle)),
-        port_(participant, service, type_support<Request>(), type_support<Reply>()),
+        server_(participant, service, type_support<Request>(), type_support<Reply>()),
         thread_([this](const std::stop_token& stop) { serve(stop); }) {}
 
  private:
   void serve(const std::stop_token& stop) {
     Request request;
     while (!stop.stop_requested()) {
-      const auto call = port_.take(&request, stop, std::chrono::seconds(1));
+      const auto call = server_.take(&request, stop, std::chrono::seconds(1));
       if (!call) {
         idle_();
         continue;
       }
       if (call->is_readable) {
         const Reply reply = answer_(request);
-        port_.answer(*call, &reply);
+        server_.send_reply(*call, &reply);
       } else if constexpr (CarriesRefusal<Reply>) {
         const Reply reply = refusal();
-        port_.answer(*call, &reply);
+        server_.send_reply(*call, &reply);
       }
     }
   }
@@ -64,9 +64,9 @@ class ServiceServer {
 
   std::function<Reply(const Request&)> answer_;
   std::function<void()> idle_;
-  ServicePort port_;
+  UntypedServiceServer server_;
   // Last: stops before what it uses is gone.
   std::jthread thread_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

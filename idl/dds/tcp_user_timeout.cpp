@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 /// The port at which a socket waits for connections; nothing for other files.
@@ -30,7 +30,7 @@ std::optional<std::uint16_t> listening_port_of(int fd) {
 
 }  // namespace
 
-void drop_stalled_peers(std::uint16_t listening_port, std::chrono::milliseconds patience) {
+void set_tcp_user_timeout(std::uint16_t listening_port, std::chrono::milliseconds timeout) {
   // Fast DDS shows its sockets to nobody. An accepted connection inherits what is set here.
   std::error_code none;
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd", none)) {
@@ -38,9 +38,9 @@ void drop_stalled_peers(std::uint16_t listening_port, std::chrono::milliseconds 
     int fd = -1;
     std::from_chars(name.data(), name.data() + name.size(), fd);
     if (listening_port_of(fd) != listening_port) continue;
-    const auto timeout_ms = static_cast<unsigned int>(patience.count());
+    const auto timeout_ms = static_cast<unsigned int>(timeout.count());
     ::setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &timeout_ms, sizeof timeout_ms);
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

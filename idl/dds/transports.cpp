@@ -15,7 +15,7 @@
 
 #include "idl/dds/dds_error.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 using namespace eprosima::fastdds::rtps;
 
@@ -37,13 +37,13 @@ void require_shared_memory_room(std::uint64_t segment_mib) {
 }
 
 // Of a peer without a port, as many processes are looked for.
-constexpr std::uint32_t processes_of_peer = 16;
+constexpr std::uint32_t max_participants_per_peer = 16;
 
 std::shared_ptr<TransportDescriptorInterface> udp_transport(const DdsOptions& options) {
   const auto udp = std::make_shared<UDPv4TransportDescriptor>();
   udp->sendBufferSize = udp->receiveBufferSize = options.socket_buffer_bytes;
   udp->maxMessageSize = options.max_datagram_bytes;
-  udp->maxInitialPeersRange = processes_of_peer;
+  udp->maxInitialPeersRange = max_participants_per_peer;
   udp->interfaceWhiteList = options.interfaces;
   return udp;
 }
@@ -110,4 +110,4 @@ std::uint32_t granted_socket_buffer_bytes(std::uint32_t wanted_bytes) {
   return static_cast<std::uint32_t>(granted) / 2;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -5,7 +5,7 @@
 
 #include "idl/dds/dds_options.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Sets what carries the participant's messages: UDP with large socket buffers or TCP, and shared
 /// memory unless it is switched off.
@@ -16,4 +16,4 @@ void set_transports(const DdsOptions& options, eprosima::fastdds::dds::DomainPar
 /// no socket can be made.
 [[nodiscard]] std::uint32_t granted_socket_buffer_bytes(std::uint32_t wanted_bytes);
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -3,7 +3,7 @@
 #include "nav_msgsPubSubTypes.h"
 #include "traversable_areaPubSubTypes.h"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using eprosima::fastdds::dds::TypeSupport;
@@ -12,39 +12,39 @@ using eprosima::fastdds::dds::TypeSupport;
 
 template <>
 TypeSupport type_support<nav_msgs::msg::OccupancyGrid>() {
-  return make<nav_msgs::msg::OccupancyGridPubSubType>();
+  return make_bounded_type_support<nav_msgs::msg::OccupancyGridPubSubType>();
 }
 template <>
 TypeSupport type_support<nav_msgs::srv::GetMap_Request>() {
-  return make<nav_msgs::srv::GetMap_RequestPubSubType>();
+  return make_bounded_type_support<nav_msgs::srv::GetMap_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<nav_msgs::srv::GetMap_Response>() {
-  return make<nav_msgs::srv::GetMap_ResponsePubSubType>();
+  return make_bounded_type_support<nav_msgs::srv::GetMap_ResponsePubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::GetTraversableArea_Request>() {
-  return make<stillmap_msgs::srv::GetTraversableArea_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::GetTraversableArea_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::GetTraversableArea_Response>() {
-  return make<stillmap_msgs::srv::GetTraversableArea_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::GetTraversableArea_ResponsePubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::CheckPath_Request>() {
-  return make<stillmap_msgs::srv::CheckPath_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::CheckPath_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::CheckPath_Response>() {
-  return make<stillmap_msgs::srv::CheckPath_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::CheckPath_ResponsePubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::NearestTraversable_Request>() {
-  return make<stillmap_msgs::srv::NearestTraversable_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::NearestTraversable_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::NearestTraversable_Response>() {
-  return make<stillmap_msgs::srv::NearestTraversable_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::NearestTraversable_ResponsePubSubType>();
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -1,7 +1,7 @@
 #include "idl/dds/type_support.hpp"
 
-#include "idl/dds/dynamic_type.hpp"
 #include "idl/dds/bounded_type_support.hpp"
+#include "idl/dds/dynamic_type.hpp"
 #include "nav_msgsPubSubTypes.h"
 #include "octomap_msgsPubSubTypes.h"
 #include "rmw_dds_commonPubSubTypes.h"
@@ -12,7 +12,7 @@
 #include "tf2_msgsPubSubTypes.h"
 #include "tile_indexPubSubTypes.h"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using eprosima::fastdds::dds::TypeSupport;
@@ -21,120 +21,121 @@ using eprosima::fastdds::dds::TypeSupport;
 
 template <>
 TypeSupport type_support<sensor_msgs::msg::PointCloud2>() {
-  return make<sensor_msgs::msg::PointCloud2PubSubType>();
+  return make_bounded_type_support<sensor_msgs::msg::PointCloud2PubSubType>();
 }
 template <>
 TypeSupport type_support<nav_msgs::msg::Odometry>() {
-  return make<nav_msgs::msg::OdometryPubSubType>();
+  return make_bounded_type_support<nav_msgs::msg::OdometryPubSubType>();
 }
 template <>
 TypeSupport type_support<nav_msgs::msg::Path>() {
-  return make<nav_msgs::msg::PathPubSubType>();
+  return make_bounded_type_support<nav_msgs::msg::PathPubSubType>();
 }
 template <>
 TypeSupport type_support<tf2_msgs::msg::TFMessage>() {
-  return make<tf2_msgs::msg::TFMessagePubSubType>();
+  return make_bounded_type_support<tf2_msgs::msg::TFMessagePubSubType>();
 }
 template <>
 TypeSupport type_support<rmw_dds_common::msg::ParticipantEntitiesInfo>() {
-  return make<rmw_dds_common::msg::ParticipantEntitiesInfoPubSubType>();
+  return make_bounded_type_support<rmw_dds_common::msg::ParticipantEntitiesInfoPubSubType>();
 }
 template <>
 TypeSupport type_support<rmw_dds_common_iron::msg::ParticipantEntitiesInfo>() {
-  TypeSupport type = make<rmw_dds_common_iron::msg::ParticipantEntitiesInfoPubSubType>();
+  TypeSupport type =
+      make_bounded_type_support<rmw_dds_common_iron::msg::ParticipantEntitiesInfoPubSubType>();
   // Two layouts of one ROS 2 type: on the wire both have its name.
   type->setName("rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_");
   return type;
 }
 template <>
 TypeSupport type_support<stillmap_msgs::msg::TileInfo>() {
-  TypeSupport type = make<stillmap_msgs::msg::TileInfoPubSubType>();
-  describe_tile_info(type);
+  TypeSupport type = make_bounded_type_support<stillmap_msgs::msg::TileInfoPubSubType>();
+  register_tile_info_type(type);
   return type;
 }
 template <>
 TypeSupport type_support<stillmap_msgs::msg::MapTile>() {
-  return make<stillmap_msgs::msg::MapTilePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::msg::MapTilePubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::msg::Status>() {
-  return make<stillmap_msgs::msg::StatusPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::msg::StatusPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::GetStaticMap_Request>() {
-  return make<stillmap_msgs::srv::GetStaticMap_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::GetStaticMap_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::GetStaticMap_Response>() {
-  return make<stillmap_msgs::srv::GetStaticMap_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::GetStaticMap_ResponsePubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::GetTileVersions_Request>() {
-  return make<stillmap_msgs::srv::GetTileVersions_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::GetTileVersions_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::GetTileVersions_Response>() {
-  return make<stillmap_msgs::srv::GetTileVersions_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::GetTileVersions_ResponsePubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::GetTiles_Request>() {
-  return make<stillmap_msgs::srv::GetTiles_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::GetTiles_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::GetTiles_Response>() {
-  return make<stillmap_msgs::srv::GetTiles_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::GetTiles_ResponsePubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::GetStatus_Request>() {
-  return make<stillmap_msgs::srv::GetStatus_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::GetStatus_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::GetStatus_Response>() {
-  return make<stillmap_msgs::srv::GetStatus_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::GetStatus_ResponsePubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::SaveMap_Request>() {
-  return make<stillmap_msgs::srv::SaveMap_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::SaveMap_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::SaveMap_Response>() {
-  return make<stillmap_msgs::srv::SaveMap_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::SaveMap_ResponsePubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::LoadMap_Request>() {
-  return make<stillmap_msgs::srv::LoadMap_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::LoadMap_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::LoadMap_Response>() {
-  return make<stillmap_msgs::srv::LoadMap_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::LoadMap_ResponsePubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::Reset_Request>() {
-  return make<stillmap_msgs::srv::Reset_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::Reset_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::Reset_Response>() {
-  return make<stillmap_msgs::srv::Reset_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::Reset_ResponsePubSubType>();
 }
 template <>
 TypeSupport type_support<octomap_msgs::msg::Octomap>() {
-  return make<octomap_msgs::msg::OctomapPubSubType>();
+  return make_bounded_type_support<octomap_msgs::msg::OctomapPubSubType>();
 }
 template <>
 TypeSupport type_support<octomap_msgs::srv::GetOctomap_Request>() {
-  return make<octomap_msgs::srv::GetOctomap_RequestPubSubType>();
+  return make_bounded_type_support<octomap_msgs::srv::GetOctomap_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<octomap_msgs::srv::GetOctomap_Response>() {
-  return make<octomap_msgs::srv::GetOctomap_ResponsePubSubType>();
+  return make_bounded_type_support<octomap_msgs::srv::GetOctomap_ResponsePubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::QueryOccupancy_Request>() {
-  return make<stillmap_msgs::srv::QueryOccupancy_RequestPubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::QueryOccupancy_RequestPubSubType>();
 }
 template <>
 TypeSupport type_support<stillmap_msgs::srv::QueryOccupancy_Response>() {
-  return make<stillmap_msgs::srv::QueryOccupancy_ResponsePubSubType>();
+  return make_bounded_type_support<stillmap_msgs::srv::QueryOccupancy_ResponsePubSubType>();
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 std::chrono::milliseconds left_until(std::chrono::steady_clock::time_point deadline) {
@@ -13,23 +13,24 @@ std::chrono::milliseconds left_until(std::chrono::steady_clock::time_point deadl
 
 }  // namespace
 
-ServiceAsker::ServiceAsker(Participant& participant, const std::string& service,
-                           TypeSupport request_type, TypeSupport reply_type)
+UntypedServiceClient::UntypedServiceClient(Participant& participant, const std::string& service,
+                                           TypeSupport request_type, TypeSupport reply_type)
     : request_type_(std::move(request_type)),
       reply_type_(std::move(reply_type)),
       requests_(participant, request_topic(service), request_type_.get_type_name(), service_qos()),
       replies_(participant, reply_topic(service), reply_type_.get_type_name(), service_qos()) {}
 
-bool ServiceAsker::wait_for_server(std::chrono::milliseconds timeout) const {
+bool UntypedServiceClient::wait_for_server(std::chrono::milliseconds timeout) const {
   const auto deadline = Clock::now() + timeout;
   return requests_.readers().wait_for_any(timeout) &&
          replies_.events().wait_for_writer(left_until(deadline));
 }
 
-bool ServiceAsker::ask(const void* request, void* reply, std::chrono::milliseconds timeout) {
+bool UntypedServiceClient::call(const void* request, void* reply,
+                                std::chrono::milliseconds timeout) {
   const auto now = Clock::now();
   if (!wait_for_server(timeout)) return false;
-  const SampleBytes bytes = to_bytes(request_type_, request, 0);
+  const SerializedSample bytes = to_bytes(request_type_, request, 0);
   sent_.clear();
   for (const auto deadline : {now + timeout / 2, now + timeout}) {
     send(bytes);
@@ -38,14 +39,14 @@ bool ServiceAsker::ask(const void* request, void* reply, std::chrono::millisecon
   return false;
 }
 
-void ServiceAsker::send(const SampleBytes& request) {
+void UntypedServiceClient::send(const SerializedSample& request) {
   eprosima::fastrtps::rtps::WriteParams params;
   params.related_sample_identity().writer_guid() = replies_.guid();
   if (requests_.write(request, params)) sent_.push_back(params.sample_identity());
 }
 
-bool ServiceAsker::receive(void* reply, Clock::time_point deadline) {
-  SampleBytes bytes;
+bool UntypedServiceClient::receive(void* reply, Clock::time_point deadline) {
+  SerializedSample bytes;
   eprosima::fastdds::dds::SampleInfo info;
   while (replies_.take(bytes, info, {}, left_until(deadline))) {
     if (is_ours(info.related_sample_identity) && from_bytes(reply_type_, bytes, reply)) return true;
@@ -53,7 +54,7 @@ bool ServiceAsker::receive(void* reply, Clock::time_point deadline) {
   return false;
 }
 
-bool ServiceAsker::is_ours(const eprosima::fastrtps::rtps::SampleIdentity& answered) const {
+bool UntypedServiceClient::is_ours(const eprosima::fastrtps::rtps::SampleIdentity& answered) const {
   return std::ranges::any_of(sent_, [&](const auto& request) {
     return answered.sequence_number() == request.sequence_number() &&
            (answered.writer_guid() == replies_.guid() ||
@@ -61,4 +62,4 @@ bool ServiceAsker::is_ours(const eprosima::fastrtps::rtps::SampleIdentity& answe
   });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

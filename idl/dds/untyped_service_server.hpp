@@ -5,11 +5,11 @@
 #include <optional>
 #include <string>
 
+#include "idl/dds/serialized_sample.hpp"
 #include "idl/dds/service_faults.hpp"
 #include "idl/dds/service_identity.hpp"
-#include "idl/dds/serialized_sample.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Who asked, and how the reply is to be tied to the request.
 struct ServiceCall {
@@ -25,13 +25,13 @@ struct ServiceCall {
 
 /// The server's end of one ROS 2 service, for clients of rmw_fastrtps and of rmw_cyclonedds. One
 /// thread uses it.
-class ServicePort {
+class UntypedServiceServer {
  public:
   using TypeSupport = eprosima::fastdds::dds::TypeSupport;
 
   /// Throws DdsError when the topics cannot be made.
-  ServicePort(Participant& participant, const std::string& service, TypeSupport request_type,
-              TypeSupport reply_type);
+  UntypedServiceServer(Participant& participant, const std::string& service,
+                       TypeSupport request_type, TypeSupport reply_type);
 
   /// Waits for the next request and reads it into `request`, an object of the request's type;
   /// meanwhile sends replies whose readers have been found. Nothing after `timeout`, on a stop, or
@@ -40,18 +40,18 @@ class ServicePort {
                                                 std::chrono::milliseconds timeout);
 
   /// Sends the reply as soon as its reader is found; a reader that is not found in time gets none.
-  void answer(const ServiceCall& call, const void* reply);
+  void send_reply(const ServiceCall& call, const void* reply);
 
  private:
   using Clock = std::chrono::steady_clock;
 
   struct WaitingReply {
     ServiceCall call;
-    SampleBytes bytes;
+    SerializedSample bytes;
     Clock::time_point deadline;
   };
 
-  [[nodiscard]] std::optional<ServiceCall> read(SampleBytes& bytes,
+  [[nodiscard]] std::optional<ServiceCall> read(SerializedSample& bytes,
                                                 const eprosima::fastdds::dds::SampleInfo& info,
                                                 void* request);
   void remember(const eprosima::fastrtps::rtps::GUID_t& request_writer);
@@ -64,11 +64,11 @@ class ServicePort {
   ServiceFaults& faults_;
   TypeSupport request_type_;
   TypeSupport reply_type_;
-  UnreadWriter replies_;
-  UnreadReader requests_;
+  SerializedSampleWriter replies_;
+  SerializedSampleReader requests_;
   std::deque<WaitingReply> waiting_;
   /// When each client of rmw_cyclonedds asked first.
   std::map<eprosima::fastrtps::rtps::GUID_t, Clock::time_point> first_requests_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

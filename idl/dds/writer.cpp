@@ -4,7 +4,7 @@
 
 #include "idl/dds/dds_error.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 using namespace eprosima::fastdds::dds;
 using eprosima::fastrtps::rtps::WriteParams;
@@ -32,7 +32,7 @@ bool MatchedReaders::has(const Guid& reader) const {
   return readers_.contains(reader);
 }
 
-int MatchedReaders::count_of_peer(const Guid& endpoint) const {
+int MatchedReaders::count_of_participant(const Guid& endpoint) const {
   const std::scoped_lock lock(mutex_);
   return static_cast<int>(std::ranges::count(readers_, endpoint.guidPrefix, &Guid::guidPrefix));
 }
@@ -74,8 +74,8 @@ void UntypedWriter::dispose_untyped(const void* sample) {
   writer_->dispose(mutable_sample(sample), HANDLE_NIL);
 }
 
-void UntypedWriter::forget_untyped(const void* sample) {
+void UntypedWriter::unregister_untyped(const void* sample) {
   writer_->unregister_instance(mutable_sample(sample), HANDLE_NIL);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -12,7 +12,7 @@
 #include "idl/dds/participant.hpp"
 #include "idl/dds/type_support.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// The readers that a writer has found.
 class MatchedReaders : public eprosima::fastdds::dds::DataWriterListener {
@@ -23,7 +23,7 @@ class MatchedReaders : public eprosima::fastdds::dds::DataWriterListener {
   [[nodiscard]] bool wait_for_any(std::chrono::milliseconds timeout) const;
   [[nodiscard]] bool has(const Guid& reader) const;
   /// Readers in the process that `endpoint` belongs to.
-  [[nodiscard]] int count_of_peer(const Guid& endpoint) const;
+  [[nodiscard]] int count_of_participant(const Guid& endpoint) const;
 
  private:
   void on_publication_matched(
@@ -52,7 +52,7 @@ class UntypedWriter {
   [[nodiscard]] bool write_untyped(const void* sample,
                                    eprosima::fastrtps::rtps::WriteParams& params);
   void dispose_untyped(const void* sample);
-  void forget_untyped(const void* sample);
+  void unregister_untyped(const void* sample);
 
  private:
   std::string topic_;
@@ -80,7 +80,7 @@ class Writer : public UntypedWriter {
   void dispose(const T& sample) { dispose_untyped(&sample); }
 
   /// Keeps the instance with the sample's key for late joiners no more; who has it keeps it.
-  void forget(const T& sample) { forget_untyped(&sample); }
+  void unregister(const T& sample) { unregister_untyped(&sample); }
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -3,9 +3,9 @@
 #include <cstdint>
 #include <string>
 
-namespace stillmap {
+namespace stillmap::dds {
 
-/// How much a finding matters.
+/// How much a diagnostic matters.
 enum class Severity : std::uint8_t {
   /// It works, but may not for long, or not as fast as it could.
   advice = 0,
@@ -14,14 +14,14 @@ enum class Severity : std::uint8_t {
 };
 
 /// Something that is wrong, with what shows it and what would help.
-struct Finding {
+struct Diagnostic {
   Severity severity = Severity::problem;
   /// One line: "no scans: nobody publishes rt/points".
   std::string what;
   /// What was seen.
   std::string evidence;
   /// What to do.
-  std::string way_out;
+  std::string hint;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Which state of which map an answer shows. Versions compare only within one map_id.
 struct MapIdentity {
@@ -12,4 +12,4 @@ struct MapIdentity {
   double voxel_size_m = 0.0;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -4,7 +4,7 @@
 
 #include "idl/dds/service_identity.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using Names = std::vector<std::string>;
@@ -19,8 +19,8 @@ void append(Names& names, const Names& more) {
 }
 
 Names all_services(const ServiceNames& services) {
-  Names all = services.reading;
-  append(all, services.changing);
+  Names all = services.read_only;
+  append(all, services.modifying);
   return all;
 }
 
@@ -31,14 +31,14 @@ Names inputs(const TopicNames& names) {
   return topics;
 }
 
-void let_ask(Access& access, const Names& services) {
+void allow_calling(Access& access, const Names& services) {
   for (const std::string& service : services) {
     access.publish.push_back(request_topic(service));
     access.subscribe.push_back(reply_topic(service));
   }
 }
 
-void let_answer(Access& access, const Names& services) {
+void allow_serving(Access& access, const Names& services) {
   for (const std::string& service : services) {
     access.publish.push_back(reply_topic(service));
     access.subscribe.push_back(request_topic(service));
@@ -93,10 +93,10 @@ ServiceNames service_names(const std::string& name_space) {
               octomap_binary, octomap_full, get_removed, restore_removed, query_occupancy,
               get_traversable_area, check_path, nearest_traversable, get_map] =
       Services::in(name_space);
-  return {.reading = {get_static_map, get_tile_versions, get_tiles, get_status, octomap_binary,
-                      octomap_full, get_removed, query_occupancy, get_traversable_area, check_path,
-                      nearest_traversable, get_map},
-          .changing = {save_map, load_map, reset, restore_removed}};
+  return {.read_only = {get_static_map, get_tile_versions, get_tiles, get_status, octomap_binary,
+                        octomap_full, get_removed, query_occupancy, get_traversable_area,
+                        check_path, nearest_traversable, get_map},
+          .modifying = {save_map, load_map, reset, restore_removed}};
 }
 
 Access access_of(Role role, const TopicNames& names) {
@@ -107,21 +107,21 @@ Access access_of(Role role, const TopicNames& names) {
     case Role::server:
       append(access.publish, outputs);
       append(access.subscribe, inputs(names));
-      let_answer(access, all_services(services));
+      allow_serving(access, all_services(services));
       break;
     case Role::sensor:
       append(access.publish, inputs(names));
       append(access.subscribe, outputs);
-      let_ask(access, {Services::in(names.name_space).get_status});
+      allow_calling(access, {Services::in(names.name_space).get_status});
       break;
     case Role::planner:
     case Role::operator_of_server:
       append(access.subscribe, outputs);
       append(access.subscribe, inputs(names));
-      let_ask(access, role == Role::planner ? services.reading : all_services(services));
+      allow_calling(access, role == Role::planner ? services.read_only : all_services(services));
       break;
   }
   return access;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

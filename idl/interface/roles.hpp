@@ -8,7 +8,7 @@
 #include "idl/dds/security/access.hpp"
 #include "idl/interface/topics.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// What an identity of a secured domain is there for.
 enum class Role {
@@ -41,8 +41,8 @@ struct TopicNames {
 
 /// ROS 2 names of the services, by what they do to the map.
 struct ServiceNames {
-  std::vector<std::string> reading;
-  std::vector<std::string> changing;
+  std::vector<std::string> read_only;
+  std::vector<std::string> modifying;
 };
 [[nodiscard]] ServiceNames service_names(const std::string& name_space);
 
@@ -50,4 +50,4 @@ struct ServiceNames {
 /// not here does not compile.
 [[nodiscard]] Access access_of(Role role, const TopicNames& names);
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 std::string every_nth_scan(std::uint32_t n) {
   if (n <= 1) return "every scan";
@@ -27,4 +27,4 @@ std::uint64_t ServerStatus::dropped() const {
                          });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -8,7 +8,7 @@
 #include "core/odometry/odometry_state.hpp"
 #include "idl/interface/diagnostic.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// What the server does with scans that come faster than it maps them.
 enum class DeliveryMode : std::uint8_t {
@@ -42,7 +42,7 @@ struct SegmentationStatus {
   std::uint32_t full_columns = 0;
   /// Shares of the last scans: with labels of their own, carried ones, none.
   double fresh_share = 0.0;
-  double carried_share = 0.0;
+  double propagated_share = 0.0;
   double unlabelled_share = 0.0;
 };
 
@@ -99,7 +99,7 @@ struct ServerStatus {
   /// recording.
   double scan_delay_s = 0.0;
   /// What is wrong with the server's peers and its machine.
-  std::vector<Finding> findings;
+  std::vector<Diagnostic> diagnostics;
 
   /// Value of a counter; 0 when it never counted.
   [[nodiscard]] std::uint64_t counter(std::string_view counter_name) const;
@@ -107,4 +107,4 @@ struct ServerStatus {
   [[nodiscard]] std::uint64_t dropped() const;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

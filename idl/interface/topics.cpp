@@ -1,6 +1,6 @@
 #include "idl/interface/topics.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 // A map of 20 km by 20 km in tiles of 20 m would be a million; a drive touches some thousands.
@@ -16,20 +16,20 @@ TopicSpec<T> symmetric(const std::string& dds_name, const TopicQos& qos) {
 Topics Topics::in(const std::string& name_space) {
   const std::string prefix = "rt/" + name_space + "/";
   const TopicQos latched{.transient_local = true, .depth = 1};
-  const TopicQos large{.transient_local = true, .depth = 1, .bulky = true};
+  const TopicQos large{.transient_local = true, .depth = 1, .large_messages = true};
   const TopicQos keyed{.transient_local = true, .depth = 1, .max_keys = max_tiles};
   const TopicQos large_keyed{
-      .transient_local = true, .depth = 1, .max_keys = max_tiles, .bulky = true};
+      .transient_local = true, .depth = 1, .max_keys = max_tiles, .large_messages = true};
   // Deep, so that a client that stalls for a minute still gets every pose.
   const TopicQos every_pose{.depth = 1000};
-  const TopicQos newest{.reliable = false, .depth = 1, .bulky = true};
+  const TopicQos newest{.reliable = false, .depth = 1, .large_messages = true};
   return {
       .odometry = symmetric<nav_msgs::msg::Odometry>(prefix + "odometry", every_pose),
       .tf = symmetric<tf2_msgs::msg::TFMessage>("rt/tf", {.depth = 100}),
       .path = symmetric<nav_msgs::msg::Path>(prefix + "path", large),
       // RViz2 asks for reliable clouds unless it is told otherwise.
       .scan = {.dds_name = prefix + "scan",
-               .writer = {.depth = 1, .bulky = true},
+               .writer = {.depth = 1, .large_messages = true},
                .reader = newest},
       .static_cloud = symmetric<sensor_msgs::msg::PointCloud2>(prefix + "static_cloud", large),
       .tile_index = symmetric<stillmap_msgs::msg::TileInfo>(prefix + "tile_index", keyed),
@@ -41,11 +41,11 @@ Topics Topics::in(const std::string& name_space) {
 }
 
 TopicSpec<sensor_msgs::msg::PointCloud2> points_topic(const std::string& ros_name,
-                                                      DeliveryMode delivery, int scans_waiting) {
+                                                      DeliveryMode delivery, int queue_length) {
   const bool every = delivery == DeliveryMode::every;
   return {.dds_name = "rt/" + ros_name,
-          .writer = {.depth = scans_waiting, .keep_all = every},
-          .reader = {.reliable = every, .depth = scans_waiting, .keep_all = every}};
+          .writer = {.depth = queue_length, .keep_all = every},
+          .reader = {.reliable = every, .depth = queue_length, .keep_all = every}};
 }
 
 TopicSpec<nav_msgs::msg::Odometry> odometry_prior_topic(const std::string& ros_name) {
@@ -72,4 +72,4 @@ Services Services::in(const std::string& name_space) {
           .get_map = prefix + "get_map"};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -7,7 +7,7 @@
 #include "idl/interface/server_status.hpp"
 #include "idl/msg/wire_types.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Version of every struct in stillmap_msgs.idl that carries one.
 inline constexpr std::uint8_t wire_format_version = 4;
@@ -41,10 +41,10 @@ struct Topics {
 };
 
 /// Incoming scans as the server reads them: with `every`, a publisher must be reliable and waits
-/// when `scans_waiting` are not taken yet.
+/// when `queue_length` are not taken yet.
 [[nodiscard]] TopicSpec<sensor_msgs::msg::PointCloud2> points_topic(const std::string& ros_name,
                                                                     DeliveryMode delivery,
-                                                                    int scans_waiting);
+                                                                    int queue_length);
 
 /// The odometry prior (nav_msgs/Odometry) as the server reads it.
 [[nodiscard]] TopicSpec<nav_msgs::msg::Odometry> odometry_prior_topic(const std::string& ros_name);
@@ -73,4 +73,4 @@ struct Services {
   [[nodiscard]] static Services in(const std::string& name_space);
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

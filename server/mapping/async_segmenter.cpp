@@ -5,13 +5,13 @@
 #include <exception>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
-constexpr std::uint32_t misses_until_too_slow = 3;
-constexpr std::uint32_t unwaited_until_next_try = 4;
+constexpr std::uint32_t max_misses = 3;
+constexpr std::uint32_t scans_until_retry = 4;
 /// A scan that is due is put off by at most so many others while the mapper lags behind.
-constexpr std::uint32_t most_put_off = 10;
+constexpr std::uint32_t max_postponed_scans = 10;
 
 double milliseconds(std::chrono::steady_clock::duration time) {
   return std::chrono::duration<double, std::milli>(time).count();
@@ -19,65 +19,66 @@ double milliseconds(std::chrono::steady_clock::duration time) {
 
 }  // namespace
 
-std::chrono::milliseconds label_budget(const ServerConfig& config) {
+std::chrono::milliseconds segmentation_budget(const ServerConfig& config) {
   const bool every_scan_counts = config.input.delivery == Delivery::every;
-  const LabelOrigin source = config.labels.source;
-  const bool takes_no_time = source == LabelOrigin::stream || source == LabelOrigin::none;
+  const LabelProvider source = config.labels.source;
+  const bool takes_no_time = source == LabelProvider::stream || source == LabelProvider::none;
   return std::chrono::milliseconds(every_scan_counts || takes_no_time ? 0U
                                                                       : config.labels.budget_ms);
 }
 
-PacedLabels::PacedLabels(std::unique_ptr<LabelSource> source, std::chrono::milliseconds budget,
-                         const ScanQueue& queue, Statistics& statistics)
+AsyncSegmenter::AsyncSegmenter(std::unique_ptr<Segmenter> source, std::chrono::milliseconds budget,
+                               const ScanQueue& queue, Statistics& statistics)
     : source_(std::move(source)),
       name_(source_->name()),
       full_columns_(source_->image_columns()),
       budget_(budget),
       queue_(queue),
       statistics_(statistics),
-      cadence_(source_->costs()) {
-  show_pace();
+      rate_controller_(source_->relative_costs()) {
+  report_rate();
   if (!may_skip_scans()) return;
   thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
 }
 
-PacedLabels::~PacedLabels() = default;
+AsyncSegmenter::~AsyncSegmenter() = default;
 
-LabelFeed::Answer PacedLabels::offer(const Scan& scan) {
-  Answer answer;
+SegmentationPipeline::Output AsyncSegmenter::submit(const Scan& scan) {
+  Output output;
   if (!may_skip_scans()) {
-    answer.finished.push_back(segment(scan));
-    return answer;
+    output.finished.push_back(segment(scan));
+    return output;
   }
   std::unique_lock lock(mutex_);
   if (is_due()) {
     job_ = scan;
     busy_ = true;
-    offers_since_taken_ = 0;
+    scans_since_segmented_ = 0;
     changed_.notify_all();
-    if (is_worth_the_wait()) {
+    if (should_wait()) {
       const bool in_time = changed_.wait_for(lock, budget_, [this] { return !busy_; });
       misses_ = in_time ? 0 : misses_ + 1;
     }
-    answer.pending = busy_;
+    output.pending = busy_;
   }
-  answer.finished = std::exchange(finished_, {});
-  return answer;
+  output.finished = std::exchange(finished_, {});
+  return output;
 }
 
-bool PacedLabels::is_due() {
-  ++offers_since_taken_;
-  if (busy_ || offers_since_taken_ < cadence_.every()) return false;
-  return queue_.waiting() == 0 || offers_since_taken_ >= cadence_.every() + most_put_off;
+bool AsyncSegmenter::is_due() {
+  ++scans_since_segmented_;
+  if (busy_ || scans_since_segmented_ < rate_controller_.every()) return false;
+  return queue_.waiting() == 0 ||
+         scans_since_segmented_ >= rate_controller_.every() + max_postponed_scans;
 }
 
 // A source that was late several times is too slow. But one that runs beside the odometry takes
 // longer than one that is waited for, so it gets another chance now and then.
-bool PacedLabels::is_worth_the_wait() {
-  return misses_ < misses_until_too_slow || ++unwaited_ % unwaited_until_next_try == 0;
+bool AsyncSegmenter::should_wait() {
+  return misses_ < max_misses || ++scans_without_wait_ % scans_until_retry == 0;
 }
 
-void PacedLabels::work(const std::stop_token& stop) {
+void AsyncSegmenter::work(const std::stop_token& stop) {
   while (true) {
     std::unique_lock lock(mutex_);
     if (!changed_.wait(lock, stop, [this] { return job_.has_value(); })) return;
@@ -91,52 +92,54 @@ void PacedLabels::work(const std::stop_token& stop) {
   }
 }
 
-ScanLabels PacedLabels::segment(const Scan& scan) {
+ScanLabels AsyncSegmenter::segment(const Scan& scan) {
   const auto began = Clock::now();
   try {
-    ScanLabels labels{scan.stamp_ns, source_->label(scan)};
-    statistics_.labels_worked();
-    segmented(milliseconds(Clock::now() - began));
+    ScanLabels labels{scan.stamp_ns, source_->segment(scan)};
+    statistics_.segmentation_succeeded();
+    record_duration(milliseconds(Clock::now() - began));
     return labels;
   } catch (const std::exception& error) {
-    statistics_.labels_failed(error.what());
-    warnings_.warn("label_failure", std::string("segmentation failed: ") + error.what());
+    statistics_.segmentation_failed(error.what());
+    throttled_log_.warn("label_failure", std::string("segmentation failed: ") + error.what());
     return {scan.stamp_ns, {}};
   }
 }
 
-void PacedLabels::segmented(double network_ms) {
+void AsyncSegmenter::record_duration(double network_ms) {
   statistics_.add_latency("network", network_ms);
   const std::scoped_lock lock(mutex_);
-  const std::pair before(cadence_.coarseness(), cadence_.every());
+  const std::pair before(rate_controller_.resolution_level(), rate_controller_.every());
   // Of the sensor, not of the scans that are offered: an overloaded server drops scans. Where every
   // scan gets its labels, none comes too fast.
-  cadence_.scan_segmented(network_ms, statistics_.besides_labels_ms(),
-                          may_skip_scans() ? statistics_.receive_period_ms() : 0.0);
-  const std::pair now(cadence_.coarseness(), cadence_.every());
-  source_->set_coarseness(now.first);
-  show_pace();
-  if (now != before) tell_of_pace(now > before);
+  rate_controller_.add_measurement(network_ms, statistics_.other_stages_ms(),
+                                   may_skip_scans() ? statistics_.receive_period_ms() : 0.0);
+  const std::pair now(rate_controller_.resolution_level(), rate_controller_.every());
+  source_->set_resolution_level(now.first);
+  report_rate();
+  if (now != before) log_rate_change(now > before);
 }
 
-void PacedLabels::show_pace() {
-  statistics_.segmenting({.every = cadence_.every(),
-                          .network_ms = cadence_.network_ms(),
-                          .image_columns = static_cast<std::uint32_t>(source_->image_columns()),
-                          .full_columns = static_cast<std::uint32_t>(full_columns_),
-                          .fresh_share = 0.0,
-                          .carried_share = 0.0,
-                          .unlabelled_share = 0.0});
+void AsyncSegmenter::report_rate() {
+  statistics_.set_segmentation_status(
+      {.every = rate_controller_.every(),
+       .network_ms = rate_controller_.network_ms(),
+       .image_columns = static_cast<std::uint32_t>(source_->image_columns()),
+       .full_columns = static_cast<std::uint32_t>(full_columns_),
+       .fresh_share = 0.0,
+       .propagated_share = 0.0,
+       .unlabelled_share = 0.0});
 }
 
-void PacedLabels::tell_of_pace(bool is_slower) const {
+void AsyncSegmenter::log_rate_change(bool is_slower) const {
   const int columns = source_->image_columns();
   spdlog::log(is_slower ? spdlog::level::warn : spdlog::level::info,
               "{} is segmented now{}: that takes {:.0f} ms, all else {:.0f} ms, and scans come "
               "every {:.0f} ms",
-              every_nth_scan(cadence_.every()),
+              dds::every_nth_scan(rate_controller_.every()),
               columns > 0 ? " in " + std::to_string(columns) + " columns" : "",
-              cadence_.network_ms(), statistics_.besides_labels_ms(), cadence_.period_ms());
+              rate_controller_.network_ms(), statistics_.other_stages_ms(),
+              rate_controller_.period_ms());
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

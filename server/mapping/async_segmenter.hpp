@@ -11,32 +11,32 @@
 
 #include "config/loaders/server_config.hpp"
 #include "core/segmentation_pipeline.hpp"
-#include "server/mapping/segmentation_rate_controller.hpp"
-#include "server/monitoring/throttled_log.hpp"
 #include "server/mapping/scan_queue.hpp"
+#include "server/mapping/segmentation_rate_controller.hpp"
 #include "server/monitoring/statistics.hpp"
+#include "server/monitoring/throttled_log.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// How long a scan of this server may wait for its labels; 0: as long as it takes.
-[[nodiscard]] std::chrono::milliseconds label_budget(const ServerConfig& config);
+[[nodiscard]] std::chrono::milliseconds segmentation_budget(const ServerConfig& config);
 
 /// A label source that may be slower than the sensor: it runs in a thread of its own, looks as
 /// coarsely as it must and then takes every n-th scan, none while others wait to be mapped, and
 /// nobody waits for it longer than the budget, or at all when it lately took longer than that. Its
 /// exceptions are counted and leave a scan without labels. The mapping thread calls it.
-class PacedLabels final : public LabelFeed {
+class AsyncSegmenter final : public SegmentationPipeline {
  public:
   /// With a budget of 0 the source runs in the caller's thread and gets every scan. The queue is
   /// that of the scans to come.
-  PacedLabels(std::unique_ptr<LabelSource> source, std::chrono::milliseconds budget,
-              const ScanQueue& queue, Statistics& statistics);
+  AsyncSegmenter(std::unique_ptr<Segmenter> source, std::chrono::milliseconds budget,
+                 const ScanQueue& queue, Statistics& statistics);
   /// Waits for the scan in work.
-  ~PacedLabels() override;
+  ~AsyncSegmenter() override;
 
   [[nodiscard]] std::string name() const override { return name_; }
   [[nodiscard]] bool may_skip_scans() const override { return budget_.count() > 0; }
-  [[nodiscard]] Answer offer(const Scan& scan) override;
+  [[nodiscard]] Output submit(const Scan& scan) override;
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -44,30 +44,30 @@ class PacedLabels final : public LabelFeed {
   void work(const std::stop_token& stop);
   /// The scan's labels, none after a failure.
   [[nodiscard]] ScanLabels segment(const Scan& scan);
-  void segmented(double network_ms);
+  void record_duration(double network_ms);
   /// In the status, and in the log.
-  void show_pace();
-  void tell_of_pace(bool is_slower) const;
+  void report_rate();
+  void log_rate_change(bool is_slower) const;
   /// Whether the thread is to take the scan that is offered now.
   [[nodiscard]] bool is_due();
-  [[nodiscard]] bool is_worth_the_wait();
+  [[nodiscard]] bool should_wait();
 
-  std::unique_ptr<LabelSource> source_;
+  std::unique_ptr<Segmenter> source_;
   std::string name_;
   int full_columns_;
   std::chrono::milliseconds budget_;
   const ScanQueue& queue_;
   Statistics& statistics_;
   /// Used where the source runs.
-  RareWarnings warnings_;
+  ThrottledLog throttled_log_;
 
   std::mutex mutex_;
   std::condition_variable_any changed_;
-  LabelCadence cadence_;
-  std::uint32_t offers_since_taken_ = 0;
+  SegmentationRateController rate_controller_;
+  std::uint32_t scans_since_segmented_ = 0;
   /// Scans in a row whose labels came after the budget; scans since then that did not wait.
   std::uint32_t misses_ = 0;
-  std::uint32_t unwaited_ = 0;
+  std::uint32_t scans_without_wait_ = 0;
   /// Taken from here by the thread, which is busy until it hands in the result.
   std::optional<Scan> job_;
   bool busy_ = false;
@@ -76,4 +76,4 @@ class PacedLabels final : public LabelFeed {
   std::jthread thread_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

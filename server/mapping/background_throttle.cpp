@@ -6,20 +6,20 @@
 #include <chrono>
 #include <thread>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
-constexpr auto work_between_pauses = 2ms;
+constexpr auto work_between_rests = 2ms;
 /// Longest pause, in times of the work before it.
-constexpr int rest = 9;
-constexpr std::chrono::nanoseconds longest_rest = 1s;
-constexpr auto look_period = 1ms;
+constexpr int rest_ratio = 9;
+constexpr std::chrono::nanoseconds max_rest = 1s;
+constexpr auto poll_period = 1ms;
 
 /// The time that the calling thread has worked; one that gives way to others may get none for long.
-std::chrono::nanoseconds worked() {
+std::chrono::nanoseconds thread_cpu_time() {
   timespec used{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
   return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
@@ -27,18 +27,19 @@ std::chrono::nanoseconds worked() {
 
 }  // namespace
 
-Pause give_way_to(const ScanTraffic& traffic, WithoutGaps without_gaps) {
-  return [&traffic, without_gaps, last = std::chrono::nanoseconds(0)]() mutable {
-    const auto work = worked() - last;
-    if (work < work_between_pauses) return;
-    const auto until = without_gaps == WithoutGaps::wait
+ThrottleCallback make_throttle_callback(const BackgroundThrottle& throttle,
+                                        SaturationPolicy saturation_policy) {
+  return [&throttle, saturation_policy, last = std::chrono::nanoseconds(0)]() mutable {
+    const auto work = thread_cpu_time() - last;
+    if (work < work_between_rests) return;
+    const auto until = saturation_policy == SaturationPolicy::wait
                            ? Clock::time_point::max()
-                           : Clock::now() + std::min(rest * work, longest_rest);
-    while (!traffic.is_quiet() && Clock::now() < until) {
-      std::this_thread::sleep_for(look_period);
+                           : Clock::now() + std::min(rest_ratio * work, max_rest);
+    while (!throttle.is_idle() && Clock::now() < until) {
+      std::this_thread::sleep_for(poll_period);
     }
-    last = worked();
+    last = thread_cpu_time();
   };
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -2,58 +2,61 @@
 
 #include <atomic>
 
-#include "core/throttle_callback.hpp"
+#include "core/map/throttle_callback.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Whether a scan is in work, so that what is done in the background waits for a gap. Two cores
 /// share caches, memory and often one core's arithmetic: a thread that gets only the time that
 /// nobody else wants slows the others down all the same. Thread-safe, without locks: the mapper
 /// never waits for a thread that it holds up.
-class ScanTraffic {
+class BackgroundThrottle {
  public:
   /// While it lives, a scan is in work.
-  class InWork {
+  class ScanInProgress {
    public:
-    explicit InWork(ScanTraffic& traffic) : traffic_(traffic) { ++traffic_.in_work_; }
-    ~InWork() { --traffic_.in_work_; }
-    InWork(const InWork&) = delete;
-    InWork& operator=(const InWork&) = delete;
+    explicit ScanInProgress(BackgroundThrottle& throttle) : throttle_(throttle) {
+      ++throttle_.scans_in_progress_;
+    }
+    ~ScanInProgress() { --throttle_.scans_in_progress_; }
+    ScanInProgress(const ScanInProgress&) = delete;
+    ScanInProgress& operator=(const ScanInProgress&) = delete;
 
    private:
-    ScanTraffic& traffic_;
+    BackgroundThrottle& throttle_;
   };
 
-  [[nodiscard]] bool is_quiet() const { return in_work_ == 0 || has_ended_; }
+  [[nodiscard]] bool is_idle() const { return scans_in_progress_ == 0 || is_released_; }
 
   /// Holds up nobody any more: the server ends, and background work is to be finished.
-  void end() { has_ended_ = true; }
+  void release() { is_released_ = true; }
 
  private:
-  std::atomic<bool> has_ended_ = false;
-  std::atomic<int> in_work_ = 0;
+  std::atomic<bool> is_released_ = false;
+  std::atomic<int> scans_in_progress_ = 0;
 };
 
-/// Ends the traffic when it goes, so that threads that wait for gaps can go, too.
-class TrafficEnd {
+/// Releases the throttle when it goes, so that threads that wait for gaps can go, too.
+class ThrottleRelease {
  public:
-  explicit TrafficEnd(ScanTraffic& traffic) : traffic_(traffic) {}
-  ~TrafficEnd() { traffic_.end(); }
-  TrafficEnd(const TrafficEnd&) = delete;
-  TrafficEnd& operator=(const TrafficEnd&) = delete;
+  explicit ThrottleRelease(BackgroundThrottle& throttle) : throttle_(throttle) {}
+  ~ThrottleRelease() { throttle_.release(); }
+  ThrottleRelease(const ThrottleRelease&) = delete;
+  ThrottleRelease& operator=(const ThrottleRelease&) = delete;
 
  private:
-  ScanTraffic& traffic_;
+  BackgroundThrottle& throttle_;
 };
 
 /// What a background thread does where scans come as fast as they can be mapped and leave no gaps.
-enum class WithoutGaps {
+enum class SaturationPolicy {
   wait,
   /// It still works a tenth of the time, if it gets it.
-  work_a_tenth,
+  run_at_ten_percent,
 };
 
-/// For one background thread: waits for a gap between scans. `traffic` must outlive it.
-[[nodiscard]] Pause give_way_to(const ScanTraffic& traffic, WithoutGaps without_gaps);
+/// For one background thread: waits for a gap between scans. `throttle` must outlive it.
+[[nodiscard]] ThrottleCallback make_throttle_callback(const BackgroundThrottle& throttle,
+                                                      SaturationPolicy saturation_policy);
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -6,7 +6,7 @@
 #include <mutex>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -43,4 +43,4 @@ void CheckpointThread::work(const std::stop_token& stop, Seconds period) const {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

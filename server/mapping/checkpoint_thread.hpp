@@ -5,7 +5,7 @@
 #include <stop_token>
 #include <thread>
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// How long after the begin of a save the next one is due: that one is to have ended `period` after
 /// this one began, so that what a killed server loses is no older. `longest` is what saves took
@@ -25,4 +25,4 @@ class CheckpointThread {
   std::jthread thread_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -5,13 +5,13 @@
 #include <system_error>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 constexpr const char* no_map_yet = "holds no map yet; name a file that a map was saved to";
 
 /// Opens a file that is there: open_map_file would make one that is not.
-std::unique_ptr<TileStore> open_filled(const std::filesystem::path& file) {
+std::unique_ptr<MapStore> open_existing(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::exists(file, error)) {
     throw MapFileError(file, "is not there; it must lie beside the configured map file");
@@ -36,18 +36,19 @@ bool is_plain_name(const std::string& name) {
 
 }  // namespace
 
-MapSaver::MapSaver(const MapBoard& board, std::filesystem::path file,
+MapSaver::MapSaver(const LatestMap& latest_map, std::filesystem::path file,
                    std::map<std::string, std::string> metadata, std::uint32_t memory_limit_mib)
-    : board_(board),
+    : latest_map_(latest_map),
       file_(std::move(file)),
       metadata_(std::move(metadata)),
       memory_limit_bytes_(std::size_t{memory_limit_mib} << 20),
-      source_{.take =
-                  [this](bool) {
-                    return RunCheckpoint{{*board_.view(), {}, board_.trajectory(), {}}, 0};
-                  },
-              .stored = [](std::uint64_t) {},
-              .map_bytes = [] { return std::size_t{0}; }} {
+      source_{
+          .take =
+              [this](bool) {
+                return RunCheckpoint{{*latest_map_.view(), {}, latest_map_.trajectory(), {}}, 0};
+              },
+          .stored = [](std::uint64_t) {},
+          .map_bytes = [] { return std::size_t{0}; }} {
   // Opened at once: a file that cannot be used is found before the drive, not after it.
   if (!file_.empty()) {
     store_ = open_map_file(file_);
@@ -56,10 +57,10 @@ MapSaver::MapSaver(const MapBoard& board, std::filesystem::path file,
   }
 }
 
-std::optional<StoredMap> MapSaver::load() {
+std::optional<SavedMap> MapSaver::load() {
   const std::scoped_lock lock(mutex_);
   if (file_.empty()) return std::nullopt;
-  StoredMap map = read(*store_);
+  SavedMap map = read(*store_);
   // Clients may have seen later versions than the one that is stored: versions of what follows
   // must not be taken for those.
   if (!map.metadata.contains(map_ended_key)) map.view.map_id = new_map_id();
@@ -69,15 +70,15 @@ std::optional<StoredMap> MapSaver::load() {
   return map;
 }
 
-StoredMap MapSaver::read(TileStore& store) const {
-  return memory_limit_bytes_ > 0 ? store.load_shelved() : store.load();
+SavedMap MapSaver::read(MapStore& store) const {
+  return memory_limit_bytes_ > 0 ? store.load_non_resident() : store.load();
 }
 
-std::shared_ptr<TileShelf> MapSaver::shelf() {
-  return memory_limit_bytes_ > 0 ? store_->shelf() : nullptr;
+std::shared_ptr<TileStore> MapSaver::tile_store() {
+  return memory_limit_bytes_ > 0 ? store_->tile_store() : nullptr;
 }
 
-void MapSaver::follow(CheckpointSource source) {
+void MapSaver::set_source(CheckpointSource source) {
   const std::scoped_lock lock(mutex_);
   source_ = std::move(source);
 }
@@ -93,19 +94,19 @@ void MapSaver::save_if_changed() {
 void MapSaver::save_at_end() {
   const std::scoped_lock lock(mutex_);
   // Nothing mapped: an empty map must not replace what the file holds.
-  if (!file_.empty() && board_.poses_added() > 0) save(true);
+  if (!file_.empty() && latest_map_.poses_added() > 0) save(true);
 }
 
 bool MapSaver::is_saved() const {
-  const auto view = board_.view();
-  const std::uint64_t poses = board_.poses_added();
+  const auto view = latest_map_.view();
+  const std::uint64_t poses = latest_map_.poses_added();
   return poses == 0 || (view->map_id == saved_map_id_ && view->version == saved_version_ &&
                         poses == saved_poses_);
 }
 
 void MapSaver::save(bool has_ended) {
   CheckpointLog::Attempt attempt(checkpoints_);
-  const std::uint64_t poses = board_.poses_added();
+  const std::uint64_t poses = latest_map_.poses_added();
   RunCheckpoint checkpoint = take(false);
   // Of another map than the stored one, all is new.
   if (checkpoint.map.view.map_id != saved_map_id_) checkpoint = take(true);
@@ -116,13 +117,13 @@ void MapSaver::save(bool has_ended) {
   attempt.stored();
 }
 
-void MapSaver::remember_as_saved(const MapView& view, std::uint64_t poses) {
+void MapSaver::remember_as_saved(const MapSnapshot& view, std::uint64_t poses) {
   saved_map_id_ = view.map_id;
   saved_version_ = view.version;
   saved_poses_ = poses;
 }
 
-void MapSaver::remember_metadata(const StoredMap& map) {
+void MapSaver::remember_metadata(const SavedMap& map) {
   stored_metadata_ = map.metadata;
   stored_metadata_.erase(map_ended_key);
 }
@@ -149,23 +150,23 @@ std::filesystem::path MapSaver::save_as(const std::string& name) {
   return std::filesystem::absolute(target);
 }
 
-std::filesystem::path MapSaver::go_on_in(const std::string& name,
-                                         const ReplaceRunning& replace_running) {
+std::filesystem::path MapSaver::resume_from(const std::string& name,
+                                            const ReplaceRunning& replace_running) {
   const std::scoped_lock lock(mutex_);
   const std::filesystem::path target = file_named(name);
-  auto store = open_filled(target);
-  StoredMap map = read(*store);
+  auto store = open_existing(target);
+  SavedMap map = read(*store);
   if (map.view.tiles.empty()) throw MapFileError(target, no_map_yet);
-  if (target != file_ && !file_.empty() && board_.poses_added() > 0) save(false);
+  if (target != file_ && !file_.empty() && latest_map_.poses_added() > 0) save(false);
   map.view.map_id = new_map_id();
-  replace_running(map, memory_limit_bytes_ > 0 ? store->shelf() : nullptr);
+  replace_running(map, memory_limit_bytes_ > 0 ? store->tile_store() : nullptr);
   store->begin_run(map.view.map_id);
   // Where another map lies, its own file says.
   if (target != file_) metadata_.erase("datum");
   file_ = target;
   store_ = std::move(store);
   remember_metadata(map);
-  remember_as_saved(*board_.view(), board_.poses_added());
+  remember_as_saved(*latest_map_.view(), latest_map_.poses_added());
   return std::filesystem::absolute(target);
 }
 
@@ -176,4 +177,4 @@ RunCheckpoint MapSaver::take(bool everything) const {
   return checkpoint;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -8,7 +8,7 @@
 
 #include "server/mapping/async_segmenter.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -30,8 +30,8 @@ std::size_t map_share_bytes(const MapFileConfig& config) {
 
 // Where a scan is expected in a map that was loaded: where the robot was at that time, if it is a
 // recording played again, else where it stood last. Nothing without a stored path.
-std::optional<Eigen::Isometry3d> pose_in_restored_map(const Trajectory& stored,
-                                                      std::int64_t stamp_ns) {
+std::optional<Eigen::Isometry3d> pose_in_saved_map(const Trajectory& stored,
+                                                   std::int64_t stamp_ns) {
   if (stored.empty()) return std::nullopt;
   const auto then = std::ranges::lower_bound(stored, stamp_ns, {}, &StampedPose::stamp_ns);
   return then == stored.end() ? stored.back().T_map_lidar : then->T_map_lidar;
@@ -39,29 +39,30 @@ std::optional<Eigen::Isometry3d> pose_in_restored_map(const Trajectory& stored,
 
 }  // namespace
 
-MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSource> label_source,
-                             const std::optional<StoredMap>& stored,
-                             const std::shared_ptr<TileShelf>& shelf, ScanQueue& queue,
-                             Statistics& statistics, MapBoard& board, const MappingOutputs& outputs)
+MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segmenter> label_source,
+                             const std::optional<SavedMap>& stored,
+                             const std::shared_ptr<TileStore>& tile_store, ScanQueue& queue,
+                             Statistics& statistics, LatestMap& latest_map,
+                             const MappingOutputs& outputs)
     : map_limit_bytes_(map_share_bytes(config.map)),
       lidar_frame_(config.frames.lidar),
-      view_period_(config.publish.tiles_period_s),
+      publish_period_(config.publish.tiles_period_s),
       queue_(queue),
       statistics_(statistics),
-      board_(board),
+      latest_map_(latest_map),
       outputs_(outputs),
       mapper_(config.mapper,
-              std::make_unique<PacedLabels>(std::move(label_source), label_budget(config), queue,
-                                            statistics),
+              std::make_unique<AsyncSegmenter>(std::move(label_source), segmentation_budget(config),
+                                               queue, statistics),
               {.stage_ended = [this](std::string_view stage) { stage_ended(stage); },
                .pose_found =
                    [this](std::int64_t stamp_ns, const OdometryResult& odometry) {
                      pose_found(stamp_ns, odometry);
                    }}) {
   if (stored && !stored->view.tiles.empty()) {
-    go_on_with(*stored, shelf);
+    resume(*stored, tile_store);
   } else {
-    mapper_.static_map().use_shelf(shelf);
+    mapper_.static_map().use_tile_store(tile_store);
     mapper_.reset(new_map_id());
     begin_map({});
   }
@@ -70,7 +71,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<LabelSo
 
 std::uint64_t MappingThread::reset() {
   const std::uint64_t map_id = new_map_id();
-  between_scans([this, map_id] {
+  run_between_scans([this, map_id] {
     mapper_.reset(map_id);
     begin_map({});
     spdlog::info("reset: map {} begins", map_id);
@@ -78,91 +79,91 @@ std::uint64_t MappingThread::reset() {
   return map_id;
 }
 
-void MappingThread::load(const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf) {
-  between_scans([&] {
-    go_on_with(stored, shelf);
+void MappingThread::load(const SavedMap& stored, const std::shared_ptr<TileStore>& tile_store) {
+  run_between_scans([&] {
+    resume(stored, tile_store);
     spdlog::info("loaded: going on with {} tiles as map {}", stored.view.tiles.size(),
                  stored.view.map_id);
   });
 }
 
-void MappingThread::go_on_with(const StoredMap& stored, const std::shared_ptr<TileShelf>& shelf) {
+void MappingThread::resume(const SavedMap& stored, const std::shared_ptr<TileStore>& tile_store) {
   // First what may refuse the map.
-  mapper_.restore(stored.view, stored.memories);
+  mapper_.resume(stored.view, stored.tile_evidence);
   const Trajectory& path = stored.trajectory;
   const Eigen::Vector3d last_map =
       path.empty() ? Eigen::Vector3d(0.0, 0.0, 0.0) : path.back().T_map_lidar.translation();
-  mapper_.static_map().use_shelf(shelf);
-  mapper_.static_map().take_back_near(last_map, map_limit_bytes_);
+  mapper_.static_map().use_tile_store(tile_store);
+  mapper_.static_map().reload_near(last_map, map_limit_bytes_);
   begin_map(path);
 }
 
 void MappingThread::begin_map(Trajectory trajectory) {
-  board_.begin(mapper_.map_view(), std::move(trajectory));
-  if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(board_.view());
+  latest_map_.begin(mapper_.map_snapshot(), std::move(trajectory));
+  if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
 }
 
-void MappingThread::show_now() {
-  between_scans([this] { show_view(); });
+void MappingThread::publish_now() {
+  run_between_scans([this] { publish_snapshot(); });
 }
 
 void MappingThread::stop() {
   thread_ = {};
-  const std::scoped_lock lock(asked_mutex_);
+  const std::scoped_lock lock(requests_mutex_);
   has_stopped_ = true;
-  for (std::packaged_task<void()>& task : std::exchange(asked_, {})) task();
+  for (std::packaged_task<void()>& task : std::exchange(requests_, {})) task();
 }
 
 RunCheckpoint MappingThread::checkpoint(bool everything) {
   MapCheckpoint map;
-  between_scans([&] {
+  run_between_scans([&] {
     const auto began = Clock::now();
     map = mapper_.static_map().checkpoint(everything);
-    board_.show(map.view);
+    latest_map_.publish(map.view);
     statistics_.add_latency("checkpoint", milliseconds(Clock::now() - began));
   });
-  RunCheckpoint checkpoint{stored_state(map), map.step};
-  checkpoint.map.trajectory = board_.trajectory();
+  RunCheckpoint checkpoint{to_saved_map(map), map.step};
+  checkpoint.map.trajectory = latest_map_.trajectory();
   return checkpoint;
 }
 
 void MappingThread::checkpoint_stored(std::uint64_t step) {
-  between_scans([&] {
+  run_between_scans([&] {
     StaticMap& map = mapper_.static_map();
     map.checkpoint_stored(step);
-    map.shelve(board_.newest_pose().T_map_lidar.translation(), map_limit_bytes_);
+    map.evict(latest_map_.newest_pose().T_map_lidar.translation(), map_limit_bytes_);
     for (const std::string& fault : map.unreadable_tiles()) {
-      warnings_.warn("tiles_unreadable", "not mapped there: " + fault);
+      throttled_log_.warn("tiles_unreadable", "not mapped there: " + fault);
     }
-    statistics_.map_takes(map.memory_use(), map.unreadable_tiles().size());
+    statistics_.set_map_memory(map.memory_use(), map.unreadable_tiles().size());
   });
 }
 
 MemoryUse MappingThread::memory_use() {
   MemoryUse use;
-  between_scans([&] { use = mapper_.static_map().memory_use(); });
+  run_between_scans([&] { use = mapper_.static_map().memory_use(); });
   return use;
 }
 
 std::vector<RemovedVoxel> MappingThread::removed(const Eigen::AlignedBox3d& box_map) {
   std::vector<RemovedVoxel> removed;
-  between_scans([&] { removed = mapper_.static_map().removed(box_map); });
+  run_between_scans([&] { removed = mapper_.static_map().removed(box_map); });
   return removed;
 }
 
 std::size_t MappingThread::restore_removed(RemovalReason reason,
                                            const Eigen::AlignedBox3d& box_map) {
   std::size_t restored = 0;
-  between_scans([&] { restored = mapper_.static_map().restore_removed(reason, box_map); });
+  run_between_scans([&] { restored = mapper_.static_map().restore_removed(reason, box_map); });
   return restored;
 }
 
-void MappingThread::between_scans(std::function<void()> action) {
+void MappingThread::run_between_scans(std::function<void()> action) {
   std::future<void> done;
   {
-    const std::scoped_lock lock(asked_mutex_);
+    const std::scoped_lock lock(requests_mutex_);
     if (has_stopped_) return action();
-    done = asked_.emplace_back(std::move(action)).get_future();
+    done = requests_.emplace_back(std::move(action)).get_future();
   }
   done.get();
 }
@@ -173,16 +174,16 @@ void MappingThread::work(const std::stop_token& stop) {
     const bool idle = !queued;
     if (queued) map(*std::move(queued));
     // Afterwards: the scan's pose is waited for.
-    run_asked();
-    if (idle || Clock::now() - view_shown_ >= view_period_) show_view();
+    run_requests();
+    if (idle || Clock::now() - snapshot_published_ >= publish_period_) publish_snapshot();
   }
-  show_view();
-  run_asked();
+  publish_snapshot();
+  run_requests();
 }
 
 void MappingThread::map(QueuedScan queued) {
-  std::optional<ScanTraffic::InWork> in_work;
-  if (outputs_.traffic != nullptr) in_work.emplace(*outputs_.traffic);
+  std::optional<BackgroundThrottle::ScanInProgress> scan_in_progress;
+  if (outputs_.throttle != nullptr) scan_in_progress.emplace(*outputs_.throttle);
   const auto began = Clock::now();
   stage_began_ = began;
   labels_ms_ = 0.0;
@@ -194,29 +195,29 @@ void MappingThread::map(QueuedScan queued) {
   if (!mapped) {
     const ScanRejection& rejection = mapper_.last_rejection();
     statistics_.scans_dropped(rejection.counter, 1, rejection.reason);
-    warnings_.warn(rejection.counter, "scan dropped: " + rejection.reason);
+    throttled_log_.warn(rejection.counter, "scan dropped: " + rejection.reason);
     return;
   }
   const bool unlabelled = mapped->labelled.labels.empty();
-  board_.add_pose({stamp_ns, mapped->odometry.T_map_lidar}, mapped->odometry.health,
-                  unlabelled ? "none" : mapper_.label_source());
-  statistics_.scan_mapped(mapped->labelling);
+  latest_map_.add_pose({stamp_ns, mapped->odometry.T_map_lidar}, mapped->odometry.health,
+                       unlabelled ? "none" : mapper_.label_source());
+  statistics_.scan_mapped(mapped->label_provenance);
   statistics_.add_latency("total", milliseconds(Clock::now() - queued.received));
-  hand_on(*std::move(mapped));
-  statistics_.scan_took_besides_labels(milliseconds(Clock::now() - began) - labels_ms_);
+  forward(*std::move(mapped));
+  statistics_.record_other_stages(milliseconds(Clock::now() - began) - labels_ms_);
 }
 
-void MappingThread::hand_on(MappedScan mapped) {
+void MappingThread::forward(MappedScan mapped) {
   const auto labelled = std::make_shared<const LabelledScan>(std::move(mapped.labelled));
   if (outputs_.occupancy != nullptr) {
-    outputs_.occupancy->add({labelled, mapped.odometry.T_map_lidar, !mapped.unknown_may_move});
+    outputs_.occupancy->add({labelled, mapped.odometry.T_map_lidar, !mapped.unlabelled_may_move});
   }
   if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frame_);
 }
 
 std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) const {
   if (mapper_.trajectory().empty()) {
-    return pose_in_restored_map(board_.trajectory(), stamp_ns);
+    return pose_in_saved_map(latest_map_.trajectory(), stamp_ns);
   }
   if (outputs_.prior == nullptr) return std::nullopt;
   return outputs_.prior->predict(mapper_.trajectory().back(), stamp_ns);
@@ -235,17 +236,17 @@ void MappingThread::pose_found(std::int64_t stamp_ns, const OdometryResult& odom
   statistics_.add_latency("pose", milliseconds(Clock::now() - received_));
 }
 
-void MappingThread::show_view() {
-  board_.show(mapper_.map_view());
-  view_shown_ = Clock::now();
+void MappingThread::publish_snapshot() {
+  latest_map_.publish(mapper_.map_snapshot());
+  snapshot_published_ = Clock::now();
   if (outputs_.occupancy != nullptr && map_limit_bytes_ != no_limit) {
-    outputs_.occupancy->follow(board_.view());
+    outputs_.occupancy->follow(latest_map_.view());
   }
 }
 
-void MappingThread::run_asked() {
-  const std::scoped_lock lock(asked_mutex_);
-  for (std::packaged_task<void()>& task : std::exchange(asked_, {})) task();
+void MappingThread::run_requests() {
+  const std::scoped_lock lock(requests_mutex_);
+  for (std::packaged_task<void()>& task : std::exchange(requests_, {})) task();
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -5,26 +5,26 @@
 #include "idl/conversions/pose.hpp"
 #include "idl/interface/topics.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 // At 100 Hz, 10 s: more than any scan waits in the queue.
-constexpr std::size_t poses_kept = 1000;
+constexpr std::size_t max_poses = 1000;
 // A pose this much older than the scan still stands for it.
-constexpr std::int64_t longest_gap_ns = 100'000'000;
+constexpr std::int64_t max_gap_ns = 100'000'000;
 
 }  // namespace
 
-void PosesByTime::add(const StampedPose& pose) {
+void PoseBuffer::add(const StampedPose& pose) {
   if (!poses_.empty() && pose.stamp_ns <= poses_.back().stamp_ns) return;
   poses_.push_back(pose);
-  if (poses_.size() > poses_kept) poses_.pop_front();
+  if (poses_.size() > max_poses) poses_.pop_front();
 }
 
-std::optional<Eigen::Isometry3d> PosesByTime::pose_at(std::int64_t stamp_ns) const {
+std::optional<Eigen::Isometry3d> PoseBuffer::pose_at(std::int64_t stamp_ns) const {
   const auto after = std::ranges::lower_bound(poses_, stamp_ns, {}, &StampedPose::stamp_ns);
   if (after == poses_.end()) {
-    const bool near = !poses_.empty() && stamp_ns - poses_.back().stamp_ns <= longest_gap_ns;
+    const bool near = !poses_.empty() && stamp_ns - poses_.back().stamp_ns <= max_gap_ns;
     return near ? std::optional(poses_.back().T_map_lidar) : std::nullopt;
   }
   if (after->stamp_ns == stamp_ns) return after->T_map_lidar;
@@ -40,17 +40,17 @@ std::optional<Eigen::Isometry3d> PosesByTime::pose_at(std::int64_t stamp_ns) con
                            q_before.slerp(share, q_after));
 }
 
-std::optional<Eigen::Isometry3d> PosesByTime::motion(std::int64_t from_ns,
-                                                     std::int64_t to_ns) const {
+std::optional<Eigen::Isometry3d> PoseBuffer::motion(std::int64_t from_ns,
+                                                    std::int64_t to_ns) const {
   const auto T_odom_from = pose_at(from_ns);
   const auto T_odom_to = pose_at(to_ns);
   if (!T_odom_from || !T_odom_to) return std::nullopt;
   return T_odom_from->inverse() * *T_odom_to;
 }
 
-OdometryPrior::OdometryPrior(Participant& participant, const std::string& ros_topic)
-    : reader_(participant, odometry_prior_topic(ros_topic).dds_name,
-              odometry_prior_topic(ros_topic).reader),
+OdometryPrior::OdometryPrior(dds::Participant& participant, const std::string& ros_topic)
+    : reader_(participant, dds::odometry_prior_topic(ros_topic).dds_name,
+              dds::odometry_prior_topic(ros_topic).reader),
       thread_([this](const std::stop_token& stop) { receive(stop); }) {}
 
 std::optional<Eigen::Isometry3d> OdometryPrior::predict(const StampedPose& last,
@@ -71,4 +71,4 @@ void OdometryPrior::receive(const std::stop_token& stop) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -6,15 +6,15 @@
 #include <string>
 #include <thread>
 
-#include "core/odometry/trajectory.hpp"
+#include "core/lidar/trajectory.hpp"
 #include "idl/dds/reader.hpp"
 #include "nav_msgs.h"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Poses from another odometry (wheels, GNSS), by time. Only their motion is used, so their origin
 /// does not matter; their child frame must be the lidar's.
-class PosesByTime {
+class PoseBuffer {
  public:
   /// Out-of-order poses are left out.
   void add(const StampedPose& pose);
@@ -33,7 +33,7 @@ class PosesByTime {
 /// Listens to the odometry prior.
 class OdometryPrior {
  public:
-  OdometryPrior(Participant& participant, const std::string& ros_topic);
+  OdometryPrior(dds::Participant& participant, const std::string& ros_topic);
 
   /// Where a scan at `stamp_ns` should be, given where the last one was; nothing when the prior
   /// does not know.
@@ -44,10 +44,10 @@ class OdometryPrior {
   void receive(const std::stop_token& stop);
 
   mutable std::mutex mutex_;
-  PosesByTime poses_;
-  Reader<nav_msgs::msg::Odometry> reader_;
+  PoseBuffer poses_;
+  dds::Reader<nav_msgs::msg::Odometry> reader_;
   // Last: stops before what it uses is gone.
   std::jthread thread_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::server {
 
 std::size_t ScanQueue::push_dropping_oldest(QueuedScan scan) {
   const std::scoped_lock lock(mutex_);
@@ -13,7 +13,7 @@ std::size_t ScanQueue::push_dropping_oldest(QueuedScan scan) {
   return dropped;
 }
 
-bool ScanQueue::push_when_free(QueuedScan scan, const std::stop_token& stop) {
+bool ScanQueue::push_blocking(QueuedScan scan, const std::stop_token& stop) {
   std::unique_lock lock(mutex_);
   if (!changed_.wait(lock, stop, [this] { return scans_.size() < capacity_; })) return false;
   scans_.push_back(std::move(scan));
@@ -37,4 +37,4 @@ std::size_t ScanQueue::waiting() const {
   return scans_.size();
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

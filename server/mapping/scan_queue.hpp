@@ -11,7 +11,7 @@
 
 #include "core/lidar/scan.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// A scan on its way to the mapper.
 struct QueuedScan {
@@ -31,7 +31,7 @@ class ScanQueue {
   std::size_t push_dropping_oldest(QueuedScan scan);
 
   /// Waits for room. False when a stop was requested: the scan was not taken.
-  [[nodiscard]] bool push_when_free(QueuedScan scan, const std::stop_token& stop);
+  [[nodiscard]] bool push_blocking(QueuedScan scan, const std::stop_token& stop);
 
   /// Waits for a scan. Nothing after `timeout` or when a stop was requested.
   [[nodiscard]] std::optional<QueuedScan> pop(const std::stop_token& stop,
@@ -47,4 +47,4 @@ class ScanQueue {
   std::deque<QueuedScan> scans_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -9,20 +9,20 @@
 #include "idl/conversions/header.hpp"
 #include "idl/interface/topics.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 // A reliable KEEP_ALL reader of fewer samples stalls while it assembles fragments.
-constexpr int fewest_samples = 4;
+constexpr int min_samples = 4;
 // The sensor does not change from scan to scan.
 constexpr std::uint64_t scans_between_checks = 100;
 
-TopicSpec<sensor_msgs::msg::PointCloud2> points_of(const ServerConfig& config) {
-  const int waiting = std::max(static_cast<int>(config.input.queue_length), fewest_samples);
-  return points_topic(config.topics.points, delivery_mode(config.input.delivery), waiting);
+dds::TopicSpec<sensor_msgs::msg::PointCloud2> points_of(const ServerConfig& config) {
+  const int waiting = std::max(static_cast<int>(config.input.queue_length), min_samples);
+  return dds::points_topic(config.topics.points, delivery_mode(config.input.delivery), waiting);
 }
 
-wire::CloudReading reading_of(const ServerConfig& config) {
+wire::CloudReadOptions reading_of(const ServerConfig& config) {
   const PointFieldNames& names = config.input.fields;
   return {.fields = {.intensity = names.intensity,
                      .ring = names.ring,
@@ -41,12 +41,12 @@ double seconds_since(const builtin_interfaces::msg::Time& stamp) {
 
 }  // namespace
 
-DeliveryMode delivery_mode(Delivery delivery) {
-  return delivery == Delivery::every ? DeliveryMode::every : DeliveryMode::latest;
+dds::DeliveryMode delivery_mode(Delivery delivery) {
+  return delivery == Delivery::every ? dds::DeliveryMode::every : dds::DeliveryMode::latest;
 }
 
-ScanReceiver::ScanReceiver(Participant& participant, const ServerConfig& config, ScanQueue& queue,
-                           Statistics& statistics)
+ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& config,
+                           ScanQueue& queue, Statistics& statistics)
     : topic_(points_of(config).dds_name),
       domain_id_(config.dds.domain_id),
       delivery_(delivery_mode(config.input.delivery)),
@@ -67,14 +67,14 @@ void ScanReceiver::receive(const std::stop_token& stop) {
 void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop) {
   const auto received = std::chrono::steady_clock::now();
   statistics_.scan_received();
-  statistics_.scan_told(cloud.header().frame_id(), seconds_since(cloud.header().stamp()));
-  auto [from_cloud, news] = cloud_reader_.read(cloud);
+  statistics_.record_scan_header(cloud.header().frame_id(), seconds_since(cloud.header().stamp()));
+  auto [from_cloud, cloud_changes] = cloud_reader_.read(cloud);
   auto& [scan, fault, understood] = from_cloud;
   if (!scan) return drop("bad_cloud_" + fault.counter, 1, "bad cloud: " + fault.reason);
-  report(news, *scan);
+  report(cloud_changes, *scan);
   QueuedScan queued{*std::move(scan), cloud.header().frame_id(), received};
-  if (delivery_ == DeliveryMode::every) {
-    if (!queue_.push_when_free(std::move(queued), stop)) {
+  if (delivery_ == dds::DeliveryMode::every) {
+    if (!queue_.push_blocking(std::move(queued), stop)) {
       drop("shutdown", 1, "the server is stopping");
     }
     return;
@@ -85,26 +85,27 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
   }
 }
 
-void ScanReceiver::report(const std::string& news, const Scan& scan) {
-  if (!news.empty()) spdlog::info("clouds on {}: {}", topic_, news);
+void ScanReceiver::report(const std::string& cloud_changes, const Scan& scan) {
+  if (!cloud_changes.empty()) spdlog::info("clouds on {}: {}", topic_, cloud_changes);
   const bool due = scans_read_++ % scans_between_checks == 0;
-  if (!due && news.empty()) return;
-  const std::string misfit = sensor_misfit(scan, sensor_);
+  if (!due && cloud_changes.empty()) return;
+  const std::string misfit = sensor_mismatch(scan, sensor_);
   if (misfit.empty()) return;
   statistics_.count("scans_of_another_sensor");
-  warnings_.warn("sensor", misfit +
-                               ": set 'sensor' in the configuration ('stillmap dataset sensor' "
-                               "makes a sensor file from a recording)");
+  throttled_log_.warn("sensor",
+                      misfit +
+                          ": set 'sensor' in the configuration ('stillmap dataset sensor' "
+                          "makes a sensor file from a recording)");
 }
 
 void ScanReceiver::drop(const std::string& reason, std::size_t count, const std::string& detail) {
   statistics_.scans_dropped(reason, count, detail);
-  warnings_.warn(reason, "scan dropped: " + detail);
+  throttled_log_.warn(reason, "scan dropped: " + detail);
 }
 
-std::string ScanReceiver::why_nothing_arrives() const {
+std::string ScanReceiver::no_input_reason() const {
   if (statistics_.received() > 0) return {};
-  const ReaderEvents& events = reader_.events();
+  const dds::ReaderEvents& events = reader_.events();
   std::string text = "no scan received on " + topic_ +
                      " yet: " + std::to_string(events.matched_writers()) +
                      " publishers matched in domain " + std::to_string(domain_id_);
@@ -115,4 +116,4 @@ std::string ScanReceiver::why_nothing_arrives() const {
   return text;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

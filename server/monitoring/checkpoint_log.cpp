@@ -1,6 +1,6 @@
 #include "server/monitoring/checkpoint_log.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 CheckpointLog::Attempt::~Attempt() {
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began_;
@@ -18,4 +18,4 @@ CheckpointLog::Record CheckpointLog::record() const {
   return record_;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -7,7 +7,7 @@
 
 #include "server/monitoring/duration_histogram.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// How saving the map went. Thread-safe.
 class CheckpointLog {
@@ -41,4 +41,4 @@ class CheckpointLog {
   Record record_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

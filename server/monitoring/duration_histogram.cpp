@@ -1,6 +1,6 @@
 #include "server/monitoring/duration_histogram.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 void DurationHistogram::add(double seconds) {
   ++count_;
@@ -10,4 +10,4 @@ void DurationHistogram::add(double seconds) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

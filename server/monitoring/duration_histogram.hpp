@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// How often something took how long, since the start.
 class DurationHistogram {
@@ -25,4 +25,4 @@ class DurationHistogram {
   double sum_s_ = 0.0;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -2,13 +2,13 @@
 
 #include <sched.h>
 
-namespace stillmap {
+namespace stillmap::server {
 
-bool run_in_background() {
+bool use_idle_scheduling() {
   // A nice value is not enough: the network's threads wait for each other many times a scan, and a
   // thread that holds one of them up for a moment holds up both.
   const sched_param none{};
   return sched_setscheduler(0, SCHED_IDLE, &none) == 0;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

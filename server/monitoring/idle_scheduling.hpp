@@ -1,9 +1,9 @@
 #pragma once
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Gives the calling thread only the time that no other thread wants: on busy cores the mapper and
 /// its network come first, whatever is done in the background. False where the system refuses.
-bool run_in_background();
+bool use_idle_scheduling();
 
-}  // namespace stillmap
+}  // namespace stillmap::server

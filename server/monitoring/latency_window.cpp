@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-namespace stillmap {
+namespace stillmap::server {
 
 void LatencyWindow::add(double milliseconds) {
   if (values_ms_.size() < capacity_) {
@@ -14,7 +14,7 @@ void LatencyWindow::add(double milliseconds) {
   next_ = (next_ + 1) % capacity_;
 }
 
-StageLatency LatencyWindow::summary(const std::string& stage) const {
+dds::StageLatency LatencyWindow::summary(const std::string& stage) const {
   if (values_ms_.empty()) return {.stage = stage};
   std::vector<double> sorted = values_ms_;
   std::ranges::sort(sorted);
@@ -30,4 +30,4 @@ StageLatency LatencyWindow::summary(const std::string& stage) const {
           .samples = static_cast<std::uint32_t>(sorted.size())};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

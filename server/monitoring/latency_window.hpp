@@ -6,13 +6,13 @@
 
 #include "idl/interface/server_status.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Percentiles over the last few hundred values.
 class LatencyWindow {
  public:
   void add(double milliseconds);
-  [[nodiscard]] StageLatency summary(const std::string& stage) const;
+  [[nodiscard]] dds::StageLatency summary(const std::string& stage) const;
 
  private:
   static constexpr std::size_t capacity_ = 512;
@@ -20,4 +20,4 @@ class LatencyWindow {
   std::size_t next_ = 0;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -10,7 +10,7 @@
 #include <memory>
 #include <string>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 spdlog::level::level_enum spdlog_level(LogLevel level) {
@@ -89,4 +89,4 @@ bool stderr_is_journal() {
   return std::to_string(is.st_dev) + ":" + std::to_string(is.st_ino) == stream;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -8,7 +8,7 @@
 #include <string>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 using prometheus::ClientMetric;
@@ -62,13 +62,13 @@ constexpr std::string_view drop_prefix = "dropped_";
 constexpr std::array own_family{"scans_received", "scans_mapped",   "label_failures",
                                 "map_memory_kib", "map_tiles_away", "map_tiles_unreadable"};
 
-double count(const ServerStatus& status, std::string_view name) {
+double count(const dds::ServerStatus& status, std::string_view name) {
   return static_cast<double>(status.counter(name));
 }
 
-MetricFamily drops(const ServerStatus& status) {
+MetricFamily drops(const dds::ServerStatus& status) {
   Family family = counter("scans_dropped_total", "Scans that were not mapped, by reason");
-  for (const NamedCounter& dropped : status.counters) {
+  for (const dds::NamedCounter& dropped : status.counters) {
     if (!dropped.name.starts_with(drop_prefix)) continue;
     family.add(static_cast<double>(dropped.value),
                {{"reason", dropped.name.substr(drop_prefix.size())}});
@@ -76,9 +76,9 @@ MetricFamily drops(const ServerStatus& status) {
   return family;
 }
 
-MetricFamily events(const ServerStatus& status) {
+MetricFamily events(const dds::ServerStatus& status) {
   Family family = counter("events_total", "What happened beside mapping, by event");
-  for (const NamedCounter& event : status.counters) {
+  for (const dds::NamedCounter& event : status.counters) {
     if (event.name.starts_with(drop_prefix)) continue;
     if (std::ranges::find(own_family, event.name) != own_family.end()) continue;
     family.add(static_cast<double>(event.value), {{"event", event.name}});
@@ -86,7 +86,7 @@ MetricFamily events(const ServerStatus& status) {
   return family;
 }
 
-MetricFamily odometry_health(const ServerStatus& status) {
+MetricFamily odometry_health(const dds::ServerStatus& status) {
   Family family = gauge("odometry_health", "1 for the state of the last mapped scan's odometry");
   using enum OdometryHealth;
   for (const OdometryHealth health : {initialised, good, degenerate, lost}) {
@@ -95,16 +95,16 @@ MetricFamily odometry_health(const ServerStatus& status) {
   return family;
 }
 
-MetricFamily label_shares(const SegmentationStatus& segmentation) {
+MetricFamily label_shares(const dds::SegmentationStatus& segmentation) {
   return gauge("scan_labels_ratio", "Share of the last scans whose labels came from there")
       .add(segmentation.fresh_share, {{"source", "own"}})
-      .add(segmentation.carried_share, {{"source", "carried"}})
+      .add(segmentation.propagated_share, {{"source", "carried"}})
       .add(segmentation.unlabelled_share, {{"source", "none"}});
 }
 
-MetricFamily stages(const std::vector<StageTimes>& stages) {
+MetricFamily stages(const std::vector<StageStatistics>& stages) {
   Family family = histogram("stage_duration_seconds", "Time that a stage took for a scan");
-  for (const StageTimes& times : stages) family.add(times.all, {{"stage", times.stage}});
+  for (const StageStatistics& times : stages) family.add(times.all, {{"stage", times.stage}});
   return family;
 }
 
@@ -131,7 +131,7 @@ double unix_seconds(const CheckpointLog::Record& checkpoints) {
   return std::chrono::duration<double>(checkpoints.last_stored->time_since_epoch()).count();
 }
 
-void add_scans(std::vector<MetricFamily>& all, const ServerStatus& status) {
+void add_scans(std::vector<MetricFamily>& all, const dds::ServerStatus& status) {
   all.push_back(
       counter("scans_received_total", "Scans that arrived").add(count(status, "scans_received")));
   all.push_back(
@@ -149,7 +149,7 @@ void add_scans(std::vector<MetricFamily>& all, const ServerStatus& status) {
 }
 
 void add_map(std::vector<MetricFamily>& all, const MetricsSnapshot& snapshot) {
-  const ServerStatus& status = snapshot.status;
+  const dds::ServerStatus& status = snapshot.status;
   all.push_back(
       gauge("map_tiles", "Tiles of the static map").add(static_cast<double>(status.tile_count)));
   all.push_back(
@@ -157,7 +157,7 @@ void add_map(std::vector<MetricFamily>& all, const MetricsSnapshot& snapshot) {
   all.push_back(gauge("map_memory_bytes", "What the static map takes, at the last checkpoint")
                     .add(static_cast<double>(snapshot.map_memory.bytes)));
   all.push_back(gauge("map_tiles_away", "Tiles that are on disk only, at the last checkpoint")
-                    .add(static_cast<double>(snapshot.map_memory.away_tiles)));
+                    .add(static_cast<double>(snapshot.map_memory.non_resident_tiles)));
   all.push_back(gauge("map_tiles_unreadable", "Tiles on disk that cannot be read")
                     .add(count(status, "map_tiles_unreadable")));
 }
@@ -187,7 +187,7 @@ void add_process(std::vector<MetricFamily>& all, const MetricsSnapshot& snapshot
 }  // namespace
 
 std::vector<MetricFamily> metric_families(const MetricsSnapshot& snapshot) {
-  const ServerStatus& status = snapshot.status;
+  const dds::ServerStatus& status = snapshot.status;
   std::vector<MetricFamily> all;
   all.push_back(gauge("info", "1; what runs")
                     .add(1.0, {{"version", status.software_version},
@@ -204,4 +204,4 @@ std::vector<MetricFamily> metric_families(const MetricsSnapshot& snapshot) {
   return all;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

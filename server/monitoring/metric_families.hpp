@@ -8,11 +8,11 @@ namespace prometheus {
 struct MetricFamily;
 }
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// The snapshot under Prometheus's conventions: base units, counters ending in _total, one family a
 /// quantity with what distinguishes its members as labels.
 [[nodiscard]] std::vector<prometheus::MetricFamily> metric_families(
     const MetricsSnapshot& snapshot);
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -9,7 +9,7 @@
 
 #include "server/monitoring/metric_families.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 class MetricsEndpoint::Exposed : public prometheus::Collectable {
  public:
@@ -56,4 +56,4 @@ MetricsEndpoint::MetricsEndpoint(const std::string& address, std::function<Metri
 
 MetricsEndpoint::~MetricsEndpoint() = default;
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -6,7 +6,7 @@
 
 #include "server/monitoring/metrics_snapshot.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Answers Prometheus over HTTP at /metrics, from its own threads.
 class MetricsEndpoint {
@@ -26,4 +26,4 @@ class MetricsEndpoint {
   std::string address_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

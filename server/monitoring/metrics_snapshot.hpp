@@ -10,7 +10,7 @@
 #include "server/monitoring/service_log.hpp"
 #include "server/monitoring/statistics.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Of this process, as the kernel counts it.
 struct ProcessUse {
@@ -23,12 +23,12 @@ struct ProcessUse {
 
 /// What the server knows of itself at one moment.
 struct MetricsSnapshot {
-  ServerStatus status;
-  std::vector<StageTimes> stages;
+  dds::ServerStatus status;
+  std::vector<StageStatistics> stages;
   std::map<std::string, ServiceLog::Service> services;
   CheckpointLog::Record checkpoints;
   MemoryUse map_memory;
   ProcessUse process;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

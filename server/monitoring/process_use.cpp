@@ -7,7 +7,7 @@
 
 #include "server/monitoring/metrics_snapshot.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 double resident_bytes() {
@@ -38,4 +38,4 @@ ProcessUse process_use() {
           .open_files = open_files()};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::server {
 
 void RecentMedian::add(double value) {
   last_.push_back(value);
@@ -17,4 +17,4 @@ double RecentMedian::value() const {
   return sorted[sorted.size() / 2];
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

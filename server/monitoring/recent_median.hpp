@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <deque>
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Median of the last few values, which single outliers do not move.
 class RecentMedian {
@@ -19,4 +19,4 @@ class RecentMedian {
   std::deque<double> last_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

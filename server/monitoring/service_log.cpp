@@ -2,7 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
-namespace stillmap {
+namespace stillmap::server {
 
 void ServiceLog::answered(const std::string& service, wire::ReplyCode code, double seconds) {
   {
@@ -40,4 +40,4 @@ const char* name(wire::ReplyCode code) {
   return "unknown";
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

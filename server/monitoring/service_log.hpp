@@ -11,7 +11,7 @@
 #include "idl/conversions/map_query.hpp"
 #include "server/monitoring/duration_histogram.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// What was asked of the server, and with what success. Thread-safe.
 class ServiceLog {
@@ -46,7 +46,7 @@ template <typename Reply>
 
 /// `answer`, with every call written into the log, which must outlive it.
 template <typename Answer>
-[[nodiscard]] auto counted(ServiceLog& log, std::string service, Answer answer) {
+[[nodiscard]] auto logged(ServiceLog& log, std::string service, Answer answer) {
   return [&log, service = std::move(service), answer = std::move(answer)](const auto& request) {
     const auto began = std::chrono::steady_clock::now();
     auto reply = answer(request);
@@ -56,4 +56,4 @@ template <typename Answer>
   };
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 constexpr std::chrono::seconds rate_window{5};
-constexpr std::size_t labelling_window = 100;
+constexpr std::size_t label_provenance_window = 100;
 
 }  // namespace
 
@@ -25,14 +25,14 @@ double RateWindow::rate_hz(Clock::time_point now) const {
   return count / std::max(span_s, 1e-3);
 }
 
-void LabellingWindow::add(Labelling labelling) {
-  last_.push_back(labelling);
-  if (last_.size() > labelling_window) last_.pop_front();
+void LabelProvenanceWindow::add(LabelProvenance label_provenance) {
+  last_.push_back(label_provenance);
+  if (last_.size() > label_provenance_window) last_.pop_front();
 }
 
-double LabellingWindow::share(Labelling labelling) const {
+double LabelProvenanceWindow::share(LabelProvenance label_provenance) const {
   if (last_.empty()) return 0.0;
-  return static_cast<double>(std::ranges::count(last_, labelling)) /
+  return static_cast<double>(std::ranges::count(last_, label_provenance)) /
          static_cast<double>(last_.size());
 }
 
@@ -42,74 +42,75 @@ void Statistics::scan_received() {
   received_rate_.add(RateWindow::Clock::now());
 }
 
-void Statistics::scan_told(const std::string& frame, double delay_s) {
+void Statistics::record_scan_header(const std::string& frame, double delay_s) {
   const std::scoped_lock lock(mutex_);
   scan_frame_ = frame;
   scan_delay_s_ = delay_s;
 }
 
-void Statistics::scan_mapped(Labelling labelling) {
+void Statistics::scan_mapped(LabelProvenance label_provenance) {
   const std::scoped_lock lock(mutex_);
-  labellings_.add(labelling);
+  label_provenances_.add(label_provenance);
   ++mapped_;
   mapped_rate_.add(RateWindow::Clock::now());
   last_drop_.clear();
 }
 
-void Statistics::segmenting(const SegmentationStatus& pace) {
+void Statistics::set_segmentation_status(const dds::SegmentationStatus& pace) {
   const std::scoped_lock lock(mutex_);
   segmentation_ = pace;
 }
 
-void Statistics::labels_failed(const std::string& detail) {
+void Statistics::segmentation_failed(const std::string& detail) {
   const std::scoped_lock lock(mutex_);
-  ++label_failures_;
-  last_label_failure_ = detail;
+  ++segmentation_failures_;
+  last_segmentation_failure_ = detail;
 }
 
-void Statistics::labels_worked() {
+void Statistics::segmentation_succeeded() {
   const std::scoped_lock lock(mutex_);
-  last_label_failure_.clear();
+  last_segmentation_failure_.clear();
 }
 
 void Statistics::scans_dropped(const std::string& reason, std::size_t count,
                                const std::string& detail) {
   const std::scoped_lock lock(mutex_);
   const std::string name = "dropped_" + reason;
-  const auto known = std::ranges::find(dropped_, name, &NamedCounter::name);
-  NamedCounter& counter =
-      known == dropped_.end() ? dropped_.emplace_back(NamedCounter{.name = name}) : *known;
+  const auto known = std::ranges::find(dropped_, name, &dds::NamedCounter::name);
+  dds::NamedCounter& counter =
+      known == dropped_.end() ? dropped_.emplace_back(dds::NamedCounter{.name = name}) : *known;
   counter.value += count;
   last_drop_ = detail;
 }
 
 void Statistics::count(const std::string& event) {
   const std::scoped_lock lock(mutex_);
-  const auto known = std::ranges::find(events_, event, &NamedCounter::name);
-  (known == events_.end() ? events_.emplace_back(NamedCounter{.name = event}) : *known).value += 1;
+  const auto known = std::ranges::find(events_, event, &dds::NamedCounter::name);
+  (known == events_.end() ? events_.emplace_back(dds::NamedCounter{.name = event}) : *known)
+      .value += 1;
 }
 
 void Statistics::add_latency(const std::string& stage, double milliseconds) {
   const std::scoped_lock lock(mutex_);
-  const auto known = std::ranges::find(stages_, stage, &StageTimes::stage);
-  StageTimes& times =
-      known == stages_.end() ? stages_.emplace_back(StageTimes{stage, {}, {}}) : *known;
+  const auto known = std::ranges::find(stages_, stage, &StageStatistics::stage);
+  StageStatistics& times =
+      known == stages_.end() ? stages_.emplace_back(StageStatistics{stage, {}, {}}) : *known;
   times.recent.add(milliseconds);
   times.all.add(milliseconds / 1000.0);
 }
 
-void Statistics::scan_took_besides_labels(double milliseconds) {
+void Statistics::record_other_stages(double milliseconds) {
   const std::scoped_lock lock(mutex_);
-  besides_labels_ms_.add(milliseconds);
+  other_stages_ms_.add(milliseconds);
 }
 
-void Statistics::map_takes(const MemoryUse& memory, std::size_t unreadable_tiles) {
+void Statistics::set_map_memory(const MemoryUse& memory, std::size_t unreadable_tiles) {
   const std::scoped_lock lock(mutex_);
   map_memory_ = memory;
   unreadable_tiles_ = unreadable_tiles;
 }
 
-void Statistics::report_to(ServerStatus& status) const {
+void Statistics::report_to(dds::ServerStatus& status) const {
   const std::scoped_lock lock(mutex_);
   const auto now = RateWindow::Clock::now();
   status.received_hz = received_rate_.rate_hz(now);
@@ -120,27 +121,27 @@ void Statistics::report_to(ServerStatus& status) const {
                      {.name = "scans_mapped", .value = mapped_}};
   if (map_memory_.bytes > 0) {
     status.counters.push_back({.name = "map_memory_kib", .value = map_memory_.bytes >> 10});
-    status.counters.push_back({.name = "map_tiles_away", .value = map_memory_.away_tiles});
+    status.counters.push_back({.name = "map_tiles_away", .value = map_memory_.non_resident_tiles});
   }
   if (unreadable_tiles_ > 0) {
     status.counters.push_back({.name = "map_tiles_unreadable", .value = unreadable_tiles_});
   }
-  if (label_failures_ > 0) {
-    status.counters.push_back({.name = "label_failures", .value = label_failures_});
+  if (segmentation_failures_ > 0) {
+    status.counters.push_back({.name = "label_failures", .value = segmentation_failures_});
   }
   status.counters.insert(status.counters.end(), dropped_.begin(), dropped_.end());
   status.counters.insert(status.counters.end(), events_.begin(), events_.end());
   status.segmentation = segmentation_;
-  status.segmentation.fresh_share = labellings_.share(Labelling::fresh);
-  status.segmentation.carried_share = labellings_.share(Labelling::carried);
-  status.segmentation.unlabelled_share = labellings_.share(Labelling::none);
+  status.segmentation.fresh_share = label_provenances_.share(LabelProvenance::fresh);
+  status.segmentation.propagated_share = label_provenances_.share(LabelProvenance::propagated);
+  status.segmentation.unlabelled_share = label_provenances_.share(LabelProvenance::none);
   status.latencies.clear();
-  for (const StageTimes& times : stages_) {
+  for (const StageStatistics& times : stages_) {
     status.latencies.push_back(times.recent.summary(times.stage));
   }
 }
 
-std::vector<StageTimes> Statistics::stage_times() const {
+std::vector<StageStatistics> Statistics::stage_statistics() const {
   const std::scoped_lock lock(mutex_);
   return stages_;
 }
@@ -161,9 +162,9 @@ double Statistics::receive_period_ms() const {
   return rate_hz > 0.0 ? 1000.0 / rate_hz : 0.0;
 }
 
-double Statistics::besides_labels_ms() const {
+double Statistics::other_stages_ms() const {
   const std::scoped_lock lock(mutex_);
-  return besides_labels_ms_.value();
+  return other_stages_ms_.value();
 }
 
 std::string Statistics::last_drop() const {
@@ -171,9 +172,9 @@ std::string Statistics::last_drop() const {
   return last_drop_;
 }
 
-std::string Statistics::last_label_failure() const {
+std::string Statistics::last_segmentation_failure() const {
   const std::scoped_lock lock(mutex_);
-  return last_label_failure_;
+  return last_segmentation_failure_;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -9,7 +9,7 @@
 #include <cstdlib>
 #include <cstring>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 /// False when the state did not arrive.
@@ -31,7 +31,7 @@ bool send_to(const std::string& address, const std::string& state) {
 
 }  // namespace
 
-void tell_service_manager(const std::string& state) {
+void notify_systemd(const std::string& state) {
   const char* const address = std::getenv("NOTIFY_SOCKET");
   if (address == nullptr) return;
   if (!send_to(address, state)) {
@@ -39,4 +39,4 @@ void tell_service_manager(const std::string& state) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -2,32 +2,32 @@
 
 #include <spdlog/spdlog.h>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
-constexpr std::chrono::seconds shortest_pause{5};
+constexpr std::chrono::seconds min_interval{5};
 
 }  // namespace
 
-std::string RareWarnings::due(const std::string& kind, const std::string& text) {
+std::string ThrottledLog::due(const std::string& kind, const std::string& text) {
   const auto now = std::chrono::steady_clock::now();
   const auto [known, is_new] = kinds_.try_emplace(kind, Kind{.last = now});
-  if (!is_new && now - known->second.last < shortest_pause) {
-    ++known->second.left_out;
+  if (!is_new && now - known->second.last < min_interval) {
+    ++known->second.suppressed;
     return {};
   }
-  const std::uint64_t left_out = known->second.left_out;
+  const std::uint64_t suppressed = known->second.suppressed;
   known->second = {.last = now};
-  if (left_out == 0) return text;
-  return text + " (and " + std::to_string(left_out) + " more of this kind)";
+  if (suppressed == 0) return text;
+  return text + " (and " + std::to_string(suppressed) + " more of this kind)";
 }
 
-void RareWarnings::warn(const std::string& kind, const std::string& text) {
+void ThrottledLog::warn(const std::string& kind, const std::string& text) {
   if (const std::string line = due(kind, text); !line.empty()) spdlog::warn("{}", line);
 }
 
-void RareWarnings::error(const std::string& kind, const std::string& text) {
+void ThrottledLog::error(const std::string& kind, const std::string& text) {
   if (const std::string line = due(kind, text); !line.empty()) spdlog::error("{}", line);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

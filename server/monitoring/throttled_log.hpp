@@ -5,11 +5,11 @@
 #include <map>
 #include <string>
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Logs a warning or an error of one kind at most every few seconds and says how many were left
 /// out, so that a fault of every scan does not flood the log. One thread uses it.
-class RareWarnings {
+class ThrottledLog {
  public:
   void warn(const std::string& kind, const std::string& text);
   void error(const std::string& kind, const std::string& text);
@@ -20,9 +20,9 @@ class RareWarnings {
 
   struct Kind {
     std::chrono::steady_clock::time_point last;
-    std::uint64_t left_out = 0;
+    std::uint64_t suppressed = 0;
   };
   std::map<std::string, Kind> kinds_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

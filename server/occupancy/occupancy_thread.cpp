@@ -5,18 +5,18 @@
 
 #include "server/monitoring/idle_scheduling.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
-OccupancyThread::OccupancyThread(const OccupancyServing& config, Statistics& statistics,
-                                 Pause pause)
+OccupancyThread::OccupancyThread(const OccupancyServiceConfig& config, Statistics& statistics,
+                                 ThrottleCallback throttle)
     : config_(config.map),
       capacity_(config.queue_length),
       statistics_(statistics),
-      pause_(std::move(pause)),
+      throttle_(std::move(throttle)),
       map_(config.map),
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
-void OccupancyThread::begin(std::shared_ptr<const MapView> view) {
+void OccupancyThread::begin(std::shared_ptr<const MapSnapshot> view) {
   const std::scoped_lock lock(queue_mutex_);
   queue_.clear();
   to_follow_ = nullptr;
@@ -37,7 +37,7 @@ void OccupancyThread::add(OccupancyScan scan) {
   queue_changed_.notify_one();
 }
 
-void OccupancyThread::follow(std::shared_ptr<const MapView> view) {
+void OccupancyThread::follow(std::shared_ptr<const MapSnapshot> view) {
   const std::scoped_lock lock(queue_mutex_);
   if (view == followed_) return;
   followed_ = view;
@@ -46,13 +46,13 @@ void OccupancyThread::follow(std::shared_ptr<const MapView> view) {
 }
 
 void OccupancyThread::work(const std::stop_token& stop) {
-  static_cast<void>(run_in_background());
+  static_cast<void>(use_idle_scheduling());
   while (true) {
     std::unique_lock lock(queue_mutex_);
     if (!queue_changed_.wait(lock, stop, [this] { return has_work(); })) return;
     lock.unlock();
     // First, so that the job is what there is to do then.
-    pause();
+    throttle();
     lock.lock();
     if (stop.stop_requested()) return;
     Job job = next_job();
@@ -86,15 +86,15 @@ OccupancyThread::Job OccupancyThread::next_job() {
   return job;
 }
 
-void OccupancyThread::follow_now(const MapView& view) {
+void OccupancyThread::follow_now(const MapSnapshot& view) {
   const std::scoped_lock lock(map_mutex_);
-  if (map_.follow(view)) ++changes_;
+  if (map_.sync_residency(view)) ++changes_;
 }
 
-void OccupancyThread::begin_map(const MapView& view) {
+void OccupancyThread::begin_map(const MapSnapshot& view) {
   OccupancyMap fresh(config_);
-  fresh.insert(view, pause_);
-  fresh.follow(view);
+  fresh.insert(view, throttle_);
+  fresh.sync_residency(view);
   const std::scoped_lock lock(map_mutex_, queue_mutex_);
   map_ = std::move(fresh);
   stamp_ns_ = 0;
@@ -108,9 +108,10 @@ void OccupancyThread::insert(const OccupancyScan& scan, bool clears) {
   const auto began = Clock::now();
   if (!clears) statistics_.count("occupancy_not_cleared");
   // Only this thread changes the map; who asks waits for a portion at most.
-  map_.gather(*scan.labelled, scan.T_map_lidar,
-              {.clears = clears, .unknown_is_solid = scan.unknown_is_solid}, pause_);
-  while (take_portion()) pause();
+  map_.compute_update(*scan.labelled, scan.T_map_lidar,
+                      {.clear_free_space = clears, .unknown_is_solid = scan.unknown_is_solid},
+                      throttle_);
+  while (insert_portion()) throttle();
   {
     const std::scoped_lock lock(map_mutex_);
     stamp_ns_ = scan.labelled->scan.stamp_ns;
@@ -120,13 +121,13 @@ void OccupancyThread::insert(const OccupancyScan& scan, bool clears) {
   statistics_.add_latency("occupancy", took.count());
 }
 
-bool OccupancyThread::take_portion() {
+bool OccupancyThread::insert_portion() {
   const std::scoped_lock lock(map_mutex_);
-  return map_.take_gathered(OccupancyMap::portion_bricks);
+  return map_.apply_update(OccupancyMap::portion_bricks);
 }
 
-void OccupancyThread::pause() const {
-  if (pause_) pause_();
+void OccupancyThread::throttle() const {
+  if (throttle_) throttle_();
 }
 
 OccupancyAnswers OccupancyThread::answer(const OccupancyQuery& query) const {
@@ -153,4 +154,4 @@ std::uint64_t OccupancyThread::changes() const {
   return changes_;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

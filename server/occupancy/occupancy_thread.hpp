@@ -13,7 +13,7 @@
 #include "core/occupancy/occupancy_map.hpp"
 #include "server/monitoring/statistics.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// A mapped scan on its way into the octree, shared with whoever else uses it.
 struct OccupancyScan {
@@ -36,14 +36,15 @@ struct EncodedOctree {
 /// ("occupancy_scans_left_out"). Thread-safe.
 class OccupancyThread {
  public:
-  OccupancyThread(const OccupancyServing& config, Statistics& statistics, Pause pause = {});
+  OccupancyThread(const OccupancyServiceConfig& config, Statistics& statistics,
+                  ThrottleCallback throttle = {});
 
   /// A new map begins, with the voxels of this view; until they are there, answers are those of an
   /// empty one. Returns at once, as `add` does.
-  void begin(std::shared_ptr<const MapView> view);
+  void begin(std::shared_ptr<const MapSnapshot> view);
   void add(OccupancyScan scan);
   /// Tiles left memory, or came back.
-  void follow(std::shared_ptr<const MapView> view);
+  void follow(std::shared_ptr<const MapSnapshot> view);
 
   /// Throws std::invalid_argument for a query that asks for too much.
   [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) const;
@@ -58,8 +59,8 @@ class OccupancyThread {
  private:
   /// Either a new map or a scan, or the newest view to be followed, or an octree to be encoded.
   struct Job {
-    std::shared_ptr<const MapView> first_view;
-    std::shared_ptr<const MapView> next_view;
+    std::shared_ptr<const MapSnapshot> first_view;
+    std::shared_ptr<const MapSnapshot> next_view;
     OccupancyScan scan;
     std::optional<std::promise<EncodedOctree>> encoded;
   };
@@ -69,24 +70,24 @@ class OccupancyThread {
   /// Under the queue's lock.
   [[nodiscard]] bool has_work() const { return !queue_.empty() || to_follow_ || to_encode_; }
   [[nodiscard]] Job next_job();
-  void begin_map(const MapView& view);
-  void follow_now(const MapView& view);
+  void begin_map(const MapSnapshot& view);
+  void follow_now(const MapSnapshot& view);
   void insert(const OccupancyScan& scan, bool clears);
   /// Of what was gathered; true while more is left.
-  bool take_portion();
-  void pause() const;
+  bool insert_portion();
+  void throttle() const;
 
   OccupancyConfig config_;
   std::size_t capacity_;
   Statistics& statistics_;
-  Pause pause_;
+  ThrottleCallback throttle_;
   mutable std::mutex queue_mutex_;
   std::condition_variable_any queue_changed_;
   std::deque<Job> queue_;
-  std::shared_ptr<const MapView> to_follow_;
+  std::shared_ptr<const MapSnapshot> to_follow_;
   std::optional<std::promise<EncodedOctree>> to_encode_;
   /// The last view that was to be followed.
-  std::shared_ptr<const MapView> followed_;
+  std::shared_ptr<const MapSnapshot> followed_;
   mutable std::mutex map_mutex_;
   OccupancyMap map_;
   /// The one before that which is to begin.
@@ -97,4 +98,4 @@ class OccupancyThread {
   std::jthread thread_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

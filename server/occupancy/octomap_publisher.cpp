@@ -2,9 +2,9 @@
 
 #include "idl/conversions/octomap.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
-OctomapPublisher::OctomapPublisher(Participant& participant, const Topics& topics,
+OctomapPublisher::OctomapPublisher(dds::Participant& participant, const dds::Topics& topics,
                                    const ServerConfig& config, OccupancyThread& occupancy)
     : occupancy_(occupancy),
       map_frame_(config.frames.map),
@@ -24,4 +24,4 @@ void OctomapPublisher::publish() {
   static_cast<void>(writer_.write(wire::to_octomap(octree.data, octree.stamp_ns, map_frame_)));
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

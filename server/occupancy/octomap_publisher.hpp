@@ -9,14 +9,14 @@
 #include "server/occupancy/occupancy_thread.hpp"
 #include "server/publishers/periodic_thread.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Publishes the octree (binary, as RViz2's plug-in and octomap_server's clients read it) when it
 /// changed and somebody listens.
 class OctomapPublisher {
  public:
-  OctomapPublisher(Participant& participant, const Topics& topics, const ServerConfig& config,
-                   OccupancyThread& occupancy);
+  OctomapPublisher(dds::Participant& participant, const dds::Topics& topics,
+                   const ServerConfig& config, OccupancyThread& occupancy);
 
  private:
   void publish();
@@ -24,9 +24,9 @@ class OctomapPublisher {
   OccupancyThread& occupancy_;
   std::string map_frame_;
   std::uint64_t published_ = 0;
-  Writer<octomap_msgs::msg::Octomap> writer_;
+  dds::Writer<octomap_msgs::msg::Octomap> writer_;
   // Last: stops before what it uses is gone.
   PeriodicThread thread_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

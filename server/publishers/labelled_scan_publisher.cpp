@@ -4,9 +4,10 @@
 
 #include "idl/conversions/scan_to_cloud.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
-LabelledScanPublisher::LabelledScanPublisher(Participant& participant, const Topics& topics)
+LabelledScanPublisher::LabelledScanPublisher(dds::Participant& participant,
+                                             const dds::Topics& topics)
     : writer_(participant, topics.scan.dds_name, topics.scan.writer),
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
 
@@ -32,4 +33,4 @@ void LabelledScanPublisher::work(const std::stop_token& stop) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

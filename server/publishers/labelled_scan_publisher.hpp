@@ -12,13 +12,13 @@
 #include "idl/interface/topics.hpp"
 #include "sensor_msgs.h"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Publishes labelled scans from its own thread; while one is being written, only the newest of
 /// the next ones is kept.
 class LabelledScanPublisher {
  public:
-  LabelledScanPublisher(Participant& participant, const Topics& topics);
+  LabelledScanPublisher(dds::Participant& participant, const dds::Topics& topics);
 
   /// Returns at once.
   void publish(std::shared_ptr<const LabelledScan> labelled, const std::string& lidar_frame);
@@ -34,9 +34,9 @@ class LabelledScanPublisher {
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::optional<Job> newest_;
-  Writer<sensor_msgs::msg::PointCloud2> writer_;
+  dds::Writer<sensor_msgs::msg::PointCloud2> writer_;
   // Last: stops before what it uses is gone.
   std::jthread thread_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

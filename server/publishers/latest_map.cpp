@@ -5,37 +5,37 @@
 #include <functional>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::server {
 
 // The wall clock sees to it that it differs.
 std::uint64_t new_map_id() {
   return static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
 }
 
-void MapBoard::begin(std::shared_ptr<const MapView> view, Trajectory trajectory) {
+void LatestMap::begin(std::shared_ptr<const MapSnapshot> view, Trajectory trajectory) {
   auto history = std::make_shared<const TileHistory>(history_from(*view));
   const std::scoped_lock lock(mutex_);
   state_ = {std::move(view), std::move(history)};
-  shown_ = std::chrono::steady_clock::now();
+  published_at_ = std::chrono::steady_clock::now();
   changed_.notify_all();
   trajectory_ = std::move(trajectory);
   health_ = OdometryHealth::initialised;
 }
 
-void MapBoard::show(std::shared_ptr<const MapView> view) {
-  // Only the mapper's thread shows views, so the state cannot change between the two locks.
+void LatestMap::publish(std::shared_ptr<const MapSnapshot> view) {
+  // Only the mapping thread publishes views, so the state cannot change between the two locks.
   const MapState before = state();
   if (before.view == view) return;
   auto history = std::make_shared<const TileHistory>(
       before.history ? history_with(*before.history, *view) : history_from(*view));
   const std::scoped_lock lock(mutex_);
   state_ = {std::move(view), std::move(history)};
-  shown_ = std::chrono::steady_clock::now();
+  published_at_ = std::chrono::steady_clock::now();
   changed_.notify_all();
 }
 
-void MapBoard::add_pose(const StampedPose& pose, OdometryHealth health,
-                        const std::string& label_source) {
+void LatestMap::add_pose(const StampedPose& pose, OdometryHealth health,
+                         const std::string& label_source) {
   const std::scoped_lock lock(mutex_);
   const auto is_later = [&](const StampedPose& known) { return known.stamp_ns >= pose.stamp_ns; };
   const auto later =
@@ -47,37 +47,37 @@ void MapBoard::add_pose(const StampedPose& pose, OdometryHealth health,
   label_source_ = label_source;
 }
 
-std::shared_ptr<const MapView> MapBoard::view() const {
+std::shared_ptr<const MapSnapshot> LatestMap::view() const {
   const std::scoped_lock lock(mutex_);
   return state_.view;
 }
 
-std::optional<MapBoard::News> MapBoard::wait_for_news(const std::shared_ptr<const MapView>& known,
-                                                      const std::stop_token& stop,
-                                                      std::chrono::milliseconds timeout) const {
+std::optional<LatestMap::MapUpdate> LatestMap::wait_for_update(
+    const std::shared_ptr<const MapSnapshot>& known, const std::stop_token& stop,
+    std::chrono::milliseconds timeout) const {
   std::unique_lock lock(mutex_);
   const bool is_new =
       changed_.wait_for(lock, stop, timeout, [&] { return state_.view && state_.view != known; });
   if (!is_new) return std::nullopt;
-  return News{state_.view, shown_};
+  return MapUpdate{state_.view, published_at_};
 }
 
-MapState MapBoard::state() const {
+MapState LatestMap::state() const {
   const std::scoped_lock lock(mutex_);
   return state_;
 }
 
-Trajectory MapBoard::trajectory() const {
+Trajectory LatestMap::trajectory() const {
   const std::scoped_lock lock(mutex_);
   return trajectory_;
 }
 
-StampedPose MapBoard::newest_pose() const {
+StampedPose LatestMap::newest_pose() const {
   const std::scoped_lock lock(mutex_);
   return trajectory_.empty() ? StampedPose{} : trajectory_.back();
 }
 
-Trajectory MapBoard::trajectory(std::size_t max_poses) const {
+Trajectory LatestMap::trajectory(std::size_t max_poses) const {
   const std::scoped_lock lock(mutex_);
   if (trajectory_.empty()) return {};
   const std::size_t last = trajectory_.size() - 1;
@@ -89,19 +89,19 @@ Trajectory MapBoard::trajectory(std::size_t max_poses) const {
   return chosen;
 }
 
-std::uint64_t MapBoard::poses_added() const {
+std::uint64_t LatestMap::poses_added() const {
   const std::scoped_lock lock(mutex_);
   return poses_added_;
 }
 
-OdometryHealth MapBoard::health() const {
+OdometryHealth LatestMap::health() const {
   const std::scoped_lock lock(mutex_);
   return health_;
 }
 
-std::string MapBoard::label_source() const {
+std::string LatestMap::label_source() const {
   const std::scoped_lock lock(mutex_);
   return label_source_;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

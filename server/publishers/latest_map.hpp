@@ -8,37 +8,37 @@
 #include <stop_token>
 #include <string>
 
-#include "core/map/tile.hpp"
+#include "core/lidar/trajectory.hpp"
 #include "core/map/query/tile_history.hpp"
+#include "core/map/tile.hpp"
 #include "core/odometry/odometry_state.hpp"
-#include "core/odometry/trajectory.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// An id that no map of an earlier run has.
 [[nodiscard]] std::uint64_t new_map_id();
 
-/// What the mapper's thread shows to all others: immutable views, so that nobody waits for
+/// What the mapping thread publishes to all others: immutable views, so that nobody waits for
 /// anybody. Thread-safe.
-class MapBoard {
+class LatestMap {
  public:
   /// A new map begins: its first view, and the poses that led to it.
-  void begin(std::shared_ptr<const MapView> view, Trajectory trajectory);
-  void show(std::shared_ptr<const MapView> view);
+  void begin(std::shared_ptr<const MapSnapshot> view, Trajectory trajectory);
+  void publish(std::shared_ptr<const MapSnapshot> view);
   /// Poses at later times give way: a recording that is played again replaces its old path.
   void add_pose(const StampedPose& pose, OdometryHealth health, const std::string& label_source);
 
   /// Never null once `begin` was called.
-  [[nodiscard]] std::shared_ptr<const MapView> view() const;
+  [[nodiscard]] std::shared_ptr<const MapSnapshot> view() const;
   /// A view, and when it came.
-  struct News {
-    std::shared_ptr<const MapView> view;
-    std::chrono::steady_clock::time_point shown;
+  struct MapUpdate {
+    std::shared_ptr<const MapSnapshot> view;
+    std::chrono::steady_clock::time_point published_at;
   };
   /// Waits for another view than `known`. Nothing after `timeout` or when a stop was requested.
-  [[nodiscard]] std::optional<News> wait_for_news(const std::shared_ptr<const MapView>& known,
-                                                  const std::stop_token& stop,
-                                                  std::chrono::milliseconds timeout) const;
+  [[nodiscard]] std::optional<MapUpdate> wait_for_update(
+      const std::shared_ptr<const MapSnapshot>& known, const std::stop_token& stop,
+      std::chrono::milliseconds timeout) const;
   /// The view and the history that ends with it.
   [[nodiscard]] MapState state() const;
   [[nodiscard]] Trajectory trajectory() const;
@@ -56,11 +56,11 @@ class MapBoard {
   mutable std::mutex mutex_;
   mutable std::condition_variable_any changed_;
   MapState state_;
-  std::chrono::steady_clock::time_point shown_;
+  std::chrono::steady_clock::time_point published_at_;
   Trajectory trajectory_;
   std::uint64_t poses_added_ = 0;
   OdometryHealth health_ = OdometryHealth::initialised;
   std::string label_source_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

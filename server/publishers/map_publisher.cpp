@@ -3,11 +3,11 @@
 #include "idl/conversions/map_to_cloud.hpp"
 #include "idl/conversions/pose.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
-MapPublisher::MapPublisher(Participant& participant, const Topics& topics,
-                           const ServerConfig& config, const MapBoard& board)
-    : board_(board),
+MapPublisher::MapPublisher(dds::Participant& participant, const dds::Topics& topics,
+                           const ServerConfig& config, const LatestMap& latest_map)
+    : latest_map_(latest_map),
       map_frame_(config.frames.map),
       path_poses_(config.publish.path_poses),
       half_window_m_(static_cast<float>(config.publish.cloud_window_m / 2.0)),
@@ -15,33 +15,33 @@ MapPublisher::MapPublisher(Participant& participant, const Topics& topics,
       path_(participant, topics.path.dds_name, topics.path.writer),
       cloud_(participant, topics.static_cloud.dds_name, topics.static_cloud.writer),
       tile_thread_(std::chrono::duration<double>(config.publish.tiles_period_s),
-                   [this] { tiles_.publish(board_.view()); }),
+                   [this] { tiles_.publish(latest_map_.view()); }),
       path_thread_(std::chrono::duration<double>(config.publish.path_period_s),
                    [this] { publish_path(); }),
       cloud_thread_(std::chrono::duration<double>(config.publish.cloud_period_s),
                     [this] { publish_cloud(); }) {}
 
-bool MapPublisher::is_news(PathState& shown) const {
-  const PathState now{.map_id = board_.view()->map_id, .poses = board_.poses_added()};
-  if (now == shown || (now.poses == 0 && board_.view()->tiles.empty())) return false;
-  shown = now;
+bool MapPublisher::has_changed(PathState& published) const {
+  const PathState now{.map_id = latest_map_.view()->map_id, .poses = latest_map_.poses_added()};
+  if (now == published || (now.poses == 0 && latest_map_.view()->tiles.empty())) return false;
+  published = now;
   return true;
 }
 
 void MapPublisher::publish_path() {
-  if (!is_news(shown_path_)) return;
+  if (!has_changed(published_path_)) return;
   // Keep-last writers always have room.
-  static_cast<void>(path_.write(wire::to_path(board_.trajectory(path_poses_), map_frame_)));
+  static_cast<void>(path_.write(wire::to_path(latest_map_.trajectory(path_poses_), map_frame_)));
 }
 
 void MapPublisher::publish_cloud() {
-  if (!is_news(shown_cloud_)) return;
-  const StampedPose pose = board_.newest_pose();
+  if (!has_changed(published_cloud_)) return;
+  const StampedPose pose = latest_map_.newest_pose();
   const Eigen::Vector2f centre_map = pose.T_map_lidar.translation().head<2>().cast<float>();
   const Eigen::Vector2f half = Eigen::Vector2f::Constant(half_window_m_);
   const Eigen::AlignedBox2f window_map(centre_map - half, centre_map + half);
   static_cast<void>(
-      cloud_.write(wire::to_cloud(*board_.view(), window_map, pose.stamp_ns, map_frame_)));
+      cloud_.write(wire::to_cloud(*latest_map_.view(), window_map, pose.stamp_ns, map_frame_)));
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -11,14 +11,14 @@
 #include "server/publishers/periodic_thread.hpp"
 #include "server/publishers/tile_publisher.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Publishes what is heavy and not urgent, each from its own thread and only when it changed:
 /// tiles, the path, and the static map round the robot.
 class MapPublisher {
  public:
-  MapPublisher(Participant& participant, const Topics& topics, const ServerConfig& config,
-               const MapBoard& board);
+  MapPublisher(dds::Participant& participant, const dds::Topics& topics, const ServerConfig& config,
+               const LatestMap& latest_map);
 
  private:
   /// Changes with every pose, and when a map was loaded.
@@ -27,25 +27,25 @@ class MapPublisher {
     std::uint64_t poses = 0;
     friend bool operator==(const PathState&, const PathState&) = default;
   };
-  /// Whether there is a path, and another one than `shown`, which then becomes it.
-  [[nodiscard]] bool is_news(PathState& shown) const;
+  /// Whether there is a path, and another one than `published`, which then becomes it.
+  [[nodiscard]] bool has_changed(PathState& published) const;
 
   void publish_path();
   void publish_cloud();
 
-  const MapBoard& board_;
+  const LatestMap& latest_map_;
   std::string map_frame_;
   std::size_t path_poses_;
   float half_window_m_;
-  PathState shown_path_;
-  PathState shown_cloud_;
+  PathState published_path_;
+  PathState published_cloud_;
   TilePublisher tiles_;
-  Writer<nav_msgs::msg::Path> path_;
-  Writer<sensor_msgs::msg::PointCloud2> cloud_;
+  dds::Writer<nav_msgs::msg::Path> path_;
+  dds::Writer<sensor_msgs::msg::PointCloud2> cloud_;
   // Last: they stop before what they use is gone.
   PeriodicThread tile_thread_;
   PeriodicThread path_thread_;
   PeriodicThread cloud_thread_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -7,7 +7,7 @@
 #include <thread>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Calls `work` every `period` on its own thread until destroyed; work that takes longer delays the
 /// next call.
@@ -29,4 +29,4 @@ class PeriodicThread {
   std::jthread thread_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -4,12 +4,12 @@
 
 #include "idl/conversions/pose.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
-PosePublisher::PosePublisher(Participant& participant, const Topics& topics,
+PosePublisher::PosePublisher(dds::Participant& participant, const dds::Topics& topics,
                              const FramesConfig& frames)
     : map_frame_(frames.map),
-      longest_queue_(static_cast<std::size_t>(topics.odometry.writer.depth)),
+      max_queue_length_(static_cast<std::size_t>(topics.odometry.writer.depth)),
       odometry_(participant, topics.odometry.dds_name, topics.odometry.writer),
       tf_(participant, topics.tf.dds_name, topics.tf.writer),
       thread_([this](const std::stop_token& stop) { work(stop); }) {}
@@ -22,7 +22,7 @@ void PosePublisher::publish(std::int64_t stamp_ns, const OdometryResult& odometr
   Message message{wire::to_odometry(pose, odometry.covariance, map_frame_, lidar_frame),
                   wire::to_tf(pose, map_frame_, lidar_frame)};
   const std::scoped_lock lock(mutex_);
-  if (waiting_.size() >= longest_queue_) waiting_.pop_front();
+  if (waiting_.size() >= max_queue_length_) waiting_.pop_front();
   waiting_.push_back(std::move(message));
   changed_.notify_one();
 }
@@ -44,4 +44,4 @@ void PosePublisher::work(const std::stop_token& stop) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -12,7 +12,7 @@
 #include "nav_msgs.h"
 #include "tf2_msgs.h"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Publishes each pose as odometry and as the transform map -> lidar. (A map -> odom -> base chain
 /// needs the robot's own odometry; until then the lidar hangs from the map directly.) It writes
@@ -20,7 +20,8 @@ namespace stillmap {
 /// the mapper.
 class PosePublisher {
  public:
-  PosePublisher(Participant& participant, const Topics& topics, const FramesConfig& frames);
+  PosePublisher(dds::Participant& participant, const dds::Topics& topics,
+                const FramesConfig& frames);
   /// Writes what is left first.
   ~PosePublisher();
 
@@ -37,9 +38,9 @@ class PosePublisher {
   void work(const std::stop_token& stop);
 
   std::string map_frame_;
-  std::size_t longest_queue_;
-  Writer<nav_msgs::msg::Odometry> odometry_;
-  Writer<tf2_msgs::msg::TFMessage> tf_;
+  std::size_t max_queue_length_;
+  dds::Writer<nav_msgs::msg::Odometry> odometry_;
+  dds::Writer<tf2_msgs::msg::TFMessage> tf_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
   std::deque<Message> waiting_;
@@ -47,4 +48,4 @@ class PosePublisher {
   std::jthread thread_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -6,7 +6,7 @@
 #include <numeric>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::server {
 
 namespace {
 
@@ -18,22 +18,23 @@ std::string host_name() {
 
 }  // namespace
 
-ServerReport::ServerReport(ServerTraits traits, const MapBoard& board, const Statistics& statistics,
-                           std::function<std::vector<Finding>()> peer_findings,
-                           std::function<std::string()> why_nothing_arrives)
+ServerReport::ServerReport(ServerTraits traits, const LatestMap& latest_map,
+                           const Statistics& statistics,
+                           std::function<std::vector<dds::Diagnostic>()> discovery_diagnostics,
+                           std::function<std::string()> no_input_reason)
     : traits_(std::move(traits)),
       host_(host_name()),
-      board_(board),
+      latest_map_(latest_map),
       statistics_(statistics),
-      peer_findings_(std::move(peer_findings)),
-      why_nothing_arrives_(std::move(why_nothing_arrives)) {}
+      discovery_diagnostics_(std::move(discovery_diagnostics)),
+      no_input_reason_(std::move(no_input_reason)) {}
 
-ServerStatus ServerReport::status() const {
-  const auto view = board_.view();
-  const std::string live_labels = board_.label_source();
+dds::ServerStatus ServerReport::status() const {
+  const auto view = latest_map_.view();
+  const std::string live_labels = latest_map_.label_source();
   const auto wall_clock = std::chrono::system_clock::now().time_since_epoch();
   const auto uptime = std::chrono::steady_clock::now() - started_;
-  ServerStatus status;
+  dds::ServerStatus status;
   status.stamp_ns = std::chrono::nanoseconds(wall_clock).count();
   status.software_version = STILLMAP_VERSION;
   status.uptime_s = std::chrono::duration<double>(uptime).count();
@@ -42,7 +43,7 @@ ServerStatus ServerReport::status() const {
   status.host = host_;
   status.sensor = traits_.sensor;
   status.points_topic = traits_.points_topic;
-  status.health = board_.health();
+  status.health = latest_map_.health();
   status.map_version = view->version;
   status.map_id = view->map_id;
   status.tile_count = view->tiles.size();
@@ -50,8 +51,9 @@ ServerStatus ServerReport::status() const {
       view->tiles.begin(), view->tiles.end(), std::uint64_t{0},
       [](std::uint64_t sum, const auto& tile) { return sum + tile->info.voxel_count; });
   statistics_.report_to(status);
-  status.findings = peer_findings_();
-  status.findings.insert(status.findings.end(), traits_.troubles.begin(), traits_.troubles.end());
+  status.diagnostics = discovery_diagnostics_();
+  status.diagnostics.insert(status.diagnostics.end(), traits_.host_diagnostics.begin(),
+                            traits_.host_diagnostics.end());
   status.reason = reason(status);
   return status;
 }
@@ -59,10 +61,10 @@ ServerStatus ServerReport::status() const {
 namespace {
 
 /// What segmentation does less than it would on a faster machine; empty when nothing.
-std::string reduced_pace(const SegmentationStatus& segmentation) {
+std::string reduced_pace(const dds::SegmentationStatus& segmentation) {
   std::string what;
   if (segmentation.every > 1) {
-    what = every_nth_scan(segmentation.every) + " is segmented, labels are carried between";
+    what = dds::every_nth_scan(segmentation.every) + " is segmented, labels are carried between";
   }
   if (segmentation.image_columns > 0 && segmentation.image_columns < segmentation.full_columns) {
     what += (what.empty() ? "" : "; ") + std::string("range images are ") +
@@ -74,20 +76,20 @@ std::string reduced_pace(const SegmentationStatus& segmentation) {
 
 }  // namespace
 
-std::string ServerReport::reason(const ServerStatus& status) const {
-  if (const std::string why = why_nothing_arrives_(); !why.empty()) return why;
+std::string ServerReport::reason(const dds::ServerStatus& status) const {
+  if (const std::string why = no_input_reason_(); !why.empty()) return why;
   if (const std::string drop = statistics_.last_drop(); !drop.empty()) {
     return "the last scan was dropped: " + drop;
   }
   if (status.health == OdometryHealth::lost) {
     return "the odometry is lost: the last scan does not fit the map";
   }
-  if (const std::string failure = statistics_.last_label_failure(); !failure.empty()) {
+  if (const std::string failure = statistics_.last_segmentation_failure(); !failure.empty()) {
     return "the last scan could not be segmented: " + failure;
   }
   if (status.received_hz == 0.0) return "no scan for the last seconds";
   if (const std::string pace = reduced_pace(status.segmentation); !pace.empty()) return pace;
-  return status.findings.empty() ? std::string() : status.findings.front().what;
+  return status.diagnostics.empty() ? std::string() : status.diagnostics.front().what;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

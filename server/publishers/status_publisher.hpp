@@ -7,24 +7,24 @@
 #include "server/publishers/periodic_thread.hpp"
 #include "stillmap_msgs.h"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Publishes the status every period, and soon after the odometry's health changed.
 class StatusPublisher {
  public:
-  StatusPublisher(Participant& participant, const Topics& topics, double period_s,
-                  std::function<ServerStatus()> status);
+  StatusPublisher(dds::Participant& participant, const dds::Topics& topics, double period_s,
+                  std::function<dds::ServerStatus()> status);
 
  private:
   void publish_when_due();
 
   std::chrono::duration<double> period_;
-  std::function<ServerStatus()> status_;
+  std::function<dds::ServerStatus()> status_;
   std::chrono::steady_clock::time_point last_;
   OdometryHealth last_health_ = OdometryHealth::initialised;
-  Writer<stillmap_msgs::msg::Status> writer_;
+  dds::Writer<stillmap_msgs::msg::Status> writer_;
   // Last: stops before what it uses is gone.
   PeriodicThread thread_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

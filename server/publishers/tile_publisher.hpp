@@ -13,12 +13,12 @@
 #include "server/publishers/token_bucket.hpp"
 #include "stillmap_msgs.h"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Publishes every tile that changed, first its voxels and then its entry in the index, and takes
 /// back tiles that are gone: their voxels are disposed, their entry says that nothing is left. Of
 /// tiles that left memory, late joiners get the entry alone. Where the participant's options limit
-/// what is bulky, new tiles take half of that: those go first that were sent longest ago, and what
+/// large messages, new tiles take half of that: those go first that were sent longest ago, and what
 /// changes while it waits is sent once, as it is then.
 ///
 /// A tile is never replaced while a reader is still getting it (unless that takes longer than a
@@ -26,11 +26,11 @@ namespace stillmap {
 /// told that the rest will not come.
 class TilePublisher {
  public:
-  TilePublisher(Participant& participant, const Topics& topics);
+  TilePublisher(dds::Participant& participant, const dds::Topics& topics);
 
   /// Publishes what of the view is new and may be sent now; called again with the same view, it
   /// goes on.
-  void publish(const std::shared_ptr<const MapView>& shown);
+  void publish(const std::shared_ptr<const MapSnapshot>& latest);
   /// Tiles of the last view that are not published yet.
   [[nodiscard]] std::size_t waiting() const { return waiting_; }
 
@@ -38,24 +38,24 @@ class TilePublisher {
   using TilePointers = std::vector<std::shared_ptr<const Tile>>;
 
   /// What readers do not have of the view; what they know longest goes first.
-  [[nodiscard]] TilePointers news(const MapView& view) const;
+  [[nodiscard]] TilePointers pending_tiles(const MapSnapshot& view) const;
   /// All readers have what was sent, or one of them takes longer than a lease.
-  [[nodiscard]] bool last_news_arrived();
-  void publish_news(const TilePointers& tiles, const MapIdentity& identity);
-  void publish_tile(const Tile& tile, const MapIdentity& identity);
-  void forget_voxels_away(const MapView& view, const MapIdentity& identity);
-  void forget_voxels(const Tile& tile, const MapIdentity& identity);
-  void take_back_missing(const MapView& view, const MapIdentity& identity);
+  [[nodiscard]] bool last_burst_acknowledged();
+  void publish_pending(const TilePointers& tiles, const dds::MapIdentity& identity);
+  void publish_tile(const Tile& tile, const dds::MapIdentity& identity);
+  void drop_evicted_voxels(const MapSnapshot& view, const dds::MapIdentity& identity);
+  void drop_voxels(const Tile& tile, const dds::MapIdentity& identity);
+  void dispose_missing_tiles(const MapSnapshot& view, const dds::MapIdentity& identity);
 
-  Writer<stillmap_msgs::msg::MapTile> tiles_;
-  Writer<stillmap_msgs::msg::TileInfo> index_;
-  ByteAllowance allowance_;
-  std::chrono::seconds longest_wait_;
-  std::chrono::steady_clock::time_point last_news_;
+  dds::Writer<stillmap_msgs::msg::MapTile> tiles_;
+  dds::Writer<stillmap_msgs::msg::TileInfo> index_;
+  TokenBucket token_bucket_;
+  std::chrono::seconds max_wait_;
+  std::chrono::steady_clock::time_point last_burst_;
   std::uint64_t map_id_ = 0;
   std::size_t waiting_ = 0;
   std::uint64_t publications_ = 0;
-  std::shared_ptr<const MapView> last_view_;
+  std::shared_ptr<const MapSnapshot> last_view_;
   /// What readers have of a tile.
   struct Published {
     std::uint64_t revision = 0;
@@ -67,4 +67,4 @@ class TilePublisher {
   std::map<TileId, Published> published_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -2,12 +2,12 @@
 
 #include <algorithm>
 
-namespace stillmap {
+namespace stillmap::server {
 
-void ByteAllowance::refill(Clock::time_point now) {
+void TokenBucket::refill(Clock::time_point now) {
   const double seconds = refilled_ ? std::chrono::duration<double>(now - *refilled_).count() : 1.0;
-  bytes_left_ = std::min(bytes_left_ + seconds * bytes_per_s_, bytes_per_s_);
+  tokens_ = std::min(tokens_ + seconds * bytes_per_s_, bytes_per_s_);
   refilled_ = now;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

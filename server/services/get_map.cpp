@@ -1,11 +1,11 @@
 #include "server/services/get_map.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 nav_msgs::srv::GetMap_Response get_map(const ServiceContext& context) {
   nav_msgs::srv::GetMap_Response response;
-  response.map(context.planning_grid.message(context.planning_grid.grid()));
+  response.map(context.grid_provider.message(context.grid_provider.grid()));
   return response;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

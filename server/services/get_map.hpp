@@ -3,9 +3,9 @@
 #include "nav_msgs.h"
 #include "server/services/service_context.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
-/// The planning grid as Nav2 asks for maps; of no size when there is none.
+/// The traversability grid as Nav2 asks for maps; of no size when there is none.
 [[nodiscard]] nav_msgs::srv::GetMap_Response get_map(const ServiceContext& context);
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -3,7 +3,7 @@
 #include "server/services/paged_snapshots.hpp"
 #include "server/services/service_context.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// A region of the static map, in pages. All pages of an answer show the map as it was at the
 /// first.
@@ -15,15 +15,15 @@ class GetStaticMap {
       const stillmap_msgs::srv::GetStaticMap_Request& request);
 
   /// To be called now and then when nobody asks.
-  void forget_abandoned() { paged_views_.forget_abandoned(PagedViews::Clock::now()); }
+  void drop_expired() { paged_snapshots_.drop_expired(PagedSnapshots::Clock::now()); }
 
  private:
   /// A page after the first needs no history.
   [[nodiscard]] MapState state_for(const MapQuery& query) const;
-  void note(const MapQueryResult& result, const PagedViews::View& view);
+  void update_session(const MapQueryResult& result, const PagedSnapshots::Snapshot& view);
 
   const ServiceContext& context_;
-  PagedViews paged_views_;
+  PagedSnapshots paged_snapshots_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

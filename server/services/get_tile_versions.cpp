@@ -4,7 +4,7 @@
 
 #include "idl/conversions/tile.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 /// Also refuses NaN, which compares as false.
@@ -23,10 +23,10 @@ bool meets(std::int32_t index, double tile_size_m, double low, double high) {
 stillmap_msgs::srv::GetTileVersions_Response get_tile_versions(
     const ServiceContext& context, const stillmap_msgs::srv::GetTileVersions_Request& request) {
   using Response = stillmap_msgs::srv::GetTileVersions_Response;
-  return answer<Response>(context, request, [&](const MapView& view, Response& response) {
+  return answer<Response>(context, request, [&](const MapSnapshot& view, Response& response) {
     check_interval(request.min_x(), request.max_x(), "x");
     check_interval(request.min_y(), request.max_y(), "y");
-    const MapIdentity identity = wire::identity_of(view);
+    const dds::MapIdentity identity = wire::identity_of(view);
     response.identity(wire::to_wire(identity));
     for (const auto& tile : view.tiles) {
       const TileId id = tile->info.id;
@@ -38,4 +38,4 @@ stillmap_msgs::srv::GetTileVersions_Response get_tile_versions(
   });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -2,9 +2,9 @@
 
 #include "server/services/service_context.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 [[nodiscard]] stillmap_msgs::srv::LoadMap_Response load_map(
     const ServiceContext& context, const stillmap_msgs::srv::LoadMap_Request& request);
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -13,48 +13,48 @@
 #include "server/services/reset.hpp"
 #include "server/services/save_map.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
-ServiceDesk::ServiceDesk(Participant& participant, const Services& names, ServiceContext context)
+MapServices::MapServices(dds::Participant& participant, const dds::Services& names,
+                         ServiceContext context)
     : context_(std::move(context)),
       static_map_(context_),
       get_static_map_(participant, names.get_static_map,
-                      counted(context_.log, names.get_static_map,
-                              [this](const auto& request) { return static_map_(request); }),
-                      [this] { static_map_.forget_abandoned(); }),
+                      logged(context_.log, names.get_static_map,
+                             [this](const auto& request) { return static_map_(request); }),
+                      [this] { static_map_.drop_expired(); }),
       get_tile_versions_(
           participant, names.get_tile_versions,
-          counted(context_.log, names.get_tile_versions,
-                  [this](const auto& request) { return get_tile_versions(context_, request); })),
+          logged(context_.log, names.get_tile_versions,
+                 [this](const auto& request) { return get_tile_versions(context_, request); })),
       get_tiles_(participant, names.get_tiles,
-                 counted(context_.log, names.get_tiles,
-                         [this](const auto& request) { return get_tiles(context_, request); })),
+                 logged(context_.log, names.get_tiles,
+                        [this](const auto& request) { return get_tiles(context_, request); })),
       get_status_(participant, names.get_status,
-                  counted(context_.log, names.get_status,
-                          [this](const auto& request) { return get_status(context_, request); })),
+                  logged(context_.log, names.get_status,
+                         [this](const auto& request) { return get_status(context_, request); })),
       save_map_(participant, names.save_map,
-                counted(context_.log, names.save_map,
-                        [this](const auto& request) { return save_map(context_, request); })),
+                logged(context_.log, names.save_map,
+                       [this](const auto& request) { return save_map(context_, request); })),
       load_map_(participant, names.load_map,
-                counted(context_.log, names.load_map,
-                        [this](const auto& request) { return load_map(context_, request); })),
+                logged(context_.log, names.load_map,
+                       [this](const auto& request) { return load_map(context_, request); })),
       reset_(participant, names.reset,
-             counted(context_.log, names.reset,
-                     [this](const auto& request) { return stillmap::reset(context_, request); })),
+             logged(context_.log, names.reset,
+                    [this](const auto& request) { return server::reset(context_, request); })),
       get_traversable_area_(
           participant, names.get_traversable_area,
-          counted(context_.log, names.get_traversable_area,
-                  [this](const auto& request) { return get_traversable_area(context_, request); })),
+          logged(context_.log, names.get_traversable_area,
+                 [this](const auto& request) { return get_traversable_area(context_, request); })),
       check_path_(participant, names.check_path,
-                  counted(context_.log, names.check_path,
-                          [this](const auto& request) { return check_path(context_, request); })),
+                  logged(context_.log, names.check_path,
+                         [this](const auto& request) { return check_path(context_, request); })),
       nearest_traversable_(
           participant, names.nearest_traversable,
-          counted(context_.log, names.nearest_traversable,
-                  [this](const auto& request) { return nearest_traversable(context_, request); })),
-      get_map_(
-          participant, names.get_map,
-          counted(context_.log, names.get_map, [this](const auto&) { return get_map(context_); })) {
-}
+          logged(context_.log, names.nearest_traversable,
+                 [this](const auto& request) { return nearest_traversable(context_, request); })),
+      get_map_(participant, names.get_map, logged(context_.log, names.get_map, [this](const auto&) {
+                 return get_map(context_);
+               })) {}
 
-}  // namespace stillmap
+}  // namespace stillmap::server

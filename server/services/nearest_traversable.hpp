@@ -3,10 +3,10 @@
 #include "server/services/service_context.hpp"
 #include "traversable_area.h"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// The free cell nearest to a place.
 [[nodiscard]] stillmap_msgs::srv::NearestTraversable_Response nearest_traversable(
     const ServiceContext& context, const stillmap_msgs::srv::NearestTraversable_Request& request);
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -9,14 +9,15 @@
 #include "server/services/service_context.hpp"
 #include "stillmap_occupancy.h"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// What can be asked about the octree, each service on its own thread. `occupancy` may be null:
 /// then queries are refused and octomaps have neither name nor data.
-class OccupancyDesk {
+class OccupancyServices {
  public:
-  OccupancyDesk(Participant& participant, const Services& names, ServiceContext context,
-                const OccupancyThread* occupancy, std::string map_frame);
+  OccupancyServices(dds::Participant& participant, const dds::Services& names,
+                    ServiceContext context, const OccupancyThread* occupancy,
+                    std::string map_frame);
 
  private:
   [[nodiscard]] octomap_msgs::srv::GetOctomap_Response octomap(bool binary) const;
@@ -24,13 +25,13 @@ class OccupancyDesk {
   ServiceContext context_;
   const OccupancyThread* occupancy_;
   std::string map_frame_;
-  using GetOctomap =
-      ServiceServer<octomap_msgs::srv::GetOctomap_Request, octomap_msgs::srv::GetOctomap_Response>;
+  using GetOctomap = dds::ServiceServer<octomap_msgs::srv::GetOctomap_Request,
+                                        octomap_msgs::srv::GetOctomap_Response>;
   GetOctomap octomap_binary_;
   GetOctomap octomap_full_;
-  ServiceServer<stillmap_msgs::srv::QueryOccupancy_Request,
-                stillmap_msgs::srv::QueryOccupancy_Response>
+  dds::ServiceServer<stillmap_msgs::srv::QueryOccupancy_Request,
+                     stillmap_msgs::srv::QueryOccupancy_Response>
       query_occupancy_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

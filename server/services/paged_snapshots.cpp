@@ -2,31 +2,31 @@
 
 #include <algorithm>
 
-namespace stillmap {
+namespace stillmap::server {
 
-PagedViews::View PagedViews::find(std::uint64_t version) const {
+PagedSnapshots::Snapshot PagedSnapshots::find(std::uint64_t version) const {
   const auto found = std::ranges::find_if(
-      under_way_, [&](const UnderWay& entry) { return entry.view->version == version; });
-  return found == under_way_.end() ? nullptr : found->view;
+      sessions_, [&](const Session& entry) { return entry.view->version == version; });
+  return found == sessions_.end() ? nullptr : found->view;
 }
 
-void PagedViews::keep(const View& view, Clock::time_point now) {
-  if (const auto entry = entry_of(view); entry != under_way_.end()) under_way_.erase(entry);
-  under_way_.push_front({view, now + longest_pause});
-  if (under_way_.size() > most_views) under_way_.pop_back();
+void PagedSnapshots::keep(const Snapshot& view, Clock::time_point now) {
+  if (const auto entry = entry_of(view); entry != sessions_.end()) sessions_.erase(entry);
+  sessions_.push_front({view, now + max_page_interval});
+  if (sessions_.size() > max_snapshots) sessions_.pop_back();
 }
 
-void PagedViews::end(const View& view, Clock::time_point now) {
+void PagedSnapshots::end(const Snapshot& view, Clock::time_point now) {
   const auto entry = entry_of(view);
-  if (entry != under_way_.end()) entry->until = now + last_page_repeats;
+  if (entry != sessions_.end()) entry->until = now + last_page_grace;
 }
 
-void PagedViews::forget_abandoned(Clock::time_point now) {
-  std::erase_if(under_way_, [&](const UnderWay& entry) { return now > entry.until; });
+void PagedSnapshots::drop_expired(Clock::time_point now) {
+  std::erase_if(sessions_, [&](const Session& entry) { return now > entry.until; });
 }
 
-std::list<PagedViews::UnderWay>::iterator PagedViews::entry_of(const View& view) {
-  return std::ranges::find(under_way_, view, &UnderWay::view);
+std::list<PagedSnapshots::Session>::iterator PagedSnapshots::entry_of(const Snapshot& view) {
+  return std::ranges::find(sessions_, view, &Session::view);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

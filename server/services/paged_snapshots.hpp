@@ -7,47 +7,47 @@
 
 #include "core/map/tile.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Views of the map that clients page through, so that all pages of an answer show one version. A
 /// view holds the memory of every tile that has changed since, so it goes soon after the last page,
 /// or when nobody has asked for the next one for long. One thread uses it.
-class PagedViews {
+class PagedSnapshots {
  public:
   using Clock = std::chrono::steady_clock;
-  using View = std::shared_ptr<const MapView>;
+  using Snapshot = std::shared_ptr<const MapSnapshot>;
 
   /// Between two pages. A page of 8 MB takes `wifi` 11 s, and ten planners share its rate.
-  static constexpr std::chrono::seconds longest_pause{150};
+  static constexpr std::chrono::seconds max_page_interval{150};
   /// After a last page: requests are repeated when their answers are lost, and others may be
   /// reading the same version.
-  static constexpr std::chrono::seconds last_page_repeats{10};
+  static constexpr std::chrono::seconds last_page_grace{10};
   /// Beyond it, the one that was asked for longest ago goes.
-  static constexpr std::size_t most_views = 16;
+  static constexpr std::size_t max_snapshots = 16;
 
   /// Nothing when no answer of this version is under way.
-  [[nodiscard]] View find(std::uint64_t version) const;
+  [[nodiscard]] Snapshot find(std::uint64_t version) const;
 
   /// A page was given, and there are more.
-  void keep(const View& view, Clock::time_point now);
+  void keep(const Snapshot& view, Clock::time_point now);
   /// The last page of an answer was given.
-  void end(const View& view, Clock::time_point now);
+  void end(const Snapshot& view, Clock::time_point now);
 
   /// Lets go of views that nobody asks for any more.
-  void forget_abandoned(Clock::time_point now);
+  void drop_expired(Clock::time_point now);
 
-  [[nodiscard]] std::size_t size() const { return under_way_.size(); }
+  [[nodiscard]] std::size_t size() const { return sessions_.size(); }
 
  private:
-  struct UnderWay {
-    View view;
+  struct Session {
+    Snapshot view;
     Clock::time_point until;
   };
 
-  [[nodiscard]] std::list<UnderWay>::iterator entry_of(const View& view);
+  [[nodiscard]] std::list<Session>::iterator entry_of(const Snapshot& view);
 
   // Those asked for most recently first.
-  std::list<UnderWay> under_way_;
+  std::list<Session> sessions_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -2,27 +2,28 @@
 
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::server {
 
-RemovedDesk::RemovedDesk(Participant& participant, const Services& names, ServiceContext context,
-                         RemovedSource source)
+RemovedVoxelServices::RemovedVoxelServices(dds::Participant& participant,
+                                           const dds::Services& names, ServiceContext context,
+                                           RemovedSource source)
     : context_(std::move(context)),
       source_(std::move(source)),
       get_removed_(participant, names.get_removed,
-                   counted(context_.log, names.get_removed,
-                           [this](const auto& request) { return removed(request); })),
+                   logged(context_.log, names.get_removed,
+                          [this](const auto& request) { return removed(request); })),
       restore_removed_(participant, names.restore_removed,
-                       counted(context_.log, names.restore_removed,
-                               [this](const auto& request) { return restore(request); })) {}
+                       logged(context_.log, names.restore_removed,
+                              [this](const auto& request) { return restore(request); })) {}
 
-stillmap_msgs::srv::GetRemoved_Response RemovedDesk::removed(
+stillmap_msgs::srv::GetRemoved_Response RemovedVoxelServices::removed(
     const stillmap_msgs::srv::GetRemoved_Request& request) const {
   return get_removed(context_, source_, request);
 }
 
-stillmap_msgs::srv::RestoreRemoved_Response RemovedDesk::restore(
+stillmap_msgs::srv::RestoreRemoved_Response RemovedVoxelServices::restore(
     const stillmap_msgs::srv::RestoreRemoved_Request& request) const {
   return restore_removed(context_, source_, request);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -4,13 +4,13 @@
 #include "idl/interface/topics.hpp"
 #include "server/services/removed_voxels.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// What was kept out of the static map, and the way back into it.
-class RemovedDesk {
+class RemovedVoxelServices {
  public:
-  RemovedDesk(Participant& participant, const Services& names, ServiceContext context,
-              RemovedSource source);
+  RemovedVoxelServices(dds::Participant& participant, const dds::Services& names,
+                       ServiceContext context, RemovedSource source);
 
  private:
   [[nodiscard]] stillmap_msgs::srv::GetRemoved_Response removed(
@@ -20,11 +20,12 @@ class RemovedDesk {
 
   ServiceContext context_;
   RemovedSource source_;
-  ServiceServer<stillmap_msgs::srv::GetRemoved_Request, stillmap_msgs::srv::GetRemoved_Response>
+  dds::ServiceServer<stillmap_msgs::srv::GetRemoved_Request,
+                     stillmap_msgs::srv::GetRemoved_Response>
       get_removed_;
-  ServiceServer<stillmap_msgs::srv::RestoreRemoved_Request,
-                stillmap_msgs::srv::RestoreRemoved_Response>
+  dds::ServiceServer<stillmap_msgs::srv::RestoreRemoved_Request,
+                     stillmap_msgs::srv::RestoreRemoved_Response>
       restore_removed_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -7,10 +7,10 @@
 #include "idl/conversions/region.hpp"
 #include "idl/conversions/removed_voxels.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
-constexpr std::size_t most_voxels = 300'000;
+constexpr std::size_t max_voxels_per_reply = 300'000;
 
 /// Throws std::invalid_argument for what is no region.
 Region region_of(const stillmap_msgs::msg::Region& message) {
@@ -45,7 +45,7 @@ stillmap_msgs::srv::GetRemoved_Response get_removed(
     const ServiceContext& context, const RemovedSource& source,
     const stillmap_msgs::srv::GetRemoved_Request& request) {
   using Response = stillmap_msgs::srv::GetRemoved_Response;
-  return answer<Response>(context, request, [&](const MapView&, Response& response) {
+  return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
     const RegionShape region(region_of(request.region()));
     const Reasons reasons = reasons_of(request.reasons());
     std::vector<RemovedVoxel> removed = source.removed(region.bounds_map());
@@ -54,7 +54,7 @@ stillmap_msgs::srv::GetRemoved_Response get_removed(
              !region.contains(voxel.position_map.cast<double>());
     });
     response.total(removed.size());
-    const std::size_t wanted = std::min<std::size_t>(request.max_voxels(), most_voxels);
+    const std::size_t wanted = std::min<std::size_t>(request.max_voxels(), max_voxels_per_reply);
     removed.resize(std::min(removed.size(), wanted));
     wire::write_removed(removed, response);
   });
@@ -64,15 +64,15 @@ stillmap_msgs::srv::RestoreRemoved_Response restore_removed(
     const ServiceContext& context, const RemovedSource& source,
     const stillmap_msgs::srv::RestoreRemoved_Request& request) {
   using Response = stillmap_msgs::srv::RestoreRemoved_Response;
-  return answer<Response>(context, request, [&](const MapView&, Response& response) {
+  return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
     const Region region = region_of(request.region());
     const auto* const box = std::get_if<BoxRegion>(&region);
     if (box == nullptr) throw std::invalid_argument("only a box can be restored; ask for one");
     const RegionShape shape(region);
     response.restored(source.restore(reason_of(request.reason()), shape.bounds_map()));
-    context.show_now();
-    response.status(reply_status(*context.board.view()));
+    context.publish_now();
+    response.status(reply_status(*context.latest_map.view()));
   });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

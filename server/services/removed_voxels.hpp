@@ -7,7 +7,7 @@
 #include "removed_voxels.h"
 #include "server/services/service_context.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Who keeps what was removed. Both are done between two scans.
 struct RemovedSource {
@@ -26,4 +26,4 @@ struct RemovedSource {
     const ServiceContext& context, const RemovedSource& source,
     const stillmap_msgs::srv::RestoreRemoved_Request& request);
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -2,10 +2,10 @@
 
 #include "server/services/service_context.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// Saves the map now.
 [[nodiscard]] stillmap_msgs::srv::SaveMap_Response save_map(
     const ServiceContext& context, const stillmap_msgs::srv::SaveMap_Request& request);
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -7,36 +7,36 @@
 #include "core/map/query/tile_reader.hpp"
 #include "idl/conversions/map_query.hpp"
 #include "idl/interface/server_status.hpp"
-#include "server/traversability/traversability_cache.hpp"
-#include "server/publishers/latest_map.hpp"
 #include "server/mapping/map_saver.hpp"
-#include "server/traversability/traversability_grid_provider.hpp"
 #include "server/monitoring/service_log.hpp"
+#include "server/publishers/latest_map.hpp"
+#include "server/traversability/traversability_cache.hpp"
+#include "server/traversability/traversability_grid_provider.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// What the services answer from.
 struct ServiceContext {
-  const MapBoard& board;
+  const LatestMap& latest_map;
   /// For what is not in memory.
   TileReader& tiles;
   MapSaver& saver;
-  std::function<ServerStatus()> status;
+  std::function<dds::ServerStatus()> status;
   /// Returns the new map's id.
   std::function<std::uint64_t()> reset;
-  /// Goes on with this map, and the tiles that are away come from there. Throws
+  /// Goes on with this map, and the tiles that are non-resident come from there. Throws
   /// std::invalid_argument when it does not fit the configuration; then nothing changed.
-  std::function<void(const StoredMap&, const std::shared_ptr<TileShelf>&)> load;
-  /// Puts on the board what was mapped until now.
-  std::function<void()> show_now;
-  const AreaAtlas& areas;
-  const PlanningGrid& planning_grid;
+  std::function<void(const SavedMap&, const std::shared_ptr<TileStore>&)> load;
+  /// Publishes what was mapped until now.
+  std::function<void()> publish_now;
+  const TraversabilityCache& traversability;
+  const TraversabilityGridProvider& grid_provider;
   ServiceLog& log;
 };
 
 /// Status of a reply about this view.
 [[nodiscard]] inline stillmap_msgs::msg::ReplyStatus reply_status(
-    const MapView& view, wire::ReplyCode code = wire::ReplyCode::ok,
+    const MapSnapshot& view, wire::ReplyCode code = wire::ReplyCode::ok,
     const std::string& reason = {}) {
   return wire::to_reply_status(code, reason, view.version, view.map_id);
 }
@@ -46,7 +46,7 @@ struct ServiceContext {
 template <typename Reply, typename Request, typename Fill>
 [[nodiscard]] Reply answer(const ServiceContext& context, const Request& request, Fill fill) {
   Reply reply;
-  const auto view = context.board.view();
+  const auto view = context.latest_map.view();
   if (const auto fault = wire::version_fault(request.format_version())) {
     reply.status(reply_status(*view, wire::ReplyCode::invalid_request, *fault));
     return reply;
@@ -64,4 +64,4 @@ template <typename Reply, typename Request, typename Fill>
   return reply;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

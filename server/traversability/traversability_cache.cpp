@@ -6,17 +6,17 @@
 #include "core/map/tile_lookup.hpp"
 #include "core/traversability/traversability_map.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 /// As many as the largest answer has, and those round them.
-constexpr std::size_t most_tiles = 400;
+constexpr std::size_t max_tiles = 400;
 
 /// With the neighbours whose surface reaches into the box.
-MapView part_of(const MapView& map, const Eigen::AlignedBox2d& box_map) {
+MapSnapshot part_of(const MapSnapshot& map, const Eigen::AlignedBox2d& box_map) {
   const Eigen::Vector2d margin = Eigen::Vector2d::Constant(map.tile_size_m);
   const Eigen::AlignedBox2d wide(box_map.min() - margin, box_map.max() + margin);
-  MapView part = map;
+  MapSnapshot part = map;
   std::erase_if(part.tiles, [&](const auto& tile) {
     const Eigen::AlignedBox3d footprint = tile_footprint(tile->info.id, map.tile_size_m);
     const Eigen::AlignedBox2d plan(Eigen::Vector2d(footprint.min().head<2>()),
@@ -28,26 +28,27 @@ MapView part_of(const MapView& map, const Eigen::AlignedBox2d& box_map) {
 
 }  // namespace
 
-AreaAtlas::AreaAtlas(const AreaBoard& areas, const MapBoard& maps, TileReader& tiles)
-    : areas_(areas), maps_(maps), tiles_(tiles) {}
+TraversabilityCache::TraversabilityCache(const TraversabilitySnapshot& snapshot,
+                                         const LatestMap& latest_map, TileReader& tiles)
+    : snapshot_(snapshot), latest_map_(latest_map), tiles_(tiles) {}
 
-std::shared_ptr<const TraversabilityView> AreaAtlas::view(
+std::shared_ptr<const TraversabilityView> TraversabilityCache::view(
     const std::string& profile, const Eigen::AlignedBox2d& box_map) const {
-  const auto kept = areas_.view(profile);
-  const auto map = maps_.view();
-  const auto away = [](const auto& tile) { return is_away(*tile); };
-  if (std::ranges::none_of(map->tiles, away)) return kept;
-  MapView part = part_of(*map, box_map);
-  if (std::ranges::none_of(part.tiles, away)) return kept;
-  if (part.tiles.size() > most_tiles) {
+  const auto kept = snapshot_.view(profile);
+  const auto map = latest_map_.view();
+  const auto non_resident = [](const auto& tile) { return is_non_resident(*tile); };
+  if (std::ranges::none_of(map->tiles, non_resident)) return kept;
+  MapSnapshot part = part_of(*map, box_map);
+  if (std::ranges::none_of(part.tiles, non_resident)) return kept;
+  if (part.tiles.size() > max_tiles) {
     throw std::invalid_argument("the region has " + std::to_string(part.tiles.size()) +
                                 " tiles, of which some are on disk; at most " +
-                                std::to_string(most_tiles) + " can be answered: ask for parts");
+                                std::to_string(max_tiles) + " can be answered: ask for parts");
   }
-  for (auto& tile : part.tiles) tile = tiles_.whole(tile);
+  for (auto& tile : part.tiles) tile = tiles_.read(tile);
   TraversabilityMap worked_out({kept->profile});
   static_cast<void>(worked_out.update(part));
   return worked_out.view(profile);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -2,30 +2,31 @@
 
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
-bool shows_the_same(const OccupancyGrid& a, const OccupancyGrid& b) {
+bool is_same_grid(const OccupancyGrid& a, const OccupancyGrid& b) {
   return a.origin_map == b.origin_map && a.resolution_m == b.resolution_m && a.width == b.width &&
          a.height == b.height && a.data == b.data;
 }
 
 }  // namespace
 
-AreaPublisher::AreaPublisher(Participant& participant, const Topics& topics,
-                             const PlanningGrid& planning_grid)
-    : planning_grid_(planning_grid),
+TraversabilityPublisher::TraversabilityPublisher(dds::Participant& participant,
+                                                 const dds::Topics& topics,
+                                                 const TraversabilityGridProvider& grid_provider)
+    : grid_provider_(grid_provider),
       writer_(participant, topics.traversability.dds_name, topics.traversability.writer) {}
 
-void AreaPublisher::publish() {
-  OccupancyGrid grid = planning_grid_.grid();
-  if (grid.status == AreaStatus::too_large) {
-    warnings_.warn("grid", "no grid is published: " + grid.reason);
+void TraversabilityPublisher::publish() {
+  OccupancyGrid grid = grid_provider_.grid();
+  if (grid.status == TraversabilityStatus::too_large) {
+    throttled_log_.warn("grid", "no grid is published: " + grid.reason);
   }
-  if (shows_the_same(grid, published_)) return;
+  if (is_same_grid(grid, published_)) return;
   published_ = std::move(grid);
   // A keep-last writer always has room.
-  static_cast<void>(writer_.write(planning_grid_.message(published_)));
+  static_cast<void>(writer_.write(grid_provider_.message(published_)));
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

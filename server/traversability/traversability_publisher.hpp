@@ -2,23 +2,24 @@
 
 #include "idl/dds/writer.hpp"
 #include "idl/interface/topics.hpp"
-#include "server/traversability/traversability_grid_provider.hpp"
 #include "server/monitoring/throttled_log.hpp"
+#include "server/traversability/traversability_grid_provider.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
-/// Publishes the planning grid whenever it changed. One thread calls it.
-class AreaPublisher {
+/// Publishes the traversability grid whenever it changed. One thread calls it.
+class TraversabilityPublisher {
  public:
-  AreaPublisher(Participant& participant, const Topics& topics, const PlanningGrid& planning_grid);
+  TraversabilityPublisher(dds::Participant& participant, const dds::Topics& topics,
+                          const TraversabilityGridProvider& grid_provider);
 
   void publish();
 
  private:
-  const PlanningGrid& planning_grid_;
+  const TraversabilityGridProvider& grid_provider_;
   OccupancyGrid published_;
-  RareWarnings warnings_;
-  Writer<nav_msgs::msg::OccupancyGrid> writer_;
+  ThrottledLog throttled_log_;
+  dds::Writer<nav_msgs::msg::OccupancyGrid> writer_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -4,10 +4,11 @@
 #include <stdexcept>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
-std::string unknown_profile(const std::string& profile, const AreaBoard::Views& views) {
+std::string unknown_profile(const std::string& profile,
+                            const TraversabilitySnapshot::Views& views) {
   if (views.empty())
     return "this server keeps no areas; its configuration's areas.profiles is empty";
   std::string text = "profile '" + profile + "' is not one that this server keeps areas for: ";
@@ -19,12 +20,13 @@ std::string unknown_profile(const std::string& profile, const AreaBoard::Views& 
 
 }  // namespace
 
-void AreaBoard::show(Views views) {
+void TraversabilitySnapshot::publish(Views views) {
   const std::scoped_lock lock(mutex_);
   views_ = std::move(views);
 }
 
-std::shared_ptr<const TraversabilityView> AreaBoard::view(const std::string& profile) const {
+std::shared_ptr<const TraversabilityView> TraversabilitySnapshot::view(
+    const std::string& profile) const {
   const std::scoped_lock lock(mutex_);
   const auto found = std::ranges::find_if(
       views_, [&](const auto& candidate) { return candidate->profile.name == profile; });
@@ -32,4 +34,4 @@ std::shared_ptr<const TraversabilityView> AreaBoard::view(const std::string& pro
   return *found;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::server

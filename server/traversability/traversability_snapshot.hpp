@@ -7,16 +7,16 @@
 
 #include "core/traversability/traversability_view.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 
 /// The areas of all robots as of the last update: immutable views, so that nobody waits for
 /// anybody. Thread-safe.
-class AreaBoard {
+class TraversabilitySnapshot {
  public:
   /// One view a robot.
   using Views = std::vector<std::shared_ptr<const TraversabilityView>>;
 
-  void show(Views views);
+  void publish(Views views);
 
   /// Throws std::invalid_argument, naming the robots that there are, for any other.
   [[nodiscard]] std::shared_ptr<const TraversabilityView> view(const std::string& profile) const;
@@ -26,4 +26,4 @@ class AreaBoard {
   Views views_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::server

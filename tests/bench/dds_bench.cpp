@@ -29,7 +29,7 @@ using stillmap_msgs::srv::GetStaticMap_Response;
 constexpr std::size_t scan_bytes = 2'000'000;
 constexpr double run_s = 4.0;
 constexpr std::uint32_t domain_id = 43;
-constexpr auto patience = 60s;
+constexpr auto bench_timeout = 60s;
 
 /// This program in another role; its output is read, or its input is held open.
 class Child {
@@ -74,7 +74,7 @@ double share(std::vector<double>& sorted, double of_all) {
 }
 
 /// Publishes at the rate, as far as the writer keeps it; returns how many.
-int publish(Writer<PointCloud2>& writer, double rate_hz) {
+int publish(dds::Writer<PointCloud2>& writer, double rate_hz) {
   const auto began = Clock::now();
   const auto period = std::chrono::duration<double>(1.0 / rate_hz);
   int sent = 0;
@@ -101,17 +101,17 @@ std::vector<double> latencies(std::vector<std::unique_ptr<Child>>& subscribers) 
   return all;
 }
 
-bool wait_for_readers(const MatchedReaders& readers, int count) {
-  const auto deadline = Clock::now() + patience;
+bool wait_for_readers(const dds::MatchedReaders& readers, int count) {
+  const auto deadline = Clock::now() + bench_timeout;
   while (readers.count() < count && Clock::now() < deadline) std::this_thread::sleep_for(20ms);
   return readers.count() >= count;
 }
 
 void run_scans(const Network& network, int rate_hz, int count) {
-  Participant participant(options_of(network, DdsRole::server, domain_id));
+  dds::Participant participant(options_of(network, DdsRole::server, domain_id));
   const auto confirming = confirm_connections(participant);
-  const auto topic = points_topic("points", DeliveryMode::latest, 3);
-  Writer<PointCloud2> writer(participant, topic.dds_name, topic.writer);
+  const auto topic = dds::points_topic("points", dds::DeliveryMode::latest, 3);
+  dds::Writer<PointCloud2> writer(participant, topic.dds_name, topic.writer);
   std::vector<std::unique_ptr<Child>> subscribers;
   for (int i = 0; i < count; ++i) {
     subscribers.push_back(std::make_unique<Child>("--subscribe", network.name, "r"));
@@ -136,17 +136,17 @@ void run_scans(const Network& network, int rate_hz, int count) {
 void run_queries(const Network& network, const char* name, std::uint32_t bytes, int count) {
   const Child server("--answer", network.name, "w");
   const auto participant = join(options_of(network, DdsRole::client, domain_id));
-  ServiceClient<GetStaticMap_Request, GetStaticMap_Response> client(*participant,
-                                                                    "bench/get_static_map");
+  dds::ServiceClient<GetStaticMap_Request, GetStaticMap_Response> client(*participant,
+                                                                         "bench/get_static_map");
   GetStaticMap_Request request;
   request.max_bytes(bytes);
   std::vector<double> times_ms;
   // The first finds the server.
-  static_cast<void>(client.ask(request, patience));
+  static_cast<void>(client.call(request, bench_timeout));
   int answered = 0;
   for (int i = 0; i < count; ++i) {
     const auto began = Clock::now();
-    if (client.ask(request, patience)) ++answered;
+    if (client.call(request, bench_timeout)) ++answered;
     times_ms.push_back(std::chrono::duration<double, std::milli>(Clock::now() - began).count());
   }
   std::ranges::sort(times_ms);

@@ -30,16 +30,16 @@ constexpr const char* is_connected = "bench/is_connected";
 }  // namespace
 
 std::vector<Network> networks() {
-  DdsChoice host;
+  DdsNetworkConfig host;
   host.profile = "host";
-  DdsChoice lan;
+  DdsNetworkConfig lan;
   lan.shared_memory = false;
   lan.interfaces = {"127.0.0.1"};
-  DdsChoice wifi = lan;
+  DdsNetworkConfig wifi = lan;
   wifi.profile = "wifi";
-  DdsChoice wan = lan;
+  DdsNetworkConfig wan = lan;
   wan.profile = "wan";
-  DdsChoice wan_client = wan;
+  DdsNetworkConfig wan_client = wan;
   wan_client.peers = {"127.0.0.1"};
   return {{"host", host, host},
           {"lan, UDP", lan, lan},
@@ -47,54 +47,54 @@ std::vector<Network> networks() {
           {"wan, TCP", wan, wan_client}};
 }
 
-DdsOptions options_of(const Network& network, DdsRole role, std::uint32_t domain_id) {
+dds::DdsOptions options_of(const Network& network, DdsRole role, std::uint32_t domain_id) {
   const bool server = role == DdsRole::server;
-  DdsOptions options = dds_options(server ? network.choice : network.client_choice, role);
+  dds::DdsOptions options = dds_options(server ? network.choice : network.client_choice, role);
   options.domain_id = domain_id;
   return options;
 }
 
-std::unique_ptr<IsConnectedService> confirm_connections(Participant& participant) {
+std::unique_ptr<IsConnectedService> confirm_connections(dds::Participant& participant) {
   return std::make_unique<IsConnectedService>(
       participant, is_connected, [](const GetStatus_Request&) { return GetStatus_Response(); });
 }
 
-std::unique_ptr<Participant> join(const DdsOptions& options) {
-  TcpPatience patience(options, 60s);
+std::unique_ptr<dds::Participant> join(const dds::DdsOptions& options) {
+  TcpRejoinBackoff backoff(options, 60s);
   while (true) {
-    auto participant = std::make_unique<Participant>(options);
-    if (options.transport != NetworkTransport::tcp) return participant;
-    ServiceClient<GetStatus_Request, GetStatus_Response> client(*participant, is_connected);
+    auto participant = std::make_unique<dds::Participant>(options);
+    if (options.transport != dds::NetworkTransport::tcp) return participant;
+    dds::ServiceClient<GetStatus_Request, GetStatus_Response> client(*participant, is_connected);
     do {
-      if (client.ask(GetStatus_Request(), patience.wait())) return participant;
-      if (patience.is_over()) throw DdsError("nobody was found over TCP within 60 s");
-    } while (!patience.is_due());
+      if (client.call(GetStatus_Request(), backoff.next_wait())) return participant;
+      if (backoff.timed_out()) throw dds::DdsError("nobody was found over TCP within 60 s");
+    } while (!backoff.rejoin_due());
   }
 }
 
-void subscribe(const DdsOptions& options) {
+void subscribe(const dds::DdsOptions& options) {
   // Over TCP, Fast DDS 2.9 may neither connect nor end; the run goes on without this subscriber.
   constexpr unsigned int longest_life_s = 90;
   ::alarm(longest_life_s);
-  const std::unique_ptr<Participant> joined = join(options);
-  Participant& participant = *joined;
-  const auto topic = points_topic("points", DeliveryMode::latest, 3);
-  Reader<sensor_msgs::msg::PointCloud2> reader(participant, topic.dds_name, topic.reader);
+  const std::unique_ptr<dds::Participant> joined = join(options);
+  dds::Participant& participant = *joined;
+  const auto topic = dds::points_topic("points", dds::DeliveryMode::latest, 3);
+  dds::Reader<sensor_msgs::msg::PointCloud2> reader(participant, topic.dds_name, topic.reader);
   sensor_msgs::msg::PointCloud2 cloud;
   std::vector<double> latencies_ms;
-  auto patience = 60s;
-  while (reader.take(cloud, {}, patience)) {
+  auto backoff = 60s;
+  while (reader.take(cloud, {}, backoff)) {
     if (is_last(cloud)) break;
     latencies_ms.push_back(age_ms(cloud));
-    patience = 3s;
+    backoff = 3s;
   }
   for (const double latency : latencies_ms) std::printf("%f\n", latency);
 }
 
-void answer(const DdsOptions& options) {
-  Participant participant(options);
+void answer(const dds::DdsOptions& options) {
+  dds::Participant participant(options);
   const auto confirming = confirm_connections(participant);
-  const ServiceServer<GetStaticMap_Request, GetStaticMap_Response> server(
+  const dds::ServiceServer<GetStaticMap_Request, GetStaticMap_Response> server(
       participant, "bench/get_static_map",
       [](const GetStaticMap_Request& request) { return map_of(request.max_bytes()); });
   std::string line;

@@ -5,9 +5,9 @@
 #include <fstream>
 #include <vector>
 
-#include "core/map/storage/map_file.hpp"
 #include "core/map/query/map_query.hpp"
 #include "core/map/static_map.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "tests/map/map_worlds.hpp"
 
 namespace stillmap {
@@ -66,7 +66,7 @@ struct Drive {
     memory_bytes = resident_bytes() - before;
   }
   StaticMap map{StaticMapConfig{}};
-  StoredMap stored;
+  SavedMap stored;
   double voxels = 0.0;
   double memory_bytes = 0.0;
 };
@@ -83,7 +83,7 @@ void query_50_m(benchmark::State& state) {
       .box_map = Eigen::AlignedBox3d(Eigen::Vector3d(175, -25, -10), Eigen::Vector3d(225, 25, 10))};
   query.max_bytes = 100'000'000;
   query.resolution_m = static_cast<double>(state.range(0)) / 10.0;
-  const MapView& view = drive().stored.view;
+  const MapSnapshot& view = drive().stored.view;
   MapQueryResult result;
   for (auto _ : state) result = query_map(view, query);
   state.counters["voxels"] = static_cast<double>(result.voxels.size());

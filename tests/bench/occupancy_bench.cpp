@@ -47,8 +47,8 @@ class Drive {
       recording_.emplace(folder);
       return;
     }
-    SimulationConfig config;
-    config.plan = city_plan("quiet");
+    simulation::SimulationConfig config;
+    config.plan = simulation::city_plan("quiet");
     config.scans = 100;
     simulation_.emplace(config);
   }
@@ -62,7 +62,7 @@ class Drive {
 
  private:
   std::optional<ScanDataset> recording_;
-  std::optional<Simulation> simulation_;
+  std::optional<simulation::Simulation> simulation_;
 };
 
 struct Times {
@@ -82,19 +82,19 @@ struct MappedDrive {
     const Drive drive;
     MapperConfig config;
     config.sensor = drive.sensor();
-    Mapper mapper(config, std::make_unique<StreamLabels>());
+    Mapper mapper(config, std::make_unique<PassthroughSegmenter>());
     for (std::size_t i = 0; i < drive.size(); ++i) {
       const auto mapped = mapper.process(drive.scan(i));
       if (!mapped) continue;
       points += static_cast<double>(mapped->labelled.scan.size());
       insert(*mapped);
     }
-    stored.view = *mapper.map_view();
+    stored.view = *mapper.map_snapshot();
     for (const auto& tile : stored.view.tiles) voxels += static_cast<double>(tile->voxels.size());
   }
 
   void insert(const MappedScan& mapped) {
-    const bool clears = scans++ % OccupancyConfig{}.clear_every == 0;
+    const bool clears = scans++ % OccupancyConfig{}.clearing_interval == 0;
     const auto began = std::chrono::steady_clock::now();
     const std::clock_t processor_began = std::clock();
     octree.insert(mapped.labelled, mapped.odometry.T_map_lidar);
@@ -105,7 +105,7 @@ struct MappedDrive {
   }
 
   OccupancyMap octree{OccupancyConfig{}};
-  StoredMap stored;
+  SavedMap stored;
   double voxels = 0.0;
   double points = 0.0;
   std::size_t scans = 0;
@@ -169,7 +169,7 @@ void static_map_size(benchmark::State& state) {
   }
   const double heap = heap_bytes_of([&] {
     auto map = std::make_unique<StaticMap>(StaticMapConfig{});
-    map->restore(mapped.stored.view);
+    map->resume(mapped.stored.view);
     return map;
   });
   state.counters["voxels"] = mapped.voxels;

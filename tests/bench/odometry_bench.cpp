@@ -20,10 +20,10 @@ namespace {
 class Drive {
  public:
   explicit Drive(const std::string& plan) {
-    SimulationConfig config;
-    config.plan = city_plan(plan);
+    simulation::SimulationConfig config;
+    config.plan = simulation::city_plan(plan);
     config.scans = length;
-    const Simulation simulation(config);
+    const simulation::Simulation simulation(config);
     for (int k = 0; k < length; ++k) scans_.push_back(simulation.scan(k));
   }
 
@@ -33,14 +33,14 @@ class Drive {
     scan.stamp_ns = n * 100'000'000;
     return scan;
   }
-  [[nodiscard]] const SimulatedScan& at(std::int64_t n) const {
+  [[nodiscard]] const simulation::SimulatedScan& at(std::int64_t n) const {
     const std::int64_t place = n % (2 * length - 2);
     return scans_[static_cast<std::size_t>(place < length ? place : 2 * length - 2 - place)];
   }
 
  private:
   static constexpr int length = 40;
-  std::vector<SimulatedScan> scans_;
+  std::vector<simulation::SimulatedScan> scans_;
 };
 
 const Drive& drive(std::int64_t which) {
@@ -55,7 +55,7 @@ void count_points(benchmark::State& state, const Drive& of) {
   state.counters["points"] = static_cast<double>(of.at(0).scan.size());
 }
 
-PointLabels labels_of(const Scan& scan) { return StreamLabels().label(scan); }
+PointLabels labels_of(const Scan& scan) { return PassthroughSegmenter().segment(scan); }
 
 void extract_features_of_a_scan(benchmark::State& state) {
   const Drive& scans = drive(state.range(0));
@@ -116,7 +116,7 @@ void odometry_add(benchmark::State& state) {
     const Scan scan = scans.scan(n++);
     const PointLabels labels = labels_of(scan);
     state.ResumeTiming();
-    const auto step = odometry.add(scan, labels, std::nullopt);
+    const auto step = odometry.register_scan(scan, labels, std::nullopt);
     if (step.result.health == OdometryHealth::lost) state.SkipWithError("lost");
   }
   count_points(state, scans);
@@ -127,7 +127,7 @@ void mapper_process(benchmark::State& state) {
   const Drive& scans = drive(state.range(0));
   MapperConfig config;
   config.sensor = hdl_64e();
-  Mapper mapper(config, std::make_unique<StreamLabels>());
+  Mapper mapper(config, std::make_unique<PassthroughSegmenter>());
   std::int64_t n = 0;
   for (auto _ : state) {
     state.PauseTiming();

@@ -8,8 +8,8 @@
 #include <functional>
 #include <vector>
 
-#include "core/map/storage/map_file.hpp"
 #include "core/map/static_map.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "tests/map/map_worlds.hpp"
 
 namespace stillmap {
@@ -50,7 +50,7 @@ void drive_out_and_back(benchmark::State& state) {
     const auto store = open_scratch_map();
     StaticMap map{StaticMapConfig{}};
     map.reset(1);
-    map.use_shelf(store->shelf());
+    map.use_tile_store(store->tile_store());
     const double before_mib = process_mib();
     double peak_map_mib = 0.0, peak_process_mib = 0.0;
     std::vector<double> insert_ms, snapshot_ms, save_ms;
@@ -63,9 +63,9 @@ void drive_out_and_back(benchmark::State& state) {
       if (limit > 0 && scan % 25 == 24) {
         MapCheckpoint checkpoint;
         snapshot_ms.push_back(ms_of([&] { checkpoint = map.checkpoint(); }));
-        save_ms.push_back(ms_of([&] { store->save(stored_state(checkpoint)); }));
+        save_ms.push_back(ms_of([&] { store->save(to_saved_map(checkpoint)); }));
         map.checkpoint_stored(checkpoint.step);
-        map.shelve(T_map_lidar.translation(), limit);
+        map.evict(T_map_lidar.translation(), limit);
       }
       peak_map_mib = std::max(peak_map_mib, scan % 25 == 24 ? mib(map.memory_use().bytes) : 0.0);
       peak_process_mib = std::max(peak_process_mib, process_mib() - before_mib);
@@ -73,8 +73,8 @@ void drive_out_and_back(benchmark::State& state) {
     const MemoryUse use = map.memory_use();
     state.counters["map_MiB"] = peak_map_mib;
     state.counters["process_MiB"] = peak_process_mib;
-    state.counters["tiles"] = static_cast<double>(use.resident_tiles + use.away_tiles);
-    state.counters["away"] = static_cast<double>(use.away_tiles);
+    state.counters["tiles"] = static_cast<double>(use.resident_tiles + use.non_resident_tiles);
+    state.counters["away"] = static_cast<double>(use.non_resident_tiles);
     state.counters["insert_ms"] = median(insert_ms);
     state.counters["worst_insert_ms"] = std::ranges::max(insert_ms);
     state.counters["snapshot_ms"] = median(snapshot_ms);

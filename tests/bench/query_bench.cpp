@@ -57,7 +57,7 @@ class GrowingMap {
   std::vector<LabelledScan> scans_;
   std::size_t scan_ = 0;
   std::mutex mutex_;
-  std::shared_ptr<const MapView> view_;
+  std::shared_ptr<const MapSnapshot> view_;
   TileHistory history_;
   std::jthread mapper_;
 };

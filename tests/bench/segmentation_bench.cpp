@@ -39,7 +39,7 @@ const ModelDescription& model() {
 }
 
 void project(benchmark::State& state) {
-  const Scan scan = speed_scan();
+  const Scan scan = cli::benchmark_scan();
   for (auto _ : state) {
     const RangeImage image(scan.points_lidar, model().projection());
     benchmark::DoNotOptimize(make_network_input(scan, image, model()));
@@ -70,13 +70,13 @@ void best_class_of_pixels(benchmark::State& state) {
   for (float& score : scores) score = any(random);
   for (auto _ : state) {
     benchmark::DoNotOptimize(
-        most_probable(scores, classes, ScoreKind::logits, ScoreLayout::pixels));
+        argmax_outputs(scores, classes, ScoreKind::logits, ScoreLayout::pixels));
   }
 }
 BENCHMARK(best_class_of_pixels)->Unit(benchmark::kMillisecond)->UseRealTime();
 
 void votes(benchmark::State& state) {
-  const Scan scan = speed_scan();
+  const Scan scan = cli::benchmark_scan();
   const RangeImage image(scan.points_lidar, model().projection());
   PixelLabels pixels;
   for (std::size_t i = 0; i < image.pixel_count(); ++i) {

@@ -18,14 +18,14 @@ RobotProfile car() {
 }
 
 /// A street of 120 m; 20 m tiles of 0.2 m cells.
-const MapView& street() {
-  static const MapView map = *test::street_map(120).view();
+const MapSnapshot& street() {
+  static const MapSnapshot map = *test::street_map(120).view();
   return map;
 }
 
 /// The same map after one tile was seen to change: it, and what it influences.
 void update_one_tile(benchmark::State& state) {
-  MapView map = street();
+  MapSnapshot map = street();
   TraversabilityMap area({car()});
   (void)area.update(map);
   auto& changed = map.tiles[map.tiles.size() / 2];
@@ -56,7 +56,7 @@ void whole_grid(benchmark::State& state) {
   TraversabilityMap area({car()});
   (void)area.update(street());
   for (auto _ : state) {
-    benchmark::DoNotOptimize(occupancy_grid(*area.view("car"), everywhere()));
+    benchmark::DoNotOptimize(occupancy_grid(*area.view("car"), whole_map_region()));
   }
 }
 BENCHMARK(whole_grid)->Unit(benchmark::kMillisecond);

@@ -9,8 +9,8 @@
 #include "core/map/storage/map_file.hpp"
 #include "core/traversability/traversability_query.hpp"
 #include "idl/conversions/occupancy_grid.hpp"
-#include "server/traversability/traversability_thread.hpp"
 #include "server/traversability/traversability_grid_provider.hpp"
+#include "server/traversability/traversability_thread.hpp"
 
 namespace stillmap {
 namespace {
@@ -49,7 +49,7 @@ class UpdateCount {
 };
 
 /// The map file that STILLMAP_BENCH_MAP names; nothing, and why in the state, without.
-std::optional<MapView> bench_map(benchmark::State& state) {
+std::optional<MapSnapshot> bench_map(benchmark::State& state) {
   if (const char* const file = std::getenv("STILLMAP_BENCH_MAP")) {
     return open_map_file(file)->load().view;
   }
@@ -68,10 +68,10 @@ void report(std::vector<double> ms, const std::string& name, benchmark::State& s
 /// again at its next turn.
 class ChangingMap {
  public:
-  explicit ChangingMap(MapView map)
+  explicit ChangingMap(MapSnapshot map)
       : whole_(std::move(map)), now_(whole_), is_thin_(whole_.tiles.size(), false) {}
 
-  std::shared_ptr<const MapView> change() {
+  std::shared_ptr<const MapSnapshot> change() {
     const std::size_t i = turn_++ * 7 % whole_.tiles.size();
     Tile tile = *whole_.tiles[i];
     is_thin_[i] = !is_thin_[i];
@@ -79,33 +79,34 @@ class ChangingMap {
     if (is_thin_[i]) std::erase_if(tile.voxels, [&](const Voxel&) { return ++n % 2 == 0; });
     tile.info.revision = ++now_.version;
     now_.tiles[i] = std::make_shared<const Tile>(std::move(tile));
-    return std::make_shared<const MapView>(now_);
+    return std::make_shared<const MapSnapshot>(now_);
   }
 
  private:
-  MapView whole_;
-  MapView now_;
+  MapSnapshot whole_;
+  MapSnapshot now_;
   std::vector<bool> is_thin_;
   std::size_t turn_ = 0;
 };
 
-/// A tile changes on the board of a server that keeps the areas of a car and a delivery robot,
+/// A tile changes in the latest map of a server that keeps the areas of a car and a delivery robot,
 /// until both are shown and the grid of the whole map is ready to be sent; and what of it the
 /// thread, which has a low priority, spent on the processor.
 void tile_change_to_published_area(benchmark::State& state) {
-  const std::optional<MapView> map = bench_map(state);
+  const std::optional<MapSnapshot> map = bench_map(state);
   if (!map) return;
-  const AreasConfig config;
-  MapBoard maps;
-  AreaBoard areas;
-  Statistics statistics;
+  const TraversabilityConfig config;
+  server::LatestMap maps;
+  server::TraversabilitySnapshot areas;
+  server::Statistics statistics;
   UpdateCount updates;
-  const PlanningGrid planning_grid(config, "map", maps, areas);
-  maps.begin(std::make_shared<const MapView>(*map), {});
-  const AreaThread thread(robots_of(config), std::chrono::seconds(0), maps, areas, statistics, [&] {
-    benchmark::DoNotOptimize(planning_grid.message(planning_grid.grid()));
-    updates.add();
-  });
+  const server::TraversabilityGridProvider grid_provider(config, "map", maps, areas);
+  maps.begin(std::make_shared<const MapSnapshot>(*map), {});
+  const server::TraversabilityThread thread(
+      load_robots(config), std::chrono::seconds(0), maps, areas, statistics, [&] {
+        benchmark::DoNotOptimize(grid_provider.message(grid_provider.grid()));
+        updates.add();
+      });
   updates.wait_for(1);
   std::vector<double> ms;
   std::vector<double> cpu_ms;
@@ -113,7 +114,7 @@ void tile_change_to_published_area(benchmark::State& state) {
   for (auto _ : state) {
     const auto next = changing.change();
     const auto began = std::chrono::steady_clock::now();
-    maps.show(next);
+    maps.publish(next);
     cpu_ms.push_back(updates.wait_for(2 + ms.size()));
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
     state.SetIterationTime(took.count());
@@ -131,15 +132,15 @@ BENCHMARK(tile_change_to_published_area)
 /// Grid with reasons and outlines round the map's middle; args: metres across, and which region
 /// (0 box, 1 sphere).
 void area_of_region(benchmark::State& state) {
-  const std::optional<MapView> map = bench_map(state);
+  const std::optional<MapSnapshot> map = bench_map(state);
   if (!map) return;
-  TraversabilityMap areas(robots_of(AreasConfig{}));
+  TraversabilityMap areas(load_robots(TraversabilityConfig{}));
   static_cast<void>(areas.update(*map));
   const TraversabilityView& view = *areas.view("car");
   const double radius_m = 0.5 * static_cast<double>(state.range(0));
   const Eigen::Vector2d centre = view.bounds_map().center();
-  AreaQuery query;
-  query.wants_outlines = true;
+  TraversabilityQuery query;
+  query.include_outlines = true;
   BoxRegion box;
   box.box_map.min().head<2>() = centre - Eigen::Vector2d::Constant(radius_m);
   box.box_map.max().head<2>() = centre + Eigen::Vector2d::Constant(radius_m);
@@ -151,7 +152,7 @@ void area_of_region(benchmark::State& state) {
   std::size_t cells = 0;
   for (auto _ : state) {
     const double began_ms = thread_cpu_ms();
-    cells = answer_area(view, query).cells.size();
+    cells = query_traversability(view, query).cells.size();
     cpu_ms.push_back(thread_cpu_ms() - began_ms);
   }
   report(cpu_ms, "cpu_", state);

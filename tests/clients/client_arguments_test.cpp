@@ -7,7 +7,7 @@
 
 #include "config/loaders/config_error.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 using ::testing::ElementsAre;
@@ -39,11 +39,11 @@ TEST(ClientArguments, PeersAndInterfacesDoNotTakeWhatFollowsThem) {
 }
 
 TEST(ClientArguments, OverrideTheProfile) {
-  const DdsOptions options = parse({"--dds-profile", "wan", "--peer", "robot", "--udp-only",
-                                    "--interface", "10.0.0.1", "--domain", "7"})
-                                 .client.dds(DdsRole::client);
-  EXPECT_EQ(options.transport, NetworkTransport::tcp);
-  EXPECT_THAT(options.peers, ElementsAre(NetworkAddress{"robot", 5100}));
+  const dds::DdsOptions options = parse({"--dds-profile", "wan", "--peer", "robot", "--udp-only",
+                                         "--interface", "10.0.0.1", "--domain", "7"})
+                                      .client.dds(DdsRole::client);
+  EXPECT_EQ(options.transport, dds::NetworkTransport::tcp);
+  EXPECT_THAT(options.peers, ElementsAre(dds::NetworkAddress{"robot", 5100}));
   EXPECT_FALSE(options.shared_memory);
   EXPECT_THAT(options.interfaces, ElementsAre("10.0.0.1"));
   EXPECT_EQ(options.domain_id, 7U);
@@ -53,13 +53,13 @@ TEST(ClientArguments, TakeTheNetworkFromTheEnvironment) {
   setenv("STILLMAP_DDS_PROFILE", "no_multicast", 1);
   setenv("STILLMAP_PEERS", "a,b:1", 1);
   setenv("STILLMAP_DISCOVERY_SERVER", "c", 1);
-  const DdsOptions options = parse({}).client.dds(DdsRole::client);
+  const dds::DdsOptions options = parse({}).client.dds(DdsRole::client);
   unsetenv("STILLMAP_DDS_PROFILE");
   unsetenv("STILLMAP_PEERS");
   unsetenv("STILLMAP_DISCOVERY_SERVER");
   EXPECT_FALSE(options.multicast);
-  EXPECT_THAT(options.peers, ElementsAre(NetworkAddress{"a", 0}, NetworkAddress{"b", 1}));
-  EXPECT_EQ(options.discovery_server, (NetworkAddress{"c", 11811}));
+  EXPECT_THAT(options.peers, ElementsAre(dds::NetworkAddress{"a", 0}, dds::NetworkAddress{"b", 1}));
+  EXPECT_EQ(options.discovery_server, (dds::NetworkAddress{"c", 11811}));
 }
 
 TEST(ClientArguments, RefuseAProfileThatDoesNotExist) {
@@ -67,4 +67,4 @@ TEST(ClientArguments, RefuseAProfileThatDoesNotExist) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 Scan scan_at(std::int64_t stamp_ns) {
@@ -18,8 +18,8 @@ StampedPose pose_at(std::int64_t stamp_ns) {
   return pose;
 }
 
-TEST(LiveScans, GivesAScanOnceItsPoseAndLabelsAreThereInWhateverOrder) {
-  LiveScans scans;
+TEST(LiveScanSynchronizer, GivesAScanOnceItsPoseAndLabelsAreThereInWhateverOrder) {
+  LiveScanSynchronizer scans;
   scans.add_labels(7, {SemanticClass::road});
   scans.add_pose(pose_at(7));
   EXPECT_FALSE(scans.take());
@@ -32,8 +32,8 @@ TEST(LiveScans, GivesAScanOnceItsPoseAndLabelsAreThereInWhateverOrder) {
   EXPECT_FALSE(scans.take());
 }
 
-TEST(LiveScans, KeepsTheOrderOfTheSensor) {
-  LiveScans scans;
+TEST(LiveScanSynchronizer, KeepsTheOrderOfTheSensor) {
+  LiveScanSynchronizer scans;
   for (const std::int64_t stamp_ns : {1, 2}) scans.add_scan(scan_at(stamp_ns));
   scans.add_labels(2, {});
   scans.add_labels(1, {});
@@ -43,8 +43,8 @@ TEST(LiveScans, KeepsTheOrderOfTheSensor) {
   EXPECT_EQ(scans.take().value().scan.stamp_ns, 2);
 }
 
-TEST(LiveScans, AScanThatTheServerDidNotMapIsLeftOutAndCounted) {
-  LiveScans scans;
+TEST(LiveScanSynchronizer, AScanThatTheServerDidNotMapIsLeftOutAndCounted) {
+  LiveScanSynchronizer scans;
   for (const std::int64_t stamp_ns : {1, 2}) scans.add_scan(scan_at(stamp_ns));
   EXPECT_FALSE(scans.take());
   scans.add_labels(2, {});
@@ -53,8 +53,8 @@ TEST(LiveScans, AScanThatTheServerDidNotMapIsLeftOutAndCounted) {
   EXPECT_EQ(scans.without_pose(), 1U);
 }
 
-TEST(LiveScans, WaitsForLabelsOnlySoLong) {
-  LiveScans scans;
+TEST(LiveScanSynchronizer, WaitsForLabelsOnlySoLong) {
+  LiveScanSynchronizer scans;
   scans.add_scan(scan_at(0));
   scans.add_pose(pose_at(0));
   for (std::int64_t later = 1; later < 10; ++later) scans.add_pose(pose_at(later));
@@ -65,8 +65,8 @@ TEST(LiveScans, WaitsForLabelsOnlySoLong) {
   EXPECT_FALSE(live->classes);
 }
 
-TEST(LiveScans, AtTheEndTakesWhatThereIs) {
-  LiveScans scans;
+TEST(LiveScanSynchronizer, AtTheEndTakesWhatThereIs) {
+  LiveScanSynchronizer scans;
   for (const std::int64_t stamp_ns : {1, 2, 3}) scans.add_scan(scan_at(stamp_ns));
   scans.add_pose(pose_at(1));
   scans.add_pose(pose_at(2));
@@ -76,11 +76,11 @@ TEST(LiveScans, AtTheEndTakesWhatThereIs) {
   EXPECT_EQ(scans.without_pose(), 1U);
 }
 
-TEST(LiveScans, DoesNotPileUpScansForAServerThatIsGone) {
-  LiveScans scans;
+TEST(LiveScanSynchronizer, DoesNotPileUpScansForAServerThatIsGone) {
+  LiveScanSynchronizer scans;
   for (std::int64_t stamp_ns = 0; stamp_ns < 1000; ++stamp_ns) scans.add_scan(scan_at(stamp_ns));
   EXPECT_EQ(scans.without_pose(), 800U);
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -1,5 +1,5 @@
-#include "core/map/storage/map_file.hpp"
 #include "core/map/static_map.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "tests/clients/command_test.hpp"
 
 namespace stillmap::test {
@@ -30,7 +30,7 @@ class MapToolsTest : public CommandTest {
     map.insert(scan, Eigen::Isometry3d::Identity());
     open_map_file(path(file))
         ->save({.view = *map.view(),
-                .memories = {},
+                .tile_evidence = {},
                 .trajectory = {StampedPose{}, {.stamp_ns = 1'000'000'000}},
                 .metadata = {{"sensor", "by hand"}}});
   }

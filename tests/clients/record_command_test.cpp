@@ -44,8 +44,8 @@ class RecordTest : public CommandTest {
   int domain_ = free_domain();
 };
 
-std::uint64_t messages_of(const Bag& bag, const std::string& topic) {
-  const auto found = std::ranges::find(bag.topics(), topic, &BagTopic::name);
+std::uint64_t messages_of(const dds::Bag& bag, const std::string& topic) {
+  const auto found = std::ranges::find(bag.topics(), topic, &dds::BagTopic::name);
   return found == bag.topics().end() ? 0 : found->messages;
 }
 
@@ -62,7 +62,7 @@ TEST_F(RecordTest, ARecordedReplayIsTheRecordingAgain) {
     std::this_thread::sleep_for(1500ms);
     EXPECT_EQ(record.stop(), 0) << content("record.log");
   }
-  const Bag bag(path("bag"));
+  const dds::Bag bag(path("bag"));
   EXPECT_EQ(messages_of(bag, "/stillmap/odometry"), static_cast<std::uint64_t>(scans));
   for (const char* topic : {"/tf", "/stillmap/path", "/stillmap/tiles", "/stillmap/tile_index",
                             "/stillmap/static_cloud", "/stillmap/status"}) {
@@ -71,7 +71,7 @@ TEST_F(RecordTest, ARecordedReplayIsTheRecordingAgain) {
   EXPECT_THAT(content("record.log"), testing::Not(HasSubstr("lost")));
 
   const ScanDataset original(path("city"));
-  const ScanDataset recorded = open_recording(path("bag"), "points");
+  const ScanDataset recorded = dds::open_sequence(path("bag"), "points");
   ASSERT_EQ(recorded.size(), original.size());
   for (std::size_t i = 0; i < original.size(); ++i) {
     const Scan a = original.read(i).scan, b = recorded.read(i).scan;

@@ -11,7 +11,7 @@ class RegionArgumentsTest : public CommandTest {
  protected:
   static void expect_refused(const std::vector<std::string>& words, const std::string& named) {
     try {
-      static_cast<void>(plan_points("--polygon", words));
+      static_cast<void>(cli::parse_points_2d("--polygon", words));
       FAIL() << named;
     } catch (const std::invalid_argument& error) {
       EXPECT_THAT(error.what(), AllOf(HasSubstr("--polygon"), HasSubstr(named)));
@@ -21,11 +21,11 @@ class RegionArgumentsTest : public CommandTest {
 
 TEST_F(RegionArgumentsTest, ReadsPositionsFromWordsAndFiles) {
   const std::vector<Eigen::Vector2d> points{{1.0, -2.5}, {3e1, 4.0}};
-  EXPECT_EQ(plan_points("--polygon", {"1", "-2.5", "3e1", "4"}), points);
+  EXPECT_EQ(cli::parse_points_2d("--polygon", {"1", "-2.5", "3e1", "4"}), points);
   write("points.txt", "# x y\n1 -2.5\n\n 30.0,4.0 # the second\n");
-  EXPECT_EQ(plan_points("--polygon", {path("points.txt")}), points);
+  EXPECT_EQ(cli::parse_points_2d("--polygon", {path("points.txt")}), points);
   write("empty.txt", "");
-  EXPECT_TRUE(plan_points("--polygon", {path("empty.txt")}).empty());
+  EXPECT_TRUE(cli::parse_points_2d("--polygon", {path("empty.txt")}).empty());
 }
 
 TEST_F(RegionArgumentsTest, NamesWhatIsWrongAndWhere) {
@@ -40,20 +40,20 @@ TEST_F(RegionArgumentsTest, NamesWhatIsWrongAndWhere) {
 }
 
 TEST_F(RegionArgumentsTest, ChecksRegionsBeforeAnybodyIsAsked) {
-  RegionArguments region;
-  EXPECT_NO_THROW(check_region(region));
+  cli::RegionArguments region;
+  EXPECT_NO_THROW(cli::check_region(region));
   region.sphere = {0, 0, 0, 5};
-  EXPECT_NO_THROW(check_region(region));
+  EXPECT_NO_THROW(cli::check_region(region));
   region.sphere[3] = 0;
-  EXPECT_THROW(check_region(region), std::invalid_argument);
+  EXPECT_THROW(cli::check_region(region), std::invalid_argument);
   region = {};
   region.corridor = {"0", "0", "9", "9"};
-  EXPECT_THROW(check_region(region), std::invalid_argument);
+  EXPECT_THROW(cli::check_region(region), std::invalid_argument);
   region.width_m = 2.0;
-  EXPECT_NO_THROW(check_region(region));
+  EXPECT_NO_THROW(cli::check_region(region));
   region.min_z_m = 5.0;
   region.max_z_m = 1.0;
-  EXPECT_THROW(check_region(region), std::invalid_argument);
+  EXPECT_THROW(cli::check_region(region), std::invalid_argument);
 }
 
 }  // namespace

@@ -1,9 +1,10 @@
+#include "clients/commands/stage_stopwatch.hpp"
+
 #include <gtest/gtest.h>
 
-#include "clients/commands/stage_stopwatch.hpp"
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 TEST(Table, AlignsColumnsAndFillsMissingCells) {
@@ -13,16 +14,16 @@ TEST(Table, AlignsColumnsAndFillsMissingCells) {
   EXPECT_EQ(table.text(), "class  voxels\n-------------\nroad    12345\npole         \n");
 }
 
-TEST(StageTime, QuantileIsAValueThatOccurred) {
-  const StageTime stage{.stage = "odometry", .ms = {4.0, 1.0, 3.0, 2.0}};
+TEST(StageDurations, QuantileIsAValueThatOccurred) {
+  const StageDurations stage{.stage = "odometry", .ms = {4.0, 1.0, 3.0, 2.0}};
   EXPECT_DOUBLE_EQ(stage.quantile(0.0), 1.0);
   EXPECT_DOUBLE_EQ(stage.quantile(0.5), 2.0);
   EXPECT_DOUBLE_EQ(stage.quantile(0.95), 4.0);
-  EXPECT_DOUBLE_EQ(StageTime{}.quantile(0.5), 0.0);
+  EXPECT_DOUBLE_EQ(StageDurations{}.quantile(0.5), 0.0);
 }
 
-TEST(StageTimes, KeepStagesInTheirOrderWithTheTotalLast) {
-  StageTimes times;
+TEST(StageStopwatch, KeepStagesInTheirOrderWithTheTotalLast) {
+  StageStopwatch times;
   for (int scan = 0; scan < 3; ++scan) {
     times.begin();
     times.end_stage("prepare");
@@ -38,4 +39,4 @@ TEST(StageTimes, KeepStagesInTheirOrderWithTheTotalLast) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,14 +4,15 @@
 
 #include <thread>
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using namespace std::chrono_literals;
 
-constexpr MapIdentity first_map{.version = 4, .map_id = 1, .tile_size_m = 20, .voxel_size_m = 0.2};
+constexpr dds::MapIdentity first_map{
+    .version = 4, .map_id = 1, .tile_size_m = 20, .voxel_size_m = 0.2};
 
 Tile tile(TileId id, std::uint64_t revision) {
   Tile tile;
@@ -22,8 +23,8 @@ Tile tile(TileId id, std::uint64_t revision) {
   return tile;
 }
 
-RegionNews news(const MapIdentity& map, std::vector<Tile> appeared, std::vector<Tile> changed = {},
-                std::vector<TileId> removed = {}) {
+RegionUpdate update(const dds::MapIdentity& map, std::vector<Tile> appeared,
+                    std::vector<Tile> changed = {}, std::vector<TileId> removed = {}) {
   return {.map = map,
           .appeared = std::move(appeared),
           .changed = std::move(changed),
@@ -32,7 +33,7 @@ RegionNews news(const MapIdentity& map, std::vector<Tile> appeared, std::vector<
 
 std::vector<std::pair<TileId, std::uint64_t>> content(const TileMirror& mirror) {
   std::vector<std::pair<TileId, std::uint64_t>> tiles;
-  for (const auto& held : mirror.view()->tiles) {
+  for (const auto& held : mirror.snapshot()->tiles) {
     tiles.emplace_back(held->info.id, held->info.revision);
   }
   return tiles;
@@ -46,10 +47,10 @@ TEST(TileMirror, BeginsEmpty) {
 
 TEST(TileMirror, HoldsTheTilesInOrderWithTheMapsSizes) {
   TileMirror mirror;
-  mirror.apply(news(first_map, {tile({2, 0}, 3), tile({-1, 5}, 4)}));
+  mirror.apply(update(first_map, {tile({2, 0}, 3), tile({-1, 5}, 4)}));
   EXPECT_THAT(content(mirror),
               ElementsAre(std::pair(TileId{-1, 5}, 4U), std::pair(TileId{2, 0}, 3U)));
-  const auto view = mirror.view();
+  const auto view = mirror.snapshot();
   EXPECT_EQ(view->map_id, 1U);
   EXPECT_EQ(view->version, 4U);
   EXPECT_EQ(view->tile_size_m, 20.0);
@@ -58,11 +59,11 @@ TEST(TileMirror, HoldsTheTilesInOrderWithTheMapsSizes) {
 
 TEST(TileMirror, ChangesAndRemovalsTakeEffectAndOldViewsStay) {
   TileMirror mirror;
-  mirror.apply(news(first_map, {tile({0, 0}, 3), tile({1, 0}, 4)}));
-  const auto before = mirror.view();
-  MapIdentity later = first_map;
+  mirror.apply(update(first_map, {tile({0, 0}, 3), tile({1, 0}, 4)}));
+  const auto before = mirror.snapshot();
+  dds::MapIdentity later = first_map;
   later.version = 6;
-  mirror.apply(news(later, {}, {tile({1, 0}, 6)}, {{0, 0}}));
+  mirror.apply(update(later, {}, {tile({1, 0}, 6)}, {{0, 0}}));
   EXPECT_THAT(content(mirror), ElementsAre(std::pair(TileId{1, 0}, 6U)));
   EXPECT_EQ(before->tiles.size(), 2U);
   EXPECT_EQ(before->tiles.back()->info.revision, 4U);
@@ -70,41 +71,41 @@ TEST(TileMirror, ChangesAndRemovalsTakeEffectAndOldViewsStay) {
 
 TEST(TileMirror, ATileOlderThanTheOneHeldIsLeftOut) {
   TileMirror mirror;
-  mirror.apply(news(first_map, {tile({0, 0}, 9)}));
-  mirror.apply(news(first_map, {}, {tile({0, 0}, 5)}));
+  mirror.apply(update(first_map, {tile({0, 0}, 9)}));
+  mirror.apply(update(first_map, {}, {tile({0, 0}, 5)}));
   EXPECT_THAT(content(mirror), ElementsAre(std::pair(TileId{0, 0}, 9U)));
-  EXPECT_EQ(mirror.view()->version, 9U);
+  EXPECT_EQ(mirror.snapshot()->version, 9U);
 }
 
 TEST(TileMirror, AnotherMapReplacesEverythingThoughItsVersionsAreSmaller) {
   TileMirror mirror;
-  mirror.apply(news(first_map, {tile({0, 0}, 3), tile({1, 0}, 4)}));
-  MapIdentity second = first_map;
+  mirror.apply(update(first_map, {tile({0, 0}, 3), tile({1, 0}, 4)}));
+  dds::MapIdentity second = first_map;
   second.map_id = 2;
   second.version = 1;
-  mirror.apply(news(second, {tile({1, 0}, 1)}));
+  mirror.apply(update(second, {tile({1, 0}, 1)}));
   EXPECT_THAT(content(mirror), ElementsAre(std::pair(TileId{1, 0}, 1U)));
-  EXPECT_EQ(mirror.view()->map_id, 2U);
+  EXPECT_EQ(mirror.snapshot()->map_id, 2U);
 }
 
 TEST(TileMirror, KnowsWhetherItHoldsWhatTheServerHas) {
   TileMirror mirror;
-  mirror.apply(news(first_map, {tile({0, 0}, 3)}));
+  mirror.apply(update(first_map, {tile({0, 0}, 3)}));
   EXPECT_TRUE(mirror.holds({first_map, {tile({0, 0}, 2).info}}));
   EXPECT_FALSE(mirror.holds({first_map, {tile({0, 0}, 4).info}}));
   EXPECT_FALSE(mirror.holds({first_map, {tile({1, 0}, 1).info}}));
-  MapIdentity second = first_map;
+  dds::MapIdentity second = first_map;
   second.map_id = 2;
   EXPECT_FALSE(mirror.holds({second, {tile({0, 0}, 1).info}}));
 }
 
 TEST(TileMirror, WakesWhoWaitsForAChange) {
   TileMirror mirror;
-  const auto empty = mirror.view();
+  const auto empty = mirror.snapshot();
   EXPECT_EQ(mirror.wait_for_change(empty, 1ms), empty);
-  std::jthread writer([&] { mirror.apply(news(first_map, {tile({0, 0}, 3)})); });
+  std::jthread writer([&] { mirror.apply(update(first_map, {tile({0, 0}, 3)})); });
   EXPECT_EQ(mirror.wait_for_change(empty, 30s)->tiles.size(), 1U);
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -8,15 +8,15 @@
 #include "core/map/static_map.hpp"
 #include "core/traversability/traversability_map.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 /// A perfect mapper: true labels at true poses, nothing that moves or is parked.
-StaticMap map_of(const Simulation& simulation) {
+StaticMap map_of(const simulation::Simulation& simulation) {
   StaticMap map{StaticMapConfig{}};
   const Eigen::Isometry3d T_map_city = simulation.T_map_lidar_at(0.0).inverse();
   for (int i = 0; i < simulation.config().scans; ++i) {
-    const SimulatedScan simulated = simulation.scan(i);
+    const simulation::SimulatedScan simulated = simulation.scan(i);
     LabelledScan scan;
     scan.scan = simulated.scan;
     for (const std::uint32_t raw : simulated.raw_labels) {
@@ -34,36 +34,37 @@ StaticMap map_of(const Simulation& simulation) {
 class YardArea : public ::testing::Test {
  protected:
   static void SetUpTestSuite() {
-    SimulationConfig config;
-    config.plan = test_yard();
+    simulation::SimulationConfig config;
+    config.plan = simulation::test_yard();
     config.scans = 40;
     config.firings = 900;
-    const Simulation simulation(config);
+    const simulation::Simulation simulation(config);
     map_.emplace(map_of(simulation));
-    truth_ = std::make_unique<CityTruth>(config);
+    truth_ = std::make_unique<simulation::CityTruth>(config);
     T_city_map_ = simulation.T_map_lidar_at(0.0);
   }
   static void TearDownTestSuite() {
     map_.reset();
     truth_.reset();
   }
-  static AreaScore score(const std::string& robot) {
+  static TraversabilityScore score(const std::string& robot) {
     TraversabilityMap area({load_robot_profile(robot)});
     const auto map = map_->view();
     (void)area.update(*map);
     const auto view = area.view(robot);
-    return score_area(*view, simulated_truth(*truth_, view->profile, view->cell_m, T_city_map_));
+    return score_traversability(
+        *view, simulated_traversability(*truth_, view->profile, view->cell_m, T_city_map_));
   }
   static std::optional<StaticMap> map_;
-  static std::unique_ptr<CityTruth> truth_;
+  static std::unique_ptr<simulation::CityTruth> truth_;
   static Eigen::Isometry3d T_city_map_;
 };
 std::optional<StaticMap> YardArea::map_;
-std::unique_ptr<CityTruth> YardArea::truth_;
+std::unique_ptr<simulation::CityTruth> YardArea::truth_;
 Eigen::Isometry3d YardArea::T_city_map_ = Eigen::Isometry3d::Identity();
 
 TEST_F(YardArea, WhatIsFreeForACarIsRoadWithFewExceptions) {
-  const AreaScore score = YardArea::score("car");
+  const TraversabilityScore score = YardArea::score("car");
   EXPECT_GT(*score.precision(true), 0.97);
   EXPECT_GT(*score.recall(), 0.85);
   // A car must not be sent into a house, over a kerb or onto grass.
@@ -77,11 +78,11 @@ TEST_F(YardArea, WhatIsFreeForACarIsRoadWithFewExceptions) {
 }
 
 TEST_F(YardArea, ATrackedRobotHasMoreRoomThanACar) {
-  const AreaScore car = YardArea::score("car");
-  const AreaScore tracked = YardArea::score("tracked");
+  const TraversabilityScore car = YardArea::score("car");
+  const TraversabilityScore tracked = YardArea::score("tracked");
   EXPECT_GT(tracked.free_and_truly_free, car.free_and_truly_free);
   EXPECT_GT(*tracked.precision(true), 0.9);
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::cli

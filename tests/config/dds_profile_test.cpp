@@ -29,26 +29,26 @@ TEST(DdsProfileFile, EveryFieldIsRead) {
   const DdsProfile profile = read_dds_profile(write_file("radio.yaml", whole_file));
   EXPECT_EQ(profile.server_port, 7500);
   EXPECT_TRUE(profile.client_shared_memory);
-  const DdsOptions& options = profile.options;
-  EXPECT_EQ(options.transport, NetworkTransport::udp);
+  const dds::DdsOptions& options = profile.options;
+  EXPECT_EQ(options.transport, dds::NetworkTransport::udp);
   EXPECT_FALSE(options.shared_memory);
   EXPECT_EQ(options.shared_memory_mib, 8U);
   EXPECT_FALSE(options.multicast);
   EXPECT_THAT(options.interfaces, ElementsAre("10.0.0.1"));
   EXPECT_THAT(options.peers,
-              ElementsAre(NetworkAddress{"10.0.0.2", 0}, NetworkAddress{"there", 7412}));
-  EXPECT_EQ(options.discovery_server, (NetworkAddress{"10.0.0.3", 0}));
+              ElementsAre(dds::NetworkAddress{"10.0.0.2", 0}, dds::NetworkAddress{"there", 7412}));
+  EXPECT_EQ(options.discovery_server, (dds::NetworkAddress{"10.0.0.3", 0}));
   EXPECT_EQ(options.socket_buffer_bytes, 100000U);
   EXPECT_EQ(options.max_datagram_bytes, 1400U);
   EXPECT_EQ(options.heartbeat_ms, 70U);
   EXPECT_EQ(options.repair_delay_ms, 9U);
   EXPECT_EQ(options.lease_s, 33U);
-  EXPECT_EQ(options.bulk_bytes_per_s, 500000U);
+  EXPECT_EQ(options.large_message_bytes_per_s, 500000U);
 }
 
 TEST(DdsProfileFile, LanIsWhatHoldsWithoutAnyFile) {
-  const DdsOptions lan = load_dds_profile("lan").options;
-  const DdsOptions built_in;
+  const dds::DdsOptions lan = load_dds_profile("lan").options;
+  const dds::DdsOptions built_in;
   EXPECT_EQ(lan.transport, built_in.transport);
   EXPECT_EQ(load_dds_profile("lan").server_port, built_in.listening_port);
   EXPECT_EQ(lan.shared_memory, built_in.shared_memory);
@@ -62,15 +62,15 @@ TEST(DdsProfileFile, LanIsWhatHoldsWithoutAnyFile) {
   EXPECT_EQ(lan.heartbeat_ms, built_in.heartbeat_ms);
   EXPECT_EQ(lan.repair_delay_ms, built_in.repair_delay_ms);
   EXPECT_EQ(lan.lease_s, built_in.lease_s);
-  EXPECT_EQ(lan.bulk_bytes_per_s, built_in.bulk_bytes_per_s);
+  EXPECT_EQ(lan.large_message_bytes_per_s, built_in.large_message_bytes_per_s);
 }
 
 TEST(DdsProfileFile, ShippedProfilesAreWhatTheirNamesSay) {
   EXPECT_THAT(known_dds_profiles(), IsSupersetOf({"host", "lan", "no_multicast", "wan", "wifi"}));
   EXPECT_THAT(load_dds_profile("host").options.interfaces, ElementsAre("127.0.0.1"));
   EXPECT_LE(load_dds_profile("wifi").options.max_datagram_bytes, 1472U);
-  EXPECT_GT(load_dds_profile("wifi").options.bulk_bytes_per_s, 0U);
-  EXPECT_EQ(load_dds_profile("wan").options.transport, NetworkTransport::tcp);
+  EXPECT_GT(load_dds_profile("wifi").options.large_message_bytes_per_s, 0U);
+  EXPECT_EQ(load_dds_profile("wan").options.transport, dds::NetworkTransport::tcp);
   EXPECT_FALSE(load_dds_profile("no_multicast").options.multicast);
 }
 
@@ -105,61 +105,62 @@ TEST(DdsProfileFile, IsFoundInTheFolderOfTheEnvironmentFirst) {
 }
 
 TEST(NetworkAddressText, IsHostOrHostAndPort) {
-  EXPECT_EQ(network_address_from("robot.local"), (NetworkAddress{"robot.local", 0}));
-  EXPECT_EQ(network_address_from("10.1.2.3:80"), (NetworkAddress{"10.1.2.3", 80}));
+  EXPECT_EQ(network_address_from("robot.local"), (dds::NetworkAddress{"robot.local", 0}));
+  EXPECT_EQ(network_address_from("10.1.2.3:80"), (dds::NetworkAddress{"10.1.2.3", 80}));
   for (const char* text : {"", ":80", "a:", "a:0", "a:x", "a:70000", "a:-1", "::1", "a b", "a/b"}) {
     EXPECT_EQ(network_address_from(text), std::nullopt) << text;
   }
 }
 
-TEST(DdsChoiceOptions, ADeploymentOverridesItsProfile) {
-  const DdsChoice choice{.profile = write_file("radio.yaml", whole_file).string(),
-                         .shared_memory = true,
-                         .interfaces = {"10.0.0.9"},
-                         .peers = {"a", "b:1"},
-                         .discovery_server = "c:2",
-                         .socket_buffer_bytes = 70000};
-  const DdsOptions client = dds_options(choice, DdsRole::client);
+TEST(DdsNetworkConfigTest, ADeploymentOverridesItsProfile) {
+  const DdsNetworkConfig network{.profile = write_file("radio.yaml", whole_file).string(),
+                                 .shared_memory = true,
+                                 .interfaces = {"10.0.0.9"},
+                                 .peers = {"a", "b:1"},
+                                 .discovery_server = "c:2",
+                                 .socket_buffer_bytes = 70000};
+  const dds::DdsOptions client = dds_options(network, DdsRole::client);
   EXPECT_TRUE(client.shared_memory);
   EXPECT_THAT(client.interfaces, ElementsAre("10.0.0.9"));
-  EXPECT_THAT(client.peers, ElementsAre(NetworkAddress{"a", 7500}, NetworkAddress{"b", 1}));
-  EXPECT_EQ(client.discovery_server, (NetworkAddress{"c", 2}));
+  EXPECT_THAT(client.peers,
+              ElementsAre(dds::NetworkAddress{"a", 7500}, dds::NetworkAddress{"b", 1}));
+  EXPECT_EQ(client.discovery_server, (dds::NetworkAddress{"c", 2}));
   EXPECT_EQ(client.socket_buffer_bytes, 70000U);
   EXPECT_EQ(client.listening_port, 0);
-  EXPECT_EQ(dds_options(choice, DdsRole::server).listening_port, 7500);
+  EXPECT_EQ(dds_options(network, DdsRole::server).listening_port, 7500);
 }
 
-TEST(DdsChoiceOptions, OnlySensorsAndTheServerShareMemoryWhereClientsMayHang) {
-  DdsChoice lan;
+TEST(DdsNetworkConfigTest, OnlySensorsAndTheServerShareMemoryWhereClientsMayHang) {
+  DdsNetworkConfig lan;
   EXPECT_TRUE(dds_options(lan, DdsRole::server).shared_memory);
   EXPECT_TRUE(dds_options(lan, DdsRole::sensor).shared_memory);
   EXPECT_FALSE(dds_options(lan, DdsRole::client).shared_memory);
   lan.shared_memory = true;
   EXPECT_TRUE(dds_options(lan, DdsRole::client).shared_memory);
-  DdsChoice host;
+  DdsNetworkConfig host;
   host.profile = "host";
   EXPECT_TRUE(dds_options(host, DdsRole::client).shared_memory);
 }
 
-TEST(DdsChoiceOptions, WhatIsNotGivenStaysAsTheProfileHasIt) {
-  DdsChoice choice;
-  choice.profile = write_file("radio.yaml", whole_file).string();
-  const DdsOptions options = dds_options(choice, DdsRole::client);
+TEST(DdsNetworkConfigTest, WhatIsNotGivenStaysAsTheProfileHasIt) {
+  DdsNetworkConfig network;
+  network.profile = write_file("radio.yaml", whole_file).string();
+  const dds::DdsOptions options = dds_options(network, DdsRole::client);
   EXPECT_FALSE(options.shared_memory);
   EXPECT_THAT(options.interfaces, ElementsAre("10.0.0.1"));
   EXPECT_EQ(options.peers.size(), 2U);
-  EXPECT_EQ(options.discovery_server, (NetworkAddress{"10.0.0.3", 11811}));
+  EXPECT_EQ(options.discovery_server, (dds::NetworkAddress{"10.0.0.3", 11811}));
   EXPECT_EQ(options.socket_buffer_bytes, 100000U);
 }
 
-TEST(DdsChoiceOptions, TellsAllFaultsAtOnce) {
-  DdsChoice choice;
-  choice.profile = "wan";
-  choice.interfaces = {"eth0"};
-  choice.peers = {"a:b"};
-  choice.discovery_server = "c:d";
+TEST(DdsNetworkConfigTest, TellsAllFaultsAtOnce) {
+  DdsNetworkConfig network;
+  network.profile = "wan";
+  network.interfaces = {"eth0"};
+  network.peers = {"a:b"};
+  network.discovery_server = "c:d";
   EXPECT_THAT(
-      refusal([&] { (void)dds_options(choice, DdsRole::client); }),
+      refusal([&] { (void)dds_options(network, DdsRole::client); }),
       AllOf(HasSubstr("'eth0'"), HasSubstr("'a:b'"), HasSubstr("'c:d'"), HasSubstr("over TCP")));
 }
 

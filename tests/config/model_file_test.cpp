@@ -100,21 +100,21 @@ TEST(ModelFile, RefusesAFolderThatIsNotThere) {
               HasSubstr("is not a folder"));
 }
 
-TEST(LabelSource, IsTheOneAskedFor) {
-  const auto name = [](LabelOrigin source) {
-    return open_label_source({.source = source, .model = {}, .image_columns = 0, .engine = {}},
-                             hdl_64e())
+TEST(Segmenter, IsTheOneAskedFor) {
+  const auto name = [](LabelProvider source) {
+    return open_segmenter({.source = source, .model = {}, .image_columns = 0, .engine = {}},
+                          hdl_64e())
         ->name();
   };
-  EXPECT_EQ(name(LabelOrigin::stream), "stream");
-  EXPECT_EQ(name(LabelOrigin::none), "none");
+  EXPECT_EQ(name(LabelProvider::stream), "stream");
+  EXPECT_EQ(name(LabelProvider::none), "none");
 }
 
-TEST(LabelSource, NamesTheNetworkFileThatIsMissing) {
+TEST(Segmenter, NamesTheNetworkFileThatIsMissing) {
   const auto folder = write_file("model.yaml", sound).parent_path();
   try {
-    (void)open_label_source(
-        {.source = LabelOrigin::model, .model = folder, .image_columns = 0, .engine = {}},
+    (void)open_segmenter(
+        {.source = LabelProvider::model, .model = folder, .image_columns = 0, .engine = {}},
         hdl_64e());
     FAIL() << "a model without a network was opened";
   } catch (const ModelError& error) {

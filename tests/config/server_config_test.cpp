@@ -58,9 +58,9 @@ odometry: {weighting: geometric, registration: {max_iterations: 7}}
 static_map: {min_points: 5}
 )");
   EXPECT_EQ(config.mapper.sensor.rings, 16);
-  EXPECT_EQ(config.labels.source, LabelOrigin::none);
-  EXPECT_EQ(config.labels.engine.engine, EngineChoice::Engine::onednn);
-  EXPECT_EQ(config.labels.engine.precision, EngineChoice::Numbers::int8);
+  EXPECT_EQ(config.labels.source, LabelProvider::none);
+  EXPECT_EQ(config.labels.engine.engine, EngineOptions::Engine::onednn);
+  EXPECT_EQ(config.labels.engine.precision, EngineOptions::PrecisionMode::int8);
   EXPECT_EQ(config.labels.engine.threads, 3);
   EXPECT_EQ(config.labels.image_columns, 512);
   EXPECT_EQ(config.dds.domain_id, 42U);
@@ -144,9 +144,9 @@ TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
 
 TEST(ServerConfig, FindsTheRobotsOfItsAreas) {
   const ServerConfig config = load("areas: {profiles: [tracked], grid_profile: tracked}");
-  ASSERT_EQ(robots_of(config.areas).size(), 1U);
-  EXPECT_EQ(robots_of(config.areas)[0].name, "tracked");
-  EXPECT_TRUE(robots_of(load("areas: {profiles: []}").areas).empty());
+  ASSERT_EQ(load_robots(config.traversability).size(), 1U);
+  EXPECT_EQ(load_robots(config.traversability)[0].name, "tracked");
+  EXPECT_TRUE(load_robots(load("areas: {profiles: []}").traversability).empty());
   EXPECT_THAT(refusal_of("areas: {profiles: [car, submarine]}"),
               AllOf(HasSubstr("server.yaml:1: areas.profiles"), HasSubstr("'submarine'"),
                     HasSubstr("car, delivery_robot, tracked")));

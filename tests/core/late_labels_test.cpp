@@ -12,27 +12,27 @@
 namespace stillmap {
 namespace {
 
-using test::BoxDrive;
+using test::BoxSequence;
 
 /// Takes every n-th scan and hands its labels in `delay` scans later.
-class SlowFeed final : public LabelFeed {
+class SlowSegmentation final : public SegmentationPipeline {
  public:
-  SlowFeed(int every, int delay) : every_(every), delay_(delay) {}
+  SlowSegmentation(int every, int delay) : every_(every), delay_(delay) {}
 
   [[nodiscard]] std::string name() const override { return "slow"; }
   [[nodiscard]] bool may_skip_scans() const override { return true; }
-  [[nodiscard]] Answer offer(const Scan& scan) override {
-    Answer answer;
-    const int now = offers_++;
+  [[nodiscard]] Output submit(const Scan& scan) override {
+    Output output;
+    const int now = submitted_++;
     if (now % every_ == 0) {
-      jobs_.push_back({now + delay_, {scan.stamp_ns, StreamLabels().label(scan)}});
-      answer.pending = delay_ > 0;
+      jobs_.push_back({now + delay_, {scan.stamp_ns, PassthroughSegmenter().segment(scan)}});
+      output.pending = delay_ > 0;
     }
     while (!jobs_.empty() && jobs_.front().due <= now) {
-      answer.finished.push_back(jobs_.front().labels);
+      output.finished.push_back(jobs_.front().labels);
       jobs_.pop_front();
     }
-    return answer;
+    return output;
   }
 
  private:
@@ -42,16 +42,16 @@ class SlowFeed final : public LabelFeed {
   };
   int every_;
   int delay_;
-  int offers_ = 0;
+  int submitted_ = 0;
   std::deque<Job> jobs_;
 };
 
 /// Hands in empty labels, as after a failure.
-class FailingFeed final : public LabelFeed {
+class FailingSegmentation final : public SegmentationPipeline {
  public:
   [[nodiscard]] std::string name() const override { return "failing"; }
   [[nodiscard]] bool may_skip_scans() const override { return true; }
-  [[nodiscard]] Answer offer(const Scan& scan) override {
+  [[nodiscard]] Output submit(const Scan& scan) override {
     return {.finished = {{scan.stamp_ns, {}}}, .pending = false};
   }
 };
@@ -62,19 +62,19 @@ MapperConfig box_config() {
   return config;
 }
 
-const BoxDrive& traffic_drive() {
-  static const BoxDrive drive(test::street_with_traffic(), 30);
-  return drive;
+const BoxSequence& traffic_sequence() {
+  static const BoxSequence sequence(test::street_with_traffic(), 30);
+  return sequence;
 }
 
-std::size_t voxels_in(const MapView& view) {
+std::size_t voxels_in(const MapSnapshot& view) {
   std::size_t count = 0;
   for (const auto& tile : view.tiles) count += tile->voxels.size();
   return count;
 }
 
 /// Share of the voxels that are of the class that most votes of a reference map give them.
-double share_of_agreeing_voxels(const MapView& view, const MapView& reference) {
+double share_of_agreeing_voxels(const MapSnapshot& view, const MapSnapshot& reference) {
   std::size_t common = 0, agreeing = 0;
   for (const auto& tile : view.tiles) {
     const auto other = std::ranges::find(reference.tiles, tile->info.id,
@@ -109,7 +109,7 @@ struct RightLabels {
 struct Rhythm {
   int every;
   int delay;
-  /// Share of right labels to be reached; the drive is fast, and much of a scan is new ground.
+  /// Share of right labels to be reached; the sequence is fast, and much of a scan is new ground.
   double right;
 };
 
@@ -117,24 +117,24 @@ class LateLabels : public testing::TestWithParam<Rhythm> {};
 
 TEST_P(LateLabels, MapAndPosesAreNearlyThoseOfLabelsInTime) {
   const auto [every, delay, right_share] = GetParam();
-  RightLabels carried;
-  Mapper in_time(box_config(), std::make_unique<StreamLabels>());
-  Mapper late(box_config(), std::make_unique<SlowFeed>(every, delay));
-  for (std::size_t k = 0; k < traffic_drive().scans.size(); ++k) {
-    ASSERT_TRUE(in_time.process(traffic_drive().scans[k].scan));
-    const auto mapped = late.process(traffic_drive().scans[k].scan);
+  RightLabels propagated;
+  Mapper in_time(box_config(), std::make_unique<PassthroughSegmenter>());
+  Mapper late(box_config(), std::make_unique<SlowSegmentation>(every, delay));
+  for (std::size_t k = 0; k < traffic_sequence().scans.size(); ++k) {
+    ASSERT_TRUE(in_time.process(traffic_sequence().scans[k].scan));
+    const auto mapped = late.process(traffic_sequence().scans[k].scan);
     ASSERT_TRUE(mapped);
-    test::expect_near(mapped->odometry.T_map_lidar, traffic_drive().T_map_lidar[k], 0.2, 0.01);
+    test::expect_near(mapped->odometry.T_map_lidar, traffic_sequence().T_map_lidar[k], 0.2, 0.01);
     const bool fresh = delay == 0 && k % static_cast<std::size_t>(every) == 0;
     if (fresh) {
-      EXPECT_EQ(mapped->labelling, Labelling::fresh) << k;
+      EXPECT_EQ(mapped->label_provenance, LabelProvenance::fresh) << k;
     } else if (k >= static_cast<std::size_t>(every + delay)) {
-      EXPECT_EQ(mapped->labelling, Labelling::carried) << k;
-      carried.add(mapped->labelled);
+      EXPECT_EQ(mapped->label_provenance, LabelProvenance::propagated) << k;
+      propagated.add(mapped->labelled);
     }
   }
-  EXPECT_GT(carried.share(), right_share);
-  const auto reference = in_time.map_view(), view = late.map_view();
+  EXPECT_GT(propagated.share(), right_share);
+  const auto reference = in_time.map_snapshot(), view = late.map_snapshot();
   EXPECT_GT(voxels_in(*view), voxels_in(*reference) * 7 / 10);
   EXPECT_GT(share_of_agreeing_voxels(*view, *reference), 0.98);
   for (const auto& tile : view->tiles) {
@@ -151,36 +151,36 @@ INSTANTIATE_TEST_SUITE_P(Mapper, LateLabels,
                          });
 
 TEST(MapperLabels, CarriedOnesCountLessThanFreshOnes) {
-  Mapper mapper(box_config(), std::make_unique<SlowFeed>(2, 0));
-  ASSERT_TRUE(mapper.process(traffic_drive().scans[0].scan));
-  const auto mapped = mapper.process(traffic_drive().scans[1].scan);
+  Mapper mapper(box_config(), std::make_unique<SlowSegmentation>(2, 0));
+  ASSERT_TRUE(mapper.process(traffic_sequence().scans[0].scan));
+  const auto mapped = mapper.process(traffic_sequence().scans[1].scan);
   ASSERT_TRUE(mapped);
-  ASSERT_EQ(mapped->labelling, Labelling::carried);
+  ASSERT_EQ(mapped->label_provenance, LabelProvenance::propagated);
   for (const float confidence : mapped->labelled.labels.confidence) {
     ASSERT_LE(confidence, 0.5F);
   }
 }
 
 TEST(MapperLabels, AFeedThatFailsGivesPureGeometry) {
-  Mapper mapper(box_config(), std::make_unique<FailingFeed>());
+  Mapper mapper(box_config(), std::make_unique<FailingSegmentation>());
   for (std::size_t k = 0; k < 5; ++k) {
-    const auto mapped = mapper.process(traffic_drive().scans[k].scan);
+    const auto mapped = mapper.process(traffic_sequence().scans[k].scan);
     ASSERT_TRUE(mapped);
-    EXPECT_EQ(mapped->labelling, Labelling::none);
+    EXPECT_EQ(mapped->label_provenance, LabelProvenance::none);
     EXPECT_TRUE(mapped->labelled.labels.empty());
-    test::expect_near(mapped->odometry.T_map_lidar, traffic_drive().T_map_lidar[k], 0.2, 0.02);
+    test::expect_near(mapped->odometry.T_map_lidar, traffic_sequence().T_map_lidar[k], 0.2, 0.02);
   }
-  EXPECT_GT(voxels_in(*mapper.map_view()), 1000U);
+  EXPECT_GT(voxels_in(*mapper.map_snapshot()), 1000U);
 }
 
 TEST(MapperLabels, ResetForgetsWhatWasPending) {
-  Mapper mapper(box_config(), std::make_unique<SlowFeed>(2, 1));
-  for (std::size_t k = 0; k < 3; ++k) ASSERT_TRUE(mapper.process(traffic_drive().scans[k].scan));
+  Mapper mapper(box_config(), std::make_unique<SlowSegmentation>(2, 1));
+  for (std::size_t k = 0; k < 3; ++k) ASSERT_TRUE(mapper.process(traffic_sequence().scans[k].scan));
   mapper.reset(5);
   // Only now the labels of scan 2 come.
-  const auto mapped = mapper.process(traffic_drive().scans[10].scan);
+  const auto mapped = mapper.process(traffic_sequence().scans[10].scan);
   ASSERT_TRUE(mapped);
-  EXPECT_EQ(mapped->labelling, Labelling::none);
+  EXPECT_EQ(mapped->label_provenance, LabelProvenance::none);
 }
 
 }  // namespace

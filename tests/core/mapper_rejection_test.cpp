@@ -15,21 +15,22 @@ using ::testing::HasSubstr;
 /// A mapper that has mapped some scans, beside one that never sees a bad one.
 class MapperRejection : public ::testing::Test {
  protected:
-  MapperRejection() : drive_(test::street(), 6), mapper_(new_mapper()), untouched_(new_mapper()) {
+  MapperRejection()
+      : sequence_(test::street(), 6), mapper_(new_mapper()), untouched_(new_mapper()) {
     for (std::size_t k = 0; k < 5; ++k) {
-      EXPECT_TRUE(mapper_.process(drive_.scans[k].scan));
-      EXPECT_TRUE(untouched_.process(drive_.scans[k].scan));
+      EXPECT_TRUE(mapper_.process(sequence_.scans[k].scan));
+      EXPECT_TRUE(untouched_.process(sequence_.scans[k].scan));
     }
   }
 
   /// The scan is refused with this counter and reason, and leaves no trace.
   void expect_refused(const Scan& scan, const char* counter, const char* reason) {
-    const auto view = mapper_.map_view();
+    const auto view = mapper_.map_snapshot();
     EXPECT_FALSE(mapper_.process(scan));
     EXPECT_EQ(mapper_.last_rejection().counter, counter);
     EXPECT_THAT(mapper_.last_rejection().reason, HasSubstr(reason));
     EXPECT_EQ(mapper_.trajectory().size(), 5U);
-    EXPECT_EQ(mapper_.map_view()->version, view->version);
+    EXPECT_EQ(mapper_.map_snapshot()->version, view->version);
     expect_goes_on_as_if_nothing_came();
   }
 
@@ -41,19 +42,19 @@ class MapperRejection : public ::testing::Test {
     return scan;
   }
 
-  const test::BoxDrive drive_;
+  const test::BoxSequence sequence_;
   Mapper mapper_;
 
  private:
   static Mapper new_mapper() {
     MapperConfig config;
     config.sensor = test::test_lidar();
-    return {config, std::make_unique<StreamLabels>()};
+    return {config, std::make_unique<PassthroughSegmenter>()};
   }
 
   void expect_goes_on_as_if_nothing_came() {
-    const auto next = mapper_.process(drive_.scans[5].scan);
-    const auto expected = untouched_.process(drive_.scans[5].scan);
+    const auto next = mapper_.process(sequence_.scans[5].scan);
+    const auto expected = untouched_.process(sequence_.scans[5].scan);
     ASSERT_TRUE(next && expected);
     EXPECT_EQ(next->odometry.T_map_lidar.matrix(), expected->odometry.T_map_lidar.matrix());
     EXPECT_EQ(next->labelled.motion, expected->labelled.motion);
@@ -87,7 +88,7 @@ TEST_F(MapperRejection, AllPointsEqual) {
 }
 
 TEST_F(MapperRejection, HandfulOfPoints) {
-  Scan scan = drive_.scans[5].scan;
+  Scan scan = sequence_.scans[5].scan;
   scan.points_lidar.resize(99);
   scan.ring.resize(99);
   scan.labels.resize(99);
@@ -95,11 +96,11 @@ TEST_F(MapperRejection, HandfulOfPoints) {
 }
 
 TEST_F(MapperRejection, RepeatedStamp) {
-  expect_refused(drive_.scans[4].scan, "out_of_order", "400000000");
+  expect_refused(sequence_.scans[4].scan, "out_of_order", "400000000");
 }
 
 TEST_F(MapperRejection, StampOfThePast) {
-  expect_refused(drive_.scans[2].scan, "out_of_order", "200000000");
+  expect_refused(sequence_.scans[2].scan, "out_of_order", "200000000");
 }
 
 }  // namespace

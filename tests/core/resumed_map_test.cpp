@@ -16,7 +16,7 @@ namespace {
 Mapper geometric_mapper() {
   MapperConfig config;
   config.sensor = hdl_64e();
-  return {config, std::make_unique<NoLabels>()};
+  return {config, std::make_unique<NullSegmenter>()};
 }
 
 Scan scan_of(const ScanDataset& recording, std::size_t k) {
@@ -27,7 +27,7 @@ Scan scan_of(const ScanDataset& recording, std::size_t k) {
 
 /// A real street (KITTI raw, drive 0005): every second scan makes the map, the ones between have to
 /// find their place in it, without any class to help.
-TEST(StoredMapDrive, ScansThatAreNotInItFindTheirPlace) {
+TEST(ResumedMap, ScansThatAreNotInItFindTheirPlace) {
   const char* folder = std::getenv("STILLMAP_TEST_DRIVE");
   if (folder == nullptr) GTEST_SKIP() << "STILLMAP_TEST_DRIVE does not name KITTI's drive 0005";
   const ScanDataset recording{std::filesystem::path(folder)};
@@ -44,7 +44,7 @@ TEST(StoredMapDrive, ScansThatAreNotInItFindTheirPlace) {
     for (const auto& guess : {test::level_pose(0.5, 0.3, 0.05), test::level_pose(3.0, -2.0, 0.4),
                               test::level_pose(-5.0, 2.0, -2.0)}) {
       Mapper mapper = geometric_mapper();
-      mapper.restore(*maker.map_view());
+      mapper.resume(*maker.map_snapshot());
       const auto began = std::chrono::steady_clock::now();
       const auto mapped = mapper.process(scan_of(recording, k), T_map_lidar[k] * guess);
       const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;

@@ -11,26 +11,26 @@ using testing::HasSubstr;
 
 std::string refusal(const std::string& part, const std::string& function) {
   try {
-    static_cast<void>(part_address(part, function, "Files are read"));
-  } catch (const MissingPart& error) {
+    static_cast<void>(plugin_symbol(part, function, "Files are read"));
+  } catch (const MissingPlugin& error) {
     return error.what();
   }
   return {};
 }
 
-TEST(OptionalPart, IsFoundBesideTheProgramAndStaysTheSame) {
-  void* const address = part_address("pcd", "stillmap_read_pcd", "PCD files are read");
+TEST(Plugin, IsFoundBesideTheProgramAndStaysTheSame) {
+  void* const address = plugin_symbol("pcd", "stillmap_read_pcd", "PCD files are read");
   EXPECT_NE(address, nullptr);
-  EXPECT_EQ(part_address("pcd", "stillmap_read_pcd", "PCD files are read"), address);
+  EXPECT_EQ(plugin_symbol("pcd", "stillmap_read_pcd", "PCD files are read"), address);
 }
 
-TEST(OptionalPart, ThatIsNotInstalledNamesItsPackage) {
+TEST(Plugin, ThatIsNotInstalledNamesItsPackage) {
   EXPECT_THAT(refusal("no_such_part", "f"),
               AllOf(HasSubstr("Files are read by stillmap_no_such_part.so"),
                     HasSubstr("stillmap-formats")));
 }
 
-TEST(OptionalPart, WithoutTheFunctionIsRefused) {
+TEST(Plugin, WithoutTheFunctionIsRefused) {
   EXPECT_THAT(refusal("pcd", "no_such_function"), HasSubstr("no_such_function"));
 }
 

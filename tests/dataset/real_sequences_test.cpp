@@ -16,7 +16,7 @@
 namespace stillmap {
 namespace {
 
-class Recordings : public testing::Test {
+class RealSequences : public testing::Test {
  protected:
   void SetUp() override {
     const char* folder = std::getenv("STILLMAP_TEST_DATA");
@@ -50,7 +50,7 @@ std::vector<double> median_elevations(const Scan& scan, const std::vector<std::u
   return medians;
 }
 
-TEST_F(Recordings, KittiScansHave64RingsEachBelowTheOther) {
+TEST_F(RealSequences, KittiScansHave64RingsEachBelowTheOther) {
   const auto folder = recording("kitti_odom_00");
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is absent";
   const ScanDataset dataset(folder);
@@ -68,7 +68,7 @@ TEST_F(Recordings, KittiScansHave64RingsEachBelowTheOther) {
   }
 }
 
-TEST_F(Recordings, KittiTruthAndLabelsAreRead) {
+TEST_F(RealSequences, KittiTruthAndLabelsAreRead) {
   const auto folder = recording("kitti_odom_00");
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is absent";
   const ScanDataset dataset(folder);
@@ -89,7 +89,7 @@ TEST_F(Recordings, KittiTruthAndLabelsAreRead) {
   EXPECT_LT(road, std::ssize(frame.scan.labels) / 2);
 }
 
-TEST_F(Recordings, Vlp16ScansHaveTheirRingsAndTimes) {
+TEST_F(RealSequences, Vlp16ScansHaveTheirRingsAndTimes) {
   const auto folder = recording("vlp16");
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is absent";
   const ScanDataset dataset(folder);
@@ -108,7 +108,7 @@ TEST_F(Recordings, Vlp16ScansHaveTheirRingsAndTimes) {
   EXPECT_GT(*std::ranges::max_element(scan.intensity), 0.2F);
 }
 
-TEST_F(Recordings, Vlp16PointsKeepTheirRowInTheRangeImage) {
+TEST_F(RealSequences, Vlp16PointsKeepTheirRowInTheRangeImage) {
   const auto folder = recording("vlp16");
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is absent";
   const Scan scan = ScanDataset(folder).read(0).scan;

@@ -33,8 +33,8 @@ auto field(const std::string& name, const std::string& part) {
 /// A real server, and something wrong with what is round it.
 class BrokenSetup : public testing::Test {
  protected:
-  [[nodiscard]] DdsOptions dds(int domain) const {
-    DdsOptions options;
+  [[nodiscard]] dds::DdsOptions dds(int domain) const {
+    dds::DdsOptions options;
     options.domain_id = static_cast<std::uint32_t>(domain);
     options.interfaces = {"127.0.0.1"};
     options.node_name = "lidar_driver";
@@ -104,16 +104,16 @@ TEST_F(BrokenSetup, WithoutAPublisher) {
 
 TEST_F(BrokenSetup, WithAPublisherOnAnotherTopic) {
   start_server();
-  Participant participant(dds(domain_));
-  const Writer<PointCloud2> writer(participant, "rt/velodyne_points", {});
+  dds::Participant participant(dds(domain_));
+  const dds::Writer<PointCloud2> writer(participant, "rt/velodyne_points", {});
   EXPECT_THAT(problems(), Contains(AllOf(field("evidence", "velodyne_points"),
                                          field("way_out", "did you mean"))));
 }
 
 TEST_F(BrokenSetup, WithABestEffortPublisherForAReliableServer) {
   start_server("--delivery every");
-  Participant participant(dds(domain_));
-  const Writer<PointCloud2> writer(participant, "rt/points", {.reliable = false});
+  dds::Participant participant(dds(domain_));
+  const dds::Writer<PointCloud2> writer(participant, "rt/points", {.reliable = false});
   EXPECT_THAT(
       problems(),
       Contains(AllOf(field("what", "what lidar_driver writes does not reach stillmap_server"),
@@ -126,8 +126,8 @@ TEST_F(BrokenSetup, WithABestEffortPublisherForAReliableServer) {
 
 TEST_F(BrokenSetup, WithAPublisherOfAnotherType) {
   start_server();
-  Participant participant(dds(domain_));
-  const Writer<nav_msgs::msg::Odometry> writer(participant, "rt/points", {});
+  dds::Participant participant(dds(domain_));
+  const dds::Writer<nav_msgs::msg::Odometry> writer(participant, "rt/points", {});
   EXPECT_THAT(problems(), Contains(field("evidence",
                                          "type: the writer has nav_msgs::msg::dds_::"
                                          "Odometry_")));

@@ -5,7 +5,7 @@
 
 #include "tests/doctor/make_endpoint.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 using namespace std::chrono_literals;
@@ -14,22 +14,24 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-Endpoint end(bool is_writer) {
-  return test::end("rt/points", "sensor_msgs::msg::dds_::PointCloud2_", is_writer);
+dds::Endpoint end(bool is_writer) {
+  return test::make_endpoint("rt/points", "sensor_msgs::msg::dds_::PointCloud2_", is_writer);
 }
 
 /// A writer and a reader that fit, to be spoiled.
 class EndpointMatch : public testing::Test {
  protected:
-  [[nodiscard]] std::vector<std::string> found() const { return obstacles(writer_, reader_); }
-  Endpoint writer_ = end(true);
-  Endpoint reader_ = end(false);
+  [[nodiscard]] std::vector<std::string> found() const {
+    return dds::incompatible_policies(writer_, reader_);
+  }
+  dds::Endpoint writer_ = end(true);
+  dds::Endpoint reader_ = end(false);
 };
 
 TEST_F(EndpointMatch, FindsNothingWhereNothingIs) {
   EXPECT_THAT(found(), IsEmpty());
   reader_.qos.reliable = false;
-  writer_.qos.durability = Durability::persistent;
+  writer_.qos.durability = dds::Durability::persistent;
   writer_.qos.deadline = 100ms;
   writer_.qos.liveliness_kind = 2;
   EXPECT_THAT(found(), IsEmpty());
@@ -39,7 +41,7 @@ TEST_F(EndpointMatch, NamesThePolicy) {
   writer_.qos.reliable = false;
   EXPECT_THAT(found(), ElementsAre("reliability: the writer offers best effort, the reader wants "
                                    "reliable"));
-  reader_.qos.durability = Durability::transient_local;
+  reader_.qos.durability = dds::Durability::transient_local;
   EXPECT_THAT(found(), SizeIs(2));
   EXPECT_THAT(found().back(), HasSubstr("durability: the writer offers volatile"));
 }
@@ -76,18 +78,18 @@ TEST_F(EndpointMatch, ComparesOwnership) {
 
 TEST_F(EndpointMatch, LooksAtEveryPairOfDifferentPeersOnce) {
   writer_.qos.reliable = false;
-  Peer lidar, server, other;
+  dds::RemoteParticipant lidar, server, other;
   lidar.name = "lidar";
   lidar.endpoints = {writer_, reader_};
   server.name = "server";
   server.endpoints = {reader_};
   other.endpoints = {end(true), writer_};
   other.endpoints.back().topic = "rt/elsewhere";
-  const auto pairs = mismatches({lidar, server, other});
+  const auto pairs = dds::mismatches({lidar, server, other});
   ASSERT_THAT(pairs, SizeIs(1));
-  EXPECT_EQ(pairs[0].writer_peer.name, "lidar");
-  EXPECT_EQ(pairs[0].reader_peer.name, "server");
+  EXPECT_EQ(pairs[0].writer_participant.name, "lidar");
+  EXPECT_EQ(pairs[0].reader_participant.name, "server");
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::cli

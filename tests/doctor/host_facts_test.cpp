@@ -9,7 +9,7 @@
 #include "clients/doctor/domain_scan.hpp"
 #include "tests/scratch_folder.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 namespace fs = std::filesystem;
@@ -46,7 +46,7 @@ class HostFactsTest : public testing::Test {
 
 TEST_F(HostFactsTest, AreReadFromTheMachinesFiles) {
   const HostFacts host = facts();
-  EXPECT_EQ(host.largest_receive_buffer, 212992U);
+  EXPECT_EQ(host.max_receive_buffer_bytes, 212992U);
   EXPECT_EQ(host.shared_memory_fault, "");
   ASSERT_EQ(host.interfaces.size(), 3U);
   EXPECT_EQ(host.interfaces[0].name, "eth0");
@@ -59,7 +59,7 @@ TEST_F(HostFactsTest, AreReadFromTheMachinesFiles) {
 TEST_F(HostFactsTest, OfAnEmptyFolderAreNothing) {
   const ScratchFolder empty;
   const HostFacts host = read_host_facts(empty.path());
-  EXPECT_FALSE(host.largest_receive_buffer);
+  EXPECT_FALSE(host.max_receive_buffer_bytes);
   EXPECT_THAT(host.shared_memory_fault, HasSubstr("does not exist"));
   EXPECT_THAT(host.segments, IsEmpty());
   EXPECT_FALSE(host.has_multicast_route);
@@ -96,4 +96,4 @@ TEST(DomainPortsTest, AreThoseOfDiscoveryOnly) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::cli

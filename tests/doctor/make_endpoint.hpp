@@ -7,8 +7,9 @@
 namespace stillmap::test {
 
 /// A reader or writer with ordinary quality of service.
-inline Endpoint end(const std::string& topic, const std::string& type, bool is_writer) {
-  Endpoint endpoint;
+inline dds::Endpoint make_endpoint(const std::string& topic, const std::string& type,
+                                   bool is_writer) {
+  dds::Endpoint endpoint;
   endpoint.guid = is_writer ? "writer" : "reader";
   endpoint.topic = topic;
   endpoint.type = type;

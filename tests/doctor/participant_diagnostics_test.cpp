@@ -5,7 +5,7 @@
 
 #include "tests/doctor/make_endpoint.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 using ::testing::AllOf;
@@ -15,62 +15,64 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::SizeIs;
 
-Peer peer(const std::string& name) {
-  Peer made;
+dds::RemoteParticipant participant(const std::string& name) {
+  dds::RemoteParticipant made;
   made.guid = made.name = name;
   made.is_on_this_host = made.uses_shared_memory = true;
-  made.endpoints = {test::end("rt/tf", "tf2_msgs::msg::dds_::TFMessage_", true)};
+  made.endpoints = {test::make_endpoint("rt/tf", "tf2_msgs::msg::dds_::TFMessage_", true)};
   return made;
 }
 
-auto says(const std::string& what) { return Field(&Finding::what, HasSubstr(what)); }
+auto says(const std::string& what) { return Field(&dds::Diagnostic::what, HasSubstr(what)); }
 
-TEST(PeerFindingsTest, AreNoneWhereAllIsWell) {
-  EXPECT_THAT(security_findings(peer("self"), {peer("lidar")}), IsEmpty());
-  EXPECT_THAT(silent_peer_findings(peer("self"), {peer("lidar")}), IsEmpty());
+TEST(ParticipantDiagnosticsTest, AreNoneWhereAllIsWell) {
+  EXPECT_THAT(dds::security_diagnostics(participant("self"), {participant("lidar")}), IsEmpty());
+  EXPECT_THAT(dds::silent_participant_diagnostics(participant("self"), {participant("lidar")}),
+              IsEmpty());
 }
 
-TEST(PeerFindingsTest, TellWhichSideLacksSecurity) {
-  Peer secured = peer("server");
+TEST(ParticipantDiagnosticsTest, TellWhichSideLacksSecurity) {
+  dds::RemoteParticipant secured = participant("server");
   secured.is_secured = true;
-  EXPECT_THAT(security_findings(peer("self"), {secured}),
+  EXPECT_THAT(dds::security_diagnostics(participant("self"), {secured}),
               ElementsAre(AllOf(says("server is secured and self is not"),
-                                Field(&Finding::way_out, HasSubstr("--security")))));
-  EXPECT_THAT(security_findings(secured, {peer("lidar")}),
+                                Field(&dds::Diagnostic::hint, HasSubstr("--security")))));
+  EXPECT_THAT(dds::security_diagnostics(secured, {participant("lidar")}),
               ElementsAre(says("lidar is not secured and is ignored")));
-  Peer refused = secured;
+  dds::RemoteParticipant refused = secured;
   refused.refused = true;
-  EXPECT_THAT(security_findings(secured, {refused}), ElementsAre(says("refuse each other")));
-  EXPECT_THAT(security_findings(secured, {secured}), IsEmpty());
+  EXPECT_THAT(dds::security_diagnostics(secured, {refused}),
+              ElementsAre(says("refuse each other")));
+  EXPECT_THAT(dds::security_diagnostics(secured, {secured}), IsEmpty());
 }
 
-TEST(PeerFindingsTest, BlameSharedMemoryForASilentPeerOnThisHost) {
-  Peer silent = peer("server");
+TEST(ParticipantDiagnosticsTest, BlameSharedMemoryForASilentPeerOnThisHost) {
+  dds::RemoteParticipant silent = participant("server");
   silent.endpoints.clear();
-  EXPECT_THAT(silent_peer_findings(peer("self"), {silent}),
-              ElementsAre(Field(&Finding::way_out, HasSubstr("--udp-only"))));
+  EXPECT_THAT(dds::silent_participant_diagnostics(participant("self"), {silent}),
+              ElementsAre(Field(&dds::Diagnostic::hint, HasSubstr("--udp-only"))));
   silent.is_on_this_host = false;
-  EXPECT_THAT(silent_peer_findings(peer("self"), {silent}),
-              ElementsAre(Field(&Finding::way_out, HasSubstr("firewalls"))));
+  EXPECT_THAT(dds::silent_participant_diagnostics(participant("self"), {silent}),
+              ElementsAre(Field(&dds::Diagnostic::hint, HasSubstr("firewalls"))));
   silent.is_secured = true;
-  EXPECT_THAT(silent_peer_findings(peer("self"), {silent}), IsEmpty());
+  EXPECT_THAT(dds::silent_participant_diagnostics(participant("self"), {silent}), IsEmpty());
 }
 
-TEST(PeerFindingsTest, SayEachMismatchOnceWithItsRemedy) {
-  const Mismatch mismatch{.topic = "rt/points",
-                          .writer = {},
-                          .reader = {},
-                          .writer_peer = peer("lidar"),
-                          .reader_peer = peer("server"),
-                          .obstacles = {"reliability: x", "durability: y"}};
-  const auto findings = mismatch_findings({mismatch, mismatch});
-  ASSERT_THAT(findings, SizeIs(1));
-  EXPECT_EQ(findings[0].what, "rt/points: what lidar writes does not reach server");
-  EXPECT_THAT(findings[0].way_out, AllOf(HasSubstr("best effort"), HasSubstr("transient local")));
-  Mismatch harmless = mismatch;
+TEST(ParticipantDiagnosticsTest, SayEachMismatchOnceWithItsRemedy) {
+  const dds::Mismatch mismatch{.topic = "rt/points",
+                               .writer = {},
+                               .reader = {},
+                               .writer_participant = participant("lidar"),
+                               .reader_participant = participant("server"),
+                               .incompatible_policies = {"reliability: x", "durability: y"}};
+  const auto diagnostics = dds::mismatch_diagnostics({mismatch, mismatch});
+  ASSERT_THAT(diagnostics, SizeIs(1));
+  EXPECT_EQ(diagnostics[0].what, "rt/points: what lidar writes does not reach server");
+  EXPECT_THAT(diagnostics[0].hint, AllOf(HasSubstr("best effort"), HasSubstr("transient local")));
+  dds::Mismatch harmless = mismatch;
   harmless.topic = "ros_discovery_info";
-  EXPECT_EQ(finding_of(harmless).severity, Severity::advice);
+  EXPECT_EQ(dds::to_diagnostic(harmless).severity, dds::Severity::advice);
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,7 +6,7 @@
 
 #include "tests/evaluation/simple_paths.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 using test::moved;
@@ -21,38 +21,39 @@ Eigen::Isometry3d some_world() {
   return T;
 }
 
-TEST(AbsoluteError, IsZeroForTheTruthItself) {
+TEST(AbsoluteTrajectoryError, IsZeroForTheTruthItself) {
   const PosePairs pairs{winding(50), winding(50)};
   for (const Alignment alignment : {Alignment::none, Alignment::first_pose, Alignment::rigid}) {
-    EXPECT_NEAR(absolute_error(pairs, alignment).rmse_m, 0.0, 1e-12);
+    EXPECT_NEAR(absolute_trajectory_error(pairs, alignment).rmse_m, 0.0, 1e-12);
   }
 }
 
-TEST(AbsoluteError, AlignmentTakesAwayAnotherWorldFrame) {
+TEST(AbsoluteTrajectoryError, AlignmentTakesAwayAnotherWorldFrame) {
   const PosePairs pairs{winding(50), moved(some_world(), winding(50))};
-  EXPECT_GT(absolute_error(pairs, Alignment::none).rmse_m, 3.0);
+  EXPECT_GT(absolute_trajectory_error(pairs, Alignment::none).rmse_m, 3.0);
   for (const Alignment alignment : {Alignment::first_pose, Alignment::rigid}) {
-    const AbsoluteError error = absolute_error(pairs, alignment);
+    const AbsoluteTrajectoryError error = absolute_trajectory_error(pairs, alignment);
     EXPECT_NEAR(error.rmse_m, 0.0, 1e-9);
     EXPECT_TRUE(error.T_truth_estimate.isApprox(some_world().inverse(), 1e-9));
   }
 }
 
-TEST(AbsoluteError, HasTheFiguresOfAKnownDeviation) {
+TEST(AbsoluteTrajectoryError, HasTheFiguresOfAKnownDeviation) {
   PosePairs pairs{straight(4, 1.0), straight(4, 1.0)};
   pairs.estimate[1].translation().y() = 3.0;
   pairs.estimate[3].translation().z() = -4.0;
-  const AbsoluteError error = absolute_error(pairs, Alignment::none);
+  const AbsoluteTrajectoryError error = absolute_trajectory_error(pairs, Alignment::none);
   EXPECT_DOUBLE_EQ(error.rmse_m, 2.5);
   EXPECT_DOUBLE_EQ(error.mean_m, 1.75);
   EXPECT_DOUBLE_EQ(error.max_m, 4.0);
   EXPECT_DOUBLE_EQ(error.final_m, 4.0);
 }
 
-TEST(AbsoluteError, FirstPoseAlignmentLetsAWrongFirstHeadingCount) {
+TEST(AbsoluteTrajectoryError, FirstPoseAlignmentLetsAWrongFirstHeadingCount) {
   PosePairs pairs{straight(11, 1.0), straight(11, 1.0)};
   pairs.estimate[0] = pose(0, 0, 0, 0.1);
-  EXPECT_NEAR(absolute_error(pairs, Alignment::first_pose).final_m, 20.0 * std::sin(0.05), 1e-9);
+  EXPECT_NEAR(absolute_trajectory_error(pairs, Alignment::first_pose).final_m,
+              20.0 * std::sin(0.05), 1e-9);
 }
 
 TEST(RigidAlignment, IsBestAmongAlignmentsNearby) {
@@ -62,7 +63,7 @@ TEST(RigidAlignment, IsBestAmongAlignmentsNearby) {
     pairs.estimate[i].translation() +=
         Eigen::Vector3d(std::sin(t), std::cos(2.0 * t), 0.3 * t / 60);
   }
-  const double best = absolute_error(pairs, Alignment::rigid).rmse_m;
+  const double best = absolute_trajectory_error(pairs, Alignment::rigid).rmse_m;
   for (int axis = 0; axis < 6; ++axis) {
     for (const double by : {-1e-3, 1e-3}) {
       Eigen::Isometry3d nudge = Eigen::Isometry3d::Identity();
@@ -70,7 +71,8 @@ TEST(RigidAlignment, IsBestAmongAlignmentsNearby) {
       if (axis >= 3) nudge.rotate(Eigen::AngleAxisd(by, Eigen::Vector3d::Unit(axis - 3)));
       const Eigen::Isometry3d T = nudge * find_alignment(pairs, Alignment::rigid);
       const PosePairs nudged{pairs.truth, moved(T, pairs.estimate)};
-      EXPECT_GT(absolute_error(nudged, Alignment::none).rmse_m, best) << axis << " " << by;
+      EXPECT_GT(absolute_trajectory_error(nudged, Alignment::none).rmse_m, best)
+          << axis << " " << by;
     }
   }
 }
@@ -82,16 +84,16 @@ TEST(RigidAlignment, NeverMirrors) {
     pairs.truth[i].translation().y() = std::sin(static_cast<double>(i));
   }
   pairs.estimate = moved(some_world(), pairs.truth);
-  const AbsoluteError error = absolute_error(pairs, Alignment::rigid);
+  const AbsoluteTrajectoryError error = absolute_trajectory_error(pairs, Alignment::rigid);
   EXPECT_NEAR(error.T_truth_estimate.linear().determinant(), 1.0, 1e-9);
   EXPECT_NEAR(error.rmse_m, 0.0, 1e-9);
 }
 
 TEST(RigidAlignment, CopesWithALineAndWithOnePose) {
   const PosePairs line{straight(5, 1.0), moved(some_world(), straight(5, 1.0))};
-  EXPECT_NEAR(absolute_error(line, Alignment::rigid).rmse_m, 0.0, 1e-9);
+  EXPECT_NEAR(absolute_trajectory_error(line, Alignment::rigid).rmse_m, 0.0, 1e-9);
   const PosePairs one{straight(1, 1.0), moved(some_world(), straight(1, 1.0))};
-  EXPECT_NEAR(absolute_error(one, Alignment::rigid).rmse_m, 0.0, 1e-9);
+  EXPECT_NEAR(absolute_trajectory_error(one, Alignment::rigid).rmse_m, 0.0, 1e-9);
 }
 
 TEST(AlignmentFromName, KnowsItsThreeNames) {
@@ -102,4 +104,4 @@ TEST(AlignmentFromName, KnowsItsThreeNames) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -9,7 +9,7 @@
 
 #include "core/evaluation/class_groups.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 using enum SemanticClass;
@@ -78,4 +78,4 @@ TEST(ConfusionMatrix, RefusesDifferentLengths) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -7,7 +7,7 @@
 #include "core/evaluation/relative_pose_error.hpp"
 #include "tests/evaluation/simple_paths.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 test::Path read_poses(const std::filesystem::path& file) {
@@ -36,4 +36,4 @@ TEST(KittiOdometryError, AgreesWithTheDevelopmentKitOnARealEstimate) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

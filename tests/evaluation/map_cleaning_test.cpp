@@ -7,7 +7,7 @@
 #include <random>
 #include <stdexcept>
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 using Points = std::vector<Eigen::Vector3f>;
@@ -97,4 +97,4 @@ TEST(MapCleaningScore, AgreesWithASearchThroughAllPoints) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 using enum Motion;
@@ -45,4 +45,4 @@ TEST(MovingScore, RefusesDifferentLengths) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

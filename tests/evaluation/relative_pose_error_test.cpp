@@ -6,7 +6,7 @@
 
 #include "tests/evaluation/simple_paths.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 using test::moved;
@@ -16,44 +16,44 @@ using test::straight;
 using test::winding;
 
 // A path that repeats one motion.
-Path repeated(const Eigen::Isometry3d& step, std::size_t count) {
-  Path path{Eigen::Isometry3d::Identity()};
+simulation::Path repeated(const Eigen::Isometry3d& step, std::size_t count) {
+  simulation::Path path{Eigen::Isometry3d::Identity()};
   while (path.size() < count) path.push_back(path.back() * step);
   return path;
 }
 
-TEST(RelativeError, IsTheErrorOfEachStep) {
+TEST(RelativePoseError, IsTheErrorOfEachStep) {
   const PosePairs pairs{repeated(pose(1.0, 0, 0), 11), repeated(pose(1.02, 0, 0), 11)};
-  const RelativeError error = relative_error(pairs).value();
+  const RelativePoseError error = relative_pose_error(pairs).value();
   EXPECT_NEAR(error.mean_translation_m, 0.02, 1e-12);
   EXPECT_NEAR(error.rmse_translation_m, 0.02, 1e-12);
   EXPECT_NEAR(error.max_translation_m, 0.02, 1e-12);
   EXPECT_NEAR(error.mean_rotation_rad, 0.0, 1e-12);
 }
 
-TEST(RelativeError, SeesARotationPerStep) {
+TEST(RelativePoseError, SeesARotationPerStep) {
   const PosePairs pairs{repeated(pose(1.0, 0, 0), 11), repeated(pose(1.0, 0, 0, 0.01), 11)};
-  const RelativeError error = relative_error(pairs).value();
+  const RelativePoseError error = relative_pose_error(pairs).value();
   EXPECT_NEAR(error.mean_rotation_rad, 0.01, 1e-12);
   EXPECT_NEAR(error.max_rotation_rad, 0.01, 1e-12);
 }
 
-TEST(RelativeError, CountsOneJumpOnce) {
+TEST(RelativePoseError, CountsOneJumpOnce) {
   PosePairs pairs{straight(5, 1.0), straight(5, 1.0)};
   for (std::size_t i = 2; i < 5; ++i) pairs.estimate[i].translation().y() += 0.4;
-  const RelativeError error = relative_error(pairs).value();
+  const RelativePoseError error = relative_pose_error(pairs).value();
   EXPECT_NEAR(error.mean_translation_m, 0.1, 1e-12);
   EXPECT_NEAR(error.rmse_translation_m, 0.2, 1e-12);
   EXPECT_NEAR(error.max_translation_m, 0.4, 1e-12);
 }
 
-TEST(RelativeError, DoesNotDependOnTheWorldFrames) {
+TEST(RelativePoseError, DoesNotDependOnTheWorldFrames) {
   const PosePairs pairs{winding(30), moved(pose(7, 8, 9, 1.0), winding(30))};
-  EXPECT_NEAR(relative_error(pairs)->max_translation_m, 0.0, 1e-9);
+  EXPECT_NEAR(relative_pose_error(pairs)->max_translation_m, 0.0, 1e-9);
 }
 
-TEST(RelativeError, IsNothingForOnePose) {
-  EXPECT_FALSE(relative_error({straight(1, 1.0), straight(1, 1.0)}).has_value());
+TEST(RelativePoseError, IsNothingForOnePose) {
+  EXPECT_FALSE(relative_pose_error({straight(1, 1.0), straight(1, 1.0)}).has_value());
 }
 
 TEST(KittiOdometryError, IsTheScaleErrorOfAScaledStraight) {
@@ -87,4 +87,4 @@ TEST(KittiOdometryError, IsNothingForAShortPath) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

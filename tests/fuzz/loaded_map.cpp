@@ -19,7 +19,7 @@ RobotProfile small_robot() {
 }
 
 /// A point in every tile, and one at the origin.
-LabelledScan touching_scan(const MapView& view) {
+LabelledScan touching_scan(const MapSnapshot& view) {
   LabelledScan scan;
   const auto add = [&](const Eigen::Vector3f& p_map) {
     scan.scan.points_lidar.push_back(p_map);
@@ -34,9 +34,9 @@ LabelledScan touching_scan(const MapView& view) {
   return scan;
 }
 
-void go_on_with(const StoredMap& stored) {
+void resume(const SavedMap& stored) {
   StaticMap map(street_config());
-  map.restore(stored.view, stored.memories);
+  map.resume(stored.view, stored.tile_evidence);
   const Eigen::Isometry3d origin = Eigen::Isometry3d::Identity();
   map.insert(touching_scan(stored.view), origin);
   const Eigen::AlignedBox3d box_map(Eigen::Vector3d(-5, -5, -5), Eigen::Vector3d(5, 5, 5));
@@ -55,17 +55,17 @@ void go_on_with(const StoredMap& stored) {
 
 }  // namespace
 
-void load_as_a_server_does(const std::filesystem::path& file) {
-  StoredMap stored;
+void load_and_resume_map(const std::filesystem::path& file) {
+  SavedMap stored;
   try {
     const auto store = open_map_file(file);
     stored = store->load();
-    static_cast<void>(store->load_shelved());
+    static_cast<void>(store->load_non_resident());
   } catch (const MapFileError&) {
     return;
   }
   try {
-    go_on_with(stored);
+    resume(stored);
   } catch (const std::invalid_argument&) {
   }
 }

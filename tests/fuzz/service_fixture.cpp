@@ -27,48 +27,48 @@ RobotProfile robot() {
 
 }  // namespace
 
-ServedWorld::ServedWorld()
+ServiceFixture::ServiceFixture()
     : map_(street_config()),
-      saver_(board_, fresh_map_file(), {{"software", "0"}}),
+      saver_(latest_map_, fresh_map_file(), {{"software", "0"}}),
       removed_{
           .removed = [this](const auto& box_map) { return map_.removed(box_map); },
           .restore = [this](RemovalReason reason,
                             const auto& box_map) { return map_.restore_removed(reason, box_map); }},
-      context_{.board = board_,
+      context_{.latest_map = latest_map_,
                .tiles = tiles_,
                .saver = saver_,
-               .status = [] { return ServerStatus{}; },
+               .status = [] { return dds::ServerStatus{}; },
                .reset =
                    [this] {
                      map_.reset(78);
-                     board_.begin(map_.view(), {});
+                     latest_map_.begin(map_.view(), {});
                      return std::uint64_t{78};
                    },
                .load =
-                   [this](const StoredMap& map, const auto&) {
-                     map_.restore(map.view, map.memories);
-                     board_.begin(map_.view(), map.trajectory);
+                   [this](const SavedMap& map, const auto&) {
+                     map_.resume(map.view, map.tile_evidence);
+                     latest_map_.begin(map_.view(), map.trajectory);
                    },
-               .show_now = [this] { board_.show(map_.view()); },
-               .areas = atlas_,
-               .planning_grid = grid_,
+               .publish_now = [this] { latest_map_.publish(map_.view()); },
+               .traversability = traversability_cache_,
+               .grid_provider = grid_provider_,
                .log = log_} {
-  begin_again();
+  reset();
 }
 
-void ServedWorld::begin_again() {
-  const StoredMap street = small_street();
-  map_.restore(street.view, street.memories);
-  board_.begin(map_.view(), street.trajectory);
+void ServiceFixture::reset() {
+  const SavedMap street = small_street();
+  map_.resume(street.view, street.tile_evidence);
+  latest_map_.begin(map_.view(), street.trajectory);
   octree_ = OccupancyMap(OccupancyConfig{});
-  octree_.insert(*board_.view());
-  show_areas();
+  octree_.insert(*latest_map_.view());
+  publish_traversability();
 }
 
-void ServedWorld::show_areas() {
+void ServiceFixture::publish_traversability() {
   TraversabilityMap areas({robot()});
-  static_cast<void>(areas.update(*board_.view()));
-  areas_.show({areas.view("car")});
+  static_cast<void>(areas.update(*latest_map_.view()));
+  snapshot_.publish({areas.view("car")});
 }
 
 }  // namespace stillmap::fuzz

@@ -9,35 +9,36 @@ namespace stillmap::fuzz {
 
 /// What a server's services answer from, without a server: a small map, its areas, a map file in
 /// memory.
-class ServedWorld {
+class ServiceFixture {
  public:
-  ServedWorld();
-  ServedWorld(const ServedWorld&) = delete;
-  ServedWorld& operator=(const ServedWorld&) = delete;
+  ServiceFixture();
+  ServiceFixture(const ServiceFixture&) = delete;
+  ServiceFixture& operator=(const ServiceFixture&) = delete;
 
-  [[nodiscard]] const ServiceContext& context() const { return context_; }
-  [[nodiscard]] const RemovedSource& removed() const { return removed_; }
-  [[nodiscard]] GetStaticMap& static_map() { return static_map_; }
+  [[nodiscard]] const server::ServiceContext& context() const { return context_; }
+  [[nodiscard]] const server::RemovedSource& removed() const { return removed_; }
+  [[nodiscard]] server::GetStaticMap& static_map() { return static_map_; }
   [[nodiscard]] const OccupancyMap& octree() const { return octree_; }
   /// As it was at first, whatever requests did to it.
-  void begin_again();
+  void reset();
 
  private:
-  void show_areas();
+  void publish_traversability();
 
   StaticMap map_;
-  MapBoard board_;
+  server::LatestMap latest_map_;
   TileReader tiles_;
-  MapSaver saver_;
-  AreaBoard areas_;
-  AreaAtlas atlas_{areas_, board_, tiles_};
-  AreasConfig areas_config_;
-  PlanningGrid grid_{areas_config_, "map", board_, areas_};
+  server::MapSaver saver_;
+  server::TraversabilitySnapshot snapshot_;
+  server::TraversabilityCache traversability_cache_{snapshot_, latest_map_, tiles_};
+  TraversabilityConfig traversability_config_;
+  server::TraversabilityGridProvider grid_provider_{traversability_config_, "map", latest_map_,
+                                                    snapshot_};
   OccupancyMap octree_{OccupancyConfig{}};
-  RemovedSource removed_;
-  ServiceLog log_;
-  ServiceContext context_;
-  GetStaticMap static_map_{context_};
+  server::RemovedSource removed_;
+  server::ServiceLog log_;
+  server::ServiceContext context_;
+  server::GetStaticMap static_map_{context_};
 };
 
 }  // namespace stillmap::fuzz

@@ -40,13 +40,13 @@ StaticMapConfig street_config() {
   return config;
 }
 
-StoredMap small_street() {
+SavedMap small_street() {
   StaticMap map(street_config());
   map.reset(77);
   const Eigen::Isometry3d T_map_lidar(Eigen::Translation3d(0.0, 0.0, lidar_height_m));
   for (int i = 0; i < 3; ++i) map.insert(street_scan(), T_map_lidar);
   static_cast<void>(map.view());
-  StoredMap stored = stored_state(map.checkpoint(true));
+  SavedMap stored = to_saved_map(map.checkpoint(true));
   for (int i = 0; i < 3; ++i) {
     stored.trajectory.push_back({1'700'000'000'000'000'000 + i * 100'000'000LL, T_map_lidar});
   }

@@ -5,9 +5,9 @@
 namespace stillmap::fuzz {
 
 /// A map of four small tiles with ground, a wall, a pole and something that was taken out; with the
-/// memories of its tiles, a few poses and metadata. Small, for it is mutated and loaded again and
+/// evidence of its tiles, a few poses and metadata. Small, for it is mutated and loaded again and
 /// again.
-[[nodiscard]] StoredMap small_street();
+[[nodiscard]] SavedMap small_street();
 
 /// The sizes of its tiles and voxels.
 [[nodiscard]] StaticMapConfig street_config();

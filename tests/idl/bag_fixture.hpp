@@ -13,7 +13,7 @@
 #include "idl/conversions/scan_to_cloud.hpp"
 #include "sensor_msgs.h"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 using Bytes = std::vector<std::uint8_t>;
 
@@ -64,4 +64,4 @@ inline void write_bag(const std::filesystem::path& folder, const std::vector<Byt
   writer.finish();
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

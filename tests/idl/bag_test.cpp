@@ -14,7 +14,7 @@
 #include "tests/idl/bag_fixture.hpp"
 #include "tests/scratch_folder.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 namespace fs = std::filesystem;
@@ -22,7 +22,7 @@ using testing::AllOf;
 using testing::HasSubstr;
 
 std::string fault_of(const fs::path& path, const std::string& topic = {}) {
-  return message_of<DatasetError>([&] { (void)open_recording(path, topic); });
+  return message_of<DatasetError>([&] { (void)open_sequence(path, topic); });
 }
 
 void expect_scan(const Scan& scan, const Scan& expected) {
@@ -40,7 +40,7 @@ TEST(Bag, WhatIsWrittenComesBackInEitherByteOrder) {
   const ScratchFolder folder;
   write_bag(folder / "bag", {bag_message(0), bag_message(1, false), bag_message(2)});
   for (const fs::path& path : {folder / "bag", folder / "bag" / "bag_0.db3"}) {
-    const ScanDataset dataset = open_recording(path);
+    const ScanDataset dataset = open_sequence(path);
     ASSERT_EQ(dataset.size(), 3U);
     for (int k = 0; k < 3; ++k) {
       const auto i = static_cast<std::size_t>(k);
@@ -56,7 +56,7 @@ TEST(Bag, ReadsLabelsThatAReplaySent) {
   const ScratchFolder folder;
   const std::vector<std::uint32_t> raw(10, 252);
   write_bag(folder / "bag", {serialized(wire::to_cloud(bag_scan(0), raw, "lidar"))});
-  const DatasetFrame frame = open_recording(folder / "bag").read(0);
+  const DatasetFrame frame = open_sequence(folder / "bag").read(0);
   EXPECT_THAT(frame.scan.labels, testing::Each(SemanticClass::car));
 }
 
@@ -64,7 +64,7 @@ TEST(Bag, AMissingMetadataFileIsNoFault) {
   const ScratchFolder folder;
   write_bag(folder / "bag", {bag_message(0), bag_message(1)});
   fs::remove(folder / "bag" / "metadata.yaml");
-  EXPECT_EQ(open_recording(folder / "bag").size(), 2U);
+  EXPECT_EQ(open_sequence(folder / "bag").size(), 2U);
 }
 
 TEST(Bag, ASplitBagIsReadInOrderOfTime) {
@@ -78,7 +78,7 @@ TEST(Bag, ASplitBagIsReadInOrderOfTime) {
   BagMetadata metadata;
   metadata.files = {"a_0.db3", "a_1.db3"};
   write_bag_metadata(folder / "a" / "metadata.yaml", metadata);
-  const ScanDataset dataset = open_recording(folder / "a");
+  const ScanDataset dataset = open_sequence(folder / "a");
   ASSERT_EQ(dataset.size(), 3U);
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_EQ(dataset.stamp_ns(i), bag_scan(static_cast<int>(i)).stamp_ns);
@@ -99,9 +99,9 @@ TEST(Bag, ABagWhoseRecorderWasKilledKeepsWhatWasCommitted) {
   for (const char* file : {"bag_0.db3", "bag_0.db3-wal", "metadata.yaml"}) {
     fs::copy(folder / "bag" / file, folder / "copy" / file);
   }
-  EXPECT_EQ(open_recording(folder / "copy").size(), 2U);
+  EXPECT_EQ(open_sequence(folder / "copy").size(), 2U);
   // A reader may also look in while the recorder goes on.
-  EXPECT_EQ(open_recording(folder / "bag").size(), 2U);
+  EXPECT_EQ(open_sequence(folder / "bag").size(), 2U);
 }
 
 Bytes packed(std::span<const std::uint8_t> content) {
@@ -122,7 +122,7 @@ TEST(Bag, ReadsMessagesThatAreCompressed) {
   const ScratchFolder folder;
   write_bag(folder / "bag", {packed(bag_message(0)), packed(bag_message(1))});
   set_compression(folder / "bag", "MESSAGE", "bag_0.db3");
-  const ScanDataset dataset = open_recording(folder / "bag");
+  const ScanDataset dataset = open_sequence(folder / "bag");
   expect_scan(dataset.read(1).scan, bag_scan(1));
   EXPECT_EQ(dataset.stamp_ns(1), bag_scan(1).stamp_ns);
 }
@@ -138,7 +138,7 @@ TEST(Bag, ReadsFilesThatAreCompressed) {
       .write(reinterpret_cast<const char*>(frame.data()),
              static_cast<std::streamsize>(frame.size()));
   set_compression(folder / "bag", "FILE", "bag_0.db3.zstd");
-  expect_scan(open_recording(folder / "bag").read(1).scan, bag_scan(1));
+  expect_scan(open_sequence(folder / "bag").read(1).scan, bag_scan(1));
   fs::resize_file(folder / "bag" / "bag_0.db3.zstd", frame.size() / 2);
   EXPECT_THAT(fault_of(folder / "bag"), HasSubstr("cut off"));
 }
@@ -154,8 +154,8 @@ TEST(Bag, SeveralTopicsOfScansMustBeChosenFrom) {
   }
   EXPECT_THAT(fault_of(folder / "bag"),
               AllOf(HasSubstr("--topic-in"), HasSubstr("/front"), HasSubstr("/rear")));
-  EXPECT_EQ(open_recording(folder / "bag", "rear").stamp_ns(0), bag_scan(1).stamp_ns);
-  EXPECT_EQ(open_recording(folder / "bag", "/front").stamp_ns(0), bag_scan(0).stamp_ns);
+  EXPECT_EQ(open_sequence(folder / "bag", "rear").stamp_ns(0), bag_scan(1).stamp_ns);
+  EXPECT_EQ(open_sequence(folder / "bag", "/front").stamp_ns(0), bag_scan(0).stamp_ns);
   EXPECT_THAT(fault_of(folder / "bag", "side"), AllOf(HasSubstr("/side"), HasSubstr("/rear")));
   EXPECT_THAT(fault_of(folder / "bag", "odometry"), HasSubstr("no scans"));
 }
@@ -165,7 +165,7 @@ TEST(Bag, OneDamagedMessageLeavesTheOthersReadable) {
   Bytes cut = bag_message(1);
   cut.resize(cut.size() / 2);
   write_bag(folder / "bag", {bag_message(0), cut, bag_message(2), {}});
-  const ScanDataset dataset = open_recording(folder / "bag");
+  const ScanDataset dataset = open_sequence(folder / "bag");
   ASSERT_EQ(dataset.size(), 4U);
   EXPECT_THAT(message_of<DatasetError>([&] { (void)dataset.read(1); }),
               AllOf(HasSubstr("message 2 of /points"), HasSubstr("cut off")));
@@ -206,7 +206,7 @@ TEST(Bag, DamagedFilesNeverEndInAnythingButAnError) {
     for (int i = 0; i < 40; ++i) bytes[random() % bytes.size()] = static_cast<char>(random());
     const fs::path file = folder.file("damaged.db3", bytes);
     try {
-      const ScanDataset dataset = open_recording(file);
+      const ScanDataset dataset = open_sequence(file);
       for (std::size_t i = 0; i < std::min<std::size_t>(dataset.size(), 4); ++i) {
         (void)dataset.read(i);
       }
@@ -224,10 +224,10 @@ TEST(Cdr, AnyBytesGiveAScanOrAnError) {
     for (int i = 0; i < 4 && !bytes.empty(); ++i) {
       bytes[random() % bytes.size()] = static_cast<std::uint8_t>(random());
     }
-    for (const auto kind :
-         {ScanMessage::point_cloud, ScanMessage::velodyne_packets, ScanMessage::livox_points}) {
+    for (const auto kind : {ScanMessageType::point_cloud, ScanMessageType::velodyne_packets,
+                            ScanMessageType::livox_points}) {
       try {
-        (void)scan_of_message(kind, bytes);
+        (void)decode_scan(kind, bytes);
       } catch (const CdrError&) {
       }
     }
@@ -239,7 +239,7 @@ TEST(Cdr, EveryCutOfAMessageIsNoticed) {
   for (std::size_t length = 0; length < sound.size(); ++length) {
     // The end that is left over is padding of the encoder at most.
     const std::span<const std::uint8_t> cut(sound.data(), length);
-    EXPECT_THROW((void)scan_of_message(ScanMessage::point_cloud, cut), CdrError) << length;
+    EXPECT_THROW((void)decode_scan(ScanMessageType::point_cloud, cut), CdrError) << length;
   }
 }
 
@@ -274,7 +274,7 @@ TEST(ScanMessages, ReadsLivoxsOwnMessage) {
         .put(3.0F);
     message.put(std::uint8_t(100 + i)).put(std::uint8_t{16}).put(std::uint8_t{3});
   }
-  const Scan scan = scan_of_message(ScanMessage::livox_points, message.bytes()).frame.scan;
+  const Scan scan = decode_scan(ScanMessageType::livox_points, message.bytes()).frame.scan;
   EXPECT_EQ(scan.stamp_ns, 1'700'000'000'005);
   ASSERT_EQ(scan.size(), 2U);
   EXPECT_EQ(scan.points_lidar[1], Eigen::Vector3f(2.0F, 2.0F, 3.0F));
@@ -292,7 +292,7 @@ TEST(ScanMessages, VelodynePacketsOfAnotherSensorAreNamed) {
                      : std::uint8_t(i == 1205 ? 0x28 : 0));
   }
   try {
-    (void)scan_of_message(ScanMessage::velodyne_packets, message.bytes());
+    (void)decode_scan(ScanMessageType::velodyne_packets, message.bytes());
     FAIL();
   } catch (const CdrError& fault) {
     EXPECT_THAT(fault.what(), HasSubstr("0x28"));
@@ -318,7 +318,7 @@ TEST(BagWriter, MetadataCountsWhatIsThere) {
   EXPECT_FALSE(fs::exists(folder / "bag" / "bag_0.db3-wal"));
 }
 
-TEST(BagScans, SaysThatATopicsMessagesCannotBeFound) {
+TEST(BagScanSource, SaysThatATopicsMessagesCannotBeFound) {
   const ScratchFolder folder;
   write_bag(folder / "bag", {bag_message(0)});
   for (const auto& entry : std::filesystem::directory_iterator(folder / "bag")) {
@@ -327,9 +327,9 @@ TEST(BagScans, SaysThatATopicsMessagesCannotBeFound) {
     SQLite::Database(entry.path().string(), SQLite::OPEN_READWRITE)
         .exec("UPDATE topics SET name = CAST(name AS BLOB)");
   }
-  EXPECT_NE(message_of<DatasetError>([&] { BagScans(folder / "bag", ""); }).find("damaged"),
+  EXPECT_NE(message_of<DatasetError>([&] { BagScanSource(folder / "bag", ""); }).find("damaged"),
             std::string::npos);
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

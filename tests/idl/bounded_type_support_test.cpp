@@ -7,7 +7,7 @@
 #include "sensor_msgs.h"
 #include "tests/idl/cloud_fixture.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using eprosima::fastdds::dds::TypeSupport;
@@ -15,9 +15,9 @@ using eprosima::fastrtps::rtps::SerializedPayload_t;
 using sensor_msgs::msg::PointCloud2;
 
 /// What a peer sends: the bytes of a sample.
-class GuardedSample : public testing::Test {
+class BoundedTypeSupportTest : public testing::Test {
  protected:
-  GuardedSample() {
+  BoundedTypeSupportTest() {
     PointCloud2 cloud = wire::three_points();
     SerializedPayload_t payload(type_->getSerializedSizeProvider(&cloud)());
     EXPECT_TRUE(type_->serialize(&cloud, &payload));
@@ -36,22 +36,22 @@ class GuardedSample : public testing::Test {
   std::string sample_;
 };
 
-TEST_F(GuardedSample, IsTakenWhenItIsSound) { EXPECT_TRUE(is_taken()); }
+TEST_F(BoundedTypeSupportTest, IsTakenWhenItIsSound) { EXPECT_TRUE(is_taken()); }
 
-TEST_F(GuardedSample, OfAnUnknownEncapsulationIsDropped) {
+TEST_F(BoundedTypeSupportTest, OfAnUnknownEncapsulationIsDropped) {
   sample_[1] = '\x77';
   EXPECT_FALSE(is_taken());
 }
 
-TEST_F(GuardedSample, WithABooleanThatIsNeitherIsDropped) {
+TEST_F(BoundedTypeSupportTest, WithABooleanThatIsNeitherIsDropped) {
   sample_.back() = '\x02';  // is_dense, the last member
   EXPECT_FALSE(is_taken());
 }
 
-TEST_F(GuardedSample, ThatEndsEarlyIsDropped) {
+TEST_F(BoundedTypeSupportTest, ThatEndsEarlyIsDropped) {
   sample_.resize(sample_.size() / 2);
   EXPECT_FALSE(is_taken());
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -49,7 +49,7 @@ TEST(CloudColour, OfTheMapIsThatOfEachVoxelsClass) {
   Tile tile;
   tile.voxels = {voxel};
   tile.info.bounds_map.extend(voxel.mean_map);
-  const MapView view{.version = 1, .tiles = {std::make_shared<const Tile>(tile)}};
+  const MapSnapshot view{.version = 1, .tiles = {std::make_shared<const Tile>(tile)}};
   const Eigen::AlignedBox2f window(Eigen::Vector2f(-10.0F, -10.0F), Eigen::Vector2f(10.0F, 10.0F));
   const PointCloud2 cloud = to_cloud(view, window, 5, "map");
   EXPECT_EQ(shown_colour(cloud, 0), colour(SemanticClass::vegetation));

@@ -11,7 +11,7 @@ namespace stillmap::wire {
 
 /// A cloud of three points with float32 x y z: (1, 2, 3), (4, 5, 6), (7, 8, 9).
 inline sensor_msgs::msg::PointCloud2 three_points() {
-  CloudColumns columns(1'500'000'000, "lidar");
+  PointCloud2Builder columns(1'500'000'000, "lidar");
   const auto x = columns.add_field("x", FieldType::float32);
   const auto y = columns.add_field("y", FieldType::float32);
   const auto z = columns.add_field("z", FieldType::float32);
@@ -26,7 +26,7 @@ inline sensor_msgs::msg::PointCloud2 three_points() {
 template <typename T>
 sensor_msgs::msg::PointCloud2 three_points_with(const std::string& field, FieldType type,
                                                 const std::vector<T>& values) {
-  CloudColumns columns(1'500'000'000, "lidar");
+  PointCloud2Builder columns(1'500'000'000, "lidar");
   const auto x = columns.add_field("x", FieldType::float32);
   columns.add_field("y", FieldType::float32);
   columns.add_field("z", FieldType::float32);

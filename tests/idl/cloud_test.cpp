@@ -97,7 +97,7 @@ TEST(CloudToScan, TakesTheFirstCandidateNameThatIsThere) {
 
 template <typename T>
 void expect_coordinates_of_type(FieldType type) {
-  CloudColumns columns(0, "lidar");
+  PointCloud2Builder columns(0, "lidar");
   const auto x = columns.add_field("x", type);
   const auto y = columns.add_field("y", type);
   const auto z = columns.add_field("z", type);
@@ -105,7 +105,7 @@ void expect_coordinates_of_type(FieldType type) {
   columns.fill(x, [](std::size_t) { return static_cast<T>(1); });
   columns.fill(y, [](std::size_t) { return static_cast<T>(2); });
   columns.fill(z, [](std::size_t) { return static_cast<T>(100); });
-  const CloudReading as_it_is;
+  const CloudReadOptions as_it_is;
   const ScanFromCloud back = to_scan(columns.take(), as_it_is);
   ASSERT_TRUE(back.scan);
   EXPECT_EQ(back.scan->points_lidar.front(), Eigen::Vector3f(1.0F, 2.0F, 100.0F));
@@ -208,7 +208,7 @@ TEST(MapToCloud, ShowsTheVoxelsInTheWindow) {
   tile.voxels = {inside, outside};
   tile.info.bounds_map.extend(inside.mean_map);
   tile.info.bounds_map.extend(outside.mean_map);
-  const MapView view{.version = 1, .tiles = {std::make_shared<const Tile>(tile)}};
+  const MapSnapshot view{.version = 1, .tiles = {std::make_shared<const Tile>(tile)}};
   const auto cloud =
       to_cloud(view, {Eigen::Vector2f(-10.0F, -10.0F), Eigen::Vector2f(10.0F, 10.0F)}, 5, "map");
   const ScanFromCloud back = to_scan(cloud, {.fields = {}, .labels_are_classes = true});

@@ -5,7 +5,7 @@
 
 #include <fastdds/dds/log/Log.hpp>
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 TEST(DdsLog, StaysOutOfWhatAProgramPrints) {
@@ -19,4 +19,4 @@ TEST(DdsLog, StaysOutOfWhatAProgramPrints) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

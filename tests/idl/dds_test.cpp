@@ -19,7 +19,7 @@
 #include "stillmap_msgs.h"
 #include "tests/idl/dds_fixture.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using namespace std::chrono_literals;
@@ -42,11 +42,11 @@ TEST_P(OverTransport, CarriesLargeCloudsWhole) {
   const TopicQos qos{.depth = 10};
   Writer<PointCloud2> writer(here_, "rt/points", qos);
   Reader<PointCloud2> reader(there_, "rt/points", qos);
-  ASSERT_TRUE(writer.readers().wait_for_any(patience));
+  ASSERT_TRUE(writer.readers().wait_for_any(discovery_timeout));
   for (std::uint32_t i = 1; i <= 5; ++i) {
     ASSERT_TRUE(writer.write(cloud_of(3'000'000, i)));
     PointCloud2 got;
-    ASSERT_TRUE(reader.take(got, {}, patience));
+    ASSERT_TRUE(reader.take(got, {}, discovery_timeout));
     EXPECT_EQ(got.width(), i);
     EXPECT_EQ(got.data().size(), 3'000'000U);
     EXPECT_EQ(got.data().back(), i);
@@ -69,7 +69,7 @@ TEST_P(OverTransport, FilteredReadersGetTheirTilesOnly) {
                                  std::uint64_t revision) {
     std::set<TileId> got;
     stillmap_msgs::msg::TileInfo message;
-    while (got.size() < 16 && reader.take(message, {}, patience)) {
+    while (got.size() < 16 && reader.take(message, {}, discovery_timeout)) {
       EXPECT_EQ(message.state().revision(), revision);
       got.insert({message.tile_x(), message.tile_y()});
     }
@@ -104,7 +104,7 @@ TEST_P(OverTransport, OutlivesFilteredReadersThatComeAndGo) {
       readers.push_back(std::make_unique<Reader<stillmap_msgs::msg::TileInfo>>(
           there_, topic.dds_name, topic.reader, filter));
     }
-    EXPECT_TRUE(readers.front()->take(message, {}, patience));
+    EXPECT_TRUE(readers.front()->take(message, {}, discovery_timeout));
   }
 }
 
@@ -121,7 +121,7 @@ TEST_P(OverTransport, LosesAndReordersNothingWhenEverySampleCounts) {
   const auto topic = points_topic("points", DeliveryMode::every, 4);
   Writer<PointCloud2> writer(here_, topic.dds_name, topic.writer);
   Reader<PointCloud2> reader(there_, topic.dds_name, topic.reader);
-  ASSERT_TRUE(writer.readers().wait_for_any(patience));
+  ASSERT_TRUE(writer.readers().wait_for_any(discovery_timeout));
   constexpr std::uint32_t clouds = 40;
   const std::jthread sender([&](const std::stop_token& stop) {
     for (std::uint32_t i = 0; i < clouds; ++i) {
@@ -131,7 +131,7 @@ TEST_P(OverTransport, LosesAndReordersNothingWhenEverySampleCounts) {
   });
   for (std::uint32_t i = 0; i < clouds; ++i) {
     PointCloud2 got;
-    ASSERT_TRUE(reader.take(got, {}, patience)) << "after " << i << " clouds";
+    ASSERT_TRUE(reader.take(got, {}, discovery_timeout)) << "after " << i << " clouds";
     ASSERT_EQ(got.width(), i);
     std::this_thread::sleep_for(20ms);
   }
@@ -151,7 +151,7 @@ TEST_P(OverTransport, GivesALateJoinerTheNewestOfEveryKey) {
   Reader<stillmap_msgs::msg::TileInfo> reader(there_, topic.dds_name, topic.reader);
   std::map<std::int32_t, std::uint64_t> revisions;
   stillmap_msgs::msg::TileInfo message;
-  while (revisions.size() < tiles - 1 && reader.take(message, {}, patience)) {
+  while (revisions.size() < tiles - 1 && reader.take(message, {}, discovery_timeout)) {
     revisions[message.tile_x()] = message.state().revision();
   }
   EXPECT_EQ(revisions.size(), static_cast<std::size_t>(tiles - 1));
@@ -180,7 +180,7 @@ TEST(Reader, TellsOfPublishersThatDoNotFit) {
   Participant participant(loopback(false));
   Reader<PointCloud2> reader(participant, "rt/points", {.reliable = true});
   Writer<PointCloud2> writer(participant, "rt/points", {.reliable = false});
-  const auto deadline = std::chrono::steady_clock::now() + patience;
+  const auto deadline = std::chrono::steady_clock::now() + discovery_timeout;
   while (reader.events().incompatible_writers() == 0 &&
          std::chrono::steady_clock::now() < deadline) {
     std::this_thread::sleep_for(10ms);
@@ -223,7 +223,7 @@ Info announced_by(const DdsOptions& options) {
   Reader<Info> reader(watcher, "ros_discovery_info", {.transient_local = true, .depth = 1});
   Info info;
   do {
-    EXPECT_TRUE(reader.take(info, {}, patience));
+    EXPECT_TRUE(reader.take(info, {}, discovery_timeout));
   } while (!testing::Test::HasFailure() &&
            info.node_entities_info_seq()[0].writer_gid_seq().empty());
   return info;
@@ -251,4 +251,4 @@ TEST(Transports, TellTheBufferThatTheKernelGrants) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -72,7 +72,7 @@ TEST_P(DriverCloud, IsReadTheSameInTheOtherByteOrder) {
   ASSERT_TRUE(native.scan && swapped.scan);
   EXPECT_EQ(swapped.scan->ring, native.scan->ring);
   EXPECT_EQ(swapped.scan->intensity, native.scan->intensity);
-  EXPECT_EQ(swapped.understood, native.understood);
+  EXPECT_EQ(swapped.format, native.format);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, DriverCloud, testing::ValuesIn(driver_layouts()),
@@ -89,19 +89,19 @@ TEST(CloudReader, SaysOnceHowCloudsAreUnderstood) {
   CloudReader reader({});
   const auto cloud = as_driver_sends(layout_named("Ouster"), seen_by_driver());
   const auto first = reader.read(cloud);
-  EXPECT_THAT(first.news, HasSubstr("intensity from reflectivity (uint16)"));
-  EXPECT_THAT(first.news, HasSubstr("time from t (uint32: ns from the stamp)"));
-  EXPECT_THAT(first.news, HasSubstr("ring from ring (uint16)"));
-  EXPECT_THAT(first.news, HasSubstr("intensity reaches 255"));
-  EXPECT_THAT(reader.read(cloud).news, IsEmpty());
+  EXPECT_THAT(first.format_change, HasSubstr("intensity from reflectivity (uint16)"));
+  EXPECT_THAT(first.format_change, HasSubstr("time from t (uint32: ns from the stamp)"));
+  EXPECT_THAT(first.format_change, HasSubstr("ring from ring (uint16)"));
+  EXPECT_THAT(first.format_change, HasSubstr("intensity reaches 255"));
+  EXPECT_THAT(reader.read(cloud).format_change, IsEmpty());
 }
 
 TEST(CloudReader, SaysWhatIsMissing) {
   CloudReader reader({});
   const auto result =
       reader.read(as_driver_sends(layout_named("LivoxWithoutTimes"), seen_by_driver()));
-  EXPECT_THAT(result.news, HasSubstr("no time"));
-  EXPECT_THAT(result.news, HasSubstr("no ring"));
+  EXPECT_THAT(result.format_change, HasSubstr("no time"));
+  EXPECT_THAT(result.format_change, HasSubstr("no ring"));
 }
 
 TEST(CloudReader, TimesOfOneConstantAreHarmless) {
@@ -123,7 +123,7 @@ TEST(CloudReader, AStampOfAnotherClockStillGivesTheTimesWithinTheScan) {
   const ScanFromCloud back = to_scan(cloud, {});
   ASSERT_TRUE(back.scan);
   EXPECT_NEAR(back.scan->time_offset_s.at(63), seen.time_offset_s[63], 2e-6F);
-  EXPECT_THAT(back.understood, HasSubstr("another clock"));
+  EXPECT_THAT(back.format, HasSubstr("another clock"));
 }
 
 TEST(CloudReader, AFloatRingWithNanGivesNoNonsense) {

@@ -12,7 +12,7 @@
 
 // Services, asked by processes of other vendors.
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using namespace std::chrono_literals;
@@ -29,7 +29,7 @@ SaveMap_Response echo(const SaveMap_Request& request) {
   return reply;
 }
 
-SampleBytes request_for(const std::string& file, std::size_t gap_bytes) {
+SerializedSample request_for(const std::string& file, std::size_t gap_bytes) {
   SaveMap_Request request;
   request.file(file);
   return to_bytes(type_support<SaveMap_Request>(), &request, gap_bytes);
@@ -39,13 +39,13 @@ CorrelationHeader header_of(std::uint8_t client, std::uint8_t number) {
   return {client, 2, 3, 4, 5, 6, 7, 8, number, 0, 0, 0, 0, 0, 0, 0};
 }
 
-SampleBytes cyclone_request(const CorrelationHeader& header, const std::string& file) {
-  SampleBytes bytes = request_for(file, header.size());
+SerializedSample cyclone_request(const CorrelationHeader& header, const std::string& file) {
+  SerializedSample bytes = request_for(file, header.size());
   put_correlation_header(header, bytes);
   return bytes;
 }
 
-std::optional<SaveMap_Response> read_reply(SampleBytes bytes) {
+std::optional<SaveMap_Response> read_reply(SerializedSample bytes) {
   SaveMap_Response reply;
   if (!from_bytes(type_support<SaveMap_Response>(), bytes, &reply)) return std::nullopt;
   return reply;
@@ -65,9 +65,9 @@ class ForeignService : public testing::Test {
 
 /// The reply to the request with this header, among replies to all.
 std::optional<SaveMap_Response> reply_to(ByteClient& client, const CorrelationHeader& header) {
-  const auto deadline = std::chrono::steady_clock::now() + patience;
+  const auto deadline = std::chrono::steady_clock::now() + discovery_timeout;
   while (std::chrono::steady_clock::now() < deadline) {
-    auto reply = client.receive(patience);
+    auto reply = client.receive(discovery_timeout);
     if (!reply) return std::nullopt;
     if (take_correlation_header(reply->bytes) == header) return read_reply(reply->bytes);
   }
@@ -75,34 +75,34 @@ std::optional<SaveMap_Response> reply_to(ByteClient& client, const CorrelationHe
 }
 
 TEST_F(ForeignService, AnswersCycloneWithTheHeaderOfItsRequest) {
-  VendorPeer peer(eclipse_cyclone);
+  VendorParticipant peer(eclipse_cyclone);
   ByteClient client(peer, service, type_stem);
   ASSERT_TRUE(client.wait_for_server());
   const auto header = header_of(1, 77);
-  client.ask(cyclone_request(header, "x"));
+  client.call(cyclone_request(header, "x"));
   const auto reply = reply_to(client, header);
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->file(), "saved x");
 }
 
 TEST_F(ForeignService, AnswersCycloneOnABigEndianMachine) {
-  VendorPeer peer(eclipse_cyclone);
+  VendorParticipant peer(eclipse_cyclone);
   ByteClient client(peer, service, type_stem);
   ASSERT_TRUE(client.wait_for_server());
   // Client 0x0102030405060708, request 9, format version 0, string of 2 bytes "x".
-  client.ask({0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 0,   0, 0, 0,
-              0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 0, 2, 'x', 0, 0, 0});
+  client.call({0, 0, 0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 0,   0, 0, 0,
+               0, 0, 0, 9, 0, 0, 0, 0, 0, 0, 0, 2, 'x', 0, 0, 0});
   const auto reply = reply_to(client, {8, 7, 6, 5, 4, 3, 2, 1, 9, 0, 0, 0, 0, 0, 0, 0});
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->file(), "saved x");
 }
 
 TEST_F(ForeignService, AnswersOtherVendorsByTheIdentityOfTheirRequest) {
-  VendorPeer peer(rti_connext);
+  VendorParticipant peer(rti_connext);
   ByteClient client(peer, service, type_stem);
   ASSERT_TRUE(client.wait_for_server());
-  const auto identity = client.ask(request_for("y", 0));
-  auto reply = client.receive(patience);
+  const auto identity = client.call(request_for("y", 0));
+  auto reply = client.receive(discovery_timeout);
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->answered, identity);
   const auto read = read_reply(reply->bytes);
@@ -111,12 +111,12 @@ TEST_F(ForeignService, AnswersOtherVendorsByTheIdentityOfTheirRequest) {
 }
 
 TEST_F(ForeignService, AnswersEveryClientOfOneProcess) {
-  VendorPeer peer(eclipse_cyclone);
+  VendorParticipant peer(eclipse_cyclone);
   ByteClient first(peer, service, type_stem);
   ByteClient second(peer, service, type_stem);
   ASSERT_TRUE(first.wait_for_server() && second.wait_for_server());
-  first.ask(cyclone_request(header_of(1, 1), "first"));
-  second.ask(cyclone_request(header_of(2, 1), "second"));
+  first.call(cyclone_request(header_of(1, 1), "first"));
+  second.call(cyclone_request(header_of(2, 1), "second"));
   const auto to_first = reply_to(first, header_of(1, 1));
   const auto to_second = reply_to(second, header_of(2, 1));
   ASSERT_TRUE(to_first && to_second);
@@ -137,18 +137,18 @@ TEST_F(ForeignService, AnswersManyClientsOfBothKindsAtOnce) {
         for (int i = 0; i < requests; ++i) {
           SaveMap_Request request;
           request.file(std::to_string(100 * c + i));
-          const auto reply = client.ask(request, patience);
+          const auto reply = client.call(request, discovery_timeout);
           if (reply && reply->file() == "saved " + request.file()) ++fast_right;
         }
       });
       clients.emplace_back([&cyclone_right, c] {
-        VendorPeer peer(eclipse_cyclone);
+        VendorParticipant peer(eclipse_cyclone);
         ByteClient client(peer, service, type_stem);
         if (!client.wait_for_server()) return;
         for (int i = 0; i < requests; ++i) {
           const auto header = header_of(static_cast<std::uint8_t>(c), static_cast<std::uint8_t>(i));
           const std::string file = std::to_string(1000 * c + i);
-          client.ask(cyclone_request(header, file));
+          client.call(cyclone_request(header, file));
           const auto reply = reply_to(client, header);
           if (reply && reply->file() == "saved " + file) ++cyclone_right;
         }
@@ -162,15 +162,16 @@ TEST_F(ForeignService, AnswersManyClientsOfBothKindsAtOnce) {
 
 struct HostileBytes {
   std::string name;
-  SampleBytes bytes;
+  SerializedSample bytes;
 };
 
 std::vector<HostileBytes> hostile_requests(std::size_t header_bytes) {
-  const SampleBytes good = request_for("file", header_bytes);
+  const SerializedSample good = request_for("file", header_bytes);
   std::vector<HostileBytes> all;
   for (std::size_t length = encapsulation_bytes; length < good.size(); length += 5) {
-    all.push_back({"cut at " + std::to_string(length),
-                   SampleBytes(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(length))});
+    all.push_back(
+        {"cut at " + std::to_string(length),
+         SerializedSample(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(length))});
   }
   // PL_CDR and XCDR2's, and what is none at all.
   for (const int kind : {2, 3, 6, 7, 10, 200}) {
@@ -183,22 +184,22 @@ std::vector<HostileBytes> hostile_requests(std::size_t header_bytes) {
 }
 
 TEST_F(ForeignService, OutlivesHostileRequestsAndCountsThem) {
-  VendorPeer cyclone(eclipse_cyclone);
+  VendorParticipant cyclone(eclipse_cyclone);
   ByteClient cyclone_client(cyclone, service, type_stem);
-  VendorPeer other(rti_connext);
+  VendorParticipant other(rti_connext);
   ByteClient other_client(other, service, type_stem);
   ASSERT_TRUE(cyclone_client.wait_for_server() && other_client.wait_for_server());
   std::uint64_t sent = 0;
   for (const auto& [name, bytes] : hostile_requests(sizeof(CorrelationHeader))) {
-    cyclone_client.ask(bytes);
+    cyclone_client.call(bytes);
     ++sent;
   }
   for (const auto& [name, bytes] : hostile_requests(0)) {
-    other_client.ask(bytes);
+    other_client.call(bytes);
     ++sent;
   }
   const auto header = header_of(9, 9);
-  cyclone_client.ask(cyclone_request(header, "still here"));
+  cyclone_client.call(cyclone_request(header, "still here"));
   const auto reply = reply_to(cyclone_client, header);
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->file(), "saved still here");
@@ -208,13 +209,13 @@ TEST_F(ForeignService, OutlivesHostileRequestsAndCountsThem) {
 }
 
 TEST_F(ForeignService, RefusesARequestThatItCannotReadInWords) {
-  VendorPeer peer(eclipse_cyclone);
+  VendorParticipant peer(eclipse_cyclone);
   ByteClient client(peer, service, type_stem);
   ASSERT_TRUE(client.wait_for_server());
   const auto header = header_of(3, 4);
-  SampleBytes request = cyclone_request(header, "file");
+  SerializedSample request = cyclone_request(header, "file");
   request.resize(request.size() - 3);
-  client.ask(request);
+  client.call(request);
   const auto reply = reply_to(client, header);
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->status().code(), 1);
@@ -223,17 +224,18 @@ TEST_F(ForeignService, RefusesARequestThatItCannotReadInWords) {
 }
 
 TEST_F(ForeignService, IsNotHeldUpByClientsThatNeverListen) {
-  VendorPeer deaf(eclipse_cyclone);
+  VendorParticipant deaf(eclipse_cyclone);
   ByteClient deaf_client(deaf, service, type_stem, false);
   Participant side(loopback(false));
   ServiceClient<SaveMap_Request, SaveMap_Response> client(side, service);
-  ASSERT_TRUE(deaf_client.wait_for_server() && client.wait_for_server(patience));
+  ASSERT_TRUE(deaf_client.wait_for_server() && client.wait_for_server(discovery_timeout));
   constexpr int deaf_requests = 10;
-  for (int i = 0; i < deaf_requests; ++i) deaf_client.ask(cyclone_request(header_of(1, 1), "deaf"));
+  for (int i = 0; i < deaf_requests; ++i)
+    deaf_client.call(cyclone_request(header_of(1, 1), "deaf"));
   const auto began = std::chrono::steady_clock::now();
   SaveMap_Request request;
   request.file("quick");
-  EXPECT_TRUE(client.ask(request, patience));
+  EXPECT_TRUE(client.call(request, discovery_timeout));
   // One after the other, the deaf ones would take 5 s.
   EXPECT_LT(std::chrono::steady_clock::now() - began, 2s);
   for (int i = 0; i < 500 && faults("undelivered_reply") < deaf_requests; ++i) {
@@ -243,4 +245,4 @@ TEST_F(ForeignService, IsNotHeldUpByClientsThatNeverListen) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

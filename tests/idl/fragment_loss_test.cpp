@@ -15,7 +15,7 @@
 #include "stillmap_msgs.h"
 #include "tests/idl/dds_fixture.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using namespace std::chrono_literals;
@@ -51,7 +51,7 @@ class LossySender {
 
   void write(MapTile tile) { writer_->write(&tile); }
   [[nodiscard]] bool wait_until_all_arrived() {
-    return writer_->wait_for_acknowledgments(to_duration(patience)) ==
+    return writer_->wait_for_acknowledgments(to_duration(discovery_timeout)) ==
            eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
   }
 
@@ -70,7 +70,7 @@ TEST(FragmentLoss, TilesInFragmentsArriveWholeWhenFragmentsGetLost) {
   Participant there(options);
   const auto topic = Topics::in("stillmap").tiles;
   Reader<MapTile> reader(there, topic.dds_name, topic.reader);
-  ASSERT_TRUE(reader.events().wait_for_writer(patience));
+  ASSERT_TRUE(reader.events().wait_for_writer(discovery_timeout));
   constexpr std::int32_t tiles = 100;
   constexpr std::uint64_t revisions = 3;
   for (std::uint64_t revision = 1; revision <= revisions; ++revision) {
@@ -90,7 +90,7 @@ TEST(FragmentLoss, TilesInFragmentsArriveWholeWhenFragmentsGetLost) {
            std::ranges::all_of(newest, [](const auto& entry) { return entry.second == revisions; });
   };
   MapTile got;
-  while (!all_newest() && reader.take(got, {}, patience)) {
+  while (!all_newest() && reader.take(got, {}, discovery_timeout)) {
     EXPECT_EQ(got.index_x(),
               std::vector<std::uint16_t>(10'000, static_cast<std::uint16_t>(got.tile_x())));
     newest[got.tile_x()] = got.state().revision();
@@ -99,4 +99,4 @@ TEST(FragmentLoss, TilesInFragmentsArriveWholeWhenFragmentsGetLost) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -19,7 +19,7 @@
 #include "sensor_msgs.h"
 #include "tests/idl/dds_fixture.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using namespace std::chrono_literals;
@@ -30,7 +30,7 @@ using sensor_msgs::msg::PointCloud2;
 /// Of this process, so that tests beside each other do not meet; below those that Linux gives out.
 std::uint16_t test_port() { return static_cast<std::uint16_t>(20000 + ::getpid() % 10000); }
 
-bool finds(Participant& a, Participant& b, std::chrono::milliseconds timeout = patience) {
+bool finds(Participant& a, Participant& b, std::chrono::milliseconds timeout = discovery_timeout) {
   Writer<PointCloud2> writer(a, "rt/points", {});
   Reader<PointCloud2> reader(b, "rt/points", {});
   return writer.readers().wait_for_any(timeout) && reader.events().wait_for_writer(timeout);
@@ -39,11 +39,11 @@ bool finds(Participant& a, Participant& b, std::chrono::milliseconds timeout = p
 void expect_large_clouds_arrive(Participant& a, Participant& b) {
   Writer<PointCloud2> writer(a, "rt/points", {});
   Reader<PointCloud2> reader(b, "rt/points", {});
-  ASSERT_TRUE(writer.readers().wait_for_any(patience));
+  ASSERT_TRUE(writer.readers().wait_for_any(discovery_timeout));
   for (std::uint32_t i = 1; i <= 3; ++i) {
     ASSERT_TRUE(writer.write(cloud_of(2'000'000, i)));
     PointCloud2 got;
-    ASSERT_TRUE(reader.take(got, {}, patience));
+    ASSERT_TRUE(reader.take(got, {}, discovery_timeout));
     EXPECT_EQ(got.width(), i);
     EXPECT_EQ(got.data().size(), 2'000'000U);
   }
@@ -210,25 +210,26 @@ TEST(Network, RefusesAPeerWhoseNameIsNotKnown) {
   EXPECT_THROW(Participant participant(options), DdsError);
 }
 
-TEST(Network, BulkKeepsToItsRateAndSmallMessagesOvertakeIt) {
+TEST(Network, LargeMessagesKeepToTheirRateAndSmallMessagesOvertakeThem) {
   DdsOptions options = loopback(false);
   options.max_datagram_bytes = 1400;
-  options.bulk_bytes_per_s = 1'000'000;
+  options.large_message_bytes_per_s = 1'000'000;
   Participant a(options);
   Participant b(loopback(false));
-  Writer<PointCloud2> bulk(a, "rt/bulk", {.bulky = true});
+  Writer<PointCloud2> large(a, "rt/bulk", {.large_messages = true});
   Writer<PointCloud2> small(a, "rt/small", {});
-  Reader<PointCloud2> bulk_reader(b, "rt/bulk", {});
+  Reader<PointCloud2> large_reader(b, "rt/bulk", {});
   Reader<PointCloud2> small_reader(b, "rt/small", {});
-  ASSERT_TRUE(bulk.readers().wait_for_any(patience) && small.readers().wait_for_any(patience));
+  ASSERT_TRUE(large.readers().wait_for_any(discovery_timeout) &&
+              small.readers().wait_for_any(discovery_timeout));
   const auto began = std::chrono::steady_clock::now();
-  ASSERT_TRUE(bulk.write(cloud_of(2'000'000, 1)));
+  ASSERT_TRUE(large.write(cloud_of(2'000'000, 1)));
   EXPECT_LT(std::chrono::steady_clock::now() - began, 500ms) << "a write does not wait";
   ASSERT_TRUE(small.write(cloud_of(100, 2)));
   PointCloud2 got;
-  ASSERT_TRUE(small_reader.take(got, {}, patience));
+  ASSERT_TRUE(small_reader.take(got, {}, discovery_timeout));
   EXPECT_LT(std::chrono::steady_clock::now() - began, 1s);
-  ASSERT_TRUE(bulk_reader.take(got, {}, patience));
+  ASSERT_TRUE(large_reader.take(got, {}, discovery_timeout));
   EXPECT_EQ(got.data().size(), 2'000'000U);
   const auto took = std::chrono::steady_clock::now() - began;
   EXPECT_GT(took, 1500ms);
@@ -285,4 +286,4 @@ TEST(NetworkSettings, HeartbeatsAndRepairsFollowTheProfile) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -43,7 +43,7 @@ TEST(OccupancyConversion, KeepsTheQuestions) {
   query.rays = {{.origin_map = {7, 8, 9},
                  .direction_map = {1, 0, 2},
                  .max_range_m = 33.0,
-                 .passes_unknown = true}};
+                 .ignore_unknown = true}};
   query.max_voxels = 77;
   const OccupancyQuery back = from_request(to_request(query));
   EXPECT_EQ(back.points_map, query.points_map);
@@ -54,7 +54,7 @@ TEST(OccupancyConversion, KeepsTheQuestions) {
   EXPECT_EQ(back.rays[0].origin_map, query.rays[0].origin_map);
   EXPECT_EQ(back.rays[0].direction_map, query.rays[0].direction_map);
   EXPECT_EQ(back.rays[0].max_range_m, 33.0);
-  EXPECT_TRUE(back.rays[0].passes_unknown);
+  EXPECT_TRUE(back.rays[0].ignore_unknown);
   EXPECT_EQ(back.max_voxels, 77U);
 }
 

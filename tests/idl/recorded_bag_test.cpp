@@ -14,7 +14,7 @@
 #include "tests/idl/bag_fixture.hpp"
 #include "tests/scratch_folder.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 namespace fs = std::filesystem;
@@ -96,7 +96,7 @@ class PointsByPlace {
 };
 
 TEST_F(RecordedBag, ItsPacketsGiveThePointsOfAnotherDecoder) {
-  const ScanDataset dataset = open_recording(bag_);
+  const ScanDataset dataset = open_sequence(bag_);
   ASSERT_EQ(dataset.size(), 4U);
   EXPECT_EQ(dataset.suggested_sensor().name, "VLP-16");
   // Theirs is cut at another azimuth: the points lie in several of our scans.
@@ -115,4 +115,4 @@ TEST_F(RecordedBag, ItsPacketsGiveThePointsOfAnotherDecoder) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -10,7 +10,7 @@
 
 // ros_discovery_info while endpoints come and go.
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using namespace std::chrono_literals;
@@ -27,7 +27,7 @@ class RosGraphOfANode : public testing::Test {
 
   /// Takes announcements until one has so many readers and writers.
   bool announces(std::size_t readers, std::size_t writers) {
-    while (announcements_.take(newest_, {}, patience)) {
+    while (announcements_.take(newest_, {}, discovery_timeout)) {
       const auto& node = newest_.node_entities_info_seq().at(0);
       if (node.reader_gid_seq().size() == readers && node.writer_gid_seq().size() == writers) {
         return true;
@@ -60,4 +60,4 @@ TEST_F(RosGraphOfANode, AnnouncesEndpointsAsTheyComeAndGo) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

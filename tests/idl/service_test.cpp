@@ -8,13 +8,13 @@
 #include "stillmap_msgs.h"
 #include "tests/idl/dds_fixture.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using namespace std::chrono_literals;
 using stillmap_msgs::srv::SaveMap_Request;
 using stillmap_msgs::srv::SaveMap_Response;
-using Server = ServiceServer<SaveMap_Request, SaveMap_Response>;
+using server::Server = ServiceServer<SaveMap_Request, SaveMap_Response>;
 using Client = ServiceClient<SaveMap_Request, SaveMap_Response>;
 
 SaveMap_Response echo(const SaveMap_Request& request) {
@@ -31,7 +31,7 @@ SaveMap_Request request_for(const std::string& file) {
 
 TEST(Service, AnswersEachClientWithItsOwnReply) {
   Participant server_side(loopback(true));
-  const Server server(server_side, "stillmap/save_map", echo);
+  const server::Server server(server_side, "stillmap/save_map", echo);
   std::atomic<int> right = 0;
   {
     std::vector<std::jthread> clients;
@@ -41,7 +41,7 @@ TEST(Service, AnswersEachClientWithItsOwnReply) {
         Client client(client_side, "stillmap/save_map");
         for (int i = 0; i < 20; ++i) {
           const std::string file = std::to_string(c) + "_" + std::to_string(i);
-          const auto reply = client.ask(request_for(file), patience);
+          const auto reply = client.call(request_for(file), discovery_timeout);
           if (reply && reply->file() == "saved " + file) ++right;
         }
       });
@@ -52,14 +52,14 @@ TEST(Service, AnswersEachClientWithItsOwnReply) {
 
 TEST(Service, CarriesAReplyOfMegabytes) {
   Participant server_side(loopback(false));
-  const Server server(server_side, "stillmap/save_map", [](const SaveMap_Request&) {
+  const server::Server server(server_side, "stillmap/save_map", [](const SaveMap_Request&) {
     SaveMap_Response reply;
     reply.file(std::string(5'000'000, 'x'));
     return reply;
   });
   Participant client_side(loopback(false));
   Client client(client_side, "stillmap/save_map");
-  const auto reply = client.ask(request_for(""), patience);
+  const auto reply = client.call(request_for(""), discovery_timeout);
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->file().size(), 5'000'000U);
 }
@@ -68,10 +68,10 @@ TEST(Service, WaitsForAServerThatComesLater) {
   Participant client_side(loopback(false));
   Client client(client_side, "stillmap/save_map");
   std::optional<SaveMap_Response> reply;
-  std::jthread asker([&] { reply = client.ask(request_for("late"), patience); });
+  std::jthread asker([&] { reply = client.call(request_for("late"), discovery_timeout); });
   std::this_thread::sleep_for(300ms);
   Participant server_side(loopback(false));
-  const Server server(server_side, "stillmap/save_map", echo);
+  const server::Server server(server_side, "stillmap/save_map", echo);
   asker.join();
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->file(), "saved late");
@@ -81,7 +81,7 @@ TEST(Service, GivesUpWithoutAServer) {
   Participant client_side(loopback(false));
   Client client(client_side, "stillmap/save_map");
   const auto began = std::chrono::steady_clock::now();
-  EXPECT_FALSE(client.ask(request_for(""), 300ms));
+  EXPECT_FALSE(client.call(request_for(""), 300ms));
   EXPECT_LT(std::chrono::steady_clock::now() - began, 5s);
   EXPECT_FALSE(client.wait_for_server(0ms));
 }
@@ -89,16 +89,17 @@ TEST(Service, GivesUpWithoutAServer) {
 TEST(Service, AsksAgainWhenTheFirstAnswerDoesNotCome) {
   Participant server_side(loopback(false));
   std::atomic<int> asked = 0;
-  const Server server(server_side, "stillmap/save_map", [&](const SaveMap_Request& request) {
-    // The first answer is late.
-    if (asked++ == 0) std::this_thread::sleep_for(1500ms);
-    return echo(request);
-  });
+  const server::Server server(server_side, "stillmap/save_map",
+                              [&](const SaveMap_Request& request) {
+                                // The first answer is late.
+                                if (asked++ == 0) std::this_thread::sleep_for(1500ms);
+                                return echo(request);
+                              });
   Participant client_side(loopback(false));
   Client client(client_side, "stillmap/save_map");
-  ASSERT_TRUE(client.wait_for_server(patience));
-  EXPECT_TRUE(client.ask(request_for("again"), 2s + 500ms));
+  ASSERT_TRUE(client.wait_for_server(discovery_timeout));
+  EXPECT_TRUE(client.call(request_for("again"), 2s + 500ms));
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

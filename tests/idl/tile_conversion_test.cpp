@@ -85,7 +85,7 @@ TEST(StatusConversion, KeepsEverything) {
                                        .image_columns = 1024,
                                        .full_columns = 1536,
                                        .fresh_share = 0.25,
-                                       .carried_share = 0.5,
+                                       .propagated_share = 0.5,
                                        .unlabelled_share = 0.125},
                       .counters = {{"scans_received", 8}, {"dropped_empty", 2}},
                       .latencies = {{"odometry", 1.0, 2.0, 3.0, 4}},
@@ -94,8 +94,8 @@ TEST(StatusConversion, KeepsEverything) {
                       .points_topic = "lidar/points",
                       .scan_frame = "velodyne",
                       .scan_delay_s = 0.25,
-                      .findings = {{Severity::advice, "what", "evidence", "way out"},
-                                   {Severity::problem, "worse", "", ""}}};
+                      .diagnostics = {{Severity::advice, "what", "evidence", "way out"},
+                                      {Severity::problem, "worse", "", ""}}};
   const auto back = from_wire(to_wire(status));
   ASSERT_TRUE(back);
   EXPECT_EQ(back->stamp_ns, status.stamp_ns);
@@ -109,18 +109,18 @@ TEST(StatusConversion, KeepsEverything) {
   EXPECT_EQ(back->points_topic, "lidar/points");
   EXPECT_EQ(back->scan_frame, "velodyne");
   EXPECT_EQ(back->scan_delay_s, 0.25);
-  ASSERT_EQ(back->findings.size(), 2U);
-  EXPECT_EQ(back->findings[0].severity, Severity::advice);
-  EXPECT_EQ(back->findings[0].what, "what");
-  EXPECT_EQ(back->findings[0].evidence, "evidence");
-  EXPECT_EQ(back->findings[0].way_out, "way out");
-  EXPECT_EQ(back->findings[1].severity, Severity::problem);
+  ASSERT_EQ(back->diagnostics.size(), 2U);
+  EXPECT_EQ(back->diagnostics[0].severity, Severity::advice);
+  EXPECT_EQ(back->diagnostics[0].what, "what");
+  EXPECT_EQ(back->diagnostics[0].evidence, "evidence");
+  EXPECT_EQ(back->diagnostics[0].hint, "way out");
+  EXPECT_EQ(back->diagnostics[1].severity, Severity::problem);
   EXPECT_EQ(back->segmentation.every, 3U);
   EXPECT_EQ(back->segmentation.network_ms, 210.0);
   EXPECT_EQ(back->segmentation.image_columns, 1024U);
   EXPECT_EQ(back->segmentation.full_columns, 1536U);
   EXPECT_EQ(back->segmentation.fresh_share, 0.25);
-  EXPECT_EQ(back->segmentation.carried_share, 0.5);
+  EXPECT_EQ(back->segmentation.propagated_share, 0.5);
   EXPECT_EQ(back->segmentation.unlabelled_share, 0.125);
   EXPECT_EQ(back->mapped_hz, 9.0);
   EXPECT_EQ(back->voxel_count, 6U);

@@ -4,18 +4,18 @@
 #include <array>
 #include <cmath>
 
-#include "idl/conversions/traversability_query.hpp"
-#include "idl/conversions/traversability_status.hpp"
 #include "idl/conversions/occupancy_grid.hpp"
 #include "idl/conversions/path_query.hpp"
+#include "idl/conversions/traversability_query.hpp"
+#include "idl/conversions/traversability_status.hpp"
 
 namespace stillmap::wire {
 namespace {
 
 using ::testing::HasSubstr;
 
-AreaAnswer two_cells() {
-  AreaAnswer answer;
+TraversabilityAnswer two_cells() {
+  TraversabilityAnswer answer;
   answer.grid.origin_map = {-1.4, 0.2};
   answer.grid.resolution_m = 0.2;
   answer.grid.width = 2;
@@ -38,7 +38,7 @@ PathCheck blocked() {
   check.conflict = {.segment = 3,
                     .along_m = 4.5,
                     .pose = {.position_map = {1.5, -2.5}, .heading_rad = 0.5},
-                    .place_map = {2.1, -2.3},
+                    .cell_centre_map = {2.1, -2.3},
                     .reason = BlockReason::unknown};
   check.clearance_m = 0.3;
   check.checked_m = 4.5;
@@ -48,25 +48,25 @@ PathCheck blocked() {
 }
 
 TEST(AreaConversion, KeepsTheQuery) {
-  AreaQuery query;
+  TraversabilityQuery query;
   query.profile = "delivery_robot";
   query.region = SphereRegion{.centre_map = {1.0, 2.0, 3.0}, .radius_m = 4.0};
-  query.wants_grid = false;
-  query.wants_outlines = true;
+  query.include_grid = false;
+  query.include_outlines = true;
   query.max_cells = 5000;
   query.min_outline_area_m2 = 2.5;
-  const AreaQueryFromRequest back = from_request(to_request(query));
+  const TraversabilityQueryFromRequest back = from_request(to_request(query));
   ASSERT_TRUE(back.query) << back.fault;
   EXPECT_EQ(back.query->profile, query.profile);
   EXPECT_EQ(std::get<SphereRegion>(back.query->region).radius_m, 4.0);
-  EXPECT_FALSE(back.query->wants_grid);
-  EXPECT_TRUE(back.query->wants_outlines);
+  EXPECT_FALSE(back.query->include_grid);
+  EXPECT_TRUE(back.query->include_outlines);
   EXPECT_EQ(back.query->max_cells, 5000U);
   EXPECT_EQ(back.query->min_outline_area_m2, 2.5);
 }
 
 TEST(AreaConversion, NobodyGetsMoreCellsThanAnAnswerBrings) {
-  auto request = to_request(AreaQuery{});
+  auto request = to_request(TraversabilityQuery{});
   EXPECT_EQ(request.max_cells(), max_answered_cells);
   for (const std::uint32_t asked : {0U, 4'000'000'000U}) {
     request.max_cells(asked);
@@ -77,10 +77,10 @@ TEST(AreaConversion, NobodyGetsMoreCellsThanAnAnswerBrings) {
 }
 
 TEST(AreaConversion, KeepsTheAnswer) {
-  const AreaAnswer answer = two_cells();
+  const TraversabilityAnswer answer = two_cells();
   const auto back = from_response(to_response(answer));
   ASSERT_TRUE(back);
-  EXPECT_EQ(back->grid.status, AreaStatus::ok);
+  EXPECT_EQ(back->grid.status, TraversabilityStatus::ok);
   EXPECT_EQ(back->grid.origin_map, answer.grid.origin_map);
   EXPECT_EQ(back->grid.resolution_m, 0.2);
   EXPECT_EQ(back->grid.width, 2U);
@@ -102,9 +102,10 @@ TEST(AreaConversion, KeepsTheAnswer) {
 }
 
 TEST(AreaConversion, KeepsEveryStatusAndRefusesOthers) {
-  for (const AreaStatus status : {AreaStatus::ok, AreaStatus::invalid_request,
-                                  AreaStatus::too_large, AreaStatus::not_found}) {
-    AreaAnswer answer;
+  for (const TraversabilityStatus status :
+       {TraversabilityStatus::ok, TraversabilityStatus::invalid_request,
+        TraversabilityStatus::too_large, TraversabilityStatus::not_found}) {
+    TraversabilityAnswer answer;
     answer.grid.status = status;
     answer.grid.reason = "why";
     const auto back = from_response(to_response(answer));
@@ -165,7 +166,7 @@ TEST(PathConversion, KeepsTheConflict) {
   EXPECT_EQ(back->conflict->along_m, 4.5);
   EXPECT_EQ(back->conflict->pose.position_map, check.conflict->pose.position_map);
   EXPECT_EQ(back->conflict->pose.heading_rad, 0.5);
-  EXPECT_EQ(back->conflict->place_map, check.conflict->place_map);
+  EXPECT_EQ(back->conflict->cell_centre_map, check.conflict->cell_centre_map);
   EXPECT_EQ(back->conflict->reason, BlockReason::unknown);
 }
 
@@ -174,7 +175,7 @@ TEST(PathConversion, AFreeOrRefusedPathHasNoConflict) {
   free.is_free = true;
   EXPECT_FALSE(from_response(to_response(free, 0))->conflict);
   PathCheck refused;
-  refused.status = AreaStatus::too_large;
+  refused.status = TraversabilityStatus::too_large;
   refused.reason = "long";
   const auto back = from_response(to_response(refused, 0));
   ASSERT_TRUE(back);
@@ -199,8 +200,8 @@ TEST(NearestConversion, KeepsTheAnswer) {
   EXPECT_EQ(back->distance_m, 3.0);
   EXPECT_EQ(back->cell, nearest.cell);
   EXPECT_EQ(back->map_version, 4U);
-  nearest.status = AreaStatus::not_found;
-  EXPECT_EQ(from_response(to_response(nearest, 5))->status, AreaStatus::not_found);
+  nearest.status = TraversabilityStatus::not_found;
+  EXPECT_EQ(from_response(to_response(nearest, 5))->status, TraversabilityStatus::not_found);
 }
 
 TEST(OccupancyGridConversion, KeepsTheGridAsNav2ReadsIt) {

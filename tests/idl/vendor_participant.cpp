@@ -12,7 +12,7 @@
 #include "idl/dds/service_identity.hpp"
 #include "tests/idl/dds_fixture.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using namespace std::chrono_literals;
@@ -33,7 +33,7 @@ GuidPrefix_t next_prefix(const VendorId& vendor) {
 
 }  // namespace
 
-VendorPeer::VendorPeer(const VendorId& vendor) {
+VendorParticipant::VendorParticipant(const VendorId& vendor) {
   talk_over_transports();
   DomainParticipantQos qos;
   qos.wire_protocol().prefix = next_prefix(vendor);
@@ -45,33 +45,33 @@ VendorPeer::VendorPeer(const VendorId& vendor) {
       static_cast<DomainId_t>(test_domain_id()), qos);
 }
 
-VendorPeer::~VendorPeer() {
+VendorParticipant::~VendorParticipant() {
   participant_->delete_contained_entities();
   DomainParticipantFactory::get_instance()->delete_participant(participant_);
 }
 
-Topic* VendorPeer::topic(const std::string& name, const std::string& type_name) {
+Topic* VendorParticipant::topic(const std::string& name, const std::string& type_name) {
   if (TopicDescription* const known = participant_->lookup_topicdescription(name)) {
     return static_cast<Topic*>(known);
   }
-  unread_type(type_name).register_type(participant_);
+  serialized_sample_type(type_name).register_type(participant_);
   return participant_->create_topic(name, type_name, TOPIC_QOS_DEFAULT);
 }
 
-DataWriter& VendorPeer::make_writer(const std::string& name, const std::string& type_name,
-                                    const TopicQos& qos) {
+DataWriter& VendorParticipant::make_writer(const std::string& name, const std::string& type_name,
+                                           const TopicQos& qos) {
   Publisher* const publisher = participant_->create_publisher(PUBLISHER_QOS_DEFAULT);
   return *publisher->create_datawriter(topic(name, type_name), writer_qos(qos, DdsOptions{}));
 }
 
-DataReader& VendorPeer::make_reader(const std::string& name, const std::string& type_name,
-                                    const TopicQos& qos) {
+DataReader& VendorParticipant::make_reader(const std::string& name, const std::string& type_name,
+                                           const TopicQos& qos) {
   Subscriber* const subscriber = participant_->create_subscriber(SUBSCRIBER_QOS_DEFAULT);
   return *subscriber->create_datareader(topic(name, type_name), reader_qos(qos, DdsOptions{}));
 }
 
-ByteClient::ByteClient(VendorPeer& peer, const std::string& service, const std::string& type_stem,
-                       bool has_reply_reader)
+ByteClient::ByteClient(VendorParticipant& peer, const std::string& service,
+                       const std::string& type_stem, bool has_reply_reader)
     : requests_(&peer.make_writer(request_topic(service), type_stem + "_Request_", service_qos())) {
   if (has_reply_reader) {
     replies_ = &peer.make_reader(reply_topic(service), type_stem + "_Response_", service_qos());
@@ -91,9 +91,9 @@ bool ByteClient::wait_for_server() const {
   return false;
 }
 
-eprosima::fastrtps::rtps::SampleIdentity ByteClient::ask(const SampleBytes& request) {
+eprosima::fastrtps::rtps::SampleIdentity ByteClient::call(const SerializedSample& request) {
   eprosima::fastrtps::rtps::WriteParams params;
-  SampleBytes bytes = request;
+  SerializedSample bytes = request;
   requests_->write(&bytes, params);
   return params.sample_identity();
 }
@@ -113,4 +113,4 @@ std::optional<ByteClient::Reply> ByteClient::receive(std::chrono::milliseconds t
   return std::nullopt;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

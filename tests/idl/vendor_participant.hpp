@@ -8,7 +8,7 @@
 #include "idl/dds/qos.hpp"
 #include "idl/dds/serialized_sample.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// RTPS vendor ids, with which every GUID of the vendor's begins.
 using VendorId = std::array<std::uint8_t, 2>;
@@ -16,12 +16,12 @@ inline constexpr VendorId rti_connext{0x01, 0x01};
 inline constexpr VendorId eclipse_cyclone{0x01, 0x10};
 
 /// A process whose GUIDs look as another vendor's, and which sends and takes plain bytes.
-class VendorPeer {
+class VendorParticipant {
  public:
-  explicit VendorPeer(const VendorId& vendor);
-  ~VendorPeer();
-  VendorPeer(const VendorPeer&) = delete;
-  VendorPeer& operator=(const VendorPeer&) = delete;
+  explicit VendorParticipant(const VendorId& vendor);
+  ~VendorParticipant();
+  VendorParticipant(const VendorParticipant&) = delete;
+  VendorParticipant& operator=(const VendorParticipant&) = delete;
 
   using Writer = eprosima::fastdds::dds::DataWriter;
   using Reader = eprosima::fastdds::dds::DataReader;
@@ -42,23 +42,23 @@ class VendorPeer {
 class ByteClient {
  public:
   /// `has_reply_reader` false: it asks and never listens.
-  ByteClient(VendorPeer& peer, const std::string& service, const std::string& type_stem,
+  ByteClient(VendorParticipant& peer, const std::string& service, const std::string& type_stem,
              bool has_reply_reader = true);
 
   [[nodiscard]] bool wait_for_server() const;
   /// Returns the request's identity.
-  eprosima::fastrtps::rtps::SampleIdentity ask(const SampleBytes& request);
+  eprosima::fastrtps::rtps::SampleIdentity call(const SerializedSample& request);
 
   struct Reply {
-    SampleBytes bytes;
+    SerializedSample bytes;
     eprosima::fastrtps::rtps::SampleIdentity answered;
   };
   /// The next reply to anybody.
   [[nodiscard]] std::optional<Reply> receive(std::chrono::milliseconds timeout);
 
  private:
-  VendorPeer::Writer* requests_;
-  VendorPeer::Reader* replies_ = nullptr;
+  VendorParticipant::Writer* requests_;
+  VendorParticipant::Reader* replies_ = nullptr;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

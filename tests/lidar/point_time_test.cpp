@@ -66,7 +66,7 @@ TEST_P(TimeUnits, AreFoundFromMagnitudeAndSpan) {
   for (int i = 0; i <= 100; ++i) {
     const double offset_s = 0.001 * i;
     times.push_back((begin_s + offset_s) * per_second);
-    if (type == TimeType::whole) times.back() = std::round(times.back());
+    if (type == TimeType::integer) times.back() = std::round(times.back());
     if (type == TimeType::float32) times.back() = static_cast<float>(times.back());
     const double reference_s = begin_s < 100.0 || begin_s > 1e9 ? begin_s : 0.0;
     expected.push_back(
@@ -79,9 +79,9 @@ INSTANTIATE_TEST_SUITE_P(
     All, TimeUnits,
     testing::Values(UnitCase{"VelodyneOffsets", TimeType::float32, 1.0, 0.0},
                     UnitCase{"VelodyneOffsetsFromTheEnd", TimeType::float32, 1.0, -0.1},
-                    UnitCase{"OusterNanoseconds", TimeType::whole, 1e9, 0.0},
-                    UnitCase{"WholeMicroseconds", TimeType::whole, 1e6, 0.0},
-                    UnitCase{"WholeMicrosecondsOfTheHour", TimeType::whole, 1e6, 3000.0},
+                    UnitCase{"OusterNanoseconds", TimeType::integer, 1e9, 0.0},
+                    UnitCase{"WholeMicroseconds", TimeType::integer, 1e6, 0.0},
+                    UnitCase{"WholeMicrosecondsOfTheHour", TimeType::integer, 1e6, 3000.0},
                     UnitCase{"FloatMilliseconds", TimeType::float32, 1e3, 0.0},
                     UnitCase{"FloatNanoseconds", TimeType::float32, 1e9, 0.0},
                     UnitCase{"DoubleNanoseconds", TimeType::float64, 1e9, 0.0},

@@ -105,7 +105,7 @@ Eigen::Isometry3d pose(double angle, const Eigen::Vector3d& axis, const Eigen::V
   return T;
 }
 
-TEST(CompensateMotion, AgreesWithTheMatrixExponential) {
+TEST(Deskew, AgreesWithTheMatrixExponential) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> any(-1.0, 1.0);
   for (const double angle : {0.0, 1e-12, 1e-7, 1e-3, 0.1, 1.5, 3.0}) {
@@ -121,7 +121,7 @@ TEST(CompensateMotion, AgreesWithTheMatrixExponential) {
       scan.time_offset_s.push_back(static_cast<float>(offset_s));
       expected.push_back(part_of(twist, offset_s / 0.1) * p);
     }
-    const Scan still = compensate_motion(scan, T_start_end, 0.1);
+    const Scan still = deskew(scan, T_start_end, 0.1);
     ASSERT_EQ(still.size(), expected.size());
     for (std::size_t i = 0; i < expected.size(); ++i) {
       EXPECT_LT((still.points_lidar[i].cast<double>() - expected[i]).norm(), 1e-4)
@@ -131,7 +131,7 @@ TEST(CompensateMotion, AgreesWithTheMatrixExponential) {
   }
 }
 
-TEST(CompensateMotion, MakesAWallFlatThatATurningLidarSawBent) {
+TEST(Deskew, MakesAWallFlatThatATurningLidarSawBent) {
   // The lidar drives 2 m and turns 0.2 rad in a revolution while it looks at the wall x = 20.
   const Twist twist{0.2 * Eigen::Vector3d::UnitZ(), {2.0, 0.1, 0.0}};
   Scan scan;
@@ -142,36 +142,36 @@ TEST(CompensateMotion, MakesAWallFlatThatATurningLidarSawBent) {
     scan.time_offset_s.push_back(static_cast<float>(0.1 * part));
   }
   EXPECT_GT(std::abs(scan.points_lidar.back().x() - 20.0F), 1.0F);
-  const Scan still = compensate_motion(scan, part_of(twist, 1.0), 0.1);
+  const Scan still = deskew(scan, part_of(twist, 1.0), 0.1);
   for (const auto& p : still.points_lidar) EXPECT_NEAR(p.x(), 20.0F, 1e-4F);
 }
 
-TEST(CompensateMotion, LeavesAScanWithoutTimesAsItIs) {
+TEST(Deskew, LeavesAScanWithoutTimesAsItIs) {
   Scan scan;
   scan.points_lidar = {{1, 2, 3}};
   const auto T = pose(0.3, Eigen::Vector3d::UnitX(), {1, 1, 1});
-  EXPECT_EQ(compensate_motion(scan, T, 0.1).points_lidar, scan.points_lidar);
+  EXPECT_EQ(deskew(scan, T, 0.1).points_lidar, scan.points_lidar);
 }
 
-TEST(CompensateMotion, MovesPointsOfOneTimeAlike) {
+TEST(Deskew, MovesPointsOfOneTimeAlike) {
   Scan scan;
   scan.points_lidar = {{1, 2, 3}, {4, 5, 6}, {-7, 8, 9}};
   const auto T = pose(0.3, Eigen::Vector3d::UnitZ(), {1, 0, 0});
   scan.time_offset_s.assign(3, 0.0F);
-  EXPECT_EQ(compensate_motion(scan, T, 0.1).points_lidar, scan.points_lidar);
+  EXPECT_EQ(deskew(scan, T, 0.1).points_lidar, scan.points_lidar);
   scan.time_offset_s.assign(3, 0.1F);
-  const Scan moved = compensate_motion(scan, T, 0.1);
+  const Scan moved = deskew(scan, T, 0.1);
   for (std::size_t i = 0; i < 3; ++i) {
     EXPECT_LT((moved.points_lidar[i] - T.cast<float>() * scan.points_lidar[i]).norm(), 1e-5F);
   }
 }
 
-TEST(CompensateMotion, LeavesPointsOfBrokenClocksWhereTheyAre) {
+TEST(Deskew, LeavesPointsOfBrokenClocksWhereTheyAre) {
   Scan scan;
   scan.points_lidar.assign(3, {10, 0, 0});
   scan.time_offset_s = {nan, inf, 1e9F};
   const auto T = pose(0.3, Eigen::Vector3d::UnitZ(), {1, 0, 0});
-  EXPECT_EQ(compensate_motion(scan, T, 0.1).points_lidar, scan.points_lidar);
+  EXPECT_EQ(deskew(scan, T, 0.1).points_lidar, scan.points_lidar);
 }
 
 TEST(UsablePoints, AreThoseThatAreKept) {

@@ -63,7 +63,7 @@ TEST(FitSensor, MakesASensorOfTheRingsOfAnUnknownOne) {
   for (int ring = 0; ring < 64; ++ring) {
     EXPECT_NEAR(fitted->beam_elevation(ring), ouster.beam_elevation(ring), 0.01 * degree) << ring;
   }
-  EXPECT_THAT(sensor_misfit(scan, *fitted), IsEmpty());
+  EXPECT_THAT(sensor_mismatch(scan, *fitted), IsEmpty());
 }
 
 TEST(FitSensor, GivesALidarWithoutRingsBands) {
@@ -93,15 +93,15 @@ TEST(FitSensor, MakesNothingOfNothing) {
   EXPECT_FALSE(fit_sensor(scan));
 }
 
-TEST(SensorMisfit, NamesWhatDoesNotFit) {
+TEST(SensorMismatch, NamesWhatDoesNotFit) {
   SensorModel wide;
   wide.rings = 128;
   wide.fov_up = 45.0 * degree;
   wide.fov_down = -45.0 * degree;
-  EXPECT_THAT(sensor_misfit(scan_of(wide, true), hdl_64e()), HasSubstr("ring field reaches 127"));
-  EXPECT_THAT(sensor_misfit(scan_of(wide, false), hdl_64e()), HasSubstr("between -4"));
-  EXPECT_THAT(sensor_misfit(scan_of(hdl_64e(), true), hdl_64e()), IsEmpty());
-  EXPECT_THAT(sensor_misfit({}, hdl_64e()), IsEmpty());
+  EXPECT_THAT(sensor_mismatch(scan_of(wide, true), hdl_64e()), HasSubstr("ring field reaches 127"));
+  EXPECT_THAT(sensor_mismatch(scan_of(wide, false), hdl_64e()), HasSubstr("between -4"));
+  EXPECT_THAT(sensor_mismatch(scan_of(hdl_64e(), true), hdl_64e()), IsEmpty());
+  EXPECT_THAT(sensor_mismatch({}, hdl_64e()), IsEmpty());
 }
 
 }  // namespace

@@ -20,7 +20,8 @@ using Positions = std::vector<std::array<float, 3>>;
 using Copy = std::map<TileId, Positions>;
 
 /// The whole answer, page by page, put into the client's copy.
-MapQueryResult update(Copy& copy, const MapView& view, const TileHistory& history, MapQuery query) {
+MapQueryResult update(Copy& copy, const MapSnapshot& view, const TileHistory& history,
+                      MapQuery query) {
   const MapQueryResult first = query_map(view, query, &history);
   MapQueryResult page = first;
   Positions all;
@@ -53,7 +54,7 @@ class ChangesQueryTest : public testing::Test {
       map_.insert(test::street_scan(static_cast<std::uint32_t>(i), 200),
                   Eigen::Isometry3d(Eigen::Translation3d(3.0 * i, 0.0, 1.73)));
     }
-    MapView after = *map_.view();
+    MapSnapshot after = *map_.view();
     after.version += 1;
     const VoxelGrid grid(after.voxel_size_m, after.tile_size_m);
     std::vector<Voxel> half = after.tiles.front()->voxels;
@@ -62,15 +63,15 @@ class ChangesQueryTest : public testing::Test {
         make_tile(after.tiles.front()->info.id, after.version, std::move(half), grid));
     gone_ = after.tiles[1]->info.id;
     after.tiles.erase(after.tiles.begin() + 1);
-    after_ = std::make_shared<const MapView>(std::move(after));
+    after_ = std::make_shared<const MapSnapshot>(std::move(after));
     history_ = history_with(history_, *after_);
   }
 
   [[nodiscard]] KnownVersion known() const { return {before_->map_id, before_->version}; }
 
   StaticMap map_;
-  std::shared_ptr<const MapView> before_;
-  std::shared_ptr<const MapView> after_;
+  std::shared_ptr<const MapSnapshot> before_;
+  std::shared_ptr<const MapSnapshot> after_;
   TileHistory history_;
   TileId gone_;
 };

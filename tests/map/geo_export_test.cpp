@@ -27,7 +27,7 @@ std::vector<QueryVoxel> small_map() {
 }
 
 TEST(TopView, KeepsTheHighestVoxelOfEachCell) {
-  const TopView top = look_from_above(small_map(), 0.5);
+  const TopView top = rasterize_top_view(small_map(), 0.5);
   EXPECT_EQ(top.columns, 28);
   EXPECT_EQ(top.rows, 10);
   EXPECT_EQ(top.corner_map, Eigen::Vector2d(-4.0, 5.0));
@@ -43,11 +43,11 @@ TEST(TopView, KeepsTheHighestVoxelOfEachCell) {
 }
 
 TEST(TopView, RefusesWhatMakesNoRaster) {
-  EXPECT_THROW(static_cast<void>(look_from_above({}, 0.5)), std::invalid_argument);
+  EXPECT_THROW(static_cast<void>(rasterize_top_view({}, 0.5)), std::invalid_argument);
   const std::vector<QueryVoxel> far{voxel(-9e4F, -9e4F, 0, SemanticClass::road),
                                     voxel(9e4F, 9e4F, 0, SemanticClass::road)};
   EXPECT_THAT(
-      message_of<std::invalid_argument>([&] { static_cast<void>(look_from_above(far, 0.2)); }),
+      message_of<std::invalid_argument>([&] { static_cast<void>(rasterize_top_view(far, 0.2)); }),
       HasSubstr("too large"));
 }
 

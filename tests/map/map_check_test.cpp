@@ -59,14 +59,14 @@ class MapCheckTest : public testing::Test {
     return is_found;
   }
   void expect_tiles_as_saved(const std::string& what) const {
-    const MapView view = read_map_file(file_).view;
+    const MapSnapshot view = read_map_file(file_).view;
     ASSERT_EQ(view.tiles.size(), saved_.view.tiles.size()) << what;
     for (std::size_t i = 0; i < view.tiles.size(); ++i) {
       EXPECT_EQ(view.tiles[i]->info.content_hash, saved_.view.tiles[i]->info.content_hash) << what;
     }
   }
 
-  StoredMap saved_ = test::stored_map(2);
+  SavedMap saved_ = test::saved_map(2);
   ScratchFolder folder_;
   fs::path file_ = folder_ / "city.stillmap";
 };

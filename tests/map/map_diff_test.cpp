@@ -7,8 +7,8 @@
 #include <random>
 #include <set>
 
-#include "core/picture/map_diff_picture.hpp"
 #include "core/map/tile_content.hpp"
+#include "core/picture/map_diff_picture.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {
@@ -24,26 +24,26 @@ constexpr int columns = 8;
 using Cell = std::array<int, 3>;
 using Cells = std::map<Cell, SemanticClass>;
 
-MapView view_of(const Cells& cells) {
+MapSnapshot view_of(const Cells& cells) {
   const VoxelGrid grid(voxel_size_m, tile_size_m);
   std::map<TileId, std::vector<Voxel>> voxels;
   for (const auto& [cell, label] : cells) {
     const Eigen::Vector3d centre =
         (Eigen::Vector3d(cell[0], cell[1], cell[2]) + Eigen::Vector3d::Constant(0.5)) *
         voxel_size_m;
-    const VoxelGrid::Place place = grid.place(centre);
+    const VoxelGrid::Index index = grid.index(centre);
     Voxel voxel;
-    voxel.index = place.voxel;
+    voxel.index = index.voxel;
     voxel.point_count = 1;
     voxel.mean_map = centre.cast<float>();
     voxel.evidence.add(label, 1.0F);
-    voxels[place.tile].push_back(voxel);
+    voxels[index.tile].push_back(voxel);
   }
-  MapView view{.version = 1,
-               .map_id = 1,
-               .tile_size_m = tile_size_m,
-               .voxel_size_m = voxel_size_m,
-               .tiles = {}};
+  MapSnapshot view{.version = 1,
+                   .map_id = 1,
+                   .tile_size_m = tile_size_m,
+                   .voxel_size_m = voxel_size_m,
+                   .tiles = {}};
   for (auto& [id, tile] : voxels) {
     std::ranges::sort(tile, {}, &Voxel::index);
     view.tiles.push_back(std::make_shared<const Tile>(make_tile(id, 1, tile, grid)));
@@ -142,15 +142,15 @@ TEST(MapDiff, AgreesWithThePlainDefinitionAcrossTheBordersOfTiles) {
 }
 
 TEST(MapDiff, AMapDoesNotDifferFromItself) {
-  const MapView view = view_of(random_cells(5, 200));
+  const MapSnapshot view = view_of(random_cells(5, 200));
   EXPECT_EQ(diff_maps(view, view, {.tolerance_voxels = 0}).counts.sum(), 0U);
-  EXPECT_EQ(diff_maps(MapView(), MapView()).counts.sum(), 0U);
+  EXPECT_EQ(diff_maps(MapSnapshot(), MapSnapshot()).counts.sum(), 0U);
 }
 
 TEST(MapDiff, AgainstNothingEverythingAppearsOrIsGone) {
-  const MapView view = view_of(random_cells(5, 200));
-  const MapDiff all_new = diff_maps(MapView(), view);
-  const MapDiff all_gone = diff_maps(view, MapView());
+  const MapSnapshot view = view_of(random_cells(5, 200));
+  const MapDiff all_new = diff_maps(MapSnapshot(), view);
+  const MapDiff all_gone = diff_maps(view, MapSnapshot());
   EXPECT_EQ(all_new.counts.appeared, all_new.counts.sum());
   EXPECT_EQ(all_gone.counts.gone, all_new.counts.appeared);
   EXPECT_EQ(all_gone.counts.sum(), all_gone.counts.gone);
@@ -168,8 +168,8 @@ TEST(MapDiff, ASurfaceThatMovedByOneCellIsTheSame) {
 }
 
 TEST(MapDiff, RefusesMapsThatCannotBeCompared) {
-  const MapView view = view_of(random_cells(5, 20));
-  MapView coarse = view;
+  const MapSnapshot view = view_of(random_cells(5, 20));
+  MapSnapshot coarse = view;
   coarse.voxel_size_m *= 2.0;
   const auto compare = [&] { static_cast<void>(diff_maps(view, coarse)); };
   EXPECT_THAT(message_of<std::invalid_argument>(compare),
@@ -191,8 +191,8 @@ TEST(MapDiff, ThePictureHasEveryKindOfChangeInItsColour) {
     before[{x, 30, 0}] = SemanticClass::terrain;
     after[{x, 30, 0}] = SemanticClass::vegetation;
   }
-  const MapView a = view_of(before);
-  const MapView b = view_of(after);
+  const MapSnapshot a = view_of(before);
+  const MapSnapshot b = view_of(after);
   write_diff_picture(folder / "diff.png", a, b, diff_maps(a, b), 400);
   const cv::Mat3b picture = cv::imread((folder / "diff.png").string());
   ASSERT_FALSE(picture.empty());

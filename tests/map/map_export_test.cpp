@@ -10,7 +10,7 @@
 namespace stillmap {
 namespace {
 
-void expect_points_of(const MapView& view, const CloudFile& cloud) {
+void expect_points_of(const MapSnapshot& view, const CloudFile& cloud) {
   std::size_t i = 0;
   for (const auto& tile : view.tiles) {
     for (const Voxel& voxel : tile->voxels) {
@@ -34,7 +34,7 @@ TEST(MapExport, FilesHoldEveryVoxelWithItsClass) {
 
 TEST(MapExport, FolderThatIsMissingIsNamed) {
   const ScratchFolder folder;
-  EXPECT_THROW(export_ply(MapView{}, folder / "no" / "map.ply"), DatasetError);
+  EXPECT_THROW(export_ply(MapSnapshot{}, folder / "no" / "map.ply"), DatasetError);
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ class MapFileCopyTest : public testing::Test {
 };
 
 TEST_F(MapFileCopyTest, ReadsWhatWasSavedAndLeavesNothingBehind) {
-  const StoredMap saved = test::stored_map(2);
+  const SavedMap saved = test::saved_map(2);
   open_map_file(file_)->save(saved);
   const std::string before = content_of(file_);
   test::expect_equal(read_map_file(file_), saved);
@@ -40,14 +40,14 @@ TEST_F(MapFileCopyTest, ReadsWhatWasSavedAndLeavesNothingBehind) {
 
 TEST_F(MapFileCopyTest, ReadsTheLastSaveOfAFileInUse) {
   const auto store = open_map_file(file_);
-  store->save(test::stored_map(1));
-  test::expect_equal(read_map_file(file_), test::stored_map(1));
-  store->save(test::stored_map(4));
-  test::expect_equal(read_map_file(file_), test::stored_map(4));
+  store->save(test::saved_map(1));
+  test::expect_equal(read_map_file(file_), test::saved_map(1));
+  store->save(test::saved_map(4));
+  test::expect_equal(read_map_file(file_), test::saved_map(4));
 }
 
 TEST_F(MapFileCopyTest, BringsInTheLogOfACrashInTheCopyOnly) {
-  open_map_file(folder_ / "live.stillmap")->save(test::stored_map(1));
+  open_map_file(folder_ / "live.stillmap")->save(test::saved_map(1));
   // A connection that is still open leaves its log where it is, as a crash does.
   SQLite::Database live((folder_ / "live.stillmap").string(), SQLite::OPEN_READWRITE);
   live.exec("PRAGMA wal_autocheckpoint = 0; INSERT INTO metadata VALUES ('late', 'yes')");
@@ -76,7 +76,7 @@ TEST_F(MapFileCopyTest, NamesWhatCannotBeRead) {
 }
 
 TEST_F(MapFileCopyTest, FiguresOfAMapAreThoseCountedByHand) {
-  const StoredMap saved = test::stored_map(2);
+  const SavedMap saved = test::saved_map(2);
   open_map_file(file_)->save(saved);
   const MapFileInfo info = map_file_info(file_);
   std::uint64_t voxels = 0;
@@ -96,7 +96,7 @@ TEST_F(MapFileCopyTest, FiguresOfAMapAreThoseCountedByHand) {
   EXPECT_EQ(info.map.poses, saved.trajectory.size());
   // Poses stand one metre apart.
   EXPECT_NEAR(info.map.path_length_m, static_cast<double>(saved.trajectory.size() - 1), 1e-9);
-  EXPECT_EQ(info.map.driven.last_ns, saved.trajectory.back().stamp_ns);
+  EXPECT_EQ(info.map.trajectory_span.last_ns, saved.trajectory.back().stamp_ns);
   EXPECT_EQ(info.map.metadata, saved.metadata);
   EXPECT_EQ(info.bytes, fs::file_size(file_));
   EXPECT_GT(info.schema_version, 0U);

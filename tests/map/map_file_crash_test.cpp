@@ -17,7 +17,7 @@ constexpr int states = 12;
 /// Runs in the child: saves one state after the other, and tells the number of each finished save
 /// through the pipe, until killed.
 [[noreturn]] void save_for_ever(const std::filesystem::path& file,
-                                const std::vector<StoredMap>& maps, int pipe_end) {
+                                const std::vector<SavedMap>& maps, int pipe_end) {
   // A forked process has lost TBB's workers.
   const tbb::global_control alone(tbb::global_control::max_allowed_parallelism, 1);
   const auto store = open_map_file(file);
@@ -28,7 +28,7 @@ constexpr int states = 12;
 }
 
 /// Kills a saving process after `delay_us`; the last save that it reported, -1 for none.
-int last_save_before_kill(const std::filesystem::path& file, const std::vector<StoredMap>& maps,
+int last_save_before_kill(const std::filesystem::path& file, const std::vector<SavedMap>& maps,
                           useconds_t delay_us) {
   int ends[2] = {};
   EXPECT_EQ(pipe(ends), 0);
@@ -49,15 +49,15 @@ int last_save_before_kill(const std::filesystem::path& file, const std::vector<S
 TEST(MapFileCrash, KilledWhileSavingTheLastSaveOrTheNextOneIsThere) {
   const ScratchFolder folder;
   const std::filesystem::path file = folder / "city.stillmap";
-  std::vector<StoredMap> maps;
-  for (int i = 0; i < states; ++i) maps.push_back(test::stored_map(i));
+  std::vector<SavedMap> maps;
+  for (int i = 0; i < states; ++i) maps.push_back(test::saved_map(i));
   std::mt19937 random(4);
   std::uniform_int_distribution<useconds_t> delay_us(2'000, 150'000);
   int kills_after_a_save = 0;
   std::string before = "nothing";
   for (int kill_count = 0; kill_count < 20; ++kill_count) {
     const int last = last_save_before_kill(file, maps, delay_us(random));
-    const StoredMap found = open_map_file(file)->load();
+    const SavedMap found = open_map_file(file)->load();
     const std::string seed = found.view.tiles.empty() ? "nothing" : found.metadata.at("seed");
     if (last < 0) {
       EXPECT_TRUE(seed == before || seed == "0") << seed;

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using test::expect_equal;
-using test::stored_map;
+using test::saved_map;
 using testing::HasSubstr;
 
 std::string bytes_of(const fs::path& file) {
@@ -49,7 +49,7 @@ class MapFileTest : public testing::Test {
 };
 
 TEST_F(MapFileTest, NewFileHoldsAnEmptyMap) {
-  const StoredMap map = open_map_file(file_)->load();
+  const SavedMap map = open_map_file(file_)->load();
   EXPECT_TRUE(map.view.tiles.empty());
   EXPECT_TRUE(map.trajectory.empty());
   EXPECT_EQ(open_map_file(file_)->load().view.version, 0U);
@@ -57,23 +57,23 @@ TEST_F(MapFileTest, NewFileHoldsAnEmptyMap) {
 
 TEST_F(MapFileTest, EmptyFileBecomesAMapFile) {
   write_bytes(file_, "");
-  open_map_file(file_)->save(stored_map(1));
-  expect_equal(open_map_file(file_)->load(), stored_map(1));
+  open_map_file(file_)->save(saved_map(1));
+  expect_equal(open_map_file(file_)->load(), saved_map(1));
 }
 
 TEST_F(MapFileTest, LoadsWhatWasSavedLast) {
   const auto store = open_map_file(file_);
   for (const int seed : {1, 5, 2, 2, 0}) {
-    store->save(stored_map(seed));
-    expect_equal(store->load(), stored_map(seed));
-    expect_equal(open_map_file(file_)->load(), stored_map(seed));
+    store->save(saved_map(seed));
+    expect_equal(store->load(), saved_map(seed));
+    expect_equal(open_map_file(file_)->load(), saved_map(seed));
   }
-  store->save(StoredMap{});
-  expect_equal(store->load(), StoredMap{});
+  store->save(SavedMap{});
+  expect_equal(store->load(), SavedMap{});
 }
 
 TEST_F(MapFileTest, WritesOnlyTilesThatChanged) {
-  StoredMap map = stored_map(1);
+  SavedMap map = saved_map(1);
   const auto store = open_map_file(file_);
   store->save(map);
   // A stored tile that the store believes unchanged stays as it is, even if it is not.
@@ -90,19 +90,19 @@ TEST_F(MapFileTest, WritesOnlyTilesThatChanged) {
 
 TEST_F(MapFileTest, TheFileAloneIsTheWholeMapAfterEachSave) {
   const auto store = open_map_file(file_);
-  store->save(stored_map(4));
+  store->save(saved_map(4));
   const fs::path copy = folder_ / "copy.stillmap";
   fs::copy_file(file_, copy);
-  expect_equal(open_map_file(copy)->load(), stored_map(4));
+  expect_equal(open_map_file(copy)->load(), saved_map(4));
 }
 
 TEST_F(MapFileTest, TwoStoresOnOneFileSeeEachOthersSaves) {
   const auto one = open_map_file(file_);
   const auto other = open_map_file(file_);
-  one->save(stored_map(1));
-  expect_equal(other->load(), stored_map(1));
-  other->save(stored_map(2));
-  expect_equal(one->load(), stored_map(2));
+  one->save(saved_map(1));
+  expect_equal(other->load(), saved_map(1));
+  other->save(saved_map(2));
+  expect_equal(one->load(), saved_map(2));
 }
 
 TEST_F(MapFileTest, RefusesWhatIsNoDatabase) {
@@ -123,13 +123,13 @@ TEST_F(MapFileTest, RefusesAnotherProgramsDatabase) {
 }
 
 TEST_F(MapFileTest, RefusesANewerSchema) {
-  open_map_file(file_)->save(stored_map(1));
+  open_map_file(file_)->save(saved_map(1));
   alter("PRAGMA user_version = 3");
   expect_refused("newer Stillmap (schema 3");
 }
 
 TEST_F(MapFileTest, RefusesATruncatedFile) {
-  open_map_file(file_)->save(stored_map(1));
+  open_map_file(file_)->save(saved_map(1));
   const std::string whole = bytes_of(file_);
   for (const double share : {0.2, 0.5, 0.9, 0.999}) {
     write_bytes(file_, whole.substr(0, static_cast<std::size_t>(share * double(whole.size()))));
@@ -138,7 +138,7 @@ TEST_F(MapFileTest, RefusesATruncatedFile) {
 }
 
 TEST_F(MapFileTest, NeverTakesADamagedFileForAnotherMap) {
-  open_map_file(file_)->save(stored_map(1));
+  open_map_file(file_)->save(saved_map(1));
   const std::string whole = bytes_of(file_);
   std::mt19937 random(2);
   int refused = 0;
@@ -148,7 +148,7 @@ TEST_F(MapFileTest, NeverTakesADamagedFileForAnotherMap) {
     for (std::size_t k = 0; k < 32; ++k) damaged[at + k] = static_cast<char>(random());
     write_bytes(file_, damaged);
     try {
-      const StoredMap map = open_map_file(file_)->load();
+      const SavedMap map = open_map_file(file_)->load();
       // Damage in unused space or in plain numbers is not seen; no tile may be a wrong one.
       for (const auto& tile : map.view.tiles) EXPECT_FALSE(tile->voxels.empty());
     } catch (const MapFileError&) {
@@ -160,23 +160,23 @@ TEST_F(MapFileTest, NeverTakesADamagedFileForAnotherMap) {
 }
 
 TEST_F(MapFileTest, RefusesATileThatIsNotTheStoredOne) {
-  open_map_file(file_)->save(stored_map(1));
+  open_map_file(file_)->save(saved_map(1));
   alter("UPDATE tiles SET content_hash = content_hash + 1");
   expect_refused("content hash");
 }
 
 TEST_F(MapFileTest, RefusesATileBeyondTheEndOfAnyMap) {
-  open_map_file(file_)->save(stored_map(1));
+  open_map_file(file_)->save(saved_map(1));
   alter("UPDATE tiles SET x = 2147483647 WHERE rowid = (SELECT min(rowid) FROM tiles)");
   const auto store = open_map_file(file_);
-  for (const auto load : {&TileStore::load, &TileStore::load_shelved}) {
+  for (const auto load : {&MapStore::load, &MapStore::load_non_resident}) {
     EXPECT_THAT([&] { (void)((*store).*load)(); },
                 testing::ThrowsMessage<MapFileError>(HasSubstr("farther out than any map")));
   }
 }
 
 TEST_F(MapFileTest, RefusesImpossibleSizes) {
-  open_map_file(file_)->save(stored_map(1));
+  open_map_file(file_)->save(saved_map(1));
   alter("UPDATE map SET voxel_size_m = 0");
   expect_refused("voxels of 0");
 }
@@ -196,7 +196,7 @@ TEST_F(MapFileTest, RefusesAReadOnlyFolder) {
 
 TEST_F(MapFileTest, FileInAReadOnlyFolderIsRefusedAndLeftAlone) {
   if (geteuid() == 0) GTEST_SKIP() << "root may write in read-only folders";
-  open_map_file(file_)->save(stored_map(1));
+  open_map_file(file_)->save(saved_map(1));
   fs::permissions(folder_.path(), fs::perms::owner_read | fs::perms::owner_exec);
   expect_refused("must exist and be writable");
   fs::permissions(folder_.path(), fs::perms::owner_all);

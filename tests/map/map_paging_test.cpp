@@ -5,8 +5,8 @@
 #include <stdexcept>
 
 #include "core/lidar/range_image_view.hpp"
-#include "core/map/storage/map_file.hpp"
 #include "core/map/static_map.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "tests/map/map_worlds.hpp"
 #include "tests/scratch_folder.hpp"
 
@@ -40,7 +40,8 @@ class Drive {
     }
     const Isometry3d T_map_lidar(Eigen::Translation3d(start_m_ + x_of(scan), 0.0, 0.0));
     map_.insert(seen, T_map_lidar);
-    map_.look_through(RangeView(seen.scan, {}, hdl_64e(), T_map_lidar), seen.scan.stamp_ns);
+    map_.clear_seen_through(RangeImageView(seen.scan, {}, hdl_64e(), T_map_lidar),
+                            seen.scan.stamp_ns);
   }
 
  private:
@@ -53,10 +54,10 @@ class PagedMap {
  public:
   static constexpr std::size_t limit_bytes = 11'000'000;
 
-  explicit PagedMap(std::unique_ptr<TileStore> store = open_scratch_map())
+  explicit PagedMap(std::unique_ptr<MapStore> store = open_scratch_map())
       : store_(std::move(store)) {
     map_.reset(7);
-    map_.use_shelf(store_->shelf());
+    map_.use_tile_store(store_->tile_store());
   }
   void drive(double start_m = 0.0) {
     Drive drive(map_, start_m);
@@ -64,27 +65,27 @@ class PagedMap {
       drive.see(scan);
       if (scan % 4 != 3) continue;
       const MapCheckpoint checkpoint = map_.checkpoint();
-      store_->save(stored_state(checkpoint));
+      store_->save(to_saved_map(checkpoint));
       map_.checkpoint_stored(checkpoint.step);
-      shelved_ += map_.shelve(Vector3d(start_m + Drive::x_of(scan), 0.0, 0.0), limit_bytes);
+      evicted_ += map_.evict(Vector3d(start_m + Drive::x_of(scan), 0.0, 0.0), limit_bytes);
       peak_bytes_ = std::max(peak_bytes_, map_.memory_use().bytes);
     }
   }
   /// Everything, whether in memory or not.
-  [[nodiscard]] StoredMap whole() {
-    store_->save(stored_state(map_.checkpoint()));
+  [[nodiscard]] SavedMap whole() {
+    store_->save(to_saved_map(map_.checkpoint()));
     return store_->load();
   }
 
   StaticMap map_{StaticMapConfig{}};
-  std::unique_ptr<TileStore> store_;
-  std::size_t shelved_ = 0;
+  std::unique_ptr<MapStore> store_;
+  std::size_t evicted_ = 0;
   std::size_t peak_bytes_ = 0;
 };
 
 using Key = std::pair<TileId, VoxelIndex>;
 
-std::map<Key, const Voxel*> voxels_of(const MapView& view) {
+std::map<Key, const Voxel*> voxels_of(const MapSnapshot& view) {
   std::map<Key, const Voxel*> voxels;
   for (const auto& tile : view.tiles) {
     for (const Voxel& voxel : tile->voxels) voxels[{tile->info.id, voxel.index}] = &voxel;
@@ -108,10 +109,10 @@ TEST(MapPaging, AMapThatDoesNotFitBecomesTheSameMap) {
   for (int scan = 0; scan < Drive::scans; ++scan) drive.see(scan);
   PagedMap paged;
   paged.drive();
-  ASSERT_GT(paged.shelved_, 50U);
+  ASSERT_GT(paged.evicted_, 50U);
 
   const auto expected = voxels_of(*plain.view());
-  const StoredMap stored = paged.whole();
+  const SavedMap stored = paged.whole();
   const auto got = voxels_of(stored.view);
   ASSERT_EQ(got.size(), expected.size());
   for (const auto& [key, voxel] : expected) {
@@ -139,7 +140,7 @@ TEST(MapPaging, MemoryStaysBelowTheLimitOnADriveThatNeedsManyTimesIt) {
 TEST(MapPaging, FarFromTheOriginWhereFloatsAreCoarseTheFileStaysReadable) {
   PagedMap paged;
   paged.drive(60'000.0);
-  ASSERT_GT(paged.shelved_, 50U);
+  ASSERT_GT(paged.evicted_, 50U);
   EXPECT_NO_THROW(static_cast<void>(paged.whole()));
 }
 
@@ -147,13 +148,13 @@ TEST(MapPaging, AMapThatIsShownByOtherRulesIsStoredAsItIsShown) {
   const auto store = open_scratch_map();
   StaticMap before{StaticMapConfig{}};
   Drive(before).see(0);
-  store->save(stored_state(before.checkpoint()));
+  store->save(to_saved_map(before.checkpoint()));
   StaticMapConfig stricter;
   stricter.min_points = 5;
   StaticMap after{stricter};
-  const StoredMap stored = store->load();
-  after.restore(stored.view, stored.memories);
-  store->save(stored_state(after.checkpoint(true)));
+  const SavedMap stored = store->load();
+  after.resume(stored.view, stored.tile_evidence);
+  store->save(to_saved_map(after.checkpoint(true)));
   EXPECT_LT(voxels_of(store->load().view).size(), voxels_of(stored.view).size());
 }
 
@@ -161,7 +162,8 @@ TEST(MapPaging, ViewsNameEveryTileAndSayWhichAreAway) {
   PagedMap paged;
   paged.drive();
   const auto view = paged.map_.view();
-  const auto away = std::ranges::count_if(view->tiles, [](const auto& t) { return is_away(*t); });
+  const auto away =
+      std::ranges::count_if(view->tiles, [](const auto& t) { return is_non_resident(*t); });
   EXPECT_GT(away, 10);
   EXPECT_EQ(view->tiles.size(), paged.whole().view.tiles.size());
 }
@@ -170,7 +172,7 @@ TEST(MapPaging, TilesThatAreNotStoredYetStay) {
   PagedMap paged;
   Drive drive(paged.map_);
   for (int scan = 0; scan < Drive::scans / 2; ++scan) drive.see(scan);
-  EXPECT_EQ(paged.map_.shelve(Vector3d::Zero(), 0), 0U);
+  EXPECT_EQ(paged.map_.evict(Vector3d::Zero(), 0), 0U);
 }
 
 TEST(MapPaging, ARestartGoesOnWithWhatWasHidden) {
@@ -182,30 +184,30 @@ TEST(MapPaging, ARestartGoesOnWithWhatWasHidden) {
 
   const auto store = open_map_file(folder / "map.stillmap");
   StaticMap after{StaticMapConfig{}};
-  after.use_shelf(store->shelf());
-  const StoredMap shelved = store->load_shelved();
-  after.restore(shelved.view, shelved.memories);
+  after.use_tile_store(store->tile_store());
+  const SavedMap non_resident = store->load_non_resident();
+  after.resume(non_resident.view, non_resident.tile_evidence);
   EXPECT_EQ(after.memory_use().resident_tiles, 0U);
   EXPECT_EQ(places(after.removed(test::everywhere())), removed);
-  after.take_back_near(Vector3d::Zero(), PagedMap::limit_bytes);
+  after.reload_near(Vector3d::Zero(), PagedMap::limit_bytes);
   EXPECT_LE(after.memory_use().bytes, PagedMap::limit_bytes);
   EXPECT_GT(after.memory_use().resident_tiles, 5U);
-  EXPECT_EQ(after.view()->tiles.size(), shelved.view.tiles.size());
+  EXPECT_EQ(after.view()->tiles.size(), non_resident.view.tiles.size());
   EXPECT_GT(after.restore_removed(RemovalReason::moving, test::everywhere()), 100U);
 }
 
 /// Has lost one tile.
-class FaultyShelf : public TileShelf {
+class FaultyTileStore : public TileStore {
  public:
-  FaultyShelf(std::shared_ptr<TileShelf> sound, TileId lost)
+  FaultyTileStore(std::shared_ptr<TileStore> sound, TileId lost)
       : sound_(std::move(sound)), lost_(lost) {}
-  TileRecord take(TileId id) override {
+  TileRecord load(TileId id) override {
     if (id == lost_) throw std::runtime_error("the disk is broken");
-    return sound_->take(id);
+    return sound_->load(id);
   }
 
  private:
-  std::shared_ptr<TileShelf> sound_;
+  std::shared_ptr<TileStore> sound_;
   TileId lost_;
 };
 
@@ -213,18 +215,18 @@ TEST(MapPaging, ATileThatCannotBeReadStaysAsItIsStored) {
   const ScratchFolder folder;
   PagedMap before(open_map_file(folder / "map.stillmap"));
   before.drive();
-  const StoredMap whole = before.whole();
+  const SavedMap whole = before.whole();
 
   const auto store = open_map_file(folder / "map.stillmap");
   StaticMap after{StaticMapConfig{}};
-  after.use_shelf(std::make_shared<FaultyShelf>(store->shelf(), TileId{2, 0}));
-  const StoredMap shelved = store->load_shelved();
-  after.restore(shelved.view, shelved.memories);
+  after.use_tile_store(std::make_shared<FaultyTileStore>(store->tile_store(), TileId{2, 0}));
+  const SavedMap non_resident = store->load_non_resident();
+  after.resume(non_resident.view, non_resident.tile_evidence);
   Drive drive(after);
   for (int scan = 0; scan < 10; ++scan) drive.see(scan);
   EXPECT_THAT(after.unreadable_tiles(), testing::ElementsAre("tile (2, 0): the disk is broken"));
-  store->save(stored_state(after.checkpoint()));
-  const auto tile_of = [](const StoredMap& map) {
+  store->save(to_saved_map(after.checkpoint()));
+  const auto tile_of = [](const SavedMap& map) {
     return *std::ranges::find(map.view.tiles, TileId{2, 0},
                               [](const auto& tile) { return tile->info.id; });
   };
@@ -235,7 +237,7 @@ TEST(MapPaging, AFileOfTheFirstFormatIsReadAndUpgradedByTheFirstSave) {
   const ScratchFolder folder;
   const auto file = folder / "old.stillmap";
   StaticMap map = test::street_map(3, 100);
-  const StoredMap stored{*map.view(), {}, {}, {{"sensor", "HDL-64E"}}};
+  const SavedMap stored{*map.view(), {}, {}, {{"sensor", "HDL-64E"}}};
   open_map_file(file)->save(stored);
   {
     SQLite::Database database(file.string(), SQLite::OPEN_READWRITE);
@@ -248,11 +250,11 @@ TEST(MapPaging, AFileOfTheFirstFormatIsReadAndUpgradedByTheFirstSave) {
   }
   const auto store = open_map_file(file);
   EXPECT_EQ(voxels_of(store->load().view).size(), voxels_of(stored.view).size());
-  const StoredMap shelved = store->load_shelved();
-  ASSERT_EQ(shelved.view.tiles.size(), stored.view.tiles.size());
+  const SavedMap non_resident = store->load_non_resident();
+  ASSERT_EQ(non_resident.view.tiles.size(), stored.view.tiles.size());
   for (std::size_t i = 0; i < stored.view.tiles.size(); ++i) {
-    EXPECT_EQ(shelved.view.tiles[i]->info.voxel_count, stored.view.tiles[i]->info.voxel_count);
-    EXPECT_TRUE(shelved.view.tiles[i]->info.bounds_map.isApprox(
+    EXPECT_EQ(non_resident.view.tiles[i]->info.voxel_count, stored.view.tiles[i]->info.voxel_count);
+    EXPECT_TRUE(non_resident.view.tiles[i]->info.bounds_map.isApprox(
         stored.view.tiles[i]->info.bounds_map, 1e-6F));
   }
   EXPECT_EQ(voxels_of(store->load().view).size(), voxels_of(stored.view).size());
@@ -262,11 +264,11 @@ TEST(MapPaging, ACopyHoldsEverything) {
   const ScratchFolder folder;
   PagedMap paged;
   paged.drive();
-  const StoredMap whole = paged.whole();
+  const SavedMap whole = paged.whole();
   paged.store_->copy_to(folder / "copy.stillmap");
-  const StoredMap copy = open_map_file(folder / "copy.stillmap")->load();
+  const SavedMap copy = open_map_file(folder / "copy.stillmap")->load();
   EXPECT_EQ(voxels_of(copy.view).size(), voxels_of(whole.view).size());
-  EXPECT_EQ(copy.memories.size(), whole.memories.size());
+  EXPECT_EQ(copy.tile_evidence.size(), whole.tile_evidence.size());
 }
 
 }  // namespace

@@ -33,7 +33,7 @@ Row row(const QueryVoxel& v) {
 }
 
 /// Every voxel of the map looked at.
-std::vector<Row> oracle(const MapView& view, const MapQuery& query) {
+std::vector<Row> oracle(const MapSnapshot& view, const MapQuery& query) {
   const RegionShape region(query.region);
   std::vector<Row> rows;
   for (const auto& tile : view.tiles) {
@@ -48,7 +48,7 @@ std::vector<Row> oracle(const MapView& view, const MapQuery& query) {
 }
 
 /// All pages, one after the other.
-std::vector<Row> all_pages(const MapView& view, MapQuery query, int& pages) {
+std::vector<Row> all_pages(const MapSnapshot& view, MapQuery query, int& pages) {
   std::vector<Row> rows;
   pages = 0;
   do {
@@ -70,10 +70,10 @@ class MapQueryTest : public testing::Test {
  protected:
   static void SetUpTestSuite() { view_ = test::street_map(12, 300).view(); }
   static void TearDownTestSuite() { view_.reset(); }
-  static const MapView& view() { return *view_; }
+  static const MapSnapshot& view() { return *view_; }
 
  private:
-  static inline std::shared_ptr<const MapView> view_;
+  static inline std::shared_ptr<const MapSnapshot> view_;
 };
 
 TEST_F(MapQueryTest, AgreesWithBruteForceOnRandomBoxesAndClasses) {
@@ -193,9 +193,9 @@ TEST_F(MapQueryTest, NothingThereIsAFineAnswer) {
   EXPECT_TRUE(result.continuation.empty());
   query.region = box_region({Vector3d::Constant(9e5), Vector3d::Constant(infinity)});
   EXPECT_EQ(query_map(view(), query).total_voxels, 0U);
-  EXPECT_EQ(query_map(MapView{}, MapQuery()).status, QueryStatus::ok);
+  EXPECT_EQ(query_map(MapSnapshot{}, MapQuery()).status, QueryStatus::ok);
   query.resolution_m = 1.0;
-  EXPECT_EQ(query_map(MapView{}, query).status, QueryStatus::ok);
+  EXPECT_EQ(query_map(MapSnapshot{}, query).status, QueryStatus::ok);
 }
 
 TEST_F(MapQueryTest, RefusesWhatCannotBeAnsweredAndNamesIt) {
@@ -234,13 +234,13 @@ TEST_F(MapQueryTest, ContinuationOfAnotherVersionOrMapIsStale) {
   query.max_bytes = 1000;
   query.continuation = query_map(view(), query).continuation;
   EXPECT_EQ(continuation_version(query.continuation), view().version);
-  MapView later = view();
+  MapSnapshot later = view();
   ++later.version;
   MapQueryResult result = query_map(later, query);
   EXPECT_EQ(result.status, QueryStatus::stale_continuation);
   EXPECT_THAT(result.reason, testing::HasSubstr("ask again"));
   EXPECT_EQ(result.map_version, later.version);
-  MapView other = view();
+  MapSnapshot other = view();
   ++other.map_id;
   EXPECT_EQ(query_map(other, query).status, QueryStatus::stale_continuation);
 }

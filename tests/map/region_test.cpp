@@ -96,16 +96,16 @@ TEST(Region, BoxTestsNeverContradictPositionsInTheBox) {
       const RegionShape shape(region);
       const Vector3d corner(coordinate(random), coordinate(random), coordinate(random) / 10.0);
       const AlignedBox3d box(corner, corner + Vector3d(8.0, 8.0, 1.0) * share(random));
-      const bool may_meet = shape.may_meet(box);
+      const bool may_intersect = shape.may_intersect(box);
       const bool covers = shape.covers(box);
-      const RegionShape near = shape.near(box);
+      const RegionShape near = shape.restricted_to(box);
       covered += covers ? 1 : 0;
-      missed += may_meet ? 0 : 1;
+      missed += may_intersect ? 0 : 1;
       for (int k = 0; k < 20; ++k) {
         const Vector3d p = box.min() + box.sizes().cwiseProduct(
                                            Vector3d(share(random), share(random), share(random)));
         const bool inside = shape.contains(p);
-        EXPECT_LE(inside, may_meet);
+        EXPECT_LE(inside, may_intersect);
         EXPECT_GE(inside, covers);
         EXPECT_EQ(near.contains(p), inside);
         EXPECT_LE(inside, shape.bounds_map().contains(p));
@@ -138,7 +138,7 @@ TEST(Region, HeightsBoundPolygonsAndCorridors) {
       PolygonRegion{.corners_map = {{0, 0}, {4, 0}, {4, 4}, {0, 4}}, .heights = {1.0, 2.0}})};
   EXPECT_TRUE(polygon.contains({2, 2, 1.0}));
   EXPECT_FALSE(polygon.contains({2, 2, 0.9}));
-  EXPECT_FALSE(polygon.may_meet(AlignedBox3d(Vector3d(1, 1, 3), Vector3d(2, 2, 4))));
+  EXPECT_FALSE(polygon.may_intersect(AlignedBox3d(Vector3d(1, 1, 3), Vector3d(2, 2, 4))));
   const RegionShape corridor{Region(CorridorRegion{
       .path_map = {{0, 0}, {9, 0}}, .half_width_m = 1.0, .heights = {-infinity, 0.0}})};
   EXPECT_TRUE(corridor.contains({5, 0.5, -1e9}));

@@ -4,14 +4,14 @@
 
 namespace stillmap::test {
 
-StoredMap stored_map(int seed) {
+SavedMap saved_map(int seed) {
   StaticMap map = street_map(1 + seed % 3, 60);
   LabelledScan landmark;
   for (int i = 0; i < 3; ++i) {
     add_point(landmark, {static_cast<float>(seed % 50), 0.0F, 5.0F}, SemanticClass::pole);
   }
   map.insert(landmark, Eigen::Isometry3d::Identity());
-  StoredMap stored;
+  SavedMap stored;
   stored.view = *map.view();
   stored.view.map_id = 0xFFFFFFFFFFFFFF00ULL + static_cast<std::uint64_t>(seed % 200);
   for (int i = 0; i < 5 + seed; ++i) {
@@ -22,7 +22,7 @@ StoredMap stored_map(int seed) {
   return stored;
 }
 
-void expect_equal(const StoredMap& a, const StoredMap& b) {
+void expect_equal(const SavedMap& a, const SavedMap& b) {
   EXPECT_EQ(a.view.version, b.view.version);
   EXPECT_EQ(a.view.map_id, b.view.map_id);
   EXPECT_EQ(a.view.tile_size_m, b.view.tile_size_m);

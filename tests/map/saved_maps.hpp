@@ -7,9 +7,9 @@
 namespace stillmap::test {
 
 /// A small map with everything that a map file holds, different for each `seed`.
-[[nodiscard]] StoredMap stored_map(int seed);
+[[nodiscard]] SavedMap saved_map(int seed);
 
 /// Expects two stored maps to be the same in everything.
-void expect_equal(const StoredMap& a, const StoredMap& b);
+void expect_equal(const SavedMap& a, const SavedMap& b);
 
 }  // namespace stillmap::test

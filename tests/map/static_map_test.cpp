@@ -28,13 +28,13 @@ LabelledScan point_scan(const Vector3f& p, SemanticClass label, int count = 1,
   return scan;
 }
 
-std::size_t voxel_count(const MapView& view) {
+std::size_t voxel_count(const MapSnapshot& view) {
   std::size_t count = 0;
   for (const auto& tile : view.tiles) count += tile->voxels.size();
   return count;
 }
 
-std::vector<std::uint64_t> hashes(const MapView& view) {
+std::vector<std::uint64_t> hashes(const MapSnapshot& view) {
   std::vector<std::uint64_t> hashes;
   for (const auto& tile : view.tiles) hashes.push_back(tile->info.content_hash);
   return hashes;
@@ -230,10 +230,10 @@ TEST(StaticMap, DoesNotDependOnTheNumberOfThreads) {
 
 TEST(StaticMap, RestoredMapGoesOnLikeTheOriginal) {
   StaticMap original = test::street_map(3, 200);
-  MapView stored = *original.view();
+  MapSnapshot stored = *original.view();
   stored.map_id = 77;
   StaticMap restored(StaticMapConfig{});
-  restored.restore(stored);
+  restored.resume(stored);
   EXPECT_EQ(restored.view()->version, stored.version);
   EXPECT_EQ(restored.view()->map_id, 77U);
   EXPECT_EQ(restored.view()->tiles, stored.tiles);
@@ -252,7 +252,7 @@ TEST(StaticMap, RestoreRefusesAnotherVoxelSize) {
   StaticMap original = test::street_map(1, 100);
   StaticMap other(StaticMapConfig{.voxel_size_m = 0.1});
   EXPECT_THAT(
-      [&] { other.restore(*original.view()); },
+      [&] { other.resume(*original.view()); },
       testing::ThrowsMessage<std::invalid_argument>(testing::HasSubstr("voxel_size_m 0.2")));
 }
 

@@ -9,8 +9,9 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using Event = TileHistory::Event;
 
-MapView view_of(std::uint64_t version, const std::vector<Event>& tiles, std::uint64_t map_id = 7) {
-  MapView view{
+MapSnapshot view_of(std::uint64_t version, const std::vector<Event>& tiles,
+                    std::uint64_t map_id = 7) {
+  MapSnapshot view{
       .version = version, .map_id = map_id, .tile_size_m = 20.0, .voxel_size_m = 0.2, .tiles = {}};
   for (const auto& [id, revision] : tiles) {
     Tile tile;
@@ -28,7 +29,7 @@ TEST(TileHistory, RemembersWhenTilesAppearAndGo) {
   EXPECT_THAT(history.appeared, ElementsAre(Event{{0, 0}, 2}, Event{{0, 1}, 4}));
   history = history_with(history, view_of(6, {{{0, 1}, 4}}));
   EXPECT_THAT(history.appeared, ElementsAre(Event{{0, 1}, 4}));
-  EXPECT_THAT(history.gone, ElementsAre(Event{{0, 0}, 6}));
+  EXPECT_THAT(history.removed, ElementsAre(Event{{0, 0}, 6}));
   EXPECT_EQ(history.version, 6U);
   EXPECT_EQ(history.known_since, 3U);
 }
@@ -37,7 +38,7 @@ TEST(TileHistory, ATileThatComesBackAppearsAgain) {
   TileHistory history = history_from(view_of(1, {{{0, 0}, 1}}));
   history = history_with(history, view_of(2, {}));
   history = history_with(history, view_of(4, {{{0, 0}, 4}}));
-  EXPECT_THAT(history.gone, IsEmpty());
+  EXPECT_THAT(history.removed, IsEmpty());
   EXPECT_THAT(history.appeared, ElementsAre(Event{{0, 0}, 4}));
 }
 
@@ -47,7 +48,7 @@ TEST(TileHistory, ForgetsTheOldestRemovalsAndSaysSo) {
   history = history_with(history, view_of(3, {{{0, 2}, 1}}), 2);
   EXPECT_EQ(history.known_since, 1U);
   history = history_with(history, view_of(4, {}), 2);
-  EXPECT_THAT(history.gone, ElementsAre(Event{{0, 1}, 3}, Event{{0, 2}, 4}));
+  EXPECT_THAT(history.removed, ElementsAre(Event{{0, 1}, 3}, Event{{0, 2}, 4}));
   EXPECT_EQ(history.known_since, 2U);
 }
 
@@ -56,7 +57,7 @@ TEST(TileHistory, BeginsAnewWithAnotherMap) {
   history = history_with(history, view_of(9, {{{1, 1}, 8}}, 8));
   EXPECT_EQ(history.map_id, 8U);
   EXPECT_EQ(history.known_since, 9U);
-  EXPECT_THAT(history.gone, IsEmpty());
+  EXPECT_THAT(history.removed, IsEmpty());
   history = history_with(history, view_of(2, {}, 8));
   EXPECT_EQ(history.known_since, 2U);
 }

@@ -40,7 +40,7 @@ TEST(TileLookup, WholeWorldIsEveryTileAndNonsenseIsNone) {
   AlignedBox3d no_number = everywhere;
   no_number.min().x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_TRUE(tile_versions(*view, no_number).empty());
-  EXPECT_TRUE(tile_versions(MapView{}, everywhere).empty());
+  EXPECT_TRUE(tile_versions(MapSnapshot{}, everywhere).empty());
 }
 
 TEST(TileLookup, FindsTilesByIdAndLeavesOutUnknownOnes) {
@@ -49,7 +49,7 @@ TEST(TileLookup, FindsTilesByIdAndLeavesOutUnknownOnes) {
   const std::vector<TileId> ids{{1000, 1000}, known, {-1000, 3}, view->tiles.front()->info.id};
   EXPECT_THAT(find_tiles(*view, ids),
               testing::ElementsAre(view->tiles.back(), view->tiles.front()));
-  EXPECT_TRUE(find_tiles(MapView{}, ids).empty());
+  EXPECT_TRUE(find_tiles(MapSnapshot{}, ids).empty());
 }
 
 }  // namespace

@@ -61,14 +61,15 @@ Seen parked_car(double azimuth, double elevation) {
   return seen;
 }
 
-class LookThrough : public testing::Test {
+class VisibilityClearing : public testing::Test {
  protected:
   template <typename World>
   void see(World world, int scans) {
     for (int i = 0; i < scans; ++i) {
       const LabelledScan scan = looking_ahead(++stamp_ns_, world);
       map_.insert(scan, Isometry3d::Identity());
-      map_.look_through(RangeView(scan.scan, {}, hdl_64e(), Isometry3d::Identity()), stamp_ns_);
+      map_.clear_seen_through(RangeImageView(scan.scan, {}, hdl_64e(), Isometry3d::Identity()),
+                              stamp_ns_);
     }
   }
   [[nodiscard]] int shown(SemanticClass label) {
@@ -88,7 +89,7 @@ class LookThrough : public testing::Test {
   std::int64_t stamp_ns_ = 0;
 };
 
-TEST_F(LookThrough, WhatRaysKeepPassingThroughLeavesTheView) {
+TEST_F(VisibilityClearing, WhatRaysKeepPassingThroughLeavesTheView) {
   see(ghost, 2);
   const int before = shown(fence);
   ASSERT_GT(before, 50);
@@ -100,7 +101,7 @@ TEST_F(LookThrough, WhatRaysKeepPassingThroughLeavesTheView) {
   EXPECT_GT(shown(building), 100);
 }
 
-TEST_F(LookThrough, WhatComesToStandThereComesIntoViewAgain) {
+TEST_F(VisibilityClearing, WhatComesToStandThereComesIntoViewAgain) {
   see(ghost, 2);
   const int before = shown(fence);
   see(wall, 20);
@@ -109,7 +110,7 @@ TEST_F(LookThrough, WhatComesToStandThereComesIntoViewAgain) {
   EXPECT_GE(shown(fence), before);
 }
 
-TEST_F(LookThrough, ThinThingsStay) {
+TEST_F(VisibilityClearing, ThinThingsStay) {
   see(pole_before_wall, 3);
   const int before = shown(pole);
   ASSERT_GT(before, 5);
@@ -118,7 +119,7 @@ TEST_F(LookThrough, ThinThingsStay) {
   EXPECT_EQ(removed(RemovalReason::seen_through), 0);
 }
 
-TEST_F(LookThrough, RemovedThingsAreRememberedWithTheirReason) {
+TEST_F(VisibilityClearing, RemovedThingsAreRememberedWithTheirReason) {
   see(passing_car, 1);
   const int moving = removed(RemovalReason::moving);
   EXPECT_GT(moving, 50);
@@ -127,7 +128,7 @@ TEST_F(LookThrough, RemovedThingsAreRememberedWithTheirReason) {
   EXPECT_EQ(shown(car), 0);
 }
 
-TEST_F(LookThrough, RemovedThingsCanBeShownAgain) {
+TEST_F(VisibilityClearing, RemovedThingsCanBeShownAgain) {
   see(parked_car, 3);
   const int parked = removed(RemovalReason::semi_static);
   ASSERT_GT(parked, 50);
@@ -140,20 +141,20 @@ TEST_F(LookThrough, RemovedThingsCanBeShownAgain) {
   EXPECT_EQ(shown(car), static_cast<int>(restored));
 }
 
-TEST_F(LookThrough, AStoredMapKeepsItsWeight) {
+TEST_F(VisibilityClearing, AStoredMapKeepsItsWeight) {
   see(ghost, 10);
   const auto stored = map_.view();
   map_ = StaticMap(StaticMapConfig{});
-  map_.restore(*stored);
+  map_.resume(*stored);
   const int before = shown(fence);
   ASSERT_GT(before, 50);
   see(wall, 5);
   EXPECT_EQ(shown(fence), before);
 }
 
-TEST_F(LookThrough, OffItLeavesEverything) {
+TEST_F(VisibilityClearing, OffItLeavesEverything) {
   StaticMapConfig config;
-  config.clear_range_m = 0.0;
+  config.clearing_range_m = 0.0;
   map_ = StaticMap(config);
   see(ghost, 2);
   const int before = shown(fence);

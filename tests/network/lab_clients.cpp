@@ -12,9 +12,9 @@
 #include <thread>
 #include <vector>
 
-#include "clients/library/client.hpp"
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/library/client.hpp"
 
 namespace stillmap {
 namespace {
@@ -23,7 +23,7 @@ using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
 
 struct Arguments {
-  ClientArguments client;
+  cli::ClientArguments client;
   int count = 1;
   /// Longest time, from the end of the drive, until all tiles must have come.
   double settle_s = 30.0;
@@ -42,7 +42,7 @@ class PoseAges {
     const auto now = Clock::now();
     const std::scoped_lock lock(mutex_);
     ages_ms_.push_back(static_cast<double>(now_ns - stamp_ns) / 1e6);
-    if (last_) longest_gap_s_ = std::max(longest_gap_s_, Seconds(now - *last_).count());
+    if (last_) max_gap_s_ = std::max(max_gap_s_, Seconds(now - *last_).count());
     last_ = now;
   }
 
@@ -56,14 +56,14 @@ class PoseAges {
             {"p99_ms", sorted[sorted.size() * 99 / 100]},
             {"max_ms", sorted.back()},
             {"last_ms", ages_ms_.back()},
-            {"longest_gap_s", longest_gap_s_}};
+            {"max_gap_s", max_gap_s_}};
   }
 
  private:
   mutable std::mutex mutex_;
   std::vector<double> ages_ms_;
   std::optional<Clock::time_point> last_;
-  double longest_gap_s_ = 0.0;
+  double max_gap_s_ = 0.0;
 };
 
 class Planner {
@@ -72,7 +72,7 @@ class Planner {
       : client_(options),
         busy_(arguments.busy_ms),
         tiles_subscription_(client_.subscribe_tiles(
-            [this](const MapIdentity&, const Tile& tile) { note(tile.info); })) {
+            [this](const dds::MapIdentity&, const Tile& tile) { note(tile.info); })) {
     if (!arguments.with_poses) return;
     poses_subscription_.emplace(client_.subscribe_odometry([this](const OdometryUpdate& update) {
       poses_.note(update.pose.stamp_ns);
@@ -134,7 +134,7 @@ struct Settled {
 };
 
 /// Waits until the map stands still and all planners have all of it.
-Settled settle(Planners& planners, double longest_s) {
+Settled settle(Planners& planners, double max_s) {
   const auto began = Clock::now();
   Settled settled;
   do {
@@ -146,14 +146,14 @@ Settled settle(Planners& planners, double longest_s) {
       if (settled.tiles > 0 && settled.lacking == 0) break;
     }
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
-  } while (settled.took_s < longest_s);
+  } while (settled.took_s < max_s);
   return settled;
 }
 
 /// What the server says of its work.
-nlohmann::json mapper_report(const ServerStatus& status) {
+nlohmann::json mapper_report(const dds::ServerStatus& status) {
   nlohmann::json report{{"mapped", status.counter("scans_mapped")}};
-  for (const StageLatency& stage : status.latencies) {
+  for (const dds::StageLatency& stage : status.latencies) {
     if (stage.stage != "total") continue;
     report["p50_ms"] = stage.p50_ms;
     report["p99_ms"] = stage.p99_ms;
@@ -168,7 +168,7 @@ void wait_for_end_of_input() {
   }
 }
 
-ExitCode watch(const Arguments& arguments) {
+cli::ExitCode watch(const Arguments& arguments) {
   Planners planners;
   for (int i = 0; i < arguments.count; ++i) {
     planners.emplace_back(arguments, arguments.client.client());
@@ -184,21 +184,21 @@ ExitCode watch(const Arguments& arguments) {
                               {"mapper", mapper_report(planners.front().client().status())},
                               {"poses", poses}}
             << std::endl;
-  return settled.tiles > 0 && settled.lacking == 0 ? ExitCode::ok : ExitCode::failed;
+  return settled.tiles > 0 && settled.lacking == 0 ? cli::ExitCode::ok : cli::ExitCode::failed;
 }
 
 }  // namespace
 }  // namespace stillmap
 
 int main(int argc, char** argv) {
-  stillmap::CommandLine line("lab_clients", "", "Planners for network tests.");
+  stillmap::cli::CommandLine line("lab_clients", "", "Planners for network tests.");
   stillmap::Arguments arguments;
   auto root = line.root();
   root.option("--count", arguments.count, "Planners");
   root.option("--settle", arguments.settle_s, "Wait so long for all tiles in the end [s]");
   root.option("--busy-ms", arguments.busy_ms, "Take so long for each sample");
   root.flag("--poses,!--no-poses", arguments.with_poses, "Take poses, too (default)");
-  stillmap::add_client_options(root, arguments.client);
-  if (line.parse(argc, argv) != stillmap::CommandLine::Parsed::command) return 2;
-  return static_cast<int>(stillmap::run_action([&] { return stillmap::watch(arguments); }));
+  stillmap::cli::add_client_options(root, arguments.client);
+  if (line.parse(argc, argv) != stillmap::cli::CommandLine::Parsed::command) return 2;
+  return static_cast<int>(stillmap::cli::run_action([&] { return stillmap::watch(arguments); }));
 }

@@ -7,9 +7,9 @@
 #include <thread>
 #include <vector>
 
-#include "clients/library/client.hpp"
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/library/client.hpp"
 #include "clients/library/scan_publisher.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "core/dataset/scan_dataset.hpp"
@@ -20,7 +20,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 struct Arguments {
-  ClientArguments client;
+  cli::ClientArguments client;
   std::string dataset;
   int scans = 0;
   double rate_hz = 10.0;
@@ -47,12 +47,12 @@ std::size_t to_and_fro(std::size_t step, std::size_t frames) {
   return static_cast<std::size_t>(std::lround(0.5 * last * (1.0 - std::cos(phase))));
 }
 
-ExitCode drive(const Arguments& arguments) {
-  StopSignal stop;
+cli::ExitCode drive(const Arguments& arguments) {
+  cli::StopSignal stop;
   std::vector<DatasetFrame> frames = read_frames(arguments);
   Client client(arguments.client.client());
   ScanPublisher publisher(client, {.dds = arguments.client.dds(DdsRole::sensor)});
-  if (!publisher.wait_for_subscriber(arguments.client.timeout())) return ExitCode::no_server;
+  if (!publisher.wait_for_subscriber(arguments.client.timeout())) return cli::ExitCode::no_server;
   const auto period = std::chrono::duration<double>(1.0 / arguments.rate_hz);
   const auto began = Clock::now();
   int sent = 0;
@@ -66,20 +66,20 @@ ExitCode drive(const Arguments& arguments) {
     std::this_thread::sleep_until(began + sent * period);
   }
   std::printf("{\"published\": %d}\n", sent);
-  return ExitCode::ok;
+  return cli::ExitCode::ok;
 }
 
 }  // namespace
 }  // namespace stillmap
 
 int main(int argc, char** argv) {
-  stillmap::CommandLine line("lab_robot", "", "A lidar driver for network tests.");
+  stillmap::cli::CommandLine line("lab_robot", "", "A lidar driver for network tests.");
   stillmap::Arguments arguments;
   auto root = line.root();
   root.option("DATASET", arguments.dataset, "Recording").required();
   root.option("--scans", arguments.scans, "Scans to publish").required();
   root.option("--rate", arguments.rate_hz, "Scans a second").above_zero();
-  stillmap::add_client_options(root, arguments.client);
-  if (line.parse(argc, argv) != stillmap::CommandLine::Parsed::command) return 2;
-  return static_cast<int>(stillmap::run_action([&] { return stillmap::drive(arguments); }));
+  stillmap::cli::add_client_options(root, arguments.client);
+  if (line.parse(argc, argv) != stillmap::cli::CommandLine::Parsed::command) return 2;
+  return static_cast<int>(stillmap::cli::run_action([&] { return stillmap::drive(arguments); }));
 }

@@ -39,7 +39,7 @@ ALL = [
 SHORT = ("undisturbed LAN", "5 % loss, wifi", "no multicast, discovery server")
 
 
-def pose_faults(poses, mapper, longest_gap_s):
+def pose_faults(poses, mapper, max_gap_s):
     if poses["count"] == 0:
         return ["no poses arrived"]
     faults = []
@@ -47,12 +47,12 @@ def pose_faults(poses, mapper, longest_gap_s):
         faults.append("poses are old")
     if poses["last_ms"] > mapper["p99_ms"] + FRESH_AT_THE_END_MS:
         faults.append(f"the last pose was {poses['last_ms']:.0f} ms old")
-    if poses["longest_gap_s"] > longest_gap_s:
-        faults.append(f"no pose for {poses['longest_gap_s']:.1f} s")
+    if poses["max_gap_s"] > max_gap_s:
+        faults.append(f"no pose for {poses['max_gap_s']:.1f} s")
     return faults
 
 
-def faults_of(figures, longest_gap_s, undisturbed):
+def faults_of(figures, max_gap_s, undisturbed):
     """What does not hold, in words."""
     faults = []
     mapper = figures["mapper"]
@@ -60,9 +60,9 @@ def faults_of(figures, longest_gap_s, undisturbed):
         faults.append(f"{figures['lacking']} of {figures['tiles']} tiles did not arrive")
     if figures["memory_mb"] > undisturbed["memory_mb"] + MEMORY_GROWTH_MB:
         faults.append("the server's memory grew")
-    if longest_gap_s is None:
+    if max_gap_s is None:
         return faults  # Nobody was there while the robot drove.
-    faults += pose_faults(figures["poses"], mapper, longest_gap_s)
+    faults += pose_faults(figures["poses"], mapper, max_gap_s)
     if mapper["p50_ms"] > 1.5 * undisturbed["mapper"]["p50_ms"] + SLOWER_MS:
         faults.append("the mapper became slower")
     if mapper["mapped"] < 0.7 * undisturbed["mapper"]["mapped"]:
@@ -78,7 +78,7 @@ def row_of(name, figures):
     poses = figures["poses"]
     ages = ["-"] * 4 if poses["count"] == 0 else [
         str(poses["count"]), f"{poses['p50_ms']:.0f} ms", f"{poses['p99_ms']:.0f} ms",
-        f"{poses['longest_gap_s']:.1f} s"]
+        f"{poses['max_gap_s']:.1f} s"]
     return [name, str(figures["tiles"]), str(figures["lacking"]), f"{figures['settled_s']:.1f} s",
             *ages, f"{figures['memory_mb']:.0f} MB", f"{figures['mapper']['p50_ms']:.0f} ms",
             f"{figures['mapper']['p99_ms']:.0f} ms",
@@ -113,7 +113,7 @@ def main():
     print_row(HEAD)
     print_row(["---"] * len(HEAD))
     undisturbed, failed = None, False
-    for name, scenario, longest_gap_s in ALL:
+    for name, scenario, max_gap_s in ALL:
         if arguments.short and name not in SHORT:
             continue
         if arguments.only and arguments.only not in name:
@@ -128,7 +128,7 @@ def main():
             continue
         undisturbed = undisturbed or figures
         print_row(row_of(name, figures))
-        for fault in faults_of(figures, longest_gap_s, undisturbed):
+        for fault in faults_of(figures, max_gap_s, undisturbed):
             failed = True
             print(f"  FAILED: {name}: {fault}", flush=True)
     raise SystemExit(1 if failed else 0)

@@ -42,8 +42,8 @@ void DenseOccupancy::add_passed(const Eigen::Vector3d& from_map, const Eigen::Ve
   }
 }
 
-void DenseOccupancy::insert(const PlacedScan& placed, const ScanUse& use) {
-  const bool clears = scans_++ % config_.clear_every == 0 && use.clears;
+void DenseOccupancy::insert(const PlacedScan& placed, const ScanUpdateOptions& use) {
+  const bool clears = scans_++ % config_.clearing_interval == 0 && use.clear_free_space;
   const Eigen::Vector3d lidar_map = placed.T_map_lidar.translation();
   std::set<Key> hits;
   std::set<Key> ends;

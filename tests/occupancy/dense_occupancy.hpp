@@ -18,7 +18,7 @@ class DenseOccupancy {
   /// Voxels -`reach` .. `reach` - 1 along each axis.
   DenseOccupancy(const OccupancyConfig& config, int reach) : config_(config), reach_(reach) {}
 
-  void insert(const PlacedScan& placed, const ScanUse& use = {});
+  void insert(const PlacedScan& placed, const ScanUpdateOptions& use = {});
 
   [[nodiscard]] const std::map<Key, double>& log_odds() const { return log_odds_; }
   [[nodiscard]] Eigen::Vector3d centre_map(const Key& key) const;

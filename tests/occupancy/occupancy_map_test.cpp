@@ -19,7 +19,7 @@ OccupancyConfig small_config() {
   config.resolution_m = 0.25;
   config.max_range_m = 3.5;
   config.clear_range_m = 2.5;
-  config.clear_every = 2;
+  config.clearing_interval = 2;
   config.clear_margin_m = 0.2;
   return config;
 }
@@ -31,7 +31,7 @@ TEST(OccupancyMap, AgreesWithAPlainSlowReference) {
   DenseOccupancy reference(small_config(), 24);
   for (std::uint32_t seed = 0; seed < 12; ++seed) {
     const PlacedScan placed = random_scan(seed, 60, 3.0);
-    const ScanUse use{.clears = seed % 5 != 4, .unknown_is_solid = true};
+    const ScanUpdateOptions use{.clear_free_space = seed % 5 != 4, .unknown_is_solid = true};
     map.insert(placed.scan, placed.T_map_lidar, use);
     reference.insert(placed, use);
   }
@@ -56,8 +56,8 @@ TEST(OccupancyMap, CanBeHeldUpWhileItTakesAScan) {
   int portions = 0;
   for (std::uint32_t seed = 0; seed < 2; ++seed) {
     const PlacedScan placed = random_scan(seed, 300, 3.0);
-    map.gather(placed.scan, placed.T_map_lidar, {}, [&] { ++pauses; });
-    while (map.take_gathered(7)) ++portions;
+    map.compute_update(placed.scan, placed.T_map_lidar, {}, [&] { ++pauses; });
+    while (map.apply_update(7)) ++portions;
     undisturbed.insert(placed.scan, placed.T_map_lidar);
   }
   EXPECT_GE(pauses, 2 * 300 / 64);
@@ -78,7 +78,7 @@ TEST(OccupancyMap, UnknownClassesAreSolidUnlessTheyMayBeMovers) {
   LabelledScan scan = one_point({5.1F, 0.1F, 0.1F});
   for (const bool is_solid : {true, false}) {
     OccupancyMap map(OccupancyConfig{});
-    map.insert(scan, at(0.0), {.clears = true, .unknown_is_solid = is_solid});
+    map.insert(scan, at(0.0), {.clear_free_space = true, .unknown_is_solid = is_solid});
     EXPECT_EQ(map.at_point({5.1, 0.1, 0.1}).occupancy,
               is_solid ? Occupancy::occupied : Occupancy::unknown);
   }
@@ -95,10 +95,10 @@ TEST(OccupancyMap, WhatIsSeenThroughBecomesFree) {
 
 TEST(OccupancyMap, ClearsEveryNthScanAndNotAtAllWhenToldSo) {
   OccupancyConfig config;
-  config.clear_every = 2;
+  config.clearing_interval = 2;
   OccupancyMap map(config);
   const LabelledScan scan = one_point({10.0F, 0.1F, 0.1F});
-  map.insert(scan, at(0.0), {.clears = false, .unknown_is_solid = true});
+  map.insert(scan, at(0.0), {.clear_free_space = false, .unknown_is_solid = true});
   map.insert(scan, at(0.0));
   EXPECT_EQ(map.at_point({5.0, 0.05, 0.05}).occupancy, Occupancy::unknown);
   map.insert(scan, at(0.0));
@@ -121,7 +121,7 @@ TEST(OccupancyMap, BrokenPointsAndPosesTellNothing) {
 }
 
 TEST(OccupancyMap, BeginsWithAStaticMapsVoxelsAtAnyResolution) {
-  const MapView view = *street_map(10).view();
+  const MapSnapshot view = *street_map(10).view();
   for (const double resolution_m : {0.1, 0.2, 0.5}) {
     OccupancyConfig config;
     config.resolution_m = resolution_m;

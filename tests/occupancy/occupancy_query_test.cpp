@@ -52,7 +52,7 @@ TEST_F(OccupancyQuery, BoxesCountVoxelsAndListTheOccupiedOnes) {
 
 TEST_F(OccupancyQuery, RaysEndAtWhatIsOccupiedOrUnknownOrAtTheirRange) {
   const RayOccupancy hit = map_.along_ray(
-      {.origin_map = {8.0, 0.1, 0.1}, .direction_map = {3, 0, 0}, .passes_unknown = true});
+      {.origin_map = {8.0, 0.1, 0.1}, .direction_map = {3, 0, 0}, .ignore_unknown = true});
   EXPECT_EQ(hit.end, Occupancy::occupied);
   EXPECT_NEAR(hit.length_m, 2.0, 1e-9);
   EXPECT_LT((hit.end_map - Eigen::Vector3d(10.0, 0.1, 0.1)).norm(), 1e-9);
@@ -68,7 +68,7 @@ TEST_F(OccupancyQuery, RaysEndAtWhatIsOccupiedOrUnknownOrAtTheirRange) {
 }
 
 TEST_F(OccupancyQuery, RaysLeaveTheMapAtItsEdge) {
-  RayQuery ray{.origin_map = {6550.0, 0.1, 0.1}, .passes_unknown = true};
+  RayQuery ray{.origin_map = {6550.0, 0.1, 0.1}, .ignore_unknown = true};
   const RayOccupancy result = map_.along_ray(ray);
   EXPECT_EQ(result.end, Occupancy::free);
   EXPECT_NEAR(result.length_m, 3.6, 1e-6);

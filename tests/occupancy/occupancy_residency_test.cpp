@@ -8,9 +8,9 @@ namespace stillmap::test {
 namespace {
 
 /// A street of 300 m, seen and cleared along its way.
-class FollowedStreet : public testing::Test {
+class PagedStreet : public testing::Test {
  protected:
-  FollowedStreet() {
+  PagedStreet() {
     StaticMapConfig config;
     StaticMap street(config);
     for (int k = 0; k < 10; ++k) {
@@ -25,10 +25,10 @@ class FollowedStreet : public testing::Test {
   }
 
   /// The view when tiles behind this place have left memory.
-  [[nodiscard]] MapView without_tiles_before(double x_map) const {
-    MapView view = view_;
+  [[nodiscard]] MapSnapshot without_tiles_before(double x_map) const {
+    MapSnapshot view = view_;
     for (auto& tile : view.tiles) {
-      if ((tile->info.id.x + 1) * view.tile_size_m <= x_map) tile = shelved(*tile);
+      if ((tile->info.id.x + 1) * view.tile_size_m <= x_map) tile = without_voxels(*tile);
     }
     return view;
   }
@@ -39,32 +39,32 @@ class FollowedStreet : public testing::Test {
   }
 
   OccupancyMap map_{OccupancyConfig{}};
-  MapView view_;
+  MapSnapshot view_;
 };
 
-TEST_F(FollowedStreet, ForgetsWhatIsOnTheShelfAndNothingElse) {
+TEST_F(PagedStreet, ForgetsWhatIsOnTheShelfAndNothingElse) {
   const BoxOccupancy ahead = between(150.0, 400.0);
   ASSERT_GT(between(0.0, 100.0).free, 1000U);
-  EXPECT_FALSE(map_.follow(view_));
-  EXPECT_TRUE(map_.follow(without_tiles_before(140.0)));
+  EXPECT_FALSE(map_.sync_residency(view_));
+  EXPECT_TRUE(map_.sync_residency(without_tiles_before(140.0)));
   // Columns of 25.6 m that reach into tiles in memory stay.
   EXPECT_EQ(between(-10.0, 100.0).free, 0U);
   EXPECT_EQ(between(-10.0, 100.0).occupied, 0U);
   EXPECT_EQ(between(150.0, 400.0).free, ahead.free);
   EXPECT_EQ(between(150.0, 400.0).occupied, ahead.occupied);
-  EXPECT_FALSE(map_.follow(without_tiles_before(140.0))) << "nothing new";
+  EXPECT_FALSE(map_.sync_residency(without_tiles_before(140.0))) << "nothing new";
 }
 
-TEST_F(FollowedStreet, CountsItsNodesRightly) {
+TEST_F(PagedStreet, CountsItsNodesRightly) {
   const OccupancySize whole = map_.size();
-  map_.follow(without_tiles_before(140.0));
+  map_.sync_residency(without_tiles_before(140.0));
   EXPECT_LT(map_.size().memory_bytes, whole.memory_bytes);
   EXPECT_EQ(map_.size().nodes, OccupancyMap(map_.encode(false)).size().nodes);
 }
 
-TEST_F(FollowedStreet, TakesVoxelsOfTilesThatCameBackForOccupied) {
-  map_.follow(without_tiles_before(140.0));
-  EXPECT_TRUE(map_.follow(view_));
+TEST_F(PagedStreet, TakesVoxelsOfTilesThatCameBackForOccupied) {
+  map_.sync_residency(without_tiles_before(140.0));
+  EXPECT_TRUE(map_.sync_residency(view_));
   std::size_t voxels = 0;
   for (const auto& tile : view_.tiles) {
     if ((tile->info.id.x + 1) * view_.tile_size_m > 100.0) continue;
@@ -76,12 +76,12 @@ TEST_F(FollowedStreet, TakesVoxelsOfTilesThatCameBackForOccupied) {
   EXPECT_GT(voxels, 100U);
 }
 
-TEST_F(FollowedStreet, KnowsFromItsFirstViewWhatIsAway) {
+TEST_F(PagedStreet, KnowsFromItsFirstViewWhatIsAway) {
   OccupancyMap map{OccupancyConfig{}};
-  const MapView stored = without_tiles_before(140.0);
+  const MapSnapshot stored = without_tiles_before(140.0);
   map.insert(stored);
-  EXPECT_TRUE(map.follow(stored));
-  EXPECT_TRUE(map.follow(view_));
+  EXPECT_TRUE(map.sync_residency(stored));
+  EXPECT_TRUE(map.sync_residency(view_));
   const Voxel& voxel = view_.tiles.front()->voxels.front();
   EXPECT_EQ(map.at_point(voxel.mean_map.cast<double>()).occupancy, Occupancy::occupied);
 }

@@ -7,11 +7,11 @@
 namespace stillmap::test {
 
 /// A lidar that winds along x at 6 m/s, ten scans a second, from the origin.
-struct BoxDrive {
+struct BoxSequence {
   std::vector<Eigen::Isometry3d> T_map_lidar;
   std::vector<BoxScan> scans;
 
-  BoxDrive(const BoxWorld& world, int count) {
+  BoxSequence(const BoxWorld& world, int count) {
     for (int k = 0; k < count; ++k) {
       const double x = 0.6 * k;
       const double y = 1.0 - std::cos(x / 8.0);

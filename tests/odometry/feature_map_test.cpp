@@ -140,7 +140,7 @@ TEST(FeatureMapForget, KeepsWhatIsNearAndForgetsWhatIsFar) {
   FeatureMap map(config);
   map.insert(points);
   const Eigen::Vector3f centre(3.0F, -4.0F, 0.0F);
-  map.forget_far_from(centre);
+  map.remove_far_from(centre);
   std::size_t left = 0;
   for (const LabelledPoint& point : points) {
     const bool is_there = map.nearest(point.position_map, 1, 0.0F).count == 1;
@@ -161,7 +161,7 @@ TEST(FeatureMapForget, RoomOfForgottenVoxelsIsUsedAgain) {
     const Eigen::Vector3f centre(20.0F * static_cast<float>(k), 0.0F, 0.0F);
     const auto points = random_points(300, centre, {2.0F, 2.0F, 2.0F}, 42U + unsigned(k));
     map.insert(points);
-    map.forget_far_from(centre);
+    map.remove_far_from(centre);
     ASSERT_EQ(map.size(), points.size());
     const Neighbours found = map.nearest(points[7].position_map, 1, 1.0F);
     ASSERT_EQ(found.count, 1);

@@ -16,57 +16,58 @@ using test::car_size_m;
 
 struct Judged {
   BoxScan seen;
-  Objects objects;
-  std::vector<ObjectVerdict> verdicts;
+  ObjectClusters objects;
+  std::vector<MotionClass> motion_classes;
 
-  /// The one verdict on all points that `chosen` picks by their position in the lidar frame.
+  /// The one class of all points that `chosen` picks by their position in the lidar frame.
   template <typename Predicate>
-  [[nodiscard]] ObjectVerdict verdict_where(Predicate chosen) const {
+  [[nodiscard]] MotionClass verdict_where(Predicate chosen) const {
     std::vector<int> votes(3, 0);
     for (std::size_t i = 0; i < seen.scan.size(); ++i)
-      if (objects.of_point[i] != Objects::none && chosen(seen.scan.points_lidar[i]))
-        ++votes[static_cast<std::size_t>(verdicts[static_cast<std::size_t>(objects.of_point[i])])];
-    return static_cast<ObjectVerdict>(std::ranges::max_element(votes) - votes.begin());
+      if (objects.of_point[i] != ObjectClusters::none && chosen(seen.scan.points_lidar[i]))
+        ++votes[static_cast<std::size_t>(
+            motion_classes[static_cast<std::size_t>(objects.of_point[i])])];
+    return static_cast<MotionClass>(std::ranges::max_element(votes) - votes.begin());
   }
 };
 
 /// The last of `scans` scans at 10 Hz from a lidar that drives along x.
-Judged judge_last(const BoxWorld& world, int scans, double lidar_speed_m_s = 0.0) {
+Judged classify_last(const BoxWorld& world, int scans, double lidar_speed_m_s = 0.0) {
   const SensorModel sensor = test::test_lidar();
   const MotionConfig config;
-  PastViews past(config);
+  RangeImageHistory history(config);
   Judged last;
   for (int k = 0; k < scans; ++k) {
     const double time_s = 0.1 * k;
     const Eigen::Isometry3d T = test::level_pose(lidar_speed_m_s * time_s, 0.0, 0.0);
     last.seen = world.scan(sensor, T, time_s);
     const Scan& scan = last.seen.scan;
-    last.objects = find_objects(scan.points_lidar, scan.labels, config.object_gap_m);
-    RangeView now(scan, scan.labels, sensor, T);
-    last.verdicts = judge_objects(scan, last.objects, T, past, now, config);
-    past.add(std::move(now));
+    last.objects = cluster_objects(scan.points_lidar, scan.labels, config.object_gap_m);
+    RangeImageView now(scan, scan.labels, sensor, T);
+    last.motion_classes = classify_motion(scan, last.objects, T, history, now, config);
+    history.add(std::move(now));
   }
   return last;
 }
 
 bool anywhere(const Eigen::Vector3f& /*p_lidar*/) { return true; }
 
-TEST(JudgeObjects, ParkedCarIsParkedOnceThePastIsFull) {
+TEST(ClassifyMotion, ParkedCarIsParkedOnceThePastIsFull) {
   BoxWorld world = test::street();
   for (const double speed_m_s : {0.0, 8.0}) {
-    const Judged judged = judge_last(world, 9, speed_m_s);
+    const Judged judged = classify_last(world, 9, speed_m_s);
     const auto near_left_or_right = [](const Eigen::Vector3f& p) { return p.norm() < 12.0F; };
-    EXPECT_EQ(judged.verdict_where(near_left_or_right), ObjectVerdict::parked) << speed_m_s;
-    EXPECT_EQ(judge_last(world, 5, speed_m_s).verdict_where(anywhere), ObjectVerdict::undecided);
+    EXPECT_EQ(judged.verdict_where(near_left_or_right), MotionClass::parked) << speed_m_s;
+    EXPECT_EQ(classify_last(world, 5, speed_m_s).verdict_where(anywhere), MotionClass::undecided);
   }
 }
 
-TEST(JudgeObjects, FirstScansDecideNothing) {
+TEST(ClassifyMotion, FirstScansDecideNothing) {
   BoxWorld world = test::street();
   world.stand(10.0, 0.0, car_size_m, SemanticClass::car, {8.0, 0.0, 0.0});
   for (const int scans : {1, 2})
-    for (const ObjectVerdict verdict : judge_last(world, scans).verdicts)
-      EXPECT_EQ(verdict, ObjectVerdict::undecided);
+    for (const MotionClass motion_class : classify_last(world, scans).motion_classes)
+      EXPECT_EQ(motion_class, MotionClass::undecided);
 }
 
 struct MovingCase {
@@ -76,7 +77,7 @@ struct MovingCase {
   double lidar_speed_m_s;
 };
 
-TEST(JudgeObjects, MovingCarIsMovingWhicheverWayItGoes) {
+TEST(ClassifyMotion, MovingCarIsMovingWhicheverWayItGoes) {
   const MovingCase cases[] = {
       {"crosses", 12.0, -4.0, {0.0, 5.0, 0.0}, 0.0},
       {"comes towards", 25.0, 2.5, {-8.0, 0.0, 0.0}, 0.0},
@@ -89,9 +90,9 @@ TEST(JudgeObjects, MovingCarIsMovingWhicheverWayItGoes) {
     BoxWorld world;
     world.stand(60.0, 0.0, {1.0, 80.0, 8.0}, SemanticClass::building);
     world.stand(moving.x, moving.y, car_size_m, SemanticClass::car, moving.velocity_map);
-    const Judged judged = judge_last(world, 10, moving.lidar_speed_m_s);
+    const Judged judged = classify_last(world, 10, moving.lidar_speed_m_s);
     ASSERT_GE(judged.objects.count, 1U) << moving.what;
-    EXPECT_EQ(judged.verdict_where(anywhere), ObjectVerdict::moving) << moving.what;
+    EXPECT_EQ(judged.verdict_where(anywhere), MotionClass::moving) << moving.what;
   }
 }
 
@@ -118,13 +119,15 @@ struct SplitCase {
     labels.confidence.push_back(1.0F);
   }
   /// Motion of the car's points; the road's must be stationary.
-  [[nodiscard]] Motion car_motion(ObjectVerdict verdict, bool use_past_views = true) const {
+  [[nodiscard]] Motion car_motion(MotionClass motion_class,
+                                  bool use_range_image_history = true) const {
     OdometryConfig config;
-    config.motion.use_past_views = use_past_views;
-    const Objects objects = find_objects(scan.points_lidar, labels.classes, 0.5);
+    config.motion.use_range_image_history = use_range_image_history;
+    const ObjectClusters objects = cluster_objects(scan.points_lidar, labels.classes, 0.5);
     EXPECT_EQ(objects.count, 1U);
-    const auto motion = split_by_motion(scan, labels, objects, std::vector<ObjectVerdict>{verdict},
-                                        Eigen::Isometry3d::Identity(), map, config);
+    const auto motion =
+        classify_point_motion(scan, labels, objects, std::vector<MotionClass>{motion_class},
+                              Eigen::Isometry3d::Identity(), map, config);
     EXPECT_EQ(motion.size(), scan.size());
     EXPECT_EQ(motion.back(), Motion::stationary);
     for (std::size_t i = 0; i + 1 < motion.size(); ++i) EXPECT_EQ(motion[i], motion[0]);
@@ -132,36 +135,35 @@ struct SplitCase {
   }
 };
 
-TEST(SplitByMotion, VerdictDecidesWhereThereIsOne) {
+TEST(ClassifyPointMotion, VerdictDecidesWhereThereIsOne) {
   const SplitCase on_road(SemanticClass::road);
   const SplitCase on_car(SemanticClass::car);
   for (const SplitCase* scene : {&on_road, &on_car}) {
-    EXPECT_EQ(scene->car_motion(ObjectVerdict::moving), Motion::highly_dynamic);
-    EXPECT_EQ(scene->car_motion(ObjectVerdict::parked), Motion::semi_static);
+    EXPECT_EQ(scene->car_motion(MotionClass::moving), Motion::highly_dynamic);
+    EXPECT_EQ(scene->car_motion(MotionClass::parked), Motion::semi_static);
   }
 }
 
-TEST(SplitByMotion, UndecidedObjectIsSemiStatic) {
-  EXPECT_EQ(SplitCase(SemanticClass::road).car_motion(ObjectVerdict::undecided),
-            Motion::semi_static);
+TEST(ClassifyPointMotion, UndecidedObjectIsSemiStatic) {
+  EXPECT_EQ(SplitCase(SemanticClass::road).car_motion(MotionClass::undecided), Motion::semi_static);
 }
 
-TEST(SplitByMotion, WithoutPastViewsTheMapDecides) {
+TEST(ClassifyPointMotion, WithoutPastViewsTheMapDecides) {
   const auto motion_beside = [](SemanticClass map_label) {
-    return SplitCase(map_label).car_motion(ObjectVerdict::undecided, false);
+    return SplitCase(map_label).car_motion(MotionClass::undecided, false);
   };
   EXPECT_EQ(motion_beside(SemanticClass::road), Motion::highly_dynamic);
   EXPECT_EQ(motion_beside(SemanticClass::car), Motion::semi_static);
   EXPECT_EQ(motion_beside(SemanticClass::unlabeled), Motion::semi_static);
 }
 
-TEST(SplitByMotion, WithoutLabelsAllIsStationary) {
+TEST(ClassifyPointMotion, WithoutLabelsAllIsStationary) {
   SplitCase scene(SemanticClass::road);
   scene.labels = {};
-  const Objects objects = find_objects(scene.scan.points_lidar, {}, 0.5);
+  const ObjectClusters objects = cluster_objects(scene.scan.points_lidar, {}, 0.5);
   for (const Motion motion :
-       split_by_motion(scene.scan, scene.labels, objects, {}, Eigen::Isometry3d::Identity(),
-                       scene.map, OdometryConfig{}))
+       classify_point_motion(scene.scan, scene.labels, objects, {}, Eigen::Isometry3d::Identity(),
+                             scene.map, OdometryConfig{}))
     EXPECT_EQ(motion, Motion::stationary);
 }
 

@@ -25,16 +25,16 @@ struct Labelled {
   void add_car(float x, float y, SemanticClass label = car) {
     for (int k = 0; k <= 20; ++k) add({x + 0.2F * static_cast<float>(k), y, 0.0F}, label);
   }
-  [[nodiscard]] Objects objects(double gap_m = 0.5) const {
-    return find_objects(points, labels, gap_m);
+  [[nodiscard]] ObjectClusters objects(double gap_m = 0.5) const {
+    return cluster_objects(points, labels, gap_m);
   }
 };
 
-TEST(FindObjects, TwoCarsApartAreTwoObjects) {
+TEST(ClusterObjects, TwoCarsApartAreTwoObjects) {
   Labelled scene;
   scene.add_car(5.0F, 2.0F);
   scene.add_car(5.0F, -2.0F);
-  const Objects objects = scene.objects();
+  const ObjectClusters objects = scene.objects();
   EXPECT_EQ(objects.count, 2U);
   const std::set<std::int32_t> first(objects.of_point.begin(), objects.of_point.begin() + 21);
   const std::set<std::int32_t> second(objects.of_point.begin() + 21, objects.of_point.end());
@@ -43,7 +43,7 @@ TEST(FindObjects, TwoCarsApartAreTwoObjects) {
   EXPECT_NE(first, second);
 }
 
-TEST(FindObjects, NeighbouringCubesAreOneObjectInEveryDirection) {
+TEST(ClusterObjects, NeighbouringCubesAreOneObjectInEveryDirection) {
   for (int x = -1; x <= 1; ++x)
     for (int y = -1; y <= 1; ++y)
       for (int z = -1; z <= 1; ++z) {
@@ -55,7 +55,7 @@ TEST(FindObjects, NeighbouringCubesAreOneObjectInEveryDirection) {
       }
 }
 
-TEST(FindObjects, ACubeBetweenSeparates) {
+TEST(ClusterObjects, ACubeBetweenSeparates) {
   Labelled scene;
   scene.add({0.25F, 0.25F, 0.25F}, car);
   scene.add({1.25F, 0.25F, 0.25F}, car);
@@ -63,13 +63,13 @@ TEST(FindObjects, ACubeBetweenSeparates) {
   EXPECT_EQ(scene.objects(1.0).count, 1U);
 }
 
-TEST(FindObjects, KindsNeverMix) {
+TEST(ClusterObjects, KindsNeverMix) {
   Labelled scene;
   for (const SemanticClass label : {car, person, bicyclist}) scene.add({1.0F, 1.0F, 1.0F}, label);
   EXPECT_EQ(scene.objects().count, 3U);
 }
 
-TEST(FindObjects, ClassesOfOneKindDoMix) {
+TEST(ClusterObjects, ClassesOfOneKindDoMix) {
   Labelled vehicles;
   for (const SemanticClass label : {car, truck, other_vehicle})
     vehicles.add({1.0F, 1.0F, 1.0F}, label);
@@ -80,24 +80,25 @@ TEST(FindObjects, ClassesOfOneKindDoMix) {
   EXPECT_EQ(riders.objects().count, 1U);
 }
 
-TEST(FindObjects, WhatCannotMoveIsNoObject) {
+TEST(ClusterObjects, WhatCannotMoveIsNoObject) {
   Labelled scene;
   for (const SemanticClass label : {unlabeled, road, building, pole, vegetation})
     scene.add({1.0F, 1.0F, 1.0F}, label);
-  const Objects objects = scene.objects();
+  const ObjectClusters objects = scene.objects();
   EXPECT_EQ(objects.count, 0U);
-  EXPECT_THAT(objects.of_point, Each(Objects::none));
+  EXPECT_THAT(objects.of_point, Each(ObjectClusters::none));
 }
 
-TEST(FindObjects, WithoutLabelsThereIsNone) {
+TEST(ClusterObjects, WithoutLabelsThereIsNone) {
   const std::vector<Eigen::Vector3f> points(3, Eigen::Vector3f::Zero());
-  const Objects objects = find_objects(points, {}, 0.5);
+  const ObjectClusters objects = cluster_objects(points, {}, 0.5);
   EXPECT_EQ(objects.count, 0U);
-  EXPECT_THAT(objects.of_point, ElementsAre(Objects::none, Objects::none, Objects::none));
-  EXPECT_EQ(find_objects({}, {}, 0.5).count, 0U);
+  EXPECT_THAT(objects.of_point,
+              ElementsAre(ObjectClusters::none, ObjectClusters::none, ObjectClusters::none));
+  EXPECT_EQ(cluster_objects({}, {}, 0.5).count, 0U);
 }
 
-TEST(FindObjects, EqualsGroupsFoundPlainly) {
+TEST(ClusterObjects, EqualsGroupsFoundPlainly) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> coordinate(-6.0F, 6.0F);
   Labelled scene;
@@ -124,7 +125,7 @@ TEST(FindObjects, EqualsGroupsFoundPlainly) {
         changed = true;
       }
   }
-  const Objects objects = scene.objects();
+  const ObjectClusters objects = scene.objects();
   EXPECT_EQ(objects.count, std::set<std::size_t>(group.begin(), group.end()).size());
   for (std::size_t i = 0; i < n; ++i)
     for (std::size_t j = 0; j < i; ++j)

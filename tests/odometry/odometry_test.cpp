@@ -12,7 +12,7 @@
 namespace stillmap {
 namespace {
 
-using test::BoxDrive;
+using test::BoxSequence;
 using test::expect_near;
 using test::level_pose;
 
@@ -22,54 +22,56 @@ OdometryConfig with_weighting(Weighting weighting) {
   return config;
 }
 
-std::vector<OdometryResult> results(const BoxDrive& drive, Odometry& odometry, bool with_labels) {
+std::vector<OdometryResult> results(const BoxSequence& sequence, Odometry& odometry,
+                                    bool with_labels) {
   std::vector<OdometryResult> all;
-  for (const test::BoxScan& seen : drive.scans)
+  for (const test::BoxScan& seen : sequence.scans)
     all.push_back(
-        odometry.add(seen.scan, with_labels ? seen.labels() : PointLabels{}, std::nullopt).result);
+        odometry.register_scan(seen.scan, with_labels ? seen.labels() : PointLabels{}, std::nullopt)
+            .result);
   return all;
 }
 
 /// Within 1 % of the 24 m driven.
-void expect_follows(const BoxDrive& drive, const std::vector<OdometryResult>& all) {
-  ASSERT_EQ(all.size(), drive.scans.size());
+void expect_follows(const BoxSequence& sequence, const std::vector<OdometryResult>& all) {
+  ASSERT_EQ(all.size(), sequence.scans.size());
   EXPECT_EQ(all[0].health, OdometryHealth::initialised);
   for (std::size_t k = 0; k < all.size(); ++k) {
     if (k > 0) {
       EXPECT_EQ(all[k].health, OdometryHealth::good) << "scan " << k;
     }
-    expect_near(all[k].T_map_lidar, drive.T_map_lidar[k], 0.2, 0.01);
+    expect_near(all[k].T_map_lidar, sequence.T_map_lidar[k], 0.2, 0.01);
   }
 }
 
-class OdometryDrive : public ::testing::Test {
+class OdometrySequence : public ::testing::Test {
  protected:
-  static const BoxDrive& quiet() {
-    static const BoxDrive drive(test::street(), 40);
-    return drive;
+  static const BoxSequence& quiet() {
+    static const BoxSequence sequence(test::street(), 40);
+    return sequence;
   }
 };
 
-TEST_F(OdometryDrive, FollowsTheTruthInEveryWeighting) {
+TEST_F(OdometrySequence, FollowsTheTruthInEveryWeighting) {
   for (const Weighting mode : {Weighting::none, Weighting::geometric, Weighting::semantic}) {
     Odometry odometry(with_weighting(mode), test::test_lidar());
     expect_follows(quiet(), results(quiet(), odometry, true));
   }
 }
 
-TEST_F(OdometryDrive, FollowsTheTruthWithoutLabels) {
+TEST_F(OdometrySequence, FollowsTheTruthWithoutLabels) {
   Odometry odometry(OdometryConfig{}, test::test_lidar());
   expect_follows(quiet(), results(quiet(), odometry, false));
 }
 
-TEST_F(OdometryDrive, WithoutLabelsEveryPointIsStationary) {
+TEST_F(OdometrySequence, WithoutLabelsEveryPointIsStationary) {
   Odometry odometry(OdometryConfig{}, test::test_lidar());
-  const auto step = odometry.add(quiet().scans[0].scan, PointLabels{}, std::nullopt);
+  const auto step = odometry.register_scan(quiet().scans[0].scan, PointLabels{}, std::nullopt);
   ASSERT_EQ(step.motion.size(), quiet().scans[0].scan.size());
   EXPECT_THAT(step.motion, ::testing::Each(Motion::stationary));
 }
 
-TEST_F(OdometryDrive, ResetStartsAnewAndRepeatsItselfToTheBit) {
+TEST_F(OdometrySequence, ResetStartsAnewAndRepeatsItselfToTheBit) {
   Odometry odometry(OdometryConfig{}, test::test_lidar());
   const auto first = results(quiet(), odometry, true);
   odometry.reset();
@@ -79,7 +81,7 @@ TEST_F(OdometryDrive, ResetStartsAnewAndRepeatsItselfToTheBit) {
     EXPECT_EQ(first[k].T_map_lidar.matrix(), second[k].T_map_lidar.matrix()) << "scan " << k;
 }
 
-TEST_F(OdometryDrive, PredictsConstantVelocityUpToASecond) {
+TEST_F(OdometrySequence, PredictsConstantVelocityUpToASecond) {
   Odometry odometry(OdometryConfig{}, test::test_lidar());
   EXPECT_TRUE(odometry.motion_during(0.1).isApprox(Eigen::Isometry3d::Identity()));
   const auto all = results(quiet(), odometry, true);
@@ -93,69 +95,72 @@ TEST_F(OdometryDrive, PredictsConstantVelocityUpToASecond) {
   expect_near(odometry.predict(stamp_ns + 2'000'000'000), last, 1e-12, 1e-7);
 }
 
-TEST_F(OdometryDrive, GapInTimeIsBridgedWhereTheLidarStood) {
+TEST_F(OdometrySequence, GapInTimeIsBridgedWhereTheLidarStood) {
   Odometry odometry(OdometryConfig{}, test::test_lidar());
-  const BoxDrive before(test::street(), 10);
+  const BoxSequence before(test::street(), 10);
   (void)results(before, odometry, true);
   const double end_s = 0.1 * 9 + 3.0;
   const Eigen::Isometry3d T_true = before.T_map_lidar.back() * level_pose(0.3, 0.0, 0.01);
   const auto seen = test::street().scan(test::test_lidar(), T_true, end_s);
-  const OdometryResult result = odometry.add(seen.scan, seen.labels(), std::nullopt).result;
+  const OdometryResult result =
+      odometry.register_scan(seen.scan, seen.labels(), std::nullopt).result;
   EXPECT_EQ(result.health, OdometryHealth::good);
   expect_near(result.T_map_lidar, T_true, 0.1, 0.01);
 }
 
-TEST_F(OdometryDrive, PriorReplacesThePrediction) {
+TEST_F(OdometrySequence, PriorReplacesThePrediction) {
   Odometry odometry(OdometryConfig{}, test::test_lidar());
   const Eigen::Isometry3d T_start = level_pose(5.0, -2.0, 1.2);
   const test::BoxScan& first = quiet().scans[0];
-  const auto start = odometry.add(first.scan, first.labels(), T_start);
+  const auto start = odometry.register_scan(first.scan, first.labels(), T_start);
   expect_near(start.result.T_map_lidar, T_start, 1e-12, 1e-7);
 
   // Four metres on at once: no velocity could know.
   const Eigen::Isometry3d T_moved = level_pose(4.0, 0.5, 0.1);
   const auto seen = test::street().scan(test::test_lidar(), T_moved, 0.1);
   const Eigen::Isometry3d T_true = T_start * T_moved;
-  const auto step = odometry.add(seen.scan, seen.labels(), T_true * level_pose(0.2, 0.1, 0.01));
+  const auto step =
+      odometry.register_scan(seen.scan, seen.labels(), T_true * level_pose(0.2, 0.1, 0.01));
   EXPECT_EQ(step.result.health, OdometryHealth::good);
   expect_near(step.result.T_map_lidar, T_true, 0.1, 0.01);
 }
 
-TEST_F(OdometryDrive, FindsTheFirstMotionOfAFastStart) {
+TEST_F(OdometrySequence, FindsTheFirstMotionOfAFastStart) {
   // 54 km/h: farther in a scan than a plane's neighbours are looked for.
   for (const double ahead_m : {1.5, -1.5}) {
     Odometry odometry(OdometryConfig{}, test::test_lidar());
     const test::BoxScan& first = quiet().scans[0];
-    (void)odometry.add(first.scan, first.labels(), std::nullopt);
+    (void)odometry.register_scan(first.scan, first.labels(), std::nullopt);
     const Eigen::Isometry3d T_true = level_pose(ahead_m, 0.0, 0.02);
     const auto seen = test::street().scan(test::test_lidar(), T_true, 0.1);
-    const OdometryResult result = odometry.add(seen.scan, seen.labels(), std::nullopt).result;
+    const OdometryResult result =
+        odometry.register_scan(seen.scan, seen.labels(), std::nullopt).result;
     EXPECT_EQ(result.health, OdometryHealth::good);
     expect_near(result.T_map_lidar, T_true, 0.1, 0.01);
   }
 }
 
-TEST_F(OdometryDrive, ScanWithoutFeaturesIsLostAtThePrediction) {
+TEST_F(OdometrySequence, ScanWithoutFeaturesIsLostAtThePrediction) {
   Odometry odometry(OdometryConfig{}, test::test_lidar());
-  (void)results(BoxDrive(test::street(), 5), odometry, true);
+  (void)results(BoxSequence(test::street(), 5), odometry, true);
   Scan blind;
   blind.stamp_ns = 500'000'000;
   blind.points_lidar.assign(200, Eigen::Vector3f(5.0F, 1.0F, 0.0F));
   blind.ring.assign(200, 3);
   const Eigen::Isometry3d predicted = odometry.predict(blind.stamp_ns);
-  const OdometryResult result = odometry.add(blind, PointLabels{}, std::nullopt).result;
+  const OdometryResult result = odometry.register_scan(blind, PointLabels{}, std::nullopt).result;
   EXPECT_EQ(result.health, OdometryHealth::lost);
   expect_near(result.T_map_lidar, predicted, 1e-12, 1e-7);
 }
 
 TEST(OdometryInTraffic, FindsTheMovingCarsAndFollowsTheTruth) {
-  const BoxDrive drive(test::street_with_traffic(), 40);
+  const BoxSequence sequence(test::street_with_traffic(), 40);
   Odometry odometry(OdometryConfig{}, test::test_lidar());
   double found = 0.0, missed = 0.0, wrong = 0.0;
-  for (std::size_t k = 0; k < drive.scans.size(); ++k) {
-    const test::BoxScan& seen = drive.scans[k];
-    const auto step = odometry.add(seen.scan, seen.labels(), std::nullopt);
-    expect_near(step.result.T_map_lidar, drive.T_map_lidar[k], 0.2, 0.01);
+  for (std::size_t k = 0; k < sequence.scans.size(); ++k) {
+    const test::BoxScan& seen = sequence.scans[k];
+    const auto step = odometry.register_scan(seen.scan, seen.labels(), std::nullopt);
+    expect_near(step.result.T_map_lidar, sequence.T_map_lidar[k], 0.2, 0.01);
     if (k < 10) continue;
     for (std::size_t i = 0; i < seen.scan.size(); ++i) {
       const bool flagged = step.motion[i] == Motion::highly_dynamic;

@@ -27,107 +27,109 @@ BoxWorld with_car(double rear_x) {
   return world;
 }
 
-RangeView view(const BoxWorld& world,
-               const Eigen::Isometry3d& T_map_lidar = Eigen::Isometry3d::Identity()) {
+RangeImageView view(const BoxWorld& world,
+                    const Eigen::Isometry3d& T_map_lidar = Eigen::Isometry3d::Identity()) {
   const test::BoxScan seen = world.scan(test::test_lidar(), T_map_lidar, 0.0);
   return {seen.scan, seen.scan.labels, test::test_lidar(), T_map_lidar};
 }
 
 MotionConfig every_view() {
   MotionConfig config;
-  config.past_views = 1;
-  config.past_view_interval = 1;
+  config.range_image_history_size = 1;
+  config.range_image_history_interval = 1;
   return config;
 }
 
 /// What one view of `before` says of a point that is seen in `now`.
-PastSight sight(const BoxWorld& before, const BoxWorld& now, const Eigen::Vector3f& p_map) {
-  PastViews past(every_view());
-  past.add(view(before));
-  return past.sight(0, p_map, view(now));
+PastObservation observation(const BoxWorld& before, const BoxWorld& now,
+                            const Eigen::Vector3f& p_map) {
+  RangeImageHistory history(every_view());
+  history.add(view(before));
+  return history.observation(0, p_map, view(now));
 }
 
 const Eigen::Vector3f rear_at_10m(10.0F, 0.0F, -0.8F);
 
-TEST(PastViews, PlaceThatARayPassedWasFree) {
-  EXPECT_EQ(sight(walled(), with_car(10.0), rear_at_10m), PastSight::free);
+TEST(RangeImageHistory, PlaceThatARayPassedWasFree) {
+  EXPECT_EQ(observation(walled(), with_car(10.0), rear_at_10m), PastObservation::free);
 }
 
-TEST(PastViews, PlaceOfTheSameCarIsTheSame) {
-  EXPECT_EQ(sight(with_car(10.0), with_car(10.0), rear_at_10m), PastSight::same);
+TEST(RangeImageHistory, PlaceOfTheSameCarIsTheSame) {
+  EXPECT_EQ(observation(with_car(10.0), with_car(10.0), rear_at_10m), PastObservation::same);
 }
 
-TEST(PastViews, PlaceHiddenByAWallIsUnknown) {
+TEST(RangeImageHistory, PlaceHiddenByAWallIsUnknown) {
   BoxWorld hidden = walled();
   hidden.stand(6.0, 0.0, {0.5, 10.0, 4.0}, SemanticClass::building);
-  EXPECT_EQ(sight(hidden, with_car(10.0), rear_at_10m), PastSight::unknown);
+  EXPECT_EQ(observation(hidden, with_car(10.0), rear_at_10m), PastObservation::unknown);
 }
 
-TEST(PastViews, PlaceBehindACarThatIsStillThereIsUnknown) {
+TEST(RangeImageHistory, PlaceBehindACarThatIsStillThereIsUnknown) {
   BoxWorld both = with_car(10.0);
   both.stand(7.0, 0.0, {1.0, 3.0, 1.6}, SemanticClass::car);
-  EXPECT_EQ(sight(both, both, rear_at_10m), PastSight::unknown);
+  EXPECT_EQ(observation(both, both, rear_at_10m), PastObservation::unknown);
 }
 
-TEST(PastViews, CarThatDroveOnAheadIsGoneFromBeforeItsRear) {
-  EXPECT_EQ(sight(with_car(8.5), with_car(10.0), rear_at_10m), PastSight::gone_before_it);
+TEST(RangeImageHistory, CarThatDroveOnAheadIsGoneFromBeforeItsRear) {
+  EXPECT_EQ(observation(with_car(8.5), with_car(10.0), rear_at_10m),
+            PastObservation::removed_in_front);
 }
 
-TEST(PastViews, AnotherCarFarBeforeItSaysNothing) {
-  EXPECT_EQ(sight(with_car(5.0), with_car(10.0), rear_at_10m), PastSight::unknown)
+TEST(RangeImageHistory, AnotherCarFarBeforeItSaysNothing) {
+  EXPECT_EQ(observation(with_car(5.0), with_car(10.0), rear_at_10m), PastObservation::unknown)
       << "5 m in a scan is no motion of one car";
 }
 
-TEST(PastViews, DirectionWithoutReturnIsUnknown) {
+TEST(RangeImageHistory, DirectionWithoutReturnIsUnknown) {
   const BoxWorld open;
-  EXPECT_EQ(sight(open, with_car(10.0), {10.0F, 0.0F, 0.8F}), PastSight::unknown);
+  EXPECT_EQ(observation(open, with_car(10.0), {10.0F, 0.0F, 0.8F}), PastObservation::unknown);
 }
 
-TEST(PastViews, PlaceOutsideTheFieldOfViewIsUnknown) {
-  EXPECT_EQ(sight(walled(), walled(), {2.0F, 0.0F, 3.0F}), PastSight::unknown);
-  EXPECT_EQ(sight(walled(), walled(), {0.5F, 0.0F, -1.6F}), PastSight::unknown);
-  EXPECT_EQ(sight(walled(), walled(), {0.0F, 0.0F, 0.0F}), PastSight::unknown);
+TEST(RangeImageHistory, PlaceOutsideTheFieldOfViewIsUnknown) {
+  EXPECT_EQ(observation(walled(), walled(), {2.0F, 0.0F, 3.0F}), PastObservation::unknown);
+  EXPECT_EQ(observation(walled(), walled(), {0.5F, 0.0F, -1.6F}), PastObservation::unknown);
+  EXPECT_EQ(observation(walled(), walled(), {0.0F, 0.0F, 0.0F}), PastObservation::unknown);
 }
 
-TEST(PastViews, LookFromAnotherPlaceAgrees) {
+TEST(RangeImageHistory, LookFromAnotherPlaceAgrees) {
   const Eigen::Isometry3d T_before = test::level_pose(-4.0, 1.5, 0.6);
-  PastViews past(every_view());
-  past.add(view(walled(), T_before));
-  EXPECT_EQ(past.sight(0, rear_at_10m, view(with_car(10.0))), PastSight::free);
-  past.add(view(with_car(10.0), T_before));
-  EXPECT_EQ(past.sight(0, rear_at_10m, view(with_car(10.0))), PastSight::same);
+  RangeImageHistory history(every_view());
+  history.add(view(walled(), T_before));
+  EXPECT_EQ(history.observation(0, rear_at_10m, view(with_car(10.0))), PastObservation::free);
+  history.add(view(with_car(10.0), T_before));
+  EXPECT_EQ(history.observation(0, rear_at_10m, view(with_car(10.0))), PastObservation::same);
 }
 
-TEST(PastViews, MarginKeepsANearbySurfaceFromBeingFree) {
-  EXPECT_EQ(sight(with_car(10.3), with_car(10.0), rear_at_10m), PastSight::unknown);
-  EXPECT_EQ(sight(with_car(11.5), with_car(10.0), rear_at_10m), PastSight::free);
+TEST(RangeImageHistory, MarginKeepsANearbySurfaceFromBeingFree) {
+  EXPECT_EQ(observation(with_car(10.3), with_car(10.0), rear_at_10m), PastObservation::unknown);
+  EXPECT_EQ(observation(with_car(11.5), with_car(10.0), rear_at_10m), PastObservation::free);
 }
 
-TEST(PastViews, KeepsOneViewEachInterval) {
+TEST(RangeImageHistory, KeepsOneViewEachInterval) {
   MotionConfig config;
-  config.past_views = 2;
-  config.past_view_interval = 3;
-  PastViews past(config);
+  config.range_image_history_size = 2;
+  config.range_image_history_interval = 3;
+  RangeImageHistory history(config);
   // The car comes a metre nearer in each view: 20 m in the first, 13 m in the last.
   for (int k = 0; k < 8; ++k) {
-    EXPECT_EQ(past.size(), static_cast<std::size_t>(std::min(k / 3, 2)));
-    past.add(view(with_car(20.0 - k)));
+    EXPECT_EQ(history.size(), static_cast<std::size_t>(std::min(k / 3, 2)));
+    history.add(view(with_car(20.0 - k)));
   }
-  const RangeView now = view(walled());
+  const RangeImageView now = view(walled());
   // Three views ago it stood at 15 m, six views ago at 18 m.
-  EXPECT_EQ(past.sight(0, {15.0F, 0.0F, -0.8F}, now), PastSight::same);
-  EXPECT_EQ(past.sight(1, {18.0F, 0.0F, -0.8F}, now), PastSight::same);
-  past.clear();
-  EXPECT_EQ(past.size(), 0U);
+  EXPECT_EQ(history.observation(0, {15.0F, 0.0F, -0.8F}, now), PastObservation::same);
+  EXPECT_EQ(history.observation(1, {18.0F, 0.0F, -0.8F}, now), PastObservation::same);
+  history.clear();
+  EXPECT_EQ(history.size(), 0U);
 }
 
-TEST(RangeView, SeesThePointsOfItsScan) {
+TEST(RangeImageView, SeesThePointsOfItsScan) {
   const BoxWorld world = with_car(10.0);
   const Eigen::Isometry3d T_map_lidar = test::level_pose(2.0, 1.0, -2.9);
   const test::BoxScan seen = world.scan(test::test_lidar(), T_map_lidar, 0.0);
-  const RangeView from_here(seen.scan, seen.scan.labels, test::test_lidar(), T_map_lidar);
+  const RangeImageView from_here(seen.scan, seen.scan.labels, test::test_lidar(), T_map_lidar);
   for (std::size_t i = 0; i < seen.scan.size(); ++i) {
-    const auto look = from_here.look_at(T_map_lidar.cast<float>() * seen.scan.points_lidar[i]);
+    const auto look = from_here.observe(T_map_lidar.cast<float>() * seen.scan.points_lidar[i]);
     ASSERT_TRUE(look) << i;
     EXPECT_NEAR(look->range_m, look->point_range_m, 0.02F);
     EXPECT_EQ(look->movable, seen.scan.labels[i] == SemanticClass::car);

@@ -14,7 +14,7 @@ namespace {
 
 /// The first scans of KITTI's odometry sequence 00: a car at some 8 m/s in a street. Its true poses
 /// are wrong by decimetres there, so they are not looked at.
-TEST(RecordedDrive, IsNeverLostAndMovesAsACarDoes) {
+TEST(RecordedSequence, IsNeverLostAndMovesAsACarDoes) {
   const char* folder = std::getenv("STILLMAP_TEST_DATA");
   if (folder == nullptr) GTEST_SKIP() << "STILLMAP_TEST_DATA does not name the test recordings";
   const ScanDataset recording(std::filesystem::path(folder) / "kitti_odom_00");
@@ -26,7 +26,7 @@ TEST(RecordedDrive, IsNeverLostAndMovesAsACarDoes) {
     scan.stamp_ns = recording.stamp_ns(k);
     scan.ring = assign_rings(scan, sensor);
     scan = drop_unusable_points(std::move(scan), PrepareConfig{});
-    const OdometryResult result = odometry.add(scan, PointLabels{}, std::nullopt).result;
+    const OdometryResult result = odometry.register_scan(scan, PointLabels{}, std::nullopt).result;
     EXPECT_EQ(result.health, k == 0 ? OdometryHealth::initialised : OdometryHealth::good) << k;
     EXPECT_LT(test::translation_error(result.T_map_lidar, T_map_last), 2.0) << k;
     EXPECT_LT(test::rotation_error(result.T_map_lidar, T_map_last), 0.1) << k;

@@ -38,30 +38,31 @@ std::vector<std::uint32_t> thin_plainly(const std::vector<Eigen::Vector3f>& poin
   return kept;
 }
 
-TEST(Thin, EqualsAnOrderedSetOfCubes) {
+TEST(VoxelDownsample, EqualsAnOrderedSetOfCubes) {
   const std::vector<Eigen::Vector3f> points = random_points(5000, 8.0F);
   std::vector<std::uint32_t> chosen(points.size());
   std::iota(chosen.begin(), chosen.end(), 0U);
   std::ranges::shuffle(chosen, std::mt19937(12));
   chosen.resize(4000);
   for (const double spacing_m : {0.1, 0.5, 1.0, 3.0, 100.0})
-    EXPECT_EQ(thin(points, chosen, spacing_m), thin_plainly(points, chosen, spacing_m))
+    EXPECT_EQ(voxel_downsample(points, chosen, spacing_m), thin_plainly(points, chosen, spacing_m))
         << spacing_m;
 }
 
-TEST(Thin, CubesDoNotMeetAtTheOrigin) {
+TEST(VoxelDownsample, CubesDoNotMeetAtTheOrigin) {
   const std::vector<Eigen::Vector3f> points{{0.1F, 0.0F, 0.0F}, {-0.1F, 0.0F, 0.0F}};
-  EXPECT_THAT(thin(points, std::vector<std::uint32_t>{0, 1}, 1.0), ElementsAre(0, 1));
+  EXPECT_THAT(voxel_downsample(points, std::vector<std::uint32_t>{0, 1}, 1.0), ElementsAre(0, 1));
 }
 
-TEST(Thin, FirstOfEqualPointsStays) {
+TEST(VoxelDownsample, FirstOfEqualPointsStays) {
   const std::vector<Eigen::Vector3f> points(50, Eigen::Vector3f(3.0F, -2.0F, 1.0F));
-  EXPECT_THAT(thin(points, std::vector<std::uint32_t>{30, 2, 49}, 0.2), ElementsAre(30));
+  EXPECT_THAT(voxel_downsample(points, std::vector<std::uint32_t>{30, 2, 49}, 0.2),
+              ElementsAre(30));
 }
 
-TEST(Thin, NothingOfNothing) {
-  EXPECT_THAT(thin({}, {}, 0.5), IsEmpty());
-  EXPECT_THAT(thin(random_points(10, 1.0F), {}, 0.5), IsEmpty());
+TEST(VoxelDownsample, NothingOfNothing) {
+  EXPECT_THAT(voxel_downsample({}, {}, 0.5), IsEmpty());
+  EXPECT_THAT(voxel_downsample(random_points(10, 1.0F), {}, 0.5), IsEmpty());
 }
 
 }  // namespace

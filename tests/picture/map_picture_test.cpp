@@ -50,7 +50,7 @@ TEST(MapPicture, ShowsTheMapTheDriveAndTheBoxAtASensibleSize) {
 
 TEST(MapPicture, EmptyMapStillGivesAPicture) {
   const ScratchFolder folder;
-  write_map_picture(folder / "empty.png", MapView{}, {});
+  write_map_picture(folder / "empty.png", MapSnapshot{}, {});
   EXPECT_FALSE(cv::imread((folder / "empty.png").string()).empty());
 }
 
@@ -58,15 +58,15 @@ TEST(MapPicture, PosesThatAreNoNumbersDoNoHarm) {
   const ScratchFolder folder;
   Trajectory trajectory = drive(3);
   trajectory[1].T_map_lidar.translation().x() = std::numeric_limits<double>::quiet_NaN();
-  write_map_picture(folder / "nan.png", MapView{}, trajectory);
+  write_map_picture(folder / "nan.png", MapSnapshot{}, trajectory);
   EXPECT_FALSE(cv::imread((folder / "nan.png").string()).empty());
 }
 
 TEST(MapPicture, FileThatCannotBeWrittenIsNamed) {
   const ScratchFolder folder;
-  EXPECT_THAT([&] { write_map_picture(folder / "no" / "map.png", MapView{}, {}); },
+  EXPECT_THAT([&] { write_map_picture(folder / "no" / "map.png", MapSnapshot{}, {}); },
               testing::ThrowsMessage<std::runtime_error>(testing::HasSubstr("no/map.png")));
-  EXPECT_THROW(write_map_picture(folder / "map.unknown", MapView{}, {}), std::runtime_error);
+  EXPECT_THROW(write_map_picture(folder / "map.unknown", MapSnapshot{}, {}), std::runtime_error);
 }
 
 }  // namespace

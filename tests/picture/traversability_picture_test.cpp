@@ -28,7 +28,7 @@ TEST(TraversabilityPicture, FreeIsGreenObstaclesAreRedAndYIsUp) {
   test::VoxelWorld world;
   world.ground(-20, -20, 20, 20, road);
   world.block(-16, 8, -8, 16, 0.3, 2.0, building);  // upper left
-  const auto view = test::area_of(world.view(), test::square_robot());
+  const auto view = test::traversability_of(world.view(), test::square_robot());
   const cv::Mat3b picture = picture_of(*view);
   const double px_per_m = picture.cols / 40.0;
   const auto at = [&](double x_m, double y_m) {
@@ -43,7 +43,7 @@ TEST(TraversabilityPicture, FreeIsGreenObstaclesAreRedAndYIsUp) {
 TEST(TraversabilityPicture, ShowsThePath) {
   test::VoxelWorld world;
   world.ground(-20, -20, 20, 20, road);
-  const auto view = test::area_of(world.view(), test::square_robot());
+  const auto view = test::traversability_of(world.view(), test::square_robot());
   const std::vector<PlanarPose> path{{{-10, 0}, 0}, {{10, 0}, 0}};
   TraversabilityPictureOptions options;
   options.path_map = path;
@@ -53,11 +53,11 @@ TEST(TraversabilityPicture, ShowsThePath) {
 }
 
 TEST(TraversabilityPicture, AnEmptyAreaIsAPictureToo) {
-  EXPECT_FALSE(picture_of(*test::area_of(MapView{}, test::square_robot())).empty());
+  EXPECT_FALSE(picture_of(*test::traversability_of(MapSnapshot{}, test::square_robot())).empty());
 }
 
 TEST(TraversabilityPicture, NamesAFileThatCannotBeWritten) {
-  const auto view = test::area_of(MapView{}, test::square_robot());
+  const auto view = test::traversability_of(MapSnapshot{}, test::square_robot());
   for (const char* file : {"/dev/null/a.png", "/tmp/area.unknown_ending"}) {
     EXPECT_THAT(message_of<std::runtime_error>([&] { write_traversability_picture(file, *view); }),
                 HasSubstr(file));

@@ -8,8 +8,8 @@ namespace stillmap {
 namespace {
 
 using enum SemanticClass;
-using test::area_of;
 using test::square_robot;
+using test::traversability_of;
 using test::VoxelWorld;
 
 /// A road 24 m square with a wall across it that ends 3 m before its side.
@@ -23,7 +23,7 @@ VoxelWorld walled_road(double wall_end_y = 9.0) {
 std::optional<CoarseRoute> route(const VoxelWorld& world, const Eigen::Vector2d& from,
                                  const Eigen::Vector2d& to) {
   VoxelWorld copy = world;
-  const auto view = area_of(copy.view(), square_robot());
+  const auto view = traversability_of(copy.view(), square_robot());
   return find_coarse_route(PlanningGrid(*view, view->bounds_map(), 4.0), from, to);
 }
 

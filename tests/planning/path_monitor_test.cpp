@@ -16,9 +16,9 @@ using test::VoxelWorld;
 using ::testing::HasSubstr;
 
 /// A road of 60 by 60 m; a path along its lower side.
-class PathWatchTest : public testing::Test {
+class PathMonitorTest : public testing::Test {
  protected:
-  PathWatchTest() : area_({square_robot()}) {
+  PathMonitorTest() : area_({square_robot()}) {
     world_.ground(0, 0, 60, 60, road);
     plan_ = plan_path(look(), {{5, 5}, 0.0}, {{55, 5}, 0.0});
     watch_.emplace(look(), plan_);
@@ -34,53 +34,53 @@ class PathWatchTest : public testing::Test {
   TraversabilityMap area_;
   std::shared_ptr<const TraversabilityView> view_;
   PathPlan plan_;
-  std::optional<PathWatch> watch_;
+  std::optional<PathMonitor> watch_;
 };
 
-TEST_F(PathWatchTest, NothingNewIsNoCause) {
+TEST_F(PathMonitorTest, NothingNewIsNoCause) {
   ASSERT_TRUE(plan_.is_found());
-  EXPECT_FALSE(watch_->look_at(look()));
+  EXPECT_FALSE(watch_->update(look()));
 }
 
-TEST_F(PathWatchTest, AnObstacleOnTheWayIsAConflictWithAPlace) {
+TEST_F(PathMonitorTest, AnObstacleOnTheWayIsAConflictWithAPlace) {
   world_.block(30, 2, 31, 8, 0.3, 2.0, building);
-  const auto cause = watch_->look_at(look());
+  const auto cause = watch_->update(look());
   ASSERT_TRUE(cause);
   ASSERT_TRUE(cause->conflict);
-  EXPECT_NEAR(cause->conflict->place_map.x(), 30.0, 0.5);
+  EXPECT_NEAR(cause->conflict->cell_centre_map.x(), 30.0, 0.5);
   EXPECT_THAT(cause->reason, HasSubstr("not free any more: obstacle"));
 }
 
-TEST_F(PathWatchTest, AChangeBesideTheWayIsACauseWithoutAConflict) {
+TEST_F(PathMonitorTest, AChangeBesideTheWayIsACauseWithoutAConflict) {
   world_.block(30, 7, 31, 7.6, 0.3, 2.0, building);
-  const auto cause = watch_->look_at(look());
+  const auto cause = watch_->update(look());
   ASSERT_TRUE(cause);
   EXPECT_FALSE(cause->conflict);
   EXPECT_THAT(cause->reason, HasSubstr("on the way changed"));
-  EXPECT_FALSE(watch_->look_at(look()));
+  EXPECT_FALSE(watch_->update(look()));
 }
 
-TEST_F(PathWatchTest, AChangeElsewhereIsNone) {
+TEST_F(PathMonitorTest, AChangeElsewhereIsNone) {
   world_.block(30, 50, 31, 52, 0.3, 2.0, building);
-  EXPECT_FALSE(watch_->look_at(look()));
+  EXPECT_FALSE(watch_->update(look()));
 }
 
-TEST_F(PathWatchTest, GroundThatIsGoneOnTheWayIsAConflict) {
+TEST_F(PathMonitorTest, GroundThatIsGoneOnTheWayIsAConflict) {
   world_.clear(20, 0, 32, 20);
-  const auto cause = watch_->look_at(look());
+  const auto cause = watch_->update(look());
   ASSERT_TRUE(cause && cause->conflict);
   EXPECT_EQ(cause->conflict->reason, BlockReason::unknown);
 }
 
-TEST_F(PathWatchTest, AnotherMapAndAPlanThatFailedAreCauses) {
-  PathWatch failed(look(), plan_path(look(), {{5, 5}, {}}, {{90, 5}, {}}));
-  EXPECT_FALSE(failed.look_at(look()));
+TEST_F(PathMonitorTest, AnotherMapAndAPlanThatFailedAreCauses) {
+  PathMonitor failed(look(), plan_path(look(), {{5, 5}, {}}, {{90, 5}, {}}));
+  EXPECT_FALSE(failed.update(look()));
   world_.ground(60, 0, 100, 60, road);
-  EXPECT_TRUE(failed.look_at(look()));
-  MapView other = world_.view();
+  EXPECT_TRUE(failed.update(look()));
+  MapSnapshot other = world_.view();
   other.map_id = 7;
   (void)area_.update(other);
-  const auto cause = watch_->look_at(*area_.view("square"));
+  const auto cause = watch_->update(*area_.view("square"));
   ASSERT_TRUE(cause);
   EXPECT_THAT(cause->reason, HasSubstr("another map"));
 }

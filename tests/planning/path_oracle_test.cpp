@@ -10,7 +10,7 @@ namespace stillmap {
 namespace {
 
 using enum SemanticClass;
-using test::area_of;
+using test::traversability_of;
 using test::VoxelWorld;
 
 /// A yard 40 m square with walls at random.
@@ -38,7 +38,7 @@ TEST(PathOracle, FindsAWayWheneverTheGridHasOneAndNotMuchLonger) {
   config.cost_weight = 0.0;  // cost is length, as on the grid
   int ways = 0;
   for (int seed = 1; seed <= 8; ++seed) {
-    const auto view = area_of(maze(seed).view(), test::square_robot());
+    const auto view = traversability_of(maze(seed).view(), test::square_robot());
     const auto optimum_m = test::shortest_way_m(*view, from, to);
     if (!optimum_m) continue;
     ++ways;

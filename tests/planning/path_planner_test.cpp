@@ -12,8 +12,8 @@ namespace stillmap {
 namespace {
 
 using enum SemanticClass;
-using test::area_of;
 using test::square_robot;
+using test::traversability_of;
 using test::VoxelWorld;
 using ::testing::HasSubstr;
 
@@ -50,7 +50,7 @@ void expect_drivable(const TraversabilityView& view, const PathPlan& plan) {
 }
 
 TEST(PathPlanner, ACarTurnsRoundTheEndOfTheWall) {
-  const auto view = area_of(two_lanes().view(), small_car());
+  const auto view = traversability_of(two_lanes().view(), small_car());
   const PathPlan plan = plan_path(*view, {{5, -3}, 0.0}, {{5, 3}, pi});
   expect_drivable(*view, plan);
   EXPECT_EQ(plan.poses.front().pose.position_map, Eigen::Vector2d(5, -3));
@@ -64,11 +64,11 @@ TEST(PathPlanner, ACarTurnsRoundTheEndOfTheWall) {
 }
 
 TEST(PathPlanner, EveryPlannerFindsTheWay) {
-  const auto view = area_of(two_lanes().view(), square_robot());
+  const auto view = traversability_of(two_lanes().view(), square_robot());
   for (std::size_t i = 0; i < planner_kind_count; ++i) {
     PlanningConfig config;
     config.planner = static_cast<PlannerKind>(i);
-    config.max_work = 200'000;
+    config.max_steps = 200'000;
     bool has_path = false;
     config.improved = [&](double) { has_path = true; };
     config.should_stop = [&] { return has_path; };
@@ -79,7 +79,7 @@ TEST(PathPlanner, EveryPlannerFindsTheWay) {
 }
 
 TEST(PathPlanner, TheSameSeedGivesTheSamePath) {
-  const auto view = area_of(two_lanes().view(), small_car());
+  const auto view = traversability_of(two_lanes().view(), small_car());
   const auto plan = [&](std::uint32_t seed) {
     PlanningConfig config;
     config.seed = seed;
@@ -94,7 +94,7 @@ TEST(PathPlanner, TheSameSeedGivesTheSamePath) {
 
 TEST(PathPlanner, ABlockedStartOrGoalSaysWhyAndOffersAPlace) {
   VoxelWorld world = two_lanes();
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   const PathPlan on_wall = plan_path(*view, {{30, 0}, {}}, {{30, 3}, {}});
   EXPECT_EQ(on_wall.status, PlanStatus::start_blocked);
   ASSERT_TRUE(on_wall.conflict);
@@ -110,10 +110,10 @@ TEST(PathPlanner, ABlockedStartOrGoalSaysWhyAndOffersAPlace) {
 TEST(PathPlanner, WithoutAWayItSaysSoAtOnce) {
   VoxelWorld world = two_lanes();
   world.block(40, -6, 41, 6, 0.3, 2.0, building);
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   const PathPlan plan = plan_path(*view, {{30, -3}, {}}, {{50, -3}, {}});
-  EXPECT_EQ(plan.status, PlanStatus::no_way);
-  EXPECT_EQ(plan.work, 0U);
+  EXPECT_EQ(plan.status, PlanStatus::no_path);
+  EXPECT_EQ(plan.steps, 0U);
   EXPECT_TRUE(plan.poses.empty());
 }
 
@@ -121,11 +121,11 @@ TEST(PathPlanner, DrivesOnUnknownGroundOnlyIfItMay) {
   VoxelWorld world = two_lanes();
   world.clear(46, -6, 60, 6);
   RobotProfile robot = square_robot();
-  const MapView map = world.view();
-  EXPECT_EQ(plan_path(*area_of(map, robot), {{30, -3}, {}}, {{30, 3}, {}}).status,
-            PlanStatus::no_way);
+  const MapSnapshot map = world.view();
+  EXPECT_EQ(plan_path(*traversability_of(map, robot), {{30, -3}, {}}, {{30, 3}, {}}).status,
+            PlanStatus::no_path);
   robot.unknown = UnknownGround::allowed;
-  const auto view = area_of(map, robot);
+  const auto view = traversability_of(map, robot);
   const PathPlan plan = plan_path(*view, {{30, -3}, {}}, {{30, 3}, {}});
   expect_drivable(*view, plan);
   // Also to a place that no tile covers.
@@ -133,7 +133,7 @@ TEST(PathPlanner, DrivesOnUnknownGroundOnlyIfItMay) {
 }
 
 TEST(PathPlanner, WhereItIsAlreadyItNeedNotGo) {
-  const auto view = area_of(two_lanes().view(), small_car());
+  const auto view = traversability_of(two_lanes().view(), small_car());
   const PathPlan plan = plan_path(*view, {{30, -3}, 0.0}, {{30, -3}, {}});
   EXPECT_EQ(plan.status, PlanStatus::found);
   EXPECT_EQ(plan.poses.size(), 1U);
@@ -145,7 +145,7 @@ TEST(PathPlanner, WhereItIsAlreadyItNeedNotGo) {
 }
 
 TEST(PathPlanner, StoppedEarlyItHasNoPathAndSaysSo) {
-  const auto view = area_of(two_lanes().view(), small_car());
+  const auto view = traversability_of(two_lanes().view(), small_car());
   PlanningConfig config;
   config.should_stop = [] { return true; };
   const PathPlan plan = plan_path(*view, {{5, -3}, 0.0}, {{5, 3}, pi}, config);
@@ -154,8 +154,8 @@ TEST(PathPlanner, StoppedEarlyItHasNoPathAndSaysSo) {
 }
 
 TEST(PathPlanner, HostileQuestionsGetAReason) {
-  const auto view = area_of(two_lanes().view(), square_robot());
-  const auto reason = [&](const PlanPlace& from, const PlanPlace& to) {
+  const auto view = traversability_of(two_lanes().view(), square_robot());
+  const auto reason = [&](const Goal& from, const Goal& to) {
     const PathPlan plan = plan_path(*view, from, to);
     EXPECT_EQ(plan.status, PlanStatus::invalid_request);
     EXPECT_TRUE(plan.poses.empty());
@@ -165,12 +165,12 @@ TEST(PathPlanner, HostileQuestionsGetAReason) {
   EXPECT_THAT(reason({{30, 3}, {}}, {{1e9, 0}, {}}), HasSubstr("goal: position"));
   EXPECT_THAT(reason({{30, 3}, nan}, {{30, -3}, {}}), HasSubstr("heading nan"));
   EXPECT_THAT(reason({{30, 3}, {}}, {{9e4, 9e4}, {}}), HasSubstr("cells"));
-  const auto nothing = area_of(MapView{}, square_robot());
-  EXPECT_EQ(plan_path(*nothing, {{0, 0}, {}}, {{1, 1}, {}}).status, PlanStatus::no_way);
+  const auto nothing = traversability_of(MapSnapshot{}, square_robot());
+  EXPECT_EQ(plan_path(*nothing, {{0, 0}, {}}, {{1, 1}, {}}).status, PlanStatus::no_path);
 }
 
 TEST(PathPlanner, RefusesAConfigurationWithFaults) {
-  const auto view = area_of(two_lanes().view(), square_robot());
+  const auto view = traversability_of(two_lanes().view(), square_robot());
   PlanningConfig config;
   config.reverse_factor = 0.5;
   config.cost_weight = nan;

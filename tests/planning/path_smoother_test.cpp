@@ -10,18 +10,18 @@ namespace stillmap {
 namespace {
 
 using enum SemanticClass;
-using test::area_of;
 using test::square_robot;
+using test::traversability_of;
 using test::VoxelWorld;
 
-class PathPolishTest : public testing::Test {
+class PathSmootherTest : public testing::Test {
  protected:
-  PathPolishTest() { world_.ground(-20, -20, 20, 20, road); }
+  PathSmootherTest() { world_.ground(-20, -20, 20, 20, road); }
 
-  [[nodiscard]] DriveCheck drive() {
-    view_ = area_of(world_.view(), square_robot());
+  [[nodiscard]] CollisionChecker checker() {
+    view_ = traversability_of(world_.view(), square_robot());
     grid_.emplace(*view_, view_->bounds_map(), 4.0);
-    return DriveCheck(*grid_, 3.0);
+    return CollisionChecker(*grid_, 3.0);
   }
 
   VoxelWorld world_;
@@ -29,63 +29,64 @@ class PathPolishTest : public testing::Test {
   std::optional<PlanningGrid> grid_;
 };
 
-TEST_F(PathPolishTest, ADetourOverOpenGroundBecomesNearlyStraight) {
-  const DriveCheck check = drive();
+TEST_F(PathSmootherTest, ADetourOverOpenGroundBecomesNearlyStraight) {
+  const CollisionChecker check = checker();
   const auto detour =
-      drive_through(check, std::array{PlanarPose{{-15, 0}, 0}, PlanarPose{{-5, 9}, 1.0},
-                                      PlanarPose{{4, -8}, 0}, PlanarPose{{15, 0}, 0}});
+      connect_waypoints(check, std::array{PlanarPose{{-15, 0}, 0}, PlanarPose{{-5, 9}, 1.0},
+                                          PlanarPose{{4, -8}, 0}, PlanarPose{{15, 0}, 0}});
   ASSERT_TRUE(detour);
-  const auto polished = polish(check, *detour, {}, 1000, 1, {});
+  const auto smoothed = smooth_path(check, *detour, {}, 1000, 1, {});
   EXPECT_GT(detour->back().cost, 45.0);
-  EXPECT_LT(polished.back().cost, 31.0);
-  EXPECT_EQ(polished.back().at.pose.position_map, Eigen::Vector2d(15, 0));
+  EXPECT_LT(smoothed.back().cost, 31.0);
+  EXPECT_EQ(smoothed.back().at.pose.position_map, Eigen::Vector2d(15, 0));
 }
 
-TEST_F(PathPolishTest, StaysFreeAndItsCostsAddUp) {
+TEST_F(PathSmootherTest, StaysFreeAndItsCostsAddUp) {
   world_.block(-1, -20, 1, 6, 0.3, 2.0, building);
-  const DriveCheck check = drive();
-  const auto path = drive_through(
+  const CollisionChecker check = checker();
+  const auto path = connect_waypoints(
       check, std::array{PlanarPose{{-15, -9}, 0}, PlanarPose{{0, 14}, 0}, PlanarPose{{15, -9}, 0}});
   ASSERT_TRUE(path);
-  const auto polished = polish(check, *path, {}, 1000, 1, {});
-  EXPECT_LT(polished.back().cost, path->back().cost);
+  const auto smoothed = smooth_path(check, *path, {}, 1000, 1, {});
+  EXPECT_LT(smoothed.back().cost, path->back().cost);
   double length_m = 0.0;
-  for (std::size_t i = 1; i < polished.size(); ++i) {
-    EXPECT_TRUE(grid_->is_free(polished[i].at.pose));
-    EXPECT_GE(polished[i].cost, polished[i - 1].cost);
-    length_m += polished[i].at.step_m;
+  for (std::size_t i = 1; i < smoothed.size(); ++i) {
+    EXPECT_TRUE(grid_->is_free(smoothed[i].at.pose));
+    EXPECT_GE(smoothed[i].cost, smoothed[i - 1].cost);
+    length_m += smoothed[i].at.step_m;
   }
-  EXPECT_GE(polished.back().cost, length_m - 1e-6);
+  EXPECT_GE(smoothed.back().cost, length_m - 1e-6);
 }
 
-TEST_F(PathPolishTest, EndsInTheEndThatCostsLeast) {
-  const DriveCheck check = drive();
+TEST_F(PathSmootherTest, EndsInTheEndThatCostsLeast) {
+  const CollisionChecker check = checker();
   // Turned round at the goal, though any heading would do.
   const std::array ends{PlanarPose{{15, 0}, 3.1}, PlanarPose{{15, 0}, 0.0}};
-  const auto path = drive_through(check, std::array{PlanarPose{{-15, 0}, 0}, ends[0]});
+  const auto path = connect_waypoints(check, std::array{PlanarPose{{-15, 0}, 0}, ends[0]});
   ASSERT_TRUE(path);
-  const auto polished = polish(check, *path, ends, 1000, 1, {});
-  EXPECT_EQ(polished.back().at.pose.heading_rad, 0.0);
-  EXPECT_LT(polished.back().cost, 30.1);
+  const auto smoothed = smooth_path(check, *path, ends, 1000, 1, {});
+  EXPECT_EQ(smoothed.back().at.pose.heading_rad, 0.0);
+  EXPECT_LT(smoothed.back().cost, 30.1);
 }
 
-TEST_F(PathPolishTest, ThroughAWallThereIsNoPath) {
+TEST_F(PathSmootherTest, ThroughAWallThereIsNoPath) {
   world_.block(-1, -20, 1, 20, 0.3, 2.0, building);
-  EXPECT_FALSE(drive_through(drive(), std::array{PlanarPose{{-9, 0}, 0}, PlanarPose{{9, 0}, 0}}));
+  EXPECT_FALSE(
+      connect_waypoints(checker(), std::array{PlanarPose{{-9, 0}, 0}, PlanarPose{{9, 0}, 0}}));
 }
 
-TEST_F(PathPolishTest, ThinningKeepsEndsLengthAndTurningBacks) {
-  const DriveCheck check = drive();
+TEST_F(PathSmootherTest, ThinningKeepsEndsLengthAndTurningBacks) {
+  const CollisionChecker check = checker();
   // Beside and back: forwards, then backwards.
-  const auto path = drive_through(
+  const auto path = connect_waypoints(
       check, std::array{PlanarPose{{0, 0}, 0}, PlanarPose{{6, 0}, 0}, PlanarPose{{2, 0}, 0}});
   ASSERT_TRUE(path);
-  const auto few = thinned(*path, 0.5);
+  const auto few = downsampled(*path, 0.5);
   EXPECT_LT(few.size(), path->size() / 3);
   EXPECT_EQ(few.back().at.pose.position_map, Eigen::Vector2d(2, 0));
   double length_m = 0.0;
   double farthest_m = 0.0;
-  for (const DrivenPose& pose : few) {
+  for (const PathPoint& pose : few) {
     length_m += pose.at.step_m;
     farthest_m = std::max(farthest_m, pose.at.pose.position_map.x());
   }

@@ -11,8 +11,8 @@ namespace stillmap {
 namespace {
 
 using enum SemanticClass;
-using test::area_of;
 using test::square_robot;
+using test::traversability_of;
 using test::VoxelWorld;
 
 /// A road with posts and a hole, 24 m square.
@@ -31,7 +31,7 @@ VoxelWorld road_with_posts() {
 }
 
 void expect_agreement(const RobotProfile& robot, int seed) {
-  const auto view = area_of(road_with_posts().view(), robot);
+  const auto view = traversability_of(road_with_posts().view(), robot);
   const Eigen::AlignedBox2d box(Eigen::Vector2d(-14, -14), Eigen::Vector2d(14, 14));
   const PlanningGrid grid(*view, box, 1.0);
   std::mt19937 random(static_cast<unsigned>(seed));
@@ -67,7 +67,7 @@ TEST(PlanningGrid, SaysOfEveryPoseWhatThePathCheckSays) {
 TEST(PlanningGrid, NoPoseIsFreeOutsideItsBox) {
   RobotProfile robot = square_robot();
   robot.unknown = UnknownGround::allowed;
-  const auto view = area_of(road_with_posts().view(), robot);
+  const auto view = traversability_of(road_with_posts().view(), robot);
   const PlanningGrid grid(*view, {Eigen::Vector2d(-14, -14), Eigen::Vector2d(14, 14)}, 1.0);
   EXPECT_TRUE(grid.is_free({{-13.9, 0}, 0}));
   EXPECT_FALSE(grid.is_free({{-14.1, 0}, 0}));
@@ -78,7 +78,7 @@ TEST(PlanningGrid, CostlyGroundCostsMoreByTheWeight) {
   VoxelWorld world;
   world.ground(-8, -8, 8, 0, road);
   world.ground(-8, 0, 8, 8, parking);
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   const PlanningGrid grid(*view, view->bounds_map(), 4.0);
   EXPECT_FLOAT_EQ(static_cast<float>(grid.cost_factor(grid.cell_of({0, -4}))), 1.0F);
   EXPECT_NEAR(grid.cost_factor(grid.cell_of({0, 4})), 1.0 + 4.0 * 0.2, 0.05);

@@ -10,7 +10,7 @@ namespace {
 
 constexpr double pi = std::numbers::pi;
 
-std::vector<CurvePose> poses_between(const TurningCurves& curves, const PlanarPose& a,
+std::vector<CurvePose> poses_between(const ReedsSheppCurves& curves, const PlanarPose& a,
                                      const PlanarPose& b) {
   std::vector<CurvePose> poses;
   curves.visit_between(a, b, 0.1, 2.0, [&](const CurvePose& pose) {
@@ -20,9 +20,9 @@ std::vector<CurvePose> poses_between(const TurningCurves& curves, const PlanarPo
   return poses;
 }
 
-TEST(TurningCurves, LeadToTheEndInSmallStepsNoTighterThanTheRadius) {
+TEST(ReedsSheppCurves, LeadToTheEndInSmallStepsNoTighterThanTheRadius) {
   constexpr double radius_m = 5.0;
-  const TurningCurves curves(radius_m);
+  const ReedsSheppCurves curves(radius_m);
   std::mt19937 random(3);
   std::uniform_real_distribution<double> place(-15.0, 15.0);
   std::uniform_real_distribution<double> heading(-pi, pi);
@@ -52,16 +52,16 @@ TEST(TurningCurves, LeadToTheEndInSmallStepsNoTighterThanTheRadius) {
   }
 }
 
-TEST(TurningCurves, StopWhenTheVisitorSaysSo) {
-  const TurningCurves curves(2.0);
+TEST(ReedsSheppCurves, StopWhenTheVisitorSaysSo) {
+  const ReedsSheppCurves curves(2.0);
   int visited = 0;
   curves.visit_between({{0, 0}, 0}, {{10, 0}, 0}, 0.1, 1.0,
                        [&](const CurvePose&) { return ++visited < 7; });
   EXPECT_EQ(visited, 7);
 }
 
-TEST(TurningCurves, FromAPoseToItselfThereIsNothingToVisit) {
-  EXPECT_TRUE(poses_between(TurningCurves(2.0), {{3, 4}, 1}, {{3, 4}, 1}).empty());
+TEST(ReedsSheppCurves, FromAPoseToItselfThereIsNothingToVisit) {
+  EXPECT_TRUE(poses_between(ReedsSheppCurves(2.0), {{3, 4}, 1}, {{3, 4}, 1}).empty());
 }
 
 }  // namespace

@@ -7,7 +7,7 @@
 #include "idl/dds/security/signed_document.hpp"
 #include "tests/scratch_folder.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using ::testing::HasSubstr;
@@ -89,4 +89,4 @@ TEST(SignedDocumentTest, RefusesWhatWasChangedOrNeverSigned) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

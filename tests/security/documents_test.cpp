@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using ::testing::ElementsAre;
@@ -40,4 +40,4 @@ TEST(AccessTest, FollowsTheExpressions) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

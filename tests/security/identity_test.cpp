@@ -8,7 +8,7 @@
 #include "idl/dds/security/signed_document.hpp"
 #include "tests/scratch_folder.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 namespace fs = std::filesystem;
@@ -133,4 +133,4 @@ TEST_F(IdentityTest, IsMadeOnceAndReplacedOnDemand) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -4,7 +4,7 @@
 
 #include "idl/dds/service_identity.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 const TopicNames names{.points = "lidar/points", .odometry_prior = "odom", .name_space = "car_7"};
@@ -73,4 +73,4 @@ TEST(RolesTest, HaveNames) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -6,9 +6,9 @@
 #include <thread>
 
 #include "idl/dds/reader.hpp"
-#include "idl/interface/roles.hpp"
 #include "idl/dds/security/authority.hpp"
 #include "idl/dds/security/security_error.hpp"
+#include "idl/interface/roles.hpp"
 #include "sensor_msgs.h"
 #include "tests/clients/process.hpp"
 #include "tests/scratch_folder.hpp"
@@ -31,8 +31,8 @@ class SecuredDomain : public testing::Test {
     return folder_ / "keys" / name;
   }
 
-  [[nodiscard]] DdsOptions dds(const std::filesystem::path& security) const {
-    DdsOptions options = setup_.dds();
+  [[nodiscard]] dds::DdsOptions dds(const std::filesystem::path& security) const {
+    dds::DdsOptions options = setup_.dds();
     options.security = security;
     return options;
   }
@@ -68,9 +68,9 @@ class SecuredDomain : public testing::Test {
 
   /// An identity of an authority that the server does not know.
   [[nodiscard]] std::filesystem::path stranger() const {
-    const Authority other = Authority::make(folder_ / "other", 10);
-    return other.add("planner", "planner", access_of(Role::planner, {}),
-                     Validity::days_from_now(5));
+    const dds::Authority other = dds::Authority::make(folder_ / "other", 10);
+    return other.add("planner", "planner", dds::access_of(dds::Role::planner, {}),
+                     dds::Validity::days_from_now(5));
   }
 
   ScratchFolder folder_;
@@ -83,7 +83,7 @@ class SecuredDomain : public testing::Test {
 /// Counts what comes on a topic.
 class Listener {
  public:
-  Listener(const DdsOptions& dds, const std::string& topic)
+  Listener(const dds::DdsOptions& dds, const std::string& topic)
       : participant_(dds), reader_(participant_, topic, {.reliable = false}) {}
 
   [[nodiscard]] int samples() {
@@ -93,8 +93,8 @@ class Listener {
   }
 
  private:
-  Participant participant_;
-  Reader<sensor_msgs::msg::PointCloud2> reader_;
+  dds::Participant participant_;
+  dds::Reader<sensor_msgs::msg::PointCloud2> reader_;
   int samples_ = 0;
 };
 
@@ -102,7 +102,7 @@ TEST_F(SecuredDomain, IsDeafAndMuteToAnOutsider) {
   ASSERT_EQ(made_.exit_code, 0) << made_.err;
   start_server();
   constexpr int scans = 6;
-  const std::string labelled = Topics::in("stillmap").scan.dds_name;
+  const std::string labelled = dds::Topics::in("stillmap").scan.dds_name;
   Listener outside(dds({}), labelled), inside(dds(identity("planner")), labelled);
   Listener outside_points(dds({}), "rt/points"),
       inside_points(dds(identity("planner")), "rt/points");
@@ -127,11 +127,11 @@ TEST_F(SecuredDomain, IsDeafAndMuteToAnOutsider) {
   EXPECT_EQ(outside.samples(), 0);
   // It hears the two scans of the other outsider at most.
   EXPECT_LE(outside_points.samples(), 2);
-  const ServerStatus status = planner.status();
+  const dds::ServerStatus status = planner.status();
   EXPECT_EQ(status.counter("scans_received"), static_cast<std::uint64_t>(scans));
   EXPECT_EQ(status.map_id, map_id);
-  EXPECT_THAT(status.findings,
-              Contains(Field(&Finding::what, HasSubstr("is not secured and is ignored"))));
+  EXPECT_THAT(status.diagnostics,
+              Contains(Field(&dds::Diagnostic::what, HasSubstr("is not secured and is ignored"))));
 }
 
 TEST_F(SecuredDomain, LetsAPlannerAskAndAnOperatorCommand) {
@@ -159,7 +159,7 @@ TEST_F(SecuredDomain, LetsAPlannerAskAndAnOperatorCommand) {
 
 TEST_F(SecuredDomain, LetsNobodyButASensorSendScans) {
   for (const std::string name : {"planner", "operator"}) {
-    EXPECT_THAT(message_of<NotPermitted>([&] { (void)publisher(identity(name)); }),
+    EXPECT_THAT(message_of<dds::NotPermitted>([&] { (void)publisher(identity(name)); }),
                 AllOf(HasSubstr("may not write rt/points"), HasSubstr(name)));
   }
   EXPECT_NO_THROW((void)publisher(identity("sensor")));
@@ -177,17 +177,17 @@ TEST_F(SecuredDomain, RefusesAnotherAuthorityAndSaysSoOnBothSides) {
     const std::string log = content_of(folder_ / "server.log");
     return log.find("refuse each other") != std::string::npos;
   }));
-  EXPECT_THAT(planner.status().findings,
-              Contains(Field(&Finding::evidence, HasSubstr("another authority"))));
+  EXPECT_THAT(planner.status().diagnostics,
+              Contains(Field(&dds::Diagnostic::evidence, HasSubstr("another authority"))));
 }
 
 TEST_F(SecuredDomain, DoesNotStartWithAnIdentityThatExpired) {
   const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
-  const Validity past{.from = now - std::chrono::days(9), .to = now - std::chrono::days(2)};
-  const Authority authority = Authority::open(folder_ / "keys");
-  for (const Role role : {Role::server, Role::planner}) {
-    (void)authority.add(std::string(name(role)), std::string(name(role)), access_of(role, {}), past,
-                        true);
+  const dds::Validity past{.from = now - std::chrono::days(9), .to = now - std::chrono::days(2)};
+  const dds::Authority authority = dds::Authority::open(folder_ / "keys");
+  for (const dds::Role role : {dds::Role::server, dds::Role::planner}) {
+    (void)authority.add(std::string(name(role)), std::string(name(role)), dds::access_of(role, {}),
+                        past, true);
   }
   start_server();
   EXPECT_EQ(server_->wait(), 2);

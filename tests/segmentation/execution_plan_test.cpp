@@ -36,7 +36,7 @@ Int8Calibration calibration_of(const NetworkGraph& graph) {
 /// tensor a buffer holds changes only where a step writes it.
 void expect_right_contents(const ExecutionPlan& plan) {
   std::vector<std::pair<TensorId, ValueType>> holds(plan.buffers.size(), {999999, ValueType::f32});
-  const auto expect = [&](const Place& place) {
+  const auto expect = [&](const TensorPlacement& place) {
     EXPECT_EQ(holds[place.buffer], std::pair(place.tensor, place.type));
   };
   for (std::size_t i = 0; i < plan.steps.size(); ++i) {
@@ -50,7 +50,7 @@ void expect_right_contents(const ExecutionPlan& plan) {
           }
         },
         plan.steps[i]);
-    const Place& to = target(plan.steps[i]);
+    const TensorPlacement& to = target(plan.steps[i]);
     EXPECT_LE(plan.buffers[to.buffer].first_step, i);
     EXPECT_GE(plan.buffers[to.buffer].last_step, i);
     holds[to.buffer] = {to.tensor, to.type};

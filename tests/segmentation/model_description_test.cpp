@@ -36,7 +36,7 @@ TEST(ForSensor, LetsOneNetworkLabelScansOfDifferentSensors) {
   model.network_file = test::write_model(test::light_bytes(8, 0, 0, 20));
   const Scan scan = test::random_scan(500, 3);
   for (const SensorModel& sensor : {vlp_16(), hdl_32e(), hdl_64e()}) {
-    const PointLabels labels = open_model(for_sensor(model, sensor))->label(scan);
+    const PointLabels labels = open_model(for_sensor(model, sensor))->segment(scan);
     EXPECT_EQ(labels.classes.size(), scan.size()) << sensor.name;
   }
 }

@@ -158,48 +158,48 @@ TEST(ReplaceTransposed, RefusesWhatIsNoMultipleOfTheInput) {
   EXPECT_THROW(replace_transposed_convolutions(builder.graph), UnsupportedLayer);
 }
 
-TEST(FuseFollowUps, MakesADarkNetBlockTwoLayersWithTheSameResult) {
+TEST(FusePostOps, MakesADarkNetBlockTwoLayersWithTheSameResult) {
   GraphBuilder builder;
   const TensorId x = builder.add(LeakyRelu{0.1F}, {builder.add(convolution(3, 4), {0})});
   const TensorId narrow = builder.add(LeakyRelu{0.1F}, {builder.add(convolution(4, 2), {x})});
   const TensorId wide = builder.add(LeakyRelu{0.1F}, {builder.add(convolution(2, 4), {narrow})});
   builder.add(convolution(4, 3), {builder.add(Add{}, {wide, x})});
   NetworkGraph fused = builder.graph;
-  fuse_follow_ups(fused);
+  fuse_post_ops(fused);
   EXPECT_EQ(fused.layers.size(), 4U);
-  EXPECT_EQ(fused.layers[2].follow_ups.size(), 2U);
+  EXPECT_EQ(fused.layers[2].post_ops.size(), 2U);
   expect_same(run(fused), run(builder.graph));
 }
 
-TEST(FuseFollowUps, KeepsWhatSomeoneElseReads) {
+TEST(FusePostOps, KeepsWhatSomeoneElseReads) {
   GraphBuilder builder;
   const TensorId c = builder.add(convolution(3, 3), {0});
   builder.add(Add{}, {builder.add(LeakyRelu{0.2F}, {c}), c});
   NetworkGraph fused = builder.graph;
-  fuse_follow_ups(fused);
+  fuse_post_ops(fused);
   EXPECT_EQ(fused.layers.size(), 3U);
   expect_same(run(fused), run(builder.graph));
 }
 
-TEST(FuseFollowUps, TakesASumIntoTheLaterOfItsLayers) {
+TEST(FusePostOps, TakesASumIntoTheLaterOfItsLayers) {
   GraphBuilder builder;
   const TensorId first = builder.add(convolution(3, 4), {0});
   const TensorId second = builder.add(convolution(3, 4), {0});
   builder.add(LeakyRelu{0.3F}, {builder.add(Add{}, {first, second})});
   NetworkGraph fused = builder.graph;
-  fuse_follow_ups(fused);
+  fuse_post_ops(fused);
   ASSERT_EQ(fused.layers.size(), 2U);
-  EXPECT_TRUE(fused.layers[0].follow_ups.empty());
-  EXPECT_EQ(fused.layers[1].follow_ups.size(), 2U);
+  EXPECT_TRUE(fused.layers[0].post_ops.empty());
+  EXPECT_EQ(fused.layers[1].post_ops.size(), 2U);
   expect_same(run(fused), run(builder.graph));
 }
 
-TEST(FuseFollowUps, LeavesATensorThatIsAddedToItself) {
+TEST(FusePostOps, LeavesATensorThatIsAddedToItself) {
   GraphBuilder builder;
   const TensorId c = builder.add(convolution(3, 4), {0});
   builder.add(Add{}, {c, c});
   NetworkGraph fused = builder.graph;
-  fuse_follow_ups(fused);
+  fuse_post_ops(fused);
   EXPECT_EQ(fused.layers.size(), 2U);
   expect_same(run(fused), run(builder.graph));
 }
@@ -216,7 +216,7 @@ NetworkGraph tied() {
   const TensorId wide = builder.add(LeakyRelu{0.1F}, {builder.add(widening, {sum})});
   builder.add(convolution(2, 3), {wide});
   replace_transposed_convolutions(builder.graph);
-  fuse_follow_ups(builder.graph);
+  fuse_post_ops(builder.graph);
   infer_shapes(builder.graph, image);
   return builder.graph;
 }

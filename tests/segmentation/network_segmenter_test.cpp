@@ -56,14 +56,14 @@ std::size_t shown_point(const Scan& scan, const RangeImage& image, std::size_t p
 
 struct Fixture {
   TinyNetwork network = random_network(8, 32, 20);
-  ModelDescription model = describe(network);
+  ModelDescription model = cli::describe(network);
   Fixture() { model.network_file = write_model(onnx_bytes(network)); }
 };
 
-TEST(NetworkLabels, GivesEveryPointTheClassThatItsPixelHasByHand) {
+TEST(NetworkSegmenter, GivesEveryPointTheClassThatItsPixelHasByHand) {
   const Fixture fixture;
   const Scan scan = random_scan(600, 4);
-  const PointLabels labels = open_model(fixture.model)->label(scan);
+  const PointLabels labels = open_model(fixture.model)->segment(scan);
   const RangeImage image = test::project(scan, fixture.model);
   ASSERT_EQ(labels.classes.size(), scan.size());
   for (std::size_t i = 0; i < scan.size(); ++i) {
@@ -74,22 +74,22 @@ TEST(NetworkLabels, GivesEveryPointTheClassThatItsPixelHasByHand) {
   }
 }
 
-TEST(NetworkLabels, MapsOutputsToClasses) {
+TEST(NetworkSegmenter, MapsOutputsToClasses) {
   Fixture fixture;
   const Scan scan = random_scan(600, 4);
-  const PointLabels plain = open_model(fixture.model)->label(scan);
+  const PointLabels plain = open_model(fixture.model)->segment(scan);
   std::ranges::reverse(fixture.model.classes);
-  const PointLabels mapped = open_model(fixture.model)->label(scan);
+  const PointLabels mapped = open_model(fixture.model)->segment(scan);
   for (std::size_t i = 0; i < scan.size(); ++i) {
     EXPECT_EQ(static_cast<int>(mapped.classes[i]), 19 - static_cast<int>(plain.classes[i]));
   }
 }
 
-TEST(NetworkLabels, LetsTheNeighboursVoteWhenAsked) {
+TEST(NetworkSegmenter, LetsTheNeighboursVoteWhenAsked) {
   Fixture fixture;
   const Scan scan = random_scan(600, 4);
   const RangeImage image = test::project(scan, fixture.model);
-  const PointLabels own = open_model(fixture.model)->label(scan);
+  const PointLabels own = open_model(fixture.model)->segment(scan);
   PixelLabels pixels{.classes = std::vector(image.pixel_count(), SemanticClass::unlabeled),
                      .confidence = std::vector(image.pixel_count(), 0.0F)};
   for (std::size_t i = 0; i < scan.size(); ++i) {
@@ -98,20 +98,20 @@ TEST(NetworkLabels, LetsTheNeighboursVoteWhenAsked) {
     pixels.confidence[pixel] = own.confidence[i];
   }
   fixture.model.knn = KnnConfig{};
-  const PointLabels voted = open_model(fixture.model)->label(scan);
+  const PointLabels voted = open_model(fixture.model)->segment(scan);
   EXPECT_EQ(voted.classes, knn_labels(image, pixels, KnnConfig{}).classes);
   EXPECT_NE(voted.classes, own.classes);
 }
 
-TEST(NetworkLabels, HasNothingToSayOfAnEmptyScan) {
-  EXPECT_TRUE(open_model(Fixture().model)->label({}).empty());
+TEST(NetworkSegmenter, HasNothingToSayOfAnEmptyScan) {
+  EXPECT_TRUE(open_model(Fixture().model)->segment({}).empty());
 }
 
-TEST(NetworkLabels, LeavesPointsThatCannotBeProjectedUnlabeled) {
+TEST(NetworkSegmenter, LeavesPointsThatCannotBeProjectedUnlabeled) {
   Scan scan = random_scan(50, 2);
   scan.points_lidar[3].x() = std::numeric_limits<float>::quiet_NaN();
   scan.points_lidar[4].setZero();
-  const PointLabels labels = open_model(Fixture().model)->label(scan);
+  const PointLabels labels = open_model(Fixture().model)->segment(scan);
   EXPECT_EQ(labels.classes[3], SemanticClass::unlabeled);
   EXPECT_EQ(labels.classes[4], SemanticClass::unlabeled);
   EXPECT_EQ(labels.confidence[3], 0.0F);
@@ -148,44 +148,45 @@ class OneClass final : public SegmentationNetwork {
   std::uint8_t output_;
 };
 
-TEST(NetworkLabels, LooksAsCoarselyAsItIsTold) {
-  NetworkLabels labels(describe(random_network(2, 32, 20)), std::make_unique<OneClass>(64U, 9));
-  EXPECT_EQ(labels.costs(), std::vector{1.0});
-  labels.add_coarser(16, std::make_unique<OneClass>(32U, 1));
-  EXPECT_EQ(labels.costs(), (std::vector{1.0, 0.5}));
+TEST(NetworkSegmenter, LooksAsCoarselyAsItIsTold) {
+  NetworkSegmenter labels(cli::describe(random_network(2, 32, 20)),
+                          std::make_unique<OneClass>(64U, 9));
+  EXPECT_EQ(labels.relative_costs(), std::vector{1.0});
+  labels.add_lower_resolution(16, std::make_unique<OneClass>(32U, 1));
+  EXPECT_EQ(labels.relative_costs(), (std::vector{1.0, 0.5}));
   EXPECT_EQ(labels.details(), "one class, image 2x32 down to 16");
   const Scan scan = random_scan(5, 2);
   EXPECT_EQ(labels.image_columns(), 32);
-  EXPECT_EQ(labels.label(scan).classes, std::vector(5, SemanticClass::road));
-  labels.set_coarseness(1);
+  EXPECT_EQ(labels.segment(scan).classes, std::vector(5, SemanticClass::road));
+  labels.set_resolution_level(1);
   EXPECT_EQ(labels.image_columns(), 16);
-  EXPECT_EQ(labels.label(scan).classes, std::vector(5, SemanticClass::car));
-  labels.set_coarseness(0);
-  EXPECT_EQ(labels.label(scan).classes, std::vector(5, SemanticClass::road));
+  EXPECT_EQ(labels.segment(scan).classes, std::vector(5, SemanticClass::car));
+  labels.set_resolution_level(0);
+  EXPECT_EQ(labels.segment(scan).classes, std::vector(5, SemanticClass::road));
 }
 
-TEST(NetworkLabels, OpensAModelInTheWidthsThatItKnows) {
+TEST(NetworkSegmenter, OpensAModelInTheWidthsThatItKnows) {
   ModelDescription model = test::describe_family(16, 128, 20);
   model.network_file = write_model(test::light_bytes(8, 0, 0, 20));
-  EXPECT_EQ(open_model_of_many_widths(model)->costs(), std::vector{1.0});
-  model.least_columns = 32;
-  const auto labels = open_model_of_many_widths(model);
-  EXPECT_EQ(labels->costs(), (std::vector{1.0, 0.5, 0.25}));
+  EXPECT_EQ(open_multi_resolution_model(model)->relative_costs(), std::vector{1.0});
+  model.min_columns = 32;
+  const auto labels = open_multi_resolution_model(model);
+  EXPECT_EQ(labels->relative_costs(), (std::vector{1.0, 0.5, 0.25}));
   const Scan scan = random_scan(600, 4);
-  labels->set_coarseness(1);
+  labels->set_resolution_level(1);
   ModelDescription narrow = model;
   narrow.columns = 64;
-  EXPECT_EQ(labels->label(scan).classes, open_model(narrow)->label(scan).classes);
-  model.least_columns = 112;
-  EXPECT_EQ(open_model_of_many_widths(model)->costs(), (std::vector{1.0, 0.875}));
+  EXPECT_EQ(labels->segment(scan).classes, open_model(narrow)->segment(scan).classes);
+  model.min_columns = 112;
+  EXPECT_EQ(open_multi_resolution_model(model)->relative_costs(), (std::vector{1.0, 0.875}));
 }
 
-TEST(NetworkLabels, LeavesPointsUnlabeledWhereTheNetworkFails) {
-  const ModelDescription model = describe(random_network(1, 2, 20));
-  NetworkLabels labels(model, std::make_unique<HalfBlind>());
+TEST(NetworkSegmenter, LeavesPointsUnlabeledWhereTheNetworkFails) {
+  const ModelDescription model = cli::describe(random_network(1, 2, 20));
+  NetworkSegmenter labels(model, std::make_unique<HalfBlind>());
   Scan scan;
   scan.points_lidar = {{0.0F, 5.0F, 0.0F}, {0.0F, -5.0F, 0.0F}};
-  EXPECT_EQ(labels.label(scan).classes,
+  EXPECT_EQ(labels.segment(scan).classes,
             (std::vector{SemanticClass::unlabeled, SemanticClass::road}));
 }
 

@@ -12,8 +12,8 @@
 namespace stillmap {
 namespace {
 
-using Engine = EngineChoice::Engine;
-using Numbers = EngineChoice::Numbers;
+using Engine = EngineOptions::Engine;
+using PrecisionMode = EngineOptions::PrecisionMode;
 using ::testing::HasSubstr;
 
 ModelDescription light() {
@@ -44,7 +44,7 @@ ModelDescription exotic() {
   return model;
 }
 
-std::string engine(const ModelDescription& model, const EngineChoice& choice) {
+std::string engine(const ModelDescription& model, const EngineOptions& choice) {
   return open_network(model, choice).network->engine();
 }
 
@@ -58,24 +58,24 @@ TEST(OpenNetwork, RemarksWhyItIsNotFaster) {
   EXPECT_EQ(open_network(calibrated(), {}).remark, "");
   EXPECT_THAT(open_network(light(), {}).remark, HasSubstr("stillmap model calibrate"));
   EXPECT_THAT(open_network(exotic(), {}).remark, HasSubstr("operator Sigmoid"));
-  EXPECT_EQ(open_network(light(), {.precision = Numbers::fp32}).remark, "");
+  EXPECT_EQ(open_network(light(), {.precision = PrecisionMode::fp32}).remark, "");
 }
 
 TEST(OpenNetwork, DoesAsItIsTold) {
   const ModelDescription model = calibrated();
   EXPECT_EQ(engine(model, {.engine = Engine::opencv}), "OpenCV");
-  EXPECT_THAT(engine(model, {.precision = Numbers::fp32}), HasSubstr("oneDNN fp32"));
-  EXPECT_THAT(engine(model, {.engine = Engine::onednn, .precision = Numbers::int8}),
+  EXPECT_THAT(engine(model, {.precision = PrecisionMode::fp32}), HasSubstr("oneDNN fp32"));
+  EXPECT_THAT(engine(model, {.engine = Engine::onednn, .precision = PrecisionMode::int8}),
               HasSubstr("oneDNN int8"));
 }
 
 TEST(OpenNetwork, RefusesWhatCannotBe) {
   EXPECT_THROW((void)open_network(exotic(), {.engine = Engine::onednn}), UnsupportedModel);
-  EXPECT_THROW((void)open_network(exotic(), {.precision = Numbers::int8}), ModelError);
-  EXPECT_THROW((void)open_network(light(), {.precision = Numbers::int8}), ModelError);
-  EXPECT_THROW(
-      (void)open_network(calibrated(), {.engine = Engine::opencv, .precision = Numbers::int8}),
-      ModelError);
+  EXPECT_THROW((void)open_network(exotic(), {.precision = PrecisionMode::int8}), ModelError);
+  EXPECT_THROW((void)open_network(light(), {.precision = PrecisionMode::int8}), ModelError);
+  EXPECT_THROW((void)open_network(calibrated(),
+                                  {.engine = Engine::opencv, .precision = PrecisionMode::int8}),
+               ModelError);
 }
 
 TEST(OpenNetwork, DoesNotHideADamagedModelBehindTheFallback) {

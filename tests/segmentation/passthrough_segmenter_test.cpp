@@ -16,39 +16,39 @@ Scan labelled_scan() {
   return scan;
 }
 
-TEST(StreamLabels, HandsOnTheScansLabelsAndTrustsThem) {
-  const PointLabels labels = StreamLabels().label(labelled_scan());
+TEST(PassthroughSegmenter, HandsOnTheScansLabelsAndTrustsThem) {
+  const PointLabels labels = PassthroughSegmenter().segment(labelled_scan());
   EXPECT_EQ(labels.classes, labelled_scan().labels);
   EXPECT_EQ(labels.confidence, (std::vector<float>{1.0F, 0.0F}));
 }
 
-TEST(StreamLabels, HasNoneForAScanWithoutLabels) {
+TEST(PassthroughSegmenter, HasNoneForAScanWithoutLabels) {
   Scan scan = labelled_scan();
   scan.labels.clear();
-  EXPECT_TRUE(StreamLabels().label(scan).empty());
+  EXPECT_TRUE(PassthroughSegmenter().segment(scan).empty());
 }
 
-TEST(NoLabels, IgnoresLabelsThatAreThere) {
-  EXPECT_TRUE(NoLabels().label(labelled_scan()).empty());
-  EXPECT_EQ(NoLabels().name(), "none");
+TEST(NullSegmenter, IgnoresLabelsThatAreThere) {
+  EXPECT_TRUE(NullSegmenter().segment(labelled_scan()).empty());
+  EXPECT_EQ(NullSegmenter().name(), "none");
 }
 
-class AllCars final : public LabelSource {
+class AllCars final : public Segmenter {
  public:
   [[nodiscard]] std::string name() const override { return "all cars"; }
-  [[nodiscard]] PointLabels label(const Scan& scan) override {
+  [[nodiscard]] PointLabels segment(const Scan& scan) override {
     return {.classes = std::vector(scan.size(), SemanticClass::car),
             .confidence = std::vector(scan.size(), 0.5F)};
   }
 };
 
-TEST(StreamFirstLabels, AsksTheOtherSourceOnlyAboutScansWithoutLabels) {
-  StreamFirstLabels labels(std::make_unique<AllCars>());
+TEST(FallbackSegmenter, AsksTheOtherSourceOnlyAboutScansWithoutLabels) {
+  FallbackSegmenter labels(std::make_unique<AllCars>());
   EXPECT_EQ(labels.name(), "stream, else all cars");
-  EXPECT_EQ(labels.label(labelled_scan()).classes, labelled_scan().labels);
+  EXPECT_EQ(labels.segment(labelled_scan()).classes, labelled_scan().labels);
   Scan scan = labelled_scan();
   scan.labels.clear();
-  EXPECT_EQ(labels.label(scan).classes[1], SemanticClass::car);
+  EXPECT_EQ(labels.segment(scan).classes[1], SemanticClass::car);
 }
 
 }  // namespace

@@ -23,21 +23,21 @@ TEST(ScoreKind, IsLogitsWhenScoresAreNegativeOrSumToSomethingElse) {
   EXPECT_EQ(score_kind(std::vector<float>{0.5F, 0.5F, 0.9F, 0.5F}, 2), ScoreKind::logits);
 }
 
-TEST(MostProbable, TakesTheLargestProbabilityAsItIs) {
-  const PixelOutputs result = most_probable(probabilities, 3, ScoreKind::probabilities);
+TEST(ArgmaxOutputs, TakesTheLargestProbabilityAsItIs) {
+  const PixelOutputs result = argmax_outputs(probabilities, 3, ScoreKind::probabilities);
   EXPECT_EQ(result.output, (std::vector<std::uint8_t>{1, 2}));
   EXPECT_FLOAT_EQ(result.confidence[0], 0.7F);
   EXPECT_FLOAT_EQ(result.confidence[1], 0.6F);
 }
 
-TEST(MostProbable, AppliesTheSoftMaxToLogits) {
+TEST(ArgmaxOutputs, AppliesTheSoftMaxToLogits) {
   std::mt19937 random(3);
   std::normal_distribution<float> score(0.0F, 5.0F);
   constexpr std::size_t outputs = 20;
   constexpr std::size_t pixels = 100;
   std::vector<float> scores(outputs * pixels);
   for (float& value : scores) value = score(random);
-  const PixelOutputs result = most_probable(scores, outputs, ScoreKind::logits);
+  const PixelOutputs result = argmax_outputs(scores, outputs, ScoreKind::logits);
   for (std::size_t i = 0; i < pixels; ++i) {
     double sum = 0.0;
     for (std::size_t n = 0; n < outputs; ++n) sum += std::exp(double{scores[n * pixels + i]});
@@ -57,15 +57,15 @@ std::vector<float> by_pixels(const std::vector<float>& planes, std::size_t outpu
   return turned;
 }
 
-TEST(MostProbable, DoesNotCareHowScoresLieInMemory) {
+TEST(ArgmaxOutputs, DoesNotCareHowScoresLieInMemory) {
   std::mt19937 random(4);
   std::normal_distribution<float> score(0.0F, 5.0F);
   for (const std::size_t outputs : {1UL, 3UL, 20UL, 255UL}) {
     std::vector<float> scores(outputs * 77);
     for (float& value : scores) value = score(random);
     const std::vector<float> turned = by_pixels(scores, outputs);
-    const PixelOutputs a = most_probable(scores, outputs, ScoreKind::logits);
-    const PixelOutputs b = most_probable(turned, outputs, ScoreKind::logits, ScoreLayout::pixels);
+    const PixelOutputs a = argmax_outputs(scores, outputs, ScoreKind::logits);
+    const PixelOutputs b = argmax_outputs(turned, outputs, ScoreKind::logits, ScoreLayout::pixels);
     EXPECT_EQ(a.output, b.output);
     EXPECT_EQ(a.confidence, b.confidence);
     EXPECT_EQ(probabilities_of(scores, outputs, ScoreKind::logits),
@@ -85,19 +85,19 @@ TEST(ProbabilitiesOf, AreTheSoftMaxOfLogitsAndProbabilitiesAsTheyAre) {
   EXPECT_EQ(probabilities_of(probabilities, 3, ScoreKind::probabilities), probabilities);
 }
 
-TEST(MostProbable, SurvivesLogitsThatOverflowAnExponential) {
+TEST(ArgmaxOutputs, SurvivesLogitsThatOverflowAnExponential) {
   const PixelOutputs result =
-      most_probable(std::vector<float>{1000.0F, 900.0F}, 2, ScoreKind::logits);
+      argmax_outputs(std::vector<float>{1000.0F, 900.0F}, 2, ScoreKind::logits);
   EXPECT_EQ(result.output[0], 0);
   EXPECT_FLOAT_EQ(result.confidence[0], 1.0F);
 }
 
-TEST(MostProbable, SaysNothingOfPixelsWithoutFiniteScores) {
+TEST(ArgmaxOutputs, SaysNothingOfPixelsWithoutFiniteScores) {
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
   constexpr float infinity = std::numeric_limits<float>::infinity();
   const std::vector<float> scores{nan, 1.0F, infinity, 0.5F, 2.0F, 0.5F};
   for (const ScoreKind kind : {ScoreKind::logits, ScoreKind::probabilities}) {
-    const PixelOutputs result = most_probable(scores, 2, kind);
+    const PixelOutputs result = argmax_outputs(scores, 2, kind);
     EXPECT_EQ(result.output[0], PixelOutputs::no_output);
     EXPECT_EQ(result.output[2], PixelOutputs::no_output);
     EXPECT_EQ(result.confidence[0], 0.0F);

@@ -145,7 +145,7 @@ PlainTensor run_plainly(NetworkGraph graph, const ImageShape& shape, std::span<c
     for (const TensorId id : layer.inputs) inputs.push_back(&tensors[id]);
     const ImageShape& output_shape = graph.tensors[layer.output].shape;
     PlainTensor result = std::visit(PlainLayer{inputs, output_shape}, layer.operation);
-    for (const FollowUp& step : layer.follow_ups) {
+    for (const PostOp& step : layer.post_ops) {
       std::vector<const PlainTensor*> operands{&result};
       const PlainLayer follow{operands, output_shape};
       if (const auto* const sum = std::get_if<AddTensor>(&step)) {

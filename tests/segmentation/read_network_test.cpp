@@ -119,7 +119,7 @@ TEST(ReadNetwork, RefusesWeightsThatAreWorkedOut) {
 
 TEST(OnnxFile, ReadsTheDeclaredShapeAndWhatIsLeftOpen) {
   using Shape = std::vector<std::int64_t>;
-  OnnxBuilder fixed(5, 8, 300);
+  OnnxBuilder cli::fixed(5, 8, 300);
   const OnnxFile file(write_model(fixed.bytes(fixed.convolve("input", 3, three))));
   EXPECT_EQ(file.declared_input_shape(), (Shape{1, 5, 8, 300}));
   OnnxBuilder open(5, 0, 0);

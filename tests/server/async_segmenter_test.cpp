@@ -5,7 +5,7 @@
 
 #include "tests/server/slow_segmenter.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 using namespace std::chrono_literals;
@@ -19,124 +19,124 @@ Scan scan_at(std::int64_t stamp_ns) {
   return scan;
 }
 
-class PacedLabelsTest : public testing::Test {
+class AsyncSegmenterTest : public testing::Test {
  protected:
-  [[nodiscard]] std::unique_ptr<PacedLabels> feed(std::chrono::milliseconds budget) {
-    return std::make_unique<PacedLabels>(std::make_unique<test::SlowLabels>(source_), budget,
-                                         queue_, statistics_);
+  [[nodiscard]] std::unique_ptr<AsyncSegmenter> make_segmenter(std::chrono::milliseconds budget) {
+    return std::make_unique<AsyncSegmenter>(std::make_unique<test::SlowSegmenter>(source_), budget,
+                                            queue_, statistics_);
   }
-  [[nodiscard]] ServerStatus status() const {
-    ServerStatus status;
+  [[nodiscard]] dds::ServerStatus status() const {
+    dds::ServerStatus status;
     statistics_.report_to(status);
     return status;
   }
 
-  test::SlowLabels::Behaviour source_;
+  test::SlowSegmenter::Behaviour source_;
   ScanQueue queue_{3};
   Statistics statistics_;
 };
 
-TEST_F(PacedLabelsTest, AFastSourceAnswersInTime) {
-  const auto labels = feed(5s);
+TEST_F(AsyncSegmenterTest, AFastSourceAnswersInTime) {
+  const auto labels = make_segmenter(5s);
   for (int k = 0; k < 5; ++k) {
-    const auto answer = labels->offer(scan_at(k));
-    ASSERT_EQ(answer.finished.size(), 1U);
-    EXPECT_EQ(answer.finished[0].stamp_ns, k);
-    EXPECT_EQ(answer.finished[0].labels.classes[0], SemanticClass::road);
-    EXPECT_FALSE(answer.pending);
+    const auto output = labels->submit(scan_at(k));
+    ASSERT_EQ(output.finished.size(), 1U);
+    EXPECT_EQ(output.finished[0].stamp_ns, k);
+    EXPECT_EQ(output.finished[0].labels.classes[0], SemanticClass::road);
+    EXPECT_FALSE(output.pending);
   }
 }
 
-TEST_F(PacedLabelsTest, NobodyWaitsLongerThanTheBudgetAndLateLabelsComeWithALaterScan) {
+TEST_F(AsyncSegmenterTest, NobodyWaitsLongerThanTheBudgetAndLateLabelsComeWithALaterScan) {
   source_.delay_ms = 300;
-  const auto labels = feed(20ms);
+  const auto labels = make_segmenter(20ms);
   const auto began = Clock::now();
-  const auto first = labels->offer(scan_at(1));
+  const auto first = labels->submit(scan_at(1));
   EXPECT_TRUE(first.pending);
   EXPECT_TRUE(first.finished.empty());
-  const auto second = labels->offer(scan_at(2));
+  const auto second = labels->submit(scan_at(2));
   EXPECT_FALSE(second.pending);
   EXPECT_LT(Clock::now() - began, 200ms);
   std::this_thread::sleep_for(500ms);
   source_.delay_ms = 0;
-  const auto third = labels->offer(scan_at(3));
+  const auto third = labels->submit(scan_at(3));
   ASSERT_GE(third.finished.size(), 1U);
   EXPECT_EQ(third.finished[0].stamp_ns, 1);
 }
 
-TEST_F(PacedLabelsTest, CatchingUpComesFirstButNotForEver) {
-  const auto labels = feed(5s);
+TEST_F(AsyncSegmenterTest, CatchingUpComesFirstButNotForEver) {
+  const auto labels = make_segmenter(5s);
   EXPECT_EQ(queue_.push_dropping_oldest({scan_at(100), "lidar", Clock::now()}), 0U);
   int segmented = 0;
-  for (int k = 0; k < 33; ++k) segmented += labels->offer(scan_at(k)).finished.empty() ? 0 : 1;
+  for (int k = 0; k < 33; ++k) segmented += labels->submit(scan_at(k)).finished.empty() ? 0 : 1;
   EXPECT_EQ(segmented, 3);
   ASSERT_TRUE(queue_.pop({}, 0ms).has_value());
-  EXPECT_FALSE(labels->offer(scan_at(33)).finished.empty());
+  EXPECT_FALSE(labels->submit(scan_at(33)).finished.empty());
 }
 
-TEST_F(PacedLabelsTest, WithoutABudgetEveryScanGetsItsLabels) {
+TEST_F(AsyncSegmenterTest, WithoutABudgetEveryScanGetsItsLabels) {
   source_.delay_ms = 30;
-  const auto labels = feed(0ms);
+  const auto labels = make_segmenter(0ms);
   EXPECT_FALSE(labels->may_skip_scans());
   for (int k = 0; k < 4; ++k) {
-    const auto answer = labels->offer(scan_at(k));
-    ASSERT_EQ(answer.finished.size(), 1U);
-    EXPECT_EQ(answer.finished[0].stamp_ns, k);
-    EXPECT_FALSE(answer.finished[0].labels.empty());
+    const auto output = labels->submit(scan_at(k));
+    ASSERT_EQ(output.finished.size(), 1U);
+    EXPECT_EQ(output.finished[0].stamp_ns, k);
+    EXPECT_FALSE(output.finished[0].labels.empty());
   }
 }
 
-TEST_F(PacedLabelsTest, WithoutABudgetEveryScanIsLookedAtClosely) {
+TEST_F(AsyncSegmenterTest, WithoutABudgetEveryScanIsLookedAtClosely) {
   source_.delay_ms = 20;
   source_.costs = {1.0, 0.5};
-  const auto labels = feed(0ms);
+  const auto labels = make_segmenter(0ms);
   for (int k = 0; k < 12; ++k) {
     // The sensor is four times as fast as the source.
     for (int i = 0; i < 4; ++i) statistics_.scan_received();
-    (void)labels->offer(scan_at(k));
+    (void)labels->submit(scan_at(k));
   }
-  const SegmentationStatus pace = status().segmentation;
+  const dds::SegmentationStatus pace = status().segmentation;
   EXPECT_EQ(pace.every, 1U);
   EXPECT_EQ(pace.image_columns, 2000U);
   EXPECT_GE(pace.network_ms, 20.0);
 }
 
-TEST_F(PacedLabelsTest, FailuresAreCountedAndGiveNoLabels) {
+TEST_F(AsyncSegmenterTest, FailuresAreCountedAndGiveNoLabels) {
   for (const auto budget : {0ms, 5000ms}) {
-    const auto labels = feed(budget);
+    const auto labels = make_segmenter(budget);
     source_.fails = true;
-    const auto answer = labels->offer(scan_at(1));
-    ASSERT_EQ(answer.finished.size(), 1U);
-    EXPECT_TRUE(answer.finished[0].labels.empty());
-    EXPECT_EQ(statistics_.last_label_failure(), "the network is broken");
+    const auto output = labels->submit(scan_at(1));
+    ASSERT_EQ(output.finished.size(), 1U);
+    EXPECT_TRUE(output.finished[0].labels.empty());
+    EXPECT_EQ(statistics_.last_segmentation_failure(), "the network is broken");
     source_.fails = false;
-    EXPECT_FALSE(labels->offer(scan_at(2)).finished[0].labels.empty());
-    EXPECT_EQ(statistics_.last_label_failure(), "");
+    EXPECT_FALSE(labels->submit(scan_at(2)).finished[0].labels.empty());
+    EXPECT_EQ(statistics_.last_segmentation_failure(), "");
   }
   EXPECT_EQ(status().counter("label_failures"), 2U);
 }
 
-TEST_F(PacedLabelsTest, EndsWhileTheSourceWorks) {
+TEST_F(AsyncSegmenterTest, EndsWhileTheSourceWorks) {
   source_.delay_ms = 200;
   {
-    const auto labels = feed(1ms);
-    EXPECT_TRUE(labels->offer(scan_at(1)).pending);
+    const auto labels = make_segmenter(1ms);
+    EXPECT_TRUE(labels->submit(scan_at(1)).pending);
   }
   EXPECT_EQ(source_.labelled, 1);
 }
 
-TEST(LabelBudget, CountsForALiveNetworkOnly) {
+TEST(SegmentationBudget, CountsForALiveNetworkOnly) {
   ServerConfig config;
   config.labels.budget_ms = 70;
-  for (const auto source : {LabelOrigin::stream, LabelOrigin::none}) {
+  for (const auto source : {LabelProvider::stream, LabelProvider::none}) {
     config.labels.source = source;
-    EXPECT_EQ(label_budget(config), 0ms);
+    EXPECT_EQ(segmentation_budget(config), 0ms);
   }
-  config.labels.source = LabelOrigin::model;
-  EXPECT_EQ(label_budget(config), 70ms);
+  config.labels.source = LabelProvider::model;
+  EXPECT_EQ(segmentation_budget(config), 70ms);
   config.input.delivery = Delivery::every;
-  EXPECT_EQ(label_budget(config), 0ms);
+  EXPECT_EQ(segmentation_budget(config), 0ms);
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::server

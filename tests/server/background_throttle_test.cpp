@@ -9,40 +9,41 @@
 #include <optional>
 #include <thread>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 using namespace std::chrono_literals;
 using Clock = std::chrono::steady_clock;
 
 /// Works and pauses for so long; returns the longest pause.
-Clock::duration longest_pause(const Pause& pause, Clock::duration duration) {
+Clock::duration max_delay(const ThrottleCallback& callback, Clock::duration duration) {
   Clock::duration longest{};
   const auto end = Clock::now() + duration;
   while (Clock::now() < end) {
     const auto began = Clock::now();
-    pause();
+    callback();
     longest = std::max(longest, Clock::now() - began);
   }
   return longest;
 }
 
-TEST(ScanTraffic, HoldsUpBackgroundWorkWhileAScanIsInWork) {
-  ScanTraffic traffic;
-  const Pause pause = give_way_to(traffic, WithoutGaps::work_a_tenth);
-  const ScanTraffic::InWork scan(traffic);
-  EXPECT_FALSE(traffic.is_quiet());
-  EXPECT_GE(longest_pause(pause, 200ms), 15ms);
+TEST(BackgroundThrottle, HoldsUpBackgroundWorkWhileAScanIsInWork) {
+  BackgroundThrottle throttle;
+  const ThrottleCallback callback =
+      make_throttle_callback(throttle, SaturationPolicy::run_at_ten_percent);
+  const BackgroundThrottle::ScanInProgress scan(throttle);
+  EXPECT_FALSE(throttle.is_idle());
+  EXPECT_GE(max_delay(callback, 200ms), 15ms);
 }
 
-TEST(ScanTraffic, LeavesNoTimeWhereScansNeverEndToWhoWaits) {
-  ScanTraffic traffic;
-  auto scan = std::make_unique<ScanTraffic::InWork>(traffic);
+TEST(BackgroundThrottle, LeavesNoTimeWhereScansNeverEndToWhoWaits) {
+  BackgroundThrottle throttle;
+  auto scan = std::make_unique<BackgroundThrottle::ScanInProgress>(throttle);
   std::atomic<std::uint64_t> rounds = 0;
-  std::jthread background(
-      [&, pause = give_way_to(traffic, WithoutGaps::wait)](const std::stop_token& stop) {
-        for (; !stop.stop_requested(); ++rounds) pause();
-      });
+  std::jthread background([&, callback = make_throttle_callback(throttle, SaturationPolicy::wait)](
+                              const std::stop_token& stop) {
+    for (; !stop.stop_requested(); ++rounds) callback();
+  });
   // It may take a while to work at all; then it rests for longer than who works a tenth of the
   // time.
   const auto deadline = Clock::now() + 60s;
@@ -57,33 +58,35 @@ TEST(ScanTraffic, LeavesNoTimeWhereScansNeverEndToWhoWaits) {
   EXPECT_GT(rounds, before);
 }
 
-TEST(ScanTraffic, LeavesSomeTimeWhereScansNeverEnd) {
-  ScanTraffic traffic;
-  const Pause pause = give_way_to(traffic, WithoutGaps::work_a_tenth);
-  const ScanTraffic::InWork scan(traffic);
+TEST(BackgroundThrottle, LeavesSomeTimeWhereScansNeverEnd) {
+  BackgroundThrottle throttle;
+  const ThrottleCallback callback =
+      make_throttle_callback(throttle, SaturationPolicy::run_at_ten_percent);
+  const BackgroundThrottle::ScanInProgress scan(throttle);
   // Else it would not return at all.
-  EXPECT_LT(longest_pause(pause, 200ms), 10s);
+  EXPECT_LT(max_delay(callback, 200ms), 10s);
 }
 
-TEST(ScanTraffic, LetsBackgroundWorkGoOnWhenTheScanIsDone) {
-  ScanTraffic traffic;
-  const Pause pause = give_way_to(traffic, WithoutGaps::work_a_tenth);
-  std::optional<ScanTraffic::InWork> scan(traffic);
-  static_cast<void>(longest_pause(pause, 50ms));
+TEST(BackgroundThrottle, LetsBackgroundWorkGoOnWhenTheScanIsDone) {
+  BackgroundThrottle throttle;
+  const ThrottleCallback callback =
+      make_throttle_callback(throttle, SaturationPolicy::run_at_ten_percent);
+  std::optional<BackgroundThrottle::ScanInProgress> scan(throttle);
+  static_cast<void>(max_delay(callback, 50ms));
   scan.reset();
-  EXPECT_TRUE(traffic.is_quiet());
+  EXPECT_TRUE(throttle.is_idle());
   int calls = 0;
   const auto end = Clock::now() + 100ms;
-  for (; Clock::now() < end; ++calls) pause();
+  for (; Clock::now() < end; ++calls) callback();
   EXPECT_GT(calls, 100) << "each call is only a look at the clock";
 }
 
-TEST(ScanTraffic, HoldsUpNobodyAtTheEnd) {
-  ScanTraffic traffic;
-  const ScanTraffic::InWork scan(traffic);
-  traffic.end();
-  EXPECT_TRUE(traffic.is_quiet());
+TEST(BackgroundThrottle, HoldsUpNobodyAtTheEnd) {
+  BackgroundThrottle throttle;
+  const BackgroundThrottle::ScanInProgress scan(throttle);
+  throttle.release();
+  EXPECT_TRUE(throttle.is_idle());
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -6,7 +6,7 @@
 #include <mutex>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -54,4 +54,4 @@ TEST(CheckpointThread, StopsAtOnceWhileItWaits) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -12,11 +12,11 @@ TEST(ForeignRequest, ThatCannotBeReadIsCountedInTheStatus) {
   Client client(setup.client());
   EXPECT_EQ(client.status().counter("unreadable_request_stillmap/save_map"), 0U);
 
-  VendorPeer peer(rti_connext);
+  VendorParticipant peer(rti_connext);
   ByteClient hostile(peer, "stillmap/save_map", "stillmap_msgs::srv::dds_::SaveMap");
   ASSERT_TRUE(hostile.wait_for_server());
   // A string of 2^32 - 1 bytes, of which none follows.
-  hostile.ask({0, 1, 0, 0, 2, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF});
+  hostile.call({0, 1, 0, 0, 2, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF});
   EXPECT_TRUE(hostile.receive(patience));
   EXPECT_TRUE(eventually(
       [&] { return client.status().counter("unreadable_request_stillmap/save_map") == 1; }));

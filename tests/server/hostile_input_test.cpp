@@ -26,7 +26,7 @@ class HostileInput : public testing::Test {
   void send(const Scan& scan) { send(wire::to_cloud(scan, {}, "lidar")); }
 
   /// After the server dealt with everything sent.
-  ServerStatus status() {
+  dds::ServerStatus status() {
     EXPECT_TRUE(wait_for_scans(client_, sent_));
     return client_.status();
   }
@@ -34,9 +34,9 @@ class HostileInput : public testing::Test {
   ServiceSetup setup_;
   ServerProcess server_;
   Client client_;
-  Participant participant_{setup_.dds()};
-  TopicSpec<PointCloud2> topic_ = points_topic("points", DeliveryMode::every, 4);
-  Writer<PointCloud2> clouds_{participant_, topic_.dds_name, topic_.writer};
+  dds::Participant participant_{setup_.dds()};
+  dds::TopicSpec<PointCloud2> topic_ = dds::points_topic("points", dds::DeliveryMode::every, 4);
+  dds::Writer<PointCloud2> clouds_{participant_, topic_.dds_name, topic_.writer};
   std::uint64_t sent_ = 0;
 };
 
@@ -54,7 +54,7 @@ TEST_F(HostileInput, BadCloudsAreCountedAndServiceGoesOn) {
   bad_type.fields()[0].datatype(99);
   send(bad_type);
   send(PointCloud2());
-  ServerStatus now = status();
+  dds::ServerStatus now = status();
   EXPECT_EQ(now.counter("dropped_bad_cloud_size_mismatch"), 1U);
   EXPECT_EQ(now.counter("dropped_bad_cloud_no_xyz"), 1U);
   EXPECT_EQ(now.counter("dropped_bad_cloud_bad_field"), 1U);
@@ -69,7 +69,7 @@ TEST_F(HostileInput, BadCloudsAreCountedAndServiceGoesOn) {
 
 TEST_F(HostileInput, ScansOutOfOrderOrRepeatedAreDropped) {
   for (const int index : {0, 1, 3, 2, 3, 4}) send(room_scan(index));
-  const ServerStatus now = status();
+  const dds::ServerStatus now = status();
   EXPECT_EQ(now.counter("scans_mapped"), 4U);
   EXPECT_EQ(now.counter("dropped_out_of_order"), 2U);
 }
@@ -85,7 +85,7 @@ TEST_F(HostileInput, ScansWithoutAUsablePointAreDropped) {
   for (auto& point : zero.points_lidar) point.setZero();
   for (const Scan& scan : {nan, infinite, zero}) send(scan);
   send(room_scan(3));
-  const ServerStatus now = status();
+  const dds::ServerStatus now = status();
   EXPECT_EQ(now.dropped(), 3U);
   EXPECT_EQ(now.counter("scans_mapped"), 1U);
 }
@@ -102,7 +102,7 @@ TEST_F(HostileInput, ScansWithAllPointsEqualOrHalfNanDoNoHarm) {
   for (auto& value : half.intensity) value = 0.0F;
   send(half);
   for (int index = 3; index < 6; ++index) send(room_scan(index));
-  const ServerStatus now = status();
+  const dds::ServerStatus now = status();
   EXPECT_GE(now.counter("scans_mapped"), 5U);
   EXPECT_EQ(now.health, OdometryHealth::good);
 }

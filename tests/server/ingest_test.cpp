@@ -21,7 +21,7 @@ using namespace std::chrono_literals;
 struct PublisherCase {
   const char* name;
   const char* delivery;
-  TopicQos offered;
+  dds::TopicQos offered;
   bool matches;
 };
 
@@ -34,8 +34,8 @@ TEST_P(ScanPublishers, ReachTheServerOrItSaysWhyNot) {
   const ServerProcess server(setup.server_arguments());
   Client client(setup.client());
   client.wait_for_server(patience);
-  Participant participant(setup.dds());
-  Writer<PointCloud2> clouds(participant, "rt/points", offered);
+  dds::Participant participant(setup.dds());
+  dds::Writer<PointCloud2> clouds(participant, "rt/points", offered);
   if (!matches) {
     EXPECT_TRUE(eventually([&] {
       return client.status().reason.find("best-effort") != std::string::npos;

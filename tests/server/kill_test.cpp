@@ -82,7 +82,7 @@ Loss kill_while_mapping(const ServiceSetup& setup, int first, double after_s) {
     killed = Clock::now();
     EXPECT_EQ(server.wait_for_exit(patience), -1);
   }
-  const StoredMap stored = open_map_file(setup.map_file())->load();
+  const SavedMap stored = open_map_file(setup.map_file())->load();
   const std::int64_t last_ns = stored.trajectory.empty() ? 0 : stored.trajectory.back().stamp_ns;
   return {poses.count(), stored.trajectory.size(), poses.lost_s(last_ns, killed)};
 }

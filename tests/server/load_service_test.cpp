@@ -3,8 +3,8 @@
 #include <atomic>
 #include <fstream>
 
-#include "core/map/storage/map_file.hpp"
 #include "core/map/static_map.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "tests/server/room_scans.hpp"
 #include "tests/server/server_process.hpp"
 
@@ -32,7 +32,7 @@ class LoadService : public testing::Test {
   std::string refusal(const std::string& name) {
     // A save shows what was mapped until now: then nothing changes by itself.
     client_.save_map("shown.stillmap");
-    const ServerStatus before = client_.status();
+    const dds::ServerStatus before = client_.status();
     std::string why;
     try {
       client_.load_map(name);
@@ -40,7 +40,7 @@ class LoadService : public testing::Test {
     } catch (const ServiceError& error) {
       why = error.what();
     }
-    const ServerStatus after = client_.status();
+    const dds::ServerStatus after = client_.status();
     EXPECT_EQ(after.map_id, before.map_id) << name;
     EXPECT_EQ(after.voxel_count, before.voxel_count) << name;
     return why;
@@ -63,7 +63,7 @@ TEST_F(LoadService, GoesOnWhereTheLoadedPathEnded) {
   EXPECT_EQ(fs::path(loaded.file).filename(), "hall.stillmap");
   EXPECT_NE(loaded.map_id, old_id);
   EXPECT_EQ(loaded.pose_count, 8U);
-  const StoredMap hall = open_map_file(beside("hall.stillmap"))->load();
+  const SavedMap hall = open_map_file(beside("hall.stillmap"))->load();
   EXPECT_EQ(loaded.tile_count, hall.view.tiles.size());
   EXPECT_EQ(client_.status().map_id, loaded.map_id);
   std::atomic<std::size_t> path_poses = 0;
@@ -81,7 +81,7 @@ TEST_F(LoadService, GoesOnWhereTheLoadedPathEnded) {
   map_scans(8, 14);
   server_.send(SIGTERM);
   ASSERT_EQ(server_.wait_for_exit(patience), 0);
-  const StoredMap longer = open_map_file(beside("hall.stillmap"))->load();
+  const SavedMap longer = open_map_file(beside("hall.stillmap"))->load();
   ASSERT_EQ(longer.trajectory.size(), 14U);
   EXPECT_EQ(longer.view.map_id, loaded.map_id);
   const Eigen::Isometry3d T_map_room =
@@ -113,7 +113,7 @@ TEST_F(LoadService, TellsClientsThatAnotherMapBegan) {
 TEST_F(LoadService, RefusesWhatItCannotGoOnWith) {
   map_scans(0, 8);
   client_.save_map("good.stillmap");
-  StoredMap other = open_map_file(beside("good.stillmap"))->load();
+  SavedMap other = open_map_file(beside("good.stillmap"))->load();
   other.view.tiles.clear();
   open_map_file(beside("no_tiles.stillmap"))->save(other);
   std::string bytes = content_of(beside("good.stillmap"));
@@ -149,7 +149,7 @@ TEST_F(LoadService, RefusesAMapOfAnotherVoxelSize) {
   map.insert(scan, Eigen::Isometry3d::Identity());
   ASSERT_FALSE(map.view()->tiles.empty());
   open_map_file(beside("coarse.stillmap"))
-      ->save({.view = *map.view(), .memories = {}, .trajectory = {}, .metadata = {}});
+      ->save({.view = *map.view(), .tile_evidence = {}, .trajectory = {}, .metadata = {}});
   EXPECT_THAT(refusal("coarse.stillmap"), HasSubstr("voxel_size_m"));
 }
 

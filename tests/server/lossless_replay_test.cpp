@@ -35,7 +35,7 @@ TEST(LosslessReplay, GivesEveryScanOnceAndInOrder) {
   for (int i = 0; i < scans; ++i) {
     EXPECT_EQ(stamps[static_cast<std::size_t>(i)], room_pose(i).stamp_ns);
   }
-  const ServerStatus status = client.status();
+  const dds::ServerStatus status = client.status();
   EXPECT_EQ(status.counter("scans_received"), static_cast<std::uint64_t>(scans));
   EXPECT_EQ(status.dropped(), 0U);
 }
@@ -45,12 +45,12 @@ TEST(LatestDelivery, DropsTheOldestAndAccountsForEveryScan) {
   const ServerProcess server(setup.server_arguments());
   Client client(setup.client());
   client.wait_for_server(patience);
-  EXPECT_EQ(client.status().delivery, DeliveryMode::latest);
+  EXPECT_EQ(client.status().delivery, dds::DeliveryMode::latest);
 
   constexpr int scans = 120;
   ScanPublisher publisher(setup.publisher(false));
   drive(publisher, 0, scans);
-  ServerStatus status;
+  dds::ServerStatus status;
   ASSERT_TRUE(eventually([&] {
     status = client.status();
     const std::uint64_t dealt_with = status.counter("scans_mapped") + status.dropped();

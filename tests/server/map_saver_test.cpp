@@ -9,7 +9,7 @@
 #include "core/map/static_map.hpp"
 #include "tests/scratch_folder.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 LabelledScan scan_of(float x) {
@@ -21,27 +21,27 @@ LabelledScan scan_of(float x) {
 
 class MapSaverTest : public testing::Test {
  protected:
-  MapSaverTest() { board_.begin(map_.view(), {}); }
+  MapSaverTest() { latest_map_.begin(map_.view(), {}); }
 
   /// As the mapper's thread does with a scan.
   void map_scan(float x) {
     map_.insert(scan_of(x), Eigen::Isometry3d::Identity());
-    board_.show(map_.view());
-    board_.add_pose({.stamp_ns = static_cast<std::int64_t>(x)}, OdometryHealth::good, "none");
+    latest_map_.publish(map_.view());
+    latest_map_.add_pose({.stamp_ns = static_cast<std::int64_t>(x)}, OdometryHealth::good, "none");
   }
 
   ScratchFolder folder_;
   StaticMap map_{StaticMapConfig()};
-  MapBoard board_;
+  LatestMap latest_map_;
 };
 
 TEST_F(MapSaverTest, SavesWhatTheBoardShows) {
-  MapSaver saver(board_, folder_ / "map.stillmap", {{"sensor", "vlp_16"}});
+  MapSaver saver(latest_map_, folder_ / "map.stillmap", {{"sensor", "vlp_16"}});
   for (const float x : {5.0F, 50.0F}) {
     map_scan(x);
     saver.save_if_changed();
   }
-  const auto stored = MapSaver(board_, folder_ / "map.stillmap", {}).load();
+  const auto stored = MapSaver(latest_map_, folder_ / "map.stillmap", {}).load();
   ASSERT_TRUE(stored);
   EXPECT_EQ(stored->view.version, map_.view()->version);
   EXPECT_EQ(stored->view.tiles.size(), 2U);
@@ -51,8 +51,8 @@ TEST_F(MapSaverTest, SavesWhatTheBoardShows) {
 
 TEST_F(MapSaverTest, LeavesTheFileAloneUntilSomethingWasMapped) {
   map_scan(5.0F);
-  MapSaver(board_, folder_ / "map.stillmap", {}).save_as("");
-  MapBoard empty;
+  MapSaver(latest_map_, folder_ / "map.stillmap", {}).save_as("");
+  LatestMap empty;
   empty.begin(StaticMap(StaticMapConfig()).view(), {});
   MapSaver saver(empty, folder_ / "map.stillmap", {});
   saver.save_if_changed();
@@ -61,14 +61,14 @@ TEST_F(MapSaverTest, LeavesTheFileAloneUntilSomethingWasMapped) {
 
 TEST_F(MapSaverTest, SavesUnderAnotherNameBesideTheConfiguredFile) {
   map_scan(5.0F);
-  MapSaver saver(board_, folder_ / "map.stillmap", {});
+  MapSaver saver(latest_map_, folder_ / "map.stillmap", {});
   EXPECT_EQ(saver.save_as("copy.stillmap"), folder_ / "copy.stillmap");
   EXPECT_EQ(open_map_file(folder_ / "copy.stillmap")->load().view.tiles.size(), 1U);
   EXPECT_EQ(saver.save_as(""), folder_ / "map.stillmap");
 }
 
 TEST_F(MapSaverTest, LetsNobodyChooseAnotherFolder) {
-  MapSaver saver(board_, folder_ / "map.stillmap", {});
+  MapSaver saver(latest_map_, folder_ / "map.stillmap", {});
   for (const char* name : {"../map", "/etc/passwd", "a/b", ".", ".."}) {
     EXPECT_THROW(saver.save_as(name), std::invalid_argument) << name;
   }
@@ -78,8 +78,8 @@ TEST_F(MapSaverTest, LetsNobodyChooseAnotherFolder) {
 void save_far_map(const std::filesystem::path& file) {
   StaticMap other{StaticMapConfig()};
   other.insert(scan_of(50.0F), Eigen::Isometry3d::Identity());
-  StoredMap stored{
-      .view = *other.view(), .memories = {}, .trajectory = {StampedPose{}}, .metadata = {}};
+  SavedMap stored{
+      .view = *other.view(), .tile_evidence = {}, .trajectory = {StampedPose{}}, .metadata = {}};
   stored.metadata = {{"sensor", "another"}, {"datum", "48,11"}};
   open_map_file(file)->save(stored);
 }
@@ -87,17 +87,17 @@ void save_far_map(const std::filesystem::path& file) {
 TEST_F(MapSaverTest, GoesOnInAnotherFileAndLeavesTheRunningMapInItsOwn) {
   map_scan(5.0F);
   save_far_map(folder_ / "far.stillmap");
-  MapSaver saver(board_, folder_ / "map.stillmap", {{"sensor", "vlp_16"}, {"datum", "1,2"}});
-  const auto file = saver.go_on_in(
-      "far.stillmap", [&](const StoredMap& stored, const std::shared_ptr<TileShelf>&) {
-        board_.begin(std::make_shared<const MapView>(stored.view), stored.trajectory);
+  MapSaver saver(latest_map_, folder_ / "map.stillmap", {{"sensor", "vlp_16"}, {"datum", "1,2"}});
+  const auto file = saver.resume_from(
+      "far.stillmap", [&](const SavedMap& stored, const std::shared_ptr<TileStore>&) {
+        latest_map_.begin(std::make_shared<const MapSnapshot>(stored.view), stored.trajectory);
       });
   EXPECT_EQ(file, folder_ / "far.stillmap");
-  board_.add_pose({.stamp_ns = 1}, OdometryHealth::good, "none");
+  latest_map_.add_pose({.stamp_ns = 1}, OdometryHealth::good, "none");
   saver.save_if_changed();
-  const StoredMap own = open_map_file(folder_ / "map.stillmap")->load();
+  const SavedMap own = open_map_file(folder_ / "map.stillmap")->load();
   EXPECT_EQ(own.view.tiles.at(0)->info.id.x, 0);
-  const StoredMap far = open_map_file(folder_ / "far.stillmap")->load();
+  const SavedMap far = open_map_file(folder_ / "far.stillmap")->load();
   EXPECT_EQ(far.trajectory.size(), 2U);
   EXPECT_EQ(far.metadata.at("sensor"), "vlp_16");
   EXPECT_EQ(own.metadata.at("datum"), "1,2");
@@ -107,25 +107,25 @@ TEST_F(MapSaverTest, GoesOnInAnotherFileAndLeavesTheRunningMapInItsOwn) {
 TEST_F(MapSaverTest, StaysInItsFileWhenAnotherCannotBeLoaded) {
   map_scan(5.0F);
   save_far_map(folder_ / "far.stillmap");
-  MapSaver saver(board_, folder_ / "map.stillmap", {});
-  const auto refuse = [](const StoredMap&, const std::shared_ptr<TileShelf>&) {
+  MapSaver saver(latest_map_, folder_ / "map.stillmap", {});
+  const auto refuse = [](const SavedMap&, const std::shared_ptr<TileStore>&) {
     throw std::invalid_argument("another voxel size");
   };
-  EXPECT_THROW(saver.go_on_in("far.stillmap", refuse), std::invalid_argument);
+  EXPECT_THROW(saver.resume_from("far.stillmap", refuse), std::invalid_argument);
   std::ofstream(folder_ / "text") << "no database";
   std::ofstream(folder_ / "empty");
   std::filesystem::create_directory(folder_ / "folder");
   for (const char* name : {"text", "empty", "folder", "missing"}) {
-    EXPECT_THROW(saver.go_on_in(name, refuse), MapFileError) << name;
+    EXPECT_THROW(saver.resume_from(name, refuse), MapFileError) << name;
   }
   EXPECT_EQ(std::filesystem::file_size(folder_ / "empty"), 0U);
   EXPECT_FALSE(std::filesystem::exists(folder_ / "missing"));
-  EXPECT_THROW(saver.go_on_in("../map", refuse), std::invalid_argument);
+  EXPECT_THROW(saver.resume_from("../map", refuse), std::invalid_argument);
   EXPECT_EQ(saver.save_as(""), folder_ / "map.stillmap");
 }
 
 TEST_F(MapSaverTest, NeedsAFileToSaveTo) {
-  MapSaver saver(board_, {}, {});
+  MapSaver saver(latest_map_, {}, {});
   EXPECT_FALSE(saver.load());
   EXPECT_NO_THROW(saver.save_if_changed());
   EXPECT_THROW(saver.save_as(""), std::invalid_argument);
@@ -133,7 +133,7 @@ TEST_F(MapSaverTest, NeedsAFileToSaveTo) {
 
 TEST_F(MapSaverTest, NamesOfOtherFilesAreRefused) {
   map_scan(5.0F);
-  MapSaver saver(board_, folder_ / "map.stillmap", {});
+  MapSaver saver(latest_map_, folder_ / "map.stillmap", {});
   // With a NUL inside, two names mean one file.
   const std::string cut_off("map.stillmap\0.other", 19);
   for (const std::string& name :
@@ -143,8 +143,8 @@ TEST_F(MapSaverTest, NamesOfOtherFilesAreRefused) {
   }
   map_scan(50.0F);
   saver.save_if_changed();
-  EXPECT_EQ(MapSaver(board_, folder_ / "map.stillmap", {}).load()->view.tiles.size(), 2U);
+  EXPECT_EQ(MapSaver(latest_map_, folder_ / "map.stillmap", {}).load()->view.tiles.size(), 2U);
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::server

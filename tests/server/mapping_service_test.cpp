@@ -36,9 +36,9 @@ class MappingService : public testing::Test {
 };
 
 TEST_F(MappingService, SaysWhyNothingHappens) {
-  const ServerStatus status = client_.status();
+  const dds::ServerStatus status = client_.status();
   EXPECT_THAT(status.reason, HasSubstr("no scan received on rt/points yet"));
-  EXPECT_EQ(status.delivery, DeliveryMode::every);
+  EXPECT_EQ(status.delivery, dds::DeliveryMode::every);
   EXPECT_EQ(status.label_source, "stream, else street");
   EXPECT_EQ(status.voxel_count, 0U);
   EXPECT_FALSE(status.software_version.empty());
@@ -64,7 +64,7 @@ TEST_F(MappingService, GivesAPoseForEveryScan) {
     const Eigen::Isometry3d T_true = T_start * room_pose(i).T_map_lidar;
     EXPECT_LT((pose.T_map_lidar.translation() - T_true.translation()).norm(), 0.15) << i;
   }
-  const ServerStatus status = client_.status();
+  const dds::ServerStatus status = client_.status();
   EXPECT_EQ(status.counter("scans_received"), 15U);
   EXPECT_EQ(status.counter("scans_mapped"), 15U);
   EXPECT_EQ(status.dropped(), 0U);
@@ -76,13 +76,13 @@ TEST_F(MappingService, GivesALateJoinerEveryTileAndThePath) {
   drive_scans(10);
   Client late(setup_.client());
   TileMirror mirror;
-  const auto tiles = late.subscribe_tiles([&](const MapIdentity&, const Tile& tile) {
+  const auto tiles = late.subscribe_tiles([&](const dds::MapIdentity&, const Tile& tile) {
     const std::scoped_lock lock(mirror.mutex);
     mirror.hashes[tile.info.id] = tile.info.content_hash;
     mirror.voxels[tile.info.id] = tile.voxels.size();
   });
   TileMirror index;
-  const auto infos = late.subscribe_tile_index([&](const MapIdentity&, const TileInfo& info) {
+  const auto infos = late.subscribe_tile_index([&](const dds::MapIdentity&, const TileInfo& info) {
     const std::scoped_lock lock(index.mutex);
     index.hashes[info.id] = info.content_hash;
   });

@@ -11,7 +11,7 @@
 #include "server/monitoring/service_log.hpp"
 #include "stillmap_msgs.h"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 TEST(DurationHistogram, CountsCumulativelyWithInclusiveBounds) {
@@ -44,13 +44,13 @@ TEST(CheckpointLog, TellsWhatWasStoredFromWhatWasNot) {
 
 TEST(ServiceLog, CountsAnswersByServiceAndCode) {
   ServiceLog log;
-  const auto reset = counted(log, "stillmap/reset", [](const int& code) {
+  const auto reset = logged(log, "stillmap/reset", [](const int& code) {
     stillmap_msgs::srv::Reset_Response reply;
     reply.status().code(static_cast<std::uint8_t>(code));
     return reply;
   });
   // A standard type has no code.
-  const auto plain = counted(log, "stillmap/plain", [](const int& value) { return value; });
+  const auto plain = logged(log, "stillmap/plain", [](const int& value) { return value; });
   for (const int code : {0, 1, 1}) EXPECT_EQ(reset(code).status().code(), code);
   EXPECT_EQ(plain(7), 7);
   const auto services = log.services();
@@ -111,4 +111,4 @@ TEST(ProcessUse, IsThatOfThisProcess) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -34,7 +34,7 @@ class OccupancyService : public testing::Test {
 
   /// The octree follows the map within a moment.
   [[nodiscard]] std::uint32_t scans_in_octree() {
-    for (const StageLatency& stage : client_.status().latencies) {
+    for (const dds::StageLatency& stage : client_.status().latencies) {
       if (stage.stage == "occupancy") return stage.samples;
     }
     return 0;
@@ -120,7 +120,7 @@ TEST_F(OccupancyService, HostileQueriesGetAReasonEachAndHarmNoOther) {
 
 TEST_F(OccupancyService, RefusesAQueryThatAsksForTooMuch) {
   OccupancyQuery query;
-  query.rays.resize(OccupancyQuery::most_rays + 1);
+  query.rays.resize(OccupancyQuery::max_rays + 1);
   try {
     static_cast<void>(client_.query_occupancy(query));
     FAIL() << "answered";

@@ -11,15 +11,15 @@ namespace {
 
 using namespace std::chrono_literals;
 
-OccupancyScan room(int index) {
+server::OccupancyScan room(int index) {
   auto labelled = std::make_shared<LabelledScan>();
   labelled->scan = room_scan(index);
   labelled->motion.resize(labelled->scan.size());
   return {labelled, room_pose(index).T_map_lidar, true};
 }
 
-std::uint64_t counted(const Statistics& statistics, const char* event) {
-  ServerStatus status;
+std::uint64_t counted(const server::Statistics& statistics, const char* event) {
+  dds::ServerStatus status;
   statistics.report_to(status);
   return status.counter(event);
 }
@@ -27,46 +27,46 @@ std::uint64_t counted(const Statistics& statistics, const char* event) {
 class OccupancyThreadTest : public testing::Test {
  protected:
   /// Waits until the thread has done so many jobs.
-  [[nodiscard]] static bool done(const OccupancyThread& thread, std::uint64_t jobs) {
+  [[nodiscard]] static bool done(const server::OccupancyThread& thread, std::uint64_t jobs) {
     const auto deadline = std::chrono::steady_clock::now() + 60s;
     while (thread.changes() < jobs && std::chrono::steady_clock::now() < deadline) {
       std::this_thread::sleep_for(5ms);
     }
     return thread.changes() == jobs;
   }
-  [[nodiscard]] static BoxOccupancy all_of(const OccupancyThread& thread) {
+  [[nodiscard]] static BoxOccupancy all_of(const server::OccupancyThread& thread) {
     const Eigen::Vector3d far = Eigen::Vector3d::Constant(500.0);
     OccupancyQuery query;
     query.boxes_map.emplace_back(-far, far);
     query.max_voxels = 0;
     return thread.answer(query).boxes.at(0);
   }
-  Statistics statistics_;
+  server::Statistics statistics_;
 };
 
 TEST_F(OccupancyThreadTest, MakesWhatTheMapWouldMake) {
-  OccupancyThread thread(OccupancyServing{}, statistics_);
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_);
   OccupancyMap map(OccupancyConfig{});
   for (int i = 0; i < 4; ++i) {
-    const OccupancyScan scan = room(i);
+    const server::OccupancyScan scan = room(i);
     map.insert(*scan.labelled, scan.T_map_lidar);
     thread.add(scan);
     ASSERT_TRUE(done(thread, static_cast<std::uint64_t>(i) + 1));
   }
-  const EncodedOctree octree = thread.encode(false);
+  const server::EncodedOctree octree = thread.encode(false);
   EXPECT_EQ(octree.data.bytes, map.encode(false).bytes);
   EXPECT_EQ(octree.stamp_ns, room_scan(3).stamp_ns);
   EXPECT_EQ(counted(statistics_, "occupancy_not_cleared"), 0U);
 }
 
 TEST_F(OccupancyThreadTest, EncodesInTheBackgroundWhatItEncodesAtOnce) {
-  OccupancyThread thread(OccupancyServing{}, statistics_);
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_);
   thread.add(room(0));
   ASSERT_TRUE(done(thread, 1));
   for (int i = 0; i < 2; ++i) {
-    std::future<EncodedOctree> encoded = thread.encode_in_background();
+    std::future<server::EncodedOctree> encoded = thread.encode_in_background();
     ASSERT_EQ(encoded.wait_for(60s), std::future_status::ready);
-    const EncodedOctree octree = encoded.get();
+    const server::EncodedOctree octree = encoded.get();
     EXPECT_TRUE(octree.data.binary);
     EXPECT_EQ(octree.data.bytes, thread.encode(true).data.bytes);
     EXPECT_EQ(octree.stamp_ns, room_scan(0).stamp_ns);
@@ -76,7 +76,7 @@ TEST_F(OccupancyThreadTest, EncodesInTheBackgroundWhatItEncodesAtOnce) {
 /// Holds the thread up where it looks for a gap.
 class GatedOccupancyThreadTest : public OccupancyThreadTest {
  protected:
-  Pause gate() {
+  ThrottleCallback gate() {
     return [this] {
       is_waiting_ = !is_open_;
       while (!is_open_) std::this_thread::sleep_for(1ms);
@@ -95,7 +95,7 @@ class GatedOccupancyThreadTest : public OccupancyThreadTest {
 };
 
 TEST_F(GatedOccupancyThreadTest, WaitsForGapsBetweenScansAndTakesThemThen) {
-  OccupancyThread thread(OccupancyServing{}, statistics_, gate());
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate());
   is_open_ = false;
   for (int i = 0; i < 4; ++i) thread.add(room(i));
   ASSERT_TRUE(waits());
@@ -107,11 +107,11 @@ TEST_F(GatedOccupancyThreadTest, WaitsForGapsBetweenScansAndTakesThemThen) {
 }
 
 TEST_F(GatedOccupancyThreadTest, EncodesInAGap) {
-  OccupancyThread thread(OccupancyServing{}, statistics_, gate());
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate());
   thread.add(room(0));
   ASSERT_TRUE(done(thread, 1));
   is_open_ = false;
-  std::future<EncodedOctree> encoded = thread.encode_in_background();
+  std::future<server::EncodedOctree> encoded = thread.encode_in_background();
   ASSERT_TRUE(waits());
   EXPECT_EQ(encoded.wait_for(0s), std::future_status::timeout);
   is_open_ = true;
@@ -119,7 +119,7 @@ TEST_F(GatedOccupancyThreadTest, EncodesInAGap) {
 }
 
 TEST_F(GatedOccupancyThreadTest, ShowsNothingOfTheOldMapWhileANewOneWaitsForAGap) {
-  OccupancyThread thread(OccupancyServing{}, statistics_, gate());
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate());
   thread.add(room(0));
   ASSERT_TRUE(done(thread, 1));
   is_open_ = false;
@@ -134,9 +134,9 @@ TEST_F(GatedOccupancyThreadTest, ShowsNothingOfTheOldMapWhileANewOneWaitsForAGap
 }
 
 TEST_F(GatedOccupancyThreadTest, EndsWithAnEncodingUnderWay) {
-  std::future<EncodedOctree> encoded;
+  std::future<server::EncodedOctree> encoded;
   {
-    OccupancyThread thread(OccupancyServing{}, statistics_, gate());
+    server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate());
     is_open_ = false;
     encoded = thread.encode_in_background();
     ASSERT_TRUE(waits());
@@ -146,10 +146,10 @@ TEST_F(GatedOccupancyThreadTest, EndsWithAnEncodingUnderWay) {
 }
 
 TEST_F(OccupancyThreadTest, LeavesOutClearingAndThenScansWhenItCannotKeepUp) {
-  OccupancyServing config;
+  OccupancyServiceConfig config;
   config.queue_length = 4;
-  OccupancyThread thread(config, statistics_);
-  const OccupancyScan scan = room(0);
+  server::OccupancyThread thread(config, statistics_);
+  const server::OccupancyScan scan = room(0);
   constexpr std::uint64_t scans = 400;
   for (std::uint64_t i = 0; i < scans; ++i) thread.add(scan);
   const std::uint64_t left_out = counted(statistics_, "occupancy_scans_left_out");
@@ -160,7 +160,7 @@ TEST_F(OccupancyThreadTest, LeavesOutClearingAndThenScansWhenItCannotKeepUp) {
 }
 
 TEST_F(OccupancyThreadTest, BeginsAnotherMapWithItsViewAndForgetsScansOfTheOldOne) {
-  OccupancyThread thread(OccupancyServing{}, statistics_);
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_);
   thread.add(room(0));
   ASSERT_TRUE(done(thread, 1));
   EXPECT_GT(all_of(thread).free, 100U);

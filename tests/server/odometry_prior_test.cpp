@@ -4,7 +4,7 @@
 
 #include <numbers>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 constexpr std::int64_t ms = 1'000'000;
@@ -14,20 +14,20 @@ Eigen::Isometry3d at(double x, double yaw) {
                            Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()));
 }
 
-PosesByTime drive() {
-  PosesByTime poses;
+PoseBuffer drive() {
+  PoseBuffer poses;
   for (int i = 0; i <= 10; ++i) poses.add({i * 100 * ms, at(i, 0.0)});
   return poses;
 }
 
-TEST(PosesByTime, InterpolatesTheMotion) {
+TEST(PoseBuffer, InterpolatesTheMotion) {
   const auto motion = drive().motion(150 * ms, 420 * ms);
   ASSERT_TRUE(motion);
   EXPECT_TRUE(motion->translation().isApprox(Eigen::Vector3d(2.7, 0.0, 0.0), 1e-9));
 }
 
-TEST(PosesByTime, TurnsTheMotionIntoTheFirstPosesFrame) {
-  PosesByTime poses;
+TEST(PoseBuffer, TurnsTheMotionIntoTheFirstPosesFrame) {
+  PoseBuffer poses;
   poses.add({0, at(0.0, std::numbers::pi / 2)});
   poses.add({100 * ms, at(1.0, std::numbers::pi / 2)});
   const auto motion = poses.motion(0, 100 * ms);
@@ -35,20 +35,20 @@ TEST(PosesByTime, TurnsTheMotionIntoTheFirstPosesFrame) {
   EXPECT_TRUE(motion->translation().isApprox(Eigen::Vector3d(0.0, -1.0, 0.0), 1e-9));
 }
 
-TEST(PosesByTime, KnowsNothingOfOtherTimes) {
+TEST(PoseBuffer, KnowsNothingOfOtherTimes) {
   EXPECT_FALSE(drive().motion(-1, 100 * ms));
   EXPECT_FALSE(drive().motion(500 * ms, 1101 * ms));
-  EXPECT_FALSE(PosesByTime().motion(0, 1));
+  EXPECT_FALSE(PoseBuffer().motion(0, 1));
 }
 
-TEST(PosesByTime, StretchesTheNewestPoseALittle) {
+TEST(PoseBuffer, StretchesTheNewestPoseALittle) {
   const auto motion = drive().motion(900 * ms, 1050 * ms);
   ASSERT_TRUE(motion);
   EXPECT_TRUE(motion->translation().isApprox(Eigen::Vector3d(1.0, 0.0, 0.0), 1e-9));
 }
 
-TEST(PosesByTime, LeavesOutWhatComesOutOfOrder) {
-  PosesByTime poses = drive();
+TEST(PoseBuffer, LeavesOutWhatComesOutOfOrder) {
+  PoseBuffer poses = drive();
   poses.add({500 * ms, at(1000.0, 0.0)});
   EXPECT_TRUE(poses.motion(400 * ms, 600 * ms)
                   ->translation()
@@ -56,4 +56,4 @@ TEST(PosesByTime, LeavesOutWhatComesOutOfOrder) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::server

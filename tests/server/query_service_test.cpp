@@ -34,7 +34,7 @@ class QueryService : public testing::Test {
 
   /// The view that queries see follows the last scan within a moment.
   [[nodiscard]] bool shows_all_it_mapped() {
-    const ServerStatus before = client_.status();
+    const dds::ServerStatus before = client_.status();
     std::this_thread::sleep_for(std::chrono::milliseconds(500));
     return before.voxel_count > 0 && client_.status().map_version == before.map_version;
   }

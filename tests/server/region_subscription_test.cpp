@@ -17,18 +17,18 @@ const CorridorRegion corner{
 /// What a subscriber holds: its copy of the region.
 class RegionCopy {
  public:
-  void add(const RegionNews& news) {
+  void add(const RegionUpdate& update) {
     const std::scoped_lock lock(mutex_);
-    for (const Tile& tile : news.appeared) {
+    for (const Tile& tile : update.appeared) {
       EXPECT_TRUE(hashes_.emplace(tile.info.id, tile.info.content_hash).second);
       seen_.insert_or_assign(tile.info.id, true);
     }
-    for (const Tile& tile : news.changed) {
+    for (const Tile& tile : update.changed) {
       EXPECT_TRUE(hashes_.contains(tile.info.id));
       hashes_[tile.info.id] = tile.info.content_hash;
     }
-    for (const TileId id : news.removed) EXPECT_EQ(hashes_.erase(id), 1U);
-    map_id_ = news.map.map_id;
+    for (const TileId id : update.removed) EXPECT_EQ(hashes_.erase(id), 1U);
+    map_id_ = update.map.map_id;
   }
   [[nodiscard]] std::map<TileId, std::uint64_t> hashes() const {
     const std::scoped_lock lock(mutex_);
@@ -63,7 +63,7 @@ class RegionSubscription : public testing::Test {
     const TileVersions versions = client_.get_tile_versions();
     std::map<TileId, std::uint64_t> inside;
     for (const TileInfo& info : versions.tiles) {
-      if (shape_.may_meet(tile_footprint(info.id, versions.map.tile_size_m))) {
+      if (shape_.may_intersect(tile_footprint(info.id, versions.map.tile_size_m))) {
         inside[info.id] = info.content_hash;
       }
     }
@@ -92,7 +92,7 @@ class RegionSubscription : public testing::Test {
 TEST_F(RegionSubscription, FollowsItsRegionAndReceivesNothingElse) {
   RegionCopy copy;
   const auto subscription =
-      client_.subscribe_region(corner, [&](const RegionNews& news) { copy.add(news); });
+      client_.subscribe_region(corner, [&](const RegionUpdate& update) { copy.add(update); });
   drive(publisher_, 0, 6);
   expect_only_the_region(copy);
   drive(publisher_, 6, 12);
@@ -106,7 +106,7 @@ TEST_F(RegionSubscription, ComesLateAndSeesAResetTakeItsTiles) {
   RegionCopy copy;
   Client late(setup_.client());
   const auto subscription =
-      late.subscribe_region(corner, [&](const RegionNews& news) { copy.add(news); });
+      late.subscribe_region(corner, [&](const RegionUpdate& update) { copy.add(update); });
   expect_only_the_region(copy);
   const std::uint64_t new_map = client_.reset();
   EXPECT_TRUE(eventually([&] { return copy.hashes().empty() && copy.map_id() == new_map; }));
@@ -116,7 +116,7 @@ TEST_F(RegionSubscription, ComesLateAndSeesAResetTakeItsTiles) {
 }
 
 TEST_F(RegionSubscription, RefusesARegionWithFaults) {
-  const auto ignore = [](const RegionNews&) {};
+  const auto ignore = [](const RegionUpdate&) {};
   EXPECT_THROW(static_cast<void>(client_.subscribe_region(SphereRegion{}, ignore)),
                std::invalid_argument);
 }

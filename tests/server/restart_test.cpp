@@ -29,7 +29,7 @@ void terminate(ServerProcess& server, Client&) {
 TEST(Restart, SigtermSavesTheMapAndTheNextServerServesIt) {
   const ServiceSetup setup("every");
   run_server(setup, 0, 8, terminate);
-  const StoredMap stored = open_map_file(setup.map_file())->load();
+  const SavedMap stored = open_map_file(setup.map_file())->load();
   EXPECT_EQ(stored.trajectory.size(), 8U);
   ASSERT_FALSE(stored.view.tiles.empty());
 
@@ -48,7 +48,7 @@ TEST(Restart, GoesOnWithMapAndPath) {
   const ServiceSetup setup("every");
   run_server(setup, 0, 8, terminate);
   run_server(setup, 8, 14, terminate);
-  const StoredMap stored = open_map_file(setup.map_file())->load();
+  const SavedMap stored = open_map_file(setup.map_file())->load();
   ASSERT_EQ(stored.trajectory.size(), 14U);
   const Eigen::Vector3d step = stored.trajectory[8].T_map_lidar.translation() -
                                stored.trajectory[7].T_map_lidar.translation();
@@ -74,7 +74,7 @@ TEST(Restart, KillBetweenTwoSavesLosesNothingSaved) {
     server.send(SIGKILL);
     EXPECT_EQ(server.wait_for_exit(patience), -1);
   });
-  const StoredMap stored = open_map_file(setup.map_file())->load();
+  const SavedMap stored = open_map_file(setup.map_file())->load();
   EXPECT_EQ(stored.trajectory.size(), 10U);
   EXPECT_FALSE(stored.view.tiles.empty());
 
@@ -87,7 +87,7 @@ TEST(Restart, KillBetweenTwoSavesLosesNothingSaved) {
 TEST(Restart, WhatDoesNotFitIntoMemoryIsServedFromTheFile) {
   const ServiceSetup setup("every", "save_period_s: 0.2, memory_limit_mib: 1");
   run_server(setup, 0, 30, terminate);
-  const StoredMap stored = open_map_file(setup.map_file())->load();
+  const SavedMap stored = open_map_file(setup.map_file())->load();
 
   const ServerProcess next(setup.server_arguments());
   Client client(setup.client());

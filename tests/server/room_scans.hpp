@@ -1,7 +1,7 @@
 #pragma once
 
 #include "core/lidar/scan.hpp"
-#include "core/odometry/trajectory.hpp"
+#include "core/lidar/trajectory.hpp"
 
 namespace stillmap::test {
 

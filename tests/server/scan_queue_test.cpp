@@ -4,7 +4,7 @@
 
 #include <thread>
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 using namespace std::chrono_literals;
@@ -35,7 +35,7 @@ TEST(ScanQueue, LetsAPatientSenderWaitForRoom) {
   ScanQueue queue(1);
   constexpr std::int64_t scans = 200;
   const std::jthread sender([&] {
-    for (std::int64_t i = 0; i < scans; ++i) EXPECT_TRUE(queue.push_when_free(scan_at(i), {}));
+    for (std::int64_t i = 0; i < scans; ++i) EXPECT_TRUE(queue.push_blocking(scan_at(i), {}));
   });
   for (std::int64_t i = 0; i < scans; ++i) {
     const auto scan = queue.pop({}, 10s);
@@ -52,10 +52,10 @@ TEST(ScanQueue, StopsWaitingWhenAsked) {
     std::this_thread::sleep_for(20ms);
     stop.request_stop();
   });
-  EXPECT_FALSE(queue.push_when_free(scan_at(2), stop.get_token()));
+  EXPECT_FALSE(queue.push_blocking(scan_at(2), stop.get_token()));
   ScanQueue empty(1);
   EXPECT_FALSE(empty.pop(stop.get_token(), 60s));
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -62,7 +62,7 @@ std::vector<std::string> ServiceSetup::server_arguments() const {
   return {"--config", (folder_ / "server.yaml").string()};
 }
 
-DdsOptions ServiceSetup::dds() const { return loopback(true); }
+dds::DdsOptions ServiceSetup::dds() const { return loopback(true); }
 
 ClientOptions ServiceSetup::client() const {
   return {.dds = dds(), .server_name = "stillmap", .request_timeout = patience};
@@ -90,7 +90,7 @@ void drive(ScanPublisher& publisher, int first, int last) {
 
 bool wait_for_scans(Client& client, std::uint64_t scans) {
   return eventually([&] {
-    const ServerStatus status = client.status();
+    const dds::ServerStatus status = client.status();
     return status.counter("scans_mapped") + status.dropped() >= scans;
   });
 }

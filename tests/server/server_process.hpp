@@ -38,7 +38,7 @@ class ServiceSetup {
                         const std::string& map_options = "save_period_s: 3600");
 
   [[nodiscard]] std::vector<std::string> server_arguments() const;
-  [[nodiscard]] DdsOptions dds() const;
+  [[nodiscard]] dds::DdsOptions dds() const;
   [[nodiscard]] ClientOptions client() const;
   [[nodiscard]] ScanPublisherOptions publisher(bool lossless) const;
   [[nodiscard]] std::filesystem::path map_file() const { return folder_ / "map.stillmap"; }

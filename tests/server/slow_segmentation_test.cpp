@@ -7,7 +7,7 @@
 #include "tests/server/room_scans.hpp"
 #include "tests/server/slow_segmenter.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 using namespace std::chrono_literals;
@@ -19,13 +19,13 @@ constexpr auto period = 100ms;
 ServerConfig live_config() {
   ServerConfig config;
   config.mapper.sensor = vlp_16();
-  config.labels.source = LabelOrigin::model;
+  config.labels.source = LabelProvider::model;
   config.labels.budget_ms = 30;
   config.input.queue_length = 20;
   return config;
 }
 
-class SlowNetwork : public testing::Test {
+class SlowSegmentation : public testing::Test {
  protected:
   /// Sends scans at 10 Hz, as a sensor does, and waits until they are worked off.
   void drive(int scans) {
@@ -40,58 +40,59 @@ class SlowNetwork : public testing::Test {
       std::this_thread::sleep_for(5ms);
     }
   }
-  [[nodiscard]] ServerStatus status() const {
+  [[nodiscard]] dds::ServerStatus status() const {
     return ServerReport(
-               {.label_source = "slow", .sensor = {}, .points_topic = {}, .troubles = {}}, board_,
-               statistics_, [] { return std::vector<Finding>(); }, [] { return std::string(); })
+               {.label_source = "slow", .sensor = {}, .points_topic = {}, .host_diagnostics = {}},
+               latest_map_, statistics_, [] { return std::vector<dds::Diagnostic>(); },
+               [] { return std::string(); })
         .status();
   }
   [[nodiscard]] double median_ms(const std::string& stage) const {
-    for (const StageLatency& latency : status().latencies) {
+    for (const dds::StageLatency& latency : status().latencies) {
       if (latency.stage == stage) return latency.p50_ms;
     }
     ADD_FAILURE() << "no stage " << stage;
     return 0.0;
   }
 
-  test::SlowLabels::Behaviour source_;
+  test::SlowSegmenter::Behaviour source_;
   ScanQueue queue_{20};
   Statistics statistics_;
-  MapBoard board_;
+  LatestMap latest_map_;
   int next_scan_ = 0;
 };
 
-TEST_F(SlowNetwork, DelaysNoPoseBeyondTheBudgetAndIsUsedForEveryNthScan) {
+TEST_F(SlowSegmentation, DelaysNoPoseBeyondTheBudgetAndIsUsedForEveryNthScan) {
   source_.delay_ms = 200;
-  MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
-                        nullptr, queue_, statistics_, board_, {});
+  MappingThread mapping(live_config(), std::make_unique<test::SlowSegmenter>(source_), std::nullopt,
+                        nullptr, queue_, statistics_, latest_map_, {});
   drive(30);
-  const ServerStatus slow = status();
+  const dds::ServerStatus slow = status();
   EXPECT_EQ(slow.counter("scans_mapped"), 30U);
   EXPECT_GE(slow.segmentation.every, 2U);
   EXPECT_GE(slow.segmentation.network_ms, 199.0);
   EXPECT_EQ(slow.segmentation.fresh_share, 0.0);
-  EXPECT_GT(slow.segmentation.carried_share, 0.6);
-  EXPECT_THAT(slow.reason, HasSubstr(every_nth_scan(slow.segmentation.every)));
+  EXPECT_GT(slow.segmentation.propagated_share, 0.6);
+  EXPECT_THAT(slow.reason, HasSubstr(dds::every_nth_scan(slow.segmentation.every)));
   EXPECT_THAT(slow.reason, HasSubstr("carried"));
   // The network's 200 ms do not show: the budget of 30 ms, and much room for a busy machine.
   EXPECT_LT(median_ms("segment"), 190.0);
 
   source_.delay_ms = 0;
   drive(20);
-  const ServerStatus fast = status();
+  const dds::ServerStatus fast = status();
   EXPECT_EQ(fast.segmentation.every, 1U);
   EXPECT_GT(fast.segmentation.fresh_share, 0.0);
   EXPECT_EQ(fast.reason, "");
 }
 
-TEST_F(SlowNetwork, LooksMoreCoarselyBeforeScansAreLeftOut) {
+TEST_F(SlowSegmentation, LooksMoreCoarselyBeforeScansAreLeftOut) {
   source_.delay_ms = 150;
   source_.costs = {1.0, 0.3};
-  MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
-                        nullptr, queue_, statistics_, board_, {});
+  MappingThread mapping(live_config(), std::make_unique<test::SlowSegmenter>(source_), std::nullopt,
+                        nullptr, queue_, statistics_, latest_map_, {});
   drive(20);
-  const ServerStatus slow = status();
+  const dds::ServerStatus slow = status();
   EXPECT_EQ(slow.segmentation.image_columns, 600U);
   EXPECT_EQ(slow.segmentation.full_columns, 2000U);
   EXPECT_LT(slow.segmentation.network_ms, 150.0);
@@ -103,12 +104,12 @@ TEST_F(SlowNetwork, LooksMoreCoarselyBeforeScansAreLeftOut) {
   EXPECT_EQ(status().reason, "");
 }
 
-TEST_F(SlowNetwork, ThatFailsLeavesPosesAndMap) {
+TEST_F(SlowSegmentation, ThatFailsLeavesPosesAndMap) {
   source_.fails = true;
-  MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
-                        nullptr, queue_, statistics_, board_, {});
+  MappingThread mapping(live_config(), std::make_unique<test::SlowSegmenter>(source_), std::nullopt,
+                        nullptr, queue_, statistics_, latest_map_, {});
   drive(8);
-  const ServerStatus failing = status();
+  const dds::ServerStatus failing = status();
   EXPECT_EQ(failing.counter("scans_mapped"), 8U);
   EXPECT_EQ(failing.counter("label_failures"), 8U);
   EXPECT_EQ(failing.segmentation.unlabelled_share, 1.0);
@@ -117,19 +118,19 @@ TEST_F(SlowNetwork, ThatFailsLeavesPosesAndMap) {
   source_.fails = false;
   drive(3);
   EXPECT_EQ(status().reason, "");
-  EXPECT_EQ(board_.trajectory().size(), 11U);
+  EXPECT_EQ(latest_map_.trajectory().size(), 11U);
 }
 
-TEST_F(SlowNetwork, DoesNotHoldUpTheEnd) {
+TEST_F(SlowSegmentation, DoesNotHoldUpTheEnd) {
   source_.delay_ms = 400;
   const auto began = Clock::now();
   {
-    MappingThread mapping(live_config(), std::make_unique<test::SlowLabels>(source_), std::nullopt,
-                          nullptr, queue_, statistics_, board_, {});
+    MappingThread mapping(live_config(), std::make_unique<test::SlowSegmenter>(source_),
+                          std::nullopt, nullptr, queue_, statistics_, latest_map_, {});
     drive(2);
   }
   EXPECT_LT(Clock::now() - began, 2s);
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::server

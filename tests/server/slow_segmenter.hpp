@@ -12,7 +12,7 @@ namespace stillmap::test {
 
 /// The scan's own labels, after a while that can be changed as it runs; in images of 2000 columns
 /// or a smaller share of them.
-class SlowLabels final : public LabelSource {
+class SlowSegmenter final : public Segmenter {
  public:
   struct Behaviour {
     std::atomic<int> delay_ms{0};
@@ -20,18 +20,20 @@ class SlowLabels final : public LabelSource {
     std::atomic<int> labelled{0};
     std::vector<double> costs{1.0};
   };
-  explicit SlowLabels(Behaviour& behaviour) : behaviour_(behaviour) {}
+  explicit SlowSegmenter(Behaviour& behaviour) : behaviour_(behaviour) {}
 
   [[nodiscard]] std::string name() const override { return "slow"; }
-  [[nodiscard]] std::vector<double> costs() const override { return behaviour_.costs; }
-  void set_coarseness(std::size_t coarseness) override { cost_ = behaviour_.costs.at(coarseness); }
+  [[nodiscard]] std::vector<double> relative_costs() const override { return behaviour_.costs; }
+  void set_resolution_level(std::size_t resolution_level) override {
+    cost_ = behaviour_.costs.at(resolution_level);
+  }
   [[nodiscard]] int image_columns() const override { return static_cast<int>(2000 * cost_); }
-  [[nodiscard]] PointLabels label(const Scan& scan) override {
+  [[nodiscard]] PointLabels segment(const Scan& scan) override {
     std::this_thread::sleep_for(
         std::chrono::duration<double, std::milli>(behaviour_.delay_ms * cost_));
     if (behaviour_.fails) throw std::runtime_error("the network is broken");
     ++behaviour_.labelled;
-    return StreamLabels().label(scan);
+    return PassthroughSegmenter().segment(scan);
   }
 
  private:

@@ -4,7 +4,7 @@
 
 #include "server/monitoring/latency_window.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 using namespace std::chrono_literals;
@@ -13,7 +13,7 @@ TEST(LatencyWindow, GivesNearestRankPercentiles) {
   LatencyWindow window;
   // 100, 99, ... 1: the order must not matter.
   for (int i = 100; i >= 1; --i) window.add(i);
-  const StageLatency latency = window.summary("odometry");
+  const dds::StageLatency latency = window.summary("odometry");
   EXPECT_EQ(latency.stage, "odometry");
   EXPECT_EQ(latency.p50_ms, 50.0);
   EXPECT_EQ(latency.p99_ms, 99.0);
@@ -50,13 +50,13 @@ TEST(Statistics, CountsDropsByReason) {
   statistics.scans_dropped("empty", 1, "no points");
   statistics.scans_dropped("queue_full", 1, "too fast");
   EXPECT_EQ(statistics.last_drop(), "too fast");
-  ServerStatus status;
+  dds::ServerStatus status;
   statistics.report_to(status);
   EXPECT_EQ(status.counter("scans_received"), 3U);
   EXPECT_EQ(status.counter("dropped_queue_full"), 3U);
   EXPECT_EQ(status.counter("dropped_empty"), 1U);
   EXPECT_EQ(status.dropped(), 4U);
-  statistics.scan_mapped(Labelling::fresh);
+  statistics.scan_mapped(LabelProvenance::fresh);
   EXPECT_TRUE(statistics.last_drop().empty());
 }
 
@@ -65,7 +65,7 @@ TEST(Statistics, ReportsStagesInTheOrderOfTheirFirstScan) {
   for (int scan = 0; scan < 2; ++scan) {
     for (const char* stage : {"queue", "prepare", "odometry"}) statistics.add_latency(stage, 1.0);
   }
-  ServerStatus status;
+  dds::ServerStatus status;
   statistics.report_to(status);
   ASSERT_EQ(status.latencies.size(), 3U);
   EXPECT_EQ(status.latencies[0].stage, "queue");
@@ -74,4 +74,4 @@ TEST(Statistics, ReportsStagesInTheOrderOfTheirFirstScan) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -6,11 +6,11 @@
 #include <thread>
 
 #include "idl/dds/reader.hpp"
-#include "server/publishers/token_bucket.hpp"
 #include "server/publishers/tile_publisher.hpp"
+#include "server/publishers/token_bucket.hpp"
 #include "tests/idl/dds_fixture.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 using namespace std::chrono_literals;
@@ -27,8 +27,8 @@ std::shared_ptr<const Tile> tile_of(TileId id, std::uint64_t revision) {
   return std::make_shared<const Tile>(std::move(tile));
 }
 
-std::shared_ptr<const MapView> row_of_tiles(int count, std::uint64_t revision) {
-  auto view = std::make_shared<MapView>();
+std::shared_ptr<const MapSnapshot> row_of_tiles(int count, std::uint64_t revision) {
+  auto view = std::make_shared<MapSnapshot>();
   view->version = revision;
   view->map_id = 7;
   view->tile_size_m = 20.0;
@@ -38,16 +38,17 @@ std::shared_ptr<const MapView> row_of_tiles(int count, std::uint64_t revision) {
 }
 
 /// The row, with tile 0 at another revision.
-std::shared_ptr<const MapView> with_first_changed(const MapView& row, std::uint64_t revision) {
-  auto view = std::make_shared<MapView>(row);
+std::shared_ptr<const MapSnapshot> with_first_changed(const MapSnapshot& row,
+                                                      std::uint64_t revision) {
+  auto view = std::make_shared<MapSnapshot>(row);
   view->version = revision;
   view->tiles.front() = tile_of({0, 0}, revision);
   return view;
 }
 
-DdsOptions slow_network() {
-  DdsOptions options = loopback(false);
-  options.bulk_bytes_per_s = 400'000;
+dds::DdsOptions slow_network() {
+  dds::DdsOptions options = loopback(false);
+  options.large_message_bytes_per_s = 400'000;
   options.max_datagram_bytes = 1400;
   return options;
 }
@@ -57,56 +58,56 @@ class TilePacing : public testing::Test {
   void expect_all_arrive(std::size_t tiles) {
     std::map<std::int32_t, std::uint64_t> revisions;
     MapTile message;
-    while (revisions.size() < tiles && reader_.take(message, {}, patience)) {
+    while (revisions.size() < tiles && reader_.take(message, {}, discovery_timeout)) {
       revisions[message.tile_x()] = message.state().revision();
     }
     EXPECT_EQ(revisions.size(), tiles);
   }
 
-  Topics topics_ = Topics::in("stillmap");
-  Participant here_{slow_network()};
-  Participant there_{slow_network()};
+  dds::Topics topics_ = dds::Topics::in("stillmap");
+  dds::Participant here_{slow_network()};
+  dds::Participant there_{slow_network()};
   TilePublisher publisher_{here_, topics_};
-  Reader<MapTile> reader_{there_, topics_.tiles.dds_name, topics_.tiles.reader};
+  dds::Reader<MapTile> reader_{there_, topics_.tiles.dds_name, topics_.tiles.reader};
 };
 
-TEST(ByteAllowanceOfNoRate, AllowsEverything) {
-  ByteAllowance allowance(0);
-  allowance.refill(Clock::now());
-  allowance.spend(1'000'000'000);
-  EXPECT_TRUE(allowance.allows());
+TEST(TokenBucketOfNoRate, AllowsEverything) {
+  TokenBucket bucket(0);
+  bucket.refill(Clock::now());
+  bucket.consume(1'000'000'000);
+  EXPECT_TRUE(bucket.has_tokens());
 }
 
-TEST(ByteAllowanceOfARate, KeepsToItAndPaysItsDebts) {
-  ByteAllowance allowance(1000);
+TEST(TokenBucketOfARate, KeepsToItAndPaysItsDebts) {
+  TokenBucket bucket(1000);
   Clock::time_point now{};
-  allowance.refill(now);
-  allowance.spend(3000);
-  EXPECT_FALSE(allowance.allows());
-  allowance.refill(now += 1900ms);
-  EXPECT_FALSE(allowance.allows());
-  allowance.refill(now += 200ms);
-  EXPECT_TRUE(allowance.allows());
+  bucket.refill(now);
+  bucket.consume(3000);
+  EXPECT_FALSE(bucket.has_tokens());
+  bucket.refill(now += 1900ms);
+  EXPECT_FALSE(bucket.has_tokens());
+  bucket.refill(now += 200ms);
+  EXPECT_TRUE(bucket.has_tokens());
 }
 
-TEST(ByteAllowanceOfARate, SavesUpNoMoreThanASecond) {
-  ByteAllowance allowance(1000);
+TEST(TokenBucketOfARate, SavesUpNoMoreThanASecond) {
+  TokenBucket bucket(1000);
   Clock::time_point now{};
-  allowance.refill(now);
-  allowance.refill(now += 3600s);
-  allowance.spend(1001);
-  EXPECT_FALSE(allowance.allows());
+  bucket.refill(now);
+  bucket.refill(now += 3600s);
+  bucket.consume(1001);
+  EXPECT_FALSE(bucket.has_tokens());
 }
 
 TEST_F(TilePacing, ABurstIsSpreadAndArrivesWhole) {
-  ASSERT_TRUE(reader_.events().wait_for_writer(patience));
+  ASSERT_TRUE(reader_.events().wait_for_writer(discovery_timeout));
   constexpr int tiles = 40;
   const auto view = row_of_tiles(tiles, 1);
   const auto began = Clock::now();
   publisher_.publish(view);
   EXPECT_GT(publisher_.waiting(), 25U);
   EXPECT_LT(publisher_.waiting(), 35U);
-  while (publisher_.waiting() > 0 && Clock::now() - began < patience) {
+  while (publisher_.waiting() > 0 && Clock::now() - began < discovery_timeout) {
     std::this_thread::sleep_for(50ms);
     publisher_.publish(view);
   }
@@ -121,11 +122,11 @@ TEST_F(TilePacing, ATileThatKeepsChangingDoesNotHoldUpTheOthers) {
   const auto began = Clock::now();
   std::uint64_t revision = 1;
   publisher_.publish(row);
-  while (publisher_.waiting() > 1 && Clock::now() - began < patience) {
+  while (publisher_.waiting() > 1 && Clock::now() - began < discovery_timeout) {
     std::this_thread::sleep_for(50ms);
     publisher_.publish(with_first_changed(*row, ++revision));
   }
-  EXPECT_LT(Clock::now() - began, patience);
+  EXPECT_LT(Clock::now() - began, discovery_timeout);
   expect_all_arrive(tiles);
 }
 
@@ -135,7 +136,7 @@ TEST_F(TilePacing, WhatChangesWhileItWaitsIsSentAsItIsThen) {
   const std::size_t sent_at_once = tiles - publisher_.waiting();
   const auto newest = row_of_tiles(static_cast<int>(tiles), 2);
   const auto began = Clock::now();
-  while (publisher_.waiting() > 0 && Clock::now() - began < patience) {
+  while (publisher_.waiting() > 0 && Clock::now() - began < discovery_timeout) {
     publisher_.publish(newest);
     std::this_thread::sleep_for(50ms);
   }
@@ -152,4 +153,4 @@ TEST_F(TilePacing, WhatChangesWhileItWaitsIsSentAsItIsThen) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -5,8 +5,8 @@
 #include <limits>
 #include <mutex>
 
-#include "core/traversability/traversability_summary.hpp"
 #include "core/traversability/traversability_answer_view.hpp"
+#include "core/traversability/traversability_summary.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {
@@ -16,8 +16,8 @@ using ::testing::HasSubstr;
 
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
-AreaQuery query_of(const Region& region, const std::string& profile = "car") {
-  AreaQuery query;
+TraversabilityQuery query_of(const Region& region, const std::string& profile = "car") {
+  TraversabilityQuery query;
   query.profile = profile;
   query.region = region;
   return query;
@@ -28,14 +28,15 @@ PathQuery path_of(const std::string& profile, const std::vector<Eigen::Vector2d>
 }
 
 /// A server that has mapped a hall with pillars and keeps the areas of two robots.
-class AreaService : public testing::Test {
+class TraversabilityService : public testing::Test {
  protected:
-  AreaService() : setup_("every"), server_(setup_.server_arguments()), client_(setup_.client()) {
+  TraversabilityService()
+      : setup_("every"), server_(setup_.server_arguments()), client_(setup_.client()) {
     drive(publisher_, 0, 12);
     EXPECT_TRUE(wait_for_scans(client_, 12));
     EXPECT_TRUE(eventually([&] {
       const auto answer = client_.get_traversable_area(query_of(BoxRegion{}));
-      return answer.grid.status == AreaStatus::ok &&
+      return answer.grid.status == TraversabilityStatus::ok &&
              answer.grid.map_version == client_.status().map_version;
     }));
   }
@@ -46,62 +47,62 @@ class AreaService : public testing::Test {
   ScanPublisher publisher_{setup_.publisher(true)};
 };
 
-TEST_F(AreaService, TellsWhereEachRobotCanGo) {
+TEST_F(TraversabilityService, TellsWhereEachRobotCanGo) {
   for (const std::string robot : {"car", "delivery_robot"}) {
-    AreaQuery query = query_of(BoxRegion{}, robot);
-    query.wants_outlines = true;
-    const AreaAnswer answer = client_.get_traversable_area(query);
-    ASSERT_EQ(answer.grid.status, AreaStatus::ok) << answer.grid.reason;
-    const AreaSummary summary = summarize(answer);
+    TraversabilityQuery query = query_of(BoxRegion{}, robot);
+    query.include_outlines = true;
+    const TraversabilityAnswer answer = client_.get_traversable_area(query);
+    ASSERT_EQ(answer.grid.status, TraversabilityStatus::ok) << answer.grid.reason;
+    const TraversabilitySummary summary = summarize(answer);
     EXPECT_GT(summary.free, 100U) << robot;
     EXPECT_GT(summary.lethal.at(static_cast<std::size_t>(BlockReason::obstacle)), 10U);
-    EXPECT_GT(summary.lethal.at(static_cast<std::size_t>(BlockReason::inflation)), 10U);
+    EXPECT_GT(summary.lethal.at(static_cast<std::size_t>(BlockReason::inscribed)), 10U);
     EXPECT_FALSE(answer.outlines.empty());
     EXPECT_EQ(answer.map_id, client_.status().map_id);
   }
 }
 
-TEST_F(AreaService, AnswersEveryKindOfRegion) {
-  const AreaAnswer all = client_.get_traversable_area(query_of(BoxRegion{}));
-  const TraversabilityView whole = area_view(all, RobotProfile{});
+TEST_F(TraversabilityService, AnswersEveryKindOfRegion) {
+  const TraversabilityAnswer all = client_.get_traversable_area(query_of(BoxRegion{}));
+  const TraversabilityView whole = view_of_answer(all, RobotProfile{});
   for (const Region& region :
        {Region(SphereRegion{.centre_map = {5, 0, 0}, .radius_m = 6.0}),
         Region(PolygonRegion{.corners_map = {{-5, -9}, {14, -9}, {5, 9}}, .heights = {}}),
         Region(CorridorRegion{
             .path_map = {{-9, -5}, {0, 0}, {9, 5}}, .half_width_m = 3.0, .heights = {}})}) {
-    const AreaAnswer answer = client_.get_traversable_area(query_of(region));
-    ASSERT_EQ(answer.grid.status, AreaStatus::ok) << answer.grid.reason;
+    const TraversabilityAnswer answer = client_.get_traversable_area(query_of(region));
+    ASSERT_EQ(answer.grid.status, TraversabilityStatus::ok) << answer.grid.reason;
     EXPECT_GT(answer.grid.data.size(), 100U);
-    EXPECT_EQ(answer.grid.data, answer_area(whole, query_of(region)).grid.data);
+    EXPECT_EQ(answer.grid.data, query_traversability(whole, query_of(region)).grid.data);
   }
 }
 
-TEST_F(AreaService, ChecksPathsAndFindsPlaces) {
+TEST_F(TraversabilityService, ChecksPathsAndFindsPlaces) {
   const NearestTraversable start = client_.nearest_traversable("delivery_robot", {4.0, 0.0});
-  ASSERT_EQ(start.status, AreaStatus::ok) << start.reason;
+  ASSERT_EQ(start.status, TraversabilityStatus::ok) << start.reason;
   EXPECT_EQ(start.map_version, client_.status().map_version);
   PathQuery path{
       .profile = "delivery_robot", .positions_map = {start.position_map}, .headings_rad = {0.0}};
-  EXPECT_EQ(client_.check_path(path).status, AreaStatus::ok);
+  EXPECT_EQ(client_.check_path(path).status, TraversabilityStatus::ok);
   // Through the wall at y = 14.
   path.positions_map.emplace_back(start.position_map.x(), 20.0);
   path.headings_rad.clear();
   const PathCheck check = client_.check_path(path);
-  ASSERT_EQ(check.status, AreaStatus::ok) << check.reason;
+  ASSERT_EQ(check.status, TraversabilityStatus::ok) << check.reason;
   ASSERT_TRUE(check.conflict);
   EXPECT_FALSE(check.is_free);
-  EXPECT_LT(check.conflict->place_map.y(), 14.6);
+  EXPECT_LT(check.conflict->cell_centre_map.y(), 14.6);
 }
 
-TEST_F(AreaService, RefusesHostileRequestsWithTheirReasonAndGoesOn) {
-  using enum AreaStatus;
+TEST_F(TraversabilityService, RefusesHostileRequestsWithTheirReasonAndGoesOn) {
+  using enum TraversabilityStatus;
   BoxRegion huge;
   huge.box_map = {Eigen::Vector3d::Constant(-1e9), Eigen::Vector3d::Constant(1e9)};
   BoxRegion of_nan;
   of_nan.box_map.min().x() = nan;
-  const auto expect_area = [&](const AreaQuery& query, AreaStatus status,
+  const auto expect_area = [&](const TraversabilityQuery& query, TraversabilityStatus status,
                                const std::string& named) {
-    const AreaAnswer answer = client_.get_traversable_area(query);
+    const TraversabilityAnswer answer = client_.get_traversable_area(query);
     EXPECT_EQ(answer.grid.status, status) << named;
     EXPECT_THAT(answer.grid.reason, HasSubstr(named));
     EXPECT_TRUE(answer.grid.data.empty());
@@ -115,11 +116,11 @@ TEST_F(AreaService, RefusesHostileRequestsWithTheirReasonAndGoesOn) {
   expect_area(query_of(BoxRegion{}, "submarine"), invalid_request, "car, delivery_robot");
   expect_area(query_of(SphereRegion{.centre_map = {5e5, 0, 0}, .radius_m = 3}), not_found,
               "outside the map");
-  AreaQuery tiny = query_of(BoxRegion{});
+  TraversabilityQuery tiny = query_of(BoxRegion{});
   tiny.max_cells = 3;
   expect_area(tiny, too_large, "at most 3");
 
-  const auto expect_path = [&](const PathQuery& query, AreaStatus status,
+  const auto expect_path = [&](const PathQuery& query, TraversabilityStatus status,
                                const std::string& named) {
     const PathCheck check = client_.check_path(query);
     EXPECT_EQ(check.status, status) << named;
@@ -145,14 +146,14 @@ TEST_F(AreaService, RefusesHostileRequestsWithTheirReasonAndGoesOn) {
   EXPECT_EQ(client_.status().health, OdometryHealth::good);
 }
 
-TEST_F(AreaService, PublishesTheGridThatNav2AsksFor) {
+TEST_F(TraversabilityService, PublishesTheGridThatNav2AsksFor) {
   std::mutex mutex;
   OccupancyGrid newest;
   const Subscription subscription = client_.subscribe_planning_grid([&](const OccupancyGrid& grid) {
     const std::scoped_lock lock(mutex);
     newest = grid;
   });
-  const AreaAnswer answer = client_.get_traversable_area(query_of(BoxRegion{}));
+  const TraversabilityAnswer answer = client_.get_traversable_area(query_of(BoxRegion{}));
   // It comes although it was published before anybody listened.
   EXPECT_TRUE(eventually([&] {
     const std::scoped_lock lock(mutex);
@@ -168,19 +169,20 @@ TEST_F(AreaService, PublishesTheGridThatNav2AsksFor) {
     const std::scoped_lock lock(mutex);
     return newest.data.empty();
   }));
-  EXPECT_EQ(client_.get_traversable_area(query_of(BoxRegion{})).grid.status, AreaStatus::not_found);
+  EXPECT_EQ(client_.get_traversable_area(query_of(BoxRegion{})).grid.status,
+            TraversabilityStatus::not_found);
 }
 
-TEST_F(AreaService, TellsHowLongAChangeTakes) {
-  const ServerStatus status = client_.status();
-  const auto is_areas = [](const StageLatency& latency) { return latency.stage == "areas"; };
+TEST_F(TraversabilityService, TellsHowLongAChangeTakes) {
+  const dds::ServerStatus status = client_.status();
+  const auto is_areas = [](const dds::StageLatency& latency) { return latency.stage == "areas"; };
   const auto areas = std::ranges::find_if(status.latencies, is_areas);
   ASSERT_NE(areas, status.latencies.end());
   EXPECT_GT(areas->samples, 0U);
   EXPECT_GT(areas->p50_ms, 0.0);
 }
 
-TEST(AreaConfiguration, AnUnknownRobotEndsTheServerWithTheNamesThereAre) {
+TEST(TraversabilityConfiguration, AnUnknownRobotEndsTheServerWithTheNamesThereAre) {
   const ScratchFolder folder;
   std::ofstream(folder / "server.yaml") << "areas: {profiles: [submarine]}\n";
   ServerProcess server({"--config", (folder / "server.yaml").string()});

@@ -9,7 +9,7 @@
 #include "server/traversability/traversability_grid_provider.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
-namespace stillmap {
+namespace stillmap::server {
 namespace {
 
 using namespace std::chrono_literals;
@@ -27,26 +27,26 @@ RobotProfile small_robot() {
   return robot;
 }
 
-std::shared_ptr<const MapView> shared(const MapView& view) {
-  return std::make_shared<const MapView>(view);
+std::shared_ptr<const MapSnapshot> shared(const MapSnapshot& view) {
+  return std::make_shared<const MapSnapshot>(view);
 }
 
 /// A thread on a map of a road, 16 m by 16 m.
-class AreaThreadTest : public testing::Test {
+class TraversabilityThreadTest : public testing::Test {
  protected:
-  AreaThreadTest() {
+  TraversabilityThreadTest() {
     world_.ground(-8, -8, 8, 8, road);
-    maps_.begin(shared(world_.view()), {});
+    latest_map_.begin(shared(world_.view()), {});
   }
 
   void start(std::chrono::duration<double> period) {
-    thread_.emplace(std::vector{square_robot(), small_robot()}, period, maps_, areas_, statistics_,
-                    [this] { ++updates_; });
+    thread_.emplace(std::vector{square_robot(), small_robot()}, period, latest_map_, snapshot_,
+                    statistics_, [this] { ++updates_; });
   }
 
   [[nodiscard]] bool wait_for_version(std::uint64_t version) const {
     const auto deadline = std::chrono::steady_clock::now() + 60s;
-    while (areas_.view("small")->version != version) {
+    while (snapshot_.view("small")->version != version) {
       if (std::chrono::steady_clock::now() > deadline) return false;
       std::this_thread::sleep_for(1ms);
     }
@@ -54,28 +54,28 @@ class AreaThreadTest : public testing::Test {
   }
 
   [[nodiscard]] double cost_at(const std::string& robot, double x_m, double y_m) const {
-    return test::look(*areas_.view(robot), x_m, y_m).cell.cost;
+    return test::look(*snapshot_.view(robot), x_m, y_m).cell.cost;
   }
 
   VoxelWorld world_;
-  MapBoard maps_;
-  AreaBoard areas_;
+  LatestMap latest_map_;
+  TraversabilitySnapshot snapshot_;
   Statistics statistics_;
   std::atomic<int> updates_ = 0;
-  std::optional<AreaThread> thread_;
+  std::optional<TraversabilityThread> thread_;
 };
 
-TEST_F(AreaThreadTest, KeepsEveryRobotsAreaUpToDate) {
+TEST_F(TraversabilityThreadTest, KeepsEveryRobotsAreaUpToDate) {
   start(0s);
-  ASSERT_TRUE(wait_for_version(maps_.view()->version));
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
   EXPECT_EQ(cost_at("small", 1.1, 1.1), 0);
   world_.block(1, 1, 2, 2, 0.3, 2.0, building);
-  maps_.show(shared(world_.view()));
-  ASSERT_TRUE(wait_for_version(maps_.view()->version));
+  latest_map_.publish(shared(world_.view()));
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
   EXPECT_EQ(cost_at("small", 1.1, 1.1), 100);
   for (const RobotProfile& robot : {square_robot(), small_robot()}) {
-    const auto fresh = test::area_of(*maps_.view(), robot);
-    const auto kept = areas_.view(robot.name);
+    const auto fresh = test::traversability_of(*latest_map_.view(), robot);
+    const auto kept = snapshot_.view(robot.name);
     ASSERT_EQ(kept->tiles.size(), fresh->tiles.size());
     for (std::size_t i = 0; i < fresh->tiles.size(); ++i) {
       EXPECT_EQ(kept->tiles[i]->cells, fresh->tiles[i]->cells);
@@ -83,12 +83,12 @@ TEST_F(AreaThreadTest, KeepsEveryRobotsAreaUpToDate) {
   }
 }
 
-TEST_F(AreaThreadTest, TellsHowLongAChangeTakes) {
+TEST_F(TraversabilityThreadTest, TellsHowLongAChangeTakes) {
   start(0s);
-  ASSERT_TRUE(wait_for_version(maps_.view()->version));
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
   thread_.reset();
   EXPECT_EQ(updates_, 1);
-  ServerStatus status;
+  dds::ServerStatus status;
   statistics_.report_to(status);
   ASSERT_EQ(status.latencies.size(), 1U);
   EXPECT_EQ(status.latencies[0].stage, "areas");
@@ -96,37 +96,37 @@ TEST_F(AreaThreadTest, TellsHowLongAChangeTakes) {
   EXPECT_GT(status.latencies[0].p50_ms, 0.0);
 }
 
-TEST_F(AreaThreadTest, UpdatesOnceAPeriodHoweverOftenTheMapChanges) {
+TEST_F(TraversabilityThreadTest, UpdatesOnceAPeriodHoweverOftenTheMapChanges) {
   start(3600s);
-  ASSERT_TRUE(wait_for_version(maps_.view()->version));
-  const std::uint64_t first = areas_.view("small")->version;
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
+  const std::uint64_t first = snapshot_.view("small")->version;
   for (int i = 0; i < 5; ++i) {
     world_.block(1 + i, 1, 2 + i, 2, 0.3, 2.0, building);
-    maps_.show(shared(world_.view()));
+    latest_map_.publish(shared(world_.view()));
   }
   std::this_thread::sleep_for(50ms);
-  EXPECT_EQ(areas_.view("small")->version, first);
+  EXPECT_EQ(snapshot_.view("small")->version, first);
   // Destroying it must not take the hour.
   thread_.reset();
   EXPECT_EQ(updates_, 1);
 }
 
-TEST_F(AreaThreadTest, FollowsToAnotherMap) {
+TEST_F(TraversabilityThreadTest, FollowsToAnotherMap) {
   start(0s);
-  ASSERT_TRUE(wait_for_version(maps_.view()->version));
-  MapView other;
-  other.map_id = maps_.view()->map_id + 1;
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
+  MapSnapshot other;
+  other.map_id = latest_map_.view()->map_id + 1;
   other.version = 99;
-  maps_.begin(shared(other), {});
+  latest_map_.begin(shared(other), {});
   ASSERT_TRUE(wait_for_version(99));
-  EXPECT_TRUE(areas_.view("small")->tiles.empty());
-  EXPECT_EQ(areas_.view("small")->map_id, other.map_id);
+  EXPECT_TRUE(snapshot_.view("small")->tiles.empty());
+  EXPECT_EQ(snapshot_.view("small")->map_id, other.map_id);
 }
 
-TEST_F(AreaThreadTest, NamesTheRobotsThereAre) {
+TEST_F(TraversabilityThreadTest, NamesTheRobotsThereAre) {
   const auto refusal = [&](const std::string& profile) -> std::string {
     try {
-      static_cast<void>(areas_.view(profile));
+      static_cast<void>(snapshot_.view(profile));
     } catch (const std::invalid_argument& error) {
       return error.what();
     }
@@ -137,29 +137,30 @@ TEST_F(AreaThreadTest, NamesTheRobotsThereAre) {
   EXPECT_THAT(refusal("car"), AllOf(HasSubstr("'car'"), HasSubstr("small")));
 }
 
-TEST_F(AreaThreadTest, ThePlanningGridIsAWindowRoundTheRobot) {
-  AreasConfig config;
+TEST_F(TraversabilityThreadTest, TheGridIsAWindowRoundTheRobot) {
+  TraversabilityConfig config;
   config.profiles = {"small"};
   config.grid_profile = "small";
   config.grid_window_m = 4.0;
-  const PlanningGrid window(config, "map", maps_, areas_);
+  const TraversabilityGridProvider window(config, "map", latest_map_, snapshot_);
   start(0s);
-  ASSERT_TRUE(wait_for_version(maps_.view()->version));
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
   StampedPose pose{.stamp_ns = 5'000'000'000};
   pose.T_map_lidar.translation().x() = 4.0;
-  maps_.add_pose(pose, OdometryHealth::good, "");
+  latest_map_.add_pose(pose, OdometryHealth::good, "");
   const OccupancyGrid grid = window.grid();
-  ASSERT_EQ(grid.status, AreaStatus::ok) << grid.reason;
+  ASSERT_EQ(grid.status, TraversabilityStatus::ok) << grid.reason;
   EXPECT_EQ(grid.width, 20U);
   EXPECT_NEAR(grid.origin_map.x(), 2.0, 1e-9);
   EXPECT_NEAR(grid.origin_map.y(), -2.0, 1e-9);
   EXPECT_EQ(window.message(grid).header().stamp().sec(), 5);
   EXPECT_EQ(window.message(grid).header().frame_id(), "map");
   config.grid_window_m = 0.0;
-  EXPECT_EQ(PlanningGrid(config, "map", maps_, areas_).grid().width, 80U);
+  EXPECT_EQ(TraversabilityGridProvider(config, "map", latest_map_, snapshot_).grid().width, 80U);
   config.grid_profile = "";
-  EXPECT_EQ(PlanningGrid(config, "map", maps_, areas_).grid().status, AreaStatus::not_found);
+  EXPECT_EQ(TraversabilityGridProvider(config, "map", latest_map_, snapshot_).grid().status,
+            TraversabilityStatus::not_found);
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::server

@@ -9,7 +9,7 @@
 #include "core/simulation/street_objects.hpp"
 #include "core/simulation/vegetation.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 Eigen::AlignedBox3f bounds(const Mesh& mesh) {
@@ -22,7 +22,7 @@ struct Kind {
   const char* name;
   std::function<Mesh(Random)> make;
   /// Reach to the sides, least and largest height [m].
-  float reach, least_height, largest_height;
+  float reach, min_height, max_height;
 };
 
 std::vector<Kind> kinds() {
@@ -47,8 +47,8 @@ TEST(AnyShape, StandsInTheGroundAndHasItsSize) {
       ASSERT_LT(mesh.triangles.size(), 30000U);
       const Eigen::AlignedBox3f box = bounds(mesh);
       EXPECT_LE(box.min().z(), 0.1F);
-      EXPECT_GE(box.max().z(), kind.least_height);
-      EXPECT_LE(box.max().z(), kind.largest_height);
+      EXPECT_GE(box.max().z(), kind.min_height);
+      EXPECT_LE(box.max().z(), kind.max_height);
       EXPECT_LT(box.max().head<2>().cwiseAbs().maxCoeff(), kind.reach);
       EXPECT_LT(box.min().head<2>().cwiseAbs().maxCoeff(), kind.reach);
     }
@@ -122,4 +122,4 @@ TEST(AnyShape, OutbuildingsStandOutOfTheFront) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

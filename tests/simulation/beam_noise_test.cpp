@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 struct Statistics {
@@ -10,7 +10,7 @@ struct Statistics {
 };
 
 Statistics fire(const BeamNoise& noise, float range_m, float cos_incidence,
-                const SurfaceFacts& surface) {
+                const SurfaceProperties& surface) {
   constexpr int shots = 20000;
   double count = 0.0, sum = 0.0, squares = 0.0, intensity = 0.0;
   for (int i = 0; i < shots; ++i) {
@@ -27,7 +27,7 @@ Statistics fire(const BeamNoise& noise, float range_m, float cos_incidence,
   return {count / shots, mean, std::sqrt(squares / count - mean * mean), intensity / count};
 }
 
-constexpr SurfaceFacts grey{50, 0.4F};
+constexpr SurfaceProperties grey{50, 0.4F};
 
 TEST(BeamNoise, NearReturnsHaveTheConfiguredNoiseAndLosses) {
   const Statistics near = fire({.range_sigma_m = 0.03, .drop_share = 0.1}, 10.0F, 1.0F, grey);
@@ -56,8 +56,7 @@ TEST(BeamNoise, IntensityFollowsReflectivityAngleAndStaysInRange) {
 }
 
 TEST(BeamNoise, SilentNoiseChangesNothing) {
-  const BeamNoise none{
-      .range_sigma_m = 0, .drop_share = 0, .intensity_sigma = 0, .weakest_return = 0};
+  const BeamNoise none{.range_sigma_m = 0, .drop_share = 0, .intensity_sigma = 0, .min_return = 0};
   const Statistics all = fire(none, 100.0F, 0.01F, grey);
   EXPECT_EQ(all.share, 1.0);
   EXPECT_EQ(all.sigma_m, 0.0);
@@ -71,4 +70,4 @@ TEST(BeamNoise, NamesItsFaults) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

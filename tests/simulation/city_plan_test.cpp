@@ -5,7 +5,7 @@
 #include "core/simulation/city.hpp"
 #include "core/simulation/ground_shape.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using testing::HasSubstr;
@@ -109,4 +109,4 @@ TEST_F(Ground, ParkedVehiclesStandInBaysApartFromEachOther) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

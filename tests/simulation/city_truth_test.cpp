@@ -6,7 +6,7 @@
 
 #include "core/simulation/ground_shape.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 SimulationConfig yard() {
@@ -66,4 +66,4 @@ TEST_F(CityTruthTest, FindsKerbsHousesAndParkedVehicles) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 class Lane : public testing::Test {
@@ -96,4 +96,4 @@ TEST(TrafficLight, IsRedAtTheStartOfEveryPeriod) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

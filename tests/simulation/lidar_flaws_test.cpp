@@ -6,7 +6,7 @@
 
 #include "core/simulation/simulation.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 SimulationConfig clean_yard() {
@@ -14,7 +14,7 @@ SimulationConfig clean_yard() {
   config.plan = test_yard();
   config.sensor = vlp_16();
   config.scans = 3;
-  config.noise = {.range_sigma_m = 0, .drop_share = 0, .intensity_sigma = 0, .weakest_return = 0};
+  config.noise = {.range_sigma_m = 0, .drop_share = 0, .intensity_sigma = 0, .min_return = 0};
   return config;
 }
 
@@ -108,7 +108,7 @@ TEST(LidarFlaws, MixedReturnsLieBetweenTheSurfaces) {
 TEST(LidarFlaws, DrawnOnesFitTheirSensor) {
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
     for (const SensorModel& sensor : {hdl_64e(), hdl_32e(), vlp_16()}) {
-      const LidarFlaws flaws = drawn_flaws(sensor, Random(seed));
+      const LidarFlaws flaws = random_flaws(sensor, Random(seed));
       EXPECT_EQ(flaws.faults(sensor), "");
       EXPECT_EQ(flaws.beams.size(), static_cast<std::size_t>(sensor.rings));
     }
@@ -127,4 +127,4 @@ TEST(LidarFlaws, NamesItsFaults) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

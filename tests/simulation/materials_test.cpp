@@ -2,29 +2,29 @@
 
 #include <gmock/gmock.h>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 TEST(Materials, UsualOnesAreTheTable) {
-  const Materials materials = usual_materials();
+  const Materials materials = default_materials();
   for (std::size_t i = 0; i < surface_count; ++i) {
     const auto surface = static_cast<Surface>(i);
-    EXPECT_EQ(materials.of(surface).label, facts_of(surface).label);
-    EXPECT_EQ(materials.of(surface).reflectivity, facts_of(surface).reflectivity);
-    EXPECT_EQ(materials.at(surface, {3, 4, 5}).lost, facts_of(surface).lost);
+    EXPECT_EQ(materials.of(surface).label, properties_of(surface).label);
+    EXPECT_EQ(materials.of(surface).reflectivity, properties_of(surface).reflectivity);
+    EXPECT_EQ(materials.at(surface, {3, 4, 5}).lost, properties_of(surface).lost);
   }
   EXPECT_EQ(materials.patch({1, 2, 3}), 1.0F);
 }
 
 TEST(Materials, DrawnOnesKeepClassesAndStayPhysical) {
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
-    const Materials materials = drawn_materials(Random(seed));
+    const Materials materials = random_materials(Random(seed));
     for (std::size_t i = 0; i < surface_count; ++i) {
-      const SurfaceFacts& facts = materials.facts[i];
-      EXPECT_EQ(facts.label, facts_of(static_cast<Surface>(i)).label);
-      EXPECT_GT(facts.reflectivity, 0.0F);
-      EXPECT_LE(facts.lost, 1.0F);
-      EXPECT_LT(facts.pile_m, 0.5F);
+      const SurfaceProperties& properties = materials.properties[i];
+      EXPECT_EQ(properties.label, properties_of(static_cast<Surface>(i)).label);
+      EXPECT_GT(properties.reflectivity, 0.0F);
+      EXPECT_LE(properties.lost, 1.0F);
+      EXPECT_LT(properties.pile_m, 0.5F);
     }
   }
 }
@@ -32,7 +32,7 @@ TEST(Materials, DrawnOnesKeepClassesAndStayPhysical) {
 TEST(Materials, DrawnRoadsAreDarkAndBright) {
   std::vector<float> asphalt;
   for (std::uint64_t seed = 0; seed < 100; ++seed) {
-    asphalt.push_back(drawn_materials(Random(seed)).of(Surface::asphalt).reflectivity);
+    asphalt.push_back(random_materials(Random(seed)).of(Surface::asphalt).reflectivity);
   }
   const auto [darkest, brightest] = std::ranges::minmax(asphalt);
   EXPECT_LT(darkest, 0.12F);
@@ -40,7 +40,7 @@ TEST(Materials, DrawnRoadsAreDarkAndBright) {
 }
 
 TEST(Materials, PatchesAverageToOneWithinTheirStrength) {
-  Materials materials = usual_materials();
+  Materials materials = default_materials();
   materials.patchiness = 0.4;
   double sum = 0.0;
   constexpr int spots = 20000;
@@ -58,7 +58,7 @@ TEST(Materials, PatchesAverageToOneWithinTheirStrength) {
 }
 
 TEST(Materials, PanesLoseTheirShareOfBeams) {
-  Materials materials = usual_materials();
+  Materials materials = default_materials();
   materials.lost_in_panes = true;
   double lost = 0.0;
   constexpr int spots = 20000;
@@ -74,4 +74,4 @@ TEST(Materials, PanesLoseTheirShareOfBeams) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -8,7 +8,7 @@
 #include "core/simulation/object_shapes.hpp"
 #include "core/simulation/vegetation.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 double area(const Mesh& mesh) {
@@ -118,4 +118,4 @@ TEST(Tree, LeavesHoles) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

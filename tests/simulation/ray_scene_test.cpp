@@ -7,7 +7,7 @@
 #include "core/simulation/object_shapes.hpp"
 #include "core/simulation/random.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector3f;
@@ -92,4 +92,4 @@ TEST(RayScene, RaysEndAtTheirRange) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

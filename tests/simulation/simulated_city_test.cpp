@@ -8,7 +8,7 @@
 
 #include "core/simulation/simulation.hpp"
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 SimulationConfig with_plan(CityPlan plan, int scans) {
@@ -227,4 +227,4 @@ TEST(Labels, OnlyObjectsThatCanBeCountedHaveInstances) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

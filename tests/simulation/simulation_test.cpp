@@ -8,7 +8,7 @@
 #include <limits>
 #include <numbers>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 SimulationConfig small(std::uint64_t seed = 1) {
@@ -155,7 +155,7 @@ TEST(Simulation, RollingScanUndoneWithTheTrueMotionIsTheDeskewedWorld) {
   SimulationConfig config = small();
   config.sensor = hdl_64e();
   config.firings = 1000;
-  config.noise = {.range_sigma_m = 0, .drop_share = 0, .intensity_sigma = 0, .weakest_return = 0};
+  config.noise = {.range_sigma_m = 0, .drop_share = 0, .intensity_sigma = 0, .min_return = 0};
   const SimulatedScan still = Simulation(config).scan(10);
   config.rolling = true;
   const Simulation rolling(config);
@@ -199,4 +199,4 @@ TEST(Simulation, RejectsABadConfigurationWithAllFaults) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 // Outline on the ground.
@@ -134,4 +134,4 @@ TEST(Crowd, StandsAtRedAndFlowsAtGreen) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

@@ -6,21 +6,21 @@
 #include <map>
 #include <set>
 
-namespace stillmap {
+namespace stillmap::simulation {
 namespace {
 
 constexpr std::uint64_t first_seed = 4000;
 
 // Fewer firings: the same things are seen, sooner.
-SimulationConfig quick_drive(std::uint64_t seed) {
-  SimulationConfig config = training_drive(seed);
+SimulationConfig quick_sequence(std::uint64_t seed) {
+  SimulationConfig config = training_sequence(seed);
   config.firings = 500;
   return config;
 }
 
 TEST(TrainingPlan, IsWithoutFaultWhateverIsDrawn) {
   for (std::uint64_t seed = 0; seed < 3000; ++seed) {
-    ASSERT_EQ(training_drive(seed).faults(), "") << seed;
+    ASSERT_EQ(training_sequence(seed).faults(), "") << seed;
   }
 }
 
@@ -28,46 +28,46 @@ TEST(TrainingPlan, VariesEverything) {
   std::set<int> lanes;
   std::map<std::string, int> sensors;
   int without_sidewalk = 0, without_kerb = 0, sloped = 0, with_car_park = 0;
-  constexpr int drives = 600;
-  for (std::uint64_t seed = 0; seed < drives; ++seed) {
-    const SimulationConfig drive = training_drive(seed);
-    lanes.insert(drive.plan.route_profile.lanes);
-    ++sensors[drive.sensor.name];
-    without_sidewalk += drive.plan.route_profile.sidewalk_m == 0.0 ? 1 : 0;
-    without_kerb += drive.plan.kerb_m == 0.0 ? 1 : 0;
-    sloped += drive.plan.embankment_m > 1.0 ? 1 : 0;
-    with_car_park += drive.plan.patches.empty() ? 0 : 1;
+  constexpr int sequences = 600;
+  for (std::uint64_t seed = 0; seed < sequences; ++seed) {
+    const SimulationConfig sequence = training_sequence(seed);
+    lanes.insert(sequence.plan.route_profile.lanes);
+    ++sensors[sequence.sensor.name];
+    without_sidewalk += sequence.plan.route_profile.sidewalk_m == 0.0 ? 1 : 0;
+    without_kerb += sequence.plan.kerb_m == 0.0 ? 1 : 0;
+    sloped += sequence.plan.embankment_m > 1.0 ? 1 : 0;
+    with_car_park += sequence.plan.patches.empty() ? 0 : 1;
   }
   EXPECT_EQ(lanes, (std::set{1, 2, 3}));
-  EXPECT_NEAR(sensors["HDL-64E"], 0.6 * drives, 0.08 * drives);
-  EXPECT_NEAR(sensors["VLP-16"], 0.2 * drives, 0.06 * drives);
-  EXPECT_NEAR(sensors["HDL-32E"], 0.1 * drives, 0.05 * drives);
+  EXPECT_NEAR(sensors["HDL-64E"], 0.6 * sequences, 0.08 * sequences);
+  EXPECT_NEAR(sensors["VLP-16"], 0.2 * sequences, 0.06 * sequences);
+  EXPECT_NEAR(sensors["HDL-32E"], 0.1 * sequences, 0.05 * sequences);
   EXPECT_EQ(sensors.size(), 4U);
   for (const int count : {without_sidewalk, without_kerb, sloped, with_car_park}) {
-    EXPECT_GT(count, drives / 20);
-    EXPECT_LT(count, drives);
+    EXPECT_GT(count, sequences / 20);
+    EXPECT_LT(count, sequences);
   }
 }
 
-TEST(TrainingDrive, SameSeedGivesTheSameBits) {
-  const SimulatedScan a = Simulation(quick_drive(first_seed)).scan(40);
-  const SimulatedScan b = Simulation(quick_drive(first_seed)).scan(40);
+TEST(TrainingSequence, SameSeedGivesTheSameBits) {
+  const SimulatedScan a = Simulation(quick_sequence(first_seed)).scan(40);
+  const SimulatedScan b = Simulation(quick_sequence(first_seed)).scan(40);
   EXPECT_EQ(a.scan.points_lidar, b.scan.points_lidar);
   EXPECT_EQ(a.scan.intensity, b.scan.intensity);
   EXPECT_EQ(a.raw_labels, b.raw_labels);
   EXPECT_NE(a.scan.points_lidar,
-            Simulation(quick_drive(first_seed + 1)).scan(40).scan.points_lidar);
+            Simulation(quick_sequence(first_seed + 1)).scan(40).scan.points_lidar);
 }
 
-TEST(TrainingDrive, ScansAreFarApartAndAsManyAsWanted) {
+TEST(TrainingSequence, ScansAreFarApartAndAsManyAsWanted) {
   for (std::uint64_t seed = first_seed; seed < first_seed + 4; ++seed) {
-    const Simulation drive(quick_drive(seed));
-    const std::vector<int> scans = spread_scans(drive, 8);
+    const Simulation sequence(quick_sequence(seed));
+    const std::vector<int> scans = spread_scans(sequence, 8);
     ASSERT_EQ(scans.size(), 8U) << seed;
     for (std::size_t i = 1; i < scans.size(); ++i) {
-      const double period_s = drive.config().sensor.period_s;
-      const Eigen::Vector3d step = drive.T_map_lidar_at(scans[i] * period_s).translation() -
-                                   drive.T_map_lidar_at(scans[i - 1] * period_s).translation();
+      const double period_s = sequence.config().sensor.period_s;
+      const Eigen::Vector3d step = sequence.T_map_lidar_at(scans[i] * period_s).translation() -
+                                   sequence.T_map_lidar_at(scans[i - 1] * period_s).translation();
       // Along the way it is 8 m; a turn lies between some.
       EXPECT_GT(step.norm(), 4.0) << seed;
     }
@@ -81,10 +81,10 @@ class TrainingScans : public testing::Test {
     scans_ = new std::vector<SimulatedScan>;
     heights_m_ = new std::vector<double>;
     for (std::uint64_t seed = first_seed; seed < first_seed + cities; ++seed) {
-      const Simulation drive(quick_drive(seed));
-      for (const int index : spread_scans(drive, 4)) {
-        scans_->push_back(drive.scan(index));
-        heights_m_->push_back(drive.config().lidar_height_m);
+      const Simulation sequence(quick_sequence(seed));
+      for (const int index : spread_scans(sequence, 4)) {
+        scans_->push_back(sequence.scan(index));
+        heights_m_->push_back(sequence.config().lidar_height_m);
       }
     }
   }
@@ -148,4 +148,4 @@ TEST_F(TrainingScans, RoadsLieBelowAndPeopleAreAsTallAsPeople) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::simulation

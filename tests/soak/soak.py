@@ -20,7 +20,7 @@ import time
 SAMPLE_S = 5.0
 STATUS_EVERY = 3  # samples
 CLIENT_PAUSE_S = (0.5, 3.0)
-MOST_CLIENTS = 3
+MAX_CLIENTS = 3
 WARM_UP = 1 / 6  # of the run
 # Beyond these the server leaks. A pose is kept in the trajectory, in its published path and their
 # copies; a voxel in the map, its views and the octree; and the allocator needs some play.
@@ -33,7 +33,7 @@ MORE_SEGMENTS = 6
 # A client's two ports in shared memory stay open in the server, and a later client takes others as
 # long as there are any (idl/dds/discovery.cpp).
 MORE_PORTS = 200
-LONGEST_GAP_S = 20.0
+MAX_GAP_S = 20.0
 # After this long, DDS has forgotten a client that was killed.
 LEASE_S = 30.0
 
@@ -74,7 +74,7 @@ class Poses(threading.Thread):
                                         text=True)
         self.count = 0
         self.last = None
-        self.longest_gap_s = 0.0
+        self.max_gap_s = 0.0
 
     def run(self):
         for line in self.process.stdout:
@@ -82,7 +82,7 @@ class Poses(threading.Thread):
                 continue
             now = time.monotonic()
             if self.last is not None:
-                self.longest_gap_s = max(self.longest_gap_s, now - self.last)
+                self.max_gap_s = max(self.max_gap_s, now - self.last)
             self.last = now
             self.count += 1
 
@@ -136,7 +136,7 @@ class Clients(threading.Thread):
     def run(self):
         while not self.stop.is_set():
             self.running = [t for t in self.running if t.is_alive()]
-            if len(self.running) < MOST_CLIENTS:
+            if len(self.running) < MAX_CLIENTS:
                 process = subprocess.Popen(self.command(), stdout=subprocess.DEVNULL,
                                            stderr=subprocess.DEVNULL)
                 life = threading.Thread(target=self.live, args=(process,), daemon=True)
@@ -255,8 +255,8 @@ class Soak:
         demand(mapped == self.sent, f"{self.sent} scans were sent, {mapped} were mapped")
         demand(status is not None and dropped_of(status) == 0, "scans were dropped")
         demand(self.drive_exit == 0, "the server stopped taking scans")
-        demand(self.poses.longest_gap_s <= LONGEST_GAP_S,
-               f"no pose came for {self.poses.longest_gap_s:.1f} s")
+        demand(self.poses.max_gap_s <= MAX_GAP_S,
+               f"no pose came for {self.poses.max_gap_s:.1f} s")
         demand(self.grown_mib() <= self.allowed_mib(),
                f"memory grew by {self.grown_mib():.1f} MiB, {self.allowed_mib():.1f} are explained")
         for name, slack in (("fds", MORE_FDS), ("threads", MORE_THREADS),
@@ -295,7 +295,7 @@ class Soak:
         print(f"  scans     {self.sent} sent ({rate:.2f}/s), {known[-1]['mapped']} mapped at the last "
               f"sample, {dropped_of(self.last_status)} dropped")
         print(f"  poses     {self.poses.count} at the client that stayed; longest gap "
-              f"{self.poses.longest_gap_s:.1f} s")
+              f"{self.poses.max_gap_s:.1f} s")
         print("  clients   " + ", ".join(f"{n} ended {how}" for how, n in self.clients.ends.items()) +
               f"; {self.clients.failed} had no answer")
         print(f"  memory    own {first['own_mib']:.1f} -> {last['own_mib']:.1f} MiB after the warm-up, "
@@ -328,7 +328,7 @@ def curve(samples, columns=64, rows=8):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bin", default="build/release/bin")
-    parser.add_argument("--drive", default="build/release/tests/soak/soak_drive")
+    parser.add_argument("--drive", default="build/release/tests/soak/soak_sensor")
     parser.add_argument("--minutes", type=float, default=30)
     parser.add_argument("--domain", type=int, default=57)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,7 +1,7 @@
 // A sensor for a long run: drives round and round in a room, 10 scans a second, so that the map is
 // complete after the first round.
 //
-//   soak_drive SERVER_DOMAIN SECONDS
+//   soak_sensor SERVER_DOMAIN SECONDS
 //
 // Prints how many scans were sent, once a second; at the end until the server has taken all.
 
@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
     return drive(static_cast<std::uint32_t>(std::atoi(argv[1])),
                  std::chrono::seconds(std::atoi(argv[2])));
   } catch (const std::exception& fault) {
-    std::fprintf(stderr, "soak_drive: %s\n", fault.what());
+    std::fprintf(stderr, "soak_sensor: %s\n", fault.what());
     return 1;
   }
 }

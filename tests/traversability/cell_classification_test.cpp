@@ -6,9 +6,9 @@ namespace stillmap {
 namespace {
 
 using enum SemanticClass;
-using test::area_of;
 using test::look;
 using test::square_robot;
+using test::traversability_of;
 using test::VoxelWorld;
 
 VoxelWorld plain_road() {
@@ -17,27 +17,27 @@ VoxelWorld plain_road() {
   return world;
 }
 
-TEST(Judgement, AKerbIsAStepForOneRobotAndNoneForAnother) {
+TEST(CellClassification, AKerbIsAStepForOneRobotAndNoneForAnother) {
   VoxelWorld world = plain_road();
   world.ground(-8, 2, 8, 8, road, [](double, double) { return 0.23; });
   RobotProfile robot = square_robot();
-  EXPECT_EQ(look(*area_of(world.view(), robot), 0.1, 2.1).cell.reason, BlockReason::step);
+  EXPECT_EQ(look(*traversability_of(world.view(), robot), 0.1, 2.1).cell.reason, BlockReason::step);
   robot.max_step_m = 0.2;
-  EXPECT_EQ(look(*area_of(world.view(), robot), 0.1, 2.1).cell.state, CellState::free);
+  EXPECT_EQ(look(*traversability_of(world.view(), robot), 0.1, 2.1).cell.state, CellState::free);
 }
 
-TEST(Judgement, WhatStandsIsAnObstacleWhatHangsIsHeadRoom) {
+TEST(CellClassification, WhatStandsIsAnObstacleWhatHangsIsHeadRoom) {
   VoxelWorld world = plain_road();
   world.block(2.0, 2.0, 2.2, 2.2, 0.3, 2.0, pole);
   world.block(-3.0, 2.0, -2.0, 3.0, 1.3, 1.9, vegetation);
   world.block(-3.0, -3.0, -2.0, -2.0, 1.8, 2.4, building);
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   EXPECT_EQ(look(*view, 2.1, 2.1).cell.reason, BlockReason::obstacle);
   EXPECT_EQ(look(*view, -2.5, 2.5).cell.reason, BlockReason::low_headroom);
   EXPECT_EQ(look(*view, -2.5, -2.5).cell.state, CellState::free);
 }
 
-TEST(Judgement, SlopeRoughnessAndClassHaveTheirOwnReasons) {
+TEST(CellClassification, SlopeRoughnessAndClassHaveTheirOwnReasons) {
   VoxelWorld world;
   world.ground(-8, -8, 0, 8, road, [](double x, double) { return 0.5 * x; });
   world.ground(0, -8, 8, 0, road,
@@ -45,35 +45,36 @@ TEST(Judgement, SlopeRoughnessAndClassHaveTheirOwnReasons) {
   world.ground(0, 0, 8, 8, terrain);
   RobotProfile robot = square_robot();
   robot.max_step_m = 0.3;
-  const auto view = area_of(world.view(), robot);
+  const auto view = traversability_of(world.view(), robot);
   EXPECT_EQ(look(*view, -4.1, 0.1).cell.reason, BlockReason::slope);
   EXPECT_EQ(look(*view, 4.1, 4.1).cell.reason, BlockReason::ground_class);
   robot.max_roughness_m = 0.01;
-  EXPECT_EQ(look(*area_of(world.view(), robot), 4.1, -4.1).cell.reason, BlockReason::roughness);
+  EXPECT_EQ(look(*traversability_of(world.view(), robot), 4.1, -4.1).cell.reason,
+            BlockReason::roughness);
 }
 
-TEST(Judgement, UnknownIsNotLethalAndDoesNotInflate) {
+TEST(CellClassification, UnknownIsNotLethalAndDoesNotInflate) {
   VoxelWorld world;
   world.ground(-8, -8, 2, 8, road);
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   EXPECT_EQ(look(*view, 2.1, 0.1).cell.state, CellState::unknown);
   EXPECT_EQ(look(*view, 1.9, 0.1).cell.state, CellState::free);
   EXPECT_EQ(look(*view, 50.0, 0.1).cell.state, CellState::unknown);
 }
 
-TEST(Judgement, InflationIsTheInscribedRadiusAndThenTheCostFalls) {
+TEST(CellClassification, InflationIsTheInscribedRadiusAndThenTheCostFalls) {
   VoxelWorld world = plain_road();
   world.block(0.0, 0.0, 0.2, 0.2, 0.3, 1.5, pole);
   RobotProfile robot = square_robot();
   robot.length_m = 2.0;
-  const auto view = area_of(world.view(), robot);
+  const auto view = traversability_of(world.view(), robot);
   int last_cost = 100;
   for (double x_m = 0.1; x_m < 2.0; x_m += 0.2) {
     const TraversabilityCell cell = look(*view, x_m, 0.1).cell;
     const double distance_m = x_m - 0.1;
     EXPECT_NEAR(cell.clearance_m, distance_m, 1e-5);
     const BlockReason reason = x_m < 0.2                                  ? BlockReason::obstacle
-                               : distance_m <= robot.inscribed_radius_m() ? BlockReason::inflation
+                               : distance_m <= robot.inscribed_radius_m() ? BlockReason::inscribed
                                                                           : BlockReason::none;
     EXPECT_EQ(cell.reason, reason) << x_m;
     EXPECT_LE(cell.cost, last_cost);
@@ -84,20 +85,20 @@ TEST(Judgement, InflationIsTheInscribedRadiusAndThenTheCostFalls) {
   EXPECT_EQ(last_cost, 0);
 }
 
-TEST(Judgement, InflationCrossesTheEdgesOfTiles) {
+TEST(CellClassification, InflationCrossesTheEdgesOfTiles) {
   VoxelWorld world = plain_road();
   world.block(4.0, 0.0, 4.2, 0.2, 0.3, 1.5, pole);  // first column of its tile
-  const auto view = area_of(world.view(), square_robot());
-  EXPECT_EQ(look(*view, 3.9, 0.1).cell.reason, BlockReason::inflation);
-  EXPECT_EQ(look(*view, 3.9, -0.1).cell.reason, BlockReason::inflation);
+  const auto view = traversability_of(world.view(), square_robot());
+  EXPECT_EQ(look(*view, 3.9, 0.1).cell.reason, BlockReason::inscribed);
+  EXPECT_EQ(look(*view, 3.9, -0.1).cell.reason, BlockReason::inscribed);
 }
 
-TEST(Judgement, CostGrowsWithClassSlopeAndInference) {
+TEST(CellClassification, CostGrowsWithClassSlopeAndInference) {
   VoxelWorld world = plain_road();
   world.ground(-8, 0, 0, 8, parking);
   world.ground(0, 0, 8, 8, road, [](double x, double) { return 0.1 + 0.2 * x; });
   world.clear(4.0, -5.0, 4.4, -4.6);
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   EXPECT_EQ(look(*view, 4.9, -4.9).cell.cost, 0);
   EXPECT_EQ(look(*view, -4.1, 4.1).cell.cost, 20);  // 0.2 of 98
   EXPECT_GT(look(*view, 6.1, 6.1).cell.cost, 20);
@@ -105,11 +106,11 @@ TEST(Judgement, CostGrowsWithClassSlopeAndInference) {
   EXPECT_EQ(look(*view, 4.1, -4.9).cell.cost, 10);
 }
 
-TEST(Judgement, AWallOnGroundThatNobodySawIsAnObstacle) {
+TEST(CellClassification, AWallOnGroundThatNobodySawIsAnObstacle) {
   VoxelWorld world = plain_road();
   world.clear(4, -8, 8, 8);
   world.block(5.0, -8, 5.2, 8, 0.5, 3.0, building);
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   EXPECT_EQ(look(*view, 5.1, 0.1).cell.reason, BlockReason::obstacle);
   EXPECT_EQ(look(*view, 6.1, 0.1).cell.state, CellState::unknown);
 }

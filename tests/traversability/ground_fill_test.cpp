@@ -8,9 +8,9 @@ namespace stillmap {
 namespace {
 
 using enum SemanticClass;
-using test::area_of;
 using test::look;
 using test::square_robot;
+using test::traversability_of;
 using test::VoxelWorld;
 
 const SurfaceCell& surface_at(const TraversabilityView& view, double x_m, double y_m) {
@@ -28,7 +28,7 @@ VoxelWorld street() {
 TEST(GroundFill, PlaceOfARemovedCarBecomesInferredRoad) {
   VoxelWorld world = street();
   world.clear(-2.2, -1.0, 2.2, 0.8);
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   for (const double x_m : {-2.1, 0.1, 2.1}) {
     EXPECT_EQ(surface_at(*view, x_m, 0.1).ground.origin, GroundOrigin::inferred) << x_m;
     EXPECT_NEAR(surface_at(*view, x_m, 0.1).ground.height_m, 0.1, 1e-5);
@@ -41,7 +41,7 @@ TEST(GroundFill, PlaceOfARemovedCarBecomesInferredRoad) {
 TEST(GroundFill, AHoleThatHidesTheKerbIsFilledAlongItAndNeverAcross) {
   VoxelWorld world = street();
   world.clear(-2.2, 0.4, 2.2, 3.0);  // a car and its shadow over the kerb
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   for (double y_m = 0.5; y_m < 3.0; y_m += 0.2) {
     const GroundCell& ground = surface_at(*view, 0.1, y_m).ground;
     if (ground.origin != GroundOrigin::inferred) continue;
@@ -55,7 +55,7 @@ TEST(GroundFill, NotAcrossAStepEvenWithinOneClass) {
   VoxelWorld world;
   world.ground(-6, -6, 0, 6, road);
   world.ground(1, -6, 6, 6, road, [](double, double) { return 0.3; });
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   EXPECT_EQ(surface_at(*view, 0.5, 0.1).ground.origin, GroundOrigin::none);
   EXPECT_EQ(look(*view, 0.5, 0.1).cell.state, CellState::unknown);
 }
@@ -65,7 +65,7 @@ TEST(GroundFill, AlongASlopeTheGapRisesWithIt) {
   const auto slope = [](double x_m, double) { return 0.12 * x_m; };
   world.ground(-6, -6, 6, 6, road, slope);
   world.clear(-1, -1, 1, 1);
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   for (const double x_m : {-0.9, 0.1, 0.9}) {
     EXPECT_EQ(surface_at(*view, x_m, 0.1).ground.origin, GroundOrigin::inferred);
     EXPECT_NEAR(surface_at(*view, x_m, 0.1).ground.height_m, slope(x_m, 0.1), 0.01);
@@ -76,7 +76,7 @@ TEST(GroundFill, NotOverMoreThanTheLongestGap) {
   VoxelWorld world;
   world.ground(-10, -10, 10, 10, road);
   world.clear(-5, -5, 5, 5);
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   EXPECT_EQ(look(*view, 0.1, 0.1).cell.state, CellState::unknown);
   // On lines across a corner the gap is short enough.
   EXPECT_EQ(look(*view, 4.9, 4.9).cell.state, CellState::free);
@@ -87,7 +87,7 @@ TEST(GroundFill, NotThroughWhatStandsInTheGap) {
   world.ground(-6, -6, 6, 6, road);
   world.clear(-1, -6, 1, 6);
   world.block(-0.2, -6, 0.2, 6, 0.2, 2.5, building);  // a wall on ground that nobody saw
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   EXPECT_NE(surface_at(*view, 0.7, 0.1).ground.origin, GroundOrigin::inferred);
   EXPECT_EQ(look(*view, 0.1, 0.1).cell.reason, BlockReason::obstacle);
   EXPECT_EQ(look(*view, 0.7, 0.1).cell.state, CellState::unknown);
@@ -96,7 +96,7 @@ TEST(GroundFill, NotThroughWhatStandsInTheGap) {
 TEST(GroundFill, BridgesTheGapsBetweenRings) {
   VoxelWorld world;
   for (double x_m = -6; x_m < 6; x_m += 1.0) world.ground(x_m, -6, x_m + 0.2, 6, road);
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   for (double x_m = -3.9; x_m < 4; x_m += 0.2) {
     EXPECT_EQ(look(*view, x_m, 0.1).cell.state, CellState::free) << x_m;
   }
@@ -105,7 +105,7 @@ TEST(GroundFill, BridgesTheGapsBetweenRings) {
 TEST(GroundFill, NothingIsInferredBeyondTheEdgeOfWhatWasSeen) {
   VoxelWorld world;
   world.ground(-4, -4, 2.1, 4, road);
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   EXPECT_EQ(look(*view, 2.5, 0.1).cell.state, CellState::unknown);
 }
 

@@ -62,7 +62,7 @@ TEST(Nav2Map, DescriptionHasWhatMapServerAsksFor) {
 
 TEST(Nav2Map, SaysWhyNothingCanBeWritten) {
   OccupancyGrid none;
-  none.status = AreaStatus::not_found;
+  none.status = TraversabilityStatus::not_found;
   none.reason = "the map is empty";
   const ScratchFolder folder;
   EXPECT_THAT(message_of<std::invalid_argument>([&] { write_nav2_map(folder.path(), none); }),

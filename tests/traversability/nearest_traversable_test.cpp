@@ -11,8 +11,8 @@ namespace stillmap {
 namespace {
 
 using enum SemanticClass;
-using test::area_of;
 using test::square_robot;
+using test::traversability_of;
 using test::VoxelWorld;
 using ::testing::HasSubstr;
 
@@ -36,11 +36,11 @@ double by_brute_force(const TraversabilityView& view, const Eigen::Vector2d& p_m
 }
 
 TEST(NearestTraversable, EqualsBruteForce) {
-  const auto view = area_of(road_with_a_house().view(), square_robot());
+  const auto view = traversability_of(road_with_a_house().view(), square_robot());
   for (const Eigen::Vector2d& p_map : {Eigen::Vector2d(0, 0), Eigen::Vector2d(2.5, -1),
                                        Eigen::Vector2d(-11.5, 4), Eigen::Vector2d(7.03, 7.03)}) {
     const NearestTraversable nearest = nearest_traversable(*view, p_map);
-    ASSERT_EQ(nearest.status, AreaStatus::ok);
+    ASSERT_EQ(nearest.status, TraversabilityStatus::ok);
     EXPECT_DOUBLE_EQ(nearest.distance_m, by_brute_force(*view, p_map));
     EXPECT_NEAR((nearest.position_map - p_map).norm(), nearest.distance_m, 1e-12);
     EXPECT_EQ(nearest.cell.state, CellState::free);
@@ -49,16 +49,16 @@ TEST(NearestTraversable, EqualsBruteForce) {
 }
 
 TEST(NearestTraversable, RespectsTheLongestWay) {
-  const auto view = area_of(road_with_a_house().view(), square_robot());
+  const auto view = traversability_of(road_with_a_house().view(), square_robot());
   const NearestTraversable nearest = nearest_traversable(*view, {0, 0}, 2.0);
-  EXPECT_EQ(nearest.status, AreaStatus::not_found);
+  EXPECT_EQ(nearest.status, TraversabilityStatus::not_found);
   EXPECT_THAT(nearest.reason, HasSubstr("within 2 m"));
 }
 
 TEST(NearestTraversable, HostilePlacesGetAStatusAndAReason) {
-  const auto view = area_of(road_with_a_house().view(), square_robot());
+  const auto view = traversability_of(road_with_a_house().view(), square_robot());
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  using enum AreaStatus;
+  using enum TraversabilityStatus;
   EXPECT_EQ(nearest_traversable(*view, {nan, 0}).status, invalid_request);
   EXPECT_EQ(nearest_traversable(*view, {0, nan}).status, invalid_request);
   EXPECT_EQ(nearest_traversable(*view, {-nan, nan}).status, invalid_request);
@@ -66,7 +66,8 @@ TEST(NearestTraversable, HostilePlacesGetAStatusAndAReason) {
   EXPECT_EQ(nearest_traversable(*view, {0, 0}, nan).status, invalid_request);
   EXPECT_EQ(nearest_traversable(*view, {0, 0}, -1.0).status, invalid_request);
   EXPECT_EQ(nearest_traversable(*view, {9e4, 0}).status, not_found);
-  EXPECT_EQ(nearest_traversable(*area_of(MapView{}, square_robot()), {0, 0}).status, not_found);
+  EXPECT_EQ(nearest_traversable(*traversability_of(MapSnapshot{}, square_robot()), {0, 0}).status,
+            not_found);
 }
 
 }  // namespace

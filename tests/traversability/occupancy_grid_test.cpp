@@ -11,8 +11,8 @@ namespace stillmap {
 namespace {
 
 using enum SemanticClass;
-using test::area_of;
 using test::square_robot;
+using test::traversability_of;
 using test::VoxelWorld;
 using ::testing::HasSubstr;
 
@@ -21,7 +21,7 @@ std::shared_ptr<const TraversabilityView> area() {
   world.ground(-8, -8, 8, 6, road);
   world.ground(-8, 0, -4, 4, parking);
   world.block(0, 0, 2, 2, 0.3, 2.0, building);
-  return area_of(world.view(), square_robot());
+  return traversability_of(world.view(), square_robot());
 }
 
 Eigen::AlignedBox2d box(double x0, double y0, double x1, double y1) {
@@ -29,8 +29,8 @@ Eigen::AlignedBox2d box(double x0, double y0, double x1, double y1) {
 }
 
 TEST(OccupancyGrid, HasNav2sValues) {
-  const OccupancyGrid grid = occupancy_grid(*area(), everywhere());
-  ASSERT_EQ(grid.status, AreaStatus::ok);
+  const OccupancyGrid grid = occupancy_grid(*area(), whole_map_region());
+  ASSERT_EQ(grid.status, TraversabilityStatus::ok);
   EXPECT_EQ(grid.origin_map, Eigen::Vector2d(-8, -8));
   EXPECT_EQ(grid.width, 80U);
   EXPECT_EQ(grid.height, 80U);  // whole tiles
@@ -40,7 +40,7 @@ TEST(OccupancyGrid, HasNav2sValues) {
                    static_cast<std::uint32_t>((y_m + 8) / 0.2));
   };
   EXPECT_EQ(at(1.1, 1.1), occupancy_lethal);
-  EXPECT_EQ(at(2.3, 1.1), occupancy_inflated);
+  EXPECT_EQ(at(2.3, 1.1), occupancy_inscribed);
   EXPECT_EQ(at(-6.1, 2.1), 20);
   EXPECT_EQ(at(-6.1, -6.1), 0);
   EXPECT_EQ(at(1.1, 7.1), occupancy_unknown);
@@ -49,7 +49,7 @@ TEST(OccupancyGrid, HasNav2sValues) {
 TEST(OccupancyGrid, EveryCellIsTheViews) {
   const auto view = area();
   const OccupancyGrid grid = occupancy_grid(*view, {box(-3.05, -1.2, 4.9, 3.3), {}});
-  ASSERT_EQ(grid.status, AreaStatus::ok);
+  ASSERT_EQ(grid.status, TraversabilityStatus::ok);
   CellLookup lookup(*view);
   for (std::uint32_t y = 0; y < grid.height; ++y) {
     for (std::uint32_t x = 0; x < grid.width; ++x) {
@@ -64,8 +64,8 @@ TEST(OccupancyGrid, EveryCellIsTheViews) {
 }
 
 TEST(OccupancyGrid, AnotherShapeThanABoxTakesCellsOut) {
-  const AreaRegion circle =
-      area_region(SphereRegion{.centre_map = {0.0, 0.0, 99.0}, .radius_m = 3.0});
+  const TraversabilityRegion circle =
+      traversability_region(SphereRegion{.centre_map = {0.0, 0.0, 99.0}, .radius_m = 3.0});
   const OccupancyGrid grid = occupancy_grid(*area(), circle);
   EXPECT_EQ(grid.width, 30U);
   EXPECT_EQ(grid.at(0, 0), occupancy_unknown);
@@ -84,27 +84,29 @@ TEST(OccupancyGrid, HostileBoxesGetAStatusAndAReason) {
     EXPECT_NE(grid.reason, "");
     return grid.status;
   };
-  EXPECT_EQ(status(box(nan, 0, 1, 1)), AreaStatus::invalid_request);
-  EXPECT_EQ(status(box(2, 0, 1, 1)), AreaStatus::invalid_request);
-  EXPECT_EQ(status(Eigen::AlignedBox2d()), AreaStatus::invalid_request);
-  EXPECT_EQ(status(box(500, 500, 501, 501)), AreaStatus::not_found);
-  EXPECT_EQ(occupancy_grid(*area_of(MapView{}, square_robot()), everywhere()).status,
-            AreaStatus::not_found);
+  EXPECT_EQ(status(box(nan, 0, 1, 1)), TraversabilityStatus::invalid_request);
+  EXPECT_EQ(status(box(2, 0, 1, 1)), TraversabilityStatus::invalid_request);
+  EXPECT_EQ(status(Eigen::AlignedBox2d()), TraversabilityStatus::invalid_request);
+  EXPECT_EQ(status(box(500, 500, 501, 501)), TraversabilityStatus::not_found);
+  EXPECT_EQ(
+      occupancy_grid(*traversability_of(MapSnapshot{}, square_robot()), whole_map_region()).status,
+      TraversabilityStatus::not_found);
 }
 
 TEST(OccupancyGrid, TwoFarTilesDoNotMakeAnEndlessGrid) {
   VoxelWorld world;
   world.ground(0, 0, 2, 2, road);
   world.ground(90'000, 90'000, 90'002, 90'002, road);
-  const OccupancyGrid grid = occupancy_grid(*area_of(world.view(), square_robot()), everywhere());
-  EXPECT_EQ(grid.status, AreaStatus::too_large);
+  const OccupancyGrid grid =
+      occupancy_grid(*traversability_of(world.view(), square_robot()), whole_map_region());
+  EXPECT_EQ(grid.status, TraversabilityStatus::too_large);
   EXPECT_THAT(grid.reason, HasSubstr("smaller box"));
 }
 
 TEST(OccupancyGrid, KeepsToTheCellsThatAreAllowed) {
-  EXPECT_EQ(occupancy_grid(*area(), everywhere(), 6400).status, AreaStatus::ok);
-  const OccupancyGrid grid = occupancy_grid(*area(), everywhere(), 6399);
-  EXPECT_EQ(grid.status, AreaStatus::too_large);
+  EXPECT_EQ(occupancy_grid(*area(), whole_map_region(), 6400).status, TraversabilityStatus::ok);
+  const OccupancyGrid grid = occupancy_grid(*area(), whole_map_region(), 6399);
+  EXPECT_EQ(grid.status, TraversabilityStatus::too_large);
   EXPECT_THAT(grid.reason, HasSubstr("80 x 80 cells of 0.2 m; at most 6399"));
 }
 

@@ -12,8 +12,8 @@ namespace stillmap {
 namespace {
 
 using enum SemanticClass;
-using test::area_of;
 using test::square_robot;
+using test::traversability_of;
 using test::VoxelWorld;
 using ::testing::HasSubstr;
 
@@ -33,9 +33,9 @@ PathCheck check(const TraversabilityView& view, const std::vector<PlanarPose>& p
 }
 
 TEST(PathCheck, ThroughTheGapIsFreeWithTheClearanceThatIsLeft) {
-  const auto view = area_of(walled_road().view(), square_robot());
+  const auto view = traversability_of(walled_road().view(), square_robot());
   const PathCheck path = check(*view, {{{-4, 0}, 0}, {{4, 0}, 0}});
-  ASSERT_EQ(path.status, AreaStatus::ok);
+  ASSERT_EQ(path.status, TraversabilityStatus::ok);
   EXPECT_TRUE(path.is_free);
   EXPECT_NEAR(path.checked_m, 8.0, 1e-9);
   // Half the gap less half the width, to a cell.
@@ -43,28 +43,28 @@ TEST(PathCheck, ThroughTheGapIsFreeWithTheClearanceThatIsLeft) {
 }
 
 TEST(PathCheck, AgainstTheWallSaysWhereWhyAndHowFar) {
-  const auto view = area_of(walled_road().view(), square_robot());
+  const auto view = traversability_of(walled_road().view(), square_robot());
   const PathCheck path = check(*view, {{{-4, -4}, 0}, {{-2, -4}, 0}, {{4, -4}, 0}});
   ASSERT_TRUE(path.conflict);
   EXPECT_FALSE(path.is_free);
   EXPECT_EQ(path.conflict->reason, BlockReason::obstacle);
   EXPECT_EQ(path.conflict->segment, 1U);
-  EXPECT_NEAR(path.conflict->place_map.x(), 0.1, 0.11);
-  EXPECT_NEAR(path.conflict->place_map.y(), -4.0, 0.7);
+  EXPECT_NEAR(path.conflict->cell_centre_map.x(), 0.1, 0.11);
+  EXPECT_NEAR(path.conflict->cell_centre_map.y(), -4.0, 0.7);
   // The robot's front is half a metre ahead of it.
   EXPECT_NEAR(path.conflict->along_m, 3.5, 0.2);
   EXPECT_EQ(path.clearance_m, 0.0);
 }
 
 TEST(PathCheck, AThinWallBetweenTwoFarPosesIsNotJumpedOver) {
-  const auto view = area_of(walled_road().view(), square_robot());
+  const auto view = traversability_of(walled_road().view(), square_robot());
   EXPECT_FALSE(check(*view, {{{-6, 4}, 0}, {{6, 4}, 0}}).is_free);
 }
 
 TEST(PathCheck, TheOrientedFootprintDecides) {
   RobotProfile robot = square_robot();
   robot.length_m = 3.0;
-  const auto view = area_of(walled_road().view(), robot);
+  const auto view = traversability_of(walled_road().view(), robot);
   EXPECT_TRUE(check(*view, {{{0, 0}, 0}}).is_free);
   EXPECT_FALSE(check(*view, {{{0, 0}, std::numbers::pi / 2}}).is_free);
   // Turning on the spot sweeps the corners into the wall.
@@ -75,40 +75,40 @@ TEST(PathCheck, TheFootprintLiesAheadOfThePoseAsTheProfileSays) {
   RobotProfile robot = square_robot();
   robot.length_m = 3.0;
   robot.centre_ahead_m = 1.3;
-  const auto view = area_of(walled_road().view(), robot);
+  const auto view = traversability_of(walled_road().view(), robot);
   EXPECT_TRUE(check(*view, {{{1.0, -4}, 0}}).is_free);
   EXPECT_FALSE(check(*view, {{{1.0, -4}, std::numbers::pi}}).is_free);
 }
 
 TEST(PathCheck, UnknownGroundStopsThoseWhomItMust) {
   RobotProfile robot = square_robot();
-  const MapView map = walled_road().view();
-  const PathCheck stopped = check(*area_of(map, robot), {{{-4, 0}, 0}, {{-12, 0}, 0}});
+  const MapSnapshot map = walled_road().view();
+  const PathCheck stopped = check(*traversability_of(map, robot), {{{-4, 0}, 0}, {{-12, 0}, 0}});
   ASSERT_TRUE(stopped.conflict);
   EXPECT_EQ(stopped.conflict->reason, BlockReason::unknown);
   robot.unknown = UnknownGround::allowed;
-  EXPECT_TRUE(check(*area_of(map, robot), {{{-4, 0}, 0}, {{-12, 0}, 0}}).is_free);
+  EXPECT_TRUE(check(*traversability_of(map, robot), {{{-4, 0}, 0}, {{-12, 0}, 0}}).is_free);
 }
 
 TEST(PathCheck, CountsTheWayOverInferredGround) {
   VoxelWorld world;
   world.ground(-8, -8, 8, 8, road);
   world.clear(0, -0.4, 1, 0.4);
-  const auto view = area_of(world.view(), square_robot());
+  const auto view = traversability_of(world.view(), square_robot());
   const PathCheck path = check(*view, {{{-4, 0}, 0}, {{4, 0}, 0}});
   EXPECT_TRUE(path.is_free);
   EXPECT_NEAR(path.inferred_m, 2.0, 0.4);  // the hole and the robot's length
 }
 
 TEST(PathCheck, HostilePathsGetAStatusAndAReason) {
-  const auto view = area_of(walled_road().view(), square_robot());
-  const auto refused = [&](const std::vector<PlanarPose>& path_map, AreaStatus status) {
+  const auto view = traversability_of(walled_road().view(), square_robot());
+  const auto refused = [&](const std::vector<PlanarPose>& path_map, TraversabilityStatus status) {
     const PathCheck path = check(*view, path_map);
     EXPECT_EQ(path.status, status);
     EXPECT_FALSE(path.is_free);
     return path.reason;
   };
-  using enum AreaStatus;
+  using enum TraversabilityStatus;
   EXPECT_THAT(refused({}, invalid_request), HasSubstr("no poses"));
   EXPECT_THAT(refused({{{0, 0}, 0}, {{nan, 0}, 0}}, invalid_request), HasSubstr("pose 1"));
   EXPECT_THAT(refused({{{0, 0}, nan}}, invalid_request), HasSubstr("heading nan"));
@@ -122,8 +122,8 @@ TEST(PathCheck, HostilePathsGetAStatusAndAReason) {
 }
 
 TEST(PathCheck, OnAnEmptyMapIsNotFound) {
-  const auto view = area_of(MapView{}, square_robot());
-  EXPECT_EQ(check(*view, {{{0, 0}, 0}}).status, AreaStatus::not_found);
+  const auto view = traversability_of(MapSnapshot{}, square_robot());
+  EXPECT_EQ(check(*view, {{{0, 0}, 0}}).status, TraversabilityStatus::not_found);
 }
 
 }  // namespace

@@ -12,8 +12,8 @@ namespace stillmap {
 namespace {
 
 using enum SemanticClass;
-using test::area_of;
 using test::square_robot;
+using test::traversability_of;
 using test::VoxelWorld;
 using ::testing::HasSubstr;
 
@@ -27,7 +27,7 @@ std::shared_ptr<const TraversabilityView> bend() {
   RobotProfile robot = square_robot();
   robot.length_m = 2.0;
   robot.width_m = 0.6;
-  return area_of(world.view(), robot);
+  return traversability_of(world.view(), robot);
 }
 
 PathQuery path(std::vector<Eigen::Vector2d> positions_map, std::vector<double> headings_rad = {}) {
@@ -47,7 +47,7 @@ TEST(PathQuery, HeadingsAreTheRobotsNotThePaths) {
   EXPECT_TRUE(check_path(*bend(), path({{0, 0}, {4, 0}}, {0.0, 0.0})).is_free);
   const PathCheck sideways = check_path(*bend(), path({{0, 0}, {4, 0}}, {across, across}));
   ASSERT_TRUE(sideways.conflict);
-  EXPECT_NEAR(std::abs(sideways.conflict->place_map.y()), 1.1, 0.11);
+  EXPECT_NEAR(std::abs(sideways.conflict->cell_centre_map.y()), 1.1, 0.11);
 }
 
 TEST(PathQuery, AConflictCountsThePositionsAsked) {
@@ -66,14 +66,14 @@ TEST(PathQuery, WaysOfNoLengthKeepTheHeading) {
 
 TEST(PathQuery, HostilePathsGetAStatusAndAReason) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto expect = [view = bend()](const PathQuery& query, AreaStatus status,
+  const auto expect = [view = bend()](const PathQuery& query, TraversabilityStatus status,
                                       const std::string& named) {
     const PathCheck check = check_path(*view, query);
     EXPECT_EQ(check.status, status) << named;
     EXPECT_FALSE(check.is_free);
     EXPECT_THAT(check.reason, HasSubstr(named));
   };
-  using enum AreaStatus;
+  using enum TraversabilityStatus;
   expect(path({}), invalid_request, "no poses");
   expect(path({{0, 0}}), invalid_request, "one position and no heading");
   expect(path({{0, 0}, {1, 0}}, {0.0}), invalid_request, "2 positions and 1 headings");

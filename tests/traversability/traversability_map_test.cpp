@@ -69,7 +69,7 @@ TEST_P(TileSides, IncrementalUpdatesEqualAFullOneBitByBit) {
   for (int round = 0; round < 15; ++round) {
     const int edits = 1 + static_cast<int>(random() % 3);
     for (int i = 0; i < edits; ++i) edit(world, random);
-    const MapView map = world.view();
+    const MapSnapshot map = world.view();
     (void)incremental.update(map);
     TraversabilityMap full({square_robot(), tall_robot()});
     (void)full.update(map);
@@ -87,7 +87,7 @@ TEST(TraversabilityMap, CanBeHeldUpBetweenTiles) {
   TraversabilityMap map({square_robot()});
   std::atomic<int> pauses = 0;
   const TraversabilityUpdate update = map.update(world.view(), [&] { ++pauses; });
-  EXPECT_EQ(pauses, update.map_tiles + update.surfaces + update.judged);
+  EXPECT_EQ(pauses, update.map_tiles + update.surfaces + update.classified);
 }
 
 TEST(TraversabilityMap, AChangeReachesOnlyTheNeighboursNearIt) {
@@ -100,7 +100,7 @@ TEST(TraversabilityMap, AChangeReachesOnlyTheNeighboursNearIt) {
   world.block(1.0, 9.0, 1.4, 9.4, 0.3, 2.0, pole);  // near its left edge
   const TraversabilityUpdate work = area.update(world.view());
   EXPECT_EQ(work.surfaces, 2U);
-  EXPECT_EQ(work.judged, 2U);
+  EXPECT_EQ(work.classified, 2U);
 }
 
 TEST(TraversabilityMap, TilesThatGoTakeTheirInfluenceAlong) {
@@ -110,7 +110,7 @@ TEST(TraversabilityMap, TilesThatGoTakeTheirInfluenceAlong) {
   TraversabilityMap incremental({square_robot()});
   (void)incremental.update(world.view());
   world.clear(4.0, 0.0, 8.0, 4.0);  // exactly one tile
-  const MapView map = world.view();
+  const MapSnapshot map = world.view();
   EXPECT_EQ(incremental.update(map).map_tiles, 1U);
   TraversabilityMap full({square_robot()});
   (void)full.update(map);
@@ -128,7 +128,7 @@ TEST(TraversabilityMap, AChangeInsideATileStaysAmongItsNeighbours) {
   const TraversabilityUpdate work = area.update(world.view());
   EXPECT_EQ(work.map_tiles, 1U);
   EXPECT_LE(work.surfaces, 9U);
-  EXPECT_LE(work.judged, 9U);
+  EXPECT_LE(work.classified, 9U);
   std::size_t shared = 0;
   const auto after = area.view("square");
   for (std::size_t i = 0; i < after->tiles.size(); ++i) {
@@ -146,14 +146,14 @@ TEST(TraversabilityMap, NothingIsDoneWhenNothingChanged) {
   (void)area.update(world.view());
   const auto before = area.view("square")->tiles;
   const TraversabilityUpdate work = area.update(world.view());
-  EXPECT_EQ(work.map_tiles + work.surfaces + work.judged, 0U);
+  EXPECT_EQ(work.map_tiles + work.surfaces + work.classified, 0U);
   EXPECT_EQ(area.view("square")->tiles, before);
 }
 
 TEST(TraversabilityMap, AnotherMapSharesNothingWithTheLast) {
   VoxelWorld world;
   world.ground(-4, -4, 4, 4, road);
-  MapView map = world.view();
+  MapSnapshot map = world.view();
   TraversabilityMap area({square_robot()});
   (void)area.update(map);
   map.map_id = 2;
@@ -165,11 +165,11 @@ TEST(TraversabilityMap, SurvivesAnEmptyMapBetweenOthers) {
   VoxelWorld world;
   world.ground(-4, -4, 4, 4, road);
   TraversabilityMap area({square_robot()});
-  (void)area.update(MapView{});
+  (void)area.update(MapSnapshot{});
   EXPECT_TRUE(area.view("square")->tiles.empty());
   (void)area.update(world.view());
   EXPECT_FALSE(area.view("square")->tiles.empty());
-  (void)area.update(MapView{});
+  (void)area.update(MapSnapshot{});
   EXPECT_TRUE(area.view("square")->tiles.empty());
 }
 
@@ -188,7 +188,7 @@ TEST(TraversabilityMap, OldViewsStayAsTheyWere) {
 TEST(TraversabilityMap, VoxelsThatCannotBeAreLeftOut) {
   VoxelWorld world;
   world.ground(-4, -4, 4, 4, road);
-  MapView map = world.view();
+  MapSnapshot map = world.view();
   Tile broken = *map.tiles.front();
   broken.voxels[5].mean_map.z() = std::numeric_limits<float>::quiet_NaN();
   broken.voxels[9].index.x = 60'000;
@@ -205,7 +205,7 @@ TEST(TraversabilityMap, RefusesWhatItCannotWorkWith) {
   EXPECT_THROW(TraversabilityMap({square_robot(), square_robot()}), std::invalid_argument);
   VoxelWorld world;
   world.ground(-4, -4, 4, 4, road);
-  MapView map = world.view();
+  MapSnapshot map = world.view();
   map.voxel_size_m = 0.3;
   TraversabilityMap area({square_robot()});
   EXPECT_THROW((void)area.update(map), std::invalid_argument);

@@ -7,16 +7,16 @@
 #include <limits>
 
 #include "core/map/query/region_shape.hpp"
-#include "core/traversability/traversability_summary.hpp"
 #include "core/traversability/traversability_answer_view.hpp"
+#include "core/traversability/traversability_summary.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
 namespace stillmap {
 namespace {
 
 using enum SemanticClass;
-using test::area_of;
 using test::square_robot;
+using test::traversability_of;
 using test::VoxelWorld;
 using ::testing::HasSubstr;
 
@@ -27,11 +27,11 @@ std::shared_ptr<const TraversabilityView> area() {
   VoxelWorld world;
   world.ground(-8, -8, 8, 6, road);
   world.block(0, 0, 2, 2, 0.3, 2.0, building);
-  return area_of(world.view(), square_robot());
+  return traversability_of(world.view(), square_robot());
 }
 
-AreaQuery of(const Region& region) {
-  AreaQuery query;
+TraversabilityQuery of(const Region& region) {
+  TraversabilityQuery query;
   query.region = region;
   return query;
 }
@@ -48,14 +48,14 @@ PolygonRegion star() {
   return polygon;
 }
 
-TEST(AreaQuery, EveryCellOfARegionIsTheViewsAndNoOther) {
+TEST(TraversabilityQuery, EveryCellOfARegionIsTheViewsAndNoOther) {
   const auto view = area();
   for (const Region& region :
        {Region(star()), Region(SphereRegion{.centre_map = {1, -2, 30}, .radius_m = 5.5}),
         Region(CorridorRegion{
             .path_map = {{-7, -7}, {0, 0}, {7, -5}}, .half_width_m = 1.3, .heights = {}})}) {
-    const AreaAnswer answer = answer_area(*view, of(region));
-    ASSERT_EQ(answer.grid.status, AreaStatus::ok) << answer.grid.reason;
+    const TraversabilityAnswer answer = query_traversability(*view, of(region));
+    ASSERT_EQ(answer.grid.status, TraversabilityStatus::ok) << answer.grid.reason;
     const RegionShape shape(region);
     const double level_m = 0.5 * (shape.bounds_map().min().z() + shape.bounds_map().max().z());
     CellLookup lookup(*view);
@@ -81,8 +81,8 @@ TEST(AreaQuery, EveryCellOfARegionIsTheViewsAndNoOther) {
   }
 }
 
-TEST(AreaQuery, TellsTheGroundWhereItIsKnown) {
-  const AreaAnswer answer = answer_area(*area(), {});
+TEST(TraversabilityQuery, TellsTheGroundWhereItIsKnown) {
+  const TraversabilityAnswer answer = query_traversability(*area(), {});
   const auto at = [&](double x_m, double y_m) {
     return answer.cells[static_cast<std::size_t>((y_m + 8) / 0.2) * answer.grid.width +
                         static_cast<std::size_t>((x_m + 8) / 0.2)];
@@ -90,62 +90,62 @@ TEST(AreaQuery, TellsTheGroundWhereItIsKnown) {
   EXPECT_NEAR(at(-5.1, -5.1).ground_z_m, 0.1, 0.1);
   EXPECT_TRUE(std::isnan(at(1.1, 7.1).ground_z_m));
   EXPECT_EQ(at(1.1, 1.1).reason, BlockReason::obstacle);
-  EXPECT_EQ(at(2.3, 1.1).reason, BlockReason::inflation);
+  EXPECT_EQ(at(2.3, 1.1).reason, BlockReason::inscribed);
   EXPECT_EQ(answer.grid.map_version, area()->version);
 }
 
-TEST(AreaQuery, GivesOutlinesAloneWhenOnlyThoseAreWanted) {
-  AreaQuery query;
-  query.wants_grid = false;
-  query.wants_outlines = true;
-  const AreaAnswer answer = answer_area(*area(), query);
+TEST(TraversabilityQuery, GivesOutlinesAloneWhenOnlyThoseAreWanted) {
+  TraversabilityQuery query;
+  query.include_grid = false;
+  query.include_outlines = true;
+  const TraversabilityAnswer answer = query_traversability(*area(), query);
   ASSERT_EQ(answer.outlines.size(), 1U);
   EXPECT_EQ(answer.outlines[0].holes.size(), 1U);
   EXPECT_TRUE(answer.grid.data.empty());
   EXPECT_TRUE(answer.cells.empty());
   query.min_outline_area_m2 = 1e4;
-  EXPECT_TRUE(answer_area(*area(), query).outlines.empty());
+  EXPECT_TRUE(query_traversability(*area(), query).outlines.empty());
 }
 
-TEST(AreaQuery, HostileQueriesGetAStatusAndAReason) {
-  const auto expect = [view = area()](const AreaQuery& query, AreaStatus status,
+TEST(TraversabilityQuery, HostileQueriesGetAStatusAndAReason) {
+  const auto expect = [view = area()](const TraversabilityQuery& query, TraversabilityStatus status,
                                       const std::string& named) {
-    const AreaAnswer answer = answer_area(*view, query);
+    const TraversabilityAnswer answer = query_traversability(*view, query);
     EXPECT_EQ(answer.grid.status, status) << named;
     EXPECT_THAT(answer.grid.reason, HasSubstr(named));
     EXPECT_TRUE(answer.cells.empty());
   };
   expect(of(PolygonRegion{.corners_map = {{0, 0}, {9, 9}, {9, 0}, {0, 9}}, .heights = {}}),
-         AreaStatus::invalid_request, "polygon edges 0");
-  expect(of(CorridorRegion{}), AreaStatus::invalid_request, "corridor path has 0 points");
-  expect(of(SphereRegion{.centre_map = {nan, 0, 0}, .radius_m = 1}), AreaStatus::invalid_request,
-         "sphere centre");
+         TraversabilityStatus::invalid_request, "polygon edges 0");
+  expect(of(CorridorRegion{}), TraversabilityStatus::invalid_request, "corridor path has 0 points");
+  expect(of(SphereRegion{.centre_map = {nan, 0, 0}, .radius_m = 1}),
+         TraversabilityStatus::invalid_request, "sphere centre");
   BoxRegion box;
   box.box_map = {Eigen::Vector3d::Constant(-1e9), Eigen::Vector3d::Constant(1e9)};
-  expect(of(box), AreaStatus::invalid_request, "box x");
-  expect(of(SphereRegion{.centre_map = {900, 0, 0}, .radius_m = 1}), AreaStatus::not_found,
-         "outside the map");
-  AreaQuery query;
+  expect(of(box), TraversabilityStatus::invalid_request, "box x");
+  expect(of(SphereRegion{.centre_map = {900, 0, 0}, .radius_m = 1}),
+         TraversabilityStatus::not_found, "outside the map");
+  TraversabilityQuery query;
   query.max_cells = 10;
-  expect(query, AreaStatus::too_large, "at most 10");
+  expect(query, TraversabilityStatus::too_large, "at most 10");
   query.max_cells = 0;
-  expect(query, AreaStatus::invalid_request, "max_cells is 0");
+  expect(query, TraversabilityStatus::invalid_request, "max_cells is 0");
   query = {};
-  query.wants_grid = false;
-  expect(query, AreaStatus::invalid_request, "neither grid nor outlines");
+  query.include_grid = false;
+  expect(query, TraversabilityStatus::invalid_request, "neither grid nor outlines");
   query = {};
   query.min_outline_area_m2 = nan;
-  expect(query, AreaStatus::invalid_request, "min_outline_area_m2");
+  expect(query, TraversabilityStatus::invalid_request, "min_outline_area_m2");
 }
 
-TEST(AreaView, AnswersAsTheAnswerThatItWasMadeFrom) {
-  const AreaAnswer answer = answer_area(*area(), of(star()));
-  const TraversabilityView view = area_view(answer, square_robot());
+TEST(TraversabilityAnswerView, AnswersAsTheAnswerThatItWasMadeFrom) {
+  const TraversabilityAnswer answer = query_traversability(*area(), of(star()));
+  const TraversabilityView view = view_of_answer(answer, square_robot());
   BoxRegion box;
   box.box_map.min().head<2>() = answer.grid.origin_map;
   box.box_map.max().head<2>() =
       answer.grid.origin_map + 0.2 * Eigen::Vector2d(answer.grid.width, answer.grid.height);
-  const AreaAnswer again = answer_area(view, of(box));
+  const TraversabilityAnswer again = query_traversability(view, of(box));
   EXPECT_EQ(again.grid.data, answer.grid.data);
   EXPECT_EQ(again.grid.origin_map, answer.grid.origin_map);
   ASSERT_EQ(again.cells.size(), answer.cells.size());

@@ -17,17 +17,17 @@ std::shared_ptr<const TraversabilityView> area() {
   world.ground(-4, -4, 4, 4, road);
   world.block(0, 0, 0.2, 0.2, 0.3, 2.0, pole);
   world.clear(2.0, 2.0, 2.4, 2.4);  // inferred
-  return test::area_of(world.view(), test::square_robot());
+  return test::traversability_of(world.view(), test::square_robot());
 }
 
 bool is_pole(const Eigen::Vector3d& p_map) {
   return p_map.x() > 0.0 && p_map.x() < 0.2 && p_map.y() > 0.0 && p_map.y() < 0.2;
 }
 
-TrueCell truly(BlockReason reason) { return {reason, false, false}; }
+CellTruth truly(BlockReason reason) { return {reason, false, false}; }
 
-TEST(AreaScore, IsPerfectWhereTheTruthIsTheSame) {
-  const AreaScore score = score_area(*area(), [](const Eigen::Vector3d& p_map) {
+TEST(TraversabilityScore, IsPerfectWhereTheTruthIsTheSame) {
+  const TraversabilityScore score = score_traversability(*area(), [](const Eigen::Vector3d& p_map) {
     return truly(is_pole(p_map) ? BlockReason::obstacle : BlockReason::none);
   });
   EXPECT_EQ(score.lethal_and_truly_lethal, 1U);
@@ -36,11 +36,11 @@ TEST(AreaScore, IsPerfectWhereTheTruthIsTheSame) {
   EXPECT_EQ(score.recall(), 1.0);
 }
 
-TEST(AreaScore, EveryFalseFreeCellHasOneCause) {
-  const AreaScore score = score_area(*area(), [](const Eigen::Vector3d& p_map) {
-    if (p_map.y() > 3.0) return TrueCell{BlockReason::obstacle, true, false};
+TEST(TraversabilityScore, EveryFalseFreeCellHasOneCause) {
+  const TraversabilityScore score = score_traversability(*area(), [](const Eigen::Vector3d& p_map) {
+    if (p_map.y() > 3.0) return CellTruth{BlockReason::obstacle, true, false};
     if (p_map.y() > 2.0) return truly(BlockReason::obstacle);
-    if (p_map.y() > 1.0) return TrueCell{BlockReason::ground_class, false, true};
+    if (p_map.y() > 1.0) return CellTruth{BlockReason::ground_class, false, true};
     if (p_map.y() > 0.2) return truly(BlockReason::ground_class);
     return truly(BlockReason::none);
   });
@@ -60,10 +60,10 @@ TEST(AreaScore, EveryFalseFreeCellHasOneCause) {
   EXPECT_DOUBLE_EQ(*score.recall(), free / (free + 1.0));
 }
 
-TEST(AreaScore, NothingSeenHasNoScore) {
-  const auto nothing = test::area_of(MapView{}, test::square_robot());
-  const AreaScore score =
-      score_area(*nothing, [](const Eigen::Vector3d&) { return truly(BlockReason::none); });
+TEST(TraversabilityScore, NothingSeenHasNoScore) {
+  const auto nothing = test::traversability_of(MapSnapshot{}, test::square_robot());
+  const TraversabilityScore score = score_traversability(
+      *nothing, [](const Eigen::Vector3d&) { return truly(BlockReason::none); });
   EXPECT_EQ(score.precision(true), std::nullopt);
   EXPECT_EQ(score.recall(), std::nullopt);
 }

@@ -25,7 +25,7 @@ void set(OccupancyGrid& grid, std::uint32_t x0, std::uint32_t y0, std::uint32_t 
   }
 }
 
-TEST(AreaOutline, ASquareWithAHole) {
+TEST(TraversableOutline, ASquareWithAHole) {
   OccupancyGrid grid = grid_of(20, 20, -1);
   set(grid, 2, 2, 18, 18, 0);
   set(grid, 8, 8, 11, 11, 100);
@@ -41,18 +41,18 @@ TEST(AreaOutline, ASquareWithAHole) {
   EXPECT_EQ(bounds.min(), Eigen::Vector2d(-10.0 + 2.5 * 0.5, 5.0 + 2.5 * 0.5));
 }
 
-TEST(AreaOutline, CellsOfTheSafetyMarginAreOutside) {
+TEST(TraversableOutline, CellsOfTheSafetyMarginAreOutside) {
   OccupancyGrid grid = grid_of(20, 20, 0);
-  set(grid, 10, 0, 20, 20, occupancy_inflated);
+  set(grid, 10, 0, 20, 20, occupancy_inscribed);
   const auto polygons = free_outlines(grid);
   ASSERT_EQ(polygons.size(), 1U);
   for (const Eigen::Vector2d& corner : polygons[0].outer) EXPECT_LT(corner.x(), -5.0);
 }
 
 /// Draws the polygons back onto a grid.
-cv::Mat1b drawn(const std::vector<AreaPolygon>& polygons, const OccupancyGrid& grid) {
+cv::Mat1b drawn(const std::vector<TraversablePolygon>& polygons, const OccupancyGrid& grid) {
   cv::Mat1b image(static_cast<int>(grid.height), static_cast<int>(grid.width), std::uint8_t{0});
-  const auto cells = [&](const AreaRing& ring) {
+  const auto cells = [&](const TraversableRing& ring) {
     std::vector<cv::Point> points;
     for (const Eigen::Vector2d& p_map : ring) {
       const Eigen::Vector2d cell = (p_map - grid.origin_map) / grid.resolution_m;
@@ -60,15 +60,15 @@ cv::Mat1b drawn(const std::vector<AreaPolygon>& polygons, const OccupancyGrid& g
     }
     return points;
   };
-  for (const AreaPolygon& polygon : polygons) {
+  for (const TraversablePolygon& polygon : polygons) {
     std::vector<std::vector<cv::Point>> rings{cells(polygon.outer)};
-    for (const AreaRing& hole : polygon.holes) rings.push_back(cells(hole));
+    for (const TraversableRing& hole : polygon.holes) rings.push_back(cells(hole));
     cv::fillPoly(image, rings, cv::Scalar(255));
   }
   return image;
 }
 
-TEST(AreaOutline, NothingThatIsNotFreeIsInside) {
+TEST(TraversableOutline, NothingThatIsNotFreeIsInside) {
   std::mt19937 random(4);
   OccupancyGrid grid = grid_of(80, 60, 0);
   for (int i = 0; i < 40; ++i) {
@@ -92,7 +92,7 @@ TEST(AreaOutline, NothingThatIsNotFreeIsInside) {
   EXPECT_LT(missed, 20);  // single cells in corners
 }
 
-TEST(AreaOutline, TheLargestPieceComesFirstAndSpecksAreLeftOut) {
+TEST(TraversableOutline, TheLargestPieceComesFirstAndSpecksAreLeftOut) {
   OccupancyGrid grid = grid_of(40, 20, -1);
   set(grid, 1, 1, 4, 4, 0);
   set(grid, 10, 1, 30, 15, 0);
@@ -102,7 +102,7 @@ TEST(AreaOutline, TheLargestPieceComesFirstAndSpecksAreLeftOut) {
   EXPECT_GT(area_m2(polygons[0]), area_m2(polygons[1]));
 }
 
-TEST(AreaOutline, OfNothingIsNothing) {
+TEST(TraversableOutline, OfNothingIsNothing) {
   EXPECT_TRUE(free_outlines(OccupancyGrid{}).empty());
   EXPECT_TRUE(free_outlines(grid_of(10, 10, 100)).empty());
 }

@@ -54,7 +54,7 @@ void VoxelWorld::clear(double x0, double y0, double x1, double y1) {
   for_cells(x0, y0, x1, y1, [&](int x, int y) { columns_.erase({x, y}); });
 }
 
-MapView VoxelWorld::view() {
+MapSnapshot VoxelWorld::view() {
   ++version_;
   std::map<TileId, std::vector<Voxel>> voxels;
   for (const auto& [cell, column] : columns_) {
@@ -62,7 +62,7 @@ MapView VoxelWorld::view() {
       voxels[{floor_divide(cell.first, side_), floor_divide(cell.second, side_)}].push_back(voxel);
     }
   }
-  MapView map;
+  MapSnapshot map;
   map.version = version_;
   map.map_id = 1;
   map.tile_size_m = side_ * cell_m;
@@ -94,7 +94,8 @@ RobotProfile square_robot() {
   return robot;
 }
 
-std::shared_ptr<const TraversabilityView> area_of(const MapView& map, const RobotProfile& profile) {
+std::shared_ptr<const TraversabilityView> traversability_of(const MapSnapshot& map,
+                                                            const RobotProfile& profile) {
   TraversabilityMap area({profile});
   (void)area.update(map);
   return area.view(profile.name);

@@ -32,7 +32,7 @@ class VoxelWorld {
   void clear(double x0, double y0, double x1, double y1);
 
   /// The map as it is now. Tiles that changed since the last call have a new revision.
-  [[nodiscard]] MapView view();
+  [[nodiscard]] MapSnapshot view();
 
   static double flat(double, double) { return 0.1; }
 
@@ -51,8 +51,8 @@ class VoxelWorld {
 [[nodiscard]] RobotProfile square_robot();
 
 /// The area of one robot on a map.
-[[nodiscard]] std::shared_ptr<const TraversabilityView> area_of(const MapView& map,
-                                                                const RobotProfile& profile);
+[[nodiscard]] std::shared_ptr<const TraversabilityView> traversability_of(
+    const MapSnapshot& map, const RobotProfile& profile);
 
 /// What is at a place; a cell that is not there is unknown.
 [[nodiscard]] CellLookup::Found look(const TraversabilityView& view, double x_m, double y_m);

@@ -1,15 +1,15 @@
 #include "clients/commands/arguments/client_arguments.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 std::chrono::milliseconds ClientArguments::timeout() const {
   return std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * timeout_s));
 }
 
-DdsOptions ClientArguments::dds(DdsRole role) const {
-  DdsChoice choice = network;
+dds::DdsOptions ClientArguments::dds(DdsRole role) const {
+  DdsNetworkConfig choice = network;
   if (udp_only) choice.shared_memory = false;
-  DdsOptions options = dds_options(choice, role);
+  dds::DdsOptions options = dds_options(choice, role);
   options.domain_id = domain;
   options.security = security;
   return options;
@@ -19,7 +19,7 @@ ClientOptions ClientArguments::client() const {
   return {.dds = dds(DdsRole::client), .server_name = server_name, .request_timeout = timeout()};
 }
 
-void add_network_options(CommandHandle command, DdsChoice& network) {
+void add_network_options(CommandHandle command, DdsNetworkConfig& network) {
   command
       .option("--dds-profile", network.profile,
               "Kind of network: host, lan, wifi, wan, "
@@ -69,4 +69,4 @@ Client connect(const ClientArguments& arguments) {
   return client;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -1,6 +1,6 @@
 #include "clients/commands/arguments/engine_arguments.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 void add_engine_options(CommandHandle command, EngineArguments& arguments) {
   command
@@ -15,16 +15,16 @@ void add_engine_options(CommandHandle command, EngineArguments& arguments) {
       .between(0, 1024);
 }
 
-void set_engine(const EngineArguments& arguments, EngineChoice& choice) {
-  using Engine = EngineChoice::Engine;
-  using Numbers = EngineChoice::Numbers;
+void set_engine(const EngineArguments& arguments, EngineOptions& choice) {
+  using Engine = EngineOptions::Engine;
+  using PrecisionMode = EngineOptions::PrecisionMode;
   if (arguments.engine == "auto") choice.engine = Engine::automatic;
   if (arguments.engine == "onednn") choice.engine = Engine::onednn;
   if (arguments.engine == "opencv") choice.engine = Engine::opencv;
-  if (arguments.precision == "auto") choice.precision = Numbers::automatic;
-  if (arguments.precision == "fp32") choice.precision = Numbers::fp32;
-  if (arguments.precision == "int8") choice.precision = Numbers::int8;
+  if (arguments.precision == "auto") choice.precision = PrecisionMode::automatic;
+  if (arguments.precision == "fp32") choice.precision = PrecisionMode::fp32;
+  if (arguments.precision == "int8") choice.precision = PrecisionMode::int8;
   if (arguments.threads > 0) choice.threads = static_cast<int>(arguments.threads);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

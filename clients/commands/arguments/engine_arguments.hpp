@@ -6,7 +6,7 @@
 #include "clients/terminal/command_line.hpp"
 #include "core/segmentation/open_network.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// How a command line says what runs a network; empty: as configured.
 struct EngineArguments {
@@ -20,6 +20,6 @@ struct EngineArguments {
 void add_engine_options(CommandHandle command, EngineArguments& arguments);
 
 /// Puts what the command line says in place of `choice`.
-void set_engine(const EngineArguments& arguments, EngineChoice& choice);
+void set_engine(const EngineArguments& arguments, EngineOptions& choice);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,7 +6,7 @@
 #include "config/loaders/sensor_file.hpp"
 #include "config/loaders/server_config.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 void add_segmentation_options(CommandHandle command, MapperArguments& arguments) {
   command
@@ -14,7 +14,7 @@ void add_segmentation_options(CommandHandle command, MapperArguments& arguments)
           "--columns", arguments.columns,
           "Columns of the range image of a model that runs; default: as configured, else as the "
           "model says")
-      .between(least_image_columns, most_image_columns);
+      .between(min_image_columns, max_image_columns);
   add_engine_options(command, arguments.engine);
 }
 
@@ -59,29 +59,29 @@ MapperConfig mapper_config(const MapperArguments& arguments, const SensorModel& 
   return config;
 }
 
-std::unique_ptr<LabelSource> label_source(const MapperArguments& arguments,
-                                          const ScanDataset& dataset) {
+std::unique_ptr<Segmenter> label_source(const MapperArguments& arguments,
+                                        const ScanDataset& dataset) {
   LabelsConfig labels;
   if (!arguments.config_file.empty()) labels = load_server_config(arguments.config_file).labels;
   if (arguments.labels == "none") {
-    labels.source = LabelOrigin::none;
+    labels.source = LabelProvider::none;
   } else if (arguments.labels == "files") {
     if (!dataset.has_labels(0)) {
       throw std::invalid_argument(dataset.file(0).string() +
                                   " has no labels: use --labels model or none");
     }
-    labels.source = LabelOrigin::stream;
+    labels.source = LabelProvider::stream;
   } else if (arguments.labels == "model") {
-    labels.source = LabelOrigin::model;
+    labels.source = LabelProvider::model;
   } else if (arguments.labels != "auto") {
-    labels.source = LabelOrigin::model;
+    labels.source = LabelProvider::model;
     labels.model = arguments.labels;
-  } else if (labels.source == LabelOrigin::automatic) {
-    labels.source = dataset.has_labels(0) ? LabelOrigin::stream : LabelOrigin::model;
+  } else if (labels.source == LabelProvider::automatic) {
+    labels.source = dataset.has_labels(0) ? LabelProvider::stream : LabelProvider::model;
   }
   if (arguments.columns > 0) labels.image_columns = static_cast<int>(arguments.columns);
   set_engine(arguments.engine, labels.engine);
-  return open_label_source(labels, mapper_config(arguments, dataset.suggested_sensor()).sensor);
+  return open_segmenter(labels, mapper_config(arguments, dataset.suggested_sensor()).sensor);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

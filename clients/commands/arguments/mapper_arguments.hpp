@@ -8,7 +8,7 @@
 #include "core/dataset/scan_dataset.hpp"
 #include "core/mapper.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// How a command line asks for a mapper.
 struct MapperArguments {
@@ -36,7 +36,7 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments);
 [[nodiscard]] MapperConfig mapper_config(const MapperArguments& arguments,
                                          const SensorModel& suggested_sensor);
 /// Throws ConfigError, ModelError or std::invalid_argument.
-[[nodiscard]] std::unique_ptr<LabelSource> label_source(const MapperArguments& arguments,
-                                                        const ScanDataset& dataset);
+[[nodiscard]] std::unique_ptr<Segmenter> label_source(const MapperArguments& arguments,
+                                                      const ScanDataset& dataset);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

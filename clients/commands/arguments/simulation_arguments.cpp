@@ -6,10 +6,10 @@
 
 #include "config/loaders/sensor_file.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
-void scale(TrafficPlan& traffic, double factor) {
+void scale(simulation::TrafficPlan& traffic, double factor) {
   traffic.vehicles_per_km *= factor;
   traffic.cyclists_per_km *= factor;
   traffic.pedestrians_per_km *= factor;
@@ -29,15 +29,15 @@ std::optional<double> number_in(const std::string& text) {
   return std::nullopt;
 }
 
-CityPlan plan_of(const SimulationArguments& arguments) {
-  if (arguments.traffic.empty()) return city_plan(arguments.preset);
+simulation::CityPlan plan_of(const SimulationArguments& arguments) {
+  if (arguments.traffic.empty()) return simulation::city_plan(arguments.preset);
   const std::optional<double> factor = number_in(arguments.traffic);
-  if (!factor) return city_plan(arguments.traffic);
+  if (!factor) return simulation::city_plan(arguments.traffic);
   if (!(*factor >= 0.0 && *factor <= 10.0)) {
     throw std::invalid_argument("traffic '" + arguments.traffic +
                                 "' is not a factor from 0 to 10 or the name of a preset");
   }
-  CityPlan plan = city_plan(arguments.preset);
+  simulation::CityPlan plan = simulation::city_plan(arguments.preset);
   scale(plan.traffic, *factor);
   return plan;
 }
@@ -60,9 +60,9 @@ void check_seed(const std::string& option, std::uint64_t seed) {
                               std::to_string(last_seed));
 }
 
-SimulationConfig simulation_config(const SimulationArguments& arguments) {
+simulation::SimulationConfig simulation_config(const SimulationArguments& arguments) {
   check_seed("--seed", arguments.seed);
-  SimulationConfig config;
+  simulation::SimulationConfig config;
   config.plan = plan_of(arguments);
   config.seed = arguments.seed;
   config.sensor = load_sensor(sensor_name(arguments.sensor));
@@ -74,4 +74,4 @@ SimulationConfig simulation_config(const SimulationArguments& arguments) {
   return config;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -5,7 +5,7 @@
 
 #include "core/simulation/simulation.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// How a command line asks for a simulated drive.
 struct SimulationArguments {
@@ -23,6 +23,6 @@ struct SimulationArguments {
 void check_seed(const std::string& option, std::uint64_t seed);
 
 /// Throws std::invalid_argument or ConfigError naming the value.
-[[nodiscard]] SimulationConfig simulation_config(const SimulationArguments& arguments);
+[[nodiscard]] simulation::SimulationConfig simulation_config(const SimulationArguments& arguments);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -8,7 +8,7 @@
 #include "clients/terminal/stop_signal.hpp"
 #include "core/dataset/scan_merge.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -93,4 +93,4 @@ void add_dataset_aggregate_command(CommandHandle dataset, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -1,6 +1,6 @@
 #include "clients/commands/command.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 void add_dataset_command(CommandHandle program, Action& action) {
   CommandHandle dataset = program.command("dataset",
@@ -21,4 +21,4 @@ void add_dataset_command(CommandHandle program, Action& action) {
       "'stillmap dataset STEP --help' shows options and examples.");
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,14 +4,14 @@
 #include <stdexcept>
 
 #include "clients/commands/arguments/client_arguments.hpp"
+#include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/live_export.hpp"
-#include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/dataset/sequence_export.hpp"
 #include "clients/terminal/progress.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 constexpr std::string_view topic_prefix = "topic:";
@@ -55,8 +55,8 @@ std::string describe(const Arguments& arguments, const ExportSummary& summary) {
   return text;
 }
 
-ExportSummary export_from_recording(const Arguments& arguments, StopSignal& stop) {
-  const ScanDataset dataset = open_recording(arguments.source, arguments.topic_in);
+ExportSummary export_from_dataset(const Arguments& arguments, StopSignal& stop) {
+  const ScanDataset dataset = dds::open_sequence(arguments.source, arguments.topic_in);
   std::error_code ignored;
   if (std::filesystem::equivalent(arguments.source, arguments.out, ignored)) {
     throw std::invalid_argument(arguments.out + " is the recording itself; name another folder");
@@ -66,7 +66,7 @@ ExportSummary export_from_recording(const Arguments& arguments, StopSignal& stop
   auto labels = label_source(arguments.mapper, dataset);
   prepare_sequence_folder(arguments.out, arguments.force);
   Progress progress("export", "scans", total);
-  return export_recording(
+  return export_sequence(
       dataset, arguments.range, config, std::move(labels), arguments.out,
       [&](std::size_t seen) {
         progress.update(seen);
@@ -101,7 +101,7 @@ ExitCode run(const Arguments& arguments) {
   StopSignal stop;
   const ExportSummary summary = arguments.source.starts_with(topic_prefix)
                                     ? export_from_topic(arguments, stop)
-                                    : export_from_recording(arguments, stop);
+                                    : export_from_dataset(arguments, stop);
   std::cout << (arguments.json ? to_json(arguments, summary).dump(2) + "\n"
                                : describe(arguments, summary));
   if (summary.stopped) {
@@ -154,4 +154,4 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

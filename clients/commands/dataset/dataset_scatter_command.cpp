@@ -6,7 +6,7 @@
 #include "clients/terminal/progress.hpp"
 #include "core/dataset/label_scatter.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -72,4 +72,4 @@ void add_dataset_scatter_command(CommandHandle dataset, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

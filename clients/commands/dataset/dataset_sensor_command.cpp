@@ -7,7 +7,7 @@
 #include "config/loaders/sensor_file.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -17,7 +17,8 @@ struct Arguments {
 };
 
 ExitCode run(const Arguments& arguments) {
-  const SensorModel sensor = open_recording(arguments.dataset, arguments.topic).suggested_sensor();
+  const SensorModel sensor =
+      dds::open_sequence(arguments.dataset, arguments.topic).suggested_sensor();
   constexpr double degree = std::numbers::pi / 180.0;
   std::cout << sensor.name << ": " << sensor.rings << " rings from "
             << fixed(sensor.fov_up / degree, 2) << " to " << fixed(sensor.fov_down / degree, 2)
@@ -35,7 +36,7 @@ void add_dataset_sensor_command(CommandHandle dataset, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   CommandHandle command =
       dataset.command("sensor", "Find out from a recording which sensor it is of");
-  command.option("DATASET", arguments->dataset, recording_kinds).required();
+  command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic, topic_in_help);
   command.option("--out", arguments->out, "Write a sensor file (YAML) for the server");
   command.explain(
@@ -47,4 +48,4 @@ void add_dataset_sensor_command(CommandHandle dataset, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,16 +6,16 @@
 
 #include "clients/commands/dataset/live_scan_synchronizer.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds poll_period{20};
 /// How long poses and labels of the last scans may be under way.
-constexpr std::chrono::milliseconds last_news{1000};
+constexpr std::chrono::milliseconds drain_time{1000};
 
-wire::CloudReading reading_of(const ServerConfig& config) {
+wire::CloudReadOptions reading_of(const ServerConfig& config) {
   const PointFieldNames& names = config.input.fields;
   return {.fields = {.intensity = names.intensity,
                      .ring = names.ring,
@@ -52,12 +52,12 @@ class LiveInput {
   void stop_listening() { points_.end(); }
 
  private:
-  [[nodiscard]] std::pair<std::unique_lock<std::mutex>, LiveScans&> locked() {
+  [[nodiscard]] std::pair<std::unique_lock<std::mutex>, LiveScanSynchronizer&> locked() {
     return {std::unique_lock(mutex_), scans_};
   }
 
   std::mutex mutex_;
-  LiveScans scans_;
+  LiveScanSynchronizer scans_;
   std::optional<Clock::time_point> last_scan_;
   // Last: end before what they use is gone.
   Subscription poses_;
@@ -65,9 +65,9 @@ class LiveInput {
   Subscription points_;
 };
 
-class LiveExport {
+class LiveExporter {
  public:
-  LiveExport(const ServerConfig& config, const std::filesystem::path& folder)
+  LiveExporter(const ServerConfig& config, const std::filesystem::path& folder)
       : prepare_(config.mapper.prepare), output_(folder) {}
 
   void write(const LiveScan& live) {
@@ -110,7 +110,7 @@ class LiveExport {
 ExportSummary export_live(Client& client, const LiveExportOptions& options,
                           const ServerConfig& config, const std::filesystem::path& folder,
                           StopSignal& stop, const std::function<void(std::size_t)>& scan_done) {
-  LiveExport output(config, folder);
+  LiveExporter output(config, folder);
   LiveInput input(client, options.topic, config);
   bool stopped = false;
   while (!stopped && output.scans() < options.scans && !input.silent_for(options.silence)) {
@@ -122,10 +122,10 @@ ExportSummary export_live(Client& client, const LiveExportOptions& options,
   }
   if (output.scans() < options.scans) {
     input.stop_listening();
-    (void)stop.wait_for(last_news);
+    (void)stop.wait_for(drain_time);
     while (const auto live = input.take_last()) output.write(*live);
   }
   return output.finish(input.without_pose());
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,12 +6,12 @@
 #include <functional>
 #include <string>
 
-#include "clients/library/client.hpp"
 #include "clients/commands/dataset/sequence_output.hpp"
+#include "clients/library/client.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "config/loaders/server_config.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 struct LiveExportOptions {
   /// ROS 2 name of the sensor's topic.
@@ -31,4 +31,4 @@ struct LiveExportOptions {
                                         const std::filesystem::path& folder, StopSignal& stop,
                                         const std::function<void(std::size_t)>& scan_done);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "core/lidar/scan.hpp"
-#include "core/odometry/trajectory.hpp"
+#include "core/lidar/trajectory.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// A scan of the sensor with what the server made of it.
 struct LiveScan {
@@ -21,7 +21,7 @@ struct LiveScan {
 };
 
 /// Brings together by their stamps what arrives on three topics: scans, poses, labels.
-class LiveScans {
+class LiveScanSynchronizer {
  public:
   void add_scan(const Scan& scan);
   void add_pose(const StampedPose& pose);
@@ -37,9 +37,9 @@ class LiveScans {
 
  private:
   /// Poses of so many later scans say that a scan's labels are lost: they are sent best effort.
-  static constexpr std::size_t labels_patience = 10;
+  static constexpr std::size_t max_label_delay_scans = 10;
   /// More scans do not wait for a server that is gone.
-  static constexpr std::size_t most_waiting = 200;
+  static constexpr std::size_t max_waiting = 200;
 
   [[nodiscard]] std::optional<LiveScan> take_if(bool all_arrived);
 
@@ -49,4 +49,4 @@ class LiveScans {
   std::size_t without_pose_ = 0;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,14 +4,14 @@
 
 #include "core/dataset/dataset_error.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
-class RecordingExport {
+class SequenceExporter {
  public:
-  RecordingExport(const ScanDataset& dataset, bool strict, const MapperConfig& config,
-                  std::unique_ptr<LabelSource> labels, const std::filesystem::path& folder,
-                  const ScanSkipped& scan_skipped)
+  SequenceExporter(const ScanDataset& dataset, bool strict, const MapperConfig& config,
+                   std::unique_ptr<Segmenter> labels, const std::filesystem::path& folder,
+                   const ScanSkipped& scan_skipped)
       : dataset_(dataset),
         strict_(strict),
         scan_skipped_(scan_skipped),
@@ -74,18 +74,18 @@ class RecordingExport {
 
 }  // namespace
 
-ExportSummary export_recording(const ScanDataset& dataset, const ScanRange& range,
-                               const MapperConfig& config, std::unique_ptr<LabelSource> labels,
-                               const std::filesystem::path& folder, const ScanDone& scan_done,
-                               const ScanSkipped& scan_skipped) {
+ExportSummary export_sequence(const ScanDataset& dataset, const ScanRange& range,
+                              const MapperConfig& config, std::unique_ptr<Segmenter> labels,
+                              const std::filesystem::path& folder, const ScanDone& scan_done,
+                              const ScanSkipped& scan_skipped) {
   const std::size_t end = range.end(dataset);
-  RecordingExport run(dataset, range.strict, config, std::move(labels), folder, scan_skipped);
-  bool go_on = true;
-  for (std::size_t index = range.first; index < end && go_on; ++index) {
+  SequenceExporter run(dataset, range.strict, config, std::move(labels), folder, scan_skipped);
+  bool keep_running = true;
+  for (std::size_t index = range.first; index < end && keep_running; ++index) {
     run.export_scan(index);
-    go_on = scan_done(index + 1 - range.first);
+    keep_running = scan_done(index + 1 - range.first);
   }
-  return run.finish(!go_on);
+  return run.finish(!keep_running);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,7 +4,7 @@
 #include <array>
 #include <stdexcept>
 
-namespace stillmap {
+namespace stillmap::cli {
 
 void prepare_sequence_folder(const std::filesystem::path& folder, bool force) {
   constexpr std::array parts{"velodyne",  "labels",       "labels.bak",
@@ -46,4 +46,4 @@ ExportSummary SequenceOutput::finish() const {
   return summary_;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

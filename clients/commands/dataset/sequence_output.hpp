@@ -10,7 +10,7 @@
 #include "core/dataset/kitti_sequence_writer.hpp"
 #include "core/lidar/prepare.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// Makes way for a new sequence. Throws std::invalid_argument when `folder` holds one already and
 /// `force` is not set; with `force`, removes the files of that sequence and nothing else.
@@ -56,4 +56,4 @@ class SequenceOutput {
   ExportSummary summary_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -1,7 +1,7 @@
 
 #include "clients/commands/command.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 void add_evaluate_command(CommandHandle program, Action& action) {
   CommandHandle evaluate = program.command(
@@ -15,4 +15,4 @@ void add_evaluate_command(CommandHandle program, Action& action) {
   evaluate.explain("'stillmap evaluate WHAT --help' shows options and examples.");
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -12,7 +12,7 @@
 #include "core/evaluation/map_cleaning.hpp"
 #include "core/map/storage/map_file.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -27,15 +27,15 @@ struct Arguments {
 // Where the labelled scans are put to make the true map. With the map's own poses, the figures
 // speak of the cleaning alone; with true poses, drift counts as well.
 Trajectory poses_for_truth(const Arguments& arguments, const ScanDataset& dataset,
-                           const StoredMap& map) {
+                           const SavedMap& map) {
   if (arguments.poses == "map") return map.trajectory;
   std::optional<Trajectory> truth = dataset.truth();
   if (!truth) throw DatasetError(arguments.truth, "has no true poses; use --poses map");
   return *truth;
 }
 
-void add_scan(MapTruth& truth, const DatasetFrame& frame, const Eigen::Isometry3d& T_map_lidar,
-              double max_range_m) {
+void add_scan(evaluation::MapTruth& truth, const DatasetFrame& frame,
+              const Eigen::Isometry3d& T_map_lidar, double max_range_m) {
   std::vector<Eigen::Vector3f> points_map;
   std::vector<std::uint16_t> ids;
   const Eigen::Isometry3f T = T_map_lidar.cast<float>();
@@ -48,9 +48,9 @@ void add_scan(MapTruth& truth, const DatasetFrame& frame, const Eigen::Isometry3
   truth.add(points_map, ids);
 }
 
-MapTruth true_map(const Arguments& arguments, const ScanDataset& dataset,
-                  const Trajectory& trajectory) {
-  MapTruth truth(arguments.voxel_size_m);
+evaluation::MapTruth true_map(const Arguments& arguments, const ScanDataset& dataset,
+                              const Trajectory& trajectory) {
+  evaluation::MapTruth truth(arguments.voxel_size_m);
   Progress progress("true map", "scans", dataset.size());
   std::size_t used = 0;
   for (std::size_t i = 0; i < dataset.size(); ++i) {
@@ -71,7 +71,7 @@ MapTruth true_map(const Arguments& arguments, const ScanDataset& dataset,
   return truth;
 }
 
-std::vector<Eigen::Vector3f> points_of(const MapView& view) {
+std::vector<Eigen::Vector3f> points_of(const MapSnapshot& view) {
   std::vector<Eigen::Vector3f> points;
   for (const auto& tile : view.tiles) {
     for (const Voxel& voxel : tile->voxels) points.push_back(voxel.mean_map);
@@ -79,7 +79,7 @@ std::vector<Eigen::Vector3f> points_of(const MapView& view) {
   return points;
 }
 
-nlohmann::json to_json(const MapCleaningScore& score, const Arguments& arguments) {
+nlohmann::json to_json(const evaluation::MapCleaningScore& score, const Arguments& arguments) {
   const auto number = [](const std::optional<double>& value) {
     return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
   };
@@ -96,7 +96,7 @@ nlohmann::json to_json(const MapCleaningScore& score, const Arguments& arguments
           {"poses", arguments.poses}};
 }
 
-std::string describe(const MapCleaningScore& score) {
+std::string describe(const evaluation::MapCleaningScore& score) {
   const auto percent = [](const std::optional<double>& share) {
     return share ? fixed(100.0 * *share, 2) : std::string("-");
   };
@@ -120,9 +120,11 @@ ExitCode run(const Arguments& arguments) {
     throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
   }
   const ScanDataset dataset(arguments.truth);
-  const StoredMap map = open_map_file(arguments.map)->load();
-  const MapTruth truth = true_map(arguments, dataset, poses_for_truth(arguments, dataset, map));
-  const MapCleaningScore score = map_cleaning_score(truth, points_of(map.view));
+  const SavedMap map = open_map_file(arguments.map)->load();
+  const evaluation::MapTruth truth =
+      true_map(arguments, dataset, poses_for_truth(arguments, dataset, map));
+  const evaluation::MapCleaningScore score =
+      evaluation::map_cleaning_score(truth, points_of(map.view));
   std::cout << (arguments.json ? to_json(score, arguments).dump(2) + "\n" : describe(score));
   return ExitCode::ok;
 }
@@ -157,4 +159,4 @@ void add_evaluate_map_command(CommandHandle evaluate, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,8 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "clients/commands/command.hpp"
 #include "clients/commands/arguments/mapper_arguments.hpp"
+#include "clients/commands/command.hpp"
 #include "clients/commands/evaluate/segmentation_report.hpp"
 #include "clients/commands/evaluate/segmentation_run.hpp"
 #include "clients/terminal/progress.hpp"
@@ -16,7 +16,7 @@
 #include "core/evaluation/confusion_matrix.hpp"
 #include "core/picture/segmentation_picture.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -41,12 +41,12 @@ std::vector<std::filesystem::path> label_files(const std::filesystem::path& fold
   return files;
 }
 
-ConfusionMatrix compare_files(const Arguments& arguments) {
+evaluation::ConfusionMatrix compare_files(const Arguments& arguments) {
   const auto predictions = label_files(arguments.predictions, "predictions");
   const std::filesystem::path truth_folder =
       label_files(arguments.truth, "labels").front().parent_path();
   Progress progress("compare", "scans", predictions.size());
-  ConfusionMatrix matrix;
+  evaluation::ConfusionMatrix matrix;
   std::uint64_t done = 0;
   for (const std::filesystem::path& prediction : predictions) {
     const auto predicted = read_values<std::uint32_t>(prediction);
@@ -62,11 +62,11 @@ ConfusionMatrix compare_files(const Arguments& arguments) {
 }
 
 // Truth above prediction, of the first scan that was taken.
-void write_picture(const Arguments& arguments, const ScanDataset& dataset, LabelSource& labels) {
+void write_picture(const Arguments& arguments, const ScanDataset& dataset, Segmenter& labels) {
   DatasetFrame frame = dataset.read(arguments.range.first);
   const std::vector<SemanticClass> truth = reduced_classes(frame.raw_labels);
   frame.scan.labels.clear();
-  const std::vector<SemanticClass> found = labels.label(frame.scan).classes;
+  const std::vector<SemanticClass> found = labels.segment(frame.scan).classes;
   const RangeImage image(frame.scan.points_lidar, projection_model(dataset.suggested_sensor()));
   std::vector<std::span<const SemanticClass>> strips;
   if (!truth.empty()) strips.emplace_back(truth);
@@ -74,10 +74,10 @@ void write_picture(const Arguments& arguments, const ScanDataset& dataset, Label
   write_segmentation_picture(arguments.picture, image, strips);
 }
 
-ConfusionMatrix run_model(const Arguments& arguments) {
+evaluation::ConfusionMatrix run_model(const Arguments& arguments) {
   const ScanDataset dataset(arguments.truth);
   const std::size_t scans = arguments.range.end(dataset) - arguments.range.first;
-  const std::unique_ptr<LabelSource> labels = label_source(arguments.mapper, dataset);
+  const std::unique_ptr<Segmenter> labels = label_source(arguments.mapper, dataset);
   Progress progress("segment", "scans", scans);
   const SegmentationResult result =
       segment_dataset(dataset, arguments.range, *labels, [&](std::size_t seen) {
@@ -93,7 +93,7 @@ ConfusionMatrix run_model(const Arguments& arguments) {
 }
 
 ExitCode run(const Arguments& arguments) {
-  const ConfusionMatrix matrix =
+  const evaluation::ConfusionMatrix matrix =
       arguments.predictions.empty() ? run_model(arguments) : compare_files(arguments);
   std::cout << (arguments.json ? to_json(matrix).dump(2) + "\n" : describe(matrix));
   return ExitCode::ok;
@@ -134,4 +134,4 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

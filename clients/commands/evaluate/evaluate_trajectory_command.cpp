@@ -7,7 +7,7 @@
 #include "clients/commands/mapping/trajectory_report.hpp"
 #include "core/dataset/kitti_files.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -39,7 +39,7 @@ int travel_axis(const std::vector<Eigen::Isometry3d>& poses) {
 }
 
 // Camera and lidar frames mixed up give figures that look like bad odometry.
-std::string frame_warning(const PosePairs& pairs) {
+std::string frame_warning(const evaluation::PosePairs& pairs) {
   const int truth = travel_axis(pairs.truth);
   const int estimate = travel_axis(pairs.estimate);
   if (truth == estimate) return {};
@@ -54,7 +54,7 @@ ExitCode run(const Arguments& arguments) {
   const PoseFile estimate = read_in_frame(arguments.estimate, arguments.estimate_calib);
   const bool converted = !arguments.truth_calib.empty() || !arguments.estimate_calib.empty();
   const std::string frame = converted ? "lidar" : arguments.frame;
-  const PosePairs pairs =
+  const evaluation::PosePairs pairs =
       pair_poses(truth, estimate, static_cast<std::int64_t>(1e9 * arguments.max_difference_s));
   const TrajectoryReport report = report_trajectory(pairs);
   const std::string warning = frame_warning(pairs);
@@ -111,4 +111,4 @@ void add_evaluate_trajectory_command(CommandHandle evaluate, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

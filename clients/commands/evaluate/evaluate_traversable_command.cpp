@@ -3,8 +3,8 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "clients/commands/command.hpp"
 #include "clients/commands/arguments/simulation_arguments.hpp"
+#include "clients/commands/command.hpp"
 #include "clients/commands/evaluate/traversability_truth.hpp"
 #include "clients/terminal/table.hpp"
 #include "config/loaders/robot_profile.hpp"
@@ -12,7 +12,7 @@
 #include "core/map/storage/map_file.hpp"
 #include "core/traversability/traversability_map.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -26,7 +26,7 @@ nlohmann::json number(const std::optional<double>& value) {
   return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
 }
 
-nlohmann::json to_json(const AreaScore& score, double cell_m2) {
+nlohmann::json to_json(const TraversabilityScore& score, double cell_m2) {
   nlohmann::json false_free = nlohmann::json::object();
   for (std::size_t i = 0; i < false_free_count; ++i) {
     false_free[std::string(name(static_cast<FalseFree>(i)))] =
@@ -47,7 +47,7 @@ nlohmann::json to_json(const AreaScore& score, double cell_m2) {
           {"false_lethal_m2", false_lethal}};
 }
 
-std::string describe(const AreaScore& score, double cell_m2) {
+std::string describe(const TraversabilityScore& score, double cell_m2) {
   const auto area = [&](std::uint64_t cells) {
     return fixed(cell_m2 * static_cast<double>(cells), 1);
   };
@@ -76,16 +76,16 @@ ExitCode run(const Arguments& arguments) {
   if (!std::filesystem::exists(arguments.map)) {
     throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
   }
-  const StoredMap map = open_map_file(arguments.map)->load();
-  const SimulationConfig config = simulation_config(arguments.simulation);
+  const SavedMap map = open_map_file(arguments.map)->load();
+  const simulation::SimulationConfig config = simulation_config(arguments.simulation);
   // The map's frame is the lidar's at the first scan.
-  const Eigen::Isometry3d T_city_map = Simulation(config).T_map_lidar_at(0.0);
-  const CityTruth truth(config);
+  const Eigen::Isometry3d T_city_map = simulation::Simulation(config).T_map_lidar_at(0.0);
+  const simulation::CityTruth truth(config);
   TraversabilityMap area({profile});
   (void)area.update(map.view);
   const TraversabilityView& view = *area.view(profile.name);
-  const AreaScore score =
-      score_area(view, simulated_truth(truth, profile, view.cell_m, T_city_map));
+  const TraversabilityScore score =
+      score_traversability(view, simulated_traversability(truth, profile, view.cell_m, T_city_map));
   const double cell_m2 = view.cell_m * view.cell_m;
   std::cout << (arguments.json ? to_json(score, cell_m2).dump(2) + "\n" : describe(score, cell_m2));
   return ExitCode::ok;
@@ -116,4 +116,4 @@ void add_evaluate_traversable_command(CommandHandle evaluate, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -8,7 +8,7 @@
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -26,7 +26,7 @@ double times_better(const WeightingResult& none, const WeightingResult& result) 
   return of_this > 0.0 ? of_none / of_this : 1.0;
 }
 
-void add_rows(Table& table, const TrueRecording& recording,
+void add_rows(Table& table, const GroundTruthSequence& recording,
               const std::vector<WeightingResult>& results) {
   for (const WeightingResult& result : results) {
     const TrajectoryReport& report = result.report;
@@ -40,7 +40,7 @@ void add_rows(Table& table, const TrueRecording& recording,
   }
 }
 
-nlohmann::json json_of(const TrueRecording& recording,
+nlohmann::json json_of(const GroundTruthSequence& recording,
                        const std::vector<WeightingResult>& results) {
   nlohmann::json rows = nlohmann::json::array();
   for (const WeightingResult& result : results) {
@@ -60,8 +60,8 @@ ExitCode run(const Arguments& arguments) {
                "KITTI %", "none / this", "ms a scan"});
   nlohmann::json rows = nlohmann::json::array();
   for (const std::string& name : arguments.recordings) {
-    const TrueRecording recording =
-        open_true_recording(name, arguments.scans, arguments.mapper, arguments.simulation);
+    const GroundTruthSequence recording =
+        open_ground_truth_sequence(name, arguments.scans, arguments.mapper, arguments.simulation);
     Progress progress(name, "scans", recording.scans);
     const auto results = compare_weightings(recording, [&](std::size_t seen) {
       progress.update(seen);
@@ -105,4 +105,4 @@ void add_evaluate_weightings_command(CommandHandle evaluate, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

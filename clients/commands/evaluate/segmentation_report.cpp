@@ -6,7 +6,7 @@
 #include "clients/terminal/table.hpp"
 #include "core/evaluation/class_groups.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 std::string percent(const std::optional<double>& share) {
@@ -19,14 +19,14 @@ nlohmann::json share_or_null(const std::optional<double>& share) {
 
 }  // namespace
 
-nlohmann::json to_json(const ConfusionMatrix& matrix) {
+nlohmann::json to_json(const evaluation::ConfusionMatrix& matrix) {
   nlohmann::json by_class = nlohmann::json::object();
   for (std::size_t k = 1; k < semantic_class_count; ++k) {
     const auto label = static_cast<SemanticClass>(k);
     by_class[std::string(name(label))] = share_or_null(matrix.iou(label));
   }
   nlohmann::json by_group = nlohmann::json::object();
-  for (const ClassGroup& group : coarse_groups()) {
+  for (const evaluation::ClassGroup& group : evaluation::coarse_groups()) {
     by_group[std::string(group.name)] = share_or_null(matrix.iou(group.classes));
   }
   return {{"points", matrix.total()},
@@ -37,7 +37,7 @@ nlohmann::json to_json(const ConfusionMatrix& matrix) {
           {"iou_of_groups", by_group}};
 }
 
-std::string describe(const ConfusionMatrix& matrix) {
+std::string describe(const evaluation::ConfusionMatrix& matrix) {
   Table classes({"class", "IoU %"});
   for (std::size_t k = 1; k < semantic_class_count; ++k) {
     const auto label = static_cast<SemanticClass>(k);
@@ -47,7 +47,7 @@ std::string describe(const ConfusionMatrix& matrix) {
   classes.add({"mean of those seen", percent(matrix.mean_iou_of_present())});
   classes.add({"accuracy", percent(matrix.accuracy())});
   Table groups({"group", "IoU %"});
-  for (const ClassGroup& group : coarse_groups()) {
+  for (const evaluation::ClassGroup& group : evaluation::coarse_groups()) {
     groups.add({std::string(group.name), percent(matrix.iou(group.classes))});
   }
   std::string text = classes.text();
@@ -55,4 +55,4 @@ std::string describe(const ConfusionMatrix& matrix) {
   return text.append(" labelled points; unlabeled truth is left out, as in semantic-kitti-api\n");
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -5,10 +5,10 @@
 
 #include "core/evaluation/confusion_matrix.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// IoU of every class and of the coarse groups, for people and for programs.
-[[nodiscard]] std::string describe(const ConfusionMatrix& matrix);
-[[nodiscard]] nlohmann::json to_json(const ConfusionMatrix& matrix);
+[[nodiscard]] std::string describe(const evaluation::ConfusionMatrix& matrix);
+[[nodiscard]] nlohmann::json to_json(const evaluation::ConfusionMatrix& matrix);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

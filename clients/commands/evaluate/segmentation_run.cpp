@@ -2,19 +2,19 @@
 
 #include "core/dataset/kitti_files.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& range,
-                                   LabelSource& labels, const ScanDone& scan_done) {
+                                   Segmenter& labels, const ScanDone& scan_done) {
   SegmentationResult result;
-  StageTimes times;
+  StageStopwatch times;
   const std::size_t end = range.end(dataset);
   for (std::size_t index = range.first; index < end; ++index) {
     if (dataset.has_labels(index)) {
       DatasetFrame frame = dataset.read(index);
       frame.scan.labels.clear();
       times.begin();
-      const PointLabels found = labels.label(frame.scan);
+      const PointLabels found = labels.segment(frame.scan);
       times.end();
       result.points.add(reduced_classes(frame.raw_labels), found.classes);
       result.scans += 1;
@@ -26,4 +26,4 @@ SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& 
   return result;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

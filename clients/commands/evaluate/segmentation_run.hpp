@@ -5,10 +5,10 @@
 #include "core/evaluation/confusion_matrix.hpp"
 #include "core/segmentation/segmenter.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 struct SegmentationResult {
-  ConfusionMatrix points;
+  evaluation::ConfusionMatrix points;
   std::size_t scans = 0;
   /// From scan to the class of every point.
   double median_ms = 0.0;
@@ -18,6 +18,6 @@ struct SegmentationResult {
 /// Labels the scans of a labelled recording and compares with its labels. Scans without labels
 /// are left out. Throws DatasetError for a damaged file.
 [[nodiscard]] SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& range,
-                                                 LabelSource& labels, const ScanDone& scan_done);
+                                                 Segmenter& labels, const ScanDone& scan_done);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -1,19 +1,19 @@
 #include "clients/commands/evaluate/traversability_truth.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
-TrueCell true_cell(const TrueGround& ground, const RobotProfile& profile) {
-  TrueCell cell;
+CellTruth true_cell(const simulation::TrueGround& ground, const RobotProfile& profile) {
+  CellTruth cell;
   cell.is_edge = ground.is_edge;
   const bool has_step = ground.is_edge && ground.step_m > profile.max_step_m;
-  if (ground.standing == Standing::fixed) {
+  if (ground.standing == simulation::Standing::fixed) {
     cell.reason = BlockReason::obstacle;
   } else if (!profile.class_cost.at(static_cast<std::size_t>(ground.label))) {
     cell.reason = BlockReason::ground_class;
   } else if (has_step) {
     cell.reason = BlockReason::step;
-  } else if (ground.standing == Standing::parked) {
+  } else if (ground.standing == simulation::Standing::parked) {
     cell.reason = BlockReason::obstacle;
     cell.is_removed_vehicle = true;
   }
@@ -22,8 +22,9 @@ TrueCell true_cell(const TrueGround& ground, const RobotProfile& profile) {
 
 }  // namespace
 
-AreaTruth simulated_truth(const CityTruth& truth, const RobotProfile& profile, double cell_m,
-                          const Eigen::Isometry3d& T_city_map) {
+TraversabilityTruth simulated_traversability(const simulation::CityTruth& truth,
+                                             const RobotProfile& profile, double cell_m,
+                                             const Eigen::Isometry3d& T_city_map) {
   return [&truth, profile, cell_m, T_city_map](const Eigen::Vector3d& ground_map) {
     const Eigen::Vector3d ground_city = T_city_map * ground_map;
     return true_cell(
@@ -32,4 +33,4 @@ AreaTruth simulated_truth(const CityTruth& truth, const RobotProfile& profile, d
   };
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

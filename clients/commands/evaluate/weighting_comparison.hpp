@@ -11,10 +11,10 @@
 #include "clients/commands/mapping/trajectory_report.hpp"
 #include "core/dataset/scan_dataset.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// Scans with true poses, from disk or simulated on the way.
-struct TrueRecording {
+struct GroundTruthSequence {
   std::string name;
   std::size_t scans = 0;
   MapperConfig config;
@@ -26,9 +26,10 @@ struct TrueRecording {
 
 /// Opens a recording with true poses, or "sim:PRESET". `max_scans` limits both. Throws
 /// DatasetError, ConfigError or std::invalid_argument.
-[[nodiscard]] TrueRecording open_true_recording(const std::string& name, std::size_t max_scans,
-                                                const MapperArguments& mapper,
-                                                const SimulationArguments& simulation);
+[[nodiscard]] GroundTruthSequence open_ground_truth_sequence(const std::string& name,
+                                                             std::size_t max_scans,
+                                                             const MapperArguments& mapper,
+                                                             const SimulationArguments& simulation);
 
 /// One row of the paper's Table I.
 struct WeightingResult {
@@ -40,6 +41,6 @@ struct WeightingResult {
 /// Runs the three weightings side by side on the same scans. `scan_done(seen)` returning false ends
 /// it early. Throws std::runtime_error when a scan cannot be mapped.
 [[nodiscard]] std::vector<WeightingResult> compare_weightings(
-    const TrueRecording& recording, const std::function<bool(std::size_t)>& scan_done);
+    const GroundTruthSequence& recording, const std::function<bool(std::size_t)>& scan_done);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

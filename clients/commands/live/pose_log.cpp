@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-namespace stillmap {
+namespace stillmap::cli {
 
 PoseLog::PoseLog(Client& client)
     : odometry_(client.subscribe_odometry([this](const OdometryUpdate& update) {
@@ -43,4 +43,4 @@ Trajectory PoseLog::poses_of(const std::vector<std::int64_t>& stamps_ns) const {
   return trajectory;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -9,7 +9,7 @@
 
 #include "clients/library/client.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// The poses that come back from a server, by stamp. What the odometry topic lost under way comes
 /// from the path. Callbacks may come from any thread.
@@ -38,4 +38,4 @@ class PoseLog {
   Subscription path_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -10,7 +10,7 @@
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -52,13 +52,13 @@ void record(Recorder& recorder, const Arguments& arguments, StopSignal& stop) {
     return arguments.seconds > 0.0 && passed.count() >= arguments.seconds;
   };
   while (!stop.wait_for(poll_period) && !over()) {
-    recorder.take_arrived();
+    recorder.write_received();
     if (Clock::now() - committed < commit_period) continue;
     recorder.commit();
     committed = Clock::now();
     progress.update(recorder.messages(), progress_note(recorder));
   }
-  recorder.take_arrived();
+  recorder.write_received();
   recorder.finish();
 }
 
@@ -128,4 +128,4 @@ void add_record_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -11,7 +11,7 @@
 #include "idl/dds/serialized_message.hpp"
 #include "idl/interface/topics.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 using eprosima::fastdds::dds::SampleInfo;
@@ -19,34 +19,35 @@ using eprosima::fastdds::dds::TypeSupport;
 using eprosima::fastrtps::rtps::GUID_t;
 
 /// Samples that may wait while the disk is busy, and of each key on a keyed topic.
-constexpr int most_waiting = 20;
-constexpr int most_waiting_a_key = 4;
+constexpr int max_waiting = 20;
+constexpr int max_waiting_per_key = 4;
 
 struct RecordableTopic {
   std::string dds_name;
   TypeSupport type;
-  TopicQos offered;
+  dds::TopicQos offered;
 };
 
 template <typename T>
-RecordableTopic recordable(const TopicSpec<T>& topic) {
-  return {.dds_name = topic.dds_name, .type = type_support<T>(), .offered = topic.writer};
+RecordableTopic recordable(const dds::TopicSpec<T>& topic) {
+  return {.dds_name = topic.dds_name, .type = dds::type_support<T>(), .offered = topic.writer};
 }
 
 std::vector<RecordableTopic> recordable_topics(const RecorderOptions& options) {
-  const Topics of_server = Topics::in(options.server_name);
-  return {recordable(points_topic(options.points_topic, DeliveryMode::latest, most_waiting)),
-          recordable(odometry_prior_topic(options.odometry_topic)),
-          recordable(of_server.odometry),
-          recordable(of_server.tf),
-          recordable(of_server.path),
-          recordable(of_server.scan),
-          recordable(of_server.static_cloud),
-          recordable(of_server.tile_index),
-          recordable(of_server.tiles),
-          recordable(of_server.status),
-          recordable(of_server.octomap),
-          recordable(of_server.traversability)};
+  const dds::Topics of_server = dds::Topics::in(options.server_name);
+  return {
+      recordable(dds::points_topic(options.points_topic, dds::DeliveryMode::latest, max_waiting)),
+      recordable(dds::odometry_prior_topic(options.odometry_topic)),
+      recordable(of_server.odometry),
+      recordable(of_server.tf),
+      recordable(of_server.path),
+      recordable(of_server.scan),
+      recordable(of_server.static_cloud),
+      recordable(of_server.tile_index),
+      recordable(of_server.tiles),
+      recordable(of_server.status),
+      recordable(of_server.octomap),
+      recordable(of_server.traversability)};
 }
 
 /// "/points" of "rt/points".
@@ -56,37 +57,38 @@ std::vector<RecordableTopic> chosen_topics(const RecorderOptions& options) {
   std::vector<RecordableTopic> all = recordable_topics(options);
   if (options.topics.empty()) return all;
   std::vector<RecordableTopic> chosen;
-  for (const std::string& wanted : options.topics) {
-    const std::string name = wanted.starts_with('/') ? wanted : "/" + wanted;
+  for (const std::string& requested : options.topics) {
+    const std::string name = requested.starts_with('/') ? requested : "/" + requested;
     const auto found = std::ranges::find(all, name, ros_name);
     if (found == all.end()) {
       std::string known;
       for (const RecordableTopic& topic : all) known.append(" ").append(ros_name(topic));
-      throw std::invalid_argument("topic '" + wanted + "' cannot be recorded; there are" + known);
+      throw std::invalid_argument("topic '" + requested + "' cannot be recorded; there are" +
+                                  known);
     }
     chosen.push_back(*found);
   }
   return chosen;
 }
 
-std::vector<BagTopic> bag_topics(const std::vector<RecordableTopic>& topics) {
-  std::vector<BagTopic> in_bag;
+std::vector<dds::BagTopic> bag_topics(const std::vector<RecordableTopic>& topics) {
+  std::vector<dds::BagTopic> in_bag;
   for (const RecordableTopic& topic : topics) {
-    const TopicQos& qos = topic.offered;
-    in_bag.push_back(
-        {.name = ros_name(topic),
-         .type = ros_type_name(topic.type),
-         .serialization_format = "cdr",
-         .offered_qos_profiles = offered_qos_yaml(qos.reliable, qos.transient_local, qos.depth),
-         .messages = 0});
+    const dds::TopicQos& qos = topic.offered;
+    in_bag.push_back({.name = ros_name(topic),
+                      .type = dds::ros_type_name(topic.type),
+                      .serialization_format = "cdr",
+                      .offered_qos_profiles =
+                          dds::offered_qos_yaml(qos.reliable, qos.transient_local, qos.depth),
+                      .messages = 0});
   }
   return in_bag;
 }
 
-TopicQos reader_qos_for(const RecordableTopic& topic, bool as_offered) {
-  TopicQos qos = topic.offered;
+dds::TopicQos reader_qos_for(const RecordableTopic& topic, bool as_offered) {
+  dds::TopicQos qos = topic.offered;
   qos.keep_all = false;
-  qos.depth = qos.max_keys > 1 ? most_waiting_a_key : most_waiting;
+  qos.depth = qos.max_keys > 1 ? max_waiting_per_key : max_waiting;
   // Publishers that promise less are recorded too, with what they promise.
   qos.reliable = as_offered;
   qos.transient_local = as_offered && qos.transient_local;
@@ -117,19 +119,19 @@ std::int64_t wall_clock_ns() {
 /// A topic that is being recorded.
 class Input {
  public:
-  Input(Participant& participant, RecordableTopic topic)
+  Input(dds::Participant& participant, RecordableTopic topic)
       : participant_(participant), topic_(std::move(topic)) {
     listen(true);
   }
 
   /// Asks for what any publisher gives, once one gives less than was asked for.
-  void adapt() {
+  void relax_qos() {
     if (!as_offered_ || reader_->events().incompatible_writers() == 0) return;
     reader_.reset();
     listen(false);
   }
 
-  [[nodiscard]] bool take(RawSample& sample) {
+  [[nodiscard]] bool take(dds::SerializedMessage& sample) {
     SampleInfo info;
     if (!reader_->take(sample, info)) return false;
     const auto& number = info.sample_identity.sequence_number();
@@ -148,9 +150,9 @@ class Input {
     reader_.emplace(participant_, topic_.dds_name, topic_.type, reader_qos_for(topic_, as_offered));
   }
 
-  Participant& participant_;
+  dds::Participant& participant_;
   RecordableTopic topic_;
-  std::optional<RawReader> reader_;
+  std::optional<dds::SerializedMessageReader> reader_;
   bool as_offered_ = true;
   LossCounter losses_;
 };
@@ -165,8 +167,8 @@ struct Recorder::Connection {
     }
   }
 
-  Participant participant;
-  BagWriter bag;
+  dds::Participant participant;
+  dds::BagWriter bag;
   std::vector<std::unique_ptr<Input>> inputs;
 };
 
@@ -174,13 +176,13 @@ Recorder::Recorder(const RecorderOptions& options)
     : connection_(std::make_unique<Connection>(options, chosen_topics(options))) {}
 Recorder::~Recorder() = default;
 
-void Recorder::take_arrived() {
-  RawSample sample;
+void Recorder::write_received() {
+  dds::SerializedMessage sample;
   for (std::size_t i = 0; i < connection_->inputs.size(); ++i) {
     Input& input = *connection_->inputs[i];
-    input.adapt();
+    input.relax_qos();
     // One topic that never pauses does not starve the others.
-    for (int taken = 0; taken < most_waiting && input.take(sample); ++taken) {
+    for (int taken = 0; taken < max_waiting && input.take(sample); ++taken) {
       connection_->bag.add(i, wall_clock_ns(), sample.bytes);
     }
   }
@@ -192,7 +194,7 @@ void Recorder::finish() { connection_->bag.finish(); }
 std::vector<RecordedTopic> Recorder::topics() const {
   std::vector<RecordedTopic> topics;
   for (std::size_t i = 0; i < connection_->inputs.size(); ++i) {
-    const BagTopic& topic = connection_->bag.topics()[i];
+    const dds::BagTopic& topic = connection_->bag.topics()[i];
     topics.push_back({.name = topic.name,
                       .messages = topic.messages,
                       .lost = connection_->inputs[i]->lost(),
@@ -210,4 +212,4 @@ std::uint64_t Recorder::lost() const {
   return lost;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -8,10 +8,10 @@
 
 #include "idl/dds/dds_options.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 struct RecorderOptions {
-  DdsOptions dds;
+  dds::DdsOptions dds;
   /// First part of the server's topic names.
   std::string server_name = "stillmap";
   /// The sensor's topic, and that of its odometry.
@@ -46,7 +46,7 @@ class Recorder {
   Recorder& operator=(const Recorder&) = delete;
 
   /// Writes what has arrived. Throws DatasetError when it cannot.
-  void take_arrived();
+  void write_received();
   /// Brings it to the disk.
   void commit();
   /// The last commit; leaves a bag in one plain file.
@@ -62,4 +62,4 @@ class Recorder {
   std::unique_ptr<Connection> connection_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,15 +6,15 @@
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/commands/mapping/pose_files.hpp"
 #include "clients/commands/live/pose_log.hpp"
 #include "clients/commands/live/replay_run.hpp"
+#include "clients/commands/mapping/pose_files.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -31,7 +31,7 @@ struct Arguments {
   bool json = false;
 };
 
-struct Outcome {
+struct ReplayOutcome {
   ReplayResult replay;
   ServerCounts server;
   Trajectory poses;
@@ -39,21 +39,22 @@ struct Outcome {
 
 void require_subscribers(ScanPublisher& publisher, const Arguments& arguments, StopSignal& stop) {
   const auto deadline = std::chrono::steady_clock::now() + arguments.client.timeout();
-  const auto wanted = static_cast<int>(arguments.subscribers);
-  while (publisher.subscribers() < wanted && std::chrono::steady_clock::now() < deadline) {
+  const auto requested = static_cast<int>(arguments.subscribers);
+  while (publisher.subscribers() < requested && std::chrono::steady_clock::now() < deadline) {
     if (stop.wait_for(std::chrono::milliseconds(10))) return;
   }
   const int there = publisher.subscribers();
-  if (there >= wanted) return;
+  if (there >= requested) return;
   throw ServiceTimeout(
       "a server answers in DDS domain " + std::to_string(arguments.client.domain) + ", but " +
-      (there == 0 ? "nobody takes"
-                  : "only " + std::to_string(there) + " of " + std::to_string(wanted) + " take") +
+      (there == 0
+           ? "nobody takes"
+           : "only " + std::to_string(there) + " of " + std::to_string(requested) + " take") +
       " scans from topic '" + arguments.topic + "': is that its topics.points?");
 }
 
-void require_lossless(const ServerStatus& status) {
-  if (status.delivery == DeliveryMode::every) return;
+void require_lossless(const dds::ServerStatus& status) {
+  if (status.delivery == dds::DeliveryMode::every) return;
   throw std::invalid_argument(
       "the server drops scans when they come too fast (input delivery: latest), so the replay "
       "cannot be lossless: start it with --delivery every");
@@ -78,8 +79,8 @@ ReplayResult publish_with_progress(const ScanDataset& dataset, const Arguments& 
       [&](const SkippedScan& scan) { progress.say("stillmap: left out: " + scan.reason); });
 }
 
-Outcome replay(const Arguments& arguments, StopSignal& stop) {
-  const ScanDataset dataset = open_recording(arguments.dataset, arguments.topic_in);
+ReplayOutcome replay(const Arguments& arguments, StopSignal& stop) {
+  const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
   (void)arguments.replay.range.end(dataset);
   Client client = connect(arguments.client);
   PoseLog poses(client);
@@ -87,14 +88,16 @@ Outcome replay(const Arguments& arguments, StopSignal& stop) {
                                    .points_topic = arguments.topic,
                                    .lossless = arguments.lossless});
   require_subscribers(publisher, arguments, stop);
-  const ServerStatus before = client.status();
+  const dds::ServerStatus before = client.status();
   if (arguments.lossless) require_lossless(before);
-  Outcome outcome;
+  ReplayOutcome outcome;
   outcome.replay = publish_with_progress(dataset, arguments, publisher, stop);
   const std::vector<std::int64_t>& stamps_ns = outcome.replay.published_stamps_ns;
   // A lossy topic may have lost scans that nobody counts, so there the wait ends sooner.
-  const auto patience = arguments.lossless ? arguments.replay.patience : std::chrono::seconds(2);
-  const ServerStatus after = wait_until_mapped(client, before, stamps_ns.size(), patience, stop);
+  const auto idle_timeout =
+      arguments.lossless ? arguments.replay.idle_timeout : std::chrono::seconds(2);
+  const dds::ServerStatus after =
+      wait_until_mapped(client, before, stamps_ns.size(), idle_timeout, stop);
   outcome.server = counts_since(before, after);
   if (outcome.server.mapped == stamps_ns.size()) {
     poses.wait_for(stamps_ns, std::chrono::seconds(5));
@@ -103,7 +106,7 @@ Outcome replay(const Arguments& arguments, StopSignal& stop) {
   return outcome;
 }
 
-nlohmann::json to_json(const Outcome& outcome) {
+nlohmann::json to_json(const ReplayOutcome& outcome) {
   return {{"published", outcome.replay.published_stamps_ns.size()},
           {"acknowledged", outcome.replay.acknowledged},
           {"left_out", outcome.replay.skipped.size()},
@@ -115,7 +118,7 @@ nlohmann::json to_json(const Outcome& outcome) {
           {"stopped", outcome.replay.stopped}};
 }
 
-std::string describe(const Outcome& outcome) {
+std::string describe(const ReplayOutcome& outcome) {
   const auto published = static_cast<double>(outcome.replay.published_stamps_ns.size());
   return std::to_string(outcome.replay.published_stamps_ns.size()) + " scans published in " +
          fixed(outcome.replay.seconds, 1) + " s (" + fixed(published / outcome.replay.seconds, 1) +
@@ -128,7 +131,7 @@ std::string describe(const Outcome& outcome) {
 
 ExitCode run(const Arguments& arguments) {
   StopSignal stop;
-  const Outcome outcome = replay(arguments, stop);
+  const ReplayOutcome outcome = replay(arguments, stop);
   if (!arguments.out.empty()) write_poses_as_named(arguments.out, outcome.poses);
   std::cout << (arguments.json ? to_json(outcome).dump(2) + "\n" : describe(outcome));
   if (!arguments.json && !arguments.out.empty()) {
@@ -155,7 +158,7 @@ void add_replay_command(CommandHandle program, Action& action) {
   ReplayOptions& replay = arguments->replay;
   CommandHandle command =
       program.command("replay", "Publish a recording on DDS, as a lidar driver would");
-  command.option("DATASET", arguments->dataset, recording_kinds).required();
+  command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic_in, topic_in_help);
   command
       .option("--rate", arguments->rate,
@@ -188,4 +191,4 @@ void add_replay_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -7,7 +7,7 @@
 
 #include "core/dataset/dataset_error.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -16,9 +16,9 @@ constexpr std::chrono::milliseconds publish_step{500};
 constexpr std::chrono::milliseconds status_period{100};
 
 /// When a scan of a recording is due.
-class Pace {
+class ReplayClock {
  public:
-  Pace(std::int64_t first_stamp_ns, double rate)
+  ReplayClock(std::int64_t first_stamp_ns, double rate)
       : first_stamp_ns_(first_stamp_ns), rate_(rate), began_(Clock::now()) {}
 
   /// Waits for the scan's time; true when told to stop instead.
@@ -62,9 +62,10 @@ bool publish(ScanPublisher& publisher, const DatasetFrame& frame, const ReplayOp
   const auto began = Clock::now();
   while (!publisher.publish(frame.scan, frame.raw_labels, publish_step)) {
     if (stop.requested()) return false;
-    if (Clock::now() - began > options.patience) {
+    if (Clock::now() - began > options.idle_timeout) {
       throw ServiceTimeout(
-          "the server has taken no scan for " + std::to_string(options.patience.count() / 1000) +
+          "the server has taken no scan for " +
+          std::to_string(options.idle_timeout.count() / 1000) +
           " s: did it stop? 'stillmap status' tells; a lossless replay needs a server with input "
           "delivery: every");
     }
@@ -79,40 +80,41 @@ ReplayResult replay_dataset(const ScanDataset& dataset, const ReplayOptions& opt
                             const ScanSkipped& scan_skipped) {
   const std::size_t end = options.range.end(dataset);
   const auto began = Clock::now();
-  const Pace pace(dataset.stamp_ns(options.range.first), options.rate);
+  const ReplayClock clock(dataset.stamp_ns(options.range.first), options.rate);
   ReplayResult result;
   for (std::size_t index = options.range.first; index < end && !result.stopped; ++index) {
     const auto frame = read(dataset, index, options, result, scan_skipped);
     if (frame) {
-      result.stopped = pace.wait_or_stop(dataset.stamp_ns(index), stop) ||
+      result.stopped = clock.wait_or_stop(dataset.stamp_ns(index), stop) ||
                        !publish(publisher, *frame, options, stop);
       if (!result.stopped) result.published_stamps_ns.push_back(frame->scan.stamp_ns);
     }
     (void)scan_done(index + 1 - options.range.first);
   }
-  result.acknowledged = publisher.wait_for_all_acknowledged(options.patience);
+  result.acknowledged = publisher.wait_for_all_acknowledged(options.idle_timeout);
   result.seconds = std::chrono::duration<double>(Clock::now() - began).count();
   return result;
 }
 
-ServerCounts counts_since(const ServerStatus& before, const ServerStatus& now) {
+ServerCounts counts_since(const dds::ServerStatus& before, const dds::ServerStatus& now) {
   return {.mapped = now.counter("scans_mapped") - before.counter("scans_mapped"),
           .dropped = now.dropped() - before.dropped()};
 }
 
-ServerStatus wait_until_mapped(Client& client, const ServerStatus& before, std::uint64_t scans,
-                               std::chrono::milliseconds patience, StopSignal& stop) {
-  ServerStatus status = client.status();
+dds::ServerStatus wait_until_mapped(Client& client, const dds::ServerStatus& before,
+                                    std::uint64_t scans, std::chrono::milliseconds idle_timeout,
+                                    StopSignal& stop) {
+  dds::ServerStatus status = client.status();
   auto changed = Clock::now();
   std::uint64_t done_before = 0;
   while (true) {
     const ServerCounts counts = counts_since(before, status);
     const std::uint64_t done = counts.mapped + counts.dropped;
     if (done != std::exchange(done_before, done)) changed = Clock::now();
-    if (done >= scans || Clock::now() - changed > patience) return status;
+    if (done >= scans || Clock::now() - changed > idle_timeout) return status;
     if (stop.wait_for(status_period)) return status;
     status = client.status();
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

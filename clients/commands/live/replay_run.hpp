@@ -5,13 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "clients/library/client.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
+#include "clients/library/client.hpp"
 #include "clients/library/scan_publisher.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "core/dataset/scan_dataset.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 struct ReplayOptions {
   ScanRange range;
@@ -19,7 +19,7 @@ struct ReplayOptions {
   double rate = 1.0;
   bool with_labels = true;
   /// How long a publisher that must not lose anything waits for the server to take a scan.
-  std::chrono::milliseconds patience{30'000};
+  std::chrono::milliseconds idle_timeout{30'000};
 };
 
 struct ReplayResult {
@@ -42,12 +42,14 @@ struct ServerCounts {
   std::uint64_t mapped = 0;
   std::uint64_t dropped = 0;
 };
-[[nodiscard]] ServerCounts counts_since(const ServerStatus& before, const ServerStatus& now);
+[[nodiscard]] ServerCounts counts_since(const dds::ServerStatus& before,
+                                        const dds::ServerStatus& now);
 
 /// Asks until the server has mapped or dropped `scans` of them since `before`, or nothing has
-/// changed for `patience`. Returns the last status.
-[[nodiscard]] ServerStatus wait_until_mapped(Client& client, const ServerStatus& before,
-                                             std::uint64_t scans,
-                                             std::chrono::milliseconds patience, StopSignal& stop);
+/// changed for `idle_timeout`. Returns the last status.
+[[nodiscard]] dds::ServerStatus wait_until_mapped(Client& client, const dds::ServerStatus& before,
+                                                  std::uint64_t scans,
+                                                  std::chrono::milliseconds idle_timeout,
+                                                  StopSignal& stop);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -15,7 +15,7 @@
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -27,14 +27,14 @@ struct Arguments {
   bool json = false;
 };
 
-/// News from the server, handed from its subscriptions' threads to the one that prints.
-class News {
+/// Updates from the server, handed from its subscriptions' threads to the one that prints.
+class UpdateQueue {
  public:
   void add(const StampedPose& pose) {
     const std::lock_guard lock(mutex_);
     poses_.push_back(pose);
   }
-  void add(const ServerStatus& status) {
+  void add(const dds::ServerStatus& status) {
     const std::lock_guard lock(mutex_);
     status_ = status;
   }
@@ -42,7 +42,7 @@ class News {
     const std::lock_guard lock(mutex_);
     return std::exchange(poses_, {});
   }
-  std::optional<ServerStatus> take_status() {
+  std::optional<dds::ServerStatus> take_status() {
     const std::lock_guard lock(mutex_);
     return std::exchange(status_, std::nullopt);
   }
@@ -50,7 +50,7 @@ class News {
  private:
   std::mutex mutex_;
   std::deque<StampedPose> poses_;
-  std::optional<ServerStatus> status_;
+  std::optional<dds::ServerStatus> status_;
 };
 
 double yaw_deg(const Eigen::Isometry3d& T) {
@@ -68,7 +68,7 @@ nlohmann::json pose_json(const StampedPose& pose) {
 }
 
 // One line a second: the newest pose, and how the server is.
-std::string status_line(const ServerStatus& status, const Trajectory& poses) {
+std::string status_line(const dds::ServerStatus& status, const Trajectory& poses) {
   std::string line;
   if (poses.empty()) {
     line = "no pose yet";
@@ -83,18 +83,18 @@ std::string status_line(const ServerStatus& status, const Trajectory& poses) {
   return line + (status.reason.empty() ? "" : "  (" + status.reason + ")");
 }
 
-/// Prints news until the limits are reached; keeps the poses.
+/// Prints updates until the limits are reached; keeps the poses.
 class Watch {
  public:
   explicit Watch(const Arguments& arguments) : arguments_(arguments) {}
 
-  void print(News& news) {
-    for (const StampedPose& pose : news.take_poses()) {
+  void print(UpdateQueue& updates) {
+    for (const StampedPose& pose : updates.take_poses()) {
       if (enough_poses()) break;
       poses_.push_back(pose);
       if (arguments_.json) std::cout << pose_json(pose).dump() << "\n";
     }
-    if (const std::optional<ServerStatus> status = news.take_status()) {
+    if (const std::optional<dds::ServerStatus> status = updates.take_status()) {
       if (arguments_.json) {
         nlohmann::json json = to_json(*status);
         json["type"] = "status";
@@ -119,20 +119,20 @@ class Watch {
 ExitCode run(const Arguments& arguments) {
   StopSignal stop;
   Client client = connect(arguments.client);
-  News news;
+  UpdateQueue updates;
   const Subscription odometry =
-      client.subscribe_odometry([&](const OdometryUpdate& update) { news.add(update.pose); });
+      client.subscribe_odometry([&](const OdometryUpdate& update) { updates.add(update.pose); });
   const Subscription status =
-      client.subscribe_status([&](const ServerStatus& update) { news.add(update); });
+      client.subscribe_status([&](const dds::ServerStatus& update) { updates.add(update); });
   Watch watch(arguments);
   const auto began = std::chrono::steady_clock::now();
   bool time_is_up = false;
   while (!stop.wait_for(std::chrono::milliseconds(50)) && !watch.enough_poses() && !time_is_up) {
-    watch.print(news);
+    watch.print(updates);
     const std::chrono::duration<double> watched = std::chrono::steady_clock::now() - began;
     time_is_up = arguments.duration_s > 0.0 && watched.count() >= arguments.duration_s;
   }
-  watch.print(news);
+  watch.print(updates);
   if (!arguments.out.empty()) {
     write_poses_as_named(arguments.out, watch.poses());
     std::cerr << watch.poses().size() << " poses written to " << arguments.out
@@ -163,4 +163,4 @@ void add_watch_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

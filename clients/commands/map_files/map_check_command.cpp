@@ -7,7 +7,7 @@
 #include "clients/terminal/progress.hpp"
 #include "core/map/tools/map_check.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -85,4 +85,4 @@ void add_map_check_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

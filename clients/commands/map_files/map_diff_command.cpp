@@ -5,10 +5,10 @@
 
 #include "clients/commands/command.hpp"
 #include "clients/commands/map_files/map_diff_report.hpp"
-#include "core/picture/map_diff_picture.hpp"
 #include "core/map/storage/map_file_copy.hpp"
+#include "core/picture/map_diff_picture.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -20,8 +20,8 @@ struct Arguments {
 };
 
 ExitCode run(const Arguments& arguments) {
-  const MapView before = read_map_file(arguments.before).view;
-  const MapView after = read_map_file(arguments.after).view;
+  const MapSnapshot before = read_map_file(arguments.before).view;
+  const MapSnapshot after = read_map_file(arguments.after).view;
   const MapDiff diff = diff_maps(before, after, arguments.options);
   if (!arguments.picture.empty()) write_diff_picture(arguments.picture, before, after, diff);
   std::cout << (arguments.json ? to_json(diff).dump(2) + "\n" : describe(diff));
@@ -53,4 +53,4 @@ void add_map_diff_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -5,11 +5,11 @@
 
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
-constexpr std::size_t most_tiles = 10;
-constexpr std::size_t most_pairs = 10;
+constexpr std::size_t max_tiles = 10;
+constexpr std::size_t max_pairs = 10;
 
 std::string text_of(SemanticClass label) { return std::string(name(label)); }
 
@@ -56,7 +56,7 @@ std::string relabelled_lines(const MapDiff& diff) {
   }
   std::ranges::stable_sort(pairs, std::greater(), [](const auto& pair) { return pair.first; });
   std::string text;
-  for (std::size_t i = 0; i < std::min(pairs.size(), most_pairs); ++i) {
+  for (std::size_t i = 0; i < std::min(pairs.size(), max_pairs); ++i) {
     text +=
         (i == 0 ? "relabelled: " : ", ") + pairs[i].second + " " + std::to_string(pairs[i].first);
   }
@@ -68,13 +68,13 @@ std::string tile_table(const MapDiff& diff) {
   std::ranges::stable_sort(tiles, std::greater(),
                            [](const TileDifference& tile) { return tile.counts.sum(); });
   Table table({"tile", "appeared", "gone", "relabelled"});
-  for (std::size_t i = 0; i < std::min(tiles.size(), most_tiles); ++i) {
+  for (std::size_t i = 0; i < std::min(tiles.size(), max_tiles); ++i) {
     add_row(table, {std::to_string(tiles[i].id.x) + ", " + std::to_string(tiles[i].id.y)},
             tiles[i].counts);
   }
   std::string text = table.text();
-  if (tiles.size() > most_tiles) {
-    text += "and " + std::to_string(tiles.size() - most_tiles) +
+  if (tiles.size() > max_tiles) {
+    text += "and " + std::to_string(tiles.size() - max_tiles) +
             " more tiles with fewer changes; --json lists all\n";
   }
   return text;
@@ -116,4 +116,4 @@ std::string describe(const MapDiff& diff) {
   return class_table(diff) + relabelled_lines(diff) + "\n" + tile_table(diff);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -3,14 +3,14 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
+#include "clients/commands/command.hpp"
 #include "clients/commands/query/class_arguments.hpp"
 #include "clients/commands/query/cloud_output.hpp"
-#include "clients/commands/command.hpp"
 #include "clients/commands/query/region_arguments.hpp"
-#include "core/map/tools/geo_export.hpp"
 #include "core/map/storage/map_file_copy.hpp"
+#include "core/map/tools/geo_export.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -28,13 +28,13 @@ bool is_raster_name(const std::string& file) {
 }
 
 void check_output_name(const std::string& file) {
-  if (is_cloud_name(file) || is_raster_name(file)) return;
+  if (is_cloud_file(file) || is_raster_name(file)) return;
   const bool is_octree = file.ends_with(".bt") || file.ends_with(".ot");
   throw std::invalid_argument("--output " + file + ": the name must end in .pcd, .ply or .tif" +
                               (is_octree ? "; OctoMap files come from stillmap octomap" : ""));
 }
 
-MapQuery query_of(const Arguments& arguments, const StoredMap& map) {
+MapQuery query_of(const Arguments& arguments, const SavedMap& map) {
   const Eigen::Vector2d robot_map =
       map.trajectory.empty()
           ? Eigen::Vector2d(Eigen::Vector2d::Zero())
@@ -46,7 +46,7 @@ MapQuery query_of(const Arguments& arguments, const StoredMap& map) {
   return query;
 }
 
-std::vector<QueryVoxel> voxels_of(const MapView& view, MapQuery query) {
+std::vector<QueryVoxel> voxels_of(const MapSnapshot& view, MapQuery query) {
   std::vector<QueryVoxel> voxels;
   do {
     const MapQueryResult page = query_map(view, query);
@@ -57,7 +57,7 @@ std::vector<QueryVoxel> voxels_of(const MapView& view, MapQuery query) {
   return voxels;
 }
 
-Datum datum_of(const Arguments& arguments, const StoredMap& map) {
+Datum datum_of(const Arguments& arguments, const SavedMap& map) {
   if (!arguments.datum.empty()) return datum_from_text(arguments.datum);
   const auto stored = map.metadata.find("datum");
   if (stored != map.metadata.end()) return datum_from_text(stored->second);
@@ -67,9 +67,8 @@ Datum datum_of(const Arguments& arguments, const StoredMap& map) {
       "48.137,11.575,519,90");
 }
 
-void write(const Arguments& arguments, const StoredMap& map,
-           const std::vector<QueryVoxel>& voxels) {
-  if (is_cloud_name(arguments.output)) {
+void write(const Arguments& arguments, const SavedMap& map, const std::vector<QueryVoxel>& voxels) {
+  if (is_cloud_file(arguments.output)) {
     write_cloud(arguments.output, voxels);
     return;
   }
@@ -81,7 +80,7 @@ void write(const Arguments& arguments, const StoredMap& map,
 ExitCode run(const Arguments& arguments) {
   check_output_name(arguments.output);
   check_region(arguments.region);
-  const StoredMap map = read_map_file(arguments.file);
+  const SavedMap map = read_map_file(arguments.file);
   const std::vector<QueryVoxel> voxels = voxels_of(map.view, query_of(arguments, map));
   write(arguments, map, voxels);
   std::vector<std::string> files{arguments.output};
@@ -131,4 +130,4 @@ void add_map_export_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

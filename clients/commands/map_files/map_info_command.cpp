@@ -5,7 +5,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/map_files/map_info_report.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -35,4 +35,4 @@ void add_map_info_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

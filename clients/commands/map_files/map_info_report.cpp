@@ -9,7 +9,7 @@
 
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 std::string utc(std::int64_t stamp_ns) {
@@ -108,10 +108,10 @@ nlohmann::json to_json(const MapFileInfo& info) {
           {"bytes_per_voxel", bytes_a_voxel(info)},
           {"classes", classes},
           {"bounds_map", bounds_map},
-          {"seen", span_json(map.seen)},
+          {"seen", span_json(map.observation_span)},
           {"poses", map.poses},
           {"path_length_m", map.path_length_m},
-          {"driven", span_json(map.driven)},
+          {"driven", span_json(map.trajectory_span)},
           {"metadata", map.metadata}};
 }
 
@@ -127,11 +127,13 @@ std::string describe(const MapFileInfo& info) {
   if (!map.bounds_map.isEmpty()) text << "bounds    " << bounds_text(map.bounds_map) << "\n";
   text << "path      " << map.poses << " poses, " << fixed(map.path_length_m, 1) << " m\n";
   if (map.poses > 0) {
-    text << "driven    " << utc(map.driven.first_ns) << " to " << utc(map.driven.last_ns)
-         << " UTC, " << fixed(seconds(map.driven), 1) << " s\n";
+    text << "driven    " << utc(map.trajectory_span.first_ns) << " to "
+         << utc(map.trajectory_span.last_ns) << " UTC, " << fixed(seconds(map.trajectory_span), 1)
+         << " s\n";
   }
   if (map.voxels > 0) {
-    text << "seen      " << utc(map.seen.first_ns) << " to " << utc(map.seen.last_ns) << " UTC\n";
+    text << "seen      " << utc(map.observation_span.first_ns) << " to "
+         << utc(map.observation_span.last_ns) << " UTC\n";
   }
   for (const auto& [key, value] : map.metadata)
     text << "metadata  " << key << ": " << value << "\n";
@@ -143,4 +145,4 @@ std::string describe(const MapFileInfo& info) {
   return text.str();
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -5,10 +5,10 @@
 
 #include "core/map/tools/map_info.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 [[nodiscard]] nlohmann::json to_json(const MapFileInfo& info);
 /// The same for people, with a bar for the share of every class.
 [[nodiscard]] std::string describe(const MapFileInfo& info);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -3,15 +3,15 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
+#include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/mapping/map_output.hpp"
-#include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -50,7 +50,7 @@ void write_report(const std::filesystem::path& file, const nlohmann::json& repor
 
 ExitCode run(const Arguments& arguments) {
   StopSignal stop;
-  const ScanDataset dataset = open_recording(arguments.dataset, arguments.topic_in);
+  const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   prepare_output_folder(arguments.out, arguments.force);
   const MappingResult result = map_with_progress(dataset, arguments, config, stop);
@@ -73,7 +73,7 @@ void add_map_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   CommandHandle command =
       program.command("map", "Map a recording in this process: the server's mapper without DDS");
-  command.option("DATASET", arguments->dataset, recording_kinds).required();
+  command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic_in, topic_in_help);
   command.option("--out", arguments->out, "Folder for the results").with_default();
   add_mapper_options(command, arguments->mapper);
@@ -95,4 +95,4 @@ void add_map_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

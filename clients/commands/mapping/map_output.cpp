@@ -5,11 +5,11 @@
 
 #include "clients/commands/mapping/pose_files.hpp"
 #include "core/dataset/dataset_error.hpp"
-#include "core/map/tools/map_export.hpp"
 #include "core/map/storage/map_file.hpp"
+#include "core/map/tools/map_export.hpp"
 #include "core/picture/map_picture.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 // The truth of the scans that were mapped, in the frame of the first of them.
@@ -26,17 +26,17 @@ std::optional<Trajectory> truth_of(const ScanDataset& dataset, const MappingResu
   return truth;
 }
 
-PosePairs pairs_of(const Trajectory& truth, const Trajectory& estimate) {
-  PosePairs pairs;
+evaluation::PosePairs pairs_of(const Trajectory& truth, const Trajectory& estimate) {
+  evaluation::PosePairs pairs;
   for (const StampedPose& pose : truth) pairs.truth.push_back(pose.T_map_lidar);
   for (const StampedPose& pose : estimate) pairs.estimate.push_back(pose.T_map_lidar);
-  return pair_by_index(pairs.truth, pairs.estimate);
+  return evaluation::pair_by_index(pairs.truth, pairs.estimate);
 }
 
 void save_map(const std::filesystem::path& file, const MappingResult& result,
               const MapperConfig& config) {
   open_map_file(file)->save({.view = *result.view,
-                             .memories = result.memories,
+                             .tile_evidence = result.tile_evidence,
                              .trajectory = result.trajectory,
                              .metadata = {{"sensor", config.sensor.name},
                                           {"label_source", result.label_source},
@@ -77,7 +77,7 @@ MapOutput write_map_output(const std::filesystem::path& folder, const ScanDatase
   MapPictureOptions picture;
   picture.truth = truth_of(dataset, result);
   if (picture.truth) {
-    const PosePairs pairs = pairs_of(*picture.truth, result.trajectory);
+    const evaluation::PosePairs pairs = pairs_of(*picture.truth, result.trajectory);
     output.accuracy = report_trajectory(pairs);
     draw_trajectories(folder, pairs, *output.accuracy, GroundPlane::xy);
   }
@@ -85,4 +85,4 @@ MapOutput write_map_output(const std::filesystem::path& folder, const ScanDatase
   return output;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -8,7 +8,7 @@
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/trajectory_report.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// Results of a mapping run, with its errors where the recording brings the truth.
 struct MapOutput {
@@ -34,4 +34,4 @@ void prepare_output_folder(const std::filesystem::path& folder, bool force);
 /// The same for people, shorter.
 [[nodiscard]] std::string describe(const MappingResult& result, const MapOutput& output);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

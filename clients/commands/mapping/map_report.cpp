@@ -5,7 +5,7 @@
 #include "clients/commands/mapping/map_output.hpp"
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 double peak_memory_mb() {
@@ -14,7 +14,7 @@ double peak_memory_mb() {
   return static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts kB
 }
 
-std::uint64_t voxel_count(const MapView& view) {
+std::uint64_t voxel_count(const MapSnapshot& view) {
   std::uint64_t count = 0;
   for (const auto& tile : view.tiles) count += tile->info.voxel_count;
   return count;
@@ -24,9 +24,9 @@ nlohmann::json optional_number(const std::optional<double>& value) {
   return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
 }
 
-nlohmann::json stages_json(const std::vector<StageTime>& stages) {
+nlohmann::json stages_json(const std::vector<StageDurations>& stages) {
   nlohmann::json json = nlohmann::json::object();
-  for (const StageTime& stage : stages) {
+  for (const StageDurations& stage : stages) {
     json[stage.stage] = {{"median_ms", stage.quantile(0.5)},
                          {"p95_ms", stage.quantile(0.95)},
                          {"p99_ms", stage.quantile(0.99)}};
@@ -42,9 +42,9 @@ nlohmann::json skipped_json(const std::vector<SkippedScan>& skipped) {
   return json;
 }
 
-std::string describe_stages(const std::vector<StageTime>& stages) {
+std::string describe_stages(const std::vector<StageDurations>& stages) {
   Table table({"ms a scan", "median", "p95", "p99"});
-  for (const StageTime& stage : stages) {
+  for (const StageDurations& stage : stages) {
     table.add({stage.stage, fixed(stage.quantile(0.5), 1), fixed(stage.quantile(0.95), 1),
                fixed(stage.quantile(0.99), 1)});
   }
@@ -56,7 +56,7 @@ std::string describe_stages(const std::vector<StageTime>& stages) {
 nlohmann::json to_json(const MappingResult& result, const MapOutput& output) {
   nlohmann::json health = nlohmann::json::object();
   for (const auto& [state, count] : result.health) health[name(state)] = count;
-  const StageTime& total = result.stages.back();
+  const StageDurations& total = result.stages.back();
   return {{"scans", result.trajectory.size()},
           {"seconds", result.seconds},
           {"stopped", result.stopped},
@@ -103,4 +103,4 @@ std::string describe(const MappingResult& result, const MapOutput& output) {
   return text;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

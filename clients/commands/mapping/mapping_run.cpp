@@ -7,7 +7,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/map/storage/map_file.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 /// The true ids of the points that the mapper will keep.
@@ -25,7 +25,7 @@ std::vector<std::uint16_t> true_ids_of_kept_points(const DatasetFrame& frame,
 class MappingRun {
  public:
   MappingRun(const ScanDataset& dataset, bool strict, const MapperConfig& config,
-             std::unique_ptr<LabelSource> labels, const ScanSkipped& scan_skipped)
+             std::unique_ptr<Segmenter> labels, const ScanSkipped& scan_skipped)
       : dataset_(dataset),
         strict_(strict),
         scan_skipped_(scan_skipped),
@@ -48,14 +48,15 @@ class MappingRun {
     times_.end();
     result_.scan_of_pose.push_back(index);
     result_.health[mapped->odometry.health] += 1;
-    if (!true_ids.empty()) result_.moving += moving_score(mapped->labelled.motion, true_ids);
+    if (!true_ids.empty())
+      result_.moving += evaluation::moving_score(mapped->labelled.motion, true_ids);
   }
 
   MappingResult finish(bool stopped) {
     result_.trajectory = mapper_.trajectory();
-    StoredMap map = stored_state(mapper_.static_map().checkpoint(true));
-    result_.view = std::make_shared<const MapView>(std::move(map.view));
-    result_.memories = std::move(map.memories);
+    SavedMap map = to_saved_map(mapper_.static_map().checkpoint(true));
+    result_.view = std::make_shared<const MapSnapshot>(std::move(map.view));
+    result_.tile_evidence = std::move(map.tile_evidence);
     result_.label_source = mapper_.label_source();
     result_.stages = times_.stages();
     result_.stopped = stopped;
@@ -82,7 +83,7 @@ class MappingRun {
   bool strict_;
   const ScanSkipped& scan_skipped_;
   PrepareConfig prepare_;
-  StageTimes times_;
+  StageStopwatch times_;
   Mapper mapper_;
   MappingResult result_;
 };
@@ -99,19 +100,19 @@ std::size_t ScanRange::end(const ScanDataset& dataset) const {
 }
 
 MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
-                          const MapperConfig& config, std::unique_ptr<LabelSource> labels,
+                          const MapperConfig& config, std::unique_ptr<Segmenter> labels,
                           const ScanDone& scan_done, const ScanSkipped& scan_skipped) {
   const std::size_t end = range.end(dataset);
   MappingRun run(dataset, range.strict, config, std::move(labels), scan_skipped);
   const auto began = std::chrono::steady_clock::now();
-  bool go_on = true;
-  for (std::size_t index = range.first; index < end && go_on; ++index) {
+  bool keep_running = true;
+  for (std::size_t index = range.first; index < end && keep_running; ++index) {
     run.map_scan(index);
-    go_on = !scan_done || scan_done(index + 1 - range.first);
+    keep_running = !scan_done || scan_done(index + 1 - range.first);
   }
-  MappingResult result = run.finish(!go_on);
+  MappingResult result = run.finish(!keep_running);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return result;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

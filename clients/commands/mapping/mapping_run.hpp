@@ -12,7 +12,7 @@
 #include "core/evaluation/moving_score.hpp"
 #include "core/mapper.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// Which scans of a recording, and what to do about damaged ones.
 struct ScanRange {
@@ -37,15 +37,15 @@ struct MappingResult {
   Trajectory trajectory;
   /// Index in the recording of each pose of the trajectory.
   std::vector<std::size_t> scan_of_pose;
-  std::shared_ptr<const MapView> view;
+  std::shared_ptr<const MapSnapshot> view;
   /// What the tiles know beside what they show.
-  TileMemories memories;
+  TileEvidenceMap tile_evidence;
   std::string label_source;
   std::vector<SkippedScan> skipped;
   std::map<OdometryHealth, std::size_t> health;
   /// Against the recording's moving ids, where it has labels.
-  MovingScore moving;
-  std::vector<StageTime> stages;
+  evaluation::MovingScore moving;
+  std::vector<StageDurations> stages;
   double seconds = 0.0;
   /// It ended early because it was told to.
   bool stopped = false;
@@ -59,8 +59,8 @@ using ScanSkipped = std::function<void(const SkippedScan&)>;
 /// Maps a recording in this process.
 [[nodiscard]] MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
                                         const MapperConfig& config,
-                                        std::unique_ptr<LabelSource> labels,
+                                        std::unique_ptr<Segmenter> labels,
                                         const ScanDone& scan_done = {},
                                         const ScanSkipped& scan_skipped = {});
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

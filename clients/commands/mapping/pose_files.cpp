@@ -9,10 +9,10 @@
 #include <string>
 
 #include "core/dataset/dataset_error.hpp"
-#include "core/dataset/kitti_files.hpp"
 #include "core/dataset/file_stamp.hpp"
+#include "core/dataset/kitti_files.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 constexpr std::int64_t ns_per_s = 1'000'000'000;
@@ -116,12 +116,12 @@ void write_poses_as_named(const std::filesystem::path& file, const Trajectory& t
   file.extension() == ".tum" ? write_tum(file, trajectory) : write_kitti_poses(file, trajectory);
 }
 
-PosePairs pair_poses(const PoseFile& truth, const PoseFile& estimate,
-                     std::int64_t max_difference_ns) {
+evaluation::PosePairs pair_poses(const PoseFile& truth, const PoseFile& estimate,
+                                 std::int64_t max_difference_ns) {
   if (truth.stamps_ns.empty() || estimate.stamps_ns.empty()) {
-    return pair_by_index(truth.poses, estimate.poses);
+    return evaluation::pair_by_index(truth.poses, estimate.poses);
   }
-  return pair_by_stamp(stamped(truth), stamped(estimate), max_difference_ns);
+  return evaluation::pair_by_stamp(stamped(truth), stamped(estimate), max_difference_ns);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "core/evaluation/pose_pairs.hpp"
-#include "core/odometry/trajectory.hpp"
+#include "core/lidar/trajectory.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// Poses of a text file, in whatever frame it is in.
 struct PoseFile {
@@ -32,7 +32,7 @@ void write_poses_as_named(const std::filesystem::path& file, const Trajectory& t
 
 /// Pairs by stamp when both have stamps (at most `max_difference_ns` apart), else by index. Throws
 /// std::invalid_argument.
-[[nodiscard]] PosePairs pair_poses(const PoseFile& truth, const PoseFile& estimate,
-                                   std::int64_t max_difference_ns);
+[[nodiscard]] evaluation::PosePairs pair_poses(const PoseFile& truth, const PoseFile& estimate,
+                                               std::int64_t max_difference_ns);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -7,26 +7,29 @@
 
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 constexpr double deg_per_rad = 180.0 / std::numbers::pi;
 
-void add_absolute(Table& table, const std::string& alignment, const AbsoluteError& error) {
+void add_absolute(Table& table, const std::string& alignment,
+                  const evaluation::AbsoluteTrajectoryError& error) {
   table.add({"ATE, aligned: " + alignment, fixed(error.rmse_m, 3) + " m",
              fixed(error.mean_m, 3) + " m", fixed(error.max_m, 3) + " m"});
 }
 
 }  // namespace
 
-TrajectoryReport report_trajectory(const PosePairs& pairs) {
-  return {.poses = pairs.size(),
-          .path_m = distance_travelled(pairs.truth).back(),
-          .unaligned = absolute_error(pairs, Alignment::none),
-          .first_aligned = absolute_error(pairs, Alignment::first_pose),
-          .rigid_aligned = absolute_error(pairs, Alignment::rigid),
-          .relative = relative_error(pairs),
-          .kitti = kitti_odometry_error(pairs)};
+TrajectoryReport report_trajectory(const evaluation::PosePairs& pairs) {
+  return {
+      .poses = pairs.size(),
+      .path_m = evaluation::distance_travelled(pairs.truth).back(),
+      .unaligned = evaluation::absolute_trajectory_error(pairs, evaluation::Alignment::none),
+      .first_aligned =
+          evaluation::absolute_trajectory_error(pairs, evaluation::Alignment::first_pose),
+      .rigid_aligned = evaluation::absolute_trajectory_error(pairs, evaluation::Alignment::rigid),
+      .relative = evaluation::relative_pose_error(pairs),
+      .kitti = evaluation::kitti_odometry_error(pairs)};
 }
 
 std::string describe(const TrajectoryReport& report) {
@@ -36,7 +39,7 @@ std::string describe(const TrajectoryReport& report) {
   add_absolute(table, "first pose", report.first_aligned);
   add_absolute(table, "best rigid fit", report.rigid_aligned);
   if (report.relative) {
-    const RelativeError& step = *report.relative;
+    const evaluation::RelativePoseError& step = *report.relative;
     table.add({"motion from pose to pose", fixed(100.0 * step.rmse_translation_m, 2) + " cm",
                fixed(100.0 * step.mean_translation_m, 2) + " cm",
                fixed(100.0 * step.max_translation_m, 2) + " cm"});
@@ -71,7 +74,7 @@ nlohmann::json to_json(const TrajectoryReport& report) {
   }
   if (report.kitti) {
     nlohmann::json by_length = nlohmann::json::array();
-    for (const KittiLengthError& length : report.kitti->by_length) {
+    for (const evaluation::KittiLengthError& length : report.kitti->by_length) {
       by_length.push_back({{"length_m", length.length_m},
                            {"segments", length.segments},
                            {"translation_percent", length.translation_percent},
@@ -86,7 +89,7 @@ nlohmann::json to_json(const TrajectoryReport& report) {
 }
 
 std::vector<std::filesystem::path> draw_trajectories(const std::filesystem::path& folder,
-                                                     const PosePairs& pairs,
+                                                     const evaluation::PosePairs& pairs,
                                                      const TrajectoryReport& report,
                                                      GroundPlane plane) {
   std::vector<Eigen::Vector3d> truth, estimate;
@@ -100,8 +103,8 @@ std::vector<std::filesystem::path> draw_trajectories(const std::filesystem::path
   const std::array<ChartLine, 2> lines{
       ChartLine{"error in m, best rigid fit", report.rigid_aligned.per_pose_m},
       ChartLine{"error in m, first poses aligned", report.first_aligned.per_pose_m}};
-  write_chart(errors, "distance in m", distance_travelled(pairs.truth), lines);
+  write_chart(errors, "distance in m", evaluation::distance_travelled(pairs.truth), lines);
   return {paths, errors};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

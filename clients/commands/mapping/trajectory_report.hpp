@@ -10,20 +10,20 @@
 #include "core/evaluation/relative_pose_error.hpp"
 #include "core/picture/trajectory_picture.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// All figures of an estimated trajectory against the truth.
 struct TrajectoryReport {
   std::size_t poses = 0;
   double path_m = 0.0;
-  AbsoluteError unaligned;
-  AbsoluteError first_aligned;
-  AbsoluteError rigid_aligned;
-  std::optional<RelativeError> relative;
-  std::optional<KittiOdometryError> kitti;
+  evaluation::AbsoluteTrajectoryError unaligned;
+  evaluation::AbsoluteTrajectoryError first_aligned;
+  evaluation::AbsoluteTrajectoryError rigid_aligned;
+  std::optional<evaluation::RelativePoseError> relative;
+  std::optional<evaluation::KittiOdometryError> kitti;
 };
 
-[[nodiscard]] TrajectoryReport report_trajectory(const PosePairs& pairs);
+[[nodiscard]] TrajectoryReport report_trajectory(const evaluation::PosePairs& pairs);
 
 /// As a table for people.
 [[nodiscard]] std::string describe(const TrajectoryReport& report);
@@ -32,8 +32,8 @@ struct TrajectoryReport {
 /// Writes trajectory.png (both paths, best rigid fit) and trajectory_error.png (error over
 /// distance) into the folder; returns their names. Throws std::runtime_error.
 std::vector<std::filesystem::path> draw_trajectories(const std::filesystem::path& folder,
-                                                     const PosePairs& pairs,
+                                                     const evaluation::PosePairs& pairs,
                                                      const TrajectoryReport& report,
                                                      GroundPlane plane);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,7 +6,7 @@
 
 #include "core/lidar/sensor_model.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 constexpr int points_a_ring = 1900;
@@ -21,7 +21,7 @@ double range_m(double yaw, double elevation) {
 
 }  // namespace
 
-Scan speed_scan() {
+Scan benchmark_scan() {
   const SensorModel sensor = hdl_64e();
   Scan scan;
   for (int ring = 0; ring < sensor.rings; ++ring) {
@@ -39,4 +39,4 @@ Scan speed_scan() {
   return scan;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

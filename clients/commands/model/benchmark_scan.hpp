@@ -2,10 +2,10 @@
 
 #include "core/lidar/scan.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// A scan as large as those of an HDL-64E (64 x 1900 points), with walls and poles made up by a
 /// formula: for timing, where what is seen does not matter.
-[[nodiscard]] Scan speed_scan();
+[[nodiscard]] Scan benchmark_scan();
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

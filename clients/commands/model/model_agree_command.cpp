@@ -12,7 +12,7 @@
 #include "core/segmentation/opencv_network.hpp"
 #include "core/segmentation/pixel_scores.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -31,8 +31,8 @@ struct Agreement {
   std::size_t values = 0;
 
   void add(std::span<const float> reference, std::span<const float> other, std::size_t outputs) {
-    const PixelOutputs a = most_probable(reference, outputs, ScoreKind::probabilities);
-    const PixelOutputs b = most_probable(other, outputs, ScoreKind::probabilities);
+    const PixelOutputs a = argmax_outputs(reference, outputs, ScoreKind::probabilities);
+    const PixelOutputs b = argmax_outputs(other, outputs, ScoreKind::probabilities);
     for (std::size_t i = 0; i < a.output.size(); ++i) same += a.output[i] == b.output[i] ? 1 : 0;
     pixels += a.output.size();
     for (std::size_t i = 0; i < reference.size(); ++i) {
@@ -114,4 +114,4 @@ void add_model_agree_command(CommandHandle model, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

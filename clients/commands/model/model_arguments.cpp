@@ -8,7 +8,7 @@
 #include "core/segmentation/bare_model.hpp"
 #include "core/segmentation/network_input.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 constexpr int default_rows = 64;
@@ -27,7 +27,7 @@ ModelDescription load_by(const ModelArguments& arguments, Load load) {
   if (rows > 0) model.rows = rows;
   if (columns > 0) {
     model.columns = columns;
-    model.least_columns = 0;
+    model.min_columns = 0;
   }
   return model;
 }
@@ -44,7 +44,7 @@ void add_model_options(CommandHandle command, ModelArguments& arguments) {
       .between(1, 512);
   command
       .option("--columns", arguments.columns, "Columns of the image; default: as model.yaml says")
-      .between(1, most_image_columns);
+      .between(1, max_image_columns);
 }
 
 ModelDescription load_model(const ModelArguments& arguments) {
@@ -76,4 +76,4 @@ std::vector<float> input_of(const ScanSample& sample, const ModelDescription& mo
   return make_network_input(scan, image, model);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

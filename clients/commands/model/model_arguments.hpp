@@ -8,7 +8,7 @@
 #include "core/dataset/scan_dataset.hpp"
 #include "core/segmentation/model_description.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// How a command line names a model and the size of its image.
 struct ModelArguments {
@@ -39,4 +39,4 @@ struct ScanSample {
 /// The model's input for the scan, of which `model` is for the recording's sensor.
 [[nodiscard]] std::vector<float> input_of(const ScanSample& sample, const ModelDescription& model);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

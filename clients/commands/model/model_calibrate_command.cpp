@@ -9,7 +9,7 @@
 #include "core/segmentation/activation_ranges.hpp"
 #include "core/segmentation/onednn_network.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -29,7 +29,8 @@ struct FittedNetwork {
       : model(for_sensor(any, sensor)), network(model, Precision::fp32) {}
 };
 
-ActivationRanges watch(const ModelDescription& model, const std::vector<ScanSample>& samples) {
+ActivationRanges observe_activations(const ModelDescription& model,
+                                     const std::vector<ScanSample>& samples) {
   std::map<const ScanDataset*, FittedNetwork> networks;
   ActivationRanges ranges;
   Progress progress("calibrate", "scans", samples.size());
@@ -52,7 +53,7 @@ ExitCode run(const Arguments& arguments) {
   std::vector<ScanDataset> datasets;
   for (const std::string& folder : arguments.datasets) datasets.emplace_back(folder);
   const std::vector<ScanSample> samples = choose_scans(datasets, arguments.scans);
-  const ActivationRanges ranges = watch(model, samples);
+  const ActivationRanges ranges = observe_activations(model, samples);
   Int8Calibration calibration;
   calibration.made = std::to_string(samples.size()) + " scans of " +
                      std::to_string(datasets.size()) + " recordings";
@@ -93,4 +94,4 @@ void add_model_calibrate_command(CommandHandle model, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -1,6 +1,6 @@
 #include "clients/commands/command.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 void add_model_command(CommandHandle program, Action& action) {
   CommandHandle model = program.command(
@@ -16,4 +16,4 @@ void add_model_command(CommandHandle program, Action& action) {
       "'stillmap model STEP --help' shows options and examples.");
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -7,7 +7,7 @@
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/onednn_network.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -24,9 +24,9 @@ void print_description(const ModelDescription& model) {
   line("sensor    ", model.sensor);
   line("training  ", model.training);
   line("accuracy  ", model.accuracy);
-  const std::string least = std::to_string(model.least_columns);
+  const std::string least = std::to_string(model.min_columns);
   line("image     ", std::to_string(model.rows) + "x" + std::to_string(model.columns) +
-                         (model.least_columns > 0 ? ", down to " + least + " columns" : "") +
+                         (model.min_columns > 0 ? ", down to " + least + " columns" : "") +
                          (model.follow_sensor ? ", rows as the sensor has rings" : ""));
   line("outputs   ", std::to_string(model.classes.size()));
   line("int8      ", model.int8 ? "calibrated: " + model.int8->made : "not calibrated");
@@ -66,4 +66,4 @@ void add_model_info_command(CommandHandle model, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -1,12 +1,12 @@
 #include <iostream>
 #include <memory>
 
-#include "clients/commands/command.hpp"
 #include "clients/commands/arguments/engine_arguments.hpp"
+#include "clients/commands/command.hpp"
 #include "clients/commands/model/model_arguments.hpp"
 #include "core/dataset/binary_file.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -17,7 +17,7 @@ struct Arguments {
 
 ExitCode run(const Arguments& arguments) {
   const ModelDescription model = load_model(arguments.model);
-  EngineChoice choice;
+  EngineOptions choice;
   set_engine(arguments.engine, choice);
   const OpenedNetwork opened = open_network(model, choice);
   const std::size_t values_an_image = input_channels * static_cast<std::size_t>(model.rows) *
@@ -59,4 +59,4 @@ void add_model_run_command(CommandHandle model, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

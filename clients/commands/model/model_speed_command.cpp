@@ -4,14 +4,14 @@
 #include <stdexcept>
 
 #include "clients/commands/command.hpp"
+#include "clients/commands/model/benchmark_scan.hpp"
 #include "clients/commands/model/model_arguments.hpp"
 #include "clients/commands/model/model_timing.hpp"
-#include "clients/commands/model/benchmark_scan.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -30,18 +30,18 @@ std::uint32_t whole_number(const std::string& text) {
 }
 
 std::vector<std::string> row(const ModelDescription& model, const std::string& engine,
-                             const LabelTiming& timing) {
-  const double total = timing.projection_ms + timing.network_ms + timing.votes_ms;
+                             const SegmentationTiming& timing) {
+  const double total = timing.projection_ms + timing.network_ms + timing.knn_ms;
   return {model.name,
           std::to_string(model.rows) + "x" + std::to_string(model.columns),
           engine,
           fixed(timing.projection_ms, 1),
           fixed(timing.network_ms, 1),
-          fixed(timing.votes_ms, 1),
+          fixed(timing.knn_ms, 1),
           fixed(total, 1),
-          fixed(timing.giga_per_s, 0),
-          fixed(timing.peak_giga_per_s, 0),
-          fixed(100.0 * timing.giga_per_s / timing.peak_giga_per_s, 0),
+          fixed(timing.gops, 0),
+          fixed(timing.peak_gops, 0),
+          fixed(100.0 * timing.gops / timing.peak_gops, 0),
           fixed(timing.memory_mb, 0)};
 }
 
@@ -53,13 +53,14 @@ void time_model(const ModelDescription& model, const Scan& scan, const Arguments
     if (arguments.skip_opencv && engine.name.starts_with("OpenCV")) continue;
     std::cerr << "stillmap: timing " << model.name << ", " << model.columns << " columns, "
               << engine.name << "\n";
-    table.add(row(model, engine.name, time_labels(model, engine, scan, giga_operations, threads)));
+    table.add(
+        row(model, engine.name, time_segmentation(model, engine, scan, giga_operations, threads)));
   }
 }
 
 ExitCode run(const Arguments& arguments) {
-  const Scan scan =
-      arguments.dataset.empty() ? speed_scan() : open_recording(arguments.dataset).read(0).scan;
+  const Scan scan = arguments.dataset.empty() ? benchmark_scan()
+                                              : dds::open_sequence(arguments.dataset).read(0).scan;
   Table table({"network", "image", "engine", "project ms", "network ms", "k-NN ms", "total ms",
                "Gop/s", "peak", "%", "MB"});
   for (const std::string& model_path : arguments.models) {
@@ -102,4 +103,4 @@ void add_model_speed_command(CommandHandle model, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

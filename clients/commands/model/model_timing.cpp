@@ -13,7 +13,7 @@
 #include "core/segmentation/network_segmenter.hpp"
 #include "core/segmentation/opencv_network.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 using Clock = std::chrono::steady_clock;
@@ -36,12 +36,12 @@ Int8Calibration calibrate_on(const ModelDescription& model, const std::vector<fl
 }  // namespace
 
 double median_ms(const std::function<void()>& work) {
-  constexpr double enough_ms = 2000.0;
-  constexpr std::size_t fewest = 5, most = 40;
+  constexpr double target_ms = 2000.0;
+  constexpr std::size_t min_runs = 5, max_runs = 40;
   work();
   std::vector<double> times;
   double total = 0.0;
-  while (times.size() < fewest || (total < enough_ms && times.size() < most)) {
+  while (times.size() < min_runs || (total < target_ms && times.size() < max_runs)) {
     times.push_back(ms_of(work));
     total += times.back();
   }
@@ -50,7 +50,7 @@ double median_ms(const std::function<void()>& work) {
   return *middle;
 }
 
-double peak_giga_per_s(Precision precision, int threads) {
+double peak_gops(Precision precision, int threads) {
   constexpr int runs = 8;
   MatrixProduct product(precision, threads);
   double fastest_ms = ms_of([&] { product.run(); });
@@ -88,10 +88,10 @@ std::vector<TimedEngine> timed_engines(const ModelDescription& model, const Scan
           {"oneDNN int8", Precision::int8, onednn(calibrated, Precision::int8)}};
 }
 
-LabelTiming time_labels(const ModelDescription& model, const TimedEngine& engine, const Scan& scan,
-                        double giga_operations, int threads) {
-  LabelTiming timing;
-  timing.peak_giga_per_s = peak_giga_per_s(engine.precision, threads);
+SegmentationTiming time_segmentation(const ModelDescription& model, const TimedEngine& engine,
+                                     const Scan& scan, double giga_operations, int threads) {
+  SegmentationTiming timing;
+  timing.peak_gops = peak_gops(engine.precision, threads);
   const auto project = [&] {
     const RangeImage image(scan.points_lidar, model.projection());
     return make_network_input(scan, image, model);
@@ -103,12 +103,12 @@ LabelTiming time_labels(const ModelDescription& model, const TimedEngine& engine
   PixelOutputs outputs;
   timing.network_ms = median_ms([&] { outputs = network->run(input); });
   timing.memory_mb = resident_mb() - before_mb;
-  timing.giga_per_s = giga_operations / timing.network_ms * 1e3;
+  timing.gops = giga_operations / timing.network_ms * 1e3;
   const RangeImage image(scan.points_lidar, model.projection());
   const PixelLabels pixels = pixel_labels(std::move(outputs), model);
-  const KnnConfig votes = model.knn.value_or(KnnConfig{});
-  timing.votes_ms = median_ms([&] { (void)knn_labels(image, pixels, votes); });
+  const KnnConfig knn = model.knn.value_or(KnnConfig{});
+  timing.knn_ms = median_ms([&] { (void)knn_labels(image, pixels, knn); });
   return timing;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -10,25 +10,25 @@
 #include "core/segmentation/onednn_network.hpp"
 #include "core/segmentation/segmentation_network.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// Median of how long `work` takes [ms], once warm: 5 to 40 runs, about two seconds.
 [[nodiscard]] double median_ms(const std::function<void()>& work);
 
 /// What the machine reaches now in a large matrix product [10^9 operations a second].
-[[nodiscard]] double peak_giga_per_s(Precision precision, int threads);
+[[nodiscard]] double peak_gops(Precision precision, int threads);
 
 /// Resident memory of this process [MB], what was freed given back first.
 [[nodiscard]] double resident_mb();
 
 /// Medians of the stages from a scan to the classes of its points [ms].
-struct LabelTiming {
+struct SegmentationTiming {
   double projection_ms = 0.0;
   double network_ms = 0.0;
-  double votes_ms = 0.0;
+  double knn_ms = 0.0;
   /// Operations a second of the network, and of a matrix product just before [10^9].
-  double giga_per_s = 0.0;
-  double peak_giga_per_s = 0.0;
+  double gops = 0.0;
+  double peak_gops = 0.0;
   /// Growth of the process by the network [MB].
   double memory_mb = 0.0;
 };
@@ -46,7 +46,8 @@ struct TimedEngine {
                                                      const Scan& scan, int threads);
 
 /// `giga_operations`: of the network for one scan.
-[[nodiscard]] LabelTiming time_labels(const ModelDescription& model, const TimedEngine& engine,
-                                      const Scan& scan, double giga_operations, int threads);
+[[nodiscard]] SegmentationTiming time_segmentation(const ModelDescription& model,
+                                                   const TimedEngine& engine, const Scan& scan,
+                                                   double giga_operations, int threads);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

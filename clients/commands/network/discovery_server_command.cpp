@@ -6,18 +6,18 @@
 #include "clients/library/discovery_server.hpp"
 #include "clients/terminal/stop_signal.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
   int port = 11811;
   std::uint32_t domain = 0;
-  DdsChoice network;
+  DdsNetworkConfig network;
 };
 
 ExitCode run(const Arguments& arguments) {
   StopSignal stop;
-  DdsOptions options = dds_options(arguments.network, DdsRole::client);
+  dds::DdsOptions options = dds_options(arguments.network, DdsRole::client);
   options.domain_id = arguments.domain;
   options.discovery_port = static_cast<std::uint16_t>(arguments.port);
   // It carries no data.
@@ -55,4 +55,4 @@ void add_discovery_server_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -8,7 +8,7 @@
 #include "clients/commands/network/doctor_report.hpp"
 #include "clients/doctor/collect_snapshot.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -37,16 +37,17 @@ ExitCode run(const Arguments& arguments) {
     std::cerr << "removed " << remove_stale_segments(arguments.host_root)
               << " shared memory segments of dead processes\n";
   }
-  const Evidence evidence = gather(options_of(arguments));
-  const Findings findings = diagnose(evidence);
+  const SystemSnapshot snapshot = collect_snapshot(options_of(arguments));
+  const Diagnostics diagnostics = diagnose(snapshot);
   if (arguments.json) {
-    std::cout << doctor_json(evidence, findings).dump(2) << "\n";
+    std::cout << doctor_json(snapshot, diagnostics).dump(2) << "\n";
   } else {
-    std::cout << doctor_text(evidence, findings, arguments.endpoints);
+    std::cout << doctor_text(snapshot, diagnostics, arguments.endpoints);
   }
-  const bool is_ill = std::ranges::any_of(
-      findings, [](const Finding& finding) { return finding.severity == Severity::problem; });
-  return is_ill ? ExitCode::failed : ExitCode::ok;
+  const bool has_problem = std::ranges::any_of(diagnostics, [](const dds::Diagnostic& diagnostic) {
+    return diagnostic.severity == dds::Severity::problem;
+  });
+  return has_problem ? ExitCode::failed : ExitCode::ok;
 }
 
 }  // namespace
@@ -81,4 +82,4 @@ void add_doctor_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

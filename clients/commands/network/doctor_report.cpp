@@ -5,7 +5,7 @@
 
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 using nlohmann::json;
@@ -14,108 +14,117 @@ std::string counted(std::size_t count, const std::string& thing) {
   return std::to_string(count) + " " + thing + (count == 1 ? "" : "s");
 }
 
-const char* name(Severity severity) { return severity == Severity::problem ? "problem" : "advice"; }
-
-std::size_t count(const Findings& findings, Severity severity) {
-  return static_cast<std::size_t>(std::ranges::count(findings, severity, &Finding::severity));
+const char* name(dds::Severity severity) {
+  return severity == dds::Severity::problem ? "problem" : "advice";
 }
 
-std::string peer_table(const Evidence& evidence) {
-  if (evidence.peers.empty()) return {};
+std::size_t count(const Diagnostics& diagnostics, dds::Severity severity) {
+  return static_cast<std::size_t>(
+      std::ranges::count(diagnostics, severity, &dds::Diagnostic::severity));
+}
+
+std::string participant_table(const SystemSnapshot& snapshot) {
+  if (snapshot.participants.empty()) return {};
   Table table({"peer", "vendor", "where", "writers", "readers", "security"});
-  for (const Peer& peer : evidence.peers) {
-    const auto writers = std::ranges::count(peer.endpoints, true, &Endpoint::is_writer);
-    const auto all = static_cast<std::ptrdiff_t>(peer.endpoints.size());
-    table.add({peer.name, peer.vendor, whereabouts(peer), std::to_string(writers),
-               std::to_string(all - writers),
-               peer.refused ? "refused" : (peer.is_secured ? "yes" : "no")});
+  for (const dds::RemoteParticipant& participant : snapshot.participants) {
+    const auto writers = std::ranges::count(participant.endpoints, true, &dds::Endpoint::is_writer);
+    const auto all = static_cast<std::ptrdiff_t>(participant.endpoints.size());
+    table.add({participant.name, participant.vendor, dds::describe_location(participant),
+               std::to_string(writers), std::to_string(all - writers),
+               participant.refused ? "refused" : (participant.is_secured ? "yes" : "no")});
   }
   return table.text() + "\n";
 }
 
-std::string endpoint_table(const Evidence& evidence) {
+std::string endpoint_table(const SystemSnapshot& snapshot) {
   Table table({"topic", "end", "peer", "quality of service", "type"});
-  for (const Peer& peer : evidence.peers) {
-    for (const Endpoint& endpoint : peer.endpoints) {
-      table.add({endpoint.topic, endpoint.is_writer ? "writer" : "reader", peer.name,
+  for (const dds::RemoteParticipant& participant : snapshot.participants) {
+    for (const dds::Endpoint& endpoint : participant.endpoints) {
+      table.add({endpoint.topic, endpoint.is_writer ? "writer" : "reader", participant.name,
                  describe(endpoint.qos), endpoint.type});
     }
   }
   return table.text() + "\n";
 }
 
-std::string other_domains(const Evidence& evidence) {
+std::string other_domains(const SystemSnapshot& snapshot) {
   std::string text;
-  for (const OtherDomain& domain : evidence.other_domains) {
+  for (const OtherDomain& domain : snapshot.other_domains) {
     text += (text.empty() ? "" : ", ") + std::to_string(domain.id);
-    if (!domain.peers.empty()) text += " (" + counted(domain.peers.size(), "peer") + ")";
+    if (!domain.participants.empty())
+      text += " (" + counted(domain.participants.size(), "peer") + ")";
   }
   return text.empty() ? "" : "other domains in use: " + text + "\n";
 }
 
-std::string text_of(const Finding& finding) {
-  const std::string label = finding.severity == Severity::problem ? "PROBLEM" : "ADVICE ";
-  return label + "  " + finding.what + "\n         seen: " + finding.evidence +
-         "\n         do:   " + finding.way_out + "\n\n";
+std::string text_of(const dds::Diagnostic& diagnostic) {
+  const std::string label = diagnostic.severity == dds::Severity::problem ? "PROBLEM" : "ADVICE ";
+  return label + "  " + diagnostic.what + "\n         seen: " + diagnostic.evidence +
+         "\n         do:   " + diagnostic.hint + "\n\n";
 }
 
-json json_of(const Endpoint& endpoint) {
+json json_of(const dds::Endpoint& endpoint) {
   return {{"topic", endpoint.topic},
           {"type", endpoint.type},
           {"end", endpoint.is_writer ? "writer" : "reader"},
           {"qos", describe(endpoint.qos)}};
 }
 
-json json_of(const Peer& peer) {
+json json_of(const dds::RemoteParticipant& participant) {
   json endpoints = json::array();
-  for (const Endpoint& endpoint : peer.endpoints) endpoints.push_back(json_of(endpoint));
-  return {{"name", peer.name},
-          {"vendor", peer.vendor},
-          {"host", peer.host},
-          {"process", peer.process},
-          {"user", peer.user},
-          {"addresses", peer.addresses},
-          {"this_host", peer.is_on_this_host},
-          {"secured", peer.is_secured},
-          {"refused", peer.refused},
+  for (const dds::Endpoint& endpoint : participant.endpoints)
+    endpoints.push_back(json_of(endpoint));
+  return {{"name", participant.name},
+          {"vendor", participant.vendor},
+          {"host", participant.host},
+          {"process", participant.process},
+          {"user", participant.user},
+          {"addresses", participant.addresses},
+          {"this_host", participant.is_on_this_host},
+          {"secured", participant.is_secured},
+          {"refused", participant.refused},
           {"endpoints", endpoints}};
 }
 
 json json_of(const OtherDomain& domain) {
-  json peers = json::array();
-  for (const Peer& peer : domain.peers) peers.push_back(json_of(peer));
-  return {{"id", domain.id}, {"senders", domain.senders}, {"peers", peers}};
+  json participants = json::array();
+  for (const dds::RemoteParticipant& participant : domain.participants)
+    participants.push_back(json_of(participant));
+  return {{"id", domain.id}, {"senders", domain.senders}, {"peers", participants}};
 }
 
 }  // namespace
 
-std::string doctor_text(const Evidence& evidence, const Findings& findings, bool endpoints) {
-  std::string text = "domain " + std::to_string(evidence.dds.domain_id) + ": " +
-                     counted(evidence.peers.size(), "peer") + "\n" + other_domains(evidence) + "\n";
-  text += peer_table(evidence);
-  if (endpoints) text += endpoint_table(evidence);
-  for (const Finding& finding : findings) text += text_of(finding);
-  if (findings.empty()) return text + "nothing is wrong\n";
-  return text + counted(count(findings, Severity::problem), "problem") + ", " +
-         counted(count(findings, Severity::advice), "piece") + " of advice\n";
+std::string doctor_text(const SystemSnapshot& snapshot, const Diagnostics& diagnostics,
+                        bool endpoints) {
+  std::string text = "domain " + std::to_string(snapshot.dds.domain_id) + ": " +
+                     counted(snapshot.participants.size(), "peer") + "\n" +
+                     other_domains(snapshot) + "\n";
+  text += participant_table(snapshot);
+  if (endpoints) text += endpoint_table(snapshot);
+  for (const dds::Diagnostic& diagnostic : diagnostics) text += text_of(diagnostic);
+  if (diagnostics.empty()) return text + "nothing is wrong\n";
+  return text + counted(count(diagnostics, dds::Severity::problem), "problem") + ", " +
+         counted(count(diagnostics, dds::Severity::advice), "piece") + " of advice\n";
 }
 
-json doctor_json(const Evidence& evidence, const Findings& findings) {
-  json peers = json::array(), domains = json::array(), list = json::array();
-  for (const Peer& peer : evidence.peers) peers.push_back(json_of(peer));
-  for (const OtherDomain& domain : evidence.other_domains) domains.push_back(json_of(domain));
-  for (const Finding& finding : findings) {
-    list.push_back({{"severity", name(finding.severity)},
-                    {"what", finding.what},
-                    {"evidence", finding.evidence},
-                    {"way_out", finding.way_out}});
+json doctor_json(const SystemSnapshot& snapshot, const Diagnostics& diagnostics) {
+  json participants = json::array(), domains = json::array(), list = json::array();
+  for (const dds::RemoteParticipant& participant : snapshot.participants)
+    participants.push_back(json_of(participant));
+  for (const OtherDomain& domain : snapshot.other_domains) domains.push_back(json_of(domain));
+  for (const dds::Diagnostic& diagnostic : diagnostics) {
+    list.push_back({{"severity", name(diagnostic.severity)},
+                    {"what", diagnostic.what},
+                    {"evidence", diagnostic.evidence},
+                    {"way_out", diagnostic.hint}});
   }
-  return {{"domain", evidence.dds.domain_id},
-          {"problems", count(findings, Severity::problem)},
+  return {{"domain", snapshot.dds.domain_id},
+          {"problems", count(diagnostics, dds::Severity::problem)},
           {"findings", list},
-          {"peers", peers},
+          {"peers", participants},
           {"other_domains", domains},
-          {"udp_buffer_bytes", evidence.granted_buffer_bytes}};
+          {"udp_buffer_bytes", snapshot.granted_buffer_bytes}};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -5,13 +5,14 @@
 
 #include "clients/doctor/checks.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// Who is there, and what is wrong: for people. `endpoints`: every reader and writer, too.
-[[nodiscard]] std::string doctor_text(const Evidence& evidence, const Findings& findings,
-                                      bool endpoints);
+[[nodiscard]] std::string doctor_text(const SystemSnapshot& snapshot,
+                                      const Diagnostics& diagnostics, bool endpoints);
 
 /// The same with everything that was seen.
-[[nodiscard]] nlohmann::json doctor_json(const Evidence& evidence, const Findings& findings);
+[[nodiscard]] nlohmann::json doctor_json(const SystemSnapshot& snapshot,
+                                         const Diagnostics& diagnostics);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

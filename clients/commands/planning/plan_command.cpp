@@ -15,7 +15,7 @@
 #include "core/map/storage/map_file.hpp"
 #include "core/picture/traversability_picture.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -26,7 +26,7 @@ struct Arguments {
   std::string profile = "car";
   bool through_unknown = false;
   double time_s = 2.0;
-  std::uint64_t steps = PlanningConfig{}.max_work;
+  std::uint64_t steps = PlanningConfig{}.max_steps;
   std::uint32_t seed = 1;
   std::string planner = std::string(name(PlannerKind::rrt_connect));
   std::string sampling = "route";
@@ -40,7 +40,7 @@ struct Arguments {
 };
 
 /// "x,y" or "x,y,heading": metres and degrees.
-PlanPlace place_of(const std::string& option, const std::string& text) {
+Goal place_of(const std::string& option, const std::string& text) {
   std::vector<double> values;
   const char* at = text.data();
   const char* const end = at + text.size();
@@ -57,7 +57,7 @@ PlanPlace place_of(const std::string& option, const std::string& text) {
                                 ": must be x,y or x,y,heading in metres and degrees of the map "
                                 "frame, as 12.5,-3 or 12.5,-3,90");
   }
-  PlanPlace place{{values[0], values[1]}, std::nullopt};
+  Goal place{{values[0], values[1]}, std::nullopt};
   if (values.size() == 3) place.heading_rad = values[2] * std::numbers::pi / 180.0;
   return place;
 }
@@ -84,7 +84,7 @@ PlanTask task_of(const Arguments& arguments) {
   task.to = place_of("--to", arguments.to);
   task.config.planner = planner_of(arguments.planner);
   task.config.route_guided = arguments.sampling == "route";
-  task.config.max_work = arguments.steps;
+  task.config.max_steps = arguments.steps;
   task.config.seed = arguments.seed;
   task.time_limit_s = arguments.time_s;
   const std::string faults = task.config.faults();
@@ -107,14 +107,14 @@ void print(const Arguments& arguments, const TimedPlan& timed) {
   }
 }
 
-void show(const Arguments& arguments, const PlanRun& run) {
-  print(arguments, run.last());
-  if (!arguments.output.empty()) write_plan(arguments.output, run.last());
+void show(const Arguments& arguments, const Replanner& replanner) {
+  print(arguments, replanner.last());
+  if (!arguments.output.empty()) write_plan(arguments.output, replanner.last());
   if (arguments.picture.empty()) return;
-  const std::vector<PlanarPose> path_map = run.last().plan.path_map();
+  const std::vector<PlanarPose> path_map = replanner.last().plan.path_map();
   TraversabilityPictureOptions options;
   options.path_map = path_map;
-  write_traversability_picture(arguments.picture, run.area(), options);
+  write_traversability_picture(arguments.picture, replanner.traversability(), options);
 }
 
 ExitCode code_of(const TimedPlan& timed) {
@@ -132,20 +132,20 @@ ExitCode plan_on_file(const Arguments& arguments) {
   if (!std::filesystem::exists(arguments.map)) {
     throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
   }
-  const StoredMap map = open_map_file(arguments.map)->load();
+  const SavedMap map = open_map_file(arguments.map)->load();
   if (!task.from) {
     throw std::invalid_argument("--from: a stored map has no robot; give x,y or x,y,heading");
   }
-  PlanRun run(std::move(task));
-  (void)run.plan(map.view, std::nullopt);
-  show(arguments, run);
-  return code_of(run.last());
+  Replanner replanner(std::move(task));
+  (void)replanner.plan(map.view, std::nullopt);
+  show(arguments, replanner);
+  return code_of(replanner.last());
 }
 
 /// Plans again whenever the map asks for it, until the limits are reached.
-void follow(const Arguments& arguments, PlanRun& run, const TileMirror& mirror,
-            std::shared_ptr<const MapView> map, const std::optional<RobotPlace>& robot,
-            StopSignal& stop) {
+void follow(const Arguments& arguments, Replanner& replanner, const TileMirror& mirror,
+            std::shared_ptr<const MapSnapshot> map,
+            const std::optional<RobotPoseSubscription>& robot, StopSignal& stop) {
   const auto began = std::chrono::steady_clock::now();
   const auto is_over = [&](std::uint64_t plans) {
     const std::chrono::duration<double> followed = std::chrono::steady_clock::now() - began;
@@ -156,9 +156,10 @@ void follow(const Arguments& arguments, PlanRun& run, const TileMirror& mirror,
     const auto newest = mirror.wait_for_change(map, std::chrono::milliseconds(50));
     if (newest == map) continue;
     map = newest;
-    if (!run.follow(*map, robot ? std::optional(robot->now()) : std::nullopt)) continue;
+    if (!replanner.replan_if_needed(*map, robot ? std::optional(robot->pose()) : std::nullopt))
+      continue;
     ++plans;
-    show(arguments, run);
+    show(arguments, replanner);
   }
 }
 
@@ -167,17 +168,17 @@ ExitCode plan_on_server(const Arguments& arguments) {
   StopSignal stop;
   Client client = connect(arguments.client);
   TileMirror mirror;
-  const Subscription tiles =
-      client.subscribe_region(BoxRegion{}, [&](const RegionNews& news) { mirror.apply(news); });
+  const Subscription tiles = client.subscribe_region(
+      BoxRegion{}, [&](const RegionUpdate& update) { mirror.apply(update); });
   wait_for_whole_map(client, mirror, arguments.client.timeout());
-  std::optional<RobotPlace> robot;
+  std::optional<RobotPoseSubscription> robot;
   if (!task.from) robot.emplace(client, arguments.client.timeout());
-  PlanRun run(std::move(task));
-  const auto map = mirror.view();
-  (void)run.plan(*map, robot ? std::optional(robot->now()) : std::nullopt);
-  show(arguments, run);
-  if (arguments.follow) follow(arguments, run, mirror, map, robot, stop);
-  return code_of(run.last());
+  Replanner replanner(std::move(task));
+  const auto map = mirror.snapshot();
+  (void)replanner.plan(*map, robot ? std::optional(robot->pose()) : std::nullopt);
+  show(arguments, replanner);
+  if (arguments.follow) follow(arguments, replanner, mirror, map, robot, stop);
+  return code_of(replanner.last());
 }
 
 ExitCode run(const Arguments& arguments) {
@@ -242,4 +243,4 @@ void add_plan_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

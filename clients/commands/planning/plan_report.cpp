@@ -7,7 +7,7 @@
 
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 double heading_deg(const PlannedPose& pose) {
@@ -25,8 +25,8 @@ nlohmann::json pose_json(const PlannedPose& pose) {
 
 /// Poses some metres apart, and both ends.
 std::string pose_table(const PathPlan& plan) {
-  constexpr double most_rows = 20.0;
-  const double spacing_m = std::max(1.0, plan.length_m / most_rows);
+  constexpr double max_rows = 20.0;
+  const double spacing_m = std::max(1.0, plan.length_m / max_rows);
   Table table({"along m", "x", "y", "z", "heading deg", "gear"});
   double next_m = 0.0;
   for (const PlannedPose& pose : plan.poses) {
@@ -50,7 +50,7 @@ std::string figures(const TimedPlan& timed) {
 std::string times(const TimedPlan& timed) {
   std::string text = "planned in " + fixed(timed.plan_ms, 0) + " ms";
   if (timed.first_ms) text += " (a first path after " + fixed(*timed.first_ms, 0) + " ms)";
-  return text + ", area in " + fixed(timed.area_ms, 0) + " ms";
+  return text + ", area in " + fixed(timed.traversability_ms, 0) + " ms";
 }
 
 void write_csv(std::ostream& out, const PathPlan& plan) {
@@ -74,10 +74,10 @@ nlohmann::json to_json(const TimedPlan& timed, bool with_poses) {
                       {"clearance_m", plan.clearance_m},
                       {"cost", plan.cost},
                       {"route_m", plan.route_m},
-                      {"work", plan.work},
+                      {"work", plan.steps},
                       {"map_version", plan.map_version},
                       {"poses", plan.poses.size()},
-                      {"area_ms", timed.area_ms},
+                      {"area_ms", timed.traversability_ms},
                       {"plan_ms", timed.plan_ms}};
   if (timed.first_ms) json["first_ms"] = *timed.first_ms;
   if (!timed.cause.empty()) json["cause"] = timed.cause;
@@ -128,4 +128,4 @@ void write_plan(const std::filesystem::path& file, const TimedPlan& timed) {
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -7,13 +7,13 @@
 
 #include "core/planning/path_plan.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// A plan and how long it took.
 struct TimedPlan {
   PathPlan plan;
   /// Bringing the traversable area up to date [ms].
-  double area_ms = 0.0;
+  double traversability_ms = 0.0;
   double plan_ms = 0.0;
   /// Until the search had its first path [ms]; unknown of planners that do not tell.
   std::optional<double> first_ms;
@@ -37,4 +37,4 @@ void write_plan(const std::filesystem::path& file, const TimedPlan& timed);
 /// Throws std::invalid_argument when write_plan would refuse the name.
 void check_plan_file(const std::filesystem::path& file);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

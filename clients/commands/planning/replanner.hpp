@@ -5,60 +5,60 @@
 #include <optional>
 #include <string>
 
-#include "clients/library/client.hpp"
 #include "clients/commands/planning/plan_report.hpp"
+#include "clients/library/client.hpp"
 #include "clients/library/tile_mirror.hpp"
-#include "core/planning/path_planner.hpp"
 #include "core/planning/path_monitor.hpp"
+#include "core/planning/path_planner.hpp"
 #include "core/traversability/traversability_map.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// What a planning client wants.
 struct PlanTask {
   RobotProfile profile;
   /// Without one, the robot's newest pose.
-  std::optional<PlanPlace> from;
-  PlanPlace to;
+  std::optional<Goal> from;
+  Goal to;
   PlanningConfig config;
   /// Longest search [s].
   double time_limit_s = 2.0;
 };
 
 /// Plans on states of a map as they come, and remembers the last plan.
-class PlanRun {
+class Replanner {
  public:
-  explicit PlanRun(PlanTask task);
+  explicit Replanner(PlanTask task);
 
   /// Brings the area to this map and plans. @pre the task has a start, or `robot` is one
-  const TimedPlan& plan(const MapView& map, const std::optional<PlanPlace>& robot);
+  const TimedPlan& plan(const MapSnapshot& map, const std::optional<Goal>& robot);
 
   /// Plans again if the map asks for it: the path is not free any more, or its way changed.
   /// Whether it did.
-  bool follow(const MapView& map, const std::optional<PlanPlace>& robot);
+  bool replan_if_needed(const MapSnapshot& map, const std::optional<Goal>& robot);
 
   [[nodiscard]] const TimedPlan& last() const { return last_; }
-  [[nodiscard]] const TraversabilityView& area() const { return *area_; }
+  [[nodiscard]] const TraversabilityView& traversability() const { return *traversability_; }
 
  private:
-  void update(const MapView& map);
-  void search(const std::optional<PlanPlace>& robot, const std::string& cause);
+  void update(const MapSnapshot& map);
+  void search(const std::optional<Goal>& robot, const std::string& cause);
 
   PlanTask task_;
   TraversabilityMap map_;
-  std::shared_ptr<const TraversabilityView> area_;
-  double area_ms_ = 0.0;
+  std::shared_ptr<const TraversabilityView> traversability_;
+  double traversability_ms_ = 0.0;
   TimedPlan last_;
-  std::optional<PathWatch> watch_;
+  std::optional<PathMonitor> watch_;
 };
 
 /// Where the robot of a server is, from its path so far and then from its odometry.
-class RobotPlace {
+class RobotPoseSubscription {
  public:
   /// Waits for a pose; throws ServiceTimeout when there is none in time.
-  RobotPlace(Client& client, std::chrono::milliseconds timeout);
+  RobotPoseSubscription(Client& client, std::chrono::milliseconds timeout);
 
-  [[nodiscard]] PlanPlace now() const;
+  [[nodiscard]] Goal pose() const;
 
  private:
   void set(const StampedPose& pose);
@@ -69,4 +69,4 @@ class RobotPlace {
   Subscription odometry_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -5,7 +5,7 @@
 #include <optional>
 #include <stdexcept>
 
-namespace stillmap {
+namespace stillmap::cli {
 
 std::bitset<semantic_class_count> classes_of(const std::vector<std::string>& names) {
   std::bitset<semantic_class_count> classes;
@@ -38,4 +38,4 @@ std::bitset<3> motions_of(const std::vector<std::string>& names) {
   return motions;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

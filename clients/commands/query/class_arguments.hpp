@@ -6,7 +6,7 @@
 
 #include "core/lidar/semantic_class.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// The classes of these names. Throws std::invalid_argument listing the known ones.
 [[nodiscard]] std::bitset<semantic_class_count> classes_of(const std::vector<std::string>& names);
@@ -15,4 +15,4 @@ namespace stillmap {
 /// highly-dynamic. Throws std::invalid_argument.
 [[nodiscard]] std::bitset<3> motions_of(const std::vector<std::string>& names);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -2,9 +2,9 @@
 
 #include "core/dataset/point_cloud_files.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
-bool is_cloud_name(const std::string& file) {
+bool is_cloud_file(const std::string& file) {
   return file.ends_with(".pcd") || file.ends_with(".ply");
 }
 
@@ -17,4 +17,4 @@ void write_cloud(const std::string& file, const std::vector<QueryVoxel>& voxels)
   file.ends_with(".pcd") ? write_pcd(file, points) : write_ply(file, points);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,9 +6,9 @@
 #include <mutex>
 #include <utility>
 
-namespace stillmap {
+namespace stillmap::cli {
 
-Trajectory newest_path(Client& client, std::chrono::milliseconds timeout) {
+Trajectory fetch_trajectory(Client& client, std::chrono::milliseconds timeout) {
   std::mutex mutex;
   std::condition_variable arrived;
   Trajectory newest;
@@ -25,16 +25,16 @@ Trajectory newest_path(Client& client, std::chrono::milliseconds timeout) {
   return newest;
 }
 
-MapView fetch_map(Client& client) {
+MapSnapshot fetch_map(Client& client) {
   const TileVersions versions = client.get_tile_versions();
   std::vector<TileId> ids;
   for (const TileInfo& info : versions.tiles) ids.push_back(info.id);
   TileSet set = client.get_tiles(ids);
-  MapView view{.version = set.map.version,
-               .map_id = set.map.map_id,
-               .tile_size_m = versions.map.tile_size_m,
-               .voxel_size_m = versions.map.voxel_size_m,
-               .tiles = {}};
+  MapSnapshot view{.version = set.map.version,
+                   .map_id = set.map.map_id,
+                   .tile_size_m = versions.map.tile_size_m,
+                   .voxel_size_m = versions.map.voxel_size_m,
+                   .tiles = {}};
   for (Tile& tile : set.tiles) {
     view.tiles.push_back(std::make_shared<const Tile>(std::move(tile)));
   }
@@ -43,4 +43,4 @@ MapView fetch_map(Client& client) {
   return view;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,12 +4,12 @@
 
 #include "clients/library/client.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// The poses since the server's map began. Throws ServiceTimeout when there are none in time.
-[[nodiscard]] Trajectory newest_path(Client& client, std::chrono::milliseconds timeout);
+[[nodiscard]] Trajectory fetch_trajectory(Client& client, std::chrono::milliseconds timeout);
 
 /// All tiles of the server's map, as they are now.
-[[nodiscard]] MapView fetch_map(Client& client);
+[[nodiscard]] MapSnapshot fetch_map(Client& client);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

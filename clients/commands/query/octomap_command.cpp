@@ -12,7 +12,7 @@
 #include "core/occupancy/occupancy_map.hpp"
 #include "core/occupancy/octomap_file.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -60,7 +60,7 @@ OccupancyQuery query_of(const Arguments& arguments) {
     query.rays.push_back({.origin_map = ray.head<3>(),
                           .direction_map = ray.tail<3>(),
                           .max_range_m = arguments.max_range_m,
-                          .passes_unknown = arguments.through_unknown});
+                          .ignore_unknown = arguments.through_unknown});
   }
   return query;
 }
@@ -82,9 +82,9 @@ OccupancyMap open_map(const Arguments& arguments) {
 }
 
 /// Where octree and answers come from.
-class Source {
+class OccupancySource {
  public:
-  explicit Source(const Arguments& arguments) {
+  explicit OccupancySource(const Arguments& arguments) {
     if (arguments.map.empty()) {
       client_.emplace(connect(arguments.client));
     } else {
@@ -108,7 +108,7 @@ ExitCode run(const Arguments& arguments) {
   const bool asks =
       !arguments.points.empty() || !arguments.boxes.empty() || !arguments.rays.empty();
   const bool binary = arguments.output.empty() || is_binary_octomap(arguments.output);
-  Source source(arguments);
+  OccupancySource source(arguments);
   nlohmann::json report;
   std::string text;
   if (asks) {
@@ -174,4 +174,4 @@ void add_octomap_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,7 +6,7 @@
 #include "clients/terminal/table.hpp"
 #include "core/occupancy/occupancy_map.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 std::string place(const Eigen::Vector3d& p) {
@@ -126,4 +126,4 @@ nlohmann::json to_json(const OccupancyAnswers& answers) {
           {"rays", all(answers.rays)}};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,7 +6,7 @@
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// What an octree holds.
 struct OctomapSummary {
@@ -26,4 +26,4 @@ struct OctomapSummary {
 [[nodiscard]] std::string describe(const OccupancyQuery& query, const OccupancyAnswers& answers);
 [[nodiscard]] nlohmann::json to_json(const OccupancyAnswers& answers);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

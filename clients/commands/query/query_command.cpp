@@ -5,18 +5,18 @@
 #include <stdexcept>
 #include <utility>
 
-#include "clients/commands/query/class_arguments.hpp"
 #include "clients/commands/arguments/client_arguments.hpp"
-#include "clients/commands/query/cloud_output.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/query/class_arguments.hpp"
+#include "clients/commands/query/cloud_output.hpp"
 #include "clients/commands/query/fetch_map.hpp"
 #include "clients/commands/query/query_report.hpp"
 #include "clients/commands/query/region_arguments.hpp"
 #include "clients/terminal/progress.hpp"
-#include "core/picture/map_picture.hpp"
 #include "core/map/query/region_shape.hpp"
+#include "core/picture/map_picture.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 constexpr std::uint64_t not_given = std::numeric_limits<std::uint64_t>::max();
@@ -37,7 +37,7 @@ struct Arguments {
 };
 
 void check_out_name(const std::string& file) {
-  if (file.empty() || is_cloud_name(file)) return;
+  if (file.empty() || is_cloud_file(file)) return;
   throw std::invalid_argument("--out " + file + ": the name must end in .pcd or .ply");
 }
 
@@ -46,7 +46,7 @@ void draw_query(const std::string& file, Client& client, const Region& region,
                 std::chrono::milliseconds timeout) {
   MapPictureOptions options;
   options.query_box_map = RegionShape(region).bounds_map();
-  write_map_picture(file, fetch_map(client), newest_path(client, timeout), options);
+  write_map_picture(file, fetch_map(client), fetch_trajectory(client, timeout), options);
 }
 
 std::optional<KnownVersion> since_of(const Arguments& arguments, Client& client) {
@@ -65,7 +65,7 @@ MapQuery filters_of(const Arguments& arguments) {
   return query;
 }
 
-QueryAnswer ask(Client& client, const Arguments& arguments, const MapQuery& filters) {
+QueryAnswer run_query(Client& client, const Arguments& arguments, const MapQuery& filters) {
   QueryAnswer answer{filters, {}, {.stage = "query", .ms = {}}};
   answer.query.region = region_of(arguments.region, client, arguments.client.timeout());
   answer.query.since = since_of(arguments, client);
@@ -88,7 +88,7 @@ ExitCode run(const Arguments& arguments) {
   check_region(arguments.region);
   const MapQuery filters = filters_of(arguments);
   Client client = connect(arguments.client);
-  const QueryAnswer answer = ask(client, arguments, filters);
+  const QueryAnswer answer = run_query(client, arguments, filters);
   if (!arguments.out.empty()) write_cloud(arguments.out, answer.result.voxels);
   if (!arguments.picture.empty()) {
     draw_query(arguments.picture, client, answer.query.region, arguments.client.timeout());
@@ -138,4 +138,4 @@ void add_query_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

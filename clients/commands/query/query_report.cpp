@@ -8,7 +8,7 @@
 #include "clients/terminal/table.hpp"
 #include "core/map/query/region_shape.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 std::map<SemanticClass, std::uint64_t> count_by_class(const std::vector<QueryVoxel>& voxels) {
@@ -93,4 +93,4 @@ std::string describe(const QueryAnswer& answer) {
          (answer.query.since ? tile_line(answer) : std::string());
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

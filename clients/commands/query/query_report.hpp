@@ -6,14 +6,14 @@
 #include "clients/commands/stage_stopwatch.hpp"
 #include "core/map/query/map_query.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// What became of a query of the command line.
 struct QueryAnswer {
   MapQuery query;
   MapQueryResult result;
   /// Of every time it was asked, all pages together.
-  StageTime times;
+  StageDurations times;
 };
 
 [[nodiscard]] nlohmann::json to_json(const QueryAnswer& answer);
@@ -23,4 +23,4 @@ struct QueryAnswer {
 /// "appeared", "changed", "removed".
 [[nodiscard]] const char* name(TileChangeKind kind);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

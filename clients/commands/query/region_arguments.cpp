@@ -10,7 +10,7 @@
 
 #include "clients/commands/query/fetch_map.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 /// The whole word as a number; also "nan" and "inf", which the region's own check speaks about.
@@ -76,11 +76,11 @@ Region chosen_region(const RegionArguments& region, const Eigen::Vector2d& robot
                         .radius_m = region.sphere[3]};
   }
   if (!region.polygon.empty()) {
-    return PolygonRegion{.corners_map = plan_points("--polygon", region.polygon),
+    return PolygonRegion{.corners_map = parse_points_2d("--polygon", region.polygon),
                          .heights = heights};
   }
   if (!region.corridor.empty()) {
-    return CorridorRegion{.path_map = plan_points("--corridor", region.corridor),
+    return CorridorRegion{.path_map = parse_points_2d("--corridor", region.corridor),
                           .half_width_m = region.width_m / 2.0,
                           .heights = heights};
   }
@@ -122,8 +122,8 @@ Kinds add_kinds(CommandHandle command, RegionArguments& region) {
 
 }  // namespace
 
-std::vector<Eigen::Vector2d> plan_points(const std::string& option,
-                                         const std::vector<std::string>& words) {
+std::vector<Eigen::Vector2d> parse_points_2d(const std::string& option,
+                                             const std::vector<std::string>& words) {
   if (words.size() == 1 && !number(words[0])) return points_in_file(option, words[0]);
   std::vector<double> values;
   for (const std::string& word : words) {
@@ -140,7 +140,7 @@ std::vector<Eigen::Vector2d> plan_points(const std::string& option,
   return points;
 }
 
-void add_plan_region_options(CommandHandle command, RegionArguments& region) {
+void add_region_options_2d(CommandHandle command, RegionArguments& region) {
   static_cast<void>(add_kinds(command, region));
 }
 
@@ -172,9 +172,9 @@ void check_region(const RegionArguments& region) {
 Region region_of(const RegionArguments& region, Client& client, std::chrono::milliseconds timeout) {
   Eigen::Vector2d robot_map = Eigen::Vector2d::Zero();
   if (region.around_robot_m > 0.0) {
-    robot_map = newest_path(client, timeout).back().T_map_lidar.translation().head<2>();
+    robot_map = fetch_trajectory(client, timeout).back().T_map_lidar.translation().head<2>();
   }
   return region_at(region, robot_map);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

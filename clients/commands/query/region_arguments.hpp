@@ -8,7 +8,7 @@
 #include "clients/library/client.hpp"
 #include "clients/terminal/command_line.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// How a command line names a region of the map; nothing given means everything. [m], map frame.
 struct RegionArguments {
@@ -35,7 +35,7 @@ struct RegionArguments {
 void add_region_options(CommandHandle command, RegionArguments& region);
 
 /// The same without --min-z and --max-z, for regions that are seen from above.
-void add_plan_region_options(CommandHandle command, RegionArguments& region);
+void add_region_options_2d(CommandHandle command, RegionArguments& region);
 
 /// Throws std::invalid_argument for what is no region, wherever the robot is.
 void check_region(const RegionArguments& region);
@@ -51,7 +51,7 @@ void check_region(const RegionArguments& region);
 /// Positions in plan: numbers two by two, or the name of a text file with a position a line (x y,
 /// separated by blanks or commas; # begins a comment). `option` is for what it throws:
 /// std::invalid_argument, naming option, file and line.
-[[nodiscard]] std::vector<Eigen::Vector2d> plan_points(const std::string& option,
-                                                       const std::vector<std::string>& words);
+[[nodiscard]] std::vector<Eigen::Vector2d> parse_points_2d(const std::string& option,
+                                                           const std::vector<std::string>& words);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

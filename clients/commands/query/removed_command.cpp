@@ -10,11 +10,11 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/query/fetch_map.hpp"
 #include "clients/commands/query/region_arguments.hpp"
-#include "core/map/storage/map_file_copy.hpp"
 #include "core/map/query/region_shape.hpp"
+#include "core/map/storage/map_file_copy.hpp"
 #include "core/picture/removed_picture.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -27,25 +27,25 @@ struct Arguments {
 };
 
 /// What was found, and the map that it was removed from.
-struct Found {
+struct RemovedResult {
   std::vector<RemovedVoxel> voxels;
   std::uint64_t total = 0;
-  MapView view;
+  MapSnapshot view;
 };
 
 constexpr std::array reasons{RemovalReason::moving, RemovalReason::semi_static,
                              RemovalReason::seen_through, RemovalReason::relabelled};
 
-Found found_in_file(const Arguments& arguments) {
-  StoredMap map = read_map_file(arguments.map_file);
+RemovedResult removed_in_file(const Arguments& arguments) {
+  SavedMap map = read_map_file(arguments.map_file);
   const Eigen::Vector3d last_map = map.trajectory.empty()
                                        ? Eigen::Vector3d(0.0, 0.0, 0.0)
                                        : map.trajectory.back().T_map_lidar.translation();
   const RegionShape region(region_at(arguments.region, last_map.head<2>()));
-  Found found;
-  for (const auto& [id, memory] : map.memories) {
+  RemovedResult found;
+  for (const auto& [id, evidence] : map.tile_evidence) {
     for (const RemovedVoxel& voxel :
-         removed_voxels(*memory, map.view.voxel_size_m, map.view.tile_size_m)) {
+         removed_voxels(*evidence, map.view.voxel_size_m, map.view.tile_size_m)) {
       if (region.contains(voxel.position_map.cast<double>())) found.voxels.push_back(voxel);
     }
   }
@@ -54,15 +54,15 @@ Found found_in_file(const Arguments& arguments) {
   return found;
 }
 
-Found found_by_server(Client& client, const Arguments& arguments) {
+RemovedResult removed_on_server(Client& client, const Arguments& arguments) {
   const Region region = region_of(arguments.region, client, arguments.client.timeout());
   RemovedVoxels removed = client.get_removed(region);
-  Found found{std::move(removed.voxels), removed.total, {}};
+  RemovedResult found{std::move(removed.voxels), removed.total, {}};
   if (!arguments.picture.empty()) found.view = fetch_map(client);
   return found;
 }
 
-nlohmann::json to_json(const Found& found) {
+nlohmann::json to_json(const RemovedResult& found) {
   nlohmann::json counts;
   for (const RemovalReason reason : reasons) {
     counts[std::string(name(reason))] =
@@ -71,7 +71,7 @@ nlohmann::json to_json(const Found& found) {
   return {{"total", found.total}, {"shown", found.voxels.size()}, {"reasons", counts}};
 }
 
-std::string describe(const Found& found) {
+std::string describe(const RemovedResult& found) {
   std::string text = std::to_string(found.total) + " voxels are kept out of the static map";
   if (found.total > found.voxels.size()) {
     text.append("; of the first ").append(std::to_string(found.voxels.size()));
@@ -83,7 +83,7 @@ std::string describe(const Found& found) {
   return text + "\n";
 }
 
-RemovalReason reason_named(const std::string& text) {
+RemovalReason reason_from_name(const std::string& text) {
   for (const RemovalReason reason : reasons) {
     if (name(reason) == text) return reason;
   }
@@ -93,7 +93,7 @@ RemovalReason reason_named(const std::string& text) {
 }
 
 ExitCode restore(Client& client, const Arguments& arguments) {
-  const RemovalReason reason = reason_named(arguments.restore);
+  const RemovalReason reason = reason_from_name(arguments.restore);
   const Region region = region_of(arguments.region, client, arguments.client.timeout());
   const auto* const box = std::get_if<BoxRegion>(&region);
   if (box == nullptr) throw std::invalid_argument("--restore takes a --box or --around");
@@ -114,7 +114,8 @@ ExitCode run(const Arguments& arguments) {
     if (!client) throw std::invalid_argument("--restore needs a server; leave MAPFILE out");
     return restore(*client, arguments);
   }
-  const Found found = client ? found_by_server(*client, arguments) : found_in_file(arguments);
+  const RemovedResult found =
+      client ? removed_on_server(*client, arguments) : removed_in_file(arguments);
   if (!arguments.picture.empty()) {
     write_removed_picture(arguments.picture, found.view, found.voxels);
   }
@@ -148,4 +149,4 @@ void add_removed_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

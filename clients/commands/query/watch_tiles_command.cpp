@@ -11,7 +11,7 @@
 #include "clients/commands/query/region_arguments.hpp"
 #include "clients/terminal/stop_signal.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -23,45 +23,45 @@ struct Arguments {
   bool json = false;
 };
 
-/// A tile of the news, for printing.
-struct TileNews {
+/// A tile of the update, for printing.
+struct TileUpdate {
   TileChange change;
   std::uint64_t map_id = 0;
   std::uint64_t map_version = 0;
 };
 
 /// Tiles from the subscription's thread for the one that prints.
-class News {
+class TileUpdateQueue {
  public:
-  void add(const RegionNews& news) {
+  void add(const RegionUpdate& update) {
     const std::lock_guard lock(mutex_);
-    for (const Tile& tile : news.appeared) add(news, tile.info, TileChangeKind::appeared);
-    for (const Tile& tile : news.changed) add(news, tile.info, TileChangeKind::changed);
-    for (const TileId id : news.removed)
-      add(news, {.id = id, .bounds_map = {}}, TileChangeKind::removed);
+    for (const Tile& tile : update.appeared) add(update, tile.info, TileChangeKind::appeared);
+    for (const Tile& tile : update.changed) add(update, tile.info, TileChangeKind::changed);
+    for (const TileId id : update.removed)
+      add(update, {.id = id, .bounds_map = {}}, TileChangeKind::removed);
   }
-  std::deque<TileNews> take() {
+  std::deque<TileUpdate> take() {
     const std::lock_guard lock(mutex_);
     return std::exchange(tiles_, {});
   }
 
  private:
-  void add(const RegionNews& news, const TileInfo& info, TileChangeKind kind) {
+  void add(const RegionUpdate& update, const TileInfo& info, TileChangeKind kind) {
     tiles_.push_back(
-        {{info.id, kind, info.revision, info.voxel_count}, news.map.map_id, news.map.version});
+        {{info.id, kind, info.revision, info.voxel_count}, update.map.map_id, update.map.version});
   }
 
   std::mutex mutex_;
-  std::deque<TileNews> tiles_;
+  std::deque<TileUpdate> tiles_;
 };
 
-void print(const TileNews& news, bool json) {
-  const TileChange& tile = news.change;
+void print(const TileUpdate& update, bool json) {
+  const TileChange& tile = update.change;
   if (json) {
     const nlohmann::json line = {
-        {"type", "tile"},        {"change", name(tile.kind)},      {"x", tile.id.x},
-        {"y", tile.id.y},        {"revision", tile.revision},      {"voxels", tile.voxel_count},
-        {"map_id", news.map_id}, {"map_version", news.map_version}};
+        {"type", "tile"},          {"change", name(tile.kind)},        {"x", tile.id.x},
+        {"y", tile.id.y},          {"revision", tile.revision},        {"voxels", tile.voxel_count},
+        {"map_id", update.map_id}, {"map_version", update.map_version}};
     std::cout << line.dump() << std::endl;
     return;
   }
@@ -77,15 +77,15 @@ ExitCode run(const Arguments& arguments) {
   StopSignal stop;
   Client client = connect(arguments.client);
   const Region region = region_of(arguments.region, client, arguments.client.timeout());
-  News news;
+  TileUpdateQueue queue;
   const Subscription subscription =
-      client.subscribe_region(region, [&](const RegionNews& update) { news.add(update); });
+      client.subscribe_region(region, [&](const RegionUpdate& update) { queue.add(update); });
   const auto began = std::chrono::steady_clock::now();
   std::uint64_t printed = 0;
   const auto is_enough = [&] { return arguments.count > 0 && printed >= arguments.count; };
   bool time_is_up = false;
   while (!is_enough() && !time_is_up && !stop.wait_for(std::chrono::milliseconds(50))) {
-    for (const TileNews& tile : news.take()) {
+    for (const TileUpdate& tile : queue.take()) {
       if (is_enough()) break;
       print(tile, arguments.json);
       ++printed;
@@ -116,4 +116,4 @@ void add_watch_tiles_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

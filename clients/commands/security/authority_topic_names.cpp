@@ -5,7 +5,7 @@
 
 #include "idl/dds/security/security_error.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 std::filesystem::path file_in(const std::filesystem::path& authority_folder) {
@@ -14,7 +14,7 @@ std::filesystem::path file_in(const std::filesystem::path& authority_folder) {
 
 }  // namespace
 
-void keep_topic_names(const TopicNames& names, const std::filesystem::path& authority_folder) {
+void save_topic_names(const dds::TopicNames& names, const std::filesystem::path& authority_folder) {
   const std::filesystem::path file = file_in(authority_folder);
   std::ofstream out(file);
   out << nlohmann::json{{"points", names.points},
@@ -23,10 +23,10 @@ void keep_topic_names(const TopicNames& names, const std::filesystem::path& auth
              .dump(2)
       << "\n";
   out.close();
-  if (!out) throw SecurityError(file.string() + " cannot be written");
+  if (!out) throw dds::SecurityError(file.string() + " cannot be written");
 }
 
-TopicNames kept_topic_names(const std::filesystem::path& authority_folder) {
+dds::TopicNames load_topic_names(const std::filesystem::path& authority_folder) {
   const std::filesystem::path file = file_in(authority_folder);
   std::ifstream in(file);
   try {
@@ -35,9 +35,9 @@ TopicNames kept_topic_names(const std::filesystem::path& authority_folder) {
             .odometry_prior = json.at("odometry_prior"),
             .name_space = json.at("namespace")};
   } catch (const nlohmann::json::exception& error) {
-    throw SecurityError(file.string() + " does not name the topics (" + error.what() +
-                        "); restore it, or make a new authority");
+    throw dds::SecurityError(file.string() + " does not name the topics (" + error.what() +
+                             "); restore it, or make a new authority");
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -7,7 +7,7 @@
 #include "idl/dds/security/authority.hpp"
 #include "idl/dds/security/identity.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -19,29 +19,29 @@ struct Arguments {
 };
 
 // A replaced identity keeps its role.
-Role role_of(const Arguments& arguments) {
+dds::Role role_of(const Arguments& arguments) {
   std::string role = arguments.role;
   if (role.empty() && arguments.replace) {
     const auto file =
-        IdentityFiles(std::filesystem::path(arguments.folder) / arguments.name).certificate;
-    role = Certificate::read(file).role();
+        dds::IdentityFiles(std::filesystem::path(arguments.folder) / arguments.name).certificate;
+    role = dds::Certificate::read(file).role();
   }
-  const auto known = role_from_name(role);
+  const auto known = dds::role_from_name(role);
   if (!known) {
-    throw std::invalid_argument("--role '" + role + "' is none of " + role_names());
+    throw std::invalid_argument("--role '" + role + "' is none of " + dds::role_names());
   }
   return *known;
 }
 
 ExitCode run(const Arguments& arguments) {
-  const Authority authority = Authority::open(arguments.folder);
-  const Role role = role_of(arguments);
-  const Validity validity = Validity::days_from_now(arguments.days);
+  const dds::Authority authority = dds::Authority::open(arguments.folder);
+  const dds::Role role = role_of(arguments);
+  const dds::Validity validity = dds::Validity::days_from_now(arguments.days);
   const auto folder = authority.add(arguments.name, std::string(name(role)),
-                                    access_of(role, kept_topic_names(arguments.folder)), validity,
-                                    arguments.replace);
-  std::cout << folder.string() << ": a " << name(role) << ", valid until " << to_text(validity.to)
-            << "\n";
+                                    dds::access_of(role, load_topic_names(arguments.folder)),
+                                    validity, arguments.replace);
+  std::cout << folder.string() << ": a " << name(role) << ", valid until "
+            << dds::to_text(validity.to) << "\n";
   return ExitCode::ok;
 }
 
@@ -53,7 +53,7 @@ void add_security_add_command(CommandHandle security, Action& action) {
   command.option("FOLDER", arguments->folder, "The authority's folder").required();
   command.option("NAME", arguments->name, "Of the identity: a process, a robot, a person")
       .required();
-  command.option("--role", arguments->role, "What it may do: " + role_names());
+  command.option("--role", arguments->role, "What it may do: " + dds::role_names());
   command.option("--days", arguments->days, "How long it is valid")
       .between(1, 36500)
       .with_default();
@@ -66,4 +66,4 @@ void add_security_add_command(CommandHandle security, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

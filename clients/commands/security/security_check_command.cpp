@@ -8,7 +8,7 @@
 #include "idl/dds/security/authority.hpp"
 #include "idl/dds/security/identity.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 namespace fs = std::filesystem;
@@ -19,11 +19,12 @@ struct Arguments {
 
 bool is_fault_free(const fs::path& identity) {
   const auto now = std::chrono::floor<std::chrono::seconds>(std::chrono::system_clock::now());
-  const IdentityFaults found = check_identity(identity, now);
+  const dds::IdentityFaults found = dds::check_identity(identity, now);
   if (found.faults.empty() && found.warnings.empty()) {
-    const Certificate certificate = Certificate::read(IdentityFiles(identity).certificate);
+    const dds::Certificate certificate =
+        dds::Certificate::read(dds::IdentityFiles(identity).certificate);
     std::cout << identity.string() << ": well; " << certificate.role() << " '" << certificate.name()
-              << "', valid until " << to_text(certificate.validity().to) << "\n";
+              << "', valid until " << dds::to_text(certificate.validity().to) << "\n";
     return true;
   }
   for (const std::string& fault : found.faults) std::cout << "FAULT   " << fault << "\n";
@@ -31,7 +32,7 @@ bool is_fault_free(const fs::path& identity) {
   return false;
 }
 
-bool is_key_hidden(const Authority& authority) {
+bool is_key_hidden(const dds::Authority& authority) {
   struct stat facts {};
   const fs::path file = authority.key_file();
   const bool is_hidden =
@@ -44,9 +45,9 @@ bool is_key_hidden(const Authority& authority) {
   return is_hidden;
 }
 
-bool is_of_authority(const fs::path& identity, const Authority& authority) {
-  const fs::path file = IdentityFiles(identity).certificate;
-  if (!fs::exists(file) || Certificate::read(file).is_signed_by(authority.certificate())) {
+bool is_of_authority(const fs::path& identity, const dds::Authority& authority) {
+  const fs::path file = dds::IdentityFiles(identity).certificate;
+  if (!fs::exists(file) || dds::Certificate::read(file).is_signed_by(authority.certificate())) {
     return true;
   }
   std::cout << "FAULT   " << file.string() << " was not issued by the authority of this folder\n";
@@ -58,7 +59,7 @@ ExitCode run(const Arguments& arguments) {
   if (!fs::exists(folder / "authority")) {
     return is_fault_free(folder) ? ExitCode::ok : ExitCode::failed;
   }
-  const Authority authority = Authority::open(folder);
+  const dds::Authority authority = dds::Authority::open(folder);
   bool all_well = is_key_hidden(authority);
   for (const fs::path& identity : authority.identities()) {
     all_well = is_fault_free(identity) && all_well;
@@ -83,4 +84,4 @@ void add_security_check_command(CommandHandle security, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

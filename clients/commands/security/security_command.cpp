@@ -1,6 +1,6 @@
 #include "clients/commands/command.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 void add_security_command(CommandHandle program, Action& action) {
   CommandHandle security = program.command(
@@ -15,4 +15,4 @@ void add_security_command(CommandHandle program, Action& action) {
       "'stillmap security STEP --help' shows options and examples.");
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

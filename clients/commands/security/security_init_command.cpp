@@ -5,27 +5,29 @@
 #include "clients/commands/security/authority_topic_names.hpp"
 #include "idl/dds/security/authority.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
   std::string folder;
-  TopicNames names;
+  dds::TopicNames names;
   int days = 365;
   int authority_days = 3650;
 };
 
 ExitCode run(const Arguments& arguments) {
-  const Authority authority = Authority::make(arguments.folder, arguments.authority_days);
-  keep_topic_names(arguments.names, arguments.folder);
-  const Validity validity = Validity::days_from_now(arguments.days);
-  for (const Role role : {Role::server, Role::sensor, Role::planner, Role::operator_of_server}) {
+  const dds::Authority authority = dds::Authority::make(arguments.folder, arguments.authority_days);
+  save_topic_names(arguments.names, arguments.folder);
+  const dds::Validity validity = dds::Validity::days_from_now(arguments.days);
+  for (const dds::Role role :
+       {dds::Role::server, dds::Role::sensor, dds::Role::planner, dds::Role::operator_of_server}) {
     const std::string role_name(name(role));
-    std::cout
-        << authority.add(role_name, role_name, access_of(role, arguments.names), validity).string()
-        << "\n";
+    std::cout << authority
+                     .add(role_name, role_name, dds::access_of(role, arguments.names), validity)
+                     .string()
+              << "\n";
   }
-  std::cout << "Each folder is one identity, valid until " << to_text(validity.to)
+  std::cout << "Each folder is one identity, valid until " << dds::to_text(validity.to)
             << ": copy it to where it is used, as\n  stillmap-server --security "
             << arguments.folder << "/server\n  stillmap status --security " << arguments.folder
             << "/planner\nKeep " << authority.key_file().string()
@@ -60,4 +62,4 @@ void add_security_init_command(CommandHandle security, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

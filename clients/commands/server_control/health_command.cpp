@@ -5,7 +5,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -14,7 +14,7 @@ struct Arguments {
 };
 
 /// Why the server does not map; empty when it does.
-std::string why_not_mapping(const ServerStatus& status) {
+std::string why_not_mapping(const dds::ServerStatus& status) {
   const std::string reason = status.reason.empty() ? "" : ": " + status.reason;
   if (status.received_hz == 0.0) return "no scans arrive" + reason;
   if (status.mapped_hz == 0.0) return "no scan is mapped" + reason;
@@ -28,7 +28,7 @@ ExitCode say(ExitCode code, const std::string& text) {
 }
 
 ExitCode run(const Arguments& arguments) {
-  ServerStatus status;
+  dds::ServerStatus status;
   try {
     status = connect(arguments.client).status();
   } catch (const ServiceError& error) {
@@ -60,4 +60,4 @@ void add_health_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

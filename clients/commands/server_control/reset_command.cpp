@@ -5,7 +5,7 @@
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -35,4 +35,4 @@ void add_reset_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,7 +6,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/server_control/status_report.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -16,7 +16,7 @@ struct Arguments {
 
 ExitCode run(const Arguments& arguments) {
   Client client = connect(arguments.client);
-  const ServerStatus status = client.status();
+  const dds::ServerStatus status = client.status();
   std::cout << (arguments.json ? to_json(status).dump(2) + "\n" : describe(status));
   return ExitCode::ok;
 }
@@ -37,4 +37,4 @@ void add_status_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,37 +4,38 @@
 
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
-std::string describe(const ServerStatus& status) {
+std::string describe(const dds::ServerStatus& status) {
   std::string text = "stillmap-server " + status.software_version + ", up for " +
                      fixed(status.uptime_s, 0) + " s\n";
   text += "health     " + std::string(name(status.health)) +
           (status.reason.empty() ? "" : ": " + status.reason) + "\n";
   text += "labels     " + status.label_source + "\n";
-  const SegmentationStatus& segmentation = status.segmentation;
+  const dds::SegmentationStatus& segmentation = status.segmentation;
   const std::string columns = std::to_string(segmentation.image_columns);
-  text += "           " + every_nth_scan(segmentation.every) + " segmented" +
+  text += "           " + dds::every_nth_scan(segmentation.every) + " segmented" +
           (segmentation.image_columns > 0 ? " in " + columns + " columns, " : ", ") +
           fixed(segmentation.network_ms, 1) + " ms each; of the last scans " +
           fixed(100.0 * segmentation.fresh_share, 0) + " % with labels of their own, " +
-          fixed(100.0 * segmentation.carried_share, 0) + " % with carried ones, " +
+          fixed(100.0 * segmentation.propagated_share, 0) + " % with carried ones, " +
           fixed(100.0 * segmentation.unlabelled_share, 0) + " % with none\n";
   text += "scans      " + fixed(status.received_hz, 1) + "/s in, " + fixed(status.mapped_hz, 1) +
           "/s mapped; delivery: " + name(status.delivery) + "\n";
   text += "map        id " + std::to_string(status.map_id) + ", version " +
           std::to_string(status.map_version) + ": " + std::to_string(status.voxel_count) +
           " voxels in " + std::to_string(status.tile_count) + " tiles\n";
-  for (const Finding& finding : status.findings) {
-    text += std::string(finding.severity == Severity::problem ? "problem    " : "advice     ") +
-            finding.what + "; " + finding.way_out + "\n";
+  for (const dds::Diagnostic& diagnostic : status.diagnostics) {
+    text +=
+        std::string(diagnostic.severity == dds::Severity::problem ? "problem    " : "advice     ") +
+        diagnostic.what + "; " + diagnostic.hint + "\n";
   }
   Table counters({"counter", "value"});
-  for (const NamedCounter& counter : status.counters) {
+  for (const dds::NamedCounter& counter : status.counters) {
     counters.add({counter.name, std::to_string(counter.value)});
   }
   Table latencies({"ms a scan", "p50", "p99", "max", "scans"});
-  for (const StageLatency& stage : status.latencies) {
+  for (const dds::StageLatency& stage : status.latencies) {
     latencies.add({stage.stage, fixed(stage.p50_ms, 1), fixed(stage.p99_ms, 1),
                    fixed(stage.max_ms, 1), std::to_string(stage.samples)});
   }
@@ -43,34 +44,35 @@ std::string describe(const ServerStatus& status) {
 
 namespace {
 
-nlohmann::json to_json(const SegmentationStatus& segmentation) {
+nlohmann::json to_json(const dds::SegmentationStatus& segmentation) {
   return {{"every", segmentation.every},
           {"network_ms", segmentation.network_ms},
           {"image_columns", segmentation.image_columns},
           {"full_columns", segmentation.full_columns},
           {"fresh_share", segmentation.fresh_share},
-          {"carried_share", segmentation.carried_share},
+          {"carried_share", segmentation.propagated_share},
           {"unlabelled_share", segmentation.unlabelled_share}};
 }
 
 }  // namespace
 
-nlohmann::json to_json(const ServerStatus& status) {
+nlohmann::json to_json(const dds::ServerStatus& status) {
   nlohmann::json counters = nlohmann::json::object();
-  for (const NamedCounter& counter : status.counters) counters[counter.name] = counter.value;
+  for (const dds::NamedCounter& counter : status.counters) counters[counter.name] = counter.value;
   nlohmann::json latencies = nlohmann::json::object();
-  for (const StageLatency& stage : status.latencies) {
+  for (const dds::StageLatency& stage : status.latencies) {
     latencies[stage.stage] = {{"p50_ms", stage.p50_ms},
                               {"p99_ms", stage.p99_ms},
                               {"max_ms", stage.max_ms},
                               {"samples", stage.samples}};
   }
-  nlohmann::json findings = nlohmann::json::array();
-  for (const Finding& finding : status.findings) {
-    findings.push_back({{"severity", finding.severity == Severity::problem ? "problem" : "advice"},
-                        {"what", finding.what},
-                        {"evidence", finding.evidence},
-                        {"way_out", finding.way_out}});
+  nlohmann::json diagnostics = nlohmann::json::array();
+  for (const dds::Diagnostic& diagnostic : status.diagnostics) {
+    diagnostics.push_back(
+        {{"severity", diagnostic.severity == dds::Severity::problem ? "problem" : "advice"},
+         {"what", diagnostic.what},
+         {"evidence", diagnostic.evidence},
+         {"way_out", diagnostic.hint}});
   }
   return {{"stamp_ns", status.stamp_ns},
           {"software_version", status.software_version},
@@ -94,7 +96,7 @@ nlohmann::json to_json(const ServerStatus& status) {
           {"points_topic", status.points_topic},
           {"scan_frame", status.scan_frame},
           {"scan_delay_s", status.scan_delay_s},
-          {"findings", findings}};
+          {"findings", diagnostics}};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -5,10 +5,10 @@
 
 #include "idl/interface/server_status.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// The status for people: a few lines and the latencies as a table.
-[[nodiscard]] std::string describe(const ServerStatus& status);
-[[nodiscard]] nlohmann::json to_json(const ServerStatus& status);
+[[nodiscard]] std::string describe(const dds::ServerStatus& status);
+[[nodiscard]] nlohmann::json to_json(const dds::ServerStatus& status);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -2,13 +2,13 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "clients/commands/command.hpp"
 #include "clients/commands/arguments/simulation_arguments.hpp"
+#include "clients/commands/command.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -22,13 +22,14 @@ struct Written {
   std::uint64_t points = 0;
 };
 
-Written write_sequence(const std::string& folder, const Simulation& simulation, StopSignal& stop) {
+Written write_sequence(const std::string& folder, const simulation::Simulation& simulation,
+                       StopSignal& stop) {
   KittiSequenceWriter writer(folder);
   const int scans = simulation.config().scans;
   Progress progress("simulate", "scans", static_cast<std::uint64_t>(scans));
   Written written;
   while (written.scans < scans && !stop.requested()) {
-    const SimulatedScan scan = simulation.scan(written.scans);
+    const simulation::SimulatedScan scan = simulation.scan(written.scans);
     writer.add(scan.scan, scan.raw_labels, scan.T_map_lidar);
     written.scans += 1;
     written.points += scan.scan.size();
@@ -40,8 +41,8 @@ Written write_sequence(const std::string& folder, const Simulation& simulation, 
 
 ExitCode run(const Arguments& arguments) {
   StopSignal stop;
-  const SimulationConfig config = simulation_config(arguments.simulation);
-  const Simulation simulation(config);
+  const simulation::SimulationConfig config = simulation_config(arguments.simulation);
+  const simulation::Simulation simulation(config);
   const Written written = write_sequence(arguments.out, simulation, stop);
   if (arguments.json) {
     std::cout << nlohmann::json{{"folder", arguments.out},      {"city", config.plan.name},
@@ -93,4 +94,4 @@ void add_simulate_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

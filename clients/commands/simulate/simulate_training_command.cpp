@@ -7,13 +7,13 @@
 #include <stdexcept>
 #include <string>
 
+#include "clients/commands/arguments/simulation_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/simulate/training_set.hpp"
-#include "clients/commands/arguments/simulation_arguments.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
@@ -95,4 +95,4 @@ void add_simulate_training_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -13,7 +13,7 @@
 #include "core/dataset/kitti_sequence_writer.hpp"
 #include "core/simulation/training_city.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 namespace fs = std::filesystem;
@@ -28,11 +28,11 @@ TrainingSetCount write_city(const fs::path& sequence, std::uint64_t seed,
                             const TrainingSetPlan& plan) {
   const fs::path unfinished = fs::path(sequence).concat(".unfinished");
   fs::remove_all(unfinished);
-  const Simulation drive(training_drive(seed, plan.share_of_plain));
+  const simulation::Simulation drive(simulation::training_sequence(seed, plan.share_of_plain));
   KittiSequenceWriter writer(unfinished);
   TrainingSetCount count{.cities = 1};
-  for (const int index : spread_scans(drive, plan.scans_per_city)) {
-    const SimulatedScan scan = drive.scan(index);
+  for (const int index : simulation::spread_scans(drive, plan.scans_per_city)) {
+    const simulation::SimulatedScan scan = drive.scan(index);
     writer.add(scan.scan, scan.raw_labels, scan.T_map_lidar);
     count.scans += 1;
     count.points += scan.scan.size();
@@ -71,4 +71,4 @@ TrainingSetCount write_training_set(
   return total;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <functional>
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// Which made-up cities a training set has.
 struct TrainingSetPlan {
@@ -12,7 +12,7 @@ struct TrainingSetPlan {
   int cities = 200;
   std::uint64_t first_seed = 1000;
   int scans_per_city = 8;
-  /// Of the drives, as `training_drive` has it.
+  /// Of the drives, as `training_sequence` has it.
   double share_of_plain = 0.4;
 };
 
@@ -31,4 +31,4 @@ struct TrainingSetCount {
 TrainingSetCount write_training_set(const TrainingSetPlan& plan,
                                     const std::function<bool(const TrainingSetCount&)>& after_city);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

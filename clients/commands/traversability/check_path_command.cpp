@@ -3,16 +3,16 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "clients/commands/traversability/traversability_source.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/commands/traversability/path_report.hpp"
 #include "clients/commands/query/region_arguments.hpp"
+#include "clients/commands/traversability/path_report.hpp"
+#include "clients/commands/traversability/traversability_source.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
-  AreaSourceArguments source;
+  TraversabilitySourceArguments source;
   std::vector<std::string> path;
   std::vector<double> headings_rad;
   bool json = false;
@@ -20,9 +20,9 @@ struct Arguments {
 
 ExitCode run(const Arguments& arguments) {
   PathQuery query;
-  query.positions_map = plan_points("--path", arguments.path);
+  query.positions_map = parse_points_2d("--path", arguments.path);
   query.headings_rad = arguments.headings_rad;
-  const std::unique_ptr<AreaSource> source = open_area_source(arguments.source);
+  const std::unique_ptr<TraversabilitySource> source = open_traversability_source(arguments.source);
   const PathCheck check = source->check(query);
   require_answer(check.status, check.reason);
   const std::string profile = source->robot().name;
@@ -36,7 +36,7 @@ void add_check_path_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   CommandHandle command =
       program.command("check-path", "Whether a robot can follow a path, or what is in its way");
-  add_area_source_options(command, arguments->source);
+  add_traversability_source_options(command, arguments->source);
   command
       .option("--path", arguments->path,
               "x y x y ...: positions [m]; or FILE with a position a line")
@@ -56,4 +56,4 @@ void add_check_path_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

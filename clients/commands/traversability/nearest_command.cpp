@@ -2,29 +2,29 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 
-#include "clients/commands/traversability/traversability_source.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/traversability/path_report.hpp"
+#include "clients/commands/traversability/traversability_source.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
-  AreaSourceArguments source;
+  TraversabilitySourceArguments source;
   std::vector<double> position_map;
   double max_distance_m = 100.0;
   bool json = false;
 };
 
 ExitCode run(const Arguments& arguments) {
-  const std::unique_ptr<AreaSource> source = open_area_source(arguments.source);
+  const std::unique_ptr<TraversabilitySource> source = open_traversability_source(arguments.source);
   const NearestTraversable nearest = source->nearest(
       {arguments.position_map[0], arguments.position_map[1]}, arguments.max_distance_m);
   require_answer(nearest.status, nearest.reason);
   const std::string profile = source->robot().name;
   std::cout << (arguments.json ? to_json(nearest, profile).dump(2) + "\n"
                                : describe(nearest, profile));
-  return nearest.status == AreaStatus::ok ? ExitCode::ok : ExitCode::failed;
+  return nearest.status == TraversabilityStatus::ok ? ExitCode::ok : ExitCode::failed;
 }
 
 }  // namespace
@@ -32,7 +32,7 @@ ExitCode run(const Arguments& arguments) {
 void add_nearest_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   CommandHandle command = program.command("nearest", "The nearest place where a robot can stand");
-  add_area_source_options(command, arguments->source);
+  add_traversability_source_options(command, arguments->source);
   command.option("--to", arguments->position_map, "x y: the place [m]").exactly(2).required();
   command.option("--max-distance", arguments->max_distance_m, "Search no farther than this [m]")
       .above_zero()
@@ -48,4 +48,4 @@ void add_nearest_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

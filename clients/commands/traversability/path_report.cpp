@@ -4,7 +4,7 @@
 
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 std::string at(const Eigen::Vector2d& position_map) {
@@ -22,7 +22,7 @@ nlohmann::json conflict_json(const PathConflict& conflict) {
            {{"x", conflict.pose.position_map.x()},
             {"y", conflict.pose.position_map.y()},
             {"heading_rad", conflict.pose.heading_rad}}},
-          {"place", {conflict.place_map.x(), conflict.place_map.y()}},
+          {"place", {conflict.cell_centre_map.x(), conflict.cell_centre_map.y()}},
           {"reason", name(conflict.reason)}};
 }
 
@@ -48,14 +48,14 @@ nlohmann::json to_json(const PathCheck& check, const std::string& profile) {
 }
 
 std::string describe(const PathCheck& check, const std::string& profile) {
-  if (check.status != AreaStatus::ok) return "not known: " + check.reason + "\n";
+  if (check.status != TraversabilityStatus::ok) return "not known: " + check.reason + "\n";
   if (!check.conflict) {
     return "free for " + profile + ": " + fixed(check.checked_m, 1) + " m, clearance " +
            fixed(check.clearance_m, 2) + " m" + inferred_part(check.inferred_m) + "\n";
   }
   const PathConflict& conflict = *check.conflict;
   return "blocked for " + profile + " after " + fixed(conflict.along_m, 1) +
-         " m: " + std::string(name(conflict.reason)) + " at " + at(conflict.place_map) +
+         " m: " + std::string(name(conflict.reason)) + " at " + at(conflict.cell_centre_map) +
          ", touched by the robot at " + at(conflict.pose.position_map) + " with heading " +
          fixed(conflict.pose.heading_rad, 2) + " rad, after position " +
          std::to_string(conflict.segment) + "\n";
@@ -64,7 +64,7 @@ std::string describe(const PathCheck& check, const std::string& profile) {
 nlohmann::json to_json(const NearestTraversable& nearest, const std::string& profile) {
   nlohmann::json json = {
       {"profile", profile}, {"status", name(nearest.status)}, {"map_version", nearest.map_version}};
-  if (nearest.status != AreaStatus::ok) {
+  if (nearest.status != TraversabilityStatus::ok) {
     json["reason"] = nearest.reason;
     return json;
   }
@@ -77,7 +77,7 @@ nlohmann::json to_json(const NearestTraversable& nearest, const std::string& pro
 }
 
 std::string describe(const NearestTraversable& nearest, const std::string& profile) {
-  if (nearest.status != AreaStatus::ok) return nearest.reason + "\n";
+  if (nearest.status != TraversabilityStatus::ok) return nearest.reason + "\n";
   return at(nearest.position_map) + " is free for " + profile + ", " +
          fixed(nearest.distance_m, 2) + " m away; ground at " + fixed(nearest.height_m, 2) + " m" +
          (nearest.cell.inferred ? " (inferred)" : "") + ", cost " +
@@ -85,4 +85,4 @@ std::string describe(const NearestTraversable& nearest, const std::string& profi
          fixed(nearest.cell.clearance_m, 2) + " m\n";
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -6,7 +6,7 @@
 #include "core/traversability/nearest_traversable.hpp"
 #include "core/traversability/path_check.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// Answers about paths and places, for programs and for people.
 [[nodiscard]] nlohmann::json to_json(const PathCheck& check, const std::string& profile);
@@ -14,4 +14,4 @@ namespace stillmap {
 [[nodiscard]] nlohmann::json to_json(const NearestTraversable& nearest, const std::string& profile);
 [[nodiscard]] std::string describe(const NearestTraversable& nearest, const std::string& profile);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

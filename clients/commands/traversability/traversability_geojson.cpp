@@ -4,20 +4,20 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 /// GeoJSON repeats the first corner at the end.
-nlohmann::json closed(const AreaRing& ring) {
+nlohmann::json closed(const TraversableRing& ring) {
   nlohmann::json corners = nlohmann::json::array();
   for (const Eigen::Vector2d& corner : ring) corners.push_back({corner.x(), corner.y()});
   if (!ring.empty()) corners.push_back({ring.front().x(), ring.front().y()});
   return corners;
 }
 
-nlohmann::json feature(const AreaPolygon& polygon) {
+nlohmann::json feature(const TraversablePolygon& polygon) {
   nlohmann::json rings = nlohmann::json::array({closed(polygon.outer)});
-  for (const AreaRing& hole : polygon.holes) rings.push_back(closed(hole));
+  for (const TraversableRing& hole : polygon.holes) rings.push_back(closed(hole));
   return {{"type", "Feature"},
           {"properties", {{"area_m2", area_m2(polygon)}}},
           {"geometry", {{"type", "Polygon"}, {"coordinates", std::move(rings)}}}};
@@ -25,9 +25,9 @@ nlohmann::json feature(const AreaPolygon& polygon) {
 
 }  // namespace
 
-nlohmann::json to_json(const AreaAnswer& answer, const std::string& profile) {
+nlohmann::json to_json(const TraversabilityAnswer& answer, const std::string& profile) {
   nlohmann::json features = nlohmann::json::array();
-  for (const AreaPolygon& polygon : answer.outlines) features.push_back(feature(polygon));
+  for (const TraversablePolygon& polygon : answer.outlines) features.push_back(feature(polygon));
   return {{"type", "FeatureCollection"},
           {"frame", "map"},
           {"unit", "m"},
@@ -36,7 +36,8 @@ nlohmann::json to_json(const AreaAnswer& answer, const std::string& profile) {
           {"features", std::move(features)}};
 }
 
-void write_outlines(const std::string& file, const AreaAnswer& answer, const std::string& profile) {
+void write_outlines(const std::string& file, const TraversabilityAnswer& answer,
+                    const std::string& profile) {
   std::ofstream stream(file, std::ios::trunc);
   stream << to_json(answer, profile).dump(1) << "\n";
   stream.close();
@@ -45,4 +46,4 @@ void write_outlines(const std::string& file, const AreaAnswer& answer, const std
   }
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

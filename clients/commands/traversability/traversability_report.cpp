@@ -5,20 +5,20 @@
 
 #include "clients/terminal/table.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 double square_metres(const TraversabilityView& view, std::uint64_t cells) {
   return static_cast<double>(cells) * view.cell_m * view.cell_m;
 }
 
-double ms_per_tile(const TraversableReport& report) {
+double ms_per_tile(const TraversabilityReport& report) {
   return report.milliseconds / static_cast<double>(std::max<std::size_t>(1, report.work->surfaces));
 }
 
 }  // namespace
 
-nlohmann::json to_json(const TraversabilityView& view, const TraversableReport& report) {
+nlohmann::json to_json(const TraversabilityView& view, const TraversabilityReport& report) {
   nlohmann::json lethal = nlohmann::json::object();
   for (std::size_t i = 0; i < block_reason_count; ++i) {
     const auto reason = static_cast<BlockReason>(i);
@@ -41,7 +41,7 @@ nlohmann::json to_json(const TraversabilityView& view, const TraversableReport& 
   return json;
 }
 
-std::string describe(const TraversabilityView& view, const TraversableReport& report) {
+std::string describe(const TraversabilityView& view, const TraversabilityReport& report) {
   const auto area = [&](std::uint64_t cells) { return fixed(square_metres(view, cells), 0); };
   Table table({"area for " + view.profile.name, "m2"});
   table.add({"free", area(report.summary.free)});
@@ -61,4 +61,4 @@ std::string describe(const TraversabilityView& view, const TraversableReport& re
          fixed(view.cell_m, 2) + " m, in " + fixed(report.milliseconds, 0) + " ms" + work + "\n";
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,14 +4,14 @@
 #include <optional>
 #include <string>
 
-#include "core/traversability/traversability_summary.hpp"
 #include "core/traversability/traversability_map.hpp"
+#include "core/traversability/traversability_summary.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// What there is to say of an area.
-struct TraversableReport {
-  AreaSummary summary;
+struct TraversabilityReport {
+  TraversabilitySummary summary;
   /// Of a map file, whose area is computed from scratch.
   std::optional<TraversabilityUpdate> work;
   /// From the question to the answer.
@@ -20,7 +20,8 @@ struct TraversableReport {
 
 /// `view` is of the answer.
 [[nodiscard]] nlohmann::json to_json(const TraversabilityView& view,
-                                     const TraversableReport& report);
-[[nodiscard]] std::string describe(const TraversabilityView& view, const TraversableReport& report);
+                                     const TraversabilityReport& report);
+[[nodiscard]] std::string describe(const TraversabilityView& view,
+                                   const TraversabilityReport& report);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

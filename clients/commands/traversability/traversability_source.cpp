@@ -9,44 +9,51 @@
 #include "config/loaders/robot_profile.hpp"
 #include "core/dataset/dataset_error.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
-StoredMap stored_map(const std::string& file) {
+SavedMap stored_map(const std::string& file) {
   if (!std::filesystem::exists(file)) {
     throw DatasetError(file, "does not exist; 'stillmap map' writes map files");
   }
   return open_map_file(file)->load();
 }
 
-class FileSource final : public AreaSource {
+class FileSource final : public TraversabilitySource {
  public:
-  explicit FileSource(const AreaSourceArguments& arguments)
-      : area_({load_robot_profile(arguments.profile)}), map_(stored_map(arguments.map_file)) {
-    work_ = area_.update(map_.view);
+  explicit FileSource(const TraversabilitySourceArguments& arguments)
+      : traversability_({load_robot_profile(arguments.profile)}),
+        map_(stored_map(arguments.map_file)) {
+    update_stats_ = traversability_.update(map_.view);
   }
 
-  [[nodiscard]] RobotProfile robot() const override { return area_.profiles().front(); }
-  [[nodiscard]] AreaAnswer area(AreaQuery query) override { return answer_area(view(), query); }
+  [[nodiscard]] RobotProfile robot() const override { return traversability_.profiles().front(); }
+  [[nodiscard]] TraversabilityAnswer traversability(TraversabilityQuery query) override {
+    return query_traversability(view(), query);
+  }
   [[nodiscard]] PathCheck check(PathQuery query) override { return check_path(view(), query); }
   [[nodiscard]] NearestTraversable nearest(const Eigen::Vector2d& position_map,
                                            double max_distance_m) override {
     return nearest_traversable(view(), position_map, max_distance_m);
   }
   [[nodiscard]] Trajectory trajectory() override { return map_.trajectory; }
-  [[nodiscard]] std::optional<TraversabilityUpdate> work() const override { return work_; }
+  [[nodiscard]] std::optional<TraversabilityUpdate> update_stats() const override {
+    return update_stats_;
+  }
 
  private:
-  [[nodiscard]] const TraversabilityView& view() const { return *area_.view(robot().name); }
+  [[nodiscard]] const TraversabilityView& view() const {
+    return *traversability_.view(robot().name);
+  }
 
-  TraversabilityMap area_;
-  StoredMap map_;
-  TraversabilityUpdate work_;
+  TraversabilityMap traversability_;
+  SavedMap map_;
+  TraversabilityUpdate update_stats_;
 };
 
-class ServerSource final : public AreaSource {
+class ServerSource final : public TraversabilitySource {
  public:
-  explicit ServerSource(const AreaSourceArguments& arguments)
+  explicit ServerSource(const TraversabilitySourceArguments& arguments)
       : profile_(arguments.profile),
         timeout_(arguments.client.timeout()),
         client_(connect(arguments.client)) {}
@@ -60,7 +67,7 @@ class ServerSource final : public AreaSource {
       return named;
     }
   }
-  [[nodiscard]] AreaAnswer area(AreaQuery query) override {
+  [[nodiscard]] TraversabilityAnswer traversability(TraversabilityQuery query) override {
     query.profile = profile_;
     return client_.get_traversable_area(query);
   }
@@ -72,8 +79,10 @@ class ServerSource final : public AreaSource {
                                            double max_distance_m) override {
     return client_.nearest_traversable(profile_, position_map, max_distance_m);
   }
-  [[nodiscard]] Trajectory trajectory() override { return newest_path(client_, timeout_); }
-  [[nodiscard]] std::optional<TraversabilityUpdate> work() const override { return std::nullopt; }
+  [[nodiscard]] Trajectory trajectory() override { return fetch_trajectory(client_, timeout_); }
+  [[nodiscard]] std::optional<TraversabilityUpdate> update_stats() const override {
+    return std::nullopt;
+  }
 
  private:
   std::string profile_;
@@ -83,7 +92,8 @@ class ServerSource final : public AreaSource {
 
 }  // namespace
 
-void add_area_source_options(CommandHandle command, AreaSourceArguments& arguments) {
+void add_traversability_source_options(CommandHandle command,
+                                       TraversabilitySourceArguments& arguments) {
   command.option("MAPFILE", arguments.map_file,
                  "Map file (map.stillmap of 'stillmap map'); without it, a server is asked");
   command
@@ -94,12 +104,13 @@ void add_area_source_options(CommandHandle command, AreaSourceArguments& argumen
   add_client_options(command, arguments.client);
 }
 
-std::unique_ptr<AreaSource> open_area_source(const AreaSourceArguments& arguments) {
+std::unique_ptr<TraversabilitySource> open_traversability_source(
+    const TraversabilitySourceArguments& arguments) {
   if (arguments.map_file.empty()) return std::make_unique<ServerSource>(arguments);
   return std::make_unique<FileSource>(arguments);
 }
 
-Region region_of(const RegionArguments& region, AreaSource& source) {
+Region region_of(const RegionArguments& region, TraversabilitySource& source) {
   Eigen::Vector2d robot_map = Eigen::Vector2d::Zero();
   if (region.around_robot_m > 0.0) {
     const Trajectory trajectory = source.trajectory();
@@ -110,9 +121,9 @@ Region region_of(const RegionArguments& region, AreaSource& source) {
   return region_at(region, robot_map);
 }
 
-void require_answer(AreaStatus status, const std::string& reason) {
-  if (status == AreaStatus::ok || status == AreaStatus::not_found) return;
+void require_answer(TraversabilityStatus status, const std::string& reason) {
+  if (status == TraversabilityStatus::ok || status == TraversabilityStatus::not_found) return;
   throw std::invalid_argument(reason);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

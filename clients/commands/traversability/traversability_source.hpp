@@ -6,15 +6,15 @@
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/query/region_arguments.hpp"
 #include "core/map/storage/map_file.hpp"
-#include "core/traversability/traversability_query.hpp"
 #include "core/traversability/nearest_traversable.hpp"
 #include "core/traversability/path_query.hpp"
 #include "core/traversability/traversability_map.hpp"
+#include "core/traversability/traversability_query.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 
 /// Of whom a command line asks about areas.
-struct AreaSourceArguments {
+struct TraversabilitySourceArguments {
   /// Empty: a server.
   std::string map_file;
   std::string profile = "car";
@@ -22,36 +22,38 @@ struct AreaSourceArguments {
 };
 
 /// Adds MAPFILE, --profile and the options of a client.
-void add_area_source_options(CommandHandle command, AreaSourceArguments& arguments);
+void add_traversability_source_options(CommandHandle command,
+                                       TraversabilitySourceArguments& arguments);
 
 /// Answers about areas: of a server, or from a map file, whose area is computed here.
-class AreaSource {
+class TraversabilitySource {
  public:
-  virtual ~AreaSource() = default;
+  virtual ~TraversabilitySource() = default;
 
   /// The robot that is asked about. Of a server's, only the name is known where this machine has no
   /// such robot.
   [[nodiscard]] virtual RobotProfile robot() const = 0;
   /// As core and Client have them: a refusal is in the result. `profile` is filled in.
-  [[nodiscard]] virtual AreaAnswer area(AreaQuery query) = 0;
+  [[nodiscard]] virtual TraversabilityAnswer traversability(TraversabilityQuery query) = 0;
   [[nodiscard]] virtual PathCheck check(PathQuery query) = 0;
   [[nodiscard]] virtual NearestTraversable nearest(const Eigen::Vector2d& position_map,
                                                    double max_distance_m) = 0;
   /// Where the lidar went. Throws ServiceTimeout when a server does not tell in time.
   [[nodiscard]] virtual Trajectory trajectory() = 0;
   /// What the area of the whole map took; nothing for a server, which has it ready.
-  [[nodiscard]] virtual std::optional<TraversabilityUpdate> work() const = 0;
+  [[nodiscard]] virtual std::optional<TraversabilityUpdate> update_stats() const = 0;
 };
 
 /// Opens the map file or finds the server. Throws ConfigError, DatasetError or MapFileError for a
 /// robot or a file, ServiceTimeout without a server.
-[[nodiscard]] std::unique_ptr<AreaSource> open_area_source(const AreaSourceArguments& arguments);
+[[nodiscard]] std::unique_ptr<TraversabilitySource> open_traversability_source(
+    const TraversabilitySourceArguments& arguments);
 
 /// The region that a command line names, round the newest pose where it names the robot. Throws as
 /// check_region does.
-[[nodiscard]] Region region_of(const RegionArguments& region, AreaSource& source);
+[[nodiscard]] Region region_of(const RegionArguments& region, TraversabilitySource& source);
 
 /// Throws std::invalid_argument with the reason unless the status is ok or `not_found`.
-void require_answer(AreaStatus status, const std::string& reason);
+void require_answer(TraversabilityStatus status, const std::string& reason);
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

@@ -4,20 +4,20 @@
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 
-#include "clients/commands/traversability/traversability_geojson.hpp"
-#include "clients/commands/traversability/traversability_source.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/query/region_arguments.hpp"
+#include "clients/commands/traversability/traversability_geojson.hpp"
 #include "clients/commands/traversability/traversability_report.hpp"
-#include "core/traversability/traversability_answer_view.hpp"
-#include "core/traversability/nav2_map.hpp"
+#include "clients/commands/traversability/traversability_source.hpp"
 #include "core/picture/traversability_picture.hpp"
+#include "core/traversability/nav2_map.hpp"
+#include "core/traversability/traversability_answer_view.hpp"
 
-namespace stillmap {
+namespace stillmap::cli {
 namespace {
 
 struct Arguments {
-  AreaSourceArguments source;
+  TraversabilitySourceArguments source;
   RegionArguments region;
   std::string out;
   std::string picture;
@@ -26,17 +26,19 @@ struct Arguments {
   bool json = false;
 };
 
-AreaAnswer ask(AreaSource& source, const Arguments& arguments) {
-  AreaQuery query;
+TraversabilityAnswer query_traversability(TraversabilitySource& source,
+                                          const Arguments& arguments) {
+  TraversabilityQuery query;
   query.region = region_of(arguments.region, source);
-  query.wants_outlines = !arguments.outlines.empty();
+  query.include_outlines = !arguments.outlines.empty();
   query.min_outline_area_m2 = arguments.min_outline_area_m2;
-  AreaAnswer answer = source.area(query);
-  if (answer.grid.status != AreaStatus::ok) throw std::invalid_argument(answer.grid.reason);
+  TraversabilityAnswer answer = source.traversability(query);
+  if (answer.grid.status != TraversabilityStatus::ok)
+    throw std::invalid_argument(answer.grid.reason);
   return answer;
 }
 
-void draw(const std::string& file, const TraversabilityView& view, AreaSource& source) {
+void draw(const std::string& file, const TraversabilityView& view, TraversabilitySource& source) {
   TraversabilityPictureOptions options;
   options.trajectory = source.trajectory();
   write_traversability_picture(file, view, options);
@@ -45,12 +47,12 @@ void draw(const std::string& file, const TraversabilityView& view, AreaSource& s
 ExitCode run(const Arguments& arguments) {
   check_region(arguments.region);
   const auto began = std::chrono::steady_clock::now();
-  const std::unique_ptr<AreaSource> source = open_area_source(arguments.source);
-  const AreaAnswer answer = ask(*source, arguments);
+  const std::unique_ptr<TraversabilitySource> source = open_traversability_source(arguments.source);
+  const TraversabilityAnswer answer = query_traversability(*source, arguments);
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
-  const TraversabilityView view = area_view(answer, source->robot());
-  const TraversableReport report{
-      .summary = summarize(answer), .work = source->work(), .milliseconds = took.count()};
+  const TraversabilityView view = view_of_answer(answer, source->robot());
+  const TraversabilityReport report{
+      .summary = summarize(answer), .work = source->update_stats(), .milliseconds = took.count()};
   if (!arguments.out.empty()) write_nav2_map(arguments.out, answer.grid);
   if (!arguments.outlines.empty()) {
     write_outlines(arguments.outlines, answer, view.profile.name);
@@ -66,8 +68,8 @@ void add_traversable_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   CommandHandle command = program.command(
       "traversable", "Where a robot can drive, of a server or on a stored map, and why not");
-  add_area_source_options(command, arguments->source);
-  add_plan_region_options(command, arguments->region);
+  add_traversability_source_options(command, arguments->source);
+  add_region_options_2d(command, arguments->region);
   command.option("--out", arguments->out,
                  "Folder for Nav2's map_server: map.yaml and map.pgm; made if need be");
   command.option("--picture", arguments->picture, "Draw the area and its reasons to FILE.png");
@@ -92,4 +94,4 @@ void add_traversable_command(CommandHandle program, Action& action) {
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::cli

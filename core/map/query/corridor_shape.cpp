@@ -56,7 +56,7 @@ bool CorridorShape::is_near(const Piece& piece, const Eigen::Vector2d& p_map) co
   return (offset - t * along).squaredNorm() <= half_width_m_ * half_width_m_;
 }
 
-bool CorridorShape::meets(const Piece& piece, const Eigen::AlignedBox2d& box_map) const {
+bool CorridorShape::intersects(const Piece& piece, const Eigen::AlignedBox2d& box_map) const {
   const double squared = half_width_m_ * half_width_m_;
   const auto is_near_corner = [&](const Eigen::Vector2d& corner) { return is_near(piece, corner); };
   return box_map.squaredExteriorDistance(piece.begin_map) <= squared ||
@@ -69,8 +69,9 @@ bool CorridorShape::contains(const Eigen::Vector2d& p_map) const {
   return std::ranges::any_of(pieces_, [&](const Piece& piece) { return is_near(piece, p_map); });
 }
 
-bool CorridorShape::meets(const Eigen::AlignedBox2d& box_map) const {
-  return std::ranges::any_of(pieces_, [&](const Piece& piece) { return meets(piece, box_map); });
+bool CorridorShape::intersects(const Eigen::AlignedBox2d& box_map) const {
+  return std::ranges::any_of(pieces_,
+                             [&](const Piece& piece) { return intersects(piece, box_map); });
 }
 
 bool CorridorShape::covers(const Eigen::AlignedBox2d& box_map) const {
@@ -80,10 +81,10 @@ bool CorridorShape::covers(const Eigen::AlignedBox2d& box_map) const {
   });
 }
 
-CorridorShape CorridorShape::near(const Eigen::AlignedBox2d& box_map) const {
+CorridorShape CorridorShape::restricted_to(const Eigen::AlignedBox2d& box_map) const {
   CorridorShape part(half_width_m_);
   std::ranges::copy_if(pieces_, std::back_inserter(part.pieces_),
-                       [&](const Piece& piece) { return meets(piece, box_map); });
+                       [&](const Piece& piece) { return intersects(piece, box_map); });
   return part;
 }
 

@@ -13,11 +13,11 @@ class CorridorShape {
 
   [[nodiscard]] Eigen::AlignedBox2d bounds_map() const;
   [[nodiscard]] bool contains(const Eigen::Vector2d& p_map) const;
-  [[nodiscard]] bool meets(const Eigen::AlignedBox2d& box_map) const;
+  [[nodiscard]] bool intersects(const Eigen::AlignedBox2d& box_map) const;
   /// True only if one piece of the path is near all of the box.
   [[nodiscard]] bool covers(const Eigen::AlignedBox2d& box_map) const;
   /// Answers `contains` as this does for positions in the box, from fewer pieces.
-  [[nodiscard]] CorridorShape near(const Eigen::AlignedBox2d& box_map) const;
+  [[nodiscard]] CorridorShape restricted_to(const Eigen::AlignedBox2d& box_map) const;
 
  private:
   struct Piece {
@@ -26,7 +26,7 @@ class CorridorShape {
   };
   explicit CorridorShape(double half_width_m) : half_width_m_(half_width_m) {}
   [[nodiscard]] bool is_near(const Piece& piece, const Eigen::Vector2d& p_map) const;
-  [[nodiscard]] bool meets(const Piece& piece, const Eigen::AlignedBox2d& box_map) const;
+  [[nodiscard]] bool intersects(const Piece& piece, const Eigen::AlignedBox2d& box_map) const;
 
   std::vector<Piece> pieces_;
   double half_width_m_;

@@ -16,7 +16,7 @@ QueryVoxel query_voxel(const Voxel& voxel) {
 
 /// A query that was found fine, and where its answer comes from.
 struct Selection {
-  const MapView& view;
+  const MapSnapshot& view;
   const MapQuery& query;
   RegionShape region;
   std::vector<std::size_t> tiles;
@@ -29,11 +29,11 @@ bool fill_page(const Selection& from, Continuation& position, std::vector<QueryV
   const std::size_t page_size = from.query.max_bytes / query_voxel_bytes;
   for (const std::size_t i : from.tiles) {
     if (i < position.tile) continue;
-    const auto read = from.reader.whole(from.view.tiles[i]);
+    const auto read = from.reader.read(from.view.tiles[i]);
     const Tile& tile = *read;
     const VoxelFilter filter(from.query, from.region, tile);
     for (std::size_t v = i == position.tile ? position.voxel : 0; v < tile.voxels.size(); ++v) {
-      if (!filter.takes(tile.voxels[v])) continue;
+      if (!filter.matches(tile.voxels[v])) continue;
       if (page.size() == page_size) {
         position.tile = i;
         position.voxel = v;
@@ -51,10 +51,10 @@ bool fill_coarse_page(const Selection& from, Continuation& position,
                       std::vector<QueryVoxel>& page) {
   CoarseCells cells(from.query.resolution_m);
   for (const std::size_t i : from.tiles) {
-    const auto tile = from.reader.whole(from.view.tiles[i]);
+    const auto tile = from.reader.read(from.view.tiles[i]);
     const VoxelFilter filter(from.query, from.region, *tile);
     for (const Voxel& voxel : tile->voxels) {
-      if (filter.takes(voxel)) cells.add(voxel);
+      if (filter.matches(voxel)) cells.add(voxel);
     }
   }
   const std::vector<QueryVoxel> all = cells.sorted();
@@ -67,7 +67,7 @@ bool fill_coarse_page(const Selection& from, Continuation& position,
   return end < all.size();
 }
 
-MapQueryResult result_of(const MapView& view, QueryStatus status, std::string reason) {
+MapQueryResult result_of(const MapSnapshot& view, QueryStatus status, std::string reason) {
   MapQueryResult result;
   result.status = status;
   result.reason = std::move(reason);
@@ -82,7 +82,7 @@ struct Start {
   std::optional<Refusal> refusal;
 };
 
-Start start_of(const MapView& view, const MapQuery& query, const TileHistory* history) {
+Start start_of(const MapSnapshot& view, const MapQuery& query, const TileHistory* history) {
   if (std::string faults = query_faults(view, query); !faults.empty()) {
     return {{}, Refusal{QueryStatus::invalid_request, std::move(faults)}};
   }
@@ -104,14 +104,14 @@ void describe(const Selection& selection, const TileHistory* history, Continuati
 
 }  // namespace
 
-MapQueryResult query_map(const MapView& view, const MapQuery& query, const TileHistory* history,
+MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query, const TileHistory* history,
                          TileReader& reader) {
   auto [position, refusal] = start_of(view, query, history);
   if (refusal) return result_of(view, refusal->status, std::move(refusal->reason));
 
   const RegionShape region(query.region);
   const Selection selection{view, query, region, selected_tiles(view, query, region), reader};
-  const bool is_coarse = wants_coarse(view, query.resolution_m);
+  const bool is_coarse = is_coarser_than_map(view, query.resolution_m);
   MapQueryResult result = result_of(view, QueryStatus::ok, {});
   if (!is_coarse && query.continuation.empty()) describe(selection, history, position, result);
   const bool has_more = is_coarse ? fill_coarse_page(selection, position, result.voxels)
@@ -121,7 +121,8 @@ MapQueryResult query_map(const MapView& view, const MapQuery& query, const TileH
   return result;
 }
 
-MapQueryResult query_map(const MapView& view, const MapQuery& query, const TileHistory* history) {
+MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query,
+                         const TileHistory* history) {
   TileReader reader;
   return query_map(view, query, history, reader);
 }

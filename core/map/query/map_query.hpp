@@ -8,9 +8,9 @@
 
 #include "core/lidar/motion.hpp"
 #include "core/map/query/region.hpp"
-#include "core/map/tile.hpp"
 #include "core/map/query/tile_history.hpp"
 #include "core/map/query/tile_reader.hpp"
+#include "core/map/tile.hpp"
 
 namespace stillmap {
 
@@ -99,12 +99,12 @@ inline constexpr std::size_t query_voxel_bytes = 3 * sizeof(float) + 1 + sizeof(
 /// Answers `query` from one view. A voxel is in the region when its position is. A continuation
 /// made from another map or version is stale; a damaged one, or one of another query, is invalid.
 /// `history` ends with this view; only the first page of a query with `since` needs it, and is
-/// refused without. Tiles that are away come through `reader`, one after the other; throws as that
-/// does.
-[[nodiscard]] MapQueryResult query_map(const MapView& view, const MapQuery& query,
+/// refused without. Tiles that are non-resident come through `reader`, one after the other; throws
+/// as that does.
+[[nodiscard]] MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query,
                                        const TileHistory* history, TileReader& reader);
 /// Of a view that has all its voxels.
-[[nodiscard]] MapQueryResult query_map(const MapView& view, const MapQuery& query,
+[[nodiscard]] MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query,
                                        const TileHistory* history = nullptr);
 
 /// The map version that a continuation wants, to find the view it was made from.

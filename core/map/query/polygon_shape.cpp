@@ -15,10 +15,10 @@ GridEdge diagonal_round(const Eigen::AlignedBox2d& box_map) {
 /// Whether an edge has a point in the box with this diagonal: it does unless one of the box's axes
 /// or the edge's own line keeps them apart.
 bool meets_box(const GridEdge& edge, const GridEdge& box) {
-  if (!boxes_meet(edge, box)) return false;
-  const int low_left = turn(edge.a, edge.b, box.a);
+  if (!boxes_intersect(edge, box)) return false;
+  const int low_left = orientation(edge.a, edge.b, box.a);
   const auto other_side = [&](GridPoint corner) {
-    return turn(edge.a, edge.b, corner) != low_left;
+    return orientation(edge.a, edge.b, corner) != low_left;
   };
   return low_left == 0 || other_side({box.b.x, box.a.y}) || other_side(box.b) ||
          other_side({box.a.x, box.b.y});
@@ -26,7 +26,7 @@ bool meets_box(const GridEdge& edge, const GridEdge& box) {
 
 /// Edges with one common corner: whether the second goes back along the first.
 bool folds_back(const GridEdge& first, const GridEdge& second) {
-  if (turn(first.a, first.b, second.b) != 0) return false;
+  if (orientation(first.a, first.b, second.b) != 0) return false;
   return first.a.x != first.b.x ? (first.a.x < first.b.x) != (second.a.x < second.b.x)
                                 : (first.a.y < first.b.y) != (second.a.y < second.b.y);
 }
@@ -43,7 +43,7 @@ PolygonShape::PolygonShape(const std::vector<Eigen::Vector2d>& corners_map) {
   }
 }
 
-bool PolygonShape::may_meet(std::size_t i, std::size_t j) const {
+bool PolygonShape::may_intersect(std::size_t i, std::size_t j) const {
   const std::size_t count = edges_.size();
   if ((i + 1) % count == j) return !folds_back(edges_[i], edges_[j]);
   if ((j + 1) % count == i) return !folds_back(edges_[j], edges_[i]);
@@ -57,7 +57,7 @@ std::optional<std::pair<std::size_t, std::size_t>> PolygonShape::crossing() cons
   std::ranges::sort(order, {}, [&](std::size_t i) { return edges_[i].min_x(); });
   for (auto s = order.begin(); s != order.end(); ++s) {
     for (auto t = s + 1; t != order.end() && edges_[*t].min_x() <= edges_[*s].max_x(); ++t) {
-      if (!edges_meet(edges_[*s], edges_[*t]) || may_meet(*s, *t)) continue;
+      if (!edges_intersect(edges_[*s], edges_[*t]) || may_intersect(*s, *t)) continue;
       const auto [first, second] = std::minmax(*s, *t);
       return std::pair(first_corner_[first], first_corner_[second]);
     }
@@ -67,7 +67,7 @@ std::optional<std::pair<std::size_t, std::size_t>> PolygonShape::crossing() cons
 
 bool PolygonShape::has_area() const {
   return std::ranges::any_of(edges_, [&](const GridEdge& edge) {
-    return turn(edges_.front().a, edges_.front().b, edge.b) != 0;
+    return orientation(edges_.front().a, edges_.front().b, edge.b) != 0;
   });
 }
 
@@ -76,7 +76,7 @@ bool PolygonShape::contains(const Eigen::Vector2d& p_map) const {
   bool is_inside = false;
   for (const GridEdge& edge : edges_) {
     if (p.y < edge.min_y() || p.y > edge.max_y() || p.x > edge.max_x()) continue;
-    const int side = turn(edge.a, edge.b, p);
+    const int side = orientation(edge.a, edge.b, p);
     if (side == 0 && p.x >= edge.min_x()) return true;
     // A ray towards +x; an edge owns its lower end only.
     const bool is_crossed = (edge.a.y <= p.y) != (edge.b.y <= p.y);
@@ -85,20 +85,20 @@ bool PolygonShape::contains(const Eigen::Vector2d& p_map) const {
   return is_inside;
 }
 
-bool PolygonShape::outline_meets(const Eigen::AlignedBox2d& box_map) const {
+bool PolygonShape::outline_intersects(const Eigen::AlignedBox2d& box_map) const {
   const GridEdge box = diagonal_round(box_map);
   return std::ranges::any_of(edges_, [&](const GridEdge& edge) { return meets_box(edge, box); });
 }
 
-bool PolygonShape::meets(const Eigen::AlignedBox2d& box_map) const {
-  return outline_meets(box_map) || contains(box_map.min());
+bool PolygonShape::intersects(const Eigen::AlignedBox2d& box_map) const {
+  return outline_intersects(box_map) || contains(box_map.min());
 }
 
 bool PolygonShape::covers(const Eigen::AlignedBox2d& box_map) const {
-  return !outline_meets(box_map) && contains(box_map.min());
+  return !outline_intersects(box_map) && contains(box_map.min());
 }
 
-PolygonShape PolygonShape::near(const Eigen::AlignedBox2d& box_map) const {
+PolygonShape PolygonShape::restricted_to(const Eigen::AlignedBox2d& box_map) const {
   const GridEdge box = diagonal_round(box_map);
   PolygonShape part;
   for (std::size_t i = 0; i < edges_.size(); ++i) {

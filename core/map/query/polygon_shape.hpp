@@ -22,15 +22,15 @@ class PolygonShape {
 
   /// Even-odd; the outline belongs to it.
   [[nodiscard]] bool contains(const Eigen::Vector2d& p_map) const;
-  [[nodiscard]] bool meets(const Eigen::AlignedBox2d& box_map) const;
+  [[nodiscard]] bool intersects(const Eigen::AlignedBox2d& box_map) const;
   [[nodiscard]] bool covers(const Eigen::AlignedBox2d& box_map) const;
   /// Answers `contains` as this does for positions in the box, from fewer edges.
-  [[nodiscard]] PolygonShape near(const Eigen::AlignedBox2d& box_map) const;
+  [[nodiscard]] PolygonShape restricted_to(const Eigen::AlignedBox2d& box_map) const;
 
  private:
   PolygonShape() = default;
-  [[nodiscard]] bool outline_meets(const Eigen::AlignedBox2d& box_map) const;
-  [[nodiscard]] bool may_meet(std::size_t i, std::size_t j) const;
+  [[nodiscard]] bool outline_intersects(const Eigen::AlignedBox2d& box_map) const;
+  [[nodiscard]] bool may_intersect(std::size_t i, std::size_t j) const;
 
   std::vector<GridEdge> edges_;
   /// Of each edge, the position of its first corner in the list given.

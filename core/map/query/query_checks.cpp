@@ -9,13 +9,13 @@ namespace {
 /// Resolutions that differ by less are the same: one came over the wire as float.
 constexpr double resolution_tolerance = 1e-6;
 
-void check_resolution(const MapView& view, const MapQuery& query, std::ostream& faults) {
+void check_resolution(const MapSnapshot& view, const MapQuery& query, std::ostream& faults) {
   const double resolution_m = query.resolution_m;
   const double finest_m = view.voxel_size_m * (1.0 - resolution_tolerance);
   if (resolution_m != 0.0 && !(resolution_m >= finest_m && std::isfinite(resolution_m))) {
     faults << "resolution_m is " << resolution_m << "; must be 0 (the map's own) or from "
            << view.voxel_size_m << " up. ";
-  } else if (query.since && wants_coarse(view, resolution_m)) {
+  } else if (query.since && is_coarser_than_map(view, resolution_m)) {
     faults << "resolution_m is " << resolution_m
            << "; with since_version it must be 0, the map's own: larger cells belong to no tile. ";
   }
@@ -31,11 +31,11 @@ void check_motions(const MapQuery& query, std::ostream& faults) {
 
 }  // namespace
 
-bool wants_coarse(const MapView& view, double resolution_m) {
+bool is_coarser_than_map(const MapSnapshot& view, double resolution_m) {
   return resolution_m > view.voxel_size_m * (1.0 + resolution_tolerance);
 }
 
-std::string query_faults(const MapView& view, const MapQuery& query) {
+std::string query_faults(const MapSnapshot& view, const MapQuery& query) {
   std::ostringstream faults;
   faults << region_faults(query.region);
   check_resolution(view, query, faults);
@@ -47,7 +47,7 @@ std::string query_faults(const MapView& view, const MapQuery& query) {
   return faults.str();
 }
 
-std::optional<Refusal> since_refusal(const MapView& view, const KnownVersion& since,
+std::optional<Refusal> since_refusal(const MapSnapshot& view, const KnownVersion& since,
                                      const TileHistory* history) {
   std::ostringstream reason;
   if (since.map_id != view.map_id) {
@@ -64,7 +64,7 @@ std::optional<Refusal> since_refusal(const MapView& view, const KnownVersion& si
   return Refusal{QueryStatus::changes_unknown, reason.str()};
 }
 
-std::optional<Refusal> token_refusal(const MapView& view, const MapQuery& query,
+std::optional<Refusal> token_refusal(const MapSnapshot& view, const MapQuery& query,
                                      const std::optional<Continuation>& token) {
   if (!token) {
     return Refusal{QueryStatus::invalid_request,

@@ -21,34 +21,34 @@ TileChangeKind kind_of(const TileInfo& info, const MapQuery& query, const TileHi
 VoxelFilter::VoxelFilter(const MapQuery& query, const RegionShape& region, const Tile& tile)
     : query_(query),
       is_inside_(region.covers(tile.info.bounds_map.cast<double>())),
-      takes_all_classes_(query.classes.none() || query.classes.all()),
-      near_(region.near(tile.info.bounds_map.cast<double>())) {}
+      matches_all_classes_(query.classes.none() || query.classes.all()),
+      near_(region.restricted_to(tile.info.bounds_map.cast<double>())) {}
 
 std::uint32_t VoxelFilter::count(const Tile& tile) const {
   return static_cast<std::uint32_t>(
-      std::ranges::count_if(tile.voxels, [&](const Voxel& voxel) { return takes(voxel); }));
+      std::ranges::count_if(tile.voxels, [&](const Voxel& voxel) { return matches(voxel); }));
 }
 
-std::vector<std::size_t> selected_tiles(const MapView& view, const MapQuery& query,
+std::vector<std::size_t> selected_tiles(const MapSnapshot& view, const MapQuery& query,
                                         const RegionShape& region) {
   std::vector<std::size_t> selected;
   if (query.since) {
     for (std::size_t i = 0; i < view.tiles.size(); ++i) {
       const TileInfo& info = view.tiles[i]->info;
       if (info.revision > query.since->version &&
-          region.may_meet(tile_footprint(info.id, view.tile_size_m))) {
+          region.may_intersect(tile_footprint(info.id, view.tile_size_m))) {
         selected.push_back(i);
       }
     }
     return selected;
   }
   for (const std::size_t i : tiles_in_box(view, region.bounds_map())) {
-    if (region.may_meet(view.tiles[i]->info.bounds_map.cast<double>())) selected.push_back(i);
+    if (region.may_intersect(view.tiles[i]->info.bounds_map.cast<double>())) selected.push_back(i);
   }
   return selected;
 }
 
-std::vector<TileChange> tile_changes(const MapView& view, const MapQuery& query,
+std::vector<TileChange> tile_changes(const MapSnapshot& view, const MapQuery& query,
                                      const RegionShape& region,
                                      const std::vector<std::size_t>& selected,
                                      const TileHistory* history, TileReader& reader) {
@@ -58,12 +58,13 @@ std::vector<TileChange> tile_changes(const MapView& view, const MapQuery& query,
     const TileInfo& info = view.tiles[i]->info;
     const VoxelFilter filter(query, region, *view.tiles[i]);
     const std::uint32_t count =
-        filter.takes_all() ? info.voxel_count : filter.count(*reader.whole(view.tiles[i]));
+        filter.matches_all() ? info.voxel_count : filter.count(*reader.read(view.tiles[i]));
     changes.push_back({info.id, kind_of(info, query, history), info.revision, count});
   }
   if (!query.since || history == nullptr) return changes;
-  for (const auto& [id, version] : history->gone) {
-    if (version > query.since->version && region.may_meet(tile_footprint(id, view.tile_size_m))) {
+  for (const auto& [id, version] : history->removed) {
+    if (version > query.since->version &&
+        region.may_intersect(tile_footprint(id, view.tile_size_m))) {
       changes.push_back({id, TileChangeKind::removed, version, 0});
     }
   }

@@ -77,14 +77,14 @@ bool RegionShape::contains(const Eigen::Vector3d& p_map) const {
                     shape_);
 }
 
-bool RegionShape::may_meet(const Eigen::AlignedBox3d& box_map) const {
+bool RegionShape::may_intersect(const Eigen::AlignedBox3d& box_map) const {
   if (!bounds_map_.intersects(box_map)) return false;
   return std::visit(Cases{[](const WholeBounds&) { return true; },
                           [&](const SphereRegion& sphere) {
                             return box_map.squaredExteriorDistance(sphere.centre_map) <=
                                    sphere.radius_m * sphere.radius_m;
                           },
-                          [&](const auto& plan) { return plan.meets(in_plan(box_map)); }},
+                          [&](const auto& plan) { return plan.intersects(in_plan(box_map)); }},
                     shape_);
 }
 
@@ -102,12 +102,13 @@ bool RegionShape::covers(const Eigen::AlignedBox3d& box_map) const {
                     shape_);
 }
 
-RegionShape RegionShape::near(const Eigen::AlignedBox3d& box_map) const {
-  return {bounds_map_,
-          std::visit(Cases{[](const WholeBounds& all) { return Shape(all); },
-                           [](const SphereRegion& sphere) { return Shape(sphere); },
-                           [&](const auto& plan) { return Shape(plan.near(in_plan(box_map))); }},
-                     shape_)};
+RegionShape RegionShape::restricted_to(const Eigen::AlignedBox3d& box_map) const {
+  return {bounds_map_, std::visit(Cases{[](const WholeBounds& all) { return Shape(all); },
+                                        [](const SphereRegion& sphere) { return Shape(sphere); },
+                                        [&](const auto& plan) {
+                                          return Shape(plan.restricted_to(in_plan(box_map)));
+                                        }},
+                                  shape_)};
 }
 
 }  // namespace stillmap

@@ -21,11 +21,11 @@ class RegionShape {
   /// False for NaN. Exact to a micrometre for polygons, to rounding for the others.
   [[nodiscard]] bool contains(const Eigen::Vector3d& p_map) const;
   /// False only when no position of the box is in the region. The box may be infinitely high.
-  [[nodiscard]] bool may_meet(const Eigen::AlignedBox3d& box_map) const;
+  [[nodiscard]] bool may_intersect(const Eigen::AlignedBox3d& box_map) const;
   /// True only when the whole box is in the region.
   [[nodiscard]] bool covers(const Eigen::AlignedBox3d& box_map) const;
   /// Answers `contains` as this does for positions in the box, and faster.
-  [[nodiscard]] RegionShape near(const Eigen::AlignedBox3d& box_map) const;
+  [[nodiscard]] RegionShape restricted_to(const Eigen::AlignedBox3d& box_map) const;
 
  private:
   struct WholeBounds {};

@@ -12,17 +12,17 @@ const Event* find(const std::vector<Event>& sorted, TileId id) {
   return found != sorted.end() && found->id == id ? &*found : nullptr;
 }
 
-/// Beyond `most`, the oldest are forgotten.
-void forget_oldest(TileHistory& history, std::size_t most) {
-  if (history.gone.size() <= most) return;
-  const auto kept = history.gone.end() - static_cast<std::ptrdiff_t>(most);
+/// Beyond `max_events`, the oldest are forgotten.
+void drop_oldest(TileHistory& history, std::size_t max_events) {
+  if (history.removed.size() <= max_events) return;
+  const auto kept = history.removed.end() - static_cast<std::ptrdiff_t>(max_events);
   history.known_since = std::max(history.known_since, (kept - 1)->version);
-  history.gone.erase(history.gone.begin(), kept);
+  history.removed.erase(history.removed.begin(), kept);
 }
 
 }  // namespace
 
-TileHistory history_from(const MapView& view) {
+TileHistory history_from(const MapSnapshot& view) {
   TileHistory history{view.map_id, view.version, view.version, {}, {}};
   for (const auto& tile : view.tiles) {
     history.appeared.push_back({tile->info.id, tile->info.revision});
@@ -30,7 +30,8 @@ TileHistory history_from(const MapView& view) {
   return history;
 }
 
-TileHistory history_with(const TileHistory& before, const MapView& next, std::size_t most_gone) {
+TileHistory history_with(const TileHistory& before, const MapSnapshot& next,
+                         std::size_t max_removed) {
   if (next.map_id != before.map_id || next.version < before.version) return history_from(next);
   TileHistory history{next.map_id, next.version, before.known_since, {}, {}};
   history.appeared.reserve(next.tiles.size());
@@ -39,11 +40,11 @@ TileHistory history_with(const TileHistory& before, const MapView& next, std::si
     history.appeared.push_back(known ? *known : Event{tile->info.id, tile->info.revision});
   }
   const auto is_there = [&](const Event& event) { return find(history.appeared, event.id); };
-  std::ranges::remove_copy_if(before.gone, std::back_inserter(history.gone), is_there);
+  std::ranges::remove_copy_if(before.removed, std::back_inserter(history.removed), is_there);
   for (const Event& event : before.appeared) {
-    if (!is_there(event)) history.gone.push_back({event.id, next.version});
+    if (!is_there(event)) history.removed.push_back({event.id, next.version});
   }
-  forget_oldest(history, most_gone);
+  drop_oldest(history, max_removed);
   return history;
 }
 

@@ -26,23 +26,23 @@ struct TileHistory {
   /// Every tile of the newest view, sorted by id.
   std::vector<Event> appeared;
   /// Tiles that are gone, in the order of leaving.
-  std::vector<Event> gone;
+  std::vector<Event> removed;
 };
 
 /// Tiles that are gone and remembered; the oldest are forgotten, and with them the changes since
 /// versions before.
-inline constexpr std::size_t most_gone_tiles = 10'000;
+inline constexpr std::size_t max_removed_tiles = 10'000;
 
 /// The history of a map of which nothing is known but this view.
-[[nodiscard]] TileHistory history_from(const MapView& view);
+[[nodiscard]] TileHistory history_from(const MapSnapshot& view);
 
 /// The history once `next` follows. A view of another map, or an earlier one, begins a new history.
-[[nodiscard]] TileHistory history_with(const TileHistory& before, const MapView& next,
-                                       std::size_t most_gone = most_gone_tiles);
+[[nodiscard]] TileHistory history_with(const TileHistory& before, const MapSnapshot& next,
+                                       std::size_t max_removed = max_removed_tiles);
 
 /// A state of the map and how it came to be. Safe to read from any thread.
 struct MapState {
-  std::shared_ptr<const MapView> view;
+  std::shared_ptr<const MapSnapshot> view;
   std::shared_ptr<const TileHistory> history;
 };
 

@@ -17,57 +17,58 @@ bool is_state(const TileInfo& a, const TileInfo& b) {
 
 }  // namespace
 
-TileReader::TileReader(std::shared_ptr<TileShelf> shelf, std::size_t kept_bytes)
-    : shelf_(std::move(shelf)), kept_bytes_(kept_bytes) {}
+TileReader::TileReader(std::shared_ptr<TileStore> tile_store, std::size_t cache_bytes)
+    : tile_store_(std::move(tile_store)), cache_bytes_(cache_bytes) {}
 
-void TileReader::use_shelf(std::shared_ptr<TileShelf> shelf) {
+void TileReader::use_tile_store(std::shared_ptr<TileStore> tile_store) {
   const std::scoped_lock lock(mutex_);
-  shelf_ = std::move(shelf);
-  kept_.clear();
+  tile_store_ = std::move(tile_store);
+  cache_.clear();
   bytes_ = 0;
 }
 
-std::shared_ptr<TileShelf> TileReader::shelf() {
+std::shared_ptr<TileStore> TileReader::tile_store() {
   const std::scoped_lock lock(mutex_);
-  return shelf_;
+  return tile_store_;
 }
 
-std::shared_ptr<const Tile> TileReader::whole(const std::shared_ptr<const Tile>& tile) {
-  if (!is_away(*tile)) return tile;
+std::shared_ptr<const Tile> TileReader::read(const std::shared_ptr<const Tile>& tile) {
+  if (!is_non_resident(*tile)) return tile;
   const TileInfo& wanted = tile->info;
-  if (auto known = kept(wanted)) return known;
-  const auto from = shelf();
-  auto read = from == nullptr ? nullptr : from->take(wanted.id).tile;
+  if (auto known = find_cached(wanted)) return known;
+  const auto from = tile_store();
+  auto read = from == nullptr ? nullptr : from->load(wanted.id).tile;
   if (read == nullptr || !is_state(read->info, wanted)) {
     throw TileChanged("tile (" + std::to_string(wanted.id.x) + ", " + std::to_string(wanted.id.y) +
                       ") changed while it was asked for; ask again");
   }
-  keep(read);
+  cache(read);
   return read;
 }
 
-MapView TileReader::with_voxels(const MapView& view, const std::vector<std::size_t>& tiles) {
-  MapView whole_view = view;
-  for (const std::size_t i : tiles) whole_view.tiles[i] = whole(view.tiles[i]);
-  return whole_view;
+MapSnapshot TileReader::with_voxels(const MapSnapshot& view,
+                                    const std::vector<std::size_t>& tiles) {
+  MapSnapshot complete = view;
+  for (const std::size_t i : tiles) complete.tiles[i] = read(view.tiles[i]);
+  return complete;
 }
 
-std::shared_ptr<const Tile> TileReader::kept(const TileInfo& wanted) {
+std::shared_ptr<const Tile> TileReader::find_cached(const TileInfo& wanted) {
   const std::scoped_lock lock(mutex_);
   const auto found =
-      std::ranges::find_if(kept_, [&](const auto& tile) { return is_state(tile->info, wanted); });
-  if (found == kept_.end()) return nullptr;
-  kept_.splice(kept_.begin(), kept_, found);
-  return kept_.front();
+      std::ranges::find_if(cache_, [&](const auto& tile) { return is_state(tile->info, wanted); });
+  if (found == cache_.end()) return nullptr;
+  cache_.splice(cache_.begin(), cache_, found);
+  return cache_.front();
 }
 
-void TileReader::keep(std::shared_ptr<const Tile> tile) {
+void TileReader::cache(std::shared_ptr<const Tile> tile) {
   const std::scoped_lock lock(mutex_);
   bytes_ += bytes_of(*tile);
-  kept_.push_front(std::move(tile));
-  while (bytes_ > kept_bytes_ && !kept_.empty()) {
-    bytes_ -= bytes_of(*kept_.back());
-    kept_.pop_back();
+  cache_.push_front(std::move(tile));
+  while (bytes_ > cache_bytes_ && !cache_.empty()) {
+    bytes_ -= bytes_of(*cache_.back());
+    cache_.pop_back();
   }
 }
 

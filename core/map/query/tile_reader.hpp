@@ -10,7 +10,7 @@
 
 namespace stillmap {
 
-/// The shelf has another state of the tile than the view that names it: ask of a newer view.
+/// The tile store has another state of the tile than the view that names it: ask of a newer view.
 class TileChanged : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
@@ -20,28 +20,29 @@ class TileChanged : public std::runtime_error {
 /// a region that is asked for again and again is read once. Thread-safe.
 class TileReader {
  public:
-  /// Without a shelf, every tile must have its voxels. Keeps about `kept_bytes`.
-  explicit TileReader(std::shared_ptr<TileShelf> shelf = nullptr, std::size_t kept_bytes = 0);
+  /// Without a tile store, every tile must have its voxels. Keeps about `cache_bytes`.
+  explicit TileReader(std::shared_ptr<TileStore> tile_store = nullptr, std::size_t cache_bytes = 0);
 
   /// From now on they come from there.
-  void use_shelf(std::shared_ptr<TileShelf> shelf);
+  void use_tile_store(std::shared_ptr<TileStore> tile_store);
 
-  /// The tile with its voxels. Throws TileChanged, or as the shelf does.
-  [[nodiscard]] std::shared_ptr<const Tile> whole(const std::shared_ptr<const Tile>& tile);
+  /// The tile with its voxels. Throws TileChanged, or as the tile store does.
+  [[nodiscard]] std::shared_ptr<const Tile> read(const std::shared_ptr<const Tile>& tile);
 
   /// The view with the voxels of these tiles of it (positions in `tiles`), all at once.
-  [[nodiscard]] MapView with_voxels(const MapView& view, const std::vector<std::size_t>& tiles);
+  [[nodiscard]] MapSnapshot with_voxels(const MapSnapshot& view,
+                                        const std::vector<std::size_t>& tiles);
 
  private:
-  [[nodiscard]] std::shared_ptr<TileShelf> shelf();
-  [[nodiscard]] std::shared_ptr<const Tile> kept(const TileInfo& wanted);
-  void keep(std::shared_ptr<const Tile> tile);
+  [[nodiscard]] std::shared_ptr<TileStore> tile_store();
+  [[nodiscard]] std::shared_ptr<const Tile> find_cached(const TileInfo& wanted);
+  void cache(std::shared_ptr<const Tile> tile);
 
-  std::shared_ptr<TileShelf> shelf_;
-  std::size_t kept_bytes_;
+  std::shared_ptr<TileStore> tile_store_;
+  std::size_t cache_bytes_;
   std::mutex mutex_;
   /// Most recently used first.
-  std::list<std::shared_ptr<const Tile>> kept_;
+  std::list<std::shared_ptr<const Tile>> cache_;
   std::size_t bytes_ = 0;
 };
 

@@ -44,7 +44,7 @@ constexpr const char* schema = R"sql(
   CREATE TABLE metadata (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 )sql";
 
-constexpr const char* memories_table = R"sql(
+constexpr const char* evidence_table = R"sql(
   CREATE TABLE memories (
     x INTEGER NOT NULL, y INTEGER NOT NULL, encoded BLOB NOT NULL,
     PRIMARY KEY (x, y));
@@ -101,7 +101,7 @@ void create(const fs::path& file) {
     database.exec("PRAGMA application_id = " + std::to_string(application_id));
     database.exec("PRAGMA user_version = " + std::to_string(schema_version));
     database.exec(schema);
-    database.exec(memories_table);
+    database.exec(evidence_table);
     transaction.commit();
     database.exec("PRAGMA journal_mode = WAL");
   }
@@ -167,7 +167,7 @@ void upgrade_schema(SQLite::Database& database) {
   for (const char* column : {"min_x", "min_y", "min_z", "max_x", "max_y", "max_z"}) {
     database.exec(std::string("ALTER TABLE tiles ADD COLUMN ") + column + " REAL");
   }
-  database.exec(memories_table);
+  database.exec(evidence_table);
   fill_in_infos(database);
   database.exec("PRAGMA user_version = " + std::to_string(schema_version));
   transaction.commit();

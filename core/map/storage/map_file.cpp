@@ -59,12 +59,12 @@ class ScratchMapFolder {
 };
 
 /// Reads through a connection of its own: nobody waits for a save.
-class SqliteShelf : public TileShelf {
+class SqliteTileStore : public TileStore {
  public:
-  SqliteShelf(const fs::path& file, std::shared_ptr<const ScratchMapFolder> folder)
+  SqliteTileStore(const fs::path& file, std::shared_ptr<const ScratchMapFolder> folder)
       : folder_(std::move(folder)), file_(file), database_(open_map_database(file)) {}
 
-  TileRecord take(TileId id) override {
+  TileRecord load(TileId id) override {
     const std::scoped_lock lock(mutex_);
     try {
       const SQLite::Transaction one_state(database_);
@@ -81,20 +81,20 @@ class SqliteShelf : public TileShelf {
   SQLite::Database database_;
 };
 
-class SqliteTileStore : public TileStore {
+class SqliteMapStore : public MapStore {
  public:
-  explicit SqliteTileStore(const fs::path& file,
-                           std::shared_ptr<const ScratchMapFolder> folder = nullptr)
+  explicit SqliteMapStore(const fs::path& file,
+                          std::shared_ptr<const ScratchMapFolder> folder = nullptr)
       : folder_(std::move(folder)), file_(file), database_(open_map_database(file)) {}
 
-  void save(const StoredMap& map) override {
+  void save(const SavedMap& map) override {
     writing([&] {
       if (has_first_schema(database_)) upgrade_schema(database_);
       if (!saved_trajectory_) saved_trajectory_ = read_trajectory(database_);
       SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
       const bool is_another_map = read_map_row(database_).map_id != map.view.map_id;
       write_tiles(database_, map);
-      write_memories(database_, map.memories, is_another_map);
+      write_tile_evidence(database_, map.tile_evidence, is_another_map);
       write_trajectory(database_, map.trajectory, common_poses(*saved_trajectory_, map.trajectory));
       write_metadata(database_, map);
       transaction.commit();
@@ -104,31 +104,31 @@ class SqliteTileStore : public TileStore {
     });
   }
 
-  StoredMap load() override {
+  SavedMap load() override {
     return reading([this] {
-      StoredMap map{
+      SavedMap map{
           read_map_row(database_), {}, read_trajectory(database_), read_metadata(database_)};
       map.view.tiles = read_tiles(database_, map.view);
-      if (!has_first_schema(database_)) map.memories = read_memories(database_);
-      check_agreement(map);
+      if (!has_first_schema(database_)) map.tile_evidence = read_tile_evidence(database_);
+      check_consistency(map);
       return map;
     });
   }
 
-  StoredMap load_shelved() override {
+  SavedMap load_non_resident() override {
     writing([this] {
       if (has_first_schema(database_)) upgrade_schema(database_);
     });
     return reading([this] {
-      StoredMap map{read_map_row(database_), read_memory_ids(database_), read_trajectory(database_),
-                    read_metadata(database_)};
+      SavedMap map{read_map_row(database_), read_tile_evidence_ids(database_),
+                   read_trajectory(database_), read_metadata(database_)};
       map.view.tiles = read_tile_infos(database_);
       return map;
     });
   }
 
-  std::shared_ptr<TileShelf> shelf() override {
-    return std::make_shared<SqliteShelf>(file_, folder_);
+  std::shared_ptr<TileStore> tile_store() override {
+    return std::make_shared<SqliteTileStore>(file_, folder_);
   }
 
   void begin_run(std::uint64_t map_id) override {
@@ -167,7 +167,7 @@ class SqliteTileStore : public TileStore {
   }
 
   template <typename Read>
-  StoredMap reading(Read read) {
+  SavedMap reading(Read read) {
     try {
       const SQLite::Transaction one_state(database_);
       return read();
@@ -185,9 +185,10 @@ class SqliteTileStore : public TileStore {
 
 }  // namespace
 
-StoredMap stored_state(const MapCheckpoint& checkpoint) {
-  StoredMap map{*checkpoint.view, {}, {}, {}};
-  for (const auto& [id, record] : checkpoint.records) map.memories.emplace(id, record.memory);
+SavedMap to_saved_map(const MapCheckpoint& checkpoint) {
+  SavedMap map{*checkpoint.view, {}, {}, {}};
+  for (const auto& [id, record] : checkpoint.records)
+    map.tile_evidence.emplace(id, record.evidence);
   for (auto& tile : map.view.tiles) {
     const auto record = checkpoint.records.find(tile->info.id);
     if (record != checkpoint.records.end() && record->second.tile) tile = record->second.tile;
@@ -195,14 +196,14 @@ StoredMap stored_state(const MapCheckpoint& checkpoint) {
   return map;
 }
 
-std::unique_ptr<TileStore> open_map_file(const fs::path& file) {
-  return std::make_unique<SqliteTileStore>(file);
+std::unique_ptr<MapStore> open_map_file(const fs::path& file) {
+  return std::make_unique<SqliteMapStore>(file);
 }
 
-std::unique_ptr<TileStore> open_scratch_map() {
+std::unique_ptr<MapStore> open_scratch_map() {
   auto folder = std::make_shared<const ScratchMapFolder>();
   const fs::path file = folder->path() / "map.stillmap";
-  return std::make_unique<SqliteTileStore>(file, std::move(folder));
+  return std::make_unique<SqliteMapStore>(file, std::move(folder));
 }
 
 }  // namespace stillmap

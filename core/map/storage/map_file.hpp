@@ -6,10 +6,10 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/lidar/trajectory.hpp"
 #include "core/map/static_map.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/tile_store.hpp"
-#include "core/odometry/trajectory.hpp"
 
 namespace stillmap {
 
@@ -26,35 +26,35 @@ class MapFileError : public std::runtime_error {
 inline constexpr const char* map_ended_key = "ended";
 
 /// What a map file holds.
-struct StoredMap {
-  MapView view;
+struct SavedMap {
+  MapSnapshot view;
   /// Empty for files of Stillmap's first format: what was seen too rarely, or as a movable class,
   /// starts anew.
-  TileMemories memories;
+  TileEvidenceMap tile_evidence;
   Trajectory trajectory;
   /// Free key-value pairs: "sensor", "label_source", "software".
   std::map<std::string, std::string> metadata;
 };
 
 /// A checkpoint as it is stored.
-[[nodiscard]] StoredMap stored_state(const MapCheckpoint& checkpoint);
+[[nodiscard]] SavedMap to_saved_map(const MapCheckpoint& checkpoint);
 
 /// Where tiles are kept between runs. The narrow waist behind which SQLite may one day be another
 /// database.
-class TileStore {
+class MapStore {
  public:
-  virtual ~TileStore() = default;
+  virtual ~MapStore() = default;
   /// Brings the store to this state in one transaction: after a crash the store holds either the
-  /// last save or this one. Tiles that did not change are not written again. Tiles that are away
-  /// (tile_shelf.hpp) stay as they are stored. A tile that is written without its memory loses the
-  /// one that was stored.
-  virtual void save(const StoredMap& map) = 0;
+  /// last save or this one. Tiles that did not change are not written again. Tiles that are
+  /// non-resident (core/map/tile_store.hpp) stay as they are stored. A tile that is written without
+  /// its evidence loses the one that was stored.
+  virtual void save(const SavedMap& map) = 0;
   /// The last saved state; an empty map when nothing was saved yet.
-  [[nodiscard]] virtual StoredMap load() = 0;
-  /// The same, with all tiles away: of a size that does not depend on what is in them.
-  [[nodiscard]] virtual StoredMap load_shelved() = 0;
+  [[nodiscard]] virtual SavedMap load() = 0;
+  /// The same, with all tiles non-resident: of a size that does not depend on what is in them.
+  [[nodiscard]] virtual SavedMap load_non_resident() = 0;
   /// Where those tiles are; may be used beside the store, and after it.
-  [[nodiscard]] virtual std::shared_ptr<TileShelf> shelf() = 0;
+  [[nodiscard]] virtual std::shared_ptr<TileStore> tile_store() = 0;
   /// Mapping goes on from what is stored: under this id from now on, and not ended.
   virtual void begin_run(std::uint64_t map_id) = 0;
   /// Writes the last saved state to another file, in the place of what is there. Throws
@@ -65,10 +65,10 @@ class TileStore {
 /// Opens or makes an SQLite map file (WAL; the file alone is complete after each save and may be
 /// copied). Throws MapFileError: no database, another program's, written by a newer version,
 /// damaged, or in a folder that cannot be written. Such a file is left untouched.
-[[nodiscard]] std::unique_ptr<TileStore> open_map_file(const std::filesystem::path& file);
+[[nodiscard]] std::unique_ptr<MapStore> open_map_file(const std::filesystem::path& file);
 
 /// A store that is gone with the program, for a map that is not to be kept but does not fit into
 /// memory. Throws MapFileError when the folder for temporary files cannot be written.
-[[nodiscard]] std::unique_ptr<TileStore> open_scratch_map();
+[[nodiscard]] std::unique_ptr<MapStore> open_scratch_map();
 
 }  // namespace stillmap

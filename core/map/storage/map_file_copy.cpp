@@ -48,9 +48,9 @@ fs::path fresh_folder(const fs::path& file) {
 std::unique_ptr<SQLite::Database> hold(const fs::path& file) {
   if (!fs::exists(beside(file, "-wal")) || !fs::exists(beside(file, "-shm"))) return nullptr;
   try {
-    constexpr int patience_ms = 5000;
+    constexpr int busy_timeout_ms = 5000;
     auto database =
-        std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READONLY, patience_ms);
+        std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READONLY, busy_timeout_ms);
     database->exec("BEGIN");
     static_cast<void>(database->execAndGet("SELECT count(*) FROM sqlite_master").getInt());
     return database;
@@ -104,7 +104,7 @@ void MapFileCopy::check_format() const {
   }
 }
 
-StoredMap MapFileCopy::load() const {
+SavedMap MapFileCopy::load() const {
   try {
     return open_map_file(copy_)->load();
   } catch (const MapFileError& error) {
@@ -112,6 +112,6 @@ StoredMap MapFileCopy::load() const {
   }
 }
 
-StoredMap read_map_file(const fs::path& file) { return MapFileCopy(file).load(); }
+SavedMap read_map_file(const fs::path& file) { return MapFileCopy(file).load(); }
 
 }  // namespace stillmap

@@ -23,7 +23,7 @@ class MapFileCopy {
   /// damaged.
   void check_format() const;
   /// Throws as check_format does.
-  [[nodiscard]] StoredMap load() const;
+  [[nodiscard]] SavedMap load() const;
 
  private:
   std::filesystem::path file_;
@@ -32,6 +32,6 @@ class MapFileCopy {
 };
 
 /// What a map file holds, the file left as it is. Throws MapFileError as MapFileCopy does.
-[[nodiscard]] StoredMap read_map_file(const std::filesystem::path& file);
+[[nodiscard]] SavedMap read_map_file(const std::filesystem::path& file);
 
 }  // namespace stillmap

@@ -9,32 +9,34 @@ namespace stillmap {
 // The tables of a map file, row by row. All throw SQLite::Exception, and TileCodecError for a tile
 // that is not what it should be.
 
-/// Writes the tiles that differ from their rows or have a memory given, without their memories, and
-/// takes rows of others away. Tiles that are away must be there as they are.
-void write_tiles(SQLite::Database& database, const StoredMap& map);
+/// Writes the tiles that differ from their rows or have evidence given, without their evidence, and
+/// takes rows of others away. Tiles that are non-resident must be there as they are.
+void write_tiles(SQLite::Database& database, const SavedMap& map);
 /// Those that are given; with `forget_others`, takes away all others.
-void write_memories(SQLite::Database& database, const TileMemories& memories, bool forget_others);
+void write_tile_evidence(SQLite::Database& database, const TileEvidenceMap& tile_evidence,
+                         bool forget_others);
 /// From this pose on; later rows are replaced.
 void write_trajectory(SQLite::Database& database, const Trajectory& trajectory, std::size_t from);
-void write_metadata(SQLite::Database& database, const StoredMap& map);
+void write_metadata(SQLite::Database& database, const SavedMap& map);
 
 /// Id, version and sizes of the map, without tiles.
-[[nodiscard]] MapView read_map_row(SQLite::Database& database);
+[[nodiscard]] MapSnapshot read_map_row(SQLite::Database& database);
 /// Of a map with these sizes; checked against their content hashes.
 [[nodiscard]] std::vector<std::shared_ptr<const Tile>> read_tiles(SQLite::Database& database,
-                                                                  const MapView& sizes);
+                                                                  const MapSnapshot& sizes);
 /// Without their voxels.
 [[nodiscard]] std::vector<std::shared_ptr<const Tile>> read_tile_infos(SQLite::Database& database);
-[[nodiscard]] TileMemories read_memories(SQLite::Database& database);
+[[nodiscard]] TileEvidenceMap read_tile_evidence(SQLite::Database& database);
 /// Their tiles, with null for each.
-[[nodiscard]] TileMemories read_memory_ids(SQLite::Database& database);
+[[nodiscard]] TileEvidenceMap read_tile_evidence_ids(SQLite::Database& database);
 [[nodiscard]] Trajectory read_trajectory(SQLite::Database& database);
 [[nodiscard]] std::map<std::string, std::string> read_metadata(SQLite::Database& database);
 
-/// Every memory must be that of its tile.
-void check_agreement(const StoredMap& map);
+/// All evidence must be that of its tile.
+void check_consistency(const SavedMap& map);
 
 /// One tile of a map with these sizes, checked as read_tiles does.
-[[nodiscard]] TileRecord read_record(SQLite::Database& database, TileId id, const MapView& sizes);
+[[nodiscard]] TileRecord read_record(SQLite::Database& database, TileId id,
+                                     const MapSnapshot& sizes);
 
 }  // namespace stillmap

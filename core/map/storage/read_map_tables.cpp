@@ -7,6 +7,7 @@
 #include "core/map/storage/map_tables.hpp"
 #include "core/map/storage/stored_rows.hpp"
 #include "core/map/storage/tile_codec.hpp"
+#include "core/map/storage/tile_evidence_codec.hpp"
 #include "core/map/tile_content.hpp"
 
 namespace stillmap {
@@ -28,7 +29,7 @@ TileRow tile_row(const SQLite::Statement& row) {
   return {column_tile_id(row), column_state(row), column_blob(row, 4)};
 }
 
-VoxelGrid grid_of(const MapView& sizes) {
+VoxelGrid grid_of(const MapSnapshot& sizes) {
   const double columns = sizes.tile_size_m / sizes.voxel_size_m;
   if (!(columns >= 0.5 && columns <= VoxelGrid::max_columns + 0.5)) {
     throw TileCodecError("the map has tiles of " + std::to_string(sizes.tile_size_m) +
@@ -51,28 +52,29 @@ std::shared_ptr<const Tile> checked_tile(const TileRow& row, const VoxelGrid& gr
   }
 }
 
-std::shared_ptr<const TileMemory> checked_memory(TileId id, const Blob& encoded) {
+std::shared_ptr<const TileEvidence> checked_evidence(TileId id, const Blob& encoded) {
   try {
-    TileMemory memory = decode_memory(encoded);
-    if (memory.id != id) throw TileCodecError("has the memory of another tile");
-    return std::make_shared<const TileMemory>(std::move(memory));
+    TileEvidence evidence = decode_evidence(encoded);
+    if (evidence.id != id) throw TileCodecError("has the memory of another tile");
+    return std::make_shared<const TileEvidence>(std::move(evidence));
   } catch (const TileCodecError& error) {
     throw TileCodecError(tile_name(id) + error.what());
   }
 }
 
-void check_agreement(const Tile* tile, const TileMemory* memory, TileId id) {
+void check_consistency(const Tile* tile, const TileEvidence* evidence, TileId id) {
   const std::size_t shown = tile == nullptr ? 0 : tile->voxels.size();
-  if (memory != nullptr && memory->shown.size() != shown) {
-    throw TileCodecError(tile_name(id) + "has a memory of " + std::to_string(memory->shown.size()) +
-                         " shown voxels, but shows " + std::to_string(shown));
+  if (evidence != nullptr && evidence->shown.size() != shown) {
+    throw TileCodecError(tile_name(id) + "has a memory of " +
+                         std::to_string(evidence->shown.size()) + " shown voxels, but shows " +
+                         std::to_string(shown));
   }
 }
 
 }  // namespace
 
-MapView read_map_row(SQLite::Database& database) {
-  MapView view;
+MapSnapshot read_map_row(SQLite::Database& database) {
+  MapSnapshot view;
   SQLite::Statement row(database, "SELECT map_id, version, tile_size_m, voxel_size_m FROM map");
   if (!row.executeStep()) return view;
   view.map_id = unsigned_bits(row.getColumn(0).getInt64());
@@ -83,7 +85,7 @@ MapView read_map_row(SQLite::Database& database) {
 }
 
 std::vector<std::shared_ptr<const Tile>> read_tiles(SQLite::Database& database,
-                                                    const MapView& sizes) {
+                                                    const MapSnapshot& sizes) {
   std::vector<TileRow> rows;
   SQLite::Statement row(database,
                         "SELECT x, y, revision, content_hash, encoded FROM tiles ORDER BY x, y");
@@ -117,21 +119,21 @@ std::vector<std::shared_ptr<const Tile>> read_tile_infos(SQLite::Database& datab
   return tiles;
 }
 
-TileMemories read_memories(SQLite::Database& database) {
+TileEvidenceMap read_tile_evidence(SQLite::Database& database) {
   std::vector<std::pair<TileId, Blob>> rows;
   SQLite::Statement row(database, "SELECT x, y, encoded FROM memories");
   while (row.executeStep()) rows.emplace_back(column_tile_id(row), column_blob(row, 2));
-  std::vector<std::shared_ptr<const TileMemory>> decoded(rows.size());
+  std::vector<std::shared_ptr<const TileEvidence>> decoded(rows.size());
   tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t i) {
-    decoded[i] = checked_memory(rows[i].first, rows[i].second);
+    decoded[i] = checked_evidence(rows[i].first, rows[i].second);
   });
-  TileMemories memories;
-  for (std::size_t i = 0; i < rows.size(); ++i) memories.emplace(rows[i].first, decoded[i]);
-  return memories;
+  TileEvidenceMap tile_evidence;
+  for (std::size_t i = 0; i < rows.size(); ++i) tile_evidence.emplace(rows[i].first, decoded[i]);
+  return tile_evidence;
 }
 
-TileMemories read_memory_ids(SQLite::Database& database) {
-  TileMemories ids;
+TileEvidenceMap read_tile_evidence_ids(SQLite::Database& database) {
+  TileEvidenceMap ids;
   SQLite::Statement row(database, "SELECT x, y FROM memories");
   while (row.executeStep()) ids.emplace(column_tile_id(row), nullptr);
   return ids;
@@ -159,25 +161,25 @@ std::map<std::string, std::string> read_metadata(SQLite::Database& database) {
   return metadata;
 }
 
-void check_agreement(const StoredMap& map) {
+void check_consistency(const SavedMap& map) {
   std::map<TileId, const Tile*> tiles;
   for (const auto& tile : map.view.tiles) tiles.emplace(tile->info.id, tile.get());
-  for (const auto& [id, memory] : map.memories) {
+  for (const auto& [id, evidence] : map.tile_evidence) {
     const auto tile = tiles.find(id);
-    check_agreement(tile == tiles.end() ? nullptr : tile->second, memory.get(), id);
+    check_consistency(tile == tiles.end() ? nullptr : tile->second, evidence.get(), id);
   }
 }
 
-TileRecord read_record(SQLite::Database& database, TileId id, const MapView& sizes) {
+TileRecord read_record(SQLite::Database& database, TileId id, const MapSnapshot& sizes) {
   TileRecord record;
   SQLite::Statement tile(
       database, "SELECT x, y, revision, content_hash, encoded FROM tiles WHERE x = ? AND y = ?");
   bind_id(tile, id);
   if (tile.executeStep()) record.tile = checked_tile(tile_row(tile), grid_of(sizes));
-  SQLite::Statement memory(database, "SELECT x, y, encoded FROM memories WHERE x = ? AND y = ?");
-  bind_id(memory, id);
-  if (memory.executeStep()) record.memory = checked_memory(id, column_blob(memory, 2));
-  check_agreement(record.tile.get(), record.memory.get(), id);
+  SQLite::Statement evidence(database, "SELECT x, y, encoded FROM memories WHERE x = ? AND y = ?");
+  bind_id(evidence, id);
+  if (evidence.executeStep()) record.evidence = checked_evidence(id, column_blob(evidence, 2));
+  check_consistency(record.tile.get(), record.evidence.get(), id);
   return record;
 }
 

@@ -9,9 +9,9 @@ namespace {
 
 /// Of a tile farther out, numbers of cells, at most 256 along its side, would not fit 31 bits; maps
 /// end long before (VoxelGrid::max_coordinate_m).
-constexpr int farthest_tile = 1 << 22;
+constexpr int max_tile_index = 1 << 22;
 
-bool is_near(int index) { return index >= -farthest_tile && index <= farthest_tile; }
+bool is_in_range(int index) { return index >= -max_tile_index && index <= max_tile_index; }
 
 }  // namespace
 
@@ -25,7 +25,7 @@ std::string tile_name(TileId id) {
 
 TileId column_tile_id(const SQLite::Statement& row) {
   const TileId id{row.getColumn(0).getInt(), row.getColumn(1).getInt()};
-  if (!is_near(id.x) || !is_near(id.y)) {
+  if (!is_in_range(id.x) || !is_in_range(id.y)) {
     throw TileCodecError(tile_name(id) + "lies farther out than any map goes");
   }
   return id;

@@ -1,4 +1,4 @@
-#include "core/map/tile_evidence.hpp"
+#include "core/map/storage/tile_evidence_codec.hpp"
 
 #include <algorithm>
 #include <array>
@@ -7,6 +7,7 @@
 #include "core/map/storage/byte_planes.hpp"
 #include "core/map/storage/stored_voxel.hpp"
 #include "core/map/storage/tile_codec.hpp"
+#include "core/map/storage/tile_evidence_codec.hpp"
 #include "core/map/storage/tile_frame.hpp"
 #include "core/map/voxel_grid.hpp"
 
@@ -15,8 +16,8 @@ namespace {
 
 constexpr std::uint8_t format_version = 1;
 constexpr std::size_t header_bytes = 4 + 4 + 3 * 4;
-constexpr std::size_t past_bytes = 2 + 2 + 1;
-constexpr std::size_t hidden_bytes = stored_voxel_bytes + past_bytes + 1;
+constexpr std::size_t history_bytes = 2 + 2 + 1;
+constexpr std::size_t hidden_bytes = stored_voxel_bytes + history_bytes + 1;
 constexpr std::size_t excluded_bytes = 3 * 2 + 1 + 1 + 8;
 /// Stands for no reason.
 constexpr std::uint8_t no_reason = 255;
@@ -26,14 +27,14 @@ enum Flag : std::uint8_t { was_shown_flag = 1, is_restored_flag = 2 };
 using Counts = std::array<std::uint32_t, 3>;
 
 /// As they are stored: plain numbers.
-struct StoredPast {
+struct StoredHistory {
   std::uint16_t hits = 0;
-  std::uint16_t passes = 0;
+  std::uint16_t misses = 0;
   std::uint8_t flags = 0;
 };
 struct StoredHidden {
   Voxel voxel;
-  StoredPast past;
+  StoredHistory history;
   std::uint8_t reason = no_reason;
 };
 struct StoredExcluded {
@@ -43,14 +44,14 @@ struct StoredExcluded {
   std::int64_t last_seen_ns = 0;
 };
 
-constexpr auto visit_past = [](auto&& visit, auto& past) {
-  visit(past.hits);
-  visit(past.passes);
-  visit(past.flags);
+constexpr auto visit_history = [](auto&& visit, auto& history) {
+  visit(history.hits);
+  visit(history.misses);
+  visit(history.flags);
 };
 constexpr auto visit_hidden = [](auto&& visit, auto& hidden) {
   visit_voxel(visit, hidden.voxel);
-  visit_past(visit, hidden.past);
+  visit_history(visit, hidden.history);
   visit(hidden.reason);
 };
 constexpr auto visit_excluded = [](auto&& visit, auto& excluded) {
@@ -62,38 +63,38 @@ constexpr auto visit_excluded = [](auto&& visit, auto& excluded) {
   visit(excluded.last_seen_ns);
 };
 
-StoredPast to_stored(const VoxelPast& past) {
+StoredHistory to_stored(const VoxelHistory& history) {
   const int flags =
-      (past.was_shown ? was_shown_flag : 0) | (past.is_restored ? is_restored_flag : 0);
-  return {past.hits, past.passes, static_cast<std::uint8_t>(flags)};
+      (history.was_shown ? was_shown_flag : 0) | (history.is_restored ? is_restored_flag : 0);
+  return {history.hits, history.misses, static_cast<std::uint8_t>(flags)};
 }
 
 StoredHidden to_stored(const HiddenVoxel& hidden) {
-  return {hidden.voxel, to_stored(hidden.past),
+  return {hidden.voxel, to_stored(hidden.history),
           hidden.reason ? static_cast<std::uint8_t>(*hidden.reason) : no_reason};
 }
 
-StoredExcluded to_stored(const ExcludedPlace& excluded) {
+StoredExcluded to_stored(const ExcludedVoxel& excluded) {
   return {excluded.index, static_cast<std::uint8_t>(excluded.label),
           static_cast<std::uint8_t>(excluded.was_moving ? 1 : 0), excluded.last_seen_ns};
 }
 
-VoxelPast from_stored(const StoredPast& stored) {
+VoxelHistory from_stored(const StoredHistory& stored) {
   if (stored.flags > (was_shown_flag | is_restored_flag)) throw TileCodecError("has unknown flags");
-  return {stored.hits, stored.passes, (stored.flags & was_shown_flag) != 0,
+  return {stored.hits, stored.misses, (stored.flags & was_shown_flag) != 0,
           (stored.flags & is_restored_flag) != 0};
 }
 
 HiddenVoxel from_stored(const StoredHidden& stored) {
   if (!is_possible(stored.voxel)) throw TileCodecError("has an impossible hidden voxel");
-  HiddenVoxel hidden{stored.voxel, from_stored(stored.past), std::nullopt};
+  HiddenVoxel hidden{stored.voxel, from_stored(stored.history), std::nullopt};
   if (stored.reason == no_reason) return hidden;
   if (stored.reason >= removal_reason_count) throw TileCodecError("has an unknown reason");
   hidden.reason = static_cast<RemovalReason>(stored.reason);
   return hidden;
 }
 
-ExcludedPlace from_stored(const StoredExcluded& stored) {
+ExcludedVoxel from_stored(const StoredExcluded& stored) {
   if (stored.index.x >= VoxelGrid::max_columns || stored.index.y >= VoxelGrid::max_columns ||
       stored.label >= semantic_class_count || stored.was_moving > 1) {
     throw TileCodecError("has an impossible excluded place");
@@ -129,44 +130,26 @@ void visit_header(Visitor visit, Id& id, AnyCounts& counts) {
 
 }  // namespace
 
-std::vector<RemovedVoxel> removed_voxels(const TileMemory& memory, double voxel_size_m,
-                                         double tile_size_m) {
-  const VoxelGrid grid(voxel_size_m, tile_size_m);
-  std::vector<RemovedVoxel> removed;
-  for (const HiddenVoxel& hidden : memory.hidden) {
-    if (!hidden.reason) continue;
-    removed.push_back({hidden.voxel.mean_map, hidden.voxel.evidence.winner(), *hidden.reason,
-                       hidden.voxel.last_seen_ns});
-  }
-  for (const ExcludedPlace& place : memory.excluded) {
-    const Eigen::Vector3d centre =
-        grid.corner_map(memory.id, place.index).array() + 0.5 * voxel_size_m;
-    removed.push_back({centre.cast<float>(), place.label,
-                       place.was_moving ? RemovalReason::moving : RemovalReason::semi_static,
-                       place.last_seen_ns});
-  }
-  return removed;
-}
-
-std::vector<std::uint8_t> encode_memory(const TileMemory& memory) {
+std::vector<std::uint8_t> encode_evidence(const TileEvidence& evidence) {
   std::vector<std::uint8_t> content(header_bytes);
-  const Counts counts{static_cast<std::uint32_t>(memory.shown.size()),
-                      static_cast<std::uint32_t>(memory.hidden.size()),
-                      static_cast<std::uint32_t>(memory.excluded.size())};
-  visit_header(FieldWriter(content.data()), memory.id, counts);
-  append_planes<past_bytes>(content, all_to_stored<StoredPast>(memory.shown), visit_past);
-  append_planes<hidden_bytes>(content, all_to_stored<StoredHidden>(memory.hidden), visit_hidden);
-  append_planes<excluded_bytes>(content, all_to_stored<StoredExcluded>(memory.excluded),
+  const Counts counts{static_cast<std::uint32_t>(evidence.shown.size()),
+                      static_cast<std::uint32_t>(evidence.hidden.size()),
+                      static_cast<std::uint32_t>(evidence.excluded.size())};
+  visit_header(FieldWriter(content.data()), evidence.id, counts);
+  append_planes<history_bytes>(content, all_to_stored<StoredHistory>(evidence.shown),
+                               visit_history);
+  append_planes<hidden_bytes>(content, all_to_stored<StoredHidden>(evidence.hidden), visit_hidden);
+  append_planes<excluded_bytes>(content, all_to_stored<StoredExcluded>(evidence.excluded),
                                 visit_excluded);
   return to_frame(format_version, content);
 }
 
-TileMemory decode_memory(std::span<const std::uint8_t> bytes) {
+TileEvidence decode_evidence(std::span<const std::uint8_t> bytes) {
   const std::vector<std::uint8_t> content = from_frame(format_version, bytes, header_bytes);
-  TileMemory memory;
+  TileEvidence evidence;
   Counts counts{};
-  visit_header(FieldReader(content.data()), memory.id, counts);
-  const std::size_t needed = header_bytes + std::size_t{counts[0]} * past_bytes +
+  visit_header(FieldReader(content.data()), evidence.id, counts);
+  const std::size_t needed = header_bytes + std::size_t{counts[0]} * history_bytes +
                              std::size_t{counts[1]} * hidden_bytes +
                              std::size_t{counts[2]} * excluded_bytes;
   if (content.size() != needed) {
@@ -174,10 +157,10 @@ TileMemory decode_memory(std::span<const std::uint8_t> bytes) {
                          " bytes instead of " + std::to_string(needed));
   }
   const std::uint8_t* from = content.data() + header_bytes;
-  read_list<past_bytes, StoredPast>(from, counts[0], memory.shown, visit_past);
-  read_list<hidden_bytes, StoredHidden>(from, counts[1], memory.hidden, visit_hidden);
-  read_list<excluded_bytes, StoredExcluded>(from, counts[2], memory.excluded, visit_excluded);
-  return memory;
+  read_list<history_bytes, StoredHistory>(from, counts[0], evidence.shown, visit_history);
+  read_list<hidden_bytes, StoredHidden>(from, counts[1], evidence.hidden, visit_hidden);
+  read_list<excluded_bytes, StoredExcluded>(from, counts[2], evidence.excluded, visit_excluded);
+  return evidence;
 }
 
 }  // namespace stillmap

@@ -36,7 +36,7 @@ std::vector<std::uint8_t> to_frame(std::uint8_t format_version,
 }
 
 std::vector<std::uint8_t> from_frame(std::uint8_t format_version,
-                                     std::span<const std::uint8_t> frame, std::size_t least_bytes) {
+                                     std::span<const std::uint8_t> frame, std::size_t min_bytes) {
   if (frame.empty()) throw TileCodecError("is empty");
   if (frame[0] != format_version) {
     throw TileCodecError("has format " + std::to_string(frame[0]) + ", this program reads format " +
@@ -47,7 +47,7 @@ std::vector<std::uint8_t> from_frame(std::uint8_t format_version,
   if (size == ZSTD_CONTENTSIZE_ERROR || size == ZSTD_CONTENTSIZE_UNKNOWN) {
     throw TileCodecError("is not a zstd frame");
   }
-  if (size < least_bytes || size > max_content_bytes) {
+  if (size < min_bytes || size > max_content_bytes) {
     throw TileCodecError("claims a size of " + std::to_string(size) + " bytes");
   }
   std::vector<std::uint8_t> content(size);

@@ -13,9 +13,9 @@ namespace stillmap {
                                                  std::span<const std::uint8_t> content);
 
 /// The content again. Throws TileCodecError for another version, for what is no such frame or is
-/// damaged, and for less than `least_bytes` of content.
+/// damaged, and for less than `min_bytes` of content.
 [[nodiscard]] std::vector<std::uint8_t> from_frame(std::uint8_t format_version,
                                                    std::span<const std::uint8_t> frame,
-                                                   std::size_t least_bytes);
+                                                   std::size_t min_bytes);
 
 }  // namespace stillmap

@@ -6,6 +6,7 @@
 #include "core/map/storage/map_tables.hpp"
 #include "core/map/storage/stored_rows.hpp"
 #include "core/map/storage/tile_codec.hpp"
+#include "core/map/storage/tile_evidence_codec.hpp"
 
 namespace stillmap {
 namespace {
@@ -45,21 +46,21 @@ void write_rows(SQLite::Database& database, std::span<const Tile* const> tiles) 
 
 }  // namespace
 
-void write_tiles(SQLite::Database& database, const StoredMap& map) {
+void write_tiles(SQLite::Database& database, const SavedMap& map) {
   std::map<TileId, StoredState> stored = stored_states(database);
   std::vector<const Tile*> changed;
   for (const auto& tile : map.view.tiles) {
     const auto known = stored.extract(tile->info.id);
     const bool is_stored = known && known.mapped() == stored_state_of(tile->info);
-    if (is_away(*tile)) {
+    if (is_non_resident(*tile)) {
       if (is_stored) continue;
       throw TileCodecError(tile_name(tile->info.id) + "is neither in memory nor in this file");
     }
-    if (!is_stored || map.memories.contains(tile->info.id)) changed.push_back(tile.get());
+    if (!is_stored || map.tile_evidence.contains(tile->info.id)) changed.push_back(tile.get());
   }
   write_rows(database, changed);
   SQLite::Statement remove(database, "DELETE FROM tiles WHERE x = ? AND y = ?");
-  // A memory is of one state of its tile.
+  // Evidence is of one state of its tile.
   SQLite::Statement forget(database, "DELETE FROM memories WHERE x = ? AND y = ?");
   for (const Tile* tile : changed) {
     bind_id(forget, tile->info.id);
@@ -73,15 +74,16 @@ void write_tiles(SQLite::Database& database, const StoredMap& map) {
   }
 }
 
-void write_memories(SQLite::Database& database, const TileMemories& memories, bool forget_others) {
+void write_tile_evidence(SQLite::Database& database, const TileEvidenceMap& tile_evidence,
+                         bool forget_others) {
   if (forget_others) database.exec("DELETE FROM memories");
-  std::vector<const TileMemory*> given;
-  for (const auto& [id, memory] : memories) {
-    if (memory) given.push_back(memory.get());
+  std::vector<const TileEvidence*> given;
+  for (const auto& [id, evidence] : tile_evidence) {
+    if (evidence) given.push_back(evidence.get());
   }
   std::vector<Blob> blobs(given.size());
   tbb::parallel_for(std::size_t{0}, given.size(),
-                    [&](std::size_t i) { blobs[i] = encode_memory(*given[i]); });
+                    [&](std::size_t i) { blobs[i] = encode_evidence(*given[i]); });
   SQLite::Statement insert(database, "INSERT OR REPLACE INTO memories VALUES (?, ?, ?)");
   for (std::size_t i = 0; i < given.size(); ++i) {
     bind_id(insert, given[i]->id);
@@ -109,7 +111,7 @@ void write_trajectory(SQLite::Database& database, const Trajectory& trajectory, 
   }
 }
 
-void write_metadata(SQLite::Database& database, const StoredMap& map) {
+void write_metadata(SQLite::Database& database, const SavedMap& map) {
   database.exec("DELETE FROM metadata");
   SQLite::Statement insert(database, "INSERT INTO metadata VALUES (?, ?)");
   for (const auto& [key, value] : map.metadata) {

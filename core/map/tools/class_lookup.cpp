@@ -64,8 +64,8 @@ NearClasses ClassLookup::Cells::search(const Cell& centre, SemanticClass label, 
   return near;
 }
 
-ClassLookup::ClassLookup(const MapView& view, const MapView& asking) {
-  const MapView& filled = view.tiles.empty() ? asking : view;
+ClassLookup::ClassLookup(const MapSnapshot& view, const MapSnapshot& asking) {
+  const MapSnapshot& filled = view.tiles.empty() ? asking : view;
   auto cells = std::make_unique<Cells>();
   if (!filled.tiles.empty())
     cells->columns = std::llround(filled.tile_size_m / filled.voxel_size_m);

@@ -21,7 +21,7 @@ class ClassLookup {
  public:
   /// Of `view`, for questions about cells of `asking`, which has tiles and voxels of the same size
   /// unless one of them is empty.
-  ClassLookup(const MapView& view, const MapView& asking);
+  ClassLookup(const MapSnapshot& view, const MapSnapshot& asking);
   ~ClassLookup();
   ClassLookup(const ClassLookup&) = delete;
   ClassLookup& operator=(const ClassLookup&) = delete;

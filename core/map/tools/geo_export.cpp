@@ -14,9 +14,9 @@ fs::path height_file_of(const fs::path& class_file) {
 
 void export_geotiff(std::span<const QueryVoxel> voxels, double cell_size_m, const Datum& datum,
                     const fs::path& file) {
-  const TopView top = look_from_above(voxels, cell_size_m);
+  const TopView top = rasterize_top_view(voxels, cell_size_m);
   auto* const write_geotiffs =
-      part_function<WriteGeotiffs>("geotiff", write_geotiffs_name, "GeoTIFFs are written");
+      plugin_function<WriteGeotiffs>("geotiff", write_geotiffs_name, "GeoTIFFs are written");
   write_geotiffs(top, datum, file, height_file_of(file));
 }
 

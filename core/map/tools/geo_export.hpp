@@ -17,7 +17,7 @@ namespace stillmap {
 /// (float, metres above the datum's altitude reference, -9999 where there is none). Coordinate
 /// system: the transverse Mercator projection whose origin is the datum (WGS 84, metres, scale 1),
 /// which the files state; in plan it departs from the map by less than 1 cm within 5 km.
-/// Throws std::invalid_argument as look_from_above does, DatasetError when a file cannot be
+/// Throws std::invalid_argument as rasterize_top_view does, DatasetError when a file cannot be
 /// written.
 void export_geotiff(std::span<const QueryVoxel> voxels, double cell_size_m, const Datum& datum,
                     const std::filesystem::path& file);

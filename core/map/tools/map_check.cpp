@@ -10,9 +10,10 @@
 
 #include "core/map/storage/map_database.hpp"
 #include "core/map/storage/map_file_copy.hpp"
-#include "core/map/tools/map_rows.hpp"
 #include "core/map/storage/tile_codec.hpp"
+#include "core/map/storage/tile_evidence_codec.hpp"
 #include "core/map/tile_evidence.hpp"
+#include "core/map/tools/map_rows.hpp"
 
 namespace stillmap {
 namespace {
@@ -97,23 +98,23 @@ void check_tiles(SQLite::Database& database, MapCheck& check, const CheckProgres
   }
 }
 
-void check_memory(TileId id, std::span<const std::uint8_t> encoded, std::int64_t shown,
-                  MapCheck& check) {
+void check_evidence(TileId id, std::span<const std::uint8_t> encoded, std::int64_t shown,
+                    MapCheck& check) {
   const auto fault = [&](const std::string& what) { check.faults.push_back({"tile", id, what}); };
   try {
-    const TileMemory memory = decode_memory(encoded);
-    check.hidden_voxels += memory.hidden.size() + memory.excluded.size();
-    if (memory.id != id) fault("has the memory of another tile");
-    if (std::ssize(memory.shown) != shown) {
+    const TileEvidence evidence = decode_evidence(encoded);
+    check.hidden_voxels += evidence.hidden.size() + evidence.excluded.size();
+    if (evidence.id != id) fault("has the memory of another tile");
+    if (std::ssize(evidence.shown) != shown) {
       fault("shows " + std::to_string(shown) + " voxels and has a memory of " +
-            std::to_string(memory.shown.size()));
+            std::to_string(evidence.shown.size()));
     }
   } catch (const TileCodecError& error) {
     fault(std::string("memory ") + error.what());
   }
 }
 
-void check_memories(SQLite::Database& database, MapCheck& check) {
+void check_tile_evidence(SQLite::Database& database, MapCheck& check) {
   if (has_first_schema(database)) return;
   SQLite::Statement row(database,
                         "SELECT m.x, m.y, m.encoded, coalesce(t.voxel_count, 0) FROM memories m "
@@ -122,8 +123,9 @@ void check_memories(SQLite::Database& database, MapCheck& check) {
     const SQLite::Column blob = row.getColumn(2);
     const auto* bytes = static_cast<const std::uint8_t*>(blob.getBlob());
     const auto size = static_cast<std::size_t>(blob.getBytes());
-    check_memory({row.getColumn(0).getInt(), row.getColumn(1).getInt()},
-                 std::span(bytes, bytes == nullptr ? 0 : size), row.getColumn(3).getInt64(), check);
+    check_evidence({row.getColumn(0).getInt(), row.getColumn(1).getInt()},
+                   std::span(bytes, bytes == nullptr ? 0 : size), row.getColumn(3).getInt64(),
+                   check);
   }
 }
 
@@ -160,7 +162,7 @@ MapCheck check_map_file(const std::filesystem::path& file, const CheckProgress& 
   });
   guarded(check, "tiles", [&] {
     SQLite::Database database(copy.path().string());
-    check_memories(database, check);
+    check_tile_evidence(database, check);
   });
   guarded(check, "trajectory", [&] {
     SQLite::Database database(copy.path().string());

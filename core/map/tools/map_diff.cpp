@@ -14,12 +14,12 @@ namespace {
 
 using TileChanges = std::vector<VoxelDifference>;
 
-std::string sizes(const MapView& view) {
+std::string sizes(const MapSnapshot& view) {
   return "voxels of " + std::to_string(view.voxel_size_m) + " m in tiles of " +
          std::to_string(view.tile_size_m) + " m";
 }
 
-void check(const MapView& before, const MapView& after, const MapDiffOptions& options) {
+void check(const MapSnapshot& before, const MapSnapshot& after, const MapDiffOptions& options) {
   if (options.tolerance_voxels < 0 ||
       options.tolerance_voxels > MapDiffOptions::max_tolerance_voxels) {
     throw std::invalid_argument("tolerance_voxels is " + std::to_string(options.tolerance_voxels) +
@@ -34,8 +34,8 @@ void check(const MapView& before, const MapView& after, const MapDiffOptions& op
 }
 
 /// What became of a voxel of the earlier map; nothing when it is still there.
-std::optional<VoxelDifference> fate_of(const Voxel& voxel, TileId tile, const ClassLookup& after,
-                                       int tolerance_voxels) {
+std::optional<VoxelDifference> change_of(const Voxel& voxel, TileId tile, const ClassLookup& after,
+                                         int tolerance_voxels) {
   const SemanticClass label = voxel.evidence.winner();
   const NearClasses near = after.near(tile, voxel.index, label, tolerance_voxels);
   if (near.has_same) return std::nullopt;
@@ -46,24 +46,24 @@ std::optional<VoxelDifference> fate_of(const Voxel& voxel, TileId tile, const Cl
 }
 
 /// A voxel of the later map, if it is new.
-std::optional<VoxelDifference> news_of(const Voxel& voxel, TileId tile, const ClassLookup& before,
-                                       int tolerance_voxels) {
+std::optional<VoxelDifference> addition_of(const Voxel& voxel, TileId tile,
+                                           const ClassLookup& before, int tolerance_voxels) {
   const SemanticClass label = voxel.evidence.winner();
   const NearClasses near = before.near(tile, voxel.index, label, tolerance_voxels);
   if (near.has_same || near.nearest) return std::nullopt;
   return VoxelDifference{VoxelChange::appeared, voxel.mean_map, SemanticClass::unlabeled, label};
 }
 
-/// `judge` for every voxel of the view against the other map, tile by tile.
-template <typename Judge>
-std::vector<TileChanges> judge_voxels(const MapView& view, const MapView& other,
-                                      int tolerance_voxels, Judge judge) {
+/// `compare` for every voxel of the view against the other map, tile by tile.
+template <typename Compare>
+std::vector<TileChanges> compare_voxels(const MapSnapshot& view, const MapSnapshot& other,
+                                        int tolerance_voxels, Compare compare) {
   const ClassLookup lookup(other, view);
   std::vector<TileChanges> changes(view.tiles.size());
   tbb::parallel_for(std::size_t{0}, view.tiles.size(), [&](std::size_t i) {
     const Tile& tile = *view.tiles[i];
     for (const Voxel& voxel : tile.voxels) {
-      if (const auto change = judge(voxel, tile.info.id, lookup, tolerance_voxels)) {
+      if (const auto change = compare(voxel, tile.info.id, lookup, tolerance_voxels)) {
         changes[i].push_back(*change);
       }
     }
@@ -81,7 +81,7 @@ void count_change(const VoxelDifference& difference, MapDiff& diff) {
   }
 }
 
-void add_tiles(const MapView& view, const std::vector<TileChanges>& changes,
+void add_tiles(const MapSnapshot& view, const std::vector<TileChanges>& changes,
                std::map<TileId, DifferenceCounts>& tiles, MapDiff& diff) {
   for (std::size_t i = 0; i < changes.size(); ++i) {
     if (changes[i].empty()) continue;
@@ -94,7 +94,7 @@ void add_tiles(const MapView& view, const std::vector<TileChanges>& changes,
   }
 }
 
-void count_voxels(const MapView& view, std::uint64_t ClassDifference::*count, MapDiff& diff) {
+void count_voxels(const MapSnapshot& view, std::uint64_t ClassDifference::*count, MapDiff& diff) {
   for (const auto& tile : view.tiles) {
     for (const Voxel& voxel : tile->voxels) {
       ++(diff.classes.at(static_cast<std::size_t>(voxel.evidence.winner())).*count);
@@ -118,14 +118,17 @@ void DifferenceCounts::add(VoxelChange change) {
   }
 }
 
-MapDiff diff_maps(const MapView& before, const MapView& after, const MapDiffOptions& options) {
+MapDiff diff_maps(const MapSnapshot& before, const MapSnapshot& after,
+                  const MapDiffOptions& options) {
   check(before, after, options);
   MapDiff diff;
   count_voxels(before, &ClassDifference::voxels_before, diff);
   count_voxels(after, &ClassDifference::voxels_after, diff);
   std::map<TileId, DifferenceCounts> tiles;
-  add_tiles(before, judge_voxels(before, after, options.tolerance_voxels, fate_of), tiles, diff);
-  add_tiles(after, judge_voxels(after, before, options.tolerance_voxels, news_of), tiles, diff);
+  add_tiles(before, compare_voxels(before, after, options.tolerance_voxels, change_of), tiles,
+            diff);
+  add_tiles(after, compare_voxels(after, before, options.tolerance_voxels, addition_of), tiles,
+            diff);
   for (const auto& [id, counts] : tiles) diff.tiles.push_back({id, counts});
   return diff;
 }

@@ -75,7 +75,7 @@ struct MapDiff {
 
 /// Compares voxel by voxel. Throws std::invalid_argument for maps with voxels or tiles of different
 /// sizes, or a tolerance that is not allowed.
-[[nodiscard]] MapDiff diff_maps(const MapView& before, const MapView& after,
+[[nodiscard]] MapDiff diff_maps(const MapSnapshot& before, const MapSnapshot& after,
                                 const MapDiffOptions& options = {});
 
 }  // namespace stillmap

@@ -7,7 +7,7 @@
 namespace stillmap {
 namespace {
 
-std::vector<ColouredPoint> points_of(const MapView& view) {
+std::vector<ColouredPoint> points_of(const MapSnapshot& view) {
   std::vector<ColouredPoint> points;
   for (const auto& tile : view.tiles) {
     for (const Voxel& voxel : tile->voxels) {
@@ -19,11 +19,11 @@ std::vector<ColouredPoint> points_of(const MapView& view) {
 
 }  // namespace
 
-void export_pcd(const MapView& view, const std::filesystem::path& file) {
+void export_pcd(const MapSnapshot& view, const std::filesystem::path& file) {
   write_pcd(file, points_of(view));
 }
 
-void export_ply(const MapView& view, const std::filesystem::path& file) {
+void export_ply(const MapSnapshot& view, const std::filesystem::path& file) {
   write_ply(file, points_of(view));
 }
 

@@ -14,16 +14,17 @@ void count_voxel(const Voxel& voxel, MapInfo& info) {
   info.points += voxel.point_count;
   ++info.voxels_of_class.at(static_cast<std::size_t>(voxel.evidence.winner()));
   info.bounds_map.extend(voxel.mean_map.cast<double>());
-  info.seen.first_ns =
-      is_first ? voxel.first_seen_ns : std::min(info.seen.first_ns, voxel.first_seen_ns);
-  info.seen.last_ns =
-      is_first ? voxel.last_seen_ns : std::max(info.seen.last_ns, voxel.last_seen_ns);
+  info.observation_span.first_ns =
+      is_first ? voxel.first_seen_ns
+               : std::min(info.observation_span.first_ns, voxel.first_seen_ns);
+  info.observation_span.last_ns =
+      is_first ? voxel.last_seen_ns : std::max(info.observation_span.last_ns, voxel.last_seen_ns);
 }
 
 void measure_path(const Trajectory& trajectory, MapInfo& info) {
   info.poses = trajectory.size();
   if (trajectory.empty()) return;
-  info.driven = {trajectory.front().stamp_ns, trajectory.back().stamp_ns};
+  info.trajectory_span = {trajectory.front().stamp_ns, trajectory.back().stamp_ns};
   for (std::size_t i = 1; i < trajectory.size(); ++i) {
     const Eigen::Vector3d step =
         trajectory[i].T_map_lidar.translation() - trajectory[i - 1].T_map_lidar.translation();
@@ -33,7 +34,7 @@ void measure_path(const Trajectory& trajectory, MapInfo& info) {
 
 }  // namespace
 
-MapInfo describe_map(const StoredMap& map) {
+MapInfo describe_map(const SavedMap& map) {
   MapInfo info;
   info.map_id = map.view.map_id;
   info.version = map.view.version;

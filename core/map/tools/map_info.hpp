@@ -31,14 +31,14 @@ struct MapInfo {
   std::array<std::uint64_t, semantic_class_count> voxels_of_class{};
   /// Round the voxels' means, map frame [m]; empty without voxels.
   Eigen::AlignedBox3d bounds_map;
-  TimeSpan seen;
+  TimeSpan observation_span;
   std::uint64_t poses = 0;
   double path_length_m = 0.0;
-  TimeSpan driven;
+  TimeSpan trajectory_span;
   std::map<std::string, std::string> metadata;
 };
 
-[[nodiscard]] MapInfo describe_map(const StoredMap& map);
+[[nodiscard]] MapInfo describe_map(const SavedMap& map);
 
 /// A map file and what it holds.
 struct MapFileInfo {

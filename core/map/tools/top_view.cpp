@@ -36,7 +36,7 @@ TopView empty_raster(const PlanCell& low, const PlanCell& high, double cell_size
 
 }  // namespace
 
-TopView look_from_above(std::span<const QueryVoxel> voxels, double cell_size_m) {
+TopView rasterize_top_view(std::span<const QueryVoxel> voxels, double cell_size_m) {
   if (voxels.empty()) throw std::invalid_argument("there are no voxels to make a raster of");
   PlanCell low = plan_cell(voxels.front(), cell_size_m);
   PlanCell high = low;

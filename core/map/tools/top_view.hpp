@@ -30,6 +30,6 @@ struct TopView {
 
 /// Cells lie on multiples of `cell_size_m` (above 0). Throws std::invalid_argument for no voxels,
 /// or too many cells.
-[[nodiscard]] TopView look_from_above(std::span<const QueryVoxel> voxels, double cell_size_m);
+[[nodiscard]] TopView rasterize_top_view(std::span<const QueryVoxel> voxels, double cell_size_m);
 
 }  // namespace stillmap

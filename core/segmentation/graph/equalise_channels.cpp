@@ -18,7 +18,7 @@ class Groups {
       if (!std::holds_alternative<Convolution>(layer.operation)) {
         for (const TensorId input : layer.inputs) join(input, layer.output);
       }
-      for (const FollowUp& step : layer.follow_ups) {
+      for (const PostOp& step : layer.post_ops) {
         const auto* const add = std::get_if<AddTensor>(&step);
         if (add == nullptr) continue;
         join(add->other, layer.output);

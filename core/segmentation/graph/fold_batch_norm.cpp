@@ -39,12 +39,12 @@ bool fold_into_maker(NetworkGraph& graph, const Layer& layer) {
   const auto* const norm = std::get_if<BatchNorm>(&layer.operation);
   if (norm == nullptr) return false;
   const TensorId normed = layer.inputs.front();
-  const std::size_t maker = graph.maker(normed);
-  if (maker == graph.layers.size() || graph.readers(normed).size() != 1) return false;
-  if (normed == graph.output || !std::visit(Fold{*norm}, graph.layers[maker].operation)) {
+  const std::size_t producer = graph.producer(normed);
+  if (producer == graph.layers.size() || graph.consumers(normed).size() != 1) return false;
+  if (normed == graph.output || !std::visit(Fold{*norm}, graph.layers[producer].operation)) {
     return false;
   }
-  graph.layers[maker].output = layer.output;
+  graph.layers[producer].output = layer.output;
   return true;
 }
 

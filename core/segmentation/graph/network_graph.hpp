@@ -95,7 +95,7 @@ struct AddTensor {
   TensorId own = 0;
 };
 /// What is done to the result of a convolution before it is stored.
-using FollowUp = std::variant<LeakyRelu, AddTensor>;
+using PostOp = std::variant<LeakyRelu, AddTensor>;
 
 struct Layer {
   /// As in the model's file.
@@ -104,7 +104,7 @@ struct Layer {
   std::vector<TensorId> inputs;
   TensorId output = 0;
   /// Of a convolution, in this order.
-  std::vector<FollowUp> follow_ups = {};
+  std::vector<PostOp> post_ops = {};
 };
 
 struct Tensor {
@@ -123,9 +123,9 @@ struct NetworkGraph {
   TensorId output = 0;
 
   /// Layers that read the tensor, in their order.
-  [[nodiscard]] std::vector<std::size_t> readers(TensorId tensor) const;
+  [[nodiscard]] std::vector<std::size_t> consumers(TensorId tensor) const;
   /// The layer that makes the tensor; layers.size() for the input.
-  [[nodiscard]] std::size_t maker(TensorId tensor) const;
+  [[nodiscard]] std::size_t producer(TensorId tensor) const;
 };
 
 /// A network that is wrong in itself.

@@ -105,7 +105,7 @@ class Compiler {
     return tensor;
   }
 
-  [[nodiscard]] DnnlTensor tensor(const Place& place) const {
+  [[nodiscard]] DnnlTensor tensor(const TensorPlacement& place) const {
     return {.memory = activations_.at(layout_.offset[place.buffer]),
             .type = place.type,
             .scale = place.type == ValueType::s8 ? plan_.scale_of_tensor[place.tensor] : 1.0F,
@@ -138,7 +138,7 @@ struct StepText {
   std::string operator()(const Activate& step) const { return "activate " + shape(step.to); }
   std::string operator()(const Sum& step) const { return "add " + shape(step.to); }
 
-  [[nodiscard]] std::string shape(const Place& place) const {
+  [[nodiscard]] std::string shape(const TensorPlacement& place) const {
     return graph.tensors[place.tensor].shape.text() +
            (place.type == ValueType::s8 ? " in int8" : "");
   }
@@ -186,7 +186,7 @@ struct CompiledPlan::State {
     }
   }
 
-  [[nodiscard]] std::span<const float> values(const Place& place) {
+  [[nodiscard]] std::span<const float> values(const TensorPlacement& place) {
     return {reinterpret_cast<const float*>(activations.at(layout.offset[place.buffer])),
             tensors[place.tensor].shape.size()};
   }
@@ -199,9 +199,9 @@ struct CompiledPlan::State {
   Block scratchpad;
   std::vector<Tensor> tensors;
   std::vector<ReadyStep> steps;
-  std::vector<Place> targets;
+  std::vector<TensorPlacement> targets;
   std::vector<std::string> texts;
-  Place output;
+  TensorPlacement output;
 };
 
 CompiledPlan::CompiledPlan(const NetworkGraph& graph, const ExecutionPlan& plan, int threads) {
@@ -226,7 +226,7 @@ std::span<const float> CompiledPlan::run(std::span<const float> input, const Obs
   load.arguments.at(DNNL_ARG_FROM).set_data_handle(const_cast<float*>(input.data()));
   for (std::size_t i = 0; i < state_->steps.size(); ++i) {
     state_->run(state_->steps[i]);
-    const Place& to = state_->targets[i];
+    const TensorPlacement& to = state_->targets[i];
     if (observer && to.type == ValueType::f32) observer(to.tensor, state_->values(to));
   }
   state_->stream.wait();

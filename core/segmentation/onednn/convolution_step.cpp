@@ -46,7 +46,7 @@ dnnl::post_ops post_ops(const Layer& layer, const ConvolutionTensors& tensors) {
   const float scale = working_scale(tensors);
   dnnl::post_ops after;
   bool sum_done = !tensors.sum_scale;
-  for (const FollowUp& step : layer.follow_ups) {
+  for (const PostOp& step : layer.post_ops) {
     if (const auto* const activation = std::get_if<LeakyRelu>(&step)) {
       after.append_eltwise(1.0F, dnnl::algorithm::eltwise_relu, activation->slope, 0.0F);
     } else if (!sum_done) {

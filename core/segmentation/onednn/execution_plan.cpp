@@ -15,7 +15,7 @@ std::size_t bytes_of(ValueType type) { return type == ValueType::s8 ? 1 : sizeof
 /// The sums that a convolution took in, none to two.
 std::vector<AddTensor> sums_of(const Layer& layer) {
   std::vector<AddTensor> sums;
-  for (const FollowUp& step : layer.follow_ups) {
+  for (const PostOp& step : layer.post_ops) {
     if (const auto* const add = std::get_if<AddTensor>(&step)) sums.push_back(*add);
   }
   return sums;
@@ -45,11 +45,11 @@ class Planner {
     if (std::holds_alternative<Convolution>(layer.operation)) {
       plan_convolution(index);
     } else if (const auto* const activation = std::get_if<LeakyRelu>(&layer.operation)) {
-      const Place from = version(layer.inputs.front(), ValueType::f32);
+      const TensorPlacement from = version(layer.inputs.front(), ValueType::f32);
       add_step(Activate{from, new_place(layer.output, ValueType::f32), activation->slope});
     } else if (std::holds_alternative<Add>(layer.operation)) {
-      const Place first = version(layer.inputs[0], ValueType::f32);
-      const Place second = version(layer.inputs[1], ValueType::f32);
+      const TensorPlacement first = version(layer.inputs[0], ValueType::f32);
+      const TensorPlacement second = version(layer.inputs[1], ValueType::f32);
       add_step(Sum{first, second, new_place(layer.output, ValueType::f32)});
     } else {
       throw UnsupportedLayer("layer '" + layer.name +
@@ -65,14 +65,14 @@ class Planner {
       return;
     }
     const ValueType type = precision_.of_tensor[layer.output];
-    const Place from = version(layer.inputs.front(), precision_.of_layer[index]);
+    const TensorPlacement from = version(layer.inputs.front(), precision_.of_layer[index]);
     const std::vector<AddTensor> sums = sums_of(layer);
-    std::optional<Place> added;
+    std::optional<TensorPlacement> added;
     if (sums.size() > 1) added = version(sums[1].other, type);
     const auto [to, sum_scale] = result_place(index, from, type);
     // oneDNN can do both sums of a convolution in integers only.
     if (added && precision_.of_layer[index] == ValueType::f32) {
-      const Place first_sum{sums[1].own, type, to.buffer};
+      const TensorPlacement first_sum{sums[1].own, type, to.buffer};
       add_step(Convolve{index, from, first_sum, sum_scale, {}});
       add_step(Sum{first_sum, *added, to});
     } else {
@@ -83,9 +83,9 @@ class Planner {
   void plan_row_widening(std::size_t index) {
     const Layer& layer = graph_.layers[index];
     const ValueType type = precision_.of_tensor[layer.output];
-    const Place from = version(layer.inputs.front(), precision_.of_layer[index]);
+    const TensorPlacement from = version(layer.inputs.front(), precision_.of_layer[index]);
     const std::vector<AddTensor> sums = sums_of(layer);
-    const Place phases = new_place(sums.empty() ? layer.output : sums.front().own, type);
+    const TensorPlacement phases = new_place(sums.empty() ? layer.output : sums.front().own, type);
     add_step(Convolve{index, from, phases, {}, {}});
     const auto [to, sum_scale] = result_place(index, phases, type);
     std::optional<float> sum_factor;
@@ -94,48 +94,48 @@ class Planner {
   }
 
   struct Result {
-    Place place;
+    TensorPlacement place;
     std::optional<float> sum_scale;
   };
 
   /// Where the result of a convolution goes: onto what it is added to, or into memory of its own.
   /// `from` is read while it is written.
-  Result result_place(std::size_t index, const Place& from, ValueType type) {
+  Result result_place(std::size_t index, const TensorPlacement& from, ValueType type) {
     const Layer& layer = graph_.layers[index];
     const std::vector<AddTensor> sums = sums_of(layer);
     if (sums.empty()) return {new_place(layer.output, type), std::nullopt};
     const TensorId summand = sums.front().other;
-    Place other = version(summand, type);
+    TensorPlacement other = version(summand, type);
     const bool added_twice = sums.size() > 1 && sums[1].other == summand;
     if (!is_last_reader(index, summand) || other.buffer == from.buffer || added_twice) {
-      const Place copy{summand, type, new_buffer(summand, type)};
+      const TensorPlacement copy{summand, type, new_buffer(summand, type)};
       add_step(Convert{other, copy, 1.0F});
       other = copy;
     }
-    const Place to{layer.output, type, other.buffer};
+    const TensorPlacement to{layer.output, type, other.buffer};
     set_scale(to);
     versions_[to.tensor][static_cast<std::size_t>(type)] = to;
     return {to, scale_of(other)};
   }
 
   [[nodiscard]] bool is_last_reader(std::size_t layer, TensorId tensor) const {
-    return tensor != graph_.output && graph_.readers(tensor).back() == layer;
+    return tensor != graph_.output && graph_.consumers(tensor).back() == layer;
   }
 
   /// A tensor in the type that is wanted; converted when it is not there yet.
-  Place version(TensorId tensor, ValueType type) {
-    std::optional<Place>& wanted = versions_[tensor][static_cast<std::size_t>(type)];
+  TensorPlacement version(TensorId tensor, ValueType type) {
+    std::optional<TensorPlacement>& wanted = versions_[tensor][static_cast<std::size_t>(type)];
     if (wanted) return *wanted;
     const ValueType there = type == ValueType::f32 ? ValueType::s8 : ValueType::f32;
-    const Place from = *versions_[tensor][static_cast<std::size_t>(there)];
-    const Place to = new_place(tensor, type);
+    const TensorPlacement from = *versions_[tensor][static_cast<std::size_t>(there)];
+    const TensorPlacement to = new_place(tensor, type);
     const float scale = plan_.scale_of_tensor[tensor];
     add_step(Convert{from, to, type == ValueType::f32 ? scale : 1.0F / scale});
     return to;
   }
 
-  Place new_place(TensorId tensor, ValueType type) {
-    const Place place{tensor, type, new_buffer(tensor, type)};
+  TensorPlacement new_place(TensorId tensor, ValueType type) {
+    const TensorPlacement place{tensor, type, new_buffer(tensor, type)};
     versions_[tensor][static_cast<std::size_t>(type)] = place;
     set_scale(place);
     return place;
@@ -148,7 +148,7 @@ class Planner {
     return plan_.buffers.size() - 1;
   }
 
-  void set_scale(const Place& place) {
+  void set_scale(const TensorPlacement& place) {
     if (place.type != ValueType::s8) return;
     const std::string& name = graph_.tensors[place.tensor].name;
     const auto ranges = calibration_->range_of_channels.find(name);
@@ -162,13 +162,15 @@ class Planner {
   }
 
   /// What a stored value must be multiplied with.
-  [[nodiscard]] float scale_of(const Place& place) const {
+  [[nodiscard]] float scale_of(const TensorPlacement& place) const {
     return place.type == ValueType::s8 ? plan_.scale_of_tensor[place.tensor] : 1.0F;
   }
 
   void add_step(const Step& step) {
     const std::size_t number = plan_.steps.size();
-    const auto use = [&](const Place& place) { plan_.buffers[place.buffer].last_step = number; };
+    const auto use = [&](const TensorPlacement& place) {
+      plan_.buffers[place.buffer].last_step = number;
+    };
     use(target(step));
     std::visit(
         [&](const auto& s) {
@@ -187,14 +189,14 @@ class Planner {
   const Int8Calibration* calibration_;
   LayerPrecision precision_;
   /// Of each tensor, by type.
-  std::vector<std::array<std::optional<Place>, 2>> versions_;
+  std::vector<std::array<std::optional<TensorPlacement>, 2>> versions_;
   ExecutionPlan plan_;
 };
 
 }  // namespace
 
-const Place& target(const Step& step) {
-  return std::visit([](const auto& s) -> const Place& { return s.to; }, step);
+const TensorPlacement& target(const Step& step) {
+  return std::visit([](const auto& s) -> const TensorPlacement& { return s.to; }, step);
 }
 
 ExecutionPlan plan_execution(const NetworkGraph& graph, const Int8Calibration* calibration) {

@@ -18,7 +18,7 @@ enum class ValueType { f32, s8 };
 using BufferId = std::size_t;
 
 /// One tensor in one type, rows x columns x channels in memory.
-struct Place {
+struct TensorPlacement {
   TensorId tensor = 0;
   ValueType type = ValueType::f32;
   BufferId buffer = 0;
@@ -26,43 +26,43 @@ struct Place {
 
 /// The network's input, channels x rows x columns as it comes, laid out in a buffer.
 struct LoadInput {
-  Place to;
+  TensorPlacement to;
 };
 /// The values of a buffer in another type, times `factor`; or a copy.
 struct Convert {
-  Place from, to;
+  TensorPlacement from, to;
   float factor = 1.0F;
 };
 /// A convolution with its activations. With `sum_scale`, what lies in the target, of values of that
 /// scale, is added; and then what lies in `added`.
 struct Convolve {
   std::size_t layer = 0;
-  Place from, to;
+  TensorPlacement from, to;
   std::optional<float> sum_scale = {};
-  std::optional<Place> added = {};
+  std::optional<TensorPlacement> added = {};
 };
 /// Lays the row phases of a widening convolution's result out, times `factor`. With `sum_factor`,
 /// what lies in the target times it is added.
 struct LayOutRows {
   std::size_t layer = 0;
-  Place from, to;
+  TensorPlacement from, to;
   float factor = 1.0F;
   std::optional<float> sum_factor = {};
 };
 /// An activation that no convolution could take in.
 struct Activate {
-  Place from, to;
+  TensorPlacement from, to;
   float slope = 0.0F;
 };
 /// A sum that no convolution could take in.
 struct Sum {
-  Place first, second, to;
+  TensorPlacement first, second, to;
 };
 
 using Step = std::variant<LoadInput, Convert, Convolve, LayOutRows, Activate, Sum>;
 
 /// Where a step writes.
-[[nodiscard]] const Place& target(const Step& step);
+[[nodiscard]] const TensorPlacement& target(const Step& step);
 
 struct Buffer {
   std::size_t bytes = 0;
@@ -76,7 +76,7 @@ struct ExecutionPlan {
   std::vector<Step> steps;
   std::vector<Buffer> buffers;
   /// The network's output, in f32.
-  Place output;
+  TensorPlacement output;
   /// Factor of the s8 values of each tensor; 1 for those that have none.
   std::vector<float> scale_of_tensor;
 };

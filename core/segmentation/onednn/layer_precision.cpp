@@ -26,7 +26,7 @@ LayerPrecision layer_precision(const NetworkGraph& graph, const Int8Calibration*
     precision.of_layer[i] = ValueType::s8;
     if (wanted_s8[layer.output]) precision.of_tensor[layer.output] = ValueType::s8;
     wanted_s8[layer.inputs.front()] = true;
-    for (const FollowUp& step : layer.follow_ups) {
+    for (const PostOp& step : layer.post_ops) {
       const auto* const add = std::get_if<AddTensor>(&step);
       if (add != nullptr && wanted_s8[layer.output]) wanted_s8[add->other] = true;
     }

@@ -59,7 +59,7 @@ PreparedNetwork prepare_network(const OnnxFile& file, const ModelDescription& mo
   network.had_softmax = drop_final_softmax(graph);
   fold_batch_norms(graph);
   replace_transposed_convolutions(graph);
-  fuse_follow_ups(graph);
+  fuse_post_ops(graph);
   return network;
 }
 

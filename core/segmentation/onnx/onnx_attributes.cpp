@@ -27,14 +27,14 @@ void OnnxAttributes::refuse(const std::string& name, const std::string& fault) c
   throw GraphFault("layer '" + layer_name(node_) + "': " + name + " " + fault);
 }
 
-float OnnxAttributes::real(const std::string& name, float otherwise) const {
+float OnnxAttributes::real(const std::string& name, float default_value) const {
   const onnx::AttributeProto* const attribute = find(name);
-  return attribute == nullptr ? otherwise : attribute->f();
+  return attribute == nullptr ? default_value : attribute->f();
 }
 
-std::int64_t OnnxAttributes::whole(const std::string& name, std::int64_t otherwise) const {
+std::int64_t OnnxAttributes::whole(const std::string& name, std::int64_t default_value) const {
   const onnx::AttributeProto* const attribute = find(name);
-  return attribute == nullptr ? otherwise : attribute->i();
+  return attribute == nullptr ? default_value : attribute->i();
 }
 
 std::string OnnxAttributes::text(const std::string& name) const {
@@ -48,26 +48,28 @@ std::vector<std::int64_t> OnnxAttributes::whole_numbers(const std::string& name)
   return {attribute->ints().begin(), attribute->ints().end()};
 }
 
-std::vector<int> OnnxAttributes::small_numbers(const std::string& name, int least,
-                                               std::vector<int> otherwise) const {
+std::vector<int> OnnxAttributes::small_numbers(const std::string& name, int min_value,
+                                               std::vector<int> default_value) const {
   const std::vector<std::int64_t> written = whole_numbers(name);
-  if (written.empty()) return otherwise;
-  if (written.size() != otherwise.size()) {
+  if (written.empty()) return default_value;
+  if (written.size() != default_value.size()) {
     refuse(name, "has " + std::to_string(written.size()) + " numbers where " +
-                     std::to_string(otherwise.size()) + " are wanted: not an image?");
+                     std::to_string(default_value.size()) + " are wanted: not an image?");
   }
   for (std::size_t i = 0; i < written.size(); ++i) {
-    if (written[i] < least || written[i] > max_number) {
-      refuse(name, "is " + std::to_string(written[i]) + ", but must be " + std::to_string(least) +
-                       ".." + std::to_string(max_number));
+    if (written[i] < min_value || written[i] > max_number) {
+      refuse(name, "is " + std::to_string(written[i]) + ", but must be " +
+                       std::to_string(min_value) + ".." + std::to_string(max_number));
     }
-    otherwise[i] = static_cast<int>(written[i]);
+    default_value[i] = static_cast<int>(written[i]);
   }
-  return otherwise;
+  return default_value;
 }
 
-RowsColumns OnnxAttributes::pair(const std::string& name, int least, RowsColumns otherwise) const {
-  const std::vector<int> pair = small_numbers(name, least, {otherwise.rows, otherwise.columns});
+RowsColumns OnnxAttributes::pair(const std::string& name, int min_value,
+                                 RowsColumns default_value) const {
+  const std::vector<int> pair =
+      small_numbers(name, min_value, {default_value.rows, default_value.columns});
   return {.rows = pair[0], .columns = pair[1]};
 }
 

@@ -34,7 +34,7 @@ class GraphReader {
       read_constant(node);
     } else if (kind == "Identity" || kind == "Dropout") {
       read_renaming(node);
-    } else if (const std::optional<std::string> scores = softmax_.take(node, weights_)) {
+    } else if (const std::optional<std::string> scores = softmax_.match(node, weights_)) {
       // The last part of a soft-max makes the layer, the others nothing.
       if (!scores->empty()) add_layer(node, Softmax{}, {tensor(*scores)});
     } else if (kind == "Add") {
@@ -90,7 +90,7 @@ class GraphReader {
 
   const onnx::GraphProto& proto_;
   OnnxWeights weights_;
-  SoftmaxParts softmax_;
+  SoftmaxMatcher softmax_;
   std::map<std::string, TensorId> tensors_;
   NetworkGraph graph_;
 };

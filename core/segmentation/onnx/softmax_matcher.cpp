@@ -28,37 +28,37 @@ bool undoes(const Order& back, const Order& order) {
 
 }  // namespace
 
-SoftmaxParts::SoftmaxParts(const onnx::ModelProto& model) {
+SoftmaxMatcher::SoftmaxMatcher(const onnx::ModelProto& model) {
   for (const onnx::OperatorSetIdProto& set : model.opset_import()) {
     if (set.domain().empty() || set.domain() == "ai.onnx") operator_set_ = set.version();
   }
 }
 
-std::optional<std::string> SoftmaxParts::take(const onnx::NodeProto& node,
-                                              const OnnxWeights& weights) {
+std::optional<std::string> SoftmaxMatcher::match(const onnx::NodeProto& node,
+                                                 const OnnxWeights& weights) {
   if (node.input().empty() || node.output().empty()) return std::nullopt;
   const std::string& kind = node.op_type();
-  if (kind == "Softmax") return take_softmax(node);
-  if (kind == "Exp") return take_exponential(node);
-  if (kind == "ReduceSum") return take_sum(node, weights);
-  if (kind == "Div") return take_division(node);
-  if (kind == "Transpose") return take_transpose(node);
+  if (kind == "Softmax") return match_softmax(node);
+  if (kind == "Exp") return match_exponential(node);
+  if (kind == "ReduceSum") return match_sum(node, weights);
+  if (kind == "Div") return match_division(node);
+  if (kind == "Transpose") return match_transpose(node);
   return std::nullopt;
 }
 
-const SoftmaxParts::Part* SoftmaxParts::part(const onnx::NodeProto& node, int input,
-                                             Stage stage) const {
+const SoftmaxMatcher::Part* SoftmaxMatcher::part(const onnx::NodeProto& node, int input,
+                                                 Stage stage) const {
   if (input >= node.input_size()) return nullptr;
   const auto found = parts_.find(node.input(input));
   return found == parts_.end() || found->second.stage != stage ? nullptr : &found->second;
 }
 
-std::optional<std::string> SoftmaxParts::keep(const onnx::NodeProto& node, Part part) {
+std::optional<std::string> SoftmaxMatcher::keep(const onnx::NodeProto& node, Part part) {
   parts_.insert_or_assign(node.output(0), std::move(part));
   return std::string();
 }
 
-std::optional<std::string> SoftmaxParts::take_softmax(const onnx::NodeProto& node) {
+std::optional<std::string> SoftmaxMatcher::match_softmax(const onnx::NodeProto& node) {
   const std::int64_t axis =
       OnnxAttributes(node).whole("axis", operator_set_ >= one_axis_set ? -1 : 1);
   if (const Part* const before = part(node, 0, Stage::transposed)) {
@@ -70,12 +70,12 @@ std::optional<std::string> SoftmaxParts::take_softmax(const onnx::NodeProto& nod
   return std::nullopt;
 }
 
-std::optional<std::string> SoftmaxParts::take_exponential(const onnx::NodeProto& node) {
+std::optional<std::string> SoftmaxMatcher::match_exponential(const onnx::NodeProto& node) {
   return keep(node, {Stage::exponential, node.input(0)});
 }
 
-std::optional<std::string> SoftmaxParts::take_sum(const onnx::NodeProto& node,
-                                                  const OnnxWeights& weights) {
+std::optional<std::string> SoftmaxMatcher::match_sum(const onnx::NodeProto& node,
+                                                     const OnnxWeights& weights) {
   const Part* const before = part(node, 0, Stage::exponential);
   const OnnxAttributes attributes(node);
   const Order axes =
@@ -85,7 +85,7 @@ std::optional<std::string> SoftmaxParts::take_sum(const onnx::NodeProto& node,
   return keep(node, {Stage::sum, before->scores});
 }
 
-std::optional<std::string> SoftmaxParts::take_division(const onnx::NodeProto& node) {
+std::optional<std::string> SoftmaxMatcher::match_division(const onnx::NodeProto& node) {
   const Part* const exponential = part(node, 0, Stage::exponential);
   const Part* const sum = part(node, 1, Stage::sum);
   if (exponential == nullptr || sum == nullptr) return std::nullopt;
@@ -93,7 +93,7 @@ std::optional<std::string> SoftmaxParts::take_division(const onnx::NodeProto& no
   return sum->scores;
 }
 
-std::optional<std::string> SoftmaxParts::take_transpose(const onnx::NodeProto& node) {
+std::optional<std::string> SoftmaxMatcher::match_transpose(const onnx::NodeProto& node) {
   const Order order = OnnxAttributes(node).whole_numbers("perm");
   if (const Part* const before = part(node, 0, Stage::normalised)) {
     if (undoes(order, before->order)) return before->scores;

@@ -17,13 +17,13 @@ namespace stillmap {
 /// Puts soft-maxes over the channels together that exporters write in one of three ways: as
 /// Softmax; as Exp, ReduceSum, Div (PyTorch up to 1.4); between two Transposes (before operator set
 /// 13, whose Softmax knows only the last axis).
-class SoftmaxParts {
+class SoftmaxMatcher {
  public:
-  explicit SoftmaxParts(const onnx::ModelProto& model);
+  explicit SoftmaxMatcher(const onnx::ModelProto& model);
 
   /// Nothing when the node is no part of a soft-max. Else empty, or for the part that ends it the
   /// name of the tensor whose soft-max it makes.
-  std::optional<std::string> take(const onnx::NodeProto& node, const OnnxWeights& weights);
+  std::optional<std::string> match(const onnx::NodeProto& node, const OnnxWeights& weights);
 
  private:
   enum class Stage { exponential, sum, transposed, normalised };
@@ -34,11 +34,11 @@ class SoftmaxParts {
     std::vector<std::int64_t> order = {};
   };
 
-  std::optional<std::string> take_softmax(const onnx::NodeProto& node);
-  std::optional<std::string> take_exponential(const onnx::NodeProto& node);
-  std::optional<std::string> take_sum(const onnx::NodeProto& node, const OnnxWeights& weights);
-  std::optional<std::string> take_division(const onnx::NodeProto& node);
-  std::optional<std::string> take_transpose(const onnx::NodeProto& node);
+  std::optional<std::string> match_softmax(const onnx::NodeProto& node);
+  std::optional<std::string> match_exponential(const onnx::NodeProto& node);
+  std::optional<std::string> match_sum(const onnx::NodeProto& node, const OnnxWeights& weights);
+  std::optional<std::string> match_division(const onnx::NodeProto& node);
+  std::optional<std::string> match_transpose(const onnx::NodeProto& node);
 
   /// What input number `input` is, when that is a part in this stage.
   [[nodiscard]] const Part* part(const onnx::NodeProto& node, int input, Stage stage) const;

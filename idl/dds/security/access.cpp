@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 bool any_matches(const std::vector<std::string>& expressions, const std::string& topic) {
@@ -18,4 +18,4 @@ bool any_matches(const std::vector<std::string>& expressions, const std::string&
 bool Access::may_publish(const std::string& topic) const { return any_matches(publish, topic); }
 bool Access::may_subscribe(const std::string& topic) const { return any_matches(subscribe, topic); }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// What an identity may do: DDS topic names ("rt/points"), in which * and ? stand for anything.
 struct Access {
@@ -14,4 +14,4 @@ struct Access {
   [[nodiscard]] bool may_subscribe(const std::string& topic) const;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -9,7 +9,7 @@
 #include "idl/dds/security/identity.hpp"
 #include "idl/dds/security/signed_document.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 namespace fs = std::filesystem;
@@ -107,4 +107,4 @@ std::vector<fs::path> Authority::identities() const {
 
 fs::path Authority::key_file() const { return key_in(folder_); }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

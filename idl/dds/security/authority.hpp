@@ -7,7 +7,7 @@
 #include "idl/dds/security/access.hpp"
 #include "idl/dds/security/certificate.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// The folder of a certificate authority and of the identities that it made: `authority/` with its
 /// key, and a folder for each identity that holds all that this identity needs elsewhere.
@@ -36,4 +36,4 @@ class Authority {
   PrivateKey key_;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

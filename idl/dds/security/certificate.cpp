@@ -14,7 +14,7 @@
 #include <cstdio>
 #include <cstring>
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 namespace fs = std::filesystem;
@@ -207,4 +207,4 @@ bool Certificate::belongs_to(const PrivateKey& key) const {
   return belongs;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

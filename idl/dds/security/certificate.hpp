@@ -10,7 +10,7 @@
 
 #include "idl/dds/security/security_error.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// A span of wall clock time, to the second.
 struct Validity {
@@ -79,4 +79,4 @@ class Certificate {
 /// What OpenSSL says about the last failure of this thread.
 [[nodiscard]] std::string openssl_reason();
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

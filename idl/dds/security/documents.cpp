@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using std::chrono::sys_seconds;
@@ -136,4 +136,4 @@ std::optional<Permissions> permissions_from_text(const std::string& text) {
       .access = {.publish = topics_in(text, "publish"), .subscribe = topics_in(text, "subscribe")}};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

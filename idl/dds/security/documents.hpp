@@ -6,7 +6,7 @@
 #include "idl/dds/security/access.hpp"
 #include "idl/dds/security/certificate.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// The rules of the domain, for all domain ids: nobody without a valid identity takes part, and
 /// discovery, liveliness and data are encrypted.
@@ -25,4 +25,4 @@ struct Permissions {
 /// Of a document with one grant, as to_text() makes it; nothing when it is another kind of text.
 [[nodiscard]] std::optional<Permissions> permissions_from_text(const std::string& text);
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

@@ -13,7 +13,7 @@
 #include "idl/dds/security/documents.hpp"
 #include "idl/dds/security/signed_document.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 namespace fs = std::filesystem;
@@ -45,15 +45,15 @@ class Inspection {
     const auto certificate = read_certificate(files_.certificate);
     const auto key = read_key();
     if (certificate) {
-      judge_dates(files_.certificate, certificate->validity());
-      if (authority) judge_issuer(*certificate, *authority);
-      if (key) judge_key(*certificate, *key);
+      check_dates(files_.certificate, certificate->validity());
+      if (authority) check_issuer(*certificate, *authority);
+      if (key) check_key(*certificate, *key);
     }
-    if (authority) judge_dates(files_.identity_authority, authority->validity());
+    if (authority) check_dates(files_.identity_authority, authority->validity());
     if (signer) {
       static_cast<void>(verified(files_.governance, *signer));
       const auto text = verified(files_.permissions, *signer);
-      if (text && certificate) judge_permissions(*text, *certificate);
+      if (text && certificate) check_permissions(*text, *certificate);
     }
     return std::move(found_);
   }
@@ -118,7 +118,7 @@ class Inspection {
     }
   }
 
-  void judge_dates(const fs::path& file, const Validity& validity) {
+  void check_dates(const fs::path& file, const Validity& validity) {
     if (now_ > validity.to) {
       fault(file.string() + " expired on " + to_text(validity.to) + "; " + renewal(folder_));
     } else if (now_ < validity.from) {
@@ -130,14 +130,14 @@ class Inspection {
     }
   }
 
-  void judge_issuer(const Certificate& certificate, const Certificate& authority) {
+  void check_issuer(const Certificate& certificate, const Certificate& authority) {
     if (certificate.is_signed_by(authority)) return;
     fault(files_.certificate.string() + " was not issued by the authority in " +
           files_.identity_authority.filename().string() + " (" + authority.subject() +
           "): files of two authorities are mixed; copy the whole folder again");
   }
 
-  void judge_key(const Certificate& certificate, const PrivateKey& key) {
+  void check_key(const Certificate& certificate, const PrivateKey& key) {
     if (certificate.belongs_to(key)) return;
     fault(files_.key.string() + " is not the key of " + files_.certificate.filename().string() +
           "; copy both from the same identity");
@@ -152,7 +152,7 @@ class Inspection {
     return text;
   }
 
-  void judge_permissions(const std::string& text, const Certificate& certificate) {
+  void check_permissions(const std::string& text, const Certificate& certificate) {
     const auto permissions = permissions_from_text(text);
     if (!permissions) {
       return fault(files_.permissions.string() + " has no grant that can be understood; " +
@@ -163,7 +163,7 @@ class Inspection {
             ", but the certificate is of " + certificate.subject() +
             "; copy the whole folder of one identity");
     }
-    judge_dates(files_.permissions, permissions->validity);
+    check_dates(files_.permissions, permissions->validity);
   }
 
   fs::path folder_;
@@ -207,4 +207,4 @@ Identity load_identity(const fs::path& folder) {
           .access = permissions->access};
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

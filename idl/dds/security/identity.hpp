@@ -7,7 +7,7 @@
 #include "idl/dds/security/access.hpp"
 #include "idl/dds/security/certificate.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Files of one identity, named as ROS 2 names those of an enclave.
 struct IdentityFiles {
@@ -46,4 +46,4 @@ struct IdentityFaults {
 /// Throws SecurityError with every fault that check_identity() finds now.
 [[nodiscard]] Identity load_identity(const std::filesystem::path& folder);
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

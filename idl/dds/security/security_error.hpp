@@ -2,7 +2,7 @@
 
 #include "idl/dds/dds_error.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// Certificates, keys or permissions that cannot be used: the text names the file and the way out.
 class SecurityError : public DdsError {
@@ -16,4 +16,4 @@ class NotPermitted : public SecurityError {
   using SecurityError::SecurityError;
 };
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

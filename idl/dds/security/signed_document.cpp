@@ -5,7 +5,7 @@
 
 #include <memory>
 
-namespace stillmap {
+namespace stillmap::dds {
 namespace {
 
 using Bio = std::unique_ptr<BIO, void (*)(BIO*)>;
@@ -57,4 +57,4 @@ std::optional<std::string> verified_text(const std::string& document,
   return content(*out);
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

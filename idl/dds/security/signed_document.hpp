@@ -5,7 +5,7 @@
 
 #include "idl/dds/security/certificate.hpp"
 
-namespace stillmap {
+namespace stillmap::dds {
 
 /// The text with its signature, as S/MIME: the form in which DDS Security wants governance and
 /// permissions. Throws SecurityError.
@@ -16,4 +16,4 @@ namespace stillmap {
 [[nodiscard]] std::optional<std::string> verified_text(const std::string& document,
                                                        const Certificate& authority);
 
-}  // namespace stillmap
+}  // namespace stillmap::dds

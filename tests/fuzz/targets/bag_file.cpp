@@ -18,7 +18,7 @@ enum Kind : std::uint8_t { database, metadata, compressed, compressed_file, kind
 
 /// As `stillmap replay` reads it; scans that are damaged are left out.
 void read_all(const fs::path& bag) {
-  const BagScans scans(bag, "");
+  const dds::BagScanSource scans(bag, "");
   for (std::size_t i = 0; i < scans.size(); ++i) {
     try {
       static_cast<void>(scans.read(i));
@@ -58,9 +58,9 @@ void read(Kind kind, Bytes bytes) {
     return read_all(folder.path("bag"));
   }
   if (kind == compressed) {
-    static_cast<void>(unpacked(bytes));
+    static_cast<void>(dds::decompressed(bytes));
   } else {
-    unpack_file(folder.file("packed.zstd", bytes), folder.path("plain"));
+    dds::decompress_file(folder.file("packed.zstd", bytes), folder.path("plain"));
   }
 }
 
@@ -70,7 +70,7 @@ void run(Bytes bytes) {
   try {
     read(kind, source.rest());
   } catch (const DatasetError&) {
-  } catch (const CdrError&) {
+  } catch (const dds::CdrError&) {
   }
 }
 

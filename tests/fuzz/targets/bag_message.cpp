@@ -35,10 +35,10 @@ void run(Bytes bytes) {
   const auto kind = static_cast<Kind>(source.byte() % kinds);
   if (kind == packets) return decode_packets(source);
   const Bytes message = source.rest();
-  static_cast<void>(header_stamp_ns(message));
+  static_cast<void>(dds::header_stamp_ns(message));
   try {
-    check_scan(scan_of_message(static_cast<ScanMessage>(kind), message).frame.scan);
-  } catch (const CdrError&) {
+    check_scan(dds::decode_scan(static_cast<dds::ScanMessageType>(kind), message).frame.scan);
+  } catch (const dds::CdrError&) {
   }
 }
 

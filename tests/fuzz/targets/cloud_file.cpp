@@ -8,8 +8,8 @@
 #include "core/dataset/point_cloud_files.hpp"
 #include "core/dataset/scan_dataset.hpp"
 #include "tests/fuzz/byte_source.hpp"
-#include "tests/fuzz/memory_folder.hpp"
 #include "tests/fuzz/invariant.hpp"
+#include "tests/fuzz/memory_folder.hpp"
 
 namespace stillmap::fuzz {
 namespace {

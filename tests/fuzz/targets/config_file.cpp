@@ -6,8 +6,8 @@
 #include "config/loaders/server_config.hpp"
 #include "core/occupancy/occupancy_map.hpp"
 #include "tests/fuzz/byte_source.hpp"
-#include "tests/fuzz/memory_folder.hpp"
 #include "tests/fuzz/invariant.hpp"
+#include "tests/fuzz/memory_folder.hpp"
 
 namespace stillmap::fuzz {
 namespace {
@@ -22,7 +22,7 @@ void read_server(const fs::path& file) {
   const ServerConfig config = load_server_config(file, report);
   require(config.mapper.static_map.faults().empty(), "a map can be made");
   require(config.occupancy.map.faults().empty(), "an octree can be made");
-  static_cast<void>(robots_of(config.areas));
+  static_cast<void>(load_robots(config.traversability));
 }
 
 void read(Kind kind, const fs::path& file) {

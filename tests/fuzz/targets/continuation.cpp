@@ -13,8 +13,8 @@
 namespace stillmap::fuzz {
 namespace {
 
-const MapView& street_view() {
-  static const MapView view = small_street().view;
+const MapSnapshot& street_view() {
+  static const MapSnapshot view = small_street().view;
   return view;
 }
 

@@ -24,7 +24,7 @@ void run(Bytes bytes) {
   folder.remove("map.stillmap");
   const auto file = folder.file("map.stillmap", bytes);
   look_at(file);
-  load_as_a_server_does(file);
+  load_and_resume_map(file);
 }
 
 std::vector<Seed> seeds() {

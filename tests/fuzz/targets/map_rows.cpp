@@ -1,5 +1,5 @@
-// Rows of a map file whose database is sound: sizes of the map, poses, and tiles and memories by
-// what is inside their frames, with the content hash that fits where there is one.
+// Rows of a map file whose database is sound: sizes of the map, poses, and tiles and their evidence
+// by what is inside their frames, with the content hash that fits where there is one.
 
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Exception.h>
@@ -7,10 +7,11 @@
 
 #include <cstring>
 
-#include "core/map/tools/map_check.hpp"
 #include "core/map/storage/tile_codec.hpp"
-#include "core/map/tile_content.hpp"
+#include "core/map/storage/tile_evidence_codec.hpp"
 #include "core/map/storage/tile_frame.hpp"
+#include "core/map/tile_content.hpp"
+#include "core/map/tools/map_check.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/loaded_map.hpp"
 #include "tests/fuzz/memory_folder.hpp"
@@ -115,9 +116,9 @@ const std::string& template_file() {
     const auto& folder = MemoryFolder::of_this_process();
     folder.remove("template.stillmap");
     const auto file = folder.path("template.stillmap");
-    StoredMap empty = small_street();
+    SavedMap empty = small_street();
     empty.view.tiles.clear();
-    empty.memories.clear();
+    empty.tile_evidence.clear();
     empty.trajectory.clear();
     open_map_file(file)->save(empty);
     return content_of(file);
@@ -137,7 +138,7 @@ void run(Bytes bytes) {
     database.exec("PRAGMA journal_mode = WAL");
   }
   static_cast<void>(check_map_file(file));
-  load_as_a_server_does(file);
+  load_and_resume_map(file);
 }
 
 void append_row(std::string& bytes, Row row, const std::vector<std::uint8_t>& encoded) {
@@ -157,13 +158,13 @@ Tile first_voxels(const Tile& whole) {
 }
 
 std::vector<Seed> seeds() {
-  const StoredMap street = small_street();
+  const SavedMap street = small_street();
   const Tile shown = first_voxels(*street.view.tiles.front());
-  TileMemory known = *street.memories.at(shown.info.id);
+  TileEvidence known = *street.tile_evidence.at(shown.info.id);
   known.shown.resize(shown.voxels.size());
   std::string all;
   append_row(all, tile, encode_tile(shown));
-  append_row(all, memory, encode_memory(known));
+  append_row(all, memory, encode_evidence(known));
   std::string numbers(1, static_cast<char>(pose));
   numbers.push_back(0);
   append_value(numbers, std::int64_t{1'700'000'000'000'000'000});

@@ -3,7 +3,6 @@
 
 #include <variant>
 
-#include "idl/conversions/traversability_query.hpp"
 #include "idl/conversions/map_query.hpp"
 #include "idl/conversions/occupancy_query.hpp"
 #include "idl/conversions/path_query.hpp"
@@ -11,6 +10,7 @@
 #include "idl/conversions/removed_voxels.hpp"
 #include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"
+#include "idl/conversions/traversability_query.hpp"
 #include "idl/interface/topics.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"
@@ -87,8 +87,8 @@ RemovedVoxel removed_voxel() {
 }
 
 std::vector<Seed> seeds() {
-  const MapView view = small_street().view;
-  const MapIdentity identity = wire::identity_of(view);
+  const MapSnapshot view = small_street().view;
+  const dds::MapIdentity identity = wire::identity_of(view);
   const StampedPose pose{1'500'000'000, Eigen::Isometry3d::Identity()};
   MapQuery query;
   query.max_bytes = 250;
@@ -98,7 +98,7 @@ std::vector<Seed> seeds() {
   wire::write_answers({0.2, {PointOccupancy{}}, {BoxOccupancy{}}, {RayOccupancy{}}}, occupancy);
   Tile tile = *view.tiles.front();
   tile.voxels.resize(4);
-  ServerStatus status;
+  dds::ServerStatus status;
   status.counters.push_back({"scans_mapped", 3});
   return {
       {"odometry", with_choice(0, to_cdr(wire::to_odometry(
@@ -108,7 +108,7 @@ std::vector<Seed> seeds() {
       {"tile_info", with_choice(3, to_cdr(wire::to_wire(tile.info, identity)))},
       {"status", with_choice(4, to_cdr(wire::to_wire(status)))},
       {"static_map", with_choice(5, to_cdr(wire::to_response(query_map(view, query))))},
-      {"area", with_choice(6, to_cdr(wire::to_response(AreaAnswer{})))},
+      {"area", with_choice(6, to_cdr(wire::to_response(TraversabilityAnswer{})))},
       {"path_check", with_choice(7, to_cdr(wire::to_response(PathCheck{}, 7)))},
       {"nearest", with_choice(8, to_cdr(wire::to_response(NearestTraversable{}, 7)))},
       {"occupancy", with_choice(9, to_cdr(occupancy))},

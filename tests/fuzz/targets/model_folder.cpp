@@ -5,8 +5,8 @@
 #include "config/loaders/int8_file.hpp"
 #include "config/loaders/model_file.hpp"
 #include "tests/fuzz/byte_source.hpp"
-#include "tests/fuzz/memory_folder.hpp"
 #include "tests/fuzz/invariant.hpp"
+#include "tests/fuzz/memory_folder.hpp"
 
 namespace stillmap::fuzz {
 namespace {

@@ -10,8 +10,8 @@
 #include "core/occupancy/octomap_file.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"
-#include "tests/fuzz/memory_folder.hpp"
 #include "tests/fuzz/invariant.hpp"
+#include "tests/fuzz/memory_folder.hpp"
 #include "tests/fuzz/street_map.hpp"
 
 namespace stillmap::fuzz {
@@ -40,7 +40,7 @@ void use(const OctomapData& data) {
   static_cast<void>(map.along_ray({.origin_map = Eigen::Vector3d::Zero(),
                                    .direction_map = Eigen::Vector3d(1.0, 0.5, 0.1),
                                    .max_range_m = 20.0,
-                                   .passes_unknown = true}));
+                                   .ignore_unknown = true}));
   const OctomapData again = map.encode(false);
   require(check_octomap(again).fault.empty(), "what is encoded can be read");
 }
@@ -68,7 +68,7 @@ std::string file_bytes(const char* name, const OctomapData& data) {
 }
 
 std::vector<Seed> seeds() {
-  MapView view = small_street().view;
+  MapSnapshot view = small_street().view;
   view.tiles.resize(1);
   OccupancyMap map{OccupancyConfig{}};
   map.insert(view);

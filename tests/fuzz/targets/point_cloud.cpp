@@ -17,8 +17,8 @@ namespace {
 
 using sensor_msgs::msg::PointCloud2;
 
-wire::CloudReading reading_of(std::uint8_t settings) {
-  wire::CloudReading reading;
+wire::CloudReadOptions reading_of(std::uint8_t settings) {
+  wire::CloudReadOptions reading;
   reading.labels_are_classes = (settings & 1U) != 0;
   if ((settings & 2U) != 0) reading.intensity_scale = 1.0F / 255.0F;
   if ((settings & 4U) != 0) {

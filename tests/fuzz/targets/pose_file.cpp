@@ -2,11 +2,11 @@
 // with times in them.
 
 #include "core/dataset/dataset_error.hpp"
-#include "core/dataset/kitti_files.hpp"
 #include "core/dataset/file_stamp.hpp"
+#include "core/dataset/kitti_files.hpp"
 #include "tests/fuzz/byte_source.hpp"
-#include "tests/fuzz/memory_folder.hpp"
 #include "tests/fuzz/invariant.hpp"
+#include "tests/fuzz/memory_folder.hpp"
 
 namespace stillmap::fuzz {
 namespace {

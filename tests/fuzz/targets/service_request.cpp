@@ -5,11 +5,11 @@
 #include <memory>
 #include <stdexcept>
 
-#include "idl/conversions/traversability_query.hpp"
 #include "idl/conversions/map_query.hpp"
 #include "idl/conversions/occupancy_query.hpp"
 #include "idl/conversions/path_query.hpp"
 #include "idl/conversions/region.hpp"
+#include "idl/conversions/traversability_query.hpp"
 #include "idl/interface/topics.hpp"
 #include "server/services/check_path.hpp"
 #include "server/services/get_tile_versions.hpp"
@@ -29,8 +29,8 @@ namespace {
 
 using namespace stillmap_msgs::srv;
 
-ServedWorld& world() {
-  static ServedWorld world;
+ServiceFixture& world() {
+  static ServiceFixture world;
   return world;
 }
 
@@ -76,7 +76,7 @@ void removed(Bytes bytes) {
 void occupancy(Bytes bytes) {
   answer_to<QueryOccupancy_Request>(bytes, [](const auto& request) {
     return answer<QueryOccupancy_Response>(
-        world().context(), request, [&](const MapView&, QueryOccupancy_Response& response) {
+        world().context(), request, [&](const MapSnapshot&, QueryOccupancy_Response& response) {
           wire::write_answers(world().octree().answer(wire::from_request(request)), response);
         });
   });
@@ -86,7 +86,7 @@ void occupancy(Bytes bytes) {
 template <typename Request, typename Answer>
 void change_by(Bytes bytes, const Answer& answer) {
   answer_to<Request>(bytes, answer);
-  world().begin_again();
+  world().reset();
 }
 
 void restore(Bytes bytes) {
@@ -102,7 +102,7 @@ void load(Bytes bytes) {
 }
 void forget(Bytes bytes) {
   change_by<Reset_Request>(bytes,
-                           [](const auto& r) { return stillmap::reset(world().context(), r); });
+                           [](const auto& r) { return server::reset(world().context(), r); });
 }
 
 constexpr std::array<void (*)(Bytes), 12> services = {static_map, tile_versions, tiles,   area,
@@ -118,7 +118,7 @@ void run(Bytes bytes) {
 template <typename Request>
 Request versioned() {
   Request request;
-  request.format_version(wire_format_version);
+  request.format_version(dds::wire_format_version);
   return request;
 }
 
@@ -138,10 +138,10 @@ void add_region_seeds(std::vector<Seed>& all) {
     query.resolution_m = all.size() % 4 == 1 ? 1.0 : 0.0;
     const std::string number = std::to_string(region.index());
     all.push_back({"static_map_" + number, with_choice(0, to_cdr(wire::to_request(query)))});
-    AreaQuery area_query;
+    TraversabilityQuery area_query;
     area_query.profile = "car";
     area_query.region = region;
-    area_query.wants_outlines = true;
+    area_query.include_outlines = true;
     area_query.max_cells = 10'000;
     all.push_back({"area_" + number, with_choice(3, to_cdr(wire::to_request(area_query)))});
   }

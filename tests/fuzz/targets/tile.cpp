@@ -2,6 +2,7 @@
 // inside the zstd frame, whose checksum would keep any change from being looked at.
 
 #include "core/map/storage/tile_codec.hpp"
+#include "core/map/storage/tile_evidence_codec.hpp"
 #include "core/map/storage/tile_frame.hpp"
 #include "core/map/tile_evidence.hpp"
 #include "tests/fuzz/byte_source.hpp"
@@ -24,8 +25,8 @@ void decode(Kind kind, Bytes bytes) {
     require(decode_tile(encode_tile(decoded)).voxels.size() == decoded.voxels.size(),
             "a tile comes back from its encoding");
   } else {
-    const TileMemory decoded = decode_memory(encoded);
-    require(decode_memory(encode_memory(decoded)).hidden.size() == decoded.hidden.size(),
+    const TileEvidence decoded = decode_evidence(encoded);
+    require(decode_evidence(encode_evidence(decoded)).hidden.size() == decoded.hidden.size(),
             "a memory comes back from its encoding");
     static_cast<void>(removed_voxels(decoded, 0.2, 20.0));
   }
@@ -41,12 +42,12 @@ void run(Bytes bytes) {
 }
 
 std::vector<Seed> seeds() {
-  const StoredMap map = small_street();
+  const SavedMap map = small_street();
   const auto tile_bytes = encode_tile(*map.view.tiles.front());
-  const auto memory_bytes = encode_memory(*map.memories.begin()->second);
-  constexpr std::size_t least_bytes = 1;
+  const auto memory_bytes = encode_evidence(*map.tile_evidence.begin()->second);
+  constexpr std::size_t min_bytes = 1;
   const auto content = [&](const std::vector<std::uint8_t>& framed) {
-    return text_of(from_frame(format_version, framed, least_bytes));
+    return text_of(from_frame(format_version, framed, min_bytes));
   };
   return {{"tile", with_choice(tile, text_of(tile_bytes))},
           {"tile_content", with_choice(tile_content, content(tile_bytes))},

@@ -9,18 +9,18 @@ namespace stillmap::peer {
 
 using namespace std::chrono_literals;
 
-int come_and_go(const Place& place, int clients) {
+int churn_clients(const ServerAddress& address, int clients) {
   using Request = stillmap_msgs_srv_dds__GetStatus_Request_;
   using Reply = stillmap_msgs_srv_dds__GetStatus_Response_;
   Request request{};
   request.format_version = 4;
   std::vector<double> times_ms;
   for (int i = 0; i < clients; ++i) {
-    const Participant participant(place.domain_id);
-    RmwClient<Request, Reply> client(participant, place.server + "/get_status");
+    const dds::Participant participant(address.domain_id);
+    RmwClient<Request, Reply> client(participant, address.server + "/get_status");
     if (!client.wait_for_server(30s)) throw std::runtime_error("no server found");
     const auto began = std::chrono::steady_clock::now();
-    if (!client.ask(
+    if (!client.call(
             request, [](const Reply&) {}, 5s))
       continue;
     const auto took = std::chrono::steady_clock::now() - began;

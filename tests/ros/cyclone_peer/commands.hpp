@@ -7,7 +7,7 @@
 namespace stillmap::peer {
 
 /// Where the server is.
-struct Place {
+struct ServerAddress {
   std::uint32_t domain_id = 0;
   /// First part of its topics' and services' names.
   std::string server = "stillmap";
@@ -15,19 +15,19 @@ struct Place {
 
 /// Publishes the scans of a recording (velodyne/*.bin, labels/*.label) and takes what the server
 /// sends meanwhile: odometry, tf, labelled scans.
-int drive(const Place& place, const std::filesystem::path& recording);
+int play_sequence(const ServerAddress& address, const std::filesystem::path& recording);
 
 /// Joins late and takes all that the server keeps for late joiners.
-int join_late(const Place& place);
+int join_late(const ServerAddress& address);
 
 /// Watches ros_discovery_info and Cyclone's own discovery until the node's server has gone, and
 /// holds one against the other.
-int watch_graph(const Place& place, const std::string& node);
+int watch_graph(const ServerAddress& address, const std::string& node);
 
 /// Asks every service.
-int ask_services(const Place& place);
+int ask_services(const ServerAddress& address);
 
 /// Asks get_status as so many clients one after the other, each of them new, each once.
-int come_and_go(const Place& place, int clients);
+int churn_clients(const ServerAddress& address, int clients);
 
 }  // namespace stillmap::peer

@@ -16,7 +16,7 @@ using namespace std::chrono_literals;
 using Announcement = rmw_dds_common_msg_dds__ParticipantEntitiesInfo_;
 using Guid = std::array<std::uint8_t, 16>;
 
-constexpr auto patience = 120s;
+constexpr auto discovery_timeout = 120s;
 constexpr auto announcements = "ros_discovery_info";
 
 template <typename Bytes>
@@ -75,7 +75,7 @@ Endpoint endpoint_of(const dds_builtintopic_endpoint_t& found) {
 /// What Cyclone itself knows of a kind of endpoint (DCPSPublication, DCPSSubscription).
 class Discovery {
  public:
-  Discovery(const Participant& participant, dds_entity_t builtin_topic)
+  Discovery(const dds::Participant& participant, dds_entity_t builtin_topic)
       : reader_(checked(dds_create_reader(participant.entity(), builtin_topic, nullptr, nullptr),
                         "discovery")) {}
   ~Discovery() { dds_delete(reader_); }
@@ -125,7 +125,7 @@ void print(const std::string& kind, const std::map<Guid, Endpoint>& endpoints) {
 }
 
 /// The user data of a discovered participant; nothing once it has gone.
-std::optional<std::string> user_data(const Participant& participant, const Guid& wanted) {
+std::optional<std::string> user_data(const dds::Participant& participant, const Guid& wanted) {
   const dds_entity_t reader = checked(
       dds_create_reader(participant.entity(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
       "discovery of participants");
@@ -151,9 +151,10 @@ std::optional<std::string> user_data(const Participant& participant, const Guid&
 
 }  // namespace
 
-int watch_graph(const Place& place, const std::string& name) {
-  const Participant participant(place.domain_id);
-  Reader<Announcement> reader(participant, announcements, {.transient_local = true, .depth = 1000});
+int watch_graph(const ServerAddress& address, const std::string& name) {
+  const dds::Participant participant(address.domain_id);
+  dds::Reader<Announcement> reader(participant, announcements,
+                                   {.transient_local = true, .depth = 1000});
   const Discovery publications(participant, DDS_BUILTIN_TOPIC_DCPSPUBLICATION);
   const Discovery subscriptions(participant, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION);
   std::optional<Node> node;
@@ -170,7 +171,7 @@ int watch_graph(const Place& place, const std::string& name) {
     });
     return node && std::chrono::steady_clock::now() - last_news > 2s;
   };
-  if (!wait_until(is_quiet, patience)) throw std::runtime_error("no node " + name);
+  if (!wait_until(is_quiet, discovery_timeout)) throw std::runtime_error("no node " + name);
   const auto writers = publications.of(node->participant);
   const auto readers = subscriptions.of(node->participant);
   Line("node")
@@ -189,7 +190,7 @@ int watch_graph(const Place& place, const std::string& name) {
   print("writer", writers);
   print("reader", readers);
   const auto is_gone = [&] { return !user_data(participant, node->participant); };
-  Line("node").add("has_left", wait_until(is_gone, patience));
+  Line("node").add("has_left", wait_until(is_gone, discovery_timeout));
   return 0;
 }
 

@@ -12,14 +12,14 @@ namespace {
 
 using namespace std::chrono_literals;
 using Cloud = sensor_msgs_msg_dds__PointCloud2_;
-using Path = nav_msgs_msg_dds__Path_;
+using simulation::Path = nav_msgs_msg_dds__Path_;
 using Grid = nav_msgs_msg_dds__OccupancyGrid_;
 using Octomap = octomap_msgs_msg_dds__Octomap_;
 using Status = stillmap_msgs_msg_dds__Status_;
 using TileInfo = stillmap_msgs_msg_dds__TileInfo_;
 using MapTile = stillmap_msgs_msg_dds__MapTile_;
 
-constexpr auto patience = 60s;
+constexpr auto discovery_timeout = 60s;
 constexpr Qos latched{.transient_local = true, .depth = 1};
 
 void print(const std::string& topic, const Cloud& cloud) {
@@ -36,7 +36,7 @@ void print(const std::string& topic, const Cloud& cloud) {
       .add("is_dense", cloud.is_dense);
 }
 
-void print(const std::string& topic, const Path& path) {
+void print(const std::string& topic, const simulation::Path& path) {
   Line(topic).add("frame_id", path.header.frame_id).add("poses", path.poses._length);
 }
 
@@ -77,8 +77,8 @@ void print(const std::string& topic, const Status& status) {
 
 /// Takes a latched topic until its first sample, and prints that.
 template <typename T>
-bool print_latched(const Participant& participant, const std::string& topic) {
-  Reader<T> reader(participant, topic, latched);
+bool print_latched(const dds::Participant& participant, const std::string& topic) {
+  dds::Reader<T> reader(participant, topic, latched);
   bool has_come = false;
   const auto take = [&] {
     reader.take([&](const T& sample) {
@@ -86,7 +86,7 @@ bool print_latched(const Participant& participant, const std::string& topic) {
     });
     return has_come;
   };
-  if (wait_until(take, patience)) return true;
+  if (wait_until(take, discovery_timeout)) return true;
   Line(topic).add("samples", 0);
   return false;
 }
@@ -96,9 +96,9 @@ using TileKey = std::pair<std::int32_t, std::int32_t>;
 /// Takes a keyed topic until nothing new has come for a while; voxels by tile.
 template <typename T>
 std::map<TileKey, std::uint64_t> take_tiles(
-    const Participant& participant, const std::string& topic,
+    const dds::Participant& participant, const std::string& topic,
     const std::function<std::uint64_t(const T&)>& voxels_of) {
-  Reader<T> reader(participant, topic, latched);
+  dds::Reader<T> reader(participant, topic, latched);
   std::map<TileKey, std::uint64_t> voxels;
   auto last_news = std::chrono::steady_clock::now();
   const auto take = [&] {
@@ -108,7 +108,7 @@ std::map<TileKey, std::uint64_t> take_tiles(
     });
     return !voxels.empty() && std::chrono::steady_clock::now() - last_news > 1s;
   };
-  static_cast<void>(wait_until(take, patience));
+  static_cast<void>(wait_until(take, discovery_timeout));
   const auto sum = [](std::uint64_t total, const auto& tile) { return total + tile.second; };
   Line(topic)
       .add("keys", voxels.size())
@@ -118,10 +118,10 @@ std::map<TileKey, std::uint64_t> take_tiles(
 
 }  // namespace
 
-int join_late(const Place& place) {
-  const Participant participant(place.domain_id);
-  const std::string prefix = "rt/" + place.server + "/";
-  bool has_all = print_latched<Path>(participant, prefix + "path");
+int join_late(const ServerAddress& address) {
+  const dds::Participant participant(address.domain_id);
+  const std::string prefix = "rt/" + address.server + "/";
+  bool has_all = print_latched<simulation::Path>(participant, prefix + "path");
   has_all &= print_latched<Cloud>(participant, prefix + "static_cloud");
   has_all &= print_latched<Grid>(participant, prefix + "traversability");
   has_all &= print_latched<Octomap>(participant, prefix + "octomap");

@@ -11,7 +11,7 @@
 
 namespace {
 
-using stillmap::peer::Place;
+using stillmap::peer::ServerAddress;
 
 // On this machine only, and without multicast, which containers may lack.
 constexpr auto loopback = R"(<CycloneDDS><Domain>
@@ -22,13 +22,13 @@ constexpr auto loopback = R"(<CycloneDDS><Domain>
     <Peers><Peer address="127.0.0.1"/></Peers></Discovery>
 </Domain></CycloneDDS>)";
 
-int run(const std::string& command, const Place& place, const std::string& argument) {
+int run(const std::string& command, const ServerAddress& address, const std::string& argument) {
   using namespace stillmap::peer;
-  if (command == "drive") return drive(place, argument);
-  if (command == "late") return join_late(place);
-  if (command == "graph") return watch_graph(place, argument);
-  if (command == "services") return ask_services(place);
-  if (command == "clients") return come_and_go(place, std::stoi(argument));
+  if (command == "drive") return play_sequence(address, argument);
+  if (command == "late") return join_late(address);
+  if (command == "graph") return watch_graph(address, argument);
+  if (command == "services") return ask_services(address);
+  if (command == "clients") return churn_clients(address, std::stoi(argument));
   throw std::invalid_argument("no command " + command);
 }
 
@@ -43,8 +43,8 @@ int main(int argc, char** argv) {
   setenv("CYCLONEDDS_URI", loopback, 0);
   try {
     std::cout << std::boolalpha;
-    const Place place{.domain_id = static_cast<std::uint32_t>(std::stoul(argv[2]))};
-    return run(argv[1], place, argc > 3 ? argv[3] : "");
+    const ServerAddress address{.domain_id = static_cast<std::uint32_t>(std::stoul(argv[2]))};
+    return run(argv[1], address, argc > 3 ? argv[3] : "");
   } catch (const std::exception& error) {
     std::cerr << "cyclone_peer: " << error.what() << "\n";
     return 1;

@@ -12,7 +12,7 @@ namespace stillmap::peer {
 template <typename Request, typename Reply>
 class RmwClient {
  public:
-  RmwClient(const Participant& participant, const std::string& service)
+  RmwClient(const dds::Participant& participant, const std::string& service)
       : requests_(participant, "rq/" + service + "Request", {}),
         replies_(participant, "rr/" + service + "Reply", {}) {}
 
@@ -22,8 +22,8 @@ class RmwClient {
   }
 
   /// Asks once. Hands the reply over; false when none came in time.
-  [[nodiscard]] bool ask(Request request, const std::function<void(const Reply&)>& handle,
-                         std::chrono::milliseconds timeout) {
+  [[nodiscard]] bool call(Request request, const std::function<void(const Reply&)>& handle,
+                          std::chrono::milliseconds timeout) {
     request.rmw_client = id_;
     request.rmw_sequence = ++asked_;
     requests_.write(request);
@@ -42,8 +42,8 @@ class RmwClient {
  private:
   std::uint64_t id_ = std::random_device{}() * std::uint64_t{4294967291};
   std::int64_t asked_ = 0;
-  Writer<Request> requests_;
-  Reader<Reply> replies_;
+  dds::Writer<Request> requests_;
+  dds::Reader<Reply> replies_;
 };
 
 }  // namespace stillmap::peer

@@ -18,11 +18,11 @@ using Transforms = tf2_msgs_msg_dds__TFMessage_;
 using Stamp = builtin_interfaces_msg_dds__Time_;
 
 constexpr auto scan_period = 100ms;
-constexpr auto patience = 60s;
+constexpr auto discovery_timeout = 60s;
 
-struct Place3 {
+struct Position {
   double x = 0.0, y = 0.0, z = 0.0;
-  friend bool operator==(const Place3&, const Place3&) = default;
+  friend bool operator==(const Position&, const Position&) = default;
 };
 
 std::int64_t nanoseconds(const Stamp& stamp) {
@@ -31,15 +31,16 @@ std::int64_t nanoseconds(const Stamp& stamp) {
 
 /// What came of poses.
 struct Poses {
-  std::map<std::int64_t, Place3> by_stamp;
+  std::map<std::int64_t, Position> by_stamp;
   std::string frame, child_frame;
 
   [[nodiscard]] double length_m() const {
     double length = 0.0;
-    const Place3* last = nullptr;
-    for (const auto& [stamp, place] : by_stamp) {
-      if (last) length += std::hypot(place.x - last->x, place.y - last->y, place.z - last->z);
-      last = &place;
+    const Position* last = nullptr;
+    for (const auto& [stamp, position] : by_stamp) {
+      if (last)
+        length += std::hypot(position.x - last->x, position.y - last->y, position.z - last->z);
+      last = &position;
     }
     return length;
   }
@@ -54,16 +55,16 @@ struct Poses {
 };
 
 void add(Poses& poses, const Odometry& odometry) {
-  const auto& place = odometry.pose.pose.position;
-  poses.by_stamp[nanoseconds(odometry.header.stamp)] = {place.x, place.y, place.z};
+  const auto& position = odometry.pose.pose.position;
+  poses.by_stamp[nanoseconds(odometry.header.stamp)] = {position.x, position.y, position.z};
   poses.frame = odometry.header.frame_id;
   poses.child_frame = odometry.child_frame_id;
 }
 
 void add(Poses& poses, const Transforms& message) {
   for (const auto& transform : elements(message.transforms)) {
-    const auto& place = transform.transform.translation;
-    poses.by_stamp[nanoseconds(transform.header.stamp)] = {place.x, place.y, place.z};
+    const auto& position = transform.transform.translation;
+    poses.by_stamp[nanoseconds(transform.header.stamp)] = {position.x, position.y, position.z};
     poses.frame = transform.header.frame_id;
     poses.child_frame = transform.child_frame_id;
   }
@@ -104,7 +105,7 @@ void add(Scans& scans, const Cloud& cloud) {
 /// What the server sends while it maps, taken as rviz2 and tf2_ros ask for it.
 class Listener {
  public:
-  Listener(const Participant& participant, const std::string& server)
+  Listener(const dds::Participant& participant, const std::string& server)
       : prefix_("rt/" + server + "/"),
         odometry_(participant, prefix_ + "odometry", {.depth = 1000}),
         tf_(participant, "rt/tf", {.depth = 100}),
@@ -133,9 +134,9 @@ class Listener {
 
  private:
   std::string prefix_;
-  Reader<Odometry> odometry_;
-  Reader<Transforms> tf_;
-  Reader<Cloud> scan_;
+  dds::Reader<Odometry> odometry_;
+  dds::Reader<Transforms> tf_;
+  dds::Reader<Cloud> scan_;
   Poses from_odometry_, from_tf_;
   Scans scans_;
 };
@@ -154,11 +155,11 @@ void publish_all(Lidar& lidar, Listener& listener) {
 
 }  // namespace
 
-int drive(const Place& place, const std::filesystem::path& recording) {
-  const Participant participant(place.domain_id);
+int play_sequence(const ServerAddress& address, const std::filesystem::path& recording) {
+  const dds::Participant participant(address.domain_id);
   Lidar lidar(participant, recording);
-  Listener listener(participant, place.server);
-  if (!wait_until([&] { return lidar.is_matched() && listener.is_matched(); }, patience)) {
+  Listener listener(participant, address.server);
+  if (!wait_until([&] { return lidar.is_matched() && listener.is_matched(); }, discovery_timeout)) {
     throw std::runtime_error("no server found");
   }
   publish_all(lidar, listener);
@@ -166,7 +167,7 @@ int drive(const Place& place, const std::filesystem::path& recording) {
     listener.take();
     return listener.has_poses(lidar.scans());
   };
-  const bool has_all = wait_until(is_complete, patience);
+  const bool has_all = wait_until(is_complete, discovery_timeout);
   Line("rt/points").add("published", lidar.scans());
   listener.print();
   return has_all ? 0 : 1;

@@ -12,7 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-constexpr auto patience = 60s;
+constexpr auto discovery_timeout = 60s;
 constexpr std::uint8_t format_version = 4;
 
 // C structures of idlc's want pointers that they could write through.
@@ -32,15 +32,16 @@ Region everywhere() {
 /// Asks each service once and prints a line of what came.
 class Questions {
  public:
-  explicit Questions(const Place& place) : place_(place), participant_(place.domain_id) {}
+  explicit Questions(const ServerAddress& address)
+      : address_(address), participant_(address.domain_id) {}
 
   /// `add` puts what the reply says on the line. No answer at all is a line that says so.
   template <typename Request, typename Reply>
-  void ask(const std::string& service, const Request& request,
-           const std::function<void(Line&, const Reply&)>& add) {
-    RmwClient<Request, Reply> client(participant_, place_.server + "/" + service);
-    const bool is_answered = client.wait_for_server(patience) &&
-                             client.ask(
+  void call(const std::string& service, const Request& request,
+            const std::function<void(Line&, const Reply&)>& add) {
+    RmwClient<Request, Reply> client(participant_, address_.server + "/" + service);
+    const bool is_answered = client.wait_for_server(discovery_timeout) &&
+                             client.call(
                                  request,
                                  [&](const Reply& reply) {
                                    Line line(service);
@@ -49,7 +50,7 @@ class Questions {
                                    }
                                    add(line, reply);
                                  },
-                                 patience);
+                                 discovery_timeout);
     if (is_answered) return;
     Line(service).add("answered", false);
     has_all_ = false;
@@ -58,8 +59,8 @@ class Questions {
   [[nodiscard]] bool has_all() const { return has_all_; }
 
  private:
-  Place place_;
-  Participant participant_;
+  ServerAddress address_;
+  dds::Participant participant_;
   bool has_all_ = true;
 };
 
@@ -225,8 +226,8 @@ void ask_for_rest(Questions& questions) {
 
 }  // namespace
 
-int ask_services(const Place& place) {
-  Questions questions(place);
+int ask_services(const ServerAddress& address) {
+  Questions questions(address);
   ask_for_status(questions);
   ask_for_map(questions);
   ask_for_tiles(questions);
