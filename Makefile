@@ -6,9 +6,11 @@ JOBS ?= $(shell nproc)
 FUZZ_JOBS ?= 2
 FUZZ_SECONDS ?= 600
 MINUTES ?= 30
+BASE ?= HEAD~1
+FILES ?=
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages build deb demo test test-dev test-tsan test-kill test-network test-docker image fuzz soak bench table1 ros-messages parity format format-check clean
+.PHONY: help packages configure programs build deb demo test test-dev test-tsan test-kill test-network test-docker tidy image fuzz soak bench table1 ros-messages parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -25,16 +27,21 @@ packages: ## Install the Debian packages that are missing
 	  DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -yq --no-install-recommends $$missing; \
 	fi
 
-build: packages ## Build everything in build/release (PRESET=dev, tsan for others)
+configure: packages
 	cmake --preset $(PRESET) $(CMAKE_OPTIONS)
+
+programs: configure ## Build what users run, in build/release: stillmap and stillmap-server
+	cmake --build --preset $(PRESET) -j $(JOBS) --target programs
+
+build: configure ## Build everything: programs, tests, benchmarks (PRESET=dev, tsan for others)
 	cmake --build --preset $(PRESET) -j $(JOBS)
 
-deb: build ## Debian packages in build/release/packages
+deb: programs ## Debian packages in build/release/packages
 	cpack --config $(BUILD)/CPackConfig.cmake -B $(BUILD)/packages -G DEB
 	rm -rf $(BUILD)/packages/_CPack_Packages
 	@ls -lh $(BUILD)/packages
 
-demo: build ## Run the main job: simulated city, replay over DDS, server, planning client
+demo: programs ## Run the main job: simulated city, replay over DDS, server, planning client
 	BUILD=$(BUILD) clients/demo.sh
 
 test: build ## Build and run the tests
@@ -69,7 +76,7 @@ soak: build ## A server at 10 Hz for MINUTES=30, clients coming and going, dying
 bench: build ## Benchmarks of every stage
 	@for b in $(BUILD)/tests/bench/*_bench; do echo "== $$b"; $$b || exit 1; done
 
-table1: build ## The paper's Table I on simulated streets, crowded and quiet
+table1: programs ## The paper's Table I on simulated streets, crowded and quiet
 	$(BUILD)/bin/stillmap evaluate weightings sim:crowd --seed 2 --scans 480
 	$(BUILD)/bin/stillmap evaluate weightings sim:quiet --seed 1 --scans 500
 
@@ -79,6 +86,9 @@ ros-messages: ## Write config/ros/stillmap_msgs from idl/msg
 parity: build ## Our engines against PyTorch, every RangeNet++ network and size
 	PYTHONPATH=core/segmentation/training STILLMAP_TRAINING=core/segmentation/training \
 	  STILLMAP=$(BUILD)/bin/stillmap /usr/bin/python3 tests/training/parity.py
+
+tidy: programs ## clang-tidy over the sources changed since BASE (the commit before last), or over FILES
+	@BUILD=$(BUILD) BASE=$(BASE) FILES="$(FILES)" tests/tidy.sh
 
 format: ## Format the code
 	git ls-files '*.cpp' '*.hpp' | xargs clang-format -i
