@@ -1,6 +1,7 @@
-#include "core/simulation/buildings.hpp"
-
+#include <algorithm>
 #include <cmath>
+
+#include "core/simulation/city_shapes.hpp"
 
 namespace stillmap::simulation {
 namespace {
@@ -66,7 +67,7 @@ void add_facade(Mesh& mesh, const Wall& wall, const BuildingPlan& plan, Random& 
   const int bays = std::max(1, static_cast<int>(wall.length_m / 2.9F));
   const float bay_m = wall.length_m / static_cast<float>(bays);
   const float height = floor_m * static_cast<float>(plan.floors);
-  const auto recess = static_cast<float>(random.uniform(0.12, 0.3));
+  const auto recess = random.between(0.12, 0.3);
   const bool pilasters = random.chance(0.5);
   const std::size_t door = random.index(static_cast<std::size_t>(bays));
   add_plate(mesh, wall, {0, wall.length_m, -foundation_m, 0}, 0, plan.wall);
@@ -105,7 +106,7 @@ void add_flat_roof(Mesh& mesh, float half_width, float half_depth, float height,
     add_box(mesh, {-half_width, y - 0.15F, height}, {half_width, y + 0.15F, height + 0.9F},
             Surface::plaster);
   }
-  const auto x = static_cast<float>(random.uniform(-0.5, 0.5)) * half_width;
+  const auto x = random.between(-0.5, 0.5) * half_width;
   add_box(mesh, {x - 1.5F, -1.5F, height}, {x + 1.5F, 1.5F, height + 2.5F}, Surface::brick);
 }
 
@@ -125,6 +126,83 @@ void add_gabled_roof(Mesh& mesh, float half_width, float half_depth, float heigh
   }
   add_box(mesh, {0.4F * half_width, 0.5F, height}, {0.4F * half_width + 0.7F, 1.2F, ridge + 0.8F},
           Surface::brick);
+}
+
+// A roof on two posts over some steps.
+void add_porch(Mesh& house, float x, float front, Random& random) {
+  const float depth = random.between(0.8, 2.0);
+  const float half = random.between(0.7, 1.4);
+  add_box(house, {x - half, front - depth, 2.4F}, {x + half, front, 2.6F}, Surface::roof);
+  for (const float side : {-half + 0.1F, half - 0.1F}) {
+    add_tube(house,
+             {{x + side, front - depth + 0.1F, -0.3F},
+              {x + side, front - depth + 0.1F, 2.4F},
+              0.06F,
+              0.06F,
+              6},
+             Surface::plaster);
+  }
+}
+
+void add_steps(Mesh& house, float x, float front, Random& random) {
+  const std::size_t steps = 1 + random.index(4);
+  const float half = random.between(0.5, 1.0);
+  for (std::size_t i = 0; i < steps; ++i) {
+    const auto n = static_cast<float>(i);
+    const auto rest = static_cast<float>(steps) - n;
+    add_box(house, {x - half, front - 0.3F * rest, -0.5F}, {x + half, front, 0.17F * (n + 1.0F)},
+            Surface::other_structure);
+  }
+  if (!random.chance(0.5)) return;
+  const float way = 0.3F * static_cast<float>(steps);
+  for (const float side : {-half, half}) {
+    add_tube(house, {{x + side, front - way, 0.9F}, {x + side, front, 1.5F}, 0.02F, 0.02F, 4},
+             Surface::other_structure);
+    add_tube(house,
+             {{x + side, front - way, -0.3F}, {x + side, front - way, 0.9F}, 0.02F, 0.02F, 4},
+             Surface::other_structure);
+  }
+}
+
+void add_bay_window(Mesh& house, const BuildingPlan& plan, float x, float front, Random& random) {
+  const float depth = random.between(0.4, 1.2);
+  const float half = random.between(0.9, 1.8);
+  const float top =
+      floor_m * static_cast<float>(1 + random.index(static_cast<std::size_t>(plan.floors)));
+  add_box(house, {x - half, front - depth, -1.0F}, {x + half, front, top - 0.2F}, plan.wall);
+  add_box(house, {x - half + 0.2F, front - depth - 0.02F, 0.9F},
+          {x + half - 0.2F, front - depth - 0.01F, 2.3F}, Surface::window);
+}
+
+void add_garage(Mesh& house, float x, float front, Random& random) {
+  const float half = random.between(1.4, 2.8);
+  const float ahead = random.between(0.3, 2.5);
+  add_box(house, {x - half, front - ahead, -1.0F}, {x + half, front, 2.5F}, Surface::plaster);
+  add_box(house, {x - half + 0.2F, front - ahead - 0.03F, 0.0F},
+          {x + half - 0.2F, front - ahead - 0.01F, 2.1F}, Surface::plaster);
+  add_box(house, {x - half - 0.2F, front - ahead - 0.3F, 2.5F}, {x + half + 0.2F, front, 2.7F},
+          Surface::roof);
+}
+
+// What is built onto the front of a house: steps and a porch, a bay window, a garage, a rain pipe.
+void add_outbuildings(Mesh& house, const BuildingPlan& plan, Random& random) {
+  const float front = -0.5F * plan.depth_m;
+  const float reach = std::max(0.1F, 0.5F * plan.width_m - 2.0F);
+  const auto somewhere = [&] { return random.between(-reach, reach); };
+  if (random.chance(0.35)) add_porch(house, somewhere(), front, random);
+  if (random.chance(0.35)) add_steps(house, somewhere(), front, random);
+  if (random.chance(0.3)) add_bay_window(house, plan, somewhere(), front, random);
+  if (random.chance(0.2)) add_garage(house, somewhere(), front, random);
+  if (random.chance(0.4)) {  // A rain pipe.
+    const float x = somewhere();
+    add_tube(house,
+             {{x, front - 0.06F, 0},
+              {x, front - 0.06F, floor_m * static_cast<float>(plan.floors)},
+              0.05F,
+              0.05F,
+              6},
+             plan.wall);
+  }
 }
 
 }  // namespace

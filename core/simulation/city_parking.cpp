@@ -4,9 +4,9 @@
 #include <map>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include "core/simulation/city.hpp"
-#include "core/simulation/street_side.hpp"
 
 namespace stillmap::simulation {
 namespace {
@@ -77,10 +77,6 @@ class VehiclePark {
   }
 
  private:
-  struct Shapes {
-    std::size_t first, count;
-  };
-
   // Where vehicles stand beside a street.
   struct Bays {
     double middle_m;
@@ -100,12 +96,11 @@ class VehiclePark {
   }
 
   void add_shapes(ObjectKind kind, std::size_t count) {
-    shapes_[kind] = {city_.shapes.size(), count};
-    for (std::size_t i = 0; i < count; ++i) {
-      ObjectShape shape = make_object(kind, Random(random_.index(1U << 30U)), Variety::any);
+    shapes_[kind] = city_.add_shapes(count, [&] {
+      ObjectShape shape = make_object(kind, random_.fork(), Variety::any);
       lengths_m_[city_.shapes.size()] = shape.length_m;
-      city_.shapes.push_back(std::move(shape.mesh));
-    }
+      return std::move(shape.mesh);
+    });
   }
 
   [[nodiscard]] double share_taken() const {
@@ -123,10 +118,7 @@ class VehiclePark {
     return ObjectKind::car;
   }
 
-  std::size_t random_shape(ObjectKind kind) {
-    const Shapes& shapes = shapes_.at(kind);
-    return shapes.first + random_.index(shapes.count);
-  }
+  std::size_t random_shape(ObjectKind kind) { return shapes_.at(kind).draw(random_); }
 
   double lengthwise_room_m(std::size_t shape) {
     return std::max(random_.uniform(6.0, 6.8), lengths_m_.at(shape) + random_.uniform(0.5, 1.5));
@@ -164,13 +156,13 @@ class VehiclePark {
                             .T_map_body = ground_.leaning_frame_at(spot, heading, wheelbase_m),
                             .label = standing_label(kind),
                             .instance = city_.next_instance(),
-                            .brightness = static_cast<float>(random_.uniform(darkest, 1.5))});
+                            .brightness = random_.between(darkest, 1.5)});
   }
 
   City& city_;
   const GroundShape& ground_;
   Random random_;
-  std::map<ObjectKind, Shapes> shapes_;
+  std::map<ObjectKind, ShapeRange> shapes_;
   std::map<std::size_t, double> lengths_m_;
 };
 

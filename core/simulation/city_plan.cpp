@@ -87,6 +87,21 @@ std::vector<StreetPlan> streets(std::initializer_list<double> positions,
   return out;
 }
 
+void add_sides(std::vector<StreetSide>& sides, const std::vector<StreetPlan>& streets,
+               const std::vector<StreetPlan>& across, double margin, bool along_u) {
+  const double low = across.front().position_m - margin;
+  const double high = across.back().position_m + margin;
+  const Eigen::Vector2d way = along_u ? Eigen::Vector2d(1, 0) : Eigen::Vector2d(0, 1);
+  for (const StreetPlan& street : streets) {
+    const auto point = [&](double along) {
+      return along_u ? Eigen::Vector2d(along, street.position_m)
+                     : Eigen::Vector2d(street.position_m, along);
+    };
+    sides.push_back({street.profile, point(low), way, high - low});
+    sides.push_back({street.profile, point(high), -way, high - low});
+  }
+}
+
 }  // namespace
 
 std::string CityPlan::faults() const {
@@ -113,6 +128,13 @@ std::string CityPlan::faults() const {
     out += name + ": turn_radius_m is too small for the width of the route\n";
   }
   return out;
+}
+
+Eigen::Vector2d CityPlan::direction_at(const Eigen::Vector2d& crossing) const {
+  for (const StreetPlan& street : streets_along_u) {
+    if (std::abs(street.position_m - crossing.y()) < 0.1) return {1, 0};
+  }
+  return {0, 1};
 }
 
 CityPlan quiet_city() {
@@ -196,6 +218,13 @@ CityPlan city_plan(const std::string& name) {
     if (plan.name == name) return plan;
   }
   throw std::invalid_argument("There is no city plan '" + name + "'; take quiet, crowd or yard.");
+}
+
+std::vector<StreetSide> street_sides(const CityPlan& plan) {
+  std::vector<StreetSide> sides;
+  add_sides(sides, plan.streets_along_u, plan.streets_along_v, plan.margin_m, true);
+  add_sides(sides, plan.streets_along_v, plan.streets_along_u, plan.margin_m, false);
+  return sides;
 }
 
 }  // namespace stillmap::simulation

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -138,6 +139,8 @@ struct CityPlan {
 
   /// Every fault in words, one a line; empty when a city can be built.
   [[nodiscard]] std::string faults() const;
+  /// Unit vector along the street that a crossing of the route lies on.
+  [[nodiscard]] Eigen::Vector2d direction_at(const Eigen::Vector2d& crossing) const;
 };
 
 /// Narrow residential streets, many turns, parked cars, little traffic; 900 m round.
@@ -149,5 +152,20 @@ struct CityPlan {
 /// The plan of that name ("quiet", "crowd", "yard").
 /// @throws std::invalid_argument with the names that exist.
 [[nodiscard]] CityPlan city_plan(const std::string& name);
+
+/// One side of a street, seen in the direction in which its traffic goes; plan coordinates [m].
+struct StreetSide {
+  StreetProfile profile;
+  Eigen::Vector2d start, along;
+  double length_m;
+
+  [[nodiscard]] Eigen::Vector2d at(double along_m, double right_m) const {
+    return start + along_m * along + right_m * Eigen::Vector2d(along.y(), -along.x());
+  }
+  [[nodiscard]] double heading() const { return std::atan2(along.y(), along.x()); }
+};
+
+/// Both sides of every street, from margin to margin.
+[[nodiscard]] std::vector<StreetSide> street_sides(const CityPlan& plan);
 
 }  // namespace stillmap::simulation

@@ -3,10 +3,7 @@
 #include <numbers>
 
 #include "core/simulation/city.hpp"
-#include "core/simulation/street_furniture.hpp"
-#include "core/simulation/street_objects.hpp"
-#include "core/simulation/street_side.hpp"
-#include "core/simulation/vegetation.hpp"
+#include "core/simulation/city_shapes.hpp"
 
 namespace stillmap::simulation {
 namespace {
@@ -19,21 +16,13 @@ constexpr double quarter_turn = 0.5 * std::numbers::pi;
 class StreetFurnisher {
  public:
   StreetFurnisher(City& city, const GroundShape& ground, Random random)
-      : city_(city),
-        ground_(ground),
-        many_(ground.plan().many_shapes),
-        random_(random),
-        first_tree_(city.shapes.size()) {
-    for (std::size_t i = 0; i < tree_shapes; ++i) {
-      city.shapes.push_back(many_ ? make_any_tree(fork()) : make_tree(fork()));
-    }
+      : city_(city), ground_(ground), many_(ground.plan().many_shapes), random_(random) {
+    trees_ = city.add_shapes(
+        6, [&] { return many_ ? make_any_tree(random_.fork()) : make_tree(random_.fork()); });
     if (!many_) return;
-    first_bush_ = city.shapes.size();
-    for (std::size_t i = 0; i < bush_shapes; ++i) city.shapes.push_back(make_any_bush(fork()));
-    first_person_ = city.shapes.size();
-    for (std::size_t i = 0; i < person_shapes; ++i) {
-      city.shapes.push_back(make_object(ObjectKind::person, fork()).mesh);
-    }
+    bushes_ = city.add_shapes(4, [&] { return make_any_bush(random_.fork()); });
+    people_ =
+        city.add_shapes(6, [&] { return make_object(ObjectKind::person, random_.fork()).mesh; });
   }
 
   void furnish(const StreetSide& side) {
@@ -48,28 +37,25 @@ class StreetFurnisher {
     const double kerb = side.profile.half_road_m() + 0.45;
     const double facing = side.heading() + std::numbers::pi - quarter_turn;
     place(make_traffic_light(), side.at(-3.4, kerb), facing);
-    place(many_ ? make_any_sign(fork()) : make_sign(fork()), side.at(-2.2, kerb), facing);
+    place(many_ ? make_any_sign(random_.fork()) : make_sign(random_.fork()), side.at(-2.2, kerb),
+          facing);
     for (const double at : {-4.6, 3.0, 4.6}) place(make_bollard(), side.at(at, kerb), facing);
   }
 
  private:
-  static constexpr std::size_t tree_shapes = 6;
-  static constexpr std::size_t bush_shapes = 4;
-  static constexpr std::size_t person_shapes = 6;
-
   void light_and_sign(const StreetSide& side) {
     const double kerb = side.profile.half_road_m() + 0.4;
     for (double at = random_.uniform(4.0, 16.0); at < side.length_m;
          at += random_.uniform(24.0, 30.0)) {
       if (!is_pavement(side.at(at, kerb))) continue;
-      place(many_ ? make_any_street_light(fork()) : make_street_light(), side.at(at, kerb),
+      place(many_ ? make_any_street_light(random_.fork()) : make_street_light(), side.at(at, kerb),
             side.heading() + quarter_turn);
     }
     const double spread = many_ ? 0.8 : 0.1;
     for (double at = random_.uniform(8.0, 25.0); at < side.length_m;
          at += many_ ? random_.uniform(6.0, 30.0) : random_.uniform(18.0, 40.0)) {
       if (!is_pavement(side.at(at, kerb))) continue;
-      place(many_ ? make_any_sign(fork()) : make_sign(fork()), side.at(at, kerb),
+      place(many_ ? make_any_sign(random_.fork()) : make_sign(random_.fork()), side.at(at, kerb),
             side.heading() + quarter_turn + random_.uniform(-spread, spread));
     }
   }
@@ -85,15 +71,15 @@ class StreetFurnisher {
       if (kind < 0.45) {
         add_pole_row(side, at, random_.chance(0.7) ? kerb : back);
       } else if (kind < 0.9) {
-        place_on_pavement(make_street_object(fork()), side.at(at, back), heading);
+        place_on_pavement(make_street_object(random_.fork()), side.at(at, back), heading);
       } else if (side.profile.sidewalk_m > 2.5) {
-        place_on_pavement(make_shelter(fork()), side.at(at, back - 0.6), heading);
+        place_on_pavement(make_shelter(random_.fork()), side.at(at, back - 0.6), heading);
       }
     }
   }
 
   void add_pole_row(const StreetSide& side, double at, double right_m) {
-    const Mesh pole = make_any_pole(fork());
+    const Mesh pole = make_any_pole(random_.fork());
     const std::size_t count = 1 + random_.index(5);
     const double step = random_.uniform(1.2, 2.5);
     for (std::size_t i = 0; i < count; ++i) {
@@ -120,11 +106,11 @@ class StreetFurnisher {
   }
 
   void stand(const Vector2d& spot, double heading) {
-    city_.bodies.push_back({.shape = first_person_ + random_.index(person_shapes),
+    city_.bodies.push_back({.shape = people_.draw(random_),
                             .T_map_body = ground_.frame_at(spot, heading),
                             .label = standing_label(ObjectKind::person),
                             .instance = city_.next_instance(),
-                            .brightness = static_cast<float>(random_.uniform(0.25, 1.5))});
+                            .brightness = random_.between(0.25, 1.5)});
   }
 
   void plant_trees(const StreetSide& side) {
@@ -133,7 +119,7 @@ class StreetFurnisher {
     for (double at = 3.0; at < side.length_m; at += spacing * random_.uniform(0.8, 1.2)) {
       const Vector2d spot = side.at(at, middle);
       if (ground_.zone(spot) != Zone::verge) continue;
-      city_.bodies.push_back({.shape = first_tree_ + random_.index(tree_shapes),
+      city_.bodies.push_back({.shape = trees_.draw(random_),
                               .T_map_body = ground_.frame_at(spot, random_.uniform(0.0, 6.28))});
     }
   }
@@ -148,7 +134,7 @@ class StreetFurnisher {
          at += random_.chance(0.1) ? random_.uniform(5.0, 30.0) : random_.uniform(0.6, 2.0)) {
       const Vector2d spot = side.at(at, right + random_.uniform(-0.3, 0.3));
       if (ground_.zone(spot) != (verge ? Zone::verge : Zone::lot)) continue;
-      city_.bodies.push_back({.shape = first_bush_ + random_.index(bush_shapes),
+      city_.bodies.push_back({.shape = bushes_.draw(random_),
                               .T_map_body = ground_.frame_at(spot, random_.uniform(0.0, 6.28))});
     }
   }
@@ -167,23 +153,12 @@ class StreetFurnisher {
     return zone == Zone::sidewalk || zone == Zone::verge || (many_ && zone == Zone::lot);
   }
 
-  Random fork() { return Random(random_.index(1U << 30U)); }
-
   City& city_;
   const GroundShape& ground_;
   bool many_;
   Random random_;
-  std::size_t first_tree_;
-  std::size_t first_bush_ = 0;
-  std::size_t first_person_ = 0;
+  ShapeRange trees_, bushes_, people_;
 };
-
-Vector2d direction_at(const CityPlan& plan, const Vector2d& crossing) {
-  for (const StreetPlan& street : plan.streets_along_u) {
-    if (std::abs(street.position_m - crossing.y()) < 0.1) return {1, 0};
-  }
-  return {0, 1};
-}
 
 }  // namespace
 
@@ -192,7 +167,7 @@ void furnish_streets(City& city, const GroundShape& ground, Random random) {
   StreetFurnisher furnisher(city, ground, random);
   for (const StreetSide& side : street_sides(plan)) furnisher.furnish(side);
   for (const Vector2d& crossing : plan.crossings) {
-    const Vector2d along = direction_at(plan, crossing);
+    const Vector2d along = plan.direction_at(crossing);
     for (const Vector2d& way : {along, Vector2d(-along)}) {
       furnisher.equip_crossing({plan.route_profile, crossing, way, 0.0});
     }

@@ -5,23 +5,10 @@
 #include <cmath>
 
 #include "core/simulation/city.hpp"
-#include "core/simulation/ground_shape.hpp"
 #include "core/simulation/ray_scene.hpp"
 
 namespace stillmap::simulation {
 namespace {
-
-std::vector<const Mesh*> meshes_of(const City& city) {
-  std::vector<const Mesh*> meshes{&city.fixed};
-  for (const Mesh& shape : city.shapes) meshes.push_back(&shape);
-  return meshes;
-}
-
-std::vector<StandingMesh> standing_in(const City& city) {
-  std::vector<StandingMesh> standing{{0, Eigen::Isometry3d::Identity()}};
-  for (const Body& body : city.bodies) standing.push_back({body.shape + 1, body.T_map_body});
-  return standing;
-}
 
 /// The class that the lidar's points on it have.
 SemanticClass class_of(Zone zone, const CityPlan& plan) {
@@ -49,7 +36,7 @@ struct CityTruth::World {
   explicit World(const SimulationConfig& config)
       : ground(config.plan, config.seed),
         city(build_city(ground, config.seed)),
-        scene(meshes_of(city), standing_in(city)),
+        scene(city.meshes(), city.standing_meshes()),
         standing(scene.with({})) {}
 
   [[nodiscard]] Eigen::Vector2d plan_of(const Eigen::Vector2d& spot_city) const;

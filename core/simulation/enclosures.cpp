@@ -1,13 +1,11 @@
-#include "core/simulation/enclosures.hpp"
+#include "core/simulation/city_shapes.hpp"
 
 namespace stillmap::simulation {
 namespace {
 
+// Foot of fences and walls, and of the plain ones [m].
 constexpr float buried_m = -0.5F;
-
-float between(Random& random, double low, double high) {
-  return static_cast<float>(random.uniform(low, high));
-}
+constexpr float shallow_m = -0.3F;
 
 void add_posts(Mesh& mesh, float length_m, float height, float radius, Surface surface) {
   for (float x = 0.0F; x < length_m - 0.1F; x += 0.5F * length_m) {
@@ -21,7 +19,7 @@ void add_bar(Mesh& mesh, float length_m, float z, float half, Surface surface) {
 
 // Beams find the wires or the holes between them: scraps that cover a share of the field.
 void add_wire_mesh(Mesh& mesh, float length_m, float height, Random& random) {
-  const float cover = between(random, 0.25, 0.7);
+  const float cover = random.between(0.25, 0.7);
   constexpr float cell_m = 0.07F;
   for (float x = 0.0F; x < length_m; x += cell_m) {
     for (float z = 0.05F; z < height; z += cell_m) {
@@ -34,8 +32,8 @@ void add_wire_mesh(Mesh& mesh, float length_m, float height, Random& random) {
 }
 
 void add_pickets(Mesh& mesh, float length_m, float height, Random& random) {
-  const float board = between(random, 0.05, 0.16);
-  const float gap = between(random, 0.0, 0.12);
+  const float board = random.between(0.05, 0.16);
+  const float gap = random.between(0.0, 0.12);
   for (float x = 0.0F; x + board < length_m; x += board + gap) {
     add_box(mesh, {x, -0.01F, 0.06F}, {x + board, 0.01F, height}, Surface::fence_wood);
   }
@@ -47,8 +45,8 @@ void add_pickets(Mesh& mesh, float length_m, float height, Random& random) {
 }
 
 void add_planks(Mesh& mesh, float length_m, float height, Random& random) {
-  const float board = between(random, 0.1, 0.2);
-  const float gap = between(random, 0.0, 0.2);
+  const float board = random.between(0.1, 0.2);
+  const float gap = random.between(0.0, 0.2);
   for (float z = 0.1F; z + board < height; z += board + gap) {
     add_box(mesh, {0, -0.015F, z}, {length_m, 0.015F, z + board}, Surface::fence_wood);
   }
@@ -56,8 +54,8 @@ void add_planks(Mesh& mesh, float length_m, float height, Random& random) {
 }
 
 void add_railing(Mesh& mesh, float length_m, float height, Random& random) {
-  const float step = between(random, 0.1, 0.2);
-  const float rod = between(random, 0.008, 0.02);
+  const float step = random.between(0.1, 0.2);
+  const float rod = random.between(0.008, 0.02);
   for (float x = 0.0F; x < length_m; x += step) {
     add_box(mesh, {x - rod, -rod, 0.1F}, {x + rod, rod, height}, Surface::fence_metal);
   }
@@ -67,7 +65,7 @@ void add_railing(Mesh& mesh, float length_m, float height, Random& random) {
 }
 
 void add_rails(Mesh& mesh, float length_m, float height, Random& random) {
-  const float half = between(random, 0.02, 0.08);
+  const float half = random.between(0.02, 0.08);
   for (const float part : {0.5F, 0.95F}) {
     add_bar(mesh, length_m, part * height, half, Surface::fence_metal);
   }
@@ -77,7 +75,7 @@ void add_rails(Mesh& mesh, float length_m, float height, Random& random) {
 // A band of steel on posts, or concrete that widens towards its foot.
 void add_crash_barrier(Mesh& mesh, float length_m, Random& random) {
   if (random.chance(0.6)) {
-    const float low = between(random, 0.35, 0.55);
+    const float low = random.between(0.35, 0.55);
     for (const float y : {-0.06F, 0.02F}) {
       add_box(mesh, {0, y, low}, {length_m, y + 0.04F, low + 0.14F}, Surface::fence_metal);
       add_box(mesh, {0, y, low + 0.17F}, {length_m, y + 0.04F, low + 0.31F}, Surface::fence_metal);
@@ -94,9 +92,39 @@ void add_crash_barrier(Mesh& mesh, float length_m, Random& random) {
 
 }  // namespace
 
+Mesh make_wooden_fence(float length_m) {
+  Mesh mesh;
+  add_box(mesh, {0, -0.05F, shallow_m}, {0.1F, 0.05F, 1.35F}, Surface::fence_wood);
+  for (float x = 0.1F; x + 0.05F < length_m; x += 0.2F) {
+    add_box(mesh, {x, -0.01F, 0.08F}, {x + 0.13F, 0.01F, 1.25F}, Surface::fence_wood);
+  }
+  for (const float z : {0.3F, 1.0F}) {
+    add_box(mesh, {0, -0.04F, z}, {length_m, -0.01F, z + 0.08F}, Surface::fence_wood);
+  }
+  return mesh;
+}
+
+Mesh make_railing(float length_m) {
+  Mesh mesh;
+  add_box(mesh, {0, -0.04F, shallow_m}, {0.08F, 0.04F, 1.5F}, Surface::fence_metal);
+  add_box(mesh, {0, -0.1F, shallow_m}, {length_m, 0.1F, 0.3F}, Surface::fence_metal);
+  for (float x = 0.12F; x < length_m; x += 0.12F) {
+    add_box(mesh, {x, -0.015F, 0.3F}, {x + 0.03F, 0.015F, 1.45F}, Surface::fence_metal);
+  }
+  add_box(mesh, {0, -0.025F, 1.4F}, {length_m, 0.025F, 1.45F}, Surface::fence_metal);
+  return mesh;
+}
+
+Mesh make_garden_wall(float length_m) {
+  Mesh mesh;
+  add_box(mesh, {0, -0.12F, shallow_m}, {length_m, 0.12F, 1.1F}, Surface::garden_wall);
+  add_box(mesh, {0, -0.18F, shallow_m}, {0.36F, 0.18F, 1.35F}, Surface::garden_wall);
+  return mesh;
+}
+
 Mesh make_any_fence(float length_m, Random random) {
   Mesh mesh;
-  const float height = between(random, 0.8, random.chance(0.5) ? 2.4 : 1.6);
+  const float height = random.between(0.8, random.chance(0.5) ? 2.4 : 1.6);
   if (random.chance(0.2)) {
     add_box(mesh, {0, -0.1F, buried_m}, {length_m, 0.1F, 0.25F * height}, Surface::garden_wall);
   }
@@ -124,8 +152,8 @@ Mesh make_any_fence(float length_m, Random random) {
 
 Mesh make_any_wall(float length_m, Random random) {
   Mesh mesh;
-  const float height = between(random, 0.4, random.chance(0.5) ? 2.8 : 1.5);
-  const float half = between(random, 0.08, 0.22);
+  const float height = random.between(0.4, random.chance(0.5) ? 2.8 : 1.5);
+  const float half = random.between(0.08, 0.22);
   add_box(mesh, {0, -half, buried_m - 1.0F}, {length_m, half, height}, Surface::garden_wall);
   if (random.chance(0.4)) {
     const float pier = half + 0.06F;

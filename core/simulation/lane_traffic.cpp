@@ -3,11 +3,45 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 namespace stillmap::simulation {
 namespace {
 
-struct Mover {
+using Eigen::Vector2d;
+
+constexpr double step_m = 0.25;
+
+Vector2d right_of(const Vector2d& along) { return {along.y(), -along.x()}; }
+
+double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
+
+// Points every `step_m` of the map along the closed polygon.
+std::vector<Vector2d> resample(const GroundShape& ground, const std::vector<Vector2d>& corners) {
+  std::vector<Vector2d> fine;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const Vector2d way = corners[(i + 1) % corners.size()] - corners[i];
+    const int pieces = std::max(1, static_cast<int>(std::ceil(way.norm() / 0.1)));
+    for (int k = 0; k < pieces; ++k) fine.push_back(corners[i] + way * k / pieces);
+  }
+  std::vector<double> arc{0.0};
+  for (std::size_t i = 0; i < fine.size(); ++i) {
+    const Vector2d& next = fine[(i + 1) % fine.size()];
+    arc.push_back(arc.back() + (ground.to_map(next) - ground.to_map(fine[i])).norm());
+  }
+  const auto count = static_cast<std::size_t>(std::lround(arc.back() / step_m));
+  std::vector<Vector2d> out;
+  std::size_t at = 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double wanted = arc.back() * static_cast<double>(i) / static_cast<double>(count);
+    while (arc[at + 1] <= wanted) ++at;
+    const double part = (wanted - arc[at]) / (arc[at + 1] - arc[at]);
+    out.push_back(fine[at] + part * (fine[(at + 1) % fine.size()] - fine[at]));
+  }
+  return out;
+}
+
+struct MotionState {
   double position_m, speed_mps;
 };
 
@@ -52,28 +86,93 @@ double idm(const DriverModel& model, double speed, double desired_speed_mps, dou
   return model.acceleration_mps2 * (free - follow);
 }
 
-void advance(Mover& mover, double acceleration_mps2) {
+void advance(MotionState& state, double acceleration_mps2) {
   constexpr double hardest_braking_mps2 = -8.0;
   const double change = Track::step_s * std::max(acceleration_mps2, hardest_braking_mps2);
-  const double speed = std::max(0.0, mover.speed_mps + change);
-  mover.position_m += 0.5 * (mover.speed_mps + speed) * Track::step_s;
-  mover.speed_mps = speed;
+  const double speed = std::max(0.0, state.speed_mps + change);
+  state.position_m += 0.5 * (state.speed_mps + speed) * Track::step_s;
+  state.speed_mps = speed;
 }
 
 // Distance to the nearest red line that can still be respected.
-double gap_to_red(const Path& lane, const Mover& mover, double half_length_m,
+double gap_to_red(const Path& lane, const MotionState& state, double half_length_m,
                   const std::vector<StopLine>& stops, double time_s) {
   double best = std::numeric_limits<double>::infinity();
   for (const StopLine& stop : stops) {
     if (!stop.light.is_red(time_s)) continue;
-    const double gap = lane.wrapped(stop.position_m - mover.position_m) - half_length_m;
-    const bool can_stop = gap > 0.0 && mover.speed_mps * mover.speed_mps < 2.0 * 4.0 * gap;
+    const double gap = lane.wrapped(stop.position_m - state.position_m) - half_length_m;
+    const bool can_stop = gap > 0.0 && state.speed_mps * state.speed_mps < 2.0 * 4.0 * gap;
     if (can_stop && gap < 80.0) best = std::min(best, gap);
   }
   return best;
 }
 
 }  // namespace
+
+Path::Path(const GroundShape& ground, const std::vector<Vector2d>& corners_plan) {
+  const std::vector<Vector2d> points = resample(ground, corners_plan);
+  const std::size_t n = points.size();
+  const auto map = [&](std::size_t i) { return ground.to_map(points[i % n]); };
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vector2d before = map(i) - map(i + n - 4);
+    const Vector2d after = map(i + 4) - map(i);
+    const double angle = std::abs(std::atan2(cross(before, after), before.dot(after)));
+    const double arc = 0.5 * (before.norm() + after.norm());
+    length_m_ += (map(i + 1) - map(i)).norm();
+    samples_.push_back(
+        {points[i], (points[(i + 1) % n] - points[(i + n - 1) % n]).normalized(), angle / arc});
+  }
+}
+
+double Path::wrapped(double position_m) const {
+  const double rest = std::fmod(position_m, length_m_);
+  return rest < 0.0 ? rest + length_m_ : rest;
+}
+
+Path::Spot Path::at(double position_m) const {
+  const std::size_t n = samples_.size();
+  const double index = wrapped(position_m) / length_m_ * static_cast<double>(n);
+  const auto low = std::min(static_cast<std::size_t>(index), n - 1);
+  const double part = index - static_cast<double>(low);
+  const Sample& a = samples_[low];
+  const Sample& b = samples_[(low + 1) % n];
+  const Vector2d along = (1.0 - part) * a.along_plan + part * b.along_plan;
+  return {(1.0 - part) * a.plan + part * b.plan, std::atan2(along.y(), along.x())};
+}
+
+double Path::curvature(double position_m) const {
+  const double index = wrapped(position_m) / length_m_ * static_cast<double>(samples_.size());
+  return samples_[std::min(static_cast<std::size_t>(index), samples_.size() - 1)].curvature;
+}
+
+double Path::nearest(const Vector2d& spot_plan) const {
+  const auto best = std::ranges::min_element(
+      samples_, {}, [&](const Sample& sample) { return (sample.plan - spot_plan).squaredNorm(); });
+  return length_m_ * static_cast<double>(best - samples_.begin()) /
+         static_cast<double>(samples_.size());
+}
+
+Path route_path(const GroundShape& ground, bool reversed, double offset_m,
+                std::optional<double> turn_radius_m) {
+  std::vector<Vector2d> corners = ground.plan().route;
+  if (reversed) std::ranges::reverse(corners);
+  const std::size_t n = corners.size();
+  std::vector<Vector2d> points;
+  for (std::size_t i = 0; i < n; ++i) {
+    const Vector2d in = (corners[i] - corners[(i + n - 1) % n]).normalized();
+    const Vector2d out = (corners[(i + 1) % n] - corners[i]).normalized();
+    const Vector2d corner = corners[i] + offset_m * (right_of(in) + right_of(out));
+    const double to_left = cross(in, out);
+    const double radius = turn_radius_m.value_or(ground.plan().turn_radius_m + to_left * offset_m);
+    const Vector2d centre = corner - radius * in + radius * out;
+    constexpr int pieces = 24;
+    for (int k = 0; k <= pieces; ++k) {
+      const double turn = 0.5 * std::numbers::pi * k / pieces;
+      points.push_back(centre + radius * (std::sin(turn) * in - std::cos(turn) * out));
+    }
+  }
+  return {ground, points};
+}
 
 Track::Place Track::place_at(double time_s) const {
   const double index =
@@ -109,32 +208,32 @@ std::vector<Track> drive_lane(const Path& lane, const std::vector<LaneUser>& use
                               TimeSpan span) {
   const CurveLimit curves(lane, model.lateral_acceleration_mps2);
   std::vector<Track> tracks(users.size(), Track(span.from_s));
-  std::vector<Mover> movers;
+  std::vector<MotionState> states;
   for (const LaneUser& user : users) {
-    movers.push_back(
+    states.push_back(
         {user.start_m, std::min(0.6 * user.desired_speed_mps, curves.at(user.start_m))});
   }
   const auto acceleration = [&](std::size_t i, double time_s) {
     const std::size_t next = (i + 1) % users.size();
-    const Mover& mover = movers[i];
+    const MotionState& state = states[i];
     const double desired_speed_mps =
-        std::min(users[i].desired_speed_mps, curves.at(mover.position_m));
-    const double apart = lane.wrapped(movers[next].position_m - mover.position_m);
+        std::min(users[i].desired_speed_mps, curves.at(state.position_m));
+    const double apart = lane.wrapped(states[next].position_m - state.position_m);
     const double bodies = 0.5 * (users[i].length_m + users[next].length_m);
     const double gap = next == i ? std::numeric_limits<double>::infinity() : apart - bodies;
-    const double red = gap_to_red(lane, mover, 0.5 * users[i].length_m, stops, time_s);
+    const double red = gap_to_red(lane, state, 0.5 * users[i].length_m, stops, time_s);
     // The front may come closer to the line than to a vehicle.
-    return std::min(idm(model, mover.speed_mps, desired_speed_mps, gap, movers[next].speed_mps),
-                    idm(model, mover.speed_mps, desired_speed_mps, red + 1.5, 0.0));
+    return std::min(idm(model, state.speed_mps, desired_speed_mps, gap, states[next].speed_mps),
+                    idm(model, state.speed_mps, desired_speed_mps, red + 1.5, 0.0));
   };
   const auto steps = static_cast<int>(std::ceil((span.to_s - span.from_s) / Track::step_s)) + 1;
   std::vector<double> accelerations(users.size());
   for (int step = 0; step < steps; ++step) {
     for (std::size_t i = 0; i < users.size(); ++i) {
-      tracks[i].add(movers[i].position_m, movers[i].speed_mps);
+      tracks[i].add(states[i].position_m, states[i].speed_mps);
       accelerations[i] = acceleration(i, span.from_s + step * Track::step_s);
     }
-    for (std::size_t i = 0; i < users.size(); ++i) advance(movers[i], accelerations[i]);
+    for (std::size_t i = 0; i < users.size(); ++i) advance(states[i], accelerations[i]);
   }
   return tracks;
 }

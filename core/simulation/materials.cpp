@@ -1,6 +1,7 @@
 #include "core/simulation/materials.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace stillmap::simulation {
@@ -15,24 +16,55 @@ double shade(const Eigen::Vector3f& spot_map, double size_m) {
 }
 
 void draw_pile(Materials& materials, Surface surface, double min_m, double max_m, Random& random) {
-  materials.properties[static_cast<std::size_t>(surface)].pile_m =
-      static_cast<float>(random.uniform(min_m, max_m));
+  materials.properties[static_cast<std::size_t>(surface)].pile_m = random.between(min_m, max_m);
 }
 
 void draw_lost(Materials& materials, Surface surface, double min_lost, double max_lost,
                Random& random) {
-  materials.properties[static_cast<std::size_t>(surface)].lost =
-      static_cast<float>(random.uniform(min_lost, max_lost));
+  materials.properties[static_cast<std::size_t>(surface)].lost = random.between(min_lost, max_lost);
 }
 
 // Water mirrors most beams away.
 void wet(Materials& materials, Random& random) {
   for (const Surface surface : {Surface::asphalt, Surface::parking_bay, Surface::lane_marking}) {
     SurfaceProperties& properties = materials.properties[static_cast<std::size_t>(surface)];
-    properties.lost = static_cast<float>(random.uniform(0.05, 0.35));
-    properties.reflectivity *= static_cast<float>(random.uniform(0.3, 0.8));
+    properties.lost = random.between(0.05, 0.35);
+    properties.reflectivity *= random.between(0.3, 0.8);
   }
 }
+
+// In the order of the enumeration.
+constexpr std::array<SurfaceProperties, surface_count> table{{
+    {40, 0.20F},        // asphalt
+    {60, 0.60F},        // lane_marking
+    {44, 0.26F},        // parking_bay
+    {48, 0.36F},        // pavement
+    {48, 0.42F},        // kerb
+    {72, 0.48F},        // grass
+    {50, 0.60F},        // plaster
+    {50, 0.35F},        // brick
+    {50, 0.09F, 0.4F},  // window
+    {50, 0.30F},        // roof
+    {51, 0.40F},        // fence_wood
+    {51, 0.30F},        // fence_metal
+    {51, 0.50F},        // garden_wall
+    {70, 0.45F},        // leaves
+    {70, 0.40F},        // hedge
+    {71, 0.30F},        // bark
+    {80, 0.40F},        // pole
+    {81, 2.00F},        // sign_face
+    {81, 0.35F},        // sign_back
+    {49, 0.30F},        // gravel
+    {51, 0.30F},        // fence_mesh
+    {99, 0.40F},        // street_object
+    {52, 0.40F},        // other_structure
+    {0, 0.50F},         // paint
+    {0, 0.07F, 0.6F},   // glass
+    {0, 0.10F},         // tyre
+    {0, 1.60F},         // licence_plate
+    {0, 0.35F},         // cloth
+    {0, 0.55F},         // skin
+}};
 
 }  // namespace
 
@@ -83,6 +115,10 @@ Materials random_materials(Random random) {
   materials.patchiness = random.uniform(0.0, 0.6);
   materials.patch_m = random.uniform(2.0, 12.0);
   return materials;
+}
+
+SurfaceProperties properties_of(Surface surface) {
+  return table[static_cast<std::size_t>(surface)];
 }
 
 }  // namespace stillmap::simulation

@@ -6,7 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "core/simulation/surface.hpp"
+#include "core/simulation/materials.hpp"
+#include "core/simulation/random.hpp"
 
 namespace stillmap::simulation {
 
@@ -51,5 +52,23 @@ void add_tube(Mesh& mesh, const Tube& tube, Surface surface);
 
 void add_ellipsoid(Mesh& mesh, const Eigen::Vector3f& centre, const Eigen::Vector3f& radii,
                    Surface surface);
+
+// Defined apart from their callers: inlined, fused multiply-add would round differently in each of
+// them, and the scans of a seed must keep their bits.
+
+/// A triangle of random orientation, `leaf_m` in size.
+void add_leaf(Mesh& mesh, const Eigen::Vector3f& centre, float leaf_m, Random& random,
+              Surface surface);
+
+struct Foliage {
+  int leaves = 260;
+  float leaf_m = 0.16F;
+  /// 1: evenly in the whole volume; towards 0: more and more on its surface.
+  double depth_power = 0.4;
+  Surface surface = Surface::leaves;
+};
+/// Leaves in an ellipsoid.
+void add_leaf_ball(Mesh& mesh, const Eigen::Vector3f& centre, const Eigen::Vector3f& radii,
+                   const Foliage& foliage, Random& random);
 
 }  // namespace stillmap::simulation

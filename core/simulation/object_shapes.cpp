@@ -1,11 +1,8 @@
 #include "core/simulation/object_shapes.hpp"
 
 #include <algorithm>
-#include <cassert>
+#include <array>
 #include <utility>
-
-#include "core/simulation/people.hpp"
-#include "core/simulation/vehicles.hpp"
 
 namespace stillmap::simulation {
 namespace {
@@ -22,26 +19,13 @@ ObjectShape measured(ObjectKind kind, Mesh mesh) {
 Mesh mesh_of(ObjectKind kind, Variety variety, Random& random) {
   switch (kind) {
     case ObjectKind::car:
-      return make_car(random);
     case ObjectKind::truck:
-      return variety == Variety::plain ? make_lorry(random) : make_truck(random);
     case ObjectKind::bus:
-      return variety == Variety::plain ? make_city_bus() : make_bus(random);
-    case ObjectKind::bicycle:
-      return make_bicycle(random);
-    case ObjectKind::motorcycle:
-      return make_motorcycle(random);
-    case ObjectKind::bicyclist:
-      return make_bicyclist(random);
-    case ObjectKind::motorcyclist:
-      return make_motorcyclist(random);
-    case ObjectKind::person:
-      return make_person(random);
     case ObjectKind::other_vehicle:
-      return make_other_vehicle(random);
+      return make_vehicle(kind, variety, random);
+    default:
+      return make_person_or_two_wheeler(kind, random);
   }
-  assert(false);
-  return {};
 }
 
 }  // namespace

@@ -34,11 +34,17 @@ struct ObjectShape {
   Mesh mesh;
 };
 
-/// Lorries and buses of about one size, or anything that counts as a truck or a bus.
+/// plain: trucks and buses are lorries and city buses of about one size. any: also tankers, box
+/// vans, tippers and pick-ups; minibuses and trams.
 enum class Variety : std::uint8_t { plain, any };
 
 /// A shape of that kind: body type and size vary with `random`.
 [[nodiscard]] ObjectShape make_object(ObjectKind kind, Random random,
                                       Variety variety = Variety::plain);
+
+/// The mesh alone. `kind` is car, truck, bus or other_vehicle.
+[[nodiscard]] Mesh make_vehicle(ObjectKind kind, Variety variety, Random& random);
+/// The mesh alone. `kind` is one of the others.
+[[nodiscard]] Mesh make_person_or_two_wheeler(ObjectKind kind, Random& random);
 
 }  // namespace stillmap::simulation

@@ -1,8 +1,8 @@
-#include "core/simulation/people.hpp"
-
 #include <cmath>
 #include <numbers>
 #include <utility>
+
+#include "core/simulation/object_shapes.hpp"
 
 namespace stillmap::simulation {
 namespace {
@@ -44,41 +44,10 @@ void add_rider(Mesh& mesh, float hip_x, float hip_z, const Vector3f& hand, const
   }
 }
 
-}  // namespace
-
-Mesh make_person(Random& random) {
-  Mesh mesh;
-  // One in eight is a child.
-  const double size = random.chance(0.12) ? random.uniform(0.6, 0.85) : random.uniform(0.9, 1.1);
-  const auto girth = static_cast<float>(random.uniform(0.85, 1.25));
-  const auto stride = static_cast<float>(random.uniform(0.02, 0.32));
-  const auto swing = static_cast<float>(random.uniform(0.0, 0.3));
-  for (const float side : {-1.0F, 1.0F}) {
-    const Vector3f hip(0, side * 0.09F, 0.88F);
-    add_limb(mesh, hip, {side * stride, side * 0.1F, 0.02F}, 0.09F, Surface::cloth);
-    add_limb(mesh, {0, side * 0.22F, 1.42F}, {-side * swing, side * 0.26F, 0.85F}, 0.055F,
-             Surface::cloth);
-  }
-  add_ellipsoid(mesh, {0, 0, 1.17F}, {0.14F * girth, 0.22F * girth, 0.36F}, Surface::cloth);
-  add_ellipsoid(mesh, {0.02F, 0, 1.63F}, {0.11F, 0.09F, 0.14F}, Surface::skin);
-  const double wears = random.uniform();
-  if (wears < 0.25) {
-    add_tube(mesh, {{0, 0, 0.45F}, {0, 0, 1.2F}, 0.24F * girth, 0.19F * girth}, Surface::cloth);
-  } else if (wears < 0.45) {
-    add_box(mesh, {-0.32F, -0.15F, 1.0F}, {-0.12F, 0.15F, 1.45F}, Surface::cloth);
-  } else if (wears < 0.55) {
-    add_box(mesh, {-0.15F, 0.24F, 0.5F}, {0.2F, 0.36F, 0.85F}, Surface::cloth);
-  }
-  for (Vector3f& vertex : mesh.vertices) vertex *= static_cast<float>(size);
-  return mesh;
-}
-
-namespace {
-
 // Longer or shorter and higher or lower, but still on its wheels.
 Mesh stretched(Mesh mesh, Random& random) {
-  const auto length = static_cast<float>(random.uniform(0.92, 1.08));
-  const auto height = static_cast<float>(random.uniform(0.92, 1.08));
+  const float length = random.between(0.92, 1.08);
+  const float height = random.between(0.92, 1.08);
   for (Vector3f& vertex : mesh.vertices) {
     vertex.x() *= length;
     vertex.z() *= height;
@@ -112,8 +81,8 @@ Mesh plain_motorcycle(Random& random) {
   for (const float x : {-0.68F, 0.68F}) {
     add_tube(mesh, {{x, -0.06F, 0.31F}, {x, 0.06F, 0.31F}, 0.31F, 0.31F, 12}, Surface::tyre);
   }
-  const auto seat = static_cast<float>(random.uniform(0.74, 0.9));
-  const auto girth = static_cast<float>(random.uniform(0.13, 0.24));
+  const float seat = random.between(0.74, 0.9);
+  const float girth = random.between(0.13, 0.24);
   add_frustum(mesh, {-0.6F, 0.4F, girth + 0.04F, 0.28F}, {-0.8F, 0.45F, girth, seat},
               Surface::paint, Surface::paint);
   if (random.chance(0.5)) {  // Fairing with a windscreen.
@@ -128,11 +97,32 @@ Mesh plain_motorcycle(Random& random) {
   return mesh;
 }
 
-}  // namespace
-
-Mesh make_bicycle(Random& random) { return stretched(plain_bicycle(), random); }
-
-Mesh make_motorcycle(Random& random) { return stretched(plain_motorcycle(random), random); }
+Mesh make_person(Random& random) {
+  Mesh mesh;
+  // One in eight is a child.
+  const double size = random.chance(0.12) ? random.uniform(0.6, 0.85) : random.uniform(0.9, 1.1);
+  const float girth = random.between(0.85, 1.25);
+  const float stride = random.between(0.02, 0.32);
+  const float swing = random.between(0.0, 0.3);
+  for (const float side : {-1.0F, 1.0F}) {
+    const Vector3f hip(0, side * 0.09F, 0.88F);
+    add_limb(mesh, hip, {side * stride, side * 0.1F, 0.02F}, 0.09F, Surface::cloth);
+    add_limb(mesh, {0, side * 0.22F, 1.42F}, {-side * swing, side * 0.26F, 0.85F}, 0.055F,
+             Surface::cloth);
+  }
+  add_ellipsoid(mesh, {0, 0, 1.17F}, {0.14F * girth, 0.22F * girth, 0.36F}, Surface::cloth);
+  add_ellipsoid(mesh, {0.02F, 0, 1.63F}, {0.11F, 0.09F, 0.14F}, Surface::skin);
+  const double wears = random.uniform();
+  if (wears < 0.25) {
+    add_tube(mesh, {{0, 0, 0.45F}, {0, 0, 1.2F}, 0.24F * girth, 0.19F * girth}, Surface::cloth);
+  } else if (wears < 0.45) {
+    add_box(mesh, {-0.32F, -0.15F, 1.0F}, {-0.12F, 0.15F, 1.45F}, Surface::cloth);
+  } else if (wears < 0.55) {
+    add_box(mesh, {-0.15F, 0.24F, 0.5F}, {0.2F, 0.36F, 0.85F}, Surface::cloth);
+  }
+  for (Vector3f& vertex : mesh.vertices) vertex *= static_cast<float>(size);
+  return mesh;
+}
 
 Mesh make_bicyclist(Random& random) {
   Mesh mesh = plain_bicycle();
@@ -144,6 +134,23 @@ Mesh make_motorcyclist(Random& random) {
   Mesh mesh = plain_motorcycle(random);
   add_rider(mesh, -0.3F, 0.95F, {0.36F, 0, 1.02F}, {0.05F, 0, 0.38F});
   return stretched(std::move(mesh), random);
+}
+
+}  // namespace
+
+Mesh make_person_or_two_wheeler(ObjectKind kind, Random& random) {
+  switch (kind) {
+    case ObjectKind::bicycle:
+      return stretched(plain_bicycle(), random);
+    case ObjectKind::motorcycle:
+      return stretched(plain_motorcycle(random), random);
+    case ObjectKind::bicyclist:
+      return make_bicyclist(random);
+    case ObjectKind::motorcyclist:
+      return make_motorcyclist(random);
+    default:
+      return make_person(random);
+  }
 }
 
 }  // namespace stillmap::simulation

@@ -20,11 +20,17 @@ class Random {
     return static_cast<double>(mix(state_) >> 11U) * 0x1p-53;
   }
   constexpr double uniform(double low, double high) { return low + (high - low) * uniform(); }
+  /// As `uniform`, in single precision.
+  constexpr float between(double low, double high) {
+    return static_cast<float>(uniform(low, high));
+  }
   constexpr bool chance(double probability) { return uniform() < probability; }
   /// 0 .. count - 1.
   constexpr std::size_t index(std::size_t count) {
     return static_cast<std::size_t>(uniform() * static_cast<double>(count));
   }
+  /// Numbers of their own, drawn from these.
+  constexpr Random fork() { return Random(index(1U << 30U)); }
   /// Standard normal (Box-Muller).
   double normal() {
     const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));

@@ -28,16 +28,9 @@ struct Pixel {
 };
 
 std::vector<const Mesh*> all_meshes(const City& city, const Traffic& traffic) {
-  std::vector<const Mesh*> meshes{&city.fixed};
-  for (const Mesh& shape : city.shapes) meshes.push_back(&shape);
+  std::vector<const Mesh*> meshes = city.meshes();
   for (const ObjectShape& shape : traffic.shapes()) meshes.push_back(&shape.mesh);
   return meshes;
-}
-
-std::vector<StandingMesh> standing_meshes(const City& city) {
-  std::vector<StandingMesh> standing{{0, Eigen::Isometry3d::Identity()}};
-  for (const Body& body : city.bodies) standing.push_back({body.shape + 1, body.T_map_body});
-  return standing;
 }
 
 }  // namespace
@@ -49,7 +42,7 @@ struct Simulation::World {
         city(build_city(ground, config.seed)),
         traffic(ground, config.seed, {0.0, (config.scans + 1) * config.sensor.period_s},
                 city.instances),
-        scene(all_meshes(city, traffic), standing_meshes(city)),
+        scene(all_meshes(city, traffic), city.standing_meshes()),
         firings(firings_of(config)) {
     for (int ring = 0; ring < config.sensor.rings; ++ring) {
       const double error = config.flaws.beam(static_cast<std::size_t>(ring)).elevation_error;

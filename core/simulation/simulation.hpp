@@ -8,7 +8,6 @@
 
 #include "core/lidar/scan.hpp"
 #include "core/lidar/sensor_model.hpp"
-#include "core/simulation/beam_noise.hpp"
 #include "core/simulation/city_plan.hpp"
 #include "core/simulation/lidar_flaws.hpp"
 #include "core/simulation/materials.hpp"

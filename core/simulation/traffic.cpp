@@ -7,12 +7,28 @@
 #include <utility>
 
 namespace stillmap::simulation {
+
+struct LaneParticipants {
+  /// Index in `Traffic::shapes`; none for the ego vehicle, which the lidar does not see.
+  std::vector<std::optional<std::size_t>> shapes;
+  std::vector<double> lengths_m, desired_speeds_mps;
+
+  void add(std::optional<std::size_t> shape, double length_m, double desired_speed_mps) {
+    shapes.push_back(shape);
+    lengths_m.push_back(length_m);
+    desired_speeds_mps.push_back(desired_speed_mps);
+  }
+};
+
 namespace {
+
+using Eigen::Vector2d;
 
 constexpr float ego_length_m = 4.6F;
 // Traffic has sorted itself by the time of the first scan.
 constexpr double warm_up_s = 15.0;
 constexpr double stands_below_mps = 0.1;
+constexpr double crossing_mps = 1.7;
 constexpr DriverModel vehicle_driver{};
 constexpr DriverModel walker{.acceleration_mps2 = 1.0,
                              .braking_mps2 = 1.5,
@@ -52,14 +68,33 @@ std::vector<LaneUser> spread_out(const LaneParticipants& participants, double la
   return users;
 }
 
-}  // namespace
-
-void LaneParticipants::add(std::optional<std::size_t> shape, double length_m,
-                           double desired_speed_mps) {
-  shapes.push_back(shape);
-  lengths_m.push_back(length_m);
-  desired_speeds_mps.push_back(desired_speed_mps);
+// Across the road and back, two thirds of a step beside the way there.
+std::vector<Vector2d> there_and_back(const Vector2d& middle, const Vector2d& across,
+                                     double half_way_m) {
+  const Vector2d side = 0.2 * Vector2d(across.y(), -across.x());
+  return {middle - half_way_m * across + side, middle + half_way_m * across + side,
+          middle + half_way_m * across - side, middle - half_way_m * across - side};
 }
+
+// Waits for red, walks one stage, waits for the next red.
+Track cross_at_red(double stage_m, const TrafficLight& light, double delay_s, TimeSpan span) {
+  Track track(span.from_s);
+  double position = 0.0;
+  double goal = 0.0;
+  bool was_red = true;
+  const auto steps = static_cast<int>(std::ceil((span.to_s - span.from_s) / Track::step_s)) + 1;
+  for (int step = 0; step < steps; ++step) {
+    const bool red = light.is_red(span.from_s + step * Track::step_s - delay_s);
+    if (red && !was_red) goal = position + stage_m;
+    was_red = red;
+    const double speed = position < goal ? crossing_mps : 0.0;
+    track.add(position, speed);
+    position = std::min(goal, position + speed * Track::step_s);
+  }
+  return track;
+}
+
+}  // namespace
 
 Traffic::Traffic(const GroundShape& ground, std::uint64_t seed, TimeSpan span,
                  std::uint16_t first_instance)
@@ -98,7 +133,7 @@ void Traffic::add_shapes(Random& random) {
                                                          {ObjectKind::other_vehicle, any ? 3 : 0}};
   for (const auto& [kind, count] : variants) {
     for (int i = 0; i < count; ++i) {
-      shapes_.push_back(make_object(kind, Random(random.index(1U << 30U)), variety));
+      shapes_.push_back(make_object(kind, random.fork(), variety));
     }
   }
 }
@@ -121,8 +156,7 @@ ObjectKind Traffic::random_vehicle(Random& random) const {
 }
 
 void Traffic::add_mover(std::size_t shape, std::size_t path, Track track, Random& random) {
-  movers_.push_back(
-      {shape, path, std::move(track), ++instances_, static_cast<float>(random.uniform(0.25, 1.5))});
+  movers_.push_back({shape, path, std::move(track), ++instances_, random.between(0.25, 1.5)});
 }
 
 std::vector<StopLine> Traffic::stop_lines(const Path& path) const {
@@ -156,7 +190,7 @@ LaneParticipants Traffic::vehicle_participants(const Path& lane, std::optional<O
   return participants;
 }
 
-Eigen::Vector2d Traffic::ego_start_plan() const {
+Vector2d Traffic::ego_start_plan() const {
   const CityPlan& plan = ground_.plan();
   const double offset = plan.route_profile.lane_centre_m(plan.ego_lane);
   return route_path(ground_, false, offset).at(plan.ego_start_m).plan;
@@ -207,8 +241,31 @@ void Traffic::add_participants(const LaneParticipants& participants, Path lane, 
     if (participants.shapes[i]) {
       add_mover(*participants.shapes[i], paths_.size() - 1, std::move(tracks[i]), random);
     } else {
-      ego_.push_back({.path = paths_.size() - 1, .track = std::move(tracks[i])});
+      ego_ = Mover{.path = paths_.size() - 1, .track = std::move(tracks[i])};
     }
+  }
+}
+
+void Traffic::add_crossing_people(Random& random) {
+  const CityPlan& plan = ground_.plan();
+  if (plan.crossings.empty()) return;
+  const double half_way = plan.route_profile.half_road_m() + 1.1;
+  // On a wide road people wait again on the median, half way.
+  const double stages = plan.route_profile.half_median_m > 0.8 ? 4.0 : 2.0;
+  const auto here = static_cast<std::size_t>(plan.traffic.crossing_pedestrians);
+  const std::size_t each = (here + plan.crossings.size() - 1) / plan.crossings.size();
+  for (std::size_t i = 0; i < here; ++i) {
+    const std::size_t light = i % plan.crossings.size();
+    const double slot = static_cast<double>(i / plan.crossings.size()) + 0.5;
+    const Vector2d along = plan.direction_at(plan.crossings[light]);
+    const double sideways = 3.2 * (slot / static_cast<double>(each) - 0.5);
+    const Vector2d across = (random.chance(0.5) ? 1.0 : -1.0) * Vector2d(-along.y(), along.x());
+    Path path(ground_, there_and_back(plan.crossings[light] + sideways * along, across, half_way));
+    Track track =
+        cross_at_red(path.length_m() / stages, lights_[light], random.uniform(0.3, 1.2), span_);
+    paths_.push_back(std::move(path));
+    add_mover(random_shape(ObjectKind::person, random), paths_.size() - 1, std::move(track),
+              random);
   }
 }
 
@@ -227,11 +284,10 @@ Body Traffic::body_at(const Mover& mover, double time_s) const {
 }
 
 Eigen::Isometry3d Traffic::T_map_ego_at(double time_s) const {
-  const Mover& ego = ego_.front();
-  const Path::Spot spot = paths_[ego.path].at(ego.track.position_at(time_s));
+  const Path::Spot spot = paths_[ego_->path].at(ego_->track.position_at(time_s));
   return ground_.leaning_frame_at(spot.plan, spot.heading_plan, wheelbase(ObjectKind::car));
 }
 
-double Traffic::ego_speed_at(double time_s) const { return ego_.front().track.speed_at(time_s); }
+double Traffic::ego_speed_at(double time_s) const { return ego_->track.speed_at(time_s); }
 
 }  // namespace stillmap::simulation

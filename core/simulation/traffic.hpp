@@ -6,8 +6,6 @@
 
 #include "core/simulation/city.hpp"
 #include "core/simulation/lane_traffic.hpp"
-#include "core/simulation/object_shapes.hpp"
-#include "core/simulation/path.hpp"
 
 namespace stillmap::simulation {
 
@@ -21,13 +19,8 @@ struct Mover {
   float brightness = 1.0F;
 };
 
-/// Those who share a lane, from the first one on. The ego vehicle has no shape: nobody sees it.
-struct LaneParticipants {
-  std::vector<std::optional<std::size_t>> shapes;
-  std::vector<double> lengths_m, desired_speeds_mps;
-
-  void add(std::optional<std::size_t> shape, double length_m, double desired_speed_mps);
-};
+/// The users of one lane, in order of their start.
+struct LaneParticipants;
 
 /// All that moves in the city, and the ego vehicle, over a span of time. Times count from the
 /// first scan [s].
@@ -71,7 +64,7 @@ class Traffic {
   std::vector<ObjectShape> shapes_;
   std::vector<Path> paths_;
   std::vector<Mover> movers_;
-  std::vector<Mover> ego_;
+  std::optional<Mover> ego_;
 };
 
 }  // namespace stillmap::simulation

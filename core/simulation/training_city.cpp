@@ -7,6 +7,8 @@
 namespace stillmap::simulation {
 namespace {
 
+using Eigen::Vector2d;
+
 constexpr double degree = std::numbers::pi / 180.0;
 constexpr double min_spacing_m = 8.0;
 // Of a drive; long enough to come round the longest route.
@@ -44,6 +46,134 @@ SimulationConfig plain_drive(std::uint64_t seed, Random& random) {
   config.sensor = random.chance(0.75) ? hdl_64e() : vlp_16();
   config.scans = drive_scans;
   return config;
+}
+
+StreetProfile random_profile(Random& random) {
+  StreetProfile profile;
+  const double size = random.uniform();
+  profile.lanes = size < 0.9 ? 1 : size < 0.98 ? 2 : 3;
+  profile.half_median_m = random.chance(0.2) ? random.uniform(0.5, 3.0) : 0.0;
+  profile.lane_width_m = random.uniform(2.2, 3.2);
+  profile.bike_lane_m = random.chance(0.3) ? random.uniform(1.0, 1.8) : random.uniform(0.0, 0.5);
+  const double parking = random.uniform();
+  profile.parking_m = 0.0;
+  if (parking > 0.45) profile.parking_m = random.uniform(2.0, 2.6);
+  if (parking > 0.87) profile.parking_m = random.uniform(4.4, 5.6);
+  profile.verge_m = random.chance(0.5) ? random.uniform(0.6, 4.0) : 0.0;
+  profile.sidewalk_m =
+      random.chance(0.12) ? 0.0 : random.uniform(1.2, random.chance(0.5) ? 5.0 : 2.5);
+  return profile;
+}
+
+// A block ring, and perhaps a side street of another kind that crosses it.
+void draw_streets(CityPlan& plan, Random& random) {
+  plan.route_profile = random_profile(random);
+  const double half = plan.route_profile.half_street_m();
+  plan.turn_radius_m = plan.route_profile.bike_centre_m() + 3.0;
+  const double least = std::max(2.0 * plan.turn_radius_m + 30.0, 2.0 * half + 30.0);
+  const double width = least + random.uniform(20.0, 90.0);
+  const double depth = least + random.uniform(0.0, 50.0);
+  plan.streets_along_v = {{0.0, plan.route_profile}, {width, plan.route_profile}};
+  plan.streets_along_u = {{0.0, plan.route_profile}, {depth, plan.route_profile}};
+  plan.route = {{0, 0}, {width, 0}, {width, depth}, {0, depth}};
+  StreetProfile side = random_profile(random);
+  side.lanes = 1;
+  side.half_median_m = 0.0;
+  const double middle = width * random.uniform(0.4, 0.6);
+  const double room = std::min(middle, width - middle) - half - side.half_street_m();
+  if (random.chance(0.5) && room > 15.0) {
+    plan.streets_along_v.insert(plan.streets_along_v.begin() + 1, {middle, side});
+  }
+  if (random.chance(0.5)) plan.crossings.emplace_back(0.25 * width, 0.0);
+  if (random.chance(0.3)) plan.crossings.emplace_back(0.0, 0.5 * depth);
+}
+
+void draw_ground(CityPlan& plan, Random& random) {
+  plan.margin_m = random.uniform(45.0, 65.0);
+  plan.bend_length_m = random.uniform(45.0, 120.0);
+  plan.bend_m = random.chance(0.3) ? 0.0 : random.uniform(0.0, 0.15) * plan.bend_length_m;
+  plan.hill_length_m = random.uniform(40.0, 100.0);
+  plan.hill_m = random.chance(0.3) ? 0.1 : random.uniform(0.0, 0.05) * plan.hill_length_m;
+  plan.kerb_m = random.chance(0.15) ? 0.0 : random.uniform(0.02, 0.2);
+  plan.share_driveways = random.chance(0.6) ? random.uniform(0.1, 0.8) : 0.0;
+  plan.embankment_m = random.chance(0.5) ? random.uniform(0.3, 3.5) : 0.0;
+  plan.tufts_m = random.uniform(0.0, 0.08);
+  plan.paved_medians = random.chance(0.5);
+}
+
+// Car parks and gravel yards beside the streets.
+void draw_patches(CityPlan& plan, Random& random) {
+  const double half = plan.route_profile.half_street_m();
+  const double width = plan.streets_along_v.back().position_m;
+  const double depth = plan.streets_along_u.back().position_m;
+  const std::size_t count = random.index(4);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double u = random.uniform(half, width - half - 12.0);
+    const bool beyond = random.chance(0.5);
+    const double far = random.uniform(12.0, 28.0);
+    const double edge = beyond ? depth + half + 0.5 : -half - 0.5 - far;
+    const double inner = random.chance(0.5) ? half + 0.5 : edge;
+    const Vector2d low(u, inner);
+    const Vector2d high(u + random.uniform(12.0, 40.0), inner + far);
+    plan.patches.push_back(
+        {Eigen::AlignedBox2d(low, high), random.chance(0.6) ? Zone::parking : Zone::other});
+  }
+}
+
+void draw_blocks(CityPlan& plan, Random& random) {
+  BlockPlan& blocks = plan.blocks;
+  const bool suburb = random.chance(0.6);
+  blocks.setback_min_m = suburb ? random.uniform(1.0, 6.0) : random.uniform(0.0, 2.0);
+  blocks.setback_max_m = blocks.setback_min_m + random.uniform(0.5, suburb ? 12.0 : 3.0);
+  blocks.gap_max_m = suburb ? random.uniform(2.0, 18.0) : random.uniform(0.0, 4.0);
+  blocks.floors_min = 1 + static_cast<int>(random.index(2));
+  blocks.floors_max = blocks.floors_min + static_cast<int>(random.index(suburb ? 3 : 5));
+  blocks.trees_per_100m = random.uniform(5.0, 30.0);
+  blocks.garden_trees_per_100m = random.uniform(10.0, 90.0);
+  blocks.share_fence = random.uniform(0.2, 0.75);
+  blocks.share_hedge = random.uniform(0.0, 0.95 - blocks.share_fence);
+  blocks.share_wall = 0.95 - blocks.share_fence - blocks.share_hedge;
+  if (random.chance(0.5)) blocks.share_wall *= random.uniform();
+  blocks.share_open = random.chance(0.5) ? random.uniform(0.0, 0.4) : 0.05;
+  blocks.share_wood = random.chance(0.7) ? random.uniform(0.1, 0.6) : 0.05;
+  blocks.share_halls = random.chance(0.3) ? random.uniform(0.0, 0.2) : 0.0;
+}
+
+void draw_traffic(CityPlan& plan, Random& random) {
+  plan.traffic = {
+      .vehicles_per_km = random.uniform(0.0, 35.0),
+      .share_trucks = random.uniform(0.0, 0.2),
+      .share_buses = random.uniform(0.0, 0.15),
+      .cyclists_per_km = random.uniform(0.0, 35.0),
+      .pedestrians_per_km = random.uniform(0.0, 60.0),
+      .crossing_pedestrians = static_cast<int>(random.index(8)),
+      .speed_mps = random.uniform(7.0, 13.0),
+      .light_red_s = random.uniform(4.0, 12.0),
+      .parked_per_100m = random.chance(0.15) ? 0 : 4 + static_cast<int>(random.index(12)),
+      .share_motorcyclists = random.uniform(0.0, 0.5),
+      .share_other_vehicles = random.uniform(0.0, 0.12),
+      .groups_per_100m = random.uniform(0.0, 5.0)};
+  plan.parking = {.share_motorcycles = random.uniform(0.0, 0.2),
+                  .share_trucks = random.uniform(0.0, 0.15),
+                  .share_buses = random.uniform(0.0, 0.06),
+                  .share_other_vehicles = random.uniform(0.0, 0.12),
+                  .share_bicycles = random.uniform(0.0, 0.3)};
+}
+
+// Streets, slopes, blocks, traffic and furniture are all drawn; rare things (two-wheelers, buses,
+// signs) are more frequent than in real cities.
+CityPlan training_plan(Random random) {
+  CityPlan plan;
+  plan.name = "training";
+  plan.many_shapes = true;
+  draw_streets(plan, random);
+  draw_ground(plan, random);
+  draw_patches(plan, random);
+  draw_blocks(plan, random);
+  draw_traffic(plan, random);
+  plan.ego_lane =
+      static_cast<int>(random.index(static_cast<std::size_t>(plan.route_profile.lanes)));
+  return plan;
 }
 
 }  // namespace

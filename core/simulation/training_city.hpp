@@ -7,10 +7,6 @@
 
 namespace stillmap::simulation {
 
-/// A small city of no particular place: streets, slopes, blocks, traffic and what stands about are
-/// all drawn, and rare things (two-wheelers, buses, signs) are more frequent than in life.
-[[nodiscard]] CityPlan training_plan(Random random);
-
 /// A drive for training: `training_plan`, drawn materials, and a drawn lidar with drawn flaws
 /// (60 % HDL-64E, 20 % VLP-16, 10 % HDL-32E, 10 % sensors that nobody builds). This share of all
 /// drives are plain ones through `quiet_city` or `crowded_avenue`. The same seed and share give the

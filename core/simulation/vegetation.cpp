@@ -1,22 +1,92 @@
-#include "core/simulation/vegetation.hpp"
-
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "core/simulation/leaves.hpp"
+#include "core/simulation/city_shapes.hpp"
 
 namespace stillmap::simulation {
 namespace {
 
 using Eigen::Vector3f;
 
+// What a tree is before its leaves are drawn.
+struct TreePlan {
+  float height_m, trunk_m, spread_m, radius_m, leaf_m;
+  /// How much of the crown's outline leaves cover, seen from a side.
+  float cover;
+  bool conifer;
+};
+
+TreePlan random_tree(Random& random) {
+  TreePlan tree{};
+  tree.height_m = random.between(3.0, random.chance(0.5) ? 16.0 : 9.0);
+  tree.conifer = random.chance(0.15);
+  const double bare = tree.conifer ? random.uniform(0.03, 0.2) : random.uniform(0.12, 0.5);
+  tree.trunk_m = static_cast<float>(bare) * tree.height_m;
+  tree.spread_m = random.between(0.16, 0.42) * tree.height_m;
+  tree.radius_m = random.between(0.012, 0.035) * tree.height_m;
+  tree.leaf_m = random.between(0.09, 0.28);
+  tree.cover = random.between(0.35, 1.6);
+  return tree;
+}
+
+// Leaves that cover an ellipsoid's outline as often as wished.
+Foliage foliage_of(const TreePlan& tree, const Vector3f& radii) {
+  const float outline = std::numbers::pi_v<float> * radii.x() * radii.z();
+  const float leaf = 0.6F * tree.leaf_m * tree.leaf_m;
+  const int leaves = std::clamp(static_cast<int>(tree.cover * outline / leaf), 20, 1500);
+  return {.leaves = leaves, .leaf_m = tree.leaf_m, .depth_power = 0.45};
+}
+
+void add_limbs(Mesh& mesh, const TreePlan& tree, const Vector3f& foot, const Vector3f& top,
+               Random& random) {
+  const std::size_t limbs = 4 + random.index(6);
+  for (std::size_t i = 0; i < limbs; ++i) {
+    const float part = random.between(0.55, 1.0);
+    const Vector3f start = foot + part * (top - foot);
+    const double angle = random.uniform(0.0, 2.0 * std::numbers::pi);
+    const float reach = random.between(0.3, 0.9) * tree.spread_m;
+    const Vector3f end = start + Vector3f(reach * std::cos(static_cast<float>(angle)),
+                                          reach * std::sin(static_cast<float>(angle)),
+                                          random.between(0.1, 0.8) * reach);
+    add_tube(mesh, {start, end, 0.35F * tree.radius_m, 0.08F * tree.radius_m, 5}, Surface::bark);
+  }
+}
+
+void add_broad_crown(Mesh& mesh, const TreePlan& tree, const Vector3f& top, Random& random) {
+  const float crown_m = tree.height_m - tree.trunk_m;
+  const std::size_t blobs = 3 + random.index(5);
+  for (std::size_t i = 0; i < blobs; ++i) {
+    const double angle = 2.0 * std::numbers::pi * random.uniform();
+    const float out = random.between(0.0, 0.65) * tree.spread_m;
+    const Vector3f centre = top + Vector3f(out * std::cos(static_cast<float>(angle)),
+                                           out * std::sin(static_cast<float>(angle)),
+                                           random.between(0.15, 0.8) * crown_m);
+    const float wide = random.between(0.45, 0.8) * tree.spread_m;
+    const Vector3f radii(wide, wide, std::min(random.between(0.2, 0.4) * crown_m, 1.5F * wide));
+    add_leaf_ball(mesh, centre, radii, foliage_of(tree, radii), random);
+  }
+}
+
+void add_conifer_crown(Mesh& mesh, const TreePlan& tree, const Vector3f& top, Random& random) {
+  const float crown_m = tree.height_m - tree.trunk_m;
+  constexpr int tiers = 6;
+  for (int tier = 0; tier < tiers; ++tier) {
+    const float part = (static_cast<float>(tier) + 0.5F) / tiers;
+    const float wide = 0.8F * tree.spread_m * (1.1F - part);
+    const Vector3f radii(wide, wide, 0.7F * crown_m / tiers);
+    add_leaf_ball(mesh, top + Vector3f(0, 0, part * crown_m), radii, foliage_of(tree, radii),
+                  random);
+  }
+}
+
 }  // namespace
 
 Mesh make_tree(Random random) {
   Mesh mesh;
-  const auto trunk_m = static_cast<float>(random.uniform(2.2, 3.4));
-  const auto spread_m = static_cast<float>(random.uniform(1.3, 2.2));
-  const auto radius_m = static_cast<float>(random.uniform(0.12, 0.24));
+  const float trunk_m = random.between(2.2, 3.4);
+  const float spread_m = random.between(1.3, 2.2);
+  const float radius_m = random.between(0.12, 0.24);
   const Vector3f fork(0.1F, 0.05F, trunk_m);
   add_tube(mesh, {{0, 0, -0.3F}, fork, 1.2F * radius_m, 0.8F * radius_m}, Surface::bark);
   const int blobs = 4 + static_cast<int>(random.index(3));
@@ -26,8 +96,35 @@ Mesh make_tree(Random random) {
                                 random.uniform(0.4, 1.6));
     const Vector3f blob = fork + spread_m * reach.cast<float>();
     add_tube(mesh, {fork, blob, 0.4F * radius_m, 0.1F * radius_m, 5}, Surface::bark);
-    const auto size = static_cast<float>(random.uniform(0.6, 0.85)) * spread_m;
+    const float size = random.between(0.6, 0.85) * spread_m;
     add_leaf_ball(mesh, blob, {size, size, 0.8F * size}, {}, random);
+  }
+  return mesh;
+}
+
+Mesh make_any_tree(Random random) {
+  Mesh mesh;
+  const TreePlan tree = random_tree(random);
+  const float lean = random.chance(0.3) ? 0.15F : 0.04F;
+  const Vector3f top(random.between(-lean, lean) * tree.trunk_m,
+                     random.between(-lean, lean) * tree.trunk_m, tree.trunk_m);
+  const Vector3f foot(0, 0, -0.4F);
+  const std::size_t stems = random.chance(0.12) ? 3 : 1;
+  for (std::size_t i = 0; i < stems; ++i) {
+    const Vector3f apart = i == 0
+                               ? Vector3f::Zero().eval()
+                               : Vector3f(random.between(-0.4, 0.4), random.between(-0.4, 0.4), 0);
+    add_tube(mesh,
+             {foot + 0.3F * apart, top + apart, 1.15F * tree.radius_m, 0.7F * tree.radius_m, 9},
+             Surface::bark);
+  }
+  const Vector3f tip = top + Vector3f(0, 0, 0.7F * (tree.height_m - tree.trunk_m));
+  add_tube(mesh, {top, tip, 0.7F * tree.radius_m, 0.1F * tree.radius_m, 6}, Surface::bark);
+  add_limbs(mesh, tree, foot, tip, random);
+  if (tree.conifer) {
+    add_conifer_crown(mesh, tree, top, random);
+  } else {
+    add_broad_crown(mesh, tree, top, random);
   }
   return mesh;
 }
@@ -37,6 +134,25 @@ Mesh make_bush(float size_m, Random random) {
   const Vector3f radii(0.5F * size_m, 0.5F * size_m, 0.45F * size_m);
   add_leaf_ball(mesh, {0, 0, 0.4F * size_m}, radii,
                 {.leaves = static_cast<int>(260.0F * size_m), .leaf_m = 0.12F}, random);
+  return mesh;
+}
+
+Mesh make_any_bush(Random random) {
+  Mesh mesh;
+  const float size = random.between(0.5, random.chance(0.5) ? 3.5 : 1.6);
+  const std::size_t tufts = 1 + random.index(4);
+  const float leaf = random.between(0.06, 0.16);
+  const float cover = random.between(0.5, 2.5);
+  for (std::size_t i = 0; i < tufts; ++i) {
+    const float wide = random.between(0.3, 0.6) * size;
+    const Vector3f radii(wide, wide, random.between(0.3, 0.55) * size);
+    const Vector3f centre(random.between(-0.4, 0.4) * size, random.between(-0.4, 0.4) * size,
+                          0.8F * radii.z());
+    const float outline = std::numbers::pi_v<float> * radii.x() * radii.z();
+    const int leaves =
+        std::clamp(static_cast<int>(cover * outline / (0.6F * leaf * leaf)), 30, 900);
+    add_leaf_ball(mesh, centre, radii, {.leaves = leaves, .leaf_m = leaf}, random);
+  }
   return mesh;
 }
 
@@ -51,6 +167,26 @@ Mesh make_hedge(float length_m, float height_m, float depth_m, Random random) {
   // The twigs inside: nothing is seen through a hedge below its top.
   add_box(mesh, {0, -0.3F * depth_m, -0.3F}, {length_m, 0.3F * depth_m, 0.85F * height_m},
           Surface::hedge);
+  return mesh;
+}
+
+Mesh make_any_hedge(float length_m, Random random) {
+  Mesh mesh;
+  const float height = random.between(0.5, random.chance(0.5) ? 3.0 : 1.8);
+  const float depth = random.between(0.4, 1.2);
+  const float uneven = random.chance(0.3) ? 0.3F : 0.1F;
+  constexpr float piece_m = 0.25F;
+  for (float x = 0.0F; x < length_m; x += piece_m) {
+    const float top = height * (1.0F - uneven * random.between(0.0, 1.0));
+    const float half = 0.5F * depth * (1.0F - 0.5F * random.between(0.0, 1.0));
+    add_frustum(mesh, {x, x + piece_m, half, -0.4F}, {x, x + piece_m, 0.8F * half, 0.9F * top},
+                Surface::hedge, Surface::hedge);
+    for (int i = 0; i < 18; ++i) {
+      const Vector3f spot(x + piece_m * random.between(0.0, 1.0), random.between(-0.6, 0.6) * depth,
+                          random.between(0.02, 1.08) * top);
+      add_leaf(mesh, spot, 0.09F, random, Surface::hedge);
+    }
+  }
   return mesh;
 }
 

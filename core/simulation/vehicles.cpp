@@ -1,9 +1,11 @@
-#include "core/simulation/vehicles.hpp"
+#include <array>
 
-#include "core/simulation/vehicle_parts.hpp"
+#include "core/simulation/object_shapes.hpp"
 
 namespace stillmap::simulation {
+namespace {
 
+// Two wheels at `x`, their outer sides `half_width` from the middle.
 void add_axle(Mesh& mesh, float x, float half_width, float radius) {
   for (const float side : {-1.0F, 1.0F}) {
     const float y = side * half_width;
@@ -12,13 +14,12 @@ void add_axle(Mesh& mesh, float x, float half_width, float radius) {
   }
 }
 
+// At the front and the rear end.
 void add_licence_plates(Mesh& mesh, float front, float rear) {
   for (const float x : {front, rear}) {
     add_box(mesh, {x - 0.01F, -0.26F, 0.45F}, {x + 0.01F, 0.26F, 0.56F}, Surface::licence_plate);
   }
 }
-
-namespace {
 
 // Measures of a passenger car; the cabin's x positions run from the rear.
 struct CarBody {
@@ -39,7 +40,7 @@ constexpr std::array<CarBody, 8> car_bodies{{
 
 // No two cars of a kind are alike; the bonnet stays below the cabin and the roof inside it.
 CarBody varied(CarBody car, Random& random) {
-  const auto factor = [&] { return static_cast<float>(random.uniform(0.94, 1.06)); };
+  const auto factor = [&] { return random.between(0.94, 1.06); };
   car.length *= factor();
   car.half_width *= factor();
   car.height *= factor();
@@ -81,8 +82,6 @@ Mesh make_car(const CarBody& car) {
   return mesh;
 }
 
-}  // namespace
-
 Mesh make_car(Random& random) {
   // Vans are rarer than cars.
   constexpr std::size_t vans = 2;
@@ -94,7 +93,7 @@ Mesh make_car(Random& random) {
 
 Mesh make_lorry(Random& random) {
   Mesh mesh;
-  const float front = static_cast<float>(random.uniform(3.6, 4.6));
+  const float front = random.between(3.6, 4.6);
   const bool tank = random.chance(0.2);
   const float cab_rear = front - 2.0F;
   add_frustum(mesh, {cab_rear, front, 1.2F, 0.5F}, {cab_rear, front, 1.2F, 1.6F}, Surface::paint,
@@ -113,14 +112,12 @@ Mesh make_lorry(Random& random) {
   return mesh;
 }
 
-namespace {
-
 // A driver's cab like a van's and a body of its own behind it.
 Mesh make_small_truck(Random& random) {
   Mesh mesh;
-  const auto front = static_cast<float>(random.uniform(2.5, 3.2));
+  const float front = random.between(2.5, 3.2);
   const float cab_rear = front - 1.9F;
-  const auto half = static_cast<float>(random.uniform(0.92, 1.05));
+  const float half = random.between(0.92, 1.05);
   add_frustum(mesh, {cab_rear, front, half, 0.35F}, {cab_rear, front - 0.25F, half, 1.1F},
               Surface::paint, Surface::paint);
   add_frustum(mesh, {cab_rear, front - 0.8F, half - 0.03F, 1.1F},
@@ -129,10 +126,10 @@ Mesh make_small_truck(Random& random) {
   const double kind = random.uniform();
   const float body_front = cab_rear - 0.1F;
   if (kind < 0.5) {
-    const auto top = static_cast<float>(random.uniform(2.5, 3.1));
+    const float top = random.between(2.5, 3.1);
     add_box(mesh, {-front, -half - 0.1F, 0.8F}, {body_front, half + 0.1F, top}, Surface::paint);
   } else {
-    const auto rim = static_cast<float>(random.uniform(1.05, 1.4));
+    const float rim = random.between(1.05, 1.4);
     add_box(mesh, {-front, -half, 0.75F}, {body_front, half, 0.85F}, Surface::paint);
     for (const float y : {-half, half}) {
       add_box(mesh, {-front, y - 0.03F, 0.85F}, {body_front, y + 0.03F, rim}, Surface::paint);
@@ -150,6 +147,14 @@ struct BusBody {
   /// Trams hide their wheels behind skirts.
   bool tram = false;
 };
+
+// Bus, minibus or a section of a tram.
+BusBody random_bus(Random& random) {
+  return {.front = random.between(4.0, 5.2),
+          .sill = random.between(1.0, 1.35),
+          .roof = random.between(2.3, 2.6),
+          .tram = random.chance(0.25)};
+}
 
 Mesh make_bus(const BusBody& bus) {
   Mesh mesh;
@@ -171,19 +176,105 @@ Mesh make_bus(const BusBody& bus) {
   return mesh;
 }
 
-}  // namespace
-
-Mesh make_truck(Random& random) {
-  return random.chance(0.5) ? make_lorry(random) : make_small_truck(random);
+Mesh make_caravan(Random& random) {
+  Mesh mesh;
+  const float half = random.between(1.9, 2.9);
+  const float top = random.between(2.3, 2.7);
+  const float slant = random.between(0.1, 0.5);
+  const std::array<Eigen::Vector2f, 6> side{{{-half, 0.45F},
+                                             {half, 0.45F},
+                                             {half, 1.2F},
+                                             {half - slant, top},
+                                             {-half + 0.15F, top},
+                                             {-half, 1.2F}}};
+  const float half_width = random.between(1.0, 1.2);
+  add_prism(mesh, side, half_width, Surface::paint);
+  for (const float y : {-1.0F, 1.0F}) {
+    add_box(mesh, {-0.9F, y * half_width - 0.01F, 1.3F}, {0.7F, y * half_width + 0.01F, 1.9F},
+            Surface::glass);
+  }
+  add_tube(mesh, {{half, 0, 0.5F}, {half + 1.1F, 0, 0.45F}, 0.05F, 0.05F, 6}, Surface::tyre);
+  add_tube(mesh, {{half + 0.9F, 0, 0}, {half + 0.9F, 0, 0.6F}, 0.03F, 0.03F, 6}, Surface::tyre);
+  add_axle(mesh, -0.1F, half_width, 0.32F);
+  add_licence_plates(mesh, -half, -half);
+  return mesh;
 }
 
-Mesh make_city_bus() { return make_bus(BusBody{}); }
+Mesh make_trailer(Random& random) {
+  Mesh mesh;
+  const float half = random.between(0.9, 2.2);
+  const float half_width = random.between(0.65, 1.0);
+  const float rim = random.between(0.75, 1.1);
+  add_box(mesh, {-half, -half_width, 0.45F}, {half, half_width, 0.55F}, Surface::paint);
+  for (const float y : {-half_width, half_width}) {
+    add_box(mesh, {-half, y - 0.02F, 0.55F}, {half, y + 0.02F, rim}, Surface::paint);
+  }
+  if (random.chance(0.5)) {
+    add_frustum(mesh, {-half, half, half_width, rim}, {-half, half, half_width - 0.05F, rim + 0.9F},
+                Surface::cloth, Surface::cloth);
+  }
+  add_tube(mesh, {{half, 0, 0.5F}, {half + 1.2F, 0, 0.45F}, 0.04F, 0.04F, 6}, Surface::tyre);
+  add_tube(mesh, {{half + 1.0F, 0, 0}, {half + 1.0F, 0, 0.6F}, 0.03F, 0.03F, 6}, Surface::tyre);
+  add_axle(mesh, 0, half_width + 0.2F, 0.28F);
+  return mesh;
+}
 
-Mesh make_bus(Random& random) {
-  return make_bus(BusBody{.front = static_cast<float>(random.uniform(4.0, 5.2)),
-                          .sill = static_cast<float>(random.uniform(1.0, 1.35)),
-                          .roof = static_cast<float>(random.uniform(2.3, 2.6)),
-                          .tram = random.chance(0.25)});
+Mesh make_tractor(Random& random) {
+  Mesh mesh;
+  const float big = random.between(0.65, 0.9);
+  add_box(mesh, {0.1F, -0.4F, 0.7F}, {1.9F, 0.4F, 1.45F}, Surface::paint);
+  add_frustum(mesh, {-1.2F, 0.2F, 0.75F, 1.2F}, {-1.0F, 0.1F, 0.65F, 2.6F}, Surface::glass,
+              Surface::paint);
+  add_box(mesh, {-1.2F, -0.75F, 0.9F}, {0.2F, 0.75F, 1.25F}, Surface::paint);
+  for (const float y : {-0.7F, 0.7F}) {
+    add_tube(mesh, {{-1.05F, y, 1.2F}, {-0.95F, y, 2.6F}, 0.06F, 0.06F, 6}, Surface::paint);
+    add_tube(mesh, {{0.15F, y, 1.2F}, {0.1F, y, 2.6F}, 0.06F, 0.06F, 6}, Surface::paint);
+  }
+  add_tube(mesh, {{1.2F, 0.3F, 1.4F}, {1.2F, 0.3F, 2.3F}, 0.05F, 0.05F, 6}, Surface::tyre);
+  add_axle(mesh, -0.8F, 1.05F, big);
+  add_axle(mesh, 1.4F, 0.95F, 0.45F);
+  return mesh;
+}
+
+Mesh make_digger(Random& random) {
+  Mesh mesh;
+  for (const float y : {-0.95F, 0.95F}) {
+    add_box(mesh, {-1.6F, y - 0.25F, 0.02F}, {1.6F, y + 0.25F, 0.75F}, Surface::tyre);
+  }
+  add_box(mesh, {-1.7F, -1.2F, 0.85F}, {1.0F, 1.2F, 1.7F}, Surface::paint);
+  add_frustum(mesh, {-0.3F, 1.1F, 0.5F, 1.7F}, {-0.3F, 0.9F, 0.45F, 2.8F}, Surface::glass,
+              Surface::paint);
+  const Eigen::Vector3f elbow(random.between(2.0, 3.0), 0, random.between(2.8, 3.8));
+  const Eigen::Vector3f hand(random.between(3.4, 4.6), 0, random.between(0.6, 1.6));
+  add_tube(mesh, {{0.9F, 0, 1.4F}, elbow, 0.25F, 0.2F, 6}, Surface::paint);
+  add_tube(mesh, {elbow, hand, 0.2F, 0.13F, 6}, Surface::paint);
+  add_box(mesh, hand - Eigen::Vector3f(0.5F, 0.6F, 0.5F), hand + Eigen::Vector3f(0.3F, 0.6F, 0.2F),
+          Surface::paint);
+  return mesh;
+}
+
+// Caravan, trailer, tractor or digger.
+Mesh make_other_vehicle(Random& random) {
+  const double kind = random.uniform();
+  if (kind < 0.35) return make_caravan(random);
+  if (kind < 0.65) return make_trailer(random);
+  return kind < 0.85 ? make_tractor(random) : make_digger(random);
+}
+
+}  // namespace
+
+Mesh make_vehicle(ObjectKind kind, Variety variety, Random& random) {
+  const bool any = variety == Variety::any;
+  switch (kind) {
+    case ObjectKind::car:
+      return make_car(random);
+    case ObjectKind::truck:
+      return any && !random.chance(0.5) ? make_small_truck(random) : make_lorry(random);
+    case ObjectKind::bus:
+      return make_bus(any ? random_bus(random) : BusBody{});
+    default:
+      return make_other_vehicle(random);
+  }
 }
 
 }  // namespace stillmap::simulation

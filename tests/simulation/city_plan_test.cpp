@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 
 #include "core/simulation/city.hpp"
-#include "core/simulation/ground_shape.hpp"
 
 namespace stillmap::simulation {
 namespace {

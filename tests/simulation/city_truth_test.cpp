@@ -4,7 +4,7 @@
 
 #include <map>
 
-#include "core/simulation/ground_shape.hpp"
+#include "core/simulation/ground.hpp"
 
 namespace stillmap::simulation {
 namespace {

@@ -4,9 +4,8 @@
 
 #include <numbers>
 
-#include "core/simulation/buildings.hpp"
+#include "core/simulation/city_shapes.hpp"
 #include "core/simulation/object_shapes.hpp"
-#include "core/simulation/vegetation.hpp"
 
 namespace stillmap::simulation {
 namespace {

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "core/simulation/city_plan.hpp"
+#include "core/simulation/mesh.hpp"
 
 namespace stillmap::simulation {
 
@@ -36,5 +37,11 @@ class GroundShape {
   CityPlan plan_;
   Eigen::Array<double, 8, 1> phase_;
 };
+
+/// Roads, kerbs, sidewalks and grass of the whole city, in the map frame.
+void add_ground(Mesh& mesh, const GroundShape& ground);
+
+/// Lane lines, stop lines and zebra crossings along the route, 5 mm above the road.
+void add_lane_markings(Mesh& mesh, const GroundShape& ground);
 
 }  // namespace stillmap::simulation

@@ -1,4 +1,4 @@
-#include "core/simulation/ground_shape.hpp"
+#include "core/simulation/ground.hpp"
 
 #include <algorithm>
 #include <cmath>

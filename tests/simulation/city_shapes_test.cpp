@@ -1,13 +1,11 @@
 // Shapes of every kind, whatever is drawn.
+#include "core/simulation/city_shapes.hpp"
+
 #include <gmock/gmock.h>
 
 #include <functional>
 
-#include "core/simulation/buildings.hpp"
-#include "core/simulation/enclosures.hpp"
 #include "core/simulation/ray_scene.hpp"
-#include "core/simulation/street_objects.hpp"
-#include "core/simulation/vegetation.hpp"
 
 namespace stillmap::simulation {
 namespace {
