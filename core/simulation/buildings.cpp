@@ -11,7 +11,7 @@ using Eigen::Vector3f;
 constexpr float floor_m = 3.0F;
 constexpr float foundation_m = 3.0F;
 
-// A vertical wall as a frame: `across` along it, `out` towards the observer.
+// A vertical wall as a frame: `across` along it, `out` its outward normal.
 struct Wall {
   Vector3f corner, across, out;
   float length_m;
@@ -31,7 +31,7 @@ void add_plate(Mesh& mesh, const Wall& wall, const Opening& o, float outwards, S
                 wall.at(o.right, o.top, outwards), wall.at(o.left, o.top, outwards), surface);
 }
 
-// Block that stands out of the wall: sill, pilaster, balcony.
+// Block that protrudes from the wall by `outwards`: sill, pilaster, balcony; recess where negative.
 void add_relief(Mesh& mesh, const Wall& wall, const Opening& o, float outwards, Surface surface) {
   add_plate(mesh, wall, o, outwards, surface);
   for (const float side : {o.left, o.right}) {
@@ -128,7 +128,7 @@ void add_gabled_roof(Mesh& mesh, float half_width, float half_depth, float heigh
           Surface::brick);
 }
 
-// A roof on two posts over some steps.
+// A roof on two posts.
 void add_porch(Mesh& house, float x, float front, Random& random) {
   const float depth = random.between(0.8, 2.0);
   const float half = random.between(0.7, 1.4);
@@ -184,7 +184,7 @@ void add_garage(Mesh& house, float x, float front, Random& random) {
           Surface::roof);
 }
 
-// What is built onto the front of a house: steps and a porch, a bay window, a garage, a rain pipe.
+// Attached to the front of a house: porch, steps, bay window, garage, rain pipe.
 void add_outbuildings(Mesh& house, const BuildingPlan& plan, Random& random) {
   const float front = -0.5F * plan.depth_m;
   const float reach = std::max(0.1F, 0.5F * plan.width_m - 2.0F);
@@ -193,7 +193,7 @@ void add_outbuildings(Mesh& house, const BuildingPlan& plan, Random& random) {
   if (random.chance(0.35)) add_steps(house, somewhere(), front, random);
   if (random.chance(0.3)) add_bay_window(house, plan, somewhere(), front, random);
   if (random.chance(0.2)) add_garage(house, somewhere(), front, random);
-  if (random.chance(0.4)) {  // A rain pipe.
+  if (random.chance(0.4)) {  // Rain pipe.
     const float x = somewhere();
     add_tube(house,
              {{x, front - 0.06F, 0},

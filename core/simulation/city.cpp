@@ -18,7 +18,7 @@ struct Interval {
   bool street_below, street_above;
 };
 
-// Where blocks are on one axis: between the backs of the sidewalks.
+// Extents of the blocks on one axis: between the backs of the sidewalks.
 std::vector<Interval> block_intervals(const std::vector<StreetPlan>& streets, double margin) {
   std::vector<Interval> out;
   double low = streets.front().position_m - margin;
@@ -52,7 +52,7 @@ std::vector<Frontage> frontages(const Interval& u, const Interval& v) {
   return out;
 }
 
-// Shapes that fill gardens; enclosures are pieces of `enclosure_m`.
+// Shapes in gardens. Hedges, fences and walls are fields of `enclosure_m`.
 struct GardenShapes {
   ShapeRange trees, bushes, hedges, fences, walls;
 };

@@ -12,16 +12,16 @@
 
 namespace stillmap::simulation {
 
-/// A shape somewhere in the city.
+/// A placed shape.
 struct Body {
   /// Index in `City::shapes`.
   std::size_t shape = 0;
   Eigen::Isometry3d T_map_body = Eigen::Isometry3d::Identity();
   /// Class of the surfaces that have none of their own (SemanticKITTI id).
   std::uint16_t label = 0;
-  /// Of objects that can be counted, 1..65535; 0 for plants and houses.
+  /// 1..65535 for countable objects; 0 for plants and houses.
   std::uint16_t instance = 0;
-  /// Of this object's paint or clothes, multiplies their reflectivity.
+  /// Factor on the reflectivity of this object's surfaces.
   float brightness = 1.0F;
 };
 
@@ -32,12 +32,12 @@ struct ShapeRange {
   [[nodiscard]] std::size_t draw(Random& random) const { return first + random.index(count); }
 };
 
-/// Everything that stands still.
+/// Everything that does not move.
 struct City {
   /// Ground, houses, fences, poles: one piece, in the map frame.
   Mesh fixed;
   std::vector<Mesh> shapes;
-  /// Plants and parked vehicles.
+  /// Plants, parked vehicles and standing people.
   std::vector<Body> bodies;
   std::uint16_t instances = 0;
 

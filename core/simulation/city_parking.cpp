@@ -1,4 +1,4 @@
-// Vehicles that stand: in the bays along the streets and on car parks.
+// Parked vehicles: in the bays along the streets and on car parks.
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -15,10 +15,10 @@ using Eigen::Vector2d;
 
 constexpr double quarter_turn = 0.5 * std::numbers::pi;
 
-// Bays deeper than this have cars across the street instead of along it.
+// In bays deeper than this, cars park perpendicular to the street.
 constexpr double deep_bay_m = 3.8;
 
-/// Shapes of standing vehicles, some of each kind.
+/// Places vehicles of some shapes of each kind.
 class VehiclePark {
  public:
   VehiclePark(City& city, const GroundShape& ground, Random random)
@@ -57,34 +57,34 @@ class VehiclePark {
            u += random_.uniform(2.5, 3.0)) {
         if (!random_.chance(share_taken())) continue;
         const double turned = random_.chance(0.5) ? quarter_turn : -quarter_turn;
-        leave(ObjectKind::car, random_shape(ObjectKind::car), {u, v + 0.5 * row_m},
-              turned + random_.uniform(-0.06, 0.06));
+        add_parked(ObjectKind::car, random_shape(ObjectKind::car), {u, v + 0.5 * row_m},
+                   turned + random_.uniform(-0.06, 0.06));
       }
       v += row_m + (aisle_next ? 6.0 : 0.6);
       aisle_next = !aisle_next;
     }
   }
 
-  /// Two-wheelers side by side, as in front of a shop.
-  void stand_two_wheelers(const StreetSide& side, double at, double right_m) {
+  /// A row of two-wheelers side by side.
+  void park_two_wheelers(const StreetSide& side, double at, double right_m) {
     const ObjectKind kind = random_.chance(0.6) ? ObjectKind::bicycle : ObjectKind::motorcycle;
     const std::size_t count = 1 + random_.index(6);
     const double turn = random_.chance(0.5) ? quarter_turn : 0.9;
     for (std::size_t i = 0; i < count; ++i) {
       const double along = at + static_cast<double>(i) * random_.uniform(0.6, 0.9);
-      leave(kind, random_shape(kind), side.at(along, right_m), side.heading() + turn);
+      add_parked(kind, random_shape(kind), side.at(along, right_m), side.heading() + turn);
     }
   }
 
  private:
-  // Where vehicles stand beside a street.
+  // Parking positions beside a street.
   struct Bays {
     double middle_m;
     Zone zone;
     bool across;
   };
 
-  // Without bays people park on the sidewalk, where it is wide enough.
+  // Without bays, vehicles park on the sidewalk where it is wide enough.
   [[nodiscard]] std::optional<Bays> bays_of(const StreetProfile& profile) const {
     if (profile.parking_m > 1.0) {
       return Bays{profile.half_driven_m() + 0.5 * profile.parking_m, Zone::parking,
@@ -124,7 +124,7 @@ class VehiclePark {
     return std::max(random_.uniform(6.0, 6.8), lengths_m_.at(shape) + random_.uniform(0.5, 1.5));
   }
 
-  // A bay from end to end, and nobody parks where people cross.
+  // A bay from end to end, and no pedestrian crossing.
   [[nodiscard]] bool is_free(const StreetSide& side, const Bays& bays, double at,
                              double half_m) const {
     const bool is_crossing = std::ranges::any_of(
@@ -141,15 +141,15 @@ class VehiclePark {
     const double turned = random_.chance(0.15) ? std::numbers::pi : 0.0;
     const double aslant = kind == ObjectKind::motorcycle ? 1.1 : 0.0;
     const Vector2d spot = side.at(at, bays.middle_m + random_.uniform(-0.1, 0.12));
-    leave(kind, shape, spot,
-          side.heading() + askew + turned + (bays.across ? quarter_turn : aslant));
+    add_parked(kind, shape, spot,
+               side.heading() + askew + turned + (bays.across ? quarter_turn : aslant));
     if (random_.chance(ground_.plan().parking.share_bicycles)) {
-      leave(ObjectKind::bicycle, random_shape(ObjectKind::bicycle),
-            side.at(at, side.profile.half_road_m() + 0.35), side.heading() + askew);
+      add_parked(ObjectKind::bicycle, random_shape(ObjectKind::bicycle),
+                 side.at(at, side.profile.half_road_m() + 0.35), side.heading() + askew);
     }
   }
 
-  void leave(ObjectKind kind, std::size_t shape, const Vector2d& spot, double heading) {
+  void add_parked(ObjectKind kind, std::size_t shape, const Vector2d& spot, double heading) {
     const double wheelbase_m = std::max(1.0, 0.55 * lengths_m_.at(shape));
     const double darkest = ground_.plan().many_shapes ? 0.06 : 0.25;
     city_.bodies.push_back({.shape = shape,
@@ -178,7 +178,7 @@ void park_vehicles(City& city, const GroundShape& ground, Random random) {
     for (double at = random.uniform(3.0, 30.0); at < side.length_m;
          at += random.uniform(8.0, 50.0)) {
       if (ground.zone(side.at(at, right_m)) == Zone::sidewalk) {
-        park.stand_two_wheelers(side, at, right_m);
+        park.park_two_wheelers(side, at, right_m);
       }
     }
   }

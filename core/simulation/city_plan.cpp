@@ -162,7 +162,7 @@ CityPlan crowded_avenue() {
   plan.streets_along_v.push_back({720.0, avenue()});
   plan.streets_along_u = streets({0, 140}, avenue());
   plan.route = {{0, 0}, {720, 0}, {720, 140}, {0, 140}};
-  // As wide as the kerbs allow: long vehicles sweep sideways in turns.
+  // The largest that the kerbs allow, since long vehicles sweep sideways in turns.
   plan.turn_radius_m = 22.0;
   plan.crossings = {{150, 0}, {450, 0}, {300, 140}};
   plan.ego_start_m = -30.0;

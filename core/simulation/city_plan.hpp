@@ -8,10 +8,10 @@
 
 namespace stillmap::simulation {
 
-/// What a spot of ground is.
+/// Use of a spot of ground.
 enum class Zone : std::uint8_t { road, parking, median, verge, sidewalk, lot, other };
 
-/// A rectangle of the plan between the streets that is no garden: a car park, a gravel yard.
+/// A rectangle of the plan between the streets other than garden: a car park, a gravel yard.
 struct GroundPatch {
   Eigen::AlignedBox2d area_plan;
   Zone zone = Zone::other;
@@ -33,7 +33,8 @@ struct StreetProfile {
   [[nodiscard]] double bike_centre_m() const {
     return half_median_m + lanes * lane_width_m + 0.5 * bike_lane_m;
   }
-  /// Centre line to where the parking bays begin, to the kerb, to the back of the sidewalk.
+  /// From the centre line to the start of the parking bays, to the kerb, to the back of the
+  /// sidewalk.
   [[nodiscard]] double half_driven_m() const {
     return half_median_m + lanes * lane_width_m + bike_lane_m;
   }
@@ -47,43 +48,42 @@ struct StreetPlan {
   StreetProfile profile;
 };
 
-/// Who is on the move, and how close together. Densities count along the route, in objects per
-/// kilometre of one lane.
+/// Moving objects and their density, in objects per kilometre of one lane along the route.
 struct TrafficPlan {
   double vehicles_per_km = 4.0;
-  /// Of the vehicles. Long ones sweep over the next lane in turns of less than 20 m radius.
+  /// Shares of the vehicles. Long ones sweep over the next lane in turns of less than 20 m radius.
   double share_trucks = 0.0;
   double share_buses = 0.0;
-  /// A lorry and a bus set out in the lanes beside the ego vehicle, as fast as it: most of what the
-  /// lidar sees goes along with it.
+  /// A lorry and a bus drive beside the ego vehicle at its speed, so that most of what the lidar
+  /// sees moves with it.
   bool escorted = false;
   double cyclists_per_km = 2.0;
   double pedestrians_per_km = 6.0;
-  /// People who cross the road while the traffic has red.
+  /// People who cross the road while the light for vehicles is red.
   int crossing_pedestrians = 2;
   double speed_mps = 9.0;
-  /// How much drivers' wishes differ, as a share of the speed.
+  /// Largest deviation of a driver's desired speed, as a share of `speed_mps`.
   double speed_spread = 0.15;
   /// Period and red part of every pedestrian light [s].
   double light_period_s = 60.0;
   double light_red_s = 10.0;
   int parked_per_100m = 9;
-  /// Of the moving vehicles, as share_trucks.
+  /// Shares of the vehicles, as `share_trucks`.
   double share_motorcyclists = 0.0;
   double share_other_vehicles = 0.0;
-  /// People who stand and talk, in groups on the sidewalks.
+  /// Groups of standing people on the sidewalks.
   double groups_per_100m = 0.0;
 };
 
-/// What stands in the parking bays; the rest are cars.
+/// Shares of parked vehicles; the rest are cars.
 struct ParkingPlan {
   double share_motorcycles = 0.06;
   double share_trucks = 0.0, share_buses = 0.0, share_other_vehicles = 0.0;
-  /// Bays that have a bicycle beside them.
+  /// Share of bays with a bicycle beside them.
   double share_bicycles = 0.08;
 };
 
-/// How the blocks between the streets are filled.
+/// Contents of the blocks between the streets.
 struct BlockPlan {
   double setback_min_m = 2.0, setback_max_m = 5.0;
   double gap_min_m = 0.0, gap_max_m = 7.0;
@@ -97,8 +97,7 @@ struct BlockPlan {
 };
 
 /// A city of streets on a grid in flat plan coordinates (u, v) [m]; `GroundShape` bends it into
-/// the map frame. The traffic, the ego vehicle too, goes round one closed route of streets for
-/// ever.
+/// the map frame. All traffic, the ego vehicle included, repeats one closed route of streets.
 struct CityPlan {
   std::string name;
   std::vector<StreetPlan> streets_along_v;
@@ -113,17 +112,17 @@ struct CityPlan {
   StreetProfile route_profile;
   /// Pedestrian crossings with lights, on the route's centre line.
   std::vector<Eigen::Vector2d> crossings;
-  /// Where on the route the ego vehicle starts [m], and its lane (0 = next to the middle).
+  /// The ego vehicle's start along the route [m], and its lane (0 = next to the middle).
   double ego_start_m = 0.0;
   int ego_lane = 0;
-  /// Streets are sine waves of this amplitude and (angular) length about the grid [m].
+  /// Streets follow sine waves of this amplitude and wave length / 2 pi about the grid [m].
   double bend_m = 6.0;
   double bend_length_m = 55.0;
-  /// Hills: amplitude and angular wave length [m].
+  /// Hills: amplitude and wave length / 2 pi [m].
   double hill_m = 1.2;
   double hill_length_m = 45.0;
   double kerb_m = 0.13;
-  /// Share of house fronts with a drive, where the kerb is lowered.
+  /// Share of house fronts with a driveway, where the kerb is lowered.
   double share_driveways = 0.0;
   /// Height of the slopes behind the streets, and of the tufts of grass [m].
   double embankment_m = 0.0;
@@ -131,13 +130,13 @@ struct CityPlan {
   /// Medians of stone instead of grass.
   bool paved_medians = false;
   std::vector<GroundPatch> patches;
-  /// Everything in many shapes (plants, fences, furniture, houses) instead of a few plain ones.
+  /// Many shapes of plants, fences, furniture and houses instead of a few plain ones.
   bool many_shapes = false;
   BlockPlan blocks;
   TrafficPlan traffic;
   ParkingPlan parking;
 
-  /// Every fault in words, one a line; empty when a city can be built.
+  /// All faults, one a line; empty when the plan is valid.
   [[nodiscard]] std::string faults() const;
   /// Unit vector along the street that a crossing of the route lies on.
   [[nodiscard]] Eigen::Vector2d direction_at(const Eigen::Vector2d& crossing) const;
@@ -153,7 +152,7 @@ struct CityPlan {
 /// @throws std::invalid_argument with the names that exist.
 [[nodiscard]] CityPlan city_plan(const std::string& name);
 
-/// One side of a street, seen in the direction in which its traffic goes; plan coordinates [m].
+/// One side of a street in the direction of its traffic; plan coordinates [m].
 struct StreetSide {
   StreetProfile profile;
   Eigen::Vector2d start, along;

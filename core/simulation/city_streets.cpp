@@ -12,7 +12,7 @@ using Eigen::Vector2d;
 
 constexpr double quarter_turn = 0.5 * std::numbers::pi;
 
-/// Lines one side of a street after the other.
+/// Furnishes the sides of the streets and the crossings.
 class StreetFurnisher {
  public:
   StreetFurnisher(City& city, const GroundShape& ground, Random random)
@@ -87,7 +87,7 @@ class StreetFurnisher {
     }
   }
 
-  // People who face each other.
+  // Groups of people who face each other.
   void add_groups(const StreetSide& side) {
     const double spacing = 100.0 / ground_.plan().traffic.groups_per_100m;
     for (double at = spacing * random_.uniform(); at < side.length_m;
@@ -100,12 +100,12 @@ class StreetFurnisher {
             2.0 * std::numbers::pi * static_cast<double>(i) / static_cast<double>(people);
         const Vector2d spot =
             side.at(at, right) + 0.55 * Vector2d(std::cos(angle), std::sin(angle));
-        if (is_pavement(spot)) stand(spot, angle + std::numbers::pi);
+        if (is_pavement(spot)) add_person(spot, angle + std::numbers::pi);
       }
     }
   }
 
-  void stand(const Vector2d& spot, double heading) {
+  void add_person(const Vector2d& spot, double heading) {
     city_.bodies.push_back({.shape = people_.draw(random_),
                             .T_map_body = ground_.frame_at(spot, heading),
                             .label = standing_label(ObjectKind::person),
@@ -124,7 +124,7 @@ class StreetFurnisher {
     }
   }
 
-  // On the verge, or in beds at the back of the sidewalk.
+  // On the verge, or at the back of the sidewalk.
   void plant_bushes(const StreetSide& side) {
     const StreetProfile& profile = side.profile;
     const bool verge = profile.verge_m > 1.0;
@@ -147,7 +147,7 @@ class StreetFurnisher {
     city_.fixed.append(mesh, ground_.frame_at(spot, heading).cast<float>());
   }
 
-  // Off the road: where no sidewalk is, what belongs there stands on the grass beside it.
+  // Off the road; in cities of many shapes, the lot counts too where there is no sidewalk.
   [[nodiscard]] bool is_pavement(const Vector2d& spot) const {
     const Zone zone = ground_.zone(spot);
     return zone == Zone::sidewalk || zone == Zone::verge || (many_ && zone == Zone::lot);

@@ -10,7 +10,7 @@
 namespace stillmap::simulation {
 namespace {
 
-/// The class that the lidar's points on it have.
+/// Class of lidar points on that ground.
 SemanticClass class_of(Zone zone, const CityPlan& plan) {
   switch (zone) {
     case Zone::road:
@@ -40,10 +40,10 @@ struct CityTruth::World {
         standing(scene.with({})) {}
 
   [[nodiscard]] Eigen::Vector2d plan_of(const Eigen::Vector2d& spot_city) const;
-  [[nodiscard]] Standing look(const Ray& ray) const;
-  [[nodiscard]] Standing look_up(const Eigen::Vector3d& ground_city, double edge_m, double from_m,
+  [[nodiscard]] Standing cast(const Ray& ray) const;
+  [[nodiscard]] Standing cast_up(const Eigen::Vector3d& ground_city, double edge_m, double from_m,
                                  double to_m) const;
-  [[nodiscard]] Standing look_across(const Eigen::Vector3d& ground_city, double edge_m,
+  [[nodiscard]] Standing cast_across(const Eigen::Vector3d& ground_city, double edge_m,
                                      double from_m, double to_m) const;
 
   GroundShape ground;
@@ -52,14 +52,14 @@ struct CityTruth::World {
   RaySnapshot standing;
 };
 
-/// The plan's bends are gentle: going back and forth converges by a factor of ten a round.
+/// Inverse of `to_map` by fixed-point iteration; the error falls about tenfold in each round.
 Eigen::Vector2d CityTruth::World::plan_of(const Eigen::Vector2d& spot_city) const {
   Eigen::Vector2d spot_plan = spot_city;
   for (int round = 0; round < 12; ++round) spot_plan += spot_city - ground.to_map(spot_plan);
   return spot_plan;
 }
 
-Standing CityTruth::World::look(const Ray& ray) const {
+Standing CityTruth::World::cast(const Ray& ray) const {
   const std::optional<RayHit> hit = standing.cast(ray);
   if (!hit) return Standing::nothing;
   if (hit->body == 0) return Standing::fixed;
@@ -67,8 +67,8 @@ Standing CityTruth::World::look(const Ray& ray) const {
   return is_movable(label) ? Standing::parked : Standing::fixed;
 }
 
-/// Up from the middle and near the corners: finds roofs, crowns and tops.
-Standing CityTruth::World::look_up(const Eigen::Vector3d& ground_city, double edge_m, double from_m,
+/// Casts up from the middle and near the corners: finds roofs and crowns.
+Standing CityTruth::World::cast_up(const Eigen::Vector3d& ground_city, double edge_m, double from_m,
                                    double to_m) const {
   Standing found = Standing::nothing;
   for (const auto& [x, y] : {std::pair(0.0, 0.0), std::pair(0.4, 0.4), std::pair(-0.4, 0.4),
@@ -77,13 +77,13 @@ Standing CityTruth::World::look_up(const Eigen::Vector3d& ground_city, double ed
     ray.origin_map = (ground_city + Eigen::Vector3d(x * edge_m, y * edge_m, from_m)).cast<float>();
     ray.direction_map = Eigen::Vector3f::UnitZ();
     ray.max_range_m = static_cast<float>(to_m - from_m);
-    found = std::max(found, look(ray));
+    found = std::max(found, cast(ray));
   }
   return found;
 }
 
-/// Across the square, both ways, at some heights: finds walls and poles, which are upright.
-Standing CityTruth::World::look_across(const Eigen::Vector3d& ground_city, double edge_m,
+/// Casts outwards from the middle at some heights: finds upright walls and poles.
+Standing CityTruth::World::cast_across(const Eigen::Vector3d& ground_city, double edge_m,
                                        double from_m, double to_m) const {
   Standing found = Standing::nothing;
   for (const double share : {0.02, 0.2, 0.5, 0.9}) {
@@ -94,7 +94,7 @@ Standing CityTruth::World::look_across(const Eigen::Vector3d& ground_city, doubl
       ray.origin_map = (ground_city + Eigen::Vector3d(0, 0, height_m)).cast<float>();
       ray.direction_map = along.cast<float>();
       ray.max_range_m = static_cast<float>(0.5 * edge_m);
-      found = std::max(found, look(ray));
+      found = std::max(found, cast(ray));
     }
   }
   return found;
@@ -121,8 +121,8 @@ TrueGround CityTruth::at(const Eigen::Vector2d& spot_city, double edge_m, double
     }
   }
   const Eigen::Vector3d ground_city(spot_city.x(), spot_city.y(), truth.height_m);
-  truth.standing = std::max(world_->look_up(ground_city, edge_m, from_m, to_m),
-                            world_->look_across(ground_city, edge_m, from_m, to_m));
+  truth.standing = std::max(world_->cast_up(ground_city, edge_m, from_m, to_m),
+                            world_->cast_across(ground_city, edge_m, from_m, to_m));
   return truth;
 }
 

@@ -9,37 +9,36 @@
 
 namespace stillmap::simulation {
 
-/// What stands over a spot of the city.
+/// What stands on a spot of the city.
 enum class Standing : std::uint8_t {
   nothing,
-  /// A parked vehicle, and nothing that stays.
+  /// Movable objects only.
   parked,
-  /// A house, a fence, a tree: what is still there tomorrow.
+  /// Immovable: a house, a fence, a tree.
   fixed,
 };
 
-/// The truth about a square of ground.
+/// Ground truth of a square of ground.
 struct TrueGround {
-  /// Height of the bare ground in the middle, city frame [m].
+  /// Height of the bare ground in the middle [m, city frame].
   double height_m = 0.0;
-  /// Of the bare ground.
+  /// Class of the bare ground in the middle.
   SemanticClass label = SemanticClass::unlabeled;
-  /// Highest edge between the square's middle and the ground half a square beyond its sides [m].
+  /// Largest height difference between the middle and the ground up to `edge_m` away in x or y [m].
   double step_m = 0.0;
-  /// The ground there is of another class than in the middle, somewhere.
+  /// Some of that ground is of another class than the middle.
   bool is_edge = false;
   Standing standing = Standing::nothing;
 };
 
-/// The simulated city as it is, whoever saw it: the truth that maps made from its recordings are
-/// held against. Traffic is not part of it.
+/// Ground truth of a simulated city, to evaluate maps of its sequences against. Without traffic.
 class CityTruth {
  public:
   explicit CityTruth(const SimulationConfig& config);
   ~CityTruth();
 
-  /// The square of this edge [m] around a spot (city frame [m]), and what stands in it between two
-  /// heights over the ground [m]. Thread-safe.
+  /// The square of `edge_m` around `spot_city`, and what stands in it from `from_m` to `to_m` above
+  /// the ground [m]. Thread-safe.
   [[nodiscard]] TrueGround at(const Eigen::Vector2d& spot_city, double edge_m, double from_m,
                               double to_m) const;
 

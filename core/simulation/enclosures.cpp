@@ -3,7 +3,7 @@
 namespace stillmap::simulation {
 namespace {
 
-// Foot of fences and walls, and of the plain ones [m].
+// z of the foot, of any shape and of the plain ones [m].
 constexpr float buried_m = -0.5F;
 constexpr float shallow_m = -0.3F;
 
@@ -17,7 +17,7 @@ void add_bar(Mesh& mesh, float length_m, float z, float half, Surface surface) {
   add_box(mesh, {0, -half, z - half}, {length_m, half, z + half}, surface);
 }
 
-// Beams find the wires or the holes between them: scraps that cover a share of the field.
+// Wires and gaps, as small quads that cover a random share of the field.
 void add_wire_mesh(Mesh& mesh, float length_m, float height, Random& random) {
   const float cover = random.between(0.25, 0.7);
   constexpr float cell_m = 0.07F;
@@ -72,7 +72,7 @@ void add_rails(Mesh& mesh, float length_m, float height, Random& random) {
   add_posts(mesh, length_m, height, 0.05F, Surface::fence_metal);
 }
 
-// A band of steel on posts, or concrete that widens towards its foot.
+// Steel bands on posts, or concrete that widens towards its foot.
 void add_crash_barrier(Mesh& mesh, float length_m, Random& random) {
   if (random.chance(0.6)) {
     const float low = random.between(0.35, 0.55);

@@ -11,7 +11,7 @@
 namespace stillmap::simulation {
 namespace {
 
-// Bays and verges end this far from the kerb of a crossing street, medians a little nearer.
+// Distances from the kerb of a crossing street at which bays and verges, and medians, end.
 constexpr double bay_clearance_m = 7.0;
 constexpr double median_clearance_m = 4.0;
 
@@ -29,7 +29,7 @@ NearestStreet nearest(const std::vector<StreetPlan>& streets, double position) {
   return best;
 }
 
-// Zone by one street, when `other` is the nearest street across it.
+// Zone according to one street; `other` is the nearest street across it.
 Zone zone_by(const NearestStreet& street, const NearestStreet& other) {
   if (street.profile == nullptr || street.distance_m > street.profile->half_street_m()) {
     return Zone::lot;
@@ -55,7 +55,7 @@ Zone lot_zone(const std::vector<GroundPatch>& patches, const Eigen::Vector2d& sp
   return Zone::lot;
 }
 
-// Height of a bed of tufts between 0 and 1, the same for the same spot.
+// Relative height of the tufts of grass, 0..1, constant in cells of 0.25 m.
 double tuft(const Eigen::Vector2d& spot_plan) {
   const auto cell = [](double x) {
     return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(x * 4.0)));
@@ -77,7 +77,7 @@ Zone GroundShape::zone(const Eigen::Vector2d& spot_plan) const {
   const NearestStreet along_u = nearest(plan_.streets_along_u, spot_plan.y());
   const Zone first = zone_by(along_v, along_u);
   const Zone second = zone_by(along_u, along_v);
-  // At junctions the road wins, then the sidewalk.
+  // At junctions road takes precedence, then parking and median, then sidewalk.
   for (const Zone zone : {first, second}) {
     if (zone == Zone::road) return zone;
   }
@@ -104,7 +104,7 @@ double GroundShape::height(const Eigen::Vector2d& spot_plan, Zone zone) const {
   return height;
 }
 
-// Rises or falls away behind the street, in waves along it.
+// Slope behind the street, up or down in waves along it.
 double GroundShape::embankment(const Eigen::Vector2d& spot_plan) const {
   if (plan_.embankment_m == 0.0) return 0.0;
   double behind_m = std::numeric_limits<double>::infinity();
@@ -121,17 +121,17 @@ double GroundShape::embankment(const Eigen::Vector2d& spot_plan) const {
   return plan_.embankment_m * wave * part * part * (3.0 - 2.0 * part);
 }
 
-// Height of the kerb, which is lowered at drives.
+// Height of the kerb, lowered at driveways.
 double GroundShape::kerb(const Eigen::Vector2d& spot_plan) const {
   if (plan_.share_driveways == 0.0) return plan_.kerb_m;
   constexpr double pitch_m = 11.0;
-  constexpr double drive_m = 3.75;
-  const auto is_drive = [&](double along, std::uint64_t axis) {
+  constexpr double driveway_m = 3.75;
+  const auto is_driveway = [&](double along, std::uint64_t axis) {
     const double cell = std::floor(along / pitch_m);
-    const bool has_drive =
+    const bool has_driveway =
         Random(62, static_cast<std::uint64_t>(static_cast<std::int64_t>(cell)), axis)
             .chance(plan_.share_driveways);
-    return has_drive && along - cell * pitch_m < drive_m;
+    return has_driveway && along - cell * pitch_m < driveway_m;
   };
   const NearestStreet by_u = nearest(plan_.streets_along_v, spot_plan.x());
   const NearestStreet by_v = nearest(plan_.streets_along_u, spot_plan.y());
@@ -140,7 +140,7 @@ double GroundShape::kerb(const Eigen::Vector2d& spot_plan) const {
                                      : street.distance_m - street.profile->half_road_m();
   };
   const bool beside_u = behind(by_u) < behind(by_v);
-  if (!is_drive(beside_u ? spot_plan.y() : spot_plan.x(), beside_u ? 1 : 0)) return plan_.kerb_m;
+  if (!is_driveway(beside_u ? spot_plan.y() : spot_plan.x(), beside_u ? 1 : 0)) return plan_.kerb_m;
   const double part = std::clamp((beside_u ? behind(by_u) : behind(by_v)) / 1.5, 0.15, 1.0);
   return part * plan_.kerb_m;
 }

@@ -8,7 +8,7 @@
 
 namespace stillmap::simulation {
 
-/// The city's ground: from flat plan coordinates (u, v) to the map frame, with hills, crowned
+/// Maps flat plan coordinates (u, v) to the ground in the map frame, with bends, hills, crowned
 /// roads, kerbs and rough grass.
 class GroundShape {
  public:
@@ -22,10 +22,10 @@ class GroundShape {
   [[nodiscard]] Eigen::Vector3d on_ground(const Eigen::Vector2d& spot_plan) const;
   [[nodiscard]] Eigen::Vector3d on_ground(const Eigen::Vector2d& spot_plan, Zone zone) const;
   [[nodiscard]] Eigen::Vector2d to_map(const Eigen::Vector2d& spot_plan) const;
-  /// Upright frame on the ground, x along `heading_plan` [rad] as the plan bends it.
+  /// T_map_frame of an upright frame on the ground, x along the bent `heading_plan` [rad].
   [[nodiscard]] Eigen::Isometry3d frame_at(const Eigen::Vector2d& spot_plan,
                                            double heading_plan) const;
-  /// Frame on the ground that leans with it, for wheels `wheelbase_m` apart.
+  /// T_map_frame that leans with the ground under axles `wheelbase_m` apart.
   [[nodiscard]] Eigen::Isometry3d leaning_frame_at(const Eigen::Vector2d& spot_plan,
                                                    double heading_plan, double wheelbase_m) const;
 
@@ -41,7 +41,7 @@ class GroundShape {
 /// Roads, kerbs, sidewalks and grass of the whole city, in the map frame.
 void add_ground(Mesh& mesh, const GroundShape& ground);
 
-/// Lane lines, stop lines and zebra crossings along the route, 5 mm above the road.
+/// Lane lines, stop lines and zebra crossings along the route, 6 mm above the road.
 void add_lane_markings(Mesh& mesh, const GroundShape& ground);
 
 }  // namespace stillmap::simulation

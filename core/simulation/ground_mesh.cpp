@@ -58,7 +58,7 @@ Surface surface_of(Zone zone, const CityPlan& plan) {
   }
 }
 
-// Roads without a sidewalk end in grass, not at a kerb of stone.
+// Roads without a sidewalk end in grass instead of a kerb.
 bool is_country_edge(Zone left, Zone right) {
   const auto is_lot = [](Zone zone) { return zone == Zone::lot || zone == Zone::other; };
   return (is_lot(left) && right != Zone::sidewalk) || (is_lot(right) && left != Zone::sidewalk);

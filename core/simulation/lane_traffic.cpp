@@ -16,7 +16,7 @@ Vector2d right_of(const Vector2d& along) { return {along.y(), -along.x()}; }
 
 double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
-// Points every `step_m` of the map along the closed polygon.
+// Points along the closed polygon, `step_m` apart in the map frame.
 std::vector<Vector2d> resample(const GroundShape& ground, const std::vector<Vector2d>& corners) {
   std::vector<Vector2d> fine;
   for (std::size_t i = 0; i < corners.size(); ++i) {
@@ -45,7 +45,7 @@ struct MotionState {
   double position_m, speed_mps;
 };
 
-// Speed that the curves ahead allow, every metre of the lane.
+// Highest speed that this and the following curves allow, for every metre of the lane.
 class CurveLimit {
  public:
   CurveLimit(const Path& lane, double lateral_acceleration_mps2) : lane_(lane) {
@@ -55,7 +55,7 @@ class CurveLimit {
       const double curvature = std::max(1e-4, lane.curvature(static_cast<double>(i)));
       limit_mps_[i] = std::sqrt(lateral_acceleration_mps2 / curvature);
     }
-    // Twice round backwards: v^2 = v_next^2 + 2 a s.
+    // Two rounds backwards, since the lane is closed: v^2 <= v_next^2 + 2 a s with s = 1 m.
     constexpr double braking_mps2 = 0.9;
     for (std::size_t k = 2 * count; k-- > 0;) {
       const double next = limit_mps_[(k + 1) % count];
@@ -74,7 +74,7 @@ class CurveLimit {
   std::vector<double> limit_mps_;
 };
 
-// The driver model's acceleration with `gap_m` to something `ahead_mps` fast.
+// Acceleration of the driver model, `gap_m` behind something that moves at `ahead_mps`.
 double idm(const DriverModel& model, double speed, double desired_speed_mps, double gap_m,
            double ahead_mps) {
   const double closing =
@@ -94,7 +94,7 @@ void advance(MotionState& state, double acceleration_mps2) {
   state.speed_mps = speed;
 }
 
-// Distance to the nearest red line that can still be respected.
+// Distance to the nearest stop line that is red and can still be obeyed.
 double gap_to_red(const Path& lane, const MotionState& state, double half_length_m,
                   const std::vector<StopLine>& stops, double time_s) {
   double best = std::numeric_limits<double>::infinity();
@@ -174,7 +174,7 @@ Path route_path(const GroundShape& ground, bool reversed, double offset_m,
   return {ground, points};
 }
 
-Track::Place Track::place_at(double time_s) const {
+Track::Segment Track::segment_at(double time_s) const {
   const double index =
       std::clamp((time_s - start_s_) / step_s, 0.0, static_cast<double>(knots_.size() - 1));
   const auto knot = std::min(static_cast<std::size_t>(index), knots_.size() - 2);
@@ -183,7 +183,7 @@ Track::Place Track::place_at(double time_s) const {
 
 double Track::position_at(double time_s) const {
   if (knots_.size() < 2) return knots_.front().position_m;
-  const auto [knot, t] = place_at(time_s);
+  const auto [knot, t] = segment_at(time_s);
   const Knot& a = knots_[knot];
   const Knot& b = knots_[knot + 1];
   const double t2 = t * t;
@@ -194,7 +194,7 @@ double Track::position_at(double time_s) const {
 
 double Track::speed_at(double time_s) const {
   if (knots_.size() < 2) return 0.0;
-  const auto [knot, part] = place_at(time_s);
+  const auto [knot, part] = segment_at(time_s);
   return (1.0 - part) * knots_[knot].speed_mps + part * knots_[knot + 1].speed_mps;
 }
 
@@ -222,7 +222,7 @@ std::vector<Track> drive_lane(const Path& lane, const std::vector<LaneUser>& use
     const double bodies = 0.5 * (users[i].length_m + users[next].length_m);
     const double gap = next == i ? std::numeric_limits<double>::infinity() : apart - bodies;
     const double red = gap_to_red(lane, state, 0.5 * users[i].length_m, stops, time_s);
-    // The front may come closer to the line than to a vehicle.
+    // A stop line allows a smaller standstill gap than a vehicle.
     return std::min(idm(model, state.speed_mps, desired_speed_mps, gap, states[next].speed_mps),
                     idm(model, state.speed_mps, desired_speed_mps, red + 1.5, 0.0));
   };

@@ -8,13 +8,12 @@
 
 namespace stillmap::simulation {
 
-/// A closed way on the ground. Positions are arc lengths in the map frame [m] and go round: any
-/// number is one.
+/// A closed path on the ground. Positions are arc lengths in the map frame [m], modulo the length.
 class Path {
  public:
   struct Spot {
     Eigen::Vector2d plan;
-    /// Of travel, in plan coordinates [rad].
+    /// Direction of travel in plan coordinates [rad].
     double heading_plan;
   };
 
@@ -23,11 +22,11 @@ class Path {
 
   [[nodiscard]] double length_m() const { return length_m_; }
   [[nodiscard]] Spot at(double position_m) const;
-  /// Of the way in the map, without sign [1/m].
+  /// Absolute curvature in the map frame [1/m].
   [[nodiscard]] double curvature(double position_m) const;
   /// Position nearest to a spot of the plan.
   [[nodiscard]] double nearest(const Eigen::Vector2d& spot_plan) const;
-  /// `position_m` brought to 0 .. length.
+  /// `position_m` modulo the length: 0 <= result < length.
   [[nodiscard]] double wrapped(double position_m) const;
 
  private:
@@ -39,12 +38,12 @@ class Path {
   double length_m_ = 0.0;
 };
 
-/// The city's route, or the route the other way round, shifted `offset_m` to the right of travel.
-/// Turns have the route's radius, changed by the offset, or `turn_radius_m` where given.
+/// The city's route, reversed or not, shifted `offset_m` to the right of travel.
+/// Turns have the route's radius changed by the offset, or `turn_radius_m` where given.
 [[nodiscard]] Path route_path(const GroundShape& ground, bool reversed, double offset_m,
                               std::optional<double> turn_radius_m = std::nullopt);
 
-/// Positions of one mover along its path over time.
+/// Positions along a path over time, sampled every `step_s`.
 class Track {
  public:
   static constexpr double step_s = 0.1;
@@ -52,7 +51,7 @@ class Track {
   explicit Track(double start_s) : start_s_(start_s) {}
   void add(double position_m, double speed_mps) { knots_.push_back({position_m, speed_mps}); }
 
-  /// Smooth (cubic) between the knots; stands before the first and after the last [m].
+  /// Cubic Hermite interpolation; constant before the first and after the last knot [m].
   [[nodiscard]] double position_at(double time_s) const;
   [[nodiscard]] double speed_at(double time_s) const;
 
@@ -60,17 +59,17 @@ class Track {
   struct Knot {
     double position_m, speed_mps;
   };
-  struct Place {
+  struct Segment {
     std::size_t knot;
     double part;
   };
-  [[nodiscard]] Place place_at(double time_s) const;
+  [[nodiscard]] Segment segment_at(double time_s) const;
 
   double start_s_;
   std::vector<Knot> knots_;
 };
 
-/// A light that is red for `red_s` in every period.
+/// Red for `red_s` at the start of every period.
 struct TrafficLight {
   double period_s, red_s, offset_s;
   [[nodiscard]] bool is_red(double time_s) const;
@@ -81,8 +80,7 @@ struct StopLine {
   TrafficLight light;
 };
 
-/// How those on a lane follow each other: the intelligent driver model (Treiber, Hennecke and
-/// Helbing, 2000).
+/// Parameters of the intelligent driver model (Treiber, Hennecke and Helbing, 2000).
 struct DriverModel {
   double acceleration_mps2 = 1.6;
   double braking_mps2 = 2.2;
@@ -101,8 +99,9 @@ struct TimeSpan {
   double from_s, to_s;
 };
 
-/// Tracks of all users of one closed lane, who are given in order of their start. Nobody overtakes
-/// and nobody touches the one ahead; red lights are obeyed where braking is still possible.
+/// Tracks of all users of one closed lane.
+/// @param users in order of their start. They neither overtake nor touch each other.
+/// @param stops red lights are obeyed where 4 m/s^2 of braking suffices.
 [[nodiscard]] std::vector<Track> drive_lane(const Path& lane, const std::vector<LaneUser>& users,
                                             const std::vector<StopLine>& stops,
                                             const DriverModel& model, TimeSpan span);

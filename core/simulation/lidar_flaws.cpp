@@ -10,7 +10,7 @@ namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
 
-// The HDL-64E's lasers sit in two blocks above the origin; a smaller sensor's in one point.
+// The HDL-64E has two laser blocks above its origin; the beams of smaller sensors share one origin.
 double block_height(std::size_t ring, std::size_t rings, double upper_m, double lower_m) {
   return 2 * ring < rings ? upper_m : lower_m;
 }
@@ -92,8 +92,7 @@ LidarFlaws random_flaws(const SensorModel& sensor, Random random) {
   flaws.blind_spots = random_blind_spots(sensor, random);
   flaws.roll = 0.7 * degree * random.normal();
   flaws.pitch = 0.7 * degree * random.normal();
-  // Some sensors level bright and dark, others spread them; a middling surface (0.25) is reported
-  // as 0.12 to 0.45.
+  // Sensors compress or stretch contrast; a surface of 0.25 is reported as 0.12 to 0.45.
   flaws.intensity_gamma = random.uniform(0.3, 1.2);
   flaws.intensity_gain = random.uniform(0.12, 0.45) / std::pow(0.25, flaws.intensity_gamma);
   flaws.intensity_offset = random.uniform(-0.1, 0.05);
@@ -119,14 +118,14 @@ std::optional<BeamReturn> beam_return(const BeamNoise& noise, float range_m, flo
                                       const SurfaceProperties& surface, float brightness,
                                       Random& random) {
   if (random.chance(noise.drop_share) || random.chance(surface.lost)) return std::nullopt;
-  // Rough surfaces send more back at grazing angles than Lambert's cosine has it.
+  // Rough surfaces reflect more at grazing angles than Lambert's cosine law: its square root.
   const double angle = std::sqrt(static_cast<double>(cos_incidence));
   const double reflected = surface.reflectivity * brightness * angle;
   const double received = reflected / (static_cast<double>(range_m) * range_m);
   const double weakness = noise.min_return / std::max(received, 1e-12);
   const double faint = weakness * weakness * weakness;
   if (random.uniform() * (1.0 + faint) > 1.0) return std::nullopt;
-  // The sensor corrects its intensity for range, not perfectly.
+  // The intensity that the sensor reports is corrected for range, but not fully.
   const double falloff = 1.0 / (1.0 + range_m * range_m / (70.0 * 70.0));
   const double intensity = 0.85 * reflected * falloff + noise.intensity_sigma * random.normal();
   double range = range_m + noise.range_sigma_m * random.normal();

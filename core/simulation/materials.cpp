@@ -7,7 +7,7 @@
 namespace stillmap::simulation {
 namespace {
 
-// 0..1, the same in each cube of that size.
+// Random value, 0..1, constant within each cube of that size.
 double shade(const Eigen::Vector3f& spot_map, double size_m) {
   const auto cell = [&](float x) {
     return static_cast<std::uint64_t>(static_cast<std::int64_t>(std::floor(x / size_m)));
@@ -24,7 +24,7 @@ void draw_lost(Materials& materials, Surface surface, double min_lost, double ma
   materials.properties[static_cast<std::size_t>(surface)].lost = random.between(min_lost, max_lost);
 }
 
-// Water mirrors most beams away.
+// Water mirrors beams away.
 void wet(Materials& materials, Random& random) {
   for (const Surface surface : {Surface::asphalt, Surface::parking_bay, Surface::lane_marking}) {
     SurfaceProperties& properties = materials.properties[static_cast<std::size_t>(surface)];
@@ -95,7 +95,7 @@ Materials random_materials(Random random) {
   for (SurfaceProperties& properties : materials.properties) {
     properties.reflectivity *= static_cast<float>(std::exp(random.uniform(-0.7, 0.8)));
   }
-  // Often the bays are of the road's own asphalt.
+  // Bays often share the road's asphalt.
   if (random.chance(0.5)) {
     materials.properties[static_cast<std::size_t>(Surface::parking_bay)].reflectivity =
         materials.of(Surface::asphalt).reflectivity;

@@ -9,7 +9,7 @@
 
 namespace stillmap::simulation {
 
-/// What a triangle is made of.
+/// Material of a triangle.
 enum class Surface : std::uint8_t {
   asphalt,
   lane_marking,
@@ -32,11 +32,11 @@ enum class Surface : std::uint8_t {
   sign_back,
   gravel,
   fence_mesh,
-  /// Bins, boxes, benches: a class of their own that the networks do not know.
+  /// Bins, boxes, benches: SemanticKITTI other-object, which no network is trained on.
   street_object,
-  /// Stairs, shelters, rails of stairs: neither.
+  /// Stairs, shelters, handrails: SemanticKITTI other-structure, likewise.
   other_structure,
-  // From here on parts of objects: their class is the object's.
+  // Parts of objects: the class is the object's.
   paint,
   glass,
   tyre,
@@ -46,13 +46,13 @@ enum class Surface : std::uint8_t {
 };
 
 struct SurfaceProperties {
-  /// SemanticKITTI id; 0: the class of the object it belongs to.
+  /// SemanticKITTI id; 0: that of the object it belongs to.
   std::uint16_t label;
-  /// Share of light that comes back at right angles, 0..1; above 1: retroreflective.
+  /// At normal incidence, 0..1; above 1: retroreflective.
   float reflectivity;
-  /// Share of beams that never come back: mirrored away or let through.
+  /// Share of beams without a return: mirrored away or let through.
   float lost = 0.0F;
-  /// Of blades, twigs or cloth that stand over the surface and return some beams early [m].
+  /// Depth of blades, twigs or cloth over the surface that return some beams early [m].
   float pile_m = 0.0F;
 };
 
@@ -60,11 +60,11 @@ inline constexpr std::size_t surface_count = static_cast<std::size_t>(Surface::s
 
 [[nodiscard]] SurfaceProperties properties_of(Surface surface);
 
-/// How the surfaces of one city send light back.
+/// Reflection properties of the surfaces of one city.
 struct Materials {
   /// In the order of `Surface`.
   std::array<SurfaceProperties, surface_count> properties;
-  /// Patches on ground and walls are brighter and darker by up to this share, 0..1.
+  /// Amplitude of brightness patches on ground and walls, as a share, 0..1.
   double patchiness = 0.0;
   /// Size of the coarse patches; the fine ones are a tenth of it [m].
   double patch_m = 6.0;
@@ -72,20 +72,20 @@ struct Materials {
   [[nodiscard]] const SurfaceProperties& of(Surface surface) const {
     return properties[static_cast<std::size_t>(surface)];
   }
-  /// Beams are lost in whole panes and puddles, not one by one.
+  /// Beams are lost in whole panes and puddles instead of independently.
   bool lost_in_panes = false;
 
-  /// The properties of a surface at a spot of it, with its share of lost beams there.
+  /// Properties at a spot of a surface, with the share of lost beams there.
   [[nodiscard]] SurfaceProperties at(Surface surface, const Eigen::Vector3f& spot_map) const;
-  /// Factor on the reflectivity of whatever stands still at `spot_map`.
+  /// Factor on the reflectivity of static surfaces at `spot_map`.
   [[nodiscard]] float patch(const Eigen::Vector3f& spot_map) const;
 };
 
-/// Every surface as `properties_of` has it, without patches.
+/// `properties_of` every surface, without patches.
 [[nodiscard]] Materials default_materials();
 
-/// Every surface brighter or darker than usual by factors that are drawn one by one; plants more or
-/// less thick, windows that mirror more or less, roads wet or dry.
+/// Random reflectivity of each surface, density of plants, specular loss of windows, wet or dry
+/// roads.
 [[nodiscard]] Materials random_materials(Random random);
 
 }  // namespace stillmap::simulation

@@ -8,7 +8,7 @@ namespace {
 
 using Eigen::Vector3f;
 
-// Unit vector round `axis` at `turn` of a full circle.
+// Unit vector perpendicular to `axis`, at `step` of `steps` round it.
 Vector3f rim(const Vector3f& axis, int step, int steps) {
   const Vector3f side = axis.unitOrthogonal();
   const float angle =

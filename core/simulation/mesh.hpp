@@ -11,7 +11,7 @@
 
 namespace stillmap::simulation {
 
-/// Triangles with a surface each. Both sides of a triangle reflect. Lengths in metres.
+/// Triangles with a surface each, reflecting on both sides. Lengths in metres.
 struct Mesh {
   std::vector<Eigen::Vector3f> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
@@ -20,10 +20,10 @@ struct Mesh {
 
   void add_triangle(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c,
                     Surface surface);
-  /// Corners in order round the quadrangle.
+  /// Corners in order along the outline.
   void add_quad(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c,
                 const Eigen::Vector3f& d, Surface surface);
-  /// A copy of `part`, moved.
+  /// Appends a transformed copy of `part`.
   void append(const Mesh& part, const Eigen::Isometry3f& T_mesh_part);
 };
 
@@ -63,7 +63,7 @@ void add_leaf(Mesh& mesh, const Eigen::Vector3f& centre, float leaf_m, Random& r
 struct Foliage {
   int leaves = 260;
   float leaf_m = 0.16F;
-  /// 1: evenly in the whole volume; towards 0: more and more on its surface.
+  /// Exponent of the relative depth: 1 fills the volume, towards 0 leaves gather on its surface.
   double depth_power = 0.4;
   Surface surface = Surface::leaves;
 };

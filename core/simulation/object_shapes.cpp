@@ -10,7 +10,7 @@ namespace {
 ObjectShape measured(ObjectKind kind, Mesh mesh) {
   Eigen::AlignedBox3f box;
   for (const Eigen::Vector3f& vertex : mesh.vertices) box.extend(vertex);
-  // The longer half counts twice: shapes need not be centred on their origin exactly.
+  // Twice the longer half, since shapes need not be centred exactly.
   const float length = 2.0F * std::max(box.max().x(), -box.min().x());
   const float width = 2.0F * std::max(box.max().y(), -box.min().y());
   return {kind, length, width, std::move(mesh)};

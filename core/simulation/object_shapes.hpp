@@ -8,7 +8,7 @@
 
 namespace stillmap::simulation {
 
-/// What an object is; gives its SemanticKITTI ids.
+/// Kind of an object; determines its SemanticKITTI ids.
 enum class ObjectKind : std::uint8_t {
   car,
   truck,
@@ -22,8 +22,8 @@ enum class ObjectKind : std::uint8_t {
   other_vehicle,
 };
 
-/// SemanticKITTI id of an object that stands, and of one that moves (252..259; things nobody
-/// moves have no id for it and keep the first).
+/// SemanticKITTI id of a standing and of a moving object (252..259; bicycles and motorcycles
+/// without a rider have no moving id and keep the standing one).
 [[nodiscard]] std::uint16_t standing_label(ObjectKind kind);
 [[nodiscard]] std::uint16_t moving_label(ObjectKind kind);
 

@@ -13,7 +13,7 @@ void add_limb(Mesh& mesh, const Vector3f& a, const Vector3f& b, float radius, Su
   add_tube(mesh, {a, b, radius, 0.8F * radius, 6}, surface);
 }
 
-// A tyre as a ring that rays pass through.
+// An open ring with spokes, which rays can pass.
 void add_wheel(Mesh& mesh, float x, float radius, float thickness) {
   constexpr int pieces = 12;
   const auto rim = [&](int i) -> Vector3f {
@@ -28,7 +28,7 @@ void add_wheel(Mesh& mesh, float x, float radius, float thickness) {
   }
 }
 
-// Somebody who sits: hips at (x, z), hands and feet where the machine has them.
+// A seated rider: hips at (x, z), hands and feet on the machine.
 void add_rider(Mesh& mesh, float hip_x, float hip_z, const Vector3f& hand, const Vector3f& foot) {
   const Vector3f hip(hip_x, 0, hip_z);
   const Vector3f shoulder(hip_x + 0.28F, 0, hip_z + 0.52F);
@@ -44,7 +44,7 @@ void add_rider(Mesh& mesh, float hip_x, float hip_z, const Vector3f& hand, const
   }
 }
 
-// Longer or shorter and higher or lower, but still on its wheels.
+// Scaled at random in length and height, about its foot.
 Mesh stretched(Mesh mesh, Random& random) {
   const float length = random.between(0.92, 1.08);
   const float height = random.between(0.92, 1.08);

@@ -6,8 +6,8 @@
 
 namespace stillmap::simulation {
 
-/// Numbers that depend on their keys only, never on the order in which others were drawn, so that
-/// any scan can be made first and by any thread.
+/// Random numbers that depend on their keys only, so that scans can be made in any order and on any
+/// thread.
 class Random {
  public:
   explicit constexpr Random(std::uint64_t seed, std::uint64_t a = 0, std::uint64_t b = 0,
@@ -29,7 +29,7 @@ class Random {
   constexpr std::size_t index(std::size_t count) {
     return static_cast<std::size_t>(uniform() * static_cast<double>(count));
   }
-  /// Numbers of their own, drawn from these.
+  /// An independent generator, seeded from this one.
   constexpr Random fork() { return Random(index(1U << 30U)); }
   /// Standard normal (Box-Muller).
   double normal() {

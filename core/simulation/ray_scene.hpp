@@ -21,20 +21,20 @@ struct Ray {
 
 struct RayHit {
   float range_m;
-  /// Of the angle between ray and surface normal, 0..1.
+  /// Absolute cosine of the angle between ray and surface normal, 0..1.
   float cos_incidence;
   Surface surface;
-  /// Index of the body hit, in the order in which they were given to the scene.
+  /// Index of the body hit: the standing ones in order, then the moving ones.
   std::size_t body;
 };
 
-/// A mesh that goes steadily from one pose to another during a scan.
+/// A mesh that moves linearly from one pose to another during a scan.
 struct MovingMesh {
   std::size_t mesh;
   Eigen::Isometry3d T_map_start, T_map_end;
 };
 
-/// A body that stands for ever.
+/// A mesh that never moves.
 struct StandingMesh {
   std::size_t mesh;
   Eigen::Isometry3d T_map_mesh;
@@ -42,7 +42,8 @@ struct StandingMesh {
 
 class RaySnapshot;
 
-/// Meshes in a ray tracer's trees (Embree). Thread-safe once made.
+/// Meshes and standing bodies in Embree's bounding volume hierarchies. Thread-safe once built.
+/// @pre the meshes outlive it.
 class RayScene {
  public:
   RayScene(std::vector<const Mesh*> meshes, std::span<const StandingMesh> standing);
@@ -50,7 +51,7 @@ class RayScene {
   RayScene(const RayScene&) = delete;
   RayScene& operator=(const RayScene&) = delete;
 
-  /// The scene during one scan. Bodies count from the standing ones on.
+  /// The scene during one scan, with these bodies behind the standing ones.
   [[nodiscard]] RaySnapshot with(std::span<const MovingMesh> moving) const;
 
  private:
@@ -68,7 +69,7 @@ class RaySnapshot {
 
   /// The nearest hit, if any.
   [[nodiscard]] std::optional<RayHit> cast(const Ray& ray) const;
-  /// The nearest hit of each ray. Quicker than one by one where they lie close together.
+  /// The nearest hit of each ray; faster than single casts where rays are close together.
   /// @pre rays.size() == hits.size() <= max_rays
   void cast(std::span<const Ray> rays, std::span<std::optional<RayHit>> hits) const;
   static constexpr std::size_t max_rays = 16;

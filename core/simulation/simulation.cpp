@@ -20,7 +20,7 @@ int firings_of(const SimulationConfig& config) {
   return config.sensor.rings > 32 ? 2083 : config.sensor.rings > 16 ? 2170 : 1800;
 }
 
-// What one beam saw in one firing; range 0: nothing.
+// Measurement of one beam in one firing; range 0: no return.
 struct Pixel {
   float range_m = 0.0F;
   float intensity = 0.0F;
@@ -61,7 +61,7 @@ struct Simulation::World {
     return 2.0 * std::numbers::pi * firing / firings;
   }
 
-  /// All bodies at a time: the standing ones as the scene counts them, then the movers.
+  /// All bodies at a time, in the order of `RayHit::body`.
   [[nodiscard]] std::vector<Body> bodies_at(double time_s) const {
     std::vector<Body> bodies = static_bodies;
     for (const Mover& mover : traffic.movers()) bodies.push_back(traffic.body_at(mover, time_s));
@@ -79,7 +79,7 @@ struct Simulation::World {
   }
 
   [[nodiscard]] Eigen::Isometry3d T_map_lidar_at(double time_s) const {
-    // Springs: the body nods when it brakes, and is never quite still while it drives.
+    // Suspension: pitches with acceleration and vibrates while driving.
     const double dt = 0.2;
     const double v = traffic.ego_speed_at(time_s);
     const double nod =
@@ -98,7 +98,7 @@ struct Simulation::World {
     const Body& body = bodies[hit.body];
     const Eigen::Vector3f spot_map = ray.origin_map + hit.range_m * ray.direction_map;
     const SurfaceProperties properties = config.materials.at(hit.surface, spot_map);
-    // What moves carries its own paint along; only what stands has patches.
+    // Patches are fixed to the map; countable objects have none.
     const float patch = body.instance != 0 ? 1.0F : config.materials.patch(spot_map);
     BeamNoise noise = config.noise;
     noise.min_return /= config.flaws.beam(ring).gain;
@@ -120,12 +120,12 @@ struct Simulation::World {
     return {beam.x() * level.x(), beam.x() * level.y(), beam.y()};
   }
 
-  /// Where the beams of a ring start, in the lidar's frame.
+  /// In the lidar's frame.
   [[nodiscard]] Eigen::Vector3f beam_origin(std::size_t ring) const {
     return {0.0F, 0.0F, static_cast<float>(config.flaws.beam(ring).height_m)};
   }
 
-  [[nodiscard]] std::vector<Pixel> turn(int index) const;
+  [[nodiscard]] std::vector<Pixel> fire_revolution(int index) const;
   void mix_edges(int index, std::vector<Pixel>& pixels) const;
   [[nodiscard]] SimulatedScan collect(int index, const std::vector<Pixel>& pixels) const;
 
@@ -140,14 +140,14 @@ struct Simulation::World {
   std::vector<Body> static_bodies;
 };
 
-std::vector<Pixel> Simulation::World::turn(int index) const {
+std::vector<Pixel> Simulation::World::fire_revolution(int index) const {
   const double period_s = config.rolling ? config.sensor.period_s : 0.0;
   const double start_s = index * config.sensor.period_s;
   const std::vector<Body> bodies = bodies_at(start_s);
   const RaySnapshot snapshot = scene.with(motions(start_s, start_s + period_s));
   std::vector<Pixel> pixels(beams.size() * static_cast<std::size_t>(firings));
   const Eigen::Isometry3f T_map_start = T_map_lidar_at(start_s).cast<float>();
-  // A few firings of one ring at a time: their beams lie close together.
+  // Packets of consecutive firings of one ring: coherent rays.
   const auto fire_some = [&](std::size_t ring, int first, int last) {
     std::array<Ray, RaySnapshot::max_rays> rays;
     std::array<std::size_t, RaySnapshot::max_rays> targets{};
@@ -181,7 +181,7 @@ std::vector<Pixel> Simulation::World::turn(int index) const {
   return pixels;
 }
 
-// A beam that two surfaces share reports a range between them.
+// Mixed pixels: a beam that hits two surfaces reports a range between theirs.
 void Simulation::World::mix_edges(int index, std::vector<Pixel>& pixels) const {
   if (config.flaws.mixed_share == 0.0) return;
   constexpr float min_step_m = 0.3F;
@@ -247,7 +247,7 @@ const SimulationConfig& Simulation::config() const { return world_->config; }
 
 SimulatedScan Simulation::scan(int index) const {
   assert(index >= 0 && index < world_->config.scans);
-  return world_->collect(index, world_->turn(index));
+  return world_->collect(index, world_->fire_revolution(index));
 }
 
 Eigen::Isometry3d Simulation::T_map_lidar_at(double time_s) const {

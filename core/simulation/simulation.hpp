@@ -16,40 +16,40 @@ namespace stillmap::simulation {
 
 struct SimulationConfig {
   CityPlan plan = quiet_city();
-  /// Another seed is another city with other traffic.
+  /// Determines city and traffic.
   std::uint64_t seed = 1;
   SensorModel sensor = hdl_64e();
-  /// Scans that exist, one every `sensor.period_s`.
+  /// Length of the sequence, one scan every `sensor.period_s`.
   int scans = 400;
-  /// Firings of each beam in a revolution; 0: what the sensor does at 10 Hz.
+  /// Firings of each beam in a revolution; 0: the sensor's at 10 Hz.
   int firings = 0;
-  /// True: the lidar and the traffic move while the lidar turns, every point has its time.
-  /// False: all points are of one instant.
+  /// True: lidar and traffic move during a revolution and every point has its time. False: all
+  /// points are measured at the stamp.
   bool rolling = false;
   double lidar_height_m = 1.73;
   BeamNoise noise;
   LidarFlaws flaws;
   Materials materials = default_materials();
 
-  /// Every fault in words, one a line; empty when it can be simulated.
+  /// All faults, one a line; empty when the configuration is valid.
   [[nodiscard]] std::string faults() const;
 };
 
-/// A scan and the truth about it.
+/// A scan with ground truth.
 struct SimulatedScan {
   /// Ring after ring from the highest, each anticlockwise from straight ahead. Labels are those
   /// of `raw_labels`, reduced to the network's classes. With `rolling`, points are in the lidar's
   /// frame at their own time, else at the stamp.
   Scan scan;
-  /// SemanticKITTI: class id (252..259 for what moves) in the low 16 bits, instance id in the high.
+  /// SemanticKITTI: class id (252..259: moving) in the low 16 bits, instance id in the high ones.
   std::vector<std::uint32_t> raw_labels;
   /// True pose of the lidar at the stamp.
   Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
   std::int64_t stamp_ns = 0;
 };
 
-/// A drive with a lidar through a made-up city. Deterministic: the same configuration gives the
-/// same bits, in whatever order and on however many threads. `scan` is thread-safe.
+/// A lidar sequence in a synthetic city. Deterministic: the same configuration gives the same bits,
+/// in any order and on any number of threads. `scan` is thread-safe.
 class Simulation {
  public:
   /// @throws std::invalid_argument with all faults of the configuration.

@@ -25,7 +25,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr float ego_length_m = 4.6F;
-// Traffic has sorted itself by the time of the first scan.
+// Simulated before the first scan, until the traffic is in its steady state.
 constexpr double warm_up_s = 15.0;
 constexpr double stands_below_mps = 0.1;
 constexpr double crossing_mps = 1.7;
@@ -51,7 +51,7 @@ double wheelbase(ObjectKind kind) {
   }
 }
 
-// One behind the other with uneven gaps, once round the lane.
+// Start positions once round the lane, with uneven gaps.
 std::vector<LaneUser> spread_out(const LaneParticipants& participants, double lane_m,
                                  double first_m, Random& random) {
   const std::vector<double>& lengths = participants.lengths_m;
@@ -68,7 +68,7 @@ std::vector<LaneUser> spread_out(const LaneParticipants& participants, double la
   return users;
 }
 
-// Across the road and back, two thirds of a step beside the way there.
+// Across the road and back, 0.4 m beside.
 std::vector<Vector2d> there_and_back(const Vector2d& middle, const Vector2d& across,
                                      double half_way_m) {
   const Vector2d side = 0.2 * Vector2d(across.y(), -across.x());
@@ -112,7 +112,7 @@ Traffic::Traffic(const GroundShape& ground, std::uint64_t seed, TimeSpan span,
     for (int lane = 0; lane < profile.lanes; ++lane) add_vehicle_lane(reversed, lane, random);
     add_slow_lane(ObjectKind::bicyclist, reversed, profile.bike_centre_m(), 5.0,
                   traffic.cyclists_per_km, random);
-    // Two walking lanes a sidewalk, against each other.
+    // Two walking lanes of opposite direction on each sidewalk.
     const double back = profile.half_street_m();
     const double walk_m = traffic.pedestrians_per_km / 2.0;
     add_slow_lane(ObjectKind::person, reversed, back - 0.6, 1.35, walk_m, random);
@@ -178,7 +178,7 @@ LaneParticipants Traffic::vehicle_participants(const Path& lane, std::optional<O
     participants.add(shape, shapes_[shape].length_m, traffic.speed_mps);
   }
   const auto wanted = static_cast<std::size_t>(traffic.vehicles_per_km * lane.length_m() / 1000.0);
-  // Room for everybody at walking pace, whatever is drawn.
+  // The lane must hold all participants with gaps of 3 m.
   double room_m = lane.length_m() - 40.0;
   while (participants.shapes.size() < wanted) {
     const std::size_t shape = random_shape(random_vehicle(random), random);
@@ -250,7 +250,7 @@ void Traffic::add_crossing_people(Random& random) {
   const CityPlan& plan = ground_.plan();
   if (plan.crossings.empty()) return;
   const double half_way = plan.route_profile.half_road_m() + 1.1;
-  // On a wide road people wait again on the median, half way.
+  // Where there is a median, people wait there for the next red.
   const double stages = plan.route_profile.half_median_m > 0.8 ? 4.0 : 2.0;
   const auto here = static_cast<std::size_t>(plan.traffic.crossing_pedestrians);
   const std::size_t each = (here + plan.crossings.size() - 1) / plan.crossings.size();

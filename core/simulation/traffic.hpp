@@ -9,7 +9,7 @@
 
 namespace stillmap::simulation {
 
-/// Somebody on a path.
+/// A moving object on its path.
 struct Mover {
   /// Indices in `Traffic::shapes` and `Traffic::paths`.
   std::size_t shape = 0;
@@ -22,18 +22,18 @@ struct Mover {
 /// The users of one lane, in order of their start.
 struct LaneParticipants;
 
-/// All that moves in the city, and the ego vehicle, over a span of time. Times count from the
-/// first scan [s].
+/// Everything that moves in the city, and the ego vehicle, over a span of time. Times count from
+/// the first scan [s].
 class Traffic {
  public:
-  /// @param first_instance instance ids from here on are free.
+  /// @param first_instance instance ids above it are free.
   Traffic(const GroundShape& ground, std::uint64_t seed, TimeSpan span,
           std::uint16_t first_instance);
 
   [[nodiscard]] const std::vector<ObjectShape>& shapes() const { return shapes_; }
   [[nodiscard]] const std::vector<Mover>& movers() const { return movers_; }
-  /// The mover at that time; `shape` counts in `shapes()`. Its label is a moving one (252..259)
-  /// above 0.1 m/s.
+  /// The mover at that time; `shape` is an index in `shapes()`. Above 0.1 m/s its label is a moving
+  /// one (252..259).
   [[nodiscard]] Body body_at(const Mover& mover, double time_s) const;
   /// The ego vehicle's frame on the ground, below its lidar.
   [[nodiscard]] Eigen::Isometry3d T_map_ego_at(double time_s) const;

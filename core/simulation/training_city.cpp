@@ -11,10 +11,10 @@ using Eigen::Vector2d;
 
 constexpr double degree = std::numbers::pi / 180.0;
 constexpr double min_spacing_m = 8.0;
-// Of a drive; long enough to come round the longest route.
-constexpr int drive_scans = 900;
+// Long enough for one round of the longest route.
+constexpr int sequence_scans = 900;
 
-// Evenly spaced beams over a field of view that no sensor of ours has.
+// Evenly spaced beams over a random field of view.
 SensorModel random_sensor(Random& random) {
   SensorModel sensor;
   sensor.name = "evenly spaced";
@@ -38,13 +38,13 @@ BeamNoise random_noise(Random& random) {
           .min_return = 1.2e-5 * std::exp(random.uniform(-1.0, 1.4))};
 }
 
-// A drive as `stillmap simulate` makes it by default.
-SimulationConfig plain_drive(std::uint64_t seed, Random& random) {
+// A sequence as `stillmap simulate` makes it by default.
+SimulationConfig plain_sequence(std::uint64_t seed, Random& random) {
   SimulationConfig config;
   config.plan = random.chance(0.5) ? quiet_city() : crowded_avenue();
   config.seed = seed;
   config.sensor = random.chance(0.75) ? hdl_64e() : vlp_16();
-  config.scans = drive_scans;
+  config.scans = sequence_scans;
   return config;
 }
 
@@ -65,14 +65,14 @@ StreetProfile random_profile(Random& random) {
   return profile;
 }
 
-// A block ring, and perhaps a side street of another kind that crosses it.
+// A ring of streets round one block, perhaps crossed by a side street of another kind.
 void draw_streets(CityPlan& plan, Random& random) {
   plan.route_profile = random_profile(random);
   const double half = plan.route_profile.half_street_m();
   plan.turn_radius_m = plan.route_profile.bike_centre_m() + 3.0;
-  const double least = std::max(2.0 * plan.turn_radius_m + 30.0, 2.0 * half + 30.0);
-  const double width = least + random.uniform(20.0, 90.0);
-  const double depth = least + random.uniform(0.0, 50.0);
+  const double min_side_m = std::max(2.0 * plan.turn_radius_m + 30.0, 2.0 * half + 30.0);
+  const double width = min_side_m + random.uniform(20.0, 90.0);
+  const double depth = min_side_m + random.uniform(0.0, 50.0);
   plan.streets_along_v = {{0.0, plan.route_profile}, {width, plan.route_profile}};
   plan.streets_along_u = {{0.0, plan.route_profile}, {depth, plan.route_profile}};
   plan.route = {{0, 0}, {width, 0}, {width, depth}, {0, depth}};
@@ -180,14 +180,14 @@ CityPlan training_plan(Random random) {
 
 SimulationConfig training_sequence(std::uint64_t seed, double share_of_plain) {
   Random random(seed, 91);
-  if (random.chance(share_of_plain)) return plain_drive(seed, random);
+  if (random.chance(share_of_plain)) return plain_sequence(seed, random);
   SimulationConfig config;
   config.plan = training_plan(Random(seed, 92));
   config.seed = seed;
   config.sensor = any_sensor(random);
   config.sensor.max_range_m = random.uniform(60.0, 120.0);
   config.sensor.min_range_m = random.uniform(0.5, 1.5);
-  config.scans = drive_scans;
+  config.scans = sequence_scans;
   const bool low_mount = config.sensor.rings <= 16;
   config.lidar_height_m = random.uniform(low_mount ? 0.4 : 1.4, 2.2);
   config.noise = random_noise(random);

@@ -7,10 +7,10 @@
 
 namespace stillmap::simulation {
 
-/// A drive for training: `training_plan`, drawn materials, and a drawn lidar with drawn flaws
-/// (60 % HDL-64E, 20 % VLP-16, 10 % HDL-32E, 10 % sensors that nobody builds). This share of all
-/// drives are plain ones through `quiet_city` or `crowded_avenue`. The same seed and share give the
-/// same drive.
+/// A sequence for training: random city, materials, and lidar with random flaws (60 % HDL-64E, 20 %
+/// VLP-16, 10 % HDL-32E, 10 % with evenly spaced beams). `share_of_plain` of all sequences are
+/// without flaws, in `quiet_city` or `crowded_avenue`. The same seed and share give the same
+/// sequence.
 [[nodiscard]] SimulationConfig training_sequence(std::uint64_t seed, double share_of_plain = 0.4);
 
 /// Up to `count` scans of the sequence, spread over the route and at least 8 m apart.

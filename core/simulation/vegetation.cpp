@@ -9,10 +9,10 @@ namespace {
 
 using Eigen::Vector3f;
 
-// What a tree is before its leaves are drawn.
+// Measures of a tree.
 struct TreePlan {
   float height_m, trunk_m, spread_m, radius_m, leaf_m;
-  /// How much of the crown's outline leaves cover, seen from a side.
+  /// Leaf area relative to the crown's outline from the side.
   float cover;
   bool conifer;
 };
@@ -30,7 +30,7 @@ TreePlan random_tree(Random& random) {
   return tree;
 }
 
-// Leaves that cover an ellipsoid's outline as often as wished.
+// Leaves that cover an ellipsoid's outline `tree.cover` times.
 Foliage foliage_of(const TreePlan& tree, const Vector3f& radii) {
   const float outline = std::numbers::pi_v<float> * radii.x() * radii.z();
   const float leaf = 0.6F * tree.leaf_m * tree.leaf_m;
@@ -164,7 +164,7 @@ Mesh make_hedge(float length_m, float height_m, float depth_m, Random random) {
                                random.uniform(0.02, 1.0) * height_m);
     add_leaf(mesh, spot.cast<float>(), 0.12F, random, Surface::hedge);
   }
-  // The twigs inside: nothing is seen through a hedge below its top.
+  // Twigs inside: opaque below the top.
   add_box(mesh, {0, -0.3F * depth_m, -0.3F}, {length_m, 0.3F * depth_m, 0.85F * height_m},
           Surface::hedge);
   return mesh;

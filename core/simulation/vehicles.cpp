@@ -38,7 +38,7 @@ constexpr std::array<CarBody, 8> car_bodies{{
     {5.4F, 1.00F, 2.40F, 1.25F, 1.05F, 0.75F, 0.02F, 0.08F, 1.2F},   // delivery van
 }};
 
-// No two cars of a kind are alike; the bonnet stays below the cabin and the roof inside it.
+// Random measures; the bonnet stays below the cabin and the roof within it.
 CarBody varied(CarBody car, Random& random) {
   const auto factor = [&] { return random.between(0.94, 1.06); };
   car.length *= factor();
@@ -112,7 +112,7 @@ Mesh make_lorry(Random& random) {
   return mesh;
 }
 
-// A driver's cab like a van's and a body of its own behind it.
+// Box van, tipper or pick-up: a van's cab and a separate body.
 Mesh make_small_truck(Random& random) {
   Mesh mesh;
   const float front = random.between(2.5, 3.2);

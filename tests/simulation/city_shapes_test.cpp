@@ -1,4 +1,4 @@
-// Shapes of every kind, whatever is drawn.
+// Properties that all random shapes share.
 #include "core/simulation/city_shapes.hpp"
 
 #include <gmock/gmock.h>
@@ -19,7 +19,7 @@ Eigen::AlignedBox3f bounds(const Mesh& mesh) {
 struct Kind {
   const char* name;
   std::function<Mesh(Random)> make;
-  /// Reach to the sides, least and largest height [m].
+  /// Largest horizontal coordinate, lowest and highest top [m].
   float reach, min_height, max_height;
 };
 
@@ -60,7 +60,7 @@ TEST(AnyShape, DrawsAgainTheSameAndOtherwiseAnother) {
   }
 }
 
-// Share of level rays across a field of it, 0.3 to 0.9 m high, that are stopped.
+// Share of horizontal rays, 0.3 to 0.9 m high, that one field stops.
 double opacity(const Mesh& mesh) {
   const StandingMesh standing{0, Eigen::Isometry3d::Identity()};
   const RayScene scene({&mesh}, std::span(&standing, 1));

@@ -1,4 +1,4 @@
-// What the simulated scans show: the city as it should look to a lidar.
+// Properties of the simulated scans of the presets.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -28,7 +28,7 @@ double moving_share(const SimulatedScan& out) {
   return static_cast<double>(moving) / static_cast<double>(out.raw_labels.size());
 }
 
-// Cells of a map that hold points.
+// Occupied cells of a grid.
 class Voxels {
  public:
   explicit Voxels(double size_m) : size_m_(size_m) {}
@@ -83,7 +83,7 @@ class Avenue : public testing::Test {
 const Simulation* Avenue::avenue_ = nullptr;
 
 TEST_F(Avenue, TruePosesDoNotLayMovingPointsOnEachOther) {
-  // A car's sides slide along themselves; its ends do not.
+  // The sides of a moving car overlap themselves; its ends do not.
   EXPECT_LT(share_found_again(avenue_->scan(0), avenue_->scan(4), moves), 0.8);
 }
 

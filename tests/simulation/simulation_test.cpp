@@ -122,7 +122,7 @@ std::vector<Eigen::Vector3d> walls_map(const SimulatedScan& out) {
   return walls;
 }
 
-// To the plane through the eight points next to it.
+// Distance to the plane through the eight nearest points.
 double plane_distance_m(std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& spot) {
   constexpr std::ptrdiff_t neighbours = 8;
   std::ranges::nth_element(points, points.begin() + neighbours, {},
@@ -134,8 +134,8 @@ double plane_distance_m(std::vector<Eigen::Vector3d>& points, const Eigen::Vecto
   return std::abs(axes.eigenvectors().col(0).dot(spot - mean));
 }
 
-// Two of three points of the rolling scan's walls are nearer than this to those of the deskewed
-// one, after every point was put into the map with `T_map_lidar_of` its time.
+// 67th percentile of the distances of the rolling scan's wall points to the walls of the deskewed
+// one. Each point is transformed to the map with `T_map_lidar_of` its time.
 template <class Pose>
 double wall_distance_m(const SimulatedScan& turned, const SimulatedScan& still,
                        Pose T_map_lidar_of) {

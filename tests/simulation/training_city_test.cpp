@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::uint64_t first_seed = 4000;
 
-// Fewer firings: the same things are seen, sooner.
+// Fewer firings, to be quick.
 SimulationConfig quick_sequence(std::uint64_t seed) {
   SimulationConfig config = training_sequence(seed);
   config.firings = 500;
@@ -68,7 +68,7 @@ TEST(TrainingSequence, ScansAreFarApartAndAsManyAsWanted) {
       const double period_s = sequence.config().sensor.period_s;
       const Eigen::Vector3d step = sequence.T_map_lidar_at(scans[i] * period_s).translation() -
                                    sequence.T_map_lidar_at(scans[i - 1] * period_s).translation();
-      // Along the way it is 8 m; a turn lies between some.
+      // 8 m along the route, less in a straight line where it turns.
       EXPECT_GT(step.norm(), 4.0) << seed;
     }
   }
