@@ -17,7 +17,7 @@ using test::straight;
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-std::string refusal(const simulation::Path& truth, const simulation::Path& estimate) {
+std::string refusal(const Path& truth, const Path& estimate) {
   try {
     (void)pair_by_index(truth, estimate);
   } catch (const std::invalid_argument& error) {
@@ -41,17 +41,17 @@ TEST(PairByIndex, RefusesDifferentLengthsWithBothNumbers) {
 TEST(PairByIndex, RefusesNoPoses) { EXPECT_THAT(refusal({}, {}), HasSubstr("no poses")); }
 
 TEST(PairByIndex, NamesThePoseThatIsNotFinite) {
-  simulation::Path broken = straight(4, 1.0);
+  Path broken = straight(4, 1.0);
   broken[2].translation().y() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_THAT(refusal(straight(4, 1.0), broken), HasSubstr("estimated pose 2"));
   EXPECT_THAT(refusal(broken, straight(4, 1.0)), HasSubstr("true pose 2"));
 }
 
 TEST(PairByIndex, RefusesScaledAndMirroredMatrices) {
-  simulation::Path scaled = straight(2, 1.0);
+  Path scaled = straight(2, 1.0);
   scaled[1].linear() *= 1.1;
   EXPECT_THAT(refusal(scaled, straight(2, 1.0)), HasSubstr("not a rotation"));
-  simulation::Path mirrored = straight(2, 1.0);
+  Path mirrored = straight(2, 1.0);
   mirrored[1].linear()(2, 2) = -1.0;
   EXPECT_THAT(refusal(mirrored, straight(2, 1.0)), HasSubstr("not a rotation"));
 }
@@ -84,7 +84,7 @@ TEST(PairByStamp, RefusesStampsThatDoNotGrowAndPathsThatNeverMeet) {
 }
 
 TEST(DistanceTravelled, AddsUpTheSteps) {
-  const simulation::Path path{pose(0, 0, 0), pose(3, 4, 0), pose(3, 4, 2)};
+  const Path path{pose(0, 0, 0), pose(3, 4, 0), pose(3, 4, 2)};
   EXPECT_THAT(distance_travelled(path), ElementsAre(0.0, 5.0, 7.0));
   EXPECT_TRUE(distance_travelled({}).empty());
 }

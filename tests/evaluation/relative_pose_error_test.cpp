@@ -16,8 +16,8 @@ using test::straight;
 using test::winding;
 
 // A path that repeats one motion.
-simulation::Path repeated(const Eigen::Isometry3d& step, std::size_t count) {
-  simulation::Path path{Eigen::Isometry3d::Identity()};
+Path repeated(const Eigen::Isometry3d& step, std::size_t count) {
+  Path path{Eigen::Isometry3d::Identity()};
   while (path.size() < count) path.push_back(path.back() * step);
   return path;
 }

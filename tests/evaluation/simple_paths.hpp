@@ -7,7 +7,7 @@
 
 namespace stillmap::test {
 
-using simulation::Path = std::vector<Eigen::Isometry3d>;
+using Path = std::vector<Eigen::Isometry3d>;
 
 inline Eigen::Isometry3d pose(double x, double y, double z, double yaw = 0.0) {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
@@ -17,8 +17,8 @@ inline Eigen::Isometry3d pose(double x, double y, double z, double yaw = 0.0) {
 }
 
 /// `count` poses, `step_m` apart, along x.
-inline simulation::Path straight(std::size_t count, double step_m) {
-  simulation::Path path;
+inline Path straight(std::size_t count, double step_m) {
+  Path path;
   for (std::size_t i = 0; i < count; ++i) {
     path.push_back(pose(step_m * static_cast<double>(i), 0.0, 0.0));
   }
@@ -26,8 +26,8 @@ inline simulation::Path straight(std::size_t count, double step_m) {
 }
 
 /// A bent path with height: its points do not lie on a line or plane.
-inline simulation::Path winding(std::size_t count) {
-  simulation::Path path;
+inline Path winding(std::size_t count) {
+  Path path;
   for (std::size_t i = 0; i < count; ++i) {
     const double t = 0.1 * static_cast<double>(i);
     path.push_back(
@@ -37,9 +37,8 @@ inline simulation::Path winding(std::size_t count) {
 }
 
 /// Every pose of the path as seen from another world frame.
-inline simulation::Path moved(const Eigen::Isometry3d& T_other_world,
-                              const simulation::Path& path) {
-  simulation::Path result;
+inline Path moved(const Eigen::Isometry3d& T_other_world, const Path& path) {
+  Path result;
   for (const Eigen::Isometry3d& T : path) result.push_back(T_other_world * T);
   return result;
 }

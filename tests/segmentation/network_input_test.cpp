@@ -14,7 +14,7 @@ using test::project;
 using test::random_network;
 using test::random_scan;
 
-const ModelDescription model = cli::describe(random_network(8, 32, 3));
+const ModelDescription model = describe(random_network(8, 32, 3));
 constexpr std::size_t pixels = 8 * 32;
 
 /// Value of `channel` of the point, not yet normalised.

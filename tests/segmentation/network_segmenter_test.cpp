@@ -56,7 +56,7 @@ std::size_t shown_point(const Scan& scan, const RangeImage& image, std::size_t p
 
 struct Fixture {
   TinyNetwork network = random_network(8, 32, 20);
-  ModelDescription model = cli::describe(network);
+  ModelDescription model = describe(network);
   Fixture() { model.network_file = write_model(onnx_bytes(network)); }
 };
 
@@ -149,8 +149,7 @@ class OneClass final : public SegmentationNetwork {
 };
 
 TEST(NetworkSegmenter, LooksAsCoarselyAsItIsTold) {
-  NetworkSegmenter labels(cli::describe(random_network(2, 32, 20)),
-                          std::make_unique<OneClass>(64U, 9));
+  NetworkSegmenter labels(describe(random_network(2, 32, 20)), std::make_unique<OneClass>(64U, 9));
   EXPECT_EQ(labels.relative_costs(), std::vector{1.0});
   labels.add_lower_resolution(16, std::make_unique<OneClass>(32U, 1));
   EXPECT_EQ(labels.relative_costs(), (std::vector{1.0, 0.5}));
@@ -182,7 +181,7 @@ TEST(NetworkSegmenter, OpensAModelInTheWidthsThatItKnows) {
 }
 
 TEST(NetworkSegmenter, LeavesPointsUnlabeledWhereTheNetworkFails) {
-  const ModelDescription model = cli::describe(random_network(1, 2, 20));
+  const ModelDescription model = describe(random_network(1, 2, 20));
   NetworkSegmenter labels(model, std::make_unique<HalfBlind>());
   Scan scan;
   scan.points_lidar = {{0.0F, 5.0F, 0.0F}, {0.0F, -5.0F, 0.0F}};

@@ -31,7 +31,7 @@ std::string refusal(const ModelDescription& model) {
 }
 
 std::string refusal(const TinyNetwork& network) {
-  ModelDescription model = cli::describe(network);
+  ModelDescription model = describe(network);
   model.network_file = write_model(onnx_bytes(network));
   return refusal(model);
 }
@@ -40,7 +40,7 @@ TEST(OpenCvNetwork, TakesASoundModel) { EXPECT_EQ(refusal(random_network(8, 32, 
 
 TEST(OpenCvNetwork, GivesTheSameWithAndWithoutSoftMaxInTheModel) {
   TinyNetwork tiny = random_network(8, 32, 20);
-  ModelDescription model = cli::describe(tiny);
+  ModelDescription model = describe(tiny);
   std::vector<float> input(5 * 8 * 32);
   for (std::size_t i = 0; i < input.size(); ++i) input[i] = static_cast<float>(i % 17) / 8.0F;
   model.network_file = write_model(onnx_bytes(tiny));
@@ -55,7 +55,7 @@ TEST(OpenCvNetwork, GivesTheSameWithAndWithoutSoftMaxInTheModel) {
 
 TEST(OpenCvNetwork, RefusesAnImageOfAnotherSize) {
   TinyNetwork tiny = random_network(8, 32, 3);
-  ModelDescription model = cli::describe(tiny);
+  ModelDescription model = describe(tiny);
   model.network_file = write_model(onnx_bytes(tiny));
   model.columns = 64;
   EXPECT_THAT(refusal(model),
@@ -89,7 +89,7 @@ TEST(OpenCvNetwork, NamesAnOperatorThatItDoesNotKnow) {
 }
 
 TEST(OpenCvNetwork, RefusesADescriptionWithFaults) {
-  ModelDescription model = cli::describe(random_network(8, 32, 3));
+  ModelDescription model = describe(random_network(8, 32, 3));
   model.network_file = write_model(onnx_bytes(random_network(8, 32, 3)));
   model.statistics.deviation[3] = 0.0F;
   model.rows = 0;

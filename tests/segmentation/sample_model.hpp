@@ -23,7 +23,7 @@ inline ModelDescription describe_family(int rows, int columns, int outputs) {
 }
 
 /// Fits `network`; output n is class n.
-inline ModelDescription cli::describe(const TinyNetwork& network) {
+inline ModelDescription describe(const TinyNetwork& network) {
   return describe_family(network.rows, network.columns, static_cast<int>(network.bias.size()));
 }
 

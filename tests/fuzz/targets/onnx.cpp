@@ -13,7 +13,7 @@ namespace {
 
 constexpr int rows = 8, columns = 32, classes = 3;
 
-ModelDescription cli::describe(const std::filesystem::path& file) {
+ModelDescription describe(const std::filesystem::path& file) {
   ModelDescription model;
   model.name = "fuzzed";
   model.network_file = file;
@@ -47,7 +47,7 @@ void plan(const ModelDescription& model) {
 
 void run(Bytes bytes) {
   try {
-    plan(cli::describe(MemoryFolder::of_this_process().file("model.onnx", bytes)));
+    plan(describe(MemoryFolder::of_this_process().file("model.onnx", bytes)));
   } catch (const ModelError&) {
   } catch (const GraphFault&) {
   }
