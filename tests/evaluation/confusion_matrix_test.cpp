@@ -7,8 +7,6 @@
 #include <stdexcept>
 #include <vector>
 
-#include "core/evaluation/class_groups.hpp"
-
 namespace stillmap::evaluation {
 namespace {
 

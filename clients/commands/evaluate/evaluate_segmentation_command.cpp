@@ -12,7 +12,6 @@
 #include "clients/terminal/table.hpp"
 #include "core/dataset/binary_file.hpp"
 #include "core/dataset/kitti_files.hpp"
-#include "core/evaluation/class_groups.hpp"
 #include "core/evaluation/confusion_matrix.hpp"
 #include "core/picture/segmentation_picture.hpp"
 

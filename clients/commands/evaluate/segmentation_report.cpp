@@ -4,7 +4,7 @@
 #include <optional>
 
 #include "clients/terminal/table.hpp"
-#include "core/evaluation/class_groups.hpp"
+#include "core/evaluation/confusion_matrix.hpp"
 
 namespace stillmap::cli {
 namespace {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/evaluation/pose_pairs.hpp"
+#include "core/evaluation/trajectory_error.hpp"
 #include "core/lidar/trajectory.hpp"
 
 namespace stillmap::cli {

@@ -5,9 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "core/evaluation/absolute_trajectory_error.hpp"
-#include "core/evaluation/pose_pairs.hpp"
-#include "core/evaluation/relative_pose_error.hpp"
+#include "core/evaluation/trajectory_error.hpp"
 #include "core/picture/trajectory_picture.hpp"
 
 namespace stillmap::cli {
