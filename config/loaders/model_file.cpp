@@ -8,10 +8,9 @@
 #include "config/loaders/int8_file.hpp"
 #include "config/loaders/model_folder.hpp"
 #include "config/loaders/yaml_section.hpp"
-#include "core/segmentation/fallback_segmenter.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/network_segmenter.hpp"
-#include "core/segmentation/passthrough_segmenter.hpp"
+#include "core/segmentation/segmenter.hpp"
 
 namespace stillmap {
 namespace {

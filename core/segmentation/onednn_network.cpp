@@ -1,14 +1,17 @@
 #include "core/segmentation/onednn_network.hpp"
 
+#include <dnnl.h>
+
 #include <cassert>
 
-#include "core/segmentation/graph/equalise_channels.hpp"
+#include "core/segmentation/int8_calibration.hpp"
 #include "core/segmentation/model_error.hpp"
+#include "core/segmentation/network_input.hpp"
 #include "core/segmentation/onednn/compiled_plan.hpp"
 #include "core/segmentation/onednn/execution_plan.hpp"
+#include "core/segmentation/onednn/openmp_threads.hpp"
 #include "core/segmentation/onednn/prepare_network.hpp"
 #include "core/segmentation/pixel_scores.hpp"
-#include "core/segmentation/trial_input.hpp"
 
 namespace stillmap {
 namespace {
@@ -96,5 +99,41 @@ void OneDnnNetwork::observe(std::span<const float> input, const Observer& observ
 double OneDnnNetwork::giga_operations() const { return state_->giga_operations; }
 std::size_t OneDnnNetwork::memory_bytes() const { return state_->plan->memory_bytes(); }
 std::vector<std::string> OneDnnNetwork::steps() const { return state_->plan->steps(); }
+
+namespace {
+
+constexpr dnnl_dim_t size = 1536;
+constexpr std::size_t values = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+
+}  // namespace
+
+MatrixProduct::MatrixProduct(Precision precision, int threads)
+    : precision_(precision), threads_(threads > 0 ? threads : omp_get_max_threads()) {
+  if (precision == Precision::fp32) {
+    left_.assign(values, 0.5F);
+    right_.assign(values, 0.25F);
+    product_.assign(values, 0.0F);
+  } else {
+    left_u8_.assign(values, 3);
+    right_s8_.assign(values, 2);
+    product_s32_.assign(values, 0);
+  }
+}
+
+void MatrixProduct::run() {
+  const OpenMpThreads set(threads_);
+  if (precision_ == Precision::fp32) {
+    dnnl_sgemm('N', 'N', size, size, size, 1.0F, left_.data(), size, right_.data(), size, 0.0F,
+               product_.data(), size);
+  } else {
+    const std::int32_t offset = 0;
+    dnnl_gemm_u8s8s32('N', 'N', 'F', size, size, size, 1.0F, left_u8_.data(), size, 0,
+                      right_s8_.data(), size, 0, 0.0F, product_s32_.data(), size, &offset);
+  }
+}
+
+double MatrixProduct::giga_operations() {
+  return 2.0 * static_cast<double>(size) * static_cast<double>(values) / 1e9;
+}
 
 }  // namespace stillmap

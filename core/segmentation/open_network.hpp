@@ -1,5 +1,6 @@
 #pragma once
 
+#include <filesystem>
 #include <memory>
 #include <string>
 
@@ -38,5 +39,11 @@ struct OpenedNetwork {
 /// Loads the network that `model` describes into the engine that was chosen. Throws ModelError.
 [[nodiscard]] OpenedNetwork open_network(const ModelDescription& model,
                                          const EngineOptions& choice);
+
+/// A description that lets a network file be run which has none, as for measuring its speed: the
+/// size that the file declares or else rows x columns, no normalisation, outputs without a meaning.
+/// Throws ModelError.
+[[nodiscard]] ModelDescription describe_bare_network(const std::filesystem::path& network_file,
+                                                     int rows, int columns);
 
 }  // namespace stillmap

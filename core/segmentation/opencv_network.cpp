@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "core/segmentation/model_error.hpp"
+#include "core/segmentation/network_input.hpp"
 #include "core/segmentation/onnx/onnx_file.hpp"
 #include "core/segmentation/pixel_scores.hpp"
-#include "core/segmentation/trial_input.hpp"
 
 namespace stillmap {
 namespace {

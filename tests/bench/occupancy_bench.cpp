@@ -14,7 +14,7 @@
 #include "core/mapper.hpp"
 #include "core/occupancy/occupancy_map.hpp"
 #include "core/occupancy/octomap_file.hpp"
-#include "core/segmentation/passthrough_segmenter.hpp"
+#include "core/segmentation/segmenter.hpp"
 #include "core/simulation/simulation.hpp"
 
 // One drive, mapped into the static map and into an octree at the same time. STILLMAP_BENCH_DATA

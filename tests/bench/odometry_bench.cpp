@@ -10,7 +10,7 @@
 #include "core/mapper.hpp"
 #include "core/odometry/features.hpp"
 #include "core/odometry/registration.hpp"
-#include "core/segmentation/passthrough_segmenter.hpp"
+#include "core/segmentation/segmenter.hpp"
 #include "core/simulation/simulation.hpp"
 
 namespace stillmap {

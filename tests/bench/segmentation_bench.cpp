@@ -5,13 +5,12 @@
 #include <random>
 
 #include "clients/commands/model/benchmark_scan.hpp"
-#include "core/segmentation/activation_ranges.hpp"
-#include "core/segmentation/bare_model.hpp"
+#include "core/segmentation/int8_calibration.hpp"
+#include "core/segmentation/open_network.hpp"
 #include "core/segmentation/network_input.hpp"
 #include "core/segmentation/onednn_network.hpp"
 #include "core/segmentation/opencv_network.hpp"
 #include "core/segmentation/pixel_scores.hpp"
-#include "core/segmentation/trial_input.hpp"
 #include "tests/segmentation/onnx_builder.hpp"
 
 namespace stillmap {

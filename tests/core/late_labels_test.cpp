@@ -5,7 +5,7 @@
 #include <deque>
 
 #include "core/mapper.hpp"
-#include "core/segmentation/passthrough_segmenter.hpp"
+#include "core/segmentation/segmenter.hpp"
 #include "tests/odometry/box_sequence.hpp"
 #include "tests/odometry/poses.hpp"
 

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "core/mapper.hpp"
-#include "core/segmentation/passthrough_segmenter.hpp"
+#include "core/segmentation/segmenter.hpp"
 #include "tests/odometry/box_sequence.hpp"
 
 namespace stillmap {

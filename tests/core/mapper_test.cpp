@@ -6,7 +6,7 @@
 #include <limits>
 #include <stdexcept>
 
-#include "core/segmentation/passthrough_segmenter.hpp"
+#include "core/segmentation/segmenter.hpp"
 #include "tests/odometry/box_sequence.hpp"
 #include "tests/odometry/poses.hpp"
 

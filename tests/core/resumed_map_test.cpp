@@ -7,7 +7,7 @@
 
 #include "core/dataset/scan_dataset.hpp"
 #include "core/mapper.hpp"
-#include "core/segmentation/passthrough_segmenter.hpp"
+#include "core/segmentation/segmenter.hpp"
 #include "tests/odometry/poses.hpp"
 
 namespace stillmap {

@@ -1,4 +1,4 @@
-#include "core/segmentation/activation_ranges.hpp"
+#include "core/segmentation/int8_calibration.hpp"
 
 #include <gtest/gtest.h>
 

@@ -6,8 +6,6 @@
 #include <random>
 #include <set>
 
-#include "core/segmentation/onednn/buffer_layout.hpp"
-#include "core/segmentation/onednn/layer_precision.hpp"
 #include "core/segmentation/onednn/prepare_network.hpp"
 #include "tests/segmentation/onnx_builder.hpp"
 #include "tests/segmentation/sample_model.hpp"

@@ -5,11 +5,8 @@
 
 #include <random>
 
-#include "core/segmentation/graph/equalise_channels.hpp"
-#include "core/segmentation/graph/fold_batch_norm.hpp"
-#include "core/segmentation/graph/fuse_post_ops.hpp"
-#include "core/segmentation/graph/infer_shapes.hpp"
-#include "core/segmentation/graph/replace_transposed.hpp"
+#include "core/segmentation/int8_calibration.hpp"
+#include "core/segmentation/graph/graph_passes.hpp"
 #include "tests/segmentation/plain_network.hpp"
 
 namespace stillmap {

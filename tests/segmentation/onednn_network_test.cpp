@@ -7,7 +7,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/segmentation/activation_ranges.hpp"
+#include "core/segmentation/int8_calibration.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/onnx/read_network.hpp"
 #include "core/segmentation/opencv_network.hpp"

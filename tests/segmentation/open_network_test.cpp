@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "core/segmentation/activation_ranges.hpp"
+#include "core/segmentation/int8_calibration.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/onednn_network.hpp"
 #include "tests/segmentation/onnx_builder.hpp"

@@ -1,10 +1,9 @@
-#include "core/segmentation/passthrough_segmenter.hpp"
+#include "core/segmentation/segmenter.hpp"
 
 #include <gtest/gtest.h>
 
 #include <memory>
 
-#include "core/segmentation/fallback_segmenter.hpp"
 
 namespace stillmap {
 namespace {

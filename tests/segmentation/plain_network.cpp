@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "core/segmentation/graph/infer_shapes.hpp"
+#include "core/segmentation/graph/network_graph.hpp"
 
 namespace stillmap::test {
 namespace {

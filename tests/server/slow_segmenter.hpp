@@ -6,7 +6,7 @@
 #include <thread>
 #include <vector>
 
-#include "core/segmentation/passthrough_segmenter.hpp"
+#include "core/segmentation/segmenter.hpp"
 
 namespace stillmap::test {
 

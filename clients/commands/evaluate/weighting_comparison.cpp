@@ -9,7 +9,7 @@
 
 #include "clients/commands/stage_stopwatch.hpp"
 #include "core/dataset/dataset_error.hpp"
-#include "core/segmentation/passthrough_segmenter.hpp"
+#include "core/segmentation/segmenter.hpp"
 
 namespace stillmap::cli {
 namespace {

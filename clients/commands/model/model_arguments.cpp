@@ -5,7 +5,7 @@
 #include "config/loaders/model_file.hpp"
 #include "config/loaders/model_folder.hpp"
 #include "core/lidar/range_image.hpp"
-#include "core/segmentation/bare_model.hpp"
+#include "core/segmentation/open_network.hpp"
 #include "core/segmentation/network_input.hpp"
 
 namespace stillmap::cli {

@@ -6,7 +6,7 @@
 #include "clients/commands/model/model_arguments.hpp"
 #include "clients/terminal/progress.hpp"
 #include "config/loaders/int8_file.hpp"
-#include "core/segmentation/activation_ranges.hpp"
+#include "core/segmentation/int8_calibration.hpp"
 #include "core/segmentation/onednn_network.hpp"
 
 namespace stillmap::cli {

@@ -7,8 +7,8 @@
 #include <fstream>
 
 #include "core/lidar/range_image.hpp"
-#include "core/segmentation/activation_ranges.hpp"
-#include "core/segmentation/matrix_product.hpp"
+#include "core/segmentation/int8_calibration.hpp"
+#include "core/segmentation/onednn_network.hpp"
 #include "core/segmentation/network_input.hpp"
 #include "core/segmentation/network_segmenter.hpp"
 #include "core/segmentation/opencv_network.hpp"

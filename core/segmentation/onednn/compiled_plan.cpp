@@ -4,8 +4,8 @@
 #include <cassert>
 #include <dnnl.hpp>
 
-#include "core/segmentation/onednn/buffer_layout.hpp"
 #include "core/segmentation/onednn/dnnl_step.hpp"
+#include "core/segmentation/onednn/execution_plan.hpp"
 #include "core/segmentation/onednn/openmp_threads.hpp"
 #include "core/segmentation/onednn/row_layout.hpp"
 

@@ -1,5 +1,8 @@
 #include "core/segmentation/onednn/dnnl_step.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace stillmap {
 
 using dnnl::memory;
@@ -52,6 +55,139 @@ DnnlStep sum_step(const dnnl::engine& engine, const DnnlTensor& first, const Dnn
                         {DNNL_ARG_DST, to.dnnl_memory(engine)}},
           .scratchpad = primitive.scratchpad_desc(),
           .implementation = primitive.impl_info_str()};
+}
+
+namespace {
+
+using dnnl::memory;
+using Dims = memory::dims;
+
+constexpr float largest_s8 = 127.0F;
+
+/// Weights of one convolution in the type that it multiplies, and the factors that bring its sums
+/// of products to the units in which they are summed up, one an output.
+struct Weights {
+  std::vector<float> values;
+  std::vector<float> bias;
+  std::vector<float> output_factors;
+};
+
+/// Each output's weights times what makes the largest of them 127, rounded. The bias stays in
+/// floating point, in units of the products.
+Weights integer_weights(const Convolution& c, float input_scale, float output_scale) {
+  Weights to{.values = c.weights, .bias = c.bias, .output_factors = {}};
+  const std::size_t per_output = c.weights.size() / c.bias.size();
+  for (std::size_t o = 0; o < c.bias.size(); ++o) {
+    const auto weights = std::span(to.values).subspan(o * per_output, per_output);
+    float largest = 0.0F;
+    for (const float weight : weights) largest = std::max(largest, std::abs(weight));
+    const float scale = largest > 0.0F ? largest / largest_s8 : 1.0F;
+    for (float& weight : weights) weight = std::nearbyint(weight / scale);
+    to.bias[o] /= input_scale * scale;
+    to.output_factors.push_back(input_scale * scale / output_scale);
+  }
+  return to;
+}
+
+/// Scale in which the products are summed up: of the second tensor that is added, which oneDNN
+/// cannot scale, or else of the target.
+float working_scale(const ConvolutionTensors& tensors) {
+  return tensors.added ? tensors.added->scale : tensors.to.scale;
+}
+
+dnnl::post_ops post_ops(const Layer& layer, const ConvolutionTensors& tensors) {
+  const float scale = working_scale(tensors);
+  dnnl::post_ops after;
+  bool sum_done = !tensors.sum_scale;
+  for (const PostOp& step : layer.post_ops) {
+    if (const auto* const activation = std::get_if<LeakyRelu>(&step)) {
+      after.append_eltwise(1.0F, dnnl::algorithm::eltwise_relu, activation->slope, 0.0F);
+    } else if (!sum_done) {
+      after.append_sum(*tensors.sum_scale / scale);
+      sum_done = true;
+    } else if (tensors.added) {
+      after.append_binary(dnnl::algorithm::binary_add, tensors.added->desc());
+    }
+  }
+  if (scale != tensors.to.scale) {
+    after.append_eltwise(1.0F, dnnl::algorithm::eltwise_linear, scale / tensors.to.scale, 0.0F);
+  }
+  return after;
+}
+
+/// Position of the binary post-op.
+int position_of_added(const dnnl::post_ops& after) {
+  int position = 0;
+  while (after.kind(position) != dnnl::primitive::kind::binary) ++position;
+  return position;
+}
+
+dnnl::convolution_forward::primitive_desc describe(const dnnl::engine& engine, const Layer& layer,
+                                                   const DnnlTensor& from, const DnnlTensor& to,
+                                                   const dnnl::primitive_attr& attributes) {
+  const auto& c = std::get<Convolution>(layer.operation);
+  const memory::desc weights({c.outputs, c.inputs, c.kernel.rows, c.kernel.columns},
+                             dnnl_type(from.type), memory::format_tag::any);
+  const memory::desc bias({c.outputs}, memory::data_type::f32, memory::format_tag::a);
+  const dnnl::convolution_forward::desc desc(
+      dnnl::prop_kind::forward_inference, dnnl::algorithm::convolution_direct, from.desc(), weights,
+      bias, to.desc(), Dims{c.stride.rows, c.stride.columns},
+      Dims{c.dilation.rows - 1, c.dilation.columns - 1}, Dims{c.padding.top, c.padding.left},
+      Dims{c.padding.bottom, c.padding.right});
+  return {desc, attributes, engine};
+}
+
+/// Values in memory of oneDNN's own, in the layout that it chose.
+memory in_layout(const dnnl::engine& engine, const std::vector<float>& values, const Dims& dims,
+                 memory::format_tag tag, const memory::desc& layout) {
+  // Only read, though oneDNN takes a pointer through which it could write.
+  memory plain({dims, memory::data_type::f32, tag}, engine, const_cast<float*>(values.data()));
+  memory chosen(layout, engine);
+  dnnl::stream stream(engine);
+  dnnl::reorder(plain, chosen).execute(stream, plain, chosen);
+  stream.wait();
+  return chosen;
+}
+
+}  // namespace
+
+DnnlStep convolution_step(const dnnl::engine& engine, const Layer& layer,
+                          const ConvolutionTensors& tensors) {
+  const auto& c = std::get<Convolution>(layer.operation);
+  const DnnlTensor& from = tensors.from;
+  const DnnlTensor& to = tensors.to;
+  const bool integers = from.type == ValueType::s8;
+  const Weights weights = integers ? integer_weights(c, from.scale, working_scale(tensors))
+                                   : Weights{c.weights, c.bias, {}};
+  dnnl::primitive_attr attributes = step_attributes();
+  const dnnl::post_ops after = post_ops(layer, tensors);
+  attributes.set_post_ops(after);
+  constexpr int one_an_output = 2;
+  if (integers) attributes.set_output_scales(one_an_output, weights.output_factors);
+  const auto primitive = describe(engine, layer, from, to, attributes);
+  std::string implementation = primitive.impl_info_str();
+  if (implementation.find("ref") != std::string::npos) {
+    throw UnsupportedLayer("layer '" + layer.name +
+                           "': oneDNN has only slow reference code for it on this processor (" +
+                           implementation + ")");
+  }
+  const Dims shape{c.outputs, c.inputs, c.kernel.rows, c.kernel.columns};
+  DnnlStep step{
+      .primitive = dnnl::convolution_forward(primitive),
+      .arguments = {{DNNL_ARG_SRC, from.dnnl_memory(engine)},
+                    {DNNL_ARG_DST, to.dnnl_memory(engine)},
+                    {DNNL_ARG_WEIGHTS,
+                     in_layout(engine, weights.values, shape, memory::format_tag::oihw,
+                               primitive.weights_desc())},
+                    {DNNL_ARG_BIAS, in_layout(engine, weights.bias, {c.outputs},
+                                              memory::format_tag::a, primitive.bias_desc())}},
+      .scratchpad = primitive.scratchpad_desc(),
+      .implementation = std::move(implementation)};
+  if (tensors.added) {
+    const int added = DNNL_ARG_ATTR_MULTIPLE_POST_OP(position_of_added(after)) | DNNL_ARG_SRC_1;
+    step.arguments.emplace(added, tensors.added->dnnl_memory(engine));
+  }
+  return step;
 }
 
 }  // namespace stillmap

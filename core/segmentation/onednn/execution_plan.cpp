@@ -2,10 +2,40 @@
 
 #include <algorithm>
 #include <array>
-
-#include "core/segmentation/onednn/layer_precision.hpp"
+#include <numeric>
 
 namespace stillmap {
+namespace {
+
+bool in_integers(const NetworkGraph& graph, const Layer& layer,
+                 const Int8Calibration& calibration) {
+  return std::holds_alternative<Convolution>(layer.operation) &&
+         layer.inputs.front() != graph.input && layer.output != graph.output &&
+         std::ranges::find(calibration.float_layers, layer.name) == calibration.float_layers.end();
+}
+
+}  // namespace
+
+LayerPrecision layer_precision(const NetworkGraph& graph, const Int8Calibration* calibration) {
+  LayerPrecision precision{.of_layer = std::vector(graph.layers.size(), ValueType::f32),
+                           .of_tensor = std::vector(graph.tensors.size(), ValueType::f32)};
+  if (calibration == nullptr) return precision;
+  std::vector<bool> wanted_s8(graph.tensors.size(), false);
+  // From the end, so that all that read a tensor have said what they want before it is decided.
+  for (std::size_t i = graph.layers.size(); i-- > 0;) {
+    const Layer& layer = graph.layers[i];
+    if (!in_integers(graph, layer, *calibration)) continue;
+    precision.of_layer[i] = ValueType::s8;
+    if (wanted_s8[layer.output]) precision.of_tensor[layer.output] = ValueType::s8;
+    wanted_s8[layer.inputs.front()] = true;
+    for (const PostOp& step : layer.post_ops) {
+      const auto* const add = std::get_if<AddTensor>(&step);
+      if (add != nullptr && wanted_s8[layer.output]) wanted_s8[add->other] = true;
+    }
+  }
+  return precision;
+}
+
 namespace {
 
 constexpr float largest_s8 = 127.0F;
@@ -201,6 +231,41 @@ const TensorPlacement& target(const Step& step) {
 
 ExecutionPlan plan_execution(const NetworkGraph& graph, const Int8Calibration* calibration) {
   return Planner(graph, calibration).plan();
+}
+
+namespace {
+
+std::size_t aligned(std::size_t bytes) {
+  return (bytes + BufferLayout::alignment - 1) / BufferLayout::alignment * BufferLayout::alignment;
+}
+
+bool at_one_time(const Buffer& a, const Buffer& b) {
+  return a.first_step <= b.last_step && b.first_step <= a.last_step;
+}
+
+}  // namespace
+
+BufferLayout lay_out(std::span<const Buffer> buffers) {
+  std::vector<std::size_t> by_size(buffers.size());
+  std::iota(by_size.begin(), by_size.end(), std::size_t{0});
+  std::ranges::stable_sort(by_size, std::ranges::greater(),
+                           [&](std::size_t i) { return buffers[i].bytes; });
+  BufferLayout layout{.offset = std::vector<std::size_t>(buffers.size(), 0)};
+  // Placed buffers from the lowest to the highest.
+  std::vector<std::size_t> placed;
+  for (const std::size_t i : by_size) {
+    std::size_t& offset = layout.offset[i];
+    for (const std::size_t other : placed) {
+      if (!at_one_time(buffers[i], buffers[other])) continue;
+      if (offset + aligned(buffers[i].bytes) <= layout.offset[other]) break;
+      offset = std::max(offset, layout.offset[other] + aligned(buffers[other].bytes));
+    }
+    const auto above = std::ranges::upper_bound(
+        placed, offset, {}, [&](std::size_t other) { return layout.offset[other]; });
+    placed.insert(above, i);
+    layout.bytes = std::max(layout.bytes, offset + aligned(buffers[i].bytes));
+  }
+  return layout;
 }
 
 }  // namespace stillmap

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -86,5 +87,31 @@ struct ExecutionPlan {
 /// replaced before, GraphFault when the calibration is not the network's.
 [[nodiscard]] ExecutionPlan plan_execution(const NetworkGraph& graph,
                                            const Int8Calibration* calibration);
+
+/// In which type each layer works and each tensor is stored first.
+struct LayerPrecision {
+  /// What a convolution multiplies.
+  std::vector<ValueType> of_layer;
+  std::vector<ValueType> of_tensor;
+};
+
+/// f32 throughout without a calibration. With one, convolutions multiply s8 but for those that read
+/// the network's input or make its output and `float_layers`; a tensor is s8 when a convolution
+/// that multiplies s8 makes it and another one wants it so.
+[[nodiscard]] LayerPrecision layer_precision(const NetworkGraph& graph,
+                                             const Int8Calibration* calibration);
+
+/// Places in one block of memory.
+struct BufferLayout {
+  /// Byte at which each buffer begins, a multiple of `alignment`.
+  std::vector<std::size_t> offset;
+  std::size_t bytes = 0;
+
+  static constexpr std::size_t alignment = 64;
+};
+
+/// Gives buffers that are needed at different times the same memory: the largest first, each as
+/// low as it fits.
+[[nodiscard]] BufferLayout lay_out(std::span<const Buffer> buffers);
 
 }  // namespace stillmap

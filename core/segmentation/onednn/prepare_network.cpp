@@ -1,9 +1,7 @@
 #include "core/segmentation/onednn/prepare_network.hpp"
 
-#include "core/segmentation/graph/fold_batch_norm.hpp"
-#include "core/segmentation/graph/fuse_post_ops.hpp"
-#include "core/segmentation/graph/infer_shapes.hpp"
-#include "core/segmentation/graph/replace_transposed.hpp"
+#include "core/segmentation/graph/graph_passes.hpp"
+#include "core/segmentation/graph/network_graph.hpp"
 #include "core/segmentation/onnx/read_network.hpp"
 
 namespace stillmap {

@@ -4,13 +4,175 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <cmath>
+#include <cstring>
 #include <fstream>
+#include <optional>
+#include <set>
 #include <string>
 
 #include "core/segmentation/model_error.hpp"
-#include "core/segmentation/onnx/onnx_check.hpp"
 
 namespace stillmap {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "ONNX's raw data are little-endian");
+
+constexpr std::int64_t max_values = std::int64_t{1} << 28;
+
+std::optional<std::int64_t> product(const onnx::TensorProto& tensor) {
+  std::int64_t count = 1;
+  for (const std::int64_t size : tensor.dims()) {
+    if (size < 0 || size > max_values) return std::nullopt;
+    if (size > 0 && count > max_values / size) return std::nullopt;
+    count *= size;
+  }
+  return count;
+}
+
+template <class T, class Field>
+std::vector<T> values(const onnx::TensorProto& tensor, const Field& field) {
+  if (!tensor.has_raw_data()) return {field.begin(), field.end()};
+  std::vector<T> read(tensor.raw_data().size() / sizeof(T));
+  std::memcpy(read.data(), tensor.raw_data().data(), read.size() * sizeof(T));
+  return read;
+}
+
+/// Values that the file holds, of the types that matter here.
+std::int64_t stored_values(const onnx::TensorProto& tensor) {
+  const bool is_float = tensor.data_type() == onnx::TensorProto::FLOAT;
+  if (tensor.has_raw_data()) {
+    const std::size_t bytes = is_float ? sizeof(float) : sizeof(std::int64_t);
+    if (tensor.raw_data().size() % bytes != 0) return -1;
+    return static_cast<std::int64_t>(tensor.raw_data().size() / bytes);
+  }
+  return is_float ? tensor.float_data_size() : tensor.int64_data_size();
+}
+
+}  // namespace
+
+std::string tensor_fault(const onnx::TensorProto& tensor) {
+  const std::string name = "weights '" + tensor.name() + "'";
+  if (tensor.data_location() == onnx::TensorProto::EXTERNAL || tensor.external_data_size() > 0) {
+    return name + " lie in another file; export the network as one file";
+  }
+  const std::optional<std::int64_t> wanted = product(tensor);
+  if (!wanted) return name + " have dimensions that are negative or absurd";
+  const bool is_float = tensor.data_type() == onnx::TensorProto::FLOAT;
+  if (!is_float && tensor.data_type() != onnx::TensorProto::INT64) return {};
+  if (const std::int64_t stored = stored_values(tensor); stored != *wanted) {
+    return name + " are not whole: their dimensions want " + std::to_string(*wanted) +
+           " values, the file does not hold as many";
+  }
+  const std::vector<float> numbers = float_values(tensor);
+  const bool finite = std::ranges::all_of(numbers, [](float x) { return std::isfinite(x); });
+  return finite ? std::string() : name + " are not all finite numbers";
+}
+
+std::size_t value_count(const onnx::TensorProto& tensor) {
+  return static_cast<std::size_t>(product(tensor).value_or(0));
+}
+
+std::vector<float> float_values(const onnx::TensorProto& tensor) {
+  if (tensor.data_type() != onnx::TensorProto::FLOAT) return {};
+  return values<float>(tensor, tensor.float_data());
+}
+
+std::vector<std::int64_t> int_values(const onnx::TensorProto& tensor) {
+  if (tensor.data_type() != onnx::TensorProto::INT64) return {};
+  return values<std::int64_t>(tensor, tensor.int64_data());
+}
+
+namespace {
+
+using Names = std::set<std::string>;
+
+bool is_weight(const onnx::GraphProto& graph, const std::string& name) {
+  return std::ranges::any_of(graph.initializer(), [&name](const onnx::TensorProto& tensor) {
+    return tensor.name() == name;
+  });
+}
+
+std::string weights_fault(const onnx::GraphProto& graph) {
+  Names names;
+  for (const onnx::TensorProto& tensor : graph.initializer()) {
+    if (std::string fault = tensor_fault(tensor); !fault.empty()) return fault;
+    if (!names.insert(tensor.name()).second) {
+      return "weights '" + tensor.name() + "' stand in the file twice";
+    }
+  }
+  return {};
+}
+
+std::string attribute_fault(const onnx::NodeProto& node) {
+  for (const onnx::AttributeProto& attribute : node.attribute()) {
+    if (attribute.has_t()) {
+      if (std::string fault = tensor_fault(attribute.t()); !fault.empty()) return fault;
+    }
+  }
+  return {};
+}
+
+std::string node_text(const onnx::NodeProto& node) {
+  return node.op_type() + " '" + (node.name().empty() ? "without a name" : node.name()) + "'";
+}
+
+/// What is wrong with a node, given all that is known before it; adds what the node makes.
+std::string node_fault(const onnx::NodeProto& node, Names& known) {
+  for (const std::string& input : node.input()) {
+    if (!input.empty() && !known.contains(input)) {
+      return node_text(node) + " reads '" + input +
+             "', which is neither a weight in the file nor made before it (missing, or a cycle)";
+    }
+  }
+  for (const std::string& output : node.output()) {
+    if (!output.empty() && !known.insert(output).second) {
+      return node_text(node) + " makes '" + output + "', which is there already";
+    }
+  }
+  return attribute_fault(node);
+}
+
+std::string nodes_fault(const onnx::GraphProto& graph) {
+  Names known;
+  for (const onnx::ValueInfoProto& input : graph.input()) known.insert(input.name());
+  for (const onnx::TensorProto& tensor : graph.initializer()) known.insert(tensor.name());
+  for (const onnx::NodeProto& node : graph.node()) {
+    if (std::string fault = node_fault(node, known); !fault.empty()) return fault;
+  }
+  if (!known.contains(graph.output(0).name())) {
+    return "no layer makes the network's output '" + graph.output(0).name() + "'";
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string onnx_fault(const onnx::ModelProto& model) {
+  const onnx::GraphProto& graph = model.graph();
+  if (graph.node().empty()) return "is not an ONNX network: there is no layer in it";
+  if (graph.output_size() != 1) {
+    return "has " + std::to_string(graph.output_size()) +
+           " outputs; a network that labels range images has one";
+  }
+  if (network_input(graph) == nullptr) {
+    return "does not have exactly one input; a network that labels range images has one";
+  }
+  if (std::string fault = weights_fault(graph); !fault.empty()) return fault;
+  return nodes_fault(graph);
+}
+
+const onnx::ValueInfoProto* network_input(const onnx::GraphProto& graph) {
+  const onnx::ValueInfoProto* found = nullptr;
+  for (const onnx::ValueInfoProto& input : graph.input()) {
+    if (is_weight(graph, input.name())) continue;
+    if (found != nullptr) return nullptr;
+    found = &input;
+  }
+  return found;
+}
+
 namespace {
 
 namespace fs = std::filesystem;

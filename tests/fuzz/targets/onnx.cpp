@@ -1,6 +1,6 @@
 // An ONNX file, read for a small image up to the plan of its run, in floating point and in 8 bits.
 
-#include "core/segmentation/graph/equalise_channels.hpp"
+#include "core/segmentation/int8_calibration.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "core/segmentation/onednn/execution_plan.hpp"
 #include "core/segmentation/onednn/prepare_network.hpp"

@@ -1,7 +1,8 @@
-#include "core/segmentation/passthrough_segmenter.hpp"
+#include "core/segmentation/segmenter.hpp"
 
 #include <algorithm>
 #include <cassert>
+#include <utility>
 
 namespace stillmap {
 
@@ -13,6 +14,18 @@ PointLabels PassthroughSegmenter::segment(const Scan& scan) {
     return label == SemanticClass::unlabeled ? 0.0F : 1.0F;
   });
   return labels;
+}
+
+FallbackSegmenter::FallbackSegmenter(std::unique_ptr<Segmenter> fallback)
+    : fallback_(std::move(fallback)) {}
+
+std::string FallbackSegmenter::name() const {
+  return PassthroughSegmenter().name() + ", else " + fallback_->name();
+}
+
+PointLabels FallbackSegmenter::segment(const Scan& scan) {
+  uses_stream_ = !scan.labels.empty();
+  return uses_stream_ ? PassthroughSegmenter().segment(scan) : fallback_->segment(scan);
 }
 
 }  // namespace stillmap
