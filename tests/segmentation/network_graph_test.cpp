@@ -5,15 +5,15 @@
 
 #include <random>
 
-#include "core/segmentation/int8_calibration.hpp"
 #include "core/segmentation/graph/graph_passes.hpp"
-#include "tests/segmentation/plain_network.hpp"
+#include "core/segmentation/int8_calibration.hpp"
+#include "tests/segmentation/reference_network.hpp"
 
 namespace stillmap {
 namespace {
 
-using test::PlainTensor;
-using test::run_plainly;
+using test::ReferenceTensor;
+using test::run_reference;
 using ::testing::HasSubstr;
 
 constexpr ImageShape image{.channels = 3, .rows = 4, .columns = 6};
@@ -73,11 +73,11 @@ BatchNorm batch_norm(std::size_t channels) {
   return {.scale = random_values(channels, 9), .offset = random_values(channels, 10)};
 }
 
-PlainTensor run(const NetworkGraph& graph) {
-  return run_plainly(graph, image, random_values(image.size(), 1));
+ReferenceTensor run(const NetworkGraph& graph) {
+  return run_reference(graph, image, random_values(image.size(), 1));
 }
 
-void expect_same(const PlainTensor& a, const PlainTensor& b) {
+void expect_same(const ReferenceTensor& a, const ReferenceTensor& b) {
   EXPECT_EQ(a.shape, b.shape);
   ASSERT_EQ(a.values.size(), b.values.size());
   for (std::size_t i = 0; i < a.values.size(); ++i) EXPECT_NEAR(a.values[i], b.values[i], 1e-5);
@@ -228,8 +228,8 @@ TEST(EqualiseChannels, MakesRangesEqualAndLeavesTheResult) {
   }
   NetworkGraph graph = before;
   const Int8Calibration equalised = equalise_channels(graph, calibration);
-  const PlainTensor expected = run(before);
-  const PlainTensor result = run(graph);
+  const ReferenceTensor expected = run(before);
+  const ReferenceTensor result = run(graph);
   for (std::size_t i = 0; i < expected.values.size(); ++i) {
     EXPECT_NEAR(result.values[i], expected.values[i], 1e-4 * (1.0 + std::abs(expected.values[i])));
   }
@@ -251,7 +251,7 @@ TEST(EqualiseChannels, LeavesChannelsThatAreAlwaysZero) {
     calibration.range_of_channels[tensor.name].assign(
         static_cast<std::size_t>(tensor.shape.channels), 0.0F);
   }
-  const PlainTensor before = run(graph);
+  const ReferenceTensor before = run(graph);
   (void)equalise_channels(graph, calibration);
   expect_same(run(graph), before);
 }

@@ -12,7 +12,7 @@
 #include "core/segmentation/onnx/read_network.hpp"
 #include "core/segmentation/opencv_network.hpp"
 #include "tests/segmentation/onnx_builder.hpp"
-#include "tests/segmentation/plain_network.hpp"
+#include "tests/segmentation/reference_network.hpp"
 #include "tests/segmentation/sample_model.hpp"
 
 namespace stillmap {
@@ -46,8 +46,8 @@ double largest_difference(const A& a, const B& b) {
 
 std::vector<double> plain_probabilities(const ModelDescription& model,
                                         const std::vector<float>& image) {
-  return test::run_plainly(read_network(OnnxFile(model.network_file)),
-                           {.channels = 5, .rows = model.rows, .columns = model.columns}, image)
+  return test::run_reference(read_network(OnnxFile(model.network_file)),
+                             {.channels = 5, .rows = model.rows, .columns = model.columns}, image)
       .values;
 }
 

@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/segmentation/onnx_builder.hpp"
-#include "tests/segmentation/plain_network.hpp"
+#include "tests/segmentation/reference_network.hpp"
 #include "tests/segmentation/sample_model.hpp"
 
 namespace stillmap {
@@ -119,7 +119,7 @@ TEST(ReadNetwork, RefusesWeightsThatAreWorkedOut) {
 
 TEST(OnnxFile, ReadsTheDeclaredShapeAndWhatIsLeftOpen) {
   using Shape = std::vector<std::int64_t>;
-  OnnxBuilder cli::fixed(5, 8, 300);
+  OnnxBuilder fixed(5, 8, 300);
   const OnnxFile file(write_model(fixed.bytes(fixed.convolve("input", 3, three))));
   EXPECT_EQ(file.declared_input_shape(), (Shape{1, 5, 8, 300}));
   OnnxBuilder open(5, 0, 0);

@@ -8,7 +8,7 @@
 namespace stillmap::test {
 
 /// Values of one tensor, channels x rows x columns.
-struct PlainTensor {
+struct ReferenceTensor {
   ImageShape shape;
   std::vector<double> values;
 
@@ -19,7 +19,7 @@ struct PlainTensor {
 
 /// Runs a network as its layers are defined, in double precision, without any trick: what every
 /// rearrangement of it must agree with. Shapes are inferred anew.
-[[nodiscard]] PlainTensor run_plainly(NetworkGraph graph, const ImageShape& shape,
-                                      std::span<const float> input);
+[[nodiscard]] ReferenceTensor run_reference(NetworkGraph graph, const ImageShape& shape,
+                                            std::span<const float> input);
 
 }  // namespace stillmap::test

@@ -1,4 +1,4 @@
-#include "tests/segmentation/plain_network.hpp"
+#include "tests/segmentation/reference_network.hpp"
 
 #include <cmath>
 
@@ -14,7 +14,7 @@ std::size_t place(const ImageShape& shape, int channel, int row, int column) {
          static_cast<std::size_t>(column);
 }
 
-PlainTensor zeros(const ImageShape& shape) {
+ReferenceTensor zeros(const ImageShape& shape) {
   return {.shape = shape, .values = std::vector<double>(shape.size(), 0.0)};
 }
 
@@ -35,14 +35,14 @@ float weight(const std::vector<float>& weights, int first, int second, int secon
   return weights[pair * taps.size() + place(taps, 0, row, column)];
 }
 
-struct PlainLayer {
-  const std::vector<const PlainTensor*>& inputs;
+struct ReferenceLayer {
+  const std::vector<const ReferenceTensor*>& inputs;
   const ImageShape& output_shape;
 
-  [[nodiscard]] const PlainTensor& x() const { return *inputs.front(); }
+  [[nodiscard]] const ReferenceTensor& x() const { return *inputs.front(); }
 
-  PlainTensor operator()(const Convolution& c) const {
-    PlainTensor y = zeros(output_shape);
+  ReferenceTensor operator()(const Convolution& c) const {
+    ReferenceTensor y = zeros(output_shape);
     for_each_pixel(y.shape, [&](int channel, int row, int column) {
       const int phase = row % c.widen.rows * c.widen.columns + column % c.widen.columns;
       const int output = phase * y.shape.channels + channel;
@@ -64,8 +64,8 @@ struct PlainLayer {
     return y;
   }
 
-  PlainTensor operator()(const TransposedConvolution& c) const {
-    PlainTensor y = zeros(output_shape);
+  ReferenceTensor operator()(const TransposedConvolution& c) const {
+    ReferenceTensor y = zeros(output_shape);
     for_each_pixel(y.shape, [&](int channel, int row, int column) {
       y.at(channel, row, column) = c.bias[static_cast<std::size_t>(channel)];
     });
@@ -89,8 +89,8 @@ struct PlainLayer {
     return y;
   }
 
-  PlainTensor operator()(const BatchNorm& norm) const {
-    PlainTensor y = x();
+  ReferenceTensor operator()(const BatchNorm& norm) const {
+    ReferenceTensor y = x();
     for_each_pixel(y.shape, [&](int channel, int row, int column) {
       const auto c = static_cast<std::size_t>(channel);
       double& value = y.at(channel, row, column);
@@ -99,20 +99,20 @@ struct PlainLayer {
     return y;
   }
 
-  PlainTensor operator()(const LeakyRelu& activation) const {
-    PlainTensor y = x();
+  ReferenceTensor operator()(const LeakyRelu& activation) const {
+    ReferenceTensor y = x();
     for (double& value : y.values) value = value > 0.0 ? value : activation.slope * value;
     return y;
   }
 
-  PlainTensor operator()(const Add&) const {
-    PlainTensor y = x();
+  ReferenceTensor operator()(const Add&) const {
+    ReferenceTensor y = x();
     for (std::size_t i = 0; i < y.values.size(); ++i) y.values[i] += inputs[1]->values[i];
     return y;
   }
 
-  PlainTensor operator()(const Softmax&) const {
-    PlainTensor y = x();
+  ReferenceTensor operator()(const Softmax&) const {
+    ReferenceTensor y = x();
     const std::size_t pixels = y.shape.size() / static_cast<std::size_t>(y.shape.channels);
     for (std::size_t p = 0; p < pixels; ++p) {
       double sum = 0.0;
@@ -127,27 +127,28 @@ struct PlainLayer {
 
 }  // namespace
 
-double& PlainTensor::at(int channel, int row, int column) {
+double& ReferenceTensor::at(int channel, int row, int column) {
   return values[place(shape, channel, row, column)];
 }
 
-double PlainTensor::get(int channel, int row, int column) const {
+double ReferenceTensor::get(int channel, int row, int column) const {
   if (row < 0 || row >= shape.rows || column < 0 || column >= shape.columns) return 0.0;
   return values[place(shape, channel, row, column)];
 }
 
-PlainTensor run_plainly(NetworkGraph graph, const ImageShape& shape, std::span<const float> input) {
+ReferenceTensor run_reference(NetworkGraph graph, const ImageShape& shape,
+                              std::span<const float> input) {
   infer_shapes(graph, shape);
-  std::vector<PlainTensor> tensors(graph.tensors.size());
+  std::vector<ReferenceTensor> tensors(graph.tensors.size());
   tensors[graph.input] = {.shape = shape, .values = {input.begin(), input.end()}};
   for (const Layer& layer : graph.layers) {
-    std::vector<const PlainTensor*> inputs;
+    std::vector<const ReferenceTensor*> inputs;
     for (const TensorId id : layer.inputs) inputs.push_back(&tensors[id]);
     const ImageShape& output_shape = graph.tensors[layer.output].shape;
-    PlainTensor result = std::visit(PlainLayer{inputs, output_shape}, layer.operation);
+    ReferenceTensor result = std::visit(ReferenceLayer{inputs, output_shape}, layer.operation);
     for (const PostOp& step : layer.post_ops) {
-      std::vector<const PlainTensor*> operands{&result};
-      const PlainLayer follow{operands, output_shape};
+      std::vector<const ReferenceTensor*> operands{&result};
+      const ReferenceLayer follow{operands, output_shape};
       if (const auto* const sum = std::get_if<AddTensor>(&step)) {
         operands.push_back(&tensors[sum->other]);
         result = follow(Add{});
