@@ -21,7 +21,7 @@ void read_image(YamlSection section, ModelDescription& model) {
   section.require({"rows", "columns", "fov_up_deg", "fov_down_deg"});
   section.integer("rows", model.rows, {1, 512});
   section.integer("columns", model.columns, {1, max_image_columns});
-  section.integer("least_columns", model.min_columns, {0, static_cast<double>(model.columns)});
+  section.integer("min_columns", model.min_columns, {0, static_cast<double>(model.columns)});
   section.degrees("fov_up_deg", model.fov_up, {-90, 90});
   section.degrees("fov_down_deg", model.fov_down, {-90, 90});
   section.boolean("follow_sensor", model.follow_sensor);

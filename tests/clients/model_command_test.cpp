@@ -106,13 +106,13 @@ TEST_F(ModelCommandTest, MapsWithTheModelThatIsNamed) {
 
 TEST_F(ModelCommandTest, TellsOfItsNarrowestImageAndTakesNoneThatIsWider) {
   const auto with_least = [&](const std::string& least) {
-    write("model/model.yaml", with_image("columns: 64, least_columns: " + least));
+    write("model/model.yaml", with_image("columns: 64, min_columns: " + least));
     return model("info " + path("model"));
   };
   EXPECT_THAT(with_least("32").out, HasSubstr("16x64, down to 32 columns"));
   const ProcessResult wider = with_least("128");
   EXPECT_EQ(wider.exit_code, 2);
-  EXPECT_THAT(wider.err, AllOf(HasSubstr("least_columns"), HasSubstr("128")));
+  EXPECT_THAT(wider.err, AllOf(HasSubstr("min_columns"), HasSubstr("128")));
 }
 
 TEST_F(ModelCommandTest, ANetworkOfOneSizeTakesNoOtherWidth) {

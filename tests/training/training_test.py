@@ -286,7 +286,7 @@ class Training(unittest.TestCase):
         self.assertIn("onednn   int8", result.stdout)
         self.assertTrue((self.root / "model" / "int8.yaml").exists())
         image = yaml.safe_load((self.root / "model" / "model.yaml").read_text())["image"]
-        self.assertEqual((image["columns"], image["least_columns"]), (256, 128))
+        self.assertEqual((image["columns"], image["min_columns"]), (256, 128))
         # A run from that model begins where this one ended.
         self.train(1, "next", f"start_from={self.root / 'model'}")
         first = torch.load(self.root / "next" / "last.pt")["history"][0]

@@ -33,7 +33,7 @@ def describe_run(arguments, state):
     widths = config["augmentation"].get("image_columns")
     # A network whose image does not follow the sensor is written for one size.
     if config["follow_sensor"] and widths and min(widths) < image["columns"]:
-        image["least_columns"] = min(widths)
+        image["min_columns"] = min(widths)
     best = max(entry["miou"] for entry in state["history"])
     words = {
         "name": arguments.name or arguments.folder.name,
