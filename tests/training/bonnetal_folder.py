@@ -1,4 +1,4 @@
-"""Writes model folders as lidar-bonnetal's trainer does, so that importing can be tested."""
+"""Writes model folders in lidar-bonnetal's format, for tests of the import."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Checkpoints of lidar-bonnetal's format become models that every engine runs alike."""
+"""Checkpoints in lidar-bonnetal's format become models with the same result on every engine."""
 
 import os
 import pickle

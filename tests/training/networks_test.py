@@ -1,4 +1,4 @@
-"""The networks are RangeNet++ to the parameter."""
+"""The networks have RangeNet++'s parameters."""
 
 import unittest
 

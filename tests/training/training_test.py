@@ -1,4 +1,4 @@
-"""A small network learns from a simulated recording, and a run that was stopped goes on."""
+"""A small network learns from a simulated sequence, and an interrupted run resumes."""
 
 import math
 import os
@@ -15,11 +15,11 @@ import yaml
 
 from augmentation import aim, augment_points, crop, draw_motion, drop_beams, in_sector
 from losses import class_weights, lovasz_softmax, weighted_cross_entropy
-from metrics import Confusion
 from range_images import ImageModel, normalise, project
 from networks import make_network
 from samples import TrainingSamples
 from train import Run
+from validation import Confusion
 
 STILLMAP = os.environ["STILLMAP"]
 TRAINING = Path(os.environ["STILLMAP_TRAINING"])
@@ -39,7 +39,7 @@ SMALL = [
 
 class LovaszSoftmax(unittest.TestCase):
     def scores_of(self, classes):
-        """So sure of these classes (rows x columns) that the probabilities are 0 and 1."""
+        """Logits with probabilities 0 and 1 for these classes (rows x columns)."""
         return 1000.0 * torch.nn.functional.one_hot(classes, 20).permute(2, 0, 1)[None].float()
 
     def test_of_sure_predictions_is_one_less_the_mean_iou(self):
@@ -57,7 +57,7 @@ class LovaszSoftmax(unittest.TestCase):
         loss = lovasz_softmax(self.scores_of(torch.tensor([[1, 5, 2, 1]])), truth[None])
         self.assertAlmostEqual(float(loss), 0.0, places=5)
 
-    def test_teaches_nothing_without_any_class(self):
+    def test_have_no_gradient_without_any_class(self):
         scores = torch.randn(1, 20, 2, 4, requires_grad=True)
         nothing = torch.zeros(1, 2, 4, dtype=torch.long)
         lovasz_softmax(scores, nothing).backward()
@@ -78,7 +78,7 @@ class Projection(unittest.TestCase):
         image = project(points, np.zeros(3, np.float32), self.model)
         self.assertEqual(image.point[image.point >= 0].tolist(), [1])
 
-    def test_squeezes_what_is_above_into_the_first_row(self):
+    def test_clamps_points_above_the_image_to_the_first_row(self):
         image = project(np.array([[1, 0, 5]], np.float32), np.zeros(1, np.float32), self.model)
         self.assertLess(image.pixel[0], 8)
 
@@ -265,14 +265,14 @@ class Training(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         return result.stdout
 
-    def test_learns_goes_on_and_exports(self):
+    def test_learns_resumes_and_exports(self):
         self.train(2)
         output = self.train(6)
         self.assertIn("goes on after epoch 2", output)
         history = torch.load(self.root / "run" / "last.pt")["history"]
         self.assertEqual([entry["epoch"] for entry in history], [1, 2, 3, 4, 5, 6])
         self.assertLess(history[1]["loss"], history[0]["loss"])
-        # It goes on in the longer run's schedule: in that of the first, the rate would be nothing.
+        # It resumes with the longer run's schedule: in that of the first, the rate would be 0.
         self.assertLess(history[-1]["loss"], 0.95 * history[1]["loss"])
         rate = torch.load(self.root / "run" / "last.pt")["schedule"]["lr_lambdas"][0]
         self.assertEqual(rate["settings"]["epochs"], 6)

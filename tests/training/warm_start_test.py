@@ -1,4 +1,4 @@
-"""A network is the same after a detour over a model folder, and can be trained on."""
+"""A network loaded from a model folder gives the same output, and can be trained further."""
 
 import tempfile
 import unittest

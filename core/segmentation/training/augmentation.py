@@ -1,4 +1,4 @@
-"""What is done to a training scan so that a network does not learn one sensor or one city."""
+"""Augmentation of training scans, against overfitting to one sensor or one city."""
 
 import numpy as np
 
@@ -6,8 +6,8 @@ from scans import IGNORED
 
 
 def aim(points, classes, width_rad, share, random):
-    """Azimuth [rad] of the middle of a crop of this width: anywhere or, in this share of draws, so
-    that it holds a point of a class that is drawn evenly among those of the scan."""
+    """Azimuth [rad] of the middle of a crop of this width: uniform or, in this share of draws, such
+    that the crop contains a point of a class drawn uniformly from those of the scan."""
     present = np.flatnonzero(np.bincount(classes))
     present = present[present != IGNORED]
     if random.random() >= share or not present.size:
@@ -18,15 +18,15 @@ def aim(points, classes, width_rad, share, random):
 
 
 def in_sector(points, middle_rad, width_rad):
-    """Which points lie in a sector about the vertical, at most the whole circle wide."""
+    """Mask of the points in a sector around the vertical axis."""
     middle = np.array([np.cos(middle_rad), np.sin(middle_rad)], np.float32)
     distance = np.hypot(points[:, 0], points[:, 1])
     return points[:, :2] @ middle >= np.cos(min(width_rad / 2, np.pi)) * distance - 1e-3
 
 
 def draw_motion(settings, random):
-    """A 3 x 3 matrix for points in rows, that turns about the vertical, mirrors, tilts and
-    stretches."""
+    """A random 3 x 3 matrix, for multiplication from the right with rows of points: rotation about
+    the vertical, mirroring, tilt and scale."""
     motion = np.eye(3)
     if settings["rotate"]:
         angle = random.uniform(-np.pi, np.pi)
@@ -42,7 +42,7 @@ def draw_motion(settings, random):
 
 
 def _change_remission(remission, settings, random):
-    """Another gain, offset and contrast, noise; or no remission at all."""
+    """Random gain, offset, contrast and noise; None in the share of dropped remission."""
     if random.random() < settings["remission_dropout"]:
         return None
     jitter = settings["remission_jitter"]
@@ -53,8 +53,8 @@ def _change_remission(remission, settings, random):
 
 
 def augment_points(points, remission, classes, motion, settings, random):
-    """A scan as another sensor might have seen it, from where draw_motion() puts it. Remission
-    becomes None when it is left out."""
+    """A scan as another sensor might measure it: drops points, limits the range, applies `motion`,
+    lifts the sensor, adds range noise. Remission may become None."""
     keep = random.random(len(points)) >= random.uniform(0, settings["drop_points"])
     far = random.uniform(settings["max_range_m"], 120)
     keep &= (points**2).sum(axis=1) < far**2
@@ -68,7 +68,7 @@ def augment_points(points, remission, classes, motion, settings, random):
 
 
 def drop_beams(image, settings, random):
-    """Rows of the image whose beams are lost: single ones, or every other one."""
+    """Clears rows of the image: random ones, and sometimes every other one."""
     lost = random.random(len(image.point)) < random.uniform(0, settings["drop_beams"])
     if random.random() < settings["halve_beams"]:
         lost[random.integers(2) :: 2] = True
@@ -77,7 +77,7 @@ def drop_beams(image, settings, random):
 
 
 def crop(channels, target, columns, azimuth_rad):
-    """A part of the image, `columns` wide, about this azimuth; it may run over the image's seam."""
+    """A crop of the image, `columns` wide, around this azimuth; it may cross the image's seam."""
     start = round(0.5 * (1 - azimuth_rad / np.pi) * channels.shape[2] - columns / 2)
     chosen = np.arange(start, start + columns) % channels.shape[2]
     return channels[:, :, chosen], target[:, chosen]

@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
-"""Makes a model folder of a training run: model.onnx, model.yaml, int8.yaml.
+"""Exports a training run as a model folder: model.onnx, model.yaml, int8.yaml.
 
   export.py runs/mine config/models/mine --calibrate data/validation/sequences/0001 ...
 
-int8.yaml is made, and the engines are checked against PyTorch, by the program `stillmap`.
+The program `stillmap` calibrates int8.yaml and runs the engines that are compared with PyTorch.
 """
 
 import argparse
@@ -18,7 +18,7 @@ from networks import make_network
 
 
 def load_run(folder):
-    """The best network of a run, and its state."""
+    """The network of best.pt, and the run's state."""
     state = torch.load(folder / "best.pt", map_location="cpu")
     network = make_network(state["config"]["network"], len(class_names()))
     network.load_state_dict(state["averaged"])
@@ -31,7 +31,7 @@ def describe_run(arguments, state):
     if arguments.columns:
         image["columns"] = arguments.columns
     widths = config["augmentation"].get("image_columns")
-    # A network whose image does not follow the sensor is written for one size.
+    # A network whose image does not follow the sensor is exported for one size.
     if config["follow_sensor"] and widths and min(widths) < image["columns"]:
         image["min_columns"] = min(widths)
     best = max(entry["miou"] for entry in state["history"])
@@ -65,7 +65,7 @@ def read_arguments():
     parser.add_argument("--sensor", default="spinning lidars of 16 to 64 beams")
     parser.add_argument("--training", help="how it was trained, in words")
     parser.add_argument("--accuracy", help="how well it does, in words")
-    parser.add_argument("--calibrate", nargs="*", default=[], help="recordings for int8.yaml")
+    parser.add_argument("--calibrate", nargs="*", default=[], help="sequences for int8.yaml")
     parser.add_argument("--stillmap", type=Path, default="build/release/bin/stillmap")
     arguments = parser.parse_args()
     if arguments.columns is not None and (arguments.columns < 32 or arguments.columns % 32):

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Turns a model folder of lidar-bonnetal (RangeNet++) into one of Stillmap's.
+"""Converts a model folder of lidar-bonnetal (RangeNet++) to one of Stillmap.
 
   import_rangenet.py darknet53-1024 config/models/darknet53_1024
 
@@ -21,8 +21,8 @@ from model_folder import check_engines, describe, random_images, write_model
 from networks import RangeNet
 from scans import CLASS_NAMES, CLASS_OF_ID
 
-LARGEST_DIFFERENCE = 1e-4
-LEAST_AGREEMENT = 0.9999
+MAX_DIFFERENCE = 1e-4
+MIN_AGREEMENT = 0.9999
 
 
 class ImportFault(Exception):
@@ -40,7 +40,7 @@ def read_yaml(file):
 
 
 def value_at(content, file, *names):
-    """A nested field; the fault names the way to it."""
+    """A nested field; the fault names its path."""
     for depth, name in enumerate(names, 1):
         if not isinstance(content, dict) or name not in content:
             raise ImportFault(f"{file}: has no field {'.'.join(map(str, names[:depth]))}")
@@ -54,7 +54,7 @@ def read_weights(file):
         state = torch.load(file, map_location="cpu", weights_only=True)
     except FileNotFoundError as fault:
         raise ImportFault(f"{file}: is missing") from fault
-    # Of a damaged file PyTorch raises whatever its reader stumbles over.
+    # For a damaged file PyTorch raises many types of exceptions.
     except Exception as fault:  # noqa: BLE001
         raise ImportFault(f"{file}: is no checkpoint of PyTorch: {fault}") from fault
     if not isinstance(state, dict) or not all(torch.is_tensor(t) for t in state.values()):
@@ -75,7 +75,7 @@ def load_part(part, file):
 
 
 def read_classes(folder):
-    """Name of our class of each output. Labels that our task does not know are unlabeled."""
+    """Stillmap's class of each output; `unlabeled` for labels outside the single-scan task."""
     file = folder / "data_cfg.yaml"
     original = value_at(read_yaml(file), file, "learning_map_inv")
     missing = [n for n in range(max(original, default=0) + 1) if n not in original]
@@ -156,8 +156,8 @@ def read_arguments():
 
 
 def agree(results):
-    """The bar for engines that calculate with the same precision."""
-    return all(d <= LARGEST_DIFFERENCE and a >= LEAST_AGREEMENT for _, _, d, a in results)
+    """Tolerance for engines of the same precision."""
+    return all(d <= MAX_DIFFERENCE and a >= MIN_AGREEMENT for _, _, d, a in results)
 
 
 def main():

@@ -7,7 +7,7 @@ from scans import IGNORED
 
 
 def class_weights(shares, kind):
-    """Weights against the imbalance of classes; the ignored class counts nothing.
+    """Weights against class imbalance; 0 for the ignored class.
 
     `log`: 1 / log(share + 1.02), the form that the paper prints, with the constant that keeps the
     logarithm positive. `inverse`: 1 / (share + 0.001), what lidar-bonnetal computes.
@@ -24,16 +24,16 @@ def class_weights(shares, kind):
 
 
 def weighted_cross_entropy(scores, target, weights):
-    """Mean over the pixels that have a class, each by its class's weight; 0 without any."""
+    """Mean over the pixels with a class, weighted by class; 0 when there are none."""
     if not (target != IGNORED).any():
         return 0 * scores.sum()
     return functional.cross_entropy(scores, target, weights, ignore_index=IGNORED)
 
 
 def lovasz_softmax(scores, target, pixels=16384):
-    """A smooth stand-in for 1 - mIoU (Berman et al., CVPR 2018): mean over the classes that are
-    there of the Lovasz extension of the Jaccard loss. On at most `pixels` pixels, drawn at random,
-    since it sorts all of them for every class."""
+    """A surrogate for 1 - mIoU (Berman et al., CVPR 2018): the Lovasz extension of the Jaccard
+    loss, averaged over the classes in the truth. On a random subset of at most `pixels` pixels,
+    since all of them are sorted for every class."""
     known = torch.nonzero(target.flatten() != IGNORED).flatten()
     if known.numel() > pixels:
         known = known[torch.randint(known.numel(), (pixels,), device=known.device)]
@@ -49,7 +49,7 @@ def lovasz_softmax(scores, target, pixels=16384):
 
 
 def _jaccard_gradient(truth):
-    """How much each pixel, in the order of falling errors, adds to the Jaccard loss."""
+    """Increment of the Jaccard loss by each pixel, in descending order of errors."""
     left = truth.sum() - truth.cumsum(0)
     union = truth.sum() + (1 - truth).cumsum(0)
     jaccard = 1 - left / union

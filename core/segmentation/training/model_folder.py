@@ -1,4 +1,4 @@
-"""Model folders: model.onnx and the model.yaml that describes it, as the C++ side reads them."""
+"""Model folders: model.onnx and the model.yaml that describes it, as config/loaders reads them."""
 
 import subprocess
 from pathlib import Path

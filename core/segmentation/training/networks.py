@@ -196,7 +196,7 @@ class LightRangeNet(nn.Module):
 
 
 class WithSoftmax(nn.Module):
-    """What is exported: probabilities in place of scores."""
+    """The exported network: probabilities instead of scores."""
 
     def __init__(self, network):
         super().__init__()

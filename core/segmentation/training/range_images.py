@@ -26,7 +26,7 @@ class RangeImage:
 
 
 def project(points, remission, model):
-    """Spherical projection; of several points in a pixel the nearest one stays.
+    """Spherical projection; a pixel keeps the nearest of its points.
 
     `points`: n x 3 in the lidar's frame [m], all finite and none at the origin.
     """

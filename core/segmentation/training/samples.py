@@ -31,7 +31,7 @@ def _network_input(image, remission, config):
 
 
 def plain_sample(scans, index, config):
-    """Input (5 x rows x columns) and classes (rows x columns) of a scan as it is."""
+    """Input (5 x rows x columns) and classes (rows x columns) of a scan, without augmentation."""
     points, remission, classes = scans.read(index)
     image = project(points, remission, scans.images[index])
     return _network_input(image, remission, config), _target(image, classes)
@@ -42,12 +42,12 @@ def _drawn_width(image, settings, random):
     return replace(image, columns=int(random.choice(widths))) if widths else image
 
 
-# Tilting moves points to other azimuths, few of them far.
+# Tilting changes azimuths, mostly by less than this.
 MARGIN_RAD = np.radians(4)
 
 
 def _part(scan, model, settings, motion, random):
-    """What of a scan a crop can show, since every point costs time, and the azimuth of the crop's
+    """The sector of a scan that a crop can show (to save time), and the azimuth of the crop's
     middle after the motion."""
     points, _, classes = scan
     width_rad = 2 * np.pi * settings["crop_columns"] / model.columns
@@ -58,7 +58,7 @@ def _part(scan, model, settings, motion, random):
 
 
 class TrainingSamples(torch.utils.data.Dataset):
-    """Augmented parts of range images; another draw every time."""
+    """Augmented crops of range images, drawn anew for every key (index, seed)."""
 
     def __init__(self, scans, config):
         self.scans, self.config = scans, config
@@ -85,7 +85,7 @@ class TrainingSamples(torch.utils.data.Dataset):
 
 class BatchesBySensor(torch.utils.data.Sampler):
     """Batches in random order, each of scans with the same number of rows. The order and all
-    random draws depend on the seed and the epoch alone, so that a resumed run goes on alike."""
+    random draws depend on the seed and the epoch alone, so that a resumed run is reproducible."""
 
     def __init__(self, scans, batch, seed):
         self.scans, self.batch, self.seed, self.epoch = scans, batch, seed, 0

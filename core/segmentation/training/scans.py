@@ -59,7 +59,7 @@ class ScanFiles:
         self.files, self.images = [], []
         for folder in map(Path, folders):
             for sequence in sorted((folder / "sequences").iterdir()):
-                # A name with a dot is a sequence that is still being written.
+                # A name with a suffix is a sequence that is still being written.
                 if sequence.suffix or (sequences and sequence.name not in sequences):
                     continue
                 image = sensor_image(sequence, default_image)
@@ -75,7 +75,7 @@ class ScanFiles:
         return len(self.files)
 
     def read(self, index):
-        """Points (n x 3), remission (n) and class (n); points that cannot be projected left out."""
+        """Points (n x 3), remission (n) and class (n), without points that cannot be projected."""
         scan_file, label_file = self.files[index]
         scan = np.fromfile(scan_file, np.float32)
         labels = np.fromfile(label_file, np.uint32)
@@ -87,7 +87,7 @@ class ScanFiles:
         return scan[:, :3], scan[:, 3], classes_of(labels[usable])
 
     def class_shares(self, scans=200):
-        """Share of every class among all points, from scans spread over the set."""
+        """Share of every class among all points, from scans spread evenly over the set."""
         counts = np.zeros(len(CLASS_NAMES))
         for index in np.unique(np.linspace(0, len(self) - 1, scans).astype(int)):
             counts += np.bincount(self.read(index)[2], minlength=counts.size)

@@ -3,8 +3,8 @@
 
   train.py training.yaml runs/mine --set data.train=[/data/kitti/dataset] --set network.kind=darknet53
 
-Writes into the run's folder: config.yaml, last.pt (a run that was stopped goes on from there when
-it is started again), best.pt (highest validation mIoU), curves.png and labels_*.png.
+Writes into the run's folder: config.yaml, last.pt (from which an interrupted run resumes), best.pt
+(highest validation mIoU), curves.png and labels_*.png.
 """
 
 import argparse
@@ -19,15 +19,14 @@ import torch
 import yaml
 
 from losses import class_weights, lovasz_softmax, weighted_cross_entropy
-from metrics import Confusion
 from networks import make_network
-from pictures import save_curves, save_labelled_images
 from samples import BatchesBySensor, TrainingSamples, open_scans, plain_sample
 from scans import CLASS_NAMES
+from validation import Confusion, save_curves, save_labelled_images
 
 
 def read_config(file, changes):
-    """The configuration with `a.b=value` changes; a name that does not exist is an error."""
+    """The configuration with changes of the form `a.b=value`; an unknown name is an error."""
     config = yaml.safe_load(Path(file).read_text())
     for change in changes:
         name, _, value = change.partition("=")
@@ -42,7 +41,7 @@ def read_config(file, changes):
 
 
 class Rate:
-    """Learning rate as a factor of the highest, by step."""
+    """Learning rate at each step, as a factor of the highest."""
 
     def __init__(self, settings, steps_per_epoch):
         self.settings = settings
@@ -60,7 +59,7 @@ class Rate:
 
 
 class Run:
-    """One training run: network, optimiser, where it stands, and its files."""
+    """A training run: network, optimiser, progress, and its files."""
 
     def __init__(self, config, folder, device):
         self.config, self.folder, self.device = config, folder, device
@@ -85,8 +84,8 @@ class Run:
         self.weights = class_weights(self.shares, config["loss"]["weights"]).to(device)
 
     def start_from(self, file):
-        """Takes over the weights that another run found best, or those of a model folder."""
-        # Here, since a run from random weights needs no ONNX.
+        """Loads the weights of another run's best.pt, or those of a model folder."""
+        # Imported here, since a run from random weights needs no ONNX.
         from warm_start import check_description, load_weights
 
         samples = TrainingSamples(self.scans, self.config)
@@ -109,7 +108,7 @@ class Run:
         self.network.load_state_dict(state["network"])
         self.averaged.load_state_dict(state["averaged"])
         self.optimiser.load_state_dict(state["optimiser"])
-        # Where it stands in the schedule; rate and length are this configuration's.
+        # The position in the schedule; rate and length come from this configuration.
         fresh = {"base_lrs": self.schedule.base_lrs, "lr_lambdas": [None]}
         self.schedule.load_state_dict({**state["schedule"], **fresh})
         self.epoch, self.step, self.history = state["epoch"], state["step"], state["history"]
@@ -132,7 +131,7 @@ class Run:
             write_whole(best, self.folder / "best.pt")
 
     def average(self):
-        """Follows the network's weights with a running mean, shorter in the beginning."""
+        """Updates the running mean of the network's weights, over fewer steps at the beginning."""
         wanted = self.config["optimiser"]["averaged_steps"]
         share = 1 / min(wanted, 1 + self.step / 3)
         with torch.no_grad():
@@ -194,7 +193,7 @@ def predict(network, channels, device):
 
 
 def write_whole(state, file):
-    """Never leaves half a file."""
+    """Writes atomically: an interrupted run leaves the old file."""
     torch.save(state, file.with_suffix(".part"))
     file.with_suffix(".part").replace(file)
 
@@ -210,7 +209,7 @@ def read_arguments():
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("config", help="such as training.yaml beside this file")
-    parser.add_argument("folder", type=Path, help="of the run; a run that it holds goes on")
+    parser.add_argument("folder", type=Path, help="of the run; resumes a run that it holds")
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     return parser.parse_args()

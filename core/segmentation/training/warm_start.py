@@ -1,8 +1,8 @@
-"""Weights to start a training from: another run's, or those of a model folder.
+"""Initial weights of a training: another run's, or those of a model folder.
 
-In a model.onnx the batch norms are folded into the convolutions. To train on they are taken out
-again: each gets the mean and the variance that its convolution gives on training images, and the
-scale and the offset that leave the network what it was.
+In a model.onnx the batch norms are folded into the convolutions. For further training they are
+unfolded: each gets the mean and the variance of its convolution's output on training images, and
+the scale and offset with which the network's output stays the same.
 """
 
 from pathlib import Path
@@ -16,13 +16,13 @@ from torch import nn
 
 from model_folder import CHANNELS, class_names
 
-# Squared length of a filter that PyTorch draws at random. A batch norm after it takes away any
-# length, but not the pace: the longer a filter, the slower it turns.
+# Squared norm of a filter with PyTorch's random initialisation. Before a batch norm the norm of a
+# filter does not change the output, but the effective learning rate: it falls with the norm.
 SQUARED_LENGTH = 1 / 3
 
 
 def check_description(file, config):
-    """A model folder must see images, and name classes, as this configuration does."""
+    """Raises ValueError when the model's normalisation or classes differ from the configuration."""
     file = Path(file)
     file = (file.parent if file.suffix == ".onnx" else file) / "model.yaml"
     if not file.exists():
@@ -49,7 +49,7 @@ def load_weights(network, file, images):
 
 
 def _load_onnx(network, file):
-    """Copies the tensors of an exported network; returns the biases that stand for batch norms,
+    """Copies the tensors of an exported network; returns the biases that folded batch norms left,
     by the convolution's name."""
     graph = onnx.load(str(file)).graph
     tensors = {t.name: numpy_helper.to_array(t) for t in graph.initializer}
@@ -90,8 +90,8 @@ def _load_onnx(network, file):
 
 
 def _part_of(node_name):
-    """The network's part that a node stands for: /network/encoder.0/conv/Conv is encoder.0.conv;
-    members of a sequence repeat its name, as in /network/head/head.1/Conv."""
+    """Name of the module of a node: /network/encoder.0/conv/Conv is encoder.0.conv; members of an
+    nn.Sequential repeat its name, as in /network/head/head.1/Conv."""
     steps = []
     for step in node_name.split("/")[2:-1]:
         if steps and step.startswith(steps[-1] + "."):
