@@ -1,20 +1,19 @@
-// Compiled for any x86-64, whatever the rest is compiled for: says why the program cannot run
-// before an instruction that the processor lacks would end it without a word.
+// Compiled for baseline x86-64, unlike the rest: prints an error before the program reaches an
+// instruction that the processor does not support.
 #include <unistd.h>
 
 #include <cstring>
 
 namespace {
 
-void say(const char* text) {
-  // Nothing is to be done where even stderr is gone.
+void print_error(const char* text) {
   if (write(STDERR_FILENO, text, std::strlen(text)) < 0) _exit(1);
 }
 
 bool is_new_enough() {
   __builtin_cpu_init();
 #ifdef __clang__
-  // It has no names for the levels of x86-64 there; these came with the third.
+  // clang does not accept the names of x86-64 levels here; these features came with x86-64-v3.
   return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("bmi2") &&
          __builtin_cpu_supports("fma");
 #else
@@ -24,14 +23,15 @@ bool is_new_enough() {
 
 void check_processor() {
   if (is_new_enough()) return;
-  say("this program was built for " STILLMAP_ARCH
+  print_error(
+      "this program was built for " STILLMAP_ARCH
       " processors (AVX2; x86 since 2013), and this one is older; build it from source with "
       "cmake -DSTILLMAP_ARCH=\n");
   _exit(1);
 }
 
-// Called before shared libraries are initialised: they already use our copies of the templates that
-// both instantiate.
+// Runs before shared libraries are initialised: their initialisers may already call our instances
+// of templates that both instantiate.
 [[gnu::section(".preinit_array"), gnu::used]] void (*const run_first)() = check_processor;
 
 }  // namespace
