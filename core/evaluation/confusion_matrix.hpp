@@ -21,22 +21,22 @@ class ConfusionMatrix {
   /// Points counted.
   [[nodiscard]] std::uint64_t total() const;
 
-  /// TP / (TP + FP + FN); nothing for a class that was neither seen nor predicted.
+  /// TP / (TP + FP + FN); empty for a class that is neither in the truth nor predicted.
   [[nodiscard]] std::optional<double> iou(SemanticClass label) const;
-  /// The same, with the classes of the group taken for one. They are all different.
+  /// The same with the classes of the group counted as one. No class may appear twice.
   [[nodiscard]] std::optional<double> iou(std::span<const SemanticClass> group) const;
   /// Mean over all 19 classes; one that never occurs counts 0, as in semantic-kitti-api.
   [[nodiscard]] double mean_iou() const;
-  /// Mean over the classes that were seen or predicted; nothing when there are none.
+  /// Mean over the classes that are in the truth or predicted; empty when there are none.
   [[nodiscard]] std::optional<double> mean_iou_of_present() const;
-  /// Share of points with the right class; nothing when no point was counted.
+  /// Share of points with the right class; empty when no point was counted.
   [[nodiscard]] std::optional<double> accuracy() const;
 
  private:
   std::array<std::array<std::uint64_t, semantic_class_count>, semantic_class_count> counts_{};
 };
 
-/// Classes that a user may well take for one thing.
+/// Classes that count as one, for a score that forgives confusions among them.
 struct ClassGroup {
   std::string_view name;
   std::span<const SemanticClass> classes;

@@ -25,10 +25,11 @@ std::uint64_t key(const Cell& cell) {
   return part(cell.x()) << 42U | part(cell.y()) << 21U | part(cell.z());
 }
 
-// Map points in cells as large as the search radius: neighbours lie in the 27 cells around.
-class NearPoints {
+// Radius search over map points, hashed into cells as large as the radius: all neighbours of a
+// point lie in the 27 cells around it.
+class RadiusSearch {
  public:
-  NearPoints(std::span<const Eigen::Vector3f> points_map, double radius_m) : radius_m_(radius_m) {
+  RadiusSearch(std::span<const Eigen::Vector3f> points_map, double radius_m) : radius_m_(radius_m) {
     for (const Eigen::Vector3f& point : points_map) {
       if (point.allFinite()) cells_[key(cell_of(point, radius_m_))].push_back(point);
     }
@@ -120,7 +121,7 @@ std::optional<double> MapCleaningScore::f1() const {
 
 MapCleaningScore map_cleaning_score(const MapTruth& truth,
                                     std::span<const Eigen::Vector3f> points_map) {
-  const NearPoints map_points(points_map, std::numbers::sqrt3 / 2.0 * truth.voxel_size_m());
+  const RadiusSearch map_points(points_map, std::numbers::sqrt3 / 2.0 * truth.voxel_size_m());
   MapCleaningScore score;
   for (const MapTruth::Voxel& voxel : truth.voxels()) {
     const std::uint64_t kept = map_points.any_near(voxel.mean_map) ? 1 : 0;

@@ -9,8 +9,8 @@
 
 namespace stillmap::evaluation {
 
-/// What the map should hold and what not, from labelled scans at known poses: 0.2 m voxels, each
-/// with the label that most of its points have.
+/// Ground truth of a map, from labelled scans at known poses: voxels with the number of moving,
+/// parked and fixed points in each.
 class MapTruth {
  public:
   explicit MapTruth(double voxel_size_m = 0.2);
@@ -43,14 +43,14 @@ struct MapCleaningScore {
   std::uint64_t parked_voxels = 0, parked_kept = 0;
   std::uint64_t moving_voxels = 0, moving_kept = 0;
 
-  /// Kept share of what is fixed. Our planning map leaves parked vehicles out on purpose (paper
-  /// II-C.2), so they do not count here.
+  /// Share of fixed voxels that the map keeps. Parked vehicles do not count: the planning map
+  /// leaves them out by design (paper II-C.2).
   [[nodiscard]] std::optional<double> preservation_rate() const;
-  /// As ERASOR counts: parked vehicles are static as well.
+  /// As ERASOR counts: parked vehicles are static too.
   [[nodiscard]] std::optional<double> preservation_rate_with_parked() const;
-  /// Share of moving voxels that is not in the map.
+  /// Share of moving voxels that are not in the map.
   [[nodiscard]] std::optional<double> rejection_rate() const;
-  /// The same of parked vehicles.
+  /// The same for parked vehicles.
   [[nodiscard]] std::optional<double> parked_rejection_rate() const;
   /// Harmonic mean of preservation and rejection rate.
   [[nodiscard]] std::optional<double> f1() const;

@@ -8,7 +8,7 @@
 
 namespace stillmap::evaluation {
 
-/// How well moving points are told from the rest. Rates are empty where they would divide by zero.
+/// Detection of moving points against the truth. A rate is empty where it would divide by zero.
 struct MovingScore {
   std::uint64_t true_positives = 0;
   std::uint64_t false_positives = 0;

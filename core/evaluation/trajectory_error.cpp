@@ -13,7 +13,7 @@
 namespace stillmap::evaluation {
 namespace {
 
-// Text files round to six digits or so; a matrix farther from a rotation than this is no pose.
+// Poses in text files have about six digits; a matrix farther from a rotation is rejected.
 constexpr double rotation_tolerance = 1e-3;
 
 void require_pose(const Eigen::Isometry3d& T, const char* which, std::size_t index) {
@@ -98,8 +98,8 @@ double rotation_angle(const Eigen::Isometry3d& T) {
 
 namespace {
 
-// Least squares over rotations, Umeyama eq. 40-41 with scale 1. Poses on one line leave a turn
-// about that line open; any choice gives the same error.
+// Least squares over rotations, Umeyama eq. 40-41 with scale 1. For poses on a line the rotation
+// about that line is undetermined; every choice gives the same error.
 Eigen::Isometry3d best_rigid_fit(const PosePairs& pairs) {
   Eigen::Vector3d truth_mean = Eigen::Vector3d::Zero();
   Eigen::Vector3d estimate_mean = Eigen::Vector3d::Zero();
@@ -127,15 +127,6 @@ Eigen::Isometry3d best_rigid_fit(const PosePairs& pairs) {
   return T_truth_estimate;
 }
 
-}  // namespace
-
-std::optional<Alignment> alignment_from_name(std::string_view alignment_name) {
-  if (alignment_name == "none") return Alignment::none;
-  if (alignment_name == "first") return Alignment::first_pose;
-  if (alignment_name == "rigid") return Alignment::rigid;
-  return std::nullopt;
-}
-
 Eigen::Isometry3d find_alignment(const PosePairs& pairs, Alignment alignment) {
   switch (alignment) {
     case Alignment::first_pose:
@@ -147,6 +138,8 @@ Eigen::Isometry3d find_alignment(const PosePairs& pairs, Alignment alignment) {
   }
   return Eigen::Isometry3d::Identity();
 }
+
+}  // namespace
 
 AbsoluteTrajectoryError absolute_trajectory_error(const PosePairs& pairs, Alignment alignment) {
   AbsoluteTrajectoryError error;
@@ -171,7 +164,14 @@ constexpr std::array segment_lengths_m{100.0, 200.0, 300.0, 400.0, 500.0, 600.0,
 constexpr std::size_t poses_between_segments = 10;
 constexpr double deg_per_rad = 180.0 / std::numbers::pi;
 
-// Sums, not yet means, so that lengths can be added up.
+// The true motion from pose `first` to pose `last` relative to the estimated one.
+Eigen::Isometry3d motion_error(const PosePairs& pairs, std::size_t first, std::size_t last) {
+  const Eigen::Isometry3d estimated = pairs.estimate[first].inverse() * pairs.estimate[last];
+  const Eigen::Isometry3d true_motion = pairs.truth[first].inverse() * pairs.truth[last];
+  return estimated.inverse() * true_motion;
+}
+
+// Sums over the segments of one length; the caller divides by their number.
 KittiLengthError sum_segments(const PosePairs& pairs, const std::vector<double>& distance_m,
                               double length_m) {
   KittiLengthError sum{.length_m = length_m};
@@ -189,12 +189,6 @@ KittiLengthError sum_segments(const PosePairs& pairs, const std::vector<double>&
 }
 
 }  // namespace
-
-Eigen::Isometry3d motion_error(const PosePairs& pairs, std::size_t first, std::size_t last) {
-  const Eigen::Isometry3d estimated = pairs.estimate[first].inverse() * pairs.estimate[last];
-  const Eigen::Isometry3d true_motion = pairs.truth[first].inverse() * pairs.truth[last];
-  return estimated.inverse() * true_motion;
-}
 
 std::optional<RelativePoseError> relative_pose_error(const PosePairs& pairs) {
   if (pairs.size() < 2) return std::nullopt;

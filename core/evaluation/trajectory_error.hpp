@@ -4,16 +4,15 @@
 #include <cstdint>
 #include <optional>
 #include <span>
-#include <string_view>
 #include <vector>
 
 #include "core/lidar/trajectory.hpp"
 
 namespace stillmap::evaluation {
 
-/// True and estimated poses of the same moments, in step and in time order. Both take the same
-/// body frame (lidar or camera: the caller sees to it) to their own world frame; the two world
-/// frames may differ.
+/// True and estimated poses at the same times, in time order: entry i of both belongs together.
+/// Both map the same body frame (lidar or camera, the caller's choice) to a world frame of their
+/// own; the two world frames may differ.
 struct PosePairs {
   std::vector<Eigen::Isometry3d> truth;
   std::vector<Eigen::Isometry3d> estimate;
@@ -21,14 +20,14 @@ struct PosePairs {
   [[nodiscard]] std::size_t size() const { return truth.size(); }
 };
 
-/// Pairs the poses one by one. Throws std::invalid_argument when the lengths differ, when there is
-/// no pose, or when a pose is not finite or not a rotation; the text names which.
+/// Pairs pose i with pose i. Throws std::invalid_argument when the lengths differ, when there is no
+/// pose, or when a pose is not finite or not a rotation; the text names the pose.
 [[nodiscard]] PosePairs pair_by_index(std::span<const Eigen::Isometry3d> truth,
                                       std::span<const Eigen::Isometry3d> estimate);
 
 /// Pairs every estimate with the true pose nearest in time, if it is at most `max_difference_ns`
-/// away; a true pose is used once. Stamps of both must grow. Throws std::invalid_argument as
-/// pair_by_index, when stamps do not grow, and when nothing pairs.
+/// away; a true pose is used once. Throws std::invalid_argument as pair_by_index does, and when
+/// stamps do not increase or no pair is found.
 [[nodiscard]] PosePairs pair_by_stamp(const Trajectory& truth, const Trajectory& estimate,
                                       std::int64_t max_difference_ns);
 
@@ -38,21 +37,15 @@ struct PosePairs {
 /// Angle of the rotation, 0..pi [rad].
 [[nodiscard]] double rotation_angle(const Eigen::Isometry3d& T);
 
-/// How the estimate's world is laid over the truth's before they are compared.
+/// How the estimate's world frame is aligned with the truth's before they are compared.
 enum class Alignment {
-  /// They are the same world already.
+  /// Not at all: both use the same world frame.
   none,
-  /// The first poses coincide; every later error counts in full.
+  /// The first poses coincide.
   first_pose,
-  /// The rotation and translation that fit best (S. Umeyama, 1991, without scale).
+  /// Least-squares rotation and translation (S. Umeyama, 1991, scale 1).
   rigid,
 };
-
-/// The alignment called "none", "first" or "rigid"; nothing for another word.
-[[nodiscard]] std::optional<Alignment> alignment_from_name(std::string_view alignment_name);
-
-/// Takes the estimate's world frame to the truth's.
-[[nodiscard]] Eigen::Isometry3d find_alignment(const PosePairs& pairs, Alignment alignment);
 
 /// Absolute trajectory error (ATE) in translation, after alignment.
 struct AbsoluteTrajectoryError {
@@ -62,6 +55,7 @@ struct AbsoluteTrajectoryError {
   /// Error of the last pose.
   double final_m = 0.0;
   std::vector<double> per_pose_m;
+  /// The alignment: estimate's world to truth's world.
   Eigen::Isometry3d T_truth_estimate = Eigen::Isometry3d::Identity();
 };
 
@@ -77,12 +71,8 @@ struct RelativePoseError {
   double max_rotation_rad = 0.0;
 };
 
-/// Nothing when there is one pose only.
+/// Empty for fewer than two poses.
 [[nodiscard]] std::optional<RelativePoseError> relative_pose_error(const PosePairs& pairs);
-
-/// What is left of the true motion from pose `first` to pose `last` after the estimated one.
-[[nodiscard]] Eigen::Isometry3d motion_error(const PosePairs& pairs, std::size_t first,
-                                             std::size_t last);
 
 /// Mean errors of all segments of one length.
 struct KittiLengthError {
@@ -103,7 +93,7 @@ struct KittiOdometryError {
   std::vector<KittiLengthError> by_length;
 };
 
-/// Nothing when the true path is shorter than 100 m.
+/// Empty when the true path is shorter than 100 m.
 [[nodiscard]] std::optional<KittiOdometryError> kitti_odometry_error(const PosePairs& pairs);
 
 }  // namespace stillmap::evaluation
