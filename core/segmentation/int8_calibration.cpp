@@ -11,8 +11,8 @@
 namespace stillmap {
 namespace {
 
-// Positive floating point numbers sort as their bits do: exponent and the upper bits of the
-// mantissa number the bins. Those outside 2^-24 to 2^24 go into the first and the last.
+// Positive floats sort like their bit patterns: the exponent and the upper bits of the mantissa are
+// the index of the bin. Magnitudes outside 2^-24 .. 2^24 go into the first and the last bin.
 constexpr std::uint32_t dropped_bits = 19;
 constexpr std::uint32_t first_bits = std::bit_cast<std::uint32_t>(0x1p-24F) >> dropped_bits;
 constexpr std::uint32_t last_bits = std::bit_cast<std::uint32_t>(0x1p24F) >> dropped_bits;
@@ -70,11 +70,11 @@ namespace {
 
 using Factors = std::vector<float>;
 
-/// Tensors that must have one set of factors, because they are added or are the same but for an
-/// activation.
-class Groups {
+/// Disjoint sets of tensors that must share their factors, since they are added or differ only by
+/// an activation.
+class TensorGroups {
  public:
-  explicit Groups(const NetworkGraph& graph) : parent_(graph.tensors.size()) {
+  explicit TensorGroups(const NetworkGraph& graph) : parent_(graph.tensors.size()) {
     std::iota(parent_.begin(), parent_.end(), TensorId{0});
     for (const Layer& layer : graph.layers) {
       if (!std::holds_alternative<Convolution>(layer.operation)) {
@@ -100,9 +100,9 @@ class Groups {
   std::vector<TensorId> parent_;
 };
 
-/// The largest range of each channel over a group, over the largest of all; 1 for channels that are
-/// always 0.
-std::vector<Factors> factors_of_groups(const NetworkGraph& graph, const Groups& groups,
+/// For each group the largest range of each channel, divided by the largest of all channels; 1 for
+/// channels that are always 0. Empty where the scale must not change.
+std::vector<Factors> factors_of_groups(const NetworkGraph& graph, const TensorGroups& groups,
                                        const Int8Calibration& calibration) {
   std::vector<Factors> factors(graph.tensors.size());
   for (TensorId tensor = 0; tensor < graph.tensors.size(); ++tensor) {
@@ -116,8 +116,8 @@ std::vector<Factors> factors_of_groups(const NetworkGraph& graph, const Groups& 
   factors[groups.of(graph.input)].clear();
   factors[groups.of(graph.output)].clear();
   for (Factors& of_group : factors) {
-    const float most = of_group.empty() ? 0.0F : std::ranges::max(of_group);
-    for (float& factor : of_group) factor = factor > 0.0F ? factor / most : 1.0F;
+    const float largest = of_group.empty() ? 0.0F : std::ranges::max(of_group);
+    for (float& factor : of_group) factor = factor > 0.0F ? factor / largest : 1.0F;
   }
   return factors;
 }
@@ -142,7 +142,7 @@ void multiply_inputs(Convolution& c, const Factors& factors) {
 }  // namespace
 
 Int8Calibration equalise_channels(NetworkGraph& graph, const Int8Calibration& calibration) {
-  const Groups groups(graph);
+  const TensorGroups groups(graph);
   const std::vector<Factors> factors = factors_of_groups(graph, groups, calibration);
   for (Layer& layer : graph.layers) {
     auto* const c = std::get_if<Convolution>(&layer.operation);

@@ -10,30 +10,29 @@ namespace stillmap {
 
 struct NetworkGraph;
 
-/// What must be known of a network to run it with 8-bit integers; int8.yaml in a model folder.
+/// Post-training quantisation of a network to 8-bit integers; int8.yaml in a model folder.
 struct Int8Calibration {
-  /// From what, in words.
+  /// Data and settings that it was made with, in words.
   std::string made;
-  /// Largest magnitude that counts of each channel of each tensor; larger values are cut off. By
-  /// the tensor's name in the network's file.
+  /// By the tensor's name in the network's file: the magnitude at which each channel saturates.
   std::map<std::string, std::vector<float>> range_of_channels;
   /// Layers that stay in floating point, besides the first and the last.
   std::vector<std::string> float_layers;
 };
 
-/// Watches how large the values of a network's tensors become, for its calibration.
+/// Histograms of the magnitudes in a network's tensors, from which a calibration is made.
 class ActivationRanges {
  public:
-  /// Adds the values that a tensor had for one image, pixels x channels.
+  /// Adds the values of a tensor for one image, pixels x channels.
   void add(const std::string& tensor, std::span<const float> values, std::size_t channels);
 
-  /// The magnitude of each channel of each tensor that `share` of its values do not exceed, 0 <
-  /// share <= 1 (up to 5 % more); with 1 the largest of all.
+  /// For each channel of each tensor the magnitude that `share` of its values do not exceed,
+  /// rounded up by at most 5 %; the maximum for share = 1. 0 < share <= 1.
   [[nodiscard]] std::map<std::string, std::vector<float>> ranges(double share) const;
 
  private:
   struct Histogram {
-    /// How many magnitudes are in each bin; 16 bins for each doubling.
+    /// Number of magnitudes in each bin; 16 bins per octave.
     std::vector<std::uint32_t> count;
     float largest = 0.0F;
 
@@ -44,14 +43,14 @@ class ActivationRanges {
   std::map<std::string, std::vector<Histogram>> channels_of_tensor_;
 };
 
-/// Makes the channels of each tensor about equally large, so that one factor for all of them, as
-/// int8 has it, wastes no digits on small ones: what makes a channel is divided by its range, what
-/// reads it multiplies by it. Convolutions, leaky ReLUs and sums let factors through, so the
-/// network's output does not change. Tensors that are added share their factors; the network's
-/// input and output, and what is added to them, keep theirs.
+/// Cross-layer equalisation (M. Nagel et al., ICCV 2019): scales the channels of each tensor to
+/// about the same range, since int8 has one scale for all channels of a tensor. The weights that
+/// produce a channel are divided by its range, those that read it are multiplied by it.
+/// Convolutions, leaky ReLUs and sums commute with positive factors, so the network's output does
+/// not change. Tensors that are added share their factors; the network's input and output, and
+/// tensors added to them, keep their scale, and so do tensors without an entry in the calibration.
 ///
-/// Gives the ranges that the channels have then. Tensors that the calibration does not know stay as
-/// they are.
+/// Returns the calibration of the changed graph.
 Int8Calibration equalise_channels(NetworkGraph& graph, const Int8Calibration& calibration);
 
 }  // namespace stillmap

@@ -16,15 +16,15 @@
 namespace stillmap {
 namespace {
 
-/// Farther than all points are, and than any cutoff.
-constexpr float nowhere_m = 1e30F;
+/// Range of an empty pixel: beyond all points and any cutoff.
+constexpr float empty_range_m = 1e30F;
 
 struct Decision {
   SemanticClass label = SemanticClass::unlabeled;
   float confidence = 0.0F;
 };
 
-/// 1 - Gaussian of unit sum, over the window.
+/// 1 - Gaussian over the window, which is normalised to sum 1.
 std::vector<float> distance_factors(const KnnConfig& config) {
   const double middle = (config.window - 1) / 2.0;
   std::vector<double> gaussian;
@@ -41,8 +41,8 @@ std::vector<float> distance_factors(const KnnConfig& config) {
   return factors;
 }
 
-/// A range image with half a window of what the reference sees beyond its edge, range 0 and no
-/// class, all round it, so that no window needs to know where the edge is.
+/// A range image with a border of half a window, of range 0 and no class as in the reference, so
+/// that windows need no bounds checks.
 class PaddedImage {
  public:
   PaddedImage(const RangeImage& image, const PixelLabels& pixels, int half)
@@ -58,14 +58,14 @@ class PaddedImage {
   }
 
   [[nodiscard]] std::size_t columns() const { return columns_; }
-  /// Upper left corner of the window round a pixel of the image.
+  /// Upper left corner of the window around a pixel of the image.
   [[nodiscard]] std::size_t corner(std::size_t pixel) const {
     return pixel / image_columns_ * columns_ + pixel % image_columns_;
   }
-  /// `nowhere_m` where no point is.
+  /// `empty_range_m` in empty pixels.
   [[nodiscard]] const float* range_m() const { return range_m_.data(); }
-  [[nodiscard]] SemanticClass label(std::size_t place) const { return labels_[place]; }
-  [[nodiscard]] float confidence(std::size_t place) const { return confidence_[place]; }
+  [[nodiscard]] SemanticClass label(std::size_t index) const { return labels_[index]; }
+  [[nodiscard]] float confidence(std::size_t index) const { return confidence_[index]; }
 
  private:
   void copy_row(const RangeImage& image, const PixelLabels& pixels, std::size_t row) {
@@ -73,7 +73,7 @@ class PaddedImage {
     const std::size_t to = (row + half_) * columns_ + half_;
     for (std::size_t i = 0; i < image_columns_; ++i) {
       const float range_m = image.range_m()[from + i];
-      range_m_[to + i] = range_m < 0.0F ? nowhere_m : range_m;
+      range_m_[to + i] = range_m < 0.0F ? empty_range_m : range_m;
       labels_[to + i] = pixels.classes[from + i];
       confidence_[to + i] = pixels.confidence[from + i];
     }
@@ -85,14 +85,15 @@ class PaddedImage {
   std::vector<float> confidence_;
 };
 
-/// Points that are worked on at once, in one register: a loop over arrays would go through memory.
+/// Points that are processed together in vector registers; loops over arrays would go through
+/// memory.
 constexpr std::size_t lanes = 4;
 using Floats = float __attribute__((vector_size(lanes * sizeof(float))));
 using Words = std::uint64_t __attribute__((vector_size(lanes * sizeof(std::uint64_t))));
 using Numbers = std::int32_t __attribute__((vector_size(lanes * sizeof(std::int32_t))));
 
-/// Distances and the number of a pixel in the window as one number each, which sorts by distance
-/// and then by pixel: a float's digits leave 29 bits of a double free.
+/// Distance and index of a pixel in the window packed into one double, which sorts by distance and
+/// then by index: the mantissa of a float leaves 29 bits of a double's free.
 using Keys = double __attribute__((vector_size(lanes * sizeof(double))));
 constexpr std::uint64_t pixel_bits = 0xFFFF;
 static_assert(KnnConfig::max_window * KnnConfig::max_window <= pixel_bits);
@@ -102,16 +103,16 @@ Keys keys_of(Floats distance_m, std::uint64_t pixel) {
                              pixel);
 }
 
-/// Of each of a few points the pixels nearest in range, in rising order of distance; equal ones in
-/// the order of their numbers.
+/// For each lane the pixels nearest in range, in ascending order of distance, then of index.
 template <std::size_t kept_pixels>
 class NearestPixels {
  public:
-  NearestPixels() { kept_.fill(keys_of(Floats{} + nowhere_m, 0)); }
+  NearestPixels() { kept_.fill(keys_of(Floats{} + empty_range_m, 0)); }
 
-  /// A pixel of each point's window.
+  /// Inserts a pixel of each point's window.
   void add(Keys keys) {
-    // Each place takes what fits between the one before it and itself. No place waits for another.
+    // Insertion without branches: entry k becomes the median of entry k - 1, entry k and the key.
+    // No entry depends on another one's result.
     for (std::size_t k = kept_pixels - 1; k > 0; --k) {
       const Keys after_previous = kept_[k - 1] > keys ? kept_[k - 1] : keys;
       kept_[k] = after_previous < kept_[k] ? after_previous : kept_[k];
@@ -122,7 +123,7 @@ class NearestPixels {
   [[nodiscard]] float distance_m(std::size_t k, std::size_t p) const {
     return static_cast<float>(std::bit_cast<double>(bits(k, p) & ~pixel_bits));
   }
-  [[nodiscard]] std::size_t place(std::size_t k, std::size_t p) const {
+  [[nodiscard]] std::size_t pixel(std::size_t k, std::size_t p) const {
     return bits(k, p) & pixel_bits;
   }
 
@@ -134,7 +135,7 @@ class NearestPixels {
   std::array<Keys, kept_pixels> kept_;
 };
 
-/// The class with most votes, of equals the lowest; `unlabeled` without a vote for another one.
+/// The class with most votes, the lowest of several; `unlabeled` when there is no vote for another.
 SemanticClass majority_class(std::span<const SemanticClass> voted) {
   SemanticClass winner = SemanticClass::unlabeled;
   std::ptrdiff_t most = 0;
@@ -151,9 +152,10 @@ SemanticClass majority_class(std::span<const SemanticClass> voted) {
   return winner;
 }
 
-class Poll {
+/// The vote of the pixels around each point.
+class NeighbourVote {
  public:
-  Poll(const RangeImage& image, const PixelLabels& pixels, const KnnConfig& config)
+  NeighbourVote(const RangeImage& image, const PixelLabels& pixels, const KnnConfig& config)
       : image_(image),
         pixels_(pixels),
         config_(config),
@@ -163,12 +165,12 @@ class Poll {
     for (std::size_t row = 0; row < window; ++row) {
       for (std::size_t i = 0; i < window; ++i) offsets_.push_back(row * padded_.columns() + i);
     }
-    // The point stands for itself in its own pixel, where a nearer one may hide it.
+    // In its own pixel the point counts itself, even if a nearer point hides it there.
     factors_[factors_.size() / 2] = 0.0F;
   }
 
-  /// Decides about the points from `first` on, at most as many as there are lanes. `kept_pixels`
-  /// is at least the number of neighbours.
+  /// Sets the labels of up to `lanes` points from `first` on. `kept_pixels` is at least the number
+  /// of neighbours.
   template <std::size_t kept_pixels>
   void decide(std::size_t first, PointLabels& labels) const {
     const std::size_t count = std::min(lanes, image_.point_count() - first);
@@ -180,7 +182,7 @@ class Poll {
       corner[p] = static_cast<std::int32_t>(padded_.corner(static_cast<std::size_t>(pixel)));
       range_m[p] = image_.range_of_point_m()[first + p];
     }
-    const auto nearest = ask<kept_pixels>(corner, range_m);
+    const auto nearest = find_nearest<kept_pixels>(corner, range_m);
     for (std::size_t p = 0; p < count; ++p) {
       const Decision decision = decide_one(nearest, p, static_cast<std::size_t>(corner[p]),
                                            image_.pixel_of_point()[first + p]);
@@ -191,7 +193,7 @@ class Poll {
 
  private:
   template <std::size_t kept_pixels>
-  [[nodiscard]] NearestPixels<kept_pixels> ask(Numbers corner, Floats range_m) const {
+  [[nodiscard]] NearestPixels<kept_pixels> find_nearest(Numbers corner, Floats range_m) const {
     NearestPixels<kept_pixels> nearest;
     for (std::size_t i = 0; i < offsets_.size(); ++i) {
       const float* const ranges_m = padded_.range_m() + offsets_[i];
@@ -222,14 +224,14 @@ class Poll {
     const auto cutoff_m = static_cast<float>(config_.cutoff_m);
     std::size_t votes = 0;
     for (; votes < wanted && nearest.distance_m(votes, p) <= cutoff_m; ++votes) {
-      voted[votes] = padded_.label(corner + offsets_[nearest.place(votes, p)]);
+      voted[votes] = padded_.label(corner + offsets_[nearest.pixel(votes, p)]);
     }
     const SemanticClass winner = majority_class(std::span(voted).first(votes));
     if (winner == SemanticClass::unlabeled) return {};
     float confidence = 0.0F;
     for (std::size_t k = 0; k < votes; ++k) {
       if (voted[k] != winner) continue;
-      confidence += padded_.confidence(corner + offsets_[nearest.place(k, p)]);
+      confidence += padded_.confidence(corner + offsets_[nearest.pixel(k, p)]);
     }
     return {.label = winner, .confidence = confidence / static_cast<float>(votes)};
   }
@@ -239,7 +241,7 @@ class Poll {
   const KnnConfig& config_;
   PaddedImage padded_;
   std::vector<float> factors_;
-  /// Of each pixel of the window, from its corner.
+  /// Offset of each pixel of the window from its corner.
   std::vector<std::size_t> offsets_;
 };
 
@@ -266,7 +268,7 @@ PointLabels knn_labels(const RangeImage& image, const PixelLabels& pixels,
                        const KnnConfig& config) {
   assert(config.faults().empty());
   assert(pixels.classes.size() == image.pixel_count());
-  const Poll poll(image, pixels, config);
+  const NeighbourVote vote(image, pixels, config);
   PointLabels labels;
   labels.classes.resize(image.point_count());
   labels.confidence.resize(image.point_count());
@@ -275,11 +277,11 @@ PointLabels knn_labels(const RangeImage& image, const PixelLabels& pixels,
     const tbb::blocked_range<std::size_t> all(0, (image.point_count() + lanes - 1) / lanes, 512);
     tbb::parallel_for(all, [&](const auto& some) {
       for (std::size_t i = some.begin(); i < some.end(); ++i) {
-        poll.decide<kept_pixels>(i * lanes, labels);
+        vote.decide<kept_pixels>(i * lanes, labels);
       }
     });
   };
-  // So few that they stay in registers, if they are enough.
+  // With the usual number of neighbours the nearest pixels stay in registers.
   constexpr std::integral_constant<std::size_t, 5> usual;
   constexpr std::integral_constant<std::size_t, KnnConfig::max_neighbours> all;
   if (config.neighbours <= static_cast<int>(usual)) {

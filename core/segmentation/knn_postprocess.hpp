@@ -8,21 +8,21 @@
 
 namespace stillmap {
 
-/// RangeNet++'s post-processing: a point behind another one in its pixel must not take that one's
-/// class, so the points around it vote.
+/// RangeNet++'s post-processing: a point that is hidden behind another one in its pixel must not
+/// take that one's class, so the pixels around it vote.
 struct KnnConfig {
   static constexpr int max_neighbours = 25;
   static constexpr int max_window = 15;
 
-  /// Pixels that vote, and the edge of the square in which they are looked for (odd).
+  /// Number of pixels that vote, and the edge length (odd) of the square they are searched in.
   int neighbours = 5;
   int window = 5;
-  /// Width in pixels of the Gaussian that favours pixels near the point's own.
+  /// Standard deviation in pixels of the Gaussian that favours pixels near the point's own.
   double sigma = 1.0;
-  /// A pixel farther than this in (weighted) range does not vote [m].
+  /// Pixels at a larger (weighted) difference in range do not vote [m].
   double cutoff_m = 1.0;
-  /// Without any vote a point becomes a car, as in lidar-bonnetal, and not what its pixel is. For
-  /// parity tests.
+  /// A point without any vote becomes a car, as in lidar-bonnetal, instead of its pixel's class.
+  /// For parity tests.
   bool car_without_votes = false;
 
   /// Every fault in words, one a line; empty when the configuration can be used.
@@ -35,11 +35,11 @@ struct PixelLabels {
   std::vector<float> confidence;
 };
 
-/// The class of every point by vote of the `neighbours` pixels nearest in range to it, out of the
-/// window round its pixel. The distance of a pixel is |its range - the point's| (1 - Gaussian);
-/// equal ones count in the window's order. `unlabeled` never wins; ties go to the lowest class. The
-/// confidence is the winners' summed confidence over the number of all votes. Points without a
-/// pixel are unlabeled.
+/// The class of every point by majority vote of the `neighbours` pixels nearest in range, within
+/// the window around its pixel. The distance of a pixel is |its range - the point's| (1 -
+/// Gaussian); among equal distances the window's order decides. `unlabeled` never wins; ties go to
+/// the lowest class. The confidence is the sum over the winning votes, divided by the number of all
+/// votes. Points without a pixel are unlabeled.
 [[nodiscard]] PointLabels knn_labels(const RangeImage& image, const PixelLabels& pixels,
                                      const KnnConfig& config);
 

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <string_view>
 
+#include "core/segmentation/model_error.hpp"
 #include "core/segmentation/segmentation_network.hpp"
 
 namespace stillmap {
@@ -13,8 +14,9 @@ namespace {
 constexpr std::array<std::string_view, input_channels> channel_names{"range", "x", "y", "z",
                                                                      "remission"};
 constexpr int max_rows = 512;
-/// Lidars of few beams fire some 1800 times a turn (VLP-16 at 10 Hz), others 2100 times and more.
-/// An image of more columns than that has gaps all over, which no network knows.
+/// Lidars of few beams fire some 1800 times per revolution (VLP-16 at 10 Hz), others 2100 times and
+/// more. An image with more columns than that has empty ones everywhere, unlike all training
+/// images.
 constexpr int few_beams = 16;
 constexpr int columns_of_few_beams = 1536;
 
@@ -55,6 +57,12 @@ std::string ModelDescription::faults() const {
   }
   if (knn) faults += knn->faults();
   return faults;
+}
+
+void require_valid(const ModelDescription& model) {
+  if (const std::string faults = model.faults(); !faults.empty()) {
+    throw ModelError(model.network_file, "has a description that cannot be used:\n" + faults);
+  }
 }
 
 ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor) {

@@ -18,7 +18,7 @@ namespace stillmap {
 /// Channels of the network's input, in this order: range, x, y, z [m], remission (0..1).
 inline constexpr std::size_t input_channels = 5;
 
-/// Widths of range images that can be asked for; a model's own may be less than the least.
+/// Widths of range images that a user can choose; a model's own may be smaller.
 inline constexpr int min_image_columns = 16;
 inline constexpr int max_image_columns = 8192;
 
@@ -28,39 +28,38 @@ struct InputStatistics {
   std::array<float, input_channels> deviation{};
 };
 
-/// What must be known of a network to run it and to read its output; model.yaml in a model folder.
+/// A network's input, output and post-processing; model.yaml in a model folder.
 struct ModelDescription {
   std::string name;
   std::string licence;
-  /// Sensor whose scans it was trained on, in words.
+  /// Sensors that it was trained for, training and accuracy, in words.
   std::string sensor;
-  /// How it was trained and how well it does, in words.
   std::string training;
   std::string accuracy;
   /// The weights, an ONNX file.
   std::filesystem::path network_file;
 
-  /// Range image that the network wants.
+  /// Size of the range image.
   int rows = 64;
   int columns = 1024;
-  /// The narrowest image that it was trained for, for machines that are too slow for the usual one;
-  /// 0: it knows one width.
+  /// Smallest width that it was trained for, used on machines that are too slow for `columns`; 0
+  /// when it has one width only.
   int min_columns = 0;
-  /// Upper and lower edge of the image [rad]; points beyond are squeezed into the edge rows.
+  /// Upper and lower edge of the image [rad]; points beyond are clamped to the edge rows.
   double fov_up = 0.0;
   double fov_down = 0.0;
-  /// Was trained for many sensors: it takes an image of the rows and the field of view of the
-  /// sensor at hand. See for_sensor().
+  /// Trained for many sensors: the image takes rows and field of view from the sensor. See
+  /// for_sensor().
   bool follow_sensor = false;
   InputStatistics statistics;
 
   /// Entry n is the class of the network's output n.
   std::vector<SemanticClass> classes;
-  /// Absent: a point takes the class of its pixel.
+  /// Without it a point takes the class of its pixel.
   std::optional<KnnConfig> knn;
-  /// Leave the scan's point 0 out of the image, as lidar-bonnetal's mask does. For parity tests.
+  /// Leaves the scan's point 0 out of the image, as lidar-bonnetal's mask does. For parity tests.
   bool mask_first_point = false;
-  /// Absent: it cannot be run in 8-bit integers.
+  /// Without it the network cannot run in 8-bit integers.
   std::optional<Int8Calibration> int8;
 
   [[nodiscard]] ProjectionModel projection() const {
@@ -70,9 +69,11 @@ struct ModelDescription {
   [[nodiscard]] std::string faults() const;
 };
 
-/// The model with the image that it takes of a sensor: as it was trained, or with follow_sensor the
-/// sensor's rings as rows over its field of view, and no more columns than a sensor of so many
-/// rings fills.
+/// Throws ModelError when the description has faults.
+void require_valid(const ModelDescription& model);
+
+/// The model with the image for this sensor. With follow_sensor: the sensor's rings as rows over
+/// its field of view, and for sensors of few rings a limit on the columns. Else unchanged.
 [[nodiscard]] ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor);
 
 }  // namespace stillmap

@@ -13,7 +13,7 @@ class ModelError : public std::runtime_error {
       : std::runtime_error(file.string() + ": " + fault) {}
 };
 
-/// A sound model with something in it that this engine does not run; another one may.
+/// A valid model with a layer that this engine does not support; another engine may.
 class UnsupportedModel : public ModelError {
   using ModelError::ModelError;
 };

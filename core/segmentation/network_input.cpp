@@ -26,7 +26,7 @@ std::vector<float> make_network_input(const Scan& scan, const RangeImage& image,
                                                    p_lidar.z(), remission};
     for (std::size_t c = 0; c < input_channels; ++c) {
       const float normalised = (values[c] - statistics.mean[c]) / statistics.deviation[c];
-      // Only remission can be no number here, and must not spoil its surroundings.
+      // Only remission can be NaN here; convolutions would spread it to the surroundings.
       if (std::isfinite(normalised)) input[c * pixels + pixel] = normalised;
     }
   }
@@ -39,12 +39,6 @@ std::vector<float> trial_input(const ModelDescription& model) {
   for (std::size_t i = 0; i < input.size(); ++i)
     input[i] = std::sin(0.37F * static_cast<float>(i % 9973));
   return input;
-}
-
-void require_sound(const ModelDescription& model) {
-  if (const std::string faults = model.faults(); !faults.empty()) {
-    throw ModelError(model.network_file, "has a description that cannot be used:\n" + faults);
-  }
 }
 
 void require_finite_scores(const ModelDescription& model, std::span<const float> scores) {

@@ -11,17 +11,17 @@
 
 namespace stillmap {
 
-/// The classes that a network's outputs stand for; unlabeled where it gave none.
+/// The classes of a network's outputs; unlabeled for PixelOutputs::no_output.
 [[nodiscard]] PixelLabels pixel_labels(PixelOutputs&& outputs, const ModelDescription& model);
 
-/// Labels from a network on range images (RangeNet++): projection, network, k-NN votes.
+/// Labels from a network on range images (RangeNet++): projection, inference, k-NN post-processing.
 class NetworkSegmenter final : public Segmenter {
  public:
-  /// `network` fits `model`, which has no faults. `remark` is what the log should say of it.
+  /// `network` was opened for `model`, which has no faults. `remark` is appended to details().
   NetworkSegmenter(ModelDescription model, std::unique_ptr<SegmentationNetwork> network,
                    std::string remark = {});
 
-  /// Makes it able to look more coarsely: the same model with fewer columns than all so far.
+  /// Adds a resolution level: the same model with fewer columns than all levels before.
   void add_lower_resolution(int columns, std::unique_ptr<SegmentationNetwork> network);
 
   [[nodiscard]] std::string name() const override { return model_.name; }
@@ -32,22 +32,22 @@ class NetworkSegmenter final : public Segmenter {
   [[nodiscard]] PointLabels segment(const Scan& scan) override;
 
  private:
-  struct Width {
+  struct Level {
     int columns = 0;
     std::unique_ptr<SegmentationNetwork> network;
   };
 
-  /// With the columns of the width in use.
+  /// With the columns of the current level.
   ModelDescription model_;
-  std::vector<Width> widths_;
-  std::size_t in_use_ = 0;
+  std::vector<Level> levels_;
+  std::size_t current_level_ = 0;
   std::string remark_;
 };
 
 /// Loads the network that `model` describes. Throws ModelError naming the file and the fault.
 [[nodiscard]] std::unique_ptr<Segmenter> open_model(const ModelDescription& model,
                                                     const EngineOptions& choice = {});
-/// The same, able to look more coarsely, down to the model's min_columns.
+/// The same with resolution levels down to the model's min_columns, where it has any.
 [[nodiscard]] std::unique_ptr<Segmenter> open_multi_resolution_model(
     const ModelDescription& model, const EngineOptions& choice = {});
 

@@ -16,7 +16,7 @@
 namespace stillmap {
 namespace {
 
-/// The plan in these numbers; for int8 the graph's channels are made equal first.
+/// The plan in this precision; for int8 the graph's channels are equalised first.
 ExecutionPlan plan_in(Precision precision, NetworkGraph& graph, const ModelDescription& model) {
   if (precision == Precision::fp32) return plan_execution(graph, nullptr);
   if (!model.int8) {
@@ -29,7 +29,7 @@ ExecutionPlan plan_in(Precision precision, NetworkGraph& graph, const ModelDescr
 }
 
 PreparedNetwork load(const ModelDescription& model) {
-  require_sound(model);
+  require_valid(model);
   const OnnxFile file(model.network_file);
   require_input_shape(file, static_cast<int>(input_channels), model.rows, model.columns);
   return prepare_network(file, model);
@@ -102,6 +102,7 @@ std::vector<std::string> OneDnnNetwork::steps() const { return state_->plan->ste
 
 namespace {
 
+/// Rows and columns of the matrices.
 constexpr dnnl_dim_t size = 1536;
 constexpr std::size_t values = static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
 

@@ -11,19 +11,18 @@
 
 namespace stillmap {
 
-/// What a network multiplies.
+/// Type of a network's operands.
 enum class Precision { fp32, int8 };
 
-/// Runs networks of the RangeNet family on oneDNN, several times as fast as OpenCV does: batch
-/// norms and transposed convolutions are worked into plain convolutions, activations and sums are
-/// done before a result is stored, memory is planned once. In 8-bit integers (post-training, signed
-/// activations with one factor a tensor, weights with one an output) faster again.
+/// Runs networks of the RangeNet family on oneDNN, several times faster than OpenCV: batch norms
+/// and transposed convolutions become plain convolutions, activations and sums are fused into them,
+/// and memory is planned once. int8: post-training quantisation, signed activations with one scale
+/// per tensor, weights with one scale per output.
 class OneDnnNetwork final : public SegmentationNetwork {
  public:
-  /// Loads the network and tries it once. `threads` bounds OpenMP's; 0 leaves them to it. Throws
-  /// UnsupportedModel when there is something in the network that this engine does not run, and
-  /// ModelError when the file is damaged, does not fit its description, or has no calibration for
-  /// int8.
+  /// Loads the network and runs it once. `threads`: OpenMP threads, 0 for OpenMP's default. Throws
+  /// UnsupportedModel when the network has a layer that this engine does not support, ModelError
+  /// when the file is damaged, does not fit its description, or has no calibration for int8.
   OneDnnNetwork(const ModelDescription& model, Precision precision, int threads = 0);
   ~OneDnnNetwork() override;
 
@@ -31,16 +30,16 @@ class OneDnnNetwork final : public SegmentationNetwork {
   [[nodiscard]] std::vector<float> probabilities(std::span<const float> input) override;
   [[nodiscard]] std::string engine() const override;
 
-  /// Runs the network and shows each tensor that it stores in floating point: its name, its values
-  /// as rows x columns x channels, and how many channels it has.
+  /// Runs the network and calls `observer` with each tensor that it stores in floating point: name,
+  /// values (rows x columns x channels), number of channels.
   using Observer = std::function<void(const std::string&, std::span<const float>, std::size_t)>;
   void observe(std::span<const float> input, const Observer& observer);
 
-  /// Multiplications and additions a run, in 10^9.
+  /// Multiplications and additions per run, in 10^9.
   [[nodiscard]] double giga_operations() const;
   /// Bytes of weights and activations.
   [[nodiscard]] std::size_t memory_bytes() const;
-  /// A line a step: what it does, and the name of oneDNN's code for it.
+  /// A line per step: what it does, and oneDNN's name of the implementation.
   [[nodiscard]] std::vector<std::string> steps() const;
 
  private:
@@ -48,15 +47,15 @@ class OneDnnNetwork final : public SegmentationNetwork {
   std::unique_ptr<State> state_;
 };
 
-/// A product of two large square matrices on oneDNN: what the machine can do at its best, against
-/// which networks are measured.
+/// A product of two large square matrices on oneDNN: the machine's practical peak rate, with which
+/// the rate of networks is compared.
 class MatrixProduct {
  public:
-  /// In fp32, or u8 times s8 for int8, with so many threads; 0 leaves them to OpenMP.
+  /// In fp32, or u8 times s8 for int8. `threads`: 0 for OpenMP's default.
   MatrixProduct(Precision precision, int threads);
 
   void run();
-  /// Multiplications and additions of a run, in 10^9.
+  /// Multiplications and additions per run, in 10^9.
   [[nodiscard]] static double giga_operations();
 
  private:

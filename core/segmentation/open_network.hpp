@@ -9,7 +9,7 @@
 
 namespace stillmap {
 
-/// How a network is to be run.
+/// Engine, precision and threads of a network.
 struct EngineOptions {
   enum class Engine {
     /// oneDNN where it can run the network, else OpenCV.
@@ -32,17 +32,17 @@ struct EngineOptions {
 
 struct OpenedNetwork {
   std::unique_ptr<SegmentationNetwork> network;
-  /// Why it is slower than it could be; empty when it is not.
+  /// Why a faster engine or precision could not be used; empty when it is the fastest.
   std::string remark;
 };
 
-/// Loads the network that `model` describes into the engine that was chosen. Throws ModelError.
+/// Loads the network of `model` into the chosen engine. Throws ModelError.
 [[nodiscard]] OpenedNetwork open_network(const ModelDescription& model,
                                          const EngineOptions& choice);
 
-/// A description that lets a network file be run which has none, as for measuring its speed: the
-/// size that the file declares or else rows x columns, no normalisation, outputs without a meaning.
-/// Throws ModelError.
+/// A description for an ONNX file without a model.yaml, to measure its speed: the image size that
+/// the file declares, or else rows x columns; no normalisation; all outputs unlabeled. Throws
+/// ModelError.
 [[nodiscard]] ModelDescription describe_bare_network(const std::filesystem::path& network_file,
                                                      int rows, int columns);
 

@@ -51,7 +51,7 @@ struct OpenCvNetwork::State {
   ScoreKind kind = ScoreKind::logits;
 
   cv::Mat forward(std::span<const float> input) {
-    // setInput() copies, it does not write through the pointer.
+    // setInput() copies from the pointer and does not write to it.
     const cv::Mat tensor(static_cast<int>(input_shape.size()), input_shape.data(), CV_32F,
                          const_cast<float*>(input.data()));
     net.setInput(tensor);
@@ -62,7 +62,7 @@ struct OpenCvNetwork::State {
     return {output.ptr<float>(), output.total()};
   }
 
-  /// Runs the network once, so that a model that does not fit is found at the start.
+  /// Runs the network once, so that a model that does not fit is refused on loading.
   void try_once(const ModelDescription& model);
   void require_output_shape(const cv::Mat& output, const fs::path& file) const;
 };
@@ -92,9 +92,9 @@ void OpenCvNetwork::State::require_output_shape(const cv::Mat& output, const fs:
 }
 
 OpenCvNetwork::OpenCvNetwork(const ModelDescription& model) : state_(std::make_unique<State>()) {
-  require_sound(model);
+  require_valid(model);
   constexpr auto channels = static_cast<int>(input_channels);
-  // OpenCV neither looks whether a file makes sense nor for which images it was made.
+  // OpenCV checks neither the file's consistency nor its declared input shape.
   require_input_shape(OnnxFile(model.network_file), channels, model.rows, model.columns);
   state_->net = read_with_opencv(model.network_file);
   state_->input_shape = {1, channels, model.rows, model.columns};

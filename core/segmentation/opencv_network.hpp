@@ -7,11 +7,11 @@
 
 namespace stillmap {
 
-/// Runs any ONNX network on OpenCV's dnn module: the reference engine and the fallback.
+/// Runs any ONNX network on OpenCV's dnn module: the reference and the fallback for oneDNN.
 class OpenCvNetwork final : public SegmentationNetwork {
  public:
-  /// Loads the network and tries it once. Throws ModelError when the file cannot be read, holds
-  /// weights that are not finite, or does not turn 1 x 5 x rows x columns into one score a class.
+  /// Loads the network and runs it once. Throws ModelError when the file cannot be read, holds
+  /// weights that are not finite, or does not map 1 x 5 x rows x columns to one score per class.
   explicit OpenCvNetwork(const ModelDescription& model);
   ~OpenCvNetwork() override;
 

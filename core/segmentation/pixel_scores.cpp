@@ -13,20 +13,20 @@
 namespace stillmap {
 namespace {
 
-// Wide enough for a soft-max computed in half precision.
+// Tolerates a soft-max computed in half precision.
 constexpr float sum_tolerance = 1e-2F;
 
-/// Pixels that are worked on at once. The compiler must be told to make vectors of loops over them:
-/// it would rather unroll so short a loop.
+/// Pixels that are processed together. Loops over them need `omp simd`: the compiler would unroll
+/// such short loops instead of vectorising them.
 constexpr std::size_t lanes = 16;
 template <class T>
 using Lanes = std::array<T, lanes>;
 
-/// Below it exp(x) is as good as 0.
+/// exp(x) is taken as 0 below it.
 constexpr float min_exponent = -87.0F;
 
-/// exp(x) for min_exponent <= x <= 0 to 2e-7 of its value, without branches: 2^n times Cephes'
-/// polynomial.
+/// exp(x) for min_exponent <= x <= 0 with a relative error of 2e-7, without branches: 2^n times
+/// Cephes' polynomial.
 inline float exp_of_negative(float x) {
   constexpr float log2_e = 1.44269504F, ln2_high = 0.693359375F, ln2_low = -2.12194440e-4F;
   const auto n = static_cast<std::int32_t>(x * log2_e - 0.5F);
@@ -68,15 +68,15 @@ class Tile {
     return static_cast<std::uint8_t>(best_output_[p]);
   }
   [[nodiscard]] float best(std::size_t p) const { return best_[p]; }
-  /// No score is infinite or no number.
+  /// All scores are finite.
   [[nodiscard]] bool finite(std::size_t p) const { return finite_[p] != 0; }
   [[nodiscard]] float score(std::size_t n, std::size_t p) const { return scores_[n][p]; }
 
-  /// Puts exp(score - best) in place of each score, and gives their sum.
+  /// Replaces each score by exp(score - best) and returns their sums.
   Lanes<float> exponentiate() {
     Lanes<float> sum{};
     for (std::size_t n = 0; n < outputs_; ++n) {
-      // In a loop of its own: else the compiler makes a branch of it, and no vectors.
+      // A loop of its own: otherwise the compiler emits a branch and does not vectorise.
 #pragma omp simd
       for (std::size_t p = 0; p < lanes; ++p) {
         const float x = scores_[n][p] - best_[p];
@@ -155,7 +155,7 @@ PixelOutputs argmax_outputs(std::span<const float> scores, std::size_t outputs, 
     const bool logits = kind == ScoreKind::logits;
     const Lanes<float> sum = logits ? tile.exponentiate() : Lanes<float>{};
     for (std::size_t p = 0; p < tile.count(); ++p) {
-      // One NaN or infinite score spoils the pixel: it says nothing.
+      // A NaN or infinite score makes the whole pixel invalid.
       if (!tile.finite(p)) continue;
       result.output[first + p] = tile.best_output(p);
       result.confidence[first + p] = logits ? 1.0F / sum[p] : std::clamp(tile.best(p), 0.0F, 1.0F);

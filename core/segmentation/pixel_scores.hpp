@@ -8,10 +8,10 @@
 
 namespace stillmap {
 
-/// What the last layer of a network gives.
+/// Output of a network's last layer.
 enum class ScoreKind { probabilities, logits };
 
-/// How the scores of an image lie in memory: outputs x pixels, or pixels x outputs.
+/// Memory layout of an image's scores: outputs x pixels, or pixels x outputs.
 enum class ScoreLayout { planes, pixels };
 
 /// Probabilities when every pixel's scores lie in 0..1 and sum to 1, else logits.

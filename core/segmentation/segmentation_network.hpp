@@ -8,9 +8,9 @@
 
 namespace stillmap {
 
-/// What a network says of every pixel, row by row.
+/// A network's decision for every pixel, row by row.
 struct PixelOutputs {
-  /// Stands where the network gave no number (NaN or infinite scores).
+  /// For pixels with NaN or infinite scores.
   static constexpr std::uint8_t no_output = 255;
   static constexpr std::size_t max_outputs = 255;
 
@@ -20,21 +20,20 @@ struct PixelOutputs {
   std::vector<float> confidence;
 };
 
-/// An engine with a network in it: a normalised range image in, classes out. One thread uses it at
-/// a time.
+/// A network loaded into an engine: a normalised range image in, classes out. Not thread-safe.
 class SegmentationNetwork {
  public:
   virtual ~SegmentationNetwork() = default;
 
-  /// The most probable output of every pixel. `input` is 5 x rows x columns, as
-  /// make_network_input() gives it.
+  /// The most probable output of every pixel. `input`: 5 x rows x columns, as from
+  /// make_network_input().
   [[nodiscard]] virtual PixelOutputs run(std::span<const float> input) = 0;
 
   /// The probabilities of all outputs, outputs x rows x columns. Not finite where the network's
   /// scores are not.
   [[nodiscard]] virtual std::vector<float> probabilities(std::span<const float> input) = 0;
 
-  /// What runs it, in words for a log: "oneDNN int8, 2 threads".
+  /// Engine, precision and threads for the log: "oneDNN int8, 2 threads".
   [[nodiscard]] virtual std::string engine() const = 0;
 };
 

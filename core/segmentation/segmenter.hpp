@@ -9,7 +9,7 @@
 
 namespace stillmap {
 
-/// Where the class of a point comes from: a recording's labels, a network, or nowhere.
+/// Source of the points' classes: labels that come with the scans, a network, or none.
 class Segmenter {
  public:
   virtual ~Segmenter() = default;
@@ -17,38 +17,37 @@ class Segmenter {
   /// Name for the status: "stream", "none", or the model's name.
   [[nodiscard]] virtual std::string name() const = 0;
 
-  /// How it works, in words for a log; empty when there is nothing to say.
+  /// Engine and image size in words for the log; may be empty.
   [[nodiscard]] virtual std::string details() const { return {}; }
 
-  /// Time that a scan takes at each resolution level that this source knows, as a share of the
-  /// finest's, which comes first; the others are less, each less than the one before.
+  /// Time per scan at each resolution level, relative to the finest, which comes first; strictly
+  /// decreasing.
   [[nodiscard]] virtual std::vector<double> relative_costs() const { return {1.0}; }
-  /// How coarsely to look at the next scans: an index of relative_costs().
+  /// Sets the resolution for the next scans: an index into relative_costs().
   virtual void set_resolution_level(std::size_t /*resolution_level*/) {}
-  /// Width of the range images that it looks at now; 0: it looks at none.
+  /// Current width of its range images; 0 when it uses none.
   [[nodiscard]] virtual int image_columns() const { return 0; }
 
-  /// Classes of the scan's points; empty when this source has none for this scan.
+  /// Classes of the scan's points; empty when there are none for this scan.
   [[nodiscard]] virtual PointLabels segment(const Scan& scan) = 0;
 };
 
-/// Labels that came with the scan: a recording's, or a cloud's label field. Each counts in full
-/// (confidence 1), an unlabeled point not at all. A scan without labels stays without.
+/// Labels that come with the scan, from a dataset or a point cloud's label field, with confidence 1
+/// (0 for unlabeled points). No labels for a scan without them.
 class PassthroughSegmenter final : public Segmenter {
  public:
   [[nodiscard]] std::string name() const override { return "stream"; }
   [[nodiscard]] PointLabels segment(const Scan& scan) override;
 };
 
-/// Pure geometry: no point has a class, even if the scan brings labels.
+/// No labels, even if the scan has some: a map of geometry alone.
 class NullSegmenter final : public Segmenter {
  public:
   [[nodiscard]] std::string name() const override { return "none"; }
   [[nodiscard]] PointLabels segment(const Scan& /*scan*/) override { return {}; }
 };
 
-/// The labels that come with a scan where it has any; else those of another source. So recordings
-/// with true labels keep them, and all other scans get semantics from the network.
+/// The labels that come with the scan; for scans without labels those of another segmenter.
 class FallbackSegmenter final : public Segmenter {
  public:
   explicit FallbackSegmenter(std::unique_ptr<Segmenter> fallback);
@@ -68,7 +67,7 @@ class FallbackSegmenter final : public Segmenter {
 
  private:
   std::unique_ptr<Segmenter> fallback_;
-  /// The last scan brought labels.
+  /// The last scan had labels of its own.
   bool uses_stream_ = false;
 };
 

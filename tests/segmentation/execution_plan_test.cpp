@@ -30,8 +30,7 @@ Int8Calibration calibration_of(const NetworkGraph& graph) {
   return calibration;
 }
 
-/// Walks through the plan as it would run and checks that each step finds what it reads: which
-/// tensor a buffer holds changes only where a step writes it.
+/// Simulates the plan: each step must find in its source buffers the tensors that it reads.
 void expect_right_contents(const ExecutionPlan& plan) {
   std::vector<std::pair<TensorId, ValueType>> holds(plan.buffers.size(), {999999, ValueType::f32});
   const auto expect = [&](const TensorPlacement& place) {
@@ -80,7 +79,7 @@ TEST(ExecutionPlan, ReducesTheFamilyToConvolutions) {
   EXPECT_EQ(count_steps<Sum>(plan_execution(light(), nullptr)), 0U);
 }
 
-TEST(ExecutionPlan, ReadsOnlyWhatIsStillThere) {
+TEST(ExecutionPlan, NeverReadsAnOverwrittenBuffer) {
   for (const NetworkGraph& graph : {darknet(), light()}) {
     expect_right_contents(plan_execution(graph, nullptr));
     const Int8Calibration calibration = calibration_of(graph);
@@ -107,7 +106,7 @@ TEST(ExecutionPlan, RefusesAnotherNetworksCalibration) {
   EXPECT_THROW((void)plan_execution(graph, &other), GraphFault);
 }
 
-TEST(ExecutionPlan, AddsOntoACopyOfWhatIsReadAgain) {
+TEST(ExecutionPlan, AddsToACopyOfATensorThatIsReadAgain) {
   // x feeds a convolution that is added to x, and the output as well.
   test::OnnxBuilder network(5, 4, 8);
   const test::Window same{.kernel = {3, 3}, .padding = {1, 1}};
@@ -125,7 +124,7 @@ TEST(ExecutionPlan, AddsOntoACopyOfWhatIsReadAgain) {
   }
 }
 
-TEST(BufferLayout, GivesBuffersOfOneTimeMemoryOfTheirOwn) {
+TEST(BufferLayout, SeparatesBuffersWithOverlappingLifetimes) {
   std::mt19937 random(5);
   for (int run = 0; run < 50; ++run) {
     std::vector<Buffer> buffers(30);
@@ -154,7 +153,7 @@ TEST(BufferLayout, GivesBuffersOfOneTimeMemoryOfTheirOwn) {
   }
 }
 
-TEST(BufferLayout, UsesMemoryAgain) {
+TEST(BufferLayout, ReusesMemory) {
   const std::vector<Buffer> chain{{.bytes = 640, .first_step = 0, .last_step = 1},
                                   {.bytes = 640, .first_step = 1, .last_step = 2},
                                   {.bytes = 640, .first_step = 2, .last_step = 3},

@@ -1,4 +1,4 @@
-// Files that are damaged or built to do harm: both engines must say what is wrong and live.
+// Damaged and malicious files: both engines must refuse them with a message.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -17,7 +17,7 @@ namespace stillmap {
 namespace {
 
 using test::float_tensor;
-using test::list_attribute;
+using test::ints_attribute;
 using test::Message;
 using test::onnx_file;
 using test::onnx_node;
@@ -36,7 +36,7 @@ void PrintTo(const Engine& engine, std::ostream* out) { *out << engine.name; }
 
 class HostileModel : public ::testing::TestWithParam<Engine> {
  protected:
-  /// What the engine says; empty when it takes the file.
+  /// The engine's error message; empty when it accepts the file.
   static std::string refusal(const std::string& bytes) {
     ModelDescription model = test::describe_family(rows, columns, classes);
     model.network_file = test::write_model(bytes);
@@ -66,9 +66,9 @@ INSTANTIATE_TEST_SUITE_P(Engines, HostileModel,
                          [](const auto& info) { return std::string(info.param.name); });
 
 const std::vector<float> weights(15, 0.25F);
-Message kernel_shape() { return list_attribute("kernel_shape", {1, 1}); }
+Message kernel_shape() { return ints_attribute("kernel_shape", {1, 1}); }
 
-/// One 1x1 convolution around whatever is wrong.
+/// A network of one 1x1 convolution, of which a test replaces a part.
 struct Parts {
   Message weights_tensor = float_tensor("w", {classes, 5, 1, 1}, weights);
   Message node = onnx_node("Conv", {"input", "w"}, "output", {kernel_shape()});
@@ -89,7 +89,7 @@ TEST_P(HostileModel, TakesASoundOne) { EXPECT_EQ(refusal(Parts().bytes()), ""); 
 
 TEST_P(HostileModel, IsRefusedCutAnywhere) {
   const std::string whole = Parts().bytes();
-  // The last field says which operator set is meant; all that must be there is cut away before.
+  // The last field is the operator set; every cut before it removes something required.
   for (std::size_t size = 0; size + 8 < whole.size(); ++size) {
     EXPECT_NE(refusal(whole.substr(0, size)), "") << "cut to " << size << " bytes";
   }
@@ -155,10 +155,10 @@ TEST_P(HostileModel, IsRefusedWithAnInputOrOutputOfAnotherSize) {
 TEST_P(HostileModel, IsRefusedWithNegativePaddingOrNoStride) {
   Parts parts;
   parts.node = onnx_node("Conv", {"input", "w"}, "output",
-                         {kernel_shape(), list_attribute("pads", {-1, 0, 0, 0})});
+                         {kernel_shape(), ints_attribute("pads", {-1, 0, 0, 0})});
   EXPECT_NE(refusal(parts.bytes()), "");
   parts.node = onnx_node("Conv", {"input", "w"}, "output",
-                         {kernel_shape(), list_attribute("strides", {0, 0})});
+                         {kernel_shape(), ints_attribute("strides", {0, 0})});
   EXPECT_NE(refusal(parts.bytes()), "");
 }
 

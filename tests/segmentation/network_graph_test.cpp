@@ -51,7 +51,7 @@ Convolution convolution(int inputs, int outputs, RowsColumns stride = {}) {
           .padding = {.top = 1, .left = 1, .bottom = 1, .right = 1},
           .weights = random_values(count, 5),
           .bias = random_values(static_cast<std::size_t>(outputs), 6),
-          .widen = {}};
+          .upsampling = {}};
 }
 
 TransposedConvolution transposed(RowsColumns kernel, RowsColumns stride, Padding padding = {},
@@ -134,7 +134,7 @@ INSTANTIATE_TEST_SUITE_P(
         // Kernel = stride.
         Widening{{1, 2}, {1, 2}}, Widening{{2, 2}, {2, 2}}, Widening{{2, 1}, {2, 1}},
         Widening{{3, 4}, {3, 4}},
-        // A head that widens both ways.
+        // A head that upsamples rows and columns.
         Widening{{2, 4}, {2, 2}, {0, 1, 0, 1}}, Widening{{4, 4}, {2, 2}, {1, 1, 1, 1}},
         // Odd kernels, unequal sides, places that no tap reaches.
         Widening{{3, 3}, {2, 2}, {1, 1, 0, 0}}, Widening{{3, 3}, {2, 2}, {1, 1, 1, 1}, {1, 1}},
@@ -168,7 +168,7 @@ TEST(FusePostOps, MakesADarkNetBlockTwoLayersWithTheSameResult) {
   expect_same(run(fused), run(builder.graph));
 }
 
-TEST(FusePostOps, KeepsWhatSomeoneElseReads) {
+TEST(FusePostOps, KeepsAResultWithOtherReaders) {
   GraphBuilder builder;
   const TensorId c = builder.add(convolution(3, 3), {0});
   builder.add(Add{}, {builder.add(LeakyRelu{0.2F}, {c}), c});
@@ -201,7 +201,7 @@ TEST(FusePostOps, LeavesATensorThatIsAddedToItself) {
   expect_same(run(fused), run(builder.graph));
 }
 
-/// A network whose tensors are tied by a sum, with a wide tensor that is laid out.
+/// A network with a sum, whose operands share their factors, and with upsampling.
 NetworkGraph tied() {
   GraphBuilder builder;
   const TensorId x = builder.add(LeakyRelu{0.1F}, {builder.add(convolution(3, 4), {0})});

@@ -103,7 +103,7 @@ TEST(NetworkSegmenter, LetsTheNeighboursVoteWhenAsked) {
   EXPECT_NE(voted.classes, own.classes);
 }
 
-TEST(NetworkSegmenter, HasNothingToSayOfAnEmptyScan) {
+TEST(NetworkSegmenter, GivesNoLabelsForAnEmptyScan) {
   EXPECT_TRUE(open_model(Fixture().model)->segment({}).empty());
 }
 
@@ -132,7 +132,7 @@ class HalfBlind final : public SegmentationNetwork {
   [[nodiscard]] std::string engine() const override { return "half blind"; }
 };
 
-/// Sees one class everywhere in images of this many pixels.
+/// Gives one class for all pixels of images of this size.
 class OneClass final : public SegmentationNetwork {
  public:
   OneClass(std::size_t pixels, std::uint8_t output) : pixels_(pixels), output_(output) {}
@@ -148,7 +148,7 @@ class OneClass final : public SegmentationNetwork {
   std::uint8_t output_;
 };
 
-TEST(NetworkSegmenter, LooksAsCoarselyAsItIsTold) {
+TEST(NetworkSegmenter, UsesTheResolutionLevelThatIsSet) {
   NetworkSegmenter labels(describe(random_network(2, 32, 20)), std::make_unique<OneClass>(64U, 9));
   EXPECT_EQ(labels.relative_costs(), std::vector{1.0});
   labels.add_lower_resolution(16, std::make_unique<OneClass>(32U, 1));
@@ -164,7 +164,7 @@ TEST(NetworkSegmenter, LooksAsCoarselyAsItIsTold) {
   EXPECT_EQ(labels.segment(scan).classes, std::vector(5, SemanticClass::road));
 }
 
-TEST(NetworkSegmenter, OpensAModelInTheWidthsThatItKnows) {
+TEST(NetworkSegmenter, OpensAModelInAllItsWidths) {
   ModelDescription model = test::describe_family(16, 128, 20);
   model.network_file = write_model(test::light_bytes(8, 0, 0, 20));
   EXPECT_EQ(open_multi_resolution_model(model)->relative_costs(), std::vector{1.0});

@@ -37,7 +37,7 @@ double largest_difference(const A& a, const B& b) {
   double largest = 0.0;
   for (std::size_t i = 0; i < a.size(); ++i) {
     const double difference = std::abs(static_cast<double>(a[i]) - static_cast<double>(b[i]));
-    // Otherwise nothing would differ from what is not a number.
+    // A comparison with NaN would be false.
     if (!std::isfinite(difference)) return std::numeric_limits<double>::infinity();
     largest = std::max(largest, difference);
   }

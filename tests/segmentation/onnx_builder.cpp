@@ -7,7 +7,8 @@
 namespace stillmap::test {
 namespace {
 
-enum AttributeType { real_type = 1, whole_type = 2, text_type = 3, whole_list_type = 7 };
+/// AttributeProto.AttributeType.
+enum AttributeType { float_type = 1, int_type = 2, string_type = 3, ints_type = 7 };
 constexpr int float_values = 1;
 constexpr int int64_values = 7;
 
@@ -50,7 +51,7 @@ Message float_tensor(std::string_view name, const Sizes& shape, const std::vecto
   return message.number(2, float_values).bytes(8, name).bytes(9, raw(values));
 }
 
-Message whole_tensor(std::string_view name, const std::vector<std::int64_t>& values) {
+Message int64_tensor(std::string_view name, const std::vector<std::int64_t>& values) {
   return Message()
       .number(1, values.size())
       .number(2, int64_values)
@@ -68,26 +69,23 @@ Message value_info(std::string_view name, const Sizes& shape) {
   return Message().bytes(1, name).message(2, Message().message(1, tensor_type));
 }
 
-Message whole_attribute(std::string_view name, std::int64_t value) {
-  return Message()
-      .bytes(1, name)
-      .number(3, static_cast<std::uint64_t>(value))
-      .number(20, whole_type);
+Message int_attribute(std::string_view name, std::int64_t value) {
+  return Message().bytes(1, name).number(3, static_cast<std::uint64_t>(value)).number(20, int_type);
 }
 
-Message list_attribute(std::string_view name, const Sizes& values) {
+Message ints_attribute(std::string_view name, const Sizes& values) {
   Message message;
   message.bytes(1, name);
   for (const std::int64_t value : values) message.number(8, static_cast<std::uint64_t>(value));
-  return message.number(20, whole_list_type);
+  return message.number(20, ints_type);
 }
 
-Message real_attribute(std::string_view name, float value) {
-  return Message().bytes(1, name).real(2, value).number(20, real_type);
+Message float_attribute(std::string_view name, float value) {
+  return Message().bytes(1, name).real(2, value).number(20, float_type);
 }
 
-Message text_attribute(std::string_view name, std::string_view value) {
-  return Message().bytes(1, name).bytes(4, value).number(20, text_type);
+Message string_attribute(std::string_view name, std::string_view value) {
+  return Message().bytes(1, name).bytes(4, value).number(20, string_type);
 }
 
 Message onnx_node(std::string_view operation, const std::vector<std::string>& inputs,
@@ -140,7 +138,7 @@ std::string OnnxBuilder::windowed(const std::string& operation, const std::strin
                                   int outputs, const Window& window, bool bias) {
   const std::int64_t inputs = channels(input);
   const bool transposed = operation == "ConvTranspose";
-  // So that values neither grow nor fade from layer to layer.
+  // Keeps the variance of values from layer to layer (He et al., 2015).
   const double fan_in =
       static_cast<double>(inputs * window.kernel[0] * window.kernel[1]) /
       (transposed ? static_cast<double>(window.stride[0] * window.stride[1]) : 1.0);
@@ -151,8 +149,8 @@ std::string OnnxBuilder::windowed(const std::string& operation, const std::strin
   if (bias) all.push_back(float_weights({outputs}, 0.5F));
   return node(
       operation, all, outputs,
-      {list_attribute("kernel_shape", window.kernel), list_attribute("strides", window.stride),
-       list_attribute(
+      {ints_attribute("kernel_shape", window.kernel), ints_attribute("strides", window.stride),
+       ints_attribute(
            "pads", {window.padding[0], window.padding[1], window.padding[0], window.padding[1]})});
 }
 
@@ -171,11 +169,11 @@ std::string OnnxBuilder::normalise(const std::string& input, float scale) {
   return node("BatchNormalization",
               {input, float_weights({size}, 0.3F * scale, scale), float_weights({size}, 0.3F),
                float_weights({size}, 0.3F), float_weights({size}, 0.3F, 1.0F)},
-              channels(input), {real_attribute("epsilon", 1e-5F)});
+              channels(input), {float_attribute("epsilon", 1e-5F)});
 }
 
 std::string OnnxBuilder::activate(const std::string& input) {
-  return node("LeakyRelu", {input}, channels(input), {real_attribute("alpha", 0.1F)});
+  return node("LeakyRelu", {input}, channels(input), {float_attribute("alpha", 0.1F)});
 }
 
 std::string OnnxBuilder::add(const std::string& first, const std::string& second) {
@@ -185,18 +183,18 @@ std::string OnnxBuilder::add(const std::string& first, const std::string& second
 std::string OnnxBuilder::softmax(const std::string& input, SoftmaxStyle style) {
   const int size = channels(input);
   if (style == SoftmaxStyle::whole) {
-    return node("Softmax", {input}, size, {whole_attribute("axis", 1)});
+    return node("Softmax", {input}, size, {int_attribute("axis", 1)});
   }
   operator_set_ = 9;
   if (style == SoftmaxStyle::in_parts) {
     const std::string powers = node("Exp", {input}, size);
-    const std::string sum = node("ReduceSum", {powers}, 1,
-                                 {list_attribute("axes", {1}), whole_attribute("keepdims", 1)});
+    const std::string sum =
+        node("ReduceSum", {powers}, 1, {ints_attribute("axes", {1}), int_attribute("keepdims", 1)});
     return node("Div", {powers, sum}, size);
   }
-  const std::vector<Message> swap{list_attribute("perm", {0, 3, 2, 1})};
+  const std::vector<Message> swap{ints_attribute("perm", {0, 3, 2, 1})};
   const std::string last = node("Transpose", {input}, size, swap);
-  const std::string soft = node("Softmax", {last}, size, {whole_attribute("axis", 3)});
+  const std::string soft = node("Softmax", {last}, size, {int_attribute("axis", 3)});
   return node("Transpose", {soft}, size, swap);
 }
 
@@ -222,14 +220,14 @@ std::string layer(OnnxBuilder& network, const std::string& input, int outputs, c
 /// The sum stands after the second activation.
 std::string block(OnnxBuilder& network, const std::string& input, int middle) {
   const int outputs = network.channels(input);
-  // As trained networks have it: with whole sums, values would double from block to block.
+  // As in trained networks; otherwise values would double from block to block.
   constexpr float share = 0.2F;
   const std::string narrow = layer(network, input, middle, one_by_one);
   return network.add(layer(network, narrow, outputs, three_by_three, share), input);
 }
 
-std::string widen(OnnxBuilder& network, const std::string& input, int outputs,
-                  const Window& window) {
+std::string upsample(OnnxBuilder& network, const std::string& input, int outputs,
+                     const Window& window) {
   return network.activate(network.normalise(network.transpose(input, outputs, window, true)));
 }
 
@@ -249,7 +247,7 @@ std::string darknet_bytes(int layers, int stem, int rows, int columns, int class
   }
   for (; !skips.empty(); skips.pop_back()) {
     const int before = network.channels(x);
-    x = widen(network, x, before / 2, one_by_four);
+    x = upsample(network, x, before / 2, one_by_four);
     x = network.add(block(network, x, before), skips.back());
   }
   x = network.convolve(x, classes, three_by_three, true);
@@ -270,7 +268,7 @@ std::string light_bytes(int stem, int rows, int columns, int classes) {
   }
   for (std::size_t i = strides.size(); i-- > 0;) {
     const int outputs = network.channels(skips[i]);
-    x = network.add(widen(network, x, outputs, {.kernel = strides[i], .stride = strides[i]}),
+    x = network.add(upsample(network, x, outputs, {.kernel = strides[i], .stride = strides[i]}),
                     skips[i]);
     x = block(network, x, outputs / 2);
   }

@@ -9,8 +9,8 @@
 
 namespace stillmap::test {
 
-/// Protocol Buffers by hand, so that tests can write files that no library would; field numbers
-/// are those of onnx.proto.
+/// A protocol buffer message written field by field, so that tests can write files that no library
+/// would; field numbers as in onnx.proto.
 class Message {
  public:
   Message& number(int field, std::uint64_t value);
@@ -30,14 +30,14 @@ using Sizes = std::vector<std::int64_t>;
 /// A tensor of 32-bit floats.
 [[nodiscard]] Message float_tensor(std::string_view name, const Sizes& shape,
                                    const std::vector<float>& values);
-[[nodiscard]] Message whole_tensor(std::string_view name, const std::vector<std::int64_t>& values);
-/// An input or output; a size of 0 is left open.
+[[nodiscard]] Message int64_tensor(std::string_view name, const std::vector<std::int64_t>& values);
+/// An input or output; a size of 0 is dynamic.
 [[nodiscard]] Message value_info(std::string_view name, const Sizes& shape);
 
-[[nodiscard]] Message whole_attribute(std::string_view name, std::int64_t value);
-[[nodiscard]] Message list_attribute(std::string_view name, const Sizes& values);
-[[nodiscard]] Message real_attribute(std::string_view name, float value);
-[[nodiscard]] Message text_attribute(std::string_view name, std::string_view value);
+[[nodiscard]] Message int_attribute(std::string_view name, std::int64_t value);
+[[nodiscard]] Message ints_attribute(std::string_view name, const Sizes& values);
+[[nodiscard]] Message float_attribute(std::string_view name, float value);
+[[nodiscard]] Message string_attribute(std::string_view name, std::string_view value);
 
 [[nodiscard]] Message onnx_node(std::string_view operation, const std::vector<std::string>& inputs,
                                 const std::string& output, const std::vector<Message>& attributes);
@@ -55,28 +55,28 @@ struct Window {
 enum class SoftmaxStyle { whole, in_parts, between_transposes };
 
 /// Writes ONNX networks layer by layer, with random weights from a fixed seed. Each function takes
-/// names of tensors and returns its output's.
+/// names of tensors and returns the name of its output.
 class OnnxBuilder {
  public:
-  /// A size of 0 is left open.
+  /// A size of 0 is dynamic.
   OnnxBuilder(int channels, int rows, int columns);
 
   std::string convolve(const std::string& input, int outputs, const Window& window,
                        bool bias = false);
   std::string transpose(const std::string& input, int outputs, const Window& window,
                         bool bias = false);
-  /// `scale`: about what the channels are multiplied by.
+  /// A batch norm that scales the channels by about `scale`.
   std::string normalise(const std::string& input, float scale = 1.0F);
   std::string activate(const std::string& input);
   std::string add(const std::string& first, const std::string& second);
   std::string softmax(const std::string& input, SoftmaxStyle style = SoftmaxStyle::whole);
-  /// Any other node; `channels` of its output.
+  /// Any other node; `channels`: of its output.
   std::string node(const std::string& operation, const std::vector<std::string>& inputs,
                    int channels, const std::vector<Message>& attributes = {});
-  /// Weights by hand.
+  /// Adds a tensor as weights.
   std::string weights(const Message& tensor, const std::string& name);
 
-  /// The file, whose output is this tensor.
+  /// The ONNX file of the network whose output is this tensor.
   [[nodiscard]] std::string bytes(const std::string& output) const;
   [[nodiscard]] int channels(const std::string& tensor) const { return channels_.at(tensor); }
 

@@ -35,7 +35,7 @@ ModelDescription calibrated() {
   return model;
 }
 
-/// Has an operator that only OpenCV runs.
+/// With an operator that only OpenCV supports.
 ModelDescription exotic() {
   test::OnnxBuilder network(5, 4, 8);
   ModelDescription model = test::describe_family(4, 8, 4);
@@ -61,7 +61,7 @@ TEST(OpenNetwork, RemarksWhyItIsNotFaster) {
   EXPECT_EQ(open_network(light(), {.precision = PrecisionMode::fp32}).remark, "");
 }
 
-TEST(OpenNetwork, DoesAsItIsTold) {
+TEST(OpenNetwork, UsesTheChosenEngineAndPrecision) {
   const ModelDescription model = calibrated();
   EXPECT_EQ(engine(model, {.engine = Engine::opencv}), "OpenCV");
   EXPECT_THAT(engine(model, {.precision = PrecisionMode::fp32}), HasSubstr("oneDNN fp32"));
@@ -69,7 +69,7 @@ TEST(OpenNetwork, DoesAsItIsTold) {
               HasSubstr("oneDNN int8"));
 }
 
-TEST(OpenNetwork, RefusesWhatCannotBe) {
+TEST(OpenNetwork, RefusesImpossibleChoices) {
   EXPECT_THROW((void)open_network(exotic(), {.engine = Engine::onednn}), UnsupportedModel);
   EXPECT_THROW((void)open_network(exotic(), {.precision = PrecisionMode::int8}), ModelError);
   EXPECT_THROW((void)open_network(light(), {.precision = PrecisionMode::int8}), ModelError);

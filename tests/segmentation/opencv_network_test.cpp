@@ -19,7 +19,7 @@ using test::TinyNetwork;
 using test::write_model;
 using ::testing::HasSubstr;
 
-/// What the engine says when it refuses the model; empty when it takes it.
+/// The engine's error message; empty when it accepts the model.
 std::string refusal(const ModelDescription& model) {
   try {
     const OpenCvNetwork network(model);
@@ -82,7 +82,7 @@ TEST(OpenCvNetwork, RefusesWeightsThatAreNotFinite) {
   }
 }
 
-TEST(OpenCvNetwork, NamesAnOperatorThatItDoesNotKnow) {
+TEST(OpenCvNetwork, NamesAnUnknownOperator) {
   TinyNetwork tiny = random_network(8, 32, 3);
   tiny.operation = "Convolve";
   EXPECT_THAT(refusal(tiny), HasSubstr("Convolve"));

@@ -18,7 +18,7 @@ using ::testing::HasSubstr;
 
 NetworkGraph read(const std::string& bytes) { return read_network(OnnxFile(write_model(bytes))); }
 
-/// What is said of an operator that is not supported.
+/// The message of UnsupportedLayer; empty when the network is read.
 std::string unsupported(const std::string& bytes) {
   const OnnxFile file(write_model(bytes));
   try {
@@ -31,7 +31,7 @@ std::string unsupported(const std::string& bytes) {
 
 const Window three{.kernel = {3, 3}, .padding = {1, 1}};
 
-TEST(ReadNetwork, KnowsTheSoftmaxInEveryStyleOfExporters) {
+TEST(ReadNetwork, RecognisesTheSoftmaxInEveryFormOfExporters) {
   for (const SoftmaxStyle style :
        {SoftmaxStyle::whole, SoftmaxStyle::in_parts, SoftmaxStyle::between_transposes}) {
     OnnxBuilder network(5, 4, 8);
@@ -77,11 +77,11 @@ TEST(ReadNetwork, NamesWhatItDoesNotSupport) {
     return unsupported(network.bytes(network.node(kind, {"input"}, 5, attributes)));
   };
   EXPECT_THAT(with_node("HardSwish", {}), HasSubstr("operator HardSwish (layer 'make_t1')"));
-  // Over rows: not what labels an image.
-  EXPECT_THAT(with_node("Softmax", {test::whole_attribute("axis", 2)}), HasSubstr("Softmax"));
+  // Over rows instead of channels.
+  EXPECT_THAT(with_node("Softmax", {test::int_attribute("axis", 2)}), HasSubstr("Softmax"));
   EXPECT_THAT(with_node("ReduceSum", {}), HasSubstr("ReduceSum"));
   EXPECT_THAT(with_node("Exp", {}), HasSubstr("not supported"));
-  EXPECT_THAT(with_node("Transpose", {test::list_attribute("perm", {1, 0, 2, 3})}),
+  EXPECT_THAT(with_node("Transpose", {test::ints_attribute("perm", {1, 0, 2, 3})}),
               HasSubstr("Transpose"));
 }
 
@@ -98,16 +98,16 @@ TEST(ReadNetwork, RefusesConvolutionsOfAnotherKind) {
       return std::string(fault.what());
     }
   };
-  using test::list_attribute;
+  using test::ints_attribute;
   EXPECT_EQ(convolve({}), "");
-  EXPECT_THAT(convolve({test::whole_attribute("group", 5)}), HasSubstr("5 groups"));
-  EXPECT_THAT(convolve({test::text_attribute("auto_pad", "SAME_UPPER")}), HasSubstr("auto_pad"));
-  EXPECT_THAT(convolve({list_attribute("pads", {0, -1, 0, 0})}), HasSubstr("pads is -1"));
-  EXPECT_THAT(convolve({list_attribute("strides", {0, 1})}), HasSubstr("strides is 0"));
-  EXPECT_THAT(convolve({list_attribute("strides", {std::int64_t{1} << 40, 1})}),
+  EXPECT_THAT(convolve({test::int_attribute("group", 5)}), HasSubstr("5 groups"));
+  EXPECT_THAT(convolve({test::string_attribute("auto_pad", "SAME_UPPER")}), HasSubstr("auto_pad"));
+  EXPECT_THAT(convolve({ints_attribute("pads", {0, -1, 0, 0})}), HasSubstr("pads is -1"));
+  EXPECT_THAT(convolve({ints_attribute("strides", {0, 1})}), HasSubstr("strides is 0"));
+  EXPECT_THAT(convolve({ints_attribute("strides", {std::int64_t{1} << 40, 1})}),
               HasSubstr("strides is 1099511627776"));
-  EXPECT_THAT(convolve({list_attribute("strides", {1, 1, 1})}), HasSubstr("has 3 numbers"));
-  EXPECT_THAT(convolve({list_attribute("kernel_shape", {3, 3})}), HasSubstr("kernel_shape"));
+  EXPECT_THAT(convolve({ints_attribute("strides", {1, 1, 1})}), HasSubstr("has 3 numbers"));
+  EXPECT_THAT(convolve({ints_attribute("kernel_shape", {3, 3})}), HasSubstr("kernel_shape"));
 }
 
 TEST(ReadNetwork, RefusesWeightsThatAreWorkedOut) {

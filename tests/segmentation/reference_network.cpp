@@ -44,15 +44,16 @@ struct ReferenceLayer {
   ReferenceTensor operator()(const Convolution& c) const {
     ReferenceTensor y = zeros(output_shape);
     for_each_pixel(y.shape, [&](int channel, int row, int column) {
-      const int phase = row % c.widen.rows * c.widen.columns + column % c.widen.columns;
+      const int phase =
+          row % c.upsampling.rows * c.upsampling.columns + column % c.upsampling.columns;
       const int output = phase * y.shape.channels + channel;
       double sum = c.bias[static_cast<std::size_t>(output)];
       for (int input = 0; input < c.inputs; ++input) {
         for (int kr = 0; kr < c.kernel.rows; ++kr) {
           for (int kc = 0; kc < c.kernel.columns; ++kc) {
             const int from_row =
-                row / c.widen.rows * c.stride.rows + kr * c.dilation.rows - c.padding.top;
-            const int from_column = column / c.widen.columns * c.stride.columns +
+                row / c.upsampling.rows * c.stride.rows + kr * c.dilation.rows - c.padding.top;
+            const int from_column = column / c.upsampling.columns * c.stride.columns +
                                     kc * c.dilation.columns - c.padding.left;
             sum += double{weight(c.weights, output, input, c.inputs, c.kernel, kr, kc)} *
                    x().get(input, from_row, from_column);

@@ -13,12 +13,12 @@ struct ReferenceTensor {
   std::vector<double> values;
 
   [[nodiscard]] double& at(int channel, int row, int column);
-  /// 0 outside.
+  /// 0 outside the image.
   [[nodiscard]] double get(int channel, int row, int column) const;
 };
 
-/// Runs a network as its layers are defined, in double precision, without any trick: what every
-/// rearrangement of it must agree with. Shapes are inferred anew.
+/// Runs a network layer by layer as they are defined, in double precision: the oracle for all
+/// passes and engines. Infers the shapes itself.
 [[nodiscard]] ReferenceTensor run_reference(NetworkGraph graph, const ImageShape& shape,
                                             std::span<const float> input);
 

@@ -69,10 +69,9 @@ std::string onnx_bytes(const TinyNetwork& network) {
   const auto classes = static_cast<std::int64_t>(network.bias.size());
   Message graph;
   graph.message(1, onnx_node(network.operation, {"input", "weights", "bias"}, "logits",
-                             {list_attribute("kernel_shape", {1, 1})}));
+                             {ints_attribute("kernel_shape", {1, 1})}));
   if (network.softmax) {
-    graph.message(1,
-                  onnx_node("Softmax", {"logits"}, "probabilities", {whole_attribute("axis", 1)}));
+    graph.message(1, onnx_node("Softmax", {"logits"}, "probabilities", {int_attribute("axis", 1)}));
   }
   graph.bytes(2, "tiny")
       .message(5,

@@ -16,24 +16,24 @@ struct TinyNetwork {
   std::vector<float> weights = {};
   std::vector<float> bias = {};
   bool softmax = true;
-  /// What the convolution is called; another name makes an operator that nobody knows.
+  /// The convolution's operator; another name makes an unknown operator.
   std::string operation = "Conv";
   int input_channels = 5;
   int weight_channels = 5;
 };
 
-/// Fits a network for images of this size; output n is class n.
+/// A description of a network for images of this size; output n is class n.
 [[nodiscard]] ModelDescription describe_family(int rows, int columns, int outputs);
 
-/// Fits `network`; output n is class n.
+/// A description of `network`; output n is class n.
 [[nodiscard]] ModelDescription describe(const TinyNetwork& network);
 
-/// Points in all directions, several a pixel of a small image, with intensity.
+/// Points in all directions, several per pixel of a small image, with intensity.
 [[nodiscard]] Scan random_scan(std::size_t points, unsigned seed);
 
 [[nodiscard]] RangeImage project(const Scan& scan, const ModelDescription& model);
 
-/// Numbers about as large as those of a normalised range image, some pixels empty.
+/// Normally distributed values like those of a normalised range image, some pixels empty.
 [[nodiscard]] std::vector<float> random_image(const ModelDescription& model, unsigned seed);
 
 /// Weights and biases from a fixed seed.
@@ -42,7 +42,7 @@ struct TinyNetwork {
 /// The network as an ONNX file.
 [[nodiscard]] std::string onnx_bytes(const TinyNetwork& network);
 
-/// Writes `bytes` to model.onnx in a fresh folder of the running test; returns the file.
+/// Writes `bytes` to model.onnx in a new folder for the running test; returns the file.
 std::filesystem::path write_model(const std::string& bytes);
 
 }  // namespace stillmap::test

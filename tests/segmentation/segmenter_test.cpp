@@ -14,7 +14,7 @@ Scan labelled_scan() {
   return scan;
 }
 
-TEST(PassthroughSegmenter, HandsOnTheScansLabelsAndTrustsThem) {
+TEST(PassthroughSegmenter, ReturnsTheScansLabelsWithConfidenceOne) {
   const PointLabels labels = PassthroughSegmenter().segment(labelled_scan());
   EXPECT_EQ(labels.classes, labelled_scan().labels);
   EXPECT_EQ(labels.confidence, (std::vector<float>{1.0F, 0.0F}));
@@ -40,7 +40,7 @@ class AllCars final : public Segmenter {
   }
 };
 
-TEST(FallbackSegmenter, AsksTheOtherSourceOnlyAboutScansWithoutLabels) {
+TEST(FallbackSegmenter, UsesTheFallbackOnlyForScansWithoutLabels) {
   FallbackSegmenter labels(std::make_unique<AllCars>());
   EXPECT_EQ(labels.name(), "stream, else all cars");
   EXPECT_EQ(labels.segment(labelled_scan()).classes, labelled_scan().labels);

@@ -11,7 +11,7 @@ void fold_bias(std::vector<float>& bias, const BatchNorm& norm) {
   for (std::size_t o = 0; o < bias.size(); ++o) bias[o] = norm.scale[o] * bias[o] + norm.offset[o];
 }
 
-/// Works the norm into an operation's weights; false when it has none.
+/// Folds the norm into an operation's weights; false when it has none.
 struct Fold {
   const BatchNorm& norm;
 
@@ -36,7 +36,7 @@ struct Fold {
   }
 };
 
-bool fold_into_maker(NetworkGraph& graph, const Layer& layer) {
+bool fold_into_producer(NetworkGraph& graph, const Layer& layer) {
   const auto* const norm = std::get_if<BatchNorm>(&layer.operation);
   if (norm == nullptr) return false;
   const TensorId normed = layer.inputs.front();
@@ -53,7 +53,7 @@ bool fold_into_maker(NetworkGraph& graph, const Layer& layer) {
 
 void fold_batch_norms(NetworkGraph& graph) {
   for (std::size_t i = 0; i < graph.layers.size();) {
-    if (fold_into_maker(graph, graph.layers[i])) {
+    if (fold_into_producer(graph, graph.layers[i])) {
       graph.layers.erase(graph.layers.begin() + static_cast<std::ptrdiff_t>(i));
     } else {
       ++i;
@@ -63,8 +63,8 @@ void fold_batch_norms(NetworkGraph& graph) {
 
 namespace {
 
-/// How the taps of a transposed convolution fall on its input along one direction: output
-/// stride q + phase gets tap k from input q + (phase + padding - k) / stride.
+/// Kernel taps of a transposed convolution along one axis: output stride q + phase gets tap k from
+/// input q + (phase + padding - k) / stride.
 class Taps {
  public:
   Taps(int kernel, int stride, int padding) : kernel_(kernel), stride_(stride), padding_(padding) {
@@ -77,7 +77,7 @@ class Taps {
     }
   }
 
-  /// The tap that `phase` of the output gets from the input `offset` places on; -1 if none.
+  /// The tap that `phase` of output q gets from input q + offset; -1 if none.
   [[nodiscard]] int tap(int phase, int offset) const {
     const int k = phase + padding_ - offset * stride_;
     return k >= 0 && k < kernel_ ? k : -1;
@@ -114,7 +114,7 @@ class Replacement {
                                .right = columns_.after()},
                    .weights = {},
                    .bias = {},
-                   .widen = from_.stride};
+                   .upsampling = from_.stride};
     for (int phase = 0; phase < phases; ++phase) add_phase(phase, to);
     return to;
   }
@@ -176,7 +176,7 @@ std::ptrdiff_t count_sums(const Layer& layer) {
       layer.post_ops, [](const PostOp& step) { return std::holds_alternative<AddTensor>(step); });
 }
 
-/// The other tensor of a sum, if there is one and it is known before `layer` runs.
+/// A sum as post-op of `layer`, if its other operand exists before `layer` runs.
 std::optional<PostOp> sum_with(const NetworkGraph& graph, std::size_t layer, const Layer& sum) {
   const TensorId own = graph.layers[layer].output;
   const TensorId other = sum.inputs[0] == own ? sum.inputs[1] : sum.inputs[0];
@@ -186,16 +186,17 @@ std::optional<PostOp> sum_with(const NetworkGraph& graph, std::size_t layer, con
 }
 
 std::optional<PostOp> as_post_op(const NetworkGraph& graph, std::size_t layer, const Layer& next) {
-  const bool widens_rows = std::get<Convolution>(graph.layers[layer].operation).widen.rows > 1;
-  // Rows are widened after all else, together with a sum.
-  if (count_sums(graph.layers[layer]) == (widens_rows ? 1 : 2)) return std::nullopt;
+  const bool upsamples_rows =
+      std::get<Convolution>(graph.layers[layer].operation).upsampling.rows > 1;
+  // Rows are interleaved after all post-ops but the sum, which is added in the same step.
+  if (count_sums(graph.layers[layer]) == (upsamples_rows ? 1 : 2)) return std::nullopt;
   if (const auto* const activation = std::get_if<LeakyRelu>(&next.operation)) return *activation;
   if (std::holds_alternative<Add>(next.operation)) return sum_with(graph, layer, next);
   return std::nullopt;
 }
 
-/// Takes in what comes next; false when nothing can be.
-bool take_next(NetworkGraph& graph, std::size_t index) {
+/// Fuses the layer that reads the result of layer `index` into it; false when that is impossible.
+bool fuse_next(NetworkGraph& graph, std::size_t index) {
   Layer& layer = graph.layers[index];
   const std::vector<std::size_t> consumers = graph.consumers(layer.output);
   if (consumers.size() != 1 || layer.output == graph.output) return false;
@@ -213,7 +214,7 @@ bool take_next(NetworkGraph& graph, std::size_t index) {
 void fuse_post_ops(NetworkGraph& graph) {
   for (std::size_t i = 0; i < graph.layers.size(); ++i) {
     if (!std::holds_alternative<Convolution>(graph.layers[i].operation)) continue;
-    while (take_next(graph, i)) {
+    while (fuse_next(graph, i)) {
     }
   }
 }

@@ -36,7 +36,7 @@ std::size_t NetworkGraph::producer(TensorId tensor) const {
 
 namespace {
 
-/// More than any layer of the family has: 1 GiB of numbers.
+/// Bound on the size of a tensor, 1 GiB in fp32; no network of the family comes near.
 constexpr std::int64_t max_values = std::int64_t{1} << 28;
 
 [[noreturn]] void refuse(const Layer& layer, const std::string& fault) {
@@ -59,36 +59,38 @@ ImageShape checked(const Layer& layer, int channels, std::int64_t rows, std::int
       .channels = channels, .rows = static_cast<int>(rows), .columns = static_cast<int>(columns)};
 }
 
-/// Places that a kernel finds along one direction.
-std::int64_t places(std::int64_t size, std::int64_t padding, int kernel, int dilation, int stride) {
+/// Output size of a convolution along one axis.
+std::int64_t output_size(std::int64_t size, std::int64_t padding, int kernel, int dilation,
+                         int stride) {
   const std::int64_t reach = std::int64_t{dilation} * (kernel - 1) + 1;
   return size + padding < reach ? 0 : (size + padding - reach) / stride + 1;
 }
 
-/// The shape that each kind of layer makes of its input's.
+/// Output shape of each kind of layer for the shape of its input.
 struct OutputShape {
   const Layer& layer;
   const ImageShape& input;
 
   ImageShape operator()(const Convolution& c) const {
     require_channels(layer, c.inputs, input);
-    const std::int64_t rows = places(input.rows, std::int64_t{c.padding.top} + c.padding.bottom,
-                                     c.kernel.rows, c.dilation.rows, c.stride.rows);
+    const std::int64_t rows =
+        output_size(input.rows, std::int64_t{c.padding.top} + c.padding.bottom, c.kernel.rows,
+                    c.dilation.rows, c.stride.rows);
     const std::int64_t columns =
-        places(input.columns, std::int64_t{c.padding.left} + c.padding.right, c.kernel.columns,
-               c.dilation.columns, c.stride.columns);
-    return checked(layer, c.outputs / (c.widen.rows * c.widen.columns), rows * c.widen.rows,
-                   columns * c.widen.columns);
+        output_size(input.columns, std::int64_t{c.padding.left} + c.padding.right, c.kernel.columns,
+                    c.dilation.columns, c.stride.columns);
+    return checked(layer, c.outputs / (c.upsampling.rows * c.upsampling.columns),
+                   rows * c.upsampling.rows, columns * c.upsampling.columns);
   }
   ImageShape operator()(const TransposedConvolution& c) const {
     require_channels(layer, c.inputs, input);
-    const auto widened = [](std::int64_t size, int stride, int kernel, std::int64_t padding,
-                            int extra) { return (size - 1) * stride - padding + kernel + extra; };
+    const auto upsampled = [](std::int64_t size, int stride, int kernel, std::int64_t padding,
+                              int extra) { return (size - 1) * stride - padding + kernel + extra; };
     return checked(layer, c.outputs,
-                   widened(input.rows, c.stride.rows, c.kernel.rows,
-                           std::int64_t{c.padding.top} + c.padding.bottom, c.extra.rows),
-                   widened(input.columns, c.stride.columns, c.kernel.columns,
-                           std::int64_t{c.padding.left} + c.padding.right, c.extra.columns));
+                   upsampled(input.rows, c.stride.rows, c.kernel.rows,
+                             std::int64_t{c.padding.top} + c.padding.bottom, c.extra.rows),
+                   upsampled(input.columns, c.stride.columns, c.kernel.columns,
+                             std::int64_t{c.padding.left} + c.padding.right, c.extra.columns));
   }
   ImageShape operator()(const BatchNorm& norm) const {
     require_channels(layer, static_cast<int>(norm.scale.size()), input);
@@ -108,13 +110,13 @@ void require_equal_shapes(const NetworkGraph& graph, const Layer& layer) {
   }
 }
 
-/// How much a layer narrows (above 1) or widens its input, as a fraction.
-struct Narrowing {
-  RowsColumns by, widened;
+/// Factors by which a layer shrinks and enlarges its input.
+struct Resampling {
+  RowsColumns down, up;
 };
 
-Narrowing narrowing(const Operation& operation) {
-  if (const auto* const c = std::get_if<Convolution>(&operation)) return {c->stride, c->widen};
+Resampling resampling(const Operation& operation) {
+  if (const auto* const c = std::get_if<Convolution>(&operation)) return {c->stride, c->upsampling};
   if (const auto* const c = std::get_if<TransposedConvolution>(&operation)) return {{}, c->stride};
   return {};
 }
@@ -124,18 +126,19 @@ Narrowing narrowing(const Operation& operation) {
 RowsColumns network_stride(const NetworkGraph& graph) {
   constexpr int limit = 1 << 20;
   std::vector<RowsColumns> stride_of(graph.tensors.size());
-  RowsColumns most;
+  RowsColumns largest;
   for (const Layer& layer : graph.layers) {
     const RowsColumns before = stride_of[layer.inputs.front()];
-    const Narrowing step = narrowing(layer.operation);
+    const Resampling step = resampling(layer.operation);
     RowsColumns& after = stride_of[layer.output];
-    after.rows = std::max(1, before.rows * step.by.rows / step.widened.rows);
-    after.columns = std::max(1, before.columns * step.by.columns / step.widened.columns);
-    most = {.rows = std::max(most.rows, after.rows),
-            .columns = std::max(most.columns, after.columns)};
-    if (most.rows > limit || most.columns > limit) refuse(layer, "narrows the image to nothing");
+    after.rows = std::max(1, before.rows * step.down.rows / step.up.rows);
+    after.columns = std::max(1, before.columns * step.down.columns / step.up.columns);
+    largest = {.rows = std::max(largest.rows, after.rows),
+               .columns = std::max(largest.columns, after.columns)};
+    if (largest.rows > limit || largest.columns > limit)
+      refuse(layer, "narrows the image to nothing");
   }
-  return most;
+  return largest;
 }
 
 void infer_shapes(NetworkGraph& graph, const ImageShape& input) {

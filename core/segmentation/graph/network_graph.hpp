@@ -8,20 +8,20 @@
 
 namespace stillmap {
 
-/// One number for each direction of an image: the size of a kernel, a stride.
+/// A number for each axis of an image: the size of a kernel, a stride.
 struct RowsColumns {
   int rows = 1;
   int columns = 1;
   friend bool operator==(const RowsColumns&, const RowsColumns&) = default;
 };
 
-/// Zeros that are put round an image.
+/// Zeros added around an image.
 struct Padding {
   int top = 0, left = 0, bottom = 0, right = 0;
   friend bool operator==(const Padding&, const Padding&) = default;
 };
 
-/// Size of the values at one place of a network, for one range image.
+/// Shape of a tensor, for one range image.
 struct ImageShape {
   int channels = 0, rows = 0, columns = 0;
 
@@ -34,7 +34,7 @@ struct ImageShape {
   friend bool operator==(const ImageShape&, const ImageShape&) = default;
 };
 
-/// Number of a tensor in its graph.
+/// Index into NetworkGraph::tensors.
 using TensorId = std::size_t;
 
 /// y(o, r, c) = bias(o) + sum of weights(o, i, kr, kc) x(i, r stride + kr dilation - top, ...).
@@ -47,21 +47,21 @@ struct Convolution {
   Padding padding;
   /// outputs x inputs x kernel rows x kernel columns
   std::vector<float> weights;
-  /// One an output.
+  /// One per output.
   std::vector<float> bias;
-  /// More than 1: the outputs are groups of channels (row phase x column phase x channel) that are
-  /// laid out side by side, as a transposed convolution does: y(c, r widen + i, ...).
-  RowsColumns widen;
+  /// Above 1 a depth-to-space step follows: the outputs are row phase x column phase x channel, and
+  /// phase i of row r becomes row r upsampling + i; the same with columns.
+  RowsColumns upsampling;
 };
 
-/// Adds weights(i, o, kr, kc) x(i, r, c) to y(o, r stride + kr - top, ...), for all of them.
+/// y(o, r stride + kr - top, ...) = bias(o) + sum of weights(i, o, kr, kc) x(i, r, c).
 struct TransposedConvolution {
   int inputs = 0;
   int outputs = 0;
   RowsColumns kernel;
   RowsColumns stride;
   Padding padding;
-  /// Rows and columns that the output has below and to the right of what the padding leaves.
+  /// ONNX's output_padding: further rows and columns at the bottom and the right of the output.
   RowsColumns extra{.rows = 0, .columns = 0};
   /// inputs x outputs x kernel rows x kernel columns
   std::vector<float> weights;
@@ -82,19 +82,19 @@ struct LeakyRelu {
 /// The sum of two tensors of one shape.
 struct Add {};
 
-/// Probabilities of scores, over the channels.
+/// Soft-max over the channels.
 struct Softmax {};
 
 using Operation =
     std::variant<Convolution, TransposedConvolution, BatchNorm, LeakyRelu, Add, Softmax>;
 
-/// Adds this tensor to what a convolution gives.
+/// Adds a tensor to the result of a convolution.
 struct AddTensor {
   TensorId other = 0;
-  /// What it is added to, which the convolution would make without it.
+  /// The convolution's result before this sum.
   TensorId own = 0;
 };
-/// What is done to the result of a convolution before it is stored.
+/// Applied to the result of a convolution before it is stored.
 using PostOp = std::variant<LeakyRelu, AddTensor>;
 
 struct Layer {
@@ -103,47 +103,47 @@ struct Layer {
   Operation operation;
   std::vector<TensorId> inputs;
   TensorId output = 0;
-  /// Of a convolution, in this order.
+  /// Of a convolution, in the order in which they are applied.
   std::vector<PostOp> post_ops = {};
 };
 
 struct Tensor {
   /// As in the model's file.
   std::string name;
-  /// Known after infer_shapes().
+  /// Set by infer_shapes().
   ImageShape shape = {};
 };
 
-/// A network for one image, its layers in an order in which they can be run. Each tensor but the
-/// input is the output of exactly one layer.
+/// A network for one image, its layers in topological order. Each tensor but the input is the
+/// output of exactly one layer.
 struct NetworkGraph {
   std::vector<Tensor> tensors;
   std::vector<Layer> layers;
   TensorId input = 0;
   TensorId output = 0;
 
-  /// Layers that read the tensor, in their order.
+  /// Indices of the layers that read the tensor, in ascending order.
   [[nodiscard]] std::vector<std::size_t> consumers(TensorId tensor) const;
-  /// The layer that makes the tensor; layers.size() for the input.
+  /// Index of the layer whose output the tensor is; layers.size() for the input.
   [[nodiscard]] std::size_t producer(TensorId tensor) const;
 };
 
-/// A network that is wrong in itself.
+/// An invalid network.
 class GraphFault : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// A sound network with something in it that this engine does not run.
+/// A valid network with a layer that this engine does not support.
 class UnsupportedLayer : public GraphFault {
   using GraphFault::GraphFault;
 };
 
-/// The network's strides: rows and columns of its image must be multiples of them, so that what
-/// was narrowed fits again when it is widened.
+/// The largest downsampling within the network: rows and columns of its image must be multiples of
+/// it, so that skip connections fit.
 [[nodiscard]] RowsColumns network_stride(const NetworkGraph& graph);
 
-/// Works out the shape of every tensor for an input of this shape. Throws GraphFault where layers
-/// do not fit together or a tensor would be absurdly large.
+/// Sets the shape of every tensor for an input of this shape. Throws GraphFault where layers do not
+/// fit together or a tensor would be too large.
 void infer_shapes(NetworkGraph& graph, const ImageShape& input);
 
 }  // namespace stillmap

@@ -7,17 +7,17 @@
 #include "core/segmentation/onednn/dnnl_step.hpp"
 #include "core/segmentation/onednn/execution_plan.hpp"
 #include "core/segmentation/onednn/openmp_threads.hpp"
-#include "core/segmentation/onednn/row_layout.hpp"
+#include "core/segmentation/onednn/row_interleaving.hpp"
 
 namespace stillmap {
 namespace {
 
 using dnnl::memory;
 
-/// Memory that begins at a cache line.
-class Block {
+/// Memory aligned to cache lines.
+class AlignedMemory {
  public:
-  explicit Block(std::size_t bytes) : lines_((bytes + sizeof(Line) - 1) / sizeof(Line)) {}
+  explicit AlignedMemory(std::size_t bytes) : lines_((bytes + sizeof(Line) - 1) / sizeof(Line)) {}
   [[nodiscard]] std::byte* at(std::size_t byte) {
     return reinterpret_cast<std::byte*>(lines_.data()) + byte;
   }
@@ -30,78 +30,81 @@ class Block {
   std::vector<Line> lines_;
 };
 
-/// A RowLayout with its memory.
-struct RowStep {
-  RowLayout layout;
+/// A RowInterleaving and its operands.
+struct InterleavingStep {
+  RowInterleaving interleaving;
   ValueType type = ValueType::f32;
   const void* from = nullptr;
   void* to = nullptr;
 
   void run() const {
     if (type == ValueType::f32) {
-      lay_out_rows(layout, static_cast<const float*>(from), static_cast<float*>(to));
+      interleave_rows(interleaving, static_cast<const float*>(from), static_cast<float*>(to));
     } else {
-      lay_out_rows(layout, static_cast<const std::int8_t*>(from), static_cast<std::int8_t*>(to));
+      interleave_rows(interleaving, static_cast<const std::int8_t*>(from),
+                      static_cast<std::int8_t*>(to));
     }
   }
 };
 
-using ReadyStep = std::variant<DnnlStep, RowStep>;
+using CompiledStep = std::variant<DnnlStep, InterleavingStep>;
 
-/// Makes a plan's steps ready to run.
+/// Turns the steps of a plan into primitives with their operands.
 class Compiler {
  public:
   Compiler(const NetworkGraph& graph, const ExecutionPlan& plan, const BufferLayout& layout,
-           const dnnl::engine& engine, Block& activations)
+           const dnnl::engine& engine, AlignedMemory& activations)
       : graph_(graph), plan_(plan), layout_(layout), engine_(engine), activations_(activations) {}
 
-  ReadyStep operator()(const LoadInput& step) const {
+  CompiledStep operator()(const LoadInput& step) const {
     const DnnlTensor to = tensor(step.to);
     const memory::desc planar({1, to.shape.channels, to.shape.rows, to.shape.columns},
                               memory::data_type::f32, memory::format_tag::nchw);
     return reorder_step({planar, engine_, nullptr}, to.dnnl_memory(engine_), 1.0F);
   }
-  ReadyStep operator()(const Convert& step) const {
+  CompiledStep operator()(const Convert& step) const {
     return reorder_step(tensor(step.from).dnnl_memory(engine_),
                         tensor(step.to).dnnl_memory(engine_), step.factor);
   }
-  ReadyStep operator()(const Convolve& step) const {
+  CompiledStep operator()(const Convolve& step) const {
     const Layer& layer = graph_.layers[step.layer];
     const auto& c = std::get<Convolution>(layer.operation);
     ConvolutionTensors tensors{.from = tensor(step.from),
-                               .to = unwidened(c, tensor(step.to)),
+                               .to = before_upsampling(c, tensor(step.to)),
                                .sum_scale = step.sum_scale,
                                .added = std::nullopt};
-    if (step.added) tensors.added = unwidened(c, tensor(*step.added));
+    if (step.added) tensors.added = before_upsampling(c, tensor(*step.added));
     return convolution_step(engine_, layer, tensors);
   }
-  ReadyStep operator()(const LayOutRows& step) const {
-    const RowsColumns widen = std::get<Convolution>(graph_.layers[step.layer].operation).widen;
+  CompiledStep operator()(const InterleaveRows& step) const {
+    const RowsColumns upsampling =
+        std::get<Convolution>(graph_.layers[step.layer].operation).upsampling;
     const DnnlTensor to = tensor(step.to);
     const auto size = [](int number) { return static_cast<std::size_t>(number); };
-    return RowStep{.layout = {.rows = size(to.shape.rows / widen.rows),
-                              .phases = size(widen.rows),
-                              .chunk = size(to.shape.channels) * size(widen.columns),
-                              .chunks = size(to.shape.columns / widen.columns),
-                              .factor = step.factor,
-                              .sum_factor = step.sum_factor},
-                   .type = to.type,
-                   .from = tensor(step.from).memory,
-                   .to = to.memory};
+    return InterleavingStep{
+        .interleaving = {.rows = size(to.shape.rows / upsampling.rows),
+                         .phases = size(upsampling.rows),
+                         .chunk = size(to.shape.channels) * size(upsampling.columns),
+                         .chunks = size(to.shape.columns / upsampling.columns),
+                         .factor = step.factor,
+                         .sum_factor = step.sum_factor},
+        .type = to.type,
+        .from = tensor(step.from).memory,
+        .to = to.memory};
   }
-  ReadyStep operator()(const Activate& step) const {
+  CompiledStep operator()(const Activate& step) const {
     return activation_step(engine_, tensor(step.from), tensor(step.to), step.slope);
   }
-  ReadyStep operator()(const Sum& step) const {
+  CompiledStep operator()(const Sum& step) const {
     return sum_step(engine_, tensor(step.first), tensor(step.second), tensor(step.to));
   }
 
  private:
-  /// The same memory as the convolution sees it, before its outputs are laid side by side.
-  static DnnlTensor unwidened(const Convolution& c, DnnlTensor tensor) {
+  /// The tensor in the shape before upsampling, in the same memory.
+  static DnnlTensor before_upsampling(const Convolution& c, DnnlTensor tensor) {
     tensor.shape = {.channels = c.outputs,
-                    .rows = tensor.shape.rows / c.widen.rows,
-                    .columns = tensor.shape.columns / c.widen.columns};
+                    .rows = tensor.shape.rows / c.upsampling.rows,
+                    .columns = tensor.shape.columns / c.upsampling.columns};
     return tensor;
   }
 
@@ -116,7 +119,7 @@ class Compiler {
   const ExecutionPlan& plan_;
   const BufferLayout& layout_;
   const dnnl::engine& engine_;
-  Block& activations_;
+  AlignedMemory& activations_;
 };
 
 struct StepText {
@@ -132,7 +135,7 @@ struct StepText {
            std::to_string(c.kernel.rows) + "x" + std::to_string(c.kernel.columns) + ", " +
            shape(step.to) + (step.sum_scale ? ", add" : "") + (step.added ? ", add" : "");
   }
-  std::string operator()(const LayOutRows& step) const {
+  std::string operator()(const InterleaveRows& step) const {
     return "lay out rows of " + shape(step.to) + (step.sum_factor ? ", add" : "");
   }
   std::string operator()(const Activate& step) const { return "activate " + shape(step.to); }
@@ -163,26 +166,26 @@ struct CompiledPlan::State {
     add_scratchpad();
   }
 
-  /// One piece of scratch memory that serves all, since they run one by one.
+  /// One scratchpad for all steps, since they run one after another.
   void add_scratchpad() {
-    std::size_t most = 0;
+    std::size_t largest = 0;
     const auto each = [this](const auto& work) {
-      for (ReadyStep& step : steps) {
+      for (CompiledStep& step : steps) {
         if (auto* const dnnl = std::get_if<DnnlStep>(&step)) work(*dnnl);
       }
     };
-    each([&](const DnnlStep& step) { most = std::max(most, step.scratchpad.get_size()); });
-    scratchpad = Block(most);
+    each([&](const DnnlStep& step) { largest = std::max(largest, step.scratchpad.get_size()); });
+    scratchpad = AlignedMemory(largest);
     each([&](DnnlStep& step) {
       step.arguments[DNNL_ARG_SCRATCHPAD] = {step.scratchpad, engine, scratchpad.at(0)};
     });
   }
 
-  void run(const ReadyStep& step) {
+  void run(const CompiledStep& step) {
     if (const auto* const dnnl = std::get_if<DnnlStep>(&step)) {
       dnnl->primitive.execute(stream, dnnl->arguments);
     } else {
-      std::get<RowStep>(step).run();
+      std::get<InterleavingStep>(step).run();
     }
   }
 
@@ -195,10 +198,10 @@ struct CompiledPlan::State {
   dnnl::engine engine{dnnl::engine::kind::cpu, 0};
   dnnl::stream stream{engine};
   BufferLayout layout;
-  Block activations;
-  Block scratchpad;
+  AlignedMemory activations;
+  AlignedMemory scratchpad;
   std::vector<Tensor> tensors;
-  std::vector<ReadyStep> steps;
+  std::vector<CompiledStep> steps;
   std::vector<TensorPlacement> targets;
   std::vector<std::string> texts;
   TensorPlacement output;
@@ -221,7 +224,7 @@ std::span<const float> CompiledPlan::run(std::span<const float> input) { return 
 std::span<const float> CompiledPlan::run(std::span<const float> input, const Observer& observer) {
   const OpenMpThreads set(state_->threads);
   assert(input.size() == state_->tensors[state_->targets.front().tensor].shape.size());
-  // Only read, though oneDNN takes a pointer through which it could write.
+  // oneDNN reads through this pointer, although its type allows writing.
   auto& load = std::get<DnnlStep>(state_->steps.front());
   load.arguments.at(DNNL_ARG_FROM).set_data_handle(const_cast<float*>(input.data()));
   for (std::size_t i = 0; i < state_->steps.size(); ++i) {
@@ -237,7 +240,7 @@ int CompiledPlan::threads() const { return state_->threads; }
 
 std::size_t CompiledPlan::memory_bytes() const {
   std::size_t bytes = state_->activations.bytes() + state_->scratchpad.bytes();
-  for (const ReadyStep& step : state_->steps) {
+  for (const CompiledStep& step : state_->steps) {
     const auto* const dnnl = std::get_if<DnnlStep>(&step);
     if (dnnl == nullptr || !dnnl->arguments.contains(DNNL_ARG_WEIGHTS)) continue;
     bytes += dnnl->arguments.at(DNNL_ARG_WEIGHTS).get_desc().get_size();

@@ -7,19 +7,24 @@ namespace stillmap {
 
 using dnnl::memory;
 
+namespace {
+
 memory::data_type dnnl_type(ValueType type) {
   return type == ValueType::s8 ? memory::data_type::s8 : memory::data_type::f32;
 }
 
-memory::desc DnnlTensor::desc() const {
-  return {
-      {1, shape.channels, shape.rows, shape.columns}, dnnl_type(type), memory::format_tag::nhwc};
-}
-
+/// Scratch memory comes from the caller.
 dnnl::primitive_attr step_attributes() {
   dnnl::primitive_attr attributes;
   attributes.set_scratchpad_mode(dnnl::scratchpad_mode::user);
   return attributes;
+}
+
+}  // namespace
+
+memory::desc DnnlTensor::desc() const {
+  return {
+      {1, shape.channels, shape.rows, shape.columns}, dnnl_type(type), memory::format_tag::nhwc};
 }
 
 DnnlStep reorder_step(const memory& from, const memory& to, float factor) {
@@ -59,21 +64,20 @@ DnnlStep sum_step(const dnnl::engine& engine, const DnnlTensor& first, const Dnn
 
 namespace {
 
-using dnnl::memory;
 using Dims = memory::dims;
 
 constexpr float largest_s8 = 127.0F;
 
-/// Weights of one convolution in the type that it multiplies, and the factors that bring its sums
-/// of products to the units in which they are summed up, one an output.
+/// Weights of a convolution in the type that it computes in, and for s8 one factor per output from
+/// sums of products to the target's scale.
 struct Weights {
   std::vector<float> values;
   std::vector<float> bias;
   std::vector<float> output_factors;
 };
 
-/// Each output's weights times what makes the largest of them 127, rounded. The bias stays in
-/// floating point, in units of the products.
+/// Symmetric quantisation with one scale per output: the largest weight of an output becomes 127.
+/// The bias stays in floating point, in units of the products.
 Weights integer_weights(const Convolution& c, float input_scale, float output_scale) {
   Weights to{.values = c.weights, .bias = c.bias, .output_factors = {}};
   const std::size_t per_output = c.weights.size() / c.bias.size();
@@ -89,8 +93,7 @@ Weights integer_weights(const Convolution& c, float input_scale, float output_sc
   return to;
 }
 
-/// Scale in which the products are summed up: of the second tensor that is added, which oneDNN
-/// cannot scale, or else of the target.
+/// Scale of the sums: of the second summand, which oneDNN cannot rescale, or else of the target.
 float working_scale(const ConvolutionTensors& tensors) {
   return tensors.added ? tensors.added->scale : tensors.to.scale;
 }
@@ -115,7 +118,7 @@ dnnl::post_ops post_ops(const Layer& layer, const ConvolutionTensors& tensors) {
   return after;
 }
 
-/// Position of the binary post-op.
+/// Index of the binary post-op.
 int position_of_added(const dnnl::post_ops& after) {
   int position = 0;
   while (after.kind(position) != dnnl::primitive::kind::binary) ++position;
@@ -137,10 +140,10 @@ dnnl::convolution_forward::primitive_desc describe(const dnnl::engine& engine, c
   return {desc, attributes, engine};
 }
 
-/// Values in memory of oneDNN's own, in the layout that it chose.
+/// Copies values into memory of the layout that oneDNN chose.
 memory in_layout(const dnnl::engine& engine, const std::vector<float>& values, const Dims& dims,
                  memory::format_tag tag, const memory::desc& layout) {
-  // Only read, though oneDNN takes a pointer through which it could write.
+  // oneDNN reads through this pointer, although its type allows writing.
   memory plain({dims, memory::data_type::f32, tag}, engine, const_cast<float*>(values.data()));
   memory chosen(layout, engine);
   dnnl::stream stream(engine);

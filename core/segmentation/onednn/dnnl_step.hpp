@@ -9,21 +9,21 @@
 #include "core/segmentation/graph/network_graph.hpp"
 #include "core/segmentation/onednn/execution_plan.hpp"
 
-// Only the sources that make oneDNN's primitives include this.
+// Includes dnnl.hpp: for sources that create oneDNN primitives only.
 
 namespace stillmap {
 
-/// One call of oneDNN, with the memory that it works on.
+/// A oneDNN primitive and its arguments.
 struct DnnlStep {
   dnnl::primitive primitive;
   std::unordered_map<int, dnnl::memory> arguments;
-  /// Memory that it wants while it runs.
+  /// Scratch memory that it needs while it runs.
   dnnl::memory::desc scratchpad;
-  /// oneDNN's name of the code that runs it.
+  /// oneDNN's name of the implementation.
   std::string implementation;
 };
 
-/// A tensor as it lies in memory, and the factor of its values when they are s8.
+/// A tensor in memory; `scale` is that of s8 values.
 struct DnnlTensor {
   void* memory = nullptr;
   ValueType type = ValueType::f32;
@@ -36,26 +36,21 @@ struct DnnlTensor {
   }
 };
 
-[[nodiscard]] dnnl::memory::data_type dnnl_type(ValueType type);
-
-/// Attributes that every primitive here has.
-[[nodiscard]] dnnl::primitive_attr step_attributes();
-
-/// What a convolution reads and writes. `to` and `added` have the shape before it is widened.
+/// Operands of a convolution. `to` and `added` have the shape before upsampling.
 struct ConvolutionTensors {
   DnnlTensor from, to;
-  /// Scale of what is in the target, to be added.
+  /// Scale of the content of `to`, if that is added.
   std::optional<float> sum_scale;
-  /// Added as well.
+  /// A second summand.
   std::optional<DnnlTensor> added;
 };
 
-/// The convolution of `layer`, which multiplies values of the type of `from`. Throws
-/// UnsupportedLayer when oneDNN has only reference code for it.
+/// The convolution of `layer`, in the type of `from`. Throws UnsupportedLayer when oneDNN has only
+/// its slow reference implementation for it.
 [[nodiscard]] DnnlStep convolution_step(const dnnl::engine& engine, const Layer& layer,
                                         const ConvolutionTensors& tensors);
 
-/// Copies values times `factor` into another layout or type.
+/// Copies values times `factor` to another layout or type.
 [[nodiscard]] DnnlStep reorder_step(const dnnl::memory& from, const dnnl::memory& to, float factor);
 
 [[nodiscard]] DnnlStep activation_step(const dnnl::engine& engine, const DnnlTensor& from,

@@ -21,7 +21,7 @@ LayerPrecision layer_precision(const NetworkGraph& graph, const Int8Calibration*
                            .of_tensor = std::vector(graph.tensors.size(), ValueType::f32)};
   if (calibration == nullptr) return precision;
   std::vector<bool> wanted_s8(graph.tensors.size(), false);
-  // From the end, so that all that read a tensor have said what they want before it is decided.
+  // Backwards, so that all readers of a tensor are visited before its producer.
   for (std::size_t i = graph.layers.size(); i-- > 0;) {
     const Layer& layer = graph.layers[i];
     if (!in_integers(graph, layer, *calibration)) continue;
@@ -42,7 +42,7 @@ constexpr float largest_s8 = 127.0F;
 
 std::size_t bytes_of(ValueType type) { return type == ValueType::s8 ? 1 : sizeof(float); }
 
-/// The sums that a convolution took in, none to two.
+/// The sums that are fused into a convolution, none to two.
 std::vector<AddTensor> sums_of(const Layer& layer) {
   std::vector<AddTensor> sums;
   for (const PostOp& step : layer.post_ops) {
@@ -90,8 +90,8 @@ class Planner {
 
   void plan_convolution(std::size_t index) {
     const Layer& layer = graph_.layers[index];
-    if (std::get<Convolution>(layer.operation).widen.rows > 1) {
-      plan_row_widening(index);
+    if (std::get<Convolution>(layer.operation).upsampling.rows > 1) {
+      plan_row_upsampling(index);
       return;
     }
     const ValueType type = precision_.of_tensor[layer.output];
@@ -110,7 +110,7 @@ class Planner {
     }
   }
 
-  void plan_row_widening(std::size_t index) {
+  void plan_row_upsampling(std::size_t index) {
     const Layer& layer = graph_.layers[index];
     const ValueType type = precision_.of_tensor[layer.output];
     const TensorPlacement from = version(layer.inputs.front(), precision_.of_layer[index]);
@@ -120,7 +120,7 @@ class Planner {
     const auto [to, sum_scale] = result_place(index, phases, type);
     std::optional<float> sum_factor;
     if (sum_scale) sum_factor = *sum_scale / scale_of(to);
-    add_step(LayOutRows{index, phases, to, scale_of(phases) / scale_of(to), sum_factor});
+    add_step(InterleaveRows{index, phases, to, scale_of(phases) / scale_of(to), sum_factor});
   }
 
   struct Result {
@@ -128,8 +128,8 @@ class Planner {
     std::optional<float> sum_scale;
   };
 
-  /// Where the result of a convolution goes: onto what it is added to, or into memory of its own.
-  /// `from` is read while it is written.
+  /// The target of a convolution: the buffer of the tensor that it is added to, copied first when
+  /// that is read again or is `from`, or a new buffer.
   Result result_place(std::size_t index, const TensorPlacement& from, ValueType type) {
     const Layer& layer = graph_.layers[index];
     const std::vector<AddTensor> sums = sums_of(layer);
@@ -152,7 +152,7 @@ class Planner {
     return tensor != graph_.output && graph_.consumers(tensor).back() == layer;
   }
 
-  /// A tensor in the type that is wanted; converted when it is not there yet.
+  /// A tensor in this type; adds a conversion when it does not exist yet.
   TensorPlacement version(TensorId tensor, ValueType type) {
     std::optional<TensorPlacement>& wanted = versions_[tensor][static_cast<std::size_t>(type)];
     if (wanted) return *wanted;
@@ -186,12 +186,12 @@ class Planner {
       throw GraphFault("its int8 calibration has no range for tensor '" + name +
                        "': it is another network's; calibrate again");
     }
-    // A tensor that was 0 in every scan has a range of 0.
+    // The range is 0 for a tensor that was 0 in all calibration scans.
     const float range = std::ranges::max(ranges->second);
     plan_.scale_of_tensor[place.tensor] = range > 0.0F ? range / largest_s8 : 1.0F;
   }
 
-  /// What a stored value must be multiplied with.
+  /// Factor from stored to real values.
   [[nodiscard]] float scale_of(const TensorPlacement& place) const {
     return place.type == ValueType::s8 ? plan_.scale_of_tensor[place.tensor] : 1.0F;
   }
@@ -218,7 +218,7 @@ class Planner {
   const NetworkGraph& graph_;
   const Int8Calibration* calibration_;
   LayerPrecision precision_;
-  /// Of each tensor, by type.
+  /// For each tensor its placement by type.
   std::vector<std::array<std::optional<TensorPlacement>, 2>> versions_;
   ExecutionPlan plan_;
 };

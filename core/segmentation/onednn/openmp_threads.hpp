@@ -4,11 +4,11 @@
 
 namespace stillmap {
 
-/// OpenMP, on which oneDNN runs, uses so many threads for calls from this thread while this lives.
-/// oneDNN wants the same number when a primitive is made and when it is run.
+/// Sets the number of OpenMP threads for oneDNN calls from this thread during its lifetime. oneDNN
+/// requires the same number when a primitive is created and when it runs.
 ///
-/// At its end the threads are sent away: left to themselves they would spin for milliseconds, on
-/// cores that others then wait for.
+/// The destructor releases OpenMP's threads, which otherwise spin for milliseconds and keep cores
+/// from other work.
 class OpenMpThreads {
  public:
   explicit OpenMpThreads(int threads) : before_(omp_get_max_threads()) {

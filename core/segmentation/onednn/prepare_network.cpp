@@ -24,7 +24,7 @@ void require_output(const NetworkGraph& graph, const ModelDescription& model) {
                    " is wanted (1 x classes x rows x columns of its description)");
 }
 
-/// Products and sums of all convolutions.
+/// Multiplications and additions of all convolutions, in 10^9.
 double count_operations(const NetworkGraph& graph) {
   const auto pixels = [&graph](TensorId tensor) {
     const ImageShape& shape = graph.tensors[tensor].shape;

@@ -6,17 +6,17 @@
 
 namespace stillmap {
 
-/// A network made ready for planning.
+/// A network after all passes, for plan_execution().
 struct PreparedNetwork {
   NetworkGraph graph;
-  /// The file ends in a soft-max, which was taken off: the output is its logits.
+  /// The file ends in a soft-max, which was removed: the output is logits.
   bool had_softmax = false;
-  /// Multiplications and additions of a run, in 10^9, as the file has its layers.
+  /// Multiplications and additions per run, in 10^9, of the layers as they are in the file.
   double giga_operations = 0.0;
 };
 
 /// Reads a network for images of the description's size, and reduces it to convolutions with
-/// follow-ups. Throws UnsupportedLayer or GraphFault.
+/// post-ops. Throws UnsupportedLayer or GraphFault.
 [[nodiscard]] PreparedNetwork prepare_network(const OnnxFile& file, const ModelDescription& model);
 
 }  // namespace stillmap

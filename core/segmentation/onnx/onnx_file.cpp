@@ -21,7 +21,8 @@ static_assert(std::endian::native == std::endian::little, "ONNX's raw data are l
 
 constexpr std::int64_t max_values = std::int64_t{1} << 28;
 
-std::optional<std::int64_t> product(const onnx::TensorProto& tensor) {
+/// Number of values, by the tensor's dimensions; empty when they are negative or too large.
+std::optional<std::int64_t> value_count(const onnx::TensorProto& tensor) {
   std::int64_t count = 1;
   for (const std::int64_t size : tensor.dims()) {
     if (size < 0 || size > max_values) return std::nullopt;
@@ -50,14 +51,13 @@ std::int64_t stored_values(const onnx::TensorProto& tensor) {
   return is_float ? tensor.float_data_size() : tensor.int64_data_size();
 }
 
-}  // namespace
-
+/// What is wrong with a tensor that is stored in the file; empty when it can be used.
 std::string tensor_fault(const onnx::TensorProto& tensor) {
   const std::string name = "weights '" + tensor.name() + "'";
   if (tensor.data_location() == onnx::TensorProto::EXTERNAL || tensor.external_data_size() > 0) {
     return name + " lie in another file; export the network as one file";
   }
-  const std::optional<std::int64_t> wanted = product(tensor);
+  const std::optional<std::int64_t> wanted = value_count(tensor);
   if (!wanted) return name + " have dimensions that are negative or absurd";
   const bool is_float = tensor.data_type() == onnx::TensorProto::FLOAT;
   if (!is_float && tensor.data_type() != onnx::TensorProto::INT64) return {};
@@ -65,26 +65,10 @@ std::string tensor_fault(const onnx::TensorProto& tensor) {
     return name + " are not whole: their dimensions want " + std::to_string(*wanted) +
            " values, the file does not hold as many";
   }
-  const std::vector<float> numbers = float_values(tensor);
+  const std::vector<float> numbers = tensor_floats(tensor);
   const bool finite = std::ranges::all_of(numbers, [](float x) { return std::isfinite(x); });
   return finite ? std::string() : name + " are not all finite numbers";
 }
-
-std::size_t value_count(const onnx::TensorProto& tensor) {
-  return static_cast<std::size_t>(product(tensor).value_or(0));
-}
-
-std::vector<float> float_values(const onnx::TensorProto& tensor) {
-  if (tensor.data_type() != onnx::TensorProto::FLOAT) return {};
-  return values<float>(tensor, tensor.float_data());
-}
-
-std::vector<std::int64_t> int_values(const onnx::TensorProto& tensor) {
-  if (tensor.data_type() != onnx::TensorProto::INT64) return {};
-  return values<std::int64_t>(tensor, tensor.int64_data());
-}
-
-namespace {
 
 using Names = std::set<std::string>;
 
@@ -118,7 +102,7 @@ std::string node_text(const onnx::NodeProto& node) {
   return node.op_type() + " '" + (node.name().empty() ? "without a name" : node.name()) + "'";
 }
 
-/// What is wrong with a node, given all that is known before it; adds what the node makes.
+/// What is wrong with a node, given the names of all tensors before it, to which it adds its own.
 std::string node_fault(const onnx::NodeProto& node, Names& known) {
   for (const std::string& input : node.input()) {
     if (!input.empty() && !known.contains(input)) {
@@ -147,8 +131,7 @@ std::string nodes_fault(const onnx::GraphProto& graph) {
   return {};
 }
 
-}  // namespace
-
+/// What makes the file useless for any engine; empty when nothing does.
 std::string onnx_fault(const onnx::ModelProto& model) {
   const onnx::GraphProto& graph = model.graph();
   if (graph.node().empty()) return "is not an ONNX network: there is no layer in it";
@@ -163,21 +146,9 @@ std::string onnx_fault(const onnx::ModelProto& model) {
   return nodes_fault(graph);
 }
 
-const onnx::ValueInfoProto* network_input(const onnx::GraphProto& graph) {
-  const onnx::ValueInfoProto* found = nullptr;
-  for (const onnx::ValueInfoProto& input : graph.input()) {
-    if (is_weight(graph, input.name())) continue;
-    if (found != nullptr) return nullptr;
-    found = &input;
-  }
-  return found;
-}
-
-namespace {
-
 namespace fs = std::filesystem;
 
-/// RangeNet53 has 200 MB.
+/// For comparison: RangeNet53 has 200 MB.
 constexpr std::uintmax_t max_file_bytes = std::uintmax_t{1} << 30;
 
 std::unique_ptr<onnx::ModelProto> parse(const fs::path& file) {
@@ -204,6 +175,26 @@ std::string shape_text(const Sizes& sizes) {
 }
 
 }  // namespace
+
+const onnx::ValueInfoProto* network_input(const onnx::GraphProto& graph) {
+  const onnx::ValueInfoProto* found = nullptr;
+  for (const onnx::ValueInfoProto& input : graph.input()) {
+    if (is_weight(graph, input.name())) continue;
+    if (found != nullptr) return nullptr;
+    found = &input;
+  }
+  return found;
+}
+
+std::vector<float> tensor_floats(const onnx::TensorProto& tensor) {
+  if (tensor.data_type() != onnx::TensorProto::FLOAT) return {};
+  return values<float>(tensor, tensor.float_data());
+}
+
+std::vector<std::int64_t> tensor_ints(const onnx::TensorProto& tensor) {
+  if (tensor.data_type() != onnx::TensorProto::INT64) return {};
+  return values<std::int64_t>(tensor, tensor.int64_data());
+}
 
 OnnxFile::OnnxFile(const fs::path& file) : file_(file), model_(parse(file)) {
   const std::string fault = onnx_fault(*model_);

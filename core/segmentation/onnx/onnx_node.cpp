@@ -10,7 +10,7 @@
 namespace stillmap {
 namespace {
 
-/// No kernel, stride or padding of a sound network is as large.
+/// Upper bound of kernel sizes, strides and paddings.
 constexpr std::int64_t max_number = 4096;
 
 }  // namespace
@@ -30,30 +30,30 @@ void OnnxAttributes::refuse(const std::string& name, const std::string& fault) c
   throw GraphFault("layer '" + layer_name(node_) + "': " + name + " " + fault);
 }
 
-float OnnxAttributes::real(const std::string& name, float default_value) const {
+float OnnxAttributes::float_value(const std::string& name, float default_value) const {
   const onnx::AttributeProto* const attribute = find(name);
   return attribute == nullptr ? default_value : attribute->f();
 }
 
-std::int64_t OnnxAttributes::whole(const std::string& name, std::int64_t default_value) const {
+std::int64_t OnnxAttributes::int_value(const std::string& name, std::int64_t default_value) const {
   const onnx::AttributeProto* const attribute = find(name);
   return attribute == nullptr ? default_value : attribute->i();
 }
 
-std::string OnnxAttributes::text(const std::string& name) const {
+std::string OnnxAttributes::string_value(const std::string& name) const {
   const onnx::AttributeProto* const attribute = find(name);
   return attribute == nullptr ? std::string() : attribute->s();
 }
 
-std::vector<std::int64_t> OnnxAttributes::whole_numbers(const std::string& name) const {
+std::vector<std::int64_t> OnnxAttributes::int_values(const std::string& name) const {
   const onnx::AttributeProto* const attribute = find(name);
   if (attribute == nullptr) return {};
   return {attribute->ints().begin(), attribute->ints().end()};
 }
 
-std::vector<int> OnnxAttributes::small_numbers(const std::string& name, int min_value,
-                                               std::vector<int> default_value) const {
-  const std::vector<std::int64_t> written = whole_numbers(name);
+std::vector<int> OnnxAttributes::bounded_ints(const std::string& name, int min_value,
+                                              std::vector<int> default_value) const {
+  const std::vector<std::int64_t> written = int_values(name);
   if (written.empty()) return default_value;
   if (written.size() != default_value.size()) {
     refuse(name, "has " + std::to_string(written.size()) + " numbers where " +
@@ -72,16 +72,16 @@ std::vector<int> OnnxAttributes::small_numbers(const std::string& name, int min_
 RowsColumns OnnxAttributes::pair(const std::string& name, int min_value,
                                  RowsColumns default_value) const {
   const std::vector<int> pair =
-      small_numbers(name, min_value, {default_value.rows, default_value.columns});
+      bounded_ints(name, min_value, {default_value.rows, default_value.columns});
   return {.rows = pair[0], .columns = pair[1]};
 }
 
 Padding OnnxAttributes::padding() const {
-  if (const std::string how = text("auto_pad"); !how.empty() && how != "NOTSET") {
+  if (const std::string how = string_value("auto_pad"); !how.empty() && how != "NOTSET") {
     throw UnsupportedLayer("layer '" + layer_name(node_) + "': auto_pad " + how +
                            " is not supported");
   }
-  const std::vector<int> pads = small_numbers("pads", 0, {0, 0, 0, 0});
+  const std::vector<int> pads = bounded_ints("pads", 0, {0, 0, 0, 0});
   return {.top = pads[0], .left = pads[1], .bottom = pads[2], .right = pads[3]};
 }
 
@@ -111,7 +111,7 @@ std::vector<float> OnnxWeights::values(const onnx::NodeProto& node, int input) c
     throw UnsupportedLayer("layer '" + layer_name(node) + "': weights '" + tensor.name() +
                            "' are not 32-bit floating point numbers");
   }
-  return float_values(tensor);
+  return tensor_floats(tensor);
 }
 
 std::vector<float> OnnxWeights::values(const onnx::NodeProto& node, int input,
@@ -141,20 +141,20 @@ std::vector<int> OnnxWeights::shape(const onnx::NodeProto& node, int input, int 
   return shape;
 }
 
-std::vector<std::int64_t> OnnxWeights::whole_numbers(const onnx::NodeProto& node, int input) const {
-  return int_values(find(node, input));
+std::vector<std::int64_t> OnnxWeights::int_values(const onnx::NodeProto& node, int input) const {
+  return tensor_ints(find(node, input));
 }
 
 namespace {
 
 void require_one_group(const onnx::NodeProto& node) {
-  const std::int64_t group = OnnxAttributes(node).whole("group", 1);
+  const std::int64_t group = OnnxAttributes(node).int_value("group", 1);
   if (group == 1) return;
   throw UnsupportedLayer("layer '" + layer_name(node) + "': " + node.op_type() + " in " +
                          std::to_string(group) + " groups is not supported");
 }
 
-/// The kernel's size as the weights have it; the attribute, where it is, must say the same.
+/// The kernel's size by its weights. Throws GraphFault when the attribute differs.
 RowsColumns kernel(const onnx::NodeProto& node, const std::vector<int>& weights_shape) {
   const RowsColumns of_weights{.rows = weights_shape[2], .columns = weights_shape[3]};
   if (OnnxAttributes(node).pair("kernel_shape", 1, of_weights) == of_weights) return of_weights;
@@ -179,14 +179,14 @@ Operation read_convolution(const onnx::NodeProto& node, const OnnxWeights& weigh
                      .padding = attributes.padding(),
                      .weights = weights.values(node, 1),
                      .bias = bias(node, weights, shape[0]),
-                     .widen = {}};
+                     .upsampling = {}};
 }
 
 Operation read_transposed(const onnx::NodeProto& node, const OnnxWeights& weights) {
   require_one_group(node);
   const OnnxAttributes attributes(node);
   if (attributes.pair("dilations", 1, {}) != RowsColumns{} ||
-      !attributes.whole_numbers("output_shape").empty()) {
+      !attributes.int_values("output_shape").empty()) {
     throw UnsupportedLayer("layer '" + layer_name(node) +
                            "': ConvTranspose with dilations or output_shape is not supported");
   }
@@ -207,7 +207,7 @@ Operation read_batch_norm(const onnx::NodeProto& node, const OnnxWeights& weight
   const std::vector<float> beta = weights.values(node, 2, gamma.size());
   const std::vector<float> mean = weights.values(node, 3, gamma.size());
   const std::vector<float> variance = weights.values(node, 4, gamma.size());
-  const float epsilon = OnnxAttributes(node).real("epsilon", 1e-5F);
+  const float epsilon = OnnxAttributes(node).float_value("epsilon", 1e-5F);
   BatchNorm norm;
   for (std::size_t c = 0; c < gamma.size(); ++c) {
     norm.scale.push_back(gamma[c] / std::sqrt(variance[c] + epsilon));
@@ -226,7 +226,7 @@ Operation read_operation(const onnx::NodeProto& node, const OnnxWeights& weights
   if (kind == "Conv") return read_convolution(node, weights);
   if (kind == "ConvTranspose") return read_transposed(node, weights);
   if (kind == "BatchNormalization") return read_batch_norm(node, weights);
-  if (kind == "LeakyRelu") return LeakyRelu{OnnxAttributes(node).real("alpha", 0.01F)};
+  if (kind == "LeakyRelu") return LeakyRelu{OnnxAttributes(node).float_value("alpha", 0.01F)};
   if (kind == "Relu") return LeakyRelu{0.0F};
   throw UnsupportedLayer("operator " + kind + " (layer '" + layer_name(node) +
                          "') is not supported");

@@ -11,21 +11,38 @@
 #include "core/segmentation/onnx/onnx_file.hpp"
 #include "core/segmentation/onnx/onnx_node.hpp"
 
-namespace onnx {
-class ModelProto;
-}  // namespace onnx
-
 namespace stillmap {
+namespace {
 
-/// Puts soft-maxes over the channels together that exporters write in one of three ways: as
-/// Softmax; as Exp, ReduceSum, Div (PyTorch up to 1.4); between two Transposes (before operator set
-/// 13, whose Softmax knows only the last axis).
+using Order = std::vector<std::int64_t>;
+
+constexpr std::int64_t channel_axis = 1;
+/// From this operator set on Softmax works along one axis, before along all from its axis on.
+constexpr std::int64_t one_axis_set = 13;
+
+/// Both permutations with which exporters move the channels to the last axis.
+bool channels_last(const Order& order) {
+  return order == Order{0, 2, 3, 1} || order == Order{0, 3, 2, 1};
+}
+/// `back` is the inverse permutation of `order`.
+bool is_inverse(const Order& back, const Order& order) {
+  if (back.size() != order.size()) return false;
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    if (back[i] < 0 || back[i] >= static_cast<std::int64_t>(order.size())) return false;
+    if (order[static_cast<std::size_t>(back[i])] != static_cast<std::int64_t>(i)) return false;
+  }
+  return true;
+}
+
+/// Recognises a soft-max over the channels in the three forms that exporters write: Softmax; Exp,
+/// ReduceSum, Div (PyTorch up to 1.4); Softmax between two Transposes (operator sets before 13,
+/// whose Softmax works on the last axes only).
 class SoftmaxMatcher {
  public:
   explicit SoftmaxMatcher(const onnx::ModelProto& model);
 
-  /// Nothing when the node is no part of a soft-max. Else empty, or for the part that ends it the
-  /// name of the tensor whose soft-max it makes.
+  /// std::nullopt when the node is no part of a soft-max. Else the name of the tensor whose
+  /// soft-max it completes, or an empty string when more parts must follow.
   std::optional<std::string> match(const onnx::NodeProto& node, const OnnxWeights& weights);
 
  private:
@@ -43,36 +60,13 @@ class SoftmaxMatcher {
   std::optional<std::string> match_division(const onnx::NodeProto& node);
   std::optional<std::string> match_transpose(const onnx::NodeProto& node);
 
-  /// What input number `input` is, when that is a part in this stage.
+  /// The part that makes input number `input`, if it is in this stage; else null.
   [[nodiscard]] const Part* part(const onnx::NodeProto& node, int input, Stage stage) const;
   std::optional<std::string> keep(const onnx::NodeProto& node, Part part);
 
   std::int64_t operator_set_ = 0;
   std::map<std::string, Part> parts_;
 };
-
-namespace {
-
-using Order = std::vector<std::int64_t>;
-
-constexpr std::int64_t channel_axis = 1;
-/// The Softmax of this set works along one axis; before, along all from its axis on.
-constexpr std::int64_t one_axis_set = 13;
-
-/// Both ways in which exporters bring the channels to the end, and how they put them back.
-bool channels_last(const Order& order) {
-  return order == Order{0, 2, 3, 1} || order == Order{0, 3, 2, 1};
-}
-bool undoes(const Order& back, const Order& order) {
-  if (back.size() != order.size()) return false;
-  for (std::size_t i = 0; i < order.size(); ++i) {
-    if (back[i] < 0 || back[i] >= static_cast<std::int64_t>(order.size())) return false;
-    if (order[static_cast<std::size_t>(back[i])] != static_cast<std::int64_t>(i)) return false;
-  }
-  return true;
-}
-
-}  // namespace
 
 SoftmaxMatcher::SoftmaxMatcher(const onnx::ModelProto& model) {
   for (const onnx::OperatorSetIdProto& set : model.opset_import()) {
@@ -106,7 +100,7 @@ std::optional<std::string> SoftmaxMatcher::keep(const onnx::NodeProto& node, Par
 
 std::optional<std::string> SoftmaxMatcher::match_softmax(const onnx::NodeProto& node) {
   const std::int64_t axis =
-      OnnxAttributes(node).whole("axis", operator_set_ >= one_axis_set ? -1 : 1);
+      OnnxAttributes(node).int_value("axis", operator_set_ >= one_axis_set ? -1 : 1);
   if (const Part* const before = part(node, 0, Stage::transposed)) {
     if (axis != -1 && axis != 3) return std::nullopt;
     return keep(node, {Stage::normalised, before->scores, before->order});
@@ -125,8 +119,9 @@ std::optional<std::string> SoftmaxMatcher::match_sum(const onnx::NodeProto& node
   const Part* const before = part(node, 0, Stage::exponential);
   const OnnxAttributes attributes(node);
   const Order axes =
-      node.input_size() > 1 ? weights.whole_numbers(node, 1) : attributes.whole_numbers("axes");
-  const bool over_channels = axes == Order{channel_axis} && attributes.whole("keepdims", 1) == 1;
+      node.input_size() > 1 ? weights.int_values(node, 1) : attributes.int_values("axes");
+  const bool over_channels =
+      axes == Order{channel_axis} && attributes.int_value("keepdims", 1) == 1;
   if (before == nullptr || !over_channels) return std::nullopt;
   return keep(node, {Stage::sum, before->scores});
 }
@@ -140,18 +135,16 @@ std::optional<std::string> SoftmaxMatcher::match_division(const onnx::NodeProto&
 }
 
 std::optional<std::string> SoftmaxMatcher::match_transpose(const onnx::NodeProto& node) {
-  const Order order = OnnxAttributes(node).whole_numbers("perm");
+  const Order order = OnnxAttributes(node).int_values("perm");
   if (const Part* const before = part(node, 0, Stage::normalised)) {
-    if (undoes(order, before->order)) return before->scores;
+    if (is_inverse(order, before->order)) return before->scores;
     return std::nullopt;
   }
   if (!channels_last(order)) return std::nullopt;
   return keep(node, {Stage::transposed, node.input(0), order});
 }
 
-namespace {
-
-/// Takes the nodes of an ONNX graph one by one.
+/// Builds a NetworkGraph from the nodes of an ONNX graph, in their order.
 class GraphReader {
  public:
   explicit GraphReader(const onnx::ModelProto& model)
@@ -171,9 +164,9 @@ class GraphReader {
     if (kind == "Constant") {
       read_constant(node);
     } else if (kind == "Identity" || kind == "Dropout") {
-      read_renaming(node);
+      read_alias(node);
     } else if (const std::optional<std::string> scores = softmax_.match(node, weights_)) {
-      // The last part of a soft-max makes the layer, the others nothing.
+      // The node that completes a soft-max becomes the layer.
       if (!scores->empty()) add_layer(node, Softmax{}, {tensor(*scores)});
     } else if (kind == "Add") {
       add_layer(node, Add{}, {tensor(input_name(node, 0)), tensor(input_name(node, 1))});
@@ -190,8 +183,8 @@ class GraphReader {
     }
   }
 
-  /// Layers that do nothing when a network is run.
-  void read_renaming(const onnx::NodeProto& node) {
+  /// A node without effect at inference: its output is another name for its input.
+  void read_alias(const onnx::NodeProto& node) {
     const std::string& from = input_name(node, 0);
     const std::string& to = node.output(0);
     if (weights_.has(from)) {

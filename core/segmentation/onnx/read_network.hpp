@@ -5,10 +5,10 @@
 
 namespace stillmap {
 
-/// The network of an ONNX file as a graph; shapes are not known yet. Soft-maxes that were exported
-/// in parts (Exp, ReduceSum, Div; or between two Transposes) are put together again.
+/// The network of an ONNX file as a graph, without shapes. A soft-max that was exported in parts
+/// (Exp, ReduceSum, Div, or between two Transposes) becomes one layer.
 ///
-/// Throws UnsupportedLayer naming the operator, or GraphFault.
+/// Throws UnsupportedLayer for an operator that is not supported, or GraphFault.
 [[nodiscard]] NetworkGraph read_network(const OnnxFile& file);
 
 }  // namespace stillmap

@@ -1,4 +1,4 @@
-#include "core/segmentation/onednn/row_layout.hpp"
+#include "core/segmentation/onednn/row_interleaving.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,12 +10,12 @@
 namespace stillmap {
 namespace {
 
-constexpr RowLayout layout{
+constexpr RowInterleaving layout{
     .rows = 3, .phases = 2, .chunk = 37, .chunks = 5, .factor = 0.7F, .sum_factor = 1.3F};
 constexpr std::size_t size = layout.rows * layout.phases * layout.chunk * layout.chunks;
 
 /// As the contract writes it, value by value.
-std::vector<double> by_hand(const RowLayout& how, const auto& from, const auto& to) {
+std::vector<double> by_hand(const RowInterleaving& how, const auto& from, const auto& to) {
   std::vector<double> result;
   for (std::size_t row = 0; row < how.rows * how.phases; ++row) {
     for (std::size_t i = 0; i < how.chunk * how.chunks; ++i) {
@@ -31,36 +31,36 @@ std::vector<double> by_hand(const RowLayout& how, const auto& from, const auto& 
   return result;
 }
 
-RowLayout without_sum() {
-  RowLayout plain = layout;
+RowInterleaving without_sum() {
+  RowInterleaving plain = layout;
   plain.sum_factor.reset();
   return plain;
 }
 
-TEST(RowLayout, PutsPhasesUnderEachOther) {
+TEST(RowInterleaving, PutsPhasesUnderEachOther) {
   std::mt19937 random(1);
   std::uniform_real_distribution<float> any(-3.0F, 3.0F);
   std::vector<float> from(size), to(size);
   std::ranges::generate(from, [&] { return any(random); });
   std::ranges::generate(to, [&] { return any(random); });
-  for (const RowLayout& how : {layout, without_sum()}) {
+  for (const RowInterleaving& how : {layout, without_sum()}) {
     const std::vector<double> expected = by_hand(how, from, to);
     std::vector<float> result = to;
-    lay_out_rows(how, from.data(), result.data());
+    interleave_rows(how, from.data(), result.data());
     for (std::size_t i = 0; i < size; ++i) EXPECT_NEAR(result[i], expected[i], 1e-5);
   }
 }
 
-TEST(RowLayout, RoundsAndCutsOffIntegers) {
+TEST(RowInterleaving, RoundsAndCutsOffIntegers) {
   std::mt19937 random(2);
   std::uniform_int_distribution<int> any(-128, 127);
   std::vector<std::int8_t> from(size), to(size);
   std::ranges::generate(from, [&] { return static_cast<std::int8_t>(any(random)); });
   std::ranges::generate(to, [&] { return static_cast<std::int8_t>(any(random)); });
-  for (const RowLayout& how : {layout, without_sum()}) {
+  for (const RowInterleaving& how : {layout, without_sum()}) {
     const std::vector<double> expected = by_hand(how, from, to);
     std::vector<std::int8_t> result = to;
-    lay_out_rows(how, from.data(), result.data());
+    interleave_rows(how, from.data(), result.data());
     bool cut_off = false;
     for (std::size_t i = 0; i < size; ++i) {
       const double inside = std::clamp(expected[i], -128.0, 127.0);
