@@ -5,8 +5,8 @@
 #include "config/loaders/model_file.hpp"
 #include "config/loaders/model_folder.hpp"
 #include "core/lidar/range_image.hpp"
-#include "core/segmentation/open_network.hpp"
 #include "core/segmentation/network_input.hpp"
+#include "core/segmentation/open_network.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -52,8 +52,9 @@ ModelDescription load_model(const ModelArguments& arguments) {
 }
 
 ModelDescription load_uncalibrated_model(const ModelArguments& arguments) {
-  return load_by(arguments,
-                 [](const std::filesystem::path& f) { return load_uncalibrated_model(f); });
+  return load_by(arguments, [](const std::filesystem::path& f) {
+    return stillmap::load_uncalibrated_model(f);
+  });
 }
 
 std::vector<ScanSample> choose_scans(const std::vector<ScanDataset>& datasets, std::size_t count) {
