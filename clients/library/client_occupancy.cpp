@@ -1,7 +1,7 @@
 #include <utility>
 
 #include "clients/library/connection.hpp"
-#include "core/occupancy/octomap_check.hpp"
+#include "core/occupancy/octomap_data.hpp"
 #include "idl/conversions/occupancy_query.hpp"
 #include "idl/conversions/octomap.hpp"
 

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "clients/library/connection.hpp"
-#include "core/occupancy/octomap_check.hpp"
+#include "core/occupancy/octomap_data.hpp"
 #include "idl/conversions/cloud_reader.hpp"
 #include "idl/conversions/occupancy_grid.hpp"
 #include "idl/conversions/octomap.hpp"

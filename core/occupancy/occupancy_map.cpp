@@ -8,9 +8,8 @@
 #include <stdexcept>
 
 #include "core/map/voxel_grid.hpp"
-#include "core/occupancy/octomap_check.hpp"
-#include "core/occupancy/octree_columns.hpp"
-#include "core/occupancy/octree_query.hpp"
+#include "core/occupancy/occupancy_query.hpp"
+#include "core/occupancy/octomap_data.hpp"
 #include "core/occupancy/octree_update.hpp"
 #include "core/occupancy/scan_update.hpp"
 

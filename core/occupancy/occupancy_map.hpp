@@ -9,7 +9,6 @@
 #include "core/occupancy/occupancy_config.hpp"
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"
-#include "core/occupancy/scan_update_options.hpp"
 
 namespace stillmap {
 

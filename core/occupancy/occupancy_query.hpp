@@ -1,9 +1,14 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
+
+namespace octomap {
+class OcTree;
+}
 
 namespace stillmap {
 
@@ -82,5 +87,17 @@ struct OccupancyAnswers {
   std::vector<BoxOccupancy> boxes;
   std::vector<RayOccupancy> rays;
 };
+
+// Positions are in the map frame [m]. What cannot be asked for (not finite, outside the octree)
+// comes back with a fault.
+
+[[nodiscard]] PointOccupancy query_point(const octomap::OcTree& octree,
+                                         const Eigen::Vector3d& p_map);
+
+/// At most `max_voxels` occupied voxels are listed; all are counted.
+[[nodiscard]] BoxOccupancy query_box(const octomap::OcTree& octree,
+                                     const Eigen::AlignedBox3d& box_map, std::size_t max_voxels);
+
+[[nodiscard]] RayOccupancy cast_ray(const octomap::OcTree& octree, const RayQuery& ray);
 
 }  // namespace stillmap

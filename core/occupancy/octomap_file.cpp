@@ -7,7 +7,7 @@
 #include <sstream>
 #include <system_error>
 
-#include "core/occupancy/octomap_check.hpp"
+#include "core/occupancy/octomap_data.hpp"
 
 namespace stillmap {
 namespace {

@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "core/occupancy/occupancy_map.hpp"
-#include "core/occupancy/octomap_check.hpp"
+#include "core/occupancy/octomap_data.hpp"
 #include "core/occupancy/octomap_file.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"

@@ -1,4 +1,4 @@
-#include "core/occupancy/octomap_check.hpp"
+#include "core/occupancy/octomap_data.hpp"
 
 #include <bit>
 #include <cmath>
