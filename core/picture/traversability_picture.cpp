@@ -11,7 +11,7 @@
 #include "core/picture/picture_overlay.hpp"
 #include "core/picture/picture_raster.hpp"
 #include "core/picture/png_file.hpp"
-#include "core/traversability/traversability_summary.hpp"
+#include "core/traversability/traversability_query.hpp"
 
 namespace stillmap {
 namespace {

@@ -4,7 +4,6 @@
 #include <span>
 
 #include "core/lidar/trajectory.hpp"
-#include "core/traversability/footprint.hpp"
 #include "core/traversability/traversability_view.hpp"
 
 namespace stillmap {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "core/traversability/nearest_traversable.hpp"
+#include "core/traversability/traversability_view.hpp"
 #include "core/traversability/path_check.hpp"
 
 namespace stillmap {

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "core/traversability/cell_grid.hpp"
-#include "core/traversability/footprint.hpp"
 #include "core/traversability/traversability_view.hpp"
 
 namespace stillmap {

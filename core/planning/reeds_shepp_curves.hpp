@@ -3,7 +3,7 @@
 #include <functional>
 #include <memory>
 
-#include "core/traversability/footprint.hpp"
+#include "core/traversability/traversability_view.hpp"
 
 namespace stillmap {
 

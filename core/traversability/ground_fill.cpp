@@ -1,11 +1,11 @@
-#include "core/traversability/ground_fill.hpp"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
 #include <optional>
 #include <vector>
+
+#include "core/traversability/ground_estimate.hpp"
 
 namespace stillmap {
 namespace {

@@ -2,10 +2,55 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <opencv2/imgproc.hpp>
 #include <sstream>
 
 namespace stillmap {
 namespace {
+
+// Cells along a side of a block. A shape of many corners is cut down to the few near a block once,
+// instead of asked as a whole for every cell.
+constexpr std::uint32_t block_side = 32;
+
+/// A height at which a point of the box is inside whenever one at another height is.
+double level_of(const Eigen::AlignedBox3d& bounds_map) {
+  const double low = bounds_map.min().z();
+  const double high = bounds_map.max().z();
+  // The middle of a sphere is where it is widest.
+  if (std::isfinite(low) && std::isfinite(high)) return 0.5 * (low + high);
+  return std::clamp(0.0, low, high);
+}
+
+Eigen::Vector3d at_level(const Eigen::Vector2d& p_map, double level_m) {
+  return {p_map.x(), p_map.y(), level_m};
+}
+
+/// Part of a range, in cells from the range's first.
+struct Block {
+  std::uint32_t begin_x, begin_y, end_x, end_y;
+};
+
+template <typename Visit>
+void visit_block(const CellRange& range, const Block& block, const Visit& visit) {
+  for (std::uint32_t y = block.begin_y; y < block.end_y; ++y) {
+    for (std::uint32_t x = block.begin_x; x < block.end_x; ++x) {
+      visit(static_cast<std::size_t>(y) * range.width + x,
+            CellIndex{range.first.x + static_cast<std::int32_t>(x),
+                      range.first.y + static_cast<std::int32_t>(y)});
+    }
+  }
+}
+
+Eigen::AlignedBox3d box_of(const TraversabilityView& view, const CellRange& range,
+                           const Block& block, double level_m) {
+  const auto corner = [&](std::uint32_t x, std::uint32_t y) {
+    return at_level(view.cell_m * Eigen::Vector2d(static_cast<double>(range.first.x) + x,
+                                                  static_cast<double>(range.first.y) + y),
+                    level_m);
+  };
+  return {corner(block.begin_x, block.begin_y), corner(block.end_x, block.end_y)};
+}
 
 OccupancyGrid refused(TraversabilityStatus status, const std::string& reason) {
   OccupancyGrid grid;
@@ -59,7 +104,76 @@ void fill(OccupancyGrid& grid, const TraversabilityView& view, const Traversabil
   });
 }
 
+cv::Mat1b free_cells(const OccupancyGrid& grid) {
+  cv::Mat1b free(static_cast<int>(grid.height), static_cast<int>(grid.width));
+  for (int y = 0; y < free.rows; ++y) {
+    for (int x = 0; x < free.cols; ++x) {
+      const std::int8_t value =
+          grid.at(static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
+      free(y, x) = value >= 0 && value < occupancy_inscribed ? 255 : 0;
+    }
+  }
+  return free;
+}
+
+/// Twice the area, positive when anticlockwise.
+double signed_area_m2(const TraversableRing& ring) {
+  double twice = 0.0;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
+    const Eigen::Vector2d& a = ring[i];
+    const Eigen::Vector2d& b = ring[(i + 1) % ring.size()];
+    twice += a.x() * b.y() - b.x() * a.y();
+  }
+  return 0.5 * twice;
+}
+
+TraversableRing ring_of(const std::vector<cv::Point>& contour, const OccupancyGrid& grid,
+                        bool is_anticlockwise) {
+  TraversableRing ring;
+  for (const cv::Point& cell : contour) {
+    ring.push_back(grid.origin_map +
+                   grid.resolution_m * Eigen::Vector2d(cell.x + 0.5, cell.y + 0.5));
+  }
+  if ((signed_area_m2(ring) > 0.0) != is_anticlockwise) std::reverse(ring.begin(), ring.end());
+  return ring;
+}
+
 }  // namespace
+
+TraversabilityRegion whole_map_region() {
+  const Eigen::Vector2d infinite =
+      Eigen::Vector2d::Constant(std::numeric_limits<double>::infinity());
+  return {Eigen::AlignedBox2d(-infinite, infinite), {}};
+}
+
+TraversabilityRegion traversability_region(const Region& region) {
+  RegionShape shape(region);
+  const Eigen::AlignedBox3d& bounds_map = shape.bounds_map();
+  const Eigen::AlignedBox2d box_map(bounds_map.min().head<2>(), bounds_map.max().head<2>());
+  if (std::holds_alternative<BoxRegion>(region)) return {box_map, {}};
+  return {box_map, std::move(shape)};
+}
+
+void visit_cells(const TraversabilityView& view, const TraversabilityRegion& region,
+                 const CellRange& range, const std::function<void(std::size_t, CellIndex)>& visit) {
+  if (!region.shape) {
+    visit_block(range, {0, 0, range.width, range.height}, visit);
+    return;
+  }
+  const double level_m = level_of(region.shape->bounds_map());
+  for (std::uint32_t y = 0; y < range.height; y += block_side) {
+    for (std::uint32_t x = 0; x < range.width; x += block_side) {
+      const Block block{x, y, std::min(x + block_side, range.width),
+                        std::min(y + block_side, range.height)};
+      const Eigen::AlignedBox3d box_map = box_of(view, range, block, level_m);
+      if (!region.shape->may_intersect(box_map)) continue;
+      const RegionShape near = region.shape->restricted_to(box_map);
+      visit_block(range, block, [&](std::size_t i, CellIndex cell) {
+        if (near.contains(at_level(view.centre_of(cell), level_m))) visit(i, cell);
+      });
+    }
+  }
+}
 
 CellRange range_of(const OccupancyGrid& grid) {
   const Eigen::Vector2d first = (grid.origin_map / grid.resolution_m).array().round();
@@ -95,6 +209,33 @@ OccupancyGrid occupancy_grid(const TraversabilityView& view, const Traversabilit
   grid.map_version = view.version;
   fill(grid, view, region);
   return grid;
+}
+
+double area_m2(const TraversablePolygon& polygon) {
+  double area = std::abs(signed_area_m2(polygon.outer));
+  for (const TraversableRing& hole : polygon.holes) area -= std::abs(signed_area_m2(hole));
+  return area;
+}
+
+std::vector<TraversablePolygon> free_outlines(const OccupancyGrid& grid, double min_area_m2) {
+  if (grid.data.empty()) return {};
+  std::vector<std::vector<cv::Point>> contours;
+  // Of every contour: the next and the previous one of its level, its first child, its parent.
+  std::vector<cv::Vec4i> family;
+  cv::findContours(free_cells(grid), contours, family, cv::RETR_CCOMP, cv::CHAIN_APPROX_SIMPLE);
+  std::vector<TraversablePolygon> polygons;
+  for (std::size_t i = 0; i < contours.size(); ++i) {
+    const bool is_hole = family[i][3] >= 0;
+    if (is_hole) continue;
+    TraversablePolygon polygon;
+    polygon.outer = ring_of(contours[i], grid, true);
+    for (int hole = family[i][2]; hole >= 0; hole = family[static_cast<std::size_t>(hole)][0]) {
+      polygon.holes.push_back(ring_of(contours[static_cast<std::size_t>(hole)], grid, false));
+    }
+    if (area_m2(polygon) >= min_area_m2) polygons.push_back(std::move(polygon));
+  }
+  std::ranges::stable_sort(polygons, std::ranges::greater{}, area_m2);
+  return polygons;
 }
 
 }  // namespace stillmap

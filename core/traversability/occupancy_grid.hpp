@@ -1,15 +1,44 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "core/traversability/path_check.hpp"
-#include "core/traversability/traversability_region.hpp"
+#include "core/map/query/region_shape.hpp"
 #include "core/traversability/traversability_view.hpp"
 
 namespace stillmap {
+
+/// Part of the map from above.
+struct TraversabilityRegion {
+  /// Map frame [m]; infinite faces end at the map's edge.
+  Eigen::AlignedBox2d box_map;
+  /// Where given, cells do not belong to it whose centre lies outside of it at every height.
+  std::optional<RegionShape> shape;
+};
+
+/// The whole map.
+[[nodiscard]] TraversabilityRegion whole_map_region();
+
+/// A region from above: its heights do not count, a sphere is its circle. Throws
+/// std::invalid_argument with region_faults(region) when there are any.
+[[nodiscard]] TraversabilityRegion traversability_region(const Region& region);
+
+/// A rectangle of cells.
+struct CellRange {
+  CellIndex first;
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+};
+
+/// Calls `visit(i, cell)` for the cells of the range that belong to the region, in any order; i is
+/// a cell's place in an array that goes row after row from the lowest y.
+void visit_cells(const TraversabilityView& view, const TraversabilityRegion& region,
+                 const CellRange& range, const std::function<void(std::size_t, CellIndex)>& visit);
 
 /// A grid as nav_msgs/OccupancyGrid has it: row after row from the lowest y, -1 unknown, 0 free
 /// and wanted, 1..98 free at a cost, 99 too near to something lethal, 100 lethal.
@@ -45,5 +74,25 @@ inline constexpr std::uint64_t max_grid_cells = 100'000'000;
 
 /// The view's cells that a grid of it is made of. @pre grid.status is ok
 [[nodiscard]] CellRange range_of(const OccupancyGrid& grid);
+
+/// One closed line; its last corner is joined to the first.
+using TraversableRing = std::vector<Eigen::Vector2d>;
+
+/// A piece of free area, map frame [m]: all inside `outer` and outside the holes.
+struct TraversablePolygon {
+  /// Anticlockwise.
+  TraversableRing outer;
+  /// Clockwise.
+  std::vector<TraversableRing> holes;
+};
+
+/// Outlines of what is free in a grid (values 0..98), the largest piece first. Lines run through
+/// the centres of the outermost free cells: nothing outside the free area is inside, and a strip
+/// one cell wide has no area. Pieces below `min_area_m2` are left out.
+[[nodiscard]] std::vector<TraversablePolygon> free_outlines(const OccupancyGrid& grid,
+                                                            double min_area_m2 = 1.0);
+
+/// Area of a polygon without its holes [m^2].
+[[nodiscard]] double area_m2(const TraversablePolygon& polygon);
 
 }  // namespace stillmap

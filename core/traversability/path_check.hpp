@@ -3,23 +3,11 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
-#include "core/traversability/footprint.hpp"
 #include "core/traversability/traversability_view.hpp"
 
 namespace stillmap {
-
-enum class TraversabilityStatus : std::uint8_t {
-  ok,
-  /// The question makes no sense: `reason` names the value and what would do.
-  invalid_request,
-  /// The answer would be too large, or the work too much; `reason` names the limit.
-  too_large,
-  /// Nothing of what was asked for exists.
-  not_found,
-};
-
-[[nodiscard]] std::string_view name(TraversabilityStatus status);
 
 /// The first place where a robot cannot follow a path.
 struct PathConflict {
@@ -61,5 +49,20 @@ inline constexpr double max_path_cells = 5e7;
 /// (inflation) do not stop it: the footprint itself decides.
 [[nodiscard]] PathCheck check_path(const TraversabilityView& view,
                                    std::span<const PlanarPose> path_map);
+
+/// Can this robot follow this path?
+struct PathQuery {
+  /// Name of the robot profile, for a server that keeps several.
+  std::string profile;
+  /// Map frame [m].
+  std::vector<Eigen::Vector2d> positions_map;
+  /// One a position: the robot turns evenly from one to the next. Or none: it drives straight ahead
+  /// from position to position and turns on the spot.
+  std::vector<double> headings_rad;
+};
+
+/// Checks the path, whatever profile it names; a conflict's `segment` counts the positions. At most
+/// `max_path_poses` positions, half as many without headings; without, there must be two.
+[[nodiscard]] PathCheck check_path(const TraversabilityView& view, const PathQuery& query);
 
 }  // namespace stillmap

@@ -1,12 +1,107 @@
 #include "core/traversability/surface_tile.hpp"
 
 #include <algorithm>
+#include <array>
+#include <cassert>
 #include <cmath>
+#include <optional>
+#include <utility>
 
-#include "core/traversability/ground_fill.hpp"
+#include "core/traversability/ground_estimate.hpp"
 
 namespace stillmap {
 namespace {
+
+/// The plane takes the ground this far away [m].
+constexpr double plane_reach_m = 0.5;
+/// Cells out, on either side, from which the rise without the step is taken.
+constexpr int rise_cells = 3;
+
+int plane_reach_cells(double cell_m) {
+  return std::max(1, static_cast<int>(std::lround(plane_reach_m / cell_m)));
+}
+
+std::optional<double> height_at(const GroundGrid& ground, int x, int y) {
+  if (!ground.contains(x, y) || !ground(x, y).is_known()) return std::nullopt;
+  return ground(x, y).height_m;
+}
+
+/// Sums for a plane z = a x + b y + c around a cell.
+struct PlaneFit {
+  double x = 0.0, y = 0.0, z = 0.0;
+  double xx = 0.0, xy = 0.0, yy = 0.0;
+  double xz = 0.0, yz = 0.0, zz = 0.0;
+  int count = 0;
+
+  void add(double x_m, double y_m, double z_m) {
+    x += x_m, y += y_m, z += z_m;
+    xx += x_m * x_m, xy += x_m * y_m, yy += y_m * y_m;
+    xz += x_m * z_m, yz += y_m * z_m, zz += z_m * z_m;
+    ++count;
+  }
+};
+
+PlaneFit plane_around(const GroundGrid& ground, int x0, int y0, double cell_m) {
+  const int reach = plane_reach_cells(cell_m);
+  const GroundCell& middle = ground(x0, y0);
+  PlaneFit fit;
+  for (int y = std::max(0, y0 - reach); y <= std::min(y0 + reach, ground.height() - 1); ++y) {
+    for (int x = std::max(0, x0 - reach); x <= std::min(x0 + reach, ground.width() - 1); ++x) {
+      const GroundCell& cell = ground(x, y);
+      if (!cell.is_known() || cell.label != middle.label) continue;
+      // Heights from the middle's: small numbers keep the sums exact enough.
+      fit.add((x - x0) * cell_m, (y - y0) * cell_m, cell.height_m - middle.height_m);
+    }
+  }
+  return fit;
+}
+
+void set_plane(const PlaneFit& fit, SurfaceShape& shape) {
+  constexpr int enough = 5;
+  if (fit.count < enough) return;
+  // About the mean, the plane's height is one unknown less.
+  const double n = fit.count;
+  const double xx = fit.xx - fit.x * fit.x / n;
+  const double xy = fit.xy - fit.x * fit.y / n;
+  const double yy = fit.yy - fit.y * fit.y / n;
+  const double xz = fit.xz - fit.x * fit.z / n;
+  const double yz = fit.yz - fit.y * fit.z / n;
+  const double zz = fit.zz - fit.z * fit.z / n;
+  const double determinant = xx * yy - xy * xy;
+  // Cells in a row do not carry a plane.
+  if (!(determinant > 1e-6 * (xx + yy) * (xx + yy))) return;
+  const double a = (yy * xz - xy * yz) / determinant;
+  const double b = (xx * yz - xy * xz) / determinant;
+  shape.slope = static_cast<float>(std::atan(std::hypot(a, b)));
+  const double rest = std::max(0.0, zz - a * xz - b * yz);
+  shape.roughness_m = static_cast<float>(std::sqrt(rest / n));
+}
+
+/// The rise over one cell length, on one side: from `near` cells out to `far` cells out.
+std::optional<double> rise_beyond(const GroundGrid& ground, int x, int y, std::pair<int, int> d,
+                                  int sign) {
+  const auto near_m = height_at(ground, x + sign * d.first, y + sign * d.second);
+  const auto far_m =
+      height_at(ground, x + sign * rise_cells * d.first, y + sign * rise_cells * d.second);
+  if (!near_m || !far_m) return std::nullopt;
+  return sign * (*far_m - *near_m) / (rise_cells - 1);
+}
+
+double step_along(const GroundGrid& ground, int x, int y, std::pair<int, int> d) {
+  const double here_m = ground(x, y).height_m;
+  const auto before_m = height_at(ground, x - d.first, y - d.second);
+  const auto after_m = height_at(ground, x + d.first, y + d.second);
+  const int cells = (before_m ? 1 : 0) + (after_m ? 1 : 0);
+  const double difference_m = after_m.value_or(here_m) - before_m.value_or(here_m);
+  // What the steeper side explains; on a ramp's foot that is all of it.
+  double explained_m = 0.0;
+  for (const int sign : {-1, 1}) {
+    const auto rise_m = rise_beyond(ground, x, y, d, sign);
+    if (!rise_m || *rise_m * difference_m <= 0.0) continue;
+    if (std::abs(*rise_m * cells) > std::abs(explained_m)) explained_m = *rise_m * cells;
+  }
+  return std::max(0.0, std::abs(difference_m) - std::abs(explained_m));
+}
 
 static_assert(surface_reach_m > max_filled_gap_m + 1.0, "both ends of a gap need their slopes");
 
@@ -19,6 +114,19 @@ void add_things(SurfaceTile& tile, const GroundCell& ground, Column column) {
 }
 
 }  // namespace
+
+int shape_reach_cells(double cell_m) { return std::max(rise_cells, plane_reach_cells(cell_m)); }
+
+SurfaceShape shape_at(const GroundGrid& ground, int x, int y, double cell_m) {
+  assert(ground(x, y).is_known());
+  SurfaceShape shape;
+  set_plane(plane_around(ground, x, y, cell_m), shape);
+  constexpr std::array<std::pair<int, int>, 4> lines{{{1, 0}, {1, 1}, {0, 1}, {-1, 1}}};
+  for (const auto& line : lines) {
+    shape.step_m = std::max(shape.step_m, static_cast<float>(step_along(ground, x, y, line)));
+  }
+  return shape;
+}
 
 SurfaceTile make_surface(const TileNeighbourhood<ColumnTile>& columns, double cell_m) {
   const int margin = std::min(columns.side, static_cast<int>(std::ceil(surface_reach_m / cell_m)));

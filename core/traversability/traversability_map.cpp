@@ -2,18 +2,83 @@
 
 #include <tbb/parallel_for.h>
 
+#include <algorithm>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <set>
 #include <stdexcept>
 #include <utility>
 
 #include "core/map/voxel_grid.hpp"
-#include "core/traversability/changed_cells.hpp"
 #include "core/traversability/column_tile.hpp"
 
 namespace stillmap {
 namespace {
+
+/// A rectangle of a tile's cells, both ends included.
+struct CellBox {
+  int min_x = 0, min_y = 0, max_x = 0, max_y = 0;
+};
+
+/// Where tiles changed.
+using ChangedCells = std::map<TileId, CellBox>;
+
+bool is_same(Column a, Column b) { return std::ranges::equal(a, b); }
+bool is_same(const SurfaceTile::View& a, const SurfaceTile::View& b) {
+  return *a.cell == *b.cell && std::ranges::equal(a.object_heights_m, b.object_heights_m);
+}
+
+template <typename TileT>
+std::optional<CellBox> difference(const TileT& before, const TileT& after) {
+  std::optional<CellBox> box;
+  for (int y = 0; y < after.side; ++y) {
+    for (int x = 0; x < after.side; ++x) {
+      if (is_same(before.at(x, y), after.at(x, y))) continue;
+      if (!box) box = CellBox{x, y, x, y};
+      box->min_x = std::min(box->min_x, x);
+      box->max_x = std::max(box->max_x, x);
+      box->max_y = y;
+    }
+  }
+  return box;
+}
+
+/// Notes in `changes` the smallest box around the cells in which two states of a tile differ. Null
+/// stands for a tile that is not there; a whole tile that comes or goes has changed.
+template <typename TileT>
+void note_change(ChangedCells& changes, TileId id, const TileT* before, const TileT* after) {
+  if (before != nullptr && after != nullptr) {
+    if (const auto box = difference(*before, *after)) changes[id] = *box;
+  } else if (before != nullptr || after != nullptr) {
+    const int last = (before != nullptr ? before : after)->side - 1;
+    changes[id] = {0, 0, last, last};
+  }
+}
+
+/// Whether a change between `first` and `last` reaches the tile `offset` (-1, 0, 1) tiles on.
+bool reaches(int first, int last, int offset, int side, int margin) {
+  if (offset < 0) return first < margin;
+  if (offset > 0) return last >= side - margin;
+  return true;
+}
+
+/// The tiles in which or around which (closer than `margin` cells, margin <= side) something
+/// changed.
+std::set<TileId> affected_tiles(const ChangedCells& changes, int side, int margin) {
+  std::set<TileId> affected;
+  for (const auto& [id, box] : changes) {
+    for (int dy = -1; dy <= 1; ++dy) {
+      for (int dx = -1; dx <= 1; ++dx) {
+        if (reaches(box.min_x, box.max_x, dx, side, margin) &&
+            reaches(box.min_y, box.max_y, dy, side, margin)) {
+          affected.insert({id.x + dx, id.y + dy});
+        }
+      }
+    }
+  }
+  return affected;
+}
 
 /// All that is known of a tile.
 struct TileState {
@@ -122,7 +187,7 @@ void TraversabilityMap::State::drop_missing(const MapSnapshot& map, ChangedCells
   for (const auto& tile : map.tiles) present.insert(tile->info.id);
   std::erase_if(tiles, [&](const auto& entry) {
     if (present.contains(entry.first)) return false;
-    note_change(changes, entry.first, entry.second.columns.get(), nullptr);
+    note_change<ColumnTile>(changes, entry.first, entry.second.columns.get(), nullptr);
     return true;
   });
 }

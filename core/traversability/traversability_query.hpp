@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <string>
@@ -7,7 +8,7 @@
 
 #include "core/map/query/region.hpp"
 #include "core/traversability/occupancy_grid.hpp"
-#include "core/traversability/traversable_outline.hpp"
+#include "core/traversability/traversability_view.hpp"
 
 namespace stillmap {
 
@@ -48,5 +49,28 @@ struct TraversabilityAnswer {
 /// request.
 [[nodiscard]] TraversabilityAnswer query_traversability(const TraversabilityView& view,
                                                         const TraversabilityQuery& query);
+
+/// How much of an area is in which state [cells].
+struct TraversabilitySummary {
+  std::uint64_t free = 0;
+  /// Of the free ones.
+  std::uint64_t inferred = 0;
+  /// Unknown cells of the tiles, or of an answer's grid; most of them lie behind walls.
+  std::uint64_t unknown = 0;
+  /// By `BlockReason`.
+  std::array<std::uint64_t, block_reason_count> lethal{};
+
+  [[nodiscard]] std::uint64_t all_lethal() const;
+};
+
+[[nodiscard]] TraversabilitySummary summarize(const TraversabilityView& view);
+/// Of an answer with a grid.
+[[nodiscard]] TraversabilitySummary summarize(const TraversabilityAnswer& answer);
+
+/// The cells of an answer as a view, to draw, count or ask further. Of the surface, only the height
+/// of known ground is in it; clearances are not (0). @pre the answer's status is ok and it has a
+/// grid.
+[[nodiscard]] TraversabilityView view_of_answer(const TraversabilityAnswer& answer,
+                                                const RobotProfile& profile);
 
 }  // namespace stillmap

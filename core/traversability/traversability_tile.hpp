@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "core/map/tile.hpp"
+#include "core/traversability/cell_grid.hpp"
 #include "core/traversability/robot_profile.hpp"
 #include "core/traversability/surface_tile.hpp"
-#include "core/traversability/tile_neighbourhood.hpp"
 
 namespace stillmap {
 

@@ -1,9 +1,13 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/traversability/traversability_tile.hpp"
@@ -57,5 +61,50 @@ class CellLookup {
   std::optional<TileId> last_id_;
   const TraversabilityTile* last_ = nullptr;
 };
+
+/// Where a robot stands: the point that its profile's poses speak of, and its heading from x
+/// towards y.
+struct PlanarPose {
+  Eigen::Vector2d position_map = Eigen::Vector2d::Zero();
+  double heading_rad = 0.0;
+};
+
+/// Calls `visit(CellIndex)` for the cells that a robot at `pose` covers: those whose centre is in
+/// its footprint made half a cell larger on every side, so that none that it touches is left out
+/// but at its corners. @pre the view's cell_of(pose.position_map) is a cell.
+void visit_footprint(const TraversabilityView& view, const PlanarPose& pose,
+                     const std::function<void(CellIndex)>& visit);
+
+enum class TraversabilityStatus : std::uint8_t {
+  ok,
+  /// The question makes no sense: `reason` names the value and what would do.
+  invalid_request,
+  /// The answer would be too large, or the work too much; `reason` names the limit.
+  too_large,
+  /// Nothing of what was asked for exists.
+  not_found,
+};
+
+[[nodiscard]] std::string_view name(TraversabilityStatus status);
+
+struct NearestTraversable {
+  TraversabilityStatus status = TraversabilityStatus::ok;
+  std::string reason;
+  /// Centre of the nearest free cell, map frame [m].
+  Eigen::Vector2d position_map = Eigen::Vector2d::Zero();
+  /// Of the ground there [m].
+  double height_m = 0.0;
+  /// From the place asked for [m].
+  double distance_m = 0.0;
+  TraversabilityCell cell;
+  std::uint64_t map_version = 0;
+};
+
+/// The free cell nearest to a place, at most `max_distance_m` away. Free cells keep the inscribed
+/// radius from everything lethal: with some heading, the robot can stand there. Inferred ground
+/// counts, unknown ground does not.
+[[nodiscard]] NearestTraversable nearest_traversable(const TraversabilityView& view,
+                                                     const Eigen::Vector2d& position_map,
+                                                     double max_distance_m = 100.0);
 
 }  // namespace stillmap

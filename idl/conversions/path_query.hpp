@@ -3,8 +3,8 @@
 #include <optional>
 #include <string>
 
-#include "core/traversability/nearest_traversable.hpp"
-#include "core/traversability/path_query.hpp"
+#include "core/traversability/traversability_view.hpp"
+#include "core/traversability/path_check.hpp"
 #include "traversable_area.h"
 
 namespace stillmap::wire {

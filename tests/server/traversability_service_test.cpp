@@ -5,8 +5,7 @@
 #include <limits>
 #include <mutex>
 
-#include "core/traversability/traversability_answer_view.hpp"
-#include "core/traversability/traversability_summary.hpp"
+#include "core/traversability/traversability_query.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {

@@ -1,4 +1,4 @@
-#include "core/traversability/ground_fill.hpp"
+#include "core/traversability/ground_estimate.hpp"
 
 #include <gtest/gtest.h>
 

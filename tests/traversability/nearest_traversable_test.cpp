@@ -1,4 +1,4 @@
-#include "core/traversability/nearest_traversable.hpp"
+#include "core/traversability/traversability_view.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

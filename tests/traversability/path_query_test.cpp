@@ -1,4 +1,4 @@
-#include "core/traversability/path_query.hpp"
+#include "core/traversability/path_check.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "core/traversability/surface_shape.hpp"
+#include "core/traversability/surface_tile.hpp"
 
 #include <gtest/gtest.h>
 

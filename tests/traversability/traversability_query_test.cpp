@@ -7,8 +7,6 @@
 #include <limits>
 
 #include "core/map/query/region_shape.hpp"
-#include "core/traversability/traversability_answer_view.hpp"
-#include "core/traversability/traversability_summary.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
 namespace stillmap {

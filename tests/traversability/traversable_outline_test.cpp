@@ -1,4 +1,4 @@
-#include "core/traversability/traversable_outline.hpp"
+#include "core/traversability/occupancy_grid.hpp"
 
 #include <gtest/gtest.h>
 

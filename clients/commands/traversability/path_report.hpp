@@ -3,7 +3,7 @@
 #include <nlohmann/json_fwd.hpp>
 #include <string>
 
-#include "core/traversability/nearest_traversable.hpp"
+#include "core/traversability/traversability_view.hpp"
 #include "core/traversability/path_check.hpp"
 
 namespace stillmap::cli {

@@ -5,7 +5,7 @@
 #include <string>
 
 #include "core/traversability/traversability_map.hpp"
-#include "core/traversability/traversability_summary.hpp"
+#include "core/traversability/traversability_query.hpp"
 
 namespace stillmap::cli {
 

@@ -11,7 +11,7 @@
 #include "clients/commands/traversability/traversability_source.hpp"
 #include "core/picture/traversability_picture.hpp"
 #include "core/traversability/nav2_map.hpp"
-#include "core/traversability/traversability_answer_view.hpp"
+#include "core/traversability/traversability_query.hpp"
 
 namespace stillmap::cli {
 namespace {
