@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/planning/path_plan.hpp"
+#include "core/planning/path_planner.hpp"
 #include "core/traversability/traversability_view.hpp"
 
 namespace stillmap {

@@ -1,12 +1,14 @@
 #include "core/planning/path_planner.hpp"
 
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
-#include "core/planning/best_path.hpp"
 #include "core/planning/coarse_route.hpp"
+#include "core/planning/path_search.hpp"
 #include "core/planning/path_smoother.hpp"
 
 namespace stillmap {
@@ -122,6 +124,73 @@ bool take_path(const TraversabilityView& view, const std::vector<PathPoint>& pat
   return false;
 }
 
+struct FoundPath {
+  std::vector<PathPoint> poses;
+  /// Else it leads to the place nearest to the goal that was reached.
+  bool reaches_goal = false;
+};
+
+/// Near what the coarse route costs, with some way to turn round at both ends.
+bool is_good(const FoundPath& path, const CoarseRoute& route, const RobotProfile& profile) {
+  constexpr double factor = 1.1;
+  constexpr double turns_in_radii = 4.0;
+  return path.reaches_goal &&
+         path.poses.back().cost <
+             factor * route.cost + turns_in_radii * profile.min_turning_radius_m;
+}
+
+bool is_better(const FoundPath& a, const FoundPath& b) {
+  if (a.reaches_goal != b.reaches_goal) return a.reaches_goal;
+  return a.poses.back().cost < b.poses.back().cost;
+}
+
+std::vector<PathPoint> smoothed(const CollisionChecker& checker, std::vector<PathPoint> path,
+                                std::span<const PlanarPose> goals, int tries,
+                                const PlanningConfig& config) {
+  return smooth_path(checker, std::move(path), goals, tries, config.seed, config.should_stop);
+}
+
+std::optional<FoundPath> attempt(const CollisionChecker& checker, const CoarseRoute& route,
+                                 std::span<const PlanarPose> starts,
+                                 std::span<const PlanarPose> goals, const PlanningConfig& config,
+                                 std::uint32_t seed, std::uint64_t& steps) {
+  PoseSampler sampler(checker.grid(), route, config.route_guided, seed);
+  const SearchResult found = search_path(checker, sampler, starts, goals,
+                                         {.planner = config.planner,
+                                          .max_steps = config.max_steps - steps,
+                                          .seed = seed,
+                                          .should_stop = config.should_stop,
+                                          .improved = config.improved});
+  steps += found.steps;
+  if (found.waypoints.empty()) return std::nullopt;
+  auto poses = connect_waypoints(checker, found.waypoints);
+  if (!poses) return std::nullopt;
+  // Enough to compare it with others.
+  const int tries = found.reaches_goal ? config.smoothing_attempts / 4 : 0;
+  return FoundPath{smoothed(checker, *std::move(poses), goals, tries, config), found.reaches_goal};
+}
+
+/// The cheapest of some searches with different seeds, smoothed: the first path that a search finds
+/// may drive half the way backwards. Stops when a path costs about as much as the coarse route.
+/// Adds the steps that it took to `steps`.
+std::optional<FoundPath> find_best_path(const CollisionChecker& checker, const CoarseRoute& route,
+                                        std::span<const PlanarPose> starts,
+                                        std::span<const PlanarPose> goals,
+                                        const PlanningConfig& config, std::uint64_t& steps) {
+  std::optional<FoundPath> best;
+  for (std::uint32_t i = 0; i < config.max_attempts && steps < config.max_steps; ++i) {
+    auto path = attempt(checker, route, starts, goals, config, config.seed + i, steps);
+    if (path && (!best || is_better(*path, *best))) best = std::move(path);
+    if (best && is_good(*best, route, checker.grid().profile())) break;
+    if (config.should_stop && config.should_stop()) break;
+  }
+  if (best && best->reaches_goal) {
+    best->poses =
+        smoothed(checker, std::move(best->poses), goals, config.smoothing_attempts, config);
+  }
+  return best;
+}
+
 /// One search between two ends at which the robot can stand.
 class Search {
  public:
@@ -218,6 +287,37 @@ PathPlan plan_path(const TraversabilityView& view, const Goal& from, const Goal&
     return plan;
   }
   return Search(view, from, to, config).run(start.poses, goal.poses);
+}
+
+std::string_view name(PlannerKind kind) {
+  constexpr std::array<std::string_view, planner_kind_count> names{"rrt-connect", "rrt-star",
+                                                                   "bit-star"};
+  return names.at(static_cast<std::size_t>(kind));
+}
+
+std::string PlanningConfig::faults() const {
+  std::ostringstream faults;
+  if (!(cost_weight >= 0.0 && cost_weight <= 1e3)) {
+    faults << "cost_weight = " << cost_weight << "; must be 0 to 1000\n";
+  }
+  if (!(reverse_factor >= 1.0 && reverse_factor <= 1e3)) {
+    faults << "reverse_factor = " << reverse_factor << "; must be 1 to 1000\n";
+  }
+  if (seed == 0) faults << "seed = 0; must be 1 or more\n";
+  return faults.str();
+}
+
+std::string_view name(PlanStatus status) {
+  constexpr std::array<std::string_view, 6> names{
+      "found", "invalid request", "start blocked", "goal blocked", "no way", "out of time"};
+  return names.at(static_cast<std::size_t>(status));
+}
+
+std::vector<PlanarPose> PathPlan::path_map() const {
+  std::vector<PlanarPose> path;
+  path.reserve(poses.size());
+  for (const PlannedPose& planned : poses) path.push_back(planned.pose);
+  return path;
 }
 
 }  // namespace stillmap

@@ -10,7 +10,6 @@
 #include <ompl/geometric/planners/rrt/RRTstar.h>
 #include <ompl/util/RandomNumbers.h>
 
-#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -207,12 +206,6 @@ void tell_of_improvements(ob::ProblemDefinition& problem,
 }
 
 }  // namespace
-
-std::string_view name(PlannerKind kind) {
-  constexpr std::array<std::string_view, planner_kind_count> names{"rrt-connect", "rrt-star",
-                                                                   "bit-star"};
-  return names.at(static_cast<std::size_t>(kind));
-}
 
 SearchResult search_path(const CollisionChecker& checker, PoseSampler& sampler,
                          std::span<const PlanarPose> starts, std::span<const PlanarPose> goals,

@@ -3,19 +3,13 @@
 #include <cstdint>
 #include <functional>
 #include <span>
-#include <string_view>
 #include <vector>
 
+#include "core/planning/coarse_route.hpp"
 #include "core/planning/collision_checker.hpp"
-#include "core/planning/pose_sampler.hpp"
+#include "core/planning/path_planner.hpp"
 
 namespace stillmap {
-
-/// OMPL's planners that can be chosen.
-enum class PlannerKind : std::uint8_t { rrt_connect, rrt_star, bit_star };
-inline constexpr std::size_t planner_kind_count = 3;
-
-[[nodiscard]] std::string_view name(PlannerKind kind);
 
 struct SearchSettings {
   PlannerKind planner = PlannerKind::rrt_connect;

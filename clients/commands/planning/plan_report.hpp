@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "core/planning/path_plan.hpp"
+#include "core/planning/path_planner.hpp"
 
 namespace stillmap::cli {
 
