@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/traversability/distance_transform.hpp"
+#include "core/traversability/cell_grid.hpp"
 
 namespace stillmap {
 namespace {
@@ -66,12 +66,6 @@ PlanningGrid::PlanningGrid(const TraversabilityView& view, const Eigen::AlignedB
       factors_(x, y) = static_cast<float>(1.0 + cost_weight * share_of(cell));
     });
   }
-  const CellGrid<std::int32_t> squared = squared_distances(closed);
-  distances_m_ = CellGrid<float>(columns, rows);
-  for_each_cell(squared, [&](int x, int y) {
-    distances_m_(x, y) =
-        static_cast<float>(cell_m_ * std::sqrt(static_cast<double>(squared(x, y))));
-  });
   low_ = cell_of(box_map.min());
   high_ = cell_of(box_map.max());
   const int discs =
@@ -82,6 +76,11 @@ PlanningGrid::PlanningGrid(const TraversabilityView& view, const Eigen::AlignedB
   }
   disc_radius_m_ = std::hypot(0.5 * (piece_m + cell_m_), 0.5 * (profile_.width_m + cell_m_)) +
                    half_diagonal * cell_m_;
+  // Nothing asks for more: the discs are not smaller than the inscribed circle.
+  distances_m_ = distances_to_marked(closed, disc_radius_m_ / cell_m_ + 1.0);
+  for_each_cell(closed, [&](int x, int y) {
+    distances_m_(x, y) = static_cast<float>(cell_m_ * distances_m_(x, y));
+  });
 }
 
 CellIndex PlanningGrid::cell_of(const Eigen::Vector2d& position_map) const {

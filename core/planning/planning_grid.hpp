@@ -54,7 +54,7 @@ class PlanningGrid {
   /// Of the bounds' corners.
   CellIndex low_;
   CellIndex high_;
-  /// Closed cells have distance 0.
+  /// To the nearest closed cell, whose own distance is 0; exact up to the radius of the discs.
   CellGrid<float> distances_m_;
   CellGrid<float> factors_;
   /// Discs along the robot's axis that hold the footprint and what of the cells it touches.

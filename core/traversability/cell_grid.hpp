@@ -4,6 +4,7 @@
 #include <array>
 #include <cassert>
 #include <cstddef>
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -49,6 +50,12 @@ void for_each_cell(const CellGrid<T>& grid, const Visit& visit) {
     for (int x = 0; x < grid.width(); ++x) visit(x, y);
   }
 }
+
+/// Distance from every cell's centre to that of the nearest marked cell [cells]: exact to float
+/// precision up to `max_distance`, which is also the value of all cells farther away. A mark is any
+/// value but 0. @pre 0 < max_distance <= 1024
+[[nodiscard]] CellGrid<float> distances_to_marked(const CellGrid<std::uint8_t>& marked,
+                                                  double max_distance);
 
 /// A tile and the eight around it; null where there is none. `TileT` has `side` columns and rows
 /// and `at(x, y)`.

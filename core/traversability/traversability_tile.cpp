@@ -5,7 +5,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/traversability/distance_transform.hpp"
+#include "core/traversability/cell_grid.hpp"
 
 namespace stillmap {
 namespace {
@@ -128,12 +128,12 @@ std::vector<TraversabilityCell> classify_tile(const TileNeighbourhood<SurfaceTil
     classified(x, y) = classify_cell(window(x, y), profile);
     lethal(x, y) = classified(x, y).state == CellState::lethal ? 1 : 0;
   });
-  const CellGrid<std::int32_t> squared = squared_distances(lethal);
+  const CellGrid<float> distances =
+      distances_to_marked(lethal, clearance_limit_m(profile) / cell_m + 1.0);
   std::vector<TraversabilityCell> cells;
   for (int y = margin; y < margin + surfaces.side; ++y) {
     for (int x = margin; x < margin + surfaces.side; ++x) {
-      const double distance_m = cell_m * std::sqrt(static_cast<double>(squared(x, y)));
-      cells.push_back(with_margin(classified(x, y), distance_m, profile));
+      cells.push_back(with_margin(classified(x, y), cell_m * distances(x, y), profile));
     }
   }
   return cells;
