@@ -19,7 +19,7 @@ std::string in_words(TileId id, std::size_t count) {
   std::ostringstream text;
   text << "tile " << id.x << " " << id.y;
   if (count > 1) text << " and " << count - 1 << " more";
-  text << " on the way changed";
+  text << " on the path changed";
   return text.str();
 }
 

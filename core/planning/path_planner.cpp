@@ -208,7 +208,7 @@ class Search {
     const auto route = find_coarse_route(grid_, from_.position_map, to_.position_map);
     if (!route) {
       return failed(view_, PlanStatus::no_path,
-                    "no known way from " + text_of(from_.position_map) + " to " +
+                    "no known path from " + text_of(from_.position_map) + " to " +
                         text_of(to_.position_map) + " is wide enough for '" + view_.profile.name +
                         "'; map more, or allow unknown ground");
     }
@@ -309,7 +309,7 @@ std::string PlanningConfig::faults() const {
 
 std::string_view name(PlanStatus status) {
   constexpr std::array<std::string_view, 6> names{
-      "found", "invalid request", "start blocked", "goal blocked", "no way", "out of time"};
+      "found", "invalid request", "start blocked", "goal blocked", "no path", "out of time"};
   return names.at(static_cast<std::size_t>(status));
 }
 

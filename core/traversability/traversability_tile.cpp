@@ -11,7 +11,7 @@ namespace stillmap {
 namespace {
 
 constexpr double highest_free_cost = 98.0;
-constexpr std::uint8_t inflation_cost = 99;
+constexpr std::uint8_t inscribed_cost = 99;
 constexpr std::uint8_t lethal_cost = 100;
 /// Cost at the inscribed radius; it falls to 0 at the circumscribed one.
 constexpr double near_cost = 80.0;
@@ -73,7 +73,7 @@ TraversabilityCell with_margin(TraversabilityCell cell, double distance_m,
   if (cell.state != CellState::free) return cell;
   const double inscribed_m = profile.inscribed_radius_m();
   const double circumscribed_m = profile.circumscribed_radius_m();
-  if (distance_m <= inscribed_m) return make_lethal(cell, BlockReason::inscribed, inflation_cost);
+  if (distance_m <= inscribed_m) return make_lethal(cell, BlockReason::inscribed, inscribed_cost);
   if (distance_m < circumscribed_m) {
     const double share = (circumscribed_m - distance_m) / (circumscribed_m - inscribed_m);
     cell.cost = std::max(cell.cost, static_cast<std::uint8_t>(std::lround(near_cost * share)));
@@ -91,7 +91,7 @@ std::string_view name(CellState state) {
 std::string_view name(BlockReason reason) {
   constexpr std::array<std::string_view, block_reason_count> names{
       "none",      "obstacle", "low head-room", "step",   "slope",
-      "roughness", "class",    "inflation",     "unknown"};
+      "roughness", "class",    "inscribed",     "unknown"};
   return names.at(static_cast<std::size_t>(reason));
 }
 

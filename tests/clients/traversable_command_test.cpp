@@ -20,7 +20,7 @@ TEST_F(TraversableCommandTest, PrintsAreasByStateAndReason) {
   ASSERT_EQ(result.exit_code, 0) << result.err;
   EXPECT_THAT(result.out,
               AllOf(HasSubstr("area for car"), HasSubstr("free"), HasSubstr("lethal: obstacle"),
-                    HasSubstr("lethal: inflation"), HasSubstr("unknown")));
+                    HasSubstr("lethal: inscribed"), HasSubstr("unknown")));
 }
 
 TEST_F(TraversableCommandTest, JsonHoldsTheSameFigures) {

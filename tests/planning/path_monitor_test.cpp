@@ -56,7 +56,7 @@ TEST_F(PathMonitorTest, AChangeBesideTheWayIsACauseWithoutAConflict) {
   const auto cause = watch_->update(look());
   ASSERT_TRUE(cause);
   EXPECT_FALSE(cause->conflict);
-  EXPECT_THAT(cause->reason, HasSubstr("on the way changed"));
+  EXPECT_THAT(cause->reason, HasSubstr("on the path changed"));
   EXPECT_FALSE(watch_->update(look()));
 }
 

@@ -62,7 +62,7 @@ TEST(CellClassification, UnknownIsNotLethalAndDoesNotInflate) {
   EXPECT_EQ(look(*view, 50.0, 0.1).cell.state, CellState::unknown);
 }
 
-TEST(CellClassification, InflationIsTheInscribedRadiusAndThenTheCostFalls) {
+TEST(CellClassification, CellsWithinTheInscribedRadiusAreInscribedAndThenTheCostFalls) {
   VoxelWorld world = plain_road();
   world.block(0.0, 0.0, 0.2, 0.2, 0.3, 1.5, pole);
   RobotProfile robot = square_robot();
@@ -85,7 +85,7 @@ TEST(CellClassification, InflationIsTheInscribedRadiusAndThenTheCostFalls) {
   EXPECT_EQ(last_cost, 0);
 }
 
-TEST(CellClassification, InflationCrossesTheEdgesOfTiles) {
+TEST(CellClassification, InscribedCellsCrossTheEdgesOfTiles) {
   VoxelWorld world = plain_road();
   world.block(4.0, 0.0, 4.2, 0.2, 0.3, 1.5, pole);  // first column of its tile
   const auto view = traversability_of(world.view(), square_robot());

@@ -89,7 +89,7 @@ void add_traversable_command(CommandHandle program, Action& action) {
       "Without MAPFILE, the server is asked, which keeps the areas of the robots that its\n"
       "configuration names. Regions are seen from above: heights do not count.\n"
       "A cell is free, lethal for a reason (obstacle, low head-room, step, slope, roughness,\n"
-      "class, or inflation: too near to such a cell), or unknown. 'Inferred' ground was not seen\n"
+      "class, or inscribed: too near to such a cell), or unknown. 'Inferred' ground was not seen\n"
       "and follows from what lies around: between the lidar's rings, under removed cars.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
