@@ -5,37 +5,40 @@
 
 namespace stillmap {
 
-/// How an occupancy map grows. The probabilities are OctoMap's own defaults (Hornung et al., 2013).
+/// Sensor model and resolution of an occupancy map. The probabilities are OctoMap's defaults
+/// (Hornung et al., 2013).
 struct OccupancyConfig {
-  /// Edge of the smallest voxel. The map reaches 32768 of them from its origin, to every side.
+  /// Edge of the smallest voxel. The map extends 32768 voxels from its origin in every direction.
   double resolution_m = 0.2;
-  /// Points farther from the lidar make no occupied voxels.
+  /// Points beyond this range do not mark voxels as occupied.
   double max_range_m = 60.0;
-  /// Rays clear what they pass up to this range; 0: nothing is ever cleared.
+  /// Rays mark the voxels that they traverse as free up to this range; 0 disables clearing.
   double clear_range_m = 25.0;
-  /// Every so many scans one clears: all of them would tell the same.
+  /// One scan in this many clears: consecutive scans traverse nearly the same voxels.
   std::uint32_t clearing_interval = 3;
-  /// A ray clears up to this much, and this share of its range, before its point: near its end a
+  /// Clearing ends this far, plus this share of the range, before the ray's point: near its end a
   /// ray grazes the surface that it hits.
   double clear_margin_m = 0.5;
   double clear_margin_share = 0.02;
-  /// What one scan tells of a voxel that it hit, and of one that its rays passed.
+  /// Inverse sensor model: occupancy probability given a hit, and given a ray that traverses the
+  /// voxel.
   double hit_probability = 0.7;
   double miss_probability = 0.4;
 
-  /// A voxel is never surer than this, so that it can change its mind.
+  /// Clamping thresholds, so that a voxel can change its state within a few scans.
   static constexpr double min_probability = 0.1192;
   static constexpr double max_probability = 0.971;
 
-  /// Every fault in words, one a line; empty when the configuration can be used.
+  /// One line for each invalid value; empty when the configuration is valid.
   [[nodiscard]] std::string faults() const;
 };
 
-/// What of a scan counts for the occupancy map.
+/// How one scan updates the occupancy map.
 struct ScanUpdateOptions {
-  /// Its rays clear what they pass, if it is one of those that do.
+  /// Whether its rays may clear; they do in one scan of every `clearing_interval`.
   bool clear_free_space = true;
-  /// Points of no known class are solid; false where they may be movers that came into sight.
+  /// Whether unlabelled points mark voxels as occupied; false where they may belong to moving
+  /// objects.
   bool unknown_is_solid = true;
 };
 

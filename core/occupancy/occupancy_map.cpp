@@ -23,17 +23,17 @@ struct OccupancyMap::State {
     octree.setClampingThresMax(OccupancyConfig::max_probability);
   }
 
-  void begin_to_gather() {
-    gathered = {};
+  void begin_update() {
+    pending = {};
     bricks.clear();
   }
 
-  /// Takes at most so many of the bricks that are left; false when all are taken.
-  bool take(std::size_t max_bricks, const LogOddsSteps& steps) {
-    const auto portion = gathered.first(std::min(max_bricks, gathered.size()));
+  /// Applies at most `max_bricks` of the pending bricks; returns whether more are left.
+  bool apply(std::size_t max_bricks, const LogOddsSteps& steps) {
+    const auto portion = pending.first(std::min(max_bricks, pending.size()));
     update_octree(octree, portion, steps);
-    gathered = gathered.subspan(portion.size());
-    if (!gathered.empty()) return true;
+    pending = pending.subspan(portion.size());
+    if (!pending.empty()) return true;
     ++version;
     return false;
   }
@@ -41,12 +41,12 @@ struct OccupancyMap::State {
   OccupancyConfig config;
   octomap::OcTree octree;
   VoxelBricks bricks;
-  /// Of `bricks`, what the octree has not taken yet.
-  std::span<const VoxelBrick> gathered;
+  /// The part of `bricks` that has not been applied.
+  std::span<const VoxelBrick> pending;
   std::uint64_t version = 0;
   std::uint64_t scans = 0;
-  /// Columns that are forgotten until their tiles come back.
-  std::set<OctreeColumn> nonresident;
+  /// Columns that are unknown until their tiles are reloaded.
+  std::set<OctreeColumn> non_resident;
 };
 
 namespace {
@@ -67,11 +67,11 @@ OccupancyConfig config_of(const OctomapData& data) {
   return config;
 }
 
-/// All voxels of the octree that a cube touches with more than its faces; none outside.
+/// Adds hits for all voxels whose interior a cube touches; none if it reaches out of the octree.
 void add_cube(const Eigen::Vector3d& centre_map, double side_m, double resolution_m,
               VoxelBricks& bricks) {
   const Eigen::Vector3d centre = (centre_map / resolution_m).array() + octree_origin;
-  // A little smaller, so that cubes as large as voxels are one of them.
+  // Slightly smaller, so that a cube of a voxel's size touches one voxel.
   const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.49 * side_m / resolution_m);
   if (!in_octree(centre - half) || !in_octree(centre + half)) return;
   const VoxelKey first = (centre - half).array().floor().cast<std::int32_t>();
@@ -108,27 +108,27 @@ void OccupancyMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_m
 
 void OccupancyMap::compute_update(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
                                   const ScanUpdateOptions& use, const ThrottleCallback& throttle) {
-  ScanUpdateOptions this_one = use;
+  ScanUpdateOptions options = use;
   const bool is_due = state_->scans++ % state_->config.clearing_interval == 0;
-  this_one.clear_free_space = use.clear_free_space && is_due && state_->config.clear_range_m > 0.0;
-  state_->begin_to_gather();
-  compute_scan_update(state_->config, scan, T_map_lidar, this_one, state_->bricks, throttle);
-  state_->gathered = state_->bricks.sorted();
+  options.clear_free_space = use.clear_free_space && is_due && state_->config.clear_range_m > 0.0;
+  state_->begin_update();
+  compute_scan_update(state_->config, scan, T_map_lidar, options, state_->bricks, throttle);
+  state_->pending = state_->bricks.sorted();
 }
 
 bool OccupancyMap::apply_update(std::size_t max_bricks) {
-  return state_->take(max_bricks,
-                      {state_->octree.getProbHitLog(), state_->octree.getProbMissLog()});
+  return state_->apply(max_bricks,
+                       {state_->octree.getProbHitLog(), state_->octree.getProbMissLog()});
 }
 
 void OccupancyMap::insert(const MapSnapshot& view, const ThrottleCallback& throttle) {
   if (view.tiles.empty()) return;
   const VoxelGrid grid(view.voxel_size_m, view.tile_size_m);
   const Eigen::Vector3d half = Eigen::Vector3d::Constant(view.voxel_size_m / 2.0);
-  // Finer voxels fill the static map's; coarser ones are those that hold its points.
+  // Finer voxels fill those of the static map; coarser ones are those that contain its points.
   const bool is_finer = state_->config.resolution_m <= view.voxel_size_m;
   const double side_m = is_finer ? view.voxel_size_m : 0.0;
-  state_->begin_to_gather();
+  state_->begin_update();
   for (const auto& tile : view.tiles) {
     if (throttle) throttle();
     for (const Voxel& voxel : tile->voxels) {
@@ -137,29 +137,29 @@ void OccupancyMap::insert(const MapSnapshot& view, const ThrottleCallback& throt
                state_->config.resolution_m, state_->bricks);
     }
   }
-  state_->gathered = state_->bricks.sorted();
-  const float surest = state_->octree.getClampingThresMaxLog();
-  while (state_->take(portion_bricks, {2.0F * surest, 0.0F})) {
+  state_->pending = state_->bricks.sorted();
+  const float max_log_odds = state_->octree.getClampingThresMaxLog();
+  while (state_->apply(portion_bricks, {2.0F * max_log_odds, 0.0F})) {
     if (throttle) throttle();
   }
 }
 
 bool OccupancyMap::sync_residency(const MapSnapshot& view) {
-  std::set<OctreeColumn> gone;
-  MapSnapshot back{view.version, view.map_id, view.tile_size_m, view.voxel_size_m, {}};
+  std::set<OctreeColumn> evicted;
+  MapSnapshot reloaded{view.version, view.map_id, view.tile_size_m, view.voxel_size_m, {}};
   for (const auto& [column, tiles] : columns_of(view, state_->config.resolution_m)) {
-    const bool is_gone = tiles.has_nonresident && tiles.resident.empty();
-    if (is_gone && state_->nonresident.insert(column).second) gone.insert(column);
-    if (!is_gone && state_->nonresident.erase(column) > 0) {
-      back.tiles.insert(back.tiles.end(), tiles.resident.begin(), tiles.resident.end());
+    const bool is_evicted = tiles.has_non_resident && tiles.resident.empty();
+    if (is_evicted && state_->non_resident.insert(column).second) evicted.insert(column);
+    if (!is_evicted && state_->non_resident.erase(column) > 0) {
+      reloaded.tiles.insert(reloaded.tiles.end(), tiles.resident.begin(), tiles.resident.end());
     }
   }
-  if (!gone.empty()) {
-    evict_columns(state_->octree, gone);
+  if (!evicted.empty()) {
+    evict_columns(state_->octree, evicted);
     ++state_->version;
   }
-  insert(back);
-  return !gone.empty() || !back.tiles.empty();
+  insert(reloaded);
+  return !evicted.empty() || !reloaded.tiles.empty();
 }
 
 PointOccupancy OccupancyMap::at_point(const Eigen::Vector3d& p_map) const {
@@ -193,10 +193,10 @@ OccupancyAnswers OccupancyMap::answer(const OccupancyQuery& query) const {
 OctomapData OccupancyMap::encode(bool binary) const {
   std::ostringstream out;
   if (binary) {
-    octomap::OcTree likeliest(state_->octree);
-    likeliest.toMaxLikelihood();
-    likeliest.prune();
-    likeliest.writeBinaryData(out);
+    octomap::OcTree max_likelihood(state_->octree);
+    max_likelihood.toMaxLikelihood();
+    max_likelihood.prune();
+    max_likelihood.writeBinaryData(out);
   } else {
     state_->octree.writeData(out);
   }

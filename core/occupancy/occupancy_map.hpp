@@ -12,47 +12,47 @@
 
 namespace stillmap {
 
-/// What a map holds and weighs.
+/// Size of a map.
 struct OccupancySize {
   std::uint64_t nodes = 0;
   std::uint64_t memory_bytes = 0;
 };
 
-/// Occupied, free and unknown space of the still world, as an OctoMap (Hornung et al., 2013). One
-/// thread writes; reading from others at the same time needs a lock.
+/// Occupied, free and unknown space of the static world, as an OctoMap (Hornung et al., 2013). NOT
+/// thread-safe: readers on other threads need a lock against the writer.
 class OccupancyMap {
  public:
   /// Throws std::invalid_argument with `config.faults()`.
   explicit OccupancyMap(const OccupancyConfig& config);
-  /// A map that was encoded before, by any OctoMap program. It says nothing about how sure a voxel
-  /// of binary data is, so those are as sure as can be. Throws std::invalid_argument for damaged
-  /// data.
+  /// Decodes a map that any OctoMap program encoded. Voxels of binary data get the clamping
+  /// probabilities. Throws std::invalid_argument for damaged data.
   explicit OccupancyMap(const OctomapData& data);
   ~OccupancyMap();
   OccupancyMap(OccupancyMap&&) noexcept;
   OccupancyMap& operator=(OccupancyMap&&) noexcept;
 
-  /// Stationary points become occupied voxels; where the scan is one of those that clear, what the
-  /// rays of all its points pass becomes free. A voxel changes once a scan, and a hit counts before
-  /// what passed. `scan.motion` is as long as the scan.
+  /// Voxels of stationary points are updated as hits; if the scan clears, voxels that the rays of
+  /// all its points traverse are updated as misses. Each voxel is updated once a scan, and hits
+  /// take precedence. @pre scan.motion.size() == scan.scan.size()
   void insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
               const ScanUpdateOptions& use = {});
 
-  /// The two halves of it: the first, which takes longer and may be held up, changes nothing that
-  /// readers see, and needs no lock against them. The second can be done in portions, with readers
-  /// between them; it returns whether more is left. Nothing else may be inserted before that.
+  /// The two halves of insert(). compute_update() takes longer and changes nothing that readers
+  /// see, so it needs no lock against them. apply_update() changes the octree by at most
+  /// `max_bricks` and returns whether more are left; between calls, readers may have the lock.
+  /// Nothing else may be inserted before all are applied.
   void compute_update(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
                       const ScanUpdateOptions& use, const ThrottleCallback& throttle = {});
   bool apply_update(std::size_t max_bricks = std::numeric_limits<std::size_t>::max());
-  /// A portion that takes about a millisecond.
+  /// Bricks that apply_update() applies in about a millisecond.
   static constexpr std::size_t portion_bricks = 512;
 
-  /// Takes the voxels of a static map for occupied, as sure as can be.
+  /// Sets the voxels of a static map to the highest occupancy probability.
   void insert(const MapSnapshot& view, const ThrottleCallback& throttle = {});
 
-  /// Where the static map's tiles are in the tile store, nothing stays in memory here either; where
-  /// they came back, their voxels are occupied again, and free space is to be seen anew. Returns
-  /// whether that changed anything.
+  /// Follows the residency of the static map's tiles: columns whose tiles have all been evicted to
+  /// the tile store become unknown; reloaded tiles are inserted as occupied (their free space has
+  /// to be observed again). Returns whether anything changed.
   bool sync_residency(const MapSnapshot& view);
 
   [[nodiscard]] PointOccupancy at_point(const Eigen::Vector3d& p_map) const;
@@ -64,10 +64,10 @@ class OccupancyMap {
   /// Throws std::invalid_argument with `query.faults()`.
   [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) const;
 
-  /// As OctoMap encodes it; binary data is pruned to the fewest nodes.
+  /// In OctoMap's encoding; binary data is pruned.
   [[nodiscard]] OctomapData encode(bool binary) const;
 
-  /// Grows with every insertion.
+  /// Incremented by every insertion.
   [[nodiscard]] std::uint64_t version() const;
   [[nodiscard]] double resolution_m() const;
   [[nodiscard]] OccupancySize size() const;

@@ -30,9 +30,9 @@ std::string text_of(const Eigen::Vector3d& value) {
   return text.str();
 }
 
-/// Why nothing can be said about a position; empty when it can.
-std::string place_fault(const OcTree& octree, const std::string& what,
-                        const Eigen::Vector3d& p_map) {
+/// Why a position is not in the octree; empty when it is.
+std::string position_fault(const OcTree& octree, const std::string& what,
+                           const Eigen::Vector3d& p_map) {
   if (in_octree(in_voxels(octree, p_map))) return {};
   std::ostringstream text;
   text << what << " is " << text_of(p_map) << "; the occupancy map reaches from -"
@@ -51,7 +51,7 @@ octomap::OcTreeKey tree_key(const VoxelKey& voxel) {
           static_cast<octomap::key_type>(voxel.z())};
 }
 
-/// Counts what of the octree lies in a box of voxels, both ends included.
+/// Counts the octree's voxels in a box, both ends included.
 class BoxCount {
  public:
   BoxCount(const OcTree& octree, const VoxelKey& first, const VoxelKey& last,
@@ -108,15 +108,15 @@ class BoxCount {
 };
 
 std::string box_fault(const OcTree& octree, const Eigen::AlignedBox3d& box_map) {
-  std::string fault = place_fault(octree, "box's minimum", box_map.min());
-  if (fault.empty()) fault = place_fault(octree, "box's maximum", box_map.max());
+  std::string fault = position_fault(octree, "box's minimum", box_map.min());
+  if (fault.empty()) fault = position_fault(octree, "box's maximum", box_map.max());
   if (!fault.empty() || (box_map.min().array() <= box_map.max().array()).all()) return fault;
   return "box's minimum " + text_of(box_map.min()) + " is above its maximum " +
          text_of(box_map.max());
 }
 
 std::string ray_fault(const OcTree& octree, const RayQuery& ray) {
-  if (std::string fault = place_fault(octree, "ray's origin", ray.origin_map); !fault.empty()) {
+  if (std::string fault = position_fault(octree, "ray's origin", ray.origin_map); !fault.empty()) {
     return fault;
   }
   const double length = ray.direction_map.stableNorm();
@@ -141,7 +141,7 @@ std::string OccupancyQuery::faults() const {
 
 PointOccupancy query_point(const OcTree& octree, const Eigen::Vector3d& p_map) {
   PointOccupancy result;
-  result.fault = place_fault(octree, "point", p_map);
+  result.fault = position_fault(octree, "point", p_map);
   if (!result.fault.empty()) return result;
   const VoxelKey voxel = in_voxels(octree, p_map).array().floor().cast<std::int32_t>();
   const OcTreeNode* const node = octree.search(tree_key(voxel));
@@ -182,10 +182,10 @@ RayOccupancy cast_ray(const OcTree& octree, const RayQuery& query) {
   for (; ray.entered_at() < length; ray.step()) {
     const Occupancy here =
         inside() ? occupancy_of(octree, octree.search(tree_key(ray.voxel()))) : Occupancy::unknown;
-    const bool goes_on =
+    const bool continues =
         here == Occupancy::free || (here == Occupancy::unknown && query.ignore_unknown && inside());
-    if (goes_on) continue;
-    // Who passes what is unknown leaves the map at its edge as if through free space.
+    if (continues) continue;
+    // With ignore_unknown, only the map's edge gets here: the ray counts as free.
     result.end = here == Occupancy::unknown && query.ignore_unknown ? Occupancy::free : here;
     result.length_m = ray.entered_at() * resolution_m;
     break;

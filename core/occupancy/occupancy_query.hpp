@@ -12,7 +12,7 @@ class OcTree;
 
 namespace stillmap {
 
-/// What is known of a place.
+/// State of a voxel.
 enum class Occupancy : std::uint8_t { unknown = 0, free = 1, occupied = 2 };
 
 [[nodiscard]] constexpr const char* name(Occupancy occupancy) {
@@ -22,53 +22,53 @@ enum class Occupancy : std::uint8_t { unknown = 0, free = 1, occupied = 2 };
 
 struct PointOccupancy {
   Occupancy occupancy = Occupancy::unknown;
-  /// That it is occupied, 0..1; 0.5 where nothing is known.
+  /// Probability of being occupied, 0..1; 0.5 where unknown.
   float probability = 0.5F;
-  /// Why the point cannot be asked for, in words; empty when it can.
+  /// Why the query is invalid; empty when it is valid.
   std::string fault;
 };
 
-/// Voxels that a box touches.
+/// Counts of the voxels that a box touches.
 struct BoxOccupancy {
   std::uint64_t occupied = 0;
   std::uint64_t free = 0;
   std::uint64_t unknown = 0;
-  /// Centres of occupied voxels, map frame [m], as many as were asked for.
+  /// Centres of occupied voxels, map frame [m], up to the requested number.
   std::vector<Eigen::Vector3f> occupied_map;
   std::string fault;
 
   [[nodiscard]] bool any_occupied() const { return occupied > 0; }
 };
 
-/// A ray through the map.
+/// A ray to cast.
 struct RayQuery {
   Eigen::Vector3d origin_map = Eigen::Vector3d::Zero();
   /// Of any length but 0.
   Eigen::Vector3d direction_map = Eigen::Vector3d::UnitX();
   double max_range_m = 100.0;
-  /// Goes on through what is unknown instead of ending there.
+  /// Unknown voxels do not end the ray (as in OctoMap's castRay).
   bool ignore_unknown = false;
 
-  /// A ray may not be longer.
+  /// Largest `max_range_m`.
   static constexpr double max_length_m = 1000.0;
 };
 
-/// How a ray ended: at its full range or the map's edge (free), at an occupied voxel, or at an
-/// unknown one.
+/// Result of a ray: it ended at its full range or the map's edge (free), at an occupied voxel, or
+/// at an unknown one.
 struct RayOccupancy {
   Occupancy end = Occupancy::unknown;
-  /// Where the ray enters that voxel, or ends; map frame [m].
+  /// Point at which the ray enters that voxel, or its end; map frame [m].
   Eigen::Vector3d end_map = Eigen::Vector3d::Zero();
   double length_m = 0.0;
   std::string fault;
 };
 
-/// Questions of one request.
+/// Queries of one request.
 struct OccupancyQuery {
   std::vector<Eigen::Vector3d> points_map;
   std::vector<Eigen::AlignedBox3d> boxes_map;
   std::vector<RayQuery> rays;
-  /// Of occupied voxels listed, all boxes together.
+  /// Largest number of occupied voxels listed, all boxes together.
   std::uint32_t max_voxels = 1000;
 
   static constexpr std::size_t max_points = 10'000;
@@ -76,11 +76,11 @@ struct OccupancyQuery {
   static constexpr std::size_t max_rays = 1000;
   static constexpr std::uint32_t max_listed_voxels = 100'000;
 
-  /// Why so much is not answered at once, one reason a line; empty when it is.
+  /// One line for each limit that the request exceeds; empty when it can be answered.
   [[nodiscard]] std::string faults() const;
 };
 
-/// In the order of the questions.
+/// In the order of the queries.
 struct OccupancyAnswers {
   double resolution_m = 0.0;
   std::vector<PointOccupancy> points;
@@ -88,8 +88,8 @@ struct OccupancyAnswers {
   std::vector<RayOccupancy> rays;
 };
 
-// Positions are in the map frame [m]. What cannot be asked for (not finite, outside the octree)
-// comes back with a fault.
+// Positions are in the map frame [m]. A query that is not finite or outside the octree returns a
+// fault.
 
 [[nodiscard]] PointOccupancy query_point(const octomap::OcTree& octree,
                                          const Eigen::Vector3d& p_map);

@@ -10,8 +10,7 @@ namespace {
 /// Levels below the root.
 constexpr unsigned tree_depth = 16;
 
-/// Reads nodes in the order in which they are written: a node, then all below its first child, and
-/// so on.
+/// Reads nodes in the order in which they are written: depth first, children in order.
 class EncodingWalk {
  public:
   explicit EncodingWalk(const OctomapData& data) : bytes_(data.bytes), binary_(data.binary) {}

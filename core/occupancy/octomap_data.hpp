@@ -5,29 +5,29 @@
 
 namespace stillmap {
 
-/// An octree as OctoMap encodes it: what stands behind the header of a .bt or .ot file, and in an
+/// An octree in OctoMap's encoding: the data of a .bt or .ot file after its header, and of an
 /// octomap_msgs/Octomap.
 struct OctomapData {
-  /// Occupied and free only (.bt), else every voxel's log-odds (.ot).
+  /// Occupied and free only (.bt), or every voxel's log-odds (.ot).
   bool binary = true;
   double resolution_m = 0.0;
   /// Empty for an empty map.
   std::string bytes;
 
-  /// OctoMap's name of this kind of tree.
+  /// OctoMap's id of this tree type.
   static constexpr const char* tree_id = "OcTree";
 };
 
-/// What encoded bytes hold, or what is wrong with them.
+/// Result of checking an encoding.
 struct OctomapCheck {
   /// Inner nodes and leaves.
   std::uint64_t nodes = 0;
-  /// In words; empty when all is well.
+  /// What is damaged; empty when valid.
   std::string fault;
 };
 
-/// Walks through the encoding without building anything. OctoMap's own reader trusts its input: a
-/// damaged stream makes it recurse without end.
+/// Parses the encoding without building an octree. OctoMap's reader trusts its input: on a damaged
+/// stream it recurses without end.
 [[nodiscard]] OctomapCheck check_octomap(const OctomapData& data);
 
 }  // namespace stillmap

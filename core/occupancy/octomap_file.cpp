@@ -33,7 +33,7 @@ struct Header {
   double resolution_m = 0.0;
 };
 
-/// Reads up to and with the line "data".
+/// Reads up to and including the line "data".
 Header read_header(std::istream& in, const fs::path& file) {
   Header header;
   for (std::string line; std::getline(in, line);) {

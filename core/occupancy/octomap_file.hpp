@@ -7,15 +7,15 @@
 
 namespace stillmap {
 
-/// Whether the file's name asks for the binary kind (.bt) or the full one (.ot). Throws
-/// MapFileError for another ending.
+/// Whether the file's extension is that of the binary format (.bt) and not the full one (.ot).
+/// Throws MapFileError for any other.
 [[nodiscard]] bool is_binary_octomap(const std::filesystem::path& file);
 
-/// Writes a file that octovis and every other OctoMap program opens; the kind must fit the name's
-/// ending. What stood there before is replaced in one step. Throws MapFileError.
+/// Writes a file that octovis and other OctoMap programs open. An existing file is replaced
+/// atomically. Throws MapFileError. @pre the extension matches data.binary
 void write_octomap_file(const std::filesystem::path& file, const OctomapData& data);
 
-/// Reads such a file and checks every byte. Throws MapFileError.
+/// Reads and checks such a file. Throws MapFileError.
 [[nodiscard]] OctomapData read_octomap_file(const std::filesystem::path& file);
 
 }  // namespace stillmap

@@ -7,28 +7,29 @@
 
 namespace stillmap {
 
-/// A voxel of the octree: 0..65535 along each axis, 32768 at the map's origin.
+/// Voxel key of the octree: 0..65535 along each axis; 32768 begins at the map's origin.
 using VoxelKey = Eigen::Matrix<std::int32_t, 3, 1>;
 
-/// Voxels along an axis of the octree, and the key of the one that begins at the map's origin.
+/// Voxels along an axis of the octree, and the key at the map's origin.
 inline constexpr std::int32_t octree_side = 65536;
 inline constexpr std::int32_t octree_origin = 32768;
 
-/// Whether a position, in voxels from the octree's corner, lies in the octree. False for NaN.
+/// Whether a position, in voxels from the octree's lowest corner, lies in the octree. False for
+/// NaN.
 [[nodiscard]] inline bool in_octree(const Eigen::Vector3d& p_voxels) {
-  // A voxel is kept off the ends, where rounding along a ray could step outside.
+  // One voxel of margin: rounding along a ray could step outside.
   return (p_voxels.array() >= 1.0).all() && (p_voxels.array() < octree_side - 1.0).all();
 }
 
-/// Walks along a line through a grid of unit cubes, from cube to neighbouring cube (Amanatides and
-/// Woo, 1987). Positions are in voxels.
+/// Iterates over the unit cubes that a line traverses (Amanatides and Woo, "A fast voxel traversal
+/// algorithm", 1987). Positions are in voxels.
 class RayIterator {
  public:
-  /// `direction` is of length 1. Requires a start of less than 2^30 voxels from the origin.
+  /// @pre `direction` has length 1; `start` is within 2^30 voxels of the origin.
   RayIterator(const Eigen::Vector3d& start, const Eigen::Vector3d& direction);
 
   [[nodiscard]] const VoxelKey& voxel() const { return voxel_; }
-  /// How far along the line this voxel begins; 0 for the one where it starts.
+  /// Distance along the line at which this voxel begins; 0 for the first.
   [[nodiscard]] double entered_at() const { return entered_at_; }
   void step() {
     entered_at_ = next_at_[axis_];

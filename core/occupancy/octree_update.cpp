@@ -15,7 +15,7 @@ namespace {
 using octomap::OcTree;
 using octomap::OcTreeNode;
 
-/// Depth of the nodes that are bricks: two levels above the voxels.
+/// Depth of the nodes that correspond to bricks: two levels above the voxels.
 constexpr unsigned brick_depth = 14;
 
 struct Child {
@@ -28,7 +28,7 @@ class BatchUpdate {
   BatchUpdate(OcTree& octree, const LogOddsSteps& steps) : octree_(octree), steps_(steps) {}
 
   void update(OcTreeNode& node, bool is_new, unsigned depth, std::span<const VoxelBrick> bricks) {
-    if (!is_new && stays_as_it_is(node, bricks)) return;
+    if (!is_new && is_saturated_leaf(node, bricks)) return;
     open(node, is_new);
     if (depth == brick_depth) {
       update_octants(node, bricks.front());
@@ -48,9 +48,9 @@ class BatchUpdate {
   }
 
  private:
-  /// A leaf that stands for all its voxels and is as sure as it can be.
-  [[nodiscard]] bool stays_as_it_is(const OcTreeNode& node,
-                                    std::span<const VoxelBrick> bricks) const {
+  /// Whether the node is a pruned leaf that no update can change: clamped, all in one direction.
+  [[nodiscard]] bool is_saturated_leaf(const OcTreeNode& node,
+                                       std::span<const VoxelBrick> bricks) const {
     if (octree_.nodeHasChildren(&node)) return false;
     std::uint64_t hits = 0;
     std::uint64_t misses = 0;
@@ -58,11 +58,11 @@ class BatchUpdate {
       hits |= brick.hits;
       misses |= brick.misses;
     }
-    return is_sure(node, hits, misses);
+    return is_clamped(node, hits, misses);
   }
 
-  [[nodiscard]] bool is_sure(const OcTreeNode& leaf, std::uint64_t hits,
-                             std::uint64_t misses) const {
+  [[nodiscard]] bool is_clamped(const OcTreeNode& leaf, std::uint64_t hits,
+                                std::uint64_t misses) const {
     if (hits == 0) return leaf.getLogOdds() <= octree_.getClampingThresMinLog();
     return misses == 0 && leaf.getLogOdds() >= octree_.getClampingThresMaxLog();
   }
@@ -74,7 +74,7 @@ class BatchUpdate {
       if ((hits | misses) == 0) continue;
       const Child child = child_of(node, octant);
       const bool is_leaf = !child.is_new && !octree_.nodeHasChildren(child.node);
-      if (is_leaf && is_sure(*child.node, hits, misses)) continue;
+      if (is_leaf && is_clamped(*child.node, hits, misses)) continue;
       open(*child.node, child.is_new);
       update_voxels(*child.node, hits, misses);
       close(*child.node);
@@ -89,7 +89,7 @@ class BatchUpdate {
     }
   }
 
-  /// Gives a leaf that stands for all its voxels children of its own.
+  /// Expands a pruned leaf into its children.
   void open(OcTreeNode& node, bool is_new) {
     if (!is_new && !octree_.nodeHasChildren(&node)) octree_.expandNode(&node);
   }
@@ -107,20 +107,20 @@ class BatchUpdate {
   LogOddsSteps steps_;
 };
 
-/// Only OctoMap itself can: here it reads an octree of nothing else, log-odds and no children.
+/// OctoMap creates a root only while it reads: an encoded tree of one node (log-odds, no children).
 void make_root(OcTree& octree) {
   std::istringstream root(std::string(sizeof(float) + 1, '\0'));
   octree.readData(root);
 }
 
-/// Columns begin at the octree's corner.
+/// Index of the column at a coordinate; columns are counted from the octree's lowest corner.
 std::int32_t column_at(double position_map, double resolution_m) {
   const double voxel = std::floor(position_map / resolution_m) + octree_origin;
   return static_cast<std::int32_t>(std::floor(voxel / OctreeColumn::side_voxels));
 }
 
-/// An octree to be filled node by node. (OctoMap's deleteNode() leaves what inner nodes point
-/// with.)
+/// An octree that is filled node by node. OctoMap's deleteNode() would keep the inner nodes' arrays
+/// of child pointers.
 class OctreeCopy : public octomap::OcTree {
  public:
   using octomap::OcTree::OcTree;
@@ -132,7 +132,7 @@ class OctreeCopy : public octomap::OcTree {
   }
 };
 
-/// A node's cube in plan: voxels [x, x + side) by [y, y + side).
+/// Ground plan of a node: voxels [x, x + side) by [y, y + side).
 struct NodeArea {
   std::int32_t x = 0;
   std::int32_t y = 0;
@@ -144,7 +144,7 @@ struct NodeArea {
   }
 };
 
-/// Copies a tree without some columns.
+/// Copies an octree without some columns.
 class Pruner {
  public:
   Pruner(octomap::OcTree& from, OctreeCopy& to, const std::set<OctreeColumn>& without)
@@ -157,21 +157,23 @@ class Pruner {
   }
 
  private:
-  /// How many of the columns that the area lies in, or that lie in it, are to go.
-  [[nodiscard]] std::size_t gone_in(const NodeArea& area) const {
+  /// Number of evicted columns that overlap the area.
+  [[nodiscard]] std::size_t evicted_in(const NodeArea& area) const {
     constexpr std::int32_t side = OctreeColumn::side_voxels;
     const OctreeColumn first{area.x / side, area.y / side};
     const OctreeColumn last{(area.x + area.side - 1) / side, (area.y + area.side - 1) / side};
-    return static_cast<std::size_t>(std::ranges::count_if(without_, [&](const OctreeColumn& gone) {
-      return gone.x >= first.x && gone.x <= last.x && gone.y >= first.y && gone.y <= last.y;
-    }));
+    return static_cast<std::size_t>(
+        std::ranges::count_if(without_, [&](const OctreeColumn& evicted) {
+          return evicted.x >= first.x && evicted.x <= last.x && evicted.y >= first.y &&
+                 evicted.y <= last.y;
+        }));
   }
 
   [[nodiscard]] bool keeps(octomap::OcTreeNode& node, const NodeArea& area) const {
-    if (area.side <= OctreeColumn::side_voxels) return gone_in(area) == 0;
+    if (area.side <= OctreeColumn::side_voxels) return evicted_in(area) == 0;
     if (!from_.nodeHasChildren(&node)) {
       const auto columns = static_cast<std::size_t>(area.side / OctreeColumn::side_voxels);
-      return gone_in(area) < columns * columns;
+      return evicted_in(area) < columns * columns;
     }
     for (unsigned i = 0; i < 8; ++i) {
       if (from_.nodeChildExists(&node, i) && keeps(*from_.getNodeChild(&node, i), area.child(i))) {
@@ -184,13 +186,13 @@ class Pruner {
   void copy(octomap::OcTreeNode& from, octomap::OcTreeNode& to, const NodeArea& area) {
     to.copyData(from);
     const bool is_wide = area.side > OctreeColumn::side_voxels;
-    // A leaf that is wider than a column is split where a part of it goes.
-    if (is_wide && !from_.nodeHasChildren(&from) && gone_in(area) > 0) from_.expandNode(&from);
+    // A leaf wider than a column is split where part of it is evicted.
+    if (is_wide && !from_.nodeHasChildren(&from) && evicted_in(area) > 0) from_.expandNode(&from);
     if (!from_.nodeHasChildren(&from)) return;
     for (unsigned i = 0; i < 8; ++i) {
       if (!from_.nodeChildExists(&from, i)) continue;
       octomap::OcTreeNode& child = *from_.getNodeChild(&from, i);
-      // Below a column's width all or nothing stays.
+      // A node no wider than a column is kept or evicted as a whole.
       if (is_wide && !keeps(child, area.child(i))) continue;
       copy(child, *to_.createNodeChild(&to, i), area.child(i));
     }
@@ -217,7 +219,7 @@ void update_octree(OcTree& octree, std::span<const VoxelBrick> bricks, const Log
 
 std::map<OctreeColumn, ColumnTiles> columns_of(const MapSnapshot& view, double resolution_m) {
   std::map<OctreeColumn, ColumnTiles> columns;
-  // A hair inside, so that a tile does not touch the column beyond its far edge.
+  // Half a voxel inside, so that a tile does not touch the column beyond its far edge.
   const double far_side_m = view.tile_size_m - 0.5 * resolution_m;
   for (const auto& tile : view.tiles) {
     const double x_map = tile->info.id.x * view.tile_size_m;
@@ -229,7 +231,7 @@ std::map<OctreeColumn, ColumnTiles> columns_of(const MapSnapshot& view, double r
       for (at.y = first.y; at.y <= last.y; ++at.y) {
         ColumnTiles& column = columns[at];
         if (is_non_resident(*tile)) {
-          column.has_nonresident = true;
+          column.has_non_resident = true;
         } else {
           column.resident.push_back(tile);
         }

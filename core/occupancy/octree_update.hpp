@@ -17,20 +17,19 @@ class OcTree;
 
 namespace stillmap {
 
-/// What a hit and a miss add to a voxel's log-odds.
+/// Increments of a voxel's log-odds for a hit and for a miss.
 struct LogOddsSteps {
   float hit = 0.0F;
   float miss = 0.0F;
 };
 
-/// Updates all these voxels in one walk through the octree: an inner node is visited once, however
-/// many voxels below it change. `bricks` are in the octree's order. The result is what OctoMap's
-/// updateNode() makes of the voxels one by one.
+/// Updates all voxels in one traversal of the octree that visits each inner node once. `bricks` are
+/// in the octree's order. The result equals that of OctoMap's updateNode() for each voxel.
 void update_octree(octomap::OcTree& octree, std::span<const VoxelBrick> bricks,
                    const LogOddsSteps& steps);
 
-/// A square column of the octree, of all heights: so many voxels to a side that it is a whole
-/// number of the octree's inner nodes.
+/// A square column of the octree over its full height. Its side is that of an inner node, so that
+/// no node lies in two columns.
 struct OctreeColumn {
   static constexpr std::int32_t side_voxels = 128;
   std::int32_t x = 0;
@@ -38,18 +37,18 @@ struct OctreeColumn {
   friend auto operator<=>(const OctreeColumn&, const OctreeColumn&) = default;
 };
 
-/// What the static map has of a column.
+/// The static map's tiles that touch a column.
 struct ColumnTiles {
-  /// Those in memory.
+  /// Tiles with their voxels in memory.
   std::vector<std::shared_ptr<const Tile>> resident;
-  bool has_nonresident = false;
+  bool has_non_resident = false;
 };
 
-/// The columns that tiles of the view touch.
+/// All columns that tiles of the view touch.
 [[nodiscard]] std::map<OctreeColumn, ColumnTiles> columns_of(const MapSnapshot& view,
                                                              double resolution_m);
 
-/// Makes all of these columns unknown, at the cost of a copy of what is left.
+/// Makes these columns unknown. Copies the rest of the octree.
 void evict_columns(octomap::OcTree& octree, const std::set<OctreeColumn>& columns);
 
 }  // namespace stillmap

@@ -7,7 +7,7 @@
 namespace stillmap {
 namespace {
 
-/// Puts two zero bits between the bits of a 14-bit number.
+/// Inserts two zero bits after each bit of a 14-bit number.
 std::uint64_t spread(std::uint64_t bits) {
   bits = (bits | bits << 16U) & 0x030000FF0000FFULL;
   bits = (bits | bits << 8U) & 0x0300F00F00F00FULL;
@@ -15,7 +15,7 @@ std::uint64_t spread(std::uint64_t bits) {
   return (bits | bits << 2U) & 0x09249249249249ULL;
 }
 
-/// Of a brick's key: x, y and z, 14 bits each.
+/// Morton code of a brick's key.
 std::uint64_t order_of(std::uint64_t key) {
   constexpr std::uint64_t all = (1U << 14U) - 1U;
   return spread(key >> 28U) | spread(key >> 14U & all) << 1U | spread(key & all) << 2U;
@@ -28,11 +28,11 @@ bool is_solid(const LabelledScan& scan, std::size_t i, const ScanUpdateOptions& 
   return use.unknown_is_solid || scan.label(i) != SemanticClass::unlabeled;
 }
 
-/// Everything in voxels, from the octree's corner.
-class Gathering {
+/// Positions are in voxels from the octree's lowest corner.
+class HitsAndMisses {
  public:
-  Gathering(const OccupancyConfig& config, const Eigen::Isometry3d& T_map_lidar,
-            VoxelBricks& bricks)
+  HitsAndMisses(const OccupancyConfig& config, const Eigen::Isometry3d& T_map_lidar,
+                VoxelBricks& bricks)
       : config_(config),
         T_map_lidar_(T_map_lidar),
         bricks_(bricks),
@@ -52,7 +52,7 @@ class Gathering {
     const double range_m = p_lidar.norm();
     const double margin_m = config_.clear_margin_m + config_.clear_margin_share * range_m;
     const double length_m = std::min(range_m - margin_m, config_.clear_range_m);
-    // Also false for NaN and infinite points.
+    // Negated so that NaN fails.
     if (!(length_m > 0.0) || !std::isfinite(range_m)) return;
     const Eigen::Vector3d direction = T_map_lidar_.linear() * (p_lidar / range_m);
     const double length = length_m / config_.resolution_m;
@@ -98,7 +98,7 @@ VoxelBrick& VoxelBricks::find_or_make(std::uint64_t key) {
 std::span<const VoxelBrick> VoxelBricks::sorted() {
   for (VoxelBrick& brick : bricks_) brick.misses &= ~brick.hits;
   std::ranges::sort(bricks_, {}, &VoxelBrick::order);
-  // Places in the list are others now.
+  // Sorting invalidates the indices.
   index_.clear();
   last_key_ = no_key;
   return bricks_;
@@ -107,13 +107,13 @@ std::span<const VoxelBrick> VoxelBricks::sorted() {
 void compute_scan_update(const OccupancyConfig& config, const LabelledScan& scan,
                          const Eigen::Isometry3d& T_map_lidar, const ScanUpdateOptions& use,
                          VoxelBricks& bricks, const ThrottleCallback& throttle) {
-  Gathering gathering(config, T_map_lidar, bricks);
-  if (!gathering.lidar_is_inside()) return;
+  HitsAndMisses collected(config, T_map_lidar, bricks);
+  if (!collected.lidar_is_inside()) return;
   for (std::size_t i = 0; i < scan.scan.size(); ++i) {
     if (throttle && i % points_between_throttle_calls == 0) throttle();
     const Eigen::Vector3d p_lidar = scan.scan.points_lidar[i].cast<double>();
-    if (is_solid(scan, i, use)) gathering.hit(p_lidar);
-    if (use.clear_free_space) gathering.clear_towards(p_lidar);
+    if (is_solid(scan, i, use)) collected.hit(p_lidar);
+    if (use.clear_free_space) collected.clear_towards(p_lidar);
   }
 }
 

@@ -15,28 +15,28 @@
 
 namespace stillmap {
 
-/// 4 x 4 x 4 voxels, one bit each, in the octree's own order: bit 8 * octant + child.
+/// 4 x 4 x 4 voxels, one bit each, in the octree's child order: bit 8 * octant + child.
 struct VoxelBrick {
-  /// Place among all bricks in the octree's order (x, y, z bits interleaved).
+  /// Morton code of the brick (x, y, z bits interleaved): the octree's traversal order.
   std::uint64_t order = 0;
-  /// Voxels that points fell into.
+  /// Voxels that contain points.
   std::uint64_t hits = 0;
-  /// Voxels that rays passed.
+  /// Voxels that rays traversed.
   std::uint64_t misses = 0;
-  /// Octants where a ray ended already.
+  /// Octants in which a ray has ended.
   std::uint64_t ray_ends = 0;
 };
 
-/// What one scan tells of the voxels round it, gathered before the octree is touched, so that each
-/// voxel changes once a scan. Keeps its memory from scan to scan.
+/// Hits and misses of one scan, collected before the octree is changed, so that each voxel is
+/// updated once a scan. Keeps its memory from scan to scan.
 class VoxelBricks {
  public:
   void clear();
 
-  /// The brick of the voxel, made if need be; valid until the next call.
+  /// The brick that holds the voxel, created if missing; valid until the next call.
   [[nodiscard]] VoxelBrick& brick_of(const VoxelKey& voxel) {
     const std::uint64_t key = key_of(voxel);
-    // Rays and surfaces stay in a brick for some voxels.
+    // Consecutive voxels of a ray or surface mostly share a brick.
     return key == last_key_ ? bricks_[last_] : find_or_make(key);
   }
   /// The voxel's bit in its brick.
@@ -48,25 +48,25 @@ class VoxelBricks {
     return std::uint64_t{0xFF} << (8U * corner(voxel, 1));
   }
 
-  /// All bricks in the octree's order; a voxel that was hit is not a miss, too.
+  /// All bricks in the octree's order; hits take precedence over misses.
   [[nodiscard]] std::span<const VoxelBrick> sorted();
 
  private:
-  /// Neighbouring bricks must not share slots.
+  /// Spreads neighbouring bricks over the table.
   struct KeyHash {
     std::size_t operator()(std::uint64_t key) const { return key * 0x9E3779B97F4A7C15ULL >> 20U; }
   };
 
   static constexpr std::uint64_t no_key = ~std::uint64_t{0};
 
-  /// Octant or child: one bit of each coordinate.
+  /// Octant or child index: one bit of each coordinate.
   [[nodiscard]] static unsigned corner(const VoxelKey& voxel, unsigned bit) {
     return (static_cast<unsigned>(voxel.x()) >> bit & 1U) |
            (static_cast<unsigned>(voxel.y()) >> bit & 1U) << 1U |
            (static_cast<unsigned>(voxel.z()) >> bit & 1U) << 2U;
   }
 
-  /// The brick's x, y and z, 14 bits each.
+  /// The brick's x, y and z indices, 14 bits each.
   [[nodiscard]] static std::uint64_t key_of(const VoxelKey& voxel) {
     const auto part = [](std::int32_t v) { return static_cast<std::uint64_t>(v) >> 2U; };
     return part(voxel.x()) << 28U | part(voxel.y()) << 14U | part(voxel.z());
@@ -79,10 +79,11 @@ class VoxelBricks {
   std::uint32_t last_ = 0;
 };
 
-/// Gathers what a scan tells: the voxels of its stationary points, and, where it clears, those that
-/// its rays pass within the clearing range, points of movable things included. One ray for each
-/// cube of 2 x 2 x 2 voxels that rays end in. Points that are not finite, or outside the octree,
-/// tell nothing; nor does a scan whose lidar is outside.
+/// Collects the hits and misses of a scan: hits are the voxels of its stationary points; misses, if
+/// it clears, the voxels that the rays of all its points traverse within the clearing range, one
+/// ray for each cube of 2 x 2 x 2 voxels in which rays end. Points that are not finite or outside
+/// the octree are ignored, as is a scan whose lidar is outside. `throttle` is called between
+/// points.
 void compute_scan_update(const OccupancyConfig& config, const LabelledScan& scan,
                          const Eigen::Isometry3d& T_map_lidar, const ScanUpdateOptions& use,
                          VoxelBricks& bricks, const ThrottleCallback& throttle = {});

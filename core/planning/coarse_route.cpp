@@ -23,7 +23,7 @@ constexpr std::array<Step, 8> steps{
     Step{1, 0, 1.0},      Step{-1, 0, 1.0},      Step{0, 1, 1.0},       Step{0, -1, 1.0},
     Step{1, 1, diagonal}, Step{1, -1, diagonal}, Step{-1, 1, diagonal}, Step{-1, -1, diagonal}};
 
-/// A* over squares of cells; a square is as good as its best cell, so that no gap is closed.
+/// A* over squares of cells. A square has the cost of its cheapest cell, so that no gap is closed.
 class Squares {
  public:
   Squares(const PlanningGrid& grid, int cells)
@@ -41,7 +41,7 @@ class Squares {
     }
   }
 
-  /// From the start to a square that the search has reached [squares].
+  /// Cost from the start to a square that the search has reached [squares].
   [[nodiscard]] double cost_to(CellIndex square) const { return costs_(square.x, square.y); }
 
   [[nodiscard]] CellIndex square_of(const Eigen::Vector2d& position_map) const {
@@ -49,7 +49,7 @@ class Squares {
     return {cell.x / cells_, cell.y / cells_};
   }
 
-  /// Whether the goal was reached.
+  /// Returns whether the goal was reached.
   bool search(CellIndex start, CellIndex goal) {
     if (factor(start) == blocked || factor(goal) == blocked) return false;
     costs_(start.x, start.y) = 0.0F;
@@ -63,8 +63,8 @@ class Squares {
     return false;
   }
 
-  /// Centres of the squares on the way. @pre search() was true
-  [[nodiscard]] std::vector<Eigen::Vector2d> way(CellIndex start, CellIndex goal) const {
+  /// Centres of the squares on the route. @pre search() returned true
+  [[nodiscard]] std::vector<Eigen::Vector2d> route(CellIndex start, CellIndex goal) const {
     std::vector<Eigen::Vector2d> points_map;
     for (CellIndex square = goal; square != start;) {
       points_map.push_back(centre_of(square));
@@ -115,7 +115,7 @@ class Squares {
 
 constexpr double pi = std::numbers::pi;
 
-/// Headings of the route, over some metres: its own steps go in eight directions only.
+/// The route with headings averaged over some metres: its steps have eight directions only.
 std::vector<PlanarPose> with_headings(const CoarseRoute& route) {
   constexpr double smoothing_m = 2.5;
   const auto reach = static_cast<std::size_t>(std::ceil(smoothing_m / route.step_m));
@@ -143,7 +143,7 @@ std::optional<CoarseRoute> find_coarse_route(const PlanningGrid& grid,
   CoarseRoute route;
   route.step_m = cells * grid.cell_m();
   route.cost = squares.cost_to(goal) * route.step_m;
-  route.points_map = squares.way(start, goal);
+  route.points_map = squares.route(start, goal);
   route.points_map.insert(route.points_map.begin(), start_map);
   route.points_map.push_back(goal_map);
   for (std::size_t i = 1; i < route.points_map.size(); ++i) {
@@ -165,7 +165,7 @@ PlanarPose PoseSampler::draw() {
 }
 
 PlanarPose PoseSampler::draw_beside_route() {
-  // Poses right on the route join smoothly; others get round what the route cuts close.
+  // Poses on the route connect smoothly; those beside it pass obstacles that it grazes.
   constexpr double max_deviation_m = 2.0;
   constexpr double max_turn_rad = 0.5;
   const auto i = static_cast<std::size_t>(uniform(0.0, static_cast<double>(route_.size())));
@@ -185,7 +185,7 @@ PlanarPose PoseSampler::draw_near_an_end() {
 }
 
 PlanarPose PoseSampler::draw_anywhere() {
-  // Of a map most is no place to stand; a search can do with a useless pose now and then.
+  // Most of a map is not free. An occasional colliding sample does no harm.
   constexpr int max_tries = 200;
   const Eigen::AlignedBox2d& box_map = grid_.bounds_map();
   PlanarPose pose;

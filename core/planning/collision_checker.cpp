@@ -28,7 +28,7 @@ double CollisionChecker::length_m(const PlanarPose& a, const PlanarPose& b) cons
 
 void CollisionChecker::visit(const PlanarPose& a, const PlanarPose& b,
                              const std::function<bool(const CurvePose&)>& visit_pose) const {
-  ++curves_seen_;
+  ++checked_curves_;
   curves_.visit_between(a, b, 0.5 * grid_.cell_m(), grid_.profile().circumscribed_radius_m(),
                         visit_pose);
 }
@@ -52,15 +52,15 @@ double CollisionChecker::cost(const PlanarPose& a, const PlanarPose& b) const {
 
 std::optional<std::vector<PathPoint>> CollisionChecker::connect(const PlanarPose& a,
                                                                 const PlanarPose& b) const {
-  std::vector<PathPoint> driven;
+  std::vector<PathPoint> path;
   double sum = 0.0;
   bool is_free = true;
   visit(a, b, [&](const CurvePose& pose) {
     is_free = grid_.is_free(pose.pose);
-    if (is_free) driven.push_back({pose, sum += step_cost(pose)});
+    if (is_free) path.push_back({pose, sum += step_cost(pose)});
     return is_free;
   });
-  return is_free ? std::optional(std::move(driven)) : std::nullopt;
+  return is_free ? std::optional(std::move(path)) : std::nullopt;
 }
 
 }  // namespace stillmap

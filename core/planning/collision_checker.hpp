@@ -10,32 +10,32 @@
 
 namespace stillmap {
 
-/// A pose of a path that a robot drives.
+/// A pose of a path.
 struct PathPoint {
   CurvePose at;
-  /// From the path's start to here.
+  /// Cost from the path's start.
   double cost = 0.0;
 };
 
-/// Whether and at what cost a robot drives from one pose to another on its shortest curve. Poses
-/// are looked at as close together as check_path looks at them, and answers agree with it. Not
-/// thread-safe.
+/// Collision check and cost of the shortest curve between two poses. Poses are tested at the
+/// spacing of check_path, so that results agree with it. NOT thread-safe.
 class CollisionChecker {
  public:
-  /// A metre backwards costs as much as `reverse_factor` forwards. The grid must outlive it.
+  /// A metre in reverse costs `reverse_factor` times one forwards. The grid must outlive the
+  /// checker.
   CollisionChecker(const PlanningGrid& grid, double reverse_factor);
 
   [[nodiscard]] const PlanningGrid& grid() const { return grid_; }
-  /// Of the curve from a to b, whether free or not; never above its cost [m].
+  /// Length of the curve from a to b, whether free or not; at most its cost [m].
   [[nodiscard]] double length_m(const PlanarPose& a, const PlanarPose& b) const;
-  /// Of the curve: metres times the cost of the cells under the pose; infinite when it is not free.
+  /// Metres times cost factor of the cells under the poses; infinite if the curve is not free.
   [[nodiscard]] double cost(const PlanarPose& a, const PlanarPose& b) const;
-  /// The curve's poses after a, costs counted from a; nothing when it is not free.
+  /// The curve's poses after a, with costs from a; nothing if it is not free.
   [[nodiscard]] std::optional<std::vector<PathPoint>> connect(const PlanarPose& a,
                                                               const PlanarPose& b) const;
 
-  /// Curves that were looked at so far: a measure of work that is the same on every machine.
-  [[nodiscard]] std::uint64_t curves() const { return curves_seen_; }
+  /// Number of curves checked so far: a measure of work that does not depend on the machine.
+  [[nodiscard]] std::uint64_t curves() const { return checked_curves_; }
 
  private:
   void visit(const PlanarPose& a, const PlanarPose& b,
@@ -45,8 +45,8 @@ class CollisionChecker {
   const PlanningGrid& grid_;
   ReedsSheppCurves curves_;
   double reverse_factor_;
-  mutable std::uint64_t curves_seen_ = 0;
-  /// Planners ask for a curve's cost and then whether it is free.
+  mutable std::uint64_t checked_curves_ = 0;
+  /// Cache of one curve: planners ask for its cost and then whether it is free.
   struct Answer {
     PlanarPose a;
     PlanarPose b;
@@ -55,8 +55,8 @@ class CollisionChecker {
   mutable std::optional<Answer> last_;
 };
 
-/// The turning radius that curves are made with: the profile's, or for a robot that turns on the
-/// spot half a cell [m].
+/// Radius of the curves: the profile's minimum turning radius, but at least half a cell, which
+/// stands for turning on the spot [m].
 [[nodiscard]] double curve_radius_m(const RobotProfile& profile, double cell_m);
 
 }  // namespace stillmap

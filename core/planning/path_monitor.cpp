@@ -8,14 +8,14 @@
 namespace stillmap {
 namespace {
 
-std::string in_words(const PathConflict& conflict) {
+std::string text_of(const PathConflict& conflict) {
   std::ostringstream text;
   text << "not free any more: " << name(conflict.reason) << " at (" << conflict.cell_centre_map.x()
        << ", " << conflict.cell_centre_map.y() << "), " << conflict.along_m << " m along";
   return text.str();
 }
 
-std::string in_words(TileId id, std::size_t count) {
+std::string text_of(TileId id, std::size_t count) {
   std::ostringstream text;
   text << "tile " << id.x << " " << id.y;
   if (count > 1) text << " and " << count - 1 << " more";
@@ -32,7 +32,7 @@ PathMonitor::PathMonitor(const TraversabilityView& view, const PathPlan& plan)
       tiles_(view.tiles),
       on_path_(tiles_on_path(view)) {}
 
-/// Those that the robot's circle touches at one of the poses.
+/// The tiles that the circumscribed circle touches at any pose.
 PathMonitor::Tiles PathMonitor::tiles_on_path(const TraversabilityView& view) const {
   const double reach_m = view.profile.circumscribed_radius_m();
   std::set<TileId> touched;
@@ -75,8 +75,8 @@ std::optional<ReplanReason> PathMonitor::update(const TraversabilityView& view) 
   on_path_ = std::move(now);
   if (changed.empty()) return std::nullopt;
   const PathCheck check = check_path(view, path_map_);
-  if (check.conflict) return ReplanReason{in_words(*check.conflict), check.conflict};
-  return ReplanReason{in_words(changed.front(), changed.size()), std::nullopt};
+  if (check.conflict) return ReplanReason{text_of(*check.conflict), check.conflict};
+  return ReplanReason{text_of(changed.front(), changed.size()), std::nullopt};
 }
 
 }  // namespace stillmap

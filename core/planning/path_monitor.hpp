@@ -11,22 +11,21 @@
 
 namespace stillmap {
 
-/// Why a path should be planned anew.
+/// Why a path should be replanned.
 struct ReplanReason {
-  /// In words.
   std::string reason;
-  /// Where the path is not free any more; nothing when only the way changed.
+  /// The conflict; nothing if the path is still free and only its tiles changed.
   std::optional<PathConflict> conflict;
 };
 
-/// Remembers a path and the tiles that it was planned on, and tells when a newer state of the map
-/// asks for another one.
+/// Keeps a path with the tiles that it was planned on and detects when a newer snapshot of the map
+/// requires replanning.
 class PathMonitor {
  public:
   PathMonitor(const TraversabilityView& view, const PathPlan& plan);
 
-  /// When the path is not free any more, or a tile under the robot's way appeared, went or has
-  /// other cells than before; nothing when the path can stay. A later call compares with this view.
+  /// A reason if the path has a conflict or a tile along it was added, removed or changed; nothing
+  /// if the path is still valid. The next call compares with this view.
   [[nodiscard]] std::optional<ReplanReason> update(const TraversabilityView& view);
 
  private:
@@ -37,7 +36,7 @@ class PathMonitor {
   std::vector<PlanarPose> path_map_;
   bool was_found_;
   std::uint64_t map_id_;
-  /// Of the last view: a tile that is the same object has the same cells.
+  /// Of the last view. Equal pointers mean equal cells.
   std::vector<std::shared_ptr<const TraversabilityTile>> tiles_;
   Tiles on_path_;
 };

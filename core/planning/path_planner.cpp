@@ -30,49 +30,49 @@ std::string text_of(const Eigen::Vector2d& position_map) {
   return text.str();
 }
 
-std::string fault_of(const TraversabilityView& view, const Goal& place) {
+std::string fault_of(const TraversabilityView& view, const Goal& goal) {
   std::ostringstream text;
-  if (!view.cell_of(place.position_map)) {
-    text << "position " << text_of(place.position_map)
+  if (!view.cell_of(goal.position_map)) {
+    text << "position " << text_of(goal.position_map)
          << "; must be finite and within 100 km of the map's origin";
-  } else if (place.heading_rad && !(std::abs(*place.heading_rad) <= 1e6)) {
-    text << "heading " << *place.heading_rad << "; must be finite [rad]";
+  } else if (goal.heading_rad && !(std::abs(*goal.heading_rad) <= 1e6)) {
+    text << "heading " << *goal.heading_rad << "; must be finite [rad]";
   }
   return text.str();
 }
 
-/// The poses at a place at which the robot is free: all headings asked for.
-struct Stand {
+/// The free poses at a start or goal: at its heading, or at any of several.
+struct FreePoses {
   std::vector<PlanarPose> poses;
-  /// Of the first heading, when none is free.
+  /// At the first heading that is not free.
   std::optional<PathConflict> conflict;
 };
 
-Stand stand_at(const TraversabilityView& view, const Goal& place) {
+FreePoses free_poses_at(const TraversabilityView& view, const Goal& goal) {
   constexpr int any_headings = 16;
-  const int headings = place.heading_rad ? 1 : any_headings;
-  Stand stand;
+  const int headings = goal.heading_rad ? 1 : any_headings;
+  FreePoses free;
   for (int i = 0; i < headings; ++i) {
-    const PlanarPose pose{place.position_map,
-                          place.heading_rad.value_or(2.0 * pi * i / any_headings)};
+    const PlanarPose pose{goal.position_map,
+                          goal.heading_rad.value_or(2.0 * pi * i / any_headings)};
     const PathCheck check = check_path(view, std::span(&pose, 1));
-    if (check.is_free) stand.poses.push_back(pose);
-    if (!stand.conflict) stand.conflict = check.conflict;
+    if (check.is_free) free.poses.push_back(pose);
+    if (!free.conflict) free.conflict = check.conflict;
   }
-  return stand;
+  return free;
 }
 
-PathPlan blocked(const TraversabilityView& view, PlanStatus status, const Goal& place,
-                 const Stand& stand) {
+PathPlan blocked(const TraversabilityView& view, PlanStatus status, const Goal& goal,
+                 const FreePoses& free) {
   PathPlan plan = failed(view, status, "");
   std::ostringstream text;
-  text << "'" << view.profile.name << "' cannot stand at " << text_of(place.position_map);
-  if (stand.conflict) {
-    plan.conflict = stand.conflict;
-    text << ": " << name(stand.conflict->reason) << " at "
-         << text_of(stand.conflict->cell_centre_map);
+  text << "'" << view.profile.name << "' cannot stand at " << text_of(goal.position_map);
+  if (free.conflict) {
+    plan.conflict = free.conflict;
+    text << ": " << name(free.conflict->reason) << " at "
+         << text_of(free.conflict->cell_centre_map);
   }
-  const NearestTraversable nearby = nearest_traversable(view, place.position_map);
+  const NearestTraversable nearby = nearest_traversable(view, goal.position_map);
   if (nearby.status == TraversabilityStatus::ok) {
     plan.nearby = nearby;
     text << "; the nearest free place is " << text_of(nearby.position_map) << ", "
@@ -82,7 +82,7 @@ PathPlan blocked(const TraversabilityView& view, PlanStatus status, const Goal& 
   return plan;
 }
 
-/// Everything that a search may need: the map, and both ends where unknown ground is allowed.
+/// The map, extended to start and goal, which may lie outside it on unknown ground.
 Eigen::AlignedBox2d search_box(const TraversabilityView& view, const Goal& from, const Goal& to) {
   Eigen::AlignedBox2d box = view.bounds_map();
   box.extend(from.position_map);
@@ -109,8 +109,8 @@ void set_poses(const TraversabilityView& view, std::span<const PathPoint> path, 
   plan.cost = path.back().cost;
 }
 
-/// Fills in the path if check_path finds it free, thinned out where that stays free.
-bool take_path(const TraversabilityView& view, const std::vector<PathPoint>& path, PathPlan& plan) {
+/// Sets the path if check_path finds it free; downsampled if it then stays free.
+bool set_path(const TraversabilityView& view, const std::vector<PathPoint>& path, PathPlan& plan) {
   constexpr double spacing_m = 0.25;
   for (const std::vector<PathPoint>& candidate : {downsampled(path, spacing_m), path}) {
     set_poses(view, candidate, plan);
@@ -126,11 +126,11 @@ bool take_path(const TraversabilityView& view, const std::vector<PathPoint>& pat
 
 struct FoundPath {
   std::vector<PathPoint> poses;
-  /// Else it leads to the place nearest to the goal that was reached.
+  /// If not, it leads to the nearest pose reached.
   bool reaches_goal = false;
 };
 
-/// Near what the coarse route costs, with some way to turn round at both ends.
+/// Whether the path costs about as much as the coarse route, plus turns at both ends.
 bool is_good(const FoundPath& path, const CoarseRoute& route, const RobotProfile& profile) {
   constexpr double factor = 1.1;
   constexpr double turns_in_radii = 4.0;
@@ -145,9 +145,9 @@ bool is_better(const FoundPath& a, const FoundPath& b) {
 }
 
 std::vector<PathPoint> smoothed(const CollisionChecker& checker, std::vector<PathPoint> path,
-                                std::span<const PlanarPose> goals, int tries,
+                                std::span<const PlanarPose> goals, int attempts,
                                 const PlanningConfig& config) {
-  return smooth_path(checker, std::move(path), goals, tries, config.seed, config.should_stop);
+  return smooth_path(checker, std::move(path), goals, attempts, config.seed, config.should_stop);
 }
 
 std::optional<FoundPath> attempt(const CollisionChecker& checker, const CoarseRoute& route,
@@ -165,14 +165,15 @@ std::optional<FoundPath> attempt(const CollisionChecker& checker, const CoarseRo
   if (found.waypoints.empty()) return std::nullopt;
   auto poses = connect_waypoints(checker, found.waypoints);
   if (!poses) return std::nullopt;
-  // Enough to compare it with others.
-  const int tries = found.reaches_goal ? config.smoothing_attempts / 4 : 0;
-  return FoundPath{smoothed(checker, *std::move(poses), goals, tries, config), found.reaches_goal};
+  // Enough smoothing to compare it with others.
+  const int attempts = found.reaches_goal ? config.smoothing_attempts / 4 : 0;
+  return FoundPath{smoothed(checker, *std::move(poses), goals, attempts, config),
+                   found.reaches_goal};
 }
 
-/// The cheapest of some searches with different seeds, smoothed: the first path that a search finds
-/// may drive half the way backwards. Stops when a path costs about as much as the coarse route.
-/// Adds the steps that it took to `steps`.
+/// The cheapest path of several searches with different seeds, smoothed: the first path of a search
+/// may be half in reverse. Stops at a path that costs about as much as the coarse route. Adds the
+/// steps used to `steps`.
 std::optional<FoundPath> find_best_path(const CollisionChecker& checker, const CoarseRoute& route,
                                         std::span<const PlanarPose> starts,
                                         std::span<const PlanarPose> goals,
@@ -191,7 +192,7 @@ std::optional<FoundPath> find_best_path(const CollisionChecker& checker, const C
   return best;
 }
 
-/// One search between two ends at which the robot can stand.
+/// The search between a start and a goal that are free.
 class Search {
  public:
   Search(const TraversabilityView& view, const Goal& from, const Goal& to,
@@ -215,7 +216,7 @@ class Search {
     PathPlan plan = failed(view_, PlanStatus::out_of_time, "");
     plan.route_m = route->length_m;
     const auto best = find_best_path(checker_, *route, starts, goals, config_, plan.steps);
-    if (best && take_path(view_, best->poses, plan) && best->reaches_goal) {
+    if (best && set_path(view_, best->poses, plan) && best->reaches_goal) {
       plan.status = PlanStatus::found;
     } else {
       plan.reason = reason_for(plan, goals);
@@ -246,8 +247,8 @@ class Search {
   CollisionChecker checker_;
 };
 
-/// Whether the robot is there already.
-bool is_same_place(const PlanarPose& start, const Goal& to) {
+/// Whether the start is at the goal.
+bool is_at_goal(const PlanarPose& start, const Goal& to) {
   constexpr double same_m = 1e-3;
   constexpr double same_rad = 1e-3;
   if ((start.position_map - to.position_map).norm() > same_m) return false;
@@ -277,13 +278,13 @@ PathPlan plan_path(const TraversabilityView& view, const Goal& from, const Goal&
   const std::string faults = config.faults();
   if (!faults.empty()) throw std::invalid_argument("planning: " + faults);
   if (auto refused = refusal(view, from, to)) return *std::move(refused);
-  const Stand start = stand_at(view, from);
+  const FreePoses start = free_poses_at(view, from);
   if (start.poses.empty()) return blocked(view, PlanStatus::start_blocked, from, start);
-  const Stand goal = stand_at(view, to);
+  const FreePoses goal = free_poses_at(view, to);
   if (goal.poses.empty()) return blocked(view, PlanStatus::goal_blocked, to, goal);
-  if (is_same_place(start.poses.front(), to)) {
+  if (is_at_goal(start.poses.front(), to)) {
     PathPlan plan = failed(view, PlanStatus::found, "");
-    (void)take_path(view, {{{start.poses.front(), 0.0, false}, 0.0}}, plan);
+    (void)set_path(view, {{{start.poses.front(), 0.0, false}, 0.0}}, plan);
     return plan;
   }
   return Search(view, from, to, config).run(start.poses, goal.poses);

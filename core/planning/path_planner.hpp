@@ -13,58 +13,59 @@
 
 namespace stillmap {
 
-/// OMPL's planners that can be chosen.
+/// Available planners of OMPL.
 enum class PlannerKind : std::uint8_t { rrt_connect, rrt_star, bit_star };
 inline constexpr std::size_t planner_kind_count = 3;
 
 [[nodiscard]] std::string_view name(PlannerKind kind);
 
-/// How hard plan_path looks for a path, and what a path costs.
+/// Costs and limits of plan_path.
 struct PlanningConfig {
   PlannerKind planner = PlannerKind::rrt_connect;
-  /// Draw most poses beside the coarse route instead of everywhere.
+  /// Samples most poses around the coarse route instead of uniformly.
   bool route_guided = true;
-  /// A metre over a cell of the highest cost is as long as this many metres more.
+  /// Additional cost of a metre over a cell of the highest cost.
   double cost_weight = 4.0;
-  /// A metre backwards is as long as this many forwards; 1 or more.
+  /// Cost of a metre in reverse, relative to one forwards; at least 1.
   double reverse_factor = 3.0;
-  /// Curves looked at and rounds of the planner, at most.
+  /// Limit of curves checked plus iterations of the planner.
   std::uint64_t max_steps = 60'000;
-  /// Searches with other seeds, at most, as long as the best path costs much more than the coarse
-  /// route.
+  /// Limit of searches with different seeds, as long as the best path costs much more than the
+  /// coarse route.
   std::uint32_t max_attempts = 8;
-  /// Attempts to shorten the path that was found.
+  /// Attempts to shorten the path.
   int smoothing_attempts = 1000;
-  /// Same map, question, configuration and seed: same path, unless `should_stop` cut it short.
+  /// Equal map, request, configuration and seed give the same path, unless `should_stop` ended the
+  /// search.
   std::uint32_t seed = 1;
-  /// Asked all the time; when true, the best path so far is taken. May be empty.
+  /// Polled; when true, the best path so far is returned. May be empty.
   std::function<bool()> should_stop;
-  /// Told the cost of every better path as the search finds it. May be empty.
+  /// Called with the cost of every better path. May be empty.
   std::function<void(double)> improved;
 
-  /// Every fault in words, one a line; empty when it can be used.
+  /// One line for each invalid value; empty when the configuration is valid.
   [[nodiscard]] std::string faults() const;
 };
 
-/// A place to plan from or to.
+/// Start or goal of a path.
 struct Goal {
   Eigen::Vector2d position_map = Eigen::Vector2d::Zero();
-  /// From x towards y; without one, any heading will do.
+  /// Counterclockwise from x; any heading if not set.
   std::optional<double> heading_rad;
 };
 
 enum class PlanStatus : std::uint8_t {
   found,
-  /// The question makes no sense: `reason` names the value and what would do.
+  /// `reason` names the invalid value and the valid ones.
   invalid_request,
-  /// The robot cannot stand at the start; `conflict` says why, `nearby` where it could.
+  /// The robot collides at the start: see `conflict` and `nearby`.
   start_blocked,
   /// As start_blocked, of the goal.
   goal_blocked,
-  /// No way over known ground is wide enough: more time would not help.
+  /// No path over known ground is wide enough; more steps would not help.
   no_path,
-  /// There may be a way; the search ended before one was found that the robot can drive. `poses`
-  /// is the way to the nearest place reached.
+  /// The search ended before it found a path; there may be one. `poses` lead to the nearest pose
+  /// reached.
   out_of_time,
 };
 
@@ -73,37 +74,37 @@ enum class PlanStatus : std::uint8_t {
 /// A pose of a planned path.
 struct PlannedPose {
   PlanarPose pose;
-  /// Of the ground, map frame [m]; 0 where nobody knows it.
+  /// Height of the ground, map frame [m]; 0 where unknown.
   double height_m = 0.0;
-  /// Way from the start [m].
+  /// Distance along the path [m].
   double along_m = 0.0;
-  /// The robot comes here driving backwards.
+  /// Whether the robot drives to it in reverse.
   bool is_reverse = false;
 };
 
-/// A path for a robot, or why there is none.
+/// A path, or why there is none.
 struct PathPlan {
   PlanStatus status = PlanStatus::found;
   std::string reason;
-  /// Of a blocked start or goal.
+  /// At a blocked start or goal.
   std::optional<PathConflict> conflict;
-  /// The nearest free place, when start or goal is blocked and there is one.
+  /// The free cell nearest to a blocked start or goal, if any.
   std::optional<NearestTraversable> nearby;
 
-  /// From start to goal; check_path says of them that they are free.
+  /// From start to goal; free according to check_path.
   std::vector<PlannedPose> poses;
   double length_m = 0.0;
-  /// Part of it that is driven backwards [m].
+  /// Part of it in reverse [m].
   double reverse_m = 0.0;
   /// Part of it on inferred ground [m].
   double inferred_m = 0.0;
-  /// Smallest distance from the footprint to something lethal [m], at most clearance_limit_m.
+  /// Smallest distance from the footprint to a lethal cell [m], at most clearance_limit_m.
   double clearance_m = 0.0;
-  /// Metres, each times the cost of its cell (1 and more) and of its direction.
+  /// Metres times the cost factors of cell (at least 1) and direction.
   double cost = 0.0;
-  /// Of the coarse route that guided the search [m].
+  /// Length of the coarse route [m].
   double route_m = 0.0;
-  /// Steps of the search.
+  /// Steps used by the search.
   std::uint64_t steps = 0;
   std::uint64_t map_version = 0;
 
@@ -112,13 +113,13 @@ struct PathPlan {
   [[nodiscard]] std::vector<PlanarPose> path_map() const;
 };
 
-/// A path of the view's robot from one place to another: over free cells, or unknown ones where the
-/// profile allows it, with its whole footprint at every pose, and no tighter than its turning
-/// radius. The coarse route over cells tells at once when there is no way; OMPL finds the path that
-/// the robot can drive. A path is looked at by check_path before it is given.
+/// Plans a path for the view's robot: the whole footprint stays on free cells (or unknown ones, if
+/// the profile allows them) at every pose, and curves keep to the minimum turning radius. A coarse
+/// route over the cells detects early that there is no path; OMPL then searches around it.
+/// check_path verifies every path that is returned.
 ///
-/// Not to be called by two threads at once: OMPL's seed is global.
-/// Throws std::invalid_argument for a configuration with faults.
+/// NOT thread-safe: OMPL's seed is global. Throws std::invalid_argument for a configuration with
+/// faults.
 [[nodiscard]] PathPlan plan_path(const TraversabilityView& view, const Goal& from, const Goal& to,
                                  const PlanningConfig& config = {});
 

@@ -28,7 +28,7 @@ PlanarPose pose_of(const ob::State* state) {
 void set(ob::State* state, const PlanarPose& pose) {
   auto* target = state->as<PoseState>();
   target->setXY(pose.position_map.x(), pose.position_map.y());
-  // OMPL's angles are from -pi to below pi.
+  // OMPL's angles are in [-pi, pi).
   const double yaw_rad = std::remainder(pose.heading_rad, 2.0 * std::numbers::pi);
   target->setYaw(yaw_rad >= std::numbers::pi ? -std::numbers::pi : yaw_rad);
 }
@@ -61,7 +61,7 @@ class FreeCurve final : public ob::MotionValidator {
   const CollisionChecker& checker_;
 };
 
-/// Our poses for planners that ask for a plain sampler.
+/// PoseSampler for planners that use a plain sampler.
 class PlainSampler final : public ob::StateSampler {
  public:
   PlainSampler(const ob::StateSpace* space, PoseSampler& poses)
@@ -79,7 +79,7 @@ class PlainSampler final : public ob::StateSampler {
   PoseSampler& poses_;
 };
 
-/// Our poses for planners that only want those that can still shorten the path.
+/// PoseSampler for planners that use only samples that can improve the path.
 class InformedPoses final : public ob::InformedSampler {
  public:
   InformedPoses(const ob::ProblemDefinitionPtr& problem, unsigned int tries, PoseSampler& poses)
@@ -110,7 +110,7 @@ class CurveCost final : public ob::OptimizationObjective {
             PoseSampler& poses, const Eigen::Vector2d& goal_map)
       : OptimizationObjective(space), checker_(checker), poses_(poses) {
     description_ = "cost of driving";
-    // All goals are one place with several headings.
+    // All goals share one position.
     setCostToGoHeuristic([goal_map](const ob::State* state, const ob::Goal*) {
       return ob::Cost((pose_of(state).position_map - goal_map).norm());
     });
@@ -175,7 +175,7 @@ ob::ProblemDefinitionPtr make_problem(const ob::SpaceInformationPtr& space,
 }
 
 ob::PlannerPtr make_planner(PlannerKind kind, const ob::SpaceInformationPtr& space) {
-  // Longer curves seldom stay on a street.
+  // Longer curves are rarely free of collisions in streets.
   constexpr double max_step_m = 15.0;
   switch (kind) {
     case PlannerKind::rrt_star: {
@@ -196,8 +196,8 @@ ob::PlannerPtr make_planner(PlannerKind kind, const ob::SpaceInformationPtr& spa
   return planner;
 }
 
-void tell_of_improvements(ob::ProblemDefinition& problem,
-                          const std::function<void(double)>& improved) {
+void report_improvements(ob::ProblemDefinition& problem,
+                         const std::function<void(double)>& improved) {
   if (!improved) return;
   problem.setIntermediateSolutionCallback(
       [improved](const ob::Planner*, const std::vector<const ob::State*>&, const ob::Cost cost) {
@@ -214,7 +214,7 @@ SearchResult search_path(const CollisionChecker& checker, PoseSampler& sampler,
   ompl::RNG::setSeed(settings.seed);
   const ob::SpaceInformationPtr space = make_space(checker, sampler);
   const ob::ProblemDefinitionPtr problem = make_problem(space, checker, sampler, starts, goals);
-  tell_of_improvements(*problem, settings.improved);
+  report_improvements(*problem, settings.improved);
   const ob::PlannerPtr planner = make_planner(settings.planner, space);
   planner->setProblemDefinition(problem);
   planner->setup();

@@ -8,16 +8,16 @@
 namespace stillmap {
 namespace {
 
-/// Index of the pose about `way_m` after `from`.
-std::size_t index_after(std::span<const PathPoint> path, std::size_t from, double way_m) {
+/// Index of the pose about `length_m` after `from`.
+std::size_t index_after(std::span<const PathPoint> path, std::size_t from, double length_m) {
   std::size_t to = from;
-  for (double driven_m = 0.0; to + 1 < path.size() && driven_m < way_m;) {
+  for (double driven_m = 0.0; to + 1 < path.size() && driven_m < length_m;) {
     driven_m += path[++to].at.step_m;
   }
   return to;
 }
 
-/// What lies between two poses, exchanged for `shortcut`, whose costs count from the first.
+/// Replaces the poses in (from, to] by `shortcut`, whose costs count from `from`.
 void replace(std::vector<PathPoint>& path, std::size_t from, std::size_t to,
              std::vector<PathPoint> shortcut) {
   const double cost_at_start = path[from].cost;
@@ -38,15 +38,15 @@ std::optional<std::vector<PathPoint>> connect_via(const CollisionChecker& checke
   return path;
 }
 
-/// Numbers of chance that are the same with every standard library.
-class Chance {
+/// Random numbers that do not depend on the standard library.
+class Random {
  public:
-  explicit Chance(std::uint32_t seed) : random_(seed) {}
+  explicit Random(std::uint32_t seed) : engine_(seed) {}
 
-  /// From 0 to below 1.
-  double uniform() { return static_cast<double>(random_() >> 11U) * 0x1.0p-53; }
+  /// In [0, 1).
+  double uniform() { return static_cast<double>(engine_() >> 11U) * 0x1.0p-53; }
 
-  /// From 0 to count - 1. @pre count > 0
+  /// In [0, count). @pre count > 0
   std::size_t below(std::size_t count) {
     return std::min(static_cast<std::size_t>(uniform() * static_cast<double>(count)), count - 1);
   }
@@ -63,7 +63,7 @@ class Chance {
  private:
   double symmetric() { return 2.0 * uniform() - 1.0; }
 
-  std::mt19937_64 random_;
+  std::mt19937_64 engine_;
 };
 
 }  // namespace
@@ -84,26 +84,26 @@ std::optional<std::vector<PathPoint>> connect_waypoints(const CollisionChecker& 
 }
 
 std::vector<PathPoint> smooth_path(const CollisionChecker& checker, std::vector<PathPoint> path,
-                                   std::span<const PlanarPose> ends, int tries, std::uint32_t seed,
-                                   const std::function<bool()>& should_stop) {
+                                   std::span<const PlanarPose> ends, int attempts,
+                                   std::uint32_t seed, const std::function<bool()>& should_stop) {
   constexpr double min_shortcut_m = 2.0;
   constexpr double max_shortcut_m = 80.0;
   constexpr double min_gain = 0.01;
-  Chance chance(seed);
-  for (int i = 0; i < tries && path.size() > 2; ++i) {
+  Random random(seed);
+  for (int i = 0; i < attempts && path.size() > 2; ++i) {
     if (should_stop && should_stop()) break;
-    const std::size_t from = chance.below(path.size() - 1);
-    // Small wiggles need as many tries as large ones.
-    const double way_m =
-        min_shortcut_m * std::pow(max_shortcut_m / min_shortcut_m, chance.uniform());
-    const std::size_t to = index_after(path, from, way_m);
+    const std::size_t from = random.below(path.size() - 1);
+    // Log-uniform: short detours need as many attempts as long ones.
+    const double length_m =
+        min_shortcut_m * std::pow(max_shortcut_m / min_shortcut_m, random.uniform());
+    const std::size_t to = index_after(path, from, length_m);
     const PlanarPose& a = path[from].at.pose;
     const bool is_end = to + 1 == path.size() && !ends.empty();
-    const PlanarPose& b = is_end ? ends[chance.below(ends.size())] : path[to].at.pose;
-    // Straight on, or round the other way past what lies between.
+    const PlanarPose& b = is_end ? ends[random.below(ends.size())] : path[to].at.pose;
+    // Direct, or via a pose near the middle of the replaced part.
     auto shortcut = i % 2 == 0
                         ? checker.connect(a, b)
-                        : connect_via(checker, a, chance.near(path[(from + to) / 2].at.pose), b);
+                        : connect_via(checker, a, random.near(path[(from + to) / 2].at.pose), b);
     if (!shortcut || shortcut->empty()) continue;
     if (shortcut->back().cost + min_gain > path[to].cost - path[from].cost) continue;
     replace(path, from, to, *std::move(shortcut));
@@ -117,8 +117,8 @@ std::vector<PathPoint> downsampled(std::span<const PathPoint> path, double spaci
   for (std::size_t i = 0; i < path.size(); ++i) {
     since_last_m += path[i].at.step_m;
     const bool is_end = i == 0 || i + 1 == path.size();
-    const bool turns_back = !is_end && path[i + 1].at.is_reverse != path[i].at.is_reverse && i > 0;
-    if (!is_end && !turns_back && since_last_m + path[i + 1].at.step_m <= spacing_m) continue;
+    const bool is_reversal = !is_end && path[i + 1].at.is_reverse != path[i].at.is_reverse && i > 0;
+    if (!is_end && !is_reversal && since_last_m + path[i + 1].at.step_m <= spacing_m) continue;
     kept.push_back(path[i]);
     kept.back().at.step_m = since_last_m;
     since_last_m = 0.0;

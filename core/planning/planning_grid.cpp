@@ -8,7 +8,7 @@
 namespace stillmap {
 namespace {
 
-// From a cell's centre to its corner, in cells.
+// From a cell's centre to its corner [cells], rounded up.
 constexpr double half_diagonal = 0.7072;
 
 bool is_closed(const TraversabilityCell& cell, UnknownGround unknown) {
@@ -16,10 +16,10 @@ bool is_closed(const TraversabilityCell& cell, UnknownGround unknown) {
          (cell.state == CellState::unknown && unknown == UnknownGround::blocked);
 }
 
-/// Share of the highest cost: unknown ground that may be entered is as unwanted as a narrow place.
-double share_of(const TraversabilityCell& cell) {
-  constexpr double highest_cost = 100.0;
-  return cell.state == CellState::unknown ? 1.0 : cell.cost / highest_cost;
+/// Cost of a cell, 0 to 1. Unknown ground that may be entered has the highest.
+double cost_of(const TraversabilityCell& cell) {
+  constexpr double max_cost = 100.0;
+  return cell.state == CellState::unknown ? 1.0 : cell.cost / max_cost;
 }
 
 CellIndex floor_cell(const Eigen::Vector2d& position_map, double cell_m) {
@@ -27,7 +27,7 @@ CellIndex floor_cell(const Eigen::Vector2d& position_map, double cell_m) {
   return {static_cast<std::int32_t>(cell.x()), static_cast<std::int32_t>(cell.y())};
 }
 
-/// Calls `visit(x, y, cell)` for the cells of a tile that the grid has, too.
+/// Calls `visit(x, y, cell)` for the cells of a tile that lie in the grid.
 template <typename Visit>
 void visit_shared(const TraversabilityTile& tile, CellIndex origin,
                   const CellGrid<std::uint8_t>& grid, const Visit& visit) {
@@ -55,15 +55,15 @@ PlanningGrid::PlanningGrid(const TraversabilityView& view, const Eigen::AlignedB
   origin_ = {low.x - margin, low.y - margin};
   const int columns = high.x - low.x + 1 + 2 * margin;
   const int rows = high.y - low.y + 1 + 2 * margin;
-  // Where there is no tile, nothing is known.
-  const TraversabilityCell nothing;
-  CellGrid<std::uint8_t> closed(columns, rows, is_closed(nothing, profile_.unknown) ? 1 : 0);
+  // Cells without a tile are unknown.
+  const TraversabilityCell unknown;
+  CellGrid<std::uint8_t> closed(columns, rows, is_closed(unknown, profile_.unknown) ? 1 : 0);
   factors_ =
-      CellGrid<float>(columns, rows, static_cast<float>(1.0 + cost_weight * share_of(nothing)));
+      CellGrid<float>(columns, rows, static_cast<float>(1.0 + cost_weight * cost_of(unknown)));
   for (const auto& tile : view.tiles) {
     visit_shared(*tile, origin_, closed, [&](int x, int y, const TraversabilityCell& cell) {
       closed(x, y) = is_closed(cell, profile_.unknown) ? 1 : 0;
-      factors_(x, y) = static_cast<float>(1.0 + cost_weight * share_of(cell));
+      factors_(x, y) = static_cast<float>(1.0 + cost_weight * cost_of(cell));
     });
   }
   low_ = cell_of(box_map.min());
@@ -76,7 +76,7 @@ PlanningGrid::PlanningGrid(const TraversabilityView& view, const Eigen::AlignedB
   }
   disc_radius_m_ = std::hypot(0.5 * (piece_m + cell_m_), 0.5 * (profile_.width_m + cell_m_)) +
                    half_diagonal * cell_m_;
-  // Nothing asks for more: the discs are not smaller than the inscribed circle.
+  // Larger distances are never compared: the discs are no smaller than the inscribed circle.
   distances_m_ = distances_to_marked(closed, disc_radius_m_ / cell_m_ + 1.0);
   for_each_cell(closed, [&](int x, int y) {
     distances_m_(x, y) = static_cast<float>(cell_m_ * distances_m_(x, y));
@@ -114,7 +114,7 @@ bool PlanningGrid::is_free(const PlanarPose& pose) const {
   return is_clear || !is_closed_under(pose);
 }
 
-/// The cells of visit_footprint; the quick answers before it decide most poses.
+/// Exact test over the cells of visit_footprint, for poses that the distances do not decide.
 bool PlanningGrid::is_closed_under(const PlanarPose& pose) const {
   const Eigen::Vector2d ahead(std::cos(pose.heading_rad), std::sin(pose.heading_rad));
   const Eigen::Vector2d left(-ahead.y(), ahead.x());

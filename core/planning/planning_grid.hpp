@@ -10,13 +10,13 @@
 
 namespace stillmap {
 
-/// The area of a robot as one dense grid, made for one search: where a pose is free and what it
-/// costs to be there. A cell is closed when check_path would not let the footprint touch it.
+/// Collision and cost grid of a robot for one search. A cell is closed if check_path reports a
+/// conflict when the footprint touches it.
 class PlanningGrid {
  public:
-  /// Covers the box (map frame [m], not empty) and a footprint more on every side. One metre over
-  /// a cell costs 1 + `cost_weight` * its cost, from 0 to 1.
-  /// @pre the box is small enough, cells_for(box, cell) <= max_cells
+  /// Covers the box (map frame [m], not empty) and a margin of a footprint on every side. The cost
+  /// of a metre is 1 + `cost_weight` * the cell's cost, 0 to 1.
+  /// @pre cells_for(box_map, view.cell_m) <= max_cells
   PlanningGrid(const TraversabilityView& view, const Eigen::AlignedBox2d& box_map,
                double cost_weight);
 
@@ -27,18 +27,17 @@ class PlanningGrid {
   [[nodiscard]] int width() const { return factors_.width(); }
   [[nodiscard]] int height() const { return factors_.height(); }
   [[nodiscard]] const RobotProfile& profile() const { return profile_; }
-  /// Box in which poses may lie, map frame [m].
+  /// Bounds of valid positions, map frame [m].
   [[nodiscard]] const Eigen::AlignedBox2d& bounds_map() const { return bounds_map_; }
 
-  /// The cell that holds a place within the bounds.
+  /// The cell that contains a position. @pre bounds_map().contains(position_map)
   [[nodiscard]] CellIndex cell_of(const Eigen::Vector2d& position_map) const;
   [[nodiscard]] Eigen::Vector2d centre_of(CellIndex cell) const;
 
-  /// Whether the footprint at the pose touches no closed cell; the same answer as check_path's for
-  /// that one pose. False outside the bounds.
+  /// Whether the footprint touches no closed cell: the same result as check_path's for that pose.
+  /// False outside the bounds.
   [[nodiscard]] bool is_free(const PlanarPose& pose) const;
-  /// Whether a robot whose pose lies in the cell can be free with any heading at all: false only
-  /// when it cannot.
+  /// Whether a pose in the cell can be free at some heading. Conservative: false only if none can.
   [[nodiscard]] bool may_stand_in(CellIndex cell) const;
   /// Cost of a metre in the cell, 1 or more.
   [[nodiscard]] double cost_factor(CellIndex cell) const { return factors_(cell.x, cell.y); }
@@ -51,13 +50,13 @@ class PlanningGrid {
   RobotProfile profile_;
   CellIndex origin_;
   Eigen::AlignedBox2d bounds_map_;
-  /// Of the bounds' corners.
+  /// Cells of the bounds' corners.
   CellIndex low_;
   CellIndex high_;
   /// To the nearest closed cell, whose own distance is 0; exact up to the radius of the discs.
   CellGrid<float> distances_m_;
   CellGrid<float> factors_;
-  /// Discs along the robot's axis that hold the footprint and what of the cells it touches.
+  /// Discs along the robot's axis that cover the footprint and all cells that it touches.
   std::vector<double> disc_ahead_m_;
   double disc_radius_m_ = 0.0;
 };

@@ -12,14 +12,14 @@ using Segment = ob::ReedsSheppStateSpace::ReedsSheppPathSegmentType;
 
 constexpr int segments = 5;
 
-/// A pose in units of the turning radius, as the curve's formulas have it.
+/// A pose in units of the turning radius.
 struct UnitPose {
   double x = 0.0;
   double y = 0.0;
   double heading_rad = 0.0;
 };
 
-/// The pose after a signed way of `t` radii along a segment.
+/// The pose after a signed distance of `t` radii along a segment.
 UnitPose moved(const UnitPose& from, Segment type, double t) {
   const double phi = from.heading_rad;
   switch (type) {
@@ -49,7 +49,7 @@ struct ReedsSheppCurves::Space {
     return curves.reedsShepp(a.state, b.state);
   }
 
-  /// A state of the space, freed with the object.
+  /// Owns a state of the space.
   struct State {
     explicit State(ob::ReedsSheppStateSpace* owner)
         : space(owner), state(owner->allocState()->as<ob::SE2StateSpace::StateType>()) {}
@@ -95,7 +95,7 @@ void ReedsSheppCurves::visit_between(const PlanarPose& a, const PlanarPose& b, d
     left -= std::abs(length);
     for (int k = 1; k <= count; ++k) {
       const UnitPose at = moved(from, type, length * k / count);
-      // Where the curve ends but for rounding.
+      // The curve's end, without rounding errors.
       const bool is_end = k == count && left < 1e-9;
       const PlanarPose pose =
           is_end ? b

@@ -7,17 +7,18 @@
 
 namespace stillmap {
 
-/// A pose on a curve, and how the robot got there from the last one.
+/// A pose on a curve.
 struct CurvePose {
   PlanarPose pose;
-  /// Way from the last pose [m].
+  /// Distance from the previous pose along the curve [m].
   double step_m = 0.0;
+  /// Whether the robot drives to it in reverse.
   bool is_reverse = false;
 };
 
-/// The shortest curves of a robot that drives forwards and backwards and cannot turn tighter than
-/// a radius (J. Reeds, L. Shepp, "Optimal paths for a car that goes both forwards and backwards",
-/// 1990). A robot that turns on the spot is one with a radius too small to matter.
+/// Shortest curves of a robot with a minimum turning radius that drives forwards and in reverse (J.
+/// Reeds, L. Shepp, "Optimal paths for a car that goes both forwards and backwards", 1990). NOT
+/// thread-safe.
 class ReedsSheppCurves {
  public:
   /// @pre radius_m > 0
@@ -28,8 +29,8 @@ class ReedsSheppCurves {
 
   [[nodiscard]] double length_m(const PlanarPose& a, const PlanarPose& b) const;
 
-  /// Visits poses from a (left out) to b, close enough that no point within `reach_m` of the pose
-  /// moves more than `max_move_m` from one to the next, as long as `visit` says true.
+  /// Visits poses from a (exclusive) to b, spaced so that no point within `reach_m` of the pose
+  /// moves more than `max_move_m` from one to the next. Stops when `visit` returns false.
   void visit_between(const PlanarPose& a, const PlanarPose& b, double max_move_m, double reach_m,
                      const std::function<bool(const CurvePose&)>& visit) const;
 

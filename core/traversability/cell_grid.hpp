@@ -10,7 +10,7 @@
 
 namespace stillmap {
 
-/// A rectangle of cells, row after row from the lowest y.
+/// A dense grid of cells, row by row from the lowest y.
 template <typename T>
 class CellGrid {
  public:
@@ -43,7 +43,7 @@ class CellGrid {
   std::vector<T> cells_;
 };
 
-/// Calls `visit(x, y)` for every cell, in the order in which cells are stored.
+/// Calls `visit(x, y)` for every cell in storage order.
 template <typename T, typename Visit>
 void for_each_cell(const CellGrid<T>& grid, const Visit& visit) {
   for (int y = 0; y < grid.height(); ++y) {
@@ -57,17 +57,17 @@ void for_each_cell(const CellGrid<T>& grid, const Visit& visit) {
 [[nodiscard]] CellGrid<float> distances_to_marked(const CellGrid<std::uint8_t>& marked,
                                                   double max_distance);
 
-/// A tile and the eight around it; null where there is none. `TileT` has `side` columns and rows
-/// and `at(x, y)`.
+/// A tile and its eight neighbours; null where there is no tile. `TileT` has `side` columns and
+/// rows and `at(x, y)`.
 template <typename TileT>
 struct TileNeighbourhood {
-  /// Row after row from the lowest y; the tile itself is the fifth.
+  /// Row by row from the lowest y; the middle tile is the fifth.
   std::array<const TileT*, 9> tiles{};
   /// Columns along a tile's side.
   int side = 0;
 
-  /// What lies at a cell counted from the middle tile's corner, -side to 2 side; `none` where no
-  /// tile is.
+  /// The cell at (x, y) from the middle tile's lowest corner, each in [-side, 2 side); `none` where
+  /// there is no tile.
   template <typename T>
   [[nodiscard]] T at(int x, int y, T none) const {
     const int column = (x + side) / side;
@@ -77,7 +77,7 @@ struct TileNeighbourhood {
     return T(tile->at(x - (column - 1) * side, y - (row - 1) * side));
   }
 
-  /// The middle tile with `margin` cells more on every side, margin <= side.
+  /// The middle tile with a margin on every side. @pre margin <= side
   template <typename T>
   [[nodiscard]] CellGrid<T> window(int margin, T none) const {
     CellGrid<T> cells(side + 2 * margin, side + 2 * margin, none);

@@ -21,7 +21,7 @@ ColumnTile make_columns(const Tile& tile, int side) {
   for (std::size_t i = 1; i < columns.begin.size(); ++i) columns.begin[i] += columns.begin[i - 1];
   columns.voxels.resize(columns.begin.back());
   std::vector<std::uint32_t> next(columns.begin.begin(), columns.begin.end() - 1);
-  // The voxels of a tile are sorted: those of a column come from the lowest up.
+  // A tile's voxels are sorted, so those of a column come in ascending order.
   for (const Voxel& voxel : tile.voxels) {
     if (!is_usable(voxel)) continue;
     columns.voxels[next[column_of(voxel)]++] = {voxel.mean_map.z(), voxel.point_count,

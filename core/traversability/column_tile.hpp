@@ -8,7 +8,7 @@
 
 namespace stillmap {
 
-/// A voxel of the map as one column of cells sees it.
+/// A voxel of the map in its column.
 struct ColumnVoxel {
   /// Mean height of its points, map frame [m].
   float height_m = 0.0F;
@@ -20,14 +20,14 @@ struct ColumnVoxel {
 
 using Column = std::span<const ColumnVoxel>;
 
-/// A map tile's voxels, column by column: what all later stages read.
+/// A map tile's voxels sorted by column: the input of all later stages.
 struct ColumnTile {
   /// Columns along a side.
   int side = 0;
-  /// Of every column (row after row from the lowest y), where it begins in `voxels`; one more for
-  /// the end.
+  /// Index in `voxels` of each column's first voxel, row by row from the lowest y; one more for the
+  /// end.
   std::vector<std::uint32_t> begin;
-  /// Of every column from the lowest up.
+  /// Ascending within each column.
   std::vector<ColumnVoxel> voxels;
 
   [[nodiscard]] Column at(int x, int y) const {
@@ -38,8 +38,7 @@ struct ColumnTile {
   friend bool operator==(const ColumnTile&, const ColumnTile&) = default;
 };
 
-/// Sorts a tile's voxels into columns. Voxels whose place or mean cannot be (outside the tile, not
-/// finite) are left out.
+/// Sorts a tile's voxels into columns. Invalid voxels (outside the tile, not finite) are left out.
 [[nodiscard]] ColumnTile make_columns(const Tile& tile, int side);
 
 }  // namespace stillmap

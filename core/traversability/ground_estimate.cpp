@@ -10,18 +10,18 @@ namespace stillmap {
 namespace {
 
 constexpr float nan = std::numeric_limits<float>::quiet_NaN();
-/// Edge of the squares whose low parts give the level of the ground [m].
+/// Edge of the blocks of the coarse ground level [m].
 constexpr double block_m = 2.0;
-/// Ground of a ground class lies within this of the level: below for what falls away, above for
-/// banks and walls, not as high as a bridge or the leaves of a tree [m].
+/// Band around the level for ground of a ground class: below it for falling terrain, above it for
+/// banks and walls, but below bridges and canopies [m].
 constexpr float labelled_below_m = 1.5F;
 constexpr float labelled_above_m = 2.5F;
-/// Without classes a car's bonnet must not pass for ground [m].
+/// Band for unlabelled ground: a car's bonnet must lie outside [m].
 constexpr float unlabelled_off_m = 0.5F;
-/// Voxels above the lowest one that still belong to the same surface, from that one [m].
+/// Thickness of a surface above its lowest voxel [m].
 constexpr float labelled_run_m = 0.30F;
 constexpr float unlabelled_run_m = 0.15F;
-/// A cell off the median of its neighbours by more than this is no ground [m].
+/// Largest deviation of ground from the median of its neighbours [m].
 constexpr float outlier_m = 0.4F;
 
 bool is_ground_voxel(const ColumnVoxel& voxel) { return is_ground(voxel.label); }
@@ -29,7 +29,7 @@ bool is_unlabelled_voxel(const ColumnVoxel& voxel) {
   return voxel.label == SemanticClass::unlabeled;
 }
 
-/// The lowest voxel that may be ground.
+/// The lowest voxel that can be ground.
 const ColumnVoxel* lowest_candidate(Column column) {
   const auto ground = std::ranges::find_if(column, is_ground_voxel);
   if (ground != column.end()) return &*ground;
@@ -37,9 +37,9 @@ const ColumnVoxel* lowest_candidate(Column column) {
   return nullptr;
 }
 
-float low_part(std::vector<float>& heights_m) {
+float low_percentile(std::vector<float>& heights_m) {
   if (heights_m.empty()) return nan;
-  // Not the lowest: reflections put single voxels under the ground.
+  // 10th percentile: reflections put single voxels below the ground.
   const auto tenth = heights_m.begin() + static_cast<std::ptrdiff_t>(heights_m.size() / 10);
   std::nth_element(heights_m.begin(), tenth, heights_m.end());
   return *tenth;
@@ -55,10 +55,10 @@ float block_level(const ColumnGrid& columns, int x0, int y0, int size) {
       (is_ground_voxel(*candidate) ? labelled_m : unlabelled_m).push_back(candidate->height_m);
     }
   }
-  return low_part(labelled_m.empty() ? unlabelled_m : labelled_m);
+  return low_percentile(labelled_m.empty() ? unlabelled_m : labelled_m);
 }
 
-/// Median of the blocks around; a canopy's block is overruled by the road beside it.
+/// Median of the neighbouring blocks, against blocks that hold only a canopy.
 float median_around(const CellGrid<float>& blocks_m, int x0, int y0) {
   std::array<float, 9> heights_m{};
   std::size_t count = 0;
@@ -108,7 +108,7 @@ GroundCell ground_of(Column column, float level_m) {
   return surface_from(column, 0, unlabelled_run_m, is_unlabelled_voxel);
 }
 
-/// Whether the seen ground within two cells says that this cell's is none.
+/// Whether a cell deviates from the median of the measured ground within two cells.
 bool is_outlier(const GroundGrid& ground, int x0, int y0) {
   const float here_m = ground(x0, y0).height_m;
   std::array<float, 25> heights_m{};
@@ -137,7 +137,7 @@ GroundGrid without_outliers(const GroundGrid& ground) {
   return kept;
 }
 
-/// The class that most of the cell and its neighbours have; its own when others are no more.
+/// Majority class of the cell and its neighbours; its own class in a tie.
 SemanticClass smoothed_label(const GroundGrid& ground, int x0, int y0) {
   std::array<int, semantic_class_count> votes{};
   for (int y = std::max(0, y0 - 1); y <= std::min(y0 + 1, ground.height() - 1); ++y) {

@@ -5,14 +5,14 @@
 
 namespace stillmap {
 
-/// How the ground of a cell is known.
+/// Source of a cell's ground height.
 enum class GroundOrigin : std::uint8_t {
   none,
-  /// The lidar hit it.
+  /// Measured.
   seen,
-  /// It was not hit, and follows from what was seen around (fill_holes).
+  /// Not measured; interpolated from measured ground around it (fill_holes).
   inferred,
-  /// Nobody knows it; this level only tells how high above the ground the things in the cell are.
+  /// Unknown; the height only serves as reference for the heights of objects in the cell.
   assumed,
 };
 
@@ -20,7 +20,7 @@ enum class GroundOrigin : std::uint8_t {
 struct GroundCell {
   /// Map frame [m]; 0 when `origin` is none.
   float height_m = 0.0F;
-  /// The highest voxel that counts as ground: what is above it stands on the ground.
+  /// Highest voxel that belongs to the ground; voxels above it are objects.
   float top_m = 0.0F;
   GroundOrigin origin = GroundOrigin::none;
   SemanticClass label = SemanticClass::unlabeled;
@@ -34,12 +34,11 @@ struct GroundCell {
 using ColumnGrid = CellGrid<Column>;
 using GroundGrid = CellGrid<GroundCell>;
 
-/// Coarse level of the ground, from the low parts of the columns around. `cell_m` is the edge of a
-/// cell [m].
+/// Coarse ground level, from low percentiles of the columns around. `cell_m` is the edge of a cell.
 class GroundLevel {
  public:
   GroundLevel(const ColumnGrid& columns, double cell_m);
-  /// Map frame [m]; NaN where nothing is near.
+  /// Map frame [m]; NaN without columns near.
   [[nodiscard]] float at(int x, int y) const;
 
  private:
@@ -47,27 +46,27 @@ class GroundLevel {
   CellGrid<float> blocks_m_;
 };
 
-/// Finds the ground where it was seen. Voxels of a ground class come first: the lowest of a column
-/// that is not far from the level of the surroundings, and those right above it. Without classes,
-/// the lowest voxel, if it is near that level. A cell far off the median of its neighbours (a
-/// reflection, a car's roof that was taken for road) loses its ground again. One layer only: under
-/// a bridge, the ground is what lies below.
+/// Estimates the ground where it was measured. Voxels of ground classes take precedence: the lowest
+/// of a column within a band around the level, and those directly above it. Unlabelled columns: the
+/// lowest voxel, if it is near the level. Cells far off the median of their neighbours
+/// (reflections, a car's roof labelled as road) are rejected. One layer only: below a bridge, the
+/// ground is the lower surface.
 [[nodiscard]] GroundGrid seen_ground(const ColumnGrid& columns, const GroundLevel& level);
 
-/// Holes are filled over no more than this: a parked car with the gap before and behind it [m].
+/// Longest gap that is filled: a parked car with the gaps in front of and behind it [m].
 inline constexpr double max_filled_gap_m = 6.0;
 
-/// Gives ground to cells where none was seen and the surroundings justify it: gaps between the
-/// lidar's rings, and the places of vehicles that were taken out of the map. The rule: a straight
-/// line through the cell (along an axis or a diagonal) meets seen ground at both ends,
+/// Interpolates ground in cells without measured ground, such as gaps between the lidar's rings and
+/// the footprints of vehicles removed from the map. A cell is filled if a straight line through it
+/// (along an axis or a diagonal) meets measured ground at both ends,
 ///   - over a gap of at most `max_filled_gap_m`,
-///   - with nothing that stands on the ground in the gap,
+///   - with no object on the ground in the gap,
 ///   - of the same class at both ends (road, parking and other-ground count as one),
-///   - and the far end lies where the slopes at both ends lead to: there is no step in between;
+///   - and the far end lies on the extrapolated slopes of both ends: no step in between;
 /// over more than `max_bare_gap_m`, ground in a third direction, near and of that class, must lie
-/// on the same surface. Lines that disagree about the height leave the hole. Other cells with
-/// voxels but without ground get an `assumed` level. `seen` has seen ground only. Cells nearer to
-/// the grid's edge than `border` are left as they are.
+/// on the same surface. Where lines disagree about the height, the cell stays unfilled. Other cells
+/// with voxels but without ground get an `assumed` level. Cells within `border` of the grid's edge
+/// are left unchanged. @pre `seen` has no origin other than `none` and `seen`
 [[nodiscard]] GroundGrid fill_holes(const GroundGrid& seen, const ColumnGrid& columns,
                                     const GroundLevel& level, double cell_m, int border = 0);
 

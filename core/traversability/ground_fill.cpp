@@ -10,23 +10,23 @@
 namespace stillmap {
 namespace {
 
-/// Gaps up to this need no third witness [m].
+/// Longest gap that is filled without ground in a third direction [m].
 constexpr double max_bare_gap_m = 1.6;
-/// A third witness is no farther than this [m].
-constexpr double max_witness_m = 2.4;
-/// The far end may be off the line of the slopes by this and by this share of the gap [m].
+/// Largest distance of that ground [m].
+constexpr double max_third_direction_m = 2.4;
+/// Tolerance of the far end from the extrapolated slopes: constant [m] and per metre of gap.
 constexpr double step_m = 0.06;
 constexpr double slope_doubt = 0.01;
-/// A third witness may be off by its distance times this, and `step_m`: it lies across the line,
-/// where a road's crown falls off.
+/// Tolerance of ground in the third direction, per metre, beside `step_m`: it lies across the line,
+/// where a road's camber falls off.
 constexpr double cross_slope = 0.06;
-/// Lines that differ by more disagree [m].
+/// Largest difference of the heights of two lines [m].
 constexpr double disagreement_m = 0.10;
-/// The slope at an end is taken over so many cells.
+/// Cells over which the slope at an end is measured.
 constexpr int slope_cells = 5;
-/// What stands in a gap: something from here to here above the ground [m].
-constexpr float standing_from_m = 0.25F;
-constexpr float standing_to_m = 2.0F;
+/// Height range above the ground of objects that block a gap [m].
+constexpr float object_from_m = 0.25F;
+constexpr float object_to_m = 2.0F;
 
 struct Direction {
   int dx;
@@ -39,34 +39,34 @@ constexpr std::array<Direction, 8> directions{
     {{1, 0}, {1, 1}, {0, 1}, {-1, 1}, {-1, 0}, {-1, -1}, {0, -1}, {1, -1}}};
 constexpr std::size_t line_count = 4;
 
-/// Where a look from a hole in one direction ends: so many cells on, or nowhere (0).
+/// Number of cells to the nearest ground in one direction; 0 without any in reach.
 using Reach = std::int16_t;
 
-/// Classes that lie at one level and may meet in a gap.
+/// Classes that lie at one level count as one.
 int group_of(SemanticClass label) {
-  const bool is_driven = label == SemanticClass::road || label == SemanticClass::parking ||
-                         label == SemanticClass::other_ground;
-  return static_cast<int>(is_driven ? SemanticClass::road : label);
+  const bool is_carriageway = label == SemanticClass::road || label == SemanticClass::parking ||
+                              label == SemanticClass::other_ground;
+  return static_cast<int>(is_carriageway ? SemanticClass::road : label);
 }
 
-bool stands_in(Column column, float ground_m) {
+bool has_object(Column column, float ground_m) {
   return std::ranges::any_of(column, [ground_m](const ColumnVoxel& voxel) {
     const float above_m = voxel.height_m - ground_m;
-    return above_m > standing_from_m && above_m < standing_to_m;
+    return above_m > object_from_m && above_m < object_to_m;
   });
 }
 
-/// What every hole sees of the ground around it.
+/// Nearest ground in eight directions of every cell without ground.
 class Holes {
  public:
   Holes(const GroundGrid& seen, const ColumnGrid& columns, double cell_m)
       : seen_(seen), columns_(columns), cell_m_(cell_m) {
-    for (std::size_t i = 0; i < directions.size(); ++i) look(i);
+    for (std::size_t i = 0; i < directions.size(); ++i) find_reach(i);
   }
 
-  /// Ground that follows for the hole, if any.
+  /// Interpolated ground of the cell, if it can be filled.
   [[nodiscard]] std::optional<GroundCell> inferred(int x, int y) const;
-  /// Height of the nearest ground that the hole sees.
+  /// Height of the nearest ground in any direction.
   [[nodiscard]] std::optional<float> nearest_height(int x, int y) const;
 
  private:
@@ -80,13 +80,14 @@ class Holes {
     GroundCell cell;
   };
 
-  void look(std::size_t direction);
+  void find_reach(std::size_t direction);
   [[nodiscard]] Reach reach_from(int x, int y, std::size_t direction) const;
   [[nodiscard]] std::optional<End> end(int x, int y, std::size_t direction) const;
   [[nodiscard]] std::optional<double> slope_at(const End& end, Direction outwards) const;
   [[nodiscard]] bool is_one_surface(const End& a, const End& b, std::size_t direction) const;
   [[nodiscard]] std::optional<Line> line_through(int x, int y, std::size_t direction) const;
-  [[nodiscard]] bool has_witness(int x, int y, std::size_t direction, const GroundCell& cell) const;
+  [[nodiscard]] bool has_third_direction(int x, int y, std::size_t direction,
+                                         const GroundCell& cell) const;
 
   const GroundGrid& seen_;
   const ColumnGrid& columns_;
@@ -94,9 +95,9 @@ class Holes {
   std::array<CellGrid<Reach>, directions.size()> reach_;
 };
 
-/// Looks in one direction from all holes, the nearest to the far end first: each needs its
-/// neighbour's answer only.
-void Holes::look(std::size_t direction) {
+/// Computes the reach of all cells in one direction, from the far side of the grid back: each cell
+/// needs its neighbour's result only.
+void Holes::find_reach(std::size_t direction) {
   const Direction d = directions.at(direction);
   reach_.at(direction) = CellGrid<Reach>(seen_.width(), seen_.height(), 0);
   for (int row = 0; row < seen_.height(); ++row) {
@@ -121,7 +122,7 @@ Reach Holes::reach_from(int x, int y, std::size_t direction) const {
   }
   if (cells * d.length() * cell_m_ > max_filled_gap_m) return 0;
   const GroundCell& end = seen_(x + cells * d.dx, y + cells * d.dy);
-  return stands_in(columns_(x, y), end.height_m) ? Reach{0} : static_cast<Reach>(cells);
+  return has_object(columns_(x, y), end.height_m) ? Reach{0} : static_cast<Reach>(cells);
 }
 
 std::optional<Holes::End> Holes::end(int x, int y, std::size_t direction) const {
@@ -133,7 +134,7 @@ std::optional<Holes::End> Holes::end(int x, int y, std::size_t direction) const 
   return End{cells * d.length() * cell_m_, &seen_(end_x, end_y), end_x, end_y};
 }
 
-/// Rise a metre towards the hole, from the ground farther out.
+/// Rise per metre towards the hole, from the ground farther out.
 std::optional<double> Holes::slope_at(const End& end, Direction outwards) const {
   for (int cells = slope_cells; cells >= 2; --cells) {
     const int x = end.x + cells * outwards.dx;
@@ -172,18 +173,19 @@ std::optional<Holes::Line> Holes::line_through(int x, int y, std::size_t directi
   line.cell.height_m = line.cell.top_m = static_cast<float>(height_m);
   line.cell.origin = GroundOrigin::inferred;
   line.cell.label = a->distance_m <= b->distance_m ? a->cell->label : b->cell->label;
-  if (line.gap_m > max_bare_gap_m && !has_witness(x, y, direction, line.cell)) return std::nullopt;
+  if (line.gap_m > max_bare_gap_m && !has_third_direction(x, y, direction, line.cell))
+    return std::nullopt;
   return line;
 }
 
-bool Holes::has_witness(int x, int y, std::size_t direction, const GroundCell& cell) const {
+bool Holes::has_third_direction(int x, int y, std::size_t direction, const GroundCell& cell) const {
   for (std::size_t i = 0; i < directions.size(); ++i) {
     if (i % line_count == direction) continue;
-    const std::optional<End> witness = end(x, y, i);
-    if (!witness || witness->distance_m > max_witness_m) continue;
-    if (group_of(witness->cell->label) != group_of(cell.label)) continue;
-    const double off_m = std::abs(witness->cell->height_m - cell.height_m);
-    if (off_m <= step_m + cross_slope * witness->distance_m) return true;
+    const std::optional<End> third = end(x, y, i);
+    if (!third || third->distance_m > max_third_direction_m) continue;
+    if (group_of(third->cell->label) != group_of(cell.label)) continue;
+    const double off_m = std::abs(third->cell->height_m - cell.height_m);
+    if (off_m <= step_m + cross_slope * third->distance_m) return true;
   }
   return false;
 }

@@ -9,8 +9,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// map_server takes p = (255 - shade) / 255 for occupied above occupied_thresh, for free below
-// free_thresh, else for unknown: 205 must not fall below the latter, so 0.196 and not 0.25.
+// With p = (255 - shade) / 255, map_server reads a pixel as occupied above occupied_thresh, free
+// below free_thresh, else unknown. Unknown cells (205) have p = 0.196, so free_thresh is not above
+// that.
 constexpr char occupied_shade = '\x00';
 constexpr char unknown_shade = '\xCD';
 constexpr char free_shade = '\xFE';
@@ -33,7 +34,7 @@ void write_file(const fs::path& file, const std::string& content) {
 std::string image_of(const OccupancyGrid& grid) {
   std::string image =
       "P5\n" + std::to_string(grid.width) + " " + std::to_string(grid.height) + "\n255\n";
-  // The picture's first row is the highest y.
+  // The image's first row has the highest y.
   for (std::uint32_t row = grid.height; row-- > 0;) {
     for (std::uint32_t x = 0; x < grid.width; ++x) image.push_back(shade_of(grid.at(x, row)));
   }

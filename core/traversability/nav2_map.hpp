@@ -6,11 +6,11 @@
 
 namespace stillmap {
 
-/// Writes what Nav2's map_server loads: `folder`/map.yaml and map.pgm, in its trinary mode.
-/// Lethal cells are black, free ones white, unknown ones grey. Cells of the safety margin (99) are
-/// free here: Nav2's inflation layer adds its own, for its own footprint. Costs do not fit into
-/// three values and are lost; the OccupancyGrid keeps them. Throws std::runtime_error naming the
-/// file that cannot be written, std::invalid_argument for a grid whose status is not ok.
+/// Writes the files that Nav2's map_server loads: `folder`/map.yaml and map.pgm, in trinary mode.
+/// Lethal cells are black, free ones white, unknown ones grey. Inscribed cells (99) are free:
+/// Nav2's inflation layer adds its own, for its own footprint. Costs do not fit into three values
+/// and are lost. Throws std::runtime_error naming the file that cannot be written,
+/// std::invalid_argument for a grid whose status is not ok.
 void write_nav2_map(const std::filesystem::path& folder, const OccupancyGrid& grid);
 
 }  // namespace stillmap

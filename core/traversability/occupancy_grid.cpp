@@ -9,15 +9,15 @@
 namespace stillmap {
 namespace {
 
-// Cells along a side of a block. A shape of many corners is cut down to the few near a block once,
-// instead of asked as a whole for every cell.
+// Cells along a side of a block. A shape with many corners is restricted to each block once, which
+// is faster than testing every cell against all corners.
 constexpr std::uint32_t block_side = 32;
 
-/// A height at which a point of the box is inside whenever one at another height is.
+/// The height at which the plan view of a shape with these bounds is largest.
 double level_of(const Eigen::AlignedBox3d& bounds_map) {
   const double low = bounds_map.min().z();
   const double high = bounds_map.max().z();
-  // The middle of a sphere is where it is widest.
+  // A sphere is widest at its centre.
   if (std::isfinite(low) && std::isfinite(high)) return 0.5 * (low + high);
   return std::clamp(0.0, low, high);
 }
@@ -59,7 +59,7 @@ OccupancyGrid refused(TraversabilityStatus status, const std::string& reason) {
   return grid;
 }
 
-std::string shown(const Eigen::AlignedBox2d& box_map) {
+std::string text_of(const Eigen::AlignedBox2d& box_map) {
   std::ostringstream text;
   text << "box (" << box_map.min().x() << ", " << box_map.min().y() << ") to (" << box_map.max().x()
        << ", " << box_map.max().y() << ")";
@@ -70,7 +70,7 @@ std::int8_t value_of(const TraversabilityCell& cell) {
   return cell.state == CellState::unknown ? occupancy_unknown : static_cast<std::int8_t>(cell.cost);
 }
 
-/// The cells that a box touches, as many as there may be.
+/// The cells that a box touches; more than a CellRange can hold.
 struct WideRange {
   CellIndex first;
   std::uint64_t width;
@@ -78,7 +78,7 @@ struct WideRange {
 };
 
 WideRange range_of(const TraversabilityView& view, const Eigen::AlignedBox2d& box_map) {
-  // An edge between two cells must not take in one more because of the last digit.
+  // A bound between two cells must not include another cell by rounding.
   constexpr double slack = 1e-6;
   const Eigen::Vector2d low = (box_map.min().array() / view.cell_m + slack).floor();
   const Eigen::Vector2d high = (box_map.max().array() / view.cell_m - slack).ceil();
@@ -90,7 +90,7 @@ WideRange range_of(const TraversabilityView& view, const Eigen::AlignedBox2d& bo
 std::string too_many(const Eigen::AlignedBox2d& box_map, const WideRange& range, double cell_m,
                      std::uint64_t max_cells) {
   std::ostringstream text;
-  text << shown(box_map) << " has " << range.width << " x " << range.height << " cells of "
+  text << text_of(box_map) << " has " << range.width << " x " << range.height << " cells of "
        << cell_m << " m; at most " << max_cells
        << " are given at once: ask for a smaller box, or part by part";
   return text.str();
@@ -116,7 +116,7 @@ cv::Mat1b free_cells(const OccupancyGrid& grid) {
   return free;
 }
 
-/// Twice the area, positive when anticlockwise.
+/// Positive if counterclockwise.
 double signed_area_m2(const TraversableRing& ring) {
   double twice = 0.0;
   for (std::size_t i = 0; i < ring.size(); ++i) {
@@ -128,13 +128,13 @@ double signed_area_m2(const TraversableRing& ring) {
 }
 
 TraversableRing ring_of(const std::vector<cv::Point>& contour, const OccupancyGrid& grid,
-                        bool is_anticlockwise) {
+                        bool is_counterclockwise) {
   TraversableRing ring;
   for (const cv::Point& cell : contour) {
     ring.push_back(grid.origin_map +
                    grid.resolution_m * Eigen::Vector2d(cell.x + 0.5, cell.y + 0.5));
   }
-  if ((signed_area_m2(ring) > 0.0) != is_anticlockwise) std::reverse(ring.begin(), ring.end());
+  if ((signed_area_m2(ring) > 0.0) != is_counterclockwise) std::reverse(ring.begin(), ring.end());
   return ring;
 }
 
@@ -188,13 +188,13 @@ OccupancyGrid occupancy_grid(const TraversabilityView& view, const Traversabilit
   // Written so that NaN fails.
   if (!(asked.min().array() <= asked.max().array()).all()) {
     return refused(TraversabilityStatus::invalid_request,
-                   shown(asked) + ": each minimum must be a number not above its maximum");
+                   text_of(asked) + ": each minimum must be a number not above its maximum");
   }
   if (view.tiles.empty()) return refused(TraversabilityStatus::not_found, "the map is empty");
   const Eigen::AlignedBox2d box_map = asked.intersection(view.bounds_map());
   if (box_map.isEmpty()) {
     return refused(TraversabilityStatus::not_found,
-                   shown(asked) + " lies outside the map: " + shown(view.bounds_map()));
+                   text_of(asked) + " lies outside the map: " + text_of(view.bounds_map()));
   }
   const WideRange range = range_of(view, box_map);
   if (range.width * range.height > max_cells) {
@@ -220,16 +220,17 @@ double area_m2(const TraversablePolygon& polygon) {
 std::vector<TraversablePolygon> free_outlines(const OccupancyGrid& grid, double min_area_m2) {
   if (grid.data.empty()) return {};
   std::vector<std::vector<cv::Point>> contours;
-  // Of every contour: the next and the previous one of its level, its first child, its parent.
-  std::vector<cv::Vec4i> family;
-  cv::findContours(free_cells(grid), contours, family, cv::RETR_CCOMP, cv::CHAIN_APPROX_SIMPLE);
+  // For each contour: next and previous of its level, first child, parent.
+  std::vector<cv::Vec4i> hierarchy;
+  cv::findContours(free_cells(grid), contours, hierarchy, cv::RETR_CCOMP, cv::CHAIN_APPROX_SIMPLE);
   std::vector<TraversablePolygon> polygons;
   for (std::size_t i = 0; i < contours.size(); ++i) {
-    const bool is_hole = family[i][3] >= 0;
+    const bool is_hole = hierarchy[i][3] >= 0;
     if (is_hole) continue;
     TraversablePolygon polygon;
     polygon.outer = ring_of(contours[i], grid, true);
-    for (int hole = family[i][2]; hole >= 0; hole = family[static_cast<std::size_t>(hole)][0]) {
+    for (int hole = hierarchy[i][2]; hole >= 0;
+         hole = hierarchy[static_cast<std::size_t>(hole)][0]) {
       polygon.holes.push_back(ring_of(contours[static_cast<std::size_t>(hole)], grid, false));
     }
     if (area_m2(polygon) >= min_area_m2) polygons.push_back(std::move(polygon));

@@ -13,19 +13,18 @@
 
 namespace stillmap {
 
-/// Part of the map from above.
+/// Part of the map in plan view.
 struct TraversabilityRegion {
-  /// Map frame [m]; infinite faces end at the map's edge.
+  /// Map frame [m]; infinite bounds end at the map's edge.
   Eigen::AlignedBox2d box_map;
-  /// Where given, cells do not belong to it whose centre lies outside of it at every height.
+  /// If set, the region has only cells whose centre lies in the shape at some height.
   std::optional<RegionShape> shape;
 };
 
-/// The whole map.
 [[nodiscard]] TraversabilityRegion whole_map_region();
 
-/// A region from above: its heights do not count, a sphere is its circle. Throws
-/// std::invalid_argument with region_faults(region) when there are any.
+/// Plan view of a region: heights are ignored, a sphere becomes a circle. Throws
+/// std::invalid_argument with region_faults(region) if there are any.
 [[nodiscard]] TraversabilityRegion traversability_region(const Region& region);
 
 /// A rectangle of cells.
@@ -36,12 +35,12 @@ struct CellRange {
 };
 
 /// Calls `visit(i, cell)` for the cells of the range that belong to the region, in any order; i is
-/// a cell's place in an array that goes row after row from the lowest y.
+/// the cell's index in an array that stores the range row by row from the lowest y.
 void visit_cells(const TraversabilityView& view, const TraversabilityRegion& region,
                  const CellRange& range, const std::function<void(std::size_t, CellIndex)>& visit);
 
-/// A grid as nav_msgs/OccupancyGrid has it: row after row from the lowest y, -1 unknown, 0 free
-/// and wanted, 1..98 free at a cost, 99 too near to something lethal, 100 lethal.
+/// A grid as in nav_msgs/OccupancyGrid: row by row from the lowest y, -1 unknown, 0..98 cost of
+/// free cells, 99 inscribed, 100 lethal.
 struct OccupancyGrid {
   TraversabilityStatus status = TraversabilityStatus::ok;
   std::string reason;
@@ -65,34 +64,34 @@ inline constexpr std::int8_t occupancy_lethal = 100;
 /// Largest grid [cells].
 inline constexpr std::uint64_t max_grid_cells = 100'000'000;
 
-/// The cells of a region; those of its box that do not belong to it are unknown. A box that is
-/// empty or has NaN is an invalid request, one outside the map is not found, one of more than
-/// `max_cells` too large.
+/// The cells of a region; cells of its box outside the region are unknown. A box that is empty or
+/// has NaN is an invalid request, one outside the map is not found, one of more than `max_cells`
+/// too large.
 [[nodiscard]] OccupancyGrid occupancy_grid(const TraversabilityView& view,
                                            const TraversabilityRegion& region,
                                            std::uint64_t max_cells = max_grid_cells);
 
-/// The view's cells that a grid of it is made of. @pre grid.status is ok
+/// The range of the view's cells that a grid covers. @pre grid.status is ok
 [[nodiscard]] CellRange range_of(const OccupancyGrid& grid);
 
-/// One closed line; its last corner is joined to the first.
+/// A closed line; the last corner is joined to the first.
 using TraversableRing = std::vector<Eigen::Vector2d>;
 
-/// A piece of free area, map frame [m]: all inside `outer` and outside the holes.
+/// A connected free area, map frame [m]: the inside of `outer` without the holes.
 struct TraversablePolygon {
-  /// Anticlockwise.
+  /// Counterclockwise.
   TraversableRing outer;
   /// Clockwise.
   std::vector<TraversableRing> holes;
 };
 
-/// Outlines of what is free in a grid (values 0..98), the largest piece first. Lines run through
-/// the centres of the outermost free cells: nothing outside the free area is inside, and a strip
-/// one cell wide has no area. Pieces below `min_area_m2` are left out.
+/// Outlines of the free areas of a grid (values 0..98), the largest first. Lines run through the
+/// centres of the outermost free cells, so that they enclose free cells only; a strip one cell wide
+/// has no area. Areas below `min_area_m2` are left out.
 [[nodiscard]] std::vector<TraversablePolygon> free_outlines(const OccupancyGrid& grid,
                                                             double min_area_m2 = 1.0);
 
-/// Area of a polygon without its holes [m^2].
+/// Area of a polygon, less its holes [m^2].
 [[nodiscard]] double area_m2(const TraversablePolygon& polygon);
 
 }  // namespace stillmap

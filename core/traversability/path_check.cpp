@@ -9,14 +9,14 @@
 namespace stillmap {
 namespace {
 
-/// The turn from one heading to another, the shorter way round.
-double turn(double from_rad, double to_rad) {
+/// Signed angle from one heading to another, in [-pi, pi].
+double angle_between(double from_rad, double to_rad) {
   return std::remainder(to_rad - from_rad, 2.0 * std::numbers::pi);
 }
 
-PlanarPose between(const PlanarPose& a, const PlanarPose& b, double share) {
+PlanarPose interpolate(const PlanarPose& a, const PlanarPose& b, double share) {
   return {(1.0 - share) * a.position_map + share * b.position_map,
-          a.heading_rad + share * turn(a.heading_rad, b.heading_rad)};
+          a.heading_rad + share * angle_between(a.heading_rad, b.heading_rad)};
 }
 
 std::string fault_of(const TraversabilityView& view, const PlanarPose& pose, std::size_t index) {
@@ -37,16 +37,16 @@ PathCheck refused(TraversabilityStatus status, const std::string& reason) {
   return check;
 }
 
-/// Steps from one pose to the next in which no part of the robot moves more than half a cell.
+/// Number of steps between two poses in which no part of the robot moves more than half a cell.
 int steps_between(const TraversabilityView& view, const PlanarPose& a, const PlanarPose& b) {
   const double moved_m =
       (b.position_map - a.position_map).norm() +
-      std::abs(turn(a.heading_rad, b.heading_rad)) * view.profile.circumscribed_radius_m();
+      std::abs(angle_between(a.heading_rad, b.heading_rad)) * view.profile.circumscribed_radius_m();
   return std::max(1, static_cast<int>(std::ceil(moved_m / (0.5 * view.cell_m))));
 }
 
 /// Cells under the footprint, summed over all steps.
-double cells_to_look_at(const TraversabilityView& view, std::span<const PlanarPose> path_map) {
+double cells_to_check(const TraversabilityView& view, std::span<const PlanarPose> path_map) {
   double steps = 1.0;
   for (std::size_t i = 0; i + 1 < path_map.size(); ++i) {
     steps += steps_between(view, path_map[i], path_map[i + 1]);
@@ -69,22 +69,22 @@ std::optional<PathCheck> refusal(const TraversabilityView& view,
     const std::string fault = fault_of(view, path_map[i], i);
     if (!fault.empty()) return refused(TraversabilityStatus::invalid_request, fault);
   }
-  if (cells_to_look_at(view, path_map) > max_path_cells) {
+  if (cells_to_check(view, path_map) > max_path_cells) {
     return refused(TraversabilityStatus::too_large,
                    "the path is too long or turns too much to be checked at once; ask for parts");
   }
   return std::nullopt;
 }
 
-/// Walks along the path and keeps the account.
-class Walk {
+/// Checks pose after pose of a path and accumulates the result.
+class PathWalk {
  public:
-  explicit Walk(const TraversabilityView& view) : view_(view), lookup_(view) {
+  explicit PathWalk(const TraversabilityView& view) : view_(view), lookup_(view) {
     check_.map_version = view.version;
     check_.clearance_m = clearance_limit_m(view.profile);
   }
 
-  /// Goes on to `pose`, `moved_m` from the last one; false when the robot cannot stand there.
+  /// Checks a pose `moved_m` after the last one; false in a conflict.
   bool step_to(const PlanarPose& pose, double moved_m, std::size_t segment) {
     check_.checked_m += moved_m;
     bool is_inferred = false;
@@ -94,7 +94,7 @@ class Walk {
       check_.clearance_m = std::min(check_.clearance_m, static_cast<double>(cell.clearance_m));
       is_inferred = is_inferred || cell.inferred;
       const BlockReason reason = conflict_with(cell);
-      if (reason == BlockReason::none || says_more_already(conflict, reason)) return;
+      if (reason == BlockReason::none || is_more_specific(conflict, reason)) return;
       conflict = {segment, check_.checked_m, pose, view_.centre_of(index), reason};
     });
     if (is_inferred) check_.inferred_m += moved_m;
@@ -114,8 +114,8 @@ class Walk {
         cell.state == CellState::unknown && view_.profile.unknown == UnknownGround::blocked;
     return is_closed ? BlockReason::unknown : BlockReason::none;
   }
-  /// What is known to be there says more than what nobody knows.
-  static bool says_more_already(const std::optional<PathConflict>& conflict, BlockReason reason) {
+  /// A known obstacle takes precedence over unknown ground.
+  static bool is_more_specific(const std::optional<PathConflict>& conflict, BlockReason reason) {
     return conflict && (conflict->reason != BlockReason::unknown || reason == BlockReason::unknown);
   }
 
@@ -151,28 +151,28 @@ std::vector<PlanarPose> with_headings(const PathQuery& query) {
   return poses;
 }
 
-/// Of the way from position `i` to the next; nothing for a way of no length.
-std::optional<double> heading_of_way(const std::vector<Eigen::Vector2d>& positions_map,
-                                     std::size_t i) {
-  const Eigen::Vector2d way = positions_map[i + 1] - positions_map[i];
-  if (way.squaredNorm() == 0.0) return std::nullopt;
-  return std::atan2(way.y(), way.x());
+/// Heading from position `i` to the next; nothing if they are equal.
+std::optional<double> heading_of_segment(const std::vector<Eigen::Vector2d>& positions_map,
+                                         std::size_t i) {
+  const Eigen::Vector2d segment = positions_map[i + 1] - positions_map[i];
+  if (segment.squaredNorm() == 0.0) return std::nullopt;
+  return std::atan2(segment.y(), segment.x());
 }
 
 double first_heading(const std::vector<Eigen::Vector2d>& positions_map) {
   for (std::size_t i = 0; i + 1 < positions_map.size(); ++i) {
-    if (const auto heading_rad = heading_of_way(positions_map, i)) return *heading_rad;
+    if (const auto heading_rad = heading_of_segment(positions_map, i)) return *heading_rad;
   }
   return 0.0;
 }
 
-/// Two poses a way between positions: where it begins and where it ends, both looking along it.
-std::vector<PlanarPose> straight_ahead(const std::vector<Eigen::Vector2d>& positions_map) {
+/// The poses at both ends of each segment, heading along it.
+std::vector<PlanarPose> along_segments(const std::vector<Eigen::Vector2d>& positions_map) {
   std::vector<PlanarPose> poses;
   poses.reserve(2 * positions_map.size());
   double heading_rad = first_heading(positions_map);
   for (std::size_t i = 0; i + 1 < positions_map.size(); ++i) {
-    heading_rad = heading_of_way(positions_map, i).value_or(heading_rad);
+    heading_rad = heading_of_segment(positions_map, i).value_or(heading_rad);
     poses.push_back({positions_map[i], heading_rad});
     poses.push_back({positions_map[i + 1], heading_rad});
   }
@@ -183,7 +183,7 @@ std::vector<PlanarPose> straight_ahead(const std::vector<Eigen::Vector2d>& posit
 
 PathCheck check_path(const TraversabilityView& view, std::span<const PlanarPose> path_map) {
   if (const auto refusal_of_path = refusal(view, path_map)) return *refusal_of_path;
-  Walk walk(view);
+  PathWalk walk(view);
   if (!walk.step_to(path_map.front(), 0.0, 0)) return walk.result();
   for (std::size_t i = 0; i + 1 < path_map.size(); ++i) {
     const PlanarPose& a = path_map[i];
@@ -191,7 +191,7 @@ PathCheck check_path(const TraversabilityView& view, std::span<const PlanarPose>
     const int steps = steps_between(view, a, b);
     const double moved_m = (b.position_map - a.position_map).norm() / steps;
     for (int step = 1; step <= steps; ++step) {
-      const PlanarPose pose = between(a, b, static_cast<double>(step) / steps);
+      const PlanarPose pose = interpolate(a, b, static_cast<double>(step) / steps);
       if (!walk.step_to(pose, moved_m, i)) return walk.result();
     }
   }
@@ -211,8 +211,8 @@ PathCheck check_path(const TraversabilityView& view, const PathQuery& query) {
     return refused(TraversabilityStatus::invalid_request, fault);
   }
   if (!query.headings_rad.empty()) return check_path(view, with_headings(query));
-  PathCheck check = check_path(view, straight_ahead(query.positions_map));
-  // Every second of its ways is a turn at the end of the one before.
+  PathCheck check = check_path(view, along_segments(query.positions_map));
+  // Every second of the checked segments is a turn on the spot.
   if (check.conflict) check.conflict->segment /= 2;
   return check;
 }

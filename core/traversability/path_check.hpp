@@ -9,15 +9,15 @@
 
 namespace stillmap {
 
-/// The first place where a robot cannot follow a path.
+/// The first collision along a path.
 struct PathConflict {
-  /// The way goes from pose `segment` to the next one.
+  /// Index of the pose before it.
   std::size_t segment = 0;
-  /// Way along the path up to there [m].
+  /// Distance along the path [m].
   double along_m = 0.0;
-  /// Where the robot would stand.
+  /// Pose of the robot in collision.
   PlanarPose pose;
-  /// Centre of the cell that its footprint must not touch, map frame [m].
+  /// Centre of the blocking cell under the footprint, map frame [m].
   Eigen::Vector2d cell_centre_map = Eigen::Vector2d::Zero();
   BlockReason reason = BlockReason::none;
 };
@@ -25,11 +25,11 @@ struct PathConflict {
 struct PathCheck {
   TraversabilityStatus status = TraversabilityStatus::ok;
   std::string reason;
-  /// The whole path can be followed.
+  /// Whether the whole path is free of conflicts.
   bool is_free = false;
   std::optional<PathConflict> conflict;
-  /// Smallest distance from a cell under the footprint to one that is lethal in itself [m], up to
-  /// the conflict: 0 at a conflict with such a cell; never above `clearance_limit_m`.
+  /// Smallest `TraversabilityCell::clearance_m` under the footprint, up to the conflict [m]: 0 at a
+  /// conflict with a lethal cell, at most `clearance_limit_m`.
   double clearance_m = 0.0;
   /// Length of the path, or up to the conflict [m].
   double checked_m = 0.0;
@@ -38,31 +38,32 @@ struct PathCheck {
   std::uint64_t map_version = 0;
 };
 
-/// What is checked at once at most: poses, and cells under the footprint summed over all steps.
-/// For a car, the latter is some 20 km.
+/// Limits of one check: poses, and cells under the footprint summed over all steps (about 20 km for
+/// a car).
 inline constexpr std::size_t max_path_poses = 100'000;
 inline constexpr double max_path_cells = 5e7;
 
-/// Moves the robot's oriented footprint along the poses, straight from one to the next and turning
-/// evenly, in steps in which no part of it moves more than half a cell. One pose is a path too.
-/// An empty path and poses that are not finite are invalid requests. Cells within the safety margin
-/// (inflation) do not stop it: the footprint itself decides.
+/// Checks the robot's oriented footprint along the poses, interpolated linearly, in steps in which
+/// no part of it moves more than half a cell. A path may be a single pose. An empty path and poses
+/// that are not finite are invalid requests. Inscribed cells are no conflict: the footprint itself
+/// is tested.
 [[nodiscard]] PathCheck check_path(const TraversabilityView& view,
                                    std::span<const PlanarPose> path_map);
 
-/// Can this robot follow this path?
+/// A path to check, with or without headings.
 struct PathQuery {
   /// Name of the robot profile, for a server that keeps several.
   std::string profile;
   /// Map frame [m].
   std::vector<Eigen::Vector2d> positions_map;
-  /// One a position: the robot turns evenly from one to the next. Or none: it drives straight ahead
-  /// from position to position and turns on the spot.
+  /// One for each position, interpolated linearly. Or none: the robot drives straight from position
+  /// to position and turns on the spot.
   std::vector<double> headings_rad;
 };
 
-/// Checks the path, whatever profile it names; a conflict's `segment` counts the positions. At most
-/// `max_path_poses` positions, half as many without headings; without, there must be two.
+/// Checks the path for the view's profile, whichever `query` names. A conflict's `segment` is an
+/// index of `positions_map`. At most `max_path_poses` positions; without headings half as many, and
+/// at least two.
 [[nodiscard]] PathCheck check_path(const TraversabilityView& view, const PathQuery& query);
 
 }  // namespace stillmap

@@ -9,51 +9,51 @@
 
 namespace stillmap {
 
-/// What a robot does where nobody has seen the ground.
+/// How a robot treats unknown ground.
 enum class UnknownGround : std::uint8_t {
-  /// It may not go there; paths over it are refused with the reason `unknown`.
+  /// Not traversable; paths over it are in conflict with reason `unknown`.
   blocked,
-  /// It may, as an explorer does.
+  /// Traversable, for exploration.
   allowed,
 };
 
-/// What a robot can drive over.
+/// Footprint and limits of a robot.
 struct RobotProfile {
   std::string name;
   /// Footprint: a rectangle along the robot's heading [m].
   double length_m = 1.0;
   double width_m = 1.0;
-  /// The rectangle's centre lies this far ahead of the point that poses speak of (a car's rear
-  /// axle) [m].
+  /// Distance of the rectangle's centre ahead of the pose's reference point (a car's rear axle)
+  /// [m].
   double centre_ahead_m = 0.0;
-  /// Tightest curve that it drives [m]; 0 for a robot that turns on the spot.
+  /// 0 for a robot that turns on the spot [m].
   double min_turning_radius_m = 0.0;
-  /// From the ground to the robot's belly, and to its highest point [m].
+  /// From the ground to the robot's underside, and to its highest point [m].
   double ground_clearance_m = 0.1;
   double height_m = 1.0;
-  /// Highest edge of the ground that it climbs [m].
+  /// Highest step of the ground that it climbs [m].
   double max_step_m = 0.05;
   double max_slope_deg = 15.0;
   /// Largest deviation (RMS) of the ground from a plane within half a metre [m].
   double max_roughness_m = 0.05;
-  /// Cost of ground of a class, 0 (wanted) to 1; without a value it must not be entered.
-  /// `unlabeled` is ground that nobody classified.
+  /// Cost of ground of each class, 0 to 1; lethal without a value. `unlabeled` is the cost of
+  /// ground without a class.
   std::array<std::optional<double>, semantic_class_count> class_cost{};
-  /// Added where the ground was not seen but follows from its surroundings, 0 to 1.
+  /// Added on inferred ground, 0 to 1.
   double inferred_cost = 0.1;
   UnknownGround unknown = UnknownGround::blocked;
 
-  /// Radius of the largest circle round the pose inside the footprint [m]: closer to something
-  /// lethal, the robot touches it whatever its heading.
+  /// Radius of the largest circle around the pose within the footprint [m]: closer to a lethal
+  /// cell, the robot is in collision at any heading.
   [[nodiscard]] double inscribed_radius_m() const;
-  /// Radius of the smallest circle round the pose that holds the footprint [m]: farther from
-  /// everything lethal, the robot is free whatever its heading.
+  /// Radius of the smallest circle around the pose that contains the footprint [m]: farther from
+  /// every lethal cell, the robot is free at any heading.
   [[nodiscard]] double circumscribed_radius_m() const;
-  /// What stands higher than this over the ground is an obstacle [m]: the wheels must get over it
-  /// and the belly must pass above it.
+  /// Objects higher than this above the ground are obstacles [m]: the wheels must climb over them
+  /// and the underside must clear them.
   [[nodiscard]] double obstacle_height_m() const;
 
-  /// Every fault in words, one a line; empty when the profile can be used.
+  /// One line for each invalid value; empty when the profile is valid.
   [[nodiscard]] std::string faults() const;
 
   friend bool operator==(const RobotProfile&, const RobotProfile&) = default;

@@ -12,9 +12,9 @@
 namespace stillmap {
 namespace {
 
-/// The plane takes the ground this far away [m].
+/// Radius of the plane fit [m].
 constexpr double plane_reach_m = 0.5;
-/// Cells out, on either side, from which the rise without the step is taken.
+/// Distance on either side up to which the rise without the step is measured [cells].
 constexpr int rise_cells = 3;
 
 int plane_reach_cells(double cell_m) {
@@ -26,7 +26,7 @@ std::optional<double> height_at(const GroundGrid& ground, int x, int y) {
   return ground(x, y).height_m;
 }
 
-/// Sums for a plane z = a x + b y + c around a cell.
+/// Sums for the least-squares plane z = a x + b y + c around a cell.
 struct PlaneFit {
   double x = 0.0, y = 0.0, z = 0.0;
   double xx = 0.0, xy = 0.0, yy = 0.0;
@@ -49,7 +49,7 @@ PlaneFit plane_around(const GroundGrid& ground, int x0, int y0, double cell_m) {
     for (int x = std::max(0, x0 - reach); x <= std::min(x0 + reach, ground.width() - 1); ++x) {
       const GroundCell& cell = ground(x, y);
       if (!cell.is_known() || cell.label != middle.label) continue;
-      // Heights from the middle's: small numbers keep the sums exact enough.
+      // Relative heights, for the precision of the sums.
       fit.add((x - x0) * cell_m, (y - y0) * cell_m, cell.height_m - middle.height_m);
     }
   }
@@ -59,7 +59,7 @@ PlaneFit plane_around(const GroundGrid& ground, int x0, int y0, double cell_m) {
 void set_plane(const PlaneFit& fit, SurfaceShape& shape) {
   constexpr int enough = 5;
   if (fit.count < enough) return;
-  // About the mean, the plane's height is one unknown less.
+  // Centred on the mean, c vanishes.
   const double n = fit.count;
   const double xx = fit.xx - fit.x * fit.x / n;
   const double xy = fit.xy - fit.x * fit.y / n;
@@ -68,7 +68,7 @@ void set_plane(const PlaneFit& fit, SurfaceShape& shape) {
   const double yz = fit.yz - fit.y * fit.z / n;
   const double zz = fit.zz - fit.z * fit.z / n;
   const double determinant = xx * yy - xy * xy;
-  // Cells in a row do not carry a plane.
+  // Collinear cells do not determine a plane.
   if (!(determinant > 1e-6 * (xx + yy) * (xx + yy))) return;
   const double a = (yy * xz - xy * yz) / determinant;
   const double b = (xx * yz - xy * xz) / determinant;
@@ -77,7 +77,7 @@ void set_plane(const PlaneFit& fit, SurfaceShape& shape) {
   shape.roughness_m = static_cast<float>(std::sqrt(rest / n));
 }
 
-/// The rise over one cell length, on one side: from `near` cells out to `far` cells out.
+/// Rise per cell on one side, from the nearest cell to `rise_cells` out.
 std::optional<double> rise_beyond(const GroundGrid& ground, int x, int y, std::pair<int, int> d,
                                   int sign) {
   const auto near_m = height_at(ground, x + sign * d.first, y + sign * d.second);
@@ -93,7 +93,7 @@ double step_along(const GroundGrid& ground, int x, int y, std::pair<int, int> d)
   const auto after_m = height_at(ground, x + d.first, y + d.second);
   const int cells = (before_m ? 1 : 0) + (after_m ? 1 : 0);
   const double difference_m = after_m.value_or(here_m) - before_m.value_or(here_m);
-  // What the steeper side explains; on a ramp's foot that is all of it.
+  // The rise of the steeper side; at a ramp's foot it explains the whole difference.
   double explained_m = 0.0;
   for (const int sign : {-1, 1}) {
     const auto rise_m = rise_beyond(ground, x, y, d, sign);
@@ -105,7 +105,7 @@ double step_along(const GroundGrid& ground, int x, int y, std::pair<int, int> d)
 
 static_assert(surface_reach_m > max_filled_gap_m + 1.0, "both ends of a gap need their slopes");
 
-void add_things(SurfaceTile& tile, const GroundCell& ground, Column column) {
+void add_objects(SurfaceTile& tile, const GroundCell& ground, Column column) {
   for (const ColumnVoxel& voxel : column) {
     const float above_m = voxel.height_m - ground.height_m;
     if (voxel.height_m > ground.top_m && above_m <= max_object_height_m)
@@ -143,7 +143,7 @@ SurfaceTile make_surface(const TileNeighbourhood<ColumnTile>& columns, double ce
       if (cell.ground.is_known()) cell.shape = shape_at(ground, x, y, cell_m);
       tile.cells.push_back(cell);
       tile.begin.push_back(static_cast<std::uint32_t>(tile.object_heights_m.size()));
-      if (cell.ground.origin != GroundOrigin::none) add_things(tile, cell.ground, window(x, y));
+      if (cell.ground.origin != GroundOrigin::none) add_objects(tile, cell.ground, window(x, y));
     }
   }
   tile.begin.push_back(static_cast<std::uint32_t>(tile.object_heights_m.size()));

@@ -10,48 +10,48 @@
 
 namespace stillmap {
 
-/// How the ground lies around a cell.
+/// Local shape of the ground.
 struct SurfaceShape {
-  /// Angle of the plane through the ground within half a metre [rad].
+  /// Inclination of the plane fitted to the ground within half a metre [rad].
   float slope = 0.0F;
   /// RMS distance of that ground from the plane [m].
   float roughness_m = 0.0F;
-  /// Highest edge between the cell and its neighbours, without what the slope explains [m].
+  /// Largest step between the cell and its neighbours, less the rise that the slope explains [m].
   float step_m = 0.0F;
 
   friend bool operator==(const SurfaceShape&, const SurfaceShape&) = default;
 };
 
-/// Reaches of `shape_at`: cells farther away than this do not count.
+/// Reach of `shape_at`: cells farther away have no influence.
 [[nodiscard]] int shape_reach_cells(double cell_m);
 
-/// Shape of the ground at a cell that has some. The plane is fitted to cells of its own class, so
-/// that a kerb beside it is a step and not a slope. A step is the difference across the cell, from
-/// one side to the other (or to the cell itself where a side has no ground), less what the ground
-/// on either side rises anyway.
+/// Shape of the ground at a cell. The plane is fitted to cells of the same class, so that a kerb
+/// beside it is a step and not a slope. A step is the height difference across the cell, from one
+/// side to the other (or to the cell itself where a side has no ground), less the rise of the
+/// ground on either side. @pre the cell's ground is known
 [[nodiscard]] SurfaceShape shape_at(const GroundGrid& ground, int x, int y, double cell_m);
 
-/// What a cell is like, whoever wants to drive there.
+/// Ground of a cell, independent of the robot.
 struct SurfaceCell {
   GroundCell ground;
-  /// Of known ground only.
+  /// Set for known ground only.
   SurfaceShape shape;
 
   friend bool operator==(const SurfaceCell&, const SurfaceCell&) = default;
 };
 
-/// The ground of a tile and what stands on it; the same for all robots.
+/// The ground of a tile and the objects on it, independent of the robot.
 struct SurfaceTile {
   /// Cells along a side.
   int side = 0;
-  /// Row after row from the lowest y.
+  /// Row by row from the lowest y.
   std::vector<SurfaceCell> cells;
-  /// Of every cell, where its things begin in `object_heights_m`; one more for the end.
+  /// Index in `object_heights_m` of each cell's first object; one more for the end.
   std::vector<std::uint32_t> begin;
-  /// Heights of what is not ground above the ground of its cell, from the lowest up [m].
+  /// Heights of non-ground voxels above the ground of their cell, ascending within each cell [m].
   std::vector<float> object_heights_m;
 
-  /// A cell with what stands in it.
+  /// A cell with its objects.
   struct View {
     const SurfaceCell* cell = nullptr;
     std::span<const float> object_heights_m;
@@ -64,11 +64,11 @@ struct SurfaceTile {
   friend bool operator==(const SurfaceTile&, const SurfaceTile&) = default;
 };
 
-/// Things higher above the ground than this are above every robot [m].
+/// Objects higher above the ground than this are above every robot [m].
 inline constexpr float max_object_height_m = 12.0F;
 
-/// The surface of the middle tile. What is farther from it than its neighbours reach, or than
-/// `surface_reach_m`, does not count.
+/// The surface of the middle tile. Columns farther from it than `surface_reach_m`, or than its
+/// neighbours extend, have no influence.
 [[nodiscard]] SurfaceTile make_surface(const TileNeighbourhood<ColumnTile>& columns, double cell_m);
 
 inline constexpr double surface_reach_m = 8.0;

@@ -21,7 +21,7 @@ struct CellBox {
   int min_x = 0, min_y = 0, max_x = 0, max_y = 0;
 };
 
-/// Where tiles changed.
+/// Bounding box of the changed cells of each tile.
 using ChangedCells = std::map<TileId, CellBox>;
 
 bool is_same(Column a, Column b) { return std::ranges::equal(a, b); }
@@ -44,8 +44,8 @@ std::optional<CellBox> difference(const TileT& before, const TileT& after) {
   return box;
 }
 
-/// Notes in `changes` the smallest box around the cells in which two states of a tile differ. Null
-/// stands for a tile that is not there; a whole tile that comes or goes has changed.
+/// Adds the bounding box of the cells in which two states of a tile differ to `changes`. Null
+/// stands for a missing tile; a tile that appears or disappears has changed as a whole.
 template <typename TileT>
 void note_change(ChangedCells& changes, TileId id, const TileT* before, const TileT* after) {
   if (before != nullptr && after != nullptr) {
@@ -56,15 +56,14 @@ void note_change(ChangedCells& changes, TileId id, const TileT* before, const Ti
   }
 }
 
-/// Whether a change between `first` and `last` reaches the tile `offset` (-1, 0, 1) tiles on.
+/// Whether a change in [first, last] influences the neighbour at `offset` (-1, 0, 1).
 bool reaches(int first, int last, int offset, int side, int margin) {
   if (offset < 0) return first < margin;
   if (offset > 0) return last >= side - margin;
   return true;
 }
 
-/// The tiles in which or around which (closer than `margin` cells, margin <= side) something
-/// changed.
+/// The tiles with changes in them or within `margin` cells around them. @pre margin <= side
 std::set<TileId> affected_tiles(const ChangedCells& changes, int side, int margin) {
   std::set<TileId> affected;
   for (const auto& [id, box] : changes) {
@@ -80,14 +79,14 @@ std::set<TileId> affected_tiles(const ChangedCells& changes, int side, int margi
   return affected;
 }
 
-/// All that is known of a tile.
+/// The stages of a tile.
 struct TileState {
-  /// Identify the map tile that the columns were made from.
+  /// Identify the map tile that the columns were computed from.
   std::uint64_t revision = 0;
   std::uint64_t content_hash = 0;
   std::shared_ptr<const ColumnTile> columns;
   std::shared_ptr<const SurfaceTile> surface;
-  /// One a profile.
+  /// One for each profile.
   std::vector<std::shared_ptr<const TraversabilityTile>> classified;
 };
 
@@ -104,7 +103,7 @@ int checked_side(const MapSnapshot& map) {
   return static_cast<int>(side);
 }
 
-/// A tile's state and its neighbours', of one kind.
+/// One stage of a tile and its neighbours.
 template <typename TileT, typename Member>
 TileNeighbourhood<TileT> neighbourhood(const TileStates& states, TileId id, int side,
                                        Member member) {
@@ -143,7 +142,7 @@ struct TraversabilityMap::State {
   int side = 0;
   std::vector<std::shared_ptr<const TraversabilityView>> views;
 
-  void take_sizes(const MapSnapshot& map);
+  void set_map(const MapSnapshot& map);
   [[nodiscard]] ChangedCells update_columns(const MapSnapshot& map,
                                             const ThrottleCallback& throttle);
   [[nodiscard]] std::vector<const Tile*> renewed_tiles(const MapSnapshot& map) const;
@@ -157,8 +156,8 @@ struct TraversabilityMap::State {
   void publish();
 };
 
-/// A map of another id or size shares nothing with the last one.
-void TraversabilityMap::State::take_sizes(const MapSnapshot& map) {
+/// Drops all tiles if the map has another id or another size of tiles or voxels.
+void TraversabilityMap::State::set_map(const MapSnapshot& map) {
   const int new_side = map.tiles.empty() ? 0 : checked_side(map);
   const bool is_same = map.map_id == map_id && map.tile_size_m == tile_size_m &&
                        map.voxel_size_m == cell_m && new_side == side;
@@ -225,14 +224,14 @@ ChangedCells TraversabilityMap::State::update_surfaces(const ChangedCells& colum
     surfaces[i] = std::make_shared<const SurfaceTile>(make_surface(around, cell_m));
   });
   ChangedCells changes;
-  // A tile that went away took its lethal cells along.
+  // The lethal cells of a removed tile no longer influence its neighbours.
   for (const auto& [id, box] : columns) {
     if (!tiles.contains(id)) changes[id] = box;
   }
   for (std::size_t i = 0; i < ids.size(); ++i) {
     TileState& state = tiles.at(ids[i]);
     note_change(changes, ids[i], state.surface.get(), surfaces[i].get());
-    // What is the same stays the same object: those who hold it need not look again.
+    // An unchanged surface stays the same object, so that unchanged tiles compare equal by pointer.
     if (changes.contains(ids[i])) state.surface = surfaces[i];
   }
   report.surfaces = ids.size();
@@ -304,7 +303,7 @@ TraversabilityMap& TraversabilityMap::operator=(TraversabilityMap&&) noexcept = 
 
 TraversabilityUpdate TraversabilityMap::update(const MapSnapshot& map,
                                                const ThrottleCallback& throttle) {
-  state_->take_sizes(map);
+  state_->set_map(map);
   TraversabilityUpdate report;
   if (!map.tiles.empty()) {
     const ChangedCells columns = state_->update_columns(map, throttle);

@@ -11,20 +11,19 @@
 
 namespace stillmap {
 
-/// Tiles that an update had to work on.
+/// Number of tiles that an update processed.
 struct TraversabilityUpdate {
   /// Changed, new and removed tiles of the map.
   std::size_t map_tiles = 0;
-  /// Tiles whose surface was computed anew: those and the ones that they reach into.
+  /// Tiles whose surface was recomputed: changed tiles and the neighbours that they influence.
   std::size_t surfaces = 0;
-  /// Tiles classified anew, all profiles together.
+  /// Tiles that were reclassified, summed over all profiles.
   std::size_t classified = 0;
 };
 
-/// The traversable area of a growing map, for several robots. The surface is computed once and
-/// shared by all of them. An update works on the tiles that changed and on those that they
-/// influence, and gives bit by bit what a new object would give for the same map. One thread
-/// updates; views are immutable.
+/// Traversability of a growing map for several robots, which share the surface. An update processes
+/// the tiles that changed and those that they influence; its result is bitwise that of a new object
+/// for the same map. NOT thread-safe; views are immutable.
 class TraversabilityMap {
  public:
   /// Throws std::invalid_argument naming the profile and its faults, or two profiles of one name.
@@ -33,12 +32,12 @@ class TraversabilityMap {
   TraversabilityMap(TraversabilityMap&&) noexcept;
   TraversabilityMap& operator=(TraversabilityMap&&) noexcept;
 
-  /// Brings all profiles to this state of the map. Throws std::invalid_argument when the map's
-  /// tiles are not whole numbers of voxels.
+  /// Updates all profiles to this snapshot. Throws std::invalid_argument if a tile's side is not a
+  /// whole number of voxels.
   TraversabilityUpdate update(const MapSnapshot& map, const ThrottleCallback& throttle = {});
 
   [[nodiscard]] const std::vector<RobotProfile>& profiles() const;
-  /// The area of the profile as of the last update; null when there is no such profile.
+  /// View of a profile at the last update; null if there is no such profile.
   [[nodiscard]] std::shared_ptr<const TraversabilityView> view(const std::string& profile) const;
 
  private:

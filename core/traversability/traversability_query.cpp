@@ -49,7 +49,7 @@ std::vector<TraversabilityCellInfo> cells_of(const TraversabilityView& view,
   return cells;
 }
 
-/// A cell of a tile or of an answer.
+/// `Cell` is that of a tile or of an answer.
 template <typename Cell>
 void count(const Cell& cell, TraversabilitySummary& summary) {
   switch (cell.state) {
@@ -66,7 +66,7 @@ void count(const Cell& cell, TraversabilitySummary& summary) {
   }
 }
 
-// Small, so that what is made of the view has hardly more to it than the answer.
+// Small, so that the view's tiles extend little beyond the answer's grid.
 constexpr int tile_side = 20;
 
 int tile_index(std::int32_t cell) {
@@ -114,9 +114,9 @@ std::map<TileId, NewTile> tiles_of(const TraversabilityAnswer& answer) {
     if (tile == tiles.end()) {
       tile = tiles.emplace(id, empty_tile(id, answer.grid.map_version)).first;
     }
-    const auto place = static_cast<std::size_t>((y - id.y * tile_side) * tile_side) +
+    const auto index = static_cast<std::size_t>((y - id.y * tile_side) * tile_side) +
                        static_cast<std::size_t>(x - id.x * tile_side);
-    put(tile->second, place, answer.cells[i], answer.grid.data[i]);
+    put(tile->second, index, answer.cells[i], answer.grid.data[i]);
   }
   return tiles;
 }

@@ -12,52 +12,52 @@
 
 namespace stillmap {
 
-/// Where can this robot go?
+/// Request for the traversability of a region.
 struct TraversabilityQuery {
   /// Name of the robot profile, for a server that keeps several.
   std::string profile;
-  /// Seen from above: heights do not count, a sphere is its circle.
+  /// In plan view: heights are ignored, a sphere becomes a circle.
   Region region = BoxRegion{};
   bool include_grid = true;
   bool include_outlines = false;
-  /// Largest grid [cells], also where only outlines are wanted.
+  /// Largest grid [cells], also if only outlines are requested.
   std::uint64_t max_cells = max_grid_cells;
-  /// Smaller pieces of free area are left out of the outlines [m^2].
+  /// Smaller free areas get no outline [m^2].
   double min_outline_area_m2 = 1.0;
 };
 
-/// What a planner gets to know of a cell besides its value in the grid.
+/// Details of a cell beside its value in the grid.
 struct TraversabilityCellInfo {
   CellState state = CellState::unknown;
   BlockReason reason = BlockReason::none;
   bool inferred = false;
-  /// Of the ground, map frame [m]; NaN where it is not known.
+  /// Height of the ground, map frame [m]; NaN where unknown.
   float ground_z_m = std::numeric_limits<float>::quiet_NaN();
 };
 
 struct TraversabilityAnswer {
-  /// Its status and reason are the answer's. Without values where only outlines were wanted.
+  /// Its status and reason are those of the answer. Without values if only outlines were requested.
   OccupancyGrid grid;
-  /// Of the map that it shows.
+  /// Id of the map.
   std::uint64_t map_id = 0;
   /// One for each value of the grid.
   std::vector<TraversabilityCellInfo> cells;
   std::vector<TraversablePolygon> outlines;
 };
 
-/// Answers `query` from the view, whatever profile it names. A region with faults is an invalid
-/// request.
+/// Answers `query` for the view's profile, whichever `query` names. A region with faults is an
+/// invalid request.
 [[nodiscard]] TraversabilityAnswer query_traversability(const TraversabilityView& view,
                                                         const TraversabilityQuery& query);
 
-/// How much of an area is in which state [cells].
+/// Number of cells in each state.
 struct TraversabilitySummary {
   std::uint64_t free = 0;
-  /// Of the free ones.
+  /// Part of `free` on inferred ground.
   std::uint64_t inferred = 0;
-  /// Unknown cells of the tiles, or of an answer's grid; most of them lie behind walls.
+  /// Unknown cells of the tiles, or of an answer's grid.
   std::uint64_t unknown = 0;
-  /// By `BlockReason`.
+  /// Indexed by `BlockReason`.
   std::array<std::uint64_t, block_reason_count> lethal{};
 
   [[nodiscard]] std::uint64_t all_lethal() const;
@@ -67,9 +67,8 @@ struct TraversabilitySummary {
 /// Of an answer with a grid.
 [[nodiscard]] TraversabilitySummary summarize(const TraversabilityAnswer& answer);
 
-/// The cells of an answer as a view, to draw, count or ask further. Of the surface, only the height
-/// of known ground is in it; clearances are not (0). @pre the answer's status is ok and it has a
-/// grid.
+/// Converts an answer to a view, for pictures and further queries. Of the surface, it has the
+/// height of known ground only; clearances are 0. @pre the answer's status is ok and it has a grid
 [[nodiscard]] TraversabilityView view_of_answer(const TraversabilityAnswer& answer,
                                                 const RobotProfile& profile);
 

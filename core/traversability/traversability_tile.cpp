@@ -10,15 +10,15 @@
 namespace stillmap {
 namespace {
 
-constexpr double highest_free_cost = 98.0;
+constexpr double max_free_cost = 98.0;
 constexpr std::uint8_t inscribed_cost = 99;
 constexpr std::uint8_t lethal_cost = 100;
-/// Cost at the inscribed radius; it falls to 0 at the circumscribed one.
-constexpr double near_cost = 80.0;
-/// Cost of ground as steep, or as rough, as the robot can just bear.
+/// Cost at the inscribed radius; it decreases to 0 at the circumscribed radius.
+constexpr double proximity_cost = 80.0;
+/// Cost of ground at the robot's limit of slope or roughness.
 constexpr double effort_cost = 0.5;
 
-/// The lowest thing that the robot cannot drive over and that is lower than it is high.
+/// The lowest object above the robot's obstacle height and below its top.
 const float* blocking_object(std::span<const float> object_heights_m, const RobotProfile& profile) {
   const auto object =
       std::ranges::upper_bound(object_heights_m, static_cast<float>(profile.obstacle_height_m()));
@@ -39,7 +39,7 @@ BlockReason reason_of_ground(const SurfaceCell& cell, const RobotProfile& profil
 
 BlockReason reason_of(const SurfaceTile::View& surface, const RobotProfile& profile) {
   if (const float* object_height_m = blocking_object(surface.object_heights_m, profile)) {
-    // What begins in the upper half of the robot hangs from somewhere else.
+    // An object that begins in the robot's upper half hangs from above.
     return *object_height_m < 0.5 * profile.height_m ? BlockReason::obstacle
                                                      : BlockReason::low_headroom;
   }
@@ -52,11 +52,11 @@ std::uint8_t free_cost(const SurfaceCell& cell, const RobotProfile& profile) {
       profile.class_cost.at(static_cast<std::size_t>(cell.ground.label)).value_or(1.0);
   const double steep = cell.shape.slope / (profile.max_slope_deg * std::numbers::pi / 180.0);
   const double rough = cell.shape.roughness_m / profile.max_roughness_m;
-  // Squared: a little slope is no effort.
+  // Squared, so that slight slopes cost next to nothing.
   const double effort = effort_cost * std::max(steep * steep, rough * rough);
   const bool is_inferred = cell.ground.origin == GroundOrigin::inferred;
   const double cost = std::max(of_class, effort) + (is_inferred ? profile.inferred_cost : 0.0);
-  return static_cast<std::uint8_t>(std::lround(highest_free_cost * std::min(cost, 1.0)));
+  return static_cast<std::uint8_t>(std::lround(max_free_cost * std::min(cost, 1.0)));
 }
 
 TraversabilityCell make_lethal(TraversabilityCell cell, BlockReason reason, std::uint8_t cost) {
@@ -66,9 +66,9 @@ TraversabilityCell make_lethal(TraversabilityCell cell, BlockReason reason, std:
   return cell;
 }
 
-/// Adds the footprint's margin to a cell at this distance from the nearest lethal one.
-TraversabilityCell with_margin(TraversabilityCell cell, double distance_m,
-                               const RobotProfile& profile) {
+/// Sets clearance, inscribed state and proximity cost from the distance to the nearest lethal cell.
+TraversabilityCell with_distance(TraversabilityCell cell, double distance_m,
+                                 const RobotProfile& profile) {
   cell.clearance_m = static_cast<float>(std::min(distance_m, clearance_limit_m(profile)));
   if (cell.state != CellState::free) return cell;
   const double inscribed_m = profile.inscribed_radius_m();
@@ -76,7 +76,7 @@ TraversabilityCell with_margin(TraversabilityCell cell, double distance_m,
   if (distance_m <= inscribed_m) return make_lethal(cell, BlockReason::inscribed, inscribed_cost);
   if (distance_m < circumscribed_m) {
     const double share = (circumscribed_m - distance_m) / (circumscribed_m - inscribed_m);
-    cell.cost = std::max(cell.cost, static_cast<std::uint8_t>(std::lround(near_cost * share)));
+    cell.cost = std::max(cell.cost, static_cast<std::uint8_t>(std::lround(proximity_cost * share)));
   }
   return cell;
 }
@@ -133,7 +133,7 @@ std::vector<TraversabilityCell> classify_tile(const TileNeighbourhood<SurfaceTil
   std::vector<TraversabilityCell> cells;
   for (int y = margin; y < margin + surfaces.side; ++y) {
     for (int x = margin; x < margin + surfaces.side; ++x) {
-      cells.push_back(with_margin(classified(x, y), cell_m * distances(x, y), profile));
+      cells.push_back(with_distance(classified(x, y), cell_m * distances(x, y), profile));
     }
   }
   return cells;

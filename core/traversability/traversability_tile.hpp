@@ -13,27 +13,27 @@
 namespace stillmap {
 
 enum class CellState : std::uint8_t {
-  /// Nobody has seen the ground here. Not the same as lethal.
+  /// The ground has not been observed. Not the same as lethal.
   unknown,
   free,
   lethal,
 };
 
-/// Why a cell is lethal. Where several reasons hold, the first one of this list is given.
+/// Why a cell is lethal. Where several reasons apply, the first of this list is given.
 enum class BlockReason : std::uint8_t {
   none,
-  /// Something stands on the ground.
+  /// An object on the ground.
   obstacle,
-  /// Something hangs lower than the robot is high.
+  /// An object hanging lower than the robot's height.
   low_headroom,
   step,
   slope,
   roughness,
-  /// Ground of a class that the robot must not enter.
+  /// Ground of a class that is lethal for the robot.
   ground_class,
-  /// Nearer to a lethal cell than the robot's inscribed radius; the cell itself has no fault.
+  /// Within the inscribed radius of a lethal cell (Nav2's inscribed cost).
   inscribed,
-  /// Only in answers about paths: not lethal, but unknown.
+  /// Unknown ground. In path checks only: such cells are not lethal.
   unknown,
 };
 inline constexpr std::size_t block_reason_count = 9;
@@ -41,34 +41,33 @@ inline constexpr std::size_t block_reason_count = 9;
 [[nodiscard]] std::string_view name(CellState state);
 [[nodiscard]] std::string_view name(BlockReason reason);
 
-/// A cell as one robot sees it.
+/// Classification of a cell for one robot.
 struct TraversabilityCell {
   CellState state = CellState::unknown;
   BlockReason reason = BlockReason::none;
-  /// The ground was not seen; it follows from its surroundings.
+  /// The ground was not measured but interpolated.
   bool inferred = false;
-  /// 0 (wanted) to 98 when free, 99 within the inscribed radius, 100 when lethal in itself; 0 when
-  /// unknown.
+  /// 0 to 98 when free, 99 when inscribed, 100 when lethal in itself; 0 when unknown.
   std::uint8_t cost = 0;
   /// From the cell's centre to that of the nearest cell that is lethal in itself [m]; at most
   /// `clearance_limit_m`.
   float clearance_m = 0.0F;
 
-  /// Whether the cell is lethal for what is in it, not for what is near it.
+  /// Whether the cell is lethal in itself and not merely inscribed.
   [[nodiscard]] bool is_lethal_itself() const {
     return state == CellState::lethal && reason != BlockReason::inscribed;
   }
   friend bool operator==(const TraversabilityCell&, const TraversabilityCell&) = default;
 };
 
-/// A map tile as one robot sees it.
+/// Classification of a map tile for one robot.
 struct TraversabilityTile {
   TileId id;
-  /// Version of the map with which the tile last changed.
+  /// Map version at the tile's last change.
   std::uint64_t revision = 0;
   /// Cells along a side.
   int side = 0;
-  /// Row after row from the lowest y.
+  /// Row by row from the lowest y.
   std::vector<TraversabilityCell> cells;
   std::shared_ptr<const SurfaceTile> surface;
 
@@ -78,16 +77,16 @@ struct TraversabilityTile {
   }
 };
 
-/// Farthest distance that `clearance_m` tells [m].
+/// Upper limit of `clearance_m` [m].
 [[nodiscard]] double clearance_limit_m(const RobotProfile& profile);
 
-/// What one cell is in itself, without its neighbours: its clearance is 0 when it is lethal, else
-/// the limit.
+/// Classification of a cell without regard to its neighbours: its clearance is 0 when it is lethal,
+/// else the limit.
 [[nodiscard]] TraversabilityCell classify_cell(const SurfaceTile::View& surface,
                                                const RobotProfile& profile);
 
-/// The cells of the middle tile with the safety margin of the robot's footprint, which also comes
-/// from lethal cells of the tiles around it.
+/// The middle tile's cells, with inscribed cells and costs around lethal cells, including those of
+/// the neighbouring tiles.
 [[nodiscard]] std::vector<TraversabilityCell> classify_tile(
     const TileNeighbourhood<SurfaceTile>& surfaces, const RobotProfile& profile, double cell_m);
 

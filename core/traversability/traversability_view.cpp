@@ -27,7 +27,7 @@ NearestTraversable refused(TraversabilityStatus status, const std::string& reaso
   return answer;
 }
 
-/// From a place to a tile [m].
+/// From a position to the nearest point of a tile [m].
 double distance_to(const TraversabilityView& view, const TraversabilityTile& tile,
                    const Eigen::Vector2d& position_map) {
   const Eigen::Vector2d low = view.tile_size_m * Eigen::Vector2d(tile.id.x, tile.id.y);
@@ -56,7 +56,7 @@ void search_tile(const TraversabilityView& view, const TraversabilityTile& tile,
 }  // namespace
 
 std::optional<CellIndex> TraversabilityView::cell_of(const Eigen::Vector2d& position_map) const {
-  // Each by itself: the largest of NaN and a number may be the number.
+  // Per coordinate: the maximum of NaN and a number may be the number.
   const bool is_near = (position_map.array().abs() <= VoxelGrid::max_coordinate_m).all();
   if (!is_near || !(cell_m > 0.0)) {
     return std::nullopt;
@@ -139,13 +139,13 @@ NearestTraversable nearest_traversable(const TraversabilityView& view,
   NearestTraversable best;
   best.map_version = view.version;
   best.distance_m = std::nextafter(max_distance_m, HUGE_VAL);
-  const double beyond_m = best.distance_m;
+  const double unreached_m = best.distance_m;
   for (const auto& tile : view.tiles) {
     if (distance_to(view, *tile, position_map) < best.distance_m) {
       search_tile(view, *tile, position_map, best);
     }
   }
-  if (best.distance_m < beyond_m) return best;
+  if (best.distance_m < unreached_m) return best;
   text << "no free cell for '" << view.profile.name << "' within " << max_distance_m << " m of ("
        << position_map.x() << ", " << position_map.y() << ")";
   return refused(TraversabilityStatus::not_found, text.str());

@@ -14,35 +14,35 @@
 
 namespace stillmap {
 
-/// A cell of the whole map: [x, x+1) * cell_m by [y, y+1) * cell_m in the map frame.
+/// Index of a cell of the map: [x, x+1) * cell_m by [y, y+1) * cell_m in the map frame.
 struct CellIndex {
   std::int32_t x = 0;
   std::int32_t y = 0;
   friend bool operator==(const CellIndex&, const CellIndex&) = default;
 };
 
-/// An immutable state of the area that one robot can drive on; safe to read from any thread.
+/// Immutable snapshot of the traversability for one robot; safe to read from any thread.
 struct TraversabilityView {
-  /// Of the map that it was made from.
+  /// Version of the map that it was computed from.
   std::uint64_t version = 0;
   std::uint64_t map_id = 0;
   double tile_size_m = 0.0;
   /// Edge of a cell: the map's voxel size [m].
   double cell_m = 0.0;
   RobotProfile profile;
-  /// Sorted by id; a tile for every tile of the map.
+  /// One for each tile of the map, sorted by id.
   std::vector<std::shared_ptr<const TraversabilityTile>> tiles;
 
-  /// The cell that holds a place (map frame [m]); nothing for one that is not finite or farther
-  /// than 100 km from the origin.
+  /// The cell that contains a position (map frame [m]); nothing if it is not finite or farther than
+  /// 100 km from the origin.
   [[nodiscard]] std::optional<CellIndex> cell_of(const Eigen::Vector2d& position_map) const;
-  /// Its centre, map frame [m].
+  /// Centre of a cell, map frame [m].
   [[nodiscard]] Eigen::Vector2d centre_of(CellIndex cell) const;
   /// Box around all tiles, map frame [m]; empty without tiles.
   [[nodiscard]] Eigen::AlignedBox2d bounds_map() const;
 };
 
-/// Looks up cells of a view, quickest when one lies near the last; must not outlive the view.
+/// Looks up cells of a view, fastest if consecutive cells share a tile. Must not outlive the view.
 class CellLookup {
  public:
   explicit CellLookup(const TraversabilityView& view);
@@ -52,7 +52,7 @@ class CellLookup {
     /// Null where there is no tile.
     const SurfaceCell* surface = nullptr;
   };
-  /// A cell where there is no tile is unknown.
+  /// Cells outside all tiles are unknown.
   [[nodiscard]] Found at(CellIndex cell);
 
  private:
@@ -62,26 +62,26 @@ class CellLookup {
   const TraversabilityTile* last_ = nullptr;
 };
 
-/// Where a robot stands: the point that its profile's poses speak of, and its heading from x
-/// towards y.
+/// Pose of a robot's reference point, with its heading counterclockwise from x.
 struct PlanarPose {
   Eigen::Vector2d position_map = Eigen::Vector2d::Zero();
   double heading_rad = 0.0;
 };
 
-/// Calls `visit(CellIndex)` for the cells that a robot at `pose` covers: those whose centre is in
-/// its footprint made half a cell larger on every side, so that none that it touches is left out
-/// but at its corners. @pre the view's cell_of(pose.position_map) is a cell.
+/// Calls `visit(CellIndex)` for the cells that a robot at `pose` covers: those whose centre lies in
+/// its footprint enlarged by half a cell on every side, which are all that it touches, except at
+/// its corners. @pre view.cell_of(pose.position_map)
 void visit_footprint(const TraversabilityView& view, const PlanarPose& pose,
                      const std::function<void(CellIndex)>& visit);
 
+/// Outcome of a query on a view.
 enum class TraversabilityStatus : std::uint8_t {
   ok,
-  /// The question makes no sense: `reason` names the value and what would do.
+  /// `reason` names the invalid value and the valid ones.
   invalid_request,
-  /// The answer would be too large, or the work too much; `reason` names the limit.
+  /// The answer or the computation would be too large; `reason` names the limit.
   too_large,
-  /// Nothing of what was asked for exists.
+  /// The map has nothing that the query asks for.
   not_found,
 };
 
@@ -92,17 +92,16 @@ struct NearestTraversable {
   std::string reason;
   /// Centre of the nearest free cell, map frame [m].
   Eigen::Vector2d position_map = Eigen::Vector2d::Zero();
-  /// Of the ground there [m].
+  /// Height of the ground there, map frame [m].
   double height_m = 0.0;
-  /// From the place asked for [m].
+  /// From the given position [m].
   double distance_m = 0.0;
   TraversabilityCell cell;
   std::uint64_t map_version = 0;
 };
 
-/// The free cell nearest to a place, at most `max_distance_m` away. Free cells keep the inscribed
-/// radius from everything lethal: with some heading, the robot can stand there. Inferred ground
-/// counts, unknown ground does not.
+/// The free cell nearest to a position, at most `max_distance_m` away. Inferred ground counts,
+/// unknown ground does not.
 [[nodiscard]] NearestTraversable nearest_traversable(const TraversabilityView& view,
                                                      const Eigen::Vector2d& position_map,
                                                      double max_distance_m = 100.0);
