@@ -185,7 +185,7 @@ RayOccupancy cast_ray(const OcTree& octree, const RayQuery& query) {
     const bool continues =
         here == Occupancy::free || (here == Occupancy::unknown && query.ignore_unknown && inside());
     if (continues) continue;
-    // With ignore_unknown, only the map's edge gets here: the ray counts as free.
+    // An unknown voxel that ends the ray despite ignore_unknown lies beyond the map's edge.
     result.end = here == Occupancy::unknown && query.ignore_unknown ? Occupancy::free : here;
     result.length_m = ray.entered_at() * resolution_m;
     break;

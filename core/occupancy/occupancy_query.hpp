@@ -36,8 +36,6 @@ struct BoxOccupancy {
   /// Centres of occupied voxels, map frame [m], up to the requested number.
   std::vector<Eigen::Vector3f> occupied_map;
   std::string fault;
-
-  [[nodiscard]] bool any_occupied() const { return occupied > 0; }
 };
 
 /// A ray to cast.

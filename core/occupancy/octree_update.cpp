@@ -48,7 +48,7 @@ class BatchUpdate {
   }
 
  private:
-  /// Whether the node is a pruned leaf that no update can change: clamped, all in one direction.
+  /// Whether the node is a leaf that the updates do not change: clamped, and all in that direction.
   [[nodiscard]] bool is_saturated_leaf(const OcTreeNode& node,
                                        std::span<const VoxelBrick> bricks) const {
     if (octree_.nodeHasChildren(&node)) return false;

@@ -155,12 +155,10 @@ std::optional<FoundPath> attempt(const CollisionChecker& checker, const CoarseRo
                                  std::span<const PlanarPose> goals, const PlanningConfig& config,
                                  std::uint32_t seed, std::uint64_t& steps) {
   PoseSampler sampler(checker.grid(), route, config.route_guided, seed);
-  const SearchResult found = search_path(checker, sampler, starts, goals,
-                                         {.planner = config.planner,
-                                          .max_steps = config.max_steps - steps,
-                                          .seed = seed,
-                                          .should_stop = config.should_stop,
-                                          .improved = config.improved});
+  PlanningConfig single = config;
+  single.seed = seed;
+  single.max_steps -= steps;
+  const SearchResult found = search_path(checker, sampler, starts, goals, single);
   steps += found.steps;
   if (found.waypoints.empty()) return std::nullopt;
   auto poses = connect_waypoints(checker, found.waypoints);

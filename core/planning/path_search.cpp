@@ -209,13 +209,13 @@ void report_improvements(ob::ProblemDefinition& problem,
 
 SearchResult search_path(const CollisionChecker& checker, PoseSampler& sampler,
                          std::span<const PlanarPose> starts, std::span<const PlanarPose> goals,
-                         const SearchSettings& settings) {
+                         const PlanningConfig& config) {
   ompl::msg::noOutputHandler();
-  ompl::RNG::setSeed(settings.seed);
+  ompl::RNG::setSeed(config.seed);
   const ob::SpaceInformationPtr space = make_space(checker, sampler);
   const ob::ProblemDefinitionPtr problem = make_problem(space, checker, sampler, starts, goals);
-  report_improvements(*problem, settings.improved);
-  const ob::PlannerPtr planner = make_planner(settings.planner, space);
+  report_improvements(*problem, config.improved);
+  const ob::PlannerPtr planner = make_planner(config.planner, space);
   planner->setProblemDefinition(problem);
   planner->setup();
   std::uint64_t rounds = 0;
@@ -223,15 +223,15 @@ SearchResult search_path(const CollisionChecker& checker, PoseSampler& sampler,
   const auto steps = [&] { return rounds + checker.curves() - curves_before; };
   const ob::PlannerTerminationCondition is_over([&] {
     ++rounds;
-    return steps() > settings.max_steps || (settings.should_stop && settings.should_stop());
+    return steps() > config.max_steps || (config.should_stop && config.should_stop());
   });
   (void)planner->solve(is_over);
   SearchResult result;
   result.steps = steps();
   if (!problem->hasSolution()) return result;
   result.reaches_goal = !problem->hasApproximateSolution();
-  if (settings.improved && settings.planner == PlannerKind::rrt_connect && result.reaches_goal) {
-    settings.improved(problem->getSolutionPath()->length());
+  if (config.improved && config.planner == PlannerKind::rrt_connect && result.reaches_goal) {
+    config.improved(problem->getSolutionPath()->length());
   }
   const auto* path = problem->getSolutionPath()->as<og::PathGeometric>();
   for (std::size_t i = 0; i < path->getStateCount(); ++i) {

@@ -35,8 +35,6 @@ class CellGrid {
   [[nodiscard]] const T& operator()(int x, int y) const { return cells_[index(x, y)]; }
   [[nodiscard]] std::span<const T> cells() const { return cells_; }
 
-  friend bool operator==(const CellGrid&, const CellGrid&) = default;
-
  private:
   int width_ = 0;
   int height_ = 0;

@@ -35,7 +35,6 @@ struct ColumnTile {
         static_cast<std::size_t>(y) * static_cast<std::size_t>(side) + static_cast<std::size_t>(x);
     return Column(voxels).subspan(begin[column], begin[column + 1] - begin[column]);
   }
-  friend bool operator==(const ColumnTile&, const ColumnTile&) = default;
 };
 
 /// Sorts a tile's voxels into columns. Invalid voxels (outside the tile, not finite) are left out.

@@ -9,6 +9,9 @@
 namespace stillmap {
 namespace {
 
+/// Largest number of cells under the footprint, summed over all steps; about 20 km for a car.
+constexpr double max_path_cells = 5e7;
+
 /// Signed angle from one heading to another, in [-pi, pi].
 double angle_between(double from_rad, double to_rad) {
   return std::remainder(to_rad - from_rad, 2.0 * std::numbers::pi);

@@ -38,10 +38,8 @@ struct PathCheck {
   std::uint64_t map_version = 0;
 };
 
-/// Limits of one check: poses, and cells under the footprint summed over all steps (about 20 km for
-/// a car).
+/// Largest number of poses of one check.
 inline constexpr std::size_t max_path_poses = 100'000;
-inline constexpr double max_path_cells = 5e7;
 
 /// Checks the robot's oriented footprint along the poses, interpolated linearly, in steps in which
 /// no part of it moves more than half a cell. A path may be a single pose. An empty path and poses

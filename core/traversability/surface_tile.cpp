@@ -21,6 +21,9 @@ int plane_reach_cells(double cell_m) {
   return std::max(1, static_cast<int>(std::lround(plane_reach_m / cell_m)));
 }
 
+/// Reach of `shape_at`: cells farther away have no influence.
+int shape_reach_cells(double cell_m) { return std::max(rise_cells, plane_reach_cells(cell_m)); }
+
 std::optional<double> height_at(const GroundGrid& ground, int x, int y) {
   if (!ground.contains(x, y) || !ground(x, y).is_known()) return std::nullopt;
   return ground(x, y).height_m;
@@ -105,6 +108,9 @@ double step_along(const GroundGrid& ground, int x, int y, std::pair<int, int> d)
 
 static_assert(surface_reach_m > max_filled_gap_m + 1.0, "both ends of a gap need their slopes");
 
+/// Objects higher above the ground than this are above every robot [m].
+constexpr float max_object_height_m = 12.0F;
+
 void add_objects(SurfaceTile& tile, const GroundCell& ground, Column column) {
   for (const ColumnVoxel& voxel : column) {
     const float above_m = voxel.height_m - ground.height_m;
@@ -114,8 +120,6 @@ void add_objects(SurfaceTile& tile, const GroundCell& ground, Column column) {
 }
 
 }  // namespace
-
-int shape_reach_cells(double cell_m) { return std::max(rise_cells, plane_reach_cells(cell_m)); }
 
 SurfaceShape shape_at(const GroundGrid& ground, int x, int y, double cell_m) {
   assert(ground(x, y).is_known());

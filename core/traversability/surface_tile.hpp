@@ -22,9 +22,6 @@ struct SurfaceShape {
   friend bool operator==(const SurfaceShape&, const SurfaceShape&) = default;
 };
 
-/// Reach of `shape_at`: cells farther away have no influence.
-[[nodiscard]] int shape_reach_cells(double cell_m);
-
 /// Shape of the ground at a cell. The plane is fitted to cells of the same class, so that a kerb
 /// beside it is a step and not a slope. A step is the height difference across the cell, from one
 /// side to the other (or to the cell itself where a side has no ground), less the rise of the
@@ -64,13 +61,11 @@ struct SurfaceTile {
   friend bool operator==(const SurfaceTile&, const SurfaceTile&) = default;
 };
 
-/// Objects higher above the ground than this are above every robot [m].
-inline constexpr float max_object_height_m = 12.0F;
+/// Largest distance at which columns influence a surface [m].
+inline constexpr double surface_reach_m = 8.0;
 
 /// The surface of the middle tile. Columns farther from it than `surface_reach_m`, or than its
 /// neighbours extend, have no influence.
 [[nodiscard]] SurfaceTile make_surface(const TileNeighbourhood<ColumnTile>& columns, double cell_m);
-
-inline constexpr double surface_reach_m = 8.0;
 
 }  // namespace stillmap

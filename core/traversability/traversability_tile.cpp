@@ -66,6 +66,20 @@ TraversabilityCell make_lethal(TraversabilityCell cell, BlockReason reason, std:
   return cell;
 }
 
+/// Classification of a cell without regard to its neighbours. The clearance is not set.
+TraversabilityCell classify_cell(const SurfaceTile::View& surface, const RobotProfile& profile) {
+  TraversabilityCell cell;
+  if (surface.cell == nullptr) return cell;
+  cell.inferred = surface.cell->ground.origin == GroundOrigin::inferred;
+  const BlockReason reason = reason_of(surface, profile);
+  if (reason != BlockReason::none) return make_lethal(cell, reason, lethal_cost);
+  if (surface.cell->ground.is_known()) {
+    cell.state = CellState::free;
+    cell.cost = free_cost(*surface.cell, profile);
+  }
+  return cell;
+}
+
 /// Sets clearance, inscribed state and proximity cost from the distance to the nearest lethal cell.
 TraversabilityCell with_distance(TraversabilityCell cell, double distance_m,
                                  const RobotProfile& profile) {
@@ -98,23 +112,6 @@ std::string_view name(BlockReason reason) {
 double clearance_limit_m(const RobotProfile& profile) {
   constexpr double min_limit_m = 2.0;
   return std::max(min_limit_m, profile.circumscribed_radius_m());
-}
-
-TraversabilityCell classify_cell(const SurfaceTile::View& surface, const RobotProfile& profile) {
-  TraversabilityCell cell;
-  cell.clearance_m = static_cast<float>(clearance_limit_m(profile));
-  if (surface.cell == nullptr) return cell;
-  cell.inferred = surface.cell->ground.origin == GroundOrigin::inferred;
-  const BlockReason reason = reason_of(surface, profile);
-  if (reason != BlockReason::none) {
-    cell.clearance_m = 0.0F;
-    return make_lethal(cell, reason, lethal_cost);
-  }
-  if (surface.cell->ground.is_known()) {
-    cell.state = CellState::free;
-    cell.cost = free_cost(*surface.cell, profile);
-  }
-  return cell;
 }
 
 std::vector<TraversabilityCell> classify_tile(const TileNeighbourhood<SurfaceTile>& surfaces,

@@ -80,11 +80,6 @@ struct TraversabilityTile {
 /// Upper limit of `clearance_m` [m].
 [[nodiscard]] double clearance_limit_m(const RobotProfile& profile);
 
-/// Classification of a cell without regard to its neighbours: its clearance is 0 when it is lethal,
-/// else the limit.
-[[nodiscard]] TraversabilityCell classify_cell(const SurfaceTile::View& surface,
-                                               const RobotProfile& profile);
-
 /// The middle tile's cells, with inscribed cells and costs around lethal cells, including those of
 /// the neighbouring tiles.
 [[nodiscard]] std::vector<TraversabilityCell> classify_tile(

@@ -46,8 +46,8 @@ TEST_F(OccupancyQuery, BoxesCountVoxelsAndListTheOccupiedOnes) {
   ASSERT_EQ(box.occupied_map.size(), 1U);
   EXPECT_LT((box.occupied_map[0] - Eigen::Vector3f(10.1F, 0.1F, 0.1F)).norm(), 1e-3F);
   EXPECT_TRUE(map_.in_box(end_map, 0).occupied_map.empty());
-  EXPECT_TRUE(map_.in_box(end_map, 0).any_occupied());
-  EXPECT_FALSE(map_.in_box({Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(2, 1, 1)}, 9).any_occupied());
+  EXPECT_EQ(map_.in_box(end_map, 0).occupied, 1U);
+  EXPECT_EQ(map_.in_box({Eigen::Vector3d(1, 0, 0), Eigen::Vector3d(2, 1, 1)}, 9).occupied, 0U);
 }
 
 TEST_F(OccupancyQuery, RaysEndAtWhatIsOccupiedOrUnknownOrAtTheirRange) {
