@@ -17,8 +17,8 @@
 #include "core/segmentation/segmenter.hpp"
 #include "core/simulation/simulation.hpp"
 
-// One drive, mapped into the static map and into an octree at the same time. STILLMAP_BENCH_DATA
-// names a recording; without it, a simulated drive with an HDL-64E.
+// One sequence, mapped into the static map and into an octree. STILLMAP_BENCH_DATA names a dataset
+// folder; without it, a simulated sequence with an HDL-64E.
 
 namespace stillmap {
 namespace {
@@ -31,7 +31,7 @@ double heap_bytes() {
   return static_cast<double>(info.uordblks + info.hblkhd);
 }
 
-/// A map's bytes on the heap.
+/// Heap bytes of what `make` returns.
 template <class Make>
 double heap_bytes_of(Make make) {
   const double before = heap_bytes();
@@ -39,12 +39,12 @@ double heap_bytes_of(Make make) {
   return heap_bytes() - before;
 }
 
-/// The scans of a drive, one after the other.
-class Drive {
+/// The scans of a dataset or a simulation.
+class Sequence {
  public:
-  Drive() {
+  Sequence() {
     if (const char* folder = std::getenv("STILLMAP_BENCH_DATA"); folder != nullptr) {
-      recording_.emplace(folder);
+      dataset_.emplace(folder);
       return;
     }
     simulation::SimulationConfig config;
@@ -52,16 +52,16 @@ class Drive {
     config.scans = 100;
     simulation_.emplace(config);
   }
-  [[nodiscard]] std::size_t size() const { return recording_ ? recording_->size() : 100; }
+  [[nodiscard]] std::size_t size() const { return dataset_ ? dataset_->size() : 100; }
   [[nodiscard]] Scan scan(std::size_t i) const {
-    return recording_ ? recording_->read(i).scan : simulation_->scan(static_cast<int>(i)).scan;
+    return dataset_ ? dataset_->read(i).scan : simulation_->scan(static_cast<int>(i)).scan;
   }
   [[nodiscard]] SensorModel sensor() const {
-    return recording_ ? recording_->suggested_sensor() : hdl_64e();
+    return dataset_ ? dataset_->suggested_sensor() : hdl_64e();
   }
 
  private:
-  std::optional<ScanDataset> recording_;
+  std::optional<ScanDataset> dataset_;
   std::optional<simulation::Simulation> simulation_;
 };
 
@@ -76,15 +76,15 @@ struct Times {
   }
 };
 
-/// The maps after the drive, and what each insertion took.
-struct MappedDrive {
-  MappedDrive() {
-    const Drive drive;
+/// The maps after the sequence, and the time of each insertion.
+struct MappedSequence {
+  MappedSequence() {
+    const Sequence sequence;
     MapperConfig config;
-    config.sensor = drive.sensor();
+    config.sensor = sequence.sensor();
     Mapper mapper(config, std::make_unique<PassthroughSegmenter>());
-    for (std::size_t i = 0; i < drive.size(); ++i) {
-      const auto mapped = mapper.process(drive.scan(i));
+    for (std::size_t i = 0; i < sequence.size(); ++i) {
+      const auto mapped = mapper.process(sequence.scan(i));
       if (!mapped) continue;
       points += static_cast<double>(mapped->labelled.scan.size());
       insert(*mapped);
@@ -110,20 +110,20 @@ struct MappedDrive {
   double points = 0.0;
   std::size_t scans = 0;
   double all_ms = 0.0;
-  /// The same as processor time, which a busy machine does not stretch.
+  /// Processor time, which does not depend on the machine's load.
   double processor_ms = 0.0;
   Times clearing;
   Times hits_only;
 };
 
-MappedDrive& drive() {
-  static MappedDrive drive;
-  return drive;
+MappedSequence& mapped_sequence() {
+  static MappedSequence sequence;
+  return sequence;
 }
 
-/// Time of insertion; scans that clear, and the others.
-void insert_drive(benchmark::State& state) {
-  MappedDrive& mapped = drive();
+/// Time of insertion, for scans that clear and for the others.
+void insert_sequence(benchmark::State& state) {
+  MappedSequence& mapped = mapped_sequence();
   for (auto _ : state) state.SetIterationTime(mapped.all_ms / 1000.0);
   const auto scans = static_cast<double>(mapped.scans);
   state.counters["scans"] = scans;
@@ -133,7 +133,7 @@ void insert_drive(benchmark::State& state) {
   mapped.clearing.report(state, "clearing");
   mapped.hits_only.report(state, "hits_only");
 }
-BENCHMARK(insert_drive)->UseManualTime()->Iterations(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(insert_sequence)->UseManualTime()->Iterations(1)->Unit(benchmark::kMillisecond);
 
 double file_bytes(const fs::path& file) {
   const auto bytes = static_cast<double>(fs::file_size(file));
@@ -158,9 +158,9 @@ void report_octree(benchmark::State& state, const OccupancyMap& map, double voxe
   state.counters["ot_bytes_a_voxel"] = octomap_file_bytes(map, "occupancy_bench.ot") / voxels;
 }
 
-/// The static map: what a view holds, and a live map with its view.
+/// Size of the static map: on disk, of a snapshot, and of a live map with its snapshot.
 void static_map_size(benchmark::State& state) {
-  const MappedDrive& mapped = drive();
+  const MappedSequence& mapped = mapped_sequence();
   for (auto _ : state) {
     const fs::path file = fs::temp_directory_path() / "occupancy_bench.stillmap";
     fs::remove(file);
@@ -178,19 +178,19 @@ void static_map_size(benchmark::State& state) {
 }
 BENCHMARK(static_map_size)->Iterations(1)->Unit(benchmark::kMillisecond);
 
-/// The same voxels and nothing else as an octree.
+/// Size of an octree of the same voxels.
 void octree_of_static_map_size(benchmark::State& state) {
-  const MappedDrive& mapped = drive();
+  const MappedSequence& mapped = mapped_sequence();
   OccupancyMap map(OccupancyConfig{});
   for (auto _ : state) map.insert(mapped.stored.view);
   report_octree(state, map, mapped.voxels);
 }
 BENCHMARK(octree_of_static_map_size)->Iterations(1)->Unit(benchmark::kMillisecond);
 
-/// The octree of the drive, a voxel of which is occupied or free; and how much of the static map it
-/// holds as occupied.
-void octree_of_drive_size(benchmark::State& state) {
-  const MappedDrive& mapped = drive();
+/// Size of the sequence's octree with its occupied and free voxels, and the share of the static map
+/// that is occupied in it.
+void octree_of_sequence_size(benchmark::State& state) {
+  const MappedSequence& mapped = mapped_sequence();
   const Eigen::Vector3d far = Eigen::Vector3d::Constant(3000.0);
   BoxOccupancy all;
   for (auto _ : state) all = mapped.octree.in_box({-far, far}, 0);
@@ -204,7 +204,7 @@ void octree_of_drive_size(benchmark::State& state) {
   state.counters["occupied"] = static_cast<double>(all.occupied);
   state.counters["static_kept_share"] = kept / mapped.voxels;
 }
-BENCHMARK(octree_of_drive_size)->Iterations(1)->Unit(benchmark::kMillisecond);
+BENCHMARK(octree_of_sequence_size)->Iterations(1)->Unit(benchmark::kMillisecond);
 
 }  // namespace
 }  // namespace stillmap

@@ -23,11 +23,11 @@ const MapSnapshot& street() {
   return map;
 }
 
-/// The same map after one tile was seen to change: it, and what it influences.
+/// Update after a change in one tile, including the tiles that it influences.
 void update_one_tile(benchmark::State& state) {
   MapSnapshot map = street();
-  TraversabilityMap area({car()});
-  (void)area.update(map);
+  TraversabilityMap traversability({car()});
+  (void)traversability.update(map);
   auto& changed = map.tiles[map.tiles.size() / 2];
   Tile without = *changed;
   without.voxels.resize(without.voxels.size() / 2);
@@ -37,26 +37,26 @@ void update_one_tile(benchmark::State& state) {
     Tile tile = states.at(++round % 2);
     tile.info.revision = map.version + round;
     changed = std::make_shared<const Tile>(std::move(tile));
-    benchmark::DoNotOptimize(area.update(map));
+    benchmark::DoNotOptimize(traversability.update(map));
   }
 }
 BENCHMARK(update_one_tile)->Unit(benchmark::kMillisecond);
 
-/// From nothing; the counter is time a tile.
+/// First update of a whole map; the counter is the number of tiles.
 void update_whole_street(benchmark::State& state) {
   for (auto _ : state) {
-    TraversabilityMap area({car()});
-    benchmark::DoNotOptimize(area.update(street()));
+    TraversabilityMap traversability({car()});
+    benchmark::DoNotOptimize(traversability.update(street()));
   }
   state.counters["tiles"] = static_cast<double>(street().tiles.size());
 }
 BENCHMARK(update_whole_street)->Unit(benchmark::kMillisecond);
 
 void whole_grid(benchmark::State& state) {
-  TraversabilityMap area({car()});
-  (void)area.update(street());
+  TraversabilityMap traversability({car()});
+  (void)traversability.update(street());
   for (auto _ : state) {
-    benchmark::DoNotOptimize(occupancy_grid(*area.view("car"), whole_map_region()));
+    benchmark::DoNotOptimize(occupancy_grid(*traversability.view("car"), whole_map_region()));
   }
 }
 BENCHMARK(whole_grid)->Unit(benchmark::kMillisecond);

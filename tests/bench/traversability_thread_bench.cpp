@@ -21,10 +21,10 @@ double thread_cpu_ms() {
   return 1e3 * static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_nsec);
 }
 
-/// Counts updates with their work, and lets others wait for the next.
+/// Counts updates with their processor time and waits for the next.
 class UpdateCount {
  public:
-  /// Called by the thread that updates.
+  /// Called by the updating thread.
   void add() {
     const double cpu_ms = thread_cpu_ms();
     const std::scoped_lock lock(mutex_);
@@ -33,7 +33,7 @@ class UpdateCount {
     ++count_;
     changed_.notify_all();
   }
-  /// Time on the processor of the last update.
+  /// Returns the processor time of the last update.
   double wait_for(std::uint64_t count) {
     std::unique_lock lock(mutex_);
     changed_.wait(lock, [&] { return count_ >= count; });
@@ -48,7 +48,7 @@ class UpdateCount {
   double last_work_ms_ = 0.0;
 };
 
-/// The map file that STILLMAP_BENCH_MAP names; nothing, and why in the state, without.
+/// The map file that STILLMAP_BENCH_MAP names; without it, nothing, and the reason in the state.
 std::optional<MapSnapshot> bench_map(benchmark::State& state) {
   if (const char* const file = std::getenv("STILLMAP_BENCH_MAP")) {
     return open_map_file(file)->load().view;
@@ -64,19 +64,19 @@ void report(std::vector<double> ms, const std::string& name, benchmark::State& s
   state.counters[name + "p99_ms"] = ms[ms.size() * 99 / 100];
 }
 
-/// A map of which one tile after the other changes: it loses every second voxel, and has them all
-/// again at its next turn.
+/// A map of which one tile after the other changes: it loses every second voxel, and has all again
+/// at its next change.
 class ChangingMap {
  public:
   explicit ChangingMap(MapSnapshot map)
-      : whole_(std::move(map)), now_(whole_), is_thin_(whole_.tiles.size(), false) {}
+      : whole_(std::move(map)), now_(whole_), is_halved_(whole_.tiles.size(), false) {}
 
   std::shared_ptr<const MapSnapshot> change() {
     const std::size_t i = turn_++ * 7 % whole_.tiles.size();
     Tile tile = *whole_.tiles[i];
-    is_thin_[i] = !is_thin_[i];
+    is_halved_[i] = !is_halved_[i];
     std::size_t n = 0;
-    if (is_thin_[i]) std::erase_if(tile.voxels, [&](const Voxel&) { return ++n % 2 == 0; });
+    if (is_halved_[i]) std::erase_if(tile.voxels, [&](const Voxel&) { return ++n % 2 == 0; });
     tile.info.revision = ++now_.version;
     now_.tiles[i] = std::make_shared<const Tile>(std::move(tile));
     return std::make_shared<const MapSnapshot>(now_);
@@ -85,14 +85,14 @@ class ChangingMap {
  private:
   MapSnapshot whole_;
   MapSnapshot now_;
-  std::vector<bool> is_thin_;
+  std::vector<bool> is_halved_;
   std::size_t turn_ = 0;
 };
 
-/// A tile changes in the latest map of a server that keeps the areas of a car and a delivery robot,
-/// until both are shown and the grid of the whole map is ready to be sent; and what of it the
-/// thread, which has a low priority, spent on the processor.
-void tile_change_to_published_area(benchmark::State& state) {
+/// Time from a change of a tile in the server's latest map until the traversability of two robots
+/// is published and the grid of the whole map is encoded; and the processor time of the thread,
+/// which has a low priority.
+void tile_change_to_published_traversability(benchmark::State& state) {
   const std::optional<MapSnapshot> map = bench_map(state);
   if (!map) return;
   const TraversabilityConfig config;
@@ -124,14 +124,14 @@ void tile_change_to_published_area(benchmark::State& state) {
   report(cpu_ms, "cpu_", state);
   state.counters["tiles"] = static_cast<double>(map->tiles.size());
 }
-BENCHMARK(tile_change_to_published_area)
+BENCHMARK(tile_change_to_published_traversability)
     ->Unit(benchmark::kMillisecond)
     ->UseManualTime()
     ->Iterations(300);
 
-/// Grid with reasons and outlines round the map's middle; args: metres across, and which region
+/// Grid with reasons and outlines around the map's centre; args: metres across, and type of region
 /// (0 box, 1 sphere).
-void area_of_region(benchmark::State& state) {
+void query_region(benchmark::State& state) {
   const std::optional<MapSnapshot> map = bench_map(state);
   if (!map) return;
   TraversabilityMap areas(load_robots(TraversabilityConfig{}));
@@ -158,7 +158,7 @@ void area_of_region(benchmark::State& state) {
   report(cpu_ms, "cpu_", state);
   state.counters["cells"] = static_cast<double>(cells);
 }
-BENCHMARK(area_of_region)
+BENCHMARK(query_region)
     ->ArgNames({"across_m", "region"})
     ->ArgsProduct({{20, 50, 200}, {0, 1}})
     ->Unit(benchmark::kMillisecond)
