@@ -9,8 +9,8 @@
 
 namespace stillmap::test {
 
-/// What an occupancy map must say, the slow and plain way: a log-odds value for every voxel that
-/// was ever touched, and every ray compared with every voxel of a box round the origin.
+/// Brute-force reference of an occupancy map: a log-odds value for every voxel that was touched,
+/// and every ray tested against every voxel of a box around the origin.
 class DenseOccupancy {
  public:
   using Key = std::array<int, 3>;

@@ -26,7 +26,7 @@ OccupancyConfig small_config() {
 
 Eigen::Isometry3d at(double x) { return Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, 0.0)); }
 
-TEST(OccupancyMap, AgreesWithAPlainSlowReference) {
+TEST(OccupancyMap, AgreesWithADenseReference) {
   OccupancyMap map(small_config());
   DenseOccupancy reference(small_config(), 24);
   for (std::uint32_t seed = 0; seed < 12; ++seed) {
@@ -49,7 +49,7 @@ TEST(OccupancyMap, AgreesWithAPlainSlowReference) {
   EXPECT_EQ(all.occupied + all.free, reference.log_odds().size());
 }
 
-TEST(OccupancyMap, CanBeHeldUpWhileItTakesAScan) {
+TEST(OccupancyMap, UpdatesInPortionsEqualOneUpdate) {
   OccupancyMap map(small_config());
   OccupancyMap undisturbed(small_config());
   int pauses = 0;
@@ -65,7 +65,7 @@ TEST(OccupancyMap, CanBeHeldUpWhileItTakesAScan) {
   EXPECT_EQ(map.encode(false).bytes, undisturbed.encode(false).bytes);
 }
 
-TEST(OccupancyMap, MovingAndMovableThingsAreNotSolidButTheWayToThemIsFree) {
+TEST(OccupancyMap, DynamicAndMovableObjectsAreNotOccupiedButTheirRaysClear) {
   for (const Motion motion : {Motion::semi_static, Motion::highly_dynamic}) {
     OccupancyMap map(OccupancyConfig{});
     map.insert(one_point({10.1F, 0.1F, 0.1F}, motion), at(0.1));
@@ -74,7 +74,7 @@ TEST(OccupancyMap, MovingAndMovableThingsAreNotSolidButTheWayToThemIsFree) {
   }
 }
 
-TEST(OccupancyMap, UnknownClassesAreSolidUnlessTheyMayBeMovers) {
+TEST(OccupancyMap, UnlabelledPointsAreOccupiedUnlessTheyMayMove) {
   LabelledScan scan = one_point({5.1F, 0.1F, 0.1F});
   for (const bool is_solid : {true, false}) {
     OccupancyMap map(OccupancyConfig{});
@@ -84,7 +84,7 @@ TEST(OccupancyMap, UnknownClassesAreSolidUnlessTheyMayBeMovers) {
   }
 }
 
-TEST(OccupancyMap, WhatIsSeenThroughBecomesFree) {
+TEST(OccupancyMap, VoxelsSeenThroughBecomeFree) {
   OccupancyMap map(OccupancyConfig{});
   const Eigen::Vector3d place_map(5.1, 0.1, 0.1);
   map.insert(one_point({5.1F, 0.1F, 0.1F}), at(0.0));
@@ -93,7 +93,7 @@ TEST(OccupancyMap, WhatIsSeenThroughBecomesFree) {
   EXPECT_EQ(map.at_point(place_map).occupancy, Occupancy::free);
 }
 
-TEST(OccupancyMap, ClearsEveryNthScanAndNotAtAllWhenToldSo) {
+TEST(OccupancyMap, ClearsEveryNthScanAndNeverWhenDisabled) {
   OccupancyConfig config;
   config.clearing_interval = 2;
   OccupancyMap map(config);
@@ -105,7 +105,7 @@ TEST(OccupancyMap, ClearsEveryNthScanAndNotAtAllWhenToldSo) {
   EXPECT_EQ(map.at_point({5.0, 0.05, 0.05}).occupancy, Occupancy::free);
 }
 
-TEST(OccupancyMap, BrokenPointsAndPosesTellNothing) {
+TEST(OccupancyMap, InvalidPointsAndPosesAreIgnored) {
   OccupancyMap map(OccupancyConfig{});
   constexpr float nan = std::numeric_limits<float>::quiet_NaN();
   constexpr float infinite = std::numeric_limits<float>::infinity();
@@ -120,7 +120,7 @@ TEST(OccupancyMap, BrokenPointsAndPosesTellNothing) {
   EXPECT_EQ(map.size().nodes, 0U);
 }
 
-TEST(OccupancyMap, BeginsWithAStaticMapsVoxelsAtAnyResolution) {
+TEST(OccupancyMap, InsertsAStaticMapsVoxelsAtAnyResolution) {
   const MapSnapshot view = *street_map(10).view();
   for (const double resolution_m : {0.1, 0.2, 0.5}) {
     OccupancyConfig config;

@@ -7,7 +7,7 @@
 namespace stillmap::test {
 namespace {
 
-/// A street of 300 m, seen and cleared along its way.
+/// A street of 300 m, observed and cleared along its length.
 class PagedStreet : public testing::Test {
  protected:
   PagedStreet() {
@@ -17,14 +17,14 @@ class PagedStreet : public testing::Test {
       const LabelledScan scan = street_scan(static_cast<std::uint32_t>(k), 60);
       const Eigen::Isometry3d T_map_lidar(Eigen::Translation3d(30.0 * k, 0.0, 0.0));
       map_.insert(scan, T_map_lidar);
-      // Twice, so that voxels are shown.
+      // Twice, so that voxels are published.
       street.insert(scan, T_map_lidar);
       street.insert(scan, T_map_lidar);
     }
     view_ = *street.view();
   }
 
-  /// The view when tiles behind this place have left memory.
+  /// The view with the tiles before this position evicted.
   [[nodiscard]] MapSnapshot without_tiles_before(double x_map) const {
     MapSnapshot view = view_;
     for (auto& tile : view.tiles) {
@@ -42,7 +42,7 @@ class PagedStreet : public testing::Test {
   MapSnapshot view_;
 };
 
-TEST_F(PagedStreet, ForgetsWhatIsOnTheShelfAndNothingElse) {
+TEST_F(PagedStreet, EvictsTheColumnsOfNonResidentTilesOnly) {
   const BoxOccupancy ahead = between(150.0, 400.0);
   ASSERT_GT(between(0.0, 100.0).free, 1000U);
   EXPECT_FALSE(map_.sync_residency(view_));
@@ -55,14 +55,14 @@ TEST_F(PagedStreet, ForgetsWhatIsOnTheShelfAndNothingElse) {
   EXPECT_FALSE(map_.sync_residency(without_tiles_before(140.0))) << "nothing new";
 }
 
-TEST_F(PagedStreet, CountsItsNodesRightly) {
+TEST_F(PagedStreet, CountsItsNodesCorrectlyAfterEviction) {
   const OccupancySize whole = map_.size();
   map_.sync_residency(without_tiles_before(140.0));
   EXPECT_LT(map_.size().memory_bytes, whole.memory_bytes);
   EXPECT_EQ(map_.size().nodes, OccupancyMap(map_.encode(false)).size().nodes);
 }
 
-TEST_F(PagedStreet, TakesVoxelsOfTilesThatCameBackForOccupied) {
+TEST_F(PagedStreet, InsertsTheVoxelsOfReloadedTilesAsOccupied) {
   map_.sync_residency(without_tiles_before(140.0));
   EXPECT_TRUE(map_.sync_residency(view_));
   std::size_t voxels = 0;
@@ -76,7 +76,7 @@ TEST_F(PagedStreet, TakesVoxelsOfTilesThatCameBackForOccupied) {
   EXPECT_GT(voxels, 100U);
 }
 
-TEST_F(PagedStreet, KnowsFromItsFirstViewWhatIsAway) {
+TEST_F(PagedStreet, TreatsTilesThatWereNeverResidentAsEvicted) {
   OccupancyMap map{OccupancyConfig{}};
   const MapSnapshot stored = without_tiles_before(140.0);
   map.insert(stored);

@@ -39,7 +39,7 @@ TEST(OctreeUpdate, EqualsOctoMapsOwnUpdateVoxelByVoxel) {
   VoxelBricks bricks;
   for (int round = 0; round < 200; ++round) {
     bricks.clear();
-    // Long runs of one kind, so that voxels get as sure as they can be.
+    // Long runs of one kind, so that voxels reach the clamping thresholds.
     const bool hit = round / 20 % 2 == 0;
     for (const VoxelKey& voxel : random_voxels(generator)) {
       VoxelBrick& brick = bricks.brick_of(voxel);
@@ -63,7 +63,7 @@ TEST(OctreeUpdate, OfNothingMakesNothing) {
   EXPECT_EQ(octree.getRoot(), nullptr);
 }
 
-TEST(VoxelBricks, SortAsTheOctreeDoesAndLetHitsCountBeforeMisses) {
+TEST(VoxelBricks, AreSortedAsTheOctreeAndHitsTakePrecedence) {
   VoxelBricks bricks;
   for (const auto& voxel : {VoxelKey(65535, 65535, 65535), VoxelKey(4, 0, 0), VoxelKey(0, 4, 0),
                             VoxelKey(0, 0, 4), VoxelKey(0, 0, 0)}) {

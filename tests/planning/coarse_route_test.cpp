@@ -50,7 +50,7 @@ TEST(CoarseRoute, ThereIsNoneThroughAWallOrToUnknownGround) {
   EXPECT_FALSE(route(island, {-6, -6}, {10.5, 10.5}));
 }
 
-TEST(CoarseRoute, APlaceIsItsOwnRoute) {
+TEST(CoarseRoute, FromAPositionToItselfTheLengthIsZero) {
   const auto found = route(walled_road(), {-6, -6}, {-6, -6});
   ASSERT_TRUE(found);
   EXPECT_EQ(found->length_m, 0.0);

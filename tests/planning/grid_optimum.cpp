@@ -49,9 +49,9 @@ Cell cell_at(const TraversabilityView& view, const Eigen::Vector2d& position_map
 
 }  // namespace
 
-std::optional<double> shortest_way_m(const TraversabilityView& view,
-                                     const Eigen::Vector2d& from_map,
-                                     const Eigen::Vector2d& to_map) {
+std::optional<double> shortest_path_m(const TraversabilityView& view,
+                                      const Eigen::Vector2d& from_map,
+                                      const Eigen::Vector2d& to_map) {
   const Cell goal = cell_at(view, to_map);
   std::map<Cell, double> done;
   std::priority_queue<std::pair<double, Cell>> open;

@@ -30,24 +30,24 @@ VoxelWorld maze(int seed) {
   return world;
 }
 
-TEST(PathOracle, FindsAWayWheneverTheGridHasOneAndNotMuchLonger) {
+TEST(PathOracle, FindsAPathWheneverTheGridHasOneAndNotMuchLonger) {
   constexpr double allowed_factor = 1.15;
   const Eigen::Vector2d from(-17, -17);
   const Eigen::Vector2d to(17, 17);
   PlanningConfig config;
   config.cost_weight = 0.0;  // cost is length, as on the grid
-  int ways = 0;
+  int paths = 0;
   for (int seed = 1; seed <= 8; ++seed) {
     const auto view = traversability_of(maze(seed).view(), test::square_robot());
-    const auto optimum_m = test::shortest_way_m(*view, from, to);
+    const auto optimum_m = test::shortest_path_m(*view, from, to);
     if (!optimum_m) continue;
-    ++ways;
+    ++paths;
     const PathPlan plan = plan_path(*view, {from, {}}, {to, {}}, config);
     ASSERT_EQ(plan.status, PlanStatus::found) << "maze " << seed << ": " << plan.reason;
     EXPECT_LT(plan.cost, allowed_factor * *optimum_m) << "maze " << seed;
     EXPECT_TRUE(check_path(*view, plan.path_map()).is_free);
   }
-  EXPECT_GE(ways, 4);
+  EXPECT_GE(paths, 4);
 }
 
 }  // namespace

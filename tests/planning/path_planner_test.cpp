@@ -63,7 +63,7 @@ TEST(PathPlanner, ACarTurnsRoundTheEndOfTheWall) {
   EXPECT_NEAR(plan.poses.front().height_m, 0.1, 0.05);
 }
 
-TEST(PathPlanner, EveryPlannerFindsTheWay) {
+TEST(PathPlanner, EveryPlannerFindsAPath) {
   const auto view = traversability_of(two_lanes().view(), square_robot());
   for (std::size_t i = 0; i < planner_kind_count; ++i) {
     PlanningConfig config;
@@ -92,7 +92,7 @@ TEST(PathPlanner, TheSameSeedGivesTheSamePath) {
   EXPECT_NE(first.cost, plan(4).cost);
 }
 
-TEST(PathPlanner, ABlockedStartOrGoalSaysWhyAndOffersAPlace) {
+TEST(PathPlanner, ABlockedStartOrGoalHasAConflictAndTheNearestFreeCell) {
   VoxelWorld world = two_lanes();
   const auto view = traversability_of(world.view(), square_robot());
   const PathPlan on_wall = plan_path(*view, {{30, 0}, {}}, {{30, 3}, {}});
@@ -107,7 +107,7 @@ TEST(PathPlanner, ABlockedStartOrGoalSaysWhyAndOffersAPlace) {
   EXPECT_THAT(to_unknown.reason, HasSubstr("unknown"));
 }
 
-TEST(PathPlanner, WithoutAWayItSaysSoAtOnce) {
+TEST(PathPlanner, WithoutACoarseRouteThereIsNoSearch) {
   VoxelWorld world = two_lanes();
   world.block(40, -6, 41, 6, 0.3, 2.0, building);
   const auto view = traversability_of(world.view(), square_robot());
@@ -117,7 +117,7 @@ TEST(PathPlanner, WithoutAWayItSaysSoAtOnce) {
   EXPECT_TRUE(plan.poses.empty());
 }
 
-TEST(PathPlanner, DrivesOnUnknownGroundOnlyIfItMay) {
+TEST(PathPlanner, DrivesOnUnknownGroundOnlyIfAllowed) {
   VoxelWorld world = two_lanes();
   world.clear(46, -6, 60, 6);
   RobotProfile robot = square_robot();
@@ -132,7 +132,7 @@ TEST(PathPlanner, DrivesOnUnknownGroundOnlyIfItMay) {
   expect_drivable(*view, plan_path(*view, {{30, -3}, {}}, {{80, -3}, {}}));
 }
 
-TEST(PathPlanner, WhereItIsAlreadyItNeedNotGo) {
+TEST(PathPlanner, AtTheGoalThePathIsOnePose) {
   const auto view = traversability_of(two_lanes().view(), small_car());
   const PathPlan plan = plan_path(*view, {{30, -3}, 0.0}, {{30, -3}, {}});
   EXPECT_EQ(plan.status, PlanStatus::found);
@@ -144,7 +144,7 @@ TEST(PathPlanner, WhereItIsAlreadyItNeedNotGo) {
   EXPECT_GT(turned.length_m, pi * 4.0 * 0.9);
 }
 
-TEST(PathPlanner, StoppedEarlyItHasNoPathAndSaysSo) {
+TEST(PathPlanner, StoppedEarlyItIsOutOfTime) {
   const auto view = traversability_of(two_lanes().view(), small_car());
   PlanningConfig config;
   config.should_stop = [] { return true; };
@@ -153,7 +153,7 @@ TEST(PathPlanner, StoppedEarlyItHasNoPathAndSaysSo) {
   EXPECT_THAT(plan.reason, HasSubstr("allow more"));
 }
 
-TEST(PathPlanner, HostileQuestionsGetAReason) {
+TEST(PathPlanner, InvalidRequestsGetAReason) {
   const auto view = traversability_of(two_lanes().view(), square_robot());
   const auto reason = [&](const Goal& from, const Goal& to) {
     const PathPlan plan = plan_path(*view, from, to);

@@ -75,7 +75,7 @@ TEST_F(PathSmootherTest, ThroughAWallThereIsNoPath) {
       connect_waypoints(checker(), std::array{PlanarPose{{-9, 0}, 0}, PlanarPose{{9, 0}, 0}}));
 }
 
-TEST_F(PathSmootherTest, ThinningKeepsEndsLengthAndTurningBacks) {
+TEST_F(PathSmootherTest, DownsamplingKeepsEndsLengthAndReversals) {
   const CollisionChecker check = checker();
   // Beside and back: forwards, then backwards.
   const auto path = connect_waypoints(

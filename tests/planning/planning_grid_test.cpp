@@ -53,7 +53,7 @@ void expect_agreement(const RobotProfile& robot, int seed) {
   EXPECT_LT(free, poses - poses / 20);
 }
 
-TEST(PlanningGrid, SaysOfEveryPoseWhatThePathCheckSays) {
+TEST(PlanningGrid, AgreesWithThePathCheckOnEveryPose) {
   RobotProfile car = square_robot();
   car.length_m = 4.4;
   car.width_m = 1.8;

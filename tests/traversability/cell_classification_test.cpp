@@ -26,7 +26,7 @@ TEST(CellClassification, AKerbIsAStepForOneRobotAndNoneForAnother) {
   EXPECT_EQ(look(*traversability_of(world.view(), robot), 0.1, 2.1).cell.state, CellState::free);
 }
 
-TEST(CellClassification, WhatStandsIsAnObstacleWhatHangsIsHeadRoom) {
+TEST(CellClassification, StandingObjectsAreObstaclesHangingOnesLowHeadroom) {
   VoxelWorld world = plain_road();
   world.block(2.0, 2.0, 2.2, 2.2, 0.3, 2.0, pole);
   world.block(-3.0, 2.0, -2.0, 3.0, 1.3, 1.9, vegetation);
@@ -53,7 +53,7 @@ TEST(CellClassification, SlopeRoughnessAndClassHaveTheirOwnReasons) {
             BlockReason::roughness);
 }
 
-TEST(CellClassification, UnknownIsNotLethalAndDoesNotInflate) {
+TEST(CellClassification, UnknownIsNotLethalAndHasNoInscribedCellsAround) {
   VoxelWorld world;
   world.ground(-8, -8, 2, 8, road);
   const auto view = traversability_of(world.view(), square_robot());
@@ -106,7 +106,7 @@ TEST(CellClassification, CostGrowsWithClassSlopeAndInference) {
   EXPECT_EQ(look(*view, 4.1, -4.9).cell.cost, 10);
 }
 
-TEST(CellClassification, AWallOnGroundThatNobodySawIsAnObstacle) {
+TEST(CellClassification, AWallOnUnknownGroundIsAnObstacle) {
   VoxelWorld world = plain_road();
   world.clear(4, -8, 8, 8);
   world.block(5.0, -8, 5.2, 8, 0.5, 3.0, building);

@@ -1,7 +1,6 @@
-#include "core/traversability/ground_estimate.hpp"
-
 #include <gtest/gtest.h>
 
+#include "core/traversability/ground_estimate.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
 namespace stillmap {
@@ -86,7 +85,7 @@ TEST(GroundFill, NotThroughWhatStandsInTheGap) {
   VoxelWorld world;
   world.ground(-6, -6, 6, 6, road);
   world.clear(-1, -6, 1, 6);
-  world.block(-0.2, -6, 0.2, 6, 0.2, 2.5, building);  // a wall on ground that nobody saw
+  world.block(-0.2, -6, 0.2, 6, 0.2, 2.5, building);  // a wall on unknown ground
   const auto view = traversability_of(world.view(), square_robot());
   EXPECT_NE(surface_at(*view, 0.7, 0.1).ground.origin, GroundOrigin::inferred);
   EXPECT_EQ(look(*view, 0.1, 0.1).cell.reason, BlockReason::obstacle);
