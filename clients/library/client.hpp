@@ -14,7 +14,6 @@
 #include "core/lidar/scan.hpp"
 #include "core/lidar/trajectory.hpp"
 #include "core/map/query/map_query.hpp"
-#include "core/map/removed_voxel.hpp"
 #include "core/map/tile.hpp"
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"

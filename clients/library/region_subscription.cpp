@@ -5,7 +5,7 @@
 
 #include "clients/library/connection.hpp"
 #include "clients/library/region_tracker.hpp"
-#include "core/map/tile_lookup.hpp"
+#include "core/map/voxel_grid.hpp"
 #include "idl/conversions/tile.hpp"
 #include "idl/dds/reader.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "core/map/tile_lookup.hpp"
+#include "core/map/voxel_grid.hpp"
 
 namespace stillmap {
 

@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "core/lidar/motion.hpp"
-#include "core/map/removed_voxel.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/tile_evidence.hpp"
 #include "core/map/voxel_grid.hpp"

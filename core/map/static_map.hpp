@@ -8,10 +8,8 @@
 
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/range_image_view.hpp"
-#include "core/map/removed_voxel.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/tile_evidence.hpp"
-#include "core/map/tile_store.hpp"
 
 namespace stillmap {
 
@@ -93,7 +91,7 @@ class StaticMap {
   [[nodiscard]] ClassEvidence evidence_at(const Eigen::Vector3d& position_map) const;
 
   /// The planning view as it is now: voxels hit `min_points` times whose class is not a movable
-  /// one. Tiles whose content (tile_content.hpp) did not change since the last view are shared
+  /// one. Tiles whose content (`content_hash`) did not change since the last view are shared
   /// with it, with their counts and times of then; where nothing changed, so is the whole view.
   [[nodiscard]] std::shared_ptr<const MapSnapshot> view();
 

@@ -5,11 +5,14 @@
 #include <compare>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "core/lidar/semantic_class.hpp"
 
 namespace stillmap {
+
+class VoxelGrid;
 
 /// A square column of the map frame: [x, x+1) * tile_size_m by [y, y+1) * tile_size_m, all heights.
 struct TileId {
@@ -93,5 +96,49 @@ struct MapSnapshot {
   /// Sorted by id.
   std::vector<std::shared_ptr<const Tile>> tiles;
 };
+
+/// Why a place that was hit is not in the planning view.
+enum class RemovalReason : std::uint8_t {
+  /// Only things that were seen moving were there.
+  moving,
+  /// Things that stood, but can move, were there.
+  semi_static,
+  /// It was shown, but rays keep passing through it.
+  seen_through,
+  /// It was shown, but later scans took it for something that can move.
+  relabelled,
+};
+inline constexpr int removal_reason_count = 4;
+
+/// A voxel that is kept out of the planning view, and why.
+struct RemovedVoxel {
+  Eigen::Vector3f position_map = Eigen::Vector3f::Zero();
+  SemanticClass label = SemanticClass::unlabeled;
+  RemovalReason reason = RemovalReason::moving;
+  std::int64_t last_seen_ns = 0;
+};
+
+/// Whether the tile's voxels are in a tile store: its info counts them, but they are not here.
+[[nodiscard]] inline bool is_non_resident(const Tile& tile) {
+  return tile.voxels.size() != tile.info.voxel_count;
+}
+
+/// The tile without its voxels: what views have in place of one that is non-resident.
+[[nodiscard]] inline std::shared_ptr<const Tile> without_voxels(const Tile& tile) {
+  return std::make_shared<const Tile>(Tile{tile.info, {}});
+}
+
+/// Hash of what a client sees of a tile: of every voxel its index, its winning class and its mean
+/// to an eighth of a voxel. Counts, evidence and times are not content: they change with every
+/// scan and no plan depends on them. Voxels must be sorted by index.
+[[nodiscard]] std::uint64_t content_hash(TileId tile, std::span<const Voxel> voxels,
+                                         const VoxelGrid& grid);
+
+/// The tile of these voxels, sorted by index, with its hash and bounds.
+[[nodiscard]] Tile make_tile(TileId id, std::uint64_t revision, std::vector<Voxel> voxels,
+                             const VoxelGrid& grid);
+
+/// The tile of this id; null when the snapshot has none.
+[[nodiscard]] std::shared_ptr<const Tile> find_tile(const MapSnapshot& view, TileId id);
 
 }  // namespace stillmap

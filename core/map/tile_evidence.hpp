@@ -5,7 +5,6 @@
 #include <optional>
 #include <vector>
 
-#include "core/map/removed_voxel.hpp"
 #include "core/map/tile.hpp"
 
 namespace stillmap {
@@ -59,5 +58,14 @@ struct TileRecord {
 /// The places that the evidence keeps out of the planning view, with their reasons.
 [[nodiscard]] std::vector<RemovedVoxel> removed_voxels(const TileEvidence& evidence,
                                                        double voxel_size_m, double tile_size_m);
+
+/// Where tiles are that left memory. Thread-safe.
+class TileStore {
+ public:
+  virtual ~TileStore() = default;
+  /// All that was stored of the tile last; nothing of a tile that was never stored. Throws
+  /// std::runtime_error that says why it cannot be read.
+  [[nodiscard]] virtual TileRecord load(TileId id) = 0;
+};
 
 }  // namespace stillmap

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "core/map/tile_store.hpp"
+#include "core/map/tile_evidence.hpp"
 #include "core/occupancy/scan_update.hpp"
 
 namespace stillmap {

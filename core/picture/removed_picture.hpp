@@ -4,7 +4,6 @@
 #include <string_view>
 #include <vector>
 
-#include "core/map/removed_voxel.hpp"
 #include "core/map/tile.hpp"
 
 namespace stillmap {

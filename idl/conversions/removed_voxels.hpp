@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/map/removed_voxel.hpp"
+#include "core/map/tile.hpp"
 #include "removed_voxels.h"
 
 namespace stillmap::wire {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/map/tile_store.hpp"
+#include "core/map/tile_evidence.hpp"
 #include "idl/conversions/tile.hpp"
 
 namespace stillmap::server {

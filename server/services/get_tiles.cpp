@@ -1,7 +1,5 @@
 #include "server/services/get_tiles.hpp"
 
-#include <algorithm>
-
 #include "idl/conversions/tile.hpp"
 
 namespace stillmap::server {
@@ -9,12 +7,6 @@ namespace {
 
 // About 5 MB at 27 bytes a voxel. At least one tile is always sent.
 constexpr std::size_t max_voxels_per_reply = 200'000;
-
-std::shared_ptr<const Tile> find_tile(const MapSnapshot& view, TileId id) {
-  const auto found =
-      std::ranges::lower_bound(view.tiles, id, {}, [](const auto& tile) { return tile->info.id; });
-  return found != view.tiles.end() && (*found)->info.id == id ? *found : nullptr;
-}
 
 }  // namespace
 

@@ -3,7 +3,7 @@
 #include <functional>
 #include <vector>
 
-#include "core/map/removed_voxel.hpp"
+#include "core/map/tile.hpp"
 #include "removed_voxels.h"
 #include "server/services/service_context.hpp"
 

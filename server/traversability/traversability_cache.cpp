@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "core/map/tile_lookup.hpp"
+#include "core/map/voxel_grid.hpp"
 #include "core/traversability/traversability_map.hpp"
 
 namespace stillmap::server {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/map/tile_store.hpp"
+#include "core/map/tile_evidence.hpp"
 #include "server/monitoring/idle_scheduling.hpp"
 
 namespace stillmap::server {

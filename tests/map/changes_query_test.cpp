@@ -4,8 +4,8 @@
 
 #include "core/map/query/map_query.hpp"
 #include "core/map/query/region_shape.hpp"
-#include "core/map/tile_content.hpp"
-#include "core/map/tile_lookup.hpp"
+#include "core/map/tile.hpp"
+#include "core/map/voxel_grid.hpp"
 #include "tests/map/map_worlds.hpp"
 
 namespace stillmap {

@@ -7,7 +7,7 @@
 #include <random>
 #include <set>
 
-#include "core/map/tile_content.hpp"
+#include "core/map/voxel_grid.hpp"
 #include "core/picture/map_diff_picture.hpp"
 #include "tests/scratch_folder.hpp"
 

@@ -10,7 +10,7 @@
 #include <random>
 #include <tuple>
 
-#include "core/map/tile_content.hpp"
+#include "core/map/voxel_grid.hpp"
 #include "tests/map/map_worlds.hpp"
 
 namespace stillmap {

@@ -1,10 +1,9 @@
-#include "core/map/tile_lookup.hpp"
-
 #include <gmock/gmock.h>
 
 #include <limits>
 #include <random>
 
+#include "core/map/voxel_grid.hpp"
 #include "tests/map/map_worlds.hpp"
 
 namespace stillmap {
@@ -35,21 +34,20 @@ TEST(TileLookup, AgreesWithBruteForceOnRandomBoxes) {
 TEST(TileLookup, WholeWorldIsEveryTileAndNonsenseIsNone) {
   const auto view = test::street_map(1, 100).view();
   const AlignedBox3d everywhere(Vector3d::Constant(-infinity), Vector3d::Constant(infinity));
-  EXPECT_EQ(tile_versions(*view, everywhere).size(), view->tiles.size());
-  EXPECT_TRUE(tile_versions(*view, AlignedBox3d()).empty());
+  EXPECT_EQ(tiles_in_box(*view, everywhere).size(), view->tiles.size());
+  EXPECT_TRUE(tiles_in_box(*view, AlignedBox3d()).empty());
   AlignedBox3d no_number = everywhere;
   no_number.min().x() = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_TRUE(tile_versions(*view, no_number).empty());
-  EXPECT_TRUE(tile_versions(MapSnapshot{}, everywhere).empty());
+  EXPECT_TRUE(tiles_in_box(*view, no_number).empty());
+  EXPECT_TRUE(tiles_in_box(MapSnapshot{}, everywhere).empty());
 }
 
-TEST(TileLookup, FindsTilesByIdAndLeavesOutUnknownOnes) {
+TEST(TileLookup, FindsTilesById) {
   const auto view = test::street_map(1, 100).view();
-  const TileId known = view->tiles.back()->info.id;
-  const std::vector<TileId> ids{{1000, 1000}, known, {-1000, 3}, view->tiles.front()->info.id};
-  EXPECT_THAT(find_tiles(*view, ids),
-              testing::ElementsAre(view->tiles.back(), view->tiles.front()));
-  EXPECT_TRUE(find_tiles(MapSnapshot{}, ids).empty());
+  for (const auto& tile : view->tiles) EXPECT_EQ(find_tile(*view, tile->info.id), tile);
+  EXPECT_EQ(find_tile(*view, {1000, 1000}), nullptr);
+  EXPECT_EQ(find_tile(*view, {-1000, 3}), nullptr);
+  EXPECT_EQ(find_tile(MapSnapshot{}, {0, 0}), nullptr);
 }
 
 }  // namespace

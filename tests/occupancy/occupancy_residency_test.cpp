@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "core/map/tile_store.hpp"
+#include "core/map/tile_evidence.hpp"
 #include "core/occupancy/occupancy_map.hpp"
 #include "tests/map/map_worlds.hpp"
 

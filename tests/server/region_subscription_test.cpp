@@ -4,7 +4,7 @@
 #include <mutex>
 
 #include "core/map/query/region_shape.hpp"
-#include "core/map/tile_lookup.hpp"
+#include "core/map/voxel_grid.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "core/map/tile_content.hpp"
+#include "core/map/voxel_grid.hpp"
 
 namespace stillmap::test {
 namespace {

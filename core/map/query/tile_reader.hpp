@@ -6,7 +6,7 @@
 #include <stdexcept>
 
 #include "core/map/tile.hpp"
-#include "core/map/tile_store.hpp"
+#include "core/map/tile_evidence.hpp"
 
 namespace stillmap {
 

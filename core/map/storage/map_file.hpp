@@ -9,7 +9,7 @@
 #include "core/lidar/trajectory.hpp"
 #include "core/map/static_map.hpp"
 #include "core/map/tile.hpp"
-#include "core/map/tile_store.hpp"
+#include "core/map/tile_evidence.hpp"
 
 namespace stillmap {
 
@@ -46,7 +46,7 @@ class MapStore {
   virtual ~MapStore() = default;
   /// Brings the store to this state in one transaction: after a crash the store holds either the
   /// last save or this one. Tiles that did not change are not written again. Tiles that are
-  /// non-resident (core/map/tile_store.hpp) stay as they are stored. A tile that is written without
+  /// non-resident (`is_non_resident`) stay as they are stored. A tile that is written without
   /// its evidence loses the one that was stored.
   virtual void save(const SavedMap& map) = 0;
   /// The last saved state; an empty map when nothing was saved yet.

@@ -8,7 +8,7 @@
 #include "core/map/storage/stored_rows.hpp"
 #include "core/map/storage/tile_codec.hpp"
 #include "core/map/storage/tile_evidence_codec.hpp"
-#include "core/map/tile_content.hpp"
+#include "core/map/voxel_grid.hpp"
 
 namespace stillmap {
 namespace {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/map/tile_content.hpp"
+#include "core/map/tile.hpp"
 #include "core/map/voxel_grid.hpp"
 
 namespace stillmap {

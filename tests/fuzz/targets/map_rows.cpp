@@ -10,7 +10,7 @@
 #include "core/map/storage/tile_codec.hpp"
 #include "core/map/storage/tile_evidence_codec.hpp"
 #include "core/map/storage/tile_frame.hpp"
-#include "core/map/tile_content.hpp"
+#include "core/map/tile.hpp"
 #include "core/map/tools/map_check.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/loaded_map.hpp"
