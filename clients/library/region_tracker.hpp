@@ -5,7 +5,7 @@
 #include <span>
 
 #include "clients/library/client.hpp"
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/region.hpp"
 
 namespace stillmap {
 

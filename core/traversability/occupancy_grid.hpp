@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/region.hpp"
 #include "core/traversability/traversability_view.hpp"
 
 namespace stillmap {

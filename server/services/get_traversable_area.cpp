@@ -1,6 +1,6 @@
 #include "server/services/get_traversable_area.hpp"
 
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/region.hpp"
 #include "idl/conversions/traversability_query.hpp"
 
 namespace stillmap::server {

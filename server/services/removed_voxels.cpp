@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bitset>
 
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/region.hpp"
 #include "idl/conversions/region.hpp"
 #include "idl/conversions/removed_voxels.hpp"
 

@@ -3,7 +3,7 @@
 #include <map>
 
 #include "core/map/query/map_query.hpp"
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/region.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/voxel_grid.hpp"
 #include "tests/map/map_worlds.hpp"

@@ -8,7 +8,7 @@
 #include <random>
 #include <tuple>
 
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/region.hpp"
 #include "tests/map/map_worlds.hpp"
 
 namespace stillmap {

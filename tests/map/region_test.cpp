@@ -7,8 +7,6 @@
 #include <numbers>
 #include <random>
 
-#include "core/map/query/region_shape.hpp"
-
 namespace stillmap {
 namespace {
 

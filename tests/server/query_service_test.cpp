@@ -6,8 +6,8 @@
 #include <limits>
 #include <thread>
 
-#include "core/map/query/continuation.hpp"
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/query_checks.hpp"
+#include "core/map/query/region.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {

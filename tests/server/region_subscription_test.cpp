@@ -3,7 +3,7 @@
 #include <map>
 #include <mutex>
 
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/region.hpp"
 #include "core/map/voxel_grid.hpp"
 #include "tests/server/server_process.hpp"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/region.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
 namespace stillmap {

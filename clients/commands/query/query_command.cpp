@@ -13,7 +13,7 @@
 #include "clients/commands/query/query_report.hpp"
 #include "clients/commands/query/region_arguments.hpp"
 #include "clients/terminal/progress.hpp"
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/region.hpp"
 #include "core/picture/map_picture.hpp"
 
 namespace stillmap::cli {

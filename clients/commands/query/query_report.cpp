@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/terminal/table.hpp"
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/region.hpp"
 
 namespace stillmap::cli {
 namespace {

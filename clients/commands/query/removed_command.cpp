@@ -10,7 +10,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/query/fetch_map.hpp"
 #include "clients/commands/query/region_arguments.hpp"
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/region.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/picture/removed_picture.hpp"
 

@@ -1,11 +1,10 @@
 // A number that says whether a token comes as text, or as words that get the checksum that fits;
 // then the query that it continues.
 
-#include "core/map/query/continuation.hpp"
-
 #include <span>
 
 #include "core/map/query/map_query.hpp"
+#include "core/map/query/query_checks.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/invariant.hpp"
 #include "tests/fuzz/street_map.hpp"

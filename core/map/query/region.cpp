@@ -1,10 +1,108 @@
-#include "core/map/query/region_shape.hpp"
+#include "core/map/query/region.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
 namespace stillmap {
 namespace {
+
+constexpr const char* coordinate_rule = "; coordinates are numbers within 1000000 m of the origin";
+
+bool is_usable(const Eigen::Vector2d& p) {
+  return (p.array().abs() <= max_region_coordinate_m).all();  // false for NaN
+}
+
+/// From lower to higher, each within reach or infinite.
+void check_range(const std::string& what, double min_m, double max_m, std::ostream& faults) {
+  const auto is_far = [](double value) {
+    return std::isfinite(value) && std::abs(value) > max_region_coordinate_m;
+  };
+  if (!(min_m < max_m)) {  // also NaN
+    faults << what << " is from " << min_m << " to " << max_m
+           << " m; must be two numbers, the lower one first (infinity is allowed). ";
+  } else if (is_far(min_m) || is_far(max_m)) {
+    faults << what << " is from " << min_m << " to " << max_m << " m" << coordinate_rule
+           << ", or infinite for no limit. ";
+  }
+}
+
+void check_length(const std::string& what, double length_m, std::ostream& faults) {
+  if (length_m > 0.0 && length_m <= max_region_coordinate_m) return;
+  faults << what << " is " << length_m << "; must be above 0 and at most "
+         << max_region_coordinate_m << " m. ";
+}
+
+/// False when one cannot be used.
+bool check_points(const std::string& list, const std::string& item, std::size_t least,
+                  const std::vector<Eigen::Vector2d>& points, std::ostream& faults) {
+  if (points.size() < least || points.size() > max_region_points) {
+    faults << list << " has " << points.size() << " " << item << "s; must have " << least << " to "
+           << max_region_points << ". ";
+    return false;
+  }
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (is_usable(points[i])) continue;
+    faults << list << " " << item << " " << i << " is (" << points[i].x() << ", " << points[i].y()
+           << ")" << coordinate_rule << ". ";
+    return false;
+  }
+  return true;
+}
+
+void check(const BoxRegion& box, std::ostream& faults) {
+  const char* const names[] = {"box x", "box y", "box z"};
+  for (int axis = 0; axis < 3; ++axis) {
+    check_range(names[axis], box.box_map.min()[axis], box.box_map.max()[axis], faults);
+  }
+}
+
+void check(const SphereRegion& sphere, std::ostream& faults) {
+  const Eigen::Vector3d& centre = sphere.centre_map;
+  if (!(centre.array().abs() <= max_region_coordinate_m).all()) {
+    faults << "sphere centre is (" << centre.x() << ", " << centre.y() << ", " << centre.z() << ")"
+           << coordinate_rule << ". ";
+  }
+  check_length("sphere radius_m", sphere.radius_m, faults);
+}
+
+void name_edge(const std::vector<Eigen::Vector2d>& corners, std::size_t edge, std::ostream& text) {
+  const Eigen::Vector2d& from = corners[edge];
+  const Eigen::Vector2d& to = corners[(edge + 1) % corners.size()];
+  text << edge << " (from " << from.x() << ", " << from.y() << " to " << to.x() << ", " << to.y()
+       << ")";
+}
+
+void check(const PolygonRegion& polygon, std::ostream& faults) {
+  check_range("polygon z", polygon.heights.min_m, polygon.heights.max_m, faults);
+  const std::vector<Eigen::Vector2d>& corners = polygon.corners_map;
+  if (!check_points("polygon", "corner", 3, corners, faults)) return;
+  const PolygonShape shape(corners);
+  if (!shape.has_area()) {
+    faults << "polygon has no area: its " << corners.size()
+           << " corners lie on one line; give corners round an outline. ";
+  } else if (const auto edges = shape.crossing()) {
+    faults << "polygon edges ";
+    name_edge(corners, edges->first, faults);
+    faults << " and ";
+    name_edge(corners, edges->second, faults);
+    faults << " cross or touch; list the corners in their order round the outline, or ask for two "
+              "polygons. ";
+  }
+}
+
+void check(const CorridorRegion& corridor, std::ostream& faults) {
+  check_range("corridor z", corridor.heights.min_m, corridor.heights.max_m, faults);
+  check_length("corridor half_width_m", corridor.half_width_m, faults);
+  const std::vector<Eigen::Vector2d>& path = corridor.path_map;
+  if (!check_points("corridor path", "point", 2, path, faults)) return;
+  if (std::ranges::all_of(path, [&](const Eigen::Vector2d& p) { return p == path.front(); })) {
+    faults << "corridor path has no length: all " << path.size()
+           << " points are the same; ask for a sphere. ";
+  }
+}
 
 template <typename... Functions>
 struct Cases : Functions... {
@@ -50,6 +148,12 @@ Eigen::AlignedBox3d bounds_of(const Region& region) {
 }
 
 }  // namespace
+
+std::string region_faults(const Region& region) {
+  std::ostringstream faults;
+  std::visit([&](const auto& kind) { check(kind, faults); }, region);
+  return faults.str();
+}
 
 RegionShape::RegionShape(const Eigen::AlignedBox3d& bounds_map, Shape shape)
     : bounds_map_(bounds_map), shape_(std::move(shape)) {}
