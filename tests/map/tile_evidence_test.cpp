@@ -5,7 +5,6 @@
 #include <random>
 
 #include "core/map/storage/tile_codec.hpp"
-#include "core/map/storage/tile_evidence_codec.hpp"
 
 namespace stillmap {
 namespace {

@@ -11,7 +11,6 @@
 #include "core/map/storage/map_database.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/map/storage/tile_codec.hpp"
-#include "core/map/storage/tile_evidence_codec.hpp"
 #include "core/map/tile_evidence.hpp"
 #include "core/map/tools/map_rows.hpp"
 

@@ -8,7 +8,6 @@
 #include <cstring>
 
 #include "core/map/storage/tile_codec.hpp"
-#include "core/map/storage/tile_evidence_codec.hpp"
 #include "core/map/storage/tile_frame.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/tools/map_check.hpp"

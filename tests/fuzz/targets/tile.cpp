@@ -2,7 +2,6 @@
 // inside the zstd frame, whose checksum would keep any change from being looked at.
 
 #include "core/map/storage/tile_codec.hpp"
-#include "core/map/storage/tile_evidence_codec.hpp"
 #include "core/map/storage/tile_frame.hpp"
 #include "core/map/tile_evidence.hpp"
 #include "tests/fuzz/byte_source.hpp"
