@@ -1,16 +1,107 @@
 #include "core/map/tools/map_diff.hpp"
 
 #include <tbb/parallel_for.h>
+#include <tsl/robin_map.h>
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
-#include "core/map/tools/class_lookup.hpp"
+#include "core/map/voxel_grid.hpp"
 
 namespace stillmap {
 namespace {
+
+/// What stands near a cell.
+struct NearClasses {
+  /// A voxel of the class asked for is within reach.
+  bool has_same = false;
+  /// Class of the nearest voxel within reach, of equally near ones the first by index; not looked
+  /// for when `has_same`.
+  std::optional<SemanticClass> nearest;
+};
+
+/// The classes of a map's voxels by cell, across the borders of tiles.
+class ClassLookup {
+ public:
+  /// Of `view`, for questions about cells of `asking`, which has tiles and voxels of the same size
+  /// unless one of them is empty.
+  ClassLookup(const MapSnapshot& view, const MapSnapshot& asking) {
+    const MapSnapshot& filled = view.tiles.empty() ? asking : view;
+    if (!filled.tiles.empty()) columns_ = std::llround(filled.tile_size_m / filled.voxel_size_m);
+    std::size_t voxels = 0;
+    for (const auto& tile : view.tiles) voxels += tile->voxels.size();
+    class_of_.reserve(voxels);
+    for (const auto& tile : view.tiles) {
+      for (const Voxel& voxel : tile->voxels) {
+        class_of_[key_of(cell(tile->info.id, voxel.index))] = voxel.evidence.winner();
+      }
+    }
+  }
+
+  /// Looks at all cells at most `reach` cells away along each axis. Thread-safe.
+  [[nodiscard]] NearClasses near(TileId tile, VoxelIndex index, SemanticClass label,
+                                 int reach) const {
+    const Cell centre = cell(tile, index);
+    // In most of the map nothing changed.
+    if (at(centre) == label) return {.has_same = true, .nearest = std::nullopt};
+    return search(centre, label, reach);
+  }
+
+ private:
+  /// Column, row and layer of the whole map.
+  using Cell = Eigen::Matrix<std::int64_t, 3, 1>;
+
+  static std::uint64_t key_of(const Cell& cell) {
+    // No map spans 2^21 voxels: at the finest in use, 5 cm, that were 100 km.
+    constexpr std::uint64_t mask = (1U << 21) - 1;
+    const auto bits = cell.cast<std::uint64_t>();
+    return (bits.x() & mask) << 42 | (bits.y() & mask) << 21 | (bits.z() & mask);
+  }
+
+  struct Fibonacci {
+    std::size_t operator()(std::uint64_t key) const {
+      const std::uint64_t spread = key * 0x9E3779B97F4A7C15ULL;
+      return spread ^ spread >> 32;
+    }
+  };
+
+  [[nodiscard]] Cell cell(TileId tile, VoxelIndex index) const {
+    return {tile.x * columns_ + index.x, tile.y * columns_ + index.y, index.z};
+  }
+  [[nodiscard]] std::optional<SemanticClass> at(const Cell& cell) const {
+    const auto found = class_of_.find(key_of(cell));
+    return found == class_of_.end() ? std::nullopt : std::optional(found->second);
+  }
+  [[nodiscard]] NearClasses search(const Cell& centre, SemanticClass label, int reach) const;
+
+  /// Voxels along a tile's side.
+  std::int64_t columns_ = 1;
+  tsl::robin_map<std::uint64_t, SemanticClass, Fibonacci> class_of_;
+};
+
+NearClasses ClassLookup::search(const Cell& centre, SemanticClass label, int reach) const {
+  NearClasses near;
+  std::int64_t nearest_squared = 0;
+  for (int x = -reach; x <= reach; ++x) {
+    for (int y = -reach; y <= reach; ++y) {
+      for (int z = -reach; z <= reach; ++z) {
+        const auto found = at(centre + Cell(x, y, z));
+        if (!found) continue;
+        if (*found == label) return {.has_same = true, .nearest = std::nullopt};
+        const std::int64_t squared = x * x + y * y + z * z;
+        if (near.nearest && squared >= nearest_squared) continue;
+        near.nearest = found;
+        nearest_squared = squared;
+      }
+    }
+  }
+  return near;
+}
 
 using TileChanges = std::vector<VoxelDifference>;
 
