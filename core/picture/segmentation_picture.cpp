@@ -2,7 +2,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/picture/png_file.hpp"
+#include "core/picture/map_canvas.hpp"
 
 namespace stillmap {
 namespace {

@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "core/picture/png_file.hpp"
+#include "core/picture/map_canvas.hpp"
 
 namespace stillmap {
 namespace {

@@ -8,9 +8,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "core/picture/picture_overlay.hpp"
-#include "core/picture/picture_raster.hpp"
-#include "core/picture/png_file.hpp"
+#include "core/picture/map_canvas.hpp"
 #include "core/traversability/traversability_query.hpp"
 
 namespace stillmap {

@@ -8,7 +8,7 @@
 #include <set>
 
 #include "core/map/voxel_grid.hpp"
-#include "core/picture/map_diff_picture.hpp"
+#include "core/picture/map_change_picture.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {

@@ -1,5 +1,3 @@
-#include "core/picture/png_file.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +5,7 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "core/picture/map_canvas.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {

@@ -6,7 +6,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/map_files/map_diff_report.hpp"
 #include "core/map/storage/map_file_copy.hpp"
-#include "core/picture/map_diff_picture.hpp"
+#include "core/picture/map_change_picture.hpp"
 
 namespace stillmap::cli {
 namespace {

@@ -12,7 +12,7 @@
 #include "clients/commands/query/region_arguments.hpp"
 #include "core/map/query/region.hpp"
 #include "core/map/storage/map_file_copy.hpp"
-#include "core/picture/removed_picture.hpp"
+#include "core/picture/map_change_picture.hpp"
 
 namespace stillmap::cli {
 namespace {

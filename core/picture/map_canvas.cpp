@@ -1,12 +1,15 @@
-#include "core/picture/picture_overlay.hpp"
+#include "core/picture/map_canvas.hpp"
+
+#include <png.h>
 
 #include <algorithm>
+#include <cassert>
 #include <cmath>
+#include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <stdexcept>
-
-#include "core/picture/picture_raster.hpp"
+#include <string>
 
 namespace stillmap {
 namespace {
@@ -47,7 +50,42 @@ double round_length(double max_length_m) {
   return power;
 }
 
+bool write_bgr(const std::filesystem::path& file, const cv::Mat& picture) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  image.width = static_cast<png_uint_32>(picture.cols);
+  image.height = static_cast<png_uint_32>(picture.rows);
+  image.format = PNG_FORMAT_BGR;
+  image.flags = PNG_IMAGE_FLAG_FAST;
+  const auto row_bytes = static_cast<png_int_32>(picture.step[0]);
+  return png_image_write_to_file(&image, file.c_str(), 0, picture.data, row_bytes, nullptr) != 0;
+}
+
 }  // namespace
+
+Eigen::AlignedBox2d xy_bounds(const MapSnapshot& view) {
+  Eigen::AlignedBox2d box;
+  for (const auto& tile : view.tiles) {
+    box.extend(tile->info.bounds_map.min().head<2>().cast<double>());
+    box.extend(tile->info.bounds_map.max().head<2>().cast<double>());
+  }
+  return box;
+}
+
+PictureFrame fit_frame(const Eigen::AlignedBox2d& box_map, int max_side_px) {
+  constexpr double margin_m = 4.0;
+  constexpr double max_px_per_m = 15.0;
+  const Eigen::Vector2d size_m = box_map.sizes() + Eigen::Vector2d::Constant(2.0 * margin_m);
+  PictureFrame frame;
+  frame.px_per_m = std::min(max_px_per_m, max_side_px / size_m.maxCoeff());
+  // The legend needs some width; a narrow map stands in its middle.
+  const Eigen::Vector2d size_px = (size_m * frame.px_per_m).cwiseMax(Eigen::Vector2d(640.0, 200.0));
+  frame.size = {cvCeil(size_px.x()), cvCeil(size_px.y())};
+  frame.corner_map = box_map.center() - size_px / (2.0 * frame.px_per_m);
+  return frame;
+}
+
+cv::Scalar background() { return {30, 24, 20}; }
 
 cv::Scalar query_box_colour() { return {40, 140, 255}; }
 
@@ -127,6 +165,14 @@ cv::Mat draw_legend(int width_px, const std::string& title,
     put_text(strip, entries[i].text, places[i] + cv::Point(swatch + 8, 0), {210, 210, 210});
   }
   return strip;
+}
+
+void write_png(const std::filesystem::path& file, const cv::Mat& picture) {
+  assert(picture.type() == CV_8UC3);
+  if (file.extension() == ".png" && write_bgr(file, picture)) return;
+  throw std::runtime_error(file.string() +
+                           ": the picture cannot be written; its folder must exist and be "
+                           "writable, its name end in .png");
 }
 
 }  // namespace stillmap

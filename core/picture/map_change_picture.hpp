@@ -1,7 +1,10 @@
 #pragma once
 
 #include <filesystem>
+#include <string_view>
+#include <vector>
 
+#include "core/map/tile.hpp"
 #include "core/map/tools/map_diff.hpp"
 
 namespace stillmap {
@@ -11,5 +14,13 @@ namespace stillmap {
 /// std::runtime_error naming the file when it cannot be written.
 void write_diff_picture(const std::filesystem::path& file, const MapSnapshot& before,
                         const MapSnapshot& after, const MapDiff& diff, int max_side_px = 1800);
+
+/// In words, as on the picture.
+[[nodiscard]] std::string_view name(RemovalReason reason);
+
+/// Writes a PNG of the map from above in grey, and over it what was removed, coloured by reason,
+/// with a legend that counts. Throws std::runtime_error naming the file when it cannot be written.
+void write_removed_picture(const std::filesystem::path& file, const MapSnapshot& view,
+                           const std::vector<RemovedVoxel>& removed, int max_side_px = 1800);
 
 }  // namespace stillmap

@@ -3,13 +3,37 @@
 #include <Eigen/Geometry>
 #include <filesystem>
 #include <opencv2/core/mat.hpp>
+#include <opencv2/core/types.hpp>
 #include <string>
 #include <vector>
 
 #include "core/lidar/trajectory.hpp"
-#include "core/picture/picture_frame.hpp"
+#include "core/map/tile.hpp"
 
 namespace stillmap {
+
+/// Where the map frame lies on a picture: x to the right, y up.
+struct PictureFrame {
+  /// Map position of the picture's lower left corner [m].
+  Eigen::Vector2d corner_map = Eigen::Vector2d::Zero();
+  double px_per_m = 1.0;
+  cv::Size size;
+
+  [[nodiscard]] cv::Point2d pixel(const Eigen::Vector2d& p_map) const {
+    const Eigen::Vector2d p = (p_map - corner_map) * px_per_m;
+    return {p.x(), size.height - p.y()};
+  }
+};
+
+/// Round all voxels, in plan; empty for an empty map. Map frame [m].
+[[nodiscard]] Eigen::AlignedBox2d xy_bounds(const MapSnapshot& view);
+
+/// A picture with this box (map frame [m], not empty) in its middle, with a margin; its longest
+/// side about `max_side_px`, and wide enough for a legend.
+[[nodiscard]] PictureFrame fit_frame(const Eigen::AlignedBox2d& box_map, int max_side_px);
+
+/// The background of all map pictures, BGR.
+[[nodiscard]] cv::Scalar background();
 
 /// What is drawn over the map and below it. Colours are BGR.
 void draw_trajectory(cv::Mat& picture, const PictureFrame& frame, const Trajectory& trajectory,
@@ -36,5 +60,9 @@ struct LegendEntry {
 /// A strip as wide as the picture: a title line and the entries, as many rows as they need.
 [[nodiscard]] cv::Mat draw_legend(int width_px, const std::string& title,
                                   const std::vector<LegendEntry>& entries);
+
+/// Writes a picture of 8-bit blue, green, red (CV_8UC3). Throws std::runtime_error naming the file
+/// when its name does not end in .png or it cannot be written.
+void write_png(const std::filesystem::path& file, const cv::Mat& picture);
 
 }  // namespace stillmap
