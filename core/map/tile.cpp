@@ -62,6 +62,12 @@ float ClassEvidence::share() const {
   return total > 0.0F ? strongest(*this).weight / total : 0.0F;
 }
 
+std::string_view name(RemovalReason reason) {
+  constexpr std::array<std::string_view, removal_reason_count> names{"moving", "semi-static",
+                                                                     "seen through", "relabelled"};
+  return names.at(static_cast<std::size_t>(reason));
+}
+
 std::uint64_t content_hash(TileId tile, std::span<const Voxel> voxels, const VoxelGrid& grid) {
   std::vector<std::uint64_t> words(voxels.size());
   std::ranges::transform(voxels, words.begin(),

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string_view>
 #include <vector>
 
 #include "core/lidar/semantic_class.hpp"
@@ -109,6 +110,9 @@ enum class RemovalReason : std::uint8_t {
   relabelled,
 };
 inline constexpr int removal_reason_count = 4;
+
+/// In words, for people.
+[[nodiscard]] std::string_view name(RemovalReason reason);
 
 /// A voxel that is kept out of the planning view, and why.
 struct RemovedVoxel {

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <filesystem>
-#include <string_view>
 #include <vector>
 
 #include "core/map/tile.hpp"
@@ -14,9 +13,6 @@ namespace stillmap {
 /// std::runtime_error naming the file when it cannot be written.
 void write_diff_picture(const std::filesystem::path& file, const MapSnapshot& before,
                         const MapSnapshot& after, const MapDiff& diff, int max_side_px = 1800);
-
-/// In words, as on the picture.
-[[nodiscard]] std::string_view name(RemovalReason reason);
 
 /// Writes a PNG of the map from above in grey, and over it what was removed, coloured by reason,
 /// with a legend that counts. Throws std::runtime_error naming the file when it cannot be written.

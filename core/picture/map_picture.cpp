@@ -22,7 +22,7 @@ constexpr float roof_height_m = 8.0F;
 constexpr float nothing = -1e9F;
 
 /// Of every pixel, what is seen from above.
-struct TopView {
+struct PixelView {
   cv::Mat1f height_m;
   /// Height by which pixels compete: that of poles and signs is raised.
   cv::Mat1f rank_m;
@@ -45,8 +45,8 @@ cv::Rect pixels_of(const Eigen::Vector3d& corner_map, double voxel_size_m,
   return cell & cv::Rect({0, 0}, frame.size);
 }
 
-TopView rasterize_top_view(const MapSnapshot& view, const PictureFrame& frame) {
-  TopView top{cv::Mat1f(frame.size, nothing), cv::Mat1f(frame.size, nothing),
+PixelView rasterize(const MapSnapshot& view, const PictureFrame& frame) {
+  PixelView top{cv::Mat1f(frame.size, nothing), cv::Mat1f(frame.size, nothing),
               cv::Mat1b(frame.size, 0)};
   const VoxelGrid grid(view.voxel_size_m, view.tile_size_m);
   for (const auto& tile : view.tiles) {
@@ -155,7 +155,7 @@ cv::Mat draw_voxels(const MapSnapshot& view, const PictureFrame& frame) {
   cv::Mat3b picture(frame.size);
   picture.setTo(background());
   if (view.tiles.empty()) return picture;
-  const TopView top = rasterize_top_view(view, frame);
+  const PixelView top = rasterize(view, frame);
   cv::Mat1b is_seen;
   cv::compare(top.rank_m, nothing, is_seen, cv::CMP_GT);
   const cv::Mat1f ground_m = ground_height(view, frame);

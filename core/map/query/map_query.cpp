@@ -17,7 +17,11 @@ namespace {
 class VoxelFilter {
  public:
   /// The tile may be non-resident: its info tells whether all of it is taken.
-  VoxelFilter(const MapQuery& query, const RegionShape& region, const Tile& tile);
+  VoxelFilter(const MapQuery& query, const RegionShape& region, const Tile& tile)
+      : query_(query),
+        is_inside_(region.covers(tile.info.bounds_map.cast<double>())),
+        matches_all_classes_(query.classes.none() || query.classes.all()),
+        near_(region.restricted_to(tile.info.bounds_map.cast<double>())) {}
 
   [[nodiscard]] bool matches_all() const { return is_inside_ && matches_all_classes_; }
   [[nodiscard]] bool matches(const Voxel& voxel) const {
@@ -26,7 +30,10 @@ class VoxelFilter {
             query_.classes.test(static_cast<std::size_t>(voxel.evidence.winner())));
   }
   /// How many of the tile's voxels it matches.
-  [[nodiscard]] std::uint32_t count(const Tile& tile) const;
+  [[nodiscard]] std::uint32_t count(const Tile& tile) const {
+    return static_cast<std::uint32_t>(
+        std::ranges::count_if(tile.voxels, [&](const Voxel& voxel) { return matches(voxel); }));
+  }
 
  private:
   const MapQuery& query_;
@@ -44,17 +51,9 @@ TileChangeKind kind_of(const TileInfo& info, const MapQuery& query, const TileHi
   return was_there ? TileChangeKind::changed : TileChangeKind::appeared;
 }
 
-VoxelFilter::VoxelFilter(const MapQuery& query, const RegionShape& region, const Tile& tile)
-    : query_(query),
-      is_inside_(region.covers(tile.info.bounds_map.cast<double>())),
-      matches_all_classes_(query.classes.none() || query.classes.all()),
-      near_(region.restricted_to(tile.info.bounds_map.cast<double>())) {}
-
-std::uint32_t VoxelFilter::count(const Tile& tile) const {
-  return static_cast<std::uint32_t>(
-      std::ranges::count_if(tile.voxels, [&](const Voxel& voxel) { return matches(voxel); }));
-}
-
+/// Positions in `view.tiles`, ascending, of the tiles that an answer is made from: those with
+/// voxels near the region; with `since`, those that changed and whose footprint meets it, even if
+/// no voxel is left there.
 std::vector<std::size_t> selected_tiles(const MapSnapshot& view, const MapQuery& query,
                                         const RegionShape& region) {
   std::vector<std::size_t> selected;
@@ -74,6 +73,7 @@ std::vector<std::size_t> selected_tiles(const MapSnapshot& view, const MapQuery&
   return selected;
 }
 
+/// The tiles of an answer; `selected` as selected_tiles returns it.
 std::vector<TileChange> tile_changes(const MapSnapshot& view, const MapQuery& query,
                                      const RegionShape& region,
                                      const std::vector<std::size_t>& selected,
@@ -101,7 +101,7 @@ QueryVoxel query_voxel(const Voxel& voxel) {
   return {voxel.mean_map, voxel.evidence.winner(), voxel.evidence.share(), voxel.point_count};
 }
 
-/// A query that was found fine, and where its answer comes from.
+/// A valid query, and what its answer is read from.
 struct Selection {
   const MapSnapshot& view;
   const MapQuery& query;
@@ -110,8 +110,8 @@ struct Selection {
   TileReader& reader;
 };
 
-/// A page of the map's own voxels, from `position` on, which moves on to the next page's first
-/// voxel. True when there is one.
+/// A page of the map's own voxels from `position` on. Advances `position` to the first voxel of the
+/// next page; true when there is one.
 bool fill_page(const Selection& from, Continuation& position, std::vector<QueryVoxel>& page) {
   const std::size_t page_size = from.query.max_bytes / query_voxel_bytes;
   for (const std::size_t i : from.tiles) {
@@ -132,8 +132,8 @@ bool fill_page(const Selection& from, Continuation& position, std::vector<QueryV
   return false;
 }
 
-/// A page of a coarser answer. Every page merges the whole region anew: the service keeps nothing
-/// between requests.
+/// A page of a coarser answer. Every page merges the whole region anew: nothing is kept between
+/// requests.
 bool fill_coarse_page(const Selection& from, Continuation& position,
                       std::vector<QueryVoxel>& page) {
   CoarseCells cells(from.query.resolution_m);
@@ -163,7 +163,7 @@ MapQueryResult result_of(const MapSnapshot& view, QueryStatus status, std::strin
   return result;
 }
 
-/// Where the answer goes on, or why it does not.
+/// Where a page begins, or why the query is refused.
 struct Start {
   Continuation position;
   std::optional<Refusal> refusal;
@@ -181,9 +181,9 @@ Start start_of(const MapSnapshot& view, const MapQuery& query, const TileHistory
   return {token.value_or(Continuation()), token_refusal(view, query, token)};
 }
 
-/// Tiles and total of an answer, for its first page.
-void describe(const Selection& selection, const TileHistory* history, Continuation& position,
-              MapQueryResult& result) {
+/// Fills in the tiles and the number of voxels of the whole answer, for its first page.
+void add_tiles(const Selection& selection, const TileHistory* history, Continuation& position,
+               MapQueryResult& result) {
   result.tiles = tile_changes(selection.view, selection.query, selection.region, selection.tiles,
                               history, selection.reader);
   for (const TileChange& tile : result.tiles) position.total_voxels += tile.voxel_count;
@@ -200,7 +200,7 @@ MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query, const T
   const Selection selection{view, query, region, selected_tiles(view, query, region), reader};
   const bool is_coarse = is_coarser_than_map(view, query.resolution_m);
   MapQueryResult result = result_of(view, QueryStatus::ok, {});
-  if (!is_coarse && query.continuation.empty()) describe(selection, history, position, result);
+  if (!is_coarse && query.continuation.empty()) add_tiles(selection, history, position, result);
   const bool has_more = is_coarse ? fill_coarse_page(selection, position, result.voxels)
                                   : fill_page(selection, position, result.voxels);
   result.total_voxels = position.total_voxels;

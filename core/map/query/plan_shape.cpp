@@ -8,6 +8,39 @@
 namespace stillmap {
 namespace {
 
+constexpr double grid_steps_per_m = 1 << 20;
+
+/// Positions farther than 2000 km from the origin in an axis are moved there; not for NaN.
+GridPoint to_grid(const Eigen::Vector2d& p_map) {
+  constexpr double max_coordinate_m = 2e6;
+  const auto steps = [&](double value_m) {
+    return std::llround(std::clamp(value_m, -max_coordinate_m, max_coordinate_m) *
+                        grid_steps_per_m);
+  };
+  return {steps(p_map.x()), steps(p_map.y())};
+}
+
+/// +1 when a, b, c turn left, -1 when they turn right, 0 when they lie on one line.
+int orientation(GridPoint a, GridPoint b, GridPoint c) {
+  // Differences have at most 43 bits, their products 86.
+  __extension__ using Wide = __int128;
+  const Wide left = static_cast<Wide>(b.x - a.x) * (c.y - a.y);
+  const Wide right = static_cast<Wide>(b.y - a.y) * (c.x - a.x);
+  return left > right ? 1 : (left < right ? -1 : 0);
+}
+
+/// Whether the boxes round two edges share a point.
+bool boxes_intersect(const GridEdge& s, const GridEdge& t) {
+  return s.min_x() <= t.max_x() && t.min_x() <= s.max_x() && s.min_y() <= t.max_y() &&
+         t.min_y() <= s.max_y();
+}
+
+/// Whether two edges share a point.
+bool edges_intersect(const GridEdge& s, const GridEdge& t) {
+  return boxes_intersect(s, t) && orientation(s.a, s.b, t.a) * orientation(s.a, s.b, t.b) <= 0 &&
+         orientation(t.a, t.b, s.a) * orientation(t.a, t.b, s.b) <= 0;
+}
+
 /// The grid points round a box, so that the box is inside.
 GridEdge diagonal_round(const Eigen::AlignedBox2d& box_map) {
   const GridPoint low = to_grid(box_map.min());

@@ -8,7 +8,7 @@
 
 namespace stillmap {
 
-/// Where a page of an answer ended, and of which answer.
+/// Position in the answer to a query, for the next page.
 struct Continuation {
   std::uint64_t map_id = 0;
   std::uint64_t map_version = 0;
@@ -29,28 +29,28 @@ struct Continuation {
 /// Nothing when the token is not one that to_token made.
 [[nodiscard]] std::optional<Continuation> from_token(const std::string& token);
 
-/// What cannot be answered, in words; empty when the query is fine.
+/// Every fault of the query in words; empty when it is valid.
 [[nodiscard]] std::string query_faults(const MapSnapshot& view, const MapQuery& query);
 
-/// Why a query does not get an answer.
+/// Why a query is refused.
 struct Refusal {
   QueryStatus status;
   std::string reason;
 };
 
-/// Why the changes since the version that the client has cannot be told.
+/// Set when the changes since the client's version are not known.
 [[nodiscard]] std::optional<Refusal> since_refusal(const MapSnapshot& view,
                                                    const KnownVersion& since,
                                                    const TileHistory* history);
 
-/// Why the token, if there is one, cannot be followed on this view.
+/// Set when the token is missing, damaged, or of another map, version or query.
 [[nodiscard]] std::optional<Refusal> token_refusal(const MapSnapshot& view, const MapQuery& query,
                                                    const std::optional<Continuation>& token);
 
 /// Whether the answer's voxels are larger than the map's.
 [[nodiscard]] bool is_coarser_than_map(const MapSnapshot& view, double resolution_m);
 
-/// Tells queries apart; the page size does not matter.
+/// Hash of everything that the query asks for but its page size and continuation.
 [[nodiscard]] std::uint64_t fingerprint(const MapQuery& query);
 
 }  // namespace stillmap

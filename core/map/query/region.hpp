@@ -11,7 +11,7 @@
 
 namespace stillmap {
 
-// Parts of the map that can be asked for. Map frame, metres; boundaries belong to their region.
+// Regions of a query. Map frame, metres; boundaries belong to their region.
 
 /// Heights of a region; either end may be infinite.
 struct HeightRange {
@@ -19,7 +19,7 @@ struct HeightRange {
   double max_m = std::numeric_limits<double>::infinity();
 };
 
-/// Along the map's axes; faces may be infinite. As it stands, the whole map.
+/// Axis-aligned; faces may be infinite. By default the whole map.
 struct BoxRegion {
   Eigen::AlignedBox3d box_map{Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity()),
                               Eigen::Vector3d::Constant(std::numeric_limits<double>::infinity())};
@@ -30,8 +30,8 @@ struct SphereRegion {
   double radius_m = 0.0;
 };
 
-/// What stands on a simple polygon. Corners go round the outline, in either direction; the first
-/// may be repeated at the end.
+/// Prism over a simple polygon. Corners go round the outline, in either direction; the first may be
+/// repeated at the end.
 struct PolygonRegion {
   std::vector<Eigen::Vector2d> corners_map;
   HeightRange heights;
@@ -48,19 +48,19 @@ using Region = std::variant<BoxRegion, SphereRegion, PolygonRegion, CorridorRegi
 
 /// Finite coordinates and lengths of a region are at most this: ten times as far as the map goes.
 inline constexpr double max_region_coordinate_m = 1e6;
-/// Most corners of a polygon, most points of a path.
+/// Corners of a polygon, points of a path.
 inline constexpr std::size_t max_region_points = 4096;
 
-/// Why the region cannot be used: field, value, and what would do. Empty when it can.
+/// Every fault with its field, value and the allowed range; empty when the region can be used.
 [[nodiscard]] std::string region_faults(const Region& region);
 
-/// A region made ready for many questions. Map frame [m].
+/// A region prepared for many tests. Map frame [m].
 class RegionShape {
  public:
   /// Throws std::invalid_argument with region_faults(region) when there are any.
   explicit RegionShape(const Region& region);
 
-  /// The region is inside; infinite where the region is.
+  /// Encloses the region; infinite where the region is.
   [[nodiscard]] const Eigen::AlignedBox3d& bounds_map() const { return bounds_map_; }
 
   /// False for NaN. Exact to a micrometre for polygons, to rounding for the others.

@@ -46,13 +46,6 @@ std::shared_ptr<const Tile> TileReader::read(const std::shared_ptr<const Tile>& 
   return read;
 }
 
-MapSnapshot TileReader::with_voxels(const MapSnapshot& view,
-                                    const std::vector<std::size_t>& tiles) {
-  MapSnapshot complete = view;
-  for (const std::size_t i : tiles) complete.tiles[i] = read(view.tiles[i]);
-  return complete;
-}
-
 std::shared_ptr<const Tile> TileReader::find_cached(const TileInfo& wanted) {
   const std::scoped_lock lock(mutex_);
   const auto found =

@@ -29,10 +29,6 @@ class TileReader {
   /// The tile with its voxels. Throws TileChanged, or as the tile store does.
   [[nodiscard]] std::shared_ptr<const Tile> read(const std::shared_ptr<const Tile>& tile);
 
-  /// The view with the voxels of these tiles of it (positions in `tiles`), all at once.
-  [[nodiscard]] MapSnapshot with_voxels(const MapSnapshot& view,
-                                        const std::vector<std::size_t>& tiles);
-
  private:
   [[nodiscard]] std::shared_ptr<TileStore> tile_store();
   [[nodiscard]] std::shared_ptr<const Tile> find_cached(const TileInfo& wanted);
