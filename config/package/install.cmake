@@ -2,7 +2,7 @@
 # themselves. Components become Debian packages (deb.cmake).
 install(TARGETS stillmap-server RUNTIME DESTINATION bin COMPONENT server)
 install(TARGETS stillmap RUNTIME DESTINATION bin COMPONENT tools)
-install(TARGETS stillmap_plugin_pcd stillmap_plugin_geotiff
+install(TARGETS stillmap_plugin_pcd
   LIBRARY DESTINATION ${STILLMAP_PLUGIN_FOLDER} COMPONENT formats)
 
 foreach(folder models robots sensors labels server dds ros)

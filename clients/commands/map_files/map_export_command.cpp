@@ -8,7 +8,7 @@
 #include "clients/commands/query/cloud_output.hpp"
 #include "clients/commands/query/region_arguments.hpp"
 #include "core/map/storage/map_file_copy.hpp"
-#include "core/map/tools/geo_export.hpp"
+#include "core/map/tools/map_export.hpp"
 
 namespace stillmap::cli {
 namespace {
