@@ -14,17 +14,17 @@
 namespace stillmap {
 
 struct LabelPropagationConfig {
-  /// A point takes the label of a point of the last labelled scan that is at most this far away,
-  /// and this share of its range: rings lie far apart on distant ground.
+  /// A point takes the label of a point of the last labelled scan at most this far away, plus this
+  /// share of its range: rings lie far apart on distant ground.
   double max_distance_m = 1.0;
   double max_distance_share = 0.05;
-  /// A movable thing within this distance counts more than what the map knows of the place.
+  /// A movable point of the last labelled scan within this distance overrules the class of the map.
   double movable_distance_m = 0.4;
   /// Factor on the confidence of labels that were not seen in this scan.
   float confidence_factor = 0.5F;
 };
 
-/// A scan with its labels, to be asked what was near a place.
+/// A labelled scan as a range image, for look-ups of the nearest labelled point.
 class LabelledRangeImage {
  public:
   LabelledRangeImage(const Scan& scan, const PointLabels& labels,
@@ -77,16 +77,17 @@ struct PropagatedLabels {
   std::vector<LabelOrigin> origin;
 };
 
-/// Labels for a scan that has none of its own: of the voxel that a point falls into, by the
-/// evidence of all scans before; for points at places that the map does not know (movers, new
-/// ground) and beside movable things, of the nearest point of the last labelled scan, where there
-/// is one. `T_map_lidar` may be a prediction.
+/// Labels for a scan without labels of its own. A point takes the class of its voxel in the map.
+/// Where the map has none (moving objects, new ground), or beside movable points, it takes the
+/// label of the nearest point of the last labelled scan, if there is one. `T_map_lidar` may be a
+/// prediction.
 [[nodiscard]] PropagatedLabels propagate_labels(
     const Scan& scan, const Eigen::Isometry3d& T_map_lidar, const StaticMap& map,
     const std::optional<LabelledRangeImage>& last_labelled,
     const LabelPropagationConfig& config = {});
 
-/// What the map may learn from propagated labels: not what it said itself. Confidence 0 there.
+/// The labels as evidence for the map: confidence 0 for labels that came from the map itself, so
+/// that it does not confirm itself.
 [[nodiscard]] PointLabels new_evidence(const PropagatedLabels& propagated);
 
 }  // namespace stillmap

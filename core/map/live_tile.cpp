@@ -12,12 +12,12 @@
 namespace stillmap {
 namespace {
 
-/// Scans that looked through a voxel are counted so far.
+/// Misses of a voxel are counted up to here.
 constexpr std::uint16_t max_misses = 1000;
 constexpr int layer_bias = 1 << 15;
 
-/// How many scans a voxel's points came from is not known: the most, so that nothing is lost for
-/// it.
+/// The first format does not store hits: the maximum is assumed, so that the voxel is not cleared
+/// too early.
 VoxelHistory history_of_shown(const Voxel& voxel) {
   constexpr std::uint32_t most = std::numeric_limits<std::uint16_t>::max();
   return {.hits = static_cast<std::uint16_t>(std::min(voxel.point_count, most)), .was_shown = true};
@@ -68,7 +68,7 @@ void LiveTile::insert(std::span<const TilePoint> points, std::int64_t stamp_ns) 
 }
 
 void LiveTile::hit(LiveVoxel& voxel, const TilePoint& point, std::int64_t stamp_ns) {
-  // What moves past a place says nothing of what stands there.
+  // A moving object says nothing about the voxel that it passes.
   if (point.motion == Motion::highly_dynamic) return;
   if (voxel.point_count == 0) voxel.first_seen_ns = stamp_ns;
   const bool is_new_scan = voxel.point_count == 0 || voxel.last_seen_ns != stamp_ns;
@@ -98,7 +98,7 @@ bool LiveTile::clear_seen_through(const std::function<bool(const Eigen::Vector3f
     if (voxel.last_seen_ns == stamp_ns || voxel.history.is_restored) continue;
     if (!is_free(mean_map(voxel, grid))) continue;
     if (voxel.history.misses >= max_misses) {
-      // So that a thing that is put where long nothing was can still come into view.
+      // Halved, so that something placed where space was free for long can still become visible.
       voxel.history.misses /= 2;
       voxel.history.hits /= 2;
     }
@@ -293,7 +293,7 @@ TileRecord LiveTile::record(const VisibilityRule& rule, const VoxelGrid& grid) c
   std::ranges::sort(evidence->excluded, {}, &ExcludedVoxel::index);
   if (!published_) return {nullptr, std::move(evidence)};
   assert(shown.size() == published_->voxels.size());
-  // As published, with the counts and times of now.
+  // As published, with the current counts and times.
   auto tile = std::make_shared<Tile>(Tile{published_->info, std::move(shown)});
   tile->info.bounds_map.setEmpty();
   for (const Voxel& voxel : tile->voxels) tile->info.bounds_map.extend(voxel.mean_map);
@@ -303,7 +303,7 @@ TileRecord LiveTile::record(const VisibilityRule& rule, const VoxelGrid& grid) c
 std::size_t LiveTile::memory_bytes() const {
   const auto table_bytes = [](const auto& table) {
     using Entry = typename std::remove_cvref_t<decltype(table)>::value_type;
-    // A bucket has its entry and the distance to its place.
+    // A bucket holds its entry and its probe distance.
     return table.bucket_count() * (sizeof(Entry) + 4);
   };
   return sizeof(*this) + voxels_.capacity() * sizeof(LiveVoxel) +

@@ -27,7 +27,8 @@ struct TilePoint {
   /// From the voxel's lowest corner, in 1/1024 voxel.
   std::array<std::uint16_t, 3> offset{};
   SemanticClass label = SemanticClass::unlabeled;
-  /// Semi-static: says what a known voxel is, and makes none. Highly dynamic: only remembered.
+  /// Semi-static points add evidence to existing voxels and create none; of highly dynamic points
+  /// only the place is recorded.
   Motion motion = Motion::stationary;
   float confidence = 0.0F;
 };
@@ -36,27 +37,27 @@ struct TilePoint {
 struct VisibilityRule {
   /// Points that it was hit by.
   std::uint32_t min_points = 2;
-  /// It is not, once so many scans looked through it, and so many for each that hit it.
+  /// It is hidden once this many scans saw through it, and this many for each scan that hit it.
   std::uint32_t misses_to_clear = 4;
   std::uint32_t misses_per_hit = 2;
 };
 
-/// The mutable side of a tile: everything seen so far, also what is not yet in any view.
+/// The mutable side of a tile: all evidence so far, also of voxels that no snapshot shows yet.
 class LiveTile {
  public:
   explicit LiveTile(TileId id) : id_(id) {}
-  /// Goes on from what is known of a tile.
+  /// Restores a tile from its record.
   LiveTile(TileId id, const TileRecord& record, const VoxelGrid& grid);
 
   void insert(std::span<const TilePoint> points, std::int64_t stamp_ns);
 
-  /// Counts the scan against each voxel whose place it looked through, to something behind.
-  /// `is_free` tells that of a place (map frame). True when a voxel will be hidden for it.
+  /// Counts a miss for each voxel that the scan saw through; `is_free` tells whether a ray passed a
+  /// position (map frame). True when this hides a voxel.
   [[nodiscard]] bool clear_seen_through(const std::function<bool(const Eigen::Vector3f&)>& is_free,
                                         std::int64_t stamp_ns, const VisibilityRule& rule,
                                         const VoxelGrid& grid);
 
-  /// Of the voxel; without votes when there is none.
+  /// Of the voxel; no votes when there is no such voxel.
   [[nodiscard]] ClassEvidence evidence(std::uint32_t voxel_key) const;
 
   /// Publishes the voxels that the rule shows and whose class is not a movable one. False, and the
@@ -72,20 +73,20 @@ class LiveTile {
   std::size_t restore(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
                       const VisibilityRule& rule, const VoxelGrid& grid);
 
-  /// All of it, to be gone on from later. Requires that nothing happened since `publish`.
+  /// The complete state. Requires that the tile did not change since `publish`.
   [[nodiscard]] TileRecord record(const VisibilityRule& rule, const VoxelGrid& grid) const;
 
-  /// What it takes in memory, its published tile included.
+  /// Memory in use, the published tile included.
   [[nodiscard]] std::size_t memory_bytes() const;
 
   [[nodiscard]] TileId id() const { return id_; }
-  /// What views share; null while there is nothing to show.
+  /// Shared by snapshots; null while no voxel is shown.
   [[nodiscard]] const std::shared_ptr<const Tile>& published() const { return published_; }
 
  private:
   /// Steps of a point's offset in a voxel.
   static constexpr double offset_steps = 1024.0;
-  /// The mean stands still after so many points: their sum would outgrow 32 bits.
+  /// The mean is not updated beyond this count: the sum would overflow 32 bits.
   static constexpr std::uint32_t max_mean_points = 1U << 22;
 
   /// Sums are whole numbers, so that the mean does not depend on the order of points.
@@ -98,7 +99,7 @@ class LiveTile {
     std::int64_t last_seen_ns = 0;
     VoxelHistory history;
   };
-  /// A place that only movable things hit.
+  /// A voxel that only movable objects hit.
   struct Excluded {
     SemanticClass label = SemanticClass::unlabeled;
     bool was_moving = false;

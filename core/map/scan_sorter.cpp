@@ -63,7 +63,7 @@ void ScanSorter::index_point(std::size_t i, const LabelledScan& scan,
   const auto [tile, voxel, offset] = grid_.index(p_map);
   const std::int32_t row = tile.x - window.first.x;
   const std::int32_t column = tile.y - window.first.y;
-  // Only a transform that is no rigid one gets a point out of the window.
+  // Only a transform that is not rigid moves a point out of the window.
   if (row < 0 || row >= window.side || column < 0 || column >= window.side) return;
   window_indices_[i] = static_cast<std::uint32_t>(row * window.side + column);
   placed_[i] = {voxel_key(voxel),

@@ -51,7 +51,7 @@ VoxelGrid usable_grid(const StaticMapConfig& config) {
   return {config.voxel_size_m, config.tile_size_m};
 }
 
-/// A tile without its voxels weighs this in views and indices.
+/// Memory of a non-resident tile in snapshots and indices.
 constexpr std::size_t non_resident_tile_bytes = sizeof(Tile) + 64;
 
 bool is_same_size(double a_m, double b_m) { return std::abs(a_m - b_m) <= 1e-9; }
@@ -118,11 +118,9 @@ struct StaticMap::State {
   [[nodiscard]] VisibilityRule rule() const {
     return {config.min_points, config.misses_to_clear, config.misses_per_hit};
   }
-  /// A new tile, one in memory, or one from the tile store; null when the tile store cannot read
-  /// it.
+  /// A new tile, a resident one, or one from the tile store; null when it cannot be read.
   [[nodiscard]] LiveTile* tile(TileId id);
-  /// Has the tile, which is non-resident, in memory again; false when the tile store cannot read
-  /// it.
+  /// Reads a non-resident tile from the tile store; false when it cannot be read.
   bool reload(TileId id);
   /// The tile changed in this step.
   void touch(LiveTile& live);
@@ -138,18 +136,18 @@ struct StaticMap::State {
   VoxelGrid grid;
   ScanSorter sorter;
   tsl::robin_map<TileId, Resident, TileIdHash> tiles;
-  /// In the tile store: what views show of them, null where that is nothing.
+  /// In the tile store: the tile without its voxels, null where it shows none.
   std::map<TileId, std::shared_ptr<const Tile>> non_resident;
   std::shared_ptr<TileStore> tile_store;
   /// Why tiles that are non-resident could not be read.
   std::map<TileId, std::string> unreadable;
   /// Tiles with points since the last view; a tile may be named more than once.
   std::vector<LiveTile*> touched;
-  /// Tiles left memory or came back since the last view.
+  /// Tiles were evicted or reloaded since the last view.
   bool residency_changed = false;
   /// Scans so far.
   std::uint64_t inserted = 0;
-  /// Counts everything that changes tiles, and how far of it is in the tile store.
+  /// Counts the changes of tiles; up to `stored_step` they are in the tile store.
   std::uint64_t step = 1;
   std::uint64_t stored_step = 0;
   /// The last view.
@@ -309,7 +307,7 @@ bool StaticMap::State::reload(TileId id) {
     Resident resident{std::make_unique<LiveTile>(id, tile_store->load(id), grid), stored_step};
     tiles.emplace(id, std::move(resident));
   } catch (const std::runtime_error& fault) {
-    // What is seen there from now on is not mapped: it would take the place of what is stored.
+    // The tile is not mapped from now on: a new tile would replace the stored one.
     unreadable.emplace(id, fault.what());
     return false;
   }
@@ -335,8 +333,8 @@ MapCheckpoint StaticMap::checkpoint(bool everything) {
       changed.push_back(resident.live.get());
     }
   }
-  // What is stored is what is shown: also where only other rules, or the rounding of a mean on its
-  // way through the file, changed it.
+  // Published first, so that the record agrees with the view even where only another rule, or a
+  // mean rounded in the file, changed the tile.
   state_->touched.insert(state_->touched.end(), changed.begin(), changed.end());
   MapCheckpoint checkpoint{view(), state_->step++, {}};
   std::vector<TileRecord> records(changed.size());
@@ -359,9 +357,9 @@ MemoryUse StaticMap::memory_use() const {
 
 std::size_t StaticMap::evict(const Eigen::Vector3d& position_map, std::size_t limit_bytes) {
   std::size_t bytes = state_->memory_bytes();
-  // Before it is reached: the map goes on growing until the next checkpoint.
+  // Begins below the limit: the map grows on until the next checkpoint.
   if (state_->tile_store == nullptr || bytes <= limit_bytes - limit_bytes / 8) return 0;
-  // Farther than scans reach, and than a turn would bring back at once.
+  // Beyond the reach of scans, with a margin against reloading at once after a turn.
   const double near_m = state_->config.max_range_m + 2.0 * state_->config.tile_size_m;
   std::vector<std::pair<double, TileId>> candidates;
   for (const auto& [id, resident] : state_->tiles) {
@@ -371,7 +369,7 @@ std::size_t StaticMap::evict(const Eigen::Vector3d& position_map, std::size_t li
     }
   }
   std::ranges::sort(candidates, std::greater<>());
-  // Some more than needed, so that not every scan has to evict a tile.
+  // More than needed, so that not every scan has to evict a tile.
   const std::size_t wanted_bytes = limit_bytes - limit_bytes / 4;
   std::size_t evicted_tiles = 0;
   for (const auto& [distance_m, id] : candidates) {

@@ -21,15 +21,16 @@ struct StaticMapConfig {
   double max_range_m = 60.0;
   /// A voxel enters the view once it was hit this often.
   std::uint32_t min_points = 2;
-  /// Every so many scans one is asked what it looked through: all of them would tell the same.
+  /// Visibility clearing runs on every n-th scan: consecutive scans see through the same voxels.
   std::uint32_t clearing_interval = 3;
-  /// A voxel leaves the view once so many of those looked through it, and so many for each scan
+  /// A voxel is hidden once this many of those scans saw through it, and this many for each scan
   /// that hit it.
   std::uint32_t misses_to_clear = 4;
   std::uint32_t misses_per_hit = 2;
-  /// Within this range of the lidar; 0: voxels stay whatever looks through them.
+  /// Range of clearing round the lidar; 0 turns clearing off.
   double clearing_range_m = 25.0;
-  /// A ray passed through where it went on for so much, and for this share of the range.
+  /// A ray passes through a voxel when it ends at least this far behind it, plus this share of the
+  /// range.
   double clearing_margin_m = 0.5;
   double clearing_margin_share = 0.02;
 
@@ -37,16 +38,15 @@ struct StaticMapConfig {
   [[nodiscard]] std::string faults() const;
 };
 
-/// What tiles of a map know beside what they show. Null: it is in the tile store, as all of the
-/// tile is.
+/// Evidence of tiles beyond the voxels that they show. Null: the whole tile is in the tile store.
 using TileEvidenceMap = std::map<TileId, std::shared_ptr<const TileEvidence>>;
 
 /// A state of the map to be stored.
 struct MapCheckpoint {
   std::shared_ptr<const MapSnapshot> view;
-  /// How far it goes; to be told to `checkpoint_stored`.
+  /// To be passed to `checkpoint_stored` once it is written.
   std::uint64_t step = 0;
-  /// All of the tiles that changed since what is stored.
+  /// Complete records of the tiles that changed since the last stored checkpoint.
   std::map<TileId, TileRecord> records;
 };
 
@@ -67,27 +67,27 @@ class StaticMap {
   StaticMap(StaticMap&&) noexcept;
   StaticMap& operator=(StaticMap&&) noexcept;
 
-  /// Adds the stationary points of the scan. Semi-static points add evidence to voxels that exist
-  /// and make none; of highly dynamic ones only the place is remembered. Points that are not
+  /// Adds the stationary points of the scan. Semi-static points add evidence to existing voxels and
+  /// create none; of highly dynamic points only the place is recorded. Points that are not
   /// finite, beyond `max_range_m`, or farther than 100 km from the map's origin are left out.
   /// `scan.motion` is as long as the scan. The result does not depend on the number of threads.
   void insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar);
 
-  /// Whether the scan inserted last is one to be asked what it looked through.
+  /// Whether visibility clearing is due for the scan inserted last.
   [[nodiscard]] bool clearing_due() const;
-  /// Counts that scan against the voxels that it looked through: what stood there before is not
-  /// part of the still world, whatever its class.
+  /// Visibility clearing: counts a miss for each voxel that this scan saw through. What stood there
+  /// is not part of the static world, whatever its class.
   void clear_seen_through(const RangeImageView& view, std::int64_t stamp_ns);
 
-  /// What is kept out of the planning view in this part of the map (map frame [m]), and why; in no
-  /// order. Throws as the tile store does.
+  /// Voxels in the box (map frame [m]) that are removed from the planning view, with the reason; in
+  /// no order. Throws as the tile store does.
   [[nodiscard]] std::vector<RemovedVoxel> removed(const Eigen::AlignedBox3d& box_map) const;
   /// Shows again what was removed for this reason in this part of the map; it stays until a reset.
   /// Returns how many voxels.
   std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map);
 
-  /// What a place (map frame [m]) was seen as so far, shown in a view or not; without votes where
-  /// nothing was seen. Thread-safe beside itself.
+  /// Evidence of the voxel at a position (map frame [m]), shown in a view or not; no votes where
+  /// nothing was seen. May be called from several threads, but not beside a change of the map.
   [[nodiscard]] ClassEvidence evidence_at(const Eigen::Vector3d& position_map) const;
 
   /// The planning view as it is now: voxels hit `min_points` times whose class is not a movable
@@ -95,26 +95,27 @@ class StaticMap {
   /// with it, with their counts and times of then; where nothing changed, so is the whole view.
   [[nodiscard]] std::shared_ptr<const MapSnapshot> view();
 
-  /// Takes over a stored map; later scans extend it. Tiles without their voxels are taken to be on
+  /// Takes over a stored map; later scans extend it. Tiles without their voxels are taken to be in
   /// the tile store. Give it a new `map_id`: the map may have been at a later version than the one
   /// stored. Throws std::invalid_argument when its voxel or tile size is not the configured one.
   void resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidence = {});
 
-  /// Where tiles may go that are far away. What is there must be what checkpoints brought there.
+  /// Backing store of evicted tiles. It must hold what the checkpoints of this map wrote.
   void use_tile_store(std::shared_ptr<TileStore> tile_store);
-  /// The map as it is now, with all of every tile that changed since what was stored last; with
-  /// `everything`, of every tile in memory.
+  /// The map as it is now, with the records of all tiles that changed since the last stored
+  /// checkpoint; with `everything`, of all resident tiles.
   [[nodiscard]] MapCheckpoint checkpoint(bool everything = false);
-  /// This checkpoint, and all before, are in the tile store.
+  /// To be called when this checkpoint, and so all before it, are in the tile store.
   void checkpoint_stored(std::uint64_t step);
-  /// Lets tiles that are stored and out of the lidar's reach go, farthest first, until the map
-  /// takes no more than this. Returns how many. They come back by themselves.
+  /// Evicts tiles that are stored and out of the reach of the lidar, farthest first, until the map
+  /// takes no more than this. Returns how many. They are reloaded when they are needed.
   std::size_t evict(const Eigen::Vector3d& position_map, std::size_t limit_bytes);
-  /// Has tiles from the tile store in memory, nearest first, as many as fit.
+  /// Reloads tiles from the tile store, nearest first, as many as fit.
   void reload_near(const Eigen::Vector3d& position_map, std::size_t limit_bytes);
-  /// What the tiles take, published ones included.
+  /// Memory of the tiles, published ones included.
   [[nodiscard]] MemoryUse memory_use() const;
-  /// Tiles that the tile store could not give back, with the reason: they stay as they are stored.
+  /// Tiles that could not be read from the tile store, with the reason; they stay as they are
+  /// stored.
   [[nodiscard]] std::vector<std::string> unreadable_tiles() const;
 
   /// Empties the map; `map_id` tells clients that it is another one now.

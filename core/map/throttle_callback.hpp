@@ -4,8 +4,8 @@
 
 namespace stillmap {
 
-/// Called again and again during long work, from every thread that works, where it may be held up,
-/// for a moment or until there is time for it. Empty: nobody holds it up.
+/// Called repeatedly during long work, by each thread that works. It may block to leave the
+/// processor to others. Empty: no throttling.
 using ThrottleCallback = std::function<void()>;
 
 }  // namespace stillmap

@@ -16,7 +16,8 @@ float total_weight(const ClassEvidence& evidence) {
   return total;
 }
 
-/// The strongest vote; of equals that of the lower class, so that history does not decide.
+/// The strongest vote; of equals that of the lower class, so that the order of votes does not
+/// matter.
 const ClassEvidence::Vote& strongest(const ClassEvidence& evidence) {
   return *std::ranges::max_element(evidence.votes, [](const auto& a, const auto& b) {
     return a.weight != b.weight ? a.weight < b.weight : a.label > b.label;
@@ -42,8 +43,8 @@ void ClassEvidence::add(SemanticClass label, float weight) {
   if (label == SemanticClass::unlabeled || !(weight > 0.0F)) return;
   const auto known = std::ranges::find(votes, label, &Vote::label);
   Vote& vote = known != votes.end() ? *known : *std::ranges::min_element(votes, {}, &Vote::weight);
-  // Space-saving: a newcomer inherits the weight of the one it drives out, so that a class that
-  // keeps coming is never shut out by classes that came first.
+  // Space-saving algorithm: a new class inherits the weight of the one that it replaces, so that a
+  // recurring class is not shut out by earlier ones.
   vote.label = label;
   vote.weight += std::min(weight, 1.0F);
 

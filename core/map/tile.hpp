@@ -30,12 +30,12 @@ struct VoxelIndex {
   friend auto operator<=>(const VoxelIndex&, const VoxelIndex&) = default;
 };
 
-/// Votes for the classes that a voxel was seen as. The strongest few are kept, so that a class can
-/// change its mind at a bounded size.
+/// Votes for the classes of a voxel. Only the strongest few are kept: the size is bounded, and the
+/// winner can still change.
 class ClassEvidence {
  public:
-  /// Adds `weight` (a confidence, 0..1) for `label`; the weakest candidate gives way. `unlabeled`
-  /// and weights that are not positive say nothing and change nothing.
+  /// Adds `weight` (a confidence, 0..1) for `label`, which replaces the weakest candidate when it
+  /// is none yet. `unlabeled` and weights that are not positive are ignored.
   void add(SemanticClass label, float weight);
   /// The class with most evidence, `unlabeled` without any.
   [[nodiscard]] SemanticClass winner() const;
@@ -48,9 +48,9 @@ class ClassEvidence {
     friend bool operator==(const Vote&, const Vote&) = default;
   };
   static constexpr std::size_t candidates = 3;
-  /// Older evidence fades once all of it weighs this much: however long a voxel was seen as one
-  /// class, max_total * ln 2 = 139 confident votes in a row for another one turn it (some ten
-  /// scans of a lidar nearby).
+  /// The votes are scaled down to this total: however long a voxel was seen as one class, max_total
+  /// * ln 2 = 139 confident votes in a row for another one turn it (some ten scans of a lidar
+  /// nearby).
   static constexpr float max_total = 200.0F;
   std::array<Vote, candidates> votes{};
   friend bool operator==(const ClassEvidence&, const ClassEvidence&) = default;
@@ -66,7 +66,7 @@ struct Voxel {
   std::int64_t last_seen_ns = 0;
 };
 
-/// What a client needs to know whether its copy of a tile is current.
+/// Identifies the state of a tile: tells a client whether its copy is current.
 struct TileInfo {
   TileId id;
   /// Version of the map in which the tile last changed: what changed since version v is every
@@ -100,13 +100,13 @@ struct MapSnapshot {
 
 /// Why a place that was hit is not in the planning view.
 enum class RemovalReason : std::uint8_t {
-  /// Only things that were seen moving were there.
+  /// Only objects that were seen moving were there.
   moving,
-  /// Things that stood, but can move, were there.
+  /// Objects that stood still, but can move, were there.
   semi_static,
   /// It was shown, but rays keep passing through it.
   seen_through,
-  /// It was shown, but later scans took it for something that can move.
+  /// It was shown, but later scans classified it as movable.
   relabelled,
 };
 inline constexpr int removal_reason_count = 4;
@@ -127,7 +127,7 @@ struct RemovedVoxel {
   return tile.voxels.size() != tile.info.voxel_count;
 }
 
-/// The tile without its voxels: what views have in place of one that is non-resident.
+/// The tile without its voxels: what snapshots hold in place of a non-resident tile.
 [[nodiscard]] inline std::shared_ptr<const Tile> without_voxels(const Tile& tile) {
   return std::make_shared<const Tile>(Tile{tile.info, {}});
 }

@@ -9,9 +9,9 @@
 
 namespace stillmap {
 
-/// How a voxel came to be shown or hidden.
+/// Counters that decide whether a voxel is shown.
 struct VoxelHistory {
-  /// Scans that hit it, and scans that looked through it.
+  /// Scans that hit it, and scans that saw through it.
   std::uint16_t hits = 0;
   std::uint16_t misses = 0;
   bool was_shown = false;
@@ -23,11 +23,11 @@ struct VoxelHistory {
 struct HiddenVoxel {
   Voxel voxel;
   VoxelHistory history;
-  /// Nothing: it was hit too rarely to be shown.
+  /// Empty: it was hit too rarely to be shown.
   std::optional<RemovalReason> reason;
 };
 
-/// A place that only movable things hit.
+/// A voxel that only movable objects hit.
 struct ExcludedVoxel {
   VoxelIndex index;
   SemanticClass label = SemanticClass::unlabeled;
@@ -35,8 +35,8 @@ struct ExcludedVoxel {
   std::int64_t last_seen_ns = 0;
 };
 
-/// What is known of a tile beside the voxels that it shows: with both, mapping goes on as if the
-/// tile had never left memory.
+/// State of a tile beyond the voxels that it shows: with both, mapping resumes as if the tile had
+/// stayed in memory.
 struct TileEvidence {
   TileId id;
   /// Of the tile's voxels, in their order.
@@ -47,24 +47,24 @@ struct TileEvidence {
   std::vector<ExcludedVoxel> excluded;
 };
 
-/// All of a tile.
+/// The complete state of a tile.
 struct TileRecord {
   /// Null when nothing of it is shown.
   std::shared_ptr<const Tile> tile;
-  /// Null when no more is known than what is shown.
+  /// Null when no more is known than the voxels shown.
   std::shared_ptr<const TileEvidence> evidence;
 };
 
-/// The places that the evidence keeps out of the planning view, with their reasons.
+/// The voxels that are removed from the planning view, with their reasons.
 [[nodiscard]] std::vector<RemovedVoxel> removed_voxels(const TileEvidence& evidence,
                                                        double voxel_size_m, double tile_size_m);
 
-/// Where tiles are that left memory. Thread-safe.
+/// Backing store of tiles that are not in memory. Thread-safe.
 class TileStore {
  public:
   virtual ~TileStore() = default;
-  /// All that was stored of the tile last; nothing of a tile that was never stored. Throws
-  /// std::runtime_error that says why it cannot be read.
+  /// The tile as it was stored last; an empty record when it never was. Throws std::runtime_error
+  /// with the reason when it cannot be read.
   [[nodiscard]] virtual TileRecord load(TileId id) = 0;
 };
 

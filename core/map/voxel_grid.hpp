@@ -13,7 +13,7 @@ class VoxelGrid {
   /// Positions farther from the map's origin than this, in any axis, belong to no voxel: beyond
   /// it a float resolves a voxel's mean no better than 8 mm.
   static constexpr double max_coordinate_m = 100'000.0;
-  /// Most voxels along a tile's side: column, row and layer together fit 32 bits.
+  /// Voxels along the side of a tile: column, row and layer together fit 32 bits.
   static constexpr int max_columns = 256;
 
   /// `tile_size_m` is a whole number of voxels, at most `max_columns`.

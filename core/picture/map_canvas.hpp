@@ -35,7 +35,7 @@ struct PictureFrame {
 /// The background of all map pictures, BGR.
 [[nodiscard]] cv::Scalar background();
 
-/// What is drawn over the map and below it. Colours are BGR.
+/// Colours are BGR.
 void draw_trajectory(cv::Mat& picture, const PictureFrame& frame, const Trajectory& trajectory,
                      const cv::Scalar& colour);
 

@@ -42,7 +42,7 @@ struct MapQuery {
 struct QueryVoxel {
   Eigen::Vector3f position_map;
   SemanticClass label = SemanticClass::unlabeled;
-  /// Share of the evidence that speaks for the label, 0..1.
+  /// Share of the evidence for the label, 0..1.
   float confidence = 0.0F;
   std::uint32_t point_count = 0;
 };
@@ -51,15 +51,15 @@ enum class TileChangeKind : std::uint8_t {
   /// Was not there at `since`; without `since`, every tile.
   appeared = 0,
   changed = 1,
-  /// Has nothing to show any more, in any region.
+  /// Has no voxels any more, in any region.
   removed = 2,
 };
 
-/// A tile of an answer. Who holds an older answer forgets the tile's voxels and takes these.
+/// A tile of an answer. Its voxels replace all that an older answer had in the tile.
 struct TileChange {
   TileId id;
   TileChangeKind kind = TileChangeKind::appeared;
-  /// Version of the map in which it last changed, or went.
+  /// Version of the map in which it last changed, or was removed.
   std::uint64_t revision = 0;
   /// Voxels of the answer that are the tile's. An answer's voxels are in the order of its tiles.
   std::uint32_t voxel_count = 0;
@@ -72,13 +72,13 @@ enum class QueryStatus : std::uint8_t {
   stale_continuation = 2,
   /// The server could not answer.
   failed = 3,
-  /// `since` is of another map, or older than what the server remembers: ask for everything.
+  /// `since` is of another map, or older than the history: query again without it.
   changes_unknown = 4,
 };
 
 struct MapQueryResult {
   QueryStatus status = QueryStatus::ok;
-  /// Why it is not ok: names the field, its value and what would do.
+  /// When the status is not ok: the field, its value and the allowed range.
   std::string reason;
   /// Version of the map that every page of this query shows.
   std::uint64_t map_version = 0;
@@ -86,10 +86,10 @@ struct MapQueryResult {
   std::vector<QueryVoxel> voxels;
   /// Voxels of the whole answer, all pages.
   std::uint64_t total_voxels = 0;
-  /// Tiles of the whole answer, on its first page: those that stand there first, then those that
-  /// were removed. Empty at a coarser resolution, whose cells are not the tiles'.
+  /// Tiles of the whole answer, on its first page: present tiles first, then removed ones. Empty at
+  /// a coarser resolution, whose cells belong to no tile.
   std::vector<TileChange> tiles;
-  /// Hand back for the next page; empty after the last one.
+  /// To be passed back for the next page; empty after the last one.
   std::string continuation;
 };
 
@@ -99,15 +99,14 @@ inline constexpr std::size_t query_voxel_bytes = 3 * sizeof(float) + 1 + sizeof(
 /// Answers `query` from one view. A voxel is in the region when its position is. A continuation
 /// made from another map or version is stale; a damaged one, or one of another query, is invalid.
 /// `history` ends with this view; only the first page of a query with `since` needs it, and is
-/// refused without. Tiles that are non-resident come through `reader`, one after the other; throws
-/// as that does.
+/// refused without. Non-resident tiles are read through `reader`, one at a time; throws as it does.
 [[nodiscard]] MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query,
                                        const TileHistory* history, TileReader& reader);
-/// Of a view that has all its voxels.
+/// For a view without non-resident tiles.
 [[nodiscard]] MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query,
                                        const TileHistory* history = nullptr);
 
-/// The map version that a continuation wants, to find the view it was made from.
+/// The map version that a continuation was made from.
 [[nodiscard]] std::optional<std::uint64_t> continuation_version(const std::string& continuation);
 
 }  // namespace stillmap

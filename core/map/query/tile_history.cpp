@@ -12,7 +12,7 @@ const Event* find(const std::vector<Event>& sorted, TileId id) {
   return found != sorted.end() && found->id == id ? &*found : nullptr;
 }
 
-/// Beyond `max_events`, the oldest are forgotten.
+/// Drops the oldest beyond `max_events`.
 void drop_oldest(TileHistory& history, std::size_t max_events) {
   if (history.removed.size() <= max_events) return;
   const auto kept = history.removed.end() - static_cast<std::ptrdiff_t>(max_events);

@@ -10,20 +10,20 @@
 
 namespace stillmap {
 
-/// The tile store has another state of the tile than the view that names it: ask of a newer view.
+/// The tile store has another state of the tile than the snapshot: query a newer snapshot.
 class TileChanged : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
 
-/// Reads tiles of views, wherever their voxels are, and keeps those that it brought last, so that
-/// a region that is asked for again and again is read once. Thread-safe.
+/// Reads tiles of snapshots, resident or not, and caches the last ones read from the tile store, so
+/// that repeated queries of a region read it once. Thread-safe.
 class TileReader {
  public:
-  /// Without a tile store, every tile must have its voxels. Keeps about `cache_bytes`.
+  /// Without a tile store, every tile must have its voxels. Caches about `cache_bytes`.
   explicit TileReader(std::shared_ptr<TileStore> tile_store = nullptr, std::size_t cache_bytes = 0);
 
-  /// From now on they come from there.
+  /// Replaces the tile store and empties the cache.
   void use_tile_store(std::shared_ptr<TileStore> tile_store);
 
   /// The tile with its voxels. Throws TileChanged, or as the tile store does.

@@ -87,7 +87,7 @@ void check_header(const fs::path& file) {
   }
 }
 
-/// Makes the file under another name first, so that no half-made file ever bears this one.
+/// Made under another name and then renamed, so that an incomplete file never has this name.
 void create(const fs::path& file) {
   const fs::path fresh = beside(file, ".new");
   for (const fs::path& leftover :

@@ -11,11 +11,11 @@ namespace stillmap {
 /// before anything could write to it.
 [[nodiscard]] SQLite::Database open_map_database(const std::filesystem::path& file);
 
-/// Whether the tables are those of the first schema, which knows of tiles only what they show.
+/// Whether the tables are those of the first schema, which stores only the voxels that tiles show.
 [[nodiscard]] bool has_first_schema(SQLite::Database& database);
 
-/// Makes them those of this one, in one transaction. Throws SQLite::Exception, or TileCodecError
-/// for a tile that cannot be read.
+/// Upgrades them to the current schema, in one transaction. Throws SQLite::Exception, or
+/// TileCodecError for a tile that cannot be read.
 void upgrade_schema(SQLite::Database& database);
 
 }  // namespace stillmap

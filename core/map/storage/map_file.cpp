@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Poses that both paths begin with.
+/// Number of equal poses at the beginning of both trajectories.
 std::size_t common_poses(const Trajectory& a, const Trajectory& b) {
   const auto is_same = [](const StampedPose& p, const StampedPose& q) {
     return p.stamp_ns == q.stamp_ns && p.T_map_lidar.matrix() == q.T_map_lidar.matrix();
@@ -35,7 +35,7 @@ MapFileError unreadable(const fs::path& file, const std::runtime_error& error) {
                     "); restore a copy or name another file"};
 }
 
-/// A folder that is gone with its last user.
+/// A temporary folder, removed with its last user.
 class ScratchMapFolder {
  public:
   ScratchMapFolder() {
@@ -58,7 +58,7 @@ class ScratchMapFolder {
   fs::path path_;
 };
 
-/// Reads through a connection of its own: nobody waits for a save.
+/// Reads through a connection of its own, so that readers do not wait for a save.
 class SqliteTileStore : public TileStore {
  public:
   SqliteTileStore(const fs::path& file, std::shared_ptr<const ScratchMapFolder> folder)

@@ -14,15 +14,15 @@
 namespace stillmap {
 
 /// A map file that cannot be opened, read or written. The text names the file, the fault and the
-/// way out.
+/// remedy.
 class MapFileError : public std::runtime_error {
  public:
   MapFileError(const std::filesystem::path& file, const std::string& fault)
       : std::runtime_error(file.string() + ": " + fault) {}
 };
 
-/// Key of the metadata that says that the map was saved when its run ended: versions of it that a
-/// client may have seen are all stored.
+/// Metadata key of a map that was saved at the end of its run: all versions that a client may have
+/// seen are stored.
 inline constexpr const char* map_ended_key = "ended";
 
 /// What a map file holds.
@@ -39,8 +39,7 @@ struct SavedMap {
 /// A checkpoint as it is stored.
 [[nodiscard]] SavedMap to_saved_map(const MapCheckpoint& checkpoint);
 
-/// Where tiles are kept between runs. The narrow waist behind which SQLite may one day be another
-/// database.
+/// Storage of maps between runs. Hides the database.
 class MapStore {
  public:
   virtual ~MapStore() = default;
@@ -51,14 +50,13 @@ class MapStore {
   virtual void save(const SavedMap& map) = 0;
   /// The last saved state; an empty map when nothing was saved yet.
   [[nodiscard]] virtual SavedMap load() = 0;
-  /// The same, with all tiles non-resident: of a size that does not depend on what is in them.
+  /// The same with all tiles non-resident: its size does not depend on their voxels.
   [[nodiscard]] virtual SavedMap load_non_resident() = 0;
-  /// Where those tiles are; may be used beside the store, and after it.
+  /// Reads single tiles; may be used beside the store, and after it.
   [[nodiscard]] virtual std::shared_ptr<TileStore> tile_store() = 0;
-  /// Mapping goes on from what is stored: under this id from now on, and not ended.
+  /// Mapping resumes from the stored map: sets its id and removes the mark of an ended run.
   virtual void begin_run(std::uint64_t map_id) = 0;
-  /// Writes the last saved state to another file, in the place of what is there. Throws
-  /// MapFileError.
+  /// Writes the last saved state to another file, replacing the map in it. Throws MapFileError.
   virtual void copy_to(const std::filesystem::path& file) = 0;
 };
 
@@ -67,7 +65,7 @@ class MapStore {
 /// damaged, or in a folder that cannot be written. Such a file is left untouched.
 [[nodiscard]] std::unique_ptr<MapStore> open_map_file(const std::filesystem::path& file);
 
-/// A store that is gone with the program, for a map that is not to be kept but does not fit into
+/// A temporary store, removed with its last user, for a map that is not kept but does not fit into
 /// memory. Throws MapFileError when the folder for temporary files cannot be written.
 [[nodiscard]] std::unique_ptr<MapStore> open_scratch_map();
 

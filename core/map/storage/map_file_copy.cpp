@@ -42,9 +42,9 @@ fs::path fresh_folder(const fs::path& file) {
   return name;
 }
 
-/// A reader's hold on a file that a server may have open: as long as it lasts, nothing in the log
-/// is given up, so that file and log agree when they are copied one after the other. Nothing when
-/// SQLite will not have it: opening the copy will say why.
+/// A read transaction on a file that a server may have open: while it lasts, the log is not
+/// checkpointed, so that file and log agree when they are copied one after the other. Null when
+/// SQLite refuses: opening the copy reports the reason.
 std::unique_ptr<SQLite::Database> hold(const fs::path& file) {
   if (!fs::exists(beside(file, "-wal")) || !fs::exists(beside(file, "-shm"))) return nullptr;
   try {

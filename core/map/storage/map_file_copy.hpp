@@ -6,12 +6,12 @@
 
 namespace stillmap {
 
-/// A map file copied into the temporary folder, for what only reads: whatever SQLite does when it
-/// opens a file (it brings in the log that a crash left, for one), the file itself stays as it is,
-/// byte for byte. A server may be mapping in it: the copy is its last save.
+/// A map file copied into the temporary folder, for reading only: whatever SQLite does when it
+/// opens a file (such as replaying the log that a crash left), the original stays as it is, byte
+/// for byte. A server may have it open: the copy is its last save.
 class MapFileCopy {
  public:
-  /// Throws MapFileError: missing, empty, no file, not to be read, or no room for the copy.
+  /// Throws MapFileError: missing, empty, not a file, not readable, or no room for the copy.
   explicit MapFileCopy(std::filesystem::path file);
   ~MapFileCopy();
   MapFileCopy(const MapFileCopy&) = delete;

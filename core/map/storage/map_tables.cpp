@@ -138,7 +138,7 @@ std::shared_ptr<const Tile> checked_tile(const TileRow& row, const VoxelGrid& gr
 std::shared_ptr<const TileEvidence> checked_evidence(TileId id, const Blob& encoded) {
   try {
     TileEvidence evidence = decode_evidence(encoded);
-    if (evidence.id != id) throw TileCodecError("has the memory of another tile");
+    if (evidence.id != id) throw TileCodecError("has the evidence of another tile");
     return std::make_shared<const TileEvidence>(std::move(evidence));
   } catch (const TileCodecError& error) {
     throw TileCodecError(tile_name(id) + error.what());
@@ -148,7 +148,7 @@ std::shared_ptr<const TileEvidence> checked_evidence(TileId id, const Blob& enco
 void check_consistency(const Tile* tile, const TileEvidence* evidence, TileId id) {
   const std::size_t shown = tile == nullptr ? 0 : tile->voxels.size();
   if (evidence != nullptr && evidence->shown.size() != shown) {
-    throw TileCodecError(tile_name(id) + "has a memory of " +
+    throw TileCodecError(tile_name(id) + "has evidence of " +
                          std::to_string(evidence->shown.size()) + " shown voxels, but shows " +
                          std::to_string(shown));
   }

@@ -10,12 +10,12 @@ namespace stillmap {
 // that is not what it should be.
 
 /// Writes the tiles that differ from their rows or have evidence given, without their evidence, and
-/// takes rows of others away. Tiles that are non-resident must be there as they are.
+/// deletes the rows of other tiles. Non-resident tiles must be stored in this state.
 void write_tiles(SQLite::Database& database, const SavedMap& map);
-/// Those that are given; with `forget_others`, takes away all others.
+/// Writes the evidence given; with `forget_others`, deletes all other.
 void write_tile_evidence(SQLite::Database& database, const TileEvidenceMap& tile_evidence,
                          bool forget_others);
-/// From this pose on; later rows are replaced.
+/// Replaces the rows from this pose on.
 void write_trajectory(SQLite::Database& database, const Trajectory& trajectory, std::size_t from);
 void write_metadata(SQLite::Database& database, const SavedMap& map);
 
@@ -27,12 +27,12 @@ void write_metadata(SQLite::Database& database, const SavedMap& map);
 /// Without their voxels.
 [[nodiscard]] std::vector<std::shared_ptr<const Tile>> read_tile_infos(SQLite::Database& database);
 [[nodiscard]] TileEvidenceMap read_tile_evidence(SQLite::Database& database);
-/// Their tiles, with null for each.
+/// The tiles that have evidence, with null for each.
 [[nodiscard]] TileEvidenceMap read_tile_evidence_ids(SQLite::Database& database);
 [[nodiscard]] Trajectory read_trajectory(SQLite::Database& database);
 [[nodiscard]] std::map<std::string, std::string> read_metadata(SQLite::Database& database);
 
-/// All evidence must be that of its tile.
+/// Throws when evidence does not belong to the state of its tile.
 void check_consistency(const SavedMap& map);
 
 /// One tile of a map with these sizes, checked as read_tiles does.

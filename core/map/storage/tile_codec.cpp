@@ -288,7 +288,7 @@ TileEvidence decode_evidence(std::span<const std::uint8_t> bytes) {
                              std::size_t{counts[1]} * hidden_bytes +
                              std::size_t{counts[2]} * excluded_bytes;
   if (content.size() != needed) {
-    throw TileCodecError("has a memory of " + std::to_string(content.size()) +
+    throw TileCodecError("has evidence of " + std::to_string(content.size()) +
                          " bytes instead of " + std::to_string(needed));
   }
   const std::uint8_t* from = content.data() + evidence_header_bytes;

@@ -124,7 +124,7 @@ std::vector<std::string> pose_faults(const PoseRow& pose, const std::optional<Po
   return faults;
 }
 
-/// Runs one part of the check; a database that gives up under it is a fault of its own.
+/// Runs one part of the check; an exception of the database is a fault.
 template <typename Part>
 void guarded(MapCheck& check, const std::string& place, Part part) {
   try {
@@ -210,13 +210,13 @@ void check_evidence(TileId id, std::span<const std::uint8_t> encoded, std::int64
   try {
     const TileEvidence evidence = decode_evidence(encoded);
     check.hidden_voxels += evidence.hidden.size() + evidence.excluded.size();
-    if (evidence.id != id) fault("has the memory of another tile");
+    if (evidence.id != id) fault("has the evidence of another tile");
     if (std::ssize(evidence.shown) != shown) {
-      fault("shows " + std::to_string(shown) + " voxels and has a memory of " +
+      fault("shows " + std::to_string(shown) + " voxels and has evidence of " +
             std::to_string(evidence.shown.size()));
     }
   } catch (const TileCodecError& error) {
-    fault(std::string("memory ") + error.what());
+    fault(std::string("evidence ") + error.what());
   }
 }
 
@@ -259,8 +259,8 @@ MapCheck check_map_file(const std::filesystem::path& file, const CheckProgress& 
   const MapFileCopy copy(file);
   MapCheck check;
   check_pages(copy, check);
-  // Sound pages that are refused are not damaged but something else. Damaged ones are read as far
-  // as they go, to tell which tiles are left.
+  // Sound pages in a format that is refused are not a damaged map. Damaged pages are read as far as
+  // possible, to find the tiles that are left.
   if (check.is_sound()) copy.check_format();
   guarded(check, "tiles", [&] {
     SQLite::Database database(copy.path().string());

@@ -21,11 +21,11 @@ struct MapFault {
   std::string what;
 };
 
-/// What a check looked at, and what it found.
+/// Result of a check.
 struct MapCheck {
   std::size_t tiles = 0;
   std::uint64_t voxels = 0;
-  /// Places that are known and not shown.
+  /// Voxels that are known and not shown.
   std::uint64_t hidden_voxels = 0;
   std::size_t poses = 0;
   /// Tiles that a server could still serve.
@@ -40,8 +40,8 @@ using CheckProgress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// Reads all of a map file, which stays as it is, and finds every fault: SQLite's own structure,
 /// each tile (decodes, agrees with its content hash and its row, voxels lie in their cells), sizes,
-/// revisions, poses in order of time, finite and rigid. Throws MapFileError for what is no map file
-/// that this program knows: missing, empty, a folder, another program's, of a newer version.
+/// revisions, poses in order of time, finite and rigid. Throws MapFileError for a file that is not
+/// a map of a known version: missing, empty, a folder, of another program, of a newer version.
 [[nodiscard]] MapCheck check_map_file(const std::filesystem::path& file,
                                       const CheckProgress& progress = {});
 

@@ -18,7 +18,7 @@ struct TimeSpan {
   std::int64_t last_ns = 0;
 };
 
-/// What a map is, in figures.
+/// Figures of a map.
 struct MapInfo {
   std::uint64_t map_id = 0;
   std::uint64_t version = 0;
@@ -29,7 +29,7 @@ struct MapInfo {
   /// Points that were seen in the voxels.
   std::uint64_t points = 0;
   std::array<std::uint64_t, semantic_class_count> voxels_of_class{};
-  /// Round the voxels' means, map frame [m]; empty without voxels.
+  /// Smallest box around the means of the voxels, map frame [m]; empty without voxels.
   Eigen::AlignedBox3d bounds_map;
   TimeSpan observation_span;
   std::uint64_t poses = 0;
