@@ -3,12 +3,9 @@
 #include <gmock/gmock.h>
 
 #include <map>
-#include <opencv2/imgcodecs.hpp>
 #include <random>
-#include <set>
 
 #include "core/map/voxel_grid.hpp"
-#include "core/picture/map_change_picture.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {
@@ -178,33 +175,6 @@ TEST(MapDiff, RefusesMapsThatCannotBeCompared) {
     EXPECT_THROW(static_cast<void>(diff_maps(view, view, {.tolerance_voxels = tolerance})),
                  std::invalid_argument);
   }
-}
-
-TEST(MapDiff, ThePictureHasEveryKindOfChangeInItsColour) {
-  const ScratchFolder folder;
-  Cells before;
-  Cells after;
-  for (int x = 0; x < 10; ++x) {
-    before[{x, 0, 0}] = after[{x, 0, 0}] = SemanticClass::road;
-    before[{x, 10, 0}] = SemanticClass::fence;
-    after[{x, 20, 0}] = SemanticClass::pole;
-    before[{x, 30, 0}] = SemanticClass::terrain;
-    after[{x, 30, 0}] = SemanticClass::vegetation;
-  }
-  const MapSnapshot a = view_of(before);
-  const MapSnapshot b = view_of(after);
-  write_diff_picture(folder / "diff.png", a, b, diff_maps(a, b), 400);
-  const cv::Mat3b picture = cv::imread((folder / "diff.png").string());
-  ASSERT_FALSE(picture.empty());
-  std::set<std::string> colours;
-  for (const cv::Vec3b& p : picture) {
-    if (p[1] > 150 && p[2] < 100) colours.insert("green");
-    if (p[1] < 100 && p[2] > 200) colours.insert("red");
-    if (p[1] > 180 && p[2] > 200 && p[0] < 80) colours.insert("yellow");
-  }
-  EXPECT_EQ(colours.size(), 3U);
-  EXPECT_THROW(write_diff_picture(folder / "no" / "diff.png", a, b, diff_maps(a, b)),
-               std::runtime_error);
 }
 
 }  // namespace

@@ -1,3 +1,5 @@
+#include "core/picture/map_canvas.hpp"
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -5,7 +7,6 @@
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
-#include "core/picture/map_canvas.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {
@@ -31,7 +32,7 @@ std::string refusal(const std::filesystem::path& file) {
   return {};
 }
 
-TEST(PngFile, HoldsEveryPixelAsAnotherReaderSeesIt) {
+TEST(MapCanvas, HoldsEveryPixelAsAnotherReaderSeesIt) {
   const ScratchFolder folder;
   const cv::Mat3b picture = colourful(37, 91);
   write_png(folder / "a.png", picture);
@@ -40,7 +41,7 @@ TEST(PngFile, HoldsEveryPixelAsAnotherReaderSeesIt) {
   EXPECT_EQ(cv::norm(read, picture, cv::NORM_INF), 0.0);
 }
 
-TEST(PngFile, WritesAPartOfALargerPicture) {
+TEST(MapCanvas, WritesAPartOfALargerPicture) {
   const ScratchFolder folder;
   const cv::Mat3b part = colourful(40, 50)(cv::Rect(7, 5, 20, 30));
   ASSERT_FALSE(part.isContinuous());
@@ -50,7 +51,7 @@ TEST(PngFile, WritesAPartOfALargerPicture) {
   EXPECT_EQ(cv::norm(read, part, cv::NORM_INF), 0.0);
 }
 
-TEST(PngFile, NamesTheFileThatItCannotWrite) {
+TEST(MapCanvas, NamesTheFileThatItCannotWrite) {
   const ScratchFolder folder;
   for (const auto& file : {folder / "no" / "a.png", folder / "a.jpg", folder / "png"}) {
     EXPECT_THAT(refusal(file), testing::HasSubstr(file.string()));
