@@ -13,7 +13,7 @@
 namespace stillmap {
 namespace {
 
-/// Which voxels of a tile are asked for.
+/// Selects the voxels of a tile that a query asks for.
 class VoxelFilter {
  public:
   /// The tile may be non-resident: its info tells whether all of it is taken.

@@ -179,7 +179,7 @@ class SqliteMapStore : public MapStore {
   std::shared_ptr<const ScratchMapFolder> folder_;
   fs::path file_;
   SQLite::Database database_;
-  /// What the trajectory's rows hold, once known.
+  /// The stored trajectory, once it was read.
   std::optional<Trajectory> saved_trajectory_;
 };
 
