@@ -7,13 +7,8 @@
 namespace stillmap {
 namespace {
 
-constexpr int axis_bits = 21;
-
-/// Three voxel coordinates in one word; 2^20 voxels in each direction from the origin.
 std::uint64_t key_of(const Eigen::Vector3i& voxel) {
-  constexpr std::uint64_t mask = (1U << axis_bits) - 1;
-  const auto part = [](int v) { return static_cast<std::uint64_t>(v) & mask; };
-  return part(voxel.x()) << (2 * axis_bits) | part(voxel.y()) << axis_bits | part(voxel.z());
+  return packed_index(voxel.x(), voxel.y(), voxel.z());
 }
 
 /// Voxel offsets, nearest first, so that the search radius shrinks early.
@@ -43,14 +38,6 @@ void insert_sorted(Neighbours& neighbours, int n, const LabelledPoint& point,
 }
 
 }  // namespace
-
-std::size_t FeatureMap::Hash::operator()(std::uint64_t key) const noexcept {
-  // Finaliser of MurmurHash3: neighbouring voxels land far apart.
-  key ^= key >> 33;
-  key *= 0xff51afd7ed558ccdULL;
-  key ^= key >> 33;
-  return key;
-}
 
 void FeatureMap::Block::push(const LabelledPoint& point) {
   const auto k = static_cast<std::size_t>(count++);

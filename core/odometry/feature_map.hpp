@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/lidar/semantic_class.hpp"
+#include "core/lidar/voxel_index.hpp"
 #include "core/odometry/odometry_config.hpp"
 
 namespace stillmap {
@@ -67,16 +68,13 @@ class FeatureMap {
     void push(const LabelledPoint& point);
     void remove(int i);
   };
-  struct Hash {
-    std::size_t operator()(std::uint64_t key) const noexcept;
-  };
 
   [[nodiscard]] Eigen::Vector3i voxel_of(const Eigen::Vector3f& position_map) const;
   void insert(const LabelledPoint& point);
   [[nodiscard]] Block& block_at(std::uint64_t key);
 
   /// Voxel to its place in `blocks_`: the table that every look-up walks stays small.
-  tsl::robin_map<std::uint64_t, std::uint32_t, Hash> index_;
+  tsl::robin_map<std::uint64_t, std::uint32_t, IndexHash> index_;
   std::vector<Block> blocks_;
   std::vector<std::uint32_t> free_blocks_;
   std::size_t size_ = 0;
