@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/lidar/motion.hpp"
+#include "core/lidar/voxel_index.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/tile_evidence.hpp"
 #include "core/map/voxel_grid.hpp"
@@ -105,12 +106,6 @@ class LiveTile {
     bool was_moving = false;
     std::int64_t last_seen_ns = 0;
   };
-  struct KeyHash {
-    /// Fibonacci hashing: neighbours in space spread over the table.
-    std::size_t operator()(std::uint32_t key) const {
-      return static_cast<std::size_t>((key * 0x9E3779B97F4A7C15ULL) >> 32);
-    }
-  };
 
   void add(const Voxel& known, const VoxelHistory& history, const VoxelGrid& grid);
   [[nodiscard]] LiveVoxel* find(const TilePoint& point);
@@ -133,8 +128,8 @@ class LiveTile {
 
   TileId id_;
   std::vector<LiveVoxel> voxels_;
-  tsl::robin_map<std::uint32_t, std::uint32_t, KeyHash> position_;
-  tsl::robin_map<std::uint32_t, Excluded, KeyHash> excluded_;
+  tsl::robin_map<std::uint32_t, std::uint32_t, IndexHash> position_;
+  tsl::robin_map<std::uint32_t, Excluded, IndexHash> excluded_;
   /// Positions of voxels in order of their keys; those added since the last publication are not
   /// in it yet.
   std::vector<std::uint32_t> sorted_;

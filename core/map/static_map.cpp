@@ -14,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/lidar/voxel_index.hpp"
 #include "core/map/live_tile.hpp"
 #include "core/map/scan_sorter.hpp"
 #include "core/map/tile_evidence.hpp"
@@ -39,7 +40,7 @@ struct TileIdHash {
   std::size_t operator()(const TileId& id) const {
     const auto x = static_cast<std::uint64_t>(static_cast<std::uint32_t>(id.x));
     const auto y = static_cast<std::uint64_t>(static_cast<std::uint32_t>(id.y));
-    return static_cast<std::size_t>(((x << 32 | y) * 0x9E3779B97F4A7C15ULL) >> 20);
+    return IndexHash{}(x << 32 | y);
   }
 };
 
@@ -262,7 +263,7 @@ void StaticMap::clear_seen_through(const RangeImageView& view, std::int64_t stam
   });
   ++state_->step;
   for (std::size_t i = 0; i < near.size(); ++i) {
-    // Counts changed in all of them; only what hides something is to be shown anew.
+    // Counts changed in all of them; only tiles with a voxel to hide are published again.
     state_->tiles.find(near[i]->id()).value().changed_at = state_->step;
     if (hides[i] != 0) state_->touched.push_back(near[i]);
   }

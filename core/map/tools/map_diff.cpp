@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "core/map/voxel_grid.hpp"
+#include "core/lidar/voxel_index.hpp"
 
 namespace stillmap {
 namespace {
@@ -58,17 +58,8 @@ class ClassLookup {
 
   static std::uint64_t key_of(const Cell& cell) {
     // No map spans 2^21 voxels: at the finest in use, 5 cm, that were 100 km.
-    constexpr std::uint64_t mask = (1U << 21) - 1;
-    const auto bits = cell.cast<std::uint64_t>();
-    return (bits.x() & mask) << 42 | (bits.y() & mask) << 21 | (bits.z() & mask);
+    return packed_index(cell.x(), cell.y(), cell.z());
   }
-
-  struct Fibonacci {
-    std::size_t operator()(std::uint64_t key) const {
-      const std::uint64_t spread = key * 0x9E3779B97F4A7C15ULL;
-      return spread ^ spread >> 32;
-    }
-  };
 
   [[nodiscard]] Cell cell(TileId tile, VoxelIndex index) const {
     return {tile.x * columns_ + index.x, tile.y * columns_ + index.y, index.z};
@@ -81,7 +72,7 @@ class ClassLookup {
 
   /// Voxels along a tile's side.
   std::int64_t columns_ = 1;
-  tsl::robin_map<std::uint64_t, SemanticClass, Fibonacci> class_of_;
+  tsl::robin_map<std::uint64_t, SemanticClass, IndexHash> class_of_;
 };
 
 NearClasses ClassLookup::search(const Cell& centre, SemanticClass label, int reach) const {
