@@ -39,5 +39,5 @@ set(CPACK_COMPONENT_TOOLS_DESCRIPTION
 
 set(CPACK_DEBIAN_FORMATS_PACKAGE_NAME stillmap-formats)
 set(CPACK_COMPONENT_FORMATS_DESCRIPTION
-  "For the command line: PCD files through PCL, GeoTIFF through GDAL.")
+  "For the command line: PCD files through PCL.")
 include(CPack)

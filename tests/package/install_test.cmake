@@ -9,7 +9,7 @@ endfunction()
 
 file(REMOVE_RECURSE ${PREFIX})
 run(0 "" ${CMAKE_COMMAND} --install ${BUILD} --prefix ${PREFIX})
-foreach(file bin/stillmap bin/stillmap-server lib/stillmap/stillmap_pcd.so lib/stillmap/stillmap_geotiff.so
+foreach(file bin/stillmap bin/stillmap-server lib/stillmap/stillmap_pcd.so
         lib/systemd/system/stillmap-server.service etc/stillmap/server.yaml
         share/stillmap/models/street/model.onnx share/stillmap/server/default.yaml
         share/stillmap/idl/stillmap_msgs.idl share/doc/stillmap/README.md
