@@ -94,12 +94,12 @@ std::string StaticMapConfig::faults() const {
     faults << "clear_margin_share = " << clearing_margin_share << "; must be 0 to 1\n";
   }
   if (clearing_interval == 0 || clearing_interval > 1000) {
-    faults << "look_every = " << clearing_interval << "; must be 1 to 1000\n";
+    faults << "clearing_interval = " << clearing_interval << "; must be 1 to 1000\n";
   }
   if (misses_to_clear == 0 || misses_to_clear > 1000)
-    faults << "passes = " << misses_to_clear << "; must be 1 to 1000\n";
+    faults << "misses_to_clear = " << misses_to_clear << "; must be 1 to 1000\n";
   if (misses_per_hit == 0 || misses_per_hit > 1000) {
-    faults << "passes_per_hit = " << misses_per_hit << "; must be 1 to 1000\n";
+    faults << "misses_per_hit = " << misses_per_hit << "; must be 1 to 1000\n";
   }
   if (min_points == 0) faults << "min_points = 0; must be at least 1\n";
   return faults.str();
