@@ -1,141 +1,133 @@
 #include "idl/dds/type_support.hpp"
 
-#include "idl/dds/bounded_type_support.hpp"
-#include "idl/dds/dynamic_type.hpp"
-#include "nav_msgsPubSubTypes.h"
-#include "octomap_msgsPubSubTypes.h"
-#include "rmw_dds_commonPubSubTypes.h"
-#include "rmw_dds_common_ironPubSubTypes.h"
-#include "sensor_msgsPubSubTypes.h"
-#include "stillmap_msgsPubSubTypes.h"
-#include "stillmap_occupancyPubSubTypes.h"
-#include "tf2_msgsPubSubTypes.h"
-#include "tile_indexPubSubTypes.h"
+#include <cxxabi.h>
+#include <fastcdr/Cdr.h>
+#include <fastcdr/FastBuffer.h>
+#include <fastrtps/types/TypeObjectFactory.h>
+#include <fastrtps/utils/md5.h>
+
+#include <algorithm>
+#include <exception>
+#include <vector>
+
+#include "rmw_dds_common_iron.h"
+#include "tile_index.h"
+#include "tile_indexTypeObject.h"
 
 namespace stillmap::dds {
 namespace {
 
+using eprosima::fastcdr::Cdr;
+using eprosima::fastcdr::FastBuffer;
 using eprosima::fastdds::dds::TypeSupport;
+using eprosima::fastrtps::rtps::InstanceHandle_t;
+using eprosima::fastrtps::rtps::SerializedPayload_t;
+
+constexpr std::uint32_t encapsulation_bytes = 4;
+constexpr std::size_t instance_handle_bytes = 16;
+
+void set_encapsulation(const Cdr& cdr, SerializedPayload_t& payload) {
+  payload.encapsulation = cdr.endianness() == Cdr::BIG_ENDIANNESS ? CDR_BE : CDR_LE;
+}
+
+FastBuffer buffer_of(SerializedPayload_t& payload, std::size_t bytes) {
+  return {reinterpret_cast<char*>(payload.data), bytes};
+}
 
 }  // namespace
 
-template <>
-TypeSupport type_support<sensor_msgs::msg::PointCloud2>() {
-  return make_bounded_type_support<sensor_msgs::msg::PointCloud2PubSubType>();
+std::string wire_type_name(const std::type_info& type) {
+  int fault = 0;
+  const std::unique_ptr<char, decltype(&std::free)> name(
+      abi::__cxa_demangle(type.name(), nullptr, nullptr, &fault), &std::free);
+  std::string wire_name = name.get();
+  wire_name.insert(wire_name.rfind("::") + 2, "dds_::");
+  return wire_name + "_";
 }
-template <>
-TypeSupport type_support<nav_msgs::msg::Odometry>() {
-  return make_bounded_type_support<nav_msgs::msg::OdometryPubSubType>();
+
+CdrTypeSupport::CdrTypeSupport(const std::string& name, std::size_t max_bytes, bool is_keyed,
+                               std::size_t max_key_bytes)
+    : max_key_bytes_(max_key_bytes) {
+  setName(name.c_str());
+  // Room for a submessage's alignment.
+  max_bytes += Cdr::alignment(max_bytes, 4);
+  m_typeSize = static_cast<std::uint32_t>(max_bytes) + encapsulation_bytes;
+  m_isGetKeyDefined = is_keyed;
 }
-template <>
-TypeSupport type_support<nav_msgs::msg::Path>() {
-  return make_bounded_type_support<nav_msgs::msg::PathPubSubType>();
+
+bool CdrTypeSupport::serialize(void* sample, SerializedPayload_t* payload) {
+  FastBuffer buffer = buffer_of(*payload, payload->max_size);
+  Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
+  set_encapsulation(cdr, *payload);
+  cdr.serialize_encapsulation();
+  try {
+    write(sample, cdr);
+  } catch (const eprosima::fastcdr::exception::NotEnoughMemoryException&) {
+    return false;
+  }
+  payload->length = static_cast<std::uint32_t>(cdr.getSerializedDataLength());
+  return true;
 }
-template <>
-TypeSupport type_support<tf2_msgs::msg::TFMessage>() {
-  return make_bounded_type_support<tf2_msgs::msg::TFMessagePubSubType>();
+
+bool CdrTypeSupport::deserialize(SerializedPayload_t* payload, void* sample) {
+  try {
+    FastBuffer buffer = buffer_of(*payload, payload->length);
+    Cdr cdr(buffer, Cdr::DEFAULT_ENDIAN, Cdr::DDS_CDR);
+    cdr.read_encapsulation();
+    set_encapsulation(cdr, *payload);
+    read(sample, cdr);
+    return true;
+  } catch (const std::exception&) {
+    return false;
+  }
 }
-template <>
-TypeSupport type_support<rmw_dds_common::msg::ParticipantEntitiesInfo>() {
-  return make_bounded_type_support<rmw_dds_common::msg::ParticipantEntitiesInfoPubSubType>();
+
+std::function<std::uint32_t()> CdrTypeSupport::getSerializedSizeProvider(void* sample) {
+  return [this, sample] {
+    return static_cast<std::uint32_t>(cdr_bytes(sample)) + encapsulation_bytes;
+  };
 }
-template <>
-TypeSupport type_support<rmw_dds_common_iron::msg::ParticipantEntitiesInfo>() {
-  TypeSupport type =
-      make_bounded_type_support<rmw_dds_common_iron::msg::ParticipantEntitiesInfoPubSubType>();
-  // Two layouts of one ROS 2 type: on the wire both have its name.
-  type->setName("rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_");
-  return type;
+
+bool CdrTypeSupport::getKey(void* sample, InstanceHandle_t* handle, bool force_md5) {
+  if (!m_isGetKeyDefined) return false;
+  std::vector<unsigned char> key(std::max(max_key_bytes_, instance_handle_bytes));
+  FastBuffer buffer(reinterpret_cast<char*>(key.data()), max_key_bytes_);
+  Cdr cdr(buffer, Cdr::BIG_ENDIANNESS);
+  write_key(sample, cdr);
+  if (!force_md5 && max_key_bytes_ <= instance_handle_bytes) {
+    std::copy_n(key.begin(), instance_handle_bytes, &handle->value[0]);
+    return true;
+  }
+  MD5 hash;
+  hash.init();
+  hash.update(key.data(), static_cast<unsigned int>(cdr.getSerializedDataLength()));
+  hash.finalize();
+  std::copy_n(std::begin(hash.digest), instance_handle_bytes, &handle->value[0]);
+  return true;
 }
+
 template <>
 TypeSupport type_support<stillmap_msgs::msg::TileInfo>() {
-  TypeSupport type = make_bounded_type_support<stillmap_msgs::msg::TileInfoPubSubType>();
-  register_tile_info_type(type);
+  using stillmap_msgs::msg::TileInfo;
+  TypeSupport type(std::make_unique<GeneratedTypeSupport<TileInfo>>().release());
+  auto* const factory = eprosima::fastrtps::types::TypeObjectFactory::get_instance();
+  for (const bool is_complete : {true, false}) {
+    // Filters look for the name that the type has on the wire; generated code uses another one.
+    factory->add_type_object(type.get_type_name(),
+                             stillmap_msgs::msg::GetTileInfoIdentifier(is_complete),
+                             stillmap_msgs::msg::GetTileInfoObject(is_complete));
+  }
+  // It is for this process only: in discovery, it would make other vendors compare types.
+  type->auto_fill_type_object(false);
+  type->auto_fill_type_information(false);
   return type;
 }
+
 template <>
-TypeSupport type_support<stillmap_msgs::msg::MapTile>() {
-  return make_bounded_type_support<stillmap_msgs::msg::MapTilePubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::msg::Status>() {
-  return make_bounded_type_support<stillmap_msgs::msg::StatusPubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::GetStaticMap_Request>() {
-  return make_bounded_type_support<stillmap_msgs::srv::GetStaticMap_RequestPubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::GetStaticMap_Response>() {
-  return make_bounded_type_support<stillmap_msgs::srv::GetStaticMap_ResponsePubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::GetTileVersions_Request>() {
-  return make_bounded_type_support<stillmap_msgs::srv::GetTileVersions_RequestPubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::GetTileVersions_Response>() {
-  return make_bounded_type_support<stillmap_msgs::srv::GetTileVersions_ResponsePubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::GetTiles_Request>() {
-  return make_bounded_type_support<stillmap_msgs::srv::GetTiles_RequestPubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::GetTiles_Response>() {
-  return make_bounded_type_support<stillmap_msgs::srv::GetTiles_ResponsePubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::GetStatus_Request>() {
-  return make_bounded_type_support<stillmap_msgs::srv::GetStatus_RequestPubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::GetStatus_Response>() {
-  return make_bounded_type_support<stillmap_msgs::srv::GetStatus_ResponsePubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::SaveMap_Request>() {
-  return make_bounded_type_support<stillmap_msgs::srv::SaveMap_RequestPubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::SaveMap_Response>() {
-  return make_bounded_type_support<stillmap_msgs::srv::SaveMap_ResponsePubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::LoadMap_Request>() {
-  return make_bounded_type_support<stillmap_msgs::srv::LoadMap_RequestPubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::LoadMap_Response>() {
-  return make_bounded_type_support<stillmap_msgs::srv::LoadMap_ResponsePubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::Reset_Request>() {
-  return make_bounded_type_support<stillmap_msgs::srv::Reset_RequestPubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::Reset_Response>() {
-  return make_bounded_type_support<stillmap_msgs::srv::Reset_ResponsePubSubType>();
-}
-template <>
-TypeSupport type_support<octomap_msgs::msg::Octomap>() {
-  return make_bounded_type_support<octomap_msgs::msg::OctomapPubSubType>();
-}
-template <>
-TypeSupport type_support<octomap_msgs::srv::GetOctomap_Request>() {
-  return make_bounded_type_support<octomap_msgs::srv::GetOctomap_RequestPubSubType>();
-}
-template <>
-TypeSupport type_support<octomap_msgs::srv::GetOctomap_Response>() {
-  return make_bounded_type_support<octomap_msgs::srv::GetOctomap_ResponsePubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::QueryOccupancy_Request>() {
-  return make_bounded_type_support<stillmap_msgs::srv::QueryOccupancy_RequestPubSubType>();
-}
-template <>
-TypeSupport type_support<stillmap_msgs::srv::QueryOccupancy_Response>() {
-  return make_bounded_type_support<stillmap_msgs::srv::QueryOccupancy_ResponsePubSubType>();
+TypeSupport type_support<rmw_dds_common_iron::msg::ParticipantEntitiesInfo>() {
+  using Info = rmw_dds_common_iron::msg::ParticipantEntitiesInfo;
+  constexpr const char* name = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_";
+  return TypeSupport(std::make_unique<GeneratedTypeSupport<Info>>(name).release());
 }
 
 }  // namespace stillmap::dds

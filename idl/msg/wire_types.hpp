@@ -1,7 +1,6 @@
 #pragma once
 
-// The generated types by name. Who needs their fields includes the generated header, as
-// "sensor_msgs.h".
+// Declares the generated types. For their fields, include the generated header ("sensor_msgs.h").
 
 namespace sensor_msgs::msg {
 class PointCloud2;
@@ -17,6 +16,10 @@ class OccupancyGrid;
 class Odometry;
 class Path;
 }  // namespace nav_msgs::msg
+namespace nav_msgs::srv {
+class GetMap_Request;
+class GetMap_Response;
+}  // namespace nav_msgs::srv
 namespace octomap_msgs {
 namespace msg {
 class Octomap;
@@ -26,6 +29,9 @@ class GetOctomap_Request;
 class GetOctomap_Response;
 }  // namespace srv
 }  // namespace octomap_msgs
+namespace rmw_dds_common_iron::msg {
+class ParticipantEntitiesInfo;
+}
 namespace tf2_msgs::msg {
 class TFMessage;
 }
@@ -53,6 +59,16 @@ class LoadMap_Request;
 class LoadMap_Response;
 class Reset_Request;
 class Reset_Response;
+class GetRemoved_Request;
+class GetRemoved_Response;
+class RestoreRemoved_Request;
+class RestoreRemoved_Response;
 class QueryOccupancy_Request;
 class QueryOccupancy_Response;
+class GetTraversableArea_Request;
+class GetTraversableArea_Response;
+class CheckPath_Request;
+class CheckPath_Response;
+class NearestTraversable_Request;
+class NearestTraversable_Response;
 }  // namespace stillmap_msgs::srv

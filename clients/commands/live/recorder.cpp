@@ -10,6 +10,11 @@
 #include "idl/bag/bag_writer.hpp"
 #include "idl/dds/serialized_message.hpp"
 #include "idl/interface/topics.hpp"
+#include "nav_msgs.h"
+#include "octomap_msgs.h"
+#include "sensor_msgs.h"
+#include "stillmap_msgs.h"
+#include "tf2_msgs.h"
 
 namespace stillmap::cli {
 namespace {
