@@ -113,7 +113,7 @@ struct ServerArguments {
 
 void add_server_options(CLI::App& program, ServerArguments& server) {
   program.add_option("--domain", server.domain_id, "DDS domain, instead of the file's")
-      ->check(CLI::Range(0, 232));
+      ->check(CLI::Range(std::uint32_t{0}, dds::max_domain_id));
   program
       .add_option("--security", server.security,
                   "Folder of the server's identity in a secured domain, instead of the file's")

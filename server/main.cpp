@@ -6,7 +6,7 @@
 
 #include "config/loaders/model_file.hpp"
 #include "idl/dds/dds_log.hpp"
-#include "idl/dds/security/security_error.hpp"
+#include "idl/dds/dds_error.hpp"
 #include "server/arguments.hpp"
 #include "server/mapping/async_segmenter.hpp"
 #include "server/monitoring/log_setup.hpp"

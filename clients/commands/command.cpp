@@ -8,7 +8,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/segmentation/model_error.hpp"
-#include "idl/dds/security/security_error.hpp"
+#include "idl/dds/dds_error.hpp"
 
 namespace stillmap::cli {
 namespace {

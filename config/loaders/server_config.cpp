@@ -90,7 +90,7 @@ void read_network(YamlSection& section, const fs::path& folder, DdsNetworkConfig
 }
 
 void read_dds(YamlSection section, const fs::path& folder, DdsConfig& dds) {
-  section.integer("domain_id", dds.domain_id, {0, 232});
+  section.integer("domain_id", dds.domain_id, {0, dds::max_domain_id});
   read_network(section, folder, dds.network);
   section.text("participant_name", dds.participant_name);
   section.path("security", dds.security);

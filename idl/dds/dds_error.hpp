@@ -10,4 +10,16 @@ class DdsError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Certificates, keys or permissions that cannot be used: the text names the file and the way out.
+class SecurityError : public DdsError {
+ public:
+  using DdsError::DdsError;
+};
+
+/// The permissions of our own identity forbid it.
+class NotPermitted : public SecurityError {
+ public:
+  using SecurityError::SecurityError;
+};
+
 }  // namespace stillmap::dds

@@ -7,6 +7,9 @@
 
 namespace stillmap::dds {
 
+/// The largest domain whose ports fit into 16 bits.
+inline constexpr std::uint32_t max_domain_id = 232;
+
 /// What carries data from machine to machine. TCP passes firewalls and lossy long links; it needs
 /// the address of one side.
 enum class NetworkTransport { udp, tcp };
@@ -21,7 +24,7 @@ struct NetworkAddress {
 /// How a process takes part in a DDS domain. The defaults suit one machine or a quiet network; for
 /// others there are profiles (config/loaders/dds_profile.hpp).
 struct DdsOptions {
-  /// DDS domain, 0..232; ROS 2 calls it ROS_DOMAIN_ID.
+  /// DDS domain, 0..max_domain_id; ROS 2 calls it ROS_DOMAIN_ID.
   std::uint32_t domain_id = 0;
   NetworkTransport transport = NetworkTransport::udp;
   /// The one port to be reached at, for firewalls and for peers that name it. 0: over UDP the ports

@@ -180,7 +180,6 @@ std::int32_t fresh_participant_id(std::uint32_t domain_id) {
   // not even in different domains.
   constexpr std::int32_t first = 20;
   // The highest domain's ports end at 65535, those of others where the next domain's begin.
-  constexpr std::uint32_t max_domain_id = 232;
   const std::int32_t ids = (domain_id == max_domain_id ? 60 : 120) - first;
   static std::atomic<std::int32_t> participants_made{0};
   std::optional<std::int32_t> left;

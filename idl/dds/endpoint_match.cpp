@@ -11,20 +11,6 @@ namespace {
 
 using Reasons = std::vector<std::string>;
 
-constexpr std::string_view durability_name(Durability durability) {
-  switch (durability) {
-    case Durability::volatile_:
-      return "volatile";
-    case Durability::transient_local:
-      return "transient local";
-    case Durability::transient:
-      return "transient";
-    case Durability::persistent:
-      break;
-  }
-  return "persistent";
-}
-
 std::string offer(const std::string& policy, std::string_view offered, std::string_view wanted) {
   std::string text = policy;
   return text.append(": the writer offers ")
@@ -61,8 +47,7 @@ void compare_reliability_and_durability(const EndpointQos& writer, const Endpoin
     reasons.push_back(offer("reliability", "best effort", "reliable"));
   }
   if (writer.durability < reader.durability) {
-    reasons.push_back(offer("durability", durability_name(writer.durability),
-                            durability_name(reader.durability)));
+    reasons.push_back(offer("durability", name(writer.durability), name(reader.durability)));
   }
 }
 

@@ -11,18 +11,13 @@
 #include "idl/dds/discovery.hpp"
 #include "idl/dds/discovery_monitor.hpp"
 #include "idl/dds/ros_graph.hpp"
-#include "idl/dds/secure_properties.hpp"
 #include "idl/dds/security/identity.hpp"
-#include "idl/dds/tcp_user_timeout.hpp"
 #include "idl/dds/transports.hpp"
 
 namespace stillmap::dds {
 namespace {
 
 using namespace eprosima::fastdds::dds;
-
-// The largest domain whose ports fit into 16 bits.
-constexpr std::uint32_t max_domain_id = 232;
 
 // Of a TCP peer that takes nothing, while all others wait.
 constexpr std::chrono::seconds tcp_user_timeout{5};
@@ -61,6 +56,29 @@ void check_type_support(const DomainParticipant& participant, const TypeSupport&
   }
 }
 
+/// Adds what switches DDS Security on with the identity in this folder.
+void add_security(const std::filesystem::path& identity_folder,
+                  eprosima::fastrtps::rtps::PropertyPolicy& properties) {
+  const IdentityFiles files(std::filesystem::absolute(identity_folder));
+  const auto add = [&](const std::string& name, const std::string& value) {
+    properties.properties().emplace_back(name, value);
+  };
+  const auto add_file = [&](const std::string& name, const std::filesystem::path& file) {
+    add(name, "file://" + file.string());
+  };
+  const std::string authentication = "dds.sec.auth.builtin.PKI-DH.";
+  const std::string access = "dds.sec.access.builtin.Access-Permissions.";
+  add("dds.sec.auth.plugin", "builtin.PKI-DH");
+  add_file(authentication + "identity_ca", files.identity_authority);
+  add_file(authentication + "identity_certificate", files.certificate);
+  add_file(authentication + "private_key", files.key);
+  add("dds.sec.access.plugin", "builtin.Access-Permissions");
+  add_file(access + "permissions_ca", files.permissions_authority);
+  add_file(access + "governance", files.governance);
+  add_file(access + "permissions", files.permissions);
+  add("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
+}
+
 std::unique_ptr<const Identity> identity_of(const DdsOptions& options) {
   if (options.security.empty()) return nullptr;
   return std::make_unique<const Identity>(load_identity(options.security));
@@ -91,7 +109,7 @@ Participant::~Participant() {
 
 Participant::Handle Participant::join() const {
   if (options_.domain_id > max_domain_id) {
-    throw failure("domain ids go from 0 to 232");
+    throw failure("domain ids go from 0 to " + std::to_string(max_domain_id));
   }
   DomainParticipant* const made = factory_->create_participant(
       static_cast<DomainId_t>(options_.domain_id), qos(), monitor_.get(), StatusMask::none());

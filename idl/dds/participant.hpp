@@ -12,7 +12,6 @@
 #include <mutex>
 #include <string>
 
-#include "idl/dds/content_filter.hpp"
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/dds_options.hpp"
 #include "idl/dds/qos.hpp"
@@ -24,6 +23,14 @@ namespace stillmap::dds {
 class DiscoveryMonitor;
 class RosGraph;
 struct Identity;
+
+/// Which samples a reader wants, as DDS writes it: a condition in SQL's manner on the fields of the
+/// topic's type, and the values of its parameters %0, %1 and so on. The type must be described
+/// (type_support.hpp).
+struct ContentFilter {
+  std::string expression;
+  std::vector<std::string> parameters;
+};
 
 /// This process in a DDS domain, and the makings of its readers and writers. A ROS 2 node to ROS 2
 /// tools when it has a node name. Endpoints must not outlive it. Thread-safe.

@@ -1,5 +1,7 @@
 #include "idl/dds/remote_participant.hpp"
 
+#include <array>
+
 namespace stillmap::dds {
 namespace {
 
@@ -10,6 +12,11 @@ void add_part(std::string& text, const std::string& part) {
 }
 
 }  // namespace
+
+const char* name(Durability durability) {
+  constexpr std::array names{"volatile", "transient local", "transient", "persistent"};
+  return names.at(static_cast<std::size_t>(durability));
+}
 
 std::string describe_location(const RemoteParticipant& peer) {
   std::string text = peer.is_on_this_host ? "this host" : peer.host;
@@ -27,8 +34,7 @@ std::string describe(const RemoteParticipant& peer) {
 
 std::string describe(const EndpointQos& qos) {
   std::string text = qos.reliable ? "reliable" : "best effort";
-  constexpr const char* durabilities[] = {"volatile", "transient local", "transient", "persistent"};
-  add_part(text, durabilities[static_cast<std::size_t>(qos.durability)]);
+  add_part(text, name(qos.durability));
   for (const std::string& partition : qos.partitions) {
     add_part(text, "partition '" + partition + "'");
   }

@@ -11,6 +11,9 @@ namespace stillmap::dds {
 /// How long a sample outlives its writing, weakest first, as DDS numbers them.
 enum class Durability : std::uint8_t { volatile_, transient_local, transient, persistent };
 
+/// "transient local", as diagnostics say it.
+[[nodiscard]] const char* name(Durability durability);
+
 /// The policies that decide whether a writer and a reader find together.
 struct EndpointQos {
   bool reliable = false;

@@ -32,7 +32,7 @@ RosGraph::RosGraph(Participant& participant, const Guid& participant_guid)
       node_name_(participant.options().node_name),
       gid_bytes_(participant.options().ros_gid_bytes),
       writer_(participant.make_writer(
-          "ros_discovery_info",
+          ros_discovery_topic,
           gid_bytes_ == iron_gid_bytes ? type_support<IronInfo>() : type_support<HumbleInfo>(),
           {.transient_local = true, .depth = 1}, nullptr)) {
   announce();

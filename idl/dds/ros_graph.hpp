@@ -8,6 +8,9 @@
 
 namespace stillmap::dds {
 
+/// DDS name of the topic where ROS 2 nodes announce their endpoints.
+inline constexpr const char* ros_discovery_topic = "ros_discovery_info";
+
 /// Tells ROS 2 which readers and writers belong to this node (topic ros_discovery_info), so that
 /// `ros2 node info` shows them. Not thread-safe; the participant guards it.
 class RosGraph {

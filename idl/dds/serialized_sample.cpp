@@ -4,6 +4,7 @@
 #include <cassert>
 #include <fastdds/dds/topic/TopicDataType.hpp>
 #include <memory>
+#include <utility>
 
 #include "idl/dds/dds_error.hpp"
 
@@ -14,14 +15,28 @@ using eprosima::fastdds::dds::TypeSupport;
 using eprosima::fastrtps::rtps::InstanceHandle_t;
 using eprosima::fastrtps::rtps::SerializedPayload_t;
 
-class SerializedSampleType : public eprosima::fastdds::dds::TopicDataType {
+/// A payload in memory that is not its own.
+class BorrowedPayload : public SerializedPayload_t {
  public:
-  explicit SerializedSampleType(const std::string& type_name) {
+  explicit BorrowedPayload(std::span<std::uint8_t> memory) {
+    data = memory.data();
+    length = max_size = static_cast<std::uint32_t>(memory.size());
+  }
+  // Or it would be freed.
+  ~BorrowedPayload() { data = nullptr; }
+  BorrowedPayload(const BorrowedPayload&) = delete;
+  BorrowedPayload& operator=(const BorrowedPayload&) = delete;
+};
+
+class SerializedSampleType final : public eprosima::fastdds::dds::TopicDataType {
+ public:
+  /// `keys`: the type itself, for the keys of its samples; empty when it has none.
+  SerializedSampleType(const std::string& type_name, TypeSupport keys) : keys_(std::move(keys)) {
     setName(type_name.c_str());
-    // To begin with; payloads grow as they need.
-    constexpr std::uint32_t usual_bytes = 256;
-    m_typeSize = usual_bytes;
-    m_isGetKeyDefined = false;
+    // Payloads grow as they need.
+    constexpr std::uint32_t initial_bytes = 256;
+    m_typeSize = initial_bytes;
+    m_isGetKeyDefined = !keys_.empty() && keys_->m_isGetKeyDefined;
     auto_fill_type_object(false);
     auto_fill_type_information(false);
   }
@@ -51,27 +66,31 @@ class SerializedSampleType : public eprosima::fastdds::dds::TopicDataType {
     const std::unique_ptr<SerializedSample> owned(static_cast<SerializedSample*>(sample));
   }
 
-  bool getKey(void*, InstanceHandle_t*, bool) override { return false; }
-  [[nodiscard]] bool is_bounded() const override { return false; }
-};
-
-/// A payload in memory that is not its own.
-class BorrowedPayload : public SerializedPayload_t {
- public:
-  explicit BorrowedPayload(std::span<std::uint8_t> memory) {
-    data = memory.data();
-    length = max_size = static_cast<std::uint32_t>(memory.size());
+  /// Called only where a writer sends no hash of the key.
+  bool getKey(void* data, InstanceHandle_t* handle, bool force_md5) override {
+    if (!m_isGetKeyDefined) return false;
+    BorrowedPayload payload(*static_cast<SerializedSample*>(data));
+    void* const sample = keys_->createData();
+    const bool known =
+        keys_->deserialize(&payload, sample) && keys_->getKey(sample, handle, force_md5);
+    keys_->deleteData(sample);
+    return known;
   }
-  // Or it would be freed.
-  ~BorrowedPayload() { data = nullptr; }
-  BorrowedPayload(const BorrowedPayload&) = delete;
-  BorrowedPayload& operator=(const BorrowedPayload&) = delete;
+
+  [[nodiscard]] bool is_bounded() const override { return false; }
+
+ private:
+  TypeSupport keys_;
 };
 
 }  // namespace
 
 TypeSupport serialized_sample_type(const std::string& type_name) {
-  return TypeSupport(std::make_unique<SerializedSampleType>(type_name).release());
+  return TypeSupport(std::make_unique<SerializedSampleType>(type_name, TypeSupport()).release());
+}
+
+TypeSupport serialized_sample_type(const TypeSupport& type) {
+  return TypeSupport(std::make_unique<SerializedSampleType>(type->getName(), type).release());
 }
 
 SerializedSample to_bytes(TypeSupport type, const void* sample, std::size_t gap_bytes) {

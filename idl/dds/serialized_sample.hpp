@@ -10,15 +10,19 @@
 
 namespace stillmap::dds {
 
-/// A sample as it lies on the wire: `encapsulation_bytes`, then its fields in CDR.
+/// A sample as it lies on the wire: `encapsulation_bytes`, then its fields in CDR, neither decoded
+/// nor checked.
 using SerializedSample = std::vector<std::uint8_t>;
 
 inline constexpr std::size_t encapsulation_bytes = 4;
 
 /// Carries samples of a type as bytes, under its name: for topics whose samples can be read only
-/// once it is known who wrote them.
+/// once it is known who wrote them. The type has no keys.
 [[nodiscard]] eprosima::fastdds::dds::TypeSupport serialized_sample_type(
     const std::string& type_name);
+/// The same, with the keys of `type` where it has some.
+[[nodiscard]] eprosima::fastdds::dds::TypeSupport serialized_sample_type(
+    const eprosima::fastdds::dds::TypeSupport& type);
 
 /// The sample with `gap_bytes` (a multiple of 8, so that nothing shifts) zeros between the
 /// encapsulation and its fields. `type` must be the sample's.
@@ -46,9 +50,11 @@ class SerializedSampleWriter : public UntypedWriter {
 /// Takes samples as bytes. One thread takes.
 class SerializedSampleReader : public UntypedReader {
  public:
-  SerializedSampleReader(Participant& participant, const std::string& topic,
-                         const std::string& type_name, const TopicQos& qos)
-      : UntypedReader(participant, topic, serialized_sample_type(type_name), qos) {}
+  /// `type` is a type's name or its TypeSupport, as serialized_sample_type takes them.
+  template <typename Type>
+  SerializedSampleReader(Participant& participant, const std::string& topic, const Type& type,
+                         const TopicQos& qos)
+      : UntypedReader(participant, topic, serialized_sample_type(type), qos) {}
 
   /// As Reader::take.
   [[nodiscard]] bool take(SerializedSample& sample, eprosima::fastdds::dds::SampleInfo& info,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 
@@ -15,5 +16,10 @@ void set_transports(const DdsOptions& options, eprosima::fastdds::dds::DomainPar
 /// (net.core.rmem_max caps it). Below 4 MB, large samples get lost over UDP. Throws DdsError when
 /// no socket can be made.
 [[nodiscard]] std::uint32_t granted_socket_buffer_bytes(std::uint32_t wanted_bytes);
+
+/// Has the kernel end TCP connections, accepted from now on by this process at `listening_port`,
+/// whose peer takes no data for `timeout`. Fast DDS sends to TCP peers one after the other and
+/// waits: a single stopped peer would block all others without end.
+void set_tcp_user_timeout(std::uint16_t listening_port, std::chrono::milliseconds timeout);
 
 }  // namespace stillmap::dds

@@ -45,6 +45,19 @@ std::string wire_type_name(const std::type_info& type) {
   return wire_name + "_";
 }
 
+std::string ros_type_name(const TypeSupport& type) {
+  std::string name = type->getName();
+  const auto replace = [&name](const std::string& what, const std::string& with) {
+    for (auto at = name.find(what); at != std::string::npos; at = name.find(what, at)) {
+      name.replace(at, what.size(), with);
+    }
+  };
+  replace("::dds_::", "/");
+  replace("::", "/");
+  if (name.ends_with('_')) name.pop_back();
+  return name;
+}
+
 CdrTypeSupport::CdrTypeSupport(const std::string& name, std::size_t max_bytes, bool is_keyed,
                                std::size_t max_key_bytes)
     : max_key_bytes_(max_key_bytes) {

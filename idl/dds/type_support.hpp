@@ -14,6 +14,9 @@ namespace stillmap::dds {
 /// stillmap_msgs::msg::dds_::Status_ of stillmap_msgs::msg::Status.
 [[nodiscard]] std::string wire_type_name(const std::type_info& type);
 
+/// The name that ROS 2 has for a type: "nav_msgs/msg/Odometry" of nav_msgs::msg::dds_::Odometry_.
+[[nodiscard]] std::string ros_type_name(const eprosima::fastdds::dds::TypeSupport& type);
+
 /// Carries samples of a generated type, in CDR, as the code does that fastddsgen generates beside
 /// the type; but bytes that are no sample of it (an unknown encapsulation, a boolean that is neither
 /// 0 nor 1) are refused, whereas generated code throws, which Fast DDS does not catch: anybody in

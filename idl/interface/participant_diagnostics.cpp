@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <string_view>
 
+#include "idl/dds/ros_graph.hpp"
+
 namespace stillmap::dds {
 namespace {
-
-// Only names of nodes get lost by it.
-constexpr std::string_view ros_discovery = "ros_discovery_info";
 
 struct PolicyHint {
   std::string_view policy;
@@ -50,7 +49,8 @@ std::string short_name(const RemoteParticipant& peer) {
 }  // namespace
 
 Diagnostic to_diagnostic(const Mismatch& mismatch) {
-  const bool harmless = mismatch.topic == ros_discovery;
+  // Without it, ROS 2 tools show no node names; data flows.
+  const bool harmless = mismatch.topic == ros_discovery_topic;
   return {.severity = harmless ? Severity::advice : Severity::problem,
           .what = mismatch.topic + ": what " + short_name(mismatch.writer_participant) +
                   " writes does not reach " + short_name(mismatch.reader_participant),

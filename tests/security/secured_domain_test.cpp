@@ -7,7 +7,7 @@
 
 #include "idl/dds/reader.hpp"
 #include "idl/dds/security/authority.hpp"
-#include "idl/dds/security/security_error.hpp"
+#include "idl/dds/dds_error.hpp"
 #include "idl/interface/roles.hpp"
 #include "sensor_msgs.h"
 #include "tests/clients/process.hpp"

@@ -45,7 +45,7 @@ void add_network_options(CommandHandle command, DdsNetworkConfig& network) {
 void add_client_options(CommandHandle command, ClientArguments& arguments) {
   command.option("--domain", arguments.domain, "DDS domain of the server")
       .from_environment("ROS_DOMAIN_ID")
-      .between(0, 232)
+      .between(0, dds::max_domain_id)
       .with_default();
   add_network_options(command, arguments.network);
   command.option("--server", arguments.server_name, "First part of the server's topic names")

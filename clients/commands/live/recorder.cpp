@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "idl/bag/bag_writer.hpp"
-#include "idl/dds/serialized_message.hpp"
+#include "idl/dds/serialized_sample.hpp"
 #include "idl/interface/topics.hpp"
 #include "nav_msgs.h"
 #include "octomap_msgs.h"
@@ -136,9 +136,9 @@ class Input {
     listen(false);
   }
 
-  [[nodiscard]] bool take(dds::SerializedMessage& sample) {
+  [[nodiscard]] bool take(dds::SerializedSample& sample) {
     SampleInfo info;
-    if (!reader_->take(sample, info)) return false;
+    if (!reader_->take(sample, info, {}, std::chrono::milliseconds(0))) return false;
     const auto& number = info.sample_identity.sequence_number();
     losses_.add(info.sample_identity.writer_guid(), number.to64long());
     return true;
@@ -157,7 +157,7 @@ class Input {
 
   dds::Participant& participant_;
   RecordableTopic topic_;
-  std::optional<dds::SerializedMessageReader> reader_;
+  std::optional<dds::SerializedSampleReader> reader_;
   bool as_offered_ = true;
   LossCounter losses_;
 };
@@ -182,13 +182,13 @@ Recorder::Recorder(const RecorderOptions& options)
 Recorder::~Recorder() = default;
 
 void Recorder::write_received() {
-  dds::SerializedMessage sample;
+  dds::SerializedSample sample;
   for (std::size_t i = 0; i < connection_->inputs.size(); ++i) {
     Input& input = *connection_->inputs[i];
     input.relax_qos();
     // One topic that never pauses does not starve the others.
     for (int taken = 0; taken < max_waiting && input.take(sample); ++taken) {
-      connection_->bag.add(i, wall_clock_ns(), sample.bytes);
+      connection_->bag.add(i, wall_clock_ns(), sample);
     }
   }
 }

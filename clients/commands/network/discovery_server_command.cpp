@@ -40,7 +40,7 @@ void add_discovery_server_command(CommandHandle program, Action& action) {
       .with_default();
   command.option("--domain", arguments->domain, "DDS domain of those who register")
       .from_environment("ROS_DOMAIN_ID")
-      .between(0, 232)
+      .between(0, dds::max_domain_id)
       .with_default();
   command
       .option("--interface", arguments->network.interfaces,

@@ -3,7 +3,7 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "idl/dds/security/security_error.hpp"
+#include "idl/dds/dds_error.hpp"
 
 namespace stillmap::cli {
 namespace {

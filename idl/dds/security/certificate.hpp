@@ -8,7 +8,7 @@
 #include <memory>
 #include <string>
 
-#include "idl/dds/security/security_error.hpp"
+#include "idl/dds/dds_error.hpp"
 
 namespace stillmap::dds {
 

@@ -1,4 +1,4 @@
-#include "idl/dds/untyped_service_server.hpp"
+#include "idl/dds/service_server.hpp"
 
 #include <utility>
 

@@ -1,4 +1,4 @@
-#include "idl/dds/untyped_service_client.hpp"
+#include "idl/dds/service_client.hpp"
 
 #include <algorithm>
 #include <utility>
