@@ -101,7 +101,7 @@ struct ServerArguments {
   std::optional<std::uint32_t> domain_id;
   std::optional<std::string> security;
   std::optional<std::string> map_file;
-  std::optional<Delivery> delivery;
+  std::optional<DeliveryMode> delivery;
 
   void apply_to(ServerConfig& config) const {
     if (domain_id) config.dds.domain_id = *domain_id;
@@ -123,8 +123,8 @@ void add_server_options(CLI::App& program, ServerArguments& server) {
       .add_option("--delivery", server.delivery,
                   "latest: drop scans that are too many; every: let the sender wait")
       ->option_text("latest|every")
-      ->transform(CLI::CheckedTransformer(std::map<std::string, Delivery>{
-          {"latest", Delivery::latest}, {"every", Delivery::every}}));
+      ->transform(CLI::CheckedTransformer(std::map<std::string, DeliveryMode>{
+          {"latest", DeliveryMode::latest}, {"every", DeliveryMode::every}}));
 }
 
 }  // namespace

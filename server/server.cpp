@@ -46,7 +46,7 @@ std::vector<dds::Diagnostic> host_diagnostics(std::uint32_t wanted_bytes) {
 
 ServerTraits traits(const ServerConfig& config, const Segmenter& labels,
                     const dds::DdsOptions& options) {
-  return {.delivery = delivery_mode(config.input.delivery),
+  return {.delivery = config.input.delivery,
           .label_source = labels.name(),
           .sensor = config.mapper.sensor.name,
           .points_topic = config.topics.points,
@@ -100,7 +100,7 @@ Server::~Server() = default;
 ThrottleCallback Server::throttle_callback(const ServerConfig& config,
                                            SaturationPolicy saturation_policy) const {
   // Where every scan counts, poses may come later, so that octree and areas keep up.
-  if (config.input.delivery == Delivery::every) return {};
+  if (config.input.delivery == DeliveryMode::every) return {};
   return make_throttle_callback(throttle_, saturation_policy);
 }
 
@@ -110,8 +110,6 @@ void Server::stop() {
   metrics_.reset();
   autosave_.reset();
   services_.reset();
-  occupancy_services_.reset();
-  removed_services_.reset();
   status_publisher_.reset();
   receiver_.reset();
   // They get little time while scans come.
@@ -146,7 +144,7 @@ void Server::start_mapping(const ServerConfig& config, std::unique_ptr<Segmenter
 
 void Server::start_services(const ServerConfig& config) {
   const auto status = [this] { return this->status(); };
-  const ServiceContext context{
+  ServiceContext context{
       .latest_map = latest_map_,
       .tiles = tiles_,
       .saver = saver_,
@@ -158,20 +156,25 @@ void Server::start_services(const ServerConfig& config) {
             tiles_.use_tile_store(tile_store);
           },
       .publish_now = [this] { mapping_->publish_now(); },
-      .traversability = traversability_cache_,
-      .grid_provider = grid_provider_,
-      .log = service_log_};
-  const dds::Services names = dds::Services::in(config.topics.name_space);
-  services_ = std::make_unique<MapServices>(participant_, names, context);
-  occupancy_services_ = std::make_unique<OccupancyServices>(
-      participant_, names, context, occupancy_ ? &*occupancy_ : nullptr, config.frames.map);
-  const RemovedSource removed{
       .removed = [this](const Eigen::AlignedBox3d& box_map) { return mapping_->removed(box_map); },
-      .restore =
+      .restore_removed =
           [this](RemovalReason reason, const Eigen::AlignedBox3d& box_map) {
             return mapping_->restore_removed(reason, box_map);
-          }};
-  removed_services_ = std::make_unique<RemovedVoxelServices>(participant_, names, context, removed);
+          },
+      .query_occupancy = {},
+      .encode_octomap = {},
+      .traversability = traversability_cache_,
+      .grid_provider = grid_provider_,
+      .map_frame = config.frames.map,
+      .log = service_log_};
+  if (occupancy_) {
+    context.query_occupancy = [this](const OccupancyQuery& query) {
+      return occupancy_->answer(query);
+    };
+    context.encode_octomap = [this](bool binary) { return occupancy_->encode(binary); };
+  }
+  services_ =
+      std::make_unique<MapServices>(participant_, config.topics.name_space, std::move(context));
   status_publisher_ = std::make_unique<StatusPublisher>(participant_, topics_,
                                                         config.publish.status_period_s, status);
 }

@@ -20,8 +20,6 @@
 #include "server/publishers/server_report.hpp"
 #include "server/publishers/status_publisher.hpp"
 #include "server/services/map_services.hpp"
-#include "server/services/occupancy_services.hpp"
-#include "server/services/removed_voxel_services.hpp"
 #include "server/traversability/traversability_grid_provider.hpp"
 #include "server/traversability/traversability_publisher.hpp"
 #include "server/traversability/traversability_thread.hpp"
@@ -76,8 +74,6 @@ class Server {
   std::unique_ptr<TraversabilityPublisher> traversability_publisher_;
   std::unique_ptr<TraversabilityThread> traversability_thread_;
   std::unique_ptr<MapServices> services_;
-  std::unique_ptr<OccupancyServices> occupancy_services_;
-  std::unique_ptr<RemovedVoxelServices> removed_services_;
   std::unique_ptr<StatusPublisher> status_publisher_;
   ThrottledLog save_log_;
   std::unique_ptr<CheckpointThread> autosave_;

@@ -10,6 +10,7 @@
 #include "idl/dds/participant.hpp"
 #include "idl/dds/service_client.hpp"
 #include "idl/dds/transports.hpp"
+#include "idl/interface/services.hpp"
 #include "idl/interface/topics.hpp"
 #include "stillmap_msgs.h"
 #include "tf2_msgs.h"
@@ -32,8 +33,9 @@ std::int64_t now_ns() {
 /// First parts of the names under which somebody answers get_status, and who that is.
 std::map<std::string, std::vector<dds::RemoteParticipant>> name_spaces(
     const std::vector<dds::RemoteParticipant>& participants) {
-  const std::string begin = "rq/";
-  const std::string end = "/get_statusRequest";
+  const std::string any = dds::request_topic(dds::services::get_status.in("*"));
+  const std::string begin = any.substr(0, any.find('*'));
+  const std::string end = any.substr(begin.size() + 1);
   std::map<std::string, std::vector<dds::RemoteParticipant>> found;
   for (const dds::RemoteParticipant& participant : participants) {
     for (const dds::Endpoint& endpoint : participant.endpoints) {
@@ -62,7 +64,7 @@ DiscoveredServer query_status(dds::Participant& participant, const std::string& 
   DiscoveredServer server;
   server.name_space = name_space;
   server.participants = std::move(participants);
-  StatusClient client(participant, dds::Services::in(name_space).get_status);
+  StatusClient client(participant, dds::services::get_status.in(name_space));
   server.fault = client.refusal();
   if (!server.fault.empty()) return server;
   GetStatus_Request request;

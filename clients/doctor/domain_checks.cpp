@@ -2,7 +2,7 @@
 
 #include "clients/doctor/checks.hpp"
 #include "idl/interface/participant_diagnostics.hpp"
-#include "idl/interface/topics.hpp"
+#include "idl/interface/services.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -84,7 +84,7 @@ dds::Diagnostic missing_server_diagnostic(const SystemSnapshot& snapshot) {
     diagnostic.hint = "use that domain: --domain, ROS_DOMAIN_ID, dds.domain_id";
   } else {
     diagnostic.evidence =
-        "nobody here answers " + dds::Services::in(snapshot.server_name).get_status;
+        "nobody here answers " + dds::services::get_status.in(snapshot.server_name);
     diagnostic.hint = "start stillmap-server --domain " + std::to_string(snapshot.dds.domain_id);
   }
   return diagnostic;

@@ -2,16 +2,31 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
+#include <thread>
 #include <utility>
 
 #include "clients/library/connection.hpp"
+#include "clients/library/region_subscription.hpp"
 #include "clients/library/tcp_rejoin_backoff.hpp"
+#include "core/occupancy/octomap_data.hpp"
+#include "idl/conversions/cloud_reader.hpp"
+#include "idl/conversions/occupancy_grid.hpp"
+#include "idl/conversions/occupancy_query.hpp"
+#include "idl/conversions/octomap.hpp"
+#include "idl/conversions/path_query.hpp"
+#include "idl/conversions/pose.hpp"
+#include "idl/conversions/region.hpp"
+#include "idl/conversions/removed_voxels.hpp"
 #include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"
+#include "idl/conversions/traversability_query.hpp"
+#include "sensor_msgs.h"
 
 namespace stillmap {
 
 using namespace stillmap_msgs::srv;
+namespace services = dds::services;
 
 namespace {
 
@@ -31,6 +46,37 @@ void append_page(const MapQueryResult& page, MapQueryResult& whole) {
   whole.voxels.insert(whole.voxels.end(), page.voxels.begin(), page.voxels.end());
 }
 
+/// A reader and the thread that hands its samples to the callback.
+template <typename T>
+class ReceiverThread final : public Subscription::Receiver {
+ public:
+  ReceiverThread(dds::Participant& participant, const dds::TopicSpec<T>& topic,
+                 std::function<void(const T&)> sample_arrived)
+      : sample_arrived_(std::move(sample_arrived)),
+        reader_(participant, topic.dds_name, topic.reader),
+        thread_([this](const std::stop_token& stop) { receive(stop); }) {}
+
+ private:
+  void receive(const std::stop_token& stop) {
+    T sample;
+    while (!stop.stop_requested()) {
+      if (reader_.take(sample, stop, std::chrono::seconds(1))) sample_arrived_(sample);
+    }
+  }
+
+  std::function<void(const T&)> sample_arrived_;
+  dds::Reader<T> reader_;
+  // Last: stops before what it uses is gone.
+  std::jthread thread_;
+};
+
+template <typename T>
+Subscription subscribe(dds::Participant& participant, const dds::TopicSpec<T>& topic,
+                       std::function<void(const T&)> sample_arrived) {
+  return Subscription(
+      std::make_unique<ReceiverThread<T>>(participant, topic, std::move(sample_arrived)));
+}
+
 }  // namespace
 
 std::unique_ptr<Client::Connection> Client::connect(const ClientOptions& options) {
@@ -41,8 +87,9 @@ std::unique_ptr<Client::Connection> Client::connect(const ClientOptions& options
   GetStatus_Request request;
   request.format_version(dds::wire_format_version);
   TcpRejoinBackoff backoff(options.dds, options.request_timeout);
-  while (connection->get_status.refusal().empty() &&
-         !connection->get_status.call(request, backoff.next_wait()) && !backoff.timed_out()) {
+  while (connection->client_of(services::get_status).refusal().empty() &&
+         !connection->client_of(services::get_status).call(request, backoff.next_wait()) &&
+         !backoff.timed_out()) {
     if (backoff.rejoin_due()) connection = std::make_unique<Connection>(options);
   }
   connection->connecting_since = began;
@@ -62,25 +109,18 @@ void Client::wait_for_server(std::chrono::milliseconds timeout) {
         std::chrono::steady_clock::now() - connection_->connecting_since);
     waited = std::min(since, timeout / 2);
   }
-  static_cast<void>(connection_->call(connection_->get_status, connection_->names.get_status,
-                                      GetStatus_Request(), timeout - waited, waited));
+  static_cast<void>(
+      connection_->call(services::get_status, GetStatus_Request(), timeout - waited, waited));
 }
 
 dds::ServerStatus Client::status() {
-  const auto reply = connection_->call_ok(connection_->get_status, connection_->names.get_status,
-                                          GetStatus_Request());
-  auto status = wire::from_wire(reply.server());
-  if (!status) throw malformed_reply(connection_->names.get_status);
-  return *std::move(status);
+  const auto reply = connection_->call_ok(services::get_status, GetStatus_Request());
+  return connection_->require_readable(wire::from_wire(reply.server()), services::get_status);
 }
 
 MapQueryResult Client::get_static_map(const MapQuery& query) {
-  const auto reply =
-      connection_->call(connection_->get_static_map, connection_->names.get_static_map,
-                        wire::to_request(query), connection_->options.request_timeout);
-  auto result = wire::from_response(reply);
-  if (!result) throw malformed_reply(connection_->names.get_static_map);
-  return *std::move(result);
+  const auto reply = connection_->call(services::get_static_map, wire::to_request(query));
+  return connection_->require_readable(wire::from_response(reply), services::get_static_map);
 }
 
 MapQueryResult Client::get_whole_static_map(
@@ -106,13 +146,11 @@ TileVersions Client::get_tile_versions(const Eigen::AlignedBox3d& box_map) {
   request.min_y(box_map.min().y());
   request.max_x(box_map.max().x());
   request.max_y(box_map.max().y());
-  const auto reply = connection_->call_ok(connection_->get_tile_versions,
-                                          connection_->names.get_tile_versions, std::move(request));
+  const auto reply = connection_->call_ok(services::get_tile_versions, std::move(request));
   TileVersions versions{.map = wire::from_wire(reply.identity()), .tiles = {}};
   for (const auto& message : reply.tiles()) {
-    const auto info = wire::from_wire(message);
-    if (!info) throw malformed_reply(connection_->names.get_tile_versions);
-    versions.tiles.push_back(*info);
+    versions.tiles.push_back(
+        connection_->require_readable(wire::from_wire(message), services::get_tile_versions));
   }
   return versions;
 }
@@ -121,19 +159,86 @@ TileVersions Client::get_tile_versions() { return get_tile_versions(unbounded_bo
 
 TileSet Client::get_tiles(std::span<const TileId> ids) { return connection_->fetch_tiles(ids); }
 
+OctomapData Client::octomap(bool full) {
+  const auto& service = full ? services::octomap_full : services::octomap_binary;
+  const auto reply = connection_->call(service, octomap_msgs::srv::GetOctomap_Request());
+  // The standard's reply has no place for a reason.
+  if (reply.map().id().empty()) {
+    throw ServiceError(connection_->name_of(service) +
+                       " has no octree: the server's configuration has occupancy.enabled false");
+  }
+  auto data = wire::from_octomap(reply.map());
+  const bool is_sound = data && data->binary != full && check_octomap(*data).fault.empty();
+  if (!is_sound) data.reset();
+  return connection_->require_readable(std::move(data), service);
+}
+
+OccupancyAnswers Client::query_occupancy(const OccupancyQuery& query) {
+  const auto reply = connection_->call_ok(services::query_occupancy, wire::to_request(query));
+  auto answers = wire::from_response(reply);
+  const bool answers_all = answers && answers->points.size() == query.points_map.size() &&
+                           answers->boxes.size() == query.boxes_map.size() &&
+                           answers->rays.size() == query.rays.size();
+  if (!answers_all) answers.reset();
+  return connection_->require_readable(std::move(answers), services::query_occupancy);
+}
+
+TraversabilityAnswer Client::get_traversable_area(const TraversabilityQuery& query) {
+  constexpr const auto& service = services::get_traversable_area;
+  const auto reply = connection_->call_unfailing(service, wire::to_request(query));
+  return connection_->require_readable(wire::from_response(reply), service);
+}
+
+PathCheck Client::check_path(const PathQuery& query) {
+  constexpr const auto& service = services::check_path;
+  const auto reply = connection_->call_unfailing(service, wire::to_request(query));
+  return connection_->require_readable(wire::from_response(reply), service);
+}
+
+NearestTraversable Client::nearest_traversable(const std::string& profile,
+                                               const Eigen::Vector2d& position_map,
+                                               double max_distance_m) {
+  constexpr const auto& service = services::nearest_traversable;
+  NearestTraversable_Request request;
+  request.profile(profile);
+  request.x(position_map.x());
+  request.y(position_map.y());
+  request.max_distance_m(max_distance_m);
+  const auto reply = connection_->call_unfailing(service, std::move(request));
+  return connection_->require_readable(wire::from_response(reply), service);
+}
+
+OccupancyGrid Client::planning_grid() {
+  const auto reply = connection_->call(services::get_map, nav_msgs::srv::GetMap_Request());
+  return connection_->require_readable(wire::from_message(reply.map()), services::get_map);
+}
+
+RemovedVoxels Client::get_removed(const Region& region, std::uint32_t max_voxels) {
+  GetRemoved_Request request;
+  request.region(wire::to_wire(region));
+  request.max_voxels(max_voxels);
+  const auto reply = connection_->call_ok(services::get_removed, std::move(request));
+  return {connection_->require_readable(wire::from_response(reply), services::get_removed),
+          reply.total()};
+}
+
+std::uint64_t Client::restore_removed(RemovalReason reason, const BoxRegion& box) {
+  RestoreRemoved_Request request;
+  request.region(wire::to_wire(Region(box)));
+  request.reason(static_cast<std::uint8_t>(reason));
+  return connection_->call_ok(services::restore_removed, std::move(request)).restored();
+}
+
 std::string Client::save_map(const std::string& file) {
   SaveMap_Request request;
   request.file(file);
-  return connection_
-      ->call_ok(connection_->save_map, connection_->names.save_map, std::move(request))
-      .file();
+  return connection_->call_ok(services::save_map, std::move(request)).file();
 }
 
 LoadedMap Client::load_map(const std::string& file) {
   LoadMap_Request request;
   request.file(file);
-  const auto reply =
-      connection_->call_ok(connection_->load_map, connection_->names.load_map, std::move(request));
+  const auto reply = connection_->call_ok(services::load_map, std::move(request));
   return {.file = reply.file(),
           .map_id = reply.status().map_id(),
           .tile_count = reply.tile_count(),
@@ -141,9 +246,108 @@ LoadedMap Client::load_map(const std::string& file) {
 }
 
 std::uint64_t Client::reset() {
-  return connection_->call_ok(connection_->reset, connection_->names.reset, Reset_Request())
-      .status()
-      .map_id();
+  return connection_->call_ok(services::reset, Reset_Request()).status().map_id();
+}
+
+Subscription Client::subscribe_points(const std::string& ros_topic, DeliveryMode delivery,
+                                      const wire::CloudReadOptions& reading,
+                                      std::function<void(const Scan&)> scan_arrived) {
+  constexpr int queue_length = 10;
+  return subscribe<sensor_msgs::msg::PointCloud2>(
+      connection_->participant, dds::points_topic(ros_topic, delivery, queue_length),
+      [reader = wire::CloudReader(reading),
+       arrived = std::move(scan_arrived)](const sensor_msgs::msg::PointCloud2& message) mutable {
+        const auto read = reader.read(message);
+        if (read.from_cloud.scan) arrived(*read.from_cloud.scan);
+      });
+}
+
+Subscription Client::subscribe_labelled_scans(std::function<void(const Scan&)> scan_arrived) {
+  dds::TopicSpec<sensor_msgs::msg::PointCloud2> topic = connection_->topics.scan;
+  topic.reader.depth = 10;
+  return subscribe<sensor_msgs::msg::PointCloud2>(
+      connection_->participant, topic,
+      [arrived = std::move(scan_arrived)](const sensor_msgs::msg::PointCloud2& message) {
+        const auto read = wire::to_scan(message, {.fields = {}, .labels_are_classes = true});
+        if (read.scan) arrived(*read.scan);
+      });
+}
+
+Subscription Client::subscribe_odometry(std::function<void(const OdometryUpdate&)> pose_arrived) {
+  return subscribe<nav_msgs::msg::Odometry>(
+      connection_->participant, connection_->topics.odometry,
+      [arrived = std::move(pose_arrived)](const nav_msgs::msg::Odometry& message) {
+        const auto odometry = wire::from_odometry(message);
+        if (odometry) arrived({.pose = odometry->pose, .covariance = odometry->covariance});
+      });
+}
+
+Subscription Client::subscribe_status(
+    std::function<void(const dds::ServerStatus&)> status_arrived) {
+  return subscribe<stillmap_msgs::msg::Status>(
+      connection_->participant, connection_->topics.status,
+      [arrived = std::move(status_arrived)](const stillmap_msgs::msg::Status& message) {
+        const auto status = wire::from_wire(message);
+        if (status) arrived(*status);
+      });
+}
+
+Subscription Client::subscribe_octomap(std::function<void(const OctomapData&)> octomap_arrived) {
+  return subscribe<octomap_msgs::msg::Octomap>(
+      connection_->participant, connection_->topics.octomap,
+      [arrived = std::move(octomap_arrived)](const octomap_msgs::msg::Octomap& message) {
+        const auto data = wire::from_octomap(message);
+        if (data && check_octomap(*data).fault.empty()) arrived(*data);
+      });
+}
+
+Subscription Client::subscribe_path(std::function<void(const Trajectory&)> path_arrived) {
+  return subscribe<nav_msgs::msg::Path>(
+      connection_->participant, connection_->topics.path,
+      [arrived = std::move(path_arrived)](const nav_msgs::msg::Path& message) {
+        arrived(wire::from_path(message));
+      });
+}
+
+Subscription Client::subscribe_planning_grid(
+    std::function<void(const OccupancyGrid&)> grid_arrived) {
+  return subscribe<nav_msgs::msg::OccupancyGrid>(
+      connection_->participant, connection_->topics.traversability,
+      [arrived = std::move(grid_arrived)](const nav_msgs::msg::OccupancyGrid& message) {
+        const auto grid = wire::from_message(message);
+        if (grid) arrived(*grid);
+      });
+}
+
+Subscription Client::subscribe_tiles(
+    std::function<void(const dds::MapIdentity&, const Tile&)> tile_arrived) {
+  return subscribe<stillmap_msgs::msg::MapTile>(
+      connection_->participant, connection_->topics.tiles,
+      [arrived = std::move(tile_arrived)](const stillmap_msgs::msg::MapTile& message) {
+        const auto tile = wire::from_wire(message);
+        if (tile) arrived(wire::from_wire(message.identity()), *tile);
+      });
+}
+
+Subscription Client::subscribe_tile_index(
+    std::function<void(const dds::MapIdentity&, const TileInfo&)> info_arrived) {
+  return subscribe<stillmap_msgs::msg::TileInfo>(
+      connection_->participant, connection_->topics.tile_index,
+      [arrived = std::move(info_arrived)](const stillmap_msgs::msg::TileInfo& message) {
+        const auto info = wire::from_wire(message);
+        if (info) arrived(wire::from_wire(message.identity()), *info);
+      });
+}
+
+Subscription Client::subscribe_region(const Region& region,
+                                      std::function<void(const RegionUpdate&)> update_arrived) {
+  const RegionShape shape(region);
+  const double tile_size_m = get_tile_versions(shape.bounds_map()).map.tile_size_m;
+  Connection& connection = *connection_;
+  return make_region_subscription(
+      connection.participant, connection.topics.tile_index, region, tile_size_m,
+      [&connection](std::span<const TileId> ids) { return connection.fetch_tiles(ids); },
+      std::move(update_arrived));
 }
 
 }  // namespace stillmap

@@ -10,7 +10,6 @@
 #include <string>
 #include <vector>
 
-#include "clients/library/subscription.hpp"
 #include "core/lidar/scan.hpp"
 #include "core/lidar/trajectory.hpp"
 #include "core/map/query/map_query.hpp"
@@ -97,6 +96,26 @@ struct RegionUpdate {
   std::vector<Tile> appeared;
   std::vector<Tile> changed;
   std::vector<TileId> removed;
+};
+
+/// Keeps a subscription alive. Ends it when destroyed, after a running callback returned; must not
+/// be destroyed from inside its own callback.
+class Subscription {
+ public:
+  /// What a subscription holds: a reader and the thread that waits on it.
+  class Receiver {
+   public:
+    virtual ~Receiver() = default;
+  };
+
+  Subscription() = default;
+  explicit Subscription(std::unique_ptr<Receiver> receiver) : receiver_(std::move(receiver)) {}
+
+  /// Ends it early.
+  void end() { receiver_.reset(); }
+
+ private:
+  std::unique_ptr<Receiver> receiver_;
 };
 
 /// A client of one stillmap-server. Requests may come from any thread and block until the answer is
@@ -206,8 +225,7 @@ class Client {
   /// Scans of the sensor's topic (ROS 2 name), as the server gets them; those that cannot be read
   /// are passed over. `delivery` is the server's: with `every`, a lossless sender waits for this
   /// subscription, too.
-  [[nodiscard]] Subscription subscribe_points(const std::string& ros_topic,
-                                              dds::DeliveryMode delivery,
+  [[nodiscard]] Subscription subscribe_points(const std::string& ros_topic, DeliveryMode delivery,
                                               const wire::CloudReadOptions& reading,
                                               std::function<void(const Scan&)> scan_arrived);
   /// Prepared scans with the classes that the server gave them: the usable points only,

@@ -2,6 +2,12 @@
 
 #include "idl/conversions/tile.hpp"
 #include "idl/interface/participant_diagnostics.hpp"
+#include "nav_msgs.h"
+#include "octomap_msgs.h"
+#include "removed_voxels.h"
+#include "stillmap_msgs.h"
+#include "stillmap_occupancy.h"
+#include "traversable_area.h"
 
 namespace stillmap {
 
@@ -18,63 +24,47 @@ std::vector<stillmap_msgs::msg::TileId> to_wire(std::span<const TileId> ids) {
   return out;
 }
 
-void add_tiles(const GetTiles_Response& reply, TileSet& set) {
-  for (const auto& message : reply.tiles()) {
-    auto tile = wire::from_wire(message);
-    if (!tile) throw malformed_reply("get_tiles");
-    set.tiles.push_back(*std::move(tile));
-  }
-  for (const auto& id : reply.missing()) set.missing.push_back({id.x(), id.y()});
-}
-
 }  // namespace
-
-ServiceError malformed_reply(const std::string& service) {
-  return ServiceError("the answer of " + service +
-                      " cannot be understood; client and server must have the same version");
-}
 
 Client::Connection::Connection(const ClientOptions& client_options)
     : options(client_options),
       topics(dds::Topics::in(options.server_name)),
-      names(dds::Services::in(options.server_name)),
-      participant(options.dds),
-      get_static_map(participant, names.get_static_map),
-      get_tile_versions(participant, names.get_tile_versions),
-      get_tiles(participant, names.get_tiles),
-      get_status(participant, names.get_status),
-      save_map(participant, names.save_map),
-      load_map(participant, names.load_map),
-      reset(participant, names.reset),
-      octomap_binary(participant, names.octomap_binary),
-      octomap_full(participant, names.octomap_full),
-      query_occupancy(participant, names.query_occupancy),
-      get_traversable_area(participant, names.get_traversable_area),
-      check_path(participant, names.check_path),
-      nearest_traversable(participant, names.nearest_traversable),
-      get_removed(participant, names.get_removed),
-      restore_removed(participant, names.restore_removed),
-      get_map(participant, names.get_map) {}
+      participant(options.dds) {
+  dds::for_each_service(
+      [this]<typename Request, typename Reply>(const dds::ServiceSpec<Request, Reply>& spec) {
+        clients.emplace(spec.name, std::make_shared<dds::ServiceClient<Request, Reply>>(
+                                       participant, name_of(spec)));
+      });
+}
 
 TileSet Client::Connection::fetch_tiles(std::span<const TileId> ids) {
+  constexpr const auto& service = dds::services::get_tiles;
   TileSet set;
   auto remaining = to_wire(ids);
   while (!remaining.empty()) {
     GetTiles_Request request;
     request.ids(remaining);
-    const auto reply = call_ok(get_tiles, names.get_tiles, std::move(request));
-    if (reply.left_out().size() >= remaining.size()) throw malformed_reply(names.get_tiles);
+    const auto reply = call_ok(service, std::move(request));
+    if (reply.left_out().size() >= remaining.size()) throw malformed_reply(name_of(service));
     set.map = wire::from_wire(reply.identity());
-    add_tiles(reply, set);
+    for (const auto& tile : reply.tiles()) {
+      set.tiles.push_back(require_readable(wire::from_wire(tile), service));
+    }
+    for (const auto& id : reply.missing()) set.missing.push_back({id.x(), id.y()});
     remaining = reply.left_out();
   }
   return set;
 }
 
-ServiceTimeout Client::Connection::timeout_error(const std::string& name,
+ServiceError Client::Connection::malformed_reply(const std::string& service) {
+  return ServiceError("the answer of " + service +
+                      " cannot be understood; client and server must have the same version");
+}
+
+ServiceTimeout Client::Connection::timeout_error(const std::string& service,
                                                  std::chrono::milliseconds timeout,
                                                  bool found) const {
-  std::string text = "no answer from service " + name + " in DDS domain " +
+  std::string text = "no answer from service " + service + " in DDS domain " +
                      std::to_string(options.dds.domain_id) + " within " +
                      std::to_string(timeout.count()) + " ms: ";
   if (found) return ServiceTimeout(text + "a server is there but too busy, or it was just killed");

@@ -1,10 +1,10 @@
+#include "clients/library/region_subscription.hpp"
+
 #include <chrono>
 #include <optional>
 #include <thread>
 #include <utility>
 
-#include "clients/library/connection.hpp"
-#include "clients/library/region_tracker.hpp"
 #include "core/map/voxel_grid.hpp"
 #include "idl/conversions/tile.hpp"
 #include "idl/dds/reader.hpp"
@@ -30,8 +30,6 @@ dds::ContentFilter filter_for(const Region& region, double tile_size_m) {
 /// The reader of a region's part of the index, and the thread that turns entries into updates.
 class RegionReceiver final : public Subscription::Receiver {
  public:
-  using FetchTiles = std::function<TileSet(std::span<const TileId>)>;
-
   RegionReceiver(dds::Participant& participant,
                  const dds::TopicSpec<stillmap_msgs::msg::TileInfo>& index, const Region& region,
                  double tile_size_m, FetchTiles fetch,
@@ -77,7 +75,7 @@ class RegionReceiver final : public Subscription::Receiver {
     try {
       return fetch_(tracker_.pending());
     } catch (const ServiceError&) {
-      // The server is gone or busy. What is pending stays pending, and is asked for again.
+      // The server is gone or busy. The tiles stay pending and are fetched later.
       return std::nullopt;
     }
   }
@@ -93,15 +91,50 @@ class RegionReceiver final : public Subscription::Receiver {
 
 }  // namespace
 
-Subscription Client::subscribe_region(const Region& region,
+void RegionTracker::add_index_entry(const dds::MapIdentity& map, const TileInfo& info) {
+  if (!region_.may_intersect(tile_footprint(info.id, tile_size_m_))) return;
+  if (map.map_id != map_.map_id) clear();
+  map_ = map;
+  if (info.voxel_count == 0) {
+    remove(info.id);
+  } else {
+    pending_.insert(info.id);
+  }
+}
+
+void RegionTracker::clear() {
+  removed_.merge(known_);
+  known_.clear();
+  pending_.clear();
+}
+
+void RegionTracker::remove(TileId id) {
+  pending_.erase(id);
+  if (known_.erase(id) > 0) removed_.insert(id);
+}
+
+RegionUpdate RegionTracker::take_update(TileSet fetched) {
+  RegionUpdate update{.map = map_, .appeared = {}, .changed = {}, .removed = {}};
+  if (fetched.map.map_id == map_.map_id) {
+    for (const TileId id : fetched.missing) remove(id);
+    for (Tile& tile : fetched.tiles) {
+      pending_.erase(tile.info.id);
+      const bool is_replaced = removed_.erase(tile.info.id) > 0;
+      const bool is_known = !known_.insert(tile.info.id).second || is_replaced;
+      (is_known ? update.changed : update.appeared).push_back(std::move(tile));
+    }
+  }
+  update.removed.assign(removed_.begin(), removed_.end());
+  removed_.clear();
+  return update;
+}
+
+Subscription make_region_subscription(dds::Participant& participant,
+                                      const dds::TopicSpec<stillmap_msgs::msg::TileInfo>& index,
+                                      const Region& region, double tile_size_m, FetchTiles fetch,
                                       std::function<void(const RegionUpdate&)> update_arrived) {
-  const RegionShape shape(region);
-  const double tile_size_m = get_tile_versions(shape.bounds_map()).map.tile_size_m;
-  Connection& connection = *connection_;
   return Subscription(std::make_unique<RegionReceiver>(
-      connection.participant, connection.topics.tile_index, region, tile_size_m,
-      [&connection](std::span<const TileId> ids) { return connection.fetch_tiles(ids); },
-      std::move(update_arrived)));
+      participant, index, region, tile_size_m, std::move(fetch), std::move(update_arrived)));
 }
 
 }  // namespace stillmap

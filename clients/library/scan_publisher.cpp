@@ -22,10 +22,9 @@ struct ScanPublisher::Connection {
 
   static dds::TopicSpec<sensor_msgs::msg::PointCloud2> topic_of(
       const ScanPublisherOptions& options) {
-    return dds::points_topic(
-        options.points_topic,
-        options.lossless ? dds::DeliveryMode::every : dds::DeliveryMode::latest,
-        options.max_scans_in_flight);
+    return dds::points_topic(options.points_topic,
+                             options.lossless ? DeliveryMode::every : DeliveryMode::latest,
+                             options.max_scans_in_flight);
   }
 
   ScanPublisherOptions options;

@@ -129,8 +129,8 @@ void read_fields(YamlSection section, PointFieldNames& fields) {
 }
 
 void read_input(YamlSection section, InputConfig& input) {
-  section.choice<Delivery>("delivery", input.delivery,
-                           {{"latest", Delivery::latest}, {"every", Delivery::every}});
+  section.choice<DeliveryMode>("delivery", input.delivery,
+                           {{"latest", DeliveryMode::latest}, {"every", DeliveryMode::every}});
   section.integer("queue_length", input.queue_length, {1, 1000});
   read_fields(section.section("fields"), input.fields);
   section.choice<LabelKind>(

@@ -8,6 +8,7 @@
 #include "config/loaders/config_error.hpp"
 #include "config/loaders/config_report.hpp"
 #include "config/loaders/dds_profile.hpp"
+#include "core/lidar/delivery_mode.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/mapper.hpp"
 #include "core/occupancy/occupancy_config.hpp"
@@ -69,13 +70,6 @@ struct TopicsConfig {
   std::string odometry_prior = "odom_prior";
 };
 
-enum class Delivery {
-  /// Best-effort reader and a queue that drops the oldest scan: live sensors.
-  latest,
-  /// Reliable KEEP_ALL reader with back-pressure: the sender waits, nothing is lost. Replays.
-  every,
-};
-
 /// What the numbers in a cloud's label field are.
 enum class LabelKind {
   /// Original SemanticKITTI ids (10 = car); moving ids are reduced to their class.
@@ -93,7 +87,7 @@ struct PointFieldNames {
 };
 
 struct InputConfig {
-  Delivery delivery = Delivery::latest;
+  DeliveryMode delivery = DeliveryMode::latest;
   /// Scans that may wait for the mapper.
   std::uint32_t queue_length = 3;
   PointFieldNames fields;

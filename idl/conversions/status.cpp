@@ -110,14 +110,14 @@ stillmap_msgs::msg::Status to_wire(const dds::ServerStatus& status) {
 std::optional<dds::ServerStatus> from_wire(const stillmap_msgs::msg::Status& message) {
   const auto stamp = stamp_ns(message.stamp());
   if (message.format_version() != dds::wire_format_version || !stamp ||
-      message.delivery() > static_cast<std::uint8_t>(dds::DeliveryMode::every) ||
+      message.delivery() > static_cast<std::uint8_t>(DeliveryMode::every) ||
       message.health() > static_cast<std::uint8_t>(OdometryHealth::lost)) {
     return std::nullopt;
   }
   dds::ServerStatus status{.stamp_ns = *stamp,
                            .software_version = message.software_version(),
                            .uptime_s = message.uptime_s(),
-                           .delivery = static_cast<dds::DeliveryMode>(message.delivery()),
+                           .delivery = static_cast<DeliveryMode>(message.delivery()),
                            .label_source = message.label_source(),
                            .health = static_cast<OdometryHealth>(message.health()),
                            .reason = message.reason(),

@@ -18,9 +18,9 @@ namespace stillmap::dds {
 [[nodiscard]] std::string ros_type_name(const eprosima::fastdds::dds::TypeSupport& type);
 
 /// Carries samples of a generated type, in CDR, as the code does that fastddsgen generates beside
-/// the type; but bytes that are no sample of it (an unknown encapsulation, a boolean that is neither
-/// 0 nor 1) are refused, whereas generated code throws, which Fast DDS does not catch: anybody in
-/// the domain could end the program.
+/// the type; but bytes that are no sample of it (an unknown encapsulation, a boolean that is
+/// neither 0 nor 1) are refused, whereas generated code throws, which Fast DDS does not catch:
+/// anybody in the domain could end the program.
 class CdrTypeSupport : public eprosima::fastdds::dds::TopicDataType {
  public:
   bool serialize(void* sample, eprosima::fastrtps::rtps::SerializedPayload_t* payload) override;

@@ -2,15 +2,15 @@
 
 #include <array>
 
+#include "idl/dds/ros_graph.hpp"
 #include "idl/dds/service_identity.hpp"
+#include "idl/interface/services.hpp"
+#include "idl/interface/topics.hpp"
 
 namespace stillmap::dds {
 namespace {
 
 using Names = std::vector<std::string>;
-
-// ROS 2's list of nodes and their ends, which every participant keeps.
-constexpr const char* ros_discovery = "ros_discovery_info";
 
 constexpr std::array roles{Role::server, Role::sensor, Role::planner, Role::operator_of_server};
 
@@ -18,31 +18,21 @@ void append(Names& names, const Names& more) {
   names.insert(names.end(), more.begin(), more.end());
 }
 
-Names all_services(const ServiceNames& services) {
-  Names all = services.read_only;
-  append(all, services.modifying);
-  return all;
-}
-
-/// What is sent into the server.
+/// Topics that the server reads.
 Names inputs(const TopicNames& names) {
   Names topics{"rt/" + names.points};
   if (!names.odometry_prior.empty()) topics.push_back("rt/" + names.odometry_prior);
   return topics;
 }
 
-void allow_calling(Access& access, const Names& services) {
-  for (const std::string& service : services) {
-    access.publish.push_back(request_topic(service));
-    access.subscribe.push_back(reply_topic(service));
-  }
+void allow_calling(Access& access, const std::string& service) {
+  access.publish.push_back(request_topic(service));
+  access.subscribe.push_back(reply_topic(service));
 }
 
-void allow_serving(Access& access, const Names& services) {
-  for (const std::string& service : services) {
-    access.publish.push_back(reply_topic(service));
-    access.subscribe.push_back(request_topic(service));
-  }
+void allow_serving(Access& access, const std::string& service) {
+  access.publish.push_back(reply_topic(service));
+  access.subscribe.push_back(request_topic(service));
 }
 
 }  // namespace
@@ -78,47 +68,37 @@ const std::string& role_names() {
 }
 
 std::vector<std::string> published_topics(const std::string& name_space) {
-  // Every field by name: one more in Topics, and this does not compile.
-  const auto [odometry, tf, path, scan, static_cloud, tile_index, tiles, status, octomap,
-              traversability] = Topics::in(name_space);
-  return {odometry.dds_name,      tf.dds_name,           path.dds_name,
-          scan.dds_name,          static_cloud.dds_name, tile_index.dds_name,
-          tiles.dds_name,         status.dds_name,       octomap.dds_name,
-          traversability.dds_name};
-}
-
-ServiceNames service_names(const std::string& name_space) {
-  // Every field by name, as above.
-  const auto [get_static_map, get_tile_versions, get_tiles, get_status, save_map, load_map, reset,
-              octomap_binary, octomap_full, get_removed, restore_removed, query_occupancy,
-              get_traversable_area, check_path, nearest_traversable, get_map] =
-      Services::in(name_space);
-  return {.read_only = {get_static_map, get_tile_versions, get_tiles, get_status, octomap_binary,
-                        octomap_full, get_removed, query_occupancy, get_traversable_area,
-                        check_path, nearest_traversable, get_map},
-          .modifying = {save_map, load_map, reset, restore_removed}};
+  Names names;
+  for_each_topic(Topics::in(name_space),
+                 [&](const auto& topic) { names.push_back(topic.dds_name); });
+  return names;
 }
 
 Access access_of(Role role, const TopicNames& names) {
-  Access access{.publish = {ros_discovery}, .subscribe = {ros_discovery}};
-  const Names outputs = published_topics(names.name_space);
-  const ServiceNames services = service_names(names.name_space);
+  // Every ROS 2 participant announces its node, and hears of the others.
+  Access access{.publish = {ros_discovery_topic}, .subscribe = {ros_discovery_topic}};
+  const std::string& name_space = names.name_space;
+  const Names outputs = published_topics(name_space);
   switch (role) {
     case Role::server:
       append(access.publish, outputs);
       append(access.subscribe, inputs(names));
-      allow_serving(access, all_services(services));
+      for_each_service([&](const auto& service) { allow_serving(access, service.in(name_space)); });
       break;
     case Role::sensor:
       append(access.publish, inputs(names));
       append(access.subscribe, outputs);
-      allow_calling(access, {Services::in(names.name_space).get_status});
+      allow_calling(access, services::get_status.in(name_space));
       break;
     case Role::planner:
     case Role::operator_of_server:
       append(access.subscribe, outputs);
       append(access.subscribe, inputs(names));
-      allow_calling(access, role == Role::planner ? services.read_only : all_services(services));
+      for_each_service([&](const auto& service) {
+        const bool may_call =
+            role == Role::operator_of_server || service.effect == ServiceEffect::reads;
+        if (may_call) allow_calling(access, service.in(name_space));
+      });
       break;
   }
   return access;

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "idl/dds/security/access.hpp"
-#include "idl/interface/topics.hpp"
 
 namespace stillmap::dds {
 
@@ -39,15 +38,7 @@ struct TopicNames {
 /// DDS names of everything that the server publishes.
 [[nodiscard]] std::vector<std::string> published_topics(const std::string& name_space);
 
-/// ROS 2 names of the services, by what they do to the map.
-struct ServiceNames {
-  std::vector<std::string> read_only;
-  std::vector<std::string> modifying;
-};
-[[nodiscard]] ServiceNames service_names(const std::string& name_space);
-
-/// What a role may do. Derived from Topics and Services: a topic or service that is added there and
-/// not here does not compile.
+/// What a role may do: derived from the tables of topics and services.
 [[nodiscard]] Access access_of(Role role, const TopicNames& names);
 
 }  // namespace stillmap::dds

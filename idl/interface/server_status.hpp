@@ -5,22 +5,11 @@
 #include <string_view>
 #include <vector>
 
+#include "core/lidar/delivery_mode.hpp"
 #include "core/odometry/odometry_state.hpp"
 #include "idl/interface/diagnostic.hpp"
 
 namespace stillmap::dds {
-
-/// What the server does with scans that come faster than it maps them.
-enum class DeliveryMode : std::uint8_t {
-  /// The newest scans count: the oldest waiting one is dropped and counted.
-  latest = 0,
-  /// Every scan counts: a full queue makes a reliable publisher wait.
-  every = 1,
-};
-
-[[nodiscard]] constexpr const char* name(DeliveryMode mode) {
-  return mode == DeliveryMode::every ? "every" : "latest";
-}
 
 /// An event of the server's life and how often it happened, as "scans_mapped" or
 /// "dropped_queue_full".

@@ -52,24 +52,4 @@ TopicSpec<nav_msgs::msg::Odometry> odometry_prior_topic(const std::string& ros_n
   return symmetric<nav_msgs::msg::Odometry>("rt/" + ros_name, {.reliable = false, .depth = 100});
 }
 
-Services Services::in(const std::string& name_space) {
-  const std::string prefix = name_space + "/";
-  return {.get_static_map = prefix + "get_static_map",
-          .get_tile_versions = prefix + "get_tile_versions",
-          .get_tiles = prefix + "get_tiles",
-          .get_status = prefix + "get_status",
-          .save_map = prefix + "save_map",
-          .load_map = prefix + "load_map",
-          .reset = prefix + "reset",
-          .octomap_binary = prefix + "octomap_binary",
-          .octomap_full = prefix + "octomap_full",
-          .get_removed = prefix + "get_removed",
-          .restore_removed = prefix + "restore_removed",
-          .query_occupancy = prefix + "query_occupancy",
-          .get_traversable_area = prefix + "get_traversable_area",
-          .check_path = prefix + "check_path",
-          .nearest_traversable = prefix + "nearest_traversable",
-          .get_map = prefix + "get_map"};
-}
-
 }  // namespace stillmap::dds

@@ -33,12 +33,23 @@ struct Topics {
   TopicSpec<stillmap_msgs::msg::MapTile> tiles;
   TopicSpec<stillmap_msgs::msg::Status> status;
   TopicSpec<octomap_msgs::msg::Octomap> octomap;
-  /// Where the robot of `areas.grid_profile` can go.
+  /// Where the robot of `traversability.grid_profile` can go.
   TopicSpec<nav_msgs::msg::OccupancyGrid> traversability;
 
   /// `name_space` is the first part of all names but tf's: "stillmap" gives rt/stillmap/odometry.
   [[nodiscard]] static Topics in(const std::string& name_space);
 };
+
+/// Calls visit(topic) for each of the server's topics.
+template <typename Visit>
+void for_each_topic(const Topics& topics, Visit&& visit) {
+  // Every field by name: one more in Topics, and this does not compile.
+  const auto& [odometry, tf, path, scan, static_cloud, tile_index, tiles, status, octomap,
+               traversability] = topics;
+  const auto visit_all = [&](const auto&... topic) { (visit(topic), ...); };
+  visit_all(odometry, tf, path, scan, static_cloud, tile_index, tiles, status, octomap,
+            traversability);
+}
 
 /// Incoming scans as the server reads them: with `every`, a publisher must be reliable and waits
 /// when `queue_length` are not taken yet.
@@ -48,29 +59,5 @@ struct Topics {
 
 /// The odometry prior (nav_msgs/Odometry) as the server reads it.
 [[nodiscard]] TopicSpec<nav_msgs::msg::Odometry> odometry_prior_topic(const std::string& ros_name);
-
-/// ROS 2 names of the services.
-struct Services {
-  std::string get_static_map;
-  std::string get_tile_versions;
-  std::string get_tiles;
-  std::string get_status;
-  std::string save_map;
-  std::string load_map;
-  std::string reset;
-  /// octomap_msgs/srv/GetOctomap, as octomap_server names them.
-  std::string octomap_binary;
-  std::string octomap_full;
-  std::string get_removed;
-  std::string restore_removed;
-  std::string query_occupancy;
-  std::string get_traversable_area;
-  std::string check_path;
-  std::string nearest_traversable;
-  /// nav_msgs/srv/GetMap.
-  std::string get_map;
-
-  [[nodiscard]] static Services in(const std::string& name_space);
-};
 
 }  // namespace stillmap::dds

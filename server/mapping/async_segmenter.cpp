@@ -20,7 +20,7 @@ double milliseconds(std::chrono::steady_clock::duration time) {
 }  // namespace
 
 std::chrono::milliseconds segmentation_budget(const ServerConfig& config) {
-  const bool every_scan_counts = config.input.delivery == Delivery::every;
+  const bool every_scan_counts = config.input.delivery == DeliveryMode::every;
   const LabelProvider source = config.labels.source;
   const bool takes_no_time = source == LabelProvider::stream || source == LabelProvider::none;
   return std::chrono::milliseconds(every_scan_counts || takes_no_time ? 0U

@@ -19,7 +19,7 @@ constexpr std::uint64_t scans_between_checks = 100;
 
 dds::TopicSpec<sensor_msgs::msg::PointCloud2> points_of(const ServerConfig& config) {
   const int waiting = std::max(static_cast<int>(config.input.queue_length), min_samples);
-  return dds::points_topic(config.topics.points, delivery_mode(config.input.delivery), waiting);
+  return dds::points_topic(config.topics.points, config.input.delivery, waiting);
 }
 
 wire::CloudReadOptions reading_of(const ServerConfig& config) {
@@ -41,15 +41,11 @@ double seconds_since(const builtin_interfaces::msg::Time& stamp) {
 
 }  // namespace
 
-dds::DeliveryMode delivery_mode(Delivery delivery) {
-  return delivery == Delivery::every ? dds::DeliveryMode::every : dds::DeliveryMode::latest;
-}
-
 ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& config,
                            ScanQueue& queue, Statistics& statistics)
     : topic_(points_of(config).dds_name),
       domain_id_(config.dds.domain_id),
-      delivery_(delivery_mode(config.input.delivery)),
+      delivery_(config.input.delivery),
       sensor_(config.mapper.sensor),
       cloud_reader_(reading_of(config)),
       queue_(queue),
@@ -73,7 +69,7 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
   if (!scan) return drop("bad_cloud_" + fault.counter, 1, "bad cloud: " + fault.reason);
   report(cloud_changes, *scan);
   QueuedScan queued{*std::move(scan), cloud.header().frame_id(), received};
-  if (delivery_ == dds::DeliveryMode::every) {
+  if (delivery_ == DeliveryMode::every) {
     if (!queue_.push_blocking(std::move(queued), stop)) {
       drop("shutdown", 1, "the server is stopping");
     }

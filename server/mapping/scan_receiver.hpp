@@ -15,8 +15,6 @@
 
 namespace stillmap::server {
 
-[[nodiscard]] dds::DeliveryMode delivery_mode(Delivery delivery);
-
 /// Takes clouds from DDS, makes scans of them, and queues them for the mapper.
 class ScanReceiver {
  public:
@@ -35,7 +33,7 @@ class ScanReceiver {
 
   std::string topic_;
   std::uint32_t domain_id_;
-  dds::DeliveryMode delivery_;
+  DeliveryMode delivery_;
   SensorModel sensor_;
   wire::CloudReader cloud_reader_;
   std::uint64_t scans_read_ = 0;

@@ -13,7 +13,7 @@ namespace stillmap::server {
 
 /// What a status tells of the server that stays as it is.
 struct ServerTraits {
-  dds::DeliveryMode delivery = dds::DeliveryMode::latest;
+  DeliveryMode delivery = DeliveryMode::latest;
   std::string label_source;
   std::string sensor;
   std::string points_topic;

@@ -2,36 +2,53 @@
 
 #include <exception>
 #include <functional>
+#include <memory>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "core/map/query/tile_reader.hpp"
+#include "core/map/tile.hpp"
 #include "idl/conversions/map_query.hpp"
 #include "idl/interface/server_status.hpp"
 #include "server/mapping/map_saver.hpp"
 #include "server/monitoring/service_log.hpp"
+#include "server/occupancy/occupancy_thread.hpp"
 #include "server/publishers/latest_map.hpp"
+#include "server/services/paged_snapshots.hpp"
 #include "server/traversability/traversability_cache.hpp"
 #include "server/traversability/traversability_grid_provider.hpp"
 
 namespace stillmap::server {
 
-/// What the services answer from.
+/// What the services answer from. Everything may be called from several threads at once.
 struct ServiceContext {
   const LatestMap& latest_map;
-  /// For what is not in memory.
+  /// Reads tiles that are not in memory.
   TileReader& tiles;
   MapSaver& saver;
   std::function<dds::ServerStatus()> status;
   /// Returns the new map's id.
   std::function<std::uint64_t()> reset;
-  /// Goes on with this map, and the tiles that are non-resident come from there. Throws
-  /// std::invalid_argument when it does not fit the configuration; then nothing changed.
+  /// Resumes this map, whose non-resident tiles are in the store. Throws std::invalid_argument when
+  /// it does not fit the configuration; then nothing changed.
   std::function<void(const SavedMap&, const std::shared_ptr<TileStore>&)> load;
   /// Publishes what was mapped until now.
   std::function<void()> publish_now;
+  /// What is kept out of the static map.
+  std::function<std::vector<RemovedVoxel>(const Eigen::AlignedBox3d& box_map)> removed;
+  /// Returns how many voxels are shown again.
+  std::function<std::size_t(RemovalReason reason, const Eigen::AlignedBox3d& box_map)>
+      restore_removed;
+  /// Both are empty when the server keeps no octree.
+  std::function<OccupancyAnswers(const OccupancyQuery&)> query_occupancy;
+  std::function<EncodedOctree(bool binary)> encode_octomap;
   const TraversabilityCache& traversability;
   const TraversabilityGridProvider& grid_provider;
+  std::string map_frame;
   ServiceLog& log;
+  /// Used by get_static_map alone, on one thread.
+  std::shared_ptr<PagedSnapshots> paged_snapshots = std::make_shared<PagedSnapshots>();
 };
 
 /// Status of a reply about this view.

@@ -110,7 +110,7 @@ bool wait_for_readers(const dds::MatchedReaders& readers, int count) {
 void run_scans(const Network& network, int rate_hz, int count) {
   dds::Participant participant(options_of(network, DdsRole::server, domain_id));
   const auto confirming = confirm_connections(participant);
-  const auto topic = dds::points_topic("points", dds::DeliveryMode::latest, 3);
+  const auto topic = dds::points_topic("points", DeliveryMode::latest, 3);
   dds::Writer<PointCloud2> writer(participant, topic.dds_name, topic.writer);
   std::vector<std::unique_ptr<Child>> subscribers;
   for (int i = 0; i < count; ++i) {

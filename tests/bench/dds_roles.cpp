@@ -78,7 +78,7 @@ void subscribe(const dds::DdsOptions& options) {
   ::alarm(longest_life_s);
   const std::unique_ptr<dds::Participant> joined = join(options);
   dds::Participant& participant = *joined;
-  const auto topic = dds::points_topic("points", dds::DeliveryMode::latest, 3);
+  const auto topic = dds::points_topic("points", DeliveryMode::latest, 3);
   dds::Reader<sensor_msgs::msg::PointCloud2> reader(participant, topic.dds_name, topic.reader);
   sensor_msgs::msg::PointCloud2 cloud;
   std::vector<double> latencies_ms;

@@ -1,4 +1,4 @@
-#include "clients/library/region_tracker.hpp"
+#include "clients/library/region_subscription.hpp"
 
 #include <gmock/gmock.h>
 

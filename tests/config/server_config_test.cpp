@@ -33,7 +33,7 @@ TEST(ServerConfig, ShippedDefaultFileShowsEveryFieldWithItsDefault) {
 
 TEST(ServerConfig, ShippedReplayFileLosesNoScan) {
   const ServerConfig config = load_server_config(shipped("server/replay_lossless.yaml"));
-  EXPECT_EQ(config.input.delivery, Delivery::every);
+  EXPECT_EQ(config.input.delivery, DeliveryMode::every);
 }
 
 TEST(ServerConfig, ReportsWhatAFileChanges) {

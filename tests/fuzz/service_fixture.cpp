@@ -30,29 +30,37 @@ RobotProfile robot() {
 ServiceFixture::ServiceFixture()
     : map_(street_config()),
       saver_(latest_map_, fresh_map_file(), {{"software", "0"}}),
-      removed_{
+      context_{
+          .latest_map = latest_map_,
+          .tiles = tiles_,
+          .saver = saver_,
+          .status = [] { return dds::ServerStatus{}; },
+          .reset =
+              [this] {
+                map_.reset(78);
+                latest_map_.begin(map_.view(), {});
+                return std::uint64_t{78};
+              },
+          .load =
+              [this](const SavedMap& map, const auto&) {
+                map_.resume(map.view, map.tile_evidence);
+                latest_map_.begin(map_.view(), map.trajectory);
+              },
+          .publish_now = [this] { latest_map_.publish(map_.view()); },
           .removed = [this](const auto& box_map) { return map_.removed(box_map); },
-          .restore = [this](RemovalReason reason,
-                            const auto& box_map) { return map_.restore_removed(reason, box_map); }},
-      context_{.latest_map = latest_map_,
-               .tiles = tiles_,
-               .saver = saver_,
-               .status = [] { return dds::ServerStatus{}; },
-               .reset =
-                   [this] {
-                     map_.reset(78);
-                     latest_map_.begin(map_.view(), {});
-                     return std::uint64_t{78};
-                   },
-               .load =
-                   [this](const SavedMap& map, const auto&) {
-                     map_.resume(map.view, map.tile_evidence);
-                     latest_map_.begin(map_.view(), map.trajectory);
-                   },
-               .publish_now = [this] { latest_map_.publish(map_.view()); },
-               .traversability = traversability_cache_,
-               .grid_provider = grid_provider_,
-               .log = log_} {
+          .restore_removed =
+              [this](RemovalReason reason, const auto& box_map) {
+                return map_.restore_removed(reason, box_map);
+              },
+          .query_occupancy = [this](const OccupancyQuery& query) { return octree_.answer(query); },
+          .encode_octomap =
+              [this](bool binary) {
+                return server::EncodedOctree{.data = octree_.encode(binary), .stamp_ns = 0};
+              },
+          .traversability = traversability_cache_,
+          .grid_provider = grid_provider_,
+          .map_frame = "map",
+          .log = log_} {
   reset();
 }
 

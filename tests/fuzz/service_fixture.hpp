@@ -1,14 +1,12 @@
 #pragma once
 
 #include "core/occupancy/occupancy_map.hpp"
-#include "server/services/get_static_map.hpp"
-#include "server/services/removed_voxels.hpp"
 #include "server/services/service_context.hpp"
 
 namespace stillmap::fuzz {
 
-/// What a server's services answer from, without a server: a small map, its areas, a map file in
-/// memory.
+/// What a server's services answer from, without a server: a small map, its traversability and its
+/// octree, a map file in memory.
 class ServiceFixture {
  public:
   ServiceFixture();
@@ -16,9 +14,6 @@ class ServiceFixture {
   ServiceFixture& operator=(const ServiceFixture&) = delete;
 
   [[nodiscard]] const server::ServiceContext& context() const { return context_; }
-  [[nodiscard]] const server::RemovedSource& removed() const { return removed_; }
-  [[nodiscard]] server::GetStaticMap& static_map() { return static_map_; }
-  [[nodiscard]] const OccupancyMap& octree() const { return octree_; }
   /// As it was at first, whatever requests did to it.
   void reset();
 
@@ -35,10 +30,8 @@ class ServiceFixture {
   server::TraversabilityGridProvider grid_provider_{traversability_config_, "map", latest_map_,
                                                     snapshot_};
   OccupancyMap octree_{OccupancyConfig{}};
-  server::RemovedSource removed_;
   server::ServiceLog log_;
   server::ServiceContext context_;
-  server::GetStaticMap static_map_{context_};
 };
 
 }  // namespace stillmap::fuzz

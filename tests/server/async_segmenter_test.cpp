@@ -134,7 +134,7 @@ TEST(SegmentationBudget, CountsForALiveNetworkOnly) {
   }
   config.labels.source = LabelProvider::model;
   EXPECT_EQ(segmentation_budget(config), 70ms);
-  config.input.delivery = Delivery::every;
+  config.input.delivery = DeliveryMode::every;
   EXPECT_EQ(segmentation_budget(config), 0ms);
 }
 

@@ -35,7 +35,7 @@ class HostileInput : public testing::Test {
   ServerProcess server_;
   Client client_;
   dds::Participant participant_{setup_.dds()};
-  dds::TopicSpec<PointCloud2> topic_ = dds::points_topic("points", dds::DeliveryMode::every, 4);
+  dds::TopicSpec<PointCloud2> topic_ = dds::points_topic("points", DeliveryMode::every, 4);
   dds::Writer<PointCloud2> clouds_{participant_, topic_.dds_name, topic_.writer};
   std::uint64_t sent_ = 0;
 };

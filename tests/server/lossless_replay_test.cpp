@@ -45,7 +45,7 @@ TEST(LatestDelivery, DropsTheOldestAndAccountsForEveryScan) {
   const ServerProcess server(setup.server_arguments());
   Client client(setup.client());
   client.wait_for_server(patience);
-  EXPECT_EQ(client.status().delivery, dds::DeliveryMode::latest);
+  EXPECT_EQ(client.status().delivery, DeliveryMode::latest);
 
   constexpr int scans = 120;
   ScanPublisher publisher(setup.publisher(false));

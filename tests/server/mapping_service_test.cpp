@@ -38,7 +38,7 @@ class MappingService : public testing::Test {
 TEST_F(MappingService, SaysWhyNothingHappens) {
   const dds::ServerStatus status = client_.status();
   EXPECT_THAT(status.reason, HasSubstr("no scan received on rt/points yet"));
-  EXPECT_EQ(status.delivery, dds::DeliveryMode::every);
+  EXPECT_EQ(status.delivery, DeliveryMode::every);
   EXPECT_EQ(status.label_source, "stream, else street");
   EXPECT_EQ(status.voxel_count, 0U);
   EXPECT_FALSE(status.software_version.empty());

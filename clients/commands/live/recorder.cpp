@@ -39,20 +39,12 @@ RecordableTopic recordable(const dds::TopicSpec<T>& topic) {
 }
 
 std::vector<RecordableTopic> recordable_topics(const RecorderOptions& options) {
-  const dds::Topics of_server = dds::Topics::in(options.server_name);
-  return {
-      recordable(dds::points_topic(options.points_topic, dds::DeliveryMode::latest, max_waiting)),
-      recordable(dds::odometry_prior_topic(options.odometry_topic)),
-      recordable(of_server.odometry),
-      recordable(of_server.tf),
-      recordable(of_server.path),
-      recordable(of_server.scan),
-      recordable(of_server.static_cloud),
-      recordable(of_server.tile_index),
-      recordable(of_server.tiles),
-      recordable(of_server.status),
-      recordable(of_server.octomap),
-      recordable(of_server.traversability)};
+  std::vector<RecordableTopic> topics{
+      recordable(dds::points_topic(options.points_topic, DeliveryMode::latest, max_waiting)),
+      recordable(dds::odometry_prior_topic(options.odometry_topic))};
+  dds::for_each_topic(dds::Topics::in(options.server_name),
+                      [&](const auto& topic) { topics.push_back(recordable(topic)); });
+  return topics;
 }
 
 /// "/points" of "rt/points".

@@ -54,7 +54,7 @@ void require_subscribers(ScanPublisher& publisher, const Arguments& arguments, S
 }
 
 void require_lossless(const dds::ServerStatus& status) {
-  if (status.delivery == dds::DeliveryMode::every) return;
+  if (status.delivery == DeliveryMode::every) return;
   throw std::invalid_argument(
       "the server drops scans when they come too fast (input delivery: latest), so the replay "
       "cannot be lossless: start it with --delivery every");

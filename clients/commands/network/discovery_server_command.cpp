@@ -3,8 +3,8 @@
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/library/discovery_server.hpp"
 #include "clients/terminal/stop_signal.hpp"
+#include "idl/dds/participant.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -22,7 +22,7 @@ ExitCode run(const Arguments& arguments) {
   options.discovery_port = static_cast<std::uint16_t>(arguments.port);
   // It carries no data.
   options.shared_memory = false;
-  const DiscoveryServer server(options);
+  const dds::Participant discovery_server(options);
   std::cout << "discovery server on UDP port " << arguments.port << std::endl;
   while (!stop.wait_for(std::chrono::seconds(60))) {
   }

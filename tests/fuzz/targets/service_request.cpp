@@ -1,5 +1,5 @@
-// A number that says which service, then the request as it comes over DDS, answered from a small
-// map. Those that change it are answered from a fresh one.
+// A number that says which service of the table, then the request as it comes over DDS, answered
+// from a small map.
 
 #include <array>
 #include <memory>
@@ -11,14 +11,7 @@
 #include "idl/conversions/region.hpp"
 #include "idl/conversions/traversability_query.hpp"
 #include "idl/interface/topics.hpp"
-#include "server/services/check_path.hpp"
-#include "server/services/get_tile_versions.hpp"
-#include "server/services/get_tiles.hpp"
-#include "server/services/get_traversable_area.hpp"
-#include "server/services/load_map.hpp"
-#include "server/services/nearest_traversable.hpp"
-#include "server/services/reset.hpp"
-#include "server/services/save_map.hpp"
+#include "server/services/service_handlers.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"
 #include "tests/fuzz/invariant.hpp"
@@ -34,85 +27,49 @@ ServiceFixture& world() {
   return world;
 }
 
-/// Requests are answered, with a reason where the answer is not ok.
-template <typename Request, typename Answer>
-void answer_to(Bytes bytes, const Answer& answer) {
+/// A request is answered, with a reason where the answer is not ok. Those that change the world are
+/// answered by a fresh one.
+template <typename Request, typename Reply>
+void answer_to(const server::ServiceHandler<Request, Reply>& handler, Bytes bytes) {
   const auto request = from_cdr<Request>(bytes);
   if (!request) return;
-  const auto response = answer(*request);
-  require(response.status().code() == 0 || !response.status().reason().empty(),
-          "a refusal says why");
-  static_cast<void>(to_cdr(response));
+  const Reply reply = handler.answer(world().context(), *request);
+  if constexpr (requires { reply.status().code(); }) {
+    require(reply.status().code() == 0 || !reply.status().reason().empty(), "a refusal says why");
+  }
+  static_cast<void>(to_cdr(reply));
+  if (handler.spec.effect == dds::ServiceEffect::modifies) world().reset();
 }
 
-void static_map(Bytes bytes) {
-  answer_to<GetStaticMap_Request>(bytes, [](const auto& r) { return world().static_map()(r); });
-}
-void tile_versions(Bytes bytes) {
-  answer_to<GetTileVersions_Request>(
-      bytes, [](const auto& r) { return get_tile_versions(world().context(), r); });
-}
-void tiles(Bytes bytes) {
-  answer_to<GetTiles_Request>(bytes, [](const auto& r) { return get_tiles(world().context(), r); });
-}
-void area(Bytes bytes) {
-  answer_to<GetTraversableArea_Request>(
-      bytes, [](const auto& r) { return get_traversable_area(world().context(), r); });
-}
-void path(Bytes bytes) {
-  answer_to<CheckPath_Request>(bytes,
-                               [](const auto& r) { return check_path(world().context(), r); });
-}
-void nearest(Bytes bytes) {
-  answer_to<NearestTraversable_Request>(
-      bytes, [](const auto& r) { return nearest_traversable(world().context(), r); });
-}
-void removed(Bytes bytes) {
-  answer_to<GetRemoved_Request>(
-      bytes, [](const auto& r) { return get_removed(world().context(), world().removed(), r); });
-}
+constexpr std::size_t service_count = std::tuple_size_v<decltype(server::service_handlers)>;
 
-/// Without the server's thread that keeps the octree.
-void occupancy(Bytes bytes) {
-  answer_to<QueryOccupancy_Request>(bytes, [](const auto& request) {
-    return answer<QueryOccupancy_Response>(
-        world().context(), request, [&](const MapSnapshot&, QueryOccupancy_Response& response) {
-          wire::write_answers(world().octree().answer(wire::from_request(request)), response);
-        });
+/// The service's place in the table of handlers: an input's first byte.
+std::uint8_t number_of(std::string_view service) {
+  std::uint8_t number = 0;
+  std::uint8_t found = service_count;
+  server::for_each_handler([&](const auto& handler) {
+    if (handler.spec.name == service) found = number;
+    ++number;
   });
+  require(found < service_count, "a seed is for a service of the table");
+  return found;
 }
-
-/// Those that change the world.
-template <typename Request, typename Answer>
-void change_by(Bytes bytes, const Answer& answer) {
-  answer_to<Request>(bytes, answer);
-  world().reset();
-}
-
-void restore(Bytes bytes) {
-  change_by<RestoreRemoved_Request>(bytes, [](const auto& r) {
-    return restore_removed(world().context(), world().removed(), r);
-  });
-}
-void save(Bytes bytes) {
-  change_by<SaveMap_Request>(bytes, [](const auto& r) { return save_map(world().context(), r); });
-}
-void load(Bytes bytes) {
-  change_by<LoadMap_Request>(bytes, [](const auto& r) { return load_map(world().context(), r); });
-}
-void forget(Bytes bytes) {
-  change_by<Reset_Request>(bytes,
-                           [](const auto& r) { return server::reset(world().context(), r); });
-}
-
-constexpr std::array<void (*)(Bytes), 12> services = {static_map, tile_versions, tiles,   area,
-                                                      path,       nearest,       removed, occupancy,
-                                                      restore,    save,          load,    forget};
 
 void run(Bytes bytes) {
   ByteSource source(bytes);
-  const std::size_t service = source.byte() % services.size();
-  services.at(service)(source.rest());
+  const std::size_t chosen = source.byte() % service_count;
+  const Bytes request = source.rest();
+  std::size_t number = 0;
+  server::for_each_handler([&](const auto& handler) {
+    if (number++ == chosen) answer_to(handler, request);
+  });
+}
+
+/// An input of this target.
+template <typename Request, typename Reply>
+Seed seed(const std::string& name, const dds::ServiceSpec<Request, Reply>& service,
+          const Request& request) {
+  return {name, with_choice(number_of(service.name), to_cdr(request))};
 }
 
 template <typename Request>
@@ -137,13 +94,15 @@ void add_region_seeds(std::vector<Seed>& all) {
     query.max_bytes = 500;
     query.resolution_m = all.size() % 4 == 1 ? 1.0 : 0.0;
     const std::string number = std::to_string(region.index());
-    all.push_back({"static_map_" + number, with_choice(0, to_cdr(wire::to_request(query)))});
+    all.push_back(
+        seed("static_map_" + number, dds::services::get_static_map, wire::to_request(query)));
     TraversabilityQuery area_query;
     area_query.profile = "car";
     area_query.region = region;
     area_query.include_outlines = true;
     area_query.max_cells = 10'000;
-    all.push_back({"area_" + number, with_choice(3, to_cdr(wire::to_request(area_query)))});
+    all.push_back(
+        seed("area_" + number, dds::services::get_traversable_area, wire::to_request(area_query)));
   }
 }
 
@@ -152,29 +111,29 @@ void add_removed_seeds(std::vector<Seed>& all) {
   get.region(wire::to_wire(regions().front()));
   get.reasons({0, 1});
   get.max_voxels(100);
-  all.push_back({"removed", with_choice(6, to_cdr(get))});
+  all.push_back(seed("removed", dds::services::get_removed, get));
   auto restore = versioned<RestoreRemoved_Request>();
   restore.region(wire::to_wire(regions().front()));
   restore.reason(1);
-  all.push_back({"restore", with_choice(8, to_cdr(restore))});
+  all.push_back(seed("restore", dds::services::restore_removed, restore));
 }
 
 void add_place_seeds(std::vector<Seed>& all) {
   auto versions = versioned<GetTileVersions_Request>();
   versions.max_x(5.0);
   versions.max_y(5.0);
-  all.push_back({"tile_versions", with_choice(1, to_cdr(versions))});
+  all.push_back(seed("tile_versions", dds::services::get_tile_versions, versions));
   auto ids = versioned<GetTiles_Request>();
   ids.ids().resize(2);
-  all.push_back({"tiles", with_choice(2, to_cdr(ids))});
+  all.push_back(seed("tiles", dds::services::get_tiles, ids));
   PathQuery path_query{"car", {{-1.0, 0.0}, {1.0, 0.0}, {1.0, 1.0}}, {0.0, 0.0, 1.5}};
-  all.push_back({"path_headings", with_choice(4, to_cdr(wire::to_request(path_query)))});
+  all.push_back(seed("path_headings", dds::services::check_path, wire::to_request(path_query)));
   path_query.headings_rad.clear();
-  all.push_back({"path", with_choice(4, to_cdr(wire::to_request(path_query)))});
+  all.push_back(seed("path", dds::services::check_path, wire::to_request(path_query)));
   auto near = versioned<NearestTraversable_Request>();
   near.profile("car");
   near.max_distance_m(10.0);
-  all.push_back({"nearest", with_choice(5, to_cdr(near))});
+  all.push_back(seed("nearest", dds::services::nearest_traversable, near));
 }
 
 OccupancyQuery occupancy_query() {
@@ -190,10 +149,10 @@ void add_file_seeds(std::vector<Seed>& all) {
     auto save_request = versioned<SaveMap_Request>();
     save_request.file(name);
     const std::string number = std::to_string(all.size());
-    all.push_back({"save_" + number, with_choice(9, to_cdr(save_request))});
+    all.push_back(seed("save_" + number, dds::services::save_map, save_request));
     auto load_request = versioned<LoadMap_Request>();
     load_request.file(name);
-    all.push_back({"load_" + number, with_choice(10, to_cdr(load_request))});
+    all.push_back(seed("load_" + number, dds::services::load_map, load_request));
   }
 }
 
@@ -203,8 +162,12 @@ std::vector<Seed> seeds() {
   add_place_seeds(all);
   add_removed_seeds(all);
   add_file_seeds(all);
-  all.push_back({"occupancy", with_choice(7, to_cdr(wire::to_request(occupancy_query())))});
-  all.push_back({"reset", with_choice(11, to_cdr(versioned<Reset_Request>()))});
+  all.push_back(
+      seed("occupancy", dds::services::query_occupancy, wire::to_request(occupancy_query())));
+  all.push_back(seed("status", dds::services::get_status, versioned<GetStatus_Request>()));
+  all.push_back(seed("octomap", dds::services::octomap_binary, {}));
+  all.push_back(seed("map", dds::services::get_map, {}));
+  all.push_back(seed("reset", dds::services::reset, versioned<Reset_Request>()));
   return all;
 }
 

@@ -1,16 +1,20 @@
 #pragma once
 
+#include <functional>
 #include <map>
 #include <set>
 #include <span>
+#include <vector>
 
 #include "clients/library/client.hpp"
 #include "core/map/query/region.hpp"
+#include "idl/dds/participant.hpp"
+#include "idl/interface/topics.hpp"
 
 namespace stillmap {
 
-/// What a client knows of the tiles of a region, and what it has to fetch: from entries of the
-/// tile index to updates. Not thread-safe.
+/// Which tiles of a region a client has and which it must fetch: makes updates from entries of the
+/// tile index. Not thread-safe.
 class RegionTracker {
  public:
   /// Throws std::invalid_argument for a region with faults.
@@ -23,8 +27,8 @@ class RegionTracker {
   [[nodiscard]] std::vector<TileId> pending() const { return {pending_.begin(), pending_.end()}; }
   [[nodiscard]] bool has_update() const { return !pending_.empty() || !removed_.empty(); }
 
-  /// Takes the tiles that were pending; what they and the entries so far say is in no later update
-  /// from now on. Tiles of another map are left for when the index speaks of that map.
+  /// Takes the tiles that were pending; the next update holds only what changes from now on. Tiles
+  /// of another map stay pending until the index has that map.
   [[nodiscard]] RegionUpdate take_update(TileSet fetched);
 
  private:
@@ -38,5 +42,14 @@ class RegionTracker {
   std::set<TileId> pending_;
   std::set<TileId> removed_;
 };
+
+using FetchTiles = std::function<TileSet(std::span<const TileId>)>;
+
+/// A reader of the region's part of the tile index, and the thread that makes updates of its
+/// entries, fetching changed tiles. `fetch` may throw ServiceError; it is then called again later.
+[[nodiscard]] Subscription make_region_subscription(
+    dds::Participant& participant, const dds::TopicSpec<stillmap_msgs::msg::TileInfo>& index,
+    const Region& region, double tile_size_m, FetchTiles fetch,
+    std::function<void(const RegionUpdate&)> update_arrived);
 
 }  // namespace stillmap

@@ -1,18 +1,20 @@
-#include "server/services/removed_voxels.hpp"
-
 #include <algorithm>
 #include <bitset>
 
 #include "core/map/query/region.hpp"
 #include "idl/conversions/region.hpp"
 #include "idl/conversions/removed_voxels.hpp"
+#include "server/services/service_handlers.hpp"
 
 namespace stillmap::server {
+
+using namespace stillmap_msgs::srv;
+
 namespace {
 
 constexpr std::size_t max_voxels_per_reply = 300'000;
 
-/// Throws std::invalid_argument for what is no region.
+/// Throws std::invalid_argument for a region with faults.
 Region region_of(const stillmap_msgs::msg::Region& message) {
   auto [region, fault] = wire::from_wire(message);
   if (!region) throw std::invalid_argument(fault);
@@ -41,14 +43,12 @@ Reasons reasons_of(const std::vector<std::uint8_t>& numbers) {
 
 }  // namespace
 
-stillmap_msgs::srv::GetRemoved_Response get_removed(
-    const ServiceContext& context, const RemovedSource& source,
-    const stillmap_msgs::srv::GetRemoved_Request& request) {
-  using Response = stillmap_msgs::srv::GetRemoved_Response;
+GetRemoved_Response get_removed(const ServiceContext& context, const GetRemoved_Request& request) {
+  using Response = GetRemoved_Response;
   return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
     const RegionShape region(region_of(request.region()));
     const Reasons reasons = reasons_of(request.reasons());
-    std::vector<RemovedVoxel> removed = source.removed(region.bounds_map());
+    std::vector<RemovedVoxel> removed = context.removed(region.bounds_map());
     std::erase_if(removed, [&](const RemovedVoxel& voxel) {
       return !reasons.test(static_cast<std::size_t>(voxel.reason)) ||
              !region.contains(voxel.position_map.cast<double>());
@@ -60,16 +60,15 @@ stillmap_msgs::srv::GetRemoved_Response get_removed(
   });
 }
 
-stillmap_msgs::srv::RestoreRemoved_Response restore_removed(
-    const ServiceContext& context, const RemovedSource& source,
-    const stillmap_msgs::srv::RestoreRemoved_Request& request) {
-  using Response = stillmap_msgs::srv::RestoreRemoved_Response;
+RestoreRemoved_Response restore_removed(const ServiceContext& context,
+                                        const RestoreRemoved_Request& request) {
+  using Response = RestoreRemoved_Response;
   return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
     const Region region = region_of(request.region());
     const auto* const box = std::get_if<BoxRegion>(&region);
     if (box == nullptr) throw std::invalid_argument("only a box can be restored; ask for one");
     const RegionShape shape(region);
-    response.restored(source.restore(reason_of(request.reason()), shape.bounds_map()));
+    response.restored(context.restore_removed(reason_of(request.reason()), shape.bounds_map()));
     context.publish_now();
     response.status(reply_status(*context.latest_map.view()));
   });

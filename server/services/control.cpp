@@ -1,0 +1,44 @@
+#include "idl/conversions/status.hpp"
+#include "server/services/service_handlers.hpp"
+
+namespace stillmap::server {
+
+using namespace stillmap_msgs::srv;
+
+GetStatus_Response get_status(const ServiceContext& context, const GetStatus_Request& request) {
+  using Response = GetStatus_Response;
+  return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
+    response.server(wire::to_wire(context.status()));
+  });
+}
+
+SaveMap_Response save_map(const ServiceContext& context, const SaveMap_Request& request) {
+  using Response = SaveMap_Response;
+  return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
+    context.publish_now();
+    response.status(reply_status(*context.latest_map.view()));
+    response.file(context.saver.save_as(request.file()).string());
+  });
+}
+
+LoadMap_Response load_map(const ServiceContext& context, const LoadMap_Request& request) {
+  using Response = LoadMap_Response;
+  return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
+    const auto file = context.saver.resume_from(request.file(), context.load);
+    const auto view = context.latest_map.view();
+    response.status(reply_status(*view));
+    response.file(file.string());
+    response.tile_count(view->tiles.size());
+    response.pose_count(context.latest_map.trajectory().size());
+  });
+}
+
+Reset_Response reset(const ServiceContext& context, const Reset_Request& request) {
+  using Response = Reset_Response;
+  return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
+    const std::uint64_t map_id = context.reset();
+    response.status(wire::to_reply_status(wire::ReplyCode::ok, {}, 0, map_id));
+  });
+}
+
+}  // namespace stillmap::server

@@ -1,0 +1,43 @@
+#include "idl/conversions/occupancy_query.hpp"
+#include "idl/conversions/octomap.hpp"
+#include "server/services/service_handlers.hpp"
+
+namespace stillmap::server {
+
+using namespace stillmap_msgs::srv;
+
+namespace {
+
+octomap_msgs::srv::GetOctomap_Response octomap(const ServiceContext& context, bool binary) {
+  octomap_msgs::srv::GetOctomap_Response response;
+  if (!context.encode_octomap) return response;
+  const EncodedOctree octree = context.encode_octomap(binary);
+  response.map(wire::to_octomap(octree.data, octree.stamp_ns, context.map_frame));
+  return response;
+}
+
+}  // namespace
+
+octomap_msgs::srv::GetOctomap_Response octomap_binary(
+    const ServiceContext& context, const octomap_msgs::srv::GetOctomap_Request&) {
+  return octomap(context, true);
+}
+
+octomap_msgs::srv::GetOctomap_Response octomap_full(const ServiceContext& context,
+                                                    const octomap_msgs::srv::GetOctomap_Request&) {
+  return octomap(context, false);
+}
+
+QueryOccupancy_Response query_occupancy(const ServiceContext& context,
+                                        const QueryOccupancy_Request& request) {
+  using Response = QueryOccupancy_Response;
+  return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
+    if (!context.query_occupancy) {
+      throw std::runtime_error(
+          "this server keeps no octree: its configuration has occupancy.enabled false");
+    }
+    wire::write_answers(context.query_occupancy(wire::from_request(request)), response);
+  });
+}
+
+}  // namespace stillmap::server

@@ -1,0 +1,108 @@
+#include <algorithm>
+#include <string>
+#include <utility>
+
+#include "idl/conversions/tile.hpp"
+#include "server/services/service_handlers.hpp"
+
+namespace stillmap::server {
+
+using namespace stillmap_msgs::srv;
+
+namespace {
+
+// Larger pages take too long on a slow network; a client that wants more gets more pages.
+constexpr std::uint32_t max_page_bytes = 8'000'000;
+
+/// The map that a page shows: that of the answer's first page, else the newest. A page after the
+/// first needs no history.
+MapState state_for(const ServiceContext& context, const MapQuery& query) {
+  const auto version = continuation_version(query.continuation);
+  auto view = version ? context.paged_snapshots->find(*version) : nullptr;
+  return view ? MapState{std::move(view), nullptr} : context.latest_map.state();
+}
+
+void update_session(PagedSnapshots& pages, const MapQueryResult& result,
+                    const PagedSnapshots::Snapshot& view) {
+  const auto now = PagedSnapshots::Clock::now();
+  if (result.status == QueryStatus::ok) {
+    const bool is_last = result.continuation.empty();
+    is_last ? pages.end(view, now) : pages.keep(view, now);
+  }
+  pages.drop_expired(now);
+}
+
+/// Also refuses NaN, which compares as false.
+void check_interval(double low, double high, const std::string& axis) {
+  if (low <= high) return;
+  throw std::invalid_argument("min_" + axis + " " + std::to_string(low) + " is not <= max_" + axis +
+                              " " + std::to_string(high));
+}
+
+bool meets(std::int32_t index, double tile_size_m, double low, double high) {
+  return index * tile_size_m <= high && (index + 1.0) * tile_size_m >= low;
+}
+
+// About 5 MB at 27 bytes a voxel. At least one tile is always sent.
+constexpr std::size_t max_voxels_per_reply = 200'000;
+
+}  // namespace
+
+GetStaticMap_Response get_static_map(const ServiceContext& context,
+                                     const GetStaticMap_Request& request) {
+  using Response = GetStaticMap_Response;
+  return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
+    auto [query, fault] = wire::from_request(request);
+    if (!query) throw std::invalid_argument(fault);
+    query->max_bytes = std::min(query->max_bytes, max_page_bytes);
+    const MapState state = state_for(context, *query);
+    const MapQueryResult result =
+        query_map(*state.view, *query, state.history.get(), context.tiles);
+    update_session(*context.paged_snapshots, result, state.view);
+    response = wire::to_response(result);
+  });
+}
+
+void drop_expired_pages(const ServiceContext& context) {
+  context.paged_snapshots->drop_expired(PagedSnapshots::Clock::now());
+}
+
+GetTileVersions_Response get_tile_versions(const ServiceContext& context,
+                                           const GetTileVersions_Request& request) {
+  using Response = GetTileVersions_Response;
+  return answer<Response>(context, request, [&](const MapSnapshot& view, Response& response) {
+    check_interval(request.min_x(), request.max_x(), "x");
+    check_interval(request.min_y(), request.max_y(), "y");
+    const dds::MapIdentity identity = wire::identity_of(view);
+    response.identity(wire::to_wire(identity));
+    for (const auto& tile : view.tiles) {
+      const TileId id = tile->info.id;
+      if (meets(id.x, view.tile_size_m, request.min_x(), request.max_x()) &&
+          meets(id.y, view.tile_size_m, request.min_y(), request.max_y())) {
+        response.tiles().push_back(wire::to_wire(tile->info, identity));
+      }
+    }
+  });
+}
+
+GetTiles_Response get_tiles(const ServiceContext& context, const GetTiles_Request& request) {
+  using Response = GetTiles_Response;
+  return answer<Response>(context, request, [&](const MapSnapshot& view, Response& response) {
+    const dds::MapIdentity identity = wire::identity_of(view);
+    response.identity(wire::to_wire(identity));
+    std::size_t voxels = 0;
+    for (const auto& id : request.ids()) {
+      const auto known = find_tile(view, {id.x(), id.y()});
+      if (known == nullptr) {
+        response.missing().push_back(id);
+      } else if (voxels > 0 && voxels + known->info.voxel_count > max_voxels_per_reply) {
+        response.left_out().push_back(id);
+      } else {
+        voxels += known->info.voxel_count;
+        response.tiles().push_back(wire::to_wire(*context.tiles.read(known), identity));
+      }
+    }
+  });
+}
+
+}  // namespace stillmap::server
