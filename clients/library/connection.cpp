@@ -7,7 +7,7 @@
 #include "removed_voxels.h"
 #include "stillmap_msgs.h"
 #include "stillmap_occupancy.h"
-#include "traversable_area.h"
+#include "traversability.h"
 
 namespace stillmap {
 
@@ -45,13 +45,13 @@ TileSet Client::Connection::fetch_tiles(std::span<const TileId> ids) {
     GetTiles_Request request;
     request.ids(remaining);
     const auto reply = call_ok(service, std::move(request));
-    if (reply.left_out().size() >= remaining.size()) throw malformed_reply(name_of(service));
+    if (reply.remaining().size() >= remaining.size()) throw malformed_reply(name_of(service));
     set.map = wire::from_wire(reply.identity());
     for (const auto& tile : reply.tiles()) {
       set.tiles.push_back(require_readable(wire::from_wire(tile), service));
     }
     for (const auto& id : reply.missing()) set.missing.push_back({id.x(), id.y()});
-    remaining = reply.left_out();
+    remaining = reply.remaining();
   }
   return set;
 }

@@ -22,6 +22,14 @@ class Field:
 
 
 @dataclass
+class Constant:
+    """As in .msg: uint8 BOX=0."""
+    type: str
+    name: str
+    value: int
+
+
+@dataclass
 class Structure:
     """A message, or one half of a service: Reset_Request."""
     package: str
@@ -29,6 +37,7 @@ class Structure:
     name: str
     comment: list[str] = field(default_factory=list)
     fields: list[Field] = field(default_factory=list)
+    constants: list[Constant] = field(default_factory=list)
 
     @property
     def full_name(self) -> str:
@@ -39,8 +48,11 @@ class Structure:
         return f"{self.package}::{self.kind}::dds_::{self.name}_"
 
 
+# What follows a structure's name in the name of the module that has its constants.
+CONSTANTS = "_Constants"
+
 # Brackets and semicolons are words of their own; a comment is one word.
-_IDL_WORD = re.compile(r"//[^\n]*|#include[^\n]*|@?\w+(?:::\w+)*|[{};<>\[\],]")
+_IDL_WORD = re.compile(r"//[^\n]*|#include[^\n]*|@?\w+(?:::\w+)*|[{};<>\[\],=]")
 
 
 class IdlReader:
@@ -51,11 +63,14 @@ class IdlReader:
         self._at = 0
         self._modules: list[str] = []
         self._comment: list[str] = []
+        self._constants: dict[str, list[Constant]] = {}
         self.structures: list[Structure] = []
 
     def read(self) -> list[Structure]:
         while self._at < len(self._words):
             self._declaration(self._next())
+        if self._constants:
+            raise ValueError(f"constants without a structure: {', '.join(self._constants)}")
         return self.structures
 
     def _next(self) -> str:
@@ -77,15 +92,35 @@ class IdlReader:
         elif word == "module":
             self._modules.append(self._next())
             self._expect("{")
+            # The comment above a structure's constants is the structure's own.
+            if self._modules[-1].endswith(CONSTANTS):
+                constants = self._read_constants()
+                self._constants[self._modules.pop()] = constants
+                return
         elif word == "}":
             self._modules.pop()
         elif word != ";" and not word.startswith("#include"):
             raise ValueError(f"'{word}' is not known")
         self._comment = []
 
+    def _read_constants(self) -> list[Constant]:
+        """As rosidl writes them: module Region_Constants { const octet BOX = 0; };"""
+        constants = []
+        while (word := self._next()) != "}":
+            if word != "const":
+                raise ValueError(f"'{word}' stands where 'const' is expected")
+            idl_type, name = self._next(), self._next()
+            self._expect("=")
+            constants.append(Constant(ROS_OF_IDL[idl_type], name, int(self._next())))
+            self._expect(";")
+        self._expect(";")
+        return constants
+
     def _structure(self) -> Structure:
         package, kind = self._modules
-        made = Structure(package, kind, self._next(), self._comment)
+        name = self._next()
+        made = Structure(package, kind, name, self._comment,
+                         constants=self._constants.pop(name + CONSTANTS, []))
         self._expect("{")
         while (word := self._next()) != "}":
             made.fields.append(self._field(word))
@@ -124,6 +159,9 @@ _ROS_FIELD = re.compile(
     r"^(?P<type>[\w/]+(?:<=\d+)?)(?P<array>\[[^\]]*\])?\s+(?P<name>\w+)(?:\s+\S+)?$")
 
 
+_ROS_CONSTANT = re.compile(r"^(?P<type>\w+)\s+(?P<name>[A-Z][A-Z0-9_]*)\s*=\s*(?P<value>\d+)$")
+
+
 def _is_basic(type_name: str) -> bool:
     return type_name.split("<=")[0] in IDL_OF_ROS
 
@@ -142,10 +180,17 @@ def _ros_field(package: str, line: str) -> Field | None:
     return Field(type_name + (found["array"] or ""), found["name"], comment.strip() == "key")
 
 
+def _ros_constant(line: str) -> Constant | None:
+    found = _ROS_CONSTANT.match(line.partition("#")[0].strip())
+    return Constant(found["type"], found["name"], int(found["value"])) if found else None
+
+
 def read_message(package: str, kind: str, name: str, text: str) -> Structure:
     """Of the text of a .msg file, or of half of a .srv file."""
     fields = [_ros_field(package, line) for line in text.splitlines()]
-    made = Structure(package, kind, name, fields=[f for f in fields if f])
+    constants = [_ros_constant(line) for line in text.splitlines()]
+    made = Structure(package, kind, name, fields=[f for f in fields if f],
+                     constants=[c for c in constants if c])
     if not made.fields:
         made.fields = [Field("uint8", "structure_needs_at_least_one_member")]
     return made

@@ -12,8 +12,10 @@ from interfaces import Structure, read_idl
 PACKAGE = "stillmap_msgs"
 
 
-def field_lines(structure: Structure) -> list[str]:
+def lines_of(structure: Structure) -> list[str]:
     lines = [f"# {line}" for line in structure.comment]
+    lines += [f"{constant.type} {constant.name}={constant.value}"
+              for constant in structure.constants]
     for field in structure.fields:
         type_name = field.type.removeprefix(f"{PACKAGE}/")
         lines.append(f"{type_name} {field.name}" + ("  # key" if field.is_key else ""))
@@ -28,14 +30,14 @@ def main():
         if made.package != PACKAGE:
             continue
         if made.kind == "msg":
-            texts[folder / "msg" / f"{made.name}.msg"] = field_lines(made)
+            texts[folder / "msg" / f"{made.name}.msg"] = lines_of(made)
             continue
         name, half = made.name.rsplit("_", 1)
         file = folder / "srv" / f"{name}.srv"
         if half == "Request":
-            texts[file] = field_lines(made) + ["---"]
+            texts[file] = lines_of(made) + ["---"]
         else:
-            texts[file] += field_lines(made)
+            texts[file] += lines_of(made)
     for file, lines in texts.items():
         file.parent.mkdir(exist_ok=True)
         file.write_text("\n".join(lines) + "\n")

@@ -15,25 +15,29 @@ using stillmap_msgs::srv::GetStaticMap_Response;
 
 namespace {
 
-template <std::size_t N>
-std::vector<std::uint8_t> numbers_of(const std::bitset<N>& set) {
+namespace changes = stillmap_msgs::msg::TileChange_Constants;
+static_assert(static_cast<std::uint8_t>(TileChangeKind::appeared) == changes::APPEARED &&
+              static_cast<std::uint8_t>(TileChangeKind::changed) == changes::CHANGED &&
+              static_cast<std::uint8_t>(TileChangeKind::removed) == changes::REMOVED);
+
+using Classes = std::bitset<semantic_class_count>;
+
+std::vector<std::uint8_t> to_wire(const Classes& classes) {
   std::vector<std::uint8_t> numbers;
-  for (std::uint8_t number = 0; number < N; ++number) {
-    if (set[number]) numbers.push_back(number);
+  for (std::uint8_t number = 0; number < classes.size(); ++number) {
+    if (classes[number]) numbers.push_back(number);
   }
   return numbers;
 }
 
-/// What is wrong with the field; empty when all its numbers exist.
-template <std::size_t N>
-std::string set_numbers(const std::string& field, const std::vector<std::uint8_t>& numbers,
-                        std::bitset<N>& set) {
+/// What is wrong with the numbers; empty when each is a class.
+std::string set_classes(const std::vector<std::uint8_t>& numbers, Classes& classes) {
   for (const std::uint8_t number : numbers) {
-    if (number >= N) {
-      return field + " contains " + std::to_string(number) + "; they are 0.." +
-             std::to_string(N - 1);
+    if (number >= classes.size()) {
+      return "classes contains " + std::to_string(number) + "; they are 0.." +
+             std::to_string(classes.size() - 1);
     }
-    set.set(number);
+    classes.set(number);
   }
   return {};
 }
@@ -49,7 +53,7 @@ stillmap_msgs::msg::TileChange to_wire(const TileChange& tile) {
 }
 
 bool is_known_change(const stillmap_msgs::msg::TileChange& tile) {
-  return tile.change() <= static_cast<std::uint8_t>(TileChangeKind::removed);
+  return tile.change() <= changes::REMOVED;
 }
 
 TileChange from_wire(const stillmap_msgs::msg::TileChange& message) {
@@ -93,8 +97,7 @@ GetStaticMap_Request to_request(const MapQuery& query) {
   GetStaticMap_Request request;
   request.format_version(dds::wire_format_version);
   request.region(to_wire(query.region));
-  request.classes(numbers_of(query.classes));
-  request.motions(numbers_of(query.motions));
+  request.classes(to_wire(query.classes));
   request.resolution_m(query.resolution_m);
   request.max_bytes(query.max_bytes);
   if (query.since) {
@@ -111,10 +114,7 @@ QueryFromRequest from_request(const GetStaticMap_Request& request) {
   if (!region) return {{}, std::move(region_fault)};
   MapQuery query;
   query.region = *std::move(region);
-  if (auto fault = set_numbers("classes", request.classes(), query.classes); !fault.empty()) {
-    return {{}, std::move(fault)};
-  }
-  if (auto fault = set_numbers("motions", request.motions(), query.motions); !fault.empty()) {
+  if (auto fault = set_classes(request.classes(), query.classes); !fault.empty()) {
     return {{}, std::move(fault)};
   }
   query.resolution_m = request.resolution_m();

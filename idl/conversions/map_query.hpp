@@ -10,13 +10,13 @@ namespace stillmap::wire {
 
 /// Codes of stillmap_msgs/ReplyStatus; the first are those of QueryStatus.
 enum class ReplyCode : std::uint8_t {
-  ok = 0,
-  invalid_request = 1,
-  stale_continuation = 2,
-  failed = 3,
-  changes_unknown = 4,
-  too_large = 5,
-  not_found = 6,
+  ok = stillmap_msgs::msg::ReplyStatus_Constants::OK,
+  invalid_request = stillmap_msgs::msg::ReplyStatus_Constants::INVALID_REQUEST,
+  stale_continuation = stillmap_msgs::msg::ReplyStatus_Constants::STALE_CONTINUATION,
+  failed = stillmap_msgs::msg::ReplyStatus_Constants::FAILED,
+  changes_unknown = stillmap_msgs::msg::ReplyStatus_Constants::CHANGES_UNKNOWN,
+  too_large = stillmap_msgs::msg::ReplyStatus_Constants::TOO_LARGE,
+  not_found = stillmap_msgs::msg::ReplyStatus_Constants::NOT_FOUND,
 };
 
 [[nodiscard]] stillmap_msgs::msg::ReplyStatus to_reply_status(ReplyCode code,

@@ -11,6 +11,14 @@ using stillmap_msgs::msg::Coordinates;
 using stillmap_msgs::srv::QueryOccupancy_Request;
 using stillmap_msgs::srv::QueryOccupancy_Response;
 
+namespace codes = stillmap_msgs::msg::OccupancyAtPoint_Constants;
+namespace end_codes = stillmap_msgs::msg::OccupancyAlongRay_Constants;
+static_assert(static_cast<std::uint8_t>(Occupancy::unknown) == codes::UNKNOWN &&
+              static_cast<std::uint8_t>(Occupancy::free) == codes::FREE &&
+              static_cast<std::uint8_t>(Occupancy::occupied) == codes::OCCUPIED);
+static_assert(end_codes::UNKNOWN == codes::UNKNOWN && end_codes::FREE == codes::FREE &&
+              end_codes::OCCUPIED == codes::OCCUPIED);
+
 Coordinates to_wire(const Eigen::Vector3d& value) {
   Coordinates message;
   message.x(value.x());
@@ -35,7 +43,7 @@ stillmap_msgs::msg::OccupancyRay to_wire(const RayQuery& ray) {
   message.origin(to_wire(ray.origin_map));
   message.direction(to_wire(ray.direction_map));
   message.max_range_m(ray.max_range_m);
-  message.passes_unknown(ray.ignore_unknown);
+  message.ignore_unknown(ray.ignore_unknown);
   return message;
 }
 
@@ -43,7 +51,7 @@ RayQuery from_wire(const stillmap_msgs::msg::OccupancyRay& message) {
   return {.origin_map = from_wire(message.origin()),
           .direction_map = from_wire(message.direction()),
           .max_range_m = message.max_range_m(),
-          .ignore_unknown = message.passes_unknown()};
+          .ignore_unknown = message.ignore_unknown()};
 }
 
 stillmap_msgs::msg::OccupancyAtPoint to_wire(const PointOccupancy& point) {
@@ -119,7 +127,7 @@ OccupancyQuery from_request(const QueryOccupancy_Request& request) {
   OccupancyQuery query;
   for (const auto& point : request.points()) query.points_map.push_back(from_wire(point));
   for (const auto& box : request.boxes()) {
-    // As asked for: what is no box is told, not repaired.
+    // Unchanged: a box with min above max is answered with a fault.
     Eigen::AlignedBox3d& box_map = query.boxes_map.emplace_back();
     box_map.min() = from_wire(box.min());
     box_map.max() = from_wire(box.max());

@@ -55,8 +55,8 @@ CheckPath_Response to_response(const PathCheck& check, std::uint64_t map_id) {
   response.conflict_x(conflict.pose.position_map.x());
   response.conflict_y(conflict.pose.position_map.y());
   response.conflict_heading_rad(conflict.pose.heading_rad);
-  response.place_x(conflict.cell_centre_map.x());
-  response.place_y(conflict.cell_centre_map.y());
+  response.conflict_cell_x(conflict.cell_centre_map.x());
+  response.conflict_cell_y(conflict.cell_centre_map.y());
   response.conflict_reason(static_cast<std::uint8_t>(conflict.reason));
   return response;
 }
@@ -78,7 +78,7 @@ std::optional<PathCheck> from_response(const CheckPath_Response& response) {
                     .along_m = response.conflict_along_m(),
                     .pose = {.position_map = {response.conflict_x(), response.conflict_y()},
                              .heading_rad = response.conflict_heading_rad()},
-                    .cell_centre_map = {response.place_x(), response.place_y()},
+                    .cell_centre_map = {response.conflict_cell_x(), response.conflict_cell_y()},
                     .reason = *reason};
   return check;
 }

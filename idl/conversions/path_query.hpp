@@ -3,9 +3,9 @@
 #include <optional>
 #include <string>
 
-#include "core/traversability/traversability_view.hpp"
 #include "core/traversability/path_check.hpp"
-#include "traversable_area.h"
+#include "core/traversability/traversability_view.hpp"
+#include "traversability.h"
 
 namespace stillmap::wire {
 

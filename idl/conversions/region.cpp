@@ -1,17 +1,23 @@
 #include "idl/conversions/region.hpp"
 
+#include <type_traits>
 #include <utility>
+#include <variant>
 
 namespace stillmap::wire {
 namespace {
 
 using Message = stillmap_msgs::msg::Region;
 
-// Values of Region.kind, in the order of stillmap::Region's alternatives.
-constexpr std::uint8_t box_kind = 0;
-constexpr std::uint8_t sphere_kind = 1;
-constexpr std::uint8_t polygon_kind = 2;
-constexpr std::uint8_t corridor_kind = 3;
+namespace kinds = stillmap_msgs::msg::Region_Constants;
+
+// A kind's number is the place of its alternative in stillmap::Region.
+template <std::uint8_t kind>
+using RegionOfKind = std::variant_alternative_t<kind, Region>;
+static_assert(std::is_same_v<RegionOfKind<kinds::BOX>, BoxRegion> &&
+              std::is_same_v<RegionOfKind<kinds::SPHERE>, SphereRegion> &&
+              std::is_same_v<RegionOfKind<kinds::POLYGON>, PolygonRegion> &&
+              std::is_same_v<RegionOfKind<kinds::CORRIDOR>, CorridorRegion>);
 
 void set_heights(const HeightRange& heights, Message& message) {
   message.min_z(heights.min_m);
@@ -88,16 +94,16 @@ RegionFromWire from_wire(const Message& message) {
                 std::to_string(message.y().size()) + "; give an x and a y for every point"};
   }
   switch (message.kind()) {
-    case box_kind:
+    case kinds::BOX:
       return {box_of(message), {}};
-    case sphere_kind:
+    case kinds::SPHERE:
       return {
           SphereRegion{.centre_map = {message.centre_x(), message.centre_y(), message.centre_z()},
                        .radius_m = message.radius_m()},
           {}};
-    case polygon_kind:
+    case kinds::POLYGON:
       return {PolygonRegion{.corners_map = points_of(message), .heights = heights_of(message)}, {}};
-    case corridor_kind:
+    case kinds::CORRIDOR:
       return {CorridorRegion{.path_map = points_of(message),
                              .half_width_m = message.half_width_m(),
                              .heights = heights_of(message)},

@@ -1,6 +1,15 @@
 #include "idl/conversions/removed_voxels.hpp"
 
 namespace stillmap::wire {
+namespace {
+
+namespace reasons = stillmap_msgs::srv::GetRemoved_Request_Constants;
+static_assert(static_cast<std::uint8_t>(RemovalReason::moving) == reasons::MOVING &&
+              static_cast<std::uint8_t>(RemovalReason::semi_static) == reasons::SEMI_STATIC &&
+              static_cast<std::uint8_t>(RemovalReason::seen_through) == reasons::SEEN_THROUGH &&
+              static_cast<std::uint8_t>(RemovalReason::relabelled) == reasons::RELABELLED);
+
+}  // namespace
 
 void write_removed(const std::vector<RemovedVoxel>& removed,
                    stillmap_msgs::srv::GetRemoved_Response& response) {

@@ -6,6 +6,17 @@
 namespace stillmap::wire {
 namespace {
 
+namespace codes = stillmap_msgs::msg::Status_Constants;
+static_assert(static_cast<std::uint8_t>(DeliveryMode::latest) == codes::DELIVERY_LATEST &&
+              static_cast<std::uint8_t>(DeliveryMode::every) == codes::DELIVERY_EVERY);
+static_assert(static_cast<std::uint8_t>(OdometryHealth::initialised) == codes::HEALTH_INITIALISED &&
+              static_cast<std::uint8_t>(OdometryHealth::good) == codes::HEALTH_GOOD &&
+              static_cast<std::uint8_t>(OdometryHealth::degenerate) == codes::HEALTH_DEGENERATE &&
+              static_cast<std::uint8_t>(OdometryHealth::lost) == codes::HEALTH_LOST);
+namespace severities = stillmap_msgs::msg::Diagnostic_Constants;
+static_assert(static_cast<std::uint8_t>(dds::Severity::advice) == severities::WARN &&
+              static_cast<std::uint8_t>(dds::Severity::problem) == severities::ERROR);
+
 void add_lists(const dds::ServerStatus& status, stillmap_msgs::msg::Status& message) {
   for (const dds::NamedCounter& counter : status.counters) {
     auto& out = message.counters().emplace_back();
@@ -24,23 +35,22 @@ void add_lists(const dds::ServerStatus& status, stillmap_msgs::msg::Status& mess
 
 void add_diagnostics(const dds::ServerStatus& status, stillmap_msgs::msg::Status& message) {
   for (const dds::Diagnostic& diagnostic : status.diagnostics) {
-    auto& out = message.findings().emplace_back();
+    auto& out = message.diagnostics().emplace_back();
     out.severity(static_cast<std::uint8_t>(diagnostic.severity));
     out.what(diagnostic.what);
     out.evidence(diagnostic.evidence);
-    out.way_out(diagnostic.hint);
+    out.hint(diagnostic.hint);
   }
 }
 
 void add_diagnostics(const stillmap_msgs::msg::Status& message, dds::ServerStatus& status) {
-  for (const auto& diagnostic : message.findings()) {
-    const bool is_advice =
-        diagnostic.severity() == static_cast<std::uint8_t>(dds::Severity::advice);
+  for (const auto& diagnostic : message.diagnostics()) {
+    const bool is_advice = diagnostic.severity() == severities::WARN;
     status.diagnostics.push_back(
         {.severity = is_advice ? dds::Severity::advice : dds::Severity::problem,
          .what = diagnostic.what(),
          .evidence = diagnostic.evidence(),
-         .hint = diagnostic.way_out()});
+         .hint = diagnostic.hint()});
   }
 }
 
@@ -59,22 +69,22 @@ void add_lists(const stillmap_msgs::msg::Status& message, dds::ServerStatus& sta
 
 void to_wire(const dds::SegmentationStatus& status,
              stillmap_msgs::msg::SegmentationStatus& message) {
-  message.every(status.every);
-  message.network_ms(status.network_ms);
+  message.interval(status.interval);
+  message.inference_ms(status.inference_ms);
   message.image_columns(status.image_columns);
   message.full_columns(status.full_columns);
   message.fresh_share(status.fresh_share);
-  message.carried_share(status.propagated_share);
+  message.propagated_share(status.propagated_share);
   message.unlabelled_share(status.unlabelled_share);
 }
 
 dds::SegmentationStatus from_wire(const stillmap_msgs::msg::SegmentationStatus& message) {
-  return {.every = message.every(),
-          .network_ms = message.network_ms(),
+  return {.interval = message.interval(),
+          .inference_ms = message.inference_ms(),
           .image_columns = message.image_columns(),
           .full_columns = message.full_columns(),
           .fresh_share = message.fresh_share(),
-          .propagated_share = message.carried_share(),
+          .propagated_share = message.propagated_share(),
           .unlabelled_share = message.unlabelled_share()};
 }
 
@@ -110,8 +120,7 @@ stillmap_msgs::msg::Status to_wire(const dds::ServerStatus& status) {
 std::optional<dds::ServerStatus> from_wire(const stillmap_msgs::msg::Status& message) {
   const auto stamp = stamp_ns(message.stamp());
   if (message.format_version() != dds::wire_format_version || !stamp ||
-      message.delivery() > static_cast<std::uint8_t>(DeliveryMode::every) ||
-      message.health() > static_cast<std::uint8_t>(OdometryHealth::lost)) {
+      message.delivery() > codes::DELIVERY_EVERY || message.health() > codes::HEALTH_LOST) {
     return std::nullopt;
   }
   dds::ServerStatus status{.stamp_ns = *stamp,

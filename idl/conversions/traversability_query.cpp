@@ -14,8 +14,8 @@ using stillmap_msgs::srv::GetTraversableArea_Response;
 
 namespace {
 
-stillmap_msgs::msg::AreaRing to_wire(const TraversableRing& ring) {
-  stillmap_msgs::msg::AreaRing message;
+stillmap_msgs::msg::TraversableRing to_wire(const TraversableRing& ring) {
+  stillmap_msgs::msg::TraversableRing message;
   for (const Eigen::Vector2d& corner : ring) {
     message.x().push_back(corner.x());
     message.y().push_back(corner.y());
@@ -23,7 +23,7 @@ stillmap_msgs::msg::AreaRing to_wire(const TraversableRing& ring) {
   return message;
 }
 
-std::optional<TraversableRing> from_wire(const stillmap_msgs::msg::AreaRing& message) {
+std::optional<TraversableRing> from_wire(const stillmap_msgs::msg::TraversableRing& message) {
   if (message.x().size() != message.y().size()) return std::nullopt;
   TraversableRing ring;
   ring.reserve(message.x().size());
@@ -33,14 +33,14 @@ std::optional<TraversableRing> from_wire(const stillmap_msgs::msg::AreaRing& mes
   return ring;
 }
 
-stillmap_msgs::msg::AreaPolygon to_wire(const TraversablePolygon& polygon) {
-  stillmap_msgs::msg::AreaPolygon message;
+stillmap_msgs::msg::TraversablePolygon to_wire(const TraversablePolygon& polygon) {
+  stillmap_msgs::msg::TraversablePolygon message;
   message.outer(to_wire(polygon.outer));
   for (const TraversableRing& hole : polygon.holes) message.holes().push_back(to_wire(hole));
   return message;
 }
 
-std::optional<TraversablePolygon> from_wire(const stillmap_msgs::msg::AreaPolygon& message) {
+std::optional<TraversablePolygon> from_wire(const stillmap_msgs::msg::TraversablePolygon& message) {
   auto outer = from_wire(message.outer());
   if (!outer) return std::nullopt;
   TraversablePolygon polygon{.outer = *std::move(outer), .holes = {}};
@@ -52,7 +52,7 @@ std::optional<TraversablePolygon> from_wire(const stillmap_msgs::msg::AreaPolygo
   return polygon;
 }
 
-void fill(const TraversabilityAnswer& answer, stillmap_msgs::msg::AreaGrid& message) {
+void fill(const TraversabilityAnswer& answer, stillmap_msgs::msg::TraversabilityGrid& message) {
   const OccupancyGrid& grid = answer.grid;
   message.origin_x(grid.origin_map.x());
   message.origin_y(grid.origin_map.y());
@@ -75,7 +75,7 @@ void fill(const TraversabilityAnswer& answer, stillmap_msgs::msg::AreaGrid& mess
 }
 
 /// All arrays are of one length: none, or that of the grid.
-bool is_consistent(const stillmap_msgs::msg::AreaGrid& message) {
+bool is_consistent(const stillmap_msgs::msg::TraversabilityGrid& message) {
   const std::size_t cells = message.cost().size();
   const bool has_shape = std::uint64_t{message.width()} * message.height() == cells;
   return (cells == 0 || has_shape) && message.state().size() == cells &&
@@ -83,7 +83,7 @@ bool is_consistent(const stillmap_msgs::msg::AreaGrid& message) {
          message.ground_z().size() == cells;
 }
 
-std::optional<TraversabilityCellInfo> cell_of(const stillmap_msgs::msg::AreaGrid& message,
+std::optional<TraversabilityCellInfo> cell_of(const stillmap_msgs::msg::TraversabilityGrid& message,
                                               std::size_t i) {
   const auto state = cell_state(message.state()[i]);
   const auto reason = block_reason(message.reason()[i]);
@@ -95,7 +95,8 @@ std::optional<TraversabilityCellInfo> cell_of(const stillmap_msgs::msg::AreaGrid
 }
 
 /// False when the message makes no sense.
-bool read_grid(const stillmap_msgs::msg::AreaGrid& message, TraversabilityAnswer& answer) {
+bool read_grid(const stillmap_msgs::msg::TraversabilityGrid& message,
+               TraversabilityAnswer& answer) {
   if (!is_consistent(message)) return false;
   OccupancyGrid& grid = answer.grid;
   grid.origin_map = {message.origin_x(), message.origin_y()};
@@ -119,8 +120,8 @@ GetTraversableArea_Request to_request(const TraversabilityQuery& query) {
   request.format_version(dds::wire_format_version);
   request.profile(query.profile);
   request.region(to_wire(query.region));
-  request.wants_grid(query.include_grid);
-  request.wants_outlines(query.include_outlines);
+  request.include_grid(query.include_grid);
+  request.include_outlines(query.include_outlines);
   request.max_cells(
       static_cast<std::uint32_t>(std::min<std::uint64_t>(query.max_cells, max_answered_cells)));
   request.min_outline_area_m2(query.min_outline_area_m2);
@@ -133,8 +134,8 @@ TraversabilityQueryFromRequest from_request(const GetTraversableArea_Request& re
   TraversabilityQuery query;
   query.profile = request.profile();
   query.region = *std::move(region);
-  query.include_grid = request.wants_grid();
-  query.include_outlines = request.wants_outlines();
+  query.include_grid = request.include_grid();
+  query.include_outlines = request.include_outlines();
   query.max_cells = max_answered_cells;
   if (request.max_cells() != 0) query.max_cells = std::min(max_answered_cells, request.max_cells());
   query.min_outline_area_m2 = request.min_outline_area_m2();

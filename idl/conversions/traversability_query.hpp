@@ -4,7 +4,7 @@
 #include <string>
 
 #include "core/traversability/traversability_query.hpp"
-#include "traversable_area.h"
+#include "traversability.h"
 
 namespace stillmap::wire {
 

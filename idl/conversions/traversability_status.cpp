@@ -1,9 +1,24 @@
 #include "idl/conversions/traversability_status.hpp"
 
 #include "idl/conversions/map_query.hpp"
+#include "traversability.h"
 
 namespace stillmap::wire {
 namespace {
+
+namespace codes = stillmap_msgs::msg::TraversabilityGrid_Constants;
+static_assert(static_cast<std::uint8_t>(CellState::unknown) == codes::STATE_UNKNOWN &&
+              static_cast<std::uint8_t>(CellState::free) == codes::STATE_FREE &&
+              static_cast<std::uint8_t>(CellState::lethal) == codes::STATE_LETHAL);
+static_assert(static_cast<std::uint8_t>(BlockReason::none) == codes::REASON_NONE &&
+              static_cast<std::uint8_t>(BlockReason::obstacle) == codes::REASON_OBSTACLE &&
+              static_cast<std::uint8_t>(BlockReason::low_headroom) == codes::REASON_LOW_HEADROOM &&
+              static_cast<std::uint8_t>(BlockReason::step) == codes::REASON_STEP &&
+              static_cast<std::uint8_t>(BlockReason::slope) == codes::REASON_SLOPE &&
+              static_cast<std::uint8_t>(BlockReason::roughness) == codes::REASON_ROUGHNESS &&
+              static_cast<std::uint8_t>(BlockReason::ground_class) == codes::REASON_GROUND_CLASS &&
+              static_cast<std::uint8_t>(BlockReason::inscribed) == codes::REASON_INFLATION &&
+              static_cast<std::uint8_t>(BlockReason::unknown) == codes::REASON_UNKNOWN);
 
 ReplyCode code_of(TraversabilityStatus status) {
   switch (status) {

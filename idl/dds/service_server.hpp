@@ -12,6 +12,7 @@
 #include "idl/dds/service_faults.hpp"
 #include "idl/dds/service_identity.hpp"
 #include "idl/dds/type_support.hpp"
+#include "stillmap_msgs.h"
 
 namespace stillmap::dds {
 
@@ -119,8 +120,7 @@ class ServiceServer {
 
   static Reply refusal() {
     Reply reply;
-    // An invalid request, as stillmap_msgs/ReplyStatus numbers it.
-    reply.status().code(1);
+    reply.status().code(stillmap_msgs::msg::ReplyStatus_Constants::INVALID_REQUEST);
     reply.status().reason("the request cannot be read as a " +
                           type_support<Request>().get_type_name() +
                           "; client and server must have the same version of stillmap_msgs");

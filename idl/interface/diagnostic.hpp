@@ -5,12 +5,12 @@
 
 namespace stillmap::dds {
 
-/// How much a diagnostic matters.
+/// How much a diagnostic matters, in the numbers of diagnostic_msgs/DiagnosticStatus (WARN, ERROR).
 enum class Severity : std::uint8_t {
   /// It works, but may not for long, or not as fast as it could.
-  advice = 0,
+  advice = 1,
   /// It keeps data from flowing.
-  problem = 1,
+  problem = 2,
 };
 
 /// Something that is wrong, with what shows it and what would help.

@@ -20,16 +20,17 @@ struct NamedCounter {
 
 /// How segmentation keeps up with the scans.
 struct SegmentationStatus {
-  /// Every n-th scan is segmented; those between get labels from the map and the last labelled
-  /// scan.
-  std::uint32_t every = 1;
+  /// Every `interval`-th scan is segmented; those between get labels from the map and the last
+  /// labelled scan.
+  std::uint32_t interval = 1;
   /// Median time of the label source over the last scans; 0 before the first.
-  double network_ms = 0.0;
-  /// Width of the range images that it looks at, and what that is on a machine that is fast enough;
-  /// 0: it looks at none.
+  double inference_ms = 0.0;
+  /// Columns of the range images that are segmented, and how many they are on a machine that is
+  /// fast enough; 0: no range images.
   std::uint32_t image_columns = 0;
   std::uint32_t full_columns = 0;
-  /// Shares of the last scans: with labels of their own, carried ones, none.
+  /// Shares of the points of the last scans: labelled themselves, with propagated labels, with
+  /// none.
   double fresh_share = 0.0;
   double propagated_share = 0.0;
   double unlabelled_share = 0.0;
@@ -85,9 +86,9 @@ struct ServerStatus {
   /// Frame that the last cloud named; empty before the first.
   std::string scan_frame;
   /// The server's clock when the last cloud arrived, minus the cloud's stamp; years for a
-  /// recording.
+  /// bag.
   double scan_delay_s = 0.0;
-  /// What is wrong with the server's peers and its machine.
+  /// What is wrong with other participants of the domain and the server's machine.
   std::vector<Diagnostic> diagnostics;
 
   /// Value of a counter; 0 when it never counted.

@@ -122,8 +122,8 @@ void AsyncSegmenter::record_duration(double network_ms) {
 
 void AsyncSegmenter::report_rate() {
   statistics_.set_segmentation_status(
-      {.every = rate_controller_.every(),
-       .network_ms = rate_controller_.network_ms(),
+      {.interval = rate_controller_.every(),
+       .inference_ms = rate_controller_.network_ms(),
        .image_columns = static_cast<std::uint32_t>(source_->image_columns()),
        .full_columns = static_cast<std::uint32_t>(full_columns_),
        .fresh_share = 0.0,

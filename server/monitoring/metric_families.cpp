@@ -142,7 +142,7 @@ void add_scans(std::vector<MetricFamily>& all, const dds::ServerStatus& status) 
   all.push_back(counter("label_failures_total", "Scans whose segmentation failed")
                     .add(count(status, "label_failures")));
   all.push_back(gauge("segmentation_every_scans", "n, when every n-th scan is segmented")
-                    .add(status.segmentation.every));
+                    .add(status.segmentation.interval));
   all.push_back(gauge("segmentation_image_columns", "Width of the range images; 0: none")
                     .add(status.segmentation.image_columns));
   all.push_back(label_shares(status.segmentation));

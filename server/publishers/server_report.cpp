@@ -63,8 +63,8 @@ namespace {
 /// What segmentation does less than it would on a faster machine; empty when nothing.
 std::string reduced_pace(const dds::SegmentationStatus& segmentation) {
   std::string what;
-  if (segmentation.every > 1) {
-    what = dds::every_nth_scan(segmentation.every) + " is segmented, labels are carried between";
+  if (segmentation.interval > 1) {
+    what = dds::every_nth_scan(segmentation.interval) + " is segmented, labels are carried between";
   }
   if (segmentation.image_columns > 0 && segmentation.image_columns < segmentation.full_columns) {
     what += (what.empty() ? "" : "; ") + std::string("range images are ") +

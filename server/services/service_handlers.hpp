@@ -9,7 +9,7 @@
 #include "server/services/service_context.hpp"
 #include "stillmap_msgs.h"
 #include "stillmap_occupancy.h"
-#include "traversable_area.h"
+#include "traversability.h"
 
 namespace stillmap::server {
 

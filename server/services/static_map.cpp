@@ -96,7 +96,7 @@ GetTiles_Response get_tiles(const ServiceContext& context, const GetTiles_Reques
       if (known == nullptr) {
         response.missing().push_back(id);
       } else if (voxels > 0 && voxels + known->info.voxel_count > max_voxels_per_reply) {
-        response.left_out().push_back(id);
+        response.remaining().push_back(id);
       } else {
         voxels += known->info.voxel_count;
         response.tiles().push_back(wire::to_wire(*context.tiles.read(known), identity));

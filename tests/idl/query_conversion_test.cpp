@@ -12,8 +12,6 @@ TEST(QueryConversion, KeepsTheQuery) {
   query.region = SphereRegion{.centre_map = {1.0, 2.0, 3.0}, .radius_m = 4.0};
   query.classes.set(0);
   query.classes.set(19);
-  query.motions.set(0);
-  query.motions.set(2);
   query.since = {.map_id = 77, .version = 0};
   query.resolution_m = 0.4;
   query.max_bytes = 1234;
@@ -23,7 +21,6 @@ TEST(QueryConversion, KeepsTheQuery) {
   const auto& sphere = std::get<SphereRegion>(back.query->region);
   EXPECT_EQ(sphere.centre_map, Eigen::Vector3d(1.0, 2.0, 3.0));
   EXPECT_EQ(sphere.radius_m, 4.0);
-  EXPECT_EQ(back.query->motions, query.motions);
   ASSERT_TRUE(back.query->since);
   EXPECT_EQ(back.query->since->map_id, 77U);
   EXPECT_EQ(back.query->since->version, 0U);
@@ -41,10 +38,6 @@ TEST(QueryConversion, RefusesUnknownClassesAndVersions) {
   auto request = to_request(MapQuery{});
   request.classes({3, 20});
   EXPECT_NE(from_request(request).fault.find("20"), std::string::npos);
-  request = to_request(MapQuery{});
-  request.motions({3});
-  EXPECT_NE(from_request(request).fault.find("motions contains 3; they are 0..2"),
-            std::string::npos);
   request = to_request(MapQuery{});
   request.format_version(9);
   EXPECT_NE(from_request(request).fault.find("format_version is 9"), std::string::npos);

@@ -80,8 +80,8 @@ TEST(StatusConversion, KeepsEverything) {
                       .map_id = 4,
                       .tile_count = 5,
                       .voxel_count = 6,
-                      .segmentation = {.every = 3,
-                                       .network_ms = 210.0,
+                      .segmentation = {.interval = 3,
+                                       .inference_ms = 210.0,
                                        .image_columns = 1024,
                                        .full_columns = 1536,
                                        .fresh_share = 0.25,
@@ -115,8 +115,8 @@ TEST(StatusConversion, KeepsEverything) {
   EXPECT_EQ(back->diagnostics[0].evidence, "evidence");
   EXPECT_EQ(back->diagnostics[0].hint, "way out");
   EXPECT_EQ(back->diagnostics[1].severity, Severity::problem);
-  EXPECT_EQ(back->segmentation.every, 3U);
-  EXPECT_EQ(back->segmentation.network_ms, 210.0);
+  EXPECT_EQ(back->segmentation.interval, 3U);
+  EXPECT_EQ(back->segmentation.inference_ms, 210.0);
   EXPECT_EQ(back->segmentation.image_columns, 1024U);
   EXPECT_EQ(back->segmentation.full_columns, 1536U);
   EXPECT_EQ(back->segmentation.fresh_share, 0.25);

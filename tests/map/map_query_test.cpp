@@ -105,7 +105,6 @@ TEST_F(MapQueryTest, AgreesWithBruteForceOnEveryKindOfRegion) {
       MapQuery query;
       query.region = region;
       query.max_bytes = 30'000;
-      query.motions.set(static_cast<std::size_t>(Motion::stationary));
       if (some_classes) query.classes.set(static_cast<std::size_t>(SemanticClass::road));
       int pages = 0;
       const std::vector<Row> rows = all_pages(view(), query, pages);
@@ -210,9 +209,6 @@ TEST_F(MapQueryTest, RefusesWhatCannotBeAnsweredAndNamesIt) {
   expect_refused(query, "box x is from");
   query.region = SphereRegion{};
   expect_refused(query, "sphere radius_m is 0");
-  query = MapQuery();
-  query.motions.set(static_cast<std::size_t>(Motion::semi_static));
-  expect_refused(query, "motions has no 0 (stationary)");
   for (const double resolution_m : {-1.0, 0.1, nan, infinity, -infinity}) {
     query = MapQuery();
     query.resolution_m = resolution_m;

@@ -177,7 +177,7 @@ class CyclonePeerTest(unittest.TestCase):
         self.assertIn("box x is from", reversed_box["refused"])
         self.assertEqual(report.one("get_tile_versions")["tiles"], good["tiles"])
         tiles = report.one("get_tiles")
-        self.assertEqual(int(tiles["tiles"]) + int(tiles["left_out"]), int(good["tiles"]))
+        self.assertEqual(int(tiles["tiles"]) + int(tiles["remaining"]), int(good["tiles"]))
         for service in ("get_traversable_area", "nearest_traversable", "check_path",
                         "query_occupancy", "get_removed", "save_map"):
             self.assertEqual(report.one(service)["code"], "0", service)

@@ -9,7 +9,7 @@ import unittest
 import xml.etree.ElementTree as xml
 from pathlib import Path
 
-from interfaces import (Field, Structure, read_definitions, read_idl, read_message, read_package,
+from interfaces import (Constant, Field, Structure, read_definitions, read_idl, read_message, read_package,
                         read_service)
 
 try:
@@ -47,6 +47,8 @@ def differences(ours: list[Structure], theirs: list[Structure]) -> list[str]:
 
 def field_differences(made: Structure, other: Structure) -> list[str]:
     faults = []
+    if made.constants != other.constants:
+        faults.append(f"{made.full_name}: {other.constants} instead of {made.constants}")
     for at in range(max(len(made.fields), len(other.fields))):
         place = f"{made.full_name}, field {at + 1}"
         if at >= len(made.fields):
@@ -137,8 +139,11 @@ class RosidlTest(ComparisonTest):
 
     @staticmethod
     def structure(kind: str, name: str, specification) -> Structure:
-        return Structure(PACKAGE.name, kind, name, fields=[
-            Field(str(field.type), field.name) for field in specification.fields])
+        return Structure(
+            PACKAGE.name, kind, name,
+            fields=[Field(str(field.type), field.name) for field in specification.fields],
+            constants=[Constant(constant.type, constant.name, constant.value)
+                       for constant in specification.constants])
 
     def test_it_reads_the_same_fields(self):
         theirs = [self.structure("msg", file.stem, rosidl.parse_message_string(
@@ -182,8 +187,13 @@ class DifferencesTest(unittest.TestCase):
         self.assertEqual(differences(self.message("bool a"), []), ["a_msgs/msg/Thing is missing"])
 
     def test_constants_and_comments_are_no_fields(self):
-        self.assertEqual(differences(self.message("bool a"),
+        self.assertEqual(differences(self.message("uint8 C=1\nbool a"),
                                      self.message("# b\nuint8 C = 1\nbool a # is true")), [])
+
+    def test_another_constant(self):
+        for text in ("uint8 C=2\nbool a", "uint8 D=1\nbool a", "bool a"):
+            faults = differences(self.message("uint8 C=1\nbool a"), self.message(text))
+            self.assertEqual(len(faults), 1, text)
 
     def test_an_empty_half_of_a_service_has_one_byte(self):
         request, reply = read_service("a_msgs", "Do", "---\nbool done")

@@ -96,9 +96,9 @@ TEST_F(AsyncSegmenterTest, WithoutABudgetEveryScanIsLookedAtClosely) {
     (void)labels->submit(scan_at(k));
   }
   const dds::SegmentationStatus pace = status().segmentation;
-  EXPECT_EQ(pace.every, 1U);
+  EXPECT_EQ(pace.interval, 1U);
   EXPECT_EQ(pace.image_columns, 2000U);
-  EXPECT_GE(pace.network_ms, 20.0);
+  EXPECT_GE(pace.inference_ms, 20.0);
 }
 
 TEST_F(AsyncSegmenterTest, FailuresAreCountedAndGiveNoLabels) {

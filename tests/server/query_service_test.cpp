@@ -164,8 +164,6 @@ std::vector<HostileQuery> hostile_queries() {
   all.back().query.max_bytes = 0;
   all.push_back({{}, "continuation is damaged"});
   all.back().query.continuation = "no such page";
-  all.push_back({{}, "motions has no 0"});
-  all.back().query.motions.set(1);
   return all;
 }
 

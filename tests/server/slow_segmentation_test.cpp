@@ -69,11 +69,11 @@ TEST_F(SlowSegmentation, DelaysNoPoseBeyondTheBudgetAndIsUsedForEveryNthScan) {
   drive(30);
   const dds::ServerStatus slow = status();
   EXPECT_EQ(slow.counter("scans_mapped"), 30U);
-  EXPECT_GE(slow.segmentation.every, 2U);
-  EXPECT_GE(slow.segmentation.network_ms, 199.0);
+  EXPECT_GE(slow.segmentation.interval, 2U);
+  EXPECT_GE(slow.segmentation.inference_ms, 199.0);
   EXPECT_EQ(slow.segmentation.fresh_share, 0.0);
   EXPECT_GT(slow.segmentation.propagated_share, 0.6);
-  EXPECT_THAT(slow.reason, HasSubstr(dds::every_nth_scan(slow.segmentation.every)));
+  EXPECT_THAT(slow.reason, HasSubstr(dds::every_nth_scan(slow.segmentation.interval)));
   EXPECT_THAT(slow.reason, HasSubstr("carried"));
   // The network's 200 ms do not show: the budget of 30 ms, and much room for a busy machine.
   EXPECT_LT(median_ms("segment"), 190.0);
@@ -81,7 +81,7 @@ TEST_F(SlowSegmentation, DelaysNoPoseBeyondTheBudgetAndIsUsedForEveryNthScan) {
   source_.delay_ms = 0;
   drive(20);
   const dds::ServerStatus fast = status();
-  EXPECT_EQ(fast.segmentation.every, 1U);
+  EXPECT_EQ(fast.segmentation.interval, 1U);
   EXPECT_GT(fast.segmentation.fresh_share, 0.0);
   EXPECT_EQ(fast.reason, "");
 }
@@ -95,7 +95,7 @@ TEST_F(SlowSegmentation, LooksMoreCoarselyBeforeScansAreLeftOut) {
   const dds::ServerStatus slow = status();
   EXPECT_EQ(slow.segmentation.image_columns, 600U);
   EXPECT_EQ(slow.segmentation.full_columns, 2000U);
-  EXPECT_LT(slow.segmentation.network_ms, 150.0);
+  EXPECT_LT(slow.segmentation.inference_ms, 150.0);
   EXPECT_THAT(slow.reason, HasSubstr("600 columns wide instead of 2000"));
 
   source_.delay_ms = 0;

@@ -14,9 +14,9 @@ std::string describe(const dds::ServerStatus& status) {
   text += "labels     " + status.label_source + "\n";
   const dds::SegmentationStatus& segmentation = status.segmentation;
   const std::string columns = std::to_string(segmentation.image_columns);
-  text += "           " + dds::every_nth_scan(segmentation.every) + " segmented" +
+  text += "           " + dds::every_nth_scan(segmentation.interval) + " segmented" +
           (segmentation.image_columns > 0 ? " in " + columns + " columns, " : ", ") +
-          fixed(segmentation.network_ms, 1) + " ms each; of the last scans " +
+          fixed(segmentation.inference_ms, 1) + " ms each; of the last scans " +
           fixed(100.0 * segmentation.fresh_share, 0) + " % with labels of their own, " +
           fixed(100.0 * segmentation.propagated_share, 0) + " % with carried ones, " +
           fixed(100.0 * segmentation.unlabelled_share, 0) + " % with none\n";
@@ -45,8 +45,8 @@ std::string describe(const dds::ServerStatus& status) {
 namespace {
 
 nlohmann::json to_json(const dds::SegmentationStatus& segmentation) {
-  return {{"every", segmentation.every},
-          {"network_ms", segmentation.network_ms},
+  return {{"every", segmentation.interval},
+          {"network_ms", segmentation.inference_ms},
           {"image_columns", segmentation.image_columns},
           {"full_columns", segmentation.full_columns},
           {"fresh_share", segmentation.fresh_share},

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "core/lidar/motion.hpp"
 #include "core/map/query/region.hpp"
 #include "core/map/query/tile_history.hpp"
 #include "core/map/query/tile_reader.hpp"
@@ -26,9 +25,6 @@ struct MapQuery {
   /// Classes wanted; none set means all. Taken before voxels are merged: a pole next to a wall is
   /// still found at a coarse resolution.
   std::bitset<semantic_class_count> classes;
-  /// Kinds of motion wanted, by the values of Motion; none set means stationary. The static map
-  /// keeps stationary voxels only: a query without them is refused.
-  std::bitset<3> motions;
   /// Voxel size of the answer [m]; 0 is the map's own. Finer than the map's own is refused.
   double resolution_m = 0.0;
   /// Largest size of a page's voxels in bytes; at least one voxel's.

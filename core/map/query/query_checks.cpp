@@ -47,14 +47,6 @@ void check_resolution(const MapSnapshot& view, const MapQuery& query, std::ostre
   }
 }
 
-void check_motions(const MapQuery& query, std::ostream& faults) {
-  if (query.motions.none() || query.motions.test(static_cast<std::size_t>(Motion::stationary))) {
-    return;
-  }
-  faults << "motions has no 0 (stationary), and the static map keeps nothing else; leave motions "
-            "empty. ";
-}
-
 /// What a query consists of, as whole numbers one after the other.
 class QueryWords {
  public:
@@ -127,7 +119,6 @@ std::string query_faults(const MapSnapshot& view, const MapQuery& query) {
   std::ostringstream faults;
   faults << region_faults(query.region);
   check_resolution(view, query, faults);
-  check_motions(query, faults);
   if (query.max_bytes < query_voxel_bytes) {
     faults << "max_bytes is " << query.max_bytes << "; must be at least " << query_voxel_bytes
            << ", the size of one voxel. ";
@@ -167,8 +158,8 @@ std::optional<Refusal> token_refusal(const MapSnapshot& view, const MapQuery& qu
   }
   if (token->query_fingerprint != fingerprint(query)) {
     return Refusal{QueryStatus::invalid_request,
-                   "continuation is of another query; keep region, classes, motions, resolution_m "
-                   "and since_version as they were on the first page"};
+                   "continuation is of another query; keep region, classes, resolution_m and "
+                   "since_version as they were on the first page"};
   }
   return std::nullopt;
 }
@@ -178,7 +169,6 @@ std::uint64_t fingerprint(const MapQuery& query) {
   words.add(static_cast<std::uint64_t>(query.region.index()));
   std::visit([&](const auto& kind) { words.add(kind); }, query.region);
   words.add(std::uint64_t{query.classes.to_ullong()});
-  words.add(std::uint64_t{query.motions.to_ullong()});
   words.add(query.resolution_m);
   words.add(std::uint64_t{query.since ? 1U : 0U});
   words.add(query.since.value_or(KnownVersion()).map_id);

@@ -13,7 +13,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto discovery_timeout = 60s;
-constexpr std::uint8_t format_version = 4;
+constexpr std::uint8_t format_version = 5;
 
 // C structures of idlc's want pointers that they could write through.
 std::string no_text;
@@ -131,7 +131,7 @@ void ask_for_tiles(Questions& questions) {
   questions.ask<decltype(tiles), TilesReply>("get_tiles", tiles,
                                              [](Line& line, const TilesReply& reply) {
                                                line.add("tiles", reply.tiles._length)
-                                                   .add("left_out", reply.left_out._length)
+                                                   .add("remaining", reply.remaining._length)
                                                    .add("missing", reply.missing._length);
                                              });
 }
@@ -142,7 +142,7 @@ void ask_for_area(Questions& questions) {
   area.format_version = format_version;
   area.profile = car.data();
   area.region = everywhere();
-  area.wants_grid = area.wants_outlines = true;
+  area.include_grid = area.include_outlines = true;
   questions.ask<decltype(area), AreaReply>("get_traversable_area", area,
                                            [](Line& line, const AreaReply& reply) {
                                              line.add("cells", reply.grid.width * reply.grid.height)
@@ -181,7 +181,7 @@ void ask_for_occupancy(Questions& questions) {
   std::array<stillmap_msgs_msg_dds__OccupancyRay_, 1> rays{};
   rays[0].direction = {0.0, 0.0, -1.0};
   rays[0].max_range_m = 10.0;
-  rays[0].passes_unknown = true;
+  rays[0].ignore_unknown = true;
   stillmap_msgs_srv_dds__QueryOccupancy_Request_ request{};
   request.format_version = format_version;
   lend(request.rays, rays);
