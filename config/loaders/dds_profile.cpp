@@ -64,7 +64,8 @@ void check_together(YamlSection& file, const DdsProfile& profile) {
   }
   if (options.large_message_bytes_per_s > 0 &&
       options.large_message_bytes_per_s / 20 < options.max_datagram_bytes) {
-    file.fault("bulk_bytes_per_s", "must let 20 datagrams of max_datagram_bytes pass a second");
+    file.fault("large_message_bytes_per_s",
+               "must let 20 datagrams of max_datagram_bytes pass a second");
   }
 }
 
@@ -86,7 +87,7 @@ void read_profile(YamlSection file, DdsProfile& profile) {
   file.integer("heartbeat_ms", options.heartbeat_ms, {1, 10'000});
   file.integer("repair_delay_ms", options.repair_delay_ms, {0, 1000});
   file.integer("lease_s", options.lease_s, {3, 3600});
-  file.integer("bulk_bytes_per_s", options.large_message_bytes_per_s, {0, 2e9});
+  file.integer("large_message_bytes_per_s", options.large_message_bytes_per_s, {0, 2e9});
   check_together(file, profile);
 }
 
@@ -156,8 +157,6 @@ DdsProfile read_dds_profile(const fs::path& file) {
 DdsProfile load_dds_profile(const std::string& name_or_file) {
   return read_dds_profile(find_named_file(profile_search_paths(), name_or_file));
 }
-
-std::vector<std::string> known_dds_profiles() { return known_names(profile_search_paths()); }
 
 dds::DdsOptions dds_options(const DdsNetworkConfig& network, DdsRole role) {
   const DdsProfile profile = load_dds_profile(network.profile);

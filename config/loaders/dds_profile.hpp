@@ -29,9 +29,6 @@ struct DdsProfile {
 /// ConfigError with every fault, or with the names that there are.
 [[nodiscard]] DdsProfile load_dds_profile(const std::string& name_or_file);
 
-/// Names of the profiles that are found without a folder, sorted.
-[[nodiscard]] std::vector<std::string> known_dds_profiles();
-
 /// "HOST" or "HOST:PORT"; nothing when it is neither.
 [[nodiscard]] std::optional<dds::NetworkAddress> network_address_from(const std::string& text);
 

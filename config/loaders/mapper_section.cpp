@@ -70,9 +70,9 @@ void read_registration(YamlSection section, RegistrationConfig& registration) {
 
 void read_motion(YamlSection section, MotionConfig& motion) {
   section.number("inconsistency_threshold", motion.inconsistency_threshold, shares);
-  section.boolean("use_past_views", motion.use_range_image_history);
-  section.integer("past_views", motion.range_image_history_size, {1, 100});
-  section.integer("past_view_interval", motion.range_image_history_interval, {1, 1000});
+  section.boolean("use_range_image_history", motion.use_range_image_history);
+  section.integer("range_image_history_size", motion.range_image_history_size, {1, 100});
+  section.integer("range_image_history_interval", motion.range_image_history_interval, {1, 1000});
   section.number("free_margin_m", motion.free_margin_m, {0, 100});
   section.number("free_margin_share", motion.free_margin_share, shares);
   section.number("moving_share", motion.moving_share, shares);
@@ -97,9 +97,9 @@ void read_static_map(YamlSection section, StaticMapConfig& static_map) {
   section.number("tile_size_m", static_map.tile_size_m, {0.1, 1000});
   section.number("max_range_m", static_map.max_range_m, {1, 10000});
   section.integer("min_points", static_map.min_points, {1, 1000000});
-  section.integer("look_every", static_map.clearing_interval, {1, 1000});
-  section.integer("passes", static_map.misses_to_clear, {1, 1000});
-  section.integer("passes_per_hit", static_map.misses_per_hit, {1, 1000});
+  section.integer("clearing_interval", static_map.clearing_interval, {1, 1000});
+  section.integer("misses_to_clear", static_map.misses_to_clear, {1, 1000});
+  section.integer("misses_per_hit", static_map.misses_per_hit, {1, 1000});
   section.number("clear_range_m", static_map.clearing_range_m, {0, 1000});
   section.number("clear_margin_m", static_map.clearing_margin_m, {0.01, 100});
   section.number("clear_margin_share", static_map.clearing_margin_share, {0, 1});

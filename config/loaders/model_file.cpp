@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "config/loaders/class_names.hpp"
 #include "config/loaders/int8_file.hpp"
 #include "config/loaders/model_folder.hpp"
 #include "config/loaders/yaml_section.hpp"
@@ -40,6 +39,16 @@ void read_statistics(YamlSection section, InputStatistics& statistics) {
   for (std::size_t i = 0; i < channels.size(); ++i) {
     read_channel(section.section(channels[i]), statistics, i);
   }
+}
+
+/// Reads a field that holds the name of a class ("other-vehicle").
+void read_class(YamlSection& section, const std::string& field, SemanticClass& label) {
+  std::vector<YamlSection::Choice<SemanticClass>> classes;
+  for (std::size_t i = 0; i < semantic_class_count; ++i) {
+    const auto one = static_cast<SemanticClass>(i);
+    classes.push_back({std::string(name(one)), one});
+  }
+  section.choice(field, label, classes);
 }
 
 /// Lines of 'output: class', from 0 without a gap.

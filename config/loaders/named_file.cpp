@@ -28,6 +28,18 @@ std::string list_of(const std::vector<std::string>& names) {
   return list;
 }
 
+/// Names that are found without a folder, sorted.
+std::vector<std::string> known_names(const NamedFileSearchPaths& search_paths) {
+  std::set<std::string> names;
+  for (const fs::path& folder : folders(search_paths)) {
+    std::error_code none;
+    for (const auto& entry : fs::directory_iterator(folder, none)) {
+      if (entry.path().extension() == ".yaml") names.insert(entry.path().stem().string());
+    }
+  }
+  return {names.begin(), names.end()};
+}
+
 }  // namespace
 
 bool is_file_name(const std::string& name_or_file) {
@@ -46,17 +58,6 @@ std::filesystem::path find_named_file(const NamedFileSearchPaths& search_paths,
   text.append(" '").append(name_or_file).append("' is neither known nor a .yaml file; ");
   text.append(search_paths.variable).append(" may name a folder of them; known are: ");
   throw ConfigError({text + list_of(known_names(search_paths))});
-}
-
-std::vector<std::string> known_names(const NamedFileSearchPaths& search_paths) {
-  std::set<std::string> names;
-  for (const fs::path& folder : folders(search_paths)) {
-    std::error_code none;
-    for (const auto& entry : fs::directory_iterator(folder, none)) {
-      if (entry.path().extension() == ".yaml") names.insert(entry.path().stem().string());
-    }
-  }
-  return {names.begin(), names.end()};
 }
 
 }  // namespace stillmap

@@ -25,7 +25,4 @@ struct NamedFileSearchPaths {
 [[nodiscard]] std::filesystem::path find_named_file(const NamedFileSearchPaths& search_paths,
                                                     const std::string& name_or_file);
 
-/// Names that are found without a folder, sorted.
-[[nodiscard]] std::vector<std::string> known_names(const NamedFileSearchPaths& search_paths);
-
 }  // namespace stillmap

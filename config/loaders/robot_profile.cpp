@@ -80,8 +80,6 @@ RobotProfile read_robot_profile(const fs::path& file) {
   return profile;
 }
 
-std::vector<std::string> known_robots() { return known_names(robot_search_paths()); }
-
 std::string robot_from(const fs::path& folder, const std::string& name_or_file) {
   return is_file_name(name_or_file) ? (folder / name_or_file).string() : name_or_file;
 }

@@ -20,7 +20,4 @@ namespace stillmap {
 [[nodiscard]] std::string robot_from(const std::filesystem::path& folder,
                                      const std::string& name_or_file);
 
-/// Names of the robots that are found without a folder, sorted.
-[[nodiscard]] std::vector<std::string> known_robots();
-
 }  // namespace stillmap

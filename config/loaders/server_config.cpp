@@ -130,7 +130,7 @@ void read_fields(YamlSection section, PointFieldNames& fields) {
 
 void read_input(YamlSection section, InputConfig& input) {
   section.choice<DeliveryMode>("delivery", input.delivery,
-                           {{"latest", DeliveryMode::latest}, {"every", DeliveryMode::every}});
+                               {{"latest", DeliveryMode::latest}, {"every", DeliveryMode::every}});
   section.integer("queue_length", input.queue_length, {1, 1000});
   read_fields(section.section("fields"), input.fields);
   section.choice<LabelKind>(
@@ -168,7 +168,7 @@ void read_occupancy(YamlSection section, OccupancyServiceConfig& occupancy) {
   section.number("resolution_m", map.resolution_m, {0.02, 10});
   section.number("max_range_m", map.max_range_m, {1, 300});
   section.number("clear_range_m", map.clear_range_m, {0, 300});
-  section.integer("clear_every", map.clearing_interval, {1, 1000});
+  section.integer("clearing_interval", map.clearing_interval, {1, 1000});
   section.number("clear_margin_m", map.clear_margin_m, {0, 100});
   section.number("clear_margin_share", map.clear_margin_share, {0, 0.9});
   section.number("hit_probability", map.hit_probability, {0.501, 0.99});
@@ -188,8 +188,8 @@ void read_traversability(YamlSection section, const fs::path& folder,
     const std::vector<RobotProfile> robots = load_robots(config);
     if (config.grid_profile.empty() || robots.empty()) return;
     if (std::ranges::find(robots, config.grid_profile, &RobotProfile::name) != robots.end()) return;
-    section.fault("grid_profile",
-                  "'" + config.grid_profile + "' is not one of areas.profiles; empty: no grid");
+    section.fault("grid_profile", "'" + config.grid_profile +
+                                      "' is not one of traversability.profiles; empty: no grid");
   } catch (const ConfigError& error) {
     for (const std::string& fault : error.faults()) section.fault("profiles", fault);
   }
@@ -221,7 +221,7 @@ void read_server(YamlSection file, const fs::path& folder, ServerConfig& config)
   read_publish(file.section("publish"), config.publish);
   read_map(file.section("map"), config.map);
   read_occupancy(file.section("occupancy"), config.occupancy);
-  read_traversability(file.section("areas"), folder, config.traversability);
+  read_traversability(file.section("traversability"), folder, config.traversability);
   read_log(file.section("log"), config.log);
   read_metrics(file.section("metrics"), config.metrics);
 }

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <set>
 #include <sstream>
+#include <string_view>
 
 #include "config/loaders/closest_name.hpp"
 
@@ -15,6 +16,34 @@ namespace stillmap {
 namespace {
 
 constexpr double radians_per_degree = std::numbers::pi / 180.0;
+
+/// Fields that had another name, by their path in the file.
+struct RenamedField {
+  std::string_view old_path;
+  std::string_view path;
+};
+constexpr RenamedField renamed_fields[] = {
+    {"areas", "traversability"},
+    {"bulk_bytes_per_s", "large_message_bytes_per_s"},
+    {"image.least_columns", "image.min_columns"},
+    {"occupancy.clear_every", "occupancy.clearing_interval"},
+    {"odometry.motion.past_view_interval", "odometry.motion.range_image_history_interval"},
+    {"odometry.motion.past_views", "odometry.motion.range_image_history_size"},
+    {"odometry.motion.use_past_views", "odometry.motion.use_range_image_history"},
+    {"static_map.look_every", "static_map.clearing_interval"},
+    {"static_map.passes", "static_map.misses_to_clear"},
+    {"static_map.passes_per_hit", "static_map.misses_per_hit"},
+};
+
+/// What a fault says of a name that is no field.
+std::string unknown_field(const std::string& path, const std::string& name,
+                          const std::vector<std::string>& known) {
+  const auto renamed = std::ranges::find(renamed_fields, path, &RenamedField::old_path);
+  if (renamed != std::end(renamed_fields)) {
+    return "is now called '" + std::string(renamed->path) + "'";
+  }
+  return "there is no such field" + did_you_mean(name, known);
+}
 
 /// The value as a fault shows it: short, and on one line.
 std::string shown(const YAML::Node& node) {
@@ -235,8 +264,7 @@ void YamlSection::check_names() {
     if (!seen.insert(name).second) {
       file_.fault(entry.first, path_of(name), "is written twice");
     } else if (std::ranges::find(known_, name) == known_.end()) {
-      file_.fault(entry.first, path_of(name),
-                  "there is no such field" + did_you_mean(name, known_));
+      file_.fault(entry.first, path_of(name), unknown_field(path_of(name), name, known_));
     }
   }
 }

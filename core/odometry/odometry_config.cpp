@@ -65,9 +65,9 @@ void check(const RegistrationConfig& c, const LocalMapConfig& map, FaultList& fa
 void check(const MotionConfig& c, FaultList& faults) {
   faults.require(c.inconsistency_threshold >= 0.0 && c.inconsistency_threshold <= 1.0,
                  "motion.inconsistency_threshold", c.inconsistency_threshold, "within 0..1");
-  faults.require(c.range_image_history_size >= 1, "motion.past_views", c.range_image_history_size,
+  faults.require(c.range_image_history_size >= 1, "motion.range_image_history_size", c.range_image_history_size,
                  "1 or more");
-  faults.require(c.range_image_history_interval >= 1, "motion.past_view_interval",
+  faults.require(c.range_image_history_interval >= 1, "motion.range_image_history_interval",
                  c.range_image_history_interval, "1 or more");
   faults.require(c.free_margin_m > 0.0, "motion.free_margin_m", c.free_margin_m, "above 0");
   faults.require(c.free_margin_share >= 0.0, "motion.free_margin_share", c.free_margin_share,

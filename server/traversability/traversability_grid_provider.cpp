@@ -23,11 +23,11 @@ TraversabilityGridProvider::TraversabilityGridProvider(const TraversabilityConfi
 OccupancyGrid TraversabilityGridProvider::grid() const {
   OccupancyGrid none;
   none.status = TraversabilityStatus::not_found;
-  none.reason = "no grid is configured: areas.grid_profile is empty";
+  none.reason = "no grid is configured: traversability.grid_profile is empty";
   if (profile_.empty()) return none;
   OccupancyGrid grid = occupancy_grid(*traversability_.view(profile_), window(), max_cells);
   if (grid.status == TraversabilityStatus::too_large) {
-    grid.reason += "; areas.grid_window_m makes it a window round the robot";
+    grid.reason += "; traversability.grid_window_m makes it a window round the robot";
   }
   return grid;
 }

@@ -10,12 +10,12 @@ namespace {
 std::string unknown_profile(const std::string& profile,
                             const TraversabilitySnapshot::Views& views) {
   if (views.empty())
-    return "this server keeps no areas; its configuration's areas.profiles is empty";
+    return "this server keeps no areas; its configuration's traversability.profiles is empty";
   std::string text = "profile '" + profile + "' is not one that this server keeps areas for: ";
   for (std::size_t i = 0; i < views.size(); ++i) {
     text += (i == 0 ? "" : ", ") + views[i]->profile.name;
   }
-  return text + "; others belong into its configuration's areas.profiles";
+  return text + "; others belong into its configuration's traversability.profiles";
 }
 
 }  // namespace

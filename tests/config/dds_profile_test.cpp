@@ -16,14 +16,13 @@ using test::write_file;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
-using ::testing::IsSupersetOf;
 
 constexpr const char* whole_file =
     "transport: udp\nserver_port: 7500\nshared_memory: false\nshared_memory_mib: 8\n"
     "client_shared_memory: true\n"
     "multicast: false\ninterfaces: [10.0.0.1]\npeers: [10.0.0.2, 'there:7412']\n"
     "discovery_server: 10.0.0.3\nsocket_buffer_bytes: 100000\nmax_datagram_bytes: 1400\n"
-    "heartbeat_ms: 70\nrepair_delay_ms: 9\nlease_s: 33\nbulk_bytes_per_s: 500000\n";
+    "heartbeat_ms: 70\nrepair_delay_ms: 9\nlease_s: 33\nlarge_message_bytes_per_s: 500000\n";
 
 TEST(DdsProfileFile, EveryFieldIsRead) {
   const DdsProfile profile = read_dds_profile(write_file("radio.yaml", whole_file));
@@ -66,12 +65,17 @@ TEST(DdsProfileFile, LanIsWhatHoldsWithoutAnyFile) {
 }
 
 TEST(DdsProfileFile, ShippedProfilesAreWhatTheirNamesSay) {
-  EXPECT_THAT(known_dds_profiles(), IsSupersetOf({"host", "lan", "no_multicast", "wan", "wifi"}));
   EXPECT_THAT(load_dds_profile("host").options.interfaces, ElementsAre("127.0.0.1"));
   EXPECT_LE(load_dds_profile("wifi").options.max_datagram_bytes, 1472U);
   EXPECT_GT(load_dds_profile("wifi").options.large_message_bytes_per_s, 0U);
   EXPECT_EQ(load_dds_profile("wan").options.transport, dds::NetworkTransport::tcp);
   EXPECT_FALSE(load_dds_profile("no_multicast").options.multicast);
+}
+
+TEST(DdsProfileFile, TellsTheNewNameOfARenamedField) {
+  const auto file = write_file("old.yaml", "bulk_bytes_per_s: 500000\n");
+  EXPECT_THAT(refusal([&] { (void)read_dds_profile(file); }),
+              HasSubstr("is now called 'large_message_bytes_per_s'"));
 }
 
 TEST(DdsProfileFile, TellsAllFaultsAtOnce) {
@@ -91,7 +95,7 @@ TEST(DdsProfileFile, RefusesWhatDoesNotFitTogether) {
   EXPECT_THAT(refusal_of("transport: tcp\n"), HasSubstr("server_port"));
   EXPECT_THAT(refusal_of("transport: tcp\nserver_port: 1\ndiscovery_server: a\n"),
               HasSubstr("UDP only"));
-  EXPECT_THAT(refusal_of("bulk_bytes_per_s: 1000\n"), HasSubstr("20 datagrams"));
+  EXPECT_THAT(refusal_of("large_message_bytes_per_s: 1000\n"), HasSubstr("20 datagrams"));
 }
 
 TEST(DdsProfileFile, IsFoundInTheFolderOfTheEnvironmentFirst) {

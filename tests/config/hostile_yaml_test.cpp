@@ -3,8 +3,8 @@
 
 #include <random>
 
-#include "config/loaders/label_map.hpp"
 #include "config/loaders/model_file.hpp"
+#include "config/loaders/robot_profile.hpp"
 #include "config/loaders/sensor_file.hpp"
 #include "config/loaders/server_config.hpp"
 #include "tests/config/config_files.hpp"
@@ -23,7 +23,7 @@ void expect_refused(const fs::path& file, const std::string& reason) {
   EXPECT_THAT(of_server, HasSubstr(file.string()));
   EXPECT_THAT(of_server, HasSubstr(reason));
   EXPECT_THAT(refusal([&] { (void)load_sensor(file.string()); }), HasSubstr(reason));
-  EXPECT_THAT(refusal([&] { (void)load_label_map(file); }), HasSubstr(reason));
+  EXPECT_THAT(refusal([&] { (void)read_robot_profile(file); }), HasSubstr(reason));
 }
 
 TEST(HostileYaml, MissingFile) {

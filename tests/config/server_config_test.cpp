@@ -112,6 +112,22 @@ TEST(ServerConfig, SuggestsTheNameThatWasMeant) {
   EXPECT_THAT(refusal_of("input: {delivery: reliable}"), HasSubstr("known are: latest, every"));
 }
 
+TEST(ServerConfig, TellsTheNewNameOfARenamedField) {
+  EXPECT_THAT(refusal_of("areas: {profiles: []}"),
+              HasSubstr("server.yaml:1: areas: is now called 'traversability'"));
+  EXPECT_THAT(refusal_of("static_map: {look_every: 3, passes: 4, passes_per_hit: 2}"),
+              AllOf(HasSubstr("look_every: is now called 'static_map.clearing_interval'"),
+                    HasSubstr("passes: is now called 'static_map.misses_to_clear'"),
+                    HasSubstr("passes_per_hit: is now called 'static_map.misses_per_hit'")));
+  EXPECT_THAT(refusal_of("occupancy: {clear_every: 3}"),
+              HasSubstr("is now called 'occupancy.clearing_interval'"));
+  EXPECT_THAT(refusal_of("odometry: {motion: {use_past_views: true, past_views: 4, "
+                         "past_view_interval: 2}}"),
+              AllOf(HasSubstr("is now called 'odometry.motion.use_range_image_history'"),
+                    HasSubstr("is now called 'odometry.motion.range_image_history_size'"),
+                    HasSubstr("is now called 'odometry.motion.range_image_history_interval'")));
+}
+
 TEST(ServerConfig, RefusesValuesOfTheWrongKind) {
   for (const char* value : {".nan", "nan", "inf", "1 m", "[1]", "{a: 1}", "''", "1e999", "~"}) {
     EXPECT_THAT(refusal_of("publish: {path_period_s: " + std::string(value) + "}"),
@@ -143,18 +159,18 @@ TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
 }
 
 TEST(ServerConfig, FindsTheRobotsOfItsAreas) {
-  const ServerConfig config = load("areas: {profiles: [tracked], grid_profile: tracked}");
+  const ServerConfig config = load("traversability: {profiles: [tracked], grid_profile: tracked}");
   ASSERT_EQ(load_robots(config.traversability).size(), 1U);
   EXPECT_EQ(load_robots(config.traversability)[0].name, "tracked");
-  EXPECT_TRUE(load_robots(load("areas: {profiles: []}").traversability).empty());
-  EXPECT_THAT(refusal_of("areas: {profiles: [car, submarine]}"),
-              AllOf(HasSubstr("server.yaml:1: areas.profiles"), HasSubstr("'submarine'"),
+  EXPECT_TRUE(load_robots(load("traversability: {profiles: []}").traversability).empty());
+  EXPECT_THAT(refusal_of("traversability: {profiles: [car, submarine]}"),
+              AllOf(HasSubstr("server.yaml:1: traversability.profiles"), HasSubstr("'submarine'"),
                     HasSubstr("car, delivery_robot, tracked")));
-  EXPECT_THAT(refusal_of("areas: {profiles: [car, car]}"),
+  EXPECT_THAT(refusal_of("traversability: {profiles: [car, car]}"),
               HasSubstr("two robots are called 'car'"));
-  EXPECT_THAT(refusal_of("areas: {profiles: [tracked]}"),
-              AllOf(HasSubstr("areas.grid_profile"), HasSubstr("'car' is not one of")));
-  EXPECT_THAT(refusal_of("areas: {profiles: [mine/my_robot.yaml]}"),
+  EXPECT_THAT(refusal_of("traversability: {profiles: [tracked]}"),
+              AllOf(HasSubstr("traversability.grid_profile"), HasSubstr("'car' is not one of")));
+  EXPECT_THAT(refusal_of("traversability: {profiles: [mine/my_robot.yaml]}"),
               HasSubstr((test::test_folder() / "mine/my_robot.yaml").string()));
 }
 

@@ -60,7 +60,7 @@ class Drive:
         with open(config, "w") as file:
             file.write(f"sensor: vlp_16\nlabels: {{source: stream}}\ndds: {{domain_id: {DOMAIN}}}\n"
                        "publish: {scan: false}\noccupancy: {enabled: false}\n"
-                       "areas: {profiles: [], grid_profile: ''}\n")
+                       "traversability: {profiles: [], grid_profile: ''}\n")
         self.server = self.home.start(setup.server, "--config", config, *flags)
         self.server.wait_for_text("ready", 30)
         self.memory = Watch(self.server)

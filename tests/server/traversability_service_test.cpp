@@ -183,7 +183,7 @@ TEST_F(TraversabilityService, TellsHowLongAChangeTakes) {
 
 TEST(TraversabilityConfiguration, AnUnknownRobotEndsTheServerWithTheNamesThereAre) {
   const ScratchFolder folder;
-  std::ofstream(folder / "server.yaml") << "areas: {profiles: [submarine]}\n";
+  std::ofstream(folder / "server.yaml") << "traversability: {profiles: [submarine]}\n";
   ServerProcess server({"--config", (folder / "server.yaml").string()});
   EXPECT_EQ(server.wait_for_exit(patience), 2);
 }

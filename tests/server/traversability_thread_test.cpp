@@ -132,7 +132,7 @@ TEST_F(TraversabilityThreadTest, NamesTheRobotsThereAre) {
     }
     return "no refusal";
   };
-  EXPECT_THAT(refusal("car"), HasSubstr("areas.profiles is empty"));
+  EXPECT_THAT(refusal("car"), HasSubstr("traversability.profiles is empty"));
   start(0s);
   EXPECT_THAT(refusal("car"), AllOf(HasSubstr("'car'"), HasSubstr("small")));
 }

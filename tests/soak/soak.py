@@ -189,7 +189,7 @@ class Soak:
             "labels: {source: stream}\n"
             "input: {delivery: every}\n"
             "map: {file: map.stillmap}\n"
-            "areas: {profiles: [delivery_robot], grid_profile: delivery_robot}\n")
+            "traversability: {profiles: [delivery_robot], grid_profile: delivery_robot}\n")
         self.server = self.start([f"{self.options.bin}/stillmap-server", "--config", str(config)],
                                  "server.log")
         if self.status() is None:

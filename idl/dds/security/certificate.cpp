@@ -180,7 +180,6 @@ void Certificate::write(const fs::path& file) const {
 }
 
 std::string Certificate::subject() const { return text_of(X509_get_subject_name(get())); }
-std::string Certificate::issuer() const { return text_of(X509_get_issuer_name(get())); }
 std::string Certificate::name() const { return part_of_subject(NID_commonName); }
 std::string Certificate::role() const { return part_of_subject(NID_organizationalUnitName); }
 

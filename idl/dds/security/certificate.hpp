@@ -60,7 +60,6 @@ class Certificate {
 
   /// As RFC 2253 writes it, which is how permissions name it: CN first.
   [[nodiscard]] std::string subject() const;
-  [[nodiscard]] std::string issuer() const;
   /// Empty when the subject has none.
   [[nodiscard]] std::string name() const;
   [[nodiscard]] std::string role() const;

@@ -1,6 +1,5 @@
-// A number that says which kind of file, then its YAML: server, sensor, robot, label map.
+// A number that says which kind of file, then its YAML: server, sensor, robot.
 
-#include "config/loaders/label_map.hpp"
 #include "config/loaders/robot_profile.hpp"
 #include "config/loaders/sensor_file.hpp"
 #include "config/loaders/server_config.hpp"
@@ -14,12 +13,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-enum Kind : std::uint8_t { server, sensor, robot, labels, kinds };
+enum Kind : std::uint8_t { server, sensor, robot, kinds };
 
 /// What the server makes of its configuration before it opens anything.
 void read_server(const fs::path& file) {
-  ConfigReport report;
-  const ServerConfig config = load_server_config(file, report);
+  const ServerConfig config = load_server_config(file);
   require(config.mapper.static_map.faults().empty(), "a map can be made");
   require(config.occupancy.map.faults().empty(), "an octree can be made");
   static_cast<void>(load_robots(config.traversability));
@@ -31,7 +29,6 @@ void read(Kind kind, const fs::path& file) {
   if (kind == robot) {
     require(read_robot_profile(file).faults().empty(), "a robot that was read can be used");
   }
-  if (kind == labels) static_cast<void>(load_label_map(file));
 }
 
 void run(Bytes bytes) {
@@ -57,7 +54,6 @@ std::vector<Seed> seeds() {
   add_files(server, "server", all);
   add_files(sensor, "sensors", all);
   add_files(robot, "robots", all);
-  add_files(labels, "labels", all);
   return all;
 }
 
