@@ -2,7 +2,7 @@
 
 #include "clients/library/connection.hpp"
 #include "clients/library/tcp_rejoin_backoff.hpp"
-#include "idl/conversions/scan_to_cloud.hpp"
+#include "idl/conversions/to_cloud.hpp"
 #include "idl/dds/writer.hpp"
 #include "idl/interface/topics.hpp"
 

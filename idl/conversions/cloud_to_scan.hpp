@@ -3,6 +3,7 @@
 #include <optional>
 #include <string>
 
+#include "core/lidar/intensity_scale.hpp"
 #include "core/lidar/scan.hpp"
 #include "idl/conversions/cloud_layout.hpp"
 
@@ -31,5 +32,25 @@ struct ScanFromCloud {
 /// stay in. Times of any unit, relative or absolute: see point_times().
 [[nodiscard]] ScanFromCloud to_scan(const sensor_msgs::msg::PointCloud2& cloud,
                                     const CloudReadOptions& options);
+
+/// Reads the clouds of one sensor, one after another, and finds out what its numbers mean where the
+/// description of the sensor does not fit. One thread uses it.
+class CloudReader {
+ public:
+  explicit CloudReader(const CloudReadOptions& options);
+
+  struct Result {
+    ScanFromCloud from_cloud;
+    /// How clouds are understood from this one on, when that changed; else empty.
+    std::string format_change;
+  };
+  /// Intensity comes as 0..1. Any input is fine.
+  [[nodiscard]] Result read(const sensor_msgs::msg::PointCloud2& cloud);
+
+ private:
+  CloudReadOptions options_;
+  IntensityScale intensity_scale_;
+  std::string format_;
+};
 
 }  // namespace stillmap::wire

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "idl/conversions/traversability_status.hpp"
+#include "idl/conversions/traversability.hpp"
 #include "idl/interface/topics.hpp"
 
 namespace stillmap::wire {

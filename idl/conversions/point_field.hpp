@@ -1,31 +1,41 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <optional>
 
+#include "sensor_msgs.h"
+
 namespace stillmap::wire {
 
-/// sensor_msgs/PointField's numbers for the types of a field.
+/// The type of a field, in sensor_msgs/PointField's numbers.
 enum class FieldType : std::uint8_t {
-  int8 = 1,
-  uint8 = 2,
-  int16 = 3,
-  uint16 = 4,
-  int32 = 5,
-  uint32 = 6,
-  float32 = 7,
-  float64 = 8,
+  int8 = sensor_msgs::msg::PointField_Constants::INT8,
+  uint8 = sensor_msgs::msg::PointField_Constants::UINT8,
+  int16 = sensor_msgs::msg::PointField_Constants::INT16,
+  uint16 = sensor_msgs::msg::PointField_Constants::UINT16,
+  int32 = sensor_msgs::msg::PointField_Constants::INT32,
+  uint32 = sensor_msgs::msg::PointField_Constants::UINT32,
+  float32 = sensor_msgs::msg::PointField_Constants::FLOAT32,
+  float64 = sensor_msgs::msg::PointField_Constants::FLOAT64,
 };
 
 /// Nothing for a number that ROS 2 does not define.
-[[nodiscard]] std::optional<FieldType> field_type(std::uint8_t datatype);
-
-[[nodiscard]] std::size_t size_of(FieldType type);
+[[nodiscard]] constexpr std::optional<FieldType> field_type(std::uint8_t datatype) {
+  constexpr auto first = static_cast<std::uint8_t>(FieldType::int8);
+  constexpr auto last = static_cast<std::uint8_t>(FieldType::float64);
+  if (datatype < first || datatype > last) return std::nullopt;
+  return static_cast<FieldType>(datatype);
+}
 
 /// "uint16".
-[[nodiscard]] const char* name_of(FieldType type);
+[[nodiscard]] constexpr const char* name_of(FieldType type) {
+  constexpr std::array names = {"int8",  "uint8",  "int16",   "uint16",
+                                "int32", "uint32", "float32", "float64"};
+  return names.at(static_cast<std::size_t>(type) - 1);
+}
 
 [[nodiscard]] constexpr bool is_integer(FieldType type) { return type < FieldType::float32; }
 
@@ -43,7 +53,7 @@ template <typename T>
 
 /// Calls `visit` with a value of the C++ type behind `type`.
 template <typename Visitor>
-void with_type(FieldType type, Visitor visit) {
+constexpr void with_type(FieldType type, Visitor visit) {
   switch (type) {
     case FieldType::int8:
       return visit(std::int8_t{});
@@ -62,6 +72,12 @@ void with_type(FieldType type, Visitor visit) {
     case FieldType::float64:
       return visit(double{});
   }
+}
+
+[[nodiscard]] constexpr std::size_t size_of(FieldType type) {
+  std::size_t bytes = 0;
+  with_type(type, [&](auto value) { bytes = sizeof value; });
+  return bytes;
 }
 
 }  // namespace stillmap::wire

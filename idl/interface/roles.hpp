@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-#include "idl/dds/security/access.hpp"
+#include "idl/dds/security/documents.hpp"
 
 namespace stillmap::dds {
 

@@ -6,7 +6,7 @@
 
 #include "config/loaders/server_config.hpp"
 #include "core/lidar/sensor_model.hpp"
-#include "idl/conversions/cloud_reader.hpp"
+#include "idl/conversions/cloud_to_scan.hpp"
 #include "idl/dds/reader.hpp"
 #include "sensor_msgs.h"
 #include "server/mapping/scan_queue.hpp"

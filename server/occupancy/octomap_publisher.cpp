@@ -1,6 +1,6 @@
 #include "server/occupancy/octomap_publisher.hpp"
 
-#include "idl/conversions/octomap.hpp"
+#include "idl/conversions/occupancy.hpp"
 
 namespace stillmap::server {
 

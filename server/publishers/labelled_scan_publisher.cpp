@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "idl/conversions/scan_to_cloud.hpp"
+#include "idl/conversions/to_cloud.hpp"
 
 namespace stillmap::server {
 

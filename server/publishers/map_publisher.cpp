@@ -1,6 +1,6 @@
 #include "server/publishers/map_publisher.hpp"
 
-#include "idl/conversions/map_to_cloud.hpp"
+#include "idl/conversions/to_cloud.hpp"
 #include "idl/conversions/pose.hpp"
 
 namespace stillmap::server {

@@ -1,6 +1,6 @@
 #include "core/map/query/region.hpp"
 #include "idl/conversions/path_query.hpp"
-#include "idl/conversions/traversability_query.hpp"
+#include "idl/conversions/traversability.hpp"
 #include "server/services/service_handlers.hpp"
 
 namespace stillmap::server {

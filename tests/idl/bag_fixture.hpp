@@ -10,7 +10,7 @@
 
 #include "core/lidar/scan.hpp"
 #include "idl/bag/bag_writer.hpp"
-#include "idl/conversions/scan_to_cloud.hpp"
+#include "idl/conversions/to_cloud.hpp"
 #include "sensor_msgs.h"
 
 namespace stillmap::dds {

@@ -6,8 +6,7 @@
 #include <random>
 
 #include "idl/conversions/cloud_to_scan.hpp"
-#include "idl/conversions/map_to_cloud.hpp"
-#include "idl/conversions/scan_to_cloud.hpp"
+#include "idl/conversions/to_cloud.hpp"
 #include "tests/idl/cloud_fixture.hpp"
 
 namespace stillmap::wire {

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <stdexcept>
 
-#include "idl/conversions/cloud_reader.hpp"
+#include "idl/conversions/cloud_to_scan.hpp"
 #include "idl/conversions/header.hpp"
 
 namespace stillmap::wire {

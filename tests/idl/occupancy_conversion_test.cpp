@@ -2,8 +2,7 @@
 
 #include <limits>
 
-#include "idl/conversions/occupancy_query.hpp"
-#include "idl/conversions/octomap.hpp"
+#include "idl/conversions/occupancy.hpp"
 
 namespace stillmap::wire {
 namespace {

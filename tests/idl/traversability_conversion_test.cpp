@@ -6,8 +6,7 @@
 
 #include "idl/conversions/occupancy_grid.hpp"
 #include "idl/conversions/path_query.hpp"
-#include "idl/conversions/traversability_query.hpp"
-#include "idl/conversions/traversability_status.hpp"
+#include "idl/conversions/traversability.hpp"
 
 namespace stillmap::wire {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "idl/conversions/scan_to_cloud.hpp"
+#include "idl/conversions/to_cloud.hpp"
 #include "idl/dds/writer.hpp"
 #include "idl/interface/topics.hpp"
 #include "tests/server/room_scans.hpp"

@@ -6,7 +6,7 @@
 #include <random>
 #include <thread>
 
-#include "idl/conversions/scan_to_cloud.hpp"
+#include "idl/conversions/to_cloud.hpp"
 #include "idl/dds/writer.hpp"
 #include "idl/interface/topics.hpp"
 #include "tests/server/room_scans.hpp"

@@ -1,5 +1,8 @@
 #include "idl/dds/security/documents.hpp"
 
+#include <fnmatch.h>
+
+#include <algorithm>
 #include <array>
 #include <ctime>
 #include <string_view>
@@ -7,6 +10,12 @@
 
 namespace stillmap::dds {
 namespace {
+
+bool any_matches(const std::vector<std::string>& expressions, const std::string& topic) {
+  return std::ranges::any_of(expressions, [&](const std::string& expression) {
+    return ::fnmatch(expression.c_str(), topic.c_str(), 0) == 0;
+  });
+}
 
 using std::chrono::sys_seconds;
 
@@ -80,6 +89,9 @@ std::vector<std::string> topics_in(const std::string& text, const std::string& a
 }
 
 }  // namespace
+
+bool Access::may_publish(const std::string& topic) const { return any_matches(publish, topic); }
+bool Access::may_subscribe(const std::string& topic) const { return any_matches(subscribe, topic); }
 
 std::string governance_text() {
   return std::string(

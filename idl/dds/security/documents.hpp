@@ -2,11 +2,20 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
-#include "idl/dds/security/access.hpp"
 #include "idl/dds/security/certificate.hpp"
 
 namespace stillmap::dds {
+
+/// What an identity may do: DDS topic names ("rt/points"), in which * and ? stand for anything.
+struct Access {
+  std::vector<std::string> publish;
+  std::vector<std::string> subscribe;
+
+  [[nodiscard]] bool may_publish(const std::string& topic) const;
+  [[nodiscard]] bool may_subscribe(const std::string& topic) const;
+};
 
 /// The rules of the domain, for all domain ids: nobody without a valid identity takes part, and
 /// discovery, liveliness and data are encrypted.

@@ -4,8 +4,8 @@
 #include <string>
 #include <vector>
 
-#include "idl/dds/security/access.hpp"
 #include "idl/dds/security/certificate.hpp"
+#include "idl/dds/security/documents.hpp"
 
 namespace stillmap::dds {
 

@@ -4,13 +4,13 @@
 #include <variant>
 
 #include "idl/conversions/map_query.hpp"
-#include "idl/conversions/occupancy_query.hpp"
+#include "idl/conversions/occupancy.hpp"
 #include "idl/conversions/path_query.hpp"
 #include "idl/conversions/pose.hpp"
 #include "idl/conversions/removed_voxels.hpp"
 #include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"
-#include "idl/conversions/traversability_query.hpp"
+#include "idl/conversions/traversability.hpp"
 #include "idl/interface/topics.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"

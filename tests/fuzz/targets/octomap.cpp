@@ -1,7 +1,7 @@
 // A number that says how the bytes come (an octomap_msgs/Octomap over DDS, a .bt or .ot file, or
 // the tree alone), then they; what is read is asked about and encoded again.
 
-#include "idl/conversions/octomap.hpp"
+#include "idl/conversions/occupancy.hpp"
 
 #include <stdexcept>
 

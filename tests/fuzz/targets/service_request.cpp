@@ -6,10 +6,10 @@
 #include <stdexcept>
 
 #include "idl/conversions/map_query.hpp"
-#include "idl/conversions/occupancy_query.hpp"
+#include "idl/conversions/occupancy.hpp"
 #include "idl/conversions/path_query.hpp"
 #include "idl/conversions/region.hpp"
-#include "idl/conversions/traversability_query.hpp"
+#include "idl/conversions/traversability.hpp"
 #include "idl/interface/topics.hpp"
 #include "server/services/service_handlers.hpp"
 #include "tests/fuzz/byte_source.hpp"

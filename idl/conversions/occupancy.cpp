@@ -1,7 +1,8 @@
-#include "idl/conversions/occupancy_query.hpp"
+#include "idl/conversions/occupancy.hpp"
 
 #include <algorithm>
 
+#include "idl/conversions/header.hpp"
 #include "idl/interface/topics.hpp"
 
 namespace stillmap::wire {
@@ -161,6 +162,24 @@ std::optional<OccupancyAnswers> from_response(const QueryOccupancy_Response& res
                             .fault = ray.fault()});
   }
   return answers;
+}
+
+octomap_msgs::msg::Octomap to_octomap(const OctomapData& data, std::int64_t stamp_ns,
+                                      const std::string& map_frame) {
+  octomap_msgs::msg::Octomap message;
+  message.header(to_header(stamp_ns, map_frame));
+  message.binary(data.binary);
+  message.id(OctomapData::tree_id);
+  message.resolution(data.resolution_m);
+  message.data().assign(data.bytes.begin(), data.bytes.end());
+  return message;
+}
+
+std::optional<OctomapData> from_octomap(const octomap_msgs::msg::Octomap& message) {
+  if (message.id() != OctomapData::tree_id || !(message.resolution() > 0.0)) return std::nullopt;
+  return OctomapData{.binary = message.binary(),
+                     .resolution_m = message.resolution(),
+                     .bytes = {message.data().begin(), message.data().end()}};
 }
 
 }  // namespace stillmap::wire

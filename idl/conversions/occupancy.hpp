@@ -1,8 +1,11 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "core/occupancy/occupancy_query.hpp"
+#include "core/occupancy/octomap_data.hpp"
+#include "octomap_msgs.h"
 #include "stillmap_occupancy.h"
 
 namespace stillmap::wire {
@@ -17,5 +20,12 @@ void write_answers(const OccupancyAnswers& answers,
 /// Nothing when the response makes no sense.
 [[nodiscard]] std::optional<OccupancyAnswers> from_response(
     const stillmap_msgs::srv::QueryOccupancy_Response& response);
+
+[[nodiscard]] octomap_msgs::msg::Octomap to_octomap(const OctomapData& data, std::int64_t stamp_ns,
+                                                    const std::string& map_frame);
+
+/// Nothing for a message that holds another kind of tree. Whether its bytes are an octree is for
+/// check_octomap to say.
+[[nodiscard]] std::optional<OctomapData> from_octomap(const octomap_msgs::msg::Octomap& message);
 
 }  // namespace stillmap::wire
