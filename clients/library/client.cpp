@@ -11,8 +11,8 @@
 #include "clients/library/tcp_rejoin_backoff.hpp"
 #include "core/occupancy/octomap_data.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
-#include "idl/conversions/occupancy_grid.hpp"
 #include "idl/conversions/occupancy.hpp"
+#include "idl/conversions/occupancy_grid.hpp"
 #include "idl/conversions/path_query.hpp"
 #include "idl/conversions/pose.hpp"
 #include "idl/conversions/region.hpp"
@@ -29,8 +29,7 @@ namespace services = dds::services;
 
 namespace {
 
-// A map that changes so fast that its pages are forgotten three times over is not worth waiting
-// for.
+// Pages expire when the map changes too far under a query.
 constexpr int max_whole_map_attempts = 3;
 
 Eigen::AlignedBox3d unbounded_box() {
@@ -81,7 +80,7 @@ Subscription subscribe(dds::Participant& participant, const dds::TopicSpec<T>& t
 std::unique_ptr<Client::Connection> Client::connect(const ClientOptions& options) {
   auto connection = std::make_unique<Connection>(options);
   if (options.dds.transport != dds::NetworkTransport::tcp) return connection;
-  // Before anything subscribes through the connection, another can take its place.
+  // Until something subscribes through the connection, it can be replaced.
   const auto began = connection->connecting_since;
   GetStatus_Request request;
   request.format_version(dds::wire_format_version);

@@ -33,7 +33,7 @@ class ServiceError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Nobody answered in time.
+/// There was no answer in time.
 class ServiceTimeout : public ServiceError {
  public:
   using ServiceError::ServiceError;
@@ -73,7 +73,7 @@ struct TileSet {
   std::vector<TileId> missing;
 };
 
-/// A map file that a server went on with.
+/// A map file that a server resumed.
 struct LoadedMap {
   /// On the server's machine.
   std::string file;
@@ -89,8 +89,8 @@ struct RemovedVoxels {
   std::uint64_t total = 0;
 };
 
-/// What happened in a region since the last update. Tiles are whole, also what of them lies
-/// outside.
+/// What changed in a region since the last update. Tiles are whole, including parts outside of the
+/// region.
 struct RegionUpdate {
   dds::MapIdentity map;
   std::vector<Tile> appeared;
@@ -119,7 +119,7 @@ class Subscription {
 };
 
 /// A client of one stillmap-server. Requests may come from any thread and block until the answer is
-/// there; they throw ServiceTimeout when nobody answers within `request_timeout` and ServiceError
+/// there; they throw ServiceTimeout without an answer within `request_timeout` and ServiceError
 /// when the server refuses.
 class Client {
  public:
@@ -174,7 +174,7 @@ class Client {
   [[nodiscard]] OccupancyGrid planning_grid();
 
   /// What the server keeps out of its static map in a region, and why: all of it, up to
-  /// `max_voxels` (the server brings at most 300,000).
+  /// `max_voxels` (the server sends at most 300,000).
   [[nodiscard]] RemovedVoxels get_removed(const Region& region, std::uint32_t max_voxels = 300'000);
   /// Has the server show again what was removed for this reason in a box; returns how many voxels.
   std::uint64_t restore_removed(RemovalReason reason, const BoxRegion& box);
@@ -183,12 +183,12 @@ class Client {
   /// means the configured file.
   std::string save_map(const std::string& file = {});
 
-  /// Has the server save its map, and go on with one that was saved before, and in its file. `file`
-  /// is a plain name beside the configured map file. A map that is missing, damaged, newer or of
-  /// another voxel size is refused, and the running map goes on.
+  /// Has the server save its map, resume one that was saved before, and save to that file from then
+  /// on. `file` is a plain name beside the configured map file. A map that is missing, damaged,
+  /// newer or of another voxel size is refused, and the running map continues.
   LoadedMap load_map(const std::string& file);
 
-  /// Has the server forget poses and map; returns the id of the new map.
+  /// Has the server start an empty map and trajectory; returns the id of the new map.
   std::uint64_t reset();
 
   /// Calls back for every pose. Each subscription has its own thread, and its calls never overlap;
@@ -215,10 +215,10 @@ class Client {
       std::function<void(const OccupancyGrid&)> grid_arrived);
 
   /// The tiles whose footprint meets the region: first those that exist, then what changes. Tiles
-  /// of other places do not come over the network, only their entries in the index (some 100
-  /// bytes), which this process passes over. When another map begins, the tiles of the last one are
+  /// outside of it do not come over the network, only their entries in the index (some 100
+  /// bytes), which this process ignores. When another map begins, the tiles of the last one are
   /// removed. Throws std::invalid_argument for a region with faults, and as a request does: it asks
-  /// for the size of tiles, so a server that comes back with another size needs a new subscription.
+  /// for the size of tiles, so a server that restarts with another size needs a new subscription.
   [[nodiscard]] Subscription subscribe_region(
       const Region& region, std::function<void(const RegionUpdate&)> update_arrived);
 

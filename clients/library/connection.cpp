@@ -68,7 +68,7 @@ ServiceTimeout Client::Connection::timeout_error(const std::string& service,
                      std::to_string(options.dds.domain_id) + " within " +
                      std::to_string(timeout.count()) + " ms: ";
   if (found) return ServiceTimeout(text + "a server is there but too busy, or it was just killed");
-  // Where security keeps both apart, nothing else is to be looked for.
+  // Where security keeps both apart, other reasons are irrelevant.
   const auto diagnostics =
       dds::security_diagnostics(participant.self(), participant.remote_participants());
   if (!diagnostics.empty()) {

@@ -14,7 +14,7 @@
 
 namespace stillmap {
 
-/// The client's participant and its ends of the services.
+/// The client's participant and its service clients.
 struct Client::Connection {
   explicit Connection(const ClientOptions& client_options);
 
@@ -93,7 +93,7 @@ struct Client::Connection {
                                              std::chrono::milliseconds timeout, bool found) const;
 
   ClientOptions options;
-  /// When the client that it is for began to look for the server.
+  /// When its client began to wait for the server.
   std::chrono::steady_clock::time_point connecting_since = std::chrono::steady_clock::now();
   dds::Topics topics;
   dds::Participant participant;

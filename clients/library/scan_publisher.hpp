@@ -42,7 +42,7 @@ class ScanPublisher {
   ScanPublisher& operator=(ScanPublisher&&) noexcept;
 
   /// True once a subscriber matched; false after `timeout`. Over TCP, with a connection of its own
-  /// and before the first scan, it joins the domain anew when it has found nobody for 4, 12, 28 s,
+  /// and before the first scan, it joins the domain anew without a subscriber after 4, 12, 28 s,
   /// and then throws as the constructor does.
   [[nodiscard]] bool wait_for_subscriber(std::chrono::milliseconds timeout);
 

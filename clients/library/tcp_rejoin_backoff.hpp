@@ -7,9 +7,9 @@
 
 namespace stillmap {
 
-/// A wait for somebody who may not be found: when to join the domain anew meanwhile. With Fast DDS
-/// 2.9, an answer over TCP that comes before its question is noted is lost, and with it the port
-/// that it opens, for good (TCPChannelResource::add_logical_port). Over UDP it is never time.
+/// When to join the domain anew while waiting for a peer over TCP. With Fast DDS 2.9, an answer to
+/// the opening of a port that comes before the request is registered is lost, and the port never
+/// opens (TCPChannelResource::add_logical_port). Over UDP it is never due.
 class TcpRejoinBackoff {
  public:
   using Clock = std::chrono::steady_clock;

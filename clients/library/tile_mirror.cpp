@@ -29,7 +29,7 @@ std::shared_ptr<const MapSnapshot> TileMirror::make_snapshot(const dds::MapIdent
   view->tile_size_m = map.tile_size_m;
   view->voxel_size_m = map.voxel_size_m;
   view->version = map.version;
-  // A tile that was fetched may be newer than what the update says.
+  // A fetched tile may be newer than the update.
   for (const auto& [id, tile] : tiles_) {
     view->version = std::max(view->version, tile->info.revision);
     view->tiles.push_back(tile);
@@ -61,7 +61,7 @@ bool TileMirror::holds(const TileVersions& versions) const {
 
 void wait_for_whole_map(Client& client, const TileMirror& mirror,
                         std::chrono::milliseconds timeout) {
-  // Asked for again now and then: tiles of an older answer may be gone by now.
+  // Repeated, since tiles of an older answer may have been removed meanwhile.
   constexpr std::chrono::milliseconds recheck_period(1000);
   const auto deadline = std::chrono::steady_clock::now() + timeout;
   while (std::chrono::steady_clock::now() < deadline) {

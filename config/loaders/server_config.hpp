@@ -37,8 +37,8 @@ struct LabelsConfig {
   int image_columns = 0;
   /// What runs the network.
   EngineOptions engine;
-  /// Longest wait of a scan for the network's labels; then it goes on with labels carried from the
-  /// map and earlier scans. 0: as long as it takes, as with input delivery `every`.
+  /// Longest wait of a scan for the network's labels; then it is mapped with labels
+  /// propagated from the map and earlier scans. 0: no limit, as with input delivery `every`.
   std::uint32_t budget_ms = 90;
 };
 
@@ -115,30 +115,30 @@ struct MapFileConfig {
   /// Of the static map, its copies for readers and for queries. What is far away is on disk. 0: all
   /// of the map stays in memory.
   std::uint32_t memory_limit_mib = 2048;
-  /// Go on with the map in `file` when it exists; else start empty.
+  /// Resume the map in `file` when it exists; else start empty.
   bool load_at_start = true;
   /// Where the map's origin lies, as datum_from_text() reads it; goes into the map file. Empty: not
   /// known.
   std::string datum;
 };
 
-/// The octree of occupied, free and unknown space that is kept beside the static map.
+/// The octree of occupied, free and unknown space beside the static map.
 struct OccupancyServiceConfig {
   bool enabled = true;
   OccupancyConfig map;
-  /// Scans that may wait for it; those too many are left out.
+  /// Scans that may wait for it; more are dropped.
   std::uint32_t queue_length = 16;
   /// Shortest time between two octrees on stillmap/octomap.
   double publish_period_s = 5.0;
 };
 
-/// Where robots can go, kept up to date with the map.
+/// Where robots can go, updated with the map.
 struct TraversabilityConfig {
-  /// Robots by name or file, as load_robot_profile takes them; empty: no areas.
+  /// Robots by name or file, as load_robot_profile takes them; empty: no traversability.
   std::vector<std::string> profiles = {"car", "delivery_robot"};
   /// Shortest time from update to update; nothing is done while the map stays as it is.
   double update_period_s = 1.0;
-  /// The robot whose area is published as a grid; empty: none.
+  /// The robot whose traversability is published as a grid; empty: none.
   std::string grid_profile = "car";
   /// Edge of the square round the robot that the grid shows; 0: the whole map.
   double grid_window_m = 0.0;
@@ -157,8 +157,8 @@ struct MetricsConfig {
   std::string address;
 };
 
-/// The robots that areas are kept for. Throws ConfigError with every fault: robots that do not
-/// exist (with those that do), or two of one name.
+/// The robots that traversability is kept for. Throws ConfigError with every fault: robots that do
+/// not exist (with those that do), or two of one name.
 [[nodiscard]] std::vector<RobotProfile> load_robots(const TraversabilityConfig& config);
 
 /// Everything that stillmap-server can be told. Works as it is, with a 64-beam sensor and no file.

@@ -22,7 +22,7 @@ struct Range {
 
 /// One mapping of a YAML file, read field by field into values that hold their defaults. A fault
 /// goes into the file's report and leaves the value as it was. When the section goes out of scope,
-/// every name in it that nobody asked for is a fault.
+/// every name in it that was not read is a fault.
 class YamlSection {
  public:
   /// The whole file.
@@ -68,11 +68,11 @@ class YamlSection {
     if (const auto index = read_choice(name, words)) assign(name, value, choices[*index].value);
   }
 
-  /// The names in this section, in the file's order, where names are data. All count as asked for.
+  /// The names in this section, in the file's order, where names are data. All count as read.
   [[nodiscard]] std::vector<std::string> names();
   /// Reports a fault of the field `name`.
   void fault(const std::string& name, const std::string& text);
-  /// Reports what a `faults()` said of the section's values, one fault a line.
+  /// Reports the lines of a `faults()` about the section's values.
   void faults(const std::string& lines);
 
  private:

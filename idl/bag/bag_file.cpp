@@ -9,7 +9,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Runs `action`; what SQLite says becomes an error with the file's name.
+/// Runs `action`; an error of SQLite becomes one with the file's name.
 template <typename Action>
 auto naming(const fs::path& file, Action action) {
   try {
@@ -20,7 +20,7 @@ auto naming(const fs::path& file, Action action) {
 }
 
 /// A bag whose recorder was killed has a write-ahead log, which SQLite reads where it may write
-/// beside the file. On a medium that nobody may write to, a file without log is read as it is.
+/// beside the file. On a read-only medium, a file without log is opened as it is.
 std::unique_ptr<SQLite::Database> open(const fs::path& file) {
   try {
     auto database = std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READONLY);

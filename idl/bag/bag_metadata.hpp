@@ -21,7 +21,7 @@ struct BagTopic {
 
 enum class BagCompression { none, of_files, of_messages };
 
-/// What metadata.yaml says of a bag (rosbag2, up to version 5 written and up to 9 read).
+/// The metadata.yaml of a bag (rosbag2, up to version 5 written and up to 9 read).
 struct BagMetadata {
   /// Names of the files in the bag's folder, in order.
   std::vector<std::string> files;

@@ -92,7 +92,7 @@ BagWriter::~BagWriter() {
   try {
     finish();
   } catch (const DatasetError&) {
-    // Who wants to know calls finish().
+    // finish() reports such errors.
   }
 }
 

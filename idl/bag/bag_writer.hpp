@@ -26,7 +26,7 @@ class BagWriter {
 
   /// Adds a serialized message with its encapsulation to topic number `topic`.
   void add(std::size_t topic, std::int64_t received_ns, std::span<const std::uint8_t> message);
-  /// Brings all that was added to the disk, with metadata that tells of it.
+  /// Writes all that was added to the disk, with the metadata.
   void commit();
   /// The last commit; nothing can be added after it.
   void finish();

@@ -10,7 +10,7 @@
 
 namespace stillmap::dds {
 
-/// Bytes that are not the message they are said to be.
+/// Bytes that are no message of the expected type.
 class CdrError : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;

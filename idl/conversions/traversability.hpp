@@ -25,13 +25,13 @@ namespace stillmap::wire {
 [[nodiscard]] std::optional<CellState> cell_state(std::uint8_t number);
 [[nodiscard]] std::optional<BlockReason> block_reason(std::uint8_t number);
 
-/// Most cells that an answer brings: 16 MB, a square of 280 m in cells of 0.2 m.
+/// Most cells of an answer: 16 MB, a square of 280 m in cells of 0.2 m.
 inline constexpr std::uint32_t max_answered_cells = 2'000'000;
 
 [[nodiscard]] stillmap_msgs::srv::GetTraversableArea_Request to_request(
     const TraversabilityQuery& query);
 
-/// Either a query, its `max_cells` not above what an answer brings, or what is wrong with the
+/// Either a query, its `max_cells` not above that of an answer, or what is wrong with the
 /// request. Whether the region makes sense is for query_traversability to say.
 struct TraversabilityQueryFromRequest {
   std::optional<TraversabilityQuery> query;

@@ -10,13 +10,13 @@ class DdsError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Certificates, keys or permissions that cannot be used: the text names the file and the way out.
+/// Certificates, keys or permissions that cannot be used: the text names the file and what to do.
 class SecurityError : public DdsError {
  public:
   using DdsError::DdsError;
 };
 
-/// The permissions of our own identity forbid it.
+/// The permissions of our identity forbid it.
 class NotPermitted : public SecurityError {
  public:
   using SecurityError::SecurityError;

@@ -41,10 +41,10 @@ struct DdsOptions {
   /// Addresses of the network interfaces to use ("127.0.0.1" keeps everything on this machine);
   /// empty means all of them.
   std::vector<std::string> interfaces;
-  /// Where to look for other processes, beside or instead of multicast. Who is looked for finds the
-  /// one who looks: one side's list is enough.
+  /// Where to look for other processes, beside or instead of multicast. One of two
+  /// processes needs to list the other.
   std::vector<NetworkAddress> peers;
-  /// The discovery server to register with; empty host: none, everybody finds everybody.
+  /// The discovery server to register with; empty host: none.
   NetworkAddress discovery_server;
   /// Be the discovery server on this port; 0: be none.
   std::uint16_t discovery_port = 0;
@@ -55,10 +55,10 @@ struct DdsOptions {
   std::uint32_t max_datagram_bytes = 65500;
   /// How often a reliable writer tells what it has sent, so that losses are noticed.
   std::uint32_t heartbeat_ms = 50;
-  /// How long losses are gathered before they are asked for, and again before they are sent.
+  /// How long losses are collected before they are requested, and again before they are resent.
   std::uint32_t repair_delay_ms = 5;
-  /// A process that was not heard of for so long is forgotten, and has to be found anew: longer
-  /// than the outages to be lived through, at least 3.
+  /// A process that was silent for so long is removed and must be discovered anew: longer than
+  /// outages that shall not matter, at least 3.
   std::uint32_t lease_s = 10;
   /// Limit for all large messages that this process sends: tiles, clouds, grids and large answers,
   /// to all receivers together, repairs included. Poses and the status overtake them. 0: no limit.

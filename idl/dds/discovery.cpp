@@ -173,11 +173,12 @@ Ports ports_of(std::uint32_t domain_id, std::int32_t participant_id) {
   return has_shared_memory(discovery) || has_shared_memory(data) ? Ports::left : Ports::fresh;
 }
 
-/// Ports that nobody had, as far as there are any. By default a process gets those of the last one
-/// that was killed, and who still has that one's shared memory open does not reach the new one.
+/// Ports that no process had, if there are any. By default a process gets those of the last one
+/// that was killed, and processes that still have that one's shared memory open do not reach the
+/// new one.
 std::int32_t fresh_participant_id(std::uint32_t domain_id) {
-  // Fast DDS numbers those who do not ask from 0; no two of one process may have the same number,
-  // not even in different domains.
+  // Fast DDS numbers participants without a number from 0; no two of one process may have the same
+  // number, not even in different domains.
   constexpr std::int32_t first = 20;
   // The highest domain's ports end at 65535, those of others where the next domain's begin.
   const std::int32_t ids = (domain_id == max_domain_id ? 60 : 120) - first;
@@ -206,7 +207,7 @@ void set_discovery(const DdsOptions& options, DomainParticipantQos& qos) {
     set_listening_locators(options, qos);
   } else if (udp && options.shared_memory && options.discovery_server.host.empty() &&
              options.node_name.empty()) {
-    // A service keeps the usual ports: that is where others look who list it as a peer.
+    // A service keeps the usual ports, where processes look for it that list it as a peer.
     qos.wire_protocol().participant_id = fresh_participant_id(options.domain_id);
   }
   if (!options.discovery_server.host.empty()) {

@@ -70,7 +70,7 @@ std::string host_name() {
 }
 
 // Fast DDS writes a number of the machine into every guid, but not into that of a secured
-// participant, which belongs to its certificate. Such a one tells its host in words.
+// participant, which belongs to its certificate. Those announce the name of their host.
 bool same_host(const GuidPrefix_t& ours, const VendorId_t& vendor, const GuidPrefix_t& theirs,
                const RemoteParticipant& peer) {
   if (!peer.host.empty() && peer.host.starts_with(host_name() + ":")) return true;
@@ -197,7 +197,7 @@ void DiscoveryMonitor::onParticipantAuthentication(DomainParticipant*,
                                                    ParticipantAuthenticationInfo&& info) {
   const std::scoped_lock lock(mutex_);
   const bool refused = info.status == ParticipantAuthenticationInfo::UNAUTHORIZED_PARTICIPANT;
-  // A guid alone is no peer: it was discovered before, or it is of no use.
+  // Only participants that were discovered before have more than a guid.
   const auto found = participants_.find(info.guid.guidPrefix);
   if (found == participants_.end()) return;
   found->second.peer.refused = refused;

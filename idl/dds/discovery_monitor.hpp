@@ -14,8 +14,8 @@
 
 namespace stillmap::dds {
 
-/// Keeps what discovery tells about the domain: who is there, with which endpoints, and who was
-/// refused; and our own endpoints beside them. Thread-safe.
+/// What discovery knows of the domain: participants, their endpoints, and which were refused by
+/// security; and our own endpoints. Thread-safe.
 class DiscoveryMonitor : public eprosima::fastdds::dds::DomainParticipantListener {
  public:
   using Guid = eprosima::fastrtps::rtps::GUID_t;
@@ -27,8 +27,8 @@ class DiscoveryMonitor : public eprosima::fastdds::dds::DomainParticipantListene
                           bool is_keyed, bool is_writer, const TopicQos& qos);
   void remove_local_endpoint(const Guid& guid);
 
-  /// The others, in the order of their guids. Who was refused, or has not authenticated itself in
-  /// good time, counts as refused: often only one side is told why.
+  /// The others, in the order of their guids. A participant that has not authenticated itself in
+  /// time counts as refused, too: often only one side learns of a refusal.
   [[nodiscard]] std::vector<RemoteParticipant> remote_participants() const;
   [[nodiscard]] std::vector<Endpoint> local_endpoints() const;
 

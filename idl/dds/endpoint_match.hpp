@@ -7,13 +7,13 @@
 
 namespace stillmap::dds {
 
-/// What keeps a writer and a reader of one topic apart, a policy a line, such as "reliability: the
-/// writer offers best effort, the reader wants reliable"; empty when they fit. By the rules of the
-/// DDS specification (2.2.3).
+/// Which policies keep a writer and a reader of one topic from matching, one a line, such as
+/// "reliability: the writer offers best effort, the reader wants reliable"; empty when they fit. By
+/// the rules of the DDS specification (2.2.3).
 [[nodiscard]] std::vector<std::string> incompatible_policies(const Endpoint& writer,
                                                              const Endpoint& reader);
 
-/// A writer and a reader of one topic that do not find together.
+/// A writer and a reader of one topic that do not match.
 struct Mismatch {
   std::string topic;
   Endpoint writer;
@@ -24,7 +24,7 @@ struct Mismatch {
   std::vector<std::string> incompatible_policies;
 };
 
-/// Every writer and reader of different participants on the same topic that do not fit.
+/// Every writer and reader of different participants on the same topic that do not match.
 [[nodiscard]] std::vector<Mismatch> mismatches(const std::vector<RemoteParticipant>& participants);
 
 }  // namespace stillmap::dds

@@ -19,7 +19,7 @@ namespace {
 
 using namespace eprosima::fastdds::dds;
 
-// Of a TCP peer that takes nothing, while all others wait.
+// Of a TCP peer that receives nothing, which blocks sending to all others.
 constexpr std::chrono::seconds tcp_user_timeout{5};
 
 DomainParticipantQos participant_qos(const DdsOptions& options) {
@@ -37,14 +37,14 @@ DomainParticipantQos participant_qos(const DdsOptions& options) {
   // One whose first announcements got lost is found after 1 s, not 3.
   builtin.discovery_config.leaseDuration = to_duration(std::chrono::seconds(options.lease_s));
   builtin.discovery_config.leaseDuration_announcementperiod = to_duration(std::chrono::seconds(1));
-  // Tells others where we run: host, user and process.
+  // Announces host, user and process.
   qos.properties().properties().emplace_back(parameter_policy_physical_data_host, "");
   qos.properties().properties().emplace_back(parameter_policy_physical_data_user, "");
   qos.properties().properties().emplace_back(parameter_policy_physical_data_process, "");
   return qos;
 }
 
-// Fast DDS would hand a sample of one form to a reader of the other.
+// Fast DDS would pass samples of one form to readers of the other.
 void check_type_support(const DomainParticipant& participant, const TypeSupport& type) {
   const TypeSupport registered = participant.find_type(type.get_type_name());
   if (registered.empty()) return;
@@ -103,7 +103,7 @@ Participant::Participant(const DdsOptions& options)
 }
 
 Participant::~Participant() {
-  // Out of reach first: the graph's own writer must not be announced as removed from it.
+  // Moved out first: the removal of the graph's own writer must not be announced.
   const auto graph = std::move(graph_);
 }
 

@@ -32,8 +32,8 @@ struct ContentFilter {
   std::vector<std::string> parameters;
 };
 
-/// This process in a DDS domain, and the makings of its readers and writers. A ROS 2 node to ROS 2
-/// tools when it has a node name. Endpoints must not outlive it. Thread-safe.
+/// This process in a DDS domain; makes its readers and writers. ROS 2 tools show it as a node when
+/// it has a node name. Endpoints must not outlive it. Thread-safe.
 class Participant {
  public:
   /// Joins the domain. Throws DdsError; nothing is left behind then.
@@ -48,7 +48,8 @@ class Participant {
   [[nodiscard]] ServiceFaults& service_faults() { return service_faults_; }
   [[nodiscard]] const ServiceFaults& service_faults() const { return service_faults_; }
 
-  /// Everybody else in the domain, as discovery knows them now. Discovery takes a few seconds.
+  /// The other participants of the domain, as discovery knows them now. Discovery takes a few
+  /// seconds.
   [[nodiscard]] std::vector<RemoteParticipant> remote_participants() const;
   /// This participant, in the same terms.
   [[nodiscard]] RemoteParticipant self() const;
@@ -69,7 +70,7 @@ class Participant {
                                          eprosima::fastdds::dds::TypeSupport type,
                                          const TopicQos& qos,
                                          eprosima::fastdds::dds::DataReaderListener* listener);
-  /// Gets only the samples that the filter lets pass, and no word of keys that are gone. Throws
+  /// Gets only the samples that pass the filter, and no notice of disposed keys. Throws
   /// DdsError for a filter that does not fit the type.
   [[nodiscard]] ReaderHandle make_reader(const std::string& topic,
                                          eprosima::fastdds::dds::TypeSupport type,

@@ -64,7 +64,7 @@ DataWriterQos writer_qos(const TopicQos& qos, const DdsOptions& options) {
     out.publish_mode().kind = ASYNCHRONOUS_PUBLISH_MODE;
     out.publish_mode().flow_controller_name = rate_limiter;
   }
-  // Of many sizes: each place for a sample would keep the room of the largest that it ever had.
+  // Their sizes differ: with preallocation, each slot would keep the memory of its largest sample.
   if (qos.max_keys > 1 || qos.large_messages) {
     out.endpoint().history_memory_policy = eprosima::fastrtps::rtps::DYNAMIC_RESERVE_MEMORY_MODE;
   }
@@ -72,7 +72,7 @@ DataWriterQos writer_qos(const TopicQos& qos, const DdsOptions& options) {
   // they write (its issue 4878).
   out.writer_resource_limits().reader_filters_allocation.initial = 0;
   out.writer_resource_limits().reader_filters_allocation.maximum = 0;
-  // Who has an instance that is forgotten here, keeps it.
+  // Readers keep instances that are unregistered here.
   out.writer_data_lifecycle().autodispose_unregistered_instances = false;
   return out;
 }

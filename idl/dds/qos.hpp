@@ -9,10 +9,10 @@
 
 namespace stillmap::dds {
 
-/// Quality of service of one end of a topic, as far as Stillmap needs it.
+/// Quality of service of a reader or writer, as far as Stillmap needs it.
 struct TopicQos {
   bool reliable = true;
-  /// A late joiner gets what the writer still holds.
+  /// A late joiner gets the samples that the writer still has.
   bool transient_local = false;
   /// Samples kept, per key on a keyed topic.
   int depth = 10;

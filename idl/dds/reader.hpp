@@ -14,8 +14,8 @@
 
 namespace stillmap::dds {
 
-/// What happened to a reader. Only wakes whoever waits: work inside a Fast DDS callback would hold
-/// up every other reader of the process.
+/// Events of a reader. It only wakes waiting threads: work inside a Fast DDS callback would block
+/// every other reader of the process.
 class ReaderEvents : public eprosima::fastdds::dds::DataReaderListener {
  public:
   /// Returns at new data, a requested stop, or after `timeout`.

@@ -14,7 +14,7 @@ enum class Durability : std::uint8_t { volatile_, transient_local, transient, pe
 /// "transient local", as diagnostics say it.
 [[nodiscard]] const char* name(Durability durability);
 
-/// The policies that decide whether a writer and a reader find together.
+/// The policies that decide whether a writer and a reader match.
 struct EndpointQos {
   bool reliable = false;
   Durability durability = Durability::volatile_;
@@ -50,13 +50,13 @@ struct RemoteParticipant {
   std::string host;
   std::string user;
   std::string process;
-  /// IPv4 addresses where it wants data.
+  /// IPv4 addresses where it receives data.
   std::vector<std::string> addresses;
   bool uses_shared_memory = false;
   bool is_on_this_host = false;
   /// It announces an identity of DDS Security.
   bool is_secured = false;
-  /// Ours or its identity was refused.
+  /// Its identity or ours was refused.
   bool refused = false;
   std::vector<Endpoint> endpoints;
 };
@@ -67,7 +67,7 @@ struct RemoteParticipant {
 /// "stillmap_server (this host, process 12, user robot)".
 [[nodiscard]] std::string describe(const RemoteParticipant& peer);
 
-/// "reliable, transient local": what people ask for first.
+/// "reliable, transient local".
 [[nodiscard]] std::string describe(const EndpointQos& qos);
 
 }  // namespace stillmap::dds

@@ -42,12 +42,12 @@ class UntypedServiceClient {
   SerializedSampleReader replies_;
 };
 
-/// Asks one ROS 2 service. Thread-safe: requests wait for each other.
+/// Calls one ROS 2 service. Thread-safe: calls wait for each other.
 template <typename Request, typename Reply>
 class ServiceClient {
  public:
-  /// Throws DdsError when the topics cannot be made. A service that our permissions forbid is known
-  /// by refusal(); only asking it fails.
+  /// Throws DdsError when the topics cannot be made. For a service that our permissions forbid,
+  /// refusal() says so, and calls fail.
   ServiceClient(Participant& participant, const std::string& service) {
     try {
       client_.emplace(participant, service, type_support<Request>(), type_support<Reply>());
@@ -56,10 +56,10 @@ class ServiceClient {
     }
   }
 
-  /// Why this service must not be asked; empty when it may be.
+  /// Why this service must not be called; empty when it may be.
   [[nodiscard]] const std::string& refusal() const { return refusal_; }
 
-  /// True once both of the server's ends are discovered; false after `timeout`. Throws
+  /// True once the server's reader and writer are discovered; false after `timeout`. Throws
   /// NotPermitted.
   [[nodiscard]] bool wait_for_server(std::chrono::milliseconds timeout) const {
     if (!refusal_.empty()) throw NotPermitted(refusal_);

@@ -10,9 +10,9 @@ namespace stillmap::dds {
 /// Counts the requests that a process could not answer. Thread-safe.
 class ServiceFaults {
  public:
-  /// A request that is none of the service's type: another version of it, or damaged.
+  /// A request that is not of the service's type: another version of it, or damaged.
   void unreadable_request(const std::string& service);
-  /// A reply that went to nobody: its client was never found, or left.
+  /// A reply that reached no client: it was never discovered, or left.
   void undelivered_reply(const std::string& service);
 
   /// How often each occurred: "unreadable_request_stillmap/get_status".

@@ -16,7 +16,7 @@
 
 namespace stillmap::dds {
 
-/// Who asked, and how the reply is to be tied to the request.
+/// Which client sent a request, and how the reply is correlated with it.
 struct ServiceCall {
   eprosima::fastrtps::rtps::GUID_t request_writer;
   /// For rmw_fastrtps and every vendor but Cyclone.
@@ -39,7 +39,7 @@ class UntypedServiceServer {
                        TypeSupport request_type, TypeSupport reply_type);
 
   /// Waits for the next request and reads it into `request`, an object of the request's type;
-  /// meanwhile sends replies whose readers have been found. Nothing after `timeout`, on a stop, or
+  /// meanwhile sends replies whose readers were discovered. Nothing after `timeout`, on a stop, or
   /// when a request came that cannot even be refused.
   [[nodiscard]] std::optional<ServiceCall> take(void* request, const std::stop_token& stop,
                                                 std::chrono::milliseconds timeout);
@@ -83,13 +83,13 @@ concept CarriesRefusal = requires(Reply reply) {
   reply.status().reason(std::string());
 };
 
-/// Answers the requests of one ROS 2 service, one at a time, on its own thread, whether they come
-/// from rmw_fastrtps or from rmw_cyclonedds. Requests that cannot be read are counted
+/// Answers the requests of one ROS 2 service, one at a time, on its own thread, from clients of
+/// rmw_fastrtps and rmw_cyclonedds. Requests that cannot be read are counted
 /// (Participant::service_faults) and refused, where the reply has a status.
 template <typename Request, typename Reply>
 class ServiceServer {
  public:
-  /// `answer` and `idle`, called once a second while nobody asks, must not throw. Throws DdsError
+  /// `answer` and `idle`, called once a second without requests, must not throw. Throws DdsError
   /// when the topics cannot be made.
   ServiceServer(
       Participant& participant, const std::string& service,
@@ -130,7 +130,7 @@ class ServiceServer {
   std::function<Reply(const Request&)> answer_;
   std::function<void()> idle_;
   UntypedServiceServer server_;
-  // Last: stops before what it uses is gone.
+  // Last member: stops before the others are destroyed.
   std::jthread thread_;
 };
 

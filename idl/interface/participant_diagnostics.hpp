@@ -7,18 +7,18 @@
 
 namespace stillmap::dds {
 
-/// A writer and a reader that do not find together, in words.
+/// Of a writer and a reader that do not match.
 [[nodiscard]] Diagnostic to_diagnostic(const Mismatch& mismatch);
 
-/// Every pair of ends that does not fit, each kind of obstacle between two peers once.
+/// Of every pair that does not match, each reason between two participants once.
 [[nodiscard]] std::vector<Diagnostic> mismatch_diagnostics(const std::vector<Mismatch>& mismatches);
 
-/// Who cannot talk to `self` for reasons of DDS Security: secured on one side only, or refused.
+/// Of participants that DDS Security keeps from `self`: secured on one side only, or refused.
 [[nodiscard]] std::vector<Diagnostic> security_diagnostics(
     const RemoteParticipant& self, const std::vector<RemoteParticipant>& peers);
 
-/// Peers on this machine that are there, but none of whose topics arrive: their shared memory is
-/// not ours. Discovery must have had a few seconds.
+/// Of participants without endpoints: their announcements do not arrive, as between containers with
+/// separate shared memory. Discovery must have had a few seconds.
 [[nodiscard]] std::vector<Diagnostic> silent_participant_diagnostics(
     const RemoteParticipant& self, const std::vector<RemoteParticipant>& peers);
 

@@ -9,20 +9,20 @@
 
 namespace stillmap::dds {
 
-/// What an identity of a secured domain is there for.
+/// What an identity of a secured domain is for.
 enum class Role {
   /// Everything that stillmap-server reads, publishes and answers.
   server,
-  /// Publishes scans and the odometry prior, and sees how they are taken.
+  /// Publishes scans and the odometry prior, and reads what the server publishes.
   sensor,
-  /// Reads every topic, and asks whatever changes nothing.
+  /// Reads every topic, and calls the services that change nothing.
   planner,
   /// A planner that may also reset, save, load and restore.
   operator_of_server,
 };
 
 [[nodiscard]] std::string_view name(Role role);
-/// Nothing for a name that is no role's.
+/// Nothing for other names.
 [[nodiscard]] std::optional<Role> role_from_name(std::string_view name);
 /// "server, sensor, planner, operator".
 [[nodiscard]] const std::string& role_names();

@@ -12,7 +12,8 @@ namespace stillmap::dds {
 /// Version of every struct in stillmap_msgs.idl that carries one.
 inline constexpr std::uint8_t wire_format_version = 5;
 
-/// A topic: its name as DDS sees it, its type, and the quality of service of its two ends.
+/// A topic: its name as DDS sees it, its type, and the quality of service of its writer and
+/// readers.
 template <typename T>
 struct TopicSpec {
   std::string dds_name;
@@ -21,7 +22,7 @@ struct TopicSpec {
 };
 
 /// Every topic that carries data. ROS 2 names them without "rt/". Writers offer reliable delivery,
-/// which matches readers of both kinds; what a late joiner must know is transient local.
+/// which matches readers of both kinds; what late joiners need is transient local.
 struct Topics {
   TopicSpec<nav_msgs::msg::Odometry> odometry;
   TopicSpec<tf2_msgs::msg::TFMessage> tf;
