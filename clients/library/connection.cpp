@@ -2,12 +2,6 @@
 
 #include "idl/conversions/tile.hpp"
 #include "idl/interface/participant_diagnostics.hpp"
-#include "nav_msgs.h"
-#include "octomap_msgs.h"
-#include "removed_voxels.h"
-#include "stillmap_msgs.h"
-#include "stillmap_occupancy.h"
-#include "traversability.h"
 
 namespace stillmap {
 

@@ -57,7 +57,7 @@ sensor_msgs::msg::PointCloud2 read_cloud(CdrReader cdr) {
 /// Labels that Stillmap's own replay sent; 8 bits are something else.
 bool has_semantic_kitti_labels(const sensor_msgs::msg::PointCloud2& cloud) {
   for (const auto& field : cloud.fields()) {
-    if (field.name() == "label") return field.datatype() > 2;
+    if (field.name() == "label") return field.datatype() > sensor_msgs::msg::PointField_Constants::UINT8;
   }
   return false;
 }

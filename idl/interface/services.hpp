@@ -4,7 +4,12 @@
 #include <string_view>
 #include <tuple>
 
-#include "idl/msg/wire_types.hpp"
+#include "nav_msgs.h"
+#include "octomap_msgs.h"
+#include "removed_voxels.h"
+#include "stillmap_msgs.h"
+#include "stillmap_occupancy.h"
+#include "traversability.h"
 
 namespace stillmap::dds {
 

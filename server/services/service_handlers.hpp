@@ -3,13 +3,7 @@
 #include <tuple>
 
 #include "idl/interface/services.hpp"
-#include "nav_msgs.h"
-#include "octomap_msgs.h"
-#include "removed_voxels.h"
 #include "server/services/service_context.hpp"
-#include "stillmap_msgs.h"
-#include "stillmap_occupancy.h"
-#include "traversability.h"
 
 namespace stillmap::server {
 
