@@ -14,7 +14,7 @@ namespace stillmap::fuzz {
 /// that drops it.
 template <typename Message>
 [[nodiscard]] std::optional<Message> from_cdr(Bytes bytes) {
-  static const eprosima::fastdds::dds::TypeSupport type = type_support<Message>();
+  static const eprosima::fastdds::dds::TypeSupport type = dds::type_support<Message>();
   eprosima::fastrtps::rtps::SerializedPayload_t payload(static_cast<std::uint32_t>(bytes.size()));
   if (!bytes.empty()) std::memcpy(payload.data, bytes.data(), bytes.size());
   payload.length = static_cast<std::uint32_t>(bytes.size());
@@ -26,7 +26,7 @@ template <typename Message>
 /// The bytes of a sample.
 template <typename Message>
 [[nodiscard]] std::string to_cdr(Message message) {
-  const eprosima::fastdds::dds::TypeSupport type = type_support<Message>();
+  const eprosima::fastdds::dds::TypeSupport type = dds::type_support<Message>();
   eprosima::fastrtps::rtps::SerializedPayload_t payload(
       type->getSerializedSizeProvider(&message)());
   if (!type->serialize(&message, &payload)) throw std::runtime_error("message too large");
