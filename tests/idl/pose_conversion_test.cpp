@@ -62,7 +62,7 @@ TEST(Tf, SaysWhereTheLidarIsInTheMap) {
   EXPECT_NEAR(transform.transform().rotation().w(), expected.w(), 1e-12);
 }
 
-TEST(simulation::Path, ComesBackInOrderWithoutUnusablePoses) {
+TEST(Path, ComesBackInOrderWithoutUnusablePoses) {
   const Trajectory trajectory = {
       {.stamp_ns = 10}, {.stamp_ns = 20, .T_map_lidar = some_pose()}, {.stamp_ns = 30}};
   auto message = to_path(trajectory, "map");
