@@ -12,7 +12,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/point_cloud_files.hpp"
 #include "core/dataset/point_cloud_loaders.hpp"
-#include "core/lidar/point_time.hpp"
+#include "core/lidar/point_fields.hpp"
 
 namespace stillmap {
 namespace {

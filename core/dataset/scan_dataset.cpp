@@ -13,7 +13,7 @@
 #include "core/dataset/file_stamp.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/point_cloud_files.hpp"
-#include "core/lidar/intensity_scale.hpp"
+#include "core/lidar/point_fields.hpp"
 #include "core/lidar/sensor_fit.hpp"
 
 namespace stillmap {

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "core/lidar/intensity_scale.hpp"
+#include "core/lidar/point_fields.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
 
 namespace stillmap::wire {

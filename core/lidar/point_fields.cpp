@@ -1,10 +1,12 @@
-#include "core/lidar/point_time.hpp"
+#include "core/lidar/point_fields.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
+#include <string>
+#include <vector>
 
 namespace stillmap {
 namespace {
@@ -18,8 +20,11 @@ constexpr double min_revolution_s = 5e-3;
 /// Absolute times lie between 1990 and 2100, in any unit.
 constexpr double min_epoch_s = 6.3e8;
 constexpr double max_epoch_s = 4.1e9;
-/// So many points tell what the numbers of all mean.
-constexpr std::size_t max_samples = 4096;
+/// Points that are looked at to find out what the numbers of all mean.
+constexpr std::size_t max_time_samples = 4096;
+constexpr std::size_t max_intensity_samples = 8192;
+/// Intensities may exceed their full scale by this factor.
+constexpr float overshoot = 1.5F;
 
 struct Unit {
   const char* name;
@@ -32,7 +37,7 @@ constexpr std::array<Unit, 4> units = {{{"s", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, 
 std::vector<double> sample_of(std::span<const double> times) {
   std::vector<double> sample;
   bool zeros = false;
-  const std::size_t step = times.size() / max_samples + 1;
+  const std::size_t step = times.size() / max_time_samples + 1;
   for (std::size_t i = 0; i < times.size(); i += step) {
     if (times[i] == 0.0) zeros = true;
     if (std::isfinite(times[i]) && times[i] != 0.0) sample.push_back(times[i]);
@@ -104,6 +109,43 @@ double earliest_near(double middle, std::span<const double> times_s) {
   return earliest;
 }
 
+/// Some thousand finite values from all over the scan.
+std::vector<float> sample_of(std::span<const float> intensity) {
+  std::vector<float> sample;
+  const std::size_t step = intensity.size() / max_intensity_samples + 1;
+  for (std::size_t i = 0; i < intensity.size(); i += step) {
+    if (std::isfinite(intensity[i])) sample.push_back(intensity[i]);
+  }
+  return sample;
+}
+
+/// A percentile that a few bright or broken values do not move; 0 of no values.
+float bright_value(std::vector<float>& sample) {
+  if (sample.empty()) return 0.0F;
+  const auto place = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() * 99 / 100);
+  std::ranges::nth_element(sample, place);
+  return *place;
+}
+
+float full_scale_above(float bright) {
+  for (const float scale : {1.0F, 255.0F}) {
+    if (bright <= overshoot * scale) return scale;
+  }
+  return 65535.0F;
+}
+
+/// Values of 0..1: whole numbers could as well be a dark scan of a sensor that counts to 255.
+bool fractions_only(const std::vector<float>& sample) {
+  const auto within = [](float value) { return value >= 0.0F && value <= 1.0F; };
+  const auto fraction = [](float value) { return value != std::floor(value); };
+  return std::ranges::all_of(sample, within) && std::ranges::any_of(sample, fraction);
+}
+
+std::string remark(float full_scale) {
+  return "intensity reaches " + std::to_string(static_cast<int>(full_scale)) +
+         " and not what the sensor's intensity_scale says; it is divided by that";
+}
+
 }  // namespace
 
 PointTimes point_times(std::span<const double> times, TimeType type, std::int64_t stamp_ns) {
@@ -132,6 +174,28 @@ PointTimes point_times(std::span<const double> times, TimeType type, std::int64_
   }
   return {offsets_from(earliest_near(middle_s, times_s), middle_s, times_s),
           name + " on another clock than the stamp's, counted from the earliest point"};
+}
+
+float intensity_full_scale(std::span<const float> intensity) {
+  std::vector<float> sample = sample_of(intensity);
+  return full_scale_above(bright_value(sample));
+}
+
+std::string IntensityScale::apply(std::span<float> intensity) {
+  std::vector<float> sample = sample_of(intensity);
+  std::string corrected;
+  if (!sample.empty()) {
+    const float bright = bright_value(sample);
+    const bool too_bright = bright * factor_ > overshoot;
+    if (too_bright || (first_ && factor_ < 1.0F && fractions_only(sample))) {
+      const float full_scale = full_scale_above(bright);
+      factor_ = 1.0F / full_scale;
+      corrected = remark(full_scale);
+    }
+    first_ = false;
+  }
+  for (float& value : intensity) value *= factor_;
+  return corrected;
 }
 
 }  // namespace stillmap
