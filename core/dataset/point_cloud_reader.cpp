@@ -3,11 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <initializer_list>
 #include <limits>
 #include <optional>
 #include <string>
-#include <string_view>
+#include <vector>
 
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/point_cloud_files.hpp"
@@ -78,8 +77,8 @@ struct Column {
 
 /// The first field with one of these names; nothing when there is none or it lies outside a point.
 std::optional<Column> column(const pcl::PCLPointCloud2& cloud,
-                             std::initializer_list<std::string_view> names) {
-  for (const std::string_view name : names) {
+                             const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
     const auto field = std::ranges::find(cloud.fields, name, &PCLPointField::name);
     if (field == cloud.fields.end()) continue;
     const std::size_t bytes = bytes_of(field->datatype);
@@ -101,8 +100,9 @@ pcl::PCLPointCloud2 load(const std::filesystem::path& file) {
 }
 
 std::vector<Eigen::Vector3f> points_of(const std::filesystem::path& file,
-                                       const pcl::PCLPointCloud2& cloud) {
-  const auto x = column(cloud, {"x"}), y = column(cloud, {"y"}), z = column(cloud, {"z"});
+                                       const pcl::PCLPointCloud2& cloud,
+                                       const PointFieldNames& names) {
+  const auto x = column(cloud, names.x), y = column(cloud, names.y), z = column(cloud, names.z);
   if (!x || !y || !z) {
     std::string present;
     for (const auto& field : cloud.fields) present += " " + field.name;
@@ -116,8 +116,8 @@ std::vector<Eigen::Vector3f> points_of(const std::filesystem::path& file,
   return points;
 }
 
-std::vector<float> intensity_of(const pcl::PCLPointCloud2& cloud) {
-  const auto intensity = column(cloud, {"intensity", "reflectivity", "remission"});
+std::vector<float> intensity_of(const pcl::PCLPointCloud2& cloud, const PointFieldNames& names) {
+  const auto intensity = column(cloud, names.intensity);
   if (!intensity) return {};
   std::vector<float> values;
   values.reserve(intensity->values.size());
@@ -125,9 +125,9 @@ std::vector<float> intensity_of(const pcl::PCLPointCloud2& cloud) {
   return values;
 }
 
-std::vector<float> time_offsets_of(const pcl::PCLPointCloud2& cloud, std::int64_t stamp_ns) {
-  const auto time =
-      column(cloud, {"time", "t", "timestamp", "time_stamp", "offset_time", "time_offset"});
+std::vector<float> time_offsets_of(const pcl::PCLPointCloud2& cloud, const PointFieldNames& names,
+                                   std::int64_t stamp_ns) {
+  const auto time = column(cloud, names.time);
   if (!time) return {};
   TimeType type = TimeType::integer;
   if (time->datatype == PCLPointField::FLOAT32) type = TimeType::float32;
@@ -148,14 +148,15 @@ std::vector<T> whole_numbers(const std::optional<Column>& column) {
 }  // namespace
 
 CloudFile read_point_cloud(const std::filesystem::path& file, std::int64_t stamp_ns) {
+  const PointFieldNames names;
   const pcl::PCLPointCloud2 cloud = load(file);
   CloudFile read;
   read.scan.stamp_ns = stamp_ns;
-  read.scan.points_lidar = points_of(file, cloud);
-  read.scan.intensity = intensity_of(cloud);
-  read.scan.time_offset_s = time_offsets_of(cloud, stamp_ns);
-  read.scan.ring = whole_numbers<std::uint16_t>(column(cloud, {"ring", "channel"}));
-  read.raw_labels = whole_numbers<std::uint32_t>(column(cloud, {"label"}));
+  read.scan.points_lidar = points_of(file, cloud, names);
+  read.scan.intensity = intensity_of(cloud, names);
+  read.scan.time_offset_s = time_offsets_of(cloud, names, stamp_ns);
+  read.scan.ring = whole_numbers<std::uint16_t>(column(cloud, names.ring));
+  read.raw_labels = whole_numbers<std::uint32_t>(column(cloud, names.label));
   return read;
 }
 

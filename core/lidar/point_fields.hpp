@@ -9,6 +9,22 @@ namespace stillmap {
 
 // What drivers write into the fields of a point: their names, and the numbers in them.
 
+/// Names under which the fields of a point may appear, in files and in PointCloud2 alike; the first
+/// one that is there is taken. The defaults are those of the drivers of Velodyne, Ouster, Hesai,
+/// Livox, RoboSense and Nebula. An Ouster's `intensity` counts photons while its `reflectivity` is
+/// calibrated, so that comes first; a Livox's `line` is no ring, as its beams do not keep their
+/// elevation.
+struct PointFieldNames {
+  std::vector<std::string> x = {"x"};
+  std::vector<std::string> y = {"y"};
+  std::vector<std::string> z = {"z"};
+  std::vector<std::string> intensity = {"reflectivity", "intensity", "i", "remission"};
+  std::vector<std::string> ring = {"ring", "channel"};
+  std::vector<std::string> time = {"time",       "t",           "timestamp",
+                                   "time_stamp", "offset_time", "time_offset"};
+  std::vector<std::string> label = {"label"};
+};
+
 /// Number type of a time field.
 enum class TimeType { integer, float32, float64 };
 

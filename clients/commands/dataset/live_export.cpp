@@ -16,12 +16,7 @@ constexpr std::chrono::milliseconds poll_period{20};
 constexpr std::chrono::milliseconds drain_time{1000};
 
 wire::CloudReadOptions reading_of(const ServerConfig& config) {
-  const PointFieldNames& names = config.input.fields;
-  return {.fields = {.intensity = names.intensity,
-                     .ring = names.ring,
-                     .time = names.time,
-                     .label = names.label},
-          .intensity_scale = config.mapper.sensor.intensity_scale};
+  return {.fields = config.input.fields, .intensity_scale = config.mapper.sensor.intensity_scale};
 }
 
 /// The subscriptions, and what came from them: each has its own thread.
