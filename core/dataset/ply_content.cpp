@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "core/dataset/binary_file.hpp"
-#include "core/dataset/point_cloud_header.hpp"
+#include "core/dataset/cloud_content.hpp"
 
 namespace stillmap {
 namespace {

@@ -13,7 +13,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/pcd_plugin.hpp"
 #include "core/dataset/plugin.hpp"
-#include "core/dataset/point_cloud_header.hpp"
+#include "core/dataset/cloud_content.hpp"
 
 namespace stillmap {
 namespace {

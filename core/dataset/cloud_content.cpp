@@ -1,4 +1,4 @@
-#include "core/dataset/point_cloud_header.hpp"
+#include "core/dataset/cloud_content.hpp"
 
 #include <sstream>
 
