@@ -1,8 +1,6 @@
 #include <algorithm>
 #include <cctype>
-#include <charconv>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <system_error>
 
@@ -25,27 +23,6 @@ std::string own_name(const std::string& field) {
   const std::string text = lower(field);
   constexpr std::string_view prefix = "scalar_";
   return text.starts_with(prefix) ? text.substr(prefix.size()) : text;
-}
-
-template <class T>
-double load(const char* from, bool swap) {
-  char bytes[sizeof(T)];
-  std::memcpy(bytes, from, sizeof bytes);
-  if (swap) std::reverse(bytes, bytes + sizeof bytes);
-  T value;
-  std::memcpy(&value, bytes, sizeof value);
-  return static_cast<double>(value);
-}
-
-double load_field(const CloudField& field, const char* from, bool swap) {
-  if (field.kind == 'F')
-    return field.bytes == 4 ? load<float>(from, swap) : load<double>(from, swap);
-  const bool has_sign = field.kind == 'I';
-  if (field.bytes == 1)
-    return has_sign ? load<std::int8_t>(from, swap) : load<std::uint8_t>(from, swap);
-  if (field.bytes == 2)
-    return has_sign ? load<std::int16_t>(from, swap) : load<std::uint16_t>(from, swap);
-  return has_sign ? load<std::int32_t>(from, swap) : load<std::uint32_t>(from, swap);
 }
 
 void check_size(const std::filesystem::path& file, const CloudContent& header,
@@ -124,19 +101,19 @@ void MergedCloudReader::read_words() {
   std::string word;
   for (double& number : numbers_) {
     in_ >> word;
-    const char* end = word.data() + word.size();
-    const auto [stopped, error] = std::from_chars(word.data(), end, number);
-    if (!in_ || error != std::errc{} || stopped != end) {
+    const auto value = in_ ? number_of(word) : std::nullopt;
+    if (!value) {
       throw DatasetError(file_, "point " + std::to_string(next_) + ": \"" + word.substr(0, 40) +
                                     "\" is not a number; the file is damaged");
     }
+    number = *value;
   }
 }
 
 double MergedCloudReader::value(const Column& column) const {
   if (header_.encoding == "ascii") return numbers_[column.field];
-  return load_field(header_.fields[column.field], row_.data() + column.offset,
-                    header_.encoding == "binary_big_endian");
+  return field_value(header_.fields[column.field], row_.data() + column.offset,
+                     header_.encoding == "binary_big_endian");
 }
 
 std::uint32_t MergedCloudReader::whole(const Column& column, double largest) const {

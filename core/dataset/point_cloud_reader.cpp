@@ -1,111 +1,58 @@
-#include <pcl/PCLPointCloud2.h>
-
 #include <algorithm>
-#include <cmath>
-#include <cstring>
 #include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "core/dataset/cloud_content.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/point_cloud_files.hpp"
-#include "core/dataset/point_cloud_loaders.hpp"
 #include "core/lidar/point_fields.hpp"
 
 namespace stillmap {
 namespace {
 
-using pcl::PCLPointField;
-
-std::size_t bytes_of(std::uint8_t datatype) {
-  switch (datatype) {
-    case PCLPointField::INT8:
-    case PCLPointField::UINT8:
-      return 1;
-    case PCLPointField::INT16:
-    case PCLPointField::UINT16:
-      return 2;
-    case PCLPointField::INT32:
-    case PCLPointField::UINT32:
-    case PCLPointField::FLOAT32:
-      return 4;
-    case PCLPointField::FLOAT64:
-      return 8;
-    default:
-      return 0;
-  }
-}
-
-template <class T>
-double value_at(const std::uint8_t* bytes) {
-  T value;
-  std::memcpy(&value, bytes, sizeof value);
-  return static_cast<double>(value);
-}
-
-double value_of(const std::uint8_t* bytes, std::uint8_t datatype) {
-  switch (datatype) {
-    case PCLPointField::INT8:
-      return value_at<std::int8_t>(bytes);
-    case PCLPointField::UINT8:
-      return value_at<std::uint8_t>(bytes);
-    case PCLPointField::INT16:
-      return value_at<std::int16_t>(bytes);
-    case PCLPointField::UINT16:
-      return value_at<std::uint16_t>(bytes);
-    case PCLPointField::INT32:
-      return value_at<std::int32_t>(bytes);
-    case PCLPointField::UINT32:
-      return value_at<std::uint32_t>(bytes);
-    case PCLPointField::FLOAT32:
-      return value_at<float>(bytes);
-    default:
-      return value_at<double>(bytes);
-  }
-}
-
 /// One field of all points.
 struct Column {
-  std::uint8_t datatype = 0;
+  CloudField field;
   std::vector<double> values;
 
-  [[nodiscard]] bool all_within(double least, double most) const {
-    return std::ranges::all_of(values, [&](double v) { return v >= least && v <= most; });
+  [[nodiscard]] bool all_within(double min, double max) const {
+    return std::ranges::all_of(values, [&](double v) { return v >= min && v <= max; });
   }
 };
 
-/// The first field with one of these names; nothing when there is none or it lies outside a point.
-std::optional<Column> column(const pcl::PCLPointCloud2& cloud,
-                             const std::vector<std::string>& names) {
+Column read_column(const CloudContent& cloud, const CloudField& field, std::uint64_t offset) {
+  const std::uint64_t point_bytes = cloud.point_bytes();
+  Column column{field, {}};
+  column.values.reserve(cloud.points());
+  for (std::uint64_t i = 0; i < cloud.points(); ++i) {
+    column.values.push_back(field_value(field, cloud.body.data() + i * point_bytes + offset));
+  }
+  return column;
+}
+
+/// The field with the first of these names that the cloud has.
+std::optional<Column> find_column(const CloudContent& cloud,
+                                  const std::vector<std::string>& names) {
   for (const std::string& name : names) {
-    const auto field = std::ranges::find(cloud.fields, name, &PCLPointField::name);
-    if (field == cloud.fields.end()) continue;
-    const std::size_t bytes = bytes_of(field->datatype);
-    if (bytes == 0 || field->offset + bytes > cloud.point_step) continue;
-    const std::size_t points = std::size_t{cloud.width} * cloud.height;
-    Column column{field->datatype, {}};
-    column.values.reserve(points);
-    for (std::size_t i = 0; i < points; ++i) {
-      column.values.push_back(
-          value_of(cloud.data.data() + i * cloud.point_step + field->offset, field->datatype));
+    std::uint64_t offset = 0;
+    for (const CloudField& field : cloud.fields) {
+      if (field.name == name) return read_column(cloud, field, offset);
+      offset += field.bytes * field.count;
     }
-    return column;
   }
   return std::nullopt;
 }
 
-pcl::PCLPointCloud2 load(const std::filesystem::path& file) {
-  return file.extension() == ".ply" ? load_ply(file) : load_pcd(file);
-}
-
-std::vector<Eigen::Vector3f> points_of(const std::filesystem::path& file,
-                                       const pcl::PCLPointCloud2& cloud,
+std::vector<Eigen::Vector3f> points_of(const std::filesystem::path& file, const CloudContent& cloud,
                                        const PointFieldNames& names) {
-  const auto x = column(cloud, names.x), y = column(cloud, names.y), z = column(cloud, names.z);
+  const auto x = find_column(cloud, names.x);
+  const auto y = find_column(cloud, names.y);
+  const auto z = find_column(cloud, names.z);
   if (!x || !y || !z) {
     std::string present;
-    for (const auto& field : cloud.fields) present += " " + field.name;
+    for (const CloudField& field : cloud.fields) present.append(" ").append(field.name, 0, 40);
     throw DatasetError(file, "has no fields x, y and z, only:" + present);
   }
   std::vector<Eigen::Vector3f> points;
@@ -116,8 +63,8 @@ std::vector<Eigen::Vector3f> points_of(const std::filesystem::path& file,
   return points;
 }
 
-std::vector<float> intensity_of(const pcl::PCLPointCloud2& cloud, const PointFieldNames& names) {
-  const auto intensity = column(cloud, names.intensity);
+std::vector<float> intensity_of(const CloudContent& cloud, const PointFieldNames& names) {
+  const auto intensity = find_column(cloud, names.intensity);
   if (!intensity) return {};
   std::vector<float> values;
   values.reserve(intensity->values.size());
@@ -125,13 +72,12 @@ std::vector<float> intensity_of(const pcl::PCLPointCloud2& cloud, const PointFie
   return values;
 }
 
-std::vector<float> time_offsets_of(const pcl::PCLPointCloud2& cloud, const PointFieldNames& names,
+std::vector<float> time_offsets_of(const CloudContent& cloud, const PointFieldNames& names,
                                    std::int64_t stamp_ns) {
-  const auto time = column(cloud, names.time);
+  const auto time = find_column(cloud, names.time);
   if (!time) return {};
-  TimeType type = TimeType::integer;
-  if (time->datatype == PCLPointField::FLOAT32) type = TimeType::float32;
-  if (time->datatype == PCLPointField::FLOAT64) type = TimeType::float64;
+  const TimeType floating = time->field.bytes == 4 ? TimeType::float32 : TimeType::float64;
+  const TimeType type = time->field.kind == 'F' ? floating : TimeType::integer;
   return point_times(time->values, type, stamp_ns).offsets_s;
 }
 
@@ -149,14 +95,15 @@ std::vector<T> whole_numbers(const std::optional<Column>& column) {
 
 CloudFile read_point_cloud(const std::filesystem::path& file, std::int64_t stamp_ns) {
   const PointFieldNames names;
-  const pcl::PCLPointCloud2 cloud = load(file);
+  const CloudContent cloud =
+      file.extension() == ".ply" ? read_ply_content(file) : read_pcd_content(file);
   CloudFile read;
   read.scan.stamp_ns = stamp_ns;
   read.scan.points_lidar = points_of(file, cloud, names);
   read.scan.intensity = intensity_of(cloud, names);
   read.scan.time_offset_s = time_offsets_of(cloud, names, stamp_ns);
-  read.scan.ring = whole_numbers<std::uint16_t>(column(cloud, names.ring));
-  read.raw_labels = whole_numbers<std::uint32_t>(column(cloud, names.label));
+  read.scan.ring = whole_numbers<std::uint16_t>(find_column(cloud, names.ring));
+  read.raw_labels = whole_numbers<std::uint32_t>(find_column(cloud, names.label));
   return read;
 }
 
