@@ -1,6 +1,8 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "core/lidar/scan.hpp"
@@ -25,5 +27,11 @@ struct Features {
 /// What `extract_features` sees of one ring, for its tests: curvature of each point of the ring,
 /// NaN where the ring has too few neighbours or jumps in depth.
 [[nodiscard]] std::vector<float> ring_curvature(const std::vector<Eigen::Vector3f>& ring_lidar);
+
+/// The first of the `chosen` points in every cube of `spacing_m`; indices into `points`, in their
+/// order. At 0.5 m a wall of 10 m x 3 m keeps about 120 points, however near it is.
+[[nodiscard]] std::vector<std::uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> points,
+                                                          std::span<const std::uint32_t> chosen,
+                                                          double spacing_m);
 
 }  // namespace stillmap

@@ -6,11 +6,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "core/odometry/coarse_registration.hpp"
 #include "core/odometry/features.hpp"
 #include "core/odometry/motion_classification.hpp"
 #include "core/odometry/object_clusters.hpp"
-#include "core/odometry/range_image_history.hpp"
 #include "core/odometry/registration.hpp"
 #include "core/odometry/relocalization.hpp"
 #include "core/odometry/se3.hpp"

@@ -4,8 +4,6 @@
 #include <numbers>
 #include <vector>
 
-#include "core/odometry/coarse_registration.hpp"
-
 namespace stillmap {
 namespace {
 

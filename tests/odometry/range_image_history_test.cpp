@@ -1,4 +1,4 @@
-#include "core/odometry/range_image_history.hpp"
+#include "core/odometry/motion_classification.hpp"
 
 #include <gtest/gtest.h>
 

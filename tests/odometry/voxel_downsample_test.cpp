@@ -1,4 +1,4 @@
-#include "core/odometry/voxel_downsample.hpp"
+#include "core/odometry/features.hpp"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
