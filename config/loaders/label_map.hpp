@@ -6,7 +6,7 @@
 #include <string>
 
 #include "config/loaders/config_error.hpp"
-#include "core/lidar/motion.hpp"
+#include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/semantic_class.hpp"
 
 namespace stillmap {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "core/lidar/motion.hpp"
+#include "core/lidar/labelled_scan.hpp"
 #include "core/map/query/region.hpp"
 #include "core/map/query/tile_history.hpp"
 #include "core/map/query/tile_reader.hpp"
