@@ -50,7 +50,6 @@ class FeatureMap {
 
   void clear();
   [[nodiscard]] std::size_t size() const { return size_; }
-  [[nodiscard]] bool empty() const { return size_ == 0; }
 
  private:
   static constexpr int block_capacity = 32;

@@ -39,7 +39,6 @@ class RangeImageHistory {
                                   const Eigen::Vector3f& point_map) const;
 
   void add(RangeImageView view);
-  void clear() { views_.clear(); }
   /// Views that can be asked, at most `config.range_image_history_size`.
   [[nodiscard]] std::size_t size() const;
 
