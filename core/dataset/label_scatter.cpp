@@ -11,7 +11,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/merged_cloud.hpp"
-#include "core/dataset/numbered_scans.hpp"
+#include "core/dataset/scan_merge.hpp"
 
 namespace stillmap {
 namespace {

@@ -4,11 +4,21 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
-#include "core/dataset/dataset_frame.hpp"
+#include "core/lidar/scan.hpp"
 #include "core/lidar/sensor_model.hpp"
 
 namespace stillmap {
+
+/// One scan of a recording and its truth.
+struct DatasetFrame {
+  /// With the labels reduced to the network's classes, where the recording has labels.
+  Scan scan;
+  /// Original SemanticKITTI labels: moving ids in the low, instances in the high 16 bits. Truth for
+  /// evaluation only. Empty without labels.
+  std::vector<std::uint32_t> raw_labels;
+};
 
 /// Scans from somewhere else than files of one scan each, as from a bag. Thread-safe as far as its
 /// callers need: one thread reads.
