@@ -117,7 +117,7 @@ void MergedCloudWriter::add(const MergedPoint& point) {
 }
 
 void MergedCloudWriter::flush() {
-  // Not kept open: a long drive has more tiles than a process may have files.
+  // Reopened for each write: a long sequence has more tiles than a process may have open files.
   std::ofstream out(unfinished_file_, std::ios::binary | std::ios::app);
   out << buffer_;
   out.close();

@@ -141,7 +141,7 @@ std::map<std::uint32_t, std::size_t> numbered_scans(const ScanDataset& dataset) 
         !index_of.emplace(number, i).second) {
       throw DatasetError(file,
                          "is not a scan of a SemanticKITTI sequence (velodyne/NNNNNN.bin); make "
-                         "one of this recording with 'stillmap dataset export'");
+                         "one of this dataset with 'stillmap dataset export'");
     }
   }
   return index_of;

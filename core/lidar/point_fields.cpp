@@ -12,10 +12,10 @@ namespace stillmap {
 namespace {
 
 constexpr double max_offset_s = 10.0;
-/// Shorter or longer than this is no scan, and another unit is tried.
+/// Outside these durations another unit is tried.
 constexpr double min_scan_s = 1e-3;
 constexpr double max_scan_s = 5.0;
-/// What another unit must make of it.
+/// The shortest revolution for which another unit is taken.
 constexpr double min_revolution_s = 5e-3;
 /// Absolute times lie between 1990 and 2100, in any unit.
 constexpr double min_epoch_s = 6.3e8;
@@ -32,8 +32,8 @@ struct Unit {
 };
 constexpr std::array<Unit, 4> units = {{{"s", 1.0}, {"ms", 1e-3}, {"us", 1e-6}, {"ns", 1e-9}}};
 
-/// Some thousand finite times from all over the scan. Not the zeros, which also stand for points
-/// that were not measured, unless there is nothing else.
+/// Up to some thousand finite times, spread over the scan. Zeros, which also stand for points that
+/// were not measured, are left out unless there is nothing else.
 std::vector<double> sample_of(std::span<const double> times) {
   std::vector<double> sample;
   bool zeros = false;
@@ -52,8 +52,8 @@ double median_of(std::vector<double>& values) {
   return *middle;
 }
 
-/// From the 5th to the 95th of a hundred, so that a few broken times do not count; in the times'
-/// own unit.
+/// From the 5th to the 95th percentile, so that a few broken times do not count; in the unit of the
+/// times.
 double span_of(std::vector<double>& values) {
   const auto at = [&](std::size_t percent) {
     const auto place = values.begin() + static_cast<std::ptrdiff_t>(values.size() * percent / 100);
@@ -109,7 +109,7 @@ double earliest_near(double middle, std::span<const double> times_s) {
   return earliest;
 }
 
-/// Some thousand finite values from all over the scan.
+/// Up to some thousand finite values, spread over the scan.
 std::vector<float> sample_of(std::span<const float> intensity) {
   std::vector<float> sample;
   const std::size_t step = intensity.size() / max_intensity_samples + 1;

@@ -12,11 +12,11 @@ namespace stillmap {
 
 /// The paper's F_e and F_p as indices into the scan.
 struct Features {
-  /// Edge points, thinned to `edge_spacing_m`.
+  /// Edge points, downsampled to `edge_spacing_m`.
   std::vector<std::uint32_t> edges;
-  /// Plane points, thinned to `map_plane_spacing_m`: what the local map takes in.
+  /// Plane points, downsampled to `map_plane_spacing_m`: inserted into the local map.
   std::vector<std::uint32_t> planes;
-  /// Those of `planes` that are registered, thinned to `plane_spacing_m`.
+  /// Those of `planes` that are registered, downsampled to `plane_spacing_m`.
   std::vector<std::uint32_t> registered_planes;
 };
 
@@ -24,7 +24,7 @@ struct Features {
 /// the rejection of occluded and grazing points that A-LOAM dropped). `scan.ring` must be known.
 [[nodiscard]] Features extract_features(const Scan& scan, const FeatureConfig& config);
 
-/// What `extract_features` sees of one ring, for its tests: curvature of each point of the ring,
+/// Curvature of each point of the ring,
 /// NaN where the ring has too few neighbours or jumps in depth.
 [[nodiscard]] std::vector<float> ring_curvature(const std::vector<Eigen::Vector3f>& ring_lidar);
 

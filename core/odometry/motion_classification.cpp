@@ -12,11 +12,11 @@ namespace {
 
 /// A surface is the same one within this distance along the ray [m].
 constexpr float same_surface_m = 0.3F;
-/// What stood farther before the point than this was another object [m].
+/// A surface farther in front of the point than this belonged to another object [m].
 constexpr float max_gone_gap_m = 3.0F;
 /// Spacing of the points of an object that are looked up [m].
 constexpr double sample_spacing_m = 0.2;
-/// Fewer decisive samples say nothing of an object.
+/// An object with fewer decisive samples stays undecided.
 constexpr int min_samples = 5;
 /// Share of decisive samples that must have been there before for an object to count as parked.
 constexpr double parked_share = 0.6;

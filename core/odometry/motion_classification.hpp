@@ -14,7 +14,7 @@ namespace stillmap {
 
 /// What an earlier scan saw at the place of a point.
 enum class PastObservation : std::uint8_t {
-  /// Nothing can be said: hidden, outside the field of view, no return.
+  /// Not observed: hidden, outside the field of view, no return.
   unknown,
   /// A surface was there.
   same,
@@ -24,7 +24,8 @@ enum class PastObservation : std::uint8_t {
   removed_in_front,
 };
 
-/// The last few scans, kept to ask of a point whether its place was free or filled before.
+/// Range images of the last scans, which tell whether the place of a point was free or occupied
+/// then.
 class RangeImageHistory {
  public:
   explicit RangeImageHistory(const MotionConfig& config) : config_(config) {}
@@ -34,7 +35,7 @@ class RangeImageHistory {
   [[nodiscard]] PastObservation observation(std::size_t age, const Eigen::Vector3f& point_map,
                                             const RangeImageView& now) const;
 
-  /// Whether `view` looks through this place to something behind it.
+  /// Whether `view` measured something behind this place.
   [[nodiscard]] bool sees_through(const RangeImageView& view,
                                   const Eigen::Vector3f& point_map) const;
 

@@ -16,9 +16,9 @@
 namespace stillmap {
 namespace {
 
-/// A gap in time beyond which the last velocity says nothing any more [s].
+/// Time beyond which the last velocity is not extrapolated [s].
 constexpr double max_prediction_s = 1.0;
-/// After so many scans without a pose the local map starts anew where the prediction is.
+/// After this many lost scans in a row the local map starts anew at the predicted pose.
 constexpr int max_lost_scans = 10;
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
@@ -27,7 +27,7 @@ double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
 namespace {
 
-/// The paper's "no weighting" is exactly that.
+/// The paper's "no weighting" has no robust kernel either.
 OdometryConfig without_unused_kernel(OdometryConfig config) {
   if (config.weighting == Weighting::none) config.registration.robust_scale_m = 0.0;
   return config;
@@ -42,15 +42,15 @@ struct Odometry::State {
         map{FeatureMap(odometry_config.local_map), FeatureMap(odometry_config.local_map)},
         history(odometry_config.motion) {}
 
-  /// The scan as later ones look back on it; nothing where they do not.
+  /// The range image of the scan for the history; nothing where none is kept.
   [[nodiscard]] std::optional<RangeImageView> view_of(const Scan& scan, const PointLabels& labels,
                                                       const Eigen::Isometry3d& T_map_lidar) const;
   [[nodiscard]] std::vector<MotionClass> classify(const Scan& scan, const ObjectClusters& objects,
                                                   const std::optional<RangeImageView>& now,
                                                   const Eigen::Isometry3d& T_map_lidar) const;
-  /// Whether the last velocity says where a scan of this time is.
+  /// Whether the last velocity predicts the pose of a scan of this time.
   [[nodiscard]] bool has_velocity(std::int64_t stamp_ns) const;
-  /// A scan without a pose stays out of the local map, unless the map is given up for good.
+  /// Counts lost scans, which stay out of the local map. Clears the map after `max_lost_scans`.
   [[nodiscard]] bool may_extend_map(OdometryHealth health);
   [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
                                              Eigen::Isometry3d T_map_lidar_predicted,
@@ -61,7 +61,7 @@ struct Odometry::State {
   OdometryConfig config;
   SensorModel sensor;
   LocalMap map;
-  /// Points of a map made earlier, until the first scan has its place in it.
+  /// Points of a prior map, until the first scan is registered against it.
   std::vector<LabelledPoint> prior_map;
   RangeImageHistory history;
   bool started = false;
@@ -265,7 +265,7 @@ Odometry::Step Odometry::register_scan(const Scan& scan, const PointLabels& labe
   step.result = state.estimate_pose(sets, T_map_lidar_predicted, prediction_is_good);
   const Eigen::Isometry3d& T_map_lidar = step.result.T_map_lidar;
 
-  // What moves stays out of the local map, eq. (9) and c > c_th.
+  // Moving points stay out of the local map, eq. (9) and c > c_th.
   step.motion =
       classify_point_motion(scan, labels, objects, motion_classes, T_map_lidar, state.map, config);
   if (state.may_extend_map(step.result.health))
