@@ -23,60 +23,11 @@ constexpr int max_lost_scans = 10;
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
-}  // namespace
-
-namespace {
-
 /// The paper's "no weighting" has no robust kernel either.
 OdometryConfig without_unused_kernel(OdometryConfig config) {
   if (config.weighting == Weighting::none) config.registration.robust_scale_m = 0.0;
   return config;
 }
-
-}  // namespace
-
-struct Odometry::State {
-  State(const OdometryConfig& odometry_config, const SensorModel& sensor_model)
-      : config(without_unused_kernel(odometry_config)),
-        sensor(sensor_model),
-        map{FeatureMap(odometry_config.local_map), FeatureMap(odometry_config.local_map)},
-        history(odometry_config.motion) {}
-
-  /// The range image of the scan for the history; nothing where none is kept.
-  [[nodiscard]] std::optional<RangeImageView> view_of(const Scan& scan, const PointLabels& labels,
-                                                      const Eigen::Isometry3d& T_map_lidar) const;
-  [[nodiscard]] std::vector<MotionClass> classify(const Scan& scan, const ObjectClusters& objects,
-                                                  const std::optional<RangeImageView>& now,
-                                                  const Eigen::Isometry3d& T_map_lidar) const;
-  /// Whether the last velocity predicts the pose of a scan of this time.
-  [[nodiscard]] bool has_velocity(std::int64_t stamp_ns) const;
-  /// Counts lost scans, which stay out of the local map. Clears the map after `max_lost_scans`.
-  [[nodiscard]] bool may_extend_map(OdometryHealth health);
-  [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
-                                             Eigen::Isometry3d T_map_lidar_predicted,
-                                             bool prediction_is_good) const;
-  void update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
-                    const Eigen::Isometry3d& T_map_lidar);
-
-  OdometryConfig config;
-  SensorModel sensor;
-  LocalMap map;
-  /// Points of a prior map, until the first scan is registered against it.
-  std::vector<LabelledPoint> prior_map;
-  RangeImageHistory history;
-  bool started = false;
-  /// Scans in a row that could not be registered.
-  int lost_scans = 0;
-  std::int64_t last_stamp_ns = 0;
-  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
-  /// The last scan's features, to align the next one coarsely where no velocity is known.
-  FeatureSets last_features;
-  /// Motion from the last scan but one to the last, and the time between them.
-  Eigen::Isometry3d last_motion = Eigen::Isometry3d::Identity();
-  double last_interval_s = 0.0;
-};
-
-namespace {
 
 LocalMap coarse_map_of_scan(const FeatureSets& features, const Eigen::Isometry3d& T_map_lidar) {
   LocalMap map = make_coarse_map();
@@ -91,73 +42,6 @@ LocalMap coarse_map_of_scan(const FeatureSets& features, const Eigen::Isometry3d
   fill(features.planes, map.planes);
   return map;
 }
-
-}  // namespace
-
-std::optional<RangeImageView> Odometry::State::view_of(const Scan& scan, const PointLabels& labels,
-                                                       const Eigen::Isometry3d& T_map_lidar) const {
-  if (labels.empty() || !config.motion.use_range_image_history) return std::nullopt;
-  return RangeImageView(scan, labels.classes, sensor, T_map_lidar);
-}
-
-std::vector<MotionClass> Odometry::State::classify(const Scan& scan, const ObjectClusters& objects,
-                                                   const std::optional<RangeImageView>& now,
-                                                   const Eigen::Isometry3d& T_map_lidar) const {
-  if (!now) return std::vector<MotionClass>(objects.count, MotionClass::undecided);
-  return classify_motion(scan, objects, T_map_lidar, history, *now, config.motion);
-}
-
-bool Odometry::State::has_velocity(std::int64_t stamp_ns) const {
-  return last_interval_s > 0.0 && lost_scans == 0 &&
-         seconds(stamp_ns - last_stamp_ns) <= max_prediction_s;
-}
-
-bool Odometry::State::may_extend_map(OdometryHealth health) {
-  lost_scans = health == OdometryHealth::lost ? lost_scans + 1 : 0;
-  if (lost_scans < max_lost_scans) return lost_scans == 0;
-  map.edges.clear();
-  map.planes.clear();
-  lost_scans = 0;
-  return true;
-}
-
-OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
-                                              Eigen::Isometry3d T_map_lidar_predicted,
-                                              bool prediction_is_good) const {
-  if (!started) {
-    if (prior_map.empty()) return OdometryResult{.T_map_lidar = T_map_lidar_predicted};
-    return relocalize(features, prior_map, map, T_map_lidar_predicted, config);
-  }
-  if (!prediction_is_good) {
-    const LocalMap coarse_map = coarse_map_of_scan(last_features, T_map_lidar);
-    T_map_lidar_predicted = register_features(features, coarse_map, T_map_lidar_predicted,
-                                              coarse_registration_config(config))
-                                .T_map_lidar;
-  }
-  return register_features(features, map, T_map_lidar_predicted, config);
-}
-
-void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
-                                   const Eigen::Isometry3d& T_map_lidar_now) {
-  if (started) {
-    last_motion = T_map_lidar.inverse() * T_map_lidar_now;
-    last_interval_s = seconds(stamp_ns - last_stamp_ns);
-  }
-  started = true;
-  prior_map = {};
-  last_stamp_ns = stamp_ns;
-  T_map_lidar = T_map_lidar_now;
-  if (!view) return;
-  view->move_to(T_map_lidar);
-  const auto is_gone = [&](const Eigen::Vector3f& p_map) {
-    return history.sees_through(*view, p_map);
-  };
-  map.edges.remove_movable_if(is_gone);
-  map.planes.remove_movable_if(is_gone);
-  history.add(*std::move(view));
-}
-
-namespace {
 
 SemanticClass label_of(const PointLabels& labels, std::size_t i) {
   return labels.empty() ? SemanticClass::unlabeled : labels.classes[i];
@@ -221,6 +105,110 @@ void extend_local_map(LocalMap& map, const Scan& scan, const PointLabels& labels
 }
 
 }  // namespace
+
+struct Odometry::State {
+  State(const OdometryConfig& odometry_config, const SensorModel& sensor_model)
+      : config(without_unused_kernel(odometry_config)),
+        sensor(sensor_model),
+        map{FeatureMap(odometry_config.local_map), FeatureMap(odometry_config.local_map)},
+        history(odometry_config.motion) {}
+
+  /// The range image of the scan for the history; nothing where none is kept.
+  [[nodiscard]] std::optional<RangeImageView> view_of(const Scan& scan, const PointLabels& labels,
+                                                      const Eigen::Isometry3d& T_map_lidar) const;
+  [[nodiscard]] std::vector<MotionClass> classify(const Scan& scan, const ObjectClusters& objects,
+                                                  const std::optional<RangeImageView>& now,
+                                                  const Eigen::Isometry3d& T_map_lidar) const;
+  /// Whether the last velocity predicts the pose of a scan of this time.
+  [[nodiscard]] bool has_velocity(std::int64_t stamp_ns) const;
+  /// Counts lost scans, which stay out of the local map. Clears the map after `max_lost_scans`.
+  [[nodiscard]] bool may_extend_map(OdometryHealth health);
+  [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
+                                             Eigen::Isometry3d T_map_lidar_predicted,
+                                             bool prediction_is_good) const;
+  void update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
+                    const Eigen::Isometry3d& T_map_lidar);
+
+  OdometryConfig config;
+  SensorModel sensor;
+  LocalMap map;
+  /// Points of a prior map, until the first scan is registered against it.
+  std::vector<LabelledPoint> prior_map;
+  RangeImageHistory history;
+  bool started = false;
+  /// Scans in a row that could not be registered.
+  int lost_scans = 0;
+  std::int64_t last_stamp_ns = 0;
+  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+  /// The last scan's features, to align the next one coarsely where no velocity is known.
+  FeatureSets last_features;
+  /// Motion from the last scan but one to the last, and the time between them.
+  Eigen::Isometry3d last_motion = Eigen::Isometry3d::Identity();
+  double last_interval_s = 0.0;
+};
+
+std::optional<RangeImageView> Odometry::State::view_of(const Scan& scan, const PointLabels& labels,
+                                                       const Eigen::Isometry3d& T_map_lidar) const {
+  if (labels.empty() || !config.motion.use_range_image_history) return std::nullopt;
+  return RangeImageView(scan, labels.classes, sensor, T_map_lidar);
+}
+
+std::vector<MotionClass> Odometry::State::classify(const Scan& scan, const ObjectClusters& objects,
+                                                   const std::optional<RangeImageView>& now,
+                                                   const Eigen::Isometry3d& T_map_lidar) const {
+  if (!now) return std::vector<MotionClass>(objects.count, MotionClass::undecided);
+  return classify_motion(scan, objects, T_map_lidar, history, *now, config.motion);
+}
+
+bool Odometry::State::has_velocity(std::int64_t stamp_ns) const {
+  return last_interval_s > 0.0 && lost_scans == 0 &&
+         seconds(stamp_ns - last_stamp_ns) <= max_prediction_s;
+}
+
+bool Odometry::State::may_extend_map(OdometryHealth health) {
+  lost_scans = health == OdometryHealth::lost ? lost_scans + 1 : 0;
+  if (lost_scans < max_lost_scans) return lost_scans == 0;
+  map.edges.clear();
+  map.planes.clear();
+  lost_scans = 0;
+  return true;
+}
+
+OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
+                                              Eigen::Isometry3d T_map_lidar_predicted,
+                                              bool prediction_is_good) const {
+  if (!started) {
+    if (prior_map.empty()) return OdometryResult{.T_map_lidar = T_map_lidar_predicted};
+    return relocalize(features, prior_map, map, T_map_lidar_predicted, config);
+  }
+  if (!prediction_is_good) {
+    const LocalMap coarse_map = coarse_map_of_scan(last_features, T_map_lidar);
+    T_map_lidar_predicted = register_features(features, coarse_map, T_map_lidar_predicted,
+                                              coarse_registration_config(config))
+                                .T_map_lidar;
+  }
+  return register_features(features, map, T_map_lidar_predicted, config);
+}
+
+void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
+                                   const Eigen::Isometry3d& T_map_lidar_now) {
+  if (started) {
+    last_motion = T_map_lidar.inverse() * T_map_lidar_now;
+    last_interval_s = seconds(stamp_ns - last_stamp_ns);
+  }
+  started = true;
+  prior_map = {};
+  last_stamp_ns = stamp_ns;
+  T_map_lidar = T_map_lidar_now;
+  if (!view) return;
+  view->move_to(T_map_lidar);
+  const auto is_gone = [&](const Eigen::Vector3f& p_map) {
+    return history.sees_through(*view, p_map);
+  };
+  map.edges.remove_movable_if(is_gone);
+  map.planes.remove_movable_if(is_gone);
+  history.add(*std::move(view));
+}
 
 Odometry::Odometry(const OdometryConfig& config, const SensorModel& sensor)
     : state_(std::make_unique<State>(config, sensor)) {

@@ -1,9 +1,8 @@
-#include "core/odometry/motion_classification.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "core/odometry/motion_classification.hpp"
 #include "tests/odometry/box_world.hpp"
 #include "tests/odometry/poses.hpp"
 
