@@ -29,6 +29,9 @@ inline constexpr const char* topic_in_help =
 /// The chosen command with its options, ready to run. Set while the command line is parsed.
 using Action = std::function<ExitCode()>;
 
+/// Adds every command of `stillmap`.
+void add_commands(CommandHandle program, Action& action);
+
 // Each adds one subcommand to the program; when it is chosen, it sets `action`.
 void add_map_command(CommandHandle program, Action& action);
 void add_traversable_command(CommandHandle program, Action& action);

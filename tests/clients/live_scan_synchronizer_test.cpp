@@ -1,4 +1,4 @@
-#include "clients/commands/dataset/live_scan_synchronizer.hpp"
+#include "clients/commands/dataset/live_export.hpp"
 
 #include <gtest/gtest.h>
 

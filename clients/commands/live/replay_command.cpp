@@ -1,21 +1,234 @@
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
 #include <iostream>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/commands/live/pose_log.hpp"
-#include "clients/commands/live/replay_run.hpp"
+#include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
+#include "clients/library/client.hpp"
+#include "clients/library/scan_publisher.hpp"
 #include "clients/terminal/progress.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "core/dataset/scan_dataset.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::cli {
 namespace {
+
+/// The poses that come back from a server, by stamp. What the odometry topic lost under way comes
+/// from the path. Callbacks may come from any thread.
+class PoseLog {
+ public:
+  /// Starts listening. The client must outlive the log.
+  explicit PoseLog(Client& client);
+
+  /// Waits until every one of these scans has its pose, or `timeout` has passed.
+  void wait_for(const std::vector<std::int64_t>& stamps_ns, std::chrono::milliseconds timeout);
+
+  /// The poses of these scans, in their order; scans without a pose are left out.
+  [[nodiscard]] Trajectory poses_of(const std::vector<std::int64_t>& stamps_ns) const;
+
+ private:
+  /// From the odometry topic: a scan that is sent again gets a new pose.
+  void take(const StampedPose& pose);
+  /// From the path, which may still be that of another time.
+  void add(const StampedPose& pose);
+
+  mutable std::mutex mutex_;
+  std::condition_variable added_;
+  std::map<std::int64_t, Eigen::Isometry3d> T_map_lidar_;
+  // Last: they end before what they write to.
+  Subscription odometry_;
+  Subscription path_;
+};
+
+struct ReplayOptions {
+  ScanRange range;
+  /// Times real time; 0: as fast as the server takes scans.
+  double rate = 1.0;
+  bool with_labels = true;
+  /// How long a publisher that must not lose anything waits for the server to take a scan.
+  std::chrono::milliseconds idle_timeout{30'000};
+};
+
+struct ReplayResult {
+  std::vector<std::int64_t> published_stamps_ns;
+  std::vector<SkippedScan> skipped;
+  double seconds = 0.0;
+  bool acknowledged = false;
+  bool stopped = false;
+};
+
+/// What the server made of scans since an earlier status.
+struct ServerCounts {
+  std::uint64_t mapped = 0;
+  std::uint64_t dropped = 0;
+};
+
+PoseLog::PoseLog(Client& client)
+    : odometry_(client.subscribe_odometry([this](const OdometryUpdate& update) {
+        take(update.pose);
+        added_.notify_one();
+      })),
+      path_(client.subscribe_path([this](const Trajectory& path) {
+        for (const StampedPose& pose : path) add(pose);
+        added_.notify_one();
+      })) {}
+
+void PoseLog::take(const StampedPose& pose) {
+  const std::lock_guard lock(mutex_);
+  T_map_lidar_.insert_or_assign(pose.stamp_ns, pose.T_map_lidar);
+}
+
+void PoseLog::add(const StampedPose& pose) {
+  const std::lock_guard lock(mutex_);
+  T_map_lidar_.try_emplace(pose.stamp_ns, pose.T_map_lidar);
+}
+
+void PoseLog::wait_for(const std::vector<std::int64_t>& stamps_ns,
+                       std::chrono::milliseconds timeout) {
+  std::unique_lock lock(mutex_);
+  added_.wait_for(lock, timeout, [&] {
+    return std::all_of(stamps_ns.begin(), stamps_ns.end(),
+                       [&](std::int64_t stamp_ns) { return T_map_lidar_.contains(stamp_ns); });
+  });
+}
+
+Trajectory PoseLog::poses_of(const std::vector<std::int64_t>& stamps_ns) const {
+  const std::lock_guard lock(mutex_);
+  Trajectory trajectory;
+  for (const std::int64_t stamp_ns : stamps_ns) {
+    const auto found = T_map_lidar_.find(stamp_ns);
+    if (found != T_map_lidar_.end()) trajectory.push_back({stamp_ns, found->second});
+  }
+  return trajectory;
+}
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds publish_step{500};
+constexpr std::chrono::milliseconds status_period{100};
+
+/// When a scan of a recording is due.
+class ReplayClock {
+ public:
+  ReplayClock(std::int64_t first_stamp_ns, double rate)
+      : first_stamp_ns_(first_stamp_ns), rate_(rate), began_(Clock::now()) {}
+
+  /// Waits for the scan's time; true when told to stop instead.
+  [[nodiscard]] bool wait_or_stop(std::int64_t stamp_ns, StopSignal& stop) const {
+    if (rate_ <= 0.0) return stop.requested();
+    const double due_ns = std::max(0.0, static_cast<double>(stamp_ns - first_stamp_ns_) / rate_);
+    const auto due = began_ + std::chrono::nanoseconds(static_cast<std::int64_t>(due_ns));
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(due - Clock::now());
+    return stop.wait_for(std::max(left, std::chrono::milliseconds(0)));
+  }
+
+ private:
+  std::int64_t first_stamp_ns_;
+  double rate_;
+  Clock::time_point began_;
+};
+
+std::optional<DatasetFrame> read_scan(const ScanDataset& dataset, std::size_t index,
+                                      const ReplayOptions& options, ReplayResult& result,
+                                      const ScanSkipped& scan_skipped) {
+  try {
+    DatasetFrame frame = dataset.read(index);
+    if (!options.with_labels) {
+      frame.raw_labels.clear();
+      frame.scan.labels.clear();
+    }
+    // As the driver of this sensor sends it: the server scales it back.
+    for (float& value : frame.scan.intensity) value /= dataset.suggested_sensor().intensity_scale;
+    return frame;
+  } catch (const DatasetError& error) {
+    if (options.range.strict) throw;
+    result.skipped.push_back({index, "unreadable", error.what()});
+    scan_skipped(result.skipped.back());
+    return std::nullopt;
+  }
+}
+
+// In short steps, so that the wait for the server can be interrupted. False when told to stop.
+bool publish(ScanPublisher& publisher, const DatasetFrame& frame, const ReplayOptions& options,
+             StopSignal& stop) {
+  const auto began = Clock::now();
+  while (!publisher.publish(frame.scan, frame.raw_labels, publish_step)) {
+    if (stop.requested()) return false;
+    if (Clock::now() - began > options.idle_timeout) {
+      throw ServiceTimeout(
+          "the server has taken no scan for " +
+          std::to_string(options.idle_timeout.count() / 1000) +
+          " s: did it stop? 'stillmap status' tells; a lossless replay needs a server with input "
+          "delivery: every");
+    }
+  }
+  return true;
+}
+
+/// Publishes the scans of a recording in their own rhythm. Throws ServiceTimeout when the server
+/// stops taking scans, DatasetError as ScanRange says.
+ReplayResult replay_dataset(const ScanDataset& dataset, const ReplayOptions& options,
+                            ScanPublisher& publisher, StopSignal& stop, const ScanDone& scan_done,
+                            const ScanSkipped& scan_skipped) {
+  const std::size_t end = options.range.end(dataset);
+  const auto began = Clock::now();
+  const ReplayClock clock(dataset.stamp_ns(options.range.first), options.rate);
+  ReplayResult result;
+  for (std::size_t index = options.range.first; index < end && !result.stopped; ++index) {
+    const auto frame = read_scan(dataset, index, options, result, scan_skipped);
+    if (frame) {
+      result.stopped = clock.wait_or_stop(dataset.stamp_ns(index), stop) ||
+                       !publish(publisher, *frame, options, stop);
+      if (!result.stopped) result.published_stamps_ns.push_back(frame->scan.stamp_ns);
+    }
+    (void)scan_done(index + 1 - options.range.first);
+  }
+  result.acknowledged = publisher.wait_for_all_acknowledged(options.idle_timeout);
+  result.seconds = std::chrono::duration<double>(Clock::now() - began).count();
+  return result;
+}
+
+ServerCounts counts_since(const dds::ServerStatus& before, const dds::ServerStatus& now) {
+  return {.mapped = now.counter("scans_mapped") - before.counter("scans_mapped"),
+          .dropped = now.dropped() - before.dropped()};
+}
+
+/// Asks until the server has mapped or dropped `scans` of them since `before`, or nothing has
+/// changed for `idle_timeout`. Returns the last status.
+dds::ServerStatus wait_until_mapped(Client& client, const dds::ServerStatus& before,
+                                    std::uint64_t scans, std::chrono::milliseconds idle_timeout,
+                                    StopSignal& stop) {
+  dds::ServerStatus status = client.status();
+  auto changed = Clock::now();
+  std::uint64_t done_before = 0;
+  while (true) {
+    const ServerCounts counts = counts_since(before, status);
+    const std::uint64_t done = counts.mapped + counts.dropped;
+    if (done != std::exchange(done_before, done)) changed = Clock::now();
+    if (done >= scans || Clock::now() - changed > idle_timeout) return status;
+    if (stop.wait_for(status_period)) return status;
+    status = client.status();
+  }
+}
 
 struct Arguments {
   std::string dataset;

@@ -7,8 +7,6 @@
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/commands/query/class_arguments.hpp"
-#include "clients/commands/query/cloud_output.hpp"
 #include "clients/commands/query/fetch_map.hpp"
 #include "clients/commands/query/query_report.hpp"
 #include "clients/commands/query/region_arguments.hpp"

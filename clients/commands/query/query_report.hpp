@@ -2,6 +2,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "clients/commands/stage_stopwatch.hpp"
 #include "core/map/query/map_query.hpp"
@@ -22,5 +23,12 @@ struct QueryAnswer {
 
 /// "appeared", "changed", "removed".
 [[nodiscard]] const char* name(TileChangeKind kind);
+
+/// Whether write_cloud takes a file of this name.
+[[nodiscard]] bool is_cloud_file(const std::string& file);
+
+/// Writes a point for every voxel, with its class and colour, as the name ends: .pcd or .ply.
+/// Throws DatasetError.
+void write_cloud(const std::string& file, const std::vector<QueryVoxel>& voxels);
 
 }  // namespace stillmap::cli

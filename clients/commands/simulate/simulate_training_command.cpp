@@ -1,20 +1,106 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+#include <tbb/task_group.h>
 
+#include <cstdint>
+#include <filesystem>
+#include <functional>
 #include <iostream>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 #include "clients/commands/arguments/simulation_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/commands/simulate/training_set.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
+#include "config/loaders/sensor_file.hpp"
+#include "core/dataset/dataset_error.hpp"
+#include "core/dataset/kitti_sequence_writer.hpp"
+#include "core/simulation/training_city.hpp"
 
 namespace stillmap::cli {
 namespace {
+
+/// Which made-up cities a training set has.
+struct TrainingSetPlan {
+  std::filesystem::path folder;
+  int cities = 200;
+  std::uint64_t first_seed = 1000;
+  int scans_per_city = 8;
+  /// Of the drives, as `training_sequence` has it.
+  double share_of_plain = 0.4;
+};
+
+struct TrainingSetCount {
+  int cities = 0;
+  /// Of these, complete before the run began.
+  int skipped = 0;
+  std::uint64_t scans = 0, points = 0;
+};
+
+namespace fs = std::filesystem;
+
+std::string sequence_name(std::uint64_t seed) {
+  const std::string digits = std::to_string(seed);
+  return std::string(digits.size() < 4 ? 4 - digits.size() : 0, '0').append(digits);
+}
+
+// One city, written aside and then put in its place.
+TrainingSetCount write_city(const fs::path& sequence, std::uint64_t seed,
+                            const TrainingSetPlan& plan) {
+  const fs::path unfinished = fs::path(sequence).concat(".unfinished");
+  fs::remove_all(unfinished);
+  const simulation::Simulation drive(simulation::training_sequence(seed, plan.share_of_plain));
+  KittiSequenceWriter writer(unfinished);
+  TrainingSetCount count{.cities = 1};
+  for (const int index : simulation::spread_scans(drive, plan.scans_per_city)) {
+    const simulation::SimulatedScan scan = drive.scan(index);
+    writer.add(scan.scan, scan.raw_labels, scan.T_map_lidar);
+    count.scans += 1;
+    count.points += scan.scan.size();
+  }
+  writer.finish();
+  save_sensor(drive.config().sensor, unfinished / "sensor.yaml");
+  fs::rename(unfinished, sequence);
+  return count;
+}
+
+/// Writes `folder`/sequences/SEED for each seed, several cities at a time (oneTBB): a SemanticKITTI
+/// sequence and the sensor.yaml of its lidar. Cities that are complete stay as they are; a city
+/// appears under its name only when it is.
+/// @param after_city called after every city, by one thread at a time; false ends the run.
+/// @throws DatasetError, or std::runtime_error that names the file.
+TrainingSetCount write_training_set(
+    const TrainingSetPlan& plan, const std::function<bool(const TrainingSetCount&)>& after_city) {
+  std::error_code error;
+  fs::create_directories(plan.folder / "sequences", error);
+  if (error) throw DatasetError(plan.folder, "cannot be made: " + error.message());
+  std::mutex mutex;
+  TrainingSetCount total;
+  tbb::task_group_context run;
+  const auto add = [&](const TrainingSetCount& city) {
+    const std::lock_guard lock(mutex);
+    total.cities += city.cities;
+    total.skipped += city.skipped;
+    total.scans += city.scans;
+    total.points += city.points;
+    if (!after_city(total)) run.cancel_group_execution();
+  };
+  const auto write = [&](int index) {
+    const std::uint64_t seed = plan.first_seed + static_cast<std::uint64_t>(index);
+    const fs::path sequence = plan.folder / "sequences" / sequence_name(seed);
+    add(fs::exists(sequence) ? TrainingSetCount{.cities = 1, .skipped = 1}
+                             : write_city(sequence, seed, plan));
+  };
+  tbb::parallel_for(0, plan.cities, write, tbb::simple_partitioner(), run);
+  return total;
+}
 
 struct Arguments {
   std::string out;
