@@ -5,12 +5,12 @@ namespace {
 
 constexpr const char* introduction =
     "Start here:\n"
-    "  stillmap simulate city --scans 100         a recording, when there is none\n"
+    "  stillmap simulate city --scans 100         a sequence to try it with\n"
     "  stillmap map city --out city_map           map it in this process\n"
     "  stillmap replay city                       or send it to a running stillmap-server\n"
     "  stillmap query --around-robot 50           and ask that server for its map\n"
     "'stillmap COMMAND --help' shows a command's options and examples.\n"
-    "Exit codes: 0 well; 1 the run failed; 2 wrong usage or input; 3 no server or no answer;\n"
+    "Exit codes: 0 success; 1 the run failed; 2 wrong usage or input; 3 no server or no answer;\n"
     "4 'plan' found no path.";
 
 }  // namespace
@@ -18,15 +18,15 @@ constexpr const char* introduction =
 void add_dataset_command(CommandHandle program, Action& action) {
   CommandHandle dataset = program.command("dataset",
                                           "Make a labelled data set: export scans, label them as "
-                                          "one cloud, take labels back; or find out "
-                                          "a recording's sensor");
+                                          "one cloud, write the labels back; or find "
+                                          "out the sensor of a data set");
   dataset.require_command();
   add_dataset_export_command(dataset, action);
   add_dataset_aggregate_command(dataset, action);
   add_dataset_scatter_command(dataset, action);
   add_dataset_sensor_command(dataset, action);
   dataset.explain(
-      "The way from a drive to a SemanticKITTI sequence with labels:\n"
+      "From a bag to a SemanticKITTI sequence with labels:\n"
       "  stillmap dataset export my_pcds campus --labels my_model   scans, poses, first guesses\n"
       "  stillmap dataset aggregate campus campus.ply               all scans in one cloud\n"
       "  ... correct the field 'label' in an editor, as CloudCompare ...\n"

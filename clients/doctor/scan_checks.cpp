@@ -23,7 +23,7 @@ std::vector<Publisher> publishers(const std::vector<dds::RemoteParticipant>& par
   return found;
 }
 
-// Clouds under other names, as a ROS user writes them; a server's own clouds are no input.
+// ROS names of other topics with clouds, without the server's own output.
 std::string other_clouds(const SystemSnapshot& snapshot, const std::string& points) {
   std::string names;
   for (const dds::RemoteParticipant& participant : snapshot.participants) {
@@ -48,7 +48,7 @@ dds::Diagnostic no_publisher_diagnostic(const SystemSnapshot& snapshot, const st
   dds::Diagnostic diagnostic{
       .severity = dds::Severity::problem,
       .what = "no scans: nobody publishes " + points,
-      .evidence = "peers in domain " + std::to_string(snapshot.dds.domain_id) + ": " +
+      .evidence = "participants in domain " + std::to_string(snapshot.dds.domain_id) + ": " +
                   std::to_string(snapshot.participants.size()) + ", and none of them does",
       .hint = "start the lidar's driver, or 'stillmap replay DATASET'"};
   if (const std::string names = other_clouds(snapshot, points); !names.empty()) {

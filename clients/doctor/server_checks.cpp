@@ -8,9 +8,9 @@
 namespace stillmap::cli {
 namespace {
 
-// What tf, and people, still take for one clock.
+// Larger offsets break tf lookups.
 constexpr double max_clock_offset_s = 0.1;
-// Scans older than that are a recording's.
+// Older scans are taken to be replayed.
 constexpr double replayed_age_s = 3600.0;
 
 std::string seconds(double value) {
@@ -41,7 +41,7 @@ void compare_with_sensor(const dds::ServerStatus& status, Diagnostics& diagnosti
        .evidence = "the last scan's stamp is " + seconds(std::abs(delay_s)) +
                    (delay_s < 0 ? " ahead of" : " behind") + " the server's clock",
        .hint = "keep the sensor's clock and the server's by PTP or NTP, and let the driver take "
-               "the sensor's time; a recording that is replayed has old stamps"});
+               "the sensor's time; a replayed bag has old stamps"});
 }
 
 bool is_same(const dds::Diagnostic& a, const dds::Diagnostic& b) { return a.what == b.what; }

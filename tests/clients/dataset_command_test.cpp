@@ -164,7 +164,8 @@ TEST_F(DatasetCommandTest, ALiveTopicBecomesASequence) {
   BackgroundProcess server(stillmap_server_program() + " --delivery every" + on_domain,
                            folder_ / "server.log");
   BackgroundProcess exporting(stillmap_program() + " dataset export topic:points " + path("live") +
-                                  " --silence 3 --sensor vlp_16 --json --timeout 30" + on_domain,
+                                  " --idle-timeout 3 --sensor vlp_16 --json --timeout 30" +
+                                  on_domain,
                               folder_ / "export.log");
   while (content("export.log").find("waiting for scans") == std::string::npos) {
     ASSERT_EQ(run("status --timeout 30" + on_domain).exit_code, 0) << content("server.log");
@@ -195,7 +196,7 @@ TEST_F(DatasetCommandTest, ALiveExportThatGetsNoPosesSaysSo) {
   const std::string on_domain = " --domain " + std::to_string(free_domain());
   BackgroundProcess server(stillmap_server_program() + on_domain, folder_ / "server.log");
   BackgroundProcess exporting(stillmap_program() + " dataset export topic:other " + path("live") +
-                                  " --silence 1 --timeout 30" + on_domain,
+                                  " --idle-timeout 1 --timeout 30" + on_domain,
                               folder_ / "export.log");
   while (content("export.log").find("waiting for scans") == std::string::npos) {
     ASSERT_EQ(run("status --timeout 30" + on_domain).exit_code, 0) << content("server.log");

@@ -1,6 +1,6 @@
-#include "clients/commands/dataset/live_export.hpp"
-
 #include <gtest/gtest.h>
+
+#include "clients/commands/dataset/live_export.hpp"
 
 namespace stillmap::cli {
 namespace {

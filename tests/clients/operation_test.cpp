@@ -26,10 +26,18 @@ class OperationTest : public CommandTest {
            " " + more;
   }
 
-  /// Waits until the program that logs there printed the text.
-  [[nodiscard]] bool comes_to_say(const std::string& text, const std::string& log_file) const {
+  [[nodiscard]] std::size_t count_in(const std::string& log_file, const std::string& text) const {
+    const std::string log = content(log_file);
+    std::size_t count = 0;
+    for (auto at = log.find(text); at != std::string::npos; at = log.find(text, at + 1)) ++count;
+    return count;
+  }
+
+  /// Waits until the program that logs there printed the text so many times.
+  [[nodiscard]] bool comes_to_say(const std::string& text, const std::string& log_file,
+                                  std::size_t times = 1) const {
     for (int tenths = 0; tenths < 300; ++tenths) {
-      if (content(log_file).find(text) != std::string::npos) return true;
+      if (count_in(log_file, text) >= times) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
     return false;
@@ -97,11 +105,13 @@ TEST_F(OperationTest, MetricsMoveWithScansAndRequests) {
   EXPECT_EQ(http_get(port, "/metrics"), "");
 }
 
-// A client that hangs has the server's messages pile up in shared memory; killed, it leaves that
-// behind, and Fast DDS gives the next client the same ports.
+// The server's messages for a client that hangs pile up in shared memory. When it is killed they
+// stay there, and Fast DDS gives the next client the same ports. The witness counts the messages.
 TEST_F(OperationTest, AnswersNewClientsAfterOthersHungAndWereKilled) {
   BackgroundProcess server(server_command("--log-level warning"), folder_ / "server.log");
   ASSERT_TRUE(answers()) << content("server.log");
+  const BackgroundProcess witness(stillmap_program() + " watch --json" + on_domain(),
+                                  folder_ / "witness.log");
   for (int round = 0; round < 2; ++round) {
     std::vector<std::unique_ptr<BackgroundProcess>> clients;
     for (int i = 0; i < 4; ++i) {
@@ -111,7 +121,8 @@ TEST_F(OperationTest, AnswersNewClientsAfterOthersHungAndWereKilled) {
       ASSERT_TRUE(comes_to_say("\"status\"", name)) << round;
     }
     for (const auto& client : clients) client->send(SIGSTOP);
-    std::this_thread::sleep_for(std::chrono::seconds(4));
+    const std::size_t before = count_in("witness.log", "\"status\"");
+    ASSERT_TRUE(comes_to_say("\"status\"", "witness.log", before + 4)) << round;
     for (const auto& client : clients) client->send(SIGKILL);
     for (const auto& client : clients) EXPECT_EQ(client->wait(), -1);
     EXPECT_TRUE(answers()) << round;

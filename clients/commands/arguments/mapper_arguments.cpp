@@ -47,10 +47,10 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
   command.option("--config", arguments.config_file,
                  "Server file (config/server/*.yaml); its mapper settings are used");
   command.option("--sensor", arguments.sensor,
-                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the recording suggests");
+                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the data set suggests");
   command
       .option("--labels", arguments.labels,
-              "Where classes come from: auto (the recording's, if it has any, else the model's), "
+              "Where classes come from: auto (the data set's, if it has any, else the model's), "
               "files (must have them), model (the one that comes with Stillmap), none (pure "
               "geometry), or a folder with a model")
       .with_default();

@@ -26,7 +26,7 @@ nlohmann::json to_json(const MergedClouds& merged) {
   return {{"files", files},
           {"scans", merged.scans},
           {"points", merged.points},
-          {"left_out", merged.left_out},
+          {"skipped", merged.left_out},
           {"origin_map_m", {origin.x(), origin.y(), origin.z()}}};
 }
 
@@ -39,7 +39,7 @@ std::string describe(const MergedClouds& merged) {
                      std::to_string(std::lround(origin.z())) + " m of the sequence's first pose\n";
   if (merged.left_out > 0) {
     text += std::to_string(merged.left_out) +
-            " points without finite coordinates left out; their labels will stay\n";
+            " points without finite coordinates skipped; their labels stay as they are\n";
   }
   for (const std::filesystem::path& file : merged.files) text += file.string() + "\n";
   return text;
@@ -132,7 +132,7 @@ void add_dataset_aggregate_command(CommandHandle dataset, Action& action) {
       "instance, scan_index and point_index. Edit 'label' (and 'instance'); points may be "
       "deleted,\n"
       "reordered and saved as ascii or binary with fields of any type, as long as scan_index and\n"
-      "point_index stay. All points of the scans are in it: nothing is thinned.");
+      "point_index stay. All points of the scans are in it: nothing is downsampled.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

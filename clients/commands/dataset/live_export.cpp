@@ -11,14 +11,14 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds poll_period{20};
-/// How long poses and labels of the last scans may be under way.
+/// Wait for the poses and labels of the last scans.
 constexpr std::chrono::milliseconds drain_time{1000};
 
 wire::CloudReadOptions reading_of(const ServerConfig& config) {
   return {.fields = config.input.fields, .intensity_scale = config.mapper.sensor.intensity_scale};
 }
 
-/// The subscriptions, and what came from them: each has its own thread.
+/// The subscriptions, each with a thread of its own, and the scans received.
 class LiveInput {
  public:
   LiveInput(Client& client, const std::string& topic, const ServerConfig& config)
@@ -36,10 +36,10 @@ class LiveInput {
 
   [[nodiscard]] std::optional<LiveScan> take() { return locked().second.take(); }
   [[nodiscard]] std::optional<LiveScan> take_last() { return locked().second.take_last(); }
-  /// Whether scans came, and then none for so long.
-  [[nodiscard]] bool silent_for(std::chrono::milliseconds silence) {
+  /// Whether the last scan is older than that; false before the first one.
+  [[nodiscard]] bool is_idle_for(std::chrono::milliseconds duration) {
     const std::scoped_lock lock(mutex_);
-    return last_scan_ && Clock::now() - *last_scan_ > silence;
+    return last_scan_ && Clock::now() - *last_scan_ > duration;
   }
   [[nodiscard]] std::size_t without_pose() { return locked().second.without_pose(); }
 
@@ -53,7 +53,7 @@ class LiveInput {
   std::mutex mutex_;
   LiveScanSynchronizer scans_;
   std::optional<Clock::time_point> last_scan_;
-  // Last: end before what they use is gone.
+  // Last members: their callbacks end before the members above are destroyed.
   Subscription poses_;
   Subscription labels_;
   Subscription points_;
@@ -84,7 +84,7 @@ class LiveExporter {
       if (scans > 0) summary.remarks.push_back({scans, text});
     };
     remark(without_pose,
-           "scans left out, as the server did not map them; a server with delivery 'every' maps "
+           "scans skipped, as the server did not map them; a server with delivery 'every' maps "
            "all");
     remark(labels_lost_, "scans without the server's labels, which were lost on their way");
     remark(labels_misfit_,
@@ -153,7 +153,7 @@ ExportSummary export_live(Client& client, const LiveExportOptions& options,
   LiveExporter output(config, folder);
   LiveInput input(client, options.topic, config);
   bool stopped = false;
-  while (!stopped && output.scans() < options.scans && !input.silent_for(options.silence)) {
+  while (!stopped && output.scans() < options.scans && !input.is_idle_for(options.idle_timeout)) {
     stopped = stop.wait_for(poll_period);
     while (const auto live = output.scans() < options.scans ? input.take() : std::nullopt) {
       output.write(*live);

@@ -20,7 +20,7 @@
 
 namespace stillmap::cli {
 
-/// A scan of the sensor with what the server made of it.
+/// A scan of the sensor with the pose and labels that the server published for it.
 struct LiveScan {
   Scan scan;
   Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
@@ -28,25 +28,25 @@ struct LiveScan {
   std::optional<std::vector<SemanticClass>> classes;
 };
 
-/// Brings together by their stamps what arrives on three topics: scans, poses, labels.
+/// Joins scans, poses and labels, which arrive on three topics, by their stamps.
 class LiveScanSynchronizer {
  public:
   void add_scan(const Scan& scan);
   void add_pose(const StampedPose& pose);
   void add_labels(std::int64_t stamp_ns, std::vector<SemanticClass> classes);
 
-  /// The next scan, oldest first, when all of it is there or will not come any more.
+  /// The next complete scan, oldest first; also one whose labels are lost.
   [[nodiscard]] std::optional<LiveScan> take();
-  /// The same at the end, when nothing more comes.
+  /// The same at the end of the stream: waits for nothing more.
   [[nodiscard]] std::optional<LiveScan> take_last();
 
-  /// Scans that the server did not map: there is a pose of a later one.
+  /// Scans that the server did not map: a later scan has a pose.
   [[nodiscard]] std::size_t without_pose() const { return without_pose_; }
 
  private:
-  /// Poses of so many later scans say that a scan's labels are lost: they are sent best effort.
+  /// After poses of so many later scans, missing labels count as lost (they are sent best effort).
   static constexpr std::size_t max_label_delay_scans = 10;
-  /// More scans do not wait for a server that is gone.
+  /// Bound of the queue while the server sends nothing.
   static constexpr std::size_t max_waiting = 200;
 
   [[nodiscard]] std::optional<LiveScan> take_if(bool all_arrived);
@@ -62,14 +62,14 @@ struct LiveExportOptions {
   std::string topic;
   /// End after as many scans.
   std::size_t scans = SIZE_MAX;
-  /// End when nothing has come for so long; the first scan may take longer.
-  std::chrono::milliseconds silence{10'000};
+  /// End when no scan has followed the last one for so long. The first scan may take longer.
+  std::chrono::milliseconds idle_timeout{10'000};
 };
 
-/// Writes what a running server gets and makes of it as a SemanticKITTI sequence: the sensor's
-/// scans as they come, the server's poses and, as a first guess, its labels. `config` is the
-/// server's: which points it keeps, how it reads the sensor's fields. Ends with the signal, enough
-/// scans, or silence. `scan_done(scans so far)`. Throws DatasetError.
+/// Writes the input and output of a running server as a SemanticKITTI sequence: the sensor's scans,
+/// the server's poses and, as a first guess, its labels. `config` is the server's: which points it
+/// keeps, how it reads the sensor's fields. Ends with the signal, enough scans, or the idle
+/// timeout. `scan_done(scans so far)`. Throws DatasetError.
 [[nodiscard]] ExportSummary export_live(Client& client, const LiveExportOptions& options,
                                         const ServerConfig& config,
                                         const std::filesystem::path& folder, StopSignal& stop,

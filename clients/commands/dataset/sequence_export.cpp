@@ -45,7 +45,7 @@ class SequenceExporter {
     ExportSummary summary = output_.finish();
     summary.label_source = mapper_.label_source();
     summary.stopped = stopped;
-    if (damaged_ > 0) summary.remarks.push_back({damaged_, "damaged files left out"});
+    if (damaged_ > 0) summary.remarks.push_back({damaged_, "damaged files skipped"});
     if (without_pose_ > 0) {
       summary.remarks.push_back({without_pose_, "scans with the pose of the scan before them"});
     }
@@ -59,7 +59,7 @@ class SequenceExporter {
     } catch (const DatasetError& error) {
       if (strict_) throw;
       ++damaged_;
-      scan_skipped_({index, "unreadable", std::string("left out: ") + error.what()});
+      scan_skipped_({index, "unreadable", std::string("skipped: ") + error.what()});
       return std::nullopt;
     }
   }

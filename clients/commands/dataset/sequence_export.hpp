@@ -14,15 +14,16 @@
 
 namespace stillmap::cli {
 
-/// Makes way for a new sequence. Throws std::invalid_argument when `folder` holds one already and
-/// `force` is not set; with `force`, removes the files of that sequence and nothing else.
+/// Prepares the folder for a new sequence. Throws std::invalid_argument when `folder` holds one
+/// already and `force` is not set; with `force`, removes the files of that sequence and nothing
+/// else.
 void prepare_sequence_folder(const std::filesystem::path& folder, bool force);
 
 /// What an export wrote.
 struct ExportSummary {
   std::size_t scans = 0;
   std::uint64_t points = 0;
-  /// Points that have a label from the recording or the label source.
+  /// Points that have a label from the data set or the label source.
   std::uint64_t labelled_points = 0;
   std::string label_source;
   /// Why scans are not as they should be, with the number of scans.
@@ -58,8 +59,8 @@ class SequenceOutput {
   ExportSummary summary_;
 };
 
-/// Writes a recording as a SemanticKITTI sequence: every point of every scan as it is, poses from
-/// our odometry, and for labels the recording's own where a scan has them, else the guess of
+/// Writes a data set as a SemanticKITTI sequence: every point of every scan unchanged, poses from
+/// our odometry, and for labels the data set's own where a scan has them, else those of
 /// `labels`. `scan_done` as for map_dataset. Throws DatasetError.
 [[nodiscard]] ExportSummary export_sequence(const ScanDataset& dataset, const ScanRange& range,
                                             const MapperConfig& config,

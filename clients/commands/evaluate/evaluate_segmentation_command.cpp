@@ -29,7 +29,7 @@ struct SegmentationResult {
   double p99_ms = 0.0;
 };
 
-/// Labels the scans of a labelled recording and compares with its labels. Scans without labels
+/// Segments the scans of a labelled sequence and compares with its labels. Scans without labels
 /// are left out. Throws DatasetError for a damaged file.
 SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& range,
                                    Segmenter& labels, const ScanDone& scan_done) {
@@ -186,7 +186,7 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
   CommandHandle command = evaluate.command("segmentation", "IoU of every class and their mean");
   command
       .option("--truth", arguments->truth,
-              "A recording with labels, or a folder with true .label files")
+              "A sequence with labels, or a folder with true .label files")
       .required();
   const OptionHandle predictions =
       command.option("--predictions", arguments->predictions,
@@ -197,7 +197,7 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
       .with_default()
       .excludes(predictions);
   command.option("--sensor", arguments->mapper.sensor,
-                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the recording suggests");
+                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the data set suggests");
   add_segmentation_options(command, arguments->mapper);
   command.option("--start", arguments->range.first, "Number of the first scan");
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");

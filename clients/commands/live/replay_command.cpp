@@ -32,8 +32,8 @@
 namespace stillmap::cli {
 namespace {
 
-/// The poses that come back from a server, by stamp. What the odometry topic lost under way comes
-/// from the path. Callbacks may come from any thread.
+/// The poses that a server publishes, by stamp: from the odometry topic, and those that were lost
+/// there from the path. Callbacks may run on any thread.
 class PoseLog {
  public:
   /// Starts listening. The client must outlive the log.
@@ -46,15 +46,15 @@ class PoseLog {
   [[nodiscard]] Trajectory poses_of(const std::vector<std::int64_t>& stamps_ns) const;
 
  private:
-  /// From the odometry topic: a scan that is sent again gets a new pose.
+  /// From the odometry topic: replaces the pose of a scan that is sent again.
   void take(const StampedPose& pose);
-  /// From the path, which may still be that of another time.
+  /// From the path, which may be older: does not replace a pose.
   void add(const StampedPose& pose);
 
   mutable std::mutex mutex_;
   std::condition_variable added_;
   std::map<std::int64_t, Eigen::Isometry3d> T_map_lidar_;
-  // Last: they end before what they write to.
+  // Last members: their callbacks end before the poses are destroyed.
   Subscription odometry_;
   Subscription path_;
 };
@@ -76,7 +76,7 @@ struct ReplayResult {
   bool stopped = false;
 };
 
-/// What the server made of scans since an earlier status.
+/// Scans that the server has mapped and dropped since an earlier status.
 struct ServerCounts {
   std::uint64_t mapped = 0;
   std::uint64_t dropped = 0;
@@ -126,13 +126,13 @@ using Clock = std::chrono::steady_clock;
 constexpr std::chrono::milliseconds publish_step{500};
 constexpr std::chrono::milliseconds status_period{100};
 
-/// When a scan of a recording is due.
+/// When a scan of a sequence is due.
 class ReplayClock {
  public:
   ReplayClock(std::int64_t first_stamp_ns, double rate)
       : first_stamp_ns_(first_stamp_ns), rate_(rate), began_(Clock::now()) {}
 
-  /// Waits for the scan's time; true when told to stop instead.
+  /// Waits until the scan is due; returns true when a signal arrived first.
   [[nodiscard]] bool wait_or_stop(std::int64_t stamp_ns, StopSignal& stop) const {
     if (rate_ <= 0.0) return stop.requested();
     const double due_ns = std::max(0.0, static_cast<double>(stamp_ns - first_stamp_ns_) / rate_);
@@ -156,7 +156,7 @@ std::optional<DatasetFrame> read_scan(const ScanDataset& dataset, std::size_t in
       frame.raw_labels.clear();
       frame.scan.labels.clear();
     }
-    // As the driver of this sensor sends it: the server scales it back.
+    // The unit of this sensor's driver; the server scales it back.
     for (float& value : frame.scan.intensity) value /= dataset.suggested_sensor().intensity_scale;
     return frame;
   } catch (const DatasetError& error) {
@@ -167,7 +167,7 @@ std::optional<DatasetFrame> read_scan(const ScanDataset& dataset, std::size_t in
   }
 }
 
-// In short steps, so that the wait for the server can be interrupted. False when told to stop.
+// In short steps, so that a signal ends the wait for the server. Returns false after a signal.
 bool publish(ScanPublisher& publisher, const DatasetFrame& frame, const ReplayOptions& options,
              StopSignal& stop) {
   const auto began = Clock::now();
@@ -184,8 +184,8 @@ bool publish(ScanPublisher& publisher, const DatasetFrame& frame, const ReplayOp
   return true;
 }
 
-/// Publishes the scans of a recording in their own rhythm. Throws ServiceTimeout when the server
-/// stops taking scans, DatasetError as ScanRange says.
+/// Publishes the scans of a sequence at the times of their stamps. Throws ServiceTimeout when the
+/// server stops taking scans, DatasetError as ScanRange says.
 ReplayResult replay_dataset(const ScanDataset& dataset, const ReplayOptions& options,
                             ScanPublisher& publisher, StopSignal& stop, const ScanDone& scan_done,
                             const ScanSkipped& scan_skipped) {
@@ -276,6 +276,7 @@ void require_lossless(const dds::ServerStatus& status) {
 ReplayOptions replay_options(const Arguments& arguments) {
   ReplayOptions options = arguments.replay;
   options.rate = arguments.rate > 0.0 ? arguments.rate : arguments.lossless ? 0.0 : 1.0;
+  options.idle_timeout = std::max(options.idle_timeout, arguments.client.timeout());
   return options;
 }
 
@@ -289,7 +290,7 @@ ReplayResult publish_with_progress(const ScanDataset& dataset, const Arguments& 
         progress.update(seen);
         return true;
       },
-      [&](const SkippedScan& scan) { progress.say("stillmap: left out: " + scan.reason); });
+      [&](const SkippedScan& scan) { progress.say("stillmap: skipped: " + scan.reason); });
 }
 
 ReplayOutcome replay(const Arguments& arguments, StopSignal& stop) {
@@ -306,14 +307,14 @@ ReplayOutcome replay(const Arguments& arguments, StopSignal& stop) {
   ReplayOutcome outcome;
   outcome.replay = publish_with_progress(dataset, arguments, publisher, stop);
   const std::vector<std::int64_t>& stamps_ns = outcome.replay.published_stamps_ns;
-  // A lossy topic may have lost scans that nobody counts, so there the wait ends sooner.
+  // A lossy topic loses scans that are not counted, so the wait for them is short.
   const auto idle_timeout =
-      arguments.lossless ? arguments.replay.idle_timeout : std::chrono::seconds(2);
+      arguments.lossless ? replay_options(arguments).idle_timeout : std::chrono::seconds(2);
   const dds::ServerStatus after =
       wait_until_mapped(client, before, stamps_ns.size(), idle_timeout, stop);
   outcome.server = counts_since(before, after);
   if (outcome.server.mapped == stamps_ns.size()) {
-    poses.wait_for(stamps_ns, std::chrono::seconds(5));
+    poses.wait_for(stamps_ns, arguments.client.timeout());
   }
   outcome.poses = poses.poses_of(stamps_ns);
   return outcome;
@@ -322,13 +323,13 @@ ReplayOutcome replay(const Arguments& arguments, StopSignal& stop) {
 nlohmann::json to_json(const ReplayOutcome& outcome) {
   return {{"published", outcome.replay.published_stamps_ns.size()},
           {"acknowledged", outcome.replay.acknowledged},
-          {"left_out", outcome.replay.skipped.size()},
+          {"skipped", outcome.replay.skipped.size()},
           {"mapped", outcome.server.mapped},
           {"dropped", outcome.server.dropped},
           {"poses", outcome.poses.size()},
           {"poses_frame", "lidar; the map is the lidar frame of the server's first scan"},
           {"seconds", outcome.replay.seconds},
-          {"stopped", outcome.replay.stopped}};
+          {"interrupted", outcome.replay.stopped}};
 }
 
 std::string describe(const ReplayOutcome& outcome) {
@@ -336,7 +337,7 @@ std::string describe(const ReplayOutcome& outcome) {
   return std::to_string(outcome.replay.published_stamps_ns.size()) + " scans published in " +
          fixed(outcome.replay.seconds, 1) + " s (" + fixed(published / outcome.replay.seconds, 1) +
          "/s), " + (outcome.replay.acknowledged ? "all" : "not all") + " acknowledged, " +
-         std::to_string(outcome.replay.skipped.size()) + " damaged ones left out\n" +
+         std::to_string(outcome.replay.skipped.size()) + " damaged ones skipped\n" +
          "the server mapped " + std::to_string(outcome.server.mapped) + " and dropped " +
          std::to_string(outcome.server.dropped) + "; " + std::to_string(outcome.poses.size()) +
          " poses came back\n";
@@ -358,7 +359,7 @@ ExitCode run(const Arguments& arguments) {
               << outcome.server.mapped << " of " << published << " scans, and "
               << outcome.poses.size()
               << " poses came back; 'stillmap status' counts why. A server takes no scan twice: "
-                 "'stillmap reset' makes it begin anew\n";
+                 "'stillmap reset' makes it start over\n";
     return ExitCode::failed;
   }
   return outcome.replay.stopped ? ExitCode::failed : ExitCode::ok;
@@ -370,7 +371,7 @@ void add_replay_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   ReplayOptions& replay = arguments->replay;
   CommandHandle command =
-      program.command("replay", "Publish a recording on DDS, as a lidar driver would");
+      program.command("replay", "Publish a sequence or bag on DDS, as a lidar driver would");
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic_in, topic_in_help);
   command
@@ -385,7 +386,7 @@ void add_replay_command(CommandHandle program, Action& action) {
   command.option("--start", replay.range.first, "Number of the first scan");
   command.option("--scans,--count", replay.range.count, "Take as many scans at most");
   command.flag("--labels,!--no-labels", replay.with_labels,
-               "Send the recording's labels, where it has any (default)");
+               "Send the labels of the sequence, where it has any (default)");
   command.flag("--strict", replay.range.strict, "Stop at the first damaged file");
   command.option("--topic", arguments->topic, "ROS 2 name of the topic").with_default();
   command
@@ -399,7 +400,7 @@ void add_replay_command(CommandHandle program, Action& action) {
       "Examples:\n"
       "  stillmap replay sequences/00 --rate 2\n"
       "  stillmap replay city --lossless --out poses_lidar.txt\n"
-      "Ends when the server has worked off what was sent, and says what became of it. Exit code 1\n"
+      "Ends when the server has processed what was sent, and prints the counts. Exit code 1\n"
       "when a lossless replay lost something, 3 when no server answers or it stops taking scans.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }

@@ -20,7 +20,8 @@ constexpr std::size_t max_pairs = 10;
 std::string text_of(SemanticClass label) { return std::string(name(label)); }
 
 nlohmann::json to_json(const DifferenceCounts& counts) {
-  return {{"appeared", counts.appeared}, {"gone", counts.gone}, {"relabelled", counts.relabelled}};
+  return {
+      {"appeared", counts.appeared}, {"removed", counts.gone}, {"relabelled", counts.relabelled}};
 }
 
 bool is_there(const ClassDifference& difference) {
@@ -38,7 +39,7 @@ void add_row(Table& table, std::vector<std::string> row, const DifferenceCounts&
 }
 
 std::string class_table(const MapDiff& diff) {
-  Table table({"class", "before", "after", "appeared", "gone", "relabelled"});
+  Table table({"class", "before", "after", "appeared", "removed", "relabelled"});
   std::uint64_t before = 0;
   std::uint64_t after = 0;
   for (std::size_t k = 0; k < semantic_class_count; ++k) {
@@ -73,7 +74,7 @@ std::string tile_table(const MapDiff& diff) {
   std::vector<TileDifference> tiles = diff.tiles;
   std::ranges::stable_sort(tiles, std::greater(),
                            [](const TileDifference& tile) { return tile.counts.sum(); });
-  Table table({"tile", "appeared", "gone", "relabelled"});
+  Table table({"tile", "appeared", "removed", "relabelled"});
   for (std::size_t i = 0; i < std::min(tiles.size(), max_tiles); ++i) {
     add_row(table, {std::to_string(tiles[i].id.x) + ", " + std::to_string(tiles[i].id.y)},
             tiles[i].counts);
@@ -148,12 +149,14 @@ void add_map_diff_command(CommandHandle program, Action& action) {
   command.option("BEFORE", arguments->before, "The earlier map").required();
   command.option("AFTER", arguments->after, "The later map, in the same frame").required();
   command
-      .option("--tolerance", arguments->options.tolerance_voxels,
-              "A voxel is gone, or new, only when the other map has none so many cells away")
+      .option(
+          "--tolerance", arguments->options.tolerance_voxels,
+          "A voxel counts as removed, or new, only when the other map has none so many cells away")
       .between(0, MapDiffOptions::max_tolerance_voxels)
       .with_default();
-  command.option("--picture", arguments->picture,
-                 "Draw it from above, to FILE.png: appeared green, gone red, another class yellow");
+  command.option(
+      "--picture", arguments->picture,
+      "Draw it from above, to FILE.png: appeared green, removed red, another class yellow");
   command.flag("--json", arguments->json, "Print JSON, with all tiles");
   command.explain(
       "Examples:\n"

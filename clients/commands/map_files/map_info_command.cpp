@@ -109,10 +109,10 @@ nlohmann::json to_json(const MapFileInfo& info) {
           {"bytes_per_voxel", bytes_a_voxel(info)},
           {"classes", classes},
           {"bounds_map", bounds_map},
-          {"seen", span_json(map.observation_span)},
+          {"observed_span", span_json(map.observation_span)},
           {"poses", map.poses},
           {"path_length_m", map.path_length_m},
-          {"driven", span_json(map.trajectory_span)},
+          {"trajectory_span", span_json(map.trajectory_span)},
           {"metadata", map.metadata}};
 }
 
@@ -129,12 +129,12 @@ std::string describe(const MapFileInfo& info) {
   if (!map.bounds_map.isEmpty()) text << "bounds    " << bounds_text(map.bounds_map) << "\n";
   text << "path      " << map.poses << " poses, " << fixed(map.path_length_m, 1) << " m\n";
   if (map.poses > 0) {
-    text << "driven    " << utc(map.trajectory_span.first_ns) << " to "
+    text << "recorded  " << utc(map.trajectory_span.first_ns) << " to "
          << utc(map.trajectory_span.last_ns) << " UTC, " << fixed(seconds(map.trajectory_span), 1)
          << " s\n";
   }
   if (map.voxels > 0) {
-    text << "seen      " << utc(map.observation_span.first_ns) << " to "
+    text << "observed  " << utc(map.observation_span.first_ns) << " to "
          << utc(map.observation_span.last_ns) << " UTC\n";
   }
   for (const auto& [key, value] : map.metadata)

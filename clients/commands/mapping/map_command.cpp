@@ -26,13 +26,13 @@
 namespace stillmap::cli {
 namespace {
 
-/// Results of a mapping run, with its errors where the recording brings the truth.
+/// Results of a mapping run, with its errors where the sequence has true poses.
 struct MapOutput {
   std::filesystem::path folder;
   std::optional<TrajectoryReport> accuracy;
 };
 
-// The truth of the scans that were mapped, in the frame of the first of them.
+// True poses of the mapped scans, in the lidar frame of the first of them.
 std::optional<Trajectory> truth_of(const ScanDataset& dataset, const MappingResult& result) {
   std::optional<Trajectory> all = dataset.truth();
   if (!all || result.trajectory.empty()) return std::nullopt;
@@ -151,13 +151,14 @@ std::string describe_stages(const std::vector<StageDurations>& stages) {
   return table.text();
 }
 
+/// Contents of report.json.
 nlohmann::json to_json(const MappingResult& result, const MapOutput& output) {
   nlohmann::json health = nlohmann::json::object();
   for (const auto& [state, count] : result.health) health[name(state)] = count;
   const StageDurations& total = result.stages.back();
   return {{"scans", result.trajectory.size()},
           {"seconds", result.seconds},
-          {"stopped", result.stopped},
+          {"interrupted", result.stopped},
           {"median_ms", total.quantile(0.5)},
           {"p95_ms", total.quantile(0.95)},
           {"p99_ms", total.quantile(0.99)},
@@ -178,11 +179,12 @@ nlohmann::json to_json(const MappingResult& result, const MapOutput& output) {
           {"folder", output.folder.string()}};
 }
 
+/// The same for people, shorter.
 std::string describe(const MappingResult& result, const MapOutput& output) {
   std::string text = describe_stages(result.stages);
   text += std::to_string(result.trajectory.size()) + " scans mapped in " +
           fixed(result.seconds, 1) + " s, " + std::to_string(result.skipped.size()) +
-          " left out; labels: " + result.label_source + "; odometry";
+          " skipped; labels: " + result.label_source + "; odometry";
   for (const auto& [state, count] : result.health) {
     text += std::string(" ") + name(state) + " " + std::to_string(count);
   }
@@ -194,7 +196,8 @@ std::string describe(const MappingResult& result, const MapOutput& output) {
     text += "moving points found: " + fixed(100.0 * *recall, 1) + " %, right ones among them " +
             fixed(100.0 * result.moving.precision().value_or(0.0), 1) + " %\n";
   }
-  if (output.accuracy) text += "against the recording's truth:\n" + describe(*output.accuracy);
+  if (output.accuracy)
+    text += "against the true poses of the sequence:\n" + describe(*output.accuracy);
   text += "written to " + output.folder.string() +
           ": map.stillmap map.ply map.pcd map.png report.json, and poses_lidar.txt, "
           "poses_tum.txt (lidar frame; the map is the lidar frame of the first pose)\n";
@@ -217,12 +220,12 @@ MappingResult map_with_progress(const ScanDataset& dataset, const Arguments& arg
   Progress progress("map", "scans", total);
   std::size_t skipped = 0;
   const auto scan_done = [&](std::size_t seen) {
-    progress.update(seen, skipped == 0 ? "" : std::to_string(skipped) + " left out");
+    progress.update(seen, skipped == 0 ? "" : std::to_string(skipped) + " skipped");
     return !stop.requested();
   };
   const auto scan_skipped = [&](const SkippedScan& scan) {
     ++skipped;
-    progress.say("stillmap: left out: " + scan.reason);
+    progress.say("stillmap: skipped: " + scan.reason);
   };
   return map_dataset(dataset, arguments.range, config, label_source(arguments.mapper, dataset),
                      scan_done, scan_skipped);
@@ -258,8 +261,8 @@ ExitCode run(const Arguments& arguments) {
 
 void add_map_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
-  CommandHandle command =
-      program.command("map", "Map a recording in this process: the server's mapper without DDS");
+  CommandHandle command = program.command(
+      "map", "Map a sequence or bag in this process: the server's mapper without DDS");
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic_in, topic_in_help);
   command.option("--out", arguments->out, "Folder for the results").with_default();
@@ -267,7 +270,7 @@ void add_map_command(CommandHandle program, Action& action) {
   command.option("--start", arguments->range.first, "Number of the first scan");
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
   command.flag("--strict", arguments->range.strict,
-               "Stop at the first damaged file instead of leaving it out");
+               "Stop at the first damaged file instead of skipping it");
   command.flag("--force", arguments->force, "Replace a map that is there already");
   command.flag("--json", arguments->json, "Print report.json instead of the summary");
   command.explain(
@@ -277,8 +280,8 @@ void add_map_command(CommandHandle program, Action& action) {
       "  stillmap map city --weighting none --out plain --json | jq .accuracy\n"
       "Writes map.stillmap (SQLite), map.ply, map.pcd, map.png, poses_lidar.txt (KITTI 3x4, lidar\n"
       "frame), poses_tum.txt (the same with stamps), report.json (timing, memory, accuracy), and\n"
-      "with true poses in the recording trajectory.png and trajectory_error.png. A damaged file\n"
-      "is named and left out; its scan then has no line in poses_lidar.txt.");
+      "with true poses in the sequence trajectory.png and trajectory_error.png. A damaged file\n"
+      "is named and skipped; its scan then has no line in poses_lidar.txt.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -28,7 +28,7 @@ void add_model_options(CommandHandle command, ModelArguments& arguments);
 /// The same without its int8.yaml, which may be faulty then.
 [[nodiscard]] ModelDescription load_uncalibrated_model(const ModelArguments& arguments);
 
-/// Scans of several recordings, evenly chosen.
+/// Scans of several data sets, evenly chosen.
 struct ScanSample {
   const ScanDataset* dataset = nullptr;
   std::size_t index = 0;
@@ -36,7 +36,7 @@ struct ScanSample {
 [[nodiscard]] std::vector<ScanSample> choose_scans(const std::vector<ScanDataset>& datasets,
                                                    std::size_t count);
 
-/// The model's input for the scan, of which `model` is for the recording's sensor.
+/// The model's input for the scan, of which `model` is for the data set's sensor.
 [[nodiscard]] std::vector<float> input_of(const ScanSample& sample, const ModelDescription& model);
 
 }  // namespace stillmap::cli

@@ -204,7 +204,7 @@ ExitCode run(const Arguments& arguments) {
       try {
         time_model(model, scan, arguments, table);
       } catch (const ModelError& error) {
-        std::cerr << "stillmap: left out: " << error.what() << "\n";
+        std::cerr << "stillmap: skipped: " << error.what() << "\n";
       }
     }
   }
@@ -225,7 +225,7 @@ void add_model_speed_command(CommandHandle model, Action& action) {
       .comma_separated()
       .with_default();
   command.option("--dataset", arguments->dataset,
-                 "Recording whose first scan is taken; default: one of 64 x 1900 made-up points");
+                 "Data set whose first scan is taken; default: one of 64 x 1900 made-up points");
   command.option("--threads", arguments->threads, "Threads of oneDNN; default: all")
       .between(0, 1024);
   command.flag("--skip-opencv", arguments->skip_opencv, "Leave the slow reference engine out");

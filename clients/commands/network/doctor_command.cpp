@@ -30,7 +30,7 @@ std::size_t count(const Diagnostics& diagnostics, dds::Severity severity) {
 
 std::string participant_table(const SystemSnapshot& snapshot) {
   if (snapshot.participants.empty()) return {};
-  Table table({"peer", "vendor", "where", "writers", "readers", "security"});
+  Table table({"participant", "vendor", "where", "writers", "readers", "security"});
   for (const dds::RemoteParticipant& participant : snapshot.participants) {
     const auto writers = std::ranges::count(participant.endpoints, true, &dds::Endpoint::is_writer);
     const auto all = static_cast<std::ptrdiff_t>(participant.endpoints.size());
@@ -42,7 +42,7 @@ std::string participant_table(const SystemSnapshot& snapshot) {
 }
 
 std::string endpoint_table(const SystemSnapshot& snapshot) {
-  Table table({"topic", "end", "peer", "quality of service", "type"});
+  Table table({"topic", "kind", "participant", "quality of service", "type"});
   for (const dds::RemoteParticipant& participant : snapshot.participants) {
     for (const dds::Endpoint& endpoint : participant.endpoints) {
       table.add({endpoint.topic, endpoint.is_writer ? "writer" : "reader", participant.name,
@@ -57,7 +57,7 @@ std::string other_domains(const SystemSnapshot& snapshot) {
   for (const OtherDomain& domain : snapshot.other_domains) {
     text += (text.empty() ? "" : ", ") + std::to_string(domain.id);
     if (!domain.participants.empty())
-      text += " (" + counted(domain.participants.size(), "peer") + ")";
+      text += " (" + counted(domain.participants.size(), "participant") + ")";
   }
   return text.empty() ? "" : "other domains in use: " + text + "\n";
 }
@@ -71,7 +71,7 @@ std::string text_of(const dds::Diagnostic& diagnostic) {
 json json_of(const dds::Endpoint& endpoint) {
   return {{"topic", endpoint.topic},
           {"type", endpoint.type},
-          {"end", endpoint.is_writer ? "writer" : "reader"},
+          {"kind", endpoint.is_writer ? "writer" : "reader"},
           {"qos", describe(endpoint.qos)}};
 }
 
@@ -95,14 +95,14 @@ json json_of(const OtherDomain& domain) {
   json participants = json::array();
   for (const dds::RemoteParticipant& participant : domain.participants)
     participants.push_back(json_of(participant));
-  return {{"id", domain.id}, {"senders", domain.senders}, {"peers", participants}};
+  return {{"id", domain.id}, {"senders", domain.senders}, {"participants", participants}};
 }
 
 /// Who is there, and what is wrong: for people. `endpoints`: every reader and writer, too.
 std::string doctor_text(const SystemSnapshot& snapshot, const Diagnostics& diagnostics,
                         bool endpoints) {
   std::string text = "domain " + std::to_string(snapshot.dds.domain_id) + ": " +
-                     counted(snapshot.participants.size(), "peer") + "\n" +
+                     counted(snapshot.participants.size(), "participant") + "\n" +
                      other_domains(snapshot) + "\n";
   text += participant_table(snapshot);
   if (endpoints) text += endpoint_table(snapshot);
@@ -121,12 +121,12 @@ json doctor_json(const SystemSnapshot& snapshot, const Diagnostics& diagnostics)
     list.push_back({{"severity", name(diagnostic.severity)},
                     {"what", diagnostic.what},
                     {"evidence", diagnostic.evidence},
-                    {"way_out", diagnostic.hint}});
+                    {"hint", diagnostic.hint}});
   }
   return {{"domain", snapshot.dds.domain_id},
           {"problems", count(diagnostics, dds::Severity::problem)},
-          {"findings", list},
-          {"peers", participants},
+          {"diagnostics", list},
+          {"participants", participants},
           {"other_domains", domains},
           {"udp_buffer_bytes", snapshot.granted_buffer_bytes}};
 }
@@ -174,7 +174,8 @@ ExitCode run(const Arguments& arguments) {
 
 void add_doctor_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
-  CommandHandle command = program.command("doctor", "Why is nothing happening?");
+  CommandHandle command = program.command(
+      "doctor", "Find out why no data flows: network, quality of service, machine, server");
   add_client_options(command, arguments->client);
   command
       .option("--points", arguments->points,
@@ -192,12 +193,12 @@ void add_doctor_command(CommandHandle program, Action& action) {
                "Remove the shared memory that dead processes left behind");
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
-      "Looks at the domain's peers and their quality of service, at the scans' way, at this\n"
-      "machine, and at other domains.\n"
+      "Checks the domain's participants and their quality of service, the scans on their way to\n"
+      "the server, this machine, and other domains.\n"
       "Examples:\n"
       "  stillmap doctor\n"
       "  stillmap doctor --domain 7 --endpoints\n"
-      "  stillmap doctor --security keys/planner --json | jq .findings\n"
+      "  stillmap doctor --security keys/planner --json | jq .diagnostics\n"
       "Exit codes: 0 no problem (advice at most), 1 problems were found.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }

@@ -25,16 +25,15 @@ struct PlanTask {
   double time_limit_s = 2.0;
 };
 
-/// Plans on states of a map as they come, and remembers the last plan.
+/// Plans on successive snapshots of a map and keeps the last plan.
 class Replanner {
  public:
   explicit Replanner(PlanTask task);
 
-  /// Brings the area to this map and plans. @pre the task has a start, or `robot` is one
+  /// Updates the traversability to this map and plans. @pre the task has a start, or `robot` is one
   const TimedPlan& plan(const MapSnapshot& map, const std::optional<Goal>& robot);
 
-  /// Plans again if the map asks for it: the path is not free any more, or its way changed.
-  /// Whether it did.
+  /// Plans again if the path is blocked now or the route changed. Returns whether it did.
   bool replan_if_needed(const MapSnapshot& map, const std::optional<Goal>& robot);
 
   [[nodiscard]] const TimedPlan& last() const { return last_; }
@@ -65,7 +64,7 @@ class RobotPoseSubscription {
 
   mutable std::mutex mutex_;
   StampedPose newest_;
-  // Last: ends before what it writes to.
+  // Last member: its callbacks end before `newest_` is destroyed.
   Subscription odometry_;
 };
 

@@ -264,7 +264,7 @@ ExitCode run(const Arguments& arguments) {
 void add_octomap_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   CommandHandle command = program.command(
-      "octomap", "Occupied, free and unknown space: questions, and files for octovis");
+      "octomap", "Occupied, free and unknown space: queries, and files for octovis");
   command.option("--output", arguments->output,
                  "Write the octree to FILE.bt (occupied and free) or FILE.ot (probabilities)");
   command.option("--map", arguments->map,
@@ -285,7 +285,7 @@ void add_octomap_command(CommandHandle program, Action& action) {
   command.option("--max-range", arguments->max_range_m, "Length of rays [m], at most 1000")
       .with_default();
   command.flag("--through-unknown", arguments->through_unknown,
-               "Rays go on through unknown space instead of ending there");
+               "Rays continue through unknown space instead of ending there");
   command
       .option("--max-voxels", arguments->max_voxels,
               "Occupied voxels that --json lists for all boxes together")

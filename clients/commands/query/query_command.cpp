@@ -23,7 +23,6 @@ struct Arguments {
   ClientArguments client;
   RegionArguments region;
   std::vector<std::string> classes;
-  std::vector<std::string> motions;
   double resolution_m = 0.0;
   std::uint64_t since_version = not_given;
   /// 0: the server's map of now.
@@ -58,7 +57,6 @@ std::optional<KnownVersion> since_of(const Arguments& arguments, Client& client)
 MapQuery filters_of(const Arguments& arguments) {
   MapQuery query;
   query.classes = classes_of(arguments.classes);
-  query.motions = motions_of(arguments.motions);
   query.resolution_m = arguments.resolution_m;
   return query;
 }
@@ -105,11 +103,6 @@ void add_query_command(CommandHandle program, Action& action) {
   CommandHandle command = program.command("query", "Ask the server for a region of its static map");
   add_region_options(command, arguments->region);
   command.option("--classes", arguments->classes, "Only these: road,building,traffic-sign")
-      .comma_separated();
-  command
-      .option("--motions", arguments->motions,
-              "Only these: stationary,semi-static,highly-dynamic; the static map keeps what is "
-              "stationary, and is asked for that")
       .comma_separated();
   command.option("--resolution", arguments->resolution_m,
                  "Voxel size of the answer [m]; default: the map's own");

@@ -13,7 +13,7 @@
 namespace stillmap::cli {
 namespace {
 
-/// The whole word as a number; also "nan" and "inf", which the region's own check speaks about.
+/// The whole word as a number; also "nan" and "inf", which the region's own check refuses.
 std::optional<double> number(const std::string& word) {
   try {
     std::size_t length = 0;
@@ -191,21 +191,6 @@ std::bitset<semantic_class_count> classes_of(const std::vector<std::string>& nam
     classes.set(static_cast<std::size_t>(*label));
   }
   return classes;
-}
-
-std::bitset<3> motions_of(const std::vector<std::string>& names) {
-  static constexpr std::array kinds{"stationary", "semi-static", "highly-dynamic"};
-  std::bitset<3> motions;
-  for (const std::string& motion : names) {
-    const auto kind = std::ranges::find(kinds, motion);
-    if (kind == kinds.end()) {
-      throw std::invalid_argument("motion '" + motion +
-                                  "' is not known; there are: stationary semi-static "
-                                  "highly-dynamic");
-    }
-    motions.set(static_cast<std::size_t>(kind - kinds.begin()));
-  }
-  return motions;
 }
 
 }  // namespace stillmap::cli

@@ -59,8 +59,4 @@ void check_region(const RegionArguments& region);
 /// The classes of these names. Throws std::invalid_argument listing the known ones.
 [[nodiscard]] std::bitset<semantic_class_count> classes_of(const std::vector<std::string>& names);
 
-/// The kinds of motion of these names, by the values of Motion: stationary, semi-static,
-/// highly-dynamic. Throws std::invalid_argument.
-[[nodiscard]] std::bitset<3> motions_of(const std::vector<std::string>& names);
-
 }  // namespace stillmap::cli

@@ -123,7 +123,7 @@ bool is_fault_free(const fs::path& identity) {
   if (found.faults.empty() && found.warnings.empty()) {
     const dds::Certificate certificate =
         dds::Certificate::read(dds::IdentityFiles(identity).certificate);
-    std::cout << identity.string() << ": well; " << certificate.role() << " '" << certificate.name()
+    std::cout << identity.string() << ": ok; " << certificate.role() << " '" << certificate.name()
               << "', valid until " << dds::to_text(certificate.validity().to) << "\n";
     return true;
   }
@@ -197,7 +197,7 @@ void add_security_init_command(CommandHandle security, Action& action) {
 
 void add_security_add_command(CommandHandle security, Action& action) {
   auto arguments = std::make_shared<AddArguments>();
-  CommandHandle command = security.command("add", "Make another identity, or one anew");
+  CommandHandle command = security.command("add", "Make another identity, or replace one");
   command.option("FOLDER", arguments->folder, "The authority's folder").required();
   command.option("NAME", arguments->name, "Of the identity: a process, a robot, a person")
       .required();
@@ -205,7 +205,7 @@ void add_security_add_command(CommandHandle security, Action& action) {
   command.option("--days", arguments->days, "How long it is valid")
       .between(1, 36500)
       .with_default();
-  command.flag("--replace", arguments->replace, "Make it anew where it exists, with its role");
+  command.flag("--replace", arguments->replace, "Replace an identity that exists, with its role");
   command.explain(
       "Examples:\n"
       "  stillmap security add keys planner_2 --role planner --days 30\n"
@@ -224,7 +224,7 @@ void add_security_check_command(CommandHandle security, Action& action) {
       "  stillmap security check keys\n"
       "  stillmap security check /etc/stillmap/server\n"
       "Expired or mixed files, keys that others can read, permissions of somebody else.\n"
-      "Exit codes: 0 well, 1 something was found.");
+      "Exit codes: 0 no fault, 1 something was found.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

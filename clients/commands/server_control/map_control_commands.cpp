@@ -42,9 +42,8 @@ ExitCode run(const LoadArguments& arguments) {
                      .dump(2)
               << "\n";
   } else {
-    std::cout << "going on in " << loaded.file << " (on the server's machine): map "
-              << loaded.map_id << ", " << loaded.tile_count << " tiles, " << loaded.pose_count
-              << " poses\n";
+    std::cout << "resumed " << loaded.file << " (on the server's machine): map " << loaded.map_id
+              << ", " << loaded.tile_count << " tiles, " << loaded.pose_count << " poses\n";
   }
   return ExitCode::ok;
 }
@@ -83,7 +82,7 @@ void add_save_command(CommandHandle program, Action& action) {
 void add_load_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<LoadArguments>();
   CommandHandle command =
-      program.command("load", "Have the server save its map and go on with another one");
+      program.command("load", "Have the server save its map and resume another one");
   command
       .option("FILE", arguments->file,
               "Plain name of a map file beside the server's configured one")
@@ -97,7 +96,7 @@ void add_load_command(CommandHandle program, Action& action) {
       "The running map is saved to its own file first. From then on the server maps in FILE and\n"
       "saves to it, under a new map id; the next scan is expected where FILE's path ends, so the\n"
       "robot must stand there. A file that is missing, damaged, written by a newer version or of\n"
-      "another voxel size is refused, and the running map goes on. A server that starts again\n"
+      "another voxel size is refused, and the running map stays. A server that starts again\n"
       "begins with its configured file.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }

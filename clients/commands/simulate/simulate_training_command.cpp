@@ -33,7 +33,7 @@ struct TrainingSetPlan {
   int cities = 200;
   std::uint64_t first_seed = 1000;
   int scans_per_city = 8;
-  /// Of the drives, as `training_sequence` has it.
+  /// Share of sequences in plain cities, see simulation::training_sequence.
   double share_of_plain = 0.4;
 };
 
@@ -56,17 +56,17 @@ TrainingSetCount write_city(const fs::path& sequence, std::uint64_t seed,
                             const TrainingSetPlan& plan) {
   const fs::path unfinished = fs::path(sequence).concat(".unfinished");
   fs::remove_all(unfinished);
-  const simulation::Simulation drive(simulation::training_sequence(seed, plan.share_of_plain));
+  const simulation::Simulation simulated(simulation::training_sequence(seed, plan.share_of_plain));
   KittiSequenceWriter writer(unfinished);
   TrainingSetCount count{.cities = 1};
-  for (const int index : simulation::spread_scans(drive, plan.scans_per_city)) {
-    const simulation::SimulatedScan scan = drive.scan(index);
+  for (const int index : simulation::spread_scans(simulated, plan.scans_per_city)) {
+    const simulation::SimulatedScan scan = simulated.scan(index);
     writer.add(scan.scan, scan.raw_labels, scan.T_map_lidar);
     count.scans += 1;
     count.points += scan.scan.size();
   }
   writer.finish();
-  save_sensor(drive.config().sensor, unfinished / "sensor.yaml");
+  save_sensor(simulated.config().sensor, unfinished / "sensor.yaml");
   fs::rename(unfinished, sequence);
   return count;
 }
@@ -164,17 +164,17 @@ void add_simulate_training_command(CommandHandle program, Action& action) {
       .with_default();
   command
       .option("--plain-share", arguments->plan.share_of_plain,
-              "Share of drives through the cities of `stillmap simulate` instead, 0..1")
+              "Share of cities as `stillmap simulate` makes them, 0..1")
       .with_default();
   command.option("--jobs", arguments->jobs, "Threads").above_zero().with_default();
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
-      "Every city draws its streets, plants, houses, traffic, materials and its lidar anew, "
+      "Every city draws its streets, plants, houses, traffic, materials and its lidar at random, "
       "harder\n"
       "than life: 60 % HDL-64E, 20 % VLP-16, 10 % HDL-32E, 10 % sensors that nobody builds, all\n"
       "with the flaws that real ones have. sequences/SEED/sensor.yaml tells the lidar's rings and\n"
       "field of view. The same seed gives the same files.\n"
-      "A run that was stopped goes on where it was: complete cities are left as they are.\n"
+      "A run that was stopped can be repeated: complete cities are skipped.\n"
       "Examples:\n"
       "  stillmap simulate-training train --cities 1000\n"
       "  stillmap simulate-training validation --cities 40 --first-seed 900000");
