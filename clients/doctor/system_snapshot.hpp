@@ -55,10 +55,4 @@ struct SystemSnapshot {
   std::uint32_t granted_buffer_bytes = 0;
 };
 
-/// The server of the name asked for that answered; nothing when none did.
-[[nodiscard]] const DiscoveredServer* answering_server(const SystemSnapshot& snapshot);
-
-/// The sensor's topic as DDS names it: the name that the server reports, else the configured one.
-[[nodiscard]] std::string points_topic_of(const SystemSnapshot& snapshot);
-
 }  // namespace stillmap::cli

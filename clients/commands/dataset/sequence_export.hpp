@@ -19,14 +19,14 @@ namespace stillmap::cli {
 /// else.
 void prepare_sequence_folder(const std::filesystem::path& folder, bool force);
 
-/// What an export wrote.
+/// Counts of an export.
 struct ExportSummary {
   std::size_t scans = 0;
   std::uint64_t points = 0;
   /// Points that have a label from the data set or the label source.
   std::uint64_t labelled_points = 0;
   std::string label_source;
-  /// Why scans are not as they should be, with the number of scans.
+  /// A fault of some scans, and their number.
   struct Remark {
     std::size_t scans = 0;
     std::string text;

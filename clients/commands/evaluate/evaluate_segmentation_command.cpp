@@ -30,7 +30,7 @@ struct SegmentationResult {
 };
 
 /// Segments the scans of a labelled sequence and compares with its labels. Scans without labels
-/// are left out. Throws DatasetError for a damaged file.
+/// are skipped. Throws DatasetError for a damaged file.
 SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& range,
                                    Segmenter& labels, const ScanDone& scan_done) {
   SegmentationResult result;
@@ -79,7 +79,7 @@ nlohmann::json to_json(const evaluation::ConfusionMatrix& matrix) {
           {"iou_of_groups", by_group}};
 }
 
-/// IoU of every class and of the coarse groups, for people and for programs.
+/// IoU of every class and of the coarse groups.
 std::string describe(const evaluation::ConfusionMatrix& matrix) {
   Table classes({"class", "IoU %"});
   for (std::size_t k = 1; k < semantic_class_count; ++k) {

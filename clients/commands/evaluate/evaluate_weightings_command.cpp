@@ -27,14 +27,14 @@
 namespace stillmap::cli {
 namespace {
 
-/// Scans with true poses, from disk or simulated on the way.
+/// Scans with true poses, from disk or simulated on demand.
 struct GroundTruthSequence {
   std::string name;
   std::size_t scans = 0;
   MapperConfig config;
   bool labelled = false;
   std::function<DatasetFrame(std::size_t)> read;
-  /// Lidar frame, one a scan.
+  /// Poses of the lidar, one per scan.
   std::vector<Eigen::Isometry3d> truth;
 };
 

@@ -32,7 +32,7 @@ struct RecorderOptions {
   /// The sensor's topic, and that of its odometry.
   std::string points_topic = "points";
   std::string odometry_topic = "odom_prior";
-  /// ROS 2 names to record; empty: all that can be.
+  /// ROS 2 names to record; empty: all topics of the sensor and the server.
   std::vector<std::string> topics;
   /// New folder of the bag.
   std::filesystem::path folder;
@@ -41,10 +41,10 @@ struct RecorderOptions {
 struct RecordedTopic {
   std::string name;
   std::uint64_t messages = 0;
-  /// Left out between two that came, as the writers number them. On topics of which only the newest
-  /// counts (latched ones), those that were replaced before they came are not lost.
+  /// Gaps in the sequence numbers of the writers. Not counted on latched topics (transient local),
+  /// where newer samples may replace older ones.
   std::uint64_t lost = 0;
-  /// Publishers that are there now.
+  /// Publishers matched now.
   int publishers = 0;
 };
 
@@ -53,7 +53,7 @@ using eprosima::fastdds::dds::SampleInfo;
 using eprosima::fastdds::dds::TypeSupport;
 using eprosima::fastrtps::rtps::GUID_t;
 
-/// Samples that may wait while the disk is busy, and of each key on a keyed topic.
+/// Reader depth, for when the disk is busy; on a keyed topic for each key.
 constexpr int max_waiting = 20;
 constexpr int max_waiting_per_key = 4;
 
@@ -124,13 +124,13 @@ dds::TopicQos reader_qos_for(const RecordableTopic& topic, bool as_offered) {
   dds::TopicQos qos = topic.offered;
   qos.keep_all = false;
   qos.depth = qos.max_keys > 1 ? max_waiting_per_key : max_waiting;
-  // Publishers that promise less are recorded too, with what they promise.
+  // Publishers that offer less are recorded too, with the weakest request.
   qos.reliable = as_offered;
   qos.transient_local = as_offered && qos.transient_local;
   return qos;
 }
 
-/// Finds gaps in the numbers that writers give to their samples.
+/// Counts gaps in the sequence numbers of each writer.
 class LossCounter {
  public:
   void add(const GUID_t& writer, std::uint64_t number) {
@@ -159,7 +159,7 @@ class Input {
     listen(true);
   }
 
-  /// Asks for what any publisher gives, once one gives less than was asked for.
+  /// Requests the weakest QoS once a publisher offers less than the request.
   void relax_qos() {
     if (!as_offered_ || reader_->events().incompatible_writers() == 0) return;
     reader_.reset();
@@ -192,9 +192,9 @@ class Input {
   LossCounter losses_;
 };
 
-/// Takes samples from DDS as they are, undecoded, and writes them to a rosbag2. What waits to be
-/// taken is bounded by the depth of the readers: a caller that writes too rarely loses samples, and
-/// they are counted. Not thread safe.
+/// Writes serialized samples from DDS to a rosbag2 without decoding them. Samples wait in the
+/// readers, whose depth is bounded: a caller that writes too rarely loses samples, which are
+/// counted. Not thread safe.
 class Recorder {
  public:
   /// Joins the domain and makes the bag. Throws DdsError, DatasetError for a folder that exists
@@ -251,7 +251,7 @@ class Recorder {
 };
 
 constexpr std::chrono::milliseconds poll_period{5};
-/// A run that is killed loses no more than this.
+/// A killed run loses no more than this.
 constexpr std::chrono::seconds commit_period{1};
 constexpr double bytes_a_mib = 1048576.0;
 
@@ -354,9 +354,9 @@ void add_record_command(CommandHandle program, Action& action) {
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"
-      "  stillmap record drive\n"
-      "  stillmap record drive --for 60 --topics points stillmap/odometry tf\n"
-      "  stillmap replay drive --topic-in points\n"
+      "  stillmap record tour\n"
+      "  stillmap record tour --for 60 --topics points stillmap/odometry tf\n"
+      "  stillmap replay tour --topic-in points\n"
       "Writes what DDS carried, byte for byte, as ROS 2 Humble's rosbag2 in SQLite storage:\n"
       "'ros2 bag info' and 'ros2 bag play' read it. A run that is killed keeps what it had a\n"
       "second before. Samples that were lost on the way or for a slow disk are counted.");

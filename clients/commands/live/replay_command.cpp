@@ -42,7 +42,7 @@ class PoseLog {
   /// Waits until every one of these scans has its pose, or `timeout` has passed.
   void wait_for(const std::vector<std::int64_t>& stamps_ns, std::chrono::milliseconds timeout);
 
-  /// The poses of these scans, in their order; scans without a pose are left out.
+  /// The poses of these scans, in their order, without those that have none.
   [[nodiscard]] Trajectory poses_of(const std::vector<std::int64_t>& stamps_ns) const;
 
  private:
@@ -64,7 +64,7 @@ struct ReplayOptions {
   /// Times real time; 0: as fast as the server takes scans.
   double rate = 1.0;
   bool with_labels = true;
-  /// How long a publisher that must not lose anything waits for the server to take a scan.
+  /// Longest wait of a lossless publisher for the server to take a scan.
   std::chrono::milliseconds idle_timeout{30'000};
 };
 
@@ -212,8 +212,8 @@ ServerCounts counts_since(const dds::ServerStatus& before, const dds::ServerStat
           .dropped = now.dropped() - before.dropped()};
 }
 
-/// Asks until the server has mapped or dropped `scans` of them since `before`, or nothing has
-/// changed for `idle_timeout`. Returns the last status.
+/// Polls the status until the server has mapped or dropped `scans` of them since `before`, or
+/// nothing has changed for `idle_timeout`. Returns the last status.
 dds::ServerStatus wait_until_mapped(Client& client, const dds::ServerStatus& before,
                                     std::uint64_t scans, std::chrono::milliseconds idle_timeout,
                                     StopSignal& stop) {
@@ -376,7 +376,7 @@ void add_replay_command(CommandHandle program, Action& action) {
   command.option("--topic-in", arguments->topic_in, topic_in_help);
   command
       .option("--rate", arguments->rate,
-              "Times real time; default 1, with --lossless as fast as the server takes them")
+              "Times real time; default 1, with --lossless as fast as the server maps")
       .above_zero();
   command.flag("--lossless", arguments->lossless,
                "Wait for the server instead of letting it drop scans (its input delivery "

@@ -87,7 +87,7 @@ std::string tile_table(const MapDiff& diff) {
   return text;
 }
 
-/// Everything but the single voxels.
+/// Counts by class and tile.
 nlohmann::json to_json(const MapDiff& diff) {
   nlohmann::json classes = nlohmann::json::object();
   for (std::size_t k = 0; k < semantic_class_count; ++k) {
@@ -117,7 +117,7 @@ nlohmann::json to_json(const MapDiff& diff) {
   return json;
 }
 
-/// The same for people: of the tiles those with most changes.
+/// The same as text, with the most changed tiles only.
 std::string describe(const MapDiff& diff) {
   if (diff.counts.sum() == 0) return "nothing changed\n";
   return class_table(diff) + relabelled_lines(diff) + "\n" + tile_table(diff);

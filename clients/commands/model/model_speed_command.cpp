@@ -82,7 +82,7 @@ double median_ms(const std::function<void()>& work) {
   return *middle;
 }
 
-/// What the machine reaches now in a large matrix product [10^9 operations a second].
+/// Speed of a large matrix product on this machine [10^9 operations a second].
 double peak_gops(Precision precision, int threads) {
   constexpr int runs = 8;
   MatrixProduct product(precision, threads);
@@ -91,7 +91,7 @@ double peak_gops(Precision precision, int threads) {
   return MatrixProduct::giga_operations() / fastest_ms * 1e3;
 }
 
-/// Resident memory of this process [MB], what was freed given back first.
+/// Resident memory of this process [MB], after freed memory was returned to the system.
 double resident_mb() {
   malloc_trim(0);
   std::ifstream status("/proc/self/status");
@@ -124,7 +124,7 @@ std::vector<TimedEngine> timed_engines(const ModelDescription& model, const Scan
           {"oneDNN int8", Precision::int8, onednn(calibrated, Precision::int8)}};
 }
 
-/// `giga_operations`: of the network for one scan.
+/// `giga_operations`: operations of the network for one scan.
 SegmentationTiming time_segmentation(const ModelDescription& model, const TimedEngine& engine,
                                      const Scan& scan, double giga_operations, int threads) {
   SegmentationTiming timing;

@@ -98,7 +98,7 @@ json json_of(const OtherDomain& domain) {
   return {{"id", domain.id}, {"senders", domain.senders}, {"participants", participants}};
 }
 
-/// Who is there, and what is wrong: for people. `endpoints`: every reader and writer, too.
+/// Participants and diagnostics as text. `endpoints`: with every reader and writer.
 std::string doctor_text(const SystemSnapshot& snapshot, const Diagnostics& diagnostics,
                         bool endpoints) {
   std::string text = "domain " + std::to_string(snapshot.dds.domain_id) + ": " +
@@ -142,7 +142,7 @@ struct Arguments {
 };
 
 DoctorOptions options_of(const Arguments& arguments) {
-  // As a sensor: shared memory is looked at, too.
+  // In the role of a sensor, which uses shared memory, so that this is checked, too.
   return {.dds = arguments.client.dds(DdsRole::sensor),
           .server_name = arguments.client.server_name,
           .points_topic = arguments.points,

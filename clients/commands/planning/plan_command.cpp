@@ -142,7 +142,7 @@ ExitCode plan_on_file(const Arguments& arguments) {
   return code_of(replanner.last());
 }
 
-/// Plans again whenever the map asks for it, until the limits are reached.
+/// Plans again whenever the map requires it, until a limit is reached.
 void follow(const Arguments& arguments, Replanner& replanner, const TileMirror& mirror,
             std::shared_ptr<const MapSnapshot> map,
             const std::optional<RobotPoseSubscription>& robot, StopSignal& stop) {

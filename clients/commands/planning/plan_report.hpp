@@ -17,7 +17,7 @@ struct TimedPlan {
   double plan_ms = 0.0;
   /// Until the search had its first path [ms]; only of planners that report it.
   std::optional<double> first_ms;
-  /// Why it was made, when it replaces another one.
+  /// Why it replaces the previous plan; empty for the first one.
   std::string cause;
 };
 
@@ -27,7 +27,7 @@ struct TimedPlan {
 /// For people, with the poses of the path some metres apart.
 [[nodiscard]] std::string describe(const TimedPlan& timed);
 
-/// One line, for a plan among many.
+/// One line, for --follow.
 [[nodiscard]] std::string one_line(const TimedPlan& timed);
 
 /// Writes the path: all of it to FILE.json, or one pose a line to FILE.csv. Throws

@@ -14,7 +14,7 @@
 
 namespace stillmap::cli {
 
-/// What a planning client wants.
+/// A planning request.
 struct PlanTask {
   RobotProfile profile;
   /// Without one, the robot's newest pose.
@@ -51,7 +51,7 @@ class Replanner {
   std::optional<PathMonitor> watch_;
 };
 
-/// Where the robot of a server is, from its path so far and then from its odometry.
+/// Newest pose of the robot: the end of the published path, then the odometry.
 class RobotPoseSubscription {
  public:
   /// Waits for a pose; throws ServiceTimeout when there is none in time.

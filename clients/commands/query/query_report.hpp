@@ -9,11 +9,11 @@
 
 namespace stillmap::cli {
 
-/// What became of a query of the command line.
+/// A query and its result.
 struct QueryAnswer {
   MapQuery query;
   MapQueryResult result;
-  /// Of every time it was asked, all pages together.
+  /// Of every repetition, all pages together.
   StageDurations times;
 };
 
@@ -27,7 +27,7 @@ struct QueryAnswer {
 /// Whether write_cloud takes a file of this name.
 [[nodiscard]] bool is_cloud_file(const std::string& file);
 
-/// Writes a point for every voxel, with its class and colour, as the name ends: .pcd or .ply.
+/// Writes a point for every voxel, with its class and colour, to a .pcd or .ply file.
 /// Throws DatasetError.
 void write_cloud(const std::string& file, const std::vector<QueryVoxel>& voxels);
 

@@ -25,7 +25,7 @@ std::optional<double> number(const std::string& word) {
   return std::nullopt;
 }
 
-/// The position that a line of a file names; nothing for an empty line.
+/// The position in a line of a file; nothing for an empty line.
 std::optional<Eigen::Vector2d> point_in_line(std::string line, const std::string& where) {
   line.resize(std::min(line.find('#'), line.size()));
   std::ranges::replace(line, ',', ' ');
@@ -96,7 +96,7 @@ Region chosen_region(const RegionArguments& region, const Eigen::Vector2d& robot
   return everything;
 }
 
-/// The options that name heights themselves.
+/// The options whose values include heights.
 struct Kinds {
   OptionHandle box;
   OptionHandle sphere;

@@ -26,7 +26,7 @@ struct Arguments {
   bool json = false;
 };
 
-/// What was found, and the map that it was removed from.
+/// The removed voxels, and the map that they were removed from.
 struct RemovedResult {
   std::vector<RemovedVoxel> voxels;
   std::uint64_t total = 0;

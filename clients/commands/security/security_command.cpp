@@ -20,8 +20,8 @@ std::filesystem::path file_in(const std::filesystem::path& authority_folder) {
   return authority_folder / "authority" / "topics.json";
 }
 
-/// The names that an authority's permissions are made for, kept beside its key so that a later
-/// identity fits the first ones. Throws SecurityError when the file cannot be written.
+/// Saves the topic names of an authority's permissions beside its key, so that later identities get
+/// the same ones. Throws SecurityError when the file cannot be written.
 void save_topic_names(const dds::TopicNames& names, const std::filesystem::path& authority_folder) {
   const std::filesystem::path file = file_in(authority_folder);
   std::ofstream out(file);

@@ -27,7 +27,7 @@
 namespace stillmap::cli {
 namespace {
 
-/// Which made-up cities a training set has.
+/// The simulated cities of a training set.
 struct TrainingSetPlan {
   std::filesystem::path folder;
   int cities = 200;
@@ -51,7 +51,7 @@ std::string sequence_name(std::uint64_t seed) {
   return std::string(digits.size() < 4 ? 4 - digits.size() : 0, '0').append(digits);
 }
 
-// One city, written aside and then put in its place.
+// Written under another name and renamed when complete.
 TrainingSetCount write_city(const fs::path& sequence, std::uint64_t seed,
                             const TrainingSetPlan& plan) {
   const fs::path unfinished = fs::path(sequence).concat(".unfinished");
@@ -150,7 +150,7 @@ void add_simulate_training_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   CommandHandle command = program.command(
       "simulate-training",
-      "Make a training set for segmentation: labelled scans of many made-up cities");
+      "Make a training set for segmentation: labelled scans of many simulated cities");
   command.option("OUT", arguments->out, "Folder; gets sequences/SEED").required();
   command.option("--cities", arguments->plan.cities, "How many").above_zero().with_default();
   command

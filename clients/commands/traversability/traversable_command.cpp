@@ -20,12 +20,12 @@
 namespace stillmap::cli {
 namespace {
 
-/// What there is to say of an area.
+/// Summary of the traversability of a region.
 struct TraversabilityReport {
   TraversabilitySummary summary;
-  /// Of a map file, whose area is computed from scratch.
-  std::optional<TraversabilityUpdate> work;
-  /// From the question to the answer.
+  /// Cost of the computation for a map file.
+  std::optional<TraversabilityUpdate> update;
+  /// From opening the source to the answer.
   double milliseconds = 0.0;
 };
 
@@ -74,10 +74,11 @@ double square_metres(const TraversabilityView& view, std::uint64_t cells) {
 }
 
 double ms_per_tile(const TraversabilityReport& report) {
-  return report.milliseconds / static_cast<double>(std::max<std::size_t>(1, report.work->surfaces));
+  return report.milliseconds /
+         static_cast<double>(std::max<std::size_t>(1, report.update->surfaces));
 }
 
-/// `view` is of the answer.
+/// @pre `view` was made from the answer that the report is about
 nlohmann::json to_json(const TraversabilityView& view, const TraversabilityReport& report) {
   nlohmann::json lethal = nlohmann::json::object();
   for (std::size_t i = 0; i < block_reason_count; ++i) {
@@ -94,8 +95,8 @@ nlohmann::json to_json(const TraversabilityView& view, const TraversabilityRepor
                          {"unknown_m2", square_metres(view, report.summary.unknown)},
                          {"lethal_m2", lethal},
                          {"ms", report.milliseconds}};
-  if (report.work) {
-    json["tiles"] = report.work->map_tiles;
+  if (report.update) {
+    json["tiles"] = report.update->map_tiles;
     json["ms_per_tile"] = ms_per_tile(report);
   }
   return json;
@@ -112,13 +113,13 @@ std::string describe(const TraversabilityView& view, const TraversabilityReport&
                area(report.summary.lethal.at(i))});
   }
   table.add({"unknown", area(report.summary.unknown)});
-  std::string work;
-  if (report.work) {
-    work.append(" (").append(std::to_string(report.work->map_tiles)).append(" tiles, ");
-    work.append(fixed(ms_per_tile(report), 1)).append(" ms each)");
+  std::string update;
+  if (report.update) {
+    update.append(" (").append(std::to_string(report.update->map_tiles)).append(" tiles, ");
+    update.append(fixed(ms_per_tile(report), 1)).append(" ms each)");
   }
   return table.text() + "map version " + std::to_string(view.version) + ", cells of " +
-         fixed(view.cell_m, 2) + " m, in " + fixed(report.milliseconds, 0) + " ms" + work + "\n";
+         fixed(view.cell_m, 2) + " m, in " + fixed(report.milliseconds, 0) + " ms" + update + "\n";
 }
 
 struct Arguments {
@@ -157,7 +158,7 @@ ExitCode run(const Arguments& arguments) {
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
   const TraversabilityView view = view_of_answer(answer, source->robot());
   const TraversabilityReport report{
-      .summary = summarize(answer), .work = source->update_stats(), .milliseconds = took.count()};
+      .summary = summarize(answer), .update = source->update_stats(), .milliseconds = took.count()};
   if (!arguments.out.empty()) write_nav2_map(arguments.out, answer.grid);
   if (!arguments.outlines.empty()) {
     write_outlines(arguments.outlines, answer, view.profile.name);
