@@ -149,6 +149,8 @@ TEST_F(DatasetCommandTest, NamesWhatItCannotUse) {
     return result.err;
   };
   EXPECT_THAT(refusal("export " + path("nowhere") + " " + path("out")), HasSubstr("nowhere"));
+  EXPECT_THAT(refusal("export topic:points " + path("out") + " --silence 3"),
+              HasSubstr("--idle-timeout"));
   EXPECT_THAT(refusal("aggregate " + path("city") + " " + path("c.ply") + " --from 7"),
               HasSubstr("from 7"));
   write("foreign.ply",
@@ -174,7 +176,7 @@ TEST_F(DatasetCommandTest, ALiveTopicBecomesASequence) {
   ASSERT_EQ(exporting.wait(), 0) << content("export.log");
   const std::vector<std::string> live_times = lines("live/times.txt");
   const std::vector<std::string> city_times = lines("city/times.txt");
-  // The first scans may be gone before all three have found one another.
+  // The first scans may be lost before discovery is complete.
   ASSERT_GE(live_times.size(), 6U) << content("export.log");
   for (std::size_t k = 0; k < live_times.size(); ++k) {
     const auto found = std::ranges::find(city_times, live_times[k]);
@@ -186,7 +188,7 @@ TEST_F(DatasetCommandTest, ALiveTopicBecomesASequence) {
               content("city/labels/" + stem(number) + ".label").size());
   }
   EXPECT_EQ(line_count("live/poses.txt"), live_times.size());
-  // What the server took from the stream comes back as its labels.
+  // The labels of the stream return as those of the server.
   const std::string log = content("export.log");
   EXPECT_GT(nlohmann::json::parse(log.substr(log.find("\n{"))).at("labelled_points"), 10'000);
 }
