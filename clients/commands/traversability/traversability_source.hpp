@@ -6,10 +6,10 @@
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/query/region_arguments.hpp"
 #include "core/map/storage/map_file.hpp"
-#include "core/traversability/traversability_view.hpp"
 #include "core/traversability/path_check.hpp"
 #include "core/traversability/traversability_map.hpp"
 #include "core/traversability/traversability_query.hpp"
+#include "core/traversability/traversability_view.hpp"
 
 namespace stillmap::cli {
 
