@@ -1,13 +1,13 @@
 #!/usr/bin/env bash
-# The main job, end to end, in processes of their own that only share DDS: a replay publishes the
-# lidar scans of a simulated city, stillmap-server segments and maps them, a planning client keeps
-# the map's traversable area and a path from the robot back to its start, others follow the poses
-# and ask for regions of the map. Then all of it is checked against the truth; how well the first
-# scans were segmented, too.
+# The whole product in separate processes that only share DDS: a replay publishes the lidar scans of
+# a simulated city, stillmap-server segments and maps them, a planning client keeps the traversable
+# area of the map and a path from the robot back to its start, others follow the poses and query
+# regions of the map. Then poses, map and segmentation are compared with the truth.
+# Every wait is for a condition. Its limit is long, so that the demo also passes on a busy machine.
 #
 # BUILD                build folder (build/release)
-# STILLMAP_DEMO_DIR    where recording and results go (./demo)
-# STILLMAP_DEMO_SCANS  length of the drive (300)
+# STILLMAP_DEMO_DIR    where sequence and results go (./demo)
+# STILLMAP_DEMO_SCANS  length of the sequence (300)
 set -euo pipefail
 
 bin=${BUILD:-build/release}/bin
@@ -18,6 +18,8 @@ city=$demo/city_$scans
 out=$demo/result
 query_size_m=50
 max_ate_m=1.0
+patience_s=300
+patience=(--timeout "$patience_s")
 children=()
 
 fail() {
@@ -32,6 +34,16 @@ stop_children() {
 }
 trap stop_children EXIT
 trap 'exit 130' INT TERM
+
+# wait_until WHAT COMMAND...: until the command succeeds; gives up after patience_s.
+wait_until() {
+  local what=$1 end=$((SECONDS + patience_s))
+  shift
+  until "$@"; do
+    [ "$SECONDS" -lt "$end" ] || fail "waited $patience_s s for $what"
+    sleep 0.5
+  done
+}
 
 # A domain whose discovery port (7400 + 250 * domain) nobody on this machine has open.
 free_domain() {
@@ -71,22 +83,27 @@ start_server() {
     --map-file "$out/map.stillmap" > "$out/server.log" 2>&1 &
   server=$!
   children+=("$server")
-  "$bin/stillmap" status --domain "$domain" --timeout 30 > /dev/null || fail "the server does not answer"
+  wait_until "an answer of the server" server_answers
 }
 
-# Plans the way home in one process, anew whenever the map asks for it; follows the poses in a second
-# one, and asks for the robot's surroundings in others, again and again.
+server_answers() {
+  kill -0 "$server" 2>/dev/null || fail "the server ended too early"
+  "$bin/stillmap" status --domain "$domain" --timeout 10 > /dev/null 2>&1
+}
+
+# One process plans the path home and plans again when the map requires it, a second one follows the
+# poses, and a loop queries the surroundings of the robot.
 start_clients() {
-  "$bin/stillmap" plan --domain "$domain" --to 0,0 --profile car --follow --json --timeout 60 \
+  "$bin/stillmap" plan --domain "$domain" --to 0,0 --profile car --follow --json --time-limit 30 "${patience[@]}" \
     --output "$out/path.json" --picture "$out/path.png" > "$out/plan.jsonl" 2> "$out/plan.log" &
   planner=$!
   children+=("$planner")
-  "$bin/stillmap" watch --domain "$domain" --json --out "$out/watched.tum" \
+  "$bin/stillmap" watch --domain "$domain" --json "${patience[@]}" --out "$out/watched.tum" \
     > "$out/watch.jsonl" 2> "$out/watch.log" &
   watch=$!
   children+=("$watch")
   while [ ! -e "$out/replayed" ]; do
-    "$bin/stillmap" query --domain "$domain" --around-robot "$query_size_m" --json \
+    "$bin/stillmap" query --domain "$domain" --around-robot "$query_size_m" --json --timeout 60 \
       >> "$out/queries_while_mapping.json" 2>> "$out/queries.log" || true
     sleep 1
   done &
@@ -94,9 +111,16 @@ start_clients() {
   children+=("$asker")
 }
 
+# The newest plan is a path. The planner may still be working through the last changes of the map.
+has_path_home() {
+  kill -0 "$planner" 2>/dev/null || fail "the planning client ended too early: $(cat "$out/plan.log")"
+  tail -n 1 "$out/plan.jsonl" | grep -q '"status":"found"'
+}
+
 stop_clients() {
   touch "$out/replayed"
   wait "$asker"
+  wait_until "a path home" has_path_home
   kill "$watch" || fail "the client that follows ended too early: $(cat "$out/watch.log")"
   wait "$watch" || fail "the client that follows ended with an error: $(cat "$out/watch.log")"
   kill "$planner" || fail "the planning client ended too early: $(cat "$out/plan.log")"
@@ -118,8 +142,8 @@ check() {
   [ "$dropped" = 0 ] || fail "$dropped scans were dropped"
   watched=$(grep -vc '^#' "$out/watched.tum" || true)
   [ "$watched" -ge $((scans / 2)) ] || fail "the client that follows got $watched of $scans poses"
-  grep -q '"road"' "$out/queries_while_mapping.json" || fail "no query saw a road while mapping went on"
-  grep -q '"road"' "$out/query.json" || fail "the last query saw no road"
+  grep -q '"road"' "$out/queries_while_mapping.json" || fail "no query returned a road while the server was mapping"
+  grep -q '"road"' "$out/query.json" || fail "the last query returned no road"
   is_below "$(value "$out/accuracy.json" ate_rmse_m)" "$max_ate_m" ||
     fail "pose error (ATE) is $(value "$out/accuracy.json" ate_rmse_m) m, wanted is below $max_ate_m m"
   for file in map.stillmap query.ply segmentation.png map.png path.json path.png trajectory.png trajectory_error.png; do
@@ -139,9 +163,9 @@ Stillmap demo: a simulated city, its clients and its server over DDS domain $dom
   pose error    ATE $(rounded "$out/accuracy.json" ate_rmse_m 3) m over $(rounded "$out/accuracy.json" path_m 1) m
   map           $(value "$out/status.json" voxels) voxels in $(value "$out/status.json" tiles) tiles, $(du -h "$out/map.stillmap" | cut -f1) on disk
   while mapping $(grep -vc '^#' "$out/watched.tum") poses followed, $answers region queries answered
-  the way home  planned $plans times while the map grew; now $(rounded "$out/path.json" length_m 1) m, clearance $(rounded "$out/path.json" clearance_m 1) m, in $(rounded "$out/path.json" plan_ms 0) ms
+  path home     planned $plans times while the map grew; now $(rounded "$out/path.json" length_m 1) m, clearance $(rounded "$out/path.json" clearance_m 1) m, in $(rounded "$out/path.json" plan_ms 0) ms
   at the end    $(value "$out/query.json" voxels) voxels within $query_size_m m in $(rounded "$out/query.json" ms 1) ms
-  look at       $out/map.png (map, path, queried region), $out/path.png (area, way home), $out/segmentation.png (truth, found), $out/trajectory.png, $out/trajectory_error.png
+  look at       $out/map.png (map, path, queried region), $out/path.png (traversability, path home), $out/segmentation.png (truth, found), $out/trajectory.png, $out/trajectory_error.png
   also          $out/map.stillmap $out/query.ply $out/poses_lidar.txt $out/server.log
 TEXT
 }
@@ -156,11 +180,11 @@ domain=$(free_domain) || fail "no free DDS domain between 60 and 99"
 make_city
 start_server
 start_clients
-"$bin/stillmap" replay "$city" --domain "$domain" --no-labels --lossless --out "$out/poses_lidar.txt" --json \
-  > "$out/replay.json" || fail "the replay ended with exit code $?"
-"$bin/stillmap" query --domain "$domain" --around-robot "$query_size_m" --json \
+"$bin/stillmap" replay "$city" --domain "$domain" --no-labels --lossless "${patience[@]}" \
+  --out "$out/poses_lidar.txt" --json > "$out/replay.json" || fail "the replay ended with exit code $?"
+"$bin/stillmap" query --domain "$domain" --around-robot "$query_size_m" --json "${patience[@]}" \
   --out "$out/query.ply" --picture "$out/map.png" > "$out/query.json" || fail "the query failed"
-"$bin/stillmap" status --domain "$domain" --json > "$out/status.json"
+"$bin/stillmap" status --domain "$domain" --json "${patience[@]}" > "$out/status.json"
 stop_clients
 stop_server
 "$bin/stillmap" evaluate trajectory --truth "$city/poses.txt" --truth-calib "$city/calib.txt" \

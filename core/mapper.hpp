@@ -7,11 +7,11 @@
 #include <string>
 #include <string_view>
 
+#include "core/label_synchronizer.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/lidar/trajectory.hpp"
-#include "core/map/label_propagation.hpp"
 #include "core/map/static_map.hpp"
 #include "core/odometry/odometry.hpp"
 #include "core/odometry/odometry_state.hpp"
@@ -50,23 +50,22 @@ struct ScanRejection {
 /// "static_map". The caller owns the clock.
 using StageListener = std::function<void(std::string_view stage)>;
 
-/// Who is told of a scan while it is in work; may be empty.
+/// Callbacks of Mapper::process(); each may be empty.
 struct MapperListeners {
   StageListener stage_ended;
-  /// Its pose is known; the static map does not have it yet.
+  /// The pose is known; the scan is not in the static map yet.
   std::function<void(std::int64_t stamp_ns, const OdometryResult& odometry)> pose_found;
 };
 
-/// The way of a scan through the product: prepare, segment, register, split by motion, map. One
-/// thread calls it; nothing in it waits, reads a clock or owns a thread. With a label source (or a
+/// The pipeline of a scan: prepare, label, deskew, register, insert into the static map. One thread
+/// calls it; nothing in it waits, reads a clock or owns a thread. With a Segmenter (or a
 /// BlockingSegmenter) the result depends on the scans alone.
 class Mapper {
  public:
   /// Throws std::invalid_argument with `config.faults()`.
   Mapper(const MapperConfig& config, std::unique_ptr<Segmenter> label_source,
          MapperListeners listeners = {});
-  /// With labels that may come late: scans without their own get propagated ones, and late ones
-  /// still tell the map what it is made of.
+  /// With labels that may come late: see LabelSynchronizer.
   Mapper(const MapperConfig& config, std::unique_ptr<SegmentationPipeline> segmentation,
          MapperListeners listeners = {});
 
@@ -77,7 +76,7 @@ class Mapper {
 
   [[nodiscard]] const ScanRejection& last_rejection() const { return last_rejection_; }
   [[nodiscard]] const Trajectory& trajectory() const { return trajectory_; }
-  [[nodiscard]] std::string label_source() const { return segmentation_->name(); }
+  [[nodiscard]] std::string label_source() const { return label_synchronizer_.name(); }
   [[nodiscard]] std::shared_ptr<const MapSnapshot> map_snapshot() { return static_map_.view(); }
 
   /// What is stored of it, what of it is in memory, and what was removed from it.
@@ -98,46 +97,21 @@ class Mapper {
 
   /// All but the static map.
   void clear_scan_state();
-  /// Tells the odometry what a restored map holds near there, if it does not know yet.
+  /// Adds the points of a resumed map near this position to the odometry's local map, unless they
+  /// were added when the lidar was close by.
   void add_prior_map_near(const Eigen::Vector3d& position_map);
   [[nodiscard]] bool accepts(const Scan& scan);
   [[nodiscard]] bool has_enough_points(const Scan& scan);
-  /// What a scan is mapped with.
-  struct Labels {
-    LabelProvenance label_provenance = LabelProvenance::none;
-    PointLabels labels;
-    /// What they tell the map, where that is less.
-    std::optional<PointLabels> evidence;
-  };
-  [[nodiscard]] Labels labels_for(const Scan& scan, std::optional<PointLabels> own,
-                                  const Eigen::Isometry3d& T_map_lidar_predicted);
-  /// Takes over the labels of earlier scans; returns those of this one.
-  [[nodiscard]] std::optional<PointLabels> accept_finished_labels(std::vector<ScanLabels> finished,
-                                                                  std::int64_t stamp_ns);
-  void insert_late_labels(PointLabels labels);
-  void insert(const MappedScan& mapped, const std::optional<PointLabels>& evidence);
-  /// Into the static map: what the scan hit, and what it looked through.
-  void insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar);
   void end_stage(std::string_view stage) const;
 
-  struct PosedScan {
-    LabelledScan labelled;
-    Eigen::Isometry3d T_map_lidar;
-  };
-
   MapperConfig config_;
-  std::unique_ptr<SegmentationPipeline> segmentation_;
   MapperListeners listeners_;
+  LabelSynchronizer label_synchronizer_;
   Odometry odometry_;
   StaticMap static_map_;
-  /// Tiles of a restored map, and where the odometry was last told of those nearby.
+  /// Tiles of a resumed map, and where their points were last added to the odometry's local map.
   std::set<TileId> resumed_tiles_;
   std::optional<Eigen::Vector3d> prior_map_added_at_map_;
-  /// Its labels are still to come; the static map takes it with them.
-  std::optional<PosedScan> pending_;
-  /// The newest scan with labels of its own, and once labels are propagated from it, its view.
-  std::optional<PosedScan> last_labelled_;
-  std::optional<LabelledRangeImage> last_labelled_image_;
   Trajectory trajectory_;
   ScanRejection last_rejection_;
 };

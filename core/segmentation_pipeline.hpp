@@ -16,23 +16,23 @@ enum class LabelProvenance : std::uint8_t {
   none,
   /// From the label source, for this scan.
   fresh,
-  /// From the map and the last labelled scan, as the label source was not ready in time.
+  /// From the map and the last labelled scan: the label source was not ready in time.
   propagated,
 };
 
-/// What a label source made of one scan.
+/// Result of a label source for one scan.
 struct ScanLabels {
   std::int64_t stamp_ns = 0;
   /// Empty when the source has none for this scan, or failed.
   PointLabels labels;
 };
 
-/// Labels that may come later than a scan can wait for them.
+/// Segments scans; the labels of a scan may be finished after a later scan was submitted.
 class SegmentationPipeline {
  public:
   virtual ~SegmentationPipeline() = default;
 
-  /// Name of the source, for the status.
+  /// Name of the label source, for the status.
   [[nodiscard]] virtual std::string name() const = 0;
 
   /// False: every submit() returns the labels of its scan, none are ever propagated.
@@ -48,7 +48,7 @@ class SegmentationPipeline {
   [[nodiscard]] virtual Output submit(const Scan& scan) = 0;
 };
 
-/// Every scan waits for its labels, however long that takes.
+/// Segments every scan within submit(), however long that takes.
 class BlockingSegmenter final : public SegmentationPipeline {
  public:
   explicit BlockingSegmenter(std::unique_ptr<Segmenter> source) : source_(std::move(source)) {}

@@ -17,7 +17,6 @@ TEXT
 dpkg-deb --build "$empty" "$empty.deb" > /dev/null
 
 apt-get update
-# stillmap-formats (PCD through PCL) would bring VTK: it stays out.
 DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends \
   "$empty.deb" "$1"/stillmap-data_*.deb "$1"/stillmap-server_*.deb "$1"/stillmap_*.deb
 

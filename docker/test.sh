@@ -4,7 +4,7 @@
 # memory). Starts dockerd, and makes the base image, where there is none; leaves neither.
 #
 # STILLMAP_PACKAGES   folder of .deb files (`make deb`) to build the image from, instead of the sources
-# STILLMAP_TEST_SCANS length of the simulated drives (40)
+# STILLMAP_TEST_SCANS length of the simulated sequences (40)
 # KEEP_IMAGE          set: leave the image stillmap-test
 set -euo pipefail
 cd "$(dirname "$0")/.."
@@ -148,7 +148,7 @@ test_replay() {
   pass "replay: map, poses, path and pictures are in the volume"
   "${run[@]}" run -T --rm --no-deps results map-check /results/map.stillmap > /dev/null 2>&1 ||
     fail "the map file in the volume is damaged"
-  pass "replay: the map file is sound"
+  pass "replay: the map file is valid"
 }
 
 # Drops multicast on the ports of the bridge of network $1, and shows that it is gone.
@@ -174,12 +174,17 @@ test_fleet() {
   grep -qE "\"scans_mapped\": $scans\b" "$work/fleet.json" ||
     fail "not all of $scans scans were mapped: $(grep scans_ "$work/fleet.json")"
   pass "fleet: $scans of $scans scans mapped, found through the discovery server"
-  for planner in $("${run[@]}" ps -q planner); do
-    "$docker" logs "$planner" > "$work/planner.log" 2> /dev/null
-    if grep -q '"status":"found"' "$work/planner.log"; then found=$((found + 1)); fi
+  for _ in $(seq 120); do
+    found=0
+    for planner in $("${run[@]}" ps -q planner); do
+      "$docker" logs "$planner" > "$work/planner.log" 2> /dev/null
+      if grep -q '"status":"found"' "$work/planner.log"; then found=$((found + 1)); fi
+    done
+    [ "$found" -lt 3 ] || break
+    sleep 1
   done
   [ "$found" = 3 ] || { "${run[@]}" logs --tail 5 planner >&2; fail "$found of 3 planners have a path"; }
-  pass "fleet: 3 of 3 planners planned the way home"
+  pass "fleet: 3 of 3 planners planned a path home"
   if "${run[@]}" run -T --rm -e STILLMAP_DDS_PROFILE=/etc/stillmap/bridge.yaml -e STILLMAP_DISCOVERY_SERVER= \
     tool status --timeout 4 > /dev/null 2>&1; then
     fail "a client found the server by multicast: there is some in the fleet's network"

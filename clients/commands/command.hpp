@@ -6,7 +6,7 @@
 
 namespace stillmap::cli {
 
-/// What the shell gets to know.
+/// Exit codes of the program.
 enum class ExitCode {
   ok = 0,
   /// The run failed.
@@ -19,7 +19,7 @@ enum class ExitCode {
   no_path = 4,
 };
 
-/// What can be named as a recording, and how a bag's topic is chosen; for help texts.
+/// Help texts: the kinds of data set, and how the topic of a bag is chosen.
 inline constexpr const char* dataset_kinds =
     "A KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag (folder "
     "or .db3)";
@@ -28,6 +28,9 @@ inline constexpr const char* topic_in_help =
 
 /// The chosen command with its options, ready to run. Set while the command line is parsed.
 using Action = std::function<ExitCode()>;
+
+/// Adds every command of `stillmap`.
+void add_commands(CommandHandle program, Action& action);
 
 // Each adds one subcommand to the program; when it is chosen, it sets `action`.
 void add_map_command(CommandHandle program, Action& action);

@@ -9,7 +9,7 @@ namespace stillmap::cli {
 
 using Diagnostics = std::vector<dds::Diagnostic>;
 
-// Each looks for one kind of trouble and knows nothing of the others.
+// Each check looks for one kind of fault, independently of the others.
 
 /// /dev/shm that cannot be written, segments of dead processes and of other users.
 [[nodiscard]] Diagnostics check_shared_memory(const SystemSnapshot& snapshot);
@@ -17,26 +17,26 @@ using Diagnostics = std::vector<dds::Diagnostic>;
 [[nodiscard]] Diagnostics check_socket_buffers(const SystemSnapshot& snapshot);
 /// Interfaces and routes that carry no multicast, by which participants find each other.
 [[nodiscard]] Diagnostics check_multicast(const SystemSnapshot& snapshot);
-/// Nobody in this domain, and who is in others.
+/// An empty domain, and who is in others.
 [[nodiscard]] Diagnostics check_domain(const SystemSnapshot& snapshot);
 /// Secured on one side only, or refused.
 [[nodiscard]] Diagnostics check_security(const SystemSnapshot& snapshot);
-/// Peers that are seen, but none of their topics.
+/// Participants that are discovered, but none of their endpoints.
 [[nodiscard]] Diagnostics check_silent_participants(const SystemSnapshot& snapshot);
 /// No server, one that does not answer, several of one name, another version.
 [[nodiscard]] Diagnostics check_servers(const SystemSnapshot& snapshot);
 /// Writers and readers of one topic that do not fit, of any two participants.
 [[nodiscard]] Diagnostics check_endpoints(const SystemSnapshot& snapshot);
-/// No scans, and because of what; scans that are dropped.
+/// No scans, and why; scans that are dropped.
 [[nodiscard]] Diagnostics check_scans(const SystemSnapshot& snapshot);
 /// Clouds without a frame, or with one that tf does not know.
 [[nodiscard]] Diagnostics check_frames(const SystemSnapshot& snapshot);
 /// Clocks that differ between this machine, the server's and the sensor's.
 [[nodiscard]] Diagnostics check_clocks(const SystemSnapshot& snapshot);
-/// What the server itself found.
+/// Diagnostics of the server itself.
 [[nodiscard]] Diagnostics check_server_diagnostics(const SystemSnapshot& snapshot);
 
-/// All of them, causes before their effects; what two of them say is there once.
+/// All checks, errors first, causes before their effects, without duplicates.
 [[nodiscard]] Diagnostics diagnose(const SystemSnapshot& snapshot);
 
 }  // namespace stillmap::cli

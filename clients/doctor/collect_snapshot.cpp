@@ -30,7 +30,7 @@ std::int64_t now_ns() {
   return std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch()).count();
 }
 
-/// First parts of the names under which somebody answers get_status, and who that is.
+/// Participants that answer get_status, by the first part of the service name.
 std::map<std::string, std::vector<dds::RemoteParticipant>> name_spaces(
     const std::vector<dds::RemoteParticipant>& participants) {
   const std::string any = dds::request_topic(dds::services::get_status.in("*"));
@@ -88,7 +88,7 @@ void add_frames(const TFMessage& message, std::set<std::string>& frames) {
   }
 }
 
-// Frames that are published now, and those that were published once for all.
+// Reads all transforms received so far.
 void listen_to_frames(dds::Reader<TFMessage>& reader, std::set<std::string>& frames) {
   TFMessage message;
   while (reader.take(message, {}, std::chrono::milliseconds(0))) add_frames(message, frames);
@@ -104,7 +104,7 @@ std::vector<OtherDomain> inspect_domains(const DoctorOptions& options,
     if (participants.size() == max_other_domains) continue;
     dds::DdsOptions dds = options.dds;
     dds.domain_id = id;
-    // A visitor leaves nothing behind.
+    // Leaves no segments in /dev/shm.
     dds.shared_memory = false;
     participants.push_back(std::make_unique<dds::Participant>(dds));
   }
@@ -119,13 +119,13 @@ dds::DdsOptions named(dds::DdsOptions dds) {
   return dds;
 }
 
-/// Who is there besides the participants that these hands make.
+/// Participants of this domain and of others, and the frames of tf.
 void listen(const DoctorOptions& options, dds::Participant& participant, SystemSnapshot& snapshot) {
   const dds::TopicQos passing{.reliable = false, .depth = 100};
   const dds::TopicQos kept{.transient_local = true, .depth = 100};
   dds::Reader<TFMessage> moving(participant, "rt/tf", passing);
   std::optional<dds::Reader<TFMessage>> fixed;
-  // Identities made for Stillmap alone know nothing of tf_static.
+  // The permissions of Stillmap's own identities do not include tf_static.
   if (options.dds.security.empty()) fixed.emplace(participant, "rt/tf_static", kept);
   DomainSenders senders = scan_domains(options.listening);
   for (const std::uint32_t id : domains_with_ports(snapshot.host.udp_ports)) senders[id];
@@ -149,7 +149,7 @@ SystemSnapshot collect_snapshot(const DoctorOptions& options) {
       .frames = {},
       .host = read_host_facts(options.host_root),
       .granted_buffer_bytes = dds::granted_socket_buffer_bytes(options.dds.socket_buffer_bytes)};
-  // First the machine, then what changes it: ports and segments of ours.
+  // The machine was read before this participant adds its own ports and segments.
   dds::Participant participant(named(options.dds));
   listen(options, participant, snapshot);
   for (auto& [name_space, participants] : name_spaces(snapshot.participants)) {

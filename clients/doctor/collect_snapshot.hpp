@@ -14,14 +14,14 @@ struct DoctorOptions {
   std::string points_topic = "points";
   /// Longest wait for a server's answer.
   std::chrono::milliseconds timeout{5000};
-  /// How long the domain is listened to.
+  /// How long to listen to the domain.
   std::chrono::milliseconds listening{4000};
   /// Where /proc, /sys and /dev/shm of the machine lie.
   std::filesystem::path host_root = "/";
 };
 
-/// Takes part in the domain for a few seconds and looks at the machine. Throws DdsError where even
-/// that is not possible.
+/// Joins the domain for a few seconds and reads the state of the machine. Throws DdsError when it
+/// cannot join.
 [[nodiscard]] SystemSnapshot collect_snapshot(const DoctorOptions& options);
 
 }  // namespace stillmap::cli

@@ -21,7 +21,7 @@ bool sends_clouds(const dds::RemoteParticipant& participant) {
   });
 }
 
-// Domains where a server or a sensor is, those first that matter more.
+// Other domains that contain a server or a sensor.
 std::string describe_candidate_domains(const std::vector<OtherDomain>& domains) {
   std::string text;
   for (const OtherDomain& domain : domains) {
@@ -90,7 +90,7 @@ dds::Diagnostic missing_server_diagnostic(const SystemSnapshot& snapshot) {
   return diagnostic;
 }
 
-// Ends that a client of that server would have, though we did not make them.
+// Duplicates of the server, its missing status, another version.
 Diagnostics server_diagnostics(const DiscoveredServer& server) {
   Diagnostics diagnostics;
   if (server.participants.size() > 1) {
@@ -144,8 +144,7 @@ Diagnostics check_servers(const SystemSnapshot& snapshot) {
     const Diagnostics more = server_diagnostics(server);
     diagnostics.insert(diagnostics.end(), more.begin(), more.end());
   }
-  // With nobody there, check_domain() says it; a server may be behind a participant that ignores
-  // us.
+  // An empty domain is reported by check_domain(); a participant that refuses us may be a server.
   const bool is_explained = snapshot.participants.empty() || !check_security(snapshot).empty();
   if (!is_there && !is_explained) diagnostics.push_back(missing_server_diagnostic(snapshot));
   return diagnostics;

@@ -45,7 +45,7 @@ class MulticastListener {
     sockaddr_in address{};
     address.sin_family = AF_INET;
     address.sin_port = htons(static_cast<std::uint16_t>(first_port + ports_per_domain * domain));
-    // Bound to the group, so that nothing that is sent to this machine alone is taken from others.
+    // Bound to the group, so that unicast packets still reach the processes they are for.
     address.sin_addr.s_addr = inet_addr("239.255.0.1");
     if (::bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address) != 0) return;
     for (const in_addr& interface : interfaces) {
@@ -62,7 +62,7 @@ class MulticastListener {
 
   [[nodiscard]] int descriptor() const { return socket_; }
 
-  /// Adds who sent the RTPS packets that wait.
+  /// Reads the waiting RTPS packets and adds their senders.
   void take(std::set<std::string>& senders) const {
     std::array<char, 64> head{};
     sockaddr_in from{};

@@ -1,21 +1,80 @@
 #include "clients/doctor/host_facts.hpp"
 
 #include <arpa/inet.h>
+#include <fcntl.h>
 #include <net/if.h>
+#include <sys/file.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
+#include <cstring>
 #include <fstream>
 #include <sstream>
 #include <system_error>
-
-#include "clients/doctor/shared_memory_segments.hpp"
 
 namespace stillmap::cli {
 namespace {
 
 namespace fs = std::filesystem;
+
+// A file beside the segment, which the living process holds locked: "_el" by its owner, "_sl" by
+// those who use it.
+bool is_locked(const fs::path& lock_file) {
+  const int descriptor = ::open(lock_file.c_str(), O_RDONLY | O_CLOEXEC);
+  // What cannot be looked at may be alive.
+  if (descriptor < 0) return errno != ENOENT;
+  const bool was_free = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+  ::close(descriptor);
+  return !was_free;
+}
+
+bool is_segment_name(const std::string& name) {
+  return name.starts_with("fastrtps_") && !name.ends_with("_el") && !name.ends_with("_sl");
+}
+
+fs::path beside(const fs::path& file, const std::string& ending) { return file.string() + ending; }
+
+void remove_file(const fs::path& file) {
+  std::error_code ignored;
+  fs::remove(file, ignored);
+}
+
+void remove_segment(const fs::path& folder, const std::string& name) {
+  const fs::path file = folder / name;
+  remove_file(file);
+  remove_file(beside(file, "_el"));
+  remove_file(beside(file, "_sl"));
+  remove_file(folder / ("sem." + name + "_mutex"));
+}
+
+/// The segments of Fast DDS in a folder of shared memory.
+std::vector<SharedMemorySegment> shared_memory_segments(const fs::path& folder) {
+  std::vector<SharedMemorySegment> segments;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    struct stat facts {};
+    if (!is_segment_name(name) || ::stat(entry.path().c_str(), &facts) != 0) continue;
+    segments.push_back({.name = name,
+                        .bytes = static_cast<std::uint64_t>(facts.st_size),
+                        .owner = facts.st_uid,
+                        .is_stale = !is_locked(beside(entry.path(), "_el")) &&
+                                    !is_locked(beside(entry.path(), "_sl"))});
+  }
+  return segments;
+}
+
+/// Why nothing can be written there; empty when it can.
+std::string write_fault(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error)) return folder.string() + " does not exist";
+  if (::access(folder.c_str(), W_OK | X_OK) == 0) return {};
+  const std::string reason = std::strerror(errno);
+  return folder.string() + ": " + reason;
+}
 
 std::optional<std::uint32_t> number_in(const fs::path& file) {
   std::ifstream in(file);
@@ -96,6 +155,17 @@ HostFacts read_host_facts(const fs::path& root) {
           .interfaces = interfaces_in(root / "sys/class/net"),
           .has_multicast_route = takes_multicast(root / "proc/net/route"),
           .udp_ports = ports_in(root / "proc/net/udp")};
+}
+
+int remove_stale_segments(const fs::path& root) {
+  const fs::path folder = root / "dev/shm";
+  int removed = 0;
+  for (const SharedMemorySegment& segment : shared_memory_segments(folder)) {
+    if (!segment.is_stale) continue;
+    remove_segment(folder, segment.name);
+    if (!fs::exists(folder / segment.name)) ++removed;
+  }
+  return removed;
 }
 
 }  // namespace stillmap::cli

@@ -29,7 +29,7 @@ struct DiscoveredServer {
   std::int64_t round_trip_ns = 0;
 };
 
-/// What goes on in another domain.
+/// Who is in another domain.
 struct OtherDomain {
   std::uint32_t id = 0;
   std::set<std::string> senders;
@@ -43,7 +43,7 @@ struct SystemSnapshot {
   std::string server_name;
   /// ROS 2 name of the sensor's topic.
   std::string points_topic;
-  /// Ourselves, with the ends that a client has.
+  /// This process, with the endpoints of a client.
   dds::RemoteParticipant self;
   std::vector<dds::RemoteParticipant> participants;
   std::vector<DiscoveredServer> servers;
@@ -54,11 +54,5 @@ struct SystemSnapshot {
   /// Bytes that the kernel gives to a UDP socket.
   std::uint32_t granted_buffer_bytes = 0;
 };
-
-/// The server of the name asked for that answered; nothing when none did.
-[[nodiscard]] const DiscoveredServer* answering_server(const SystemSnapshot& snapshot);
-
-/// The sensor's topic as DDS names it: the server's word counts where there is one.
-[[nodiscard]] std::string points_topic_of(const SystemSnapshot& snapshot);
 
 }  // namespace stillmap::cli

@@ -94,6 +94,15 @@ void CommandHandle::flag(const std::string& names, bool& value, const std::strin
   app_->add_flag(names, value, help);
 }
 
+void CommandHandle::renamed(const std::string& former_name, const std::string& name) {
+  app_->add_option_function<std::string>(former_name,
+                                         [former_name, name](const std::string&) {
+                                           throw CLI::ValidationError(former_name,
+                                                                      "is called " + name + " now");
+                                         })
+      ->group("");  // not in the help
+}
+
 void CommandHandle::explain(const std::string& text) { app_->footer(text); }
 
 CommandHandle CommandHandle::command(const std::string& name, const std::string& help) {

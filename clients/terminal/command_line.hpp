@@ -15,8 +15,7 @@ namespace stillmap::cli {
 
 // CLI11 is a large header: behind these handles it is compiled once instead of in every command.
 
-/// An option that was added to a command, to be refined. Values outside what is allowed are wrong
-/// usage.
+/// Refines an option that was added to a command. Values outside its limits are wrong usage.
 class OptionHandle {
  public:
   explicit OptionHandle(CLI::Option& option) : option_(&option) {}
@@ -31,9 +30,9 @@ class OptionHandle {
   OptionHandle exactly(int values);
   /// A list may be written as one word: a,b,c.
   OptionHandle comma_separated();
-  /// Each value of a list has the option's name before it, so that what follows is not taken, too.
+  /// Each value of a list has the option's name before it: words that follow are no values of it.
   OptionHandle one_at_a_time();
-  /// The environment variable that counts when the option is not given.
+  /// The environment variable that gives the value when the option is absent.
   OptionHandle from_environment(const std::string& variable);
   /// Both cannot be given.
   OptionHandle excludes(const OptionHandle& other);
@@ -59,13 +58,15 @@ class CommandHandle {
                       const std::string& help);
   /// "--labels,!--no-labels" has a name for each state.
   void flag(const std::string& names, bool& value, const std::string& help);
+  /// Makes an option's former name, with a value, wrong usage that names the new one.
+  void renamed(const std::string& former_name, const std::string& name);
 
   /// Text under the options.
   void explain(const std::string& text);
   CommandHandle command(const std::string& name, const std::string& help);
   /// One of the commands below it must be named.
   void require_command();
-  /// Called when this is the command that was named.
+  /// Called when this command was named.
   void on_chosen(const std::function<void()>& chosen);
 
  private:

@@ -6,7 +6,7 @@
 
 namespace stillmap::cli {
 
-/// How far a long run is, on stderr: a bar that is drawn anew where stderr is a terminal, else a
+/// How far a long run is, on stderr: a bar that is redrawn where stderr is a terminal, else a
 /// plain line every few seconds. One thread uses it.
 class Progress {
  public:

@@ -9,6 +9,7 @@
 #include "config/loaders/config_report.hpp"
 #include "config/loaders/dds_profile.hpp"
 #include "core/lidar/delivery_mode.hpp"
+#include "core/lidar/point_fields.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/mapper.hpp"
 #include "core/occupancy/occupancy_config.hpp"
@@ -76,14 +77,6 @@ enum class LabelKind {
   semantic_kitti,
   /// Stillmap's classes, 0..19.
   classes,
-};
-
-/// Names under which a point field may appear in a cloud; the first that is there is taken.
-struct PointFieldNames {
-  std::vector<std::string> intensity = {"reflectivity", "intensity", "i"};
-  std::vector<std::string> ring = {"ring", "channel"};
-  std::vector<std::string> time = {"time", "t", "timestamp", "time_stamp", "offset_time"};
-  std::vector<std::string> label = {"label"};
 };
 
 struct InputConfig {

@@ -7,7 +7,7 @@ set(CPACK_STRIP_FILES ON)
 # Installs as for the real root, so that the server's configuration goes to /etc.
 set(CPACK_SET_DESTDIR ON)
 set(CPACK_INSTALL_PREFIX /usr)
-set(CPACK_COMPONENTS_ALL data server tools formats)
+set(CPACK_COMPONENTS_ALL data server tools)
 set(CPACK_COMPONENTS_GROUPING IGNORE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
@@ -32,12 +32,7 @@ set(CPACK_COMPONENT_SERVER_DESCRIPTION
 
 set(CPACK_DEBIAN_TOOLS_PACKAGE_NAME stillmap)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "${same_version}")
-set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS stillmap-formats)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SUGGESTS stillmap-server)
 set(CPACK_COMPONENT_TOOLS_DESCRIPTION
   "The command line: replays recordings, asks for maps, plans paths, simulates a city.")
-
-set(CPACK_DEBIAN_FORMATS_PACKAGE_NAME stillmap-formats)
-set(CPACK_COMPONENT_FORMATS_DESCRIPTION
-  "For the command line: PCD files through PCL.")
 include(CPack)

@@ -2,8 +2,6 @@
 # themselves. Components become Debian packages (deb.cmake).
 install(TARGETS stillmap-server RUNTIME DESTINATION bin COMPONENT server)
 install(TARGETS stillmap RUNTIME DESTINATION bin COMPONENT tools)
-install(TARGETS stillmap_plugin_pcd
-  LIBRARY DESTINATION ${STILLMAP_PLUGIN_FOLDER} COMPONENT formats)
 
 foreach(folder models robots sensors labels server dds ros)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/config/${folder})
@@ -16,7 +14,7 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/idl/msg/ DESTINATION share/stillmap/idl 
 install(FILES ${PROJECT_SOURCE_DIR}/README.md DESTINATION share/doc/stillmap COMPONENT tools)
 install(FILES ${PROJECT_SOURCE_DIR}/clients/example/follow_and_query.cpp
   DESTINATION share/doc/stillmap/examples COMPONENT tools)
-foreach(package server:stillmap-server tools:stillmap data:stillmap-data formats:stillmap-formats)
+foreach(package server:stillmap-server tools:stillmap data:stillmap-data)
   string(REPLACE ":" ";" package ${package})
   list(GET package 0 component)
   list(GET package 1 name)

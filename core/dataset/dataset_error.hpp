@@ -6,8 +6,7 @@
 
 namespace stillmap {
 
-/// A recording that cannot be read or written. The text names the file, what is wrong with it and
-/// the way out.
+/// A dataset file that cannot be read or written. what() names the file, the fault and the remedy.
 class DatasetError : public std::runtime_error {
  public:
   DatasetError(const std::filesystem::path& file, const std::string& fault)

@@ -131,7 +131,7 @@ std::vector<std::uint32_t> read_kitti_labels(const std::filesystem::path& file,
   if (labels.size() != points) {
     throw DatasetError(file, std::to_string(labels.size()) + " labels for a scan of " +
                                  std::to_string(points) +
-                                 " points; take the labels that belong to this recording");
+                                 " points; take the labels that belong to this sequence");
   }
   return labels;
 }

@@ -11,7 +11,7 @@
 
 namespace stillmap {
 
-/// Writes a recording as a SemanticKITTI sequence: velodyne/, labels/, calib.txt, times.txt and
+/// Writes scans as a SemanticKITTI sequence: velodyne/, labels/, calib.txt, times.txt and
 /// poses.txt (camera frame, relative to the first scan, as KITTI has it). What .bin cannot hold
 /// goes into files of our own that ScanDataset reads back: time_offsets/NNNNNN.bin (float32 a
 /// point, seconds) and rings/NNNNNN.bin (uint16 a point).

@@ -11,7 +11,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/merged_cloud.hpp"
-#include "core/dataset/numbered_scans.hpp"
+#include "core/dataset/scan_merge.hpp"
 
 namespace stillmap {
 namespace {
@@ -44,7 +44,7 @@ ScanLabels load_labels(const fs::path& scan_file) {
   return labels;
 }
 
-/// The sequence's labels as the cloud wants them, in memory.
+/// The sequence's labels as the cloud edits them, in memory until all are checked.
 class Edits {
  public:
   Edits(fs::path cloud, const fs::path& sequence)

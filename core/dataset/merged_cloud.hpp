@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "core/dataset/point_cloud_header.hpp"
+#include "core/dataset/cloud_content.hpp"
 
 namespace stillmap {
 

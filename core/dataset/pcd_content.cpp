@@ -1,3 +1,5 @@
+#include <liblzf/lzf.h>
+
 #include <array>
 #include <cstring>
 #include <fstream>
@@ -5,7 +7,7 @@
 #include <map>
 
 #include "core/dataset/binary_file.hpp"
-#include "core/dataset/point_cloud_header.hpp"
+#include "core/dataset/cloud_content.hpp"
 
 namespace stillmap {
 namespace {
@@ -74,28 +76,53 @@ std::vector<CloudField> pcd_fields(const std::filesystem::path& file, const PcdH
   return fields;
 }
 
-void check_compressed(const std::filesystem::path& file, const CloudContent& content) {
+/// Unpacks the columns of a compressed body: all values of the first field, then all of the next.
+std::string unpacked_columns(const std::filesystem::path& file, const CloudContent& content) {
   std::array<std::uint32_t, 2> sizes{};
   check_room(file, content, sizeof sizes);
   std::memcpy(sizes.data(), content.body.data(), sizeof sizes);
-  check_room(file, content, sizeof sizes + sizes[0]);
-  const std::uint64_t unpacked = content.points() * content.point_bytes();
-  if (sizes[1] != unpacked || sizes[1] > max_compression * (sizes[0] + 1ULL)) {
-    throw DatasetError(file, "the compressed part unpacks to " + std::to_string(sizes[1]) +
-                                 " bytes and the header announces " + std::to_string(unpacked) +
+  const auto [packed_bytes, unpacked_bytes] = sizes;
+  check_room(file, content, sizeof sizes + packed_bytes);
+  const std::uint64_t announced = content.points() * content.point_bytes();
+  if (unpacked_bytes != announced || unpacked_bytes > max_compression * (packed_bytes + 1ULL)) {
+    throw DatasetError(file, "the compressed part unpacks to " + std::to_string(unpacked_bytes) +
+                                 " bytes and the header announces " + std::to_string(announced) +
                                  "; the file is damaged");
   }
+  std::string columns(unpacked_bytes, '\0');
+  if (lzf_decompress(content.body.data() + sizeof sizes, packed_bytes, columns.data(),
+                     unpacked_bytes) != unpacked_bytes) {
+    throw DatasetError(file, "the compressed part cannot be unpacked; the file is damaged");
+  }
+  return columns;
 }
 
-void check_body(const std::filesystem::path& file, const CloudContent& content) {
-  const std::uint64_t points = content.points();
+/// Puts the values of each point behind one another.
+std::string points_from_columns(const std::string& columns, const CloudContent& content) {
+  const std::uint64_t point_bytes = content.point_bytes();
+  std::string points(columns.size(), '\0');
+  std::uint64_t offset = 0;
+  const char* from = columns.data();
+  for (const CloudField& field : content.fields) {
+    const std::uint64_t bytes = field.bytes * field.count;
+    for (std::uint64_t i = 0; i < content.points(); ++i, from += bytes) {
+      std::memcpy(points.data() + i * point_bytes + offset, from, bytes);
+    }
+    offset += bytes;
+  }
+  return points;
+}
+
+void decode_body(const std::filesystem::path& file, CloudContent& content) {
   if (content.encoding == "ascii") {
-    // A digit and a blank or line's end for each field, but for the last.
-    check_room(file, content, points == 0 ? 0 : 2 * points * content.fields.size() - 1);
+    parse_ascii_body(file, content);
   } else if (content.encoding == "binary") {
-    check_room(file, content, points * content.point_bytes());
+    check_room(file, content, content.points() * content.point_bytes());
   } else if (content.encoding == "binary_compressed") {
-    if (points > 0) check_compressed(file, content);
+    check_room(file, content, 0);
+    if (content.points() > 0) {
+      content.body = points_from_columns(unpacked_columns(file, content), content);
+    }
   } else {
     throw DatasetError(file, "DATA \"" + content.encoding.substr(0, 40) +
                                  "\" is none of ascii, binary, binary_compressed");
@@ -119,7 +146,7 @@ CloudContent read_pcd_content(const std::filesystem::path& file) {
   }
   content.encoding = entry(file, header, "DATA").front();
   content.body.assign(std::istreambuf_iterator<char>(in), {});
-  check_body(file, content);
+  decode_body(file, content);
   return content;
 }
 

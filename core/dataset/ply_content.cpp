@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "core/dataset/binary_file.hpp"
-#include "core/dataset/point_cloud_header.hpp"
+#include "core/dataset/cloud_content.hpp"
 
 namespace stillmap {
 namespace {
@@ -59,6 +59,16 @@ void take_line(const std::filesystem::path& file, const Words& words, CloudConte
   }
 }
 
+void swap_bytes(CloudContent& content) {
+  char* bytes = content.body.data();
+  for (std::uint64_t i = 0; i < content.points(); ++i) {
+    for (const CloudField& field : content.fields) {
+      std::reverse(bytes, bytes + field.bytes);
+      bytes += field.bytes;
+    }
+  }
+}
+
 }  // namespace
 
 CloudContent read_ply_header(const std::filesystem::path& file, std::istream& in) {
@@ -83,11 +93,11 @@ CloudContent read_ply_content(const std::filesystem::path& file) {
   CloudContent content = read_ply_header(file, in);
   content.body.assign(std::istreambuf_iterator<char>(in), {});
   if (content.encoding == "ascii") {
-    check_room(file, content,
-               content.points() == 0 ? 0 : 2 * content.points() * content.fields.size() - 1);
+    parse_ascii_body(file, content);
   } else if (content.encoding == "binary_little_endian" ||
              content.encoding == "binary_big_endian") {
     check_room(file, content, content.points() * content.point_bytes());
+    if (content.encoding == "binary_big_endian") swap_bytes(content);
   } else {
     throw DatasetError(file, "format \"" + content.encoding.substr(0, 40) + "\" is not PLY's");
   }

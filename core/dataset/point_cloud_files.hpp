@@ -17,13 +17,11 @@ struct CloudFile {
   std::vector<std::uint32_t> raw_labels;
 };
 
-/// Reads a PCD (ascii, binary, compressed) or PLY (ascii, binary) file by the names of its fields:
-/// x y z (required), intensity | reflectivity | remission, ring | channel,
-/// time | t | timestamp | time_stamp | offset_time | time_offset (in whatever unit: see
-/// point_times()), label (original SemanticKITTI id, instance in the high bits).
-/// Fields of other names, padding too, are passed over. Intensity comes as the file has it (0..255
-/// from many). `stamp_ns` becomes the scan's stamp. Throws DatasetError for whatever is not such a
-/// file.
+/// Reads a PCD (ascii, binary, compressed) or PLY (ascii, binary) file by the names of its fields
+/// (see PointFieldNames): x y z (required), intensity, ring, time (in any unit: see point_times())
+/// and label (original SemanticKITTI id, instance in the high bits). Other fields and padding are
+/// skipped. Intensity stays as the file has it (0..255 from many). `stamp_ns` becomes the scan's
+/// stamp. Throws DatasetError for anything that is not such a file.
 [[nodiscard]] CloudFile read_point_cloud(const std::filesystem::path& file, std::int64_t stamp_ns);
 
 /// One point of a map to be written.

@@ -13,7 +13,7 @@
 #include "core/dataset/file_stamp.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/point_cloud_files.hpp"
-#include "core/lidar/intensity_scale.hpp"
+#include "core/lidar/point_fields.hpp"
 #include "core/lidar/sensor_fit.hpp"
 
 namespace stillmap {
@@ -51,7 +51,7 @@ std::vector<fs::path> scans_of(const fs::path& path) {
         is_scan_file(path, ".bin") || is_scan_file(path, ".pcd") || is_scan_file(path, ".ply");
     if (known) return {path};
     throw DatasetError(path,
-                       "is no recording; give a .bin, .pcd or .ply file, a folder "
+                       "is no dataset; give a .bin, .pcd or .ply file, a folder "
                        "of them, or a bag");
   }
   const fs::path velodyne = path / "velodyne";
@@ -95,7 +95,7 @@ std::vector<std::size_t> lines_in(const fs::path& file, const std::vector<std::s
   if (present != by_name.size()) {
     throw DatasetError(file, "has " + std::to_string(present) + " lines, fewer than the " +
                                  std::to_string(by_name.size()) +
-                                 " scans need; take the file that belongs to this recording");
+                                 " scans need; take the file that belongs to this sequence");
   }
   std::vector<std::size_t> in_order(present);
   for (std::size_t i = 0; i < present; ++i) in_order[i] = i;

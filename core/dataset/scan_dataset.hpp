@@ -14,14 +14,14 @@
 
 namespace stillmap {
 
-/// A recording on disk, read scan by scan:
+/// A dataset on disk, read scan by scan:
 /// - a SemanticKITTI sequence: velodyne/*.bin, and where present labels/*.label, times.txt,
 ///   calib.txt and poses.txt (camera frame) or poses_lidar.txt (lidar frame), and our own
 ///   time_offsets/ and rings/ (see KittiSequenceWriter);
 /// - a folder of .bin, .pcd or .ply files, in natural order ("2" before "10");
 /// - a single such file;
 /// - any ScanSource, such as a bag's topic.
-/// Intensity is brought to 0..1: as the first scan decides, for the whole recording.
+/// Intensity is scaled to 0..1, by a factor that the first scan decides for all.
 class ScanDataset {
  public:
   /// Throws DatasetError when there is no scan to be found. Reads the first scan.
@@ -59,7 +59,7 @@ class ScanDataset {
 
   /// Where the scans come from, when they are not in files of their own.
   std::shared_ptr<const ScanSource> source_;
-  /// Where velodyne/ lies; empty for other recordings.
+  /// Where velodyne/ lies; empty for other datasets.
   std::filesystem::path sequence_;
   std::vector<std::filesystem::path> files_;
   /// Line of each scan in times.txt and the pose files.

@@ -4,14 +4,23 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
-#include "core/dataset/dataset_frame.hpp"
+#include "core/lidar/scan.hpp"
 #include "core/lidar/sensor_model.hpp"
 
 namespace stillmap {
 
-/// Scans from somewhere else than files of one scan each, as from a bag. Thread-safe as far as its
-/// callers need: one thread reads.
+/// One scan of a dataset and its ground truth.
+struct DatasetFrame {
+  /// With the labels reduced to the network's classes, where the dataset has labels.
+  Scan scan;
+  /// Original SemanticKITTI labels: moving ids in the low, instances in the high 16 bits. Truth for
+  /// evaluation only. Empty without labels.
+  std::vector<std::uint32_t> raw_labels;
+};
+
+/// Scans that do not come from files of one scan each, such as those of a bag. One thread reads.
 class ScanSource {
  public:
   ScanSource() = default;
@@ -26,7 +35,7 @@ class ScanSource {
   /// Intensity in the sensor's own numbers. Throws DatasetError when the scan is damaged; the
   /// others can still be read.
   [[nodiscard]] virtual DatasetFrame read(std::size_t i) const = 0;
-  /// When the recording says which it was.
+  /// Nothing where the source does not tell which sensor it was.
   [[nodiscard]] virtual std::optional<SensorModel> sensor() const = 0;
 };
 

@@ -4,7 +4,7 @@
 #include <optional>
 #include <span>
 
-#include "core/lidar/motion.hpp"
+#include "core/lidar/labelled_scan.hpp"
 
 namespace stillmap::evaluation {
 

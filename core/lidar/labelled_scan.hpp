@@ -4,7 +4,6 @@
 #include <span>
 #include <vector>
 
-#include "core/lidar/motion.hpp"
 #include "core/lidar/scan.hpp"
 
 namespace stillmap {
@@ -17,6 +16,16 @@ struct PointLabels {
   std::vector<float> confidence;
 
   [[nodiscard]] bool empty() const { return classes.empty(); }
+};
+
+/// The paper's three kinds of points (II-C.2).
+enum class Motion : std::uint8_t {
+  /// Buildings, ground, poles: in the local map and in the static map.
+  stationary = 0,
+  /// Could move and stands still, as a parked car: in the local map, not in the static map.
+  semi_static = 1,
+  /// Moving now: in neither map.
+  highly_dynamic = 2,
 };
 
 /// A prepared scan with what is known of each point. `labels` may be empty, `motion` is as long as

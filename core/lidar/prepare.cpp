@@ -11,7 +11,8 @@
 namespace stillmap {
 namespace {
 
-/// Points whose time lies more than this many periods away have a broken clock, not a long way.
+/// Points whose time lies more periods than this from the stamp have a wrong time and are not
+/// moved.
 constexpr double max_periods = 2.0;
 
 class Usable {

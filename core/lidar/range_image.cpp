@@ -65,25 +65,6 @@ class Projection {
   float columns_per_radian_, rows_per_radian_;
 };
 
-/// Few points share a pixel: insertion sort beats std::sort there. The many of a strange scan go
-/// the safe way.
-template <class Before>
-void sort_mostly_few(std::span<std::int32_t> points, Before before) {
-  constexpr std::size_t few = 16;
-  if (points.size() > few) {
-    std::ranges::sort(points, before);
-    return;
-  }
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    const std::int32_t point = points[i];
-    std::size_t place = i;
-    for (; place > 0 && before(point, points[place - 1]); --place) {
-      points[place] = points[place - 1];
-    }
-    points[place] = point;
-  }
-}
-
 }  // namespace
 
 ProjectionModel projection_model(const SensorModel& sensor) {
@@ -102,8 +83,7 @@ RangeImage::RangeImage(std::span<const Eigen::Vector3f> points_lidar, const Proj
       range_m_(nearest_.size(), -1.0F) {
   assert(model.rows > 0 && model.columns > 0 && model.fov_down < model.fov_up);
   project(points_lidar, model);
-  put_into_pixels();
-  sort_within_pixels();
+  find_nearest();
 }
 
 void RangeImage::project(std::span<const Eigen::Vector3f> points_lidar,
@@ -122,40 +102,14 @@ void RangeImage::project(std::span<const Eigen::Vector3f> points_lidar,
   });
 }
 
-void RangeImage::put_into_pixels() {
-  begin_.assign(pixel_count() + 1, 0);
-  // Counting sort: begin_[p] first counts the points before the end of pixel p and is moved down
-  // to the beginning while the points are put in.
-  for (const std::int32_t pixel : pixel_of_point_) {
-    if (pixel != none) ++begin_[static_cast<std::size_t>(pixel)];
-  }
-  std::uint32_t end = 0;
-  for (std::uint32_t& entry : begin_) entry = end += entry;
-  points_by_pixel_.resize(end);
+void RangeImage::find_nearest() {
   for (std::size_t i = 0; i < pixel_of_point_.size(); ++i) {
     if (pixel_of_point_[i] == none) continue;
-    points_by_pixel_[--begin_[static_cast<std::size_t>(pixel_of_point_[i])]] =
-        static_cast<std::int32_t>(i);
+    const auto pixel = static_cast<std::size_t>(pixel_of_point_[i]);
+    if (nearest_[pixel] != none && range_m_[pixel] <= range_of_point_m_[i]) continue;
+    nearest_[pixel] = static_cast<std::int32_t>(i);
+    range_m_[pixel] = range_of_point_m_[i];
   }
-}
-
-void RangeImage::sort_within_pixels() {
-  const auto range = [this](std::int32_t point) {
-    return range_of_point_m_[static_cast<std::size_t>(point)];
-  };
-  const auto farther = [&](std::int32_t a, std::int32_t b) {
-    return range(a) > range(b) || (range(a) == range(b) && a > b);
-  };
-  const tbb::blocked_range<std::size_t> all(0, pixel_count(), 4096);
-  tbb::parallel_for(all, [&](const auto& some) {
-    for (std::size_t p = some.begin(); p < some.end(); ++p) {
-      const auto points = std::span(points_by_pixel_).subspan(begin_[p], begin_[p + 1] - begin_[p]);
-      if (points.empty()) continue;
-      sort_mostly_few(points, farther);
-      nearest_[p] = points.back();
-      range_m_[p] = range(points.back());
-    }
-  });
 }
 
 }  // namespace stillmap

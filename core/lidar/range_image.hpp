@@ -30,8 +30,7 @@ struct ProjectionModel {
 /// row. Column columns/2 begins at +x, +y lies in the left half. The printed equation takes arcsin
 /// of y/x and adds the fields of view with the wrong sign; the weights are trained with this one.
 ///
-/// A pixel holds all points that fall into it. Points with range 0 or that are not finite have no
-/// pixel.
+/// Points with range 0 or that are not finite have no pixel.
 class RangeImage {
  public:
   /// Pixel of a point that has none, point of a pixel that has none.
@@ -52,7 +51,7 @@ class RangeImage {
            static_cast<std::size_t>(column);
   }
 
-  /// Index of the nearest point of each pixel, or `none`.
+  /// Index of the nearest point of each pixel, of equally near ones the first; or `none`.
   [[nodiscard]] std::span<const std::int32_t> nearest() const { return nearest_; }
   /// Range of the nearest point of each pixel [m], or -1.
   [[nodiscard]] std::span<const float> range_m() const { return range_m_; }
@@ -61,24 +60,14 @@ class RangeImage {
   /// Range of each point [m]; not finite where the point is not.
   [[nodiscard]] std::span<const float> range_of_point_m() const { return range_of_point_m_; }
 
-  /// All points of a pixel in descending order of range (paper, II-B); the last is the nearest.
-  /// Points at equal range are in falling order of their index.
-  [[nodiscard]] std::span<const std::int32_t> points_in(std::size_t pixel) const {
-    return std::span(points_by_pixel_).subspan(begin_[pixel], begin_[pixel + 1] - begin_[pixel]);
-  }
-
  private:
   void project(std::span<const Eigen::Vector3f> points_lidar, const ProjectionModel& model);
-  void put_into_pixels();
-  void sort_within_pixels();
+  void find_nearest();
 
   int rows_;
   int columns_;
   std::vector<std::int32_t> pixel_of_point_;
   std::vector<float> range_of_point_m_;
-  /// Points of pixel p: points_by_pixel_[begin_[p]] up to begin_[p + 1].
-  std::vector<std::uint32_t> begin_;
-  std::vector<std::int32_t> points_by_pixel_;
   std::vector<std::int32_t> nearest_;
   std::vector<float> range_m_;
 };

@@ -11,13 +11,13 @@
 
 namespace stillmap {
 
-/// A scan as ranges over direction, with the pose it was taken from.
+/// A posed range image: the ranges of a scan over direction, and the pose it was taken from.
 class RangeImageView {
  public:
   RangeImageView(const Scan& scan, std::span<const SemanticClass> labels, const SensorModel& sensor,
                  const Eigen::Isometry3d& T_map_lidar);
 
-  /// What the view saw in the direction of a point.
+  /// What was measured in the direction of a point.
   struct Observation {
     float range_m;
     /// Smallest range in the 3 x 3 pixels around.
@@ -31,7 +31,7 @@ class RangeImageView {
 
   [[nodiscard]] const Eigen::Vector3f& origin_map() const { return origin_map_; }
 
-  /// The scan was taken from here.
+  /// Replaces the pose.
   void move_to(const Eigen::Isometry3d& T_map_lidar);
 
  private:

@@ -12,8 +12,8 @@ namespace stillmap {
 /// One revolution of the lidar. Every per-point vector is either empty ("not known") or as long
 /// as `points_lidar`.
 struct Scan {
-  /// Time of the scan's reference, nanoseconds since the Unix epoch (or since the recording's
-  /// start).
+  /// Time of the scan's reference, nanoseconds since the Unix epoch (or since the start of
+  /// the dataset).
   std::int64_t stamp_ns = 0;
   /// Frame of the lidar: x forward, y left, z up [m].
   std::vector<Eigen::Vector3f> points_lidar;
@@ -24,7 +24,7 @@ struct Scan {
   /// Beam of each point in the source's own numbers, which may begin at the top or, as Velodyne's
   /// drivers do, at the bottom; empty when unknown. assign_rings() gives 0 = highest for all.
   std::vector<std::uint16_t> ring;
-  /// Class of each point where the recording brings labels (reduced to the network's classes).
+  /// Class of each point where the dataset has labels (reduced to the network's classes).
   std::vector<SemanticClass> labels;
 
   [[nodiscard]] std::size_t size() const { return points_lidar.size(); }

@@ -17,9 +17,9 @@ constexpr std::size_t min_points = 1000;
 constexpr std::size_t min_points_on_ring = 10;
 /// Beams of one kind of sensor differ by less from its data sheet, apart from mounting and wear.
 constexpr double max_elevation_difference = 0.5 * degree;
-/// Two rings at one elevation are laid apart by this: beams must fall strictly.
+/// Smallest step between the elevations of two rings: beams must descend strictly.
 constexpr double min_elevation_step = 0.01 * degree;
-/// Bands of a sensor without rings: of 1 to 2 degrees, as its points lie.
+/// Bands that the field of view of a sensor without rings is divided into: 1 to 2 degrees each.
 constexpr int bands = 40;
 /// A sensor's points lie inside its field of view but for noise and mounting.
 constexpr double margin = 1.0 * degree;
@@ -28,7 +28,7 @@ constexpr std::size_t max_samples = 8192;
 double elevation_of(const Eigen::Vector3f& p) {
   const double across = std::hypot(static_cast<double>(p.x()), static_cast<double>(p.y()));
   const double elevation = std::atan2(static_cast<double>(p.z()), across);
-  // Points at the origin were not measured.
+  // Drivers put points that were not measured at the origin.
   return p.squaredNorm() > 0.01F ? elevation : NAN;
 }
 
@@ -53,7 +53,7 @@ std::vector<double> ring_elevations(const Scan& scan) {
   return elevations;
 }
 
-/// Fills the rings that saw nothing between or beyond their neighbours.
+/// Interpolates or extrapolates the elevations of rings without points; false with fewer than two.
 bool complete(std::vector<double>& elevations) {
   const std::ptrdiff_t known = std::ranges::count_if(elevations, [](double e) { return e == e; });
   if (known < 2) return false;
@@ -132,7 +132,7 @@ std::vector<double> sorted_elevations(const Scan& scan) {
   return elevations;
 }
 
-/// The edges of the share of the elevations that a few broken points do not move.
+/// The 0.1 % and the 99.9 % quantile: a few broken points do not move them.
 std::pair<double, double> edges_of(const std::vector<double>& sorted) {
   const std::size_t cut = sorted.size() / 1000;
   return {sorted[cut], sorted[sorted.size() - 1 - cut]};

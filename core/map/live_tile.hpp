@@ -10,7 +10,7 @@
 #include <span>
 #include <vector>
 
-#include "core/lidar/motion.hpp"
+#include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/voxel_index.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/tile_evidence.hpp"

@@ -7,7 +7,7 @@
 namespace stillmap {
 namespace {
 
-/// Fewer points fit every line and every plane.
+/// Neighbours that a line or a plane needs.
 constexpr int min_neighbours = 5;
 /// The line's eigenvalue is this many times the next one (A-LOAM).
 constexpr double line_dominance = 3.0;

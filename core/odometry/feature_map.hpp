@@ -41,7 +41,7 @@ class FeatureMap {
   [[nodiscard]] Neighbours nearest(const Eigen::Vector3f& position_map, int n,
                                    float max_distance_m) const;
 
-  /// Forgets voxels whose first point is farther than the configured radius from `centre_map`.
+  /// Removes voxels whose first point is farther than the configured radius from `centre_map`.
   void remove_far_from(const Eigen::Vector3f& centre_map);
 
   /// Removes the movable points for which `is_gone(position_map)` holds.
@@ -50,7 +50,6 @@ class FeatureMap {
 
   void clear();
   [[nodiscard]] std::size_t size() const { return size_; }
-  [[nodiscard]] bool empty() const { return size_ == 0; }
 
  private:
   static constexpr int block_capacity = 32;

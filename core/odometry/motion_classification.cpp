@@ -2,14 +2,21 @@
 
 #include <tbb/parallel_for.h>
 
-#include "core/odometry/voxel_downsample.hpp"
+#include <cmath>
+#include <utility>
+
+#include "core/odometry/features.hpp"
 
 namespace stillmap {
 namespace {
 
+/// A surface is the same one within this distance along the ray [m].
+constexpr float same_surface_m = 0.3F;
+/// A surface farther in front of the point than this belonged to another object [m].
+constexpr float max_gone_gap_m = 3.0F;
 /// Spacing of the points of an object that are looked up [m].
 constexpr double sample_spacing_m = 0.2;
-/// Fewer decisive samples say nothing of an object.
+/// An object with fewer decisive samples stays undecided.
 constexpr int min_samples = 5;
 /// Share of decisive samples that must have been there before for an object to count as parked.
 constexpr double parked_share = 0.6;
@@ -78,6 +85,48 @@ std::vector<bool> inconsistent_objects(const Scan& scan, const PointLabels& labe
 }
 
 }  // namespace
+
+float RangeImageHistory::margin(float range_m) const {
+  return static_cast<float>(config_.free_margin_m) +
+         static_cast<float>(config_.free_margin_share) * range_m;
+}
+
+std::size_t RangeImageHistory::size() const {
+  return views_.size() / static_cast<std::size_t>(config_.range_image_history_interval);
+}
+
+PastObservation RangeImageHistory::observation(std::size_t age, const Eigen::Vector3f& point_map,
+                                               const RangeImageView& now) const {
+  const auto interval = static_cast<std::size_t>(config_.range_image_history_interval);
+  const RangeImageView& past = views_[views_.size() - (age + 1) * interval];
+  const auto observation = past.observe(point_map);
+  if (!observation) return PastObservation::unknown;
+  if (observation->nearest_m > observation->point_range_m + margin(observation->point_range_m))
+    return PastObservation::free;
+  if (!observation->movable) return PastObservation::unknown;
+  if (std::abs(observation->range_m - observation->point_range_m) < same_surface_m)
+    return PastObservation::same;
+  const float gap = observation->point_range_m - observation->range_m;
+  if (gap < margin(observation->range_m) || gap > max_gone_gap_m) return PastObservation::unknown;
+  const Eigen::Vector3f surface_map =
+      past.origin_map() + observation->range_m * observation->direction_map;
+  return sees_through(now, surface_map) ? PastObservation::removed_in_front
+                                        : PastObservation::unknown;
+}
+
+bool RangeImageHistory::sees_through(const RangeImageView& view,
+                                     const Eigen::Vector3f& point_map) const {
+  const auto observation = view.observe(point_map);
+  return observation &&
+         observation->nearest_m > observation->point_range_m + margin(observation->point_range_m);
+}
+
+void RangeImageHistory::add(RangeImageView view) {
+  views_.push_back(std::move(view));
+  const auto kept = static_cast<std::size_t>(config_.range_image_history_size *
+                                             config_.range_image_history_interval);
+  if (views_.size() > kept) views_.pop_front();
+}
 
 std::vector<MotionClass> classify_motion(const Scan& scan, const ObjectClusters& objects,
                                          const Eigen::Isometry3d& T_map_lidar,

@@ -6,11 +6,9 @@
 #include <stdexcept>
 #include <utility>
 
-#include "core/odometry/coarse_registration.hpp"
 #include "core/odometry/features.hpp"
 #include "core/odometry/motion_classification.hpp"
 #include "core/odometry/object_clusters.hpp"
-#include "core/odometry/range_image_history.hpp"
 #include "core/odometry/registration.hpp"
 #include "core/odometry/relocalization.hpp"
 #include "core/odometry/se3.hpp"
@@ -18,67 +16,18 @@
 namespace stillmap {
 namespace {
 
-/// A gap in time beyond which the last velocity says nothing any more [s].
+/// Time beyond which the last velocity is not extrapolated [s].
 constexpr double max_prediction_s = 1.0;
-/// After so many scans without a pose the local map starts anew where the prediction is.
+/// After this many lost scans in a row the local map starts anew at the predicted pose.
 constexpr int max_lost_scans = 10;
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
-}  // namespace
-
-namespace {
-
-/// The paper's "no weighting" is exactly that.
+/// The paper's "no weighting" has no robust kernel either.
 OdometryConfig without_unused_kernel(OdometryConfig config) {
   if (config.weighting == Weighting::none) config.registration.robust_scale_m = 0.0;
   return config;
 }
-
-}  // namespace
-
-struct Odometry::State {
-  State(const OdometryConfig& odometry_config, const SensorModel& sensor_model)
-      : config(without_unused_kernel(odometry_config)),
-        sensor(sensor_model),
-        map{FeatureMap(odometry_config.local_map), FeatureMap(odometry_config.local_map)},
-        history(odometry_config.motion) {}
-
-  /// The scan as later ones look back on it; nothing where they do not.
-  [[nodiscard]] std::optional<RangeImageView> view_of(const Scan& scan, const PointLabels& labels,
-                                                      const Eigen::Isometry3d& T_map_lidar) const;
-  [[nodiscard]] std::vector<MotionClass> classify(const Scan& scan, const ObjectClusters& objects,
-                                                  const std::optional<RangeImageView>& now,
-                                                  const Eigen::Isometry3d& T_map_lidar) const;
-  /// Whether the last velocity says where a scan of this time is.
-  [[nodiscard]] bool has_velocity(std::int64_t stamp_ns) const;
-  /// A scan without a pose stays out of the local map, unless the map is given up for good.
-  [[nodiscard]] bool may_extend_map(OdometryHealth health);
-  [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
-                                             Eigen::Isometry3d T_map_lidar_predicted,
-                                             bool prediction_is_good) const;
-  void update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
-                    const Eigen::Isometry3d& T_map_lidar);
-
-  OdometryConfig config;
-  SensorModel sensor;
-  LocalMap map;
-  /// Points of a map made earlier, until the first scan has its place in it.
-  std::vector<LabelledPoint> prior_map;
-  RangeImageHistory history;
-  bool started = false;
-  /// Scans in a row that could not be registered.
-  int lost_scans = 0;
-  std::int64_t last_stamp_ns = 0;
-  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
-  /// The last scan's features, to align the next one coarsely where no velocity is known.
-  FeatureSets last_features;
-  /// Motion from the last scan but one to the last, and the time between them.
-  Eigen::Isometry3d last_motion = Eigen::Isometry3d::Identity();
-  double last_interval_s = 0.0;
-};
-
-namespace {
 
 LocalMap coarse_map_of_scan(const FeatureSets& features, const Eigen::Isometry3d& T_map_lidar) {
   LocalMap map = make_coarse_map();
@@ -93,73 +42,6 @@ LocalMap coarse_map_of_scan(const FeatureSets& features, const Eigen::Isometry3d
   fill(features.planes, map.planes);
   return map;
 }
-
-}  // namespace
-
-std::optional<RangeImageView> Odometry::State::view_of(const Scan& scan, const PointLabels& labels,
-                                                       const Eigen::Isometry3d& T_map_lidar) const {
-  if (labels.empty() || !config.motion.use_range_image_history) return std::nullopt;
-  return RangeImageView(scan, labels.classes, sensor, T_map_lidar);
-}
-
-std::vector<MotionClass> Odometry::State::classify(const Scan& scan, const ObjectClusters& objects,
-                                                   const std::optional<RangeImageView>& now,
-                                                   const Eigen::Isometry3d& T_map_lidar) const {
-  if (!now) return std::vector<MotionClass>(objects.count, MotionClass::undecided);
-  return classify_motion(scan, objects, T_map_lidar, history, *now, config.motion);
-}
-
-bool Odometry::State::has_velocity(std::int64_t stamp_ns) const {
-  return last_interval_s > 0.0 && lost_scans == 0 &&
-         seconds(stamp_ns - last_stamp_ns) <= max_prediction_s;
-}
-
-bool Odometry::State::may_extend_map(OdometryHealth health) {
-  lost_scans = health == OdometryHealth::lost ? lost_scans + 1 : 0;
-  if (lost_scans < max_lost_scans) return lost_scans == 0;
-  map.edges.clear();
-  map.planes.clear();
-  lost_scans = 0;
-  return true;
-}
-
-OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
-                                              Eigen::Isometry3d T_map_lidar_predicted,
-                                              bool prediction_is_good) const {
-  if (!started) {
-    if (prior_map.empty()) return OdometryResult{.T_map_lidar = T_map_lidar_predicted};
-    return relocalize(features, prior_map, map, T_map_lidar_predicted, config);
-  }
-  if (!prediction_is_good) {
-    const LocalMap coarse_map = coarse_map_of_scan(last_features, T_map_lidar);
-    T_map_lidar_predicted = register_features(features, coarse_map, T_map_lidar_predicted,
-                                              coarse_registration_config(config))
-                                .T_map_lidar;
-  }
-  return register_features(features, map, T_map_lidar_predicted, config);
-}
-
-void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
-                                   const Eigen::Isometry3d& T_map_lidar_now) {
-  if (started) {
-    last_motion = T_map_lidar.inverse() * T_map_lidar_now;
-    last_interval_s = seconds(stamp_ns - last_stamp_ns);
-  }
-  started = true;
-  prior_map = {};
-  last_stamp_ns = stamp_ns;
-  T_map_lidar = T_map_lidar_now;
-  if (!view) return;
-  view->move_to(T_map_lidar);
-  const auto is_gone = [&](const Eigen::Vector3f& p_map) {
-    return history.sees_through(*view, p_map);
-  };
-  map.edges.remove_movable_if(is_gone);
-  map.planes.remove_movable_if(is_gone);
-  history.add(*std::move(view));
-}
-
-namespace {
 
 SemanticClass label_of(const PointLabels& labels, std::size_t i) {
   return labels.empty() ? SemanticClass::unlabeled : labels.classes[i];
@@ -224,6 +106,110 @@ void extend_local_map(LocalMap& map, const Scan& scan, const PointLabels& labels
 
 }  // namespace
 
+struct Odometry::State {
+  State(const OdometryConfig& odometry_config, const SensorModel& sensor_model)
+      : config(without_unused_kernel(odometry_config)),
+        sensor(sensor_model),
+        map{FeatureMap(odometry_config.local_map), FeatureMap(odometry_config.local_map)},
+        history(odometry_config.motion) {}
+
+  /// The range image of the scan for the history; nothing where none is kept.
+  [[nodiscard]] std::optional<RangeImageView> view_of(const Scan& scan, const PointLabels& labels,
+                                                      const Eigen::Isometry3d& T_map_lidar) const;
+  [[nodiscard]] std::vector<MotionClass> classify(const Scan& scan, const ObjectClusters& objects,
+                                                  const std::optional<RangeImageView>& now,
+                                                  const Eigen::Isometry3d& T_map_lidar) const;
+  /// Whether the last velocity predicts the pose of a scan of this time.
+  [[nodiscard]] bool has_velocity(std::int64_t stamp_ns) const;
+  /// Counts lost scans, which stay out of the local map. Clears the map after `max_lost_scans`.
+  [[nodiscard]] bool may_extend_map(OdometryHealth health);
+  [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
+                                             Eigen::Isometry3d T_map_lidar_predicted,
+                                             bool prediction_is_good) const;
+  void update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
+                    const Eigen::Isometry3d& T_map_lidar);
+
+  OdometryConfig config;
+  SensorModel sensor;
+  LocalMap map;
+  /// Points of a prior map, until the first scan is registered against it.
+  std::vector<LabelledPoint> prior_map;
+  RangeImageHistory history;
+  bool started = false;
+  /// Scans in a row that could not be registered.
+  int lost_scans = 0;
+  std::int64_t last_stamp_ns = 0;
+  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+  /// The last scan's features, to align the next one coarsely where no velocity is known.
+  FeatureSets last_features;
+  /// Motion from the last scan but one to the last, and the time between them.
+  Eigen::Isometry3d last_motion = Eigen::Isometry3d::Identity();
+  double last_interval_s = 0.0;
+};
+
+std::optional<RangeImageView> Odometry::State::view_of(const Scan& scan, const PointLabels& labels,
+                                                       const Eigen::Isometry3d& T_map_lidar) const {
+  if (labels.empty() || !config.motion.use_range_image_history) return std::nullopt;
+  return RangeImageView(scan, labels.classes, sensor, T_map_lidar);
+}
+
+std::vector<MotionClass> Odometry::State::classify(const Scan& scan, const ObjectClusters& objects,
+                                                   const std::optional<RangeImageView>& now,
+                                                   const Eigen::Isometry3d& T_map_lidar) const {
+  if (!now) return std::vector<MotionClass>(objects.count, MotionClass::undecided);
+  return classify_motion(scan, objects, T_map_lidar, history, *now, config.motion);
+}
+
+bool Odometry::State::has_velocity(std::int64_t stamp_ns) const {
+  return last_interval_s > 0.0 && lost_scans == 0 &&
+         seconds(stamp_ns - last_stamp_ns) <= max_prediction_s;
+}
+
+bool Odometry::State::may_extend_map(OdometryHealth health) {
+  lost_scans = health == OdometryHealth::lost ? lost_scans + 1 : 0;
+  if (lost_scans < max_lost_scans) return lost_scans == 0;
+  map.edges.clear();
+  map.planes.clear();
+  lost_scans = 0;
+  return true;
+}
+
+OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
+                                              Eigen::Isometry3d T_map_lidar_predicted,
+                                              bool prediction_is_good) const {
+  if (!started) {
+    if (prior_map.empty()) return OdometryResult{.T_map_lidar = T_map_lidar_predicted};
+    return relocalize(features, prior_map, map, T_map_lidar_predicted, config);
+  }
+  if (!prediction_is_good) {
+    const LocalMap coarse_map = coarse_map_of_scan(last_features, T_map_lidar);
+    T_map_lidar_predicted = register_features(features, coarse_map, T_map_lidar_predicted,
+                                              coarse_registration_config(config))
+                                .T_map_lidar;
+  }
+  return register_features(features, map, T_map_lidar_predicted, config);
+}
+
+void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
+                                   const Eigen::Isometry3d& T_map_lidar_now) {
+  if (started) {
+    last_motion = T_map_lidar.inverse() * T_map_lidar_now;
+    last_interval_s = seconds(stamp_ns - last_stamp_ns);
+  }
+  started = true;
+  prior_map = {};
+  last_stamp_ns = stamp_ns;
+  T_map_lidar = T_map_lidar_now;
+  if (!view) return;
+  view->move_to(T_map_lidar);
+  const auto is_gone = [&](const Eigen::Vector3f& p_map) {
+    return history.sees_through(*view, p_map);
+  };
+  map.edges.remove_movable_if(is_gone);
+  map.planes.remove_movable_if(is_gone);
+  history.add(*std::move(view));
+}
+
 Odometry::Odometry(const OdometryConfig& config, const SensorModel& sensor)
     : state_(std::make_unique<State>(config, sensor)) {
   if (const std::string faults = config.faults(); !faults.empty())
@@ -267,7 +253,7 @@ Odometry::Step Odometry::register_scan(const Scan& scan, const PointLabels& labe
   step.result = state.estimate_pose(sets, T_map_lidar_predicted, prediction_is_good);
   const Eigen::Isometry3d& T_map_lidar = step.result.T_map_lidar;
 
-  // What moves stays out of the local map, eq. (9) and c > c_th.
+  // Moving points stay out of the local map, eq. (9) and c > c_th.
   step.motion =
       classify_point_motion(scan, labels, objects, motion_classes, T_map_lidar, state.map, config);
   if (state.may_extend_map(step.result.health))

@@ -43,8 +43,8 @@ class Odometry {
   [[nodiscard]] Step register_scan(const Scan& scan, const PointLabels& labels,
                                    const std::optional<Eigen::Isometry3d>& T_map_lidar_prior);
 
-  /// Adds points of a map made earlier (map frame) to the local map. Before the first scan, that is
-  /// then looked for in them, round its prior (see relocalize).
+  /// Adds points of a map made earlier (map frame) to the local map. Before the first scan: that
+  /// scan is then relocalized in them, round its prior (see relocalize).
   void add_prior_map(std::span<const LabelledPoint> points_map);
 
   /// Forgets poses and local map.

@@ -38,9 +38,9 @@ struct LocalMapConfig {
   /// Edge of a hash voxel [m]; neighbours are found in the 27 voxels round a point.
   double voxel_size_m = 1.0;
   int max_points_per_voxel = 20;
-  /// Points nearer than this to one that is there already bring nothing new [m].
+  /// Points nearer than this to a stored one are not added [m].
   double min_spacing_m = 0.2;
-  /// Voxels farther from the lidar than this are forgotten [m].
+  /// Voxels farther from the lidar than this are removed [m].
   double radius_m = 100.0;
 };
 

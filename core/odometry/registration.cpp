@@ -16,6 +16,8 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 /// Neighbours are looked up again once the point has moved this far since [m]; nearer than that
 /// they are nearly always the same ones.
 constexpr float same_neighbours_m = 0.02F;
+/// Motion that the coarse registration can find [m].
+constexpr double coarse_reach_m = 3.0;
 
 struct Correspondence {
   Eigen::Vector3d point_lidar;
@@ -179,6 +181,23 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
   result.rms_residual_m = std::sqrt(equations.weighted_squares / equations.weights);
   result.covariance = covariance_of(equations);
   return result;
+}
+
+OdometryConfig coarse_registration_config(OdometryConfig config) {
+  config.weighting = Weighting::none;
+  config.registration.robust_scale_m = 0.5;
+  config.registration.max_neighbour_distance_m = coarse_reach_m;
+  config.registration.max_residual_m = coarse_reach_m;
+  config.registration.max_iterations = 50;
+  config.registration.step_translation_m = 0.01;
+  config.registration.step_rotation_rad = 0.001;
+  return config;
+}
+
+LocalMap make_coarse_map() {
+  const LocalMapConfig config{
+      .voxel_size_m = coarse_reach_m, .max_points_per_voxel = 32, .min_spacing_m = 0.5};
+  return {FeatureMap(config), FeatureMap(config)};
 }
 
 }  // namespace stillmap

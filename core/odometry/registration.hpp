@@ -35,4 +35,12 @@ struct LocalMap {
                                                const Eigen::Isometry3d& T_map_lidar_predicted,
                                                const OdometryConfig& config);
 
+/// Configuration of a registration that needs no prediction: it finds motions of up to 3 m (30 m/s
+/// at 10 scans a second). A robust kernel replaces eq. (10), which has no weight for residuals
+/// above 1 m.
+[[nodiscard]] OdometryConfig coarse_registration_config(OdometryConfig config);
+
+/// An empty map for the coarse registration, with voxels as large as the motions that it finds.
+[[nodiscard]] LocalMap make_coarse_map();
+
 }  // namespace stillmap

@@ -4,17 +4,15 @@
 #include <numbers>
 #include <vector>
 
-#include "core/odometry/coarse_registration.hpp"
-
 namespace stillmap {
 namespace {
 
 /// A point of the scan lies on the map when a point of it is as near as this [m].
 constexpr float match_distance_m = 0.25F;
-/// Share of such points that ends the search, and the least that is a place.
+/// Share of such points that ends the search, and the smallest share that is accepted.
 constexpr double sure_match_ratio = 0.85;
 constexpr double min_match_ratio = 0.6;
-/// Places that are tried are so far apart that the coarse registration closes the gap.
+/// Distance between the guesses; the coarse registration converges from half of it.
 constexpr double guess_spacing_m = 3.5;
 constexpr int headings = 12;
 constexpr double refinement_radius_m = 0.6;
@@ -24,7 +22,7 @@ bool is_pole_like(SemanticClass label) {
          label == SemanticClass::traffic_sign;
 }
 
-/// This place and six in a ring round it.
+/// Zero, and six offsets in a ring round it.
 std::vector<Eigen::Vector3d> offsets_around(double radius_m) {
   std::vector<Eigen::Vector3d> places{Eigen::Vector3d::Zero()};
   for (int k = 0; k < 6; ++k) {
@@ -34,7 +32,7 @@ std::vector<Eigen::Vector3d> offsets_around(double radius_m) {
   return places;
 }
 
-/// The guess first, then all headings there, then those of the places round it.
+/// The guess itself, then all headings there, then all headings at the places round it.
 std::vector<Eigen::Isometry3d> pose_guesses_around(const Eigen::Isometry3d& T_map_lidar) {
   std::vector<Eigen::Isometry3d> guesses;
   for (const Eigen::Vector3d& place : offsets_around(guess_spacing_m)) {
@@ -49,7 +47,7 @@ std::vector<Eigen::Isometry3d> pose_guesses_around(const Eigen::Isometry3d& T_ma
   return guesses;
 }
 
-/// Ground matches wherever the map has any, and movable things may have gone.
+/// Ground matches anywhere on the ground of the map, and movable objects may have left.
 bool is_landmark(SemanticClass label) { return !is_ground(label) && !is_movable(label); }
 
 double match_ratio(const FeatureSets& features, const LocalMap& map,
@@ -123,13 +121,13 @@ OdometryResult relocalize(const FeatureSets& features, std::span<const LabelledP
     if (rough.health != OdometryHealth::lost) search.try_from(rough.T_map_lidar);
     if (search.share() >= sure_match_ratio) return search.best();
   }
-  // Nearly there, perhaps: along a street the registration may stop a step too early.
+  // Refine: along a street the registration may stop short of the optimum.
   const Eigen::Isometry3d T_map_lidar_best = search.best().T_map_lidar;
   for (const Eigen::Vector3d& place : offsets_around(refinement_radius_m)) {
     search.try_from(Eigen::Translation3d(place) * T_map_lidar_best);
   }
   if (search.share() >= min_match_ratio) return search.best();
-  // Against nothing, registration says what is known: nothing.
+  // Against an empty map the registration returns the guess as lost.
   return register_features(features, make_coarse_map(), T_map_lidar_guess, config);
 }
 

@@ -6,11 +6,11 @@
 
 namespace stillmap {
 
-/// Adds points of a map that was made earlier (map frame): what is thin and upright to the edges,
-/// all else to the planes. Movable things are left out.
+/// Adds points of a prior map (map frame): poles, trunks and traffic signs to the edges, all others
+/// to the planes. Movable objects are left out.
 void insert_prior_map(std::span<const LabelledPoint> points_map, LocalMap& map);
 
-/// Where a scan stands in a map that was made earlier: near `T_map_lidar_guess`, or, where the scan
+/// The pose of a scan in a prior map: near `T_map_lidar_guess`, or, where the scan
 /// does not fit there, within some 6 m of it at any heading. `map` holds the same points as
 /// `prior_map`, for the fine registration. The guess with health `lost` where it fits nowhere: less
 /// than 60 % of what stands up in the scan lies on the map then.

@@ -5,7 +5,7 @@
 #include <span>
 #include <string_view>
 
-#include "core/dataset/dataset_frame.hpp"
+#include "core/dataset/scan_source.hpp"
 #include "core/lidar/sensor_model.hpp"
 
 namespace stillmap::dds {

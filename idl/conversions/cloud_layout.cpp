@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <utility>
+#include <vector>
 
 #include "sensor_msgs.h"
 
@@ -59,9 +60,9 @@ std::optional<PointColumn> find_integer_column(const PointCloud2& cloud,
   return column;
 }
 
-PointColumn coordinate(const PointCloud2& cloud, const std::string& name) {
-  const auto column = find_column(cloud, {name});
-  if (!column) refuse("no_xyz", "there is no field " + name + "; x, y and z are needed");
+PointColumn coordinate(const PointCloud2& cloud, const std::vector<std::string>& names) {
+  const auto column = find_column(cloud, names);
+  if (!column) refuse("no_xyz", "there is no field " + names.front() + "; x, y and z are needed");
   return *column;
 }
 
@@ -87,7 +88,7 @@ void check_sizes(const PointCloud2& cloud) {
   }
 }
 
-CloudLayout layout_of(const PointCloud2& cloud, const PointFieldCandidates& candidates) {
+CloudLayout layout_of(const PointCloud2& cloud, const PointFieldNames& names) {
   check_sizes(cloud);
   constexpr bool here_big_endian = std::endian::native == std::endian::big;
   return {.width = cloud.width(),
@@ -95,21 +96,21 @@ CloudLayout layout_of(const PointCloud2& cloud, const PointFieldCandidates& cand
           .point_step = cloud.point_step(),
           .row_step = cloud.row_step(),
           .swap_bytes = cloud.is_bigendian() != here_big_endian,
-          .x = coordinate(cloud, "x"),
-          .y = coordinate(cloud, "y"),
-          .z = coordinate(cloud, "z"),
-          .intensity = find_column(cloud, candidates.intensity),
+          .x = coordinate(cloud, names.x),
+          .y = coordinate(cloud, names.y),
+          .z = coordinate(cloud, names.z),
+          .intensity = find_column(cloud, names.intensity),
           // Some simulators number the rings in floats.
-          .ring = find_column(cloud, candidates.ring),
-          .time = find_column(cloud, candidates.time),
-          .label = find_integer_column(cloud, candidates.label)};
+          .ring = find_column(cloud, names.ring),
+          .time = find_column(cloud, names.time),
+          .label = find_integer_column(cloud, names.label)};
 }
 
 }  // namespace
 
-CheckedLayout check_layout(const PointCloud2& cloud, const PointFieldCandidates& candidates) {
+CheckedLayout check_layout(const PointCloud2& cloud, const PointFieldNames& names) {
   try {
-    return {.layout = layout_of(cloud, candidates), .fault = {}};
+    return {.layout = layout_of(cloud, names), .fault = {}};
   } catch (const Refusal& refusal) {
     return {.layout = std::nullopt, .fault = refusal.fault};
   }

@@ -2,8 +2,8 @@
 
 #include <optional>
 #include <string>
-#include <vector>
 
+#include "core/lidar/point_fields.hpp"
 #include "idl/conversions/point_field.hpp"
 #include "idl/msg/wire_types.hpp"
 
@@ -15,17 +15,6 @@ struct PointColumn {
   FieldType type = FieldType::float32;
   /// As the cloud calls it.
   std::string name;
-};
-
-/// Names under which the fields of a cloud may appear; the first that is there is taken. The
-/// defaults are those of the drivers of Velodyne, Ouster, Hesai, Livox, RoboSense and Nebula. An
-/// Ouster's `intensity` counts photons and its `reflectivity` is calibrated, so that comes first; a
-/// Livox's `line` is no ring, as its beams do not keep their elevation.
-struct PointFieldCandidates {
-  std::vector<std::string> intensity = {"reflectivity", "intensity", "i"};
-  std::vector<std::string> ring = {"ring", "channel"};
-  std::vector<std::string> time = {"time", "t", "timestamp", "time_stamp", "offset_time"};
-  std::vector<std::string> label = {"label"};
 };
 
 /// The checked description of a cloud: every point of every column lies within the data.
@@ -58,6 +47,6 @@ struct CheckedLayout {
 
 /// Checks how a cloud describes itself against its data. Any input is fine.
 [[nodiscard]] CheckedLayout check_layout(const sensor_msgs::msg::PointCloud2& cloud,
-                                         const PointFieldCandidates& candidates);
+                                         const PointFieldNames& names);
 
 }  // namespace stillmap::wire

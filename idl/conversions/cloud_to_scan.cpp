@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/lidar/point_time.hpp"
+#include "core/lidar/point_fields.hpp"
 #include "idl/conversions/header.hpp"
 #include "sensor_msgs.h"
 

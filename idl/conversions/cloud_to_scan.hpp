@@ -11,7 +11,7 @@ namespace stillmap::wire {
 
 /// How the fields of incoming clouds are to be understood.
 struct CloudReadOptions {
-  PointFieldCandidates fields;
+  PointFieldNames fields;
   /// Brings the sensor's intensity to 0..1.
   float intensity_scale = 1.0F;
   /// The label field holds classes 0..19; otherwise original SemanticKITTI ids, of which only the

@@ -23,11 +23,7 @@ dds::TopicSpec<sensor_msgs::msg::PointCloud2> points_of(const ServerConfig& conf
 }
 
 wire::CloudReadOptions reading_of(const ServerConfig& config) {
-  const PointFieldNames& names = config.input.fields;
-  return {.fields = {.intensity = names.intensity,
-                     .ring = names.ring,
-                     .time = names.time,
-                     .label = names.label},
+  return {.fields = config.input.fields,
           .intensity_scale = config.mapper.sensor.intensity_scale,
           .labels_are_classes = config.input.label_kind == LabelKind::classes};
 }

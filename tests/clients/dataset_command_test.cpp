@@ -149,6 +149,8 @@ TEST_F(DatasetCommandTest, NamesWhatItCannotUse) {
     return result.err;
   };
   EXPECT_THAT(refusal("export " + path("nowhere") + " " + path("out")), HasSubstr("nowhere"));
+  EXPECT_THAT(refusal("export topic:points " + path("out") + " --silence 3"),
+              HasSubstr("--idle-timeout"));
   EXPECT_THAT(refusal("aggregate " + path("city") + " " + path("c.ply") + " --from 7"),
               HasSubstr("from 7"));
   write("foreign.ply",
@@ -164,7 +166,8 @@ TEST_F(DatasetCommandTest, ALiveTopicBecomesASequence) {
   BackgroundProcess server(stillmap_server_program() + " --delivery every" + on_domain,
                            folder_ / "server.log");
   BackgroundProcess exporting(stillmap_program() + " dataset export topic:points " + path("live") +
-                                  " --silence 3 --sensor vlp_16 --json --timeout 30" + on_domain,
+                                  " --idle-timeout 3 --sensor vlp_16 --json --timeout 30" +
+                                  on_domain,
                               folder_ / "export.log");
   while (content("export.log").find("waiting for scans") == std::string::npos) {
     ASSERT_EQ(run("status --timeout 30" + on_domain).exit_code, 0) << content("server.log");
@@ -173,7 +176,7 @@ TEST_F(DatasetCommandTest, ALiveTopicBecomesASequence) {
   ASSERT_EQ(exporting.wait(), 0) << content("export.log");
   const std::vector<std::string> live_times = lines("live/times.txt");
   const std::vector<std::string> city_times = lines("city/times.txt");
-  // The first scans may be gone before all three have found one another.
+  // The first scans may be lost before discovery is complete.
   ASSERT_GE(live_times.size(), 6U) << content("export.log");
   for (std::size_t k = 0; k < live_times.size(); ++k) {
     const auto found = std::ranges::find(city_times, live_times[k]);
@@ -185,7 +188,7 @@ TEST_F(DatasetCommandTest, ALiveTopicBecomesASequence) {
               content("city/labels/" + stem(number) + ".label").size());
   }
   EXPECT_EQ(line_count("live/poses.txt"), live_times.size());
-  // What the server took from the stream comes back as its labels.
+  // The labels of the stream return as those of the server.
   const std::string log = content("export.log");
   EXPECT_GT(nlohmann::json::parse(log.substr(log.find("\n{"))).at("labelled_points"), 10'000);
 }
@@ -195,7 +198,7 @@ TEST_F(DatasetCommandTest, ALiveExportThatGetsNoPosesSaysSo) {
   const std::string on_domain = " --domain " + std::to_string(free_domain());
   BackgroundProcess server(stillmap_server_program() + on_domain, folder_ / "server.log");
   BackgroundProcess exporting(stillmap_program() + " dataset export topic:other " + path("live") +
-                                  " --silence 1 --timeout 30" + on_domain,
+                                  " --idle-timeout 1 --timeout 30" + on_domain,
                               folder_ / "export.log");
   while (content("export.log").find("waiting for scans") == std::string::npos) {
     ASSERT_EQ(run("status --timeout 30" + on_domain).exit_code, 0) << content("server.log");

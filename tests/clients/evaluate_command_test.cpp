@@ -176,7 +176,7 @@ TEST_F(EvaluateCommandTest, ComparesTheThreeWeightings) {
   ASSERT_EQ(rows.size(), 3U);
   EXPECT_EQ(rows.at(0).at("weighting"), "none");
   EXPECT_EQ(rows.at(2).at("weighting"), "semantic");
-  EXPECT_DOUBLE_EQ(rows.at(0).at("times_better_than_none"), 1.0);
+  EXPECT_DOUBLE_EQ(rows.at(0).at("error_reduction_factor"), 1.0);
   std::filesystem::remove(folder_ / "city/poses.txt");
   EXPECT_EQ(run("evaluate weightings " + path("city")).exit_code, 2);
 }

@@ -1,6 +1,6 @@
-#include "clients/commands/dataset/live_scan_synchronizer.hpp"
-
 #include <gtest/gtest.h>
+
+#include "clients/commands/dataset/live_export.hpp"
 
 namespace stillmap::cli {
 namespace {

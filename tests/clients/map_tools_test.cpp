@@ -60,13 +60,13 @@ TEST_F(MapToolsTest, CheckTellsSoundFromDamagedByItsExitCode) {
   save_street("street.stillmap", true);
   const ProcessResult sound = run("map-check " + path("street.stillmap"));
   EXPECT_EQ(sound.exit_code, 0) << sound.out;
-  EXPECT_THAT(sound.out, HasSubstr("sound: "));
+  EXPECT_THAT(sound.out, HasSubstr("valid: "));
   const std::string bytes = content("street.stillmap");
   write("cut.stillmap", bytes.substr(0, bytes.size() * 3 / 4));
   const ProcessResult damaged = run("map-check --json " + path("cut.stillmap"));
   EXPECT_EQ(damaged.exit_code, 1) << damaged.err;
   const nlohmann::json json = nlohmann::json::parse(damaged.out);
-  EXPECT_FALSE(json.at("sound"));
+  EXPECT_FALSE(json.at("valid"));
   EXPECT_GT(json.at("faults").size(), 0U);
   EXPECT_EQ(content("cut.stillmap"), bytes.substr(0, bytes.size() * 3 / 4));
 }
@@ -94,10 +94,10 @@ TEST_F(MapToolsTest, DiffNamesClassesAndTilesAndDrawsThem) {
   save_street("after.stillmap", false);
   const std::string both = path("before.stillmap") + " " + path("after.stillmap");
   const nlohmann::json diff = json_of("map-diff " + both + " --picture " + path("diff.png"));
-  EXPECT_EQ(diff.at("gone"), 200);
+  EXPECT_EQ(diff.at("removed"), 200);
   EXPECT_EQ(diff.at("appeared"), 0);
-  EXPECT_EQ(diff.at("classes").at("fence").at("gone"), 200);
-  EXPECT_EQ(diff.at("classes").at("road").at("gone"), 0);
+  EXPECT_EQ(diff.at("classes").at("fence").at("removed"), 200);
+  EXPECT_EQ(diff.at("classes").at("road").at("removed"), 0);
   EXPECT_GT(diff.at("tiles").size(), 1U);
   EXPECT_TRUE(exists("diff.png"));
   EXPECT_THAT(run("map-diff " + both).out, AllOf(HasSubstr("fence"), HasSubstr("200")));

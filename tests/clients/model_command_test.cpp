@@ -55,7 +55,7 @@ TEST_F(ModelCommandTest, CalibrationMakesInt8TheDefault) {
   calibrate();
   EXPECT_TRUE(exists("model/int8.yaml"));
   EXPECT_THAT(model("info " + path("model")).out,
-              AllOf(HasSubstr("calibrated: 3 scans of 1 recordings"), HasSubstr("oneDNN int8")));
+              AllOf(HasSubstr("calibrated: 3 scans of 1 data sets"), HasSubstr("oneDNN int8")));
   write("image.f32", std::string(5 * pixels * sizeof(float), '\0'));
   const std::string files = " --input " + path("image.f32") + " --output " + path("out.f32");
   EXPECT_THAT(model("run " + path("model") + files).err, HasSubstr("oneDNN int8"));

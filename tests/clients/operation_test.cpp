@@ -1,21 +1,76 @@
-// The real programs as those see them who operate them.
+// Operation of the real programs: metrics, health, logs, signals.
+#include <arpa/inet.h>
+#include <netinet/in.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
+#include <array>
 #include <chrono>
 #include <csignal>
 #include <map>
 #include <memory>
 #include <regex>
 #include <sstream>
+#include <stdexcept>
 #include <thread>
 #include <vector>
 
 #include "tests/clients/command_test.hpp"
-#include "tests/clients/http_get.hpp"
 
 namespace stillmap::test {
 namespace {
+
+sockaddr_in loopback_port(int port) {
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_port = htons(static_cast<std::uint16_t>(port));
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  return address;
+}
+
+/// A TCP port of 127.0.0.1, held until this goes.
+class HeldPort {
+ public:
+  HeldPort() : socket_(socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0)) {
+    sockaddr_in address = loopback_port(0);
+    socklen_t size = sizeof address;
+    auto* const generic = reinterpret_cast<sockaddr*>(&address);
+    if (bind(socket_, generic, size) != 0 || listen(socket_, 1) != 0 ||
+        getsockname(socket_, generic, &size) != 0) {
+      throw std::runtime_error("no free port on 127.0.0.1");
+    }
+    number_ = ntohs(address.sin_port);
+  }
+  ~HeldPort() { close(socket_); }
+  HeldPort(const HeldPort&) = delete;
+  HeldPort& operator=(const HeldPort&) = delete;
+  [[nodiscard]] int number() const { return number_; }
+
+ private:
+  int socket_ = -1;
+  int number_ = 0;
+};
+
+/// Body of the answer to GET `path` from a server on this machine; empty when there is none or it
+/// is not "200 OK".
+std::string http_get(int port, const std::string& path) {
+  const int connection = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  const sockaddr_in address = loopback_port(port);
+  std::string answer;
+  if (connect(connection, reinterpret_cast<const sockaddr*>(&address), sizeof address) == 0) {
+    const std::string request = "GET " + path + " HTTP/1.0\r\nHost: localhost\r\n\r\n";
+    ssize_t got = write(connection, request.data(), request.size());
+    std::array<char, 4096> part{};
+    while (got > 0) {
+      got = read(connection, part.data(), part.size());
+      if (got > 0) answer.append(part.data(), static_cast<std::size_t>(got));
+    }
+  }
+  close(connection);
+  const std::size_t body = answer.find("\r\n\r\n");
+  const bool is_ok = answer.starts_with("HTTP/1.") && answer.substr(8, 4) == " 200";
+  return is_ok && body != std::string::npos ? answer.substr(body + 4) : "";
+}
 
 class OperationTest : public CommandTest {
  protected:
@@ -26,10 +81,18 @@ class OperationTest : public CommandTest {
            " " + more;
   }
 
-  /// Waits until the program that logs there printed the text.
-  [[nodiscard]] bool comes_to_say(const std::string& text, const std::string& log_file) const {
+  [[nodiscard]] std::size_t count_in(const std::string& log_file, const std::string& text) const {
+    const std::string log = content(log_file);
+    std::size_t count = 0;
+    for (auto at = log.find(text); at != std::string::npos; at = log.find(text, at + 1)) ++count;
+    return count;
+  }
+
+  /// Waits until the program that logs there printed the text so many times.
+  [[nodiscard]] bool comes_to_say(const std::string& text, const std::string& log_file,
+                                  std::size_t times = 1) const {
     for (int tenths = 0; tenths < 300; ++tenths) {
-      if (content(log_file).find(text) != std::string::npos) return true;
+      if (count_in(log_file, text) >= times) return true;
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
     return false;
@@ -97,11 +160,13 @@ TEST_F(OperationTest, MetricsMoveWithScansAndRequests) {
   EXPECT_EQ(http_get(port, "/metrics"), "");
 }
 
-// A client that hangs has the server's messages pile up in shared memory; killed, it leaves that
-// behind, and Fast DDS gives the next client the same ports.
+// The server's messages for a client that hangs pile up in shared memory. When it is killed they
+// stay there, and Fast DDS gives the next client the same ports. The witness counts the messages.
 TEST_F(OperationTest, AnswersNewClientsAfterOthersHungAndWereKilled) {
   BackgroundProcess server(server_command("--log-level warning"), folder_ / "server.log");
   ASSERT_TRUE(answers()) << content("server.log");
+  const BackgroundProcess witness(stillmap_program() + " watch --json" + on_domain(),
+                                  folder_ / "witness.log");
   for (int round = 0; round < 2; ++round) {
     std::vector<std::unique_ptr<BackgroundProcess>> clients;
     for (int i = 0; i < 4; ++i) {
@@ -111,7 +176,8 @@ TEST_F(OperationTest, AnswersNewClientsAfterOthersHungAndWereKilled) {
       ASSERT_TRUE(comes_to_say("\"status\"", name)) << round;
     }
     for (const auto& client : clients) client->send(SIGSTOP);
-    std::this_thread::sleep_for(std::chrono::seconds(4));
+    const std::size_t before = count_in("witness.log", "\"status\"");
+    ASSERT_TRUE(comes_to_say("\"status\"", "witness.log", before + 4)) << round;
     for (const auto& client : clients) client->send(SIGKILL);
     for (const auto& client : clients) EXPECT_EQ(client->wait(), -1);
     EXPECT_TRUE(answers()) << round;

@@ -9,9 +9,9 @@ class PlanCommandTest : public CommandTest {
     simulate("city");
     ASSERT_EQ(run("map " + path("city") + " --out " + path("out")).exit_code, 0);
   }
-  /// The robots of the test: small, so that a yard is large.
+  /// A small robot, for which the yard is large; the time limit leaves room on a busy machine.
   [[nodiscard]] std::string on_map() const {
-    return "plan --map " + path("out/map.stillmap") + " --profile tracked --time 60 ";
+    return "plan --map " + path("out/map.stillmap") + " --profile tracked --time-limit 60 ";
   }
 };
 
@@ -60,9 +60,11 @@ TEST_F(PlanCommandTest, RefusesWhatItCannotUseBeforeTheWork) {
   EXPECT_THAT(refusal("--map x --to 3,3 --planner magic"), HasSubstr("--planner"));
   EXPECT_THAT(refusal("--map x --to 3,3 --seed 0"), HasSubstr("seed"));
   EXPECT_THAT(refusal("--map x --to 3,3 --follow"), HasSubstr("does not change"));
+  EXPECT_THAT(refusal("--map x --to 3,3 --time 5"), HasSubstr("--time-limit"));
+  EXPECT_THAT(refusal("--map x --to 3,3 --steps 5"), HasSubstr("--max-iterations"));
 }
 
-TEST_F(PlanCommandTest, FollowsTheMapOfAServerAndPlansAnewWhenItGrows) {
+TEST_F(PlanCommandTest, FollowsTheMapOfAServerAndPlansAgainWhenItGrows) {
   simulate("city", 8);
   const std::string on_domain = " --domain " + std::to_string(free_domain());
   BackgroundProcess server(stillmap_server_program() + " --delivery every --map-file " +
@@ -79,7 +81,7 @@ TEST_F(PlanCommandTest, FollowsTheMapOfAServerAndPlansAnewWhenItGrows) {
   const nlohmann::json plan = nlohmann::json::parse(content("path.json"));
   EXPECT_EQ(plan.at("status"), "found");
   EXPECT_FALSE(plan.at("cause").get<std::string>().empty());
-  // The robot's own place, once the drive is over.
+  // From the robot's pose at the end of the replay.
   const ProcessResult again = run("plan --profile tracked --to 1,0 --timeout 30" + on_domain);
   EXPECT_EQ(again.exit_code, 0) << again.out << again.err;
   EXPECT_EQ(server.stop(), 0);

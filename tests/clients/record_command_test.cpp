@@ -2,6 +2,7 @@
 #include <cstdlib>
 #include <thread>
 
+#include "core/dataset/dataset_error.hpp"
 #include "core/dataset/scan_dataset.hpp"
 #include "idl/bag/bag.hpp"
 #include "idl/bag/bag_scan_source.hpp"
@@ -12,18 +13,27 @@ namespace {
 
 using namespace std::chrono_literals;
 
+std::uint64_t messages_of(const dds::Bag& bag, const std::string& topic) {
+  const auto found = std::ranges::find(bag.topics(), topic, &dds::BagTopic::name);
+  return found == bag.topics().end() ? 0 : found->messages;
+}
+
 class RecordTest : public CommandTest {
  protected:
   [[nodiscard]] std::string on_domain() const { return " --domain " + std::to_string(domain_); }
 
-  /// Runs until its folder is there, so that it listens.
-  void wait_for_bag(const std::string& name) const {
-    for (int i = 0; i < 600 && !exists(name + "/metadata.yaml"); ++i) {
-      std::this_thread::sleep_for(50ms);
+  /// Whether the bag that is being recorded comes to hold so many messages of a topic.
+  [[nodiscard]] bool comes_to_hold(const std::string& bag, const std::string& topic,
+                                   std::uint64_t messages) const {
+    for (int i = 0; i < 600; ++i) {
+      try {
+        if (messages_of(dds::Bag(path(bag)), topic) >= messages) return true;
+      } catch (const DatasetError&) {
+        // Not made yet.
+      }
+      std::this_thread::sleep_for(100ms);
     }
-    ASSERT_TRUE(exists(name + "/metadata.yaml"));
-    // Discovery of what publishes already.
-    std::this_thread::sleep_for(1500ms);
+    return false;
   }
 
   /// Begins when the server and, where there is one, the recorder listen.
@@ -44,11 +54,6 @@ class RecordTest : public CommandTest {
   int domain_ = free_domain();
 };
 
-std::uint64_t messages_of(const dds::Bag& bag, const std::string& topic) {
-  const auto found = std::ranges::find(bag.topics(), topic, &dds::BagTopic::name);
-  return found == bag.topics().end() ? 0 : found->messages;
-}
-
 TEST_F(RecordTest, ARecordedReplayIsTheRecordingAgain) {
   constexpr int scans = 8;
   simulate("city", scans);
@@ -57,17 +62,18 @@ TEST_F(RecordTest, ARecordedReplayIsTheRecordingAgain) {
     ASSERT_EQ(run("status --timeout 30" + on_domain()).exit_code, 0) << content("server.log");
     BackgroundProcess record(stillmap_program() + " record " + path("bag") + on_domain(),
                              folder_ / "record.log");
-    wait_for_bag("bag");
+    // The recorder has discovered the server, which publishes its status each second.
+    ASSERT_TRUE(comes_to_hold("bag", "/stillmap/status", 1)) << content("record.log");
     EXPECT_EQ(replay(path("city"), 2, "first.txt").at("mapped"), scans);
-    std::this_thread::sleep_for(1500ms);
+    for (const char* topic : {"/tf", "/stillmap/path", "/stillmap/tiles", "/stillmap/tile_index",
+                              "/stillmap/static_cloud", "/stillmap/status"}) {
+      EXPECT_TRUE(comes_to_hold("bag", topic, 1)) << topic << content("record.log");
+    }
+    EXPECT_TRUE(comes_to_hold("bag", "/stillmap/odometry", scans)) << content("record.log");
     EXPECT_EQ(record.stop(), 0) << content("record.log");
   }
-  const dds::Bag bag(path("bag"));
-  EXPECT_EQ(messages_of(bag, "/stillmap/odometry"), static_cast<std::uint64_t>(scans));
-  for (const char* topic : {"/tf", "/stillmap/path", "/stillmap/tiles", "/stillmap/tile_index",
-                            "/stillmap/static_cloud", "/stillmap/status"}) {
-    EXPECT_GT(messages_of(bag, topic), 0U) << topic << content("record.log");
-  }
+  EXPECT_EQ(messages_of(dds::Bag(path("bag")), "/stillmap/odometry"),
+            static_cast<std::uint64_t>(scans));
   EXPECT_THAT(content("record.log"), testing::Not(HasSubstr("lost")));
 
   const ScanDataset original(path("city"));

@@ -69,8 +69,8 @@ struct Scores {
   Score moving;
 };
 
-/// Maps every n-th scan with its true labels and carries them over to those between.
-Scores carry_through_the_city(int every) {
+/// Maps every n-th scan with its true labels and propagates them to the scans between.
+Scores propagate_through_the_city(int every) {
   StaticMap map(StaticMapConfig{});
   std::optional<LabelledRangeImage> last;
   Scores scores;
@@ -105,7 +105,7 @@ class PropagatedLabelsInTheCity : public testing::TestWithParam<Expected> {};
 
 TEST_P(PropagatedLabelsInTheCity, AreMostlyRight) {
   const Expected& expected = GetParam();
-  const Scores scores = carry_through_the_city(expected.every);
+  const Scores scores = propagate_through_the_city(expected.every);
   RecordProperty("coverage", std::to_string(scores.all.coverage()));
   RecordProperty("precision", std::to_string(scores.all.precision()));
   RecordProperty("moving_coverage", std::to_string(scores.moving.coverage()));

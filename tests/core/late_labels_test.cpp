@@ -150,7 +150,7 @@ INSTANTIATE_TEST_SUITE_P(Mapper, LateLabels,
                                   std::to_string(info.param.delay);
                          });
 
-TEST(MapperLabels, CarriedOnesCountLessThanFreshOnes) {
+TEST(MapperLabels, PropagatedOnesCountLessThanFreshOnes) {
   Mapper mapper(box_config(), std::make_unique<SlowSegmentation>(2, 0));
   ASSERT_TRUE(mapper.process(traffic_sequence().scans[0].scan));
   const auto mapped = mapper.process(traffic_sequence().scans[1].scan);
@@ -161,7 +161,7 @@ TEST(MapperLabels, CarriedOnesCountLessThanFreshOnes) {
   }
 }
 
-TEST(MapperLabels, AFeedThatFailsGivesPureGeometry) {
+TEST(MapperLabels, ASegmentationThatFailsGivesPureGeometry) {
   Mapper mapper(box_config(), std::make_unique<FailingSegmentation>());
   for (std::size_t k = 0; k < 5; ++k) {
     const auto mapped = mapper.process(traffic_sequence().scans[k].scan);

@@ -19,34 +19,34 @@ Mapper geometric_mapper() {
   return {config, std::make_unique<NullSegmenter>()};
 }
 
-Scan scan_of(const ScanDataset& recording, std::size_t k) {
-  Scan scan = recording.read(k).scan;
-  scan.stamp_ns = recording.stamp_ns(k);
+Scan scan_of(const ScanDataset& sequence, std::size_t k) {
+  Scan scan = sequence.read(k).scan;
+  scan.stamp_ns = sequence.stamp_ns(k);
   return scan;
 }
 
 /// A real street (KITTI raw, drive 0005): every second scan makes the map, the ones between have to
 /// find their place in it, without any class to help.
 TEST(ResumedMap, ScansThatAreNotInItFindTheirPlace) {
-  const char* folder = std::getenv("STILLMAP_TEST_DRIVE");
-  if (folder == nullptr) GTEST_SKIP() << "STILLMAP_TEST_DRIVE does not name KITTI's drive 0005";
-  const ScanDataset recording{std::filesystem::path(folder)};
+  const char* folder = std::getenv("STILLMAP_TEST_SEQUENCE");
+  if (folder == nullptr) GTEST_SKIP() << "STILLMAP_TEST_SEQUENCE does not name KITTI's drive 0005";
+  const ScanDataset sequence{std::filesystem::path(folder)};
   Mapper maker = geometric_mapper();
   Mapper follower = geometric_mapper();
   std::vector<Eigen::Isometry3d> T_map_lidar;
-  for (std::size_t k = 0; k < recording.size(); ++k) {
-    if (k % 2 == 0) (void)maker.process(scan_of(recording, k));
-    T_map_lidar.push_back(follower.process(scan_of(recording, k)).value().odometry.T_map_lidar);
+  for (std::size_t k = 0; k < sequence.size(); ++k) {
+    if (k % 2 == 0) (void)maker.process(scan_of(sequence, k));
+    T_map_lidar.push_back(follower.process(scan_of(sequence, k)).value().odometry.T_map_lidar);
   }
   int found = 0;
   int tried = 0;
-  for (std::size_t k = 5; k < recording.size(); k += 20) {
+  for (std::size_t k = 5; k < sequence.size(); k += 20) {
     for (const auto& guess : {test::level_pose(0.5, 0.3, 0.05), test::level_pose(3.0, -2.0, 0.4),
                               test::level_pose(-5.0, 2.0, -2.0)}) {
       Mapper mapper = geometric_mapper();
       mapper.resume(*maker.map_snapshot());
       const auto began = std::chrono::steady_clock::now();
-      const auto mapped = mapper.process(scan_of(recording, k), T_map_lidar[k] * guess);
+      const auto mapped = mapper.process(scan_of(sequence, k), T_map_lidar[k] * guess);
       const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
       const Eigen::Isometry3d& T = mapped.value().odometry.T_map_lidar;
       const double off_m = test::translation_error(T, T_map_lidar[k]);

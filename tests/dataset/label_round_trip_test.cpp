@@ -27,7 +27,7 @@ using testing::HasSubstr;
 
 namespace fs = std::filesystem;
 
-/// Where the lidar of the made-up drive is at scan k.
+/// Pose of the lidar in the synthetic sequence at scan k.
 Eigen::Isometry3d pose_at(std::size_t k) {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
   T.rotate(Eigen::AngleAxisd(0.3 * static_cast<double>(k), Eigen::Vector3d::UnitZ()));

@@ -145,7 +145,7 @@ TEST(ScanDataset, ReadsTheVelodyneFolderOfASequenceLikeTheSequence) {
   EXPECT_TRUE(dataset.has_labels(0));
 }
 
-TEST(ScanDataset, BringsTheIntensityOfAWholeRecordingTo0To1) {
+TEST(ScanDataset, ScalesTheIntensityOfAWholeDatasetTo0To1) {
   const ScratchFolder folder;
   (void)folder.file("0.pcd", pcd("51"));
   (void)folder.file("1.pcd", pcd("1"));
@@ -192,7 +192,7 @@ TEST(ScanDataset, FaultsSayWhatToDo) {
   };
   EXPECT_THAT(message(folder.path() / "nowhere"), HasSubstr("check the path"));
   EXPECT_THAT(message(folder.path()), HasSubstr("no .bin, .pcd or .ply"));
-  EXPECT_THAT(message(folder.file("a.txt", "x")), HasSubstr("no recording"));
+  EXPECT_THAT(message(folder.file("a.txt", "x")), HasSubstr("no dataset"));
   std::filesystem::create_directories(folder.path() / "velodyne");
   EXPECT_THAT(message(folder.path()), HasSubstr("velodyne"));
 }

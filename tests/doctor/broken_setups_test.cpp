@@ -26,7 +26,7 @@ using ::testing::IsEmpty;
 using ::testing::ResultOf;
 
 auto field(const std::string& name, const std::string& part) {
-  return ResultOf([name](const json& finding) { return finding.at(name).get<std::string>(); },
+  return ResultOf([name](const json& diagnostic) { return diagnostic.at(name).get<std::string>(); },
                   HasSubstr(part));
 }
 
@@ -66,8 +66,8 @@ class BrokenSetup : public testing::Test {
       return found;
     }
     const json report = json::parse(result.out);
-    for (const json& finding : report.at("findings")) {
-      if (finding.at("severity") == "problem") found.push_back(finding);
+    for (const json& diagnostic : report.at("diagnostics")) {
+      if (diagnostic.at("severity") == "problem") found.push_back(diagnostic);
     }
     return found;
   }
@@ -96,9 +96,10 @@ TEST_F(BrokenSetup, WithoutAPublisher) {
   start_server();
   const auto found = problems();
   // Elsewhere on this machine somebody may publish scans: then that is the way out.
-  EXPECT_THAT(found, Contains(AllOf(field("what", "nobody publishes rt/points"),
-                                    AnyOf(field("way_out", "stillmap replay"),
-                                          field("way_out", "into one domain")))));
+  EXPECT_THAT(
+      found,
+      Contains(AllOf(field("what", "nobody publishes rt/points"),
+                     AnyOf(field("hint", "stillmap replay"), field("hint", "into one domain")))));
   EXPECT_EQ(exit_code_, 1);
 }
 
@@ -106,8 +107,8 @@ TEST_F(BrokenSetup, WithAPublisherOnAnotherTopic) {
   start_server();
   dds::Participant participant(dds(domain_));
   const dds::Writer<PointCloud2> writer(participant, "rt/velodyne_points", {});
-  EXPECT_THAT(problems(), Contains(AllOf(field("evidence", "velodyne_points"),
-                                         field("way_out", "did you mean"))));
+  EXPECT_THAT(problems(),
+              Contains(AllOf(field("evidence", "velodyne_points"), field("hint", "did you mean"))));
 }
 
 TEST_F(BrokenSetup, WithABestEffortPublisherForAReliableServer) {
@@ -118,7 +119,7 @@ TEST_F(BrokenSetup, WithABestEffortPublisherForAReliableServer) {
       problems(),
       Contains(AllOf(field("what", "what lidar_driver writes does not reach stillmap_server"),
                      field("evidence", "reliability: the writer offers best effort"),
-                     field("way_out", "input.delivery: latest"))));
+                     field("hint", "input.delivery: latest"))));
   const ProcessResult status = run_stillmap(
       "status --json --interface 127.0.0.1 --domain " + std::to_string(domain_), folder_.path());
   EXPECT_THAT(status.out, HasSubstr("does not reach stillmap_server"));
@@ -148,7 +149,7 @@ TEST_F(BrokenSetup, WithSecurityOnOneSideOnly) {
   start_server("--security " + (folder_ / "keys/server").string());
   EXPECT_THAT(problems(),
               Contains(AllOf(field("what", "stillmap_server is secured and stillmap_doctor is not"),
-                             field("way_out", "--security"))));
+                             field("hint", "--security"))));
   const auto found = problems("--security " + (folder_ / "keys/planner").string());
   EXPECT_THAT(found, Contains(field("what", "nobody publishes rt/points")));
   EXPECT_THAT(found, testing::Not(Contains(field("what", "secured"))));
@@ -161,7 +162,7 @@ TEST_F(BrokenSetup, WithSharedMemoryOfItsOwn) {
   const auto script = folder_.file("own_shm.sh", "mount -t tmpfs none /dev/shm && exec \"$@\"\n");
   start_server("", "unshare -m sh " + script.string() + " ");
   EXPECT_THAT(problems(), Contains(AllOf(field("what", "nothing of stillmap_server arrives"),
-                                         field("way_out", "--udp-only"))));
+                                         field("hint", "--udp-only"))));
 }
 
 TEST_F(BrokenSetup, WithTwoServersOfOneName) {
@@ -180,7 +181,7 @@ TEST_F(BrokenSetup, WithSmallBuffersAndStaleSharedMemory) {
   const std::string root = " --host-root " + (folder_ / "host").string();
   EXPECT_THAT(problems("--udp-only" + root),
               Contains(AllOf(field("what", "UDP buffers are too small"),
-                             field("way_out", "sysctl net.core.rmem_max="))));
+                             field("hint", "sysctl net.core.rmem_max="))));
   const ProcessResult cleaned = run_stillmap(
       "doctor --clean --interface 127.0.0.1 --domain " + std::to_string(domain_) + root,
       folder_.path());

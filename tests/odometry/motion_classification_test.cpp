@@ -14,14 +14,14 @@ using test::BoxScan;
 using test::BoxWorld;
 using test::car_size_m;
 
-struct Judged {
+struct Classified {
   BoxScan seen;
   ObjectClusters objects;
   std::vector<MotionClass> motion_classes;
 
   /// The one class of all points that `chosen` picks by their position in the lidar frame.
   template <typename Predicate>
-  [[nodiscard]] MotionClass verdict_where(Predicate chosen) const {
+  [[nodiscard]] MotionClass class_where(Predicate chosen) const {
     std::vector<int> votes(3, 0);
     for (std::size_t i = 0; i < seen.scan.size(); ++i)
       if (objects.of_point[i] != ObjectClusters::none && chosen(seen.scan.points_lidar[i]))
@@ -32,11 +32,11 @@ struct Judged {
 };
 
 /// The last of `scans` scans at 10 Hz from a lidar that drives along x.
-Judged classify_last(const BoxWorld& world, int scans, double lidar_speed_m_s = 0.0) {
+Classified classify_last(const BoxWorld& world, int scans, double lidar_speed_m_s = 0.0) {
   const SensorModel sensor = test::test_lidar();
   const MotionConfig config;
   RangeImageHistory history(config);
-  Judged last;
+  Classified last;
   for (int k = 0; k < scans; ++k) {
     const double time_s = 0.1 * k;
     const Eigen::Isometry3d T = test::level_pose(lidar_speed_m_s * time_s, 0.0, 0.0);
@@ -55,10 +55,10 @@ bool anywhere(const Eigen::Vector3f& /*p_lidar*/) { return true; }
 TEST(ClassifyMotion, ParkedCarIsParkedOnceThePastIsFull) {
   BoxWorld world = test::street();
   for (const double speed_m_s : {0.0, 8.0}) {
-    const Judged judged = classify_last(world, 9, speed_m_s);
+    const Classified classified = classify_last(world, 9, speed_m_s);
     const auto near_left_or_right = [](const Eigen::Vector3f& p) { return p.norm() < 12.0F; };
-    EXPECT_EQ(judged.verdict_where(near_left_or_right), MotionClass::parked) << speed_m_s;
-    EXPECT_EQ(classify_last(world, 5, speed_m_s).verdict_where(anywhere), MotionClass::undecided);
+    EXPECT_EQ(classified.class_where(near_left_or_right), MotionClass::parked) << speed_m_s;
+    EXPECT_EQ(classify_last(world, 5, speed_m_s).class_where(anywhere), MotionClass::undecided);
   }
 }
 
@@ -90,9 +90,9 @@ TEST(ClassifyMotion, MovingCarIsMovingWhicheverWayItGoes) {
     BoxWorld world;
     world.stand(60.0, 0.0, {1.0, 80.0, 8.0}, SemanticClass::building);
     world.stand(moving.x, moving.y, car_size_m, SemanticClass::car, moving.velocity_map);
-    const Judged judged = classify_last(world, 10, moving.lidar_speed_m_s);
-    ASSERT_GE(judged.objects.count, 1U) << moving.what;
-    EXPECT_EQ(judged.verdict_where(anywhere), MotionClass::moving) << moving.what;
+    const Classified classified = classify_last(world, 10, moving.lidar_speed_m_s);
+    ASSERT_GE(classified.objects.count, 1U) << moving.what;
+    EXPECT_EQ(classified.class_where(anywhere), MotionClass::moving) << moving.what;
   }
 }
 

@@ -1,5 +1,3 @@
-#include "core/odometry/voxel_downsample.hpp"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -9,6 +7,8 @@
 #include <random>
 #include <set>
 #include <tuple>
+
+#include "core/odometry/features.hpp"
 
 namespace stillmap {
 namespace {
@@ -26,9 +26,9 @@ std::vector<Eigen::Vector3f> random_points(std::size_t count, float max_coordina
 }
 
 /// The same with an ordered set of cubes.
-std::vector<std::uint32_t> thin_plainly(const std::vector<Eigen::Vector3f>& points,
-                                        const std::vector<std::uint32_t>& chosen,
-                                        double spacing_m) {
+std::vector<std::uint32_t> downsample_plainly(const std::vector<Eigen::Vector3f>& points,
+                                              const std::vector<std::uint32_t>& chosen,
+                                              double spacing_m) {
   std::set<std::tuple<int, int, int>> taken;
   std::vector<std::uint32_t> kept;
   const auto cube = [&](float v) { return static_cast<int>(std::floor(v / spacing_m)); };
@@ -45,7 +45,8 @@ TEST(VoxelDownsample, EqualsAnOrderedSetOfCubes) {
   std::ranges::shuffle(chosen, std::mt19937(12));
   chosen.resize(4000);
   for (const double spacing_m : {0.1, 0.5, 1.0, 3.0, 100.0})
-    EXPECT_EQ(voxel_downsample(points, chosen, spacing_m), thin_plainly(points, chosen, spacing_m))
+    EXPECT_EQ(voxel_downsample(points, chosen, spacing_m),
+              downsample_plainly(points, chosen, spacing_m))
         << spacing_m;
 }
 

@@ -22,7 +22,7 @@ check "install on a bare Debian" env DEBIAN_FRONTEND=noninteractive \
   apt-get install -yq --no-install-recommends "$packages"/stillmap*.deb
 check "keep their configuration as Debian does" sh -c \
   "dpkg-query -W -f '\${Conffiles}' stillmap-server | grep -q /etc/stillmap/server.yaml"
-check "have every file that they say" dpkg -V stillmap-data stillmap-server stillmap stillmap-formats
+check "have every file that they say" dpkg -V stillmap-data stillmap-server stillmap
 check "stillmap-server names its version" stillmap-server --version
 check "/etc/stillmap/server.yaml can be used" stillmap-server --check-config /etc/stillmap/server.yaml
 check "simulate" stillmap simulate city --preset yard --sensor vlp_16 --scans 20
@@ -44,7 +44,7 @@ check "its map on disk" stillmap map-check map.stillmap
 check "a GeoTIFF" stillmap map-export map.stillmap -o map.tif --datum 48.1,11.5
 mkdir pcd
 check "a PCD file, written" stillmap map-export map.stillmap -o pcd/0.pcd
-check "and read through PCL" stillmap map pcd --sensor vlp_16 --out pcd_map
+check "and read again" stillmap map pcd --sensor vlp_16 --out pcd_map
 
-check "are removed without a trace of the programs" apt-get purge -yq stillmap stillmap-server stillmap-data stillmap-formats
+check "are removed without a trace of the programs" apt-get purge -yq stillmap stillmap-server stillmap-data
 check "nothing of them left" sh -c "! ls /usr/bin/stillmap* /etc/stillmap /usr/share/stillmap 2> /dev/null | grep -q ."

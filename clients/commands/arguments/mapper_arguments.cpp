@@ -8,6 +8,31 @@
 
 namespace stillmap::cli {
 
+void add_engine_options(CommandHandle command, EngineArguments& arguments) {
+  command
+      .option("--engine", arguments.engine,
+              "What runs the network: auto (oneDNN where it can, else OpenCV), onednn, opencv")
+      .one_of({"auto", "onednn", "opencv"});
+  command
+      .option("--precision", arguments.precision,
+              "Numbers of the network: auto (int8 where the model is calibrated), fp32, int8")
+      .one_of({"auto", "fp32", "int8"});
+  command.option("--threads", arguments.threads, "Threads of oneDNN for one scan; default: all")
+      .between(0, 1024);
+}
+
+void set_engine(const EngineArguments& arguments, EngineOptions& choice) {
+  using Engine = EngineOptions::Engine;
+  using PrecisionMode = EngineOptions::PrecisionMode;
+  if (arguments.engine == "auto") choice.engine = Engine::automatic;
+  if (arguments.engine == "onednn") choice.engine = Engine::onednn;
+  if (arguments.engine == "opencv") choice.engine = Engine::opencv;
+  if (arguments.precision == "auto") choice.precision = PrecisionMode::automatic;
+  if (arguments.precision == "fp32") choice.precision = PrecisionMode::fp32;
+  if (arguments.precision == "int8") choice.precision = PrecisionMode::int8;
+  if (arguments.threads > 0) choice.threads = static_cast<int>(arguments.threads);
+}
+
 void add_segmentation_options(CommandHandle command, MapperArguments& arguments) {
   command
       .option(
@@ -22,10 +47,10 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
   command.option("--config", arguments.config_file,
                  "Server file (config/server/*.yaml); its mapper settings are used");
   command.option("--sensor", arguments.sensor,
-                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the recording suggests");
+                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the data set suggests");
   command
       .option("--labels", arguments.labels,
-              "Where classes come from: auto (the recording's, if it has any, else the model's), "
+              "Where classes come from: auto (the data set's, if it has any, else the model's), "
               "files (must have them), model (the one that comes with Stillmap), none (pure "
               "geometry), or a folder with a model")
       .with_default();

@@ -7,7 +7,7 @@
 
 namespace stillmap::cli {
 
-/// How a command line asks for a simulated drive.
+/// How a command line asks for a simulated sequence.
 struct SimulationArguments {
   std::string preset = "quiet";
   /// A factor on everything that moves ("0.5"), or the name of a preset; empty: as the preset has.

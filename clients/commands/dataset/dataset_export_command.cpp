@@ -23,7 +23,7 @@ struct Arguments {
   MapperArguments mapper;
   ScanRange range;
   ClientArguments client;
-  double silence_s = 10.0;
+  double idle_timeout_s = 10.0;
   bool force = false;
   bool json = false;
 };
@@ -40,7 +40,7 @@ nlohmann::json to_json(const Arguments& arguments, const ExportSummary& summary)
           {"label_source", summary.label_source},
           {"poses_frame", "camera of calib.txt: scan k into scan 0; its lidar frame is Tr^-1 T Tr"},
           {"remarks", remarks},
-          {"stopped", summary.stopped}};
+          {"interrupted", summary.stopped}};
 }
 
 std::string describe(const Arguments& arguments, const ExportSummary& summary) {
@@ -59,7 +59,7 @@ ExportSummary export_from_dataset(const Arguments& arguments, StopSignal& stop) 
   const ScanDataset dataset = dds::open_sequence(arguments.source, arguments.topic_in);
   std::error_code ignored;
   if (std::filesystem::equivalent(arguments.source, arguments.out, ignored)) {
-    throw std::invalid_argument(arguments.out + " is the recording itself; name another folder");
+    throw std::invalid_argument(arguments.out + " is the source itself; name another folder");
   }
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
@@ -83,10 +83,11 @@ ExportSummary export_from_topic(const Arguments& arguments, StopSignal& stop) {
   config.mapper = mapper_config(arguments.mapper, config.mapper.sensor);
   Client client = connect(arguments.client);
   prepare_sequence_folder(arguments.out, arguments.force);
-  const LiveExportOptions options{.topic = arguments.source.substr(topic_prefix.size()),
-                                  .scans = arguments.range.count,
-                                  .silence = std::chrono::milliseconds(
-                                      static_cast<std::int64_t>(1000.0 * arguments.silence_s))};
+  const LiveExportOptions options{
+      .topic = arguments.source.substr(topic_prefix.size()),
+      .scans = arguments.range.count,
+      .idle_timeout =
+          std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * arguments.idle_timeout_s))};
   const bool known_end = options.scans != SIZE_MAX;
   Progress progress("export", "scans", known_end ? options.scans : 0);
   progress.say("stillmap: waiting for scans on '" + options.topic + "'; Ctrl-C ends the sequence");
@@ -114,8 +115,8 @@ ExitCode run(const Arguments& arguments) {
 
 void add_dataset_export_command(CommandHandle dataset, Action& action) {
   auto arguments = std::make_shared<Arguments>();
-  CommandHandle command =
-      dataset.command("export", "Write a recording or a live topic as a SemanticKITTI sequence");
+  CommandHandle command = dataset.command(
+      "export", "Write a data set, a bag or a live topic as a SemanticKITTI sequence");
   command
       .option(
           "SOURCE", arguments->source,
@@ -125,16 +126,17 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
   command.option("--topic-in", arguments->topic_in, topic_in_help);
   command.option("OUT", arguments->out, "New folder for the sequence").required();
   add_mapper_options(command, arguments->mapper);
-  command.option("--start", arguments->range.first, "Number of the recording's first scan");
+  command.option("--start", arguments->range.first, "Number of the first scan");
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
   command.flag("--strict", arguments->range.strict,
-               "Stop at the first damaged file instead of leaving it out");
+               "Stop at the first damaged file instead of skipping it");
   command.flag("--force", arguments->force,
                "Replace a sequence that is there already, with its labels");
   command.flag("--json", arguments->json, "Print JSON");
+  command.renamed("--silence", "--idle-timeout");
   command
-      .option("--silence", arguments->silence_s,
-              "Live: end when the scans that came are followed by none for so long [s]")
+      .option("--idle-timeout", arguments->idle_timeout_s,
+              "Live: end when no scan has followed the last one for so long [s]")
       .above_zero()
       .with_default();
   add_client_options(command, arguments->client);
@@ -142,13 +144,13 @@ void add_dataset_export_command(CommandHandle dataset, Action& action) {
       "Examples:\n"
       "  stillmap dataset export my_pcds campus --labels my_model --sensor vlp_16\n"
       "  stillmap dataset export topic:points campus --config server.yaml --scans 600\n"
-      "Writes velodyne/*.bin (every scan and point in the recording's order; intensity 0..1),\n"
-      "labels/*.label (the recording's own, else the first guess of --labels, of the running\n"
+      "Writes velodyne/*.bin (every scan and point in the order of the source; intensity 0..1),\n"
+      "labels/*.label (the source's own, else the first guess of --labels, of the running\n"
       "server, or 0), times.txt, calib.txt, and poses.txt from our odometry: camera frame of scan\n"
       "k into camera frame of scan 0, where calib.txt's Tr takes lidar to camera (a camera that\n"
       "looks forward from the lidar's place). Point times and rings go to time_offsets/ and "
       "rings/.\n"
-      "Ctrl-C leaves a shorter sequence that is complete in itself; a new run begins anew, as "
+      "Ctrl-C leaves a shorter sequence that is complete in itself; a new run starts over, as "
       "poses\n"
       "follow from all scans before. Live, give the server's own file with --config.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });

@@ -34,8 +34,7 @@ ExitCode run(const Arguments& arguments) {
 
 void add_dataset_sensor_command(CommandHandle dataset, Action& action) {
   auto arguments = std::make_shared<Arguments>();
-  CommandHandle command =
-      dataset.command("sensor", "Find out from a recording which sensor it is of");
+  CommandHandle command = dataset.command("sensor", "Find out which sensor recorded a data set");
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic, topic_in_help);
   command.option("--out", arguments->out, "Write a sensor file (YAML) for the server");

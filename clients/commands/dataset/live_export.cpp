@@ -1,10 +1,9 @@
 #include "clients/commands/dataset/live_export.hpp"
 
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <utility>
-
-#include "clients/commands/dataset/live_scan_synchronizer.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -12,19 +11,14 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds poll_period{20};
-/// How long poses and labels of the last scans may be under way.
+/// Wait for the poses and labels of the last scans.
 constexpr std::chrono::milliseconds drain_time{1000};
 
 wire::CloudReadOptions reading_of(const ServerConfig& config) {
-  const PointFieldNames& names = config.input.fields;
-  return {.fields = {.intensity = names.intensity,
-                     .ring = names.ring,
-                     .time = names.time,
-                     .label = names.label},
-          .intensity_scale = config.mapper.sensor.intensity_scale};
+  return {.fields = config.input.fields, .intensity_scale = config.mapper.sensor.intensity_scale};
 }
 
-/// The subscriptions, and what came from them: each has its own thread.
+/// The subscriptions, each with a thread of its own, and the scans received.
 class LiveInput {
  public:
   LiveInput(Client& client, const std::string& topic, const ServerConfig& config)
@@ -42,10 +36,10 @@ class LiveInput {
 
   [[nodiscard]] std::optional<LiveScan> take() { return locked().second.take(); }
   [[nodiscard]] std::optional<LiveScan> take_last() { return locked().second.take_last(); }
-  /// Whether scans came, and then none for so long.
-  [[nodiscard]] bool silent_for(std::chrono::milliseconds silence) {
+  /// Whether the last scan is older than that; false before the first one.
+  [[nodiscard]] bool is_idle_for(std::chrono::milliseconds duration) {
     const std::scoped_lock lock(mutex_);
-    return last_scan_ && Clock::now() - *last_scan_ > silence;
+    return last_scan_ && Clock::now() - *last_scan_ > duration;
   }
   [[nodiscard]] std::size_t without_pose() { return locked().second.without_pose(); }
 
@@ -59,7 +53,7 @@ class LiveInput {
   std::mutex mutex_;
   LiveScanSynchronizer scans_;
   std::optional<Clock::time_point> last_scan_;
-  // Last: end before what they use is gone.
+  // Last members: their callbacks end before the members above are destroyed.
   Subscription poses_;
   Subscription labels_;
   Subscription points_;
@@ -90,7 +84,7 @@ class LiveExporter {
       if (scans > 0) summary.remarks.push_back({scans, text});
     };
     remark(without_pose,
-           "scans left out, as the server did not map them; a server with delivery 'every' maps "
+           "scans skipped, as the server did not map them; a server with delivery 'every' maps "
            "all");
     remark(labels_lost_, "scans without the server's labels, which were lost on their way");
     remark(labels_misfit_,
@@ -107,13 +101,59 @@ class LiveExporter {
 
 }  // namespace
 
+void LiveScanSynchronizer::add_scan(const Scan& scan) {
+  waiting_.push_back(scan);
+  if (waiting_.size() <= max_waiting) return;
+  waiting_.pop_front();
+  ++without_pose_;
+}
+
+void LiveScanSynchronizer::add_pose(const StampedPose& pose) {
+  T_map_lidar_.insert_or_assign(pose.stamp_ns, pose.T_map_lidar);
+  if (T_map_lidar_.size() > 2 * max_waiting) T_map_lidar_.erase(T_map_lidar_.begin());
+}
+
+void LiveScanSynchronizer::add_labels(std::int64_t stamp_ns, std::vector<SemanticClass> classes) {
+  classes_.insert_or_assign(stamp_ns, std::move(classes));
+  if (classes_.size() > max_waiting) classes_.erase(classes_.begin());
+}
+
+std::optional<LiveScan> LiveScanSynchronizer::take() { return take_if(false); }
+
+std::optional<LiveScan> LiveScanSynchronizer::take_last() { return take_if(true); }
+
+std::optional<LiveScan> LiveScanSynchronizer::take_if(bool all_arrived) {
+  while (!waiting_.empty()) {
+    const std::int64_t stamp_ns = waiting_.front().stamp_ns;
+    const auto pose = T_map_lidar_.find(stamp_ns);
+    const auto later = T_map_lidar_.upper_bound(stamp_ns);
+    if (pose == T_map_lidar_.end()) {
+      if (later == T_map_lidar_.end() && !all_arrived) return std::nullopt;
+      waiting_.pop_front();
+      ++without_pose_;
+      continue;
+    }
+    const auto labels = classes_.find(stamp_ns);
+    const auto later_poses = static_cast<std::size_t>(std::distance(later, T_map_lidar_.end()));
+    if (labels == classes_.end() && later_poses < max_label_delay_scans && !all_arrived) {
+      return std::nullopt;
+    }
+    LiveScan live{
+        .scan = std::move(waiting_.front()), .T_map_lidar = pose->second, .classes = std::nullopt};
+    if (labels != classes_.end()) live.classes = std::move(labels->second);
+    waiting_.pop_front();
+    return live;
+  }
+  return std::nullopt;
+}
+
 ExportSummary export_live(Client& client, const LiveExportOptions& options,
                           const ServerConfig& config, const std::filesystem::path& folder,
                           StopSignal& stop, const std::function<void(std::size_t)>& scan_done) {
   LiveExporter output(config, folder);
   LiveInput input(client, options.topic, config);
   bool stopped = false;
-  while (!stopped && output.scans() < options.scans && !input.silent_for(options.silence)) {
+  while (!stopped && output.scans() < options.scans && !input.is_idle_for(options.idle_timeout)) {
     stopped = stop.wait_for(poll_period);
     while (const auto live = output.scans() < options.scans ? input.take() : std::nullopt) {
       output.write(*live);

@@ -24,8 +24,8 @@ struct Arguments {
   bool json = false;
 };
 
-// Where the labelled scans are put to make the true map. With the map's own poses, the figures
-// speak of the cleaning alone; with true poses, drift counts as well.
+// Poses of the labelled scans in the true map. With the map's own poses the figures measure the
+// cleaning alone; with true poses drift counts as well.
 Trajectory poses_for_truth(const Arguments& arguments, const ScanDataset& dataset,
                            const SavedMap& map) {
   if (arguments.poses == "map") return map.trajectory;
@@ -65,7 +65,7 @@ evaluation::MapTruth true_map(const Arguments& arguments, const ScanDataset& dat
   }
   if (used == 0) {
     throw std::invalid_argument("no labelled scan of " + arguments.truth +
-                                " has the stamp of a pose: is this the recording that " +
+                                " has the stamp of a pose: is this the sequence that " +
                                 arguments.map + " was made from?");
   }
   return truth;
@@ -91,7 +91,7 @@ nlohmann::json to_json(const evaluation::MapCleaningScore& score, const Argument
           {"fixed_voxels", score.fixed_voxels},
           {"parked_voxels", score.parked_voxels},
           {"moving_voxels", score.moving_voxels},
-          {"moving_voxels_left", score.moving_kept},
+          {"moving_voxels_kept", score.moving_kept},
           {"voxel_size_m", arguments.voxel_size_m},
           {"poses", arguments.poses}};
 }
@@ -135,7 +135,7 @@ void add_evaluate_map_command(CommandHandle evaluate, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   CommandHandle command = evaluate.command(
       "map", "Preservation and rejection rate of a static map against labelled scans");
-  command.option("--truth", arguments->truth, "The labelled recording").required();
+  command.option("--truth", arguments->truth, "The labelled sequence").required();
   command.option("--map", arguments->map, "Map file made from it (map.stillmap)").required();
   command
       .option("--poses", arguments->poses,

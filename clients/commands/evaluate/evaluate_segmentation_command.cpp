@@ -2,21 +2,101 @@
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
+#include <string>
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/commands/evaluate/segmentation_report.hpp"
-#include "clients/commands/evaluate/segmentation_run.hpp"
+#include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/binary_file.hpp"
 #include "core/dataset/kitti_files.hpp"
+#include "core/dataset/scan_dataset.hpp"
 #include "core/evaluation/confusion_matrix.hpp"
 #include "core/picture/segmentation_picture.hpp"
+#include "core/segmentation/segmenter.hpp"
 
 namespace stillmap::cli {
 namespace {
+
+struct SegmentationResult {
+  evaluation::ConfusionMatrix points;
+  std::size_t scans = 0;
+  /// From scan to the class of every point.
+  double median_ms = 0.0;
+  double p99_ms = 0.0;
+};
+
+/// Segments the scans of a labelled sequence and compares with its labels. Scans without labels
+/// are skipped. Throws DatasetError for a damaged file.
+SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& range,
+                                   Segmenter& labels, const ScanDone& scan_done) {
+  SegmentationResult result;
+  StageStopwatch times;
+  const std::size_t end = range.end(dataset);
+  for (std::size_t index = range.first; index < end; ++index) {
+    if (dataset.has_labels(index)) {
+      DatasetFrame frame = dataset.read(index);
+      frame.scan.labels.clear();
+      times.begin();
+      const PointLabels found = labels.segment(frame.scan);
+      times.end();
+      result.points.add(reduced_classes(frame.raw_labels), found.classes);
+      result.scans += 1;
+    }
+    if (scan_done && !scan_done(index + 1 - range.first)) break;
+  }
+  result.median_ms = times.total().quantile(0.5);
+  result.p99_ms = times.total().quantile(0.99);
+  return result;
+}
+
+std::string percent(const std::optional<double>& share) {
+  return share ? fixed(100.0 * *share, 2) : "-";
+}
+
+nlohmann::json share_or_null(const std::optional<double>& share) {
+  return share ? nlohmann::json(*share) : nlohmann::json(nullptr);
+}
+
+nlohmann::json to_json(const evaluation::ConfusionMatrix& matrix) {
+  nlohmann::json by_class = nlohmann::json::object();
+  for (std::size_t k = 1; k < semantic_class_count; ++k) {
+    const auto label = static_cast<SemanticClass>(k);
+    by_class[std::string(name(label))] = share_or_null(matrix.iou(label));
+  }
+  nlohmann::json by_group = nlohmann::json::object();
+  for (const evaluation::ClassGroup& group : evaluation::coarse_groups()) {
+    by_group[std::string(group.name)] = share_or_null(matrix.iou(group.classes));
+  }
+  return {{"points", matrix.total()},
+          {"miou", matrix.mean_iou()},
+          {"miou_present", matrix.mean_iou_of_present().value_or(0.0)},
+          {"accuracy", matrix.accuracy().value_or(0.0)},
+          {"iou", by_class},
+          {"iou_of_groups", by_group}};
+}
+
+/// IoU of every class and of the coarse groups.
+std::string describe(const evaluation::ConfusionMatrix& matrix) {
+  Table classes({"class", "IoU %"});
+  for (std::size_t k = 1; k < semantic_class_count; ++k) {
+    const auto label = static_cast<SemanticClass>(k);
+    classes.add({std::string(name(label)), percent(matrix.iou(label))});
+  }
+  classes.add({"mean of 19", percent(matrix.mean_iou())});
+  classes.add({"mean of those seen", percent(matrix.mean_iou_of_present())});
+  classes.add({"accuracy", percent(matrix.accuracy())});
+  Table groups({"group", "IoU %"});
+  for (const evaluation::ClassGroup& group : evaluation::coarse_groups()) {
+    groups.add({std::string(group.name), percent(matrix.iou(group.classes))});
+  }
+  std::string text = classes.text();
+  text.append("\n").append(groups.text()).append(std::to_string(matrix.total()));
+  return text.append(" labelled points; unlabeled truth is left out, as in semantic-kitti-api\n");
+}
 
 struct Arguments {
   std::string truth, predictions, picture;
@@ -106,7 +186,7 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
   CommandHandle command = evaluate.command("segmentation", "IoU of every class and their mean");
   command
       .option("--truth", arguments->truth,
-              "A recording with labels, or a folder with true .label files")
+              "A sequence with labels, or a folder with true .label files")
       .required();
   const OptionHandle predictions =
       command.option("--predictions", arguments->predictions,
@@ -117,7 +197,7 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
       .with_default()
       .excludes(predictions);
   command.option("--sensor", arguments->mapper.sensor,
-                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the recording suggests");
+                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the data set suggests");
   add_segmentation_options(command, arguments->mapper);
   command.option("--start", arguments->range.first, "Number of the first scan");
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");

@@ -38,7 +38,7 @@ int travel_axis(const std::vector<Eigen::Isometry3d>& poses) {
   return static_cast<int>(axis);
 }
 
-// Camera and lidar frames mixed up give figures that look like bad odometry.
+// A mix of camera and lidar frames gives errors that look like bad odometry.
 std::string frame_warning(const evaluation::PosePairs& pairs) {
   const int truth = travel_axis(pairs.truth);
   const int estimate = travel_axis(pairs.estimate);

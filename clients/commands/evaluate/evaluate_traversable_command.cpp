@@ -38,7 +38,7 @@ nlohmann::json to_json(const TraversabilityScore& score, double cell_m2) {
     false_lethal[std::string(name(static_cast<BlockReason>(i)))] =
         cell_m2 * static_cast<double>(score.false_lethal.at(i));
   }
-  return {{"precision_before_vehicles_left", number(score.precision(false))},
+  return {{"precision_with_parked_vehicles", number(score.precision(false))},
           {"precision", number(score.precision(true))},
           {"recall", number(score.recall())},
           {"free_m2", cell_m2 * static_cast<double>(score.free_and_truly_free)},
@@ -98,7 +98,7 @@ void add_evaluate_traversable_command(CommandHandle evaluate, Action& action) {
   SimulationArguments& simulation = arguments->simulation;
   CommandHandle command = evaluate.command(
       "traversable", "Precision and recall of a robot's free area on a map of a simulated city");
-  command.option("--map", arguments->map, "Map file made from the recording (map.stillmap)")
+  command.option("--map", arguments->map, "Map file made from the sequence (map.stillmap)")
       .required();
   command.option("--preset", simulation.preset, "As given to 'stillmap simulate'").with_default();
   command.option("--traffic", simulation.traffic, "As given to 'stillmap simulate'");
@@ -112,7 +112,7 @@ void add_evaluate_traversable_command(CommandHandle evaluate, Action& action) {
       "  stillmap map city --out city_map\n"
       "  stillmap evaluate traversable --map city_map/map.stillmap --preset quiet --seed 1\n"
       "Over the cells that are not unknown, without the safety margin. The map must begin with\n"
-      "the recording's first scan. Every cell that is called free and is not has a cause.");
+      "the sequence's first scan. Every cell that is called free and is not has a cause.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

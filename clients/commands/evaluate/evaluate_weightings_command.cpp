@@ -1,53 +1,190 @@
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
+#include "clients/commands/arguments/mapper_arguments.hpp"
+#include "clients/commands/arguments/simulation_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/commands/evaluate/weighting_comparison.hpp"
+#include "clients/commands/mapping/trajectory_report.hpp"
+#include "clients/commands/stage_stopwatch.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
+#include "core/dataset/dataset_error.hpp"
+#include "core/dataset/scan_dataset.hpp"
+#include "core/segmentation/segmenter.hpp"
 
 namespace stillmap::cli {
 namespace {
 
+/// Scans with true poses, from disk or simulated on demand.
+struct GroundTruthSequence {
+  std::string name;
+  std::size_t scans = 0;
+  MapperConfig config;
+  bool labelled = false;
+  std::function<DatasetFrame(std::size_t)> read;
+  /// Poses of the lidar, one per scan.
+  std::vector<Eigen::Isometry3d> truth;
+};
+
+/// One row of the paper's Table I.
+struct WeightingResult {
+  std::string weighting;
+  TrajectoryReport report;
+  double median_ms = 0.0;
+};
+
+constexpr std::array weighting_names{"none", "geometric", "semantic"};
+const std::string simulated = "sim:";
+
+GroundTruthSequence open_simulated(const std::string& name, std::size_t max_scans,
+                                   const MapperArguments& mapper, SimulationArguments arguments) {
+  arguments.preset = name.substr(simulated.size());
+  arguments.scans = static_cast<int>(std::min<std::size_t>(max_scans, 100'000));
+  const simulation::SimulationConfig config = simulation_config(arguments);
+  const auto simulation = std::make_shared<simulation::Simulation>(config);
+  GroundTruthSequence sequence;
+  sequence.name = name + " seed " + std::to_string(arguments.seed);
+  sequence.scans = static_cast<std::size_t>(config.scans);
+  sequence.config = mapper_config(mapper, config.sensor);
+  sequence.labelled = true;
+  sequence.read = [simulation](std::size_t i) {
+    simulation::SimulatedScan scan = simulation->scan(static_cast<int>(i));
+    return DatasetFrame{std::move(scan.scan), std::move(scan.raw_labels)};
+  };
+  for (int i = 0; i < config.scans; ++i) {
+    sequence.truth.push_back(simulation->T_map_lidar_at(i * config.sensor.period_s));
+  }
+  return sequence;
+}
+
+GroundTruthSequence open_dataset(const std::string& name, std::size_t max_scans,
+                                 const MapperArguments& mapper) {
+  const auto dataset = std::make_shared<ScanDataset>(name);
+  const std::optional<Trajectory> truth = dataset->truth();
+  if (!truth) throw DatasetError(name, "has no true poses (poses.txt or poses_lidar.txt)");
+  GroundTruthSequence sequence;
+  sequence.name = name;
+  sequence.scans = std::min(max_scans, dataset->size());
+  sequence.config = mapper_config(mapper, dataset->suggested_sensor());
+  sequence.labelled = dataset->has_labels(0);
+  sequence.read = [dataset](std::size_t i) { return dataset->read(i); };
+  for (const StampedPose& pose : *truth) sequence.truth.push_back(pose.T_map_lidar);
+  return sequence;
+}
+
+/// One of the mappers that are compared, and its stage times.
+struct WeightingRun {
+  WeightingRun(const std::string& weighting_name, MapperConfig config, bool labelled)
+      : weighting(weighting_name) {
+    config.odometry.weighting = weighting_from_name(weighting_name);
+    std::unique_ptr<Segmenter> labels = std::make_unique<NullSegmenter>();
+    if (labelled) labels = std::make_unique<PassthroughSegmenter>();
+    mapper = std::make_unique<Mapper>(config, std::move(labels));
+  }
+
+  void map(const Scan& scan, const std::string& sequence_name) {
+    times.begin();
+    if (!mapper->process(scan)) {
+      throw std::runtime_error("a scan of " + sequence_name +
+                               " cannot be mapped: " + mapper->last_rejection().reason);
+    }
+    times.end();
+  }
+
+  [[nodiscard]] WeightingResult result(const std::vector<Eigen::Isometry3d>& truth) const {
+    evaluation::PosePairs pairs;
+    for (const StampedPose& pose : mapper->trajectory()) {
+      pairs.truth.push_back(truth.at(pairs.estimate.size()));
+      pairs.estimate.push_back(pose.T_map_lidar);
+    }
+    return {weighting, report_trajectory(evaluation::pair_by_index(pairs.truth, pairs.estimate)),
+            times.total().quantile(0.5)};
+  }
+
+  std::string weighting;
+  std::unique_ptr<Mapper> mapper;
+  StageStopwatch times;
+};
+
+/// Opens a sequence with true poses, or "sim:PRESET". `max_scans` limits both. Throws
+/// DatasetError, ConfigError or std::invalid_argument.
+GroundTruthSequence open_ground_truth_sequence(const std::string& name, std::size_t max_scans,
+                                               const MapperArguments& mapper,
+                                               const SimulationArguments& simulation) {
+  if (name.starts_with(simulated)) return open_simulated(name, max_scans, mapper, simulation);
+  return open_dataset(name, max_scans, mapper);
+}
+
+/// Runs the three weightings side by side on the same scans. `scan_done(seen)` returning false ends
+/// it early. Throws std::runtime_error when a scan cannot be mapped.
+std::vector<WeightingResult> compare_weightings(const GroundTruthSequence& sequence,
+                                                const std::function<bool(std::size_t)>& scan_done) {
+  std::vector<WeightingRun> runs;
+  for (const char* weighting_name : weighting_names) {
+    runs.emplace_back(weighting_name, sequence.config, sequence.labelled);
+  }
+  for (std::size_t i = 0; i < sequence.scans; ++i) {
+    const DatasetFrame frame = sequence.read(i);
+    for (WeightingRun& run : runs) run.map(frame.scan, sequence.name);
+    if (!scan_done(i + 1)) break;
+  }
+  std::vector<WeightingResult> results;
+  for (const WeightingRun& run : runs) {
+    results.push_back(run.result(sequence.truth));
+  }
+  return results;
+}
+
 struct Arguments {
-  std::vector<std::string> recordings{"sim:crowd", "sim:quiet"};
+  std::vector<std::string> sequences{"sim:crowd", "sim:quiet"};
   std::size_t scans = 700;
   MapperArguments mapper;
   SimulationArguments simulation;
   bool json = false;
 };
 
-/// How often an error fits into that of no weighting; 1 where both are nothing.
-double times_better(const WeightingResult& none, const WeightingResult& result) {
+/// ATE without weighting divided by this ATE; 1 where both are 0.
+double error_reduction_factor(const WeightingResult& none, const WeightingResult& result) {
   const double of_none = none.report.rigid_aligned.rmse_m;
   const double of_this = result.report.rigid_aligned.rmse_m;
   return of_this > 0.0 ? of_none / of_this : 1.0;
 }
 
-void add_rows(Table& table, const GroundTruthSequence& recording,
+void add_rows(Table& table, const GroundTruthSequence& sequence,
               const std::vector<WeightingResult>& results) {
   for (const WeightingResult& result : results) {
     const TrajectoryReport& report = result.report;
     const auto& kitti = report.kitti;
     const auto& step = report.relative;
-    table.add({recording.name, result.weighting, fixed(report.path_m, 0),
+    table.add({sequence.name, result.weighting, fixed(report.path_m, 0),
                fixed(report.rigid_aligned.rmse_m, 3), fixed(report.first_aligned.final_m, 2),
                step ? fixed(100.0 * step->mean_translation_m, 2) : "-",
                kitti ? fixed(kitti->translation_percent, 3) : "-",
-               fixed(times_better(results.front(), result), 2), fixed(result.median_ms, 0)});
+               fixed(error_reduction_factor(results.front(), result), 2),
+               fixed(result.median_ms, 0)});
   }
 }
 
-nlohmann::json json_of(const GroundTruthSequence& recording,
+nlohmann::json json_of(const GroundTruthSequence& sequence,
                        const std::vector<WeightingResult>& results) {
   nlohmann::json rows = nlohmann::json::array();
   for (const WeightingResult& result : results) {
     nlohmann::json row = to_json(result.report);
-    row["recording"] = recording.name;
+    row["sequence"] = sequence.name;
     row["weighting"] = result.weighting;
-    row["times_better_than_none"] = times_better(results.front(), result);
+    row["error_reduction_factor"] = error_reduction_factor(results.front(), result);
     row["median_ms"] = result.median_ms;
     rows.push_back(row);
   }
@@ -56,19 +193,19 @@ nlohmann::json json_of(const GroundTruthSequence& recording,
 
 ExitCode run(const Arguments& arguments) {
   StopSignal stop;
-  Table table({"recording", "weighting", "path m", "ATE RMSE m", "final drift m", "cm a scan",
+  Table table({"sequence", "weighting", "path m", "ATE RMSE m", "final drift m", "cm a scan",
                "KITTI %", "none / this", "ms a scan"});
   nlohmann::json rows = nlohmann::json::array();
-  for (const std::string& name : arguments.recordings) {
-    const GroundTruthSequence recording =
+  for (const std::string& name : arguments.sequences) {
+    const GroundTruthSequence sequence =
         open_ground_truth_sequence(name, arguments.scans, arguments.mapper, arguments.simulation);
-    Progress progress(name, "scans", recording.scans);
-    const auto results = compare_weightings(recording, [&](std::size_t seen) {
+    Progress progress(name, "scans", sequence.scans);
+    const auto results = compare_weightings(sequence, [&](std::size_t seen) {
       progress.update(seen);
       return !stop.requested();
     });
-    add_rows(table, recording, results);
-    for (const nlohmann::json& row : json_of(recording, results)) rows.push_back(row);
+    add_rows(table, sequence, results);
+    for (const nlohmann::json& row : json_of(sequence, results)) rows.push_back(row);
     if (stop.requested()) break;
   }
   std::cout << (arguments.json ? rows.dump(2) + "\n" : table.text());
@@ -82,8 +219,8 @@ void add_evaluate_weightings_command(CommandHandle evaluate, Action& action) {
   CommandHandle command = evaluate.command(
       "weightings", "The paper's Table I: no, geometric and semantic weights on the same scans");
   command
-      .option("RECORDINGS", arguments->recordings,
-              "Recordings with true poses, or sim:crowd, sim:quiet, sim:yard")
+      .option("SEQUENCES", arguments->sequences,
+              "Sequences with true poses, or sim:crowd, sim:quiet, sim:yard")
       .with_default();
   command.option("--scans", arguments->scans, "Take as many scans of each at most")
       .above_zero()
@@ -91,17 +228,16 @@ void add_evaluate_weightings_command(CommandHandle evaluate, Action& action) {
   command.option("--seed", arguments->simulation.seed, "Of simulated cities").with_default();
   command.option("--config", arguments->mapper.config_file,
                  "Server file; its mapper settings are used");
-  command.option("--sensor", arguments->simulation.sensor, "Of simulated recordings")
-      .with_default();
+  command.option("--sensor", arguments->simulation.sensor, "Of simulated sequences").with_default();
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"
       "  stillmap evaluate weightings\n"
       "  stillmap evaluate weightings sim:crowd --seed 3 --scans 400\n"
       "  stillmap evaluate weightings sequences/10\n"
-      "ATE after the best rigid fit; final drift with the first poses aligned. The last column "
-      "but\n"
-      "one says how often the error fits into that of no weighting.");
+      "ATE after the best rigid fit; final drift with the first poses aligned. Column "
+      "'none / this'\n"
+      "is the ATE without weighting divided by this ATE.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -5,7 +5,7 @@
 
 namespace stillmap::cli {
 
-/// What a cell of a simulated city truly is for a robot. `truth` must outlive the answer.
+/// True traversability of a simulated city for a robot. `truth` must outlive the result.
 [[nodiscard]] TraversabilityTruth simulated_traversability(const simulation::CityTruth& truth,
                                                            const RobotProfile& profile,
                                                            double cell_m,

@@ -1,22 +1,254 @@
+#include <algorithm>
 #include <chrono>
+#include <cstdint>
+#include <filesystem>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/commands/live/recorder.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
+#include "idl/bag/bag_writer.hpp"
+#include "idl/dds/dds_options.hpp"
+#include "idl/dds/serialized_sample.hpp"
+#include "idl/interface/topics.hpp"
+#include "nav_msgs.h"
+#include "octomap_msgs.h"
+#include "sensor_msgs.h"
+#include "stillmap_msgs.h"
+#include "tf2_msgs.h"
 
 namespace stillmap::cli {
 namespace {
 
+struct RecorderOptions {
+  dds::DdsOptions dds;
+  /// First part of the server's topic names.
+  std::string server_name = "stillmap";
+  /// The sensor's topic, and that of its odometry.
+  std::string points_topic = "points";
+  std::string odometry_topic = "odom_prior";
+  /// ROS 2 names to record; empty: all topics of the sensor and the server.
+  std::vector<std::string> topics;
+  /// New folder of the bag.
+  std::filesystem::path folder;
+};
+
+struct RecordedTopic {
+  std::string name;
+  std::uint64_t messages = 0;
+  /// Gaps in the sequence numbers of the writers. Not counted on latched topics (transient local),
+  /// where newer samples may replace older ones.
+  std::uint64_t lost = 0;
+  /// Publishers matched now.
+  int publishers = 0;
+};
+
 using Clock = std::chrono::steady_clock;
+using eprosima::fastdds::dds::SampleInfo;
+using eprosima::fastdds::dds::TypeSupport;
+using eprosima::fastrtps::rtps::GUID_t;
+
+/// Reader depth, for when the disk is busy; on a keyed topic for each key.
+constexpr int max_waiting = 20;
+constexpr int max_waiting_per_key = 4;
+
+struct RecordableTopic {
+  std::string dds_name;
+  TypeSupport type;
+  dds::TopicQos offered;
+};
+
+template <typename T>
+RecordableTopic recordable(const dds::TopicSpec<T>& topic) {
+  return {.dds_name = topic.dds_name, .type = dds::type_support<T>(), .offered = topic.writer};
+}
+
+std::vector<RecordableTopic> recordable_topics(const RecorderOptions& options) {
+  std::vector<RecordableTopic> topics{
+      recordable(dds::points_topic(options.points_topic, DeliveryMode::latest, max_waiting)),
+      recordable(dds::odometry_prior_topic(options.odometry_topic))};
+  dds::for_each_topic(dds::Topics::in(options.server_name),
+                      [&](const auto& topic) { topics.push_back(recordable(topic)); });
+  return topics;
+}
+
+/// "/points" of "rt/points".
+std::string ros_name(const RecordableTopic& topic) { return topic.dds_name.substr(2); }
+
+std::vector<RecordableTopic> chosen_topics(const RecorderOptions& options) {
+  std::vector<RecordableTopic> all = recordable_topics(options);
+  if (options.topics.empty()) return all;
+  std::vector<RecordableTopic> chosen;
+  for (const std::string& requested : options.topics) {
+    const std::string name = requested.starts_with('/') ? requested : "/" + requested;
+    const auto found = std::ranges::find(all, name, ros_name);
+    if (found == all.end()) {
+      std::string known;
+      for (const RecordableTopic& topic : all) known.append(" ").append(ros_name(topic));
+      throw std::invalid_argument("topic '" + requested + "' cannot be recorded; there are" +
+                                  known);
+    }
+    chosen.push_back(*found);
+  }
+  return chosen;
+}
+
+std::vector<dds::BagTopic> bag_topics(const std::vector<RecordableTopic>& topics) {
+  std::vector<dds::BagTopic> in_bag;
+  for (const RecordableTopic& topic : topics) {
+    const dds::TopicQos& qos = topic.offered;
+    in_bag.push_back({.name = ros_name(topic),
+                      .type = dds::ros_type_name(topic.type),
+                      .serialization_format = "cdr",
+                      .offered_qos_profiles =
+                          dds::offered_qos_yaml(qos.reliable, qos.transient_local, qos.depth),
+                      .messages = 0});
+  }
+  return in_bag;
+}
+
+dds::TopicQos reader_qos_for(const RecordableTopic& topic, bool as_offered) {
+  dds::TopicQos qos = topic.offered;
+  qos.keep_all = false;
+  qos.depth = qos.max_keys > 1 ? max_waiting_per_key : max_waiting;
+  // Publishers that offer less are recorded too, with the weakest request.
+  qos.reliable = as_offered;
+  qos.transient_local = as_offered && qos.transient_local;
+  return qos;
+}
+
+/// Counts gaps in the sequence numbers of each writer.
+class LossCounter {
+ public:
+  void add(const GUID_t& writer, std::uint64_t number) {
+    const auto [last, is_new] = last_.try_emplace(writer, number);
+    if (is_new) return;
+    if (number > last->second + 1) lost_ += number - last->second - 1;
+    last->second = std::max(last->second, number);
+  }
+  [[nodiscard]] std::uint64_t lost() const { return lost_; }
+
+ private:
+  std::map<GUID_t, std::uint64_t> last_;
+  std::uint64_t lost_ = 0;
+};
+
+std::int64_t wall_clock_ns() {
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
+}
+
+/// A topic that is being recorded.
+class Input {
+ public:
+  Input(dds::Participant& participant, RecordableTopic topic)
+      : participant_(participant), topic_(std::move(topic)) {
+    listen(true);
+  }
+
+  /// Requests the weakest QoS once a publisher offers less than the request.
+  void relax_qos() {
+    if (!as_offered_ || reader_->events().incompatible_writers() == 0) return;
+    reader_.reset();
+    listen(false);
+  }
+
+  [[nodiscard]] bool take(dds::SerializedSample& sample) {
+    SampleInfo info;
+    if (!reader_->take(sample, info, {}, std::chrono::milliseconds(0))) return false;
+    const auto& number = info.sample_identity.sequence_number();
+    losses_.add(info.sample_identity.writer_guid(), number.to64long());
+    return true;
+  }
+
+  [[nodiscard]] std::uint64_t lost() const {
+    return topic_.offered.transient_local ? 0 : losses_.lost();
+  }
+  [[nodiscard]] int publishers() const { return reader_->events().matched_writers(); }
+
+ private:
+  void listen(bool as_offered) {
+    as_offered_ = as_offered;
+    reader_.emplace(participant_, topic_.dds_name, topic_.type, reader_qos_for(topic_, as_offered));
+  }
+
+  dds::Participant& participant_;
+  RecordableTopic topic_;
+  std::optional<dds::SerializedSampleReader> reader_;
+  bool as_offered_ = true;
+  LossCounter losses_;
+};
+
+/// Writes serialized samples from DDS to a rosbag2 without decoding them. Samples wait in the
+/// readers, whose depth is bounded: a caller that writes too rarely loses samples, which are
+/// counted. Not thread safe.
+class Recorder {
+ public:
+  /// Joins the domain and makes the bag. Throws DdsError, DatasetError for a folder that exists
+  /// already, std::invalid_argument for a topic that cannot be recorded.
+  explicit Recorder(const RecorderOptions& options) : Recorder(options, chosen_topics(options)) {}
+
+  /// Writes what has arrived. Throws DatasetError when it cannot.
+  void write_received() {
+    dds::SerializedSample sample;
+    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+      Input& input = *inputs_[i];
+      input.relax_qos();
+      // Bounded, so that a topic that never pauses does not starve the others.
+      for (int taken = 0; taken < max_waiting && input.take(sample); ++taken) {
+        bag_.add(i, wall_clock_ns(), sample);
+      }
+    }
+  }
+  /// Commits to the disk.
+  void commit() { bag_.commit(); }
+  /// The last commit; leaves a bag in one plain file.
+  void finish() { bag_.finish(); }
+
+  [[nodiscard]] std::vector<RecordedTopic> topics() const {
+    std::vector<RecordedTopic> topics;
+    for (std::size_t i = 0; i < inputs_.size(); ++i) {
+      const dds::BagTopic& topic = bag_.topics()[i];
+      topics.push_back({.name = topic.name,
+                        .messages = topic.messages,
+                        .lost = inputs_[i]->lost(),
+                        .publishers = inputs_[i]->publishers()});
+    }
+    return topics;
+  }
+  [[nodiscard]] std::uint64_t messages() const { return bag_.messages(); }
+  [[nodiscard]] std::uint64_t bytes() const { return bag_.bytes(); }
+  [[nodiscard]] std::uint64_t lost() const {
+    std::uint64_t lost = 0;
+    for (const auto& input : inputs_) lost += input->lost();
+    return lost;
+  }
+
+ private:
+  Recorder(const RecorderOptions& options, const std::vector<RecordableTopic>& topics)
+      : participant_(options.dds), bag_(options.folder, bag_topics(topics)) {
+    for (const RecordableTopic& topic : topics) {
+      inputs_.push_back(std::make_unique<Input>(participant_, topic));
+    }
+  }
+
+  dds::Participant participant_;
+  dds::BagWriter bag_;
+  std::vector<std::unique_ptr<Input>> inputs_;
+};
 
 constexpr std::chrono::milliseconds poll_period{5};
-/// A run that is killed loses no more than this.
+/// A killed run loses no more than this.
 constexpr std::chrono::seconds commit_period{1};
 constexpr double bytes_a_mib = 1048576.0;
 
@@ -119,9 +351,9 @@ void add_record_command(CommandHandle program, Action& action) {
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"
-      "  stillmap record drive\n"
-      "  stillmap record drive --for 60 --topics points stillmap/odometry tf\n"
-      "  stillmap replay drive --topic-in points\n"
+      "  stillmap record tour\n"
+      "  stillmap record tour --for 60 --topics points stillmap/odometry tf\n"
+      "  stillmap replay tour --topic-in points\n"
       "Writes what DDS carried, byte for byte, as ROS 2 Humble's rosbag2 in SQLite storage:\n"
       "'ros2 bag info' and 'ros2 bag play' read it. A run that is killed keeps what it had a\n"
       "second before. Samples that were lost on the way or for a slow disk are counted.");

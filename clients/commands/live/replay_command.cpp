@@ -1,21 +1,234 @@
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <cstdint>
+#include <functional>
 #include <iostream>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/commands/live/pose_log.hpp"
-#include "clients/commands/live/replay_run.hpp"
+#include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
+#include "clients/library/client.hpp"
+#include "clients/library/scan_publisher.hpp"
 #include "clients/terminal/progress.hpp"
+#include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "core/dataset/scan_dataset.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::cli {
 namespace {
+
+/// The poses that a server publishes, by stamp: from the odometry topic, and those that were lost
+/// there from the path. Callbacks may run on any thread.
+class PoseLog {
+ public:
+  /// Starts listening. The client must outlive the log.
+  explicit PoseLog(Client& client);
+
+  /// Waits until every one of these scans has its pose, or `timeout` has passed.
+  void wait_for(const std::vector<std::int64_t>& stamps_ns, std::chrono::milliseconds timeout);
+
+  /// The poses of these scans, in their order, without those that have none.
+  [[nodiscard]] Trajectory poses_of(const std::vector<std::int64_t>& stamps_ns) const;
+
+ private:
+  /// From the odometry topic: replaces the pose of a scan that is sent again.
+  void take(const StampedPose& pose);
+  /// From the path, which may be older: does not replace a pose.
+  void add(const StampedPose& pose);
+
+  mutable std::mutex mutex_;
+  std::condition_variable added_;
+  std::map<std::int64_t, Eigen::Isometry3d> T_map_lidar_;
+  // Last members: their callbacks end before the poses are destroyed.
+  Subscription odometry_;
+  Subscription path_;
+};
+
+struct ReplayOptions {
+  ScanRange range;
+  /// Times real time; 0: as fast as the server takes scans.
+  double rate = 1.0;
+  bool with_labels = true;
+  /// Longest wait of a lossless publisher for the server to take a scan.
+  std::chrono::milliseconds idle_timeout{30'000};
+};
+
+struct ReplayResult {
+  std::vector<std::int64_t> published_stamps_ns;
+  std::vector<SkippedScan> skipped;
+  double seconds = 0.0;
+  bool acknowledged = false;
+  bool stopped = false;
+};
+
+/// Scans that the server has mapped and dropped since an earlier status.
+struct ServerCounts {
+  std::uint64_t mapped = 0;
+  std::uint64_t dropped = 0;
+};
+
+PoseLog::PoseLog(Client& client)
+    : odometry_(client.subscribe_odometry([this](const OdometryUpdate& update) {
+        take(update.pose);
+        added_.notify_one();
+      })),
+      path_(client.subscribe_path([this](const Trajectory& path) {
+        for (const StampedPose& pose : path) add(pose);
+        added_.notify_one();
+      })) {}
+
+void PoseLog::take(const StampedPose& pose) {
+  const std::lock_guard lock(mutex_);
+  T_map_lidar_.insert_or_assign(pose.stamp_ns, pose.T_map_lidar);
+}
+
+void PoseLog::add(const StampedPose& pose) {
+  const std::lock_guard lock(mutex_);
+  T_map_lidar_.try_emplace(pose.stamp_ns, pose.T_map_lidar);
+}
+
+void PoseLog::wait_for(const std::vector<std::int64_t>& stamps_ns,
+                       std::chrono::milliseconds timeout) {
+  std::unique_lock lock(mutex_);
+  added_.wait_for(lock, timeout, [&] {
+    return std::all_of(stamps_ns.begin(), stamps_ns.end(),
+                       [&](std::int64_t stamp_ns) { return T_map_lidar_.contains(stamp_ns); });
+  });
+}
+
+Trajectory PoseLog::poses_of(const std::vector<std::int64_t>& stamps_ns) const {
+  const std::lock_guard lock(mutex_);
+  Trajectory trajectory;
+  for (const std::int64_t stamp_ns : stamps_ns) {
+    const auto found = T_map_lidar_.find(stamp_ns);
+    if (found != T_map_lidar_.end()) trajectory.push_back({stamp_ns, found->second});
+  }
+  return trajectory;
+}
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds publish_step{500};
+constexpr std::chrono::milliseconds status_period{100};
+
+/// When a scan of a sequence is due.
+class ReplayClock {
+ public:
+  ReplayClock(std::int64_t first_stamp_ns, double rate)
+      : first_stamp_ns_(first_stamp_ns), rate_(rate), began_(Clock::now()) {}
+
+  /// Waits until the scan is due; returns true when a signal arrived first.
+  [[nodiscard]] bool wait_or_stop(std::int64_t stamp_ns, StopSignal& stop) const {
+    if (rate_ <= 0.0) return stop.requested();
+    const double due_ns = std::max(0.0, static_cast<double>(stamp_ns - first_stamp_ns_) / rate_);
+    const auto due = began_ + std::chrono::nanoseconds(static_cast<std::int64_t>(due_ns));
+    const auto left = std::chrono::ceil<std::chrono::milliseconds>(due - Clock::now());
+    return stop.wait_for(std::max(left, std::chrono::milliseconds(0)));
+  }
+
+ private:
+  std::int64_t first_stamp_ns_;
+  double rate_;
+  Clock::time_point began_;
+};
+
+std::optional<DatasetFrame> read_scan(const ScanDataset& dataset, std::size_t index,
+                                      const ReplayOptions& options, ReplayResult& result,
+                                      const ScanSkipped& scan_skipped) {
+  try {
+    DatasetFrame frame = dataset.read(index);
+    if (!options.with_labels) {
+      frame.raw_labels.clear();
+      frame.scan.labels.clear();
+    }
+    // The unit of this sensor's driver; the server scales it back.
+    for (float& value : frame.scan.intensity) value /= dataset.suggested_sensor().intensity_scale;
+    return frame;
+  } catch (const DatasetError& error) {
+    if (options.range.strict) throw;
+    result.skipped.push_back({index, "unreadable", error.what()});
+    scan_skipped(result.skipped.back());
+    return std::nullopt;
+  }
+}
+
+// In short steps, so that a signal ends the wait for the server. Returns false after a signal.
+bool publish(ScanPublisher& publisher, const DatasetFrame& frame, const ReplayOptions& options,
+             StopSignal& stop) {
+  const auto began = Clock::now();
+  while (!publisher.publish(frame.scan, frame.raw_labels, publish_step)) {
+    if (stop.requested()) return false;
+    if (Clock::now() - began > options.idle_timeout) {
+      throw ServiceTimeout(
+          "the server has taken no scan for " +
+          std::to_string(options.idle_timeout.count() / 1000) +
+          " s: did it stop? 'stillmap status' tells; a lossless replay needs a server with input "
+          "delivery: every");
+    }
+  }
+  return true;
+}
+
+/// Publishes the scans of a sequence at the times of their stamps. Throws ServiceTimeout when the
+/// server stops taking scans, DatasetError as ScanRange says.
+ReplayResult replay_dataset(const ScanDataset& dataset, const ReplayOptions& options,
+                            ScanPublisher& publisher, StopSignal& stop, const ScanDone& scan_done,
+                            const ScanSkipped& scan_skipped) {
+  const std::size_t end = options.range.end(dataset);
+  const auto began = Clock::now();
+  const ReplayClock clock(dataset.stamp_ns(options.range.first), options.rate);
+  ReplayResult result;
+  for (std::size_t index = options.range.first; index < end && !result.stopped; ++index) {
+    const auto frame = read_scan(dataset, index, options, result, scan_skipped);
+    if (frame) {
+      result.stopped = clock.wait_or_stop(dataset.stamp_ns(index), stop) ||
+                       !publish(publisher, *frame, options, stop);
+      if (!result.stopped) result.published_stamps_ns.push_back(frame->scan.stamp_ns);
+    }
+    (void)scan_done(index + 1 - options.range.first);
+  }
+  result.acknowledged = publisher.wait_for_all_acknowledged(options.idle_timeout);
+  result.seconds = std::chrono::duration<double>(Clock::now() - began).count();
+  return result;
+}
+
+ServerCounts counts_since(const dds::ServerStatus& before, const dds::ServerStatus& now) {
+  return {.mapped = now.counter("scans_mapped") - before.counter("scans_mapped"),
+          .dropped = now.dropped() - before.dropped()};
+}
+
+/// Polls the status until the server has mapped or dropped `scans` of them since `before`, or
+/// nothing has changed for `idle_timeout`. Returns the last status.
+dds::ServerStatus wait_until_mapped(Client& client, const dds::ServerStatus& before,
+                                    std::uint64_t scans, std::chrono::milliseconds idle_timeout,
+                                    StopSignal& stop) {
+  dds::ServerStatus status = client.status();
+  auto changed = Clock::now();
+  std::uint64_t done_before = 0;
+  while (true) {
+    const ServerCounts counts = counts_since(before, status);
+    const std::uint64_t done = counts.mapped + counts.dropped;
+    if (done != std::exchange(done_before, done)) changed = Clock::now();
+    if (done >= scans || Clock::now() - changed > idle_timeout) return status;
+    if (stop.wait_for(status_period)) return status;
+    status = client.status();
+  }
+}
 
 struct Arguments {
   std::string dataset;
@@ -63,6 +276,7 @@ void require_lossless(const dds::ServerStatus& status) {
 ReplayOptions replay_options(const Arguments& arguments) {
   ReplayOptions options = arguments.replay;
   options.rate = arguments.rate > 0.0 ? arguments.rate : arguments.lossless ? 0.0 : 1.0;
+  options.idle_timeout = std::max(options.idle_timeout, arguments.client.timeout());
   return options;
 }
 
@@ -76,7 +290,7 @@ ReplayResult publish_with_progress(const ScanDataset& dataset, const Arguments& 
         progress.update(seen);
         return true;
       },
-      [&](const SkippedScan& scan) { progress.say("stillmap: left out: " + scan.reason); });
+      [&](const SkippedScan& scan) { progress.say("stillmap: skipped: " + scan.reason); });
 }
 
 ReplayOutcome replay(const Arguments& arguments, StopSignal& stop) {
@@ -93,14 +307,14 @@ ReplayOutcome replay(const Arguments& arguments, StopSignal& stop) {
   ReplayOutcome outcome;
   outcome.replay = publish_with_progress(dataset, arguments, publisher, stop);
   const std::vector<std::int64_t>& stamps_ns = outcome.replay.published_stamps_ns;
-  // A lossy topic may have lost scans that nobody counts, so there the wait ends sooner.
+  // A lossy topic loses scans that are not counted, so the wait for them is short.
   const auto idle_timeout =
-      arguments.lossless ? arguments.replay.idle_timeout : std::chrono::seconds(2);
+      arguments.lossless ? replay_options(arguments).idle_timeout : std::chrono::seconds(2);
   const dds::ServerStatus after =
       wait_until_mapped(client, before, stamps_ns.size(), idle_timeout, stop);
   outcome.server = counts_since(before, after);
   if (outcome.server.mapped == stamps_ns.size()) {
-    poses.wait_for(stamps_ns, std::chrono::seconds(5));
+    poses.wait_for(stamps_ns, arguments.client.timeout());
   }
   outcome.poses = poses.poses_of(stamps_ns);
   return outcome;
@@ -109,13 +323,13 @@ ReplayOutcome replay(const Arguments& arguments, StopSignal& stop) {
 nlohmann::json to_json(const ReplayOutcome& outcome) {
   return {{"published", outcome.replay.published_stamps_ns.size()},
           {"acknowledged", outcome.replay.acknowledged},
-          {"left_out", outcome.replay.skipped.size()},
+          {"skipped", outcome.replay.skipped.size()},
           {"mapped", outcome.server.mapped},
           {"dropped", outcome.server.dropped},
           {"poses", outcome.poses.size()},
           {"poses_frame", "lidar; the map is the lidar frame of the server's first scan"},
           {"seconds", outcome.replay.seconds},
-          {"stopped", outcome.replay.stopped}};
+          {"interrupted", outcome.replay.stopped}};
 }
 
 std::string describe(const ReplayOutcome& outcome) {
@@ -123,7 +337,7 @@ std::string describe(const ReplayOutcome& outcome) {
   return std::to_string(outcome.replay.published_stamps_ns.size()) + " scans published in " +
          fixed(outcome.replay.seconds, 1) + " s (" + fixed(published / outcome.replay.seconds, 1) +
          "/s), " + (outcome.replay.acknowledged ? "all" : "not all") + " acknowledged, " +
-         std::to_string(outcome.replay.skipped.size()) + " damaged ones left out\n" +
+         std::to_string(outcome.replay.skipped.size()) + " damaged ones skipped\n" +
          "the server mapped " + std::to_string(outcome.server.mapped) + " and dropped " +
          std::to_string(outcome.server.dropped) + "; " + std::to_string(outcome.poses.size()) +
          " poses came back\n";
@@ -145,7 +359,7 @@ ExitCode run(const Arguments& arguments) {
               << outcome.server.mapped << " of " << published << " scans, and "
               << outcome.poses.size()
               << " poses came back; 'stillmap status' counts why. A server takes no scan twice: "
-                 "'stillmap reset' makes it begin anew\n";
+                 "'stillmap reset' makes it start over\n";
     return ExitCode::failed;
   }
   return outcome.replay.stopped ? ExitCode::failed : ExitCode::ok;
@@ -157,12 +371,12 @@ void add_replay_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   ReplayOptions& replay = arguments->replay;
   CommandHandle command =
-      program.command("replay", "Publish a recording on DDS, as a lidar driver would");
+      program.command("replay", "Publish a sequence or bag on DDS, as a lidar driver would");
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic_in, topic_in_help);
   command
       .option("--rate", arguments->rate,
-              "Times real time; default 1, with --lossless as fast as the server takes them")
+              "Times real time; default 1, with --lossless as fast as the server maps")
       .above_zero();
   command.flag("--lossless", arguments->lossless,
                "Wait for the server instead of letting it drop scans (its input delivery "
@@ -172,7 +386,7 @@ void add_replay_command(CommandHandle program, Action& action) {
   command.option("--start", replay.range.first, "Number of the first scan");
   command.option("--scans,--count", replay.range.count, "Take as many scans at most");
   command.flag("--labels,!--no-labels", replay.with_labels,
-               "Send the recording's labels, where it has any (default)");
+               "Send the labels of the sequence, where it has any (default)");
   command.flag("--strict", replay.range.strict, "Stop at the first damaged file");
   command.option("--topic", arguments->topic, "ROS 2 name of the topic").with_default();
   command
@@ -186,7 +400,7 @@ void add_replay_command(CommandHandle program, Action& action) {
       "Examples:\n"
       "  stillmap replay sequences/00 --rate 2\n"
       "  stillmap replay city --lossless --out poses_lidar.txt\n"
-      "Ends when the server has worked off what was sent, and says what became of it. Exit code 1\n"
+      "Ends when the server has processed what was sent, and prints the counts. Exit code 1\n"
       "when a lossless replay lost something, 3 when no server answers or it stops taking scans.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }

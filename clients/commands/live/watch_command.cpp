@@ -27,7 +27,7 @@ struct Arguments {
   bool json = false;
 };
 
-/// Updates from the server, handed from its subscriptions' threads to the one that prints.
+/// Hands updates from the subscriptions' threads to the printing one.
 class UpdateQueue {
  public:
   void add(const StampedPose& pose) {
@@ -67,7 +67,7 @@ nlohmann::json pose_json(const StampedPose& pose) {
           {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
 }
 
-// One line a second: the newest pose, and how the server is.
+// One line per status, which comes each second: the newest pose, health and rates.
 std::string status_line(const dds::ServerStatus& status, const Trajectory& poses) {
   std::string line;
   if (poses.empty()) {

@@ -32,9 +32,9 @@ nlohmann::json fault_json(const MapFault& fault) {
 nlohmann::json to_json(const MapCheck& check) {
   nlohmann::json faults = nlohmann::json::array();
   for (const MapFault& fault : check.faults) faults.push_back(fault_json(fault));
-  return {{"sound", check.is_sound()},
+  return {{"valid", check.is_sound()},
           {"tiles", check.tiles},
-          {"sound_tiles", check.sound_tiles},
+          {"valid_tiles", check.sound_tiles},
           {"voxels", check.voxels},
           {"hidden_voxels", check.hidden_voxels},
           {"poses", check.poses},
@@ -55,10 +55,10 @@ std::string describe(const MapCheck& check) {
   const std::string looked_at = std::to_string(check.tiles) + " tiles, " +
                                 std::to_string(check.voxels) + " voxels, " +
                                 std::to_string(check.poses) + " poses";
-  if (check.is_sound()) return "sound: " + looked_at + "\n";
+  if (check.is_sound()) return "valid: " + looked_at + "\n";
   return text + "damaged: " + std::to_string(check.faults.size()) + " faults in " + looked_at +
          "; " + std::to_string(check.sound_tiles) +
-         " tiles are sound. Restore a copy, or map again.\n";
+         " tiles are valid. Restore a copy, or map again.\n";
 }
 
 ExitCode run(const Arguments& arguments) {
@@ -79,7 +79,7 @@ void add_map_check_command(CommandHandle program, Action& action) {
       "Examples:\n"
       "  stillmap map-check city.stillmap\n"
       "  stillmap map-check backup.stillmap --json | jq '.faults[] | select(.tile)'\n"
-      "Exit code 0: sound; 1: damaged, each fault is named with its tile; 2: no map file that "
+      "Exit code 0: valid; 1: damaged, each fault is named with its tile; 2: no map file that "
       "this\n"
       "version can read.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });

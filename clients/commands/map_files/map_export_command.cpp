@@ -4,8 +4,7 @@
 #include <stdexcept>
 
 #include "clients/commands/command.hpp"
-#include "clients/commands/query/class_arguments.hpp"
-#include "clients/commands/query/cloud_output.hpp"
+#include "clients/commands/query/query_report.hpp"
 #include "clients/commands/query/region_arguments.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/map/tools/map_export.hpp"

@@ -1,18 +1,208 @@
+#include <sys/resource.h>
+
+#include <filesystem>
 #include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <stdexcept>
+#include <string>
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/commands/mapping/map_output.hpp"
+#include "clients/commands/mapping/mapping_run.hpp"
+#include "clients/commands/mapping/pose_files.hpp"
+#include "clients/commands/mapping/trajectory_report.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
+#include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "core/map/storage/map_file.hpp"
+#include "core/map/tools/map_export.hpp"
+#include "core/picture/map_picture.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::cli {
 namespace {
+
+/// Results of a mapping run, with its errors where the sequence has true poses.
+struct MapOutput {
+  std::filesystem::path folder;
+  std::optional<TrajectoryReport> accuracy;
+};
+
+// True poses of the mapped scans, in the lidar frame of the first of them.
+std::optional<Trajectory> truth_of(const ScanDataset& dataset, const MappingResult& result) {
+  std::optional<Trajectory> all = dataset.truth();
+  if (!all || result.trajectory.empty()) return std::nullopt;
+  const Eigen::Isometry3d T_first_world =
+      all->at(result.scan_of_pose.front()).T_map_lidar.inverse();
+  Trajectory truth;
+  for (std::size_t i = 0; i < result.scan_of_pose.size(); ++i) {
+    truth.push_back({result.trajectory[i].stamp_ns,
+                     T_first_world * all->at(result.scan_of_pose[i]).T_map_lidar});
+  }
+  return truth;
+}
+
+evaluation::PosePairs pairs_of(const Trajectory& truth, const Trajectory& estimate) {
+  evaluation::PosePairs pairs;
+  for (const StampedPose& pose : truth) pairs.truth.push_back(pose.T_map_lidar);
+  for (const StampedPose& pose : estimate) pairs.estimate.push_back(pose.T_map_lidar);
+  return evaluation::pair_by_index(pairs.truth, pairs.estimate);
+}
+
+void save_map(const std::filesystem::path& file, const MappingResult& result,
+              const MapperConfig& config) {
+  open_map_file(file)->save({.view = *result.view,
+                             .tile_evidence = result.tile_evidence,
+                             .trajectory = result.trajectory,
+                             .metadata = {{"sensor", config.sensor.name},
+                                          {"label_source", result.label_source},
+                                          {"software", "stillmap " STILLMAP_VERSION},
+                                          {map_ended_key, "yes"}}});
+}
+
+/// Name of the map file in an output folder.
+std::filesystem::path map_file_in(const std::filesystem::path& folder) {
+  return folder / "map.stillmap";
+}
+
+/// Makes the folder. Throws std::invalid_argument when it holds a map already and `force` is not
+/// set; with `force`, removes that map.
+void prepare_output_folder(const std::filesystem::path& folder, bool force) {
+  const std::filesystem::path file = map_file_in(folder);
+  if (std::filesystem::exists(file)) {
+    if (!force) {
+      throw std::invalid_argument(
+          file.string() + " exists already: choose another --out, or --force to replace it");
+    }
+    for (const char* part : {"", "-wal", "-shm"}) {
+      std::filesystem::remove(file.string() + part);
+    }
+  }
+  std::error_code error;
+  std::filesystem::create_directories(folder, error);
+  if (error) throw DatasetError(folder, "cannot be made: " + error.message());
+}
+
+/// Writes poses_lidar.txt, poses_tum.txt, map.stillmap, map.ply, map.pcd, map.png and, with truth,
+/// trajectory.png and trajectory_error.png. Throws what their writers throw.
+MapOutput write_map_output(const std::filesystem::path& folder, const ScanDataset& dataset,
+                           const MappingResult& result, const MapperConfig& config) {
+  MapOutput output{.folder = folder, .accuracy = std::nullopt};
+  write_kitti_poses(folder / "poses_lidar.txt", result.trajectory);
+  write_tum(folder / "poses_tum.txt", result.trajectory);
+  save_map(map_file_in(folder), result, config);
+  export_ply(*result.view, folder / "map.ply");
+  export_pcd(*result.view, folder / "map.pcd");
+  MapPictureOptions picture;
+  picture.truth = truth_of(dataset, result);
+  if (picture.truth) {
+    const evaluation::PosePairs pairs = pairs_of(*picture.truth, result.trajectory);
+    output.accuracy = report_trajectory(pairs);
+    draw_trajectories(folder, pairs, *output.accuracy, GroundPlane::xy);
+  }
+  write_map_picture(folder / "map.png", *result.view, result.trajectory, picture);
+  return output;
+}
+
+double peak_memory_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts kB
+}
+
+std::uint64_t voxel_count(const MapSnapshot& view) {
+  std::uint64_t count = 0;
+  for (const auto& tile : view.tiles) count += tile->info.voxel_count;
+  return count;
+}
+
+nlohmann::json optional_number(const std::optional<double>& value) {
+  return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
+}
+
+nlohmann::json stages_json(const std::vector<StageDurations>& stages) {
+  nlohmann::json json = nlohmann::json::object();
+  for (const StageDurations& stage : stages) {
+    json[stage.stage] = {{"median_ms", stage.quantile(0.5)},
+                         {"p95_ms", stage.quantile(0.95)},
+                         {"p99_ms", stage.quantile(0.99)}};
+  }
+  return json;
+}
+
+nlohmann::json skipped_json(const std::vector<SkippedScan>& skipped) {
+  nlohmann::json json = nlohmann::json::array();
+  for (const SkippedScan& scan : skipped) {
+    json.push_back({{"scan", scan.index}, {"counter", scan.counter}, {"reason", scan.reason}});
+  }
+  return json;
+}
+
+std::string describe_stages(const std::vector<StageDurations>& stages) {
+  Table table({"ms a scan", "median", "p95", "p99"});
+  for (const StageDurations& stage : stages) {
+    table.add({stage.stage, fixed(stage.quantile(0.5), 1), fixed(stage.quantile(0.95), 1),
+               fixed(stage.quantile(0.99), 1)});
+  }
+  return table.text();
+}
+
+/// Contents of report.json.
+nlohmann::json to_json(const MappingResult& result, const MapOutput& output) {
+  nlohmann::json health = nlohmann::json::object();
+  for (const auto& [state, count] : result.health) health[name(state)] = count;
+  const StageDurations& total = result.stages.back();
+  return {{"scans", result.trajectory.size()},
+          {"seconds", result.seconds},
+          {"interrupted", result.stopped},
+          {"median_ms", total.quantile(0.5)},
+          {"p95_ms", total.quantile(0.95)},
+          {"p99_ms", total.quantile(0.99)},
+          {"stages", stages_json(result.stages)},
+          {"peak_memory_mb", peak_memory_mb()},
+          {"label_source", result.label_source},
+          {"health", health},
+          {"skipped", skipped_json(result.skipped)},
+          {"tiles", result.view->tiles.size()},
+          {"voxels", voxel_count(*result.view)},
+          {"voxel_size_m", result.view->voxel_size_m},
+          {"poses_frame", "lidar; the map is the lidar frame of the first pose"},
+          {"moving_points",
+           {{"precision", optional_number(result.moving.precision())},
+            {"recall", optional_number(result.moving.recall())},
+            {"iou", optional_number(result.moving.iou())}}},
+          {"accuracy", output.accuracy ? to_json(*output.accuracy) : nlohmann::json(nullptr)},
+          {"folder", output.folder.string()}};
+}
+
+/// The same for people, shorter.
+std::string describe(const MappingResult& result, const MapOutput& output) {
+  std::string text = describe_stages(result.stages);
+  text += std::to_string(result.trajectory.size()) + " scans mapped in " +
+          fixed(result.seconds, 1) + " s, " + std::to_string(result.skipped.size()) +
+          " skipped; labels: " + result.label_source + "; odometry";
+  for (const auto& [state, count] : result.health) {
+    text += std::string(" ") + name(state) + " " + std::to_string(count);
+  }
+  text += "\nmap: " + std::to_string(voxel_count(*result.view)) + " voxels of " +
+          fixed(result.view->voxel_size_m, 2) + " m in " +
+          std::to_string(result.view->tiles.size()) + " tiles; peak memory " +
+          fixed(peak_memory_mb(), 0) + " MB\n";
+  if (const auto recall = result.moving.recall()) {
+    text += "moving points found: " + fixed(100.0 * *recall, 1) + " %, right ones among them " +
+            fixed(100.0 * result.moving.precision().value_or(0.0), 1) + " %\n";
+  }
+  if (output.accuracy)
+    text += "against the true poses of the sequence:\n" + describe(*output.accuracy);
+  text += "written to " + output.folder.string() +
+          ": map.stillmap map.ply map.pcd map.png report.json, and poses_lidar.txt, "
+          "poses_tum.txt (lidar frame; the map is the lidar frame of the first pose)\n";
+  return text;
+}
 
 struct Arguments {
   std::string dataset;
@@ -30,12 +220,12 @@ MappingResult map_with_progress(const ScanDataset& dataset, const Arguments& arg
   Progress progress("map", "scans", total);
   std::size_t skipped = 0;
   const auto scan_done = [&](std::size_t seen) {
-    progress.update(seen, skipped == 0 ? "" : std::to_string(skipped) + " left out");
+    progress.update(seen, skipped == 0 ? "" : std::to_string(skipped) + " skipped");
     return !stop.requested();
   };
   const auto scan_skipped = [&](const SkippedScan& scan) {
     ++skipped;
-    progress.say("stillmap: left out: " + scan.reason);
+    progress.say("stillmap: skipped: " + scan.reason);
   };
   return map_dataset(dataset, arguments.range, config, label_source(arguments.mapper, dataset),
                      scan_done, scan_skipped);
@@ -71,8 +261,8 @@ ExitCode run(const Arguments& arguments) {
 
 void add_map_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
-  CommandHandle command =
-      program.command("map", "Map a recording in this process: the server's mapper without DDS");
+  CommandHandle command = program.command(
+      "map", "Map a sequence or bag in this process: the server's mapper without DDS");
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic_in, topic_in_help);
   command.option("--out", arguments->out, "Folder for the results").with_default();
@@ -80,7 +270,7 @@ void add_map_command(CommandHandle program, Action& action) {
   command.option("--start", arguments->range.first, "Number of the first scan");
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
   command.flag("--strict", arguments->range.strict,
-               "Stop at the first damaged file instead of leaving it out");
+               "Stop at the first damaged file instead of skipping it");
   command.flag("--force", arguments->force, "Replace a map that is there already");
   command.flag("--json", arguments->json, "Print report.json instead of the summary");
   command.explain(
@@ -90,8 +280,8 @@ void add_map_command(CommandHandle program, Action& action) {
       "  stillmap map city --weighting none --out plain --json | jq .accuracy\n"
       "Writes map.stillmap (SQLite), map.ply, map.pcd, map.png, poses_lidar.txt (KITTI 3x4, lidar\n"
       "frame), poses_tum.txt (the same with stamps), report.json (timing, memory, accuracy), and\n"
-      "with true poses in the recording trajectory.png and trajectory_error.png. A damaged file\n"
-      "is named and left out; its scan then has no line in poses_lidar.txt.");
+      "with true poses in the sequence trajectory.png and trajectory_error.png. A damaged file\n"
+      "is named and skipped; its scan then has no line in poses_lidar.txt.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

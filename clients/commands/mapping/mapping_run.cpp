@@ -21,7 +21,7 @@ std::vector<std::uint16_t> true_ids_of_kept_points(const DatasetFrame& frame,
   return ids;
 }
 
-/// One run over a recording: keeps what is reported at its end.
+/// One run over a data set: keeps what is reported at its end.
 class MappingRun {
  public:
   MappingRun(const ScanDataset& dataset, bool strict, const MapperConfig& config,
@@ -92,7 +92,7 @@ class MappingRun {
 
 std::size_t ScanRange::end(const ScanDataset& dataset) const {
   if (first >= dataset.size() || count == 0) {
-    throw std::invalid_argument("no scan to take: the recording has " +
+    throw std::invalid_argument("no scan to take: the data set has " +
                                 std::to_string(dataset.size()) + ", asked for are " +
                                 std::to_string(count) + " from number " + std::to_string(first));
   }

@@ -14,19 +14,19 @@
 
 namespace stillmap::cli {
 
-/// Which scans of a recording, and what to do about damaged ones.
+/// Which scans of a data set, and what to do about damaged ones.
 struct ScanRange {
   std::size_t first = 0;
   /// As many as this, or as there are.
   std::size_t count = SIZE_MAX;
-  /// A damaged file ends the run instead of being left out.
+  /// A damaged file ends the run instead of being skipped.
   bool strict = false;
 
   /// One past the last scan. Throws std::invalid_argument when no scan is in the range.
   [[nodiscard]] std::size_t end(const ScanDataset& dataset) const;
 };
 
-/// A scan that was left out, and why.
+/// A scan that was skipped, and why.
 struct SkippedScan {
   std::size_t index = 0;
   std::string counter;
@@ -35,28 +35,28 @@ struct SkippedScan {
 
 struct MappingResult {
   Trajectory trajectory;
-  /// Index in the recording of each pose of the trajectory.
+  /// Index in the data set of each pose of the trajectory.
   std::vector<std::size_t> scan_of_pose;
   std::shared_ptr<const MapSnapshot> view;
-  /// What the tiles know beside what they show.
+  /// Evidence of the tiles beyond the published view.
   TileEvidenceMap tile_evidence;
   std::string label_source;
   std::vector<SkippedScan> skipped;
   std::map<OdometryHealth, std::size_t> health;
-  /// Against the recording's moving ids, where it has labels.
+  /// Against the moving ids of the data set, where it has labels.
   evaluation::MovingScore moving;
   std::vector<StageDurations> stages;
   double seconds = 0.0;
-  /// It ended early because it was told to.
+  /// A signal ended it early.
   bool stopped = false;
 };
 
 /// Called after every scan with the number of scans seen; returning false ends the run.
 using ScanDone = std::function<bool(std::size_t seen)>;
-/// Called for every scan that is left out.
+/// Called for every scan that is skipped.
 using ScanSkipped = std::function<void(const SkippedScan&)>;
 
-/// Maps a recording in this process.
+/// Maps a data set in this process.
 [[nodiscard]] MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
                                         const MapperConfig& config,
                                         std::unique_ptr<Segmenter> labels,

@@ -10,7 +10,7 @@
 
 namespace stillmap::cli {
 
-/// Poses of a text file, in whatever frame it is in.
+/// Poses of a text file, in the frame of the file.
 struct PoseFile {
   std::vector<Eigen::Isometry3d> poses;
   /// One a pose where the file has stamps (TUM), else empty.
@@ -18,7 +18,7 @@ struct PoseFile {
 };
 
 /// Reads KITTI's form (12 numbers a line, 3x4 row by row) or TUM's (seconds, x y z, qx qy qz qw;
-/// lines that begin with # are remarks). Throws DatasetError naming the file and line.
+/// lines that begin with # are comments). Throws DatasetError naming the file and line.
 [[nodiscard]] PoseFile read_pose_file(const std::filesystem::path& file);
 
 /// Writes TUM's form. Throws DatasetError.

@@ -105,8 +105,8 @@ void add_model_agree_command(CommandHandle model, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   CommandHandle command = model.command("agree", "How far the engines agree on real scans");
   add_model_options(command, arguments->model);
-  command.option("DATASET", arguments->dataset, "Recording whose scans are looked at").required();
-  command.option("--scans", arguments->scans, "Scans to look at, evenly chosen").with_default();
+  command.option("DATASET", arguments->dataset, "Data set whose scans are compared").required();
+  command.option("--scans", arguments->scans, "Scans to compare, evenly chosen").with_default();
   command.explain(
       "Example:\n"
       "  stillmap model agree my_model sequences/00 --scans 20\n"

@@ -25,10 +25,10 @@ void add_model_options(CommandHandle command, ModelArguments& arguments);
 /// The model in a folder, or a network file without a description. Throws ConfigError or
 /// ModelError.
 [[nodiscard]] ModelDescription load_model(const ModelArguments& arguments);
-/// The same without its int8.yaml, which may be faulty then.
+/// The same without reading int8.yaml.
 [[nodiscard]] ModelDescription load_uncalibrated_model(const ModelArguments& arguments);
 
-/// Scans of several recordings, evenly chosen.
+/// Scans of several data sets, evenly chosen.
 struct ScanSample {
   const ScanDataset* dataset = nullptr;
   std::size_t index = 0;
@@ -36,7 +36,7 @@ struct ScanSample {
 [[nodiscard]] std::vector<ScanSample> choose_scans(const std::vector<ScanDataset>& datasets,
                                                    std::size_t count);
 
-/// The model's input for the scan, of which `model` is for the recording's sensor.
+/// The network's input for the scan. @pre `model` is fitted to the sensor of the data set
 [[nodiscard]] std::vector<float> input_of(const ScanSample& sample, const ModelDescription& model);
 
 }  // namespace stillmap::cli

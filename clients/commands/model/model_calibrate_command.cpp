@@ -20,7 +20,7 @@ struct Arguments {
   std::vector<std::string> float_layers;
 };
 
-/// A model and its network for one recording's sensor.
+/// A model and its network for the sensor of one data set.
 struct FittedNetwork {
   ModelDescription model;
   OneDnnNetwork network;
@@ -56,7 +56,7 @@ ExitCode run(const Arguments& arguments) {
   const ActivationRanges ranges = observe_activations(model, samples);
   Int8Calibration calibration;
   calibration.made = std::to_string(samples.size()) + " scans of " +
-                     std::to_string(datasets.size()) + " recordings";
+                     std::to_string(datasets.size()) + " data sets";
   calibration.range_of_channels = ranges.ranges(arguments.share);
   calibration.float_layers = arguments.float_layers;
   const std::filesystem::path file = model.network_file.parent_path() / "int8.yaml";
@@ -75,7 +75,7 @@ void add_model_calibrate_command(CommandHandle model, Action& action) {
   add_model_options(command, arguments->model);
   command
       .option("DATASET", arguments->datasets,
-              "Recordings like those on which the network will work; no labels are needed")
+              "Data sets like those on which the network will work; no labels are needed")
       .required();
   command.option("--scans", arguments->scans, "Scans to look at, evenly chosen").with_default();
   command

@@ -1,18 +1,152 @@
+#include <malloc.h>
+
+#include <algorithm>
 #include <charconv>
+#include <chrono>
+#include <fstream>
+#include <functional>
 #include <iostream>
 #include <memory>
 #include <stdexcept>
+#include <string>
+#include <vector>
 
 #include "clients/commands/command.hpp"
 #include "clients/commands/model/benchmark_scan.hpp"
 #include "clients/commands/model/model_arguments.hpp"
-#include "clients/commands/model/model_timing.hpp"
 #include "clients/terminal/table.hpp"
+#include "core/lidar/range_image.hpp"
+#include "core/lidar/scan.hpp"
+#include "core/segmentation/int8_calibration.hpp"
+#include "core/segmentation/model_description.hpp"
 #include "core/segmentation/model_error.hpp"
+#include "core/segmentation/network_input.hpp"
+#include "core/segmentation/network_segmenter.hpp"
+#include "core/segmentation/onednn_network.hpp"
+#include "core/segmentation/opencv_network.hpp"
+#include "core/segmentation/segmentation_network.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::cli {
 namespace {
+
+/// Medians of the stages from a scan to the classes of its points [ms].
+struct SegmentationTiming {
+  double projection_ms = 0.0;
+  double network_ms = 0.0;
+  double knn_ms = 0.0;
+  /// Operations a second of the network, and of a matrix product just before [10^9].
+  double gops = 0.0;
+  double peak_gops = 0.0;
+  /// Growth of the process by the network [MB].
+  double memory_mb = 0.0;
+};
+
+/// An engine to be timed, opened by `open`.
+struct TimedEngine {
+  std::string name;
+  Precision precision = Precision::fp32;
+  std::function<std::unique_ptr<SegmentationNetwork>()> open;
+};
+
+using Clock = std::chrono::steady_clock;
+
+double ms_of(const std::function<void()>& work) {
+  const auto began = Clock::now();
+  work();
+  return std::chrono::duration<double, std::milli>(Clock::now() - began).count();
+}
+
+Int8Calibration calibrate_on(const ModelDescription& model, const std::vector<float>& input) {
+  ActivationRanges ranges;
+  OneDnnNetwork(model, Precision::fp32)
+      .observe(input, [&ranges](const std::string& tensor, auto values, std::size_t channels) {
+        ranges.add(tensor, values, channels);
+      });
+  return {.made = "one scan", .range_of_channels = ranges.ranges(1.0), .float_layers = {}};
+}
+
+/// Median of how long `work` takes [ms], once warm: 5 to 40 runs, about two seconds.
+double median_ms(const std::function<void()>& work) {
+  constexpr double target_ms = 2000.0;
+  constexpr std::size_t min_runs = 5, max_runs = 40;
+  work();
+  std::vector<double> times;
+  double total = 0.0;
+  while (times.size() < min_runs || (total < target_ms && times.size() < max_runs)) {
+    times.push_back(ms_of(work));
+    total += times.back();
+  }
+  const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
+  std::ranges::nth_element(times, middle);
+  return *middle;
+}
+
+/// Speed of a large matrix product on this machine [10^9 operations a second].
+double peak_gops(Precision precision, int threads) {
+  constexpr int runs = 8;
+  MatrixProduct product(precision, threads);
+  double fastest_ms = ms_of([&] { product.run(); });
+  for (int i = 0; i < runs; ++i) fastest_ms = std::min(fastest_ms, ms_of([&] { product.run(); }));
+  return MatrixProduct::giga_operations() / fastest_ms * 1e3;
+}
+
+/// Resident memory of this process [MB], after freed memory was returned to the system.
+double resident_mb() {
+  malloc_trim(0);
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;) {
+    double kb = 0.0;
+    if (word == "VmRSS:" && status >> kb) return kb / 1e3;
+  }
+  return 0.0;
+}
+
+/// OpenCV, oneDNN in fp32 and in int8; a model that is not calibrated is calibrated on `scan`,
+/// which does not change how long it takes.
+std::vector<TimedEngine> timed_engines(const ModelDescription& model, const Scan& scan,
+                                       int threads) {
+  ModelDescription calibrated = model;
+  if (!model.int8) {
+    const RangeImage image(scan.points_lidar, model.projection());
+    calibrated.int8 = calibrate_on(model, make_network_input(scan, image, model));
+  }
+  const auto onednn = [threads](const ModelDescription& which, Precision precision) {
+    return [which, precision, threads]() -> std::unique_ptr<SegmentationNetwork> {
+      return std::make_unique<OneDnnNetwork>(which, precision, threads);
+    };
+  };
+  return {{"OpenCV fp32", Precision::fp32,
+           [model]() -> std::unique_ptr<SegmentationNetwork> {
+             return std::make_unique<OpenCvNetwork>(model);
+           }},
+          {"oneDNN fp32", Precision::fp32, onednn(model, Precision::fp32)},
+          {"oneDNN int8", Precision::int8, onednn(calibrated, Precision::int8)}};
+}
+
+/// `giga_operations`: operations of the network for one scan.
+SegmentationTiming time_segmentation(const ModelDescription& model, const TimedEngine& engine,
+                                     const Scan& scan, double giga_operations, int threads) {
+  SegmentationTiming timing;
+  timing.peak_gops = peak_gops(engine.precision, threads);
+  const auto project = [&] {
+    const RangeImage image(scan.points_lidar, model.projection());
+    return make_network_input(scan, image, model);
+  };
+  timing.projection_ms = median_ms([&] { (void)project(); });
+  const std::vector<float> input = project();
+  const double before_mb = resident_mb();
+  const std::unique_ptr<SegmentationNetwork> network = engine.open();
+  PixelOutputs outputs;
+  timing.network_ms = median_ms([&] { outputs = network->run(input); });
+  timing.memory_mb = resident_mb() - before_mb;
+  timing.gops = giga_operations / timing.network_ms * 1e3;
+  const RangeImage image(scan.points_lidar, model.projection());
+  const PixelLabels pixels = pixel_labels(std::move(outputs), model);
+  const KnnConfig knn = model.knn.value_or(KnnConfig{});
+  timing.knn_ms = median_ms([&] { (void)knn_labels(image, pixels, knn); });
+  return timing;
+}
 
 struct Arguments {
   std::vector<std::string> models;
@@ -70,7 +204,7 @@ ExitCode run(const Arguments& arguments) {
       try {
         time_model(model, scan, arguments, table);
       } catch (const ModelError& error) {
-        std::cerr << "stillmap: left out: " << error.what() << "\n";
+        std::cerr << "stillmap: skipped: " << error.what() << "\n";
       }
     }
   }
@@ -91,7 +225,7 @@ void add_model_speed_command(CommandHandle model, Action& action) {
       .comma_separated()
       .with_default();
   command.option("--dataset", arguments->dataset,
-                 "Recording whose first scan is taken; default: one of 64 x 1900 made-up points");
+                 "Data set whose first scan is taken; default: one of 64 x 1900 made-up points");
   command.option("--threads", arguments->threads, "Threads of oneDNN; default: all")
       .between(0, 1024);
   command.flag("--skip-opencv", arguments->skip_opencv, "Leave the slow reference engine out");

@@ -25,8 +25,8 @@ struct Arguments {
   std::string to;
   std::string profile = "car";
   bool through_unknown = false;
-  double time_s = 2.0;
-  std::uint64_t steps = PlanningConfig{}.max_steps;
+  double time_limit_s = 2.0;
+  std::uint64_t max_iterations = PlanningConfig{}.max_steps;
   std::uint32_t seed = 1;
   std::string planner = std::string(name(PlannerKind::rrt_connect));
   std::string sampling = "route";
@@ -84,15 +84,15 @@ PlanTask task_of(const Arguments& arguments) {
   task.to = place_of("--to", arguments.to);
   task.config.planner = planner_of(arguments.planner);
   task.config.route_guided = arguments.sampling == "route";
-  task.config.max_steps = arguments.steps;
+  task.config.max_steps = arguments.max_iterations;
   task.config.seed = arguments.seed;
-  task.time_limit_s = arguments.time_s;
+  task.time_limit_s = arguments.time_limit_s;
   const std::string faults = task.config.faults();
   if (!faults.empty()) throw std::invalid_argument(faults);
   return task;
 }
 
-/// A name without an ending that can be written is wrong usage, before the work and not after it.
+/// Refuses file names that cannot be written before the search, not after it.
 void check_files(const Arguments& arguments) {
   if (!arguments.output.empty()) check_plan_file(arguments.output);
   if (arguments.picture.empty() || arguments.picture.ends_with(".png")) return;
@@ -142,7 +142,7 @@ ExitCode plan_on_file(const Arguments& arguments) {
   return code_of(replanner.last());
 }
 
-/// Plans again whenever the map asks for it, until the limits are reached.
+/// Plans again whenever the map requires it, until a limit is reached.
 void follow(const Arguments& arguments, Replanner& replanner, const TileMirror& mirror,
             std::shared_ptr<const MapSnapshot> map,
             const std::optional<RobotPoseSubscription>& robot, StopSignal& stop) {
@@ -187,10 +187,14 @@ ExitCode run(const Arguments& arguments) {
 }
 
 void add_search_options(CommandHandle command, Arguments& arguments) {
-  command.option("--time", arguments.time_s, "Longest search [s]").above_zero().with_default();
+  command.renamed("--time", "--time-limit");
+  command.renamed("--steps", "--max-iterations");
+  command.option("--time-limit", arguments.time_limit_s, "Longest search [s]")
+      .above_zero()
+      .with_default();
   command
-      .option("--steps", arguments.steps,
-              "Longest search in steps, which are the same on every machine")
+      .option("--max-iterations", arguments.max_iterations,
+              "Longest search in iterations of the planner; the same result on every machine")
       .with_default();
   command.option("--seed", arguments.seed, "Seed of the search, 1 or more").with_default();
   command.option("--planner", arguments.planner, "Planner of OMPL")
@@ -221,10 +225,11 @@ void add_plan_command(CommandHandle program, Action& action) {
                "Unknown ground may be driven on; without it as the profile says");
   command.option("--map", arguments->map, "Plan on a map file instead of a server's map");
   command.option("--output", arguments->output, "Write the path to FILE.json or FILE.csv");
-  command.option("--picture", arguments->picture, "Draw area and path to FILE.png");
+  command.option("--picture", arguments->picture,
+                 "Draw the traversability and the path to FILE.png");
   command.flag("--follow", arguments->follow,
-               "Stay subscribed and plan anew when the path is not free any more or its way "
-               "changes, saying why");
+               "Stay subscribed and plan again when the path is blocked or the route changes; "
+               "says why");
   command.option("--duration", arguments->duration_s, "End --follow after as many seconds")
       .above_zero();
   command.option("--count", arguments->count, "End --follow after as many plans");
@@ -238,7 +243,7 @@ void add_plan_command(CommandHandle program, Action& action) {
       "  stillmap plan --to 0,0 --follow --picture path.png   until Ctrl-C\n"
       "The path keeps the robot's whole footprint on free cells and its turning radius\n"
       "(min_turning_radius_m of the profile); driving backwards costs three times as much.\n"
-      "Exit code 4 when there is no path: start or goal is blocked, no way is known, or the\n"
+      "Exit code 4 when there is no path: start or goal is blocked, no route is known, or the\n"
       "search ran out of time; with --follow, of the last plan.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }

@@ -50,7 +50,7 @@ std::string figures(const TimedPlan& timed) {
 std::string times(const TimedPlan& timed) {
   std::string text = "planned in " + fixed(timed.plan_ms, 0) + " ms";
   if (timed.first_ms) text += " (a first path after " + fixed(*timed.first_ms, 0) + " ms)";
-  return text + ", area in " + fixed(timed.traversability_ms, 0) + " ms";
+  return text + ", traversability in " + fixed(timed.traversability_ms, 0) + " ms";
 }
 
 void write_csv(std::ostream& out, const PathPlan& plan) {
@@ -74,10 +74,10 @@ nlohmann::json to_json(const TimedPlan& timed, bool with_poses) {
                       {"clearance_m", plan.clearance_m},
                       {"cost", plan.cost},
                       {"route_m", plan.route_m},
-                      {"work", plan.steps},
+                      {"iterations", plan.steps},
                       {"map_version", plan.map_version},
                       {"poses", plan.poses.size()},
-                      {"area_ms", timed.traversability_ms},
+                      {"traversability_ms", timed.traversability_ms},
                       {"plan_ms", timed.plan_ms}};
   if (timed.first_ms) json["first_ms"] = *timed.first_ms;
   if (!timed.cause.empty()) json["cause"] = timed.cause;
@@ -93,7 +93,7 @@ nlohmann::json to_json(const TimedPlan& timed, bool with_poses) {
 
 std::string describe(const TimedPlan& timed) {
   std::string text;
-  if (!timed.cause.empty()) text += "planned anew: " + timed.cause + "\n";
+  if (!timed.cause.empty()) text += "planned again: " + timed.cause + "\n";
   if (!timed.plan.is_found()) {
     return text + std::string(name(timed.plan.status)) + ": " + timed.plan.reason + "\n";
   }

@@ -12,22 +12,22 @@ namespace stillmap::cli {
 /// A plan and how long it took.
 struct TimedPlan {
   PathPlan plan;
-  /// Bringing the traversable area up to date [ms].
+  /// Update of the traversability map [ms].
   double traversability_ms = 0.0;
   double plan_ms = 0.0;
-  /// Until the search had its first path [ms]; unknown of planners that do not tell.
+  /// Until the search had its first path [ms]; only of planners that report it.
   std::optional<double> first_ms;
-  /// Why it was made, when it replaces another one.
+  /// Why it replaces the previous plan; empty for the first one.
   std::string cause;
 };
 
-/// `with_poses`: every pose of the path, too.
+/// `with_poses`: with every pose of the path.
 [[nodiscard]] nlohmann::json to_json(const TimedPlan& timed, bool with_poses);
 
-/// What a person wants to know, with the path in steps of some metres.
+/// For people, with the poses of the path some metres apart.
 [[nodiscard]] std::string describe(const TimedPlan& timed);
 
-/// One line, for a plan among many.
+/// One line, for --follow.
 [[nodiscard]] std::string one_line(const TimedPlan& timed);
 
 /// Writes the path: all of it to FILE.json, or one pose a line to FILE.csv. Throws

@@ -14,7 +14,7 @@
 
 namespace stillmap::cli {
 
-/// What a planning client wants.
+/// A planning request.
 struct PlanTask {
   RobotProfile profile;
   /// Without one, the robot's newest pose.
@@ -25,16 +25,15 @@ struct PlanTask {
   double time_limit_s = 2.0;
 };
 
-/// Plans on states of a map as they come, and remembers the last plan.
+/// Plans on successive snapshots of a map and keeps the last plan.
 class Replanner {
  public:
   explicit Replanner(PlanTask task);
 
-  /// Brings the area to this map and plans. @pre the task has a start, or `robot` is one
+  /// Updates the traversability to this map and plans. @pre the task has a start, or `robot` is one
   const TimedPlan& plan(const MapSnapshot& map, const std::optional<Goal>& robot);
 
-  /// Plans again if the map asks for it: the path is not free any more, or its way changed.
-  /// Whether it did.
+  /// Plans again if the path is blocked now or the route changed. Returns whether it did.
   bool replan_if_needed(const MapSnapshot& map, const std::optional<Goal>& robot);
 
   [[nodiscard]] const TimedPlan& last() const { return last_; }
@@ -52,7 +51,7 @@ class Replanner {
   std::optional<PathMonitor> watch_;
 };
 
-/// Where the robot of a server is, from its path so far and then from its odometry.
+/// Newest pose of the robot: the end of the published path, then the odometry.
 class RobotPoseSubscription {
  public:
   /// Waits for a pose; throws ServiceTimeout when there is none in time.
@@ -65,7 +64,7 @@ class RobotPoseSubscription {
 
   mutable std::mutex mutex_;
   StampedPose newest_;
-  // Last: ends before what it writes to.
+  // Last member: its callbacks end before `newest_` is destroyed.
   Subscription odometry_;
 };
 

@@ -7,8 +7,6 @@
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/commands/query/class_arguments.hpp"
-#include "clients/commands/query/cloud_output.hpp"
 #include "clients/commands/query/fetch_map.hpp"
 #include "clients/commands/query/query_report.hpp"
 #include "clients/commands/query/region_arguments.hpp"
@@ -27,7 +25,7 @@ struct Arguments {
   std::vector<std::string> classes;
   double resolution_m = 0.0;
   std::uint64_t since_version = not_given;
-  /// 0: the server's map of now.
+  /// 0: the server's current map.
   std::uint64_t since_map = 0;
   std::string out;
   std::string picture;
@@ -40,7 +38,7 @@ void check_out_name(const std::string& file) {
   throw std::invalid_argument("--out " + file + ": the name must end in .pcd or .ply");
 }
 
-// The whole map with the path and the box round what was asked for.
+// The whole map with the path and the bounding box of the queried region.
 void draw_query(const std::string& file, Client& client, const Region& region,
                 std::chrono::milliseconds timeout) {
   MapPictureOptions options;
@@ -55,7 +53,7 @@ std::optional<KnownVersion> since_of(const Arguments& arguments, Client& client)
   return KnownVersion{.map_id = map_id, .version = arguments.since_version};
 }
 
-/// What is asked for, without what only a server knows.
+/// The filters of the query, which can be checked without a server.
 MapQuery filters_of(const Arguments& arguments) {
   MapQuery query;
   query.classes = classes_of(arguments.classes);
@@ -102,7 +100,7 @@ ExitCode run(const Arguments& arguments) {
 
 void add_query_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
-  CommandHandle command = program.command("query", "Ask the server for a region of its static map");
+  CommandHandle command = program.command("query", "Query a region of the server's static map");
   add_region_options(command, arguments->region);
   command.option("--classes", arguments->classes, "Only these: road,building,traffic-sign")
       .comma_separated();
@@ -111,11 +109,13 @@ void add_query_command(CommandHandle program, Action& action) {
   command.option("--since-version", arguments->since_version,
                  "Only tiles that appeared or changed since this version; names those removed");
   command.option("--since-map", arguments->since_map,
-                 "Id of the map that the version is of; default: the server's map of now");
+                 "Id of the map that the version is of; default: the server's current map");
   command.option("--out", arguments->out, "Write the voxels to FILE.pcd or FILE.ply");
   command.option("--picture", arguments->picture,
                  "Draw the whole map from above, the path and the region, to FILE.png");
-  command.option("--repeat", arguments->repeat, "Ask so many times; says median and p99")
+  command
+      .option("--repeat", arguments->repeat,
+              "Repeat the query so many times; prints median and p99")
       .above_zero();
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");

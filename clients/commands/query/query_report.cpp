@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/terminal/table.hpp"
+#include "core/dataset/point_cloud_files.hpp"
 #include "core/map/query/region.hpp"
 
 namespace stillmap::cli {
@@ -91,6 +92,19 @@ std::string describe(const QueryAnswer& answer) {
               : " (median of " + std::to_string(answer.times.ms.size()) + "; p99 " +
                     fixed(answer.times.quantile(0.99), 1) + " ms)\n") +
          (answer.query.since ? tile_line(answer) : std::string());
+}
+
+bool is_cloud_file(const std::string& file) {
+  return file.ends_with(".pcd") || file.ends_with(".ply");
+}
+
+void write_cloud(const std::string& file, const std::vector<QueryVoxel>& voxels) {
+  std::vector<ColouredPoint> points;
+  points.reserve(voxels.size());
+  for (const QueryVoxel& voxel : voxels) {
+    points.push_back({voxel.position_map, voxel.label, voxel.confidence});
+  }
+  file.ends_with(".pcd") ? write_pcd(file, points) : write_ply(file, points);
 }
 
 }  // namespace stillmap::cli

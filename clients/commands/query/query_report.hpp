@@ -2,17 +2,18 @@
 
 #include <nlohmann/json_fwd.hpp>
 #include <string>
+#include <vector>
 
 #include "clients/commands/stage_stopwatch.hpp"
 #include "core/map/query/map_query.hpp"
 
 namespace stillmap::cli {
 
-/// What became of a query of the command line.
+/// A query and its result.
 struct QueryAnswer {
   MapQuery query;
   MapQueryResult result;
-  /// Of every time it was asked, all pages together.
+  /// Of every repetition, all pages together.
   StageDurations times;
 };
 
@@ -22,5 +23,12 @@ struct QueryAnswer {
 
 /// "appeared", "changed", "removed".
 [[nodiscard]] const char* name(TileChangeKind kind);
+
+/// Whether write_cloud takes a file of this name.
+[[nodiscard]] bool is_cloud_file(const std::string& file);
+
+/// Writes a point for every voxel, with its class and colour, to a .pcd or .ply file.
+/// Throws DatasetError.
+void write_cloud(const std::string& file, const std::vector<QueryVoxel>& voxels);
 
 }  // namespace stillmap::cli

@@ -13,7 +13,7 @@
 namespace stillmap::cli {
 namespace {
 
-/// The whole word as a number; also "nan" and "inf", which the region's own check speaks about.
+/// The whole word as a number; also "nan" and "inf", which the region's own check refuses.
 std::optional<double> number(const std::string& word) {
   try {
     std::size_t length = 0;
@@ -25,7 +25,7 @@ std::optional<double> number(const std::string& word) {
   return std::nullopt;
 }
 
-/// The position that a line of a file names; nothing for an empty line.
+/// The position in a line of a file; nothing for an empty line.
 std::optional<Eigen::Vector2d> point_in_line(std::string line, const std::string& where) {
   line.resize(std::min(line.find('#'), line.size()));
   std::ranges::replace(line, ',', ' ');
@@ -96,7 +96,7 @@ Region chosen_region(const RegionArguments& region, const Eigen::Vector2d& robot
   return everything;
 }
 
-/// The options that name heights themselves.
+/// The options whose values include heights.
 struct Kinds {
   OptionHandle box;
   OptionHandle sphere;
@@ -175,6 +175,22 @@ Region region_of(const RegionArguments& region, Client& client, std::chrono::mil
     robot_map = fetch_trajectory(client, timeout).back().T_map_lidar.translation().head<2>();
   }
   return region_at(region, robot_map);
+}
+
+std::bitset<semantic_class_count> classes_of(const std::vector<std::string>& names) {
+  std::bitset<semantic_class_count> classes;
+  for (const std::string& class_name : names) {
+    const std::optional<SemanticClass> label = class_from_name(class_name);
+    if (!label) {
+      std::string known;
+      for (std::size_t k = 0; k < semantic_class_count; ++k) {
+        known.append(" ").append(name(static_cast<SemanticClass>(k)));
+      }
+      throw std::invalid_argument("class '" + class_name + "' is not known; there are:" + known);
+    }
+    classes.set(static_cast<std::size_t>(*label));
+  }
+  return classes;
 }
 
 }  // namespace stillmap::cli

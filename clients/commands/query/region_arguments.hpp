@@ -1,5 +1,6 @@
 #pragma once
 
+#include <bitset>
 #include <chrono>
 #include <limits>
 #include <string>
@@ -7,6 +8,7 @@
 
 #include "clients/library/client.hpp"
 #include "clients/terminal/command_line.hpp"
+#include "core/lidar/semantic_class.hpp"
 
 namespace stillmap::cli {
 
@@ -53,5 +55,8 @@ void check_region(const RegionArguments& region);
 /// std::invalid_argument, naming option, file and line.
 [[nodiscard]] std::vector<Eigen::Vector2d> parse_points_2d(const std::string& option,
                                                            const std::vector<std::string>& words);
+
+/// The classes of these names. Throws std::invalid_argument listing the known ones.
+[[nodiscard]] std::bitset<semantic_class_count> classes_of(const std::vector<std::string>& names);
 
 }  // namespace stillmap::cli

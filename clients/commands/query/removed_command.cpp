@@ -26,7 +26,7 @@ struct Arguments {
   bool json = false;
 };
 
-/// What was found, and the map that it was removed from.
+/// The removed voxels, and the map that they were removed from.
 struct RemovedResult {
   std::vector<RemovedVoxel> voxels;
   std::uint64_t total = 0;
@@ -127,8 +127,8 @@ ExitCode run(const Arguments& arguments) {
 
 void add_removed_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
-  CommandHandle command =
-      program.command("removed", "What is kept out of the static map, and why; and bring it back");
+  CommandHandle command = program.command(
+      "removed", "Voxels that are kept out of the static map, by reason; can restore them");
   command.option("MAPFILE", arguments->map_file, "A map file instead of a server");
   add_region_options(command, arguments->region);
   command.option("--picture", arguments->picture,

@@ -30,7 +30,7 @@ struct TileUpdate {
   std::uint64_t map_version = 0;
 };
 
-/// Tiles from the subscription's thread for the one that prints.
+/// Hands tiles from the subscription's thread to the printing one.
 class TileUpdateQueue {
  public:
   void add(const RegionUpdate& update) {

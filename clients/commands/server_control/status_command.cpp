@@ -5,26 +5,61 @@
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/server_control/status_report.hpp"
+#include "clients/terminal/table.hpp"
 
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct StatusArguments {
   ClientArguments client;
   bool json = false;
 };
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const StatusArguments& arguments) {
   Client client = connect(arguments.client);
   const dds::ServerStatus status = client.status();
   std::cout << (arguments.json ? to_json(status).dump(2) + "\n" : describe(status));
   return ExitCode::ok;
 }
 
+struct HealthArguments {
+  ClientArguments client;
+  bool mapping = false;
+};
+
+/// Why the server does not map; empty when it does.
+std::string why_not_mapping(const dds::ServerStatus& status) {
+  const std::string reason = status.reason.empty() ? "" : ": " + status.reason;
+  if (status.received_hz == 0.0) return "no scans arrive" + reason;
+  if (status.mapped_hz == 0.0) return "no scan is mapped" + reason;
+  if (status.health == OdometryHealth::lost) return "the odometry is lost" + reason;
+  return {};
+}
+
+ExitCode say(ExitCode code, const std::string& text) {
+  std::cout << (code == ExitCode::ok ? "healthy: " : "unhealthy: ") << text << "\n";
+  return code;
+}
+
+ExitCode run(const HealthArguments& arguments) {
+  dds::ServerStatus status;
+  try {
+    status = connect(arguments.client).status();
+  } catch (const ServiceError& error) {
+    return say(ExitCode::failed, error.what());
+  }
+  if (const std::string why = why_not_mapping(status); arguments.mapping && !why.empty()) {
+    return say(ExitCode::failed, why);
+  }
+  return say(ExitCode::ok, "up for " + fixed(status.uptime_s, 0) + " s, " +
+                               fixed(status.mapped_hz, 1) + " scans/s mapped" +
+                               (status.reason.empty() ? "" : ", " + status.reason));
+}
+
 }  // namespace
 
 void add_status_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<StatusArguments>();
   CommandHandle command =
       program.command("status", "What the server does: health, rates, counters, latencies, map");
   add_client_options(command, arguments->client);
@@ -34,6 +69,22 @@ void add_status_command(CommandHandle program, Action& action) {
       "  stillmap status\n"
       "  stillmap status --domain 7 --json | jq .health\n"
       "Exit code 3: no server answers in this domain.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+void add_health_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<HealthArguments>();
+  arguments->client.timeout_s = 4.0;
+  CommandHandle command = program.command(
+      "health", "Whether the server is well: exit code 0 or 1, and a line that says why");
+  add_client_options(command, arguments->client);
+  command.flag("--mapping", arguments->mapping,
+               "Unhealthy as well when no scans arrive or none is mapped, or the odometry is lost");
+  command.explain(
+      "Examples:\n"
+      "  stillmap health                     is it alive: Docker's HEALTHCHECK, a liveness probe\n"
+      "  stillmap health --mapping           does it work: a readiness probe on a driving robot\n"
+      "A server that waits for its first scan is alive.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

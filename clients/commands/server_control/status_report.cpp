@@ -17,8 +17,8 @@ std::string describe(const dds::ServerStatus& status) {
   text += "           " + dds::every_nth_scan(segmentation.interval) + " segmented" +
           (segmentation.image_columns > 0 ? " in " + columns + " columns, " : ", ") +
           fixed(segmentation.inference_ms, 1) + " ms each; of the last scans " +
-          fixed(100.0 * segmentation.fresh_share, 0) + " % with labels of their own, " +
-          fixed(100.0 * segmentation.propagated_share, 0) + " % with carried ones, " +
+          fixed(100.0 * segmentation.fresh_share, 0) + " % with their own labels, " +
+          fixed(100.0 * segmentation.propagated_share, 0) + " % with propagated labels, " +
           fixed(100.0 * segmentation.unlabelled_share, 0) + " % with none\n";
   text += "scans      " + fixed(status.received_hz, 1) + "/s in, " + fixed(status.mapped_hz, 1) +
           "/s mapped; delivery: " + name(status.delivery) + "\n";
@@ -45,12 +45,12 @@ std::string describe(const dds::ServerStatus& status) {
 namespace {
 
 nlohmann::json to_json(const dds::SegmentationStatus& segmentation) {
-  return {{"every", segmentation.interval},
+  return {{"interval", segmentation.interval},
           {"network_ms", segmentation.inference_ms},
           {"image_columns", segmentation.image_columns},
           {"full_columns", segmentation.full_columns},
           {"fresh_share", segmentation.fresh_share},
-          {"carried_share", segmentation.propagated_share},
+          {"propagated_share", segmentation.propagated_share},
           {"unlabelled_share", segmentation.unlabelled_share}};
 }
 
@@ -72,7 +72,7 @@ nlohmann::json to_json(const dds::ServerStatus& status) {
         {{"severity", diagnostic.severity == dds::Severity::problem ? "problem" : "advice"},
          {"what", diagnostic.what},
          {"evidence", diagnostic.evidence},
-         {"way_out", diagnostic.hint}});
+         {"hint", diagnostic.hint}});
   }
   return {{"stamp_ns", status.stamp_ns},
           {"software_version", status.software_version},
@@ -96,7 +96,7 @@ nlohmann::json to_json(const dds::ServerStatus& status) {
           {"points_topic", status.points_topic},
           {"scan_frame", status.scan_frame},
           {"scan_delay_s", status.scan_delay_s},
-          {"findings", diagnostics}};
+          {"diagnostics", diagnostics}};
 }
 
 }  // namespace stillmap::cli

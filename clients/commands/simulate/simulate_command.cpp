@@ -67,7 +67,7 @@ void add_simulate_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<Arguments>();
   SimulationArguments& simulation = arguments->simulation;
   CommandHandle command = program.command(
-      "simulate", "Make a recording: a drive through a made-up city, with labels and true poses");
+      "simulate", "Make a sequence in a simulated city, with labels and true poses");
   command.option("OUT", arguments->out, "New folder for the sequence").required();
   command.option("--preset", simulation.preset, "City: quiet, crowd or yard (one small block)")
       .with_default();

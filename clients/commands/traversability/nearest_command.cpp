@@ -3,11 +3,36 @@
 #include <nlohmann/json.hpp>
 
 #include "clients/commands/command.hpp"
-#include "clients/commands/traversability/path_report.hpp"
 #include "clients/commands/traversability/traversability_source.hpp"
+#include "clients/terminal/table.hpp"
 
 namespace stillmap::cli {
 namespace {
+
+nlohmann::json to_json(const NearestTraversable& nearest, const std::string& profile) {
+  nlohmann::json json = {
+      {"profile", profile}, {"status", name(nearest.status)}, {"map_version", nearest.map_version}};
+  if (nearest.status != TraversabilityStatus::ok) {
+    json["reason"] = nearest.reason;
+    return json;
+  }
+  json["position"] = {nearest.position_map.x(), nearest.position_map.y(), nearest.height_m};
+  json["distance_m"] = nearest.distance_m;
+  json["cost"] = nearest.cell.cost;
+  json["inferred"] = nearest.cell.inferred;
+  json["clearance_m"] = nearest.cell.clearance_m;
+  return json;
+}
+
+std::string describe(const NearestTraversable& nearest, const std::string& profile) {
+  if (nearest.status != TraversabilityStatus::ok) return nearest.reason + "\n";
+  return "(" + fixed(nearest.position_map.x(), 2) + ", " + fixed(nearest.position_map.y(), 2) +
+         ")" + " is free for " + profile + ", " + fixed(nearest.distance_m, 2) +
+         " m away; ground at " + fixed(nearest.height_m, 2) + " m" +
+         (nearest.cell.inferred ? " (inferred)" : "") + ", cost " +
+         std::to_string(nearest.cell.cost) + " of 98, clearance " +
+         fixed(nearest.cell.clearance_m, 2) + " m\n";
+}
 
 struct Arguments {
   TraversabilitySourceArguments source;

@@ -6,14 +6,14 @@
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/query/region_arguments.hpp"
 #include "core/map/storage/map_file.hpp"
-#include "core/traversability/traversability_view.hpp"
 #include "core/traversability/path_check.hpp"
 #include "core/traversability/traversability_map.hpp"
 #include "core/traversability/traversability_query.hpp"
+#include "core/traversability/traversability_view.hpp"
 
 namespace stillmap::cli {
 
-/// Of whom a command line asks about areas.
+/// Source of the traversability that a command line names.
 struct TraversabilitySourceArguments {
   /// Empty: a server.
   std::string map_file;
@@ -25,22 +25,21 @@ struct TraversabilitySourceArguments {
 void add_traversability_source_options(CommandHandle command,
                                        TraversabilitySourceArguments& arguments);
 
-/// Answers about areas: of a server, or from a map file, whose area is computed here.
+/// Traversability of a server, or of a map file, for which it is computed here.
 class TraversabilitySource {
  public:
   virtual ~TraversabilitySource() = default;
 
-  /// The robot that is asked about. Of a server's, only the name is known where this machine has no
-  /// such robot.
+  /// The robot. With a server only its name is known when this machine has no profile of that name.
   [[nodiscard]] virtual RobotProfile robot() const = 0;
-  /// As core and Client have them: a refusal is in the result. `profile` is filled in.
+  /// As in core and Client: a refusal is part of the result. `profile` is filled in.
   [[nodiscard]] virtual TraversabilityAnswer traversability(TraversabilityQuery query) = 0;
   [[nodiscard]] virtual PathCheck check(PathQuery query) = 0;
   [[nodiscard]] virtual NearestTraversable nearest(const Eigen::Vector2d& position_map,
                                                    double max_distance_m) = 0;
-  /// Where the lidar went. Throws ServiceTimeout when a server does not tell in time.
+  /// Poses of the lidar. Throws ServiceTimeout when a server sends none in time.
   [[nodiscard]] virtual Trajectory trajectory() = 0;
-  /// What the area of the whole map took; nothing for a server, which has it ready.
+  /// Cost of computing the whole map; nothing for a server, which keeps it up to date.
   [[nodiscard]] virtual std::optional<TraversabilityUpdate> update_stats() const = 0;
 };
 

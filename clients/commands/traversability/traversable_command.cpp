@@ -1,20 +1,126 @@
+#include <algorithm>
 #include <chrono>
+#include <fstream>
 #include <iostream>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <stdexcept>
+#include <string>
 
 #include "clients/commands/command.hpp"
 #include "clients/commands/query/region_arguments.hpp"
-#include "clients/commands/traversability/traversability_geojson.hpp"
-#include "clients/commands/traversability/traversability_report.hpp"
 #include "clients/commands/traversability/traversability_source.hpp"
+#include "clients/terminal/table.hpp"
 #include "core/picture/traversability_picture.hpp"
 #include "core/traversability/nav2_map.hpp"
+#include "core/traversability/traversability_map.hpp"
 #include "core/traversability/traversability_query.hpp"
 
 namespace stillmap::cli {
 namespace {
+
+/// Summary of the traversability of a region.
+struct TraversabilityReport {
+  TraversabilitySummary summary;
+  /// Cost of the computation for a map file.
+  std::optional<TraversabilityUpdate> update;
+  /// From opening the source to the answer.
+  double milliseconds = 0.0;
+};
+
+/// GeoJSON repeats the first corner at the end.
+nlohmann::json closed(const TraversableRing& ring) {
+  nlohmann::json corners = nlohmann::json::array();
+  for (const Eigen::Vector2d& corner : ring) corners.push_back({corner.x(), corner.y()});
+  if (!ring.empty()) corners.push_back({ring.front().x(), ring.front().y()});
+  return corners;
+}
+
+nlohmann::json feature(const TraversablePolygon& polygon) {
+  nlohmann::json rings = nlohmann::json::array({closed(polygon.outer)});
+  for (const TraversableRing& hole : polygon.holes) rings.push_back(closed(hole));
+  return {{"type", "Feature"},
+          {"properties", {{"area_m2", area_m2(polygon)}}},
+          {"geometry", {{"type", "Polygon"}, {"coordinates", std::move(rings)}}}};
+}
+
+/// Outlines in GeoJSON's form: a polygon with holes a feature, its area in its properties.
+/// Coordinates are metres in the map frame, not degrees.
+nlohmann::json to_json(const TraversabilityAnswer& answer, const std::string& profile) {
+  nlohmann::json features = nlohmann::json::array();
+  for (const TraversablePolygon& polygon : answer.outlines) features.push_back(feature(polygon));
+  return {{"type", "FeatureCollection"},
+          {"frame", "map"},
+          {"unit", "m"},
+          {"profile", profile},
+          {"map_version", answer.grid.map_version},
+          {"features", std::move(features)}};
+}
+
+/// Throws std::runtime_error naming the file when it cannot be written.
+void write_outlines(const std::string& file, const TraversabilityAnswer& answer,
+                    const std::string& profile) {
+  std::ofstream stream(file, std::ios::trunc);
+  stream << to_json(answer, profile).dump(1) << "\n";
+  stream.close();
+  if (!stream) {
+    throw std::runtime_error(file + ": cannot be written; its folder must exist and be writable");
+  }
+}
+
+double square_metres(const TraversabilityView& view, std::uint64_t cells) {
+  return static_cast<double>(cells) * view.cell_m * view.cell_m;
+}
+
+double ms_per_tile(const TraversabilityReport& report) {
+  return report.milliseconds /
+         static_cast<double>(std::max<std::size_t>(1, report.update->surfaces));
+}
+
+/// @pre `view` was made from the answer that the report is about
+nlohmann::json to_json(const TraversabilityView& view, const TraversabilityReport& report) {
+  nlohmann::json lethal = nlohmann::json::object();
+  for (std::size_t i = 0; i < block_reason_count; ++i) {
+    const auto reason = static_cast<BlockReason>(i);
+    if (reason == BlockReason::none || reason == BlockReason::unknown) continue;
+    lethal[std::string(name(reason))] = square_metres(view, report.summary.lethal.at(i));
+  }
+  nlohmann::json json = {{"profile", view.profile.name},
+                         {"map_id", view.map_id},
+                         {"map_version", view.version},
+                         {"cell_m", view.cell_m},
+                         {"free_m2", square_metres(view, report.summary.free)},
+                         {"inferred_m2", square_metres(view, report.summary.inferred)},
+                         {"unknown_m2", square_metres(view, report.summary.unknown)},
+                         {"lethal_m2", lethal},
+                         {"ms", report.milliseconds}};
+  if (report.update) {
+    json["tiles"] = report.update->map_tiles;
+    json["ms_per_tile"] = ms_per_tile(report);
+  }
+  return json;
+}
+
+std::string describe(const TraversabilityView& view, const TraversabilityReport& report) {
+  const auto area = [&](std::uint64_t cells) { return fixed(square_metres(view, cells), 0); };
+  Table table({"area for " + view.profile.name, "m2"});
+  table.add({"free", area(report.summary.free)});
+  table.add({"  of it inferred", area(report.summary.inferred)});
+  for (std::size_t i = 0; i < block_reason_count; ++i) {
+    if (report.summary.lethal.at(i) == 0) continue;
+    table.add({"lethal: " + std::string(name(static_cast<BlockReason>(i))),
+               area(report.summary.lethal.at(i))});
+  }
+  table.add({"unknown", area(report.summary.unknown)});
+  std::string update;
+  if (report.update) {
+    update.append(" (").append(std::to_string(report.update->map_tiles)).append(" tiles, ");
+    update.append(fixed(ms_per_tile(report), 1)).append(" ms each)");
+  }
+  return table.text() + "map version " + std::to_string(view.version) + ", cells of " +
+         fixed(view.cell_m, 2) + " m, in " + fixed(report.milliseconds, 0) + " ms" + update + "\n";
+}
 
 struct Arguments {
   TraversabilitySourceArguments source;
@@ -52,7 +158,7 @@ ExitCode run(const Arguments& arguments) {
   const std::chrono::duration<double, std::milli> took = std::chrono::steady_clock::now() - began;
   const TraversabilityView view = view_of_answer(answer, source->robot());
   const TraversabilityReport report{
-      .summary = summarize(answer), .work = source->update_stats(), .milliseconds = took.count()};
+      .summary = summarize(answer), .update = source->update_stats(), .milliseconds = took.count()};
   if (!arguments.out.empty()) write_nav2_map(arguments.out, answer.grid);
   if (!arguments.outlines.empty()) {
     write_outlines(arguments.outlines, answer, view.profile.name);

@@ -1,0 +1,200 @@
+#include "core/dataset/point_cloud_files.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <optional>
+#include <string>
+
+#include "core/dataset/cloud_content.hpp"
+#include "core/dataset/dataset_error.hpp"
+#include "core/lidar/point_fields.hpp"
+
+namespace stillmap {
+namespace {
+
+/// One field of all points.
+struct Column {
+  CloudField field;
+  std::vector<double> values;
+
+  [[nodiscard]] bool all_within(double min, double max) const {
+    return std::ranges::all_of(values, [&](double v) { return v >= min && v <= max; });
+  }
+};
+
+Column read_column(const CloudContent& cloud, const CloudField& field, std::uint64_t offset) {
+  const std::uint64_t point_bytes = cloud.point_bytes();
+  Column column{field, {}};
+  column.values.reserve(cloud.points());
+  for (std::uint64_t i = 0; i < cloud.points(); ++i) {
+    column.values.push_back(field_value(field, cloud.body.data() + i * point_bytes + offset));
+  }
+  return column;
+}
+
+/// The field with the first of these names that the cloud has.
+std::optional<Column> find_column(const CloudContent& cloud,
+                                  const std::vector<std::string>& names) {
+  for (const std::string& name : names) {
+    std::uint64_t offset = 0;
+    for (const CloudField& field : cloud.fields) {
+      if (field.name == name) return read_column(cloud, field, offset);
+      offset += field.bytes * field.count;
+    }
+  }
+  return std::nullopt;
+}
+
+std::vector<Eigen::Vector3f> points_of(const std::filesystem::path& file, const CloudContent& cloud,
+                                       const PointFieldNames& names) {
+  const auto x = find_column(cloud, names.x);
+  const auto y = find_column(cloud, names.y);
+  const auto z = find_column(cloud, names.z);
+  if (!x || !y || !z) {
+    std::string present;
+    for (const CloudField& field : cloud.fields) present.append(" ").append(field.name, 0, 40);
+    throw DatasetError(file, "has no fields x, y and z, only:" + present);
+  }
+  std::vector<Eigen::Vector3f> points;
+  points.reserve(x->values.size());
+  for (std::size_t i = 0; i < x->values.size(); ++i) {
+    points.emplace_back(Eigen::Vector3d(x->values[i], y->values[i], z->values[i]).cast<float>());
+  }
+  return points;
+}
+
+std::vector<float> intensity_of(const CloudContent& cloud, const PointFieldNames& names) {
+  const auto intensity = find_column(cloud, names.intensity);
+  if (!intensity) return {};
+  std::vector<float> values;
+  values.reserve(intensity->values.size());
+  for (const double value : intensity->values) values.push_back(static_cast<float>(value));
+  return values;
+}
+
+std::vector<float> time_offsets_of(const CloudContent& cloud, const PointFieldNames& names,
+                                   std::int64_t stamp_ns) {
+  const auto time = find_column(cloud, names.time);
+  if (!time) return {};
+  const TimeType floating = time->field.bytes == 4 ? TimeType::float32 : TimeType::float64;
+  const TimeType type = time->field.kind == 'F' ? floating : TimeType::integer;
+  return point_times(time->values, type, stamp_ns).offsets_s;
+}
+
+/// A column of whole numbers that all fit into T, else empty.
+template <class T>
+std::vector<T> whole_numbers(const std::optional<Column>& column) {
+  if (!column || !column->all_within(0.0, std::numeric_limits<T>::max())) return {};
+  std::vector<T> values;
+  values.reserve(column->values.size());
+  for (const double value : column->values) values.push_back(static_cast<T>(value));
+  return values;
+}
+
+constexpr std::size_t pcd_point_bytes = 24;
+constexpr std::size_t ply_point_bytes = 23;
+
+/// Puts values behind one another without padding.
+class Packer {
+ public:
+  explicit Packer(char* to) : to_(to) {}
+
+  template <class T>
+  Packer& operator<<(const T& value) {
+    std::memcpy(to_, &value, sizeof value);
+    to_ += sizeof value;
+    return *this;
+  }
+
+ private:
+  char* to_;
+};
+
+std::uint32_t label_of(const ColouredPoint& point) { return semantic_kitti_id(point.label); }
+
+void pack_pcd(const ColouredPoint& point, char* to) {
+  const Rgb rgb = colour(point.label);
+  const std::uint32_t packed_rgb =
+      (std::uint32_t{rgb.r} << 16U) | (std::uint32_t{rgb.g} << 8U) | rgb.b;
+  Packer(to) << point.position.x() << point.position.y() << point.position.z() << packed_rgb
+             << label_of(point) << point.confidence;
+}
+
+void pack_ply(const ColouredPoint& point, char* to) {
+  const Rgb rgb = colour(point.label);
+  Packer(to) << point.position.x() << point.position.y() << point.position.z() << rgb.r << rgb.g
+             << rgb.b << label_of(point) << point.confidence;
+}
+
+template <std::size_t point_bytes, class Pack>
+void write_cloud(const std::filesystem::path& file, const std::string& header,
+                 std::span<const ColouredPoint> points, Pack pack) {
+  std::ofstream out(file, std::ios::binary | std::ios::trunc);
+  out << header;
+  std::array<char, point_bytes> bytes{};
+  for (const ColouredPoint& point : points) {
+    pack(point, bytes.data());
+    out.write(bytes.data(), point_bytes);
+  }
+  out.close();
+  if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
+}
+
+}  // namespace
+
+CloudFile read_point_cloud(const std::filesystem::path& file, std::int64_t stamp_ns) {
+  const PointFieldNames names;
+  const CloudContent cloud =
+      file.extension() == ".ply" ? read_ply_content(file) : read_pcd_content(file);
+  CloudFile read;
+  read.scan.stamp_ns = stamp_ns;
+  read.scan.points_lidar = points_of(file, cloud, names);
+  read.scan.intensity = intensity_of(cloud, names);
+  read.scan.time_offset_s = time_offsets_of(cloud, names, stamp_ns);
+  read.scan.ring = whole_numbers<std::uint16_t>(find_column(cloud, names.ring));
+  read.raw_labels = whole_numbers<std::uint32_t>(find_column(cloud, names.label));
+  return read;
+}
+
+void write_pcd(const std::filesystem::path& file, std::span<const ColouredPoint> points) {
+  const std::string count = std::to_string(points.size());
+  // By convention the bits of a colour stand in a field of type float.
+  write_cloud<pcd_point_bytes>(file,
+                               "# .PCD v0.7 - Point Cloud Data file format\n"
+                               "VERSION 0.7\n"
+                               "FIELDS x y z rgb label confidence\n"
+                               "SIZE 4 4 4 4 4 4\n"
+                               "TYPE F F F F U F\n"
+                               "COUNT 1 1 1 1 1 1\n"
+                               "WIDTH " +
+                                   count +
+                                   "\nHEIGHT 1\n"
+                                   "VIEWPOINT 0 0 0 1 0 0 0\n"
+                                   "POINTS " +
+                                   count + "\nDATA binary\n",
+                               points, pack_pcd);
+}
+
+void write_ply(const std::filesystem::path& file, std::span<const ColouredPoint> points) {
+  write_cloud<ply_point_bytes>(file,
+                               "ply\n"
+                               "format binary_little_endian 1.0\n"
+                               "element vertex " +
+                                   std::to_string(points.size()) +
+                                   "\n"
+                                   "property float x\n"
+                                   "property float y\n"
+                                   "property float z\n"
+                                   "property uchar red\n"
+                                   "property uchar green\n"
+                                   "property uchar blue\n"
+                                   "property uint label\n"
+                                   "property float confidence\n"
+                                   "end_header\n",
+                               points, pack_ply);
+}
+
+}  // namespace stillmap

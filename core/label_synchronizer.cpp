@@ -1,0 +1,124 @@
+#include "core/label_synchronizer.hpp"
+
+#include <algorithm>
+#include <utility>
+
+#include "core/lidar/range_image_view.hpp"
+
+namespace stillmap {
+namespace {
+
+/// Adds what the scan hit, and clears what it saw through when that is due.
+void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar,
+                 const SensorModel& sensor, StaticMap& map) {
+  map.insert(labelled, T_map_lidar);
+  if (!map.clearing_due()) return;
+  const RangeImageView view(labelled.scan, {}, sensor, T_map_lidar);
+  map.clear_seen_through(view, labelled.scan.stamp_ns);
+}
+
+bool nothing_propagated(const PropagatedLabels& propagated) {
+  return std::ranges::all_of(propagated.origin,
+                             [](LabelOrigin origin) { return origin == LabelOrigin::none; });
+}
+
+}  // namespace
+
+LabelSynchronizer::LabelSynchronizer(std::unique_ptr<SegmentationPipeline> segmentation,
+                                     const SensorModel& sensor)
+    : segmentation_(std::move(segmentation)), sensor_(sensor) {}
+
+LabelSynchronizer::Submission LabelSynchronizer::submit(const Scan& scan, StaticMap& map) {
+  SegmentationPipeline::Output output = segmentation_->submit(scan);
+  Submission submission{.own = std::nullopt, .pending = output.pending};
+  for (auto& [stamp_ns, labels] : output.finished) {
+    if (stamp_ns == scan.stamp_ns) {
+      submission.own = std::move(labels);
+    } else if (pending_ && pending_->labelled.scan.stamp_ns == stamp_ns) {
+      insert_late_labels(std::move(labels), map);
+    }
+  }
+  return submission;
+}
+
+void LabelSynchronizer::insert_late_labels(PointLabels labels, StaticMap& map) {
+  PosedScan late = *std::exchange(pending_, std::nullopt);
+  late.labelled.labels = std::move(labels);
+  LabelledScan& labelled = late.labelled;
+  // Motion was classified without these labels: movable points count as semi-static at most, which
+  // makes no voxels.
+  for (std::size_t i = 0; i < labelled.motion.size(); ++i) {
+    const bool movable = is_movable(labelled.label(i));
+    if (labelled.motion[i] == Motion::highly_dynamic && movable) continue;
+    labelled.motion[i] = movable ? Motion::semi_static : Motion::stationary;
+  }
+  insert_scan(labelled, late.T_map_lidar, sensor_, map);
+  if (!labelled.labels.empty()) remember_labelled(std::move(late));
+}
+
+LabelSynchronizer::Labels LabelSynchronizer::labels_for(
+    const Scan& scan, Submission submission, const Eigen::Isometry3d& T_map_lidar_predicted,
+    const StaticMap& map) {
+  Labels labels;
+  labels.pending = submission.pending;
+  if (submission.own && (!submission.own->empty() || !segmentation_->may_skip_scans())) {
+    labels.provenance = submission.own->empty() ? LabelProvenance::none : LabelProvenance::fresh;
+    labels.labels = *std::move(submission.own);
+    return labels;
+  }
+  if (last_labelled_ && !last_labelled_image_) {
+    const LabelledScan& last = last_labelled_->labelled;
+    last_labelled_image_.emplace(last.scan, last.labels, last_labelled_->T_map_lidar, sensor_);
+  }
+  PropagatedLabels propagated =
+      propagate_labels(scan, T_map_lidar_predicted, map, last_labelled_image_);
+  if (nothing_propagated(propagated)) return labels;
+  labels.provenance = LabelProvenance::propagated;
+  labels.evidence = new_evidence(propagated);
+  labels.labels = std::move(propagated.labels);
+  return labels;
+}
+
+void LabelSynchronizer::insert(const LabelledScan& labelled, const Labels& labels,
+                               const Eigen::Isometry3d& T_map_lidar, StaticMap& map) {
+  if (labels.pending) {
+    pending_ = PosedScan{labelled, T_map_lidar};
+    return;
+  }
+  if (labels.provenance == LabelProvenance::propagated) {
+    insert_propagated(labelled, labels, T_map_lidar, map);
+    return;
+  }
+  // While labels of another scan are pending, a scan without any stays out: its moving objects
+  // cannot be told from what stands still.
+  if (labels.provenance == LabelProvenance::none && pending_) return;
+  insert_scan(labelled, T_map_lidar, sensor_, map);
+  if (labels.provenance == LabelProvenance::fresh && segmentation_->may_skip_scans()) {
+    remember_labelled({labelled, T_map_lidar});
+  }
+}
+
+void LabelSynchronizer::insert_propagated(const LabelledScan& labelled, const Labels& labels,
+                                          const Eigen::Isometry3d& T_map_lidar,
+                                          StaticMap& map) const {
+  LabelledScan known{labelled.scan, labels.evidence, labelled.motion};
+  // A point without a class may be a moving object that has just come into sight: it makes no
+  // voxel.
+  for (std::size_t i = 0; i < known.motion.size(); ++i) {
+    if (known.label(i) == SemanticClass::unlabeled) known.motion[i] = Motion::highly_dynamic;
+  }
+  insert_scan(known, T_map_lidar, sensor_, map);
+}
+
+void LabelSynchronizer::remember_labelled(PosedScan posed) {
+  last_labelled_ = std::move(posed);
+  last_labelled_image_.reset();
+}
+
+void LabelSynchronizer::reset() {
+  pending_.reset();
+  last_labelled_.reset();
+  last_labelled_image_.reset();
+}
+
+}  // namespace stillmap

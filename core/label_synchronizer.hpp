@@ -1,0 +1,90 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/lidar/labelled_scan.hpp"
+#include "core/lidar/sensor_model.hpp"
+#include "core/map/label_propagation.hpp"
+#include "core/map/static_map.hpp"
+#include "core/segmentation_pipeline.hpp"
+
+namespace stillmap {
+
+/// Matches scans with labels that may arrive after them. It owns the segmentation pipeline and
+/// decides which labels a scan is registered with (its own, else labels propagated from the map and
+/// from the last labelled scan), and when and with which labels the scan enters the static map. At
+/// most one scan waits for its labels: where another one becomes pending first, the earlier scan
+/// stays out of the static map. NOT thread safe.
+class LabelSynchronizer {
+ public:
+  LabelSynchronizer(std::unique_ptr<SegmentationPipeline> segmentation, const SensorModel& sensor);
+
+  /// Name of the label source, for the status.
+  [[nodiscard]] std::string name() const { return segmentation_->name(); }
+
+  /// What the pipeline said when a scan was submitted.
+  struct Submission {
+    /// Labels of the submitted scan; empty ones where the source failed.
+    std::optional<PointLabels> own;
+    /// They will come later.
+    bool pending = false;
+  };
+
+  /// Submits a prepared scan. An earlier scan whose labels have arrived since enters `map` with
+  /// them.
+  [[nodiscard]] Submission submit(const Scan& scan, StaticMap& map);
+
+  /// The labels that a scan is registered with.
+  struct Labels {
+    LabelProvenance provenance = LabelProvenance::none;
+    PointLabels labels;
+    /// The part of propagated labels that does not come from the map itself, which alone counts as
+    /// new evidence there.
+    PointLabels evidence;
+    bool pending = false;
+
+    /// Whether points without a class may be moving objects that have just come into sight.
+    [[nodiscard]] bool unlabelled_may_move() const {
+      return provenance == LabelProvenance::propagated ||
+             (provenance == LabelProvenance::none && pending);
+    }
+  };
+
+  /// `scan` is the submitted one after motion compensation; the predicted pose places it in `map`.
+  [[nodiscard]] Labels labels_for(const Scan& scan, Submission submission,
+                                  const Eigen::Isometry3d& T_map_lidar_predicted,
+                                  const StaticMap& map);
+
+  /// Inserts a registered scan into `map`: with `labels` where they are final; a scan whose own
+  /// labels are pending is kept until submit() receives them. `labelled` holds `labels.labels`.
+  void insert(const LabelledScan& labelled, const Labels& labels,
+              const Eigen::Isometry3d& T_map_lidar, StaticMap& map);
+
+  /// Forgets the pending and the last labelled scan.
+  void reset();
+
+ private:
+  struct PosedScan {
+    LabelledScan labelled;
+    Eigen::Isometry3d T_map_lidar;
+  };
+
+  void insert_late_labels(PointLabels labels, StaticMap& map);
+  void insert_propagated(const LabelledScan& labelled, const Labels& labels,
+                         const Eigen::Isometry3d& T_map_lidar, StaticMap& map) const;
+  void remember_labelled(PosedScan posed);
+
+  std::unique_ptr<SegmentationPipeline> segmentation_;
+  SensorModel sensor_;
+  /// The scan whose own labels are still to come.
+  std::optional<PosedScan> pending_;
+  /// The newest scan with labels of its own; its range image is made when labels are first
+  /// propagated from it.
+  std::optional<PosedScan> last_labelled_;
+  std::optional<LabelledRangeImage> last_labelled_image_;
+};
+
+}  // namespace stillmap
