@@ -3,7 +3,7 @@
 #include <optional>
 #include <string>
 
-#include "core/lidar/intensity_scale.hpp"
+#include "core/lidar/point_fields.hpp"
 #include "core/lidar/scan.hpp"
 #include "idl/conversions/cloud_layout.hpp"
 
