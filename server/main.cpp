@@ -9,7 +9,7 @@
 #include "idl/dds/security/security_error.hpp"
 #include "server/arguments.hpp"
 #include "server/mapping/async_segmenter.hpp"
-#include "server/monitoring/log_setup.hpp"
+#include "server/monitoring/log.hpp"
 #include "server/monitoring/systemd_notify.hpp"
 #include "server/server.hpp"
 

@@ -5,7 +5,6 @@
 
 #include "config/loaders/server_config.hpp"
 #include "idl/interface/topics.hpp"
-#include "server/mapping/background_throttle.hpp"
 #include "server/mapping/checkpoint_thread.hpp"
 #include "server/mapping/map_saver.hpp"
 #include "server/mapping/mapping_thread.hpp"
@@ -13,8 +12,8 @@
 #include "server/monitoring/discovery_diagnostics.hpp"
 #include "server/monitoring/metrics_endpoint.hpp"
 #include "server/monitoring/throttled_log.hpp"
+#include "server/occupancy/occupancy.hpp"
 #include "server/occupancy/occupancy_thread.hpp"
-#include "server/occupancy/octomap_publisher.hpp"
 #include "server/publishers/latest_map.hpp"
 #include "server/publishers/map_publisher.hpp"
 #include "server/publishers/server_report.hpp"
@@ -22,7 +21,8 @@
 #include "server/services/map_services.hpp"
 #include "server/services/occupancy_services.hpp"
 #include "server/services/removed_voxel_services.hpp"
-#include "server/traversability/traversability_grid_provider.hpp"
+#include "server/threads/background_throttle.hpp"
+#include "server/traversability/traversability_grid.hpp"
 #include "server/traversability/traversability_publisher.hpp"
 #include "server/traversability/traversability_thread.hpp"
 

@@ -11,10 +11,10 @@
 
 #include "config/loaders/server_config.hpp"
 #include "core/segmentation_pipeline.hpp"
-#include "server/mapping/scan_queue.hpp"
 #include "server/mapping/segmentation_rate_controller.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/monitoring/throttled_log.hpp"
+#include "server/threads/bounded_queue.hpp"
 
 namespace stillmap::server {
 

@@ -12,16 +12,16 @@
 #include "config/loaders/server_config.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/mapper.hpp"
-#include "server/mapping/background_throttle.hpp"
 #include "server/mapping/map_saver.hpp"
 #include "server/mapping/odometry_prior.hpp"
-#include "server/mapping/scan_queue.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/monitoring/throttled_log.hpp"
 #include "server/occupancy/occupancy_thread.hpp"
 #include "server/publishers/labelled_scan_publisher.hpp"
 #include "server/publishers/latest_map.hpp"
-#include "server/publishers/pose_publisher.hpp"
+#include "server/publishers/scan_publishers.hpp"
+#include "server/threads/background_throttle.hpp"
+#include "server/threads/bounded_queue.hpp"
 
 namespace stillmap::server {
 

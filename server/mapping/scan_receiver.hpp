@@ -9,9 +9,9 @@
 #include "idl/conversions/cloud_reader.hpp"
 #include "idl/dds/reader.hpp"
 #include "sensor_msgs.h"
-#include "server/mapping/scan_queue.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/monitoring/throttled_log.hpp"
+#include "server/threads/bounded_queue.hpp"
 
 namespace stillmap::server {
 

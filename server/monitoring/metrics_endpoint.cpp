@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "server/monitoring/metric_families.hpp"
+#include "server/monitoring/metrics.hpp"
 
 namespace stillmap::server {
 

@@ -11,8 +11,8 @@
 #include "core/segmentation_pipeline.hpp"
 #include "idl/interface/server_status.hpp"
 #include "server/monitoring/duration_histogram.hpp"
-#include "server/monitoring/latency_window.hpp"
 #include "server/monitoring/recent_median.hpp"
+#include "server/monitoring/recent_values.hpp"
 
 namespace stillmap::server {
 

@@ -8,8 +8,8 @@
 #include "nav_msgs.h"
 #include "sensor_msgs.h"
 #include "server/publishers/latest_map.hpp"
-#include "server/publishers/periodic_thread.hpp"
 #include "server/publishers/tile_publisher.hpp"
+#include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
 

@@ -4,7 +4,7 @@
 
 #include "idl/dds/writer.hpp"
 #include "idl/interface/topics.hpp"
-#include "server/publishers/periodic_thread.hpp"
+#include "server/threads/periodic_worker.hpp"
 #include "stillmap_msgs.h"
 
 namespace stillmap::server {

@@ -11,7 +11,7 @@
 #include "server/monitoring/service_log.hpp"
 #include "server/publishers/latest_map.hpp"
 #include "server/traversability/traversability_cache.hpp"
-#include "server/traversability/traversability_grid_provider.hpp"
+#include "server/traversability/traversability_grid.hpp"
 
 namespace stillmap::server {
 

@@ -3,7 +3,7 @@
 #include "idl/dds/writer.hpp"
 #include "idl/interface/topics.hpp"
 #include "server/monitoring/throttled_log.hpp"
-#include "server/traversability/traversability_grid_provider.hpp"
+#include "server/traversability/traversability_grid.hpp"
 
 namespace stillmap::server {
 

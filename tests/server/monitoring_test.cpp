@@ -7,7 +7,7 @@
 
 #include "server/monitoring/checkpoint_log.hpp"
 #include "server/monitoring/duration_histogram.hpp"
-#include "server/monitoring/metric_families.hpp"
+#include "server/monitoring/metrics.hpp"
 #include "server/monitoring/service_log.hpp"
 #include "stillmap_msgs.h"
 

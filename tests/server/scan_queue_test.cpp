@@ -1,8 +1,8 @@
-#include "server/mapping/scan_queue.hpp"
-
 #include <gtest/gtest.h>
 
 #include <thread>
+
+#include "server/threads/bounded_queue.hpp"
 
 namespace stillmap::server {
 namespace {

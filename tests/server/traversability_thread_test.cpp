@@ -6,7 +6,7 @@
 #include <atomic>
 #include <stdexcept>
 
-#include "server/traversability/traversability_grid_provider.hpp"
+#include "server/traversability/traversability_grid.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
 namespace stillmap::server {

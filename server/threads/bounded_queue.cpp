@@ -1,4 +1,4 @@
-#include "server/mapping/scan_queue.hpp"
+#include "server/threads/bounded_queue.hpp"
 
 #include <utility>
 

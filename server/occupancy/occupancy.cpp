@@ -1,4 +1,4 @@
-#include "server/occupancy/octomap_publisher.hpp"
+#include "server/occupancy/occupancy.hpp"
 
 #include "idl/conversions/octomap.hpp"
 

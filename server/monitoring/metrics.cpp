@@ -1,4 +1,4 @@
-#include "server/monitoring/metric_families.hpp"
+#include "server/monitoring/metrics.hpp"
 
 #include <prometheus/metric_family.h>
 

@@ -7,7 +7,7 @@
 #include "idl/interface/topics.hpp"
 #include "octomap_msgs.h"
 #include "server/occupancy/occupancy_thread.hpp"
-#include "server/publishers/periodic_thread.hpp"
+#include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
 

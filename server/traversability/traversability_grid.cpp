@@ -1,4 +1,4 @@
-#include "server/traversability/traversability_grid_provider.hpp"
+#include "server/traversability/traversability_grid.hpp"
 
 #include "idl/conversions/occupancy_grid.hpp"
 

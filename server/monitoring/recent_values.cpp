@@ -1,4 +1,4 @@
-#include "server/monitoring/latency_window.hpp"
+#include "server/monitoring/recent_values.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "server/publishers/pose_publisher.hpp"
+#include "server/publishers/scan_publishers.hpp"
 
 #include <utility>
 

@@ -1,4 +1,4 @@
-#include "server/monitoring/log_setup.hpp"
+#include "server/monitoring/log.hpp"
 
 #include <spdlog/pattern_formatter.h>
 #include <spdlog/sinks/ansicolor_sink.h>
