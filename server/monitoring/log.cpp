@@ -13,6 +13,9 @@
 namespace stillmap::server {
 namespace {
 
+/// Between two lines of one kind.
+constexpr std::chrono::seconds min_interval{5};
+
 spdlog::level::level_enum spdlog_level(LogLevel level) {
   switch (level) {
     case LogLevel::debug:
@@ -58,6 +61,14 @@ class JournalPriority : public spdlog::custom_flag_formatter {
   }
 };
 
+/// Whether stderr goes to systemd's journal: JOURNAL_STREAM names its device and inode.
+bool stderr_is_journal() {
+  const char* const stream = std::getenv("JOURNAL_STREAM");
+  struct stat is {};
+  if (stream == nullptr || fstat(STDERR_FILENO, &is) != 0) return false;
+  return std::to_string(is.st_dev) + ":" + std::to_string(is.st_ino) == stream;
+}
+
 std::unique_ptr<spdlog::formatter> journal_format() {
   auto format = std::make_unique<spdlog::pattern_formatter>();
   format->add_flag<JournalPriority>('*').set_pattern("%*%v");
@@ -82,11 +93,25 @@ void start_log(LogLevel level) {
 
 void set_log_level(LogLevel level) { spdlog::set_level(spdlog_level(level)); }
 
-bool stderr_is_journal() {
-  const char* const stream = std::getenv("JOURNAL_STREAM");
-  struct stat is {};
-  if (stream == nullptr || fstat(STDERR_FILENO, &is) != 0) return false;
-  return std::to_string(is.st_dev) + ":" + std::to_string(is.st_ino) == stream;
+std::string ThrottledLog::due(const std::string& kind, const std::string& text) {
+  const auto now = std::chrono::steady_clock::now();
+  const auto [known, is_new] = kinds_.try_emplace(kind, Kind{.last = now});
+  if (!is_new && now - known->second.last < min_interval) {
+    ++known->second.suppressed;
+    return {};
+  }
+  const std::uint64_t suppressed = known->second.suppressed;
+  known->second = {.last = now};
+  if (suppressed == 0) return text;
+  return text + " (and " + std::to_string(suppressed) + " more of this kind)";
+}
+
+void ThrottledLog::warn(const std::string& kind, const std::string& text) {
+  if (const std::string line = due(kind, text); !line.empty()) spdlog::warn("{}", line);
+}
+
+void ThrottledLog::error(const std::string& kind, const std::string& text) {
+  if (const std::string line = due(kind, text); !line.empty()) spdlog::error("{}", line);
 }
 
 }  // namespace stillmap::server

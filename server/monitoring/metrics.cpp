@@ -1,207 +1,150 @@
 #include "server/monitoring/metrics.hpp"
 
-#include <prometheus/metric_family.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
-#include <algorithm>
-#include <array>
-#include <chrono>
-#include <string>
-#include <utility>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 
 namespace stillmap::server {
 namespace {
 
-using prometheus::ClientMetric;
-using prometheus::MetricFamily;
-using prometheus::MetricType;
-using Labels = std::vector<ClientMetric::Label>;
-
-/// A family with one way to fill each kind of metric.
-class Family {
- public:
-  Family(std::string name, std::string help, MetricType type)
-      : family_{std::move(name), std::move(help), type, {}} {}
-
-  Family& add(double value, Labels labels = {}) {
-    ClientMetric& metric = family_.metric.emplace_back();
-    metric.label = std::move(labels);
-    metric.counter.value = metric.gauge.value = value;
-    return *this;
-  }
-
-  Family& add(const DurationHistogram& durations, Labels labels = {}) {
-    ClientMetric& metric = family_.metric.emplace_back();
-    metric.label = std::move(labels);
-    metric.histogram.sample_count = durations.count();
-    metric.histogram.sample_sum = durations.sum_s();
-    for (std::size_t i = 0; i < DurationHistogram::bounds_s.size(); ++i) {
-      metric.histogram.bucket.push_back(
-          {durations.count_up_to(i), DurationHistogram::bounds_s.at(i)});
-    }
-    return *this;
-  }
-
-  operator MetricFamily() const { return family_; }
-
- private:
-  MetricFamily family_;
-};
-
-Family counter(const std::string& name, const std::string& help) {
-  return {"stillmap_" + name, help, MetricType::Counter};
+Metrics::Counters& counters(prometheus::Registry& registry, const std::string& name,
+                            const std::string& help) {
+  return prometheus::BuildCounter().Name(name).Help(help).Register(registry);
 }
-Family gauge(const std::string& name, const std::string& help) {
-  return {"stillmap_" + name, help, MetricType::Gauge};
+Metrics::Gauges& gauges(prometheus::Registry& registry, const std::string& name,
+                        const std::string& help) {
+  return prometheus::BuildGauge().Name(name).Help(help).Register(registry);
 }
-Family histogram(const std::string& name, const std::string& help) {
-  return {"stillmap_" + name, help, MetricType::Histogram};
+Metrics::Histograms& histograms(prometheus::Registry& registry, const std::string& name,
+                                const std::string& help) {
+  return prometheus::BuildHistogram().Name(name).Help(help).Register(registry);
+}
+prometheus::Counter& counter(prometheus::Registry& registry, const std::string& name,
+                             const std::string& help) {
+  return counters(registry, name, help).Add({});
+}
+prometheus::Gauge& gauge(prometheus::Registry& registry, const std::string& name,
+                         const std::string& help) {
+  return gauges(registry, name, help).Add({});
 }
 
-constexpr std::string_view drop_prefix = "dropped_";
-/// Counters of the status that have a family of their own.
-constexpr std::array own_family{"scans_received", "scans_mapped",   "label_failures",
-                                "map_memory_kib", "map_tiles_away", "map_tiles_unreadable"};
-
-double count(const dds::ServerStatus& status, std::string_view name) {
-  return static_cast<double>(status.counter(name));
+double resident_bytes() {
+  std::ifstream statm("/proc/self/statm");
+  double total_pages = 0.0;
+  double resident_pages = 0.0;
+  statm >> total_pages >> resident_pages;
+  return resident_pages * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-MetricFamily drops(const dds::ServerStatus& status) {
-  Family family = counter("scans_dropped_total", "Scans that were not mapped, by reason");
-  for (const dds::NamedCounter& dropped : status.counters) {
-    if (!dropped.name.starts_with(drop_prefix)) continue;
-    family.add(static_cast<double>(dropped.value),
-               {{"reason", dropped.name.substr(drop_prefix.size())}});
-  }
-  return family;
+double seconds(const timeval& time) {
+  return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
 }
 
-MetricFamily events(const dds::ServerStatus& status) {
-  Family family = counter("events_total", "What happened beside mapping, by event");
-  for (const dds::NamedCounter& event : status.counters) {
-    if (event.name.starts_with(drop_prefix)) continue;
-    if (std::ranges::find(own_family, event.name) != own_family.end()) continue;
-    family.add(static_cast<double>(event.value), {{"event", event.name}});
-  }
-  return family;
+double processor_seconds() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
 }
 
-MetricFamily odometry_health(const dds::ServerStatus& status) {
-  Family family = gauge("odometry_health", "1 for the state of the last mapped scan's odometry");
-  using enum OdometryHealth;
-  for (const OdometryHealth health : {initialised, good, degenerate, lost}) {
-    family.add(status.health == health ? 1.0 : 0.0, {{"state", name(health)}});
-  }
-  return family;
-}
-
-MetricFamily label_shares(const dds::SegmentationStatus& segmentation) {
-  return gauge("scan_labels_ratio", "Share of the last scans whose labels came from there")
-      .add(segmentation.fresh_share, {{"source", "own"}})
-      .add(segmentation.propagated_share, {{"source", "carried"}})
-      .add(segmentation.unlabelled_share, {{"source", "none"}});
-}
-
-MetricFamily stages(const std::vector<StageStatistics>& stages) {
-  Family family = histogram("stage_duration_seconds", "Time that a stage took for a scan");
-  for (const StageStatistics& times : stages) family.add(times.all, {{"stage", times.stage}});
-  return family;
-}
-
-MetricFamily answers(const MetricsSnapshot& snapshot) {
-  Family family = counter("service_requests_total", "Requests answered, by service and code");
-  for (const auto& [service, log] : snapshot.services) {
-    for (const auto& [code, answered] : log.answers) {
-      family.add(static_cast<double>(answered), {{"service", service}, {"code", name(code)}});
-    }
-  }
-  return family;
-}
-
-MetricFamily answer_times(const MetricsSnapshot& snapshot) {
-  Family family = histogram("service_duration_seconds", "Time to make an answer, without its way");
-  for (const auto& [service, log] : snapshot.services) {
-    family.add(log.times, {{"service", service}});
-  }
-  return family;
-}
-
-double unix_seconds(const CheckpointLog::Record& checkpoints) {
-  if (!checkpoints.last_stored) return 0.0;
-  return std::chrono::duration<double>(checkpoints.last_stored->time_since_epoch()).count();
-}
-
-void add_scans(std::vector<MetricFamily>& all, const dds::ServerStatus& status) {
-  all.push_back(
-      counter("scans_received_total", "Scans that arrived").add(count(status, "scans_received")));
-  all.push_back(
-      counter("scans_mapped_total", "Scans that were mapped").add(count(status, "scans_mapped")));
-  all.push_back(drops(status));
-  all.push_back(events(status));
-  all.push_back(odometry_health(status));
-  all.push_back(counter("label_failures_total", "Scans whose segmentation failed")
-                    .add(count(status, "label_failures")));
-  all.push_back(gauge("segmentation_every_scans", "n, when every n-th scan is segmented")
-                    .add(status.segmentation.every));
-  all.push_back(gauge("segmentation_image_columns", "Width of the range images; 0: none")
-                    .add(status.segmentation.image_columns));
-  all.push_back(label_shares(status.segmentation));
-}
-
-void add_map(std::vector<MetricFamily>& all, const MetricsSnapshot& snapshot) {
-  const dds::ServerStatus& status = snapshot.status;
-  all.push_back(
-      gauge("map_tiles", "Tiles of the static map").add(static_cast<double>(status.tile_count)));
-  all.push_back(
-      gauge("map_voxels", "Voxels of the static map").add(static_cast<double>(status.voxel_count)));
-  all.push_back(gauge("map_memory_bytes", "What the static map takes, at the last checkpoint")
-                    .add(static_cast<double>(snapshot.map_memory.bytes)));
-  all.push_back(gauge("map_tiles_away", "Tiles that are on disk only, at the last checkpoint")
-                    .add(static_cast<double>(snapshot.map_memory.non_resident_tiles)));
-  all.push_back(gauge("map_tiles_unreadable", "Tiles on disk that cannot be read")
-                    .add(count(status, "map_tiles_unreadable")));
-}
-
-void add_checkpoints(std::vector<MetricFamily>& all, const CheckpointLog::Record& checkpoints) {
-  all.push_back(histogram("checkpoint_duration_seconds", "Time that saving the map took")
-                    .add(checkpoints.times));
-  all.push_back(counter("checkpoint_failures_total", "Saves of the map that failed")
-                    .add(static_cast<double>(checkpoints.failures)));
-  all.push_back(gauge("checkpoint_last_success_timestamp_seconds",
-                      "Unix time of the last save; 0 before the first")
-                    .add(unix_seconds(checkpoints)));
-}
-
-void add_process(std::vector<MetricFamily>& all, const MetricsSnapshot& snapshot) {
-  // Names that every client library of Prometheus gives them.
-  const ProcessUse& process = snapshot.process;
-  all.push_back(Family("process_resident_memory_bytes", "Memory of the process", MetricType::Gauge)
-                    .add(process.resident_bytes));
-  all.push_back(
-      Family("process_cpu_seconds_total", "Processor time of the process", MetricType::Counter)
-          .add(process.cpu_seconds));
-  all.push_back(Family("process_open_fds", "Files and sockets that are open", MetricType::Gauge)
-                    .add(process.open_files));
+double open_files() {
+  std::error_code none;
+  const std::filesystem::directory_iterator files("/proc/self/fd", none);
+  return static_cast<double>(std::distance(begin(files), end(files)));
 }
 
 }  // namespace
 
-std::vector<MetricFamily> metric_families(const MetricsSnapshot& snapshot) {
-  const dds::ServerStatus& status = snapshot.status;
-  std::vector<MetricFamily> all;
-  all.push_back(gauge("info", "1; what runs")
-                    .add(1.0, {{"version", status.software_version},
-                               {"delivery", name(status.delivery)},
-                               {"label_source", status.label_source}}));
-  all.push_back(gauge("uptime_seconds", "Since the start").add(status.uptime_s));
-  add_scans(all, status);
-  all.push_back(stages(snapshot.stages));
-  add_map(all, snapshot);
-  all.push_back(answers(snapshot));
-  all.push_back(answer_times(snapshot));
-  add_checkpoints(all, snapshot.checkpoints);
-  add_process(all, snapshot);
-  return all;
+// The process_ families have the names that every client library of Prometheus gives them.
+Metrics::Metrics()
+    : scans_received(counter(registry_, "stillmap_scans_received_total", "Scans that arrived")),
+      scans_mapped(counter(registry_, "stillmap_scans_mapped_total", "Scans that were mapped")),
+      scans_dropped(counters(registry_, "stillmap_scans_dropped_total",
+                             "Scans that were not mapped, by reason")),
+      events(
+          counters(registry_, "stillmap_events_total", "What happened beside mapping, by event")),
+      label_failures(
+          counter(registry_, "stillmap_label_failures_total", "Scans whose segmentation failed")),
+      stage_durations(histograms(registry_, "stillmap_stage_duration_seconds",
+                                 "Time that a stage took for a scan")),
+      map_memory_bytes(gauge(registry_, "stillmap_map_memory_bytes",
+                             "What the static map takes, at the last checkpoint")),
+      map_tiles_evicted(gauge(registry_, "stillmap_map_tiles_evicted",
+                              "Tiles that are on disk only, at the last checkpoint")),
+      map_tiles_unreadable(
+          gauge(registry_, "stillmap_map_tiles_unreadable", "Tiles on disk that cannot be read")),
+      service_requests(counters(registry_, "stillmap_service_requests_total",
+                                "Requests answered, by service and code")),
+      service_durations(histograms(registry_, "stillmap_service_duration_seconds",
+                                   "Time to make an answer, without its way")),
+      checkpoint_durations(
+          add_durations(histograms(registry_, "stillmap_checkpoint_duration_seconds",
+                                   "Time that saving the map took"),
+                        {})),
+      checkpoint_failures(
+          counter(registry_, "stillmap_checkpoint_failures_total", "Saves of the map that failed")),
+      last_checkpoint(gauge(registry_, "stillmap_checkpoint_last_success_timestamp_seconds",
+                            "Unix time of the last save; 0 before the first")),
+      info_(gauges(registry_, "stillmap_info", "1; what runs")),
+      uptime_(gauge(registry_, "stillmap_uptime_seconds", "Since the start")),
+      odometry_health_(gauges(registry_, "stillmap_odometry_health",
+                              "1 for the state of the last mapped scan's odometry")),
+      segmentation_every_(gauge(registry_, "stillmap_segmentation_every_scans",
+                                "n, when every n-th scan is segmented")),
+      segmentation_columns_(gauge(registry_, "stillmap_segmentation_image_columns",
+                                  "Width of the range images; 0: none")),
+      scan_labels_(gauges(registry_, "stillmap_scan_labels_ratio",
+                          "Share of the last scans whose labels came from there")),
+      map_tiles_(gauge(registry_, "stillmap_map_tiles", "Tiles of the static map")),
+      map_voxels_(gauge(registry_, "stillmap_map_voxels", "Voxels of the static map")),
+      resident_memory_(gauge(registry_, "process_resident_memory_bytes", "Memory of the process")),
+      cpu_seconds_(
+          counter(registry_, "process_cpu_seconds_total", "Processor time of the process")),
+      open_files_(gauge(registry_, "process_open_fds", "Files and sockets that are open")) {}
+
+prometheus::Histogram& Metrics::add_durations(Histograms& family,
+                                              const prometheus::Labels& labels) {
+  return family.Add(
+      labels, prometheus::Histogram::BucketBoundaries{0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1,
+                                                      0.25, 0.5, 1.0, 2.5, 5.0, 10.0});
+}
+
+std::vector<prometheus::MetricFamily> Metrics::collect(const dds::ServerStatus& status) {
+  const std::scoped_lock lock(collect_mutex_);
+  show(status);
+  show_process();
+  return registry_.Collect();
+}
+
+void Metrics::show(const dds::ServerStatus& status) {
+  // The label source can change while the server runs: the old series must not stay beside the new.
+  prometheus::Gauge& info = info_.Add({{"version", status.software_version},
+                                       {"delivery", name(status.delivery)},
+                                       {"label_source", status.label_source}});
+  if (shown_info_ != nullptr && shown_info_ != &info) info_.Remove(shown_info_);
+  shown_info_ = &info;
+  info.Set(1.0);
+  uptime_.Set(status.uptime_s);
+  using enum OdometryHealth;
+  for (const OdometryHealth health : {initialised, good, degenerate, lost}) {
+    odometry_health_.Add({{"state", name(health)}}).Set(status.health == health ? 1.0 : 0.0);
+  }
+  const dds::SegmentationStatus& segmentation = status.segmentation;
+  segmentation_every_.Set(segmentation.every);
+  segmentation_columns_.Set(segmentation.image_columns);
+  scan_labels_.Add({{"source", "segmented"}}).Set(segmentation.fresh_share);
+  scan_labels_.Add({{"source", "propagated"}}).Set(segmentation.propagated_share);
+  scan_labels_.Add({{"source", "none"}}).Set(segmentation.unlabelled_share);
+  map_tiles_.Set(static_cast<double>(status.tile_count));
+  map_voxels_.Set(static_cast<double>(status.voxel_count));
+}
+
+void Metrics::show_process() {
+  resident_memory_.Set(resident_bytes());
+  cpu_seconds_.Increment(processor_seconds() - cpu_seconds_.Value());
+  open_files_.Set(open_files());
 }
 
 }  // namespace stillmap::server

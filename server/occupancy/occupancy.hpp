@@ -12,7 +12,7 @@
 namespace stillmap::server {
 
 /// Publishes the octree (binary, as RViz2's plug-in and octomap_server's clients read it) when it
-/// changed and somebody listens.
+/// has changed and has a reader.
 class OctomapPublisher {
  public:
   OctomapPublisher(dds::Participant& participant, const dds::Topics& topics,
@@ -26,7 +26,20 @@ class OctomapPublisher {
   std::uint64_t published_ = 0;
   dds::Writer<octomap_msgs::msg::Octomap> writer_;
   // Last: stops before what it uses is gone.
-  PeriodicThread thread_;
+  PeriodicWorker worker_;
+};
+
+/// The octree and its topic.
+class Occupancy {
+ public:
+  Occupancy(dds::Participant& participant, const dds::Topics& topics, const ServerConfig& config,
+            Statistics& statistics, ThrottleCallback throttle);
+
+  [[nodiscard]] OccupancyThread& thread() { return thread_; }
+
+ private:
+  OccupancyThread thread_;
+  OctomapPublisher publisher_;
 };
 
 }  // namespace stillmap::server

@@ -10,8 +10,8 @@
 #include "server/mapping/map_saver.hpp"
 #include "server/monitoring/service_log.hpp"
 #include "server/publishers/latest_map.hpp"
-#include "server/traversability/traversability_cache.hpp"
 #include "server/traversability/traversability_grid.hpp"
+#include "server/traversability/traversability_snapshot.hpp"
 
 namespace stillmap::server {
 

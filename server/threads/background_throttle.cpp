@@ -1,5 +1,6 @@
 #include "server/threads/background_throttle.hpp"
 
+#include <sched.h>
 #include <time.h>
 
 #include <algorithm>
@@ -18,7 +19,7 @@ constexpr int rest_ratio = 9;
 constexpr std::chrono::nanoseconds max_rest = 1s;
 constexpr auto poll_period = 1ms;
 
-/// The time that the calling thread has worked; one that gives way to others may get none for long.
+/// Processor time of the calling thread, which stands still while the scheduler prefers others.
 std::chrono::nanoseconds thread_cpu_time() {
   timespec used{};
   ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
@@ -26,6 +27,13 @@ std::chrono::nanoseconds thread_cpu_time() {
 }
 
 }  // namespace
+
+bool use_idle_scheduling() {
+  // A nice value is not enough: the network's threads wait for each other many times a scan, and a
+  // thread that holds one of them up for a moment holds up both.
+  const sched_param none{};
+  return sched_setscheduler(0, SCHED_IDLE, &none) == 0;
+}
 
 ThrottleCallback make_throttle_callback(const BackgroundThrottle& throttle,
                                         SaturationPolicy saturation_policy) {

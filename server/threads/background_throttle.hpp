@@ -6,13 +6,17 @@
 
 namespace stillmap::server {
 
-/// Whether a scan is in work, so that what is done in the background waits for a gap. Two cores
-/// share caches, memory and often one core's arithmetic: a thread that gets only the time that
-/// nobody else wants slows the others down all the same. Thread-safe, without locks: the mapper
-/// never waits for a thread that it holds up.
+/// Gives the calling thread the scheduling class SCHED_IDLE: on busy cores it runs only when no
+/// other thread wants to. False where the system refuses.
+bool use_idle_scheduling();
+
+/// Whether a scan is being mapped, so that background work waits for the time between scans. Idle
+/// scheduling alone is not enough: cores share caches, memory bandwidth and often arithmetic units,
+/// so that a background thread slows the mapper down even on another core. Thread-safe and without
+/// locks: the mapper never waits for a background thread.
 class BackgroundThrottle {
  public:
-  /// While it lives, a scan is in work.
+  /// Marks a scan as being mapped while it lives.
   class ScanInProgress {
    public:
     explicit ScanInProgress(BackgroundThrottle& throttle) : throttle_(throttle) {
@@ -28,7 +32,7 @@ class BackgroundThrottle {
 
   [[nodiscard]] bool is_idle() const { return scans_in_progress_ == 0 || is_released_; }
 
-  /// Holds up nobody any more: the server ends, and background work is to be finished.
+  /// Lets all background work run from now on: the server ends, and its threads are to finish.
   void release() { is_released_ = true; }
 
  private:
@@ -36,7 +40,7 @@ class BackgroundThrottle {
   std::atomic<int> scans_in_progress_ = 0;
 };
 
-/// Releases the throttle when it goes, so that threads that wait for gaps can go, too.
+/// Releases the throttle when destroyed, so that threads that wait for it can end.
 class ThrottleRelease {
  public:
   explicit ThrottleRelease(BackgroundThrottle& throttle) : throttle_(throttle) {}
@@ -48,14 +52,14 @@ class ThrottleRelease {
   BackgroundThrottle& throttle_;
 };
 
-/// What a background thread does where scans come as fast as they can be mapped and leave no gaps.
+/// What a background thread does when scans come as fast as they can be mapped, without gaps.
 enum class SaturationPolicy {
   wait,
-  /// It still works a tenth of the time, if it gets it.
+  /// It still works a tenth of the time, if the scheduler grants it.
   run_at_ten_percent,
 };
 
-/// For one background thread: waits for a gap between scans. `throttle` must outlive it.
+/// For one background thread: returns when no scan is being mapped. `throttle` must outlive it.
 [[nodiscard]] ThrottleCallback make_throttle_callback(const BackgroundThrottle& throttle,
                                                       SaturationPolicy saturation_policy);
 

@@ -1,31 +1,29 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
+#include <stop_token>
 #include <thread>
-#include <utility>
+
+#include "server/threads/monotonic_clock.hpp"
 
 namespace stillmap::server {
 
-/// Calls `work` every `period` on its own thread until destroyed; work that takes longer delays the
-/// next call.
-class PeriodicThread {
+/// Calls its work again and again on a thread of its own until destroyed.
+class PeriodicWorker {
  public:
-  PeriodicThread(std::chrono::duration<double> period, std::function<void()> work)
-      : work_(std::move(work)), thread_([this, period](const std::stop_token& stop) {
-          std::mutex mutex;
-          std::condition_variable_any never_notified;
-          std::unique_lock lock(mutex);
-          while (!stop.stop_requested()) {
-            work_();
-            never_notified.wait_for(lock, stop, period, [] { return false; });
-          }
-        }) {}
+  using Work = std::function<void(const std::stop_token& stop)>;
+  /// Returns when the next round is due.
+  using Round = std::function<MonotonicClock::TimePoint(const std::stop_token& stop)>;
+
+  /// Pauses for `period` between the end of one call and the next; 0 for work that waits itself,
+  /// until something happens or a stop is requested. The work must not throw.
+  PeriodicWorker(std::chrono::duration<double> period, Work work,
+                 MonotonicClock& clock = MonotonicClock::steady());
+  /// For rounds that say themselves when the next one is due.
+  explicit PeriodicWorker(Round round, MonotonicClock& clock = MonotonicClock::steady());
 
  private:
-  std::function<void()> work_;
   std::jthread thread_;
 };
 

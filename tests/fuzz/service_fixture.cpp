@@ -29,7 +29,7 @@ RobotProfile robot() {
 
 ServiceFixture::ServiceFixture()
     : map_(street_config()),
-      saver_(latest_map_, fresh_map_file(), {{"software", "0"}}),
+      saver_(latest_map_, statistics_, fresh_map_file(), {{"software", "0"}}),
       removed_{
           .removed = [this](const auto& box_map) { return map_.removed(box_map); },
           .restore = [this](RemovalReason reason,
@@ -53,6 +53,7 @@ ServiceFixture::ServiceFixture()
                .traversability = traversability_cache_,
                .grid_provider = grid_provider_,
                .log = log_} {
+  saver_.set_source(source_);
   reset();
 }
 

@@ -4,6 +4,7 @@
 #include "server/services/get_static_map.hpp"
 #include "server/services/removed_voxels.hpp"
 #include "server/services/service_context.hpp"
+#include "tests/server/latest_map_source.hpp"
 
 namespace stillmap::fuzz {
 
@@ -28,7 +29,9 @@ class ServiceFixture {
   StaticMap map_;
   server::LatestMap latest_map_;
   TileReader tiles_;
+  server::Statistics statistics_;
   server::MapSaver saver_;
+  test::LatestMapSource source_{latest_map_};
   server::TraversabilitySnapshot snapshot_;
   server::TraversabilityCache traversability_cache_{snapshot_, latest_map_, tiles_};
   TraversabilityConfig traversability_config_;
@@ -36,7 +39,7 @@ class ServiceFixture {
                                                     snapshot_};
   OccupancyMap octree_{OccupancyConfig{}};
   server::RemovedSource removed_;
-  server::ServiceLog log_;
+  server::ServiceLog log_{statistics_.metrics()};
   server::ServiceContext context_;
   server::GetStaticMap static_map_{context_};
 };

@@ -7,7 +7,6 @@
 
 #include "idl/dds/reader.hpp"
 #include "server/publishers/tile_publisher.hpp"
-#include "server/publishers/token_bucket.hpp"
 #include "tests/idl/dds_fixture.hpp"
 
 namespace stillmap::server {
