@@ -71,7 +71,7 @@ fuzz: ## Fuzz all that takes bytes from outside, FUZZ_SECONDS=600 each, FUZZ_JOB
 	@JOBS=$(FUZZ_JOBS) tests/fuzz/fuzz.sh $(FUZZ_SECONDS)
 
 soak: build ## A server at 10 Hz for MINUTES=30, clients coming and going, dying and hanging: memory flat
-	@python3 tests/soak/soak.py --bin $(BUILD)/bin --drive $(BUILD)/tests/soak/soak_sensor --minutes $(MINUTES)
+	@python3 tests/soak/soak.py --bin $(BUILD)/bin --sensor $(BUILD)/tests/soak/soak_sensor --minutes $(MINUTES)
 
 bench: build ## Benchmarks of every stage
 	@for b in $(BUILD)/tests/bench/*_bench; do echo "== $$b"; $$b || exit 1; done

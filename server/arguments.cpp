@@ -27,7 +27,7 @@ constexpr const char* footer =
 
 constexpr int bad_usage = 2;
 
-/// What is said of logs and metrics instead of the file's.
+/// Options for logs and metrics, which override the configuration file.
 struct OperationArguments {
   std::optional<LogLevel> log_level;
   std::optional<std::string> metrics_address;
@@ -64,7 +64,7 @@ Arguments check_config(const std::string& file) {
   return {.config = std::nullopt};
 }
 
-/// What is said of the network instead of the file's.
+/// Options for the network, which override the configuration file.
 struct NetworkArguments {
   std::optional<std::string> profile;
   std::vector<std::string> peers;
@@ -96,7 +96,7 @@ void add_network_options(CLI::App& program, NetworkArguments& network) {
       ->envname("STILLMAP_DISCOVERY_SERVER");
 }
 
-/// What is said of the map, the input and the domain instead of the file's.
+/// Options for the map, the input and the domain, which override the configuration file.
 struct ServerArguments {
   std::optional<std::uint32_t> domain_id;
   std::optional<std::string> security;

@@ -1,7 +1,9 @@
 #include <pthread.h>
 #include <spdlog/spdlog.h>
+#include <systemd/sd-daemon.h>
 
 #include <csignal>
+#include <cstring>
 #include <exception>
 
 #include "config/loaders/model_file.hpp"
@@ -9,8 +11,7 @@
 #include "idl/dds/dds_error.hpp"
 #include "server/arguments.hpp"
 #include "server/mapping/async_segmenter.hpp"
-#include "server/monitoring/log_setup.hpp"
-#include "server/monitoring/systemd_notify.hpp"
+#include "server/monitoring/log.hpp"
 #include "server/server.hpp"
 
 namespace {
@@ -28,6 +29,13 @@ sigset_t block_stop_signals() {
   return signals;
 }
 
+/// For units with Type=notify; does nothing elsewhere.
+void notify_systemd(const char* state) {
+  if (const int result = sd_notify(0, state); result < 0) {
+    spdlog::warn("systemd was not notified of {}: {}", state, std::strerror(-result));
+  }
+}
+
 void serve(const stillmap::ServerConfig& config) {
   const sigset_t signals = block_stop_signals();
   const bool adaptive_width = stillmap::server::segmentation_budget(config).count() > 0;
@@ -37,11 +45,11 @@ void serve(const stillmap::ServerConfig& config) {
   }
   stillmap::server::Server server(config, std::move(labels));
   spdlog::info("ready: scans from rt/{}, domain {}", config.topics.points, config.dds.domain_id);
-  stillmap::server::notify_systemd("READY=1");
+  notify_systemd("READY=1");
   int signal = 0;
   sigwait(&signals, &signal);
   spdlog::info("stopping");
-  stillmap::server::notify_systemd("STOPPING=1");
+  notify_systemd("STOPPING=1");
   server.stop();
 }
 

@@ -10,7 +10,7 @@ namespace {
 
 constexpr std::uint32_t max_misses = 3;
 constexpr std::uint32_t scans_until_retry = 4;
-/// A scan that is due is put off by at most so many others while the mapper lags behind.
+/// A scan that is due is put off by at most so many others while scans wait to be mapped.
 constexpr std::uint32_t max_postponed_scans = 10;
 
 double milliseconds(std::chrono::steady_clock::duration time) {
@@ -38,10 +38,17 @@ AsyncSegmenter::AsyncSegmenter(std::unique_ptr<Segmenter> source, std::chrono::m
       rate_controller_(source_->relative_costs()) {
   report_rate();
   if (!may_skip_scans()) return;
-  thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+  worker_.emplace(
+      submitted_,
+      [this](const Scan& submitted) {
+        ScanLabels labels = segment(submitted);
+        const std::scoped_lock lock(mutex_);
+        finished_.push_back(std::move(labels));
+        busy_ = false;
+        finished_changed_.notify_all();
+      },
+      WorkerOptions{.finishes_queue = true});
 }
-
-AsyncSegmenter::~AsyncSegmenter() = default;
 
 SegmentationPipeline::Output AsyncSegmenter::submit(const Scan& scan) {
   Output output;
@@ -51,12 +58,11 @@ SegmentationPipeline::Output AsyncSegmenter::submit(const Scan& scan) {
   }
   std::unique_lock lock(mutex_);
   if (is_due()) {
-    job_ = scan;
     busy_ = true;
     scans_since_segmented_ = 0;
-    changed_.notify_all();
+    submitted_.push_dropping_oldest(scan);
     if (should_wait()) {
-      const bool in_time = changed_.wait_for(lock, budget_, [this] { return !busy_; });
+      const bool in_time = finished_changed_.wait_for(lock, budget_, [this] { return !busy_; });
       misses_ = in_time ? 0 : misses_ + 1;
     }
     output.pending = busy_;
@@ -72,24 +78,10 @@ bool AsyncSegmenter::is_due() {
          scans_since_segmented_ >= rate_controller_.every() + max_postponed_scans;
 }
 
-// A source that was late several times is too slow. But one that runs beside the odometry takes
-// longer than one that is waited for, so it gets another chance now and then.
+// A source that was late several times is too slow to wait for. But one that runs beside the
+// odometry takes longer than one that is waited for, so waiting is tried again every few scans.
 bool AsyncSegmenter::should_wait() {
   return misses_ < max_misses || ++scans_without_wait_ % scans_until_retry == 0;
-}
-
-void AsyncSegmenter::work(const std::stop_token& stop) {
-  while (true) {
-    std::unique_lock lock(mutex_);
-    if (!changed_.wait(lock, stop, [this] { return job_.has_value(); })) return;
-    const Scan scan = *std::exchange(job_, std::nullopt);
-    lock.unlock();
-    ScanLabels labels = segment(scan);
-    lock.lock();
-    finished_.push_back(std::move(labels));
-    busy_ = false;
-    changed_.notify_all();
-  }
 }
 
 ScanLabels AsyncSegmenter::segment(const Scan& scan) {
@@ -110,8 +102,8 @@ void AsyncSegmenter::record_duration(double network_ms) {
   statistics_.add_latency("network", network_ms);
   const std::scoped_lock lock(mutex_);
   const std::pair before(rate_controller_.resolution_level(), rate_controller_.every());
-  // Of the sensor, not of the scans that are offered: an overloaded server drops scans. Where every
-  // scan gets its labels, none comes too fast.
+  // The sensor's period, not that of the submitted scans: an overloaded server drops scans. Where
+  // every scan is segmented, none comes too fast.
   rate_controller_.add_measurement(network_ms, statistics_.other_stages_ms(),
                                    may_skip_scans() ? statistics_.receive_period_ms() : 0.0);
   const std::pair now(rate_controller_.resolution_level(), rate_controller_.every());

@@ -8,9 +8,14 @@
 namespace stillmap::server {
 namespace {
 
+/// Saves whose durations decide when the next one is due.
+constexpr std::size_t recent_saves = 10;
+/// The next save may take so many times the longest of them.
+constexpr double duration_margin = 1.5;
+
 constexpr const char* no_map_yet = "holds no map yet; name a file that a map was saved to";
 
-/// Opens a file that is there: open_map_file would make one that is not.
+/// Opens an existing file; open_map_file would create a missing one.
 std::unique_ptr<MapStore> open_existing(const std::filesystem::path& file) {
   std::error_code error;
   if (!std::filesystem::exists(file, error)) {
@@ -23,8 +28,8 @@ std::unique_ptr<MapStore> open_existing(const std::filesystem::path& file) {
   return open_map_file(file);
 }
 
-/// Requests come over the network: they must not choose any file of this machine, nor one of those
-/// that SQLite keeps beside the map file while it is open.
+/// Requests come over the network: they must not name any file outside the map folder, nor those
+/// that SQLite keeps beside an open map file.
 bool is_plain_name(const std::string& name) {
   const std::filesystem::path plain(name);
   const auto is_control = [](unsigned char c) { return c < ' '; };
@@ -36,20 +41,14 @@ bool is_plain_name(const std::string& name) {
 
 }  // namespace
 
-MapSaver::MapSaver(const LatestMap& latest_map, std::filesystem::path file,
+MapSaver::MapSaver(const LatestMap& latest_map, Statistics& statistics, std::filesystem::path file,
                    std::map<std::string, std::string> metadata, std::uint32_t memory_limit_mib)
     : latest_map_(latest_map),
+      statistics_(statistics),
       file_(std::move(file)),
       metadata_(std::move(metadata)),
-      memory_limit_bytes_(std::size_t{memory_limit_mib} << 20),
-      source_{
-          .take =
-              [this](bool) {
-                return RunCheckpoint{{*latest_map_.view(), {}, latest_map_.trajectory(), {}}, 0};
-              },
-          .stored = [](std::uint64_t) {},
-          .map_bytes = [] { return std::size_t{0}; }} {
-  // Opened at once: a file that cannot be used is found before the drive, not after it.
+      memory_limit_bytes_(std::size_t{memory_limit_mib} << 20) {
+  // Opened at the start, so that a file that cannot be written is noticed before mapping begins.
   if (!file_.empty()) {
     store_ = open_map_file(file_);
   } else if (memory_limit_bytes_ > 0) {
@@ -61,8 +60,8 @@ std::optional<SavedMap> MapSaver::load() {
   const std::scoped_lock lock(mutex_);
   if (file_.empty()) return std::nullopt;
   SavedMap map = read(*store_);
-  // Clients may have seen later versions than the one that is stored: versions of what follows
-  // must not be taken for those.
+  // Clients may have seen later versions than the stored one; under a new id, the versions that
+  // follow cannot be confused with those.
   if (!map.metadata.contains(map_ended_key)) map.view.map_id = new_map_id();
   store_->begin_run(map.view.map_id);
   saved_map_id_ = map.view.map_id;
@@ -78,16 +77,16 @@ std::shared_ptr<TileStore> MapSaver::tile_store() {
   return memory_limit_bytes_ > 0 ? store_->tile_store() : nullptr;
 }
 
-void MapSaver::set_source(CheckpointSource source) {
+void MapSaver::set_source(CheckpointSource& source) {
   const std::scoped_lock lock(mutex_);
-  source_ = std::move(source);
+  source_ = &source;
 }
 
 void MapSaver::save_if_changed() {
   const std::scoped_lock lock(mutex_);
   if (!store_ || is_saved()) return;
-  // A file for the run only serves to make room.
-  if (file_.empty() && source_.map_bytes() < memory_limit_bytes_ / 2) return;
+  // A temporary file is only there to make room in memory.
+  if (file_.empty() && source_->memory_use().bytes < memory_limit_bytes_ / 2) return;
   save(false);
 }
 
@@ -105,16 +104,26 @@ bool MapSaver::is_saved() const {
 }
 
 void MapSaver::save(bool has_ended) {
-  CheckpointLog::Attempt attempt(checkpoints_);
+  const auto began = std::chrono::steady_clock::now();
+  try {
+    store(has_ended);
+  } catch (...) {
+    statistics_.map_save_failed();
+    throw;
+  }
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
+  statistics_.map_saved(took.count());
+}
+
+void MapSaver::store(bool has_ended) {
   const std::uint64_t poses = latest_map_.poses_added();
   RunCheckpoint checkpoint = take(false);
-  // Of another map than the stored one, all is new.
+  // Nothing is stored yet of another map.
   if (checkpoint.map.view.map_id != saved_map_id_) checkpoint = take(true);
   if (has_ended) checkpoint.map.metadata[map_ended_key] = "yes";
   store_->save(checkpoint.map);
-  source_.stored(checkpoint.step);
+  source_->checkpoint_stored(checkpoint.step);
   remember_as_saved(checkpoint.map.view, poses);
-  attempt.stored();
 }
 
 void MapSaver::remember_as_saved(const MapSnapshot& view, std::uint64_t poses) {
@@ -161,7 +170,7 @@ std::filesystem::path MapSaver::resume_from(const std::string& name,
   map.view.map_id = new_map_id();
   replace_running(map, memory_limit_bytes_ > 0 ? store->tile_store() : nullptr);
   store->begin_run(map.view.map_id);
-  // Where another map lies, its own file says.
+  // The datum of another map is that in its own file.
   if (target != file_) metadata_.erase("datum");
   file_ = target;
   store_ = std::move(store);
@@ -171,10 +180,35 @@ std::filesystem::path MapSaver::resume_from(const std::string& name,
 }
 
 RunCheckpoint MapSaver::take(bool everything) const {
-  RunCheckpoint checkpoint = source_.take(everything);
+  RunCheckpoint checkpoint = source_->checkpoint(everything);
   checkpoint.map.metadata = metadata_;
   checkpoint.map.metadata.insert(stored_metadata_.begin(), stored_metadata_.end());
   return checkpoint;
+}
+
+std::chrono::duration<double> due_after_begin(std::chrono::duration<double> period,
+                                              std::chrono::duration<double> longest) {
+  return std::max(period - duration_margin * longest, 0.5 * period);
+}
+
+CheckpointWorker::CheckpointWorker(std::chrono::duration<double> period, std::function<void()> save,
+                                   MonotonicClock& clock)
+    : period_(period),
+      save_(std::move(save)),
+      clock_(clock),
+      worker_([this](const std::stop_token&) { return save_and_schedule(); }, clock) {}
+
+MonotonicClock::TimePoint CheckpointWorker::save_and_schedule() {
+  const auto began = clock_.now();
+  try {
+    save_();
+  } catch (const MapFileError& error) {
+    throttled_log_.error("save", std::string("the map was not saved: ") + error.what());
+  }
+  durations_.emplace_back(clock_.now() - began);
+  if (durations_.size() > recent_saves) durations_.pop_front();
+  const auto due = due_after_begin(period_, *std::ranges::max_element(durations_));
+  return began + std::chrono::duration_cast<std::chrono::steady_clock::duration>(due);
 }
 
 }  // namespace stillmap::server

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <chrono>
 #include <cstdint>
+#include <deque>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -10,25 +12,29 @@
 #include <string>
 
 #include "core/map/storage/map_file.hpp"
-#include "server/monitoring/checkpoint_log.hpp"
+#include "server/monitoring/log.hpp"
+#include "server/monitoring/statistics.hpp"
 #include "server/publishers/latest_map.hpp"
+#include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
 
 /// A state of map and path to be stored.
 struct RunCheckpoint {
   SavedMap map;
-  /// How far the map goes; told back when it is stored.
+  /// Number of the checkpoint, for `checkpoint_stored`.
   std::uint64_t step = 0;
 };
 
-/// Who maps, as the saver sees it.
-struct CheckpointSource {
-  /// What changed since what was stored last, or everything.
-  std::function<RunCheckpoint(bool everything)> take;
-  std::function<void(std::uint64_t step)> stored;
-  /// What the static map takes in memory.
-  std::function<std::size_t()> map_bytes;
+/// The running map, as the saver sees it.
+class CheckpointSource {
+ public:
+  virtual ~CheckpointSource() = default;
+  /// What changed since the last stored checkpoint, or everything, and the path up to it.
+  [[nodiscard]] virtual RunCheckpoint checkpoint(bool everything) = 0;
+  /// Everything up to this checkpoint is stored: far tiles may be evicted.
+  virtual void checkpoint_stored(std::uint64_t step) = 0;
+  [[nodiscard]] virtual MemoryUse memory_use() = 0;
 };
 
 /// Writes the map to its file, and with a memory limit keeps there what is not in memory.
@@ -39,21 +45,23 @@ class MapSaver {
       std::function<void(const SavedMap& map, const std::shared_ptr<TileStore>& tile_store)>;
 
   /// `file`, the current one to begin with, may be empty: then only named files can be saved, and
-  /// tiles that do not fit into memory go to a file for the run. `metadata` goes into every file.
-  /// Until `set_source` is called, the latest map is what is saved. Throws MapFileError.
-  MapSaver(const LatestMap& latest_map, std::filesystem::path file,
+  /// tiles that do not fit into memory go to a temporary file. `metadata` goes into every file.
+  /// Throws MapFileError.
+  MapSaver(const LatestMap& latest_map, Statistics& statistics, std::filesystem::path file,
            std::map<std::string, std::string> metadata, std::uint32_t memory_limit_mib = 0);
 
-  /// What the file held, for mapping to go on from; nothing when there is no file. With a memory
+  /// What the file holds, for mapping to resume from; nothing when there is no file. With a memory
   /// limit, its tiles are non-resident. The map has a new id unless it was saved when its last run
   /// ended. Throws MapFileError.
   [[nodiscard]] std::optional<SavedMap> load();
-  /// Where tiles that are non-resident come from; null without a memory limit.
+  /// Backing store of tiles that are evicted from memory; null without a memory limit.
   [[nodiscard]] std::shared_ptr<TileStore> tile_store();
-  void set_source(CheckpointSource source);
+
+  /// Saves come from there; called once, before any of them. `source` must outlive the last.
+  void set_source(CheckpointSource& source);
 
   /// Saves to the current file, if there is one and scans were mapped since the last save; without
-  /// one, what is to leave memory. Throws MapFileError.
+  /// one, to the temporary file when memory is running out. Throws MapFileError.
   void save_if_changed();
   /// The same when the run has ended.
   void save_at_end();
@@ -63,19 +71,18 @@ class MapSaver {
   std::filesystem::path save_as(const std::string& name);
 
   /// Makes `name` the current file: reads the map there, saves the running map to its own file, and
-  /// hands the other one, under a new id, to `replace_running`, which publishes it. An
-  /// empty or the current name goes back to the last save. Throws as save_as, also for a file that
-  /// is not there or holds no map, and what `replace_running` throws; the current file is then the
-  /// one that it was.
+  /// hands the other one, under a new id, to `replace_running`, which publishes it. An empty name
+  /// or that of the current file returns to the last save. Throws as save_as, also for a file that
+  /// does not exist or holds no map, and what `replace_running` throws; the current file stays the
+  /// same then.
   std::filesystem::path resume_from(const std::string& name, const ReplaceRunning& replace_running);
-
-  /// Saves to the current file so far.
-  [[nodiscard]] CheckpointLog::Record checkpoints() const { return checkpoints_.record(); }
 
  private:
   [[nodiscard]] SavedMap read(MapStore& store) const;
   [[nodiscard]] bool is_saved() const;
+  /// Counts the save and times it.
   void save(bool has_ended);
+  void store(bool has_ended);
   [[nodiscard]] RunCheckpoint take(bool everything) const;
   /// Throws std::invalid_argument.
   [[nodiscard]] std::filesystem::path file_named(const std::string& name) const;
@@ -84,17 +91,42 @@ class MapSaver {
   void remember_metadata(const SavedMap& map);
 
   const LatestMap& latest_map_;
+  Statistics& statistics_;
   std::filesystem::path file_;
   std::map<std::string, std::string> metadata_;
   std::map<std::string, std::string> stored_metadata_;
   std::size_t memory_limit_bytes_;
-  CheckpointSource source_;
-  CheckpointLog checkpoints_;
+  CheckpointSource* source_ = nullptr;
   std::mutex mutex_;
   std::unique_ptr<MapStore> store_;
   std::uint64_t saved_map_id_ = 0;
   std::uint64_t saved_version_ = 0;
   std::uint64_t saved_poses_ = 0;
+};
+
+/// How long after the begin of a save the next one is due: the next one is to have ended `period`
+/// after this one began, so that a killed server loses no more than that. `longest` is the longest
+/// of the last saves. At least half of the period.
+[[nodiscard]] std::chrono::duration<double> due_after_begin(std::chrono::duration<double> period,
+                                                            std::chrono::duration<double> longest);
+
+/// Calls `save` again and again on a thread of its own until destroyed. Logs the MapFileErrors that
+/// it throws.
+class CheckpointWorker {
+ public:
+  CheckpointWorker(std::chrono::duration<double> period, std::function<void()> save,
+                   MonotonicClock& clock = MonotonicClock::steady());
+
+ private:
+  [[nodiscard]] MonotonicClock::TimePoint save_and_schedule();
+
+  std::chrono::duration<double> period_;
+  std::function<void()> save_;
+  MonotonicClock& clock_;
+  std::deque<std::chrono::duration<double>> durations_;
+  ThrottledLog throttled_log_;
+  // Last: stops before what it uses is gone.
+  PeriodicWorker worker_;
 };
 
 }  // namespace stillmap::server

@@ -13,7 +13,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-// How long a request, or the last view of a drive, may wait while no scan comes.
+// How long a request, or the snapshot after the last scan, may wait while no scan comes.
 constexpr std::chrono::milliseconds idle_period{50};
 
 double milliseconds(Clock::duration time) {
@@ -22,14 +22,14 @@ double milliseconds(Clock::duration time) {
 
 constexpr std::size_t no_limit = std::numeric_limits<std::size_t>::max();
 
-// The rest is for copies: in the writers' histories, and for queries.
+// The rest of the limit is for copies: in the writers' histories, and for queries.
 std::size_t map_share_bytes(const MapFileConfig& config) {
   if (config.memory_limit_mib == 0) return no_limit;
   return (std::size_t{config.memory_limit_mib} << 20) / 4 * 3;
 }
 
-// Where a scan is expected in a map that was loaded: where the robot was at that time, if it is a
-// recording played again, else where it stood last. Nothing without a stored path.
+// Expected pose of the first scan in a map that was loaded: the stored pose of its time, when a
+// recording is played again, else the last one. Nothing without a stored path.
 std::optional<Eigen::Isometry3d> pose_in_saved_map(const Trajectory& stored,
                                                    std::int64_t stamp_ns) {
   if (stored.empty()) return std::nullopt;
@@ -66,7 +66,14 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
     mapper_.reset(new_map_id());
     begin_map({});
   }
-  thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+  worker_.emplace(
+      queue_,
+      [this](QueuedScan queued) {
+        // Before the requests: its pose is urgent.
+        map(std::move(queued));
+        end_round(false);
+      },
+      WorkerOptions{.on_idle = [this] { end_round(true); }, .idle_period = idle_period});
 }
 
 std::uint64_t MappingThread::reset() {
@@ -82,13 +89,13 @@ std::uint64_t MappingThread::reset() {
 void MappingThread::load(const SavedMap& stored, const std::shared_ptr<TileStore>& tile_store) {
   run_between_scans([&] {
     resume(stored, tile_store);
-    spdlog::info("loaded: going on with {} tiles as map {}", stored.view.tiles.size(),
+    spdlog::info("loaded: resuming with {} tiles as map {}", stored.view.tiles.size(),
                  stored.view.map_id);
   });
 }
 
 void MappingThread::resume(const SavedMap& stored, const std::shared_ptr<TileStore>& tile_store) {
-  // First what may refuse the map.
+  // First: it throws for a map that does not fit.
   mapper_.resume(stored.view, stored.tile_evidence);
   const Trajectory& path = stored.trajectory;
   const Eigen::Vector3d last_map =
@@ -108,7 +115,9 @@ void MappingThread::publish_now() {
 }
 
 void MappingThread::stop() {
-  thread_ = {};
+  if (!worker_) return;
+  worker_.reset();
+  publish_snapshot();
   const std::scoped_lock lock(requests_mutex_);
   has_stopped_ = true;
   for (std::packaged_task<void()>& task : std::exchange(requests_, {})) task();
@@ -168,17 +177,9 @@ void MappingThread::run_between_scans(std::function<void()> action) {
   done.get();
 }
 
-void MappingThread::work(const std::stop_token& stop) {
-  while (!stop.stop_requested()) {
-    auto queued = queue_.pop(stop, idle_period);
-    const bool idle = !queued;
-    if (queued) map(*std::move(queued));
-    // Afterwards: the scan's pose is waited for.
-    run_requests();
-    if (idle || Clock::now() - snapshot_published_ >= publish_period_) publish_snapshot();
-  }
-  publish_snapshot();
+void MappingThread::end_round(bool is_idle) {
   run_requests();
+  if (is_idle || Clock::now() - snapshot_published_ >= publish_period_) publish_snapshot();
 }
 
 void MappingThread::map(QueuedScan queued) {

@@ -6,22 +6,21 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "config/loaders/server_config.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/mapper.hpp"
-#include "server/mapping/background_throttle.hpp"
 #include "server/mapping/map_saver.hpp"
 #include "server/mapping/odometry_prior.hpp"
 #include "server/mapping/scan_queue.hpp"
+#include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
-#include "server/monitoring/throttled_log.hpp"
 #include "server/occupancy/occupancy_thread.hpp"
-#include "server/publishers/labelled_scan_publisher.hpp"
 #include "server/publishers/latest_map.hpp"
-#include "server/publishers/pose_publisher.hpp"
+#include "server/publishers/scan_publishers.hpp"
+#include "server/threads/background_throttle.hpp"
+#include "server/threads/worker.hpp"
 
 namespace stillmap::server {
 
@@ -34,59 +33,59 @@ struct MappingOutputs {
   BackgroundThrottle* throttle = nullptr;
 };
 
-/// The one thread that maps: takes scans from the queue, runs the mapper, and publishes what
-/// became of them as the latest map.
-class MappingThread {
+/// The one thread that maps: takes scans from the queue, runs the mapper, and publishes the result
+/// as the latest map. Its other functions wait for the scan in work.
+class MappingThread : public CheckpointSource {
  public:
-  /// Throws std::invalid_argument for a mapper configuration with faults. Goes on with `stored`
-  /// when there is one: its map is extended, and the first scan is expected where it ended. Tiles
-  /// that are non-resident come from `tile_store`, to which they may go when it is not null.
+  /// Resumes `stored` when there is one: its map is extended, and the first scan is expected where
+  /// its path ended. Evicted tiles go to `tile_store` and are reloaded from there; when it is null,
+  /// none are evicted. Throws std::invalid_argument for a mapper configuration with faults.
   MappingThread(const ServerConfig& config, std::unique_ptr<Segmenter> label_source,
                 const std::optional<SavedMap>& stored, const std::shared_ptr<TileStore>& tile_store,
                 ScanQueue& queue, Statistics& statistics, LatestMap& latest_map,
                 const MappingOutputs& outputs);
+  ~MappingThread() override { stop(); }
 
-  /// Maps no more. What follows is done in the caller's thread.
+  /// Ends after the scan in work. Later calls of the other functions run in the caller's thread.
   void stop();
 
-  /// Forgets poses and map, after the scan in work; returns the id of the new map.
+  /// Drops poses and map; returns the id of the new map.
   [[nodiscard]] std::uint64_t reset();
-  /// Goes on with this map, after the scan in work: the next scan is expected where its path ended.
-  /// Tiles that are non-resident come from `tile_store`. Throws std::invalid_argument when its
-  /// voxels or tiles are not of the configured size; then nothing changed.
+  /// Resumes this map: the next scan is expected where its path ended. Its non-resident tiles are
+  /// reloaded from `tile_store`. Throws std::invalid_argument when its voxels or tiles are not of
+  /// the configured size; then nothing changed.
   void load(const SavedMap& stored, const std::shared_ptr<TileStore>& tile_store);
   /// Publishes what was mapped so far, the scan in work included.
   void publish_now();
 
-  /// What changed since what was stored last, or everything, and the path to it; it is also
-  /// published as the latest map.
-  [[nodiscard]] RunCheckpoint checkpoint(bool everything);
-  /// Everything up to this step of a checkpoint is stored: far tiles may leave memory.
-  void checkpoint_stored(std::uint64_t step);
-  [[nodiscard]] MemoryUse memory_use();
+  /// It is also published as the latest map.
+  [[nodiscard]] RunCheckpoint checkpoint(bool everything) override;
+  void checkpoint_stored(std::uint64_t step) override;
+  [[nodiscard]] MemoryUse memory_use() override;
 
-  /// As StaticMap has them.
+  /// As in StaticMap.
   [[nodiscard]] std::vector<RemovedVoxel> removed(const Eigen::AlignedBox3d& box_map);
   std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map);
 
  private:
-  void work(const std::stop_token& stop);
   void map(QueuedScan queued);
-  /// Shows a new map, and has the octree begin with it.
+  /// Runs the requests, and publishes the map when that is due.
+  void end_round(bool is_idle);
+  /// Publishes a new map, and starts a new octree from it.
   void begin_map(Trajectory trajectory);
   void forward(MappedScan mapped);
   void stage_ended(std::string_view stage);
-  /// At once, before the map takes the scan: clients wait for it.
+  /// Publishes the pose before the scan is inserted into the map, to keep the latency of poses low.
   void pose_found(std::int64_t stamp_ns, const OdometryResult& odometry);
-  /// In the thread that maps.
+  /// To be called in the thread that maps.
   void resume(const SavedMap& stored, const std::shared_ptr<TileStore>& tile_store);
   [[nodiscard]] std::optional<Eigen::Isometry3d> prior_for(std::int64_t stamp_ns) const;
   void publish_snapshot();
-  /// Runs it in the thread that maps, after the scan in work, and waits for that.
+  /// Runs `action` in the thread that maps, after the scan in work, and waits for its end.
   void run_between_scans(std::function<void()> action);
   void run_requests();
 
-  /// For what the map itself takes.
+  /// Limit of the memory that the static map takes.
   std::size_t map_limit_bytes_;
   std::string lidar_frame_;
   std::chrono::duration<double> publish_period_;
@@ -106,7 +105,7 @@ class MappingThread {
   bool has_stopped_ = false;
   std::vector<std::packaged_task<void()>> requests_;
   // Last: stops before what it uses is gone.
-  std::jthread thread_;
+  std::optional<Worker<QueuedScan>> worker_;
 };
 
 }  // namespace stillmap::server

@@ -51,7 +51,13 @@ std::optional<Eigen::Isometry3d> PoseBuffer::motion(std::int64_t from_ns,
 OdometryPrior::OdometryPrior(dds::Participant& participant, const std::string& ros_topic)
     : reader_(participant, dds::odometry_prior_topic(ros_topic).dds_name,
               dds::odometry_prior_topic(ros_topic).reader),
-      thread_([this](const std::stop_token& stop) { receive(stop); }) {}
+      worker_(std::chrono::seconds(0),
+              [this, message = nav_msgs::msg::Odometry()](const std::stop_token& stop) mutable {
+                if (!reader_.take(message, stop, std::chrono::seconds(1))) return;
+                const auto odometry = wire::from_odometry(message);
+                const std::scoped_lock lock(mutex_);
+                if (odometry) poses_.add(odometry->pose);
+              }) {}
 
 std::optional<Eigen::Isometry3d> OdometryPrior::predict(const StampedPose& last,
                                                         std::int64_t stamp_ns) const {
@@ -59,16 +65,6 @@ std::optional<Eigen::Isometry3d> OdometryPrior::predict(const StampedPose& last,
   const auto T_last_now = poses_.motion(last.stamp_ns, stamp_ns);
   if (!T_last_now) return std::nullopt;
   return last.T_map_lidar * *T_last_now;
-}
-
-void OdometryPrior::receive(const std::stop_token& stop) {
-  nav_msgs::msg::Odometry message;
-  while (!stop.stop_requested()) {
-    if (!reader_.take(message, stop, std::chrono::seconds(1))) continue;
-    const auto odometry = wire::from_odometry(message);
-    const std::scoped_lock lock(mutex_);
-    if (odometry) poses_.add(odometry->pose);
-  }
 }
 
 }  // namespace stillmap::server

@@ -4,11 +4,11 @@
 #include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 
 #include "core/lidar/trajectory.hpp"
 #include "idl/dds/reader.hpp"
 #include "nav_msgs.h"
+#include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
 
@@ -30,24 +30,22 @@ class PoseBuffer {
   std::deque<StampedPose> poses_;
 };
 
-/// Listens to the odometry prior.
+/// Receives the odometry prior, and predicts the poses of scans from it.
 class OdometryPrior {
  public:
   OdometryPrior(dds::Participant& participant, const std::string& ros_topic);
 
   /// Where a scan at `stamp_ns` should be, given where the last one was; nothing when the prior
-  /// does not know.
+  /// does not cover both times.
   [[nodiscard]] std::optional<Eigen::Isometry3d> predict(const StampedPose& last,
                                                          std::int64_t stamp_ns) const;
 
  private:
-  void receive(const std::stop_token& stop);
-
   mutable std::mutex mutex_;
   PoseBuffer poses_;
   dds::Reader<nav_msgs::msg::Odometry> reader_;
   // Last: stops before what it uses is gone.
-  std::jthread thread_;
+  PeriodicWorker worker_;
 };
 
 }  // namespace stillmap::server

@@ -28,7 +28,7 @@ wire::CloudReadOptions reading_of(const ServerConfig& config) {
           .labels_are_classes = config.input.label_kind == LabelKind::classes};
 }
 
-// By this machine's clock; a stamp that cannot be read is as good as now.
+// By this machine's clock; 0 for a stamp that is not a time.
 double seconds_since(const builtin_interfaces::msg::Time& stamp) {
   const auto now = std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch());
   const std::int64_t stamp_ns = wire::stamp_ns(stamp).value_or(now.count());
@@ -47,14 +47,10 @@ ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& co
       queue_(queue),
       statistics_(statistics),
       reader_(participant, topic_, points_of(config).reader),
-      thread_([this](const std::stop_token& stop) { receive(stop); }) {}
-
-void ScanReceiver::receive(const std::stop_token& stop) {
-  sensor_msgs::msg::PointCloud2 cloud;
-  while (!stop.stop_requested()) {
-    if (reader_.take(cloud, stop, std::chrono::seconds(1))) accept(cloud, stop);
-  }
-}
+      worker_(std::chrono::seconds(0),
+              [this, cloud = sensor_msgs::msg::PointCloud2()](const std::stop_token& stop) mutable {
+                if (reader_.take(cloud, stop, std::chrono::seconds(1))) accept(cloud, stop);
+              }) {}
 
 void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop) {
   const auto received = std::chrono::steady_clock::now();
@@ -83,7 +79,7 @@ void ScanReceiver::report(const std::string& cloud_changes, const Scan& scan) {
   if (!due && cloud_changes.empty()) return;
   const std::string misfit = sensor_mismatch(scan, sensor_);
   if (misfit.empty()) return;
-  statistics_.count("scans_of_another_sensor");
+  statistics_.count("sensor_mismatch");
   throttled_log_.warn("sensor",
                       misfit +
                           ": set 'sensor' in the configuration ('stillmap dataset sensor' "

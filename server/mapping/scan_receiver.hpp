@@ -2,7 +2,6 @@
 
 #include <stop_token>
 #include <string>
-#include <thread>
 
 #include "config/loaders/server_config.hpp"
 #include "core/lidar/sensor_model.hpp"
@@ -10,8 +9,9 @@
 #include "idl/dds/reader.hpp"
 #include "sensor_msgs.h"
 #include "server/mapping/scan_queue.hpp"
+#include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
-#include "server/monitoring/throttled_log.hpp"
+#include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
 
@@ -21,13 +21,12 @@ class ScanReceiver {
   ScanReceiver(dds::Participant& participant, const ServerConfig& config, ScanQueue& queue,
                Statistics& statistics);
 
-  /// Why no scan arrives, seen from here; empty when scans do arrive.
+  /// Why no scan has arrived yet; empty once one has.
   [[nodiscard]] std::string no_input_reason() const;
 
  private:
-  void receive(const std::stop_token& stop);
   void accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop);
-  /// Tells what is new about the clouds, and now and then whether they can be the sensor's.
+  /// Logs changes of the cloud's layout, and now and then checks that scans fit the sensor model.
   void report(const std::string& cloud_changes, const Scan& scan);
   void drop(const std::string& reason, std::size_t count, const std::string& detail);
 
@@ -42,7 +41,7 @@ class ScanReceiver {
   ThrottledLog throttled_log_;
   dds::Reader<sensor_msgs::msg::PointCloud2> reader_;
   // Last: stops before what it uses is gone.
-  std::jthread thread_;
+  PeriodicWorker worker_;
 };
 
 }  // namespace stillmap::server

@@ -6,20 +6,20 @@
 namespace stillmap::server {
 namespace {
 
-/// The rate slows when the network takes more than the room in its n periods by this much: scans do
-/// not come to the millisecond.
+/// The rate falls when the network takes this many times the time in its n periods: scans do not
+/// come to the millisecond.
 constexpr double late_share = 1.05;
-/// It quickens to one at which the network would need no more than this share of the room.
+/// It rises to one at which the network would need at most this share of the time.
 constexpr double spare_share = 0.85;
-/// The first run of all takes longer than the others: memory and threads are new.
+/// The very first runs take longer than the others: memory and threads are new.
 constexpr std::size_t min_runs = 3;
 constexpr double max_every = 1000.0;
 /// A minute of a usual sensor's scans.
 constexpr int max_patience = 600;
-/// Even where all else fills the period, the network gets this share of it.
+/// Even where other work fills the period, the network gets this share of it.
 constexpr double min_room_share = 0.1;
 
-/// How many rooms of this length hold so much.
+/// How many periods with `room_ms` each hold `ms`.
 std::uint32_t periods(double ms, double room_ms) {
   return static_cast<std::uint32_t>(std::clamp(std::ceil(ms / room_ms), 1.0, max_every));
 }
@@ -39,7 +39,7 @@ void SegmentationRateController::add_measurement(double network_ms, double other
     change_to(first_within(late_share, room_ms));
   } else {
     Rate faster = std::min(rate_, first_within(spare_share, room_ms));
-    // Where a closer look at every scan would fit, this one at every scan does.
+    // Where a finer resolution would fit for every scan, the present one does.
     if (faster.resolution_level < rate_.resolution_level && runs_ < patience_) {
       faster = {.resolution_level = rate_.resolution_level, .every = 1};
     }

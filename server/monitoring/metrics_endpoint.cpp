@@ -2,25 +2,26 @@
 
 #include <prometheus/collectable.h>
 #include <prometheus/exposer.h>
-#include <prometheus/metric_family.h>
 
 #include <stdexcept>
 #include <utility>
 
-#include "server/monitoring/metric_families.hpp"
+#include "server/monitoring/metrics.hpp"
 
 namespace stillmap::server {
 
 class MetricsEndpoint::Exposed : public prometheus::Collectable {
  public:
-  explicit Exposed(std::function<MetricsSnapshot()> take) : take_(std::move(take)) {}
+  Exposed(Metrics& metrics, std::function<dds::ServerStatus()> status)
+      : metrics_(metrics), status_(std::move(status)) {}
 
   [[nodiscard]] std::vector<prometheus::MetricFamily> Collect() const override {
-    return metric_families(take_());
+    return metrics_.collect(status_());
   }
 
  private:
-  std::function<MetricsSnapshot()> take_;
+  Metrics& metrics_;
+  std::function<dds::ServerStatus()> status_;
 };
 
 class MetricsListener {
@@ -47,8 +48,10 @@ std::unique_ptr<MetricsListener> listen_at(const std::string& address) {
 
 }  // namespace
 
-MetricsEndpoint::MetricsEndpoint(const std::string& address, std::function<MetricsSnapshot()> take)
-    : exposed_(std::make_shared<Exposed>(std::move(take))), listener_(listen_at(address)) {
+MetricsEndpoint::MetricsEndpoint(const std::string& address, Metrics& metrics,
+                                 std::function<dds::ServerStatus()> status)
+    : exposed_(std::make_shared<Exposed>(metrics, std::move(status))),
+      listener_(listen_at(address)) {
   listener_->exposer().RegisterCollectable(exposed_);
   const std::string host = address.substr(0, address.rfind(':'));
   address_ = host + ":" + std::to_string(listener_->exposer().GetListeningPorts().at(0));

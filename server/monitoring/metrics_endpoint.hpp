@@ -4,16 +4,19 @@
 #include <memory>
 #include <string>
 
-#include "server/monitoring/metrics_snapshot.hpp"
+#include "idl/interface/server_status.hpp"
 
 namespace stillmap::server {
 
-/// Answers Prometheus over HTTP at /metrics, from its own threads.
+class Metrics;
+
+/// Answers Prometheus over HTTP at /metrics, from its own threads, until destroyed.
 class MetricsEndpoint {
  public:
-  /// `take` is called for every request, also by several threads. Throws std::runtime_error that
+  /// `status` is called for every request, also by several threads. Throws std::runtime_error that
   /// names the address when it cannot be listened on.
-  MetricsEndpoint(const std::string& address, std::function<MetricsSnapshot()> take);
+  MetricsEndpoint(const std::string& address, Metrics& metrics,
+                  std::function<dds::ServerStatus()> status);
   ~MetricsEndpoint();
 
   /// Where it listens, with the port that was free for port 0.

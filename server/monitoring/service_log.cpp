@@ -2,21 +2,14 @@
 
 #include <spdlog/spdlog.h>
 
+#include "server/monitoring/metrics.hpp"
+
 namespace stillmap::server {
 
 void ServiceLog::answered(const std::string& service, wire::ReplyCode code, double seconds) {
-  {
-    const std::scoped_lock lock(mutex_);
-    Service& entry = services_[service];
-    ++entry.answers[code];
-    entry.times.add(seconds);
-  }
+  metrics_.service_requests.Add({{"service", service}, {"code", name(code)}}).Increment();
+  Metrics::add_durations(metrics_.service_durations, {{"service", service}}).Observe(seconds);
   spdlog::debug("{}: {} in {:.1f} ms", service, name(code), 1000.0 * seconds);
-}
-
-std::map<std::string, ServiceLog::Service> ServiceLog::services() const {
-  const std::scoped_lock lock(mutex_);
-  return services_;
 }
 
 const char* name(wire::ReplyCode code) {

@@ -1,40 +1,32 @@
 #pragma once
 
 #include <chrono>
-#include <cstdint>
-#include <map>
-#include <mutex>
 #include <string>
 #include <utility>
-#include <vector>
 
 #include "idl/conversions/map_query.hpp"
-#include "server/monitoring/duration_histogram.hpp"
 
 namespace stillmap::server {
 
-/// What was asked of the server, and with what success. Thread-safe.
+class Metrics;
+
+/// Counts and times the answers of each service. Thread-safe.
 class ServiceLog {
  public:
+  /// `metrics` must outlive it.
+  explicit ServiceLog(Metrics& metrics) : metrics_(metrics) {}
+
+  /// `service`: its ROS 2 name.
   void answered(const std::string& service, wire::ReplyCode code, double seconds);
 
-  struct Service {
-    /// By the answer's code.
-    std::map<wire::ReplyCode, std::uint64_t> answers;
-    DurationHistogram times;
-  };
-  /// By the service's ROS 2 name.
-  [[nodiscard]] std::map<std::string, Service> services() const;
-
  private:
-  mutable std::mutex mutex_;
-  std::map<std::string, Service> services_;
+  Metrics& metrics_;
 };
 
 /// "ok", "invalid_request", ...
 [[nodiscard]] const char* name(wire::ReplyCode code);
 
-/// What a reply says of itself; the standard types say nothing, and their answers are taken for ok.
+/// The code in a reply's status; replies of standard types have none and count as ok.
 template <typename Reply>
 [[nodiscard]] wire::ReplyCode code_of(const Reply& reply) {
   if constexpr (requires { reply.status().code(); }) {

@@ -1,44 +1,33 @@
 #include "server/monitoring/statistics.hpp"
 
 #include <algorithm>
+#include <chrono>
+
+#include "server/monitoring/metrics.hpp"
 
 namespace stillmap::server {
 namespace {
 
-constexpr std::chrono::seconds rate_window{5};
-constexpr std::size_t label_provenance_window = 100;
+std::uint64_t whole(double value) { return static_cast<std::uint64_t>(value); }
+
+/// The counter of this name, which becomes a member of the family when it first occurs.
+prometheus::Counter& member(std::vector<std::pair<std::string, prometheus::Counter*>>& known,
+                            Metrics::Counters& family, const char* label, const std::string& name) {
+  using Entry = std::pair<std::string, prometheus::Counter*>;
+  const auto found = std::ranges::find(known, name, &Entry::first);
+  if (found != known.end()) return *found->second;
+  return *known.emplace_back(name, &family.Add({{label, name}})).second;
+}
 
 }  // namespace
 
-void RateWindow::add(Clock::time_point event) {
-  events_.push_back(event);
-  while (event - events_.front() > rate_window) events_.pop_front();
-}
+Statistics::Statistics() : metrics_(std::make_unique<Metrics>()) {}
 
-double RateWindow::rate_hz(Clock::time_point now) const {
-  const auto is_recent = [&](Clock::time_point event) { return now - event <= rate_window; };
-  const auto first = std::ranges::find_if(events_, is_recent);
-  const auto count = static_cast<double>(events_.end() - first);
-  if (count < 2) return count / std::chrono::duration<double>(rate_window).count();
-  // Between the events, so that the rate is right from the second scan on.
-  const double span_s = std::chrono::duration<double>(now - *first).count();
-  return count / std::max(span_s, 1e-3);
-}
-
-void LabelProvenanceWindow::add(LabelProvenance label_provenance) {
-  last_.push_back(label_provenance);
-  if (last_.size() > label_provenance_window) last_.pop_front();
-}
-
-double LabelProvenanceWindow::share(LabelProvenance label_provenance) const {
-  if (last_.empty()) return 0.0;
-  return static_cast<double>(std::ranges::count(last_, label_provenance)) /
-         static_cast<double>(last_.size());
-}
+Statistics::~Statistics() = default;
 
 void Statistics::scan_received() {
   const std::scoped_lock lock(mutex_);
-  ++received_;
+  metrics_->scans_received.Increment();
   received_rate_.add(RateWindow::Clock::now());
 }
 
@@ -50,20 +39,20 @@ void Statistics::record_scan_header(const std::string& frame, double delay_s) {
 
 void Statistics::scan_mapped(LabelProvenance label_provenance) {
   const std::scoped_lock lock(mutex_);
+  metrics_->scans_mapped.Increment();
   label_provenances_.add(label_provenance);
-  ++mapped_;
   mapped_rate_.add(RateWindow::Clock::now());
   last_drop_.clear();
 }
 
-void Statistics::set_segmentation_status(const dds::SegmentationStatus& pace) {
+void Statistics::set_segmentation_status(const dds::SegmentationStatus& segmentation) {
   const std::scoped_lock lock(mutex_);
-  segmentation_ = pace;
+  segmentation_ = segmentation;
 }
 
 void Statistics::segmentation_failed(const std::string& detail) {
   const std::scoped_lock lock(mutex_);
-  ++segmentation_failures_;
+  metrics_->label_failures.Increment();
   last_segmentation_failure_ = detail;
 }
 
@@ -75,28 +64,24 @@ void Statistics::segmentation_succeeded() {
 void Statistics::scans_dropped(const std::string& reason, std::size_t count,
                                const std::string& detail) {
   const std::scoped_lock lock(mutex_);
-  const std::string name = "dropped_" + reason;
-  const auto known = std::ranges::find(dropped_, name, &dds::NamedCounter::name);
-  dds::NamedCounter& counter =
-      known == dropped_.end() ? dropped_.emplace_back(dds::NamedCounter{.name = name}) : *known;
-  counter.value += count;
+  member(dropped_, metrics_->scans_dropped, "reason", reason).Increment(static_cast<double>(count));
   last_drop_ = detail;
 }
 
 void Statistics::count(const std::string& event) {
   const std::scoped_lock lock(mutex_);
-  const auto known = std::ranges::find(events_, event, &dds::NamedCounter::name);
-  (known == events_.end() ? events_.emplace_back(dds::NamedCounter{.name = event}) : *known)
-      .value += 1;
+  member(events_, metrics_->events, "event", event).Increment();
 }
 
 void Statistics::add_latency(const std::string& stage, double milliseconds) {
   const std::scoped_lock lock(mutex_);
-  const auto known = std::ranges::find(stages_, stage, &StageStatistics::stage);
-  StageStatistics& times =
-      known == stages_.end() ? stages_.emplace_back(StageStatistics{stage, {}, {}}) : *known;
-  times.recent.add(milliseconds);
-  times.all.add(milliseconds / 1000.0);
+  auto known = std::ranges::find(stages_, stage, &Stage::name);
+  if (known == stages_.end()) {
+    auto& all = Metrics::add_durations(metrics_->stage_durations, {{"stage", stage}});
+    known = stages_.insert(known, Stage{stage, {}, &all});
+  }
+  known->recent.add(milliseconds);
+  known->all->Observe(milliseconds / 1000.0);
 }
 
 void Statistics::record_other_stages(double milliseconds) {
@@ -104,10 +89,42 @@ void Statistics::record_other_stages(double milliseconds) {
   other_stages_ms_.add(milliseconds);
 }
 
+void Statistics::map_saved(double seconds) {
+  metrics_->checkpoint_durations.Observe(seconds);
+  const auto now = std::chrono::system_clock::now().time_since_epoch();
+  metrics_->last_checkpoint.Set(std::chrono::duration<double>(now).count());
+}
+
+void Statistics::map_save_failed() { metrics_->checkpoint_failures.Increment(); }
+
 void Statistics::set_map_memory(const MemoryUse& memory, std::size_t unreadable_tiles) {
-  const std::scoped_lock lock(mutex_);
-  map_memory_ = memory;
-  unreadable_tiles_ = unreadable_tiles;
+  metrics_->map_memory_bytes.Set(static_cast<double>(memory.bytes));
+  metrics_->map_tiles_evicted.Set(static_cast<double>(memory.non_resident_tiles));
+  metrics_->map_tiles_unreadable.Set(static_cast<double>(unreadable_tiles));
+}
+
+std::vector<dds::NamedCounter> Statistics::counters() const {
+  const Metrics& metrics = *metrics_;
+  std::vector<dds::NamedCounter> all{
+      {.name = "scans_received", .value = whole(metrics.scans_received.Value())},
+      {.name = "scans_mapped", .value = whole(metrics.scans_mapped.Value())}};
+  const auto add = [&](const std::string& name, double value) {
+    all.push_back({.name = name, .value = whole(value)});
+  };
+  if (const double bytes = metrics.map_memory_bytes.Value(); bytes > 0.0) {
+    add("map_memory_kib", bytes / 1024.0);
+    add("map_tiles_evicted", metrics.map_tiles_evicted.Value());
+  }
+  if (const double tiles = metrics.map_tiles_unreadable.Value(); tiles > 0.0) {
+    add("map_tiles_unreadable", tiles);
+  }
+  if (const double failures = metrics.label_failures.Value(); failures > 0.0) {
+    add("label_failures", failures);
+  }
+  // On the wire, all counters share one list.
+  for (const auto& [reason, counter] : dropped_) add("dropped_" + reason, counter->Value());
+  for (const auto& [event, counter] : events_) add(event, counter->Value());
+  return all;
 }
 
 void Statistics::report_to(dds::ServerStatus& status) const {
@@ -117,44 +134,16 @@ void Statistics::report_to(dds::ServerStatus& status) const {
   status.mapped_hz = mapped_rate_.rate_hz(now);
   status.scan_frame = scan_frame_;
   status.scan_delay_s = scan_delay_s_;
-  status.counters = {{.name = "scans_received", .value = received_},
-                     {.name = "scans_mapped", .value = mapped_}};
-  if (map_memory_.bytes > 0) {
-    status.counters.push_back({.name = "map_memory_kib", .value = map_memory_.bytes >> 10});
-    status.counters.push_back({.name = "map_tiles_away", .value = map_memory_.non_resident_tiles});
-  }
-  if (unreadable_tiles_ > 0) {
-    status.counters.push_back({.name = "map_tiles_unreadable", .value = unreadable_tiles_});
-  }
-  if (segmentation_failures_ > 0) {
-    status.counters.push_back({.name = "label_failures", .value = segmentation_failures_});
-  }
-  status.counters.insert(status.counters.end(), dropped_.begin(), dropped_.end());
-  status.counters.insert(status.counters.end(), events_.begin(), events_.end());
+  status.counters = counters();
   status.segmentation = segmentation_;
   status.segmentation.fresh_share = label_provenances_.share(LabelProvenance::fresh);
   status.segmentation.propagated_share = label_provenances_.share(LabelProvenance::propagated);
   status.segmentation.unlabelled_share = label_provenances_.share(LabelProvenance::none);
   status.latencies.clear();
-  for (const StageStatistics& times : stages_) {
-    status.latencies.push_back(times.recent.summary(times.stage));
-  }
+  for (const Stage& stage : stages_) status.latencies.push_back(stage.recent.summary(stage.name));
 }
 
-std::vector<StageStatistics> Statistics::stage_statistics() const {
-  const std::scoped_lock lock(mutex_);
-  return stages_;
-}
-
-MemoryUse Statistics::map_memory() const {
-  const std::scoped_lock lock(mutex_);
-  return map_memory_;
-}
-
-std::uint64_t Statistics::received() const {
-  const std::scoped_lock lock(mutex_);
-  return received_;
-}
+std::uint64_t Statistics::received() const { return whole(metrics_->scans_received.Value()); }
 
 double Statistics::receive_period_ms() const {
   const std::scoped_lock lock(mutex_);

@@ -1,21 +1,20 @@
 #pragma once
 
 #include <atomic>
-#include <condition_variable>
 #include <deque>
 #include <future>
 #include <memory>
 #include <mutex>
-#include <optional>
-#include <thread>
+#include <variant>
 
 #include "config/loaders/server_config.hpp"
 #include "core/occupancy/occupancy_map.hpp"
 #include "server/monitoring/statistics.hpp"
+#include "server/threads/worker.hpp"
 
 namespace stillmap::server {
 
-/// A mapped scan on its way into the octree, shared with whoever else uses it.
+/// A mapped scan on its way into the octree, shared with the other consumers of the scan.
 struct OccupancyScan {
   std::shared_ptr<const LabelledScan> labelled;
   Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
@@ -23,79 +22,78 @@ struct OccupancyScan {
   bool unknown_is_solid = true;
 };
 
-/// The octree as it was when asked for.
+/// An octree in OctoMap's encoding.
 struct EncodedOctree {
   OctomapData data;
   /// Stamp of the newest scan that is in it as a whole; 0: none.
   std::int64_t stamp_ns = 0;
 };
 
-/// Keeps the octree on a thread of its own and of low priority, so that the mapper never waits for
-/// it. Who cannot keep up leaves out clearing first ("occupancy_not_cleared" in the status), then
-/// scans
-/// ("occupancy_scans_left_out"). Thread-safe.
+/// Keeps the octree on a thread of idle priority, so that the mapper never waits for it. When it
+/// cannot keep up, it first stops clearing free space along the rays ("occupancy_not_cleared" in
+/// the status), then drops scans ("occupancy_scans_dropped"). Thread-safe.
 class OccupancyThread {
  public:
   OccupancyThread(const OccupancyServiceConfig& config, Statistics& statistics,
                   ThrottleCallback throttle = {});
 
-  /// A new map begins, with the voxels of this view; until they are there, answers are those of an
-  /// empty one. Returns at once, as `add` does.
+  /// Starts a new map from the voxels of this view; until they are inserted, queries see an empty
+  /// map. Returns at once, as `add` does.
   void begin(std::shared_ptr<const MapSnapshot> view);
   void add(OccupancyScan scan);
-  /// Tiles left memory, or came back.
+  /// Drops and restores parts of the octree with the tiles that were evicted and reloaded.
   void follow(std::shared_ptr<const MapSnapshot> view);
 
   /// Throws std::invalid_argument for a query that asks for too much.
   [[nodiscard]] OccupancyAnswers answer(const OccupancyQuery& query) const;
-  /// At once, on the calling thread.
+  /// Encodes on the calling thread.
   [[nodiscard]] EncodedOctree encode(bool binary) const;
-  /// On this object's thread, when that comes to it; one at a time. The future throws
-  /// std::future_error where the thread ends before.
+  /// Encodes on this object's thread, before the scans that wait; one request at a time. The future
+  /// throws std::future_error when the thread ends before.
   [[nodiscard]] std::future<EncodedOctree> encode_in_background();
   /// Grows with every change, over all maps.
   [[nodiscard]] std::uint64_t changes() const;
 
  private:
-  /// Either a new map or a scan, or the newest view to be followed, or an octree to be encoded.
-  struct Job {
-    std::shared_ptr<const MapSnapshot> first_view;
-    std::shared_ptr<const MapSnapshot> next_view;
-    OccupancyScan scan;
-    std::optional<std::promise<EncodedOctree>> encoded;
+  struct NewMap {
+    std::shared_ptr<const MapSnapshot> view;
   };
+  struct Residency {
+    std::shared_ptr<const MapSnapshot> view;
+  };
+  struct Encoding {
+    std::promise<EncodedOctree> encoded;
+  };
+  /// The queue keeps them in this order: at most one of each of the first three, then scans.
+  using Job = std::variant<NewMap, Residency, Encoding, OccupancyScan>;
+  using Jobs = std::deque<Job>;
 
-  void work(const std::stop_token& stop);
-  void work_on(Job job, bool keeps_up);
-  /// Under the queue's lock.
-  [[nodiscard]] bool has_work() const { return !queue_.empty() || to_follow_ || to_encode_; }
-  [[nodiscard]] Job next_job();
-  void begin_map(const MapSnapshot& view);
-  void follow_now(const MapSnapshot& view);
-  void insert(const OccupancyScan& scan, bool clears);
-  /// Of what was gathered; true while more is left.
-  bool insert_portion();
+  /// Puts the job before those of later kinds; replaces one of the same kind.
+  static void insert_urgent(Jobs& jobs, Job job);
+
+  void run(NewMap job);
+  void run(Residency job);
+  void run(Encoding job);
+  void run(OccupancyScan scan);
+  /// Part of the update that was computed; true while more is left.
+  bool apply_portion();
   void throttle() const;
 
   OccupancyConfig config_;
-  std::size_t capacity_;
+  std::size_t max_scans_;
   Statistics& statistics_;
   ThrottleCallback throttle_;
-  mutable std::mutex queue_mutex_;
-  std::condition_variable_any queue_changed_;
-  std::deque<Job> queue_;
-  std::shared_ptr<const MapSnapshot> to_follow_;
-  std::optional<std::promise<EncodedOctree>> to_encode_;
-  /// The last view that was to be followed.
+  BoundedQueue<Job> jobs_;
+  /// The last view that was given to `follow`. Guarded by the queue's lock.
   std::shared_ptr<const MapSnapshot> followed_;
   mutable std::mutex map_mutex_;
   OccupancyMap map_;
-  /// The one before that which is to begin.
+  /// A new map waits to replace it. Changed under the queue's lock.
   std::atomic<bool> has_old_map_ = false;
   std::uint64_t changes_ = 0;
   std::int64_t stamp_ns_ = 0;
   // Last: stops before what it uses is gone.
-  std::jthread thread_;
+  Worker<Job> worker_;
 };
 
 }  // namespace stillmap::server

@@ -18,19 +18,20 @@ namespace stillmap::server {
 /// An id that no map of an earlier run has.
 [[nodiscard]] std::uint64_t new_map_id();
 
-/// What the mapping thread publishes to all others: immutable views, so that nobody waits for
-/// anybody. Thread-safe.
+/// What the mapping thread publishes to all other threads: immutable views, so that readers and the
+/// mapper do not wait for each other. Thread-safe.
 class LatestMap {
  public:
   /// A new map begins: its first view, and the poses that led to it.
   void begin(std::shared_ptr<const MapSnapshot> view, Trajectory trajectory);
   void publish(std::shared_ptr<const MapSnapshot> view);
-  /// Poses at later times give way: a recording that is played again replaces its old path.
+  /// Removes poses with the same or later stamps first: a recording that is played again replaces
+  /// its old path.
   void add_pose(const StampedPose& pose, OdometryHealth health, const std::string& label_source);
 
   /// Never null once `begin` was called.
   [[nodiscard]] std::shared_ptr<const MapSnapshot> view() const;
-  /// A view, and when it came.
+  /// A view, and when it was published.
   struct MapUpdate {
     std::shared_ptr<const MapSnapshot> view;
     std::chrono::steady_clock::time_point published_at;
@@ -42,8 +43,8 @@ class LatestMap {
   /// The view and the history that ends with it.
   [[nodiscard]] MapState state() const;
   [[nodiscard]] Trajectory trajectory() const;
-  /// So many of its poses (2 or more) at most, evenly chosen, the newest always among them. The
-  /// ones that are chosen stay the same until there are twice as many.
+  /// At most `max_poses` (>= 2) of its poses, evenly spaced, the newest always among them. The
+  /// selection stays the same until the path has twice as many poses.
   [[nodiscard]] Trajectory trajectory(std::size_t max_poses) const;
   /// The newest pose; the origin before the first.
   [[nodiscard]] StampedPose newest_pose() const;

@@ -14,12 +14,12 @@ MapPublisher::MapPublisher(dds::Participant& participant, const dds::Topics& top
       tiles_(participant, topics),
       path_(participant, topics.path.dds_name, topics.path.writer),
       cloud_(participant, topics.static_cloud.dds_name, topics.static_cloud.writer),
-      tile_thread_(std::chrono::duration<double>(config.publish.tiles_period_s),
-                   [this] { tiles_.publish(latest_map_.view()); }),
-      path_thread_(std::chrono::duration<double>(config.publish.path_period_s),
-                   [this] { publish_path(); }),
-      cloud_thread_(std::chrono::duration<double>(config.publish.cloud_period_s),
-                    [this] { publish_cloud(); }) {}
+      tile_worker_(std::chrono::duration<double>(config.publish.tiles_period_s),
+                   [this](const std::stop_token&) { tiles_.publish(latest_map_.view()); }),
+      path_worker_(std::chrono::duration<double>(config.publish.path_period_s),
+                   [this](const std::stop_token&) { publish_path(); }),
+      cloud_worker_(std::chrono::duration<double>(config.publish.cloud_period_s),
+                    [this](const std::stop_token&) { publish_cloud(); }) {}
 
 bool MapPublisher::has_changed(PathState& published) const {
   const PathState now{.map_id = latest_map_.view()->map_id, .poses = latest_map_.poses_added()};

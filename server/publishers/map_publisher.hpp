@@ -8,13 +8,13 @@
 #include "nav_msgs.h"
 #include "sensor_msgs.h"
 #include "server/publishers/latest_map.hpp"
-#include "server/publishers/periodic_thread.hpp"
 #include "server/publishers/tile_publisher.hpp"
+#include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
 
-/// Publishes what is heavy and not urgent, each from its own thread and only when it changed:
-/// tiles, the path, and the static map round the robot.
+/// Publishes the large and less urgent topics, each from its own thread and only when it changed:
+/// tiles, the path, and a cloud of the static map round the robot.
 class MapPublisher {
  public:
   MapPublisher(dds::Participant& participant, const dds::Topics& topics, const ServerConfig& config,
@@ -43,9 +43,9 @@ class MapPublisher {
   dds::Writer<nav_msgs::msg::Path> path_;
   dds::Writer<sensor_msgs::msg::PointCloud2> cloud_;
   // Last: they stop before what they use is gone.
-  PeriodicThread tile_thread_;
-  PeriodicThread path_thread_;
-  PeriodicThread cloud_thread_;
+  PeriodicWorker tile_worker_;
+  PeriodicWorker path_worker_;
+  PeriodicWorker cloud_worker_;
 };
 
 }  // namespace stillmap::server

@@ -1,9 +1,16 @@
 #include "server/publishers/status_publisher.hpp"
 
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
 #include <algorithm>
+#include <array>
+#include <numeric>
 #include <utility>
 
 #include "idl/conversions/status.hpp"
+#include "idl/dds/transports.hpp"
+#include "idl/interface/participant_diagnostics.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -11,14 +18,145 @@ namespace {
 // How soon a change of health is told.
 constexpr std::chrono::duration<double> poll_period{0.1};
 
+void log(const dds::Diagnostic& diagnostic) {
+  spdlog::warn("{}: {}; {}", diagnostic.what, diagnostic.evidence, diagnostic.hint);
+}
+
+// Of all mismatched pairs of the domain, those with an endpoint of this server.
+std::vector<dds::Mismatch> own_mismatches(const dds::RemoteParticipant& self,
+                                          std::vector<dds::RemoteParticipant> peers) {
+  peers.push_back(self);
+  std::vector<dds::Mismatch> found = dds::mismatches(peers);
+  std::erase_if(found, [&](const dds::Mismatch& mismatch) {
+    return mismatch.writer_participant.guid != self.guid &&
+           mismatch.reader_participant.guid != self.guid;
+  });
+  return found;
+}
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
+/// How segmentation is reduced because the machine is too slow; empty when it is not.
+std::string reduced_pace(const dds::SegmentationStatus& segmentation) {
+  std::string what;
+  if (segmentation.interval > 1) {
+    what = dds::every_nth_scan(segmentation.interval) + " is segmented, labels are propagated between";
+  }
+  if (segmentation.image_columns > 0 && segmentation.image_columns < segmentation.full_columns) {
+    what += (what.empty() ? "" : "; ") + std::string("range images are ") +
+            std::to_string(segmentation.image_columns) + " columns wide instead of " +
+            std::to_string(segmentation.full_columns);
+  }
+  return what.empty() ? what : "segmentation cannot keep the sensor's rate: " + what;
+}
+
 }  // namespace
+
+DiscoveryDiagnostics::DiscoveryDiagnostics(const dds::Participant& participant)
+    : participant_(participant) {}
+
+std::vector<dds::Diagnostic> DiscoveryDiagnostics::diagnostics() {
+  const std::scoped_lock lock(mutex_);
+  const auto now = std::chrono::steady_clock::now();
+  if (now - collected_ < std::chrono::seconds(1)) return last_;
+  collected_ = now;
+  last_ = collect();
+  for (const dds::Diagnostic& diagnostic : last_) {
+    if (seen_.insert(diagnostic.what + diagnostic.evidence).second) log(diagnostic);
+  }
+  return last_;
+}
+
+std::vector<dds::Diagnostic> DiscoveryDiagnostics::collect() const {
+  const dds::RemoteParticipant self = participant_.self();
+  const std::vector<dds::RemoteParticipant> peers = participant_.remote_participants();
+  std::vector<dds::Diagnostic> all = dds::mismatch_diagnostics(own_mismatches(self, peers));
+  for (dds::Diagnostic& diagnostic : dds::security_diagnostics(self, peers)) {
+    all.push_back(std::move(diagnostic));
+  }
+  return all;
+}
+
+std::vector<dds::Diagnostic> host_diagnostics(std::uint32_t wanted_buffer_bytes) {
+  const std::uint32_t granted = dds::granted_socket_buffer_bytes(wanted_buffer_bytes);
+  if (granted >= wanted_buffer_bytes) return {};
+  const dds::Diagnostic diagnostic{
+      .severity = dds::Severity::advice,
+      .what = "UDP buffers are too small: large clouds over UDP can get lost",
+      .evidence = "they have " + std::to_string(granted) + " bytes instead of " +
+                  std::to_string(wanted_buffer_bytes),
+      .hint = "sudo sysctl net.core.rmem_max=" + std::to_string(wanted_buffer_bytes)};
+  log(diagnostic);
+  return {diagnostic};
+}
+
+ServerReport::ServerReport(ServerTraits traits, const LatestMap& latest_map,
+                           const Statistics& statistics,
+                           std::function<std::vector<dds::Diagnostic>()> discovery_diagnostics,
+                           std::function<std::string()> no_input_reason)
+    : traits_(std::move(traits)),
+      host_(host_name()),
+      latest_map_(latest_map),
+      statistics_(statistics),
+      discovery_diagnostics_(std::move(discovery_diagnostics)),
+      no_input_reason_(std::move(no_input_reason)) {}
+
+dds::ServerStatus ServerReport::status() const {
+  const auto view = latest_map_.view();
+  const std::string live_labels = latest_map_.label_source();
+  const auto wall_clock = std::chrono::system_clock::now().time_since_epoch();
+  const auto uptime = std::chrono::steady_clock::now() - started_;
+  dds::ServerStatus status;
+  status.stamp_ns = std::chrono::nanoseconds(wall_clock).count();
+  status.software_version = STILLMAP_VERSION;
+  status.uptime_s = std::chrono::duration<double>(uptime).count();
+  status.delivery = traits_.delivery;
+  status.label_source = live_labels.empty() ? traits_.label_source : live_labels;
+  status.host = host_;
+  status.sensor = traits_.sensor;
+  status.points_topic = traits_.points_topic;
+  status.health = latest_map_.health();
+  status.map_version = view->version;
+  status.map_id = view->map_id;
+  status.tile_count = view->tiles.size();
+  status.voxel_count = std::accumulate(
+      view->tiles.begin(), view->tiles.end(), std::uint64_t{0},
+      [](std::uint64_t sum, const auto& tile) { return sum + tile->info.voxel_count; });
+  statistics_.report_to(status);
+  status.diagnostics = discovery_diagnostics_();
+  status.diagnostics.insert(status.diagnostics.end(), traits_.host_diagnostics.begin(),
+                            traits_.host_diagnostics.end());
+  status.reason = reason(status);
+  return status;
+}
+
+std::string ServerReport::reason(const dds::ServerStatus& status) const {
+  if (const std::string why = no_input_reason_(); !why.empty()) return why;
+  if (const std::string drop = statistics_.last_drop(); !drop.empty()) {
+    return "the last scan was dropped: " + drop;
+  }
+  if (status.health == OdometryHealth::lost) {
+    return "the odometry is lost: the last scan does not fit the map";
+  }
+  if (const std::string failure = statistics_.last_segmentation_failure(); !failure.empty()) {
+    return "the last scan could not be segmented: " + failure;
+  }
+  if (status.received_hz == 0.0) return "no scan for the last seconds";
+  if (const std::string pace = reduced_pace(status.segmentation); !pace.empty()) return pace;
+  return status.diagnostics.empty() ? std::string() : status.diagnostics.front().what;
+}
 
 StatusPublisher::StatusPublisher(dds::Participant& participant, const dds::Topics& topics,
                                  double period_s, std::function<dds::ServerStatus()> status)
     : period_(period_s),
       status_(std::move(status)),
       writer_(participant, topics.status.dds_name, topics.status.writer),
-      thread_(std::min(poll_period, period_), [this] { publish_when_due(); }) {}
+      worker_(std::min(poll_period, period_),
+              [this](const std::stop_token&) { publish_when_due(); }) {}
 
 void StatusPublisher::publish_when_due() {
   const dds::ServerStatus status = status_();

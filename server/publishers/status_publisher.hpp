@@ -1,15 +1,80 @@
 #pragma once
 
+#include <chrono>
 #include <functional>
+#include <mutex>
+#include <set>
+#include <string>
+#include <vector>
 
+#include "idl/dds/participant.hpp"
 #include "idl/dds/writer.hpp"
+#include "idl/interface/diagnostic.hpp"
+#include "idl/interface/server_status.hpp"
 #include "idl/interface/topics.hpp"
-#include "server/publishers/periodic_thread.hpp"
+#include "server/monitoring/statistics.hpp"
+#include "server/publishers/latest_map.hpp"
+#include "server/threads/periodic_worker.hpp"
 #include "stillmap_msgs.h"
 
 namespace stillmap::server {
 
-/// Publishes the status every period, and soon after the odometry's health changed.
+/// Problems between the server and the other participants of its domain: endpoints whose types or
+/// quality of service do not match, and identities that are refused. Thread-safe.
+class DiscoveryDiagnostics {
+ public:
+  /// Each diagnostic is also logged when it first occurs.
+  explicit DiscoveryDiagnostics(const dds::Participant& participant);
+
+  /// At most a second old: comparing all endpoints takes time in a domain of many participants.
+  [[nodiscard]] std::vector<dds::Diagnostic> diagnostics();
+
+ private:
+  [[nodiscard]] std::vector<dds::Diagnostic> collect() const;
+
+  const dds::Participant& participant_;
+  std::mutex mutex_;
+  std::chrono::steady_clock::time_point collected_;
+  std::vector<dds::Diagnostic> last_;
+  std::set<std::string> seen_;
+};
+
+/// Problems of this machine, logged too: socket buffers smaller than wanted.
+[[nodiscard]] std::vector<dds::Diagnostic> host_diagnostics(std::uint32_t wanted_buffer_bytes);
+
+/// The part of the status that does not change.
+struct ServerTraits {
+  DeliveryMode delivery = DeliveryMode::latest;
+  std::string label_source;
+  std::string sensor;
+  std::string points_topic;
+  std::vector<dds::Diagnostic> host_diagnostics;
+};
+
+/// Puts the server's status together, and says in words why nothing happens. Thread-safe.
+class ServerReport {
+ public:
+  /// `discovery_diagnostics`: the current ones. `no_input_reason` returns an empty text once scans
+  /// arrive.
+  ServerReport(ServerTraits traits, const LatestMap& latest_map, const Statistics& statistics,
+               std::function<std::vector<dds::Diagnostic>()> discovery_diagnostics,
+               std::function<std::string()> no_input_reason);
+
+  [[nodiscard]] dds::ServerStatus status() const;
+
+ private:
+  [[nodiscard]] std::string reason(const dds::ServerStatus& status) const;
+
+  ServerTraits traits_;
+  std::string host_;
+  const LatestMap& latest_map_;
+  const Statistics& statistics_;
+  std::function<std::vector<dds::Diagnostic>()> discovery_diagnostics_;
+  std::function<std::string()> no_input_reason_;
+  std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
+};
+
+/// Publishes the status every period, and within 0.1 s after the odometry's health changed.
 class StatusPublisher {
  public:
   StatusPublisher(dds::Participant& participant, const dds::Topics& topics, double period_s,
@@ -24,7 +89,7 @@ class StatusPublisher {
   OdometryHealth last_health_ = OdometryHealth::initialised;
   dds::Writer<stillmap_msgs::msg::Status> writer_;
   // Last: stops before what it uses is gone.
-  PeriodicThread thread_;
+  PeriodicWorker worker_;
 };
 
 }  // namespace stillmap::server

@@ -22,6 +22,12 @@ std::size_t message_bytes(const Tile& tile) {
 
 }  // namespace
 
+void TokenBucket::refill(Clock::time_point now) {
+  const double seconds = refilled_ ? std::chrono::duration<double>(now - *refilled_).count() : 1.0;
+  tokens_ = std::min(tokens_ + seconds * bytes_per_s_, bytes_per_s_);
+  refilled_ = now;
+}
+
 TilePublisher::TilePublisher(dds::Participant& participant, const dds::Topics& topics)
     : tiles_(participant, topics.tiles.dds_name, topics.tiles.writer),
       index_(participant, topics.tile_index.dds_name, topics.tile_index.writer),
@@ -30,7 +36,7 @@ TilePublisher::TilePublisher(dds::Participant& participant, const dds::Topics& t
 
 void TilePublisher::publish(const std::shared_ptr<const MapSnapshot>& latest) {
   token_bucket_.refill(TokenBucket::Clock::now());
-  // A view of the same version may have tiles in other places: in memory, or away.
+  // A view of the same version may differ in which tiles are resident.
   if (latest == last_view_ && waiting_ == 0) return;
   last_view_ = latest;
   const MapSnapshot& view = *latest;

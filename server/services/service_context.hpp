@@ -16,8 +16,8 @@
 #include "server/occupancy/occupancy_thread.hpp"
 #include "server/publishers/latest_map.hpp"
 #include "server/services/paged_snapshots.hpp"
-#include "server/traversability/traversability_cache.hpp"
-#include "server/traversability/traversability_grid_provider.hpp"
+#include "server/traversability/traversability_grid.hpp"
+#include "server/traversability/traversability_snapshot.hpp"
 
 namespace stillmap::server {
 

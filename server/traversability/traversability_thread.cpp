@@ -7,15 +7,17 @@
 #include <utility>
 
 #include "core/map/tile_evidence.hpp"
-#include "server/monitoring/idle_scheduling.hpp"
+#include "server/threads/background_throttle.hpp"
 
 namespace stillmap::server {
 namespace {
 
-// How long a thread without work sleeps; a change or a stop wakes it.
+using Clock = std::chrono::steady_clock;
+
+// How long the thread waits for a change of the map; a change or a stop wakes it.
 constexpr std::chrono::seconds idle_period{1};
 
-/// Areas take memory as the map does: where that is on disk, they are worked out when asked for.
+/// Traversability takes memory as the map does: for evicted tiles it is computed when queried.
 MapSnapshot in_memory(const MapSnapshot& map) {
   MapSnapshot resident = map;
   std::erase_if(resident.tiles, [](const auto& tile) { return is_non_resident(*tile); });
@@ -28,39 +30,39 @@ TraversabilityThread::TraversabilityThread(std::vector<RobotProfile> robots,
                                            std::chrono::duration<double> period,
                                            const LatestMap& latest_map,
                                            TraversabilitySnapshot& snapshot, Statistics& statistics,
-                                           std::function<void()> updated, ThrottleCallback throttle)
+                                           std::function<void()> updated, ThrottleCallback throttle,
+                                           MonotonicClock& clock)
     : period_(period),
       latest_map_(latest_map),
       snapshot_(snapshot),
       statistics_(statistics),
       updated_(std::move(updated)),
       throttle_(std::move(throttle)),
+      clock_(clock),
       traversability_(std::move(robots)) {
   publish();
-  thread_ = std::jthread([this](const std::stop_token& stop) { work(stop); });
+  worker_.emplace(std::chrono::seconds(0), [this](const std::stop_token& stop) {
+    if (!std::exchange(has_begun_, true) && !use_idle_scheduling()) {
+      spdlog::warn("traversability is computed at full priority");
+    }
+    follow_map(stop);
+  });
 }
 
-void TraversabilityThread::work(const std::stop_token& stop) {
-  if (!use_idle_scheduling()) spdlog::warn("areas are computed at full priority");
-  std::shared_ptr<const MapSnapshot> known;
-  Clock::time_point next_update;
-  while (!stop.stop_requested()) {
-    const auto map_update = latest_map_.wait_for_update(known, stop, idle_period);
-    if (!map_update) continue;
-    wait_until(next_update, stop);
-    if (stop.stop_requested()) return;
-    next_update = Clock::now() + std::chrono::duration_cast<Clock::duration>(period_);
-    known = latest_map_.view();
-    update(in_memory(*known));
-    const std::chrono::duration<double, std::milli> latency =
-        Clock::now() - map_update->published_at;
-    statistics_.add_latency("areas", latency.count());
-  }
+void TraversabilityThread::follow_map(const std::stop_token& stop) {
+  const auto map_update = latest_map_.wait_for_update(known_, stop, idle_period);
+  if (!map_update) return;
+  clock_.sleep_until(next_update_, stop);
+  if (stop.stop_requested()) return;
+  next_update_ = clock_.now() + std::chrono::duration_cast<Clock::duration>(period_);
+  known_ = latest_map_.view();
+  update(in_memory(*known_));
+  const std::chrono::duration<double, std::milli> latency = Clock::now() - map_update->published_at;
+  statistics_.add_latency("traversability", latency.count());
 }
 
 void TraversabilityThread::update(const MapSnapshot& map) {
-  // One core only: its loops must not run on threads that keep their full priority, and only this
-  // thread gives way.
+  // On this thread only: the workers of TBB's other arenas run at full priority.
   tbb::task_arena this_thread(1);
   this_thread.execute([&] { static_cast<void>(traversability_.update(map, throttle_)); });
   publish();
@@ -73,11 +75,6 @@ void TraversabilityThread::publish() {
     views.push_back(traversability_.view(robot.name));
   }
   snapshot_.publish(std::move(views));
-}
-
-void TraversabilityThread::wait_until(Clock::time_point time, const std::stop_token& stop) {
-  std::unique_lock lock(pause_mutex_);
-  pause_.wait_until(lock, stop, time, [] { return false; });
 }
 
 }  // namespace stillmap::server

@@ -1,38 +1,37 @@
 #pragma once
 
 #include <chrono>
-#include <condition_variable>
 #include <functional>
-#include <mutex>
-#include <thread>
+#include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/traversability/traversability_map.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/publishers/latest_map.hpp"
+#include "server/threads/periodic_worker.hpp"
 #include "server/traversability/traversability_snapshot.hpp"
 
 namespace stillmap::server {
 
-/// Keeps the areas of all robots up to date with the map, in a thread of its own that gives way to
-/// all others: it has a low priority and works on one core.
+/// Keeps the traversability of all robots up to date with the map, on a thread of idle priority
+/// that uses one core.
 class TraversabilityThread {
  public:
   /// `period` is the shortest time from update to update; `updated` is called after each, in this
-  /// thread. The time from a change of the map until then is the latency "areas". Publishes empty
-  /// areas at once. Throws std::invalid_argument for a robot with faults, or two of one name.
+  /// thread. The time from a change of the map until then is the latency "traversability".
+  /// Publishes empty views at once. Throws std::invalid_argument for a robot with faults, or two of
+  /// one name.
   TraversabilityThread(std::vector<RobotProfile> robots, std::chrono::duration<double> period,
                        const LatestMap& latest_map, TraversabilitySnapshot& snapshot,
                        Statistics& statistics, std::function<void()> updated,
-                       ThrottleCallback throttle = {});
+                       ThrottleCallback throttle = {},
+                       MonotonicClock& clock = MonotonicClock::steady());
 
  private:
-  using Clock = std::chrono::steady_clock;
-
-  void work(const std::stop_token& stop);
+  void follow_map(const std::stop_token& stop);
   void update(const MapSnapshot& map);
   void publish();
-  void wait_until(Clock::time_point time, const std::stop_token& stop);
 
   std::chrono::duration<double> period_;
   const LatestMap& latest_map_;
@@ -40,11 +39,13 @@ class TraversabilityThread {
   Statistics& statistics_;
   std::function<void()> updated_;
   ThrottleCallback throttle_;
+  MonotonicClock& clock_;
   TraversabilityMap traversability_;
-  std::mutex pause_mutex_;
-  std::condition_variable_any pause_;
+  bool has_begun_ = false;
+  std::shared_ptr<const MapSnapshot> known_;
+  MonotonicClock::TimePoint next_update_;
   // Last: stops before what it uses is gone.
-  std::jthread thread_;
+  std::optional<PeriodicWorker> worker_;
 };
 
 }  // namespace stillmap::server

@@ -9,7 +9,7 @@
 #include "core/map/storage/map_file.hpp"
 #include "core/traversability/traversability_query.hpp"
 #include "idl/conversions/occupancy_grid.hpp"
-#include "server/traversability/traversability_grid_provider.hpp"
+#include "server/traversability/traversability_grid.hpp"
 #include "server/traversability/traversability_thread.hpp"
 
 namespace stillmap {

@@ -147,9 +147,9 @@ TEST_F(OperationTest, MetricsMoveWithScansAndRequests) {
   EXPECT_EQ(after.at(R"(stillmap_stage_duration_seconds_count{stage="odometry"})"), 8.0);
   EXPECT_GT(after.at(R"(stillmap_stage_duration_seconds_sum{stage="total"})"), 0.0);
   const std::string status_answers =
-      R"(stillmap_service_requests_total{service="stillmap/get_status",code="ok"})";
+      R"(stillmap_service_requests_total{code="ok",service="stillmap/get_status"})";
   EXPECT_GT(after.at(status_answers), before.at(status_answers));
-  EXPECT_EQ(after.at(R"(stillmap_service_requests_total{service="stillmap/save_map",code="ok"})"),
+  EXPECT_EQ(after.at(R"(stillmap_service_requests_total{code="ok",service="stillmap/save_map"})"),
             1.0);
   EXPECT_GE(after.at("stillmap_checkpoint_duration_seconds_count"), 1.0);
   EXPECT_GT(after.at("stillmap_checkpoint_last_success_timestamp_seconds"), 1.6e9);

@@ -29,7 +29,7 @@ RobotProfile robot() {
 
 ServiceFixture::ServiceFixture()
     : map_(street_config()),
-      saver_(latest_map_, fresh_map_file(), {{"software", "0"}}),
+      saver_(latest_map_, statistics_, fresh_map_file(), {{"software", "0"}}),
       context_{
           .latest_map = latest_map_,
           .tiles = tiles_,
@@ -61,6 +61,7 @@ ServiceFixture::ServiceFixture()
           .grid_provider = grid_provider_,
           .map_frame = "map",
           .log = log_} {
+  saver_.set_source(source_);
   reset();
 }
 

@@ -2,6 +2,7 @@
 
 #include "core/occupancy/occupancy_map.hpp"
 #include "server/services/service_context.hpp"
+#include "tests/server/latest_map_source.hpp"
 
 namespace stillmap::fuzz {
 
@@ -23,14 +24,16 @@ class ServiceFixture {
   StaticMap map_;
   server::LatestMap latest_map_;
   TileReader tiles_;
+  server::Statistics statistics_;
   server::MapSaver saver_;
+  test::LatestMapSource source_{latest_map_};
   server::TraversabilitySnapshot snapshot_;
   server::TraversabilityCache traversability_cache_{snapshot_, latest_map_, tiles_};
   TraversabilityConfig traversability_config_;
   server::TraversabilityGridProvider grid_provider_{traversability_config_, "map", latest_map_,
                                                     snapshot_};
   OccupancyMap octree_{OccupancyConfig{}};
-  server::ServiceLog log_;
+  server::ServiceLog log_{statistics_.metrics()};
   server::ServiceContext context_;
 };
 

@@ -1,4 +1,4 @@
-#include "server/mapping/background_throttle.hpp"
+#include "server/threads/background_throttle.hpp"
 
 #include <gtest/gtest.h>
 

@@ -12,8 +12,8 @@ TEST(ForeignRequest, ThatCannotBeReadIsCountedInTheStatus) {
   Client client(setup.client());
   EXPECT_EQ(client.status().counter("unreadable_request_stillmap/save_map"), 0U);
 
-  VendorParticipant peer(rti_connext);
-  ByteClient hostile(peer, "stillmap/save_map", "stillmap_msgs::srv::dds_::SaveMap");
+  dds::VendorParticipant peer(dds::rti_connext);
+  dds::ByteClient hostile(peer, "stillmap/save_map", "stillmap_msgs::srv::dds_::SaveMap");
   ASSERT_TRUE(hostile.wait_for_server());
   // A string of 2^32 - 1 bytes, of which none follows.
   hostile.call({0, 1, 0, 0, 2, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF});

@@ -7,7 +7,9 @@
 #include <stdexcept>
 
 #include "core/map/static_map.hpp"
+#include "server/monitoring/metrics.hpp"
 #include "tests/scratch_folder.hpp"
+#include "tests/server/latest_map_source.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -33,15 +35,18 @@ class MapSaverTest : public testing::Test {
   ScratchFolder folder_;
   StaticMap map_{StaticMapConfig()};
   LatestMap latest_map_;
+  test::LatestMapSource source_{latest_map_};
+  Statistics statistics_;
 };
 
-TEST_F(MapSaverTest, SavesWhatTheBoardShows) {
-  MapSaver saver(latest_map_, folder_ / "map.stillmap", {{"sensor", "vlp_16"}});
+TEST_F(MapSaverTest, SavesTheLatestMap) {
+  MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {{"sensor", "vlp_16"}});
+  saver.set_source(source_);
   for (const float x : {5.0F, 50.0F}) {
     map_scan(x);
     saver.save_if_changed();
   }
-  const auto stored = MapSaver(latest_map_, folder_ / "map.stillmap", {}).load();
+  const auto stored = MapSaver(latest_map_, statistics_, folder_ / "map.stillmap", {}).load();
   ASSERT_TRUE(stored);
   EXPECT_EQ(stored->view.version, map_.view()->version);
   EXPECT_EQ(stored->view.tiles.size(), 2U);
@@ -51,24 +56,30 @@ TEST_F(MapSaverTest, SavesWhatTheBoardShows) {
 
 TEST_F(MapSaverTest, LeavesTheFileAloneUntilSomethingWasMapped) {
   map_scan(5.0F);
-  MapSaver(latest_map_, folder_ / "map.stillmap", {}).save_as("");
+  {
+    MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
+    saver.set_source(source_);
+    saver.save_as("");
+  }
   LatestMap empty;
   empty.begin(StaticMap(StaticMapConfig()).view(), {});
-  MapSaver saver(empty, folder_ / "map.stillmap", {});
+  MapSaver saver(empty, statistics_, folder_ / "map.stillmap", {});
   saver.save_if_changed();
   EXPECT_EQ(saver.load()->view.tiles.size(), 1U);
 }
 
 TEST_F(MapSaverTest, SavesUnderAnotherNameBesideTheConfiguredFile) {
   map_scan(5.0F);
-  MapSaver saver(latest_map_, folder_ / "map.stillmap", {});
+  MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
+  saver.set_source(source_);
   EXPECT_EQ(saver.save_as("copy.stillmap"), folder_ / "copy.stillmap");
   EXPECT_EQ(open_map_file(folder_ / "copy.stillmap")->load().view.tiles.size(), 1U);
   EXPECT_EQ(saver.save_as(""), folder_ / "map.stillmap");
 }
 
-TEST_F(MapSaverTest, LetsNobodyChooseAnotherFolder) {
-  MapSaver saver(latest_map_, folder_ / "map.stillmap", {});
+TEST_F(MapSaverTest, RefusesNamesInOtherFolders) {
+  MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
+  saver.set_source(source_);
   for (const char* name : {"../map", "/etc/passwd", "a/b", ".", ".."}) {
     EXPECT_THROW(saver.save_as(name), std::invalid_argument) << name;
   }
@@ -87,7 +98,9 @@ void save_far_map(const std::filesystem::path& file) {
 TEST_F(MapSaverTest, GoesOnInAnotherFileAndLeavesTheRunningMapInItsOwn) {
   map_scan(5.0F);
   save_far_map(folder_ / "far.stillmap");
-  MapSaver saver(latest_map_, folder_ / "map.stillmap", {{"sensor", "vlp_16"}, {"datum", "1,2"}});
+  MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap",
+                 {{"sensor", "vlp_16"}, {"datum", "1,2"}});
+  saver.set_source(source_);
   const auto file = saver.resume_from(
       "far.stillmap", [&](const SavedMap& stored, const std::shared_ptr<TileStore>&) {
         latest_map_.begin(std::make_shared<const MapSnapshot>(stored.view), stored.trajectory);
@@ -107,7 +120,8 @@ TEST_F(MapSaverTest, GoesOnInAnotherFileAndLeavesTheRunningMapInItsOwn) {
 TEST_F(MapSaverTest, StaysInItsFileWhenAnotherCannotBeLoaded) {
   map_scan(5.0F);
   save_far_map(folder_ / "far.stillmap");
-  MapSaver saver(latest_map_, folder_ / "map.stillmap", {});
+  MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
+  saver.set_source(source_);
   const auto refuse = [](const SavedMap&, const std::shared_ptr<TileStore>&) {
     throw std::invalid_argument("another voxel size");
   };
@@ -124,8 +138,37 @@ TEST_F(MapSaverTest, StaysInItsFileWhenAnotherCannotBeLoaded) {
   EXPECT_EQ(saver.save_as(""), folder_ / "map.stillmap");
 }
 
+TEST_F(MapSaverTest, CountsAndTimesSaves) {
+  MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
+  saver.set_source(source_);
+  Metrics& metrics = statistics_.metrics();
+  EXPECT_EQ(metrics.last_checkpoint.Value(), 0.0);
+  map_scan(5.0F);
+  saver.save_if_changed();
+  saver.save_if_changed();
+  EXPECT_EQ(metrics.checkpoint_durations.Collect().histogram.sample_count, 1U);
+  EXPECT_GT(metrics.last_checkpoint.Value(), 1.6e9);
+  EXPECT_EQ(metrics.checkpoint_failures.Value(), 0.0);
+}
+
+TEST_F(MapSaverTest, CountsSavesThatFail) {
+  class FailingSource : public test::LatestMapSource {
+   public:
+    using LatestMapSource::LatestMapSource;
+    void checkpoint_stored(std::uint64_t) override { throw MapFileError("map", "no space left"); }
+  };
+  FailingSource source(latest_map_);
+  MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
+  saver.set_source(source);
+  map_scan(5.0F);
+  EXPECT_THROW(saver.save_if_changed(), MapFileError);
+  EXPECT_EQ(statistics_.metrics().checkpoint_failures.Value(), 1.0);
+  EXPECT_EQ(statistics_.metrics().last_checkpoint.Value(), 0.0);
+}
+
 TEST_F(MapSaverTest, NeedsAFileToSaveTo) {
-  MapSaver saver(latest_map_, {}, {});
+  MapSaver saver(latest_map_, statistics_, {}, {});
+  saver.set_source(source_);
   EXPECT_FALSE(saver.load());
   EXPECT_NO_THROW(saver.save_if_changed());
   EXPECT_THROW(saver.save_as(""), std::invalid_argument);
@@ -133,7 +176,8 @@ TEST_F(MapSaverTest, NeedsAFileToSaveTo) {
 
 TEST_F(MapSaverTest, NamesOfOtherFilesAreRefused) {
   map_scan(5.0F);
-  MapSaver saver(latest_map_, folder_ / "map.stillmap", {});
+  MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
+  saver.set_source(source_);
   // With a NUL inside, two names mean one file.
   const std::string cut_off("map.stillmap\0.other", 19);
   for (const std::string& name :
@@ -143,7 +187,9 @@ TEST_F(MapSaverTest, NamesOfOtherFilesAreRefused) {
   }
   map_scan(50.0F);
   saver.save_if_changed();
-  EXPECT_EQ(MapSaver(latest_map_, folder_ / "map.stillmap", {}).load()->view.tiles.size(), 2U);
+  EXPECT_EQ(
+      MapSaver(latest_map_, statistics_, folder_ / "map.stillmap", {}).load()->view.tiles.size(),
+      2U);
 }
 
 }  // namespace

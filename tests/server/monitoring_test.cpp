@@ -4,94 +4,118 @@
 #include <prometheus/metric_family.h>
 
 #include <algorithm>
+#include <map>
 
-#include "server/monitoring/checkpoint_log.hpp"
-#include "server/monitoring/duration_histogram.hpp"
-#include "server/monitoring/metric_families.hpp"
+#include "server/monitoring/metrics.hpp"
 #include "server/monitoring/service_log.hpp"
+#include "server/monitoring/statistics.hpp"
 #include "stillmap_msgs.h"
 
 namespace stillmap::server {
 namespace {
 
-TEST(DurationHistogram, CountsCumulativelyWithInclusiveBounds) {
-  DurationHistogram histogram;
-  for (const double seconds : {0.0005, 0.001, 0.3, 99.0}) histogram.add(seconds);
-  EXPECT_EQ(histogram.count(), 4U);
-  EXPECT_DOUBLE_EQ(histogram.sum_s(), 99.3015);
-  EXPECT_EQ(histogram.count_up_to(0), 2U);
-  const auto half_second = std::ranges::find(DurationHistogram::bounds_s, 0.5);
-  const auto bucket = static_cast<std::size_t>(half_second - DurationHistogram::bounds_s.begin());
-  EXPECT_EQ(histogram.count_up_to(bucket - 1), 2U);
-  EXPECT_EQ(histogram.count_up_to(bucket), 3U);
-  EXPECT_EQ(histogram.count_up_to(DurationHistogram::bounds_s.size() - 1), 3U);
+using prometheus::MetricFamily;
+using testing::ElementsAre;
+using testing::Pair;
+
+MetricFamily family(Metrics& metrics, const std::string& name,
+                    const dds::ServerStatus& status = {}) {
+  const auto families = metrics.collect(status);
+  const auto found = std::ranges::find(families, name, &MetricFamily::name);
+  return found == families.end() ? MetricFamily() : *found;
 }
 
-TEST(CheckpointLog, TellsWhatWasStoredFromWhatWasNot) {
-  CheckpointLog log;
-  EXPECT_FALSE(log.record().last_stored);
-  { const CheckpointLog::Attempt failed(log); }
-  EXPECT_EQ(log.record().failures, 1U);
-  EXPECT_FALSE(log.record().last_stored);
-  {
-    CheckpointLog::Attempt attempt(log);
-    attempt.stored();
+/// Values of a family of counters or gauges, by one of its labels.
+std::map<std::string, double> values_by(const MetricFamily& family, const std::string& label) {
+  std::map<std::string, double> values;
+  for (const auto& metric : family.metric) {
+    const auto found =
+        std::ranges::find(metric.label, label, &prometheus::ClientMetric::Label::name);
+    if (found == metric.label.end()) continue;
+    values[found->value] = metric.counter.value + metric.gauge.value;
   }
-  EXPECT_EQ(log.record().failures, 1U);
-  EXPECT_EQ(log.record().times.count(), 1U);
-  EXPECT_TRUE(log.record().last_stored);
+  return values;
 }
 
 TEST(ServiceLog, CountsAnswersByServiceAndCode) {
-  ServiceLog log;
+  Metrics metrics;
+  ServiceLog log(metrics);
   const auto reset = logged(log, "stillmap/reset", [](const int& code) {
     stillmap_msgs::srv::Reset_Response reply;
     reply.status().code(static_cast<std::uint8_t>(code));
     return reply;
   });
+  for (const int code : {0, 1, 1}) EXPECT_EQ(reset(code).status().code(), code);
+  EXPECT_THAT(values_by(family(metrics, "stillmap_service_requests_total"), "code"),
+              ElementsAre(Pair("invalid_request", 2.0), Pair("ok", 1.0)));
   // A standard type has no code.
   const auto plain = logged(log, "stillmap/plain", [](const int& value) { return value; });
-  for (const int code : {0, 1, 1}) EXPECT_EQ(reset(code).status().code(), code);
   EXPECT_EQ(plain(7), 7);
-  const auto services = log.services();
-  ASSERT_EQ(services.size(), 2U);
-  EXPECT_THAT(services.at("stillmap/reset").answers,
-              testing::ElementsAre(std::pair(wire::ReplyCode::ok, 1U),
-                                   std::pair(wire::ReplyCode::invalid_request, 2U)));
-  EXPECT_EQ(services.at("stillmap/reset").times.count(), 3U);
-  EXPECT_EQ(services.at("stillmap/plain").answers.at(wire::ReplyCode::ok), 1U);
+  EXPECT_EQ(
+      values_by(family(metrics, "stillmap_service_requests_total"), "service").at("stillmap/plain"),
+      1.0);
+  const MetricFamily durations = family(metrics, "stillmap_service_duration_seconds");
+  ASSERT_EQ(durations.metric.size(), 2U);
+  EXPECT_EQ(durations.metric[0].histogram.sample_count + durations.metric[1].histogram.sample_count,
+            4U);
 }
 
-prometheus::MetricFamily family(const MetricsSnapshot& snapshot, const std::string& name) {
-  const auto families = metric_families(snapshot);
-  const auto found = std::ranges::find(families, name, &prometheus::MetricFamily::name);
-  return found == families.end() ? prometheus::MetricFamily() : *found;
+TEST(Metrics, GiveDropsByReasonAndOtherEventsApart) {
+  Statistics statistics;
+  for (int scan = 0; scan < 9; ++scan) statistics.scan_received();
+  statistics.scans_dropped("queue_full", 3, "too fast");
+  statistics.scans_dropped("empty", 1, "no points");
+  statistics.count("occupancy_not_cleared");
+  Metrics& metrics = statistics.metrics();
+  EXPECT_EQ(family(metrics, "stillmap_scans_received_total").metric.at(0).counter.value, 9.0);
+  EXPECT_THAT(values_by(family(metrics, "stillmap_scans_dropped_total"), "reason"),
+              ElementsAre(Pair("empty", 1.0), Pair("queue_full", 3.0)));
+  EXPECT_THAT(values_by(family(metrics, "stillmap_events_total"), "event"),
+              ElementsAre(Pair("occupancy_not_cleared", 1.0)));
 }
 
-TEST(MetricFamilies, GiveDropsByReasonAndOtherEventsApart) {
-  MetricsSnapshot snapshot;
-  snapshot.status.counters = {{"scans_received", 9}, {"scans_mapped", 5},
-                              {"map_memory_kib", 3}, {"dropped_queue_full", 3},
-                              {"dropped_empty", 1},  {"occupancy_not_cleared", 2}};
-  EXPECT_EQ(family(snapshot, "stillmap_scans_received_total").metric.at(0).counter.value, 9.0);
-  const auto drops = family(snapshot, "stillmap_scans_dropped_total").metric;
-  ASSERT_EQ(drops.size(), 2U);
-  EXPECT_EQ(drops[0].label.at(0).value, "queue_full");
-  EXPECT_EQ(drops[0].counter.value, 3.0);
-  const auto events = family(snapshot, "stillmap_events_total").metric;
-  ASSERT_EQ(events.size(), 1U);
-  EXPECT_EQ(events[0].label.at(0).value, "occupancy_not_cleared");
+TEST(Metrics, AndTheStatusHaveOneSource) {
+  Statistics statistics;
+  statistics.set_map_memory({.bytes = 4096, .resident_tiles = 0, .non_resident_tiles = 5}, 1);
+  statistics.segmentation_failed("the network is broken");
+  dds::ServerStatus status;
+  statistics.report_to(status);
+  EXPECT_EQ(status.counter("map_memory_kib"), 4U);
+  EXPECT_EQ(status.counter("map_tiles_evicted"), 5U);
+  EXPECT_EQ(status.counter("map_tiles_unreadable"), 1U);
+  EXPECT_EQ(status.counter("label_failures"), 1U);
+  Metrics& metrics = statistics.metrics();
+  EXPECT_EQ(family(metrics, "stillmap_map_memory_bytes").metric.at(0).gauge.value, 4096.0);
+  EXPECT_EQ(family(metrics, "stillmap_map_tiles_evicted").metric.at(0).gauge.value, 5.0);
+  EXPECT_EQ(family(metrics, "stillmap_label_failures_total").metric.at(0).counter.value, 1.0);
 }
 
-TEST(MetricFamilies, KeepPrometheusConventions) {
-  const auto families = metric_families({.status = {},
-                                         .stages = {},
-                                         .services = {},
-                                         .checkpoints = {},
-                                         .map_memory = {},
-                                         .process = process_use()});
+TEST(Metrics, ShowTheStatusAsItIs) {
+  Metrics metrics;
+  dds::ServerStatus status;
+  status.health = OdometryHealth::good;
+  status.label_source = "model";
+  status.segmentation.fresh_share = 0.25;
+  status.segmentation.propagated_share = 0.75;
+  const auto health = values_by(family(metrics, "stillmap_odometry_health", status), "state");
+  EXPECT_EQ(health.at("good"), 1.0);
+  EXPECT_EQ(health.at("lost"), 0.0);
+  EXPECT_THAT(values_by(family(metrics, "stillmap_scan_labels_ratio", status), "source"),
+              ElementsAre(Pair("none", 0.0), Pair("propagated", 0.75), Pair("segmented", 0.25)));
+  status.label_source = "none";
+  EXPECT_THAT(values_by(family(metrics, "stillmap_info", status), "label_source"),
+              ElementsAre(Pair("none", 1.0)))
+      << "without the source before";
+}
+
+TEST(Metrics, KeepPrometheusConventions) {
+  Statistics statistics;
+  statistics.add_latency("odometry", 1.0);
+  statistics.scans_dropped("queue_full", 3, "too fast");
+  statistics.count("sensor_mismatch");
+  ServiceLog(statistics.metrics()).answered("stillmap/reset", wire::ReplyCode::ok, 0.1);
   std::vector<std::string> names;
-  for (const auto& one : families) {
+  for (const auto& one : statistics.metrics().collect({})) {
     names.push_back(one.name);
     EXPECT_EQ(one.name.ends_with("_total"), one.type == prometheus::MetricType::Counter)
         << one.name;
@@ -103,11 +127,13 @@ TEST(MetricFamilies, KeepPrometheusConventions) {
   EXPECT_EQ(std::ranges::adjacent_find(names), names.end());
 }
 
-TEST(ProcessUse, IsThatOfThisProcess) {
-  const ProcessUse use = process_use();
-  EXPECT_GT(use.resident_bytes, 1e6);
-  EXPECT_GE(use.open_files, 3.0);
-  EXPECT_GE(use.cpu_seconds, 0.0);
+TEST(Metrics, ShowThisProcess) {
+  Metrics metrics;
+  EXPECT_GT(family(metrics, "process_resident_memory_bytes").metric.at(0).gauge.value, 1e6);
+  EXPECT_GE(family(metrics, "process_open_fds").metric.at(0).gauge.value, 3.0);
+  const double before = family(metrics, "process_cpu_seconds_total").metric.at(0).counter.value;
+  EXPECT_GT(before, 0.0);
+  EXPECT_GE(family(metrics, "process_cpu_seconds_total").metric.at(0).counter.value, before);
 }
 
 }  // namespace

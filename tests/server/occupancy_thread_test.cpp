@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
+#include <condition_variable>
+#include <mutex>
+#include <thread>
 
 #include "tests/server/room_scans.hpp"
 
@@ -73,35 +75,43 @@ TEST_F(OccupancyThreadTest, EncodesInTheBackgroundWhatItEncodesAtOnce) {
   }
 }
 
-/// Holds the thread up where it looks for a gap.
+/// Holds the thread up where it calls the throttle.
 class GatedOccupancyThreadTest : public OccupancyThreadTest {
  protected:
   ThrottleCallback gate() {
     return [this] {
+      std::unique_lock lock(gate_mutex_);
       is_waiting_ = !is_open_;
-      while (!is_open_) std::this_thread::sleep_for(1ms);
+      gate_changed_.notify_all();
+      gate_changed_.wait(lock, [this] { return is_open_; });
       is_waiting_ = false;
     };
   }
-  [[nodiscard]] bool waits() const {
-    const auto deadline = std::chrono::steady_clock::now() + 60s;
-    while (!is_waiting_ && std::chrono::steady_clock::now() < deadline) {
-      std::this_thread::sleep_for(1ms);
-    }
-    return is_waiting_;
+  [[nodiscard]] bool waits() {
+    std::unique_lock lock(gate_mutex_);
+    return gate_changed_.wait_for(lock, 60s, [this] { return is_waiting_; });
   }
-  std::atomic<bool> is_open_ = true;
-  std::atomic<bool> is_waiting_ = false;
+  void set_open(bool is_open) {
+    const std::scoped_lock lock(gate_mutex_);
+    is_open_ = is_open;
+    gate_changed_.notify_all();
+  }
+
+ private:
+  std::mutex gate_mutex_;
+  std::condition_variable gate_changed_;
+  bool is_open_ = true;
+  bool is_waiting_ = false;
 };
 
 TEST_F(GatedOccupancyThreadTest, WaitsForGapsBetweenScansAndTakesThemThen) {
   server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate());
-  is_open_ = false;
+  set_open(false);
   for (int i = 0; i < 4; ++i) thread.add(room(i));
   ASSERT_TRUE(waits());
   EXPECT_EQ(thread.changes(), 0U);
-  EXPECT_EQ(all_of(thread).occupied, 0U) << "who asks does not wait for gaps";
-  is_open_ = true;
+  EXPECT_EQ(all_of(thread).occupied, 0U) << "queries do not wait for the throttle";
+  set_open(true);
   EXPECT_TRUE(done(thread, 4));
   EXPECT_GT(all_of(thread).occupied, 100U);
 }
@@ -110,11 +120,11 @@ TEST_F(GatedOccupancyThreadTest, EncodesInAGap) {
   server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate());
   thread.add(room(0));
   ASSERT_TRUE(done(thread, 1));
-  is_open_ = false;
+  set_open(false);
   std::future<server::EncodedOctree> encoded = thread.encode_in_background();
   ASSERT_TRUE(waits());
   EXPECT_EQ(encoded.wait_for(0s), std::future_status::timeout);
-  is_open_ = true;
+  set_open(true);
   EXPECT_EQ(encoded.wait_for(60s), std::future_status::ready);
 }
 
@@ -122,13 +132,13 @@ TEST_F(GatedOccupancyThreadTest, ShowsNothingOfTheOldMapWhileANewOneWaitsForAGap
   server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate());
   thread.add(room(0));
   ASSERT_TRUE(done(thread, 1));
-  is_open_ = false;
+  set_open(false);
   StaticMap map{StaticMapConfig{}};
   thread.begin(map.view());
   ASSERT_TRUE(waits());
   EXPECT_EQ(all_of(thread).occupied, 0U);
   EXPECT_EQ(thread.encode(true).data.bytes, OccupancyMap(OccupancyConfig{}).encode(true).bytes);
-  is_open_ = true;
+  set_open(true);
   EXPECT_TRUE(done(thread, 2));
   EXPECT_EQ(all_of(thread).occupied, 0U);
 }
@@ -137,24 +147,24 @@ TEST_F(GatedOccupancyThreadTest, EndsWithAnEncodingUnderWay) {
   std::future<server::EncodedOctree> encoded;
   {
     server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate());
-    is_open_ = false;
+    set_open(false);
     encoded = thread.encode_in_background();
     ASSERT_TRUE(waits());
-    is_open_ = true;
+    set_open(true);
   }
   EXPECT_EQ(encoded.wait_for(0s), std::future_status::ready) << "with an octree or an exception";
 }
 
-TEST_F(OccupancyThreadTest, LeavesOutClearingAndThenScansWhenItCannotKeepUp) {
+TEST_F(OccupancyThreadTest, StopsClearingAndThenDropsScansWhenItCannotKeepUp) {
   OccupancyServiceConfig config;
   config.queue_length = 4;
   server::OccupancyThread thread(config, statistics_);
   const server::OccupancyScan scan = room(0);
   constexpr std::uint64_t scans = 400;
   for (std::uint64_t i = 0; i < scans; ++i) thread.add(scan);
-  const std::uint64_t left_out = counted(statistics_, "occupancy_scans_left_out");
-  EXPECT_GT(left_out, 0U);
-  ASSERT_TRUE(done(thread, scans - left_out));
+  const std::uint64_t dropped = counted(statistics_, "occupancy_scans_dropped");
+  EXPECT_GT(dropped, 0U);
+  ASSERT_TRUE(done(thread, scans - dropped));
   EXPECT_GT(counted(statistics_, "occupancy_not_cleared"), 0U);
   EXPECT_GT(all_of(thread).occupied, 100U);
 }

@@ -51,7 +51,7 @@ int ServerProcess::wait_for_exit(std::chrono::seconds timeout) {
 ServiceSetup::ServiceSetup(const std::string& delivery, const std::string& map_options) {
   std::ofstream(folder_ / "server.yaml")
       << "sensor: vlp_16\n"
-      << "dds: {domain_id: " << test_domain_id() << ", interfaces: [127.0.0.1]}\n"
+      << "dds: {domain_id: " << dds::test_domain_id() << ", interfaces: [127.0.0.1]}\n"
       << "input: {delivery: " << delivery << ", queue_length: 3}\n"
       << "publish: {path_period_s: 0.1, cloud_period_s: 0.1, tiles_period_s: 0.1, "
       << "status_period_s: 0.2}\n"
@@ -62,7 +62,7 @@ std::vector<std::string> ServiceSetup::server_arguments() const {
   return {"--config", (folder_ / "server.yaml").string()};
 }
 
-dds::DdsOptions ServiceSetup::dds() const { return loopback(true); }
+dds::DdsOptions ServiceSetup::dds() const { return dds::loopback(true); }
 
 ClientOptions ServiceSetup::client() const {
   return {.dds = dds(), .server_name = "stillmap", .request_timeout = patience};

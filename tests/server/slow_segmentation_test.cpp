@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "server/mapping/mapping_thread.hpp"
-#include "server/publishers/server_report.hpp"
+#include "server/publishers/status_publisher.hpp"
 #include "tests/server/room_scans.hpp"
 #include "tests/server/slow_segmenter.hpp"
 
@@ -74,7 +74,7 @@ TEST_F(SlowSegmentation, DelaysNoPoseBeyondTheBudgetAndIsUsedForEveryNthScan) {
   EXPECT_EQ(slow.segmentation.fresh_share, 0.0);
   EXPECT_GT(slow.segmentation.propagated_share, 0.6);
   EXPECT_THAT(slow.reason, HasSubstr(dds::every_nth_scan(slow.segmentation.interval)));
-  EXPECT_THAT(slow.reason, HasSubstr("carried"));
+  EXPECT_THAT(slow.reason, HasSubstr("labels are propagated between"));
   // The network's 200 ms do not show: the budget of 30 ms, and much room for a busy machine.
   EXPECT_LT(median_ms("segment"), 190.0);
 

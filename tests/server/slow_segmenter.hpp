@@ -16,6 +16,8 @@ class SlowSegmenter final : public Segmenter {
  public:
   struct Behaviour {
     std::atomic<int> delay_ms{0};
+    /// It finishes no scan while this is set; notified when it is cleared.
+    std::atomic<bool> is_held{false};
     std::atomic<bool> fails{false};
     std::atomic<int> labelled{0};
     std::vector<double> costs{1.0};
@@ -31,6 +33,7 @@ class SlowSegmenter final : public Segmenter {
   [[nodiscard]] PointLabels segment(const Scan& scan) override {
     std::this_thread::sleep_for(
         std::chrono::duration<double, std::milli>(behaviour_.delay_ms * cost_));
+    behaviour_.is_held.wait(true);
     if (behaviour_.fails) throw std::runtime_error("the network is broken");
     ++behaviour_.labelled;
     return PassthroughSegmenter().segment(scan);

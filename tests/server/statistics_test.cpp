@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "server/monitoring/latency_window.hpp"
+#include "server/monitoring/recent_values.hpp"
 
 namespace stillmap::server {
 namespace {

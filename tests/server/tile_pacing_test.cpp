@@ -7,7 +7,6 @@
 
 #include "idl/dds/reader.hpp"
 #include "server/publishers/tile_publisher.hpp"
-#include "server/publishers/token_bucket.hpp"
 #include "tests/idl/dds_fixture.hpp"
 
 namespace stillmap::server {
@@ -47,7 +46,7 @@ std::shared_ptr<const MapSnapshot> with_first_changed(const MapSnapshot& row,
 }
 
 dds::DdsOptions slow_network() {
-  dds::DdsOptions options = loopback(false);
+  dds::DdsOptions options = dds::loopback(false);
   options.large_message_bytes_per_s = 400'000;
   options.max_datagram_bytes = 1400;
   return options;
@@ -58,7 +57,7 @@ class TilePacing : public testing::Test {
   void expect_all_arrive(std::size_t tiles) {
     std::map<std::int32_t, std::uint64_t> revisions;
     MapTile message;
-    while (revisions.size() < tiles && reader_.take(message, {}, discovery_timeout)) {
+    while (revisions.size() < tiles && reader_.take(message, {}, dds::discovery_timeout)) {
       revisions[message.tile_x()] = message.state().revision();
     }
     EXPECT_EQ(revisions.size(), tiles);
@@ -100,14 +99,14 @@ TEST(TokenBucketOfARate, SavesUpNoMoreThanASecond) {
 }
 
 TEST_F(TilePacing, ABurstIsSpreadAndArrivesWhole) {
-  ASSERT_TRUE(reader_.events().wait_for_writer(discovery_timeout));
+  ASSERT_TRUE(reader_.events().wait_for_writer(dds::discovery_timeout));
   constexpr int tiles = 40;
   const auto view = row_of_tiles(tiles, 1);
   const auto began = Clock::now();
   publisher_.publish(view);
   EXPECT_GT(publisher_.waiting(), 25U);
   EXPECT_LT(publisher_.waiting(), 35U);
-  while (publisher_.waiting() > 0 && Clock::now() - began < discovery_timeout) {
+  while (publisher_.waiting() > 0 && Clock::now() - began < dds::discovery_timeout) {
     std::this_thread::sleep_for(50ms);
     publisher_.publish(view);
   }
@@ -122,11 +121,11 @@ TEST_F(TilePacing, ATileThatKeepsChangingDoesNotHoldUpTheOthers) {
   const auto began = Clock::now();
   std::uint64_t revision = 1;
   publisher_.publish(row);
-  while (publisher_.waiting() > 1 && Clock::now() - began < discovery_timeout) {
+  while (publisher_.waiting() > 1 && Clock::now() - began < dds::discovery_timeout) {
     std::this_thread::sleep_for(50ms);
     publisher_.publish(with_first_changed(*row, ++revision));
   }
-  EXPECT_LT(Clock::now() - began, discovery_timeout);
+  EXPECT_LT(Clock::now() - began, dds::discovery_timeout);
   expect_all_arrive(tiles);
 }
 
@@ -136,7 +135,7 @@ TEST_F(TilePacing, WhatChangesWhileItWaitsIsSentAsItIsThen) {
   const std::size_t sent_at_once = tiles - publisher_.waiting();
   const auto newest = row_of_tiles(static_cast<int>(tiles), 2);
   const auto began = Clock::now();
-  while (publisher_.waiting() > 0 && Clock::now() - began < discovery_timeout) {
+  while (publisher_.waiting() > 0 && Clock::now() - began < dds::discovery_timeout) {
     publisher_.publish(newest);
     std::this_thread::sleep_for(50ms);
   }

@@ -3,10 +3,12 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <atomic>
+#include <condition_variable>
+#include <mutex>
 #include <stdexcept>
 
-#include "server/traversability/traversability_grid_provider.hpp"
+#include "server/traversability/traversability_grid.hpp"
+#include "tests/server/manual_clock.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
 namespace stillmap::server {
@@ -40,17 +42,19 @@ class TraversabilityThreadTest : public testing::Test {
   }
 
   void start(std::chrono::duration<double> period) {
+    const auto updated = [this] {
+      const std::scoped_lock lock(mutex_);
+      ++updates_;
+      updated_.notify_all();
+    };
     thread_.emplace(std::vector{square_robot(), small_robot()}, period, latest_map_, snapshot_,
-                    statistics_, [this] { ++updates_; });
+                    statistics_, updated, ThrottleCallback(), clock_);
   }
 
-  [[nodiscard]] bool wait_for_version(std::uint64_t version) const {
-    const auto deadline = std::chrono::steady_clock::now() + 60s;
-    while (snapshot_.view("small")->version != version) {
-      if (std::chrono::steady_clock::now() > deadline) return false;
-      std::this_thread::sleep_for(1ms);
-    }
-    return true;
+  [[nodiscard]] bool wait_for_version(std::uint64_t version) {
+    std::unique_lock lock(mutex_);
+    return updated_.wait_for(lock, 60s,
+                             [&] { return snapshot_.view("small")->version == version; });
   }
 
   [[nodiscard]] double cost_at(const std::string& robot, double x_m, double y_m) const {
@@ -61,11 +65,14 @@ class TraversabilityThreadTest : public testing::Test {
   LatestMap latest_map_;
   TraversabilitySnapshot snapshot_;
   Statistics statistics_;
-  std::atomic<int> updates_ = 0;
+  test::ManualClock clock_;
+  std::mutex mutex_;
+  std::condition_variable updated_;
+  int updates_ = 0;
   std::optional<TraversabilityThread> thread_;
 };
 
-TEST_F(TraversabilityThreadTest, KeepsEveryRobotsAreaUpToDate) {
+TEST_F(TraversabilityThreadTest, KeepsEveryRobotsViewUpToDate) {
   start(0s);
   ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
   EXPECT_EQ(cost_at("small", 1.1, 1.1), 0);
@@ -91,7 +98,7 @@ TEST_F(TraversabilityThreadTest, TellsHowLongAChangeTakes) {
   dds::ServerStatus status;
   statistics_.report_to(status);
   ASSERT_EQ(status.latencies.size(), 1U);
-  EXPECT_EQ(status.latencies[0].stage, "areas");
+  EXPECT_EQ(status.latencies[0].stage, "traversability");
   EXPECT_EQ(status.latencies[0].samples, 1U);
   EXPECT_GT(status.latencies[0].p50_ms, 0.0);
 }
@@ -104,11 +111,19 @@ TEST_F(TraversabilityThreadTest, UpdatesOnceAPeriodHoweverOftenTheMapChanges) {
     world_.block(1 + i, 1, 2 + i, 2, 0.3, 2.0, building);
     latest_map_.publish(shared(world_.view()));
   }
-  std::this_thread::sleep_for(50ms);
+  const auto pause = clock_.wait_for_sleeper();
+  ASSERT_TRUE(pause);
+  EXPECT_EQ(*pause, 3600s);
   EXPECT_EQ(snapshot_.view("small")->version, first);
-  // Destroying it must not take the hour.
+  clock_.advance(*pause);
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
+  EXPECT_EQ(updates_, 2);
+  // Destroying it must not take the next hour.
+  world_.block(1, 1, 2, 2, 2.0, 3.0, building);
+  latest_map_.publish(shared(world_.view()));
+  ASSERT_TRUE(clock_.wait_for_sleeper());
   thread_.reset();
-  EXPECT_EQ(updates_, 1);
+  EXPECT_EQ(updates_, 2);
 }
 
 TEST_F(TraversabilityThreadTest, FollowsToAnotherMap) {

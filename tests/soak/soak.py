@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A server under a long drive, with clients that come and go, hang and die.
+"""A server under a long run, with clients that come and go, hang and die.
 
 A sensor drives round in one hall at 10 Hz, so that the map stops growing after the first round;
 whatever grows from then on is looked at. Fails when the server's memory grows beyond what poses and
@@ -211,13 +211,13 @@ class Soak:
         self.start_server()
         poses = Poses([self.stillmap, "watch", "--json", *self.here()])
         poses.start()
-        drive = self.start([self.options.drive, str(self.options.domain), str(seconds)], "drive.log")
+        sensor = self.start([self.options.sensor, str(self.options.domain), str(seconds)], "sensor.log")
         time.sleep(min(10, seconds / 6))
         self.quiet_before = use_of(self.server.pid)
         clients = Clients(self.stillmap, self.options.domain, self.options.seed)
         clients.start()
         begin = time.monotonic()
-        while drive.poll() is None:
+        while sensor.poll() is None:
             if self.server.poll() is not None:
                 raise SystemExit(f"soak: FAILED: the server ended with {self.server.returncode}")
             self.sample(begin)
@@ -229,10 +229,10 @@ class Soak:
         poses.process.send_signal(signal.SIGINT)
         poses.process.wait()
         self.poses, self.clients = poses, clients
-        sent = [line.split()[1] for line in (self.out / "drive.log").read_text().splitlines()
+        sent = [line.split()[1] for line in (self.out / "sensor.log").read_text().splitlines()
                 if line.startswith("sent")]
         self.sent = int(sent[-1]) if sent else 0
-        self.drive_exit = drive.returncode
+        self.sensor_exit = sensor.returncode
         self.server.send_signal(signal.SIGTERM)
         self.server_exit = self.server.wait(timeout=60)
 
@@ -254,7 +254,7 @@ class Soak:
         mapped = status["counters"]["scans_mapped"] if status else 0
         demand(mapped == self.sent, f"{self.sent} scans were sent, {mapped} were mapped")
         demand(status is not None and dropped_of(status) == 0, "scans were dropped")
-        demand(self.drive_exit == 0, "the server stopped taking scans")
+        demand(self.sensor_exit == 0, "the server stopped taking scans")
         demand(self.poses.max_gap_s <= MAX_GAP_S,
                f"no pose came for {self.poses.max_gap_s:.1f} s")
         demand(self.grown_mib() <= self.allowed_mib(),
@@ -328,7 +328,7 @@ def curve(samples, columns=64, rows=8):
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--bin", default="build/release/bin")
-    parser.add_argument("--drive", default="build/release/tests/soak/soak_sensor")
+    parser.add_argument("--sensor", default="build/release/tests/soak/soak_sensor")
     parser.add_argument("--minutes", type=float, default=30)
     parser.add_argument("--domain", type=int, default=57)
     parser.add_argument("--seed", type=int, default=1)

@@ -1,0 +1,83 @@
+#include "server/interface.hpp"
+
+#include <memory>
+#include <string>
+
+namespace stillmap::server {
+namespace {
+
+ServerTraits traits(const ServerConfig& config, const InterfaceContext& context) {
+  return {.delivery = config.input.delivery,
+          .label_source = context.mapping.label_source(),
+          .sensor = config.mapper.sensor.name,
+          .points_topic = config.topics.points,
+          .host_diagnostics = host_diagnostics(context.participant.options().socket_buffer_bytes)};
+}
+
+}  // namespace
+
+Interface::Interface(const ServerConfig& config, const InterfaceContext& context)
+    : participant_(context.participant),
+      map_publisher_(context.participant, context.topics, config, context.mapping.latest_map()),
+      receiver_(std::in_place, context.participant, config, context.mapping.scans(),
+                context.statistics),
+      discovery_diagnostics_(context.participant),
+      report_(
+          traits(config, context), context.mapping.latest_map(), context.statistics,
+          [this] { return discovery_diagnostics_.diagnostics(); },
+          [this] { return receiver_ ? receiver_->no_input_reason() : std::string(); }) {
+  services_.emplace(context.participant, config.topics.name_space,
+                    service_context(config, context));
+  status_publisher_.emplace(context.participant, context.topics, config.publish.status_period_s,
+                            [this] { return status(); });
+}
+
+ServiceContext Interface::service_context(const ServerConfig& config,
+                                          const InterfaceContext& context) const {
+  Mapping& mapping = context.mapping;
+  ServiceContext services{
+      .latest_map = mapping.latest_map(),
+      .tiles = mapping.tiles(),
+      .saver = mapping.saver(),
+      .status = [this] { return status(); },
+      .reset = [&mapping] { return mapping.reset(); },
+      .load = [&mapping](
+                  const SavedMap& map,
+                  const std::shared_ptr<TileStore>& tile_store) { mapping.load(map, tile_store); },
+      .publish_now = [&mapping] { mapping.publish_now(); },
+      .removed =
+          [&mapping](const Eigen::AlignedBox3d& box_map) { return mapping.removed(box_map); },
+      .restore_removed =
+          [&mapping](RemovalReason reason, const Eigen::AlignedBox3d& box_map) {
+            return mapping.restore_removed(reason, box_map);
+          },
+      .query_occupancy = {},
+      .encode_octomap = {},
+      .traversability = context.traversability.views(),
+      .grid_provider = context.traversability.grid(),
+      .map_frame = config.frames.map,
+      .log = context.service_log};
+  if (const OccupancyThread* occupancy = context.occupancy) {
+    services.query_occupancy = [occupancy](const OccupancyQuery& query) {
+      return occupancy->answer(query);
+    };
+    services.encode_octomap = [occupancy](bool binary) { return occupancy->encode(binary); };
+  }
+  return services;
+}
+
+void Interface::stop() {
+  services_.reset();
+  status_publisher_.reset();
+  receiver_.reset();
+}
+
+dds::ServerStatus Interface::status() const {
+  dds::ServerStatus status = report_.status();
+  for (const auto& [name, value] : participant_.service_faults().counts()) {
+    status.counters.push_back({.name = name, .value = value});
+  }
+  return status;
+}
+
+}  // namespace stillmap::server

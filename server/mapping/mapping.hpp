@@ -1,0 +1,79 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "config/loaders/server_config.hpp"
+#include "core/map/query/tile_reader.hpp"
+#include "idl/dds/participant.hpp"
+#include "idl/interface/topics.hpp"
+#include "server/mapping/map_saver.hpp"
+#include "server/mapping/mapping_thread.hpp"
+#include "server/mapping/odometry_prior.hpp"
+#include "server/mapping/scan_queue.hpp"
+#include "server/publishers/latest_map.hpp"
+#include "server/publishers/scan_publishers.hpp"
+
+namespace stillmap::server {
+
+/// What the mapping uses of the rest of the server; all of it must outlive the mapping.
+struct MappingContext {
+  dds::Participant& participant;
+  const dds::Topics& topics;
+  Statistics& statistics;
+  BackgroundThrottle& throttle;
+  /// Null: no octree.
+  OccupancyThread* occupancy = nullptr;
+};
+
+/// From queued scans to poses and the static map: the mapping thread with its inputs and outputs,
+/// the map file, and the checkpoints. Thread-safe.
+class Mapping {
+ public:
+  /// Loads the map file where the configuration says so, and starts. Throws MapFileError, DdsError,
+  /// or std::invalid_argument for a map that does not fit the configuration.
+  Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
+          const MappingContext& context);
+
+  /// No more checkpoints, mapping ends after the scan in work, and the map is saved. Throws
+  /// MapFileError. Without this call the destructor ends mapping, but saves nothing.
+  void stop();
+
+  /// Of the segmenter.
+  [[nodiscard]] const std::string& label_source() const { return label_source_; }
+  [[nodiscard]] ScanQueue& scans() { return scans_; }
+  [[nodiscard]] const LatestMap& latest_map() const { return latest_map_; }
+  /// Reads tiles from memory or from the map file.
+  [[nodiscard]] TileReader& tiles() { return tiles_; }
+
+  /// As in MappingThread.
+  [[nodiscard]] std::uint64_t reset() { return thread_->reset(); }
+  void publish_now() { thread_->publish_now(); }
+  [[nodiscard]] std::vector<RemovedVoxel> removed(const Eigen::AlignedBox3d& box_map) {
+    return thread_->removed(box_map);
+  }
+  std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map) {
+    return thread_->restore_removed(reason, box_map);
+  }
+
+  [[nodiscard]] MapSaver& saver() { return saver_; }
+  /// As MappingThread::load, for MapSaver::resume_from.
+  void load(const SavedMap& map, const std::shared_ptr<TileStore>& tile_store);
+
+ private:
+  std::string label_source_;
+  ScanQueue scans_;
+  LatestMap latest_map_;
+  MapSaver saver_;
+  TileReader tiles_;
+  PosePublisher poses_;
+  std::optional<LabelledScanPublisher> labelled_scans_;
+  std::optional<OdometryPrior> prior_;
+  // Each uses what stands above it, and stops before it.
+  std::optional<MappingThread> thread_;
+  std::optional<CheckpointWorker> checkpoints_;
+};
+
+}  // namespace stillmap::server

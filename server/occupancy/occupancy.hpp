@@ -1,0 +1,45 @@
+#pragma once
+
+#include <string>
+
+#include "config/loaders/server_config.hpp"
+#include "idl/dds/writer.hpp"
+#include "idl/interface/topics.hpp"
+#include "octomap_msgs.h"
+#include "server/occupancy/occupancy_thread.hpp"
+#include "server/threads/periodic_worker.hpp"
+
+namespace stillmap::server {
+
+/// Publishes the octree (binary, as RViz2's plug-in and octomap_server's clients read it) when it
+/// has changed and has a reader.
+class OctomapPublisher {
+ public:
+  OctomapPublisher(dds::Participant& participant, const dds::Topics& topics,
+                   const ServerConfig& config, OccupancyThread& occupancy);
+
+ private:
+  void publish();
+
+  OccupancyThread& occupancy_;
+  std::string map_frame_;
+  std::uint64_t published_ = 0;
+  dds::Writer<octomap_msgs::msg::Octomap> writer_;
+  // Last: stops before what it uses is gone.
+  PeriodicWorker worker_;
+};
+
+/// The octree and its topic.
+class Occupancy {
+ public:
+  Occupancy(dds::Participant& participant, const dds::Topics& topics, const ServerConfig& config,
+            Statistics& statistics, ThrottleCallback throttle);
+
+  [[nodiscard]] OccupancyThread& thread() { return thread_; }
+
+ private:
+  OccupancyThread thread_;
+  OctomapPublisher publisher_;
+};
+
+}  // namespace stillmap::server

@@ -1,0 +1,53 @@
+#include "server/threads/background_throttle.hpp"
+
+#include <sched.h>
+#include <time.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+namespace stillmap::server {
+namespace {
+
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr auto work_between_rests = 2ms;
+/// Longest pause, in times of the work before it.
+constexpr int rest_ratio = 9;
+constexpr std::chrono::nanoseconds max_rest = 1s;
+constexpr auto poll_period = 1ms;
+
+/// Processor time of the calling thread, which stands still while the scheduler prefers others.
+std::chrono::nanoseconds thread_cpu_time() {
+  timespec used{};
+  ::clock_gettime(CLOCK_THREAD_CPUTIME_ID, &used);
+  return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
+}
+
+}  // namespace
+
+bool use_idle_scheduling() {
+  // A nice value is not enough: the network's threads wait for each other many times a scan, and a
+  // thread that holds one of them up for a moment holds up both.
+  const sched_param none{};
+  return sched_setscheduler(0, SCHED_IDLE, &none) == 0;
+}
+
+ThrottleCallback make_throttle_callback(const BackgroundThrottle& throttle,
+                                        SaturationPolicy saturation_policy) {
+  return [&throttle, saturation_policy, last = std::chrono::nanoseconds(0)]() mutable {
+    const auto work = thread_cpu_time() - last;
+    if (work < work_between_rests) return;
+    const auto until = saturation_policy == SaturationPolicy::wait
+                           ? Clock::time_point::max()
+                           : Clock::now() + std::min(rest_ratio * work, max_rest);
+    while (!throttle.is_idle() && Clock::now() < until) {
+      std::this_thread::sleep_for(poll_period);
+    }
+    last = thread_cpu_time();
+  };
+}
+
+}  // namespace stillmap::server

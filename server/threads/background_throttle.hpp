@@ -1,0 +1,66 @@
+#pragma once
+
+#include <atomic>
+
+#include "core/map/throttle_callback.hpp"
+
+namespace stillmap::server {
+
+/// Gives the calling thread the scheduling class SCHED_IDLE: on busy cores it runs only when no
+/// other thread wants to. False where the system refuses.
+bool use_idle_scheduling();
+
+/// Whether a scan is being mapped, so that background work waits for the time between scans. Idle
+/// scheduling alone is not enough: cores share caches, memory bandwidth and often arithmetic units,
+/// so that a background thread slows the mapper down even on another core. Thread-safe and without
+/// locks: the mapper never waits for a background thread.
+class BackgroundThrottle {
+ public:
+  /// Marks a scan as being mapped while it lives.
+  class ScanInProgress {
+   public:
+    explicit ScanInProgress(BackgroundThrottle& throttle) : throttle_(throttle) {
+      ++throttle_.scans_in_progress_;
+    }
+    ~ScanInProgress() { --throttle_.scans_in_progress_; }
+    ScanInProgress(const ScanInProgress&) = delete;
+    ScanInProgress& operator=(const ScanInProgress&) = delete;
+
+   private:
+    BackgroundThrottle& throttle_;
+  };
+
+  [[nodiscard]] bool is_idle() const { return scans_in_progress_ == 0 || is_released_; }
+
+  /// Lets all background work run from now on: the server ends, and its threads are to finish.
+  void release() { is_released_ = true; }
+
+ private:
+  std::atomic<bool> is_released_ = false;
+  std::atomic<int> scans_in_progress_ = 0;
+};
+
+/// Releases the throttle when destroyed, so that threads that wait for it can end.
+class ThrottleRelease {
+ public:
+  explicit ThrottleRelease(BackgroundThrottle& throttle) : throttle_(throttle) {}
+  ~ThrottleRelease() { throttle_.release(); }
+  ThrottleRelease(const ThrottleRelease&) = delete;
+  ThrottleRelease& operator=(const ThrottleRelease&) = delete;
+
+ private:
+  BackgroundThrottle& throttle_;
+};
+
+/// What a background thread does when scans come as fast as they can be mapped, without gaps.
+enum class SaturationPolicy {
+  wait,
+  /// It still works a tenth of the time, if the scheduler grants it.
+  run_at_ten_percent,
+};
+
+/// For one background thread: returns when no scan is being mapped. `throttle` must outlive it.
+[[nodiscard]] ThrottleCallback make_throttle_callback(const BackgroundThrottle& throttle,
+                                                      SaturationPolicy saturation_policy);
+
+}  // namespace stillmap::server

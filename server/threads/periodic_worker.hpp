@@ -1,0 +1,30 @@
+#pragma once
+
+#include <chrono>
+#include <functional>
+#include <stop_token>
+#include <thread>
+
+#include "server/threads/monotonic_clock.hpp"
+
+namespace stillmap::server {
+
+/// Calls its work again and again on a thread of its own until destroyed.
+class PeriodicWorker {
+ public:
+  using Work = std::function<void(const std::stop_token& stop)>;
+  /// Returns when the next round is due.
+  using Round = std::function<MonotonicClock::TimePoint(const std::stop_token& stop)>;
+
+  /// Pauses for `period` between the end of one call and the next; 0 for work that waits itself,
+  /// until something happens or a stop is requested. The work must not throw.
+  PeriodicWorker(std::chrono::duration<double> period, Work work,
+                 MonotonicClock& clock = MonotonicClock::steady());
+  /// For rounds that say themselves when the next one is due.
+  explicit PeriodicWorker(Round round, MonotonicClock& clock = MonotonicClock::steady());
+
+ private:
+  std::jthread thread_;
+};
+
+}  // namespace stillmap::server

@@ -1,0 +1,25 @@
+#include "server/traversability/traversability.hpp"
+
+#include <utility>
+
+namespace stillmap::server {
+
+Traversability::Traversability(const ServerConfig& config, dds::Participant& participant,
+                               const dds::Topics& topics, const LatestMap& latest_map,
+                               TileReader& tiles, Statistics& statistics, ThrottleCallback throttle)
+    : cache_(snapshot_, latest_map, tiles),
+      grid_(config.traversability, config.frames.map, latest_map, snapshot_) {
+  std::vector<RobotProfile> robots = load_robots(config.traversability);
+  if (robots.empty()) return;
+  if (!config.traversability.grid_profile.empty()) {
+    publisher_.emplace(participant, topics, grid_);
+  }
+  const auto publish = [this] {
+    if (publisher_) publisher_->publish();
+  };
+  thread_.emplace(std::move(robots),
+                  std::chrono::duration<double>(config.traversability.update_period_s), latest_map,
+                  snapshot_, statistics, publish, std::move(throttle));
+}
+
+}  // namespace stillmap::server

@@ -1,0 +1,70 @@
+#include "server/traversability/traversability_grid.hpp"
+
+#include <utility>
+
+#include "idl/conversions/occupancy_grid.hpp"
+
+namespace stillmap::server {
+namespace {
+
+// A square kilometre in cells of 0.2 m, 25 MB: more is of no use every second.
+constexpr std::uint64_t max_cells = 25'000'000;
+
+bool is_same_grid(const OccupancyGrid& a, const OccupancyGrid& b) {
+  return a.origin_map == b.origin_map && a.resolution_m == b.resolution_m && a.width == b.width &&
+         a.height == b.height && a.data == b.data;
+}
+
+}  // namespace
+
+TraversabilityGridProvider::TraversabilityGridProvider(const TraversabilityConfig& config,
+                                                       const std::string& map_frame,
+                                                       const LatestMap& latest_map,
+                                                       const TraversabilitySnapshot& traversability)
+    : profile_(config.profiles.empty() ? std::string() : config.grid_profile),
+      window_m_(config.grid_window_m),
+      map_frame_(map_frame),
+      latest_map_(latest_map),
+      traversability_(traversability) {}
+
+OccupancyGrid TraversabilityGridProvider::grid() const {
+  OccupancyGrid none;
+  none.status = TraversabilityStatus::not_found;
+  none.reason = "no grid is configured: traversability.grid_profile is empty";
+  if (profile_.empty()) return none;
+  OccupancyGrid grid = occupancy_grid(*traversability_.view(profile_), window(), max_cells);
+  if (grid.status == TraversabilityStatus::too_large) {
+    grid.reason += "; traversability.grid_window_m makes it a window round the robot";
+  }
+  return grid;
+}
+
+nav_msgs::msg::OccupancyGrid TraversabilityGridProvider::message(const OccupancyGrid& grid) const {
+  return wire::to_message(grid, latest_map_.newest_pose().stamp_ns, map_frame_);
+}
+
+TraversabilityRegion TraversabilityGridProvider::window() const {
+  if (window_m_ == 0.0) return whole_map_region();
+  const Eigen::Vector2d robot_map = latest_map_.newest_pose().T_map_lidar.translation().head<2>();
+  const Eigen::Vector2d half = Eigen::Vector2d::Constant(window_m_ / 2.0);
+  return {Eigen::AlignedBox2d(robot_map - half, robot_map + half), {}};
+}
+
+TraversabilityPublisher::TraversabilityPublisher(dds::Participant& participant,
+                                                 const dds::Topics& topics,
+                                                 const TraversabilityGridProvider& grid_provider)
+    : grid_provider_(grid_provider),
+      writer_(participant, topics.traversability.dds_name, topics.traversability.writer) {}
+
+void TraversabilityPublisher::publish() {
+  OccupancyGrid grid = grid_provider_.grid();
+  if (grid.status == TraversabilityStatus::too_large) {
+    throttled_log_.warn("grid", "no grid is published: " + grid.reason);
+  }
+  if (is_same_grid(grid, published_)) return;
+  published_ = std::move(grid);
+  // A keep-last writer always has room.
+  static_cast<void>(writer_.write(grid_provider_.message(published_)));
+}
+
+}  // namespace stillmap::server

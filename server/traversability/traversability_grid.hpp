@@ -1,0 +1,54 @@
+#pragma once
+
+#include <string>
+
+#include "config/loaders/server_config.hpp"
+#include "core/traversability/occupancy_grid.hpp"
+#include "idl/dds/writer.hpp"
+#include "idl/interface/topics.hpp"
+#include "nav_msgs.h"
+#include "server/monitoring/log.hpp"
+#include "server/publishers/latest_map.hpp"
+#include "server/traversability/traversability_snapshot.hpp"
+
+namespace stillmap::server {
+
+/// The traversability of one robot as an occupancy grid for Nav2. Thread-safe.
+class TraversabilityGridProvider {
+ public:
+  TraversabilityGridProvider(const TraversabilityConfig& config, const std::string& map_frame,
+                             const LatestMap& latest_map,
+                             const TraversabilitySnapshot& traversability);
+
+  /// As of the last update. Its status is not ok without a robot or a map, for a window off the
+  /// map, and when the grid would be too large; the reason names a remedy.
+  [[nodiscard]] OccupancyGrid grid() const;
+  /// The same with the newest scan's stamp; empty when the status is not ok.
+  [[nodiscard]] nav_msgs::msg::OccupancyGrid message(const OccupancyGrid& grid) const;
+
+ private:
+  [[nodiscard]] TraversabilityRegion window() const;
+
+  std::string profile_;
+  double window_m_;
+  std::string map_frame_;
+  const LatestMap& latest_map_;
+  const TraversabilitySnapshot& traversability_;
+};
+
+/// Publishes the traversability grid whenever it changed. One thread calls it.
+class TraversabilityPublisher {
+ public:
+  TraversabilityPublisher(dds::Participant& participant, const dds::Topics& topics,
+                          const TraversabilityGridProvider& grid_provider);
+
+  void publish();
+
+ private:
+  const TraversabilityGridProvider& grid_provider_;
+  OccupancyGrid published_;
+  ThrottledLog throttled_log_;
+  dds::Writer<nav_msgs::msg::OccupancyGrid> writer_;
+};
+
+}  // namespace stillmap::server
