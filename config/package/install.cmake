@@ -11,7 +11,11 @@ endforeach()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/idl/msg/ DESTINATION share/stillmap/idl COMPONENT data
   FILES_MATCHING PATTERN "*.idl")
 
-install(FILES ${PROJECT_SOURCE_DIR}/README.md DESTINATION share/doc/stillmap COMPONENT tools)
+# The pages link to each other by their folders.
+foreach(page . core core/segmentation idl server clients config config/dds docker tests)
+  install(FILES ${PROJECT_SOURCE_DIR}/${page}/README.md DESTINATION share/doc/stillmap/${page}
+    COMPONENT tools)
+endforeach()
 install(FILES ${PROJECT_SOURCE_DIR}/clients/example/follow_and_query.cpp
   DESTINATION share/doc/stillmap/examples COMPONENT tools)
 foreach(package server:stillmap-server tools:stillmap data:stillmap-data)

@@ -25,7 +25,7 @@ run(0 "can be used" ${PREFIX}/bin/stillmap-server --check-config ${PREFIX}/etc/s
 # Only the installation has this robot.
 file(READ ${PREFIX}/share/stillmap/robots/car.yaml robot)
 file(WRITE ${PREFIX}/share/stillmap/robots/only_installed.yaml "${robot}")
-file(WRITE ${PREFIX}/robot.yaml "labels: {source: none}\nareas: {profiles: [only_installed]}\n")
+file(WRITE ${PREFIX}/robot.yaml "labels: {source: none}\ntraversability: {profiles: [only_installed]}\n")
 run(0 "can be used" ${PREFIX}/bin/stillmap-server --check-config ${PREFIX}/robot.yaml)
 run(2 "only_installed" ${BUILD}/bin/stillmap-server --check-config ${PREFIX}/robot.yaml)
 
