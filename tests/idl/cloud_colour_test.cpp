@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstring>
 
-#include "idl/conversions/to_cloud.hpp"
 #include "idl/conversions/point_field.hpp"
+#include "idl/conversions/to_cloud.hpp"
 
 // What RViz2 needs of a cloud to show it in the colours of its classes.
 

@@ -14,7 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 using stillmap_msgs::srv::SaveMap_Request;
 using stillmap_msgs::srv::SaveMap_Response;
-using server::Server = ServiceServer<SaveMap_Request, SaveMap_Response>;
+using Server = ServiceServer<SaveMap_Request, SaveMap_Response>;
 using Client = ServiceClient<SaveMap_Request, SaveMap_Response>;
 
 SaveMap_Response echo(const SaveMap_Request& request) {
@@ -31,7 +31,7 @@ SaveMap_Request request_for(const std::string& file) {
 
 TEST(Service, AnswersEachClientWithItsOwnReply) {
   Participant server_side(loopback(true));
-  const server::Server server(server_side, "stillmap/save_map", echo);
+  const Server server(server_side, "stillmap/save_map", echo);
   std::atomic<int> right = 0;
   {
     std::vector<std::jthread> clients;
@@ -52,7 +52,7 @@ TEST(Service, AnswersEachClientWithItsOwnReply) {
 
 TEST(Service, CarriesAReplyOfMegabytes) {
   Participant server_side(loopback(false));
-  const server::Server server(server_side, "stillmap/save_map", [](const SaveMap_Request&) {
+  const Server server(server_side, "stillmap/save_map", [](const SaveMap_Request&) {
     SaveMap_Response reply;
     reply.file(std::string(5'000'000, 'x'));
     return reply;
@@ -71,7 +71,7 @@ TEST(Service, WaitsForAServerThatComesLater) {
   std::jthread asker([&] { reply = client.call(request_for("late"), discovery_timeout); });
   std::this_thread::sleep_for(300ms);
   Participant server_side(loopback(false));
-  const server::Server server(server_side, "stillmap/save_map", echo);
+  const Server server(server_side, "stillmap/save_map", echo);
   asker.join();
   ASSERT_TRUE(reply);
   EXPECT_EQ(reply->file(), "saved late");
@@ -89,12 +89,11 @@ TEST(Service, GivesUpWithoutAServer) {
 TEST(Service, AsksAgainWhenTheFirstAnswerDoesNotCome) {
   Participant server_side(loopback(false));
   std::atomic<int> asked = 0;
-  const server::Server server(server_side, "stillmap/save_map",
-                              [&](const SaveMap_Request& request) {
-                                // The first answer is late.
-                                if (asked++ == 0) std::this_thread::sleep_for(1500ms);
-                                return echo(request);
-                              });
+  const Server server(server_side, "stillmap/save_map", [&](const SaveMap_Request& request) {
+    // The first answer is late.
+    if (asked++ == 0) std::this_thread::sleep_for(1500ms);
+    return echo(request);
+  });
   Participant client_side(loopback(false));
   Client client(client_side, "stillmap/save_map");
   ASSERT_TRUE(client.wait_for_server(discovery_timeout));

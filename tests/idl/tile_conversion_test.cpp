@@ -25,7 +25,7 @@ Tile some_tile() {
   return tile;
 }
 
-constexpr MapIdentity identity{
+constexpr dds::MapIdentity identity{
     .version = 42, .map_id = 99, .tile_size_m = 20.0, .voxel_size_m = 0.2};
 
 TEST(TileConversion, KeepsEverythingButTheLosersOfTheVote) {
@@ -67,35 +67,35 @@ TEST(TileConversion, RefusesWhatItDoesNotUnderstand) {
 }
 
 TEST(StatusConversion, KeepsEverything) {
-  ServerStatus status{.stamp_ns = 5'000'000'001,
-                      .software_version = "1.2.3",
-                      .uptime_s = 4.5,
-                      .delivery = DeliveryMode::every,
-                      .label_source = "stream",
-                      .health = OdometryHealth::degenerate,
-                      .reason = "why",
-                      .received_hz = 10.0,
-                      .mapped_hz = 9.0,
-                      .map_version = 3,
-                      .map_id = 4,
-                      .tile_count = 5,
-                      .voxel_count = 6,
-                      .segmentation = {.interval = 3,
-                                       .inference_ms = 210.0,
-                                       .image_columns = 1024,
-                                       .full_columns = 1536,
-                                       .fresh_share = 0.25,
-                                       .propagated_share = 0.5,
-                                       .unlabelled_share = 0.125},
-                      .counters = {{"scans_received", 8}, {"dropped_empty", 2}},
-                      .latencies = {{"odometry", 1.0, 2.0, 3.0, 4}},
-                      .host = "robot",
-                      .sensor = "vlp_16",
-                      .points_topic = "lidar/points",
-                      .scan_frame = "velodyne",
-                      .scan_delay_s = 0.25,
-                      .diagnostics = {{Severity::advice, "what", "evidence", "way out"},
-                                      {Severity::problem, "worse", "", ""}}};
+  dds::ServerStatus status{.stamp_ns = 5'000'000'001,
+                           .software_version = "1.2.3",
+                           .uptime_s = 4.5,
+                           .delivery = DeliveryMode::every,
+                           .label_source = "stream",
+                           .health = OdometryHealth::degenerate,
+                           .reason = "why",
+                           .received_hz = 10.0,
+                           .mapped_hz = 9.0,
+                           .map_version = 3,
+                           .map_id = 4,
+                           .tile_count = 5,
+                           .voxel_count = 6,
+                           .segmentation = {.interval = 3,
+                                            .inference_ms = 210.0,
+                                            .image_columns = 1024,
+                                            .full_columns = 1536,
+                                            .fresh_share = 0.25,
+                                            .propagated_share = 0.5,
+                                            .unlabelled_share = 0.125},
+                           .counters = {{"scans_received", 8}, {"dropped_empty", 2}},
+                           .latencies = {{"odometry", 1.0, 2.0, 3.0, 4}},
+                           .host = "robot",
+                           .sensor = "vlp_16",
+                           .points_topic = "lidar/points",
+                           .scan_frame = "velodyne",
+                           .scan_delay_s = 0.25,
+                           .diagnostics = {{dds::Severity::advice, "what", "evidence", "way out"},
+                                           {dds::Severity::problem, "worse", "", ""}}};
   const auto back = from_wire(to_wire(status));
   ASSERT_TRUE(back);
   EXPECT_EQ(back->stamp_ns, status.stamp_ns);
@@ -110,11 +110,11 @@ TEST(StatusConversion, KeepsEverything) {
   EXPECT_EQ(back->scan_frame, "velodyne");
   EXPECT_EQ(back->scan_delay_s, 0.25);
   ASSERT_EQ(back->diagnostics.size(), 2U);
-  EXPECT_EQ(back->diagnostics[0].severity, Severity::advice);
+  EXPECT_EQ(back->diagnostics[0].severity, dds::Severity::advice);
   EXPECT_EQ(back->diagnostics[0].what, "what");
   EXPECT_EQ(back->diagnostics[0].evidence, "evidence");
   EXPECT_EQ(back->diagnostics[0].hint, "way out");
-  EXPECT_EQ(back->diagnostics[1].severity, Severity::problem);
+  EXPECT_EQ(back->diagnostics[1].severity, dds::Severity::problem);
   EXPECT_EQ(back->segmentation.interval, 3U);
   EXPECT_EQ(back->segmentation.inference_ms, 210.0);
   EXPECT_EQ(back->segmentation.image_columns, 1024U);
@@ -133,10 +133,10 @@ TEST(StatusConversion, KeepsEverything) {
 }
 
 TEST(StatusConversion, RefusesNumbersThatStandForNothing) {
-  auto message = to_wire(ServerStatus{});
+  auto message = to_wire(dds::ServerStatus{});
   message.health(17);
   EXPECT_FALSE(from_wire(message));
-  message = to_wire(ServerStatus{});
+  message = to_wire(dds::ServerStatus{});
   message.delivery(2);
   EXPECT_FALSE(from_wire(message));
 }

@@ -1,9 +1,10 @@
+#include "idl/dds/type_support.hpp"
+
 #include <gtest/gtest.h>
 
 #include <cstring>
 #include <string>
 
-#include "idl/dds/type_support.hpp"
 #include "sensor_msgs.h"
 #include "tests/idl/cloud_fixture.hpp"
 

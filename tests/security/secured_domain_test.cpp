@@ -5,10 +5,11 @@
 #include <fstream>
 #include <thread>
 
+#include "idl/dds/dds_error.hpp"
 #include "idl/dds/reader.hpp"
 #include "idl/dds/security/authority.hpp"
-#include "idl/dds/dds_error.hpp"
 #include "idl/interface/roles.hpp"
+#include "idl/interface/topics.hpp"
 #include "sensor_msgs.h"
 #include "tests/clients/process.hpp"
 #include "tests/scratch_folder.hpp"

@@ -32,7 +32,7 @@ const fs::path& sound_bag() {
   static const fs::path folder = [] {
     const fs::path path = MemoryFolder::of_this_process().path("sound_bag");
     fs::remove_all(path);
-    write_bag(path, {bag_message(0), bag_message(1)});
+    dds::write_bag(path, {dds::bag_message(0), dds::bag_message(1)});
     return path;
   }();
   return folder;

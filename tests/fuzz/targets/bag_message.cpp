@@ -93,8 +93,8 @@ std::vector<Seed> seeds() {
   std::string received;
   append_value(received, std::int32_t{100});
   received += packet_bytes();
-  return {{"cloud", with_choice(cloud, text_of(bag_message(0)))},
-          {"cloud_big_endian", with_choice(cloud, text_of(bag_message(1, false)))},
+  return {{"cloud", with_choice(cloud, text_of(dds::bag_message(0)))},
+          {"cloud_big_endian", with_choice(cloud, text_of(dds::bag_message(1, false)))},
           {"velodyne", with_choice(velodyne_scan, velodyne_bytes())},
           {"livox", with_choice(livox, livox_bytes())},
           {"packets", with_choice(packets, received + received)}};

@@ -11,6 +11,7 @@
 #include "core/map/storage/tile_frame.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/tools/map_check.hpp"
+#include "core/map/voxel_grid.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/loaded_map.hpp"
 #include "tests/fuzz/memory_folder.hpp"

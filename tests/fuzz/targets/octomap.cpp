@@ -1,13 +1,12 @@
 // A number that says how the bytes come (an octomap_msgs/Octomap over DDS, a .bt or .ot file, or
 // the tree alone), then they; what is read is asked about and encoded again.
 
-#include "idl/conversions/occupancy.hpp"
-
 #include <stdexcept>
 
 #include "core/occupancy/occupancy_map.hpp"
 #include "core/occupancy/octomap_data.hpp"
 #include "core/occupancy/octomap_file.hpp"
+#include "idl/conversions/occupancy.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"
 #include "tests/fuzz/invariant.hpp"

@@ -55,8 +55,8 @@ void run(Bytes bytes) {
   const Scan& scan = *read.from_cloud.scan;
   check(scan, *cloud);
   constexpr double period_s = 0.1;
-  const Scan prepared = compensate_motion(drop_unusable_points(scan, PrepareConfig{}),
-                                          Eigen::Isometry3d::Identity(), period_s);
+  const Scan prepared =
+      deskew(drop_unusable_points(scan, PrepareConfig{}), Eigen::Isometry3d::Identity(), period_s);
   static_cast<void>(assign_rings(prepared, vlp_16()));
   const RangeImage image(prepared.points_lidar,
                          {.rows = 16, .columns = 64, .fov_up = 0.3, .fov_down = -0.3});

@@ -16,7 +16,7 @@ int churn_clients(const ServerAddress& address, int clients) {
   request.format_version = 4;
   std::vector<double> times_ms;
   for (int i = 0; i < clients; ++i) {
-    const dds::Participant participant(address.domain_id);
+    const Participant participant(address.domain_id);
     RmwClient<Request, Reply> client(participant, address.server + "/get_status");
     if (!client.wait_for_server(30s)) throw std::runtime_error("no server found");
     const auto began = std::chrono::steady_clock::now();

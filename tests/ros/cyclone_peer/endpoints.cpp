@@ -16,11 +16,10 @@ std::unique_ptr<dds_qos_t, decltype(&dds_delete_qos)> make_qos(const Qos& qos) {
   return made;
 }
 
-dds::Participant::Participant(std::uint32_t domain_id)
+Participant::Participant(std::uint32_t domain_id)
     : entity_(checked(dds_create_participant(domain_id, nullptr, nullptr), "participant")) {}
 
-dds_entity_t dds::Participant::topic(const dds_topic_descriptor_t& type,
-                                     const std::string& name) const {
+dds_entity_t Participant::topic(const dds_topic_descriptor_t& type, const std::string& name) const {
   return checked(dds_create_topic(entity_, &type, name.c_str(), nullptr, nullptr), "topic " + name);
 }
 

@@ -75,7 +75,7 @@ Endpoint endpoint_of(const dds_builtintopic_endpoint_t& found) {
 /// What Cyclone itself knows of a kind of endpoint (DCPSPublication, DCPSSubscription).
 class Discovery {
  public:
-  Discovery(const dds::Participant& participant, dds_entity_t builtin_topic)
+  Discovery(const Participant& participant, dds_entity_t builtin_topic)
       : reader_(checked(dds_create_reader(participant.entity(), builtin_topic, nullptr, nullptr),
                         "discovery")) {}
   ~Discovery() { dds_delete(reader_); }
@@ -125,7 +125,7 @@ void print(const std::string& kind, const std::map<Guid, Endpoint>& endpoints) {
 }
 
 /// The user data of a discovered participant; nothing once it has gone.
-std::optional<std::string> user_data(const dds::Participant& participant, const Guid& wanted) {
+std::optional<std::string> user_data(const Participant& participant, const Guid& wanted) {
   const dds_entity_t reader = checked(
       dds_create_reader(participant.entity(), DDS_BUILTIN_TOPIC_DCPSPARTICIPANT, nullptr, nullptr),
       "discovery of participants");
@@ -152,9 +152,8 @@ std::optional<std::string> user_data(const dds::Participant& participant, const 
 }  // namespace
 
 int watch_graph(const ServerAddress& address, const std::string& name) {
-  const dds::Participant participant(address.domain_id);
-  dds::Reader<Announcement> reader(participant, announcements,
-                                   {.transient_local = true, .depth = 1000});
+  const Participant participant(address.domain_id);
+  Reader<Announcement> reader(participant, announcements, {.transient_local = true, .depth = 1000});
   const Discovery publications(participant, DDS_BUILTIN_TOPIC_DCPSPUBLICATION);
   const Discovery subscriptions(participant, DDS_BUILTIN_TOPIC_DCPSSUBSCRIPTION);
   std::optional<Node> node;

@@ -12,7 +12,7 @@ namespace {
 
 using namespace std::chrono_literals;
 using Cloud = sensor_msgs_msg_dds__PointCloud2_;
-using simulation::Path = nav_msgs_msg_dds__Path_;
+using Path = nav_msgs_msg_dds__Path_;
 using Grid = nav_msgs_msg_dds__OccupancyGrid_;
 using Octomap = octomap_msgs_msg_dds__Octomap_;
 using Status = stillmap_msgs_msg_dds__Status_;
@@ -36,7 +36,7 @@ void print(const std::string& topic, const Cloud& cloud) {
       .add("is_dense", cloud.is_dense);
 }
 
-void print(const std::string& topic, const simulation::Path& path) {
+void print(const std::string& topic, const Path& path) {
   Line(topic).add("frame_id", path.header.frame_id).add("poses", path.poses._length);
 }
 
@@ -77,8 +77,8 @@ void print(const std::string& topic, const Status& status) {
 
 /// Takes a latched topic until its first sample, and prints that.
 template <typename T>
-bool print_latched(const dds::Participant& participant, const std::string& topic) {
-  dds::Reader<T> reader(participant, topic, latched);
+bool print_latched(const Participant& participant, const std::string& topic) {
+  Reader<T> reader(participant, topic, latched);
   bool has_come = false;
   const auto take = [&] {
     reader.take([&](const T& sample) {
@@ -96,9 +96,9 @@ using TileKey = std::pair<std::int32_t, std::int32_t>;
 /// Takes a keyed topic until nothing new has come for a while; voxels by tile.
 template <typename T>
 std::map<TileKey, std::uint64_t> take_tiles(
-    const dds::Participant& participant, const std::string& topic,
+    const Participant& participant, const std::string& topic,
     const std::function<std::uint64_t(const T&)>& voxels_of) {
-  dds::Reader<T> reader(participant, topic, latched);
+  Reader<T> reader(participant, topic, latched);
   std::map<TileKey, std::uint64_t> voxels;
   auto last_news = std::chrono::steady_clock::now();
   const auto take = [&] {
@@ -119,9 +119,9 @@ std::map<TileKey, std::uint64_t> take_tiles(
 }  // namespace
 
 int join_late(const ServerAddress& address) {
-  const dds::Participant participant(address.domain_id);
+  const Participant participant(address.domain_id);
   const std::string prefix = "rt/" + address.server + "/";
-  bool has_all = print_latched<simulation::Path>(participant, prefix + "path");
+  bool has_all = print_latched<Path>(participant, prefix + "path");
   has_all &= print_latched<Cloud>(participant, prefix + "static_cloud");
   has_all &= print_latched<Grid>(participant, prefix + "traversability");
   has_all &= print_latched<Octomap>(participant, prefix + "octomap");

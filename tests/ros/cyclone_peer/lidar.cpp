@@ -55,7 +55,7 @@ Stamp stamp_of(std::size_t scan) {
 
 }  // namespace
 
-Lidar::Lidar(const dds::Participant& participant, const std::filesystem::path& recording)
+Lidar::Lidar(const Participant& participant, const std::filesystem::path& recording)
     : recording_(recording),
       fields_(fields_named(field_names_)),
       writer_(participant, "rt/points", {.depth = 1, .keep_all = true}) {

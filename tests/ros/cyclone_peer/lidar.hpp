@@ -15,7 +15,7 @@ namespace stillmap::peer {
 class Lidar {
  public:
   /// `recording` has velodyne/*.bin and labels/*.label.
-  Lidar(const dds::Participant& participant, const std::filesystem::path& recording);
+  Lidar(const Participant& participant, const std::filesystem::path& recording);
 
   [[nodiscard]] std::size_t scans() const { return names_.size(); }
   [[nodiscard]] bool is_matched() const { return writer_.is_matched(); }
@@ -31,7 +31,7 @@ class Lidar {
   std::vector<std::filesystem::path> names_;
   std::array<std::string, 5> field_names_ = {"x", "y", "z", "intensity", "label"};
   std::array<Field, 5> fields_{};
-  dds::Writer<Cloud> writer_;
+  Writer<Cloud> writer_;
 };
 
 }  // namespace stillmap::peer

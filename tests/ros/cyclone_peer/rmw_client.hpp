@@ -12,7 +12,7 @@ namespace stillmap::peer {
 template <typename Request, typename Reply>
 class RmwClient {
  public:
-  RmwClient(const dds::Participant& participant, const std::string& service)
+  RmwClient(const Participant& participant, const std::string& service)
       : requests_(participant, "rq/" + service + "Request", {}),
         replies_(participant, "rr/" + service + "Reply", {}) {}
 
@@ -42,8 +42,8 @@ class RmwClient {
  private:
   std::uint64_t id_ = std::random_device{}() * std::uint64_t{4294967291};
   std::int64_t asked_ = 0;
-  dds::Writer<Request> requests_;
-  dds::Reader<Reply> replies_;
+  Writer<Request> requests_;
+  Reader<Reply> replies_;
 };
 
 }  // namespace stillmap::peer

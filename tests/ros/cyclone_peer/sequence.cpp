@@ -105,7 +105,7 @@ void add(Scans& scans, const Cloud& cloud) {
 /// What the server sends while it maps, taken as rviz2 and tf2_ros ask for it.
 class Listener {
  public:
-  Listener(const dds::Participant& participant, const std::string& server)
+  Listener(const Participant& participant, const std::string& server)
       : prefix_("rt/" + server + "/"),
         odometry_(participant, prefix_ + "odometry", {.depth = 1000}),
         tf_(participant, "rt/tf", {.depth = 100}),
@@ -134,9 +134,9 @@ class Listener {
 
  private:
   std::string prefix_;
-  dds::Reader<Odometry> odometry_;
-  dds::Reader<Transforms> tf_;
-  dds::Reader<Cloud> scan_;
+  Reader<Odometry> odometry_;
+  Reader<Transforms> tf_;
+  Reader<Cloud> scan_;
   Poses from_odometry_, from_tf_;
   Scans scans_;
 };
@@ -156,7 +156,7 @@ void publish_all(Lidar& lidar, Listener& listener) {
 }  // namespace
 
 int play_sequence(const ServerAddress& address, const std::filesystem::path& recording) {
-  const dds::Participant participant(address.domain_id);
+  const Participant participant(address.domain_id);
   Lidar lidar(participant, recording);
   Listener listener(participant, address.server);
   if (!wait_until([&] { return lidar.is_matched() && listener.is_matched(); }, discovery_timeout)) {

@@ -60,7 +60,7 @@ class Questions {
 
  private:
   ServerAddress address_;
-  dds::Participant participant_;
+  Participant participant_;
   bool has_all_ = true;
 };
 
@@ -68,14 +68,14 @@ void ask_for_status(Questions& questions) {
   using Reply = stillmap_msgs_srv_dds__GetStatus_Response_;
   stillmap_msgs_srv_dds__GetStatus_Request_ request{};
   request.format_version = format_version;
-  questions.ask<decltype(request), Reply>("get_status", request,
-                                          [](Line& line, const Reply& reply) {
-                                            line.add("version", reply.server.software_version)
-                                                .add("tiles", reply.server.tile_count)
-                                                .add("voxels", reply.server.voxel_count);
-                                          });
+  questions.call<decltype(request), Reply>("get_status", request,
+                                           [](Line& line, const Reply& reply) {
+                                             line.add("version", reply.server.software_version)
+                                                 .add("tiles", reply.server.tile_count)
+                                                 .add("voxels", reply.server.voxel_count);
+                                           });
   request.format_version = format_version + 1;
-  questions.ask<decltype(request), Reply>(
+  questions.call<decltype(request), Reply>(
       "get_status", request,
       [](Line& line, const Reply& reply) { line.add("refused", reply.status.reason); });
 }
@@ -93,17 +93,17 @@ void ask_for_map(Questions& questions) {
         .add("total", reply.total_voxels)
         .add("continues", reply.continuation[0] != '\0');
   };
-  questions.ask<Request, Reply>("get_static_map", request, print);
+  questions.call<Request, Reply>("get_static_map", request, print);
   std::array<std::uint8_t, 2> buildings_and_fences = {13, 14};
   lend(request.classes, buildings_and_fences);
-  questions.ask<Request, Reply>("get_static_map", request, [](Line& line, const Reply& reply) {
+  questions.call<Request, Reply>("get_static_map", request, [](Line& line, const Reply& reply) {
     const auto labels = elements(reply.voxels.label);
     line.add("voxels", labels.size()).add("other_classes", std::ranges::count_if(labels, [](int c) {
                                             return c != 13 && c != 14;
                                           }));
   });
   request.region.min_x = request.region.max_x + 1.0;
-  questions.ask<Request, Reply>("get_static_map", request, [](Line& line, const Reply& reply) {
+  questions.call<Request, Reply>("get_static_map", request, [](Line& line, const Reply& reply) {
     line.add("refused", reply.status.reason);
   });
 }
@@ -120,7 +120,7 @@ void ask_for_tiles(Questions& questions) {
                                                                  .min_y = region.min_y,
                                                                  .max_x = region.max_x,
                                                                  .max_y = region.max_y};
-  questions.ask<stillmap_msgs_srv_dds__GetTileVersions_Request_, VersionsReply>(
+  questions.call<stillmap_msgs_srv_dds__GetTileVersions_Request_, VersionsReply>(
       "get_tile_versions", versions, [&](Line& line, const VersionsReply& reply) {
         for (const auto& tile : elements(reply.tiles)) ids.push_back({tile.tile_x, tile.tile_y});
         line.add("tiles", ids.size()).add("tile_size_m", reply.identity.tile_size_m);
@@ -128,12 +128,12 @@ void ask_for_tiles(Questions& questions) {
   stillmap_msgs_srv_dds__GetTiles_Request_ tiles{};
   tiles.format_version = format_version;
   lend(tiles.ids, ids);
-  questions.ask<decltype(tiles), TilesReply>("get_tiles", tiles,
-                                             [](Line& line, const TilesReply& reply) {
-                                               line.add("tiles", reply.tiles._length)
-                                                   .add("remaining", reply.remaining._length)
-                                                   .add("missing", reply.missing._length);
-                                             });
+  questions.call<decltype(tiles), TilesReply>("get_tiles", tiles,
+                                              [](Line& line, const TilesReply& reply) {
+                                                line.add("tiles", reply.tiles._length)
+                                                    .add("remaining", reply.remaining._length)
+                                                    .add("missing", reply.missing._length);
+                                              });
 }
 
 void ask_for_area(Questions& questions) {
@@ -143,12 +143,12 @@ void ask_for_area(Questions& questions) {
   area.profile = car.data();
   area.region = everywhere();
   area.include_grid = area.include_outlines = true;
-  questions.ask<decltype(area), AreaReply>("get_traversable_area", area,
-                                           [](Line& line, const AreaReply& reply) {
-                                             line.add("cells", reply.grid.width * reply.grid.height)
-                                                 .add("outlines", reply.outlines._length)
-                                                 .add("reason", reply.status.reason);
-                                           });
+  questions.call<decltype(area), AreaReply>(
+      "get_traversable_area", area, [](Line& line, const AreaReply& reply) {
+        line.add("cells", reply.grid.width * reply.grid.height)
+            .add("outlines", reply.outlines._length)
+            .add("reason", reply.status.reason);
+      });
   using NearestReply = stillmap_msgs_srv_dds__NearestTraversable_Response_;
   stillmap_msgs_srv_dds__NearestTraversable_Request_ nearest{};
   nearest.format_version = format_version;
@@ -156,7 +156,7 @@ void ask_for_area(Questions& questions) {
   nearest.max_distance_m = 30.0;
   double x = 0.0;
   double y = 0.0;
-  questions.ask<decltype(nearest), NearestReply>(
+  questions.call<decltype(nearest), NearestReply>(
       "nearest_traversable", nearest, [&](Line& line, const NearestReply& reply) {
         x = reply.x;
         y = reply.y;
@@ -170,7 +170,7 @@ void ask_for_area(Questions& questions) {
   path.profile = car.data();
   lend(path.x, xs);
   lend(path.y, ys);
-  questions.ask<decltype(path), PathReply>(
+  questions.call<decltype(path), PathReply>(
       "check_path", path, [](Line& line, const PathReply& reply) {
         line.add("is_free", reply.is_free).add("checked_m", reply.checked_m);
       });
@@ -185,17 +185,17 @@ void ask_for_occupancy(Questions& questions) {
   stillmap_msgs_srv_dds__QueryOccupancy_Request_ request{};
   request.format_version = format_version;
   lend(request.rays, rays);
-  questions.ask<decltype(request), Reply>("query_occupancy", request,
-                                          [](Line& line, const Reply& reply) {
-                                            const auto found = elements(reply.rays);
-                                            line.add("rays", found.size());
-                                            if (!found.empty())
-                                              line.add("length_m", found[0].length_m);
-                                          });
+  questions.call<decltype(request), Reply>("query_occupancy", request,
+                                           [](Line& line, const Reply& reply) {
+                                             const auto found = elements(reply.rays);
+                                             line.add("rays", found.size());
+                                             if (!found.empty())
+                                               line.add("length_m", found[0].length_m);
+                                           });
   using OctomapReply = octomap_msgs_srv_dds__GetOctomap_Response_;
   const octomap_msgs_srv_dds__GetOctomap_Request_ nothing{};
   for (const std::string& service : {std::string("octomap_binary"), std::string("octomap_full")}) {
-    questions.ask<octomap_msgs_srv_dds__GetOctomap_Request_, OctomapReply>(
+    questions.call<octomap_msgs_srv_dds__GetOctomap_Request_, OctomapReply>(
         service, nothing, [](Line& line, const OctomapReply& reply) {
           line.add("id", reply.map.id).add("bytes", reply.map.data._length);
         });
@@ -204,7 +204,7 @@ void ask_for_occupancy(Questions& questions) {
 
 void ask_for_rest(Questions& questions) {
   using MapReply = nav_msgs_srv_dds__GetMap_Response_;
-  questions.ask<nav_msgs_srv_dds__GetMap_Request_, MapReply>(
+  questions.call<nav_msgs_srv_dds__GetMap_Request_, MapReply>(
       "get_map", {}, [](Line& line, const MapReply& reply) {
         line.add("cells", reply.map.data._length).add("resolution_m", reply.map.info.resolution);
       });
@@ -213,14 +213,14 @@ void ask_for_rest(Questions& questions) {
   removed.format_version = format_version;
   removed.region = everywhere();
   removed.max_voxels = 1000;
-  questions.ask<decltype(removed), RemovedReply>(
+  questions.call<decltype(removed), RemovedReply>(
       "get_removed", removed,
       [](Line& line, const RemovedReply& reply) { line.add("total", reply.total); });
   using SaveReply = stillmap_msgs_srv_dds__SaveMap_Response_;
   stillmap_msgs_srv_dds__SaveMap_Request_ save{};
   save.format_version = format_version;
   save.file = no_text.data();
-  questions.ask<decltype(save), SaveReply>(
+  questions.call<decltype(save), SaveReply>(
       "save_map", save, [](Line& line, const SaveReply& reply) { line.add("file", reply.file); });
 }
 
