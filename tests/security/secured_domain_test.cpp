@@ -200,7 +200,7 @@ TEST_F(SecuredDomain, DoesNotStartWithAnIdentityThatExpired) {
   const ProcessResult checked =
       run_stillmap("security check " + (folder_ / "keys").string(), folder_.path());
   EXPECT_EQ(checked.exit_code, 1);
-  EXPECT_THAT(checked.out, AllOf(HasSubstr("FAULT   "), HasSubstr("operator: well")));
+  EXPECT_THAT(checked.out, AllOf(HasSubstr("FAULT   "), HasSubstr("operator: ok")));
   const ProcessResult renewed = run_stillmap(
       "security add " + (folder_ / "keys").string() + " server --replace", folder_.path());
   EXPECT_EQ(renewed.exit_code, 0) << renewed.err;
