@@ -3,9 +3,10 @@
 install(TARGETS stillmap-server RUNTIME DESTINATION bin COMPONENT server)
 install(TARGETS stillmap RUNTIME DESTINATION bin COMPONENT tools)
 
-foreach(folder models robots sensors labels server dds ros)
+foreach(folder models robots sensors server dds ros)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/config/${folder})
-    install(DIRECTORY ${PROJECT_SOURCE_DIR}/config/${folder} DESTINATION share/stillmap COMPONENT data)
+    install(DIRECTORY ${PROJECT_SOURCE_DIR}/config/${folder} DESTINATION share/stillmap COMPONENT data
+      PATTERN README.md EXCLUDE)
   endif()
 endforeach()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/idl/msg/ DESTINATION share/stillmap/idl COMPONENT data
@@ -16,6 +17,8 @@ foreach(page . core core/segmentation idl server clients config config/dds docke
   install(FILES ${PROJECT_SOURCE_DIR}/${page}/README.md DESTINATION share/doc/stillmap/${page}
     COMPONENT tools)
 endforeach()
+install(FILES ${PROJECT_SOURCE_DIR}/clients/demo_map.png ${PROJECT_SOURCE_DIR}/clients/demo_path.png
+  DESTINATION share/doc/stillmap/clients COMPONENT tools)
 install(FILES ${PROJECT_SOURCE_DIR}/clients/example/follow_and_query.cpp
   DESTINATION share/doc/stillmap/examples COMPONENT tools)
 foreach(package server:stillmap-server tools:stillmap data:stillmap-data)

@@ -413,7 +413,8 @@ class Checks:
 
     def option_of_tool(self, option):
         """Of a script of ours."""
-        return any(option in self.repository.read(name) for name in self.repository.files
+        whole = re.compile(re.escape(option) + r"(?![\w-])")
+        return any(whole.search(self.repository.read(name)) for name in self.repository.files
                    if name.endswith((".py", ".sh")) and not name.startswith("tests/docs/"))
 
     def dotted_key(self, page, number, code):

@@ -46,7 +46,7 @@ namespace {
 
 nlohmann::json to_json(const dds::SegmentationStatus& segmentation) {
   return {{"interval", segmentation.interval},
-          {"network_ms", segmentation.inference_ms},
+          {"inference_ms", segmentation.inference_ms},
           {"image_columns", segmentation.image_columns},
           {"full_columns", segmentation.full_columns},
           {"fresh_share", segmentation.fresh_share},
