@@ -29,8 +29,7 @@ struct SegmentationStatus {
   /// fast enough; 0: no range images.
   std::uint32_t image_columns = 0;
   std::uint32_t full_columns = 0;
-  /// Shares of the points of the last scans: labelled themselves, with propagated labels, with
-  /// none.
+  /// Shares of the last scans: with labels of their own, with propagated labels, with none.
   double fresh_share = 0.0;
   double propagated_share = 0.0;
   double unlabelled_share = 0.0;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -59,6 +60,8 @@ class Statistics {
   [[nodiscard]] double receive_period_ms() const;
   /// Median over the last scans of what is done with each but its segmentation; 0 before the first.
   [[nodiscard]] double other_stages_ms() const;
+  /// When the server began: before it read the map file and joined the domain.
+  [[nodiscard]] std::chrono::steady_clock::time_point started() const { return started_; }
   /// Why the last scan was dropped; empty once a later one was mapped.
   [[nodiscard]] std::string last_drop() const;
   /// Why the last segmentation failed; empty once a later one worked.
@@ -75,6 +78,7 @@ class Statistics {
 
   [[nodiscard]] std::vector<dds::NamedCounter> counters() const;
 
+  std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
   std::unique_ptr<Metrics> metrics_;
   mutable std::mutex mutex_;
   Counters dropped_;

@@ -1,7 +1,7 @@
 #include "server/publishers/map_publisher.hpp"
 
-#include "idl/conversions/to_cloud.hpp"
 #include "idl/conversions/pose.hpp"
+#include "idl/conversions/to_cloud.hpp"
 
 namespace stillmap::server {
 

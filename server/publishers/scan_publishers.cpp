@@ -33,7 +33,8 @@ void PosePublisher::write(const Message& message) {
 LabelledScanPublisher::LabelledScanPublisher(dds::Participant& participant,
                                              const dds::Topics& topics)
     : writer_(participant, topics.scan.dds_name, topics.scan.writer),
-      worker_(newest_, [this](const Message& message) { write(message); }) {}
+      worker_(newest_, [this](const Message& message) { write(message); },
+              {.finishes_queue = true}) {}
 
 void LabelledScanPublisher::publish(std::shared_ptr<const LabelledScan> labelled,
                                     const std::string& lidar_frame) {

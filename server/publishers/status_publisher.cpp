@@ -44,7 +44,8 @@ std::string host_name() {
 std::string reduced_pace(const dds::SegmentationStatus& segmentation) {
   std::string what;
   if (segmentation.interval > 1) {
-    what = dds::every_nth_scan(segmentation.interval) + " is segmented, labels are propagated between";
+    what =
+        dds::every_nth_scan(segmentation.interval) + " is segmented, labels are propagated between";
   }
   if (segmentation.image_columns > 0 && segmentation.image_columns < segmentation.full_columns) {
     what += (what.empty() ? "" : "; ") + std::string("range images are ") +
@@ -109,7 +110,7 @@ dds::ServerStatus ServerReport::status() const {
   const auto view = latest_map_.view();
   const std::string live_labels = latest_map_.label_source();
   const auto wall_clock = std::chrono::system_clock::now().time_since_epoch();
-  const auto uptime = std::chrono::steady_clock::now() - started_;
+  const auto uptime = std::chrono::steady_clock::now() - statistics_.started();
   dds::ServerStatus status;
   status.stamp_ns = std::chrono::nanoseconds(wall_clock).count();
   status.software_version = STILLMAP_VERSION;

@@ -71,7 +71,6 @@ class ServerReport {
   const Statistics& statistics_;
   std::function<std::vector<dds::Diagnostic>()> discovery_diagnostics_;
   std::function<std::string()> no_input_reason_;
-  std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
 };
 
 /// Publishes the status every period, and within 0.1 s after the odometry's health changed.
