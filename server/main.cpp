@@ -7,8 +7,9 @@
 #include <exception>
 
 #include "config/loaders/model_file.hpp"
-#include "idl/dds/dds_log.hpp"
+#include "core/process/stop_signals.hpp"
 #include "idl/dds/dds_error.hpp"
+#include "idl/dds/dds_log.hpp"
 #include "server/arguments.hpp"
 #include "server/mapping/async_segmenter.hpp"
 #include "server/monitoring/log.hpp"
@@ -19,16 +20,6 @@ namespace {
 constexpr int failed = 1;
 constexpr int bad_input = 2;
 
-/// Blocked before any thread starts, so that all threads inherit it and sigwait gets the signal.
-sigset_t block_stop_signals() {
-  sigset_t signals;
-  sigemptyset(&signals);
-  sigaddset(&signals, SIGINT);
-  sigaddset(&signals, SIGTERM);
-  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
-  return signals;
-}
-
 /// For units with Type=notify; does nothing elsewhere.
 void notify_systemd(const char* state) {
   if (const int result = sd_notify(0, state); result < 0) {
@@ -37,7 +28,7 @@ void notify_systemd(const char* state) {
 }
 
 void serve(const stillmap::ServerConfig& config) {
-  const sigset_t signals = block_stop_signals();
+  const sigset_t signals = stillmap::block_stop_signals();
   const bool adaptive_width = stillmap::server::segmentation_budget(config).count() > 0;
   auto labels = stillmap::open_segmenter(config.labels, config.mapper.sensor, adaptive_width);
   if (const std::string details = labels->details(); !details.empty()) {

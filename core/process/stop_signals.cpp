@@ -1,0 +1,39 @@
+#include "core/process/stop_signals.hpp"
+
+#include <ucontext.h>
+#include <unistd.h>
+
+namespace stillmap {
+namespace {
+
+sigset_t stop_signals() {
+  sigset_t signals;
+  sigemptyset(&signals);
+  sigaddset(&signals, SIGINT);
+  sigaddset(&signals, SIGTERM);
+  return signals;
+}
+
+/// Async-signal-safe. The mask takes effect in the interrupted thread when the handler returns.
+void hand_back(int signal, siginfo_t* /*info*/, void* context) {
+  sigset_t& mask = static_cast<ucontext_t*>(context)->uc_sigmask;
+  sigaddset(&mask, SIGINT);
+  sigaddset(&mask, SIGTERM);
+  kill(getpid(), signal);
+}
+
+}  // namespace
+
+sigset_t block_stop_signals() {
+  const sigset_t signals = stop_signals();
+  pthread_sigmask(SIG_BLOCK, &signals, nullptr);
+  struct sigaction action {};
+  action.sa_sigaction = hand_back;
+  action.sa_flags = SA_SIGINFO | SA_RESTART;
+  action.sa_mask = signals;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  return signals;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,13 @@
+#pragma once
+
+#include <signal.h>
+
+namespace stillmap {
+
+/// Blocks SIGINT and SIGTERM, which stay pending for sigwait or a signalfd, and returns them. To be
+/// called before the program starts threads: they inherit it. Threads that libraries started when
+/// they were loaded, as OpenBLAS does, do not: where one of them gets the signal, it blocks it,
+/// too, and hands it back to the process.
+[[nodiscard]] sigset_t block_stop_signals();
+
+}  // namespace stillmap
