@@ -227,13 +227,13 @@ class Search {
                                        std::span<const PlanarPose> goals) const {
     std::ostringstream text;
     text << "no path to " << text_of(goals.front().position_map) << " was found in " << plan.steps
-         << " steps";
+         << " iterations";
     if (!plan.poses.empty()) {
       const Eigen::Vector2d& end = plan.poses.back().pose.position_map;
       text << "; the nearest place reached is " << text_of(end) << ", "
            << (end - goals.front().position_map).norm() << " m from it";
     }
-    text << "; allow more time or steps";
+    text << "; allow more time or iterations";
     return text.str();
   }
 

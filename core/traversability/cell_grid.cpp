@@ -15,18 +15,23 @@ CellGrid<float> distances_to_marked(const CellGrid<std::uint8_t>& marked, double
   std::ranges::transform(marked.cells(), open.begin(),
                          [](std::uint8_t mark) { return std::uint8_t{mark == 0 ? 1U : 0U}; });
   cv::Mat1f result(marked.height(), marked.width(), &distances(0, 0));
-  // OpenCV adds squares of column numbers and of distances in floats, which are exact below 2^24:
-  // wider grids are cut into strips of at most 3072 columns that overlap by the largest distance.
-  constexpr int strip_width = 1024;
+  // OpenCV adds squares of cell numbers and of distances in floats, which are exact below 2^24, and
+  // its table of squares overflows beyond 46340 rows: larger grids are cut into blocks of at most
+  // 3072 cells a side that overlap by the largest distance.
+  constexpr int block_cells = 1024;
   const int overlap = static_cast<int>(std::ceil(max_distance));
-  for (int begin = 0; begin < open.cols; begin += strip_width) {
-    const int end = std::min(begin + strip_width, open.cols);
-    const int first = std::max(0, begin - overlap);
-    const int last = std::min(end + overlap, open.cols);
-    cv::Mat1f strip;
-    cv::distanceTransform(open.colRange(first, last), strip, cv::DIST_L2, cv::DIST_MASK_PRECISE);
-    // Also where nothing is marked: OpenCV's value there has no meaning.
-    cv::min(strip.colRange(begin - first, end - first), max_distance, result.colRange(begin, end));
+  const cv::Rect grid(0, 0, open.cols, open.rows);
+  for (int y = 0; y < grid.height; y += block_cells) {
+    for (int x = 0; x < grid.width; x += block_cells) {
+      const cv::Rect block = cv::Rect(x, y, block_cells, block_cells) & grid;
+      const cv::Rect wide = cv::Rect(block.tl() - cv::Point(overlap, overlap),
+                                     block.size() + cv::Size(2 * overlap, 2 * overlap)) &
+                            grid;
+      cv::Mat1f wide_distances;
+      cv::distanceTransform(open(wide), wide_distances, cv::DIST_L2, cv::DIST_MASK_PRECISE);
+      // Also where nothing is marked: OpenCV's value there has no meaning.
+      cv::min(wide_distances(block - wide.tl()), max_distance, result(block));
+    }
   }
   return distances;
 }

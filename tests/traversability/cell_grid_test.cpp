@@ -71,6 +71,20 @@ TEST(DistancesToMarked, StayExactInVeryWideGrids) {
   });
 }
 
+/// Taller than OpenCV's table of squares reaches.
+TEST(DistancesToMarked, StayExactInVeryTallGrids) {
+  CellGrid<std::uint8_t> marked(3, 70'000);
+  for (const int row : {10, 23'000, 23'050, 69'990}) marked(row % 3, row) = 1;
+  const CellGrid<float> distances = distances_to_marked(marked, max_distance);
+  for_each_cell(marked, [&](int x, int y) {
+    double nearest = max_distance;
+    for (const int row : {10, 23'000, 23'050, 69'990}) {
+      nearest = std::min(nearest, std::hypot(x - row % 3, y - row));
+    }
+    ASSERT_FLOAT_EQ(distances(x, y), static_cast<float>(nearest)) << x << ", " << y;
+  });
+}
+
 TEST(DistancesToMarked, OfOneMarkInACorner) {
   CellGrid<std::uint8_t> marked(5, 4);
   marked(4, 3) = 200;
