@@ -28,7 +28,11 @@ struct ServiceSpec {
 
   /// Last part of the name.
   std::string_view name;
-  ServiceEffect effect = ServiceEffect::reads;
+  ServiceEffect effect;
+
+  /// The effect has no default: a row that forgot it would let planners change the map.
+  consteval ServiceSpec(std::string_view last_part, ServiceEffect what_it_does)
+      : name(last_part), effect(what_it_does) {}
 
   /// Its ROS 2 name in a server's name space: "stillmap/get_status".
   [[nodiscard]] std::string in(std::string_view name_space) const {
@@ -48,12 +52,13 @@ using octomap_msgs::srv::GetOctomap_Response;
 using enum ServiceEffect;
 
 inline constexpr ServiceSpec<srv::GetStaticMap_Request, srv::GetStaticMap_Response> get_static_map{
-    "get_static_map"};
+    "get_static_map", reads};
 inline constexpr ServiceSpec<srv::GetTileVersions_Request, srv::GetTileVersions_Response>
-    get_tile_versions{"get_tile_versions"};
-inline constexpr ServiceSpec<srv::GetTiles_Request, srv::GetTiles_Response> get_tiles{"get_tiles"};
+    get_tile_versions{"get_tile_versions", reads};
+inline constexpr ServiceSpec<srv::GetTiles_Request, srv::GetTiles_Response> get_tiles{"get_tiles",
+                                                                                      reads};
 inline constexpr ServiceSpec<srv::GetStatus_Request, srv::GetStatus_Response> get_status{
-    "get_status"};
+    "get_status", reads};
 inline constexpr ServiceSpec<srv::SaveMap_Request, srv::SaveMap_Response> save_map{"save_map",
                                                                                    modifies};
 inline constexpr ServiceSpec<srv::LoadMap_Request, srv::LoadMap_Response> load_map{"load_map",
@@ -61,22 +66,23 @@ inline constexpr ServiceSpec<srv::LoadMap_Request, srv::LoadMap_Response> load_m
 inline constexpr ServiceSpec<srv::Reset_Request, srv::Reset_Response> reset{"reset", modifies};
 /// As octomap_server names them.
 inline constexpr ServiceSpec<GetOctomap_Request, GetOctomap_Response> octomap_binary{
-    "octomap_binary"};
-inline constexpr ServiceSpec<GetOctomap_Request, GetOctomap_Response> octomap_full{"octomap_full"};
+    "octomap_binary", reads};
+inline constexpr ServiceSpec<GetOctomap_Request, GetOctomap_Response> octomap_full{"octomap_full",
+                                                                                   reads};
 inline constexpr ServiceSpec<srv::QueryOccupancy_Request, srv::QueryOccupancy_Response>
-    query_occupancy{"query_occupancy"};
+    query_occupancy{"query_occupancy", reads};
 inline constexpr ServiceSpec<srv::GetRemoved_Request, srv::GetRemoved_Response> get_removed{
-    "get_removed"};
+    "get_removed", reads};
 inline constexpr ServiceSpec<srv::RestoreRemoved_Request, srv::RestoreRemoved_Response>
     restore_removed{"restore_removed", modifies};
 inline constexpr ServiceSpec<srv::GetTraversableArea_Request, srv::GetTraversableArea_Response>
-    get_traversable_area{"get_traversable_area"};
+    get_traversable_area{"get_traversable_area", reads};
 inline constexpr ServiceSpec<srv::CheckPath_Request, srv::CheckPath_Response> check_path{
-    "check_path"};
+    "check_path", reads};
 inline constexpr ServiceSpec<srv::NearestTraversable_Request, srv::NearestTraversable_Response>
-    nearest_traversable{"nearest_traversable"};
+    nearest_traversable{"nearest_traversable", reads};
 /// The traversability grid, as Nav2 asks for maps.
-inline constexpr ServiceSpec<GetMap_Request, GetMap_Response> get_map{"get_map"};
+inline constexpr ServiceSpec<GetMap_Request, GetMap_Response> get_map{"get_map", reads};
 
 inline constexpr std::tuple all{get_static_map,
                                 get_tile_versions,
