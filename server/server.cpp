@@ -27,6 +27,7 @@ ThrottleCallback throttle_callback(const ServerConfig& config, const BackgroundT
 
 Server::Server(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter)
     : service_log_(statistics_.metrics()),
+      storage_(config, segmenter->name(), statistics_),
       topics_(dds::Topics::in(config.topics.name_space)),
       participant_(server_options(config.dds)),
       // An octree that misses scans is better than late poses.
@@ -36,18 +37,20 @@ Server::Server(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter)
                            throttle_callback(config, throttle_, SaturationPolicy::wait))
                      : std::nullopt),
       mapping_(config, std::move(segmenter),
-               {.participant = participant_,
+               {.storage = storage_,
+                .participant = participant_,
                 .topics = topics_,
                 .statistics = statistics_,
                 .throttle = throttle_,
                 .occupancy = occupancy_ ? &occupancy_->thread() : nullptr}),
-      traversability_(config, participant_, topics_, mapping_.latest_map(), mapping_.tiles(),
+      traversability_(config, participant_, topics_, storage_.latest_map(), storage_.tiles(),
                       statistics_,
                       throttle_callback(config, throttle_, SaturationPolicy::run_at_ten_percent)),
       interface_(config, {.participant = participant_,
                           .topics = topics_,
                           .statistics = statistics_,
                           .service_log = service_log_,
+                          .storage = storage_,
                           .mapping = mapping_,
                           .traversability = traversability_,
                           .occupancy = occupancy_ ? &occupancy_->thread() : nullptr}) {

@@ -7,6 +7,7 @@
 #include "idl/dds/participant.hpp"
 #include "idl/interface/topics.hpp"
 #include "server/interface.hpp"
+#include "server/mapping/map_storage.hpp"
 #include "server/mapping/mapping.hpp"
 #include "server/monitoring/metrics_endpoint.hpp"
 #include "server/monitoring/service_log.hpp"
@@ -32,6 +33,8 @@ class Server {
   Statistics statistics_;
   ServiceLog service_log_;
   BackgroundThrottle throttle_;
+  // Before the participant: whoever is seen on DDS has a map file that works.
+  MapStorage storage_;
   dds::Topics topics_;
   dds::Participant participant_;
   std::optional<Occupancy> occupancy_;

@@ -26,7 +26,7 @@ static_assert(static_cast<std::uint8_t>(BlockReason::none) == codes::REASON_NONE
               static_cast<std::uint8_t>(BlockReason::slope) == codes::REASON_SLOPE &&
               static_cast<std::uint8_t>(BlockReason::roughness) == codes::REASON_ROUGHNESS &&
               static_cast<std::uint8_t>(BlockReason::ground_class) == codes::REASON_GROUND_CLASS &&
-              static_cast<std::uint8_t>(BlockReason::inscribed) == codes::REASON_INFLATION &&
+              static_cast<std::uint8_t>(BlockReason::inscribed) == codes::REASON_INSCRIBED &&
               static_cast<std::uint8_t>(BlockReason::unknown) == codes::REASON_UNKNOWN);
 
 ReplyCode code_of(TraversabilityStatus status) {
