@@ -45,12 +45,13 @@ ExitCode run(const Arguments& arguments) {
   const simulation::Simulation simulation(config);
   const Written written = write_sequence(arguments.out, simulation, stop);
   if (arguments.json) {
-    std::cout << nlohmann::json{{"folder", arguments.out},      {"city", config.plan.name},
-                                {"sensor", config.sensor.name}, {"seed", config.seed},
-                                {"scans", written.scans},       {"points", written.points},
-                                {"rolling", config.rolling}}
-                     .dump(2)
-              << "\n";
+    std::cout
+        << nlohmann::json{{"folder", arguments.out},      {"city", config.plan.name},
+                          {"sensor", config.sensor.name}, {"seed", config.seed},
+                          {"scans", written.scans},       {"points", written.points},
+                          {"rolling", config.rolling},    {"motion", arguments.simulation.motion}}
+               .dump(2)
+        << "\n";
   } else {
     std::cout << written.scans << " scans, " << written.points << " points of a "
               << config.sensor.name << " in city '" << config.plan.name << "', seed " << config.seed
@@ -84,6 +85,11 @@ void add_simulate_command(CommandHandle program, Action& action) {
       .with_default();
   command.flag("--rolling", simulation.rolling,
                "The lidar moves while it turns; every point has its time");
+  command
+      .option("--motion", simulation.motion,
+              "Of the lidar on its vehicle: vehicle (fixed), hard_turns (a robot that turns on the "
+              "spot at 55 degrees a second) or handheld")
+      .with_default();
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"
