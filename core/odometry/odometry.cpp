@@ -29,6 +29,10 @@ constexpr double min_gain_of_other_start = 1.1;
 constexpr double max_gap_s = 10.0;
 /// After so many lost scans, and again after as many, the scan is looked for all round.
 constexpr int relocalization_interval = 5;
+/// The first scans find less of the map with every step: nothing is judged by fewer than these.
+constexpr int min_fits_seen = 8;
+/// With this share of the usual fit of all its features a scan is believed where little stands up.
+constexpr double clear_fit_share = 0.85;
 /// A scan of which a smaller share than this lies in known space could lie anywhere.
 constexpr double min_believed_overlap = 0.1;
 /// A pose whose OdometryResult::upright_fit is a smaller share than this of what they have lately
@@ -323,6 +327,8 @@ struct Odometry::State {
   /// Running mean of OdometryResult::fit; 0 before the first.
   double mean_fit = 0.0;
   double mean_upright_fit = 0.0;
+  /// Scans in these means.
+  int fits_seen = 0;
   /// Running mean of the stamps' deviation from multiples of the period, as a share of it.
   double irregularity = 0.0;
 };
@@ -370,8 +376,10 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
   }
   OdometryResult found =
       search_pose(features, T_map_lidar_predicted, interval_s, prediction_is_good);
-  const bool is_believed = found.upright_fit >= min_believed_fit_share * mean_upright_fit &&
-                           found.overlap >= min_believed_overlap;
+  const bool is_believed = fits_seen < min_fits_seen ||
+                           ((found.upright_fit >= min_believed_fit_share * mean_upright_fit ||
+                             found.fit >= clear_fit_share * mean_fit) &&
+                            found.overlap >= min_believed_overlap);
   if (found.health != OdometryHealth::lost && is_believed) return found;
   if (lost_scans % relocalization_interval == relocalization_interval - 1) {
     std::vector<LabelledPoint> points_map = map.edges.points();
@@ -558,9 +566,9 @@ void Odometry::State::extend_map(const ScanInParts& parts, const Step& step,
 
 void Odometry::State::update_fit(const OdometryResult& result) {
   if (result.health == OdometryHealth::lost || result.health == OdometryHealth::initialised) return;
-  const auto update = [](double& mean, double value) {
-    mean = mean == 0.0 ? value : mean + fit_mean_gain * (value - mean);
-  };
+  ++fits_seen;
+  const double gain = std::max(fit_mean_gain, 1.0 / fits_seen);
+  const auto update = [gain](double& mean, double value) { mean += gain * (value - mean); };
   update(mean_fit, result.fit);
   update(mean_upright_fit, result.upright_fit);
 }
