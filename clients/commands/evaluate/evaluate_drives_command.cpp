@@ -6,7 +6,6 @@
 #include <iostream>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
 #include <sstream>
@@ -50,7 +49,6 @@ struct Arguments {
   std::string stamps = "as_recorded";
   MapperArguments mapper;
   bool each = false;
-  bool json = false;
 };
 
 /// "sim:crowd,seed=2,sensor=vlp_16,motion=hard_turns,rolling,scans=300": a drive in words.
