@@ -1,6 +1,7 @@
 #include "core/mapper.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
@@ -52,18 +53,18 @@ std::optional<MappedScan> Mapper::process(
   LabelSynchronizer::Submission submission = label_synchronizer_.submit(scan, static_map_);
 
   // Deskew, and labels for the points where they are now expected.
-  if (config_.prepare.deskew)
-    scan = deskew(std::move(scan), odometry_.motion_during(config_.sensor.period_s),
-                  config_.sensor.period_s);
-  const Eigen::Isometry3d T_map_lidar_expected =
-      T_map_lidar_prior.value_or(odometry_.predict(scan.stamp_ns));
+  if (!config_.prepare.deskew) scan.time_offset_s.clear();
+  const SweepTimes sweep = sweep_times(scan, config_.sensor.period_s);
+  deskew_to_middle(scan, sweep, odometry_.motion_during(sweep.duration_s));
+  const Eigen::Isometry3d T_map_lidar_expected = T_map_lidar_prior.value_or(
+      odometry_.predict(scan.stamp_ns + std::llround(sweep.middle_s * 1e9)));
   LabelSynchronizer::Labels labels = label_synchronizer_.labels_for(
       scan, std::move(submission), T_map_lidar_expected, static_map_);
   end_stage("segment");
 
   // Register: the pose, and what moves.
   add_prior_map_near(T_map_lidar_expected.translation());
-  Odometry::Step step = odometry_.register_scan(scan, labels.labels, T_map_lidar_prior);
+  Odometry::Step step = odometry_.register_scan(scan, sweep, labels.labels, T_map_lidar_prior);
   end_stage("odometry");
   if (listeners_.pose_found) listeners_.pose_found(scan.stamp_ns, step.result);
 
@@ -72,7 +73,8 @@ std::optional<MappedScan> Mapper::process(
                     labels.provenance,
                     {std::move(scan), std::move(labels.labels), std::move(step.motion)},
                     labels.unlabelled_may_move()};
-  label_synchronizer_.insert(mapped.labelled, labels, step.result.T_map_lidar, static_map_);
+  if (step.result.health != OdometryHealth::lost)
+    label_synchronizer_.insert(mapped.labelled, labels, step.result.T_map_lidar, static_map_);
   trajectory_.push_back({mapped.labelled.scan.stamp_ns, step.result.T_map_lidar});
   end_stage("static_map");
   return mapped;
@@ -83,12 +85,38 @@ bool Mapper::accepts(const Scan& scan) {
     last_rejection_ = {"empty", "the scan has no points"};
     return false;
   }
-  if (!trajectory_.empty() && scan.stamp_ns <= trajectory_.back().stamp_ns) {
-    last_rejection_ = {"out_of_order", "the scan's stamp " + std::to_string(scan.stamp_ns) +
-                                           " ns is not after the last one, " +
-                                           std::to_string(trajectory_.back().stamp_ns) + " ns"};
-    return false;
+  if (trajectory_.empty() || clock_.accepts(scan.stamp_ns, trajectory_.back().stamp_ns)) {
+    // A clock that was set back: poses of times to come would stand between those to be added.
+    while (!trajectory_.empty() && trajectory_.back().stamp_ns >= scan.stamp_ns)
+      trajectory_.pop_back();
+    return true;
   }
+  const std::int64_t last_ns = trajectory_.back().stamp_ns;
+  last_rejection_ =
+      scan.stamp_ns <= last_ns
+          ? ScanRejection{"out_of_order", "the scan's stamp " + std::to_string(scan.stamp_ns) +
+                                              " ns is not after the last one, " +
+                                              std::to_string(last_ns) + " ns"}
+          : ScanRejection{"time_jump", "the scan's stamp " + std::to_string(scan.stamp_ns) +
+                                           " ns is far after the last one, " +
+                                           std::to_string(last_ns) +
+                                           " ns: the next scans must confirm it"};
+  return false;
+}
+
+bool ScanClock::accepts(std::int64_t stamp_ns, std::int64_t last_ns) {
+  const auto follows = [stamp_ns](std::int64_t before_ns) {
+    return stamp_ns > before_ns && stamp_ns - before_ns <= max_step_ns;
+  };
+  if (follows(last_ns)) {
+    doubtful_scans_ = 0;
+    return true;
+  }
+  doubtful_scans_ = doubtful_scans_ > 0 && follows(doubtful_ns_) ? doubtful_scans_ + 1 : 1;
+  doubtful_ns_ = stamp_ns;
+  const int needed = stamp_ns > last_ns ? scans_after_jump : scans_after_step_back;
+  if (doubtful_scans_ < needed) return false;
+  doubtful_scans_ = 0;
   return true;
 }
 
@@ -127,6 +155,7 @@ void Mapper::clear_scan_state() {
   odometry_.reset();
   label_synchronizer_.reset();
   trajectory_.clear();
+  clock_ = {};
   resumed_tiles_.clear();
   prior_map_added_at_map_.reset();
 }

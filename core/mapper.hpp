@@ -41,9 +41,26 @@ struct MappedScan {
 
 /// Why a scan was not mapped.
 struct ScanRejection {
-  /// Counter's name in the status: "empty", "out_of_order", "too_few_points".
+  /// Counter's name in the status: "empty", "out_of_order", "time_jump", "too_few_points".
   std::string counter;
   std::string reason;
+};
+
+/// Decides whether a scan's stamp can be believed. A stamp far in the future, or before the last
+/// one, is a fault until the scans after it go on from there: then the clock was set.
+class ScanClock {
+ public:
+  /// `last_ns` is the stamp of the last scan that was accepted.
+  [[nodiscard]] bool accepts(std::int64_t stamp_ns, std::int64_t last_ns);
+
+ private:
+  static constexpr std::int64_t max_step_ns = 60'000'000'000;
+  static constexpr int scans_after_jump = 3;
+  /// Stamps may come again and again for a moment, when a sender starts over.
+  static constexpr int scans_after_step_back = 10;
+
+  std::int64_t doubtful_ns_ = 0;
+  int doubtful_scans_ = 0;
 };
 
 /// Called when a stage of the pipeline has ended, with its name: "prepare", "segment", "odometry",
@@ -113,6 +130,7 @@ class Mapper {
   std::set<TileId> resumed_tiles_;
   std::optional<Eigen::Vector3d> prior_map_added_at_map_;
   Trajectory trajectory_;
+  ScanClock clock_;
   ScanRejection last_rejection_;
 };
 

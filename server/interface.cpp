@@ -18,12 +18,12 @@ ServerTraits traits(const ServerConfig& config, const InterfaceContext& context)
 
 Interface::Interface(const ServerConfig& config, const InterfaceContext& context)
     : participant_(context.participant),
-      map_publisher_(context.participant, context.topics, config, context.mapping.latest_map()),
+      map_publisher_(context.participant, context.topics, config, context.storage.latest_map()),
       receiver_(std::in_place, context.participant, config, context.mapping.scans(),
                 context.statistics),
       discovery_diagnostics_(context.participant),
       report_(
-          traits(config, context), context.mapping.latest_map(), context.statistics,
+          traits(config, context), context.storage.latest_map(), context.statistics,
           [this] { return discovery_diagnostics_.diagnostics(); },
           [this] { return receiver_ ? receiver_->no_input_reason() : std::string(); }) {
   services_.emplace(context.participant, config.topics.name_space,
@@ -36,9 +36,9 @@ ServiceContext Interface::service_context(const ServerConfig& config,
                                           const InterfaceContext& context) const {
   Mapping& mapping = context.mapping;
   ServiceContext services{
-      .latest_map = mapping.latest_map(),
-      .tiles = mapping.tiles(),
-      .saver = mapping.saver(),
+      .latest_map = context.storage.latest_map(),
+      .tiles = context.storage.tiles(),
+      .saver = context.storage.saver(),
       .status = [this] { return status(); },
       .reset = [&mapping] { return mapping.reset(); },
       .load = [&mapping](

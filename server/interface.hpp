@@ -21,6 +21,7 @@ struct InterfaceContext {
   const dds::Topics& topics;
   Statistics& statistics;
   ServiceLog& service_log;
+  MapStorage& storage;
   Mapping& mapping;
   const Traversability& traversability;
   /// Null: no octree.

@@ -8,6 +8,7 @@
 #include "idl/dds/participant.hpp"
 #include "idl/interface/topics.hpp"
 #include "server/interface.hpp"
+#include "server/mapping/map_storage.hpp"
 #include "server/mapping/mapping.hpp"
 #include "server/monitoring/metrics_endpoint.hpp"
 #include "server/monitoring/service_log.hpp"
@@ -44,6 +45,8 @@ struct Server::Parts {
   Statistics statistics;
   ServiceLog service_log;
   BackgroundThrottle throttle;
+  // Before the participant: whoever is seen on DDS has a map file that works.
+  MapStorage storage;
   dds::Topics topics;
   dds::Participant participant;
   std::optional<Occupancy> occupancy;
@@ -56,6 +59,7 @@ struct Server::Parts {
 
 Server::Parts::Parts(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter)
     : service_log(statistics.metrics()),
+      storage(config, segmenter->name(), statistics),
       topics(dds::Topics::in(config.topics.name_space)),
       participant(server_options(config.dds)),
       // An octree that misses scans is better than late poses.
@@ -65,17 +69,19 @@ Server::Parts::Parts(const ServerConfig& config, std::unique_ptr<Segmenter> segm
                           throttle_callback(config, throttle, SaturationPolicy::wait))
                     : std::nullopt),
       mapping(config, std::move(segmenter),
-              {.participant = participant,
+              {.storage = storage,
+               .participant = participant,
                .topics = topics,
                .statistics = statistics,
                .throttle = throttle,
                .occupancy = occupancy ? &occupancy->thread() : nullptr}),
-      traversability(config, participant, topics, mapping.latest_map(), mapping.tiles(), statistics,
+      traversability(config, participant, topics, storage.latest_map(), storage.tiles(), statistics,
                      throttle_callback(config, throttle, SaturationPolicy::run_at_ten_percent)),
       interface(config, {.participant = participant,
                          .topics = topics,
                          .statistics = statistics,
                          .service_log = service_log,
+                         .storage = storage,
                          .mapping = mapping,
                          .traversability = traversability,
                          .occupancy = occupancy ? &occupancy->thread() : nullptr}) {

@@ -43,6 +43,7 @@ void add_evaluate_command(CommandHandle program, Action& action) {
   add_evaluate_map_command(evaluate, action);
   add_evaluate_traversable_command(evaluate, action);
   add_evaluate_weightings_command(evaluate, action);
+  add_evaluate_drives_command(evaluate, action);
   evaluate.explain("'stillmap evaluate WHAT --help' shows options and examples.");
 }
 

@@ -69,6 +69,7 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action);
 void add_evaluate_map_command(CommandHandle evaluate, Action& action);
 void add_evaluate_traversable_command(CommandHandle evaluate, Action& action);
 void add_evaluate_weightings_command(CommandHandle evaluate, Action& action);
+void add_evaluate_drives_command(CommandHandle evaluate, Action& action);
 
 // Subcommands of dataset.
 void add_dataset_export_command(CommandHandle dataset, Action& action);

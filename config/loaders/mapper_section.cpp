@@ -47,6 +47,9 @@ void read_features(YamlSection section, FeatureConfig& features) {
   section.number("edge_spacing_m", features.edge_spacing_m, lengths_m);
   section.number("map_plane_spacing_m", features.map_plane_spacing_m, lengths_m);
   section.number("plane_spacing_m", features.plane_spacing_m, lengths_m);
+  section.integer("min_surface_rings", features.min_surface_rings, {1, 100000});
+  section.number("map_surface_spacing_m", features.map_surface_spacing_m, lengths_m);
+  section.number("surface_spacing_m", features.surface_spacing_m, lengths_m);
 }
 
 void read_local_map(YamlSection section, LocalMapConfig& local_map) {
@@ -64,6 +67,8 @@ void read_registration(YamlSection section, RegistrationConfig& registration) {
   section.number("step_translation_m", registration.step_translation_m, {1e-9, 1});
   section.number("step_rotation_rad", registration.step_rotation_rad, {1e-9, 1});
   section.number("robust_scale_m", registration.robust_scale_m, {0, 100});
+  section.number("sweep_translation_m", registration.sweep_translation_m, {0, 10});
+  section.number("sweep_rotation_rad", registration.sweep_rotation_rad, {1e-6, 10});
   section.integer("min_correspondences", registration.min_correspondences, {6, 100000});
   section.number("min_observability", registration.min_observability, shares);
 }
@@ -85,6 +90,7 @@ void read_odometry(YamlSection section, OdometryConfig& odometry) {
                              {"geometric", Weighting::geometric},
                              {"semantic", Weighting::semantic}});
   section.number("alpha", odometry.alpha, shares);
+  section.boolean("paper_exact", odometry.paper_exact);
   read_features(section.section("features"), odometry.features);
   read_local_map(section.section("local_map"), odometry.local_map);
   read_registration(section.section("registration"), odometry.registration);

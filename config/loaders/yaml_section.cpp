@@ -17,7 +17,7 @@ namespace {
 
 constexpr double radians_per_degree = std::numbers::pi / 180.0;
 
-/// Fields that had another name, by their path in the file.
+/// Fields that had another name in the same section, by their path in the file.
 struct RenamedField {
   std::string_view old_path;
   std::string_view path;
@@ -35,11 +35,15 @@ constexpr RenamedField renamed_fields[] = {
     {"static_map.passes_per_hit", "static_map.misses_per_hit"},
 };
 
-/// What a fault says of a name that is no field.
+/// What a fault says of a name that is no field. `known`: the names that can be used there.
 std::string unknown_field(const std::string& path, const std::string& name,
                           const std::vector<std::string>& known) {
+  // The table holds for files of all kinds, and a path can mean nothing in this one.
+  const auto is_known_here = [&](const RenamedField& field) {
+    return std::ranges::find(known, field.path.substr(field.path.rfind('.') + 1)) != known.end();
+  };
   const auto renamed = std::ranges::find(renamed_fields, path, &RenamedField::old_path);
-  if (renamed != std::end(renamed_fields)) {
+  if (renamed != std::end(renamed_fields) && is_known_here(*renamed)) {
     return "is now called '" + std::string(renamed->path) + "'";
   }
   return "there is no such field" + did_you_mean(name, known);

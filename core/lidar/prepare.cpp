@@ -113,6 +113,34 @@ Scan drop_unusable_points(Scan scan, const PrepareConfig& config) {
   return scan;
 }
 
+double SweepTimes::part(float time_offset_s) const {
+  if (duration_s <= 0.0) return 0.0;
+  const double part = (time_offset_s - middle_s) / duration_s;
+  return std::abs(part) <= 0.5 + 1e-6 ? part : 0.0;
+}
+
+SweepTimes sweep_times(const Scan& scan, double period_s) {
+  double first_s = 0.0;
+  double last_s = 0.0;
+  bool any = false;
+  for (const float t : scan.time_offset_s) {
+    if (!(std::abs(t) <= max_periods * period_s)) continue;
+    first_s = any ? std::min<double>(first_s, t) : t;
+    last_s = any ? std::max<double>(last_s, t) : t;
+    any = true;
+  }
+  return {.middle_s = 0.5 * (first_s + last_s), .duration_s = last_s - first_s};
+}
+
+void deskew_to_middle(Scan& scan, const SweepTimes& sweep, const Eigen::Isometry3d& T_start_end) {
+  if (sweep.duration_s <= 0.0) return;
+  const ScrewMotion motion(T_start_end);
+  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scan.size(), 4096), [&](const auto& range) {
+    for (std::size_t i = range.begin(); i < range.end(); ++i)
+      scan.points_lidar[i] = motion.move(scan.points_lidar[i], sweep.part(scan.time_offset_s[i]));
+  });
+}
+
 Scan deskew(Scan scan, const Eigen::Isometry3d& T_start_end, double period_s) {
   assert(period_s > 0.0);
   if (scan.time_offset_s.empty()) return scan;

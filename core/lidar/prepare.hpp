@@ -25,6 +25,23 @@ struct PrepareConfig {
 /// per-point vectors stay aligned.
 [[nodiscard]] Scan drop_unusable_points(Scan scan, const PrepareConfig& config);
 
+/// When a sweep was measured, relative to the scan's stamp [s].
+struct SweepTimes {
+  double middle_s = 0.0;
+  /// From the first point to the last; 0: all at one instant, or no usable times.
+  double duration_s = 0.0;
+
+  /// -0.5 at the start of the sweep, 0.5 at its end; 0 for a time that cannot be of this sweep.
+  [[nodiscard]] double part(float time_offset_s) const;
+};
+
+/// From the points' times, whatever instant the stamp is.
+[[nodiscard]] SweepTimes sweep_times(const Scan& scan, double period_s);
+
+/// Moves every point to the middle of the sweep. The lidar is taken to move steadily;
+/// `T_start_end` is its motion during the whole sweep. Keeps the points' times.
+void deskew_to_middle(Scan& scan, const SweepTimes& sweep, const Eigen::Isometry3d& T_start_end);
+
 /// The scan as if taken in one instant, at `stamp_ns` (paper II-A, "jelly effect"). The lidar is
 /// taken to move steadily; `T_start_end` is its motion during `period_s`. Clears `time_offset_s`.
 /// A scan without times comes back as it is.

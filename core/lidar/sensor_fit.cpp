@@ -150,6 +150,7 @@ std::optional<SensorModel> fit_bands(const Scan& scan) {
   if (high - low < 1.0 * degree) return std::nullopt;
   SensorModel sensor;
   sensor.name = "bands of a scan without rings";
+  sensor.pattern = ScanPattern::irregular;
   sensor.rings = bands;
   sensor.fov_up = high;
   sensor.fov_down = low;

@@ -8,7 +8,10 @@ namespace stillmap {
 /// How the ring of a point is found when the scan does not carry it.
 enum class RingSource { field, order, elevation };
 
-/// Geometry of a spinning lidar. Angles in radians, elevation positive upwards.
+/// How a lidar's points lie: on rings that beams turn along, or anywhere (Livox, merged clouds).
+enum class ScanPattern { rings, irregular };
+
+/// Geometry of a lidar. Angles in radians, elevation positive upwards.
 struct SensorModel {
   std::string name;
   int rings = 64;
@@ -26,6 +29,7 @@ struct SensorModel {
   double max_range_m = 120.0;
   /// Seconds a revolution takes.
   double period_s = 0.1;
+  ScanPattern pattern = ScanPattern::rings;
   /// What to use when a scan has no ring field; `field` then means elevation.
   RingSource ring_source = RingSource::elevation;
   /// Factor that brings the intensity of a live cloud to 0..1 (1/255 for a Velodyne's PointCloud2).

@@ -57,18 +57,6 @@ constexpr std::size_t non_resident_tile_bytes = sizeof(Tile) + 64;
 
 bool is_same_size(double a_m, double b_m) { return std::abs(a_m - b_m) <= 1e-9; }
 
-void check_sizes(const MapSnapshot& view, const StaticMapConfig& config) {
-  if (view.tiles.empty() || (is_same_size(view.voxel_size_m, config.voxel_size_m) &&
-                             is_same_size(view.tile_size_m, config.tile_size_m))) {
-    return;
-  }
-  std::ostringstream fault;
-  fault << "the stored map has voxel_size_m " << view.voxel_size_m << " and tile_size_m "
-        << view.tile_size_m << ", the configuration has " << config.voxel_size_m << " and "
-        << config.tile_size_m << ": configure the stored sizes, or start a new map";
-  throw std::invalid_argument(fault.str());
-}
-
 }  // namespace
 
 std::string StaticMapConfig::faults() const {
@@ -103,6 +91,18 @@ std::string StaticMapConfig::faults() const {
   }
   if (min_points == 0) faults << "min_points = 0; must be at least 1\n";
   return faults.str();
+}
+
+void check_sizes(const MapSnapshot& stored, const StaticMapConfig& config) {
+  if (stored.tiles.empty() || (is_same_size(stored.voxel_size_m, config.voxel_size_m) &&
+                               is_same_size(stored.tile_size_m, config.tile_size_m))) {
+    return;
+  }
+  std::ostringstream fault;
+  fault << "the stored map has voxel_size_m " << stored.voxel_size_m << " and tile_size_m "
+        << stored.tile_size_m << ", the configuration has " << config.voxel_size_m << " and "
+        << config.tile_size_m << ": configure the stored sizes, or start a new map";
+  throw std::invalid_argument(fault.str());
 }
 
 struct StaticMap::State {

@@ -38,6 +38,10 @@ struct StaticMapConfig {
   [[nodiscard]] std::string faults() const;
 };
 
+/// Throws std::invalid_argument when the voxel or tile size of a stored map is not the configured
+/// one.
+void check_sizes(const MapSnapshot& stored, const StaticMapConfig& config);
+
 /// Evidence of tiles beyond the voxels that they show. Null: the whole tile is in the tile store.
 using TileEvidenceMap = std::map<TileId, std::shared_ptr<const TileEvidence>>;
 

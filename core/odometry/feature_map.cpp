@@ -148,6 +148,15 @@ void FeatureMap::remove_far_from(const Eigen::Vector3f& centre_map) {
   }
 }
 
+std::vector<LabelledPoint> FeatureMap::points() const {
+  std::vector<LabelledPoint> all;
+  all.reserve(size_);
+  for (const Block& block : blocks_)
+    for (int i = 0; i < block.count; ++i)
+      all.push_back({block.position(i), block.label[static_cast<std::size_t>(i)]});
+  return all;
+}
+
 void FeatureMap::clear() {
   index_.clear();
   blocks_.clear();

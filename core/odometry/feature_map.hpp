@@ -48,6 +48,9 @@ class FeatureMap {
   template <typename Predicate>
   void remove_movable_if(Predicate is_gone);
 
+  /// All points, in no particular order.
+  [[nodiscard]] std::vector<LabelledPoint> points() const;
+
   void clear();
   [[nodiscard]] std::size_t size() const { return size_; }
 

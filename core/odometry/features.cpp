@@ -188,6 +188,16 @@ std::vector<std::uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> poi
   return kept;
 }
 
+Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
+  std::vector<std::uint32_t> all(scan.size());
+  std::iota(all.begin(), all.end(), 0U);
+  Features features;
+  features.planes = voxel_downsample(scan.points_lidar, all, config.map_surface_spacing_m);
+  features.surfaces =
+      voxel_downsample(scan.points_lidar, features.planes, config.surface_spacing_m);
+  return features;
+}
+
 Features extract_features(const Scan& scan, const FeatureConfig& config) {
   assert(scan.ring.size() == scan.size());
   RingOrder rings = order_by_ring(scan);

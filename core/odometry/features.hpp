@@ -18,7 +18,12 @@ struct Features {
   std::vector<std::uint32_t> planes;
   /// Those of `planes` that are registered, downsampled to `plane_spacing_m`.
   std::vector<std::uint32_t> registered_planes;
+  /// Points of a scan without rings that are registered: the local map says what they lie on.
+  std::vector<std::uint32_t> surfaces;
 };
+
+/// All points of a scan without rings, thinned: `planes` and `surfaces`.
+[[nodiscard]] Features extract_surfaces(const Scan& scan, const FeatureConfig& config);
 
 /// Edge and plane points of every ring by their curvature (LOAM V-A, with
 /// the rejection of occluded and grazing points that A-LOAM dropped). `scan.ring` must be known.

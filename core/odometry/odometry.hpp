@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
+#include "core/lidar/prepare.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/odometry/feature_map.hpp"
 #include "core/odometry/odometry_config.hpp"
@@ -39,8 +40,10 @@ class Odometry {
   };
 
   /// Registers a prepared scan, splits its points by motion, and adds it to the local map.
-  /// `scan.ring` must be known.
-  [[nodiscard]] Step register_scan(const Scan& scan, const PointLabels& labels,
+  /// `scan.ring` must be known. The points come moved to the middle of the sweep by
+  /// motion_during(sweep.duration_s), with their times; they leave as if measured at the stamp,
+  /// where the result's pose is, by the motion that was found, and without times.
+  [[nodiscard]] Step register_scan(Scan& scan, const SweepTimes& sweep, const PointLabels& labels,
                                    const std::optional<Eigen::Isometry3d>& T_map_lidar_prior);
 
   /// Adds points of a map made earlier (map frame) to the local map. Before the first scan: that

@@ -30,6 +30,12 @@ void check(const FeatureConfig& c, FaultList& faults) {
   faults.require(c.map_plane_spacing_m > 0.0, "features.map_plane_spacing_m", c.map_plane_spacing_m,
                  "above 0");
   faults.require(c.plane_spacing_m > 0.0, "features.plane_spacing_m", c.plane_spacing_m, "above 0");
+  faults.require(c.min_surface_rings >= 1, "features.min_surface_rings", c.min_surface_rings,
+                 "1 or more");
+  faults.require(c.map_surface_spacing_m > 0.0, "features.map_surface_spacing_m",
+                 c.map_surface_spacing_m, "above 0");
+  faults.require(c.surface_spacing_m > 0.0, "features.surface_spacing_m", c.surface_spacing_m,
+                 "above 0");
 }
 
 void check(const LocalMapConfig& c, FaultList& faults) {
@@ -56,6 +62,10 @@ void check(const RegistrationConfig& c, const LocalMapConfig& map, FaultList& fa
                  "above 0");
   faults.require(c.robust_scale_m >= 0.0, "registration.robust_scale_m", c.robust_scale_m,
                  "0 or more");
+  faults.require(c.sweep_translation_m >= 0.0, "registration.sweep_translation_m",
+                 c.sweep_translation_m, "0 or more");
+  faults.require(c.sweep_rotation_rad > 0.0, "registration.sweep_rotation_rad",
+                 c.sweep_rotation_rad, "above 0");
   faults.require(c.min_correspondences >= 6, "registration.min_correspondences",
                  c.min_correspondences, "6 or more");
   faults.require(c.min_observability >= 0.0 && c.min_observability < 1.0,
@@ -65,8 +75,8 @@ void check(const RegistrationConfig& c, const LocalMapConfig& map, FaultList& fa
 void check(const MotionConfig& c, FaultList& faults) {
   faults.require(c.inconsistency_threshold >= 0.0 && c.inconsistency_threshold <= 1.0,
                  "motion.inconsistency_threshold", c.inconsistency_threshold, "within 0..1");
-  faults.require(c.range_image_history_size >= 1, "motion.range_image_history_size", c.range_image_history_size,
-                 "1 or more");
+  faults.require(c.range_image_history_size >= 1, "motion.range_image_history_size",
+                 c.range_image_history_size, "1 or more");
   faults.require(c.range_image_history_interval >= 1, "motion.range_image_history_interval",
                  c.range_image_history_interval, "1 or more");
   faults.require(c.free_margin_m > 0.0, "motion.free_margin_m", c.free_margin_m, "above 0");

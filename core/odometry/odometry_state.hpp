@@ -29,6 +29,17 @@ struct OdometryResult {
   int iterations = 0;
   int edge_correspondences = 0;
   int plane_correspondences = 0;
+  /// Motion of the lidar during the sweep beyond what the points were compensated for: translation
+  /// [m] and rotation [rad] from its start to its end, along the lidar's axes in its middle.
+  Eigen::Matrix<double, 6, 1> sweep_correction = Eigen::Matrix<double, 6, 1>::Zero();
+  /// How well the scan lies on the local map: mean over all its features of a robust score of
+  /// their distance, 0 for those without a counterpart, 1 for a perfect fit.
+  double fit = 0.0;
+  /// Share of the features that lie where the local map has points at all.
+  double overlap = 0.0;
+  /// The same as `fit`, of the features in known space alone, and without those on level planes:
+  /// ground lies on ground anywhere.
+  double upright_fit = 0.0;
   /// Root mean square of the weighted residuals after the last iteration [m].
   double rms_residual_m = 0.0;
 };

@@ -5,6 +5,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -23,58 +24,87 @@ struct Correspondence {
   Eigen::Vector3d point_lidar;
   FittedSurface surface;
   double inconsistency = 0.0;
+  double sweep_part = 0.0;
   bool found = false;
+  bool in_known_space = false;
   /// Where the neighbours were looked up; NaN: not yet.
   Eigen::Vector3f searched_map = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
 };
 
-enum class FeatureKind { edge, plane };
+enum class FeatureKind { edge, plane, surface };
+
+std::optional<FittedSurface> fit(FeatureKind kind, const Neighbours& neighbours) {
+  if (kind == FeatureKind::edge) return fit_line(neighbours);
+  if (auto plane = fit_plane(neighbours); plane || kind == FeatureKind::plane) return plane;
+  return fit_line(neighbours);
+}
 
 /// One correspondence a feature, in the features' order whatever the number of threads.
 void find_correspondences(std::span<const FeaturePoint> features, FeatureKind kind,
-                          const FeatureMap& map, const Eigen::Isometry3d& T_map_lidar,
+                          const FeatureMap& map, const OdometryResult& pose,
                           const RegistrationConfig& config, std::span<Correspondence> found) {
-  const Eigen::Isometry3f T = T_map_lidar.cast<float>();
   const tbb::blocked_range<std::size_t> all(0, features.size(), 128);
   tbb::parallel_for(all, [&](const auto& range) {
     for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      const Eigen::Vector3f point_map = T * features[i].position_lidar;
+      const double part = features[i].sweep_part;
+      found[i].point_lidar =
+          compensated(features[i].position_lidar.cast<double>(), part, pose.sweep_correction);
+      const Eigen::Vector3f point_map = (pose.T_map_lidar * found[i].point_lidar).cast<float>();
       if ((point_map - found[i].searched_map).norm() < same_neighbours_m) continue;
       found[i].searched_map = point_map;
+      found[i].sweep_part = part;
       const Neighbours neighbours = map.nearest(
           point_map, config.neighbours, static_cast<float>(config.max_neighbour_distance_m));
-      const auto surface = kind == FeatureKind::edge ? fit_line(neighbours) : fit_plane(neighbours);
+      found[i].in_known_space = neighbours.count > 0;
+      const auto surface = fit(kind, neighbours);
       found[i].found = surface.has_value();
       if (!surface) continue;
-      found[i].point_lidar = features[i].position_lidar.cast<double>();
       found[i].surface = *surface;
       found[i].inconsistency = semantic_inconsistency(neighbours, features[i].label);
     }
   });
 }
 
-/// J'WJ and J'We of eq. (13) over the correspondences whose residual is valid.
+/// J'WJ and J'We of eq. (13) over the correspondences whose residual is valid. A point's derivative
+/// by the sweep's motion (along the map's axes) is its sweep part times that by the pose.
 struct NormalEquations {
   Matrix6d hessian = Matrix6d::Zero();
+  Matrix6d hessian_pose_sweep = Matrix6d::Zero();
+  Matrix6d hessian_sweep = Matrix6d::Zero();
   PoseTangent gradient = PoseTangent::Zero();
+  PoseTangent gradient_sweep = PoseTangent::Zero();
   double weighted_squares = 0.0;
   double weights = 0.0;
   double squared_ranges = 0.0;
+  /// Sum of the features' scores (OdometryResult::fit), and of those that lie on no level plane.
+  double scores = 0.0;
+  double upright_scores = 0.0;
+  int on_level_planes = 0;
   int edges = 0;
   int planes = 0;
 
   [[nodiscard]] int count() const { return edges + planes; }
 };
 
-double robust_factor(const OdometryConfig& config, double squared_distance) {
-  const double scale = config.registration.robust_scale_m;
+double geman_mcclure(double scale, double squared_distance) {
   if (scale == 0.0) return 1.0;
   const double ratio = scale * scale / (scale * scale + squared_distance);
   return ratio * ratio;
 }
 
+/// Scale of the robust score of `OdometryResult::fit` [m].
+constexpr double fit_scale_m = 0.2;
+
+/// Whether the surface is a plane like the ground, in a map whose z points up.
+bool lies_on_level_plane(const FittedSurface& surface) {
+  constexpr double min_squared_cosine = 0.64;
+  // The trace is 1 for a plane and 2 for a line.
+  return surface.projector.trace() < 1.5 && surface.projector(2, 2) > min_squared_cosine;
+}
+
 NormalEquations build_normal_equations(std::span<const Correspondence> correspondences,
-                                       std::size_t edge_count, const Eigen::Isometry3d& T_map_lidar,
+                                       std::size_t edge_count, bool rolling,
+                                       const Eigen::Isometry3d& T_map_lidar,
                                        const OdometryConfig& config) {
   NormalEquations equations;
   for (std::size_t i = 0; i < correspondences.size(); ++i) {
@@ -84,11 +114,23 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
     const double squared = r.vector.squaredNorm();
     const double distance = std::sqrt(squared);
     if (distance > config.registration.max_residual_m) continue;
+    const double score = geman_mcclure(fit_scale_m, squared);
+    equations.scores += score;
+    const bool is_level = lies_on_level_plane(c.surface);
+    equations.on_level_planes += is_level ? 1 : 0;
+    equations.upright_scores += is_level ? 0.0 : score;
     const double w = weight(config.weighting, config.alpha, distance, c.inconsistency) *
-                     robust_factor(config, squared);
+                     geman_mcclure(config.registration.robust_scale_m, squared);
     if (w <= 0.0) continue;
-    equations.hessian.noalias() += w * r.jacobian.transpose() * r.jacobian;
-    equations.gradient.noalias() += w * r.jacobian.transpose() * r.vector;
+    const Matrix6d jtj = w * r.jacobian.transpose() * r.jacobian;
+    const PoseTangent jtr = w * r.jacobian.transpose() * r.vector;
+    equations.hessian += jtj;
+    equations.gradient += jtr;
+    if (rolling) {
+      equations.hessian_pose_sweep += c.sweep_part * jtj;
+      equations.hessian_sweep += c.sweep_part * c.sweep_part * jtj;
+      equations.gradient_sweep += c.sweep_part * jtr;
+    }
     equations.weighted_squares += w * squared;
     equations.weights += w;
     equations.squared_ranges += w * c.point_lidar.squaredNorm();
@@ -96,6 +138,63 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
   }
   return equations;
 }
+
+/// Residuals of a scan that fits, for the weight of the sweep's prior beside them [m].
+constexpr double expected_residual_m = 0.05;
+
+/// Neighbouring residuals err alike: beside the prior, all of a scan's count as this many.
+constexpr double independent_correspondences = 100.0;
+
+/// Adds the prior of the motion within the sweep, along the map's axes.
+void add_sweep_prior(const SweepPrior& prior, const OdometryResult& at,
+                     const RegistrationConfig& config, NormalEquations& equations) {
+  const double correspondences = std::max(1.0, equations.weights);
+  const double share = prior.duration_share;
+  PoseTangent change = PoseTangent::Zero();
+  if (share > 0.0) {
+    const Eigen::Isometry3d since_last = prior.T_map_lidar_last.inverse() * at.T_map_lidar;
+    change = share * twist_of(since_last) - prior.compensated;
+  }
+  const PoseTangent deviation = at.sweep_correction - change;
+  PoseTangent weight;
+  weight.head<3>().setConstant(std::pow(expected_residual_m / config.sweep_translation_m, 2));
+  weight.tail<3>().setConstant(std::pow(expected_residual_m / config.sweep_rotation_rad, 2));
+  weight *= correspondences / independent_correspondences;
+  PoseTangent error;
+  error << at.T_map_lidar.linear() * deviation.head<3>(),
+      at.T_map_lidar.linear() * deviation.tail<3>();
+  const PoseTangent weighted = weight.cwiseProduct(error);
+  equations.hessian_sweep.diagonal() += weight;
+  equations.hessian_pose_sweep.diagonal() -= share * weight;
+  equations.hessian.diagonal() += share * share * weight;
+  equations.gradient_sweep += weighted;
+  equations.gradient -= share * weighted;
+}
+
+/// The sweep's motion taken out of the equations (Schur's complement).
+class SweepElimination {
+ public:
+  explicit SweepElimination(const NormalEquations& equations) {
+    const Eigen::LDLT<Matrix6d> ldlt(equations.hessian_sweep);
+    by_pose_ = ldlt.solve(equations.hessian_pose_sweep.transpose());
+    constant_ = ldlt.solve(equations.gradient_sweep);
+  }
+
+  [[nodiscard]] NormalEquations reduced(NormalEquations equations) const {
+    equations.hessian -= equations.hessian_pose_sweep * by_pose_;
+    equations.hessian = 0.5 * (equations.hessian + equations.hessian.transpose()).eval();
+    equations.gradient -= equations.hessian_pose_sweep * constant_;
+    return equations;
+  }
+  /// Step of the sweep's motion along the map's axes.
+  [[nodiscard]] PoseTangent step(const PoseTangent& pose_step) const {
+    return -(constant_ + by_pose_ * pose_step);
+  }
+
+ private:
+  Matrix6d by_pose_;
+  PoseTangent constant_;
+};
 
 struct Step {
   PoseTangent tangent;
@@ -136,46 +235,88 @@ Matrix6d covariance_of(const NormalEquations& equations) {
   return information.ldlt().solve(Matrix6d::Identity());
 }
 
-/// A prediction that nothing confirmed: 1 m and 0.3 rad.
-Matrix6d lost_covariance() {
+}  // namespace
+
+OdometryResult lost_at(const Eigen::Isometry3d& T_map_lidar_predicted) {
+  // 1 m and 0.3 rad.
   PoseTangent variance;
   variance << 1.0, 1.0, 1.0, 0.1, 0.1, 0.1;
-  return variance.asDiagonal();
+  OdometryResult result;
+  result.T_map_lidar = T_map_lidar_predicted;
+  result.health = OdometryHealth::lost;
+  result.covariance = variance.asDiagonal();
+  return result;
 }
 
-}  // namespace
+Eigen::Vector3d compensated(const Eigen::Vector3d& point_lidar, double sweep_part,
+                            const PoseTangent& sweep_twist) {
+  const Eigen::Vector3d t = sweep_part * sweep_twist.head<3>();
+  const Eigen::Vector3d r = sweep_part * sweep_twist.tail<3>();
+  const Eigen::Vector3d moved = t + r.cross(point_lidar);
+  return point_lidar + moved + 0.5 * r.cross(moved);
+}
 
 OdometryResult register_features(const FeatureSets& features, const LocalMap& map,
                                  const Eigen::Isometry3d& T_map_lidar_predicted,
-                                 const OdometryConfig& config) {
+                                 const OdometryConfig& config,
+                                 const PoseTangent& sweep_correction) {
   const RegistrationConfig& limits = config.registration;
   OdometryResult result;
   result.T_map_lidar = T_map_lidar_predicted;
+  result.sweep_correction = sweep_correction;
+  const bool rolling = features.rolling && limits.sweep_translation_m > 0.0;
   const std::size_t edge_count = features.edges.size();
-  std::vector<Correspondence> correspondences(edge_count + features.planes.size());
+  const std::size_t plane_count = features.planes.size();
+  std::vector<Correspondence> correspondences(edge_count + plane_count + features.surfaces.size());
   const std::span all(correspondences);
   NormalEquations equations;
   bool degenerate = false;
   for (; result.iterations < limits.max_iterations && !result.converged; ++result.iterations) {
-    find_correspondences(features.edges, FeatureKind::edge, map.edges, result.T_map_lidar, limits,
+    find_correspondences(features.edges, FeatureKind::edge, map.edges, result, limits,
                          all.first(edge_count));
-    find_correspondences(features.planes, FeatureKind::plane, map.planes, result.T_map_lidar,
-                         limits, all.subspan(edge_count));
-    equations = build_normal_equations(correspondences, edge_count, result.T_map_lidar, config);
+    find_correspondences(features.planes, FeatureKind::plane, map.planes, result, limits,
+                         all.subspan(edge_count, plane_count));
+    find_correspondences(features.surfaces, FeatureKind::surface, map.planes, result, limits,
+                         all.subspan(edge_count + plane_count));
+    equations =
+        build_normal_equations(correspondences, edge_count, rolling, result.T_map_lidar, config);
     if (equations.count() < limits.min_correspondences) break;
+    std::optional<SweepElimination> sweep;
+    if (rolling) {
+      add_sweep_prior(features.sweep_prior, result, limits, equations);
+      sweep.emplace(equations);
+      equations = sweep->reduced(equations);
+    }
     const Step step = solve(equations, limits.min_observability);
     degenerate = step.degenerate;
+    PoseTangent sweep_step = PoseTangent::Zero();
+    if (sweep) {
+      const PoseTangent along_map = sweep->step(step.tangent);
+      sweep_step << result.T_map_lidar.linear().transpose() * along_map.head<3>(),
+          result.T_map_lidar.linear().transpose() * along_map.tail<3>();
+      result.sweep_correction += sweep_step;
+    }
     result.T_map_lidar = boxplus(result.T_map_lidar, step.tangent);
-    result.converged = step.tangent.head<3>().norm() < limits.step_translation_m &&
-                       step.tangent.tail<3>().norm() < limits.step_rotation_rad;
+    const auto is_small = [&](const PoseTangent& tangent) {
+      return tangent.head<3>().norm() < limits.step_translation_m &&
+             tangent.tail<3>().norm() < limits.step_rotation_rad;
+    };
+    result.converged = is_small(step.tangent) && is_small(0.5 * sweep_step);
   }
   result.edge_correspondences = equations.edges;
   result.plane_correspondences = equations.planes;
+  const auto known =
+      std::ranges::count_if(all, [](const Correspondence& c) { return c.in_known_space; });
+  result.upright_fit =
+      equations.upright_scores /
+      std::max<double>(1.0, static_cast<double>(known - equations.on_level_planes));
+  const double features_in_all = std::max<double>(1.0, static_cast<double>(all.size()));
+  result.fit = equations.scores / features_in_all;
+  result.overlap = static_cast<double>(known) / features_in_all;
   if (equations.count() < limits.min_correspondences || !result.T_map_lidar.matrix().allFinite()) {
-    result.T_map_lidar = T_map_lidar_predicted;
-    result.health = OdometryHealth::lost;
-    result.covariance = lost_covariance();
-    return result;
+    OdometryResult lost = lost_at(T_map_lidar_predicted);
+    lost.iterations = result.iterations;
+    return lost;
   }
   result.health = degenerate ? OdometryHealth::degenerate : OdometryHealth::good;
   result.rms_residual_m = std::sqrt(equations.weighted_squares / equations.weights);
@@ -183,7 +324,22 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
   return result;
 }
 
+OdometryResult register_in_two_stages(const FeatureSets& features, const LocalMap& map,
+                                      const Eigen::Isometry3d& T_map_lidar_predicted,
+                                      const OdometryConfig& config) {
+  OdometryConfig wide = config;
+  wide.weighting = Weighting::none;
+  wide.registration.robust_scale_m = 0.0;
+  const OdometryResult first = register_features(features, map, T_map_lidar_predicted, wide);
+  if (first.health == OdometryHealth::lost) return first;
+  OdometryResult second =
+      register_features(features, map, first.T_map_lidar, config, first.sweep_correction);
+  second.iterations += first.iterations;
+  return second;
+}
+
 OdometryConfig coarse_registration_config(OdometryConfig config) {
+  config.registration.sweep_translation_m = 0.0;
   config.weighting = Weighting::none;
   config.registration.robust_scale_m = 0.5;
   config.registration.max_neighbour_distance_m = coarse_reach_m;

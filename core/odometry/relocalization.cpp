@@ -68,6 +68,7 @@ double match_ratio(const FeatureSets& features, const LocalMap& map,
   };
   count(features.edges);
   count(features.planes);
+  count(features.surfaces);
   return landmarks > 0 ? static_cast<double>(matched) / landmarks : 0.0;
 }
 

@@ -37,11 +37,36 @@ PoseTangent boxminus(const Eigen::Isometry3d& b, const Eigen::Isometry3d& a) {
   return xi;
 }
 
+namespace {
+
+/// V of SE(3)'s exponential: exp(t, r) has the translation V t.
+Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& r) {
+  const double angle = r.norm();
+  const Eigen::Matrix3d k = skew(r);
+  if (angle < 1e-4) return Eigen::Matrix3d::Identity() + 0.5 * k + k * k / 6.0;
+  const double squared = angle * angle;
+  return Eigen::Matrix3d::Identity() + (1.0 - std::cos(angle)) / squared * k +
+         (angle - std::sin(angle)) / (squared * angle) * k * k;
+}
+
+}  // namespace
+
+PoseTangent twist_of(const Eigen::Isometry3d& T) {
+  const Eigen::Vector3d r = so3_log(T.linear());
+  PoseTangent twist;
+  twist << left_jacobian(r).inverse() * T.translation(), r;
+  return twist;
+}
+
+Eigen::Isometry3d motion_of(const PoseTangent& twist) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = so3_exp(twist.tail<3>());
+  T.translation() = left_jacobian(twist.tail<3>()) * twist.head<3>();
+  return T;
+}
+
 Eigen::Isometry3d scaled_motion(const Eigen::Isometry3d& T, double s) {
-  Eigen::Isometry3d scaled = Eigen::Isometry3d::Identity();
-  scaled.linear() = so3_exp(s * so3_log(T.linear()));
-  scaled.translation() = s * T.translation();
-  return scaled;
+  return motion_of(s * twist_of(T));
 }
 
 }  // namespace stillmap

@@ -24,6 +24,13 @@ using PoseTangent = Eigen::Matrix<double, 6, 1>;
 /// The xi with boxplus(a, xi) = b.
 [[nodiscard]] PoseTangent boxminus(const Eigen::Isometry3d& b, const Eigen::Isometry3d& a);
 
+/// Twist of the screw motion T: its rotation vector, and the translation that exp() takes back to
+/// T's.
+[[nodiscard]] PoseTangent twist_of(const Eigen::Isometry3d& T);
+
+/// Inverse of twist_of.
+[[nodiscard]] Eigen::Isometry3d motion_of(const PoseTangent& twist);
+
 /// The share `s` of the motion T: s = 0 is none, 1 is T, larger extrapolates.
 [[nodiscard]] Eigen::Isometry3d scaled_motion(const Eigen::Isometry3d& T, double s);
 

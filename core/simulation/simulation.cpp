@@ -90,7 +90,10 @@ struct Simulation::World {
     Eigen::Isometry3d T_map_lidar = traffic.T_map_ego_at(time_s);
     T_map_lidar.rotate(Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
                        Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()));
-    return T_map_lidar * Eigen::Translation3d(0, 0, config.lidar_height_m);
+    T_map_lidar = T_map_lidar * Eigen::Translation3d(0, 0, config.lidar_height_m);
+    // Not even a product with the identity where nothing is asked for: scans keep their bits.
+    if (config.motion == LidarMotion::vehicle) return T_map_lidar;
+    return T_map_lidar * T_vehicle_lidar_at(config.motion, time_s);
   }
 
   [[nodiscard]] Pixel pixel_of(const RayHit& hit, const std::vector<Body>& bodies, const Ray& ray,

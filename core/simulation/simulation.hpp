@@ -10,6 +10,7 @@
 #include "core/lidar/sensor_model.hpp"
 #include "core/simulation/city_plan.hpp"
 #include "core/simulation/lidar_flaws.hpp"
+#include "core/simulation/lidar_motion.hpp"
 #include "core/simulation/materials.hpp"
 
 namespace stillmap::simulation {
@@ -26,6 +27,7 @@ struct SimulationConfig {
   /// True: lidar and traffic move during a revolution and every point has its time. False: all
   /// points are measured at the stamp.
   bool rolling = false;
+  LidarMotion motion = LidarMotion::vehicle;
   double lidar_height_m = 1.73;
   BeamNoise noise;
   LidarFlaws flaws;

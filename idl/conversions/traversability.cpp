@@ -28,7 +28,7 @@ static_assert(static_cast<std::uint8_t>(BlockReason::none) == grid_codes::REASON
               static_cast<std::uint8_t>(BlockReason::roughness) == grid_codes::REASON_ROUGHNESS &&
               static_cast<std::uint8_t>(BlockReason::ground_class) ==
                   grid_codes::REASON_GROUND_CLASS &&
-              static_cast<std::uint8_t>(BlockReason::inscribed) == grid_codes::REASON_INFLATION &&
+              static_cast<std::uint8_t>(BlockReason::inscribed) == grid_codes::REASON_INSCRIBED &&
               static_cast<std::uint8_t>(BlockReason::unknown) == grid_codes::REASON_UNKNOWN);
 
 ReplyCode code_of(TraversabilityStatus status) {

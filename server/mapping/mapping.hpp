@@ -6,20 +6,19 @@
 #include <vector>
 
 #include "config/loaders/server_config.hpp"
-#include "core/map/query/tile_reader.hpp"
 #include "idl/dds/participant.hpp"
 #include "idl/interface/topics.hpp"
-#include "server/mapping/map_saver.hpp"
+#include "server/mapping/map_storage.hpp"
 #include "server/mapping/mapping_thread.hpp"
 #include "server/mapping/odometry_prior.hpp"
 #include "server/mapping/scan_queue.hpp"
-#include "server/publishers/latest_map.hpp"
 #include "server/publishers/scan_publishers.hpp"
 
 namespace stillmap::server {
 
 /// What the mapping uses of the rest of the server; all of it must outlive the mapping.
 struct MappingContext {
+  MapStorage& storage;
   dds::Participant& participant;
   const dds::Topics& topics;
   Statistics& statistics;
@@ -29,11 +28,11 @@ struct MappingContext {
 };
 
 /// From queued scans to poses and the static map: the mapping thread with its inputs and outputs,
-/// the map file, and the checkpoints. Thread-safe.
+/// and the checkpoints. Thread-safe.
 class Mapping {
  public:
-  /// Loads the map file where the configuration says so, and starts. Throws MapFileError, DdsError,
-  /// or std::invalid_argument for a map that does not fit the configuration.
+  /// Resumes what the storage has loaded, and starts. Throws DdsError, or std::invalid_argument for
+  /// a mapper configuration with faults.
   Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
           const MappingContext& context);
 
@@ -44,9 +43,6 @@ class Mapping {
   /// Of the segmenter.
   [[nodiscard]] const std::string& label_source() const { return label_source_; }
   [[nodiscard]] ScanQueue& scans() { return scans_; }
-  [[nodiscard]] const LatestMap& latest_map() const { return latest_map_; }
-  /// Reads tiles from memory or from the map file.
-  [[nodiscard]] TileReader& tiles() { return tiles_; }
 
   /// As in MappingThread.
   [[nodiscard]] std::uint64_t reset() { return thread_->reset(); }
@@ -58,16 +54,13 @@ class Mapping {
     return thread_->restore_removed(reason, box_map);
   }
 
-  [[nodiscard]] MapSaver& saver() { return saver_; }
   /// As MappingThread::load, for MapSaver::resume_from.
   void load(const SavedMap& map, const std::shared_ptr<TileStore>& tile_store);
 
  private:
   std::string label_source_;
+  MapStorage& storage_;
   ScanQueue scans_;
-  LatestMap latest_map_;
-  MapSaver saver_;
-  TileReader tiles_;
   PosePublisher poses_;
   std::optional<LabelledScanPublisher> labelled_scans_;
   std::optional<OdometryPrior> prior_;

@@ -12,6 +12,7 @@
 #include "core/odometry/registration.hpp"
 #include "core/segmentation/segmenter.hpp"
 #include "core/simulation/simulation.hpp"
+#include "tests/odometry/register_scan.hpp"
 
 namespace stillmap {
 namespace {
@@ -116,7 +117,7 @@ void odometry_add(benchmark::State& state) {
     const Scan scan = scans.scan(n++);
     const PointLabels labels = labels_of(scan);
     state.ResumeTiming();
-    const auto step = odometry.register_scan(scan, labels, std::nullopt);
+    const auto step = test::register_scan(odometry, scan, labels, std::nullopt);
     if (step.result.health == OdometryHealth::lost) state.SkipWithError("lost");
   }
   count_points(state, scans);

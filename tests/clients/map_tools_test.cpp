@@ -8,8 +8,9 @@ namespace {
 /// Maps made by hand: commands that read files need no drive.
 class MapToolsTest : public CommandTest {
  protected:
-  /// A road of 40 m; with `fence`, one beside it.
-  void save_street(const std::string& file, bool fence, double voxel_size_m = 0.2) const {
+  /// A road of 40 m; with `fence`, one beside it; with `speck`, a voxel far above.
+  void save_street(const std::string& file, bool fence, double voxel_size_m = 0.2,
+                   bool speck = false) const {
     StaticMapConfig config;
     config.voxel_size_m = voxel_size_m;
     StaticMap map(config);
@@ -27,6 +28,7 @@ class MapToolsTest : public CommandTest {
       add(x, 0.1F, 0.1F, SemanticClass::road);
       if (fence) add(x, 3.1F, 1.1F, SemanticClass::fence);
     }
+    if (speck) add(0.1F, 0.1F, 9.1F, SemanticClass::vegetation);
     map.insert(scan, Eigen::Isometry3d::Identity());
     open_map_file(path(file))
         ->save({.view = *map.view(),
@@ -122,6 +124,27 @@ TEST_F(MapToolsTest, ExportTakesRegionsAndClasses) {
   EXPECT_LT(json_of(command + path("few.ply") + " --resolution 1").at("voxels"), 100);
   for (const char* file : {"all.pcd", "road.ply", "half.ply", "near.ply", "few.ply"}) {
     EXPECT_TRUE(exists(file)) << file;
+  }
+}
+
+TEST_F(MapToolsTest, ExportLeavesOutOutliers) {
+  save_street("street.stillmap", true, 0.2, true);
+  const std::string command = "map-export " + path("street.stillmap") + " --output ";
+  EXPECT_EQ(json_of(command + path("all.ply")).at("voxels"), 401);
+  const nlohmann::json json = json_of(command + path("clean.ply") + " --remove-outliers 3");
+  EXPECT_EQ(json.at("voxels"), 400);
+  EXPECT_EQ(json.at("outliers_removed"), 1);
+  const ProcessResult text =
+      run(command + path("clean.pcd") + " --remove-outliers 3 --outlier-neighbours 4");
+  EXPECT_THAT(text.out, AllOf(HasSubstr("400 voxels written"), HasSubstr("outliers removed: 1")));
+  for (const char* bad : {" --remove-outliers 0", " --remove-outliers -1", " --remove-outliers nan",
+                          " --remove-outliers many", " --remove-outliers 3 --outlier-neighbours 0",
+                          " --remove-outliers 3 --outlier-neighbours 2.5",
+                          " --remove-outliers 3 --outlier-neighbours 500"}) {
+    const ProcessResult result = run(command + path("bad.ply") + bad);
+    EXPECT_EQ(result.exit_code, 2) << bad;
+    EXPECT_THAT(result.err, testing::ContainsRegex("outlier|sigma")) << bad;
+    EXPECT_FALSE(exists("bad.ply")) << bad;
   }
 }
 

@@ -16,6 +16,7 @@ using test::write_file;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 constexpr const char* whole_profile =
     "transport: udp\nserver_port: 7500\nshared_memory: false\nshared_memory_mib: 8\n"
@@ -76,6 +77,12 @@ TEST(DdsProfileFile, TellsTheNewNameOfARenamedField) {
   const auto file = write_file("old.yaml", "bulk_bytes_per_s: 500000\n");
   EXPECT_THAT(refusal([&] { (void)read_dds_profile(file); }),
               HasSubstr("is now called 'large_message_bytes_per_s'"));
+}
+
+TEST(DdsProfileFile, TellsNoNewNameThatItRefusesItself) {
+  const auto file = write_file("areas.yaml", "areas: {profiles: []}\n");
+  EXPECT_THAT(refusal([&] { (void)read_dds_profile(file); }),
+              AllOf(HasSubstr("areas: there is no such field"), Not(HasSubstr("is now called"))));
 }
 
 TEST(DdsProfileFile, TellsAllFaultsAtOnce) {

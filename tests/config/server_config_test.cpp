@@ -14,6 +14,7 @@ using test::write_file;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::UnorderedElementsAre;
 
 ServerConfig load(const std::string& yaml) {
@@ -126,6 +127,12 @@ TEST(ServerConfig, TellsTheNewNameOfARenamedField) {
               AllOf(HasSubstr("is now called 'odometry.motion.use_range_image_history'"),
                     HasSubstr("is now called 'odometry.motion.range_image_history_size'"),
                     HasSubstr("is now called 'odometry.motion.range_image_history_interval'")));
+}
+
+TEST(ServerConfig, TellsNoNewNameThatItRefusesItself) {
+  EXPECT_THAT(refusal_of("bulk_bytes_per_s: 500000"),
+              AllOf(HasSubstr("bulk_bytes_per_s: there is no such field"),
+                    Not(HasSubstr("is now called"))));
 }
 
 TEST(ServerConfig, RefusesValuesOfTheWrongKind) {

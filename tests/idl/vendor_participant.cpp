@@ -36,7 +36,7 @@ GuidPrefix_t next_prefix(const VendorId& vendor) {
 
 }  // namespace
 
-VendorParticipant::VendorParticipant(const VendorId& vendor) {
+VendorParticipant::VendorParticipant(const VendorId& vendor, Listener* listener) {
   talk_over_transports();
   DomainParticipantQos qos;
   qos.wire_protocol().prefix = next_prefix(vendor);
@@ -45,7 +45,7 @@ VendorParticipant::VendorParticipant(const VendorId& vendor) {
   udp->interfaceWhiteList = {"127.0.0.1"};
   qos.transport().user_transports.push_back(udp);
   participant_ = DomainParticipantFactory::get_instance()->create_participant(
-      static_cast<DomainId_t>(test_domain_id()), qos);
+      static_cast<DomainId_t>(test_domain_id()), qos, listener, StatusMask::none());
 }
 
 VendorParticipant::~VendorParticipant() {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <fastdds/dds/domain/DomainParticipantListener.hpp>
 #include <memory>
 #include <optional>
 #include <string>
@@ -18,7 +19,10 @@ inline constexpr VendorId eclipse_cyclone{0x01, 0x10};
 /// A process whose GUIDs look as another vendor's, and which sends and takes plain bytes.
 class VendorParticipant {
  public:
-  explicit VendorParticipant(const VendorId& vendor);
+  using Listener = eprosima::fastdds::dds::DomainParticipantListener;
+
+  /// `listener` hears of the other participants, and must outlive this one.
+  explicit VendorParticipant(const VendorId& vendor, Listener* listener = nullptr);
   ~VendorParticipant();
   VendorParticipant(const VendorParticipant&) = delete;
   VendorParticipant& operator=(const VendorParticipant&) = delete;

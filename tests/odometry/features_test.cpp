@@ -134,7 +134,7 @@ TEST(ExtractFeatures, EdgesAndPlanesAreDifferentPoints) {
   const Features features = extract_features(scan, FeatureConfig{});
   const std::set<std::uint32_t> planes(features.planes.begin(), features.planes.end());
   for (const std::uint32_t i : features.edges) EXPECT_FALSE(planes.contains(i));
-  EXPECT_LT(features.registered_planes.size(), features.planes.size());
+  EXPECT_LE(features.registered_planes.size(), features.planes.size());
   for (const std::uint32_t i : features.registered_planes) EXPECT_TRUE(planes.contains(i));
 }
 

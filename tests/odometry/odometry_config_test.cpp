@@ -67,7 +67,8 @@ INSTANTIATE_TEST_SUITE_P(
                   [](C& c) { c.registration.min_observability = 1.0; }},
         FaultCase{"motion.inconsistency_threshold",
                   [](C& c) { c.motion.inconsistency_threshold = 2.0; }},
-        FaultCase{"motion.range_image_history_size", [](C& c) { c.motion.range_image_history_size = 0; }},
+        FaultCase{"motion.range_image_history_size",
+                  [](C& c) { c.motion.range_image_history_size = 0; }},
         FaultCase{"motion.range_image_history_interval",
                   [](C& c) { c.motion.range_image_history_interval = 0; }},
         FaultCase{"motion.moving_share", [](C& c) { c.motion.moving_share = 0.0; }},
@@ -80,7 +81,8 @@ TEST(OdometryConfig, AllFaultsAreListedOneALine) {
   config.alpha = -1.0;
   config.motion.range_image_history_size = 0;
   const std::string faults = config.faults();
-  EXPECT_THAT(faults, AllOf(HasSubstr("alpha = -1"), HasSubstr("motion.range_image_history_size = 0")));
+  EXPECT_THAT(faults,
+              AllOf(HasSubstr("alpha = -1"), HasSubstr("motion.range_image_history_size = 0")));
   EXPECT_EQ(std::ranges::count(faults, '\n'), 2);
 }
 

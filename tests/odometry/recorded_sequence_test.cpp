@@ -8,6 +8,7 @@
 #include "core/lidar/rings.hpp"
 #include "core/odometry/odometry.hpp"
 #include "tests/odometry/poses.hpp"
+#include "tests/odometry/register_scan.hpp"
 
 namespace stillmap {
 namespace {
@@ -26,7 +27,8 @@ TEST(RecordedSequence, IsNeverLostAndMovesAsACarDoes) {
     scan.stamp_ns = recording.stamp_ns(k);
     scan.ring = assign_rings(scan, sensor);
     scan = drop_unusable_points(std::move(scan), PrepareConfig{});
-    const OdometryResult result = odometry.register_scan(scan, PointLabels{}, std::nullopt).result;
+    const OdometryResult result =
+        test::register_scan(odometry, scan, PointLabels{}, std::nullopt).result;
     EXPECT_EQ(result.health, k == 0 ? OdometryHealth::initialised : OdometryHealth::good) << k;
     EXPECT_LT(test::translation_error(result.T_map_lidar, T_map_last), 2.0) << k;
     EXPECT_LT(test::rotation_error(result.T_map_lidar, T_map_last), 0.1) << k;

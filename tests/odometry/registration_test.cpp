@@ -39,7 +39,7 @@ class RegisterInCourtyard : public ::testing::TestWithParam<Weighting> {
   const FeatureSets features_ = world_.features(T_true, 0.01, 1);
 
   void expect_converges_from(const Eigen::Isometry3d& start) const {
-    const auto result = register_features(features_, map_, start, with_weighting(GetParam()));
+    const auto result = register_in_two_stages(features_, map_, start, with_weighting(GetParam()));
     EXPECT_EQ(result.health, OdometryHealth::good);
     EXPECT_TRUE(result.converged);
     EXPECT_GT(result.edge_correspondences, 20);

@@ -117,6 +117,15 @@ class RosPackageTest(ComparisonTest):
             for field in made.fields:
                 self.assertRegex(field.name, FIELD_NAME, made.full_name)
 
+    def test_reasons_are_called_as_the_core_and_the_tools_call_them(self):
+        header = (SOURCE / "core/traversability/traversability_tile.hpp").read_text()
+        reasons = re.search(r"enum class BlockReason[^{]*{(.*?)}", header, re.DOTALL)[1]
+        names = [name.upper() for name in re.findall(r"^\s*(\w+),$", reasons, re.MULTILINE)]
+        grid = next(made for made in self.package if made.name == "TraversabilityGrid")
+        self.assertEqual([constant.name for constant in grid.constants
+                          if constant.name.startswith("REASON_")],
+                         [f"REASON_{name}" for name in names])
+
     def test_package_names_every_package_that_it_uses(self):
         used = {field.type.split("/")[0] for made in self.package for field in made.fields
                 if "/" in field.type} - {"stillmap_msgs"}

@@ -1,9 +1,12 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <atomic>
 #include <fstream>
 
 #include "core/map/storage/map_file.hpp"
+#include "tests/idl/vendor_participant.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {
@@ -144,6 +147,51 @@ TEST(Startup, RefusesWhatCannotWorkWithAnExitCode) {
 
   ServerProcess help({"--help"});
   EXPECT_EQ(help.wait_for_exit(patience), 0);
+}
+
+/// Counts who joins the test's domain, however short.
+class Onlooker : public dds::VendorParticipant::Listener {
+ public:
+  [[nodiscard]] int joined() const { return joined_; }
+
+ private:
+  using Info = eprosima::fastrtps::rtps::ParticipantDiscoveryInfo;
+  void on_participant_discovery(eprosima::fastdds::dds::DomainParticipant*, Info&& info) override {
+    if (info.status == Info::DISCOVERED_PARTICIPANT) ++joined_;
+  }
+
+  std::atomic<int> joined_ = 0;
+  const dds::VendorParticipant participant_{dds::eclipse_cyclone, this};
+};
+
+/// What a server says that ends by itself, with exit code 1.
+std::string last_words(const ServiceSetup& setup) {
+  testing::internal::CaptureStderr();
+  ServerProcess server(setup.server_arguments());
+  EXPECT_EQ(server.wait_for_exit(patience), 1);
+  return testing::internal::GetCapturedStderr();
+}
+
+TEST(Startup, NobodySeesAServerWhoseMapFileIsUnusable) {
+  const Onlooker onlooker;
+  const ServiceSetup text("latest");
+  std::ofstream(text.map_file()) << "this is no database, and must stay as it is";
+  EXPECT_THAT(last_words(text), testing::HasSubstr(text.map_file().string()));
+
+  const ServiceSetup coarse("latest");
+  StaticMap map(StaticMapConfig{.voxel_size_m = 0.4});
+  LabelledScan scan;
+  scan.scan.points_lidar.assign(20, Eigen::Vector3f(1, 1, 1));
+  scan.motion.assign(20, Motion::stationary);
+  map.insert(scan, Eigen::Isometry3d::Identity());
+  open_map_file(coarse.map_file())
+      ->save({.view = *map.view(), .tile_evidence = {}, .trajectory = {}, .metadata = {}});
+  EXPECT_THAT(last_words(coarse), testing::HasSubstr("voxel_size_m 0.4"));
+  EXPECT_EQ(onlooker.joined(), 0);
+
+  const ServiceSetup usable("latest");
+  const ServerProcess server(usable.server_arguments());
+  EXPECT_TRUE(eventually([&] { return onlooker.joined() > 0; }));
 }
 
 }  // namespace

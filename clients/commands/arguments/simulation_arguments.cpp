@@ -68,6 +68,7 @@ simulation::SimulationConfig simulation_config(const SimulationArguments& argume
   config.sensor = load_sensor(sensor_name(arguments.sensor));
   config.scans = arguments.scans;
   config.rolling = arguments.rolling;
+  config.motion = simulation::lidar_motion(arguments.motion);
   if (const std::string faults = config.faults(); !faults.empty()) {
     throw std::invalid_argument(faults);
   }

@@ -16,6 +16,7 @@ struct SimulationArguments {
   std::uint64_t seed = 1;
   int scans = 300;
   bool rolling = false;
+  std::string motion = "vehicle";
 };
 
 /// A negative number that was typed comes as one near 2^64. Throws std::invalid_argument naming

@@ -8,6 +8,7 @@
 #include "clients/terminal/json.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/map/tools/map_export.hpp"
+#include "core/map/tools/outlier_removal.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -18,6 +19,9 @@ struct MapExportArguments {
   RegionArguments region;
   std::vector<std::string> classes;
   double resolution_m = 0.0;
+  /// 0: outliers stay.
+  double outlier_sigma = 0.0;
+  int outlier_neighbours = OutlierRemovalConfig{}.neighbours;
   std::string datum;
   bool json = false;
 };
@@ -81,16 +85,24 @@ ExitCode run(const MapExportArguments& arguments) {
   check_output_name(arguments.output);
   check_region(arguments.region);
   const SavedMap map = read_map_file(arguments.file);
-  const std::vector<QueryVoxel> voxels = voxels_of(map.view, query_of(arguments, map));
+  std::vector<QueryVoxel> voxels = voxels_of(map.view, query_of(arguments, map));
+  const std::size_t found = voxels.size();
+  if (arguments.outlier_sigma != 0.0) {
+    voxels = without_outliers(
+        voxels, {.neighbours = arguments.outlier_neighbours, .sigma = arguments.outlier_sigma});
+  }
+  const std::size_t outliers = found - voxels.size();
   write(arguments, map, voxels);
   std::vector<std::string> files{arguments.output};
   if (is_raster_name(arguments.output)) files.push_back(height_file_of(arguments.output).string());
   if (arguments.json) {
-    std::cout << Json{{"voxels", voxels.size()}, {"files", files}}.dump(2) << "\n";
+    const Json json{{"voxels", voxels.size()}, {"outliers_removed", outliers}, {"files", files}};
+    std::cout << json.dump(2) << "\n";
     return ExitCode::ok;
   }
   std::cout << voxels.size() << " voxels written to";
   for (const std::string& file : files) std::cout << " " << file;
+  if (arguments.outlier_sigma > 0.0) std::cout << ", outliers removed: " << outliers;
   std::cout << "\n";
   return ExitCode::ok;
 }
@@ -112,6 +124,16 @@ void add_map_export_command(CommandHandle program, Action& action) {
       .comma_separated();
   command.option("--resolution", arguments->resolution_m,
                  "Voxel size of the export [m]; default: the map's own");
+  command
+      .option("--remove-outliers", arguments->outlier_sigma,
+              "SIGMA: without voxels whose mean distance to their nearest others is more than so "
+              "many standard deviations above the mean")
+      .above_zero();
+  command
+      .option("--outlier-neighbours", arguments->outlier_neighbours,
+              "How many others --remove-outliers looks at")
+      .with_default()
+      .between(1, 1000);
   command.option("--datum", arguments->datum,
                  "Of a GeoTIFF: LATITUDE,LONGITUDE[,ALTITUDE[,AZIMUTH]] of the map's origin and "
                  "where its x axis points, clockwise from north (90, east); default: the file's "
@@ -122,6 +144,7 @@ void add_map_export_command(CommandHandle program, Action& action) {
       "  stillmap map-export city.stillmap --output city.ply\n"
       "  stillmap map-export city.stillmap -o poles.pcd --classes pole,traffic-sign\n"
       "  stillmap map-export city.stillmap -o way.ply --corridor path.txt --width 6 --max-z 2\n"
+      "  stillmap map-export city.stillmap -o clean.ply --remove-outliers 3\n"
       "  stillmap map-export city.stillmap -o city.tif --datum 49.011,8.417,115,35\n"
       "Points are in the map frame [m]. --around-robot is round the end of the stored path. The\n"
       "GeoTIFF is in the transverse Mercator projection at the datum (WGS 84), which any GIS "

@@ -48,7 +48,7 @@ ExitCode run(const SimulateArguments& arguments) {
     std::cout << Json{{"folder", arguments.out},      {"city", config.plan.name},
                       {"sensor", config.sensor.name}, {"seed", config.seed},
                       {"scans", written.scans},       {"points", written.points},
-                      {"rolling", config.rolling}}
+                      {"rolling", config.rolling},    {"motion", arguments.simulation.motion}}
                      .dump(2)
               << "\n";
   } else {
@@ -84,6 +84,11 @@ void add_simulate_command(CommandHandle program, Action& action) {
       .with_default();
   command.flag("--rolling", simulation.rolling,
                "The lidar moves while it turns; every point has its time");
+  command
+      .option("--motion", simulation.motion,
+              "Of the lidar on its vehicle: vehicle (fixed), hard_turns (a robot that turns on the "
+              "spot at 55 degrees a second) or handheld")
+      .with_default();
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"

@@ -1,0 +1,44 @@
+#include "server/mapping/map_storage.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <map>
+
+namespace stillmap::server {
+namespace {
+
+std::map<std::string, std::string> file_metadata(const ServerConfig& config,
+                                                 const std::string& label_source) {
+  std::map<std::string, std::string> metadata{
+      {"software", std::string("stillmap ") + STILLMAP_VERSION},
+      {"sensor", config.mapper.sensor.name},
+      {"label_source", label_source}};
+  if (!config.map.datum.empty()) metadata["datum"] = config.map.datum;
+  return metadata;
+}
+
+std::size_t tile_cache_bytes(const MapFileConfig& config) {
+  return (std::size_t{config.memory_limit_mib} << 20) / 8;
+}
+
+std::optional<SavedMap> saved_map(MapSaver& saver, const ServerConfig& config) {
+  if (!config.map.load_at_start) return std::nullopt;
+  auto stored = saver.load();
+  if (stored && !stored->view.tiles.empty()) {
+    check_sizes(stored->view, config.mapper.static_map);
+    spdlog::info("resuming from {}: {} tiles, {} poses", config.map.file.string(),
+                 stored->view.tiles.size(), stored->trajectory.size());
+  }
+  return stored;
+}
+
+}  // namespace
+
+MapStorage::MapStorage(const ServerConfig& config, const std::string& label_source,
+                       Statistics& statistics)
+    : saver_(latest_map_, statistics, config.map.file, file_metadata(config, label_source),
+             config.map.memory_limit_mib),
+      tiles_(saver_.tile_store(), tile_cache_bytes(config.map)),
+      loaded_(saved_map(saver_, config)) {}
+
+}  // namespace stillmap::server

@@ -1,0 +1,135 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "core/mapper.hpp"
+#include "core/segmentation/segmenter.hpp"
+#include "core/simulation/simulation.hpp"
+
+namespace stillmap {
+namespace {
+
+using simulation::LidarMotion;
+using simulation::SimulatedScan;
+using simulation::Simulation;
+using simulation::SimulationConfig;
+
+SimulationConfig yard(LidarMotion motion, bool rolling, std::uint64_t seed = 5) {
+  SimulationConfig config;
+  config.plan = simulation::test_yard();
+  config.seed = seed;
+  config.sensor = hdl_64e();
+  config.firings = 900;
+  config.scans = 34;
+  config.rolling = rolling;
+  config.motion = motion;
+  return config;
+}
+
+Mapper mapper_of(const SimulationConfig& config) {
+  MapperConfig mapper;
+  mapper.sensor = config.sensor;
+  return {mapper, std::make_unique<PassthroughSegmenter>()};
+}
+
+/// Poses relative to the first, of a drive whose points' times count from `stamp_part` of the
+/// sweep.
+std::vector<Eigen::Isometry3d> drive(const SimulationConfig& config, double stamp_part) {
+  const Simulation simulation(config);
+  Mapper mapper = mapper_of(config);
+  const double shift_s = stamp_part * config.sensor.period_s;
+  std::vector<Eigen::Isometry3d> poses;
+  for (int k = 0; k < config.scans; ++k) {
+    Scan scan = simulation.scan(k).scan;
+    scan.stamp_ns += std::llround(shift_s * 1e9);
+    for (float& offset : scan.time_offset_s) offset -= static_cast<float>(shift_s);
+    const auto mapped = mapper.process(std::move(scan));
+    if (!mapped || mapped->odometry.health == OdometryHealth::lost) break;
+    poses.push_back(mapped->odometry.T_map_lidar);
+  }
+  return poses;
+}
+
+/// Largest error of the motion from scan to scan, from the given scan on [m].
+double worst_step_m(const SimulationConfig& config, const std::vector<Eigen::Isometry3d>& poses,
+                    double stamp_part, std::size_t from) {
+  const Simulation simulation(config);
+  const double period_s = config.sensor.period_s;
+  const auto truth = [&](std::size_t k) {
+    return simulation.T_map_lidar_at((static_cast<double>(k) + stamp_part) * period_s);
+  };
+  double worst = 0.0;
+  for (std::size_t k = from; k < poses.size(); ++k) {
+    const Eigen::Isometry3d step = truth(k - 1).inverse() * truth(k);
+    const Eigen::Isometry3d found = poses[k - 1].inverse() * poses[k];
+    worst = std::max(worst, (step.inverse() * found).translation().norm());
+  }
+  return worst;
+}
+
+TEST(HardDrives, TurnsFromOneScanToTheNextAreFollowed) {
+  const SimulationConfig config = yard(LidarMotion::hard_turns, false);
+  const auto poses = drive(config, 0.0);
+  ASSERT_EQ(poses.size(), 34U);
+  EXPECT_LE(worst_step_m(config, poses, 0.0, 1), 0.03);
+}
+
+TEST(HardDrives, RollingScansAreFollowedWhateverInstantTheStampIs) {
+  const SimulationConfig config = yard(LidarMotion::vehicle, true);
+  for (const double stamp_part : {0.0, 0.5, 1.0}) {
+    const auto poses = drive(config, stamp_part);
+    ASSERT_EQ(poses.size(), 34U) << "stamp at " << stamp_part;
+    EXPECT_LE(worst_step_m(config, poses, stamp_part, 3), 0.05) << "stamp at " << stamp_part;
+  }
+}
+
+TEST(HardDrives, ScansOfAnotherPlaceAreLostAndEnterNoMap) {
+  const SimulationConfig here = yard(LidarMotion::vehicle, false);
+  SimulationConfig there = yard(LidarMotion::vehicle, false, 6);
+  there.plan = simulation::crowded_avenue();
+  const Simulation first(here);
+  const Simulation second(there);
+  Mapper mapper = mapper_of(here);
+  for (int k = 0; k < 20; ++k) ASSERT_TRUE(mapper.process(first.scan(k).scan));
+  const std::uint64_t version = mapper.map_snapshot()->version;
+  for (int k = 20; k < 24; ++k) {
+    Scan scan = second.scan(k).scan;
+    const auto mapped = mapper.process(std::move(scan));
+    ASSERT_TRUE(mapped);
+    EXPECT_EQ(mapped->odometry.health, OdometryHealth::lost) << "scan " << k;
+  }
+  EXPECT_EQ(mapper.map_snapshot()->version, version);
+  // Back at the first place, it goes on.
+  const auto mapped = mapper.process(first.scan(25).scan);
+  ASSERT_TRUE(mapped);
+  EXPECT_EQ(mapped->odometry.health, OdometryHealth::good);
+}
+
+TEST(ScanClock, AStampFarAheadMustBeConfirmed) {
+  constexpr std::int64_t period_ns = 100'000'000;
+  constexpr std::int64_t hour_ns = 3'600'000'000'000;
+  ScanClock clock;
+  EXPECT_TRUE(clock.accepts(period_ns, 0));
+  EXPECT_FALSE(clock.accepts(hour_ns, period_ns));
+  // The fault passes.
+  EXPECT_TRUE(clock.accepts(3 * period_ns, period_ns));
+  // The clock was set: the third scan of the new time is believed.
+  EXPECT_FALSE(clock.accepts(hour_ns, 3 * period_ns));
+  EXPECT_FALSE(clock.accepts(hour_ns + period_ns, 3 * period_ns));
+  EXPECT_TRUE(clock.accepts(hour_ns + 2 * period_ns, 3 * period_ns));
+}
+
+TEST(ScanClock, AStampInThePastMustBeConfirmedLonger) {
+  constexpr std::int64_t period_ns = 100'000'000;
+  constexpr std::int64_t last_ns = 1'000'000'000'000;
+  ScanClock clock;
+  for (int k = 0; k < 9; ++k) EXPECT_FALSE(clock.accepts(period_ns * (k + 1), last_ns));
+  EXPECT_TRUE(clock.accepts(period_ns * 10, last_ns));
+  // The same stamp again and again confirms nothing.
+  ScanClock stuck;
+  for (int k = 0; k < 30; ++k) EXPECT_FALSE(stuck.accepts(period_ns, last_ns));
+}
+
+}  // namespace
+}  // namespace stillmap
