@@ -2,7 +2,20 @@
 
 #include <spdlog/spdlog.h>
 
+#include <optional>
 #include <utility>
+
+#include "idl/dds/participant.hpp"
+#include "idl/interface/topics.hpp"
+#include "server/interface.hpp"
+#include "server/mapping/map_storage.hpp"
+#include "server/mapping/mapping.hpp"
+#include "server/monitoring/metrics_endpoint.hpp"
+#include "server/monitoring/service_log.hpp"
+#include "server/monitoring/statistics.hpp"
+#include "server/occupancy/occupancy.hpp"
+#include "server/threads/background_throttle.hpp"
+#include "server/traversability/traversability.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -25,51 +38,74 @@ ThrottleCallback throttle_callback(const ServerConfig& config, const BackgroundT
 
 }  // namespace
 
-Server::Server(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter)
-    : service_log_(statistics_.metrics()),
-      storage_(config, segmenter->name(), statistics_),
-      topics_(dds::Topics::in(config.topics.name_space)),
-      participant_(server_options(config.dds)),
+struct Server::Parts {
+  Parts(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter);
+
+  // In the order of construction: each part uses those above it, and ends before them.
+  Statistics statistics;
+  ServiceLog service_log;
+  BackgroundThrottle throttle;
+  // Before the participant: whoever is seen on DDS has a map file that works.
+  MapStorage storage;
+  dds::Topics topics;
+  dds::Participant participant;
+  std::optional<Occupancy> occupancy;
+  Mapping mapping;
+  Traversability traversability;
+  Interface interface;
+  std::optional<MetricsEndpoint> metrics;
+  ThrottleRelease throttle_release{throttle};
+};
+
+Server::Parts::Parts(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter)
+    : service_log(statistics.metrics()),
+      storage(config, segmenter->name(), statistics),
+      topics(dds::Topics::in(config.topics.name_space)),
+      participant(server_options(config.dds)),
       // An octree that misses scans is better than late poses.
-      occupancy_(config.occupancy.enabled
-                     ? std::make_optional<Occupancy>(
-                           participant_, topics_, config, statistics_,
-                           throttle_callback(config, throttle_, SaturationPolicy::wait))
-                     : std::nullopt),
-      mapping_(config, std::move(segmenter),
-               {.storage = storage_,
-                .participant = participant_,
-                .topics = topics_,
-                .statistics = statistics_,
-                .throttle = throttle_,
-                .occupancy = occupancy_ ? &occupancy_->thread() : nullptr}),
-      traversability_(config, participant_, topics_, storage_.latest_map(), storage_.tiles(),
-                      statistics_,
-                      throttle_callback(config, throttle_, SaturationPolicy::run_at_ten_percent)),
-      interface_(config, {.participant = participant_,
-                          .topics = topics_,
-                          .statistics = statistics_,
-                          .service_log = service_log_,
-                          .storage = storage_,
-                          .mapping = mapping_,
-                          .traversability = traversability_,
-                          .occupancy = occupancy_ ? &occupancy_->thread() : nullptr}) {
+      occupancy(config.occupancy.enabled
+                    ? std::make_optional<Occupancy>(
+                          participant, topics, config, statistics,
+                          throttle_callback(config, throttle, SaturationPolicy::wait))
+                    : std::nullopt),
+      mapping(config, std::move(segmenter),
+              {.storage = storage,
+               .participant = participant,
+               .topics = topics,
+               .statistics = statistics,
+               .throttle = throttle,
+               .occupancy = occupancy ? &occupancy->thread() : nullptr}),
+      traversability(config, participant, topics, storage.latest_map(), storage.tiles(), statistics,
+                     throttle_callback(config, throttle, SaturationPolicy::run_at_ten_percent)),
+      interface(config, {.participant = participant,
+                         .topics = topics,
+                         .statistics = statistics,
+                         .service_log = service_log,
+                         .storage = storage,
+                         .mapping = mapping,
+                         .traversability = traversability,
+                         .occupancy = occupancy ? &occupancy->thread() : nullptr}) {
   if (config.metrics.address.empty()) return;
-  metrics_.emplace(config.metrics.address, statistics_.metrics(),
-                   [this] { return interface_.status(); });
-  spdlog::info("metrics: http://{}/metrics", metrics_->address());
+  metrics.emplace(config.metrics.address, statistics.metrics(),
+                  [this] { return interface.status(); });
+  spdlog::info("metrics: http://{}/metrics", metrics->address());
 }
+
+Server::Server(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter)
+    : parts_(std::make_unique<Parts>(config, std::move(segmenter))) {}
+
+Server::~Server() = default;
 
 // Requests and scans wait for the mapping thread: they end first, so that none waits for a thread
 // that has ended. Traversability gets processor time only between scans, so it ends after them.
 // The map is saved when nothing can change it any more; the topics are closed after that, by the
 // destructors.
 void Server::stop() {
-  throttle_.release();
-  metrics_.reset();
-  interface_.stop();
-  traversability_.stop();
-  mapping_.stop();
+  parts_->throttle.release();
+  parts_->metrics.reset();
+  parts_->interface.stop();
+  parts_->traversability.stop();
+  parts_->mapping.stop();
 }
 
 }  // namespace stillmap::server

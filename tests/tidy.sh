@@ -22,10 +22,25 @@ if [ -n "${FILES:-}" ]; then
 else
   files=$(git diff --name-only --diff-filter=d "${BASE:-HEAD~1}" -- '*.cpp')
 fi
+# GCC's precompiled headers are nothing to clang, and sources that are compiled in batches get entries of
+# their own.
+database=$(mktemp -d)
+trap 'rm -rf "$database"' EXIT
+/usr/bin/python3 - "$build/compile_commands.json" > "$database/compile_commands.json" << 'end'
+import json, re, sys
+entries = []
+for entry in json.load(open(sys.argv[1])):
+    command = re.sub(r" -Winvalid-pch| -fpch-preprocess| -include \S*cmake_pch\.hxx", "", entry["command"])
+    sources = [entry["file"]]
+    if "/Unity/unity_" in entry["file"]:
+        sources = re.findall(r'#include "(.*)"', open(entry["file"]).read())
+    entries += [{**entry, "file": source, "command": command.replace(entry["file"], source)} for source in sources]
+json.dump(entries, sys.stdout, indent=0)
+end
 # Only what the compiler was told of: no fuzz target, no test that was left out.
 known=()
 for file in $files; do
-  if grep -q "\"file\": \".*/$file\"" "$build/compile_commands.json"; then
+  if grep -q "\"file\": \".*/$file\"" "$database/compile_commands.json"; then
     known+=("$file")
   elif [ -n "${FILES:-}" ]; then
     echo "tidy: $file is no source that $build compiles" >&2
@@ -34,11 +49,6 @@ for file in $files; do
 done
 [ ${#known[@]} -gt 0 ] || { echo "tidy: no changed sources"; exit 0; }
 
-# GCC's precompiled headers are nothing to clang.
-database=$(mktemp -d)
-trap 'rm -rf "$database"' EXIT
-sed -E 's/ -Winvalid-pch//; s/ -fpch-preprocess//; s/ -include [^ ]*cmake_pch\.hxx//' \
-  "$build/compile_commands.json" > "$database/compile_commands.json"
 # How many warnings there are in headers that are not ours is of no interest.
 if printf '%s\0' "${known[@]}" | xargs -0 -n 1 -P "$(nproc)" \
     clang-tidy -p "$database" --quiet --warnings-as-errors='*' 2> "$database/noise"; then

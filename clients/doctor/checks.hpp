@@ -9,6 +9,9 @@ namespace stillmap::cli {
 
 using Diagnostics = std::vector<dds::Diagnostic>;
 
+/// The DDS type of scans.
+inline constexpr const char* cloud_type = "sensor_msgs::msg::dds_::PointCloud2_";
+
 // Each check looks for one kind of fault, independently of the others.
 
 /// /dev/shm that cannot be written, segments of dead processes and of other users.

@@ -7,8 +7,6 @@
 namespace stillmap::cli {
 namespace {
 
-constexpr const char* cloud_type = "sensor_msgs::msg::dds_::PointCloud2_";
-
 bool is_server(const dds::RemoteParticipant& participant) {
   return std::ranges::any_of(participant.endpoints, [](const dds::Endpoint& endpoint) {
     return !endpoint.is_writer && endpoint.topic.ends_with("/get_statusRequest");

@@ -23,8 +23,6 @@ std::string points_topic_of(const SystemSnapshot& snapshot) {
   return "rt/" + (tells ? server->status->points_topic : snapshot.points_topic);
 }
 
-constexpr const char* cloud_type = "sensor_msgs::msg::dds_::PointCloud2_";
-
 struct Publisher {
   const dds::RemoteParticipant* participant;
   const dds::Endpoint* endpoint;

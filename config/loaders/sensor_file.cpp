@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "config/loaders/closest_name.hpp"
+#include "config/loaders/named_file.hpp"
 #include "config/loaders/yaml_section.hpp"
 
 namespace stillmap {
@@ -21,10 +22,6 @@ const std::map<std::string, SensorModel (*)()>& built_in_sensors() {
   static const std::map<std::string, SensorModel (*)()> sensors{
       {"hdl_64e", hdl_64e}, {"hdl_32e", hdl_32e}, {"vlp_16", vlp_16}};
   return sensors;
-}
-
-bool is_file_name(const std::string& text) {
-  return text.find('/') != std::string::npos || text.ends_with(".yaml") || text.ends_with(".yml");
 }
 
 const std::vector<YamlSection::Choice<RingSource>>& ring_sources() {

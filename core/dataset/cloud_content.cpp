@@ -17,8 +17,6 @@ namespace stillmap {
 namespace {
 
 constexpr std::uint64_t max_points = std::uint64_t{1} << 26;
-constexpr std::uint64_t max_point_bytes = 4096;
-
 /// Calls `use(T{})` with the field's type.
 template <class Use>
 auto with_type(const CloudField& field, Use use) {

@@ -51,8 +51,13 @@ struct CloudContent {
 // What the readers of both formats share: nothing believes a count of a header before the file has
 // been found large enough for it.
 
+inline constexpr std::size_t max_header_lines = 1000;
+inline constexpr std::uint64_t max_point_bytes = 4096;
+
+using Words = std::vector<std::string>;
+
 /// The words of a header's line.
-[[nodiscard]] std::vector<std::string> words_of(const std::string& line);
+[[nodiscard]] Words words_of(const std::string& line);
 
 /// The number that is all of a word; nan and inf are numbers.
 [[nodiscard]] std::optional<double> number_of(std::string_view word);

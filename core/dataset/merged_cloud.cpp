@@ -48,8 +48,6 @@ std::string header(std::uint64_t points, const Eigen::Vector3d& origin_map) {
          end;
 }
 
-constexpr std::uint64_t max_point_bytes = 4096;
-
 std::string lower(std::string text) {
   std::ranges::transform(text, text.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });

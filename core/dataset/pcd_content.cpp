@@ -12,11 +12,9 @@
 namespace stillmap {
 namespace {
 
-constexpr std::size_t max_header_lines = 1000;
 /// LZF cannot pack tighter.
 constexpr std::uint64_t max_compression = 300;
 
-using Words = std::vector<std::string>;
 using PcdHeader = std::map<std::string, Words>;
 
 PcdHeader pcd_header(const std::filesystem::path& file, std::istream& in) {

@@ -10,10 +10,6 @@
 namespace stillmap {
 namespace {
 
-constexpr std::size_t max_header_lines = 1000;
-
-using Words = std::vector<std::string>;
-
 struct PlyType {
   std::string_view name;
   char kind;

@@ -17,8 +17,6 @@
 namespace stillmap {
 namespace {
 
-constexpr double ns_per_s = 1e9;
-
 struct NumberedScan {
   std::uint32_t number = 0;
   std::size_t index = 0;
@@ -54,7 +52,7 @@ Scan compensated(Scan scan, const Trajectory& poses, std::size_t index) {
   const auto& [end_ns, T_map_end] = poses[from + 1];
   if (end_ns <= start_ns) return scan;
   return deskew(std::move(scan), T_map_start.inverse() * T_map_end,
-                static_cast<double>(end_ns - start_ns) / ns_per_s);
+                static_cast<double>(end_ns - start_ns) / 1e9);
 }
 
 /// The clouds that the points go to, one a tile.

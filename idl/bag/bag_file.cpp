@@ -11,7 +11,7 @@ namespace fs = std::filesystem;
 
 /// Runs `action`; an error of SQLite becomes one with the file's name.
 template <typename Action>
-auto naming(const fs::path& file, Action action) {
+auto reading(const fs::path& file, Action action) {
   try {
     return action();
   } catch (const SQLite::Exception& fault) {
@@ -52,7 +52,7 @@ bool has_column(SQLite::Database& database, const std::string& table, const std:
 BagFile::BagFile(const fs::path& file) : path_(file) {
   std::error_code error;
   if (!fs::is_regular_file(file, error)) throw DatasetError(file, "no such file; check the path");
-  naming(file, [&] {
+  reading(file, [&] {
     database_ = open(file);
     for (const char* table : {"topics", "messages"}) {
       if (!database_->tableExists(table)) {
@@ -66,7 +66,7 @@ BagFile::BagFile(BagFile&&) noexcept = default;
 BagFile& BagFile::operator=(BagFile&&) noexcept = default;
 
 std::vector<BagTopic> BagFile::topics() const {
-  return naming(path_, [&] {
+  return reading(path_, [&] {
     // The first versions did not store it.
     const bool qos = has_column(*database_, "topics", "offered_qos_profiles");
     SQLite::Statement query(*database_,
@@ -87,7 +87,7 @@ std::vector<BagTopic> BagFile::topics() const {
 }
 
 std::vector<BagMessage> BagFile::messages(const std::string& topic, std::size_t file) const {
-  return naming(path_, [&] {
+  return reading(path_, [&] {
     SQLite::Statement query(*database_,
                             "SELECT m.id, m.timestamp FROM messages m JOIN topics t ON m.topic_id "
                             "= t.id WHERE t.name = ? ORDER BY m.timestamp, m.id");
@@ -111,7 +111,7 @@ std::vector<std::uint8_t> BagFile::first_bytes(std::int64_t row, int bytes) cons
 }
 
 std::vector<std::uint8_t> BagFile::blob(const char* query_text, std::int64_t row, int bytes) const {
-  return naming(path_, [&] {
+  return reading(path_, [&] {
     SQLite::Statement query(*database_, query_text);
     query.bind(1, row);
     if (bytes > 0) query.bind(2, bytes);

@@ -26,7 +26,7 @@ constexpr const char* tables =
     "INSERT INTO schema VALUES (3, 'humble');";
 
 template <typename Action>
-void naming(const fs::path& file, Action action) {
+void writing(const fs::path& file, Action action) {
   try {
     action();
   } catch (const SQLite::Exception& fault) {
@@ -70,7 +70,7 @@ BagWriter::BagWriter(const fs::path& folder, const std::vector<BagTopic>& topics
     : folder_(new_folder(folder)), file_(folder / (bag_name(folder) + "_0.db3")) {
   metadata_.files = {file_.filename().string()};
   metadata_.topics = topics;
-  naming(file_, [&] {
+  writing(file_, [&] {
     storage_ = std::make_unique<Storage>(file_);
     SQLite::Statement insert(storage_->database, "INSERT INTO topics VALUES (?, ?, ?, ?, ?)");
     for (std::size_t i = 0; i < topics.size(); ++i) {
@@ -99,7 +99,7 @@ BagWriter::~BagWriter() {
 void BagWriter::add(std::size_t topic, std::int64_t received_ns,
                     std::span<const std::uint8_t> message) {
   assert(storage_ && topic < metadata_.topics.size());
-  naming(file_, [&] {
+  writing(file_, [&] {
     if (!storage_->transaction) storage_->transaction.emplace(storage_->database);
     SQLite::Statement& insert = *storage_->insert;
     insert.bind(1, static_cast<std::int64_t>(topic + 1));
@@ -124,7 +124,7 @@ void BagWriter::add(std::size_t topic, std::int64_t received_ns,
 
 void BagWriter::commit() {
   if (!storage_ || !storage_->transaction) return;
-  naming(file_, [&] { storage_->transaction->commit(); });
+  writing(file_, [&] { storage_->transaction->commit(); });
   storage_->transaction.reset();
   write_bag_metadata(folder_ / "metadata.yaml", metadata_);
 }
@@ -132,7 +132,7 @@ void BagWriter::commit() {
 void BagWriter::finish() {
   if (!storage_) return;
   commit();
-  naming(file_, [&] {
+  writing(file_, [&] {
     storage_->insert.reset();
     // The log becomes part of the file, which anything may then read, from anywhere.
     storage_->database.exec("PRAGMA journal_mode=DELETE");

@@ -12,13 +12,13 @@ using stillmap_msgs::msg::Coordinates;
 using stillmap_msgs::srv::QueryOccupancy_Request;
 using stillmap_msgs::srv::QueryOccupancy_Response;
 
-namespace codes = stillmap_msgs::msg::OccupancyAtPoint_Constants;
+namespace point_codes = stillmap_msgs::msg::OccupancyAtPoint_Constants;
 namespace end_codes = stillmap_msgs::msg::OccupancyAlongRay_Constants;
-static_assert(static_cast<std::uint8_t>(Occupancy::unknown) == codes::UNKNOWN &&
-              static_cast<std::uint8_t>(Occupancy::free) == codes::FREE &&
-              static_cast<std::uint8_t>(Occupancy::occupied) == codes::OCCUPIED);
-static_assert(end_codes::UNKNOWN == codes::UNKNOWN && end_codes::FREE == codes::FREE &&
-              end_codes::OCCUPIED == codes::OCCUPIED);
+static_assert(static_cast<std::uint8_t>(Occupancy::unknown) == point_codes::UNKNOWN &&
+              static_cast<std::uint8_t>(Occupancy::free) == point_codes::FREE &&
+              static_cast<std::uint8_t>(Occupancy::occupied) == point_codes::OCCUPIED);
+static_assert(end_codes::UNKNOWN == point_codes::UNKNOWN && end_codes::FREE == point_codes::FREE &&
+              end_codes::OCCUPIED == point_codes::OCCUPIED);
 
 Coordinates to_wire(const Eigen::Vector3d& value) {
   Coordinates message;

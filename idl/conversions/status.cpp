@@ -6,13 +6,15 @@
 namespace stillmap::wire {
 namespace {
 
-namespace codes = stillmap_msgs::msg::Status_Constants;
-static_assert(static_cast<std::uint8_t>(DeliveryMode::latest) == codes::DELIVERY_LATEST &&
-              static_cast<std::uint8_t>(DeliveryMode::every) == codes::DELIVERY_EVERY);
-static_assert(static_cast<std::uint8_t>(OdometryHealth::initialised) == codes::HEALTH_INITIALISED &&
-              static_cast<std::uint8_t>(OdometryHealth::good) == codes::HEALTH_GOOD &&
-              static_cast<std::uint8_t>(OdometryHealth::degenerate) == codes::HEALTH_DEGENERATE &&
-              static_cast<std::uint8_t>(OdometryHealth::lost) == codes::HEALTH_LOST);
+namespace status_codes = stillmap_msgs::msg::Status_Constants;
+static_assert(static_cast<std::uint8_t>(DeliveryMode::latest) == status_codes::DELIVERY_LATEST &&
+              static_cast<std::uint8_t>(DeliveryMode::every) == status_codes::DELIVERY_EVERY);
+static_assert(static_cast<std::uint8_t>(OdometryHealth::initialised) ==
+                  status_codes::HEALTH_INITIALISED &&
+              static_cast<std::uint8_t>(OdometryHealth::good) == status_codes::HEALTH_GOOD &&
+              static_cast<std::uint8_t>(OdometryHealth::degenerate) ==
+                  status_codes::HEALTH_DEGENERATE &&
+              static_cast<std::uint8_t>(OdometryHealth::lost) == status_codes::HEALTH_LOST);
 namespace severities = stillmap_msgs::msg::Diagnostic_Constants;
 static_assert(static_cast<std::uint8_t>(dds::Severity::advice) == severities::WARN &&
               static_cast<std::uint8_t>(dds::Severity::problem) == severities::ERROR);
@@ -120,7 +122,8 @@ stillmap_msgs::msg::Status to_wire(const dds::ServerStatus& status) {
 std::optional<dds::ServerStatus> from_wire(const stillmap_msgs::msg::Status& message) {
   const auto stamp = stamp_ns(message.stamp());
   if (message.format_version() != dds::wire_format_version || !stamp ||
-      message.delivery() > codes::DELIVERY_EVERY || message.health() > codes::HEALTH_LOST) {
+      message.delivery() > status_codes::DELIVERY_EVERY ||
+      message.health() > status_codes::HEALTH_LOST) {
     return std::nullopt;
   }
   dds::ServerStatus status{.stamp_ns = *stamp,

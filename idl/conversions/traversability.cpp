@@ -15,19 +15,21 @@ using stillmap_msgs::srv::GetTraversableArea_Response;
 
 namespace {
 
-namespace codes = stillmap_msgs::msg::TraversabilityGrid_Constants;
-static_assert(static_cast<std::uint8_t>(CellState::unknown) == codes::STATE_UNKNOWN &&
-              static_cast<std::uint8_t>(CellState::free) == codes::STATE_FREE &&
-              static_cast<std::uint8_t>(CellState::lethal) == codes::STATE_LETHAL);
-static_assert(static_cast<std::uint8_t>(BlockReason::none) == codes::REASON_NONE &&
-              static_cast<std::uint8_t>(BlockReason::obstacle) == codes::REASON_OBSTACLE &&
-              static_cast<std::uint8_t>(BlockReason::low_headroom) == codes::REASON_LOW_HEADROOM &&
-              static_cast<std::uint8_t>(BlockReason::step) == codes::REASON_STEP &&
-              static_cast<std::uint8_t>(BlockReason::slope) == codes::REASON_SLOPE &&
-              static_cast<std::uint8_t>(BlockReason::roughness) == codes::REASON_ROUGHNESS &&
-              static_cast<std::uint8_t>(BlockReason::ground_class) == codes::REASON_GROUND_CLASS &&
-              static_cast<std::uint8_t>(BlockReason::inscribed) == codes::REASON_INSCRIBED &&
-              static_cast<std::uint8_t>(BlockReason::unknown) == codes::REASON_UNKNOWN);
+namespace grid_codes = stillmap_msgs::msg::TraversabilityGrid_Constants;
+static_assert(static_cast<std::uint8_t>(CellState::unknown) == grid_codes::STATE_UNKNOWN &&
+              static_cast<std::uint8_t>(CellState::free) == grid_codes::STATE_FREE &&
+              static_cast<std::uint8_t>(CellState::lethal) == grid_codes::STATE_LETHAL);
+static_assert(static_cast<std::uint8_t>(BlockReason::none) == grid_codes::REASON_NONE &&
+              static_cast<std::uint8_t>(BlockReason::obstacle) == grid_codes::REASON_OBSTACLE &&
+              static_cast<std::uint8_t>(BlockReason::low_headroom) ==
+                  grid_codes::REASON_LOW_HEADROOM &&
+              static_cast<std::uint8_t>(BlockReason::step) == grid_codes::REASON_STEP &&
+              static_cast<std::uint8_t>(BlockReason::slope) == grid_codes::REASON_SLOPE &&
+              static_cast<std::uint8_t>(BlockReason::roughness) == grid_codes::REASON_ROUGHNESS &&
+              static_cast<std::uint8_t>(BlockReason::ground_class) ==
+                  grid_codes::REASON_GROUND_CLASS &&
+              static_cast<std::uint8_t>(BlockReason::inscribed) == grid_codes::REASON_INSCRIBED &&
+              static_cast<std::uint8_t>(BlockReason::unknown) == grid_codes::REASON_UNKNOWN);
 
 ReplyCode code_of(TraversabilityStatus status) {
   switch (status) {

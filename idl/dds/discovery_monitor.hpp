@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "idl/dds/qos.hpp"
 #include "idl/dds/remote_participant.hpp"
+#include "idl/dds/topic_qos.hpp"
 
 namespace stillmap::dds {
 

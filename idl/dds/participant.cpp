@@ -1,15 +1,21 @@
 #include "idl/dds/participant.hpp"
 
 #include <fastdds/dds/domain/DomainParticipant.hpp>
+#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
+#include <fastdds/dds/publisher/DataWriter.hpp>
 #include <fastdds/dds/publisher/Publisher.hpp>
+#include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
+#include <fastdds/dds/topic/ContentFilteredTopic.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
+#include <fastdds/dds/topic/TypeSupport.hpp>
 #include <sstream>
 #include <string_view>
 #include <typeinfo>
 
 #include "idl/dds/discovery.hpp"
 #include "idl/dds/discovery_monitor.hpp"
+#include "idl/dds/qos.hpp"
 #include "idl/dds/ros_graph.hpp"
 #include "idl/dds/security/identity.hpp"
 #include "idl/dds/transports.hpp"

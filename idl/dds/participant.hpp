@@ -1,22 +1,34 @@
 #pragma once
 
 #include <cstdint>
-#include <fastdds/dds/domain/DomainParticipantFactory.hpp>
-#include <fastdds/dds/publisher/DataWriter.hpp>
-#include <fastdds/dds/subscriber/DataReader.hpp>
-#include <fastdds/dds/topic/ContentFilteredTopic.hpp>
-#include <fastdds/dds/topic/TypeSupport.hpp>
 #include <functional>
 #include <map>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/dds_options.hpp"
-#include "idl/dds/qos.hpp"
 #include "idl/dds/remote_participant.hpp"
 #include "idl/dds/service_faults.hpp"
+#include "idl/dds/topic_qos.hpp"
+
+// Fast DDS's headers take two seconds to compile.
+namespace eprosima::fastdds::dds {
+class ContentFilteredTopic;
+class DataReader;
+class DataReaderListener;
+class DataWriter;
+class DataWriterListener;
+class DomainParticipant;
+class DomainParticipantFactory;
+class DomainParticipantQos;
+class Publisher;
+class Subscriber;
+class Topic;
+class TypeSupport;
+}  // namespace eprosima::fastdds::dds
 
 namespace stillmap::dds {
 

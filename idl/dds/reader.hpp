@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <mutex>

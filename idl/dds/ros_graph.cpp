@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <fastdds/dds/publisher/DataWriter.hpp>
 
 #include "idl/dds/type_support.hpp"
 #include "rmw_dds_common.h"

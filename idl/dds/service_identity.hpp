@@ -3,19 +3,11 @@
 #include <array>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <optional>
-#include <string>
 
-#include "idl/dds/qos.hpp"
 #include "idl/dds/serialized_sample.hpp"
+#include "idl/dds/service_topics.hpp"
 
 namespace stillmap::dds {
-
-/// DDS names of a ROS 2 service's two topics; `service` as in "stillmap/get_status".
-[[nodiscard]] std::string request_topic(const std::string& service);
-[[nodiscard]] std::string reply_topic(const std::string& service);
-
-/// What both ends of a service use.
-[[nodiscard]] TopicQos service_qos();
 
 /// Identity that a reply carries so that rmw_fastrtps clients find their request again: the
 /// request's own, its writer replaced by the client's reply reader where the request names it.

@@ -1,8 +1,10 @@
 #include "idl/dds/writer.hpp"
 
 #include <algorithm>
+#include <fastdds/dds/publisher/DataWriter.hpp>
 
 #include "idl/dds/dds_error.hpp"
+#include "idl/dds/qos.hpp"
 
 namespace stillmap::dds {
 

@@ -3,7 +3,7 @@
 #include <array>
 
 #include "idl/dds/ros_graph.hpp"
-#include "idl/dds/service_identity.hpp"
+#include "idl/dds/service_topics.hpp"
 #include "idl/interface/services.hpp"
 #include "idl/interface/topics.hpp"
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <string>
 
-#include "idl/dds/qos.hpp"
+#include "idl/dds/topic_qos.hpp"
 #include "idl/interface/server_status.hpp"
 #include "idl/msg/wire_types.hpp"
 

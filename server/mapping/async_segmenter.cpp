@@ -5,6 +5,8 @@
 #include <exception>
 #include <utility>
 
+#include "server/mapping/milliseconds.hpp"
+
 namespace stillmap::server {
 namespace {
 
@@ -12,10 +14,6 @@ constexpr std::uint32_t max_misses = 3;
 constexpr std::uint32_t scans_until_retry = 4;
 /// A scan that is due is put off by at most so many others while scans wait to be mapped.
 constexpr std::uint32_t max_postponed_scans = 10;
-
-double milliseconds(std::chrono::steady_clock::duration time) {
-  return std::chrono::duration<double, std::milli>(time).count();
-}
 
 }  // namespace
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/mapping/async_segmenter.hpp"
+#include "server/mapping/milliseconds.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -15,10 +16,6 @@ using Clock = std::chrono::steady_clock;
 
 // How long a request, or the snapshot after the last scan, may wait while no scan comes.
 constexpr std::chrono::milliseconds idle_period{50};
-
-double milliseconds(Clock::duration time) {
-  return std::chrono::duration<double, std::milli>(time).count();
-}
 
 constexpr std::size_t no_limit = std::numeric_limits<std::size_t>::max();
 

@@ -12,7 +12,7 @@ using namespace stillmap_msgs::srv;
 
 namespace {
 
-constexpr std::size_t max_voxels_per_reply = 300'000;
+constexpr std::size_t max_removed_per_reply = 300'000;
 
 /// Throws std::invalid_argument for a region with faults.
 Region region_of(const stillmap_msgs::msg::Region& message) {
@@ -54,7 +54,7 @@ GetRemoved_Response get_removed(const ServiceContext& context, const GetRemoved_
              !region.contains(voxel.position_map.cast<double>());
     });
     response.total(removed.size());
-    const std::size_t wanted = std::min<std::size_t>(request.max_voxels(), max_voxels_per_reply);
+    const std::size_t wanted = std::min<std::size_t>(request.max_voxels(), max_removed_per_reply);
     removed.resize(std::min(removed.size(), wanted));
     wire::write_removed(removed, response);
   });

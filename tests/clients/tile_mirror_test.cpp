@@ -11,7 +11,7 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using namespace std::chrono_literals;
 
-constexpr dds::MapIdentity first_map{
+constexpr dds::MapIdentity mirrored_map{
     .version = 4, .map_id = 1, .tile_size_m = 20, .voxel_size_m = 0.2};
 
 Tile tile(TileId id, std::uint64_t revision) {
@@ -47,7 +47,7 @@ TEST(TileMirror, BeginsEmpty) {
 
 TEST(TileMirror, HoldsTheTilesInOrderWithTheMapsSizes) {
   TileMirror mirror;
-  mirror.apply(update(first_map, {tile({2, 0}, 3), tile({-1, 5}, 4)}));
+  mirror.apply(update(mirrored_map, {tile({2, 0}, 3), tile({-1, 5}, 4)}));
   EXPECT_THAT(content(mirror),
               ElementsAre(std::pair(TileId{-1, 5}, 4U), std::pair(TileId{2, 0}, 3U)));
   const auto view = mirror.snapshot();
@@ -59,9 +59,9 @@ TEST(TileMirror, HoldsTheTilesInOrderWithTheMapsSizes) {
 
 TEST(TileMirror, ChangesAndRemovalsTakeEffectAndOldViewsStay) {
   TileMirror mirror;
-  mirror.apply(update(first_map, {tile({0, 0}, 3), tile({1, 0}, 4)}));
+  mirror.apply(update(mirrored_map, {tile({0, 0}, 3), tile({1, 0}, 4)}));
   const auto before = mirror.snapshot();
-  dds::MapIdentity later = first_map;
+  dds::MapIdentity later = mirrored_map;
   later.version = 6;
   mirror.apply(update(later, {}, {tile({1, 0}, 6)}, {{0, 0}}));
   EXPECT_THAT(content(mirror), ElementsAre(std::pair(TileId{1, 0}, 6U)));
@@ -71,16 +71,16 @@ TEST(TileMirror, ChangesAndRemovalsTakeEffectAndOldViewsStay) {
 
 TEST(TileMirror, ATileOlderThanTheOneHeldIsLeftOut) {
   TileMirror mirror;
-  mirror.apply(update(first_map, {tile({0, 0}, 9)}));
-  mirror.apply(update(first_map, {}, {tile({0, 0}, 5)}));
+  mirror.apply(update(mirrored_map, {tile({0, 0}, 9)}));
+  mirror.apply(update(mirrored_map, {}, {tile({0, 0}, 5)}));
   EXPECT_THAT(content(mirror), ElementsAre(std::pair(TileId{0, 0}, 9U)));
   EXPECT_EQ(mirror.snapshot()->version, 9U);
 }
 
 TEST(TileMirror, AnotherMapReplacesEverythingThoughItsVersionsAreSmaller) {
   TileMirror mirror;
-  mirror.apply(update(first_map, {tile({0, 0}, 3), tile({1, 0}, 4)}));
-  dds::MapIdentity second = first_map;
+  mirror.apply(update(mirrored_map, {tile({0, 0}, 3), tile({1, 0}, 4)}));
+  dds::MapIdentity second = mirrored_map;
   second.map_id = 2;
   second.version = 1;
   mirror.apply(update(second, {tile({1, 0}, 1)}));
@@ -90,11 +90,11 @@ TEST(TileMirror, AnotherMapReplacesEverythingThoughItsVersionsAreSmaller) {
 
 TEST(TileMirror, KnowsWhetherItHoldsWhatTheServerHas) {
   TileMirror mirror;
-  mirror.apply(update(first_map, {tile({0, 0}, 3)}));
-  EXPECT_TRUE(mirror.holds({first_map, {tile({0, 0}, 2).info}}));
-  EXPECT_FALSE(mirror.holds({first_map, {tile({0, 0}, 4).info}}));
-  EXPECT_FALSE(mirror.holds({first_map, {tile({1, 0}, 1).info}}));
-  dds::MapIdentity second = first_map;
+  mirror.apply(update(mirrored_map, {tile({0, 0}, 3)}));
+  EXPECT_TRUE(mirror.holds({mirrored_map, {tile({0, 0}, 2).info}}));
+  EXPECT_FALSE(mirror.holds({mirrored_map, {tile({0, 0}, 4).info}}));
+  EXPECT_FALSE(mirror.holds({mirrored_map, {tile({1, 0}, 1).info}}));
+  dds::MapIdentity second = mirrored_map;
   second.map_id = 2;
   EXPECT_FALSE(mirror.holds({second, {tile({0, 0}, 1).info}}));
 }
@@ -103,7 +103,7 @@ TEST(TileMirror, WakesWhoWaitsForAChange) {
   TileMirror mirror;
   const auto empty = mirror.snapshot();
   EXPECT_EQ(mirror.wait_for_change(empty, 1ms), empty);
-  std::jthread writer([&] { mirror.apply(update(first_map, {tile({0, 0}, 3)})); });
+  std::jthread writer([&] { mirror.apply(update(mirrored_map, {tile({0, 0}, 3)})); });
   EXPECT_EQ(mirror.wait_for_change(empty, 30s)->tiles.size(), 1U);
 }
 

@@ -18,7 +18,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
-constexpr const char* whole_file =
+constexpr const char* whole_profile =
     "transport: udp\nserver_port: 7500\nshared_memory: false\nshared_memory_mib: 8\n"
     "client_shared_memory: true\n"
     "multicast: false\ninterfaces: [10.0.0.1]\npeers: [10.0.0.2, 'there:7412']\n"
@@ -26,7 +26,7 @@ constexpr const char* whole_file =
     "heartbeat_ms: 70\nrepair_delay_ms: 9\nlease_s: 33\nlarge_message_bytes_per_s: 500000\n";
 
 TEST(DdsProfileFile, EveryFieldIsRead) {
-  const DdsProfile profile = read_dds_profile(write_file("radio.yaml", whole_file));
+  const DdsProfile profile = read_dds_profile(write_file("radio.yaml", whole_profile));
   EXPECT_EQ(profile.server_port, 7500);
   EXPECT_TRUE(profile.client_shared_memory);
   const dds::DdsOptions& options = profile.options;
@@ -124,7 +124,7 @@ TEST(NetworkAddressText, IsHostOrHostAndPort) {
 }
 
 TEST(DdsNetworkConfigTest, ADeploymentOverridesItsProfile) {
-  const DdsNetworkConfig network{.profile = write_file("radio.yaml", whole_file).string(),
+  const DdsNetworkConfig network{.profile = write_file("radio.yaml", whole_profile).string(),
                                  .shared_memory = true,
                                  .interfaces = {"10.0.0.9"},
                                  .peers = {"a", "b:1"},
@@ -155,7 +155,7 @@ TEST(DdsNetworkConfigTest, OnlySensorsAndTheServerShareMemoryWhereClientsMayHang
 
 TEST(DdsNetworkConfigTest, WhatIsNotGivenStaysAsTheProfileHasIt) {
   DdsNetworkConfig network;
-  network.profile = write_file("radio.yaml", whole_file).string();
+  network.profile = write_file("radio.yaml", whole_profile).string();
   const dds::DdsOptions options = dds_options(network, DdsRole::client);
   EXPECT_FALSE(options.shared_memory);
   EXPECT_THAT(options.interfaces, ElementsAre("10.0.0.1"));

@@ -33,18 +33,18 @@ classes: {0: unlabeled, 1: car, 2: road}
 knn: {neighbours: 7}
 )";
 
-ModelDescription load(const std::string& yaml) {
+ModelDescription load_model(const std::string& yaml) {
   return load_model_description(write_file("model.yaml", yaml).parent_path());
 }
 
 std::string refusal_of(std::string yaml, const std::string& from, const std::string& to) {
   EXPECT_NE(yaml.find(from), std::string::npos);
   yaml.replace(yaml.find(from), from.size(), to);
-  return refusal([&] { (void)load(yaml); });
+  return refusal([&] { (void)load_model(yaml); });
 }
 
 TEST(ModelFile, ReadsADescriptionThatCanBeUsed) {
-  const ModelDescription model = load(sound);
+  const ModelDescription model = load_model(sound);
   EXPECT_EQ(model.faults(), "");
   EXPECT_EQ(model.name, "tiny");
   EXPECT_EQ(model.columns, 512);
@@ -60,12 +60,12 @@ TEST(ModelFile, ReadsADescriptionThatCanBeUsed) {
 TEST(ModelFile, ReadsItsCalibrationAndWhetherItFollowsTheSensor) {
   // Of a run before.
   std::filesystem::remove(test::test_folder() / "int8.yaml");
-  EXPECT_FALSE(load(sound).int8.has_value());
-  EXPECT_FALSE(load(sound).follow_sensor);
+  EXPECT_FALSE(load_model(sound).int8.has_value());
+  EXPECT_FALSE(load_model(sound).follow_sensor);
   std::string yaml = sound;
   yaml.replace(yaml.find("fov_down_deg: -25}"), 18, "fov_down_deg: -25, follow_sensor: true}");
   (void)write_file("int8.yaml", "ranges: {a: [2, 3]}\n");
-  const ModelDescription model = load(yaml);
+  const ModelDescription model = load_model(yaml);
   EXPECT_TRUE(model.follow_sensor);
   ASSERT_TRUE(model.int8.has_value());
   EXPECT_EQ(model.int8->range_of_channels.at("a"), (std::vector{2.0F, 3.0F}));
@@ -74,7 +74,7 @@ TEST(ModelFile, ReadsItsCalibrationAndWhetherItFollowsTheSensor) {
 TEST(ModelFile, CanSwitchTheVotesOff) {
   std::string yaml = sound;
   yaml.replace(yaml.find("{neighbours: 7}"), 15, "{use: false}");
-  EXPECT_FALSE(load(yaml).knn.has_value());
+  EXPECT_FALSE(load_model(yaml).knn.has_value());
 }
 
 TEST(ModelFile, RefusesHolesInTheClassMap) {

@@ -16,7 +16,7 @@ using test::write_file;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-constexpr const char* whole_file =
+constexpr const char* whole_robot =
     "name: cart\nlength_m: 2\nwidth_m: 1\ncentre_ahead_m: 0.5\nmin_turning_radius_m: "
     "3.5\nground_clearance_m: 0.12\n"
     "height_m: 1.8\nmax_step_m: 0.07\nmax_slope_deg: 12\nmax_roughness_m: 0.04\n"
@@ -29,7 +29,7 @@ std::optional<double> cost(const RobotProfile& robot, SemanticClass label) {
 }
 
 TEST(RobotProfileFile, EveryFieldIsRead) {
-  const RobotProfile robot = read_robot_profile(write_file("cart.yaml", whole_file));
+  const RobotProfile robot = read_robot_profile(write_file("cart.yaml", whole_robot));
   EXPECT_EQ(robot.name, "cart");
   EXPECT_EQ(robot.length_m, 2.0);
   EXPECT_EQ(robot.width_m, 1.0);
@@ -72,7 +72,7 @@ TEST(RobotProfileFile, ShippedFilesBearTheNamesOfTheirRobots) {
 }
 
 TEST(RobotProfileFile, ListsEveryFaultWithItsLine) {
-  std::string text = whole_file;
+  std::string text = whole_robot;
   text.replace(text.find("length_m: 2"), 11, "length_m: x");
   text.replace(text.find("road: 0.5"), 9, "road: 1.5");
   text.replace(text.find("terrain: lethal"), 15, "terrain: deadly");
@@ -84,7 +84,7 @@ TEST(RobotProfileFile, ListsEveryFaultWithItsLine) {
 }
 
 TEST(RobotProfileFile, DemandsACostForEveryGround) {
-  std::string text = whole_file;
+  std::string text = whole_robot;
   text.replace(text.find("parking: 0.25, "), 15, "");
   text.replace(text.find("sidewalk: 0,"), 12, "sidewalk: '',");
   const std::string faults =
@@ -94,7 +94,7 @@ TEST(RobotProfileFile, DemandsACostForEveryGround) {
 }
 
 TEST(RobotProfileFile, SaysWhatDoesNotFitTogether) {
-  std::string text = whole_file;
+  std::string text = whole_robot;
   text.replace(text.find("centre_ahead_m: 0.5"), 19, "centre_ahead_m: 1.5");
   EXPECT_THAT(refusal([&] { (void)read_robot_profile(write_file("cart.yaml", text)); }),
               HasSubstr("less than half of length_m"));
@@ -109,7 +109,7 @@ TEST(RobotProfileFile, NamesTheRobotsThereAreWhenThereIsNoSuchOne) {
 }
 
 TEST(RobotProfileFile, AFolderOfOnesOwnComesFirst) {
-  const auto file = write_file("car.yaml", whole_file);
+  const auto file = write_file("car.yaml", whole_robot);
   setenv("STILLMAP_ROBOTS", file.parent_path().c_str(), 1);
   EXPECT_EQ(load_robot_profile("car").name, "cart");
   unsetenv("STILLMAP_ROBOTS");

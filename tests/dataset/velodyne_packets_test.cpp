@@ -57,7 +57,7 @@ double azimuth_deg(const Eigen::Vector3f& p) {
   const double clockwise = -std::atan2(p.y(), p.x()) / degree;
   return clockwise < 0.0 ? clockwise + 360.0 : clockwise;
 }
-double elevation_deg(const Eigen::Vector3f& p) {
+double measured_deg(const Eigen::Vector3f& p) {
   return std::atan2(p.z(), std::hypot(p.x(), p.y())) / degree;
 }
 
@@ -106,7 +106,7 @@ TEST_P(VelodyneFiring, FollowsTheManual) {
                                static_cast<double>(laser) * model.laser_us;
     const double expected_deg =
         359.0 + step_deg * static_cast<double>(block) + step_deg * in_block_us / model.block_us;
-    EXPECT_NEAR(elevation_deg(scan.points_lidar[i]), model.elevations_deg[laser], 0.005) << i;
+    EXPECT_NEAR(measured_deg(scan.points_lidar[i]), model.elevations_deg[laser], 0.005) << i;
     EXPECT_NEAR(std::remainder(azimuth_deg(scan.points_lidar[i]) - expected_deg, 360.0), 0.0, 1e-3);
     EXPECT_NEAR(scan.time_offset_s[i],
                 0.005 + 1e-6 * (static_cast<double>(block) * model.block_us + in_block_us), 1e-8);

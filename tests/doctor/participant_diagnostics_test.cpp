@@ -23,7 +23,7 @@ dds::RemoteParticipant participant(const std::string& name) {
   return made;
 }
 
-auto says(const std::string& what) { return Field(&dds::Diagnostic::what, HasSubstr(what)); }
+auto tells(const std::string& what) { return Field(&dds::Diagnostic::what, HasSubstr(what)); }
 
 TEST(ParticipantDiagnosticsTest, AreNoneWhereAllIsWell) {
   EXPECT_THAT(dds::security_diagnostics(participant("self"), {participant("lidar")}), IsEmpty());
@@ -35,14 +35,14 @@ TEST(ParticipantDiagnosticsTest, TellWhichSideLacksSecurity) {
   dds::RemoteParticipant secured = participant("server");
   secured.is_secured = true;
   EXPECT_THAT(dds::security_diagnostics(participant("self"), {secured}),
-              ElementsAre(AllOf(says("server is secured and self is not"),
+              ElementsAre(AllOf(tells("server is secured and self is not"),
                                 Field(&dds::Diagnostic::hint, HasSubstr("--security")))));
   EXPECT_THAT(dds::security_diagnostics(secured, {participant("lidar")}),
-              ElementsAre(says("lidar is not secured and is ignored")));
+              ElementsAre(tells("lidar is not secured and is ignored")));
   dds::RemoteParticipant refused = secured;
   refused.refused = true;
   EXPECT_THAT(dds::security_diagnostics(secured, {refused}),
-              ElementsAre(says("refuse each other")));
+              ElementsAre(tells("refuse each other")));
   EXPECT_THAT(dds::security_diagnostics(secured, {secured}), IsEmpty());
 }
 

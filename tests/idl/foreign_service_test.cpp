@@ -23,7 +23,7 @@ using ::testing::HasSubstr;
 constexpr auto service = "stillmap/save_map";
 constexpr auto type_stem = "stillmap_msgs::srv::dds_::SaveMap";
 
-SaveMap_Response echo(const SaveMap_Request& request) {
+SaveMap_Response saved(const SaveMap_Request& request) {
   SaveMap_Response reply;
   reply.file("saved " + request.file());
   return reply;
@@ -60,7 +60,7 @@ class ForeignService : public testing::Test {
   }
 
   Participant server_side_{loopback(false)};
-  ServiceServer<SaveMap_Request, SaveMap_Response> server_{server_side_, service, echo};
+  ServiceServer<SaveMap_Request, SaveMap_Response> server_{server_side_, service, saved};
 };
 
 /// The reply to the request with this header, among replies to all.

@@ -10,6 +10,7 @@
 
 #include "core/map/query/region.hpp"
 #include "tests/map/map_worlds.hpp"
+#include "tests/numbers.hpp"
 
 namespace stillmap {
 namespace {
@@ -17,8 +18,8 @@ namespace {
 using Eigen::AlignedBox3d;
 using Eigen::Vector3d;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::infinity;
+using test::nan;
 
 BoxRegion box_region(const AlignedBox3d& box_map) {
   BoxRegion region;

@@ -7,6 +7,8 @@
 #include <numbers>
 #include <random>
 
+#include "tests/numbers.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -16,8 +18,8 @@ using Eigen::Vector3d;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::infinity;
+using test::nan;
 
 std::vector<Vector2d> star(int corners, double size_m, std::mt19937& random) {
   std::uniform_real_distribution<double> radius(0.3 * size_m, size_m);

@@ -8,6 +8,7 @@
 
 #include "core/map/voxel_grid.hpp"
 #include "tests/map/map_worlds.hpp"
+#include "tests/numbers.hpp"
 
 namespace stillmap {
 namespace {
@@ -77,7 +78,7 @@ TEST(ClassEvidence, LongStandingClassTurnsAfterSustainedContraryEvidence) {
 using Eigen::AlignedBox3d;
 using Eigen::Vector3d;
 
-constexpr double infinity = std::numeric_limits<double>::infinity();
+using test::infinity;
 
 TEST(TileLookup, AgreesWithBruteForceOnRandomBoxes) {
   const auto view = test::street_map(5, 200).view();

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "tests/numbers.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
 namespace stillmap {
@@ -17,7 +18,7 @@ using test::traversability_of;
 using test::VoxelWorld;
 using ::testing::HasSubstr;
 
-constexpr double pi = std::numbers::pi;
+using test::pi;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 /// Two lanes of 5 m, 60 m long, with a wall between them that ends 10 m before their end.

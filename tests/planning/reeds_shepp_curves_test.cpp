@@ -5,10 +5,12 @@
 #include <numbers>
 #include <random>
 
+#include "tests/numbers.hpp"
+
 namespace stillmap {
 namespace {
 
-constexpr double pi = std::numbers::pi;
+using test::pi;
 
 std::vector<CurvePose> poses_between(const ReedsSheppCurves& curves, const PlanarPose& a,
                                      const PlanarPose& b) {

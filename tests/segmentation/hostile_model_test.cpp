@@ -28,13 +28,13 @@ using ::testing::HasSubstr;
 
 constexpr std::int64_t rows = 4, columns = 8, classes = 3;
 
-struct Engine {
+struct TestedEngine {
   const char* name;
   std::function<void(const ModelDescription&)> open;
 };
-void PrintTo(const Engine& engine, std::ostream* out) { *out << engine.name; }
+void PrintTo(const TestedEngine& engine, std::ostream* out) { *out << engine.name; }
 
-class HostileModel : public ::testing::TestWithParam<Engine> {
+class HostileModel : public ::testing::TestWithParam<TestedEngine> {
  protected:
   /// The engine's error message; empty when it accepts the file.
   static std::string refusal(const std::string& bytes) {
@@ -54,15 +54,15 @@ class HostileModel : public ::testing::TestWithParam<Engine> {
 };
 
 INSTANTIATE_TEST_SUITE_P(Engines, HostileModel,
-                         ::testing::Values(Engine{"onednn",
-                                                  [](const ModelDescription& model) {
-                                                    const OneDnnNetwork network(model,
-                                                                                Precision::fp32);
-                                                  }},
-                                           Engine{"opencv",
-                                                  [](const ModelDescription& model) {
-                                                    const OpenCvNetwork network(model);
-                                                  }}),
+                         ::testing::Values(TestedEngine{"onednn",
+                                                        [](const ModelDescription& model) {
+                                                          const OneDnnNetwork network(
+                                                              model, Precision::fp32);
+                                                        }},
+                                           TestedEngine{"opencv",
+                                                        [](const ModelDescription& model) {
+                                                          const OpenCvNetwork network(model);
+                                                        }}),
                          [](const auto& info) { return std::string(info.param.name); });
 
 const std::vector<float> weights(15, 0.25F);

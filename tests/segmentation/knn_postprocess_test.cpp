@@ -15,11 +15,11 @@
 namespace stillmap {
 namespace {
 
-constexpr int rows = 8;
-constexpr int columns = 32;
+constexpr int image_rows = 8;
+constexpr int image_columns = 32;
 constexpr std::size_t invalid = 20;
 
-const ModelDescription model = test::describe(test::random_network(rows, columns, 3));
+const ModelDescription model = test::describe(test::random_network(image_rows, image_columns, 3));
 
 struct Neighbour {
   float distance_m;
@@ -28,7 +28,7 @@ struct Neighbour {
 };
 
 /// 1 - normalised Gaussian, row by row.
-std::vector<float> weights(const KnnConfig& config) {
+std::vector<float> knn_weights(const KnnConfig& config) {
   const int half = config.window / 2;
   std::vector<double> gaussian;
   for (int r = -half; r <= half; ++r) {
@@ -49,13 +49,13 @@ std::vector<Neighbour> sorted_window(const RangeImage& image, const PixelLabels&
   const int pixel = image.pixel_of_point()[point];
   const float own_range = image.range_of_point_m()[point];
   const int half = config.window / 2;
-  const std::vector<float> weight = weights(config);
+  const std::vector<float> weight = knn_weights(config);
   std::vector<Neighbour> window;
   for (int r = 0; r < config.window; ++r) {
     for (int c = 0; c < config.window; ++c) {
-      const int row = pixel / columns + r - half;
-      const int column = pixel % columns + c - half;
-      const bool inside = row >= 0 && row < rows && column >= 0 && column < columns;
+      const int row = pixel / image_columns + r - half;
+      const int column = pixel % image_columns + c - half;
+      const bool inside = row >= 0 && row < image_rows && column >= 0 && column < image_columns;
       const std::size_t at = inside ? image.pixel(row, column) : 0;
       float range = inside ? image.range_m()[at] : 0.0F;
       if (range < 0.0F) range = std::numeric_limits<float>::infinity();
@@ -69,13 +69,13 @@ std::vector<Neighbour> sorted_window(const RangeImage& image, const PixelLabels&
   return window;
 }
 
-struct Expected {
+struct ExpectedVote {
   std::size_t label;
   float confidence;
 };
 
-Expected reference(const RangeImage& image, const PixelLabels& pixels, std::size_t point,
-                   const KnnConfig& config) {
+ExpectedVote reference(const RangeImage& image, const PixelLabels& pixels, std::size_t point,
+                       const KnnConfig& config) {
   std::vector<Neighbour> window = sorted_window(image, pixels, point, config);
   window.resize(static_cast<std::size_t>(config.neighbours));
   std::array<int, invalid + 1> histogram{};
@@ -104,7 +104,7 @@ PixelLabels random_pixels(unsigned seed) {
   std::uniform_int_distribution<int> label(-4, 19);
   std::uniform_real_distribution<float> share(0.0F, 1.0F);
   PixelLabels pixels;
-  for (int i = 0; i < rows * columns; ++i) {
+  for (int i = 0; i < image_rows * image_columns; ++i) {
     pixels.classes.push_back(static_cast<SemanticClass>(std::max(0, label(random))));
     pixels.confidence.push_back(share(random));
   }
@@ -119,7 +119,7 @@ void expect_like_reference(const KnnConfig& config) {
     const PointLabels labels = knn_labels(image, pixels, config);
     ASSERT_EQ(labels.classes.size(), scan.size());
     for (std::size_t i = 0; i < scan.size(); ++i) {
-      const Expected expected = reference(image, pixels, i, config);
+      const ExpectedVote expected = reference(image, pixels, i, config);
       EXPECT_EQ(static_cast<std::size_t>(labels.classes[i]), expected.label) << "point " << i;
       EXPECT_NEAR(labels.confidence[i], expected.confidence, 1e-6F) << "point " << i;
     }
@@ -140,7 +140,7 @@ TEST(KnnPostprocess, EqualsThePlainReferenceWithItsQuirk) {
 TEST(KnnPostprocess, GivesAHiddenPointTheClassOfItsSurroundings) {
   // A pole at 5 m, and a wall at 10 m of which one point lies behind the pole in its pixel.
   Scan scan;
-  const float step = 2.0F * std::numbers::pi_v<float> / columns;
+  const float step = 2.0F * std::numbers::pi_v<float> / image_columns;
   for (int i = -4; i <= 4; ++i) {
     const float yaw = (static_cast<float>(i) + 0.5F) * step;
     scan.points_lidar.emplace_back(10.0F * std::cos(yaw), 10.0F * std::sin(yaw), 0.0F);

@@ -16,14 +16,14 @@ using Engine = EngineOptions::Engine;
 using PrecisionMode = EngineOptions::PrecisionMode;
 using ::testing::HasSubstr;
 
-ModelDescription light() {
+ModelDescription light_model() {
   ModelDescription model = test::describe_family(8, 32, 4);
   model.network_file = test::write_model(test::light_bytes(8, 8, 32, 4));
   return model;
 }
 
 ModelDescription calibrated() {
-  ModelDescription model = light();
+  ModelDescription model = light_model();
   ActivationRanges ranges;
   OneDnnNetwork(model, Precision::fp32)
       .observe(test::random_image(model, 1),
@@ -50,15 +50,15 @@ std::string engine(const ModelDescription& model, const EngineOptions& choice) {
 
 TEST(OpenNetwork, TakesTheFastestThatRunsTheModel) {
   EXPECT_THAT(engine(calibrated(), {.threads = 2}), HasSubstr("oneDNN int8, 2 threads"));
-  EXPECT_THAT(engine(light(), {.threads = 2}), HasSubstr("oneDNN fp32, 2 threads"));
+  EXPECT_THAT(engine(light_model(), {.threads = 2}), HasSubstr("oneDNN fp32, 2 threads"));
   EXPECT_EQ(engine(exotic(), {}), "OpenCV");
 }
 
 TEST(OpenNetwork, RemarksWhyItIsNotFaster) {
   EXPECT_EQ(open_network(calibrated(), {}).remark, "");
-  EXPECT_THAT(open_network(light(), {}).remark, HasSubstr("stillmap model calibrate"));
+  EXPECT_THAT(open_network(light_model(), {}).remark, HasSubstr("stillmap model calibrate"));
   EXPECT_THAT(open_network(exotic(), {}).remark, HasSubstr("operator Sigmoid"));
-  EXPECT_EQ(open_network(light(), {.precision = PrecisionMode::fp32}).remark, "");
+  EXPECT_EQ(open_network(light_model(), {.precision = PrecisionMode::fp32}).remark, "");
 }
 
 TEST(OpenNetwork, UsesTheChosenEngineAndPrecision) {
@@ -72,14 +72,14 @@ TEST(OpenNetwork, UsesTheChosenEngineAndPrecision) {
 TEST(OpenNetwork, RefusesImpossibleChoices) {
   EXPECT_THROW((void)open_network(exotic(), {.engine = Engine::onednn}), UnsupportedModel);
   EXPECT_THROW((void)open_network(exotic(), {.precision = PrecisionMode::int8}), ModelError);
-  EXPECT_THROW((void)open_network(light(), {.precision = PrecisionMode::int8}), ModelError);
+  EXPECT_THROW((void)open_network(light_model(), {.precision = PrecisionMode::int8}), ModelError);
   EXPECT_THROW((void)open_network(calibrated(),
                                   {.engine = Engine::opencv, .precision = PrecisionMode::int8}),
                ModelError);
 }
 
 TEST(OpenNetwork, DoesNotHideADamagedModelBehindTheFallback) {
-  ModelDescription model = light();
+  ModelDescription model = light_model();
   model.network_file = test::write_model("not a network");
   try {
     (void)open_network(model, {});

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/occupancy/occupancy_map.hpp"
+#include "tests/numbers.hpp"
 #include "tests/server/room_scans.hpp"
 #include "tests/server/server_process.hpp"
 
@@ -13,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 constexpr double infinite = std::numeric_limits<double>::infinity();
 
 Eigen::AlignedBox3d everything() {

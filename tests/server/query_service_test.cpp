@@ -8,6 +8,7 @@
 
 #include "core/map/query/query_checks.hpp"
 #include "core/map/query/region.hpp"
+#include "tests/numbers.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {
@@ -15,7 +16,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 
 BoxRegion box(const Eigen::Vector3d& min, const Eigen::Vector3d& max) {
   BoxRegion region;

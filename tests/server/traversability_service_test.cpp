@@ -6,6 +6,7 @@
 #include <mutex>
 
 #include "core/traversability/traversability_query.hpp"
+#include "tests/numbers.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {
@@ -13,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 
 TraversabilityQuery query_of(const Region& region, const std::string& profile = "car") {
   TraversabilityQuery query;

@@ -18,7 +18,7 @@ using test::traversability_of;
 using test::VoxelWorld;
 using ::testing::HasSubstr;
 
-std::shared_ptr<const TraversabilityView> area() {
+std::shared_ptr<const TraversabilityView> area_with_parking() {
   VoxelWorld world;
   world.ground(-8, -8, 8, 6, road);
   world.ground(-8, 0, -4, 4, parking);
@@ -31,7 +31,7 @@ Eigen::AlignedBox2d box(double x0, double y0, double x1, double y1) {
 }
 
 TEST(OccupancyGrid, HasNav2sValues) {
-  const OccupancyGrid grid = occupancy_grid(*area(), whole_map_region());
+  const OccupancyGrid grid = occupancy_grid(*area_with_parking(), whole_map_region());
   ASSERT_EQ(grid.status, TraversabilityStatus::ok);
   EXPECT_EQ(grid.origin_map, Eigen::Vector2d(-8, -8));
   EXPECT_EQ(grid.width, 80U);
@@ -49,7 +49,7 @@ TEST(OccupancyGrid, HasNav2sValues) {
 }
 
 TEST(OccupancyGrid, EveryCellIsTheViews) {
-  const auto view = area();
+  const auto view = area_with_parking();
   const OccupancyGrid grid = occupancy_grid(*view, {box(-3.05, -1.2, 4.9, 3.3), {}});
   ASSERT_EQ(grid.status, TraversabilityStatus::ok);
   CellLookup lookup(*view);
@@ -68,19 +68,19 @@ TEST(OccupancyGrid, EveryCellIsTheViews) {
 TEST(OccupancyGrid, AnotherShapeThanABoxTakesCellsOut) {
   const TraversabilityRegion circle =
       traversability_region(SphereRegion{.centre_map = {0.0, 0.0, 99.0}, .radius_m = 3.0});
-  const OccupancyGrid grid = occupancy_grid(*area(), circle);
+  const OccupancyGrid grid = occupancy_grid(*area_with_parking(), circle);
   EXPECT_EQ(grid.width, 30U);
   EXPECT_EQ(grid.at(0, 0), occupancy_unknown);
   EXPECT_EQ(grid.at(15, 5), 0);
 }
 
 TEST(OccupancyGrid, BoxesBeyondTheMapEndAtItsEdge) {
-  EXPECT_EQ(occupancy_grid(*area(), {box(-1e9, -1e9, 1e9, 1e9), {}}).width, 80U);
+  EXPECT_EQ(occupancy_grid(*area_with_parking(), {box(-1e9, -1e9, 1e9, 1e9), {}}).width, 80U);
 }
 
 TEST(OccupancyGrid, HostileBoxesGetAStatusAndAReason) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-  const auto status = [view = area()](const Eigen::AlignedBox2d& b) {
+  const auto status = [view = area_with_parking()](const Eigen::AlignedBox2d& b) {
     const OccupancyGrid grid = occupancy_grid(*view, {b, {}});
     EXPECT_TRUE(grid.data.empty());
     EXPECT_NE(grid.reason, "");
@@ -106,8 +106,9 @@ TEST(OccupancyGrid, TwoFarTilesDoNotMakeAnEndlessGrid) {
 }
 
 TEST(OccupancyGrid, KeepsToTheCellsThatAreAllowed) {
-  EXPECT_EQ(occupancy_grid(*area(), whole_map_region(), 6400).status, TraversabilityStatus::ok);
-  const OccupancyGrid grid = occupancy_grid(*area(), whole_map_region(), 6399);
+  EXPECT_EQ(occupancy_grid(*area_with_parking(), whole_map_region(), 6400).status,
+            TraversabilityStatus::ok);
+  const OccupancyGrid grid = occupancy_grid(*area_with_parking(), whole_map_region(), 6399);
   EXPECT_EQ(grid.status, TraversabilityStatus::too_large);
   EXPECT_THAT(grid.reason, HasSubstr("80 x 80 cells of 0.2 m; at most 6399"));
 }

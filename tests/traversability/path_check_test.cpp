@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "tests/numbers.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
 namespace stillmap {
@@ -17,7 +18,7 @@ using test::traversability_of;
 using test::VoxelWorld;
 using ::testing::HasSubstr;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 
 /// A road 16 m square with a wall across it that has a gap of 2 m.
 VoxelWorld walled_road() {

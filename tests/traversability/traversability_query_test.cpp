@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/map/query/region.hpp"
+#include "tests/numbers.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
 namespace stillmap {
@@ -18,10 +19,10 @@ using test::traversability_of;
 using test::VoxelWorld;
 using ::testing::HasSubstr;
 
-constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+using test::nan;
 
 /// 16 m square with a house in it; (x, 7) was never seen.
-std::shared_ptr<const TraversabilityView> area() {
+std::shared_ptr<const TraversabilityView> area_with_house() {
   VoxelWorld world;
   world.ground(-8, -8, 8, 6, road);
   world.block(0, 0, 2, 2, 0.3, 2.0, building);
@@ -47,7 +48,7 @@ PolygonRegion star() {
 }
 
 TEST(TraversabilityQuery, EveryCellOfARegionIsTheViewsAndNoOther) {
-  const auto view = area();
+  const auto view = area_with_house();
   for (const Region& region :
        {Region(star()), Region(SphereRegion{.centre_map = {1, -2, 30}, .radius_m = 5.5}),
         Region(CorridorRegion{
@@ -80,7 +81,7 @@ TEST(TraversabilityQuery, EveryCellOfARegionIsTheViewsAndNoOther) {
 }
 
 TEST(TraversabilityQuery, TellsTheGroundWhereItIsKnown) {
-  const TraversabilityAnswer answer = query_traversability(*area(), {});
+  const TraversabilityAnswer answer = query_traversability(*area_with_house(), {});
   const auto at = [&](double x_m, double y_m) {
     return answer.cells[static_cast<std::size_t>((y_m + 8) / 0.2) * answer.grid.width +
                         static_cast<std::size_t>((x_m + 8) / 0.2)];
@@ -89,25 +90,26 @@ TEST(TraversabilityQuery, TellsTheGroundWhereItIsKnown) {
   EXPECT_TRUE(std::isnan(at(1.1, 7.1).ground_z_m));
   EXPECT_EQ(at(1.1, 1.1).reason, BlockReason::obstacle);
   EXPECT_EQ(at(2.3, 1.1).reason, BlockReason::inscribed);
-  EXPECT_EQ(answer.grid.map_version, area()->version);
+  EXPECT_EQ(answer.grid.map_version, area_with_house()->version);
 }
 
 TEST(TraversabilityQuery, GivesOutlinesAloneWhenOnlyThoseAreWanted) {
   TraversabilityQuery query;
   query.include_grid = false;
   query.include_outlines = true;
-  const TraversabilityAnswer answer = query_traversability(*area(), query);
+  const TraversabilityAnswer answer = query_traversability(*area_with_house(), query);
   ASSERT_EQ(answer.outlines.size(), 1U);
   EXPECT_EQ(answer.outlines[0].holes.size(), 1U);
   EXPECT_TRUE(answer.grid.data.empty());
   EXPECT_TRUE(answer.cells.empty());
   query.min_outline_area_m2 = 1e4;
-  EXPECT_TRUE(query_traversability(*area(), query).outlines.empty());
+  EXPECT_TRUE(query_traversability(*area_with_house(), query).outlines.empty());
 }
 
 TEST(TraversabilityQuery, HostileQueriesGetAStatusAndAReason) {
-  const auto expect = [view = area()](const TraversabilityQuery& query, TraversabilityStatus status,
-                                      const std::string& named) {
+  const auto expect = [view = area_with_house()](const TraversabilityQuery& query,
+                                                 TraversabilityStatus status,
+                                                 const std::string& named) {
     const TraversabilityAnswer answer = query_traversability(*view, query);
     EXPECT_EQ(answer.grid.status, status) << named;
     EXPECT_THAT(answer.grid.reason, HasSubstr(named));
@@ -137,7 +139,7 @@ TEST(TraversabilityQuery, HostileQueriesGetAStatusAndAReason) {
 }
 
 TEST(TraversabilityAnswerView, AnswersAsTheAnswerThatItWasMadeFrom) {
-  const TraversabilityAnswer answer = query_traversability(*area(), of(star()));
+  const TraversabilityAnswer answer = query_traversability(*area_with_house(), of(star()));
   const TraversabilityView view = view_of_answer(answer, square_robot());
   BoxRegion box;
   box.box_map.min().head<2>() = answer.grid.origin_map;

@@ -1,9 +1,9 @@
 #include <cmath>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "clients/commands/command.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "core/dataset/label_scatter.hpp"
@@ -19,8 +19,8 @@ struct AggregateArguments {
   bool json = false;
 };
 
-nlohmann::json to_json(const MergedClouds& merged) {
-  nlohmann::json files = nlohmann::json::array();
+Json to_json(const MergedClouds& merged) {
+  Json files = Json::array();
   for (const std::filesystem::path& file : merged.files) files.push_back(file.string());
   const Eigen::Vector3d& origin = merged.origin_map;
   return {{"files", files},
@@ -70,7 +70,7 @@ struct ScatterArguments {
   bool json = false;
 };
 
-nlohmann::json to_json(const ScatterResult& result) {
+Json to_json(const ScatterResult& result) {
   return {
       {"points_in_cloud", result.points_in_cloud}, {"scans_in_cloud", result.scans_in_cloud},
       {"points_missing", result.points_missing},   {"labels_changed", result.labels_changed},

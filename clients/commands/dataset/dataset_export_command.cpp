@@ -1,6 +1,5 @@
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "clients/commands/arguments/client_arguments.hpp"
@@ -8,6 +7,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/live_export.hpp"
 #include "clients/commands/dataset/sequence_export.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
@@ -16,7 +16,7 @@ namespace {
 
 constexpr std::string_view topic_prefix = "topic:";
 
-struct Arguments {
+struct DatasetExportArguments {
   std::string source;
   std::string topic_in;
   std::string out;
@@ -28,8 +28,8 @@ struct Arguments {
   bool json = false;
 };
 
-nlohmann::json to_json(const Arguments& arguments, const ExportSummary& summary) {
-  nlohmann::json remarks = nlohmann::json::array();
+Json to_json(const DatasetExportArguments& arguments, const ExportSummary& summary) {
+  Json remarks = Json::array();
   for (const auto& [scans, text] : summary.remarks) {
     remarks.push_back({{"scans", scans}, {"remark", text}});
   }
@@ -43,7 +43,7 @@ nlohmann::json to_json(const Arguments& arguments, const ExportSummary& summary)
           {"interrupted", summary.stopped}};
 }
 
-std::string describe(const Arguments& arguments, const ExportSummary& summary) {
+std::string describe(const DatasetExportArguments& arguments, const ExportSummary& summary) {
   std::string text = std::to_string(summary.scans) + " scans, " + std::to_string(summary.points) +
                      " points (" + std::to_string(summary.labelled_points) +
                      " with a label from '" + summary.label_source + "'): " + arguments.out +
@@ -55,7 +55,7 @@ std::string describe(const Arguments& arguments, const ExportSummary& summary) {
   return text;
 }
 
-ExportSummary export_from_dataset(const Arguments& arguments, StopSignal& stop) {
+ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopSignal& stop) {
   const ScanDataset dataset = dds::open_sequence(arguments.source, arguments.topic_in);
   std::error_code ignored;
   if (std::filesystem::equivalent(arguments.source, arguments.out, ignored)) {
@@ -75,7 +75,7 @@ ExportSummary export_from_dataset(const Arguments& arguments, StopSignal& stop) 
       [&](const SkippedScan& scan) { progress.say("stillmap: " + scan.reason); });
 }
 
-ExportSummary export_from_topic(const Arguments& arguments, StopSignal& stop) {
+ExportSummary export_from_topic(const DatasetExportArguments& arguments, StopSignal& stop) {
   ServerConfig config;
   if (!arguments.mapper.config_file.empty()) {
     config = load_server_config(arguments.mapper.config_file);
@@ -98,7 +98,7 @@ ExportSummary export_from_topic(const Arguments& arguments, StopSignal& stop) {
   return summary;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const DatasetExportArguments& arguments) {
   StopSignal stop;
   const ExportSummary summary = arguments.source.starts_with(topic_prefix)
                                     ? export_from_topic(arguments, stop)
@@ -114,7 +114,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_dataset_export_command(CommandHandle dataset, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<DatasetExportArguments>();
   CommandHandle command = dataset.command(
       "export", "Write a data set, a bag or a live topic as a SemanticKITTI sequence");
   command

@@ -10,13 +10,13 @@
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct DatasetSensorArguments {
   std::string dataset;
   std::string topic;
   std::string out;
 };
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const DatasetSensorArguments& arguments) {
   const SensorModel sensor =
       dds::open_sequence(arguments.dataset, arguments.topic).suggested_sensor();
   constexpr double degree = std::numbers::pi / 180.0;
@@ -33,7 +33,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_dataset_sensor_command(CommandHandle dataset, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<DatasetSensorArguments>();
   CommandHandle command = dataset.command("sensor", "Find out which sensor recorded a data set");
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic, topic_in_help);

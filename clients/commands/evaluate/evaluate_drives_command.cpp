@@ -19,6 +19,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/mapping/trajectory_report.hpp"
 #include "clients/commands/stage_stopwatch.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
@@ -40,7 +41,7 @@ struct Drive {
   std::vector<Eigen::Isometry3d> truth;
 };
 
-struct Arguments {
+struct EvaluateDrivesArguments {
   std::vector<std::string> drives;
   std::vector<std::string> weightings{"semantic"};
   std::size_t scans = 100'000;
@@ -80,11 +81,11 @@ SimulationArguments simulated_drive(const std::string& text) {
   return arguments;
 }
 
-const std::string simulated = "sim:";
+const std::string simulated_prefix = "sim:";
 
 Drive open_simulated(const std::string& name) {
   const simulation::SimulationConfig config =
-      simulation_config(simulated_drive(name.substr(simulated.size())));
+      simulation_config(simulated_drive(name.substr(simulated_prefix.size())));
   const auto simulation = std::make_shared<simulation::Simulation>(config);
   Drive drive{
       .name = name,
@@ -155,7 +156,8 @@ void restamp(Scan& scan, const std::string& how, double period_s) {
   for (float& offset : scan.time_offset_s) offset -= static_cast<float>(shift_s);
 }
 
-DriveResult run_drive(const Drive& drive, const std::string& weighting, const Arguments& arguments,
+DriveResult run_drive(const Drive& drive, const std::string& weighting,
+                      const EvaluateDrivesArguments& arguments,
                       const std::function<bool(std::size_t)>& scan_done) {
   MapperConfig config = mapper_config(arguments.mapper, drive.sensor);
   config.odometry.weighting = weighting_from_name(weighting);
@@ -228,12 +230,13 @@ std::vector<std::string> row_of(const Drive& drive, const DriveResult& result) {
   return row;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const EvaluateDrivesArguments& arguments) {
   StopSignal stop;
   Table table({"drive", "weighting", "path m", "t_err %", "deg/100m", "ATE m", "cm a scan", "worst",
                "good", "degenerate", "lost", "rejected", "voxels", "ms", "max"});
   for (const std::string& name : arguments.drives) {
-    const Drive drive = name.starts_with(simulated) ? open_simulated(name) : open_recorded(name);
+    const Drive drive =
+        name.starts_with(simulated_prefix) ? open_simulated(name) : open_recorded(name);
     for (const std::string& weighting : arguments.weightings) {
       Progress progress(name + " " + weighting, "scans", std::min(drive.scans, arguments.scans));
       const auto seen = [&](std::size_t scans) {
@@ -251,7 +254,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_evaluate_drives_command(CommandHandle evaluate, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<EvaluateDrivesArguments>();
   CommandHandle command = evaluate.command(
       "drives", "Odometry on many drives: errors, health, sharpness of the map, time");
   command

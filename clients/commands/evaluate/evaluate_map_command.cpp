@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "clients/commands/command.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
@@ -15,7 +15,7 @@
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct EvaluateMapArguments {
   std::string truth;
   std::string map;
   std::string poses = "map";
@@ -26,7 +26,7 @@ struct Arguments {
 
 // Poses of the labelled scans in the true map. With the map's own poses the figures measure the
 // cleaning alone; with true poses drift counts as well.
-Trajectory poses_for_truth(const Arguments& arguments, const ScanDataset& dataset,
+Trajectory poses_for_truth(const EvaluateMapArguments& arguments, const ScanDataset& dataset,
                            const SavedMap& map) {
   if (arguments.poses == "map") return map.trajectory;
   std::optional<Trajectory> truth = dataset.truth();
@@ -48,7 +48,7 @@ void add_scan(evaluation::MapTruth& truth, const DatasetFrame& frame,
   truth.add(points_map, ids);
 }
 
-evaluation::MapTruth true_map(const Arguments& arguments, const ScanDataset& dataset,
+evaluation::MapTruth true_map(const EvaluateMapArguments& arguments, const ScanDataset& dataset,
                               const Trajectory& trajectory) {
   evaluation::MapTruth truth(arguments.voxel_size_m);
   Progress progress("true map", "scans", dataset.size());
@@ -79,9 +79,9 @@ std::vector<Eigen::Vector3f> points_of(const MapSnapshot& view) {
   return points;
 }
 
-nlohmann::json to_json(const evaluation::MapCleaningScore& score, const Arguments& arguments) {
+Json to_json(const evaluation::MapCleaningScore& score, const EvaluateMapArguments& arguments) {
   const auto number = [](const std::optional<double>& value) {
-    return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
+    return value ? Json(*value) : Json(nullptr);
   };
   return {{"preservation_rate", number(score.preservation_rate())},
           {"preservation_rate_with_parked", number(score.preservation_rate_with_parked())},
@@ -115,7 +115,7 @@ std::string describe(const evaluation::MapCleaningScore& score) {
          " %; F1 of preservation and rejection of what moves: " + percent(score.f1()) + " %\n";
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const EvaluateMapArguments& arguments) {
   if (!std::filesystem::exists(arguments.map)) {
     throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
   }
@@ -132,7 +132,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_evaluate_map_command(CommandHandle evaluate, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<EvaluateMapArguments>();
   CommandHandle command = evaluate.command(
       "map", "Preservation and rejection rate of a static map against labelled scans");
   command.option("--truth", arguments->truth, "The labelled sequence").required();

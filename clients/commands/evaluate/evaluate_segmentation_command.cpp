@@ -1,7 +1,6 @@
 #include <algorithm>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -9,6 +8,7 @@
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/binary_file.hpp"
@@ -57,19 +57,19 @@ std::string percent(const std::optional<double>& share) {
   return share ? fixed(100.0 * *share, 2) : "-";
 }
 
-nlohmann::json share_or_null(const std::optional<double>& share) {
-  return share ? nlohmann::json(*share) : nlohmann::json(nullptr);
+Json share_or_null(const std::optional<double>& share) {
+  return share ? Json(*share) : Json(nullptr);
 }
 
-nlohmann::json to_json(const evaluation::ConfusionMatrix& matrix) {
-  nlohmann::json by_class = nlohmann::json::object();
+Json to_json(const evaluation::ConfusionMatrix& matrix) {
+  Json by_class = Json::object();
   for (std::size_t k = 1; k < semantic_class_count; ++k) {
     const auto label = static_cast<SemanticClass>(k);
-    by_class[std::string(name(label))] = share_or_null(matrix.iou(label));
+    by_class.set(std::string(name(label)), share_or_null(matrix.iou(label)));
   }
-  nlohmann::json by_group = nlohmann::json::object();
+  Json by_group = Json::object();
   for (const evaluation::ClassGroup& group : evaluation::coarse_groups()) {
-    by_group[std::string(group.name)] = share_or_null(matrix.iou(group.classes));
+    by_group.set(std::string(group.name), share_or_null(matrix.iou(group.classes)));
   }
   return {{"points", matrix.total()},
           {"miou", matrix.mean_iou()},
@@ -98,7 +98,7 @@ std::string describe(const evaluation::ConfusionMatrix& matrix) {
   return text.append(" labelled points; unlabeled truth is left out, as in semantic-kitti-api\n");
 }
 
-struct Arguments {
+struct EvaluateSegmentationArguments {
   std::string truth, predictions, picture;
   MapperArguments mapper;
   ScanRange range;
@@ -120,7 +120,7 @@ std::vector<std::filesystem::path> label_files(const std::filesystem::path& fold
   return files;
 }
 
-evaluation::ConfusionMatrix compare_files(const Arguments& arguments) {
+evaluation::ConfusionMatrix compare_files(const EvaluateSegmentationArguments& arguments) {
   const auto predictions = label_files(arguments.predictions, "predictions");
   const std::filesystem::path truth_folder =
       label_files(arguments.truth, "labels").front().parent_path();
@@ -141,7 +141,8 @@ evaluation::ConfusionMatrix compare_files(const Arguments& arguments) {
 }
 
 // Truth above prediction, of the first scan that was taken.
-void write_picture(const Arguments& arguments, const ScanDataset& dataset, Segmenter& labels) {
+void write_picture(const EvaluateSegmentationArguments& arguments, const ScanDataset& dataset,
+                   Segmenter& labels) {
   DatasetFrame frame = dataset.read(arguments.range.first);
   const std::vector<SemanticClass> truth = reduced_classes(frame.raw_labels);
   frame.scan.labels.clear();
@@ -153,7 +154,7 @@ void write_picture(const Arguments& arguments, const ScanDataset& dataset, Segme
   write_segmentation_picture(arguments.picture, image, strips);
 }
 
-evaluation::ConfusionMatrix run_model(const Arguments& arguments) {
+evaluation::ConfusionMatrix run_model(const EvaluateSegmentationArguments& arguments) {
   const ScanDataset dataset(arguments.truth);
   const std::size_t scans = arguments.range.end(dataset) - arguments.range.first;
   const std::unique_ptr<Segmenter> labels = label_source(arguments.mapper, dataset);
@@ -171,7 +172,7 @@ evaluation::ConfusionMatrix run_model(const Arguments& arguments) {
   return result.points;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const EvaluateSegmentationArguments& arguments) {
   const evaluation::ConfusionMatrix matrix =
       arguments.predictions.empty() ? run_model(arguments) : compare_files(arguments);
   std::cout << (arguments.json ? to_json(matrix).dump(2) + "\n" : describe(matrix));
@@ -181,7 +182,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<EvaluateSegmentationArguments>();
   arguments->mapper.labels = "model";
   CommandHandle command = evaluate.command("segmentation", "IoU of every class and their mean");
   command

@@ -1,16 +1,16 @@
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "clients/commands/command.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
 #include "clients/commands/mapping/trajectory_report.hpp"
+#include "clients/terminal/json.hpp"
 #include "core/dataset/kitti_files.hpp"
 
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct EvaluateTrajectoryArguments {
   std::string truth, estimate;
   std::string truth_calib, estimate_calib;
   std::string frame = "lidar";
@@ -49,7 +49,7 @@ std::string frame_warning(const evaluation::PosePairs& pairs) {
          ": one file may be in the camera frame (give --truth-calib or --estimate-calib)";
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const EvaluateTrajectoryArguments& arguments) {
   const PoseFile truth = read_in_frame(arguments.truth, arguments.truth_calib);
   const PoseFile estimate = read_in_frame(arguments.estimate, arguments.estimate_calib);
   const bool converted = !arguments.truth_calib.empty() || !arguments.estimate_calib.empty();
@@ -65,9 +65,9 @@ ExitCode run(const Arguments& arguments) {
                       frame == "camera" ? GroundPlane::xz : GroundPlane::xy);
   }
   if (arguments.json) {
-    nlohmann::json json = to_json(report);
-    json["frame"] = frame;
-    json["warning"] = warning;
+    Json json = to_json(report);
+    json.set("frame", frame);
+    json.set("warning", warning);
     std::cout << json.dump(2) << "\n";
   } else {
     std::cout << "Frame of both: " << frame << (converted ? " (converted from camera)" : "") << "\n"
@@ -79,7 +79,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_evaluate_trajectory_command(CommandHandle evaluate, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<EvaluateTrajectoryArguments>();
   CommandHandle command = evaluate.command(
       "trajectory",
       "Errors of an estimated trajectory: ATE, relative error a frame, KITTI odometry metric");

@@ -1,11 +1,11 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "clients/commands/arguments/simulation_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/evaluate/traversability_truth.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 #include "config/loaders/robot_profile.hpp"
 #include "core/dataset/dataset_error.hpp"
@@ -15,28 +15,26 @@
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct EvaluateTraversableArguments {
   std::string map;
   std::string profile = "car";
   SimulationArguments simulation;
   bool json = false;
 };
 
-nlohmann::json number(const std::optional<double>& value) {
-  return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
-}
+Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
-nlohmann::json to_json(const TraversabilityScore& score, double cell_m2) {
-  nlohmann::json false_free = nlohmann::json::object();
+Json to_json(const TraversabilityScore& score, double cell_m2) {
+  Json false_free = Json::object();
   for (std::size_t i = 0; i < false_free_count; ++i) {
-    false_free[std::string(name(static_cast<FalseFree>(i)))] =
-        cell_m2 * static_cast<double>(score.false_free.at(i));
+    false_free.set(std::string(name(static_cast<FalseFree>(i))),
+                   cell_m2 * static_cast<double>(score.false_free.at(i)));
   }
-  nlohmann::json false_lethal = nlohmann::json::object();
+  Json false_lethal = Json::object();
   for (std::size_t i = 0; i < block_reason_count; ++i) {
     if (score.false_lethal.at(i) == 0) continue;
-    false_lethal[std::string(name(static_cast<BlockReason>(i)))] =
-        cell_m2 * static_cast<double>(score.false_lethal.at(i));
+    false_lethal.set(std::string(name(static_cast<BlockReason>(i))),
+                     cell_m2 * static_cast<double>(score.false_lethal.at(i)));
   }
   return {{"precision_with_parked_vehicles", number(score.precision(false))},
           {"precision", number(score.precision(true))},
@@ -71,7 +69,7 @@ std::string describe(const TraversabilityScore& score, double cell_m2) {
          "), recall " + percent(score.recall()) + "\n";
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const EvaluateTraversableArguments& arguments) {
   const RobotProfile profile = load_robot_profile(arguments.profile);
   if (!std::filesystem::exists(arguments.map)) {
     throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
@@ -94,7 +92,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_evaluate_traversable_command(CommandHandle evaluate, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<EvaluateTraversableArguments>();
   SimulationArguments& simulation = arguments->simulation;
   CommandHandle command = evaluate.command(
       "traversable", "Precision and recall of a robot's free area on a map of a simulated city");

@@ -5,7 +5,6 @@
 #include <functional>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -17,6 +16,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/mapping/trajectory_report.hpp"
 #include "clients/commands/stage_stopwatch.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
@@ -147,7 +147,7 @@ std::vector<WeightingResult> compare_weightings(const GroundTruthSequence& seque
   return results;
 }
 
-struct Arguments {
+struct EvaluateWeightingsArguments {
   std::vector<std::string> sequences{"sim:crowd", "sim:quiet"};
   std::size_t scans = 700;
   MapperArguments mapper;
@@ -177,25 +177,24 @@ void add_rows(Table& table, const GroundTruthSequence& sequence,
   }
 }
 
-nlohmann::json json_of(const GroundTruthSequence& sequence,
-                       const std::vector<WeightingResult>& results) {
-  nlohmann::json rows = nlohmann::json::array();
+Json json_of(const GroundTruthSequence& sequence, const std::vector<WeightingResult>& results) {
+  Json rows = Json::array();
   for (const WeightingResult& result : results) {
-    nlohmann::json row = to_json(result.report);
-    row["sequence"] = sequence.name;
-    row["weighting"] = result.weighting;
-    row["error_reduction_factor"] = error_reduction_factor(results.front(), result);
-    row["median_ms"] = result.median_ms;
+    Json row = to_json(result.report);
+    row.set("sequence", sequence.name);
+    row.set("weighting", result.weighting);
+    row.set("error_reduction_factor", error_reduction_factor(results.front(), result));
+    row.set("median_ms", result.median_ms);
     rows.push_back(row);
   }
   return rows;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const EvaluateWeightingsArguments& arguments) {
   StopSignal stop;
   Table table({"sequence", "weighting", "path m", "ATE RMSE m", "final drift m", "cm a scan",
                "KITTI %", "none / this", "ms a scan"});
-  nlohmann::json rows = nlohmann::json::array();
+  Json rows = Json::array();
   for (const std::string& name : arguments.sequences) {
     const GroundTruthSequence sequence =
         open_ground_truth_sequence(name, arguments.scans, arguments.mapper, arguments.simulation);
@@ -205,7 +204,7 @@ ExitCode run(const Arguments& arguments) {
       return !stop.requested();
     });
     add_rows(table, sequence, results);
-    for (const nlohmann::json& row : json_of(sequence, results)) rows.push_back(row);
+    rows.append(json_of(sequence, results));
     if (stop.requested()) break;
   }
   std::cout << (arguments.json ? rows.dump(2) + "\n" : table.text());
@@ -215,7 +214,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_evaluate_weightings_command(CommandHandle evaluate, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<EvaluateWeightingsArguments>();
   CommandHandle command = evaluate.command(
       "weightings", "The paper's Table I: no, geometric and semantic weights on the same scans");
   command

@@ -5,7 +5,6 @@
 #include <iostream>
 #include <map>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -14,6 +13,7 @@
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
@@ -247,12 +247,12 @@ class Recorder {
   std::vector<std::unique_ptr<Input>> inputs_;
 };
 
-constexpr std::chrono::milliseconds poll_period{5};
+constexpr std::chrono::milliseconds record_poll_period{5};
 /// A killed run loses no more than this.
 constexpr std::chrono::seconds commit_period{1};
 constexpr double bytes_a_mib = 1048576.0;
 
-struct Arguments {
+struct RecordArguments {
   RecorderOptions recorder;
   std::string out;
   ClientArguments client;
@@ -261,7 +261,7 @@ struct Arguments {
   bool json = false;
 };
 
-RecorderOptions recorder_options(const Arguments& arguments) {
+RecorderOptions recorder_options(const RecordArguments& arguments) {
   RecorderOptions options = arguments.recorder;
   options.dds = arguments.client.dds(DdsRole::sensor);
   options.server_name = arguments.client.server_name;
@@ -275,7 +275,7 @@ std::string progress_note(const Recorder& recorder) {
   return note;
 }
 
-void record(Recorder& recorder, const Arguments& arguments, StopSignal& stop) {
+void record(Recorder& recorder, const RecordArguments& arguments, StopSignal& stop) {
   Progress progress("record", "messages", 0);
   const auto began = Clock::now();
   auto committed = began;
@@ -283,7 +283,7 @@ void record(Recorder& recorder, const Arguments& arguments, StopSignal& stop) {
     const std::chrono::duration<double> passed = Clock::now() - began;
     return arguments.seconds > 0.0 && passed.count() >= arguments.seconds;
   };
-  while (!stop.wait_for(poll_period) && !over()) {
+  while (!stop.wait_for(record_poll_period) && !over()) {
     recorder.write_received();
     if (Clock::now() - committed < commit_period) continue;
     recorder.commit();
@@ -294,8 +294,8 @@ void record(Recorder& recorder, const Arguments& arguments, StopSignal& stop) {
   recorder.finish();
 }
 
-nlohmann::json to_json(const Recorder& recorder, const std::string& folder) {
-  nlohmann::json topics = nlohmann::json::array();
+Json to_json(const Recorder& recorder, const std::string& folder) {
+  Json topics = Json::array();
   for (const RecordedTopic& topic : recorder.topics()) {
     topics.push_back({{"name", topic.name},
                       {"messages", topic.messages},
@@ -321,7 +321,7 @@ std::string describe(const Recorder& recorder, const std::string& folder) {
   return text;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const RecordArguments& arguments) {
   StopSignal stop;
   Recorder recorder(recorder_options(arguments));
   record(recorder, arguments, stop);
@@ -336,7 +336,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_record_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RecordArguments>();
   CommandHandle command =
       program.command("record", "Record the sensor's and the server's topics to a ROS 2 bag");
   command.option("OUT", arguments->out, "New folder for the bag").required();

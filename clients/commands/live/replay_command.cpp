@@ -9,7 +9,6 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -22,6 +21,7 @@
 #include "clients/commands/mapping/pose_files.hpp"
 #include "clients/library/client.hpp"
 #include "clients/library/scan_publisher.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
@@ -230,7 +230,7 @@ dds::ServerStatus wait_until_mapped(Client& client, const dds::ServerStatus& bef
   }
 }
 
-struct Arguments {
+struct ReplayArguments {
   std::string dataset;
   std::string topic_in;
   ClientArguments client;
@@ -250,7 +250,8 @@ struct ReplayOutcome {
   Trajectory poses;
 };
 
-void require_subscribers(ScanPublisher& publisher, const Arguments& arguments, StopSignal& stop) {
+void require_subscribers(ScanPublisher& publisher, const ReplayArguments& arguments,
+                         StopSignal& stop) {
   const auto deadline = std::chrono::steady_clock::now() + arguments.client.timeout();
   const auto requested = static_cast<int>(arguments.subscribers);
   while (publisher.subscribers() < requested && std::chrono::steady_clock::now() < deadline) {
@@ -273,14 +274,14 @@ void require_lossless(const dds::ServerStatus& status) {
       "cannot be lossless: start it with --delivery every");
 }
 
-ReplayOptions replay_options(const Arguments& arguments) {
+ReplayOptions replay_options(const ReplayArguments& arguments) {
   ReplayOptions options = arguments.replay;
   options.rate = arguments.rate > 0.0 ? arguments.rate : arguments.lossless ? 0.0 : 1.0;
   options.idle_timeout = std::max(options.idle_timeout, arguments.client.timeout());
   return options;
 }
 
-ReplayResult publish_with_progress(const ScanDataset& dataset, const Arguments& arguments,
+ReplayResult publish_with_progress(const ScanDataset& dataset, const ReplayArguments& arguments,
                                    ScanPublisher& publisher, StopSignal& stop) {
   const ScanRange& range = arguments.replay.range;
   Progress progress("replay", "scans", range.end(dataset) - range.first);
@@ -293,7 +294,7 @@ ReplayResult publish_with_progress(const ScanDataset& dataset, const Arguments& 
       [&](const SkippedScan& scan) { progress.say("stillmap: skipped: " + scan.reason); });
 }
 
-ReplayOutcome replay(const Arguments& arguments, StopSignal& stop) {
+ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
   (void)arguments.replay.range.end(dataset);
   Client client = connect(arguments.client);
@@ -320,7 +321,7 @@ ReplayOutcome replay(const Arguments& arguments, StopSignal& stop) {
   return outcome;
 }
 
-nlohmann::json to_json(const ReplayOutcome& outcome) {
+Json to_json(const ReplayOutcome& outcome) {
   return {{"published", outcome.replay.published_stamps_ns.size()},
           {"acknowledged", outcome.replay.acknowledged},
           {"skipped", outcome.replay.skipped.size()},
@@ -343,7 +344,7 @@ std::string describe(const ReplayOutcome& outcome) {
          " poses came back\n";
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const ReplayArguments& arguments) {
   StopSignal stop;
   const ReplayOutcome outcome = replay(arguments, stop);
   if (!arguments.out.empty()) write_poses_as_named(arguments.out, outcome.poses);
@@ -368,7 +369,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_replay_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ReplayArguments>();
   ReplayOptions& replay = arguments->replay;
   CommandHandle command =
       program.command("replay", "Publish a sequence or bag on DDS, as a lidar driver would");

@@ -3,7 +3,6 @@
 #include <iostream>
 #include <memory>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -12,13 +11,14 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
 #include "clients/commands/server_control/status_report.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct WatchArguments {
   ClientArguments client;
   /// 0: no limit.
   std::size_t count = 0;
@@ -57,7 +57,7 @@ double yaw_deg(const Eigen::Isometry3d& T) {
   return std::atan2(T.linear()(1, 0), T.linear()(0, 0)) * 180.0 / std::numbers::pi;
 }
 
-nlohmann::json pose_json(const StampedPose& pose) {
+Json pose_json(const StampedPose& pose) {
   const Eigen::Vector3d t = pose.T_map_lidar.translation();
   const Eigen::Quaterniond q(pose.T_map_lidar.linear());
   return {{"type", "pose"},
@@ -86,7 +86,7 @@ std::string status_line(const dds::ServerStatus& status, const Trajectory& poses
 /// Prints updates until the limits are reached; keeps the poses.
 class Watch {
  public:
-  explicit Watch(const Arguments& arguments) : arguments_(arguments) {}
+  explicit Watch(const WatchArguments& arguments) : arguments_(arguments) {}
 
   void print(UpdateQueue& updates) {
     for (const StampedPose& pose : updates.take_poses()) {
@@ -96,8 +96,8 @@ class Watch {
     }
     if (const std::optional<dds::ServerStatus> status = updates.take_status()) {
       if (arguments_.json) {
-        nlohmann::json json = to_json(*status);
-        json["type"] = "status";
+        Json json = status_json(*status);
+        json.set("type", "status");
         std::cout << json.dump() << "\n";
       } else {
         std::cout << status_line(*status, poses_) << "\n";
@@ -112,11 +112,11 @@ class Watch {
   [[nodiscard]] const Trajectory& poses() const { return poses_; }
 
  private:
-  const Arguments& arguments_;
+  const WatchArguments& arguments_;
   Trajectory poses_;
 };
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const WatchArguments& arguments) {
   StopSignal stop;
   Client client = connect(arguments.client);
   UpdateQueue updates;
@@ -145,7 +145,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_watch_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<WatchArguments>();
   CommandHandle command =
       program.command("watch", "Poses, health and rates of a server as they come");
   command.option("--count", arguments->count, "End after as many poses");

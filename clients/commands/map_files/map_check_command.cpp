@@ -1,16 +1,16 @@
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 
 #include "clients/commands/command.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "core/map/tools/map_check.hpp"
 
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct MapCheckArguments {
   std::string file;
   bool json = false;
 };
@@ -23,14 +23,14 @@ MapCheck check_with_progress(const std::string& file) {
   });
 }
 
-nlohmann::json fault_json(const MapFault& fault) {
-  nlohmann::json json{{"place", fault.place}, {"what", fault.what}};
-  if (fault.tile) json["tile"] = {fault.tile->x, fault.tile->y};
+Json fault_json(const MapFault& fault) {
+  Json json{{"place", fault.place}, {"what", fault.what}};
+  if (fault.tile) json.set("tile", {fault.tile->x, fault.tile->y});
   return json;
 }
 
-nlohmann::json to_json(const MapCheck& check) {
-  nlohmann::json faults = nlohmann::json::array();
+Json to_json(const MapCheck& check) {
+  Json faults = Json::array();
   for (const MapFault& fault : check.faults) faults.push_back(fault_json(fault));
   return {{"valid", check.is_sound()},
           {"tiles", check.tiles},
@@ -61,7 +61,7 @@ std::string describe(const MapCheck& check) {
          " tiles are valid. Restore a copy, or map again.\n";
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const MapCheckArguments& arguments) {
   const MapCheck check = check_with_progress(arguments.file);
   std::cout << (arguments.json ? to_json(check).dump(2) + "\n" : describe(check));
   return check.is_sound() ? ExitCode::ok : ExitCode::failed;
@@ -70,7 +70,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_map_check_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<MapCheckArguments>();
   CommandHandle command =
       program.command("map-check", "Verify a map file: its database, every tile's hash, the path");
   command.option("FILE", arguments->file, "A map file; it is only read").required();

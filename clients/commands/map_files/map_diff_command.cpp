@@ -1,11 +1,11 @@
 #include <algorithm>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 
 #include "clients/commands/command.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/map/tools/map_diff.hpp"
@@ -19,7 +19,7 @@ constexpr std::size_t max_pairs = 10;
 
 std::string text_of(SemanticClass label) { return std::string(name(label)); }
 
-nlohmann::json to_json(const DifferenceCounts& counts) {
+Json to_json(const DifferenceCounts& counts) {
   return {
       {"appeared", counts.appeared}, {"removed", counts.gone}, {"relabelled", counts.relabelled}};
 }
@@ -88,32 +88,32 @@ std::string tile_table(const MapDiff& diff) {
 }
 
 /// Counts by class and tile.
-nlohmann::json to_json(const MapDiff& diff) {
-  nlohmann::json classes = nlohmann::json::object();
+Json to_json(const MapDiff& diff) {
+  Json classes = Json::object();
   for (std::size_t k = 0; k < semantic_class_count; ++k) {
     const ClassDifference& difference = diff.classes.at(k);
     if (!is_there(difference)) continue;
-    nlohmann::json& json = classes[text_of(static_cast<SemanticClass>(k))];
-    json = to_json(difference.counts);
-    json["before"] = difference.voxels_before;
-    json["after"] = difference.voxels_after;
+    Json json = to_json(difference.counts);
+    json.set("before", difference.voxels_before);
+    json.set("after", difference.voxels_after);
+    classes.set(text_of(static_cast<SemanticClass>(k)), json);
   }
-  nlohmann::json relabelled = nlohmann::json::array();
+  Json relabelled = Json::array();
   for (const auto& [pair, voxels] : diff.relabelled) {
     relabelled.push_back(
         {{"from", text_of(pair.first)}, {"to", text_of(pair.second)}, {"voxels", voxels}});
   }
-  nlohmann::json tiles = nlohmann::json::array();
+  Json tiles = Json::array();
   for (const TileDifference& tile : diff.tiles) {
-    nlohmann::json json = to_json(tile.counts);
-    json["x"] = tile.id.x;
-    json["y"] = tile.id.y;
+    Json json = to_json(tile.counts);
+    json.set("x", tile.id.x);
+    json.set("y", tile.id.y);
     tiles.push_back(json);
   }
-  nlohmann::json json = to_json(diff.counts);
-  json["classes"] = classes;
-  json["relabelled_pairs"] = relabelled;
-  json["tiles"] = tiles;
+  Json json = to_json(diff.counts);
+  json.set("classes", classes);
+  json.set("relabelled_pairs", relabelled);
+  json.set("tiles", tiles);
   return json;
 }
 
@@ -123,7 +123,7 @@ std::string describe(const MapDiff& diff) {
   return class_table(diff) + relabelled_lines(diff) + "\n" + tile_table(diff);
 }
 
-struct Arguments {
+struct MapDiffArguments {
   std::string before;
   std::string after;
   MapDiffOptions options;
@@ -131,7 +131,7 @@ struct Arguments {
   bool json = false;
 };
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const MapDiffArguments& arguments) {
   const MapSnapshot before = read_map_file(arguments.before).view;
   const MapSnapshot after = read_map_file(arguments.after).view;
   const MapDiff diff = diff_maps(before, after, arguments.options);
@@ -143,7 +143,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_map_diff_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<MapDiffArguments>();
   CommandHandle command =
       program.command("map-diff", "Say what changed between two map files of one place, by class");
   command.option("BEFORE", arguments->before, "The earlier map").required();

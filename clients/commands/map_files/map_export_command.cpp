@@ -1,11 +1,11 @@
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "clients/commands/command.hpp"
 #include "clients/commands/query/query_report.hpp"
 #include "clients/commands/query/region_arguments.hpp"
+#include "clients/terminal/json.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/map/tools/map_export.hpp"
 #include "core/map/tools/outlier_removal.hpp"
@@ -13,7 +13,7 @@
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct MapExportArguments {
   std::string file;
   std::string output;
   RegionArguments region;
@@ -37,7 +37,7 @@ void check_output_name(const std::string& file) {
                               (is_octree ? "; OctoMap files come from stillmap octomap" : ""));
 }
 
-MapQuery query_of(const Arguments& arguments, const SavedMap& map) {
+MapQuery query_of(const MapExportArguments& arguments, const SavedMap& map) {
   const Eigen::Vector2d robot_map =
       map.trajectory.empty()
           ? Eigen::Vector2d(Eigen::Vector2d::Zero())
@@ -60,7 +60,7 @@ std::vector<QueryVoxel> voxels_of(const MapSnapshot& view, MapQuery query) {
   return voxels;
 }
 
-Datum datum_of(const Arguments& arguments, const SavedMap& map) {
+Datum datum_of(const MapExportArguments& arguments, const SavedMap& map) {
   if (!arguments.datum.empty()) return datum_from_text(arguments.datum);
   const auto stored = map.metadata.find("datum");
   if (stored != map.metadata.end()) return datum_from_text(stored->second);
@@ -70,7 +70,8 @@ Datum datum_of(const Arguments& arguments, const SavedMap& map) {
       "48.137,11.575,519,90");
 }
 
-void write(const Arguments& arguments, const SavedMap& map, const std::vector<QueryVoxel>& voxels) {
+void write(const MapExportArguments& arguments, const SavedMap& map,
+           const std::vector<QueryVoxel>& voxels) {
   if (is_cloud_file(arguments.output)) {
     write_cloud(arguments.output, voxels);
     return;
@@ -80,7 +81,7 @@ void write(const Arguments& arguments, const SavedMap& map, const std::vector<Qu
   export_geotiff(voxels, cell_size_m, datum_of(arguments, map), arguments.output);
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const MapExportArguments& arguments) {
   check_output_name(arguments.output);
   check_region(arguments.region);
   const SavedMap map = read_map_file(arguments.file);
@@ -95,8 +96,7 @@ ExitCode run(const Arguments& arguments) {
   std::vector<std::string> files{arguments.output};
   if (is_raster_name(arguments.output)) files.push_back(height_file_of(arguments.output).string());
   if (arguments.json) {
-    const nlohmann::json json{
-        {"voxels", voxels.size()}, {"outliers_removed", outliers}, {"files", files}};
+    const Json json{{"voxels", voxels.size()}, {"outliers_removed", outliers}, {"files", files}};
     std::cout << json.dump(2) << "\n";
     return ExitCode::ok;
   }
@@ -110,7 +110,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_map_export_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<MapExportArguments>();
   CommandHandle command =
       program.command("map-export", "Write a map file, or a part of it, as PCD, PLY or GeoTIFF");
   command.option("FILE", arguments->file, "A map file; it is only read").required();

@@ -4,11 +4,11 @@
 #include <ctime>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 
 #include "clients/commands/command.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/map/tools/map_info.hpp"
 
@@ -81,20 +81,20 @@ std::string bounds_text(const Eigen::AlignedBox3d& bounds_map) {
   return text + " m (map frame)";
 }
 
-nlohmann::json corner(const Eigen::Vector3d& p_map) { return {p_map.x(), p_map.y(), p_map.z()}; }
+Json corner(const Eigen::Vector3d& p_map) { return {p_map.x(), p_map.y(), p_map.z()}; }
 
-nlohmann::json span_json(const TimeSpan& span) {
+Json span_json(const TimeSpan& span) {
   return {{"first_ns", span.first_ns}, {"last_ns", span.last_ns}};
 }
 
-nlohmann::json to_json(const MapFileInfo& info) {
+Json to_json(const MapFileInfo& info) {
   const MapInfo& map = info.map;
-  nlohmann::json classes = nlohmann::json::object();
+  Json classes = Json::object();
   for (std::size_t k = 0; k < semantic_class_count; ++k) {
     if (map.voxels_of_class.at(k) == 0) continue;
-    classes[std::string(name(static_cast<SemanticClass>(k)))] = map.voxels_of_class.at(k);
+    classes.set(std::string(name(static_cast<SemanticClass>(k))), map.voxels_of_class.at(k));
   }
-  nlohmann::json bounds_map = nullptr;
+  Json bounds_map = nullptr;
   if (!map.bounds_map.isEmpty()) {
     bounds_map = {{"min", corner(map.bounds_map.min())}, {"max", corner(map.bounds_map.max())}};
   }
@@ -147,12 +147,12 @@ std::string describe(const MapFileInfo& info) {
   return text.str();
 }
 
-struct Arguments {
+struct MapInfoArguments {
   std::string file;
   bool json = false;
 };
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const MapInfoArguments& arguments) {
   const MapFileInfo info = map_file_info(arguments.file);
   std::cout << (arguments.json ? to_json(info).dump(2) + "\n" : describe(info));
   return ExitCode::ok;
@@ -161,7 +161,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_map_info_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<MapInfoArguments>();
   CommandHandle command =
       program.command("map-info", "Say what a map file holds: sizes, classes, bounds, path, times");
   command.option("FILE", arguments->file, "A map file; it is only read").required();

@@ -4,7 +4,6 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -14,6 +13,7 @@
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
 #include "clients/commands/mapping/trajectory_report.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
@@ -120,22 +120,22 @@ std::uint64_t voxel_count(const MapSnapshot& view) {
   return count;
 }
 
-nlohmann::json optional_number(const std::optional<double>& value) {
-  return value ? nlohmann::json(*value) : nlohmann::json(nullptr);
+Json optional_number(const std::optional<double>& value) {
+  return value ? Json(*value) : Json(nullptr);
 }
 
-nlohmann::json stages_json(const std::vector<StageDurations>& stages) {
-  nlohmann::json json = nlohmann::json::object();
+Json stages_json(const std::vector<StageDurations>& stages) {
+  Json json = Json::object();
   for (const StageDurations& stage : stages) {
-    json[stage.stage] = {{"median_ms", stage.quantile(0.5)},
-                         {"p95_ms", stage.quantile(0.95)},
-                         {"p99_ms", stage.quantile(0.99)}};
+    json.set(stage.stage, {{"median_ms", stage.quantile(0.5)},
+                           {"p95_ms", stage.quantile(0.95)},
+                           {"p99_ms", stage.quantile(0.99)}});
   }
   return json;
 }
 
-nlohmann::json skipped_json(const std::vector<SkippedScan>& skipped) {
-  nlohmann::json json = nlohmann::json::array();
+Json skipped_json(const std::vector<SkippedScan>& skipped) {
+  Json json = Json::array();
   for (const SkippedScan& scan : skipped) {
     json.push_back({{"scan", scan.index}, {"counter", scan.counter}, {"reason", scan.reason}});
   }
@@ -152,9 +152,9 @@ std::string describe_stages(const std::vector<StageDurations>& stages) {
 }
 
 /// Contents of report.json.
-nlohmann::json to_json(const MappingResult& result, const MapOutput& output) {
-  nlohmann::json health = nlohmann::json::object();
-  for (const auto& [state, count] : result.health) health[name(state)] = count;
+Json to_json(const MappingResult& result, const MapOutput& output) {
+  Json health = Json::object();
+  for (const auto& [state, count] : result.health) health.set(name(state), count);
   const StageDurations& total = result.stages.back();
   return {{"scans", result.trajectory.size()},
           {"seconds", result.seconds},
@@ -175,7 +175,7 @@ nlohmann::json to_json(const MappingResult& result, const MapOutput& output) {
            {{"precision", optional_number(result.moving.precision())},
             {"recall", optional_number(result.moving.recall())},
             {"iou", optional_number(result.moving.iou())}}},
-          {"accuracy", output.accuracy ? to_json(*output.accuracy) : nlohmann::json(nullptr)},
+          {"accuracy", output.accuracy ? to_json(*output.accuracy) : Json(nullptr)},
           {"folder", output.folder.string()}};
 }
 
@@ -204,7 +204,7 @@ std::string describe(const MappingResult& result, const MapOutput& output) {
   return text;
 }
 
-struct Arguments {
+struct MapArguments {
   std::string dataset;
   std::string topic_in;
   std::string out = "stillmap_out";
@@ -214,7 +214,7 @@ struct Arguments {
   bool json = false;
 };
 
-MappingResult map_with_progress(const ScanDataset& dataset, const Arguments& arguments,
+MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& arguments,
                                 const MapperConfig& config, StopSignal& stop) {
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
   Progress progress("map", "scans", total);
@@ -231,14 +231,14 @@ MappingResult map_with_progress(const ScanDataset& dataset, const Arguments& arg
                      scan_done, scan_skipped);
 }
 
-void write_report(const std::filesystem::path& file, const nlohmann::json& report) {
+void write_report(const std::filesystem::path& file, const Json& report) {
   std::ofstream out(file, std::ios::trunc);
   out << report.dump(2) << "\n";
   out.close();
   if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const MapArguments& arguments) {
   StopSignal stop;
   const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
@@ -249,7 +249,7 @@ ExitCode run(const Arguments& arguments) {
     return ExitCode::bad_input;
   }
   const MapOutput output = write_map_output(arguments.out, dataset, result, config);
-  const nlohmann::json report = to_json(result, output);
+  const Json report = to_json(result, output);
   write_report(output.folder / "report.json", report);
   std::cout << (arguments.json ? report.dump(2) + "\n" : describe(result, output));
   if (result.stopped)
@@ -260,7 +260,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_map_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<MapArguments>();
   CommandHandle command = program.command(
       "map", "Map a sequence or bag in this process: the server's mapper without DDS");
   command.option("DATASET", arguments->dataset, dataset_kinds).required();

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 
 namespace stillmap::cli {
@@ -55,35 +55,35 @@ std::string describe(const TrajectoryReport& report) {
   return text;
 }
 
-nlohmann::json to_json(const TrajectoryReport& report) {
-  nlohmann::json json = {{"poses", report.poses},
-                         {"path_m", report.path_m},
-                         {"ate_rmse_m", report.rigid_aligned.rmse_m},
-                         {"ate_max_m", report.rigid_aligned.max_m},
-                         {"ate_first_pose_rmse_m", report.first_aligned.rmse_m},
-                         {"ate_unaligned_rmse_m", report.unaligned.rmse_m},
-                         {"final_drift_m", report.first_aligned.final_m},
-                         {"relative", nullptr},
-                         {"kitti", nullptr}};
+Json to_json(const TrajectoryReport& report) {
+  Json json = {{"poses", report.poses},
+               {"path_m", report.path_m},
+               {"ate_rmse_m", report.rigid_aligned.rmse_m},
+               {"ate_max_m", report.rigid_aligned.max_m},
+               {"ate_first_pose_rmse_m", report.first_aligned.rmse_m},
+               {"ate_unaligned_rmse_m", report.unaligned.rmse_m},
+               {"final_drift_m", report.first_aligned.final_m},
+               {"relative", nullptr},
+               {"kitti", nullptr}};
   if (report.relative) {
-    json["relative"] = {{"mean_translation_m", report.relative->mean_translation_m},
-                        {"rmse_translation_m", report.relative->rmse_translation_m},
-                        {"max_translation_m", report.relative->max_translation_m},
-                        {"mean_rotation_deg", deg_per_rad * report.relative->mean_rotation_rad},
-                        {"max_rotation_deg", deg_per_rad * report.relative->max_rotation_rad}};
+    json.set("relative", {{"mean_translation_m", report.relative->mean_translation_m},
+                          {"rmse_translation_m", report.relative->rmse_translation_m},
+                          {"max_translation_m", report.relative->max_translation_m},
+                          {"mean_rotation_deg", deg_per_rad * report.relative->mean_rotation_rad},
+                          {"max_rotation_deg", deg_per_rad * report.relative->max_rotation_rad}});
   }
   if (report.kitti) {
-    nlohmann::json by_length = nlohmann::json::array();
+    Json by_length = Json::array();
     for (const evaluation::KittiLengthError& length : report.kitti->by_length) {
       by_length.push_back({{"length_m", length.length_m},
                            {"segments", length.segments},
                            {"translation_percent", length.translation_percent},
                            {"rotation_deg_per_100m", length.rotation_deg_per_100m}});
     }
-    json["kitti"] = {{"translation_percent", report.kitti->translation_percent},
-                     {"rotation_deg_per_100m", report.kitti->rotation_deg_per_100m},
-                     {"segments", report.kitti->segments},
-                     {"by_length", by_length}};
+    json.set("kitti", {{"translation_percent", report.kitti->translation_percent},
+                       {"rotation_deg_per_100m", report.kitti->rotation_deg_per_100m},
+                       {"segments", report.kitti->segments},
+                       {"by_length", by_length}});
   }
   return json;
 }

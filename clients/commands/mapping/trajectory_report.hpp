@@ -1,10 +1,10 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 
+#include "clients/terminal/json.hpp"
 #include "core/evaluation/trajectory_error.hpp"
 #include "core/picture/trajectory_picture.hpp"
 
@@ -25,7 +25,7 @@ struct TrajectoryReport {
 
 /// As a table for people.
 [[nodiscard]] std::string describe(const TrajectoryReport& report);
-[[nodiscard]] nlohmann::json to_json(const TrajectoryReport& report);
+[[nodiscard]] Json to_json(const TrajectoryReport& report);
 
 /// Writes trajectory.png (both paths, best rigid fit) and trajectory_error.png (error over
 /// distance) into the folder; returns their names. Throws std::runtime_error.

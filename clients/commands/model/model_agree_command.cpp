@@ -15,7 +15,7 @@
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct ModelAgreeArguments {
   ModelArguments model;
   std::string dataset;
   std::uint64_t scans = 20;
@@ -74,7 +74,7 @@ Networks open_all(const ModelDescription& model) {
   return networks;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const ModelAgreeArguments& arguments) {
   std::vector<ScanDataset> datasets;
   datasets.emplace_back(arguments.dataset);
   const ModelDescription model =
@@ -102,7 +102,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_model_agree_command(CommandHandle model, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ModelAgreeArguments>();
   CommandHandle command = model.command("agree", "How far the engines agree on real scans");
   add_model_options(command, arguments->model);
   command.option("DATASET", arguments->dataset, "Data set whose scans are compared").required();

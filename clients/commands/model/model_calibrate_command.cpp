@@ -12,7 +12,7 @@
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct ModelCalibrateArguments {
   ModelArguments model;
   std::vector<std::string> datasets;
   std::uint64_t scans = 32;
@@ -48,7 +48,7 @@ ActivationRanges observe_activations(const ModelDescription& model,
   return ranges;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const ModelCalibrateArguments& arguments) {
   const ModelDescription model = load_uncalibrated_model(arguments.model);
   std::vector<ScanDataset> datasets;
   for (const std::string& folder : arguments.datasets) datasets.emplace_back(folder);
@@ -69,7 +69,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_model_calibrate_command(CommandHandle model, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ModelCalibrateArguments>();
   CommandHandle command =
       model.command("calibrate", "Make int8.yaml, with which a model runs in 8-bit integers");
   add_model_options(command, arguments->model);

@@ -148,7 +148,7 @@ SegmentationTiming time_segmentation(const ModelDescription& model, const TimedE
   return timing;
 }
 
-struct Arguments {
+struct ModelSpeedArguments {
   std::vector<std::string> models;
   std::vector<std::string> columns{"1024"};
   std::string dataset;
@@ -179,8 +179,8 @@ std::vector<std::string> row(const ModelDescription& model, const std::string& e
           fixed(timing.memory_mb, 0)};
 }
 
-void time_model(const ModelDescription& model, const Scan& scan, const Arguments& arguments,
-                Table& table) {
+void time_model(const ModelDescription& model, const Scan& scan,
+                const ModelSpeedArguments& arguments, Table& table) {
   const auto threads = static_cast<int>(arguments.threads);
   const double giga_operations = OneDnnNetwork(model, Precision::fp32, threads).giga_operations();
   for (const TimedEngine& engine : timed_engines(model, scan, threads)) {
@@ -192,7 +192,7 @@ void time_model(const ModelDescription& model, const Scan& scan, const Arguments
   }
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const ModelSpeedArguments& arguments) {
   const Scan scan = arguments.dataset.empty() ? benchmark_scan()
                                               : dds::open_sequence(arguments.dataset).read(0).scan;
   Table table({"network", "image", "engine", "project ms", "network ms", "k-NN ms", "total ms",
@@ -217,7 +217,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_model_speed_command(CommandHandle model, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<ModelSpeedArguments>();
   CommandHandle command =
       model.command("speed", "Time projection, network and k-NN on every engine");
   command.option("MODEL", arguments->models, "Model folders or ONNX files").required();

@@ -9,13 +9,13 @@
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct DiscoveryServerArguments {
   int port = 11811;
   std::uint32_t domain = 0;
   DdsNetworkConfig network;
 };
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const DiscoveryServerArguments& arguments) {
   StopSignal stop;
   dds::DdsOptions options = dds_options(arguments.network, DdsRole::client);
   options.domain_id = arguments.domain;
@@ -32,7 +32,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_discovery_server_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<DiscoveryServerArguments>();
   CommandHandle command = program.command(
       "discovery-server", "Let processes find each other where there is no multicast");
   command.option("--port", arguments->port, "UDP port to listen at")

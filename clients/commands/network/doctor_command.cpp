@@ -1,25 +1,23 @@
 #include <algorithm>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <string>
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/doctor/checks.hpp"
 #include "clients/doctor/collect_snapshot.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 
 namespace stillmap::cli {
 namespace {
 
-using nlohmann::json;
-
 std::string counted(std::size_t count, const std::string& thing) {
   return std::to_string(count) + " " + thing + (count == 1 ? "" : "s");
 }
 
-const char* name(dds::Severity severity) {
+const char* severity_name(dds::Severity severity) {
   return severity == dds::Severity::problem ? "problem" : "advice";
 }
 
@@ -68,15 +66,15 @@ std::string text_of(const dds::Diagnostic& diagnostic) {
          "\n         do:   " + diagnostic.hint + "\n\n";
 }
 
-json json_of(const dds::Endpoint& endpoint) {
+Json json_of(const dds::Endpoint& endpoint) {
   return {{"topic", endpoint.topic},
           {"type", endpoint.type},
           {"kind", endpoint.is_writer ? "writer" : "reader"},
           {"qos", describe(endpoint.qos)}};
 }
 
-json json_of(const dds::RemoteParticipant& participant) {
-  json endpoints = json::array();
+Json json_of(const dds::RemoteParticipant& participant) {
+  Json endpoints = Json::array();
   for (const dds::Endpoint& endpoint : participant.endpoints)
     endpoints.push_back(json_of(endpoint));
   return {{"name", participant.name},
@@ -91,8 +89,8 @@ json json_of(const dds::RemoteParticipant& participant) {
           {"endpoints", endpoints}};
 }
 
-json json_of(const OtherDomain& domain) {
-  json participants = json::array();
+Json json_of(const OtherDomain& domain) {
+  Json participants = Json::array();
   for (const dds::RemoteParticipant& participant : domain.participants)
     participants.push_back(json_of(participant));
   return {{"id", domain.id}, {"senders", domain.senders}, {"participants", participants}};
@@ -112,13 +110,13 @@ std::string doctor_text(const SystemSnapshot& snapshot, const Diagnostics& diagn
          counted(count(diagnostics, dds::Severity::advice), "piece") + " of advice\n";
 }
 
-json doctor_json(const SystemSnapshot& snapshot, const Diagnostics& diagnostics) {
-  json participants = json::array(), domains = json::array(), list = json::array();
+Json doctor_json(const SystemSnapshot& snapshot, const Diagnostics& diagnostics) {
+  Json participants = Json::array(), domains = Json::array(), list = Json::array();
   for (const dds::RemoteParticipant& participant : snapshot.participants)
     participants.push_back(json_of(participant));
   for (const OtherDomain& domain : snapshot.other_domains) domains.push_back(json_of(domain));
   for (const dds::Diagnostic& diagnostic : diagnostics) {
-    list.push_back({{"severity", name(diagnostic.severity)},
+    list.push_back({{"severity", severity_name(diagnostic.severity)},
                     {"what", diagnostic.what},
                     {"evidence", diagnostic.evidence},
                     {"hint", diagnostic.hint}});
@@ -131,7 +129,7 @@ json doctor_json(const SystemSnapshot& snapshot, const Diagnostics& diagnostics)
           {"udp_buffer_bytes", snapshot.granted_buffer_bytes}};
 }
 
-struct Arguments {
+struct DoctorArguments {
   ClientArguments client;
   std::string points = "points";
   double listening_s = 4.0;
@@ -141,7 +139,7 @@ struct Arguments {
   bool json = false;
 };
 
-DoctorOptions options_of(const Arguments& arguments) {
+DoctorOptions options_of(const DoctorArguments& arguments) {
   // In the role of a sensor, which uses shared memory, so that this is checked, too.
   return {.dds = arguments.client.dds(DdsRole::sensor),
           .server_name = arguments.client.server_name,
@@ -152,7 +150,7 @@ DoctorOptions options_of(const Arguments& arguments) {
           .host_root = arguments.host_root};
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const DoctorArguments& arguments) {
   if (arguments.clean) {
     std::cerr << "removed " << remove_stale_segments(arguments.host_root)
               << " shared memory segments of dead processes\n";
@@ -173,7 +171,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_doctor_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<DoctorArguments>();
   CommandHandle command = program.command(
       "doctor", "Find out why no data flows: network, quality of service, machine, server");
   add_client_options(command, arguments->client);

@@ -3,12 +3,12 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <numbers>
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/planning/replanner.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "config/loaders/robot_profile.hpp"
 #include "core/dataset/dataset_error.hpp"
@@ -18,7 +18,7 @@
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct PlanArguments {
   ClientArguments client;
   std::string map;
   std::string from;
@@ -76,7 +76,7 @@ std::vector<std::string> planner_names() {
   return names;
 }
 
-PlanTask task_of(const Arguments& arguments) {
+PlanTask task_of(const PlanArguments& arguments) {
   PlanTask task;
   task.profile = load_robot_profile(arguments.profile);
   if (arguments.through_unknown) task.profile.unknown = UnknownGround::allowed;
@@ -93,13 +93,13 @@ PlanTask task_of(const Arguments& arguments) {
 }
 
 /// Refuses file names that cannot be written before the search, not after it.
-void check_files(const Arguments& arguments) {
+void check_files(const PlanArguments& arguments) {
   if (!arguments.output.empty()) check_plan_file(arguments.output);
   if (arguments.picture.empty() || arguments.picture.ends_with(".png")) return;
   throw std::invalid_argument("--picture " + arguments.picture + ": must end in .png");
 }
 
-void print(const Arguments& arguments, const TimedPlan& timed) {
+void print(const PlanArguments& arguments, const TimedPlan& timed) {
   if (arguments.json) {
     std::cout << to_json(timed, !arguments.follow).dump(arguments.follow ? -1 : 2) << std::endl;
   } else {
@@ -107,7 +107,7 @@ void print(const Arguments& arguments, const TimedPlan& timed) {
   }
 }
 
-void show(const Arguments& arguments, const Replanner& replanner) {
+void show(const PlanArguments& arguments, const Replanner& replanner) {
   print(arguments, replanner.last());
   if (!arguments.output.empty()) write_plan(arguments.output, replanner.last());
   if (arguments.picture.empty()) return;
@@ -122,7 +122,7 @@ ExitCode code_of(const TimedPlan& timed) {
   return timed.plan.is_found() ? ExitCode::ok : ExitCode::no_path;
 }
 
-ExitCode plan_on_file(const Arguments& arguments) {
+ExitCode plan_on_file(const PlanArguments& arguments) {
   if (arguments.follow) {
     throw std::invalid_argument(
         "--follow: a map file does not change; leave out --map to follow "
@@ -143,7 +143,7 @@ ExitCode plan_on_file(const Arguments& arguments) {
 }
 
 /// Plans again whenever the map requires it, until a limit is reached.
-void follow(const Arguments& arguments, Replanner& replanner, const TileMirror& mirror,
+void follow(const PlanArguments& arguments, Replanner& replanner, const TileMirror& mirror,
             std::shared_ptr<const MapSnapshot> map,
             const std::optional<RobotPoseSubscription>& robot, StopSignal& stop) {
   const auto began = std::chrono::steady_clock::now();
@@ -163,7 +163,7 @@ void follow(const Arguments& arguments, Replanner& replanner, const TileMirror& 
   }
 }
 
-ExitCode plan_on_server(const Arguments& arguments) {
+ExitCode plan_on_server(const PlanArguments& arguments) {
   PlanTask task = task_of(arguments);
   StopSignal stop;
   Client client = connect(arguments.client);
@@ -181,12 +181,12 @@ ExitCode plan_on_server(const Arguments& arguments) {
   return code_of(replanner.last());
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const PlanArguments& arguments) {
   check_files(arguments);
   return arguments.map.empty() ? plan_on_server(arguments) : plan_on_file(arguments);
 }
 
-void add_search_options(CommandHandle command, Arguments& arguments) {
+void add_search_options(CommandHandle command, PlanArguments& arguments) {
   command.renamed("--time", "--time-limit");
   command.renamed("--steps", "--max-iterations");
   command.option("--time-limit", arguments.time_limit_s, "Longest search [s]")
@@ -210,7 +210,7 @@ void add_search_options(CommandHandle command, Arguments& arguments) {
 }  // namespace
 
 void add_plan_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<PlanArguments>();
   CommandHandle command =
       program.command("plan", "A path that a robot can drive, on a server's map or a stored one");
   command.option("--to", arguments->to, "Goal: x,y or x,y,heading, metres and degrees, map frame")

@@ -1,10 +1,10 @@
 #include "clients/commands/planning/plan_report.hpp"
 
 #include <fstream>
-#include <nlohmann/json.hpp>
 #include <numbers>
 #include <stdexcept>
 
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 
 namespace stillmap::cli {
@@ -14,7 +14,7 @@ double heading_deg(const PlannedPose& pose) {
   return std::remainder(pose.pose.heading_rad, 2.0 * std::numbers::pi) * 180.0 / std::numbers::pi;
 }
 
-nlohmann::json pose_json(const PlannedPose& pose) {
+Json pose_json(const PlannedPose& pose) {
   return {{"x_m", pose.pose.position_map.x()},
           {"y_m", pose.pose.position_map.y()},
           {"z_m", pose.height_m},
@@ -64,29 +64,30 @@ void write_csv(std::ostream& out, const PathPlan& plan) {
 
 }  // namespace
 
-nlohmann::json to_json(const TimedPlan& timed, bool with_poses) {
+Json to_json(const TimedPlan& timed, bool with_poses) {
   const PathPlan& plan = timed.plan;
-  nlohmann::json json{{"status", name(plan.status)},
-                      {"reason", plan.reason},
-                      {"length_m", plan.length_m},
-                      {"reverse_m", plan.reverse_m},
-                      {"inferred_m", plan.inferred_m},
-                      {"clearance_m", plan.clearance_m},
-                      {"cost", plan.cost},
-                      {"route_m", plan.route_m},
-                      {"iterations", plan.steps},
-                      {"map_version", plan.map_version},
-                      {"poses", plan.poses.size()},
-                      {"traversability_ms", timed.traversability_ms},
-                      {"plan_ms", timed.plan_ms}};
-  if (timed.first_ms) json["first_ms"] = *timed.first_ms;
-  if (!timed.cause.empty()) json["cause"] = timed.cause;
+  Json json{{"status", name(plan.status)},
+            {"reason", plan.reason},
+            {"length_m", plan.length_m},
+            {"reverse_m", plan.reverse_m},
+            {"inferred_m", plan.inferred_m},
+            {"clearance_m", plan.clearance_m},
+            {"cost", plan.cost},
+            {"route_m", plan.route_m},
+            {"iterations", plan.steps},
+            {"map_version", plan.map_version},
+            {"poses", plan.poses.size()},
+            {"traversability_ms", timed.traversability_ms},
+            {"plan_ms", timed.plan_ms}};
+  if (timed.first_ms) json.set("first_ms", *timed.first_ms);
+  if (!timed.cause.empty()) json.set("cause", timed.cause);
   if (plan.nearby) {
-    json["nearby_m"] = {plan.nearby->position_map.x(), plan.nearby->position_map.y()};
+    json.set("nearby_m", {plan.nearby->position_map.x(), plan.nearby->position_map.y()});
   }
   if (with_poses) {
-    json["path"] = nlohmann::json::array();
-    for (const PlannedPose& pose : plan.poses) json["path"].push_back(pose_json(pose));
+    Json path = Json::array();
+    for (const PlannedPose& pose : plan.poses) path.push_back(pose_json(pose));
+    json.set("path", std::move(path));
   }
   return json;
 }

@@ -1,10 +1,10 @@
 #pragma once
 
 #include <filesystem>
-#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 
+#include "clients/terminal/json.hpp"
 #include "core/planning/path_planner.hpp"
 
 namespace stillmap::cli {
@@ -22,7 +22,7 @@ struct TimedPlan {
 };
 
 /// `with_poses`: with every pose of the path.
-[[nodiscard]] nlohmann::json to_json(const TimedPlan& timed, bool with_poses);
+[[nodiscard]] Json to_json(const TimedPlan& timed, bool with_poses);
 
 /// For people, with the poses of the path some metres apart.
 [[nodiscard]] std::string describe(const TimedPlan& timed);

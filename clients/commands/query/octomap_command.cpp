@@ -1,7 +1,6 @@
 #include <filesystem>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
@@ -9,6 +8,7 @@
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/occupancy/occupancy_map.hpp"
@@ -51,21 +51,19 @@ std::string outcome(const RayOccupancy& ray) {
   return "is free for " + where;
 }
 
-nlohmann::json coordinates(const Eigen::Vector3d& p) {
-  return nlohmann::json::array({p.x(), p.y(), p.z()});
+Json coordinates(const Eigen::Vector3d& p) { return Json::array({p.x(), p.y(), p.z()}); }
+
+Json with_fault(Json answer, const std::string& fault) {
+  return fault.empty() ? std::move(answer) : Json{{"fault", fault}};
 }
 
-nlohmann::json with_fault(nlohmann::json answer, const std::string& fault) {
-  return fault.empty() ? std::move(answer) : nlohmann::json{{"fault", fault}};
-}
-
-nlohmann::json one(const PointOccupancy& point) {
+Json one(const PointOccupancy& point) {
   return with_fault({{"occupancy", name(point.occupancy)}, {"probability", point.probability}},
                     point.fault);
 }
 
-nlohmann::json one(const BoxOccupancy& box) {
-  nlohmann::json voxels = nlohmann::json::array();
+Json one(const BoxOccupancy& box) {
+  Json voxels = Json::array();
   for (const auto& voxel_map : box.occupied_map) {
     voxels.push_back(coordinates(voxel_map.cast<double>()));
   }
@@ -76,15 +74,15 @@ nlohmann::json one(const BoxOccupancy& box) {
                     box.fault);
 }
 
-nlohmann::json one(const RayOccupancy& ray) {
+Json one(const RayOccupancy& ray) {
   return with_fault(
       {{"end", name(ray.end)}, {"length_m", ray.length_m}, {"end_point", coordinates(ray.end_map)}},
       ray.fault);
 }
 
 template <class Answer>
-nlohmann::json all(const std::vector<Answer>& answers) {
-  nlohmann::json list = nlohmann::json::array();
+Json all(const std::vector<Answer>& answers) {
+  Json list = Json::array();
   for (const Answer& answer : answers) list.push_back(one(answer));
   return list;
 }
@@ -109,7 +107,7 @@ std::string describe(const OctomapSummary& summary) {
   return text.str();
 }
 
-nlohmann::json to_json(const OctomapSummary& summary) {
+Json to_json(const OctomapSummary& summary) {
   return {{"resolution_m", summary.resolution_m},
           {"nodes", summary.nodes},
           {"occupied", summary.occupied},
@@ -137,14 +135,14 @@ std::string describe(const OccupancyQuery& query, const OccupancyAnswers& answer
   return text;
 }
 
-nlohmann::json to_json(const OccupancyAnswers& answers) {
+Json to_json(const OccupancyAnswers& answers) {
   return {{"resolution_m", answers.resolution_m},
           {"points", all(answers.points)},
           {"boxes", all(answers.boxes)},
           {"rays", all(answers.rays)}};
 }
 
-struct Arguments {
+struct OctomapArguments {
   ClientArguments client;
   /// Instead of a server.
   std::string map;
@@ -174,7 +172,7 @@ std::vector<Eigen::VectorXd> groups(const std::string& option, const std::vector
   return all;
 }
 
-OccupancyQuery query_of(const Arguments& arguments) {
+OccupancyQuery query_of(const OctomapArguments& arguments) {
   OccupancyQuery query;
   query.max_voxels = arguments.max_voxels;
   for (const auto& point : groups("--point", arguments.points, 3)) {
@@ -195,7 +193,7 @@ OccupancyQuery query_of(const Arguments& arguments) {
 }
 
 /// The octree of a stored static map, or of a file of OctoMap's.
-OccupancyMap open_map(const Arguments& arguments) {
+OccupancyMap open_map(const OctomapArguments& arguments) {
   const std::filesystem::path file = arguments.map;
   if (file.extension() == ".bt" || file.extension() == ".ot") {
     return OccupancyMap(read_octomap_file(file));
@@ -213,7 +211,7 @@ OccupancyMap open_map(const Arguments& arguments) {
 /// Where octree and answers come from.
 class OccupancySource {
  public:
-  explicit OccupancySource(const Arguments& arguments) {
+  explicit OccupancySource(const OctomapArguments& arguments) {
     if (arguments.map.empty()) {
       client_.emplace(connect(arguments.client));
     } else {
@@ -232,23 +230,23 @@ class OccupancySource {
   std::optional<Client> client_;
 };
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const OctomapArguments& arguments) {
   const OccupancyQuery query = query_of(arguments);
   const bool asks =
       !arguments.points.empty() || !arguments.boxes.empty() || !arguments.rays.empty();
   const bool binary = arguments.output.empty() || is_binary_octomap(arguments.output);
   OccupancySource source(arguments);
-  nlohmann::json report;
+  Json report;
   std::string text;
   if (asks) {
     const OccupancyAnswers answers = source.answer(query);
-    report["answers"] = to_json(answers);
+    report.set("answers", to_json(answers));
     text += describe(query, answers);
   }
   if (!asks || !arguments.output.empty()) {
     const OctomapData data = source.octomap(binary);
     const OctomapSummary summary = summarize(data);
-    report["octomap"] = to_json(summary);
+    report.set("octomap", to_json(summary));
     text += describe(summary);
     if (!arguments.output.empty()) {
       write_octomap_file(arguments.output, data);
@@ -262,7 +260,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_octomap_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<OctomapArguments>();
   CommandHandle command = program.command(
       "octomap", "Occupied, free and unknown space: queries, and files for octovis");
   command.option("--output", arguments->output,

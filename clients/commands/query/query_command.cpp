@@ -1,7 +1,6 @@
 #include <iostream>
 #include <limits>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
@@ -10,6 +9,7 @@
 #include "clients/commands/query/fetch_map.hpp"
 #include "clients/commands/query/query_report.hpp"
 #include "clients/commands/query/region_arguments.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "core/map/query/region.hpp"
 #include "core/picture/map_picture.hpp"
@@ -19,7 +19,7 @@ namespace {
 
 constexpr std::uint64_t not_given = std::numeric_limits<std::uint64_t>::max();
 
-struct Arguments {
+struct QueryArguments {
   ClientArguments client;
   RegionArguments region;
   std::vector<std::string> classes;
@@ -46,7 +46,7 @@ void draw_query(const std::string& file, Client& client, const Region& region,
   write_map_picture(file, fetch_map(client), fetch_trajectory(client, timeout), options);
 }
 
-std::optional<KnownVersion> since_of(const Arguments& arguments, Client& client) {
+std::optional<KnownVersion> since_of(const QueryArguments& arguments, Client& client) {
   if (arguments.since_version == not_given) return std::nullopt;
   const std::uint64_t map_id =
       arguments.since_map == 0 ? client.status().map_id : arguments.since_map;
@@ -54,14 +54,14 @@ std::optional<KnownVersion> since_of(const Arguments& arguments, Client& client)
 }
 
 /// The filters of the query, which can be checked without a server.
-MapQuery filters_of(const Arguments& arguments) {
+MapQuery filters_of(const QueryArguments& arguments) {
   MapQuery query;
   query.classes = classes_of(arguments.classes);
   query.resolution_m = arguments.resolution_m;
   return query;
 }
 
-QueryAnswer run_query(Client& client, const Arguments& arguments, const MapQuery& filters) {
+QueryAnswer run_query(Client& client, const QueryArguments& arguments, const MapQuery& filters) {
   QueryAnswer answer{filters, {}, {.stage = "query", .ms = {}}};
   answer.query.region = region_of(arguments.region, client, arguments.client.timeout());
   answer.query.since = since_of(arguments, client);
@@ -79,7 +79,7 @@ QueryAnswer run_query(Client& client, const Arguments& arguments, const MapQuery
   return answer;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const QueryArguments& arguments) {
   check_out_name(arguments.out);
   check_region(arguments.region);
   const MapQuery filters = filters_of(arguments);
@@ -99,7 +99,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_query_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<QueryArguments>();
   CommandHandle command = program.command("query", "Query a region of the server's static map");
   add_region_options(command, arguments->region);
   command.option("--classes", arguments->classes, "Only these: road,building,traffic-sign")

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
 
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/point_cloud_files.hpp"
 #include "core/map/query/region.hpp"
@@ -19,15 +19,15 @@ std::map<SemanticClass, std::uint64_t> count_by_class(const std::vector<QueryVox
 }
 
 /// Infinite coordinates are null.
-nlohmann::json corner_json(const Eigen::Vector3d& p) {
-  nlohmann::json json = nlohmann::json::array();
+Json corner_json(const Eigen::Vector3d& p) {
+  Json json = Json::array();
   for (const double value : p) {
-    json.push_back(std::isfinite(value) ? nlohmann::json(value) : nlohmann::json(nullptr));
+    json.push_back(std::isfinite(value) ? Json(value) : Json(nullptr));
   }
   return json;
 }
 
-nlohmann::json tile_json(const TileChange& tile) {
+Json tile_json(const TileChange& tile) {
   return {{"x", tile.id.x},
           {"y", tile.id.y},
           {"change", name(tile.kind)},
@@ -58,12 +58,12 @@ const char* name(TileChangeKind kind) {
   return "unknown";
 }
 
-nlohmann::json to_json(const QueryAnswer& answer) {
-  nlohmann::json by_class = nlohmann::json::object();
+Json to_json(const QueryAnswer& answer) {
+  Json by_class = Json::object();
   for (const auto& [label, count] : count_by_class(answer.result.voxels)) {
-    by_class[std::string(name(label))] = count;
+    by_class.set(std::string(name(label)), count);
   }
-  nlohmann::json tiles = nlohmann::json::array();
+  Json tiles = Json::array();
   for (const TileChange& tile : answer.result.tiles) tiles.push_back(tile_json(tile));
   const Eigen::AlignedBox3d bounds_map = RegionShape(answer.query.region).bounds_map();
   return {

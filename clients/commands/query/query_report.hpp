@@ -1,10 +1,10 @@
 #pragma once
 
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <vector>
 
 #include "clients/commands/stage_stopwatch.hpp"
+#include "clients/terminal/json.hpp"
 #include "core/map/query/map_query.hpp"
 
 namespace stillmap::cli {
@@ -17,7 +17,7 @@ struct QueryAnswer {
   StageDurations times;
 };
 
-[[nodiscard]] nlohmann::json to_json(const QueryAnswer& answer);
+[[nodiscard]] Json to_json(const QueryAnswer& answer);
 /// The same for people, shorter.
 [[nodiscard]] std::string describe(const QueryAnswer& answer);
 

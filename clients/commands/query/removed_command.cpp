@@ -2,7 +2,6 @@
 #include <array>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 
@@ -10,6 +9,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/query/fetch_map.hpp"
 #include "clients/commands/query/region_arguments.hpp"
+#include "clients/terminal/json.hpp"
 #include "core/map/query/region.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/picture/map_change_picture.hpp"
@@ -17,7 +17,7 @@
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct RemovedArguments {
   std::string map_file;
   ClientArguments client;
   RegionArguments region;
@@ -36,7 +36,7 @@ struct RemovedResult {
 constexpr std::array reasons{RemovalReason::moving, RemovalReason::semi_static,
                              RemovalReason::seen_through, RemovalReason::relabelled};
 
-RemovedResult removed_in_file(const Arguments& arguments) {
+RemovedResult removed_in_file(const RemovedArguments& arguments) {
   SavedMap map = read_map_file(arguments.map_file);
   const Eigen::Vector3d last_map = map.trajectory.empty()
                                        ? Eigen::Vector3d(0.0, 0.0, 0.0)
@@ -54,7 +54,7 @@ RemovedResult removed_in_file(const Arguments& arguments) {
   return found;
 }
 
-RemovedResult removed_on_server(Client& client, const Arguments& arguments) {
+RemovedResult removed_on_server(Client& client, const RemovedArguments& arguments) {
   const Region region = region_of(arguments.region, client, arguments.client.timeout());
   RemovedVoxels removed = client.get_removed(region);
   RemovedResult found{std::move(removed.voxels), removed.total, {}};
@@ -62,11 +62,11 @@ RemovedResult removed_on_server(Client& client, const Arguments& arguments) {
   return found;
 }
 
-nlohmann::json to_json(const RemovedResult& found) {
-  nlohmann::json counts;
+Json to_json(const RemovedResult& found) {
+  Json counts;
   for (const RemovalReason reason : reasons) {
-    counts[std::string(name(reason))] =
-        std::ranges::count(found.voxels, reason, &RemovedVoxel::reason);
+    counts.set(std::string(name(reason)),
+               std::ranges::count(found.voxels, reason, &RemovedVoxel::reason));
   }
   return {{"total", found.total}, {"shown", found.voxels.size()}, {"reasons", counts}};
 }
@@ -92,21 +92,21 @@ RemovalReason reason_from_name(const std::string& text) {
                               "relabelled");
 }
 
-ExitCode restore(Client& client, const Arguments& arguments) {
+ExitCode restore(Client& client, const RemovedArguments& arguments) {
   const RemovalReason reason = reason_from_name(arguments.restore);
   const Region region = region_of(arguments.region, client, arguments.client.timeout());
   const auto* const box = std::get_if<BoxRegion>(&region);
   if (box == nullptr) throw std::invalid_argument("--restore takes a --box or --around");
   const std::uint64_t restored = client.restore_removed(reason, *box);
   if (arguments.json) {
-    std::cout << nlohmann::json{{"restored", restored}}.dump(2) << "\n";
+    std::cout << Json{{"restored", restored}}.dump(2) << "\n";
   } else {
     std::cout << restored << " voxels are shown again\n";
   }
   return ExitCode::ok;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const RemovedArguments& arguments) {
   check_region(arguments.region);
   std::optional<Client> client;
   if (arguments.map_file.empty()) client.emplace(connect(arguments.client));
@@ -126,7 +126,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_removed_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<RemovedArguments>();
   CommandHandle command = program.command(
       "removed", "Voxels that are kept out of the static map, by reason; can restore them");
   command.option("MAPFILE", arguments->map_file, "A map file instead of a server");

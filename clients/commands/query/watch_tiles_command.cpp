@@ -2,19 +2,19 @@
 #include <iostream>
 #include <memory>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/query/query_report.hpp"
 #include "clients/commands/query/region_arguments.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/stop_signal.hpp"
 
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct WatchTilesArguments {
   ClientArguments client;
   RegionArguments region;
   /// 0: no limit.
@@ -58,7 +58,7 @@ class TileUpdateQueue {
 void print(const TileUpdate& update, bool json) {
   const TileChange& tile = update.change;
   if (json) {
-    const nlohmann::json line = {
+    const Json line = {
         {"type", "tile"},          {"change", name(tile.kind)},        {"x", tile.id.x},
         {"y", tile.id.y},          {"revision", tile.revision},        {"voxels", tile.voxel_count},
         {"map_id", update.map_id}, {"map_version", update.map_version}};
@@ -72,7 +72,7 @@ void print(const TileUpdate& update, bool json) {
   std::cout << std::endl;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const WatchTilesArguments& arguments) {
   check_region(arguments.region);
   StopSignal stop;
   Client client = connect(arguments.client);
@@ -99,7 +99,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_watch_tiles_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<WatchTilesArguments>();
   CommandHandle command = program.command(
       "watch-tiles", "Tiles of a region as they appear, change and go; no others are received");
   add_region_options(command, arguments->region);

@@ -8,9 +8,10 @@
 #include <stdexcept>
 
 #include "clients/commands/command.hpp"
+#include "clients/terminal/json.hpp"
+#include "idl/dds/dds_error.hpp"
 #include "idl/dds/security/authority.hpp"
 #include "idl/dds/security/identity.hpp"
-#include "idl/dds/dds_error.hpp"
 #include "idl/interface/roles.hpp"
 
 namespace stillmap::cli {
@@ -25,9 +26,9 @@ std::filesystem::path file_in(const std::filesystem::path& authority_folder) {
 void save_topic_names(const dds::TopicNames& names, const std::filesystem::path& authority_folder) {
   const std::filesystem::path file = file_in(authority_folder);
   std::ofstream out(file);
-  out << nlohmann::json{{"points", names.points},
-                        {"odometry_prior", names.odometry_prior},
-                        {"namespace", names.name_space}}
+  out << Json{{"points", names.points},
+              {"odometry_prior", names.odometry_prior},
+              {"namespace", names.name_space}}
              .dump(2)
       << "\n";
   out.close();

@@ -1,9 +1,9 @@
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/terminal/json.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -18,7 +18,7 @@ ExitCode run(const SaveArguments& arguments) {
   Client client = connect(arguments.client);
   const std::string file = client.save_map(arguments.file);
   if (arguments.json) {
-    std::cout << nlohmann::json{{"file", file}}.dump(2) << "\n";
+    std::cout << Json{{"file", file}}.dump(2) << "\n";
   } else {
     std::cout << "saved to " << file << " (on the server's machine)\n";
   }
@@ -35,10 +35,10 @@ ExitCode run(const LoadArguments& arguments) {
   Client client = connect(arguments.client);
   const LoadedMap loaded = client.load_map(arguments.file);
   if (arguments.json) {
-    std::cout << nlohmann::json{{"file", loaded.file},
-                                {"map_id", loaded.map_id},
-                                {"tiles", loaded.tile_count},
-                                {"poses", loaded.pose_count}}
+    std::cout << Json{{"file", loaded.file},
+                      {"map_id", loaded.map_id},
+                      {"tiles", loaded.tile_count},
+                      {"poses", loaded.pose_count}}
                      .dump(2)
               << "\n";
   } else {
@@ -57,7 +57,7 @@ ExitCode run(const ResetArguments& arguments) {
   Client client = connect(arguments.client);
   const std::uint64_t map_id = client.reset();
   if (arguments.json) {
-    std::cout << nlohmann::json{{"map_id", map_id}}.dump(2) << "\n";
+    std::cout << Json{{"map_id", map_id}}.dump(2) << "\n";
   } else {
     std::cout << "poses and map are forgotten; the new map has id " << map_id << "\n";
   }

@@ -1,10 +1,10 @@
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/server_control/status_report.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 
 namespace stillmap::cli {
@@ -18,7 +18,7 @@ struct StatusArguments {
 ExitCode run(const StatusArguments& arguments) {
   Client client = connect(arguments.client);
   const dds::ServerStatus status = client.status();
-  std::cout << (arguments.json ? to_json(status).dump(2) + "\n" : describe(status));
+  std::cout << (arguments.json ? status_json(status).dump(2) + "\n" : status_text(status));
   return ExitCode::ok;
 }
 

@@ -1,12 +1,11 @@
 #include "clients/commands/server_control/status_report.hpp"
 
-#include <nlohmann/json.hpp>
-
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 
 namespace stillmap::cli {
 
-std::string describe(const dds::ServerStatus& status) {
+std::string status_text(const dds::ServerStatus& status) {
   std::string text = "stillmap-server " + status.software_version + ", up for " +
                      fixed(status.uptime_s, 0) + " s\n";
   text += "health     " + std::string(name(status.health)) +
@@ -44,7 +43,7 @@ std::string describe(const dds::ServerStatus& status) {
 
 namespace {
 
-nlohmann::json to_json(const dds::SegmentationStatus& segmentation) {
+Json to_json(const dds::SegmentationStatus& segmentation) {
   return {{"interval", segmentation.interval},
           {"inference_ms", segmentation.inference_ms},
           {"image_columns", segmentation.image_columns},
@@ -56,17 +55,18 @@ nlohmann::json to_json(const dds::SegmentationStatus& segmentation) {
 
 }  // namespace
 
-nlohmann::json to_json(const dds::ServerStatus& status) {
-  nlohmann::json counters = nlohmann::json::object();
-  for (const dds::NamedCounter& counter : status.counters) counters[counter.name] = counter.value;
-  nlohmann::json latencies = nlohmann::json::object();
+Json status_json(const dds::ServerStatus& status) {
+  Json counters = Json::object();
+  for (const dds::NamedCounter& counter : status.counters)
+    counters.set(counter.name, counter.value);
+  Json latencies = Json::object();
   for (const dds::StageLatency& stage : status.latencies) {
-    latencies[stage.stage] = {{"p50_ms", stage.p50_ms},
-                              {"p99_ms", stage.p99_ms},
-                              {"max_ms", stage.max_ms},
-                              {"samples", stage.samples}};
+    latencies.set(stage.stage, {{"p50_ms", stage.p50_ms},
+                                {"p99_ms", stage.p99_ms},
+                                {"max_ms", stage.max_ms},
+                                {"samples", stage.samples}});
   }
-  nlohmann::json diagnostics = nlohmann::json::array();
+  Json diagnostics = Json::array();
   for (const dds::Diagnostic& diagnostic : status.diagnostics) {
     diagnostics.push_back(
         {{"severity", diagnostic.severity == dds::Severity::problem ? "problem" : "advice"},

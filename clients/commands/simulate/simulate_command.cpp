@@ -1,9 +1,9 @@
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "clients/commands/arguments/simulation_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
@@ -11,7 +11,7 @@
 namespace stillmap::cli {
 namespace {
 
-struct Arguments {
+struct SimulateArguments {
   std::string out;
   SimulationArguments simulation;
   bool json = false;
@@ -39,19 +39,18 @@ Written write_sequence(const std::string& folder, const simulation::Simulation& 
   return written;
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const SimulateArguments& arguments) {
   StopSignal stop;
   const simulation::SimulationConfig config = simulation_config(arguments.simulation);
   const simulation::Simulation simulation(config);
   const Written written = write_sequence(arguments.out, simulation, stop);
   if (arguments.json) {
-    std::cout
-        << nlohmann::json{{"folder", arguments.out},      {"city", config.plan.name},
-                          {"sensor", config.sensor.name}, {"seed", config.seed},
-                          {"scans", written.scans},       {"points", written.points},
-                          {"rolling", config.rolling},    {"motion", arguments.simulation.motion}}
-               .dump(2)
-        << "\n";
+    std::cout << Json{{"folder", arguments.out},      {"city", config.plan.name},
+                      {"sensor", config.sensor.name}, {"seed", config.seed},
+                      {"scans", written.scans},       {"points", written.points},
+                      {"rolling", config.rolling},    {"motion", arguments.simulation.motion}}
+                     .dump(2)
+              << "\n";
   } else {
     std::cout << written.scans << " scans, " << written.points << " points of a "
               << config.sensor.name << " in city '" << config.plan.name << "', seed " << config.seed
@@ -65,7 +64,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_simulate_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SimulateArguments>();
   SimulationArguments& simulation = arguments->simulation;
   CommandHandle command = program.command(
       "simulate", "Make a sequence in a simulated city, with labels and true poses");

@@ -10,13 +10,13 @@
 #include <iostream>
 #include <memory>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <system_error>
 
 #include "clients/commands/arguments/simulation_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "config/loaders/sensor_file.hpp"
@@ -102,14 +102,14 @@ TrainingSetCount write_training_set(
   return total;
 }
 
-struct Arguments {
+struct SimulateTrainingArguments {
   std::string out;
   TrainingSetPlan plan;
   int jobs = tbb::info::default_concurrency();
   bool json = false;
 };
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const SimulateTrainingArguments& arguments) {
   check_seed("--first-seed", arguments.plan.first_seed);
   if (const double share = arguments.plan.share_of_plain; !(share >= 0.0 && share <= 1.0)) {
     throw std::invalid_argument("--plain-share " + std::to_string(share) +
@@ -130,11 +130,11 @@ ExitCode run(const Arguments& arguments) {
     });
   }
   if (arguments.json) {
-    std::cout << nlohmann::json{{"folder", arguments.out},
-                                {"cities", count.cities},
-                                {"skipped", count.skipped},
-                                {"scans", count.scans},
-                                {"points", count.points}}
+    std::cout << Json{{"folder", arguments.out},
+                      {"cities", count.cities},
+                      {"skipped", count.skipped},
+                      {"scans", count.scans},
+                      {"points", count.points}}
                      .dump(2)
               << "\n";
   } else {
@@ -147,7 +147,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_simulate_training_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<SimulateTrainingArguments>();
   CommandHandle command = program.command(
       "simulate-training",
       "Make a training set for segmentation: labelled scans of many simulated cities");

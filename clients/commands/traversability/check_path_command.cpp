@@ -1,11 +1,11 @@
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 
 #include "clients/commands/command.hpp"
 #include "clients/commands/query/region_arguments.hpp"
 #include "clients/commands/traversability/traversability_source.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 
 namespace stillmap::cli {
@@ -19,7 +19,7 @@ std::string at(const Eigen::Vector2d& position_map) {
       .append(")");
 }
 
-nlohmann::json conflict_json(const PathConflict& conflict) {
+Json conflict_json(const PathConflict& conflict) {
   return {{"segment", conflict.segment},
           {"along_m", conflict.along_m},
           {"pose",
@@ -36,16 +36,16 @@ std::string inferred_part(double inferred_m) {
   return text.append(fixed(inferred_m, 1)).append(" m of it on inferred ground");
 }
 
-nlohmann::json to_json(const PathCheck& check, const std::string& profile) {
-  nlohmann::json json = {{"profile", profile},
-                         {"status", name(check.status)},
-                         {"free", check.is_free},
-                         {"clearance_m", check.clearance_m},
-                         {"checked_m", check.checked_m},
-                         {"inferred_m", check.inferred_m},
-                         {"map_version", check.map_version}};
-  if (!check.reason.empty()) json["reason"] = check.reason;
-  if (check.conflict) json["conflict"] = conflict_json(*check.conflict);
+Json to_json(const PathCheck& check, const std::string& profile) {
+  Json json = {{"profile", profile},
+               {"status", name(check.status)},
+               {"free", check.is_free},
+               {"clearance_m", check.clearance_m},
+               {"checked_m", check.checked_m},
+               {"inferred_m", check.inferred_m},
+               {"map_version", check.map_version}};
+  if (!check.reason.empty()) json.set("reason", check.reason);
+  if (check.conflict) json.set("conflict", conflict_json(*check.conflict));
   return json;
 }
 
@@ -63,14 +63,14 @@ std::string describe(const PathCheck& check, const std::string& profile) {
          std::to_string(conflict.segment) + "\n";
 }
 
-struct Arguments {
+struct CheckPathArguments {
   TraversabilitySourceArguments source;
   std::vector<std::string> path;
   std::vector<double> headings_rad;
   bool json = false;
 };
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const CheckPathArguments& arguments) {
   PathQuery query;
   query.positions_map = parse_points_2d("--path", arguments.path);
   query.headings_rad = arguments.headings_rad;
@@ -85,7 +85,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_check_path_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<CheckPathArguments>();
   CommandHandle command =
       program.command("check-path", "Whether a robot can follow a path, or what is in its way");
   add_traversability_source_options(command, arguments->source);

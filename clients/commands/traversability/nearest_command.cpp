@@ -1,26 +1,26 @@
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 
 #include "clients/commands/command.hpp"
 #include "clients/commands/traversability/traversability_source.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 
 namespace stillmap::cli {
 namespace {
 
-nlohmann::json to_json(const NearestTraversable& nearest, const std::string& profile) {
-  nlohmann::json json = {
+Json to_json(const NearestTraversable& nearest, const std::string& profile) {
+  Json json = {
       {"profile", profile}, {"status", name(nearest.status)}, {"map_version", nearest.map_version}};
   if (nearest.status != TraversabilityStatus::ok) {
-    json["reason"] = nearest.reason;
+    json.set("reason", nearest.reason);
     return json;
   }
-  json["position"] = {nearest.position_map.x(), nearest.position_map.y(), nearest.height_m};
-  json["distance_m"] = nearest.distance_m;
-  json["cost"] = nearest.cell.cost;
-  json["inferred"] = nearest.cell.inferred;
-  json["clearance_m"] = nearest.cell.clearance_m;
+  json.set("position", {nearest.position_map.x(), nearest.position_map.y(), nearest.height_m});
+  json.set("distance_m", nearest.distance_m);
+  json.set("cost", nearest.cell.cost);
+  json.set("inferred", nearest.cell.inferred);
+  json.set("clearance_m", nearest.cell.clearance_m);
   return json;
 }
 
@@ -34,14 +34,14 @@ std::string describe(const NearestTraversable& nearest, const std::string& profi
          fixed(nearest.cell.clearance_m, 2) + " m\n";
 }
 
-struct Arguments {
+struct NearestArguments {
   TraversabilitySourceArguments source;
   std::vector<double> position_map;
   double max_distance_m = 100.0;
   bool json = false;
 };
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const NearestArguments& arguments) {
   const std::unique_ptr<TraversabilitySource> source = open_traversability_source(arguments.source);
   const NearestTraversable nearest = source->nearest(
       {arguments.position_map[0], arguments.position_map[1]}, arguments.max_distance_m);
@@ -55,7 +55,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_nearest_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<NearestArguments>();
   CommandHandle command = program.command("nearest", "The nearest place where a robot can stand");
   add_traversability_source_options(command, arguments->source);
   command.option("--to", arguments->position_map, "x y: the place [m]").exactly(2).required();

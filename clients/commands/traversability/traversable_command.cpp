@@ -3,7 +3,6 @@
 #include <fstream>
 #include <iostream>
 #include <memory>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -11,6 +10,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/query/region_arguments.hpp"
 #include "clients/commands/traversability/traversability_source.hpp"
+#include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/picture/traversability_picture.hpp"
 #include "core/traversability/nav2_map.hpp"
@@ -30,15 +30,15 @@ struct TraversabilityReport {
 };
 
 /// GeoJSON repeats the first corner at the end.
-nlohmann::json closed(const TraversableRing& ring) {
-  nlohmann::json corners = nlohmann::json::array();
+Json closed(const TraversableRing& ring) {
+  Json corners = Json::array();
   for (const Eigen::Vector2d& corner : ring) corners.push_back({corner.x(), corner.y()});
   if (!ring.empty()) corners.push_back({ring.front().x(), ring.front().y()});
   return corners;
 }
 
-nlohmann::json feature(const TraversablePolygon& polygon) {
-  nlohmann::json rings = nlohmann::json::array({closed(polygon.outer)});
+Json feature(const TraversablePolygon& polygon) {
+  Json rings = Json::array({closed(polygon.outer)});
   for (const TraversableRing& hole : polygon.holes) rings.push_back(closed(hole));
   return {{"type", "Feature"},
           {"properties", {{"area_m2", area_m2(polygon)}}},
@@ -47,8 +47,8 @@ nlohmann::json feature(const TraversablePolygon& polygon) {
 
 /// Outlines in GeoJSON's form: a polygon with holes a feature, its area in its properties.
 /// Coordinates are metres in the map frame, not degrees.
-nlohmann::json to_json(const TraversabilityAnswer& answer, const std::string& profile) {
-  nlohmann::json features = nlohmann::json::array();
+Json to_json(const TraversabilityAnswer& answer, const std::string& profile) {
+  Json features = Json::array();
   for (const TraversablePolygon& polygon : answer.outlines) features.push_back(feature(polygon));
   return {{"type", "FeatureCollection"},
           {"frame", "map"},
@@ -79,25 +79,25 @@ double ms_per_tile(const TraversabilityReport& report) {
 }
 
 /// @pre `view` was made from the answer that the report is about
-nlohmann::json to_json(const TraversabilityView& view, const TraversabilityReport& report) {
-  nlohmann::json lethal = nlohmann::json::object();
+Json to_json(const TraversabilityView& view, const TraversabilityReport& report) {
+  Json lethal = Json::object();
   for (std::size_t i = 0; i < block_reason_count; ++i) {
     const auto reason = static_cast<BlockReason>(i);
     if (reason == BlockReason::none || reason == BlockReason::unknown) continue;
-    lethal[std::string(name(reason))] = square_metres(view, report.summary.lethal.at(i));
+    lethal.set(std::string(name(reason)), square_metres(view, report.summary.lethal.at(i)));
   }
-  nlohmann::json json = {{"profile", view.profile.name},
-                         {"map_id", view.map_id},
-                         {"map_version", view.version},
-                         {"cell_m", view.cell_m},
-                         {"free_m2", square_metres(view, report.summary.free)},
-                         {"inferred_m2", square_metres(view, report.summary.inferred)},
-                         {"unknown_m2", square_metres(view, report.summary.unknown)},
-                         {"lethal_m2", lethal},
-                         {"ms", report.milliseconds}};
+  Json json = {{"profile", view.profile.name},
+               {"map_id", view.map_id},
+               {"map_version", view.version},
+               {"cell_m", view.cell_m},
+               {"free_m2", square_metres(view, report.summary.free)},
+               {"inferred_m2", square_metres(view, report.summary.inferred)},
+               {"unknown_m2", square_metres(view, report.summary.unknown)},
+               {"lethal_m2", lethal},
+               {"ms", report.milliseconds}};
   if (report.update) {
-    json["tiles"] = report.update->map_tiles;
-    json["ms_per_tile"] = ms_per_tile(report);
+    json.set("tiles", report.update->map_tiles);
+    json.set("ms_per_tile", ms_per_tile(report));
   }
   return json;
 }
@@ -122,7 +122,7 @@ std::string describe(const TraversabilityView& view, const TraversabilityReport&
          fixed(view.cell_m, 2) + " m, in " + fixed(report.milliseconds, 0) + " ms" + update + "\n";
 }
 
-struct Arguments {
+struct TraversableArguments {
   TraversabilitySourceArguments source;
   RegionArguments region;
   std::string out;
@@ -133,7 +133,7 @@ struct Arguments {
 };
 
 TraversabilityAnswer query_traversability(TraversabilitySource& source,
-                                          const Arguments& arguments) {
+                                          const TraversableArguments& arguments) {
   TraversabilityQuery query;
   query.region = region_of(arguments.region, source);
   query.include_outlines = !arguments.outlines.empty();
@@ -150,7 +150,7 @@ void draw(const std::string& file, const TraversabilityView& view, Traversabilit
   write_traversability_picture(file, view, options);
 }
 
-ExitCode run(const Arguments& arguments) {
+ExitCode run(const TraversableArguments& arguments) {
   check_region(arguments.region);
   const auto began = std::chrono::steady_clock::now();
   const std::unique_ptr<TraversabilitySource> source = open_traversability_source(arguments.source);
@@ -171,7 +171,7 @@ ExitCode run(const Arguments& arguments) {
 }  // namespace
 
 void add_traversable_command(CommandHandle program, Action& action) {
-  auto arguments = std::make_shared<Arguments>();
+  auto arguments = std::make_shared<TraversableArguments>();
   CommandHandle command = program.command(
       "traversable", "Where a robot can drive, of a server or on a stored map, and why not");
   add_traversability_source_options(command, arguments->source);

@@ -16,6 +16,13 @@
 #include "core/map/storage/tile_codec.hpp"
 
 namespace stillmap {
+
+std::filesystem::path beside(const std::filesystem::path& file, const char* suffix) {
+  std::filesystem::path path = file;
+  path += suffix;
+  return path;
+}
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -49,12 +56,6 @@ constexpr const char* evidence_table = R"sql(
     x INTEGER NOT NULL, y INTEGER NOT NULL, encoded BLOB NOT NULL,
     PRIMARY KEY (x, y));
 )sql";
-
-fs::path beside(const fs::path& file, const char* suffix) {
-  fs::path path = file;
-  path += suffix;
-  return path;
-}
 
 /// SQLite's file header has its numbers big-endian.
 std::uint32_t big_endian(std::string_view bytes) {

@@ -6,6 +6,9 @@
 
 namespace stillmap {
 
+/// SQLite's file with this suffix ("-wal", "-shm") beside a database.
+[[nodiscard]] std::filesystem::path beside(const std::filesystem::path& file, const char* suffix);
+
 /// Opens the SQLite database of a map file, made with an empty schema when there is no file yet.
 /// A file that is not a sound map file of this schema or the one before is refused (MapFileError)
 /// before anything could write to it.

@@ -10,16 +10,12 @@
 #include <system_error>
 #include <utility>
 
+#include "core/map/storage/map_database.hpp"
+
 namespace stillmap {
 namespace {
 
 namespace fs = std::filesystem;
-
-fs::path beside(const fs::path& file, const char* suffix) {
-  fs::path path = file;
-  path += suffix;
-  return path;
-}
 
 void check_readable(const fs::path& file) {
   std::error_code error;

@@ -10,6 +10,8 @@
 #include "tests/idl/bag_fixture.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace bag_file_inputs {
 namespace {
 
 namespace fs = std::filesystem;
@@ -84,7 +86,8 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace bag_file_inputs
 
-const Target bag_file_target{"bag_file", run, seeds};
+const Target bag_file_target{"bag_file", bag_file_inputs::run, bag_file_inputs::seeds};
 
 }  // namespace stillmap::fuzz

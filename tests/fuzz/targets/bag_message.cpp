@@ -9,6 +9,8 @@
 #include "tests/idl/bag_fixture.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace bag_message_inputs {
 namespace {
 
 enum Kind : std::uint8_t { cloud, velodyne_scan, livox, packets, kinds };
@@ -101,7 +103,8 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace bag_message_inputs
 
-const Target bag_message_target{"bag_message", run, seeds};
+const Target bag_message_target{"bag_message", bag_message_inputs::run, bag_message_inputs::seeds};
 
 }  // namespace stillmap::fuzz

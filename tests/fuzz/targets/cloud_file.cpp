@@ -12,6 +12,8 @@
 #include "tests/fuzz/memory_folder.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace cloud_file_inputs {
 namespace {
 
 enum Kind : std::uint8_t { bin, label, pcd, ply, merged, kinds };
@@ -125,7 +127,8 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace cloud_file_inputs
 
-const Target cloud_file_target{"cloud_file", run, seeds};
+const Target cloud_file_target{"cloud_file", cloud_file_inputs::run, cloud_file_inputs::seeds};
 
 }  // namespace stillmap::fuzz

@@ -9,6 +9,8 @@
 #include "tests/fuzz/memory_folder.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace config_file_inputs {
 namespace {
 
 namespace fs = std::filesystem;
@@ -58,7 +60,8 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace config_file_inputs
 
-const Target config_file_target{"config_file", run, seeds};
+const Target config_file_target{"config_file", config_file_inputs::run, config_file_inputs::seeds};
 
 }  // namespace stillmap::fuzz

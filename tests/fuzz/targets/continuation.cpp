@@ -10,6 +10,8 @@
 #include "tests/fuzz/street_map.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace continuation_inputs {
 namespace {
 
 const MapSnapshot& street_view() {
@@ -71,7 +73,9 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace continuation_inputs
 
-const Target continuation_target{"continuation", run, seeds};
+const Target continuation_target{"continuation", continuation_inputs::run,
+                                 continuation_inputs::seeds};
 
 }  // namespace stillmap::fuzz

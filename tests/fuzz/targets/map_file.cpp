@@ -8,6 +8,8 @@
 #include "tests/fuzz/street_map.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace map_file_inputs {
 namespace {
 
 /// As `stillmap map check` and `map info` read it: the file stays as it is.
@@ -40,7 +42,8 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace map_file_inputs
 
-const Target map_file_target{"map_file", run, seeds};
+const Target map_file_target{"map_file", map_file_inputs::run, map_file_inputs::seeds};
 
 }  // namespace stillmap::fuzz

@@ -18,6 +18,8 @@
 #include "tests/fuzz/street_map.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace map_rows_inputs {
 namespace {
 
 enum Row : std::uint8_t { sizes, pose, tile, memory, metadata, rows };
@@ -179,7 +181,8 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace map_rows_inputs
 
-const Target map_rows_target{"map_rows", run, seeds};
+const Target map_rows_target{"map_rows", map_rows_inputs::run, map_rows_inputs::seeds};
 
 }  // namespace stillmap::fuzz

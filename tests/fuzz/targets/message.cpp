@@ -18,6 +18,8 @@
 #include "tests/fuzz/street_map.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace message_inputs {
 namespace {
 
 using namespace stillmap_msgs::srv;
@@ -117,7 +119,8 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace message_inputs
 
-const Target message_target{"message", run, seeds};
+const Target message_target{"message", message_inputs::run, message_inputs::seeds};
 
 }  // namespace stillmap::fuzz

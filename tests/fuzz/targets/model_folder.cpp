@@ -9,6 +9,8 @@
 #include "tests/fuzz/memory_folder.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace model_folder_inputs {
 namespace {
 
 constexpr const char* separator = "\n===\n";
@@ -45,7 +47,9 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace model_folder_inputs
 
-const Target model_folder_target{"model_folder", run, seeds};
+const Target model_folder_target{"model_folder", model_folder_inputs::run,
+                                 model_folder_inputs::seeds};
 
 }  // namespace stillmap::fuzz

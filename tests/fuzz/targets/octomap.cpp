@@ -14,6 +14,8 @@
 #include "tests/fuzz/street_map.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace octomap_inputs {
 namespace {
 
 enum Kind : std::uint8_t { message, binary_file, full_file, binary_tree, full_tree, kinds };
@@ -81,7 +83,8 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace octomap_inputs
 
-const Target octomap_target{"octomap", run, seeds};
+const Target octomap_target{"octomap", octomap_inputs::run, octomap_inputs::seeds};
 
 }  // namespace stillmap::fuzz

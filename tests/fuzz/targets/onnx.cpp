@@ -9,6 +9,8 @@
 #include "tests/segmentation/onnx_builder.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace onnx_inputs {
 namespace {
 
 constexpr int rows = 8, columns = 32, classes = 3;
@@ -75,7 +77,8 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace onnx_inputs
 
-const Target onnx_target{"onnx", run, seeds};
+const Target onnx_target{"onnx", onnx_inputs::run, onnx_inputs::seeds};
 
 }  // namespace stillmap::fuzz

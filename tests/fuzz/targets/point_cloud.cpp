@@ -13,6 +13,8 @@
 #include "tests/idl/driver_clouds.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace point_cloud_inputs {
 namespace {
 
 using sensor_msgs::msg::PointCloud2;
@@ -84,7 +86,8 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace point_cloud_inputs
 
-const Target point_cloud_target{"point_cloud", run, seeds};
+const Target point_cloud_target{"point_cloud", point_cloud_inputs::run, point_cloud_inputs::seeds};
 
 }  // namespace stillmap::fuzz

@@ -9,6 +9,8 @@
 #include "tests/fuzz/memory_folder.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace pose_file_inputs {
 namespace {
 
 enum Kind : std::uint8_t { poses, times, calibration, name, kinds };
@@ -69,7 +71,8 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace pose_file_inputs
 
-const Target pose_file_target{"pose_file", run, seeds};
+const Target pose_file_target{"pose_file", pose_file_inputs::run, pose_file_inputs::seeds};
 
 }  // namespace stillmap::fuzz

@@ -18,6 +18,8 @@
 #include "tests/fuzz/service_fixture.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace service_request_inputs {
 namespace {
 
 using namespace stillmap_msgs::srv;
@@ -172,7 +174,9 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace service_request_inputs
 
-const Target service_request_target{"service_request", run, seeds};
+const Target service_request_target{"service_request", service_request_inputs::run,
+                                    service_request_inputs::seeds};
 
 }  // namespace stillmap::fuzz

@@ -9,6 +9,8 @@
 #include "tests/fuzz/street_map.hpp"
 
 namespace stillmap::fuzz {
+// A namespace of its own: every target has helpers of the same names.
+namespace tile_inputs {
 namespace {
 
 enum Kind : std::uint8_t { tile, tile_content, memory, memory_content, kinds };
@@ -55,7 +57,8 @@ std::vector<Seed> seeds() {
 }
 
 }  // namespace
+}  // namespace tile_inputs
 
-const Target tile_target{"tile", run, seeds};
+const Target tile_target{"tile", tile_inputs::run, tile_inputs::seeds};
 
 }  // namespace stillmap::fuzz
