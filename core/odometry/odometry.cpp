@@ -21,8 +21,11 @@ namespace {
 
 /// Time beyond which the last velocity is not extrapolated [s].
 constexpr double max_prediction_s = 1.0;
-/// After so many lost scans, and again after as many, the scan is looked for all round.
+/// The second scan that is lost, and one of so many after it, are looked for all round: up to this
+/// far away, and farther by what the lidar may have driven since [m].
 constexpr int relocalization_interval = 5;
+constexpr double relocalization_reach_m = 24.0;
+constexpr double max_relocalization_reach_m = 60.0;
 /// Fewer static features than this are helped out by parked vehicles.
 constexpr std::size_t min_static_features = 100;
 /// Weight of the newest stamp in the running mean of their deviations.
@@ -174,14 +177,22 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
     if (prior_map.empty()) return OdometryResult{.T_map_lidar = prediction.T_map_lidar};
     return relocalize(features, prior_map, map, prediction.T_map_lidar, config);
   }
-  const OdometryResult found = search_pose(features, map, last, prediction, fits, config);
+  // Until the place is known, few features tell it sooner.
+  OdometryResult found = search_pose(lost_scans > 0 ? thinned(features) : features, map, last,
+                                     prediction, fits, config);
+  if (lost_scans > 0 && found.health != OdometryHealth::lost)
+    found = register_features(features, map, found.T_map_lidar, config, found.sweep_correction);
   if (found.health != OdometryHealth::lost && fits.believes(found)) return found;
-  if (lost_scans % relocalization_interval == relocalization_interval - 1) {
+  if (lost_scans % relocalization_interval == 1) {
     std::vector<LabelledPoint> points_map = map.edges.points();
     const std::vector<LabelledPoint> planes_map = map.planes.points();
     points_map.insert(points_map.end(), planes_map.begin(), planes_map.end());
+    const double driven_m = last.interval_s > 0.0 ? last.motion.translation().norm() *
+                                                        prediction.interval_s / last.interval_s
+                                                  : 0.0;
     const OdometryResult again =
-        relocalize(thinned(features), points_map, map, prediction.T_map_lidar, config);
+        relocalize(thinned(features), points_map, map, prediction.T_map_lidar, config,
+                   std::min(relocalization_reach_m + driven_m, max_relocalization_reach_m));
     if (fits.believes_relocalized(again)) return again;
   }
   return lost_at(prediction.T_map_lidar);

@@ -4,17 +4,21 @@
 #include <numbers>
 #include <vector>
 
+#include "core/odometry/correlative_search.hpp"
+
 namespace stillmap {
 namespace {
 
 /// A point of the scan lies on the map when a point of it is as near as this [m].
 constexpr float match_distance_m = 0.25F;
-/// Share of such points that ends the search, and the smallest share that is accepted.
+/// Share of such points at the guess that ends the search, and the smallest share that is accepted.
 constexpr double sure_match_ratio = 0.85;
 constexpr double min_match_ratio = 0.6;
-/// Distance between the guesses; the coarse registration converges from half of it.
-constexpr double guess_spacing_m = 3.5;
-constexpr int headings = 12;
+/// Another place, so far away [m], fits less well than by this share of the best.
+constexpr double min_other_place_m = 1.5;
+constexpr double max_other_share = 0.85;
+/// Places that the correlative search proposes, for registration to try.
+constexpr std::size_t proposals = 16;
 constexpr double refinement_radius_m = 0.6;
 
 bool is_pole_like(SemanticClass label) {
@@ -30,21 +34,6 @@ std::vector<Eigen::Vector3d> offsets_around(double radius_m) {
     places.emplace_back(radius_m * std::cos(bearing), radius_m * std::sin(bearing), 0.0);
   }
   return places;
-}
-
-/// The guess itself, then all headings there, then all headings at the places round it.
-std::vector<Eigen::Isometry3d> pose_guesses_around(const Eigen::Isometry3d& T_map_lidar) {
-  std::vector<Eigen::Isometry3d> guesses;
-  for (const Eigen::Vector3d& place : offsets_around(guess_spacing_m)) {
-    for (int k = 0; k < headings; ++k) {
-      // 0, 1, -1, 2, ...: small turns first.
-      const int steps = k % 2 == 0 ? -k / 2 : (k + 1) / 2;
-      const double turn = steps * 2.0 * std::numbers::pi / headings;
-      guesses.push_back(Eigen::Translation3d(place) * T_map_lidar *
-                        Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()));
-    }
-  }
-  return guesses;
 }
 
 /// Ground matches anywhere on the ground of the map, and movable objects may have left.
@@ -79,23 +68,46 @@ class Search {
       : features_(features), map_(map), config_(config) {}
 
   void try_from(const Eigen::Isometry3d& T_map_lidar) {
-    const OdometryResult found = register_features(features_, map_, T_map_lidar, config_);
+    const OdometryResult found = register_in_two_stages(features_, map_, T_map_lidar, config_);
     if (found.health == OdometryHealth::lost) return;
-    const double share = match_ratio(features_, map_, found.T_map_lidar);
-    if (share <= share_) return;
-    share_ = share;
-    best_ = found;
+    found_.push_back({found, match_ratio(features_, map_, found.T_map_lidar)});
+    if (found_.back().share > best().share) best_ = found_.size() - 1;
   }
-  [[nodiscard]] const OdometryResult& best() const { return best_; }
-  [[nodiscard]] double share() const { return share_; }
+  struct Found {
+    OdometryResult result;
+    double share = 0.0;
+  };
+  /// Of share 0 before the first.
+  [[nodiscard]] const Found& best() const { return found_[best_]; }
+  /// Whether no other place fits nearly as well: streets look alike.
+  [[nodiscard]] bool is_unique() const {
+    return std::ranges::none_of(found_, [&](const Found& other) {
+      const Eigen::Isometry3d off = best().result.T_map_lidar.inverse() * other.result.T_map_lidar;
+      return off.translation().norm() > min_other_place_m &&
+             other.share > max_other_share * best().share;
+    });
+  }
 
  private:
   const FeatureSets& features_;
   const LocalMap& map_;
   const OdometryConfig& config_;
-  OdometryResult best_;
-  double share_ = 0.0;
+  std::vector<Found> found_{Found{}};
+  std::size_t best_ = 0;
 };
+
+std::vector<Eigen::Isometry3d> proposed_poses(const FeatureSets& features,
+                                              std::span<const LabelledPoint> prior_map,
+                                              const Eigen::Isometry3d& T_map_lidar_guess,
+                                              double reach_m) {
+  std::vector<Eigen::Vector3f> of_scan, of_map;
+  for (const auto* points : {&features.edges, &features.planes, &features.surfaces})
+    for (const FeaturePoint& point : *points)
+      if (is_landmark(point.label)) of_scan.push_back(point.position_lidar);
+  for (const LabelledPoint& point : prior_map)
+    if (is_landmark(point.label)) of_map.push_back(point.position_map);
+  return correlative_search(of_scan, of_map, T_map_lidar_guess, proposals, {.reach_m = reach_m});
+}
 
 }  // namespace
 
@@ -112,22 +124,27 @@ void insert_prior_map(std::span<const LabelledPoint> points_map, LocalMap& map) 
 
 OdometryResult relocalize(const FeatureSets& features, std::span<const LabelledPoint> prior_map,
                           const LocalMap& map, const Eigen::Isometry3d& T_map_lidar_guess,
-                          const OdometryConfig& config) {
+                          const OdometryConfig& config, double reach_m) {
   LocalMap coarse_map = make_coarse_map();
   insert_prior_map(prior_map, coarse_map);
   Search search(features, map, config);
-  for (const Eigen::Isometry3d& guess : pose_guesses_around(T_map_lidar_guess)) {
+  const auto try_coarsely_from = [&](const Eigen::Isometry3d& T_map_lidar) {
     const OdometryResult rough =
-        register_features(features, coarse_map, guess, coarse_registration_config(config));
+        register_features(features, coarse_map, T_map_lidar, coarse_registration_config(config));
     if (rough.health != OdometryHealth::lost) search.try_from(rough.T_map_lidar);
-    if (search.share() >= sure_match_ratio) return search.best();
+  };
+  try_coarsely_from(T_map_lidar_guess);
+  if (search.best().share >= sure_match_ratio) return search.best().result;
+  for (const Eigen::Isometry3d& T :
+       proposed_poses(features, prior_map, T_map_lidar_guess, reach_m)) {
+    search.try_from(T);
+    if (search.best().share < sure_match_ratio) try_coarsely_from(T);
   }
   // Refine: along a street the registration may stop short of the optimum.
-  const Eigen::Isometry3d T_map_lidar_best = search.best().T_map_lidar;
-  for (const Eigen::Vector3d& place : offsets_around(refinement_radius_m)) {
+  const Eigen::Isometry3d T_map_lidar_best = search.best().result.T_map_lidar;
+  for (const Eigen::Vector3d& place : offsets_around(refinement_radius_m))
     search.try_from(Eigen::Translation3d(place) * T_map_lidar_best);
-  }
-  if (search.share() >= min_match_ratio) return search.best();
+  if (search.best().share >= min_match_ratio && search.is_unique()) return search.best().result;
   // Against an empty map the registration returns the guess as lost.
   return register_features(features, make_coarse_map(), T_map_lidar_guess, config);
 }
