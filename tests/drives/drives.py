@@ -74,7 +74,8 @@ def run_other_program(run, stillmap, results):
 def run_one(run, stillmap, results):
     if run.program:
         return run_other_program(run, stillmap, results)
-    return json.loads(call([stillmap, "evaluate", "drives", *run.options()]))
+    rows = json.loads(call([stillmap, "evaluate", "drives", *run.options()]))
+    return rows if run.judged else [{**row, "health": None} for row in rows]
 
 
 def commit():
@@ -181,7 +182,7 @@ def parse(words):
                         help="Folder with kitti_raw_0005, avia_campus, semantickitti_mini; missing ones are left out")
     parser.add_argument("--against", metavar="NAME=PROGRAM", type=named_program, action="append", default=[],
                         help="Another odometry: PROGRAM SEQUENCE OUT writes OUT/poses_lidar.txt and OUT/ms.txt")
-    parser.add_argument("--only", default="", help="Only runs whose name or group contains this")
+    parser.add_argument("--only", default="", help="Run only what has this in its name or group; the page keeps the others")
     parser.add_argument("--quick", action="store_true", help="2 seeds of 60 scans")
     parser.add_argument("--fresh", action="store_true", help="Run what is finished again")
     parser.add_argument("--list", action="store_true", help="Print the runs' names")
@@ -195,8 +196,8 @@ def main(words):
     extent = suite.Extent.quick() if arguments.quick else suite.Extent()
     arguments.results.mkdir(parents=True, exist_ok=True)
     avia = with_poses(arguments.recordings, arguments.results) if arguments.recordings else None
-    runs = [run for run in suite.suite(extent, arguments.recordings, avia, arguments.against)
-            if arguments.only in run.name or arguments.only in run.group]
+    everything = suite.suite(extent, arguments.recordings, avia, arguments.against)
+    runs = [run for run in everything if arguments.only in run.name or arguments.only in run.group]
     if arguments.list:
         print("\n".join(run.name for run in runs))
         return 0
@@ -205,7 +206,7 @@ def main(words):
         return 2
     failures = run_all(runs, arguments)
     results = read_results(arguments.results / "runs.jsonl")
-    content = page.section([results[run.name] for run in runs if run.name in results], machine())
+    content = page.section([results[run.name] for run in everything if run.name in results], machine())
     if str(arguments.page) == "-":
         print(content)
     else:

@@ -131,6 +131,13 @@ class Drives(unittest.TestCase):
         self.assertEqual(self.run_drives("--only", "quiet, 16 beams", "--fresh"), 0)
         self.assertEqual(len(self.calls()), 4)
 
+    def test_keeps_other_drives_on_the_page(self):
+        self.run_drives("--only", "quiet, 16 beams")
+        self.run_drives("--only", "quiet, 32 beams")
+        text = (self.folder / "page.md").read_text()
+        self.assertIn("| quiet, 16 beams: ", text)
+        self.assertIn("| quiet, 32 beams: ", text)
+
     def test_goes_on_after_a_line_that_was_cut_off(self):
         self.run_drives("--only", "quiet, 16 beams")
         file = self.folder / "results" / "runs.jsonl"
@@ -153,6 +160,14 @@ class Drives(unittest.TestCase):
         text = (self.folder / "page.md").read_text()
         self.assertIn("| teleport | quiet, 64 beams | true | 60 | 2 | 1 (166.7) | 2 (6.90) | 1 |", text)
         self.assertIn("| all of these | all drives | all | 120 | 4 | 2 (166.7) | 4 (6.90) | 2 |", text)
+
+    def test_judges_no_health_by_a_truth_that_is_no_better(self):
+        (self.folder / "kitti_raw_0005" / "velodyne").mkdir(parents=True)
+        (self.folder / "kitti_raw_0005" / "velodyne" / "0.bin").touch()
+        self.assertEqual(self.run_drives("--recordings", str(self.folder), "--only", "kitti_raw_0005 labels=none"), 0)
+        text = (self.folder / "page.md").read_text()
+        self.assertIn("| none | semantic | 0.100 / 0.100 | 0.020 / 0.020 | 0.10 / 0.10 | - | - | 2, 1 | 5.0 |", text)
+        self.assertNotIn("| none | all drives |", text)
 
     def test_compares_with_another_program(self):
         other = self.write("other", OTHER_PROGRAM.format(python=sys.executable))

@@ -50,13 +50,14 @@ def odometry_row(key, rows):
         values = [nested(row, "trajectory", *keys) for row in rows]
         return median_and_worst([None if v is None else factor * v for v in values], decimals)
 
-    ours = any(row.get("health") for row in rows)
+    judged = any(row.get("health") for row in rows)
+    ours = all("lost" in row for row in rows)
     voxels = [row["voxels"] for row in rows if row.get("voxels")]
     return [f"{group}: {len(rows)} of {rows[0]['scans']} scans", LABELS.get(labels, labels), weighting,
             figures(3, 1, "kitti", "translation_percent"), figures(3, 1, "ate_rmse_m"),
             figures(2, 100, "relative", "mean_translation_m"),
-            f"{health['wrong_called_good']} of {health['wrong']}" if ours else "-",
-            f"{health['right_called_bad']} of {health['right']}" if ours else "-",
+            f"{health['wrong_called_good']} of {health['wrong']}" if judged else "-",
+            f"{health['right_called_bad']} of {health['right']}" if judged else "-",
             f"{sum(row['lost'] for row in rows)}, {sum(row['degenerate'] for row in rows)}" if ours else "-",
             f"{statistics.median(voxels) / 1000:.1f}" if voxels else "-",
             f"{statistics.median(row['median_ms'] for row in rows):.1f} / "
@@ -92,7 +93,7 @@ def health_table(results):
             "right, called lost (in 200 right ones)", "rejected scans"]
     groups, rows, everything = groups_of(results), [], {}
     for (group, labels, mutation, weighting), of_group in groups.items():
-        if weighting == "semantic":
+        if weighting == "semantic" and health_sums(of_group)["poses"]:
             everything.setdefault(mutation, []).extend(of_group)
             if mutation != "none":
                 rows.append(health_row(group, labels, mutation, of_group))

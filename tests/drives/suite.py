@@ -20,15 +20,14 @@ class Run:
     weightings: tuple = WEIGHTINGS
     labels: str = "files"
     mutation: str = "none"
-    other_place: str = ""
+    # The true poses are good enough to tell wrong poses by.
+    judged: bool = True
     # Name and path of a program that is run in place of ours.
     program: tuple = ()
 
     @property
     def name(self):
         parts = [self.drive, "labels=" + self.labels, "mutate=" + self.mutation, "+".join(self.weightings)]
-        if self.other_place:
-            parts.append("beside=" + self.other_place)
         return " ".join([self.program[0] + ":"] + parts[:1] if self.program else parts)
 
     @property
@@ -37,9 +36,8 @@ class Run:
         return self.scans * (1 + len(self.weightings) + 2 * (self.labels == "model"))
 
     def options(self):
-        options = [self.drive, "--labels", self.labels, "--mutate", self.mutation,
-                   "--weightings", *self.weightings, "--json"]
-        return options + (["--other-place", self.other_place] if self.other_place else [])
+        return [self.drive, "--labels", self.labels, "--mutate", self.mutation,
+                "--weightings", *self.weightings, "--json"]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,16 +96,10 @@ def scans_of(folder):
 def recorded(folder, avia):
     """The recordings that are there; `avia`: where that of a Livox Avia lies, with poses_lidar.txt, or None."""
     kitti, mini = folder / "kitti_raw_0005", folder / "semantickitti_mini"
-    other_place = mini / "00"
     if kitti.is_dir():
-        base = Run("KITTI raw 0005, 64 beams, rolling", str(kitti), scans_of(kitti))
+        base = Run("KITTI raw 0005, 64 beams, rolling", str(kitti), scans_of(kitti), judged=False)
         yield dataclasses.replace(base, labels="none")
         yield dataclasses.replace(base, labels="model")
-        for mutation in MUTATIONS:
-            if mutation != "other_place" or other_place.is_dir():
-                yield dataclasses.replace(
-                    base, labels="none", weightings=("semantic",), mutation=mutation,
-                    other_place=str(other_place) if mutation == "other_place" else "")
     if avia:
         base = Run("Livox Avia, on foot", str(avia), scans_of(avia), labels="none")
         yield base

@@ -15,6 +15,13 @@ MapperConfig weighted(MapperConfig config, const std::string& weighting) {
   return config;
 }
 
+std::string in_words(const Eigen::Isometry3d& motion) {
+  std::ostringstream text;
+  text << 100.0 * motion.translation().norm() << " cm "
+       << evaluation::rotation_angle(motion) * 180.0 / std::numbers::pi << " deg";
+  return text.str();
+}
+
 }  // namespace
 
 const PointLabels& SharedLabels::segment(const Scan& scan) {
@@ -83,18 +90,21 @@ const OdometryResult* DriveRun::map(Scan scan,
   return &last_;
 }
 
-std::string DriveRun::last_step() const {
+std::string DriveRun::last_error() const {
   if (poses_.size() < 2) return {};
   const evaluation::JudgedPose& before = poses_[poses_.size() - 2];
   const evaluation::JudgedPose& now = poses_.back();
   if (!before.T_world_lidar_true || !now.T_world_lidar_true) return {};
   const Eigen::Isometry3d truth = before.T_world_lidar_true->inverse() * *now.T_world_lidar_true;
-  const Eigen::Isometry3d error = truth.inverse() * before.T_map_lidar.inverse() * now.T_map_lidar;
-  constexpr double deg = 180.0 / std::numbers::pi;
+  const Eigen::Isometry3d step = truth.inverse() * before.T_map_lidar.inverse() * now.T_map_lidar;
   std::ostringstream text;
-  text << "step " << truth.translation().norm() << " m " << evaluation::rotation_angle(truth) * deg
-       << " deg, error " << 100.0 * error.translation().norm() << " cm "
-       << evaluation::rotation_angle(error) * deg << " deg";
+  text << "step " << in_words(truth) << ", error " << in_words(step);
+  const evaluation::JudgedPose& first = poses_.front();
+  if (!first.T_world_lidar_true) return text.str();
+  const Eigen::Isometry3d since_first =
+      first.T_world_lidar_true->inverse() * *now.T_world_lidar_true;
+  text << ", pose off by "
+       << in_words(since_first.inverse() * first.T_map_lidar.inverse() * now.T_map_lidar);
   return text.str();
 }
 

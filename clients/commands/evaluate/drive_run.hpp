@@ -77,8 +77,9 @@ class DriveRun {
 
   [[nodiscard]] DriveResult result();
   [[nodiscard]] const std::string& weighting() const { return weighting_; }
-  /// Error of the motion between the last two scans with a truth, in words; empty without.
-  [[nodiscard]] std::string last_step() const;
+  /// Error of the last motion, from scan to scan, and of the last pose with the first ones aligned,
+  /// in words; empty without a truth.
+  [[nodiscard]] std::string last_error() const;
 
  private:
   using Clock = std::chrono::steady_clock;

@@ -153,7 +153,7 @@ std::vector<DriveResult> run_drive(const MutatedDrive& drive,
       std::cerr << seen << " " << run.weighting() << " "
                 << (found != nullptr ? name(found->health) : "rejected");
       if (found != nullptr)
-        std::cerr << " " << run.last_step() << "; it " << found->iterations << " e "
+        std::cerr << " " << run.last_error() << "; it " << found->iterations << " e "
                   << found->edge_correspondences << " p " << found->plane_correspondences << " rms "
                   << found->rms_residual_m;
       std::cerr << "\n";
