@@ -141,7 +141,8 @@ def run_all(runs, arguments):
         else:
             result = {"run": run.name, "group": run.group, "labels": run.labels, "mutation": run.mutation,
                       "commit": commit(), "date": datetime.date.today().isoformat(),
-                      "seconds": round(time.monotonic() - run_began, 1), "rows": rows}
+                      "seconds": round(time.monotonic() - run_began, 1),
+                      "load": os.getloadavg()[0], "rows": rows}
             append_line(file, json.dumps(result))
         done += run.cost
     return failures
@@ -179,7 +180,7 @@ def parse(words):
     parser.add_argument("--program", default="build/release/bin/stillmap", help="stillmap")
     parser.add_argument("--results", type=pathlib.Path, default=pathlib.Path("build/release/drives"))
     parser.add_argument("--recordings", type=existing_folder,
-                        help="Folder with kitti_raw_0005, avia_campus, semantickitti_mini; missing ones are left out")
+                        help="Folder with kitti_raw_0005 and avia_campus; missing ones are left out")
     parser.add_argument("--against", metavar="NAME=PROGRAM", type=named_program, action="append", default=[],
                         help="Another odometry: PROGRAM SEQUENCE OUT writes OUT/poses_lidar.txt and OUT/ms.txt")
     parser.add_argument("--only", default="", help="Run only what has this in its name or group; the page keeps the others")

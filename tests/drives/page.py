@@ -110,8 +110,10 @@ def section(results, machine):
     commits = ", ".join(sorted({result["commit"] for result in results}))
     dates = sorted({result["date"] for result in results})
     when = dates[0] if len(dates) == 1 else f"{dates[0]} to {dates[-1]}"
+    loads = [result["load"] for result in results if "load" in result]
+    load = f" · load average {statistics.median(loads):.1f}" if loads else ""
     return "\n".join([
-        f"`make drives` · {machine} · {when} · {commits}", "",
+        f"`make drives` · {machine}{load} · {when} · {commits}", "",
         "Figures with a stroke are medians and the worst of the drives; times are the median scan, and the p99 "
         "of the slowest drive.", "",
         odometry_table(results), "",

@@ -95,7 +95,7 @@ def scans_of(folder):
 
 def recorded(folder, avia):
     """The recordings that are there; `avia`: where that of a Livox Avia lies, with poses_lidar.txt, or None."""
-    kitti, mini = folder / "kitti_raw_0005", folder / "semantickitti_mini"
+    kitti = folder / "kitti_raw_0005"
     if kitti.is_dir():
         base = Run("KITTI raw 0005, 64 beams, rolling", str(kitti), scans_of(kitti), judged=False)
         yield dataclasses.replace(base, labels="none")
@@ -106,10 +106,6 @@ def recorded(folder, avia):
         for mutation in MUTATIONS:
             if mutation != "other_place":
                 yield dataclasses.replace(base, weightings=("semantic",), mutation=mutation)
-    for sequence in sorted(mini.iterdir()) if mini.is_dir() else ():
-        run = Run("SemanticKITTI, 64 beams", str(sequence), scans_of(sequence))
-        yield run
-        yield dataclasses.replace(run, labels="model")
 
 
 def suite(extent, recordings=None, avia=None, programs=()):
