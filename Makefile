@@ -6,11 +6,13 @@ JOBS ?= $(shell nproc)
 FUZZ_JOBS ?= 2
 FUZZ_SECONDS ?= 600
 MINUTES ?= 30
+RECORDINGS ?=
+DRIVES ?=
 BASE ?= HEAD~1
 FILES ?=
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages configure programs build deb demo test test-dev test-tsan test-kill test-network test-docker tidy image fuzz soak bench table1 ros-messages parity format format-check clean
+.PHONY: help packages configure programs build deb demo test test-dev test-tsan test-kill test-network test-docker tidy image fuzz soak bench table1 drives ros-messages parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -79,6 +81,10 @@ bench: build ## Benchmarks of every stage
 table1: programs ## The paper's Table I on simulated streets, crowded and quiet
 	$(BUILD)/bin/stillmap evaluate weightings sim:crowd --seed 2 --scans 480
 	$(BUILD)/bin/stillmap evaluate weightings sim:quiet --seed 1 --scans 500
+
+drives: programs ## Every drive, simulated and in RECORDINGS=FOLDER, into tests/README.md: hours; goes on where it stopped
+	@/usr/bin/python3 tests/drives/drives.py --program $(BUILD)/bin/stillmap --results $(BUILD)/drives \
+	  $(if $(RECORDINGS),--recordings $(RECORDINGS)) $(DRIVES)
 
 ros-messages: ## Write config/ros/stillmap_msgs from idl/msg
 	/usr/bin/python3 config/ros/write_package.py idl/msg

@@ -181,5 +181,59 @@ TEST_F(EvaluateCommandTest, ComparesTheThreeWeightings) {
   EXPECT_EQ(run("evaluate weightings " + path("city")).exit_code, 2);
 }
 
+constexpr const char* short_drive = "evaluate drives sim:yard,sensor=vlp_16,scans=14 --json";
+
+TEST_F(EvaluateCommandTest, RunsDrivesWithEveryWeightingAndLabelSource) {
+  for (const std::string labels : {"random30", "model"}) {
+    const ProcessResult result =
+        run(std::string(short_drive) + " --weightings none semantic --labels " + labels);
+    ASSERT_EQ(result.exit_code, 0) << result.err;
+    const nlohmann::json rows = nlohmann::json::parse(result.out);
+    ASSERT_EQ(rows.size(), 2U);
+    EXPECT_EQ(rows.at(1).at("weighting"), "semantic");
+    EXPECT_EQ(rows.at(1).at("labels"), labels);
+    EXPECT_EQ(rows.at(1).at("scans"), 14);
+    EXPECT_EQ(rows.at(1).at("health").at("wrong"), 0);
+    EXPECT_LT(rows.at(1).at("trajectory").at("ate_rmse_m"), 0.2);
+    EXPECT_GT(rows.at(1).at("voxels"), 1000);
+    EXPECT_GT(rows.at(1).at("p99_ms"), 0.0);
+  }
+}
+
+TEST_F(EvaluateCommandTest, CountsEveryPoseOfAnotherPlaceAsWrong) {
+  const ProcessResult result = run(std::string(short_drive) + " --mutate other_place");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json row = nlohmann::json::parse(result.out).at(0);
+  EXPECT_EQ(row.at("mutation"), "other_place");
+  EXPECT_GE(row.at("health").at("wrong"), 7);
+}
+
+TEST_F(EvaluateCommandTest, TakesARecordingFromAScanOn) {
+  simulate("city", 6);
+  const ProcessResult result =
+      run("evaluate drives " + path("city") + " --json --start 2 --scans 3 --mutate jitter");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json row = nlohmann::json::parse(result.out).at(0);
+  EXPECT_EQ(row.at("scans"), 3);
+  EXPECT_LT(row.at("trajectory").at("ate_rmse_m"), 0.2);
+}
+
+TEST_F(EvaluateCommandTest, NamesWhatADriveCannotBe) {
+  simulate("city", 2);
+  const std::vector<std::pair<std::string, std::string>> faults{
+      {"sim:yard,seeds=3", "seeds=3"},
+      {"sim:yard,seed=three", "seed=three"},
+      {"sim:village", "village"},
+      {"sim:yard --mutate flood", "flood"},
+      {"sim:yard --labels wrong", "wrong"},
+      {path("city") + " --mutate other_place", "--other-place"},
+      {path("missing"), "missing"}};
+  for (const auto& [arguments, message] : faults) {
+    const ProcessResult result = run("evaluate drives " + arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments;
+    EXPECT_THAT(result.err, HasSubstr(message)) << arguments;
+  }
+}
+
 }  // namespace
 }  // namespace stillmap::test

@@ -1,45 +1,30 @@
-#include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
-#include <cstdint>
+#include <cmath>
+#include <deque>
 #include <functional>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <optional>
 #include <random>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
-#include "clients/commands/arguments/simulation_arguments.hpp"
 #include "clients/commands/command.hpp"
-#include "clients/commands/mapping/trajectory_report.hpp"
-#include "clients/commands/stage_stopwatch.hpp"
+#include "clients/commands/evaluate/drive_run.hpp"
+#include "clients/commands/evaluate/ground_truth_sequence.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
-#include "core/dataset/dataset_error.hpp"
-#include "core/dataset/scan_dataset.hpp"
-#include "core/segmentation/segmenter.hpp"
+#include "config/loaders/model_file.hpp"
+#include "config/loaders/server_config.hpp"
+#include "core/evaluation/drive_mutation.hpp"
 
 namespace stillmap::cli {
 namespace {
-
-/// Scans with true poses, from disk or simulated on demand.
-struct Drive {
-  std::string name;
-  std::size_t scans = 0;
-  SensorModel sensor;
-  bool labelled = false;
-  std::function<Scan(std::size_t)> read;
-  /// Poses of the lidar at the scans' stamps.
-  std::vector<Eigen::Isometry3d> truth;
-};
 
 struct EvaluateDrivesArguments {
   std::vector<std::string> drives;
@@ -48,87 +33,29 @@ struct EvaluateDrivesArguments {
   std::size_t start = 0;
   std::string labels = "files";
   std::string stamps = "as_recorded";
+  std::string mutation = "none";
+  std::string other_place;
   MapperArguments mapper;
   bool each = false;
+  bool json = false;
 };
 
-/// "sim:crowd,seed=2,sensor=vlp_16,motion=hard_turns,rolling,scans=300": a drive in words.
-SimulationArguments simulated_drive(const std::string& text) {
-  SimulationArguments arguments;
-  std::istringstream words(text);
-  std::getline(words, arguments.preset, ',');
-  for (std::string word; std::getline(words, word, ',');) {
-    const std::size_t equals = word.find('=');
-    const std::string key = word.substr(0, equals);
-    const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
-    if (key == "seed")
-      arguments.seed = std::stoull(value);
-    else if (key == "scans")
-      arguments.scans = std::stoi(value);
-    else if (key == "sensor")
-      arguments.sensor = value;
-    else if (key == "motion")
-      arguments.motion = value;
-    else if (key == "traffic")
-      arguments.traffic = value;
-    else if (word == "rolling")
-      arguments.rolling = true;
-    else
-      throw std::invalid_argument(
-          "'" + word + "' in 'sim:" + text +
-          "': there are seed=, scans=, sensor=, motion=, traffic= and rolling");
-  }
-  return arguments;
-}
-
-const std::string simulated_prefix = "sim:";
-
-Drive open_simulated(const std::string& name) {
-  const simulation::SimulationConfig config =
-      simulation_config(simulated_drive(name.substr(simulated_prefix.size())));
-  const auto simulation = std::make_shared<simulation::Simulation>(config);
-  Drive drive{
-      .name = name,
-      .scans = static_cast<std::size_t>(config.scans),
-      .sensor = config.sensor,
-      .labelled = true,
-      .read = [simulation](std::size_t i) { return simulation->scan(static_cast<int>(i)).scan; },
-      .truth = {}};
-  for (int i = 0; i < config.scans; ++i)
-    drive.truth.push_back(simulation->T_map_lidar_at(i * config.sensor.period_s));
-  return drive;
-}
-
-Drive open_recorded(const std::string& name) {
-  const auto dataset = std::make_shared<ScanDataset>(name);
-  const std::optional<Trajectory> truth = dataset->truth();
-  Drive drive{.name = name,
-              .scans = dataset->size(),
-              .sensor = dataset->suggested_sensor(),
-              .labelled = dataset->has_labels(0),
-              .read = [dataset](std::size_t i) { return dataset->read(i).scan; },
-              .truth = {}};
-  if (truth)
-    for (const StampedPose& pose : *truth) drive.truth.push_back(pose.T_map_lidar);
-  return drive;
-}
-
-/// What became of a drive.
-struct DriveResult {
-  std::string weighting;
-  std::optional<TrajectoryReport> report;
-  std::map<OdometryHealth, std::size_t> health;
-  std::size_t rejected = 0;
-  std::size_t voxels = 0;
-  double median_ms = 0.0;
-  /// Of the longest scan.
-  double max_ms = 0.0;
-};
+constexpr const char* drives_explanation =
+    "Examples:\n"
+    "  stillmap evaluate drives sim:crowd,seed=2,motion=hard_turns --weightings none semantic\n"
+    "  stillmap evaluate drives sim:quiet,rolling,scans=100 --mutate teleport\n"
+    "A pose is wrong when the motion since the last right one is off by more than 0.2 m and 2 % "
+    "of\n"
+    "the path, or 1 deg and 0.02 deg a metre, or since that 20 m back by more than 5 % of the "
+    "path.\n"
+    "Column 'wrong good': wrong poses called good; 'right lost': right ones called lost; ms: a "
+    "scan\n"
+    "without the time for labels, map included.";
 
 /// Wrong labels: a share of the points at random, or all of a class.
 void spoil_labels(Scan& scan, const std::string& how, std::size_t index) {
   if (scan.labels.empty() || how == "files") return;
-  if (how == "none") {
+  if (how == "none" || how == "model") {
     scan.labels.clear();
     return;
   }
@@ -156,62 +83,90 @@ void restamp(Scan& scan, const std::string& how, double period_s) {
   for (float& offset : scan.time_offset_s) offset -= static_cast<float>(shift_s);
 }
 
-DriveResult run_drive(const Drive& drive, const std::string& weighting,
-                      const EvaluateDrivesArguments& arguments,
-                      const std::function<bool(std::size_t)>& scan_done) {
-  MapperConfig config = mapper_config(arguments.mapper, drive.sensor);
-  config.odometry.weighting = weighting_from_name(weighting);
-  Mapper mapper(config, drive.labelled
-                            ? std::unique_ptr<Segmenter>(std::make_unique<PassthroughSegmenter>())
-                            : std::make_unique<NullSegmenter>());
-  DriveResult result{.weighting = weighting, .report = {}, .health = {}};
-  evaluation::PosePairs pairs;
-  StageStopwatch times;
-  const std::size_t end = std::min(drive.scans, arguments.start + arguments.scans);
-  for (std::size_t i = arguments.start; i < end; ++i) {
-    Scan scan = drive.read(i);
-    spoil_labels(scan, arguments.labels, i);
-    restamp(scan, arguments.stamps, config.sensor.period_s);
-    times.begin();
-    const std::optional<MappedScan> mapped = mapper.process(std::move(scan));
-    times.end();
-    if (!mapped) {
-      ++result.rejected;
-      continue;
-    }
-    ++result.health[mapped->odometry.health];
-    if (!drive.truth.empty()) {
-      pairs.truth.push_back(drive.truth.at(i));
-      pairs.estimate.push_back(mapped->odometry.T_map_lidar);
-      if (arguments.each && pairs.size() > 1) {
-        const std::size_t n = pairs.size() - 1;
-        const Eigen::Isometry3d dt = pairs.truth[n - 1].inverse() * pairs.truth[n];
-        const Eigen::Isometry3d de = pairs.estimate[n - 1].inverse() * pairs.estimate[n];
-        const Eigen::Isometry3d e = dt.inverse() * de;
-        std::cerr << i << " " << name(mapped->odometry.health) << " step "
-                  << dt.translation().norm() << " m " << evaluation::rotation_angle(dt) * 57.2958
-                  << " deg, error " << e.translation().norm() * 100 << " cm "
-                  << evaluation::rotation_angle(e) * 57.2958 << " deg; it "
-                  << mapped->odometry.iterations << " e " << mapped->odometry.edge_correspondences
-                  << " p " << mapped->odometry.plane_correspondences << " rms "
-                  << mapped->odometry.rms_residual_m << "\n";
-      }
-    }
-    if (!scan_done(i + 1 - arguments.start)) break;
+/// A drive as the mappers get it.
+struct MutatedDrive {
+  GroundTruthSequence sequence;
+  std::optional<GroundTruthSequence> other_place;
+  std::vector<evaluation::MutatedScan> scans;
+
+  [[nodiscard]] std::optional<Eigen::Isometry3d> truth(const evaluation::MutatedScan& scan) const {
+    if (scan.of_other_place || sequence.truth.empty()) return std::nullopt;
+    return sequence.truth.at(scan.index);
   }
-  for (const auto& tile : mapper.map_snapshot()->tiles) result.voxels += tile->voxels.size();
-  result.median_ms = times.total().quantile(0.5);
-  result.max_ms = times.total().quantile(1.0);
-  if (pairs.size() > 1) result.report = report_trajectory(pairs);
-  return result;
+};
+
+MutatedDrive open_drive(const std::string& name, const EvaluateDrivesArguments& arguments) {
+  const evaluation::DriveMutation mutation = evaluation::drive_mutation(arguments.mutation);
+  MutatedDrive drive{.sequence = open_ground_truth_sequence(name), .other_place = {}, .scans = {}};
+  if (mutation == evaluation::DriveMutation::other_place)
+    drive.other_place = arguments.other_place.empty()
+                            ? open_other_city(name)
+                            : open_ground_truth_sequence(arguments.other_place);
+  const std::vector<std::int64_t>& stamps_ns = drive.sequence.stamps_ns;
+  const std::size_t start = std::min(arguments.start, stamps_ns.size());
+  const std::size_t count = std::min(arguments.scans, stamps_ns.size() - start);
+  drive.scans =
+      evaluation::mutate_drive(mutation, std::span(stamps_ns).subspan(start, count),
+                               drive.other_place ? drive.other_place->size() : std::size_t{0});
+  for (evaluation::MutatedScan& scan : drive.scans)
+    if (!scan.of_other_place) scan.index += start;
+  return drive;
 }
 
-std::vector<std::string> row_of(const Drive& drive, const DriveResult& result) {
-  const auto count = [&](OdometryHealth health) {
-    const auto found = result.health.find(health);
-    return std::to_string(found == result.health.end() ? 0 : found->second);
-  };
-  std::vector<std::string> row{drive.name, result.weighting};
+std::shared_ptr<SharedLabels> labels_of(const GroundTruthSequence& sequence,
+                                        const SensorModel& sensor,
+                                        const EvaluateDrivesArguments& arguments) {
+  if (arguments.labels != "model") {
+    if (!sequence.labelled || arguments.labels == "none")
+      return std::make_shared<SharedLabels>(std::make_unique<NullSegmenter>());
+    return std::make_shared<SharedLabels>(std::make_unique<PassthroughSegmenter>());
+  }
+  LabelsConfig labels;
+  if (!arguments.mapper.config_file.empty())
+    labels = load_server_config(arguments.mapper.config_file).labels;
+  labels.source = LabelProvider::model;
+  return std::make_shared<SharedLabels>(open_segmenter(labels, sensor));
+}
+
+/// All weightings on the same scans. `scan_done(seen)` returning false ends it early.
+std::vector<DriveResult> run_drive(const MutatedDrive& drive,
+                                   const EvaluateDrivesArguments& arguments,
+                                   const std::function<bool(std::size_t)>& scan_done) {
+  const MapperConfig config = mapper_config(arguments.mapper, drive.sequence.sensor);
+  const auto labels = labels_of(drive.sequence, config.sensor, arguments);
+  std::deque<DriveRun> runs;
+  for (const std::string& weighting : arguments.weightings)
+    runs.emplace_back(weighting, config, std::make_unique<SharedSegmenter>(labels));
+  std::size_t seen = 0;
+  for (const evaluation::MutatedScan& mutated : drive.scans) {
+    const GroundTruthSequence& source =
+        mutated.of_other_place ? *drive.other_place : drive.sequence;
+    Scan scan = evaluation::mutate_scan(source.read(mutated.index), mutated);
+    spoil_labels(scan, arguments.labels, mutated.index);
+    restamp(scan, arguments.stamps, config.sensor.period_s);
+    labels->next_scan();
+    for (std::size_t k = 0; k < runs.size(); ++k) {
+      // In turn: the first one of a scan finds the caches cold.
+      DriveRun& run = runs[(seen + k) % runs.size()];
+      const OdometryResult* found = run.map(scan, drive.truth(mutated));
+      if (!arguments.each) continue;
+      std::cerr << seen << " " << run.weighting() << " "
+                << (found != nullptr ? name(found->health) : "rejected");
+      if (found != nullptr)
+        std::cerr << " " << run.last_error() << "; it " << found->iterations << " e "
+                  << found->edge_correspondences << " p " << found->plane_correspondences << " rms "
+                  << found->rms_residual_m;
+      std::cerr << "\n";
+    }
+    if (!scan_done(++seen)) break;
+  }
+  std::vector<DriveResult> results;
+  for (DriveRun& run : runs) results.push_back(run.result());
+  return results;
+}
+
+std::vector<std::string> row_of(const std::string& drive, const DriveResult& result) {
+  std::vector<std::string> row{drive, result.weighting};
   if (result.report) {
     const TrajectoryReport& r = *result.report;
     row.insert(
@@ -223,31 +178,53 @@ std::vector<std::string> row_of(const Drive& drive, const DriveResult& result) {
   } else {
     row.insert(row.end(), 6, "-");
   }
-  row.insert(row.end(),
-             {count(OdometryHealth::good), count(OdometryHealth::degenerate),
-              count(OdometryHealth::lost), std::to_string(result.rejected),
-              std::to_string(result.voxels), fixed(result.median_ms, 1), fixed(result.max_ms, 0)});
+  for (const OdometryHealth health :
+       {OdometryHealth::good, OdometryHealth::degenerate, OdometryHealth::lost})
+    row.push_back(std::to_string(result.count(health)));
+  row.push_back(std::to_string(result.rejected));
+  if (result.score) {
+    row.insert(row.end(), {std::to_string(result.score->wrong),
+                           std::to_string(result.score->wrong_called_good.size()),
+                           std::to_string(result.score->right_called_bad.size())});
+  } else {
+    row.insert(row.end(), 3, "-");
+  }
+  row.insert(row.end(), {std::to_string(result.voxels), fixed(result.duration.quantile(0.5), 1),
+                         fixed(result.duration.quantile(0.99), 1)});
+  return row;
+}
+
+Json json_of(const MutatedDrive& drive, const EvaluateDrivesArguments& arguments,
+             const DriveResult& result) {
+  Json row = to_json(result);
+  row.set("drive", drive.sequence.name);
+  row.set("sensor", drive.sequence.sensor.name);
+  row.set("labels", arguments.labels);
+  row.set("stamps", arguments.stamps);
+  row.set("mutation", arguments.mutation);
   return row;
 }
 
 ExitCode run(const EvaluateDrivesArguments& arguments) {
   StopSignal stop;
   Table table({"drive", "weighting", "path m", "t_err %", "deg/100m", "ATE m", "cm a scan", "worst",
-               "good", "degenerate", "lost", "rejected", "voxels", "ms", "max"});
+               "good", "degenerate", "lost", "rejected", "wrong", "wrong good", "right lost",
+               "voxels", "ms", "p99"});
+  Json rows = Json::array();
   for (const std::string& name : arguments.drives) {
-    const Drive drive =
-        name.starts_with(simulated_prefix) ? open_simulated(name) : open_recorded(name);
-    for (const std::string& weighting : arguments.weightings) {
-      Progress progress(name + " " + weighting, "scans", std::min(drive.scans, arguments.scans));
-      const auto seen = [&](std::size_t scans) {
-        progress.update(scans);
-        return !stop.requested();
-      };
-      table.add(row_of(drive, run_drive(drive, weighting, arguments, seen)));
-      if (stop.requested()) break;
+    const MutatedDrive drive = open_drive(name, arguments);
+    Progress progress(name, "scans", drive.scans.size());
+    const auto scan_done = [&](std::size_t scans) {
+      progress.update(scans);
+      return !stop.requested();
+    };
+    for (const DriveResult& result : run_drive(drive, arguments, scan_done)) {
+      table.add(row_of(drive.sequence.name, result));
+      rows.push_back(json_of(drive, arguments, result));
     }
+    if (stop.requested()) break;
   }
-  std::cout << table.text();
+  std::cout << (arguments.json ? rows.dump(2) + "\n" : table.text());
   return stop.requested() ? ExitCode::failed : ExitCode::ok;
 }
 
@@ -259,20 +236,41 @@ void add_evaluate_drives_command(CommandHandle evaluate, Action& action) {
       "drives", "Odometry on many drives: errors, health, sharpness of the map, time");
   command
       .option("DRIVES", arguments->drives,
-              "Sequences, or sim:PRESET[,seed=N][,scans=N][,sensor=S][,motion=M][,rolling]")
+              "Sequences, or sim:PRESET[,seed=N][,scans=N][,sensor=S][,motion=M][,traffic=T]"
+              "[,rolling]")
       .required();
-  command.option("--weightings", arguments->weightings, "none, geometric, semantic").with_default();
+  command
+      .option("--weightings", arguments->weightings,
+              "none, geometric, semantic: each on the same scans")
+      .with_default();
   command.option("--scans", arguments->scans, "Take as many scans of each at most").above_zero();
   command.option("--start", arguments->start, "Number of the first scan");
   command
       .option("--labels", arguments->labels,
-              "files, none, random30, no_movers, buildings_move, vegetation_moves")
+              "Those of the files, spoilt ones, none, or those of the network")
+      .one_of(
+          {"files", "none", "model", "random30", "no_movers", "buildings_move", "vegetation_moves"})
       .with_default();
-  command.option("--stamps", arguments->stamps, "as_recorded, middle, end, removed").with_default();
+  command
+      .option("--stamps", arguments->stamps,
+              "Where in the sweep the stamp is, or no times of points at all")
+      .one_of({"as_recorded", "middle", "end", "removed"})
+      .with_default();
+  command
+      .option("--mutate", arguments->mutation,
+              "What goes wrong: a second and three are missing, the lidar is carried off, sees "
+              "another place, half or all but 20 degrees of the view is covered, stamps are off")
+      .one_of({"none", "drop", "teleport", "other_place", "cover", "cover_all", "jitter", "late"})
+      .with_default();
+  command.option("--other-place", arguments->other_place,
+                 "The sequence for --mutate other_place; default: the same simulated drive in "
+                 "another city");
   command.option("--config", arguments->mapper.config_file,
                  "Server file; its mapper settings are used");
   command.option("--sensor", arguments->mapper.sensor, "Of recorded sequences");
   command.flag("--each", arguments->each, "Print every scan's error to stderr");
+  command.flag("--json", arguments->json, "Print JSON");
+  command.explain(drives_explanation);
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -1,19 +1,17 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <cstdint>
 #include <functional>
 #include <iostream>
 #include <memory>
-#include <optional>
 #include <stdexcept>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/arguments/simulation_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/evaluate/ground_truth_sequence.hpp"
 #include "clients/commands/mapping/trajectory_report.hpp"
 #include "clients/commands/stage_stopwatch.hpp"
 #include "clients/terminal/json.hpp"
@@ -21,22 +19,11 @@
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
-#include "core/dataset/scan_dataset.hpp"
+#include "core/mapper.hpp"
 #include "core/segmentation/segmenter.hpp"
 
 namespace stillmap::cli {
 namespace {
-
-/// Scans with true poses, from disk or simulated on demand.
-struct GroundTruthSequence {
-  std::string name;
-  std::size_t scans = 0;
-  MapperConfig config;
-  bool labelled = false;
-  std::function<DatasetFrame(std::size_t)> read;
-  /// Poses of the lidar, one per scan.
-  std::vector<Eigen::Isometry3d> truth;
-};
 
 /// One row of the paper's Table I.
 struct WeightingResult {
@@ -46,43 +33,6 @@ struct WeightingResult {
 };
 
 constexpr std::array weighting_names{"none", "geometric", "semantic"};
-const std::string simulated = "sim:";
-
-GroundTruthSequence open_simulated(const std::string& name, std::size_t max_scans,
-                                   const MapperArguments& mapper, SimulationArguments arguments) {
-  arguments.preset = name.substr(simulated.size());
-  arguments.scans = static_cast<int>(std::min<std::size_t>(max_scans, 100'000));
-  const simulation::SimulationConfig config = simulation_config(arguments);
-  const auto simulation = std::make_shared<simulation::Simulation>(config);
-  GroundTruthSequence sequence;
-  sequence.name = name + " seed " + std::to_string(arguments.seed);
-  sequence.scans = static_cast<std::size_t>(config.scans);
-  sequence.config = mapper_config(mapper, config.sensor);
-  sequence.labelled = true;
-  sequence.read = [simulation](std::size_t i) {
-    simulation::SimulatedScan scan = simulation->scan(static_cast<int>(i));
-    return DatasetFrame{std::move(scan.scan), std::move(scan.raw_labels)};
-  };
-  for (int i = 0; i < config.scans; ++i) {
-    sequence.truth.push_back(simulation->T_map_lidar_at(i * config.sensor.period_s));
-  }
-  return sequence;
-}
-
-GroundTruthSequence open_dataset(const std::string& name, std::size_t max_scans,
-                                 const MapperArguments& mapper) {
-  const auto dataset = std::make_shared<ScanDataset>(name);
-  const std::optional<Trajectory> truth = dataset->truth();
-  if (!truth) throw DatasetError(name, "has no true poses (poses.txt or poses_lidar.txt)");
-  GroundTruthSequence sequence;
-  sequence.name = name;
-  sequence.scans = std::min(max_scans, dataset->size());
-  sequence.config = mapper_config(mapper, dataset->suggested_sensor());
-  sequence.labelled = dataset->has_labels(0);
-  sequence.read = [dataset](std::size_t i) { return dataset->read(i); };
-  for (const StampedPose& pose : *truth) sequence.truth.push_back(pose.T_map_lidar);
-  return sequence;
-}
 
 /// One of the mappers that are compared, and its stage times.
 struct WeightingRun {
@@ -118,26 +68,18 @@ struct WeightingRun {
   StageStopwatch times;
 };
 
-/// Opens a sequence with true poses, or "sim:PRESET". `max_scans` limits both. Throws
-/// DatasetError, ConfigError or std::invalid_argument.
-GroundTruthSequence open_ground_truth_sequence(const std::string& name, std::size_t max_scans,
-                                               const MapperArguments& mapper,
-                                               const SimulationArguments& simulation) {
-  if (name.starts_with(simulated)) return open_simulated(name, max_scans, mapper, simulation);
-  return open_dataset(name, max_scans, mapper);
-}
-
 /// Runs the three weightings side by side on the same scans. `scan_done(seen)` returning false ends
 /// it early. Throws std::runtime_error when a scan cannot be mapped.
 std::vector<WeightingResult> compare_weightings(const GroundTruthSequence& sequence,
+                                                const MapperConfig& config, std::size_t max_scans,
                                                 const std::function<bool(std::size_t)>& scan_done) {
   std::vector<WeightingRun> runs;
   for (const char* weighting_name : weighting_names) {
-    runs.emplace_back(weighting_name, sequence.config, sequence.labelled);
+    runs.emplace_back(weighting_name, config, sequence.labelled);
   }
-  for (std::size_t i = 0; i < sequence.scans; ++i) {
-    const DatasetFrame frame = sequence.read(i);
-    for (WeightingRun& run : runs) run.map(frame.scan, sequence.name);
+  for (std::size_t i = 0; i < std::min(max_scans, sequence.size()); ++i) {
+    const Scan scan = sequence.read(i);
+    for (WeightingRun& run : runs) run.map(scan, sequence.name);
     if (!scan_done(i + 1)) break;
   }
   std::vector<WeightingResult> results;
@@ -192,17 +134,22 @@ Json json_of(const GroundTruthSequence& sequence, const std::vector<WeightingRes
 
 ExitCode run(const EvaluateWeightingsArguments& arguments) {
   StopSignal stop;
+  SimulationArguments simulated = arguments.simulation;
+  simulated.scans = static_cast<int>(std::min<std::size_t>(arguments.scans, 100'000));
   Table table({"sequence", "weighting", "path m", "ATE RMSE m", "final drift m", "cm a scan",
                "KITTI %", "none / this", "ms a scan"});
   Json rows = Json::array();
   for (const std::string& name : arguments.sequences) {
-    const GroundTruthSequence sequence =
-        open_ground_truth_sequence(name, arguments.scans, arguments.mapper, arguments.simulation);
-    Progress progress(name, "scans", sequence.scans);
-    const auto results = compare_weightings(sequence, [&](std::size_t seen) {
-      progress.update(seen);
+    const GroundTruthSequence sequence = open_ground_truth_sequence(name, simulated);
+    if (sequence.truth.empty())
+      throw DatasetError(name, "has no true poses (poses.txt or poses_lidar.txt)");
+    const MapperConfig config = mapper_config(arguments.mapper, sequence.sensor);
+    Progress progress(name, "scans", std::min(arguments.scans, sequence.size()));
+    const auto seen = [&](std::size_t scans) {
+      progress.update(scans);
       return !stop.requested();
-    });
+    };
+    const auto results = compare_weightings(sequence, config, arguments.scans, seen);
     add_rows(table, sequence, results);
     rows.append(json_of(sequence, results));
     if (stop.requested()) break;
@@ -219,7 +166,7 @@ void add_evaluate_weightings_command(CommandHandle evaluate, Action& action) {
       "weightings", "The paper's Table I: no, geometric and semantic weights on the same scans");
   command
       .option("SEQUENCES", arguments->sequences,
-              "Sequences with true poses, or sim:crowd, sim:quiet, sim:yard")
+              "Sequences with true poses, or sim:crowd, sim:quiet, sim:yard (see evaluate drives)")
       .with_default();
   command.option("--scans", arguments->scans, "Take as many scans of each at most")
       .above_zero()

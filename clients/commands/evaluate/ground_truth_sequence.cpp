@@ -1,0 +1,113 @@
+#include "clients/commands/evaluate/ground_truth_sequence.hpp"
+
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
+
+#include "core/dataset/scan_dataset.hpp"
+#include "core/simulation/simulation.hpp"
+
+namespace stillmap::cli {
+namespace {
+
+const std::string simulated_prefix = "sim:";
+/// From a city's seed to that of another one.
+constexpr std::uint64_t other_city_seeds = 1000;
+
+int number_of(const std::string& word, const std::string& value) {
+  std::size_t read = 0;
+  try {
+    const int number = std::stoi(value, &read);
+    if (read == value.size()) return number;
+  } catch (const std::logic_error&) {
+    read = 0;  // No number at all, or a longer one; refused below.
+  }
+  throw std::invalid_argument("'" + word + "' in a simulated drive: '" + value +
+                              "' is no whole number");
+}
+
+SimulationArguments simulated_drive(const std::string& name, SimulationArguments arguments) {
+  std::istringstream words(name.substr(simulated_prefix.size()));
+  std::getline(words, arguments.preset, ',');
+  for (std::string word; std::getline(words, word, ',');) {
+    const std::size_t equals = word.find('=');
+    const std::string key = word.substr(0, equals);
+    const std::string value = equals == std::string::npos ? "" : word.substr(equals + 1);
+    if (key == "seed")
+      arguments.seed = static_cast<std::uint64_t>(number_of(word, value));
+    else if (key == "scans")
+      arguments.scans = number_of(word, value);
+    else if (key == "sensor")
+      arguments.sensor = value;
+    else if (key == "motion")
+      arguments.motion = value;
+    else if (key == "traffic")
+      arguments.traffic = value;
+    else if (word == "rolling")
+      arguments.rolling = true;
+    else
+      throw std::invalid_argument(
+          "'" + word + "' in '" + name +
+          "': there are seed=, scans=, sensor=, motion=, traffic= and rolling");
+  }
+  return arguments;
+}
+
+GroundTruthSequence open_simulated(const SimulationArguments& arguments) {
+  const simulation::SimulationConfig config = simulation_config(arguments);
+  const auto simulation = std::make_shared<simulation::Simulation>(config);
+  GroundTruthSequence sequence;
+  sequence.sensor = config.sensor;
+  sequence.labelled = true;
+  sequence.read = [simulation](std::size_t i) {
+    return simulation->scan(static_cast<int>(i)).scan;
+  };
+  for (int i = 0; i < config.scans; ++i) {
+    const double time_s = i * config.sensor.period_s;
+    sequence.stamps_ns.push_back(std::llround(1e9 * time_s));
+    sequence.truth.push_back(simulation->T_map_lidar_at(time_s));
+  }
+  return sequence;
+}
+
+GroundTruthSequence open_recorded(const std::string& name) {
+  const auto dataset = std::make_shared<ScanDataset>(name);
+  GroundTruthSequence sequence;
+  sequence.name = name;
+  sequence.sensor = dataset->suggested_sensor();
+  sequence.labelled = dataset->has_labels(0);
+  sequence.read = [dataset](std::size_t i) { return dataset->read(i).scan; };
+  for (std::size_t i = 0; i < dataset->size(); ++i)
+    sequence.stamps_ns.push_back(dataset->stamp_ns(i));
+  if (const std::optional<Trajectory> truth = dataset->truth())
+    for (const StampedPose& pose : *truth) sequence.truth.push_back(pose.T_map_lidar);
+  return sequence;
+}
+
+}  // namespace
+
+GroundTruthSequence open_ground_truth_sequence(const std::string& name,
+                                               const SimulationArguments& simulated) {
+  if (!name.starts_with(simulated_prefix)) return open_recorded(name);
+  const SimulationArguments arguments = simulated_drive(name, simulated);
+  GroundTruthSequence sequence = open_simulated(arguments);
+  sequence.name = name;
+  if (name.find(",seed=") == std::string::npos)
+    sequence.name += ",seed=" + std::to_string(arguments.seed);
+  return sequence;
+}
+
+GroundTruthSequence open_other_city(const std::string& name) {
+  if (!name.starts_with(simulated_prefix))
+    throw std::invalid_argument("there is no other place for the recording " + name +
+                                ": name one with --other-place");
+  SimulationArguments arguments = simulated_drive(name, {});
+  arguments.seed += other_city_seeds;
+  GroundTruthSequence sequence = open_simulated(arguments);
+  sequence.name = name + ",seed=" + std::to_string(arguments.seed);
+  return sequence;
+}
+
+}  // namespace stillmap::cli
