@@ -243,11 +243,11 @@ struct ScanInParts {
   const Scan& scan;
   const SweepTimes& sweep;
   const PointLabels& labels;
-  Features features;
-  ObjectClusters objects;
-  std::optional<RangeImageView> view;
-  std::vector<MotionClass> motion_classes;
-  SweepPrior sweep_prior;
+  Features features{};
+  ObjectClusters objects{};
+  std::optional<RangeImageView> view{};
+  std::vector<MotionClass> motion_classes{};
+  SweepPrior sweep_prior{};
   MovableUse movable = MovableUse::none;
 };
 
