@@ -49,7 +49,7 @@ demo: programs ## Run the main job: simulated city, replay over DDS, server, pla
 test: build ## Build and run the tests
 	$(ONE_CORE) ctest --preset $(PRESET) -j $(JOBS)
 
-test-dev: ## The tests under ASan and UBSan, warnings as errors
+test-dev: ## The tests under ASan and UBSan with assertions, warnings as errors
 	$(MAKE) test PRESET=dev
 
 test-tsan: ## The tests under ThreadSanitizer

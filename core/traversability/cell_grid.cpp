@@ -13,7 +13,7 @@ CellGrid<float> distances_to_marked(const CellGrid<std::uint8_t>& marked, double
   // OpenCV measures the distance to the nearest zero.
   cv::Mat1b open(marked.height(), marked.width());
   std::ranges::transform(marked.cells(), open.begin(),
-                         [](std::uint8_t mark) { return std::uint8_t{mark == 0 ? 1U : 0U}; });
+                         [](std::uint8_t mark) { return static_cast<std::uint8_t>(mark == 0); });
   cv::Mat1f result(marked.height(), marked.width(), &distances(0, 0));
   // OpenCV adds squares of cell numbers and of distances in floats, which are exact below 2^24, and
   // its table of squares overflows beyond 46340 rows: larger grids are cut into blocks of at most
