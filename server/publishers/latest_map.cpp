@@ -37,14 +37,16 @@ void LatestMap::publish(std::shared_ptr<const MapSnapshot> view) {
 void LatestMap::add_pose(const StampedPose& pose, OdometryHealth health,
                          const std::string& label_source) {
   const std::scoped_lock lock(mutex_);
+  ++poses_added_;
+  health_ = health;
+  label_source_ = label_source;
+  // A pose that nothing confirmed is no part of the path, nor of its file.
+  if (health == OdometryHealth::lost) return;
   const auto is_later = [&](const StampedPose& known) { return known.stamp_ns >= pose.stamp_ns; };
   const auto later =
       std::ranges::find_if(trajectory_.rbegin(), trajectory_.rend(), std::not_fn(is_later));
   trajectory_.erase(later.base(), trajectory_.end());
   trajectory_.push_back(pose);
-  ++poses_added_;
-  health_ = health;
-  label_source_ = label_source;
 }
 
 std::shared_ptr<const MapSnapshot> LatestMap::view() const {

@@ -26,7 +26,7 @@ class LatestMap {
   void begin(std::shared_ptr<const MapSnapshot> view, Trajectory trajectory);
   void publish(std::shared_ptr<const MapSnapshot> view);
   /// Removes poses with the same or later stamps first: a recording that is played again replaces
-  /// its old path.
+  /// its old path. A lost pose changes health and label source alone.
   void add_pose(const StampedPose& pose, OdometryHealth health, const std::string& label_source);
 
   /// Never null once `begin` was called.
@@ -46,7 +46,7 @@ class LatestMap {
   /// At most `max_poses` (>= 2) of its poses, evenly spaced, the newest always among them. The
   /// selection stays the same until the path has twice as many poses.
   [[nodiscard]] Trajectory trajectory(std::size_t max_poses) const;
-  /// The newest pose; the origin before the first.
+  /// The newest pose that was not lost; the origin before the first.
   [[nodiscard]] StampedPose newest_pose() const;
   /// Poses added so far, over all maps: changes with every scan.
   [[nodiscard]] std::uint64_t poses_added() const;

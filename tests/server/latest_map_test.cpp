@@ -39,6 +39,18 @@ TEST(LatestMap, LetsAReplayReplaceItsOldPath) {
   EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{1}));
 }
 
+TEST(LatestMap, KeepsLostPosesOutOfThePath) {
+  LatestMap latest_map;
+  latest_map.begin(std::make_shared<const MapSnapshot>(), {{.stamp_ns = 1}, {.stamp_ns = 2}});
+  latest_map.add_pose({.stamp_ns = 1}, OdometryHealth::lost, "stream");
+  latest_map.add_pose({.stamp_ns = 3}, OdometryHealth::lost, "stream");
+  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{1, 2}));
+  EXPECT_EQ(latest_map.health(), OdometryHealth::lost);
+  EXPECT_EQ(latest_map.poses_added(), 2U);
+  add(latest_map, 4);
+  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{1, 2, 4}));
+}
+
 TEST(LatestMap, BeginsANewPathWithANewMap) {
   LatestMap latest_map;
   latest_map.begin(std::make_shared<const MapSnapshot>(MapSnapshot{.map_id = 1, .tiles = {}}), {});
