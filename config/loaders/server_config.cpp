@@ -1,6 +1,7 @@
 #include "config/loaders/server_config.hpp"
 
 #include <algorithm>
+#include <numbers>
 #include <stdexcept>
 
 #include "config/loaders/listening_address.hpp"
@@ -9,6 +10,7 @@
 #include "config/loaders/robot_profile.hpp"
 #include "config/loaders/sensor_file.hpp"
 #include "config/loaders/yaml_section.hpp"
+#include "core/frames/rigid_motion.hpp"
 #include "core/map/datum.hpp"
 #include "core/segmentation/model_description.hpp"
 
@@ -68,8 +70,60 @@ void read_labels(YamlSection section, LabelsConfig& labels) {
 
 void read_frames(YamlSection section, FramesConfig& frames) {
   section.text("map", frames.map);
+  section.text("odom", frames.odom);
+  using OdomSource = FramesConfig::OdomSource;
+  section.choice<OdomSource>("odom_source", frames.odom_source,
+                             {{"own", OdomSource::own}, {"prior", OdomSource::prior}});
+  section.text("base", frames.base);
   section.text("lidar", frames.lidar);
   if (frames.map.empty()) section.fault("map", "is empty; a frame needs a name");
+  if (!frames.odom.empty() && frames.base.empty()) {
+    section.fault("odom", "needs the robot's frame beneath it: set frames.base, as base_link");
+  }
+  if (frames.odom.empty() && frames.odom_source == OdomSource::prior) {
+    section.fault("odom_source", "needs the frame that the odometry is in: set frames.odom");
+  }
+  const std::vector<std::string> names{frames.map, frames.odom, frames.base, frames.lidar};
+  for (auto name = names.begin(); name != names.end(); ++name) {
+    if (name->empty() || std::find(names.begin(), name, *name) == name) continue;
+    section.fault("map", "'" + *name + "' is the name of two frames");
+  }
+}
+
+/// Three numbers in a list, which stay as they are where the file leaves them out.
+Eigen::Vector3d read_triple(YamlSection& section, const std::string& name,
+                            const Eigen::Vector3d& unchanged, Range allowed) {
+  std::vector<double> values(unchanged.begin(), unchanged.end());
+  section.number_list(name, values, allowed);
+  if (values.size() == 3) return Eigen::Map<const Eigen::Vector3d>(values.data());
+  section.fault(name, "has " + std::to_string(values.size()) + " numbers; wanted are three");
+  return unchanged;
+}
+
+Eigen::Isometry3d read_extrinsic(YamlSection& section) {
+  constexpr double radians_per_degree = std::numbers::pi / 180.0;
+  const Eigen::Vector3d none(0.0, 0.0, 0.0);
+  const Eigen::Vector3d xyz_m = read_triple(section, "xyz_m", none, {-100, 100});
+  const Eigen::Vector3d rpy_deg = read_triple(section, "rpy_deg", none, {-360, 360});
+  return from_xyz_rpy(xyz_m, rpy_deg * radians_per_degree);
+}
+
+void read_mount(YamlSection section, const FramesConfig& frames, MountConfig& mount) {
+  using Source = MountConfig::Source;
+  section.choice<Source>(
+      "source", mount.source,
+      {{"configuration", Source::configuration}, {"tf_static", Source::tf_static}});
+  mount.T_base_lidar = read_extrinsic(section);
+  section.number("wait_s", mount.wait_s, {0, 3600});
+  section.choice<bool>("if_missing", mount.identity_if_missing,
+                       {{"drop", false}, {"identity", true}});
+  const bool is_mounted = !mount.T_base_lidar.isApprox(Eigen::Isometry3d::Identity());
+  if (mount.source == Source::tf_static && is_mounted) {
+    section.fault("xyz_m", "and rpy_deg are not used with source: tf_static; leave them out");
+  }
+  if (frames.base.empty() && (is_mounted || mount.source == Source::tf_static)) {
+    section.fault("source", "needs the robot's frame: set frames.base, as base_link");
+  }
 }
 
 void read_network(YamlSection& section, const fs::path& folder, DdsNetworkConfig& network) {
@@ -215,8 +269,13 @@ void read_server(YamlSection file, const fs::path& folder, ServerConfig& config)
   read_mapper(file, config.mapper);
   read_labels(file.section("labels"), config.labels);
   read_frames(file.section("frames"), config.frames);
+  read_mount(file.section("mount"), config.frames, config.mount);
   read_dds(file.section("dds"), folder, config.dds);
   read_topics(file.section("topics"), config.topics);
+  if (config.frames.odom_source == FramesConfig::OdomSource::prior &&
+      config.topics.odometry_prior.empty()) {
+    file.fault("frames", "odom_source: prior needs topics.odometry_prior");
+  }
   read_input(file.section("input"), config.input);
   read_publish(file.section("publish"), config.publish);
   read_map(file.section("map"), config.map);

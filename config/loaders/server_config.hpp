@@ -43,11 +43,38 @@ struct LabelsConfig {
   std::uint32_t budget_ms = 90;
 };
 
-/// Names of the coordinate frames in everything that is published.
+/// Names of the coordinate frames in everything that is published (REP 105).
 struct FramesConfig {
   std::string map = "map";
+  /// Between map and base: poses in it never jump. Empty: no such frame.
+  std::string odom;
+  enum class OdomSource {
+    /// The server's own odometry, made smooth.
+    own,
+    /// The odometry prior, whose publisher also publishes odom -> base.
+    prior,
+  };
+  OdomSource odom_source = OdomSource::own;
+  /// The robot, whose poses are published. Empty: the lidar is the base.
+  std::string base;
   /// Empty: the frame that the incoming clouds name.
   std::string lidar = "lidar";
+};
+
+/// Where the lidar sits on the robot, T_base_lidar.
+struct MountConfig {
+  enum class Source {
+    /// `T_base_lidar` below.
+    configuration,
+    /// What the robot publishes on /tf_static.
+    tf_static,
+  };
+  Source source = Source::configuration;
+  Eigen::Isometry3d T_base_lidar = Eigen::Isometry3d::Identity();
+  /// Longest wait for the transform on /tf_static.
+  double wait_s = 10.0;
+  /// After that: map as if the lidar were the base; else scans are dropped until it comes.
+  bool identity_if_missing = false;
 };
 
 struct DdsConfig {
@@ -159,6 +186,7 @@ struct ServerConfig {
   MapperConfig mapper{.sensor = hdl_64e(), .prepare = {}, .odometry = {}, .static_map = {}};
   LabelsConfig labels;
   FramesConfig frames;
+  MountConfig mount;
   DdsConfig dds;
   TopicsConfig topics;
   InputConfig input;

@@ -82,6 +82,40 @@ static_map: {min_points: 5}
   EXPECT_EQ(config.mapper.static_map.min_points, 5U);
 }
 
+TEST(ServerConfig, ReadsWhereTheLidarSits) {
+  const ServerConfig config = load(
+      "frames: {base: base_link, odom: odom}\n"
+      "mount: {xyz_m: [1, 2, 3], rpy_deg: [0, 90, 0]}\n");
+  EXPECT_EQ(config.frames.base, "base_link");
+  EXPECT_EQ(config.frames.odom, "odom");
+  const Eigen::Isometry3d& T_base_lidar = config.mount.T_base_lidar;
+  EXPECT_TRUE((T_base_lidar * Eigen::Vector3d(1.0, 0.0, 0.0))
+                  .isApprox(Eigen::Vector3d(1.0, 2.0, 2.0), 1e-12));
+  const ServerConfig published = load(
+      "frames: {base: base_link, lidar: ''}\n"
+      "mount: {source: tf_static, wait_s: 3, if_missing: identity}\n");
+  EXPECT_EQ(published.mount.source, MountConfig::Source::tf_static);
+  EXPECT_EQ(published.mount.wait_s, 3.0);
+  EXPECT_TRUE(published.mount.identity_if_missing);
+}
+
+TEST(ServerConfig, RefusesFramesThatDoNotFitTogether) {
+  EXPECT_THAT(refusal_of("mount: {xyz_m: [1, 0, 0]}"), HasSubstr("set frames.base"));
+  EXPECT_THAT(refusal_of("mount: {source: tf_static}"), HasSubstr("set frames.base"));
+  EXPECT_THAT(refusal_of("frames: {odom: odom}"), HasSubstr("set frames.base"));
+  EXPECT_THAT(refusal_of("frames: {base: b, odom_source: prior}"), HasSubstr("set frames.odom"));
+  EXPECT_THAT(refusal_of("frames: {base: b, odom: o, odom_source: prior}\n"
+                         "topics: {odometry_prior: ''}"),
+              HasSubstr("needs topics.odometry_prior"));
+  EXPECT_THAT(refusal_of("frames: {base: map}"), HasSubstr("'map' is the name of two frames"));
+  EXPECT_THAT(refusal_of("frames: {base: b}\nmount: {xyz_m: [1, 0]}"),
+              HasSubstr("mount.xyz_m: has 2 numbers; wanted are three"));
+  EXPECT_THAT(refusal_of("frames: {base: b}\nmount: {rpy_deg: [0, .nan, 0]}"),
+              HasSubstr("mount.rpy_deg"));
+  EXPECT_THAT(refusal_of("frames: {base: b}\nmount: {source: tf_static, xyz_m: [1, 0, 0]}"),
+              HasSubstr("are not used with source: tf_static"));
+}
+
 TEST(ServerConfig, TakesRelativePathsFromTheFilesFolder) {
   (void)write_file("my_sensor.yaml", "{name: mine, rings: 8, fov_up_deg: 10, fov_down_deg: -10}");
   const ServerConfig config =

@@ -58,6 +58,10 @@ ServiceSetup::ServiceSetup(const std::string& delivery, const std::string& map_o
       << "map: {file: map.stillmap, " << map_options << "}\n";
 }
 
+void ServiceSetup::add(const std::string& yaml) const {
+  std::ofstream(folder_ / "server.yaml", std::ios::app) << yaml;
+}
+
 std::vector<std::string> ServiceSetup::server_arguments() const {
   return {"--config", (folder_ / "server.yaml").string()};
 }

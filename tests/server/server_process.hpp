@@ -37,6 +37,9 @@ class ServiceSetup {
   explicit ServiceSetup(const std::string& delivery,
                         const std::string& map_options = "save_period_s: 3600");
 
+  /// More sections of the server's file.
+  void add(const std::string& yaml) const;
+
   [[nodiscard]] std::vector<std::string> server_arguments() const;
   [[nodiscard]] dds::DdsOptions dds() const;
   [[nodiscard]] ClientOptions client() const;

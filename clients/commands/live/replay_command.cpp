@@ -45,15 +45,19 @@ class PoseLog {
   /// The poses of these scans, in their order, without those that have none.
   [[nodiscard]] Trajectory poses_of(const std::vector<std::int64_t>& stamps_ns) const;
 
+  /// What they are poses of.
+  [[nodiscard]] std::string frame() const;
+
  private:
   /// From the odometry topic: replaces the pose of a scan that is sent again.
-  void take(const StampedPose& pose);
+  void take(const OdometryUpdate& update);
   /// From the path, which may be older: does not replace a pose.
   void add(const StampedPose& pose);
 
   mutable std::mutex mutex_;
   std::condition_variable added_;
   std::map<std::int64_t, Eigen::Isometry3d> T_map_lidar_;
+  std::string frame_ = "lidar";
   // Last members: their callbacks end before the poses are destroyed.
   Subscription odometry_;
   Subscription path_;
@@ -84,7 +88,7 @@ struct ServerCounts {
 
 PoseLog::PoseLog(Client& client)
     : odometry_(client.subscribe_odometry([this](const OdometryUpdate& update) {
-        take(update.pose);
+        take(update);
         added_.notify_one();
       })),
       path_(client.subscribe_path([this](const Trajectory& path) {
@@ -92,9 +96,15 @@ PoseLog::PoseLog(Client& client)
         added_.notify_one();
       })) {}
 
-void PoseLog::take(const StampedPose& pose) {
+void PoseLog::take(const OdometryUpdate& update) {
   const std::lock_guard lock(mutex_);
-  T_map_lidar_.insert_or_assign(pose.stamp_ns, pose.T_map_lidar);
+  T_map_lidar_.insert_or_assign(update.pose.stamp_ns, update.pose.T_map_lidar);
+  frame_ = update.child_frame;
+}
+
+std::string PoseLog::frame() const {
+  const std::lock_guard lock(mutex_);
+  return frame_;
 }
 
 void PoseLog::add(const StampedPose& pose) {
@@ -248,6 +258,8 @@ struct ReplayOutcome {
   ReplayResult replay;
   ServerCounts server;
   Trajectory poses;
+  /// What they are poses of.
+  std::string frame;
 };
 
 void require_subscribers(ScanPublisher& publisher, const ReplayArguments& arguments,
@@ -318,6 +330,7 @@ ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
     poses.wait_for(stamps_ns, arguments.client.timeout());
   }
   outcome.poses = poses.poses_of(stamps_ns);
+  outcome.frame = poses.frame();
   return outcome;
 }
 
@@ -328,7 +341,7 @@ Json to_json(const ReplayOutcome& outcome) {
           {"mapped", outcome.server.mapped},
           {"dropped", outcome.server.dropped},
           {"poses", outcome.poses.size()},
-          {"poses_frame", "lidar; the map is the lidar frame of the server's first scan"},
+          {"poses_frame", outcome.frame + "; the map is its place at the server's first scan"},
           {"seconds", outcome.replay.seconds},
           {"interrupted", outcome.replay.stopped}};
 }
@@ -347,11 +360,11 @@ std::string describe(const ReplayOutcome& outcome) {
 ExitCode run(const ReplayArguments& arguments) {
   StopSignal stop;
   const ReplayOutcome outcome = replay(arguments, stop);
-  if (!arguments.out.empty()) write_poses_as_named(arguments.out, outcome.poses);
+  if (!arguments.out.empty()) write_poses_as_named(arguments.out, outcome.poses, outcome.frame);
   std::cout << (arguments.json ? to_json(outcome).dump(2) + "\n" : describe(outcome));
   if (!arguments.json && !arguments.out.empty()) {
-    std::cout << "poses written to " << arguments.out
-              << " (lidar frame; the map is the lidar frame of the server's first scan)\n";
+    std::cout << "poses written to " << arguments.out << " (frame '" << outcome.frame
+              << "'; the map is its place at the server's first scan)\n";
   }
   const std::size_t published = outcome.replay.published_stamps_ns.size();
   const bool complete = outcome.server.mapped >= published && outcome.poses.size() == published;
