@@ -14,8 +14,9 @@ std::string without_slash(const std::string& frame) {
 bool FrameTree::set(const FrameTransform& transform) {
   const std::string above = without_slash(transform.parent);
   const std::string below = without_slash(transform.child);
-  const bool is_finite = transform.T_parent_child.matrix().allFinite();
-  if (above.empty() || below.empty() || !is_finite) return false;
+  const Eigen::Isometry3d& T = transform.T_parent_child;
+  const bool is_usable = T.matrix().allFinite() && T.translation().norm() <= max_length_m;
+  if (above.empty() || below.empty() || !is_usable) return false;
   for (auto frame = above;;) {
     if (frame == below) return false;
     const auto link = link_of_child_.find(frame);

@@ -20,8 +20,8 @@ struct FrameTransform {
 class FrameTree {
  public:
   /// Replaces what was known of the child. False, and nothing changes, for a transform that is not
-  /// finite, a frame without a name, one that would be its own ancestor, or more frames than any
-  /// robot has.
+  /// finite or longer than any robot, a frame without a name, one that would be its own ancestor,
+  /// or more frames than any robot has.
   bool set(const FrameTransform& transform);
 
   /// T_target_source; nothing when the two do not hang together.
@@ -33,6 +33,7 @@ class FrameTree {
 
  private:
   static constexpr std::size_t max_frames = 10'000;
+  static constexpr double max_length_m = 1000.0;
 
   struct Link {
     std::string parent;

@@ -30,8 +30,9 @@ void StaticTransforms::take(const tf2_msgs::msg::TFMessage& message) {
   if (unusable == 0) return;
   statistics_.count("tf_static_unusable");
   throttled_log_.warn("tf_static", "a message on /tf_static has " + std::to_string(unusable) +
-                                       " transforms that cannot be used: not finite, without "
-                                       "names, or of a frame to its own ancestor");
+                                       " transforms that cannot be used: not finite, longer "
+                                       "than a robot, without names, or of a frame to its own "
+                                       "ancestor");
 }
 
 std::optional<Eigen::Isometry3d> StaticTransforms::find(const std::string& target,

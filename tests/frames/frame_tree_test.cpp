@@ -62,6 +62,7 @@ TEST(FrameTree, RefusesWhatCannotBe) {
   Eigen::Isometry3d nan = at(1.0);
   nan.translation().x() = std::numeric_limits<double>::quiet_NaN();
   EXPECT_FALSE(tree.set({"base_link", "lidar", nan}));
+  EXPECT_FALSE(tree.set({"base_link", "lidar", at(1e300)}));
   EXPECT_FALSE(tree.set({"", "lidar", at(1.0)}));
   EXPECT_FALSE(tree.set({"base_link", "", at(1.0)}));
   EXPECT_FALSE(tree.set({"lidar", "lidar", at(1.0)}));
@@ -73,7 +74,7 @@ TEST(FrameTree, HoldsAsManyFramesAsARobotHas) {
   FrameTree tree;
   int taken = 0;
   for (int i = 0; i < 20'000; ++i) {
-    taken += tree.set({"base_link", "frame" + std::to_string(i), at(i)}) ? 1 : 0;
+    taken += tree.set({"base_link", "frame" + std::to_string(i), at(1.0)}) ? 1 : 0;
   }
   EXPECT_EQ(taken, 10'000);
   EXPECT_TRUE(tree.set({"base_link", "frame7", at(-1.0)}));

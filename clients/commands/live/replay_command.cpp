@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "clients/commands/arguments/client_arguments.hpp"
+#include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
@@ -248,6 +249,10 @@ struct ReplayArguments {
   /// 0: not given.
   double rate = 0.0;
   std::string topic = "points";
+  /// header.frame_id of the clouds.
+  std::string frame = "lidar";
+  std::string base_frame = "base_link";
+  MountArguments mount;
   std::string out;
   std::uint32_t subscribers = 1;
   bool lossless = false;
@@ -306,6 +311,12 @@ ReplayResult publish_with_progress(const ScanDataset& dataset, const ReplayArgum
       [&](const SkippedScan& scan) { progress.say("stillmap: skipped: " + scan.reason); });
 }
 
+std::optional<FrameTransform> mount_of(const ReplayArguments& arguments) {
+  const auto T_base_lidar = arguments.mount.T_base_lidar();
+  if (!T_base_lidar) return std::nullopt;
+  return FrameTransform{arguments.base_frame, arguments.frame, *T_base_lidar};
+}
+
 ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
   (void)arguments.replay.range.end(dataset);
@@ -313,6 +324,8 @@ ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   PoseLog poses(client);
   ScanPublisher publisher(client, {.dds = arguments.client.dds(DdsRole::sensor),
                                    .points_topic = arguments.topic,
+                                   .lidar_frame = arguments.frame,
+                                   .mount = mount_of(arguments),
                                    .lossless = arguments.lossless});
   require_subscribers(publisher, arguments, stop);
   const dds::ServerStatus before = client.status();
@@ -408,12 +421,17 @@ void add_replay_command(CommandHandle program, Action& action) {
               "Begin when so many take the scans: the server, and 'stillmap record', say")
       .between(1, 1000)
       .with_default();
+  command.option("--frame", arguments->frame, "The clouds' frame (header.frame_id)").with_default();
+  add_mount_option(command, arguments->mount, "Publish on /tf_static");
+  command.option("--base", arguments->base_frame, "The robot's frame there").with_default();
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"
       "  stillmap replay sequences/00 --rate 2\n"
       "  stillmap replay city --lossless --out poses_lidar.txt\n"
+      "  stillmap replay city --mount 1.2,0,1.4,0,15,0   # for a server with mount: {source: "
+      "tf_static}\n"
       "Ends when the server has processed what was sent, and prints the counts. Exit code 1\n"
       "when a lossless replay lost something, 3 when no server answers or it stops taking scans.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
