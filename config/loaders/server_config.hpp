@@ -77,6 +77,18 @@ struct MountConfig {
   bool identity_if_missing = false;
 };
 
+/// One lidar of several on a robot.
+struct LidarConfig {
+  /// In counters and messages.
+  std::string name;
+  SensorModel sensor;
+  /// ROS 2 name, without the prefix that DDS sees.
+  std::string topic;
+  /// header.frame_id of its clouds, where several lidars share a topic; empty: any.
+  std::string frame;
+  Eigen::Isometry3d T_base_lidar = Eigen::Isometry3d::Identity();
+};
+
 struct DdsConfig {
   /// 0..232, as DDS defines it; ROS_DOMAIN_ID of the ROS 2 peers.
   std::uint32_t domain_id = 0;
@@ -110,6 +122,8 @@ struct InputConfig {
   DeliveryMode delivery = DeliveryMode::latest;
   /// Scans that may wait for the mapper.
   std::uint32_t queue_length = 3;
+  /// Of several lidars: longest wait of a sweep for the scan of one.
+  double sweep_wait_s = 0.1;
   PointFieldNames fields;
   LabelKind label_kind = LabelKind::semantic_kitti;
 };
@@ -187,6 +201,9 @@ struct ServerConfig {
   LabelsConfig labels;
   FramesConfig frames;
   MountConfig mount;
+  /// Empty: one lidar, `mapper.sensor` on `topics.points`. Else `mapper.sensor`, `frames.lidar` and
+  /// `mount` are those of the merged scans.
+  std::vector<LidarConfig> lidars;
   DdsConfig dds;
   TopicsConfig topics;
   InputConfig input;

@@ -41,6 +41,9 @@ Scan mounted_scan(int index, const Eigen::Isometry3d& T_base_lidar) {
 
 class Frames : public testing::Test {
  protected:
+  explicit Frames(const std::string& sensors = "sensor: vlp_16")
+      : setup_("every", "save_period_s: 3600", sensors) {}
+
   void start(const std::string& yaml) {
     setup_.add(yaml);
     server_.emplace(setup_.server_arguments());
@@ -52,10 +55,10 @@ class Frames : public testing::Test {
       updates_.emplace(update.pose.stamp_ns, update);
     });
     publisher_.emplace(setup_.publisher(true));
-    ASSERT_TRUE(publisher_->wait_for_subscriber(patience));
   }
 
   void drive(int first, int last, const Eigen::Isometry3d& T_base_lidar) {
+    ASSERT_TRUE(publisher_->wait_for_subscriber(patience));
     for (int i = first; i < last; ++i) {
       ASSERT_TRUE(publisher_->publish(mounted_scan(i, T_base_lidar), {}, patience));
     }
@@ -93,7 +96,7 @@ class Frames : public testing::Test {
     return reader.take(message, {}, patience) ? std::optional(message) : std::nullopt;
   }
 
-  ServiceSetup setup_{"every"};
+  ServiceSetup setup_;
   dds::Topics topics_ = dds::Topics::in("stillmap");
   std::optional<ServerProcess> server_;
   std::optional<Client> client_;
@@ -324,6 +327,75 @@ TEST_F(OdometryPriorFrames, AFrameThatIsNowhereOnTheRobotIsRefused) {
   expect_poses_of_base(seen_scans);
   EXPECT_GE(client_->status().counter("odometry_prior_unknown_frame"), 1U);
   EXPECT_EQ(client_->status().dropped(), 0U);
+}
+
+Eigen::Isometry3d rear_mount() {
+  return from_xyz_rpy({-0.8, 0.2, 1.2}, {0.0, 10.0 * deg, 180.0 * deg});
+}
+
+class SeveralLidars : public Frames {
+ protected:
+  SeveralLidars()
+      : Frames(
+            "sensors:\n"
+            "  - {name: front, sensor: vlp_16, topic: front/points, xyz_m: [1.2, 0.1, 1.4],"
+            " rpy_deg: [0, 15, 0]}\n"
+            "  - {name: rear, sensor: vlp_16, topic: rear/points, frame: rear_lidar,"
+            " xyz_m: [-0.8, 0.2, 1.2], rpy_deg: [0, 10, 180]}") {
+    start("frames: {base: base_link}\n");
+    front_.emplace(publisher_on("front/points", "front_lidar"));
+    rear_.emplace(publisher_on("rear/points", "rear_lidar"));
+  }
+
+  [[nodiscard]] ScanPublisher publisher_on(const std::string& topic, const std::string& frame) {
+    ScanPublisherOptions options = setup_.publisher(true);
+    options.points_topic = topic;
+    options.lidar_frame = frame;
+    ScanPublisher publisher(options);
+    EXPECT_TRUE(publisher.wait_for_subscriber(patience));
+    return publisher;
+  }
+
+  std::optional<ScanPublisher> front_, rear_;
+};
+
+TEST_F(SeveralLidars, AreMappedAsOne) {
+  constexpr int scans = 12;
+  for (int i = 0; i < scans; ++i) {
+    ASSERT_TRUE(front_->publish(mounted_scan(i, tilted_mount()), {}, patience));
+    ASSERT_TRUE(rear_->publish(mounted_scan(i, rear_mount()), {}, patience));
+  }
+  expect_poses_of_base(scans);
+  const dds::ServerStatus status = client_->status();
+  EXPECT_EQ(status.counter("scans_mapped"), static_cast<std::uint64_t>(scans));
+  EXPECT_EQ(status.dropped(), 0U);
+  EXPECT_EQ(status.counter("sweeps_without_rear"), 0U);
+  const auto mount = sample(topics_.tf_static);
+  ASSERT_TRUE(mount);
+  const Eigen::Vector3d origin = wire::from_tf(*mount).at(0).T_parent_child.translation();
+  EXPECT_TRUE(origin.isApprox(Eigen::Vector3d(0.2, 0.15, 1.3), 1e-9)) << origin.transpose();
+}
+
+TEST_F(SeveralLidars, GoOnWithoutOneThatFallsSilent) {
+  constexpr int both = 5;
+  constexpr int scans = 12;
+  for (int i = 0; i < scans; ++i) {
+    ASSERT_TRUE(front_->publish(mounted_scan(i, tilted_mount()), {}, patience));
+    if (i >= both) continue;
+    ASSERT_TRUE(rear_->publish(mounted_scan(i, rear_mount()), {}, patience));
+  }
+  expect_poses_of_base(scans);
+  const dds::ServerStatus status = client_->status();
+  EXPECT_EQ(status.counter("sweeps_without_rear"), static_cast<std::uint64_t>(scans - both));
+  EXPECT_EQ(status.counter("sweeps_without_front"), 0U);
+  EXPECT_EQ(status.dropped(), 0U);
+}
+
+TEST_F(SeveralLidars, ACloudOfNoneOfThemIsRefused) {
+  ScanPublisher stranger = publisher_on("rear/points", "camera");
+  ASSERT_TRUE(stranger.publish(mounted_scan(0, rear_mount()), {}, patience));
+  EXPECT_TRUE(eventually([&] { return client_->status().counter("dropped_unknown_frame") == 1; }));
+  EXPECT_THAT(client_->status().reason, HasSubstr("'camera'"));
 }
 
 }  // namespace
