@@ -23,7 +23,7 @@ struct ScanPublisherOptions {
   /// header.frame_id of the clouds.
   std::string lidar_frame = "lidar";
   /// Published on /tf_static, as a robot does: where the lidar sits.
-  std::optional<FrameTransform> mount;
+  std::optional<FrameTransform> mount = std::nullopt;
   /// Keep every scan until the server took it (needs a server with `delivery: every`); otherwise a
   /// newer scan may overtake an untaken one.
   bool lossless = false;

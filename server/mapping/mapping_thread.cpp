@@ -18,6 +18,10 @@ using Clock = std::chrono::steady_clock;
 // How long a request, or the snapshot after the last scan, may wait while no scan comes.
 constexpr std::chrono::milliseconds idle_period{50};
 
+// No robot is faster; a prior that says so begins anew, or is broken.
+constexpr double max_speed_m_s = 150.0;
+constexpr double max_jump_m = 1.0;
+
 constexpr std::size_t no_limit = std::numeric_limits<std::size_t>::max();
 
 // The rest of the limit is for copies: in the writers' histories, and for queries.
@@ -244,13 +248,23 @@ std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns)
 
 std::optional<Eigen::Isometry3d> MappingThread::motion_prior(std::int64_t stamp_ns) {
   if (outputs_.prior == nullptr) return std::nullopt;
-  const auto motion = outputs_.prior->motion(mapper_.trajectory().back().stamp_ns, stamp_ns);
+  const std::int64_t last_ns = mapper_.trajectory().back().stamp_ns;
+  const auto motion = outputs_.prior->motion(last_ns, stamp_ns);
   if (!motion) return std::nullopt;
+  const double distance_m = motion->T_before_after.translation().norm();
+  const double interval_s = 1e-9 * static_cast<double>(stamp_ns - last_ns);
+  if (!(distance_m <= max_jump_m + max_speed_m_s * interval_s)) {
+    refuse_prior("odometry_prior_jumps", "it jumps by " + std::to_string(distance_m) + " m in " +
+                                             std::to_string(interval_s) + " s");
+    return std::nullopt;
+  }
   const auto T_lidar_frame = frames_.T_lidar_frame(motion->frame);
   if (T_lidar_frame) return motion_of_frame(*T_lidar_frame, motion->T_before_after);
-  refuse_prior("it moves the frame '" + motion->frame +
-               "' (child_frame_id), and where that is on the robot is not known; set frames.base "
-               "and mount, or publish it on /tf_static beneath frames.base");
+  refuse_prior(
+      "odometry_prior_unknown_frame",
+      "it moves the frame '" + motion->frame +
+          "' (child_frame_id), and where that is on the robot is not known; set frames.base "
+          "and mount, or publish it on /tf_static beneath frames.base");
   return std::nullopt;
 }
 
@@ -259,8 +273,9 @@ OdomPose MappingThread::pose_in_priors_odom(std::int64_t stamp_ns,
   const auto prior = outputs_.prior != nullptr ? outputs_.prior->pose_at(stamp_ns) : std::nullopt;
   const auto T_lidar_frame = prior ? frames_.T_lidar_frame(prior->frame) : std::nullopt;
   if (prior && prior->odom_frame != odom_frame_) {
-    refuse_prior("its poses are in the frame '" + prior->odom_frame +
-                 "' (header.frame_id), and frames.odom is '" + odom_frame_ + "'");
+    refuse_prior("odometry_prior_unknown_frame",
+                 "its poses are in the frame '" + prior->odom_frame +
+                     "' (header.frame_id), and frames.odom is '" + odom_frame_ + "'");
   } else if (T_lidar_frame) {
     const Eigen::Isometry3d T_base_frame = frames_.T_base_lidar() * *T_lidar_frame;
     T_map_odom_ = T_map_base * T_base_frame * prior->T_odom_frame.inverse();
@@ -269,9 +284,9 @@ OdomPose MappingThread::pose_in_priors_odom(std::int64_t stamp_ns,
   return {.T_map_odom = T_map_odom_, .T_odom_base = T_map_odom_.inverse() * T_map_base};
 }
 
-void MappingThread::refuse_prior(const std::string& reason) {
-  statistics_.count("odometry_prior_unknown_frame");
-  throttled_log_.warn("odometry_prior", "the odometry prior is not used: " + reason);
+void MappingThread::refuse_prior(const std::string& counter, const std::string& reason) {
+  statistics_.count(counter);
+  throttled_log_.warn(counter, "the odometry prior is not used: " + reason);
 }
 
 void MappingThread::stage_ended(std::string_view stage) {

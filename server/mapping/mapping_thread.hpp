@@ -94,7 +94,7 @@ class MappingThread : public CheckpointSource {
   /// Base in odom by the prior's poses.
   [[nodiscard]] OdomPose pose_in_priors_odom(std::int64_t stamp_ns,
                                              const Eigen::Isometry3d& T_map_base);
-  void refuse_prior(const std::string& reason);
+  void refuse_prior(const std::string& counter, const std::string& reason);
   void drop(const ScanRejection& rejection);
   void publish_snapshot();
   /// Runs `action` in the thread that maps, after the scan in work, and waits for its end.

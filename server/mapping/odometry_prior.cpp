@@ -12,11 +12,16 @@ namespace {
 constexpr std::size_t max_poses = 1000;
 // A pose this much older than the scan still stands for it.
 constexpr std::int64_t max_gap_ns = 100'000'000;
+// No network delays a pose by more against those after it.
+constexpr std::int64_t max_disorder_ns = 5'000'000'000;
 
 }  // namespace
 
 void PoseBuffer::add(const StampedPose& pose) {
-  if (!poses_.empty() && pose.stamp_ns <= poses_.back().stamp_ns) return;
+  if (!poses_.empty() && pose.stamp_ns <= poses_.back().stamp_ns) {
+    if (poses_.back().stamp_ns - pose.stamp_ns < max_disorder_ns) return;
+    poses_.clear();
+  }
   poses_.push_back(pose);
   if (poses_.size() > max_poses) poses_.pop_front();
 }

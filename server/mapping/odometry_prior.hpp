@@ -16,7 +16,8 @@ namespace stillmap::server {
 /// does not matter. They are poses of a frame on the robot, whichever that is.
 class PoseBuffer {
  public:
-  /// Out-of-order poses are left out.
+  /// Out-of-order poses are left out; one that is far older is of a clock that was set back, and
+  /// begins anew.
   void add(const StampedPose& pose);
 
   /// Motion of that frame from one time to another, interpolated; nothing when the poses do not

@@ -269,15 +269,19 @@ class OdometryPriorFrames : public Frames {
 
   /// Drives with all of the wheels' poses sent before every scan: the server's reader finds their
   /// writer at some time, and leaves out what it has.
-  void drive_with_wheels(int scans, const std::string& child_frame) {
+  void drive_with_wheels(
+      int scans, const std::string& child_frame,
+      const Eigen::Isometry3d& T_wheels_after_reset = Eigen::Isometry3d::Identity()) {
     const auto topic = dds::odometry_prior_topic("odom_prior");
     dds::Writer<nav_msgs::msg::Odometry> wheels(*participant_, topic.dds_name, {.depth = 100});
     ASSERT_TRUE(wheels.readers().wait_for_any(patience));
     for (int scan = 0; scan < scans; ++scan) {
       for (int i = 0; i < seen_scans + 2; ++i) {
         const auto none = Eigen::Matrix<double, 6, 6>::Zero();
-        ASSERT_TRUE(wheels.write(wire::to_odometry({room_pose(i).stamp_ns, T_wheels_base(i)}, none,
-                                                   "wheel_odom", child_frame)));
+        const Eigen::Isometry3d T =
+            i < seen_scans / 2 ? T_wheels_base(i) : T_wheels_after_reset * T_wheels_base(i);
+        ASSERT_TRUE(wheels.write(
+            wire::to_odometry({room_pose(i).stamp_ns, T}, none, "wheel_odom", child_frame)));
       }
       drive(scan, scan + 1, turned_mount());
       ASSERT_TRUE(wait_for_scans(*client_, static_cast<std::uint64_t>(scan + 1)));
@@ -319,6 +323,14 @@ TEST_F(OdometryPriorFrames, WheelsThatHaveTheirOwnOdomGetOnlyItsPlaceInTheMap) {
   const Eigen::Isometry3d T_error = T_room_base(0) * last[0].T_parent_child;
   EXPECT_LT(T_error.translation().norm(), 0.1);
   EXPECT_LT(Eigen::AngleAxisd(T_error.linear()).angle(), 1.0 * deg);
+}
+
+TEST_F(OdometryPriorFrames, WheelsThatBeginAnewAreNotFollowed) {
+  start("frames: {base: base_link}\n" + std::string(turned_mount_yaml));
+  drive_with_wheels(seen_scans, "base_link", from_xyz_rpy({1e200, 0.0, 0.0}, {0.0, 0.0, 1.0}));
+  expect_poses_of_base(seen_scans);
+  EXPECT_EQ(client_->status().counter("odometry_prior_jumps"), 1U);
+  EXPECT_EQ(client_->status().dropped(), 0U);
 }
 
 TEST_F(OdometryPriorFrames, AFrameThatIsNowhereOnTheRobotIsRefused) {
