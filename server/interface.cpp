@@ -1,17 +1,19 @@
 #include "server/interface.hpp"
 
 #include <memory>
+#include <set>
 #include <string>
 
 namespace stillmap::server {
 namespace {
 
 ServerTraits traits(const ServerConfig& config, const InterfaceContext& context) {
-  return {.delivery = config.input.delivery,
-          .label_source = context.mapping.label_source(),
-          .sensor = config.mapper.sensor.name,
-          .points_topic = config.topics.points,
-          .host_diagnostics = host_diagnostics(context.participant.options().socket_buffer_bytes)};
+  return {
+      .delivery = config.input.delivery,
+      .label_source = context.mapping.label_source(),
+      .sensor = config.mapper.sensor.name,
+      .points_topic = config.lidars.empty() ? config.topics.points : config.lidars.front().topic,
+      .host_diagnostics = host_diagnostics(context.participant.options().socket_buffer_bytes)};
 }
 
 }  // namespace
@@ -19,13 +21,12 @@ ServerTraits traits(const ServerConfig& config, const InterfaceContext& context)
 Interface::Interface(const ServerConfig& config, const InterfaceContext& context)
     : participant_(context.participant),
       map_publisher_(context.participant, context.topics, config, context.storage.latest_map()),
-      receiver_(std::in_place, context.participant, config, context.mapping.scans(),
-                context.statistics),
       discovery_diagnostics_(context.participant),
       report_(
           traits(config, context), context.storage.latest_map(), context.statistics,
           [this] { return discovery_diagnostics_.diagnostics(); },
-          [this] { return receiver_ ? receiver_->no_input_reason() : std::string(); }) {
+          [this] { return no_input_reason(); }) {
+  start_receivers(config, context);
   services_.emplace(context.participant, config.topics.name_space,
                     service_context(config, context));
   status_publisher_.emplace(context.participant, context.topics, config.publish.status_period_s,
@@ -69,7 +70,32 @@ ServiceContext Interface::service_context(const ServerConfig& config,
 void Interface::stop() {
   services_.reset();
   status_publisher_.reset();
-  receiver_.reset();
+  receivers_.clear();
+}
+
+void Interface::start_receivers(const ServerConfig& config, const InterfaceContext& context) {
+  ScanQueue& scans = context.mapping.scans();
+  if (config.lidars.empty()) {
+    receivers_.emplace_back(context.participant, config, scans, context.statistics);
+    return;
+  }
+  sweeps_.emplace(config, scans, context.statistics);
+  std::set<std::string> topics;
+  for (const LidarConfig& lidar : config.lidars) topics.insert(lidar.topic);
+  for (const std::string& topic : topics) {
+    receivers_.emplace_back(context.participant, config, topic, *sweeps_, scans,
+                            context.statistics);
+  }
+}
+
+std::string Interface::no_input_reason() const {
+  std::string first;
+  for (const ScanReceiver& receiver : receivers_) {
+    const std::string reason = receiver.no_input_reason();
+    if (reason.empty()) return {};
+    if (first.empty()) first = reason;
+  }
+  return first;
 }
 
 dds::ServerStatus Interface::status() const {

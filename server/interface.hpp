@@ -1,6 +1,8 @@
 #pragma once
 
+#include <list>
 #include <optional>
+#include <string>
 
 #include "config/loaders/server_config.hpp"
 #include "idl/dds/participant.hpp"
@@ -43,12 +45,18 @@ class Interface {
   [[nodiscard]] dds::ServerStatus status() const;
 
  private:
+  void start_receivers(const ServerConfig& config, const InterfaceContext& context);
+  /// Why no scan has arrived yet; empty once one has.
+  [[nodiscard]] std::string no_input_reason() const;
   [[nodiscard]] ServiceContext service_context(const ServerConfig& config,
                                                const InterfaceContext& context) const;
 
   const dds::Participant& participant_;
   MapPublisher map_publisher_;
-  std::optional<ScanReceiver> receiver_;
+  /// Of several lidars.
+  std::optional<SweepInput> sweeps_;
+  /// One a topic.
+  std::list<ScanReceiver> receivers_;
   DiscoveryDiagnostics discovery_diagnostics_;
   ServerReport report_;
   std::optional<MapServices> services_;

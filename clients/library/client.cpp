@@ -276,7 +276,11 @@ Subscription Client::subscribe_odometry(std::function<void(const OdometryUpdate&
       connection_->participant, connection_->topics.odometry,
       [arrived = std::move(pose_arrived)](const nav_msgs::msg::Odometry& message) {
         const auto odometry = wire::from_odometry(message);
-        if (odometry) arrived({.pose = odometry->pose, .covariance = odometry->covariance});
+        if (!odometry) return;
+        arrived({.pose = odometry->pose,
+                 .frame = message.header().frame_id(),
+                 .child_frame = message.child_frame_id(),
+                 .covariance = odometry->covariance});
       });
 }
 

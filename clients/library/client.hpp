@@ -16,9 +16,9 @@
 #include "core/map/tile.hpp"
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"
-#include "core/traversability/traversability_view.hpp"
 #include "core/traversability/path_check.hpp"
 #include "core/traversability/traversability_query.hpp"
+#include "core/traversability/traversability_view.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
 #include "idl/dds/dds_options.hpp"
 #include "idl/interface/map_identity.hpp"
@@ -53,10 +53,13 @@ struct ClientOptions {
   std::chrono::milliseconds request_timeout{5000};
 };
 
-/// A pose of the lidar as the server estimated it. How healthy the odometry is, is in
-/// ServerStatus::health.
+/// A pose as the server estimated it: of the robot, or of its lidar where the server knows no other
+/// frame (frames.base). How healthy the odometry is, is in ServerStatus::health.
 struct OdometryUpdate {
   StampedPose pose;
+  /// As "map" and "base_link".
+  std::string frame;
+  std::string child_frame;
   /// Of (translation [m], rotation [rad]) in the map frame.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
 };

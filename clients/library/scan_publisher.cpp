@@ -2,6 +2,7 @@
 
 #include "clients/library/connection.hpp"
 #include "clients/library/tcp_rejoin_backoff.hpp"
+#include "idl/conversions/pose.hpp"
 #include "idl/conversions/to_cloud.hpp"
 #include "idl/dds/writer.hpp"
 #include "idl/interface/topics.hpp"
@@ -13,12 +14,24 @@ struct ScanPublisher::Connection {
       : options(publisher_options),
         own(std::make_unique<dds::Participant>(options.dds)),
         topic(topic_of(options)),
-        writer(*own, topic.dds_name, topic.writer) {}
+        writer(*own, topic.dds_name, topic.writer) {
+    publish_mount(*own);
+  }
 
   Connection(dds::Participant& shared, const ScanPublisherOptions& publisher_options)
       : options(publisher_options),
         topic(topic_of(options)),
-        writer(shared, topic.dds_name, topic.writer) {}
+        writer(shared, topic.dds_name, topic.writer) {
+    publish_mount(shared);
+  }
+
+  void publish_mount(dds::Participant& participant) {
+    if (!options.mount) return;
+    const auto tf_static = dds::Topics::in("stillmap").tf_static;
+    mount_writer.emplace(participant, tf_static.dds_name, tf_static.writer);
+    // A keep-last writer always has room, and keeps it for subscribers that come later.
+    static_cast<void>(mount_writer->write(wire::to_tf(0, {*options.mount})));
+  }
 
   static dds::TopicSpec<sensor_msgs::msg::PointCloud2> topic_of(
       const ScanPublisherOptions& options) {
@@ -32,6 +45,7 @@ struct ScanPublisher::Connection {
   std::unique_ptr<dds::Participant> own;
   dds::TopicSpec<sensor_msgs::msg::PointCloud2> topic;
   dds::Writer<sensor_msgs::msg::PointCloud2> writer;
+  std::optional<dds::Writer<tf2_msgs::msg::TFMessage>> mount_writer;
 };
 
 ScanPublisher::ScanPublisher(const ScanPublisherOptions& options)

@@ -4,9 +4,11 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 
+#include "core/frames/frame_tree.hpp"
 #include "core/lidar/scan.hpp"
 #include "idl/dds/dds_options.hpp"
 
@@ -20,6 +22,8 @@ struct ScanPublisherOptions {
   std::string points_topic = "points";
   /// header.frame_id of the clouds.
   std::string lidar_frame = "lidar";
+  /// Published on /tf_static, as a robot does: where the lidar sits.
+  std::optional<FrameTransform> mount = std::nullopt;
   /// Keep every scan until the server took it (needs a server with `delivery: every`); otherwise a
   /// newer scan may overtake an untaken one.
   bool lossless = false;

@@ -1,6 +1,8 @@
 #include "config/loaders/server_config.hpp"
 
 #include <algorithm>
+#include <cctype>
+#include <numbers>
 #include <stdexcept>
 
 #include "config/loaders/listening_address.hpp"
@@ -9,6 +11,8 @@
 #include "config/loaders/robot_profile.hpp"
 #include "config/loaders/sensor_file.hpp"
 #include "config/loaders/yaml_section.hpp"
+#include "core/frames/rigid_motion.hpp"
+#include "core/lidar/sweep_merger.hpp"
 #include "core/map/datum.hpp"
 #include "core/segmentation/model_description.hpp"
 
@@ -68,8 +72,60 @@ void read_labels(YamlSection section, LabelsConfig& labels) {
 
 void read_frames(YamlSection section, FramesConfig& frames) {
   section.text("map", frames.map);
+  section.text("odom", frames.odom);
+  using OdomSource = FramesConfig::OdomSource;
+  section.choice<OdomSource>("odom_source", frames.odom_source,
+                             {{"own", OdomSource::own}, {"prior", OdomSource::prior}});
+  section.text("base", frames.base);
   section.text("lidar", frames.lidar);
   if (frames.map.empty()) section.fault("map", "is empty; a frame needs a name");
+  if (!frames.odom.empty() && frames.base.empty()) {
+    section.fault("odom", "needs the robot's frame beneath it: set frames.base, as base_link");
+  }
+  if (frames.odom.empty() && frames.odom_source == OdomSource::prior) {
+    section.fault("odom_source", "needs the frame that the odometry is in: set frames.odom");
+  }
+  const std::vector<std::string> names{frames.map, frames.odom, frames.base, frames.lidar};
+  for (auto name = names.begin(); name != names.end(); ++name) {
+    if (name->empty() || std::find(names.begin(), name, *name) == name) continue;
+    section.fault("map", "'" + *name + "' is the name of two frames");
+  }
+}
+
+/// Three numbers in a list, which stay as they are where the file leaves them out.
+Eigen::Vector3d read_triple(YamlSection& section, const std::string& name,
+                            const Eigen::Vector3d& unchanged, Range allowed) {
+  std::vector<double> values(unchanged.begin(), unchanged.end());
+  section.number_list(name, values, allowed);
+  if (values.size() == 3) return Eigen::Map<const Eigen::Vector3d>(values.data());
+  section.fault(name, "has " + std::to_string(values.size()) + " numbers; wanted are three");
+  return unchanged;
+}
+
+Eigen::Isometry3d read_extrinsic(YamlSection& section) {
+  constexpr double radians_per_degree = std::numbers::pi / 180.0;
+  const Eigen::Vector3d none(0.0, 0.0, 0.0);
+  const Eigen::Vector3d xyz_m = read_triple(section, "xyz_m", none, {-100, 100});
+  const Eigen::Vector3d rpy_deg = read_triple(section, "rpy_deg", none, {-360, 360});
+  return from_xyz_rpy(xyz_m, rpy_deg * radians_per_degree);
+}
+
+void read_mount(YamlSection section, const FramesConfig& frames, MountConfig& mount) {
+  using Source = MountConfig::Source;
+  section.choice<Source>(
+      "source", mount.source,
+      {{"configuration", Source::configuration}, {"tf_static", Source::tf_static}});
+  mount.T_base_lidar = read_extrinsic(section);
+  section.number("wait_s", mount.wait_s, {0, 3600});
+  section.choice<bool>("if_missing", mount.identity_if_missing,
+                       {{"drop", false}, {"identity", true}});
+  const bool is_mounted = !mount.T_base_lidar.isApprox(Eigen::Isometry3d::Identity());
+  if (mount.source == Source::tf_static && is_mounted) {
+    section.fault("xyz_m", "and rpy_deg are not used with source: tf_static; leave them out");
+  }
+  if (frames.base.empty() && (is_mounted || mount.source == Source::tf_static)) {
+    section.fault("source", "needs the robot's frame: set frames.base, as base_link");
+  }
 }
 
 void read_network(YamlSection& section, const fs::path& folder, DdsNetworkConfig& network) {
@@ -100,6 +156,8 @@ void read_dds(YamlSection section, const fs::path& folder, DdsConfig& dds) {
   }
 }
 
+constexpr const char* topic_rule = "; ROS 2 names have letters, digits, '_', and '/' inside";
+
 bool is_topic_name(const std::string& name) {
   constexpr const char* allowed =
       "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789_/";
@@ -111,13 +169,13 @@ void read_topics(YamlSection section, TopicsConfig& topics) {
   section.text("points", topics.points);
   section.text("namespace", topics.name_space);
   section.text("odometry_prior", topics.odometry_prior);
-  const std::string rule = "; ROS 2 names have letters, digits, '_', and '/' inside";
-  if (!is_topic_name(topics.points)) section.fault("points", "'" + topics.points + "'" + rule);
+  if (!is_topic_name(topics.points))
+    section.fault("points", "'" + topics.points + "'" + topic_rule);
   if (!is_topic_name(topics.name_space)) {
-    section.fault("namespace", "'" + topics.name_space + "'" + rule);
+    section.fault("namespace", "'" + topics.name_space + "'" + topic_rule);
   }
   if (!topics.odometry_prior.empty() && !is_topic_name(topics.odometry_prior)) {
-    section.fault("odometry_prior", "'" + topics.odometry_prior + "'" + rule);
+    section.fault("odometry_prior", "'" + topics.odometry_prior + "'" + topic_rule);
   }
 }
 
@@ -132,6 +190,7 @@ void read_input(YamlSection section, InputConfig& input) {
   section.choice<DeliveryMode>("delivery", input.delivery,
                                {{"latest", DeliveryMode::latest}, {"every", DeliveryMode::every}});
   section.integer("queue_length", input.queue_length, {1, 1000});
+  section.number("sweep_wait_s", input.sweep_wait_s, {0, 60});
   read_fields(section.section("fields"), input.fields);
   section.choice<LabelKind>(
       "label_kind", input.label_kind,
@@ -195,6 +254,68 @@ void read_traversability(YamlSection section, const fs::path& folder,
   }
 }
 
+LidarConfig read_lidar(YamlSection& section, const fs::path& folder) {
+  LidarConfig lidar;
+  section.require({"name", "sensor", "topic"});
+  section.text("name", lidar.name);
+  read_sensor_name(section, folder, lidar.sensor);
+  section.text("topic", lidar.topic);
+  section.text("frame", lidar.frame);
+  lidar.T_base_lidar = read_extrinsic(section);
+  // In counters, whose names are metrics' labels.
+  const bool is_word = std::ranges::all_of(
+      lidar.name, [](unsigned char c) { return std::isalnum(c) != 0 || c == '_'; });
+  if (lidar.name.empty() || !is_word) {
+    section.fault("name", "'" + lidar.name + "'; names have letters, digits and '_'");
+  }
+  if (!is_topic_name(lidar.topic)) section.fault("topic", "'" + lidar.topic + "'" + topic_rule);
+  return lidar;
+}
+
+/// Whether clouds of both would be taken for the same lidar's.
+bool are_mixed_up(const LidarConfig& a, const LidarConfig& b) {
+  return a.topic == b.topic && (a.frame.empty() || b.frame.empty() || a.frame == b.frame);
+}
+
+/// What one lidar has elsewhere, several have in their list.
+void check_single_lidar_fields(YamlSection& file) {
+  for (const char* name : {"sensor", "mount"}) {
+    if (!file.has(name)) continue;
+    file.fault(name, "is of one lidar, and 'sensors' lists several: leave one of the two out");
+  }
+}
+
+void read_lidars(YamlSection& file, const fs::path& folder, ServerConfig& config) {
+  std::vector<LidarConfig>& lidars = config.lidars;
+  file.sections("sensors", [&](YamlSection section) {
+    LidarConfig lidar = read_lidar(section, folder);
+    for (const LidarConfig& other : lidars) {
+      if (lidar.name == other.name) section.fault("name", "two are called '" + lidar.name + "'");
+      if (are_mixed_up(lidar, other)) {
+        section.fault("topic", "is also that of '" + other.name +
+                                   "'; their frames (header.frame_id) must tell them apart");
+      }
+    }
+    lidars.push_back(std::move(lidar));
+  });
+  if (lidars.empty()) return;
+  check_single_lidar_fields(file);
+  if (config.frames.base.empty() || config.frames.lidar.empty()) {
+    file.fault("sensors",
+               "need names for the robot's frame and for that of the merged scans: set "
+               "frames.base (base_link) and frames.lidar");
+  }
+  std::vector<Eigen::Isometry3d> T_base_lidars;
+  for (const LidarConfig& lidar : lidars) T_base_lidars.push_back(lidar.T_base_lidar);
+  config.mount.T_base_lidar = merged_frame(T_base_lidars);
+  const Eigen::Isometry3d T_merged_base = config.mount.T_base_lidar.inverse();
+  std::vector<PlacedSensor> sensors;
+  for (const LidarConfig& lidar : lidars) {
+    sensors.push_back({lidar.sensor, T_merged_base * lidar.T_base_lidar});
+  }
+  config.mapper.sensor = merged_sensor(sensors);
+}
+
 void read_log(YamlSection section, LogConfig& log) {
   section.choice<LogLevel>("level", log.level,
                            {{"debug", LogLevel::debug},
@@ -215,9 +336,15 @@ void read_server(YamlSection file, const fs::path& folder, ServerConfig& config)
   read_mapper(file, config.mapper);
   read_labels(file.section("labels"), config.labels);
   read_frames(file.section("frames"), config.frames);
+  read_mount(file.section("mount"), config.frames, config.mount);
   read_dds(file.section("dds"), folder, config.dds);
   read_topics(file.section("topics"), config.topics);
+  if (config.frames.odom_source == FramesConfig::OdomSource::prior &&
+      config.topics.odometry_prior.empty()) {
+    file.fault("frames", "odom_source: prior needs topics.odometry_prior");
+  }
   read_input(file.section("input"), config.input);
+  read_lidars(file, folder, config);
   read_publish(file.section("publish"), config.publish);
   read_map(file.section("map"), config.map);
   read_occupancy(file.section("occupancy"), config.occupancy);

@@ -43,11 +43,50 @@ struct LabelsConfig {
   std::uint32_t budget_ms = 90;
 };
 
-/// Names of the coordinate frames in everything that is published.
+/// Names of the coordinate frames in everything that is published (REP 105).
 struct FramesConfig {
   std::string map = "map";
+  /// Between map and base: poses in it never jump. Empty: no such frame.
+  std::string odom;
+  enum class OdomSource {
+    /// The server's own odometry, made smooth.
+    own,
+    /// The odometry prior, whose publisher also publishes odom -> base.
+    prior,
+  };
+  OdomSource odom_source = OdomSource::own;
+  /// The robot, whose poses are published. Empty: the lidar is the base.
+  std::string base;
   /// Empty: the frame that the incoming clouds name.
   std::string lidar = "lidar";
+};
+
+/// Where the lidar sits on the robot, T_base_lidar.
+struct MountConfig {
+  enum class Source {
+    /// `T_base_lidar` below.
+    configuration,
+    /// What the robot publishes on /tf_static.
+    tf_static,
+  };
+  Source source = Source::configuration;
+  Eigen::Isometry3d T_base_lidar = Eigen::Isometry3d::Identity();
+  /// Longest wait for the transform on /tf_static.
+  double wait_s = 10.0;
+  /// After that: map as if the lidar were the base; else scans are dropped until it comes.
+  bool identity_if_missing = false;
+};
+
+/// One lidar of several on a robot.
+struct LidarConfig {
+  /// In counters and messages.
+  std::string name;
+  SensorModel sensor;
+  /// ROS 2 name, without the prefix that DDS sees.
+  std::string topic;
+  /// header.frame_id of its clouds, where several lidars share a topic; empty: any.
+  std::string frame;
+  Eigen::Isometry3d T_base_lidar = Eigen::Isometry3d::Identity();
 };
 
 struct DdsConfig {
@@ -83,6 +122,8 @@ struct InputConfig {
   DeliveryMode delivery = DeliveryMode::latest;
   /// Scans that may wait for the mapper.
   std::uint32_t queue_length = 3;
+  /// Of several lidars: longest wait of a sweep for the scan of one.
+  double sweep_wait_s = 0.1;
   PointFieldNames fields;
   LabelKind label_kind = LabelKind::semantic_kitti;
 };
@@ -159,6 +200,10 @@ struct ServerConfig {
   MapperConfig mapper{.sensor = hdl_64e(), .prepare = {}, .odometry = {}, .static_map = {}};
   LabelsConfig labels;
   FramesConfig frames;
+  MountConfig mount;
+  /// Empty: one lidar, `mapper.sensor` on `topics.points`. Else `mapper.sensor`, `frames.lidar` and
+  /// `mount` are those of the merged scans.
+  std::vector<LidarConfig> lidars;
   DdsConfig dds;
   TopicsConfig topics;
   InputConfig input;

@@ -96,6 +96,18 @@ YamlSection::YamlSection(YamlFile& file, YAML::Node node, std::string path)
 
 YamlSection::~YamlSection() { check_names(); }
 
+bool YamlSection::has(const std::string& name) const {
+  const YAML::Node& node = node_;
+  return node[name].IsDefined();
+}
+
+YamlSection YamlSection::item_section(const std::string& name, const YAML::Node& item) {
+  if (!item.IsMap()) {
+    file_.fault(item, path_of(name), shown(item) + " is not allowed; a section with fields");
+  }
+  return {file_, item.IsMap() ? item : YAML::Node(YAML::NodeType::Map), path_of(name)};
+}
+
 YamlSection YamlSection::section(const std::string& name) {
   const std::optional<YAML::Node> node = field(name);
   // A section whose lines are all commented out is null: every field keeps its default.

@@ -33,6 +33,19 @@ class YamlSection {
 
   [[nodiscard]] YamlSection section(const std::string& name);
 
+  /// Calls `read(YamlSection)` for every section of a list.
+  template <typename Read>
+  void sections(const std::string& name, Read read) {
+    const auto items = read_list(name, "sections with fields");
+    if (!items) return;
+    for (std::size_t i = 0; i < items->size(); ++i) {
+      read(item_section(name + "[" + std::to_string(i) + "]", (*items)[i]));
+    }
+  }
+
+  /// Whether the file has the field.
+  [[nodiscard]] bool has(const std::string& name) const;
+
   /// Each of these fields that the file leaves out is a fault.
   void require(const std::vector<std::string>& names);
 
@@ -77,6 +90,8 @@ class YamlSection {
 
  private:
   YamlSection(YamlFile& file, YAML::Node node, std::string path);
+
+  [[nodiscard]] YamlSection item_section(const std::string& name, const YAML::Node& item);
 
   /// The field's node; nothing when the file leaves it out. The name is known from now on.
   std::optional<YAML::Node> field(const std::string& name);

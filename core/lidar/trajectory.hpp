@@ -8,7 +8,8 @@ namespace stillmap {
 
 struct StampedPose {
   std::int64_t stamp_ns = 0;
-  /// Takes points of the lidar frame to the map frame [m].
+  /// Takes points of the lidar frame to the map frame [m]. In what a server with `frames.base`
+  /// publishes and stores: points of that frame.
   Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
 };
 

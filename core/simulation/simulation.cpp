@@ -90,7 +90,11 @@ struct Simulation::World {
     Eigen::Isometry3d T_map_lidar = traffic.T_map_ego_at(time_s);
     T_map_lidar.rotate(Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
                        Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()));
-    T_map_lidar = T_map_lidar * Eigen::Translation3d(0, 0, config.lidar_height_m);
+    if (config.T_base_lidar) {
+      T_map_lidar = T_map_lidar * *config.T_base_lidar;
+    } else {
+      T_map_lidar = T_map_lidar * Eigen::Translation3d(0, 0, config.lidar_height_m);
+    }
     // Not even a product with the identity where nothing is asked for: scans keep their bits.
     if (config.motion == LidarMotion::vehicle) return T_map_lidar;
     return T_map_lidar * T_vehicle_lidar_at(config.motion, time_s);
@@ -234,6 +238,7 @@ std::string SimulationConfig::faults() const {
   check(scans, 1, 100000, "scans");
   check(firings, 0, 10000, "firings");
   check(lidar_height_m, 0.3, 4.0, "lidar_height_m");
+  if (T_base_lidar) check(T_base_lidar->translation().z(), 0.3, 4.0, "T_base_lidar.z");
   return out;
 }
 

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +30,8 @@ struct SimulationConfig {
   bool rolling = false;
   LidarMotion motion = LidarMotion::vehicle;
   double lidar_height_m = 1.73;
+  /// Where the lidar sits on the vehicle, instead of upright at that height. Base is on the ground.
+  std::optional<Eigen::Isometry3d> T_base_lidar;
   BeamNoise noise;
   LidarFlaws flaws;
   Materials materials = default_materials();

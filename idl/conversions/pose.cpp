@@ -24,26 +24,18 @@ Quaternion to_quaternion(const Eigen::Isometry3d& T) {
 }
 
 template <typename Vector>
-Vector to_vector(const Eigen::Isometry3d& T) {
+Vector to_vector(const Eigen::Vector3d& v) {
   Vector out;
-  out.x(T.translation().x());
-  out.y(T.translation().y());
-  out.z(T.translation().z());
+  out.x(v.x());
+  out.y(v.y());
+  out.z(v.z());
   return out;
 }
 
-}  // namespace
-
-geometry_msgs::msg::Pose to_pose(const Eigen::Isometry3d& T) {
-  geometry_msgs::msg::Pose pose;
-  pose.position(to_vector<geometry_msgs::msg::Point>(T));
-  pose.orientation(to_quaternion<geometry_msgs::msg::Quaternion>(T));
-  return pose;
-}
-
-std::optional<Eigen::Isometry3d> to_isometry(const geometry_msgs::msg::Pose& pose) {
-  const auto& p = pose.position();
-  const auto& o = pose.orientation();
+// Nothing when a number is not finite or the quaternion has no length.
+template <typename Vector>
+std::optional<Eigen::Isometry3d> isometry(const Vector& p,
+                                          const geometry_msgs::msg::Quaternion& o) {
   const Eigen::Vector3d translation(p.x(), p.y(), p.z());
   const Eigen::Quaterniond rotation(o.w(), o.x(), o.y(), o.z());
   if (!translation.allFinite() || !rotation.coeffs().allFinite() ||
@@ -53,13 +45,29 @@ std::optional<Eigen::Isometry3d> to_isometry(const geometry_msgs::msg::Pose& pos
   return Eigen::Isometry3d(Eigen::Translation3d(translation) * rotation.normalized());
 }
 
+}  // namespace
+
+geometry_msgs::msg::Pose to_pose(const Eigen::Isometry3d& T) {
+  geometry_msgs::msg::Pose pose;
+  pose.position(to_vector<geometry_msgs::msg::Point>(T.translation()));
+  pose.orientation(to_quaternion<geometry_msgs::msg::Quaternion>(T));
+  return pose;
+}
+
+std::optional<Eigen::Isometry3d> to_isometry(const geometry_msgs::msg::Pose& pose) {
+  return isometry(pose.position(), pose.orientation());
+}
+
 nav_msgs::msg::Odometry to_odometry(const StampedPose& pose, const Matrix6& covariance,
-                                    const std::string& map_frame, const std::string& lidar_frame) {
+                                    const std::string& frame, const std::string& child_frame,
+                                    const Eigen::Matrix<double, 6, 1>& velocity) {
   nav_msgs::msg::Odometry odom;
-  odom.header(to_header(pose.stamp_ns, map_frame));
-  odom.child_frame_id(lidar_frame);
+  odom.header(to_header(pose.stamp_ns, frame));
+  odom.child_frame_id(child_frame);
   odom.pose().pose(to_pose(pose.T_map_lidar));
   RowMajor6::Map(odom.pose().covariance().data()) = covariance;
+  odom.twist().twist().linear(to_vector<geometry_msgs::msg::Vector3>(velocity.head<3>()));
+  odom.twist().twist().angular(to_vector<geometry_msgs::msg::Vector3>(velocity.tail<3>()));
   return odom;
 }
 
@@ -71,16 +79,27 @@ std::optional<PoseWithCovariance> from_odometry(const nav_msgs::msg::Odometry& o
                             .covariance = RowMajor6::Map(odom.pose().covariance().data())};
 }
 
-tf2_msgs::msg::TFMessage to_tf(const StampedPose& pose, const std::string& map_frame,
-                               const std::string& lidar_frame) {
-  geometry_msgs::msg::TransformStamped transform;
-  transform.header(to_header(pose.stamp_ns, map_frame));
-  transform.child_frame_id(lidar_frame);
-  transform.transform().translation(to_vector<geometry_msgs::msg::Vector3>(pose.T_map_lidar));
-  transform.transform().rotation(to_quaternion<geometry_msgs::msg::Quaternion>(pose.T_map_lidar));
+tf2_msgs::msg::TFMessage to_tf(std::int64_t stamp_ns,
+                               const std::vector<FrameTransform>& transforms) {
   tf2_msgs::msg::TFMessage message;
-  message.transforms().push_back(transform);
+  for (const FrameTransform& transform : transforms) {
+    const Eigen::Isometry3d& T = transform.T_parent_child;
+    geometry_msgs::msg::TransformStamped& out = message.transforms().emplace_back();
+    out.header(to_header(stamp_ns, transform.parent));
+    out.child_frame_id(transform.child);
+    out.transform().translation(to_vector<geometry_msgs::msg::Vector3>(T.translation()));
+    out.transform().rotation(to_quaternion<geometry_msgs::msg::Quaternion>(T));
+  }
   return message;
+}
+
+std::vector<FrameTransform> from_tf(const tf2_msgs::msg::TFMessage& message) {
+  std::vector<FrameTransform> transforms;
+  for (const geometry_msgs::msg::TransformStamped& in : message.transforms()) {
+    const auto T = isometry(in.transform().translation(), in.transform().rotation());
+    if (T) transforms.push_back({in.header().frame_id(), in.child_frame_id(), *T});
+  }
+  return transforms;
 }
 
 nav_msgs::msg::Path to_path(const Trajectory& trajectory, const std::string& map_frame) {

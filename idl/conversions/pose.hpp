@@ -3,7 +3,9 @@
 #include <Eigen/Geometry>
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "core/frames/frame_tree.hpp"
 #include "core/lidar/trajectory.hpp"
 #include "core/odometry/odometry_state.hpp"
 #include "nav_msgs.h"
@@ -16,12 +18,12 @@ namespace stillmap::wire {
 /// Nothing when a number is not finite or the quaternion has no length.
 [[nodiscard]] std::optional<Eigen::Isometry3d> to_isometry(const geometry_msgs::msg::Pose& pose);
 
-/// header.frame_id is the map's frame, child_frame_id the lidar's. The covariance is of (x, y, z,
-/// rotation about x, y, z) in the map frame, as ROS 2 orders it; twist is not estimated.
-[[nodiscard]] nav_msgs::msg::Odometry to_odometry(const StampedPose& pose,
-                                                  const Eigen::Matrix<double, 6, 6>& covariance,
-                                                  const std::string& map_frame,
-                                                  const std::string& lidar_frame);
+/// `frame` is header.frame_id. The covariance is of (x, y, z, rotation about x, y, z) along that
+/// frame's axes, as ROS 2 orders it; `velocity` (m/s, rad/s) is along the child's.
+[[nodiscard]] nav_msgs::msg::Odometry to_odometry(
+    const StampedPose& pose, const Eigen::Matrix<double, 6, 6>& covariance,
+    const std::string& frame, const std::string& child_frame,
+    const Eigen::Matrix<double, 6, 1>& velocity = Eigen::Matrix<double, 6, 1>::Zero());
 
 struct PoseWithCovariance {
   StampedPose pose;
@@ -31,9 +33,11 @@ struct PoseWithCovariance {
 /// Nothing when the pose or the stamp cannot be used.
 [[nodiscard]] std::optional<PoseWithCovariance> from_odometry(const nav_msgs::msg::Odometry& odom);
 
-/// The transform from `lidar_frame` to `map_frame` at the pose's stamp.
-[[nodiscard]] tf2_msgs::msg::TFMessage to_tf(const StampedPose& pose, const std::string& map_frame,
-                                             const std::string& lidar_frame);
+[[nodiscard]] tf2_msgs::msg::TFMessage to_tf(std::int64_t stamp_ns,
+                                             const std::vector<FrameTransform>& transforms);
+
+/// Transforms that cannot be used are left out.
+[[nodiscard]] std::vector<FrameTransform> from_tf(const tf2_msgs::msg::TFMessage& message);
 
 [[nodiscard]] nav_msgs::msg::Path to_path(const Trajectory& trajectory,
                                           const std::string& map_frame);

@@ -18,7 +18,7 @@ void append(Names& names, const Names& more) {
   names.insert(names.end(), more.begin(), more.end());
 }
 
-/// Topics that the server reads.
+/// Topics that the server reads and does not write itself.
 Names inputs(const TopicNames& names) {
   Names topics{"rt/" + names.points};
   if (!names.odometry_prior.empty()) topics.push_back("rt/" + names.odometry_prior);
@@ -79,14 +79,18 @@ Access access_of(Role role, const TopicNames& names) {
   Access access{.publish = {ros_discovery_topic}, .subscribe = {ros_discovery_topic}};
   const std::string& name_space = names.name_space;
   const Names outputs = published_topics(name_space);
+  const std::string tf_static = Topics::in(name_space).tf_static.dds_name;
   switch (role) {
     case Role::server:
       append(access.publish, outputs);
       append(access.subscribe, inputs(names));
+      access.subscribe.push_back(tf_static);
       for_each_service([&](const auto& service) { allow_serving(access, service.in(name_space)); });
       break;
     case Role::sensor:
       append(access.publish, inputs(names));
+      // The robot says where its sensors are.
+      access.publish.push_back(tf_static);
       append(access.subscribe, outputs);
       allow_calling(access, services::get_status.in(name_space));
       break;

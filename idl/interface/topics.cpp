@@ -25,7 +25,12 @@ Topics Topics::in(const std::string& name_space) {
   const TopicQos newest{.reliable = false, .depth = 1, .large_messages = true};
   return {
       .odometry = symmetric<nav_msgs::msg::Odometry>(prefix + "odometry", every_pose),
+      .local_odometry = symmetric<nav_msgs::msg::Odometry>(prefix + "local_odometry", every_pose),
       .tf = symmetric<tf2_msgs::msg::TFMessage>("rt/tf", {.depth = 100}),
+      // Each node of a robot writes its own transforms once, in one sample.
+      .tf_static = {.dds_name = "rt/tf_static",
+                    .writer = latched,
+                    .reader = {.transient_local = true, .depth = 100}},
       .path = symmetric<nav_msgs::msg::Path>(prefix + "path", large),
       // RViz2 asks for reliable clouds unless it is told otherwise.
       .scan = {.dds_name = prefix + "scan",

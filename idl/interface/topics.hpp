@@ -25,7 +25,10 @@ struct TopicSpec {
 /// which matches readers of both kinds; what late joiners need is transient local.
 struct Topics {
   TopicSpec<nav_msgs::msg::Odometry> odometry;
+  /// As `odometry`, in the frame odom, where it never jumps.
+  TopicSpec<nav_msgs::msg::Odometry> local_odometry;
   TopicSpec<tf2_msgs::msg::TFMessage> tf;
+  TopicSpec<tf2_msgs::msg::TFMessage> tf_static;
   TopicSpec<nav_msgs::msg::Path> path;
   TopicSpec<sensor_msgs::msg::PointCloud2> scan;
   TopicSpec<sensor_msgs::msg::PointCloud2> static_cloud;
@@ -37,7 +40,8 @@ struct Topics {
   /// Where the robot of `traversability.grid_profile` can go.
   TopicSpec<nav_msgs::msg::OccupancyGrid> traversability;
 
-  /// `name_space` is the first part of all names but tf's: "stillmap" gives rt/stillmap/odometry.
+  /// `name_space` is the first part of all names but those of tf: "stillmap" gives
+  /// rt/stillmap/odometry.
   [[nodiscard]] static Topics in(const std::string& name_space);
 };
 
@@ -45,11 +49,11 @@ struct Topics {
 template <typename Visit>
 void for_each_topic(const Topics& topics, Visit&& visit) {
   // Every field by name: one more in Topics, and this does not compile.
-  const auto& [odometry, tf, path, scan, static_cloud, tile_index, tiles, status, octomap,
-               traversability] = topics;
+  const auto& [odometry, local_odometry, tf, tf_static, path, scan, static_cloud, tile_index, tiles,
+               status, octomap, traversability] = topics;
   const auto visit_all = [&](const auto&... topic) { (visit(topic), ...); };
-  visit_all(odometry, tf, path, scan, static_cloud, tile_index, tiles, status, octomap,
-            traversability);
+  visit_all(odometry, local_odometry, tf, tf_static, path, scan, static_cloud, tile_index, tiles,
+            status, octomap, traversability);
 }
 
 /// Incoming scans as the server reads them: with `every`, a publisher must be reliable and waits

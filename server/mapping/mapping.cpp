@@ -14,11 +14,16 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
   if (!config.topics.odometry_prior.empty()) {
     prior_.emplace(context.participant, config.topics.odometry_prior);
   }
-  const MappingOutputs outputs{.poses = &poses_,
-                               .scans = labelled_scans_ ? &*labelled_scans_ : nullptr,
-                               .prior = prior_ ? &*prior_ : nullptr,
-                               .occupancy = context.occupancy,
-                               .throttle = &context.throttle};
+  if (!config.frames.base.empty()) {
+    static_transforms_.emplace(context.participant, context.topics, context.statistics);
+  }
+  const MappingOutputs outputs{
+      .poses = &poses_,
+      .scans = labelled_scans_ ? &*labelled_scans_ : nullptr,
+      .prior = prior_ ? &*prior_ : nullptr,
+      .static_transforms = static_transforms_ ? &*static_transforms_ : nullptr,
+      .occupancy = context.occupancy,
+      .throttle = &context.throttle};
   thread_.emplace(config, std::move(segmenter), storage_.take_loaded(),
                   storage_.saver().tile_store(), scans_, context.statistics, storage_.latest_map(),
                   outputs);

@@ -12,6 +12,7 @@
 #include "server/mapping/mapping_thread.hpp"
 #include "server/mapping/odometry_prior.hpp"
 #include "server/mapping/scan_queue.hpp"
+#include "server/mapping/static_transforms.hpp"
 #include "server/publishers/scan_publishers.hpp"
 
 namespace stillmap::server {
@@ -64,6 +65,8 @@ class Mapping {
   PosePublisher poses_;
   std::optional<LabelledScanPublisher> labelled_scans_;
   std::optional<OdometryPrior> prior_;
+  /// Only where the robot has a frame of its own.
+  std::optional<StaticTransforms> static_transforms_;
   // Each uses what stands above it, and stops before it.
   std::optional<MappingThread> thread_;
   std::optional<CheckpointWorker> checkpoints_;

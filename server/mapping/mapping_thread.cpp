@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "core/frames/rigid_motion.hpp"
 #include "server/mapping/async_segmenter.hpp"
 #include "server/mapping/milliseconds.hpp"
 
@@ -16,6 +17,10 @@ using Clock = std::chrono::steady_clock;
 
 // How long a request, or the snapshot after the last scan, may wait while no scan comes.
 constexpr std::chrono::milliseconds idle_period{50};
+
+// No robot is faster; a prior that says so begins anew, or is broken.
+constexpr double max_speed_m_s = 150.0;
+constexpr double max_jump_m = 1.0;
 
 constexpr std::size_t no_limit = std::numeric_limits<std::size_t>::max();
 
@@ -42,7 +47,6 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
                              Statistics& statistics, LatestMap& latest_map,
                              const MappingOutputs& outputs)
     : map_limit_bytes_(map_share_bytes(config.map)),
-      lidar_frame_(config.frames.lidar),
       publish_period_(config.publish.tiles_period_s),
       queue_(queue),
       statistics_(statistics),
@@ -55,7 +59,11 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
                .pose_found =
                    [this](std::int64_t stamp_ns, const OdometryResult& odometry) {
                      pose_found(stamp_ns, odometry);
-                   }}) {
+                   }}),
+      frames_(config, outputs.static_transforms, statistics),
+      odom_frame_(config.frames.odom) {
+  const bool is_odom_own = config.frames.odom_source == FramesConfig::OdomSource::own;
+  if (!odom_frame_.empty() && is_odom_own) odom_.emplace();
   if (stored && !stored->view.tiles.empty()) {
     resume(*stored, tile_store);
   } else {
@@ -104,6 +112,7 @@ void MappingThread::resume(const SavedMap& stored, const std::shared_ptr<TileSto
 
 void MappingThread::begin_map(Trajectory trajectory) {
   latest_map_.begin(mapper_.map_snapshot(), std::move(trajectory));
+  if (odom_) odom_->begin_map();
   if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
 }
 
@@ -185,19 +194,14 @@ void MappingThread::map(QueuedScan queued) {
   const auto began = Clock::now();
   stage_began_ = began;
   labels_ms_ = 0.0;
-  frame_ = lidar_frame_.empty() ? queued.frame : lidar_frame_;
   received_ = queued.received;
   statistics_.add_latency("queue", milliseconds(began - queued.received));
   const std::int64_t stamp_ns = queued.scan.stamp_ns;
+  if (!locate_lidar(queued)) return drop({"unknown_frame", frames_.missing()});
   auto mapped = mapper_.process(std::move(queued.scan), prior_for(stamp_ns));
-  if (!mapped) {
-    const ScanRejection& rejection = mapper_.last_rejection();
-    statistics_.scans_dropped(rejection.counter, 1, rejection.reason);
-    throttled_log_.warn(rejection.counter, "scan dropped: " + rejection.reason);
-    return;
-  }
+  if (!mapped) return drop(mapper_.last_rejection());
   const bool unlabelled = mapped->labelled.labels.empty();
-  latest_map_.add_pose({stamp_ns, mapped->odometry.T_map_lidar}, mapped->odometry.health,
+  latest_map_.add_pose({stamp_ns, T_map_base(mapped->odometry)}, mapped->odometry.health,
                        unlabelled ? "none" : mapper_.label_source());
   statistics_.scan_mapped(mapped->label_provenance);
   statistics_.add_latency("total", milliseconds(Clock::now() - queued.received));
@@ -205,20 +209,84 @@ void MappingThread::map(QueuedScan queued) {
   statistics_.record_other_stages(milliseconds(Clock::now() - began) - labels_ms_);
 }
 
+void MappingThread::drop(const ScanRejection& rejection) {
+  statistics_.scans_dropped(rejection.counter, 1, rejection.reason);
+  throttled_log_.warn(rejection.counter, "scan dropped: " + rejection.reason);
+}
+
+bool MappingThread::locate_lidar(const QueuedScan& queued) {
+  if (!frames_.locate_lidar(queued.frame, mapper_.trajectory().empty())) return false;
+  const bool is_told = mounted_frame_ == frames_.lidar() || !frames_.is_configured();
+  if (is_told || !frames_.has_base() || outputs_.poses == nullptr) return true;
+  mounted_frame_ = frames_.lidar();
+  outputs_.poses->publish_static(queued.scan.stamp_ns,
+                                 {frames_.base(), mounted_frame_, frames_.T_base_lidar()});
+  return true;
+}
+
 void MappingThread::forward(MappedScan mapped) {
   const auto labelled = std::make_shared<const LabelledScan>(std::move(mapped.labelled));
   if (outputs_.occupancy != nullptr) {
     outputs_.occupancy->add({labelled, mapped.odometry.T_map_lidar, !mapped.unlabelled_may_move});
   }
-  if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frame_);
+  if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frames_.lidar());
 }
 
-std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) const {
-  if (mapper_.trajectory().empty()) {
-    return pose_in_saved_map(latest_map_.trajectory(), stamp_ns);
+std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) {
+  motion_prior_.reset();
+  if (!mapper_.trajectory().empty()) {
+    motion_prior_ = motion_prior(stamp_ns);
+    if (!motion_prior_) return std::nullopt;
+    return mapper_.trajectory().back().T_map_lidar * *motion_prior_;
   }
+  const auto T_map_base_stored = pose_in_saved_map(latest_map_.trajectory(), stamp_ns);
+  if (T_map_base_stored) return *T_map_base_stored * frames_.T_base_lidar();
+  // A map begins where the robot stands, whichever way its lidar looks.
+  if (frames_.has_base()) return frames_.T_base_lidar();
+  return std::nullopt;
+}
+
+std::optional<Eigen::Isometry3d> MappingThread::motion_prior(std::int64_t stamp_ns) {
   if (outputs_.prior == nullptr) return std::nullopt;
-  return outputs_.prior->predict(mapper_.trajectory().back(), stamp_ns);
+  const std::int64_t last_ns = mapper_.trajectory().back().stamp_ns;
+  const auto motion = outputs_.prior->motion(last_ns, stamp_ns);
+  if (!motion) return std::nullopt;
+  const double distance_m = motion->T_before_after.translation().norm();
+  const double interval_s = 1e-9 * static_cast<double>(stamp_ns - last_ns);
+  if (!(distance_m <= max_jump_m + max_speed_m_s * interval_s)) {
+    refuse_prior("odometry_prior_jumps", "it jumps by " + std::to_string(distance_m) + " m in " +
+                                             std::to_string(interval_s) + " s");
+    return std::nullopt;
+  }
+  const auto T_lidar_frame = frames_.T_lidar_frame(motion->frame);
+  if (T_lidar_frame) return motion_of_frame(*T_lidar_frame, motion->T_before_after);
+  refuse_prior(
+      "odometry_prior_unknown_frame",
+      "it moves the frame '" + motion->frame +
+          "' (child_frame_id), and where that is on the robot is not known; set frames.base "
+          "and mount, or publish it on /tf_static beneath frames.base");
+  return std::nullopt;
+}
+
+OdomPose MappingThread::pose_in_priors_odom(std::int64_t stamp_ns,
+                                            const Eigen::Isometry3d& T_map_base) {
+  const auto prior = outputs_.prior != nullptr ? outputs_.prior->pose_at(stamp_ns) : std::nullopt;
+  const auto T_lidar_frame = prior ? frames_.T_lidar_frame(prior->frame) : std::nullopt;
+  if (prior && prior->odom_frame != odom_frame_) {
+    refuse_prior("odometry_prior_unknown_frame",
+                 "its poses are in the frame '" + prior->odom_frame +
+                     "' (header.frame_id), and frames.odom is '" + odom_frame_ + "'");
+  } else if (T_lidar_frame) {
+    const Eigen::Isometry3d T_base_frame = frames_.T_base_lidar() * *T_lidar_frame;
+    T_map_odom_ = T_map_base * T_base_frame * prior->T_odom_frame.inverse();
+  }
+  // Without a pose of this time, odom stays where it was in the map: it hardly moves.
+  return {.T_map_odom = T_map_odom_, .T_odom_base = T_map_odom_.inverse() * T_map_base};
+}
+
+void MappingThread::refuse_prior(const std::string& counter, const std::string& reason) {
+  statistics_.count(counter);
+  throttled_log_.warn(counter, "the odometry prior is not used: " + reason);
 }
 
 void MappingThread::stage_ended(std::string_view stage) {
@@ -230,7 +298,22 @@ void MappingThread::stage_ended(std::string_view stage) {
 }
 
 void MappingThread::pose_found(std::int64_t stamp_ns, const OdometryResult& odometry) {
-  if (outputs_.poses != nullptr) outputs_.poses->publish(stamp_ns, odometry, frame_);
+  const Eigen::Isometry3d T_lidar_base = frames_.T_base_lidar().inverse();
+  RobotPose pose{
+      .stamp_ns = stamp_ns,
+      .T_map_base = T_map_base(odometry),
+      .covariance = covariance_of_frame(odometry.covariance, odometry.T_map_lidar, T_lidar_base),
+      .base_frame = frames_.base(),
+      .odom = std::nullopt};
+  if (odom_) {
+    std::optional<Eigen::Isometry3d> motion_base;
+    if (motion_prior_) motion_base = motion_of_frame(frames_.T_base_lidar(), *motion_prior_);
+    pose.odom = odom_->update(stamp_ns, pose.T_map_base, odometry.health, motion_base);
+  } else if (!odom_frame_.empty()) {
+    pose.odom = pose_in_priors_odom(stamp_ns, pose.T_map_base);
+    pose.is_odom_own = false;
+  }
+  if (outputs_.poses != nullptr) outputs_.poses->publish(pose);
   statistics_.add_latency("pose", milliseconds(Clock::now() - received_));
 }
 

@@ -9,10 +9,12 @@
 #include <vector>
 
 #include "config/loaders/server_config.hpp"
+#include "core/frames/odom_frame.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/mapper.hpp"
 #include "server/mapping/map_saver.hpp"
 #include "server/mapping/odometry_prior.hpp"
+#include "server/mapping/robot_frames.hpp"
 #include "server/mapping/scan_queue.hpp"
 #include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
@@ -24,11 +26,12 @@
 
 namespace stillmap::server {
 
-/// Where mapped scans go; what is null is switched off.
+/// Where mapped scans go, and what helps to map them; what is null is switched off.
 struct MappingOutputs {
   PosePublisher* poses = nullptr;
   LabelledScanPublisher* scans = nullptr;
   const OdometryPrior* prior = nullptr;
+  const StaticTransforms* static_transforms = nullptr;
   OccupancyThread* occupancy = nullptr;
   BackgroundThrottle* throttle = nullptr;
 };
@@ -79,7 +82,20 @@ class MappingThread : public CheckpointSource {
   void pose_found(std::int64_t stamp_ns, const OdometryResult& odometry);
   /// To be called in the thread that maps.
   void resume(const SavedMap& stored, const std::shared_ptr<TileStore>& tile_store);
-  [[nodiscard]] std::optional<Eigen::Isometry3d> prior_for(std::int64_t stamp_ns) const;
+  /// False where it is not known: then the scan is dropped.
+  [[nodiscard]] bool locate_lidar(const QueuedScan& queued);
+  /// Expected pose of the lidar; nothing where the mapper is to predict it from its own poses.
+  [[nodiscard]] std::optional<Eigen::Isometry3d> prior_for(std::int64_t stamp_ns);
+  /// Motion of the lidar since the last scan by another odometry.
+  [[nodiscard]] std::optional<Eigen::Isometry3d> motion_prior(std::int64_t stamp_ns);
+  [[nodiscard]] Eigen::Isometry3d T_map_base(const OdometryResult& odometry) const {
+    return odometry.T_map_lidar * frames_.T_base_lidar().inverse();
+  }
+  /// Base in odom by the prior's poses.
+  [[nodiscard]] OdomPose pose_in_priors_odom(std::int64_t stamp_ns,
+                                             const Eigen::Isometry3d& T_map_base);
+  void refuse_prior(const std::string& counter, const std::string& reason);
+  void drop(const ScanRejection& rejection);
   void publish_snapshot();
   /// Runs `action` in the thread that maps, after the scan in work, and waits for its end.
   void run_between_scans(std::function<void()> action);
@@ -87,7 +103,6 @@ class MappingThread : public CheckpointSource {
 
   /// Limit of the memory that the static map takes.
   std::size_t map_limit_bytes_;
-  std::string lidar_frame_;
   std::chrono::duration<double> publish_period_;
   ScanQueue& queue_;
   Statistics& statistics_;
@@ -95,8 +110,16 @@ class MappingThread : public CheckpointSource {
   MappingOutputs outputs_;
   Mapper mapper_;
   ThrottledLog throttled_log_;
-  /// Of the scan in work.
-  std::string frame_;
+  RobotFrames frames_;
+  std::string odom_frame_;
+  /// Where there is a frame odom of our own.
+  std::optional<OdomFrame> odom_;
+  /// Where it is the prior's.
+  Eigen::Isometry3d T_map_odom_ = Eigen::Isometry3d::Identity();
+  /// The frame of the lidar whose place is on /tf_static.
+  std::string mounted_frame_;
+  /// Of the scan in work: its lidar's motion by the prior.
+  std::optional<Eigen::Isometry3d> motion_prior_;
   std::chrono::steady_clock::time_point received_;
   std::chrono::steady_clock::time_point stage_began_;
   double labels_ms_ = 0.0;

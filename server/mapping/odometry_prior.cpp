@@ -12,11 +12,16 @@ namespace {
 constexpr std::size_t max_poses = 1000;
 // A pose this much older than the scan still stands for it.
 constexpr std::int64_t max_gap_ns = 100'000'000;
+// No network delays a pose by more against those after it.
+constexpr std::int64_t max_disorder_ns = 5'000'000'000;
 
 }  // namespace
 
 void PoseBuffer::add(const StampedPose& pose) {
-  if (!poses_.empty() && pose.stamp_ns <= poses_.back().stamp_ns) return;
+  if (!poses_.empty() && pose.stamp_ns <= poses_.back().stamp_ns) {
+    if (poses_.back().stamp_ns - pose.stamp_ns < max_disorder_ns) return;
+    poses_.clear();
+  }
   poses_.push_back(pose);
   if (poses_.size() > max_poses) poses_.pop_front();
 }
@@ -53,18 +58,34 @@ OdometryPrior::OdometryPrior(dds::Participant& participant, const std::string& r
               dds::odometry_prior_topic(ros_topic).reader),
       worker_(std::chrono::seconds(0),
               [this, message = nav_msgs::msg::Odometry()](const std::stop_token& stop) mutable {
-                if (!reader_.take(message, stop, std::chrono::seconds(1))) return;
-                const auto odometry = wire::from_odometry(message);
-                const std::scoped_lock lock(mutex_);
-                if (odometry) poses_.add(odometry->pose);
+                if (reader_.take(message, stop, std::chrono::seconds(1))) add(message);
               }) {}
 
-std::optional<Eigen::Isometry3d> OdometryPrior::predict(const StampedPose& last,
-                                                        std::int64_t stamp_ns) const {
+void OdometryPrior::add(const nav_msgs::msg::Odometry& message) {
+  const auto odometry = wire::from_odometry(message);
+  if (!odometry) return;
   const std::scoped_lock lock(mutex_);
-  const auto T_last_now = poses_.motion(last.stamp_ns, stamp_ns);
-  if (!T_last_now) return std::nullopt;
-  return last.T_map_lidar * *T_last_now;
+  // There is no motion from a pose of one frame to that of another.
+  const bool is_same =
+      message.child_frame_id() == frame_ && message.header().frame_id() == odom_frame_;
+  if (!is_same) poses_ = {};
+  odom_frame_ = message.header().frame_id();
+  frame_ = message.child_frame_id();
+  poses_.add(odometry->pose);
+}
+
+std::optional<PriorMotion> OdometryPrior::motion(std::int64_t from_ns, std::int64_t to_ns) const {
+  const std::scoped_lock lock(mutex_);
+  const auto T_before_after = poses_.motion(from_ns, to_ns);
+  if (!T_before_after) return std::nullopt;
+  return PriorMotion{frame_, *T_before_after};
+}
+
+std::optional<PriorPose> OdometryPrior::pose_at(std::int64_t stamp_ns) const {
+  const std::scoped_lock lock(mutex_);
+  const auto T_odom_frame = poses_.pose_at(stamp_ns);
+  if (!T_odom_frame) return std::nullopt;
+  return PriorPose{odom_frame_, frame_, *T_odom_frame};
 }
 
 }  // namespace stillmap::server

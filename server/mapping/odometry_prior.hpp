@@ -13,36 +13,57 @@
 namespace stillmap::server {
 
 /// Poses from another odometry (wheels, GNSS), by time. Only their motion is used, so their origin
-/// does not matter; their child frame must be the lidar's.
+/// does not matter. They are poses of a frame on the robot, whichever that is.
 class PoseBuffer {
  public:
-  /// Out-of-order poses are left out.
+  /// Out-of-order poses are left out; one that is far older is of a clock that was set back, and
+  /// begins anew.
   void add(const StampedPose& pose);
 
-  /// Motion of the lidar from one time to another, interpolated; nothing when the poses do not
+  /// Motion of that frame from one time to another, interpolated; nothing when the poses do not
   /// reach that far.
   [[nodiscard]] std::optional<Eigen::Isometry3d> motion(std::int64_t from_ns,
                                                         std::int64_t to_ns) const;
 
- private:
+  /// Interpolated, in the other odometry's own frame; nothing when the poses do not reach that far.
   [[nodiscard]] std::optional<Eigen::Isometry3d> pose_at(std::int64_t stamp_ns) const;
 
+ private:
   std::deque<StampedPose> poses_;
 };
 
-/// Receives the odometry prior, and predicts the poses of scans from it.
+/// Motion of a frame on the robot.
+struct PriorMotion {
+  std::string frame;
+  Eigen::Isometry3d T_before_after = Eigen::Isometry3d::Identity();
+};
+
+/// Pose of a frame on the robot.
+struct PriorPose {
+  /// header.frame_id and child_frame_id.
+  std::string odom_frame;
+  std::string frame;
+  Eigen::Isometry3d T_odom_frame = Eigen::Isometry3d::Identity();
+};
+
+/// Receives the odometry prior.
 class OdometryPrior {
  public:
   OdometryPrior(dds::Participant& participant, const std::string& ros_topic);
 
-  /// Where a scan at `stamp_ns` should be, given where the last one was; nothing when the prior
-  /// does not cover both times.
-  [[nodiscard]] std::optional<Eigen::Isometry3d> predict(const StampedPose& last,
-                                                         std::int64_t stamp_ns) const;
+  /// Motion of the prior's child frame; nothing when the prior does not cover both times.
+  [[nodiscard]] std::optional<PriorMotion> motion(std::int64_t from_ns, std::int64_t to_ns) const;
+
+  [[nodiscard]] std::optional<PriorPose> pose_at(std::int64_t stamp_ns) const;
 
  private:
+  void add(const nav_msgs::msg::Odometry& message);
+
   mutable std::mutex mutex_;
+  /// All between the same two frames.
   PoseBuffer poses_;
+  std::string odom_frame_;
+  std::string frame_;
   dds::Reader<nav_msgs::msg::Odometry> reader_;
   // Last: stops before what it uses is gone.
   PeriodicWorker worker_;

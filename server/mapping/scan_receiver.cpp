@@ -17,15 +17,16 @@ constexpr int min_samples = 4;
 // The sensor does not change from scan to scan.
 constexpr std::uint64_t scans_between_checks = 100;
 
-dds::TopicSpec<sensor_msgs::msg::PointCloud2> points_of(const ServerConfig& config) {
+dds::TopicSpec<sensor_msgs::msg::PointCloud2> points_of(const ServerConfig& config,
+                                                        const std::string& ros_topic) {
   const int waiting = std::max(static_cast<int>(config.input.queue_length), min_samples);
-  return dds::points_topic(config.topics.points, config.input.delivery, waiting);
+  return dds::points_topic(ros_topic, config.input.delivery, waiting);
 }
 
-wire::CloudReadOptions reading_of(const ServerConfig& config) {
-  return {.fields = config.input.fields,
-          .intensity_scale = config.mapper.sensor.intensity_scale,
-          .labels_are_classes = config.input.label_kind == LabelKind::classes};
+wire::CloudReadOptions reading_of(const InputConfig& input, const SensorModel& sensor) {
+  return {.fields = input.fields,
+          .intensity_scale = sensor.intensity_scale,
+          .labels_are_classes = input.label_kind == LabelKind::classes};
 }
 
 // By this machine's clock; 0 for a stamp that is not a time.
@@ -39,28 +40,82 @@ double seconds_since(const builtin_interfaces::msg::Time& stamp) {
 
 ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& config,
                            ScanQueue& queue, Statistics& statistics)
-    : topic_(points_of(config).dds_name),
+    : ScanReceiver(participant, config, config.topics.points,
+                   {{.index = 0,
+                     .name = "",
+                     .frame = "",
+                     .sensor = config.mapper.sensor,
+                     .reader = wire::CloudReader(reading_of(config.input, config.mapper.sensor))}},
+                   nullptr, queue, statistics) {}
+
+ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& config,
+                           const std::string& ros_topic, SweepInput& sweeps, ScanQueue& queue,
+                           Statistics& statistics)
+    : ScanReceiver(participant, config, ros_topic, lidars_on(config, ros_topic), &sweeps, queue,
+                   statistics) {}
+
+ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& config,
+                           const std::string& ros_topic, std::vector<Lidar> lidars,
+                           SweepInput* sweeps, ScanQueue& queue, Statistics& statistics)
+    : topic_(points_of(config, ros_topic).dds_name),
       domain_id_(config.dds.domain_id),
       delivery_(config.input.delivery),
-      sensor_(config.mapper.sensor),
-      cloud_reader_(reading_of(config)),
+      lidars_(std::move(lidars)),
+      sweeps_(sweeps),
       queue_(queue),
       statistics_(statistics),
-      reader_(participant, topic_, points_of(config).reader),
+      reader_(participant, topic_, points_of(config, ros_topic).reader),
       worker_(std::chrono::seconds(0),
               [this, cloud = sensor_msgs::msg::PointCloud2()](const std::stop_token& stop) mutable {
-                if (reader_.take(cloud, stop, std::chrono::seconds(1))) accept(cloud, stop);
+                if (reader_.take(cloud, stop, std::chrono::seconds(1))) {
+                  accept(cloud, stop);
+                } else if (sweeps_ != nullptr) {
+                  sweeps_->queue_overdue(stop);
+                }
               }) {}
+
+std::vector<ScanReceiver::Lidar> ScanReceiver::lidars_on(const ServerConfig& config,
+                                                         const std::string& ros_topic) {
+  std::vector<Lidar> lidars;
+  for (std::size_t i = 0; i < config.lidars.size(); ++i) {
+    const LidarConfig& lidar = config.lidars[i];
+    if (lidar.topic != ros_topic) continue;
+    lidars.push_back({.index = i,
+                      .name = lidar.name,
+                      .frame = lidar.frame,
+                      .sensor = lidar.sensor,
+                      .reader = wire::CloudReader(reading_of(config.input, lidar.sensor))});
+  }
+  return lidars;
+}
+
+ScanReceiver::Lidar* ScanReceiver::lidar_of(const std::string& frame) {
+  const auto found = std::ranges::find_if(
+      lidars_, [&](const Lidar& lidar) { return lidar.frame.empty() || lidar.frame == frame; });
+  return found == lidars_.end() ? nullptr : &*found;
+}
 
 void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop) {
   const auto received = std::chrono::steady_clock::now();
-  statistics_.scan_received();
-  statistics_.record_scan_header(cloud.header().frame_id(), seconds_since(cloud.header().stamp()));
-  auto [from_cloud, cloud_changes] = cloud_reader_.read(cloud);
+  has_received_ = true;
+  const std::string& frame = cloud.header().frame_id();
+  if (sweeps_ == nullptr) statistics_.scan_received();
+  statistics_.record_scan_header(frame, seconds_since(cloud.header().stamp()));
+  Lidar* const lidar = lidar_of(frame);
+  if (lidar == nullptr) {
+    return drop("unknown_frame", 1,
+                "a cloud on " + topic_ + " has the frame '" + frame +
+                    "', which no lidar of 'sensors' on this topic has");
+  }
+  auto [from_cloud, cloud_changes] = lidar->reader.read(cloud);
   auto& [scan, fault, understood] = from_cloud;
   if (!scan) return drop("bad_cloud_" + fault.counter, 1, "bad cloud: " + fault.reason);
-  report(cloud_changes, *scan);
-  QueuedScan queued{*std::move(scan), cloud.header().frame_id(), received};
+  report(*lidar, cloud_changes, *scan);
+  if (sweeps_ != nullptr) return sweeps_->add(lidar->index, *std::move(scan), stop);
+  queue_scan({*std::move(scan), frame, received}, stop);
+}
+
+void ScanReceiver::queue_scan(QueuedScan queued, const std::stop_token& stop) {
   if (delivery_ == DeliveryMode::every) {
     if (!queue_.push_blocking(std::move(queued), stop)) {
       drop("shutdown", 1, "the server is stopping");
@@ -73,11 +128,11 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
   }
 }
 
-void ScanReceiver::report(const std::string& cloud_changes, const Scan& scan) {
+void ScanReceiver::report(Lidar& lidar, const std::string& cloud_changes, const Scan& scan) {
   if (!cloud_changes.empty()) spdlog::info("clouds on {}: {}", topic_, cloud_changes);
-  const bool due = scans_read_++ % scans_between_checks == 0;
+  const bool due = lidar.scans_read++ % scans_between_checks == 0;
   if (!due && cloud_changes.empty()) return;
-  const std::string misfit = sensor_mismatch(scan, sensor_);
+  const std::string misfit = sensor_mismatch(scan, lidar.sensor);
   if (misfit.empty()) return;
   statistics_.count("sensor_mismatch");
   throttled_log_.warn("sensor",
@@ -92,7 +147,7 @@ void ScanReceiver::drop(const std::string& reason, std::size_t count, const std:
 }
 
 std::string ScanReceiver::no_input_reason() const {
-  if (statistics_.received() > 0) return {};
+  if (has_received_) return {};
   const dds::ReaderEvents& events = reader_.events();
   std::string text = "no scan received on " + topic_ +
                      " yet: " + std::to_string(events.matched_writers()) +

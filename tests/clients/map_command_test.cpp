@@ -22,7 +22,34 @@ TEST_F(MapCommandTest, WritesPosesMapPicturesAndReport) {
     EXPECT_TRUE(exists(std::string("out/") + file)) << file;
   }
   EXPECT_EQ(line_count("out/poses_lidar.txt"), 6U);
-  EXPECT_THAT(result.out, AllOf(HasSubstr("6 scans"), HasSubstr("lidar frame")));
+  EXPECT_THAT(result.out, AllOf(HasSubstr("6 scans"), HasSubstr("frame 'lidar'")));
+}
+
+TEST_F(MapCommandTest, GivesPosesOfTheRobotWhereTheLidarIsMounted) {
+  const std::string mount = " --mount 1.2,0,1.4,0,15,0";
+  ASSERT_EQ(run("simulate " + path("city") + " --preset yard --sensor vlp_16 --scans 8" + mount)
+                .exit_code,
+            0);
+  const ProcessResult result = map_city("--json" + mount);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json report = nlohmann::json::parse(result.out);
+  EXPECT_THAT(report.at("poses_frame"), HasSubstr("base_link"));
+  EXPECT_LT(report.at("accuracy").at("ate_rmse_m"), 0.1);
+  EXPECT_EQ(line_count("out/poses_base.txt"), 8U);
+  EXPECT_THAT(content("out/poses_tum.txt"), HasSubstr("base_link"));
+
+  // The same from a server's file.
+  write("server.yaml",
+        "sensor: vlp_16\nframes: {base: base_link}\n"
+        "mount: {xyz_m: [1.2, 0, 1.4], rpy_deg: [0, 15, 0]}\n");
+  const std::string poses = content("out/poses_base.txt");
+  ASSERT_EQ(map_city("--force --config " + path("server.yaml")).exit_code, 0);
+  EXPECT_EQ(content("out/poses_base.txt"), poses);
+
+  write("server.yaml", "frames: {base: base_link}\nmount: {source: tf_static}\n");
+  const ProcessResult refused = map_city("--force --config " + path("server.yaml"));
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, AllOf(HasSubstr("/tf_static"), HasSubstr("--mount")));
 }
 
 TEST_F(MapCommandTest, ReportHoldsTimingMemoryAndAccuracy) {

@@ -82,6 +82,78 @@ static_map: {min_points: 5}
   EXPECT_EQ(config.mapper.static_map.min_points, 5U);
 }
 
+TEST(ServerConfig, ReadsWhereTheLidarSits) {
+  const ServerConfig config = load(
+      "frames: {base: base_link, odom: odom}\n"
+      "mount: {xyz_m: [1, 2, 3], rpy_deg: [0, 90, 0]}\n");
+  EXPECT_EQ(config.frames.base, "base_link");
+  EXPECT_EQ(config.frames.odom, "odom");
+  const Eigen::Isometry3d& T_base_lidar = config.mount.T_base_lidar;
+  EXPECT_TRUE((T_base_lidar * Eigen::Vector3d(1.0, 0.0, 0.0))
+                  .isApprox(Eigen::Vector3d(1.0, 2.0, 2.0), 1e-12));
+  const ServerConfig published = load(
+      "frames: {base: base_link, lidar: ''}\n"
+      "mount: {source: tf_static, wait_s: 3, if_missing: identity}\n");
+  EXPECT_EQ(published.mount.source, MountConfig::Source::tf_static);
+  EXPECT_EQ(published.mount.wait_s, 3.0);
+  EXPECT_TRUE(published.mount.identity_if_missing);
+}
+
+TEST(ServerConfig, RefusesFramesThatDoNotFitTogether) {
+  EXPECT_THAT(refusal_of("mount: {xyz_m: [1, 0, 0]}"), HasSubstr("set frames.base"));
+  EXPECT_THAT(refusal_of("mount: {source: tf_static}"), HasSubstr("set frames.base"));
+  EXPECT_THAT(refusal_of("frames: {odom: odom}"), HasSubstr("set frames.base"));
+  EXPECT_THAT(refusal_of("frames: {base: b, odom_source: prior}"), HasSubstr("set frames.odom"));
+  EXPECT_THAT(refusal_of("frames: {base: b, odom: o, odom_source: prior}\n"
+                         "topics: {odometry_prior: ''}"),
+              HasSubstr("needs topics.odometry_prior"));
+  EXPECT_THAT(refusal_of("frames: {base: map}"), HasSubstr("'map' is the name of two frames"));
+  EXPECT_THAT(refusal_of("frames: {base: b}\nmount: {xyz_m: [1, 0]}"),
+              HasSubstr("mount.xyz_m: has 2 numbers; wanted are three"));
+  EXPECT_THAT(refusal_of("frames: {base: b}\nmount: {rpy_deg: [0, .nan, 0]}"),
+              HasSubstr("mount.rpy_deg"));
+  EXPECT_THAT(refusal_of("frames: {base: b}\nmount: {source: tf_static, xyz_m: [1, 0, 0]}"),
+              HasSubstr("are not used with source: tf_static"));
+}
+
+TEST(ServerConfig, ReadsSeveralLidarsOfOneRobot) {
+  const ServerConfig config = load(
+      "frames: {base: base_link}\n"
+      "sensors:\n"
+      "  - {name: front, sensor: vlp_16, topic: front/points, xyz_m: [1, 0, 1]}\n"
+      "  - {name: rear, sensor: hdl_32e, topic: rear/points, frame: r, xyz_m: [-1, 0, 2],\n"
+      "     rpy_deg: [0, 0, 180]}\n");
+  ASSERT_EQ(config.lidars.size(), 2U);
+  EXPECT_EQ(config.lidars[0].sensor.rings, 16);
+  EXPECT_EQ(config.lidars[1].name, "rear");
+  EXPECT_EQ(config.lidars[1].topic, "rear/points");
+  EXPECT_EQ(config.lidars[1].frame, "r");
+  EXPECT_TRUE(
+      config.mount.T_base_lidar.translation().isApprox(Eigen::Vector3d(0.0, 0.0, 1.5), 1e-12));
+  EXPECT_EQ(config.mapper.sensor.rings, 48);
+  EXPECT_EQ(config.mapper.sensor.pattern, ScanPattern::irregular);
+}
+
+TEST(ServerConfig, RefusesLidarsThatCannotBeToldApart) {
+  const std::string base = "frames: {base: base_link}\n";
+  const std::string front = "{name: front, sensor: vlp_16, topic: points}";
+  const auto with = [&](const std::string& second) {
+    return refusal_of(base + "sensors: [" + front + ", " + second + "]\n");
+  };
+  EXPECT_THAT(with("{name: rear, sensor: vlp_16, topic: points}"),
+              HasSubstr("sensors[1].topic: is also that of 'front'"));
+  EXPECT_THAT(with("{name: front, sensor: vlp_16, topic: b}"), HasSubstr("two are called 'front'"));
+  EXPECT_THAT(with("{name: a b, sensor: vlp_16, topic: b}"), HasSubstr("sensors[1].name"));
+  EXPECT_THAT(with("{sensor: vlp16, topic: b}"),
+              AllOf(HasSubstr("sensors[1].name: is missing"), HasSubstr("did you mean 'vlp_16'")));
+  EXPECT_THAT(with("7"), HasSubstr("sensors[1]"));
+  EXPECT_THAT(refusal_of("sensors: [" + front + "]\n"), HasSubstr("frames.base"));
+  EXPECT_THAT(refusal_of(base + "sensor: vlp_16\nsensors: [" + front + "]\n"),
+              HasSubstr("leave one of the two out"));
+  EXPECT_THAT(refusal_of(base + "mount: {xyz_m: [1, 0, 0]}\nsensors: [" + front + "]\n"),
+              HasSubstr("leave one of the two out"));
+}
+
 TEST(ServerConfig, TakesRelativePathsFromTheFilesFolder) {
   (void)write_file("my_sensor.yaml", "{name: mine, rings: 8, fov_up_deg: 10, fov_down_deg: -10}");
   const ServerConfig config =

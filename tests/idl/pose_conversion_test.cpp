@@ -38,6 +38,15 @@ TEST(Odometry, ComesBackWithItsCovariance) {
   EXPECT_EQ(back->covariance, covariance);
 }
 
+TEST(Odometry, HasAVelocityWhereOneIsGiven) {
+  Eigen::Matrix<double, 6, 1> velocity;
+  velocity << 1.0, 2.0, 3.0, 4.0, 5.0, 6.0;
+  const auto message = to_odometry({.stamp_ns = 1}, Eigen::Matrix<double, 6, 6>::Zero(), "odom",
+                                   "base_link", velocity);
+  EXPECT_EQ(message.twist().twist().linear().y(), 2.0);
+  EXPECT_EQ(message.twist().twist().angular().z(), 6.0);
+}
+
 TEST(Odometry, IsRefusedWhenItIsNoPose) {
   const auto message = to_odometry({.stamp_ns = 1}, Eigen::Matrix<double, 6, 6>::Zero(), "a", "b");
   auto nan = message;
@@ -52,7 +61,7 @@ TEST(Odometry, IsRefusedWhenItIsNoPose) {
 }
 
 TEST(Tf, SaysWhereTheLidarIsInTheMap) {
-  const auto message = to_tf({.stamp_ns = 7, .T_map_lidar = some_pose()}, "map", "lidar");
+  const auto message = to_tf(7, {{"map", "lidar", some_pose()}});
   ASSERT_EQ(message.transforms().size(), 1U);
   const auto& transform = message.transforms().front();
   EXPECT_EQ(transform.header().frame_id(), "map");
@@ -60,6 +69,16 @@ TEST(Tf, SaysWhereTheLidarIsInTheMap) {
   EXPECT_EQ(transform.transform().translation().y(), -2.5);
   const Eigen::Quaterniond expected(some_pose().rotation());
   EXPECT_NEAR(transform.transform().rotation().w(), expected.w(), 1e-12);
+}
+
+TEST(Tf, ComesBackWithoutUnusableTransforms) {
+  auto message = to_tf(7, {{"base_link", "lidar", some_pose()}, {"base_link", "imu", some_pose()}});
+  message.transforms()[1].transform().rotation() = {};
+  const std::vector<FrameTransform> back = from_tf(message);
+  ASSERT_EQ(back.size(), 1U);
+  EXPECT_EQ(back[0].parent, "base_link");
+  EXPECT_EQ(back[0].child, "lidar");
+  EXPECT_TRUE(back[0].T_parent_child.isApprox(some_pose(), 1e-12));
 }
 
 TEST(Path, ComesBackInOrderWithoutUnusablePoses) {

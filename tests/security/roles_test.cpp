@@ -28,6 +28,7 @@ TEST(RolesTest, LetTheServerDoAllThatItDoes) {
   });
   EXPECT_TRUE(server.may_subscribe("rt/lidar/points"));
   EXPECT_TRUE(server.may_subscribe("rt/odom"));
+  EXPECT_TRUE(server.may_subscribe("rt/tf_static"));
 }
 
 TEST(RolesTest, LetAPlannerReadEverythingAndChangeNothing) {
@@ -55,6 +56,7 @@ TEST(RolesTest, LetASensorSendAndSeeHowItIsTaken) {
   const Access sensor = access_of(Role::sensor, names);
   EXPECT_TRUE(sensor.may_publish("rt/lidar/points"));
   EXPECT_TRUE(sensor.may_publish("rt/odom"));
+  EXPECT_TRUE(sensor.may_publish("rt/tf_static"));
   EXPECT_TRUE(sensor.may_subscribe("rt/car_7/status"));
   EXPECT_TRUE(sensor.may_publish(request_topic("car_7/get_status")));
   EXPECT_FALSE(sensor.may_publish(request_topic("car_7/reset")));

@@ -47,6 +47,14 @@ TEST(PoseBuffer, StretchesTheNewestPoseALittle) {
   EXPECT_TRUE(motion->translation().isApprox(Eigen::Vector3d(1.0, 0.0, 0.0), 1e-9));
 }
 
+TEST(PoseBuffer, BeginsAnewWhereTheClockWasSetBack) {
+  PoseBuffer poses;
+  poses.add({3'600'000 * ms, at(0.0, 0.0)});
+  poses.add({0, at(0.0, 0.0)});
+  poses.add({100 * ms, at(1.0, 0.0)});
+  EXPECT_TRUE(poses.motion(0, 100 * ms));
+}
+
 TEST(PoseBuffer, LeavesOutWhatComesOutOfOrder) {
   PoseBuffer poses = drive();
   poses.add({500 * ms, at(1000.0, 0.0)});

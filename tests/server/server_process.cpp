@@ -48,14 +48,19 @@ int ServerProcess::wait_for_exit(std::chrono::seconds timeout) {
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
 
-ServiceSetup::ServiceSetup(const std::string& delivery, const std::string& map_options) {
+ServiceSetup::ServiceSetup(const std::string& delivery, const std::string& map_options,
+                           const std::string& sensors) {
   std::ofstream(folder_ / "server.yaml")
-      << "sensor: vlp_16\n"
+      << sensors << "\n"
       << "dds: {domain_id: " << dds::test_domain_id() << ", interfaces: [127.0.0.1]}\n"
       << "input: {delivery: " << delivery << ", queue_length: 3}\n"
       << "publish: {path_period_s: 0.1, cloud_period_s: 0.1, tiles_period_s: 0.1, "
       << "status_period_s: 0.2}\n"
       << "map: {file: map.stillmap, " << map_options << "}\n";
+}
+
+void ServiceSetup::add(const std::string& yaml) const {
+  std::ofstream(folder_ / "server.yaml", std::ios::app) << yaml;
 }
 
 std::vector<std::string> ServiceSetup::server_arguments() const {

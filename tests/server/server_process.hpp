@@ -33,9 +33,14 @@ class ServerProcess {
 /// Files and options of one test's server and clients, in a domain of their own.
 class ServiceSetup {
  public:
-  /// `delivery`: "latest" or "every". `map_options`: fields of the section `map`.
+  /// `delivery`: "latest" or "every". `map_options`: fields of the section `map`. `sensors`: the
+  /// line of the server's file that names them.
   explicit ServiceSetup(const std::string& delivery,
-                        const std::string& map_options = "save_period_s: 3600");
+                        const std::string& map_options = "save_period_s: 3600",
+                        const std::string& sensors = "sensor: vlp_16");
+
+  /// More sections of the server's file.
+  void add(const std::string& yaml) const;
 
   [[nodiscard]] std::vector<std::string> server_arguments() const;
   [[nodiscard]] dds::DdsOptions dds() const;

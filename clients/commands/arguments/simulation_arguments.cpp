@@ -69,6 +69,7 @@ simulation::SimulationConfig simulation_config(const SimulationArguments& argume
   config.scans = arguments.scans;
   config.rolling = arguments.rolling;
   config.motion = simulation::lidar_motion(arguments.motion);
+  config.T_base_lidar = arguments.mount.T_base_lidar();
   if (const std::string faults = config.faults(); !faults.empty()) {
     throw std::invalid_argument(faults);
   }

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <string>
 
+#include "clients/commands/arguments/mount_arguments.hpp"
 #include "core/simulation/simulation.hpp"
 
 namespace stillmap::cli {
@@ -17,6 +18,7 @@ struct SimulationArguments {
   int scans = 300;
   bool rolling = false;
   std::string motion = "vehicle";
+  MountArguments mount;
 };
 
 /// A negative number that was typed comes as one near 2^64. Throws std::invalid_argument naming

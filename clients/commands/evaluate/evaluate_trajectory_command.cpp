@@ -1,11 +1,13 @@
 #include <iostream>
 #include <memory>
 
+#include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
 #include "clients/commands/mapping/trajectory_report.hpp"
 #include "clients/terminal/json.hpp"
 #include "core/dataset/kitti_files.hpp"
+#include "core/frames/rigid_motion.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -14,6 +16,7 @@ struct EvaluateTrajectoryArguments {
   std::string truth, estimate;
   std::string truth_calib, estimate_calib;
   std::string frame = "lidar";
+  MountArguments truth_mount;
   double max_difference_s = 0.05;
   std::string pictures;
   bool json = false;
@@ -50,10 +53,15 @@ std::string frame_warning(const evaluation::PosePairs& pairs) {
 }
 
 ExitCode run(const EvaluateTrajectoryArguments& arguments) {
-  const PoseFile truth = read_in_frame(arguments.truth, arguments.truth_calib);
+  PoseFile truth = read_in_frame(arguments.truth, arguments.truth_calib);
+  // From poses of the lidar to those of the robot, whose map is where its own first pose is.
+  if (const auto T_base_lidar = arguments.truth_mount.T_base_lidar()) {
+    for (Eigen::Isometry3d& T : truth.poses) T = motion_of_frame(*T_base_lidar, T);
+  }
   const PoseFile estimate = read_in_frame(arguments.estimate, arguments.estimate_calib);
   const bool converted = !arguments.truth_calib.empty() || !arguments.estimate_calib.empty();
-  const std::string frame = converted ? "lidar" : arguments.frame;
+  const bool is_mounted = !arguments.truth_mount.xyz_rpy.empty();
+  const std::string frame = is_mounted ? "base" : converted ? "lidar" : arguments.frame;
   const evaluation::PosePairs pairs =
       pair_poses(truth, estimate, static_cast<std::int64_t>(1e9 * arguments.max_difference_s));
   const TrajectoryReport report = report_trajectory(pairs);
@@ -89,6 +97,8 @@ void add_evaluate_trajectory_command(CommandHandle evaluate, Action& action) {
   command.option("--truth-calib", arguments->truth_calib,
                  "The truth is in the camera frame: convert with Tr of this calib.txt");
   command.option("--estimate-calib", arguments->estimate_calib, "The same for the estimate");
+  add_mount_option(command, arguments->truth_mount,
+                   "The truth is of the lidar, the estimate of the robot: convert the truth");
   command
       .option("--frame", arguments->frame,
               "Frame of both files when nothing is converted: lidar or camera")

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "clients/commands/arguments/client_arguments.hpp"
+#include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
@@ -45,15 +46,19 @@ class PoseLog {
   /// The poses of these scans, in their order, without those that have none.
   [[nodiscard]] Trajectory poses_of(const std::vector<std::int64_t>& stamps_ns) const;
 
+  /// What they are poses of.
+  [[nodiscard]] std::string frame() const;
+
  private:
   /// From the odometry topic: replaces the pose of a scan that is sent again.
-  void take(const StampedPose& pose);
+  void take(const OdometryUpdate& update);
   /// From the path, which may be older: does not replace a pose.
   void add(const StampedPose& pose);
 
   mutable std::mutex mutex_;
   std::condition_variable added_;
   std::map<std::int64_t, Eigen::Isometry3d> T_map_lidar_;
+  std::string frame_ = "lidar";
   // Last members: their callbacks end before the poses are destroyed.
   Subscription odometry_;
   Subscription path_;
@@ -84,7 +89,7 @@ struct ServerCounts {
 
 PoseLog::PoseLog(Client& client)
     : odometry_(client.subscribe_odometry([this](const OdometryUpdate& update) {
-        take(update.pose);
+        take(update);
         added_.notify_one();
       })),
       path_(client.subscribe_path([this](const Trajectory& path) {
@@ -92,9 +97,15 @@ PoseLog::PoseLog(Client& client)
         added_.notify_one();
       })) {}
 
-void PoseLog::take(const StampedPose& pose) {
+void PoseLog::take(const OdometryUpdate& update) {
   const std::lock_guard lock(mutex_);
-  T_map_lidar_.insert_or_assign(pose.stamp_ns, pose.T_map_lidar);
+  T_map_lidar_.insert_or_assign(update.pose.stamp_ns, update.pose.T_map_lidar);
+  frame_ = update.child_frame;
+}
+
+std::string PoseLog::frame() const {
+  const std::lock_guard lock(mutex_);
+  return frame_;
 }
 
 void PoseLog::add(const StampedPose& pose) {
@@ -238,6 +249,10 @@ struct ReplayArguments {
   /// 0: not given.
   double rate = 0.0;
   std::string topic = "points";
+  /// header.frame_id of the clouds.
+  std::string frame = "lidar";
+  std::string base_frame = "base_link";
+  MountArguments mount;
   std::string out;
   std::uint32_t subscribers = 1;
   bool lossless = false;
@@ -248,6 +263,8 @@ struct ReplayOutcome {
   ReplayResult replay;
   ServerCounts server;
   Trajectory poses;
+  /// What they are poses of.
+  std::string frame;
 };
 
 void require_subscribers(ScanPublisher& publisher, const ReplayArguments& arguments,
@@ -294,6 +311,12 @@ ReplayResult publish_with_progress(const ScanDataset& dataset, const ReplayArgum
       [&](const SkippedScan& scan) { progress.say("stillmap: skipped: " + scan.reason); });
 }
 
+std::optional<FrameTransform> mount_of(const ReplayArguments& arguments) {
+  const auto T_base_lidar = arguments.mount.T_base_lidar();
+  if (!T_base_lidar) return std::nullopt;
+  return FrameTransform{arguments.base_frame, arguments.frame, *T_base_lidar};
+}
+
 ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
   (void)arguments.replay.range.end(dataset);
@@ -301,6 +324,8 @@ ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   PoseLog poses(client);
   ScanPublisher publisher(client, {.dds = arguments.client.dds(DdsRole::sensor),
                                    .points_topic = arguments.topic,
+                                   .lidar_frame = arguments.frame,
+                                   .mount = mount_of(arguments),
                                    .lossless = arguments.lossless});
   require_subscribers(publisher, arguments, stop);
   const dds::ServerStatus before = client.status();
@@ -318,6 +343,7 @@ ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
     poses.wait_for(stamps_ns, arguments.client.timeout());
   }
   outcome.poses = poses.poses_of(stamps_ns);
+  outcome.frame = poses.frame();
   return outcome;
 }
 
@@ -328,7 +354,7 @@ Json to_json(const ReplayOutcome& outcome) {
           {"mapped", outcome.server.mapped},
           {"dropped", outcome.server.dropped},
           {"poses", outcome.poses.size()},
-          {"poses_frame", "lidar; the map is the lidar frame of the server's first scan"},
+          {"poses_frame", outcome.frame + "; the map is its place at the server's first scan"},
           {"seconds", outcome.replay.seconds},
           {"interrupted", outcome.replay.stopped}};
 }
@@ -347,11 +373,11 @@ std::string describe(const ReplayOutcome& outcome) {
 ExitCode run(const ReplayArguments& arguments) {
   StopSignal stop;
   const ReplayOutcome outcome = replay(arguments, stop);
-  if (!arguments.out.empty()) write_poses_as_named(arguments.out, outcome.poses);
+  if (!arguments.out.empty()) write_poses_as_named(arguments.out, outcome.poses, outcome.frame);
   std::cout << (arguments.json ? to_json(outcome).dump(2) + "\n" : describe(outcome));
   if (!arguments.json && !arguments.out.empty()) {
-    std::cout << "poses written to " << arguments.out
-              << " (lidar frame; the map is the lidar frame of the server's first scan)\n";
+    std::cout << "poses written to " << arguments.out << " (frame '" << outcome.frame
+              << "'; the map is its place at the server's first scan)\n";
   }
   const std::size_t published = outcome.replay.published_stamps_ns.size();
   const bool complete = outcome.server.mapped >= published && outcome.poses.size() == published;
@@ -395,12 +421,17 @@ void add_replay_command(CommandHandle program, Action& action) {
               "Begin when so many take the scans: the server, and 'stillmap record', say")
       .between(1, 1000)
       .with_default();
+  command.option("--frame", arguments->frame, "The clouds' frame (header.frame_id)").with_default();
+  add_mount_option(command, arguments->mount, "Publish on /tf_static");
+  command.option("--base", arguments->base_frame, "The robot's frame there").with_default();
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"
       "  stillmap replay sequences/00 --rate 2\n"
       "  stillmap replay city --lossless --out poses_lidar.txt\n"
+      "  stillmap replay city --mount 1.2,0,1.4,0,15,0   # for a server with mount: {source: "
+      "tf_static}\n"
       "Ends when the server has processed what was sent, and prints the counts. Exit code 1\n"
       "when a lossless replay lost something, 3 when no server answers or it stops taking scans.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });

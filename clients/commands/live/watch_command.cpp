@@ -30,7 +30,7 @@ struct WatchArguments {
 /// Hands updates from the subscriptions' threads to the printing one.
 class UpdateQueue {
  public:
-  void add(const StampedPose& pose) {
+  void add(const OdometryUpdate& pose) {
     const std::lock_guard lock(mutex_);
     poses_.push_back(pose);
   }
@@ -38,7 +38,7 @@ class UpdateQueue {
     const std::lock_guard lock(mutex_);
     status_ = status;
   }
-  std::deque<StampedPose> take_poses() {
+  std::deque<OdometryUpdate> take_poses() {
     const std::lock_guard lock(mutex_);
     return std::exchange(poses_, {});
   }
@@ -49,7 +49,7 @@ class UpdateQueue {
 
  private:
   std::mutex mutex_;
-  std::deque<StampedPose> poses_;
+  std::deque<OdometryUpdate> poses_;
   std::optional<dds::ServerStatus> status_;
 };
 
@@ -57,12 +57,13 @@ double yaw_deg(const Eigen::Isometry3d& T) {
   return std::atan2(T.linear()(1, 0), T.linear()(0, 0)) * 180.0 / std::numbers::pi;
 }
 
-Json pose_json(const StampedPose& pose) {
+Json pose_json(const OdometryUpdate& update) {
+  const StampedPose& pose = update.pose;
   const Eigen::Vector3d t = pose.T_map_lidar.translation();
   const Eigen::Quaterniond q(pose.T_map_lidar.linear());
   return {{"type", "pose"},
           {"stamp_ns", pose.stamp_ns},
-          {"frame", "lidar in map"},
+          {"frame", update.child_frame + " in " + update.frame},
           {"position_m", {t.x(), t.y(), t.z()}},
           {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
 }
@@ -89,10 +90,11 @@ class Watch {
   explicit Watch(const WatchArguments& arguments) : arguments_(arguments) {}
 
   void print(UpdateQueue& updates) {
-    for (const StampedPose& pose : updates.take_poses()) {
+    for (const OdometryUpdate& update : updates.take_poses()) {
       if (enough_poses()) break;
-      poses_.push_back(pose);
-      if (arguments_.json) std::cout << pose_json(pose).dump() << "\n";
+      poses_.push_back(update.pose);
+      frame_ = update.child_frame;
+      if (arguments_.json) std::cout << pose_json(update).dump() << "\n";
     }
     if (const std::optional<dds::ServerStatus> status = updates.take_status()) {
       if (arguments_.json) {
@@ -110,10 +112,13 @@ class Watch {
     return arguments_.count > 0 && poses_.size() >= arguments_.count;
   }
   [[nodiscard]] const Trajectory& poses() const { return poses_; }
+  /// What they are poses of.
+  [[nodiscard]] const std::string& frame() const { return frame_; }
 
  private:
   const WatchArguments& arguments_;
   Trajectory poses_;
+  std::string frame_;
 };
 
 ExitCode run(const WatchArguments& arguments) {
@@ -121,7 +126,7 @@ ExitCode run(const WatchArguments& arguments) {
   Client client = connect(arguments.client);
   UpdateQueue updates;
   const Subscription odometry =
-      client.subscribe_odometry([&](const OdometryUpdate& update) { updates.add(update.pose); });
+      client.subscribe_odometry([&](const OdometryUpdate& update) { updates.add(update); });
   const Subscription status =
       client.subscribe_status([&](const dds::ServerStatus& update) { updates.add(update); });
   Watch watch(arguments);
@@ -134,9 +139,9 @@ ExitCode run(const WatchArguments& arguments) {
   }
   watch.print(updates);
   if (!arguments.out.empty()) {
-    write_poses_as_named(arguments.out, watch.poses());
-    std::cerr << watch.poses().size() << " poses written to " << arguments.out
-              << " (lidar frame; the map is the lidar frame of the server's first scan)\n";
+    write_poses_as_named(arguments.out, watch.poses(), watch.frame());
+    std::cerr << watch.poses().size() << " poses of the frame '" << watch.frame()
+              << "' in the server's map written to " << arguments.out << "\n";
   }
   const bool too_few = arguments.count > 0 && !watch.enough_poses() && time_is_up;
   return too_few ? ExitCode::no_server : ExitCode::ok;

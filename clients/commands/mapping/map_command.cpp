@@ -9,6 +9,7 @@
 #include <string>
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
+#include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
@@ -17,7 +18,9 @@
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "clients/terminal/table.hpp"
+#include "config/loaders/server_config.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "core/frames/rigid_motion.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/map/tools/map_export.hpp"
 #include "core/picture/map_picture.hpp"
@@ -29,19 +32,24 @@ namespace {
 /// Results of a mapping run, with its errors where the sequence has true poses.
 struct MapOutput {
   std::filesystem::path folder;
+  /// What the poses are of.
+  std::string frame;
   std::optional<TrajectoryReport> accuracy;
 };
 
-// True poses of the mapped scans, in the lidar frame of the first of them.
-std::optional<Trajectory> truth_of(const ScanDataset& dataset, const MappingResult& result) {
+// True poses of the body at the mapped scans, in its frame at the first of them.
+std::optional<Trajectory> truth_of(const ScanDataset& dataset, const MappingResult& result,
+                                   const MappedBody& body) {
   std::optional<Trajectory> all = dataset.truth();
   if (!all || result.trajectory.empty()) return std::nullopt;
   const Eigen::Isometry3d T_first_world =
       all->at(result.scan_of_pose.front()).T_map_lidar.inverse();
   Trajectory truth;
   for (std::size_t i = 0; i < result.scan_of_pose.size(); ++i) {
-    truth.push_back({result.trajectory[i].stamp_ns,
-                     T_first_world * all->at(result.scan_of_pose[i]).T_map_lidar});
+    const Eigen::Isometry3d T_first_lidar =
+        T_first_world * all->at(result.scan_of_pose[i]).T_map_lidar;
+    truth.push_back(
+        {result.trajectory[i].stamp_ns, motion_of_frame(body.T_body_lidar, T_first_lidar)});
   }
   return truth;
 }
@@ -87,18 +95,24 @@ void prepare_output_folder(const std::filesystem::path& folder, bool force) {
   if (error) throw DatasetError(folder, "cannot be made: " + error.message());
 }
 
-/// Writes poses_lidar.txt, poses_tum.txt, map.stillmap, map.ply, map.pcd, map.png and, with truth,
-/// trajectory.png and trajectory_error.png. Throws what their writers throw.
+/// Name of the file with KITTI's form of the poses.
+std::string pose_file_of(const std::string& frame) {
+  return frame == "lidar" ? "poses_lidar.txt" : "poses_base.txt";
+}
+
+/// Writes poses_lidar.txt or poses_base.txt, poses_tum.txt, map.stillmap, map.ply, map.pcd, map.png
+/// and, with truth, trajectory.png and trajectory_error.png. Throws what their writers throw.
 MapOutput write_map_output(const std::filesystem::path& folder, const ScanDataset& dataset,
-                           const MappingResult& result, const MapperConfig& config) {
-  MapOutput output{.folder = folder, .accuracy = std::nullopt};
-  write_kitti_poses(folder / "poses_lidar.txt", result.trajectory);
-  write_tum(folder / "poses_tum.txt", result.trajectory);
+                           const MappingResult& result, const MapperConfig& config,
+                           const MappedBody& body) {
+  MapOutput output{.folder = folder, .frame = body.frame, .accuracy = std::nullopt};
+  write_kitti_poses(folder / pose_file_of(body.frame), result.trajectory);
+  write_tum(folder / "poses_tum.txt", result.trajectory, body.frame);
   save_map(map_file_in(folder), result, config);
   export_ply(*result.view, folder / "map.ply");
   export_pcd(*result.view, folder / "map.pcd");
   MapPictureOptions picture;
-  picture.truth = truth_of(dataset, result);
+  picture.truth = truth_of(dataset, result, body);
   if (picture.truth) {
     const evaluation::PosePairs pairs = pairs_of(*picture.truth, result.trajectory);
     output.accuracy = report_trajectory(pairs);
@@ -170,7 +184,7 @@ Json to_json(const MappingResult& result, const MapOutput& output) {
           {"tiles", result.view->tiles.size()},
           {"voxels", voxel_count(*result.view)},
           {"voxel_size_m", result.view->voxel_size_m},
-          {"poses_frame", "lidar; the map is the lidar frame of the first pose"},
+          {"poses_frame", output.frame + "; the map is its frame at the first pose"},
           {"moving_points",
            {{"precision", optional_number(result.moving.precision())},
             {"recall", optional_number(result.moving.recall())},
@@ -199,8 +213,9 @@ std::string describe(const MappingResult& result, const MapOutput& output) {
   if (output.accuracy)
     text += "against the true poses of the sequence:\n" + describe(*output.accuracy);
   text += "written to " + output.folder.string() +
-          ": map.stillmap map.ply map.pcd map.png report.json, and poses_lidar.txt, "
-          "poses_tum.txt (lidar frame; the map is the lidar frame of the first pose)\n";
+          ": map.stillmap map.ply map.pcd map.png report.json, and " + pose_file_of(output.frame) +
+          ", poses_tum.txt (frame '" + output.frame +
+          "'; the map is its place at the first pose)\n";
   return text;
 }
 
@@ -209,13 +224,34 @@ struct MapArguments {
   std::string topic_in;
   std::string out = "stillmap_out";
   MapperArguments mapper;
+  MountArguments mount;
   ScanRange range;
   bool force = false;
   bool json = false;
 };
 
+/// The robot, where the command line or the server's file says where its lidar sits.
+MappedBody body_of(const MapArguments& arguments) {
+  const std::string& file = arguments.mapper.config_file;
+  const ServerConfig server = file.empty() ? ServerConfig{} : load_server_config(file);
+  if (!server.lidars.empty()) {
+    throw std::invalid_argument(file + " lists several lidars ('sensors'), but a sequence is of " +
+                                "one: give a file with 'sensor' and 'mount'");
+  }
+  const std::string base = server.frames.base.empty() ? "base_link" : server.frames.base;
+  if (const auto T_base_lidar = arguments.mount.T_base_lidar()) return {base, *T_base_lidar};
+  if (server.frames.base.empty()) return {};
+  if (server.mount.source == MountConfig::Source::tf_static) {
+    throw std::invalid_argument(file +
+                                " takes the lidar's place from /tf_static, which a sequence "
+                                "does not have: give it with --mount");
+  }
+  return {base, server.mount.T_base_lidar};
+}
+
 MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& arguments,
-                                const MapperConfig& config, StopSignal& stop) {
+                                const MapperConfig& config, const MappedBody& body,
+                                StopSignal& stop) {
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
   Progress progress("map", "scans", total);
   std::size_t skipped = 0;
@@ -227,8 +263,8 @@ MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& 
     ++skipped;
     progress.say("stillmap: skipped: " + scan.reason);
   };
-  return map_dataset(dataset, arguments.range, config, label_source(arguments.mapper, dataset),
-                     scan_done, scan_skipped);
+  return map_dataset(dataset, arguments.range, config, body,
+                     label_source(arguments.mapper, dataset), scan_done, scan_skipped);
 }
 
 void write_report(const std::filesystem::path& file, const Json& report) {
@@ -242,13 +278,14 @@ ExitCode run(const MapArguments& arguments) {
   StopSignal stop;
   const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
+  const MappedBody body = body_of(arguments);
   prepare_output_folder(arguments.out, arguments.force);
-  const MappingResult result = map_with_progress(dataset, arguments, config, stop);
+  const MappingResult result = map_with_progress(dataset, arguments, config, body, stop);
   if (result.trajectory.empty()) {
     std::cerr << "stillmap: no scan of " << arguments.dataset << " could be mapped\n";
     return ExitCode::bad_input;
   }
-  const MapOutput output = write_map_output(arguments.out, dataset, result, config);
+  const MapOutput output = write_map_output(arguments.out, dataset, result, config, body);
   const Json report = to_json(result, output);
   write_report(output.folder / "report.json", report);
   std::cout << (arguments.json ? report.dump(2) + "\n" : describe(result, output));
@@ -267,6 +304,8 @@ void add_map_command(CommandHandle program, Action& action) {
   command.option("--topic-in", arguments->topic_in, topic_in_help);
   command.option("--out", arguments->out, "Folder for the results").with_default();
   add_mapper_options(command, arguments->mapper);
+  add_mount_option(command, arguments->mount,
+                   "Poses of the robot, and the map from where it stands, as a server has them");
   command.option("--start", arguments->range.first, "Number of the first scan");
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
   command.flag("--strict", arguments->range.strict,
@@ -279,9 +318,9 @@ void add_map_command(CommandHandle program, Action& action) {
       "  stillmap map my_vlp16_pcds --sensor vlp_16 --labels none --out campus\n"
       "  stillmap map city --weighting none --out plain --json | jq .accuracy\n"
       "Writes map.stillmap (SQLite), map.ply, map.pcd, map.png, poses_lidar.txt (KITTI 3x4, lidar\n"
-      "frame), poses_tum.txt (the same with stamps), report.json (timing, memory, accuracy), and\n"
-      "with true poses in the sequence trajectory.png and trajectory_error.png. A damaged file\n"
-      "is named and skipped; its scan then has no line in poses_lidar.txt.");
+      "frame; poses_base.txt with --mount), poses_tum.txt (the same with stamps), report.json\n"
+      "(timing, memory, accuracy), and with true poses in the sequence trajectory.png and\n"
+      "trajectory_error.png. A damaged file is named and skipped; its scan then has no pose.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

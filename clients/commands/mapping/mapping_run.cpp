@@ -25,10 +25,12 @@ std::vector<std::uint16_t> true_ids_of_kept_points(const DatasetFrame& frame,
 class MappingRun {
  public:
   MappingRun(const ScanDataset& dataset, bool strict, const MapperConfig& config,
-             std::unique_ptr<Segmenter> labels, const ScanSkipped& scan_skipped)
+             const MappedBody& body, std::unique_ptr<Segmenter> labels,
+             const ScanSkipped& scan_skipped)
       : dataset_(dataset),
         strict_(strict),
         scan_skipped_(scan_skipped),
+        T_body_lidar_(body.T_body_lidar),
         prepare_(config.prepare),
         mapper_(config, std::move(labels),
                 {.stage_ended = [this](std::string_view stage) { times_.end_stage(stage); },
@@ -39,7 +41,11 @@ class MappingRun {
     if (!frame) return;
     const std::vector<std::uint16_t> true_ids = true_ids_of_kept_points(*frame, prepare_);
     times_.begin();
-    const std::optional<MappedScan> mapped = mapper_.process(std::move(frame->scan));
+    std::optional<Eigen::Isometry3d> T_map_lidar_first;
+    const bool is_mounted = !T_body_lidar_.isApprox(Eigen::Isometry3d::Identity());
+    if (is_mounted && mapper_.trajectory().empty()) T_map_lidar_first = T_body_lidar_;
+    const std::optional<MappedScan> mapped =
+        mapper_.process(std::move(frame->scan), T_map_lidar_first);
     if (!mapped) {
       skip({index, mapper_.last_rejection().counter,
             dataset_.file(index).string() + ": " + mapper_.last_rejection().reason});
@@ -53,7 +59,10 @@ class MappingRun {
   }
 
   MappingResult finish(bool stopped) {
-    result_.trajectory = mapper_.trajectory();
+    const Eigen::Isometry3d T_lidar_body = T_body_lidar_.inverse();
+    for (const StampedPose& pose : mapper_.trajectory()) {
+      result_.trajectory.push_back({pose.stamp_ns, pose.T_map_lidar * T_lidar_body});
+    }
     SavedMap map = to_saved_map(mapper_.static_map().checkpoint(true));
     result_.view = std::make_shared<const MapSnapshot>(std::move(map.view));
     result_.tile_evidence = std::move(map.tile_evidence);
@@ -82,6 +91,7 @@ class MappingRun {
   const ScanDataset& dataset_;
   bool strict_;
   const ScanSkipped& scan_skipped_;
+  Eigen::Isometry3d T_body_lidar_;
   PrepareConfig prepare_;
   StageStopwatch times_;
   Mapper mapper_;
@@ -100,10 +110,11 @@ std::size_t ScanRange::end(const ScanDataset& dataset) const {
 }
 
 MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
-                          const MapperConfig& config, std::unique_ptr<Segmenter> labels,
-                          const ScanDone& scan_done, const ScanSkipped& scan_skipped) {
+                          const MapperConfig& config, const MappedBody& body,
+                          std::unique_ptr<Segmenter> labels, const ScanDone& scan_done,
+                          const ScanSkipped& scan_skipped) {
   const std::size_t end = range.end(dataset);
-  MappingRun run(dataset, range.strict, config, std::move(labels), scan_skipped);
+  MappingRun run(dataset, range.strict, config, body, std::move(labels), scan_skipped);
   const auto began = std::chrono::steady_clock::now();
   bool keep_running = true;
   for (std::size_t index = range.first; index < end && keep_running; ++index) {

@@ -33,7 +33,15 @@ struct SkippedScan {
   std::string reason;
 };
 
+/// What the poses of a run are of.
+struct MappedBody {
+  std::string frame = "lidar";
+  /// Where the lidar sits on it. The map begins where the body stands.
+  Eigen::Isometry3d T_body_lidar = Eigen::Isometry3d::Identity();
+};
+
 struct MappingResult {
+  /// Of the body.
   Trajectory trajectory;
   /// Index in the data set of each pose of the trajectory.
   std::vector<std::size_t> scan_of_pose;
@@ -58,7 +66,7 @@ using ScanSkipped = std::function<void(const SkippedScan&)>;
 
 /// Maps a data set in this process.
 [[nodiscard]] MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
-                                        const MapperConfig& config,
+                                        const MapperConfig& config, const MappedBody& body,
                                         std::unique_ptr<Segmenter> labels,
                                         const ScanDone& scan_done = {},
                                         const ScanSkipped& scan_skipped = {});

@@ -89,10 +89,11 @@ PoseFile read_pose_file(const std::filesystem::path& file) {
   return {.poses = read_poses(file), .stamps_ns = {}};
 }
 
-void write_tum(const std::filesystem::path& file, const Trajectory& trajectory) {
+void write_tum(const std::filesystem::path& file, const Trajectory& trajectory,
+               const std::string& frame) {
   std::ofstream out(file, std::ios::trunc);
-  out << "# stamp[s] x y z[m] qx qy qz qw: takes lidar points to the map, which is the lidar frame "
-         "of the first pose\n"
+  out << "# stamp[s] x y z[m] qx qy qz qw: takes points of the frame '" << frame
+      << "' to the map, which begins at the first pose\n"
       << std::fixed << std::setprecision(9);
   for (const StampedPose& pose : trajectory) {
     const Eigen::Quaterniond q(pose.T_map_lidar.linear());
@@ -112,8 +113,10 @@ void write_kitti_poses(const std::filesystem::path& file, const Trajectory& traj
   write_poses(file, poses);
 }
 
-void write_poses_as_named(const std::filesystem::path& file, const Trajectory& trajectory) {
-  file.extension() == ".tum" ? write_tum(file, trajectory) : write_kitti_poses(file, trajectory);
+void write_poses_as_named(const std::filesystem::path& file, const Trajectory& trajectory,
+                          const std::string& frame) {
+  file.extension() == ".tum" ? write_tum(file, trajectory, frame)
+                             : write_kitti_poses(file, trajectory);
 }
 
 evaluation::PosePairs pair_poses(const PoseFile& truth, const PoseFile& estimate,

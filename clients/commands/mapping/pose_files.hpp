@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "core/evaluation/trajectory_error.hpp"
@@ -21,14 +22,16 @@ struct PoseFile {
 /// lines that begin with # are comments). Throws DatasetError naming the file and line.
 [[nodiscard]] PoseFile read_pose_file(const std::filesystem::path& file);
 
-/// Writes TUM's form. Throws DatasetError.
-void write_tum(const std::filesystem::path& file, const Trajectory& trajectory);
+/// Writes TUM's form; a remark says that they are poses of `frame`. Throws DatasetError.
+void write_tum(const std::filesystem::path& file, const Trajectory& trajectory,
+               const std::string& frame = "lidar");
 
 /// Writes KITTI's form. Throws DatasetError.
 void write_kitti_poses(const std::filesystem::path& file, const Trajectory& trajectory);
 
 /// TUM's form to a name that ends in .tum, else KITTI's. Throws DatasetError.
-void write_poses_as_named(const std::filesystem::path& file, const Trajectory& trajectory);
+void write_poses_as_named(const std::filesystem::path& file, const Trajectory& trajectory,
+                          const std::string& frame);
 
 /// Pairs by stamp when both have stamps (at most `max_difference_ns` apart), else by index. Throws
 /// std::invalid_argument.

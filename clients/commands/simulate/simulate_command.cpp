@@ -89,6 +89,8 @@ void add_simulate_command(CommandHandle program, Action& action) {
               "Of the lidar on its vehicle: vehicle (fixed), hard_turns (a robot that turns on the "
               "spot at 55 degrees a second) or handheld")
       .with_default();
+  add_mount_option(command, simulation.mount,
+                   "Not upright above the middle of its vehicle, but there");
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"

@@ -64,7 +64,18 @@ void read_status(Bytes bytes) {
       bytes, [](const auto& message) { static_cast<void>(wire::from_wire(message)); });
 }
 
-constexpr std::array<void (*)(Bytes), 11> readers = {
+void read_tf(Bytes bytes) {
+  read_as<tf2_msgs::msg::TFMessage>(bytes, [](const auto& message) {
+    FrameTree tree;
+    for (const FrameTransform& transform : wire::from_tf(message)) {
+      static_cast<void>(tree.set(transform));
+      const auto T = tree.find(transform.parent, transform.child);
+      require(!T || !T->matrix().hasNaN(), "a chain of transforms is a number");
+    }
+  });
+}
+
+constexpr std::array<void (*)(Bytes), 12> readers = {
     read_odometry,
     read_path,
     read_tile,
@@ -76,6 +87,7 @@ constexpr std::array<void (*)(Bytes), 11> readers = {
     read_response<NearestTraversable_Response>,
     read_response<QueryOccupancy_Response>,
     read_response<GetRemoved_Response>,
+    read_tf,
 };
 
 void run(Bytes bytes) {
@@ -105,6 +117,8 @@ std::vector<Seed> seeds() {
   return {
       {"odometry", with_choice(0, to_cdr(wire::to_odometry(
                                       pose, Eigen::Matrix<double, 6, 6>::Identity(), "map", "l")))},
+      {"tf", with_choice(11, to_cdr(wire::to_tf(1, {{"base_link", "mast", pose.T_map_lidar},
+                                                    {"mast", "lidar", pose.T_map_lidar}})))},
       {"path", with_choice(1, to_cdr(wire::to_path({pose, pose}, "map")))},
       {"tile", with_choice(2, to_cdr(wire::to_wire(tile, identity)))},
       {"tile_info", with_choice(3, to_cdr(wire::to_wire(tile.info, identity)))},

@@ -1,0 +1,35 @@
+#include "clients/commands/arguments/mount_arguments.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <stdexcept>
+
+#include "core/frames/rigid_motion.hpp"
+
+namespace stillmap::cli {
+
+std::optional<Eigen::Isometry3d> MountArguments::T_base_lidar() const {
+  if (xyz_rpy.empty()) return std::nullopt;
+  constexpr double largest = 1000.0;
+  const bool is_usable = std::ranges::all_of(
+      xyz_rpy, [](double value) { return std::isfinite(value) && std::abs(value) <= largest; });
+  if (!is_usable) {
+    throw std::invalid_argument(
+        "--mount needs finite numbers: x,y,z in metres, roll,pitch,yaw in "
+        "degrees");
+  }
+  constexpr double radians_per_degree = std::numbers::pi / 180.0;
+  return from_xyz_rpy({xyz_rpy[0], xyz_rpy[1], xyz_rpy[2]},
+                      radians_per_degree * Eigen::Vector3d(xyz_rpy[3], xyz_rpy[4], xyz_rpy[5]));
+}
+
+void add_mount_option(CommandHandle command, MountArguments& arguments, const std::string& help) {
+  command
+      .option("--mount", arguments.xyz_rpy,
+              help + ": x,y,z [m],roll,pitch,yaw [deg] of the lidar on the robot, as in a URDF")
+      .exactly(6)
+      .comma_separated();
+}
+
+}  // namespace stillmap::cli

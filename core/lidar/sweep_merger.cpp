@@ -1,0 +1,171 @@
+#include "core/lidar/sweep_merger.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+namespace stillmap {
+namespace {
+
+/// Beams of tilted lidars, and of lidars beside the middle, leave their own field of view.
+constexpr double fov_margin_rad = 2.0 * std::numbers::pi / 180.0;
+/// Near enough that the places of lidars count, far enough that they do not blow the view up.
+constexpr double near_range_m = 5.0;
+constexpr int max_rows = 128;
+
+double seconds(std::int64_t ns) { return 1e-9 * static_cast<double>(ns); }
+
+double elevation_of(const Eigen::Vector3d& p) {
+  return std::atan2(p.z(), std::hypot(p.x(), p.y()));
+}
+
+/// Widens `view` by what the sensor sees.
+void widen(SensorModel& view, const PlacedSensor& placed) {
+  for (const double elevation : {placed.sensor.fov_up, placed.sensor.fov_down}) {
+    for (int degree = 0; degree < 360; degree += 5) {
+      const double azimuth = degree * std::numbers::pi / 180.0;
+      const Eigen::Vector3d ray(std::cos(elevation) * std::cos(azimuth),
+                                std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+      for (const double range_m : {near_range_m, placed.sensor.max_range_m}) {
+        const double seen = elevation_of(placed.T_merged_lidar * (range_m * ray));
+        view.fov_up = std::max(view.fov_up, seen);
+        view.fov_down = std::min(view.fov_down, seen);
+      }
+    }
+  }
+}
+
+template <typename T>
+void append(std::vector<T>& all, const std::vector<T>& part, std::size_t points, const T& unknown) {
+  if (part.empty()) {
+    all.resize(all.size() + points, unknown);
+  } else {
+    all.insert(all.end(), part.begin(), part.end());
+  }
+}
+
+}  // namespace
+
+Eigen::Isometry3d merged_frame(std::span<const Eigen::Isometry3d> T_base_lidars) {
+  assert(!T_base_lidars.empty());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Isometry3d& T_base_lidar : T_base_lidars) sum += T_base_lidar.translation();
+  return Eigen::Isometry3d(Eigen::Translation3d(sum / static_cast<double>(T_base_lidars.size())));
+}
+
+SensorModel merged_sensor(std::span<const PlacedSensor> sensors) {
+  assert(!sensors.empty());
+  SensorModel merged = sensors.front().sensor;
+  merged.name.clear();
+  merged.rings = 0;
+  merged.beam_elevations.clear();
+  merged.pattern = ScanPattern::irregular;
+  merged.ring_source = RingSource::elevation;
+  merged.intensity_scale = 1.0F;
+  merged.fov_up = -std::numbers::pi / 2.0;
+  merged.fov_down = std::numbers::pi / 2.0;
+  for (const PlacedSensor& placed : sensors) {
+    const SensorModel& sensor = placed.sensor;
+    const double offset_m = placed.T_merged_lidar.translation().norm();
+    merged.name += (merged.name.empty() ? "" : " + ") + sensor.name;
+    merged.rings += sensor.rings;
+    merged.columns = std::max(merged.columns, sensor.columns);
+    merged.min_range_m = std::min(merged.min_range_m, sensor.min_range_m);
+    merged.max_range_m = std::max(merged.max_range_m, sensor.max_range_m + offset_m);
+    merged.period_s = std::max(merged.period_s, sensor.period_s);
+    widen(merged, placed);
+  }
+  merged.rings = std::min(merged.rings, max_rows);
+  merged.fov_up = std::min(merged.fov_up + fov_margin_rad, std::numbers::pi / 2.0);
+  merged.fov_down = std::max(merged.fov_down - fov_margin_rad, -std::numbers::pi / 2.0);
+  return merged;
+}
+
+void move_points(Scan& scan, const Eigen::Isometry3d& T_new_old) {
+  const Eigen::Isometry3f T = T_new_old.cast<float>();
+  for (Eigen::Vector3f& point : scan.points_lidar) point = T * point;
+}
+
+Scan merged_scan(std::vector<Scan> parts) {
+  Scan merged;
+  if (parts.empty()) return merged;
+  merged.stamp_ns = std::ranges::min(parts, {}, &Scan::stamp_ns).stamp_ns;
+  const bool has_times = std::ranges::any_of(parts, [&](const Scan& part) {
+    return part.stamp_ns != merged.stamp_ns || !part.time_offset_s.empty();
+  });
+  const bool has_intensity =
+      std::ranges::any_of(parts, [](const Scan& part) { return !part.intensity.empty(); });
+  const bool has_labels =
+      std::ranges::any_of(parts, [](const Scan& part) { return !part.labels.empty(); });
+  for (Scan& part : parts) {
+    const auto later_s = static_cast<float>(seconds(part.stamp_ns - merged.stamp_ns));
+    for (float& time_s : part.time_offset_s) time_s += later_s;
+    const std::size_t points = part.size();
+    merged.points_lidar.insert(merged.points_lidar.end(), part.points_lidar.begin(),
+                               part.points_lidar.end());
+    if (has_times) append(merged.time_offset_s, part.time_offset_s, points, later_s);
+    if (has_intensity) append(merged.intensity, part.intensity, points, 0.0F);
+    if (has_labels) append(merged.labels, part.labels, points, SemanticClass::unlabeled);
+  }
+  return merged;
+}
+
+SweepMerger::SweepMerger(const Config& config)
+    : config_(config), lidars_(config.lidars), is_silent_(config.lidars, false) {}
+
+std::size_t SweepMerger::add(std::size_t lidar, Scan scan, double now_s) {
+  is_silent_[lidar] = false;
+  const bool is_late = last_stamp_ns_ && scan.stamp_ns <= *last_stamp_ns_ &&
+                       seconds(*last_stamp_ns_ - scan.stamp_ns) < max_late_s;
+  if (is_late) return 1;
+  std::deque<Waiting>& waiting = lidars_[lidar];
+  waiting.push_back({std::move(scan), now_s});
+  if (waiting.size() <= max_waiting) return 0;
+  waiting.pop_front();
+  return 1;
+}
+
+std::optional<std::size_t> SweepMerger::earliest() const {
+  std::optional<std::size_t> first;
+  for (std::size_t lidar = 0; lidar < lidars_.size(); ++lidar) {
+    if (lidars_[lidar].empty()) continue;
+    const auto stamp_ns = [&](std::size_t i) { return lidars_[i].front().scan.stamp_ns; };
+    if (!first || stamp_ns(lidar) < stamp_ns(*first)) first = lidar;
+  }
+  return first;
+}
+
+bool SweepMerger::is_in_sweep(std::size_t lidar, std::int64_t stamp_ns) const {
+  if (lidars_[lidar].empty()) return false;
+  return seconds(lidars_[lidar].front().scan.stamp_ns - stamp_ns) < 0.5 * config_.period_s;
+}
+
+std::optional<SweepMerger::Sweep> SweepMerger::next(double now_s) {
+  const auto first = earliest();
+  if (!first) return std::nullopt;
+  const Waiting& reference = lidars_[*first].front();
+  const std::int64_t stamp_ns = reference.scan.stamp_ns;
+  const bool is_overdue = now_s - reference.arrived_s >= config_.max_wait_s;
+  std::vector<Scan> parts;
+  Sweep sweep;
+  for (std::size_t lidar = 0; lidar < lidars_.size(); ++lidar) {
+    if (is_in_sweep(lidar, stamp_ns)) continue;
+    const bool may_come = lidars_[lidar].empty() && !is_silent_[lidar];
+    if (may_come && !is_overdue) return std::nullopt;
+    if (may_come) is_silent_[lidar] = true;
+    sweep.missing.push_back(lidar);
+  }
+  for (std::size_t lidar = 0; lidar < lidars_.size(); ++lidar) {
+    if (!is_in_sweep(lidar, stamp_ns)) continue;
+    parts.push_back(std::move(lidars_[lidar].front().scan));
+    lidars_[lidar].pop_front();
+  }
+  last_stamp_ns_ = stamp_ns;
+  sweep.scan = merged_scan(std::move(parts));
+  return sweep;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,91 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "core/lidar/scan.hpp"
+#include "core/lidar/sensor_model.hpp"
+
+namespace stillmap {
+
+/// A lidar of several, and where it sits in the frame that their scans are merged in.
+struct PlacedSensor {
+  SensorModel sensor;
+  Eigen::Isometry3d T_merged_lidar = Eigen::Isometry3d::Identity();
+};
+
+/// The frame that scans of several lidars are merged in: base's axes, in the middle of the lidars,
+/// where their range images differ least from what each of them sees.
+[[nodiscard]] Eigen::Isometry3d merged_frame(std::span<const Eigen::Isometry3d> T_base_lidars);
+
+/// The lidar that would have measured the merged scan: without rings, with a field of view that
+/// holds those of all.
+[[nodiscard]] SensorModel merged_sensor(std::span<const PlacedSensor> sensors);
+
+/// The scan's points in another frame.
+void move_points(Scan& scan, const Eigen::Isometry3d& T_new_old);
+
+/// Scans of several lidars on one robot as one, at the stamp of the earliest. Every point keeps the
+/// time at which it was measured, now from that stamp; rings do not count any more. The parts are
+/// in the merged frame.
+[[nodiscard]] Scan merged_scan(std::vector<Scan> parts);
+
+/// Sorts the scans of several lidars into sweeps: scans whose stamps lie less than half a period
+/// apart, one of each lidar. Reads no clock: the caller says when a scan arrived.
+class SweepMerger {
+ public:
+  struct Config {
+    std::size_t lidars = 2;
+    double period_s = 0.1;
+    /// Longest wait for a lidar's scan after the first of its sweep has arrived.
+    double max_wait_s = 0.1;
+  };
+
+  struct Sweep {
+    Scan scan;
+    /// Lidars that sent nothing in time.
+    std::vector<std::size_t> missing;
+  };
+
+  explicit SweepMerger(const Config& config);
+
+  /// Takes a scan (merged frame) that arrived at `now_s`. Returns how many scans are lost by it:
+  /// one that comes after its sweep, or the oldest that waits where too many do.
+  [[nodiscard]] std::size_t add(std::size_t lidar, Scan scan, double now_s);
+
+  /// The next sweep that has all its scans or need not wait any longer. A lidar that kept a sweep
+  /// waiting in vain is not waited for until it sends again.
+  [[nodiscard]] std::optional<Sweep> next(double now_s);
+
+  /// Scans of a lidar that wait for those of others.
+  [[nodiscard]] std::size_t waiting(std::size_t lidar) const { return lidars_[lidar].size(); }
+
+ private:
+  /// More wait only where the clocks of lidars differ by as many sweeps.
+  static constexpr std::size_t max_waiting = 8;
+  /// A scan that is older than this comes of a clock that was set back, not too late.
+  static constexpr double max_late_s = 1.0;
+
+  struct Waiting {
+    Scan scan;
+    double arrived_s = 0.0;
+  };
+
+  /// The lidar whose waiting scan has the earliest stamp.
+  [[nodiscard]] std::optional<std::size_t> earliest() const;
+  /// Whether the lidar's waiting scan is of the sweep that begins at this stamp.
+  [[nodiscard]] bool is_in_sweep(std::size_t lidar, std::int64_t stamp_ns) const;
+
+  Config config_;
+  /// In the order of arrival.
+  std::vector<std::deque<Waiting>> lidars_;
+  std::vector<bool> is_silent_;
+  std::optional<std::int64_t> last_stamp_ns_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,169 @@
+#include "core/lidar/sweep_merger.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+namespace stillmap {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
+
+constexpr std::int64_t ms = 1'000'000;
+constexpr double deg = std::numbers::pi / 180.0;
+
+/// A scan of one point, whose x tells where it comes from.
+Scan scan_at(std::int64_t stamp_ms, float x) {
+  Scan scan;
+  scan.stamp_ns = stamp_ms * ms;
+  scan.points_lidar = {{x, 0.0F, 0.0F}};
+  return scan;
+}
+
+std::vector<float> xs(const Scan& scan) {
+  std::vector<float> values;
+  for (const Eigen::Vector3f& point : scan.points_lidar) values.push_back(point.x());
+  return values;
+}
+
+TEST(MergedScan, KeepsTheTimeOfEveryPoint) {
+  Scan front = scan_at(1000, 1.0F);
+  front.time_offset_s = {0.02F};
+  Scan rear = scan_at(1030, 2.0F);
+  rear.time_offset_s = {-0.01F};
+  const Scan merged = merged_scan({front, rear});
+  EXPECT_EQ(merged.stamp_ns, 1000 * ms);
+  ASSERT_EQ(merged.time_offset_s.size(), 2U);
+  EXPECT_FLOAT_EQ(merged.time_offset_s[0], 0.02F);
+  EXPECT_FLOAT_EQ(merged.time_offset_s[1], 0.02F);
+}
+
+TEST(MergedScan, GivesPointsWithoutTimesThatOfTheirStamp) {
+  const Scan merged = merged_scan({scan_at(1040, 1.0F), scan_at(1000, 2.0F)});
+  EXPECT_EQ(merged.stamp_ns, 1000 * ms);
+  EXPECT_THAT(merged.time_offset_s, ElementsAre(0.04F, 0.0F));
+}
+
+TEST(MergedScan, NeedsNoTimesForScansOfOneInstant) {
+  EXPECT_THAT(merged_scan({scan_at(1000, 1.0F), scan_at(1000, 2.0F)}).time_offset_s, IsEmpty());
+}
+
+TEST(MergedScan, FillsUpWhatOneLidarDoesNotHave) {
+  Scan front = scan_at(1000, 1.0F);
+  front.intensity = {0.5F};
+  front.labels = {SemanticClass::car};
+  front.ring = {7};
+  const Scan merged = merged_scan({scan_at(1000, 2.0F), front});
+  EXPECT_THAT(merged.intensity, ElementsAre(0.0F, 0.5F));
+  EXPECT_THAT(merged.labels, ElementsAre(SemanticClass::unlabeled, SemanticClass::car));
+  EXPECT_THAT(merged.ring, IsEmpty());
+}
+
+TEST(MergedScan, OfNothingIsEmpty) { EXPECT_TRUE(merged_scan({}).empty()); }
+
+TEST(MergedFrame, LiesInTheMiddleOfTheLidars) {
+  const std::vector<Eigen::Isometry3d> lidars{
+      Eigen::Isometry3d(Eigen::Translation3d(1.0, 0.5, 2.0) *
+                        Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitY())),
+      Eigen::Isometry3d(Eigen::Translation3d(-2.0, 0.5, 1.0))};
+  const Eigen::Isometry3d T_base_merged = merged_frame(lidars);
+  EXPECT_TRUE(T_base_merged.translation().isApprox(Eigen::Vector3d(-0.5, 0.5, 1.5)));
+  EXPECT_TRUE(T_base_merged.linear().isIdentity());
+}
+
+TEST(MergedSensor, SeesWhatTiltedLidarsSee) {
+  PlacedSensor level{.sensor = vlp_16()};
+  PlacedSensor tilted{.sensor = vlp_16()};
+  tilted.T_merged_lidar = Eigen::AngleAxisd(30.0 * deg, Eigen::Vector3d::UnitY());
+  const SensorModel merged = merged_sensor(std::vector{level, tilted});
+  EXPECT_THAT(merged.faults(), IsEmpty());
+  EXPECT_EQ(merged.rings, 32);
+  EXPECT_EQ(merged.pattern, ScanPattern::irregular);
+  EXPECT_GE(merged.fov_up, 45.9 * deg);
+  EXPECT_LE(merged.fov_up, 49.0 * deg);
+  EXPECT_LE(merged.fov_down, -45.9 * deg);
+}
+
+TEST(MergedSensor, OfALidarOnItsSideHasNoMoreThanASphere) {
+  PlacedSensor sideways{.sensor = hdl_32e()};
+  sideways.T_merged_lidar = Eigen::AngleAxisd(90.0 * deg, Eigen::Vector3d::UnitX());
+  EXPECT_THAT(merged_sensor(std::vector{sideways, sideways}).faults(), IsEmpty());
+}
+
+class Merger : public testing::Test {
+ protected:
+  SweepMerger merger_{{.lidars = 2, .period_s = 0.1, .max_wait_s = 0.05}};
+};
+
+TEST_F(Merger, WaitsForTheOtherLidar) {
+  EXPECT_EQ(merger_.add(0, scan_at(1000, 1.0F), 0.0), 0U);
+  EXPECT_FALSE(merger_.next(0.01));
+  EXPECT_EQ(merger_.add(1, scan_at(1040, 2.0F), 0.02), 0U);
+  const auto sweep = merger_.next(0.02);
+  ASSERT_TRUE(sweep);
+  EXPECT_THAT(xs(sweep->scan), ElementsAre(1.0F, 2.0F));
+  EXPECT_THAT(sweep->missing, IsEmpty());
+  EXPECT_FALSE(merger_.next(10.0));
+}
+
+TEST_F(Merger, PairsScansByStampNotByArrival) {
+  // The first one comes while the other still sends the sweep before.
+  EXPECT_EQ(merger_.add(1, scan_at(940, 2.0F), 0.0), 0U);
+  EXPECT_EQ(merger_.add(0, scan_at(1000, 1.0F), 0.01), 0U);
+  const auto alone = merger_.next(0.01);
+  ASSERT_TRUE(alone);
+  EXPECT_THAT(xs(alone->scan), ElementsAre(2.0F));
+  EXPECT_THAT(alone->missing, ElementsAre(0U));
+  EXPECT_FALSE(merger_.next(0.01));
+  EXPECT_EQ(merger_.add(1, scan_at(1040, 3.0F), 0.04), 0U);
+  EXPECT_THAT(xs(merger_.next(0.04)->scan), ElementsAre(1.0F, 3.0F));
+}
+
+TEST_F(Merger, GoesOnWithoutALidarThatFallsSilent) {
+  EXPECT_EQ(merger_.add(0, scan_at(1000, 1.0F), 0.0), 0U);
+  EXPECT_FALSE(merger_.next(0.049));
+  const auto sweep = merger_.next(0.051);
+  ASSERT_TRUE(sweep);
+  EXPECT_THAT(sweep->missing, ElementsAre(1U));
+  // From now on nothing waits for it,
+  EXPECT_EQ(merger_.add(0, scan_at(1100, 1.0F), 0.1), 0U);
+  EXPECT_TRUE(merger_.next(0.1));
+  // until it sends again.
+  EXPECT_EQ(merger_.add(1, scan_at(1200, 2.0F), 0.2), 0U);
+  EXPECT_FALSE(merger_.next(0.2));
+  EXPECT_EQ(merger_.add(0, scan_at(1200, 1.0F), 0.21), 0U);
+  EXPECT_THAT(merger_.next(0.21)->missing, IsEmpty());
+}
+
+TEST_F(Merger, LeavesOutAScanThatComesAfterItsSweep) {
+  EXPECT_EQ(merger_.add(0, scan_at(1000, 1.0F), 0.0), 0U);
+  ASSERT_TRUE(merger_.next(0.06));
+  EXPECT_EQ(merger_.add(1, scan_at(990, 2.0F), 0.07), 1U);
+  EXPECT_FALSE(merger_.next(1.0));
+}
+
+TEST_F(Merger, TakesAClockThatWasSetBack) {
+  EXPECT_EQ(merger_.add(0, scan_at(100'000, 1.0F), 0.0), 0U);
+  ASSERT_TRUE(merger_.next(0.06));
+  EXPECT_EQ(merger_.add(0, scan_at(2000, 1.0F), 0.1), 0U);
+  EXPECT_TRUE(merger_.next(0.2));
+}
+
+TEST_F(Merger, IsBoundedWhereClocksDiffer) {
+  std::size_t lost = 0;
+  for (int i = 0; i < 100; ++i) {
+    const double now_s = 0.1 * i;
+    lost += merger_.add(0, scan_at(1000 + 100 * i, 1.0F), now_s);
+    lost += merger_.add(1, scan_at(9'000'000 + 100 * i, 2.0F), now_s);
+    const auto sweep = merger_.next(now_s);
+    ASSERT_TRUE(sweep) << i;
+    EXPECT_THAT(xs(sweep->scan), ElementsAre(1.0F)) << i;
+  }
+  EXPECT_LE(merger_.waiting(1), 8U);
+  EXPECT_EQ(lost, 92U);
+}
+
+}  // namespace
+}  // namespace stillmap

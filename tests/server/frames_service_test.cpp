@@ -1,0 +1,414 @@
+#include <gmock/gmock.h>
+
+#include <map>
+#include <mutex>
+#include <random>
+
+#include "core/frames/rigid_motion.hpp"
+#include "idl/conversions/pose.hpp"
+#include "idl/dds/reader.hpp"
+#include "idl/dds/writer.hpp"
+#include "idl/interface/topics.hpp"
+#include "tests/numbers.hpp"
+#include "tests/server/room_scans.hpp"
+#include "tests/server/server_process.hpp"
+
+namespace stillmap::test {
+namespace {
+
+using namespace std::chrono_literals;
+using ::testing::HasSubstr;
+
+constexpr double deg = std::numbers::pi / 180.0;
+/// Of the room, beneath the lidar of room_pose().
+constexpr double ground_z_m = -1.5;
+
+/// A lidar 1.2 m ahead that looks down by 15 degrees.
+Eigen::Isometry3d tilted_mount() { return from_xyz_rpy({1.2, 0.1, 1.4}, {0.0, 15.0 * deg, 0.0}); }
+constexpr const char* tilted_mount_yaml = "mount: {xyz_m: [1.2, 0.1, 1.4], rpy_deg: [0, 15, 0]}\n";
+/// One that looks to the left, 1 m ahead.
+Eigen::Isometry3d turned_mount() { return from_xyz_rpy({1.0, 0.0, 1.5}, {0.0, 0.0, 90.0 * deg}); }
+constexpr const char* turned_mount_yaml = "mount: {xyz_m: [1, 0, 1.5], rpy_deg: [0, 0, 90]}\n";
+
+/// The robot on the ground of the room.
+Eigen::Isometry3d T_room_base(int index) {
+  return Eigen::Translation3d(0.0, 0.0, ground_z_m) * room_pose(index).T_map_lidar;
+}
+
+Scan mounted_scan(int index, const Eigen::Isometry3d& T_base_lidar) {
+  return seen_in_room({room_pose(index).stamp_ns, T_room_base(index) * T_base_lidar});
+}
+
+class Frames : public testing::Test {
+ protected:
+  explicit Frames(const std::string& sensors = "sensor: vlp_16")
+      : setup_("every", "save_period_s: 3600", sensors) {}
+
+  void start(const std::string& yaml) {
+    setup_.add(yaml);
+    server_.emplace(setup_.server_arguments());
+    client_.emplace(setup_.client());
+    client_->wait_for_server(patience);
+    participant_.emplace(setup_.dds());
+    odometry_ = client_->subscribe_odometry([this](const OdometryUpdate& update) {
+      const std::scoped_lock lock(mutex_);
+      updates_.emplace(update.pose.stamp_ns, update);
+    });
+    publisher_.emplace(setup_.publisher(true));
+  }
+
+  void drive(int first, int last, const Eigen::Isometry3d& T_base_lidar) {
+    ASSERT_TRUE(publisher_->wait_for_subscriber(patience));
+    for (int i = first; i < last; ++i) {
+      ASSERT_TRUE(publisher_->publish(mounted_scan(i, T_base_lidar), {}, patience));
+    }
+  }
+
+  [[nodiscard]] std::map<std::int64_t, OdometryUpdate> updates(std::size_t count) {
+    EXPECT_TRUE(eventually([&] {
+      const std::scoped_lock lock(mutex_);
+      return updates_.size() >= count;
+    }));
+    const std::scoped_lock lock(mutex_);
+    return updates_;
+  }
+
+  void expect_poses_of_base(int scans) {
+    const auto poses = updates(static_cast<std::size_t>(scans));
+    const Eigen::Isometry3d T_start = T_room_base(0).inverse();
+    for (int i = 0; i < scans; ++i) {
+      const auto found = poses.find(room_pose(i).stamp_ns);
+      ASSERT_NE(found, poses.end()) << i;
+      const OdometryUpdate& update = found->second;
+      EXPECT_EQ(update.frame, "map");
+      EXPECT_EQ(update.child_frame, "base_link");
+      const Eigen::Isometry3d T_error =
+          (T_start * T_room_base(i)).inverse() * update.pose.T_map_lidar;
+      EXPECT_LT(T_error.translation().norm(), 0.1) << i;
+      EXPECT_LT(Eigen::AngleAxisd(T_error.linear()).angle(), 1.0 * deg) << i;
+    }
+  }
+
+  template <typename T>
+  [[nodiscard]] std::optional<T> sample(const dds::TopicSpec<T>& topic) {
+    dds::Reader<T> reader(*participant_, topic.dds_name, topic.reader);
+    T message;
+    return reader.take(message, {}, patience) ? std::optional(message) : std::nullopt;
+  }
+
+  ServiceSetup setup_;
+  dds::Topics topics_ = dds::Topics::in("stillmap");
+  std::optional<ServerProcess> server_;
+  std::optional<Client> client_;
+  std::optional<dds::Participant> participant_;
+  std::optional<ScanPublisher> publisher_;
+  std::mutex mutex_;
+  std::map<std::int64_t, OdometryUpdate> updates_;
+  Subscription odometry_;
+};
+
+TEST_F(Frames, PosesAreTheRobotsWhereverItsLidarSits) {
+  start("frames: {base: base_link}\n" + std::string(tilted_mount_yaml));
+  drive(0, 15, tilted_mount());
+  expect_poses_of_base(15);
+  // The covariance of a frame beneath the lidar is another one, not none.
+  EXPECT_GT(updates(15).rbegin()->second.covariance(0, 0), 0.0);
+
+  std::mutex mutex;
+  Trajectory path;
+  const auto subscription = client_->subscribe_path([&](const Trajectory& trajectory) {
+    const std::scoped_lock lock(mutex);
+    path = trajectory;
+  });
+  EXPECT_TRUE(eventually([&] {
+    const std::scoped_lock lock(mutex);
+    return path.size() == 15;
+  }));
+  const Eigen::Isometry3d T_end = T_room_base(0).inverse() * T_room_base(14);
+  EXPECT_LT((path.back().T_map_lidar.translation() - T_end.translation()).norm(), 0.1);
+}
+
+TEST_F(Frames, TheMapIsLevelAndItsGroundIsWhereTheRobotStands) {
+  start("frames: {base: base_link}\n" + std::string(tilted_mount_yaml));
+  drive(0, 15, tilted_mount());
+  std::size_t ground_voxels = 0;
+  std::mutex mutex;
+  std::map<TileId, Tile> tiles;
+  const auto subscription =
+      client_->subscribe_tiles([&](const dds::MapIdentity&, const Tile& tile) {
+        const std::scoped_lock lock(mutex);
+        tiles[tile.info.id] = tile;
+      });
+  ASSERT_TRUE(wait_for_scans(*client_, 15));
+  EXPECT_TRUE(eventually([&] {
+    const std::scoped_lock lock(mutex);
+    return tiles.size() == client_->get_tile_versions().tiles.size();
+  }));
+  const std::scoped_lock lock(mutex);
+  for (const auto& [id, tile] : tiles) {
+    for (const Voxel& voxel : tile.voxels) {
+      if (voxel.evidence.winner() != SemanticClass::road) continue;
+      EXPECT_NEAR(voxel.mean_map.z(), 0.0, 0.15) << voxel.mean_map.transpose();
+      ++ground_voxels;
+    }
+  }
+  EXPECT_GT(ground_voxels, 100U);
+}
+
+TEST_F(Frames, TheTransformTreeIsWhole) {
+  start("frames: {base: base_link, odom: odom}\n" + std::string(tilted_mount_yaml));
+  dds::Reader<tf2_msgs::msg::TFMessage> tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
+  ASSERT_TRUE(tf.events().wait_for_writer(patience));
+  drive(0, 3, tilted_mount());
+  tf2_msgs::msg::TFMessage message;
+  ASSERT_TRUE(tf.take(message, {}, patience));
+  const std::vector<FrameTransform> chain = wire::from_tf(message);
+  ASSERT_EQ(chain.size(), 2U);
+  EXPECT_EQ(chain[0].parent, "map");
+  EXPECT_EQ(chain[0].child, "odom");
+  EXPECT_EQ(chain[1].parent, "odom");
+  EXPECT_EQ(chain[1].child, "base_link");
+
+  const auto fixed = sample(topics_.tf_static);
+  ASSERT_TRUE(fixed);
+  const std::vector<FrameTransform> mounts = wire::from_tf(*fixed);
+  ASSERT_EQ(mounts.size(), 1U);
+  EXPECT_EQ(mounts[0].parent, "base_link");
+  EXPECT_EQ(mounts[0].child, "lidar");
+  EXPECT_TRUE(mounts[0].T_parent_child.isApprox(tilted_mount(), 1e-9));
+}
+
+TEST_F(Frames, OdomGoesOnWhereTheMapBeginsAnew) {
+  start("frames: {base: base_link, odom: odom}\n" + std::string(tilted_mount_yaml));
+  dds::Reader<nav_msgs::msg::Odometry> local(*participant_, topics_.local_odometry.dds_name,
+                                             topics_.local_odometry.reader);
+  ASSERT_TRUE(local.events().wait_for_writer(patience));
+  drive(0, 10, tilted_mount());
+  ASSERT_TRUE(wait_for_scans(*client_, 10));
+  (void)client_->reset();
+  drive(10, 20, tilted_mount());
+  const auto poses = updates(20);
+  EXPECT_TRUE(poses.at(room_pose(10).stamp_ns)
+                  .pose.T_map_lidar.isApprox(Eigen::Isometry3d::Identity(), 1e-6));
+  std::optional<Eigen::Vector3d> last;
+  double velocity_m_s = 0.0;
+  for (int i = 0; i < 20; ++i) {
+    nav_msgs::msg::Odometry message;
+    ASSERT_TRUE(local.take(message, {}, patience)) << i;
+    EXPECT_EQ(message.header().frame_id(), "odom");
+    EXPECT_EQ(message.child_frame_id(), "base_link");
+    const Eigen::Vector3d position = wire::from_odometry(message)->pose.T_map_lidar.translation();
+    EXPECT_LT((position - last.value_or(position)).norm(), 0.3) << i;
+    last = position;
+    velocity_m_s = message.twist().twist().linear().x();
+  }
+  EXPECT_NEAR(velocity_m_s, 1.5, 0.3);
+  const Eigen::Isometry3d T_end = T_room_base(0).inverse() * T_room_base(19);
+  EXPECT_LT((*last - T_end.translation()).norm(), 0.3);
+}
+
+TEST_F(Frames, TheMountCanComeFromTheRobot) {
+  start("frames: {base: base_link}\nmount: {source: tf_static, wait_s: 60}\n");
+  dds::Writer<tf2_msgs::msg::TFMessage> robot(*participant_, topics_.tf_static.dds_name,
+                                              topics_.tf_static.writer);
+  const Eigen::Isometry3d T_base_mast = from_xyz_rpy({0.5, 0.0, 1.0}, {0.0, 0.0, 1.0});
+  const auto message = wire::to_tf(0, {{"base_link", "mast", T_base_mast},
+                                       {"mast", "lidar", T_base_mast.inverse() * tilted_mount()}});
+  // No scan is lost that comes before the transform.
+  drive(0, 3, tilted_mount());
+  ASSERT_TRUE(robot.write(message));
+  drive(3, 15, tilted_mount());
+  expect_poses_of_base(15);
+  EXPECT_EQ(client_->status().dropped(), 0U);
+}
+
+TEST_F(Frames, AMountThatNeverComesIsNamed) {
+  start("frames: {base: base_link}\nmount: {source: tf_static, wait_s: 0.1}\n");
+  drive(0, 3, tilted_mount());
+  ASSERT_TRUE(wait_for_scans(*client_, 3));
+  const dds::ServerStatus status = client_->status();
+  EXPECT_EQ(status.counter("dropped_unknown_frame"), 3U);
+  EXPECT_THAT(status.reason, HasSubstr("no transform base_link -> lidar on /tf_static"));
+  // The service goes on, and so does mapping once it is there.
+  dds::Writer<tf2_msgs::msg::TFMessage> robot(*participant_, topics_.tf_static.dds_name,
+                                              topics_.tf_static.writer);
+  ASSERT_TRUE(robot.readers().wait_for_any(patience));
+  ASSERT_TRUE(robot.write(wire::to_tf(0, {{"base_link", "lidar", tilted_mount()}})));
+  int next = 3;
+  EXPECT_TRUE(eventually([&] {
+    drive(next, next + 1, tilted_mount());
+    ++next;
+    return client_->status().counter("scans_mapped") >= 3;
+  }));
+}
+
+/// A scan that shows nothing: its pose is where it is expected.
+Scan empty_air(std::int64_t stamp_ns) {
+  Scan scan;
+  scan.stamp_ns = stamp_ns;
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> anywhere(-20.0F, 20.0F);
+  for (int i = 0; i < 3000; ++i) {
+    scan.points_lidar.emplace_back(anywhere(random), anywhere(random), 0.2F * anywhere(random));
+    scan.intensity.push_back(0.0F);
+    scan.ring.push_back(static_cast<std::uint16_t>(i % 16));
+  }
+  return scan;
+}
+
+class OdometryPriorFrames : public Frames {
+ protected:
+  static constexpr int seen_scans = 12;
+
+  /// Wheels that say that the robot goes as in the room, and then ahead and round a curve.
+  static Eigen::Isometry3d T_wheels_base(int index) {
+    if (index < seen_scans) return T_room_base(index);
+    const Eigen::Isometry3d step = from_xyz_rpy({1.5, 0.0, 0.0}, {0.0, 0.0, 0.2});
+    return T_wheels_base(index - 1) * step;
+  }
+
+  /// Drives with all of the wheels' poses sent before every scan: the server's reader finds their
+  /// writer at some time, and leaves out what it has.
+  void drive_with_wheels(
+      int scans, const std::string& child_frame,
+      const Eigen::Isometry3d& T_wheels_after_reset = Eigen::Isometry3d::Identity()) {
+    const auto topic = dds::odometry_prior_topic("odom_prior");
+    dds::Writer<nav_msgs::msg::Odometry> wheels(*participant_, topic.dds_name, {.depth = 100});
+    ASSERT_TRUE(wheels.readers().wait_for_any(patience));
+    for (int scan = 0; scan < scans; ++scan) {
+      for (int i = 0; i < seen_scans + 2; ++i) {
+        const auto none = Eigen::Matrix<double, 6, 6>::Zero();
+        const Eigen::Isometry3d T =
+            i < seen_scans / 2 ? T_wheels_base(i) : T_wheels_after_reset * T_wheels_base(i);
+        ASSERT_TRUE(wheels.write(
+            wire::to_odometry({room_pose(i).stamp_ns, T}, none, "wheel_odom", child_frame)));
+      }
+      drive(scan, scan + 1, turned_mount());
+      ASSERT_TRUE(wait_for_scans(*client_, static_cast<std::uint64_t>(scan + 1)));
+    }
+  }
+};
+
+TEST_F(OdometryPriorFrames, MotionOfTheBasePredictsTheLidars) {
+  start("frames: {base: base_link}\n" + std::string(turned_mount_yaml));
+  drive_with_wheels(seen_scans, "base_link");
+  ASSERT_TRUE(publisher_->publish(empty_air(room_pose(seen_scans).stamp_ns), {}, patience));
+  const auto poses = updates(seen_scans + 1);
+  ASSERT_EQ(client_->status().health, OdometryHealth::lost);
+  const Eigen::Isometry3d T_last = poses.at(room_pose(seen_scans - 1).stamp_ns).pose.T_map_lidar;
+  const Eigen::Isometry3d T_now = poses.at(room_pose(seen_scans).stamp_ns).pose.T_map_lidar;
+  const Eigen::Isometry3d step =
+      T_wheels_base(seen_scans - 1).inverse() * T_wheels_base(seen_scans);
+  EXPECT_TRUE((T_last.inverse() * T_now).isApprox(step, 1e-6))
+      << (T_last.inverse() * T_now).matrix();
+  EXPECT_EQ(client_->status().counter("odometry_prior_unknown_frame"), 0U);
+}
+
+TEST_F(OdometryPriorFrames, WheelsThatHaveTheirOwnOdomGetOnlyItsPlaceInTheMap) {
+  start("frames: {base: base_link, odom: wheel_odom, odom_source: prior}\n" +
+        std::string(turned_mount_yaml));
+  dds::Reader<tf2_msgs::msg::TFMessage> tf(*participant_, topics_.tf.dds_name, topics_.tf.reader);
+  ASSERT_TRUE(tf.events().wait_for_writer(patience));
+  drive_with_wheels(seen_scans, "base_link");
+  std::vector<FrameTransform> last;
+  for (int i = 0; i < seen_scans; ++i) {
+    tf2_msgs::msg::TFMessage message;
+    ASSERT_TRUE(tf.take(message, {}, patience)) << i;
+    last = wire::from_tf(message);
+    ASSERT_EQ(last.size(), 1U);
+  }
+  EXPECT_EQ(last[0].parent, "map");
+  EXPECT_EQ(last[0].child, "wheel_odom");
+  // The wheels count from the middle of the room, the map from the first scan.
+  const Eigen::Isometry3d T_error = T_room_base(0) * last[0].T_parent_child;
+  EXPECT_LT(T_error.translation().norm(), 0.1);
+  EXPECT_LT(Eigen::AngleAxisd(T_error.linear()).angle(), 1.0 * deg);
+}
+
+TEST_F(OdometryPriorFrames, WheelsThatBeginAnewAreNotFollowed) {
+  start("frames: {base: base_link}\n" + std::string(turned_mount_yaml));
+  drive_with_wheels(seen_scans, "base_link", from_xyz_rpy({1e200, 0.0, 0.0}, {0.0, 0.0, 1.0}));
+  expect_poses_of_base(seen_scans);
+  EXPECT_EQ(client_->status().counter("odometry_prior_jumps"), 1U);
+  EXPECT_EQ(client_->status().dropped(), 0U);
+}
+
+TEST_F(OdometryPriorFrames, AFrameThatIsNowhereOnTheRobotIsRefused) {
+  start("frames: {base: base_link}\n" + std::string(turned_mount_yaml));
+  drive_with_wheels(seen_scans, "trailer");
+  expect_poses_of_base(seen_scans);
+  EXPECT_GE(client_->status().counter("odometry_prior_unknown_frame"), 1U);
+  EXPECT_EQ(client_->status().dropped(), 0U);
+}
+
+Eigen::Isometry3d rear_mount() {
+  return from_xyz_rpy({-0.8, 0.2, 1.2}, {0.0, 10.0 * deg, 180.0 * deg});
+}
+
+class SeveralLidars : public Frames {
+ protected:
+  SeveralLidars()
+      : Frames(
+            "sensors:\n"
+            "  - {name: front, sensor: vlp_16, topic: front/points, xyz_m: [1.2, 0.1, 1.4],"
+            " rpy_deg: [0, 15, 0]}\n"
+            "  - {name: rear, sensor: vlp_16, topic: rear/points, frame: rear_lidar,"
+            " xyz_m: [-0.8, 0.2, 1.2], rpy_deg: [0, 10, 180]}") {
+    start("frames: {base: base_link}\n");
+    front_.emplace(publisher_on("front/points", "front_lidar"));
+    rear_.emplace(publisher_on("rear/points", "rear_lidar"));
+  }
+
+  [[nodiscard]] ScanPublisher publisher_on(const std::string& topic, const std::string& frame) {
+    ScanPublisherOptions options = setup_.publisher(true);
+    options.points_topic = topic;
+    options.lidar_frame = frame;
+    ScanPublisher publisher(options);
+    EXPECT_TRUE(publisher.wait_for_subscriber(patience));
+    return publisher;
+  }
+
+  std::optional<ScanPublisher> front_, rear_;
+};
+
+TEST_F(SeveralLidars, AreMappedAsOne) {
+  constexpr int scans = 12;
+  for (int i = 0; i < scans; ++i) {
+    ASSERT_TRUE(front_->publish(mounted_scan(i, tilted_mount()), {}, patience));
+    ASSERT_TRUE(rear_->publish(mounted_scan(i, rear_mount()), {}, patience));
+  }
+  expect_poses_of_base(scans);
+  const dds::ServerStatus status = client_->status();
+  EXPECT_EQ(status.counter("scans_mapped"), static_cast<std::uint64_t>(scans));
+  EXPECT_EQ(status.dropped(), 0U);
+  EXPECT_EQ(status.counter("sweeps_without_rear"), 0U);
+  const auto mount = sample(topics_.tf_static);
+  ASSERT_TRUE(mount);
+  const Eigen::Vector3d origin = wire::from_tf(*mount).at(0).T_parent_child.translation();
+  EXPECT_TRUE(origin.isApprox(Eigen::Vector3d(0.2, 0.15, 1.3), 1e-9)) << origin.transpose();
+}
+
+TEST_F(SeveralLidars, GoOnWithoutOneThatFallsSilent) {
+  constexpr int both = 5;
+  constexpr int scans = 12;
+  for (int i = 0; i < scans; ++i) {
+    ASSERT_TRUE(front_->publish(mounted_scan(i, tilted_mount()), {}, patience));
+    if (i >= both) continue;
+    ASSERT_TRUE(rear_->publish(mounted_scan(i, rear_mount()), {}, patience));
+  }
+  expect_poses_of_base(scans);
+  const dds::ServerStatus status = client_->status();
+  EXPECT_EQ(status.counter("sweeps_without_rear"), static_cast<std::uint64_t>(scans - both));
+  EXPECT_EQ(status.counter("sweeps_without_front"), 0U);
+  EXPECT_EQ(status.dropped(), 0U);
+}
+
+TEST_F(SeveralLidars, ACloudOfNoneOfThemIsRefused) {
+  ScanPublisher stranger = publisher_on("rear/points", "camera");
+  ASSERT_TRUE(stranger.publish(mounted_scan(0, rear_mount()), {}, patience));
+  EXPECT_TRUE(eventually([&] { return client_->status().counter("dropped_unknown_frame") == 1; }));
+  EXPECT_THAT(client_->status().reason, HasSubstr("'camera'"));
+}
+
+}  // namespace
+}  // namespace stillmap::test
