@@ -1,7 +1,11 @@
 #include "clients/library/scan_publisher.hpp"
 
+#include <cassert>
+#include <optional>
+
 #include "clients/library/connection.hpp"
 #include "clients/library/tcp_rejoin_backoff.hpp"
+#include "idl/conversions/imu.hpp"
 #include "idl/conversions/to_cloud.hpp"
 #include "idl/dds/writer.hpp"
 #include "idl/interface/topics.hpp"
@@ -13,12 +17,16 @@ struct ScanPublisher::Connection {
       : options(publisher_options),
         own(std::make_unique<dds::Participant>(options.dds)),
         topic(topic_of(options)),
-        writer(*own, topic.dds_name, topic.writer) {}
+        writer(*own, topic.dds_name, topic.writer) {
+    open_imu(*own);
+  }
 
   Connection(dds::Participant& shared, const ScanPublisherOptions& publisher_options)
       : options(publisher_options),
         topic(topic_of(options)),
-        writer(shared, topic.dds_name, topic.writer) {}
+        writer(shared, topic.dds_name, topic.writer) {
+    open_imu(shared);
+  }
 
   static dds::TopicSpec<sensor_msgs::msg::PointCloud2> topic_of(
       const ScanPublisherOptions& options) {
@@ -27,11 +35,19 @@ struct ScanPublisher::Connection {
                              options.max_scans_in_flight);
   }
 
+  void open_imu(dds::Participant& participant) {
+    if (options.imu_topic.empty()) return;
+    const auto imu = dds::imu_topic(options.imu_topic,
+                                    options.lossless ? DeliveryMode::every : DeliveryMode::latest);
+    imu_writer.emplace(participant, imu.dds_name, imu.writer);
+  }
+
   ScanPublisherOptions options;
   bool has_written = false;
   std::unique_ptr<dds::Participant> own;
   dds::TopicSpec<sensor_msgs::msg::PointCloud2> topic;
   dds::Writer<sensor_msgs::msg::PointCloud2> writer;
+  std::optional<dds::Writer<sensor_msgs::msg::Imu>> imu_writer;
 };
 
 ScanPublisher::ScanPublisher(const ScanPublisherOptions& options)
@@ -61,6 +77,10 @@ bool ScanPublisher::wait_for_subscriber(std::chrono::milliseconds timeout) {
   return true;
 }
 
+bool ScanPublisher::wait_for_imu_subscriber(std::chrono::milliseconds timeout) {
+  return connection_->imu_writer && connection_->imu_writer->readers().wait_for_any(timeout);
+}
+
 int ScanPublisher::subscribers() const { return connection_->writer.readers().count(); }
 
 bool ScanPublisher::publish(const Scan& scan, std::span<const std::uint32_t> raw_labels,
@@ -73,6 +93,23 @@ bool ScanPublisher::publish(const Scan& scan, std::span<const std::uint32_t> raw
     if (std::chrono::steady_clock::now() >= deadline) return false;
   }
   return true;
+}
+
+std::size_t ScanPublisher::publish(std::span<const ImuSample> samples,
+                                   std::chrono::milliseconds timeout) {
+  assert(connection_->imu_writer);
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  connection_->has_written = true;
+  std::size_t written = 0;
+  while (written < samples.size()) {
+    const auto message = wire::to_imu(samples[written], connection_->options.imu_frame);
+    if (connection_->imu_writer->write(message)) {
+      ++written;
+    } else if (std::chrono::steady_clock::now() >= deadline) {
+      break;
+    }
+  }
+  return written;
 }
 
 bool ScanPublisher::wait_for_all_acknowledged(std::chrono::milliseconds timeout) {

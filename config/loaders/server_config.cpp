@@ -111,6 +111,7 @@ void read_topics(YamlSection section, TopicsConfig& topics) {
   section.text("points", topics.points);
   section.text("namespace", topics.name_space);
   section.text("odometry_prior", topics.odometry_prior);
+  section.text("imu", topics.imu);
   const std::string rule = "; ROS 2 names have letters, digits, '_', and '/' inside";
   if (!is_topic_name(topics.points)) section.fault("points", "'" + topics.points + "'" + rule);
   if (!is_topic_name(topics.name_space)) {
@@ -118,6 +119,9 @@ void read_topics(YamlSection section, TopicsConfig& topics) {
   }
   if (!topics.odometry_prior.empty() && !is_topic_name(topics.odometry_prior)) {
     section.fault("odometry_prior", "'" + topics.odometry_prior + "'" + rule);
+  }
+  if (!topics.imu.empty() && !is_topic_name(topics.imu)) {
+    section.fault("imu", "'" + topics.imu + "'" + rule);
   }
 }
 

@@ -14,9 +14,12 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
   if (!config.topics.odometry_prior.empty()) {
     prior_.emplace(context.participant, config.topics.odometry_prior);
   }
+  if (!config.topics.imu.empty())
+    imu_.emplace(context.participant, config.topics.imu, config.input.delivery);
   const MappingOutputs outputs{.poses = &poses_,
                                .scans = labelled_scans_ ? &*labelled_scans_ : nullptr,
                                .prior = prior_ ? &*prior_ : nullptr,
+                               .imu = imu_ ? &*imu_ : nullptr,
                                .occupancy = context.occupancy,
                                .throttle = &context.throttle};
   thread_.emplace(config, std::move(segmenter), storage_.take_loaded(),

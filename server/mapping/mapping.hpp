@@ -8,6 +8,7 @@
 #include "config/loaders/server_config.hpp"
 #include "idl/dds/participant.hpp"
 #include "idl/interface/topics.hpp"
+#include "server/mapping/imu_receiver.hpp"
 #include "server/mapping/map_storage.hpp"
 #include "server/mapping/mapping_thread.hpp"
 #include "server/mapping/odometry_prior.hpp"
@@ -64,6 +65,7 @@ class Mapping {
   PosePublisher poses_;
   std::optional<LabelledScanPublisher> labelled_scans_;
   std::optional<OdometryPrior> prior_;
+  std::optional<ImuReceiver> imu_;
   // Each uses what stands above it, and stops before it.
   std::optional<MappingThread> thread_;
   std::optional<CheckpointWorker> checkpoints_;

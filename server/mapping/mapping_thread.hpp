@@ -11,6 +11,7 @@
 #include "config/loaders/server_config.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/mapper.hpp"
+#include "server/mapping/imu_receiver.hpp"
 #include "server/mapping/map_saver.hpp"
 #include "server/mapping/odometry_prior.hpp"
 #include "server/mapping/scan_queue.hpp"
@@ -24,11 +25,12 @@
 
 namespace stillmap::server {
 
-/// Where mapped scans go; what is null is switched off.
+/// Where mapped scans go, and what comes beside them; what is null is switched off.
 struct MappingOutputs {
   PosePublisher* poses = nullptr;
   LabelledScanPublisher* scans = nullptr;
   const OdometryPrior* prior = nullptr;
+  ImuReceiver* imu = nullptr;
   OccupancyThread* occupancy = nullptr;
   BackgroundThrottle* throttle = nullptr;
 };
@@ -69,6 +71,10 @@ class MappingThread : public CheckpointSource {
 
  private:
   void map(QueuedScan queued);
+  /// Gives the mapper the IMU's samples up to the scan's last point.
+  void feed_imu(const Scan& scan);
+  /// Counts and logs what became of them.
+  void report_imu();
   /// Runs the requests, and publishes the map when that is due.
   void end_round(bool is_idle);
   /// Publishes a new map, and starts a new octree from it.
@@ -88,6 +94,7 @@ class MappingThread : public CheckpointSource {
   /// Limit of the memory that the static map takes.
   std::size_t map_limit_bytes_;
   std::string lidar_frame_;
+  double sensor_period_s_;
   std::chrono::duration<double> publish_period_;
   ScanQueue& queue_;
   Statistics& statistics_;
@@ -95,6 +102,9 @@ class MappingThread : public CheckpointSource {
   MappingOutputs outputs_;
   Mapper mapper_;
   ThrottledLog throttled_log_;
+  /// As reported last.
+  InertialCounts imu_counts_;
+  bool imu_was_believed_ = false;
   /// Of the scan in work.
   std::string frame_;
   std::chrono::steady_clock::time_point received_;

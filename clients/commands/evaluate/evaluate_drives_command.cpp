@@ -17,6 +17,7 @@
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/arguments/simulation_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/mapping/imu_feed.hpp"
 #include "clients/commands/mapping/trajectory_report.hpp"
 #include "clients/commands/stage_stopwatch.hpp"
 #include "clients/terminal/json.hpp"
@@ -26,6 +27,8 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/scan_dataset.hpp"
 #include "core/segmentation/segmenter.hpp"
+#include "core/simulation/simulated_imu.hpp"
+#include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -39,6 +42,7 @@ struct Drive {
   std::function<Scan(std::size_t)> read;
   /// Poses of the lidar at the scans' stamps.
   std::vector<Eigen::Isometry3d> truth;
+  std::vector<ImuSample> imu;
 };
 
 struct EvaluateDrivesArguments {
@@ -48,13 +52,20 @@ struct EvaluateDrivesArguments {
   std::size_t start = 0;
   std::string labels = "files";
   std::string stamps = "as_recorded";
+  std::string imu = "as_recorded";
   MapperArguments mapper;
   bool each = false;
 };
 
 /// "sim:crowd,seed=2,sensor=vlp_16,motion=hard_turns,rolling,scans=300": a drive in words.
-SimulationArguments simulated_drive(const std::string& text) {
-  SimulationArguments arguments;
+struct SimulatedDrive {
+  SimulationArguments simulation;
+  bool imu = false;
+};
+
+SimulatedDrive simulated_drive(const std::string& text) {
+  SimulatedDrive drive;
+  SimulationArguments& arguments = drive.simulation;
   std::istringstream words(text);
   std::getline(words, arguments.preset, ',');
   for (std::string word; std::getline(words, word, ',');) {
@@ -73,19 +84,21 @@ SimulationArguments simulated_drive(const std::string& text) {
       arguments.traffic = value;
     else if (word == "rolling")
       arguments.rolling = true;
+    else if (word == "imu")
+      drive.imu = true;
     else
       throw std::invalid_argument(
           "'" + word + "' in 'sim:" + text +
-          "': there are seed=, scans=, sensor=, motion=, traffic= and rolling");
+          "': there are seed=, scans=, sensor=, motion=, traffic=, rolling and imu");
   }
-  return arguments;
+  return drive;
 }
 
 const std::string simulated_prefix = "sim:";
 
 Drive open_simulated(const std::string& name) {
-  const simulation::SimulationConfig config =
-      simulation_config(simulated_drive(name.substr(simulated_prefix.size())));
+  const SimulatedDrive asked = simulated_drive(name.substr(simulated_prefix.size()));
+  const simulation::SimulationConfig config = simulation_config(asked.simulation);
   const auto simulation = std::make_shared<simulation::Simulation>(config);
   Drive drive{
       .name = name,
@@ -93,21 +106,27 @@ Drive open_simulated(const std::string& name) {
       .sensor = config.sensor,
       .labelled = true,
       .read = [simulation](std::size_t i) { return simulation->scan(static_cast<int>(i)).scan; },
-      .truth = {}};
+      .truth = {},
+      .imu = {}};
+  if (asked.imu) {
+    drive.imu = simulation::simulated_imu(*simulation);
+    drive.sensor.imu = ImuMount{};
+  }
   for (int i = 0; i < config.scans; ++i)
     drive.truth.push_back(simulation->T_map_lidar_at(i * config.sensor.period_s));
   return drive;
 }
 
 Drive open_recorded(const std::string& name) {
-  const auto dataset = std::make_shared<ScanDataset>(name);
+  const auto dataset = std::make_shared<ScanDataset>(dds::open_sequence(name));
   const std::optional<Trajectory> truth = dataset->truth();
   Drive drive{.name = name,
               .scans = dataset->size(),
               .sensor = dataset->suggested_sensor(),
               .labelled = dataset->has_labels(0),
               .read = [dataset](std::size_t i) { return dataset->read(i).scan; },
-              .truth = {}};
+              .truth = {},
+              .imu = dataset->imu()};
   if (truth)
     for (const StampedPose& pose : *truth) drive.truth.push_back(pose.T_map_lidar);
   return drive;
@@ -156,6 +175,29 @@ void restamp(Scan& scan, const std::string& how, double period_s) {
   for (float& offset : scan.time_offset_s) offset -= static_cast<float>(shift_s);
 }
 
+/// Faults of an IMU.
+std::vector<ImuSample> spoilt(std::vector<ImuSample> samples, const std::string& how) {
+  if (how == "none") return {};
+  const Eigen::Matrix3d turned =
+      Eigen::AngleAxisd(0.5 * M_PI, Eigen::Vector3d(1.0, 1.0, 1.0).normalized()).matrix();
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    ImuSample& sample = samples[k];
+    if (how == "deg_per_s") sample.angular_velocity_imu *= 180.0 / M_PI;
+    if (how == "turned") sample.angular_velocity_imu = turned * sample.angular_velocity_imu;
+    if (how == "late") sample.stamp_ns += 20'000'000;
+    const std::size_t breaks = samples.size() / 3;
+    if (how == "frozen" && k > breaks) {
+      sample.angular_velocity_imu = samples[breaks].angular_velocity_imu;
+      sample.acceleration_imu = samples[breaks].acceleration_imu;
+    }
+    if (how == "stops" && k > breaks) {
+      samples.resize(k);
+      break;
+    }
+  }
+  return samples;
+}
+
 DriveResult run_drive(const Drive& drive, const std::string& weighting,
                       const EvaluateDrivesArguments& arguments,
                       const std::function<bool(std::size_t)>& scan_done) {
@@ -164,6 +206,7 @@ DriveResult run_drive(const Drive& drive, const std::string& weighting,
   Mapper mapper(config, drive.labelled
                             ? std::unique_ptr<Segmenter>(std::make_unique<PassthroughSegmenter>())
                             : std::make_unique<NullSegmenter>());
+  ImuFeed imu(spoilt(drive.imu, arguments.imu));
   DriveResult result{.weighting = weighting, .report = {}, .health = {}};
   evaluation::PosePairs pairs;
   StageStopwatch times;
@@ -172,6 +215,8 @@ DriveResult run_drive(const Drive& drive, const std::string& weighting,
     Scan scan = drive.read(i);
     spoil_labels(scan, arguments.labels, i);
     restamp(scan, arguments.stamps, config.sensor.period_s);
+    for (const ImuSample& sample : imu.take_up_to_end_of(scan, config.sensor.period_s))
+      mapper.add(sample);
     times.begin();
     const std::optional<MappedScan> mapped = mapper.process(std::move(scan));
     times.end();
@@ -198,6 +243,13 @@ DriveResult run_drive(const Drive& drive, const std::string& weighting,
       }
     }
     if (!scan_done(i + 1 - arguments.start)) break;
+  }
+  if (arguments.each && mapper.inertial().has_samples()) {
+    const InertialTracker& tracker = mapper.inertial();
+    std::cerr << "imu: helped " << tracker.counts().scans_helped << " scans, trust lost "
+              << tracker.counts().trust_losses << " times, bias "
+              << tracker.calibration().bias_imu().transpose() << " rad/s, late by "
+              << 1e3 * tracker.calibration().time_offset_s() << " ms\n";
   }
   for (const auto& tile : mapper.map_snapshot()->tiles) result.voxels += tile->voxels.size();
   result.median_ms = times.total().quantile(0.5);
@@ -259,7 +311,7 @@ void add_evaluate_drives_command(CommandHandle evaluate, Action& action) {
       "drives", "Odometry on many drives: errors, health, sharpness of the map, time");
   command
       .option("DRIVES", arguments->drives,
-              "Sequences, or sim:PRESET[,seed=N][,scans=N][,sensor=S][,motion=M][,rolling]")
+              "Sequences, or sim:PRESET[,seed=N][,scans=N][,sensor=S][,motion=M][,rolling][,imu]")
       .required();
   command.option("--weightings", arguments->weightings, "none, geometric, semantic").with_default();
   command.option("--scans", arguments->scans, "Take as many scans of each at most").above_zero();
@@ -269,6 +321,10 @@ void add_evaluate_drives_command(CommandHandle evaluate, Action& action) {
               "files, none, random30, no_movers, buildings_move, vegetation_moves")
       .with_default();
   command.option("--stamps", arguments->stamps, "as_recorded, middle, end, removed").with_default();
+  command
+      .option("--imu", arguments->imu,
+              "as_recorded, none, or with a fault: deg_per_s, turned, late, frozen, stops")
+      .with_default();
   command.option("--config", arguments->mapper.config_file,
                  "Server file; its mapper settings are used");
   command.option("--sensor", arguments->mapper.sensor, "Of recorded sequences");
