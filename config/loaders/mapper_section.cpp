@@ -50,6 +50,7 @@ void read_features(YamlSection section, FeatureConfig& features) {
   section.integer("min_surface_rings", features.min_surface_rings, {1, 100000});
   section.number("map_surface_spacing_m", features.map_surface_spacing_m, lengths_m);
   section.number("surface_spacing_m", features.surface_spacing_m, lengths_m);
+  section.integer("max_surfaces", features.max_surfaces, {500, 1000000});
 }
 
 void read_local_map(YamlSection section, LocalMapConfig& local_map) {

@@ -171,6 +171,35 @@ void ScanDataset::learn_from_first_scan() {
   intensity_scale_ = 1.0F / intensity_full_scale(first.intensity);
   const auto known = source_ ? source_->sensor() : std::nullopt;
   suggested_sensor_ = known ? *known : guess_sensor(first, files_.front().extension() == ".bin");
+  if (first.time_offset_s.empty() && first.ring.empty()) kitti_lidar_ = find_kitti_lidar();
+}
+
+std::optional<KittiLidar> ScanDataset::find_kitti_lidar() const {
+  constexpr std::size_t samples = 9;
+  if (source_ || files_.front().extension() != ".bin") return std::nullopt;
+  std::vector<Scan> scans;
+  for (std::size_t k = 0; k < std::min(samples, size()); ++k) {
+    try {
+      scans.push_back(
+          read_kitti_bin(file(size() > samples ? k * (size() - 1) / (samples - 1) : k)));
+    } catch (const DatasetError&) {
+      // Whoever reads that scan is told.
+      continue;
+    }
+  }
+  return recognise_kitti_lidar(scans, period_s());
+}
+
+double ScanDataset::period_s() const {
+  std::vector<std::int64_t> steps_ns;
+  for (std::size_t i = 1; i < size(); ++i) steps_ns.push_back(stamp_ns(i) - stamp_ns(i - 1));
+  const double usual_s = 1e-9 * static_cast<double>(default_period_ns);
+  if (steps_ns.empty()) return usual_s;
+  const auto middle = steps_ns.begin() + static_cast<std::ptrdiff_t>(steps_ns.size() / 2);
+  std::ranges::nth_element(steps_ns, middle);
+  const double median_s = 1e-9 * static_cast<double>(*middle);
+  // Recordings may leave scans out.
+  return median_s > 0.5 * usual_s && median_s < 1.5 * usual_s ? median_s : usual_s;
 }
 
 fs::path ScanDataset::beside(std::size_t i, const char* folder, const char* extension) const {
@@ -214,6 +243,7 @@ DatasetFrame ScanDataset::read(std::size_t i) const {
   if (intensity_scale_ != 1.0F) {
     for (float& value : frame.scan.intensity) value *= intensity_scale_;
   }
+  if (kitti_lidar_) kitti_lidar_->correct(frame.scan);
   frame.scan.labels = reduced_classes(frame.raw_labels);
   return frame;
 }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/dataset/kitti_lidar.hpp"
 #include "core/dataset/scan_source.hpp"
 #include "core/lidar/scan.hpp"
 #include "core/lidar/sensor_model.hpp"
@@ -21,7 +22,8 @@ namespace stillmap {
 /// - a folder of .bin, .pcd or .ply files, in natural order ("2" before "10");
 /// - a single such file;
 /// - any ScanSource, such as a bag's topic.
-/// Intensity is scaled to 0..1, by a factor that the first scan decides for all.
+/// Intensity is scaled to 0..1, by a factor that the first scan decides for all. Files of KITTI's
+/// own lidar are corrected (see KittiLidar), unless they come with files of our own.
 class ScanDataset {
  public:
   /// Throws DatasetError when there is no scan to be found. Reads the first scan.
@@ -54,6 +56,9 @@ class ScanDataset {
   /// A guess from the kind of file and the first scan's rings or elevations.
   [[nodiscard]] SensorModel suggested_sensor() const { return suggested_sensor_; }
 
+  /// What read() corrects, where the files are recognised as those of KITTI's lidar.
+  [[nodiscard]] const std::optional<KittiLidar>& kitti_lidar() const { return kitti_lidar_; }
+
  private:
   [[nodiscard]] DatasetFrame read_unscaled(std::size_t i) const;
   [[nodiscard]] std::filesystem::path beside(std::size_t i, const char* folder,
@@ -61,6 +66,10 @@ class ScanDataset {
 
   /// Takes scale and sensor from the first scan.
   void learn_from_first_scan();
+  /// Looks at some of the scans.
+  [[nodiscard]] std::optional<KittiLidar> find_kitti_lidar() const;
+  /// Time between scans; 0.1 where the stamps say nothing [s].
+  [[nodiscard]] double period_s() const;
 
   /// Where the scans come from, when they are not in files of their own.
   std::shared_ptr<const ScanSource> source_;
@@ -72,6 +81,7 @@ class ScanDataset {
   std::vector<std::int64_t> stamps_ns_;
   float intensity_scale_ = 1.0F;
   SensorModel suggested_sensor_;
+  std::optional<KittiLidar> kitti_lidar_;
 };
 
 }  // namespace stillmap

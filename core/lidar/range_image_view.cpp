@@ -15,6 +15,40 @@ namespace {
 constexpr int max_columns = 1024;
 constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
 
+/// So many points are projected at once, in vector registers.
+constexpr Eigen::Index batch_size = 256;
+using Batch = Eigen::Array<float, batch_size, 1>;
+
+constexpr float pi = std::numbers::pi_v<float>;
+
+/// Arc tangent of `t`, |t| <= 1, to 1e-5 rad: a five hundredth of a pixel.
+template <class T>
+T small_arc_tangent(const T& t) {
+  const T s = t * t;
+  return t * (0.99997726F +
+              s * (-0.33262347F +
+                   s * (0.19354346F + s * (-0.11643287F + s * (0.05265332F + s * -0.01172120F)))));
+}
+
+float fast_atan2(float y, float x) {
+  const float larger = std::max(std::abs(x), std::abs(y));
+  if (!(larger > 0.0F)) return 0.0F;
+  float angle = small_arc_tangent(std::min(std::abs(x), std::abs(y)) / larger);
+  if (std::abs(y) > std::abs(x)) angle = 0.5F * pi - angle;
+  if (x < 0.0F) angle = pi - angle;
+  return std::copysign(angle, y);
+}
+
+/// The same for many, not both of them 0.
+Batch fast_atan2(const Batch& y, const Batch& x) {
+  const Batch larger = x.abs().max(y.abs());
+  const Batch smaller = x.abs().min(y.abs());
+  Batch angle = small_arc_tangent<Batch>(smaller / larger);
+  angle = (y.abs() > x.abs()).select(0.5F * pi - angle, angle);
+  angle = (x < 0.0F).select(pi - angle, angle);
+  return (y < 0.0F).select(-angle, angle);
+}
+
 }  // namespace
 
 RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> labels,
@@ -25,15 +59,12 @@ RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> 
       rows_per_rad_(static_cast<float>(sensor.rings / (sensor.fov_up - sensor.fov_down))),
       pixels_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_), 0.0F) {
   move_to(T_map_lidar);
-  struct Return {
-    std::size_t pixel = none;
-    float range_m = 0.0F;
-  };
   std::vector<Return> returns(scan.size());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scan.size(), 4096), [&](const auto& block) {
-    for (std::size_t i = block.begin(); i != block.end(); ++i) {
-      const float range_m = scan.points_lidar[i].norm();
-      returns[i] = {pixel_of(scan.points_lidar[i], range_m).value_or(none), range_m};
+    constexpr auto step = static_cast<std::size_t>(batch_size);
+    for (std::size_t i = block.begin(); i < block.end(); i += step) {
+      const std::size_t count = std::min(step, block.end() - i);
+      project(std::span(scan.points_lidar).subspan(i, count), std::span(returns).subspan(i, count));
     }
   });
   for (std::size_t i = 0; i < returns.size(); ++i) {
@@ -50,17 +81,39 @@ void RangeImageView::move_to(const Eigen::Isometry3d& T_map_lidar) {
   origin_map_ = T_map_lidar.translation().cast<float>();
 }
 
+void RangeImageView::project(std::span<const Eigen::Vector3f> points_lidar,
+                             std::span<Return> returns) const {
+  Batch x = Batch::Ones(), y = Batch::Ones(), z = Batch::Ones();
+  for (std::size_t i = 0; i < points_lidar.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    x[k] = points_lidar[i].x();
+    y[k] = points_lidar[i].y();
+    z[k] = points_lidar[i].z();
+  }
+  const Batch across = (x.square() + y.square()).sqrt();
+  const Batch range_m = (across.square() + z.square()).sqrt();
+  const Batch row = (fov_up_ - fast_atan2(z, across)) * rows_per_rad_;
+  const Batch column = 0.5F * (1.0F - fast_atan2(y, x) / pi) * static_cast<float>(columns_);
+  for (std::size_t i = 0; i < points_lidar.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    returns[i] = {pixel_at(row[k], column[k], range_m[k]).value_or(none), range_m[k]};
+  }
+}
+
 std::optional<std::size_t> RangeImageView::pixel_of(const Eigen::Vector3f& point_lidar,
                                                     float range_m) const {
-  if (range_m <= 0.0F) return std::nullopt;
-  const float elevation = std::asin(std::clamp(point_lidar.z() / range_m, -1.0F, 1.0F));
-  const float row = (fov_up_ - elevation) * rows_per_rad_;
+  const float elevation = fast_atan2(point_lidar.z(), point_lidar.head<2>().norm());
+  const float turn = 0.5F * (1.0F - fast_atan2(point_lidar.y(), point_lidar.x()) / pi);
+  return pixel_at((fov_up_ - elevation) * rows_per_rad_, turn * static_cast<float>(columns_),
+                  range_m);
+}
+
+std::optional<std::size_t> RangeImageView::pixel_at(float row, float column, float range_m) const {
+  if (!(range_m > 0.0F)) return std::nullopt;
   // Half a row of slack: the outermost beams look along the edge of the field of view.
-  if (row < -0.5F || row >= static_cast<float>(rows_) + 0.5F) return std::nullopt;
-  const float turn =
-      0.5F * (1.0F - std::atan2(point_lidar.y(), point_lidar.x()) * std::numbers::inv_pi_v<float>);
+  if (!(row >= -0.5F && row < static_cast<float>(rows_) + 0.5F)) return std::nullopt;
   const int r = std::clamp(static_cast<int>(row), 0, rows_ - 1);
-  const int c = std::clamp(static_cast<int>(turn * static_cast<float>(columns_)), 0, columns_ - 1);
+  const int c = std::clamp(static_cast<int>(column), 0, columns_ - 1);
   return static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) +
          static_cast<std::size_t>(c);
 }

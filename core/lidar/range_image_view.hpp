@@ -35,6 +35,14 @@ class RangeImageView {
   void move_to(const Eigen::Isometry3d& T_map_lidar);
 
  private:
+  /// Pixel and range of a measured point.
+  struct Return {
+    std::size_t pixel = 0;
+    float range_m = 0.0F;
+  };
+  void project(std::span<const Eigen::Vector3f> points_lidar, std::span<Return> returns) const;
+  /// Nothing outside the field of view, or without a range.
+  [[nodiscard]] std::optional<std::size_t> pixel_at(float row, float column, float range_m) const;
   [[nodiscard]] std::optional<std::size_t> pixel_of(const Eigen::Vector3f& point_lidar,
                                                     float range_m) const;
 

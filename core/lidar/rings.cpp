@@ -78,25 +78,56 @@ std::vector<std::uint16_t> cut_at(std::span<const float> azimuth, float seam) {
   return rings;
 }
 
-/// Squared distances of the points' slopes from their ring's mean: small when the cut is right.
-double spread_within_rings(std::span<const float> slopes, std::span<const std::uint16_t> rings) {
-  double squares = 0.0;
-  double sum = 0.0, sum_of_squares = 0.0;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < rings.size(); ++i) {
-    if (const double s = slopes[i]; std::isfinite(s)) {
-      sum += s;
-      sum_of_squares += s * s;
-      ++count;
-    }
-    const bool last_of_ring = i + 1 == rings.size() || rings[i + 1] != rings[i];
-    if (last_of_ring && count > 0) {
-      squares += sum_of_squares - sum * sum / static_cast<double>(count);
-      sum = sum_of_squares = 0.0;
-      count = 0;
-    }
+/// What happens to the slope at the cuts of a seam: medians over the cuts.
+struct StepsAtCuts {
+  /// Difference from the step between the sensor's beams: small where rings end.
+  float from_next_beam = std::numeric_limits<float>::infinity();
+  /// The step itself: small where a ring only goes on.
+  float from_same_beam = std::numeric_limits<float>::infinity();
+  float between_beams = 0.0F;
+
+  /// Neither where the scan is compensated for its motion and the sweep began there.
+  [[nodiscard]] bool is_clear() const {
+    return std::min(from_next_beam, from_same_beam) < 0.5F * between_beams;
   }
-  return squares;
+};
+
+float median_of(std::vector<float>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::ranges::nth_element(values, middle);
+  return *middle;
+}
+
+StepsAtCuts steps_at_cuts(std::span<const float> slopes, std::span<const std::uint16_t> rings,
+                          const SensorModel& sensor) {
+  constexpr std::size_t points_on_each_side = 5;
+  const auto median_slope = [&](std::size_t begin) {
+    const auto side = slopes.subspan(begin, points_on_each_side);
+    std::vector<float> values(side.begin(), side.end());
+    return median_of(values);
+  };
+  std::vector<float> from_next_beam, from_same_beam, between_beams;
+  for (std::size_t i = points_on_each_side; i + points_on_each_side <= rings.size(); ++i) {
+    if (rings[i] == rings[i - 1] || rings[i] >= sensor.rings) continue;
+    const auto beams = static_cast<float>(std::tan(sensor.beam_elevation(rings[i] - 1)) -
+                                          std::tan(sensor.beam_elevation(rings[i])));
+    const float step = median_slope(i - points_on_each_side) - median_slope(i);
+    if (!std::isfinite(step)) continue;
+    from_next_beam.push_back(std::abs(step - beams));
+    from_same_beam.push_back(std::abs(step));
+    between_beams.push_back(beams);
+  }
+  if (from_next_beam.empty()) return {};
+  return {median_of(from_next_beam), median_of(from_same_beam), median_of(between_beams)};
+}
+
+/// Whether the first of two seams, half a turn apart, is where rings end.
+bool is_seam(const StepsAtCuts& first, const StepsAtCuts& second) {
+  if (!first.is_clear() && !second.is_clear()) return first.from_next_beam <= second.from_next_beam;
+  float evidence = 0.0F;
+  if (first.is_clear()) evidence += first.from_same_beam - first.from_next_beam;
+  if (second.is_clear()) evidence -= second.from_same_beam - second.from_next_beam;
+  return evidence >= 0.0F;
 }
 
 /// Whether ring numbers grow downwards: the mean ring of the upper half is the smaller one.
@@ -155,7 +186,7 @@ std::vector<std::uint16_t> rings_from_order(const Scan& scan, const SensorModel&
   std::vector<std::uint16_t> from_front = cut_at(azimuth, 0.0F);
   std::vector<std::uint16_t> from_back = cut_at(azimuth, turn / 2.0F);
   const bool front_is_better =
-      spread_within_rings(slopes, from_front) <= spread_within_rings(slopes, from_back);
+      is_seam(steps_at_cuts(slopes, from_front, sensor), steps_at_cuts(slopes, from_back, sensor));
   std::vector<std::uint16_t> rings = std::move(front_is_better ? from_front : from_back);
 
   // A scan loses whole rings to the sky, and a late point may open one too many.

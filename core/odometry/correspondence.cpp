@@ -43,20 +43,14 @@ Pca pca(const Neighbours& neighbours) {
   return result;
 }
 
-}  // namespace
-
-std::optional<FittedSurface> fit_line(const Neighbours& neighbours) {
-  if (neighbours.count < min_neighbours) return std::nullopt;
-  const Pca fit = pca(neighbours);
+std::optional<FittedSurface> line_of(const Pca& fit) {
   // Written so that points all at one place are no line either.
   if (!(fit.eigenvalues[2] > line_dominance * fit.eigenvalues[1])) return std::nullopt;
   const Eigen::Vector3d u = fit.eigenvectors.col(2);
   return FittedSurface{fit.centre, Eigen::Matrix3d::Identity() - u * u.transpose()};
 }
 
-std::optional<FittedSurface> fit_plane(const Neighbours& neighbours) {
-  if (neighbours.count < min_neighbours) return std::nullopt;
-  const Pca fit = pca(neighbours);
+std::optional<FittedSurface> plane_of(const Pca& fit, const Neighbours& neighbours) {
   if (!(fit.eigenvalues[1] > min_plane_width_share * fit.eigenvalues[2])) return std::nullopt;
   const Eigen::Vector3d n = fit.eigenvectors.col(0);
   for (std::size_t k = 0; k < static_cast<std::size_t>(neighbours.count); ++k) {
@@ -64,6 +58,25 @@ std::optional<FittedSurface> fit_plane(const Neighbours& neighbours) {
     if (std::abs(n.dot(d)) > plane_thickness_m) return std::nullopt;
   }
   return FittedSurface{fit.centre, n * n.transpose()};
+}
+
+}  // namespace
+
+std::optional<FittedSurface> fit_line(const Neighbours& neighbours) {
+  if (neighbours.count < min_neighbours) return std::nullopt;
+  return line_of(pca(neighbours));
+}
+
+std::optional<FittedSurface> fit_plane(const Neighbours& neighbours) {
+  if (neighbours.count < min_neighbours) return std::nullopt;
+  return plane_of(pca(neighbours), neighbours);
+}
+
+std::optional<FittedSurface> fit_surface(const Neighbours& neighbours) {
+  if (neighbours.count < min_neighbours) return std::nullopt;
+  const Pca fit = pca(neighbours);
+  if (auto plane = plane_of(fit, neighbours)) return plane;
+  return line_of(fit);
 }
 
 double semantic_inconsistency(const Neighbours& neighbours, SemanticClass label) {

@@ -25,6 +25,9 @@ struct FittedSurface {
 /// directions.
 [[nodiscard]] std::optional<FittedSurface> fit_plane(const Neighbours& neighbours);
 
+/// The plane where there is one, else the line.
+[[nodiscard]] std::optional<FittedSurface> fit_surface(const Neighbours& neighbours);
+
 /// c of eq. (9): the share of neighbours with another class than `label`. 0 when `label` or all
 /// neighbours are unlabeled, since no label contradicts nothing.
 [[nodiscard]] double semantic_inconsistency(const Neighbours& neighbours, SemanticClass label);

@@ -134,6 +134,8 @@ Neighbours FeatureMap::nearest(const Eigen::Vector3f& position_map, int n,
 }
 
 void FeatureMap::remove_far_from(const Eigen::Vector3f& centre_map) {
+  if (kept_round_map_ && (centre_map - *kept_round_map_).norm() < 0.02F * radius_m_) return;
+  kept_round_map_ = centre_map;
   for (auto entry = index_.begin(); entry != index_.end();) {
     Block& block = blocks_[entry->second];
     if (block.count > 0 &&
@@ -162,6 +164,7 @@ void FeatureMap::clear() {
   blocks_.clear();
   free_blocks_.clear();
   size_ = 0;
+  kept_round_map_.reset();
 }
 
 }  // namespace stillmap

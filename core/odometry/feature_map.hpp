@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -41,7 +42,8 @@ class FeatureMap {
   [[nodiscard]] Neighbours nearest(const Eigen::Vector3f& position_map, int n,
                                    float max_distance_m) const;
 
-  /// Removes voxels whose first point is farther than the configured radius from `centre_map`.
+  /// Removes voxels whose first point is farther than the configured radius from `centre_map`,
+  /// where that has moved by a fiftieth of the radius since it was last done.
   void remove_far_from(const Eigen::Vector3f& centre_map);
 
   /// Removes the movable points for which `is_gone(position_map)` holds.
@@ -80,6 +82,8 @@ class FeatureMap {
   std::vector<Block> blocks_;
   std::vector<std::uint32_t> free_blocks_;
   std::size_t size_ = 0;
+  /// Where voxels were last removed round.
+  std::optional<Eigen::Vector3f> kept_round_map_;
   int max_points_;
   float voxel_size_m_;
   float min_spacing_m_;

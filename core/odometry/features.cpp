@@ -167,18 +167,23 @@ std::vector<float> ring_curvature(const std::vector<Eigen::Vector3f>& ring) {
   return curvature;
 }
 
-std::vector<std::uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> points,
-                                            std::span<const std::uint32_t> chosen,
-                                            double spacing_m) {
+namespace {
+
+std::vector<std::uint32_t> first_in_cubes(std::span<const Eigen::Vector3f> points,
+                                          std::span<const std::uint32_t> chosen,
+                                          float inverse_spacing) {
   // An open-addressing set of its own: it is filled once and thrown away, so it needs neither
   // growth nor deletion.
   const std::size_t slots = std::bit_ceil(2 * chosen.size() + 1);
   std::vector<std::uint64_t> taken(slots, unused);
-  const auto inverse_spacing = static_cast<float>(1.0 / spacing_m);
   std::vector<std::uint32_t> kept;
   kept.reserve(chosen.size() / 2);
+  std::uint64_t last = unused;
   for (const std::uint32_t i : chosen) {
     const std::uint64_t cube = cube_of(points[i], inverse_spacing);
+    // Points that were measured one after the other mostly share one.
+    if (cube == last) continue;
+    last = cube;
     std::size_t slot = (cube * 0x9e3779b97f4a7c15ULL) >> 20 & (slots - 1);
     while (taken[slot] != unused && taken[slot] != cube) slot = (slot + 1) & (slots - 1);
     if (taken[slot] == cube) continue;
@@ -186,6 +191,37 @@ std::vector<std::uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> poi
     kept.push_back(i);
   }
   return kept;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> voxel_downsample(std::span<const Eigen::Vector3f> points,
+                                            std::span<const std::uint32_t> chosen,
+                                            double spacing_m) {
+  // The first point of a cube is the first one in its block, too.
+  constexpr std::size_t block_size = 16384;
+  const auto inverse_spacing = static_cast<float>(1.0 / spacing_m);
+  const std::size_t blocks = chosen.size() / block_size + 1;
+  if (blocks == 1) return first_in_cubes(points, chosen, inverse_spacing);
+  std::vector<std::vector<std::uint32_t>> of_block(blocks);
+  tbb::parallel_for(std::size_t{0}, blocks, [&](std::size_t k) {
+    const std::size_t begin = k * block_size;
+    const auto block = chosen.subspan(begin, std::min(block_size, chosen.size() - begin));
+    of_block[k] = first_in_cubes(points, block, inverse_spacing);
+  });
+  std::vector<std::uint32_t> candidates;
+  for (const auto& block : of_block)
+    candidates.insert(candidates.end(), block.begin(), block.end());
+  return first_in_cubes(points, candidates, inverse_spacing);
+}
+
+std::vector<std::uint32_t> few_surfaces(const Scan& scan, const FeatureConfig& config,
+                                        const Features& features) {
+  const auto max_surfaces = static_cast<double>(config.max_surfaces);
+  const auto count = static_cast<double>(features.surfaces.size());
+  if (count <= max_surfaces) return features.surfaces;
+  return voxel_downsample(scan.points_lidar, features.surfaces,
+                          config.surface_spacing_m * std::sqrt(count / max_surfaces));
 }
 
 Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {

@@ -25,6 +25,10 @@ struct Features {
 /// All points of a scan without rings, thinned: `planes` and `surfaces`.
 [[nodiscard]] Features extract_surfaces(const Scan& scan, const FeatureConfig& config);
 
+/// About `config.max_surfaces` of the `surfaces`, spread evenly.
+[[nodiscard]] std::vector<std::uint32_t> few_surfaces(const Scan& scan, const FeatureConfig& config,
+                                                      const Features& features);
+
 /// Edge and plane points of every ring by their curvature (LOAM V-A, with
 /// the rejection of occluded and grazing points that A-LOAM dropped). `scan.ring` must be known.
 [[nodiscard]] Features extract_features(const Scan& scan, const FeatureConfig& config);

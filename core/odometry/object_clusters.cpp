@@ -3,6 +3,7 @@
 #include <tsl/robin_map.h>
 
 #include <numeric>
+#include <optional>
 
 namespace stillmap {
 namespace {
@@ -77,14 +78,21 @@ ObjectClusters cluster_objects(std::span<const Eigen::Vector3f> points_lidar,
   const auto inverse_gap = static_cast<float>(1.0 / gap_m);
   CubeTable table;
   std::vector<Cube> cubes;
+  std::optional<std::uint64_t> last_key;
+  std::int32_t last_cube = ObjectClusters::none;
   for (std::size_t i = 0; i < points_lidar.size(); ++i) {
     if (!is_movable(labels[i])) continue;
     const Cube cube{(points_lidar[i] * inverse_gap).array().floor().cast<int>(),
                     kind_of(labels[i])};
-    const auto [entry, is_new] =
-        table.try_emplace(key_of(cube.index, cube.kind), static_cast<std::uint32_t>(cubes.size()));
-    if (is_new) cubes.push_back(cube);
-    objects.of_point[i] = static_cast<std::int32_t>(entry->second);
+    const std::uint64_t key = key_of(cube.index, cube.kind);
+    // Points that were measured one after the other mostly share a cube.
+    if (key != last_key) {
+      const auto [entry, is_new] = table.try_emplace(key, static_cast<std::uint32_t>(cubes.size()));
+      if (is_new) cubes.push_back(cube);
+      last_key = key;
+      last_cube = static_cast<std::int32_t>(entry->second);
+    }
+    objects.of_point[i] = last_cube;
   }
   Sets sets(cubes.size());
   join_neighbours(cubes, table, sets);

@@ -34,6 +34,7 @@ void check(const FeatureConfig& c, FaultList& faults) {
                  "1 or more");
   faults.require(c.map_surface_spacing_m > 0.0, "features.map_surface_spacing_m",
                  c.map_surface_spacing_m, "above 0");
+  faults.require(c.max_surfaces >= 500, "features.max_surfaces", c.max_surfaces, "500 or more");
   faults.require(c.surface_spacing_m > 0.0, "features.surface_spacing_m", c.surface_spacing_m,
                  "above 0");
 }

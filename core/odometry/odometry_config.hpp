@@ -39,6 +39,8 @@ struct FeatureConfig {
   /// registered [m].
   double map_surface_spacing_m = 0.3;
   double surface_spacing_m = 0.5;
+  /// So many of these points are registered first; all where they do not fit.
+  int max_surfaces = 2500;
 };
 
 /// The points that scans register against.
@@ -68,8 +70,8 @@ struct RegistrationConfig {
   double robust_scale_m = 0.1;
   /// How far the motion within a sweep differs from that since the last pose: standard deviations
   /// [m, rad]. 0 metres: the motion within the sweep is not estimated.
-  double sweep_translation_m = 0.01;
-  double sweep_rotation_rad = 0.002;
+  double sweep_translation_m = 0.03;
+  double sweep_rotation_rad = 0.01;
   /// Fewer correspondences than this give no pose.
   int min_correspondences = 50;
   /// A direction is degenerate when one metre (or radian, times the scan's mean range) along it

@@ -35,8 +35,7 @@ enum class FeatureKind { edge, plane, surface };
 
 std::optional<FittedSurface> fit(FeatureKind kind, const Neighbours& neighbours) {
   if (kind == FeatureKind::edge) return fit_line(neighbours);
-  if (auto plane = fit_plane(neighbours); plane || kind == FeatureKind::plane) return plane;
-  return fit_line(neighbours);
+  return kind == FeatureKind::plane ? fit_plane(neighbours) : fit_surface(neighbours);
 }
 
 /// One correspondence a feature, in the features' order whatever the number of threads.
@@ -139,6 +138,13 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
   return equations;
 }
 
+PoseTangent rotated(const Eigen::Matrix3d& R, const PoseTangent& tangent) {
+  PoseTangent result;
+  result.head<3>() = R.lazyProduct(tangent.head<3>());
+  result.tail<3>() = R.lazyProduct(tangent.tail<3>());
+  return result;
+}
+
 /// Residuals of a scan that fits, for the weight of the sweep's prior beside them [m].
 constexpr double expected_residual_m = 0.05;
 
@@ -168,10 +174,7 @@ void add_sweep_prior(const SweepPrior& prior, const OdometryResult& at,
       prior.rotation_is_measured ? measured_rotation_rad : config.sweep_rotation_rad;
   weight.tail<3>().setConstant(std::pow(expected_residual_m / rotation_rad, 2));
   weight *= correspondences / independent_correspondences;
-  PoseTangent error;
-  error << at.T_map_lidar.linear() * deviation.head<3>(),
-      at.T_map_lidar.linear() * deviation.tail<3>();
-  const PoseTangent weighted = weight.cwiseProduct(error);
+  const PoseTangent weighted = weight.cwiseProduct(rotated(at.T_map_lidar.linear(), deviation));
   equations.hessian_sweep.diagonal() += weight;
   equations.hessian_pose_sweep.diagonal() -= share.cwiseProduct(weight);
   equations.hessian.diagonal() += share.cwiseAbs2().cwiseProduct(weight);
@@ -243,6 +246,45 @@ Matrix6d covariance_of(const NormalEquations& equations) {
   return information.ldlt().solve(Matrix6d::Identity());
 }
 
+/// Moves the pose, and with a `sweep_prior` the motion within the sweep, by one step. `equations`
+/// are those of the pose alone afterwards. Returns whether a direction is not observed.
+bool take_step(const SweepPrior* sweep_prior, const RegistrationConfig& limits,
+               NormalEquations& equations, OdometryResult& result) {
+  std::optional<SweepElimination> sweep;
+  if (sweep_prior) {
+    add_sweep_prior(*sweep_prior, result, limits, equations);
+    sweep.emplace(equations);
+    equations = sweep->reduced(equations);
+  }
+  const Step step = solve(equations, limits.min_observability);
+  PoseTangent sweep_step = PoseTangent::Zero();
+  if (sweep) {
+    const PoseTangent along_map = sweep->step(step.tangent);
+    sweep_step = rotated(result.T_map_lidar.linear().transpose(), along_map);
+    result.sweep_correction += sweep_step;
+  }
+  result.T_map_lidar = boxplus(result.T_map_lidar, step.tangent);
+  const auto is_small = [&](const PoseTangent& tangent) {
+    return tangent.head<3>().norm() < limits.step_translation_m &&
+           tangent.tail<3>().norm() < limits.step_rotation_rad;
+  };
+  result.converged = is_small(step.tangent) && is_small(0.5 * sweep_step);
+  return step.degenerate;
+}
+
+/// What the last iteration says of how well the scan lies on the map.
+void take_fit(std::span<const Correspondence> correspondences, const NormalEquations& equations,
+              OdometryResult& result) {
+  result.edge_correspondences = equations.edges;
+  result.plane_correspondences = equations.planes;
+  const auto known = static_cast<double>(std::ranges::count_if(
+      correspondences, [](const Correspondence& c) { return c.in_known_space; }));
+  result.upright_fit = equations.upright_scores / std::max(1.0, known - equations.on_level_planes);
+  const double count = std::max(1.0, static_cast<double>(correspondences.size()));
+  result.fit = equations.scores / count;
+  result.overlap = known / count;
+}
+
 }  // namespace
 
 OdometryResult lost_at(const Eigen::Isometry3d& T_map_lidar_predicted) {
@@ -289,38 +331,9 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
     equations =
         build_normal_equations(correspondences, edge_count, rolling, result.T_map_lidar, config);
     if (equations.count() < limits.min_correspondences) break;
-    std::optional<SweepElimination> sweep;
-    if (rolling) {
-      add_sweep_prior(features.sweep_prior, result, limits, equations);
-      sweep.emplace(equations);
-      equations = sweep->reduced(equations);
-    }
-    const Step step = solve(equations, limits.min_observability);
-    degenerate = step.degenerate;
-    PoseTangent sweep_step = PoseTangent::Zero();
-    if (sweep) {
-      const PoseTangent along_map = sweep->step(step.tangent);
-      sweep_step << result.T_map_lidar.linear().transpose() * along_map.head<3>(),
-          result.T_map_lidar.linear().transpose() * along_map.tail<3>();
-      result.sweep_correction += sweep_step;
-    }
-    result.T_map_lidar = boxplus(result.T_map_lidar, step.tangent);
-    const auto is_small = [&](const PoseTangent& tangent) {
-      return tangent.head<3>().norm() < limits.step_translation_m &&
-             tangent.tail<3>().norm() < limits.step_rotation_rad;
-    };
-    result.converged = is_small(step.tangent) && is_small(0.5 * sweep_step);
+    degenerate = take_step(rolling ? &features.sweep_prior : nullptr, limits, equations, result);
   }
-  result.edge_correspondences = equations.edges;
-  result.plane_correspondences = equations.planes;
-  const auto known =
-      std::ranges::count_if(all, [](const Correspondence& c) { return c.in_known_space; });
-  result.upright_fit =
-      equations.upright_scores /
-      std::max<double>(1.0, static_cast<double>(known - equations.on_level_planes));
-  const double features_in_all = std::max<double>(1.0, static_cast<double>(all.size()));
-  result.fit = equations.scores / features_in_all;
-  result.overlap = static_cast<double>(known) / features_in_all;
+  take_fit(all, equations, result);
   if (equations.count() < limits.min_correspondences || !result.T_map_lidar.matrix().allFinite()) {
     OdometryResult lost = lost_at(T_map_lidar_predicted);
     lost.iterations = result.iterations;

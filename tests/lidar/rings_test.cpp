@@ -91,6 +91,22 @@ TEST(RingsFromOrder, KnowsAScanOfTheFrontOnly) {
   EXPECT_LT(share_wrong(rings_from_order(ringed.scan, hdl_64e()), ringed.truth), 0.001);
 }
 
+TEST(RingsFromOrder, KnowsTheSeamOfACompensatedScan) {
+  // Compensated for 1.5 m straight ahead in a sweep that begins and ends at the rear: a ring comes
+  // together there with another slope, as if the next one began.
+  for (const double start : {0.0, pi}) {
+    RingedScan ringed = ring_after_ring(hdl_64e(), {.start_azimuth = start, .dropped = 0.1}, 5);
+    for (Eigen::Vector3f& p : ringed.scan.points_lidar) {
+      const double turns = std::atan2(p.y(), p.x()) / (2.0 * pi);
+      const float range_m = 4.0F + 0.5F * std::abs(p.z());
+      p = p.normalized() * range_m;
+      p.x() -= static_cast<float>(1.5 * turns);
+    }
+    EXPECT_LT(share_wrong(rings_from_order(ringed.scan, hdl_64e()), ringed.truth), 0.01)
+        << "start " << start;
+  }
+}
+
 TEST(RingsFromOrder, RefusesAFileStoredColumnByColumn) {
   RingedScan ringed = ring_after_ring(hdl_64e(), {});
   Scan by_column;

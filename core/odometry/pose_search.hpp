@@ -1,0 +1,57 @@
+#pragma once
+
+#include "core/odometry/registration.hpp"
+#include "core/odometry/se3.hpp"
+
+namespace stillmap {
+
+/// How well scans have lately fitted the local map: what a fit is judged by.
+class FitStatistics {
+ public:
+  /// A scan that was registered.
+  void add(const OdometryResult& result);
+
+  /// Whether enough fits are known to judge by.
+  [[nodiscard]] bool are_known() const;
+
+  /// Whether a scan lies as well on the local map as scans have lately: no other start is tried.
+  [[nodiscard]] bool fits(const OdometryResult& result) const;
+  /// Whether a pose can be believed; all can before enough fits are known.
+  [[nodiscard]] bool believes(const OdometryResult& result) const;
+  /// The same, where the scan was looked for all round: by what stands up in it alone.
+  [[nodiscard]] bool believes_relocalized(const OdometryResult& result) const;
+
+ private:
+  /// Running means of OdometryResult::fit and upright_fit.
+  double mean_fit_ = 0.0;
+  double mean_upright_fit_ = 0.0;
+  int count_ = 0;
+};
+
+/// The last scan that was registered.
+struct RegisteredScan {
+  FeatureSets features;
+  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+  /// Motion from the scan before it, and the time between them [s]; 0: there was none.
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+  double interval_s = 0.0;
+};
+
+/// Where the next scan is expected.
+struct PosePrediction {
+  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+  /// Time since the last registered scan [s].
+  double interval_s = 0.0;
+  /// A velocity or a prior tells it.
+  bool is_known = false;
+  /// Scans in a row before this one that could not be registered.
+  int lost_scans = 0;
+};
+
+/// All starts that may lead to the pose, the cheapest first, until one fits.
+[[nodiscard]] OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
+                                         const RegisteredScan& last,
+                                         const PosePrediction& prediction,
+                                         const FitStatistics& fits, const OdometryConfig& config);
+
+}  // namespace stillmap

@@ -1,0 +1,135 @@
+#include "core/dataset/kitti_lidar.hpp"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <random>
+
+namespace stillmap {
+namespace {
+
+constexpr double per_degree = std::numbers::pi / 180.0;
+
+/// How uneven the beams of KITTI's lidar are, roughly [deg].
+constexpr std::array<double, 64> uneven_deg{
+    0.11,  0.07,  0.14,  0.01,  0.06,  -0.02, 0.05,  0.0,   -0.01, -0.09, -0.04, -0.05, -0.09,
+    -0.08, -0.07, -0.08, -0.04, -0.08, -0.02, -0.05, -0.02, -0.02, -0.01, 0.0,   -0.03, -0.01,
+    0.02,  0.08,  0.04,  0.02,  0.12,  0.09,  -0.1,  -0.12, -0.09, 0.02,  0.05,  -0.06, -0.06,
+    0.01,  0.05,  0.12,  0.09,  0.06,  -0.02, 0.04,  0.04,  0.16,  0.04,  0.01,  -0.06, -0.02,
+    -0.03, 0.05,  0.1,   0.04,  0.03,  -0.1,  -0.07, 0.0,   0.06,  -0.08, -0.06, -0.08};
+
+struct Drawing {
+  bool is_uneven = true;
+  /// Deviation of a beam's azimuth from the even step [deg].
+  double azimuth_noise_deg = 0.07;
+  /// Straight ahead during the sweep; the points are compensated for it [m].
+  double way_m = 0.0;
+};
+
+/// Posts before a wall all round, stored ring after ring as KITTI stores them.
+Scan draw(const Drawing& drawing, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> noise(0.0, drawing.azimuth_noise_deg * per_degree);
+  Scan scan;
+  for (int ring = 0; ring < 64; ++ring) {
+    const double beam_deg = ring < 32 ? 2.0 - ring / 3.0 : -8.83 - (ring - 32) / 2.0;
+    const double offset_deg =
+        drawing.is_uneven ? uneven_deg.at(static_cast<std::size_t>(ring)) : 0.0;
+    const double elevation = (beam_deg + offset_deg) * per_degree;
+    for (int column = 0; column < 2000; ++column) {
+      const double azimuth = column * 0.18 * per_degree;
+      const bool is_post = column / 20 % 4 == 0;
+      const bool is_edge = column % 20 == 0;
+      const double range_m = is_post ? 6.0 : 20.0;
+      const double a = azimuth + (is_edge ? noise(random) : 0.0);
+      Eigen::Vector3d p(range_m * std::cos(a), range_m * std::sin(a),
+                        range_m * std::tan(elevation));
+      // Measured at -az / 2 pi of the sweep.
+      const double turns = std::remainder(a, 2.0 * std::numbers::pi) / (2.0 * std::numbers::pi);
+      p.x() -= turns * drawing.way_m;
+      scan.points_lidar.push_back(p.cast<float>());
+      scan.intensity.push_back(0.5F);
+    }
+  }
+  return scan;
+}
+
+std::optional<KittiLidar> recognised(const Drawing& drawing) {
+  const Scan scan = draw(drawing);
+  return recognise_kitti_lidar(std::span(&scan, 1), 0.1);
+}
+
+TEST(KittiLidar, IsRecognisedRollingAsInKittiRaw) {
+  const auto lidar = recognised({});
+  ASSERT_TRUE(lidar);
+  EXPECT_DOUBLE_EQ(lidar->sweep_duration_s, 0.1);
+}
+
+TEST(KittiLidar, IsRecognisedCompensatedAsInKittiOdometry) {
+  for (const double way_m : {0.15, 0.5, 1.5}) {
+    const auto lidar = recognised({.way_m = way_m});
+    ASSERT_TRUE(lidar) << way_m;
+    EXPECT_EQ(lidar->sweep_duration_s, 0.0) << way_m;
+  }
+}
+
+TEST(KittiLidar, IsNotSeenInOtherLidars) {
+  EXPECT_FALSE(recognised({.is_uneven = false}));
+  // Its beams, but turned by a simulator.
+  EXPECT_FALSE(recognised({.azimuth_noise_deg = 0.0}));
+  EXPECT_FALSE(recognise_kitti_lidar({}, 0.1));
+  const Scan empty;
+  EXPECT_FALSE(recognise_kitti_lidar(std::span(&empty, 1), 0.1));
+  Scan shuffled = draw({});
+  std::mt19937 random(3);
+  std::ranges::shuffle(shuffled.points_lidar, random);
+  EXPECT_FALSE(recognise_kitti_lidar(std::span(&shuffled, 1), 0.1));
+}
+
+TEST(AzimuthSteps, TellTheWayThatWasCompensatedFor) {
+  for (const double way_m : {0.0, 0.3, 1.0, -0.5}) {
+    const auto steps = azimuth_steps(draw({.way_m = way_m}));
+    ASSERT_TRUE(steps);
+    EXPECT_NEAR(steps->compensated_m, way_m, 0.03 + 0.05 * std::abs(way_m));
+  }
+}
+
+TEST(AzimuthSteps, NeedJumpsInRange) {
+  Scan wall;
+  for (int i = 0; i < 2000; ++i) {
+    const double a = i * 0.18 * per_degree;
+    wall.points_lidar.emplace_back(10.0 * std::cos(a), 10.0 * std::sin(a), 0.0);
+  }
+  EXPECT_FALSE(azimuth_steps(wall));
+}
+
+TEST(KittiLidar, TurnsPointsUpAndGivesThemTimes) {
+  Scan scan = draw({});
+  scan.points_lidar.emplace_back(0.0F, 0.0F, 0.0F);
+  const Scan before = scan;
+  KittiLidar{.sweep_duration_s = 0.1}.correct(scan);
+  ASSERT_EQ(scan.time_offset_s.size(), scan.size());
+  for (std::size_t i = 0; i + 1 < scan.size(); i += 997) {
+    const Eigen::Vector3f &p = scan.points_lidar[i], &q = before.points_lidar[i];
+    EXPECT_NEAR(p.norm(), q.norm(), 1e-4);
+    EXPECT_NEAR(std::atan2(p.y(), p.x()), std::atan2(q.y(), q.x()), 1e-5);
+    const auto elevation = [](const Eigen::Vector3f& v) {
+      return std::atan2(v.z(), v.head<2>().norm());
+    };
+    EXPECT_NEAR(elevation(p) - elevation(q), 0.205 * per_degree, 1e-5);
+    EXPECT_NEAR(scan.time_offset_s[i], -0.1 * std::atan2(p.y(), p.x()) / (2.0 * std::numbers::pi),
+                1e-6);
+  }
+}
+
+TEST(KittiLidar, LeavesCompensatedScansWithoutTimes) {
+  Scan scan = draw({});
+  KittiLidar{}.correct(scan);
+  EXPECT_TRUE(scan.time_offset_s.empty());
+}
+
+}  // namespace
+}  // namespace stillmap
