@@ -16,10 +16,11 @@ constexpr int max_repetitions = 10;
 constexpr double max_rate_rad_s = 70.0;
 constexpr double max_acceleration_m_s2 = 320.0;
 
-/// A steady lidar's rates and accelerations vary by less (standard deviation [rad/s], and as a
-/// share of their mean).
-constexpr double max_steady_rate_deviation = 0.03;
-constexpr double max_steady_acceleration_share = 0.05;
+/// A lidar rests when rates and accelerations vary by no more than a sensor's noise (standard
+/// deviation [rad/s], and as a share of their mean): whatever drives vibrates more, and its
+/// acceleration would be taken for a tilt.
+constexpr double max_steady_rate_deviation = 0.01;
+constexpr double max_steady_acceleration_share = 0.01;
 /// And turns slower than this [rad/s].
 constexpr double max_steady_rate = 0.1;
 constexpr std::ptrdiff_t min_steady_samples = 10;

@@ -10,7 +10,7 @@ constexpr double sweep_step_s = 0.0025;
 constexpr int max_sweep_steps = 400;
 /// Up is the mean over this time.
 constexpr std::int64_t up_window_ns = 500'000'000;
-/// The lidar rests, or goes straight on, when it turns by less than this from pose to pose, and the
+/// The lidar rests when it turns by less than this from pose to pose, and the
 /// rate is a bias when it is the mean over at least this time [rad, s].
 constexpr double max_rest_rotation_rad = 0.0015;
 constexpr double min_rest_s = 0.08;

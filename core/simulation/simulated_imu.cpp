@@ -40,6 +40,12 @@ Eigen::Vector3d true_acceleration(const Simulation& simulation, double time_s) {
          (acceleration_map + gravity_m_s2 * Eigen::Vector3d::UnitZ());
 }
 
+double speed_at(const Simulation& simulation, double time_s) {
+  constexpr double window_s = 0.1;
+  const Eigen::Vector3d from = simulation.T_map_lidar_at(time_s).translation();
+  return (simulation.T_map_lidar_at(time_s + window_s).translation() - from).norm() / window_s;
+}
+
 }  // namespace
 
 std::vector<ImuSample> simulated_imu(const Simulation& simulation, const ImuErrors& errors,
@@ -64,9 +70,10 @@ std::vector<ImuSample> simulated_imu(const Simulation& simulation, const ImuErro
     sample.stamp_ns = std::llround((time_s + mount.time_offset_s) * 1e9);
     sample.angular_velocity_imu = R_imu_lidar * true_rate(simulation, time_s, step_s) + gyro_bias +
                                   errors.gyro_noise * random_vector(random);
-    sample.acceleration_imu = R_imu_lidar * true_acceleration(simulation, time_s) +
-                              accelerometer_bias +
-                              errors.accelerometer_noise * random_vector(random);
+    sample.acceleration_imu =
+        R_imu_lidar * true_acceleration(simulation, time_s) + accelerometer_bias +
+        (errors.accelerometer_noise + errors.vibration * speed_at(simulation, time_s)) *
+            random_vector(random);
     samples.push_back(sample);
   }
   return samples;

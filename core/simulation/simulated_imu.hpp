@@ -16,6 +16,8 @@ struct ImuErrors {
   /// Noise of a sample: standard deviations [rad/s, m/s^2].
   double gyro_noise = 0.002;
   double accelerometer_noise = 0.02;
+  /// Vibration of whatever drives: acceleration for each m/s of speed [1/s].
+  double vibration = 0.05;
   /// Largest constant error of an axis [rad/s, m/s^2].
   double gyro_bias = 0.008;
   double accelerometer_bias = 0.05;
