@@ -36,6 +36,7 @@ Mapper::Mapper(const MapperConfig& config, std::unique_ptr<SegmentationPipeline>
     : config_(checked(config)),
       listeners_(std::move(listeners)),
       label_synchronizer_(std::move(segmentation), config.sensor),
+      inertial_(config.sensor.imu),
       odometry_(config.odometry, config.sensor),
       static_map_(config.static_map) {}
 
@@ -55,16 +56,21 @@ std::optional<MappedScan> Mapper::process(
   // Deskew, and labels for the points where they are now expected.
   if (!config_.prepare.deskew) scan.time_offset_s.clear();
   const SweepTimes sweep = sweep_times(scan, config_.sensor.period_s);
-  deskew_to_middle(scan, sweep, odometry_.motion_during(sweep.duration_s));
-  const Eigen::Isometry3d T_map_lidar_expected = T_map_lidar_prior.value_or(
-      odometry_.predict(scan.stamp_ns + std::llround(sweep.middle_s * 1e9)));
+  const std::int64_t middle_ns = scan.stamp_ns + std::llround(sweep.middle_s * 1e9);
+  const std::optional<InertialMotion> inertial = inertial_motion(scan.stamp_ns, sweep);
+  odometry_.sweep_motion(sweep, inertial).move_to_middle(scan, sweep);
+  const auto T_map_lidar_known = levelled(T_map_lidar_prior, scan.stamp_ns, sweep);
+  const Eigen::Isometry3d T_map_lidar_expected =
+      T_map_lidar_known.value_or(odometry_.predict(middle_ns, inertial));
   LabelSynchronizer::Labels labels = label_synchronizer_.labels_for(
       scan, std::move(submission), T_map_lidar_expected, static_map_);
   end_stage("segment");
 
   // Register: the pose, and what moves.
   add_prior_map_near(T_map_lidar_expected.translation());
-  Odometry::Step step = odometry_.register_scan(scan, sweep, labels.labels, T_map_lidar_prior);
+  Odometry::Step step =
+      odometry_.register_scan(scan, sweep, labels.labels, T_map_lidar_known, inertial);
+  teach_inertial(middle_ns, step);
   end_stage("odometry");
   if (listeners_.pose_found) listeners_.pose_found(scan.stamp_ns, step.result);
 
@@ -78,6 +84,33 @@ std::optional<MappedScan> Mapper::process(
   trajectory_.push_back({mapped.labelled.scan.stamp_ns, step.result.T_map_lidar});
   end_stage("static_map");
   return mapped;
+}
+
+std::optional<InertialMotion> Mapper::inertial_motion(std::int64_t stamp_ns,
+                                                      const SweepTimes& sweep) {
+  if (!last_middle_) return std::nullopt;
+  return inertial_.motion(last_middle_->stamp_ns, stamp_ns, sweep);
+}
+
+std::optional<Eigen::Isometry3d> Mapper::levelled(
+    const std::optional<Eigen::Isometry3d>& T_map_lidar_prior, std::int64_t stamp_ns,
+    const SweepTimes& sweep) const {
+  const bool begins_map = trajectory_.empty() && resumed_tiles_.empty();
+  if (T_map_lidar_prior || !begins_map) return T_map_lidar_prior;
+  const auto up_lidar =
+      inertial_.up_lidar(stamp_ns + std::llround((sweep.middle_s + 0.5 * sweep.duration_s) * 1e9));
+  if (!up_lidar) return std::nullopt;
+  return Eigen::Isometry3d(Eigen::Quaterniond::FromTwoVectors(*up_lidar, Eigen::Vector3d::UnitZ()));
+}
+
+void Mapper::teach_inertial(std::int64_t middle_ns, const Odometry::Step& step) {
+  if (step.result.health == OdometryHealth::lost) return inertial_.forget_motion();
+  const Eigen::Isometry3d& T_map_lidar = step.T_map_lidar_middle;
+  if (last_middle_ && step.result.health == OdometryHealth::good) {
+    inertial_.learn(last_middle_->stamp_ns, middle_ns,
+                    last_middle_->T_map_lidar.linear().transpose() * T_map_lidar.linear());
+  }
+  last_middle_ = StampedPose{middle_ns, T_map_lidar};
 }
 
 bool Mapper::accepts(const Scan& scan) {
@@ -155,6 +188,8 @@ void Mapper::clear_scan_state() {
   odometry_.reset();
   label_synchronizer_.reset();
   trajectory_.clear();
+  last_middle_.reset();
+  inertial_.forget_motion();
   clock_ = {};
   resumed_tiles_.clear();
   prior_map_added_at_map_.reset();

@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "core/inertial/inertial_tracker.hpp"
 #include "core/label_synchronizer.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/prepare.hpp"
@@ -91,6 +92,11 @@ class Mapper {
   [[nodiscard]] std::optional<MappedScan> process(
       Scan raw_scan, const std::optional<Eigen::Isometry3d>& T_map_lidar_prior = std::nullopt);
 
+  /// A sample of the IMU, before the scans whose sweeps end after it. Without samples, or where
+  /// they are wrong, scans are mapped by what the scans themselves say.
+  void add(const ImuSample& sample) { inertial_.add(sample); }
+  [[nodiscard]] const InertialTracker& inertial() const { return inertial_; }
+
   [[nodiscard]] const ScanRejection& last_rejection() const { return last_rejection_; }
   [[nodiscard]] const Trajectory& trajectory() const { return trajectory_; }
   [[nodiscard]] std::string label_source() const { return label_synchronizer_.name(); }
@@ -119,11 +125,22 @@ class Mapper {
   void add_prior_map_near(const Eigen::Vector3d& position_map);
   [[nodiscard]] bool accepts(const Scan& scan);
   [[nodiscard]] bool has_enough_points(const Scan& scan);
+  /// The prior, or for the first scan of a new map the attitude that the IMU tells: map's z is up.
+  [[nodiscard]] std::optional<Eigen::Isometry3d> levelled(
+      const std::optional<Eigen::Isometry3d>& T_map_lidar_prior, std::int64_t stamp_ns,
+      const SweepTimes& sweep) const;
+  /// Rotation by the IMU from the last pose on.
+  [[nodiscard]] std::optional<InertialMotion> inertial_motion(std::int64_t stamp_ns,
+                                                              const SweepTimes& sweep);
+  void teach_inertial(std::int64_t middle_ns, const Odometry::Step& step);
   void end_stage(std::string_view stage) const;
 
   MapperConfig config_;
   MapperListeners listeners_;
   LabelSynchronizer label_synchronizer_;
+  InertialTracker inertial_;
+  /// Of the last scan that was registered, in the middle of its sweep.
+  std::optional<StampedPose> last_middle_;
   Odometry odometry_;
   StaticMap static_map_;
   /// Tiles of a resumed map, and where their points were last added to the odometry's local map.

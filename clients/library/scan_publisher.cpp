@@ -1,7 +1,11 @@
 #include "clients/library/scan_publisher.hpp"
 
+#include <cassert>
+#include <optional>
+
 #include "clients/library/connection.hpp"
 #include "clients/library/tcp_rejoin_backoff.hpp"
+#include "idl/conversions/imu.hpp"
 #include "idl/conversions/pose.hpp"
 #include "idl/conversions/to_cloud.hpp"
 #include "idl/dds/writer.hpp"
@@ -16,6 +20,7 @@ struct ScanPublisher::Connection {
         topic(topic_of(options)),
         writer(*own, topic.dds_name, topic.writer) {
     publish_mount(*own);
+    open_imu(*own);
   }
 
   Connection(dds::Participant& shared, const ScanPublisherOptions& publisher_options)
@@ -31,6 +36,7 @@ struct ScanPublisher::Connection {
     mount_writer.emplace(participant, tf_static.dds_name, tf_static.writer);
     // A keep-last writer always has room, and keeps it for subscribers that come later.
     static_cast<void>(mount_writer->write(wire::to_tf(0, {*options.mount})));
+    open_imu(shared);
   }
 
   static dds::TopicSpec<sensor_msgs::msg::PointCloud2> topic_of(
@@ -40,12 +46,20 @@ struct ScanPublisher::Connection {
                              options.max_scans_in_flight);
   }
 
+  void open_imu(dds::Participant& participant) {
+    if (options.imu_topic.empty()) return;
+    const auto imu = dds::imu_topic(options.imu_topic,
+                                    options.lossless ? DeliveryMode::every : DeliveryMode::latest);
+    imu_writer.emplace(participant, imu.dds_name, imu.writer);
+  }
+
   ScanPublisherOptions options;
   bool has_written = false;
   std::unique_ptr<dds::Participant> own;
   dds::TopicSpec<sensor_msgs::msg::PointCloud2> topic;
   dds::Writer<sensor_msgs::msg::PointCloud2> writer;
   std::optional<dds::Writer<tf2_msgs::msg::TFMessage>> mount_writer;
+  std::optional<dds::Writer<sensor_msgs::msg::Imu>> imu_writer;
 };
 
 ScanPublisher::ScanPublisher(const ScanPublisherOptions& options)
@@ -75,6 +89,10 @@ bool ScanPublisher::wait_for_subscriber(std::chrono::milliseconds timeout) {
   return true;
 }
 
+bool ScanPublisher::wait_for_imu_subscriber(std::chrono::milliseconds timeout) {
+  return connection_->imu_writer && connection_->imu_writer->readers().wait_for_any(timeout);
+}
+
 int ScanPublisher::subscribers() const { return connection_->writer.readers().count(); }
 
 bool ScanPublisher::publish(const Scan& scan, std::span<const std::uint32_t> raw_labels,
@@ -87,6 +105,23 @@ bool ScanPublisher::publish(const Scan& scan, std::span<const std::uint32_t> raw
     if (std::chrono::steady_clock::now() >= deadline) return false;
   }
   return true;
+}
+
+std::size_t ScanPublisher::publish(std::span<const ImuSample> samples,
+                                   std::chrono::milliseconds timeout) {
+  assert(connection_->imu_writer);
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  connection_->has_written = true;
+  std::size_t written = 0;
+  while (written < samples.size()) {
+    const auto message = wire::to_imu(samples[written], connection_->options.imu_frame);
+    if (connection_->imu_writer->write(message)) {
+      ++written;
+    } else if (std::chrono::steady_clock::now() >= deadline) {
+      break;
+    }
+  }
+  return written;
 }
 
 bool ScanPublisher::wait_for_all_acknowledged(std::chrono::milliseconds timeout) {

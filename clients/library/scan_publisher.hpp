@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/frames/frame_tree.hpp"
+#include "core/inertial/imu_sample.hpp"
 #include "core/lidar/scan.hpp"
 #include "idl/dds/dds_options.hpp"
 
@@ -20,10 +21,14 @@ struct ScanPublisherOptions {
   dds::DdsOptions dds;
   /// ROS 2 name of the topic, without "rt/".
   std::string points_topic = "points";
+  /// ROS 2 name of the IMU's topic; empty: no samples are published.
+  std::string imu_topic;
   /// header.frame_id of the clouds.
   std::string lidar_frame = "lidar";
   /// Published on /tf_static, as a robot does: where the lidar sits.
   std::optional<FrameTransform> mount = std::nullopt;
+  /// header.frame_id of the IMU's samples.
+  std::string imu_frame = "imu";
   /// Keep every scan until the server took it (needs a server with `delivery: every`); otherwise a
   /// newer scan may overtake an untaken one.
   bool lossless = false;
@@ -31,7 +36,8 @@ struct ScanPublisherOptions {
   int max_scans_in_flight = 4;
 };
 
-/// Publishes scans as sensor_msgs/PointCloud2, as a lidar driver does. One thread uses it.
+/// Publishes scans as sensor_msgs/PointCloud2, as a lidar driver does, and samples of the IMU
+/// beside it as sensor_msgs/Imu. One thread uses it.
 class ScanPublisher {
  public:
   /// Joins the domain. Throws DdsError when the domain or an interface cannot be used.
@@ -50,6 +56,10 @@ class ScanPublisher {
   /// and then throws as the constructor does.
   [[nodiscard]] bool wait_for_subscriber(std::chrono::milliseconds timeout);
 
+  /// True once a subscriber of the IMU's samples matched; false after `timeout`, or where the
+  /// options name no topic for them.
+  [[nodiscard]] bool wait_for_imu_subscriber(std::chrono::milliseconds timeout);
+
   /// Subscribers matched now.
   [[nodiscard]] int subscribers() const;
 
@@ -60,6 +70,11 @@ class ScanPublisher {
   /// nothing was written, and the caller may ask again.
   [[nodiscard]] bool publish(const Scan& scan, std::span<const std::uint32_t> raw_labels = {},
                              std::chrono::milliseconds timeout = std::chrono::seconds(10));
+
+  /// Writes samples of the IMU; the options must name its topic. Lossless: waits as for a scan, and
+  /// returns how many were written before the timeout.
+  [[nodiscard]] std::size_t publish(std::span<const ImuSample> samples,
+                                    std::chrono::milliseconds timeout = std::chrono::seconds(10));
 
   /// True once every subscriber acknowledged every scan written; false after `timeout`.
   [[nodiscard]] bool wait_for_all_acknowledged(std::chrono::milliseconds timeout);

@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/emitter.h>
 
+#include <Eigen/Geometry>
 #include <cassert>
 #include <fstream>
 #include <map>
@@ -40,6 +41,27 @@ std::string ring_source_name(RingSource wanted) {
   return {};
 }
 
+/// Roll about x, then pitch about y, then yaw about z, all axes fixed, as URDF and
+/// static_transform_publisher have them.
+Eigen::Matrix3d rotation_of(const std::vector<double>& roll_pitch_yaw) {
+  return (Eigen::AngleAxisd(roll_pitch_yaw[2], Eigen::Vector3d::UnitZ()) *
+          Eigen::AngleAxisd(roll_pitch_yaw[1], Eigen::Vector3d::UnitY()) *
+          Eigen::AngleAxisd(roll_pitch_yaw[0], Eigen::Vector3d::UnitX()))
+      .toRotationMatrix();
+}
+
+void read_imu(YamlSection section, std::optional<ImuMount>& imu) {
+  std::vector<double> roll_pitch_yaw;
+  double time_offset_s = 0.0;
+  section.degrees_list("roll_pitch_yaw_deg", roll_pitch_yaw, {-360, 360});
+  section.number("time_offset_s", time_offset_s, {-0.15, 0.15});
+  if (roll_pitch_yaw.size() == 3) {
+    imu = ImuMount{.R_lidar_imu = rotation_of(roll_pitch_yaw), .time_offset_s = time_offset_s};
+  } else if (!roll_pitch_yaw.empty() || time_offset_s != 0.0) {
+    section.fault("roll_pitch_yaw_deg", "needs three angles: the IMU's axes in the lidar's frame");
+  }
+}
+
 void read_sensor(YamlSection& file, SensorModel& sensor) {
   file.require({"name", "rings", "fov_up_deg", "fov_down_deg"});
   file.text("name", sensor.name);
@@ -53,6 +75,7 @@ void read_sensor(YamlSection& file, SensorModel& sensor) {
   file.number("period_s", sensor.period_s, {0.001, 60});
   file.choice<RingSource>("ring_source", sensor.ring_source, ring_sources());
   file.number("intensity_scale", sensor.intensity_scale, {1e-9, 1e9});
+  read_imu(file.section("imu"), sensor.imu);
   file.faults(sensor.faults());
 }
 
@@ -73,7 +96,16 @@ void save_sensor(const SensorModel& sensor, const fs::path& file) {
   yaml << YAML::Key << "max_range_m" << YAML::Value << sensor.max_range_m;
   yaml << YAML::Key << "period_s" << YAML::Value << sensor.period_s;
   yaml << YAML::Key << "ring_source" << YAML::Value << ring_source_name(sensor.ring_source);
-  yaml << YAML::Key << "intensity_scale" << YAML::Value << sensor.intensity_scale << YAML::EndMap;
+  yaml << YAML::Key << "intensity_scale" << YAML::Value << sensor.intensity_scale;
+  if (sensor.imu) {
+    const Eigen::Vector3d yaw_pitch_roll = sensor.imu->R_lidar_imu.eulerAngles(2, 1, 0) / degree;
+    yaml << YAML::Key << "imu" << YAML::Value << YAML::BeginMap;
+    yaml << YAML::Key << "roll_pitch_yaw_deg" << YAML::Value << YAML::Flow << YAML::BeginSeq
+         << yaw_pitch_roll[2] << yaw_pitch_roll[1] << yaw_pitch_roll[0] << YAML::EndSeq;
+    yaml << YAML::Key << "time_offset_s" << YAML::Value << sensor.imu->time_offset_s
+         << YAML::EndMap;
+  }
+  yaml << YAML::EndMap;
   std::ofstream out(file);
   out << yaml.c_str() << '\n';
   if (!out.flush()) throw std::runtime_error(file.string() + ": cannot be written");

@@ -169,6 +169,7 @@ void read_topics(YamlSection section, TopicsConfig& topics) {
   section.text("points", topics.points);
   section.text("namespace", topics.name_space);
   section.text("odometry_prior", topics.odometry_prior);
+  section.text("imu", topics.imu);
   if (!is_topic_name(topics.points))
     section.fault("points", "'" + topics.points + "'" + topic_rule);
   if (!is_topic_name(topics.name_space)) {
@@ -176,6 +177,9 @@ void read_topics(YamlSection section, TopicsConfig& topics) {
   }
   if (!topics.odometry_prior.empty() && !is_topic_name(topics.odometry_prior)) {
     section.fault("odometry_prior", "'" + topics.odometry_prior + "'" + topic_rule);
+  }
+  if (!topics.imu.empty() && !is_topic_name(topics.imu)) {
+    section.fault("imu", "'" + topics.imu + "'" + topic_rule);
   }
 }
 

@@ -108,6 +108,8 @@ struct TopicsConfig {
   std::string name_space = "stillmap";
   /// A nav_msgs/Odometry whose motion predicts the next pose; empty: constant velocity.
   std::string odometry_prior = "odom_prior";
+  /// A sensor_msgs/Imu fixed to the lidar; empty: none.
+  std::string imu = "imu/data";
 };
 
 /// What the numbers in a cloud's label field are.

@@ -11,6 +11,7 @@
 
 #include "core/dataset/binary_file.hpp"
 #include "core/dataset/file_stamp.hpp"
+#include "core/dataset/imu_file.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/point_cloud_files.hpp"
 #include "core/lidar/point_fields.hpp"
@@ -245,6 +246,12 @@ DatasetFrame ScanDataset::read(std::size_t i) const {
   if (kitti_lidar_) kitti_lidar_->correct(frame.scan);
   frame.scan.labels = reduced_classes(frame.raw_labels);
   return frame;
+}
+
+std::vector<ImuSample> ScanDataset::imu() const {
+  if (source_) return source_->imu();
+  const fs::path file = imu_file_in(sequence_.empty() ? files_.front().parent_path() : sequence_);
+  return file.empty() ? std::vector<ImuSample>{} : read_imu_file(file);
 }
 
 std::optional<Trajectory> ScanDataset::truth() const {

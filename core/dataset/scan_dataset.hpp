@@ -48,6 +48,11 @@ class ScanDataset {
   /// frame and there is no calib.txt.
   [[nodiscard]] std::optional<Trajectory> truth() const;
 
+  /// Samples of an IMU by the scans' clock: imu.csv or imu.txt beside velodyne/ or the scans' files
+  /// (see read_imu_file), or those of the source; empty without any. Throws DatasetError when the
+  /// file is damaged.
+  [[nodiscard]] std::vector<ImuSample> imu() const;
+
   /// A guess from the kind of file and the first scan's rings or elevations.
   [[nodiscard]] SensorModel suggested_sensor() const { return suggested_sensor_; }
 

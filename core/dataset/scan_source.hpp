@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/inertial/imu_sample.hpp"
 #include "core/lidar/scan.hpp"
 #include "core/lidar/sensor_model.hpp"
 
@@ -37,6 +38,9 @@ class ScanSource {
   [[nodiscard]] virtual DatasetFrame read(std::size_t i) const = 0;
   /// Nothing where the source does not tell which sensor it was.
   [[nodiscard]] virtual std::optional<SensorModel> sensor() const = 0;
+  /// Samples of the IMU that was recorded beside the scans, in the order of the recording; empty
+  /// without one.
+  [[nodiscard]] virtual std::vector<ImuSample> imu() const { return {}; }
 };
 
 }  // namespace stillmap

@@ -1,7 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
+
+#include "core/lidar/imu_mount.hpp"
 
 namespace stillmap {
 
@@ -35,6 +38,9 @@ struct SensorModel {
   /// Factor that brings the intensity of a live cloud to 0..1 (1/255 for a Velodyne's PointCloud2).
   /// Files read through ScanDataset are 0..1 already.
   float intensity_scale = 1.0F;
+  /// Of the IMU whose samples come beside the scans. Where it is not known, the IMU is taken to
+  /// have the lidar's axes as far as that proves true, and tells nothing of gravity.
+  std::optional<ImuMount> imu;
 
   /// Every fault in words, one a line; empty when the model can be used.
   [[nodiscard]] std::string faults() const;

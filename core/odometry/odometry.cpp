@@ -93,6 +93,14 @@ struct Odometry::State {
   /// taken for a fault of the clock, and the time for a multiple of the sensor's period.
   [[nodiscard]] double interval_to(std::int64_t stamp_ns) const;
   [[nodiscard]] Eigen::Isometry3d motion_during(double period_s) const;
+  /// The IMU's rotation once the first scans have told the velocity; before that the first scan is
+  /// straightened without it. The paper has none.
+  [[nodiscard]] bool follows(const std::optional<InertialMotion>& inertial) const {
+    return inertial && started && !first_scan && !config.paper_exact;
+  }
+  /// motion_during() since the last pose, turned as the IMU says.
+  [[nodiscard]] Eigen::Isometry3d motion_to_middle(
+      double interval_s, const std::optional<InertialMotion>& inertial) const;
   /// Finds features, objects and the range image of a scan, and what its objects do, seen from the
   /// predicted pose.
   void take_apart(ScanInParts& parts, const PosePrediction& prediction) const;
@@ -107,7 +115,7 @@ struct Odometry::State {
   [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
                                              const PosePrediction& prediction) const;
   [[nodiscard]] SweepPrior sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,
-                                       const Eigen::Isometry3d& T_sweep) const;
+                                       const SweepMotion& motion) const;
   void extend_map(const ScanInParts& parts, const Step& step,
                   const Eigen::Isometry3d& T_map_middle);
   /// Builds the local map anew from the first scan, compensated for the motion that the second one
@@ -169,6 +177,15 @@ Eigen::Isometry3d Odometry::State::motion_during(double period_s) const {
   if (last.interval_s <= 0.0 || period_s <= 0.0 || period_s > max_prediction_s)
     return Eigen::Isometry3d::Identity();
   return scaled_motion(last.motion, period_s / last.interval_s);
+}
+
+Eigen::Isometry3d Odometry::State::motion_to_middle(
+    double interval_s, const std::optional<InertialMotion>& inertial) const {
+  const Eigen::Isometry3d T_last_middle = motion_during(interval_s);
+  if (!follows(inertial)) return T_last_middle;
+  PoseTangent twist = twist_of(T_last_middle);
+  twist.tail<3>() = so3_log(inertial->R_last_middle);
+  return motion_of(twist);
 }
 
 OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
@@ -311,14 +328,15 @@ void Odometry::State::straighten_first_scan(const FeatureSets& features, std::in
 }
 
 SweepPrior Odometry::State::sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,
-                                        const Eigen::Isometry3d& T_sweep) const {
+                                        const SweepMotion& motion) const {
   SweepPrior prior;
   if (!started) return prior;
   prior.T_map_lidar_last = last.T_map_lidar;
   const double interval_s = interval_to(time_ns);
   if (interval_s > 0.0 && interval_s < max_prediction_s)
     prior.duration_share = std::min(1.0, sweep.duration_s / interval_s);
-  prior.compensated = twist_of(T_sweep);
+  prior.compensated = motion.twist();
+  prior.rotation_is_measured = motion.rotation_is_measured();
   return prior;
 }
 
@@ -342,8 +360,17 @@ Odometry::~Odometry() = default;
 Odometry::Odometry(Odometry&&) noexcept = default;
 Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 
-Eigen::Isometry3d Odometry::predict(std::int64_t stamp_ns) const {
-  return state_->last.T_map_lidar * motion_during(seconds(stamp_ns - state_->last_stamp_ns));
+Eigen::Isometry3d Odometry::predict(std::int64_t stamp_ns,
+                                    const std::optional<InertialMotion>& inertial) const {
+  const double interval_s = seconds(stamp_ns - state_->last_stamp_ns);
+  return state_->last.T_map_lidar * state_->motion_to_middle(interval_s, inertial);
+}
+
+SweepMotion Odometry::sweep_motion(const SweepTimes& sweep,
+                                   const std::optional<InertialMotion>& inertial) const {
+  const Eigen::Isometry3d T_start_end = motion_during(sweep.duration_s);
+  if (!state_->follows(inertial)) return SweepMotion(T_start_end);
+  return {twist_of(T_start_end).head<3>(), inertial->R_middle_at};
 }
 
 Eigen::Isometry3d Odometry::motion_during(double period_s) const {
@@ -352,16 +379,18 @@ Eigen::Isometry3d Odometry::motion_during(double period_s) const {
 
 Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
                                        const PointLabels& labels,
-                                       const std::optional<Eigen::Isometry3d>& T_map_lidar_prior) {
+                                       const std::optional<Eigen::Isometry3d>& T_map_lidar_prior,
+                                       const std::optional<InertialMotion>& inertial) {
   assert(labels.empty() || labels.classes.size() == scan.size());
   State& state = *state_;
   const OdometryConfig& config = state.config;
   const std::int64_t time_ns = scan.stamp_ns + std::llround(sweep.middle_s * 1e9);
-  const Eigen::Isometry3d T_sweep = motion_during(sweep.duration_s);
+  const SweepMotion expected_motion = sweep_motion(sweep, inertial);
   const double stamp_part = sweep.duration_s > 0.0 ? -sweep.middle_s / sweep.duration_s : 0.0;
   const Eigen::Isometry3d T_map_lidar_predicted =
-      T_map_lidar_prior ? *T_map_lidar_prior * scaled_motion(T_sweep, stamp_part).inverse()
-                        : state.last.T_map_lidar * motion_during(state.interval_to(time_ns));
+      T_map_lidar_prior
+          ? *T_map_lidar_prior * expected_motion.T_middle_at(stamp_part).inverse()
+          : state.last.T_map_lidar * state.motion_to_middle(state.interval_to(time_ns), inertial);
 
   // Features F_e and F_p, without those on objects that may be moving.
   const PosePrediction prediction{.T_map_lidar = T_map_lidar_predicted,
@@ -370,7 +399,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
                                   .lost_scans = state.lost_scans};
   ScanInParts parts{.scan = scan, .sweep = sweep, .labels = labels};
   state.take_apart(parts, prediction);
-  parts.sweep_prior = state.sweep_prior(time_ns, sweep, T_sweep);
+  parts.sweep_prior = state.sweep_prior(time_ns, sweep, expected_motion);
 
   // Pose against the local map, eq. (5)-(13), at the middle of the sweep.
   Step step;
@@ -381,6 +410,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   const Eigen::Isometry3d T_map_middle = step.result.T_map_lidar;
   const Eigen::Isometry3d T_correction = motion_of(step.result.sweep_correction);
   deskew_to_middle(scan, sweep, T_correction);
+  step.T_map_lidar_middle = T_map_middle;
 
   // Moving points stay out of the local map, eq. (9) and c > c_th.
   step.motion = classify_point_motion(scan, labels, parts.objects, parts.motion_classes,
@@ -398,7 +428,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   // What users see is at the stamp.
   if (sweep.middle_s != 0.0) {
     const Eigen::Isometry3d T_middle_stamp =
-        scaled_motion(T_correction, stamp_part) * scaled_motion(T_sweep, stamp_part);
+        scaled_motion(T_correction, stamp_part) * expected_motion.T_middle_at(stamp_part);
     move_points(scan, T_middle_stamp.inverse());
     step.result.T_map_lidar = T_map_middle * T_middle_stamp;
   }

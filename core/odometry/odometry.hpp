@@ -7,12 +7,14 @@
 #include <string>
 #include <vector>
 
+#include "core/inertial/inertial_motion.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/odometry/feature_map.hpp"
 #include "core/odometry/odometry_config.hpp"
 #include "core/odometry/odometry_state.hpp"
+#include "core/odometry/sweep_motion.hpp"
 
 namespace stillmap {
 
@@ -28,23 +30,32 @@ class Odometry {
 
   /// Motion that the next scan is expected to bring: the last one again (constant velocity), scaled
   /// to the time that passed.
-  [[nodiscard]] Eigen::Isometry3d predict(std::int64_t stamp_ns) const;
+  [[nodiscard]] Eigen::Isometry3d predict(
+      std::int64_t stamp_ns, const std::optional<InertialMotion>& inertial = std::nullopt) const;
 
   /// Motion of the lidar during `period_s` at the last velocity, for motion compensation.
   [[nodiscard]] Eigen::Isometry3d motion_during(double period_s) const;
+
+  /// Motion within the next sweep: its rotation by the IMU where there is one, all else by the last
+  /// velocity.
+  [[nodiscard]] SweepMotion sweep_motion(
+      const SweepTimes& sweep, const std::optional<InertialMotion>& inertial = std::nullopt) const;
 
   struct Step {
     OdometryResult result;
     /// Motion of every point of the scan (II-C.2).
     std::vector<Motion> motion;
+    /// Pose of the lidar in the middle of the sweep.
+    Eigen::Isometry3d T_map_lidar_middle = Eigen::Isometry3d::Identity();
   };
 
   /// Registers a prepared scan, splits its points by motion, and adds it to the local map.
   /// `scan.ring` must be known. The points come moved to the middle of the sweep by
-  /// motion_during(sweep.duration_s), with their times; they leave as if measured at the stamp,
-  /// where the result's pose is, by the motion that was found, and without times.
+  /// sweep_motion(), with their times; they leave as if measured at the stamp, where the result's
+  /// pose is, by the motion that was found, and without times.
   [[nodiscard]] Step register_scan(Scan& scan, const SweepTimes& sweep, const PointLabels& labels,
-                                   const std::optional<Eigen::Isometry3d>& T_map_lidar_prior);
+                                   const std::optional<Eigen::Isometry3d>& T_map_lidar_prior,
+                                   const std::optional<InertialMotion>& inertial = std::nullopt);
 
   /// Adds points of a map made earlier (map frame) to the local map. Before the first scan: that
   /// scan is then relocalized in them, round its prior (see relocalize).

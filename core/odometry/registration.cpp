@@ -151,27 +151,35 @@ constexpr double expected_residual_m = 0.05;
 /// Neighbouring residuals err alike: beside the prior, all of a scan's count as this many.
 constexpr double independent_correspondences = 100.0;
 
+/// Error of a sweep's rotation that a gyro measured [rad].
+constexpr double measured_rotation_rad = 0.0005;
+
 /// Adds the prior of the motion within the sweep, along the map's axes.
 void add_sweep_prior(const SweepPrior& prior, const OdometryResult& at,
                      const RegistrationConfig& config, NormalEquations& equations) {
   const double correspondences = std::max(1.0, equations.weights);
-  const double share = prior.duration_share;
+  // A rotation that was measured does not depend on where the pose turns out to be.
+  PoseTangent share = PoseTangent::Constant(prior.duration_share);
+  if (prior.rotation_is_measured) share.tail<3>().setZero();
   PoseTangent change = PoseTangent::Zero();
-  if (share > 0.0) {
+  if (prior.duration_share > 0.0) {
     const Eigen::Isometry3d since_last = prior.T_map_lidar_last.inverse() * at.T_map_lidar;
-    change = share * twist_of(since_last) - prior.compensated;
+    change = share.cwiseProduct(twist_of(since_last)) - prior.compensated;
+    if (prior.rotation_is_measured) change.tail<3>().setZero();
   }
   const PoseTangent deviation = at.sweep_correction - change;
   PoseTangent weight;
   weight.head<3>().setConstant(std::pow(expected_residual_m / config.sweep_translation_m, 2));
-  weight.tail<3>().setConstant(std::pow(expected_residual_m / config.sweep_rotation_rad, 2));
+  const double rotation_rad =
+      prior.rotation_is_measured ? measured_rotation_rad : config.sweep_rotation_rad;
+  weight.tail<3>().setConstant(std::pow(expected_residual_m / rotation_rad, 2));
   weight *= correspondences / independent_correspondences;
   const PoseTangent weighted = weight.cwiseProduct(rotated(at.T_map_lidar.linear(), deviation));
   equations.hessian_sweep.diagonal() += weight;
-  equations.hessian_pose_sweep.diagonal() -= share * weight;
-  equations.hessian.diagonal() += share * share * weight;
+  equations.hessian_pose_sweep.diagonal() -= share.cwiseProduct(weight);
+  equations.hessian.diagonal() += share.cwiseAbs2().cwiseProduct(weight);
   equations.gradient_sweep += weighted;
-  equations.gradient -= share * weighted;
+  equations.gradient -= share.cwiseProduct(weighted);
 }
 
 /// The sweep's motion taken out of the equations (Schur's complement).

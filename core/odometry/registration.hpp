@@ -27,6 +27,8 @@ struct SweepPrior {
   double duration_share = 0.0;
   /// Motion that the points were compensated for (translation, rotation of the whole sweep).
   PoseTangent compensated = PoseTangent::Zero();
+  /// The rotation that the points were compensated for was measured.
+  bool rotation_is_measured = false;
 };
 
 /// The point of a lidar that moves by `sweep_twist` during its sweep, at the middle of the sweep;

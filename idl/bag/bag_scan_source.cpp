@@ -111,6 +111,24 @@ DatasetFrame BagScanSource::read(std::size_t i) const {
   return frame;
 }
 
+std::vector<ImuSample> BagScanSource::imu() const {
+  const auto is_imu = [](const BagTopic& topic) {
+    return topic.messages > 0 && topic.type == imu_message_type &&
+           topic.serialization_format == "cdr";
+  };
+  const std::vector<BagTopic>& topics = bag_.topics();
+  if (std::ranges::count_if(topics, is_imu) != 1) return {};
+  std::vector<ImuSample> samples;
+  for (const BagMessage& message : bag_.messages(std::ranges::find_if(topics, is_imu)->name)) {
+    try {
+      samples.push_back(decode_imu(bag_.bytes(message)));
+    } catch (const CdrError&) {
+      // One of hundreds a second; the mapper sees the gap.
+    }
+  }
+  return samples;
+}
+
 ScanDataset open_sequence(const fs::path& path, const std::string& topic) {
   if (is_bag(path)) return ScanDataset(std::make_shared<const BagScanSource>(path, topic));
   if (!topic.empty()) {

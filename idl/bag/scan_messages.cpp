@@ -57,7 +57,8 @@ sensor_msgs::msg::PointCloud2 read_cloud(CdrReader cdr) {
 /// Labels that Stillmap's own replay sent; 8 bits are something else.
 bool has_semantic_kitti_labels(const sensor_msgs::msg::PointCloud2& cloud) {
   for (const auto& field : cloud.fields()) {
-    if (field.name() == "label") return field.datatype() > sensor_msgs::msg::PointField_Constants::UINT8;
+    if (field.name() == "label")
+      return field.datatype() > sensor_msgs::msg::PointField_Constants::UINT8;
   }
   return false;
 }
@@ -137,6 +138,29 @@ DecodedScan decode_scan(ScanMessageType kind, std::span<const std::uint8_t> mess
       return from_livox(cdr);
   }
   throw CdrError("it is of a kind that is not known");
+}
+
+ImuSample decode_imu(std::span<const std::uint8_t> message) {
+  CdrReader cdr(message);
+  ImuSample sample;
+  sample.stamp_ns = read_stamp_ns(cdr);
+  (void)cdr.text();
+  const auto skip = [&cdr](int values) {
+    for (int k = 0; k < values; ++k) (void)cdr.value<double>();
+  };
+  const auto vector = [&cdr] {
+    const auto x = cdr.value<double>();
+    const auto y = cdr.value<double>();
+    return Eigen::Vector3d(x, y, cdr.value<double>());
+  };
+  constexpr int orientation = 4;
+  constexpr int covariance = 9;
+  skip(orientation + covariance);
+  sample.angular_velocity_imu = vector();
+  skip(covariance);
+  sample.acceleration_imu = vector();
+  skip(covariance);
+  return sample;
 }
 
 std::optional<std::int64_t> header_stamp_ns(std::span<const std::uint8_t> message) {

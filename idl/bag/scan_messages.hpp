@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "core/dataset/scan_source.hpp"
+#include "core/inertial/imu_sample.hpp"
 #include "core/lidar/sensor_model.hpp"
 
 namespace stillmap::dds {
@@ -33,6 +34,11 @@ struct DecodedScan {
 /// Makes a scan of a serialized message. Throws CdrError in words for bytes that are not such a
 /// message, or give no scan.
 [[nodiscard]] DecodedScan decode_scan(ScanMessageType kind, std::span<const std::uint8_t> message);
+
+inline constexpr std::string_view imu_message_type = "sensor_msgs/msg/Imu";
+
+/// Reads a serialized sensor_msgs/msg/Imu. Throws CdrError for bytes that are none.
+[[nodiscard]] ImuSample decode_imu(std::span<const std::uint8_t> message);
 
 /// The stamp of a message that begins with a std_msgs/Header; 12 bytes are enough. Nothing when
 /// there is none.

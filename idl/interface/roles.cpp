@@ -22,6 +22,7 @@ void append(Names& names, const Names& more) {
 Names inputs(const TopicNames& names) {
   Names topics{"rt/" + names.points};
   if (!names.odometry_prior.empty()) topics.push_back("rt/" + names.odometry_prior);
+  if (!names.imu.empty()) topics.push_back("rt/" + names.imu);
   return topics;
 }
 

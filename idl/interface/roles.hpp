@@ -32,6 +32,8 @@ struct TopicNames {
   std::string points = "points";
   /// Empty: none.
   std::string odometry_prior = "odom_prior";
+  /// Empty: none.
+  std::string imu = "imu/data";
   std::string name_space = "stillmap";
 };
 

@@ -57,4 +57,13 @@ TopicSpec<nav_msgs::msg::Odometry> odometry_prior_topic(const std::string& ros_n
   return symmetric<nav_msgs::msg::Odometry>("rt/" + ros_name, {.reliable = false, .depth = 100});
 }
 
+TopicSpec<sensor_msgs::msg::Imu> imu_topic(const std::string& ros_name, DeliveryMode delivery) {
+  const bool every = delivery == DeliveryMode::every;
+  // A second and more at 400 Hz.
+  constexpr int depth = 500;
+  return {.dds_name = "rt/" + ros_name,
+          .writer = {.depth = depth, .keep_all = every},
+          .reader = {.reliable = every, .depth = depth, .keep_all = every}};
+}
+
 }  // namespace stillmap::dds

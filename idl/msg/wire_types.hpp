@@ -3,8 +3,9 @@
 // Declares the generated types. For their fields, include the generated header ("sensor_msgs.h").
 
 namespace sensor_msgs::msg {
+class Imu;
 class PointCloud2;
-}
+}  // namespace sensor_msgs::msg
 namespace std_msgs::msg {
 class Header;
 }

@@ -17,11 +17,14 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
   if (!config.frames.base.empty()) {
     static_transforms_.emplace(context.participant, context.topics, context.statistics);
   }
+  if (!config.topics.imu.empty())
+    imu_.emplace(context.participant, config.topics.imu, config.input.delivery);
   const MappingOutputs outputs{
       .poses = &poses_,
       .scans = labelled_scans_ ? &*labelled_scans_ : nullptr,
       .prior = prior_ ? &*prior_ : nullptr,
       .static_transforms = static_transforms_ ? &*static_transforms_ : nullptr,
+      .imu = imu_ ? &*imu_ : nullptr,
       .occupancy = context.occupancy,
       .throttle = &context.throttle};
   thread_.emplace(config, std::move(segmenter), storage_.take_loaded(),

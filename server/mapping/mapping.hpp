@@ -8,6 +8,7 @@
 #include "config/loaders/server_config.hpp"
 #include "idl/dds/participant.hpp"
 #include "idl/interface/topics.hpp"
+#include "server/mapping/imu_receiver.hpp"
 #include "server/mapping/map_storage.hpp"
 #include "server/mapping/mapping_thread.hpp"
 #include "server/mapping/odometry_prior.hpp"
@@ -67,6 +68,7 @@ class Mapping {
   std::optional<OdometryPrior> prior_;
   /// Only where the robot has a frame of its own.
   std::optional<StaticTransforms> static_transforms_;
+  std::optional<ImuReceiver> imu_;
   // Each uses what stands above it, and stops before it.
   std::optional<MappingThread> thread_;
   std::optional<CheckpointWorker> checkpoints_;

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -47,6 +48,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
                              Statistics& statistics, LatestMap& latest_map,
                              const MappingOutputs& outputs)
     : map_limit_bytes_(map_share_bytes(config.map)),
+      sensor_period_s_(config.mapper.sensor.period_s),
       publish_period_(config.publish.tiles_period_s),
       queue_(queue),
       statistics_(statistics),
@@ -198,8 +200,10 @@ void MappingThread::map(QueuedScan queued) {
   statistics_.add_latency("queue", milliseconds(began - queued.received));
   const std::int64_t stamp_ns = queued.scan.stamp_ns;
   if (!locate_lidar(queued)) return drop({"unknown_frame", frames_.missing()});
+  feed_imu(queued.scan);
   auto mapped = mapper_.process(std::move(queued.scan), prior_for(stamp_ns));
   if (!mapped) return drop(mapper_.last_rejection());
+  report_imu();
   const bool unlabelled = mapped->labelled.labels.empty();
   latest_map_.add_pose({stamp_ns, T_map_base(mapped->odometry)}, mapped->odometry.health,
                        unlabelled ? "none" : mapper_.label_source());
@@ -222,6 +226,45 @@ bool MappingThread::locate_lidar(const QueuedScan& queued) {
   outputs_.poses->publish_static(queued.scan.stamp_ns,
                                  {frames_.base(), mounted_frame_, frames_.T_base_lidar()});
   return true;
+}
+
+void MappingThread::feed_imu(const Scan& scan) {
+  if (outputs_.imu == nullptr) return;
+  const SweepTimes sweep = sweep_times(scan, sensor_period_s_);
+  const std::int64_t end_ns =
+      scan.stamp_ns + std::llround(1e9 * (sweep.middle_s + 0.5 * sweep.duration_s));
+  const std::int64_t until_ns = mapper_.inertial().imu_time(end_ns);
+  for (const ImuSample& sample : outputs_.imu->take(until_ns)) mapper_.add(sample);
+}
+
+void MappingThread::report_imu() {
+  const InertialTracker& imu = mapper_.inertial();
+  if (!imu.has_samples()) return;
+  const InertialCounts now = imu.counts();
+  const auto report = [&](const char* event, std::uint64_t InertialCounts::*count) {
+    if (now.*count > imu_counts_.*count) statistics_.count(event, now.*count - imu_counts_.*count);
+  };
+  report("imu_samples", &InertialCounts::samples);
+  report("imu_not_usable", &InertialCounts::not_usable);
+  report("imu_out_of_order", &InertialCounts::out_of_order);
+  report("imu_scans_helped", &InertialCounts::scans_helped);
+  report("imu_samples_missing", &InertialCounts::scans_without_samples);
+  report("imu_disbelieved", &InertialCounts::trust_losses);
+  if (now.trust_losses > imu_counts_.trust_losses) {
+    throttled_log_.warn("imu",
+                        "the IMU's rates are not the lidar's: scans are mapped without it until "
+                        "they are; check 'imu' in the sensor's file, and that rates are in rad/s");
+  }
+  if (imu.is_believed() && !imu_was_believed_) {
+    const GyroCalibration& calibration = imu.calibration();
+    spdlog::info(
+        "IMU: its rates are the lidar's, with a bias of {:.4f} {:.4f} {:.4f} rad/s and "
+        "{:.1f} ms late",
+        calibration.bias_imu().x(), calibration.bias_imu().y(), calibration.bias_imu().z(),
+        1e3 * calibration.time_offset_s());
+  }
+  imu_was_believed_ = imu.is_believed();
+  imu_counts_ = now;
 }
 
 void MappingThread::forward(MappedScan mapped) {

@@ -12,6 +12,7 @@
 #include "core/frames/odom_frame.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/mapper.hpp"
+#include "server/mapping/imu_receiver.hpp"
 #include "server/mapping/map_saver.hpp"
 #include "server/mapping/odometry_prior.hpp"
 #include "server/mapping/robot_frames.hpp"
@@ -32,6 +33,7 @@ struct MappingOutputs {
   LabelledScanPublisher* scans = nullptr;
   const OdometryPrior* prior = nullptr;
   const StaticTransforms* static_transforms = nullptr;
+  ImuReceiver* imu = nullptr;
   OccupancyThread* occupancy = nullptr;
   BackgroundThrottle* throttle = nullptr;
 };
@@ -72,6 +74,10 @@ class MappingThread : public CheckpointSource {
 
  private:
   void map(QueuedScan queued);
+  /// Gives the mapper the IMU's samples up to the scan's last point.
+  void feed_imu(const Scan& scan);
+  /// Counts and logs what became of them.
+  void report_imu();
   /// Runs the requests, and publishes the map when that is due.
   void end_round(bool is_idle);
   /// Publishes a new map, and starts a new octree from it.
@@ -103,6 +109,7 @@ class MappingThread : public CheckpointSource {
 
   /// Limit of the memory that the static map takes.
   std::size_t map_limit_bytes_;
+  double sensor_period_s_;
   std::chrono::duration<double> publish_period_;
   ScanQueue& queue_;
   Statistics& statistics_;
@@ -120,6 +127,9 @@ class MappingThread : public CheckpointSource {
   std::string mounted_frame_;
   /// Of the scan in work: its lidar's motion by the prior.
   std::optional<Eigen::Isometry3d> motion_prior_;
+  /// As reported last.
+  InertialCounts imu_counts_;
+  bool imu_was_believed_ = false;
   std::chrono::steady_clock::time_point received_;
   std::chrono::steady_clock::time_point stage_began_;
   double labels_ms_ = 0.0;

@@ -68,9 +68,9 @@ void Statistics::scans_dropped(const std::string& reason, std::size_t count,
   last_drop_ = detail;
 }
 
-void Statistics::count(const std::string& event) {
+void Statistics::count(const std::string& event, std::uint64_t times) {
   const std::scoped_lock lock(mutex_);
-  member(events_, metrics_->events, "event", event).Increment();
+  member(events_, metrics_->events, "event", event).Increment(static_cast<double>(times));
 }
 
 void Statistics::add_latency(const std::string& stage, double milliseconds) {

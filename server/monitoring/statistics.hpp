@@ -42,7 +42,7 @@ class Statistics {
   /// Counts "dropped_<reason>" in the status; the last `detail` is told there, too.
   void scans_dropped(const std::string& reason, std::size_t count, const std::string& detail);
   /// Counts an event that has nothing more to tell.
-  void count(const std::string& event);
+  void count(const std::string& event, std::uint64_t times = 1);
   void add_latency(const std::string& stage, double milliseconds);
   /// Everything that was done with a scan, without its segmentation, took so long.
   void record_other_stages(double milliseconds);

@@ -32,9 +32,9 @@ class CommandTest : public testing::Test {
     return run_stillmap(arguments, folder_);
   }
   /// A small recording: one block, 16 beams.
-  void simulate(const std::string& name, int scans = 6) const {
+  void simulate(const std::string& name, int scans = 6, const std::string& options = "") const {
     const ProcessResult result = run("simulate " + path(name) + " --preset yard --sensor vlp_16" +
-                                     " --scans " + std::to_string(scans));
+                                     " --scans " + std::to_string(scans) + options);
     ASSERT_EQ(result.exit_code, 0) << result.err;
   }
   /// Puts `text` where a file was or was not.

@@ -56,7 +56,7 @@ class RecordTest : public CommandTest {
 
 TEST_F(RecordTest, ARecordedReplayIsTheRecordingAgain) {
   constexpr int scans = 8;
-  simulate("city", scans);
+  simulate("city", scans, " --imu");
   {
     BackgroundProcess server(server_command(), folder_ / "server.log");
     ASSERT_EQ(run("status --timeout 30" + on_domain()).exit_code, 0) << content("server.log");
@@ -78,6 +78,12 @@ TEST_F(RecordTest, ARecordedReplayIsTheRecordingAgain) {
 
   const ScanDataset original(path("city"));
   const ScanDataset recorded = dds::open_sequence(path("bag"), "points");
+  const std::vector<ImuSample> sent = original.imu(), received = recorded.imu();
+  ASSERT_EQ(received.size(), sent.size());
+  for (std::size_t k = 0; k < sent.size(); ++k) {
+    EXPECT_EQ(received[k].stamp_ns, sent[k].stamp_ns);
+    EXPECT_EQ(received[k].angular_velocity_imu, sent[k].angular_velocity_imu);
+  }
   ASSERT_EQ(recorded.size(), original.size());
   for (std::size_t i = 0; i < original.size(); ++i) {
     const Scan a = original.read(i).scan, b = recorded.read(i).scan;

@@ -15,6 +15,17 @@ TEST_F(SimulateCommandTest, WritesASequenceWithTruth) {
   EXPECT_EQ(line_count("city/poses.txt"), 3U);
 }
 
+TEST_F(SimulateCommandTest, WritesTheSamplesOfAnImuWhenAsked) {
+  simulate("plain", 1);
+  EXPECT_FALSE(exists("plain/imu.csv"));
+  simulate("city", 3, " --imu");
+  // A line of names, then 200 a second.
+  EXPECT_EQ(line_count("city/imu.csv"), 1U + 61U);
+  const ProcessResult drives =
+      run("evaluate drives " + path("city") + " --imu deg_per_s --scans 2");
+  EXPECT_EQ(drives.exit_code, 0) << drives.err;
+}
+
 TEST_F(SimulateCommandTest, IsTheSameForTheSameSeedOnly) {
   const std::string common = " --preset yard --sensor vlp16 --scans 1 --seed ";
   ASSERT_EQ(run("simulate " + path("a") + common + "1").exit_code, 0);

@@ -26,6 +26,10 @@ void expect_same(const SensorModel& a, const SensorModel& b) {
   EXPECT_EQ(a.period_s, b.period_s);
   EXPECT_EQ(a.ring_source, b.ring_source);
   EXPECT_EQ(a.intensity_scale, b.intensity_scale);
+  ASSERT_EQ(a.imu.has_value(), b.imu.has_value());
+  if (!a.imu) return;
+  EXPECT_TRUE(a.imu->R_lidar_imu.isApprox(b.imu->R_lidar_imu, 1e-5));
+  EXPECT_EQ(a.imu->time_offset_s, b.imu->time_offset_s);
 }
 
 TEST(SensorFile, ShippedFilesEqualTheBuiltInSensors) {
@@ -47,6 +51,10 @@ TEST(SensorFile, WhatIsSavedIsReadBack) {
   sensor.max_range_m = 77.25;
   sensor.ring_source = RingSource::field;
   sensor.intensity_scale = 1.0F / 255.0F;
+  sensor.imu = ImuMount{
+      .R_lidar_imu =
+          Eigen::AngleAxisd(2.0, Eigen::Vector3d(1.0, -2.0, 0.5).normalized()).toRotationMatrix(),
+      .time_offset_s = 0.004};
   const auto file = write_file("saved.yaml", "");
   save_sensor(sensor, file);
   expect_same(load_sensor(file.string()), sensor);
@@ -63,6 +71,21 @@ TEST(SensorFile, DemandsWhatHasNoDefault) {
       refusal([] { (void)load_sensor(write_file("a.yaml", "name: x").string()); });
   for (const char* field : {"rings", "fov_up_deg", "fov_down_deg"}) {
     EXPECT_THAT(text, HasSubstr(field + std::string(": is missing")));
+  }
+}
+
+TEST(SensorFile, KnowsTheImuOnlyWhereItsAxesAreGiven) {
+  const std::string sensor = "name: x\nrings: 16\nfov_up_deg: 15\nfov_down_deg: -15\n";
+  EXPECT_FALSE(load_sensor(write_file("a.yaml", sensor).string()).imu);
+  const auto imu =
+      load_sensor(write_file("a.yaml", sensor + "imu: {roll_pitch_yaw_deg: [0, 0, 90]}").string())
+          .imu;
+  ASSERT_TRUE(imu);
+  EXPECT_TRUE((imu->R_lidar_imu * Eigen::Vector3d::UnitX()).isApprox(Eigen::Vector3d::UnitY()));
+  for (const char* fault :
+       {"roll_pitch_yaw_deg: [0, 0]", "time_offset_s: 0.01", "time_offset_s: 3"}) {
+    const auto file = write_file("a.yaml", sensor + "imu: {" + fault + "}");
+    EXPECT_THAT(refusal([&] { (void)load_sensor(file.string()); }), HasSubstr("imu."));
   }
 }
 

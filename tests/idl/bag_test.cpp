@@ -11,6 +11,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 #include "idl/bag/cdr_reader.hpp"
+#include "idl/conversions/imu.hpp"
 #include "tests/idl/bag_fixture.hpp"
 #include "tests/scratch_folder.hpp"
 
@@ -49,6 +50,26 @@ TEST(Bag, WhatIsWrittenComesBackInEitherByteOrder) {
       expect_scan(dataset.read(i).scan, bag_scan(k));
     }
     EXPECT_FALSE(dataset.truth());
+  }
+}
+
+TEST(Bag, ReadsTheImuBesideTheScansInEitherByteOrder) {
+  const ScratchFolder folder;
+  const ImuSample sample{1'700'000'000'123'456'789, {0.1, -0.2, 0.3}, {0.5, -9.5, 1.5}};
+  BagTopic imu = cloud_topic("/imu/data");
+  imu.type = "sensor_msgs/msg/Imu";
+  BagWriter writer(folder / "bag", {cloud_topic("/points"), imu});
+  writer.add(0, 1, bag_message(0));
+  writer.add(1, 2, serialized(wire::to_imu(sample, "a_frame")));
+  writer.add(1, 3, serialized(wire::to_imu(sample, "f"), false));
+  writer.add(1, 4, Bytes{0, 1, 0, 0, 7});
+  writer.finish();
+  const std::vector<ImuSample> samples = open_sequence(folder / "bag").imu();
+  ASSERT_EQ(samples.size(), 2U) << "the damaged message is left out";
+  for (const ImuSample& read : samples) {
+    EXPECT_EQ(read.stamp_ns, sample.stamp_ns);
+    EXPECT_EQ(read.angular_velocity_imu, sample.angular_velocity_imu);
+    EXPECT_EQ(read.acceleration_imu, sample.acceleration_imu);
   }
 }
 

@@ -9,7 +9,8 @@
 namespace stillmap::dds {
 namespace {
 
-const TopicNames names{.points = "lidar/points", .odometry_prior = "odom", .name_space = "car_7"};
+const TopicNames names{
+    .points = "lidar/points", .odometry_prior = "odom", .imu = "imu", .name_space = "car_7"};
 
 // Another reading of the list: a size that comes from the struct itself.
 constexpr std::size_t topic_count = sizeof(Topics) / sizeof(TopicSpec<stillmap_msgs::msg::Status>);
@@ -29,6 +30,7 @@ TEST(RolesTest, LetTheServerDoAllThatItDoes) {
   EXPECT_TRUE(server.may_subscribe("rt/lidar/points"));
   EXPECT_TRUE(server.may_subscribe("rt/odom"));
   EXPECT_TRUE(server.may_subscribe("rt/tf_static"));
+  EXPECT_TRUE(server.may_subscribe("rt/imu"));
 }
 
 TEST(RolesTest, LetAPlannerReadEverythingAndChangeNothing) {
@@ -57,6 +59,7 @@ TEST(RolesTest, LetASensorSendAndSeeHowItIsTaken) {
   EXPECT_TRUE(sensor.may_publish("rt/lidar/points"));
   EXPECT_TRUE(sensor.may_publish("rt/odom"));
   EXPECT_TRUE(sensor.may_publish("rt/tf_static"));
+  EXPECT_TRUE(sensor.may_publish("rt/imu"));
   EXPECT_TRUE(sensor.may_subscribe("rt/car_7/status"));
   EXPECT_TRUE(sensor.may_publish(request_topic("car_7/get_status")));
   EXPECT_FALSE(sensor.may_publish(request_topic("car_7/reset")));

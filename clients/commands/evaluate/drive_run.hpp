@@ -71,6 +71,10 @@ class DriveRun {
   /// faults.
   DriveRun(const std::string& weighting, MapperConfig config, std::unique_ptr<Segmenter> labels);
 
+  /// A sample of the IMU, before the scans whose sweeps end after it.
+  void add(const ImuSample& sample) { mapper_.add(sample); }
+  [[nodiscard]] const InertialTracker& inertial() const { return mapper_.inertial(); }
+
   /// Maps the next scan; nothing where it is rejected. `T_world_lidar_true` is its truth, nothing
   /// where it has none.
   const OdometryResult* map(Scan scan, const std::optional<Eigen::Isometry3d>& T_world_lidar_true);

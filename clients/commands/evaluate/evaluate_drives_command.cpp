@@ -15,6 +15,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/evaluate/drive_run.hpp"
 #include "clients/commands/evaluate/ground_truth_sequence.hpp"
+#include "clients/commands/mapping/imu_feed.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
@@ -33,6 +34,7 @@ struct EvaluateDrivesArguments {
   std::size_t start = 0;
   std::string labels = "files";
   std::string stamps = "as_recorded";
+  std::string imu = "as_recorded";
   std::string mutation = "none";
   std::string other_place;
   MapperArguments mapper;
@@ -81,6 +83,35 @@ void restamp(Scan& scan, const std::string& how, double period_s) {
   const double shift_s = how == "middle" ? 0.5 * period_s : how == "end" ? period_s : 0.0;
   scan.stamp_ns += std::llround(shift_s * 1e9);
   for (float& offset : scan.time_offset_s) offset -= static_cast<float>(shift_s);
+}
+
+/// Faults of an IMU.
+std::vector<ImuSample> spoilt(std::vector<ImuSample> samples, const std::string& how) {
+  if (how == "none") return {};
+  const Eigen::Matrix3d turned =
+      Eigen::AngleAxisd(0.5 * M_PI, Eigen::Vector3d(1.0, 1.0, 1.0).normalized()).matrix();
+  const std::size_t breaks = samples.size() / 3;
+  if (how == "stops") samples.resize(breaks);
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    ImuSample& sample = samples[k];
+    if (how == "deg_per_s") sample.angular_velocity_imu *= 180.0 / M_PI;
+    if (how == "turned") sample.angular_velocity_imu = turned * sample.angular_velocity_imu;
+    if (how == "late") sample.stamp_ns += 20'000'000;
+    if (how == "frozen" && k > breaks) {
+      sample.angular_velocity_imu = samples[breaks].angular_velocity_imu;
+      sample.acceleration_imu = samples[breaks].acceleration_imu;
+    }
+  }
+  return samples;
+}
+
+void print_imu(const DriveRun& run) {
+  const InertialTracker& tracker = run.inertial();
+  if (!tracker.has_samples()) return;
+  std::cerr << run.weighting() << " imu: helped " << tracker.counts().scans_helped
+            << " scans, trust lost " << tracker.counts().trust_losses << " times, bias "
+            << tracker.calibration().bias_imu().transpose() << " rad/s, late by "
+            << 1e3 * tracker.calibration().time_offset_s() << " ms\n";
 }
 
 /// A drive as the mappers get it.
@@ -137,6 +168,7 @@ std::vector<DriveResult> run_drive(const MutatedDrive& drive,
   std::deque<DriveRun> runs;
   for (const std::string& weighting : arguments.weightings)
     runs.emplace_back(weighting, config, std::make_unique<SharedSegmenter>(labels));
+  ImuFeed imu(spoilt(drive.sequence.imu, arguments.imu));
   std::size_t seen = 0;
   for (const evaluation::MutatedScan& mutated : drive.scans) {
     const GroundTruthSequence& source =
@@ -145,6 +177,8 @@ std::vector<DriveResult> run_drive(const MutatedDrive& drive,
     spoil_labels(scan, arguments.labels, mutated.index);
     restamp(scan, arguments.stamps, config.sensor.period_s);
     labels->next_scan();
+    for (const ImuSample& sample : imu.take_up_to_end_of(scan, config.sensor.period_s))
+      for (DriveRun& run : runs) run.add(sample);
     for (std::size_t k = 0; k < runs.size(); ++k) {
       // In turn: the first one of a scan finds the caches cold.
       DriveRun& run = runs[(seen + k) % runs.size()];
@@ -161,7 +195,10 @@ std::vector<DriveResult> run_drive(const MutatedDrive& drive,
     if (!scan_done(++seen)) break;
   }
   std::vector<DriveResult> results;
-  for (DriveRun& run : runs) results.push_back(run.result());
+  for (DriveRun& run : runs) {
+    if (arguments.each) print_imu(run);
+    results.push_back(run.result());
+  }
   return results;
 }
 
@@ -237,7 +274,7 @@ void add_evaluate_drives_command(CommandHandle evaluate, Action& action) {
   command
       .option("DRIVES", arguments->drives,
               "Sequences, or sim:PRESET[,seed=N][,scans=N][,sensor=S][,motion=M][,traffic=T]"
-              "[,rolling]")
+              "[,rolling][,imu]")
       .required();
   command
       .option("--weightings", arguments->weightings,
@@ -255,6 +292,9 @@ void add_evaluate_drives_command(CommandHandle evaluate, Action& action) {
       .option("--stamps", arguments->stamps,
               "Where in the sweep the stamp is, or no times of points at all")
       .one_of({"as_recorded", "middle", "end", "removed"})
+      .with_default();
+  command.option("--imu", arguments->imu, "As recorded, none, or with a fault")
+      .one_of({"as_recorded", "none", "deg_per_s", "turned", "late", "frozen", "stops"})
       .with_default();
   command
       .option("--mutate", arguments->mutation,

@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "core/dataset/scan_dataset.hpp"
+#include "core/simulation/simulated_imu.hpp"
 #include "core/simulation/simulation.hpp"
 
 namespace stillmap::cli {
@@ -28,7 +29,15 @@ int number_of(const std::string& word, const std::string& value) {
                               "' is no whole number");
 }
 
-SimulationArguments simulated_drive(const std::string& name, SimulationArguments arguments) {
+/// A simulated drive in words.
+struct SimulatedDrive {
+  SimulationArguments simulation;
+  bool imu = false;
+};
+
+SimulatedDrive simulated_drive(const std::string& name, const SimulationArguments& defaults) {
+  SimulatedDrive drive{.simulation = defaults};
+  SimulationArguments& arguments = drive.simulation;
   std::istringstream words(name.substr(simulated_prefix.size()));
   std::getline(words, arguments.preset, ',');
   for (std::string word; std::getline(words, word, ',');) {
@@ -47,20 +56,26 @@ SimulationArguments simulated_drive(const std::string& name, SimulationArguments
       arguments.traffic = value;
     else if (word == "rolling")
       arguments.rolling = true;
+    else if (word == "imu")
+      drive.imu = true;
     else
       throw std::invalid_argument(
           "'" + word + "' in '" + name +
-          "': there are seed=, scans=, sensor=, motion=, traffic= and rolling");
+          "': there are seed=, scans=, sensor=, motion=, traffic=, rolling and imu");
   }
-  return arguments;
+  return drive;
 }
 
-GroundTruthSequence open_simulated(const SimulationArguments& arguments) {
-  const simulation::SimulationConfig config = simulation_config(arguments);
+GroundTruthSequence open_simulated(const SimulatedDrive& drive) {
+  const simulation::SimulationConfig config = simulation_config(drive.simulation);
   const auto simulation = std::make_shared<simulation::Simulation>(config);
   GroundTruthSequence sequence;
   sequence.sensor = config.sensor;
   sequence.labelled = true;
+  if (drive.imu) {
+    sequence.imu = simulation::simulated_imu(*simulation);
+    sequence.sensor.imu = ImuMount{};
+  }
   sequence.read = [simulation](std::size_t i) {
     return simulation->scan(static_cast<int>(i)).scan;
   };
@@ -78,6 +93,7 @@ GroundTruthSequence open_recorded(const std::string& name) {
   sequence.name = name;
   sequence.sensor = dataset->suggested_sensor();
   sequence.labelled = dataset->has_labels(0);
+  sequence.imu = dataset->imu();
   sequence.read = [dataset](std::size_t i) { return dataset->read(i).scan; };
   for (std::size_t i = 0; i < dataset->size(); ++i)
     sequence.stamps_ns.push_back(dataset->stamp_ns(i));
@@ -91,11 +107,11 @@ GroundTruthSequence open_recorded(const std::string& name) {
 GroundTruthSequence open_ground_truth_sequence(const std::string& name,
                                                const SimulationArguments& simulated) {
   if (!name.starts_with(simulated_prefix)) return open_recorded(name);
-  const SimulationArguments arguments = simulated_drive(name, simulated);
-  GroundTruthSequence sequence = open_simulated(arguments);
+  const SimulatedDrive drive = simulated_drive(name, simulated);
+  GroundTruthSequence sequence = open_simulated(drive);
   sequence.name = name;
   if (name.find(",seed=") == std::string::npos)
-    sequence.name += ",seed=" + std::to_string(arguments.seed);
+    sequence.name += ",seed=" + std::to_string(drive.simulation.seed);
   return sequence;
 }
 
@@ -103,10 +119,10 @@ GroundTruthSequence open_other_city(const std::string& name) {
   if (!name.starts_with(simulated_prefix))
     throw std::invalid_argument("there is no other place for the recording " + name +
                                 ": name one with --other-place");
-  SimulationArguments arguments = simulated_drive(name, {});
-  arguments.seed += other_city_seeds;
-  GroundTruthSequence sequence = open_simulated(arguments);
-  sequence.name = name + ",seed=" + std::to_string(arguments.seed);
+  SimulatedDrive drive = simulated_drive(name, {});
+  drive.simulation.seed += other_city_seeds;
+  GroundTruthSequence sequence = open_simulated(drive);
+  sequence.name = name + ",seed=" + std::to_string(drive.simulation.seed);
   return sequence;
 }
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "clients/commands/arguments/simulation_arguments.hpp"
+#include "core/inertial/imu_sample.hpp"
 #include "core/lidar/scan.hpp"
 #include "core/lidar/sensor_model.hpp"
 
@@ -23,13 +24,15 @@ struct GroundTruthSequence {
   std::vector<std::int64_t> stamps_ns;
   /// True pose of the lidar at each scan's stamp; empty where it is not known.
   std::vector<Eigen::Isometry3d> truth;
+  /// Of an IMU beside the lidar, where there was one.
+  std::vector<ImuSample> imu;
 
   [[nodiscard]] std::size_t size() const { return stamps_ns.size(); }
 };
 
 /// Opens a sequence, or a simulated one: "sim:crowd,seed=2,sensor=vlp_16,motion=hard_turns,rolling,
-/// scans=300" (also traffic=). What the words do not say is as in `simulated`; their preset comes
-/// first. Throws DatasetError, ConfigError or std::invalid_argument.
+/// imu,scans=300" (also traffic=). What the words do not say is as in `simulated`; their preset
+/// comes first. Throws DatasetError, ConfigError or std::invalid_argument.
 [[nodiscard]] GroundTruthSequence open_ground_truth_sequence(
     const std::string& name, const SimulationArguments& simulated = {});
 

@@ -37,6 +37,7 @@ struct RecorderOptions {
   /// The sensor's topic, and that of its odometry.
   std::string points_topic = "points";
   std::string odometry_topic = "odom_prior";
+  std::string imu_topic = "imu/data";
   /// ROS 2 names to record; empty: all topics of the sensor and the server.
   std::vector<std::string> topics;
   /// New folder of the bag.
@@ -60,6 +61,8 @@ using eprosima::fastrtps::rtps::GUID_t;
 
 /// Reader depth, for when the disk is busy; on a keyed topic for each key.
 constexpr int max_waiting = 20;
+/// Of small samples that come often.
+constexpr int max_waiting_often = 500;
 constexpr int max_waiting_per_key = 4;
 
 struct RecordableTopic {
@@ -76,7 +79,8 @@ RecordableTopic recordable(const dds::TopicSpec<T>& topic) {
 std::vector<RecordableTopic> recordable_topics(const RecorderOptions& options) {
   std::vector<RecordableTopic> topics{
       recordable(dds::points_topic(options.points_topic, DeliveryMode::latest, max_waiting)),
-      recordable(dds::odometry_prior_topic(options.odometry_topic))};
+      recordable(dds::odometry_prior_topic(options.odometry_topic)),
+      recordable(dds::imu_topic(options.imu_topic, DeliveryMode::latest))};
   dds::for_each_topic(dds::Topics::in(options.server_name),
                       [&](const auto& topic) { topics.push_back(recordable(topic)); });
   return topics;
@@ -120,7 +124,8 @@ std::vector<dds::BagTopic> bag_topics(const std::vector<RecordableTopic>& topics
 dds::TopicQos reader_qos_for(const RecordableTopic& topic, bool as_offered) {
   dds::TopicQos qos = topic.offered;
   qos.keep_all = false;
-  qos.depth = qos.max_keys > 1 ? max_waiting_per_key : max_waiting;
+  qos.depth = qos.max_keys > 1 ? max_waiting_per_key
+                               : std::clamp(qos.depth, max_waiting, max_waiting_often);
   // Publishers that offer less are recorded too, with the weakest request.
   qos.reliable = as_offered;
   qos.transient_local = as_offered && qos.transient_local;
@@ -347,6 +352,7 @@ void add_record_command(CommandHandle program, Action& action) {
   command.option("--points", arguments->recorder.points_topic, "The sensor's topic").with_default();
   command.option("--odometry", arguments->recorder.odometry_topic, "The odometry prior's topic")
       .with_default();
+  command.option("--imu", arguments->recorder.imu_topic, "The IMU's topic").with_default();
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(

@@ -10,6 +10,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -18,6 +19,7 @@
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/mapping/imu_feed.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
 #include "clients/library/client.hpp"
@@ -135,6 +137,7 @@ Trajectory PoseLog::poses_of(const std::vector<std::int64_t>& stamps_ns) const {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::chrono::milliseconds publish_step{500};
+constexpr std::chrono::milliseconds imu_patience{1000};
 constexpr std::chrono::milliseconds status_period{100};
 
 /// When a scan of a sequence is due.
@@ -178,26 +181,41 @@ std::optional<DatasetFrame> read_scan(const ScanDataset& dataset, std::size_t in
   }
 }
 
+/// Throws when the server takes nothing for too long.
+void require_progress(Clock::time_point began, const ReplayOptions& options) {
+  if (Clock::now() - began <= options.idle_timeout) return;
+  throw ServiceTimeout(
+      "the server has taken no scan for " + std::to_string(options.idle_timeout.count() / 1000) +
+      " s: did it stop? 'stillmap status' tells; a lossless replay needs a server with input "
+      "delivery: every");
+}
+
+// The samples first: the server waits for those of a scan's sweep, but not long.
+bool publish(ScanPublisher& publisher, std::span<const ImuSample> samples,
+             const ReplayOptions& options, StopSignal& stop) {
+  const auto began = Clock::now();
+  while (!samples.empty()) {
+    samples = samples.subspan(publisher.publish(samples, publish_step));
+    if (stop.requested()) return false;
+    if (!samples.empty()) require_progress(began, options);
+  }
+  return true;
+}
+
 // In short steps, so that a signal ends the wait for the server. Returns false after a signal.
 bool publish(ScanPublisher& publisher, const DatasetFrame& frame, const ReplayOptions& options,
              StopSignal& stop) {
   const auto began = Clock::now();
   while (!publisher.publish(frame.scan, frame.raw_labels, publish_step)) {
     if (stop.requested()) return false;
-    if (Clock::now() - began > options.idle_timeout) {
-      throw ServiceTimeout(
-          "the server has taken no scan for " +
-          std::to_string(options.idle_timeout.count() / 1000) +
-          " s: did it stop? 'stillmap status' tells; a lossless replay needs a server with input "
-          "delivery: every");
-    }
+    require_progress(began, options);
   }
   return true;
 }
 
 /// Publishes the scans of a sequence at the times of their stamps. Throws ServiceTimeout when the
 /// server stops taking scans, DatasetError as ScanRange says.
-ReplayResult replay_dataset(const ScanDataset& dataset, const ReplayOptions& options,
+ReplayResult replay_dataset(const ScanDataset& dataset, ImuFeed imu, const ReplayOptions& options,
                             ScanPublisher& publisher, StopSignal& stop, const ScanDone& scan_done,
                             const ScanSkipped& scan_skipped) {
   const std::size_t end = options.range.end(dataset);
@@ -207,7 +225,9 @@ ReplayResult replay_dataset(const ScanDataset& dataset, const ReplayOptions& opt
   for (std::size_t index = options.range.first; index < end && !result.stopped; ++index) {
     const auto frame = read_scan(dataset, index, options, result, scan_skipped);
     if (frame) {
+      const auto samples = imu.take_up_to_end_of(frame->scan, dataset.suggested_sensor().period_s);
       result.stopped = clock.wait_or_stop(dataset.stamp_ns(index), stop) ||
+                       !publish(publisher, samples, options, stop) ||
                        !publish(publisher, *frame, options, stop);
       if (!result.stopped) result.published_stamps_ns.push_back(frame->scan.stamp_ns);
     }
@@ -253,6 +273,7 @@ struct ReplayArguments {
   std::string frame = "lidar";
   std::string base_frame = "base_link";
   MountArguments mount;
+  std::string imu_topic = "imu/data";
   std::string out;
   std::uint32_t subscribers = 1;
   bool lossless = false;
@@ -298,12 +319,13 @@ ReplayOptions replay_options(const ReplayArguments& arguments) {
   return options;
 }
 
-ReplayResult publish_with_progress(const ScanDataset& dataset, const ReplayArguments& arguments,
-                                   ScanPublisher& publisher, StopSignal& stop) {
+ReplayResult publish_with_progress(const ScanDataset& dataset, ImuFeed imu,
+                                   const ReplayArguments& arguments, ScanPublisher& publisher,
+                                   StopSignal& stop) {
   const ScanRange& range = arguments.replay.range;
   Progress progress("replay", "scans", range.end(dataset) - range.first);
   return replay_dataset(
-      dataset, replay_options(arguments), publisher, stop,
+      dataset, std::move(imu), replay_options(arguments), publisher, stop,
       [&](std::size_t seen) {
         progress.update(seen);
         return true;
@@ -320,18 +342,22 @@ std::optional<FrameTransform> mount_of(const ReplayArguments& arguments) {
 ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
   (void)arguments.replay.range.end(dataset);
+  ImuFeed imu(dataset.imu());
   Client client = connect(arguments.client);
   PoseLog poses(client);
   ScanPublisher publisher(client, {.dds = arguments.client.dds(DdsRole::sensor),
                                    .points_topic = arguments.topic,
                                    .lidar_frame = arguments.frame,
                                    .mount = mount_of(arguments),
+                                   .imu_topic = imu.empty() ? "" : arguments.imu_topic,
                                    .lossless = arguments.lossless});
   require_subscribers(publisher, arguments, stop);
+  // Found with the scans' subscriber; a server need not have one.
+  if (!imu.empty()) (void)publisher.wait_for_imu_subscriber(imu_patience);
   const dds::ServerStatus before = client.status();
   if (arguments.lossless) require_lossless(before);
   ReplayOutcome outcome;
-  outcome.replay = publish_with_progress(dataset, arguments, publisher, stop);
+  outcome.replay = publish_with_progress(dataset, std::move(imu), arguments, publisher, stop);
   const std::vector<std::int64_t>& stamps_ns = outcome.replay.published_stamps_ns;
   // A lossy topic loses scans that are not counted, so the wait for them is short.
   const auto idle_timeout =
@@ -416,6 +442,10 @@ void add_replay_command(CommandHandle program, Action& action) {
                "Send the labels of the sequence, where it has any (default)");
   command.flag("--strict", replay.range.strict, "Stop at the first damaged file");
   command.option("--topic", arguments->topic, "ROS 2 name of the topic").with_default();
+  command
+      .option("--imu-topic", arguments->imu_topic,
+              "ROS 2 name of the topic for the samples of an IMU, where the sequence has any")
+      .with_default();
   command
       .option("--subscribers", arguments->subscribers,
               "Begin when so many take the scans: the server, and 'stillmap record', say")

@@ -202,6 +202,10 @@ std::string describe(const MappingResult& result, const MapOutput& output) {
   for (const auto& [state, count] : result.health) {
     text += std::string(" ") + name(state) + " " + std::to_string(count);
   }
+  if (result.imu.samples > 0) {
+    text += "; IMU: " + std::to_string(result.imu.samples) + " samples helped " +
+            std::to_string(result.imu.scans_helped) + " scans";
+  }
   text += "\nmap: " + std::to_string(voxel_count(*result.view)) + " voxels of " +
           fixed(result.view->voxel_size_m, 2) + " m in " +
           std::to_string(result.view->tiles.size()) + " tiles; peak memory " +

@@ -4,6 +4,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "clients/commands/mapping/imu_feed.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/map/storage/map_file.hpp"
 
@@ -34,12 +35,16 @@ class MappingRun {
         prepare_(config.prepare),
         mapper_(config, std::move(labels),
                 {.stage_ended = [this](std::string_view stage) { times_.end_stage(stage); },
-                 .pose_found = {}}) {}
+                 .pose_found = {}}),
+        imu_(dataset.imu()),
+        period_s_(config.sensor.period_s) {}
 
   void map_scan(std::size_t index) {
     std::optional<DatasetFrame> frame = read(index);
     if (!frame) return;
     const std::vector<std::uint16_t> true_ids = true_ids_of_kept_points(*frame, prepare_);
+    for (const ImuSample& sample : imu_.take_up_to_end_of(frame->scan, period_s_))
+      mapper_.add(sample);
     times_.begin();
     std::optional<Eigen::Isometry3d> T_map_lidar_first;
     const bool is_mounted = !T_body_lidar_.isApprox(Eigen::Isometry3d::Identity());
@@ -67,6 +72,7 @@ class MappingRun {
     result_.view = std::make_shared<const MapSnapshot>(std::move(map.view));
     result_.tile_evidence = std::move(map.tile_evidence);
     result_.label_source = mapper_.label_source();
+    result_.imu = mapper_.inertial().counts();
     result_.stages = times_.stages();
     result_.stopped = stopped;
     return std::move(result_);
@@ -95,6 +101,8 @@ class MappingRun {
   PrepareConfig prepare_;
   StageStopwatch times_;
   Mapper mapper_;
+  ImuFeed imu_;
+  double period_s_;
   MappingResult result_;
 };
 

@@ -51,6 +51,8 @@ struct MappingResult {
   std::string label_source;
   std::vector<SkippedScan> skipped;
   std::map<OdometryHealth, std::size_t> health;
+  /// What became of the samples of the data set's IMU.
+  InertialCounts imu;
   /// Against the moving ids of the data set, where it has labels.
   evaluation::MovingScore moving;
   std::vector<StageDurations> stages;

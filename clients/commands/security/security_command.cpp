@@ -28,6 +28,7 @@ void save_topic_names(const dds::TopicNames& names, const std::filesystem::path&
   std::ofstream out(file);
   out << Json{{"points", names.points},
               {"odometry_prior", names.odometry_prior},
+              {"imu", names.imu},
               {"namespace", names.name_space}}
              .dump(2)
       << "\n";
@@ -43,6 +44,7 @@ dds::TopicNames load_topic_names(const std::filesystem::path& authority_folder) 
     const auto json = nlohmann::json::parse(in);
     return {.points = json.at("points"),
             .odometry_prior = json.at("odometry_prior"),
+            .imu = json.value("imu", std::string()),
             .name_space = json.at("namespace")};
   } catch (const nlohmann::json::exception& error) {
     throw dds::SecurityError(file.string() + " does not name the topics (" + error.what() +
@@ -181,6 +183,7 @@ void add_security_init_command(CommandHandle security, Action& action) {
       .option("--odometry-prior", arguments->names.odometry_prior,
               "Topic of the odometry prior; empty: none")
       .with_default();
+  command.option("--imu", arguments->names.imu, "Topic of the IMU; empty: none").with_default();
   command.option("--server", arguments->names.name_space, "First part of the server's topic names")
       .with_default();
   command.option("--days", arguments->days, "How long the identities are valid")

@@ -1,3 +1,4 @@
+#include <filesystem>
 #include <iostream>
 #include <memory>
 
@@ -6,7 +7,9 @@
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
+#include "core/dataset/imu_file.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
+#include "core/simulation/simulated_imu.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -14,6 +17,7 @@ namespace {
 struct SimulateArguments {
   std::string out;
   SimulationArguments simulation;
+  bool imu = false;
   bool json = false;
 };
 
@@ -23,7 +27,7 @@ struct Written {
 };
 
 Written write_sequence(const std::string& folder, const simulation::Simulation& simulation,
-                       StopSignal& stop) {
+                       bool imu, StopSignal& stop) {
   KittiSequenceWriter writer(folder);
   const int scans = simulation.config().scans;
   Progress progress("simulate", "scans", static_cast<std::uint64_t>(scans));
@@ -36,6 +40,7 @@ Written write_sequence(const std::string& folder, const simulation::Simulation& 
     progress.update(static_cast<std::uint64_t>(written.scans));
   }
   writer.finish();
+  if (imu) write_imu_csv(std::filesystem::path(folder) / "imu.csv", simulated_imu(simulation));
   return written;
 }
 
@@ -43,7 +48,7 @@ ExitCode run(const SimulateArguments& arguments) {
   StopSignal stop;
   const simulation::SimulationConfig config = simulation_config(arguments.simulation);
   const simulation::Simulation simulation(config);
-  const Written written = write_sequence(arguments.out, simulation, stop);
+  const Written written = write_sequence(arguments.out, simulation, arguments.imu, stop);
   if (arguments.json) {
     std::cout << Json{{"folder", arguments.out},      {"city", config.plan.name},
                       {"sensor", config.sensor.name}, {"seed", config.seed},
@@ -91,6 +96,8 @@ void add_simulate_command(CommandHandle program, Action& action) {
       .with_default();
   add_mount_option(command, simulation.mount,
                    "Not upright above the middle of its vehicle, but there");
+  command.flag("--imu", arguments->imu,
+               "Write imu.csv, too: an IMU at the lidar, 200 Hz, with noise and bias");
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"

@@ -1,0 +1,43 @@
+#include "core/inertial/gyro_trust.hpp"
+
+#include <algorithm>
+
+namespace stillmap {
+namespace {
+
+/// Rotation that must have been foretold: 2 degrees in all, and the share that may be missed.
+constexpr double proof_rad = 0.035;
+constexpr double max_missed_share = 0.1;
+/// Older scans count this much less with each scan.
+constexpr double proof_memory = 0.95;
+constexpr double recent_memory = 0.7;
+/// Registration itself errs by this much [rad].
+constexpr double registration_error_rad = 0.0025;
+
+constexpr double square(double x) { return x * x; }
+
+}  // namespace
+
+void GyroTrust::add(const Eigen::Vector3d& registered, const Eigen::Vector3d& missed_by_gyro,
+                    const Eigen::Vector3d& missed_by_repetition) {
+  const auto forget = [](double& sum, double memory, double squared) {
+    sum = memory * sum + (1.0 - memory) * squared;
+  };
+  forget(recent_missed_, recent_memory, missed_by_gyro.squaredNorm());
+  forget(recent_missed_by_repetition_, recent_memory, missed_by_repetition.squaredNorm());
+  if (is_believed_) {
+    const double bearable =
+        std::max(square(registration_error_rad), 0.5 * recent_missed_by_repetition_);
+    if (recent_missed_ <= bearable) return;
+    is_believed_ = false;
+    losses_ += 1;
+    registered_ = missed_ = 0.0;
+    return;
+  }
+  registered_ = proof_memory * registered_ + registered.squaredNorm();
+  missed_ = proof_memory * missed_ + missed_by_gyro.squaredNorm();
+  is_believed_ =
+      registered_ > square(proof_rad) && missed_ < square(max_missed_share) * registered_;
+}
+
+}  // namespace stillmap

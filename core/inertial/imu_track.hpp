@@ -1,0 +1,71 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <deque>
+#include <optional>
+
+#include "core/inertial/imu_sample.hpp"
+
+namespace stillmap {
+
+/// What becomes of a sample.
+enum class ImuSampleFate {
+  taken,
+  /// NaN or infinity, or a rate or acceleration that no IMU measures.
+  not_usable,
+  /// Not after the last one.
+  out_of_order,
+};
+
+/// An IMU's mean measurement while it moved steadily.
+struct SteadyMean {
+  Eigen::Vector3d angular_velocity_imu = Eigen::Vector3d::Zero();
+  /// Unit vector against gravity.
+  Eigen::Vector3d up_imu = Eigen::Vector3d::UnitZ();
+  double duration_s = 0.0;
+};
+
+/// The last samples of an IMU. Times are those of its stamps.
+class ImuTrack {
+ public:
+  /// Longest time between two samples over which rates are interpolated.
+  static constexpr std::int64_t max_gap_ns = 50'000'000;
+
+  /// After many samples that are not after the last one the clock was set: the track starts over.
+  [[nodiscard]] ImuSampleFate add(const ImuSample& sample);
+
+  /// Takes directions of the IMU at `to_ns` to those at `from_ns`, by its rates less `bias_imu`
+  /// [rad/s]. Nothing where samples are missing, or say the same again and again.
+  [[nodiscard]] std::optional<Eigen::Quaterniond> rotation(std::int64_t from_ns, std::int64_t to_ns,
+                                                           const Eigen::Vector3d& bias_imu) const;
+
+  /// Rate of turn [rad/s]; nothing where samples are missing.
+  [[nodiscard]] std::optional<Eigen::Vector3d> rate_at(std::int64_t time_ns) const;
+
+  /// Nothing where the IMU was shaken or turned between these times, or has too few samples.
+  [[nodiscard]] std::optional<SteadyMean> steady_mean(std::int64_t from_ns,
+                                                      std::int64_t to_ns) const;
+
+ private:
+  struct Entry {
+    ImuSample sample;
+    /// Samples in a row up to this one that say the same.
+    int repetitions = 0;
+  };
+  using Entries = std::deque<Entry>;
+
+  /// The last entry that is not after `time_ns`, where one follows it closely.
+  [[nodiscard]] Entries::const_iterator before(std::int64_t time_ns) const;
+
+  Entries entries_;
+  int out_of_order_ = 0;
+};
+
+/// Rotation vector of q, of at most pi [rad].
+[[nodiscard]] Eigen::Vector3d rotation_vector(const Eigen::Quaterniond& q);
+
+/// Inverse of rotation_vector.
+[[nodiscard]] Eigen::Quaterniond rotation_by(const Eigen::Vector3d& rotation_vector);
+
+}  // namespace stillmap

@@ -1,0 +1,104 @@
+#include "core/inertial/inertial_tracker.hpp"
+
+#include <cmath>
+
+namespace stillmap {
+namespace {
+
+/// A sweep's rotation is told at times this far apart at most [s].
+constexpr double sweep_step_s = 0.0025;
+constexpr int max_sweep_steps = 400;
+/// Up is the mean over this time.
+constexpr std::int64_t up_window_ns = 500'000'000;
+/// The lidar rests when it turns by less than this from pose to pose, and the
+/// rate is a bias when it is the mean over at least this time [rad, s].
+constexpr double max_rest_rotation_rad = 0.0015;
+constexpr double min_rest_s = 0.08;
+
+double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
+std::int64_t nanoseconds(double s) { return std::llround(s * 1e9); }
+
+}  // namespace
+
+InertialTracker::InertialTracker(const std::optional<ImuMount>& mount)
+    : mount_is_known_(mount.has_value()),
+      R_lidar_imu_(mount.value_or(ImuMount{}).R_lidar_imu),
+      calibration_(mount.value_or(ImuMount{}).time_offset_s) {}
+
+void InertialTracker::add(const ImuSample& sample) {
+  counts_.samples += 1;
+  const ImuSampleFate fate = track_.add(sample);
+  counts_.not_usable += fate == ImuSampleFate::not_usable ? 1 : 0;
+  counts_.out_of_order += fate == ImuSampleFate::out_of_order ? 1 : 0;
+}
+
+InertialCounts InertialTracker::counts() const {
+  InertialCounts counts = counts_;
+  counts.trust_losses = static_cast<std::uint64_t>(trust_.losses());
+  return counts;
+}
+
+std::int64_t InertialTracker::imu_time(std::int64_t lidar_ns) const {
+  return lidar_ns + nanoseconds(calibration_.time_offset_s());
+}
+
+std::optional<Eigen::Matrix3d> InertialTracker::rotation_lidar(std::int64_t from_ns,
+                                                               std::int64_t to_ns) const {
+  const auto R_from_to =
+      track_.rotation(imu_time(from_ns), imu_time(to_ns), calibration_.bias_imu());
+  if (!R_from_to) return std::nullopt;
+  return (R_lidar_imu_ * *R_from_to * R_lidar_imu_.conjugate()).toRotationMatrix();
+}
+
+std::optional<InertialMotion> InertialTracker::motion(std::int64_t last_ns, std::int64_t stamp_ns,
+                                                      const SweepTimes& sweep) {
+  if (!trust_.is_believed()) return std::nullopt;
+  const std::int64_t middle_ns = stamp_ns + nanoseconds(sweep.middle_s);
+  const int steps = static_cast<int>(
+      std::min<double>(max_sweep_steps, std::ceil(sweep.duration_s / sweep_step_s)));
+  InertialMotion motion;
+  const auto R_last_middle = rotation_lidar(last_ns, middle_ns);
+  bool is_whole = R_last_middle.has_value();
+  if (is_whole) motion.R_last_middle = *R_last_middle;
+  for (int k = 0; k <= steps && steps > 0 && is_whole; ++k) {
+    const double part = static_cast<double>(k) / steps - 0.5;
+    const auto R_middle_at =
+        rotation_lidar(middle_ns, middle_ns + nanoseconds(part * sweep.duration_s));
+    is_whole = R_middle_at.has_value();
+    if (is_whole) motion.R_middle_at.push_back(*R_middle_at);
+  }
+  (is_whole ? counts_.scans_helped : counts_.scans_without_samples) += 1;
+  if (!is_whole) return std::nullopt;
+  return motion;
+}
+
+std::optional<Eigen::Vector3d> InertialTracker::up_lidar(std::int64_t time_ns) const {
+  if (!mount_is_known_) return std::nullopt;
+  const auto mean = track_.steady_mean(imu_time(time_ns - up_window_ns), imu_time(time_ns));
+  if (!mean) return std::nullopt;
+  return R_lidar_imu_ * mean->up_imu;
+}
+
+void InertialTracker::learn(std::int64_t from_ns, std::int64_t to_ns,
+                            const Eigen::Matrix3d& R_from_to) {
+  const double duration_s = seconds(to_ns - from_ns);
+  if (!(duration_s > 0.0)) return;
+  const Eigen::Vector3d registered = rotation_vector(Eigen::Quaterniond(R_from_to));
+  const auto last_rate = last_rate_lidar_;
+  last_rate_lidar_ = registered / duration_s;
+  const auto R_gyro = rotation_lidar(from_ns, to_ns);
+  const auto rate_from = track_.rate_at(imu_time(from_ns));
+  const auto rate_to = track_.rate_at(imu_time(to_ns));
+  if (!R_gyro || !rate_from || !rate_to) return;
+  const Eigen::Vector3d missing =
+      rotation_vector(Eigen::Quaterniond(R_gyro->transpose() * R_from_to));
+  if (last_rate) trust_.add(registered, missing, registered - duration_s * *last_rate);
+  (void)calibration_.learn_from_rotation(R_lidar_imu_.conjugate() * missing, duration_s,
+                                         *rate_to - *rate_from);
+  if (registered.norm() > max_rest_rotation_rad) return;
+  const auto mean = track_.steady_mean(imu_time(from_ns), imu_time(to_ns));
+  if (mean && mean->duration_s >= min_rest_s)
+    calibration_.learn_at_rest(mean->angular_velocity_imu);
+}
+
+}  // namespace stillmap

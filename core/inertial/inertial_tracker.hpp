@@ -1,0 +1,75 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+
+#include "core/inertial/gyro_calibration.hpp"
+#include "core/inertial/gyro_trust.hpp"
+#include "core/inertial/imu_track.hpp"
+#include "core/inertial/inertial_motion.hpp"
+#include "core/lidar/imu_mount.hpp"
+#include "core/lidar/prepare.hpp"
+
+namespace stillmap {
+
+/// What has become of an IMU's samples.
+struct InertialCounts {
+  std::uint64_t samples = 0;
+  std::uint64_t not_usable = 0;
+  std::uint64_t out_of_order = 0;
+  /// Scans whose rotation the IMU told, and scans that samples were missing for, as they came too
+  /// late, had a gap or said the same again and again.
+  std::uint64_t scans_helped = 0;
+  std::uint64_t scans_without_samples = 0;
+  /// How often the gyro was no longer believed (see GyroTrust).
+  std::uint64_t trust_losses = 0;
+};
+
+/// Follows an IMU that is fixed to the lidar: tells the lidar's rotation and which way is up, and
+/// learns bias and delay from the poses that are found. Times are the lidar's. Reads no clock.
+class InertialTracker {
+ public:
+  explicit InertialTracker(const std::optional<ImuMount>& mount);
+
+  void add(const ImuSample& sample);
+
+  /// The lidar's rotation from `last_ns` to the middle of a sweep, and within it. Nothing where
+  /// samples are missing, or before the gyro is believed.
+  [[nodiscard]] std::optional<InertialMotion> motion(std::int64_t last_ns, std::int64_t stamp_ns,
+                                                     const SweepTimes& sweep);
+
+  /// Unit vector against gravity along the lidar's axes, from up to half a second before this time;
+  /// nothing where the lidar was shaken or turned, or the mount is not known.
+  [[nodiscard]] std::optional<Eigen::Vector3d> up_lidar(std::int64_t time_ns) const;
+
+  /// The lidar's rotation between two times was found by registration.
+  void learn(std::int64_t from_ns, std::int64_t to_ns, const Eigen::Matrix3d& R_from_to);
+
+  /// The next pose does not go on from the last one that was learnt.
+  void forget_motion() { last_rate_lidar_.reset(); }
+
+  /// False before the first sample.
+  [[nodiscard]] bool has_samples() const { return counts_.samples > 0; }
+  [[nodiscard]] bool is_believed() const { return trust_.is_believed(); }
+  [[nodiscard]] const GyroCalibration& calibration() const { return calibration_; }
+  [[nodiscard]] InertialCounts counts() const;
+
+  /// What the IMU's stamps say at this time.
+  [[nodiscard]] std::int64_t imu_time(std::int64_t lidar_ns) const;
+
+ private:
+  [[nodiscard]] std::optional<Eigen::Matrix3d> rotation_lidar(std::int64_t from_ns,
+                                                              std::int64_t to_ns) const;
+
+  bool mount_is_known_;
+  Eigen::Quaterniond R_lidar_imu_;
+  ImuTrack track_;
+  GyroCalibration calibration_;
+  GyroTrust trust_;
+  InertialCounts counts_;
+  /// Mean rate of turn between the last two poses [rad/s].
+  std::optional<Eigen::Vector3d> last_rate_lidar_;
+};
+
+}  // namespace stillmap

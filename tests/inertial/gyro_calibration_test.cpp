@@ -1,0 +1,46 @@
+#include "core/inertial/gyro_calibration.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace stillmap {
+namespace {
+
+TEST(GyroCalibration, FindsBiasAndDelayFromRotationsWithNoise) {
+  const Eigen::Vector3d bias(0.01, -0.006, 0.004);
+  constexpr double delay_s = 0.012;
+  GyroCalibration calibration(0.0);
+  std::mt19937 random(1);
+  std::normal_distribution<double> noise(0.0, 0.0005);
+  for (int k = 0; k < 200; ++k) {
+    const Eigen::Vector3d change(0.3 * std::sin(k), 0.2 * std::cos(1.3 * k),
+                                 0.8 * std::sin(0.7 * k));
+    const Eigen::Vector3d missing = -0.1 * (bias - calibration.bias_imu()) +
+                                    (delay_s - calibration.time_offset_s()) * change +
+                                    Eigen::Vector3d(noise(random), noise(random), noise(random));
+    EXPECT_TRUE(calibration.learn_from_rotation(missing, 0.1, change));
+  }
+  EXPECT_LT((calibration.bias_imu() - bias).norm(), 0.001);
+  EXPECT_NEAR(calibration.time_offset_s(), delay_s, 0.0005);
+}
+
+TEST(GyroCalibration, LearnsTheBiasAtRestAtOnce) {
+  GyroCalibration calibration(0.0);
+  const Eigen::Vector3d bias(0.008, 0.002, -0.005);
+  calibration.learn_at_rest(bias);
+  EXPECT_LT((calibration.bias_imu() - bias).norm(), 1e-4);
+}
+
+TEST(GyroCalibration, LearnsNothingFromWhatNoBiasExplains) {
+  GyroCalibration calibration(0.0);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(calibration.learn_from_rotation({0.0, 0.0, 1.0}, 0.1, Eigen::Vector3d::Zero()));
+  EXPECT_FALSE(calibration.learn_from_rotation({nan, 0.0, 0.0}, 0.1, Eigen::Vector3d::Zero()));
+  EXPECT_EQ(calibration.bias_imu(), Eigen::Vector3d(0.0, 0.0, 0.0));
+}
+
+}  // namespace
+}  // namespace stillmap

@@ -1,0 +1,126 @@
+#include "core/inertial/imu_track.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace stillmap {
+namespace {
+
+constexpr std::int64_t ms = 1'000'000;
+
+/// Turns that differ a little, as noise has it.
+ImuSample turning_sample(std::int64_t stamp_ns, double rate_z) {
+  const double noise = 1e-7 * static_cast<double>(stamp_ns / ms % 3);
+  return {stamp_ns, {0.0, noise, rate_z}, {0.0, 0.0, 9.81}};
+}
+
+/// `rate(t)` about z at 200 Hz from 0 to 1 s.
+template <typename Rate>
+ImuTrack turning_track(Rate rate) {
+  ImuTrack track;
+  for (int k = 0; k <= 200; ++k)
+    EXPECT_EQ(track.add(turning_sample(k * 5 * ms, rate(0.005 * k))), ImuSampleFate::taken);
+  return track;
+}
+
+double yaw_between(const ImuTrack& track, std::int64_t from_ns, std::int64_t to_ns) {
+  const auto R = track.rotation(from_ns, to_ns, Eigen::Vector3d::Zero());
+  EXPECT_TRUE(R);
+  return R ? rotation_vector(*R).z() : std::numeric_limits<double>::quiet_NaN();
+}
+
+TEST(ImuTrack, IntegratesRatesThatChange) {
+  const ImuTrack track = turning_track([](double t) { return 2.0 * t; });
+  EXPECT_NEAR(yaw_between(track, 0, 1000 * ms), 1.0, 1e-6);
+  EXPECT_NEAR(yaw_between(track, 251 * ms, 503 * ms), 0.503 * 0.503 - 0.251 * 0.251, 1e-6);
+  EXPECT_NEAR(yaw_between(track, 503 * ms, 251 * ms), 0.251 * 0.251 - 0.503 * 0.503, 1e-6);
+  EXPECT_NEAR(yaw_between(track, 400 * ms, 400 * ms), 0.0, 1e-12);
+}
+
+TEST(ImuTrack, TurnsAboutAxesThatTurnWithIt) {
+  // A quarter about x, then one about the new z.
+  ImuTrack track;
+  const double rate = 0.5 * M_PI;
+  for (int k = 0; k <= 400; ++k) {
+    ImuSample sample = turning_sample(k * 5 * ms, 0.0);
+    sample.angular_velocity_imu[k < 200 ? 0 : 2] = rate;
+    ASSERT_EQ(track.add(sample), ImuSampleFate::taken);
+  }
+  const auto R = track.rotation(0, 2000 * ms, Eigen::Vector3d::Zero());
+  ASSERT_TRUE(R);
+  const Eigen::Quaterniond expected = rotation_by(0.5 * M_PI * Eigen::Vector3d::UnitX()) *
+                                      rotation_by(0.5 * M_PI * Eigen::Vector3d::UnitZ());
+  EXPECT_LT(R->angularDistance(expected), 0.01);
+}
+
+TEST(ImuTrack, TakesTheBiasOff) {
+  const ImuTrack track = turning_track([](double) { return 0.3; });
+  const auto R = track.rotation(0, 1000 * ms, {0.0, 0.0, 0.3});
+  ASSERT_TRUE(R);
+  EXPECT_LT(rotation_vector(*R).norm(), 1e-6);
+}
+
+TEST(ImuTrack, KnowsNothingBeyondItsSamplesOrAcrossGaps) {
+  ImuTrack track = turning_track([](double) { return 1.0; });
+  const Eigen::Vector3d no_bias = Eigen::Vector3d::Zero();
+  EXPECT_FALSE(track.rotation(-1, 100 * ms, no_bias));
+  EXPECT_FALSE(track.rotation(900 * ms, 1001 * ms, no_bias));
+  EXPECT_TRUE(track.rotation(900 * ms, 1000 * ms, no_bias));
+  for (int k = 0; k < 100; ++k)
+    ASSERT_EQ(track.add(turning_sample((1100 + 5 * k) * ms, 1.0)), ImuSampleFate::taken);
+  EXPECT_FALSE(track.rotation(990 * ms, 1110 * ms, no_bias));
+  EXPECT_FALSE(track.rate_at(1050 * ms));
+  EXPECT_TRUE(track.rotation(1100 * ms, 1110 * ms, no_bias));
+  EXPECT_FALSE(ImuTrack().rotation(0, 1, no_bias));
+}
+
+TEST(ImuTrack, DoesNotBelieveAFrozenSensor) {
+  ImuTrack track = turning_track([](double) { return 1.0; });
+  ImuSample frozen = turning_sample(1000 * ms, 1.0);
+  for (int k = 1; k <= 100; ++k) {
+    frozen.stamp_ns += 5 * ms;
+    ASSERT_EQ(track.add(frozen), ImuSampleFate::taken);
+  }
+  EXPECT_FALSE(track.rotation(1300 * ms, 1400 * ms, Eigen::Vector3d::Zero()));
+  EXPECT_TRUE(track.rotation(900 * ms, 1000 * ms, Eigen::Vector3d::Zero()));
+}
+
+TEST(ImuTrack, LeavesOutWhatIsNoMeasurement) {
+  ImuTrack track;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_EQ(track.add({0, {nan, 0.0, 0.0}, {0.0, 0.0, 9.8}}), ImuSampleFate::not_usable);
+  EXPECT_EQ(track.add({0, {0.0, 0.0, 0.0}, {0.0, nan, 9.8}}), ImuSampleFate::not_usable);
+  EXPECT_EQ(track.add({0, {1e4, 0.0, 0.0}, {0.0, 0.0, 9.8}}), ImuSampleFate::not_usable);
+  EXPECT_EQ(track.add(turning_sample(5 * ms, 0.0)), ImuSampleFate::taken);
+  EXPECT_EQ(track.add(turning_sample(5 * ms, 0.0)), ImuSampleFate::out_of_order);
+  EXPECT_EQ(track.add(turning_sample(4 * ms, 0.0)), ImuSampleFate::out_of_order);
+}
+
+TEST(ImuTrack, GoesOnAfterItsClockWasSetBack) {
+  ImuTrack track;
+  ASSERT_EQ(track.add(turning_sample(3'600'000 * ms, 1.0)), ImuSampleFate::taken);
+  for (int k = 0; k < 300; ++k) (void)track.add(turning_sample(k * 5 * ms, 1.0));
+  EXPECT_NEAR(yaw_between(track, 1000 * ms, 1400 * ms), 0.4, 1e-6);
+}
+
+TEST(ImuTrack, TellsUpOnlyWhereItMovesSteadily) {
+  ImuTrack track;
+  const Eigen::Vector3d up = Eigen::Vector3d(0.3, -0.2, 0.9).normalized();
+  for (int k = 0; k < 200; ++k) {
+    const double shaken = k < 100 ? 0.0 : (k % 2 == 0 ? 3.0 : -3.0);
+    const Eigen::Vector3d noise(0.01 * (k % 3), shaken, 0.01 * (k % 5));
+    ASSERT_EQ(track.add({k * 5 * ms, {0.001 * (k % 2), 0.0, 0.004}, 9.81 * up + noise}),
+              ImuSampleFate::taken);
+  }
+  const auto steady = track.steady_mean(0, 490 * ms);
+  ASSERT_TRUE(steady);
+  EXPECT_LT(std::acos(steady->up_imu.dot(up)), 0.005);
+  EXPECT_NEAR(steady->angular_velocity_imu.z(), 0.004, 1e-9);
+  EXPECT_FALSE(track.steady_mean(500 * ms, 990 * ms));
+  EXPECT_FALSE(track.steady_mean(0, 20 * ms));
+}
+
+}  // namespace
+}  // namespace stillmap
