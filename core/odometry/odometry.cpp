@@ -114,6 +114,11 @@ struct Odometry::State {
                    FeatureSets& features, OdometryResult& result) const;
   [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
                                              const PosePrediction& prediction) const;
+  /// Looked for by few features, then registered by all.
+  [[nodiscard]] OdometryResult relocalized(const FeatureSets& features,
+                                           std::span<const LabelledPoint> points_map,
+                                           const Eigen::Isometry3d& T_map_lidar_guess,
+                                           double reach_m) const;
   [[nodiscard]] SweepPrior sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,
                                        const SweepMotion& motion) const;
   void extend_map(const ScanInParts& parts, const Step& step,
@@ -188,11 +193,21 @@ Eigen::Isometry3d Odometry::State::motion_to_middle(
   return motion_of(twist);
 }
 
+OdometryResult Odometry::State::relocalized(const FeatureSets& features,
+                                            std::span<const LabelledPoint> points_map,
+                                            const Eigen::Isometry3d& T_map_lidar_guess,
+                                            double reach_m) const {
+  const OdometryResult found =
+      relocalize(thinned(features), points_map, map, T_map_lidar_guess, config, reach_m);
+  if (found.health == OdometryHealth::lost) return found;
+  return register_features(features, map, found.T_map_lidar, config, found.sweep_correction);
+}
+
 OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
                                               const PosePrediction& prediction) const {
   if (!started) {
     if (prior_map.empty()) return OdometryResult{.T_map_lidar = prediction.T_map_lidar};
-    return relocalize(features, prior_map, map, prediction.T_map_lidar, config);
+    return relocalized(features, prior_map, prediction.T_map_lidar, relocalization_reach_m);
   }
   // Until the place is known, few features tell it sooner.
   OdometryResult found = search_pose(lost_scans > 0 ? thinned(features) : features, map, last,
@@ -201,15 +216,12 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
     found = register_features(features, map, found.T_map_lidar, config, found.sweep_correction);
   if (found.health != OdometryHealth::lost && fits.believes(found)) return found;
   if (lost_scans % relocalization_interval == 1) {
-    std::vector<LabelledPoint> points_map = map.edges.points();
-    const std::vector<LabelledPoint> planes_map = map.planes.points();
-    points_map.insert(points_map.end(), planes_map.begin(), planes_map.end());
     const double driven_m = last.interval_s > 0.0 ? last.motion.translation().norm() *
                                                         prediction.interval_s / last.interval_s
                                                   : 0.0;
     const OdometryResult again =
-        relocalize(thinned(features), points_map, map, prediction.T_map_lidar, config,
-                   std::min(relocalization_reach_m + driven_m, max_relocalization_reach_m));
+        relocalized(features, points_of(map), prediction.T_map_lidar,
+                    std::min(relocalization_reach_m + driven_m, max_relocalization_reach_m));
     if (fits.believes_relocalized(again)) return again;
   }
   return lost_at(prediction.T_map_lidar);

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/odometry/relocalization.hpp"
 #include "core/odometry/scan_features.hpp"
 
 namespace stillmap {
@@ -19,6 +20,10 @@ constexpr double min_gain_of_other_start = 1.1;
 constexpr double short_gap_s = 1.0;
 /// After a gap of up to this the lidar may have gone straight on [s].
 constexpr double max_gap_s = 10.0;
+/// Where these fail, poses so far from the last one are judged by the landmarks alone [m], and so
+/// many are tried.
+constexpr double proposal_reach_m = 6.0;
+constexpr std::size_t max_proposals = 4;
 /// The first scans find less of the map with every step: nothing is judged by fewer than these.
 constexpr int min_fits_seen = 8;
 /// With this share of the usual fit of all its features a scan is believed where little stands up.
@@ -135,6 +140,11 @@ bool FitStatistics::fits(const OdometryResult& result) const {
   return result.health != OdometryHealth::lost && result.fit >= min_fit_share * mean_fit_;
 }
 
+bool FitStatistics::fits_poorly(const OdometryResult& result) const {
+  return result.health == OdometryHealth::lost ||
+         (are_known() && result.fit < clear_fit_share * mean_fit_);
+}
+
 bool FitStatistics::believes(const OdometryResult& result) const {
   if (!are_known()) return true;
   return (believes_relocalized(result) || result.fit >= clear_fit_share * mean_fit_) &&
@@ -170,6 +180,15 @@ OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
     const OdometryResult coarse = register_features(features, coarse_map, T, coarse_config);
     if (best.take(register_in_two_stages(features, map, coarse.T_map_lidar, config))) break;
     if (starts.size() > 1 && best.take(register_in_two_stages(features, map, T, config))) break;
+  }
+  if (fits.fits_poorly(best.result()) && !config.paper_exact) {
+    for (const Eigen::Isometry3d& T : propose_poses(features, points_of(map), last.T_map_lidar,
+                                                    proposal_reach_m, max_proposals)) {
+      // Only a clear one: somewhere in reach there is nearly always a place that looks a little
+      // alike.
+      const OdometryResult found = register_in_two_stages(features, map, T, config);
+      if (fits.fits(found) && best.take(found)) break;
+    }
   }
   return best.result();
 }

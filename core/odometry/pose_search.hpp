@@ -16,6 +16,8 @@ class FitStatistics {
 
   /// Whether a scan lies as well on the local map as scans have lately: no other start is tried.
   [[nodiscard]] bool fits(const OdometryResult& result) const;
+  /// Whether it lies so much worse that the lidar may be somewhere else.
+  [[nodiscard]] bool fits_poorly(const OdometryResult& result) const;
   /// Whether a pose can be believed; all can before enough fits are known.
   [[nodiscard]] bool believes(const OdometryResult& result) const;
   /// The same, where the scan was looked for all round: by what stands up in it alone.

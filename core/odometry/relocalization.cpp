@@ -96,20 +96,27 @@ class Search {
   std::size_t best_ = 0;
 };
 
-std::vector<Eigen::Isometry3d> proposed_poses(const FeatureSets& features,
-                                              std::span<const LabelledPoint> prior_map,
-                                              const Eigen::Isometry3d& T_map_lidar_guess,
-                                              double reach_m) {
+}  // namespace
+
+std::vector<LabelledPoint> points_of(const LocalMap& map) {
+  std::vector<LabelledPoint> points_map = map.edges.points();
+  const std::vector<LabelledPoint> planes_map = map.planes.points();
+  points_map.insert(points_map.end(), planes_map.begin(), planes_map.end());
+  return points_map;
+}
+
+std::vector<Eigen::Isometry3d> propose_poses(const FeatureSets& features,
+                                             std::span<const LabelledPoint> points_map,
+                                             const Eigen::Isometry3d& T_map_lidar_guess,
+                                             double reach_m, std::size_t count) {
   std::vector<Eigen::Vector3f> of_scan, of_map;
   for (const auto* points : {&features.edges, &features.planes, &features.surfaces})
     for (const FeaturePoint& point : *points)
       if (is_landmark(point.label)) of_scan.push_back(point.position_lidar);
-  for (const LabelledPoint& point : prior_map)
+  for (const LabelledPoint& point : points_map)
     if (is_landmark(point.label)) of_map.push_back(point.position_map);
-  return correlative_search(of_scan, of_map, T_map_lidar_guess, proposals, {.reach_m = reach_m});
+  return correlative_search(of_scan, of_map, T_map_lidar_guess, count, {.reach_m = reach_m});
 }
-
-}  // namespace
 
 void insert_prior_map(std::span<const LabelledPoint> points_map, LocalMap& map) {
   std::vector<LabelledPoint> edges;
@@ -136,7 +143,7 @@ OdometryResult relocalize(const FeatureSets& features, std::span<const LabelledP
   try_coarsely_from(T_map_lidar_guess);
   if (search.best().share >= sure_match_ratio) return search.best().result;
   for (const Eigen::Isometry3d& T :
-       proposed_poses(features, prior_map, T_map_lidar_guess, reach_m)) {
+       propose_poses(features, prior_map, T_map_lidar_guess, reach_m, proposals)) {
     search.try_from(T);
     if (search.best().share < sure_match_ratio) try_coarsely_from(T);
   }
