@@ -57,7 +57,7 @@ class PosePublisher {
   std::string odom_frame_;
   dds::Writer<nav_msgs::msg::Odometry> odometry_;
   dds::Writer<tf2_msgs::msg::TFMessage> tf_;
-  /// Only with a frame odom of our own, and for a transform that nobody else publishes.
+  /// Only with a frame odom of our own, and only with a base.
   std::optional<dds::Writer<nav_msgs::msg::Odometry>> local_odometry_;
   std::optional<dds::Writer<tf2_msgs::msg::TFMessage>> tf_static_;
   BoundedQueue<Message> queue_;

@@ -1,4 +1,5 @@
 #include <gmock/gmock.h>
+#include <signal.h>
 
 #include <map>
 #include <mutex>
@@ -242,6 +243,24 @@ TEST_F(Frames, AMountThatNeverComesIsNamed) {
   }));
 }
 
+TEST_F(Frames, AMapIsResumedByARobotWithAnotherMount) {
+  start("frames: {base: base_link}\nmount: {source: tf_static, wait_s: 60}\n");
+  dds::Writer<tf2_msgs::msg::TFMessage> robot(*participant_, topics_.tf_static.dds_name,
+                                              topics_.tf_static.writer);
+  ASSERT_TRUE(robot.write(wire::to_tf(0, {{"base_link", "lidar", tilted_mount()}})));
+  drive(0, 10, tilted_mount());
+  ASSERT_TRUE(wait_for_scans(*client_, 10));
+  server_->send(SIGTERM);
+  ASSERT_EQ(server_->wait_for_exit(patience), 0);
+
+  ASSERT_TRUE(robot.write(wire::to_tf(0, {{"base_link", "lidar", turned_mount()}})));
+  server_.emplace(setup_.server_arguments());
+  client_->wait_for_server(patience);
+  publisher_.emplace(setup_.publisher(true));
+  drive(10, 15, turned_mount());
+  expect_poses_of_base(15);
+}
+
 /// A scan that shows nothing: its pose is where it is expected.
 Scan empty_air(std::int64_t stamp_ns) {
   Scan scan;
@@ -378,6 +397,7 @@ TEST_F(SeveralLidars, AreMappedAsOne) {
     ASSERT_TRUE(rear_->publish(mounted_scan(i, rear_mount()), {}, patience));
   }
   expect_poses_of_base(scans);
+  ASSERT_TRUE(wait_for_scans(*client_, scans));
   const dds::ServerStatus status = client_->status();
   EXPECT_EQ(status.counter("scans_mapped"), static_cast<std::uint64_t>(scans));
   EXPECT_EQ(status.dropped(), 0U);
@@ -397,6 +417,7 @@ TEST_F(SeveralLidars, GoOnWithoutOneThatFallsSilent) {
     ASSERT_TRUE(rear_->publish(mounted_scan(i, rear_mount()), {}, patience));
   }
   expect_poses_of_base(scans);
+  ASSERT_TRUE(wait_for_scans(*client_, scans));
   const dds::ServerStatus status = client_->status();
   EXPECT_EQ(status.counter("sweeps_without_rear"), static_cast<std::uint64_t>(scans - both));
   EXPECT_EQ(status.counter("sweeps_without_front"), 0U);
