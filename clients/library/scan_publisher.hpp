@@ -22,7 +22,7 @@ struct ScanPublisherOptions {
   /// ROS 2 name of the topic, without "rt/".
   std::string points_topic = "points";
   /// ROS 2 name of the IMU's topic; empty: no samples are published.
-  std::string imu_topic;
+  std::string imu_topic{};
   /// header.frame_id of the clouds.
   std::string lidar_frame = "lidar";
   /// Published on /tf_static, as a robot does: where the lidar sits.
