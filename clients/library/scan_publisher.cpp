@@ -28,6 +28,7 @@ struct ScanPublisher::Connection {
         topic(topic_of(options)),
         writer(shared, topic.dds_name, topic.writer) {
     publish_mount(shared);
+    open_imu(shared);
   }
 
   void publish_mount(dds::Participant& participant) {
@@ -36,7 +37,6 @@ struct ScanPublisher::Connection {
     mount_writer.emplace(participant, tf_static.dds_name, tf_static.writer);
     // A keep-last writer always has room, and keeps it for subscribers that come later.
     static_cast<void>(mount_writer->write(wire::to_tf(0, {*options.mount})));
-    open_imu(shared);
   }
 
   static dds::TopicSpec<sensor_msgs::msg::PointCloud2> topic_of(

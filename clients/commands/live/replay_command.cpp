@@ -347,9 +347,9 @@ ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   PoseLog poses(client);
   ScanPublisher publisher(client, {.dds = arguments.client.dds(DdsRole::sensor),
                                    .points_topic = arguments.topic,
+                                   .imu_topic = imu.empty() ? "" : arguments.imu_topic,
                                    .lidar_frame = arguments.frame,
                                    .mount = mount_of(arguments),
-                                   .imu_topic = imu.empty() ? "" : arguments.imu_topic,
                                    .lossless = arguments.lossless});
   require_subscribers(publisher, arguments, stop);
   // Found with the scans' subscriber; a server need not have one.
