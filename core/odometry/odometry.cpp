@@ -114,11 +114,6 @@ struct Odometry::State {
                    FeatureSets& features, OdometryResult& result) const;
   [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
                                              const PosePrediction& prediction) const;
-  /// Looked for by few features, then registered by all.
-  [[nodiscard]] OdometryResult relocalized(const FeatureSets& features,
-                                           std::span<const LabelledPoint> points_map,
-                                           const Eigen::Isometry3d& T_map_lidar_guess,
-                                           double reach_m) const;
   [[nodiscard]] SweepPrior sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,
                                        const SweepMotion& motion) const;
   void extend_map(const ScanInParts& parts, const Step& step,
@@ -193,21 +188,12 @@ Eigen::Isometry3d Odometry::State::motion_to_middle(
   return motion_of(twist);
 }
 
-OdometryResult Odometry::State::relocalized(const FeatureSets& features,
-                                            std::span<const LabelledPoint> points_map,
-                                            const Eigen::Isometry3d& T_map_lidar_guess,
-                                            double reach_m) const {
-  const OdometryResult found =
-      relocalize(thinned(features), points_map, map, T_map_lidar_guess, config, reach_m);
-  if (found.health == OdometryHealth::lost) return found;
-  return register_features(features, map, found.T_map_lidar, config, found.sweep_correction);
-}
-
 OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
                                               const PosePrediction& prediction) const {
   if (!started) {
     if (prior_map.empty()) return OdometryResult{.T_map_lidar = prediction.T_map_lidar};
-    return relocalized(features, prior_map, prediction.T_map_lidar, relocalization_reach_m);
+    return relocalize(features, prior_map, map, prediction.T_map_lidar, config,
+                      relocalization_reach_m);
   }
   // Until the place is known, few features tell it sooner.
   OdometryResult found = search_pose(lost_scans > 0 ? thinned(features) : features, map, last,
@@ -220,8 +206,8 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
                                                         prediction.interval_s / last.interval_s
                                                   : 0.0;
     const OdometryResult again =
-        relocalized(features, points_of(map), prediction.T_map_lidar,
-                    std::min(relocalization_reach_m + driven_m, max_relocalization_reach_m));
+        relocalize(features, points_of(map), map, prediction.T_map_lidar, config,
+                   std::min(relocalization_reach_m + driven_m, max_relocalization_reach_m));
     if (fits.believes_relocalized(again)) return again;
   }
   return lost_at(prediction.T_map_lidar);

@@ -103,8 +103,10 @@ OdometryResult search_first_motion(const FeatureSets& features, const LocalMap& 
     for (int k = 0; k < first_motion_directions; ++k) {
       const double bearing = 2.0 * std::numbers::pi * k / first_motion_directions;
       const double distance_m = ring * first_motion_spacing_m;
-      try_from(T_map_lidar_predicted * Eigen::Translation3d(distance_m * std::cos(bearing),
-                                                            distance_m * std::sin(bearing), 0.0));
+      // Along the map's axes: the lidar may be mounted tilted.
+      try_from(Eigen::Translation3d(distance_m * std::cos(bearing), distance_m * std::sin(bearing),
+                                    0.0) *
+               T_map_lidar_predicted);
     }
   }
   if (best.health == OdometryHealth::lost) return lost_at(T_map_lidar_predicted);

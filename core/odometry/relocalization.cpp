@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/odometry/correlative_search.hpp"
+#include "core/odometry/scan_features.hpp"
 
 namespace stillmap {
 namespace {
@@ -135,23 +136,28 @@ OdometryResult relocalize(const FeatureSets& features, std::span<const LabelledP
   LocalMap coarse_map = make_coarse_map();
   insert_prior_map(prior_map, coarse_map);
   Search search(features, map, config);
-  const auto try_coarsely_from = [&](const Eigen::Isometry3d& T_map_lidar) {
+  const auto try_coarsely_from = [&](const FeatureSets& points,
+                                     const Eigen::Isometry3d& T_map_lidar, Search& into) {
     const OdometryResult rough =
-        register_features(features, coarse_map, T_map_lidar, coarse_registration_config(config));
-    if (rough.health != OdometryHealth::lost) search.try_from(rough.T_map_lidar);
+        register_features(points, coarse_map, T_map_lidar, coarse_registration_config(config));
+    if (rough.health != OdometryHealth::lost) into.try_from(rough.T_map_lidar);
   };
-  try_coarsely_from(T_map_lidar_guess);
+  try_coarsely_from(features, T_map_lidar_guess, search);
   if (search.best().share >= sure_match_ratio) return search.best().result;
+  // Few features tell the place sooner.
+  const FeatureSets few = thinned(features);
+  Search places(few, map, config);
+  places.try_from(search.best().share > 0.0 ? search.best().result.T_map_lidar : T_map_lidar_guess);
   for (const Eigen::Isometry3d& T :
-       propose_poses(features, prior_map, T_map_lidar_guess, reach_m, proposals)) {
-    search.try_from(T);
-    if (search.best().share < sure_match_ratio) try_coarsely_from(T);
+       propose_poses(few, prior_map, T_map_lidar_guess, reach_m, proposals)) {
+    places.try_from(T);
+    if (places.best().share < sure_match_ratio) try_coarsely_from(few, T, places);
   }
   // Refine: along a street the registration may stop short of the optimum.
-  const Eigen::Isometry3d T_map_lidar_best = search.best().result.T_map_lidar;
+  const Eigen::Isometry3d T_map_lidar_best = places.best().result.T_map_lidar;
   for (const Eigen::Vector3d& place : offsets_around(refinement_radius_m))
     search.try_from(Eigen::Translation3d(place) * T_map_lidar_best);
-  if (search.best().share >= min_match_ratio && search.is_unique()) return search.best().result;
+  if (search.best().share >= min_match_ratio && places.is_unique()) return search.best().result;
   // Against an empty map the registration returns the guess as lost.
   return register_features(features, make_coarse_map(), T_map_lidar_guess, config);
 }
