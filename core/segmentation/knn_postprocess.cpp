@@ -97,10 +97,13 @@ using Numbers = std::int32_t __attribute__((vector_size(lanes * sizeof(std::int3
 using Keys = double __attribute__((vector_size(lanes * sizeof(double))));
 constexpr std::uint64_t pixel_bits = 0xFFFF;
 static_assert(KnnConfig::max_window * KnnConfig::max_window <= pixel_bits);
+/// Added to every key: one step of the exponent. Without it distance 0 gives denormal numbers,
+/// which are all zero to a processor that a library told to treat them so (DAZ).
+constexpr std::uint64_t exponent_step = std::uint64_t{1} << 52U;
 
 Keys keys_of(Floats distance_m, std::uint64_t pixel) {
-  return std::bit_cast<Keys>(std::bit_cast<Words>(__builtin_convertvector(distance_m, Keys)) |
-                             pixel);
+  const Words bits = std::bit_cast<Words>(__builtin_convertvector(distance_m, Keys));
+  return std::bit_cast<Keys>((bits + exponent_step) | pixel);
 }
 
 /// For each lane the pixels nearest in range, in ascending order of distance, then of index.
@@ -121,7 +124,7 @@ class NearestPixels {
   }
 
   [[nodiscard]] float distance_m(std::size_t k, std::size_t p) const {
-    return static_cast<float>(std::bit_cast<double>(bits(k, p) & ~pixel_bits));
+    return static_cast<float>(std::bit_cast<double>((bits(k, p) & ~pixel_bits) - exponent_step));
   }
   [[nodiscard]] std::size_t pixel(std::size_t k, std::size_t p) const {
     return bits(k, p) & pixel_bits;

@@ -1,6 +1,9 @@
 #include "core/segmentation/knn_postprocess.hpp"
 
 #include <gtest/gtest.h>
+#ifdef __SSE3__
+#include <pmmintrin.h>
+#endif
 
 #include <algorithm>
 #include <array>
@@ -136,6 +139,17 @@ TEST(KnnPostprocess, EqualsThePlainReferenceWithOtherParameters) {
 TEST(KnnPostprocess, EqualsThePlainReferenceWithItsQuirk) {
   expect_like_reference({.car_without_votes = true});
 }
+
+#ifdef __SSE3__
+TEST(KnnPostprocess, EqualsThePlainReferenceWhereDenormalNumbersAreZero) {
+  // As libraries for neural networks leave the processor.
+  const unsigned before = _mm_getcsr();
+  _mm_setcsr(before | _MM_FLUSH_ZERO_ON | _MM_DENORMALS_ZERO_ON);
+  expect_like_reference({.neighbours = 7, .window = 7, .sigma = 1.5, .cutoff_m = 2.0});
+  expect_like_reference({});
+  _mm_setcsr(before);
+}
+#endif
 
 TEST(KnnPostprocess, GivesAHiddenPointTheClassOfItsSurroundings) {
   // A pole at 5 m, and a wall at 10 m of which one point lies behind the pole in its pixel.
