@@ -98,7 +98,7 @@ using Keys = double __attribute__((vector_size(lanes * sizeof(double))));
 constexpr std::uint64_t pixel_bits = 0xFFFF;
 static_assert(KnnConfig::max_window * KnnConfig::max_window <= pixel_bits);
 /// Added to every key: one step of the exponent. Without it distance 0 gives denormal numbers,
-/// which are all zero to a processor that a library told to treat them so (DAZ).
+/// which are all zero to a processor that was told to treat them so (DAZ).
 constexpr std::uint64_t exponent_step = std::uint64_t{1} << 52U;
 
 Keys keys_of(Floats distance_m, std::uint64_t pixel) {

@@ -142,7 +142,7 @@ TEST(KnnPostprocess, EqualsThePlainReferenceWithItsQuirk) {
 
 #ifdef __SSE3__
 TEST(KnnPostprocess, EqualsThePlainReferenceWhereDenormalNumbersAreZero) {
-  // As libraries for neural networks leave the processor.
+  // Libraries may leave the processor so.
   const unsigned before = _mm_getcsr();
   _mm_setcsr(before | _MM_FLUSH_ZERO_ON | _MM_DENORMALS_ZERO_ON);
   expect_like_reference({.neighbours = 7, .window = 7, .sigma = 1.5, .cutoff_m = 2.0});
