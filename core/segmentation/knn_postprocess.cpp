@@ -222,7 +222,7 @@ class NeighbourVote {
   template <class Nearest>
   [[nodiscard]] Decision count_votes(const Nearest& nearest, std::size_t p,
                                      std::size_t corner) const {
-    std::array<SemanticClass, KnnConfig::max_neighbours> voted;
+    std::array<SemanticClass, KnnConfig::max_neighbours> voted{};
     const auto wanted = static_cast<std::size_t>(config_.neighbours);
     const auto cutoff_m = static_cast<float>(config_.cutoff_m);
     std::size_t votes = 0;
