@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 
 #include "core/lidar/scan.hpp"
 
@@ -18,6 +19,9 @@ struct KittiLidar {
   /// Turns the points up, and gives them the times of a sweep that falls in azimuth from one end
   /// behind the car to the other and faces forward at the stamp. Both leave order and range alone.
   void correct(Scan& scan) const;
+
+  /// What correct() does, for those who did not ask for it.
+  [[nodiscard]] std::string in_words() const;
 };
 
 /// How azimuths step along the rings, where the range jumps: a lidar measures at even steps;

@@ -125,6 +125,11 @@ TEST(KittiLidar, TurnsPointsUpAndGivesThemTimes) {
   }
 }
 
+TEST(KittiLidar, SaysWhatItDoes) {
+  EXPECT_NE(KittiLidar{.sweep_duration_s = 0.1}.in_words().find("timed"), std::string::npos);
+  EXPECT_EQ(KittiLidar{}.in_words().find("timed"), std::string::npos);
+}
+
 TEST(KittiLidar, LeavesCompensatedScansWithoutTimes) {
   Scan scan = draw({});
   KittiLidar{}.correct(scan);

@@ -342,6 +342,7 @@ std::optional<FrameTransform> mount_of(const ReplayArguments& arguments) {
 ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
   (void)arguments.replay.range.end(dataset);
+  if (dataset.kitti_lidar()) std::cerr << "stillmap: " << dataset.kitti_lidar()->in_words() << "\n";
   ImuFeed imu(dataset.imu());
   Client client = connect(arguments.client);
   PoseLog poses(client);

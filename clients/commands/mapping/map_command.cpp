@@ -256,6 +256,7 @@ MappedBody body_of(const MapArguments& arguments) {
 MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& arguments,
                                 const MapperConfig& config, const MappedBody& body,
                                 StopSignal& stop) {
+  if (dataset.kitti_lidar()) std::cerr << "stillmap: " << dataset.kitti_lidar()->in_words() << "\n";
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
   Progress progress("map", "scans", total);
   std::size_t skipped = 0;
