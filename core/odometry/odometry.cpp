@@ -32,6 +32,8 @@ constexpr std::size_t min_static_features = 100;
 constexpr double irregularity_gain = 0.1;
 /// A stamp off the sensor's period by more than this share of it is irregular.
 constexpr double max_period_deviation = 0.1;
+/// Irregular stamps whose mean interval is the period within this share only scatter.
+constexpr double max_mean_deviation = 0.2;
 /// Objects are judged again where the registered pose is farther than this from the predicted one
 /// [m, rad].
 constexpr double judge_again_distance_m = 0.2;
@@ -147,6 +149,10 @@ struct Odometry::State {
   FitStatistics fits;
   /// Running mean of the stamps' deviation from multiples of the period, as a share of it.
   double irregularity = 0.0;
+  /// Running mean of the time between stamps.
+  double mean_interval_s = 0.0;
+  /// The last stamp as a steady clock would have set it, which follows the stamps slowly.
+  std::int64_t steady_ns = 0;
 };
 
 std::optional<RangeImageView> Odometry::State::view_of(const Scan& scan, const PointLabels& labels,
@@ -169,7 +175,14 @@ bool Odometry::State::has_velocity(std::int64_t stamp_ns) const {
 double Odometry::State::interval_to(std::int64_t stamp_ns) const {
   const double interval_s = seconds(stamp_ns - last_stamp_ns);
   const double periods = std::round(interval_s / sensor.period_s);
-  if (irregularity > max_period_deviation || periods > 10.0) return interval_s;
+  if (periods > 10.0) return interval_s;
+  if (irregularity > max_period_deviation) {
+    // Stamps that scatter about the period's own are the clock's fault, not the sensor's.
+    const bool is_scatter = std::abs(mean_interval_s / sensor.period_s - 1.0) < max_mean_deviation;
+    if (!is_scatter) return interval_s;
+    return std::max(1.0, std::round(seconds(stamp_ns - steady_ns) / sensor.period_s)) *
+           sensor.period_s;
+  }
   return std::max(1.0, periods) * sensor.period_s;
 }
 
@@ -284,8 +297,19 @@ void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeIma
     last.motion = last.T_map_lidar.inverse() * T_map_lidar_now;
     const double periods = seconds(stamp_ns - last_stamp_ns) / sensor.period_s;
     const double deviation = std::min(1.0, std::abs(periods - std::round(periods)));
+    mean_interval_s += irregularity_gain * (seconds(stamp_ns - last_stamp_ns) - mean_interval_s);
+    const double since_steady_s = seconds(stamp_ns - steady_ns);
+    const double whole_s =
+        std::max(1.0, std::round(since_steady_s / sensor.period_s)) * sensor.period_s;
+    steady_ns += std::llround(
+        1e9 * (whole_s + irregularity_gain * std::clamp(since_steady_s - whole_s, -sensor.period_s,
+                                                        sensor.period_s)));
     last.interval_s = interval_to(stamp_ns);
     irregularity += irregularity_gain * (deviation - irregularity);
+  }
+  if (!started) {
+    steady_ns = stamp_ns;
+    mean_interval_s = sensor.period_s;
   }
   started = true;
   prior_map = {};
