@@ -1,6 +1,7 @@
 #include "core/odometry/features.hpp"
 
 #include <tbb/parallel_for.h>
+#include <tsl/robin_map.h>
 
 #include <algorithm>
 #include <bit>
@@ -9,6 +10,8 @@
 #include <limits>
 #include <numeric>
 #include <span>
+
+#include "core/lidar/voxel_index.hpp"
 
 namespace stillmap {
 namespace {
@@ -224,6 +227,65 @@ std::vector<std::uint32_t> few_surfaces(const Scan& scan, const FeatureConfig& c
                           config.surface_spacing_m * std::sqrt(count / max_surfaces));
 }
 
+namespace {
+
+/// Height of what stands in every column of the scan.
+class ColumnHeights {
+ public:
+  ColumnHeights(std::span<const Eigen::Vector3f> points, std::span<const std::uint32_t> chosen) {
+    heights_.reserve(chosen.size());
+    for (const std::uint32_t i : chosen) {
+      const float z = points[i].z();
+      const auto [entry, is_new] = heights_.try_emplace(column_of(points[i]), Range{z, z});
+      if (is_new) continue;
+      entry.value().low = std::min(entry->second.low, z);
+      entry.value().high = std::max(entry->second.high, z);
+    }
+  }
+  /// The column that the point stands in is higher than level ground.
+  [[nodiscard]] bool stands_up(const Eigen::Vector3f& point) const {
+    constexpr float min_height_m = 0.6F;
+    const auto entry = heights_.find(column_of(point));
+    return entry != heights_.end() && entry->second.high - entry->second.low > min_height_m;
+  }
+
+ private:
+  struct Range {
+    float low;
+    float high;
+  };
+  static std::uint64_t column_of(const Eigen::Vector3f& point) {
+    constexpr float inverse_width = 1.0F;
+    return cube_of({point.x(), point.y(), 0.0F}, inverse_width);
+  }
+  tsl::robin_map<std::uint64_t, Range, IndexHash> heights_;
+};
+
+/// So many of them, spread evenly.
+std::vector<std::uint32_t> some_of(const std::vector<std::uint32_t>& all, std::size_t max_count) {
+  const std::size_t count = std::min(all.size(), max_count);
+  std::vector<std::uint32_t> some(count);
+  for (std::size_t k = 0; k < count; ++k) some[k] = all[k * all.size() / count];
+  return some;
+}
+
+/// Points of any kind for the alignment of points, from the `chosen` ones.
+void pick_points(const Scan& scan, std::span<const std::uint32_t> chosen, Features& features) {
+  constexpr double map_spacing_m = 0.5;
+  constexpr double spacing_m = 1.0;
+  constexpr std::size_t max_upright = 800;
+  constexpr std::size_t max_level = 300;
+  features.points = voxel_downsample(scan.points_lidar, chosen, map_spacing_m);
+  const ColumnHeights columns(scan.points_lidar, features.points);
+  std::vector<std::uint32_t> upright, level;
+  for (const std::uint32_t i : voxel_downsample(scan.points_lidar, features.points, spacing_m))
+    (columns.stands_up(scan.points_lidar[i]) ? upright : level).push_back(i);
+  features.upright_points = some_of(upright, max_upright);
+  features.level_points = some_of(level, max_level);
+}
+
+}  // namespace
+
 Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
   std::vector<std::uint32_t> all(scan.size());
   std::iota(all.begin(), all.end(), 0U);
@@ -231,6 +293,7 @@ Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
   features.planes = voxel_downsample(scan.points_lidar, all, config.map_surface_spacing_m);
   features.surfaces =
       voxel_downsample(scan.points_lidar, features.planes, config.surface_spacing_m);
+  pick_points(scan, features.planes, features);
   return features;
 }
 
@@ -255,6 +318,9 @@ Features extract_features(const Scan& scan, const FeatureConfig& config) {
   features.planes = voxel_downsample(scan.points_lidar, planes, config.map_plane_spacing_m);
   features.registered_planes =
       voxel_downsample(scan.points_lidar, features.planes, config.plane_spacing_m);
+  std::vector<std::uint32_t> all(scan.size());
+  std::iota(all.begin(), all.end(), 0U);
+  pick_points(scan, all, features);
   return features;
 }
 

@@ -80,7 +80,7 @@ struct Odometry::State {
   State(const OdometryConfig& odometry_config, const SensorModel& sensor_model)
       : config(as_used(odometry_config)),
         sensor(sensor_model),
-        map{FeatureMap(odometry_config.local_map), FeatureMap(odometry_config.local_map)},
+        map(odometry_config.local_map),
         history(odometry_config.motion) {}
 
   /// The range image of the scan for the history; nothing where none is kept.
@@ -338,8 +338,7 @@ void Odometry::State::straighten_first_scan(const FeatureSets& features, std::in
     const PoseTangent velocity =
         twist_of(last.T_map_lidar.inverse() * found.T_map_lidar) / interval_s;
     last.T_map_lidar = first.T_map_stamp * motion_of(velocity * first.sweep.middle_s);
-    map.edges.clear();
-    map.planes.clear();
+    map.clear();
     extend_local_map(map, first.features, last.T_map_lidar, velocity * first.sweep.duration_s);
     moving.sweep_prior.T_map_lidar_last = last.T_map_lidar;
     found = register_features(moving, map, last.T_map_lidar * motion_of(velocity * interval_s),
@@ -428,6 +427,8 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   FeatureSets features;
   step.result = state.find_pose(parts, prediction, features);
   state.judge_again(parts, T_map_lidar_predicted, features, step.result);
+  if (state.started && !config.paper_exact && step.result.health != OdometryHealth::lost)
+    step.result = confirmed_by_points(step.result, features, state.map, config);
   if (state.first_scan) state.straighten_first_scan(features, time_ns, sweep, step.result);
   const Eigen::Isometry3d T_map_middle = step.result.T_map_lidar;
   const Eigen::Isometry3d T_correction = motion_of(step.result.sweep_correction);

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/odometry/point_alignment.hpp"
 #include "core/odometry/relocalization.hpp"
 #include "core/odometry/scan_features.hpp"
 
@@ -12,10 +13,13 @@ namespace stillmap {
 namespace {
 
 /// Starts for the motion to the second scan: rings of this many directions [m].
-constexpr int first_motion_rings = 4;
+constexpr int first_motion_rings = 2;
 constexpr int first_motion_directions = 8;
-constexpr double first_motion_spacing_m = 0.75;
-constexpr double min_gain_of_other_start = 1.1;
+constexpr double first_motion_spacing_m = 1.5;
+constexpr double min_gain_of_other_start = 1.01;
+/// A pose that the alignment of points moves by more than this is not confirmed [m, rad].
+constexpr double max_point_deviation_m = 0.2;
+constexpr double max_point_deviation_rad = 0.035;
 /// Gaps longer than this are looked across from where the lidar was last, too [s].
 constexpr double short_gap_s = 1.0;
 /// After a gap of up to this the lidar may have gone straight on [s].
@@ -79,39 +83,84 @@ class BestStart {
   OdometryResult best_;
 };
 
-/// The motion from the first scan to the second, which may be of any speed up to 30 m/s at 10 Hz.
+/// Whether enough is left of the scan without what could move by its label.
+bool labels_tell_enough(const FeatureSets& features, const OdometryConfig& config) {
+  constexpr std::ptrdiff_t min_points = 100;
+  return config.weighting == Weighting::semantic &&
+         std::ranges::count_if(features.points, [](const FeaturePoint& point) {
+           return !is_movable(point.label);
+         }) >= min_points;
+}
+
+/// The motion from the first scan to the second, which may be of any speed up to 40 m/s at 10 Hz,
+/// by the alignment of points: the features of two sparse scans alone may agree on a wrong one.
 OdometryResult search_first_motion(const FeatureSets& features, const LocalMap& map,
                                    const RegisteredScan& last,
                                    const Eigen::Isometry3d& T_map_lidar_predicted,
                                    const OdometryConfig& config) {
-  const LocalMap coarse_map = coarse_map_of_scan(last.features, last.T_map_lidar);
-  const Eigen::Isometry3d T_coarse = register_features(features, coarse_map, T_map_lidar_predicted,
-                                                       coarse_registration_config(config))
-                                         .T_map_lidar;
-  OdometryResult best = register_in_two_stages(features, map, T_coarse, config);
-  // Other starts must be clearly better: streets look alike a few metres on, and where no structure
-  // shows the motion along them all places fit.
-  const FeatureSets some = thinned(features);
-  const auto try_from = [&](const Eigen::Isometry3d& T) {
-    const OdometryResult other = register_in_two_stages(some, map, T, config);
-    const bool is_clear = other.health == OdometryHealth::good &&
-                          agreement(other) > min_gain_of_other_start * agreement(best);
-    if (is_clear) best = other;
+  const PointAlignmentConfig alignment{.without_movable = labels_tell_enough(features, config)};
+  const auto aligned_from = [&](const Eigen::Isometry3d& T) {
+    return align_points(features, map.points, T, PoseTangent::Zero(), alignment);
   };
-  try_from(T_map_lidar_predicted);
+  PointAlignment best = aligned_from(T_map_lidar_predicted);
   for (int ring = 1; ring <= first_motion_rings; ++ring) {
     for (int k = 0; k < first_motion_directions; ++k) {
       const double bearing = 2.0 * std::numbers::pi * k / first_motion_directions;
       const double distance_m = ring * first_motion_spacing_m;
       // Along the map's axes: the lidar may be mounted tilted.
-      try_from(Eigen::Translation3d(distance_m * std::cos(bearing), distance_m * std::sin(bearing),
-                                    0.0) *
-               T_map_lidar_predicted);
+      const PointAlignment other =
+          aligned_from(Eigen::Translation3d(distance_m * std::cos(bearing),
+                                            distance_m * std::sin(bearing), 0.0) *
+                       T_map_lidar_predicted);
+      // Where no structure shows the motion along a street all places on it fit alike.
+      if (other.fit > min_gain_of_other_start * best.fit) best = other;
     }
   }
-  if (best.health == OdometryHealth::lost) return lost_at(T_map_lidar_predicted);
-  return register_features(features, map, best.T_map_lidar, config, best.sweep_correction);
+  // Points and features are two witnesses; that of the points is the stronger one, but its values
+  // lie near each other.
+  const LocalMap coarse_map = coarse_map_of_scan(last.features, last.T_map_lidar);
+  const Eigen::Isometry3d T_coarse = register_features(features, coarse_map, T_map_lidar_predicted,
+                                                       coarse_registration_config(config))
+                                         .T_map_lidar;
+  OdometryResult found = lost_at(T_map_lidar_predicted);
+  double best_score = 0.0;
+  for (const OdometryResult& candidate :
+       {register_features(features, map, best.T_map_lidar, config),
+        register_in_two_stages(features, map, best.T_map_lidar, config),
+        register_in_two_stages(features, map, T_coarse, config)}) {
+    if (candidate.health == OdometryHealth::lost) continue;
+    PointAlignmentConfig in_place = alignment;
+    in_place.max_iterations = 1;
+    const double fit_there = align_points(features, map.points, candidate.T_map_lidar,
+                                          candidate.sweep_correction, in_place)
+                                 .fit;
+    const double score = agreement(candidate) * fit_there * fit_there;
+    if (score <= best_score) continue;
+    found = candidate;
+    best_score = score;
+  }
+  return found;
 }
+
+/// A pose, and where the alignment of points comes to from there.
+struct SecondOpinion {
+  SecondOpinion(const OdometryResult& found, const FeatureSets& features, const LocalMap& map,
+                bool without_movable)
+      : pose(found),
+        aligned(align_points(features, map.points, found.T_map_lidar, found.sweep_correction,
+                             {.without_movable = without_movable})),
+        off(boxminus(aligned.T_map_lidar, found.T_map_lidar)) {
+    pose.point_deviation_m = off.head<3>().norm();
+  }
+  [[nodiscard]] bool confirms() const {
+    return pose.point_deviation_m < max_point_deviation_m &&
+           off.tail<3>().norm() < max_point_deviation_rad;
+  }
+
+  OdometryResult pose;
+  PointAlignment aligned;
+  PoseTangent off;
+};
 
 /// Where the lidar may be after the prediction has failed.
 std::vector<Eigen::Isometry3d> starts_without_prediction(const RegisteredScan& last,
@@ -155,6 +204,28 @@ bool FitStatistics::believes(const OdometryResult& result) const {
 
 bool FitStatistics::believes_relocalized(const OdometryResult& result) const {
   return result.upright_fit >= min_believed_fit_share * mean_upright_fit_;
+}
+
+OdometryResult confirmed_by_points(const OdometryResult& found, const FeatureSets& features,
+                                   const LocalMap& map, const OdometryConfig& config) {
+  // Labels may be wrong, and most points may be in motion: either kind of points will do.
+  std::vector<SecondOpinion> opinions;
+  for (const bool without_movable : {false, true}) {
+    if (without_movable && !labels_tell_enough(features, config)) continue;
+    opinions.emplace_back(found, features, map, without_movable);
+    if (opinions.back().confirms()) return opinions.back().pose;
+  }
+  for (const SecondOpinion& opinion : opinions) {
+    const OdometryResult other = register_features(features, map, opinion.aligned.T_map_lidar,
+                                                   config, found.sweep_correction);
+    if (other.health == OdometryHealth::lost) continue;
+    const bool without_movable = &opinion != &opinions.front();
+    const SecondOpinion again(other, features, map, without_movable);
+    if (again.confirms() && again.aligned.fit > opinion.aligned.fit) return again.pose;
+  }
+  OdometryResult doubtful = opinions.front().pose;
+  doubtful.health = OdometryHealth::degenerate;
+  return doubtful;
 }
 
 OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,

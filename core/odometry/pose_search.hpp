@@ -50,6 +50,13 @@ struct PosePrediction {
   int lost_scans = 0;
 };
 
+/// A second opinion: `found`, where the alignment of points (of any kind and class) stays there;
+/// the pose that registration finds from where they align, where both agree on that one and the
+/// points fit better; else `found`, degenerate.
+[[nodiscard]] OdometryResult confirmed_by_points(const OdometryResult& found,
+                                                 const FeatureSets& features, const LocalMap& map,
+                                                 const OdometryConfig& config);
+
 /// All starts that may lead to the pose, the cheapest first, until one fits.
 [[nodiscard]] OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
                                          const RegisteredScan& last,

@@ -287,6 +287,20 @@ void take_fit(std::span<const Correspondence> correspondences, const NormalEquat
 
 }  // namespace
 
+LocalMap::LocalMap(const LocalMapConfig& config)
+    : edges(config),
+      planes(config),
+      points({.voxel_size_m = 1.5,
+              .max_points_per_voxel = 20,
+              .min_spacing_m = 0.5,
+              .radius_m = config.radius_m}) {}
+
+void LocalMap::clear() {
+  edges.clear();
+  planes.clear();
+  points.clear();
+}
+
 OdometryResult lost_at(const Eigen::Isometry3d& T_map_lidar_predicted) {
   // 1 m and 0.3 rad.
   PoseTangent variance;
@@ -374,7 +388,7 @@ OdometryConfig coarse_registration_config(OdometryConfig config) {
 LocalMap make_coarse_map() {
   const LocalMapConfig config{
       .voxel_size_m = coarse_reach_m, .max_points_per_voxel = 32, .min_spacing_m = 0.5};
-  return {FeatureMap(config), FeatureMap(config)};
+  return LocalMap(config);
 }
 
 }  // namespace stillmap

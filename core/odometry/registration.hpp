@@ -41,15 +41,24 @@ struct FeatureSets {
   std::vector<FeaturePoint> planes;
   /// Points that may lie on a line or a plane, as the local map says.
   std::vector<FeaturePoint> surfaces;
+  /// Points of any kind and class, for the alignment of points: on something that stands up, and
+  /// on level ground.
+  std::vector<FeaturePoint> points;
+  std::vector<FeaturePoint> level_points;
   /// The points were measured one after the other: their motion within the sweep is estimated too.
   bool rolling = false;
   SweepPrior sweep_prior;
 };
 
-/// The local map's feature sets M_e and M_p.
+/// The local map's feature sets M_e and M_p, and points of any kind for the alignment of points.
 struct LocalMap {
+  explicit LocalMap(const LocalMapConfig& config);
+
+  void clear();
+
   FeatureMap edges;
   FeatureMap planes;
+  FeatureMap points;
 };
 
 /// A prediction that nothing confirmed.

@@ -122,6 +122,7 @@ std::vector<Eigen::Isometry3d> propose_poses(const FeatureSets& features,
 void insert_prior_map(std::span<const LabelledPoint> points_map, LocalMap& map) {
   std::vector<LabelledPoint> edges;
   std::vector<LabelledPoint> planes;
+  map.points.insert(points_map);
   for (const LabelledPoint& point : points_map) {
     if (is_movable(point.label)) continue;
     (is_pole_like(point.label) ? edges : planes).push_back(point);

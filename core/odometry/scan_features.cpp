@@ -54,6 +54,8 @@ FeatureSets ScanFeatures::registered(const UsablePoints& usable) const {
   collect(features_.edges, sets.edges);
   collect(features_.registered_planes, sets.planes);
   collect(features_.surfaces, sets.surfaces);
+  for (const std::uint32_t i : features_.upright_points) sets.points.push_back(point(i));
+  for (const std::uint32_t i : features_.level_points) sets.level_points.push_back(point(i));
   return sets;
 }
 
@@ -68,6 +70,8 @@ FeatureSets ScanFeatures::of_map(const UsablePoints& usable,
   sets.rolling = rolling();
   collect(features_.edges, sets.edges);
   collect(features_.planes, sets.planes);
+  sets.points.reserve(features_.points.size());
+  for (const std::uint32_t i : features_.points) sets.points.push_back(point(i));
   return sets;
 }
 
@@ -98,7 +102,8 @@ void extend_local_map(LocalMap& map, const FeatureSets& features,
     to.remove_far_from(T_map_lidar.translation().cast<float>());
   };
   tbb::parallel_invoke([&] { extend(features.edges, map.edges); },
-                       [&] { extend(features.planes, map.planes); });
+                       [&] { extend(features.planes, map.planes); },
+                       [&] { extend(features.points, map.points); });
 }
 
 LocalMap coarse_map_of_scan(const FeatureSets& features, const Eigen::Isometry3d& T_map_lidar) {

@@ -66,7 +66,7 @@ void extract_features_of_a_scan(benchmark::State& state) {
 }
 
 struct Registration {
-  LocalMap map{FeatureMap(LocalMapConfig{}), FeatureMap(LocalMapConfig{})};
+  LocalMap map{LocalMapConfig{}};
   FeatureSets features;
   Eigen::Isometry3d T_map_lidar_predicted;
 

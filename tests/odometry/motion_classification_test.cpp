@@ -100,7 +100,7 @@ TEST(ClassifyMotion, MovingCarIsMovingWhicheverWayItGoes) {
 struct SplitCase {
   Scan scan;
   PointLabels labels;
-  LocalMap map{FeatureMap(LocalMapConfig{}), FeatureMap(LocalMapConfig{})};
+  LocalMap map{LocalMapConfig{}};
 
   explicit SplitCase(SemanticClass map_label) {
     std::vector<LabelledPoint> map_points;

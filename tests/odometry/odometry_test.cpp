@@ -14,6 +14,7 @@ namespace stillmap {
 namespace {
 
 using test::BoxSequence;
+using test::BoxWorld;
 using test::expect_near;
 using test::level_pose;
 
@@ -154,6 +155,41 @@ TEST_F(OdometrySequence, ScanWithoutFeaturesIsLostAtThePrediction) {
       test::register_scan(odometry, blind, PointLabels{}, std::nullopt).result;
   EXPECT_EQ(result.health, OdometryHealth::lost);
   expect_near(result.T_map_lidar, predicted, 1e-12, 1e-7);
+}
+
+/// The street, and cars that keep the lidar's pace beside and ahead of it.
+BoxWorld street_with_convoy(std::initializer_list<double> lanes_y_m) {
+  BoxWorld world = test::street();
+  for (const double y : lanes_y_m)
+    for (int k = -3; k <= 3; ++k)
+      world.stand(8.0 * k + (y == 0.0 ? 4.5 : 3.0), y, test::car_size_m, SemanticClass::car,
+                  {6.0, 0.0, 0.0});
+  return world;
+}
+
+TEST(OdometryInTraffic, AConvoyDoesNotTakeItAlong) {
+  const BoxSequence round_it(street_with_convoy({-3.2, 0.0, 3.2}), 15);
+  const BoxSequence beside_it(street_with_convoy({-3.2}), 15);
+  for (const auto& [sequence, with_labels] : {std::pair(&round_it, true), {&beside_it, false}}) {
+    Odometry odometry(OdometryConfig{}, test::test_lidar());
+    const std::vector<OdometryResult> all = results(*sequence, odometry, with_labels);
+    for (std::size_t k = 0; k < all.size(); ++k)
+      expect_near(all[k].T_map_lidar, sequence->T_map_lidar[k], 0.3, 0.02);
+  }
+}
+
+TEST(OdometryInTraffic, SurvivesAWholeClassOfWrongLabels) {
+  const BoxSequence sequence(street_with_convoy({-3.2}), 15);
+  Odometry odometry(OdometryConfig{}, test::test_lidar());
+  for (std::size_t k = 0; k < sequence.scans.size(); ++k) {
+    const test::BoxScan& seen = sequence.scans[k];
+    PointLabels labels = seen.labels();
+    for (SemanticClass& label : labels.classes)
+      if (label == SemanticClass::building) label = SemanticClass::car;
+    const OdometryResult result =
+        test::register_scan(odometry, seen.scan, labels, std::nullopt).result;
+    expect_near(result.T_map_lidar, sequence.T_map_lidar[k], 0.3, 0.02);
+  }
 }
 
 TEST(OdometryInTraffic, FindsTheMovingCarsAndFollowsTheTruth) {

@@ -109,7 +109,7 @@ TEST(RegisterFeatures, TooFewCorrespondencesAreLostAtThePrediction) {
   };
   lost(few, world.local_map());
   lost(FeatureSets{}, world.local_map());
-  lost(world.features(T_true, 0.01, 3), LocalMap{FeatureMap(empty), FeatureMap(empty)});
+  lost(world.features(T_true, 0.01, 3), LocalMap(empty));
 }
 
 TEST(RegisterFeatures, CovarianceIsPositiveDefiniteAndGrowsWithTheNoise) {

@@ -29,7 +29,7 @@ class SurfaceWorld {
   /// Map points on a grid of 0.25 m.
   [[nodiscard]] LocalMap local_map() const {
     const LocalMapConfig config;
-    LocalMap map{FeatureMap(config), FeatureMap(config)};
+    LocalMap map(config);
     for (const Patch& patch : planes) insert_patch(patch, map.planes);
     for (const Eigen::Vector3d& foot : posts)
       for (int k = 0; k <= 16; ++k) {
