@@ -94,6 +94,9 @@ struct Odometry::State {
   /// Time since the last pose [s]. Where stamps have come evenly, a single one that does not is
   /// taken for a fault of the clock, and the time for a multiple of the sensor's period.
   [[nodiscard]] double interval_to(std::int64_t stamp_ns) const;
+  [[nodiscard]] bool is_searched_widely() const {
+    return lost_scans == 0 || lost_scans % relocalization_interval == 1;
+  }
   [[nodiscard]] Eigen::Isometry3d motion_during(double period_s) const;
   /// The IMU's rotation once the first scans have told the velocity; before that the first scan is
   /// straightened without it. The paper has none.
@@ -213,8 +216,11 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
                                      prediction, fits, config);
   if (lost_scans > 0 && found.health != OdometryHealth::lost)
     found = register_features(features, map, found.T_map_lidar, config, found.sweep_correction);
-  if (found.health != OdometryHealth::lost && fits.believes(found)) return found;
-  if (lost_scans % relocalization_interval == 1) {
+  const bool is_believed = prediction.is_known || !fits.are_known()
+                               ? fits.believes(found)
+                               : fits.believes_relocalized(found);
+  if (found.health != OdometryHealth::lost && is_believed) return found;
+  if (lost_scans > 0 && is_searched_widely()) {
     const double driven_m = last.interval_s > 0.0 ? last.motion.translation().norm() *
                                                         prediction.interval_s / last.interval_s
                                                   : 0.0;
@@ -417,7 +423,8 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   const PosePrediction prediction{.T_map_lidar = T_map_lidar_predicted,
                                   .interval_s = state.interval_to(time_ns),
                                   .is_known = T_map_lidar_prior || state.has_velocity(time_ns),
-                                  .lost_scans = state.lost_scans};
+                                  .lost_scans = state.lost_scans,
+                                  .is_searched_widely = state.is_searched_widely()};
   ScanInParts parts{.scan = scan, .sweep = sweep, .labels = labels};
   state.take_apart(parts, prediction);
   parts.sweep_prior = state.sweep_prior(time_ns, sweep, expected_motion);

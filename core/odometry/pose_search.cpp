@@ -12,10 +12,12 @@
 namespace stillmap {
 namespace {
 
-/// Starts for the motion to the second scan: rings of this many directions [m].
-constexpr int first_motion_rings = 2;
-constexpr int first_motion_directions = 8;
-constexpr double first_motion_spacing_m = 1.5;
+/// Starts round a pose that may be far off: rings of this many directions [m].
+constexpr int alignment_rings = 2;
+constexpr int alignment_directions = 8;
+constexpr double alignment_spacing_m = 1.5;
+constexpr int rough_iterations = 20;
+constexpr std::size_t rough_points = 300;
 constexpr double min_gain_of_other_start = 1.01;
 /// A pose that the alignment of points moves by more than this is not confirmed [m, rad].
 constexpr double max_point_deviation_m = 0.2;
@@ -38,6 +40,9 @@ constexpr double min_believed_overlap = 0.1;
 /// been is not believed. Simulated drives with hard turns fall to 0.58; scans of another city, or
 /// of the wrong place in this one, reach 0.32.
 constexpr double min_believed_fit_share = 0.5;
+/// The same, where nothing told the place: streets look alike. A street 3 m off reaches 0.54, the
+/// right place across a gap of 33 m 0.77.
+constexpr double min_relocalized_fit_share = 0.65;
 /// Share of the running mean of fits below which other starts are tried.
 constexpr double min_fit_share = 0.95;
 /// Weight of the newest fit in the running mean.
@@ -60,29 +65,6 @@ bool agree(const OdometryResult& a, const OdometryResult& b) {
          difference.tail<3>().norm() < max_angle_rad;
 }
 
-/// The best of several starts.
-class BestStart {
- public:
-  BestStart(const Eigen::Isometry3d& T_map_lidar_predicted, const FitStatistics& fits)
-      : fits_(fits), best_(lost_at(T_map_lidar_predicted)) {}
-
-  /// Whether the best one fits now.
-  bool take(const OdometryResult& other) {
-    const int iterations = best_.iterations + other.iterations;
-    const bool is_found = other.health != OdometryHealth::lost;
-    const bool is_better =
-        best_.health == OdometryHealth::lost || agreement(other) > agreement(best_);
-    if (is_found && is_better) best_ = other;
-    best_.iterations = iterations;
-    return fits_.fits(best_);
-  }
-  [[nodiscard]] const OdometryResult& result() const { return best_; }
-
- private:
-  const FitStatistics& fits_;
-  OdometryResult best_;
-};
-
 /// Whether enough is left of the scan without what could move by its label.
 bool labels_tell_enough(const FeatureSets& features, const OdometryConfig& config) {
   constexpr std::ptrdiff_t min_points = 100;
@@ -92,54 +74,102 @@ bool labels_tell_enough(const FeatureSets& features, const OdometryConfig& confi
          }) >= min_points;
 }
 
-/// The motion from the first scan to the second, which may be of any speed up to 40 m/s at 10 Hz,
-/// by the alignment of points: the features of two sparse scans alone may agree on a wrong one.
-OdometryResult search_first_motion(const FeatureSets& features, const LocalMap& map,
-                                   const RegisteredScan& last,
-                                   const Eigen::Isometry3d& T_map_lidar_predicted,
-                                   const OdometryConfig& config) {
-  const PointAlignmentConfig alignment{.without_movable = labels_tell_enough(features, config)};
+/// The best of several starts, by two witnesses: the features, and the points, whose values lie
+/// nearer each other.
+class BestStart {
+ public:
+  BestStart(const Eigen::Isometry3d& T_map_lidar_predicted, const FeatureSets& features,
+            const LocalMap& map, const FitStatistics& fits, const OdometryConfig& config)
+      : features_(features),
+        map_(map),
+        fits_(fits),
+        in_place_{.max_iterations = 1, .without_movable = labels_tell_enough(features, config)},
+        best_(lost_at(T_map_lidar_predicted)) {}
+
+  /// Whether the best one fits now.
+  bool take(const OdometryResult& other) {
+    const int iterations = best_.iterations + other.iterations;
+    if (other.health != OdometryHealth::lost) {
+      const double score = score_of(other);
+      if (best_.health == OdometryHealth::lost || score > score_) {
+        best_ = other;
+        score_ = score;
+      }
+    }
+    best_.iterations = iterations;
+    return fits_.fits(best_);
+  }
+  [[nodiscard]] const OdometryResult& result() const { return best_; }
+
+ private:
+  [[nodiscard]] double score_of(const OdometryResult& result) const {
+    const double fit =
+        align_points(features_, map_.points, result.T_map_lidar, result.sweep_correction, in_place_)
+            .fit;
+    return agreement(result) * fit * fit;
+  }
+
+  const FeatureSets& features_;
+  const LocalMap& map_;
+  const FitStatistics& fits_;
+  PointAlignmentConfig in_place_;
+  OdometryResult best_;
+  double score_ = 0.0;
+};
+
+/// At most so many of the points, spread evenly.
+std::vector<FeaturePoint> every_nth(const std::vector<FeaturePoint>& points,
+                                    std::size_t max_count) {
+  const std::size_t count = std::min(points.size(), max_count);
+  std::vector<FeaturePoint> some;
+  some.reserve(count);
+  for (std::size_t k = 0; k < count; ++k) some.push_back(points[k * points.size() / count]);
+  return some;
+}
+
+/// Where the points align best, started at a pose and in rings round it.
+Eigen::Isometry3d align_points_around(const FeatureSets& features, const LocalMap& map,
+                                      const Eigen::Isometry3d& T_map_lidar,
+                                      const OdometryConfig& config) {
+  PointAlignmentConfig alignment{.without_movable = labels_tell_enough(features, config)};
+  alignment.max_iterations = rough_iterations;
+  FeatureSets some;
+  some.points = every_nth(features.points, rough_points);
+  some.level_points = every_nth(features.level_points, rough_points / 4);
   const auto aligned_from = [&](const Eigen::Isometry3d& T) {
-    return align_points(features, map.points, T, PoseTangent::Zero(), alignment);
+    return align_points(some, map.points, T, PoseTangent::Zero(), alignment);
   };
-  PointAlignment best = aligned_from(T_map_lidar_predicted);
-  for (int ring = 1; ring <= first_motion_rings; ++ring) {
-    for (int k = 0; k < first_motion_directions; ++k) {
-      const double bearing = 2.0 * std::numbers::pi * k / first_motion_directions;
-      const double distance_m = ring * first_motion_spacing_m;
+  PointAlignment best = aligned_from(T_map_lidar);
+  for (int ring = 1; ring <= alignment_rings; ++ring) {
+    for (int k = 0; k < alignment_directions; ++k) {
+      const double bearing = 2.0 * std::numbers::pi * k / alignment_directions;
+      const double distance_m = ring * alignment_spacing_m;
       // Along the map's axes: the lidar may be mounted tilted.
       const PointAlignment other =
           aligned_from(Eigen::Translation3d(distance_m * std::cos(bearing),
                                             distance_m * std::sin(bearing), 0.0) *
-                       T_map_lidar_predicted);
+                       T_map_lidar);
       // Where no structure shows the motion along a street all places on it fit alike.
       if (other.fit > min_gain_of_other_start * best.fit) best = other;
     }
   }
-  // Points and features are two witnesses; that of the points is the stronger one, but its values
-  // lie near each other.
+  return best.T_map_lidar;
+}
+
+/// The motion from the first scan to the second, which may be of any speed up to 40 m/s at 10 Hz,
+/// by the alignment of points: the features of two sparse scans alone may agree on a wrong one.
+void search_first_motion(const FeatureSets& features, const LocalMap& map,
+                         const RegisteredScan& last, const Eigen::Isometry3d& T_map_lidar_predicted,
+                         const OdometryConfig& config, BestStart& best) {
+  const Eigen::Isometry3d T_aligned =
+      align_points_around(features, map, T_map_lidar_predicted, config);
   const LocalMap coarse_map = coarse_map_of_scan(last.features, last.T_map_lidar);
   const Eigen::Isometry3d T_coarse = register_features(features, coarse_map, T_map_lidar_predicted,
                                                        coarse_registration_config(config))
                                          .T_map_lidar;
-  OdometryResult found = lost_at(T_map_lidar_predicted);
-  double best_score = 0.0;
-  for (const OdometryResult& candidate :
-       {register_features(features, map, best.T_map_lidar, config),
-        register_in_two_stages(features, map, best.T_map_lidar, config),
-        register_in_two_stages(features, map, T_coarse, config)}) {
-    if (candidate.health == OdometryHealth::lost) continue;
-    PointAlignmentConfig in_place = alignment;
-    in_place.max_iterations = 1;
-    const double fit_there = align_points(features, map.points, candidate.T_map_lidar,
-                                          candidate.sweep_correction, in_place)
-                                 .fit;
-    const double score = agreement(candidate) * fit_there * fit_there;
-    if (score <= best_score) continue;
-    found = candidate;
-    best_score = score;
-  }
-  return found;
+  best.take(register_features(features, map, T_aligned, config));
+  best.take(register_in_two_stages(features, map, T_aligned, config));
+  best.take(register_in_two_stages(features, map, T_coarse, config));
 }
 
 /// A pose, and where the alignment of points comes to from there.
@@ -198,12 +228,13 @@ bool FitStatistics::fits_poorly(const OdometryResult& result) const {
 
 bool FitStatistics::believes(const OdometryResult& result) const {
   if (!are_known()) return true;
-  return (believes_relocalized(result) || result.fit >= clear_fit_share * mean_fit_) &&
+  const bool stands_well = result.upright_fit >= min_believed_fit_share * mean_upright_fit_;
+  return (stands_well || result.fit >= clear_fit_share * mean_fit_) &&
          result.overlap >= min_believed_overlap;
 }
 
 bool FitStatistics::believes_relocalized(const OdometryResult& result) const {
-  return result.upright_fit >= min_believed_fit_share * mean_upright_fit_;
+  return result.upright_fit >= min_relocalized_fit_share * mean_upright_fit_;
 }
 
 OdometryResult confirmed_by_points(const OdometryResult& found, const FeatureSets& features,
@@ -231,7 +262,7 @@ OdometryResult confirmed_by_points(const OdometryResult& found, const FeatureSet
 OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
                            const RegisteredScan& last, const PosePrediction& prediction,
                            const FitStatistics& fits, const OdometryConfig& config) {
-  BestStart best(prediction.T_map_lidar, fits);
+  BestStart best(prediction.T_map_lidar, features, map, fits, config);
   if (prediction.is_known) {
     const OdometryResult direct = register_features(features, map, prediction.T_map_lidar, config);
     if (best.take(direct) || config.paper_exact) return best.result();
@@ -244,8 +275,10 @@ OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
       if (best.take(register_in_two_stages(features, map, T, config))) return best.result();
     }
   }
-  if (last.interval_s <= 0.0 && !config.paper_exact)
-    return search_first_motion(features, map, last, prediction.T_map_lidar, config);
+  if (last.interval_s <= 0.0 && !config.paper_exact) {
+    search_first_motion(features, map, last, prediction.T_map_lidar, config, best);
+    return best.result();
+  }
   const LocalMap coarse_map = coarse_map_of_scan(last.features, last.T_map_lidar);
   const OdometryConfig coarse_config = coarse_registration_config(config);
   const std::vector<Eigen::Isometry3d> starts = starts_without_prediction(last, prediction);
@@ -254,7 +287,12 @@ OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
     if (best.take(register_in_two_stages(features, map, coarse.T_map_lidar, config))) break;
     if (starts.size() > 1 && best.take(register_in_two_stages(features, map, T, config))) break;
   }
-  if (fits.fits_poorly(best.result()) && !config.paper_exact) {
+  if (prediction.is_searched_widely && fits.fits_poorly(best.result()) && !config.paper_exact) {
+    for (const Eigen::Isometry3d& T : starts) {
+      const Eigen::Isometry3d T_aligned = align_points_around(features, map, T, config);
+      if (best.take(register_features(features, map, T_aligned, config))) break;
+      if (best.take(register_in_two_stages(features, map, T_aligned, config))) break;
+    }
     for (const Eigen::Isometry3d& T : propose_poses(features, points_of(map), last.T_map_lidar,
                                                     proposal_reach_m, max_proposals)) {
       // Only a clear one: somewhere in reach there is nearly always a place that looks a little

@@ -20,7 +20,7 @@ class FitStatistics {
   [[nodiscard]] bool fits_poorly(const OdometryResult& result) const;
   /// Whether a pose can be believed; all can before enough fits are known.
   [[nodiscard]] bool believes(const OdometryResult& result) const;
-  /// The same, where the scan was looked for all round: by what stands up in it alone.
+  /// The same, where no prediction told the place: by what stands up in it alone, and more of that.
   [[nodiscard]] bool believes_relocalized(const OdometryResult& result) const;
 
  private:
@@ -48,6 +48,8 @@ struct PosePrediction {
   bool is_known = false;
   /// Scans in a row before this one that could not be registered.
   int lost_scans = 0;
+  /// Starts farther off are tried, too: not for every one of many lost scans.
+  bool is_searched_widely = true;
 };
 
 /// A second opinion: `found`, where the alignment of points (of any kind and class) stays there;
