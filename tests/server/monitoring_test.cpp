@@ -74,6 +74,21 @@ TEST(Metrics, GiveDropsByReasonAndOtherEventsApart) {
               ElementsAre(Pair("occupancy_not_cleared", 1.0)));
 }
 
+TEST(Metrics, ShowTheFaultsOfServicesThatTheStatusHas) {
+  Metrics metrics;
+  dds::ServerStatus status;
+  status.counters = {{.name = "slow_client_stillmap/get_tiles", .value = 3},
+                     {.name = "unreadable_request_stillmap/reset", .value = 1}};
+  for (const double slow : {3.0, 5.0}) {
+    status.counters.front().value = static_cast<std::uint64_t>(slow);
+    const MetricFamily faults = family(metrics, "stillmap_service_faults_total", status);
+    EXPECT_THAT(values_by(faults, "service"),
+                ElementsAre(Pair("stillmap/get_tiles", slow), Pair("stillmap/reset", 1.0)));
+    EXPECT_THAT(values_by(faults, "fault"),
+                ElementsAre(Pair("slow_client", slow), Pair("unreadable_request", 1.0)));
+  }
+}
+
 TEST(Metrics, AndTheStatusHaveOneSource) {
   Statistics statistics;
   statistics.set_map_memory({.bytes = 4096, .resident_tiles = 0, .non_resident_tiles = 5}, 1);
