@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 
+#include "server/monitoring/log.hpp"
 #include "server/monitoring/metrics.hpp"
 #include "server/monitoring/service_log.hpp"
 #include "server/monitoring/statistics.hpp"
@@ -149,6 +150,14 @@ TEST(Metrics, ShowThisProcess) {
   const double before = family(metrics, "process_cpu_seconds_total").metric.at(0).counter.value;
   EXPECT_GT(before, 0.0);
   EXPECT_GE(family(metrics, "process_cpu_seconds_total").metric.at(0).counter.value, before);
+}
+
+TEST(NewLines, AreOnceEachAndForgottenWhenThereAreMany) {
+  NewLines lines;
+  EXPECT_TRUE(lines.add("first"));
+  EXPECT_FALSE(lines.add("first"));
+  for (std::size_t i = 0; i < NewLines::max_lines; ++i) EXPECT_TRUE(lines.add(std::to_string(i)));
+  EXPECT_TRUE(lines.add("first"));
 }
 
 }  // namespace
