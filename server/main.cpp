@@ -1,6 +1,7 @@
 #include <pthread.h>
 #include <spdlog/spdlog.h>
 #include <systemd/sd-daemon.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <cstring>
@@ -14,11 +15,16 @@
 #include "server/mapping/async_segmenter.hpp"
 #include "server/monitoring/log.hpp"
 #include "server/server.hpp"
+#include "server/threads/thread_failure.hpp"
 
 namespace {
 
 constexpr int failed = 1;
 constexpr int bad_input = 2;
+constexpr int thread_failed = 3;
+
+// How long a server of which a thread failed may take to save its map.
+constexpr unsigned int save_after_failure_s = 60;
 
 /// For units with Type=notify; does nothing elsewhere.
 void notify_systemd(const char* state) {
@@ -27,8 +33,10 @@ void notify_systemd(const char* state) {
   }
 }
 
-void serve(const stillmap::ServerConfig& config) {
-  const sigset_t signals = stillmap::block_stop_signals();
+/// Returns the exit code.
+int serve(const stillmap::ServerConfig& config) {
+  sigset_t signals = stillmap::block_stop_signals();
+  stillmap::server::block_thread_failures(signals);
   const bool adaptive_width = stillmap::server::segmentation_budget(config).count() > 0;
   auto labels = stillmap::open_segmenter(config.labels, config.mapper.sensor, adaptive_width);
   if (const std::string details = labels->details(); !details.empty()) {
@@ -39,9 +47,13 @@ void serve(const stillmap::ServerConfig& config) {
   notify_systemd("READY=1");
   int signal = 0;
   sigwait(&signals, &signal);
+  const bool has_failed = signal == stillmap::server::thread_failure_signal;
+  // What is left of the server may hang: then the signal ends it, and systemd starts another.
+  if (has_failed) ::alarm(save_after_failure_s);
   spdlog::info("stopping");
   notify_systemd("STOPPING=1");
   server.stop();
+  return has_failed ? thread_failed : 0;
 }
 
 }  // namespace
@@ -53,8 +65,7 @@ int main(int argc, char** argv) {
     const stillmap::server::Arguments arguments = stillmap::server::read_arguments(argc, argv);
     if (!arguments.config) return arguments.exit_code;
     stillmap::server::set_log_level(arguments.config->log.level);
-    serve(*arguments.config);
-    return 0;
+    return serve(*arguments.config);
   } catch (const stillmap::ConfigError& error) {
     spdlog::critical("{}", error.what());
     return bad_input;

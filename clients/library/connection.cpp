@@ -1,5 +1,7 @@
 #include "clients/library/connection.hpp"
 
+#include <cmath>
+
 #include "idl/conversions/tile.hpp"
 #include "idl/interface/participant_diagnostics.hpp"
 
@@ -8,6 +10,8 @@ namespace stillmap {
 using namespace stillmap_msgs::srv;
 
 namespace {
+
+constexpr std::chrono::seconds noticeable_stop{1};
 
 std::vector<stillmap_msgs::msg::TileId> to_wire(std::span<const TileId> ids) {
   std::vector<stillmap_msgs::msg::TileId> out(ids.size());
@@ -57,11 +61,18 @@ ServiceError Client::Connection::malformed_reply(const std::string& service) {
 
 ServiceTimeout Client::Connection::timeout_error(const std::string& service,
                                                  std::chrono::milliseconds timeout,
-                                                 bool found) const {
+                                                 const Unanswered& call) const {
   std::string text = "no answer from service " + service + " in DDS domain " +
                      std::to_string(options.dds.domain_id) + " within " +
                      std::to_string(timeout.count()) + " ms: ";
-  if (found) return ServiceTimeout(text + "a server is there but too busy, or it was just killed");
+  if (call.overdue > noticeable_stop) {
+    text += "this process itself was stopped or had no processor, for " +
+            std::to_string(std::lround(call.overdue.count())) + " s; ask again; ";
+  }
+  if (call.found) {
+    text += "a server is there but too busy, or it was just killed";
+    return ServiceTimeout(call.modifies ? text + "; the request may still be carried out" : text);
+  }
   // Where security keeps both apart, other reasons are irrelevant.
   const auto diagnostics =
       dds::security_diagnostics(participant.self(), participant.remote_participants());

@@ -29,10 +29,13 @@ struct Client::Connection {
     }
     auto& client = client_of(spec);
     if (!client.refusal().empty()) throw ServiceError(name_of(spec) + ": " + client.refusal());
+    const auto began = std::chrono::steady_clock::now();
     auto reply = client.call(request, timeout);
     if (!reply) {
       throw timeout_error(name_of(spec), timeout + waited,
-                          client.wait_for_server(std::chrono::milliseconds(0)));
+                          {.found = client.wait_for_server(std::chrono::milliseconds(0)),
+                           .modifies = spec.effect == dds::ServiceEffect::modifies,
+                           .overdue = std::chrono::steady_clock::now() - began - timeout});
     }
     return *std::move(reply);
   }
@@ -89,8 +92,18 @@ struct Client::Connection {
   [[nodiscard]] TileSet fetch_tiles(std::span<const TileId> ids);
 
   [[nodiscard]] static ServiceError malformed_reply(const std::string& service);
+  /// What is known of a call without an answer.
+  struct Unanswered {
+    /// There is a server.
+    bool found = false;
+    /// The service changes something.
+    bool modifies = false;
+    /// How much later than it was to be this process noticed.
+    std::chrono::duration<double> overdue{};
+  };
   [[nodiscard]] ServiceTimeout timeout_error(const std::string& service,
-                                             std::chrono::milliseconds timeout, bool found) const;
+                                             std::chrono::milliseconds timeout,
+                                             const Unanswered& call) const;
 
   ClientOptions options;
   /// When its client began to wait for the server.

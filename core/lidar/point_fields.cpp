@@ -25,6 +25,8 @@ constexpr std::size_t max_time_samples = 4096;
 constexpr std::size_t max_intensity_samples = 8192;
 /// Intensities may exceed their full scale by this factor.
 constexpr float overshoot = 1.5F;
+/// So many scans in a row are no broken ones.
+constexpr int proof_of_full_scale = 5;
 
 struct Unit {
   const char* name;
@@ -181,20 +183,32 @@ float intensity_full_scale(std::span<const float> intensity) {
   return full_scale_above(bright_value(sample));
 }
 
+std::optional<float> IntensityScale::contradiction(std::vector<float>& sample) const {
+  const float bright = bright_value(sample);
+  const bool is_too_bright = bright * factor_ > overshoot;
+  const bool is_too_dark = is_first_ && factor_ < 1.0F && fractions_only(sample);
+  if (!is_too_bright && !is_too_dark) return std::nullopt;
+  return full_scale_above(bright);
+}
+
 std::string IntensityScale::apply(std::span<float> intensity) {
   std::vector<float> sample = sample_of(intensity);
+  if (sample.empty()) return {};
   std::string corrected;
-  if (!sample.empty()) {
-    const float bright = bright_value(sample);
-    const bool too_bright = bright * factor_ > overshoot;
-    if (too_bright || (first_ && factor_ < 1.0F && fractions_only(sample))) {
-      const float full_scale = full_scale_above(bright);
-      factor_ = 1.0F / full_scale;
-      corrected = remark(full_scale);
+  float factor = factor_;
+  if (const auto full_scale = contradiction(sample)) {
+    if (*full_scale != shown_full_scale_) {
+      scans_in_a_row_ = 0;
+      corrected = remark(*full_scale);
     }
-    first_ = false;
+    shown_full_scale_ = *full_scale;
+    factor = 1.0F / *full_scale;
+    if (++scans_in_a_row_ >= proof_of_full_scale) factor_ = factor;
+  } else {
+    is_first_ = false;
+    shown_full_scale_ = 0.0F;
   }
-  for (float& value : intensity) value *= factor_;
+  for (float& value : intensity) value *= factor;
   return corrected;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -55,21 +56,28 @@ struct PointTimes {
 [[nodiscard]] float intensity_full_scale(std::span<const float> intensity);
 
 /// The factor that scales a sensor's intensity to 0..1, kept for a whole run, as single scans may
-/// be dark.
+/// be dark, or broken.
 class IntensityScale {
  public:
   /// As the sensor's description has it.
   explicit IntensityScale(float stated) : factor_(stated) {}
 
-  /// Scales the values of one scan to 0..1. A description that contradicts them is corrected:
-  /// brighter scans than it allows for raise the full scale (to 255 or 65535), and a first scan
-  /// with nothing but fractions up to 1 lowers it. Returns what was corrected, in words, else
-  /// nothing.
+  /// Scales the values of one scan to 0..1. Scans that are brighter than the description allows
+  /// for are scaled by a full scale of their own (255 or 65535), and so are the first ones with
+  /// nothing but fractions up to 1. Five of them in a row correct the description for the rest of
+  /// the run. Returns in words what is corrected, once for scans in a row, else nothing.
   [[nodiscard]] std::string apply(std::span<float> intensity);
 
  private:
+  /// The full scale that the scan shows; nothing where it fits the factor.
+  [[nodiscard]] std::optional<float> contradiction(std::vector<float>& sample) const;
+
   float factor_;
-  bool first_ = true;
+  /// No scan has fitted the description yet.
+  bool is_first_ = true;
+  /// Of the last scans, which contradict the description alike.
+  float shown_full_scale_ = 0.0F;
+  int scans_in_a_row_ = 0;
 };
 
 }  // namespace stillmap

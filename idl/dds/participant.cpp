@@ -17,6 +17,7 @@
 #include "idl/dds/discovery_monitor.hpp"
 #include "idl/dds/qos.hpp"
 #include "idl/dds/ros_graph.hpp"
+#include "idl/dds/ros_nodes.hpp"
 #include "idl/dds/security/identity.hpp"
 #include "idl/dds/transports.hpp"
 
@@ -102,7 +103,13 @@ Participant::Participant(const DdsOptions& options)
       subscriber_(handle_->create_subscriber(SUBSCRIBER_QOS_DEFAULT)) {
   if (publisher_ == nullptr || subscriber_ == nullptr) throw failure("cannot make endpoints");
   if (!options_.node_name.empty()) {
-    // The announcing writer itself is no part of the node, so no graph exists while it is made.
+    // The announcing writer and the reader of the others' announcements are no part of the node, so
+    // no graph exists while they are made.
+    try {
+      nodes_ = std::make_unique<RosNodes>(*this);
+    } catch (const NotPermitted&) {
+      // Others go without names.
+    }
     auto graph = std::make_unique<RosGraph>(*this, handle_->guid());
     graph_ = std::move(graph);
   }
@@ -141,7 +148,9 @@ DomainParticipantQos Participant::qos() const {
 }
 
 std::vector<RemoteParticipant> Participant::remote_participants() const {
-  return monitor_->remote_participants();
+  std::vector<RemoteParticipant> participants = monitor_->remote_participants();
+  if (nodes_) nodes_->add_to(participants);
+  return participants;
 }
 
 RemoteParticipant Participant::self() const {

@@ -34,6 +34,7 @@ namespace stillmap::dds {
 
 class DiscoveryMonitor;
 class RosGraph;
+class RosNodes;
 struct Identity;
 
 /// Which samples a reader wants, as DDS writes it: a condition in SQL's manner on the fields of the
@@ -61,7 +62,7 @@ class Participant {
   [[nodiscard]] const ServiceFaults& service_faults() const { return service_faults_; }
 
   /// The other participants of the domain, as discovery knows them now. Discovery takes a few
-  /// seconds.
+  /// seconds. With a node name, also which ROS 2 nodes they hold.
   [[nodiscard]] std::vector<RemoteParticipant> remote_participants() const;
   /// This participant, in the same terms.
   [[nodiscard]] RemoteParticipant self() const;
@@ -117,6 +118,7 @@ class Participant {
   std::map<std::string, eprosima::fastdds::dds::Topic*> topics_;
   std::uint64_t filters_made_ = 0;
   std::unique_ptr<RosGraph> graph_;
+  std::unique_ptr<RosNodes> nodes_;
 };
 
 }  // namespace stillmap::dds

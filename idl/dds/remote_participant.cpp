@@ -1,5 +1,6 @@
 #include "idl/dds/remote_participant.hpp"
 
+#include <algorithm>
 #include <array>
 
 namespace stillmap::dds {
@@ -26,8 +27,22 @@ std::string describe_location(const RemoteParticipant& peer) {
   return text;
 }
 
+std::string display_name(const RemoteParticipant& peer) {
+  constexpr std::size_t max_names = 3;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(max_names, peer.ros_nodes.size()); ++i) {
+    add_part(text, peer.ros_nodes[i]);
+  }
+  if (peer.ros_nodes.size() > max_names) {
+    text += " and " + std::to_string(peer.ros_nodes.size() - max_names) + " more nodes";
+  }
+  if (!text.empty()) return text;
+  // rmw_fastrtps gives its participants the name of the enclave, which is "/" where there is none.
+  return peer.name.empty() || peer.name == "/" ? "a participant without a name" : peer.name;
+}
+
 std::string describe(const RemoteParticipant& peer) {
-  const std::string name = peer.name.empty() ? "a participant without a name" : peer.name;
+  const std::string name = display_name(peer);
   const std::string where = describe_location(peer);
   return where.empty() ? name : name + " (" + where + ")";
 }

@@ -44,6 +44,8 @@ struct RemoteParticipant {
   /// Prefix of the guids of its endpoints.
   std::string guid;
   std::string name;
+  /// The ROS 2 nodes that it holds ("/rviz2"), as far as they are known.
+  std::vector<std::string> ros_nodes;
   /// "Fast DDS", "Cyclone DDS", or "vendor 1.7".
   std::string vendor;
   /// Empty when it does not tell.
@@ -60,6 +62,9 @@ struct RemoteParticipant {
   bool refused = false;
   std::vector<Endpoint> endpoints;
 };
+
+/// Its ROS 2 nodes, or its own name, or that it has none.
+[[nodiscard]] std::string display_name(const RemoteParticipant& peer);
 
 /// "host, process 12, user robot, 192.168.0.5": what is known of where a peer runs.
 [[nodiscard]] std::string describe_location(const RemoteParticipant& peer);

@@ -4,6 +4,7 @@
 #include <array>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 
+#include "idl/dds/serialized_sample.hpp"
 #include "idl/dds/type_support.hpp"
 #include "rmw_dds_common.h"
 #include "rmw_dds_common_iron.h"
@@ -32,10 +33,9 @@ RosGraph::RosGraph(Participant& participant, const Guid& participant_guid)
     : participant_guid_(participant_guid),
       node_name_(participant.options().node_name),
       gid_bytes_(participant.options().ros_gid_bytes),
-      writer_(participant.make_writer(
-          ros_discovery_topic,
-          gid_bytes_ == iron_gid_bytes ? type_support<IronInfo>() : type_support<HumbleInfo>(),
-          {.transient_local = true, .depth = 1}, nullptr)) {
+      writer_(participant.make_writer(ros_discovery_topic,
+                                      serialized_sample_type(ros_discovery_type),
+                                      {.transient_local = true, .depth = 1}, nullptr)) {
   announce();
 }
 
@@ -75,7 +75,8 @@ void RosGraph::announce_as() {
   Info info;
   info.gid(to_gid<Gid>(participant_guid_));
   info.node_entities_info_seq().push_back(node);
-  writer_->write(&info);
+  SerializedSample bytes = to_bytes(type_support<Info>(), &info, 0);
+  writer_->write(&bytes);
 }
 
 }  // namespace stillmap::dds

@@ -10,6 +10,10 @@ namespace stillmap::dds {
 
 /// DDS name of the topic where ROS 2 nodes announce their endpoints.
 inline constexpr const char* ros_discovery_topic = "ros_discovery_info";
+/// DDS name of its type, of which there are two layouts: peers of both may be in one domain, so its
+/// samples are handled as bytes.
+inline constexpr const char* ros_discovery_type =
+    "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_";
 
 /// Tells ROS 2 which readers and writers belong to this node (topic ros_discovery_info), so that
 /// `ros2 node info` shows them. Not thread-safe; the participant guards it.

@@ -1,6 +1,8 @@
 #include "idl/dds/service_client.hpp"
 
 #include <algorithm>
+#include <limits>
+#include <random>
 #include <utility>
 
 namespace stillmap::dds {
@@ -11,12 +13,20 @@ std::chrono::milliseconds left_until(std::chrono::steady_clock::time_point deadl
   return std::max(std::chrono::ceil<std::chrono::milliseconds>(left), std::chrono::milliseconds(0));
 }
 
+std::int64_t random_number() {
+  std::random_device device;
+  // Room is left to count on.
+  return std::uniform_int_distribution<std::int64_t>(
+      1, std::numeric_limits<std::int64_t>::max() / 2)(device);
+}
+
 }  // namespace
 
 UntypedServiceClient::UntypedServiceClient(Participant& participant, const std::string& service,
                                            TypeSupport request_type, TypeSupport reply_type)
     : request_type_(std::move(request_type)),
       reply_type_(std::move(reply_type)),
+      call_number_(random_number()),
       requests_(participant, request_topic(service), request_type_.get_type_name(), service_qos()),
       replies_(participant, reply_topic(service), reply_type_.get_type_name(), service_qos()) {}
 
@@ -32,16 +42,17 @@ bool UntypedServiceClient::call(const void* request, void* reply,
   if (!wait_for_server(timeout)) return false;
   const SerializedSample bytes = to_bytes(request_type_, request, 0);
   sent_.clear();
+  const RequestId id{.client = replies_.guid(), .number = ++call_number_};
   for (const auto deadline : {now + timeout / 2, now + timeout}) {
-    send(bytes);
+    send(bytes, id);
     if (receive(reply, deadline)) return true;
   }
   return false;
 }
 
-void UntypedServiceClient::send(const SerializedSample& request) {
+void UntypedServiceClient::send(const SerializedSample& request, const RequestId& id) {
   eprosima::fastrtps::rtps::WriteParams params;
-  params.related_sample_identity().writer_guid() = replies_.guid();
+  params.related_sample_identity() = identity_of_call(id);
   if (requests_.write(request, params)) sent_.push_back(params.sample_identity());
 }
 

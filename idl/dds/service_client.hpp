@@ -30,12 +30,15 @@ class UntypedServiceClient {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void send(const SerializedSample& request);
+  void send(const SerializedSample& request, const RequestId& id);
   [[nodiscard]] bool receive(void* reply, Clock::time_point deadline);
   [[nodiscard]] bool is_ours(const eprosima::fastrtps::rtps::SampleIdentity& answered) const;
 
   TypeSupport request_type_;
   TypeSupport reply_type_;
+  /// Of the newest call. Begins anywhere, so that two processes whose guids are the same, one after
+  /// the other, are told apart.
+  std::int64_t call_number_;
   std::vector<eprosima::fastrtps::rtps::SampleIdentity> sent_;
   // First: where permissions forbid a service, they are refused for its requests.
   SerializedSampleWriter requests_;
@@ -68,7 +71,8 @@ class ServiceClient {
 
   /// Throws NotPermitted for a service that our permissions forbid. The answer; nothing after
   /// `timeout`. A request is sent again at half time: a server that was just restarted may have
-  /// lost the first, and the first answer that comes is taken.
+  /// lost the first, and the first answer that comes is taken. Both name the same call, which a
+  /// service that changes something carries out once.
   [[nodiscard]] std::optional<Reply> call(const Request& request,
                                           std::chrono::milliseconds timeout) {
     const std::scoped_lock lock(mutex_);

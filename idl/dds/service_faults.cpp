@@ -10,6 +10,8 @@ void ServiceFaults::undelivered_reply(const std::string& service) {
   count("undelivered_reply_" + service);
 }
 
+void ServiceFaults::slow_client(const std::string& service) { count("slow_client_" + service); }
+
 std::map<std::string, std::uint64_t> ServiceFaults::counts() const {
   const std::scoped_lock lock(mutex_);
   return counts_;

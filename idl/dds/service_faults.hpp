@@ -15,6 +15,9 @@ class ServiceFaults {
   /// A reply that reached no client: it was never discovered, or left.
   void undelivered_reply(const std::string& service);
 
+  /// A request of a client that does not take the replies it has: it was refused.
+  void slow_client(const std::string& service);
+
   /// How often each occurred: "unreadable_request_stillmap/get_status".
   [[nodiscard]] std::map<std::string, std::uint64_t> counts() const;
 

@@ -27,6 +27,22 @@ bool names_reply_reader(const SampleInfo& request) {
   return request.related_sample_identity.writer_guid() != GUID_t::unknown();
 }
 
+SampleIdentity identity_of_call(const RequestId& id) {
+  SampleIdentity identity;
+  identity.writer_guid() = id.client;
+  identity.sequence_number() =
+      eprosima::fastrtps::rtps::SequenceNumber_t(static_cast<std::uint64_t>(id.number));
+  return identity;
+}
+
+std::optional<RequestId> request_id(const SampleInfo& request) {
+  if (!names_reply_reader(request)) return std::nullopt;
+  const SampleIdentity& call = request.related_sample_identity;
+  const RequestId id{.client = call.writer_guid(),
+                     .number = static_cast<std::int64_t>(call.sequence_number().to64long())};
+  return id.number > 0 ? std::optional(id) : std::nullopt;
+}
+
 bool has_correlation_header(const GUID_t& request_writer) {
   // A participant's GUID begins with its vendor's id.
   constexpr std::array<std::uint8_t, 2> cyclone = {0x01, 0x10};

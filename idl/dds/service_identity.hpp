@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <optional>
 
@@ -17,6 +18,23 @@ namespace stillmap::dds {
 /// True when a request names the reader that its reply is for.
 [[nodiscard]] bool names_reply_reader(const eprosima::fastdds::dds::SampleInfo& request);
 
+/// What all requests of one call have in common, however often the client sends it. Clients of
+/// Stillmap's library name it; those of ROS 2 send a call once and do not.
+struct RequestId {
+  /// The client's reply reader.
+  eprosima::fastrtps::rtps::GUID_t client;
+  /// Above 0.
+  std::int64_t number = 0;
+  friend bool operator==(const RequestId&, const RequestId&) = default;
+};
+
+/// The identity that a request carries so that it names its reply reader and its call.
+[[nodiscard]] eprosima::fastrtps::rtps::SampleIdentity identity_of_call(const RequestId& id);
+
+/// Nothing when the request does not name its call.
+[[nodiscard]] std::optional<RequestId> request_id(
+    const eprosima::fastdds::dds::SampleInfo& request);
+
 /// What rmw_cyclonedds puts between encapsulation and fields of a request, and looks for in the
 /// reply: the client (uint64) and the request's number (int64). Kept as little-endian bytes.
 using CorrelationHeader = std::array<std::uint8_t, 16>;
@@ -30,5 +48,17 @@ using CorrelationHeader = std::array<std::uint8_t, 16>;
 
 /// Puts the header into a reply that has a gap for it (see to_bytes).
 void put_correlation_header(const CorrelationHeader& header, SerializedSample& reply);
+
+/// Which client sent a request, and how the reply is correlated with it.
+struct ServiceCall {
+  eprosima::fastrtps::rtps::GUID_t request_writer;
+  /// For rmw_fastrtps and every vendor but Cyclone.
+  eprosima::fastrtps::rtps::SampleIdentity reply_identity;
+  bool names_reply_reader = false;
+  /// For rmw_cyclonedds.
+  std::optional<CorrelationHeader> header;
+  /// For Stillmap's own clients.
+  std::optional<RequestId> id;
+};
 
 }  // namespace stillmap::dds

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <deque>
+#include <exception>
 #include <functional>
 #include <map>
 #include <optional>
@@ -8,7 +9,8 @@
 #include <thread>
 #include <utility>
 
-#include "idl/dds/serialized_sample.hpp"
+#include "idl/dds/answered_requests.hpp"
+#include "idl/dds/reply_writer.hpp"
 #include "idl/dds/service_faults.hpp"
 #include "idl/dds/service_identity.hpp"
 #include "idl/dds/type_support.hpp"
@@ -16,16 +18,18 @@
 
 namespace stillmap::dds {
 
-/// Which client sent a request, and how the reply is correlated with it.
-struct ServiceCall {
-  eprosima::fastrtps::rtps::GUID_t request_writer;
-  /// For rmw_fastrtps and every vendor but Cyclone.
-  eprosima::fastrtps::rtps::SampleIdentity reply_identity;
-  bool names_reply_reader = false;
-  /// For rmw_cyclonedds.
-  std::optional<CorrelationHeader> header;
-  /// False when the bytes are no request of the service's type.
-  bool is_readable = false;
+/// Why a request is not answered, as the status of a reply says it.
+struct Refusal {
+  std::uint8_t code = 0;
+  std::string reason;
+};
+
+struct ServiceOptions {
+  /// A call that comes again, as clients send it when its answer is late, is answered from memory:
+  /// for services that change something.
+  bool carries_out_once = false;
+  /// Called once a second without requests; must not throw.
+  std::function<void()> idle = [] {};
 };
 
 /// The server's end of one ROS 2 service, for clients of rmw_fastrtps and of rmw_cyclonedds. One
@@ -33,47 +37,74 @@ struct ServiceCall {
 class UntypedServiceServer {
  public:
   using TypeSupport = eprosima::fastdds::dds::TypeSupport;
+  /// The reply that says so, after a gap of so many bytes.
+  using MakeRefusal =
+      std::function<SerializedSample(const Refusal& refusal, std::size_t gap_bytes)>;
 
-  /// Throws DdsError when the topics cannot be made.
+  /// Replies of a client that were not taken; what it asks beyond them is refused.
+  static constexpr std::size_t max_client_bytes = 16U << 20U;
+  /// Replies that wait to be written; beyond them, requests wait.
+  static constexpr std::size_t max_waiting_bytes = 32U << 20U;
+
+  /// `make_refusal` is empty where the reply's type cannot say why there is no answer. Throws
+  /// DdsError when the topics cannot be made.
   UntypedServiceServer(Participant& participant, const std::string& service,
-                       TypeSupport request_type, TypeSupport reply_type);
+                       TypeSupport request_type, TypeSupport reply_type, bool carries_out_once,
+                       MakeRefusal make_refusal);
 
-  /// Waits for the next request and reads it into `request`, an object of the request's type;
-  /// meanwhile sends replies whose readers were discovered. Nothing after `timeout`, on a stop, or
-  /// when a request came that cannot even be refused.
+  /// Waits for the next request that is to be carried out, and reads it into `request`, an object
+  /// of the request's type; meanwhile sends replies that wait for their readers, and refuses or
+  /// answers again what needs no more. Nothing after `timeout` or on a stop.
   [[nodiscard]] std::optional<ServiceCall> take(void* request, const std::stop_token& stop,
                                                 std::chrono::milliseconds timeout);
 
   /// Sends the reply as soon as its reader is found; a reader that is not found in time gets none.
   void send_reply(const ServiceCall& call, const void* reply);
 
+  /// Tells the client that its request failed, where the reply's type can.
+  void send_failure(const ServiceCall& call, const std::string& reason);
+
  private:
   using Clock = std::chrono::steady_clock;
+  using SampleInfo = eprosima::fastdds::dds::SampleInfo;
 
   struct WaitingReply {
     ServiceCall call;
     SerializedSample bytes;
-    Clock::time_point deadline;
+    Clock::time_point since;
   };
 
-  [[nodiscard]] std::optional<ServiceCall> read(SerializedSample& bytes,
-                                                const eprosima::fastdds::dds::SampleInfo& info,
+  /// Nothing for a request that needs nothing more.
+  [[nodiscard]] std::optional<ServiceCall> read(SerializedSample& bytes, const SampleInfo& info,
                                                 void* request);
-  void remember(const eprosima::fastrtps::rtps::GUID_t& request_writer);
+  /// True when the call was answered before, and is again.
+  [[nodiscard]] bool answer_again(const ServiceCall& call);
+  void refuse(const ServiceCall& call, const Refusal& refusal);
+  void remember(const eprosima::fastrtps::rtps::GUID_t& request_writer, Clock::time_point now);
   [[nodiscard]] bool reaches_client(const ServiceCall& call) const;
   [[nodiscard]] bool may_reach_client(const ServiceCall& call) const;
+  void wait_for_reader(const ServiceCall& call, SerializedSample bytes);
   void send_waiting();
-  void send(const WaitingReply& reply);
+  /// True when it needs to wait no more.
+  [[nodiscard]] bool send_or_drop(const WaitingReply& reply, Clock::time_point now);
+  /// False when there is no room yet.
+  [[nodiscard]] bool send(const WaitingReply& reply, Clock::time_point now);
+  void repeat_heartbeat(Clock::time_point now);
 
   std::string service_;
+  bool carries_out_once_;
+  MakeRefusal make_refusal_;
   ServiceFaults& faults_;
   TypeSupport request_type_;
   TypeSupport reply_type_;
-  SerializedSampleWriter replies_;
+  ReplyWriter replies_;
   SerializedSampleReader requests_;
+  AnsweredRequests answered_;
   std::deque<WaitingReply> waiting_;
-  /// When each client of rmw_cyclonedds asked first.
-  std::map<eprosima::fastrtps::rtps::GUID_t, Clock::time_point> first_requests_;
+  std::size_t waiting_bytes_ = 0;
+  /// When each client of rmw_cyclonedds was to get its first reply.
+  std::map<eprosima::fastrtps::rtps::GUID_t, Clock::time_point> first_replies_;
+  Clock::time_point last_heartbeat_;
 };
 
 /// A reply that can say in words why there is no answer.
@@ -84,19 +115,19 @@ concept CarriesRefusal = requires(Reply reply) {
 };
 
 /// Answers the requests of one ROS 2 service, one at a time, on its own thread, from clients of
-/// rmw_fastrtps and rmw_cyclonedds. Requests that cannot be read are counted
-/// (Participant::service_faults) and refused, where the reply has a status.
+/// rmw_fastrtps and rmw_cyclonedds. Requests that cannot be read, and those of clients that do not
+/// take the replies they have, are counted (Participant::service_faults) and refused, where the
+/// reply has a status.
 template <typename Request, typename Reply>
 class ServiceServer {
  public:
-  /// `answer` and `idle`, called once a second without requests, must not throw. Throws DdsError
-  /// when the topics cannot be made.
-  ServiceServer(
-      Participant& participant, const std::string& service,
-      std::function<Reply(const Request&)> answer, std::function<void()> idle = [] {})
+  /// What `answer` throws is refused in words. Throws DdsError when the topics cannot be made.
+  ServiceServer(Participant& participant, const std::string& service,
+                std::function<Reply(const Request&)> answer, ServiceOptions options = {})
       : answer_(std::move(answer)),
-        idle_(std::move(idle)),
-        server_(participant, service, type_support<Request>(), type_support<Reply>()),
+        idle_(std::move(options.idle)),
+        server_(participant, service, type_support<Request>(), type_support<Reply>(),
+                options.carries_out_once, make_refusal()),
         thread_([this](const std::stop_token& stop) { serve(stop); }) {}
 
  private:
@@ -108,23 +139,26 @@ class ServiceServer {
         idle_();
         continue;
       }
-      if (call->is_readable) {
+      try {
         const Reply reply = answer_(request);
         server_.send_reply(*call, &reply);
-      } else if constexpr (CarriesRefusal<Reply>) {
-        const Reply reply = refusal();
-        server_.send_reply(*call, &reply);
+      } catch (const std::exception& fault) {
+        server_.send_failure(*call, fault.what());
       }
     }
   }
 
-  static Reply refusal() {
-    Reply reply;
-    reply.status().code(stillmap_msgs::msg::ReplyStatus_Constants::INVALID_REQUEST);
-    reply.status().reason("the request cannot be read as a " +
-                          type_support<Request>().get_type_name() +
-                          "; client and server must have the same version of stillmap_msgs");
-    return reply;
+  static UntypedServiceServer::MakeRefusal make_refusal() {
+    if constexpr (CarriesRefusal<Reply>) {
+      return [](const Refusal& refusal, std::size_t gap_bytes) {
+        Reply reply;
+        reply.status().code(refusal.code);
+        reply.status().reason(refusal.reason);
+        return to_bytes(type_support<Reply>(), &reply, gap_bytes);
+      };
+    } else {
+      return {};
+    }
   }
 
   std::function<Reply(const Request&)> answer_;

@@ -54,8 +54,15 @@ UntypedWriter::UntypedWriter(Participant& participant, const std::string& topic,
                              const TypeSupport& type, const TopicQos& qos)
     : topic_(topic), writer_(participant.make_writer(topic, type, qos, &readers_)) {}
 
+eprosima::fastrtps::rtps::GUID_t UntypedWriter::guid() const { return writer_->guid(); }
+
 bool UntypedWriter::wait_for_acknowledgements(std::chrono::milliseconds timeout) {
   return writer_->wait_for_acknowledgments(to_duration(timeout)) == ReturnCode::RETCODE_OK;
+}
+
+void UntypedWriter::forget_written() {
+  std::size_t removed = 0;
+  writer_->clear_history(&removed);
 }
 
 bool UntypedWriter::write_untyped(const void* sample) {

@@ -42,9 +42,13 @@ class UntypedWriter {
                 const eprosima::fastdds::dds::TypeSupport& type, const TopicQos& qos);
 
   [[nodiscard]] const MatchedReaders& readers() const { return readers_; }
+  [[nodiscard]] eprosima::fastrtps::rtps::GUID_t guid() const;
 
   /// True once every matched reliable reader has everything written; false after `timeout`.
   [[nodiscard]] bool wait_for_acknowledgements(std::chrono::milliseconds timeout);
+
+  /// Late joiners get nothing of what was written so far.
+  void forget_written();
 
  protected:
   /// False when there was no room: nothing was written.

@@ -15,7 +15,10 @@ struct PolicyHint {
 
 constexpr PolicyHint policy_hints[] = {
     {"type", "give both the same message type, or one of them another topic name"},
-    {"keys", "build both from the same definition of the message"},
+    {"keys",
+     "ROS 2 nodes up to Jazzy have no keys and cannot read such topics: they use static_cloud, the "
+     "traversability grid, and the service get_tiles; other programs: build both from the same "
+     "definition of the message"},
     {"reliability",
      "let the writer be reliable, or the reader best effort (of stillmap-server's scans: "
      "input.delivery: latest)"},
@@ -42,18 +45,14 @@ std::string joined(const std::vector<std::string>& parts) {
   return text;
 }
 
-std::string short_name(const RemoteParticipant& peer) {
-  return peer.name.empty() ? "a participant without a name" : peer.name;
-}
-
 }  // namespace
 
 Diagnostic to_diagnostic(const Mismatch& mismatch) {
   // Without it, ROS 2 tools show no node names; data flows.
   const bool harmless = mismatch.topic == ros_discovery_topic;
   return {.severity = harmless ? Severity::advice : Severity::problem,
-          .what = mismatch.topic + ": what " + short_name(mismatch.writer_participant) +
-                  " writes does not reach " + short_name(mismatch.reader_participant),
+          .what = mismatch.topic + ": what " + display_name(mismatch.writer_participant) +
+                  " writes does not reach " + display_name(mismatch.reader_participant),
           .evidence = joined(mismatch.incompatible_policies) +
                       "; writer: " + describe(mismatch.writer_participant) +
                       ", reader: " + describe(mismatch.reader_participant),
@@ -79,7 +78,7 @@ std::vector<Diagnostic> security_diagnostics(const RemoteParticipant& self,
     if (peer.is_secured && !self.is_secured) {
       diagnostics.push_back(
           {.severity = Severity::problem,
-           .what = short_name(peer) + " is secured and " + short_name(self) + " is not",
+           .what = display_name(peer) + " is secured and " + display_name(self) + " is not",
            .evidence = describe(peer) + " announces an identity of DDS Security and ignores "
                                         "everybody without one",
            .hint = "name an identity: --security FOLDER or STILLMAP_SECURITY; 'stillmap "
@@ -87,13 +86,13 @@ std::vector<Diagnostic> security_diagnostics(const RemoteParticipant& self,
     } else if (!peer.is_secured && self.is_secured) {
       diagnostics.push_back(
           {.severity = Severity::problem,
-           .what = short_name(peer) + " is not secured and is ignored",
+           .what = display_name(peer) + " is not secured and is ignored",
            .evidence = describe(peer) + " is in this domain without an identity",
            .hint = "start it with --security FOLDER (ROS 2: an enclave), or in another domain"});
     } else if (peer.refused) {
       diagnostics.push_back(
           {.severity = Severity::problem,
-           .what = short_name(peer) + " and " + short_name(self) + " refuse each other",
+           .what = display_name(peer) + " and " + display_name(self) + " refuse each other",
            .evidence = "authentication with " + describe(peer) +
                        " failed: another authority, an identity that expired, or a clock that is "
                        "wrong on one side",
@@ -113,7 +112,7 @@ std::vector<Diagnostic> silent_participant_diagnostics(
     if (peer.is_on_this_host && self.uses_shared_memory) {
       diagnostics.push_back(
           {.severity = Severity::problem,
-           .what = "nothing of " + short_name(peer) + " arrives, though it runs on this host",
+           .what = "nothing of " + display_name(peer) + " arrives, though it runs on this host",
            .evidence = describe(peer) +
                        " is seen, but none of its topics: its shared memory (/dev/shm) is not "
                        "ours, as between containers or users",
@@ -122,7 +121,7 @@ std::vector<Diagnostic> silent_participant_diagnostics(
     } else {
       diagnostics.push_back(
           {.severity = Severity::problem,
-           .what = "nothing of " + short_name(peer) + " arrives",
+           .what = "nothing of " + display_name(peer) + " arrives",
            .evidence = describe(peer) + " is seen by multicast, but none of its topics",
            .hint = "let UDP ports 7400 to 65535 pass the firewalls between both machines"});
     }

@@ -71,7 +71,8 @@ struct ServerStatus {
   SegmentationStatus segmentation;
   /// "scans_received", "scans_mapped", "label_failures" once there are any, and "dropped_<reason>"
   /// for every reason that occurred; then events beside mapping, as "occupancy_not_cleared", and
-  /// "unreadable_request_<service>" and "undelivered_reply_<service>" once there are any.
+  /// "unreadable_request_<service>", "undelivered_reply_<service>" and "slow_client_<service>" once
+  /// there are any.
   std::vector<NamedCounter> counters;
   /// In the order of the pipeline: wait in the queue, its stages, and "total"; then
   /// what runs beside it, as "occupancy".

@@ -12,7 +12,7 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
       poses_(context.participant, context.topics, config.frames) {
   if (config.publish.scan) labelled_scans_.emplace(context.participant, context.topics);
   if (!config.topics.odometry_prior.empty()) {
-    prior_.emplace(context.participant, config.topics.odometry_prior);
+    prior_.emplace(context.participant, config.topics.odometry_prior, context.statistics);
   }
   if (!config.frames.base.empty()) {
     static_transforms_.emplace(context.participant, context.topics, context.statistics);

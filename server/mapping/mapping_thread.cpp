@@ -80,7 +80,9 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
         map(std::move(queued));
         end_round(false);
       },
-      WorkerOptions{.on_idle = [this] { end_round(true); }, .idle_period = idle_period});
+      WorkerOptions{.on_idle = [this] { end_round(true); },
+                    .idle_period = idle_period,
+                    .on_failure = [this] { run_requests_elsewhere(); }});
 }
 
 std::uint64_t MappingThread::reset() {
@@ -125,7 +127,12 @@ void MappingThread::publish_now() {
 void MappingThread::stop() {
   if (!worker_) return;
   worker_.reset();
-  publish_snapshot();
+  // Of a worker that failed, only checkpoints are wanted.
+  if (!has_stopped_) publish_snapshot();
+  run_requests_elsewhere();
+}
+
+void MappingThread::run_requests_elsewhere() {
   const std::scoped_lock lock(requests_mutex_);
   has_stopped_ = true;
   for (std::packaged_task<void()>& task : std::exchange(requests_, {})) task();

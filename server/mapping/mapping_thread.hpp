@@ -106,6 +106,8 @@ class MappingThread : public CheckpointSource {
   /// Runs `action` in the thread that maps, after the scan in work, and waits for its end.
   void run_between_scans(std::function<void()> action);
   void run_requests();
+  /// Runs those that wait, and from now on each in the thread that asks: this one has ended.
+  void run_requests_elsewhere();
 
   /// Limit of the memory that the static map takes.
   std::size_t map_limit_bytes_;

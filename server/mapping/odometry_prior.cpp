@@ -1,6 +1,7 @@
 #include "server/mapping/odometry_prior.hpp"
 
 #include <algorithm>
+#include <utility>
 
 #include "idl/conversions/pose.hpp"
 #include "idl/interface/topics.hpp"
@@ -12,18 +13,29 @@ namespace {
 constexpr std::size_t max_poses = 1000;
 // A pose this much older than the scan still stands for it.
 constexpr std::int64_t max_gap_ns = 100'000'000;
-// No network delays a pose by more against those after it.
-constexpr std::int64_t max_disorder_ns = 5'000'000'000;
+// The next pose of an odometry comes sooner.
+constexpr std::int64_t max_step_ns = 5'000'000'000;
+// So many poses in a row, each after the other, are of the odometry's clock, whatever the poses
+// before them said.
+constexpr std::size_t proof_of_clock = 5;
+
+bool follows(const StampedPose& before, const StampedPose& after) {
+  return after.stamp_ns > before.stamp_ns && after.stamp_ns - before.stamp_ns <= max_step_ns;
+}
 
 }  // namespace
 
-void PoseBuffer::add(const StampedPose& pose) {
-  if (!poses_.empty() && pose.stamp_ns <= poses_.back().stamp_ns) {
-    if (poses_.back().stamp_ns - pose.stamp_ns < max_disorder_ns) return;
-    poses_.clear();
+bool PoseBuffer::add(const StampedPose& pose) {
+  if (poses_.empty() || follows(poses_.back(), pose)) {
+    doubted_.clear();
+    poses_.push_back(pose);
+    if (poses_.size() > max_poses) poses_.pop_front();
+    return true;
   }
-  poses_.push_back(pose);
-  if (poses_.size() > max_poses) poses_.pop_front();
+  if (!doubted_.empty() && !follows(doubted_.back(), pose)) doubted_.clear();
+  doubted_.push_back(pose);
+  if (doubted_.size() >= proof_of_clock) poses_ = std::exchange(doubted_, {});
+  return false;
 }
 
 std::optional<Eigen::Isometry3d> PoseBuffer::pose_at(std::int64_t stamp_ns) const {
@@ -53,8 +65,10 @@ std::optional<Eigen::Isometry3d> PoseBuffer::motion(std::int64_t from_ns,
   return T_odom_from->inverse() * *T_odom_to;
 }
 
-OdometryPrior::OdometryPrior(dds::Participant& participant, const std::string& ros_topic)
-    : reader_(participant, dds::odometry_prior_topic(ros_topic).dds_name,
+OdometryPrior::OdometryPrior(dds::Participant& participant, const std::string& ros_topic,
+                             Statistics& statistics)
+    : statistics_(statistics),
+      reader_(participant, dds::odometry_prior_topic(ros_topic).dds_name,
               dds::odometry_prior_topic(ros_topic).reader),
       worker_(std::chrono::seconds(0),
               [this, message = nav_msgs::msg::Odometry()](const std::stop_token& stop) mutable {
@@ -71,7 +85,7 @@ void OdometryPrior::add(const nav_msgs::msg::Odometry& message) {
   if (!is_same) poses_ = {};
   odom_frame_ = message.header().frame_id();
   frame_ = message.child_frame_id();
-  poses_.add(odometry->pose);
+  if (!poses_.add(odometry->pose)) statistics_.count("odometry_prior_out_of_order");
 }
 
 std::optional<PriorMotion> OdometryPrior::motion(std::int64_t from_ns, std::int64_t to_ns) const {

@@ -8,6 +8,7 @@
 #include "core/lidar/trajectory.hpp"
 #include "idl/dds/reader.hpp"
 #include "nav_msgs.h"
+#include "server/monitoring/statistics.hpp"
 #include "server/threads/periodic_worker.hpp"
 
 namespace stillmap::server {
@@ -16,9 +17,10 @@ namespace stillmap::server {
 /// does not matter. They are poses of a frame on the robot, whichever that is.
 class PoseBuffer {
  public:
-  /// Out-of-order poses are left out; one that is far older is of a clock that was set back, and
-  /// begins anew.
-  void add(const StampedPose& pose);
+  /// A pose that is not later than the newest, or later by more than 5 s, is left out (false);
+  /// after five of those in a row, each following the other, the clock is theirs, and they take the
+  /// place of what was there.
+  bool add(const StampedPose& pose);
 
   /// Motion of that frame from one time to another, interpolated; nothing when the poses do not
   /// reach that far.
@@ -30,6 +32,8 @@ class PoseBuffer {
 
  private:
   std::deque<StampedPose> poses_;
+  /// The newest that were left out, as far as they follow each other.
+  std::deque<StampedPose> doubted_;
 };
 
 /// Motion of a frame on the robot.
@@ -46,10 +50,12 @@ struct PriorPose {
   Eigen::Isometry3d T_odom_frame = Eigen::Isometry3d::Identity();
 };
 
-/// Receives the odometry prior.
+/// Receives the odometry prior; poses that are left out are counted
+/// ("odometry_prior_out_of_order").
 class OdometryPrior {
  public:
-  OdometryPrior(dds::Participant& participant, const std::string& ros_topic);
+  OdometryPrior(dds::Participant& participant, const std::string& ros_topic,
+                Statistics& statistics);
 
   /// Motion of the prior's child frame; nothing when the prior does not cover both times.
   [[nodiscard]] std::optional<PriorMotion> motion(std::int64_t from_ns, std::int64_t to_ns) const;
@@ -59,6 +65,7 @@ class OdometryPrior {
  private:
   void add(const nav_msgs::msg::Odometry& message);
 
+  Statistics& statistics_;
   mutable std::mutex mutex_;
   /// All between the same two frames.
   PoseBuffer poses_;

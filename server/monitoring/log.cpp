@@ -6,6 +6,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <memory>
 #include <string>
@@ -112,6 +113,13 @@ void ThrottledLog::warn(const std::string& kind, const std::string& text) {
 
 void ThrottledLog::error(const std::string& kind, const std::string& text) {
   if (const std::string line = due(kind, text); !line.empty()) spdlog::error("{}", line);
+}
+
+bool NewLines::add(const std::string& text) {
+  if (std::ranges::find(lines_, text) != lines_.end()) return false;
+  lines_.push_back(text);
+  if (lines_.size() > max_lines) lines_.pop_front();
+  return true;
 }
 
 }  // namespace stillmap::server

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <string>
 
@@ -32,6 +34,19 @@ class ThrottledLog {
     std::uint64_t suppressed = 0;
   };
   std::map<std::string, Kind> kinds_;
+};
+
+/// The texts that were logged last, so that what lasts is logged once. One thread uses it.
+class NewLines {
+ public:
+  /// Beyond them, the oldest is forgotten.
+  static constexpr std::size_t max_lines = 1000;
+
+  /// True when the text is not among them; then it is.
+  bool add(const std::string& text);
+
+ private:
+  std::deque<std::string> lines_;
 };
 
 }  // namespace stillmap::server

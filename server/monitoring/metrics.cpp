@@ -97,6 +97,8 @@ Metrics::Metrics()
                                   "Width of the range images; 0: none")),
       scan_labels_(gauges(registry_, "stillmap_scan_labels_ratio",
                           "Share of the last scans whose labels came from there")),
+      service_faults_(counters(registry_, "stillmap_service_faults_total",
+                               "Requests that got no answer, by service and fault")),
       map_tiles_(gauge(registry_, "stillmap_map_tiles", "Tiles of the static map")),
       map_voxels_(gauge(registry_, "stillmap_map_voxels", "Voxels of the static map")),
       resident_memory_(gauge(registry_, "process_resident_memory_bytes", "Memory of the process")),
@@ -139,6 +141,19 @@ void Metrics::show(const dds::ServerStatus& status) {
   scan_labels_.Add({{"source", "none"}}).Set(segmentation.unlabelled_share);
   map_tiles_.Set(static_cast<double>(status.tile_count));
   map_voxels_.Set(static_cast<double>(status.voxel_count));
+  show_service_faults(status);
+}
+
+void Metrics::show_service_faults(const dds::ServerStatus& status) {
+  // As dds::ServiceFaults names them.
+  for (const std::string fault : {"unreadable_request", "undelivered_reply", "slow_client"}) {
+    for (const dds::NamedCounter& counter : status.counters) {
+      if (!counter.name.starts_with(fault + "_")) continue;
+      prometheus::Counter& shown = service_faults_.Add(
+          {{"service", counter.name.substr(fault.size() + 1)}, {"fault", fault}});
+      shown.Increment(static_cast<double>(counter.value) - shown.Value());
+    }
+  }
 }
 
 void Metrics::show_process() {

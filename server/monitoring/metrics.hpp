@@ -60,6 +60,7 @@ class Metrics {
  private:
   void show(const dds::ServerStatus& status);
   void show_process();
+  void show_service_faults(const dds::ServerStatus& status);
 
   // Set by `collect` alone, for one caller at a time.
   std::mutex collect_mutex_;
@@ -70,6 +71,7 @@ class Metrics {
   prometheus::Gauge& segmentation_every_;
   prometheus::Gauge& segmentation_columns_;
   Gauges& scan_labels_;
+  Counters& service_faults_;
   prometheus::Gauge& map_tiles_;
   prometheus::Gauge& map_voxels_;
   prometheus::Gauge& resident_memory_;

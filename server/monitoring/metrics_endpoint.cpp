@@ -5,6 +5,7 @@
 
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 #include "server/monitoring/metrics.hpp"
 
@@ -24,9 +25,26 @@ class MetricsEndpoint::Exposed : public prometheus::Collectable {
   std::function<dds::ServerStatus()> status_;
 };
 
+namespace {
+
+/// Of the web server (civetweb) that the Prometheus library uses. Each connection takes a thread
+/// until its request has come whole and the answer has been taken, so both are bounded in time:
+/// connections that stay silent or drip cannot keep the threads. A scrape waits for its turn.
+std::vector<std::string> web_server_options(const std::string& address) {
+  return {"listening_ports",    address,  //
+          "num_threads",        "16",     //
+          "request_timeout_ms", "1000",   //
+          "enable_keep_alive",  "no",     //
+          "max_request_size",   "8192",   //
+          "connection_queue",   "64",     //
+          "listen_backlog",     "64"};
+}
+
+}  // namespace
+
 class MetricsListener {
  public:
-  explicit MetricsListener(const std::string& address) : exposer_(address) {}
+  explicit MetricsListener(const std::string& address) : exposer_(web_server_options(address)) {}
   prometheus::Exposer& exposer() { return exposer_; }
 
  private:

@@ -1,28 +1,64 @@
 #include "server/occupancy/occupancy.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "idl/conversions/occupancy.hpp"
 
 namespace stillmap::server {
 
+namespace {
+
+// How soon a reader that joins, and another map, are noticed.
+constexpr std::chrono::duration<double> poll_period{0.1};
+// However many readers join.
+constexpr std::chrono::duration<double> min_period{1.0};
+
+}  // namespace
+
 OctomapPublisher::OctomapPublisher(dds::Participant& participant, const dds::Topics& topics,
                                    const ServerConfig& config, OccupancyThread& occupancy)
     : occupancy_(occupancy),
       map_frame_(config.frames.map),
+      period_(config.occupancy.publish_period_s),
       writer_(participant, topics.octomap.dds_name, topics.octomap.writer),
-      worker_(std::chrono::duration<double>(config.occupancy.publish_period_s),
-              [this](const std::stop_token&) { publish(); }) {}
+      worker_(std::min(poll_period, period_),
+              [this](const std::stop_token&) { publish_when_due(); }) {}
+
+void OctomapPublisher::publish_when_due() {
+  if (const std::uint64_t map = occupancy_.maps_begun(); map != map_) {
+    map_ = map;
+    is_urgent_ = true;
+    forget_published();
+  }
+  const int readers = writer_.readers().count();
+  if (readers > std::exchange(readers_, readers)) is_urgent_ = true;
+  const bool has_changed = occupancy_.changes() != published_;
+  // Encoding a whole octree without a reader would be wasted.
+  if (readers == 0 && has_changed) forget_published();
+  if (readers > 0 && has_changed && is_due()) publish();
+}
+
+bool OctomapPublisher::is_due() {
+  const auto period = is_urgent_ ? std::min(min_period, period_) : period_;
+  const auto now = std::chrono::steady_clock::now();
+  if (now - last_ < period) return false;
+  is_urgent_ = false;
+  last_ = now;
+  return true;
+}
+
+void OctomapPublisher::forget_published() {
+  if (published_ != 0) writer_.forget_written();
+  published_ = 0;
+}
 
 void OctomapPublisher::publish() {
-  // Encoding a whole octree without a reader would be wasted; a late joiner gets it within a
-  // period.
-  if (writer_.readers().count() == 0) return;
   const std::uint64_t changes = occupancy_.changes();
-  if (changes == published_) return;
-  published_ = changes;
   // On the octree's thread of idle priority: encoding takes long and must not delay poses.
   const EncodedOctree octree = occupancy_.encode_in_background().get();
+  if (occupancy_.maps_begun() != map_) return;
+  published_ = changes;
   // Keep-last writers always have room.
   static_cast<void>(writer_.write(wire::to_octomap(octree.data, octree.stamp_ns, map_frame_)));
 }

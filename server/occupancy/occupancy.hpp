@@ -1,5 +1,7 @@
 #pragma once
 
+#include <chrono>
+#include <cstdint>
 #include <string>
 
 #include "config/loaders/server_config.hpp"
@@ -12,18 +14,28 @@
 namespace stillmap::server {
 
 /// Publishes the octree (binary, as RViz2's plug-in and octomap_server's clients read it) when it
-/// has changed and has a reader.
+/// has changed and has a reader: every period, and at once to a reader that joins. Nothing is kept
+/// for late joiners that is older than the last reader, or of a map that is no more.
 class OctomapPublisher {
  public:
   OctomapPublisher(dds::Participant& participant, const dds::Topics& topics,
                    const ServerConfig& config, OccupancyThread& occupancy);
 
  private:
+  void publish_when_due();
+  [[nodiscard]] bool is_due();
+  void forget_published();
   void publish();
 
   OccupancyThread& occupancy_;
   std::string map_frame_;
+  std::chrono::duration<double> period_;
+  /// OccupancyThread::changes() of what is kept for late joiners; 0: nothing is.
   std::uint64_t published_ = 0;
+  std::uint64_t map_ = 0;
+  int readers_ = 0;
+  bool is_urgent_ = false;
+  std::chrono::steady_clock::time_point last_;
   dds::Writer<octomap_msgs::msg::Octomap> writer_;
   // Last: stops before what it uses is gone.
   PeriodicWorker worker_;

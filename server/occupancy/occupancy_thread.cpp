@@ -42,6 +42,7 @@ void OccupancyThread::begin(std::shared_ptr<const MapSnapshot> view) {
     std::erase_if(jobs, [](const Job& job) { return !std::holds_alternative<Encoding>(job); });
     insert_urgent(jobs, NewMap{std::move(view)});
     has_old_map_ = true;
+    ++maps_begun_;
   });
 }
 

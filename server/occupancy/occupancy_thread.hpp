@@ -53,6 +53,8 @@ class OccupancyThread {
   [[nodiscard]] std::future<EncodedOctree> encode_in_background();
   /// Grows with every change, over all maps.
   [[nodiscard]] std::uint64_t changes() const;
+  /// Grows with every `begin`.
+  [[nodiscard]] std::uint64_t maps_begun() const { return maps_begun_; }
 
  private:
   struct NewMap {
@@ -90,6 +92,7 @@ class OccupancyThread {
   OccupancyMap map_;
   /// A new map waits to replace it. Changed under the queue's lock.
   std::atomic<bool> has_old_map_ = false;
+  std::atomic<std::uint64_t> maps_begun_ = 0;
   std::uint64_t changes_ = 0;
   std::int64_t stamp_ns_ = 0;
   // Last: stops before what it uses is gone.

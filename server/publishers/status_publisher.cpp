@@ -67,7 +67,7 @@ std::vector<dds::Diagnostic> DiscoveryDiagnostics::diagnostics() {
   collected_ = now;
   last_ = collect();
   for (const dds::Diagnostic& diagnostic : last_) {
-    if (seen_.insert(diagnostic.what + diagnostic.evidence).second) log(diagnostic);
+    if (logged_.add(diagnostic.what + diagnostic.evidence)) log(diagnostic);
   }
   return last_;
 }

@@ -3,7 +3,6 @@
 #include <chrono>
 #include <functional>
 #include <mutex>
-#include <set>
 #include <string>
 #include <vector>
 
@@ -12,6 +11,7 @@
 #include "idl/interface/diagnostic.hpp"
 #include "idl/interface/server_status.hpp"
 #include "idl/interface/topics.hpp"
+#include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/publishers/latest_map.hpp"
 #include "server/threads/periodic_worker.hpp"
@@ -23,7 +23,7 @@ namespace stillmap::server {
 /// quality of service do not match, and identities that are refused. Thread-safe.
 class DiscoveryDiagnostics {
  public:
-  /// Each diagnostic is also logged when it first occurs.
+  /// Each diagnostic is also logged when it occurs and was not among the last thousand.
   explicit DiscoveryDiagnostics(const dds::Participant& participant);
 
   /// At most a second old: comparing all endpoints takes time in a domain of many participants.
@@ -36,7 +36,7 @@ class DiscoveryDiagnostics {
   std::mutex mutex_;
   std::chrono::steady_clock::time_point collected_;
   std::vector<dds::Diagnostic> last_;
-  std::set<std::string> seen_;
+  NewLines logged_;
 };
 
 /// Problems of this machine, logged too: socket buffers smaller than wanted.

@@ -10,16 +10,17 @@ namespace stillmap::server {
 MapServices::MapServices(dds::Participant& participant, const std::string& name_space,
                          ServiceContext context)
     : context_(std::move(context)) {
-  for_each_handler(
-      [&]<typename Request, typename Reply>(const ServiceHandler<Request, Reply>& handler) {
-        const std::string name = handler.spec.in(name_space);
-        auto answer = [this, answer = handler.answer](const Request& request) {
-          return answer(context_, request);
-        };
-        servers_.push_back(std::make_shared<dds::ServiceServer<Request, Reply>>(
-            participant, name, logged(context_.log, name, std::move(answer)),
-            [this, idle = handler.idle] { idle(context_); }));
-      });
+  for_each_handler([&]<typename Request, typename Reply>(
+                       const ServiceHandler<Request, Reply>& handler) {
+    const std::string name = handler.spec.in(name_space);
+    auto answer = [this, answer = handler.answer](const Request& request) {
+      return answer(context_, request);
+    };
+    servers_.push_back(std::make_shared<dds::ServiceServer<Request, Reply>>(
+        participant, name, logged(context_.log, name, std::move(answer)),
+        dds::ServiceOptions{.carries_out_once = handler.spec.effect == dds::ServiceEffect::modifies,
+                            .idle = [this, idle = handler.idle] { idle(context_); }}));
+  });
 }
 
 }  // namespace stillmap::server

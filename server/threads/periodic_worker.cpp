@@ -4,6 +4,8 @@
 #include <mutex>
 #include <utility>
 
+#include "server/threads/thread_failure.hpp"
+
 namespace stillmap::server {
 namespace {
 
@@ -40,7 +42,9 @@ PeriodicWorker::PeriodicWorker(std::chrono::duration<double> period, Work work,
 
 PeriodicWorker::PeriodicWorker(Round round, MonotonicClock& clock)
     : thread_([round = std::move(round), &clock](const std::stop_token& stop) {
-        while (!stop.stop_requested()) clock.sleep_until(round(stop), stop);
+        run_or_report([&] {
+          while (!stop.stop_requested()) clock.sleep_until(round(stop), stop);
+        });
       }) {}
 
 }  // namespace stillmap::server

@@ -17,7 +17,8 @@ class PeriodicWorker {
   using Round = std::function<MonotonicClock::TimePoint(const std::stop_token& stop)>;
 
   /// Pauses for `period` between the end of one call and the next; 0 for work that waits itself,
-  /// until something happens or a stop is requested. The work must not throw.
+  /// until something happens or a stop is requested. What it throws ends the worker and is reported
+  /// (run_or_report).
   PeriodicWorker(std::chrono::duration<double> period, Work work,
                  MonotonicClock& clock = MonotonicClock::steady());
   /// For rounds that say themselves when the next one is due.

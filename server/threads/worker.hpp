@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "server/threads/bounded_queue.hpp"
+#include "server/threads/thread_failure.hpp"
 
 namespace stillmap::server {
 
@@ -20,6 +21,8 @@ struct WorkerOptions {
   std::chrono::milliseconds idle_period = std::chrono::hours(1);
   /// Handles what still waits when it is stopped, instead of leaving it in the queue.
   bool finishes_queue = false;
+  /// Called on the worker's thread, as the last thing, when `handle` or one of these threw.
+  std::function<void()> on_failure = {};
 };
 
 /// Takes items from a queue and hands them to `handle`, one at a time, on a thread of its own.
@@ -27,12 +30,14 @@ template <typename T>
 class Worker {
  public:
   /// The queue must outlive the worker, which is the only one to take from it. What `handle` and
-  /// the options call must not throw.
+  /// the options throw ends the worker and is reported (run_or_report).
   Worker(BoundedQueue<T>& queue, std::function<void(T)> handle, WorkerOptions options = {})
       : queue_(queue),
         handle_(std::move(handle)),
         options_(std::move(options)),
-        thread_([this](const std::stop_token& stop) { run(stop); }) {}
+        thread_([this](const std::stop_token& stop) {
+          run_or_report([&] { run(stop); }, options_.on_failure);
+        }) {}
 
   /// Ends after the item in work, and waits for that.
   void stop() { thread_ = {}; }

@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <thread>
 
 #include "idl/dds/reader.hpp"
+#include "idl/dds/ros_nodes.hpp"
 #include "idl/dds/writer.hpp"
 #include "rmw_dds_common.h"
+#include "rmw_dds_common_iron.h"
 #include "sensor_msgs.h"
 #include "tests/idl/dds_fixture.hpp"
 
@@ -57,6 +60,65 @@ TEST_F(RosGraphOfANode, AnnouncesEndpointsAsTheyComeAndGo) {
     EXPECT_TRUE(announces(1, 1));
   }
   EXPECT_TRUE(announces(0, 0));
+}
+
+TEST(RosNodeNames, AreReadOfBothLayouts) {
+  const auto check = []<typename Info>(Info info) {
+    typename std::remove_cvref_t<decltype(info.node_entities_info_seq())>::value_type node;
+    node.node_namespace("/");
+    node.node_name("rviz2");
+    node.reader_gid_seq().resize(3);
+    info.node_entities_info_seq() = {node, node};
+    info.node_entities_info_seq()[1].node_namespace("/robot");
+    info.node_entities_info_seq()[1].writer_gid_seq().resize(2);
+    const auto names = ros_node_names(to_bytes(type_support<Info>(), &info, 0));
+    EXPECT_EQ(names, std::vector<std::string>({"/rviz2", "/robot/rviz2"}));
+  };
+  check(ParticipantEntitiesInfo());
+  check(rmw_dds_common_iron::msg::ParticipantEntitiesInfo());
+}
+
+TEST(RosNodeNames, AreNoneInOtherBytes) {
+  ParticipantEntitiesInfo info;
+  info.node_entities_info_seq().resize(1);
+  const SerializedSample good = to_bytes(type_support<ParticipantEntitiesInfo>(), &info, 0);
+  for (std::size_t length = 0; length < good.size(); ++length) {
+    const SerializedSample cut(good.begin(), good.begin() + static_cast<std::ptrdiff_t>(length));
+    EXPECT_TRUE(ros_node_names(cut).empty()) << length;
+  }
+  EXPECT_TRUE(ros_node_names(SerializedSample(200, 0xFF)).empty());
+}
+
+TEST_F(RosGraphOfANode, TellsOtherNodesWhoIsWho) {
+  DdsOptions options = node_options();
+  options.node_name = "planner";
+  // As Iron and later announce it.
+  options.ros_gid_bytes = 16;
+  const Participant planner(options);
+  const auto is_known = [](const Participant& from, const std::string& name) {
+    const auto peers = from.remote_participants();
+    return std::ranges::any_of(peers, [&](const RemoteParticipant& peer) {
+      return peer.ros_nodes == std::vector{name} && display_name(peer) == name;
+    });
+  };
+  const auto deadline = std::chrono::steady_clock::now() + discovery_timeout;
+  while (std::chrono::steady_clock::now() < deadline &&
+         !(is_known(node_, "/planner") && is_known(planner, "/mapper"))) {
+    std::this_thread::sleep_for(20ms);
+  }
+  EXPECT_TRUE(is_known(node_, "/planner"));
+  EXPECT_TRUE(is_known(planner, "/mapper"));
+}
+
+TEST(DisplayName, PrefersNodesAndDoesNotTakeAnEnclaveForAName) {
+  RemoteParticipant peer;
+  EXPECT_EQ(display_name(peer), "a participant without a name");
+  peer.name = "/";
+  EXPECT_EQ(display_name(peer), "a participant without a name");
+  peer.name = "driver";
+  EXPECT_EQ(display_name(peer), "driver");
+  peer.ros_nodes = {"/a", "/b", "/c", "/d", "/e"};
+  EXPECT_EQ(display_name(peer), "/a, /b, /c and 2 more nodes");
 }
 
 }  // namespace

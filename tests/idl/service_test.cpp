@@ -100,5 +100,83 @@ TEST(Service, AsksAgainWhenTheFirstAnswerDoesNotCome) {
   EXPECT_TRUE(client.call(request_for("again"), 2s + 500ms));
 }
 
+/// A server that counts what it carries out, and is late for the first time.
+class LateServer {
+ public:
+  explicit LateServer(bool carries_out_once)
+      : server_(side_, "stillmap/save_map",
+                [this](const SaveMap_Request& request) {
+                  if (carried_out_++ == 0) std::this_thread::sleep_for(1s);
+                  return echo(request);
+                },
+                {.carries_out_once = carries_out_once}) {}
+
+  /// How often it was carried out in the end, when one call waits longer than half its time.
+  int after_one_call() {
+    Participant client_side(loopback(false));
+    Client client(client_side, "stillmap/save_map");
+    EXPECT_TRUE(client.wait_for_server(discovery_timeout));
+    const auto reply = client.call(request_for("late"), 1500ms);
+    EXPECT_TRUE(reply && reply->file() == "saved late");
+    // The repeated request is still on its way through the server.
+    EXPECT_TRUE(client.call(request_for("another"), discovery_timeout));
+    return carried_out_ - 1;
+  }
+
+ private:
+  Participant side_{loopback(false)};
+  std::atomic<int> carried_out_ = 0;
+  Server server_;
+};
+
+TEST(Service, CarriesOutOnceWhatIsAskedAgain) { EXPECT_EQ(LateServer(true).after_one_call(), 1); }
+
+TEST(Service, MayAnswerAnewWhereNothingChanges) {
+  EXPECT_EQ(LateServer(false).after_one_call(), 2);
+}
+
+TEST(Service, SaysWhyAnAnswerFailed) {
+  Participant server_side(loopback(false));
+  const Server server(server_side, "stillmap/save_map",
+                      [](const SaveMap_Request&) -> SaveMap_Response {
+                        throw std::runtime_error("out of memory");
+                      });
+  Participant client_side(loopback(false));
+  Client client(client_side, "stillmap/save_map");
+  for (int i = 0; i < 2; ++i) {
+    const auto reply = client.call(request_for(""), discovery_timeout);
+    ASSERT_TRUE(reply);
+    EXPECT_EQ(reply->status().code(), 3);
+    EXPECT_EQ(reply->status().reason(), "out of memory");
+  }
+}
+
+RequestId call_number(std::int64_t number) { return {.client = {}, .number = number}; }
+
+TEST(AnsweredRequests, AreFoundByTheirCall) {
+  AnsweredRequests answers;
+  const AnsweredRequests::Clock::time_point now;
+  answers.add(call_number(7), {1, 2}, now);
+  ASSERT_NE(answers.find(call_number(7), now), nullptr);
+  EXPECT_EQ(*answers.find(call_number(7), now), SerializedSample({1, 2}));
+  EXPECT_EQ(answers.find(call_number(8), now), nullptr);
+  EXPECT_EQ(answers.find(call_number(7), now + AnsweredRequests::max_age + 1s), nullptr);
+}
+
+TEST(AnsweredRequests, AreBoundedInCountBytesAndAge) {
+  AnsweredRequests many;
+  AnsweredRequests large;
+  const AnsweredRequests::Clock::time_point now;
+  for (std::int64_t i = 1; i <= 3000; ++i) {
+    many.add(call_number(i), {0}, now);
+    large.add(call_number(i), SerializedSample(AnsweredRequests::max_bytes / 8), now);
+  }
+  EXPECT_EQ(many.count(), AnsweredRequests::max_count);
+  EXPECT_NE(many.find(call_number(3000), now), nullptr);
+  EXPECT_EQ(large.count(), 8U);
+  large.add(call_number(4000), {0}, now + AnsweredRequests::max_age + 1s);
+  EXPECT_EQ(large.count(), 1U);
+}
+
 }  // namespace
 }  // namespace stillmap::dds

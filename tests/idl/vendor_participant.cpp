@@ -94,8 +94,13 @@ bool ByteClient::wait_for_server() const {
   return false;
 }
 
-eprosima::fastrtps::rtps::SampleIdentity ByteClient::call(const SerializedSample& request) {
+eprosima::fastrtps::rtps::SampleIdentity ByteClient::call(const SerializedSample& request,
+                                                          std::int64_t call_number) {
   eprosima::fastrtps::rtps::WriteParams params;
+  if (call_number > 0) {
+    params.related_sample_identity() =
+        identity_of_call({.client = replies_->guid(), .number = call_number});
+  }
   SerializedSample bytes = request;
   requests_->write(&bytes, params);
   return params.sample_identity();

@@ -50,8 +50,9 @@ class ByteClient {
              bool has_reply_reader = true);
 
   [[nodiscard]] bool wait_for_server() const;
-  /// Returns the request's identity.
-  eprosima::fastrtps::rtps::SampleIdentity call(const SerializedSample& request);
+  /// Returns the request's identity. `call_number`: of a client that names its calls.
+  eprosima::fastrtps::rtps::SampleIdentity call(const SerializedSample& request,
+                                                std::int64_t call_number = 0);
 
   struct Reply {
     SerializedSample bytes;

@@ -185,6 +185,37 @@ TEST(IntensityScale, ADescriptionThatDoesNotFitIsCorrectedOnce) {
   EXPECT_EQ(values, street(0.99F, false));
 }
 
+TEST(IntensityScale, OneBrokenScanChangesNothingForTheOthers) {
+  for (const int fitting_before : {0, 3}) {
+    IntensityScale scale(1.0F);
+    std::vector<float> values;
+    for (int i = 0; i < fitting_before; ++i) {
+      values = street(0.99F, false);
+      EXPECT_THAT(scale.apply(values), IsEmpty());
+    }
+    for (int broken = 0; broken < 20; ++broken) {
+      values = street(60'000.0F, true);
+      EXPECT_THAT(scale.apply(values), HasSubstr("65535"));
+      EXPECT_LE(*std::ranges::max_element(values), 1.0F);
+      values = street(0.99F, false);
+      EXPECT_THAT(scale.apply(values), IsEmpty());
+      EXPECT_EQ(values, street(0.99F, false));
+    }
+  }
+}
+
+TEST(IntensityScale, ADescriptionThatWasDisprovedIsNotUsedForDarkScans) {
+  IntensityScale scale(1.0F);
+  std::vector<float> values;
+  for (int i = 0; i < 5; ++i) {
+    values = street(255.0F, true);
+    EXPECT_EQ(scale.apply(values).empty(), i > 0);
+  }
+  values.assign(5000, 1.0F);
+  EXPECT_THAT(scale.apply(values), IsEmpty());
+  EXPECT_FLOAT_EQ(values.front(), 1.0F / 255.0F);
+}
+
 TEST(IntensityScale, ADarkScanOfWholeNumbersCorrectsNothing) {
   IntensityScale scale(1.0F / 255.0F);
   std::vector<float> values(5000, 1.0F);

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <map>
 
+#include "server/monitoring/log.hpp"
 #include "server/monitoring/metrics.hpp"
 #include "server/monitoring/service_log.hpp"
 #include "server/monitoring/statistics.hpp"
@@ -74,6 +75,21 @@ TEST(Metrics, GiveDropsByReasonAndOtherEventsApart) {
               ElementsAre(Pair("occupancy_not_cleared", 1.0)));
 }
 
+TEST(Metrics, ShowTheFaultsOfServicesThatTheStatusHas) {
+  Metrics metrics;
+  dds::ServerStatus status;
+  status.counters = {{.name = "slow_client_stillmap/get_tiles", .value = 3},
+                     {.name = "unreadable_request_stillmap/reset", .value = 1}};
+  for (const double slow : {3.0, 5.0}) {
+    status.counters.front().value = static_cast<std::uint64_t>(slow);
+    const MetricFamily faults = family(metrics, "stillmap_service_faults_total", status);
+    EXPECT_THAT(values_by(faults, "service"),
+                ElementsAre(Pair("stillmap/get_tiles", slow), Pair("stillmap/reset", 1.0)));
+    EXPECT_THAT(values_by(faults, "fault"),
+                ElementsAre(Pair("slow_client", slow), Pair("unreadable_request", 1.0)));
+  }
+}
+
 TEST(Metrics, AndTheStatusHaveOneSource) {
   Statistics statistics;
   statistics.set_map_memory({.bytes = 4096, .resident_tiles = 0, .non_resident_tiles = 5}, 1);
@@ -134,6 +150,14 @@ TEST(Metrics, ShowThisProcess) {
   const double before = family(metrics, "process_cpu_seconds_total").metric.at(0).counter.value;
   EXPECT_GT(before, 0.0);
   EXPECT_GE(family(metrics, "process_cpu_seconds_total").metric.at(0).counter.value, before);
+}
+
+TEST(NewLines, AreOnceEachAndForgottenWhenThereAreMany) {
+  NewLines lines;
+  EXPECT_TRUE(lines.add("first"));
+  EXPECT_FALSE(lines.add("first"));
+  for (std::size_t i = 0; i < NewLines::max_lines; ++i) EXPECT_TRUE(lines.add(std::to_string(i)));
+  EXPECT_TRUE(lines.add("first"));
 }
 
 }  // namespace

@@ -3,6 +3,9 @@
 #include <atomic>
 #include <csignal>
 #include <limits>
+#include <mutex>
+#include <thread>
+#include <vector>
 
 #include "core/occupancy/occupancy_map.hpp"
 #include "tests/numbers.hpp"
@@ -136,6 +139,58 @@ TEST_F(OccupancyService, PublishesTheOctreeToWhoComesLate) {
   const Subscription octomaps =
       client_.subscribe_octomap([&](const OctomapData& data) { bytes = data.bytes.size(); });
   EXPECT_TRUE(eventually([&] { return bytes > 100; }));
+}
+
+/// The sizes of the octrees that a new reader gets, in their order.
+class LateReader {
+ public:
+  explicit LateReader(Client& client)
+      : subscription_(client.subscribe_octomap([this](const OctomapData& data) {
+          const std::scoped_lock lock(mutex_);
+          bytes_.push_back(data.bytes.size());
+        })) {}
+
+  /// Of the first; 0 when none comes for so long.
+  [[nodiscard]] std::size_t first_bytes(std::chrono::milliseconds timeout) {
+    const auto deadline = std::chrono::steady_clock::now() + timeout;
+    while (std::chrono::steady_clock::now() < deadline) {
+      {
+        const std::scoped_lock lock(mutex_);
+        if (!bytes_.empty()) return bytes_.front();
+      }
+      std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    }
+    return 0;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::size_t> bytes_;
+  Subscription subscription_;
+};
+
+TEST_F(OccupancyService, WhoComesLateGetsTheOctreeAsItIsNow) {
+  const std::size_t early_bytes = LateReader(client_).first_bytes(patience);
+  EXPECT_EQ(early_bytes, client_.octomap(false).bytes.size());
+  drive(publisher_, 8, 60);
+  ASSERT_TRUE(wait_for_scans(client_, 60));
+  const auto is_settled = [&] {
+    const std::size_t now_bytes = client_.octomap(false).bytes.size();
+    std::this_thread::sleep_for(std::chrono::milliseconds(500));
+    return now_bytes != early_bytes && now_bytes == client_.octomap(false).bytes.size();
+  };
+  ASSERT_TRUE(eventually(is_settled));
+  EXPECT_EQ(LateReader(client_).first_bytes(patience), client_.octomap(false).bytes.size());
+}
+
+TEST_F(OccupancyService, WhoComesLateGetsNoOctreeOfAMapThatIsNoMore) {
+  // One reader stays, so that the topic is never idle.
+  LateReader stays(client_);
+  const std::size_t old_bytes = stays.first_bytes(patience);
+  ASSERT_GT(old_bytes, 100U);
+  static_cast<void>(client_.reset());
+  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  EXPECT_LT(LateReader(client_).first_bytes(std::chrono::milliseconds(2000)), old_bytes);
 }
 
 TEST_F(OccupancyService, AResetBeginsAnEmptyOctree) {

@@ -69,12 +69,12 @@ Json pose_json(const OdometryUpdate& update) {
 }
 
 // One line per status, which comes each second: the newest pose, health and rates.
-std::string status_line(const dds::ServerStatus& status, const Trajectory& poses) {
+std::string status_line(const dds::ServerStatus& status, const std::optional<StampedPose>& newest) {
   std::string line;
-  if (poses.empty()) {
+  if (!newest) {
     line = "no pose yet";
   } else {
-    const Eigen::Isometry3d& T = poses.back().T_map_lidar;
+    const Eigen::Isometry3d& T = newest->T_map_lidar;
     line = "x " + fixed(T.translation().x(), 2) + "  y " + fixed(T.translation().y(), 2) + "  z " +
            fixed(T.translation().z(), 2) + " m  yaw " + fixed(yaw_deg(T), 1) + " deg";
   }
@@ -84,7 +84,7 @@ std::string status_line(const dds::ServerStatus& status, const Trajectory& poses
   return line + (status.reason.empty() ? "" : "  (" + status.reason + ")");
 }
 
-/// Prints updates until the limits are reached; keeps the poses.
+/// Prints updates until the limits are reached; keeps the poses where they are to be written.
 class Watch {
  public:
   explicit Watch(const WatchArguments& arguments) : arguments_(arguments) {}
@@ -92,7 +92,9 @@ class Watch {
   void print(UpdateQueue& updates) {
     for (const OdometryUpdate& update : updates.take_poses()) {
       if (enough_poses()) break;
-      poses_.push_back(update.pose);
+      ++poses_seen_;
+      newest_ = update.pose;
+      if (!arguments_.out.empty()) poses_.push_back(update.pose);
       frame_ = update.child_frame;
       if (arguments_.json) std::cout << pose_json(update).dump() << "\n";
     }
@@ -102,14 +104,14 @@ class Watch {
         json.set("type", "status");
         std::cout << json.dump() << "\n";
       } else {
-        std::cout << status_line(*status, poses_) << "\n";
+        std::cout << status_line(*status, newest_) << "\n";
       }
     }
     std::cout.flush();
   }
 
   [[nodiscard]] bool enough_poses() const {
-    return arguments_.count > 0 && poses_.size() >= arguments_.count;
+    return arguments_.count > 0 && poses_seen_ >= arguments_.count;
   }
   [[nodiscard]] const Trajectory& poses() const { return poses_; }
   /// What they are poses of.
@@ -117,6 +119,8 @@ class Watch {
 
  private:
   const WatchArguments& arguments_;
+  std::size_t poses_seen_ = 0;
+  std::optional<StampedPose> newest_;
   Trajectory poses_;
   std::string frame_;
 };

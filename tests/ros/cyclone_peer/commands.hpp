@@ -30,4 +30,7 @@ int ask_services(const ServerAddress& address);
 /// Asks get_status as so many clients one after the other, each of them new, each once.
 int churn_clients(const ServerAddress& address, int clients);
 
+/// The same with the whole octree, asked for half a second after the last client has gone.
+int churn_clients_of_large_replies(const ServerAddress& address, int clients);
+
 }  // namespace stillmap::peer

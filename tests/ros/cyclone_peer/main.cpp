@@ -29,6 +29,7 @@ int run(const std::string& command, const ServerAddress& address, const std::str
   if (command == "graph") return watch_graph(address, argument);
   if (command == "services") return ask_services(address);
   if (command == "clients") return churn_clients(address, std::stoi(argument));
+  if (command == "large") return churn_clients_of_large_replies(address, std::stoi(argument));
   throw std::invalid_argument("no command " + command);
 }
 
@@ -36,8 +37,8 @@ int run(const std::string& command, const ServerAddress& address, const std::str
 
 int main(int argc, char** argv) {
   if (argc < 3) {
-    std::cerr
-        << "usage: cyclone_peer drive|late|graph|services|clients DOMAIN [RECORDING|NODE|COUNT]\n";
+    std::cerr << "usage: cyclone_peer drive|late|graph|services|clients|large DOMAIN "
+                 "[RECORDING|NODE|COUNT]\n";
     return 2;
   }
   setenv("CYCLONEDDS_URI", loopback, 0);

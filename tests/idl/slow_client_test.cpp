@@ -1,0 +1,137 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <csignal>
+#include <fstream>
+#include <thread>
+
+#include "idl/dds/service_client.hpp"
+#include "idl/dds/service_server.hpp"
+#include "stillmap_msgs.h"
+#include "tests/idl/dds_fixture.hpp"
+
+// A client that asks and is stopped, as by SIGSTOP: it takes no reply and is still in the domain.
+
+namespace stillmap::dds {
+namespace {
+
+using namespace std::chrono_literals;
+using stillmap_msgs::srv::SaveMap_Request;
+using stillmap_msgs::srv::SaveMap_Response;
+
+constexpr auto large_service = "stillmap/save_map";
+constexpr int stopped_requests = 90;
+constexpr std::size_t large_reply_bytes = 4'000'000;
+
+/// Asks 90 times, stops itself, and looks at the replies when it goes on: how many came, and how
+/// many of those say why there is no other.
+class StoppingClient {
+ public:
+  explicit StoppingClient(std::uint32_t domain_id)
+      : pid_(::fork()), is_child_(pid_ == 0), domain_id_(domain_id) {
+    if (is_child_) ::_exit(run());
+  }
+  ~StoppingClient() { ::kill(pid_, SIGKILL); }
+  StoppingClient(const StoppingClient&) = delete;
+  StoppingClient& operator=(const StoppingClient&) = delete;
+
+  [[nodiscard]] bool wait_until_stopped() const {
+    int how = 0;
+    return ::waitpid(pid_, &how, WUNTRACED) == pid_ && WIFSTOPPED(how);
+  }
+
+  /// Lets it go on; its refused requests.
+  [[nodiscard]] int refused() const {
+    ::kill(pid_, SIGCONT);
+    int how = 0;
+    return ::waitpid(pid_, &how, 0) == pid_ && WIFEXITED(how) ? WEXITSTATUS(how) : -1;
+  }
+
+ private:
+  [[nodiscard]] int run() const {
+    DdsOptions options = loopback(false);
+    options.domain_id = domain_id_;
+    Participant participant(options);
+    const auto request_type = type_support<SaveMap_Request>();
+    SerializedSampleWriter asker(participant, request_topic(large_service),
+                                 request_type.get_type_name(), service_qos());
+    SerializedSampleReader replies(participant, reply_topic(large_service),
+                                   type_support<SaveMap_Response>().get_type_name(), service_qos());
+    asker.readers().wait_for_any(discovery_timeout);
+    replies.events().wait_for_writer(discovery_timeout);
+    const SaveMap_Request request;
+    for (int i = 0; i < stopped_requests; ++i) {
+      eprosima::fastrtps::rtps::WriteParams params;
+      params.related_sample_identity().writer_guid() = replies.guid();
+      static_cast<void>(asker.write(to_bytes(request_type, &request, 0), params));
+    }
+    static_cast<void>(asker.wait_for_acknowledgements(discovery_timeout));
+    ::raise(SIGSTOP);
+    return count_refused(replies);
+  }
+
+  static int count_refused(SerializedSampleReader& replies) {
+    int refused = 0;
+    SerializedSample bytes;
+    eprosima::fastdds::dds::SampleInfo info;
+    while (replies.take(bytes, info, {}, 2s)) {
+      SaveMap_Response reply;
+      if (from_bytes(type_support<SaveMap_Response>(), bytes, &reply) &&
+          reply.status().code() == 3 &&
+          reply.status().reason().find("was the process stopped") != std::string::npos) {
+        ++refused;
+      }
+    }
+    return refused;
+  }
+
+  pid_t pid_;
+  bool is_child_;
+  std::uint32_t domain_id_;
+};
+
+std::size_t memory_in_use() {
+  std::ifstream statm("/proc/self/statm");
+  std::size_t total = 0;
+  std::size_t resident = 0;
+  statm >> total >> resident;
+  return resident * static_cast<std::size_t>(::sysconf(_SC_PAGESIZE));
+}
+
+TEST(SlowClient, ThatIsStoppedLosesAndIsToldAndNobodyElseNotices) {
+  // Forked before this process has threads.
+  const StoppingClient stopping(test_domain_id());
+  Participant server_side(loopback(false));
+  ServiceServer<SaveMap_Request, SaveMap_Response> server(
+      server_side, large_service, [](const SaveMap_Request&) {
+        SaveMap_Response reply;
+        reply.file(std::string(large_reply_bytes, 'x'));
+        return reply;
+      });
+  const std::size_t before = memory_in_use();
+  ASSERT_TRUE(stopping.wait_until_stopped());
+  const auto refused = [&] {
+    const auto counts = server_side.service_faults().counts();
+    const auto found = counts.find(std::string("slow_client_") + large_service);
+    return found == counts.end() ? std::uint64_t{0} : found->second;
+  };
+  for (int i = 0; i < 500 && refused() < 40; ++i) std::this_thread::sleep_for(10ms);
+  EXPECT_GE(refused(), 40U);
+  {
+    Participant other_side(loopback(false));
+    ServiceClient<SaveMap_Request, SaveMap_Response> other(other_side, large_service);
+    ASSERT_TRUE(other.wait_for_server(discovery_timeout));
+    for (int i = 0; i < 20; ++i) {
+      const auto began = std::chrono::steady_clock::now();
+      EXPECT_TRUE(other.call(SaveMap_Request(), discovery_timeout)) << i;
+      EXPECT_LT(std::chrono::steady_clock::now() - began, 1s) << i;
+    }
+  }
+  // All replies to both are 440 MB.
+  EXPECT_LT(memory_in_use() - before, 220'000'000U);
+  EXPECT_GE(stopping.refused(), 40);
+}
+
+}  // namespace
+}  // namespace stillmap::dds
