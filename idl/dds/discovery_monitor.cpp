@@ -136,7 +136,7 @@ void DiscoveryMonitor::add_local_endpoint(const Guid& guid, const std::string& t
                     .is_writer = is_writer,
                     .is_keyed = is_keyed,
                     .qos = {}};
-  endpoint.qos.reliable = qos.reliable;
+  endpoint.qos.reliable = qos.reliable && !qos.accept_best_effort;
   if (qos.transient_local) endpoint.qos.durability = Durability::transient_local;
   const std::scoped_lock lock(mutex_);
   local_endpoints_[guid] = std::move(endpoint);
