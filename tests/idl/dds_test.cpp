@@ -13,8 +13,6 @@
 #include "idl/dds/writer.hpp"
 #include "idl/interface/topics.hpp"
 #include "nav_msgs.h"
-#include "rmw_dds_common.h"
-#include "rmw_dds_common_iron.h"
 #include "sensor_msgs.h"
 #include "stillmap_msgs.h"
 #include "tests/idl/dds_fixture.hpp"

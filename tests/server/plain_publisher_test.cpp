@@ -2,6 +2,7 @@
 // own.
 #include <gmock/gmock.h>
 
+#include <filesystem>
 #include <fstream>
 #include <optional>
 #include <string>
@@ -21,13 +22,6 @@ constexpr int small = 20'000;
 
 class PlainPublisher : public testing::Test {
  protected:
-  PlainPublisher() {
-    std::ofstream(folder_ / "server.yaml") << "sensor: hdl_64e\n"
-                                           << "dds: {domain_id: " << domain_ << "}\n"
-                                           << "map: {file: map.stillmap}\n"
-                                           << "labels: {source: none}\n";
-  }
-
   ~PlainPublisher() override {
     if (publisher_) publisher_->stop();
   }
@@ -43,14 +37,20 @@ class PlainPublisher : public testing::Test {
     return sent;
   }
 
+  [[nodiscard]] ClientOptions client_options() const {
+    dds::DdsOptions dds;
+    dds.domain_id = static_cast<std::uint32_t>(domain_);
+    return {.dds = dds, .server_name = "stillmap", .request_timeout = patience};
+  }
   [[nodiscard]] std::string options() const { return "--domain " + std::to_string(domain_); }
 
   ScratchFolder folder_;
   int domain_ = free_domain();
-  ServerProcess server_{{"--config", (folder_ / "server.yaml").string()}};
-  Client client_{{.dds = {.domain_id = static_cast<std::uint32_t>(domain_)},
-                  .server_name = "stillmap",
-                  .request_timeout = patience}};
+  std::filesystem::path config_ =
+      folder_.file("server.yaml", "sensor: hdl_64e\ndds: {domain_id: " + std::to_string(domain_) +
+                                      "}\nmap: {file: map.stillmap}\nlabels: {source: none}\n");
+  ServerProcess server_{{"--config", config_.string()}};
+  Client client_{client_options()};
   std::optional<BackgroundProcess> publisher_;
 };
 
@@ -74,9 +74,9 @@ TEST_F(PlainPublisher, WhatABestEffortOneLosesIsCountedAndExplained) {
   // What was lost before the first that arrived, and after the last, nobody knows.
   EXPECT_LE(status.counter("scans_received") + status.counter("scans_lost"), sent);
   EXPECT_GT(status.counter("scans_received") + status.counter("scans_lost"), sent - sent / 5);
-  const auto health = run_stillmap("health " + options(), folder_);
+  const auto health = run_stillmap("health " + options(), folder_.path());
   EXPECT_THAT(health.out, HasSubstr("scans of plain_publisher get lost on the way"));
-  const auto doctor = run_stillmap("doctor " + options(), folder_);
+  const auto doctor = run_stillmap("doctor " + options(), folder_.path());
   EXPECT_THAT(doctor.out, HasSubstr("let the publisher offer reliable delivery"));
 }
 
