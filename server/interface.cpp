@@ -3,6 +3,7 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 
 namespace stillmap::server {
 namespace {
@@ -24,8 +25,7 @@ Interface::Interface(const ServerConfig& config, const InterfaceContext& context
       discovery_diagnostics_(context.participant),
       report_(
           traits(config, context), context.storage.latest_map(), context.statistics,
-          [this] { return discovery_diagnostics_.diagnostics(); },
-          [this] { return no_input_reason(); }) {
+          [this] { return diagnostics(); }, [this] { return no_input_reason(); }) {
   start_receivers(config, context);
   services_.emplace(context.participant, config.topics.name_space,
                     service_context(config, context));
@@ -86,6 +86,16 @@ void Interface::start_receivers(const ServerConfig& config, const InterfaceConte
     receivers_.emplace_back(context.participant, config, topic, *sweeps_, scans,
                             context.statistics);
   }
+}
+
+std::vector<dds::Diagnostic> Interface::diagnostics() {
+  std::vector<dds::Diagnostic> all = discovery_diagnostics_.diagnostics();
+  for (const ScanReceiver& receiver : receivers_) {
+    for (dds::Diagnostic& diagnostic : receiver.loss_diagnostics()) {
+      all.push_back(std::move(diagnostic));
+    }
+  }
+  return all;
 }
 
 std::string Interface::no_input_reason() const {

@@ -3,6 +3,7 @@
 #include <list>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "config/loaders/server_config.hpp"
 #include "idl/dds/participant.hpp"
@@ -46,6 +47,8 @@ class Interface {
 
  private:
   void start_receivers(const ServerConfig& config, const InterfaceContext& context);
+  /// Of discovery, and about scans that get lost.
+  [[nodiscard]] std::vector<dds::Diagnostic> diagnostics();
   /// Why no scan has arrived yet; empty once one has.
   [[nodiscard]] std::string no_input_reason() const;
   [[nodiscard]] ServiceContext service_context(const ServerConfig& config,

@@ -24,7 +24,6 @@ dds::DdsOptions server_options(const DdsConfig& config) {
   dds::DdsOptions options = dds_options(config.network, DdsRole::server);
   options.domain_id = config.domain_id;
   options.node_name = config.participant_name;
-  options.ros_gid_bytes = config.ros_gid_bytes;
   options.security = config.security;
   return options;
 }

@@ -150,9 +150,10 @@ void read_dds(YamlSection section, const fs::path& folder, DdsConfig& dds) {
   read_network(section, folder, dds.network);
   section.text("participant_name", dds.participant_name);
   section.path("security", dds.security);
-  section.integer("ros_gid_bytes", dds.ros_gid_bytes, {16, 24});
-  if (dds.ros_gid_bytes != 16 && dds.ros_gid_bytes != 24) {
-    section.fault("ros_gid_bytes", "must be 24 (ROS 2 up to Humble) or 16 (from Iron)");
+  if (section.has("ros_gid_bytes")) {
+    section.fault(
+        "ros_gid_bytes",
+        "is no setting any more: the server finds out which ROS 2 its peers are; remove it");
   }
 }
 

@@ -95,8 +95,6 @@ struct DdsConfig {
   /// Transports, discovery and pacing, for the kind of network; what is set on top of it.
   DdsNetworkConfig network;
   std::string participant_name = "stillmap_server";
-  /// Length of a GID in ros_discovery_info: 24 up to ROS 2 Humble, 16 from Iron.
-  std::uint32_t ros_gid_bytes = 24;
   /// Folder of the server's identity in a secured domain; empty: no security.
   std::filesystem::path security;
 };

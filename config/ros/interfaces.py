@@ -9,6 +9,9 @@ ROS_OF_IDL = {
     "boolean": "bool", "octet": "uint8", "short": "int16", "unsigned short": "uint16",
     "long": "int32", "unsigned long": "uint32", "long long": "int64",
     "unsigned long long": "uint64", "float": "float32", "double": "float64", "string": "string"}
+# As rosidl writes IDL.
+ROS_OF_ROSIDL = {"uint8": "uint8", "int16": "int16", "uint16": "uint16", "int32": "int32",
+                 "uint32": "uint32", "int64": "int64", "uint64": "uint64"}
 IDL_OF_ROS = {ros: idl for idl, ros in ROS_OF_IDL.items()} | {
     "byte": "octet", "char": "octet", "int8": "octet"}
 
@@ -149,9 +152,10 @@ def _ros_type(words: list[str]) -> str:
     if "::" in name:
         package, _, message = name.split("::")
         return f"{package}/{message}"
-    if name not in ROS_OF_IDL:
+    known = ROS_OF_IDL | ROS_OF_ROSIDL
+    if name not in known:
         raise ValueError(f"type '{name}' has no counterpart in .msg")
-    return ROS_OF_IDL[name]
+    return known[name]
 
 
 # A type, how many of it, a name, a default.
@@ -208,7 +212,8 @@ def read_package(folder: Path) -> list[Structure]:
                 for file in sorted(folder.glob("msg/*.msg"))]
     services = [read_service(folder.name, file.stem, file.read_text())
                 for file in sorted(folder.glob("srv/*.srv"))]
-    return messages + [half for service in services for half in service]
+    keyed = read_idl(sorted(folder.glob("msg/*.idl")))
+    return messages + keyed + [half for service in services for half in service]
 
 
 def read_definitions(text: str) -> list[Structure]:

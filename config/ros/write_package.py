@@ -1,13 +1,15 @@
 #!/usr/bin/env python3
-"""Writes stillmap_msgs/msg and stillmap_msgs/srv, which lie beside it, from our IDL.
+"""Writes stillmap_msgs/msg and stillmap_msgs/srv, which lie beside it, and the table of type hashes,
+from our IDL.
 
-    config/ros/write_package.py idl/msg
+    config/ros/write_package.py idl/msg idl/dds/type_hash_table.inc
 """
 
 import sys
 from pathlib import Path
 
 from interfaces import Structure, read_idl
+from type_hashes import hash_table
 
 PACKAGE = "stillmap_msgs"
 
@@ -16,10 +18,28 @@ def lines_of(structure: Structure) -> list[str]:
     lines = [f"# {line}" for line in structure.comment]
     lines += [f"{constant.type} {constant.name}={constant.value}"
               for constant in structure.constants]
-    for field in structure.fields:
-        type_name = field.type.removeprefix(f"{PACKAGE}/")
-        lines.append(f"{type_name} {field.name}" + ("  # key" if field.is_key else ""))
+    lines += [f"{field.type.removeprefix(f'{PACKAGE}/')} {field.name}" for field in structure.fields]
     return lines
+
+
+def rosidl_type(ros_type: str) -> str:
+    if ros_type.endswith("[]"):
+        return f"sequence<{rosidl_type(ros_type[:-2])}>"
+    if "/" in ros_type:
+        package, name = ros_type.split("/")
+        return f"{package}::msg::{name}"
+    return {"float32": "float", "float64": "double", "bool": "boolean"}.get(ros_type, ros_type)
+
+
+def keyed_message(structure: Structure) -> str:
+    """IDL as rosidl reads it: a .msg cannot say which fields are keys."""
+    used = sorted({field.type.removesuffix("[]") for field in structure.fields if "/" in field.type})
+    includes = [f'#include "{name.replace("/", "/msg/")}.idl"' for name in used]
+    comment = [f"    // {line}" for line in structure.comment]
+    members = [f"      {'@key ' * field.is_key}{rosidl_type(field.type)} {field.name};"
+               for field in structure.fields]
+    return "\n".join([*includes, f"module {structure.package} {{", "  module msg {", *comment,
+                      f"    struct {structure.name} {{", *members, "    };", "  };", "};"]) + "\n"
 
 
 def main():
@@ -28,6 +48,10 @@ def main():
     texts: dict[Path, list[str]] = {}
     for made in structures:
         if made.package != PACKAGE:
+            continue
+        if any(field.is_key for field in made.fields):
+            (folder / "msg" / f"{made.name}.msg").unlink(missing_ok=True)
+            texts[folder / "msg" / f"{made.name}.idl"] = keyed_message(made).splitlines()
             continue
         if made.kind == "msg":
             texts[folder / "msg" / f"{made.name}.msg"] = lines_of(made)
@@ -41,7 +65,8 @@ def main():
     for file, lines in texts.items():
         file.parent.mkdir(exist_ok=True)
         file.write_text("\n".join(lines) + "\n")
-    print(f"{len(texts)} files in {folder}")
+    Path(sys.argv[2]).write_text(hash_table(structures))
+    print(f"{len(texts)} files in {folder}, and {sys.argv[2]}")
 
 
 if __name__ == "__main__":

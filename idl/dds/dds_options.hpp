@@ -65,8 +65,6 @@ struct DdsOptions {
   std::uint32_t large_message_bytes_per_s = 0;
   /// Name of the participant, and of the node that ROS 2 tools show; empty: no ROS 2 node.
   std::string node_name;
-  /// Length of a GID in ros_discovery_info: 24 up to ROS 2 Humble, 16 from Iron.
-  std::uint32_t ros_gid_bytes = 24;
   /// Folder of the identity that this process has in a secured domain; empty: no security.
   std::filesystem::path security;
 };

@@ -116,12 +116,22 @@ EndpointQos qos_from(const Qos& qos) {
 }
 
 template <typename ProxyData>
+std::string user_data_of(const ProxyData& data) {
+  // ROS 2's are shorter.
+  constexpr std::size_t max_bytes = 256;
+  const auto& bytes = data.m_qos.m_userData;
+  return {bytes.begin(),
+          bytes.begin() + static_cast<std::ptrdiff_t>(std::min(max_bytes, bytes.size()))};
+}
+
+template <typename ProxyData>
 Endpoint endpoint_from(ProxyData& data, bool is_writer) {
   return {.guid = streamed(data.guid()),
           .topic = data.topicName().to_string(),
           .type = data.typeName().to_string(),
           .is_writer = is_writer,
           .is_keyed = data.topicKind() == WITH_KEY,
+          .user_data = user_data_of(data),
           .qos = qos_from(data.m_qos)};
 }
 
@@ -135,8 +145,9 @@ void DiscoveryMonitor::add_local_endpoint(const Guid& guid, const std::string& t
                     .type = type,
                     .is_writer = is_writer,
                     .is_keyed = is_keyed,
+                    .user_data = {},
                     .qos = {}};
-  endpoint.qos.reliable = qos.reliable;
+  endpoint.qos.reliable = qos.reliable && !qos.accept_best_effort;
   if (qos.transient_local) endpoint.qos.durability = Durability::transient_local;
   const std::scoped_lock lock(mutex_);
   local_endpoints_[guid] = std::move(endpoint);
@@ -217,13 +228,32 @@ void DiscoveryMonitor::on_publisher_discovery(DomainParticipant*, WriterDiscover
 }
 
 void DiscoveryMonitor::add_remote_endpoint(const Guid& guid, Endpoint endpoint) {
+  const bool is_of_graph = endpoint.topic == ros_discovery_topic;
   const std::scoped_lock lock(mutex_);
   remote_endpoints_[guid] = std::move(endpoint);
+  if (is_of_graph && ros_peers_changed_) ros_peers_changed_();
 }
 
 void DiscoveryMonitor::remove_remote_endpoint(const Guid& guid) {
   const std::scoped_lock lock(mutex_);
   remote_endpoints_.erase(guid);
+}
+
+void DiscoveryMonitor::watch_ros_peers(std::function<void()> changed) {
+  const std::scoped_lock lock(mutex_);
+  ros_peers_changed_ = std::move(changed);
+}
+
+std::optional<RosGids> DiscoveryMonitor::ros_gids() const {
+  const std::scoped_lock lock(mutex_);
+  std::optional<RosGids> needed;
+  for (const auto& [guid, endpoint] : remote_endpoints_) {
+    const std::optional<RosGids> read = gids_read_by(endpoint);
+    if (!read) continue;
+    // Of two kinds, the newer one: it is the one that will stay.
+    if (!needed || *needed == RosGids::any || *read == RosGids::of_16_bytes) needed = read;
+  }
+  return needed;
 }
 
 }  // namespace stillmap::dds

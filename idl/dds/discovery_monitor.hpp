@@ -4,12 +4,15 @@
 
 #include <chrono>
 #include <fastdds/dds/domain/DomainParticipantListener.hpp>
+#include <functional>
 #include <map>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "idl/dds/remote_participant.hpp"
+#include "idl/dds/ros_gids.hpp"
 #include "idl/dds/topic_qos.hpp"
 
 namespace stillmap::dds {
@@ -31,6 +34,12 @@ class DiscoveryMonitor : public eprosima::fastdds::dds::DomainParticipantListene
   /// time counts as refused, too: often only one side learns of a refusal.
   [[nodiscard]] std::vector<RemoteParticipant> remote_participants() const;
   [[nodiscard]] std::vector<Endpoint> local_endpoints() const;
+
+  /// The layout of announcements that ROS 2 nodes in the domain read; nothing where nobody does.
+  [[nodiscard]] std::optional<RosGids> ros_gids() const;
+  /// `changed` is called from within discovery when a node comes that reads announcements, and must
+  /// only wake somebody. Empty: no more; when this returns, no call is under way.
+  void watch_ros_peers(std::function<void()> changed);
 
  private:
   using Prefix = eprosima::fastrtps::rtps::GuidPrefix_t;
@@ -59,6 +68,7 @@ class DiscoveryMonitor : public eprosima::fastdds::dds::DomainParticipantListene
   std::map<Prefix, Known> participants_;
   std::map<Guid, Endpoint> remote_endpoints_;
   std::map<Guid, Endpoint> local_endpoints_;
+  std::function<void()> ros_peers_changed_;
 };
 
 }  // namespace stillmap::dds

@@ -106,6 +106,20 @@ std::vector<std::string> incompatible_policies(const Endpoint& writer, const End
   return reasons;
 }
 
+namespace {
+
+/// Whether some endpoint of the participant matches this one.
+bool reaches(const RemoteParticipant& participant, const Endpoint& endpoint) {
+  return std::ranges::any_of(participant.endpoints, [&](const Endpoint& other) {
+    if (other.is_writer == endpoint.is_writer || other.topic != endpoint.topic) return false;
+    return (endpoint.is_writer ? incompatible_policies(endpoint, other)
+                               : incompatible_policies(other, endpoint))
+        .empty();
+  });
+}
+
+}  // namespace
+
 std::vector<Mismatch> mismatches(const std::vector<RemoteParticipant>& participants) {
   struct Match {
     const RemoteParticipant* peer;
@@ -126,7 +140,8 @@ std::vector<Mismatch> mismatches(const std::vector<RemoteParticipant>& participa
         const Match& reader = it->second;
         if (reader.peer == &peer) continue;
         auto reasons = incompatible_policies(writer, *reader.endpoint);
-        if (reasons.empty()) continue;
+        // One of two readers is enough: a reliable one, and one for best-effort writers.
+        if (reasons.empty() || reaches(*reader.peer, writer)) continue;
         found.push_back({.topic = writer.topic,
                          .writer = writer,
                          .reader = *reader.endpoint,

@@ -24,7 +24,8 @@ struct Mismatch {
   std::vector<std::string> incompatible_policies;
 };
 
-/// Every writer and reader of different participants on the same topic that do not match.
+/// Every writer and reader of different participants on the same topic that do not match, unless
+/// another reader of the same participant does.
 [[nodiscard]] std::vector<Mismatch> mismatches(const std::vector<RemoteParticipant>& participants);
 
 }  // namespace stillmap::dds

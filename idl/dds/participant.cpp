@@ -20,6 +20,7 @@
 #include "idl/dds/ros_nodes.hpp"
 #include "idl/dds/security/identity.hpp"
 #include "idl/dds/transports.hpp"
+#include "idl/dds/type_hash.hpp"
 
 namespace stillmap::dds {
 namespace {
@@ -48,6 +49,18 @@ DomainParticipantQos participant_qos(const DdsOptions& options) {
   qos.properties().properties().emplace_back(parameter_policy_physical_data_host, "");
   qos.properties().properties().emplace_back(parameter_policy_physical_data_user, "");
   qos.properties().properties().emplace_back(parameter_policy_physical_data_process, "");
+  return qos;
+}
+
+/// What ROS 2 adds to its endpoints; what it announces in itself has two definitions, and no hash.
+std::string user_data_of(const std::string& topic, const TypeSupport& type, bool is_writer) {
+  if (topic != ros_discovery_topic) return type_hash_user_data(type.get_type_name());
+  return is_writer ? std::string() : any_gids_user_data;
+}
+
+template <typename Qos>
+Qos with_user_data(Qos qos, const std::string& text) {
+  qos.user_data().setValue({text.begin(), text.end()});
   return qos;
 }
 
@@ -110,7 +123,7 @@ Participant::Participant(const DdsOptions& options)
     } catch (const NotPermitted&) {
       // Others go without names.
     }
-    auto graph = std::make_unique<RosGraph>(*this, handle_->guid());
+    auto graph = std::make_unique<RosGraph>(*this, *monitor_, handle_->guid());
     graph_ = std::move(graph);
   }
 }
@@ -203,8 +216,9 @@ Participant::WriterHandle Participant::make_writer(const std::string& name, Type
                                                    DataWriterListener* listener) {
   require_permission(name, true);
   const std::scoped_lock lock(mutex_);
-  DataWriter* const made =
-      publisher_->create_datawriter(topic(name, type), writer_qos(qos, options_), listener);
+  DataWriter* const made = publisher_->create_datawriter(
+      topic(name, type), with_user_data(writer_qos(qos, options_), user_data_of(name, type, true)),
+      listener);
   if (made == nullptr) throw failure("cannot write topic " + name);
   const auto remove = [this](DataWriter* writer) {
     const std::scoped_lock remove_lock(mutex_);
@@ -224,8 +238,9 @@ Participant::ReaderHandle Participant::make_reader(const std::string& name, Type
                                                    DataReaderListener* listener) {
   require_permission(name, false);
   const std::scoped_lock lock(mutex_);
-  DataReader* const made =
-      subscriber_->create_datareader(topic(name, type), reader_qos(qos, options_), listener);
+  DataReader* const made = subscriber_->create_datareader(
+      topic(name, type), with_user_data(reader_qos(qos, options_), user_data_of(name, type, false)),
+      listener);
   if (made == nullptr) throw failure("cannot read topic " + name);
   monitor_->add_local_endpoint(made->guid(), name, type.get_type_name(), type->m_isGetKeyDefined,
                                false, qos);
@@ -242,8 +257,9 @@ Participant::ReaderHandle Participant::make_reader(const std::string& name, Type
       handle_->create_contentfilteredtopic(name + "_filtered_" + std::to_string(filters_made_++),
                                            whole, filter.expression, filter.parameters);
   if (filtered == nullptr) throw failure("cannot filter topic " + name + ": " + filter.expression);
-  DataReader* const made =
-      subscriber_->create_datareader(filtered, reader_qos(qos, options_), listener);
+  DataReader* const made = subscriber_->create_datareader(
+      filtered, with_user_data(reader_qos(qos, options_), user_data_of(name, type, false)),
+      listener);
   if (made == nullptr) {
     handle_->delete_contentfilteredtopic(filtered);
     throw failure("cannot read topic " + name);

@@ -9,8 +9,17 @@ using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
 
 void ReaderEvents::wait_for_data(const std::stop_token& stop, std::chrono::milliseconds timeout) {
   std::unique_lock lock(mutex_);
-  changed_.wait_for(lock, stop, timeout, [this] { return data_arrived_; });
-  data_arrived_ = false;
+  changed_.wait_for(lock, stop, timeout, [this] { return must_look_; });
+  must_look_ = false;
+}
+
+void ReaderEvents::wake() {
+  {
+    const std::scoped_lock lock(mutex_);
+    must_look_ = true;
+    changed_.notify_all();
+  }
+  if (wakes_ != nullptr) wakes_->wake();
 }
 
 int ReaderEvents::matched_writers() const {
@@ -38,11 +47,7 @@ int ReaderEvents::incompatible_writers() const {
   return incompatible_writers_;
 }
 
-void ReaderEvents::on_data_available(DataReader*) {
-  const std::scoped_lock lock(mutex_);
-  data_arrived_ = true;
-  changed_.notify_all();
-}
+void ReaderEvents::on_data_available(DataReader*) { wake(); }
 
 void ReaderEvents::on_subscription_matched(DataReader*, const SubscriptionMatchedStatus& status) {
   const Guid writer = eprosima::fastrtps::rtps::iHandle2GUID(status.last_publication_handle);
@@ -57,13 +62,24 @@ void ReaderEvents::on_subscription_matched(DataReader*, const SubscriptionMatche
 
 void ReaderEvents::on_requested_incompatible_qos(DataReader*,
                                                  const RequestedIncompatibleQosStatus& status) {
-  const std::scoped_lock lock(mutex_);
-  incompatible_writers_ = static_cast<int>(status.total_count);
+  {
+    const std::scoped_lock lock(mutex_);
+    incompatible_writers_ = static_cast<int>(status.total_count);
+  }
+  wake();
 }
 
 UntypedReader::UntypedReader(Participant& participant, const std::string& topic,
                              const TypeSupport& type, const TopicQos& qos)
-    : reader_(participant.make_reader(topic, type, qos, &events_)) {}
+    : reader_(participant.make_reader(topic, type, qos, &events_)) {
+  if (!qos.reliable || !qos.accept_best_effort) return;
+  make_best_effort_ = [this, &participant, topic, type, weaker = qos]() mutable {
+    weaker.reliable = false;
+    auto made = std::make_unique<BestEffort>(events_);
+    made->reader = participant.make_reader(topic, type, weaker, &made->events);
+    return made;
+  };
+}
 
 UntypedReader::UntypedReader(Participant& participant, const std::string& topic,
                              const TypeSupport& type, const TopicQos& qos,
@@ -74,16 +90,47 @@ bool UntypedReader::take_untyped(void* sample, SampleInfo& info, const std::stop
                                  std::chrono::milliseconds timeout) {
   const auto deadline = std::chrono::steady_clock::now() + timeout;
   while (!stop.stop_requested()) {
-    // Samples without data only say that a key or a writer is gone.
-    while (reader_->take_next_sample(sample, &info) == ReturnCode::RETCODE_OK) {
-      if (info.valid_data) return true;
-    }
+    open_best_effort_when_needed();
+    if (take_next(sample, info)) return true;
     const auto left =
         std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
     if (left.count() <= 0) return false;
     events_.wait_for_data(stop, left);
   }
   return false;
+}
+
+bool UntypedReader::take_next(void* sample, SampleInfo& info) {
+  // Samples without data only say that a key or a writer is gone.
+  while (reader_->take_next_sample(sample, &info) == ReturnCode::RETCODE_OK) {
+    if (info.valid_data) return true;
+  }
+  if (!best_effort_) return false;
+  // It also gets, once more, what reliable writers write.
+  while (best_effort_->reader->take_next_sample(sample, &info) == ReturnCode::RETCODE_OK) {
+    if (info.valid_data && !events_.has_writer(info.sample_identity.writer_guid())) return true;
+  }
+  return false;
+}
+
+void UntypedReader::open_best_effort_when_needed() {
+  if (!make_best_effort_ || best_effort_ || events_.incompatible_writers() == 0) return;
+  auto made = make_best_effort_();
+  const std::scoped_lock lock(best_effort_mutex_);
+  best_effort_ = std::move(made);
+}
+
+int UntypedReader::matched_writers() const {
+  const std::scoped_lock lock(best_effort_mutex_);
+  // Best effort matches every writer.
+  const int by_best_effort = best_effort_ ? best_effort_->events.matched_writers() : 0;
+  return std::max(by_best_effort, events_.matched_writers());
+}
+
+int UntypedReader::incompatible_writers() const {
+  const std::scoped_lock lock(best_effort_mutex_);
+  if (best_effort_) return best_effort_->events.incompatible_writers();
+  return make_best_effort_ ? 0 : events_.incompatible_writers();
 }
 
 }  // namespace stillmap::dds

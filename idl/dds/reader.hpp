@@ -5,6 +5,8 @@
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/DataReaderListener.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
+#include <functional>
+#include <memory>
 #include <mutex>
 #include <set>
 #include <stop_token>
@@ -19,7 +21,11 @@ namespace stillmap::dds {
 /// every other reader of the process.
 class ReaderEvents : public eprosima::fastdds::dds::DataReaderListener {
  public:
-  /// Returns at new data, a requested stop, or after `timeout`.
+  /// `wakes`: events of another reader, whose waiting thread what happens here wakes, too; may be
+  /// null, else it must outlive these.
+  explicit ReaderEvents(ReaderEvents* wakes = nullptr) : wakes_(wakes) {}
+
+  /// Returns at new data, a writer that does not fit, a requested stop, or after `timeout`.
   void wait_for_data(const std::stop_token& stop, std::chrono::milliseconds timeout);
 
   using Guid = eprosima::fastrtps::rtps::GUID_t;
@@ -42,9 +48,12 @@ class ReaderEvents : public eprosima::fastdds::dds::DataReaderListener {
       eprosima::fastdds::dds::DataReader* reader,
       const eprosima::fastdds::dds::RequestedIncompatibleQosStatus& status) override;
 
+  void wake();
+
+  ReaderEvents* wakes_;
   mutable std::mutex mutex_;
   mutable std::condition_variable_any changed_;
-  bool data_arrived_ = false;
+  bool must_look_ = false;
   std::set<Guid> writers_;
   int incompatible_writers_ = 0;
 };
@@ -58,7 +67,12 @@ class UntypedReader {
                 const eprosima::fastdds::dds::TypeSupport& type, const TopicQos& qos,
                 const ContentFilter& filter);
 
+  /// Of a reader that accepts best effort, too: those of writers that are read reliably.
   [[nodiscard]] const ReaderEvents& events() const { return events_; }
+  /// Writers that are read, in either way.
+  [[nodiscard]] int matched_writers() const;
+  /// Writers that cannot be read, as ReaderEvents::incompatible_writers.
+  [[nodiscard]] int incompatible_writers() const;
   [[nodiscard]] eprosima::fastrtps::rtps::GUID_t guid() const { return reader_->guid(); }
 
  protected:
@@ -66,8 +80,20 @@ class UntypedReader {
                                   const std::stop_token& stop, std::chrono::milliseconds timeout);
 
  private:
+  /// Reads what the reliable reader does not match.
+  struct BestEffort {
+    explicit BestEffort(ReaderEvents& reliable) : events(&reliable) {}
+    ReaderEvents events;
+    Participant::ReaderHandle reader;
+  };
+  [[nodiscard]] bool take_next(void* sample, eprosima::fastdds::dds::SampleInfo& info);
+  void open_best_effort_when_needed();
+
+  std::function<std::unique_ptr<BestEffort>()> make_best_effort_;
   ReaderEvents events_;
   Participant::ReaderHandle reader_;
+  mutable std::mutex best_effort_mutex_;
+  std::unique_ptr<BestEffort> best_effort_;
 };
 
 /// Reads samples of a generated type T from one topic. One thread takes.

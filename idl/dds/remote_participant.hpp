@@ -36,6 +36,8 @@ struct Endpoint {
   std::string type;
   bool is_writer = false;
   bool is_keyed = false;
+  /// What its owner adds, such as ROS 2's type hash (type_hash.hpp): anything.
+  std::string user_data{};
   EndpointQos qos;
 };
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 
+#include "idl/dds/discovery_monitor.hpp"
 #include "idl/dds/serialized_sample.hpp"
 #include "idl/dds/type_support.hpp"
 #include "rmw_dds_common.h"
@@ -14,8 +15,6 @@ namespace {
 
 using HumbleInfo = rmw_dds_common::msg::ParticipantEntitiesInfo;
 using IronInfo = rmw_dds_common_iron::msg::ParticipantEntitiesInfo;
-
-constexpr std::uint32_t iron_gid_bytes = 16;
 
 template <typename Gid>
 Gid to_gid(const RosGraph::Guid& guid) {
@@ -29,37 +28,72 @@ Gid to_gid(const RosGraph::Guid& guid) {
 
 }  // namespace
 
-RosGraph::RosGraph(Participant& participant, const Guid& participant_guid)
-    : participant_guid_(participant_guid),
+RosGraph::RosGraph(Participant& participant, DiscoveryMonitor& monitor,
+                   const Guid& participant_guid)
+    : monitor_(monitor),
+      participant_guid_(participant_guid),
       node_name_(participant.options().node_name),
-      gid_bytes_(participant.options().ros_gid_bytes),
-      writer_(participant.make_writer(ros_discovery_topic,
-                                      serialized_sample_type(ros_discovery_type),
-                                      {.transient_local = true, .depth = 1}, nullptr)) {
-  announce();
+      // As bytes: both layouts have one name.
+      writer_(participant.make_writer(
+          ros_discovery_topic, serialized_sample_type(ros_discovery_type),
+          {.transient_local = true, .depth = 1}, nullptr)),
+      follower_([this](const std::stop_token& stop) { follow_peers(stop); }) {
+  monitor_.watch_ros_peers([this] { wake_follower(); });
+  // For those that came in the meantime.
+  wake_follower();
 }
 
+void RosGraph::wake_follower() {
+  const std::scoped_lock lock(wake_mutex_);
+  peers_changed_ = true;
+  wake_.notify_all();
+}
+
+RosGraph::~RosGraph() { monitor_.watch_ros_peers({}); }
+
 void RosGraph::add_reader(const Guid& reader) {
+  const std::scoped_lock lock(mutex_);
   readers_.push_back(reader);
   announce();
 }
 
 void RosGraph::add_writer(const Guid& writer) {
+  const std::scoped_lock lock(mutex_);
   writers_.push_back(writer);
   announce();
 }
 
 void RosGraph::remove(const Guid& endpoint) {
+  const std::scoped_lock lock(mutex_);
   std::erase(readers_, endpoint);
   std::erase(writers_, endpoint);
   announce();
 }
 
+void RosGraph::follow_peers(const std::stop_token& stop) {
+  // A write from within discovery would wait for discovery.
+  while (!stop.stop_requested()) {
+    {
+      std::unique_lock lock(wake_mutex_);
+      if (!wake_.wait(lock, stop, [this] { return peers_changed_; })) return;
+      peers_changed_ = false;
+    }
+    const std::optional<RosGids> needed = monitor_.ros_gids();
+    const std::scoped_lock lock(mutex_);
+    if (!needed || layout_ == needed) continue;
+    // What was told stays true for who understands both.
+    const bool must_tell = *needed != RosGids::any || !layout_;
+    layout_ = needed;
+    if (must_tell) announce();
+  }
+}
+
 void RosGraph::announce() {
-  if (gid_bytes_ == iron_gid_bytes) {
-    announce_as<IronInfo>();
-  } else {
+  if (!layout_) return;
+  if (*layout_ == RosGids::of_24_bytes) {
     announce_as<HumbleInfo>();
+  } else {
+    announce_as<IronInfo>();
   }
 }
 

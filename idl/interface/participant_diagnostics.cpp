@@ -45,7 +45,58 @@ std::string joined(const std::vector<std::string>& parts) {
   return text;
 }
 
+std::string short_name(const RemoteParticipant& peer) {
+  return peer.name.empty() ? "a participant without a name" : peer.name;
+}
+
+/// Who has the endpoint; nulls where it is gone.
+std::pair<const RemoteParticipant*, const Endpoint*> owner_of(
+    const std::string& endpoint_guid, const std::vector<RemoteParticipant>& peers) {
+  for (const RemoteParticipant& peer : peers) {
+    const auto found = std::ranges::find(peer.endpoints, endpoint_guid, &Endpoint::guid);
+    if (found != peer.endpoints.end()) return {&peer, &*found};
+  }
+  return {nullptr, nullptr};
+}
+
+constexpr const char* carriage_hint =
+    "give the publisher's shared memory more room than a scan takes (Fast DDS: segment_size, 512 "
+    "KB "
+    "unless it is set), or switch it off on the server (dds.shared_memory: false)";
+constexpr const char* network_hint =
+    "sudo sysctl net.core.rmem_max=8388608 on this machine, or a network that carries the rate";
+
 }  // namespace
+
+Diagnostic lost_scans_diagnostic(const std::string& topic, const ScanLosses& losses,
+                                 const RemoteParticipant& self,
+                                 const std::vector<RemoteParticipant>& peers) {
+  const auto [peer, endpoint] = owner_of(losses.writer_guid, peers);
+  const bool is_reliable = endpoint != nullptr && endpoint->qos.reliable;
+  const bool by_shared_memory = peer != nullptr && peer->is_on_this_host &&
+                                peer->uses_shared_memory && self.uses_shared_memory;
+  const std::uint64_t sent = losses.received + losses.lost;
+  Diagnostic diagnostic{
+      .severity = 2 * losses.lost >= sent ? Severity::problem : Severity::advice,
+      .what = topic + ": scans of " + (peer == nullptr ? "a publisher" : short_name(*peer)) +
+              " get lost on the way",
+      .evidence =
+          std::to_string(losses.lost) + " of its last " + std::to_string(sent) + " did not arrive",
+      .hint = by_shared_memory ? carriage_hint : network_hint};
+  if (peer == nullptr) return diagnostic;
+  diagnostic.evidence += "; " + describe(*peer) + " offers " + describe(endpoint->qos);
+  if (is_reliable) {
+    diagnostic.evidence +=
+        ": it replaced them before they could be sent again, or this machine had no time to take "
+        "them";
+    diagnostic.hint =
+        std::string("let the publisher keep more scans (keep last 5 or more); ") + diagnostic.hint;
+  } else {
+    diagnostic.evidence += ": what gets lost is not sent again";
+    diagnostic.hint = std::string("let the publisher offer reliable delivery; ") + diagnostic.hint;
+  }
+  return diagnostic;
+}
 
 Diagnostic to_diagnostic(const Mismatch& mismatch) {
   // Without it, ROS 2 tools show no node names; data flows.

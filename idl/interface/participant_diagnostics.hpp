@@ -22,4 +22,17 @@ namespace stillmap::dds {
 [[nodiscard]] std::vector<Diagnostic> silent_participant_diagnostics(
     const RemoteParticipant& self, const std::vector<RemoteParticipant>& peers);
 
+/// How many scans of a publisher arrived lately, and how many did not.
+struct ScanLosses {
+  /// Of the publisher, as in Endpoint.
+  std::string writer_guid;
+  std::uint64_t received = 0;
+  std::uint64_t lost = 0;
+};
+
+/// Why scans on `topic` (its DDS name) get lost on the way to `self`, and what would help.
+[[nodiscard]] Diagnostic lost_scans_diagnostic(const std::string& topic, const ScanLosses& losses,
+                                               const RemoteParticipant& self,
+                                               const std::vector<RemoteParticipant>& peers);
+
 }  // namespace stillmap::dds

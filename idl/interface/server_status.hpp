@@ -69,10 +69,10 @@ struct ServerStatus {
   std::uint64_t tile_count = 0;
   std::uint64_t voxel_count = 0;
   SegmentationStatus segmentation;
-  /// "scans_received", "scans_mapped", "label_failures" once there are any, and "dropped_<reason>"
-  /// for every reason that occurred; then events beside mapping, as "occupancy_not_cleared", and
-  /// "unreadable_request_<service>", "undelivered_reply_<service>" and "slow_client_<service>" once
-  /// there are any.
+  /// "scans_received", "scans_mapped", "scans_lost" (which did not arrive) and "label_failures"
+  /// once there are any, and "dropped_<reason>" for every reason that occurred; then events beside
+  /// mapping, as "occupancy_not_cleared", and "unreadable_request_<service>" and
+  /// "undelivered_reply_<service>" and "slow_client_<service>" once there are any.
   std::vector<NamedCounter> counters;
   /// In the order of the pipeline: wait in the queue, its stages, and "total"; then
   /// what runs beside it, as "occupancy".

@@ -50,11 +50,14 @@ TopicSpec<sensor_msgs::msg::PointCloud2> points_topic(const std::string& ros_nam
   const bool every = delivery == DeliveryMode::every;
   return {.dds_name = "rt/" + ros_name,
           .writer = {.depth = queue_length, .keep_all = every},
-          .reader = {.reliable = every, .depth = queue_length, .keep_all = every}};
+          .reader = {.accept_best_effort = !every, .depth = queue_length, .keep_all = every}};
 }
 
 TopicSpec<nav_msgs::msg::Odometry> odometry_prior_topic(const std::string& ros_name) {
-  return symmetric<nav_msgs::msg::Odometry>("rt/" + ros_name, {.reliable = false, .depth = 100});
+  constexpr int depth = 100;
+  return {.dds_name = "rt/" + ros_name,
+          .writer = {.reliable = false, .depth = depth},
+          .reader = {.accept_best_effort = true, .depth = depth}};
 }
 
 TopicSpec<sensor_msgs::msg::Imu> imu_topic(const std::string& ros_name, DeliveryMode delivery) {
@@ -63,7 +66,7 @@ TopicSpec<sensor_msgs::msg::Imu> imu_topic(const std::string& ros_name, Delivery
   constexpr int depth = 500;
   return {.dds_name = "rt/" + ros_name,
           .writer = {.depth = depth, .keep_all = every},
-          .reader = {.reliable = every, .depth = depth, .keep_all = every}};
+          .reader = {.accept_best_effort = !every, .depth = depth, .keep_all = every}};
 }
 
 }  // namespace stillmap::dds

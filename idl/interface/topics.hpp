@@ -56,8 +56,9 @@ void for_each_topic(const Topics& topics, Visit&& visit) {
             status, octomap, traversability);
 }
 
-/// Incoming scans as the server reads them: with `every`, a publisher must be reliable and waits
-/// when `queue_length` are not taken yet.
+/// Incoming scans as the server reads them: reliably from whoever offers that, since large samples
+/// get lost even on one machine. With `every`, a publisher must offer it, and waits when
+/// `queue_length` are not taken yet; with `latest`, it never waits.
 [[nodiscard]] TopicSpec<sensor_msgs::msg::PointCloud2> points_topic(const std::string& ros_name,
                                                                     DeliveryMode delivery,
                                                                     int queue_length);

@@ -54,7 +54,7 @@ ImuReceiver::ImuReceiver(dds::Participant& participant, const std::string& ros_t
               }) {}
 
 std::vector<ImuSample> ImuReceiver::take(std::int64_t until_ns) {
-  const bool is_published = reader_.events().matched_writers() > 0;
+  const bool is_published = reader_.matched_writers() > 0;
   return queue_.take(until_ns, is_published ? patience_ : std::chrono::milliseconds(0));
 }
 

@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <sstream>
 #include <utility>
 
 #include "core/lidar/sensor_fit.hpp"
@@ -58,7 +59,7 @@ ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& co
                            const std::string& ros_topic, std::vector<Lidar> lidars,
                            SweepInput* sweeps, ScanQueue& queue, Statistics& statistics)
     : topic_(points_of(config, ros_topic).dds_name),
-      domain_id_(config.dds.domain_id),
+      participant_(participant),
       delivery_(config.input.delivery),
       lidars_(std::move(lidars)),
       sweeps_(sweeps),
@@ -67,7 +68,9 @@ ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& co
       reader_(participant, topic_, points_of(config, ros_topic).reader),
       worker_(std::chrono::seconds(0),
               [this, cloud = sensor_msgs::msg::PointCloud2()](const std::stop_token& stop) mutable {
-                if (reader_.take(cloud, stop, std::chrono::seconds(1))) {
+                eprosima::fastdds::dds::SampleInfo info;
+                if (reader_.take(cloud, info, stop, std::chrono::seconds(1))) {
+                  count_losses(info.sample_identity);
                   accept(cloud, stop);
                 } else if (sweeps_ != nullptr) {
                   sweeps_->queue_overdue(stop);
@@ -93,6 +96,29 @@ ScanReceiver::Lidar* ScanReceiver::lidar_of(const std::string& frame) {
   const auto found = std::ranges::find_if(
       lidars_, [&](const Lidar& lidar) { return lidar.frame.empty() || lidar.frame == frame; });
   return found == lidars_.end() ? nullptr : &*found;
+}
+
+void ScanReceiver::count_losses(const eprosima::fastrtps::rtps::SampleIdentity& scan) {
+  std::ostringstream writer;
+  writer << scan.writer_guid();
+  const std::uint64_t lost = losses_.add(scan);
+  recent_losses_.add(writer.str(), lost, ScanLossWindow::Clock::now());
+  if (lost == 0) return;
+  statistics_.scans_lost(lost);
+  throttled_log_.warn("lost", std::to_string(lost) + " scans on " + topic_ +
+                                  " got lost on the way: 'stillmap doctor' says why");
+}
+
+std::vector<dds::Diagnostic> ScanReceiver::loss_diagnostics() const {
+  std::vector<dds::Diagnostic> diagnostics;
+  const auto losses = recent_losses_.losses(ScanLossWindow::Clock::now());
+  if (losses.empty()) return diagnostics;
+  const dds::RemoteParticipant self = participant_.self();
+  const std::vector<dds::RemoteParticipant> peers = participant_.remote_participants();
+  for (const dds::ScanLosses& of_writer : losses) {
+    diagnostics.push_back(dds::lost_scans_diagnostic(topic_, of_writer, self, peers));
+  }
+  return diagnostics;
 }
 
 void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop) {
@@ -148,12 +174,11 @@ void ScanReceiver::drop(const std::string& reason, std::size_t count, const std:
 
 std::string ScanReceiver::no_input_reason() const {
   if (has_received_) return {};
-  const dds::ReaderEvents& events = reader_.events();
-  std::string text = "no scan received on " + topic_ +
-                     " yet: " + std::to_string(events.matched_writers()) +
-                     " publishers matched in domain " + std::to_string(domain_id_);
-  if (events.incompatible_writers() > 0) {
-    text += "; " + std::to_string(events.incompatible_writers()) +
+  std::string text =
+      "no scan received on " + topic_ + " yet: " + std::to_string(reader_.matched_writers()) +
+      " publishers matched in domain " + std::to_string(participant_.options().domain_id);
+  if (reader_.incompatible_writers() > 0) {
+    text += "; " + std::to_string(reader_.incompatible_writers()) +
             " publishers do not fit, as they are best-effort and delivery is 'every'";
   }
   return text;

@@ -9,10 +9,13 @@
 #include "core/lidar/sensor_model.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
 #include "idl/dds/reader.hpp"
+#include "idl/dds/sample_losses.hpp"
+#include "idl/interface/diagnostic.hpp"
 #include "sensor_msgs.h"
 #include "server/mapping/scan_queue.hpp"
 #include "server/mapping/sweep_input.hpp"
 #include "server/monitoring/log.hpp"
+#include "server/monitoring/scan_loss_window.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/threads/periodic_worker.hpp"
 
@@ -32,6 +35,9 @@ class ScanReceiver {
   /// Why no scan has arrived yet; empty once one has.
   [[nodiscard]] std::string no_input_reason() const;
 
+  /// About publishers whose scans got lost lately.
+  [[nodiscard]] std::vector<dds::Diagnostic> loss_diagnostics() const;
+
  private:
   struct Lidar {
     /// Of several: its number.
@@ -50,6 +56,8 @@ class ScanReceiver {
   [[nodiscard]] static std::vector<Lidar> lidars_on(const ServerConfig& config,
                                                     const std::string& ros_topic);
   [[nodiscard]] Lidar* lidar_of(const std::string& frame);
+  /// Counts the scans that are missing before this one.
+  void count_losses(const eprosima::fastrtps::rtps::SampleIdentity& scan);
   void accept(const sensor_msgs::msg::PointCloud2& cloud, const std::stop_token& stop);
   /// Logs changes of the cloud's layout, and now and then checks that scans fit the sensor model.
   void report(Lidar& lidar, const std::string& cloud_changes, const Scan& scan);
@@ -57,7 +65,7 @@ class ScanReceiver {
   void drop(const std::string& reason, std::size_t count, const std::string& detail);
 
   std::string topic_;
-  std::uint32_t domain_id_;
+  const dds::Participant& participant_;
   DeliveryMode delivery_;
   std::vector<Lidar> lidars_;
   /// Null: one lidar.
@@ -66,6 +74,8 @@ class ScanReceiver {
   ScanQueue& queue_;
   Statistics& statistics_;
   ThrottledLog throttled_log_;
+  dds::SampleLosses losses_;
+  ScanLossWindow recent_losses_;
   dds::Reader<sensor_msgs::msg::PointCloud2> reader_;
   // Last: stops before what it uses is gone.
   PeriodicWorker worker_;

@@ -61,6 +61,8 @@ double open_files() {
 Metrics::Metrics()
     : scans_received(counter(registry_, "stillmap_scans_received_total", "Scans that arrived")),
       scans_mapped(counter(registry_, "stillmap_scans_mapped_total", "Scans that were mapped")),
+      scans_lost(counter(registry_, "stillmap_scans_lost_total",
+                         "Scans that were published and did not arrive")),
       scans_dropped(counters(registry_, "stillmap_scans_dropped_total",
                              "Scans that were not mapped, by reason")),
       events(

@@ -38,6 +38,7 @@ class Metrics {
  public:
   prometheus::Counter& scans_received;
   prometheus::Counter& scans_mapped;
+  prometheus::Counter& scans_lost;
   /// Labels: reason.
   Counters& scans_dropped;
   /// Labels: event.

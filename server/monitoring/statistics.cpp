@@ -68,6 +68,10 @@ void Statistics::scans_dropped(const std::string& reason, std::size_t count,
   last_drop_ = detail;
 }
 
+void Statistics::scans_lost(std::uint64_t count) {
+  metrics_->scans_lost.Increment(static_cast<double>(count));
+}
+
 void Statistics::count(const std::string& event, std::uint64_t times) {
   const std::scoped_lock lock(mutex_);
   member(events_, metrics_->events, "event", event).Increment(static_cast<double>(times));
@@ -111,6 +115,7 @@ std::vector<dds::NamedCounter> Statistics::counters() const {
   const auto add = [&](const std::string& name, double value) {
     all.push_back({.name = name, .value = whole(value)});
   };
+  if (const double lost = metrics.scans_lost.Value(); lost > 0.0) add("scans_lost", lost);
   if (const double bytes = metrics.map_memory_bytes.Value(); bytes > 0.0) {
     add("map_memory_kib", bytes / 1024.0);
     add("map_tiles_evicted", metrics.map_tiles_evicted.Value());

@@ -41,6 +41,8 @@ class Statistics {
   void segmentation_succeeded();
   /// Counts "dropped_<reason>" in the status; the last `detail` is told there, too.
   void scans_dropped(const std::string& reason, std::size_t count, const std::string& detail);
+  /// So many were published and did not arrive: "scans_lost" in the status.
+  void scans_lost(std::uint64_t count);
   /// Counts an event that has nothing more to tell.
   void count(const std::string& event, std::uint64_t times = 1);
   void add_latency(const std::string& stage, double milliseconds);

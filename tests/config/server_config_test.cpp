@@ -50,8 +50,7 @@ TEST(ServerConfig, ReadsFieldsOfEveryKind) {
 sensor: vlp_16
 labels: {source: none, engine: onednn, precision: int8, threads: 3, image_columns: 512}
 dds: {domain_id: 42, shared_memory: false, interfaces: [127.0.0.1],
-      profile: wifi, peers: [a, "b:1"], discovery_server: c, socket_buffer_bytes: 99999,
-      ros_gid_bytes: 16}
+      profile: wifi, peers: [a, "b:1"], discovery_server: c, socket_buffer_bytes: 99999}
 topics: {odometry_prior: ""}
 input: {fields: {label: [label, class]}, label_kind: classes}
 prepare: {ego_hull_lidar_m: [-1, -0.5, -1, 1, 0.5, 0]}
@@ -71,7 +70,6 @@ static_map: {min_points: 5}
   EXPECT_THAT(config.dds.network.peers, ::testing::ElementsAre("a", "b:1"));
   EXPECT_EQ(config.dds.network.discovery_server, "c");
   EXPECT_EQ(config.dds.network.socket_buffer_bytes, 99999U);
-  EXPECT_EQ(config.dds.ros_gid_bytes, 16U);
   EXPECT_EQ(config.topics.odometry_prior, "");
   EXPECT_THAT(config.input.fields.label, ::testing::ElementsAre("label", "class"));
   EXPECT_EQ(config.input.label_kind, LabelKind::classes);
@@ -229,7 +227,7 @@ TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
   EXPECT_THAT(refusal_of("prepare: {ego_hull_lidar_m: [1, 1, 1, 0, 0, 0]}"),
               HasSubstr("minimum above"));
   EXPECT_THAT(refusal_of("static_map: {tile_size_m: 20.1}"), HasSubstr("static_map"));
-  EXPECT_THAT(refusal_of("dds: {ros_gid_bytes: 20}"), HasSubstr("must be 24"));
+  EXPECT_THAT(refusal_of("dds: {ros_gid_bytes: 16}"), HasSubstr("its peers are; remove it"));
   EXPECT_THAT(refusal_of("dds: {interfaces: [eth0]}"), HasSubstr("not an IPv4 address"));
   EXPECT_THAT(refusal_of("dds: {profile: ether}"), HasSubstr("DDS profile 'ether'"));
   EXPECT_THAT(refusal_of("topics: {points: 'a b'}"), HasSubstr("topics.points"));

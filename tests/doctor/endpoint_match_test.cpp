@@ -91,5 +91,15 @@ TEST_F(EndpointMatch, LooksAtEveryPairOfDifferentPeersOnce) {
   EXPECT_EQ(pairs[0].reader_participant.name, "server");
 }
 
+TEST_F(EndpointMatch, IsContentWithOneOfTwoReaders) {
+  writer_.qos.reliable = false;
+  dds::RemoteParticipant lidar, server;
+  lidar.endpoints = {writer_};
+  server.endpoints = {reader_, reader_};
+  EXPECT_THAT(dds::mismatches({lidar, server}), SizeIs(2));
+  server.endpoints[1].qos.reliable = false;
+  EXPECT_THAT(dds::mismatches({lidar, server}), IsEmpty());
+}
+
 }  // namespace
 }  // namespace stillmap::cli

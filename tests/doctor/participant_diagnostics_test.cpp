@@ -74,5 +74,35 @@ TEST(ParticipantDiagnosticsTest, SayEachMismatchOnceWithItsRemedy) {
   EXPECT_EQ(dds::to_diagnostic(harmless).severity, dds::Severity::advice);
 }
 
+/// A publisher on this host, and the server.
+std::vector<dds::RemoteParticipant> lidar(bool reliable) {
+  dds::RemoteParticipant made = participant("lidar");
+  made.endpoints.push_back(
+      test::make_endpoint("rt/points", "sensor_msgs::msg::dds_::PointCloud2_", true));
+  made.endpoints.back().guid = "writer of clouds";
+  made.endpoints.back().qos.reliable = reliable;
+  return {made};
+}
+
+TEST(LostScans, AreExplainedByWhatThePublisherOffersAndHowItSends) {
+  const dds::RemoteParticipant server = participant("server");
+  const dds::ScanLosses few{.writer_guid = "writer of clouds", .received = 90, .lost = 10};
+  const auto reliable = dds::lost_scans_diagnostic("rt/points", few, server, lidar(true));
+  EXPECT_EQ(reliable.severity, dds::Severity::advice);
+  EXPECT_THAT(reliable, tells("scans of lidar get lost"));
+  EXPECT_THAT(reliable.evidence, HasSubstr("10 of its last 100"));
+  EXPECT_THAT(reliable.hint, AllOf(HasSubstr("keep last 5"), HasSubstr("segment_size")));
+  const auto best_effort = dds::lost_scans_diagnostic("rt/points", few, server, lidar(false));
+  EXPECT_THAT(best_effort.hint, HasSubstr("offer reliable"));
+  dds::RemoteParticipant over_udp = server;
+  over_udp.uses_shared_memory = false;
+  EXPECT_THAT(dds::lost_scans_diagnostic("rt/points", few, over_udp, lidar(false)).hint,
+              HasSubstr("net.core.rmem_max"));
+  const dds::ScanLosses most{.writer_guid = "gone", .received = 1, .lost = 3};
+  const auto unknown = dds::lost_scans_diagnostic("rt/points", most, server, {});
+  EXPECT_EQ(unknown.severity, dds::Severity::problem);
+  EXPECT_THAT(unknown, tells("scans of a publisher get lost"));
+}
+
 }  // namespace
 }  // namespace stillmap::cli

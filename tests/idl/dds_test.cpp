@@ -13,8 +13,6 @@
 #include "idl/dds/writer.hpp"
 #include "idl/interface/topics.hpp"
 #include "nav_msgs.h"
-#include "rmw_dds_common.h"
-#include "rmw_dds_common_iron.h"
 #include "sensor_msgs.h"
 #include "stillmap_msgs.h"
 #include "tests/idl/dds_fixture.hpp"
@@ -213,35 +211,6 @@ TEST(Participant, CanBeMadeAgainAfterAFailureHalfWay) {
     const Writer<nav_msgs::msg::Path> wrong(participant, "rt/points", {});
   };
   for (int i = 0; i < 3; ++i) EXPECT_THROW(fail(), DdsError);
-}
-
-template <typename Info>
-Info announced_by(const DdsOptions& options) {
-  Participant node(options);
-  const Writer<PointCloud2> writer(node, "rt/points", {});
-  Participant watcher(loopback(false));
-  Reader<Info> reader(watcher, "ros_discovery_info", {.transient_local = true, .depth = 1});
-  Info info;
-  do {
-    EXPECT_TRUE(reader.take(info, {}, discovery_timeout));
-  } while (!testing::Test::HasFailure() &&
-           info.node_entities_info_seq()[0].writer_gid_seq().empty());
-  return info;
-}
-
-TEST(RosGraph, ShowsTheNodeAndItsEndpoints) {
-  DdsOptions options = loopback(false);
-  options.node_name = "stillmap_server";
-  const auto humble = announced_by<rmw_dds_common::msg::ParticipantEntitiesInfo>(options);
-  ASSERT_EQ(humble.node_entities_info_seq().size(), 1U);
-  const auto& node = humble.node_entities_info_seq()[0];
-  EXPECT_EQ(std::string(node.node_name().c_str()), "stillmap_server");
-  EXPECT_EQ(node.writer_gid_seq().size(), 1U);
-  EXPECT_EQ(node.reader_gid_seq().size(), 0U);
-
-  options.ros_gid_bytes = 16;
-  const auto iron = announced_by<rmw_dds_common_iron::msg::ParticipantEntitiesInfo>(options);
-  EXPECT_EQ(iron.node_entities_info_seq()[0].writer_gid_seq().size(), 1U);
 }
 
 TEST(Transports, TellTheBufferThatTheKernelGrants) {

@@ -238,6 +238,7 @@ class CyclonePeerTest(unittest.TestCase):
         for facts in graph.all("writer") + graph.all("reader"):
             self.assertRegex(facts["topic"], r"^(rt|rq|rr)/")
             self.assertRegex(facts["type"], r"^\w+::(msg|srv)::dds_::\w+_$")
+            self.assertRegex(facts["user_data"], r"^typehash=RIHS01_[0-9a-f]{64};$", facts)
 
 
 if __name__ == "__main__":

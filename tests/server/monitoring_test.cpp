@@ -8,6 +8,7 @@
 
 #include "server/monitoring/log.hpp"
 #include "server/monitoring/metrics.hpp"
+#include "server/monitoring/scan_loss_window.hpp"
 #include "server/monitoring/service_log.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "stillmap_msgs.h"
@@ -104,6 +105,40 @@ TEST(Metrics, AndTheStatusHaveOneSource) {
   EXPECT_EQ(family(metrics, "stillmap_map_memory_bytes").metric.at(0).gauge.value, 4096.0);
   EXPECT_EQ(family(metrics, "stillmap_map_tiles_evicted").metric.at(0).gauge.value, 5.0);
   EXPECT_EQ(family(metrics, "stillmap_label_failures_total").metric.at(0).counter.value, 1.0);
+}
+
+TEST(Statistics, CountScansThatDidNotArrive) {
+  Statistics statistics;
+  dds::ServerStatus status;
+  statistics.report_to(status);
+  EXPECT_EQ(std::ranges::count(status.counters, "scans_lost", &dds::NamedCounter::name), 0);
+  statistics.scans_lost(2);
+  statistics.scans_lost(3);
+  statistics.report_to(status);
+  EXPECT_EQ(status.counter("scans_lost"), 5U);
+  EXPECT_EQ(status.dropped(), 0U) << "they were never received";
+  const auto metric = family(statistics.metrics(), "stillmap_scans_lost_total").metric.at(0);
+  EXPECT_EQ(metric.counter.value, 5.0);
+}
+
+TEST(ScanLossWindow, TellsOfTheLastMinuteOnly) {
+  using namespace std::chrono_literals;
+  ScanLossWindow window;
+  const ScanLossWindow::Clock::time_point start{24h};
+  window.add("sound", 0, start);
+  window.add("lossy", 0, start);
+  window.add("lossy", 4, start + 1s);
+  const auto losses = window.losses(start + 2s);
+  ASSERT_EQ(losses.size(), 1U);
+  EXPECT_EQ(losses[0].writer_guid, "lossy");
+  EXPECT_EQ(losses[0].received, 2U);
+  EXPECT_EQ(losses[0].lost, 4U);
+  window.add("lossy", 0, start + 29s);
+  EXPECT_EQ(window.losses(start + 31s).size(), 1U);
+  window.add("lossy", 0, start + 62s);
+  EXPECT_TRUE(window.losses(start + 62s).empty());
+  window.add("lossy", 1, start + 63s);
+  EXPECT_TRUE(window.losses(start + 200s).empty());
 }
 
 TEST(Metrics, ShowTheStatusAsItIs) {

@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <filesystem>
 #include <iostream>
-#include <map>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -19,6 +18,7 @@
 #include "clients/terminal/table.hpp"
 #include "idl/bag/bag_writer.hpp"
 #include "idl/dds/dds_options.hpp"
+#include "idl/dds/sample_losses.hpp"
 #include "idl/dds/serialized_sample.hpp"
 #include "idl/interface/topics.hpp"
 #include "nav_msgs.h"
@@ -57,7 +57,6 @@ struct RecordedTopic {
 using Clock = std::chrono::steady_clock;
 using eprosima::fastdds::dds::SampleInfo;
 using eprosima::fastdds::dds::TypeSupport;
-using eprosima::fastrtps::rtps::GUID_t;
 
 /// Reader depth, for when the disk is busy; on a keyed topic for each key.
 constexpr int max_waiting = 20;
@@ -132,22 +131,6 @@ dds::TopicQos reader_qos_for(const RecordableTopic& topic, bool as_offered) {
   return qos;
 }
 
-/// Counts gaps in the sequence numbers of each writer.
-class LossCounter {
- public:
-  void add(const GUID_t& writer, std::uint64_t number) {
-    const auto [last, is_new] = last_.try_emplace(writer, number);
-    if (is_new) return;
-    if (number > last->second + 1) lost_ += number - last->second - 1;
-    last->second = std::max(last->second, number);
-  }
-  [[nodiscard]] std::uint64_t lost() const { return lost_; }
-
- private:
-  std::map<GUID_t, std::uint64_t> last_;
-  std::uint64_t lost_ = 0;
-};
-
 std::int64_t wall_clock_ns() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
@@ -171,8 +154,7 @@ class Input {
   [[nodiscard]] bool take(dds::SerializedSample& sample) {
     SampleInfo info;
     if (!reader_->take(sample, info, {}, std::chrono::milliseconds(0))) return false;
-    const auto& number = info.sample_identity.sequence_number();
-    losses_.add(info.sample_identity.writer_guid(), number.to64long());
+    losses_.add(info.sample_identity);
     return true;
   }
 
@@ -191,7 +173,7 @@ class Input {
   RecordableTopic topic_;
   std::optional<dds::SerializedSampleReader> reader_;
   bool as_offered_ = true;
-  LossCounter losses_;
+  dds::SampleLosses losses_;
 };
 
 /// Writes serialized samples from DDS to a rosbag2 without decoding them. Samples wait in the

@@ -36,6 +36,15 @@ std::string why_not_mapping(const dds::ServerStatus& status) {
   return {};
 }
 
+/// What is wrong beside the reason, in one line: scans that get lost, peers that do not fit.
+std::string other_troubles(const dds::ServerStatus& status) {
+  std::string text;
+  for (const dds::Diagnostic& diagnostic : status.diagnostics) {
+    if (diagnostic.what != status.reason) text += "; " + diagnostic.what;
+  }
+  return text;
+}
+
 ExitCode say(ExitCode code, const std::string& text) {
   std::cout << (code == ExitCode::ok ? "healthy: " : "unhealthy: ") << text << "\n";
   return code;
@@ -49,11 +58,12 @@ ExitCode run(const HealthArguments& arguments) {
     return say(ExitCode::failed, error.what());
   }
   if (const std::string why = why_not_mapping(status); arguments.mapping && !why.empty()) {
-    return say(ExitCode::failed, why);
+    return say(ExitCode::failed, why + other_troubles(status));
   }
   return say(ExitCode::ok, "up for " + fixed(status.uptime_s, 0) + " s, " +
                                fixed(status.mapped_hz, 1) + " scans/s mapped" +
-                               (status.reason.empty() ? "" : ", " + status.reason));
+                               (status.reason.empty() ? "" : ", " + status.reason) +
+                               other_troubles(status));
 }
 
 }  // namespace

@@ -58,8 +58,17 @@ std::optional<Node> find_node(const Announcement& announcement, const std::strin
 /// An endpoint that Cyclone discovered.
 struct Endpoint {
   Guid participant;
-  std::string topic, type, reliability, durability;
+  std::string topic, type, reliability, durability, user_data;
 };
+
+std::string user_data_of(const dds_qos_t* qos) {
+  void* bytes = nullptr;
+  std::size_t size = 0;
+  dds_qget_userdata(qos, &bytes, &size);
+  std::string text = size == 0 ? "" : std::string(static_cast<const char*>(bytes), size);
+  dds_free(bytes);
+  return text;
+}
 
 Endpoint endpoint_of(const dds_builtintopic_endpoint_t& found) {
   dds_reliability_kind_t reliability{};
@@ -71,7 +80,8 @@ Endpoint endpoint_of(const dds_builtintopic_endpoint_t& found) {
       .topic = found.topic_name,
       .type = found.type_name,
       .reliability = reliability == DDS_RELIABILITY_RELIABLE ? "RELIABLE" : "BEST_EFFORT",
-      .durability = durability == DDS_DURABILITY_TRANSIENT_LOCAL ? "TRANSIENT_LOCAL" : "VOLATILE"};
+      .durability = durability == DDS_DURABILITY_TRANSIENT_LOCAL ? "TRANSIENT_LOCAL" : "VOLATILE",
+      .user_data = user_data_of(found.qos)};
 }
 
 /// What Cyclone itself knows of a kind of endpoint (DCPSPublication, DCPSSubscription).
@@ -122,7 +132,8 @@ void print(const std::string& kind, const std::map<Guid, Endpoint>& endpoints) {
         .add("topic", endpoint.topic)
         .add("type", endpoint.type)
         .add("reliability", endpoint.reliability)
-        .add("durability", endpoint.durability);
+        .add("durability", endpoint.durability)
+        .add("user_data", endpoint.user_data);
   }
 }
 
@@ -138,11 +149,7 @@ std::optional<std::string> user_data(const Participant& participant, const Guid&
     const auto& found = *static_cast<const dds_builtintopic_participant_t*>(sample);
     if (info.valid_data && info.instance_state == DDS_ALIVE_INSTANCE_STATE &&
         guid_of(found.key.v) == wanted) {
-      void* bytes = nullptr;
-      std::size_t size = 0;
-      dds_qget_userdata(found.qos, &bytes, &size);
-      text = size == 0 ? "" : std::string(static_cast<const char*>(bytes), size);
-      dds_free(bytes);
+      text = user_data_of(found.qos);
     }
     dds_return_loan(reader, &sample, 1);
     sample = nullptr;
