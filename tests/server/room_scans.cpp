@@ -16,6 +16,7 @@ constexpr double ground_z_m = -1.5;
 constexpr double pillar_radius_m = 0.4;
 constexpr std::array<std::array<double, 2>, 8> pillars = {
     {{-18, 6}, {-11, -7}, {-4, 9}, {3, -5}, {8, 7}, {13, -9}, {18, 4}, {22, -3}}};
+constexpr int columns = 720;
 
 struct Hit {
   double range_m = std::numeric_limits<double>::infinity();
@@ -65,9 +66,9 @@ StampedPose room_pose(int index) {
               Eigen::AngleAxisd(0.01 * index, Eigen::Vector3d::UnitZ()))};
 }
 
-Scan room_scan(int index, int columns) { return seen_in_room(room_pose(index), columns); }
+Scan room_scan(int index) { return seen_in_room(room_pose(index)); }
 
-Scan seen_in_room(const StampedPose& pose, int columns) {
+Scan seen_in_room(const StampedPose& pose) {
   const SensorModel sensor = vlp_16();
   Scan scan;
   scan.stamp_ns = pose.stamp_ns;

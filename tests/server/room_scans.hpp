@@ -8,11 +8,10 @@ namespace stillmap::test {
 /// True pose of the lidar at scan `index` of a slow drive through a hall with pillars.
 [[nodiscard]] StampedPose room_pose(int index);
 
-/// What a 16-beam lidar sees there, `columns` times a turn: ground (road), walls (building),
-/// pillars (pole).
-[[nodiscard]] Scan room_scan(int index, int columns = 720);
+/// What a 16-beam lidar sees there: ground (road), walls (building), pillars (pole).
+[[nodiscard]] Scan room_scan(int index);
 
 /// The same from any pose in the hall.
-[[nodiscard]] Scan seen_in_room(const StampedPose& pose, int columns = 720);
+[[nodiscard]] Scan seen_in_room(const StampedPose& pose);
 
 }  // namespace stillmap::test

@@ -18,8 +18,6 @@ using Clock = std::chrono::steady_clock;
 // Of the sensor, ten times a second; the network's times are in proportion.
 constexpr auto period = 100ms * test::slowdown;
 constexpr int period_ms = 100 * test::slowdown;
-// So few that all but the network takes little of the period.
-constexpr int columns = 180;
 
 ServerConfig live_config() {
   ServerConfig config;
@@ -52,7 +50,7 @@ class SlowSegmentation : public testing::Test {
   }
   void send() {
     statistics_.scan_received();
-    queue_.push_dropping_oldest({test::room_scan(next_scan_++, columns), "lidar", Clock::now()});
+    queue_.push_dropping_oldest({test::room_scan(next_scan_++), "lidar", Clock::now()});
   }
   void work_off() const {
     while (status().counter("scans_mapped") + status().dropped() <
