@@ -96,15 +96,15 @@ Server::Server(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter)
 Server::~Server() = default;
 
 // Requests and scans wait for the mapping thread: they end first, so that none waits for a thread
-// that has ended. Traversability gets processor time only between scans, so it ends after them.
-// The map is saved when nothing can change it any more; the topics are closed after that, by the
-// destructors.
+// that has ended. The map is saved when nothing can change it any more, and before background
+// threads end: where other programs keep all cores busy, those of idle priority may need minutes for
+// what they have in work. The topics are closed after that, by the destructors.
 void Server::stop() {
   parts_->throttle.release();
   parts_->metrics.reset();
   parts_->interface.stop();
-  parts_->traversability.stop();
   parts_->mapping.stop();
+  parts_->traversability.stop();
 }
 
 }  // namespace stillmap::server

@@ -4,8 +4,6 @@
 #include <chrono>
 #include <utility>
 
-#include "server/threads/background_throttle.hpp"
-
 namespace stillmap::server {
 namespace {
 
@@ -15,7 +13,7 @@ constexpr std::size_t urgent_kinds = 3;
 }  // namespace
 
 OccupancyThread::OccupancyThread(const OccupancyServiceConfig& config, Statistics& statistics,
-                                 ThrottleCallback throttle)
+                                 ThrottleCallback throttle, BackgroundScheduling scheduling)
     : config_(config.map),
       max_scans_(config.queue_length),
       statistics_(statistics),
@@ -24,7 +22,7 @@ OccupancyThread::OccupancyThread(const OccupancyServiceConfig& config, Statistic
       map_(config.map),
       worker_(jobs_,
               [this](Job job) { std::visit([this](auto& kind) { run(std::move(kind)); }, job); },
-              {.on_start = [] { static_cast<void>(use_idle_scheduling()); },
+              {.on_start = [scheduling] { static_cast<void>(use_scheduling(scheduling)); },
                .before_take = [this] { this->throttle(); }}) {}
 
 void OccupancyThread::insert_urgent(Jobs& jobs, Job job) {

@@ -10,6 +10,7 @@
 #include "config/loaders/server_config.hpp"
 #include "core/occupancy/occupancy_map.hpp"
 #include "server/monitoring/statistics.hpp"
+#include "server/threads/background_throttle.hpp"
 #include "server/threads/worker.hpp"
 
 namespace stillmap::server {
@@ -29,13 +30,14 @@ struct EncodedOctree {
   std::int64_t stamp_ns = 0;
 };
 
-/// Keeps the octree on a thread of idle priority, so that the mapper never waits for it. When it
+/// Keeps the octree on a thread, of idle priority so that the mapper never waits for it. When it
 /// cannot keep up, it first stops clearing free space along the rays ("occupancy_not_cleared" in
 /// the status), then drops scans ("occupancy_scans_dropped"). Thread-safe.
 class OccupancyThread {
  public:
   OccupancyThread(const OccupancyServiceConfig& config, Statistics& statistics,
-                  ThrottleCallback throttle = {});
+                  ThrottleCallback throttle = {},
+                  BackgroundScheduling scheduling = BackgroundScheduling::idle);
 
   /// Starts a new map from the voxels of this view; until they are inserted, queries see an empty
   /// map. Returns at once, as `add` does.

@@ -28,7 +28,8 @@ std::chrono::nanoseconds thread_cpu_time() {
 
 }  // namespace
 
-bool use_idle_scheduling() {
+bool use_scheduling(BackgroundScheduling scheduling) {
+  if (scheduling == BackgroundScheduling::normal) return true;
   // A nice value is not enough: the network's threads wait for each other many times a scan, and a
   // thread that holds one of them up for a moment holds up both.
   const sched_param none{};

@@ -6,9 +6,12 @@
 
 namespace stillmap::server {
 
-/// Gives the calling thread the scheduling class SCHED_IDLE: on busy cores it runs only when no
-/// other thread wants to. False where the system refuses.
-bool use_idle_scheduling();
+/// When a background thread runs: beside all others, or, by SCHED_IDLE, on busy cores only when no
+/// other thread wants to.
+enum class BackgroundScheduling { normal, idle };
+
+/// Applies it to the calling thread. False where the system refuses.
+bool use_scheduling(BackgroundScheduling scheduling);
 
 /// Whether a scan is being mapped, so that background work waits for the time between scans. Idle
 /// scheduling alone is not enough: cores share caches, memory bandwidth and often arithmetic units,

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "core/map/tile_evidence.hpp"
-#include "server/threads/background_throttle.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -31,7 +30,7 @@ TraversabilityThread::TraversabilityThread(std::vector<RobotProfile> robots,
                                            const LatestMap& latest_map,
                                            TraversabilitySnapshot& snapshot, Statistics& statistics,
                                            std::function<void()> updated, ThrottleCallback throttle,
-                                           MonotonicClock& clock)
+                                           MonotonicClock& clock, BackgroundScheduling scheduling)
     : period_(period),
       latest_map_(latest_map),
       snapshot_(snapshot),
@@ -39,10 +38,11 @@ TraversabilityThread::TraversabilityThread(std::vector<RobotProfile> robots,
       updated_(std::move(updated)),
       throttle_(std::move(throttle)),
       clock_(clock),
-      traversability_(std::move(robots)) {
+      traversability_(std::move(robots)),
+      scheduling_(scheduling) {
   publish();
   worker_.emplace(std::chrono::seconds(0), [this](const std::stop_token& stop) {
-    if (!std::exchange(has_begun_, true) && !use_idle_scheduling()) {
+    if (!std::exchange(has_begun_, true) && !use_scheduling(scheduling_)) {
       spdlog::warn("traversability is computed at full priority");
     }
     follow_map(stop);

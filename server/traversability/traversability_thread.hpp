@@ -9,6 +9,7 @@
 #include "core/traversability/traversability_map.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/publishers/latest_map.hpp"
+#include "server/threads/background_throttle.hpp"
 #include "server/threads/periodic_worker.hpp"
 #include "server/traversability/traversability_snapshot.hpp"
 
@@ -26,7 +27,8 @@ class TraversabilityThread {
                        const LatestMap& latest_map, TraversabilitySnapshot& snapshot,
                        Statistics& statistics, std::function<void()> updated,
                        ThrottleCallback throttle = {},
-                       MonotonicClock& clock = MonotonicClock::steady());
+                       MonotonicClock& clock = MonotonicClock::steady(),
+                       BackgroundScheduling scheduling = BackgroundScheduling::idle);
 
  private:
   void follow_map(const std::stop_token& stop);
@@ -41,6 +43,7 @@ class TraversabilityThread {
   ThrottleCallback throttle_;
   MonotonicClock& clock_;
   TraversabilityMap traversability_;
+  BackgroundScheduling scheduling_;
   bool has_begun_ = false;
   std::shared_ptr<const MapSnapshot> known_;
   MonotonicClock::TimePoint next_update_;

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "tests/clients/command_test.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -166,13 +167,15 @@ TEST_F(DatasetCommandTest, ALiveTopicBecomesASequence) {
   BackgroundProcess server(stillmap_server_program() + " --delivery every" + on_domain,
                            folder_ / "server.log");
   BackgroundProcess exporting(stillmap_program() + " dataset export topic:points " + path("live") +
-                                  " --idle-timeout 3 --sensor vlp_16 --json --timeout 30" +
-                                  on_domain,
+                                  " --idle-timeout " + std::to_string(3 * slowdown) +
+                                  " --sensor vlp_16 --json --timeout 30" + on_domain,
                               folder_ / "export.log");
   while (content("export.log").find("waiting for scans") == std::string::npos) {
     ASSERT_EQ(run("status --timeout 30" + on_domain).exit_code, 0) << content("server.log");
   }
-  ASSERT_EQ(run("replay " + path("city") + " --rate 0.5" + on_domain).exit_code, 0);
+  ASSERT_EQ(run("replay " + path("city") + " --rate " + std::to_string(0.5 / slowdown) + on_domain)
+                .exit_code,
+            0);
   ASSERT_EQ(exporting.wait(), 0) << content("export.log");
   const std::vector<std::string> live_times = lines("live/times.txt");
   const std::vector<std::string> city_times = lines("city/times.txt");

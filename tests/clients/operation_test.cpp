@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "tests/clients/command_test.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -262,7 +263,7 @@ TEST_F(OperationTest, SavesTheMapWithinWhatDockerWaits) {
   }
   const auto began = std::chrono::steady_clock::now();
   EXPECT_EQ(server.stop(), 0) << content("server.log");
-  EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(10));
+  EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(10 * slowdown));
   const ProcessResult info = run("map-info --json " + path("server.stillmap"));
   ASSERT_EQ(info.exit_code, 0) << info.err;
   EXPECT_THAT(content("server.log"), HasSubstr("stopping"));

@@ -32,7 +32,8 @@ struct Drawing {
 /// Posts before a wall all round, stored ring after ring as KITTI stores them.
 Scan draw(const Drawing& drawing, unsigned seed = 1) {
   std::mt19937 random(seed);
-  std::normal_distribution<double> noise(0.0, drawing.azimuth_noise_deg * per_degree);
+  // Its deviation must not be 0.
+  std::normal_distribution<double> noise(0.0, 1.0);
   Scan scan;
   for (int ring = 0; ring < 64; ++ring) {
     const double beam_deg = ring < 32 ? 2.0 - ring / 3.0 : -8.83 - (ring - 32) / 2.0;
@@ -44,7 +45,8 @@ Scan draw(const Drawing& drawing, unsigned seed = 1) {
       const bool is_post = column / 20 % 4 == 0;
       const bool is_edge = column % 20 == 0;
       const double range_m = is_post ? 6.0 : 20.0;
-      const double a = azimuth + (is_edge ? noise(random) : 0.0);
+      const double a =
+          azimuth + (is_edge ? drawing.azimuth_noise_deg * per_degree * noise(random) : 0.0);
       Eigen::Vector3d p(range_m * std::cos(a), range_m * std::sin(a),
                         range_m * std::tan(elevation));
       // Measured at -az / 2 pi of the sweep.

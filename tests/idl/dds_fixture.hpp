@@ -9,11 +9,12 @@
 
 #include "idl/dds/dds_options.hpp"
 #include "sensor_msgs.h"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::dds {
 
 /// How long what must happen may take on a busy machine.
-inline constexpr std::chrono::seconds discovery_timeout{20};
+inline constexpr std::chrono::seconds discovery_timeout{20 * test::slowdown};
 
 /// A message of a size, told from others by its width and its bytes.
 inline sensor_msgs::msg::PointCloud2 cloud_of(std::size_t bytes, std::uint32_t number) {

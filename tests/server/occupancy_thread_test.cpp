@@ -7,11 +7,16 @@
 #include <thread>
 
 #include "tests/server/room_scans.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::test {
 namespace {
 
 using namespace std::chrono_literals;
+
+// Else it would wait for gaps in what other tests do on this machine.
+constexpr auto scheduling = server::BackgroundScheduling::normal;
+constexpr auto patience = 60s * slowdown;
 
 server::OccupancyScan room(int index) {
   auto labelled = std::make_shared<LabelledScan>();
@@ -30,7 +35,7 @@ class OccupancyThreadTest : public testing::Test {
  protected:
   /// Waits until the thread has done so many jobs.
   [[nodiscard]] static bool done(const server::OccupancyThread& thread, std::uint64_t jobs) {
-    const auto deadline = std::chrono::steady_clock::now() + 60s;
+    const auto deadline = std::chrono::steady_clock::now() + patience;
     while (thread.changes() < jobs && std::chrono::steady_clock::now() < deadline) {
       std::this_thread::sleep_for(5ms);
     }
@@ -47,7 +52,7 @@ class OccupancyThreadTest : public testing::Test {
 };
 
 TEST_F(OccupancyThreadTest, MakesWhatTheMapWouldMake) {
-  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_);
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, {}, scheduling);
   OccupancyMap map(OccupancyConfig{});
   for (int i = 0; i < 4; ++i) {
     const server::OccupancyScan scan = room(i);
@@ -62,12 +67,12 @@ TEST_F(OccupancyThreadTest, MakesWhatTheMapWouldMake) {
 }
 
 TEST_F(OccupancyThreadTest, EncodesInTheBackgroundWhatItEncodesAtOnce) {
-  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_);
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, {}, scheduling);
   thread.add(room(0));
   ASSERT_TRUE(done(thread, 1));
   for (int i = 0; i < 2; ++i) {
     std::future<server::EncodedOctree> encoded = thread.encode_in_background();
-    ASSERT_EQ(encoded.wait_for(60s), std::future_status::ready);
+    ASSERT_EQ(encoded.wait_for(patience), std::future_status::ready);
     const server::EncodedOctree octree = encoded.get();
     EXPECT_TRUE(octree.data.binary);
     EXPECT_EQ(octree.data.bytes, thread.encode(true).data.bytes);
@@ -89,7 +94,7 @@ class GatedOccupancyThreadTest : public OccupancyThreadTest {
   }
   [[nodiscard]] bool waits() {
     std::unique_lock lock(gate_mutex_);
-    return gate_changed_.wait_for(lock, 60s, [this] { return is_waiting_; });
+    return gate_changed_.wait_for(lock, patience, [this] { return is_waiting_; });
   }
   void set_open(bool is_open) {
     const std::scoped_lock lock(gate_mutex_);
@@ -105,7 +110,7 @@ class GatedOccupancyThreadTest : public OccupancyThreadTest {
 };
 
 TEST_F(GatedOccupancyThreadTest, WaitsForGapsBetweenScansAndTakesThemThen) {
-  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate());
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate(), scheduling);
   set_open(false);
   for (int i = 0; i < 4; ++i) thread.add(room(i));
   ASSERT_TRUE(waits());
@@ -117,7 +122,7 @@ TEST_F(GatedOccupancyThreadTest, WaitsForGapsBetweenScansAndTakesThemThen) {
 }
 
 TEST_F(GatedOccupancyThreadTest, EncodesInAGap) {
-  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate());
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate(), scheduling);
   thread.add(room(0));
   ASSERT_TRUE(done(thread, 1));
   set_open(false);
@@ -125,11 +130,11 @@ TEST_F(GatedOccupancyThreadTest, EncodesInAGap) {
   ASSERT_TRUE(waits());
   EXPECT_EQ(encoded.wait_for(0s), std::future_status::timeout);
   set_open(true);
-  EXPECT_EQ(encoded.wait_for(60s), std::future_status::ready);
+  EXPECT_EQ(encoded.wait_for(patience), std::future_status::ready);
 }
 
 TEST_F(GatedOccupancyThreadTest, ShowsNothingOfTheOldMapWhileANewOneWaitsForAGap) {
-  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate());
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate(), scheduling);
   thread.add(room(0));
   ASSERT_TRUE(done(thread, 1));
   set_open(false);
@@ -146,7 +151,7 @@ TEST_F(GatedOccupancyThreadTest, ShowsNothingOfTheOldMapWhileANewOneWaitsForAGap
 TEST_F(GatedOccupancyThreadTest, EndsWithAnEncodingUnderWay) {
   std::future<server::EncodedOctree> encoded;
   {
-    server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate());
+    server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate(), scheduling);
     set_open(false);
     encoded = thread.encode_in_background();
     ASSERT_TRUE(waits());
@@ -158,7 +163,7 @@ TEST_F(GatedOccupancyThreadTest, EndsWithAnEncodingUnderWay) {
 TEST_F(OccupancyThreadTest, StopsClearingAndThenDropsScansWhenItCannotKeepUp) {
   OccupancyServiceConfig config;
   config.queue_length = 4;
-  server::OccupancyThread thread(config, statistics_);
+  server::OccupancyThread thread(config, statistics_, {}, scheduling);
   const server::OccupancyScan scan = room(0);
   constexpr std::uint64_t scans = 400;
   for (std::uint64_t i = 0; i < scans; ++i) thread.add(scan);
@@ -170,7 +175,7 @@ TEST_F(OccupancyThreadTest, StopsClearingAndThenDropsScansWhenItCannotKeepUp) {
 }
 
 TEST_F(OccupancyThreadTest, BeginsAnotherMapWithItsViewAndForgetsScansOfTheOldOne) {
-  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_);
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, {}, scheduling);
   thread.add(room(0));
   ASSERT_TRUE(done(thread, 1));
   EXPECT_GT(all_of(thread).free, 100U);

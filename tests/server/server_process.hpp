@@ -11,6 +11,7 @@
 #include "clients/library/client.hpp"
 #include "clients/library/scan_publisher.hpp"
 #include "tests/scratch_folder.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::test {
 
@@ -53,7 +54,7 @@ class ServiceSetup {
 };
 
 /// The longest that a loaded machine may need for anything here.
-inline constexpr std::chrono::seconds patience{60};
+inline constexpr std::chrono::seconds patience{60 * slowdown};
 
 /// Waits until `condition` holds; false after `patience`.
 [[nodiscard]] bool eventually(const std::function<bool()>& condition);

@@ -9,6 +9,7 @@
 
 #include "server/traversability/traversability_grid.hpp"
 #include "tests/server/manual_clock.hpp"
+#include "tests/slowdown.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
 namespace stillmap::server {
@@ -48,12 +49,12 @@ class TraversabilityThreadTest : public testing::Test {
       updated_.notify_all();
     };
     thread_.emplace(std::vector{square_robot(), small_robot()}, period, latest_map_, snapshot_,
-                    statistics_, updated, ThrottleCallback(), clock_);
+                    statistics_, updated, ThrottleCallback(), clock_, BackgroundScheduling::normal);
   }
 
   [[nodiscard]] bool wait_for_version(std::uint64_t version) {
     std::unique_lock lock(mutex_);
-    return updated_.wait_for(lock, 60s,
+    return updated_.wait_for(lock, 60s * test::slowdown,
                              [&] { return snapshot_.view("small")->version == version; });
   }
 
