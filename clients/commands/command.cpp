@@ -21,8 +21,16 @@ ExitCode report(const std::exception& error, ExitCode code) {
 }  // namespace
 
 ExitCode run_action(const Action& action) {
+  // A command that prints for ever ends when nobody can get it any more.
+  std::cout.exceptions(std::ios::badbit);
   try {
-    return action();
+    const ExitCode code = action();
+    std::cout.flush();
+    return code;
+  } catch (const std::ios_base::failure& error) {
+    if (!std::cout.bad()) return report(error, ExitCode::failed);
+    std::cerr << "stillmap: the output cannot be written to stdout; is the disk full?\n";
+    return ExitCode::failed;
   } catch (const ServiceTimeout& error) {
     return report(error, ExitCode::no_server);
   } catch (const DatasetError& error) {
