@@ -1,5 +1,4 @@
 #include "idl/conversions/occupancy.hpp"
-
 #include "server/services/service_handlers.hpp"
 
 namespace stillmap::server {
