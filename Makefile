@@ -59,6 +59,7 @@ test-tsan: ## The tests under ThreadSanitizer
 	$(MAKE) test PRESET=tsan ONE_CORE='taskset -c 0'
 
 test-kill: build ## Kill the server at KILLS=50 random moments, also while its disk fails, and look at what is stored
+	STILLMAP_KILLS=$(KILLS) $(BUILD)/tests/server/map_saver_faults_test
 	STILLMAP_KILLS=$(KILLS) $(BUILD)/tests/server/kill_test
 
 test-network: build ## Loss, slow links, outages, TCP, dead and late subscribers, in network namespaces

@@ -241,8 +241,8 @@ NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
   saved_map_id_ = 0;
   stored_metadata_.clear();
   if (discard && !begun.kept_file.empty()) {
-    fs::remove(begun.kept_file);
-    begun.kept_file.clear();
+    std::error_code not_removed;
+    if (fs::remove(begun.kept_file, not_removed)) begun.kept_file.clear();
   }
   return begun;
 }

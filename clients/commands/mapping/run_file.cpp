@@ -66,7 +66,7 @@ std::string to_ranges(const std::vector<std::size_t>& indices) {
 }
 
 std::optional<std::vector<std::size_t>> from_ranges(const std::string& text) {
-  constexpr std::size_t max_indices = 100'000'000;
+  constexpr std::size_t max_indices = 10'000'000;
   std::vector<std::size_t> indices;
   std::istringstream ranges(text);
   for (std::string range; std::getline(ranges, range, ',');) {
@@ -74,9 +74,9 @@ std::optional<std::vector<std::size_t>> from_ranges(const std::string& text) {
     std::size_t first = 0;
     if (!(numbers >> first)) return std::nullopt;
     std::size_t last = first;
-    if (numbers.peek() == '-') numbers.ignore() >> last;
-    if (!numbers || numbers.peek() != std::istringstream::traits_type::eof() || last < first ||
-        last - first >= max_indices) {
+    char dash = '-';
+    if (!numbers.eof() && !(numbers >> dash >> last)) return std::nullopt;
+    if (dash != '-' || !numbers.eof() || last < first || last >= max_indices) {
       return std::nullopt;
     }
     for (std::size_t i = first; i <= last; ++i) indices.push_back(i);

@@ -93,7 +93,7 @@ class SqliteMapStore : public MapStore {
     writing([&] {
       if (has_first_schema(database_)) upgrade_schema(database_);
       if (!saved_trajectory_) saved_trajectory_ = read_trajectory(database_);
-      if (!log_is_empty_) empty_log();
+      if (!log_is_empty_) empty_log("PASSIVE");
       SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
       const bool is_another_map = read_map_row(database_).map_id != map.view.map_id;
       write_tiles(database_, map);
@@ -103,7 +103,7 @@ class SqliteMapStore : public MapStore {
       commit(transaction);
       saved_trajectory_ = map.trajectory;
       // So that a copy of the file alone is a copy of the map.
-      empty_log();
+      empty_log("TRUNCATE");
     });
   }
 
@@ -136,7 +136,7 @@ class SqliteMapStore : public MapStore {
 
   void begin_run(std::uint64_t map_id) override {
     writing([&] {
-      if (!log_is_empty_) empty_log();
+      if (!log_is_empty_) empty_log("PASSIVE");
       SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
       SQLite::Statement rename(database_, "UPDATE map SET map_id = ?");
       rename.bind(1, static_cast<std::int64_t>(map_id));
@@ -145,7 +145,7 @@ class SqliteMapStore : public MapStore {
       reopen.bind(1, map_ended_key);
       reopen.exec();
       commit(transaction);
-      empty_log();
+      empty_log("TRUNCATE");
     });
   }
 
@@ -162,7 +162,7 @@ class SqliteMapStore : public MapStore {
   }
 
   void complete_file() override {
-    writing([&] { empty_log(); });
+    writing([&] { empty_log("TRUNCATE"); });
     if (!log_is_empty_) {
       throw MapFileError(file_, "is being read by another program; try again when it has ended");
     }
@@ -198,9 +198,12 @@ class SqliteMapStore : public MapStore {
   }
 
   /// Brings the log's content into the file, unless somebody reads what it still has without it.
-  void empty_log() {
-    SQLite::Statement checkpoint(database_, "PRAGMA wal_checkpoint(TRUNCATE)");
-    log_is_empty_ = checkpoint.executeStep() && checkpoint.getColumn(0).getInt() == 0;
+  /// "PASSIVE" does not wait for them, "TRUNCATE" does for a while and leaves no log.
+  void empty_log(const std::string& mode) {
+    SQLite::Statement checkpoint(database_, "PRAGMA wal_checkpoint(" + mode + ")");
+    if (!checkpoint.executeStep()) return;
+    const auto number = [&](int column) { return checkpoint.getColumn(column).getInt(); };
+    log_is_empty_ = number(0) == 0 && number(1) == number(2);
   }
 
   template <typename Action>
