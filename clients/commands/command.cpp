@@ -23,9 +23,9 @@ ExitCode report(const std::exception& error, ExitCode code) {
 }  // namespace
 
 ExitCode run_action(const Action& action) {
-  // A command that prints for ever ends when nobody can get it any more.
-  std::cout.exceptions(std::ios::badbit);
   try {
+    // A command that prints for ever ends when nobody can get it any more.
+    std::cout.exceptions(std::ios::badbit);
     const ExitCode code = action();
     std::cout.flush();
     std::cout.exceptions(std::ios::goodbit);

@@ -4,11 +4,13 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gmock/gmock.h>
+#include <poll.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <tbb/global_control.h>
 #include <unistd.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
@@ -239,6 +241,9 @@ class MapSaverFaults : public testing::TestWithParam<SaverFault> {
       }
     }
     close(ends[1]);
+    // Most often it has saved once before its disk fails.
+    pollfd first_report{.fd = ends[0], .events = POLLIN, .revents = 0};
+    if (random_() % 5 != 0) poll(&first_report, 1, 60'000);
     wait_up_to(150'000);
     set_fault(GetParam().disk);
     wait_up_to(150'000);
@@ -301,7 +306,9 @@ TEST_P(MapSaverFaults, NothingThatWasStoredIsLostAndNoFileHoldsAnotherMap) {
       }
     }
   }
-  EXPECT_GT(saves, 0U);
+  if (wanted_rounds() >= 20) {
+    EXPECT_GT(saves, 10U);
+  }
   std::cout << GetParam().name << ": " << wanted_rounds() << " rounds, " << saves << " saves\n";
 }
 
