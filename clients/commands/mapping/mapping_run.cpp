@@ -69,12 +69,11 @@ class MappingRun {
     times_.begin();
     std::optional<Eigen::Isometry3d> T_map_lidar_first;
     const bool is_mounted = !T_body_lidar_.isApprox(Eigen::Isometry3d::Identity());
-    if (mapper_.trajectory().empty()) {
-      if (!earlier_.empty()) {
-        T_map_lidar_first = earlier_.back().T_map_lidar * T_body_lidar_;
-      } else if (is_mounted) {
-        T_map_lidar_first = T_body_lidar_;
-      }
+    // Until the lidar is found in the earlier map, every scan is looked for where that ended.
+    if (!earlier_.empty() && !is_registered_) {
+      T_map_lidar_first = earlier_.back().T_map_lidar * T_body_lidar_;
+    } else if (earlier_.empty() && mapper_.trajectory().empty() && is_mounted) {
+      T_map_lidar_first = T_body_lidar_;
     }
     const std::optional<MappedScan> mapped =
         mapper_.process(std::move(frame->scan), T_map_lidar_first);
@@ -86,6 +85,7 @@ class MappingRun {
     times_.end();
     result_.scan_of_pose.push_back(index);
     result_.health[mapped->odometry.health] += 1;
+    is_registered_ |= mapped->odometry.health != OdometryHealth::lost;
     if (!true_ids.empty())
       result_.moving += evaluation::moving_score(mapped->labelled.motion, true_ids);
   }
@@ -138,6 +138,7 @@ class MappingRun {
   ImuFeed imu_;
   double period_s_;
   Trajectory earlier_;
+  bool is_registered_ = false;
   std::uint64_t step_ = 0;
   MappingResult result_;
 };
@@ -160,7 +161,10 @@ MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
   const std::size_t end = range.end(dataset);
   std::size_t index = range.first;
   MappingRun run(dataset, range.strict, config, body, std::move(labels), scan_skipped);
-  if (auto earlier = run_file.earlier()) {
+  // The map of a few scans is too thin to be found in, and soon made again.
+  constexpr std::size_t min_resumed_scans = 30;
+  if (auto earlier = run_file.earlier();
+      earlier && earlier->scan_of_pose.size() >= min_resumed_scans) {
     index = earlier->next_scan;
     run.resume(*std::move(earlier));
   }
