@@ -172,6 +172,8 @@ RemoteParticipant Participant::self() const {
   guid << handle_->guid().guidPrefix;
   self.guid = guid.str();
   self.name = handle_->get_qos().name().to_string();
+  // As the others name it.
+  if (!options_.node_name.empty()) self.ros_nodes = {"/" + options_.node_name};
   self.is_on_this_host = true;
   self.uses_shared_memory = options_.shared_memory;
   self.is_secured = identity_ != nullptr;

@@ -117,12 +117,12 @@ TEST_F(BrokenSetup, WithABestEffortPublisherForAReliableServer) {
   const dds::Writer<PointCloud2> writer(participant, "rt/points", {.reliable = false});
   EXPECT_THAT(
       problems(),
-      Contains(AllOf(field("what", "what lidar_driver writes does not reach stillmap_server"),
+      Contains(AllOf(field("what", "what /lidar_driver writes does not reach /stillmap_server"),
                      field("evidence", "reliability: the writer offers best effort"),
                      field("hint", "input.delivery: latest"))));
   const ProcessResult status = run_stillmap(
       "status --json --interface 127.0.0.1 --domain " + std::to_string(domain_), folder_.path());
-  EXPECT_THAT(status.out, HasSubstr("does not reach stillmap_server"));
+  EXPECT_THAT(status.out, HasSubstr("does not reach /stillmap_server"));
 }
 
 TEST_F(BrokenSetup, WithAPublisherOfAnotherType) {
@@ -147,9 +147,10 @@ TEST_F(BrokenSetup, WithSecurityOnOneSideOnly) {
   ASSERT_EQ(run_stillmap("security init " + (folder_ / "keys").string(), folder_.path()).exit_code,
             0);
   start_server("--security " + (folder_ / "keys/server").string());
-  EXPECT_THAT(problems(),
-              Contains(AllOf(field("what", "stillmap_server is secured and stillmap_doctor is not"),
-                             field("hint", "--security"))));
+  EXPECT_THAT(
+      problems(),
+      Contains(AllOf(field("what", "stillmap_server is secured and /stillmap_doctor is not"),
+                     field("hint", "--security"))));
   const auto found = problems("--security " + (folder_ / "keys/planner").string());
   EXPECT_THAT(found, Contains(field("what", "nobody publishes rt/points")));
   EXPECT_THAT(found, testing::Not(Contains(field("what", "secured"))));

@@ -58,8 +58,8 @@ class StoppingClient {
                                  request_type.get_type_name(), service_qos());
     SerializedSampleReader replies(participant, reply_topic(large_service),
                                    type_support<SaveMap_Response>().get_type_name(), service_qos());
-    asker.readers().wait_for_any(discovery_timeout);
-    replies.events().wait_for_writer(discovery_timeout);
+    static_cast<void>(asker.readers().wait_for_any(discovery_timeout));
+    static_cast<void>(replies.events().wait_for_writer(discovery_timeout));
     const SaveMap_Request request;
     for (int i = 0; i < stopped_requests; ++i) {
       eprosima::fastrtps::rtps::WriteParams params;
