@@ -112,13 +112,13 @@ TEST_F(MapCommandTest, ASignalLeavesTheOldMapAndTheRunCanBeResumed) {
   simulate("city", 3);
   ASSERT_EQ(map_city().exit_code, 0);
   const std::string before = content("out/map.stillmap");
-  simulate("street", 60);
+  simulate("street", 120);
   const std::string map = "map " + path("street") + " --out " + path("out") + " --labels none";
   const char* how = " --force --save-period 0.01";
   for (const int signal : {SIGKILL, SIGINT, SIGHUP}) {
     BackgroundProcess running(stillmap_program() + " " + map + how, folder_ / "log");
     while (!exists("out/unfinished/run.stillmap")) usleep(1000);
-    usleep(200'000);
+    usleep(600'000);
     running.send(signal);
     ASSERT_EQ(running.wait(), signal == SIGKILL ? -1 : 1) << content("log");
     EXPECT_EQ(content("out/map.stillmap"), before) << signal;
@@ -129,9 +129,9 @@ TEST_F(MapCommandTest, ASignalLeavesTheOldMapAndTheRunCanBeResumed) {
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
   const nlohmann::json report = nlohmann::json::parse(resumed.out);
   EXPECT_GT(report.at("resumed_at_scan"), 0);
-  EXPECT_EQ(report.at("scans"), 60);
+  EXPECT_EQ(report.at("scans"), 120);
   EXPECT_LT(report.at("accuracy").at("ate_rmse_m"), 0.5);
-  EXPECT_EQ(line_count("out/poses_lidar.txt"), 60U);
+  EXPECT_EQ(line_count("out/poses_lidar.txt"), 120U);
   EXPECT_FALSE(exists("out/unfinished"));
 }
 

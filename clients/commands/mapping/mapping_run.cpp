@@ -162,7 +162,7 @@ MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
   std::size_t index = range.first;
   MappingRun run(dataset, range.strict, config, body, std::move(labels), scan_skipped);
   // The map of a few scans is too thin to be found in, and soon made again.
-  constexpr std::size_t min_resumed_scans = 30;
+  constexpr std::size_t min_resumed_scans = 10;
   if (auto earlier = run_file.earlier();
       earlier && earlier->scan_of_pose.size() >= min_resumed_scans) {
     index = earlier->next_scan;
