@@ -6,6 +6,7 @@ JOBS ?= $(shell nproc)
 FUZZ_JOBS ?= 2
 FUZZ_SECONDS ?= 600
 MINUTES ?= 30
+KILLS ?= 50
 RECORDINGS ?=
 DRIVES ?=
 BASE ?= HEAD~1
@@ -57,8 +58,9 @@ test-tsan: ## The tests under ThreadSanitizer
 	@# no threads, and our own are looked at.
 	$(MAKE) test PRESET=tsan ONE_CORE='taskset -c 0'
 
-test-kill: build ## Kill the server at 50 random moments of mapping, and look at what is stored
-	STILLMAP_KILLS=50 $(BUILD)/tests/server/kill_test
+test-kill: build ## Kill the server at KILLS=50 random moments, also while its disk fails, and look at what is stored
+	STILLMAP_KILLS=$(KILLS) $(BUILD)/tests/server/map_saver_faults_test
+	STILLMAP_KILLS=$(KILLS) $(BUILD)/tests/server/kill_test
 
 test-network: build ## Loss, slow links, outages, TCP, dead and late subscribers, in network namespaces
 	/usr/bin/python3 tests/network/run.py --programs $(BUILD)/bin --lab $(BUILD)/tests/network

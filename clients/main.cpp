@@ -10,7 +10,8 @@ int main(int argc, char** argv) {
   using enum stillmap::cli::CommandLine::Parsed;
   switch (command_line.parse(argc, argv)) {
     case answered:
-      return static_cast<int>(stillmap::cli::ExitCode::ok);
+      action = [] { return stillmap::cli::ExitCode::ok; };
+      break;
     case wrong_usage:
       return static_cast<int>(stillmap::cli::ExitCode::bad_input);
     case command:

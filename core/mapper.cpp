@@ -173,10 +173,15 @@ bool Mapper::has_enough_points(const Scan& scan) {
 }
 
 void Mapper::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidence) {
-  // First the step that may throw.
-  static_map_.resume(view, tile_evidence);
+  StaticMap prepared(config_.static_map);
+  prepared.resume(view, tile_evidence);
+  resume(std::move(prepared));
+}
+
+void Mapper::resume(StaticMap prepared) {
+  static_map_ = std::move(prepared);
   clear_scan_state();
-  for (const auto& tile : view.tiles) resumed_tiles_.insert(tile->info.id);
+  for (const auto& tile : static_map_.view()->tiles) resumed_tiles_.insert(tile->info.id);
 }
 
 void Mapper::reset(std::uint64_t map_id) {

@@ -23,7 +23,7 @@ constexpr const char* footer =
     "  stillmap-server --delivery every                   for 'stillmap replay --lossless'\n"
     "  stillmap-server --check-config my_server.yaml      every fault of a file, or none\n"
     "Then, elsewhere: stillmap replay DATASET, stillmap watch, stillmap query, stillmap status.\n"
-    "SIGINT and SIGTERM save the map and end the server with exit code 0.";
+    "SIGINT, SIGTERM and SIGHUP save the map and end the server with exit code 0.";
 
 constexpr int bad_usage = 2;
 

@@ -41,10 +41,14 @@ ServiceContext Interface::service_context(const ServerConfig& config,
       .tiles = context.storage.tiles(),
       .saver = context.storage.saver(),
       .status = [this] { return status(); },
-      .reset = [&mapping] { return mapping.reset(); },
-      .load = [&mapping](
-                  const SavedMap& map,
-                  const std::shared_ptr<TileStore>& tile_store) { mapping.load(map, tile_store); },
+      .begin_map =
+          [&mapping](std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store) {
+            mapping.reset(map_id, tile_store);
+          },
+      .prepare_map =
+          [&mapping](const SavedMap& map, const std::shared_ptr<TileStore>& tile_store) {
+            return mapping.prepare(map, tile_store);
+          },
       .publish_now = [&mapping] { mapping.publish_now(); },
       .removed =
           [&mapping](const Eigen::AlignedBox3d& box_map) { return mapping.removed(box_map); },

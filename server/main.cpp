@@ -6,6 +6,7 @@
 #include <csignal>
 #include <cstring>
 #include <exception>
+#include <iostream>
 
 #include "config/loaders/model_file.hpp"
 #include "core/process/stop_signals.hpp"
@@ -37,6 +38,8 @@ void notify_systemd(const char* state) {
 int serve(const stillmap::ServerConfig& config) {
   sigset_t signals = stillmap::block_stop_signals();
   stillmap::server::block_thread_failures(signals);
+  // At a limit of file sizes, writing fails as on a full disk, instead of ending the server.
+  static_cast<void>(std::signal(SIGXFSZ, SIG_IGN));
   const bool adaptive_width = stillmap::server::segmentation_budget(config).count() > 0;
   auto labels = stillmap::open_segmenter(config.labels, config.mapper.sensor, adaptive_width);
   if (const std::string details = labels->details(); !details.empty()) {
@@ -63,7 +66,11 @@ int main(int argc, char** argv) {
   stillmap::dds::log_dds_to_stderr();
   try {
     const stillmap::server::Arguments arguments = stillmap::server::read_arguments(argc, argv);
-    if (!arguments.config) return arguments.exit_code;
+    if (!arguments.config) {
+      if (std::cout.flush()) return arguments.exit_code;
+      spdlog::critical("the output cannot be written to stdout; is the disk full?");
+      return failed;
+    }
     stillmap::server::set_log_level(arguments.config->log.level);
     return serve(*arguments.config);
   } catch (const stillmap::ConfigError& error) {

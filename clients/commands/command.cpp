@@ -14,6 +14,8 @@ namespace stillmap::cli {
 namespace {
 
 ExitCode report(const std::exception& error, ExitCode code) {
+  // Writing to cerr flushes cout, which must not throw again.
+  std::cout.exceptions(std::ios::goodbit);
   std::cerr << "stillmap: " << error.what() << "\n";
   return code;
 }
@@ -22,7 +24,16 @@ ExitCode report(const std::exception& error, ExitCode code) {
 
 ExitCode run_action(const Action& action) {
   try {
-    return action();
+    // A command that prints for ever ends when nobody can get it any more.
+    std::cout.exceptions(std::ios::badbit);
+    const ExitCode code = action();
+    std::cout.flush();
+    std::cout.exceptions(std::ios::goodbit);
+    return code;
+  } catch (const std::ios_base::failure& error) {
+    if (!std::cout.bad()) return report(error, ExitCode::failed);
+    return report(std::runtime_error("the output cannot be written to stdout; is the disk full?"),
+                  ExitCode::failed);
   } catch (const ServiceTimeout& error) {
     return report(error, ExitCode::no_server);
   } catch (const DatasetError& error) {

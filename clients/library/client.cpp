@@ -227,9 +227,10 @@ std::uint64_t Client::restore_removed(RemovalReason reason, const BoxRegion& box
   return connection_->call_ok(services::restore_removed, std::move(request)).restored();
 }
 
-std::string Client::save_map(const std::string& file) {
+std::string Client::save_map(const std::string& file, bool overwrite) {
   SaveMap_Request request;
   request.file(file);
+  request.overwrite(overwrite);
   return connection_->call_ok(services::save_map, std::move(request)).file();
 }
 
@@ -243,8 +244,11 @@ LoadedMap Client::load_map(const std::string& file) {
           .pose_count = reply.pose_count()};
 }
 
-std::uint64_t Client::reset() {
-  return connection_->call_ok(services::reset, Reset_Request()).status().map_id();
+BegunMap Client::reset(bool discard) {
+  Reset_Request request;
+  request.discard(discard);
+  const auto reply = connection_->call_ok(services::reset, std::move(request));
+  return {.map_id = reply.status().map_id(), .kept_file = reply.kept_file()};
 }
 
 Subscription Client::subscribe_points(const std::string& ros_topic, DeliveryMode delivery,

@@ -86,6 +86,13 @@ struct LoadedMap {
   std::uint64_t pose_count = 0;
 };
 
+/// The map that a reset began.
+struct BegunMap {
+  std::uint64_t map_id = 0;
+  /// Where the map until then is kept, on the server's machine; empty where it is not.
+  std::string kept_file;
+};
+
 struct RemovedVoxels {
   std::vector<RemovedVoxel> voxels;
   /// Of the region, also those that did not come.
@@ -183,16 +190,18 @@ class Client {
   std::uint64_t restore_removed(RemovalReason reason, const BoxRegion& box);
 
   /// Has the server save its map; returns the file's name on the server's machine. An empty name
-  /// means the configured file.
-  std::string save_map(const std::string& file = {});
+  /// means the file that it saves to anyhow. Another map of that name is refused, unless
+  /// `overwrite`.
+  std::string save_map(const std::string& file = {}, bool overwrite = false);
 
   /// Has the server save its map, resume one that was saved before, and save to that file from then
   /// on. `file` is a plain name beside the configured map file. A map that is missing, damaged,
   /// newer or of another voxel size is refused, and the running map continues.
   LoadedMap load_map(const std::string& file);
 
-  /// Has the server start an empty map and trajectory; returns the id of the new map.
-  std::uint64_t reset();
+  /// Has the server start an empty map and trajectory. The map until then is kept in a file beside
+  /// the server's map file, unless `discard`.
+  BegunMap reset(bool discard = false);
 
   /// Calls back for every pose. Each subscription has its own thread, and its calls never overlap;
   /// it ends with the Subscription, which must not outlive the client.

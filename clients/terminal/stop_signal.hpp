@@ -4,8 +4,8 @@
 
 namespace stillmap::cli {
 
-/// Turns SIGINT and SIGTERM into something to ask for, so that a run can end in order and keep
-/// what it has. Make it before any thread starts: threads inherit the blocked signals.
+/// Turns SIGINT, SIGTERM and SIGHUP into something to ask for, so that a run can end in order and
+/// keep what it has. Make it before any thread starts: threads inherit the blocked signals.
 class StopSignal {
  public:
   /// Throws std::system_error.

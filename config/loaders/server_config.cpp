@@ -217,6 +217,8 @@ void read_map(YamlSection section, MapFileConfig& map) {
   section.number("save_period_s", map.save_period_s, {0.1, 86400});
   section.integer("memory_limit_mib", map.memory_limit_mib, {0, 1 << 20});
   section.boolean("load_at_start", map.load_at_start);
+  section.integer("saved_maps", map.saved_maps, {0, 100000});
+  section.integer("saved_maps_mib", map.saved_maps_mib, {0, 1 << 30});
   section.text("datum", map.datum);
   if (map.datum.empty()) return;
   try {

@@ -151,6 +151,9 @@ struct MapFileConfig {
   std::uint32_t memory_limit_mib = 2048;
   /// Resume the map in `file` when it exists; else start empty.
   bool load_at_start = true;
+  /// How many maps, and how many MiB of them, clients may have saved or kept beside `file`.
+  std::uint32_t saved_maps = 100;
+  std::uint32_t saved_maps_mib = 51200;
   /// Where the map's origin lies, as datum_from_text() reads it; goes into the map file. Empty: not
   /// known.
   std::string datum;

@@ -13,6 +13,8 @@ struct StampedPose {
   Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
 };
 
+/// The poses of one run after the other. Within a run stamps increase; a run may begin with an
+/// earlier stamp than the one before it ended with.
 using Trajectory = std::vector<StampedPose>;
 
 }  // namespace stillmap

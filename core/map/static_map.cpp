@@ -146,6 +146,7 @@ struct StaticMap::State {
   std::vector<LiveTile*> touched;
   /// Tiles were evicted or reloaded since the last view.
   bool residency_changed = false;
+  bool is_frozen = false;
   /// Scans so far.
   std::uint64_t inserted = 0;
   /// Counts the changes of tiles; up to `stored_step` they are in the tile store.
@@ -225,6 +226,7 @@ StaticMap& StaticMap::operator=(StaticMap&&) noexcept = default;
 void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar) {
   assert(scan.motion.size() == scan.scan.size());
   assert(scan.labels.empty() || scan.labels.classes.size() == scan.scan.size());
+  if (state_->is_frozen) return;
   const auto batches = state_->sorter.sort(scan, T_map_lidar);
   std::vector<LiveTile*> hit(batches.size());
   std::ranges::transform(batches, hit.begin(),
@@ -241,12 +243,15 @@ void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_
   ++state_->inserted;
 }
 
+void StaticMap::set_frozen(bool is_frozen) { state_->is_frozen = is_frozen; }
+
 bool StaticMap::clearing_due() const {
-  return state_->config.clearing_range_m > 0.0 &&
+  return !state_->is_frozen && state_->config.clearing_range_m > 0.0 &&
          state_->inserted % state_->config.clearing_interval == 0;
 }
 
 void StaticMap::clear_seen_through(const RangeImageView& view, std::int64_t stamp_ns) {
+  if (state_->is_frozen) return;
   const StaticMapConfig& config = state_->config;
   const auto is_free = [&](const Eigen::Vector3f& position_map) {
     const double range_m = (position_map - view.origin_map()).norm();

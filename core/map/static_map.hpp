@@ -122,6 +122,10 @@ class StaticMap {
   /// stored.
   [[nodiscard]] std::vector<std::string> unreadable_tiles() const;
 
+  /// While frozen, scans are neither inserted nor cleared with: the map keeps what it has and takes
+  /// no more memory.
+  void set_frozen(bool is_frozen);
+
   /// Empties the map; `map_id` tells clients that it is another one now.
   void reset(std::uint64_t map_id);
 

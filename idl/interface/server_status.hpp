@@ -18,6 +18,10 @@ struct NamedCounter {
   std::uint64_t value = 0;
 };
 
+/// Of checkpoints that failed since the last one that did not: while it is above 0, what is mapped
+/// is in memory alone.
+inline constexpr const char* checkpoints_failing_counter = "checkpoints_failing";
+
 /// How segmentation keeps up with the scans.
 struct SegmentationStatus {
   /// Every `interval`-th scan is segmented; those between get labels from the map and the last

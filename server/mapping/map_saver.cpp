@@ -5,8 +5,12 @@
 #include <system_error>
 #include <utility>
 
+#include "core/map/map_id.hpp"
+
 namespace stillmap::server {
 namespace {
+
+namespace fs = std::filesystem;
 
 /// Saves whose durations decide when the next one is due.
 constexpr std::size_t recent_saves = 10;
@@ -16,44 +20,40 @@ constexpr double duration_margin = 1.5;
 constexpr const char* no_map_yet = "holds no map yet; name a file that a map was saved to";
 
 /// Opens an existing file; open_map_file would create a missing one.
-std::unique_ptr<MapStore> open_existing(const std::filesystem::path& file) {
+std::unique_ptr<MapStore> open_existing(const fs::path& file) {
   std::error_code error;
-  if (!std::filesystem::exists(file, error)) {
+  if (!fs::exists(file, error)) {
     throw MapFileError(file, "is not there; it must lie beside the configured map file");
   }
-  if (std::filesystem::is_regular_file(file, error) &&
-      std::filesystem::file_size(file, error) == 0) {
+  if (fs::is_regular_file(file, error) && fs::file_size(file, error) == 0) {
     throw MapFileError(file, no_map_yet);
   }
   return open_map_file(file);
 }
 
-/// Requests come over the network: they must not name any file outside the map folder, nor those
-/// that SQLite keeps beside an open map file.
-bool is_plain_name(const std::string& name) {
-  const std::filesystem::path plain(name);
-  const auto is_control = [](unsigned char c) { return c < ' '; };
-  const auto ends_as = [&](const char* ending) { return name.ends_with(ending); };
-  return !plain.has_parent_path() && name != "." && name != ".." &&
-         std::ranges::none_of(name, is_control) && !ends_as("-wal") && !ends_as("-shm") &&
-         !ends_as("-journal");
-}
-
 }  // namespace
 
-MapSaver::MapSaver(const LatestMap& latest_map, Statistics& statistics, std::filesystem::path file,
-                   std::map<std::string, std::string> metadata, std::uint32_t memory_limit_mib)
+MapSaver::MapSaver(const LatestMap& latest_map, Statistics& statistics, const fs::path& file,
+                   std::map<std::string, std::string> metadata, std::uint32_t memory_limit_mib,
+                   const SavedMapsLimit& saved_maps_limit)
     : latest_map_(latest_map),
       statistics_(statistics),
-      file_(std::move(file)),
+      file_(file.empty() ? file : fs::absolute(file)),
+      folder_(file_, saved_maps_limit),
       metadata_(std::move(metadata)),
       memory_limit_bytes_(std::size_t{memory_limit_mib} << 20) {
   // Opened at the start, so that a file that cannot be written is noticed before mapping begins.
   if (!file_.empty()) {
+    lock_ = std::make_unique<MapLock>(file_);
     store_ = open_map_file(file_);
   } else if (memory_limit_bytes_ > 0) {
     store_ = open_scratch_map();
   }
+}
+
+MapStore& MapSaver::open_store() {
+  if (!store_) store_ = open_map_file(file_);
+  return *store_;
 }
 
 std::optional<SavedMap> MapSaver::load() {
@@ -61,10 +61,12 @@ std::optional<SavedMap> MapSaver::load() {
   if (file_.empty()) return std::nullopt;
   SavedMap map = read(*store_);
   // Clients may have seen later versions than the stored one; under a new id, the versions that
-  // follow cannot be confused with those.
-  if (!map.metadata.contains(map_ended_key)) map.view.map_id = new_map_id();
+  // follow cannot be confused with those. Maps of older programs all have the id 0.
+  if (!map.metadata.contains(map_ended_key) || map.view.map_id == 0) {
+    map.view.map_id = new_map_id();
+  }
   store_->begin_run(map.view.map_id);
-  saved_map_id_ = map.view.map_id;
+  if (!map.view.tiles.empty()) saved_map_id_ = map.view.map_id;
   remember_metadata(map);
   return map;
 }
@@ -73,8 +75,16 @@ SavedMap MapSaver::read(MapStore& store) const {
   return memory_limit_bytes_ > 0 ? store.load_non_resident() : store.load();
 }
 
+std::optional<fs::path> MapSaver::put_stored_map_aside() {
+  const std::scoped_lock lock(mutex_);
+  if (file_.empty() || !store_->holds_map()) return std::nullopt;
+  const fs::path kept = folder_.unused_file_for(file_);
+  put_aside(kept);
+  return kept;
+}
+
 std::shared_ptr<TileStore> MapSaver::tile_store() {
-  return memory_limit_bytes_ > 0 ? store_->tile_store() : nullptr;
+  return memory_limit_bytes_ > 0 ? open_store().tile_store() : nullptr;
 }
 
 void MapSaver::set_source(CheckpointSource& source) {
@@ -84,7 +94,7 @@ void MapSaver::set_source(CheckpointSource& source) {
 
 void MapSaver::save_if_changed() {
   const std::scoped_lock lock(mutex_);
-  if (!store_ || is_saved()) return;
+  if ((!store_ && file_.empty()) || is_saved()) return;
   // A temporary file is only there to make room in memory.
   if (file_.empty() && source_->memory_use().bytes < memory_limit_bytes_ / 2) return;
   save(false);
@@ -107,8 +117,9 @@ void MapSaver::save(bool has_ended) {
   const auto began = std::chrono::steady_clock::now();
   try {
     store(has_ended);
-  } catch (...) {
-    statistics_.map_save_failed();
+  } catch (const std::exception& error) {
+    statistics_.map_save_failed(error.what());
+    source_->checkpoint_failed();
     throw;
   }
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - began;
@@ -119,9 +130,12 @@ void MapSaver::store(bool has_ended) {
   const std::uint64_t poses = latest_map_.poses_added();
   RunCheckpoint checkpoint = take(false);
   // Nothing is stored yet of another map.
-  if (checkpoint.map.view.map_id != saved_map_id_) checkpoint = take(true);
+  if (checkpoint.map.view.map_id != saved_map_id_) {
+    if (saved_map_id_ != 0) throw MapFileError(file_, "holds another map than the running one");
+    checkpoint = take(true);
+  }
   if (has_ended) checkpoint.map.metadata[map_ended_key] = "yes";
-  store_->save(checkpoint.map);
+  open_store().save(checkpoint.map);
   source_->checkpoint_stored(checkpoint.step);
   remember_as_saved(checkpoint.map.view, poses);
 }
@@ -137,46 +151,126 @@ void MapSaver::remember_metadata(const SavedMap& map) {
   stored_metadata_.erase(map_ended_key);
 }
 
-std::filesystem::path MapSaver::file_named(const std::string& name) const {
+fs::path MapSaver::file_named(const std::string& name) const {
   if (file_.empty() && name.empty()) {
     throw std::invalid_argument(
         "no map file is configured; set map.file in the server's configuration or --map-file");
   }
-  if (!is_plain_name(name)) {
-    throw std::invalid_argument("file '" + name +
-                                "' must be a plain name; it is looked for beside the configured "
-                                "map file");
+  return name.empty() ? file_ : folder_.file_named(name);
+}
+
+bool MapSaver::is_empty() const {
+  return latest_map_.view()->tiles.empty() && latest_map_.poses_stored() == 0;
+}
+
+fs::path MapSaver::save_as(const std::string& name, bool overwrite) {
+  const std::scoped_lock lock(mutex_);
+  const fs::path target = file_named(name);
+  if (is_empty()) {
+    throw std::invalid_argument("the map is empty: no scan was mapped yet; nothing is saved");
   }
-  return name.empty() ? file_ : file_.parent_path() / name;
+  if ((store_ || !file_.empty()) && !is_saved()) save(false);
+  if (target != file_) save_copy(target, overwrite);
+  return target;
 }
 
-std::filesystem::path MapSaver::save_as(const std::string& name) {
-  const std::scoped_lock lock(mutex_);
-  const std::filesystem::path target = file_named(name);
-  if (store_) save(false);
-  if (store_ && target != file_) store_->copy_to(target);
-  if (!store_) open_map_file(target)->save(take(true).map);
-  return std::filesystem::absolute(target);
+void MapSaver::save_copy(const fs::path& target, bool overwrite) {
+  const bool is_there = fs::exists(target);
+  if (is_there && !is_map_file(target)) {
+    throw std::invalid_argument(target.string() +
+                                " is there already and no map file; name another file");
+  }
+  if (is_there && !overwrite) {
+    throw std::invalid_argument(target.string() +
+                                " holds a map already; name another file, or ask for it to be "
+                                "overwritten (stillmap save --overwrite)");
+  }
+  const MapLock target_lock(target);
+  std::error_code unknown;
+  const std::uintmax_t bytes = file_.empty() ? 0 : fs::file_size(file_, unknown);
+  folder_.check_room(file_, target, unknown ? 0 : bytes);
+  if (store_ || !file_.empty()) return open_store().copy_to(target);
+  const std::unique_ptr<MapStore> scratch = open_scratch_map();
+  scratch->save(take(true).map);
+  scratch->copy_to(target);
 }
 
-std::filesystem::path MapSaver::resume_from(const std::string& name,
-                                            const ReplaceRunning& replace_running) {
+fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepare) {
   const std::scoped_lock lock(mutex_);
-  const std::filesystem::path target = file_named(name);
-  auto store = open_existing(target);
-  SavedMap map = read(*store);
+  const fs::path target = file_named(name);
+  const bool is_own = target == file_;
+  auto target_lock = is_own ? nullptr : std::make_unique<MapLock>(target);
+  auto store = is_own ? nullptr : open_existing(target);
+  MapStore& source = is_own ? open_store() : *store;
+  SavedMap map = read(source);
   if (map.view.tiles.empty()) throw MapFileError(target, no_map_yet);
-  if (target != file_ && !file_.empty() && latest_map_.poses_added() > 0) save(false);
   map.view.map_id = new_map_id();
-  replace_running(map, memory_limit_bytes_ > 0 ? store->tile_store() : nullptr);
-  store->begin_run(map.view.map_id);
-  // The datum of another map is that in its own file.
-  if (target != file_) metadata_.erase("datum");
-  file_ = target;
-  store_ = std::move(store);
+  const auto begin = prepare(map, memory_limit_bytes_ > 0 ? source.tile_store() : nullptr);
+  if (!is_own && !file_.empty() && !is_empty() && !is_saved()) save(false);
+  // The last step that can fail.
+  source.begin_run(map.view.map_id);
+  begin();
+  if (!is_own) {
+    // The datum of another map is that in its own file.
+    metadata_.erase("datum");
+    file_ = target;
+    store_ = std::move(store);
+    lock_ = std::move(target_lock);
+  }
   remember_metadata(map);
   remember_as_saved(*latest_map_.view(), latest_map_.poses_added());
-  return std::filesystem::absolute(target);
+  return target;
+}
+
+NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
+  const std::scoped_lock lock(mutex_);
+  NewMap begun{.map_id = new_map_id(), .kept_file = {}};
+  if (!file_.empty()) {
+    if (!discard && !is_empty() && !is_saved()) save(false);
+    if (open_store().holds_map()) {
+      std::error_code unknown;
+      const std::uintmax_t bytes = fs::file_size(file_, unknown);
+      if (!discard) folder_.check_room(file_, {}, unknown ? 0 : bytes);
+      begun.kept_file = folder_.unused_file_for(file_);
+      put_aside(begun.kept_file);
+    }
+  } else if (memory_limit_bytes_ > 0) {
+    store_ = open_scratch_map();
+  }
+  begin(begun.map_id, memory_limit_bytes_ > 0 ? store_->tile_store() : nullptr);
+  saved_map_id_ = 0;
+  stored_metadata_.clear();
+  if (discard && !begun.kept_file.empty()) {
+    std::error_code not_removed;
+    if (fs::remove(begun.kept_file, not_removed)) begun.kept_file.clear();
+  }
+  return begun;
+}
+
+void MapSaver::put_aside(const fs::path& kept) {
+  open_store().complete_file();
+  const fs::path fresh = file_.string() + ".empty";
+  try {
+    fs::remove(fresh);
+    static_cast<void>(open_map_file(fresh));
+    // Tiles of the old map may still be read through connections that are open: they keep its
+    // file and its log, which is empty, whatever their names are.
+    store_.reset();
+    fs::rename(file_, kept);
+  } catch (const fs::filesystem_error& error) {
+    throw MapFileError(file_, std::string("cannot be kept as ") + kept.string() + " (" +
+                                  error.what() + "); its folder must be writable");
+  }
+  try {
+    replace_map_file(fresh, file_);
+    // Its tile store, too, can be opened.
+    static_cast<void>(open_store().tile_store());
+  } catch (const MapFileError&) {
+    store_.reset();
+    std::error_code not_moved;
+    fs::rename(kept, file_, not_moved);
+    throw;
+  }
 }
 
 RunCheckpoint MapSaver::take(bool everything) const {

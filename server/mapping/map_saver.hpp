@@ -12,6 +12,8 @@
 #include <string>
 
 #include "core/map/storage/map_file.hpp"
+#include "core/map/storage/map_lock.hpp"
+#include "server/mapping/map_folder.hpp"
 #include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/publishers/latest_map.hpp"
@@ -34,26 +36,45 @@ class CheckpointSource {
   [[nodiscard]] virtual RunCheckpoint checkpoint(bool everything) = 0;
   /// Everything up to this checkpoint is stored: far tiles may be evicted.
   virtual void checkpoint_stored(std::uint64_t step) = 0;
+  /// It is not: what changed since the last one is in memory alone.
+  virtual void checkpoint_failed() = 0;
   [[nodiscard]] virtual MemoryUse memory_use() = 0;
 };
 
-/// Writes the map to its file, and with a memory limit keeps there what is not in memory.
+/// The map that a reset began.
+struct NewMap {
+  std::uint64_t map_id = 0;
+  /// Where the map until then is kept; empty when it is not.
+  std::filesystem::path kept_file;
+};
+
+/// Writes the map to its file, and with a memory limit keeps there what is not in memory. A file
+/// never gets another map's content: a map that gives way to a new one keeps a file of its own.
 /// Thread-safe; saves wait for each other.
 class MapSaver {
  public:
-  using ReplaceRunning =
-      std::function<void(const SavedMap& map, const std::shared_ptr<TileStore>& tile_store)>;
+  /// Makes a stored map ready to run; what it returns publishes it in the running one's place, and
+  /// cannot fail.
+  using PrepareMap = std::function<std::function<void()>(
+      const SavedMap& map, const std::shared_ptr<TileStore>& tile_store)>;
+  /// Publishes a new, empty map.
+  using BeginMap =
+      std::function<void(std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store)>;
 
   /// `file`, the current one to begin with, may be empty: then only named files can be saved, and
   /// tiles that do not fit into memory go to a temporary file. `metadata` goes into every file.
-  /// Throws MapFileError.
-  MapSaver(const LatestMap& latest_map, Statistics& statistics, std::filesystem::path file,
-           std::map<std::string, std::string> metadata, std::uint32_t memory_limit_mib = 0);
+  /// Throws MapFileError, also for a file that another process saves its map to.
+  MapSaver(const LatestMap& latest_map, Statistics& statistics, const std::filesystem::path& file,
+           std::map<std::string, std::string> metadata, std::uint32_t memory_limit_mib = 0,
+           const SavedMapsLimit& saved_maps_limit = {});
 
   /// What the file holds, for mapping to resume from; nothing when there is no file. With a memory
   /// limit, its tiles are non-resident. The map has a new id unless it was saved when its last run
   /// ended. Throws MapFileError.
   [[nodiscard]] std::optional<SavedMap> load();
+  /// Instead of `load`: a map that the file holds is renamed, and the file empty from now on.
+  /// Returns the map's new name; nothing where the file holds none. Throws MapFileError.
+  std::optional<std::filesystem::path> put_stored_map_aside();
   /// Backing store of tiles that are evicted from memory; null without a memory limit.
   [[nodiscard]] std::shared_ptr<TileStore> tile_store();
 
@@ -67,25 +88,36 @@ class MapSaver {
   void save_at_end();
 
   /// Saves to `name` beside the configured file, or to the current file when empty; returns where.
-  /// Throws MapFileError, or std::invalid_argument for a name that is a path.
-  std::filesystem::path save_as(const std::string& name);
+  /// Throws MapFileError, or std::invalid_argument for a name that is a path, one that another map
+  /// has already unless `overwrite`, beyond the limit of saved maps, and for a map that is empty.
+  std::filesystem::path save_as(const std::string& name, bool overwrite = false);
 
-  /// Makes `name` the current file: reads the map there, saves the running map to its own file, and
-  /// hands the other one, under a new id, to `replace_running`, which publishes it. An empty name
-  /// or that of the current file returns to the last save. Throws as save_as, also for a file that
-  /// does not exist or holds no map, and what `replace_running` throws; the current file stays the
-  /// same then.
-  std::filesystem::path resume_from(const std::string& name, const ReplaceRunning& replace_running);
+  /// Makes `name` the current file: reads and prepares the map there under a new id, saves the
+  /// running map to its own file, and lets the other one take its place. An empty name or that of
+  /// the current file returns to the last save. Throws as save_as, also for a file that does not
+  /// exist, cannot be written or holds no map, and what `prepare` throws; then the running map goes
+  /// on, and its file stays its own.
+  std::filesystem::path resume_from(const std::string& name, const PrepareMap& prepare);
+
+  /// Lets an empty map begin. The running map is saved, and kept beside the current file, which is
+  /// the new map's; with `discard`, it is gone. Throws as save_as; then the running map goes on.
+  NewMap begin_anew(bool discard, const BeginMap& begin);
 
  private:
+  /// Opens it again where that failed before.
+  [[nodiscard]] MapStore& open_store();
   [[nodiscard]] SavedMap read(MapStore& store) const;
   [[nodiscard]] bool is_saved() const;
   /// Counts the save and times it.
   void save(bool has_ended);
   void store(bool has_ended);
   [[nodiscard]] RunCheckpoint take(bool everything) const;
-  /// Throws std::invalid_argument.
+  /// The current file when empty. Throws std::invalid_argument.
   [[nodiscard]] std::filesystem::path file_named(const std::string& name) const;
+  void save_copy(const std::filesystem::path& target, bool overwrite);
+  [[nodiscard]] bool is_empty() const;
+  /// Renames the current file, and puts an empty one in its place.
+  void put_aside(const std::filesystem::path& kept);
   void remember_as_saved(const MapSnapshot& view, std::uint64_t poses);
   /// Of the current file; what `metadata_` does not say stays as it is.
   void remember_metadata(const SavedMap& map);
@@ -93,6 +125,8 @@ class MapSaver {
   const LatestMap& latest_map_;
   Statistics& statistics_;
   std::filesystem::path file_;
+  MapFolder folder_;
+  std::unique_ptr<MapLock> lock_;
   std::map<std::string, std::string> metadata_;
   std::map<std::string, std::string> stored_metadata_;
   std::size_t memory_limit_bytes_;

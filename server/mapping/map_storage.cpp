@@ -22,7 +22,13 @@ std::size_t tile_cache_bytes(const MapFileConfig& config) {
 }
 
 std::optional<SavedMap> saved_map(MapSaver& saver, const ServerConfig& config) {
-  if (!config.map.load_at_start) return std::nullopt;
+  if (!config.map.load_at_start) {
+    if (const auto kept = saver.put_stored_map_aside()) {
+      spdlog::info("the map in {} is kept as {} (map.load_at_start is false)",
+                   config.map.file.string(), kept->string());
+    }
+    return std::nullopt;
+  }
   auto stored = saver.load();
   if (stored && !stored->view.tiles.empty()) {
     check_sizes(stored->view, config.mapper.static_map);
@@ -37,8 +43,10 @@ std::optional<SavedMap> saved_map(MapSaver& saver, const ServerConfig& config) {
 MapStorage::MapStorage(const ServerConfig& config, const std::string& label_source,
                        Statistics& statistics)
     : saver_(latest_map_, statistics, config.map.file, file_metadata(config, label_source),
-             config.map.memory_limit_mib),
-      tiles_(saver_.tile_store(), tile_cache_bytes(config.map)),
-      loaded_(saved_map(saver_, config)) {}
+             config.map.memory_limit_mib,
+             {.max_maps = config.map.saved_maps,
+              .max_bytes = std::uintmax_t{config.map.saved_maps_mib} << 20}),
+      loaded_(saved_map(saver_, config)),
+      tiles_(saver_.tile_store(), tile_cache_bytes(config.map)) {}
 
 }  // namespace stillmap::server

@@ -15,7 +15,8 @@ namespace stillmap::server {
 /// so that a server whose map file is unusable ends before anybody sees it.
 class MapStorage {
  public:
-  /// Opens the map file, and loads it where the configuration says so. `label_source` goes into the
+  /// Opens the map file, and loads it where the configuration says so; otherwise a map that is in
+  /// it is kept under another name. `label_source` goes into the
   /// file. Throws MapFileError, or std::invalid_argument for a map that does not fit the
   /// configuration.
   MapStorage(const ServerConfig& config, const std::string& label_source, Statistics& statistics);
@@ -34,8 +35,9 @@ class MapStorage {
  private:
   LatestMap latest_map_;
   MapSaver saver_;
-  TileReader tiles_;
   std::optional<SavedMap> loaded_;
+  // Of the file as it is once the map was loaded or put aside.
+  TileReader tiles_;
 };
 
 }  // namespace stillmap::server

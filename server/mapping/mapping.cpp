@@ -41,9 +41,17 @@ void Mapping::stop() {
   storage_.saver().save_at_end();
 }
 
-void Mapping::load(const SavedMap& map, const std::shared_ptr<TileStore>& tile_store) {
-  thread_->load(map, tile_store);
+void Mapping::reset(std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store) {
+  thread_->reset(map_id, tile_store);
   storage_.tiles().use_tile_store(tile_store);
+}
+
+std::function<void()> Mapping::prepare(const SavedMap& map,
+                                       const std::shared_ptr<TileStore>& tile_store) {
+  return [this, tile_store, replace = thread_->prepare(map, tile_store)] {
+    replace();
+    storage_.tiles().use_tile_store(tile_store);
+  };
 }
 
 }  // namespace stillmap::server

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -47,7 +48,6 @@ class Mapping {
   [[nodiscard]] ScanQueue& scans() { return scans_; }
 
   /// As in MappingThread.
-  [[nodiscard]] std::uint64_t reset() { return thread_->reset(); }
   void publish_now() { thread_->publish_now(); }
   [[nodiscard]] std::vector<RemovedVoxel> removed(const Eigen::AlignedBox3d& box_map) {
     return thread_->removed(box_map);
@@ -56,8 +56,11 @@ class Mapping {
     return thread_->restore_removed(reason, box_map);
   }
 
-  /// As MappingThread::load, for MapSaver::resume_from.
-  void load(const SavedMap& map, const std::shared_ptr<TileStore>& tile_store);
+  /// As MappingThread::reset, for MapSaver::begin_anew.
+  void reset(std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store);
+  /// As MappingThread::prepare, for MapSaver::resume_from.
+  [[nodiscard]] std::function<void()> prepare(const SavedMap& map,
+                                              const std::shared_ptr<TileStore>& tile_store);
 
  private:
   std::string label_source_;

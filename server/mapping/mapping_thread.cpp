@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "core/frames/rigid_motion.hpp"
+#include "core/map/map_id.hpp"
 #include "server/mapping/async_segmenter.hpp"
 #include "server/mapping/milliseconds.hpp"
 
@@ -31,12 +32,14 @@ std::size_t map_share_bytes(const MapFileConfig& config) {
   return (std::size_t{config.memory_limit_mib} << 20) / 4 * 3;
 }
 
-// Expected pose of the first scan in a map that was loaded: the stored pose of its time, when a
-// recording is played again, else the last one. Nothing without a stored path.
+// Expected pose of the first scan in a map that was loaded: the stored pose of its very stamp, when
+// a recording is played again, else the last one, where the robot was switched off: a stamp that
+// merely lies within the stored path's times may be that of a clock not set yet. Nothing without a
+// stored path.
 std::optional<Eigen::Isometry3d> pose_in_saved_map(const Trajectory& stored,
                                                    std::int64_t stamp_ns) {
   if (stored.empty()) return std::nullopt;
-  const auto then = std::ranges::lower_bound(stored, stamp_ns, {}, &StampedPose::stamp_ns);
+  const auto then = std::ranges::find(stored, stamp_ns, &StampedPose::stamp_ns);
   return then == stored.end() ? stored.back().T_map_lidar : then->T_map_lidar;
 }
 
@@ -48,6 +51,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
                              Statistics& statistics, LatestMap& latest_map,
                              const MappingOutputs& outputs)
     : map_limit_bytes_(map_share_bytes(config.map)),
+      map_config_(config.mapper.static_map),
       sensor_period_s_(config.mapper.sensor.period_s),
       publish_period_(config.publish.tiles_period_s),
       queue_(queue),
@@ -67,7 +71,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
   const bool is_odom_own = config.frames.odom_source == FramesConfig::OdomSource::own;
   if (!odom_frame_.empty() && is_odom_own) odom_.emplace();
   if (stored && !stored->view.tiles.empty()) {
-    resume(*stored, tile_store);
+    resume(resumed(*stored, tile_store), stored->trajectory);
   } else {
     mapper_.static_map().use_tile_store(tile_store);
     mapper_.reset(new_map_id());
@@ -85,36 +89,51 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
                     .on_failure = [this] { run_requests_elsewhere(); }});
 }
 
-std::uint64_t MappingThread::reset() {
-  const std::uint64_t map_id = new_map_id();
-  run_between_scans([this, map_id] {
+void MappingThread::reset(std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store) {
+  run_between_scans([&] {
+    mapper_.static_map().use_tile_store(tile_store);
     mapper_.reset(map_id);
     begin_map({});
     spdlog::info("reset: map {} begins", map_id);
   });
-  return map_id;
 }
 
-void MappingThread::load(const SavedMap& stored, const std::shared_ptr<TileStore>& tile_store) {
-  run_between_scans([&] {
-    resume(stored, tile_store);
-    spdlog::info("loaded: resuming with {} tiles as map {}", stored.view.tiles.size(),
-                 stored.view.map_id);
-  });
+std::function<void()> MappingThread::prepare(const SavedMap& stored,
+                                             const std::shared_ptr<TileStore>& tile_store) {
+  struct Prepared {
+    StaticMap map;
+    Trajectory path;
+  };
+  auto prepared = std::make_shared<Prepared>(resumed(stored, tile_store), stored.trajectory);
+  return [this, prepared = std::move(prepared)] {
+    run_between_scans([&] {
+      resume(std::move(prepared->map), std::move(prepared->path));
+      const auto view = latest_map_.view();
+      spdlog::info("loaded: resuming with {} tiles as map {}", view->tiles.size(), view->map_id);
+    });
+  };
 }
 
-void MappingThread::resume(const SavedMap& stored, const std::shared_ptr<TileStore>& tile_store) {
-  // First: it throws for a map that does not fit.
-  mapper_.resume(stored.view, stored.tile_evidence);
+StaticMap MappingThread::resumed(const SavedMap& stored,
+                                 const std::shared_ptr<TileStore>& tile_store) const {
+  StaticMap map(map_config_);
+  map.resume(stored.view, stored.tile_evidence);
+  map.use_tile_store(tile_store);
   const Trajectory& path = stored.trajectory;
   const Eigen::Vector3d last_map =
       path.empty() ? Eigen::Vector3d(0.0, 0.0, 0.0) : path.back().T_map_lidar.translation();
-  mapper_.static_map().use_tile_store(tile_store);
-  mapper_.static_map().reload_near(last_map, map_limit_bytes_);
-  begin_map(path);
+  map.reload_near(last_map, map_limit_bytes_);
+  return map;
+}
+
+void MappingThread::resume(StaticMap prepared, Trajectory path) {
+  mapper_.resume(std::move(prepared));
+  begin_map(std::move(path));
 }
 
 void MappingThread::begin_map(Trajectory trajectory) {
+  mapper_.static_map().set_frozen(false);
+  is_map_frozen_ = false;
   latest_map_.begin(mapper_.map_snapshot(), std::move(trajectory));
   if (odom_) odom_->begin_map();
   if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
@@ -153,14 +172,34 @@ RunCheckpoint MappingThread::checkpoint(bool everything) {
 
 void MappingThread::checkpoint_stored(std::uint64_t step) {
   run_between_scans([&] {
-    StaticMap& map = mapper_.static_map();
-    map.checkpoint_stored(step);
-    map.evict(latest_map_.newest_pose().T_map_lidar.translation(), map_limit_bytes_);
-    for (const std::string& fault : map.unreadable_tiles()) {
-      throttled_log_.warn("tiles_unreadable", "not mapped there: " + fault);
-    }
-    statistics_.set_map_memory(map.memory_use(), map.unreadable_tiles().size());
+    mapper_.static_map().checkpoint_stored(step);
+    bound_memory();
+    if (!is_map_frozen_) return;
+    mapper_.static_map().set_frozen(false);
+    is_map_frozen_ = false;
+    spdlog::info("the map was saved: scans enter it again");
   });
+}
+
+void MappingThread::checkpoint_failed() {
+  run_between_scans([&] {
+    bound_memory();
+    const bool is_full = mapper_.static_map().memory_use().bytes > map_limit_bytes_;
+    if (!is_full || is_map_frozen_) return;
+    mapper_.static_map().set_frozen(true);
+    is_map_frozen_ = true;
+    spdlog::error(
+        "the map fills its memory and cannot be saved: scans give poses, but do not enter it");
+  });
+}
+
+void MappingThread::bound_memory() {
+  StaticMap& map = mapper_.static_map();
+  map.evict(latest_map_.newest_pose().T_map_lidar.translation(), map_limit_bytes_);
+  for (const std::string& fault : map.unreadable_tiles()) {
+    throttled_log_.warn("tiles_unreadable", "not mapped there: " + fault);
+  }
+  statistics_.set_map_memory(map.memory_use(), map.unreadable_tiles().size());
 }
 
 MemoryUse MappingThread::memory_use() {
@@ -215,6 +254,7 @@ void MappingThread::map(QueuedScan queued) {
   latest_map_.add_pose({stamp_ns, T_map_base(mapped->odometry)}, mapped->odometry.health,
                        unlabelled ? "none" : mapper_.label_source());
   statistics_.scan_mapped(mapped->label_provenance);
+  if (is_map_frozen_) statistics_.count("scans_not_in_map");
   statistics_.add_latency("total", milliseconds(Clock::now() - queued.received));
   forward(*std::move(mapped));
   statistics_.record_other_stages(milliseconds(Clock::now() - began) - labels_ms_);

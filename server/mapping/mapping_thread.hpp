@@ -54,18 +54,23 @@ class MappingThread : public CheckpointSource {
   /// Ends after the scan in work. Later calls of the other functions run in the caller's thread.
   void stop();
 
-  /// Drops poses and map; returns the id of the new map.
-  [[nodiscard]] std::uint64_t reset();
-  /// Resumes this map: the next scan is expected where its path ended. Its non-resident tiles are
-  /// reloaded from `tile_store`. Throws std::invalid_argument when its voxels or tiles are not of
-  /// the configured size; then nothing changed.
-  void load(const SavedMap& stored, const std::shared_ptr<TileStore>& tile_store);
+  /// Drops poses and map, and begins this one. Tiles that are evicted go to `tile_store`.
+  void reset(std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store);
+  /// Makes this map ready in the caller's thread, while the running one goes on. What is returned
+  /// puts it in the running one's place and cannot fail: the next scan is expected where its path
+  /// ended, its non-resident tiles are reloaded from `tile_store`. Throws std::invalid_argument
+  /// when its voxels or tiles are not of the configured size.
+  [[nodiscard]] std::function<void()> prepare(const SavedMap& stored,
+                                              const std::shared_ptr<TileStore>& tile_store);
   /// Publishes what was mapped so far, the scan in work included.
   void publish_now();
 
   /// It is also published as the latest map.
   [[nodiscard]] RunCheckpoint checkpoint(bool everything) override;
   void checkpoint_stored(std::uint64_t step) override;
+  /// A map that fills its memory and cannot be saved is frozen until it can: its tiles are nowhere
+  /// else.
+  void checkpoint_failed() override;
   [[nodiscard]] MemoryUse memory_use() override;
 
   /// As in StaticMap.
@@ -86,8 +91,13 @@ class MappingThread : public CheckpointSource {
   void stage_ended(std::string_view stage);
   /// Publishes the pose before the scan is inserted into the map, to keep the latency of poses low.
   void pose_found(std::int64_t stamp_ns, const OdometryResult& odometry);
+  /// The stored map, its tiles round the end of its path in memory.
+  [[nodiscard]] StaticMap resumed(const SavedMap& stored,
+                                  const std::shared_ptr<TileStore>& tile_store) const;
   /// To be called in the thread that maps.
-  void resume(const SavedMap& stored, const std::shared_ptr<TileStore>& tile_store);
+  void resume(StaticMap prepared, Trajectory path);
+  /// Makes room, freezes the map or lets it grow again, and reports what it takes.
+  void bound_memory();
   /// False where it is not known: then the scan is dropped.
   [[nodiscard]] bool locate_lidar(const QueuedScan& queued);
   /// Expected pose of the lidar; nothing where the mapper is to predict it from its own poses.
@@ -111,6 +121,8 @@ class MappingThread : public CheckpointSource {
 
   /// Limit of the memory that the static map takes.
   std::size_t map_limit_bytes_;
+  StaticMapConfig map_config_;
+  bool is_map_frozen_ = false;
   double sensor_period_s_;
   std::chrono::duration<double> publish_period_;
   ScanQueue& queue_;

@@ -87,6 +87,8 @@ Metrics::Metrics()
                         {})),
       checkpoint_failures(
           counter(registry_, "stillmap_checkpoint_failures_total", "Saves of the map that failed")),
+      checkpoints_failing(gauge(registry_, "stillmap_checkpoints_failing",
+                                "Saves of the map that failed since the last one that did not")),
       last_checkpoint(gauge(registry_, "stillmap_checkpoint_last_success_timestamp_seconds",
                             "Unix time of the last save; 0 before the first")),
       info_(gauges(registry_, "stillmap_info", "1; what runs")),

@@ -55,6 +55,8 @@ class Metrics {
   Histograms& service_durations;
   prometheus::Histogram& checkpoint_durations;
   prometheus::Counter& checkpoint_failures;
+  /// Since the last success.
+  prometheus::Gauge& checkpoints_failing;
   /// Seconds of Unix time.
   prometheus::Gauge& last_checkpoint;
 

@@ -94,12 +94,20 @@ void Statistics::record_other_stages(double milliseconds) {
 }
 
 void Statistics::map_saved(double seconds) {
+  const std::scoped_lock lock(mutex_);
+  last_save_failure_.clear();
+  metrics_->checkpoints_failing.Set(0.0);
   metrics_->checkpoint_durations.Observe(seconds);
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   metrics_->last_checkpoint.Set(std::chrono::duration<double>(now).count());
 }
 
-void Statistics::map_save_failed() { metrics_->checkpoint_failures.Increment(); }
+void Statistics::map_save_failed(const std::string& why) {
+  const std::scoped_lock lock(mutex_);
+  last_save_failure_ = why;
+  metrics_->checkpoint_failures.Increment();
+  metrics_->checkpoints_failing.Increment();
+}
 
 void Statistics::set_map_memory(const MemoryUse& memory, std::size_t unreadable_tiles) {
   metrics_->map_memory_bytes.Set(static_cast<double>(memory.bytes));
@@ -122,6 +130,10 @@ std::vector<dds::NamedCounter> Statistics::counters() const {
   }
   if (const double tiles = metrics.map_tiles_unreadable.Value(); tiles > 0.0) {
     add("map_tiles_unreadable", tiles);
+  }
+  if (const double failures = metrics.checkpoint_failures.Value(); failures > 0.0) {
+    add("checkpoint_failures", failures);
+    add(dds::checkpoints_failing_counter, metrics.checkpoints_failing.Value());
   }
   if (const double failures = metrics.label_failures.Value(); failures > 0.0) {
     add("label_failures", failures);
@@ -164,6 +176,11 @@ double Statistics::other_stages_ms() const {
 std::string Statistics::last_drop() const {
   const std::scoped_lock lock(mutex_);
   return last_drop_;
+}
+
+std::string Statistics::last_save_failure() const {
+  const std::scoped_lock lock(mutex_);
+  return last_save_failure_;
 }
 
 std::string Statistics::last_segmentation_failure() const {

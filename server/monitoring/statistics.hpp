@@ -49,7 +49,8 @@ class Statistics {
   /// Everything that was done with a scan, without its segmentation, took so long.
   void record_other_stages(double milliseconds);
   void map_saved(double seconds);
-  void map_save_failed();
+  /// `why` is told in the status until a save succeeds.
+  void map_save_failed(const std::string& why);
 
   /// What the static map takes now, and how many of its tiles cannot be read.
   void set_map_memory(const MemoryUse& memory, std::size_t unreadable_tiles);
@@ -66,6 +67,8 @@ class Statistics {
   [[nodiscard]] std::chrono::steady_clock::time_point started() const { return started_; }
   /// Why the last scan was dropped; empty once a later one was mapped.
   [[nodiscard]] std::string last_drop() const;
+  /// Why the last save of the map failed; empty once a later one succeeded.
+  [[nodiscard]] std::string last_save_failure() const;
   /// Why the last segmentation failed; empty once a later one worked.
   [[nodiscard]] std::string last_segmentation_failure() const;
 
@@ -96,6 +99,7 @@ class Statistics {
   RecentMedian other_stages_ms_{9};
   dds::SegmentationStatus segmentation_;
   std::string last_segmentation_failure_;
+  std::string last_save_failure_;
 };
 
 }  // namespace stillmap::server

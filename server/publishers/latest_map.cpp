@@ -2,15 +2,9 @@
 
 #include <algorithm>
 #include <chrono>
-#include <functional>
 #include <utility>
 
 namespace stillmap::server {
-
-// The wall clock sees to it that it differs.
-std::uint64_t new_map_id() {
-  return static_cast<std::uint64_t>(std::chrono::system_clock::now().time_since_epoch().count());
-}
 
 void LatestMap::begin(std::shared_ptr<const MapSnapshot> view, Trajectory trajectory) {
   auto history = std::make_shared<const TileHistory>(history_from(*view));
@@ -19,6 +13,7 @@ void LatestMap::begin(std::shared_ptr<const MapSnapshot> view, Trajectory trajec
   published_at_ = std::chrono::steady_clock::now();
   changed_.notify_all();
   trajectory_ = std::move(trajectory);
+  session_begin_ = trajectory_.size();
   health_ = OdometryHealth::initialised;
 }
 
@@ -42,10 +37,9 @@ void LatestMap::add_pose(const StampedPose& pose, OdometryHealth health,
   label_source_ = label_source;
   // A pose that nothing confirmed is no part of the path, nor of its file.
   if (health == OdometryHealth::lost) return;
-  const auto is_later = [&](const StampedPose& known) { return known.stamp_ns >= pose.stamp_ns; };
-  const auto later =
-      std::ranges::find_if(trajectory_.rbegin(), trajectory_.rend(), std::not_fn(is_later));
-  trajectory_.erase(later.base(), trajectory_.end());
+  while (trajectory_.size() > session_begin_ && trajectory_.back().stamp_ns >= pose.stamp_ns) {
+    trajectory_.pop_back();
+  }
   trajectory_.push_back(pose);
 }
 
@@ -89,6 +83,11 @@ Trajectory LatestMap::trajectory(std::size_t max_poses) const {
   for (std::size_t i = 0; i < last; i += stride) chosen.push_back(trajectory_[i]);
   chosen.push_back(trajectory_.back());
   return chosen;
+}
+
+std::size_t LatestMap::poses_stored() const {
+  const std::scoped_lock lock(mutex_);
+  return trajectory_.size();
 }
 
 std::uint64_t LatestMap::poses_added() const {

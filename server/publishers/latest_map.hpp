@@ -15,18 +15,16 @@
 
 namespace stillmap::server {
 
-/// An id that no map of an earlier run has.
-[[nodiscard]] std::uint64_t new_map_id();
-
 /// What the mapping thread publishes to all other threads: immutable views, so that readers and the
 /// mapper do not wait for each other. Thread-safe.
 class LatestMap {
  public:
-  /// A new map begins: its first view, and the poses that led to it.
+  /// A new map begins: its first view, and the poses that led to it. Those stay: the poses of this
+  /// run follow them as a session of their own, whatever their stamps.
   void begin(std::shared_ptr<const MapSnapshot> view, Trajectory trajectory);
   void publish(std::shared_ptr<const MapSnapshot> view);
-  /// Removes poses with the same or later stamps first: a recording that is played again replaces
-  /// its old path. A lost pose changes health and label source alone.
+  /// Removes poses of this session with the same or later stamps first: a clock that was set back
+  /// replaces what it said. A lost pose changes health and label source alone.
   void add_pose(const StampedPose& pose, OdometryHealth health, const std::string& label_source);
 
   /// Never null once `begin` was called.
@@ -48,6 +46,8 @@ class LatestMap {
   [[nodiscard]] Trajectory trajectory(std::size_t max_poses) const;
   /// The newest pose that was not lost; the origin before the first.
   [[nodiscard]] StampedPose newest_pose() const;
+  /// Poses of the path.
+  [[nodiscard]] std::size_t poses_stored() const;
   /// Poses added so far, over all maps: changes with every scan.
   [[nodiscard]] std::uint64_t poses_added() const;
   [[nodiscard]] OdometryHealth health() const;
@@ -59,6 +59,8 @@ class LatestMap {
   MapState state_;
   std::chrono::steady_clock::time_point published_at_;
   Trajectory trajectory_;
+  /// Where the poses of this session begin in it.
+  std::size_t session_begin_ = 0;
   std::uint64_t poses_added_ = 0;
   OdometryHealth health_ = OdometryHealth::initialised;
   std::string label_source_;

@@ -136,6 +136,9 @@ dds::ServerStatus ServerReport::status() const {
 }
 
 std::string ServerReport::reason(const dds::ServerStatus& status) const {
+  if (const std::string failure = statistics_.last_save_failure(); !failure.empty()) {
+    return "the map cannot be saved, what is mapped is in memory alone: " + failure;
+  }
   if (const std::string why = no_input_reason_(); !why.empty()) return why;
   if (const std::string drop = statistics_.last_drop(); !drop.empty()) {
     return "the last scan was dropped: " + drop;

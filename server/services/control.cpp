@@ -17,14 +17,14 @@ SaveMap_Response save_map(const ServiceContext& context, const SaveMap_Request& 
   return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
     context.publish_now();
     response.status(reply_status(*context.latest_map.view()));
-    response.file(context.saver.save_as(request.file()).string());
+    response.file(context.saver.save_as(request.file(), request.overwrite()).string());
   });
 }
 
 LoadMap_Response load_map(const ServiceContext& context, const LoadMap_Request& request) {
   using Response = LoadMap_Response;
   return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
-    const auto file = context.saver.resume_from(request.file(), context.load);
+    const auto file = context.saver.resume_from(request.file(), context.prepare_map);
     const auto view = context.latest_map.view();
     response.status(reply_status(*view));
     response.file(file.string());
@@ -36,8 +36,9 @@ LoadMap_Response load_map(const ServiceContext& context, const LoadMap_Request& 
 Reset_Response reset(const ServiceContext& context, const Reset_Request& request) {
   using Response = Reset_Response;
   return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
-    const std::uint64_t map_id = context.reset();
-    response.status(wire::to_reply_status(wire::ReplyCode::ok, {}, 0, map_id));
+    const NewMap begun = context.saver.begin_anew(request.discard(), context.begin_map);
+    response.status(wire::to_reply_status(wire::ReplyCode::ok, {}, 0, begun.map_id));
+    response.kept_file(begun.kept_file.string());
   });
 }
 

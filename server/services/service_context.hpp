@@ -28,11 +28,9 @@ struct ServiceContext {
   TileReader& tiles;
   MapSaver& saver;
   std::function<dds::ServerStatus()> status;
-  /// Returns the new map's id.
-  std::function<std::uint64_t()> reset;
-  /// Resumes this map, whose non-resident tiles are in the store. Throws std::invalid_argument when
-  /// it does not fit the configuration; then nothing changed.
-  std::function<void(const SavedMap&, const std::shared_ptr<TileStore>&)> load;
+  /// For the saver: how a new map, or one that was saved, takes the running one's place.
+  MapSaver::BeginMap begin_map;
+  MapSaver::PrepareMap prepare_map;
   /// Publishes what was mapped until now.
   std::function<void()> publish_now;
   /// What is kept out of the static map.

@@ -1,3 +1,10 @@
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <set>
+
 #include "tests/clients/command_test.hpp"
 
 namespace stillmap::test {
@@ -85,6 +92,77 @@ TEST_F(MapCommandTest, DoesNotWriteOverAMapUnlessForced) {
   EXPECT_EQ(content("out/map.stillmap"), before);
   ASSERT_EQ(map_city("--scans 2 --force").exit_code, 0);
   EXPECT_EQ(line_count("out/poses_lidar.txt"), 2U);
+}
+
+TEST_F(MapCommandTest, WhatIsRefusedLeavesTheOldMap) {
+  simulate("city", 3);
+  ASSERT_EQ(map_city().exit_code, 0);
+  const std::string before = content("out/map.stillmap");
+  for (const char* wrong :
+       {"--labels nosuchmodel", "--start 9", "--sensor vlp_17", "--config no.yaml", "--resume"}) {
+    EXPECT_EQ(map_city(std::string(wrong) + " --force").exit_code, 2) << wrong;
+    EXPECT_EQ(content("out/map.stillmap"), before) << wrong;
+  }
+  truncate("city/labels/000001.label", 10);
+  EXPECT_EQ(map_city("--force --strict").exit_code, 2);
+  EXPECT_EQ(content("out/map.stillmap"), before);
+}
+
+TEST_F(MapCommandTest, ASignalLeavesTheOldMapAndTheRunCanBeResumed) {
+  simulate("city", 3);
+  ASSERT_EQ(map_city().exit_code, 0);
+  const std::string before = content("out/map.stillmap");
+  simulate("street", 120);
+  const std::string map = "map " + path("street") + " --out " + path("out") + " --labels none";
+  const char* how = " --force --save-period 0.01";
+  for (const int signal : {SIGKILL, SIGINT, SIGHUP}) {
+    BackgroundProcess running(stillmap_program() + " " + map + how, folder_ / "log");
+    while (!exists("out/unfinished/run.stillmap")) usleep(1000);
+    usleep(600'000);
+    running.send(signal);
+    ASSERT_EQ(running.wait(), signal == SIGKILL ? -1 : 1) << content("log");
+    EXPECT_EQ(content("out/map.stillmap"), before) << signal;
+    how = " --resume --save-period 0.01";
+  }
+  EXPECT_EQ(run(map).exit_code, 2) << "an unfinished run is not thrown away unasked";
+  const ProcessResult resumed = run(map + " --resume --json");
+  ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
+  const nlohmann::json report = nlohmann::json::parse(resumed.out);
+  EXPECT_GT(report.at("resumed_at_scan"), 0);
+  EXPECT_EQ(report.at("scans"), 120);
+  EXPECT_LT(report.at("accuracy").at("ate_rmse_m"), 0.5);
+  EXPECT_EQ(line_count("out/poses_lidar.txt"), 120U);
+  EXPECT_FALSE(exists("out/unfinished"));
+}
+
+TEST_F(MapCommandTest, EveryMapHasAnIdOfItsOwn) {
+  simulate("city", 2);
+  std::set<std::uint64_t> ids;
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_EQ(map_city("--force").exit_code, 0);
+    const ProcessResult info = run("map-info --json " + path("out/map.stillmap"));
+    ids.insert(nlohmann::json::parse(info.out).at("map_id").get<std::uint64_t>());
+  }
+  EXPECT_EQ(ids.size(), 2U);
+  EXPECT_FALSE(ids.contains(0));
+}
+
+TEST_F(MapCommandTest, OutputThatCannotBeWrittenIsAFailure) {
+  simulate("city", 2);
+  ASSERT_EQ(map_city().exit_code, 0);
+  const std::string out_map = path("out/map.stillmap");
+  for (const std::string& arguments :
+       {std::string("--help"), std::string("--version"), "map-info " + out_map,
+        "map-info --json " + out_map, "map-check " + out_map, std::string("model --help"),
+        "map " + path("city") + " --force --out " + path("out")}) {
+    const std::string command =
+        stillmap_program() + " " + arguments + " > /dev/full 2> " + path("err");
+    const int status = std::system(command.c_str());
+    EXPECT_EQ(WEXITSTATUS(status), 1) << arguments;
+    EXPECT_THAT(content("err"), HasSubstr("stdout")) << arguments;
+  }
+  const std::string server = stillmap_server_program() + " --version > /dev/full 2> /dev/null";
+  EXPECT_EQ(WEXITSTATUS(std::system(server.c_str())), 1);
 }
 
 TEST_F(MapCommandTest, NamesADamagedFileAndGoesOn) {

@@ -1,6 +1,7 @@
 // Operation of the real programs: metrics, health, logs, signals.
 #include <arpa/inet.h>
 #include <netinet/in.h>
+#include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/un.h>
 
@@ -210,6 +211,43 @@ TEST_F(OperationTest, HealthSaysWhetherTheServerAnswersAndMaps) {
   EXPECT_EQ(idle.exit_code, 1);
   EXPECT_THAT(idle.out, HasSubstr("unhealthy: no scans arrive"));
   EXPECT_EQ(server.stop(), 0);
+}
+
+TEST_F(OperationTest, ADiskWithoutRoomIsUnhealthyUntilThereIsSome) {
+  simulate("city", 20);
+  write("server.yaml", "sensor: vlp_16\nmap: {save_period_s: 0.2}\n");
+  BackgroundProcess server(server_command("--delivery every --config " + path("server.yaml")),
+                           folder_ / "server.log");
+  ASSERT_TRUE(answers());
+  std::istringstream lock(content("server.stillmap.lock"));
+  std::string host;
+  pid_t pid = 0;
+  ASSERT_TRUE(lock >> host >> pid);
+  const auto limit_files_to = [&](rlim_t bytes) {
+    const rlimit limit{.rlim_cur = bytes, .rlim_max = RLIM_INFINITY};
+    ASSERT_EQ(prlimit(pid, RLIMIT_FSIZE, &limit, nullptr), 0);
+  };
+  const auto becomes = [&](int exit_code) {
+    ProcessResult health;
+    for (int tries = 0; tries < 60; ++tries) {
+      health = run("health --timeout 30" + on_domain());
+      if (health.exit_code == exit_code) return health.out;
+    }
+    ADD_FAILURE() << health.out;
+    return health.out;
+  };
+  becomes(0);
+  limit_files_to(60'000);
+  ASSERT_EQ(run("replay " + path("city") + " --lossless" + on_domain()).exit_code, 0);
+  EXPECT_THAT(becomes(1),
+              AllOf(HasSubstr("checkpoints in a row failed"), HasSubstr(path("server.stillmap"))));
+  const nlohmann::json status = nlohmann::json::parse(run("status --json" + on_domain()).out);
+  EXPECT_GT(status.at("counters").at("checkpoints_failing"), 0);
+  EXPECT_THAT(status.at("reason"), HasSubstr("cannot be saved"));
+  limit_files_to(RLIM_INFINITY);
+  becomes(0);
+  EXPECT_EQ(server.stop(), 0);
+  EXPECT_EQ(run("map-check " + path("server.stillmap")).exit_code, 0);
 }
 
 TEST_F(OperationTest, ChecksAConfigurationWithoutStarting) {

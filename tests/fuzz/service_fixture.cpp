@@ -35,16 +35,19 @@ ServiceFixture::ServiceFixture()
           .tiles = tiles_,
           .saver = saver_,
           .status = [] { return dds::ServerStatus{}; },
-          .reset =
-              [this] {
-                map_.reset(78);
+          .begin_map =
+              [this](std::uint64_t map_id, const auto&) {
+                map_.reset(map_id);
                 latest_map_.begin(map_.view(), {});
-                return std::uint64_t{78};
               },
-          .load =
+          .prepare_map =
               [this](const SavedMap& map, const auto&) {
-                map_.resume(map.view, map.tile_evidence);
-                latest_map_.begin(map_.view(), map.trajectory);
+                StaticMap resumed(street_config());
+                resumed.resume(map.view, map.tile_evidence);
+                return [this, map] {
+                  map_.resume(map.view, map.tile_evidence);
+                  latest_map_.begin(map_.view(), map.trajectory);
+                };
               },
           .publish_now = [this] { latest_map_.publish(map_.view()); },
           .removed = [this](const auto& box_map) { return map_.removed(box_map); },

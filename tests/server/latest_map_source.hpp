@@ -12,6 +12,7 @@ class LatestMapSource : public server::CheckpointSource {
     return {{*latest_map_.view(), {}, latest_map_.trajectory(), {}}, 0};
   }
   void checkpoint_stored(std::uint64_t /*step*/) override {}
+  void checkpoint_failed() override {}
   [[nodiscard]] MemoryUse memory_use() override { return {}; }
 
  private:

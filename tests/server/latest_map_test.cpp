@@ -29,14 +29,18 @@ TEST(LatestMap, CollectsThePath) {
   EXPECT_EQ(latest_map.label_source(), "stream");
 }
 
-TEST(LatestMap, LetsAReplayReplaceItsOldPath) {
+TEST(LatestMap, KeepsThePathOfEarlierRunsWhateverTheClockSays) {
   LatestMap latest_map;
   latest_map.begin(std::make_shared<const MapSnapshot>(),
-                   {{.stamp_ns = 1}, {.stamp_ns = 2}, {.stamp_ns = 3}});
+                   {{.stamp_ns = 10}, {.stamp_ns = 20}, {.stamp_ns = 30}});
   add(latest_map, 2);
-  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{1, 2}));
+  add(latest_map, 4);
+  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{10, 20, 30, 2, 4}));
+  // A clock that is set back replaces what it said in this run.
+  add(latest_map, 3);
+  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{10, 20, 30, 2, 3}));
   add(latest_map, 1);
-  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{1}));
+  EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{10, 20, 30, 1}));
 }
 
 TEST(LatestMap, KeepsLostPosesOutOfThePath) {

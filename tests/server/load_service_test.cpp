@@ -31,7 +31,7 @@ class LoadService : public testing::Test {
   /// Why the server does not load `name`; it must go on as if nothing had been asked.
   std::string refusal(const std::string& name) {
     // A save shows what was mapped until now: then nothing changes by itself.
-    client_.save_map("shown.stillmap");
+    client_.save_map("shown.stillmap", true);
     const dds::ServerStatus before = client_.status();
     std::string why;
     try {
@@ -92,6 +92,33 @@ TEST_F(LoadService, GoesOnWhereTheLoadedPathEnded) {
     EXPECT_LT((pose.translation() - expected).norm(), 0.3) << i;
   }
   EXPECT_EQ(open_map_file(setup_.map_file())->load().trajectory.size(), 16U);
+}
+
+TEST_F(LoadService, AMapThatAResetKeptCanBeLoadedAgain) {
+  map_scans(0, 8);
+  const BegunMap begun = client_.reset();
+  ASSERT_FALSE(begun.kept_file.empty());
+  EXPECT_EQ(client_.status().map_id, begun.map_id);
+  EXPECT_EQ(open_map_file(begun.kept_file)->load().trajectory.size(), 8U);
+  map_scans(20, 24);
+  const LoadedMap loaded = client_.load_map(fs::path(begun.kept_file).filename().string());
+  EXPECT_EQ(loaded.pose_count, 8U);
+  EXPECT_EQ(open_map_file(setup_.map_file())->load().trajectory.size(), 4U);
+  EXPECT_TRUE(client_.reset(true).kept_file.empty());
+  EXPECT_TRUE(open_map_file(begun.kept_file)->load().view.tiles.empty()) << "it was running";
+}
+
+TEST_F(LoadService, ASecondServerOfTheFileEndsAndNamesTheFirst) {
+  testing::internal::CaptureStderr();
+  ServerProcess second(setup_.server_arguments());
+  EXPECT_EQ(second.wait_for_exit(patience), 1);
+  EXPECT_THAT(testing::internal::GetCapturedStderr(), HasSubstr("in use by process"));
+  map_scans(0, 4);
+  server_.send(SIGKILL);
+  ASSERT_EQ(server_.wait_for_exit(patience), -1);
+  ServerProcess third(setup_.server_arguments());
+  Client client(setup_.client());
+  EXPECT_NO_THROW(client.wait_for_server(patience)) << "the dead hold no lock";
 }
 
 TEST_F(LoadService, TellsClientsThatAnotherMapBegan) {

@@ -32,6 +32,17 @@ class MapSaverTest : public testing::Test {
     latest_map_.add_pose({.stamp_ns = static_cast<std::int64_t>(x)}, OdometryHealth::good, "none");
   }
 
+  /// As a server takes over a stored map.
+  MapSaver::PrepareMap prepare_ = [this](const SavedMap& stored, const auto&) {
+    return [this, stored] {
+      latest_map_.begin(std::make_shared<const MapSnapshot>(stored.view), stored.trajectory);
+    };
+  };
+  MapSaver::BeginMap begin_ = [this](std::uint64_t map_id, const auto&) {
+    map_.reset(map_id);
+    latest_map_.begin(map_.view(), {});
+  };
+
   ScratchFolder folder_;
   StaticMap map_{StaticMapConfig()};
   LatestMap latest_map_;
@@ -46,12 +57,11 @@ TEST_F(MapSaverTest, SavesTheLatestMap) {
     map_scan(x);
     saver.save_if_changed();
   }
-  const auto stored = MapSaver(latest_map_, statistics_, folder_ / "map.stillmap", {}).load();
-  ASSERT_TRUE(stored);
-  EXPECT_EQ(stored->view.version, map_.view()->version);
-  EXPECT_EQ(stored->view.tiles.size(), 2U);
-  EXPECT_EQ(stored->trajectory.size(), 2U);
-  EXPECT_EQ(stored->metadata.at("sensor"), "vlp_16");
+  const SavedMap stored = open_map_file(folder_ / "map.stillmap")->load();
+  EXPECT_EQ(stored.view.version, map_.view()->version);
+  EXPECT_EQ(stored.view.tiles.size(), 2U);
+  EXPECT_EQ(stored.trajectory.size(), 2U);
+  EXPECT_EQ(stored.metadata.at("sensor"), "vlp_16");
 }
 
 TEST_F(MapSaverTest, LeavesTheFileAloneUntilSomethingWasMapped) {
@@ -101,10 +111,7 @@ TEST_F(MapSaverTest, GoesOnInAnotherFileAndLeavesTheRunningMapInItsOwn) {
   MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap",
                  {{"sensor", "vlp_16"}, {"datum", "1,2"}});
   saver.set_source(source_);
-  const auto file = saver.resume_from(
-      "far.stillmap", [&](const SavedMap& stored, const std::shared_ptr<TileStore>&) {
-        latest_map_.begin(std::make_shared<const MapSnapshot>(stored.view), stored.trajectory);
-      });
+  const auto file = saver.resume_from("far.stillmap", prepare_);
   EXPECT_EQ(file, folder_ / "far.stillmap");
   latest_map_.add_pose({.stamp_ns = 1}, OdometryHealth::good, "none");
   saver.save_if_changed();
@@ -122,7 +129,8 @@ TEST_F(MapSaverTest, StaysInItsFileWhenAnotherCannotBeLoaded) {
   save_far_map(folder_ / "far.stillmap");
   MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
   saver.set_source(source_);
-  const auto refuse = [](const SavedMap&, const std::shared_ptr<TileStore>&) {
+  const auto refuse = [](const SavedMap&,
+                         const std::shared_ptr<TileStore>&) -> std::function<void()> {
     throw std::invalid_argument("another voxel size");
   };
   EXPECT_THROW(saver.resume_from("far.stillmap", refuse), std::invalid_argument);
@@ -187,9 +195,7 @@ TEST_F(MapSaverTest, NamesOfOtherFilesAreRefused) {
   }
   map_scan(50.0F);
   saver.save_if_changed();
-  EXPECT_EQ(
-      MapSaver(latest_map_, statistics_, folder_ / "map.stillmap", {}).load()->view.tiles.size(),
-      2U);
+  EXPECT_EQ(open_map_file(folder_ / "map.stillmap")->load().view.tiles.size(), 2U);
 }
 
 }  // namespace

@@ -110,7 +110,7 @@ TEST_F(MappingService, GivesALateJoinerEveryTileAndThePath) {
 TEST_F(MappingService, ForgetsEverythingOnReset) {
   drive_scans(8);
   const std::uint64_t old_id = client_.get_tile_versions().map.map_id;
-  const std::uint64_t new_id = client_.reset();
+  const std::uint64_t new_id = client_.reset().map_id;
   EXPECT_NE(new_id, old_id);
   const TileVersions after = client_.get_tile_versions();
   EXPECT_EQ(after.map.map_id, new_id);

@@ -108,7 +108,7 @@ TEST_F(RegionSubscription, ComesLateAndSeesAResetTakeItsTiles) {
   const auto subscription =
       late.subscribe_region(corner, [&](const RegionUpdate& update) { copy.add(update); });
   expect_only_the_region(copy);
-  const std::uint64_t new_map = client_.reset();
+  const std::uint64_t new_map = client_.reset().map_id;
   EXPECT_TRUE(eventually([&] { return copy.hashes().empty() && copy.map_id() == new_map; }));
   drive(publisher_, 0, 6);
   ASSERT_TRUE(wait_for_scans(client_, 12));

@@ -7,6 +7,7 @@
 
 #include "core/map/storage/map_file.hpp"
 #include "tests/idl/vendor_participant.hpp"
+#include "tests/server/room_scans.hpp"
 #include "tests/server/server_process.hpp"
 
 namespace stillmap::test {
@@ -56,6 +57,54 @@ TEST(Restart, GoesOnWithMapAndPath) {
   const Eigen::Vector3d step = stored.trajectory[8].T_map_lidar.translation() -
                                stored.trajectory[7].T_map_lidar.translation();
   EXPECT_LT(step.norm(), 0.5);
+}
+
+/// Scans of the room with another clock.
+void drive_at(ScanPublisher& publisher, int first, int last, std::int64_t offset_ns) {
+  ASSERT_TRUE(publisher.wait_for_subscriber(patience));
+  for (int i = first; i < last; ++i) {
+    Scan scan = room_scan(i);
+    scan.stamp_ns += offset_ns;
+    ASSERT_TRUE(publisher.publish(scan, {}, patience)) << "scan " << i;
+  }
+}
+
+// Time since boot, or a clock that is not set yet: stamps before the stored path's, or among them.
+TEST(Restart, AnEarlierClockNeitherDeletesThePathNorMisplacesTheMap) {
+  const ServiceSetup setup("every");
+  run_server(setup, 0, 10, terminate);
+  const SavedMap before = open_map_file(setup.map_file())->load();
+  ASSERT_EQ(before.trajectory.size(), 10U);
+  const std::int64_t day_ns = 86'400'000'000'000;
+  const std::int64_t amid_ns = -room_scan(10).stamp_ns + room_scan(3).stamp_ns + 12'345'678;
+  for (const std::int64_t offset_ns : {-day_ns, amid_ns}) {
+    const SavedMap earlier = open_map_file(setup.map_file())->load();
+    ServerProcess server(setup.server_arguments());
+    Client client(setup.client());
+    client.wait_for_server(patience);
+    ScanPublisher publisher(setup.publisher(true));
+    drive_at(publisher, 10, 13, offset_ns);
+    ASSERT_TRUE(wait_for_scans(client, 3));
+    terminate(server, client);
+    const SavedMap stored = open_map_file(setup.map_file())->load();
+    ASSERT_EQ(stored.trajectory.size(), earlier.trajectory.size() + 3);
+    for (std::size_t i = 0; i < earlier.trajectory.size(); ++i) {
+      EXPECT_EQ(stored.trajectory[i].stamp_ns, earlier.trajectory[i].stamp_ns);
+    }
+    const Eigen::Isometry3d T_map_room =
+        before.trajectory.front().T_map_lidar * room_pose(0).T_map_lidar.inverse();
+    const Eigen::Vector3d expected = T_map_room * room_pose(12).T_map_lidar.translation();
+    EXPECT_LT((stored.trajectory.back().T_map_lidar.translation() - expected).norm(), 0.3);
+  }
+}
+
+TEST(Restart, SighupSavesTheMapAsSigtermDoes) {
+  const ServiceSetup setup("every");
+  run_server(setup, 0, 8, [](ServerProcess& server, Client&) {
+    server.send(SIGHUP);
+    EXPECT_EQ(server.wait_for_exit(patience), 0);
+  });
+  EXPECT_EQ(open_map_file(setup.map_file())->load().trajectory.size(), 8U);
 }
 
 TEST(Restart, SigintEndsAServerWithoutScans) {

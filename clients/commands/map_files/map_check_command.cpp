@@ -38,6 +38,7 @@ Json to_json(const MapCheck& check) {
           {"voxels", check.voxels},
           {"hidden_voxels", check.hidden_voxels},
           {"poses", check.poses},
+          {"sessions", check.sessions},
           {"faults", faults}};
 }
 
@@ -52,9 +53,9 @@ std::string describe(const MapFault& fault) {
 std::string describe(const MapCheck& check) {
   std::string text;
   for (const MapFault& fault : check.faults) text += describe(fault) + "\n";
-  const std::string looked_at = std::to_string(check.tiles) + " tiles, " +
-                                std::to_string(check.voxels) + " voxels, " +
-                                std::to_string(check.poses) + " poses";
+  const std::string looked_at =
+      std::to_string(check.tiles) + " tiles, " + std::to_string(check.voxels) + " voxels, " +
+      std::to_string(check.poses) + " poses of " + std::to_string(check.sessions) + " runs";
   if (check.is_sound()) return "valid: " + looked_at + "\n";
   return text + "damaged: " + std::to_string(check.faults.size()) + " faults in " + looked_at +
          "; " + std::to_string(check.sound_tiles) +

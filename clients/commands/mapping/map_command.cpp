@@ -1,5 +1,6 @@
 #include <sys/resource.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
@@ -7,10 +8,12 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/mapping/map_output_folder.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
 #include "clients/commands/mapping/trajectory_report.hpp"
@@ -72,29 +75,6 @@ void save_map(const std::filesystem::path& file, const MappingResult& result,
                                           {map_ended_key, "yes"}}});
 }
 
-/// Name of the map file in an output folder.
-std::filesystem::path map_file_in(const std::filesystem::path& folder) {
-  return folder / "map.stillmap";
-}
-
-/// Makes the folder. Throws std::invalid_argument when it holds a map already and `force` is not
-/// set; with `force`, removes that map.
-void prepare_output_folder(const std::filesystem::path& folder, bool force) {
-  const std::filesystem::path file = map_file_in(folder);
-  if (std::filesystem::exists(file)) {
-    if (!force) {
-      throw std::invalid_argument(
-          file.string() + " exists already: choose another --out, or --force to replace it");
-    }
-    for (const char* part : {"", "-wal", "-shm"}) {
-      std::filesystem::remove(file.string() + part);
-    }
-  }
-  std::error_code error;
-  std::filesystem::create_directories(folder, error);
-  if (error) throw DatasetError(folder, "cannot be made: " + error.message());
-}
-
 /// Name of the file with KITTI's form of the poses.
 std::string pose_file_of(const std::string& frame) {
   return frame == "lidar" ? "poses_lidar.txt" : "poses_base.txt";
@@ -102,13 +82,14 @@ std::string pose_file_of(const std::string& frame) {
 
 /// Writes poses_lidar.txt or poses_base.txt, poses_tum.txt, map.stillmap, map.ply, map.pcd, map.png
 /// and, with truth, trajectory.png and trajectory_error.png. Throws what their writers throw.
-MapOutput write_map_output(const std::filesystem::path& folder, const ScanDataset& dataset,
+MapOutput write_map_output(const MapOutputFolder& out, const ScanDataset& dataset,
                            const MappingResult& result, const MapperConfig& config,
                            const MappedBody& body) {
-  MapOutput output{.folder = folder, .frame = body.frame, .accuracy = std::nullopt};
+  const std::filesystem::path& folder = out.unfinished();
+  MapOutput output{.folder = out.path(), .frame = body.frame, .accuracy = std::nullopt};
   write_kitti_poses(folder / pose_file_of(body.frame), result.trajectory);
   write_tum(folder / "poses_tum.txt", result.trajectory, body.frame);
-  save_map(map_file_in(folder), result, config);
+  save_map(out.new_map_file(), result, config);
   export_ply(*result.view, folder / "map.ply");
   export_pcd(*result.view, folder / "map.pcd");
   MapPictureOptions picture;
@@ -170,27 +151,29 @@ Json to_json(const MappingResult& result, const MapOutput& output) {
   Json health = Json::object();
   for (const auto& [state, count] : result.health) health.set(name(state), count);
   const StageDurations& total = result.stages.back();
-  return {{"scans", result.trajectory.size()},
-          {"seconds", result.seconds},
-          {"interrupted", result.stopped},
-          {"median_ms", total.quantile(0.5)},
-          {"p95_ms", total.quantile(0.95)},
-          {"p99_ms", total.quantile(0.99)},
-          {"stages", stages_json(result.stages)},
-          {"peak_memory_mb", peak_memory_mb()},
-          {"label_source", result.label_source},
-          {"health", health},
-          {"skipped", skipped_json(result.skipped)},
-          {"tiles", result.view->tiles.size()},
-          {"voxels", voxel_count(*result.view)},
-          {"voxel_size_m", result.view->voxel_size_m},
-          {"poses_frame", output.frame + "; the map is its frame at the first pose"},
-          {"moving_points",
-           {{"precision", optional_number(result.moving.precision())},
-            {"recall", optional_number(result.moving.recall())},
-            {"iou", optional_number(result.moving.iou())}}},
-          {"accuracy", output.accuracy ? to_json(*output.accuracy) : Json(nullptr)},
-          {"folder", output.folder.string()}};
+  return {
+      {"scans", result.trajectory.size()},
+      {"seconds", result.seconds},
+      {"interrupted", result.stopped},
+      {"resumed_at_scan", result.resumed_at_scan ? Json(*result.resumed_at_scan) : Json(nullptr)},
+      {"median_ms", total.quantile(0.5)},
+      {"p95_ms", total.quantile(0.95)},
+      {"p99_ms", total.quantile(0.99)},
+      {"stages", stages_json(result.stages)},
+      {"peak_memory_mb", peak_memory_mb()},
+      {"label_source", result.label_source},
+      {"health", health},
+      {"skipped", skipped_json(result.skipped)},
+      {"tiles", result.view->tiles.size()},
+      {"voxels", voxel_count(*result.view)},
+      {"voxel_size_m", result.view->voxel_size_m},
+      {"poses_frame", output.frame + "; the map is its frame at the first pose"},
+      {"moving_points",
+       {{"precision", optional_number(result.moving.precision())},
+        {"recall", optional_number(result.moving.recall())},
+        {"iou", optional_number(result.moving.iou())}}},
+      {"accuracy", output.accuracy ? to_json(*output.accuracy) : Json(nullptr)},
+      {"folder", output.folder.string()}};
 }
 
 /// The same for people, shorter.
@@ -230,7 +213,8 @@ struct MapArguments {
   MapperArguments mapper;
   MountArguments mount;
   ScanRange range;
-  bool force = false;
+  OutputPolicy policy;
+  double save_period_s = 30.0;
   bool json = false;
 };
 
@@ -255,6 +239,7 @@ MappedBody body_of(const MapArguments& arguments) {
 
 MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& arguments,
                                 const MapperConfig& config, const MappedBody& body,
+                                std::unique_ptr<Segmenter> labels, RunFile& run_file,
                                 StopSignal& stop) {
   if (dataset.kitti_lidar()) std::cerr << "stillmap: " << dataset.kitti_lidar()->in_words() << "\n";
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
@@ -268,8 +253,8 @@ MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& 
     ++skipped;
     progress.say("stillmap: skipped: " + scan.reason);
   };
-  return map_dataset(dataset, arguments.range, config, body,
-                     label_source(arguments.mapper, dataset), scan_done, scan_skipped);
+  return map_dataset(dataset, arguments.range, config, body, std::move(labels), run_file, scan_done,
+                     scan_skipped);
 }
 
 void write_report(const std::filesystem::path& file, const Json& report) {
@@ -279,24 +264,48 @@ void write_report(const std::filesystem::path& file, const Json& report) {
   if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
 }
 
+/// Maps what is left to map; the run's file is closed after that.
+MappingResult map_into(const MapOutputFolder& out, const ScanDataset& dataset,
+                       const MapArguments& arguments, const MapperConfig& config,
+                       const MappedBody& body, std::unique_ptr<Segmenter> labels,
+                       StopSignal& stop) {
+  RunFile run_file(out.run_file(),
+                   std::filesystem::weakly_canonical(arguments.dataset).string() + " from scan " +
+                       std::to_string(arguments.range.first),
+                   std::chrono::duration<double>(arguments.save_period_s));
+  return map_with_progress(dataset, arguments, config, body, std::move(labels), run_file, stop);
+}
+
+ExitCode stopped_early(const MapOutputFolder& out, const std::string& what_is_there) {
+  std::cerr << "stillmap: stopped early, as asked; " << what_is_there
+            << "; 'stillmap map ... --out " << out.path().string() << " --resume' goes on\n";
+  return ExitCode::failed;
+}
+
 ExitCode run(const MapArguments& arguments) {
   StopSignal stop;
   const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   const MappedBody body = body_of(arguments);
-  prepare_output_folder(arguments.out, arguments.force);
-  const MappingResult result = map_with_progress(dataset, arguments, config, body, stop);
+  static_cast<void>(arguments.range.end(dataset));
+  auto labels = label_source(arguments.mapper, dataset);
+  // Nothing above touched the folder.
+  MapOutputFolder out(arguments.out, arguments.policy);
+  const MappingResult result =
+      map_into(out, dataset, arguments, config, body, std::move(labels), stop);
+  if (result.stopped && out.had_map()) {
+    return stopped_early(out, out.path().string() + " holds the map that it held before");
+  }
   if (result.trajectory.empty()) {
     std::cerr << "stillmap: no scan of " << arguments.dataset << " could be mapped\n";
     return ExitCode::bad_input;
   }
-  const MapOutput output = write_map_output(arguments.out, dataset, result, config, body);
+  const MapOutput output = write_map_output(out, dataset, result, config, body);
   const Json report = to_json(result, output);
-  write_report(output.folder / "report.json", report);
+  write_report(out.unfinished() / "report.json", report);
+  out.publish(result.stopped);
   std::cout << (arguments.json ? report.dump(2) + "\n" : describe(result, output));
-  if (result.stopped)
-    std::cerr << "stillmap: stopped early, as asked; the files hold what was mapped\n";
-  return result.stopped ? ExitCode::failed : ExitCode::ok;
+  return result.stopped ? stopped_early(out, "the files hold what was mapped") : ExitCode::ok;
 }
 
 }  // namespace
@@ -315,7 +324,15 @@ void add_map_command(CommandHandle program, Action& action) {
   command.option("--scans,--count", arguments->range.count, "Take as many scans at most");
   command.flag("--strict", arguments->range.strict,
                "Stop at the first damaged file instead of skipping it");
-  command.flag("--force", arguments->force, "Replace a map that is there already");
+  command.flag("--force", arguments->policy.force,
+               "Replace a map that is there already, once the new one is complete");
+  command.flag("--resume", arguments->policy.resume,
+               "Go on with the run that was stopped or killed in this folder");
+  command
+      .option("--save-period", arguments->save_period_s,
+              "Seconds between saves of the run, for --resume")
+      .with_default()
+      .above_zero();
   command.flag("--json", arguments->json, "Print report.json instead of the summary");
   command.explain(
       "Examples:\n"
@@ -325,7 +342,9 @@ void add_map_command(CommandHandle program, Action& action) {
       "Writes map.stillmap (SQLite), map.ply, map.pcd, map.png, poses_lidar.txt (KITTI 3x4, lidar\n"
       "frame; poses_base.txt with --mount), poses_tum.txt (the same with stamps), report.json\n"
       "(timing, memory, accuracy), and with true poses in the sequence trajectory.png and\n"
-      "trajectory_error.png. A damaged file is named and skipped; its scan then has no pose.");
+      "trajectory_error.png. A damaged file is named and skipped; its scan then has no pose.\n"
+      "Until the results are complete they are in the folder 'unfinished', and those that were\n"
+      "there stay.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -6,6 +6,7 @@
 
 #include "clients/commands/mapping/imu_feed.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "core/map/map_id.hpp"
 #include "core/map/storage/map_file.hpp"
 
 namespace stillmap::cli {
@@ -37,7 +38,27 @@ class MappingRun {
                 {.stage_ended = [this](std::string_view stage) { times_.end_stage(stage); },
                  .pose_found = {}}),
         imu_(dataset.imu()),
-        period_s_(config.sensor.period_s) {}
+        period_s_(config.sensor.period_s) {
+    mapper_.reset(new_map_id());
+  }
+
+  /// Goes on where an earlier run was. Throws std::invalid_argument for another voxel size.
+  void resume(RunState earlier) {
+    mapper_.resume(earlier.map.view, earlier.map.tile_evidence);
+    earlier_ = std::move(earlier.map.trajectory);
+    result_.scan_of_pose = std::move(earlier.scan_of_pose);
+    result_.resumed_at_scan = earlier.next_scan;
+  }
+
+  /// What changed since the last saved state.
+  [[nodiscard]] RunState state(std::size_t next_scan) {
+    MapCheckpoint checkpoint = mapper_.static_map().checkpoint();
+    step_ = checkpoint.step;
+    RunState state{to_saved_map(checkpoint), result_.scan_of_pose, next_scan};
+    state.map.trajectory = path();
+    return state;
+  }
+  void state_saved() { mapper_.static_map().checkpoint_stored(step_); }
 
   void map_scan(std::size_t index) {
     std::optional<DatasetFrame> frame = read(index);
@@ -48,7 +69,12 @@ class MappingRun {
     times_.begin();
     std::optional<Eigen::Isometry3d> T_map_lidar_first;
     const bool is_mounted = !T_body_lidar_.isApprox(Eigen::Isometry3d::Identity());
-    if (is_mounted && mapper_.trajectory().empty()) T_map_lidar_first = T_body_lidar_;
+    // Until the lidar is found in the earlier map, every scan is looked for where that ended.
+    if (!earlier_.empty() && !is_registered_) {
+      T_map_lidar_first = earlier_.back().T_map_lidar * T_body_lidar_;
+    } else if (earlier_.empty() && mapper_.trajectory().empty() && is_mounted) {
+      T_map_lidar_first = T_body_lidar_;
+    }
     const std::optional<MappedScan> mapped =
         mapper_.process(std::move(frame->scan), T_map_lidar_first);
     if (!mapped) {
@@ -59,15 +85,13 @@ class MappingRun {
     times_.end();
     result_.scan_of_pose.push_back(index);
     result_.health[mapped->odometry.health] += 1;
+    is_registered_ |= mapped->odometry.health != OdometryHealth::lost;
     if (!true_ids.empty())
       result_.moving += evaluation::moving_score(mapped->labelled.motion, true_ids);
   }
 
   MappingResult finish(bool stopped) {
-    const Eigen::Isometry3d T_lidar_body = T_body_lidar_.inverse();
-    for (const StampedPose& pose : mapper_.trajectory()) {
-      result_.trajectory.push_back({pose.stamp_ns, pose.T_map_lidar * T_lidar_body});
-    }
+    result_.trajectory = path();
     SavedMap map = to_saved_map(mapper_.static_map().checkpoint(true));
     result_.view = std::make_shared<const MapSnapshot>(std::move(map.view));
     result_.tile_evidence = std::move(map.tile_evidence);
@@ -79,6 +103,16 @@ class MappingRun {
   }
 
  private:
+  /// Of the body, with what an earlier run has mapped.
+  [[nodiscard]] Trajectory path() const {
+    const Eigen::Isometry3d T_lidar_body = T_body_lidar_.inverse();
+    Trajectory path = earlier_;
+    for (const StampedPose& pose : mapper_.trajectory()) {
+      path.push_back({pose.stamp_ns, pose.T_map_lidar * T_lidar_body});
+    }
+    return path;
+  }
+
   std::optional<DatasetFrame> read(std::size_t index) {
     try {
       return dataset_.read(index);
@@ -103,6 +137,9 @@ class MappingRun {
   Mapper mapper_;
   ImuFeed imu_;
   double period_s_;
+  Trajectory earlier_;
+  bool is_registered_ = false;
+  std::uint64_t step_ = 0;
   MappingResult result_;
 };
 
@@ -119,17 +156,28 @@ std::size_t ScanRange::end(const ScanDataset& dataset) const {
 
 MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
                           const MapperConfig& config, const MappedBody& body,
-                          std::unique_ptr<Segmenter> labels, const ScanDone& scan_done,
-                          const ScanSkipped& scan_skipped) {
+                          std::unique_ptr<Segmenter> labels, RunFile& run_file,
+                          const ScanDone& scan_done, const ScanSkipped& scan_skipped) {
   const std::size_t end = range.end(dataset);
+  std::size_t index = range.first;
   MappingRun run(dataset, range.strict, config, body, std::move(labels), scan_skipped);
-  const auto began = std::chrono::steady_clock::now();
-  bool keep_running = true;
-  for (std::size_t index = range.first; index < end && keep_running; ++index) {
-    run.map_scan(index);
-    keep_running = !scan_done || scan_done(index + 1 - range.first);
+  // The map of a few scans is too thin to be found in, and soon made again.
+  constexpr std::size_t min_resumed_scans = 10;
+  if (auto earlier = run_file.earlier();
+      earlier && earlier->scan_of_pose.size() >= min_resumed_scans) {
+    index = earlier->next_scan;
+    run.resume(*std::move(earlier));
   }
-  MappingResult result = run.finish(!keep_running);
+  const auto began = std::chrono::steady_clock::now();
+  bool is_stopped = false;
+  while (index < end && !is_stopped) {
+    run.map_scan(index++);
+    is_stopped = scan_done && !scan_done(index - range.first) && index < end;
+    if (index == end || !(is_stopped || run_file.is_due())) continue;
+    run_file.save(run.state(index));
+    run.state_saved();
+  }
+  MappingResult result = run.finish(is_stopped);
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
   return result;
 }

@@ -4,9 +4,11 @@
 #include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "clients/commands/mapping/run_file.hpp"
 #include "clients/commands/stage_stopwatch.hpp"
 #include "core/dataset/scan_dataset.hpp"
 #include "core/evaluation/moving_score.hpp"
@@ -57,6 +59,8 @@ struct MappingResult {
   evaluation::MovingScore moving;
   std::vector<StageDurations> stages;
   double seconds = 0.0;
+  /// Index of the scan that a resumed run went on with.
+  std::optional<std::size_t> resumed_at_scan;
   /// A signal ended it early.
   bool stopped = false;
 };
@@ -66,10 +70,12 @@ using ScanDone = std::function<bool(std::size_t seen)>;
 /// Called for every scan that is skipped.
 using ScanSkipped = std::function<void(const SkippedScan&)>;
 
-/// Maps a data set in this process.
+/// Maps a data set in this process. The run goes on from what `run_file` holds, and its state is
+/// saved there from time to time; what is reported of scans, but poses and map, is of the resumed
+/// part alone. Throws what reading and saving throw.
 [[nodiscard]] MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
                                         const MapperConfig& config, const MappedBody& body,
-                                        std::unique_ptr<Segmenter> labels,
+                                        std::unique_ptr<Segmenter> labels, RunFile& run_file,
                                         const ScanDone& scan_done = {},
                                         const ScanSkipped& scan_skipped = {});
 

@@ -11,12 +11,13 @@ namespace {
 struct SaveArguments {
   ClientArguments client;
   std::string file;
+  bool overwrite = false;
   bool json = false;
 };
 
 ExitCode run(const SaveArguments& arguments) {
   Client client = connect(arguments.client);
-  const std::string file = client.save_map(arguments.file);
+  const std::string file = client.save_map(arguments.file, arguments.overwrite);
   if (arguments.json) {
     std::cout << Json{{"file", file}}.dump(2) << "\n";
   } else {
@@ -50,16 +51,21 @@ ExitCode run(const LoadArguments& arguments) {
 
 struct ResetArguments {
   ClientArguments client;
+  bool discard = false;
   bool json = false;
 };
 
 ExitCode run(const ResetArguments& arguments) {
   Client client = connect(arguments.client);
-  const std::uint64_t map_id = client.reset();
+  const BegunMap begun = client.reset(arguments.discard);
   if (arguments.json) {
-    std::cout << Json{{"map_id", map_id}}.dump(2) << "\n";
+    std::cout << Json{{"map_id", begun.map_id}, {"kept_file", begun.kept_file}}.dump(2) << "\n";
   } else {
-    std::cout << "poses and map are forgotten; the new map has id " << map_id << "\n";
+    std::cout << "a new, empty map begins, with id " << begun.map_id << "; the one until now is "
+              << (begun.kept_file.empty()
+                      ? std::string("not kept")
+                      : "kept as " + begun.kept_file + " (on the server's machine)")
+              << "\n";
   }
   return ExitCode::ok;
 }
@@ -74,6 +80,7 @@ void add_save_command(CommandHandle program, Action& action) {
       "Plain name; the file is put beside the server's configured map file, which is the "
       "default");
   add_client_options(command, arguments->client);
+  command.flag("--overwrite", arguments->overwrite, "Replace a map that has this name already");
   command.flag("--json", arguments->json, "Print JSON");
   command.explain("Examples:\n  stillmap save\n  stillmap save before_rain.stillmap");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
@@ -103,10 +110,18 @@ void add_load_command(CommandHandle program, Action& action) {
 
 void add_reset_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<ResetArguments>();
-  CommandHandle command = program.command("reset", "Have the server forget its poses and its map");
+  CommandHandle command = program.command(
+      "reset", "Have the server begin a new, empty map, and keep the one until now");
+  command.flag("--discard", arguments->discard, "Do not keep it");
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");
-  command.explain("Example:\n  stillmap reset\nMap files that were saved stay as they are.");
+  command.explain(
+      "Examples:\n"
+      "  stillmap reset\n"
+      "  stillmap reset --json | jq -r .kept_file\n"
+      "The map until now is saved, and its file renamed: city.stillmap is kept beside it as\n"
+      "city.2026-05-31_142500.stillmap, to return to with 'stillmap load'. A server without a map\n"
+      "file keeps nothing.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

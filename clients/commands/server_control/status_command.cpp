@@ -27,6 +27,13 @@ struct HealthArguments {
   bool mapping = false;
 };
 
+/// Why the server loses what it maps when it ends; empty when it does not.
+std::string why_not_saved(const dds::ServerStatus& status) {
+  const std::uint64_t failing = status.counter(dds::checkpoints_failing_counter);
+  if (failing == 0) return {};
+  return std::to_string(failing) + " checkpoints in a row failed: " + status.reason;
+}
+
 /// Why the server does not map; empty when it does.
 std::string why_not_mapping(const dds::ServerStatus& status) {
   const std::string reason = status.reason.empty() ? "" : ": " + status.reason;
@@ -56,6 +63,9 @@ ExitCode run(const HealthArguments& arguments) {
     status = connect(arguments.client).status();
   } catch (const ServiceError& error) {
     return say(ExitCode::failed, error.what());
+  }
+  if (const std::string why = why_not_saved(status); !why.empty()) {
+    return say(ExitCode::failed, why);
   }
   if (const std::string why = why_not_mapping(status); arguments.mapping && !why.empty()) {
     return say(ExitCode::failed, why + other_troubles(status));
@@ -94,7 +104,9 @@ void add_health_command(CommandHandle program, Action& action) {
       "Examples:\n"
       "  stillmap health                     is it alive: Docker's HEALTHCHECK, a liveness probe\n"
       "  stillmap health --mapping           does it work: a readiness probe on a driving robot\n"
-      "A server that waits for its first scan is alive.");
+      "A server that waits for its first scan is alive. One whose checkpoints fail is not well: "
+      "what\n"
+      "it maps is in memory alone.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -3,9 +3,10 @@
 #include <SQLiteCpp/Exception.h>
 #include <SQLiteCpp/Statement.h>
 #include <SQLiteCpp/Transaction.h>
+#include <fcntl.h>
 #include <sqlite3.h>
+#include <unistd.h>
 
-#include <array>
 #include <cstdint>
 #include <fstream>
 #include <string>
@@ -13,6 +14,7 @@
 #include <system_error>
 
 #include "core/map/storage/map_file.hpp"
+#include "core/map/storage/save_marks.hpp"
 #include "core/map/storage/tile_codec.hpp"
 
 namespace stillmap {
@@ -21,6 +23,10 @@ std::filesystem::path beside(const std::filesystem::path& file, const char* suff
   std::filesystem::path path = file;
   path += suffix;
   return path;
+}
+
+std::string sqlite_name(const std::filesystem::path& file) {
+  return std::filesystem::absolute(file).string();
 }
 
 namespace {
@@ -64,17 +70,27 @@ std::uint32_t big_endian(std::string_view bytes) {
   return value;
 }
 
-/// Reads the header as plain bytes: SQLite itself might already repair or create something.
-void check_header(const fs::path& file) {
+constexpr std::size_t header_bytes = 100;
+
+/// Reads the header as plain bytes: SQLite itself might already repair or create something. Empty
+/// where the file is no SQLite database.
+std::string header_of(const fs::path& file) {
   constexpr std::string_view magic("SQLite format 3\0", 16);
-  std::array<char, 100> bytes{};
+  std::string header(header_bytes, '\0');
   std::ifstream stream(file, std::ios::binary);
-  stream.read(bytes.data(), bytes.size());
-  const std::string_view header(bytes.data(), static_cast<std::size_t>(stream.gcount()));
-  if (header.size() < bytes.size() || !header.starts_with(magic)) {
+  stream.read(header.data(), header_bytes);
+  return stream && header.starts_with(magic) ? header : std::string();
+}
+
+std::uint32_t application_of(std::string_view header) { return big_endian(header.substr(68, 4)); }
+
+void check_header(const fs::path& file) {
+  const std::string bytes = header_of(file);
+  const std::string_view header = bytes;
+  if (header.empty()) {
     throw MapFileError(file, "is not a map file (no SQLite database); name another file");
   }
-  if (big_endian(header.substr(68, 4)) != application_id) {
+  if (application_of(header) != application_id) {
     throw MapFileError(file, "is a database of another program; name another file");
   }
   const std::uint32_t version = big_endian(header.substr(60, 4));
@@ -88,6 +104,15 @@ void check_header(const fs::path& file) {
   }
 }
 
+/// For renames to survive a power cut.
+void sync_folder(const fs::path& file) {
+  const int descriptor = ::open(fs::absolute(file).parent_path().c_str(), O_RDONLY | O_DIRECTORY);
+  if (descriptor < 0) return;
+  // Some file systems cannot sync folders; then there is nothing that could be done.
+  static_cast<void>(::fsync(descriptor));
+  ::close(descriptor);
+}
+
 /// Made under another name and then renamed, so that an incomplete file never has this name.
 void create(const fs::path& file) {
   const fs::path fresh = beside(file, ".new");
@@ -97,7 +122,7 @@ void create(const fs::path& file) {
     fs::remove(leftover, none_there);
   }
   {
-    SQLite::Database database(fresh.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    SQLite::Database database(sqlite_name(fresh), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
     SQLite::Transaction transaction(database);
     database.exec("PRAGMA application_id = " + std::to_string(application_id));
     database.exec("PRAGMA user_version = " + std::to_string(schema_version));
@@ -107,6 +132,7 @@ void create(const fs::path& file) {
     database.exec("PRAGMA journal_mode = WAL");
   }
   fs::rename(fresh, file);
+  sync_folder(file);
 }
 
 void check_pages(SQLite::Database& database, const fs::path& file) {
@@ -122,15 +148,39 @@ void check_pages(SQLite::Database& database, const fs::path& file) {
   sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
 }
 
+SQLite::Database connect(const fs::path& file) {
+  SQLite::Database database(sqlite_name(file), SQLite::OPEN_READWRITE, busy_timeout_ms);
+  // FULL: a save that returned survives a power cut, not only a crash.
+  database.exec("PRAGMA synchronous = FULL");
+  return database;
+}
+
 SQLite::Database open_or_create(const fs::path& file) {
   if (!fs::exists(file) || (fs::is_regular_file(file) && fs::file_size(file) == 0)) create(file);
   if (!fs::is_regular_file(file)) throw MapFileError(file, "is not a file; name another one");
   check_header(file);
-  SQLite::Database database(file.string(), SQLite::OPEN_READWRITE, busy_timeout_ms);
+  put_away_other_log(file);
+  SQLite::Database database = connect(file);
   check_pages(database, file);
-  // FULL: a save that returned survives a power cut, not only a crash.
-  database.exec("PRAGMA synchronous = FULL");
   return database;
+}
+
+/// What `open` returns; its errors as MapFileError.
+template <typename Open>
+SQLite::Database opened(const fs::path& file, Open open) {
+  try {
+    return open(file);
+  } catch (const SQLite::Exception& error) {
+    const bool is_damaged =
+        error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB;
+    throw MapFileError(file, is_damaged ? std::string("is damaged (") + error.what() +
+                                              "); restore a copy or name another file"
+                                        : std::string("cannot be opened (") + error.what() +
+                                              "); its folder must exist and be writable");
+  } catch (const fs::filesystem_error& error) {
+    throw MapFileError(file, std::string("cannot be opened (") + error.what() +
+                                 "); its folder must exist and be writable");
+  }
 }
 
 /// A stored tile's counts and bounds, for its new columns.
@@ -174,20 +224,29 @@ void upgrade_schema(SQLite::Database& database) {
   transaction.commit();
 }
 
-SQLite::Database open_map_database(const fs::path& file) {
-  try {
-    return open_or_create(file);
-  } catch (const SQLite::Exception& error) {
-    const bool is_damaged =
-        error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB;
-    throw MapFileError(file, is_damaged ? std::string("is damaged (") + error.what() +
-                                              "); restore a copy or name another file"
-                                        : std::string("cannot be opened (") + error.what() +
-                                              "); its folder must exist and be writable");
-  } catch (const fs::filesystem_error& error) {
-    throw MapFileError(file, std::string("cannot be opened (") + error.what() +
-                                 "); its folder must exist and be writable");
+SQLite::Database open_map_database(const fs::path& file) { return opened(file, open_or_create); }
+
+SQLite::Database connect_to_map_database(const fs::path& file) { return opened(file, connect); }
+
+bool is_map_file(const fs::path& file) {
+  std::error_code not_there;
+  if (!fs::is_regular_file(file, not_there)) return false;
+  const std::string header = header_of(file);
+  return !header.empty() && application_of(header) == application_id;
+}
+
+void put_in_place(const fs::path& fresh, const fs::path& file) {
+  if (fs::exists(beside(file, "-wal"))) {
+    try {
+      // Closed again, it has no log: what is there stays complete until the rename.
+      static_cast<void>(open_map_database(file));
+    } catch (const MapFileError&) {
+      // Not worth keeping complete.
+    }
   }
+  for (const char* suffix : {"-wal", "-shm"}) fs::remove(beside(file, suffix));
+  fs::rename(fresh, file);
+  sync_folder(file);
 }
 
 }  // namespace stillmap

@@ -3,16 +3,28 @@
 #include <SQLiteCpp/Database.h>
 
 #include <filesystem>
+#include <string>
 
 namespace stillmap {
 
 /// SQLite's file with this suffix ("-wal", "-shm") beside a database.
 [[nodiscard]] std::filesystem::path beside(const std::filesystem::path& file, const char* suffix);
 
+/// The name by which SQLite opens this file and no other: absolute, since it takes a relative name
+/// such as "file:..." for a URI, which can mean any file.
+[[nodiscard]] std::string sqlite_name(const std::filesystem::path& file);
+
 /// Opens the SQLite database of a map file, made with an empty schema when there is no file yet.
 /// A file that is not a sound map file of this schema or the one before is refused (MapFileError)
-/// before anything could write to it.
+/// before anything could write to it. A log beside it that belongs to another file (a backup was
+/// copied over the one that a crash left) is renamed, and the file opened as it is alone.
 [[nodiscard]] SQLite::Database open_map_database(const std::filesystem::path& file);
+/// One more connection to a file that this process has opened so, without a look at its content.
+[[nodiscard]] SQLite::Database connect_to_map_database(const std::filesystem::path& file);
+
+/// Puts a complete and closed map file in the place of another one, or of none, in one step: after
+/// a crash the old or the new one is there. Throws std::filesystem::filesystem_error.
+void put_in_place(const std::filesystem::path& fresh, const std::filesystem::path& file);
 
 /// Whether the tables are those of the first schema, which stores only the voxels that tiles show.
 [[nodiscard]] bool has_first_schema(SQLite::Database& database);

@@ -5,6 +5,7 @@
 #include <SQLiteCpp/Exception.h>
 #include <SQLiteCpp/Statement.h>
 #include <SQLiteCpp/Transaction.h>
+#include <sqlite3.h>
 
 #include <algorithm>
 #include <cstdlib>
@@ -15,6 +16,7 @@
 
 #include "core/map/storage/map_database.hpp"
 #include "core/map/storage/map_tables.hpp"
+#include "core/map/storage/save_marks.hpp"
 #include "core/map/storage/tile_codec.hpp"
 
 namespace stillmap {
@@ -62,7 +64,7 @@ class ScratchMapFolder {
 class SqliteTileStore : public TileStore {
  public:
   SqliteTileStore(const fs::path& file, std::shared_ptr<const ScratchMapFolder> folder)
-      : folder_(std::move(folder)), file_(file), database_(open_map_database(file)) {}
+      : folder_(std::move(folder)), file_(file), database_(connect_to_map_database(file)) {}
 
   TileRecord load(TileId id) override {
     const std::scoped_lock lock(mutex_);
@@ -91,16 +93,17 @@ class SqliteMapStore : public MapStore {
     writing([&] {
       if (has_first_schema(database_)) upgrade_schema(database_);
       if (!saved_trajectory_) saved_trajectory_ = read_trajectory(database_);
+      if (!log_is_empty_) empty_log("PASSIVE");
       SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
       const bool is_another_map = read_map_row(database_).map_id != map.view.map_id;
       write_tiles(database_, map);
       write_tile_evidence(database_, map.tile_evidence, is_another_map);
       write_trajectory(database_, map.trajectory, common_poses(*saved_trajectory_, map.trajectory));
       write_metadata(database_, map);
-      transaction.commit();
+      commit(transaction);
       saved_trajectory_ = map.trajectory;
-      // The log's content into the file, so that a copy of the file alone is a copy of the map.
-      database_.exec("PRAGMA wal_checkpoint(TRUNCATE)");
+      // So that a copy of the file alone is a copy of the map.
+      empty_log("TRUNCATE");
     });
   }
 
@@ -133,27 +136,76 @@ class SqliteMapStore : public MapStore {
 
   void begin_run(std::uint64_t map_id) override {
     writing([&] {
+      if (!log_is_empty_) empty_log("PASSIVE");
+      SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
       SQLite::Statement rename(database_, "UPDATE map SET map_id = ?");
       rename.bind(1, static_cast<std::int64_t>(map_id));
       rename.exec();
       SQLite::Statement reopen(database_, "DELETE FROM metadata WHERE key = ?");
       reopen.bind(1, map_ended_key);
       reopen.exec();
+      commit(transaction);
+      empty_log("TRUNCATE");
     });
+  }
+
+  bool holds_map() override {
+    try {
+      const auto has_rows = [&](const char* table) {
+        return database_.execAndGet(std::string("SELECT EXISTS (SELECT 1 FROM ") + table + ")")
+                   .getInt() != 0;
+      };
+      return has_rows("tiles") || has_rows("trajectory");
+    } catch (const SQLite::Exception& error) {
+      throw unreadable(file_, error);
+    }
+  }
+
+  void complete_file() override {
+    writing([&] { empty_log("TRUNCATE"); });
+    if (!log_is_empty_) {
+      throw MapFileError(file_, "is being read by another program; try again when it has ended");
+    }
   }
 
   void copy_to(const fs::path& file) override {
     // What is there must be a map, or nothing: another program's file is not overwritten.
-    static_cast<void>(open_map_database(file));
+    if (fs::exists(file)) static_cast<void>(open_map_database(file));
+    const fs::path fresh = beside(file, ".new");
     try {
-      SQLite::Database target(file.string(), SQLite::OPEN_READWRITE);
-      SQLite::Backup(target, database_).executeStep(-1);
-    } catch (const SQLite::Exception& error) {
+      fs::remove(fresh);
+      back_up_to(fresh);
+      put_in_place(fresh, file);
+    } catch (const std::runtime_error& error) {
+      std::error_code ignored;
+      fs::remove(fresh, ignored);
       throw MapFileError(file, std::string("cannot be written (") + error.what() + ")");
     }
   }
 
  private:
+  void back_up_to(const fs::path& fresh) {
+    SQLite::Database target(sqlite_name(fresh), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    const int result = SQLite::Backup(target, database_).executeStep(-1);
+    // Busy and locked are no exceptions: nothing is copied then.
+    if (result != SQLITE_DONE) throw SQLite::Exception(sqlite3_errstr(result), result);
+  }
+
+  void commit(SQLite::Transaction& transaction) {
+    add_save_mark(database_, log_is_empty_);
+    log_is_empty_ = false;
+    transaction.commit();
+  }
+
+  /// Brings the log's content into the file, unless somebody reads what it still has without it.
+  /// "PASSIVE" does not wait for them, "TRUNCATE" does for a while and leaves no log.
+  void empty_log(const std::string& mode) {
+    SQLite::Statement checkpoint(database_, "PRAGMA wal_checkpoint(" + mode + ")");
+    if (!checkpoint.executeStep()) return;
+    const auto number = [&](int column) { return checkpoint.getColumn(column).getInt(); };
+    log_is_empty_ = number(0) == 0 && number(1) == number(2);
+  }
+
   template <typename Action>
   void writing(Action action) {
     try {
@@ -181,6 +233,7 @@ class SqliteMapStore : public MapStore {
   SQLite::Database database_;
   /// The stored trajectory, once it was read.
   std::optional<Trajectory> saved_trajectory_;
+  bool log_is_empty_ = false;
 };
 
 }  // namespace
@@ -198,6 +251,14 @@ SavedMap to_saved_map(const MapCheckpoint& checkpoint) {
 
 std::unique_ptr<MapStore> open_map_file(const fs::path& file) {
   return std::make_unique<SqliteMapStore>(file);
+}
+
+void replace_map_file(const fs::path& fresh, const fs::path& file) {
+  try {
+    put_in_place(fresh, file);
+  } catch (const fs::filesystem_error& error) {
+    throw MapFileError(file, std::string("cannot be replaced (") + error.what() + ")");
+  }
 }
 
 std::unique_ptr<MapStore> open_scratch_map() {

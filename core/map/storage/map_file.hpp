@@ -54,9 +54,16 @@ class MapStore {
   [[nodiscard]] virtual SavedMap load_non_resident() = 0;
   /// Reads single tiles; may be used beside the store, and after it.
   [[nodiscard]] virtual std::shared_ptr<TileStore> tile_store() = 0;
-  /// Mapping resumes from the stored map: sets its id and removes the mark of an ended run.
+  /// Mapping resumes from the stored map: sets its id and removes the mark of an ended run, in one
+  /// transaction.
   virtual void begin_run(std::uint64_t map_id) = 0;
-  /// Writes the last saved state to another file, replacing the map in it. Throws MapFileError.
+  /// Whether a save or a run left any tile or pose in it.
+  [[nodiscard]] virtual bool holds_map() = 0;
+  /// All that was saved is in the file itself, none of it in its log: then the file may be renamed
+  /// when the store is gone. Throws MapFileError where another program is reading it.
+  virtual void complete_file() = 0;
+  /// Writes the last saved state to another file, which is replaced in one step. Throws
+  /// MapFileError, and leaves that file as it was.
   virtual void copy_to(const std::filesystem::path& file) = 0;
 };
 
@@ -64,6 +71,13 @@ class MapStore {
 /// copied). Throws MapFileError: no database, another program's, written by a newer version,
 /// damaged, or in a folder that cannot be written. Such a file is left untouched.
 [[nodiscard]] std::unique_ptr<MapStore> open_map_file(const std::filesystem::path& file);
+
+/// Puts a map file that no store has open in the place of another one, or of none, in one step.
+/// Throws MapFileError.
+void replace_map_file(const std::filesystem::path& fresh, const std::filesystem::path& file);
+
+/// Whether the file's header is that of a map file.
+[[nodiscard]] bool is_map_file(const std::filesystem::path& file);
 
 /// A temporary store, removed with its last user, for a map that is not kept but does not fit into
 /// memory. Throws MapFileError when the folder for temporary files cannot be written.

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/map/storage/map_database.hpp"
+#include "core/map/storage/save_marks.hpp"
 
 namespace stillmap {
 namespace {
@@ -45,8 +46,8 @@ std::unique_ptr<SQLite::Database> hold(const fs::path& file) {
   if (!fs::exists(beside(file, "-wal")) || !fs::exists(beside(file, "-shm"))) return nullptr;
   try {
     constexpr int busy_timeout_ms = 5000;
-    auto database =
-        std::make_unique<SQLite::Database>(file.string(), SQLite::OPEN_READONLY, busy_timeout_ms);
+    auto database = std::make_unique<SQLite::Database>(sqlite_name(file), SQLite::OPEN_READONLY,
+                                                       busy_timeout_ms);
     database->exec("BEGIN");
     static_cast<void>(database->execAndGet("SELECT count(*) FROM sqlite_master").getInt());
     return database;
@@ -61,7 +62,9 @@ void copy_with_log(const fs::path& file, const fs::path& copy) {
   // A source that cannot be written must not make the copy so.
   fs::permissions(copy, fs::perms::owner_read | fs::perms::owner_write, fs::perm_options::add);
   const fs::path log = beside(file, "-wal");
-  if (fs::exists(log)) fs::copy_file(log, beside(copy, "-wal"));
+  if (!fs::exists(log)) return;
+  fs::copy_file(log, beside(copy, "-wal"));
+  put_away_other_log(copy);
 }
 
 /// The error of the copy as one of the file.

@@ -28,6 +28,9 @@ struct MapCheck {
   /// Voxels that are known and not shown.
   std::uint64_t hidden_voxels = 0;
   std::size_t poses = 0;
+  /// Runs that the path is of: each begins at the start or with a pose that is not later than the
+  /// one before.
+  std::size_t sessions = 0;
   /// Tiles that a server could still serve.
   std::size_t sound_tiles = 0;
   std::vector<MapFault> faults;
@@ -40,7 +43,7 @@ using CheckProgress = std::function<void(std::size_t done, std::size_t total)>;
 
 /// Reads all of a map file, which stays as it is, and finds every fault: SQLite's own structure,
 /// each tile (decodes, agrees with its content hash and its row, voxels lie in their cells), sizes,
-/// revisions, poses in order of time, finite and rigid. Throws MapFileError for a file that is not
+/// revisions, poses finite and rigid. Throws MapFileError for a file that is not
 /// a map of a known version: missing, empty, a folder, of another program, of a newer version.
 [[nodiscard]] MapCheck check_map_file(const std::filesystem::path& file,
                                       const CheckProgress& progress = {});

@@ -24,7 +24,8 @@ void count_voxel(const Voxel& voxel, MapInfo& info) {
 void measure_path(const Trajectory& trajectory, MapInfo& info) {
   info.poses = trajectory.size();
   if (trajectory.empty()) return;
-  info.trajectory_span = {trajectory.front().stamp_ns, trajectory.back().stamp_ns};
+  const auto [first, last] = std::ranges::minmax(trajectory, {}, &StampedPose::stamp_ns);
+  info.trajectory_span = {first.stamp_ns, last.stamp_ns};
   for (std::size_t i = 1; i < trajectory.size(); ++i) {
     const Eigen::Vector3d step =
         trajectory[i].T_map_lidar.translation() - trajectory[i - 1].T_map_lidar.translation();

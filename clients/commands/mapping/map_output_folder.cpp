@@ -1,0 +1,89 @@
+#include "clients/commands/mapping/map_output_folder.hpp"
+
+#include <stdexcept>
+#include <string>
+#include <system_error>
+#include <utility>
+#include <vector>
+
+#include "core/dataset/dataset_error.hpp"
+#include "core/map/storage/map_file.hpp"
+
+namespace stillmap::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+void make(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw DatasetError(folder, "cannot be made: " + error.message());
+}
+
+/// Whether an earlier run has saved anything there.
+bool holds_run(const fs::path& run_file) {
+  try {
+    return fs::exists(run_file) && open_map_file(run_file)->holds_map();
+  } catch (const MapFileError&) {
+    return false;
+  }
+}
+
+void check(const fs::path& map_file, const fs::path& run_file, const OutputPolicy& policy) {
+  if (policy.force && policy.resume) {
+    throw std::invalid_argument("--force begins anew and --resume goes on: give one of them");
+  }
+  const bool has_run = holds_run(run_file);
+  if (policy.resume) {
+    if (has_run) return;
+    throw std::invalid_argument(run_file.string() +
+                                " is not there: there is no run to resume; leave out --resume");
+  }
+  if (policy.force) return;
+  if (has_run) {
+    throw std::invalid_argument(run_file.string() +
+                                " is of a run that was not finished: --resume to go on with it, "
+                                "or --force to begin anew");
+  }
+  if (fs::exists(map_file)) {
+    throw std::invalid_argument(map_file.string() +
+                                " exists already: choose another --out, or --force to replace it");
+  }
+}
+
+}  // namespace
+
+MapOutputFolder::MapOutputFolder(fs::path folder, const OutputPolicy& policy)
+    : folder_(std::move(folder)), unfinished_(folder_ / "unfinished") {
+  const fs::path map_file = folder_ / "map.stillmap";
+  had_map_ = fs::exists(map_file);
+  check(map_file, run_file(), policy);
+  make(folder_);
+  lock_ = std::make_unique<MapLock>(map_file);
+  std::error_code error;
+  if (!policy.resume) fs::remove_all(unfinished_, error);
+  if (error) throw DatasetError(unfinished_, "cannot be removed: " + error.message());
+  make(unfinished_);
+}
+
+MapOutputFolder::~MapOutputFolder() {
+  std::error_code ignored;
+  if (!holds_run(run_file())) fs::remove_all(unfinished_, ignored);
+}
+
+void MapOutputFolder::publish(bool keep_run) {
+  replace_map_file(new_map_file(), folder_ / new_map_file().filename());
+  std::error_code error;
+  const std::string run_name = run_file().filename().string();
+  std::vector<fs::path> results;
+  for (const fs::directory_entry& entry : fs::directory_iterator(unfinished_, error)) {
+    if (!entry.path().filename().string().starts_with(run_name)) results.push_back(entry.path());
+  }
+  for (const fs::path& result : results) {
+    fs::rename(result, folder_ / result.filename(), error);
+    if (error) throw DatasetError(result, "cannot be moved to its place: " + error.message());
+  }
+  if (!keep_run) fs::remove_all(unfinished_, error);
+}
+
+}  // namespace stillmap::cli

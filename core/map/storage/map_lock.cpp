@@ -1,0 +1,104 @@
+#include "core/map/storage/map_lock.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <sstream>
+#include <string>
+
+#include "core/map/storage/map_database.hpp"
+#include "core/map/storage/map_file.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  ::gethostname(name.data(), name.size() - 1);
+  return name.data();
+}
+
+struct Holder {
+  std::string host;
+  pid_t pid = 0;
+};
+
+/// As written in the lock file; without pid where nothing is.
+Holder holder_in(int descriptor) {
+  std::array<char, 512> text{};
+  const ssize_t bytes = ::pread(descriptor, text.data(), text.size() - 1, 0);
+  Holder holder;
+  if (bytes > 0) std::istringstream(text.data()) >> holder.host >> holder.pid;
+  return holder;
+}
+
+/// Where the file system has no locks: only a process of this machine is known to be dead.
+bool may_live(const Holder& holder) {
+  if (holder.pid <= 0) return false;
+  if (holder.host != host_name()) return true;
+  return holder.pid != ::getpid() && (::kill(holder.pid, 0) == 0 || errno == EPERM);
+}
+
+MapFileError held_by(const fs::path& map_file, const Holder& holder) {
+  const std::string who = holder.pid == 0 ? "another process"
+                                          : "process " + std::to_string(holder.pid) +
+                                                " on the machine '" + holder.host + "'";
+  return {map_file, "is in use by " + who + ", which writes its map there; stop it, or name " +
+                        "another file"};
+}
+
+MapFileError not_lockable(const fs::path& map_file, const char* why) {
+  return {map_file, std::string("cannot be locked (") + why +
+                        "); its folder must exist and be writable"};
+}
+
+/// Opens and locks it; -1 when it was removed meanwhile, by a holder that ended.
+int try_lock(const fs::path& lock_file, const fs::path& map_file) {
+  const int descriptor = ::open(lock_file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644);
+  if (descriptor < 0) throw not_lockable(map_file, std::strerror(errno));
+  const bool is_locked = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+  const bool has_no_locks = !is_locked && errno != EWOULDBLOCK;
+  const Holder holder = holder_in(descriptor);
+  if (!is_locked && !(has_no_locks && !may_live(holder))) {
+    ::close(descriptor);
+    throw held_by(map_file, holder);
+  }
+  struct stat opened {};
+  struct stat named {};
+  if (::fstat(descriptor, &opened) == 0 && ::stat(lock_file.c_str(), &named) == 0 &&
+      opened.st_ino == named.st_ino) {
+    return descriptor;
+  }
+  ::close(descriptor);
+  return -1;
+}
+
+}  // namespace
+
+MapLock::MapLock(const fs::path& map_file) : lock_file_(beside(map_file, ".lock")) {
+  while (descriptor_ < 0) descriptor_ = try_lock(lock_file_, map_file);
+  const std::string holder = host_name() + " " + std::to_string(::getpid()) + "\n";
+  const bool is_named =
+      ::ftruncate(descriptor_, 0) == 0 && ::pwrite(descriptor_, holder.data(), holder.size(), 0) ==
+                                              static_cast<ssize_t>(holder.size());
+  if (is_named) return;
+  const std::string why = std::strerror(errno);
+  ::close(descriptor_);
+  throw not_lockable(map_file, why.c_str());
+}
+
+MapLock::~MapLock() {
+  std::error_code ignored;
+  fs::remove(lock_file_, ignored);
+  ::close(descriptor_);
+}
+
+}  // namespace stillmap

@@ -1,0 +1,23 @@
+#pragma once
+
+#include <filesystem>
+
+namespace stillmap {
+
+/// Who writes a map file: one process at a time. The file "NAME.lock" beside it names the holder,
+/// as "host pid", and is locked (flock) as long as the holder lives: a lock that a killed process
+/// left behind is taken over. Programs that only read need none.
+class MapLock {
+ public:
+  /// Throws MapFileError that names the holder, or when the lock file cannot be written.
+  explicit MapLock(const std::filesystem::path& map_file);
+  ~MapLock();
+  MapLock(const MapLock&) = delete;
+  MapLock& operator=(const MapLock&) = delete;
+
+ private:
+  std::filesystem::path lock_file_;
+  int descriptor_ = -1;
+};
+
+}  // namespace stillmap

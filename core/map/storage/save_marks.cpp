@@ -1,0 +1,115 @@
+#include "core/map/storage/save_marks.hpp"
+
+#include <SQLiteCpp/Exception.h>
+#include <SQLiteCpp/Statement.h>
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <random>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "core/map/storage/map_database.hpp"
+
+namespace stillmap {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The log's own header; a log without more has nothing to apply.
+constexpr std::uintmax_t log_header_bytes = 32;
+
+std::int64_t random_mark() {
+  std::random_device entropy;
+  return static_cast<std::int64_t>(entropy()) << 32 | entropy();
+}
+
+/// In the order of the saves; none in a file that was saved before there were marks.
+std::vector<std::int64_t> marks(SQLite::Database& database) {
+  std::vector<std::int64_t> all;
+  if (!database.tableExists("saves")) return all;
+  SQLite::Statement row(database, "SELECT mark FROM saves ORDER BY rowid");
+  while (row.executeStep()) all.push_back(row.getColumn(0).getInt64());
+  return all;
+}
+
+/// An SQLite URI that names the file: "immutable" reads it without its log.
+std::string uri_without_log(const fs::path& file) {
+  constexpr const char* digits = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char c : fs::absolute(file).string()) {
+    if (c == '?' || c == '#' || c == '%') {
+      const auto byte = static_cast<unsigned char>(c);
+      uri += {'%', digits[byte >> 4], digits[byte & 15]};
+    } else {
+      uri += c;
+    }
+  }
+  return uri + "?immutable=1";
+}
+
+/// Nothing where the file cannot be read without its log, as when a crash came while the log was
+/// written into it.
+std::optional<std::int64_t> last_mark_without_log(const fs::path& file) {
+  try {
+    SQLite::Database alone(uri_without_log(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    const std::vector<std::int64_t> all = marks(alone);
+    return all.empty() ? std::nullopt : std::make_optional(all.back());
+  } catch (const SQLite::Exception&) {
+    return std::nullopt;
+  }
+}
+
+bool is_sound_without_log(const fs::path& file) {
+  try {
+    SQLite::Database alone(uri_without_log(file), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    return alone.execAndGet("PRAGMA quick_check(1)").getString() == "ok";
+  } catch (const SQLite::Exception&) {
+    return false;
+  }
+}
+
+/// Whether the log goes on from this state of the file.
+bool is_log_of(const fs::path& file) {
+  try {
+    SQLite::Database database(sqlite_name(file), SQLite::OPEN_READWRITE);
+    sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
+    // Busy where any process has the file open: then the log is in use.
+    database.exec("PRAGMA locking_mode = EXCLUSIVE");
+    static_cast<void>(database.tableExists("saves"));
+    const auto last = last_mark_without_log(file);
+    if (!last) return true;
+    const std::vector<std::int64_t> with_log = marks(database);
+    return std::ranges::find(with_log, *last) != with_log.end();
+  } catch (const SQLite::Exception& error) {
+    const bool is_damaged =
+        error.getErrorCode() == SQLITE_CORRUPT || error.getErrorCode() == SQLITE_NOTADB;
+    return !is_damaged || !is_sound_without_log(file);
+  }
+}
+
+}  // namespace
+
+void add_save_mark(SQLite::Database& database, bool log_was_empty) {
+  database.exec("CREATE TABLE IF NOT EXISTS saves (mark INTEGER NOT NULL)");
+  if (log_was_empty) {
+    database.exec("DELETE FROM saves WHERE rowid < (SELECT max(rowid) FROM saves)");
+  }
+  SQLite::Statement insert(database, "INSERT INTO saves VALUES (?)");
+  insert.bind(1, random_mark());
+  insert.exec();
+}
+
+void put_away_other_log(const fs::path& file) {
+  const fs::path log = beside(file, "-wal");
+  std::error_code none_there;
+  const std::uintmax_t bytes = fs::file_size(log, none_there);
+  if (none_there || bytes <= log_header_bytes || is_log_of(file)) return;
+  fs::rename(log, beside(file, "-wal.other"));
+  fs::remove(beside(file, "-shm"));
+}
+
+}  // namespace stillmap

@@ -1,0 +1,98 @@
+#include "server/mapping/map_folder.hpp"
+
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <ctime>
+#include <stdexcept>
+#include <string_view>
+#include <system_error>
+
+#include "core/map/storage/map_file.hpp"
+
+namespace stillmap::server {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr std::size_t max_name_bytes = 200;
+
+/// Of the files that stand beside a map file while it is used.
+constexpr std::array<std::string_view, 7> reserved_endings{
+    "-wal", "-shm", "-journal", ".new", ".empty", ".lock", ".other"};
+
+/// No path, nothing that SQLite, a shell or another system would read as more than a name.
+bool is_plain_name(const std::string& name) {
+  const auto is_special = [](unsigned char c) {
+    return c < ' ' || c == 127 || std::string_view("/\\:?*%\"<>|").find(static_cast<char>(c)) !=
+                                      std::string_view::npos;
+  };
+  const auto ends_as = [&](std::string_view ending) { return name.ends_with(ending); };
+  return !name.empty() && name.size() <= max_name_bytes && name.front() != '.' &&
+         name.front() != '-' && std::ranges::none_of(name, is_special) &&
+         std::ranges::none_of(reserved_endings, ends_as);
+}
+
+std::string local_time() {
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
+  std::tm parts{};
+  ::localtime_r(&now, &parts);
+  std::array<char, 32> text{};
+  std::strftime(text.data(), text.size(), "%Y-%m-%d_%H%M%S", &parts);
+  return text.data();
+}
+
+}  // namespace
+
+MapFolder::MapFolder(const fs::path& map_file, const SavedMapsLimit& limit)
+    : folder_(fs::absolute(map_file.empty() ? fs::path("map") : map_file).parent_path()),
+      limit_(limit) {}
+
+fs::path MapFolder::file_named(const std::string& name) const {
+  if (!is_plain_name(name)) {
+    throw std::invalid_argument("file '" + name +
+                                "' must be a plain name, without any of / \\ : ? * % \" < > | and "
+                                "not beginning with . or -; it is looked for beside the "
+                                "configured map file");
+  }
+  const fs::path file = folder_ / name;
+  std::error_code error;
+  if (fs::weakly_canonical(file, error).parent_path() != fs::weakly_canonical(folder_, error)) {
+    throw std::invalid_argument("file '" + name + "' is a link that leads out of " +
+                                folder_.string() + "; it must be a plain name of a file there");
+  }
+  return file;
+}
+
+fs::path MapFolder::unused_file_for(const fs::path& map_file) const {
+  const std::string stem = map_file.stem().string() + "." + local_time();
+  const std::string extension = map_file.extension().string();
+  fs::path file = folder_ / (stem + extension);
+  for (int n = 2; fs::exists(file); ++n) {
+    file = folder_ / (stem + "." + std::to_string(n) + extension);
+  }
+  return file;
+}
+
+void MapFolder::check_room(const fs::path& running, const fs::path& replaced,
+                           std::uintmax_t bytes) const {
+  std::uintmax_t maps = 1;
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
+    const fs::path& file = entry.path();
+    // Opening the running map's file and closing it again would release SQLite's locks on it.
+    if (file == running || file == replaced || !is_map_file(file)) continue;
+    ++maps;
+    const std::uintmax_t size = entry.file_size(error);
+    if (!error) bytes += size;
+  }
+  if (maps <= limit_.max_maps && bytes <= limit_.max_bytes) return;
+  throw std::invalid_argument(
+      "with it, there would be " + std::to_string(maps) + " saved maps of " +
+      std::to_string(bytes >> 20) + " MiB in " + folder_.string() + ", and the limits are " +
+      std::to_string(limit_.max_maps) + " (map.saved_maps) and " +
+      std::to_string(limit_.max_bytes >> 20) +
+      " MiB (map.saved_maps_mib): remove some there, or raise the limits");
+}
+
+}  // namespace stillmap::server
