@@ -119,6 +119,11 @@ struct Odometry::State {
                    FeatureSets& features, OdometryResult& result) const;
   [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
                                              const PosePrediction& prediction) const;
+  /// Asks the points for a second opinion; the paper has none.
+  void confirm(const FeatureSets& features, OdometryResult& result) const {
+    if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
+    result = confirmed_by_points(result, features, map, config);
+  }
   [[nodiscard]] SweepPrior sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,
                                        const SweepMotion& motion) const;
   void extend_map(const ScanInParts& parts, const Step& step,
@@ -434,8 +439,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   FeatureSets features;
   step.result = state.find_pose(parts, prediction, features);
   state.judge_again(parts, T_map_lidar_predicted, features, step.result);
-  if (state.started && !config.paper_exact && step.result.health != OdometryHealth::lost)
-    step.result = confirmed_by_points(step.result, features, state.map, config);
+  state.confirm(features, step.result);
   if (state.first_scan) state.straighten_first_scan(features, time_ns, sweep, step.result);
   const Eigen::Isometry3d T_map_middle = step.result.T_map_lidar;
   const Eigen::Isometry3d T_correction = motion_of(step.result.sweep_correction);
