@@ -10,9 +10,10 @@ RECORDINGS ?=
 DRIVES ?=
 BASE ?= HEAD~1
 FILES ?=
+TILES ?=
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages configure programs build deb demo test test-dev test-tsan test-kill test-network test-docker tidy image fuzz soak bench table1 drives ros-messages parity format format-check clean
+.PHONY: help packages configure programs build deb demo test test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 drives ros-messages parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -59,6 +60,10 @@ test-tsan: ## The tests under ThreadSanitizer
 
 test-kill: build ## Kill the server at 50 random moments of mapping, and look at what is stored
 	STILLMAP_KILLS=50 $(BUILD)/tests/server/kill_test
+
+test-scale: build ## A server with TILES=100000,1000000 tiles and 512 MiB beside an empty one: start, mapping, look-ups, late joiners
+	@/usr/bin/python3 tests/scale/scale.py --bin $(BUILD)/bin --tools $(BUILD)/tests/scale --maps $(BUILD)/scale --standing \
+	  $(if $(TILES),--tiles $(TILES))
 
 test-network: build ## Loss, slow links, outages, TCP, dead and late subscribers, in network namespaces
 	/usr/bin/python3 tests/network/run.py --programs $(BUILD)/bin --lab $(BUILD)/tests/network

@@ -344,10 +344,10 @@ Subscription Client::subscribe_tile_index(
 Subscription Client::subscribe_region(const Region& region,
                                       std::function<void(const RegionUpdate&)> update_arrived) {
   const RegionShape shape(region);
-  const double tile_size_m = get_tile_versions(shape.bounds_map()).map.tile_size_m;
   Connection& connection = *connection_;
   return make_region_subscription(
-      connection.participant, connection.topics.tile_index, region, tile_size_m,
+      connection.participant, connection.topics.tile_index, region,
+      get_tile_versions(shape.bounds_map()),
       [&connection](std::span<const TileId> ids) { return connection.fetch_tiles(ids); },
       std::move(update_arrived));
 }

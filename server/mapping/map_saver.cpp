@@ -13,6 +13,10 @@ constexpr std::size_t recent_saves = 10;
 /// The next save may take so many times the longest of them.
 constexpr double duration_margin = 1.5;
 
+/// A robot that has gone no farther stands [m], [rad].
+constexpr double standing_distance_m = 0.5;
+constexpr double standing_angle_rad = 0.2;
+
 constexpr const char* no_map_yet = "holds no map yet; name a file that a map was saved to";
 
 /// Opens an existing file; open_map_file would create a missing one.
@@ -42,12 +46,15 @@ bool is_plain_name(const std::string& name) {
 }  // namespace
 
 MapSaver::MapSaver(const LatestMap& latest_map, Statistics& statistics, std::filesystem::path file,
-                   std::map<std::string, std::string> metadata, std::uint32_t memory_limit_mib)
+                   std::map<std::string, std::string> metadata, const MapSaverLimits& limits,
+                   MonotonicClock& clock)
     : latest_map_(latest_map),
       statistics_(statistics),
       file_(std::move(file)),
       metadata_(std::move(metadata)),
-      memory_limit_bytes_(std::size_t{memory_limit_mib} << 20) {
+      memory_limit_bytes_(std::size_t{limits.memory_limit_mib} << 20),
+      standing_allowance_(std::uint64_t{limits.standing_mib_per_hour} << 20),
+      clock_(clock) {
   // Opened at the start, so that a file that cannot be written is noticed before mapping begins.
   if (!file_.empty()) {
     store_ = open_map_file(file_);
@@ -87,13 +94,36 @@ void MapSaver::save_if_changed() {
   if (!store_ || is_saved()) return;
   // A temporary file is only there to make room in memory.
   if (file_.empty() && source_->memory_use().bytes < memory_limit_bytes_ / 2) return;
-  save(false);
+  save(scope());
 }
 
 void MapSaver::save_at_end() {
   const std::scoped_lock lock(mutex_);
   // Nothing mapped: an empty map must not replace what the file holds.
-  if (!file_.empty() && latest_map_.poses_added() > 0) save(true);
+  if (!file_.empty() && latest_map_.poses_added() > 0) save(CheckpointScope::changed, true);
+}
+
+void MapSaver::make_room() {
+  const std::scoped_lock lock(mutex_);
+  if (store_) save(CheckpointScope::changed);
+}
+
+CheckpointScope MapSaver::scope() {
+  // Evidence that is not stored cannot be evicted.
+  const bool is_full =
+      memory_limit_bytes_ > 0 && source_->memory_use().bytes > memory_limit_bytes_ / 2;
+  if (is_full || has_moved() || standing_allowance_.is_open(clock_.now())) {
+    return CheckpointScope::changed;
+  }
+  return CheckpointScope::changed_views;
+}
+
+bool MapSaver::has_moved() const {
+  if (!T_map_base_saved_ || latest_map_.view()->map_id != saved_map_id_) return true;
+  const Eigen::Isometry3d motion =
+      T_map_base_saved_->inverse() * latest_map_.newest_pose().T_map_lidar;
+  return motion.translation().norm() > standing_distance_m ||
+         Eigen::AngleAxisd(motion.linear()).angle() > standing_angle_rad;
 }
 
 bool MapSaver::is_saved() const {
@@ -103,10 +133,10 @@ bool MapSaver::is_saved() const {
                         poses == saved_poses_);
 }
 
-void MapSaver::save(bool has_ended) {
+void MapSaver::save(CheckpointScope scope, bool has_ended) {
   const auto began = std::chrono::steady_clock::now();
   try {
-    store(has_ended);
+    if (!store(scope, has_ended)) return;
   } catch (...) {
     statistics_.map_save_failed();
     throw;
@@ -115,15 +145,25 @@ void MapSaver::save(bool has_ended) {
   statistics_.map_saved(took.count());
 }
 
-void MapSaver::store(bool has_ended) {
+bool MapSaver::store(CheckpointScope scope, bool has_ended) {
   const std::uint64_t poses = latest_map_.poses_added();
-  RunCheckpoint checkpoint = take(false);
+  const bool is_standing = !has_moved();
+  const Eigen::Isometry3d T_map_base = latest_map_.newest_pose().T_map_lidar;
+  RunCheckpoint checkpoint = take(scope);
   // Nothing is stored yet of another map.
-  if (checkpoint.map.view.map_id != saved_map_id_) checkpoint = take(true);
+  if (checkpoint.map.view.map_id != saved_map_id_) {
+    scope = CheckpointScope::everything;
+    checkpoint = take(scope);
+  }
+  checkpoint.map.is_partial = scope == CheckpointScope::changed_views;
+  if (checkpoint.map.is_partial && checkpoint.map.tile_evidence.empty()) return false;
   if (has_ended) checkpoint.map.metadata[map_ended_key] = "yes";
-  store_->save(checkpoint.map);
+  const std::uint64_t bytes = store_->save(checkpoint.map);
   source_->checkpoint_stored(checkpoint.step);
   remember_as_saved(checkpoint.map.view, poses);
+  if (is_standing) standing_allowance_.spend(bytes);
+  if (!checkpoint.map.is_partial) T_map_base_saved_ = T_map_base;
+  return true;
 }
 
 void MapSaver::remember_as_saved(const MapSnapshot& view, std::uint64_t poses) {
@@ -153,9 +193,9 @@ std::filesystem::path MapSaver::file_named(const std::string& name) const {
 std::filesystem::path MapSaver::save_as(const std::string& name) {
   const std::scoped_lock lock(mutex_);
   const std::filesystem::path target = file_named(name);
-  if (store_) save(false);
+  if (store_) save(CheckpointScope::changed);
   if (store_ && target != file_) store_->copy_to(target);
-  if (!store_) open_map_file(target)->save(take(true).map);
+  if (!store_) open_map_file(target)->save(take(CheckpointScope::everything).map);
   return std::filesystem::absolute(target);
 }
 
@@ -166,7 +206,9 @@ std::filesystem::path MapSaver::resume_from(const std::string& name,
   auto store = open_existing(target);
   SavedMap map = read(*store);
   if (map.view.tiles.empty()) throw MapFileError(target, no_map_yet);
-  if (target != file_ && !file_.empty() && latest_map_.poses_added() > 0) save(false);
+  if (target != file_ && !file_.empty() && latest_map_.poses_added() > 0) {
+    save(CheckpointScope::changed);
+  }
   map.view.map_id = new_map_id();
   replace_running(map, memory_limit_bytes_ > 0 ? store->tile_store() : nullptr);
   store->begin_run(map.view.map_id);
@@ -174,16 +216,27 @@ std::filesystem::path MapSaver::resume_from(const std::string& name,
   if (target != file_) metadata_.erase("datum");
   file_ = target;
   store_ = std::move(store);
+  T_map_base_saved_.reset();
   remember_metadata(map);
   remember_as_saved(*latest_map_.view(), latest_map_.poses_added());
   return std::filesystem::absolute(target);
 }
 
-RunCheckpoint MapSaver::take(bool everything) const {
-  RunCheckpoint checkpoint = source_->checkpoint(everything);
+RunCheckpoint MapSaver::take(CheckpointScope scope) const {
+  RunCheckpoint checkpoint = source_->checkpoint(scope);
   checkpoint.map.metadata = metadata_;
   checkpoint.map.metadata.insert(stored_metadata_.begin(), stored_metadata_.end());
   return checkpoint;
+}
+
+bool WriteAllowance::is_open(MonotonicClock::TimePoint now) {
+  if (bytes_per_hour_ == 0.0) return true;
+  if (refilled_) {
+    const std::chrono::duration<double, std::ratio<3600>> hours = now - *refilled_;
+    left_ = std::min(bytes_per_hour_, left_ + hours.count() * bytes_per_hour_);
+  }
+  refilled_ = now;
+  return left_ > 0.0;
 }
 
 std::chrono::duration<double> due_after_begin(std::chrono::duration<double> period,

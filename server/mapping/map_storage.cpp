@@ -37,7 +37,8 @@ std::optional<SavedMap> saved_map(MapSaver& saver, const ServerConfig& config) {
 MapStorage::MapStorage(const ServerConfig& config, const std::string& label_source,
                        Statistics& statistics)
     : saver_(latest_map_, statistics, config.map.file, file_metadata(config, label_source),
-             config.map.memory_limit_mib),
+             {.memory_limit_mib = config.map.memory_limit_mib,
+              .standing_mib_per_hour = config.map.standing_mib_per_hour}),
       tiles_(saver_.tile_store(), tile_cache_bytes(config.map)),
       loaded_(saved_map(saver_, config)) {}
 

@@ -8,7 +8,7 @@
 #include <stop_token>
 #include <string>
 
-#include "core/lidar/trajectory.hpp"
+#include "core/lidar/shared_trajectory.hpp"
 #include "core/map/query/tile_history.hpp"
 #include "core/map/tile.hpp"
 #include "core/odometry/odometry_state.hpp"
@@ -23,7 +23,7 @@ namespace stillmap::server {
 class LatestMap {
  public:
   /// A new map begins: its first view, and the poses that led to it.
-  void begin(std::shared_ptr<const MapSnapshot> view, Trajectory trajectory);
+  void begin(std::shared_ptr<const MapSnapshot> view, SharedTrajectory trajectory);
   void publish(std::shared_ptr<const MapSnapshot> view);
   /// Removes poses with the same or later stamps first: a recording that is played again replaces
   /// its old path. A lost pose changes health and label source alone.
@@ -42,7 +42,8 @@ class LatestMap {
       std::chrono::milliseconds timeout) const;
   /// The view and the history that ends with it.
   [[nodiscard]] MapState state() const;
-  [[nodiscard]] Trajectory trajectory() const;
+  /// Costs little: it shares its poses.
+  [[nodiscard]] SharedTrajectory trajectory() const;
   /// At most `max_poses` (>= 2) of its poses, evenly spaced, the newest always among them. The
   /// selection stays the same until the path has twice as many poses.
   [[nodiscard]] Trajectory trajectory(std::size_t max_poses) const;
@@ -58,7 +59,7 @@ class LatestMap {
   mutable std::condition_variable_any changed_;
   MapState state_;
   std::chrono::steady_clock::time_point published_at_;
-  Trajectory trajectory_;
+  SharedTrajectory trajectory_;
   std::uint64_t poses_added_ = 0;
   OdometryHealth health_ = OdometryHealth::initialised;
   std::string label_source_;

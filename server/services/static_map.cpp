@@ -2,6 +2,7 @@
 #include <string>
 #include <utility>
 
+#include "core/map/voxel_grid.hpp"
 #include "idl/conversions/tile.hpp"
 #include "server/services/service_handlers.hpp"
 
@@ -39,10 +40,6 @@ void check_interval(double low, double high, const std::string& axis) {
                               " " + std::to_string(high));
 }
 
-bool meets(std::int32_t index, double tile_size_m, double low, double high) {
-  return index * tile_size_m <= high && (index + 1.0) * tile_size_m >= low;
-}
-
 // About 5 MB at 27 bytes a voxel. At least one tile is always sent.
 constexpr std::size_t max_voxels_per_reply = 200'000;
 
@@ -75,12 +72,12 @@ GetTileVersions_Response get_tile_versions(const ServiceContext& context,
     check_interval(request.min_y(), request.max_y(), "y");
     const dds::MapIdentity identity = wire::identity_of(view);
     response.identity(wire::to_wire(identity));
-    for (const auto& tile : view.tiles) {
-      const TileId id = tile->info.id;
-      if (meets(id.x, view.tile_size_m, request.min_x(), request.max_x()) &&
-          meets(id.y, view.tile_size_m, request.min_y(), request.max_y())) {
-        response.tiles().push_back(wire::to_wire(tile->info, identity));
-      }
+    const Eigen::AlignedBox3d box_map(Eigen::Vector3d(request.min_x(), request.min_y(), 0.0),
+                                      Eigen::Vector3d(request.max_x(), request.max_y(), 0.0));
+    const auto tiles = tiles_in_range(view.tiles, tile_range(box_map, view.tile_size_m));
+    response.tiles().reserve(tiles.size());
+    for (const auto& tile : tiles) {
+      response.tiles().push_back(wire::to_wire(tile->info, identity));
     }
   });
 }

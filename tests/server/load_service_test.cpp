@@ -114,7 +114,7 @@ TEST_F(LoadService, RefusesWhatItCannotGoOnWith) {
   map_scans(0, 8);
   client_.save_map("good.stillmap");
   SavedMap other = open_map_file(beside("good.stillmap"))->load();
-  other.view.tiles.clear();
+  other.view.tiles = {};
   open_map_file(beside("no_tiles.stillmap"))->save(other);
   std::string bytes = content_of(beside("good.stillmap"));
   std::ofstream(beside("newer.stillmap"), std::ios::binary)

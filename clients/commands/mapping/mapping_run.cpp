@@ -68,7 +68,7 @@ class MappingRun {
     for (const StampedPose& pose : mapper_.trajectory()) {
       result_.trajectory.push_back({pose.stamp_ns, pose.T_map_lidar * T_lidar_body});
     }
-    SavedMap map = to_saved_map(mapper_.static_map().checkpoint(true));
+    SavedMap map = to_saved_map(mapper_.static_map().checkpoint(CheckpointScope::everything));
     result_.view = std::make_shared<const MapSnapshot>(std::move(map.view));
     result_.tile_evidence = std::move(map.tile_evidence);
     result_.label_source = mapper_.label_source();
