@@ -237,10 +237,11 @@ class StandingRobot : public MapSaverTest {
   [[nodiscard]] SavedMap stored() { return open_map_file(file_)->load(); }
   /// Until nothing more is written of it.
   void stand() {
-    for (std::size_t poses = 0; poses != stored().trajectory.size();) {
+    std::size_t poses = 0;
+    do {
       poses = stored().trajectory.size();
       for (int i = 0; i < 10; ++i) scan_and_save(20);
-    }
+    } while (poses != stored().trajectory.size());
   }
 
   std::int64_t stamp_ns_ = 0;
