@@ -11,9 +11,10 @@ RECORDINGS ?=
 DRIVES ?=
 BASE ?= HEAD~1
 FILES ?=
+TILES ?=
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages configure programs build deb demo test test-dev test-tsan test-kill test-network test-docker tidy image fuzz soak bench table1 drives ros-messages parity format format-check clean
+.PHONY: help packages configure programs build deb demo test test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 drives ros-messages parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -48,19 +49,21 @@ demo: programs ## Run the main job: simulated city, replay over DDS, server, pla
 	BUILD=$(BUILD) clients/demo.sh
 
 test: build ## Build and run the tests
-	$(ONE_CORE) ctest --preset $(PRESET) -j $(JOBS)
+	ctest --preset $(PRESET) -j $(JOBS)
 
 test-dev: ## The tests under ASan and UBSan with assertions, warnings as errors
 	$(MAKE) test PRESET=dev
 
 test-tsan: ## The tests under ThreadSanitizer
-	@# Debian's oneTBB is not instrumented: what it synchronises looks like races. On one core it starts
-	@# no threads, and our own are looked at.
-	$(MAKE) test PRESET=tsan ONE_CORE='taskset -c 0'
+	$(MAKE) test PRESET=tsan
 
 test-kill: build ## Kill the server at KILLS=50 random moments, also while its disk fails, and look at what is stored
 	STILLMAP_KILLS=$(KILLS) $(BUILD)/tests/server/map_saver_faults_test
 	STILLMAP_KILLS=$(KILLS) $(BUILD)/tests/server/kill_test
+
+test-scale: build ## A server with TILES=100000,1000000 tiles and 512 MiB beside an empty one: start, mapping, look-ups, late joiners
+	@/usr/bin/python3 tests/scale/scale.py --bin $(BUILD)/bin --tools $(BUILD)/tests/scale --maps $(BUILD)/scale --standing \
+	  $(if $(TILES),--tiles $(TILES))
 
 test-network: build ## Loss, slow links, outages, TCP, dead and late subscribers, in network namespaces
 	/usr/bin/python3 tests/network/run.py --programs $(BUILD)/bin --lab $(BUILD)/tests/network

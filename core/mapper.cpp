@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "core/lidar/rings.hpp"
+#include "core/map/voxel_grid.hpp"
 
 namespace stillmap {
 namespace {
@@ -82,6 +83,10 @@ std::optional<MappedScan> Mapper::process(
   if (step.result.health != OdometryHealth::lost)
     label_synchronizer_.insert(mapped.labelled, labels, step.result.T_map_lidar, static_map_);
   trajectory_.push_back({mapped.labelled.scan.stamp_ns, step.result.T_map_lidar});
+  if (trajectory_.size() > 2 * max_poses_) {
+    trajectory_.erase(trajectory_.begin(),
+                      trajectory_.end() - static_cast<std::ptrdiff_t>(max_poses_));
+  }
   end_stage("static_map");
   return mapped;
 }
@@ -181,7 +186,7 @@ void Mapper::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidenc
 void Mapper::resume(StaticMap prepared) {
   static_map_ = std::move(prepared);
   clear_scan_state();
-  for (const auto& tile : static_map_.view()->tiles) resumed_tiles_.insert(tile->info.id);
+  resumed_tiles_ = static_map_.view()->tiles;
 }
 
 void Mapper::reset(std::uint64_t map_id) {
@@ -196,7 +201,7 @@ void Mapper::clear_scan_state() {
   last_middle_.reset();
   inertial_.forget_motion();
   clock_ = {};
-  resumed_tiles_.clear();
+  resumed_tiles_ = {};
   prior_map_added_at_map_.reset();
 }
 
@@ -206,10 +211,12 @@ void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {
       (position_map - *prior_map_added_at_map_).norm() < prior_map_update_distance_m)
     return;
   prior_map_added_at_map_ = position_map;
+  static_map_.reload_near(position_map);
   const auto view = static_map_.view();
   std::vector<LabelledPoint> points_map;
-  for (const auto& tile : view->tiles) {
-    if (!resumed_tiles_.contains(tile->info.id)) continue;
+  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(config_.static_map.max_range_m);
+  for (const auto& tile : tiles_in_box(*view, {position_map - reach, position_map + reach})) {
+    if (resumed_tiles_.find(tile->info.id) == nullptr) continue;
     const Eigen::AlignedBox3d bounds_map = tile->info.bounds_map.cast<double>();
     if (bounds_map.exteriorDistance(position_map) > config_.static_map.max_range_m) continue;
     for (const Voxel& voxel : tile->voxels) {

@@ -1,9 +1,9 @@
 #pragma once
 
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
 
@@ -98,7 +98,10 @@ class Mapper {
   [[nodiscard]] const InertialTracker& inertial() const { return inertial_; }
 
   [[nodiscard]] const ScanRejection& last_rejection() const { return last_rejection_; }
+  /// The poses of all scans, or of the last ones.
   [[nodiscard]] const Trajectory& trajectory() const { return trajectory_; }
+  /// Keeps at least this many of the last poses, and at most twice as many.
+  void limit_trajectory(std::size_t poses) { max_poses_ = poses; }
   [[nodiscard]] std::string label_source() const { return label_synchronizer_.name(); }
   [[nodiscard]] std::shared_ptr<const MapSnapshot> map_snapshot() { return static_map_.view(); }
 
@@ -146,9 +149,10 @@ class Mapper {
   Odometry odometry_;
   StaticMap static_map_;
   /// Tiles of a resumed map, and where their points were last added to the odometry's local map.
-  std::set<TileId> resumed_tiles_;
+  TileTable resumed_tiles_;
   std::optional<Eigen::Vector3d> prior_map_added_at_map_;
   Trajectory trajectory_;
+  std::size_t max_poses_ = std::numeric_limits<std::size_t>::max() / 2;
   ScanClock clock_;
   ScanRejection last_rejection_;
 };

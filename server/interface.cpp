@@ -21,7 +21,8 @@ ServerTraits traits(const ServerConfig& config, const InterfaceContext& context)
 
 Interface::Interface(const ServerConfig& config, const InterfaceContext& context)
     : participant_(context.participant),
-      map_publisher_(context.participant, context.topics, config, context.storage.latest_map()),
+      map_publisher_(context.participant, context.topics, config, context.storage.latest_map(),
+                     context.storage.tiles()),
       discovery_diagnostics_(context.participant),
       report_(
           traits(config, context), context.storage.latest_map(), context.statistics,

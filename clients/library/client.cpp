@@ -144,11 +144,24 @@ TileVersions Client::get_tile_versions(const Eigen::AlignedBox3d& box_map) {
   request.min_y(box_map.min().y());
   request.max_x(box_map.max().x());
   request.max_y(box_map.max().y());
-  const auto reply = connection_->call_ok(services::get_tile_versions, std::move(request));
-  TileVersions versions{.map = wire::from_wire(reply.identity()), .tiles = {}};
-  for (const auto& message : reply.tiles()) {
-    versions.tiles.push_back(
-        connection_->require_readable(wire::from_wire(message), services::get_tile_versions));
+  TileVersions versions;
+  for (bool has_more = true; has_more;) {
+    const bool is_first = request.continuation().empty();
+    const auto reply =
+        connection_->call_ok(services::get_tile_versions, GetTileVersions_Request(request));
+    const dds::MapIdentity map = wire::from_wire(reply.identity());
+    if (is_first) versions = {.map = map, .tiles = {}};
+    if (map.map_id != versions.map.map_id) {
+      // Another map than on the pages before: from the beginning.
+      request.continuation().clear();
+      continue;
+    }
+    for (const auto& message : reply.tiles()) {
+      versions.tiles.push_back(
+          connection_->require_readable(wire::from_wire(message), services::get_tile_versions));
+    }
+    request.continuation(reply.continuation());
+    has_more = !reply.continuation().empty();
   }
   return versions;
 }
@@ -348,10 +361,10 @@ Subscription Client::subscribe_tile_index(
 Subscription Client::subscribe_region(const Region& region,
                                       std::function<void(const RegionUpdate&)> update_arrived) {
   const RegionShape shape(region);
-  const double tile_size_m = get_tile_versions(shape.bounds_map()).map.tile_size_m;
   Connection& connection = *connection_;
   return make_region_subscription(
-      connection.participant, connection.topics.tile_index, region, tile_size_m,
+      connection.participant, connection.topics.tile_index, region,
+      get_tile_versions(shape.bounds_map()),
       [&connection](std::span<const TileId> ids) { return connection.fetch_tiles(ids); },
       std::move(update_arrived));
 }

@@ -37,9 +37,11 @@ Client::Connection::Connection(const ClientOptions& client_options)
 
 TileSet Client::Connection::fetch_tiles(std::span<const TileId> ids) {
   constexpr const auto& service = dds::services::get_tiles;
+  // More than an answer has, and few enough not to be sent again and again.
+  constexpr std::size_t ids_per_request = 2000;
   TileSet set;
-  auto remaining = to_wire(ids);
-  while (!remaining.empty()) {
+  auto remaining = to_wire(ids.first(std::min(ids.size(), ids_per_request)));
+  for (ids = ids.subspan(remaining.size()); !remaining.empty();) {
     GetTiles_Request request;
     request.ids(remaining);
     const auto reply = call_ok(service, std::move(request));
@@ -50,6 +52,9 @@ TileSet Client::Connection::fetch_tiles(std::span<const TileId> ids) {
     }
     for (const auto& id : reply.missing()) set.missing.push_back({id.x(), id.y()});
     remaining = reply.remaining();
+    if (!remaining.empty()) continue;
+    remaining = to_wire(ids.first(std::min(ids.size(), ids_per_request)));
+    ids = ids.subspan(remaining.size());
   }
   return set;
 }

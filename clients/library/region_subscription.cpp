@@ -27,21 +27,30 @@ dds::ContentFilter filter_for(const Region& region, double tile_size_m) {
                          std::to_string(range.first.y), std::to_string(range.last.y)}};
 }
 
+RegionTracker tracker_of(const Region& region, const TileVersions& present) {
+  RegionTracker tracker(region, present.map.tile_size_m);
+  for (const TileInfo& info : present.tiles) tracker.add_index_entry(present.map, info);
+  return tracker;
+}
+
 /// The reader of a region's part of the index, and the thread that turns entries into updates.
 class RegionReceiver final : public Subscription::Receiver {
  public:
   RegionReceiver(dds::Participant& participant,
                  const dds::TopicSpec<stillmap_msgs::msg::TileInfo>& index, const Region& region,
-                 double tile_size_m, FetchTiles fetch,
+                 const TileVersions& present, FetchTiles fetch,
                  std::function<void(const RegionUpdate&)> update_arrived)
-      : tracker_(region, tile_size_m),
+      : tracker_(tracker_of(region, present)),
         fetch_(std::move(fetch)),
         update_arrived_(std::move(update_arrived)),
-        reader_(participant, index.dds_name, index.reader, filter_for(region, tile_size_m)),
+        reader_(participant, index.dds_name, index.reader,
+                filter_for(region, present.map.tile_size_m)),
         thread_([this](const std::stop_token& stop) { receive(stop); }) {}
 
  private:
   void receive(const std::stop_token& stop) {
+    // What is there already first; later what the index tells.
+    if (tracker_.has_update()) deliver_update();
     while (!stop.stop_requested()) {
       collect_entries(stop);
       if (tracker_.has_update() && !stop.stop_requested()) deliver_update();
@@ -95,15 +104,13 @@ void RegionTracker::add_index_entry(const dds::MapIdentity& map, const TileInfo&
   if (!region_.may_intersect(tile_footprint(info.id, tile_size_m_))) return;
   if (map.map_id != map_.map_id) clear();
   map_ = map;
-  if (info.voxel_count == 0) {
-    remove(info.id);
-  } else {
-    pending_.insert(info.id);
-  }
+  if (info.voxel_count == 0) return remove(info.id);
+  const auto known = known_.find(info.id);
+  if (known == known_.end() || known->second < info.revision) pending_.insert(info.id);
 }
 
 void RegionTracker::clear() {
-  removed_.merge(known_);
+  for (const auto& [id, revision] : known_) removed_.insert(id);
   known_.clear();
   pending_.clear();
 }
@@ -120,7 +127,8 @@ RegionUpdate RegionTracker::take_update(TileSet fetched) {
     for (Tile& tile : fetched.tiles) {
       pending_.erase(tile.info.id);
       const bool is_replaced = removed_.erase(tile.info.id) > 0;
-      const bool is_known = !known_.insert(tile.info.id).second || is_replaced;
+      const bool is_known =
+          !known_.insert_or_assign(tile.info.id, tile.info.revision).second || is_replaced;
       (is_known ? update.changed : update.appeared).push_back(std::move(tile));
     }
   }
@@ -131,10 +139,11 @@ RegionUpdate RegionTracker::take_update(TileSet fetched) {
 
 Subscription make_region_subscription(dds::Participant& participant,
                                       const dds::TopicSpec<stillmap_msgs::msg::TileInfo>& index,
-                                      const Region& region, double tile_size_m, FetchTiles fetch,
+                                      const Region& region, const TileVersions& present,
+                                      FetchTiles fetch,
                                       std::function<void(const RegionUpdate&)> update_arrived) {
   return Subscription(std::make_unique<RegionReceiver>(
-      participant, index, region, tile_size_m, std::move(fetch), std::move(update_arrived)));
+      participant, index, region, present, std::move(fetch), std::move(update_arrived)));
 }
 
 }  // namespace stillmap

@@ -21,6 +21,7 @@ class RegionTracker {
   RegionTracker(const Region& region, double tile_size_m)
       : region_(region), tile_size_m_(tile_size_m) {}
 
+  /// An entry of a tile that was fetched in this state, or a newer one, changes nothing.
   void add_index_entry(const dds::MapIdentity& map, const TileInfo& info);
 
   /// Tiles that changed and are not fetched yet.
@@ -38,7 +39,8 @@ class RegionTracker {
   RegionShape region_;
   double tile_size_m_;
   dds::MapIdentity map_;
-  std::set<TileId> known_;
+  /// With their revisions.
+  std::map<TileId, std::uint64_t> known_;
   std::set<TileId> pending_;
   std::set<TileId> removed_;
 };
@@ -46,10 +48,12 @@ class RegionTracker {
 using FetchTiles = std::function<TileSet(std::span<const TileId>)>;
 
 /// A reader of the region's part of the tile index, and the thread that makes updates of its
-/// entries, fetching changed tiles. `fetch` may throw ServiceError; it is then called again later.
+/// entries, fetching changed tiles. `present` are the region's tiles: the first update has them,
+/// since the index has but those round the robot. `fetch` may throw ServiceError; it is then called
+/// again later.
 [[nodiscard]] Subscription make_region_subscription(
     dds::Participant& participant, const dds::TopicSpec<stillmap_msgs::msg::TileInfo>& index,
-    const Region& region, double tile_size_m, FetchTiles fetch,
+    const Region& region, const TileVersions& present, FetchTiles fetch,
     std::function<void(const RegionUpdate&)> update_arrived);
 
 }  // namespace stillmap

@@ -30,10 +30,13 @@ std::shared_ptr<const MapSnapshot> TileMirror::make_snapshot(const dds::MapIdent
   view->voxel_size_m = map.voxel_size_m;
   view->version = map.version;
   // A fetched tile may be newer than the update.
+  std::vector<std::shared_ptr<const Tile>> tiles;
+  tiles.reserve(tiles_.size());
   for (const auto& [id, tile] : tiles_) {
     view->version = std::max(view->version, tile->info.revision);
-    view->tiles.push_back(tile);
+    tiles.push_back(tile);
   }
+  view->tiles = TileTable(std::move(tiles));
   return view;
 }
 

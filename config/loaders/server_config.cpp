@@ -208,6 +208,7 @@ void read_publish(YamlSection section, PublishConfig& publish) {
   section.number("cloud_period_s", publish.cloud_period_s, periods_s);
   section.number("cloud_window_m", publish.cloud_window_m, {1, 1000});
   section.number("tiles_period_s", publish.tiles_period_s, periods_s);
+  section.number("tile_window_m", publish.tile_window_m, {1, 2000});
   section.number("status_period_s", publish.status_period_s, periods_s);
   section.boolean("scan", publish.scan);
 }
@@ -216,6 +217,7 @@ void read_map(YamlSection section, MapFileConfig& map) {
   section.path("file", map.file);
   section.number("save_period_s", map.save_period_s, {0.1, 86400});
   section.integer("memory_limit_mib", map.memory_limit_mib, {0, 1 << 20});
+  section.integer("standing_mib_per_hour", map.standing_mib_per_hour, {0, 1 << 20});
   section.boolean("load_at_start", map.load_at_start);
   section.integer("saved_maps", map.saved_maps, {0, 100000});
   section.integer("saved_maps_mib", map.saved_maps_mib, {0, 1 << 30});

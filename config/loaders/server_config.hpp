@@ -136,6 +136,8 @@ struct PublishConfig {
   /// Edge of the square round the robot that static_cloud shows.
   double cloud_window_m = 60.0;
   double tiles_period_s = 0.5;
+  /// Edge of the square round the robot whose tiles late joiners get from the topics.
+  double tile_window_m = 300.0;
   double status_period_s = 1.0;
   /// Publish every labelled scan (stillmap/scan).
   bool scan = true;
@@ -149,6 +151,8 @@ struct MapFileConfig {
   /// Of the static map, its copies for readers and for queries. What is far away is on disk. 0: all
   /// of the map stays in memory.
   std::uint32_t memory_limit_mib = 2048;
+  /// Written an hour while the robot stands and its map hardly changes; 0: no limit.
+  std::uint32_t standing_mib_per_hour = 3;
   /// Resume the map in `file` when it exists; else start empty.
   bool load_at_start = true;
   /// How many maps, and how many MiB of them, clients may have saved or kept beside `file`.

@@ -23,6 +23,20 @@ VoxelHistory history_of_shown(const Voxel& voxel) {
   return {.hits = static_cast<std::uint16_t>(std::min(voxel.point_count, most)), .was_shown = true};
 }
 
+/// Voxels, sorted by index, that only one of the lists has, or that have another class there.
+std::size_t changed_voxels(std::span<const Voxel> before, std::span<const Voxel> after) {
+  std::size_t changed = 0;
+  auto a = before.begin();
+  auto b = after.begin();
+  while (a != before.end() && b != after.end()) {
+    const auto order = a->index <=> b->index;
+    if (order != 0 || a->evidence.winner() != b->evidence.winner()) ++changed;
+    if (order <= 0) ++a;
+    if (order >= 0) ++b;
+  }
+  return changed + static_cast<std::size_t>((before.end() - a) + (after.end() - b));
+}
+
 }  // namespace
 
 std::uint32_t voxel_key(VoxelIndex index) {
@@ -173,9 +187,12 @@ std::vector<Voxel> LiveTile::visible_voxels(const VisibilityRule& rule, const Vo
 bool LiveTile::publish(std::uint64_t revision, const VisibilityRule& rule, const VoxelGrid& grid) {
   sort_new_voxels();
   Tile next = make_tile(id_, revision, visible_voxels(rule, grid), grid);
+  const auto shown = published_ ? std::span(published_->voxels) : std::span<const Voxel>();
+  unrecorded_voxels_ += changed_voxels(shown, next.voxels);
   if (next.voxels.empty()) return std::exchange(published_, nullptr) != nullptr;
   if (published_ && published_->info.content_hash == next.info.content_hash) return false;
   next.voxels.shrink_to_fit();
+  next.info.appeared_in = published_ ? published_->info.appeared_in : revision;
   published_ = std::make_shared<const Tile>(std::move(next));
   return true;
 }

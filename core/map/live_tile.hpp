@@ -8,6 +8,7 @@
 #include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
@@ -74,6 +75,14 @@ class LiveTile {
   std::size_t restore(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
                       const VisibilityRule& rule, const VoxelGrid& grid);
 
+  /// Whether what is published differs by more than a few voxels from what was stored last. A
+  /// standing lidar finds a new voxel now and then, at the edge of its noise.
+  [[nodiscard]] bool view_has_changed() const { return unrecorded_voxels_ >= min_changed_voxels; }
+  /// A record of the tile is to be stored.
+  void begin_recording() { recording_voxels_ = unrecorded_voxels_; }
+  /// It is stored.
+  void end_recording() { unrecorded_voxels_ -= std::exchange(recording_voxels_, 0); }
+
   /// The complete state. Requires that the tile did not change since `publish`.
   [[nodiscard]] TileRecord record(const VisibilityRule& rule, const VoxelGrid& grid) const;
 
@@ -89,6 +98,7 @@ class LiveTile {
   static constexpr double offset_steps = 1024.0;
   /// The mean is not updated beyond this count: the sum would overflow 32 bits.
   static constexpr std::uint32_t max_mean_points = 1U << 22;
+  static constexpr std::size_t min_changed_voxels = 16;
 
   /// Sums are whole numbers, so that the mean does not depend on the order of points.
   struct LiveVoxel {
@@ -134,6 +144,9 @@ class LiveTile {
   /// in it yet.
   std::vector<std::uint32_t> sorted_;
   std::shared_ptr<const Tile> published_;
+  /// Voxels that appeared, went or got another class since the last record.
+  std::size_t unrecorded_voxels_ = 0;
+  std::size_t recording_voxels_ = 0;
 };
 
 }  // namespace stillmap

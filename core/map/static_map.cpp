@@ -8,6 +8,7 @@
 #include <cmath>
 #include <map>
 #include <memory>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -121,37 +122,50 @@ struct StaticMap::State {
   }
   /// A new tile, a resident one, or one from the tile store; null when it cannot be read.
   [[nodiscard]] LiveTile* tile(TileId id);
+  /// What the last view, or the next one, has of the tile; null where it shows nothing.
+  [[nodiscard]] std::shared_ptr<const Tile> shown(TileId id) const;
+  [[nodiscard]] bool is_known_non_resident(TileId id) const;
   /// Reads a non-resident tile from the tile store; false when it cannot be read.
   bool reload(TileId id);
-  /// The tile changed in this step.
-  void touch(LiveTile& live);
+  void add_resident(TileId id, const TileRecord& record);
+  void evict(TileId id);
+  /// The tile changed in this step; `is_published`: what it shows may have, too.
+  void touch(LiveTile& live, bool is_published = true);
   /// Tiles in memory whose footprint comes this near.
   [[nodiscard]] std::vector<LiveTile*> tiles_near(const Eigen::Vector3f& position_map,
                                                   double range_m) const;
   /// From the tile's footprint [m].
   [[nodiscard]] double distance_m(TileId id, const Eigen::Vector2d& position_map) const;
-  [[nodiscard]] std::vector<std::shared_ptr<const Tile>> published_tiles() const;
+  /// Scans from a position reach tiles that are this near, with a margin of two tiles [m].
+  [[nodiscard]] double reach_m() const { return config.max_range_m + 2.0 * config.tile_size_m; }
   [[nodiscard]] std::size_t memory_bytes() const;
+  [[nodiscard]] std::vector<LiveTile*> tiles_to_store(CheckpointScope scope) const;
 
   StaticMapConfig config;
   VoxelGrid grid;
   ScanSorter sorter;
   tsl::robin_map<TileId, Resident, TileIdHash> tiles;
-  /// In the tile store: the tile without its voxels, null where it shows none.
-  std::map<TileId, std::shared_ptr<const Tile>> non_resident;
+  /// In the tile store alone, and without any voxel to show. Other tiles that are not in `tiles`
+  /// but in the view are there, too.
+  std::set<TileId> hidden_non_resident;
+  /// Both kinds.
+  std::size_t non_resident_count = 0;
   std::shared_ptr<TileStore> tile_store;
   /// Why tiles that are non-resident could not be read.
   std::map<TileId, std::string> unreadable;
   /// Tiles with points since the last view; a tile may be named more than once.
   std::vector<LiveTile*> touched;
-  /// Tiles were evicted or reloaded since the last view.
-  bool residency_changed = false;
   bool is_frozen = false;
+  /// What the next view shows otherwise than the last one.
+  std::map<TileId, std::shared_ptr<const Tile>> edits;
+  /// Resident tiles that changed since they were stored.
+  std::set<TileId> unsaved;
+  /// Tiles of the checkpoint that was taken last.
+  std::vector<TileId> in_checkpoint;
   /// Scans so far.
   std::uint64_t inserted = 0;
-  /// Counts the changes of tiles; up to `stored_step` they are in the tile store.
+  /// Counts the changes of tiles.
   std::uint64_t step = 1;
-  std::uint64_t stored_step = 0;
   /// The last view.
   std::shared_ptr<const MapSnapshot> current;
 };
@@ -163,11 +177,15 @@ StaticMap::State::State(const StaticMapConfig& map_config)
 
 void StaticMap::State::clear(std::uint64_t map_id) {
   tiles.clear();
-  non_resident.clear();
+  hidden_non_resident.clear();
+  non_resident_count = 0;
   unreadable.clear();
   touched.clear();
+  edits.clear();
+  unsaved.clear();
+  in_checkpoint.clear();
   inserted = 0;
-  stored_step = step++;
+  ++step;
   MapSnapshot empty;
   empty.map_id = map_id;
   empty.tile_size_m = config.tile_size_m;
@@ -177,16 +195,26 @@ void StaticMap::State::clear(std::uint64_t map_id) {
 
 LiveTile* StaticMap::State::tile(TileId id) {
   if (const auto known = tiles.find(id); known != tiles.end()) return known->second.live.get();
-  if (non_resident.contains(id)) {
+  if (is_known_non_resident(id)) {
     return reload(id) ? tiles.find(id)->second.live.get() : nullptr;
   }
   Resident fresh{std::make_unique<LiveTile>(id), step};
   return tiles.emplace(id, std::move(fresh)).first->second.live.get();
 }
 
-void StaticMap::State::touch(LiveTile& live) {
-  touched.push_back(&live);
+std::shared_ptr<const Tile> StaticMap::State::shown(TileId id) const {
+  const auto edited = edits.find(id);
+  return edited != edits.end() ? edited->second : current->tiles.find(id);
+}
+
+bool StaticMap::State::is_known_non_resident(TileId id) const {
+  return !tiles.contains(id) && (hidden_non_resident.contains(id) || shown(id) != nullptr);
+}
+
+void StaticMap::State::touch(LiveTile& live, bool is_published) {
+  if (is_published) touched.push_back(&live);
   tiles.find(live.id()).value().changed_at = step;
+  unsaved.insert(live.id());
 }
 
 double StaticMap::State::distance_m(TileId id, const Eigen::Vector2d& position_map) const {
@@ -198,24 +226,18 @@ double StaticMap::State::distance_m(TileId id, const Eigen::Vector2d& position_m
 std::vector<LiveTile*> StaticMap::State::tiles_near(const Eigen::Vector3f& position_map,
                                                     double range_m) const {
   const Eigen::Vector2d position = position_map.head<2>().cast<double>();
+  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(range_m);
+  const Eigen::Vector3d centre = position_map.cast<double>();
   std::vector<LiveTile*> near;
-  for (const auto& [id, resident] : tiles) {
-    if (distance_m(id, position) <= range_m) near.push_back(resident.live.get());
+  const TileRange range = tile_range({centre - reach, centre + reach}, grid.tile_size_m());
+  for (TileId id = range.first; id.x <= range.last.x; ++id.x) {
+    for (id.y = range.first.y; id.y <= range.last.y; ++id.y) {
+      const auto known = tiles.find(id);
+      if (known == tiles.end() || distance_m(id, position) > range_m) continue;
+      near.push_back(known->second.live.get());
+    }
   }
   return near;
-}
-
-std::vector<std::shared_ptr<const Tile>> StaticMap::State::published_tiles() const {
-  std::vector<std::shared_ptr<const Tile>> published;
-  published.reserve(tiles.size() + non_resident.size());
-  for (const auto& [id, resident] : tiles) {
-    if (resident.live->published()) published.push_back(resident.live->published());
-  }
-  for (const auto& [id, shown] : non_resident) {
-    if (shown) published.push_back(shown);
-  }
-  std::ranges::sort(published, {}, [](const auto& shared) { return shared->info.id; });
-  return published;
 }
 
 StaticMap::StaticMap(const StaticMapConfig& config) : state_(std::make_unique<State>(config)) {}
@@ -269,8 +291,7 @@ void StaticMap::clear_seen_through(const RangeImageView& view, std::int64_t stam
   ++state_->step;
   for (std::size_t i = 0; i < near.size(); ++i) {
     // Counts changed in all of them; only tiles with a voxel to hide are published again.
-    state_->tiles.find(near[i]->id()).value().changed_at = state_->step;
-    if (hides[i] != 0) state_->touched.push_back(near[i]);
+    state_->touch(*near[i], hides[i] != 0);
   }
 }
 
@@ -292,14 +313,19 @@ std::shared_ptr<const MapSnapshot> StaticMap::view() {
   tbb::parallel_for(std::size_t{0}, touched.size(), [&](std::size_t i) {
     changed[i] = touched[i]->publish(version, state_->rule(), state_->grid) ? 1 : 0;
   });
-  const bool has_changed = std::ranges::find(changed, 1) != changed.end();
-  if (!has_changed && !std::exchange(state_->residency_changed, false)) return state_->current;
+  for (std::size_t i = 0; i < touched.size(); ++i) {
+    if (changed[i] != 0) state_->edits[touched[i]->id()] = touched[i]->published();
+  }
+  if (state_->edits.empty()) return state_->current;
 
-  state_->residency_changed = false;
-  MapSnapshot next = {has_changed ? version : state_->current->version, state_->current->map_id,
-                      state_->config.tile_size_m, state_->config.voxel_size_m,
-                      state_->published_tiles()};
-  state_->current = std::make_shared<const MapSnapshot>(std::move(next));
+  const bool has_changed = std::ranges::find(changed, 1) != changed.end();
+  std::vector<TileTable::Edit> edits;
+  edits.reserve(state_->edits.size());
+  for (auto& [id, tile] : state_->edits) edits.push_back({id, std::move(tile)});
+  state_->edits.clear();
+  state_->current = std::make_shared<const MapSnapshot>(MapSnapshot{
+      has_changed ? version : state_->current->version, state_->current->map_id,
+      state_->config.tile_size_m, state_->config.voxel_size_m, state_->current->tiles.with(edits)});
   return state_->current;
 }
 
@@ -307,23 +333,49 @@ void StaticMap::reset(std::uint64_t map_id) { state_->clear(map_id); }
 
 const StaticMapConfig& StaticMap::config() const { return state_->config; }
 
+void StaticMap::State::add_resident(TileId id, const TileRecord& record) {
+  tiles.emplace(id, Resident{std::make_unique<LiveTile>(id, record, grid), 0});
+}
+
 bool StaticMap::State::reload(TileId id) {
   if (tile_store == nullptr || unreadable.contains(id)) return false;
+  const std::shared_ptr<const Tile> stub = shown(id);
   try {
-    Resident resident{std::make_unique<LiveTile>(id, tile_store->load(id), grid), stored_step};
-    tiles.emplace(id, std::move(resident));
+    TileRecord record = tile_store->load(id);
+    if (record.tile && stub && stub->info.appeared_in != 0) {
+      // The file does not know it.
+      auto tile = std::make_shared<Tile>(*record.tile);
+      tile->info.appeared_in = stub->info.appeared_in;
+      record.tile = std::move(tile);
+    }
+    add_resident(id, record);
   } catch (const std::runtime_error& fault) {
     // The tile is not mapped from now on: a new tile would replace the stored one.
     unreadable.emplace(id, fault.what());
     return false;
   }
-  non_resident.erase(id);
-  residency_changed = true;
+  --non_resident_count;
+  hidden_non_resident.erase(id);
+  const auto& published = tiles.find(id)->second.live->published();
+  if (stub || published) edits[id] = published;
   return true;
 }
 
+void StaticMap::State::evict(TileId id) {
+  const auto resident = tiles.find(id);
+  const LiveTile& live = *resident->second.live;
+  if (live.published()) {
+    edits[id] = without_voxels(*live.published());
+  } else {
+    hidden_non_resident.insert(id);
+  }
+  ++non_resident_count;
+  std::erase(touched, &live);
+  tiles.erase(resident);
+}
+
 std::size_t StaticMap::State::memory_bytes() const {
-  std::size_t bytes = non_resident.size() * non_resident_tile_bytes;
+  std::size_t bytes = non_resident_count * non_resident_tile_bytes;
   for (const auto& [id, resident] : tiles) bytes += resident.live->memory_bytes();
   return bytes;
 }
@@ -332,45 +384,61 @@ void StaticMap::use_tile_store(std::shared_ptr<TileStore> tile_store) {
   state_->tile_store = std::move(tile_store);
 }
 
-MapCheckpoint StaticMap::checkpoint(bool everything) {
-  std::vector<LiveTile*> changed;
-  for (const auto& [id, resident] : state_->tiles) {
-    if (everything || resident.changed_at > state_->stored_step) {
-      changed.push_back(resident.live.get());
-    }
+std::vector<LiveTile*> StaticMap::State::tiles_to_store(CheckpointScope scope) const {
+  std::vector<LiveTile*> wanted;
+  if (scope == CheckpointScope::everything) {
+    for (const auto& [id, resident] : tiles) wanted.push_back(resident.live.get());
+    return wanted;
   }
+  for (const TileId id : unsaved) {
+    LiveTile* const live = tiles.find(id)->second.live.get();
+    if (scope == CheckpointScope::changed || live->view_has_changed()) wanted.push_back(live);
+  }
+  return wanted;
+}
+
+MapCheckpoint StaticMap::checkpoint(CheckpointScope scope) {
   // Published first, so that the record agrees with the view even where only another rule, or a
   // mean rounded in the file, changed the tile.
-  state_->touched.insert(state_->touched.end(), changed.begin(), changed.end());
+  const auto published_first = state_->tiles_to_store(
+      scope == CheckpointScope::everything ? scope : CheckpointScope::changed);
+  state_->touched.insert(state_->touched.end(), published_first.begin(), published_first.end());
   MapCheckpoint checkpoint{view(), state_->step++, {}};
-  std::vector<TileRecord> records(changed.size());
-  tbb::parallel_for(std::size_t{0}, changed.size(), [&](std::size_t i) {
-    records[i] = changed[i]->record(state_->rule(), state_->grid);
+  const std::vector<LiveTile*> wanted = state_->tiles_to_store(scope);
+  std::vector<TileRecord> records(wanted.size());
+  tbb::parallel_for(std::size_t{0}, wanted.size(), [&](std::size_t i) {
+    records[i] = wanted[i]->record(state_->rule(), state_->grid);
   });
-  for (std::size_t i = 0; i < changed.size(); ++i) {
-    checkpoint.records.emplace(changed[i]->id(), std::move(records[i]));
+  state_->in_checkpoint.clear();
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    wanted[i]->begin_recording();
+    state_->in_checkpoint.push_back(wanted[i]->id());
+    checkpoint.records.emplace(wanted[i]->id(), std::move(records[i]));
   }
   return checkpoint;
 }
 
 void StaticMap::checkpoint_stored(std::uint64_t step) {
-  state_->stored_step = std::max(state_->stored_step, step);
+  for (const TileId id : std::exchange(state_->in_checkpoint, {})) {
+    const auto resident = state_->tiles.find(id);
+    if (resident == state_->tiles.end()) continue;
+    resident->second.live->end_recording();
+    if (resident->second.changed_at <= step) state_->unsaved.erase(id);
+  }
 }
 
 MemoryUse StaticMap::memory_use() const {
-  return {state_->memory_bytes(), state_->tiles.size(), state_->non_resident.size()};
+  return {state_->memory_bytes(), state_->tiles.size(), state_->non_resident_count};
 }
 
 std::size_t StaticMap::evict(const Eigen::Vector3d& position_map, std::size_t limit_bytes) {
   std::size_t bytes = state_->memory_bytes();
   // Begins below the limit: the map grows on until the next checkpoint.
   if (state_->tile_store == nullptr || bytes <= limit_bytes - limit_bytes / 8) return 0;
-  // Beyond the reach of scans, with a margin against reloading at once after a turn.
-  const double near_m = state_->config.max_range_m + 2.0 * state_->config.tile_size_m;
   std::vector<std::pair<double, TileId>> candidates;
   for (const auto& [id, resident] : state_->tiles) {
     const double distance_m = state_->distance_m(id, position_map.head<2>());
-    if (resident.changed_at <= state_->stored_step && distance_m > near_m) {
+    if (distance_m > state_->reach_m() && !state_->unsaved.contains(id)) {
       candidates.emplace_back(distance_m, id);
     }
   }
@@ -380,16 +448,10 @@ std::size_t StaticMap::evict(const Eigen::Vector3d& position_map, std::size_t li
   std::size_t evicted_tiles = 0;
   for (const auto& [distance_m, id] : candidates) {
     if (bytes <= wanted_bytes) break;
-    const auto resident = state_->tiles.find(id);
-    const LiveTile& live = *resident->second.live;
-    bytes -= std::min(bytes, live.memory_bytes());
-    state_->non_resident.emplace(id,
-                                 live.published() ? without_voxels(*live.published()) : nullptr);
-    std::erase(state_->touched, &live);
-    state_->tiles.erase(resident);
+    bytes -= std::min(bytes, state_->tiles.find(id)->second.live->memory_bytes());
+    state_->evict(id);
     ++evicted_tiles;
   }
-  state_->residency_changed |= evicted_tiles > 0;
   return evicted_tiles;
 }
 
@@ -401,45 +463,56 @@ std::vector<std::string> StaticMap::unreadable_tiles() const {
   return faults;
 }
 
-std::vector<RemovedVoxel> StaticMap::removed(const Eigen::AlignedBox3d& box_map) const {
-  std::vector<RemovedVoxel> all;
-  const auto add = [&](const std::vector<RemovedVoxel>& removed) {
-    std::ranges::copy_if(removed, std::back_inserter(all), [&](const RemovedVoxel& voxel) {
-      return box_map.contains(voxel.position_map.cast<double>());
-    });
+std::vector<TileId> StaticMap::tiles_in(const Eigen::AlignedBox3d& box_map,
+                                        std::size_t max_shown) const {
+  const TileRange range = tile_range(box_map, state_->grid.tile_size_m());
+  const auto is_in = [&](TileId id) {
+    return id.x >= range.first.x && id.x <= range.last.x && id.y >= range.first.y &&
+           id.y <= range.last.y;
   };
-  const auto meets = [&](TileId id) {
-    return box_map.intersects(tile_footprint(id, state_->grid.tile_size_m()));
-  };
-  for (const auto& [id, resident] : state_->tiles) {
-    if (meets(id)) add(resident.live->removed(state_->rule(), state_->grid));
+  std::vector<TileId> ids;
+  for (const auto& tile : tiles_in_range(state_->current->tiles, range, max_shown)) {
+    ids.push_back(tile->info.id);
   }
-  for (const auto& [id, shown] : state_->non_resident) {
-    if (!meets(id) || state_->tile_store == nullptr) continue;
-    const TileRecord record = state_->tile_store->load(id);
-    if (record.evidence == nullptr) continue;
-    add(removed_voxels(*record.evidence, state_->grid.voxel_size_m(), state_->grid.tile_size_m()));
+  for (const auto& [id, resident] : state_->tiles) {
+    if (is_in(id)) ids.push_back(id);
+  }
+  std::ranges::copy_if(state_->hidden_non_resident, std::back_inserter(ids), is_in);
+  std::ranges::sort(ids);
+  const auto doubles = std::ranges::unique(ids);
+  ids.erase(doubles.begin(), doubles.end());
+  return ids;
+}
+
+StaticMap::RemovedVoxels StaticMap::removed(const Eigen::AlignedBox3d& box_map,
+                                            std::span<const TileId> tiles) const {
+  RemovedVoxels all;
+  for (const TileId id : tiles) {
+    const auto resident = state_->tiles.find(id);
+    if (resident == state_->tiles.end()) {
+      if (state_->is_known_non_resident(id)) all.non_resident.push_back(id);
+      continue;
+    }
+    std::ranges::copy_if(resident->second.live->removed(state_->rule(), state_->grid),
+                         std::back_inserter(all.voxels), [&](const RemovedVoxel& voxel) {
+                           return box_map.contains(voxel.position_map.cast<double>());
+                         });
   }
   return all;
 }
 
-std::size_t StaticMap::restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map) {
-  const auto meets = [&](TileId id) {
-    return box_map.intersects(tile_footprint(id, state_->grid.tile_size_m()));
-  };
-  std::vector<TileId> wanted;
-  for (const auto& [id, shown] : state_->non_resident) {
-    if (meets(id)) wanted.push_back(id);
-  }
-  for (const TileId id : wanted) state_->reload(id);
+std::size_t StaticMap::restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
+                                       std::span<const TileId> tiles) {
   ++state_->step;
   std::size_t restored = 0;
-  for (auto tile = state_->tiles.begin(); tile != state_->tiles.end(); ++tile) {
-    LiveTile& live = *tile.value().live;
-    if (!meets(live.id())) continue;
-    restored += live.restore(reason, box_map, state_->rule(), state_->grid);
-    state_->touched.push_back(&live);
-    tile.value().changed_at = state_->step;
+  for (const TileId id : tiles) {
+    if (state_->is_known_non_resident(id)) state_->reload(id);
+    const auto resident = state_->tiles.find(id);
+    if (resident == state_->tiles.end()) continue;
+    LiveTile& live = *resident->second.live;
+    const std::size_t voxels = live.restore(reason, box_map, state_->rule(), state_->grid);
+    if (voxels > 0) state_->touch(live);
+    restored += voxels;
   }
   return restored;
 }
@@ -448,27 +521,23 @@ void StaticMap::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evid
   check_sizes(view, state_->config);
   state_->clear(view.map_id);
   if (view.tiles.empty() && tile_evidence.empty()) return;
-  for (const auto& tile : view.tiles) {
-    const TileId id = tile->info.id;
-    if (is_non_resident(*tile)) {
-      state_->non_resident.emplace(id, tile);
-      continue;
+  state_->non_resident_count = view.tiles.non_resident_count();
+  if (state_->non_resident_count < view.tiles.size()) {
+    for (const auto& tile : view.tiles) {
+      if (is_non_resident(*tile)) continue;
+      const auto evidence = tile_evidence.find(tile->info.id);
+      state_->add_resident(tile->info.id,
+                           {tile, evidence == tile_evidence.end() ? nullptr : evidence->second});
     }
-    const auto evidence = tile_evidence.find(id);
-    const TileRecord record{tile, evidence == tile_evidence.end() ? nullptr : evidence->second};
-    state_->tiles.emplace(id, State::Resident{std::make_unique<LiveTile>(id, record, state_->grid),
-                                              state_->stored_step});
   }
   for (const auto& [id, evidence] : tile_evidence) {
-    if (state_->tiles.contains(id) || state_->non_resident.contains(id)) continue;
+    if (view.tiles.find(id) != nullptr) continue;
     if (evidence == nullptr) {
-      state_->non_resident.emplace(id, nullptr);
-      continue;
+      state_->hidden_non_resident.insert(id);
+      ++state_->non_resident_count;
+    } else {
+      state_->add_resident(id, {nullptr, evidence});
     }
-    const TileRecord hidden_only{nullptr, evidence};
-    state_->tiles.emplace(id,
-                          State::Resident{std::make_unique<LiveTile>(id, hidden_only, state_->grid),
-                                          state_->stored_step});
   }
   MapSnapshot current = view;
   current.voxel_size_m = state_->config.voxel_size_m;
@@ -476,16 +545,15 @@ void StaticMap::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evid
   state_->current = std::make_shared<const MapSnapshot>(std::move(current));
 }
 
-void StaticMap::reload_near(const Eigen::Vector3d& position_map, std::size_t limit_bytes) {
-  std::vector<std::pair<double, TileId>> nearest;
-  for (const auto& [id, shown] : state_->non_resident) {
-    nearest.emplace_back(state_->distance_m(id, position_map.head<2>()), id);
-  }
-  std::ranges::sort(nearest);
-  std::size_t bytes = state_->memory_bytes();
-  for (const auto& [distance_m, id] : nearest) {
-    if (bytes >= limit_bytes - limit_bytes / 4) return;
-    if (state_->reload(id)) bytes += state_->tiles.find(id)->second.live->memory_bytes();
+void StaticMap::reload_near(const Eigen::Vector3d& position_map) {
+  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(state_->reach_m());
+  const TileRange range =
+      tile_range({position_map - reach, position_map + reach}, state_->grid.tile_size_m());
+  for (TileId id = range.first; id.x <= range.last.x; ++id.x) {
+    for (id.y = range.first.y; id.y <= range.last.y; ++id.y) {
+      if (state_->distance_m(id, position_map.head<2>()) > state_->reach_m()) continue;
+      if (state_->is_known_non_resident(id)) state_->reload(id);
+    }
   }
 }
 

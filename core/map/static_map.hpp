@@ -1,8 +1,10 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <limits>
 #include <map>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -50,8 +52,18 @@ struct MapCheckpoint {
   std::shared_ptr<const MapSnapshot> view;
   /// To be passed to `checkpoint_stored` once it is written.
   std::uint64_t step = 0;
-  /// Complete records of the tiles that changed since the last stored checkpoint.
+  /// Complete records of tiles that changed since they were stored last.
   std::map<TileId, TileRecord> records;
+};
+
+/// Which tiles go into a checkpoint.
+enum class CheckpointScope {
+  /// Those whose view changed by more than a few voxels since they were stored.
+  changed_views,
+  /// Those that changed in any way, if only in counts and times.
+  changed,
+  /// All that are in memory.
+  everything,
 };
 
 struct MemoryUse {
@@ -83,12 +95,26 @@ class StaticMap {
   /// is not part of the static world, whatever its class.
   void clear_seen_through(const RangeImageView& view, std::int64_t stamp_ns);
 
-  /// Voxels in the box (map frame [m]) that are removed from the planning view, with the reason; in
-  /// no order. Throws as the tile store does.
-  [[nodiscard]] std::vector<RemovedVoxel> removed(const Eigen::AlignedBox3d& box_map) const;
-  /// Shows again what was removed for this reason in this part of the map; it stays until a reset.
-  /// Returns how many voxels.
-  std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map);
+  /// The tiles whose footprint meets the box (map frame [m]), resident or not, also those that show
+  /// nothing; sorted. Of those that show something, the first `max_shown`.
+  [[nodiscard]] std::vector<TileId> tiles_in(
+      const Eigen::AlignedBox3d& box_map,
+      std::size_t max_shown = std::numeric_limits<std::size_t>::max()) const;
+  /// What of tiles is kept out of the planning view.
+  struct RemovedVoxels {
+    /// In no order.
+    std::vector<RemovedVoxel> voxels;
+    /// Those of the tiles that are not in memory: what they hold is in the tile store.
+    std::vector<TileId> non_resident;
+  };
+  /// Voxels in the box (map frame [m]) that are removed from the planning view, with the reason, in
+  /// these tiles.
+  [[nodiscard]] RemovedVoxels removed(const Eigen::AlignedBox3d& box_map,
+                                      std::span<const TileId> tiles) const;
+  /// Shows again what was removed for this reason in this part of these tiles; it stays until a
+  /// reset. Non-resident ones are reloaded. Returns how many voxels.
+  std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
+                              std::span<const TileId> tiles);
 
   /// Evidence of the voxel at a position (map frame [m]), shown in a view or not; no votes where
   /// nothing was seen. May be called from several threads, but not beside a change of the map.
@@ -106,16 +132,15 @@ class StaticMap {
 
   /// Backing store of evicted tiles. It must hold what the checkpoints of this map wrote.
   void use_tile_store(std::shared_ptr<TileStore> tile_store);
-  /// The map as it is now, with the records of all tiles that changed since the last stored
-  /// checkpoint; with `everything`, of all resident tiles.
-  [[nodiscard]] MapCheckpoint checkpoint(bool everything = false);
-  /// To be called when this checkpoint, and so all before it, are in the tile store.
+  /// The map as it is now, with the records of the tiles that are to be stored.
+  [[nodiscard]] MapCheckpoint checkpoint(CheckpointScope scope = CheckpointScope::changed);
+  /// To be called when the checkpoint of this step, the last one taken, is in the tile store.
   void checkpoint_stored(std::uint64_t step);
   /// Evicts tiles that are stored and out of the reach of the lidar, farthest first, until the map
   /// takes no more than this. Returns how many. They are reloaded when they are needed.
   std::size_t evict(const Eigen::Vector3d& position_map, std::size_t limit_bytes);
-  /// Reloads tiles from the tile store, nearest first, as many as fit.
-  void reload_near(const Eigen::Vector3d& position_map, std::size_t limit_bytes);
+  /// Reloads the tiles that scans from here reach, from the tile store.
+  void reload_near(const Eigen::Vector3d& position_map);
   /// Memory of the tiles, published ones included.
   [[nodiscard]] MemoryUse memory_use() const;
   /// Tiles that could not be read from the tile store, with the reason; they stay as they are

@@ -89,9 +89,7 @@ Tile make_tile(TileId id, std::uint64_t revision, std::vector<Voxel> voxels,
 }
 
 std::shared_ptr<const Tile> find_tile(const MapSnapshot& view, TileId id) {
-  const auto found =
-      std::ranges::lower_bound(view.tiles, id, {}, [](const auto& tile) { return tile->info.id; });
-  return found != view.tiles.end() && (*found)->info.id == id ? *found : nullptr;
+  return view.tiles.find(id);
 }
 
 }  // namespace stillmap

@@ -10,17 +10,11 @@
 #include <vector>
 
 #include "core/lidar/semantic_class.hpp"
+#include "core/map/tile_table.hpp"
 
 namespace stillmap {
 
 class VoxelGrid;
-
-/// A square column of the map frame: [x, x+1) * tile_size_m by [y, y+1) * tile_size_m, all heights.
-struct TileId {
-  std::int32_t x = 0;
-  std::int32_t y = 0;
-  friend auto operator<=>(const TileId&, const TileId&) = default;
-};
 
 /// A voxel's place in its tile: column and row from the tile's corner, layer from map height 0.
 struct VoxelIndex {
@@ -77,6 +71,9 @@ struct TileInfo {
   /// Smallest box around the voxels' means, map frame [m].
   Eigen::AlignedBox3f bounds_map;
   std::uint32_t voxel_count = 0;
+  /// Version of the map in which the tile appeared; 0: before this run of the map began. Known to
+  /// the mapping process alone.
+  std::uint64_t appeared_in = 0;
 };
 
 /// An immutable tile; voxels sorted by index.
@@ -94,8 +91,7 @@ struct MapSnapshot {
   std::uint64_t map_id = 0;
   double tile_size_m = 0.0;
   double voxel_size_m = 0.0;
-  /// Sorted by id.
-  std::vector<std::shared_ptr<const Tile>> tiles;
+  TileTable tiles;
 };
 
 /// Why a place that was hit is not in the planning view.

@@ -76,27 +76,33 @@ Eigen::AlignedBox3d tile_footprint(TileId id, double tile_size_m) {
                           corner.y() + tile_size_m + float_step_m, everywhere)};
 }
 
-std::vector<std::size_t> tiles_in_box(const MapSnapshot& view, const Eigen::AlignedBox3d& box_map) {
-  std::vector<std::size_t> found;
-  if (view.tiles.empty() || !is_usable(box_map)) return found;
+std::vector<std::shared_ptr<const Tile>> tiles_in_range(const TileTable& tiles,
+                                                        const TileRange& range,
+                                                        std::size_t max_tiles, TileId from) {
+  std::vector<std::shared_ptr<const Tile>> found;
+  auto tile = tiles.lower_bound(std::max(range.first, from));
+  while (tile != tiles.end() && (*tile)->info.id.x <= range.last.x && found.size() < max_tiles) {
+    const TileId id = (*tile)->info.id;
+    if (id.y < range.first.y || id.y > range.last.y) {
+      // On to where the range begins in this row of tiles or in the next one.
+      tile = tiles.lower_bound({id.y < range.first.y ? id.x : id.x + 1, range.first.y});
+    } else {
+      found.push_back(*tile);
+      ++tile;
+    }
+  }
+  return found;
+}
+
+std::vector<std::shared_ptr<const Tile>> tiles_in_box(const MapSnapshot& view,
+                                                      const Eigen::AlignedBox3d& box_map) {
+  if (view.tiles.empty() || !is_usable(box_map)) return {};
   const IdRange xs = ids_between(box_map.min().x(), box_map.max().x(), view.tile_size_m);
   const IdRange ys = ids_between(box_map.min().y(), box_map.max().y(), view.tile_size_m);
-  const auto id_of = [](const std::shared_ptr<const Tile>& tile) { return tile->info.id; };
-
-  auto tile = std::ranges::lower_bound(view.tiles, TileId{xs.first, ys.first}, {}, id_of);
-  while (tile != view.tiles.end() && id_of(*tile).x <= xs.last) {
-    const TileId id = id_of(*tile);
-    if (id.y < ys.first || id.y > ys.last) {
-      // On to where the box begins in this row of tiles or in the next one.
-      const TileId next{id.y < ys.first ? id.x : id.x + 1, ys.first};
-      tile = std::ranges::lower_bound(tile, view.tiles.end(), next, {}, id_of);
-      continue;
-    }
-    if (box_map.intersects((*tile)->info.bounds_map.cast<double>())) {
-      found.push_back(static_cast<std::size_t>(tile - view.tiles.begin()));
-    }
-    ++tile;
-  }
+  auto found = tiles_in_range(view.tiles, {{xs.first, ys.first}, {xs.last, ys.last}});
+  std::erase_if(found, [&](const auto& tile) {
+    return !box_map.intersects(tile->info.bounds_map.template cast<double>());
+  });
   return found;
 }
 

@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <memory>
+#include <vector>
 
 #include "core/map/tile.hpp"
 
@@ -56,9 +59,16 @@ struct TileRange {
 /// The tiles whose footprint meets the box (map frame [m]; faces may be infinite, NaN must not be).
 [[nodiscard]] TileRange tile_range(const Eigen::AlignedBox3d& box_map, double tile_size_m);
 
-/// Positions in `view.tiles`, ascending, of the tiles whose bounds meet the box (map frame [m],
-/// faces included, infinite faces allowed). Empty for a box with NaN or min > max.
-[[nodiscard]] std::vector<std::size_t> tiles_in_box(const MapSnapshot& view,
-                                                    const Eigen::AlignedBox3d& box_map);
+/// The tiles of these ids, sorted by id: of those from `from` on, the first `max_tiles`.
+[[nodiscard]] std::vector<std::shared_ptr<const Tile>> tiles_in_range(
+    const TileTable& tiles, const TileRange& range,
+    std::size_t max_tiles = std::numeric_limits<std::size_t>::max(),
+    TileId from = {std::numeric_limits<std::int32_t>::min(),
+                   std::numeric_limits<std::int32_t>::min()});
+
+/// Sorted by id, the tiles whose bounds meet the box (map frame [m], faces included, infinite faces
+/// allowed). Empty for a box with NaN or min > max.
+[[nodiscard]] std::vector<std::shared_ptr<const Tile>> tiles_in_box(
+    const MapSnapshot& view, const Eigen::AlignedBox3d& box_map);
 
 }  // namespace stillmap

@@ -3,10 +3,13 @@
 #include <octomap/OcTree.h>
 
 #include <algorithm>
+#include <set>
 #include <span>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
+#include "core/map/tile_evidence.hpp"
 #include "core/map/voxel_grid.hpp"
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"
@@ -45,8 +48,8 @@ struct OccupancyMap::State {
   std::span<const VoxelBrick> pending;
   std::uint64_t version = 0;
   std::uint64_t scans = 0;
-  /// Columns that are unknown until their tiles are reloaded.
-  std::set<OctreeColumn> non_resident;
+  /// The view whose residency the octree has.
+  MapSnapshot followed;
 };
 
 namespace {
@@ -83,6 +86,11 @@ void add_cube(const Eigen::Vector3d& centre_map, double side_m, double resolutio
       }
     }
   }
+}
+
+/// Unknown until one of its tiles is reloaded.
+bool is_evicted(const ColumnTiles& tiles) {
+  return tiles.has_non_resident && tiles.resident.empty();
 }
 
 }  // namespace
@@ -130,6 +138,7 @@ void OccupancyMap::insert(const MapSnapshot& view, const ThrottleCallback& throt
   const double side_m = is_finer ? view.voxel_size_m : 0.0;
   state_->begin_update();
   for (const auto& tile : view.tiles) {
+    if (tile->voxels.empty()) continue;
     if (throttle) throttle();
     for (const Voxel& voxel : tile->voxels) {
       const Eigen::Vector3d centre_map = grid.corner_map(tile->info.id, voxel.index) + half;
@@ -144,22 +153,40 @@ void OccupancyMap::insert(const MapSnapshot& view, const ThrottleCallback& throt
   }
 }
 
+void OccupancyMap::begin_residency(const MapSnapshot& view) { state_->followed = view; }
+
 bool OccupancyMap::sync_residency(const MapSnapshot& view) {
+  const double resolution_m = state_->config.resolution_m;
+  const MapSnapshot before = std::exchange(state_->followed, view);
+  std::set<OctreeColumn> changed;
+  const auto is_away = [](const auto& tile) { return tile && is_non_resident(*tile); };
+  TileTable::for_each_difference(before.tiles, view.tiles, [&](const auto& old, const auto& now) {
+    if (is_away(old) == is_away(now)) return;
+    const TileId id = (old ? old : now)->info.id;
+    const auto columns = columns_of(id, view.tile_size_m, resolution_m);
+    changed.insert(columns.begin(), columns.end());
+  });
   std::set<OctreeColumn> evicted;
-  MapSnapshot reloaded{view.version, view.map_id, view.tile_size_m, view.voxel_size_m, {}};
-  for (const auto& [column, tiles] : columns_of(view, state_->config.resolution_m)) {
-    const bool is_evicted = tiles.has_non_resident && tiles.resident.empty();
-    if (is_evicted && state_->non_resident.insert(column).second) evicted.insert(column);
-    if (!is_evicted && state_->non_resident.erase(column) > 0) {
-      reloaded.tiles.insert(reloaded.tiles.end(), tiles.resident.begin(), tiles.resident.end());
+  std::vector<std::shared_ptr<const Tile>> reloaded_tiles;
+  for (const OctreeColumn column : changed) {
+    const ColumnTiles tiles = tiles_of(column, view, resolution_m);
+    const bool was_evicted = is_evicted(tiles_of(column, before, resolution_m));
+    if (is_evicted(tiles) && !was_evicted) evicted.insert(column);
+    if (was_evicted && !is_evicted(tiles)) {
+      reloaded_tiles.insert(reloaded_tiles.end(), tiles.resident.begin(), tiles.resident.end());
     }
   }
   if (!evicted.empty()) {
     evict_columns(state_->octree, evicted);
     ++state_->version;
   }
-  insert(reloaded);
-  return !evicted.empty() || !reloaded.tiles.empty();
+  // A tile that touches two columns is named twice.
+  std::ranges::sort(reloaded_tiles);
+  const auto doubles = std::ranges::unique(reloaded_tiles);
+  reloaded_tiles.erase(doubles.begin(), doubles.end());
+  insert(
+      {view.version, view.map_id, view.tile_size_m, view.voxel_size_m, TileTable(reloaded_tiles)});
+  return !evicted.empty() || !reloaded_tiles.empty();
 }
 
 PointOccupancy OccupancyMap::at_point(const Eigen::Vector3d& p_map) const {

@@ -50,9 +50,11 @@ class OccupancyMap {
   /// Sets the voxels of a static map to the highest occupancy probability.
   void insert(const MapSnapshot& view, const ThrottleCallback& throttle = {});
 
-  /// Follows the residency of the static map's tiles: columns whose tiles have all been evicted to
-  /// the tile store become unknown; reloaded tiles are inserted as occupied (their free space has
-  /// to be observed again). Returns whether anything changed.
+  /// The octree has the voxels of this view, whose residency is followed from here on.
+  void begin_residency(const MapSnapshot& view);
+  /// Follows the residency of the static map's tiles, at the cost of what changed: columns whose
+  /// tiles have all been evicted to the tile store become unknown; reloaded tiles are inserted as
+  /// occupied (their free space has to be observed again). Returns whether anything changed.
   bool sync_residency(const MapSnapshot& view);
 
   [[nodiscard]] PointOccupancy at_point(const Eigen::Vector3d& p_map) const;

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "core/map/tile_evidence.hpp"
+#include "core/map/voxel_grid.hpp"
 #include "core/occupancy/scan_update.hpp"
 
 namespace stillmap {
@@ -217,28 +218,39 @@ void update_octree(OcTree& octree, std::span<const VoxelBrick> bricks, const Log
   BatchUpdate(octree, steps).update(*octree.getRoot(), is_new, 0, touched);
 }
 
-std::map<OctreeColumn, ColumnTiles> columns_of(const MapSnapshot& view, double resolution_m) {
-  std::map<OctreeColumn, ColumnTiles> columns;
+std::vector<OctreeColumn> columns_of(TileId id, double tile_size_m, double resolution_m) {
   // Half a voxel inside, so that a tile does not touch the column beyond its far edge.
-  const double far_side_m = view.tile_size_m - 0.5 * resolution_m;
-  for (const auto& tile : view.tiles) {
-    const double x_map = tile->info.id.x * view.tile_size_m;
-    const double y_map = tile->info.id.y * view.tile_size_m;
-    const OctreeColumn first{column_at(x_map, resolution_m), column_at(y_map, resolution_m)};
-    const OctreeColumn last{column_at(x_map + far_side_m, resolution_m),
-                            column_at(y_map + far_side_m, resolution_m)};
-    for (OctreeColumn at = first; at.x <= last.x; ++at.x) {
-      for (at.y = first.y; at.y <= last.y; ++at.y) {
-        ColumnTiles& column = columns[at];
-        if (is_non_resident(*tile)) {
-          column.has_non_resident = true;
-        } else {
-          column.resident.push_back(tile);
-        }
-      }
-    }
+  const double far_side_m = tile_size_m - 0.5 * resolution_m;
+  const double x_map = id.x * tile_size_m;
+  const double y_map = id.y * tile_size_m;
+  const OctreeColumn first{column_at(x_map, resolution_m), column_at(y_map, resolution_m)};
+  const OctreeColumn last{column_at(x_map + far_side_m, resolution_m),
+                          column_at(y_map + far_side_m, resolution_m)};
+  std::vector<OctreeColumn> columns;
+  for (OctreeColumn at = first; at.x <= last.x; ++at.x) {
+    for (at.y = first.y; at.y <= last.y; ++at.y) columns.push_back(at);
   }
   return columns;
+}
+
+ColumnTiles tiles_of(OctreeColumn column, const MapSnapshot& view, double resolution_m) {
+  const auto corner_m = [&](std::int32_t at) {
+    return (static_cast<double>(at) * OctreeColumn::side_voxels - octree_origin) * resolution_m;
+  };
+  const Eigen::AlignedBox3d box_map(
+      Eigen::Vector3d(corner_m(column.x), corner_m(column.y), 0.0),
+      Eigen::Vector3d(corner_m(column.x + 1), corner_m(column.y + 1), 0.0));
+  ColumnTiles tiles;
+  for (const auto& tile : tiles_in_range(view.tiles, tile_range(box_map, view.tile_size_m))) {
+    const auto columns = columns_of(tile->info.id, view.tile_size_m, resolution_m);
+    if (std::ranges::find(columns, column) == columns.end()) continue;
+    if (is_non_resident(*tile)) {
+      tiles.has_non_resident = true;
+    } else {
+      tiles.resident.push_back(tile);
+    }
+  }
+  return tiles;
 }
 
 void evict_columns(octomap::OcTree& octree, const std::set<OctreeColumn>& columns) {

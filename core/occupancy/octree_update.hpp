@@ -44,9 +44,12 @@ struct ColumnTiles {
   bool has_non_resident = false;
 };
 
-/// All columns that tiles of the view touch.
-[[nodiscard]] std::map<OctreeColumn, ColumnTiles> columns_of(const MapSnapshot& view,
-                                                             double resolution_m);
+/// The columns that a tile touches.
+[[nodiscard]] std::vector<OctreeColumn> columns_of(TileId id, double tile_size_m,
+                                                   double resolution_m);
+/// The tiles of the view that touch a column.
+[[nodiscard]] ColumnTiles tiles_of(OctreeColumn column, const MapSnapshot& view,
+                                   double resolution_m);
 
 /// Makes these columns unknown. Copies the rest of the octree.
 void evict_columns(octomap::OcTree& octree, const std::set<OctreeColumn>& columns);

@@ -1,9 +1,11 @@
 #include "idl/conversions/to_cloud.hpp"
 
 #include <cassert>
+#include <limits>
 #include <optional>
 #include <vector>
 
+#include "core/map/voxel_grid.hpp"
 #include "idl/conversions/point_cloud2_builder.hpp"
 
 namespace stillmap::wire {
@@ -36,10 +38,11 @@ std::optional<std::uint32_t> add_if(PointCloud2Builder& builder, bool present, c
 std::vector<const Voxel*> voxels_in(const MapSnapshot& view,
                                     const Eigen::AlignedBox2f& window_map) {
   std::vector<const Voxel*> inside;
-  for (const auto& tile : view.tiles) {
-    const auto& bounds = tile->info.bounds_map;
-    const Eigen::AlignedBox2f footprint(bounds.min().head<2>(), bounds.max().head<2>());
-    if (!window_map.intersects(footprint)) continue;
+  constexpr double everywhere = std::numeric_limits<double>::infinity();
+  const Eigen::Vector2d low = window_map.min().cast<double>();
+  const Eigen::Vector2d high = window_map.max().cast<double>();
+  for (const auto& tile : tiles_in_box(view, {Eigen::Vector3d(low.x(), low.y(), -everywhere),
+                                              Eigen::Vector3d(high.x(), high.y(), everywhere)})) {
     for (const Voxel& voxel : tile->voxels) {
       if (window_map.contains(voxel.mean_map.head<2>())) inside.push_back(&voxel);
     }

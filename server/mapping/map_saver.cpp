@@ -17,6 +17,10 @@ constexpr std::size_t recent_saves = 10;
 /// The next save may take so many times the longest of them.
 constexpr double duration_margin = 1.5;
 
+/// A robot that has gone no farther stands [m], [rad].
+constexpr double standing_distance_m = 0.5;
+constexpr double standing_angle_rad = 0.2;
+
 constexpr const char* no_map_yet = "holds no map yet; name a file that a map was saved to";
 
 /// Opens an existing file; open_map_file would create a missing one.
@@ -34,14 +38,16 @@ std::unique_ptr<MapStore> open_existing(const fs::path& file) {
 }  // namespace
 
 MapSaver::MapSaver(const LatestMap& latest_map, Statistics& statistics, const fs::path& file,
-                   std::map<std::string, std::string> metadata, std::uint32_t memory_limit_mib,
-                   const SavedMapsLimit& saved_maps_limit)
+                   std::map<std::string, std::string> metadata, const MapSaverLimits& limits,
+                   MonotonicClock& clock)
     : latest_map_(latest_map),
       statistics_(statistics),
       file_(file.empty() ? file : fs::absolute(file)),
-      folder_(file_, saved_maps_limit),
+      folder_(file_, limits.saved_maps),
       metadata_(std::move(metadata)),
-      memory_limit_bytes_(std::size_t{memory_limit_mib} << 20) {
+      memory_limit_bytes_(std::size_t{limits.memory_limit_mib} << 20),
+      standing_allowance_(std::uint64_t{limits.standing_mib_per_hour} << 20),
+      clock_(clock) {
   // Opened at the start, so that a file that cannot be written is noticed before mapping begins.
   if (!file_.empty()) {
     lock_ = std::make_unique<MapLock>(file_);
@@ -97,13 +103,36 @@ void MapSaver::save_if_changed() {
   if ((!store_ && file_.empty()) || is_saved()) return;
   // A temporary file is only there to make room in memory.
   if (file_.empty() && source_->memory_use().bytes < memory_limit_bytes_ / 2) return;
-  save(false);
+  save(scope());
 }
 
 void MapSaver::save_at_end() {
   const std::scoped_lock lock(mutex_);
   // Nothing mapped: an empty map must not replace what the file holds.
-  if (!file_.empty() && latest_map_.poses_added() > 0) save(true);
+  if (!file_.empty() && latest_map_.poses_added() > 0) save(CheckpointScope::changed, true);
+}
+
+void MapSaver::make_room() {
+  const std::scoped_lock lock(mutex_);
+  if (store_) save(CheckpointScope::changed);
+}
+
+CheckpointScope MapSaver::scope() {
+  // Evidence that is not stored cannot be evicted.
+  const bool is_full =
+      memory_limit_bytes_ > 0 && source_->memory_use().bytes > memory_limit_bytes_ / 2;
+  if (is_full || has_moved() || standing_allowance_.is_open(clock_.now())) {
+    return CheckpointScope::changed;
+  }
+  return CheckpointScope::changed_views;
+}
+
+bool MapSaver::has_moved() const {
+  if (!T_map_base_saved_ || latest_map_.view()->map_id != saved_map_id_) return true;
+  const Eigen::Isometry3d motion =
+      T_map_base_saved_->inverse() * latest_map_.newest_pose().T_map_lidar;
+  return motion.translation().norm() > standing_distance_m ||
+         Eigen::AngleAxisd(motion.linear()).angle() > standing_angle_rad;
 }
 
 bool MapSaver::is_saved() const {
@@ -113,10 +142,10 @@ bool MapSaver::is_saved() const {
                         poses == saved_poses_);
 }
 
-void MapSaver::save(bool has_ended) {
+void MapSaver::save(CheckpointScope scope, bool has_ended) {
   const auto began = std::chrono::steady_clock::now();
   try {
-    store(has_ended);
+    if (!store(scope, has_ended)) return;
   } catch (const std::exception& error) {
     statistics_.map_save_failed(error.what());
     source_->checkpoint_failed();
@@ -126,18 +155,27 @@ void MapSaver::save(bool has_ended) {
   statistics_.map_saved(took.count());
 }
 
-void MapSaver::store(bool has_ended) {
+bool MapSaver::store(CheckpointScope scope, bool has_ended) {
   const std::uint64_t poses = latest_map_.poses_added();
-  RunCheckpoint checkpoint = take(false);
+  const bool is_standing = !has_moved();
+  const Eigen::Isometry3d T_map_base = latest_map_.newest_pose().T_map_lidar;
+  RunCheckpoint checkpoint = take(scope);
   // Nothing is stored yet of another map.
   if (checkpoint.map.view.map_id != saved_map_id_) {
     if (saved_map_id_ != 0) throw MapFileError(file_, "holds another map than the running one");
-    checkpoint = take(true);
+    scope = CheckpointScope::everything;
+    checkpoint = take(scope);
   }
+  checkpoint.map.is_partial = scope == CheckpointScope::changed_views;
+  if (checkpoint.map.is_partial && checkpoint.map.tile_evidence.empty()) return false;
   if (has_ended) checkpoint.map.metadata[map_ended_key] = "yes";
-  open_store().save(checkpoint.map);
+  const std::uint64_t bytes = open_store().save(checkpoint.map);
   source_->checkpoint_stored(checkpoint.step);
   remember_as_saved(checkpoint.map.view, poses);
+  if (is_standing) standing_allowance_.spend(bytes);
+  is_partial_ = checkpoint.map.is_partial;
+  if (!is_partial_) T_map_base_saved_ = T_map_base;
+  return true;
 }
 
 void MapSaver::remember_as_saved(const MapSnapshot& view, std::uint64_t poses) {
@@ -169,7 +207,7 @@ fs::path MapSaver::save_as(const std::string& name, bool overwrite) {
   if (is_empty()) {
     throw std::invalid_argument("the map is empty: no scan was mapped yet; nothing is saved");
   }
-  if ((store_ || !file_.empty()) && !is_saved()) save(false);
+  if ((store_ || !file_.empty()) && !is_saved_whole()) save(CheckpointScope::changed);
   if (target != file_) save_copy(target, overwrite);
   return target;
 }
@@ -191,7 +229,7 @@ void MapSaver::save_copy(const fs::path& target, bool overwrite) {
   folder_.check_room(file_, target, unknown ? 0 : bytes);
   if (store_ || !file_.empty()) return open_store().copy_to(target);
   const std::unique_ptr<MapStore> scratch = open_scratch_map();
-  scratch->save(take(true).map);
+  scratch->save(take(CheckpointScope::everything).map);
   scratch->copy_to(target);
 }
 
@@ -206,10 +244,13 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
   if (map.view.tiles.empty()) throw MapFileError(target, no_map_yet);
   map.view.map_id = new_map_id();
   const auto begin = prepare(map, memory_limit_bytes_ > 0 ? source.tile_store() : nullptr);
-  if (!is_own && !file_.empty() && !is_empty() && !is_saved()) save(false);
+  if (!is_own && !file_.empty() && !is_empty() && !is_saved_whole()) {
+    save(CheckpointScope::changed);
+  }
   // The last step that can fail.
   source.begin_run(map.view.map_id);
   begin();
+  T_map_base_saved_.reset();
   if (!is_own) {
     // The datum of another map is that in its own file.
     metadata_.erase("datum");
@@ -219,6 +260,7 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
   }
   remember_metadata(map);
   remember_as_saved(*latest_map_.view(), latest_map_.poses_added());
+  is_partial_ = false;
   return target;
 }
 
@@ -226,7 +268,7 @@ NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
   const std::scoped_lock lock(mutex_);
   NewMap begun{.map_id = new_map_id(), .kept_file = {}};
   if (!file_.empty()) {
-    if (!discard && !is_empty() && !is_saved()) save(false);
+    if (!discard && !is_empty() && !is_saved_whole()) save(CheckpointScope::changed);
     if (open_store().holds_map()) {
       std::error_code unknown;
       const std::uintmax_t bytes = fs::file_size(file_, unknown);
@@ -273,11 +315,21 @@ void MapSaver::put_aside(const fs::path& kept) {
   }
 }
 
-RunCheckpoint MapSaver::take(bool everything) const {
-  RunCheckpoint checkpoint = source_->checkpoint(everything);
+RunCheckpoint MapSaver::take(CheckpointScope scope) const {
+  RunCheckpoint checkpoint = source_->checkpoint(scope);
   checkpoint.map.metadata = metadata_;
   checkpoint.map.metadata.insert(stored_metadata_.begin(), stored_metadata_.end());
   return checkpoint;
+}
+
+bool WriteAllowance::is_open(MonotonicClock::TimePoint now) {
+  if (bytes_per_hour_ == 0.0) return true;
+  if (refilled_) {
+    const std::chrono::duration<double, std::ratio<3600>> hours = now - *refilled_;
+    left_ = std::min(bytes_per_hour_, left_ + hours.count() * bytes_per_hour_);
+  }
+  refilled_ = now;
+  return left_ > 0.0;
 }
 
 std::chrono::duration<double> due_after_begin(std::chrono::duration<double> period,

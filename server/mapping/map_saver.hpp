@@ -32,9 +32,9 @@ struct RunCheckpoint {
 class CheckpointSource {
  public:
   virtual ~CheckpointSource() = default;
-  /// What changed since the last stored checkpoint, or everything, and the path up to it.
-  [[nodiscard]] virtual RunCheckpoint checkpoint(bool everything) = 0;
-  /// Everything up to this checkpoint is stored: far tiles may be evicted.
+  /// What of the map is to be stored, and the path.
+  [[nodiscard]] virtual RunCheckpoint checkpoint(CheckpointScope scope) = 0;
+  /// This checkpoint, the last one taken, is stored: far tiles may be evicted.
   virtual void checkpoint_stored(std::uint64_t step) = 0;
   /// It is not: what changed since the last one is in memory alone.
   virtual void checkpoint_failed() = 0;
@@ -48,8 +48,37 @@ struct NewMap {
   std::filesystem::path kept_file;
 };
 
+/// Bytes that may be written in an hour, beginning with an hour's worth. Not thread-safe.
+class WriteAllowance {
+ public:
+  /// 0: any number of bytes.
+  explicit WriteAllowance(std::uint64_t bytes_per_hour)
+      : bytes_per_hour_(static_cast<double>(bytes_per_hour)), left_(bytes_per_hour_) {}
+
+  /// Whether something may be written now; it may be larger than what is left, and is paid off
+  /// before the next.
+  [[nodiscard]] bool is_open(MonotonicClock::TimePoint now);
+  void spend(std::uint64_t bytes) { left_ -= static_cast<double>(bytes); }
+
+ private:
+  double bytes_per_hour_;
+  double left_;
+  std::optional<MonotonicClock::TimePoint> refilled_;
+};
+
+/// What a MapSaver is to keep to.
+struct MapSaverLimits {
+  /// 0: all of the map stays in memory.
+  std::uint32_t memory_limit_mib = 0;
+  /// Written while the robot stands and its map hardly changes; 0: no limit.
+  std::uint32_t standing_mib_per_hour = 0;
+  SavedMapsLimit saved_maps;
+};
+
 /// Writes the map to its file, and with a memory limit keeps there what is not in memory. A file
 /// never gets another map's content: a map that gives way to a new one keeps a file of its own.
+/// While the robot stands, checkpoints hold the tiles whose view changed by more than a few voxels;
+/// what else a standing lidar gathers (counts, times, poses) is written as far as the allowance goes.
 /// Thread-safe; saves wait for each other.
 class MapSaver {
  public:
@@ -65,8 +94,8 @@ class MapSaver {
   /// tiles that do not fit into memory go to a temporary file. `metadata` goes into every file.
   /// Throws MapFileError, also for a file that another process saves its map to.
   MapSaver(const LatestMap& latest_map, Statistics& statistics, const std::filesystem::path& file,
-           std::map<std::string, std::string> metadata, std::uint32_t memory_limit_mib = 0,
-           const SavedMapsLimit& saved_maps_limit = {});
+           std::map<std::string, std::string> metadata, const MapSaverLimits& limits = {},
+           MonotonicClock& clock = MonotonicClock::steady());
 
   /// What the file holds, for mapping to resume from; nothing when there is no file. With a memory
   /// limit, its tiles are non-resident. The map has a new id unless it was saved when its last run
@@ -84,8 +113,10 @@ class MapSaver {
   /// Saves to the current file, if there is one and scans were mapped since the last save; without
   /// one, to the temporary file when memory is running out. Throws MapFileError.
   void save_if_changed();
-  /// The same when the run has ended.
+  /// The same when the run has ended: everything is stored.
   void save_at_end();
+  /// Stores everything, so that tiles can be evicted. Throws MapFileError.
+  void make_room();
 
   /// Saves to `name` beside the configured file, or to the current file when empty; returns where.
   /// Throws MapFileError, or std::invalid_argument for a name that is a path, one that another map
@@ -107,11 +138,18 @@ class MapSaver {
   /// Opens it again where that failed before.
   [[nodiscard]] MapStore& open_store();
   [[nodiscard]] SavedMap read(MapStore& store) const;
+  /// All that a checkpoint in the present scope would store.
   [[nodiscard]] bool is_saved() const;
+  /// All that is known, a standing robot's evidence included.
+  [[nodiscard]] bool is_saved_whole() const { return is_saved() && !is_partial_; }
+  /// Everything that changed, or what matters while the robot stands.
+  [[nodiscard]] CheckpointScope scope();
+  [[nodiscard]] bool has_moved() const;
   /// Counts the save and times it.
-  void save(bool has_ended);
-  void store(bool has_ended);
-  [[nodiscard]] RunCheckpoint take(bool everything) const;
+  void save(CheckpointScope scope, bool has_ended = false);
+  /// False where there was nothing to write.
+  bool store(CheckpointScope scope, bool has_ended);
+  [[nodiscard]] RunCheckpoint take(CheckpointScope scope) const;
   /// The current file when empty. Throws std::invalid_argument.
   [[nodiscard]] std::filesystem::path file_named(const std::string& name) const;
   void save_copy(const std::filesystem::path& target, bool overwrite);
@@ -136,6 +174,12 @@ class MapSaver {
   std::uint64_t saved_map_id_ = 0;
   std::uint64_t saved_version_ = 0;
   std::uint64_t saved_poses_ = 0;
+  /// The last save left out what a standing robot gathered.
+  bool is_partial_ = false;
+  WriteAllowance standing_allowance_;
+  MonotonicClock& clock_;
+  /// Where the robot was when everything was stored last.
+  std::optional<Eigen::Isometry3d> T_map_base_saved_;
 };
 
 /// How long after the begin of a save the next one is due: the next one is to have ended `period`

@@ -43,9 +43,10 @@ std::optional<SavedMap> saved_map(MapSaver& saver, const ServerConfig& config) {
 MapStorage::MapStorage(const ServerConfig& config, const std::string& label_source,
                        Statistics& statistics)
     : saver_(latest_map_, statistics, config.map.file, file_metadata(config, label_source),
-             config.map.memory_limit_mib,
-             {.max_maps = config.map.saved_maps,
-              .max_bytes = std::uintmax_t{config.map.saved_maps_mib} << 20}),
+             {.memory_limit_mib = config.map.memory_limit_mib,
+              .standing_mib_per_hour = config.map.standing_mib_per_hour,
+              .saved_maps = {.max_maps = config.map.saved_maps,
+                             .max_bytes = std::uintmax_t{config.map.saved_maps_mib} << 20}}),
       loaded_(saved_map(saver_, config)),
       tiles_(saver_.tile_store(), tile_cache_bytes(config.map)) {}
 

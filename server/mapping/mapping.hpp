@@ -53,7 +53,7 @@ class Mapping {
     return thread_->removed(box_map);
   }
   std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map) {
-    return thread_->restore_removed(reason, box_map);
+    return thread_->restore_removed(reason, box_map, [this] { storage_.saver().make_room(); });
   }
 
   /// As MappingThread::reset, for MapSaver::begin_anew.

@@ -4,11 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <stdexcept>
 #include <utility>
 
 #include "core/frames/rigid_motion.hpp"
 #include "core/map/map_id.hpp"
+#include "core/map/tile_evidence.hpp"
 #include "server/mapping/async_segmenter.hpp"
 #include "server/mapping/milliseconds.hpp"
 
@@ -24,6 +27,15 @@ constexpr std::chrono::milliseconds idle_period{50};
 constexpr double max_speed_m_s = 150.0;
 constexpr double max_jump_m = 1.0;
 
+// Of the mapper's own poses; stamps that are set back are looked for among them.
+constexpr std::size_t mapper_poses = 1000;
+
+// Tiles that a request looks at before it lets a waiting scan pass; some milliseconds.
+constexpr std::size_t tiles_at_once = 8;
+
+// Tiles of one request that may have to be read from the disk.
+constexpr std::size_t max_stored_tiles = 4000;
+
 constexpr std::size_t no_limit = std::numeric_limits<std::size_t>::max();
 
 // The rest of the limit is for copies: in the writers' histories, and for queries.
@@ -36,7 +48,7 @@ std::size_t map_share_bytes(const MapFileConfig& config) {
 // a recording is played again, else the last one, where the robot was switched off: a stamp that
 // merely lies within the stored path's times may be that of a clock not set yet. Nothing without a
 // stored path.
-std::optional<Eigen::Isometry3d> pose_in_saved_map(const Trajectory& stored,
+std::optional<Eigen::Isometry3d> pose_in_saved_map(const SharedTrajectory& stored,
                                                    std::int64_t stamp_ns) {
   if (stored.empty()) return std::nullopt;
   const auto then = std::ranges::find(stored, stamp_ns, &StampedPose::stamp_ns);
@@ -68,11 +80,14 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
                    }}),
       frames_(config, outputs.static_transforms, statistics),
       odom_frame_(config.frames.odom) {
+  // The whole path is the latest map's.
+  mapper_.limit_trajectory(mapper_poses);
   const bool is_odom_own = config.frames.odom_source == FramesConfig::OdomSource::own;
   if (!odom_frame_.empty() && is_odom_own) odom_.emplace();
   if (stored && !stored->view.tiles.empty()) {
-    resume(resumed(*stored, tile_store), stored->trajectory);
+    resume({resumed(*stored, tile_store), stored->trajectory, tile_store});
   } else {
+    tile_store_ = tile_store;
     mapper_.static_map().use_tile_store(tile_store);
     mapper_.reset(new_map_id());
     begin_map({});
@@ -91,6 +106,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
 
 void MappingThread::reset(std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store) {
   run_between_scans([&] {
+    tile_store_ = tile_store;
     mapper_.static_map().use_tile_store(tile_store);
     mapper_.reset(map_id);
     begin_map({});
@@ -100,14 +116,11 @@ void MappingThread::reset(std::uint64_t map_id, const std::shared_ptr<TileStore>
 
 std::function<void()> MappingThread::prepare(const SavedMap& stored,
                                              const std::shared_ptr<TileStore>& tile_store) {
-  struct Prepared {
-    StaticMap map;
-    Trajectory path;
-  };
-  auto prepared = std::make_shared<Prepared>(resumed(stored, tile_store), stored.trajectory);
+  auto prepared =
+      std::make_shared<PreparedMap>(resumed(stored, tile_store), stored.trajectory, tile_store);
   return [this, prepared = std::move(prepared)] {
     run_between_scans([&] {
-      resume(std::move(prepared->map), std::move(prepared->path));
+      resume(std::move(*prepared));
       const auto view = latest_map_.view();
       spdlog::info("loaded: resuming with {} tiles as map {}", view->tiles.size(), view->map_id);
     });
@@ -119,19 +132,20 @@ StaticMap MappingThread::resumed(const SavedMap& stored,
   StaticMap map(map_config_);
   map.resume(stored.view, stored.tile_evidence);
   map.use_tile_store(tile_store);
-  const Trajectory& path = stored.trajectory;
+  const SharedTrajectory& path = stored.trajectory;
   const Eigen::Vector3d last_map =
       path.empty() ? Eigen::Vector3d(0.0, 0.0, 0.0) : path.back().T_map_lidar.translation();
-  map.reload_near(last_map, map_limit_bytes_);
+  map.reload_near(last_map);
   return map;
 }
 
-void MappingThread::resume(StaticMap prepared, Trajectory path) {
-  mapper_.resume(std::move(prepared));
-  begin_map(std::move(path));
+void MappingThread::resume(PreparedMap prepared) {
+  tile_store_ = std::move(prepared.tile_store);
+  mapper_.resume(std::move(prepared.map));
+  begin_map(std::move(prepared.path));
 }
 
-void MappingThread::begin_map(Trajectory trajectory) {
+void MappingThread::begin_map(SharedTrajectory trajectory) {
   mapper_.static_map().set_frozen(false);
   is_map_frozen_ = false;
   latest_map_.begin(mapper_.map_snapshot(), std::move(trajectory));
@@ -157,11 +171,11 @@ void MappingThread::run_requests_elsewhere() {
   for (std::packaged_task<void()>& task : std::exchange(requests_, {})) task();
 }
 
-RunCheckpoint MappingThread::checkpoint(bool everything) {
+RunCheckpoint MappingThread::checkpoint(CheckpointScope scope) {
   MapCheckpoint map;
   run_between_scans([&] {
     const auto began = Clock::now();
-    map = mapper_.static_map().checkpoint(everything);
+    map = mapper_.static_map().checkpoint(scope);
     latest_map_.publish(map.view);
     statistics_.add_latency("checkpoint", milliseconds(Clock::now() - began));
   });
@@ -209,16 +223,76 @@ MemoryUse MappingThread::memory_use() {
 }
 
 std::vector<RemovedVoxel> MappingThread::removed(const Eigen::AlignedBox3d& box_map) {
-  std::vector<RemovedVoxel> removed;
-  run_between_scans([&] { removed = mapper_.static_map().removed(box_map); });
-  return removed;
+  const TilesOfBox tiles = tiles_of(box_map);
+  StaticMap::RemovedVoxels all;
+  for (std::span<const TileId> left(tiles.ids); !left.empty();) {
+    run_on_some(left, [&](std::span<const TileId> some) {
+      StaticMap::RemovedVoxels part = mapper_.static_map().removed(box_map, some);
+      all.voxels.insert(all.voxels.end(), part.voxels.begin(), part.voxels.end());
+      all.non_resident.insert(all.non_resident.end(), part.non_resident.begin(),
+                              part.non_resident.end());
+      return true;
+    });
+  }
+  if (tiles.tile_store == nullptr) return std::move(all.voxels);
+  // From the disk in the caller's thread.
+  const StaticMapConfig& config = mapper_.static_map().config();
+  for (const TileId id : all.non_resident) {
+    const TileRecord record = tiles.tile_store->load(id);
+    if (record.evidence == nullptr) continue;
+    std::ranges::copy_if(removed_voxels(*record.evidence, config.voxel_size_m, config.tile_size_m),
+                         std::back_inserter(all.voxels), [&](const RemovedVoxel& voxel) {
+                           return box_map.contains(voxel.position_map.cast<double>());
+                         });
+  }
+  return std::move(all.voxels);
 }
 
-std::size_t MappingThread::restore_removed(RemovalReason reason,
-                                           const Eigen::AlignedBox3d& box_map) {
+std::size_t MappingThread::restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
+                                           const std::function<void()>& make_room) {
+  const TilesOfBox tiles = tiles_of(box_map);
   std::size_t restored = 0;
-  run_between_scans([&] { restored = mapper_.static_map().restore_removed(reason, box_map); });
+  for (std::span<const TileId> left(tiles.ids); !left.empty();) {
+    bool is_full = false;
+    run_on_some(left, [&](std::span<const TileId> some) {
+      restored += mapper_.static_map().restore_removed(reason, box_map, some);
+      is_full = mapper_.static_map().memory_use().bytes > map_limit_bytes_;
+      return !is_full;
+    });
+    if (is_full) make_room();
+  }
   return restored;
+}
+
+MappingThread::TilesOfBox MappingThread::tiles_of(const Eigen::AlignedBox3d& box_map) {
+  TilesOfBox tiles;
+  std::size_t non_resident = 0;
+  run_between_scans([&] {
+    const StaticMap& map = mapper_.static_map();
+    const std::size_t resident = map.memory_use().resident_tiles;
+    tiles = {map.tiles_in(box_map, max_stored_tiles + resident + 1), tile_store_};
+    // At least so many.
+    non_resident = tiles.ids.size() - std::min(resident, tiles.ids.size());
+  });
+  if (non_resident > max_stored_tiles) {
+    throw std::invalid_argument("the region has " + std::to_string(non_resident) +
+                                " tiles or more that are on disk; at most " +
+                                std::to_string(max_stored_tiles) +
+                                " can be answered: ask for parts");
+  }
+  return tiles;
+}
+
+void MappingThread::run_on_some(std::span<const TileId>& left,
+                                const std::function<bool(std::span<const TileId> some)>& action) {
+  run_between_scans([&] {
+    bool goes_on = true;
+    while (!left.empty() && goes_on) {
+      const auto some = left.first(std::min(left.size(), tiles_at_once));
+      goes_on = action(some) && queue_.waiting() == 0;
+      left = left.subspan(some.size());
+    }
+  });
 }
 
 void MappingThread::run_between_scans(std::function<void()> action) {

@@ -5,6 +5,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -66,18 +67,32 @@ class MappingThread : public CheckpointSource {
   void publish_now();
 
   /// It is also published as the latest map.
-  [[nodiscard]] RunCheckpoint checkpoint(bool everything) override;
+  [[nodiscard]] RunCheckpoint checkpoint(CheckpointScope scope) override;
   void checkpoint_stored(std::uint64_t step) override;
   /// A map that fills its memory and cannot be saved is frozen until it can: its tiles are nowhere
   /// else.
   void checkpoint_failed() override;
   [[nodiscard]] MemoryUse memory_use() override;
 
-  /// As in StaticMap.
+  /// Voxels in the box (map frame [m]) that are removed from the planning view, in no order. Scans
+  /// go on being mapped meanwhile: each tile is as it was at some moment of the call. Throws
+  /// std::invalid_argument for a box with more tiles on disk than one answer may read, or as the
+  /// tile store does.
   [[nodiscard]] std::vector<RemovedVoxel> removed(const Eigen::AlignedBox3d& box_map);
-  std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map);
+  /// As StaticMap::restore_removed, tile by tile between scans. `make_room` is called where the map
+  /// has grown to its memory limit: it is to store the map, so that tiles can be evicted. Throws
+  /// as `removed` and `make_room` do; what was restored until then stays.
+  std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
+                              const std::function<void()>& make_room);
 
  private:
+  /// A stored map that can take the running one's place.
+  struct PreparedMap {
+    StaticMap map;
+    SharedTrajectory path;
+    std::shared_ptr<TileStore> tile_store;
+  };
+
   void map(QueuedScan queued);
   /// Gives the mapper the IMU's samples up to the scan's last point.
   void feed_imu(const Scan& scan);
@@ -86,7 +101,7 @@ class MappingThread : public CheckpointSource {
   /// Runs the requests, and publishes the map when that is due.
   void end_round(bool is_idle);
   /// Publishes a new map, and starts a new octree from it.
-  void begin_map(Trajectory trajectory);
+  void begin_map(SharedTrajectory trajectory);
   void forward(MappedScan mapped);
   void stage_ended(std::string_view stage);
   /// Publishes the pose before the scan is inserted into the map, to keep the latency of poses low.
@@ -95,7 +110,7 @@ class MappingThread : public CheckpointSource {
   [[nodiscard]] StaticMap resumed(const SavedMap& stored,
                                   const std::shared_ptr<TileStore>& tile_store) const;
   /// To be called in the thread that maps.
-  void resume(StaticMap prepared, Trajectory path);
+  void resume(PreparedMap prepared);
   /// Makes room, freezes the map or lets it grow again, and reports what it takes.
   void bound_memory();
   /// False where it is not known: then the scan is dropped.
@@ -113,6 +128,16 @@ class MappingThread : public CheckpointSource {
   void refuse_prior(const std::string& counter, const std::string& reason);
   void drop(const ScanRejection& rejection);
   void publish_snapshot();
+  /// The tiles that meet the box, and where those are stored that are not in memory.
+  struct TilesOfBox {
+    std::vector<TileId> ids;
+    std::shared_ptr<TileStore> tile_store;
+  };
+  [[nodiscard]] TilesOfBox tiles_of(const Eigen::AlignedBox3d& box_map);
+  /// Takes tiles from the front of `left` and runs `action` on them in the thread that maps, until
+  /// a scan waits or it returns false.
+  void run_on_some(std::span<const TileId>& left,
+                   const std::function<bool(std::span<const TileId> some)>& action);
   /// Runs `action` in the thread that maps, after the scan in work, and waits for its end.
   void run_between_scans(std::function<void()> action);
   void run_requests();
@@ -130,6 +155,8 @@ class MappingThread : public CheckpointSource {
   LatestMap& latest_map_;
   MappingOutputs outputs_;
   Mapper mapper_;
+  /// Where evicted tiles are.
+  std::shared_ptr<TileStore> tile_store_;
   ThrottledLog throttled_log_;
   RobotFrames frames_;
   std::string odom_frame_;

@@ -71,7 +71,7 @@ void OccupancyThread::run(Residency job) {
 void OccupancyThread::run(NewMap job) {
   OccupancyMap fresh(config_);
   fresh.insert(*job.view, throttle_);
-  fresh.sync_residency(*job.view);
+  fresh.begin_residency(*job.view);
   const std::scoped_lock lock(map_mutex_);
   map_ = std::move(fresh);
   stamp_ns_ = 0;

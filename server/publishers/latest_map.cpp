@@ -1,12 +1,11 @@
 #include "server/publishers/latest_map.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <utility>
 
 namespace stillmap::server {
 
-void LatestMap::begin(std::shared_ptr<const MapSnapshot> view, Trajectory trajectory) {
+void LatestMap::begin(std::shared_ptr<const MapSnapshot> view, SharedTrajectory trajectory) {
   auto history = std::make_shared<const TileHistory>(history_from(*view));
   const std::scoped_lock lock(mutex_);
   state_ = {std::move(view), std::move(history)};
@@ -21,8 +20,8 @@ void LatestMap::publish(std::shared_ptr<const MapSnapshot> view) {
   // Only the mapping thread publishes views, so the state cannot change between the two locks.
   const MapState before = state();
   if (before.view == view) return;
-  auto history = std::make_shared<const TileHistory>(
-      before.history ? history_with(*before.history, *view) : history_from(*view));
+  auto history = std::make_shared<const TileHistory>(before.history ? history_with(before, *view)
+                                                                    : history_from(*view));
   const std::scoped_lock lock(mutex_);
   state_ = {std::move(view), std::move(history)};
   published_at_ = std::chrono::steady_clock::now();
@@ -37,9 +36,9 @@ void LatestMap::add_pose(const StampedPose& pose, OdometryHealth health,
   label_source_ = label_source;
   // A pose that nothing confirmed is no part of the path, nor of its file.
   if (health == OdometryHealth::lost) return;
-  while (trajectory_.size() > session_begin_ && trajectory_.back().stamp_ns >= pose.stamp_ns) {
-    trajectory_.pop_back();
-  }
+  std::size_t kept = trajectory_.size();
+  while (kept > session_begin_ && trajectory_[kept - 1].stamp_ns >= pose.stamp_ns) --kept;
+  trajectory_.truncate(kept);
   trajectory_.push_back(pose);
 }
 
@@ -63,7 +62,7 @@ MapState LatestMap::state() const {
   return state_;
 }
 
-Trajectory LatestMap::trajectory() const {
+SharedTrajectory LatestMap::trajectory() const {
   const std::scoped_lock lock(mutex_);
   return trajectory_;
 }
@@ -74,14 +73,14 @@ StampedPose LatestMap::newest_pose() const {
 }
 
 Trajectory LatestMap::trajectory(std::size_t max_poses) const {
-  const std::scoped_lock lock(mutex_);
-  if (trajectory_.empty()) return {};
-  const std::size_t last = trajectory_.size() - 1;
+  const SharedTrajectory whole = trajectory();
+  if (whole.empty()) return {};
+  const std::size_t last = whole.size() - 1;
   std::size_t stride = 1;
   while ((last + stride - 1) / stride + 1 > max_poses) stride *= 2;
   Trajectory chosen;
-  for (std::size_t i = 0; i < last; i += stride) chosen.push_back(trajectory_[i]);
-  chosen.push_back(trajectory_.back());
+  for (std::size_t i = 0; i < last; i += stride) chosen.push_back(whole[i]);
+  chosen.push_back(whole.back());
   return chosen;
 }
 

@@ -8,7 +8,7 @@
 #include <stop_token>
 #include <string>
 
-#include "core/lidar/trajectory.hpp"
+#include "core/lidar/shared_trajectory.hpp"
 #include "core/map/query/tile_history.hpp"
 #include "core/map/tile.hpp"
 #include "core/odometry/odometry_state.hpp"
@@ -21,7 +21,7 @@ class LatestMap {
  public:
   /// A new map begins: its first view, and the poses that led to it. Those stay: the poses of this
   /// run follow them as a session of their own, whatever their stamps.
-  void begin(std::shared_ptr<const MapSnapshot> view, Trajectory trajectory);
+  void begin(std::shared_ptr<const MapSnapshot> view, SharedTrajectory trajectory);
   void publish(std::shared_ptr<const MapSnapshot> view);
   /// Removes poses of this session with the same or later stamps first: a clock that was set back
   /// replaces what it said. A lost pose changes health and label source alone.
@@ -40,7 +40,8 @@ class LatestMap {
       std::chrono::milliseconds timeout) const;
   /// The view and the history that ends with it.
   [[nodiscard]] MapState state() const;
-  [[nodiscard]] Trajectory trajectory() const;
+  /// Costs little: it shares its poses.
+  [[nodiscard]] SharedTrajectory trajectory() const;
   /// At most `max_poses` (>= 2) of its poses, evenly spaced, the newest always among them. The
   /// selection stays the same until the path has twice as many poses.
   [[nodiscard]] Trajectory trajectory(std::size_t max_poses) const;
@@ -58,7 +59,7 @@ class LatestMap {
   mutable std::condition_variable_any changed_;
   MapState state_;
   std::chrono::steady_clock::time_point published_at_;
-  Trajectory trajectory_;
+  SharedTrajectory trajectory_;
   /// Where the poses of this session begin in it.
   std::size_t session_begin_ = 0;
   std::uint64_t poses_added_ = 0;

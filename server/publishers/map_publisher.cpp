@@ -6,16 +6,17 @@
 namespace stillmap::server {
 
 MapPublisher::MapPublisher(dds::Participant& participant, const dds::Topics& topics,
-                           const ServerConfig& config, const LatestMap& latest_map)
+                           const ServerConfig& config, const LatestMap& latest_map,
+                           TileReader& tiles)
     : latest_map_(latest_map),
       map_frame_(config.frames.map),
       path_poses_(config.publish.path_poses),
       half_window_m_(static_cast<float>(config.publish.cloud_window_m / 2.0)),
-      tiles_(participant, topics),
+      tiles_(participant, topics, tiles, config.publish.tile_window_m),
       path_(participant, topics.path.dds_name, topics.path.writer),
       cloud_(participant, topics.static_cloud.dds_name, topics.static_cloud.writer),
       tile_worker_(std::chrono::duration<double>(config.publish.tiles_period_s),
-                   [this](const std::stop_token&) { tiles_.publish(latest_map_.view()); }),
+                   [this](const std::stop_token&) { publish_tiles(); }),
       path_worker_(std::chrono::duration<double>(config.publish.path_period_s),
                    [this](const std::stop_token&) { publish_path(); }),
       cloud_worker_(std::chrono::duration<double>(config.publish.cloud_period_s),
@@ -26,6 +27,10 @@ bool MapPublisher::has_changed(PathState& published) const {
   if (now == published || (now.poses == 0 && latest_map_.view()->tiles.empty())) return false;
   published = now;
   return true;
+}
+
+void MapPublisher::publish_tiles() {
+  tiles_.publish(latest_map_.view(), latest_map_.newest_pose().T_map_lidar.translation().head<2>());
 }
 
 void MapPublisher::publish_path() {

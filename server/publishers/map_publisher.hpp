@@ -18,7 +18,7 @@ namespace stillmap::server {
 class MapPublisher {
  public:
   MapPublisher(dds::Participant& participant, const dds::Topics& topics, const ServerConfig& config,
-               const LatestMap& latest_map);
+               const LatestMap& latest_map, TileReader& tiles);
 
  private:
   /// Changes with every pose, and when a map was loaded.
@@ -30,6 +30,7 @@ class MapPublisher {
   /// Whether there is a path, and another one than `published`, which then becomes it.
   [[nodiscard]] bool has_changed(PathState& published) const;
 
+  void publish_tiles();
   void publish_path();
   void publish_cloud();
 

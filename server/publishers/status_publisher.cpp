@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <numeric>
 #include <utility>
 
 #include "idl/conversions/status.hpp"
@@ -124,9 +123,7 @@ dds::ServerStatus ServerReport::status() const {
   status.map_version = view->version;
   status.map_id = view->map_id;
   status.tile_count = view->tiles.size();
-  status.voxel_count = std::accumulate(
-      view->tiles.begin(), view->tiles.end(), std::uint64_t{0},
-      [](std::uint64_t sum, const auto& tile) { return sum + tile->info.voxel_count; });
+  status.voxel_count = view->tiles.voxel_count();
   statistics_.report_to(status);
   status.diagnostics = discovery_diagnostics_();
   status.diagnostics.insert(status.diagnostics.end(), traits_.host_diagnostics.begin(),

@@ -1,9 +1,9 @@
 #include "server/publishers/tile_publisher.hpp"
 
 #include <algorithm>
+#include <stdexcept>
 #include <utility>
 
-#include "core/map/tile_evidence.hpp"
 #include "idl/conversions/tile.hpp"
 
 namespace stillmap::server {
@@ -28,52 +28,95 @@ void TokenBucket::refill(Clock::time_point now) {
   refilled_ = now;
 }
 
-TilePublisher::TilePublisher(dds::Participant& participant, const dds::Topics& topics)
+TilePublisher::TilePublisher(dds::Participant& participant, const dds::Topics& topics,
+                             TileReader& tiles, double window_m)
     : tiles_(participant, topics.tiles.dds_name, topics.tiles.writer),
       index_(participant, topics.tile_index.dds_name, topics.tile_index.writer),
+      reader_(tiles),
+      window_m_(window_m),
       token_bucket_(participant.options().large_message_bytes_per_s / new_tile_share),
       max_wait_(participant.options().lease_s) {}
 
-void TilePublisher::publish(const std::shared_ptr<const MapSnapshot>& latest) {
+void TilePublisher::publish(const std::shared_ptr<const MapSnapshot>& latest,
+                            const Eigen::Vector2d& robot_map) {
   token_bucket_.refill(TokenBucket::Clock::now());
-  // A view of the same version may differ in which tiles are resident.
-  if (latest == last_view_ && waiting_ == 0) return;
-  last_view_ = latest;
   const MapSnapshot& view = *latest;
+  const Eigen::Vector3d half(window_m_ / 2.0, window_m_ / 2.0, 0.0);
+  const Eigen::Vector3d centre_map(robot_map.x(), robot_map.y(), 0.0);
+  const TileRange window =
+      view.tile_size_m > 0.0 ? tile_range({centre_map - half, centre_map + half}, view.tile_size_m)
+                             : TileRange{};
+  const bool is_same_window = window.first == window_.first && window.last == window_.last;
+  if (latest == last_view_ && is_same_window && pending_.empty()) return;
   const dds::MapIdentity identity = wire::identity_of(view);
-  // Tiles of another map are new whatever their revision.
-  if (view.map_id != std::exchange(map_id_, view.map_id)) {
-    for (auto& [id, known] : published_) known.revision = 0;
+  window_ = window;
+  const bool is_other_map = !last_view_ || view.map_id != last_view_->map_id;
+  is_other_map ? begin_map(view, identity) : note_changes(view, identity);
+  if (is_other_map || !is_same_window) note_window(view);
+  last_view_ = latest;
+  publish_pending(view, identity);
+}
+
+void TilePublisher::begin_map(const MapSnapshot& view, const dds::MapIdentity& identity) {
+  pending_.clear();
+  for (auto& [id, known] : published_) {
+    known.revision = 0;
+    if (view.tiles.find(id) == nullptr) {
+      publish_gone(id, view, identity);
+    } else {
+      pending_.insert(id);
+    }
   }
-  dispose_missing_tiles(view, identity);
-  drop_evicted_voxels(view, identity);
-  publish_pending(pending_tiles(view), identity);
+}
+
+void TilePublisher::note_changes(const MapSnapshot& view, const dds::MapIdentity& identity) {
+  TileTable::for_each_difference(
+      last_view_->tiles, view.tiles, [&](const auto& before, const auto& after) {
+        if (after == nullptr) {
+          pending_.erase(before->info.id);
+          publish_gone(before->info.id, view, identity);
+        } else if (before == nullptr || before->info.revision != after->info.revision) {
+          // Tiles that were evicted or reloaded are the same to readers.
+          pending_.insert(after->info.id);
+        }
+      });
+}
+
+void TilePublisher::note_window(const MapSnapshot& view) {
+  for (const auto& tile : tiles_in_range(view.tiles, window_)) {
+    const auto known = published_.find(tile->info.id);
+    if (known == published_.end() || known->second.revision != tile->info.revision) {
+      pending_.insert(tile->info.id);
+    }
+  }
+}
+
+bool TilePublisher::is_in_window(TileId id) const {
+  return id.x >= window_.first.x && id.x <= window_.last.x && id.y >= window_.first.y &&
+         id.y <= window_.last.y;
 }
 
 TilePublisher::TilePointers TilePublisher::pending_tiles(const MapSnapshot& view) const {
-  std::vector<std::pair<std::uint64_t, std::shared_ptr<const Tile>>> pending_tiles;
-  for (const auto& tile : view.tiles) {
-    const auto known = published_.find(tile->info.id);
-    const bool is_known =
-        known != published_.end() && known->second.revision == tile->info.revision;
-    if (is_known && (known->second.has_voxels || is_non_resident(*tile))) continue;
-    pending_tiles.emplace_back(known == published_.end() ? 0 : known->second.publication, tile);
+  std::vector<std::pair<std::uint64_t, std::shared_ptr<const Tile>>> pending;
+  for (const TileId id : pending_) {
+    const auto known = published_.find(id);
+    pending.emplace_back(known == published_.end() ? 0 : known->second.publication,
+                         view.tiles.find(id));
   }
-  std::ranges::stable_sort(pending_tiles, {}, [](const auto& entry) { return entry.first; });
+  std::ranges::stable_sort(pending, {}, [](const auto& entry) { return entry.first; });
   TilePointers tiles;
-  for (auto& [publication, tile] : pending_tiles) tiles.push_back(std::move(tile));
+  for (auto& [publication, tile] : pending) tiles.push_back(std::move(tile));
   return tiles;
 }
 
-void TilePublisher::publish_pending(const TilePointers& tiles, const dds::MapIdentity& identity) {
-  waiting_ = tiles.size();
-  if (tiles.empty() || !last_burst_acknowledged()) return;
+void TilePublisher::publish_pending(const MapSnapshot& view, const dds::MapIdentity& identity) {
+  if (!last_burst_acknowledged()) return;
+  release_far_tiles(identity);
+  if (pending_.empty()) return;
   last_burst_ = std::chrono::steady_clock::now();
-  for (const auto& tile : tiles) {
+  for (const auto& tile : pending_tiles(view)) {
     if (!token_bucket_.has_tokens()) return;
-    publish_tile(*tile, identity);
-    token_bucket_.consume(message_bytes(*tile));
-    --waiting_;
+    publish_tile(tile, identity);
   }
 }
 
@@ -82,43 +125,47 @@ bool TilePublisher::last_burst_acknowledged() {
          std::chrono::steady_clock::now() - last_burst_ > max_wait_;
 }
 
-void TilePublisher::publish_tile(const Tile& tile, const dds::MapIdentity& identity) {
+void TilePublisher::publish_tile(const std::shared_ptr<const Tile>& tile,
+                                 const dds::MapIdentity& identity) {
   // Keep-last writers always have room.
-  if (!is_non_resident(tile)) static_cast<void>(tiles_.write(wire::to_wire(tile, identity)));
-  static_cast<void>(index_.write(wire::to_wire(tile.info, identity)));
-  published_[tile.info.id] = {tile.info.revision, !is_non_resident(tile), ++publications_};
-}
-
-void TilePublisher::drop_evicted_voxels(const MapSnapshot& view, const dds::MapIdentity& identity) {
-  for (const auto& tile : view.tiles) {
-    if (!is_non_resident(*tile)) continue;
-    const auto known = published_.find(tile->info.id);
-    if (known != published_.end() && known->second.has_voxels) drop_voxels(*tile, identity);
+  try {
+    const auto whole = reader_.read(tile);
+    static_cast<void>(tiles_.write(wire::to_wire(*whole, identity)));
+    token_bucket_.consume(message_bytes(*whole));
+  } catch (const std::runtime_error&) {
+    // On the disk, and changed since or not to be read: the entry alone. A later view has it.
   }
+  static_cast<void>(index_.write(wire::to_wire(tile->info, identity)));
+  published_[tile->info.id] = {tile->info.revision, ++publications_};
+  pending_.erase(tile->info.id);
 }
 
-void TilePublisher::drop_voxels(const Tile& tile, const dds::MapIdentity& identity) {
-  // Without its voxels: only the key counts.
-  tiles_.unregister(wire::to_wire(tile, identity));
-  published_[tile.info.id].has_voxels = false;
+void TilePublisher::publish_gone(TileId id, const MapSnapshot& view,
+                                 const dds::MapIdentity& identity) {
+  Tile gone;
+  gone.info = {.id = id, .revision = view.version, .bounds_map = {}};
+  if (published_.contains(id)) tiles_.dispose(wire::to_wire(gone, identity));
+  // Disposed samples do not pass content filters: the index says it with an empty tile.
+  static_cast<void>(index_.write(wire::to_wire(gone.info, identity)));
+  published_[id] = {0, ++publications_};
 }
 
-void TilePublisher::dispose_missing_tiles(const MapSnapshot& view,
-                                          const dds::MapIdentity& identity) {
-  const auto is_gone = [&](const auto& entry) {
-    const auto found = std::ranges::lower_bound(view.tiles, entry.first, {},
-                                                [](const auto& tile) { return tile->info.id; });
-    return found == view.tiles.end() || (*found)->info.id != entry.first;
-  };
-  std::erase_if(published_, [&](const auto& entry) {
-    if (!is_gone(entry)) return false;
-    Tile gone;
-    gone.info = {.id = entry.first, .revision = view.version, .bounds_map = {}};
-    tiles_.dispose(wire::to_wire(gone, identity));
-    // Disposed samples do not pass content filters: the index says it with an empty tile.
-    static_cast<void>(index_.write(wire::to_wire(gone.info, identity)));
-    return true;
-  });
+void TilePublisher::release_far_tiles(const dds::MapIdentity& identity) {
+  std::vector<std::pair<std::uint64_t, TileId>> far;
+  for (const auto& [id, known] : published_) {
+    if (!is_in_window(id)) far.emplace_back(known.publication, id);
+  }
+  if (far.size() <= max_far_tiles) return;
+  std::ranges::sort(far);
+  far.resize(far.size() - max_far_tiles);
+  for (const auto& [publication, id] : far) {
+    // Only the key counts.
+    Tile key;
+    key.info.id = id;
+    tiles_.unregister(wire::to_wire(key, identity));
+    index_.unregister(wire::to_wire(key.info, identity));
+    published_.erase(id);
+  }
 }
 
 }  // namespace stillmap::server

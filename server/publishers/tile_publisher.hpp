@@ -5,9 +5,12 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <vector>
 
+#include "core/map/query/tile_reader.hpp"
 #include "core/map/tile.hpp"
+#include "core/map/voxel_grid.hpp"
 #include "idl/dds/writer.hpp"
 #include "idl/interface/map_identity.hpp"
 #include "idl/interface/topics.hpp"
@@ -36,52 +39,68 @@ class TokenBucket {
   std::optional<Clock::time_point> refilled_;
 };
 
-/// Publishes every tile that changed, first its voxels and then its entry in the index. Tiles that
-/// no longer exist are disposed, and their entry becomes empty. Of evicted tiles, late joiners get
-/// the entry alone. Where the participant's options limit the rate of large messages, new tiles
-/// take half of it: those published longest ago go first, and a tile that changes while it waits is
-/// sent once, in its newest state.
+/// Publishes the tiles in a window round the robot, and every tile that changes: first its voxels
+/// and then its entry in the index. Tiles that no longer exist are disposed, and their entry
+/// becomes empty. Late joiners get the window and the tiles that changed last elsewhere, however
+/// large the map is; the rest is theirs to ask for. Where the participant's options limit the rate
+/// of large messages, new tiles take half of it: those published longest ago go first, and a tile
+/// that changes while it waits is sent once, in its newest state.
 ///
 /// A tile is never replaced while a reader is still receiving it (unless that takes longer than a
 /// lease): Fast DDS 2.9 readers abort when they have some fragments of a keyed sample and are then
 /// told that the rest will not come.
 class TilePublisher {
  public:
-  TilePublisher(dds::Participant& participant, const dds::Topics& topics);
+  /// Tiles outside the window that late joiners get, too.
+  static constexpr std::size_t max_far_tiles = 256;
+
+  /// `window_m` is the window's edge. Tiles in it that are not in memory are read through `tiles`.
+  TilePublisher(dds::Participant& participant, const dds::Topics& topics, TileReader& tiles,
+                double window_m);
 
   /// Publishes what is new in the view, as far as the rate allows now; call it again with the same
-  /// view to continue.
-  void publish(const std::shared_ptr<const MapSnapshot>& latest);
-  /// Tiles of the last view that are not published yet.
-  [[nodiscard]] std::size_t waiting() const { return waiting_; }
+  /// view to continue. `robot_map` is where the window is [m].
+  void publish(const std::shared_ptr<const MapSnapshot>& latest, const Eigen::Vector2d& robot_map);
+  /// Tiles that are not published yet.
+  [[nodiscard]] std::size_t waiting() const { return pending_.size(); }
+  /// Tiles that late joiners get.
+  [[nodiscard]] std::size_t held() const { return published_.size(); }
 
  private:
   using TilePointers = std::vector<std::shared_ptr<const Tile>>;
 
-  /// Tiles of the view that readers do not have, those published longest ago first.
+  /// Another map, or the first: what was published is not of it.
+  void begin_map(const MapSnapshot& view, const dds::MapIdentity& identity);
+  /// Notes what differs from the last view.
+  void note_changes(const MapSnapshot& view, const dds::MapIdentity& identity);
+  /// Notes the window's tiles that are not published.
+  void note_window(const MapSnapshot& view);
+  [[nodiscard]] bool is_in_window(TileId id) const;
+  /// Tiles that readers do not have, those published longest ago first.
   [[nodiscard]] TilePointers pending_tiles(const MapSnapshot& view) const;
   /// All readers have acknowledged the last burst, or it was sent longer than a lease ago.
   [[nodiscard]] bool last_burst_acknowledged();
-  void publish_pending(const TilePointers& tiles, const dds::MapIdentity& identity);
-  void publish_tile(const Tile& tile, const dds::MapIdentity& identity);
-  void drop_evicted_voxels(const MapSnapshot& view, const dds::MapIdentity& identity);
-  void drop_voxels(const Tile& tile, const dds::MapIdentity& identity);
-  void dispose_missing_tiles(const MapSnapshot& view, const dds::MapIdentity& identity);
+  void publish_pending(const MapSnapshot& view, const dds::MapIdentity& identity);
+  void publish_tile(const std::shared_ptr<const Tile>& tile, const dds::MapIdentity& identity);
+  void publish_gone(TileId id, const MapSnapshot& view, const dds::MapIdentity& identity);
+  /// Late joiners no longer get tiles that are far and changed long ago; who has them keeps them.
+  void release_far_tiles(const dds::MapIdentity& identity);
 
   dds::Writer<stillmap_msgs::msg::MapTile> tiles_;
   dds::Writer<stillmap_msgs::msg::TileInfo> index_;
+  TileReader& reader_;
+  double window_m_;
   TokenBucket token_bucket_;
   std::chrono::seconds max_wait_;
   std::chrono::steady_clock::time_point last_burst_;
-  std::uint64_t map_id_ = 0;
-  std::size_t waiting_ = 0;
   std::uint64_t publications_ = 0;
   std::shared_ptr<const MapSnapshot> last_view_;
+  TileRange window_;
+  std::set<TileId> pending_;
   /// What was published of a tile.
   struct Published {
+    /// 0: of another map, or the tile is gone.
     std::uint64_t revision = 0;
-    /// Late joiners get the voxels, too.
-    bool has_voxels = false;
     /// Number of the publication that brought it.
     std::uint64_t publication = 0;
   };

@@ -2,8 +2,8 @@
 
 #include <chrono>
 #include <cstdint>
-#include <list>
 #include <memory>
+#include <vector>
 
 #include "core/map/tile.hpp"
 
@@ -11,7 +11,8 @@ namespace stillmap::server {
 
 /// Views of the map that clients page through, so that all pages of an answer show one version. A
 /// view holds the memory of every tile that has changed since, so it goes soon after the last page,
-/// or when nobody has asked for the next one for long. One thread uses it.
+/// or when nobody has asked for the next one for long. Any number of clients may page as long as
+/// their views hold no more than `max_bytes`. One thread uses it.
 class PagedSnapshots {
  public:
   using Clock = std::chrono::steady_clock;
@@ -22,8 +23,10 @@ class PagedSnapshots {
   /// After a last page: requests are repeated when their answers are lost, and others may be
   /// reading the same version.
   static constexpr std::chrono::seconds last_page_grace{10};
-  /// Beyond it, the one that was asked for longest ago goes.
-  static constexpr std::size_t max_snapshots = 16;
+  static constexpr std::size_t default_max_bytes = std::size_t{64} << 20;
+
+  /// Beyond `max_bytes`, the view that was asked for longest ago goes.
+  explicit PagedSnapshots(std::size_t max_bytes = default_max_bytes) : max_bytes_(max_bytes) {}
 
   /// Nothing when no answer of this version is under way.
   [[nodiscard]] Snapshot find(std::uint64_t version) const;
@@ -37,17 +40,27 @@ class PagedSnapshots {
   void drop_expired(Clock::time_point now);
 
   [[nodiscard]] std::size_t size() const { return sessions_.size(); }
+  /// About what the views take beside the newest of them.
+  [[nodiscard]] std::size_t bytes() const;
 
  private:
   struct Session {
     Snapshot view;
+    Clock::time_point asked;
     Clock::time_point until;
+    /// Of what the next newer view does not share.
+    std::size_t bytes = 0;
   };
+  using Sessions = std::vector<Session>;
 
-  [[nodiscard]] std::list<Session>::iterator entry_of(const Snapshot& view);
+  [[nodiscard]] Sessions::iterator session_of(const Snapshot& view);
+  void erase(Sessions::iterator session);
+  /// Brings the session's `bytes` up to date with the one after it.
+  void weigh(Sessions::iterator session);
 
-  // Those asked for most recently first.
-  std::list<Session> sessions_;
+  std::size_t max_bytes_;
+  /// In the order in which their views were first asked for, and so of their versions.
+  Sessions sessions_;
 };
 
 }  // namespace stillmap::server

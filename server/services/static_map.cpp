@@ -1,7 +1,10 @@
 #include <algorithm>
+#include <charconv>
+#include <limits>
 #include <string>
 #include <utility>
 
+#include "core/map/voxel_grid.hpp"
 #include "idl/conversions/tile.hpp"
 #include "server/services/service_handlers.hpp"
 
@@ -39,8 +42,28 @@ void check_interval(double low, double high, const std::string& axis) {
                               " " + std::to_string(high));
 }
 
-bool meets(std::int32_t index, double tile_size_m, double low, double high) {
-  return index * tile_size_m <= high && (index + 1.0) * tile_size_m >= low;
+// About 2 MB.
+constexpr std::size_t max_versions_per_reply = 20'000;
+
+/// Where a page of tile versions ends: its last tile.
+std::string page_end(TileId last) { return std::to_string(last.x) + "," + std::to_string(last.y); }
+
+/// The first tile that may be on the next page. Throws std::invalid_argument for a text that
+/// page_end() did not write.
+TileId after_page(const std::string& continuation) {
+  constexpr std::int32_t lowest = std::numeric_limits<std::int32_t>::min();
+  if (continuation.empty()) return {lowest, lowest};
+  TileId last;
+  const char* const end = continuation.data() + continuation.size();
+  const auto x = std::from_chars(continuation.data(), end, last.x);
+  const bool has_comma = x.ec == std::errc() && x.ptr != end && *x.ptr == ',';
+  const auto y = has_comma ? std::from_chars(x.ptr + 1, end, last.y) : x;
+  if (!has_comma || y.ec != std::errc() || y.ptr != end ||
+      last.y == std::numeric_limits<std::int32_t>::max()) {
+    throw std::invalid_argument(
+        "continuation is damaged; hand back the text of the last page as it is");
+  }
+  return {last.x, last.y + 1};
 }
 
 // About 5 MB at 27 bytes a voxel. At least one tile is always sent.
@@ -75,12 +98,18 @@ GetTileVersions_Response get_tile_versions(const ServiceContext& context,
     check_interval(request.min_y(), request.max_y(), "y");
     const dds::MapIdentity identity = wire::identity_of(view);
     response.identity(wire::to_wire(identity));
-    for (const auto& tile : view.tiles) {
-      const TileId id = tile->info.id;
-      if (meets(id.x, view.tile_size_m, request.min_x(), request.max_x()) &&
-          meets(id.y, view.tile_size_m, request.min_y(), request.max_y())) {
-        response.tiles().push_back(wire::to_wire(tile->info, identity));
-      }
+    const Eigen::AlignedBox3d box_map(Eigen::Vector3d(request.min_x(), request.min_y(), 0.0),
+                                      Eigen::Vector3d(request.max_x(), request.max_y(), 0.0));
+    const TileRange range = tile_range(box_map, view.tile_size_m);
+    auto tiles = tiles_in_range(view.tiles, range, max_versions_per_reply + 1,
+                                after_page(request.continuation()));
+    if (tiles.size() > max_versions_per_reply) {
+      tiles.pop_back();
+      response.continuation(page_end(tiles.back()->info.id));
+    }
+    response.tiles().reserve(tiles.size());
+    for (const auto& tile : tiles) {
+      response.tiles().push_back(wire::to_wire(tile->info, identity));
     }
   });
 }

@@ -26,25 +26,29 @@ std::string unknown_profile(const std::string& profile,
 /// The tiles of the largest answer, and their neighbours.
 constexpr std::size_t max_tiles = 400;
 
-/// The tiles in the box, and the neighbours whose surface reaches into it.
-MapSnapshot part_of(const MapSnapshot& map, const Eigen::AlignedBox2d& box_map) {
+/// More tiles than any window has.
+constexpr std::size_t max_window_tiles = 10'000;
+
+/// The tiles in the box, and the neighbours whose surface reaches into it; no more than tell that
+/// they are too many.
+std::vector<std::shared_ptr<const Tile>> tiles_round(const MapSnapshot& map,
+                                                     const Eigen::AlignedBox2d& box_map) {
   const Eigen::Vector2d margin = Eigen::Vector2d::Constant(map.tile_size_m);
-  const Eigen::AlignedBox2d wide(box_map.min() - margin, box_map.max() + margin);
-  MapSnapshot part = map;
-  std::erase_if(part.tiles, [&](const auto& tile) {
-    const Eigen::AlignedBox3d footprint = tile_footprint(tile->info.id, map.tile_size_m);
-    const Eigen::AlignedBox2d plan(Eigen::Vector2d(footprint.min().head<2>()),
-                                   Eigen::Vector2d(footprint.max().head<2>()));
-    return !wide.intersects(plan);
-  });
-  return part;
+  const Eigen::Vector2d low = box_map.min() - margin;
+  const Eigen::Vector2d high = box_map.max() + margin;
+  return tiles_in_range(
+      map.tiles,
+      tile_range({Eigen::Vector3d(low.x(), low.y(), 0.0), Eigen::Vector3d(high.x(), high.y(), 0.0)},
+                 map.tile_size_m),
+      max_window_tiles + 1);
 }
 
 }  // namespace
 
-void TraversabilitySnapshot::publish(Views views) {
+void TraversabilitySnapshot::publish(Views views, const TileRange& window) {
   const std::scoped_lock lock(mutex_);
   views_ = std::move(views);
+  window_ = window;
 }
 
 std::shared_ptr<const TraversabilityView> TraversabilitySnapshot::view(
@@ -56,6 +60,11 @@ std::shared_ptr<const TraversabilityView> TraversabilitySnapshot::view(
   return *found;
 }
 
+TileRange TraversabilitySnapshot::window() const {
+  const std::scoped_lock lock(mutex_);
+  return window_;
+}
+
 TraversabilityCache::TraversabilityCache(const TraversabilitySnapshot& snapshot,
                                          const LatestMap& latest_map, TileReader& tiles)
     : snapshot_(snapshot), latest_map_(latest_map), tiles_(tiles) {}
@@ -64,16 +73,24 @@ std::shared_ptr<const TraversabilityView> TraversabilityCache::view(
     const std::string& profile, const Eigen::AlignedBox2d& box_map) const {
   const auto kept = snapshot_.view(profile);
   const auto map = latest_map_.view();
-  const auto non_resident = [](const auto& tile) { return is_non_resident(*tile); };
-  if (std::ranges::none_of(map->tiles, non_resident)) return kept;
-  MapSnapshot part = part_of(*map, box_map);
-  if (std::ranges::none_of(part.tiles, non_resident)) return kept;
-  if (part.tiles.size() > max_tiles) {
-    throw std::invalid_argument("the region has " + std::to_string(part.tiles.size()) +
-                                " tiles, of which some are on disk; at most " +
-                                std::to_string(max_tiles) + " can be answered: ask for parts");
+  if (map->tiles.empty()) return kept;
+  const TileRange window = snapshot_.window();
+  const auto is_kept = [&](const auto& tile) {
+    const TileId id = tile->info.id;
+    return !is_non_resident(*tile) && id.x >= window.first.x && id.x <= window.last.x &&
+           id.y >= window.first.y && id.y <= window.last.y;
+  };
+  auto tiles = tiles_round(*map, box_map);
+  if (std::ranges::all_of(tiles, is_kept)) return kept;
+  if (tiles.size() > max_tiles) {
+    throw std::invalid_argument(
+        "the region has " + std::to_string(tiles.size()) +
+        " tiles or more, of which some are on disk or far from the robot; at most " +
+        std::to_string(max_tiles) + " can be answered: ask for parts");
   }
-  for (auto& tile : part.tiles) tile = tiles_.read(tile);
+  for (auto& tile : tiles) tile = tiles_.read(tile);
+  MapSnapshot part = *map;
+  part.tiles = TileTable(std::move(tiles));
   TraversabilityMap computed({kept->profile});
   static_cast<void>(computed.update(part));
   return computed.view(profile);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/map/query/tile_reader.hpp"
+#include "core/map/voxel_grid.hpp"
 #include "core/traversability/traversability_view.hpp"
 #include "server/publishers/latest_map.hpp"
 
@@ -19,26 +20,30 @@ class TraversabilitySnapshot {
   /// One view a robot.
   using Views = std::vector<std::shared_ptr<const TraversabilityView>>;
 
-  void publish(Views views);
+  /// `window`: the tiles that they know of, where those are in memory.
+  void publish(Views views, const TileRange& window);
 
   /// Throws std::invalid_argument for an unknown robot, naming the known ones.
   [[nodiscard]] std::shared_ptr<const TraversabilityView> view(const std::string& profile) const;
+  [[nodiscard]] TileRange window() const;
 
  private:
   mutable std::mutex mutex_;
   Views views_;
+  TileRange window_;
 };
 
 /// The traversability of any part of the map: the view that is kept up to date in the background,
-/// or, where tiles of the map are not in memory, one that is computed for the query. Thread-safe.
+/// or, where it does not reach or tiles of the map are not in memory, one that is computed for the
+/// query. Thread-safe.
 class TraversabilityCache {
  public:
   TraversabilityCache(const TraversabilitySnapshot& snapshot, const LatestMap& latest_map,
                       TileReader& tiles);
 
   /// A view that is complete within the box (map frame [m]). Throws std::invalid_argument for an
-  /// unknown robot, naming the known ones, and for a box with more non-resident tiles than one
-  /// answer may read; and as TileReader::read.
+  /// unknown robot, naming the known ones, and for a box with more tiles than are computed for
+  /// one answer; and as TileReader::read.
   [[nodiscard]] std::shared_ptr<const TraversabilityView> view(
       const std::string& profile, const Eigen::AlignedBox2d& box_map) const;
 

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "core/map/tile_evidence.hpp"
+#include "core/map/voxel_grid.hpp"
+#include "server/threads/background_throttle.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -16,11 +18,24 @@ using Clock = std::chrono::steady_clock;
 // How long the thread waits for a change of the map; a change or a stop wakes it.
 constexpr std::chrono::seconds idle_period{1};
 
-/// Traversability takes memory as the map does: for evicted tiles it is computed when queried.
-MapSnapshot in_memory(const MapSnapshot& map) {
-  MapSnapshot resident = map;
-  std::erase_if(resident.tiles, [](const auto& tile) { return is_non_resident(*tile); });
-  return resident;
+/// Edge of the square round the robot that is kept up to date [m]: an update costs as much as it
+/// has tiles, however large the map is.
+constexpr double window_m = 1000.0;
+
+TileRange window_round(const Eigen::Vector3d& robot_map, double tile_size_m) {
+  if (!(tile_size_m > 0.0)) return {};
+  const Eigen::Vector3d half = Eigen::Vector3d::Constant(window_m / 2.0);
+  return tile_range({robot_map - half, robot_map + half}, tile_size_m);
+}
+
+/// Traversability takes memory as the map does: for evicted tiles it is computed when queried, as
+/// it is beyond the window.
+MapSnapshot in_memory(const MapSnapshot& map, const TileRange& window) {
+  MapSnapshot part = map;
+  std::vector<std::shared_ptr<const Tile>> resident = tiles_in_range(map.tiles, window);
+  std::erase_if(resident, [](const auto& tile) { return is_non_resident(*tile); });
+  part.tiles = TileTable(std::move(resident));
+  return part;
 }
 
 }  // namespace
@@ -56,7 +71,8 @@ void TraversabilityThread::follow_map(const std::stop_token& stop) {
   if (stop.stop_requested()) return;
   next_update_ = clock_.now() + std::chrono::duration_cast<Clock::duration>(period_);
   known_ = latest_map_.view();
-  update(in_memory(*known_));
+  window_ = window_round(latest_map_.newest_pose().T_map_lidar.translation(), known_->tile_size_m);
+  update(in_memory(*known_, window_));
   const std::chrono::duration<double, std::milli> latency = Clock::now() - map_update->published_at;
   statistics_.add_latency("traversability", latency.count());
 }
@@ -74,7 +90,7 @@ void TraversabilityThread::publish() {
   for (const RobotProfile& robot : traversability_.profiles()) {
     views.push_back(traversability_.view(robot.name));
   }
-  snapshot_.publish(std::move(views));
+  snapshot_.publish(std::move(views), window_);
 }
 
 }  // namespace stillmap::server

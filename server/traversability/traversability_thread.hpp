@@ -15,8 +15,8 @@
 
 namespace stillmap::server {
 
-/// Keeps the traversability of all robots up to date with the map, on a thread of idle priority
-/// that uses one core.
+/// Keeps the traversability of all robots up to date with the map in a window round the robot, on a
+/// thread of idle priority that uses one core.
 class TraversabilityThread {
  public:
   /// `period` is the shortest time from update to update; `updated` is called after each, in this
@@ -46,6 +46,7 @@ class TraversabilityThread {
   BackgroundScheduling scheduling_;
   bool has_begun_ = false;
   std::shared_ptr<const MapSnapshot> known_;
+  TileRange window_;
   MonotonicClock::TimePoint next_update_;
   // Last: stops before what it uses is gone.
   std::optional<PeriodicWorker> worker_;

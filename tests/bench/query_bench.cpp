@@ -45,7 +45,9 @@ class GrowingMap {
       auto view = map_.view();
       {
         const std::scoped_lock lock(mutex_);
-        history_ = history_with(history_, *view);
+        history_ = view_
+                       ? history_with({view_, std::make_shared<const TileHistory>(history_)}, *view)
+                       : history_from(*view);
         view_ = std::move(view);
       }
       next += std::chrono::milliseconds(100);

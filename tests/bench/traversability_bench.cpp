@@ -28,7 +28,7 @@ void update_one_tile(benchmark::State& state) {
   MapSnapshot map = street();
   TraversabilityMap traversability({car()});
   (void)traversability.update(map);
-  auto& changed = map.tiles[map.tiles.size() / 2];
+  const auto changed = map.tiles[map.tiles.size() / 2];
   Tile without = *changed;
   without.voxels.resize(without.voxels.size() / 2);
   const std::array<Tile, 2> states{*changed, without};
@@ -36,7 +36,7 @@ void update_one_tile(benchmark::State& state) {
   for (auto _ : state) {
     Tile tile = states.at(++round % 2);
     tile.info.revision = map.version + round;
-    changed = std::make_shared<const Tile>(std::move(tile));
+    map.tiles.set(std::make_shared<const Tile>(std::move(tile)));
     benchmark::DoNotOptimize(traversability.update(map));
   }
 }

@@ -78,7 +78,7 @@ class ChangingMap {
     std::size_t n = 0;
     if (is_halved_[i]) std::erase_if(tile.voxels, [&](const Voxel&) { return ++n % 2 == 0; });
     tile.info.revision = ++now_.version;
-    now_.tiles[i] = std::make_shared<const Tile>(std::move(tile));
+    now_.tiles.set(std::make_shared<const Tile>(std::move(tile)));
     return std::make_shared<const MapSnapshot>(now_);
   }
 

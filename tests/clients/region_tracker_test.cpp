@@ -1,6 +1,6 @@
-#include "clients/library/region_subscription.hpp"
-
 #include <gmock/gmock.h>
+
+#include "clients/library/region_subscription.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -13,9 +13,10 @@ constexpr dds::MapIdentity first_map{
 constexpr dds::MapIdentity second_map{
     .version = 1, .map_id = 2, .tile_size_m = 20, .voxel_size_m = 0.2};
 
-TileInfo info(TileId id, std::uint32_t voxels = 5) {
+TileInfo info(TileId id, std::uint32_t voxels = 5, std::uint64_t revision = 1) {
   TileInfo info;
   info.id = id;
+  info.revision = revision;
   info.voxel_count = voxels;
   return info;
 }
@@ -54,6 +55,8 @@ TEST(RegionTracker, TellsWhatAppearsChangesAndGoes) {
               ElementsAre(TileId{0, 0}));
   EXPECT_FALSE(tracker.has_update());
   tracker.add_index_entry(first_map, info({0, 0}));
+  EXPECT_FALSE(tracker.has_update()) << "what was fetched already";
+  tracker.add_index_entry(first_map, info({0, 0}, 5, 2));
   tracker.add_index_entry(first_map, info({1, 0}));
   RegionUpdate update = tracker.take_update(tiles(first_map, {{0, 0}, {1, 0}}));
   EXPECT_THAT(ids(update.changed), ElementsAre(TileId{0, 0}));

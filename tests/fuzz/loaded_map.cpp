@@ -40,8 +40,8 @@ void resume(const SavedMap& stored) {
   const Eigen::Isometry3d origin = Eigen::Isometry3d::Identity();
   map.insert(touching_scan(stored.view), origin);
   const Eigen::AlignedBox3d box_map(Eigen::Vector3d(-5, -5, -5), Eigen::Vector3d(5, 5, 5));
-  static_cast<void>(map.removed(box_map));
-  static_cast<void>(map.restore_removed(RemovalReason::moving, box_map));
+  static_cast<void>(map.removed(box_map, map.tiles_in(box_map)));
+  static_cast<void>(map.restore_removed(RemovalReason::moving, box_map, map.tiles_in(box_map)));
   const auto view = map.view();
   static_cast<void>(query_map(*view, MapQuery{}));
   MapQuery coarse;

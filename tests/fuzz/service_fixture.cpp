@@ -50,10 +50,13 @@ ServiceFixture::ServiceFixture()
                 };
               },
           .publish_now = [this] { latest_map_.publish(map_.view()); },
-          .removed = [this](const auto& box_map) { return map_.removed(box_map); },
+          .removed =
+              [this](const auto& box_map) {
+                return map_.removed(box_map, map_.tiles_in(box_map)).voxels;
+              },
           .restore_removed =
               [this](RemovalReason reason, const auto& box_map) {
-                return map_.restore_removed(reason, box_map);
+                return map_.restore_removed(reason, box_map, map_.tiles_in(box_map));
               },
           .query_occupancy = [this](const OccupancyQuery& query) { return octree_.answer(query); },
           .encode_octomap =
@@ -80,7 +83,7 @@ void ServiceFixture::reset() {
 void ServiceFixture::publish_traversability() {
   TraversabilityMap areas({robot()});
   static_cast<void>(areas.update(*latest_map_.view()));
-  snapshot_.publish({areas.view("car")});
+  snapshot_.publish({areas.view("car")}, {{-10'000, -10'000}, {10'000, 10'000}});
 }
 
 }  // namespace stillmap::fuzz

@@ -46,7 +46,7 @@ SavedMap small_street() {
   const Eigen::Isometry3d T_map_lidar(Eigen::Translation3d(0.0, 0.0, lidar_height_m));
   for (int i = 0; i < 3; ++i) map.insert(street_scan(), T_map_lidar);
   static_cast<void>(map.view());
-  SavedMap stored = to_saved_map(map.checkpoint(true));
+  SavedMap stored = to_saved_map(map.checkpoint(CheckpointScope::everything));
   for (int i = 0; i < 3; ++i) {
     stored.trajectory.push_back({1'700'000'000'000'000'000 + i * 100'000'000LL, T_map_lidar});
   }

@@ -59,12 +59,12 @@ class ChangesQueryTest : public testing::Test {
     const VoxelGrid grid(after.voxel_size_m, after.tile_size_m);
     std::vector<Voxel> half = after.tiles.front()->voxels;
     half.resize(half.size() / 2);
-    after.tiles.front() = std::make_shared<const Tile>(
-        make_tile(after.tiles.front()->info.id, after.version, std::move(half), grid));
+    after.tiles.set(std::make_shared<const Tile>(
+        make_tile(after.tiles.front()->info.id, after.version, std::move(half), grid)));
     gone_ = after.tiles[1]->info.id;
-    after.tiles.erase(after.tiles.begin() + 1);
+    after.tiles.erase(gone_);
     after_ = std::make_shared<const MapSnapshot>(std::move(after));
-    history_ = history_with(history_, *after_);
+    history_ = history_with({before_, std::make_shared<const TileHistory>(history_)}, *after_);
   }
 
   [[nodiscard]] KnownVersion known() const { return {before_->map_id, before_->version}; }

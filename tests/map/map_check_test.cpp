@@ -87,7 +87,7 @@ TEST_F(MapCheckTest, ASoundFilePassesAndStaysAsItIs) {
 }
 
 TEST_F(MapCheckTest, NamesTheTileThatDoesNotDecode) {
-  const TileId id = saved_.view.tiles.at(1)->info.id;
+  const TileId id = saved_.view.tiles[1]->info.id;
   alter("UPDATE tiles SET encoded = x'0102030405' WHERE x = " + std::to_string(id.x) +
         " AND y = " + std::to_string(id.y));
   const MapFault fault = only_fault();
@@ -98,7 +98,7 @@ TEST_F(MapCheckTest, NamesTheTileThatDoesNotDecode) {
 }
 
 TEST_F(MapCheckTest, NamesTilesThatAreNotTheirRows) {
-  const TileId first = saved_.view.tiles.at(0)->info.id;
+  const TileId first = saved_.view.tiles[0]->info.id;
   const std::string where =
       " WHERE x = " + std::to_string(first.x) + " AND y = " + std::to_string(first.y);
   alter("UPDATE tiles SET content_hash = content_hash + 1" + where);

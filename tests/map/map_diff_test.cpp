@@ -43,7 +43,7 @@ MapSnapshot view_of(const Cells& cells) {
                    .tiles = {}};
   for (auto& [id, tile] : voxels) {
     std::ranges::sort(tile, {}, &Voxel::index);
-    view.tiles.push_back(std::make_shared<const Tile>(make_tile(id, 1, tile, grid)));
+    view.tiles.set(std::make_shared<const Tile>(make_tile(id, 1, tile, grid)));
   }
   return view;
 }

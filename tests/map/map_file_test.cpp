@@ -80,8 +80,8 @@ TEST_F(MapFileTest, WritesOnlyTilesThatChanged) {
   alter("UPDATE tiles SET encoded = x'00'");
   auto changed = std::make_shared<Tile>(*map.view.tiles[0]);
   ++changed->info.revision;
-  map.view.tiles[0] = changed;
-  map.view.tiles.pop_back();
+  map.view.tiles.set(changed);
+  map.view.tiles.erase(map.view.tiles.back()->info.id);
   store->save(map);
   SQLite::Database database(file_.string());
   EXPECT_EQ(database.execAndGet("SELECT count(*) FROM tiles").getUInt(), map.view.tiles.size());

@@ -102,6 +102,19 @@ std::multiset<std::tuple<int, float, float, float>> places(const std::vector<Rem
   return places;
 }
 
+/// Of tiles in memory and of those in the store.
+std::vector<RemovedVoxel> removed_everywhere(const StaticMap& map, TileStore& store) {
+  StaticMap::RemovedVoxels all = map.removed(test::everywhere(), map.tiles_in(test::everywhere()));
+  for (const TileId id : all.non_resident) {
+    const TileRecord record = store.load(id);
+    if (record.evidence == nullptr) continue;
+    const StaticMapConfig& config = map.config();
+    std::ranges::copy(removed_voxels(*record.evidence, config.voxel_size_m, config.tile_size_m),
+                      std::back_inserter(all.voxels));
+  }
+  return all.voxels;
+}
+
 TEST(MapPaging, AMapThatDoesNotFitBecomesTheSameMap) {
   StaticMap plain{StaticMapConfig{}};
   plain.reset(7);
@@ -122,9 +135,10 @@ TEST(MapPaging, AMapThatDoesNotFitBecomesTheSameMap) {
     EXPECT_EQ(other->second->evidence, voxel->evidence);
     EXPECT_TRUE(other->second->mean_map.isApprox(voxel->mean_map, 1e-4F));
   }
-  const auto removed = places(plain.removed(test::everywhere()));
+  const auto removed =
+      places(plain.removed(test::everywhere(), plain.tiles_in(test::everywhere())).voxels);
   EXPECT_GT(removed.size(), 500U);
-  EXPECT_EQ(places(paged.map_.removed(test::everywhere())), removed);
+  EXPECT_EQ(places(removed_everywhere(paged.map_, *paged.store_->tile_store())), removed);
 }
 
 TEST(MapPaging, MemoryStaysBelowTheLimitOnADriveThatNeedsManyTimesIt) {
@@ -154,7 +168,7 @@ TEST(MapPaging, AMapThatIsShownByOtherRulesIsStoredAsItIsShown) {
   StaticMap after{stricter};
   const SavedMap stored = store->load();
   after.resume(stored.view, stored.tile_evidence);
-  store->save(to_saved_map(after.checkpoint(true)));
+  store->save(to_saved_map(after.checkpoint(CheckpointScope::everything)));
   EXPECT_LT(voxels_of(store->load().view).size(), voxels_of(stored.view).size());
 }
 
@@ -180,7 +194,7 @@ TEST(MapPaging, ARestartGoesOnWithWhatWasHidden) {
   PagedMap before(open_map_file(folder / "map.stillmap"));
   before.drive();
   static_cast<void>(before.whole());
-  const auto removed = places(before.map_.removed(test::everywhere()));
+  const auto removed = places(removed_everywhere(before.map_, *before.store_->tile_store()));
 
   const auto store = open_map_file(folder / "map.stillmap");
   StaticMap after{StaticMapConfig{}};
@@ -188,12 +202,42 @@ TEST(MapPaging, ARestartGoesOnWithWhatWasHidden) {
   const SavedMap non_resident = store->load_non_resident();
   after.resume(non_resident.view, non_resident.tile_evidence);
   EXPECT_EQ(after.memory_use().resident_tiles, 0U);
-  EXPECT_EQ(places(after.removed(test::everywhere())), removed);
-  after.reload_near(Vector3d::Zero(), PagedMap::limit_bytes);
+  EXPECT_EQ(places(removed_everywhere(after, *store->tile_store())), removed);
+  after.reload_near(Vector3d::Zero());
   EXPECT_LE(after.memory_use().bytes, PagedMap::limit_bytes);
   EXPECT_GT(after.memory_use().resident_tiles, 5U);
   EXPECT_EQ(after.view()->tiles.size(), non_resident.view.tiles.size());
-  EXPECT_GT(after.restore_removed(RemovalReason::moving, test::everywhere()), 100U);
+  EXPECT_GT(after.restore_removed(RemovalReason::moving, test::everywhere(),
+                                  after.tiles_in(test::everywhere())),
+            100U);
+}
+
+TEST(MapPaging, RestoringInPartsKeepsToTheLimit) {
+  const ScratchFolder folder;
+  PagedMap map(open_map_file(folder / "map.stillmap"));
+  map.drive();
+  ASSERT_GT(map.evicted_, 50U);
+  const auto removed = places(removed_everywhere(map.map_, *map.store_->tile_store()));
+  const auto is_moving = [](const auto& place) {
+    return std::get<0>(place) == static_cast<int>(RemovalReason::moving);
+  };
+  const std::vector<TileId> ids = map.map_.tiles_in(test::everywhere());
+  std::size_t restored = 0;
+  std::size_t peak_bytes = 0;
+  for (std::span<const TileId> left(ids); !left.empty();) {
+    const auto some = left.first(std::min<std::size_t>(left.size(), 8));
+    left = left.subspan(some.size());
+    restored += map.map_.restore_removed(RemovalReason::moving, test::everywhere(), some);
+    peak_bytes = std::max(peak_bytes, map.map_.memory_use().bytes);
+    if (map.map_.memory_use().bytes < PagedMap::limit_bytes) continue;
+    const MapCheckpoint checkpoint = map.map_.checkpoint();
+    map.store_->save(to_saved_map(checkpoint));
+    map.map_.checkpoint_stored(checkpoint.step);
+    EXPECT_GT(map.map_.evict(Vector3d::Zero(), PagedMap::limit_bytes), 0U);
+  }
+  EXPECT_EQ(restored, std::ranges::count_if(removed, is_moving));
+  // By the tiles of one part.
+  EXPECT_LE(peak_bytes, PagedMap::limit_bytes + PagedMap::limit_bytes / 2);
 }
 
 /// Has lost one tile.

@@ -9,57 +9,63 @@ using ::testing::ElementsAre;
 using ::testing::IsEmpty;
 using Event = TileHistory::Event;
 
-MapSnapshot view_of(std::uint64_t version, const std::vector<Event>& tiles,
-                    std::uint64_t map_id = 7) {
+std::shared_ptr<const MapSnapshot> view_of(std::uint64_t version, const std::vector<TileId>& ids,
+                                           std::uint64_t map_id = 7) {
   MapSnapshot view{
       .version = version, .map_id = map_id, .tile_size_m = 20.0, .voxel_size_m = 0.2, .tiles = {}};
-  for (const auto& [id, revision] : tiles) {
+  for (const TileId id : ids) {
     Tile tile;
     tile.info.id = id;
-    tile.info.revision = revision;
-    view.tiles.push_back(std::make_shared<const Tile>(std::move(tile)));
+    view.tiles.set(std::make_shared<const Tile>(std::move(tile)));
   }
-  return view;
+  return std::make_shared<const MapSnapshot>(std::move(view));
 }
 
-TEST(TileHistory, RemembersWhenTilesAppearAndGo) {
-  TileHistory history = history_from(view_of(3, {{{0, 0}, 2}}));
-  EXPECT_EQ(history.known_since, 3U);
-  history = history_with(history, view_of(5, {{{0, 0}, 5}, {{0, 1}, 4}}));
-  EXPECT_THAT(history.appeared, ElementsAre(Event{{0, 0}, 2}, Event{{0, 1}, 4}));
-  history = history_with(history, view_of(6, {{{0, 1}, 4}}));
-  EXPECT_THAT(history.appeared, ElementsAre(Event{{0, 1}, 4}));
-  EXPECT_THAT(history.removed, ElementsAre(Event{{0, 0}, 6}));
-  EXPECT_EQ(history.version, 6U);
-  EXPECT_EQ(history.known_since, 3U);
+MapState first(const std::shared_ptr<const MapSnapshot>& view) {
+  return {view, std::make_shared<const TileHistory>(history_from(*view))};
 }
 
-TEST(TileHistory, ATileThatComesBackAppearsAgain) {
-  TileHistory history = history_from(view_of(1, {{{0, 0}, 1}}));
-  history = history_with(history, view_of(2, {}));
-  history = history_with(history, view_of(4, {{{0, 0}, 4}}));
-  EXPECT_THAT(history.removed, IsEmpty());
-  EXPECT_THAT(history.appeared, ElementsAre(Event{{0, 0}, 4}));
+MapState next(const MapState& before, const std::shared_ptr<const MapSnapshot>& view,
+              std::size_t max_removed = max_removed_tiles) {
+  return {view, std::make_shared<const TileHistory>(history_with(before, *view, max_removed))};
+}
+
+TEST(TileHistory, RemembersWhenTilesGo) {
+  MapState state = first(view_of(3, {{0, 0}}));
+  EXPECT_EQ(state.history->known_since, 3U);
+  state = next(state, view_of(5, {{0, 0}, {0, 1}}));
+  EXPECT_THAT(state.history->removed, IsEmpty());
+  state = next(state, view_of(6, {{0, 1}}));
+  EXPECT_THAT(state.history->removed, ElementsAre(Event{{0, 0}, 6}));
+  EXPECT_EQ(state.history->version, 6U);
+  EXPECT_EQ(state.history->known_since, 3U);
+}
+
+TEST(TileHistory, ATileThatComesBackIsNoRemovedOne) {
+  MapState state = first(view_of(1, {{0, 0}}));
+  state = next(state, view_of(2, {}));
+  state = next(state, view_of(4, {{0, 0}}));
+  EXPECT_THAT(state.history->removed, IsEmpty());
 }
 
 TEST(TileHistory, ForgetsTheOldestRemovalsAndSaysSo) {
-  TileHistory history = history_from(view_of(1, {{{0, 0}, 1}, {{0, 1}, 1}, {{0, 2}, 1}}));
-  history = history_with(history, view_of(2, {{{0, 1}, 1}, {{0, 2}, 1}}), 2);
-  history = history_with(history, view_of(3, {{{0, 2}, 1}}), 2);
-  EXPECT_EQ(history.known_since, 1U);
-  history = history_with(history, view_of(4, {}), 2);
-  EXPECT_THAT(history.removed, ElementsAre(Event{{0, 1}, 3}, Event{{0, 2}, 4}));
-  EXPECT_EQ(history.known_since, 2U);
+  MapState state = first(view_of(1, {{0, 0}, {0, 1}, {0, 2}}));
+  state = next(state, view_of(2, {{0, 1}, {0, 2}}), 2);
+  state = next(state, view_of(3, {{0, 2}}), 2);
+  EXPECT_EQ(state.history->known_since, 1U);
+  state = next(state, view_of(4, {}), 2);
+  EXPECT_THAT(state.history->removed, ElementsAre(Event{{0, 1}, 3}, Event{{0, 2}, 4}));
+  EXPECT_EQ(state.history->known_since, 2U);
 }
 
 TEST(TileHistory, BeginsAnewWithAnotherMap) {
-  TileHistory history = history_from(view_of(5, {{{0, 0}, 1}}));
-  history = history_with(history, view_of(9, {{{1, 1}, 8}}, 8));
-  EXPECT_EQ(history.map_id, 8U);
-  EXPECT_EQ(history.known_since, 9U);
-  EXPECT_THAT(history.removed, IsEmpty());
-  history = history_with(history, view_of(2, {}, 8));
-  EXPECT_EQ(history.known_since, 2U);
+  MapState state = first(view_of(5, {{0, 0}}));
+  state = next(state, view_of(9, {{1, 1}}, 8));
+  EXPECT_EQ(state.history->map_id, 8U);
+  EXPECT_EQ(state.history->known_since, 9U);
+  EXPECT_THAT(state.history->removed, IsEmpty());
+  state = next(state, view_of(2, {}, 8));
+  EXPECT_EQ(state.history->known_since, 2U);
 }
 
 }  // namespace

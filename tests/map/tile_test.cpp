@@ -89,9 +89,9 @@ TEST(TileLookup, AgreesWithBruteForceOnRandomBoxes) {
     for (int corner = 0; corner < 2; ++corner) {
       box.extend(Vector3d(coordinate(random), coordinate(random), coordinate(random)));
     }
-    std::vector<std::size_t> expected;
-    for (std::size_t t = 0; t < view->tiles.size(); ++t) {
-      if (box.intersects(view->tiles[t]->info.bounds_map.cast<double>())) expected.push_back(t);
+    std::vector<std::shared_ptr<const Tile>> expected;
+    for (const auto& tile : view->tiles) {
+      if (box.intersects(tile->info.bounds_map.cast<double>())) expected.push_back(tile);
     }
     EXPECT_EQ(tiles_in_box(*view, box), expected);
   }

@@ -81,7 +81,8 @@ class VisibilityClearing : public testing::Test {
     return count;
   }
   [[nodiscard]] int removed(RemovalReason reason) const {
-    const std::vector<RemovedVoxel> all = map_.removed(test::everywhere());
+    const std::vector<RemovedVoxel> all =
+        map_.removed(test::everywhere(), map_.tiles_in(test::everywhere())).voxels;
     return static_cast<int>(std::ranges::count(all, reason, &RemovedVoxel::reason));
   }
 
@@ -133,7 +134,7 @@ TEST_F(VisibilityClearing, RemovedThingsCanBeShownAgain) {
   const int parked = removed(RemovalReason::semi_static);
   ASSERT_GT(parked, 50);
   const Eigen::AlignedBox3d left(Eigen::Vector3d(0, 0, -10), Eigen::Vector3d(30, 30, 10));
-  const auto restored = map_.restore_removed(RemovalReason::semi_static, left);
+  const auto restored = map_.restore_removed(RemovalReason::semi_static, left, map_.tiles_in(left));
   EXPECT_GT(restored, 10U);
   EXPECT_EQ(shown(car), static_cast<int>(restored));
   EXPECT_EQ(removed(RemovalReason::semi_static), parked - static_cast<int>(restored));

@@ -27,8 +27,9 @@ class PagedStreet : public testing::Test {
   /// The view with the tiles before this position evicted.
   [[nodiscard]] MapSnapshot without_tiles_before(double x_map) const {
     MapSnapshot view = view_;
-    for (auto& tile : view.tiles) {
-      if ((tile->info.id.x + 1) * view.tile_size_m <= x_map) tile = without_voxels(*tile);
+    for (const auto& tile : view_.tiles) {
+      const double end_x_map = (tile->info.id.x + 1) * view.tile_size_m;
+      if (end_x_map <= x_map) view.tiles.set(without_voxels(*tile));
     }
     return view;
   }

@@ -139,7 +139,7 @@ void DiskFault::check_files(const fs::path& folder) {
     }
     for (const auto& tile : map.view.tiles) {
       for (const Voxel& voxel : tile->voxels) {
-        ASSERT_GE(voxel.first_seen_ns, map.trajectory.at(0).stamp_ns) << file;
+        ASSERT_GE(voxel.first_seen_ns, map.trajectory[0].stamp_ns) << file;
         ASSERT_LE(voxel.last_seen_ns, map.trajectory.back().stamp_ns) << file;
       }
     }

@@ -8,8 +8,8 @@ namespace stillmap::test {
 class LatestMapSource : public server::CheckpointSource {
  public:
   explicit LatestMapSource(const server::LatestMap& latest_map) : latest_map_(latest_map) {}
-  [[nodiscard]] server::RunCheckpoint checkpoint(bool /*everything*/) override {
-    return {{*latest_map_.view(), {}, latest_map_.trajectory(), {}}, 0};
+  [[nodiscard]] server::RunCheckpoint checkpoint(CheckpointScope /*scope*/) override {
+    return {{*latest_map_.view(), {}, latest_map_.trajectory(), {}, false}, 0};
   }
   void checkpoint_stored(std::uint64_t /*step*/) override {}
   void checkpoint_failed() override {}

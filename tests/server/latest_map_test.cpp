@@ -72,7 +72,7 @@ std::shared_ptr<const MapSnapshot> view_of(std::uint64_t map_id, std::uint64_t v
     Tile tile;
     tile.info.id = id;
     tile.info.revision = version;
-    view.tiles.push_back(std::make_shared<const Tile>(std::move(tile)));
+    view.tiles.set(std::make_shared<const Tile>(std::move(tile)));
   }
   return std::make_shared<const MapSnapshot>(std::move(view));
 }

@@ -88,7 +88,7 @@ TEST_F(LoadService, GoesOnWhereTheLoadedPathEnded) {
       hall.trajectory.front().T_map_lidar * room_pose(0).T_map_lidar.inverse();
   for (const int i : {7, 8, 13}) {
     const Eigen::Vector3d expected = T_map_room * room_pose(i).T_map_lidar.translation();
-    const auto& pose = longer.trajectory.at(static_cast<std::size_t>(i)).T_map_lidar;
+    const auto& pose = longer.trajectory[static_cast<std::size_t>(i)].T_map_lidar;
     EXPECT_LT((pose.translation() - expected).norm(), 0.3) << i;
   }
   EXPECT_EQ(open_map_file(setup_.map_file())->load().trajectory.size(), 16U);
@@ -141,7 +141,7 @@ TEST_F(LoadService, RefusesWhatItCannotGoOnWith) {
   map_scans(0, 8);
   client_.save_map("good.stillmap");
   SavedMap other = open_map_file(beside("good.stillmap"))->load();
-  other.view.tiles.clear();
+  other.view.tiles = {};
   open_map_file(beside("no_tiles.stillmap"))->save(other);
   std::string bytes = content_of(beside("good.stillmap"));
   std::ofstream(beside("newer.stillmap"), std::ios::binary)

@@ -40,8 +40,9 @@ volatile std::sig_atomic_t stop_requested = 0;
 class SavingProcess : public CheckpointSource {
  public:
   SavingProcess(const fs::path& file, std::int64_t first_ns, int reports)
-      : saver_(latest_map_, statistics_, file, {{"sensor", "test"}}, 64,
-               {.max_maps = 100'000, .max_bytes = std::uintmax_t{1} << 40}),
+      : saver_(latest_map_, statistics_, file, {{"sensor", "test"}},
+               {.memory_limit_mib = 64,
+                .saved_maps = {.max_maps = 100'000, .max_bytes = std::uintmax_t{1} << 40}}),
         next_ns_(first_ns),
         reports_(reports),
         random_(std::random_device{}()) {
@@ -64,8 +65,8 @@ class SavingProcess : public CheckpointSource {
     _exit(0);
   }
 
-  RunCheckpoint checkpoint(bool everything) override {
-    const MapCheckpoint map = map_.checkpoint(everything);
+  RunCheckpoint checkpoint(CheckpointScope scope) override {
+    const MapCheckpoint map = map_.checkpoint(scope);
     latest_map_.publish(map.view);
     RunCheckpoint checkpoint{to_saved_map(map), map.step};
     checkpoint.map.trajectory = latest_map_.trajectory();
@@ -163,7 +164,7 @@ class OneVoxel : public CheckpointSource {
   }
   [[nodiscard]] MapSaver& saver() { return saver_; }
 
-  RunCheckpoint checkpoint(bool /*everything*/) override {
+  RunCheckpoint checkpoint(CheckpointScope /*scope*/) override {
     return {{*latest_map_.view(), {}, latest_map_.trajectory(), {}}, 0};
   }
   void checkpoint_stored(std::uint64_t /*step*/) override {}

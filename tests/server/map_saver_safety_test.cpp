@@ -53,7 +53,7 @@ class MapSaverSafetyTest : public testing::Test {
     latest_map_.add_pose({.stamp_ns = static_cast<std::int64_t>(x)}, OdometryHealth::good, "none");
   }
   [[nodiscard]] MapSaver saver(const SavedMapsLimit& limit = {}) {
-    return {latest_map_, statistics_, file_, {{"sensor", "vlp_16"}}, 0, limit};
+    return {latest_map_, statistics_, file_, {{"sensor", "vlp_16"}}, {.saved_maps = limit}};
   }
   /// A map of one voxel 50 m away, as `name` in the folder.
   void save_far_map(const std::string& name) const {
@@ -112,7 +112,7 @@ TEST_F(MapSaverSafetyTest, ALoadWhoseRunningMapCannotBeSavedChangesNothing) {
   class FailingSource : public test::LatestMapSource {
    public:
     using LatestMapSource::LatestMapSource;
-    RunCheckpoint checkpoint(bool) override { throw MapFileError("city", "no space left"); }
+    RunCheckpoint checkpoint(CheckpointScope) override { throw MapFileError("city", "no space left"); }
   };
   FailingSource source(latest_map_);
   MapSaver saver = this->saver();
@@ -143,7 +143,7 @@ TEST_F(MapSaverSafetyTest, AResetKeepsTheMapUntilThen) {
   EXPECT_EQ(tile_in(begun.kept_file), 0);
   // And back.
   saver.resume_from(begun.kept_file.filename().string(), prepare_);
-  EXPECT_EQ(latest_map_.view()->tiles.at(0)->info.id.x, 0);
+  EXPECT_EQ(latest_map_.view()->tiles[0]->info.id.x, 0);
   EXPECT_EQ(tile_in(file_), 2);
 }
 

@@ -10,6 +10,7 @@
 #include "server/monitoring/metrics.hpp"
 #include "tests/scratch_folder.hpp"
 #include "tests/server/latest_map_source.hpp"
+#include "tests/server/manual_clock.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -116,7 +117,7 @@ TEST_F(MapSaverTest, GoesOnInAnotherFileAndLeavesTheRunningMapInItsOwn) {
   latest_map_.add_pose({.stamp_ns = 1}, OdometryHealth::good, "none");
   saver.save_if_changed();
   const SavedMap own = open_map_file(folder_ / "map.stillmap")->load();
-  EXPECT_EQ(own.view.tiles.at(0)->info.id.x, 0);
+  EXPECT_EQ(own.view.tiles[0]->info.id.x, 0);
   const SavedMap far = open_map_file(folder_ / "far.stillmap")->load();
   EXPECT_EQ(far.trajectory.size(), 2U);
   EXPECT_EQ(far.metadata.at("sensor"), "vlp_16");
@@ -196,6 +197,101 @@ TEST_F(MapSaverTest, NamesOfOtherFilesAreRefused) {
   map_scan(50.0F);
   saver.save_if_changed();
   EXPECT_EQ(open_map_file(folder_ / "map.stillmap")->load().view.tiles.size(), 2U);
+}
+
+/// A map whose tiles are stored as the mapping thread has them stored.
+class StaticMapSource : public CheckpointSource {
+ public:
+  StaticMapSource(StaticMap& map, LatestMap& latest_map) : map_(map), latest_map_(latest_map) {}
+  [[nodiscard]] RunCheckpoint checkpoint(CheckpointScope scope) override {
+    const MapCheckpoint checkpoint = map_.checkpoint(scope);
+    latest_map_.publish(checkpoint.view);
+    RunCheckpoint run{to_saved_map(checkpoint), checkpoint.step};
+    run.map.trajectory = latest_map_.trajectory();
+    return run;
+  }
+  void checkpoint_stored(std::uint64_t step) override { map_.checkpoint_stored(step); }
+  void checkpoint_failed() override {}
+  [[nodiscard]] MemoryUse memory_use() override { return map_.memory_use(); }
+
+ private:
+  StaticMap& map_;
+  LatestMap& latest_map_;
+};
+
+/// A robot that stands, and its map file.
+class StandingRobot : public MapSaverTest {
+ protected:
+  static constexpr std::uint32_t mib_per_hour = 1;
+
+  StandingRobot() { saver_.set_source(static_source_); }
+
+  /// A scan of a wall of 0.2 m voxels, this many of them, and a save.
+  void scan_and_save(int voxels, double robot_x_m = 0.0) {
+    LabelledScan labelled;
+    for (int i = 0; i < 2 * voxels; ++i) {
+      const float along = 0.1F + 0.2F * static_cast<float>(i / 2);
+      labelled.scan.points_lidar.emplace_back(5.0F, along, 1.0F);
+    }
+    labelled.motion.assign(labelled.scan.points_lidar.size(), Motion::stationary);
+    map_.insert(labelled, Eigen::Isometry3d::Identity());
+    latest_map_.publish(map_.view());
+    latest_map_.add_pose(
+        {++stamp_ns_, Eigen::Isometry3d(Eigen::Translation3d(robot_x_m, 0.0, 0.0))},
+        OdometryHealth::good, "none");
+    saver_.save_if_changed();
+  }
+  [[nodiscard]] SavedMap stored() { return open_map_file(file_)->load(); }
+  /// Until nothing more is written of it.
+  void stand() {
+    std::size_t poses = 0;
+    do {
+      poses = stored().trajectory.size();
+      for (int i = 0; i < 10; ++i) scan_and_save(20);
+    } while (poses != stored().trajectory.size());
+  }
+
+  std::int64_t stamp_ns_ = 0;
+  std::filesystem::path file_ = folder_ / "map.stillmap";
+  test::ManualClock clock_;
+  StaticMapSource static_source_{map_, latest_map_};
+  MapSaver saver_{latest_map_, statistics_, file_, {}, {.standing_mib_per_hour = mib_per_hour},
+                  clock_};
+};
+
+TEST_F(StandingRobot, WritesNoMoreThanItsAllowance) {
+  stand();
+  const SavedMap quiet = stored();
+  for (int i = 0; i < 50; ++i) scan_and_save(20);
+  EXPECT_EQ(stored().trajectory.size(), quiet.trajectory.size());
+  EXPECT_EQ(stored().view.tiles[0]->voxels[0].point_count,
+            quiet.view.tiles[0]->voxels[0].point_count);
+  clock_.advance(std::chrono::hours(1));
+  scan_and_save(20);
+  EXPECT_GT(stored().trajectory.size(), quiet.trajectory.size() + 50);
+}
+
+TEST_F(StandingRobot, StoresAtOnceWhatItSeesAppear) {
+  stand();
+  scan_and_save(22);
+  EXPECT_EQ(stored().view.tiles.voxel_count(), 20U) << "two voxels wait";
+  scan_and_save(60);
+  EXPECT_EQ(stored().view.tiles.voxel_count(), 60U);
+}
+
+TEST_F(StandingRobot, StoresEverythingWhenItMovesOnAndAtTheEnd) {
+  stand();
+  scan_and_save(22);
+  scan_and_save(22, 0.4);
+  EXPECT_EQ(stored().view.tiles.voxel_count(), 20U);
+  scan_and_save(22, 0.7);
+  EXPECT_EQ(stored().view.tiles.voxel_count(), 22U);
+  EXPECT_EQ(stored().trajectory.size(), latest_map_.trajectory().size());
+  stand();
+  scan_and_save(24, 0.7);
+  saver_.save_at_end();
+  EXPECT_EQ(stored().view.tiles.voxel_count(), 24U);
+  EXPECT_EQ(stored().trajectory.size(), latest_map_.trajectory().size());
 }
 
 }  // namespace

@@ -53,17 +53,41 @@ TEST(PagedSnapshots, GoWhenTheirClientAsksNoMore) {
   EXPECT_EQ(views.find(2), nullptr);
 }
 
-TEST(PagedSnapshots, AreLimitedInNumber) {
+/// A view with one tile of this many bytes of voxels, and one that all views share.
+PagedSnapshots::Snapshot view_with_tile(std::uint64_t version, std::size_t bytes) {
+  static const auto shared = std::make_shared<const Tile>();
+  MapSnapshot view;
+  view.version = version;
+  Tile tile;
+  tile.info.id = {1, 0};
+  tile.voxels.resize(bytes / sizeof(Voxel));
+  tile.info.voxel_count = static_cast<std::uint32_t>(tile.voxels.size());
+  view.tiles = {shared, std::make_shared<const Tile>(std::move(tile))};
+  return std::make_shared<const MapSnapshot>(std::move(view));
+}
+
+TEST(PagedSnapshots, OfManyClientsAreKeptWhileTheyTakeLittle) {
   PagedSnapshots views;
-  const auto first = view_of(0);
-  views.keep(first, begin);
-  for (std::uint64_t version = 1; version <= PagedSnapshots::max_snapshots; ++version) {
-    if (version == 5) views.keep(first, begin);
-    views.keep(view_of(version), begin);
+  for (std::uint64_t version = 0; version < 200; ++version) {
+    views.keep(view_with_tile(version, 1000), begin);
   }
-  EXPECT_EQ(views.size(), PagedSnapshots::max_snapshots);
+  EXPECT_EQ(views.size(), 200U);
+  EXPECT_NE(views.find(0), nullptr);
+}
+
+TEST(PagedSnapshots, AreLimitedInBytes) {
+  PagedSnapshots views(1'000'000);
+  const auto first = view_with_tile(0, 100'000);
+  views.keep(first, begin);
+  for (std::uint64_t version = 1; version <= 20; ++version) {
+    if (version == 5) views.keep(first, begin + 1s);
+    views.keep(view_with_tile(version, 100'000), begin);
+    EXPECT_LE(views.bytes(), 1'000'000U);
+  }
+  EXPECT_GT(views.size(), 5U);
   EXPECT_EQ(views.find(0), first);
-  EXPECT_EQ(views.find(1), nullptr) << "the one that was asked for longest ago";
+  EXPECT_EQ(views.find(1), nullptr) << "one of those that were asked for longest ago";
+  EXPECT_NE(views.find(20), nullptr);
 }
 
 TEST(PagedSnapshots, DoNotMindTheEndOfWhatIsGone) {

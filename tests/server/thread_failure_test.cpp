@@ -90,7 +90,7 @@ TEST_F(ThreadFailure, OfTheMapperLeavesAMapThatCanBeSaved) {
   });
   ASSERT_EQ(removed.wait_for(60s), std::future_status::ready);
   mapping.stop();
-  const RunCheckpoint saved = mapping.checkpoint(true);
+  const RunCheckpoint saved = mapping.checkpoint(CheckpointScope::everything);
   EXPECT_EQ(saved.map.trajectory.size(), static_cast<std::size_t>(good_scans));
   EXPECT_FALSE(saved.map.view.tiles.empty());
 }

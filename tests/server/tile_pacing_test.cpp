@@ -32,7 +32,7 @@ std::shared_ptr<const MapSnapshot> row_of_tiles(int count, std::uint64_t revisio
   view->map_id = 7;
   view->tile_size_m = 20.0;
   view->voxel_size_m = 0.2;
-  for (int x = 0; x < count; ++x) view->tiles.push_back(tile_of({x, 0}, revision));
+  for (int x = 0; x < count; ++x) view->tiles.set(tile_of({x, 0}, revision));
   return view;
 }
 
@@ -41,7 +41,7 @@ std::shared_ptr<const MapSnapshot> with_first_changed(const MapSnapshot& row,
                                                       std::uint64_t revision) {
   auto view = std::make_shared<MapSnapshot>(row);
   view->version = revision;
-  view->tiles.front() = tile_of({0, 0}, revision);
+  view->tiles.set(tile_of({0, 0}, revision));
   return view;
 }
 
@@ -66,7 +66,8 @@ class TilePacing : public testing::Test {
   dds::Topics topics_ = dds::Topics::in("stillmap");
   dds::Participant here_{slow_network()};
   dds::Participant there_{slow_network()};
-  TilePublisher publisher_{here_, topics_};
+  TileReader tiles_;
+  TilePublisher publisher_{here_, topics_, tiles_, 2000.0};
   dds::Reader<MapTile> reader_{there_, topics_.tiles.dds_name, topics_.tiles.reader};
 };
 
@@ -103,12 +104,12 @@ TEST_F(TilePacing, ABurstIsSpreadAndArrivesWhole) {
   constexpr int tiles = 40;
   const auto view = row_of_tiles(tiles, 1);
   const auto began = Clock::now();
-  publisher_.publish(view);
+  publisher_.publish(view, Eigen::Vector2d::Zero());
   EXPECT_GT(publisher_.waiting(), 25U);
   EXPECT_LT(publisher_.waiting(), 35U);
   while (publisher_.waiting() > 0 && Clock::now() - began < dds::discovery_timeout) {
     std::this_thread::sleep_for(50ms);
-    publisher_.publish(view);
+    publisher_.publish(view, Eigen::Vector2d::Zero());
   }
   // 40 tiles of 27 KB at 200 KB/s, of which the first second's worth goes at once.
   EXPECT_GT(Clock::now() - began, 4s);
@@ -120,10 +121,10 @@ TEST_F(TilePacing, ATileThatKeepsChangingDoesNotHoldUpTheOthers) {
   const auto row = row_of_tiles(static_cast<int>(tiles), 1);
   const auto began = Clock::now();
   std::uint64_t revision = 1;
-  publisher_.publish(row);
+  publisher_.publish(row, Eigen::Vector2d::Zero());
   while (publisher_.waiting() > 1 && Clock::now() - began < dds::discovery_timeout) {
     std::this_thread::sleep_for(50ms);
-    publisher_.publish(with_first_changed(*row, ++revision));
+    publisher_.publish(with_first_changed(*row, ++revision), Eigen::Vector2d::Zero());
   }
   EXPECT_LT(Clock::now() - began, dds::discovery_timeout);
   expect_all_arrive(tiles);
@@ -131,12 +132,12 @@ TEST_F(TilePacing, ATileThatKeepsChangingDoesNotHoldUpTheOthers) {
 
 TEST_F(TilePacing, WhatChangesWhileItWaitsIsSentAsItIsThen) {
   constexpr std::size_t tiles = 20;
-  publisher_.publish(row_of_tiles(static_cast<int>(tiles), 1));
+  publisher_.publish(row_of_tiles(static_cast<int>(tiles), 1), Eigen::Vector2d::Zero());
   const std::size_t sent_at_once = tiles - publisher_.waiting();
   const auto newest = row_of_tiles(static_cast<int>(tiles), 2);
   const auto began = Clock::now();
   while (publisher_.waiting() > 0 && Clock::now() - began < dds::discovery_timeout) {
-    publisher_.publish(newest);
+    publisher_.publish(newest, Eigen::Vector2d::Zero());
     std::this_thread::sleep_for(50ms);
   }
   std::map<std::int32_t, int> samples;
@@ -149,6 +150,100 @@ TEST_F(TilePacing, WhatChangesWhileItWaitsIsSentAsItIsThen) {
   }
   EXPECT_EQ(samples.size(), tiles);
   EXPECT_EQ(samples.rbegin()->second, 1);
+}
+
+/// Of a map much larger than its window.
+class TileWindow : public testing::Test {
+ protected:
+  static constexpr int side_tiles = 60;
+  static constexpr double window_m = 100.0;
+
+  TileWindow() {
+    std::vector<std::shared_ptr<const Tile>> tiles;
+    for (int x = 0; x < side_tiles; ++x) {
+      for (int y = 0; y < side_tiles; ++y) tiles.push_back(small_tile({x, y}, 1));
+    }
+    view_.version = 1;
+    view_.map_id = 7;
+    view_.tile_size_m = 20.0;
+    view_.voxel_size_m = 0.2;
+    view_.tiles = TileTable(std::move(tiles));
+  }
+  static std::shared_ptr<const Tile> small_tile(TileId id, std::uint64_t revision) {
+    Tile tile;
+    tile.info = {.id = id, .revision = revision, .content_hash = revision, .bounds_map = {}};
+    tile.info.voxel_count = 1;
+    tile.voxels.resize(1);
+    return std::make_shared<const Tile>(std::move(tile));
+  }
+  void change(TileId id) {
+    ++view_.version;
+    view_.tiles.set(small_tile(id, view_.version));
+  }
+  void publish(double robot_m) {
+    publisher_.publish(std::make_shared<const MapSnapshot>(view_),
+                       Eigen::Vector2d(robot_m, robot_m));
+  }
+  /// What arrives until nothing does.
+  std::map<TileId, std::uint64_t> take(dds::Reader<MapTile>& reader) {
+    std::map<TileId, std::uint64_t> got;
+    MapTile message;
+    for (std::chrono::milliseconds wait = dds::discovery_timeout; reader.take(message, {}, wait); wait = 300ms) {
+      got[{message.tile_x(), message.tile_y()}] = message.state().revision();
+    }
+    return got;
+  }
+
+  MapSnapshot view_;
+  dds::Topics topics_ = dds::Topics::in("stillmap");
+  dds::Participant here_{dds::loopback(true)};
+  dds::Participant there_{dds::loopback(true)};
+  TileReader tiles_;
+  TilePublisher publisher_{here_, topics_, tiles_, window_m};
+};
+
+TEST_F(TileWindow, LateJoinersGetTheTilesRoundTheRobotAndWhatChangedElsewhere) {
+  publish(600.0);
+  // 50 m to either side touch 6 rows of tiles: the edges belong to them.
+  EXPECT_GE(publisher_.held(), 25U);
+  EXPECT_LE(publisher_.held(), 49U);
+  change({2, 2});
+  publish(600.0);
+  dds::Reader<MapTile> reader(there_, topics_.tiles.dds_name, topics_.tiles.reader);
+  const auto got = take(reader);
+  EXPECT_EQ(got.size(), publisher_.held());
+  EXPECT_EQ(got.at({2, 2}), 2U);
+  for (const auto& [id, revision] : got) {
+    if (id == TileId{2, 2}) continue;
+    EXPECT_NEAR(id.x, 30, 4);
+    EXPECT_NEAR(id.y, 30, 4);
+  }
+}
+
+TEST_F(TileWindow, WhatIsHeldIsBoundedHoweverFarTheRobotGoes) {
+  std::size_t most = 0;
+  for (double robot_m = 0.0; robot_m < 20.0 * side_tiles; robot_m += 10.0) {
+    publish(robot_m);
+    most = std::max(most, publisher_.held());
+  }
+  EXPECT_GT(most, 200U);
+  EXPECT_LE(most, 49 * 2 + TilePublisher::max_far_tiles);
+  for (int i = 0; i < 400; ++i) {
+    change({i % side_tiles, 5 + i / side_tiles});
+    publish(1000.0);
+  }
+  EXPECT_LE(publisher_.held(), 49 + 1 + TilePublisher::max_far_tiles);
+}
+
+TEST_F(TileWindow, ATileThatLeavesStaysWithThoseWhoHaveIt) {
+  dds::Reader<MapTile> reader(there_, topics_.tiles.dds_name, topics_.tiles.reader);
+  ASSERT_TRUE(reader.events().wait_for_writer(dds::discovery_timeout));
+  publish(100.0);
+  EXPECT_TRUE(take(reader).contains({5, 5}));
+  view_.tiles.erase({5, 5});
+  ++view_.version;
+  publish(100.0);
+  EXPECT_FALSE(take(reader).contains({5, 5})) << "disposed: no sample with voxels";
 }
 
 }  // namespace

@@ -193,7 +193,7 @@ TEST(TraversabilityMap, VoxelsThatCannotBeAreLeftOut) {
   broken.voxels[5].mean_map.z() = std::numeric_limits<float>::quiet_NaN();
   broken.voxels[9].index.x = 60'000;
   broken.info.revision = 99;
-  map.tiles.front() = std::make_shared<const Tile>(broken);
+  map.tiles.set(std::make_shared<const Tile>(broken));
   TraversabilityMap area({square_robot()});
   EXPECT_NO_THROW((void)area.update(map));
 }

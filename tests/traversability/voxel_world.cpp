@@ -74,7 +74,7 @@ MapSnapshot VoxelWorld::view() {
     TileInfo& known = infos_[id];
     if (known.content_hash == tile.info.content_hash) tile.info.revision = known.revision;
     known = tile.info;
-    map.tiles.push_back(std::make_shared<const Tile>(std::move(tile)));
+    map.tiles.set(std::make_shared<const Tile>(std::move(tile)));
   }
   return map;
 }

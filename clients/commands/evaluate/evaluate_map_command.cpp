@@ -28,7 +28,7 @@ struct EvaluateMapArguments {
 // cleaning alone; with true poses drift counts as well.
 Trajectory poses_for_truth(const EvaluateMapArguments& arguments, const ScanDataset& dataset,
                            const SavedMap& map) {
-  if (arguments.poses == "map") return map.trajectory;
+  if (arguments.poses == "map") return map.trajectory.to_vector();
   std::optional<Trajectory> truth = dataset.truth();
   if (!truth) throw DatasetError(arguments.truth, "has no true poses; use --poses map");
   return *truth;

@@ -45,7 +45,7 @@ class MappingRun {
   /// Goes on where an earlier run was. Throws std::invalid_argument for another voxel size.
   void resume(RunState earlier) {
     mapper_.resume(earlier.map.view, earlier.map.tile_evidence);
-    earlier_ = std::move(earlier.map.trajectory);
+    earlier_ = earlier.map.trajectory.to_vector();
     result_.scan_of_pose = std::move(earlier.scan_of_pose);
     result_.resumed_at_scan = earlier.next_scan;
   }
@@ -92,7 +92,7 @@ class MappingRun {
 
   MappingResult finish(bool stopped) {
     result_.trajectory = path();
-    SavedMap map = to_saved_map(mapper_.static_map().checkpoint(true));
+    SavedMap map = to_saved_map(mapper_.static_map().checkpoint(CheckpointScope::everything));
     result_.view = std::make_shared<const MapSnapshot>(std::move(map.view));
     result_.tile_evidence = std::move(map.tile_evidence);
     result_.label_source = mapper_.label_source();

@@ -35,11 +35,10 @@ MapSnapshot fetch_map(Client& client) {
                    .tile_size_m = versions.map.tile_size_m,
                    .voxel_size_m = versions.map.voxel_size_m,
                    .tiles = {}};
-  for (Tile& tile : set.tiles) {
-    view.tiles.push_back(std::make_shared<const Tile>(std::move(tile)));
-  }
-  std::sort(view.tiles.begin(), view.tiles.end(),
-            [](const auto& a, const auto& b) { return a->info.id < b->info.id; });
+  std::vector<std::shared_ptr<const Tile>> tiles;
+  tiles.reserve(set.tiles.size());
+  for (Tile& tile : set.tiles) tiles.push_back(std::make_shared<const Tile>(std::move(tile)));
+  view.tiles = TileTable(std::move(tiles));
   return view;
 }
 

@@ -36,7 +36,7 @@ class FileSource final : public TraversabilitySource {
                                            double max_distance_m) override {
     return nearest_traversable(view(), position_map, max_distance_m);
   }
-  [[nodiscard]] Trajectory trajectory() override { return map_.trajectory; }
+  [[nodiscard]] Trajectory trajectory() override { return map_.trajectory.to_vector(); }
   [[nodiscard]] std::optional<TraversabilityUpdate> update_stats() const override {
     return update_stats_;
   }

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/map/query/coarse_cells.hpp"
+#include "core/map/query/coarse_strips.hpp"
 #include "core/map/query/query_checks.hpp"
 #include "core/map/query/region.hpp"
 #include "core/map/query/tile_reader.hpp"
@@ -44,47 +45,44 @@ class VoxelFilter {
 
 TileChangeKind kind_of(const TileInfo& info, const MapQuery& query, const TileHistory* history) {
   if (!query.since || history == nullptr) return TileChangeKind::appeared;
-  const auto found =
-      std::ranges::lower_bound(history->appeared, info.id, {}, &TileHistory::Event::id);
-  const bool was_there = found != history->appeared.end() && found->id == info.id &&
-                         found->version <= query.since->version;
-  return was_there ? TileChangeKind::changed : TileChangeKind::appeared;
+  return info.appeared_in <= query.since->version ? TileChangeKind::changed
+                                                  : TileChangeKind::appeared;
 }
 
-/// Positions in `view.tiles`, ascending, of the tiles that an answer is made from: those with
-/// voxels near the region; with `since`, those that changed and whose footprint meets it, even if
-/// no voxel is left there.
-std::vector<std::size_t> selected_tiles(const MapSnapshot& view, const MapQuery& query,
-                                        const RegionShape& region) {
-  std::vector<std::size_t> selected;
+using TilePointers = std::vector<std::shared_ptr<const Tile>>;
+
+/// Sorted by id, the tiles that an answer is made from: those with voxels near the region; with
+/// `since`, those that changed and whose footprint meets it, even if no voxel is left there.
+TilePointers selected_tiles(const MapSnapshot& view, const MapQuery& query,
+                            const RegionShape& region) {
+  TilePointers selected;
   if (query.since) {
-    for (std::size_t i = 0; i < view.tiles.size(); ++i) {
-      const TileInfo& info = view.tiles[i]->info;
-      if (info.revision > query.since->version &&
-          region.may_intersect(tile_footprint(info.id, view.tile_size_m))) {
-        selected.push_back(i);
+    view.tiles.for_each_newer(query.since->version, [&](const auto& tile) {
+      if (region.may_intersect(tile_footprint(tile->info.id, view.tile_size_m))) {
+        selected.push_back(tile);
       }
-    }
+    });
     return selected;
   }
-  for (const std::size_t i : tiles_in_box(view, region.bounds_map())) {
-    if (region.may_intersect(view.tiles[i]->info.bounds_map.cast<double>())) selected.push_back(i);
+  for (auto& tile : tiles_in_box(view, region.bounds_map())) {
+    if (region.may_intersect(tile->info.bounds_map.template cast<double>())) {
+      selected.push_back(std::move(tile));
+    }
   }
   return selected;
 }
 
 /// The tiles of an answer; `selected` as selected_tiles returns it.
 std::vector<TileChange> tile_changes(const MapSnapshot& view, const MapQuery& query,
-                                     const RegionShape& region,
-                                     const std::vector<std::size_t>& selected,
+                                     const RegionShape& region, const TilePointers& selected,
                                      const TileHistory* history, TileReader& reader) {
   std::vector<TileChange> changes;
   changes.reserve(selected.size());
-  for (const std::size_t i : selected) {
-    const TileInfo& info = view.tiles[i]->info;
-    const VoxelFilter filter(query, region, *view.tiles[i]);
+  for (const auto& tile : selected) {
+    const TileInfo& info = tile->info;
+    const VoxelFilter filter(query, region, *tile);
     const std::uint32_t count =
-        filter.matches_all() ? info.voxel_count : filter.count(*reader.read(view.tiles[i]));
+        filter.matches_all() ? info.voxel_count : filter.count(*reader.read(tile));
     changes.push_back({info.id, kind_of(info, query, history), info.revision, count});
   }
   if (!query.since || history == nullptr) return changes;
@@ -106,7 +104,7 @@ struct Selection {
   const MapSnapshot& view;
   const MapQuery& query;
   RegionShape region;
-  std::vector<std::size_t> tiles;
+  TilePointers tiles;
   TileReader& reader;
 };
 
@@ -114,9 +112,8 @@ struct Selection {
 /// next page; true when there is one.
 bool fill_page(const Selection& from, Continuation& position, std::vector<QueryVoxel>& page) {
   const std::size_t page_size = from.query.max_bytes / query_voxel_bytes;
-  for (const std::size_t i : from.tiles) {
-    if (i < position.tile) continue;
-    const auto read = from.reader.read(from.view.tiles[i]);
+  for (std::size_t i = position.tile; i < from.tiles.size(); ++i) {
+    const auto read = from.reader.read(from.tiles[i]);
     const Tile& tile = *read;
     const VoxelFilter filter(from.query, from.region, tile);
     for (std::size_t v = i == position.tile ? position.voxel : 0; v < tile.voxels.size(); ++v) {
@@ -132,26 +129,47 @@ bool fill_page(const Selection& from, Continuation& position, std::vector<QueryV
   return false;
 }
 
-/// A page of a coarser answer. Every page merges the whole region anew: nothing is kept between
-/// requests.
-bool fill_coarse_page(const Selection& from, Continuation& position,
-                      std::vector<QueryVoxel>& page) {
+/// The cells of one strip of a coarser answer, merged from the tiles that reach into it.
+std::vector<QueryVoxel> merge(const Selection& from, const CoarseStrips& strips,
+                              std::size_t strip) {
   CoarseCells cells(from.query.resolution_m);
-  for (const std::size_t i : from.tiles) {
-    const auto tile = from.reader.read(from.view.tiles[i]);
+  for (const std::size_t i : strips.tiles(strip)) {
+    const auto tile = from.reader.read(from.tiles[i]);
     const VoxelFilter filter(from.query, from.region, *tile);
     for (const Voxel& voxel : tile->voxels) {
-      if (filter.matches(voxel)) cells.add(voxel);
+      if (strips.is_in(strip, voxel) && filter.matches(voxel)) cells.add(voxel);
     }
   }
-  const std::vector<QueryVoxel> all = cells.sorted();
-  const std::size_t begin = std::min<std::size_t>(position.voxel, all.size());
-  const std::size_t end = std::min(all.size(), begin + from.query.max_bytes / query_voxel_bytes);
-  page.assign(all.begin() + static_cast<std::ptrdiff_t>(begin),
-              all.begin() + static_cast<std::ptrdiff_t>(end));
-  position.total_voxels = all.size();
-  position.voxel = end;
-  return end < all.size();
+  return cells.sorted();
+}
+
+/// A page of a coarser answer. The answer is made strip by strip, so that a page merges its own
+/// part of the region; the first page counts the rest.
+bool fill_coarse_page(const Selection& from, Continuation& position,
+                      std::vector<QueryVoxel>& page) {
+  const CoarseStrips strips(from.tiles, from.query.resolution_m, from.view.tile_size_m);
+  const std::size_t page_size = from.query.max_bytes / query_voxel_bytes;
+  const bool counts = from.query.continuation.empty();
+  std::uint64_t total = 0;
+  bool has_more = false;
+  for (std::size_t strip = position.tile; strip < strips.size(); ++strip) {
+    const std::vector<QueryVoxel> cells = merge(from, strips, strip);
+    total += cells.size();
+    if (has_more) continue;
+    const std::size_t begin =
+        strip == position.tile ? std::min<std::size_t>(position.voxel, cells.size()) : 0;
+    const std::size_t end = begin + std::min(cells.size() - begin, page_size - page.size());
+    page.insert(page.end(), cells.begin() + static_cast<std::ptrdiff_t>(begin),
+                cells.begin() + static_cast<std::ptrdiff_t>(end));
+    if (end < cells.size()) {
+      has_more = true;
+      position.tile = strip;
+      position.voxel = end;
+      if (!counts) return true;
+    }
+  }
+  if (counts) position.total_voxels = total;
+  return has_more;
 }
 
 MapQueryResult result_of(const MapSnapshot& view, QueryStatus status, std::string reason) {

@@ -16,8 +16,8 @@ struct Continuation {
   std::uint64_t query_fingerprint = 0;
   /// Voxels of the whole answer.
   std::uint64_t total_voxels = 0;
-  /// First voxel of the next page: its tile's position in the view and its own in the tile; in a
-  /// coarser answer, tile 0 and the cell's position.
+  /// First voxel of the next page: its tile's position among those of the answer and its own in the
+  /// tile; in a coarser answer, the positions of the strip and of the cell in it.
   std::uint64_t tile = 0;
   std::uint64_t voxel = 0;
   friend bool operator==(const Continuation&, const Continuation&) = default;

@@ -1,16 +1,10 @@
 #include "core/map/query/tile_history.hpp"
 
 #include <algorithm>
+#include <set>
 
 namespace stillmap {
 namespace {
-
-using Event = TileHistory::Event;
-
-const Event* find(const std::vector<Event>& sorted, TileId id) {
-  const auto found = std::ranges::lower_bound(sorted, id, {}, &Event::id);
-  return found != sorted.end() && found->id == id ? &*found : nullptr;
-}
 
 /// Drops the oldest beyond `max_events`.
 void drop_oldest(TileHistory& history, std::size_t max_events) {
@@ -23,27 +17,24 @@ void drop_oldest(TileHistory& history, std::size_t max_events) {
 }  // namespace
 
 TileHistory history_from(const MapSnapshot& view) {
-  TileHistory history{view.map_id, view.version, view.version, {}, {}};
-  for (const auto& tile : view.tiles) {
-    history.appeared.push_back({tile->info.id, tile->info.revision});
-  }
-  return history;
+  return {view.map_id, view.version, view.version, {}};
 }
 
-TileHistory history_with(const TileHistory& before, const MapSnapshot& next,
-                         std::size_t max_removed) {
-  if (next.map_id != before.map_id || next.version < before.version) return history_from(next);
-  TileHistory history{next.map_id, next.version, before.known_since, {}, {}};
-  history.appeared.reserve(next.tiles.size());
-  for (const auto& tile : next.tiles) {
-    const Event* const known = find(before.appeared, tile->info.id);
-    history.appeared.push_back(known ? *known : Event{tile->info.id, tile->info.revision});
-  }
-  const auto is_there = [&](const Event& event) { return find(history.appeared, event.id); };
-  std::ranges::remove_copy_if(before.removed, std::back_inserter(history.removed), is_there);
-  for (const Event& event : before.appeared) {
-    if (!is_there(event)) history.removed.push_back({event.id, next.version});
-  }
+TileHistory history_with(const MapState& before, const MapSnapshot& next, std::size_t max_removed) {
+  const TileHistory& known = *before.history;
+  if (next.map_id != known.map_id || next.version < known.version) return history_from(next);
+  std::set<TileId> came_back;
+  std::vector<TileHistory::Event> gone;
+  TileTable::for_each_difference(before.view->tiles, next.tiles,
+                                 [&](const auto& old_tile, const auto& new_tile) {
+                                   if (old_tile == nullptr) came_back.insert(new_tile->info.id);
+                                   if (new_tile == nullptr)
+                                     gone.push_back({old_tile->info.id, next.version});
+                                 });
+  TileHistory history{next.map_id, next.version, known.known_since, {}};
+  std::ranges::remove_copy_if(known.removed, std::back_inserter(history.removed),
+                              [&](const auto& event) { return came_back.contains(event.id); });
+  history.removed.insert(history.removed.end(), gone.begin(), gone.end());
   drop_oldest(history, max_removed);
   return history;
 }

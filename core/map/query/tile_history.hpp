@@ -8,8 +8,7 @@
 
 namespace stillmap {
 
-/// When the tiles of a map appeared and when others were removed, which a snapshot alone does not
-/// tell.
+/// When tiles of a map were removed, which a snapshot alone does not tell.
 struct TileHistory {
   struct Event {
     TileId id;
@@ -23,8 +22,6 @@ struct TileHistory {
   std::uint64_t version = 0;
   /// Changes since this version, or a later one, are known.
   std::uint64_t known_since = 0;
-  /// Every tile of the newest view, sorted by id.
-  std::vector<Event> appeared;
   /// Removed tiles, in the order of removal.
   std::vector<Event> removed;
 };
@@ -36,14 +33,15 @@ inline constexpr std::size_t max_removed_tiles = 10'000;
 /// A history that begins with this view.
 [[nodiscard]] TileHistory history_from(const MapSnapshot& view);
 
-/// `before` continued by `next`. A view of another map, or an earlier one, begins a new history.
-[[nodiscard]] TileHistory history_with(const TileHistory& before, const MapSnapshot& next,
-                                       std::size_t max_removed = max_removed_tiles);
-
 /// A snapshot of the map and its history. Safe to read from any thread.
 struct MapState {
   std::shared_ptr<const MapSnapshot> view;
   std::shared_ptr<const TileHistory> history;
 };
+
+/// The history of `before` continued by `next`, at the cost of what changed between the two views.
+/// A view of another map, or an earlier one, begins a new history.
+[[nodiscard]] TileHistory history_with(const MapState& before, const MapSnapshot& next,
+                                       std::size_t max_removed = max_removed_tiles);
 
 }  // namespace stillmap

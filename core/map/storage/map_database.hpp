@@ -2,10 +2,14 @@
 
 #include <SQLiteCpp/Database.h>
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
 namespace stillmap {
+
+/// Files up to here are checked page by page whenever they are opened, in a tenth of a second.
+inline constexpr std::uintmax_t max_checked_bytes = std::uintmax_t{64} << 20;
 
 /// SQLite's file with this suffix ("-wal", "-shm") beside a database.
 [[nodiscard]] std::filesystem::path beside(const std::filesystem::path& file, const char* suffix);
@@ -15,9 +19,10 @@ namespace stillmap {
 [[nodiscard]] std::string sqlite_name(const std::filesystem::path& file);
 
 /// Opens the SQLite database of a map file, made with an empty schema when there is no file yet.
-/// A file that is not a sound map file of this schema or the one before is refused (MapFileError)
-/// before anything could write to it. A log beside it that belongs to another file (a backup was
-/// copied over the one that a crash left) is renamed, and the file opened as it is alone.
+/// A file that is not a map file of this schema or the one before is refused (MapFileError) before
+/// anything could write to it, and so is a damaged one of up to `max_checked_bytes`; of a larger
+/// one what is damaged is found when it is read. A log beside it that belongs to another file (a
+/// backup was copied over the one that a crash left) is renamed, and the file opened as it is alone.
 [[nodiscard]] SQLite::Database open_map_database(const std::filesystem::path& file);
 /// One more connection to a file that this process has opened so, without a look at its content.
 [[nodiscard]] SQLite::Database connect_to_map_database(const std::filesystem::path& file);
@@ -32,5 +37,9 @@ void put_in_place(const std::filesystem::path& fresh, const std::filesystem::pat
 /// Upgrades them to the current schema, in one transaction. Throws SQLite::Exception, or
 /// TileCodecError for a tile that cannot be read.
 void upgrade_schema(SQLite::Database& database);
+
+/// Makes the index from which `read_tile_infos` reads where it is missing: files of earlier
+/// versions have none. Programs that do not know it keep it up to date. Throws SQLite::Exception.
+void index_tile_infos(SQLite::Database& database);
 
 }  // namespace stillmap

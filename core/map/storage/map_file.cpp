@@ -13,6 +13,7 @@
 #include <optional>
 #include <system_error>
 #include <utility>
+#include <vector>
 
 #include "core/map/storage/map_database.hpp"
 #include "core/map/storage/map_tables.hpp"
@@ -23,14 +24,6 @@ namespace stillmap {
 namespace {
 
 namespace fs = std::filesystem;
-
-/// Number of equal poses at the beginning of both trajectories.
-std::size_t common_poses(const Trajectory& a, const Trajectory& b) {
-  const auto is_same = [](const StampedPose& p, const StampedPose& q) {
-    return p.stamp_ns == q.stamp_ns && p.T_map_lidar.matrix() == q.T_map_lidar.matrix();
-  };
-  return static_cast<std::size_t>(std::ranges::mismatch(a, b, is_same).in1 - a.begin());
-}
 
 MapFileError unreadable(const fs::path& file, const std::runtime_error& error) {
   return {file, std::string("cannot be read (") + error.what() +
@@ -89,31 +82,43 @@ class SqliteMapStore : public MapStore {
                           std::shared_ptr<const ScratchMapFolder> folder = nullptr)
       : folder_(std::move(folder)), file_(file), database_(open_map_database(file)) {}
 
-  void save(const SavedMap& map) override {
+  std::uint64_t save(const SavedMap& map) override {
+    std::uint64_t log_bytes = 0;
     writing([&] {
       if (has_first_schema(database_)) upgrade_schema(database_);
+      index_tile_infos(database_);
+      forget_if_changed_by_others();
       if (!saved_trajectory_) saved_trajectory_ = read_trajectory(database_);
       if (!log_is_empty_) empty_log("PASSIVE");
+      if (!saved_tiles_) saved_tiles_ = read_tile_infos(database_);
+      const TileTable tiles = tiles_after(map);
       SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
       const bool is_another_map = read_map_row(database_).map_id != map.view.map_id;
-      write_tiles(database_, map);
+      write_tiles(database_, *saved_tiles_, tiles, map.tile_evidence);
       write_tile_evidence(database_, map.tile_evidence, is_another_map);
-      write_trajectory(database_, map.trajectory, common_poses(*saved_trajectory_, map.trajectory));
+      write_trajectory(database_, map.trajectory,
+                       SharedTrajectory::common_poses(*saved_trajectory_, map.trajectory));
       write_metadata(database_, map);
       commit(transaction);
       saved_trajectory_ = map.trajectory;
+      saved_tiles_ = tiles;
+      std::error_code no_log;
+      log_bytes = fs::file_size(beside(file_, "-wal"), no_log);
+      if (no_log) log_bytes = 0;
       // So that a copy of the file alone is a copy of the map.
       empty_log("TRUNCATE");
     });
+    return 2 * log_bytes;
   }
 
   SavedMap load() override {
     return reading([this] {
       SavedMap map{
           read_map_row(database_), {}, read_trajectory(database_), read_metadata(database_)};
-      map.view.tiles = read_tiles(database_, map.view);
+      map.view.tiles = TileTable(read_tiles(database_, map.view));
       if (!has_first_schema(database_)) map.tile_evidence = read_tile_evidence(database_);
       check_consistency(map);
+      remember(map);
       return map;
     });
   }
@@ -121,11 +126,13 @@ class SqliteMapStore : public MapStore {
   SavedMap load_non_resident() override {
     writing([this] {
       if (has_first_schema(database_)) upgrade_schema(database_);
+      index_tile_infos(database_);
     });
     return reading([this] {
-      SavedMap map{read_map_row(database_), read_tile_evidence_ids(database_),
+      SavedMap map{read_map_row(database_), read_hidden_tile_ids(database_),
                    read_trajectory(database_), read_metadata(database_)};
       map.view.tiles = read_tile_infos(database_);
+      remember(map);
       return map;
     });
   }
@@ -228,11 +235,39 @@ class SqliteMapStore : public MapStore {
     }
   }
 
+  /// What the file is to hold.
+  [[nodiscard]] TileTable tiles_after(const SavedMap& map) const {
+    if (!map.is_partial) return map.view.tiles;
+    std::vector<TileTable::Edit> edits;
+    for (const auto& [id, evidence] : map.tile_evidence) {
+      edits.push_back({id, map.view.tiles.find(id)});
+    }
+    return saved_tiles_->with(edits);
+  }
+
+  /// Another connection may have written to the file.
+  void forget_if_changed_by_others() {
+    const std::int64_t version = database_.execAndGet("PRAGMA data_version").getInt64();
+    if (version == data_version_) return;
+    data_version_ = version;
+    saved_trajectory_.reset();
+    saved_tiles_.reset();
+  }
+
+  void remember(const SavedMap& stored) {
+    data_version_ = database_.execAndGet("PRAGMA data_version").getInt64();
+    saved_trajectory_ = stored.trajectory;
+    saved_tiles_ = stored.view.tiles;
+  }
+
   std::shared_ptr<const ScratchMapFolder> folder_;
   fs::path file_;
   SQLite::Database database_;
-  /// The stored trajectory, once it was read.
-  std::optional<Trajectory> saved_trajectory_;
+  /// What is stored, once it was read: a save looks at what differs from it.
+  std::optional<SharedTrajectory> saved_trajectory_;
+  std::optional<TileTable> saved_tiles_;
+  /// SQLite's, of that time: it changes with what other connections write.
+  std::int64_t data_version_ = -1;
   bool log_is_empty_ = false;
 };
 
@@ -240,12 +275,12 @@ class SqliteMapStore : public MapStore {
 
 SavedMap to_saved_map(const MapCheckpoint& checkpoint) {
   SavedMap map{*checkpoint.view, {}, {}, {}};
-  for (const auto& [id, record] : checkpoint.records)
+  std::vector<TileTable::Edit> current;
+  for (const auto& [id, record] : checkpoint.records) {
     map.tile_evidence.emplace(id, record.evidence);
-  for (auto& tile : map.view.tiles) {
-    const auto record = checkpoint.records.find(tile->info.id);
-    if (record != checkpoint.records.end() && record->second.tile) tile = record->second.tile;
+    if (record.tile) current.push_back({id, record.tile});
   }
+  map.view.tiles = map.view.tiles.with(current);
   return map;
 }
 

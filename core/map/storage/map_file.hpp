@@ -1,12 +1,13 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <map>
 #include <memory>
 #include <stdexcept>
 #include <string>
 
-#include "core/lidar/trajectory.hpp"
+#include "core/lidar/shared_trajectory.hpp"
 #include "core/map/static_map.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/tile_evidence.hpp"
@@ -31,9 +32,11 @@ struct SavedMap {
   /// Empty for files of Stillmap's first format: what was seen too rarely, or as a movable class,
   /// starts anew.
   TileEvidenceMap tile_evidence;
-  Trajectory trajectory;
+  SharedTrajectory trajectory;
   /// Free key-value pairs: "sensor", "label_source", "software".
   std::map<std::string, std::string> metadata;
+  /// To be saved are the tiles with evidence given alone; the others stay as they are stored.
+  bool is_partial = false;
 };
 
 /// A checkpoint as it is stored.
@@ -44,13 +47,16 @@ class MapStore {
  public:
   virtual ~MapStore() = default;
   /// Brings the store to this state in one transaction: after a crash the store holds either the
-  /// last save or this one. Tiles that did not change are not written again. Tiles that are
+  /// last save or this one. Costs what changed since the last save: tiles that did not change are
+  /// neither looked at nor written again. Tiles that are
   /// non-resident (`is_non_resident`) stay as they are stored. A tile that is written without
   /// its evidence loses the one that was stored.
-  virtual void save(const SavedMap& map) = 0;
+  /// Returns about how many bytes were written to the disk, those to the log included.
+  virtual std::uint64_t save(const SavedMap& map) = 0;
   /// The last saved state; an empty map when nothing was saved yet.
   [[nodiscard]] virtual SavedMap load() = 0;
-  /// The same with all tiles non-resident: its size does not depend on their voxels.
+  /// The same with all tiles non-resident: neither time nor size depends on their voxels. Of the
+  /// tiles with evidence, only those that show nothing are named.
   [[nodiscard]] virtual SavedMap load_non_resident() = 0;
   /// Reads single tiles; may be used beside the store, and after it.
   [[nodiscard]] virtual std::shared_ptr<TileStore> tile_store() = 0;

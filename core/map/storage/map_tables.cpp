@@ -1,10 +1,13 @@
 #include "core/map/storage/map_tables.hpp"
 
 #include <SQLiteCpp/Column.h>
+#include <SQLiteCpp/Exception.h>
 #include <SQLiteCpp/Statement.h>
+#include <sqlite3.h>
 #include <tbb/parallel_for.h>
 
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <string>
 #include <utility>
@@ -43,14 +46,57 @@ std::string tile_name(TileId id) {
   return "tile (" + std::to_string(id.x) + ", " + std::to_string(id.y) + ") ";
 }
 
-/// Of a row that begins with x, y; throws TileCodecError for a tile that no map goes out to.
-TileId column_tile_id(const SQLite::Statement& row) {
-  const TileId id{row.getColumn(0).getInt(), row.getColumn(1).getInt()};
+/// Throws TileCodecError for a tile that no map goes out to.
+TileId checked_id(TileId id) {
   if (!is_in_range(id.x) || !is_in_range(id.y)) {
     throw TileCodecError(tile_name(id) + "lies farther out than any map goes");
   }
   return id;
 }
+
+/// Of a row that begins with x, y; throws TileCodecError for a tile that no map goes out to.
+TileId column_tile_id(const SQLite::Statement& row) {
+  return checked_id({row.getColumn(0).getInt(), row.getColumn(1).getInt()});
+}
+
+/// Rows of a query by SQLite's own interface: of a million rows, SQLiteCpp's columns would cost
+/// more than SQLite.
+class ManyRows {
+ public:
+  ManyRows(SQLite::Database& database, const char* query) : database_(database.getHandle()) {
+    sqlite3_stmt* statement = nullptr;
+    check(sqlite3_prepare_v2(database_, query, -1, &statement, nullptr), SQLITE_OK);
+    statement_.reset(statement);
+  }
+  [[nodiscard]] bool next() {
+    const int code = sqlite3_step(statement_.get());
+    if (code != SQLITE_DONE) check(code, SQLITE_ROW);
+    return code == SQLITE_ROW;
+  }
+  [[nodiscard]] std::int64_t integer(int column) const {
+    return sqlite3_column_int64(statement_.get(), column);
+  }
+  [[nodiscard]] double real(int column) const {
+    return sqlite3_column_double(statement_.get(), column);
+  }
+  [[nodiscard]] float number(int column) const { return static_cast<float>(real(column)); }
+  /// Of x, y in the first columns.
+  [[nodiscard]] TileId id() const {
+    return checked_id(
+        {sqlite3_column_int(statement_.get(), 0), sqlite3_column_int(statement_.get(), 1)});
+  }
+
+ private:
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+  };
+  void check(int code, int wanted) const {
+    if (code != wanted) throw SQLite::Exception(database_, code);
+  }
+
+  sqlite3* database_;
+  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+};
 
 /// Of a row that goes on with revision, content_hash.
 StoredState column_state(const SQLite::Statement& row) {
@@ -66,13 +112,6 @@ void bind_id(SQLite::Statement& statement, TileId id) {
 void run(SQLite::Statement& statement) {
   statement.exec();
   statement.reset();
-}
-
-std::map<TileId, StoredState> stored_states(SQLite::Database& database) {
-  std::map<TileId, StoredState> stored;
-  SQLite::Statement row(database, "SELECT x, y, revision, content_hash FROM tiles");
-  while (row.executeStep()) stored[column_tile_id(row)] = column_state(row);
-  return stored;
 }
 
 void write_rows(SQLite::Database& database, std::span<const Tile* const> tiles) {
@@ -156,18 +195,20 @@ void check_consistency(const Tile* tile, const TileEvidence* evidence, TileId id
 
 }  // namespace
 
-void write_tiles(SQLite::Database& database, const SavedMap& map) {
-  std::map<TileId, StoredState> stored = stored_states(database);
+void write_tiles(SQLite::Database& database, const TileTable& stored, const TileTable& tiles,
+                 const TileEvidenceMap& tile_evidence) {
   std::vector<const Tile*> changed;
-  for (const auto& tile : map.view.tiles) {
-    const auto known = stored.extract(tile->info.id);
-    const bool is_stored = known && known.mapped() == stored_state_of(tile->info);
-    if (is_non_resident(*tile)) {
-      if (is_stored) continue;
-      throw TileCodecError(tile_name(tile->info.id) + "is neither in memory nor in this file");
+  std::vector<TileId> gone;
+  TileTable::for_each_difference(stored, tiles, [&](const auto& before, const auto& after) {
+    if (after == nullptr) return gone.push_back(before->info.id);
+    const TileId id = after->info.id;
+    const bool is_stored = before && stored_state_of(before->info) == stored_state_of(after->info);
+    if (is_non_resident(*after)) {
+      if (is_stored) return;
+      throw TileCodecError(tile_name(id) + "is neither in memory nor in this file");
     }
-    if (!is_stored || map.tile_evidence.contains(tile->info.id)) changed.push_back(tile.get());
-  }
+    if (!is_stored || tile_evidence.contains(id)) changed.push_back(after.get());
+  });
   write_rows(database, changed);
   SQLite::Statement remove(database, "DELETE FROM tiles WHERE x = ? AND y = ?");
   // Evidence is of one state of its tile.
@@ -176,7 +217,7 @@ void write_tiles(SQLite::Database& database, const SavedMap& map) {
     bind_id(forget, tile->info.id);
     run(forget);
   }
-  for (const auto& [id, state] : stored) {
+  for (const TileId id : gone) {
     for (SQLite::Statement* statement : {&remove, &forget}) {
       bind_id(*statement, id);
       run(*statement);
@@ -202,7 +243,8 @@ void write_tile_evidence(SQLite::Database& database, const TileEvidenceMap& tile
   }
 }
 
-void write_trajectory(SQLite::Database& database, const Trajectory& trajectory, std::size_t from) {
+void write_trajectory(SQLite::Database& database, const SharedTrajectory& trajectory,
+                      std::size_t from) {
   SQLite::Statement forget(database, "DELETE FROM trajectory WHERE position >= ?");
   forget.bind(1, static_cast<std::int64_t>(from));
   forget.exec();
@@ -262,25 +304,22 @@ std::vector<std::shared_ptr<const Tile>> read_tiles(SQLite::Database& database,
   return tiles;
 }
 
-std::vector<std::shared_ptr<const Tile>> read_tile_infos(SQLite::Database& database) {
+TileTable read_tile_infos(SQLite::Database& database) {
   std::vector<std::shared_ptr<const Tile>> tiles;
-  SQLite::Statement row(database,
-                        "SELECT x, y, revision, content_hash, voxel_count, min_x, min_y, min_z, "
-                        "max_x, max_y, max_z FROM tiles ORDER BY x, y");
-  const auto number = [&row](int column) {
-    return static_cast<float>(row.getColumn(column).getDouble());
-  };
-  while (row.executeStep()) {
-    Tile tile;
-    tile.info.id = column_tile_id(row);
-    tile.info.revision = unsigned_bits(row.getColumn(2).getInt64());
-    tile.info.content_hash = unsigned_bits(row.getColumn(3).getInt64());
-    tile.info.voxel_count = row.getColumn(4).getUInt();
-    tile.info.bounds_map = {Eigen::Vector3f(number(5), number(6), number(7)),
-                            Eigen::Vector3f(number(8), number(9), number(10))};
-    tiles.push_back(std::make_shared<const Tile>(std::move(tile)));
+  ManyRows row(database,
+               "SELECT x, y, revision, content_hash, voxel_count, min_x, min_y, min_z, max_x, "
+               "max_y, max_z FROM tiles INDEXED BY tile_infos ORDER BY x, y");
+  while (row.next()) {
+    auto tile = std::make_shared<Tile>();
+    tile->info.id = row.id();
+    tile->info.revision = unsigned_bits(row.integer(2));
+    tile->info.content_hash = unsigned_bits(row.integer(3));
+    tile->info.voxel_count = static_cast<std::uint32_t>(row.integer(4));
+    tile->info.bounds_map = {Eigen::Vector3f(row.number(5), row.number(6), row.number(7)),
+                             Eigen::Vector3f(row.number(8), row.number(9), row.number(10))};
+    tiles.push_back(std::move(tile));
   }
-  return tiles;
+  return TileTable(std::move(tiles));
 }
 
 TileEvidenceMap read_tile_evidence(SQLite::Database& database) {
@@ -296,24 +335,26 @@ TileEvidenceMap read_tile_evidence(SQLite::Database& database) {
   return tile_evidence;
 }
 
-TileEvidenceMap read_tile_evidence_ids(SQLite::Database& database) {
+TileEvidenceMap read_hidden_tile_ids(SQLite::Database& database) {
   TileEvidenceMap ids;
-  SQLite::Statement row(database, "SELECT x, y FROM memories");
-  while (row.executeStep()) ids.emplace(column_tile_id(row), nullptr);
+  // Both are read from indices, in one order: it takes one pass.
+  ManyRows row(database, "SELECT x, y FROM memories EXCEPT SELECT x, y FROM tiles ORDER BY x, y");
+  while (row.next()) ids.emplace(row.id(), nullptr);
   return ids;
 }
 
-Trajectory read_trajectory(SQLite::Database& database) {
-  Trajectory trajectory;
-  SQLite::Statement row(
-      database, "SELECT stamp_ns, x, y, z, qx, qy, qz, qw FROM trajectory ORDER BY position");
-  const auto number = [&row](int column) { return row.getColumn(column).getDouble(); };
-  while (row.executeStep()) {
-    StampedPose& pose = trajectory.emplace_back();
-    pose.stamp_ns = row.getColumn(0).getInt64();
+SharedTrajectory read_trajectory(SQLite::Database& database) {
+  SharedTrajectory trajectory;
+  ManyRows row(database,
+               "SELECT stamp_ns, x, y, z, qx, qy, qz, qw FROM trajectory ORDER BY position");
+  const auto number = [&row](int column) { return row.real(column); };
+  while (row.next()) {
+    StampedPose pose;
+    pose.stamp_ns = row.integer(0);
     pose.T_map_lidar.translation() = Eigen::Vector3d(number(1), number(2), number(3));
     pose.T_map_lidar.linear() =
         Eigen::Quaterniond(number(7), number(4), number(5), number(6)).toRotationMatrix();
+    trajectory.push_back(pose);
   }
   return trajectory;
 }

@@ -9,14 +9,17 @@ namespace stillmap {
 // The tables of a map file, row by row. All throw SQLite::Exception, and TileCodecError for a tile
 // that is not what it should be.
 
-/// Writes the tiles that differ from their rows or have evidence given, without their evidence, and
-/// deletes the rows of other tiles. Non-resident tiles must be stored in this state.
-void write_tiles(SQLite::Database& database, const SavedMap& map);
+/// Writes the tiles that differ from those `stored`, which are what the rows hold, or have evidence
+/// given, without their evidence, and deletes the rows of tiles that are no more. Non-resident
+/// tiles must be stored in this state.
+void write_tiles(SQLite::Database& database, const TileTable& stored, const TileTable& tiles,
+                 const TileEvidenceMap& tile_evidence);
 /// Writes the evidence given; with `forget_others`, deletes all other.
 void write_tile_evidence(SQLite::Database& database, const TileEvidenceMap& tile_evidence,
                          bool forget_others);
 /// Replaces the rows from this pose on.
-void write_trajectory(SQLite::Database& database, const Trajectory& trajectory, std::size_t from);
+void write_trajectory(SQLite::Database& database, const SharedTrajectory& trajectory,
+                      std::size_t from);
 void write_metadata(SQLite::Database& database, const SavedMap& map);
 
 /// Id, version and sizes of the map, without tiles.
@@ -24,12 +27,12 @@ void write_metadata(SQLite::Database& database, const SavedMap& map);
 /// Of a map with these sizes; checked against their content hashes.
 [[nodiscard]] std::vector<std::shared_ptr<const Tile>> read_tiles(SQLite::Database& database,
                                                                   const MapSnapshot& sizes);
-/// Without their voxels.
-[[nodiscard]] std::vector<std::shared_ptr<const Tile>> read_tile_infos(SQLite::Database& database);
+/// Without their voxels, from their index alone (`index_tile_infos`).
+[[nodiscard]] TileTable read_tile_infos(SQLite::Database& database);
 [[nodiscard]] TileEvidenceMap read_tile_evidence(SQLite::Database& database);
-/// The tiles that have evidence, with null for each.
-[[nodiscard]] TileEvidenceMap read_tile_evidence_ids(SQLite::Database& database);
-[[nodiscard]] Trajectory read_trajectory(SQLite::Database& database);
+/// The tiles that have evidence but show nothing, with null for each.
+[[nodiscard]] TileEvidenceMap read_hidden_tile_ids(SQLite::Database& database);
+[[nodiscard]] SharedTrajectory read_trajectory(SQLite::Database& database);
 [[nodiscard]] std::map<std::string, std::string> read_metadata(SQLite::Database& database);
 
 /// Throws when evidence does not belong to the state of its tile.

@@ -21,7 +21,7 @@ void count_voxel(const Voxel& voxel, MapInfo& info) {
       is_first ? voxel.last_seen_ns : std::max(info.observation_span.last_ns, voxel.last_seen_ns);
 }
 
-void measure_path(const Trajectory& trajectory, MapInfo& info) {
+void measure_path(const SharedTrajectory& trajectory, MapInfo& info) {
   info.poses = trajectory.size();
   if (trajectory.empty()) return;
   const auto [first, last] = std::ranges::minmax(trajectory, {}, &StampedPose::stamp_ns);

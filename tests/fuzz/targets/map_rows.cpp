@@ -119,9 +119,9 @@ const std::string& template_file() {
     folder.remove("template.stillmap");
     const auto file = folder.path("template.stillmap");
     SavedMap empty = small_street();
-    empty.view.tiles.clear();
+    empty.view.tiles = {};
     empty.tile_evidence.clear();
-    empty.trajectory.clear();
+    empty.trajectory = {};
     open_map_file(file)->save(empty);
     return content_of(file);
   }();

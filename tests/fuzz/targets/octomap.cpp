@@ -70,7 +70,7 @@ std::string file_bytes(const char* name, const OctomapData& data) {
 
 std::vector<Seed> seeds() {
   MapSnapshot view = small_street().view;
-  view.tiles.resize(1);
+  view.tiles = {view.tiles.front()};
   OccupancyMap map{OccupancyConfig{}};
   map.insert(view);
   const OctomapData binary = map.encode(true);

@@ -13,7 +13,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto discovery_timeout = 60s;
-constexpr std::uint8_t format_version = 6;
+constexpr std::uint8_t format_version = 7;
 
 // C structures of idlc's want pointers that they could write through.
 std::string no_text;
