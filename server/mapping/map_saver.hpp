@@ -78,8 +78,8 @@ struct MapSaverLimits {
 /// Writes the map to its file, and with a memory limit keeps there what is not in memory. A file
 /// never gets another map's content: a map that gives way to a new one keeps a file of its own.
 /// While the robot stands, checkpoints hold the tiles whose view changed by more than a few voxels;
-/// what else a standing lidar gathers (counts, times, poses) is written as far as the allowance goes.
-/// Thread-safe; saves wait for each other.
+/// what else a standing lidar gathers (counts, times, poses) is written as far as the allowance
+/// goes. Thread-safe; saves wait for each other.
 class MapSaver {
  public:
   /// Makes a stored map ready to run; what it returns publishes it in the running one's place, and

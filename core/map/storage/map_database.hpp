@@ -22,7 +22,8 @@ inline constexpr std::uintmax_t max_checked_bytes = std::uintmax_t{64} << 20;
 /// A file that is not a map file of this schema or the one before is refused (MapFileError) before
 /// anything could write to it, and so is a damaged one of up to `max_checked_bytes`; of a larger
 /// one what is damaged is found when it is read. A log beside it that belongs to another file (a
-/// backup was copied over the one that a crash left) is renamed, and the file opened as it is alone.
+/// backup was copied over the one that a crash left) is renamed, and the file opened as it is
+/// alone.
 [[nodiscard]] SQLite::Database open_map_database(const std::filesystem::path& file);
 /// One more connection to a file that this process has opened so, without a look at its content.
 [[nodiscard]] SQLite::Database connect_to_map_database(const std::filesystem::path& file);
