@@ -1,7 +1,9 @@
 #include "clients/commands/command.hpp"
+#include "core/process/openmp_waits.hpp"
 #include "idl/dds/dds_log.hpp"
 
 int main(int argc, char** argv) {
+  stillmap::shorten_openmp_waits(argv);
   stillmap::dds::log_dds_to_stderr();
   stillmap::cli::CommandLine command_line("stillmap", STILLMAP_VERSION,
                                           "Lidar scans in, poses and a static semantic map out.");

@@ -9,6 +9,7 @@
 #include <iostream>
 
 #include "config/loaders/model_file.hpp"
+#include "core/process/openmp_waits.hpp"
 #include "core/process/stop_signals.hpp"
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/dds_log.hpp"
@@ -62,6 +63,7 @@ int serve(const stillmap::ServerConfig& config) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  stillmap::shorten_openmp_waits(argv);
   stillmap::server::start_log(stillmap::LogLevel::info);
   stillmap::dds::log_dds_to_stderr();
   try {

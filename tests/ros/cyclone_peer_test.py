@@ -12,10 +12,11 @@ import socket
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
-SCANS = 40
+SCANS = int(os.environ.get("STILLMAP_SCANS", "40"))
 NODE = "stillmap_server"
 WORDS_WITH_SPACES = re.compile(r"  (\w+)=")
 
@@ -206,9 +207,10 @@ class CyclonePeerTest(unittest.TestCase):
         self.assertEqual(report.one("new clients, one request each")["answered"], str(clients))
 
     def test_2_large_replies_reach_new_processes_of_an_idle_server(self):
-        processes = 10
+        processes = int(os.environ.get("STILLMAP_IDLE_PROCESSES", "10"))
         answered = 0
         for _ in range(processes):
+            time.sleep(float(os.environ.get("STILLMAP_IDLE_S", "0")))
             # What the server says to a new reader when it finds it, the peer has often missed.
             report = Peer(self.domain, "large", "1", may_fail=True).report()
             facts = report.one("new clients, one request each")
