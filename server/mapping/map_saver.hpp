@@ -72,7 +72,7 @@ struct MapSaverLimits {
   std::uint32_t memory_limit_mib = 0;
   /// Written while the robot stands and its map hardly changes; 0: no limit.
   std::uint32_t standing_mib_per_hour = 0;
-  SavedMapsLimit saved_maps;
+  SavedMapsLimit saved_maps = {};
 };
 
 /// Writes the map to its file, and with a memory limit keeps there what is not in memory. A file
