@@ -114,7 +114,7 @@ void MapSaver::save_at_end() {
 
 void MapSaver::make_room() {
   const std::scoped_lock lock(mutex_);
-  if (store_) save(CheckpointScope::changed);
+  if (store_ || !file_.empty()) save(CheckpointScope::changed);
 }
 
 CheckpointScope MapSaver::scope() {
