@@ -5,13 +5,11 @@
 
 #include <algorithm>
 #include <chrono>
-#include <thread>
 
 namespace stillmap::server {
 namespace {
 
 using namespace std::chrono_literals;
-using Clock = std::chrono::steady_clock;
 
 constexpr auto work_between_rests = 2ms;
 /// Longest pause, in times of the work before it.
@@ -37,15 +35,15 @@ bool use_scheduling(BackgroundScheduling scheduling) {
 }
 
 ThrottleCallback make_throttle_callback(const BackgroundThrottle& throttle,
-                                        SaturationPolicy saturation_policy) {
-  return [&throttle, saturation_policy, last = std::chrono::nanoseconds(0)]() mutable {
+                                        SaturationPolicy saturation_policy, MonotonicClock& clock) {
+  return [&throttle, &clock, saturation_policy, last = std::chrono::nanoseconds(0)]() mutable {
     const auto work = thread_cpu_time() - last;
     if (work < work_between_rests) return;
     const auto until = saturation_policy == SaturationPolicy::wait
-                           ? Clock::time_point::max()
-                           : Clock::now() + std::min(rest_ratio * work, max_rest);
-    while (!throttle.is_idle() && Clock::now() < until) {
-      std::this_thread::sleep_for(poll_period);
+                           ? MonotonicClock::TimePoint::max()
+                           : clock.now() + std::min(rest_ratio * work, max_rest);
+    while (!throttle.is_idle() && clock.now() < until) {
+      clock.sleep_until(clock.now() + poll_period, {});
     }
     last = thread_cpu_time();
   };

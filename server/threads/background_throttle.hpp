@@ -3,6 +3,7 @@
 #include <atomic>
 
 #include "core/map/throttle_callback.hpp"
+#include "server/threads/monotonic_clock.hpp"
 
 namespace stillmap::server {
 
@@ -62,8 +63,10 @@ enum class SaturationPolicy {
   run_at_ten_percent,
 };
 
-/// For one background thread: returns when no scan is being mapped. `throttle` must outlive it.
-[[nodiscard]] ThrottleCallback make_throttle_callback(const BackgroundThrottle& throttle,
-                                                      SaturationPolicy saturation_policy);
+/// For one background thread: returns when no scan is being mapped. `throttle` and `clock` must
+/// outlive it.
+[[nodiscard]] ThrottleCallback make_throttle_callback(
+    const BackgroundThrottle& throttle, SaturationPolicy saturation_policy,
+    MonotonicClock& clock = MonotonicClock::steady());
 
 }  // namespace stillmap::server

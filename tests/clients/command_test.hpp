@@ -10,8 +10,14 @@
 #include <string>
 
 #include "tests/clients/process.hpp"
+#include "tests/eventually.hpp"
 
 namespace stillmap::test {
+
+/// An option that takes seconds, for as long as a loaded machine may need.
+inline std::string patiently(const std::string& option = "--timeout") {
+  return " " + option + " " + std::to_string(patience.count());
+}
 
 /// Runs the real program in a fresh folder.
 class CommandTest : public testing::Test {
@@ -47,6 +53,10 @@ class CommandTest : public testing::Test {
   [[nodiscard]] std::string content(const std::string& name) const {
     std::ifstream stream(folder_ / name);
     return {std::istreambuf_iterator<char>(stream), {}};
+  }
+  /// Waits until a file contains the text.
+  [[nodiscard]] bool comes_to_contain(const std::string& name, const std::string& text) const {
+    return eventually([&] { return content(name).find(text) != std::string::npos; });
   }
   [[nodiscard]] std::size_t line_count(const std::string& name) const {
     const std::string text = content(name);

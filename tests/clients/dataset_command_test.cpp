@@ -168,11 +168,10 @@ TEST_F(DatasetCommandTest, ALiveTopicBecomesASequence) {
                            folder_ / "server.log");
   BackgroundProcess exporting(stillmap_program() + " dataset export topic:points " + path("live") +
                                   " --idle-timeout " + std::to_string(3 * slowdown) +
-                                  " --sensor vlp_16 --json --timeout 30" + on_domain,
+                                  " --sensor vlp_16 --json" + patiently() + on_domain,
                               folder_ / "export.log");
-  while (content("export.log").find("waiting for scans") == std::string::npos) {
-    ASSERT_EQ(run("status --timeout 30" + on_domain).exit_code, 0) << content("server.log");
-  }
+  ASSERT_TRUE(comes_to_contain("export.log", "waiting for scans")) << content("export.log");
+  ASSERT_EQ(run("status" + patiently() + on_domain).exit_code, 0) << content("server.log");
   ASSERT_EQ(run("replay " + path("city") + " --rate " + std::to_string(0.5 / slowdown) + on_domain)
                 .exit_code,
             0);
@@ -201,11 +200,10 @@ TEST_F(DatasetCommandTest, ALiveExportThatGetsNoPosesSaysSo) {
   const std::string on_domain = " --domain " + std::to_string(free_domain());
   BackgroundProcess server(stillmap_server_program() + on_domain, folder_ / "server.log");
   BackgroundProcess exporting(stillmap_program() + " dataset export topic:other " + path("live") +
-                                  " --idle-timeout 1 --timeout 30" + on_domain,
+                                  " --idle-timeout 1" + patiently() + on_domain,
                               folder_ / "export.log");
-  while (content("export.log").find("waiting for scans") == std::string::npos) {
-    ASSERT_EQ(run("status --timeout 30" + on_domain).exit_code, 0) << content("server.log");
-  }
+  ASSERT_TRUE(comes_to_contain("export.log", "waiting for scans")) << content("export.log");
+  ASSERT_EQ(run("status" + patiently() + on_domain).exit_code, 0) << content("server.log");
   ASSERT_EQ(run("replay " + path("city") + " --topic other" + on_domain).exit_code, 0);
   EXPECT_EQ(exporting.wait(), 1);
   EXPECT_THAT(content("export.log"), HasSubstr("the server did not map"));

@@ -18,6 +18,18 @@ class MapCommandTest : public CommandTest {
   void truncate(const std::string& name, std::uintmax_t bytes) const {
     std::filesystem::resize_file(folder_ / name, bytes);
   }
+  /// Waits until the unfinished run has been saved more than the ten times, once a scan at most,
+  /// from which on it is resumed. A save changes its file once or, as the clock ticks, twice.
+  [[nodiscard]] bool has_enough_to_resume() const {
+    std::set<std::filesystem::file_time_type> changes;
+    const auto look = [&] {
+      std::error_code missing;
+      const auto time = last_write_time(folder_ / "out/unfinished/run.stillmap", missing);
+      if (!missing) changes.insert(time);
+      return changes.size() >= 24;
+    };
+    return eventually(look, patience, std::chrono::milliseconds(1));
+  }
 };
 
 TEST_F(MapCommandTest, WritesPosesMapPicturesAndReport) {
@@ -117,8 +129,7 @@ TEST_F(MapCommandTest, ASignalLeavesTheOldMapAndTheRunCanBeResumed) {
   const char* how = " --force --save-period 0.01";
   for (const int signal : {SIGKILL, SIGINT, SIGHUP}) {
     BackgroundProcess running(stillmap_program() + " " + map + how, folder_ / "log");
-    while (!exists("out/unfinished/run.stillmap")) usleep(1000);
-    usleep(600'000);
+    ASSERT_TRUE(has_enough_to_resume()) << content("log");
     running.send(signal);
     ASSERT_EQ(running.wait(), signal == SIGKILL ? -1 : 1) << content("log");
     EXPECT_EQ(content("out/map.stillmap"), before) << signal;

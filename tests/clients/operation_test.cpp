@@ -93,15 +93,11 @@ class OperationTest : public CommandTest {
   /// Waits until the program that logs there printed the text so many times.
   [[nodiscard]] bool comes_to_say(const std::string& text, const std::string& log_file,
                                   std::size_t times = 1) const {
-    for (int tenths = 0; tenths < 300; ++tenths) {
-      if (count_in(log_file, text) >= times) return true;
-      std::this_thread::sleep_for(std::chrono::milliseconds(100));
-    }
-    return false;
+    return eventually([&] { return count_in(log_file, text) >= times; });
   }
 
   [[nodiscard]] bool answers() const {
-    return run("status --timeout 30" + on_domain()).exit_code == 0;
+    return run("status" + patiently() + on_domain()).exit_code == 0;
   }
 
   int domain_ = free_domain();
@@ -140,7 +136,7 @@ TEST_F(OperationTest, MetricsMoveWithScansAndRequests) {
   ASSERT_TRUE(answers()) << content("server.log");
   auto before = samples_of(http_get(port, "/metrics"));
   EXPECT_EQ(before.at("stillmap_scans_mapped_total"), 0.0);
-  ASSERT_EQ(run("replay " + path("city") + " --lossless --timeout 30" + on_domain()).exit_code, 0);
+  ASSERT_EQ(run("replay " + path("city") + " --lossless" + patiently() + on_domain()).exit_code, 0);
   ASSERT_EQ(run("save" + on_domain()).exit_code, 0);
   auto after = samples_of(http_get(port, "/metrics"));
   EXPECT_EQ(after.at("stillmap_scans_received_total"), 8.0);
@@ -204,10 +200,10 @@ TEST_F(OperationTest, HealthSaysWhetherTheServerAnswersAndMaps) {
   EXPECT_EQ(nobody.exit_code, 1);
   EXPECT_THAT(nobody.out, AllOf(HasSubstr("unhealthy: "), HasSubstr(std::to_string(domain_))));
   BackgroundProcess server(server_command(), folder_ / "server.log");
-  const ProcessResult alive = run("health --timeout 30" + on_domain());
+  const ProcessResult alive = run("health" + patiently() + on_domain());
   EXPECT_EQ(alive.exit_code, 0) << alive.out;
   EXPECT_THAT(alive.out, testing::StartsWith("healthy: "));
-  const ProcessResult idle = run("health --mapping --timeout 30" + on_domain());
+  const ProcessResult idle = run("health --mapping" + patiently() + on_domain());
   EXPECT_EQ(idle.exit_code, 1);
   EXPECT_THAT(idle.out, HasSubstr("unhealthy: no scans arrive"));
   EXPECT_EQ(server.stop(), 0);
@@ -229,11 +225,10 @@ TEST_F(OperationTest, ADiskWithoutRoomIsUnhealthyUntilThereIsSome) {
   };
   const auto becomes = [&](int exit_code) {
     ProcessResult health;
-    for (int tries = 0; tries < 60; ++tries) {
-      health = run("health --timeout 30" + on_domain());
-      if (health.exit_code == exit_code) return health.out;
-    }
-    ADD_FAILURE() << health.out;
+    EXPECT_TRUE(eventually([&] {
+      health = run("health" + patiently() + on_domain());
+      return health.exit_code == exit_code;
+    })) << health.out;
     return health.out;
   };
   becomes(0);
@@ -295,10 +290,9 @@ TEST_F(OperationTest, SavesTheMapWithinWhatDockerWaits) {
   BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
   ASSERT_TRUE(answers()) << content("server.log");
   BackgroundProcess replay(
-      stillmap_program() + " replay " + path("city") + " --lossless --timeout 30" + on_domain(),
+      stillmap_program() + " replay " + path("city") + " --lossless" + patiently() + on_domain(),
       folder_ / "replay.log");
-  while (run("health --mapping" + on_domain()).exit_code != 0) {
-  }
+  ASSERT_TRUE(eventually([&] { return run("health --mapping" + on_domain()).exit_code == 0; }));
   const auto began = std::chrono::steady_clock::now();
   EXPECT_EQ(server.stop(), 0) << content("server.log");
   EXPECT_LT(std::chrono::steady_clock::now() - began, std::chrono::seconds(10 * slowdown));
@@ -316,8 +310,8 @@ class NotifySocket {
     address.sun_family = AF_UNIX;
     file.copy(address.sun_path, sizeof address.sun_path - 1);
     EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&address), sizeof address), 0);
-    const timeval patience{.tv_sec = 60, .tv_usec = 0};
-    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &patience, sizeof patience);
+    const timeval time{.tv_sec = patience.count(), .tv_usec = 0};
+    setsockopt(socket_, SOL_SOCKET, SO_RCVTIMEO, &time, sizeof time);
   }
   ~NotifySocket() { close(socket_); }
   NotifySocket(const NotifySocket&) = delete;

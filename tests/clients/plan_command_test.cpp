@@ -70,19 +70,18 @@ TEST_F(PlanCommandTest, FollowsTheMapOfAServerAndPlansAgainWhenItGrows) {
   BackgroundProcess server(stillmap_server_program() + " --delivery every --map-file " +
                                path("server.stillmap") + on_domain,
                            folder_ / "server.log");
-  ASSERT_EQ(run("status --timeout 30" + on_domain).exit_code, 0) << content("server.log");
-  BackgroundProcess planner(stillmap_program() +
-                                " plan --profile tracked --from 1,0,0 --to 6,0 --follow --count 2 "
-                                "--duration 60 --json --output " +
-                                path("path.json") + on_domain,
-                            folder_ / "plan.log");
-  ASSERT_EQ(run("replay " + path("city") + " --lossless --timeout 30" + on_domain).exit_code, 0);
+  ASSERT_EQ(run("status" + patiently() + on_domain).exit_code, 0) << content("server.log");
+  BackgroundProcess planner(
+      stillmap_program() + " plan --profile tracked --from 1,0,0 --to 6,0 --follow --count 2" +
+          patiently("--duration") + " --json --output " + path("path.json") + on_domain,
+      folder_ / "plan.log");
+  ASSERT_EQ(run("replay " + path("city") + " --lossless" + patiently() + on_domain).exit_code, 0);
   EXPECT_EQ(planner.wait(), 0) << content("plan.log");
   const nlohmann::json plan = nlohmann::json::parse(content("path.json"));
   EXPECT_EQ(plan.at("status"), "found");
   EXPECT_FALSE(plan.at("cause").get<std::string>().empty());
   // From the robot's pose at the end of the replay.
-  const ProcessResult again = run("plan --profile tracked --to 1,0 --timeout 30" + on_domain);
+  const ProcessResult again = run("plan --profile tracked --to 1,0" + patiently() + on_domain);
   EXPECT_EQ(again.exit_code, 0) << again.out << again.err;
   EXPECT_EQ(server.stop(), 0);
 }

@@ -25,22 +25,21 @@ class RecordTest : public CommandTest {
   /// Whether the bag that is being recorded comes to hold so many messages of a topic.
   [[nodiscard]] bool comes_to_hold(const std::string& bag, const std::string& topic,
                                    std::uint64_t messages) const {
-    for (int i = 0; i < 600; ++i) {
+    const auto holds = [&] {
       try {
-        if (messages_of(dds::Bag(path(bag)), topic) >= messages) return true;
+        return messages_of(dds::Bag(path(bag)), topic) >= messages;
       } catch (const DatasetError&) {
-        // Not made yet.
+        return false;  // Not made yet.
       }
-      std::this_thread::sleep_for(100ms);
-    }
-    return false;
+    };
+    return eventually(holds, patience, 100ms);
   }
 
   /// Begins when the server and, where there is one, the recorder listen.
   [[nodiscard]] nlohmann::json replay(const std::string& source, int subscribers,
                                       const std::string& out) const {
     const ProcessResult result =
-        run("replay " + source + " --lossless --json --timeout 30" + " --subscribers " +
+        run("replay " + source + " --lossless --json" + patiently() + " --subscribers " +
             std::to_string(subscribers) + on_domain() + " --out " + path(out));
     EXPECT_EQ(result.exit_code, 0) << result.err << content("server.log");
     return nlohmann::json::parse(result.out, nullptr, false);
@@ -59,7 +58,7 @@ TEST_F(RecordTest, ARecordedReplayIsTheRecordingAgain) {
   simulate("city", scans, " --imu");
   {
     BackgroundProcess server(server_command(), folder_ / "server.log");
-    ASSERT_EQ(run("status --timeout 30" + on_domain()).exit_code, 0) << content("server.log");
+    ASSERT_EQ(run("status" + patiently() + on_domain()).exit_code, 0) << content("server.log");
     BackgroundProcess record(stillmap_program() + " record " + path("bag") + on_domain(),
                              folder_ / "record.log");
     // The recorder has discovered the server, which publishes its status each second.
@@ -96,7 +95,7 @@ TEST_F(RecordTest, ARecordedReplayIsTheRecordingAgain) {
 
   // A new server makes the same of what was recorded.
   BackgroundProcess server(server_command(), folder_ / "server.log");
-  ASSERT_EQ(run("status --timeout 30" + on_domain()).exit_code, 0) << content("server.log");
+  ASSERT_EQ(run("status" + patiently() + on_domain()).exit_code, 0) << content("server.log");
   EXPECT_EQ(replay(path("bag") + " --topic-in points", 1, "second.txt").at("mapped"), scans);
   EXPECT_EQ(content("second.txt"), content("first.txt"));
 }

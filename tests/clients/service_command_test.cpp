@@ -55,7 +55,7 @@ TEST_F(ServiceCommandTest, RefusesWrongRegionsClassesAndFilesBeforeAsking) {
 TEST_F(ServiceCommandTest, ReplayOverDdsGivesThePosesThatMapGives) {
   simulate("city", 8);
   BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
-  const ProcessResult replay = run("replay " + path("city") + " --lossless --json --timeout 30" +
+  const ProcessResult replay = run("replay " + path("city") + " --lossless --json" + patiently() +
                                    on_domain() + " --out " + path("replayed.txt"));
   ASSERT_EQ(replay.exit_code, 0) << replay.err << content("server.log");
   const nlohmann::json json = nlohmann::json::parse(replay.out);
@@ -77,7 +77,7 @@ TEST_F(ServiceCommandTest, ReplayWorksOverTcp) {
   std::ofstream(path("wan.yaml")) << "transport: tcp\nserver_port: " << 31000 + domain_ << "\n";
   const std::string over_tcp = " --dds-profile " + path("wan.yaml");
   BackgroundProcess server(server_command("--delivery every") + over_tcp, folder_ / "server.log");
-  const ProcessResult replay = run("replay " + path("city") + " --lossless --json --timeout 60" +
+  const ProcessResult replay = run("replay " + path("city") + " --lossless --json" + patiently() +
                                    over_tcp + " --peer 127.0.0.1" + on_domain());
   ASSERT_EQ(replay.exit_code, 0) << replay.err << content("server.log");
   EXPECT_EQ(nlohmann::json::parse(replay.out).at("mapped"), 4);
@@ -86,13 +86,11 @@ TEST_F(ServiceCommandTest, ReplayWorksOverTcp) {
 TEST_F(ServiceCommandTest, WatchFollowsThePosesOfAReplay) {
   simulate("city", 8);
   BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
-  ASSERT_EQ(run("status --timeout 30" + on_domain()).exit_code, 0) << content("server.log");
-  BackgroundProcess watch(stillmap_program() + " watch --json --count 4 --duration 60 --out " +
-                              path("watched.tum") + on_domain(),
+  ASSERT_EQ(run("status" + patiently() + on_domain()).exit_code, 0) << content("server.log");
+  BackgroundProcess watch(stillmap_program() + " watch --json --count 4" + patiently("--duration") +
+                              " --out " + path("watched.tum") + on_domain(),
                           folder_ / "watch.log");
-  while (content("watch.log").find("\"status\"") == std::string::npos) {
-    ASSERT_EQ(run("status" + on_domain()).exit_code, 0);
-  }
+  ASSERT_TRUE(comes_to_contain("watch.log", "\"status\""));
   ASSERT_EQ(run("replay " + path("city") + " --rate 4" + on_domain()).exit_code, 0);
   EXPECT_EQ(watch.wait(), 0) << content("watch.log");
   EXPECT_EQ(line_count("watched.tum"), 1U + 4U);
@@ -103,7 +101,7 @@ TEST_F(ServiceCommandTest, LosslessReplayRefusesAServerThatDropsScans) {
   simulate("city", 2);
   BackgroundProcess server(server_command("--delivery latest"), folder_ / "server.log");
   const ProcessResult replay =
-      run("replay " + path("city") + " --lossless --timeout 30" + on_domain());
+      run("replay " + path("city") + " --lossless" + patiently() + on_domain());
   EXPECT_EQ(replay.exit_code, 2);
   EXPECT_THAT(replay.err, HasSubstr("--delivery every"));
 }
@@ -111,7 +109,7 @@ TEST_F(ServiceCommandTest, LosslessReplayRefusesAServerThatDropsScans) {
 TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
   simulate("city", 5);
   BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
-  ASSERT_EQ(run("replay " + path("city") + " --lossless --timeout 30" + on_domain()).exit_code, 0)
+  ASSERT_EQ(run("replay " + path("city") + " --lossless" + patiently() + on_domain()).exit_code, 0)
       << content("server.log");
 
   const nlohmann::json status = nlohmann::json::parse(run("status --json" + on_domain()).out);
@@ -144,8 +142,9 @@ TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
   EXPECT_THAT(unknown.err, HasSubstr("ask for everything"));
 
   const std::string tiles = std::to_string(way.at("tiles").size());
-  const ProcessResult watched = run("watch-tiles --json --duration 30 --count " + tiles +
-                                    " --corridor " + path("way.txt") + " --width 6" + on_domain());
+  const ProcessResult watched =
+      run("watch-tiles --json" + patiently("--duration") + " --count " + tiles + " --corridor " +
+          path("way.txt") + " --width 6" + on_domain());
   EXPECT_EQ(watched.exit_code, 0) << watched.err;
   EXPECT_THAT(watched.out, HasSubstr("\"change\":\"appeared\""));
 
@@ -167,7 +166,7 @@ TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
 TEST_F(ServiceCommandTest, AsksARunningServerWhereARobotCanGo) {
   simulate("city", 5);
   BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
-  ASSERT_EQ(run("replay " + path("city") + " --lossless --timeout 30" + on_domain()).exit_code, 0)
+  ASSERT_EQ(run("replay " + path("city") + " --lossless" + patiently() + on_domain()).exit_code, 0)
       << content("server.log");
   // The area follows the map within a moment.
   ProcessResult nearest;

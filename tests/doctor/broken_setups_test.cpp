@@ -10,6 +10,7 @@
 #include "nav_msgs.h"
 #include "sensor_msgs.h"
 #include "tests/clients/process.hpp"
+#include "tests/eventually.hpp"
 #include "tests/scratch_folder.hpp"
 #include "tests/server/room_scans.hpp"
 
@@ -49,9 +50,8 @@ class BrokenSetup : public testing::Test {
                         (folder_ / "server.yaml").string() + " --domain " +
                         std::to_string(domain_) + " " + more,
                     folder_ / "server.log");
-    while (content_of(folder_ / "server.log").find("ready") == std::string::npos) {
-      std::this_thread::sleep_for(std::chrono::milliseconds(50));
-    }
+    const auto log = [this] { return content_of(folder_ / "server.log"); };
+    ASSERT_TRUE(eventually([&] { return log().find("ready") != std::string::npos; })) << log();
   }
 
   /// Problems that doctor finds, and its exit code in `exit_code_`.

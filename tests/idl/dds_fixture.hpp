@@ -9,7 +9,7 @@
 
 #include "idl/dds/dds_options.hpp"
 #include "sensor_msgs.h"
-#include "tests/slowdown.hpp"
+#include "tests/eventually.hpp"
 
 namespace stillmap::dds {
 

@@ -178,11 +178,8 @@ TEST(Reader, TellsOfPublishersThatDoNotFit) {
   Participant participant(loopback(false));
   Reader<PointCloud2> reader(participant, "rt/points", {.reliable = true});
   Writer<PointCloud2> writer(participant, "rt/points", {.reliable = false});
-  const auto deadline = std::chrono::steady_clock::now() + discovery_timeout;
-  while (reader.events().incompatible_writers() == 0 &&
-         std::chrono::steady_clock::now() < deadline) {
-    std::this_thread::sleep_for(10ms);
-  }
+  EXPECT_TRUE(test::eventually([&] { return reader.events().incompatible_writers() > 0; },
+                               discovery_timeout));
   EXPECT_EQ(reader.events().incompatible_writers(), 1);
   EXPECT_EQ(reader.events().matched_writers(), 0);
 }

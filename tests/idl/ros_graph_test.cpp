@@ -4,7 +4,6 @@
 #include <fastdds/dds/domain/DomainParticipant.hpp>
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
-#include <thread>
 
 #include "idl/dds/qos.hpp"
 #include "idl/dds/reader.hpp"
@@ -62,23 +61,22 @@ class RosNode {
   template <typename Info>
   std::optional<int> wait_for(std::size_t writers) {
     int unreadable = 0;
-    const auto deadline = std::chrono::steady_clock::now() + discovery_timeout;
-    while (std::chrono::steady_clock::now() < deadline) {
-      SerializedSample bytes;
-      SampleInfo sample;
-      if (reader_->take_next_sample(&bytes, &sample) != ReturnCode::RETCODE_OK) {
-        std::this_thread::sleep_for(5ms);
-        continue;
+    SerializedSample bytes;
+    SampleInfo sample;
+    const auto has_come = [&] {
+      while (reader_->take_next_sample(&bytes, &sample) == ReturnCode::RETCODE_OK) {
+        Info info;
+        if (!sample.valid_data) continue;
+        if (!from_bytes(type_support<Info>(), bytes, &info) || !is_of_mapper(info)) {
+          ++unreadable;
+        } else if (info.node_entities_info_seq()[0].writer_gid_seq().size() == writers) {
+          return true;
+        }
       }
-      Info info;
-      if (!sample.valid_data) continue;
-      if (!from_bytes(type_support<Info>(), bytes, &info) || !is_of_mapper(info)) {
-        ++unreadable;
-      } else if (info.node_entities_info_seq()[0].writer_gid_seq().size() == writers) {
-        return unreadable;
-      }
-    }
-    return std::nullopt;
+      return false;
+    };
+    if (!test::eventually(has_come, discovery_timeout, 5ms)) return std::nullopt;
+    return unreadable;
   }
 
  private:
@@ -222,13 +220,8 @@ TEST_F(RosGraphOfANode, TellsOtherNodesWhoIsWho) {
       return peer.ros_nodes == std::vector{name} && display_name(peer) == name;
     });
   };
-  const auto deadline = std::chrono::steady_clock::now() + discovery_timeout;
-  while (std::chrono::steady_clock::now() < deadline &&
-         !(is_known(node_, "/planner") && is_known(planner, "/mapper"))) {
-    std::this_thread::sleep_for(20ms);
-  }
-  EXPECT_TRUE(is_known(node_, "/planner"));
-  EXPECT_TRUE(is_known(planner, "/mapper"));
+  EXPECT_TRUE(test::eventually([&] { return is_known(node_, "/planner"); }, discovery_timeout));
+  EXPECT_TRUE(test::eventually([&] { return is_known(planner, "/mapper"); }, discovery_timeout));
 }
 
 TEST(DisplayName, PrefersNodesAndDoesNotTakeAnEnclaveForAName) {
@@ -249,15 +242,15 @@ TEST(TypeHash, IsAnnouncedByEveryEndpointOfARosType) {
   const Reader<PointCloud2> reader(node, "rt/points", {});
   const std::string wanted =
       "typehash=RIHS01_9198cabf7da3796ae6fe19c4cb3bdd3525492988c70522628af5daa124bae2b5;";
-  const auto deadline = std::chrono::steady_clock::now() + discovery_timeout;
   std::vector<std::string> found;
-  while (found.size() < 2 && std::chrono::steady_clock::now() < deadline) {
-    std::this_thread::sleep_for(20ms);
+  const auto finds_both = [&] {
     found.clear();
     for (const RemoteParticipant& peer : watcher.remote_participants()) {
       for (const Endpoint& endpoint : peer.endpoints) found.push_back(endpoint.user_data);
     }
-  }
+    return found.size() >= 2;
+  };
+  EXPECT_TRUE(test::eventually(finds_both, discovery_timeout));
   EXPECT_EQ(found, (std::vector<std::string>{wanted, wanted}));
 }
 

@@ -4,7 +4,6 @@
 
 #include <csignal>
 #include <fstream>
-#include <thread>
 
 #include "idl/dds/service_client.hpp"
 #include "idl/dds/service_server.hpp"
@@ -22,10 +21,12 @@ using stillmap_msgs::srv::SaveMap_Response;
 
 constexpr auto large_service = "stillmap/save_map";
 constexpr int stopped_requests = 90;
+/// Of these; for the others there is room, or their replies are dropped later.
+constexpr int least_refused = 40;
 constexpr std::size_t large_reply_bytes = 4'000'000;
 
-/// Asks 90 times, stops itself, and looks at the replies when it goes on: how many came, and how
-/// many of those say why there is no other.
+/// Asks 90 times, stops itself, and looks at the replies when it goes on, until enough of them say
+/// why there is no other.
 class StoppingClient {
  public:
   explicit StoppingClient(std::uint32_t domain_id)
@@ -75,7 +76,7 @@ class StoppingClient {
     int refused = 0;
     SerializedSample bytes;
     eprosima::fastdds::dds::SampleInfo info;
-    while (replies.take(bytes, info, {}, 2s)) {
+    while (refused < least_refused && replies.take(bytes, info, {}, discovery_timeout)) {
       SaveMap_Response reply;
       if (from_bytes(type_support<SaveMap_Response>(), bytes, &reply) &&
           reply.status().code() == 3 &&
@@ -116,8 +117,7 @@ TEST(SlowClient, ThatIsStoppedLosesAndIsToldAndNobodyElseNotices) {
     const auto found = counts.find(std::string("slow_client_") + large_service);
     return found == counts.end() ? std::uint64_t{0} : found->second;
   };
-  for (int i = 0; i < 500 && refused() < 40; ++i) std::this_thread::sleep_for(10ms);
-  EXPECT_GE(refused(), 40U);
+  EXPECT_TRUE(test::eventually([&] { return refused() >= least_refused; }, discovery_timeout));
   {
     Participant other_side(loopback(false));
     ServiceClient<SaveMap_Request, SaveMap_Response> other(other_side, large_service);
@@ -125,12 +125,12 @@ TEST(SlowClient, ThatIsStoppedLosesAndIsToldAndNobodyElseNotices) {
     for (int i = 0; i < 20; ++i) {
       const auto began = std::chrono::steady_clock::now();
       EXPECT_TRUE(other.call(SaveMap_Request(), discovery_timeout)) << i;
-      EXPECT_LT(std::chrono::steady_clock::now() - began, 1s) << i;
+      EXPECT_LT(std::chrono::steady_clock::now() - began, 2s * test::slowdown) << i;
     }
   }
   // All replies to both are 440 MB.
   EXPECT_LT(memory_in_use() - before, 220'000'000U);
-  EXPECT_GE(stopping.refused(), 40);
+  EXPECT_GE(stopping.refused(), least_refused);
 }
 
 }  // namespace

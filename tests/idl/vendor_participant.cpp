@@ -10,7 +10,6 @@
 #include <fastdds/dds/publisher/Publisher.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
-#include <thread>
 
 #include "idl/dds/service_identity.hpp"
 #include "tests/idl/dds_fixture.hpp"
@@ -82,16 +81,15 @@ ByteClient::ByteClient(VendorParticipant& peer, const std::string& service,
 }
 
 bool ByteClient::wait_for_server() const {
-  for (int tries = 0; tries < 2000; ++tries) {
+  const auto is_found = [this] {
     PublicationMatchedStatus requests;
     requests_->get_publication_matched_status(requests);
     SubscriptionMatchedStatus replies;
     replies.current_count = 1;
     if (replies_ != nullptr) replies_->get_subscription_matched_status(replies);
-    if (requests.current_count > 0 && replies.current_count > 0) return true;
-    std::this_thread::sleep_for(10ms);
-  }
-  return false;
+    return requests.current_count > 0 && replies.current_count > 0;
+  };
+  return test::eventually(is_found, discovery_timeout);
 }
 
 eprosima::fastrtps::rtps::SampleIdentity ByteClient::call(const SerializedSample& request,
@@ -109,16 +107,15 @@ eprosima::fastrtps::rtps::SampleIdentity ByteClient::call(const SerializedSample
 std::optional<ByteClient::Reply> ByteClient::receive(std::chrono::milliseconds timeout) {
   Reply reply;
   SampleInfo info;
-  const auto deadline = std::chrono::steady_clock::now() + timeout;
-  while (std::chrono::steady_clock::now() < deadline) {
+  const auto has_come = [&] {
     while (replies_->take_next_sample(&reply.bytes, &info) == ReturnCode::RETCODE_OK) {
-      if (!info.valid_data) continue;
-      reply.answered = info.related_sample_identity;
-      return reply;
+      if (info.valid_data) return true;
     }
-    std::this_thread::sleep_for(5ms);
-  }
-  return std::nullopt;
+    return false;
+  };
+  if (!test::eventually(has_come, timeout, 5ms)) return std::nullopt;
+  reply.answered = info.related_sample_identity;
+  return reply;
 }
 
 }  // namespace stillmap::dds

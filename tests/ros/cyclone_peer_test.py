@@ -1,6 +1,7 @@
 """The server and a Cyclone DDS program, as processes: topics, services and the ROS 2 graph.
 
 STILLMAP, STILLMAP_SERVER, CYCLONE_PEER: the programs. Without CYCLONE_PEER all is skipped.
+STILLMAP_SLOWDOWN: how many times as long the time limits are, as in tests/slowdown.hpp.
 """
 
 import math
@@ -17,6 +18,7 @@ import unittest
 from pathlib import Path
 
 SCANS = int(os.environ.get("STILLMAP_SCANS", "40"))
+SLOWDOWN = int(os.environ.get("STILLMAP_SLOWDOWN", "1"))
 NODE = "stillmap_server"
 WORDS_WITH_SPACES = re.compile(r"  (\w+)=")
 
@@ -65,7 +67,7 @@ class Peer:
             stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
 
     def report(self) -> Report:
-        text, _ = self._process.communicate(timeout=300)
+        text, _ = self._process.communicate(timeout=300 * SLOWDOWN)
         print(text, flush=True)
         if self._process.returncode != 0 and not self._may_fail:
             raise AssertionError(f"the peer failed:\n{text}")
@@ -198,7 +200,7 @@ class CyclonePeerTest(unittest.TestCase):
         for peer in cyclone:
             self.check_answers(peer.report())
         for process in fast:
-            process.communicate(timeout=120)
+            process.communicate(timeout=120 * SLOWDOWN)
             self.assertEqual(process.returncode, 0)
 
     def test_2_the_first_request_of_a_new_client_is_answered(self):
@@ -221,7 +223,7 @@ class CyclonePeerTest(unittest.TestCase):
 
     def test_3_the_graph_is_what_discovery_shows(self):
         self.server.send_signal(signal.SIGTERM)
-        self.assertEqual(self.server.wait(timeout=60), 0)
+        self.assertEqual(self.server.wait(timeout=60 * SLOWDOWN), 0)
         graph = self.watch.report()
         node, gone = graph.all("node")
         self.assertEqual((node["name"], node["user_data"]), (f"/{NODE}", "enclave=/;"))

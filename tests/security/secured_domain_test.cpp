@@ -114,7 +114,7 @@ TEST_F(SecuredDomain, IsDeafAndMuteToAnOutsider) {
   // The outsider sends first, so that it has all the time there is.
   ScanPublisher intruder(ScanPublisherOptions{.dds = dds({})});
   ScanPublisher sensor = publisher(identity("sensor"));
-  Client intruding = client({}, 1500ms);
+  Client intruding = client({}, 1500ms * slowdown);
   ASSERT_TRUE(intruder.publish(room_scan(0)));
   EXPECT_THAT(message_of<ServiceTimeout>([&] { (void)intruding.reset(); }),
               AllOf(HasSubstr("is secured"), HasSubstr("--security")));
@@ -171,7 +171,7 @@ TEST_F(SecuredDomain, RefusesAnotherAuthorityAndSaysSoOnBothSides) {
   const std::filesystem::path foreign = stranger();
   Client planner = client(identity("planner"));
   planner.wait_for_server(patience);
-  Client intruder = client(foreign, 3s);
+  Client intruder = client(foreign, 3s * slowdown);
   EXPECT_THAT(message_of<ServiceTimeout>([&] { (void)intruder.status(); }),
               HasSubstr("refuse each other"));
   EXPECT_TRUE(eventually([&] {

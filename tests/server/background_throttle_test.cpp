@@ -2,88 +2,103 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <memory>
+#include <cstdint>
 #include <optional>
 #include <thread>
+
+#include "tests/eventually.hpp"
+#include "tests/server/manual_clock.hpp"
 
 namespace stillmap::server {
 namespace {
 
 using namespace std::chrono_literals;
-using Clock = std::chrono::steady_clock;
+using Duration = std::chrono::duration<double>;
 
-/// Works and pauses for so long; returns the longest pause.
-Clock::duration max_delay(const ThrottleCallback& callback, Clock::duration duration) {
-  Clock::duration longest{};
-  const auto end = Clock::now() + duration;
-  while (Clock::now() < end) {
-    const auto began = Clock::now();
-    callback();
-    longest = std::max(longest, Clock::now() - began);
+/// A background thread that always has work, beside a scan that lasts until `end_scan`.
+class ThrottledWork {
+ public:
+  explicit ThrottledWork(SaturationPolicy policy)
+      : thread_([this, callback = make_throttle_callback(throttle_, policy, clock_)](
+                    const std::stop_token& stop) {
+          for (; !stop.stop_requested(); ++rounds_) callback();
+        }) {}
+  ~ThrottledWork() {
+    if (scan_) end_scan();
   }
-  return longest;
-}
+  ThrottledWork(const ThrottledWork&) = delete;
+  ThrottledWork& operator=(const ThrottledWork&) = delete;
 
-TEST(BackgroundThrottle, HoldsUpBackgroundWorkWhileAScanIsInWork) {
-  BackgroundThrottle throttle;
-  const ThrottleCallback callback =
-      make_throttle_callback(throttle, SaturationPolicy::run_at_ten_percent);
-  const BackgroundThrottle::ScanInProgress scan(throttle);
-  EXPECT_FALSE(throttle.is_idle());
-  EXPECT_GE(max_delay(callback, 200ms), 15ms);
+  /// Waits until the thread is held up; returns whether it is.
+  [[nodiscard]] bool is_held_up() { return clock_.wait_for_sleeper().has_value(); }
+  /// So much time passes while it is held up; returns whether it still is.
+  [[nodiscard]] bool is_held_up_after(Duration time) {
+    const std::uint64_t before = rounds_;
+    clock_.advance(time);
+    return is_held_up() && rounds_ == before;
+  }
+  /// How long it is held up, once it is; a minute for longer.
+  [[nodiscard]] Duration pause() {
+    Duration waited{0};
+    const std::uint64_t before = is_held_up() ? rounds_.load() : 0;
+    for (auto left = clock_.wait_for_sleeper(); left && waited < 60s;
+         left = clock_.wait_for_sleeper()) {
+      if (rounds_ != before) return waited;
+      clock_.advance(*left);
+      waited += *left;
+    }
+    return waited;
+  }
+  void end_scan() {
+    // It must sleep before the clock's last step: nobody would wake it after that.
+    EXPECT_TRUE(is_held_up());
+    scan_.reset();
+    clock_.advance(1h);
+  }
+  [[nodiscard]] std::uint64_t rounds() const { return rounds_; }
+
+ private:
+  BackgroundThrottle throttle_;
+  std::optional<BackgroundThrottle::ScanInProgress> scan_{throttle_};
+  test::ManualClock clock_;
+  std::atomic<std::uint64_t> rounds_ = 0;
+  // Last: ends before what it uses is gone.
+  std::jthread thread_;
+};
+
+TEST(BackgroundThrottle, LeavesATenthOfTheTimeWhereScansNeverEnd) {
+  ThrottledWork work(SaturationPolicy::run_at_ten_percent);
+  for (int i = 0; i < 3; ++i) {
+    const Duration pause = work.pause();
+    // Nine times the 2 ms of work that it is allowed at least.
+    EXPECT_GE(pause, 17.9ms);
+    EXPECT_LE(pause, 1001ms);
+  }
 }
 
 TEST(BackgroundThrottle, LeavesNoTimeWhereScansNeverEndToWhoWaits) {
-  BackgroundThrottle throttle;
-  auto scan = std::make_unique<BackgroundThrottle::ScanInProgress>(throttle);
-  std::atomic<std::uint64_t> rounds = 0;
-  std::jthread background([&, callback = make_throttle_callback(throttle, SaturationPolicy::wait)](
-                              const std::stop_token& stop) {
-    for (; !stop.stop_requested(); ++rounds) callback();
-  });
-  // It may take a while to work at all; then it rests for longer than who works a tenth of the
-  // time.
-  const auto deadline = Clock::now() + 60s;
-  std::uint64_t before = 0;
-  do {
-    before = rounds;
-    std::this_thread::sleep_for(1200ms);
-  } while ((rounds == 0 || rounds != before) && Clock::now() < deadline);
-  EXPECT_EQ(rounds, before);
-  scan.reset();
-  while (rounds == before && Clock::now() < deadline) std::this_thread::sleep_for(1ms);
-  EXPECT_GT(rounds, before);
-}
-
-TEST(BackgroundThrottle, LeavesSomeTimeWhereScansNeverEnd) {
-  BackgroundThrottle throttle;
-  const ThrottleCallback callback =
-      make_throttle_callback(throttle, SaturationPolicy::run_at_ten_percent);
-  const BackgroundThrottle::ScanInProgress scan(throttle);
-  // Else it would not return at all.
-  EXPECT_LT(max_delay(callback, 200ms), 10s);
+  ThrottledWork work(SaturationPolicy::wait);
+  ASSERT_TRUE(work.is_held_up());
+  for (const Duration time : {Duration(0.1s), Duration(2s), Duration(24h)}) {
+    EXPECT_TRUE(work.is_held_up_after(time)) << time.count() << " s";
+  }
 }
 
 TEST(BackgroundThrottle, LetsBackgroundWorkGoOnWhenTheScanIsDone) {
-  BackgroundThrottle throttle;
-  const ThrottleCallback callback =
-      make_throttle_callback(throttle, SaturationPolicy::run_at_ten_percent);
-  std::optional<BackgroundThrottle::ScanInProgress> scan(throttle);
-  static_cast<void>(max_delay(callback, 50ms));
-  scan.reset();
-  EXPECT_TRUE(throttle.is_idle());
-  int calls = 0;
-  const auto end = Clock::now() + 100ms;
-  for (; Clock::now() < end; ++calls) callback();
-  EXPECT_GT(calls, 100) << "each call is only a look at the clock";
+  for (const auto policy : {SaturationPolicy::wait, SaturationPolicy::run_at_ten_percent}) {
+    ThrottledWork work(policy);
+    work.end_scan();
+    const std::uint64_t before = work.rounds();
+    EXPECT_TRUE(test::eventually([&] { return work.rounds() > before + 1000; }));
+  }
 }
 
 TEST(BackgroundThrottle, HoldsUpNobodyAtTheEnd) {
   BackgroundThrottle throttle;
   const BackgroundThrottle::ScanInProgress scan(throttle);
+  EXPECT_FALSE(throttle.is_idle());
   throttle.release();
   EXPECT_TRUE(throttle.is_idle());
 }

@@ -152,15 +152,13 @@ class LateReader {
 
   /// Of the first; 0 when none comes for so long.
   [[nodiscard]] std::size_t first_bytes(std::chrono::milliseconds timeout) {
-    const auto deadline = std::chrono::steady_clock::now() + timeout;
-    while (std::chrono::steady_clock::now() < deadline) {
-      {
-        const std::scoped_lock lock(mutex_);
-        if (!bytes_.empty()) return bytes_.front();
-      }
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    }
-    return 0;
+    std::size_t first = 0;
+    const auto has_come = [&] {
+      const std::scoped_lock lock(mutex_);
+      if (!bytes_.empty()) first = bytes_.front();
+      return !bytes_.empty();
+    };
+    return eventually(has_come, timeout) ? first : 0;
   }
 
  private:
@@ -174,13 +172,12 @@ TEST_F(OccupancyService, WhoComesLateGetsTheOctreeAsItIsNow) {
   EXPECT_EQ(early_bytes, client_.octomap(false).bytes.size());
   drive(publisher_, 8, 60);
   ASSERT_TRUE(wait_for_scans(client_, 60));
-  const auto is_settled = [&] {
-    const std::size_t now_bytes = client_.octomap(false).bytes.size();
-    std::this_thread::sleep_for(std::chrono::milliseconds(500));
-    return now_bytes != early_bytes && now_bytes == client_.octomap(false).bytes.size();
-  };
-  ASSERT_TRUE(eventually(is_settled));
-  EXPECT_EQ(LateReader(client_).first_bytes(patience), client_.octomap(false).bytes.size());
+  ASSERT_TRUE(eventually([&] {
+    return scans_in_octree() + client_.status().counter("occupancy_scans_dropped") == 60;
+  }));
+  const std::size_t now_bytes = client_.octomap(false).bytes.size();
+  EXPECT_NE(now_bytes, early_bytes);
+  EXPECT_EQ(LateReader(client_).first_bytes(patience), now_bytes);
 }
 
 TEST_F(OccupancyService, WhoComesLateGetsNoOctreeOfAMapThatIsNoMore) {
@@ -189,7 +186,8 @@ TEST_F(OccupancyService, WhoComesLateGetsNoOctreeOfAMapThatIsNoMore) {
   const std::size_t old_bytes = stays.first_bytes(patience);
   ASSERT_GT(old_bytes, 100U);
   static_cast<void>(client_.reset());
-  std::this_thread::sleep_for(std::chrono::milliseconds(500));
+  // Long enough for the old octree to be withdrawn, too short for a new one to replace it.
+  std::this_thread::sleep_for(std::chrono::milliseconds(500 * slowdown));
   EXPECT_LT(LateReader(client_).first_bytes(std::chrono::milliseconds(2000)), old_bytes);
 }
 

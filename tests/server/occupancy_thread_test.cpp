@@ -4,10 +4,9 @@
 
 #include <condition_variable>
 #include <mutex>
-#include <thread>
 
+#include "tests/eventually.hpp"
 #include "tests/server/room_scans.hpp"
-#include "tests/slowdown.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -16,7 +15,6 @@ using namespace std::chrono_literals;
 
 // Else it would wait for gaps in what other tests do on this machine.
 constexpr auto scheduling = server::BackgroundScheduling::normal;
-constexpr auto patience = 60s * slowdown;
 
 server::OccupancyScan room(int index) {
   auto labelled = std::make_shared<LabelledScan>();
@@ -35,11 +33,7 @@ class OccupancyThreadTest : public testing::Test {
  protected:
   /// Waits until the thread has done so many jobs.
   [[nodiscard]] static bool done(const server::OccupancyThread& thread, std::uint64_t jobs) {
-    const auto deadline = std::chrono::steady_clock::now() + patience;
-    while (thread.changes() < jobs && std::chrono::steady_clock::now() < deadline) {
-      std::this_thread::sleep_for(5ms);
-    }
-    return thread.changes() == jobs;
+    return eventually([&] { return thread.changes() >= jobs; }) && thread.changes() == jobs;
   }
   [[nodiscard]] static BoxOccupancy all_of(const server::OccupancyThread& thread) {
     const Eigen::Vector3d far = Eigen::Vector3d::Constant(500.0);

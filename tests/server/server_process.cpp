@@ -7,7 +7,6 @@
 
 #include <fstream>
 #include <stdexcept>
-#include <thread>
 
 #include "tests/idl/dds_fixture.hpp"
 #include "tests/server/room_scans.hpp"
@@ -15,8 +14,6 @@
 extern char** environ;
 
 namespace stillmap::test {
-
-using namespace std::chrono_literals;
 
 ServerProcess::ServerProcess(const std::vector<std::string>& arguments) {
   std::vector<std::string> words = {STILLMAP_SERVER};
@@ -38,12 +35,8 @@ ServerProcess::~ServerProcess() {
 void ServerProcess::send(int signal) const { kill(pid_, signal); }
 
 int ServerProcess::wait_for_exit(std::chrono::seconds timeout) {
-  const auto deadline = std::chrono::steady_clock::now() + timeout;
   int status = 0;
-  while (waitpid(pid_, &status, WNOHANG) == 0) {
-    if (std::chrono::steady_clock::now() > deadline) return -2;
-    std::this_thread::sleep_for(10ms);
-  }
+  if (!eventually([&] { return waitpid(pid_, &status, WNOHANG) != 0; }, timeout)) return -2;
   pid_ = 0;
   return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
 }
@@ -75,15 +68,6 @@ ClientOptions ServiceSetup::client() const {
 
 ScanPublisherOptions ServiceSetup::publisher(bool lossless) const {
   return {.dds = dds(), .lossless = lossless};
-}
-
-bool eventually(const std::function<bool()>& condition) {
-  const auto deadline = std::chrono::steady_clock::now() + patience;
-  while (!condition()) {
-    if (std::chrono::steady_clock::now() > deadline) return false;
-    std::this_thread::sleep_for(20ms);
-  }
-  return true;
 }
 
 void drive(ScanPublisher& publisher, int first, int last) {

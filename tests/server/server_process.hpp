@@ -4,14 +4,13 @@
 
 #include <chrono>
 #include <filesystem>
-#include <functional>
 #include <string>
 #include <vector>
 
 #include "clients/library/client.hpp"
 #include "clients/library/scan_publisher.hpp"
+#include "tests/eventually.hpp"
 #include "tests/scratch_folder.hpp"
-#include "tests/slowdown.hpp"
 
 namespace stillmap::test {
 
@@ -52,12 +51,6 @@ class ServiceSetup {
  private:
   ScratchFolder folder_;
 };
-
-/// The longest that a loaded machine may need for anything here.
-inline constexpr std::chrono::seconds patience{60 * slowdown};
-
-/// Waits until `condition` holds; false after `patience`.
-[[nodiscard]] bool eventually(const std::function<bool()>& condition);
 
 /// Publishes scans `first` .. `last` - 1 of the room without losing one.
 void drive(ScanPublisher& publisher, int first, int last);

@@ -4,9 +4,9 @@
 
 #include "server/mapping/mapping_thread.hpp"
 #include "server/publishers/status_publisher.hpp"
+#include "tests/eventually.hpp"
 #include "tests/server/room_scans.hpp"
 #include "tests/server/slow_segmenter.hpp"
-#include "tests/slowdown.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -53,10 +53,10 @@ class SlowSegmentation : public testing::Test {
     queue_.push_dropping_oldest({test::room_scan(next_scan_++), "lidar", Clock::now()});
   }
   void work_off() const {
-    while (status().counter("scans_mapped") + status().dropped() <
-           static_cast<std::uint64_t>(next_scan_)) {
-      std::this_thread::sleep_for(5ms);
-    }
+    EXPECT_TRUE(test::eventually([this] {
+      const dds::ServerStatus now = status();
+      return now.counter("scans_mapped") + now.dropped() >= static_cast<std::uint64_t>(next_scan_);
+    }));
   }
   [[nodiscard]] dds::ServerStatus status() const {
     return ServerReport(

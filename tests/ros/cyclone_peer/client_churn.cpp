@@ -8,6 +8,7 @@
 #include "tests/ros/cyclone_peer/commands.hpp"
 #include "tests/ros/cyclone_peer/report.hpp"
 #include "tests/ros/cyclone_peer/rmw_client.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::peer {
 
@@ -27,12 +28,12 @@ int ask_once_each(const ServerAddress& address, const std::string& service, cons
     std::this_thread::sleep_for(pause);
     const Participant participant(address.domain_id);
     RmwClient<Request, Reply> client(participant, address.server + "/" + service);
-    if (!client.wait_for_server(30s)) throw std::runtime_error("no server found");
+    if (!client.wait_for_server(30s * test::slowdown)) throw std::runtime_error("no server found");
     const auto began = std::chrono::steady_clock::now();
     const auto handle = [&](const Reply& reply) {
       largest_bytes = std::max(largest_bytes, bytes_of(reply));
     };
-    if (!client.call(request, handle, 5s)) continue;
+    if (!client.call(request, handle, 5s * test::slowdown)) continue;
     const auto took = std::chrono::steady_clock::now() - began;
     times_ms.push_back(std::chrono::duration<double, std::milli>(took).count());
   }

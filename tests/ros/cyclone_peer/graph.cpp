@@ -8,6 +8,7 @@
 #include "tests/ros/cyclone_peer/commands.hpp"
 #include "tests/ros/cyclone_peer/endpoints.hpp"
 #include "tests/ros/cyclone_peer/report.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::peer {
 namespace {
@@ -16,9 +17,9 @@ using namespace std::chrono_literals;
 using Announcement = rmw_dds_common_msg_dds__ParticipantEntitiesInfo_;
 using Guid = std::array<std::uint8_t, 16>;
 
-constexpr auto discovery_timeout = 120s;
+constexpr auto discovery_timeout = 120s * test::slowdown;
 // The server stays while all other tests ask it.
-constexpr auto run_timeout = 500s;
+constexpr auto run_timeout = 500s * test::slowdown;
 constexpr auto announcements = "ros_discovery_info";
 
 template <typename Bytes>
@@ -177,7 +178,7 @@ int watch_graph(const ServerAddress& address, const std::string& name) {
         last_news = std::chrono::steady_clock::now();
       }
     });
-    return node && std::chrono::steady_clock::now() - last_news > 2s;
+    return node && std::chrono::steady_clock::now() - last_news > 2s * test::slowdown;
   };
   if (!wait_until(is_quiet, discovery_timeout)) throw std::runtime_error("no node " + name);
   const auto writers = publications.of(node->participant);

@@ -6,6 +6,7 @@
 #include "tests/ros/cyclone_peer/commands.hpp"
 #include "tests/ros/cyclone_peer/endpoints.hpp"
 #include "tests/ros/cyclone_peer/report.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::peer {
 namespace {
@@ -19,7 +20,7 @@ using Status = stillmap_msgs_msg_dds__Status_;
 using TileInfo = stillmap_msgs_msg_dds__TileInfo_;
 using MapTile = stillmap_msgs_msg_dds__MapTile_;
 
-constexpr auto discovery_timeout = 60s;
+constexpr auto discovery_timeout = 60s * test::slowdown;
 constexpr Qos latched{.transient_local = true, .depth = 1};
 
 void print(const std::string& topic, const Cloud& cloud) {
@@ -106,7 +107,7 @@ std::map<TileKey, std::uint64_t> take_tiles(
       voxels[{sample.tile_x, sample.tile_y}] = voxels_of(sample);
       last_news = std::chrono::steady_clock::now();
     });
-    return !voxels.empty() && std::chrono::steady_clock::now() - last_news > 1s;
+    return !voxels.empty() && std::chrono::steady_clock::now() - last_news > 1s * test::slowdown;
   };
   static_cast<void>(wait_until(take, discovery_timeout));
   const auto sum = [](std::uint64_t total, const auto& tile) { return total + tile.second; };

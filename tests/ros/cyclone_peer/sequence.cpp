@@ -7,6 +7,7 @@
 #include "tests/ros/cyclone_peer/endpoints.hpp"
 #include "tests/ros/cyclone_peer/lidar.hpp"
 #include "tests/ros/cyclone_peer/report.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::peer {
 namespace {
@@ -18,7 +19,7 @@ using Transforms = tf2_msgs_msg_dds__TFMessage_;
 using Stamp = builtin_interfaces_msg_dds__Time_;
 
 constexpr auto scan_period = 100ms;
-constexpr auto discovery_timeout = 60s;
+constexpr auto discovery_timeout = 60s * test::slowdown;
 
 struct Position {
   double x = 0.0, y = 0.0, z = 0.0;

@@ -6,14 +6,20 @@
 #include "tests/ros/cyclone_peer/commands.hpp"
 #include "tests/ros/cyclone_peer/report.hpp"
 #include "tests/ros/cyclone_peer/rmw_client.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::peer {
 namespace {
 
 using namespace std::chrono_literals;
 
+<<<<<<< HEAD
 constexpr auto discovery_timeout = 60s;
 constexpr std::uint8_t format_version = 7;
+=======
+constexpr auto discovery_timeout = 60s * test::slowdown;
+constexpr std::uint8_t format_version = 6;
+>>>>>>> sleeps
 
 // C structures of idlc's want pointers that they could write through.
 std::string no_text;
