@@ -5,6 +5,9 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstdlib>
+#include <filesystem>
+#include <system_error>
 
 namespace stillmap::server {
 namespace {
@@ -32,6 +35,15 @@ bool use_scheduling(BackgroundScheduling scheduling) {
   // thread that holds one of them up for a moment holds up both.
   const sched_param none{};
   return sched_setscheduler(0, SCHED_IDLE, &none) == 0;
+}
+
+void end_idle_scheduling() {
+  std::error_code none;
+  for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task", none)) {
+    const auto id = static_cast<pid_t>(std::strtol(thread.path().filename().c_str(), nullptr, 10));
+    const sched_param normal{};
+    if (sched_getscheduler(id) == SCHED_IDLE) sched_setscheduler(id, SCHED_OTHER, &normal);
+  }
 }
 
 ThrottleCallback make_throttle_callback(const BackgroundThrottle& throttle,

@@ -13,6 +13,9 @@ enum class BackgroundScheduling { normal, idle };
 
 /// Applies it to the calling thread. False where the system refuses.
 bool use_scheduling(BackgroundScheduling scheduling);
+/// Gives all threads of this process that have idle scheduling the normal one. Where other programs
+/// keep all cores busy, a thread of idle priority needs minutes for what is left of its work.
+void end_idle_scheduling();
 
 /// Whether a scan is being mapped, so that background work waits for the time between scans. Idle
 /// scheduling alone is not enough: cores share caches, memory bandwidth and often arithmetic units,
@@ -36,8 +39,12 @@ class BackgroundThrottle {
 
   [[nodiscard]] bool is_idle() const { return scans_in_progress_ == 0 || is_released_; }
 
-  /// Lets all background work run from now on: the server ends, and its threads are to finish.
-  void release() { is_released_ = true; }
+  /// Lets all background work run from now on, with normal priority: the server ends, and its
+  /// threads are to finish.
+  void release() {
+    is_released_ = true;
+    end_idle_scheduling();
+  }
 
  private:
   std::atomic<bool> is_released_ = false;

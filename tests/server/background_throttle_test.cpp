@@ -1,6 +1,8 @@
 #include "server/threads/background_throttle.hpp"
 
 #include <gtest/gtest.h>
+#include <sched.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
@@ -101,6 +103,20 @@ TEST(BackgroundThrottle, HoldsUpNobodyAtTheEnd) {
   EXPECT_FALSE(throttle.is_idle());
   throttle.release();
   EXPECT_TRUE(throttle.is_idle());
+}
+
+TEST(BackgroundThrottle, ThreadsThatAreToEndRunBesideAllOthers) {
+  BackgroundThrottle throttle;
+  std::atomic<pid_t> thread_id = 0;
+  const std::jthread background([&](const std::stop_token& stop) {
+    ASSERT_TRUE(use_scheduling(BackgroundScheduling::idle));
+    thread_id = gettid();
+    while (!stop.stop_requested()) std::this_thread::sleep_for(1ms);
+  });
+  ASSERT_TRUE(test::eventually([&] { return thread_id != 0; }));
+  EXPECT_EQ(sched_getscheduler(thread_id), SCHED_IDLE);
+  throttle.release();
+  EXPECT_EQ(sched_getscheduler(thread_id), SCHED_OTHER);
 }
 
 }  // namespace

@@ -13,13 +13,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-<<<<<<< HEAD
-constexpr auto discovery_timeout = 60s;
-constexpr std::uint8_t format_version = 7;
-=======
 constexpr auto discovery_timeout = 60s * test::slowdown;
-constexpr std::uint8_t format_version = 6;
->>>>>>> sleeps
+constexpr std::uint8_t format_version = 7;
 
 // C structures of idlc's want pointers that they could write through.
 std::string no_text;
@@ -125,7 +120,8 @@ void ask_for_tiles(Questions& questions) {
                                                                  .min_x = region.min_x,
                                                                  .min_y = region.min_y,
                                                                  .max_x = region.max_x,
-                                                                 .max_y = region.max_y};
+                                                                 .max_y = region.max_y,
+                                                                 .continuation = no_text.data()};
   questions.call<stillmap_msgs_srv_dds__GetTileVersions_Request_, VersionsReply>(
       "get_tile_versions", versions, [&](Line& line, const VersionsReply& reply) {
         for (const auto& tile : elements(reply.tiles)) ids.push_back({tile.tile_x, tile.tile_y});
