@@ -25,6 +25,9 @@ struct OdometryResult {
   /// the normal equations of eq. (13).
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   OdometryHealth health = OdometryHealth::initialised;
+  /// The scan fits what was known before anything left the place in doubt. While it is false, scans
+  /// agree at most with one another, and are no part of the map.
+  bool is_confirmed = true;
   bool converged = false;
   int iterations = 0;
   int edge_correspondences = 0;

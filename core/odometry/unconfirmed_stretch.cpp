@@ -1,0 +1,99 @@
+#include "core/odometry/unconfirmed_stretch.hpp"
+
+#include "core/odometry/relocalization.hpp"
+
+namespace stillmap {
+namespace {
+
+/// Less of a scan than this in the trusted map neither confirms nor contradicts.
+constexpr double min_confirming_overlap = 0.3;
+constexpr double min_contradicting_overlap = 0.5;
+/// So many scans in a row contradict: one alone may be hidden by traffic.
+constexpr int contradicting_scans = 5;
+/// A pose that was followed is confirmed by the first scan that lies so near it in the trusted map
+/// [m, rad]: what it has slid since.
+constexpr double followed_distance_m = 1.0;
+constexpr double followed_angle_rad = 0.1;
+/// One that was looked for is confirmed by scans that each come to the place where the others have
+/// it [m, rad].
+constexpr double same_distance_m = 0.1;
+constexpr double same_angle_rad = 0.02;
+/// No farther off than this [m], a scan that fits as well as scans usually do is enough. Else it
+/// takes several in a row, while so much is driven [m]: facades repeat themselves, and eleven scans
+/// within 2 m have agreed on a wrong one.
+constexpr double near_jump_m = 3.0;
+constexpr int confirming_scans = 5;
+constexpr double confirming_path_m = 5.0;
+/// What agrees with nothing by then is looked for again.
+constexpr int scans_to_agree_in = 20;
+
+}  // namespace
+
+void UnconfirmedStretch::jump(double distance_m) {
+  has_jumped_ = true;
+  has_jumped_far_ |= distance_m > near_jump_m;
+  scans_since_jump_ = 0;
+}
+
+void UnconfirmedStretch::add_prior_map(std::span<const LabelledPoint> points_map) {
+  insert_prior_map(points_map, trusted_.map);
+}
+
+UnconfirmedStretch::Verdict UnconfirmedStretch::judge(const FeatureSets& features,
+                                                      const OdometryConfig& config,
+                                                      OdometryResult& found) {
+  ++scans_since_jump_;
+  if (found.health != OdometryHealth::good) {
+    count_agreeing(false, found.T_map_lidar.translation());
+    count_contradicting(false);
+    return is_overdue() ? Verdict::contradicted : Verdict::open;
+  }
+  OdometryResult in_trusted_map =
+      register_features(features, trusted_.map, found.T_map_lidar, config, found.sweep_correction);
+  if (in_trusted_map.health == OdometryHealth::good)
+    in_trusted_map = confirmed_by_points(in_trusted_map, features, trusted_.map, config);
+  const Verdict verdict = this->verdict(in_trusted_map, found);
+  if (verdict == Verdict::confirmed) found = in_trusted_map;
+  return verdict;
+}
+
+bool UnconfirmedStretch::is_overdue() const {
+  return has_jumped_ && agreeing_scans_ == 0 && scans_since_jump_ >= scans_to_agree_in;
+}
+
+bool UnconfirmedStretch::lies_on_trusted_map(const OdometryResult& in_trusted_map) const {
+  return in_trusted_map.health == OdometryHealth::good &&
+         in_trusted_map.overlap >= min_confirming_overlap &&
+         trusted_.fits.believes_relocalized(in_trusted_map) &&
+         trusted_.fits.confirms(in_trusted_map);
+}
+
+void UnconfirmedStretch::count_agreeing(bool agrees, const Eigen::Vector3d& position_map) {
+  agreeing_path_m_ = agrees && agreeing_scans_ > 0
+                         ? agreeing_path_m_ + (position_map - agreed_at_map_).norm()
+                         : 0.0;
+  agreeing_scans_ = agrees ? agreeing_scans_ + 1 : 0;
+  agreed_at_map_ = position_map;
+}
+
+UnconfirmedStretch::Verdict UnconfirmedStretch::verdict(const OdometryResult& in_trusted_map,
+                                                        const OdometryResult& found) {
+  const PoseTangent off = boxminus(in_trusted_map.T_map_lidar, found.T_map_lidar);
+  const auto is_within = [&off](double distance_m, double angle_rad) {
+    return off.head<3>().norm() < distance_m && off.tail<3>().norm() < angle_rad;
+  };
+  const bool agrees = lies_on_trusted_map(in_trusted_map);
+  if (agrees && !has_jumped_ && is_within(followed_distance_m, followed_angle_rad))
+    return Verdict::confirmed;
+  const bool is_same = agrees && is_within(same_distance_m, same_angle_rad);
+  if (is_same && !has_jumped_far_ && trusted_.fits.fits(in_trusted_map)) return Verdict::confirmed;
+  count_agreeing(is_same, found.T_map_lidar.translation());
+  if (agreeing_scans_ >= confirming_scans && agreeing_path_m_ >= confirming_path_m)
+    return Verdict::confirmed;
+  count_contradicting(in_trusted_map.overlap >= min_contradicting_overlap &&
+                      (has_jumped_ ? !is_same : !trusted_.fits.believes(in_trusted_map)));
+  return is_overdue() || contradicting_scans_ >= contradicting_scans ? Verdict::contradicted
+                                                                     : Verdict::open;
+}
+
+}  // namespace stillmap
