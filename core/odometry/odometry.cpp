@@ -28,6 +28,8 @@ constexpr double max_prediction_s = 1.0;
 constexpr int relocalization_interval = 5;
 constexpr double relocalization_reach_m = 24.0;
 constexpr double max_relocalization_reach_m = 60.0;
+/// How far off its way a lidar may be after a gap of one second [m/s^2].
+constexpr double gap_acceleration_m_s2 = 1.5;
 /// Fewer static features than this are helped out by parked vehicles.
 constexpr std::size_t min_static_features = 100;
 /// Objects are judged again where the registered pose is farther than this from the predicted one
@@ -340,8 +342,13 @@ void Odometry::State::confirm_place(const FeatureSets& features, const PosePredi
       is_jump || (result.health == OdometryHealth::degenerate && !prediction.is_prior);
   if (!stretch && !is_doubtful) return;
   if (!stretch) stretch.emplace(UnconfirmedStretch::Trusted{map, last, intervals, fits});
-  if (is_jump)
-    stretch->jump((result.T_map_lidar.translation() - prediction.T_map_lidar.translation()).norm());
+  if (is_jump) {
+    // Across a gap it may have braked, sped up or turned; once lost it may be anywhere.
+    const double distance_m = distance_from_expected(result.T_map_lidar, last, prediction);
+    const double reach_m = gap_acceleration_m_s2 * std::pow(prediction.interval_s, 2);
+    const bool is_followed = lost_scans == 0 && distance_m < std::clamp(reach_m, 3.0, 15.0);
+    if (!is_followed) stretch->jump(distance_m);
+  }
   using enum UnconfirmedStretch::Verdict;
   const auto verdict = stretch->judge(features, config, result);
   if (verdict == confirmed) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <vector>
 
@@ -264,6 +265,14 @@ OdometryResult confirmed_by_points(const OdometryResult& found, const FeatureSet
   OdometryResult doubtful = opinions.front().pose;
   doubtful.health = OdometryHealth::degenerate;
   return doubtful;
+}
+
+double distance_from_expected(const Eigen::Isometry3d& T_map_lidar, const RegisteredScan& last,
+                              const PosePrediction& prediction) {
+  double nearest_m = std::numeric_limits<double>::infinity();
+  for (const Eigen::Isometry3d& T : starts_without_prediction(last, prediction))
+    nearest_m = std::min(nearest_m, (T_map_lidar.translation() - T.translation()).norm());
+  return nearest_m;
 }
 
 OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,

@@ -64,6 +64,12 @@ struct PosePrediction {
                                                  const FeatureSets& features, const LocalMap& map,
                                                  const OdometryConfig& config);
 
+/// How far a pose is from the nearest one that motion before a gap leads to [m]: the prediction,
+/// the last pose, or straight on from it.
+[[nodiscard]] double distance_from_expected(const Eigen::Isometry3d& T_map_lidar,
+                                            const RegisteredScan& last,
+                                            const PosePrediction& prediction);
+
 /// All starts that may lead to the pose, the cheapest first, until one fits.
 [[nodiscard]] OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
                                          const RegisteredScan& last,

@@ -33,6 +33,7 @@ void UnconfirmedStretch::jump(double distance_m) {
   has_jumped_ = true;
   has_jumped_far_ |= distance_m > near_jump_m;
   scans_since_jump_ = 0;
+  has_agreed_ = false;
 }
 
 void UnconfirmedStretch::add_prior_map(std::span<const LabelledPoint> points_map) {
@@ -58,7 +59,7 @@ UnconfirmedStretch::Verdict UnconfirmedStretch::judge(const FeatureSets& feature
 }
 
 bool UnconfirmedStretch::is_overdue() const {
-  return has_jumped_ && agreeing_scans_ == 0 && scans_since_jump_ >= scans_to_agree_in;
+  return has_jumped_ && !has_agreed_ && scans_since_jump_ >= scans_to_agree_in;
 }
 
 bool UnconfirmedStretch::lies_on_trusted_map(const OdometryResult& in_trusted_map) const {
@@ -73,6 +74,7 @@ void UnconfirmedStretch::count_agreeing(bool agrees, const Eigen::Vector3d& posi
                          ? agreeing_path_m_ + (position_map - agreed_at_map_).norm()
                          : 0.0;
   agreeing_scans_ = agrees ? agreeing_scans_ + 1 : 0;
+  has_agreed_ |= agrees;
   agreed_at_map_ = position_map;
 }
 
@@ -90,8 +92,11 @@ UnconfirmedStretch::Verdict UnconfirmedStretch::verdict(const OdometryResult& in
   count_agreeing(is_same, found.T_map_lidar.translation());
   if (agreeing_scans_ >= confirming_scans && agreeing_path_m_ >= confirming_path_m)
     return Verdict::confirmed;
-  count_contradicting(in_trusted_map.overlap >= min_contradicting_overlap &&
-                      (has_jumped_ ? !is_same : !trusted_.fits.believes(in_trusted_map)));
+  // One that drives out of the trusted map fits it less and less, and stays where it puts it.
+  const bool stays =
+      in_trusted_map.health == OdometryHealth::good && is_within(same_distance_m, same_angle_rad);
+  count_contradicting(!stays && in_trusted_map.overlap >= min_contradicting_overlap &&
+                      (has_jumped_ || !trusted_.fits.believes(in_trusted_map)));
   return is_overdue() || contradicting_scans_ >= contradicting_scans ? Verdict::contradicted
                                                                      : Verdict::open;
 }

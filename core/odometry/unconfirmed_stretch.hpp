@@ -32,8 +32,8 @@ class UnconfirmedStretch {
 
   explicit UnconfirmedStretch(Trusted trusted) : trusted_(std::move(trusted)) {}
 
-  /// No motion told where the next scan is: it was looked for, and found so far from where it was
-  /// expected [m]. Places look alike.
+  /// No motion has told where the next scan is: it was looked for, and found so far from where it
+  /// may be expected [m]. Places look alike.
   void jump(double distance_m);
 
   /// Judges the stretch by a scan that was registered at `found`; one that is degenerate itself
@@ -64,6 +64,7 @@ class UnconfirmedStretch {
   /// that it contradicts.
   int scans_since_jump_ = 0;
   int agreeing_scans_ = 0;
+  bool has_agreed_ = false;
   /// What was driven while they agreed [m], and where they did last.
   double agreeing_path_m_ = 0.0;
   Eigen::Vector3d agreed_at_map_ = Eigen::Vector3d::Zero();
