@@ -11,7 +11,8 @@ constexpr double min_contradicting_overlap = 0.5;
 /// So many scans in a row contradict: one alone may be hidden by traffic.
 constexpr int contradicting_scans = 5;
 /// A pose that was followed is confirmed by the first scan that lies so near it in the trusted map
-/// [m, rad]: what it has slid since.
+/// [m, rad]: what it has slid since. Where most of it lies in unknown space, by several in a row of
+/// which what stands up comes to the same place.
 constexpr double followed_distance_m = 1.0;
 constexpr double followed_angle_rad = 0.1;
 /// One that was looked for is confirmed by scans that each come to the place where the others have
@@ -62,11 +63,10 @@ bool UnconfirmedStretch::is_overdue() const {
   return has_jumped_ && !has_agreed_ && scans_since_jump_ >= scans_to_agree_in;
 }
 
-bool UnconfirmedStretch::lies_on_trusted_map(const OdometryResult& in_trusted_map) const {
+bool UnconfirmedStretch::stands_on_trusted_map(const OdometryResult& in_trusted_map) const {
   return in_trusted_map.health == OdometryHealth::good &&
          in_trusted_map.overlap >= min_confirming_overlap &&
-         trusted_.fits.believes_relocalized(in_trusted_map) &&
-         trusted_.fits.confirms(in_trusted_map);
+         trusted_.fits.believes_relocalized(in_trusted_map);
 }
 
 void UnconfirmedStretch::count_agreeing(bool agrees, const Eigen::Vector3d& position_map) {
@@ -84,13 +84,17 @@ UnconfirmedStretch::Verdict UnconfirmedStretch::verdict(const OdometryResult& in
   const auto is_within = [&off](double distance_m, double angle_rad) {
     return off.head<3>().norm() < distance_m && off.tail<3>().norm() < angle_rad;
   };
-  const bool agrees = lies_on_trusted_map(in_trusted_map);
+  const bool stands = stands_on_trusted_map(in_trusted_map);
+  const bool agrees = stands && trusted_.fits.confirms(in_trusted_map);
   if (agrees && !has_jumped_ && is_within(followed_distance_m, followed_angle_rad))
     return Verdict::confirmed;
-  const bool is_same = agrees && is_within(same_distance_m, same_angle_rad);
-  if (is_same && !has_jumped_far_ && trusted_.fits.fits(in_trusted_map)) return Verdict::confirmed;
+  const bool is_same =
+      (has_jumped_ ? agrees : stands) && is_within(same_distance_m, same_angle_rad);
+  if (agrees && is_same && !has_jumped_far_ && trusted_.fits.fits(in_trusted_map))
+    return Verdict::confirmed;
   count_agreeing(is_same, found.T_map_lidar.translation());
-  if (agreeing_scans_ >= confirming_scans && agreeing_path_m_ >= confirming_path_m)
+  if (agreeing_scans_ >= confirming_scans &&
+      (!has_jumped_ || agreeing_path_m_ >= confirming_path_m))
     return Verdict::confirmed;
   // One that drives out of the trusted map fits it less and less, and stays where it puts it.
   const bool stays =

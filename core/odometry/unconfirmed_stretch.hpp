@@ -47,7 +47,7 @@ class UnconfirmedStretch {
   [[nodiscard]] Trusted take_trusted() { return std::move(trusted_); }
 
  private:
-  [[nodiscard]] bool lies_on_trusted_map(const OdometryResult& in_trusted_map) const;
+  [[nodiscard]] bool stands_on_trusted_map(const OdometryResult& in_trusted_map) const;
   [[nodiscard]] Verdict verdict(const OdometryResult& in_trusted_map, const OdometryResult& found);
   [[nodiscard]] bool is_overdue() const;
 

@@ -68,6 +68,20 @@ TEST(UnconfirmedStretch, EndsWithTheFirstScanOnTheTrustedMapAndTakesItsPose) {
   expect_near(found.T_map_lidar, T_true, 0.02, 0.005);
 }
 
+TEST(UnconfirmedStretch, EndsWithScansInARowThatAgreeInThePartThatIsKnown) {
+  SurfaceWorld farther = here();
+  farther.planes.push_back(
+      {{40.0, -8.0, -1.7}, {70.0, 0.0, 0.0}, {0.0, 24.0, 0.0}, SemanticClass::road});
+  UnconfirmedStretch stretch = stretch_of_here();
+  const auto verdicts = judged(stretch, farther, 10, 0.5, Eigen::Isometry3d::Identity());
+  EXPECT_EQ(verdicts, (std::vector<Verdict>{open, open, open, open, confirmed}));
+  // Looked for, it would be too little.
+  UnconfirmedStretch jumped = stretch_of_here();
+  jumped.jump(20.0);
+  EXPECT_EQ(judged(jumped, farther, 15, 0.5, Eigen::Isometry3d::Identity()),
+            std::vector<Verdict>(15, open));
+}
+
 TEST(UnconfirmedStretch, IsNotJudgedByScansThatDoNotShowTheirMotion) {
   UnconfirmedStretch stretch = stretch_of_here();
   const Eigen::Isometry3d T_true = level_pose(3.0, 0.0, 0.0);
