@@ -12,7 +12,7 @@ enum class OdometryHealth : std::uint8_t {
   /// First scan: there was no map to register against.
   initialised = 0,
   good = 1,
-  /// Some direction of motion is not observable in this scan; the prediction fills it.
+  /// Some of the motion is not observable in this scan, or nothing older confirms its place.
   degenerate = 2,
   /// Too few correspondences: the pose is the prediction.
   lost = 3,
