@@ -355,9 +355,8 @@ void Odometry::State::confirm_place(const FeatureSets& features, const PosePredi
     UnconfirmedStretch::Trusted trusted = stretch->take_trusted();
     map = std::move(trusted.map);
     fits = trusted.fits;
-    stretch.reset();
-    return;
   }
+  if (verdict == confirmed || verdict == settled) return stretch.reset();
   result.is_confirmed = false;
   result.health = OdometryHealth::degenerate;
   if (verdict == open) return;

@@ -27,6 +27,9 @@ constexpr int confirming_scans = 5;
 constexpr double confirming_path_m = 5.0;
 /// What agrees with nothing by then is looked for again.
 constexpr int scans_to_agree_in = 20;
+/// A lidar that was followed through a tunnel does not come back to its other end: it has seen all
+/// of its motion for so long [m] that nothing of the trusted map can be in sight.
+constexpr double settling_path_m = 100.0;
 
 }  // namespace
 
@@ -37,6 +40,13 @@ void UnconfirmedStretch::jump(double distance_m) {
   has_agreed_ = false;
 }
 
+void UnconfirmedStretch::count_good(const OdometryResult& found) {
+  const bool is_good = found.health == OdometryHealth::good;
+  const Eigen::Vector3d position_map = found.T_map_lidar.translation();
+  if (is_good && good_at_map_) good_path_m_ += (position_map - *good_at_map_).norm();
+  good_at_map_ = is_good ? std::optional(position_map) : std::nullopt;
+}
+
 void UnconfirmedStretch::add_prior_map(std::span<const LabelledPoint> points_map) {
   insert_prior_map(points_map, trusted_.map);
 }
@@ -45,6 +55,7 @@ UnconfirmedStretch::Verdict UnconfirmedStretch::judge(const FeatureSets& feature
                                                       const OdometryConfig& config,
                                                       OdometryResult& found) {
   ++scans_since_jump_;
+  count_good(found);
   if (found.health != OdometryHealth::good) {
     count_agreeing(false, found.T_map_lidar.translation());
     count_contradicting(false);
@@ -101,8 +112,8 @@ UnconfirmedStretch::Verdict UnconfirmedStretch::verdict(const OdometryResult& in
       in_trusted_map.health == OdometryHealth::good && is_within(same_distance_m, same_angle_rad);
   count_contradicting(!stays && in_trusted_map.overlap >= min_contradicting_overlap &&
                       (has_jumped_ || !trusted_.fits.believes(in_trusted_map)));
-  return is_overdue() || contradicting_scans_ >= contradicting_scans ? Verdict::contradicted
-                                                                     : Verdict::open;
+  if (is_overdue() || contradicting_scans_ >= contradicting_scans) return Verdict::contradicted;
+  return !has_jumped_ && good_path_m_ >= settling_path_m ? Verdict::settled : Verdict::open;
 }
 
 }  // namespace stillmap

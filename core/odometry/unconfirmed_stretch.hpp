@@ -1,5 +1,6 @@
 #pragma once
 
+#include <optional>
 #include <span>
 #include <utility>
 
@@ -28,6 +29,9 @@ class UnconfirmedStretch {
     open,
     /// The trusted map knows this place, and the scan is not of it.
     contradicted,
+    /// The trusted map is out of sight: what was driven since shows its motion all along, and the
+    /// stretch can only be taken for what it says.
+    settled,
   };
 
   explicit UnconfirmedStretch(Trusted trusted) : trusted_(std::move(trusted)) {}
@@ -51,6 +55,8 @@ class UnconfirmedStretch {
   [[nodiscard]] Verdict verdict(const OdometryResult& in_trusted_map, const OdometryResult& found);
   [[nodiscard]] bool is_overdue() const;
 
+  /// Counts the way on which scans showed all of their motion.
+  void count_good(const OdometryResult& found);
   void count_agreeing(bool agrees, const Eigen::Vector3d& position_map);
   void count_contradicting(bool contradicts) {
     contradicting_scans_ = contradicts ? contradicting_scans_ + 1 : 0;
@@ -69,6 +75,9 @@ class UnconfirmedStretch {
   double agreeing_path_m_ = 0.0;
   Eigen::Vector3d agreed_at_map_ = Eigen::Vector3d::Zero();
   int contradicting_scans_ = 0;
+  /// Driven while scans showed all of their motion [m], and where one did last.
+  double good_path_m_ = 0.0;
+  std::optional<Eigen::Vector3d> good_at_map_;
 };
 
 }  // namespace stillmap

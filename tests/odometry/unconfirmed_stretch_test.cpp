@@ -106,6 +106,28 @@ TEST(UnconfirmedStretch, StaysOpenWhereTheTrustedMapKnowsNothing) {
   }
 }
 
+TEST(UnconfirmedStretch, SettlesOnceItsMotionWasSeenForLong) {
+  UnconfirmedStretch followed = stretch_of_here();
+  UnconfirmedStretch jumped = stretch_of_here();
+  jumped.jump(20.0);
+  Verdict last = open;
+  for (unsigned k = 0; k < 100; ++k) {
+    EXPECT_EQ(last, open) << k;
+    const FeatureSets features = here().features(Eigen::Isometry3d::Identity(), 0.01, k);
+    OdometryResult found = good_at(level_pose(200.0 + 2.0 * k, 0.0, 0.0));
+    // What shows no motion is no part of the way.
+    if (k >= 10 && k < 20) found.health = OdometryHealth::degenerate;
+    OdometryResult same = found;
+    EXPECT_NE(jumped.judge(features, {}, same), settled);
+    last = followed.judge(features, {}, found);
+    if (last == settled) {
+      EXPECT_EQ(k, 61U);
+      break;
+    }
+  }
+  EXPECT_EQ(last, settled);
+}
+
 TEST(UnconfirmedStretch, AJumpNearbyIsConfirmedByOneScanThatFitsAsUsual) {
   UnconfirmedStretch stretch = stretch_of_here();
   stretch.jump(1.0);
