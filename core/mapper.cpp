@@ -80,7 +80,7 @@ std::optional<MappedScan> Mapper::process(
                     labels.provenance,
                     {std::move(scan), std::move(labels.labels), std::move(step.motion)},
                     labels.unlabelled_may_move()};
-  if (step.result.health != OdometryHealth::lost)
+  if (step.result.is_confirmed)
     label_synchronizer_.insert(mapped.labelled, labels, step.result.T_map_lidar, static_map_);
   trajectory_.push_back({mapped.labelled.scan.stamp_ns, step.result.T_map_lidar});
   if (trajectory_.size() > 2 * max_poses_) {

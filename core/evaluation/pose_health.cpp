@@ -38,6 +38,10 @@ bool slides(const std::vector<Anchor>& right, const Anchor& now, const WrongPose
          limits.drift_share * (now.path_m - base.path_m);
 }
 
+bool is_called_good(const JudgedPose& pose) {
+  return pose.health == OdometryHealth::good || pose.health == OdometryHealth::initialised;
+}
+
 }  // namespace
 
 std::vector<bool> wrong_poses(std::span<const JudgedPose> poses, const WrongPoseLimits& limits) {
@@ -60,7 +64,7 @@ std::vector<bool> wrong_poses(std::span<const JudgedPose> poses, const WrongPose
     const bool is_wrong =
         !right.empty() && (has_left(right.back(), now, limits) || slides(right, now, limits));
     wrong.push_back(is_wrong);
-    if (!is_wrong) right.push_back(now);
+    if (right.empty() || (!is_wrong && is_called_good(pose))) right.push_back(now);
   }
   return wrong;
 }
@@ -70,12 +74,9 @@ HealthScore health_score(std::span<const JudgedPose> poses, const WrongPoseLimit
   HealthScore score;
   score.poses = poses.size();
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    const OdometryHealth health = poses[i].health;
-    const bool called_good =
-        health == OdometryHealth::good || health == OdometryHealth::initialised;
     score.wrong += wrong[i] ? 1 : 0;
-    if (wrong[i] && called_good) score.wrong_called_good.push_back(i);
-    if (!wrong[i] && health == OdometryHealth::lost) score.right_called_bad.push_back(i);
+    if (wrong[i] && is_called_good(poses[i])) score.wrong_called_good.push_back(i);
+    if (!wrong[i] && poses[i].health == OdometryHealth::lost) score.right_called_bad.push_back(i);
   }
   return score;
 }

@@ -19,8 +19,9 @@ struct JudgedPose {
   OdometryHealth health = OdometryHealth::lost;
 };
 
-/// When a pose is wrong. Errors are those of the motion since an earlier right pose, so that drift
-/// within the usual does not count, however long the drive.
+/// When a pose is wrong. Errors are those of the motion since an earlier right pose that was called
+/// good, so that drift within the usual does not count, however long the drive, and what odometry
+/// itself doubts is no measure of others.
 struct WrongPoseLimits {
   /// Since the last right pose: this much [m, deg], and shares of the true path between the two.
   double translation_m = 0.2;

@@ -14,7 +14,9 @@
 #include "core/odometry/registration.hpp"
 #include "core/odometry/relocalization.hpp"
 #include "core/odometry/scan_features.hpp"
+#include "core/odometry/scan_intervals.hpp"
 #include "core/odometry/se3.hpp"
+#include "core/odometry/unconfirmed_stretch.hpp"
 
 namespace stillmap {
 namespace {
@@ -26,20 +28,14 @@ constexpr double max_prediction_s = 1.0;
 constexpr int relocalization_interval = 5;
 constexpr double relocalization_reach_m = 24.0;
 constexpr double max_relocalization_reach_m = 60.0;
+/// How far off its way a lidar may be after a gap of one second [m/s^2].
+constexpr double gap_acceleration_m_s2 = 1.5;
 /// Fewer static features than this are helped out by parked vehicles.
 constexpr std::size_t min_static_features = 100;
-/// Weight of the newest stamp in the running mean of their deviations.
-constexpr double irregularity_gain = 0.1;
-/// A stamp off the sensor's period by more than this share of it is irregular.
-constexpr double max_period_deviation = 0.1;
-/// Irregular stamps whose mean interval is the period within this share only scatter.
-constexpr double max_mean_deviation = 0.2;
 /// Objects are judged again where the registered pose is farther than this from the predicted one
 /// [m, rad].
 constexpr double judge_again_distance_m = 0.2;
 constexpr double judge_again_angle_rad = 0.01;
-
-double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 
 OdometryConfig as_used(OdometryConfig config) {
   // The paper's "no weighting" has no robust kernel either.
@@ -81,7 +77,8 @@ struct Odometry::State {
       : config(as_used(odometry_config)),
         sensor(sensor_model),
         map(odometry_config.local_map),
-        history(odometry_config.motion) {}
+        history(odometry_config.motion),
+        intervals(sensor_model.period_s) {}
 
   /// The range image of the scan for the history; nothing where none is kept.
   [[nodiscard]] std::optional<RangeImageView> view_of(const Scan& scan, const PointLabels& labels,
@@ -91,9 +88,6 @@ struct Odometry::State {
                                                   const Eigen::Isometry3d& T_map_lidar) const;
   /// Whether the last velocity predicts the pose of a scan of this time.
   [[nodiscard]] bool has_velocity(std::int64_t stamp_ns) const;
-  /// Time since the last pose [s]. Where stamps have come evenly, a single one that does not is
-  /// taken for a fault of the clock, and the time for a multiple of the sensor's period.
-  [[nodiscard]] double interval_to(std::int64_t stamp_ns) const;
   [[nodiscard]] bool is_searched_widely() const {
     return lost_scans == 0 || lost_scans % relocalization_interval == 1;
   }
@@ -124,6 +118,11 @@ struct Odometry::State {
     if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
     result = confirmed_by_points(result, features, map, config);
   }
+  /// Calls a pose good only where the map says so that is older than any doubt of the place.
+  void confirm_place(const FeatureSets& features, const PosePrediction& prediction,
+                     OdometryResult& result);
+  /// Local map and velocity as they were before the stretch.
+  void forget_stretch();
   [[nodiscard]] SweepPrior sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,
                                        const SweepMotion& motion) const;
   void extend_map(const ScanInParts& parts, const Step& step,
@@ -149,18 +148,14 @@ struct Odometry::State {
   /// Points of a prior map, until the first scan is registered against it.
   std::vector<LabelledPoint> prior_map;
   RangeImageHistory history;
+  /// Since the place is in doubt.
+  std::optional<UnconfirmedStretch> stretch;
   bool started = false;
   /// Scans in a row that could not be registered.
   int lost_scans = 0;
-  std::int64_t last_stamp_ns = 0;
+  ScanIntervals intervals;
   RegisteredScan last;
   FitStatistics fits;
-  /// Running mean of the stamps' deviation from multiples of the period, as a share of it.
-  double irregularity = 0.0;
-  /// Running mean of the time between stamps.
-  double mean_interval_s = 0.0;
-  /// The last stamp as a steady clock would have set it, which follows the stamps slowly.
-  std::int64_t steady_ns = 0;
 };
 
 std::optional<RangeImageView> Odometry::State::view_of(const Scan& scan, const PointLabels& labels,
@@ -177,21 +172,8 @@ std::vector<MotionClass> Odometry::State::classify(const Scan& scan, const Objec
 }
 
 bool Odometry::State::has_velocity(std::int64_t stamp_ns) const {
-  return last.interval_s > 0.0 && lost_scans == 0 && interval_to(stamp_ns) <= max_prediction_s;
-}
-
-double Odometry::State::interval_to(std::int64_t stamp_ns) const {
-  const double interval_s = seconds(stamp_ns - last_stamp_ns);
-  const double periods = std::round(interval_s / sensor.period_s);
-  if (periods > 10.0) return interval_s;
-  if (irregularity > max_period_deviation) {
-    // Stamps that scatter about the period's own are the clock's fault, not the sensor's.
-    const bool is_scatter = std::abs(mean_interval_s / sensor.period_s - 1.0) < max_mean_deviation;
-    if (!is_scatter) return interval_s;
-    return std::max(1.0, std::round(seconds(stamp_ns - steady_ns) / sensor.period_s)) *
-           sensor.period_s;
-  }
-  return std::max(1.0, periods) * sensor.period_s;
+  return last.interval_s > 0.0 && lost_scans == 0 &&
+         intervals.since_last_s(stamp_ns) <= max_prediction_s;
 }
 
 Eigen::Isometry3d Odometry::State::motion_during(double period_s) const {
@@ -306,25 +288,13 @@ void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeIma
                                    const Eigen::Isometry3d& T_map_lidar_now) {
   if (started) {
     last.motion = last.T_map_lidar.inverse() * T_map_lidar_now;
-    const double periods = seconds(stamp_ns - last_stamp_ns) / sensor.period_s;
-    const double deviation = std::min(1.0, std::abs(periods - std::round(periods)));
-    mean_interval_s += irregularity_gain * (seconds(stamp_ns - last_stamp_ns) - mean_interval_s);
-    const double since_steady_s = seconds(stamp_ns - steady_ns);
-    const double whole_s =
-        std::max(1.0, std::round(since_steady_s / sensor.period_s)) * sensor.period_s;
-    steady_ns += std::llround(
-        1e9 * (whole_s + irregularity_gain * std::clamp(since_steady_s - whole_s, -sensor.period_s,
-                                                        sensor.period_s)));
-    last.interval_s = interval_to(stamp_ns);
-    irregularity += irregularity_gain * (deviation - irregularity);
-  }
-  if (!started) {
-    steady_ns = stamp_ns;
-    mean_interval_s = sensor.period_s;
+    last.interval_s = intervals.since_last_s(stamp_ns);
+    intervals.add(stamp_ns);
+  } else {
+    intervals.begin(stamp_ns);
   }
   started = true;
   prior_map = {};
-  last_stamp_ns = stamp_ns;
   last.T_map_lidar = T_map_lidar_now;
   if (!view) return;
   view->move_to(T_map_lidar_now);
@@ -340,7 +310,7 @@ void Odometry::State::straighten_first_scan(const FeatureSets& features, std::in
                                             const SweepTimes& sweep, OdometryResult& second) {
   constexpr int rounds = 4;
   const FirstScan first = *std::exchange(first_scan, std::nullopt);
-  const double interval_s = seconds(time_ns - last_stamp_ns);
+  const double interval_s = intervals.stamped_since_last_s(time_ns);
   if (second.health == OdometryHealth::lost || interval_s > max_prediction_s || !features.rolling)
     return;
   OdometryResult found = second;
@@ -359,12 +329,57 @@ void Odometry::State::straighten_first_scan(const FeatureSets& features, std::in
   second = found;
 }
 
+void Odometry::State::confirm_place(const FeatureSets& features, const PosePrediction& prediction,
+                                    OdometryResult& result) {
+  if (config.paper_exact || !fits.are_known()) return;
+  if (result.health == OdometryHealth::lost) {
+    // What the stretch has brought did not help: it is looked for in what was known before.
+    if (stretch && lost_scans > 0) forget_stretch();
+    return;
+  }
+  const bool is_jump = !prediction.is_known;
+  const bool is_doubtful =
+      is_jump || (result.health == OdometryHealth::degenerate && !prediction.is_prior);
+  if (!stretch && !is_doubtful) return;
+  if (!stretch) stretch.emplace(UnconfirmedStretch::Trusted{map, last, intervals, fits});
+  if (is_jump) {
+    // Across a gap it may have braked, sped up or turned; once lost it may be anywhere.
+    const double distance_m = distance_from_expected(result.T_map_lidar, last, prediction);
+    const double reach_m = gap_acceleration_m_s2 * std::pow(prediction.interval_s, 2);
+    const bool is_followed = lost_scans == 0 && distance_m < std::clamp(reach_m, 3.0, 15.0);
+    if (!is_followed) stretch->jump(distance_m);
+  }
+  using enum UnconfirmedStretch::Verdict;
+  const auto verdict = stretch->judge(features, config, result);
+  if (verdict == confirmed) {
+    UnconfirmedStretch::Trusted trusted = stretch->take_trusted();
+    map = std::move(trusted.map);
+    fits = trusted.fits;
+  }
+  if (verdict == confirmed || verdict == settled) return stretch.reset();
+  result.is_confirmed = false;
+  result.health = OdometryHealth::degenerate;
+  if (verdict == open) return;
+  forget_stretch();
+  result = lost_at(last.T_map_lidar);
+}
+
+void Odometry::State::forget_stretch() {
+  UnconfirmedStretch::Trusted trusted = stretch->take_trusted();
+  map = std::move(trusted.map);
+  fits = trusted.fits;
+  last = std::move(trusted.last);
+  intervals = trusted.intervals;
+  history = RangeImageHistory(config.motion);
+  stretch.reset();
+}
+
 SweepPrior Odometry::State::sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,
                                         const SweepMotion& motion) const {
   SweepPrior prior;
   if (!started) return prior;
   prior.T_map_lidar_last = last.T_map_lidar;
-  const double interval_s = interval_to(time_ns);
+  const double interval_s = intervals.since_last_s(time_ns);
   if (interval_s > 0.0 && interval_s < max_prediction_s)
     prior.duration_share = std::min(1.0, sweep.duration_s / interval_s);
   prior.compensated = motion.twist();
@@ -394,7 +409,7 @@ Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 
 Eigen::Isometry3d Odometry::predict(std::int64_t stamp_ns,
                                     const std::optional<InertialMotion>& inertial) const {
-  const double interval_s = seconds(stamp_ns - state_->last_stamp_ns);
+  const double interval_s = state_->intervals.stamped_since_last_s(stamp_ns);
   return state_->last.T_map_lidar * state_->motion_to_middle(interval_s, inertial);
 }
 
@@ -422,12 +437,14 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   const Eigen::Isometry3d T_map_lidar_predicted =
       T_map_lidar_prior
           ? *T_map_lidar_prior * expected_motion.T_middle_at(stamp_part).inverse()
-          : state.last.T_map_lidar * state.motion_to_middle(state.interval_to(time_ns), inertial);
+          : state.last.T_map_lidar *
+                state.motion_to_middle(state.intervals.since_last_s(time_ns), inertial);
 
   // Features F_e and F_p, without those on objects that may be moving.
   const PosePrediction prediction{.T_map_lidar = T_map_lidar_predicted,
-                                  .interval_s = state.interval_to(time_ns),
+                                  .interval_s = state.intervals.since_last_s(time_ns),
                                   .is_known = T_map_lidar_prior || state.has_velocity(time_ns),
+                                  .is_prior = T_map_lidar_prior.has_value(),
                                   .lost_scans = state.lost_scans,
                                   .is_searched_widely = state.is_searched_widely()};
   ScanInParts parts{.scan = scan, .sweep = sweep, .labels = labels};
@@ -440,6 +457,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   step.result = state.find_pose(parts, prediction, features);
   state.judge_again(parts, T_map_lidar_predicted, features, step.result);
   state.confirm(features, step.result);
+  state.confirm_place(features, prediction, step.result);
   if (state.first_scan) state.straighten_first_scan(features, time_ns, sweep, step.result);
   const Eigen::Isometry3d T_map_middle = step.result.T_map_lidar;
   const Eigen::Isometry3d T_correction = motion_of(step.result.sweep_correction);
@@ -473,6 +491,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
 void Odometry::add_prior_map(std::span<const LabelledPoint> points_map) {
   State& state = *state_;
   insert_prior_map(points_map, state.map);
+  if (state.stretch) state.stretch->add_prior_map(points_map);
   if (!state.started) state.prior_map.assign(points_map.begin(), points_map.end());
 }
 

@@ -12,7 +12,7 @@ enum class OdometryHealth : std::uint8_t {
   /// First scan: there was no map to register against.
   initialised = 0,
   good = 1,
-  /// Some direction of motion is not observable in this scan; the prediction fills it.
+  /// Some of the motion is not observable in this scan, or nothing older confirms its place.
   degenerate = 2,
   /// Too few correspondences: the pose is the prediction.
   lost = 3,
@@ -25,6 +25,9 @@ struct OdometryResult {
   /// the normal equations of eq. (13).
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   OdometryHealth health = OdometryHealth::initialised;
+  /// The scan fits what was known before anything left the place in doubt. While it is false, scans
+  /// agree at most with one another, and are no part of the map.
+  bool is_confirmed = true;
   bool converged = false;
   int iterations = 0;
   int edge_correspondences = 0;

@@ -22,6 +22,9 @@ class FitStatistics {
   [[nodiscard]] bool believes(const OdometryResult& result) const;
   /// The same, where no prediction told the place: by what stands up in it alone, and more of that.
   [[nodiscard]] bool believes_relocalized(const OdometryResult& result) const;
+  /// Whether enough of all its features fits to tell a place by, where part of it lies in unknown
+  /// space.
+  [[nodiscard]] bool confirms(const OdometryResult& result) const;
 
  private:
   /// Running means of OdometryResult::fit and upright_fit.
@@ -46,6 +49,8 @@ struct PosePrediction {
   double interval_s = 0.0;
   /// A velocity or a prior tells it.
   bool is_known = false;
+  /// A prior tells it, of what the scan itself does not show, too.
+  bool is_prior = false;
   /// Scans in a row before this one that could not be registered.
   int lost_scans = 0;
   /// Starts farther off are tried, too: not for every one of many lost scans.
@@ -58,6 +63,12 @@ struct PosePrediction {
 [[nodiscard]] OdometryResult confirmed_by_points(const OdometryResult& found,
                                                  const FeatureSets& features, const LocalMap& map,
                                                  const OdometryConfig& config);
+
+/// How far a pose is from the nearest one that motion before a gap leads to [m]: the prediction,
+/// the last pose, or straight on from it.
+[[nodiscard]] double distance_from_expected(const Eigen::Isometry3d& T_map_lidar,
+                                            const RegisteredScan& last,
+                                            const PosePrediction& prediction);
 
 /// All starts that may lead to the pose, the cheapest first, until one fits.
 [[nodiscard]] OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,

@@ -308,6 +308,7 @@ OdometryResult lost_at(const Eigen::Isometry3d& T_map_lidar_predicted) {
   OdometryResult result;
   result.T_map_lidar = T_map_lidar_predicted;
   result.health = OdometryHealth::lost;
+  result.is_confirmed = false;
   result.covariance = variance.asDiagonal();
   return result;
 }

@@ -390,7 +390,7 @@ void MappingThread::report_imu() {
 
 void MappingThread::forward(MappedScan mapped) {
   const auto labelled = std::make_shared<const LabelledScan>(std::move(mapped.labelled));
-  if (outputs_.occupancy != nullptr) {
+  if (outputs_.occupancy != nullptr && mapped.odometry.is_confirmed) {
     outputs_.occupancy->add({labelled, mapped.odometry.T_map_lidar, !mapped.unlabelled_may_move});
   }
   if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frames_.lidar());

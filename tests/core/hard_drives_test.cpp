@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/mapper.hpp"
@@ -104,6 +106,72 @@ TEST(HardDrives, ScansOfAnotherPlaceAreLostAndEnterNoMap) {
   const auto mapped = mapper.process(first.scan(25).scan);
   ASSERT_TRUE(mapped);
   EXPECT_EQ(mapped->odometry.health, OdometryHealth::good);
+}
+
+/// What 20 degrees ahead show of a scan.
+Scan covered(const Scan& scan) {
+  Scan seen;
+  seen.stamp_ns = scan.stamp_ns;
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    const Eigen::Vector3f& p = scan.points_lidar[i];
+    if (std::abs(std::atan2(p.y(), p.x())) > 0.175F) continue;
+    seen.points_lidar.push_back(p);
+    seen.ring.push_back(scan.ring[i]);
+    seen.labels.push_back(scan.labels[i]);
+  }
+  return seen;
+}
+
+TEST(HardDrives, ACoveredLidarThatIsCarriedElsewhereIsNotGoodThereAndMapsNothing) {
+  const SimulationConfig here = yard(LidarMotion::vehicle, false);
+  SimulationConfig there = yard(LidarMotion::vehicle, false, 6);
+  there.plan = simulation::crowded_avenue();
+  const Simulation first(here);
+  const Simulation second(there);
+  Mapper mapper = mapper_of(here);
+  for (int k = 0; k < 14; ++k) ASSERT_TRUE(mapper.process(first.scan(k).scan));
+  const auto health_of = [&mapper](Scan scan) {
+    const auto mapped = mapper.process(std::move(scan));
+    return mapped ? mapped->odometry.health : OdometryHealth::lost;
+  };
+  for (int k = 14; k < 17; ++k) static_cast<void>(health_of(covered(first.scan(k).scan)));
+  const auto count_voxels = [&mapper] {
+    std::size_t count = 0;
+    for (const auto& tile : mapper.map_snapshot()->tiles) count += tile->voxels.size();
+    return count;
+  };
+  static_cast<void>(health_of(covered(second.scan(17).scan)));
+  const std::size_t voxels = count_voxels();
+  // Little tells the two places apart through the gap; all that is seen then does, in the map as
+  // it was before.
+  for (int k = 18; k < 24; ++k) EXPECT_NE(health_of(second.scan(k).scan), OdometryHealth::good);
+  EXPECT_EQ(count_voxels(), voxels);
+  // Back at the first place it is found, and believed once it has driven some metres there.
+  EXPECT_NE(health_of(first.scan(24).scan), OdometryHealth::lost);
+  OdometryHealth last = OdometryHealth::lost;
+  for (int k = 25; k < here.scans; ++k) last = health_of(first.scan(k).scan);
+  EXPECT_EQ(last, OdometryHealth::good);
+}
+
+TEST(HardDrives, ACoveredLidarIsGoodAgainOnceItIsSeenWhereItIs) {
+  SimulationConfig config = yard(LidarMotion::vehicle, false);
+  const Simulation simulation(config);
+  Mapper mapper = mapper_of(config);
+  std::optional<OdometryResult> last;
+  for (int k = 0; k < 24; ++k) {
+    Scan scan = simulation.scan(k).scan;
+    if (k >= 12 && k < 20) scan = covered(scan);
+    const auto mapped = mapper.process(std::move(scan));
+    ASSERT_TRUE(mapped);
+    if (mapped->odometry.health == OdometryHealth::good) {
+      EXPECT_TRUE(mapped->odometry.is_confirmed);
+    }
+    last = mapped->odometry;
+  }
+  EXPECT_EQ(last->health, OdometryHealth::good);
+  const Eigen::Isometry3d T_true = simulation.T_map_lidar_at(0.0).inverse() *
+                                   simulation.T_map_lidar_at(23 * config.sensor.period_s);
+  EXPECT_LT((T_true.translation() - last->T_map_lidar.translation()).norm(), 0.1);
 }
 
 TEST(ScanClock, AStampFarAheadMustBeConfirmed) {

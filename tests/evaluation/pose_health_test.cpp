@@ -52,6 +52,15 @@ TEST(WrongPoses, AreThoseOfAJumpUntilItIsMadeGood) {
   EXPECT_THAT(wrong_poses(drive), ElementsAre(false, false, true, true, false, false));
 }
 
+TEST(WrongPoses, AreNotThoseThatComeBackFromOnesCalledDegenerate) {
+  using enum OdometryHealth;
+  const Drive drive{
+      judged(at(0), at(0), initialised),        judged(at(1), at(1)),
+      judged(at(2), at(2, 0, 0.9), degenerate), judged(at(3), at(3, 0, 1.0), degenerate),
+      judged(at(4), at(4, 0, 2.5), degenerate), judged(at(5), at(5, 0, -0.5))};
+  EXPECT_THAT(wrong_poses(drive), ElementsAre(false, false, false, false, true, false));
+}
+
 TEST(WrongPoses, AreThoseThatAreTurned) {
   const Drive drive{judged(at(0), at(0)), judged(at(1), at(1, 0, 0.9)),
                     judged(at(2), at(2, 0, 3.0))};

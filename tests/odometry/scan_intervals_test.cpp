@@ -1,0 +1,47 @@
+#include "core/odometry/scan_intervals.hpp"
+
+#include <gtest/gtest.h>
+
+namespace stillmap {
+namespace {
+
+constexpr std::int64_t ms_ns = 1'000'000;
+
+ScanIntervals even_scans() {
+  ScanIntervals intervals(0.1);
+  intervals.begin(0);
+  for (int k = 1; k <= 20; ++k) intervals.add(100 * k * ms_ns);
+  return intervals;
+}
+
+TEST(ScanIntervals, AreMultiplesOfThePeriodWhereStampsHaveComeEvenly) {
+  const ScanIntervals intervals = even_scans();
+  EXPECT_DOUBLE_EQ(intervals.since_last_s(2100 * ms_ns), 0.1);
+  EXPECT_DOUBLE_EQ(intervals.since_last_s(2190 * ms_ns), 0.2);
+  EXPECT_DOUBLE_EQ(intervals.since_last_s(2010 * ms_ns), 0.1);
+  EXPECT_DOUBLE_EQ(intervals.stamped_since_last_s(2010 * ms_ns), 0.01);
+}
+
+TEST(ScanIntervals, AreTheStampsAcrossALongGap) {
+  EXPECT_DOUBLE_EQ(even_scans().since_last_s(5430 * ms_ns), 3.43);
+}
+
+TEST(ScanIntervals, AreThePeriodWhereStampsScatterAboutIt) {
+  ScanIntervals intervals(0.1);
+  intervals.begin(0);
+  for (int k = 1; k <= 40; ++k) intervals.add((100 * k + (k % 2 == 0 ? 40 : -40)) * ms_ns);
+  EXPECT_DOUBLE_EQ(intervals.since_last_s(4060 * ms_ns), 0.1);
+  // One scan is missing.
+  EXPECT_DOUBLE_EQ(intervals.since_last_s(4240 * ms_ns), 0.2);
+}
+
+TEST(ScanIntervals, AreTheStampsOfASensorThatKeepsNoPeriod) {
+  ScanIntervals intervals(0.1);
+  intervals.begin(0);
+  std::int64_t stamp_ns = 0;
+  for (int k = 1; k <= 40; ++k) intervals.add(stamp_ns += (k % 2 == 0 ? 340 : 250) * ms_ns);
+  EXPECT_DOUBLE_EQ(intervals.since_last_s(stamp_ns + 340 * ms_ns), 0.34);
+}
+
+}  // namespace
+}  // namespace stillmap

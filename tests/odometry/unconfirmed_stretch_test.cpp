@@ -1,0 +1,156 @@
+#include "core/odometry/unconfirmed_stretch.hpp"
+
+#include <gtest/gtest.h>
+
+#include "tests/odometry/poses.hpp"
+#include "tests/odometry/surface_world.hpp"
+
+namespace stillmap {
+namespace {
+
+using enum UnconfirmedStretch::Verdict;
+using test::expect_near;
+using test::level_pose;
+using test::SurfaceWorld;
+using Verdict = UnconfirmedStretch::Verdict;
+
+/// A road of 40 m with a facade along it, so far to the left, and walls across it on both sides.
+SurfaceWorld road_with_walls(std::initializer_list<double> walls_x_m, double facade_y_m = 8.0) {
+  SurfaceWorld world;
+  const Eigen::Vector3d up(0.0, 0.0, 5.0);
+  world.planes.push_back(
+      {{-10.0, -8.0, -1.7}, {40.0, 0.0, 0.0}, {0.0, 16.0, 0.0}, SemanticClass::road});
+  world.planes.push_back(
+      {{-10.0, facade_y_m, -1.7}, {40.0, 0.0, 0.0}, up, SemanticClass::building});
+  for (const double x : walls_x_m) {
+    world.planes.push_back({{x, 4.0, -1.7}, {0.0, 4.0, 0.0}, up, SemanticClass::building});
+    world.planes.push_back({{x, -8.0, -1.7}, {0.0, 4.0, 0.0}, up, SemanticClass::building});
+  }
+  return world;
+}
+
+SurfaceWorld here() { return road_with_walls({-8.0, -1.0, 7.0, 16.0, 24.0}); }
+
+OdometryResult good_at(const Eigen::Isometry3d& T_map_lidar) {
+  return {.T_map_lidar = T_map_lidar, .health = OdometryHealth::good};
+}
+
+/// A stretch after scans of `here()` that fitted its map.
+UnconfirmedStretch stretch_of_here() {
+  UnconfirmedStretch::Trusted trusted{here().local_map(), {}, ScanIntervals(0.1), {}};
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    const Eigen::Isometry3d T = level_pose(0.1 * seed, 0.0, 0.0);
+    trusted.fits.add(register_features(here().features(T, 0.01, seed), trusted.map, T, {}));
+  }
+  return UnconfirmedStretch(std::move(trusted));
+}
+
+/// What the stretch says of scans of a world that were registered with this error, which drive on
+/// by so much each [m].
+std::vector<Verdict> judged(UnconfirmedStretch& stretch, const SurfaceWorld& world, int scans,
+                            double step_m, const Eigen::Isometry3d& error) {
+  std::vector<Verdict> verdicts;
+  for (int k = 0; k < scans; ++k) {
+    const Eigen::Isometry3d T_true = level_pose(step_m * k, 0.0, 0.0);
+    OdometryResult found = good_at(T_true * error);
+    const auto seed = static_cast<unsigned>(20 + k);
+    verdicts.push_back(stretch.judge(world.features(T_true, 0.01, seed), {}, found));
+    if (verdicts.back() != open) break;
+  }
+  return verdicts;
+}
+
+TEST(UnconfirmedStretch, EndsWithTheFirstScanOnTheTrustedMapAndTakesItsPose) {
+  UnconfirmedStretch stretch = stretch_of_here();
+  const Eigen::Isometry3d T_true = level_pose(3.0, 0.5, 0.02);
+  OdometryResult found = good_at(T_true * level_pose(0.3, 0.1, 0.02));
+  EXPECT_EQ(stretch.judge(here().features(T_true, 0.01, 3), {}, found), confirmed);
+  expect_near(found.T_map_lidar, T_true, 0.02, 0.005);
+}
+
+TEST(UnconfirmedStretch, EndsWithScansInARowThatAgreeInThePartThatIsKnown) {
+  SurfaceWorld farther = here();
+  farther.planes.push_back(
+      {{40.0, -8.0, -1.7}, {70.0, 0.0, 0.0}, {0.0, 24.0, 0.0}, SemanticClass::road});
+  UnconfirmedStretch stretch = stretch_of_here();
+  const auto verdicts = judged(stretch, farther, 10, 0.5, Eigen::Isometry3d::Identity());
+  EXPECT_EQ(verdicts, (std::vector<Verdict>{open, open, open, open, confirmed}));
+  // Looked for, it would be too little.
+  UnconfirmedStretch jumped = stretch_of_here();
+  jumped.jump(20.0);
+  EXPECT_EQ(judged(jumped, farther, 15, 0.5, Eigen::Isometry3d::Identity()),
+            std::vector<Verdict>(15, open));
+}
+
+TEST(UnconfirmedStretch, IsNotJudgedByScansThatDoNotShowTheirMotion) {
+  UnconfirmedStretch stretch = stretch_of_here();
+  const Eigen::Isometry3d T_true = level_pose(3.0, 0.0, 0.0);
+  OdometryResult found = good_at(T_true);
+  found.health = OdometryHealth::degenerate;
+  EXPECT_EQ(stretch.judge(here().features(T_true, 0.01, 3), {}, found), open);
+}
+
+TEST(UnconfirmedStretch, IsContradictedByScansInARowOfAnotherPlace) {
+  UnconfirmedStretch stretch = stretch_of_here();
+  const SurfaceWorld elsewhere = road_with_walls({-4.5, 3.0, 11.5, 20.0}, 5.5);
+  const auto verdicts = judged(stretch, elsewhere, 10, 0.0, Eigen::Isometry3d::Identity());
+  EXPECT_EQ(verdicts, (std::vector<Verdict>{open, open, open, open, contradicted}));
+}
+
+TEST(UnconfirmedStretch, StaysOpenWhereTheTrustedMapKnowsNothing) {
+  UnconfirmedStretch stretch = stretch_of_here();
+  for (unsigned seed = 1; seed <= 30; ++seed) {
+    OdometryResult found = good_at(level_pose(200.0, 0.0, 0.0));
+    EXPECT_EQ(stretch.judge(here().features(Eigen::Isometry3d::Identity(), 0.01, seed), {}, found),
+              open);
+  }
+}
+
+TEST(UnconfirmedStretch, SettlesOnceItsMotionWasSeenForLong) {
+  UnconfirmedStretch followed = stretch_of_here();
+  UnconfirmedStretch jumped = stretch_of_here();
+  jumped.jump(20.0);
+  Verdict last = open;
+  for (unsigned k = 0; k < 100; ++k) {
+    EXPECT_EQ(last, open) << k;
+    const FeatureSets features = here().features(Eigen::Isometry3d::Identity(), 0.01, k);
+    OdometryResult found = good_at(level_pose(200.0 + 2.0 * k, 0.0, 0.0));
+    // What shows no motion is no part of the way.
+    if (k >= 10 && k < 20) found.health = OdometryHealth::degenerate;
+    OdometryResult same = found;
+    EXPECT_NE(jumped.judge(features, {}, same), settled);
+    last = followed.judge(features, {}, found);
+    if (last == settled) {
+      EXPECT_EQ(k, 61U);
+      break;
+    }
+  }
+  EXPECT_EQ(last, settled);
+}
+
+TEST(UnconfirmedStretch, AJumpNearbyIsConfirmedByOneScanThatFitsAsUsual) {
+  UnconfirmedStretch stretch = stretch_of_here();
+  stretch.jump(1.0);
+  EXPECT_EQ(judged(stretch, here(), 1, 0.0, Eigen::Isometry3d::Identity()).back(), confirmed);
+}
+
+TEST(UnconfirmedStretch, AJumpFarOffIsConfirmedOnTheWayAlone) {
+  UnconfirmedStretch stands = stretch_of_here();
+  stands.jump(20.0);
+  const auto standing = judged(stands, here(), 30, 0.0, Eigen::Isometry3d::Identity());
+  EXPECT_EQ(standing, std::vector<Verdict>(30, open));
+  UnconfirmedStretch drives = stretch_of_here();
+  drives.jump(20.0);
+  const auto driving = judged(drives, here(), 30, 0.5, Eigen::Isometry3d::Identity());
+  EXPECT_EQ(driving.back(), confirmed);
+  EXPECT_EQ(driving.size(), 11U);
+}
+
+TEST(UnconfirmedStretch, AJumpToAPlaceThatScansDoNotAgreeOnIsGivenUp) {
+  UnconfirmedStretch stretch = stretch_of_here();
+  stretch.jump(20.0);
+  EXPECT_EQ(judged(stretch, here(), 30, 0.5, level_pose(0.5, 0.0, 0.0)).back(), contradicted);
+}
+
+}  // namespace
+}  // namespace stillmap
