@@ -86,6 +86,13 @@ void LiveTile::insert_block(std::span<const TilePoint> points, std::int64_t stam
   std::uint64_t brick_key = 0;
   std::uint32_t brick = BrickIndex::none;
   for (std::size_t i = 0; i < points.size(); ++i) {
+    const TilePoint* const last = i == 0 ? nullptr : &points[i - 1];
+    if (last && last->voxel_key == points[i].voxel_key &&
+        (positions[i - 1] != BrickIndex::none ||
+         (last->label == points[i].label && last->motion == points[i].motion))) {
+      positions[i] = positions[i - 1];
+      continue;
+    }
     const std::uint64_t key = place_of(points[i].voxel_key).brick_key;
     if (i == 0 || key != brick_key) brick = positions_.find_brick(key);
     brick_key = key;
