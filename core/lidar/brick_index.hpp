@@ -62,9 +62,10 @@ class BrickIndex {
     return brick == none ? none : number(brick, place.cell);
   }
 
-  /// Erases the voxels for whose number the predicate holds, and bricks without voxels.
-  template <typename Predicate>
-  void erase_if(Predicate predicate);
+  /// Erases the voxels for whose number the predicate holds, and bricks without voxels. Looks only
+  /// at bricks for which `is_looked_at(x, y, z)` holds, of their lowest voxel.
+  template <typename BrickPredicate, typename Predicate>
+  void erase_if(BrickPredicate is_looked_at, Predicate predicate);
   void clear();
 
   [[nodiscard]] std::size_t memory_bytes() const {
@@ -95,9 +96,14 @@ inline std::uint32_t BrickIndex::brick_at(std::uint64_t brick_key) {
   return entry->second;
 }
 
-template <typename Predicate>
-void BrickIndex::erase_if(Predicate predicate) {
+template <typename BrickPredicate, typename Predicate>
+void BrickIndex::erase_if(BrickPredicate is_looked_at, Predicate predicate) {
   for (auto entry = bricks_by_key_.begin(); entry != bricks_by_key_.end();) {
+    const auto [x, y, z] = unpacked_index(entry->first);
+    if (!is_looked_at(brick_side * x, brick_side * y, brick_side * z)) {
+      ++entry;
+      continue;
+    }
     bool is_empty = true;
     for (std::uint32_t& number : bricks_[entry->second]) {
       if (number != none && predicate(number)) number = none;

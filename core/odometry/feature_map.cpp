@@ -241,7 +241,14 @@ Neighbours FeatureMap::neighbours_of(const Nearest& nearest) const {
 void FeatureMap::remove_far_from(const Eigen::Vector3f& centre_map) {
   if (kept_round_map_ && (centre_map - *kept_round_map_).norm() < 0.02F * radius_m_) return;
   kept_round_map_ = centre_map;
-  index_.erase_if([&](std::uint32_t number) {
+  // What lies well within the radius stays without being looked at.
+  const float brick_size_m = BrickIndex::brick_side * voxel_size_m_;
+  const float inner_radius_m = radius_m_ - std::sqrt(3.0F) * brick_size_m;
+  const auto is_near_the_edge = [&](int x, int y, int z) {
+    const Eigen::Vector3f corner_map = voxel_size_m_ * Eigen::Vector3i(x, y, z).cast<float>();
+    return !((corner_map - centre_map).norm() < inner_radius_m);
+  };
+  index_.erase_if(is_near_the_edge, [&](std::uint32_t number) {
     Block& block = blocks_[number];
     if (block.count > 0 && (block.position(0) - centre_map).squaredNorm() <= radius_m_ * radius_m_)
       return false;

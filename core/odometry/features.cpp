@@ -158,11 +158,11 @@ class TakenCubes {
   /// Whether it was free until now.
   bool take(const Eigen::Array3i& cube) {
     const std::uint64_t brick = packed_index(cube.x() >> 2, cube.y() >> 2, cube.z() >> 2);
-    if (brick != slots_[current_].brick) go_to(brick);
+    if (brick != brick_) go_to(brick);
     const int place = (cube.x() & 3) << 4 | (cube.y() & 3) << 2 | (cube.z() & 3);
     const std::uint64_t bit = std::uint64_t{1} << place;
-    const bool was_free = (slots_[current_].taken & bit) == 0;
-    slots_[current_].taken |= bit;
+    const bool was_free = (taken_ & bit) == 0;
+    taken_ |= bit;
     return was_free;
   }
 
@@ -181,21 +181,28 @@ class TakenCubes {
     return slot;
   }
   void go_to(std::uint64_t brick) {
-    current_ = slot_of(brick);
-    if (slots_[current_].brick == brick) return;
-    if (2 * ++bricks_ > slots_.size()) {
-      std::vector<Slot> old(2 * slots_.size());
-      old.swap(slots_);
-      for (const Slot& slot : old)
-        if (slot.brick != unused) slots_[slot_of(slot.brick)] = slot;
-      current_ = slot_of(brick);
-    }
-    slots_[current_].brick = brick;
+    if (brick_ != unused) slots_[slot_].taken = taken_;
+    brick_ = brick;
+    slot_ = slot_of(brick);
+    taken_ = slots_[slot_].taken;
+    if (slots_[slot_].brick == brick) return;
+    slots_[slot_].brick = brick;
+    if (2 * ++bricks_ > slots_.size()) grow();
+  }
+  void grow() {
+    std::vector<Slot> old(2 * slots_.size());
+    old.swap(slots_);
+    for (const Slot& slot : old)
+      if (slot.brick != unused) slots_[slot_of(slot.brick)] = slot;
+    slot_ = slot_of(brick_);
   }
 
   std::vector<Slot> slots_;
   std::size_t bricks_ = 0;
-  std::size_t current_ = 0;
+  /// The last brick: what is taken of it, and where that belongs.
+  std::uint64_t brick_ = unused;
+  std::uint64_t taken_ = 0;
+  std::size_t slot_ = 0;
 };
 
 }  // namespace
@@ -219,10 +226,13 @@ std::vector<std::uint32_t> first_in_cubes(std::span<const Eigen::Vector3f> point
                                           std::span<const std::uint32_t> chosen,
                                           float inverse_spacing) {
   TakenCubes taken;
-  std::vector<std::uint32_t> kept;
-  kept.reserve(chosen.size() / 2);
-  for (const std::uint32_t i : chosen)
-    if (taken.take(cube_of(points[i], inverse_spacing))) kept.push_back(i);
+  std::vector<std::uint32_t> kept(chosen.size());
+  std::size_t count = 0;
+  for (const std::uint32_t i : chosen) {
+    kept[count] = i;
+    count += taken.take(cube_of(points[i], inverse_spacing)) ? 1 : 0;
+  }
+  kept.resize(count);
   return kept;
 }
 

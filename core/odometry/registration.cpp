@@ -334,6 +334,7 @@ OdometryResult lost_at(const Eigen::Isometry3d& T_map_lidar_predicted) {
 
 Eigen::Vector3d compensated(const Eigen::Vector3d& point_lidar, double sweep_part,
                             const PoseTangent& sweep_twist) {
+  if (sweep_part == 0.0) return point_lidar;
   const Eigen::Vector3d t = sweep_part * sweep_twist.head<3>();
   const Eigen::Vector3d r = sweep_part * sweep_twist.tail<3>();
   const Eigen::Vector3d moved = t + r.cross(point_lidar);
