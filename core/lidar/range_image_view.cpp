@@ -71,9 +71,11 @@ RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> 
   for (std::size_t i = 0; i < returns.size(); ++i) {
     const auto [pixel, range_m] = returns[i];
     if (pixel == none) continue;
-    float& old = pixels_[pixel];
-    if (old != 0.0F && std::abs(old) <= range_m) continue;
-    old = !labels.empty() && is_movable(labels[i]) ? range_m : -range_m;
+    // Without branches: which of two returns comes first is anybody's guess.
+    const float old = pixels_[pixel];
+    const bool is_nearer = old == 0.0F || range_m < std::abs(old);
+    const float signed_range = !labels.empty() && is_movable(labels[i]) ? range_m : -range_m;
+    pixels_[pixel] = is_nearer ? signed_range : old;
   }
 }
 

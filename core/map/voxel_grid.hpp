@@ -22,6 +22,7 @@ class VoxelGrid {
   VoxelGrid(double voxel_size_m, double tile_size_m)
       : voxel_size_m_(voxel_size_m),
         columns_(static_cast<int>(std::lround(tile_size_m / voxel_size_m))),
+        tiles_per_voxel_(1.0 / columns_),
         max_z_m_(std::min(max_coordinate_m,
                           // Layers are kept one off the ends of int16.
                           voxel_size_m * (std::numeric_limits<std::int16_t>::max() - 1))) {}
@@ -62,11 +63,12 @@ class VoxelGrid {
  private:
   [[nodiscard]] std::int32_t tile_of(int voxel) const {
     // Half a voxel from the tile's border, so that rounding cannot cross it.
-    return static_cast<std::int32_t>(std::floor((voxel + 0.5) / columns_));
+    return static_cast<std::int32_t>(std::floor((voxel + 0.5) * tiles_per_voxel_));
   }
 
   double voxel_size_m_;
   int columns_;
+  double tiles_per_voxel_;
   double max_z_m_;
 };
 

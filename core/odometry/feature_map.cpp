@@ -5,8 +5,6 @@
 #include <cassert>
 #include <cmath>
 
-#include "core/lidar/prefetch.hpp"
-
 namespace stillmap {
 namespace {
 
@@ -36,16 +34,60 @@ struct AxisSteps {
   std::array<float, steps> squared_gap{};
   /// Whether the voxel is in another brick than the point's own one; at most one side is.
   std::array<bool, steps> in_other_brick{};
+};
 
-  AxisSteps(BrickIndex::Part (*part_of)(int), int voxel, float below_m, float above_m) {
-    const int to_nearer = below_m < above_m ? -1 : 1;
-    part = {part_of(voxel), part_of(voxel + to_nearer), part_of(voxel - to_nearer)};
-    const float near_m = std::min(below_m, above_m);
-    const float far_m = std::max(below_m, above_m);
-    squared_gap = {0.0F, near_m * near_m, far_m * far_m};
-    for (const Step step : {nearer, farther})
-      in_other_brick[step] = part[step].brick_key != part[here].brick_key;
+/// `below_m` and `above_m`: from the point to the lower and the upper face of its voxel.
+template <auto part_of>
+AxisSteps axis_steps(int voxel, float below_m, float above_m) {
+  const int to_nearer = below_m < above_m ? -1 : 1;
+  const float near_m = std::min(below_m, above_m);
+  const float far_m = std::max(below_m, above_m);
+  AxisSteps axis;
+  axis.part = {part_of(voxel), part_of(voxel + to_nearer), part_of(voxel - to_nearer)};
+  axis.squared_gap = {0.0F, near_m * near_m, far_m * far_m};
+  for (const Step step : {nearer, farther})
+    axis.in_other_brick[step] = axis.part[step].brick_key != axis.part[here].brick_key;
+  return axis;
+}
+
+/// The voxels round a point, by their place in `search_order`.
+class VoxelsAround {
+ public:
+  VoxelsAround(const BrickIndex& index, const Eigen::Vector3i& centre,
+               const Eigen::Array3f& below_m, const Eigen::Array3f& above_m)
+      : index_(index),
+        x_(axis_steps<BrickIndex::part_x>(centre.x(), below_m.x(), above_m.x())),
+        y_(axis_steps<BrickIndex::part_y>(centre.y(), below_m.y(), above_m.y())),
+        z_(axis_steps<BrickIndex::part_z>(centre.z(), below_m.z(), above_m.z())) {
+    bricks_.fill(not_looked_up);
   }
+
+  /// From the point to the voxel.
+  [[nodiscard]] float squared_gap(std::size_t v) const {
+    const auto [x, y, z] = search_order[v];
+    return x_.squared_gap[x] + y_.squared_gap[y] + z_.squared_gap[z];
+  }
+  /// To the nearest of those that need a step to the farther side.
+  [[nodiscard]] float least_farther_squared_gap() const {
+    return std::min({x_.squared_gap[farther], y_.squared_gap[farther], z_.squared_gap[farther]});
+  }
+  /// The voxel's number, or BrickIndex::none.
+  [[nodiscard]] std::uint32_t number(std::size_t v) {
+    const auto [x, y, z] = search_order[v];
+    const auto place = BrickIndex::place(x_.part[x], y_.part[y], z_.part[z]);
+    std::uint32_t& brick =
+        bricks_[std::size_t{x_.in_other_brick[x]} << 2 | std::size_t{y_.in_other_brick[y]} << 1 |
+                std::size_t{z_.in_other_brick[z]}];
+    if (brick == not_looked_up) brick = index_.find_brick(place.brick_key);
+    return brick == BrickIndex::none ? BrickIndex::none : index_.number(brick, place.cell);
+  }
+
+ private:
+  static constexpr std::uint32_t not_looked_up = BrickIndex::none - 1;
+  const BrickIndex& index_;
+  AxisSteps x_, y_, z_;
+  /// Of the point's own brick and those beside it.
+  std::array<std::uint32_t, 8> bricks_;
 };
 
 }  // namespace
@@ -84,12 +126,6 @@ class FeatureMap::Nearest {
   int count_ = 0;
   std::array<std::uint64_t, Neighbours::capacity> words_;
 };
-
-void FeatureMap::Block::prefetch_first() const {
-  constexpr std::ptrdiff_t line = 64;
-  const auto* const begin = reinterpret_cast<const std::byte*>(this);
-  for (std::ptrdiff_t k = 0; k < 5; ++k) prefetch(begin + k * line);
-}
 
 void FeatureMap::Block::set_position(int i, const Eigen::Vector3f& position_map) {
   Group& group = groups[static_cast<std::size_t>(i / group_size)];
@@ -143,7 +179,7 @@ void FeatureMap::insert(std::span<const LabelledPoint> points) {
     const auto some = points.subspan(begin, std::min(ahead, points.size() - begin));
     for (std::size_t i = 0; i < some.size(); ++i) {
       blocks[i] = block_at(voxel_of(some[i].position_map));
-      blocks_[blocks[i]].prefetch_first();
+      blocks_[blocks[i]].prefetch_first(5);
     }
     for (std::size_t i = 0; i < some.size(); ++i) insert(some[i], blocks[i]);
   }
@@ -165,7 +201,7 @@ std::uint32_t FeatureMap::block_at(const Eigen::Vector3i& voxel) {
 void FeatureMap::prefetch_near(const Eigen::Vector3f& position_map) const {
   const Eigen::Vector3i voxel = voxel_of(position_map);
   const std::uint32_t number = index_.number(BrickIndex::place(voxel.x(), voxel.y(), voxel.z()));
-  if (number != BrickIndex::none) blocks_[number].prefetch_first();
+  if (number != BrickIndex::none) blocks_[number].prefetch_first(5);
 }
 
 void FeatureMap::insert(const LabelledPoint& point, std::uint32_t block_number) {
@@ -189,27 +225,20 @@ Neighbours FeatureMap::nearest(const Eigen::Vector3f& position_map, int n,
   // Distance from the point to the voxel's lower and upper faces.
   const Eigen::Array3f below = position_map.array() - centre.cast<float>().array() * voxel_size_m_;
   const Eigen::Array3f above = voxel_size_m_ - below;
-  const AxisSteps x(BrickIndex::part_x, centre.x(), below.x(), above.x());
-  const AxisSteps y(BrickIndex::part_y, centre.y(), below.y(), above.y());
-  const AxisSteps z(BrickIndex::part_z, centre.z(), below.z(), above.z());
-  const float least_far =
-      std::min({x.squared_gap[farther], y.squared_gap[farther], z.squared_gap[farther]});
-  constexpr std::uint32_t not_looked_up = BrickIndex::none - 1;
-  std::array<std::uint32_t, 8> bricks;
-  bricks.fill(not_looked_up);
+  VoxelsAround voxels(index_, centre, below, above);
+  // Voxels this near are usually looked through: their memory is on its way meanwhile.
+  const float usual_squared = 0.1F * voxel_size_m_ * voxel_size_m_;
+  for (std::size_t v = 1; v < nearest_voxels; ++v) {
+    if (voxels.squared_gap(v) > usual_squared) continue;
+    const std::uint32_t number = voxels.number(v);
+    if (number != BrickIndex::none) blocks_[number].prefetch_first(2);
+  }
   Nearest found(n);
   float limit = max_distance_m * max_distance_m;
   for (std::size_t v = 0; v < search_order.size(); ++v) {
-    if (v == nearest_voxels && least_far > limit) break;
-    const auto [sx, sy, sz] = search_order[v];
-    if (x.squared_gap[sx] + y.squared_gap[sy] + z.squared_gap[sz] > limit) continue;
-    const auto place = BrickIndex::place(x.part[sx], y.part[sy], z.part[sz]);
-    std::uint32_t& brick =
-        bricks[std::size_t{x.in_other_brick[sx]} << 2 | std::size_t{y.in_other_brick[sy]} << 1 |
-               std::size_t{z.in_other_brick[sz]}];
-    if (brick == not_looked_up) brick = index_.find_brick(place.brick_key);
-    if (brick == BrickIndex::none) continue;
-    const std::uint32_t number = index_.number(brick, place.cell);
+    if (v == nearest_voxels && voxels.least_farther_squared_gap() > limit) break;
+    if (voxels.squared_gap(v) > limit) continue;
+    const std::uint32_t number = voxels.number(v);
     if (number == BrickIndex::none) continue;
     const Block& block = blocks_[number];
     for (int first = 0; first < block.count; first += group_size) {

@@ -2,12 +2,14 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "core/lidar/brick_index.hpp"
+#include "core/lidar/prefetch.hpp"
 #include "core/lidar/semantic_class.hpp"
 #include "core/odometry/odometry_config.hpp"
 
@@ -76,8 +78,12 @@ class FeatureMap {
       const auto k = static_cast<std::size_t>(i % group_size);
       return {group.x[k], group.y[k], group.z[k]};
     }
-    /// Asks for its first points.
-    void prefetch_first() const;
+    /// Asks for its first cache lines; the first groups are in five.
+    void prefetch_first(std::ptrdiff_t lines) const {
+      constexpr std::ptrdiff_t line_bytes = 64;
+      const auto* const begin = reinterpret_cast<const std::byte*>(this);
+      for (std::ptrdiff_t k = 0; k < lines; ++k) prefetch(begin + k * line_bytes);
+    }
     void set_position(int i, const Eigen::Vector3f& position_map);
     /// Squared distances of a group's points; beyond `count` they mean nothing.
     [[nodiscard]] std::array<float, group_size> squared_distances(

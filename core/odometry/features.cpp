@@ -9,6 +9,7 @@
 #include <limits>
 #include <numeric>
 #include <span>
+#include <utility>
 
 #include "core/lidar/voxel_index.hpp"
 
@@ -310,13 +311,15 @@ std::vector<std::uint32_t> some_of(const std::vector<std::uint32_t>& all, std::s
   return some;
 }
 
-/// Points of any kind for the alignment of points, from the `chosen` ones.
-void pick_points(const Scan& scan, std::span<const std::uint32_t> chosen, Features& features) {
-  constexpr double map_spacing_m = 0.5;
+/// Spacing of the points of any kind in the local map [m].
+constexpr double map_point_spacing_m = 0.5;
+
+/// Points of any kind for the alignment of points, from those of the map's spacing.
+void pick_points(const Scan& scan, std::vector<std::uint32_t> spaced, Features& features) {
   constexpr double spacing_m = 1.0;
   constexpr std::size_t max_upright = 800;
   constexpr std::size_t max_level = 300;
-  features.points = voxel_downsample(scan.points_lidar, chosen, map_spacing_m);
+  features.points = std::move(spaced);
   const ColumnHeights columns(scan.points_lidar, features.points);
   std::vector<std::uint32_t> upright, level;
   for (const std::uint32_t i : voxel_downsample(scan.points_lidar, features.points, spacing_m))
@@ -334,7 +337,12 @@ Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
   features.planes = voxel_downsample(scan.points_lidar, all, config.map_surface_spacing_m);
   features.surfaces =
       voxel_downsample(scan.points_lidar, features.planes, config.surface_spacing_m);
-  pick_points(scan, features.planes, features);
+  const bool are_points_spaced = config.surface_spacing_m == map_point_spacing_m;
+  pick_points(scan,
+              are_points_spaced
+                  ? features.surfaces
+                  : voxel_downsample(scan.points_lidar, features.planes, map_point_spacing_m),
+              features);
   return features;
 }
 
@@ -361,7 +369,7 @@ Features extract_features(const Scan& scan, const FeatureConfig& config) {
       voxel_downsample(scan.points_lidar, features.planes, config.plane_spacing_m);
   std::vector<std::uint32_t> all(scan.size());
   std::iota(all.begin(), all.end(), 0U);
-  pick_points(scan, all, features);
+  pick_points(scan, voxel_downsample(scan.points_lidar, all, map_point_spacing_m), features);
   return features;
 }
 
