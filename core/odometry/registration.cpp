@@ -16,8 +16,8 @@ namespace {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 /// Neighbours are looked up again once the point has moved this far since [m]; nearer than that
-/// they are nearly always the same ones.
-constexpr float same_neighbours_m = 0.02F;
+/// they are nearly always the same ones: the local map's points are 0.2 m apart.
+constexpr float same_neighbours_m = 0.04F;
 /// Motion that the coarse registration can find [m].
 constexpr double coarse_reach_m = 3.0;
 
