@@ -12,14 +12,14 @@
 
 namespace stillmap {
 
-/// A number for each voxel of a sparse grid. Only bricks of 4 x 4 x 4 voxels are hashed: neighbours
-/// in space, which points of a scan mostly are, lie beside each other in memory and share a
-/// look-up. NOT safe for one writer beside readers; many readers are fine.
+/// A number for each voxel of a sparse grid. Only bricks of 4 x 4 x 2 voxels are hashed (ground
+/// fills half of one): neighbours in space, which points of a scan mostly are, lie beside each
+/// other in memory and share a look-up. NOT safe for one writer beside readers; many readers are
+/// fine.
 class BrickIndex {
  public:
   /// No number, no brick.
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
-  static constexpr int brick_side = 4;
 
   /// The part of a voxel's place that one of its coordinates makes.
   struct Part {
@@ -27,13 +27,13 @@ class BrickIndex {
     std::uint32_t cell = 0;
   };
   [[nodiscard]] static constexpr Part part_x(int x) {
-    return {packed_index(x >> 2, 0, 0), static_cast<std::uint32_t>(x & 3) << 4};
+    return {packed_index(x >> 2, 0, 0), static_cast<std::uint32_t>(x & 3) << 3};
   }
   [[nodiscard]] static constexpr Part part_y(int y) {
-    return {packed_index(0, y >> 2, 0), static_cast<std::uint32_t>(y & 3) << 2};
+    return {packed_index(0, y >> 2, 0), static_cast<std::uint32_t>(y & 3) << 1};
   }
   [[nodiscard]] static constexpr Part part_z(int z) {
-    return {packed_index(0, 0, z >> 2), static_cast<std::uint32_t>(z & 3)};
+    return {packed_index(0, 0, z >> 1), static_cast<std::uint32_t>(z & 1)};
   }
   /// A voxel's place: its brick, and its cell there.
   [[nodiscard]] static constexpr Part place(Part x, Part y, Part z) {
@@ -76,7 +76,7 @@ class BrickIndex {
   }
 
  private:
-  using Brick = std::array<std::uint32_t, brick_side * brick_side * brick_side>;
+  using Brick = std::array<std::uint32_t, 4 * 4 * 2>;
 
   tsl::robin_map<std::uint64_t, std::uint32_t, IndexHash> bricks_by_key_;
   std::vector<Brick> bricks_;
@@ -87,6 +87,9 @@ inline std::uint32_t BrickIndex::brick_at(std::uint64_t brick_key) {
   const auto [entry, is_new] = bricks_by_key_.try_emplace(brick_key, 0U);
   if (!is_new) return entry->second;
   if (free_.empty()) {
+    // Less room ahead than vectors take by themselves: many maps have many of these.
+    if (bricks_.size() == bricks_.capacity())
+      bricks_.reserve(bricks_.size() + bricks_.size() / 8 + 8);
     free_.push_back(static_cast<std::uint32_t>(bricks_.size()));
     bricks_.emplace_back();
   }
@@ -100,7 +103,7 @@ template <typename BrickPredicate, typename Predicate>
 void BrickIndex::erase_if(BrickPredicate is_looked_at, Predicate predicate) {
   for (auto entry = bricks_by_key_.begin(); entry != bricks_by_key_.end();) {
     const auto [x, y, z] = unpacked_index(entry->first);
-    if (!is_looked_at(brick_side * x, brick_side * y, brick_side * z)) {
+    if (!is_looked_at(4 * x, 4 * y, 2 * z)) {
       ++entry;
       continue;
     }

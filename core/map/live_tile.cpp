@@ -19,11 +19,11 @@ constexpr int layer_bias = 1 << 15;
 /// So many points are looked up before they are added: their voxels are on their way meanwhile.
 constexpr std::size_t block_size = 64;
 
-/// Place of a voxel in the index: the key's parts have 4 voxels to a brick each.
+/// Place of a voxel in the index: bricks have 4 columns, 4 rows and 2 layers.
 BrickIndex::Part place_of(std::uint32_t voxel_key) {
-  constexpr std::uint32_t in_brick = 0x03030003;
+  constexpr std::uint32_t in_brick = 0x03030001;
   const std::uint32_t cell = voxel_key & in_brick;
-  return {voxel_key & ~in_brick, (cell >> 20 | cell >> 14 | cell) & 63U};
+  return {voxel_key & ~in_brick, (cell >> 21 | cell >> 15 | cell) & 31U};
 }
 
 /// The first format does not store hits: the maximum is assumed, so that the voxel is not cleared

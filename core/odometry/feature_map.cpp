@@ -271,8 +271,8 @@ void FeatureMap::remove_far_from(const Eigen::Vector3f& centre_map) {
   if (kept_round_map_ && (centre_map - *kept_round_map_).norm() < 0.02F * radius_m_) return;
   kept_round_map_ = centre_map;
   // What lies well within the radius stays without being looked at.
-  const float brick_size_m = BrickIndex::brick_side * voxel_size_m_;
-  const float inner_radius_m = radius_m_ - std::sqrt(3.0F) * brick_size_m;
+  constexpr float brick_diagonal_voxels = 6.0F;
+  const float inner_radius_m = radius_m_ - brick_diagonal_voxels * voxel_size_m_;
   const auto is_near_the_edge = [&](int x, int y, int z) {
     const Eigen::Vector3f corner_map = voxel_size_m_ * Eigen::Vector3i(x, y, z).cast<float>();
     return !((corner_map - centre_map).norm() < inner_radius_m);
