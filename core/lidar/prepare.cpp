@@ -20,7 +20,8 @@ class Usable {
   explicit Usable(const PrepareConfig& config)
       : min_squared_(static_cast<float>(config.min_range_m * config.min_range_m)),
         max_squared_(static_cast<float>(config.max_range_m * config.max_range_m)),
-        ego_hull_lidar_(config.ego_hull_lidar.cast<float>()) {}
+        ego_hull_lidar_(config.ego_hull_lidar.cast<float>()),
+        has_ego_hull_(!ego_hull_lidar_.isEmpty()) {}
 
   bool operator()(const Eigen::Vector3f& point_lidar) const {
     const float squared = point_lidar.squaredNorm();
@@ -28,13 +29,14 @@ class Usable {
     if (!(squared >= min_squared_ && squared <= max_squared_ && std::isfinite(squared))) {
       return false;
     }
-    return ego_hull_lidar_.isEmpty() || !ego_hull_lidar_.contains(point_lidar);
+    return !has_ego_hull_ || !ego_hull_lidar_.contains(point_lidar);
   }
 
  private:
   float min_squared_;
   float max_squared_;
   Eigen::AlignedBox3f ego_hull_lidar_;
+  bool has_ego_hull_;
 };
 
 float repaired_intensity(float intensity) {
@@ -89,19 +91,24 @@ class ScrewMotion {
 
 std::vector<std::uint32_t> usable_points(const Scan& scan, const PrepareConfig& config) {
   const Usable usable(config);
-  std::vector<std::uint32_t> indices;
-  indices.reserve(scan.size());
+  std::vector<std::uint32_t> indices(scan.size());
+  std::size_t count = 0;
   for (std::size_t i = 0; i < scan.size(); ++i) {
-    if (usable(scan.points_lidar[i])) indices.push_back(static_cast<std::uint32_t>(i));
+    indices[count] = static_cast<std::uint32_t>(i);
+    count += usable(scan.points_lidar[i]) ? 1 : 0;
   }
+  indices.resize(count);
   return indices;
 }
 
 Scan drop_unusable_points(Scan scan, const PrepareConfig& config) {
   const std::vector<std::uint32_t> kept = usable_points(scan, config);
-  const auto keep = [&kept](auto& values) {
+  // Up to the first point that is dropped all stay where they are.
+  std::size_t first_moved = 0;
+  while (first_moved < kept.size() && kept[first_moved] == first_moved) ++first_moved;
+  const auto keep = [&](auto& values) {
     if (values.empty()) return;
-    for (std::size_t i = 0; i < kept.size(); ++i) values[i] = values[kept[i]];
+    for (std::size_t i = first_moved; i < kept.size(); ++i) values[i] = values[kept[i]];
     values.resize(kept.size());
   };
   keep(scan.points_lidar);

@@ -13,7 +13,6 @@ namespace {
 
 /// Finer columns would leave pixels empty between the shots of a turning lidar.
 constexpr int max_columns = 1024;
-constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
 
 /// So many points are projected at once, in vector registers.
 constexpr Eigen::Index batch_size = 256;
@@ -31,12 +30,14 @@ T small_arc_tangent(const T& t) {
 }
 
 float fast_atan2(float y, float x) {
-  const float larger = std::max(std::abs(x), std::abs(y));
-  if (!(larger > 0.0F)) return 0.0F;
-  float angle = small_arc_tangent(std::min(std::abs(x), std::abs(y)) / larger);
-  if (std::abs(y) > std::abs(x)) angle = 0.5F * pi - angle;
-  if (x < 0.0F) angle = pi - angle;
-  return std::copysign(angle, y);
+  // Without branches: the octant of the next point is anybody's guess.
+  const float width = std::abs(x);
+  const float height = std::abs(y);
+  const float larger = std::max(width, height);
+  const float within_octant =
+      small_arc_tangent(std::min(width, height) / (larger > 0.0F ? larger : 1.0F));
+  const float within_quadrant = height > width ? 0.5F * pi - within_octant : within_octant;
+  return std::copysign(x < 0.0F ? pi - within_quadrant : within_quadrant, y);
 }
 
 /// The same for many, not both of them 0.
@@ -70,9 +71,11 @@ RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> 
   for (std::size_t i = 0; i < returns.size(); ++i) {
     const auto [pixel, range_m] = returns[i];
     if (pixel == none) continue;
-    float& old = pixels_[pixel];
-    if (old != 0.0F && std::abs(old) <= range_m) continue;
-    old = !labels.empty() && is_movable(labels[i]) ? range_m : -range_m;
+    // Without branches: which of two returns comes first is anybody's guess.
+    const float old = pixels_[pixel];
+    const bool is_nearer = old == 0.0F || range_m < std::abs(old);
+    const float signed_range = !labels.empty() && is_movable(labels[i]) ? range_m : -range_m;
+    pixels_[pixel] = is_nearer ? signed_range : old;
   }
 }
 
@@ -96,26 +99,15 @@ void RangeImageView::project(std::span<const Eigen::Vector3f> points_lidar,
   const Batch column = 0.5F * (1.0F - fast_atan2(y, x) / pi) * static_cast<float>(columns_);
   for (std::size_t i = 0; i < points_lidar.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    returns[i] = {pixel_at(row[k], column[k], range_m[k]).value_or(none), range_m[k]};
+    returns[i] = {pixel_at(row[k], column[k], range_m[k]), range_m[k]};
   }
 }
 
-std::optional<std::size_t> RangeImageView::pixel_of(const Eigen::Vector3f& point_lidar,
-                                                    float range_m) const {
+std::uint32_t RangeImageView::pixel_of(const Eigen::Vector3f& point_lidar, float range_m) const {
   const float elevation = fast_atan2(point_lidar.z(), point_lidar.head<2>().norm());
   const float turn = 0.5F * (1.0F - fast_atan2(point_lidar.y(), point_lidar.x()) / pi);
   return pixel_at((fov_up_ - elevation) * rows_per_rad_, turn * static_cast<float>(columns_),
                   range_m);
-}
-
-std::optional<std::size_t> RangeImageView::pixel_at(float row, float column, float range_m) const {
-  if (!(range_m > 0.0F)) return std::nullopt;
-  // Half a row of slack: the outermost beams look along the edge of the field of view.
-  if (!(row >= -0.5F && row < static_cast<float>(rows_) + 0.5F)) return std::nullopt;
-  const int r = std::clamp(static_cast<int>(row), 0, rows_ - 1);
-  const int c = std::clamp(static_cast<int>(column), 0, columns_ - 1);
-  return static_cast<std::size_t>(r) * static_cast<std::size_t>(columns_) +
-         static_cast<std::size_t>(c);
 }
 
 std::optional<RangeImageView::Observation> RangeImageView::observe(
@@ -123,17 +115,19 @@ std::optional<RangeImageView::Observation> RangeImageView::observe(
   const Eigen::Vector3f point_lidar = T_lidar_map_ * point_map;
   Observation observation{};
   observation.point_range_m = point_lidar.norm();
-  const auto pixel = pixel_of(point_lidar, observation.point_range_m);
-  if (!pixel || pixels_[*pixel] == 0.0F) return std::nullopt;
-  observation.range_m = std::abs(pixels_[*pixel]);
-  observation.movable = pixels_[*pixel] > 0.0F;
+  const std::uint32_t pixel = pixel_of(point_lidar, observation.point_range_m);
+  if (pixel == none || pixels_[pixel] == 0.0F) return std::nullopt;
+  observation.range_m = std::abs(pixels_[pixel]);
+  observation.movable = pixels_[pixel] > 0.0F;
   observation.nearest_m = observation.range_m;
   observation.direction_map = (point_map - origin_map_) / observation.point_range_m;
-  const int row = static_cast<int>(*pixel) / columns_;
-  const int column = static_cast<int>(*pixel) % columns_;
+  const int row = static_cast<int>(pixel) / columns_;
+  const int column = static_cast<int>(pixel) - row * columns_;
+  // The image is closed at the rear.
+  const int left = column == 0 ? columns_ - 1 : column - 1;
+  const int right = column + 1 == columns_ ? 0 : column + 1;
   for (int r = std::max(0, row - 1); r <= std::min(rows_ - 1, row + 1); ++r) {
-    for (int step = -1; step <= 1; ++step) {
-      const int c = (column + step + columns_) % columns_;
+    for (const int c : {left, column, right}) {
       const float range = std::abs(pixels_[static_cast<std::size_t>(r * columns_ + c)]);
       if (range > 0.0F) observation.nearest_m = std::min(observation.nearest_m, range);
     }

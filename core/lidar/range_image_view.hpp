@@ -1,7 +1,10 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -35,16 +38,22 @@ class RangeImageView {
   void move_to(const Eigen::Isometry3d& T_map_lidar);
 
  private:
+  static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
   /// Pixel and range of a measured point.
   struct Return {
-    std::size_t pixel = 0;
+    std::uint32_t pixel = 0;
     float range_m = 0.0F;
   };
   void project(std::span<const Eigen::Vector3f> points_lidar, std::span<Return> returns) const;
-  /// Nothing outside the field of view, or without a range.
-  [[nodiscard]] std::optional<std::size_t> pixel_at(float row, float column, float range_m) const;
-  [[nodiscard]] std::optional<std::size_t> pixel_of(const Eigen::Vector3f& point_lidar,
-                                                    float range_m) const;
+  /// `none` outside the field of view, or without a range.
+  [[nodiscard]] std::uint32_t pixel_at(float row, float column, float range_m) const {
+    // Half a row of slack: the outermost beams look along the edge of the field of view.
+    const bool is_seen = range_m > 0.0F && row >= -0.5F && row < static_cast<float>(rows_) + 0.5F;
+    const int r = std::clamp(static_cast<int>(is_seen ? row : 0.0F), 0, rows_ - 1);
+    const int c = std::clamp(static_cast<int>(is_seen ? column : 0.0F), 0, columns_ - 1);
+    return is_seen ? static_cast<std::uint32_t>(r * columns_ + c) : none;
+  }
+  [[nodiscard]] std::uint32_t pixel_of(const Eigen::Vector3f& point_lidar, float range_m) const;
 
   int rows_;
   int columns_;

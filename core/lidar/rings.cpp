@@ -132,19 +132,17 @@ bool is_seam(const StepsAtCuts& first, const StepsAtCuts& second) {
 
 /// Whether ring numbers grow downwards: the mean ring of the upper half is the smaller one.
 bool numbered_from_top(const Scan& scan) {
-  double mean_ring = 0.0, mean_slope = 0.0;
-  double covariance = 0.0;
-  std::size_t count = 0;
+  double rings = 0.0, slopes = 0.0, products = 0.0;
+  double count = 0.0;
   for (std::size_t i = 0; i < scan.size(); ++i) {
     const double s = slope(scan.points_lidar[i]);
     if (!std::isfinite(s)) continue;
-    const double ring_step = scan.ring[i] - mean_ring;
-    ++count;
-    mean_ring += ring_step / static_cast<double>(count);
-    mean_slope += (s - mean_slope) / static_cast<double>(count);
-    covariance += ring_step * (s - mean_slope);
+    count += 1.0;
+    rings += scan.ring[i];
+    slopes += s;
+    products += scan.ring[i] * s;
   }
-  return covariance <= 0.0;
+  return products * count <= rings * slopes;
 }
 
 std::vector<std::uint16_t> rings_from_field(const Scan& scan, const SensorModel& sensor) {

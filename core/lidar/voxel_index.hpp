@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -11,6 +12,15 @@ namespace stillmap {
   constexpr std::uint64_t mask = (1U << 21) - 1;
   const auto part = [](std::int64_t index) { return static_cast<std::uint64_t>(index) & mask; };
   return part(x) << 42 | part(y) << 21 | part(z);
+}
+
+/// x, y and z of a packed index.
+[[nodiscard]] constexpr std::array<int, 3> unpacked_index(std::uint64_t key) {
+  // Shifts back and forth carry the sign.
+  const auto part = [key](int shift) {
+    return static_cast<int>(static_cast<std::int64_t>(key << (43 - shift)) >> 43);
+  };
+  return {part(42), part(21), part(0)};
 }
 
 /// Hash of packed indices for tables that use its low bits (finaliser of MurmurHash3): neighbours

@@ -7,6 +7,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "core/lidar/prefetch.hpp"
 #include "core/map/tile.hpp"
 
 namespace stillmap {
@@ -15,6 +16,15 @@ namespace {
 /// Misses of a voxel are counted up to here.
 constexpr std::uint16_t max_misses = 1000;
 constexpr int layer_bias = 1 << 15;
+/// So many points are looked up before they are added: their voxels are on their way meanwhile.
+constexpr std::size_t block_size = 64;
+
+/// Place of a voxel in the index: bricks have 4 columns, 4 rows and 2 layers.
+BrickIndex::Part place_of(std::uint32_t voxel_key) {
+  constexpr std::uint32_t in_brick = 0x03030001;
+  const std::uint32_t cell = voxel_key & in_brick;
+  return {voxel_key & ~in_brick, (cell >> 21 | cell >> 15 | cell) & 31U};
+}
 
 /// The first format does not store hits: the maximum is assumed, so that the voxel is not cleared
 /// too early.
@@ -49,36 +59,65 @@ VoxelIndex voxel_index(std::uint32_t key) {
           static_cast<std::int16_t>(static_cast<int>(key & 0xFFFFU) - layer_bias)};
 }
 
-LiveTile::LiveVoxel* LiveTile::find(const TilePoint& point) {
-  if (point.motion != Motion::stationary) {
-    const auto known = position_.find(point.voxel_key);
-    return known == position_.end() ? nullptr : &voxels_[known->second];
+std::uint32_t LiveTile::find(const TilePoint& point, std::uint32_t& brick, std::int64_t stamp_ns) {
+  const std::uint32_t cell = place_of(point.voxel_key).cell;
+  const bool may_make_one = point.motion == Motion::stationary;
+  if (brick == BrickIndex::none && may_make_one)
+    brick = positions_.brick_at(place_of(point.voxel_key).brick_key);
+  const std::uint32_t known =
+      brick == BrickIndex::none ? BrickIndex::none : positions_.number(brick, cell);
+  if (known != BrickIndex::none) return known;
+  if (!may_make_one) {
+    exclude(point, stamp_ns);
+    return BrickIndex::none;
   }
-  const auto [slot, is_new] =
-      position_.try_emplace(point.voxel_key, static_cast<std::uint32_t>(voxels_.size()));
-  if (is_new) {
-    voxels_.emplace_back().key = point.voxel_key;
-    excluded_.erase(point.voxel_key);
-  }
-  return &voxels_[slot->second];
+  const auto position = static_cast<std::uint32_t>(voxels_.size());
+  positions_.number(brick, cell) = position;
+  voxels_.emplace_back().key = point.voxel_key;
+  excluded_.erase(point.voxel_key);
+  return position;
+}
+
+void LiveTile::remember(std::uint32_t voxel_key, std::uint32_t position) {
+  const BrickIndex::Part place = place_of(voxel_key);
+  std::uint32_t& known = positions_.number(positions_.brick_at(place.brick_key), place.cell);
+  if (known == BrickIndex::none) known = position;
 }
 
 ClassEvidence LiveTile::evidence(std::uint32_t voxel_key) const {
-  const auto known = position_.find(voxel_key);
-  return known == position_.end() ? ClassEvidence() : voxels_[known->second].evidence;
+  const std::uint32_t known = positions_.number(place_of(voxel_key));
+  return known == BrickIndex::none ? ClassEvidence() : voxels_[known].evidence;
 }
 
 void LiveTile::insert(std::span<const TilePoint> points, std::int64_t stamp_ns) {
-  LiveVoxel* voxel = nullptr;
-  for (const TilePoint& point : points) {
-    // Neighbours on a beam mostly share a voxel: no look-up for them.
-    if (voxel == nullptr || voxel->key != point.voxel_key) voxel = find(point);
-    if (voxel == nullptr) {
-      exclude(point, stamp_ns);
-    } else {
-      hit(*voxel, point, stamp_ns);
+  for (std::size_t begin = 0; begin < points.size(); begin += block_size)
+    insert_block(points.subspan(begin, std::min(block_size, points.size() - begin)), stamp_ns);
+}
+
+void LiveTile::insert_block(std::span<const TilePoint> points, std::int64_t stamp_ns) {
+  std::array<std::uint32_t, block_size> positions;
+  // Neighbours on a beam mostly share a brick, and often a voxel.
+  std::uint64_t brick_key = 0;
+  std::uint32_t brick = BrickIndex::none;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const TilePoint* const last = i == 0 ? nullptr : &points[i - 1];
+    if (last && last->voxel_key == points[i].voxel_key &&
+        (positions[i - 1] != BrickIndex::none ||
+         (last->label == points[i].label && last->motion == points[i].motion))) {
+      positions[i] = positions[i - 1];
+      continue;
     }
+    const std::uint64_t key = place_of(points[i].voxel_key).brick_key;
+    if (i == 0 || key != brick_key) brick = positions_.find_brick(key);
+    brick_key = key;
+    positions[i] = find(points[i], brick, stamp_ns);
+    if (positions[i] == BrickIndex::none) continue;
+    const LiveVoxel& voxel = voxels_[positions[i]];
+    prefetch(&voxel);
+    prefetch(&voxel + 1);
   }
+  for (std::size_t i = 0; i < points.size(); ++i)
+    if (positions[i] != BrickIndex::none) hit(voxels_[positions[i]], points[i], stamp_ns);
 }
 
 void LiveTile::hit(LiveVoxel& voxel, const TilePoint& point, std::int64_t stamp_ns) {
@@ -238,7 +277,7 @@ std::size_t LiveTile::restore_excluded(RemovalReason reason, const Eigen::Aligne
     voxel.evidence.add(excluded.label, 1.0F);
     voxel.first_seen_ns = voxel.last_seen_ns = excluded.last_seen_ns;
     voxel.history.is_restored = true;
-    position_.emplace(key, static_cast<std::uint32_t>(voxels_.size() - 1));
+    remember(key, static_cast<std::uint32_t>(voxels_.size() - 1));
     restored.push_back(key);
   }
   for (const std::uint32_t key : restored) excluded_.erase(key);
@@ -285,7 +324,7 @@ void LiveTile::add(const Voxel& known, const VoxelHistory& history, const VoxelG
     live.offset_sum.at(static_cast<std::size_t>(axis)) =
         static_cast<std::uint32_t>(std::lround(steps * points));
   }
-  position_.emplace(live.key, static_cast<std::uint32_t>(voxels_.size()));
+  remember(live.key, static_cast<std::uint32_t>(voxels_.size()));
   voxels_.push_back(live);
 }
 
@@ -324,7 +363,7 @@ std::size_t LiveTile::memory_bytes() const {
     return table.bucket_count() * (sizeof(Entry) + 4);
   };
   return sizeof(*this) + voxels_.capacity() * sizeof(LiveVoxel) +
-         sorted_.capacity() * sizeof(std::uint32_t) + table_bytes(position_) +
+         sorted_.capacity() * sizeof(std::uint32_t) + positions_.memory_bytes() +
          table_bytes(excluded_) + (published_ ? published_->voxels.capacity() * sizeof(Voxel) : 0);
 }
 

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/lidar/brick_index.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/voxel_index.hpp"
 #include "core/map/tile.hpp"
@@ -118,7 +119,12 @@ class LiveTile {
   };
 
   void add(const Voxel& known, const VoxelHistory& history, const VoxelGrid& grid);
-  [[nodiscard]] LiveVoxel* find(const TilePoint& point);
+  /// Position in `voxels_` of the point's voxel, made where a point may make one; else
+  /// BrickIndex::none, and what stays out is recorded.
+  [[nodiscard]] std::uint32_t find(const TilePoint& point, std::uint32_t& brick,
+                                   std::int64_t stamp_ns);
+  void remember(std::uint32_t voxel_key, std::uint32_t position);
+  void insert_block(std::span<const TilePoint> points, std::int64_t stamp_ns);
   static void hit(LiveVoxel& voxel, const TilePoint& point, std::int64_t stamp_ns);
   void exclude(const TilePoint& point, std::int64_t stamp_ns);
   std::size_t restore_excluded(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
@@ -138,7 +144,7 @@ class LiveTile {
 
   TileId id_;
   std::vector<LiveVoxel> voxels_;
-  tsl::robin_map<std::uint32_t, std::uint32_t, IndexHash> position_;
+  BrickIndex positions_;
   tsl::robin_map<std::uint32_t, Excluded, IndexHash> excluded_;
   /// Positions of voxels in order of their keys; those added since the last publication are not
   /// in it yet.

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -22,7 +23,11 @@ class VoxelGrid {
   /// `tile_size_m` is a whole number of voxels, at most `max_columns`.
   VoxelGrid(double voxel_size_m, double tile_size_m)
       : voxel_size_m_(voxel_size_m),
-        columns_(static_cast<int>(std::lround(tile_size_m / voxel_size_m))) {}
+        columns_(static_cast<int>(std::lround(tile_size_m / voxel_size_m))),
+        tiles_per_voxel_(1.0 / columns_),
+        max_z_m_(std::min(max_coordinate_m,
+                          // Layers are kept one off the ends of int16.
+                          voxel_size_m * (std::numeric_limits<std::int16_t>::max() - 1))) {}
 
   [[nodiscard]] double voxel_size_m() const { return voxel_size_m_; }
   [[nodiscard]] double tile_size_m() const { return voxel_size_m_ * columns_; }
@@ -35,17 +40,38 @@ class VoxelGrid {
   };
 
   /// Whether the position has a voxel: finite, and not too far from the origin.
-  [[nodiscard]] bool holds(const Eigen::Vector3d& p_map) const;
+  [[nodiscard]] bool holds(const Eigen::Vector3d& p_map) const {
+    // Written so that NaN fails every comparison.
+    return std::abs(p_map.x()) <= max_coordinate_m && std::abs(p_map.y()) <= max_coordinate_m &&
+           std::abs(p_map.z()) <= max_z_m_;
+  }
 
   /// Requires holds(p_map).
-  [[nodiscard]] Index index(const Eigen::Vector3d& p_map) const;
+  [[nodiscard]] Index index(const Eigen::Vector3d& p_map) const {
+    const Eigen::Vector3d in_voxels = p_map / voxel_size_m_;
+    const Eigen::Vector3d whole = in_voxels.array().floor();
+    const Eigen::Vector3i voxel = whole.cast<int>();
+    const TileId tile{tile_of(voxel.x()), tile_of(voxel.y())};
+    return {tile,
+            {static_cast<std::uint16_t>(voxel.x() - tile.x * columns_),
+             static_cast<std::uint16_t>(voxel.y() - tile.y * columns_),
+             static_cast<std::int16_t>(voxel.z())},
+            in_voxels - whole};
+  }
 
   /// The voxel's lowest corner, map frame [m].
   [[nodiscard]] Eigen::Vector3d corner_map(TileId tile, VoxelIndex voxel) const;
 
  private:
+  [[nodiscard]] std::int32_t tile_of(int voxel) const {
+    // Half a voxel from the tile's border, so that rounding cannot cross it.
+    return static_cast<std::int32_t>(std::floor((voxel + 0.5) * tiles_per_voxel_));
+  }
+
   double voxel_size_m_;
   int columns_;
+  double tiles_per_voxel_;
+  double max_z_m_;
 };
 
 /// The column of a tile, all heights, and a little round it: a mean in float may lie just outside.

@@ -1,16 +1,16 @@
 #pragma once
 
-#include <tsl/robin_map.h>
-
 #include <Eigen/Core>
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "core/lidar/brick_index.hpp"
+#include "core/lidar/prefetch.hpp"
 #include "core/lidar/semantic_class.hpp"
-#include "core/lidar/voxel_index.hpp"
 #include "core/odometry/odometry_config.hpp"
 
 namespace stillmap {
@@ -42,6 +42,9 @@ class FeatureMap {
   [[nodiscard]] Neighbours nearest(const Eigen::Vector3f& position_map, int n,
                                    float max_distance_m) const;
 
+  /// Asks for the memory that `nearest` will read first at this place.
+  void prefetch_near(const Eigen::Vector3f& position_map) const;
+
   /// Removes voxels whose first point is farther than the configured radius from `centre_map`,
   /// where that has moved by a fiftieth of the radius since it was last done.
   void remove_far_from(const Eigen::Vector3f& centre_map);
@@ -58,27 +61,46 @@ class FeatureMap {
 
  private:
   static constexpr int block_capacity = 32;
-  /// Points of one voxel; coordinates apart so that distances are computed eight at a time.
+  /// Points whose distances are computed at once.
+  static constexpr int group_size = 8;
+  /// Points of one voxel. Coordinates apart, by the group: few points lie in few cache lines.
   struct Block {
-    std::array<float, block_capacity> x, y, z;
-    std::array<SemanticClass, block_capacity> label;
+    struct Group {
+      std::array<float, group_size> x, y, z;
+    };
     int count = 0;
     int movable = 0;
+    std::array<SemanticClass, block_capacity> label;
+    std::array<Group, block_capacity / group_size> groups;
 
     [[nodiscard]] Eigen::Vector3f position(int i) const {
-      const auto k = static_cast<std::size_t>(i);
-      return {x[k], y[k], z[k]};
+      const Group& group = groups[static_cast<std::size_t>(i / group_size)];
+      const auto k = static_cast<std::size_t>(i % group_size);
+      return {group.x[k], group.y[k], group.z[k]};
     }
+    /// Asks for its first cache lines; the first groups are in five.
+    void prefetch_first(std::ptrdiff_t lines) const {
+      constexpr std::ptrdiff_t line_bytes = 64;
+      const auto* const begin = reinterpret_cast<const std::byte*>(this);
+      for (std::ptrdiff_t k = 0; k < lines; ++k) prefetch(begin + k * line_bytes);
+    }
+    void set_position(int i, const Eigen::Vector3f& position_map);
+    /// Squared distances of a group's points; beyond `count` they mean nothing.
+    [[nodiscard]] std::array<float, group_size> squared_distances(
+        int first, const Eigen::Vector3f& position_map) const;
     void push(const LabelledPoint& point);
     void remove(int i);
   };
+  class Nearest;
 
   [[nodiscard]] Eigen::Vector3i voxel_of(const Eigen::Vector3f& position_map) const;
-  void insert(const LabelledPoint& point);
-  [[nodiscard]] Block& block_at(std::uint64_t key);
+  void insert(const LabelledPoint& point, std::uint32_t block);
+  /// Position in `blocks_` of the voxel's block, made where there is none.
+  [[nodiscard]] std::uint32_t block_at(const Eigen::Vector3i& voxel);
+  [[nodiscard]] Neighbours neighbours_of(const Nearest& nearest) const;
 
-  /// Voxel to its place in `blocks_`: the table that every look-up walks stays small.
-  tsl::robin_map<std::uint64_t, std::uint32_t, IndexHash> index_;
+  /// Voxel to its place in `blocks_`: what every look-up walks stays small.
+  BrickIndex index_;
   std::vector<Block> blocks_;
   std::vector<std::uint32_t> free_blocks_;
   std::size_t size_ = 0;

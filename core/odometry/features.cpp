@@ -4,12 +4,12 @@
 #include <tsl/robin_map.h>
 
 #include <algorithm>
-#include <bit>
 #include <cassert>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <span>
+#include <utility>
 
 #include "core/lidar/voxel_index.hpp"
 
@@ -146,14 +146,65 @@ std::vector<bool> unreliable_points(std::span<const Eigen::Vector3f> ring) {
   return unreliable;
 }
 
-constexpr std::uint64_t unused = ~std::uint64_t{0};
-
-std::uint64_t cube_of(const Eigen::Vector3f& point, float inverse_spacing) {
-  const Eigen::Array3i cube = (point.array() * inverse_spacing).floor().cast<int>();
-  constexpr std::uint64_t mask = (1U << 21) - 1;
-  const auto part = [](int v) { return static_cast<std::uint64_t>(v) & mask; };
-  return part(cube.x()) << 42 | part(cube.y()) << 21 | part(cube.z());
+Eigen::Array3i cube_of(const Eigen::Vector3f& point, float inverse_spacing) {
+  return (point.array() * inverse_spacing).floor().cast<int>();
 }
+
+/// Cubes of space that are taken, 64 to a brick of 4 x 4 x 4: points that were measured one after
+/// the other mostly share a brick, and no look-up is needed for them.
+class TakenCubes {
+ public:
+  TakenCubes() : slots_(initial_slots) {}
+
+  /// Whether it was free until now.
+  bool take(const Eigen::Array3i& cube) {
+    const std::uint64_t brick = packed_index(cube.x() >> 2, cube.y() >> 2, cube.z() >> 2);
+    if (brick != brick_) go_to(brick);
+    const int place = (cube.x() & 3) << 4 | (cube.y() & 3) << 2 | (cube.z() & 3);
+    const std::uint64_t bit = std::uint64_t{1} << place;
+    const bool was_free = (taken_ & bit) == 0;
+    taken_ |= bit;
+    return was_free;
+  }
+
+ private:
+  static constexpr std::size_t initial_slots = 2048;
+  static constexpr std::uint64_t unused = ~std::uint64_t{0};
+  struct Slot {
+    std::uint64_t brick = unused;
+    std::uint64_t taken = 0;
+  };
+
+  [[nodiscard]] std::size_t slot_of(std::uint64_t brick) const {
+    std::size_t slot = IndexHash{}(brick) & (slots_.size() - 1);
+    while (slots_[slot].brick != unused && slots_[slot].brick != brick)
+      slot = (slot + 1) & (slots_.size() - 1);
+    return slot;
+  }
+  void go_to(std::uint64_t brick) {
+    if (brick_ != unused) slots_[slot_].taken = taken_;
+    brick_ = brick;
+    slot_ = slot_of(brick);
+    taken_ = slots_[slot_].taken;
+    if (slots_[slot_].brick == brick) return;
+    slots_[slot_].brick = brick;
+    if (2 * ++bricks_ > slots_.size()) grow();
+  }
+  void grow() {
+    std::vector<Slot> old(2 * slots_.size());
+    old.swap(slots_);
+    for (const Slot& slot : old)
+      if (slot.brick != unused) slots_[slot_of(slot.brick)] = slot;
+    slot_ = slot_of(brick_);
+  }
+
+  std::vector<Slot> slots_;
+  std::size_t bricks_ = 0;
+  /// The last brick: what is taken of it, and where that belongs.
+  std::uint64_t brick_ = unused;
+  std::uint64_t taken_ = 0;
+  std::size_t slot_ = 0;
+};
 
 }  // namespace
 
@@ -175,24 +226,14 @@ namespace {
 std::vector<std::uint32_t> first_in_cubes(std::span<const Eigen::Vector3f> points,
                                           std::span<const std::uint32_t> chosen,
                                           float inverse_spacing) {
-  // An open-addressing set of its own: it is filled once and thrown away, so it needs neither
-  // growth nor deletion.
-  const std::size_t slots = std::bit_ceil(2 * chosen.size() + 1);
-  std::vector<std::uint64_t> taken(slots, unused);
-  std::vector<std::uint32_t> kept;
-  kept.reserve(chosen.size() / 2);
-  std::uint64_t last = unused;
+  TakenCubes taken;
+  std::vector<std::uint32_t> kept(chosen.size());
+  std::size_t count = 0;
   for (const std::uint32_t i : chosen) {
-    const std::uint64_t cube = cube_of(points[i], inverse_spacing);
-    // Points that were measured one after the other mostly share one.
-    if (cube == last) continue;
-    last = cube;
-    std::size_t slot = (cube * 0x9e3779b97f4a7c15ULL) >> 20 & (slots - 1);
-    while (taken[slot] != unused && taken[slot] != cube) slot = (slot + 1) & (slots - 1);
-    if (taken[slot] == cube) continue;
-    taken[slot] = cube;
-    kept.push_back(i);
+    kept[count] = i;
+    count += taken.take(cube_of(points[i], inverse_spacing)) ? 1 : 0;
   }
+  kept.resize(count);
   return kept;
 }
 
@@ -255,8 +296,9 @@ class ColumnHeights {
     float high;
   };
   static std::uint64_t column_of(const Eigen::Vector3f& point) {
-    constexpr float inverse_width = 1.0F;
-    return cube_of({point.x(), point.y(), 0.0F}, inverse_width);
+    // Columns of 1 m.
+    return packed_index(static_cast<int>(std::floor(point.x())),
+                        static_cast<int>(std::floor(point.y())), 0);
   }
   tsl::robin_map<std::uint64_t, Range, IndexHash> heights_;
 };
@@ -269,13 +311,15 @@ std::vector<std::uint32_t> some_of(const std::vector<std::uint32_t>& all, std::s
   return some;
 }
 
-/// Points of any kind for the alignment of points, from the `chosen` ones.
-void pick_points(const Scan& scan, std::span<const std::uint32_t> chosen, Features& features) {
-  constexpr double map_spacing_m = 0.5;
+/// Spacing of the points of any kind in the local map [m].
+constexpr double map_point_spacing_m = 0.5;
+
+/// Points of any kind for the alignment of points, from those of the map's spacing.
+void pick_points(const Scan& scan, std::vector<std::uint32_t> spaced, Features& features) {
   constexpr double spacing_m = 1.0;
   constexpr std::size_t max_upright = 800;
   constexpr std::size_t max_level = 300;
-  features.points = voxel_downsample(scan.points_lidar, chosen, map_spacing_m);
+  features.points = std::move(spaced);
   const ColumnHeights columns(scan.points_lidar, features.points);
   std::vector<std::uint32_t> upright, level;
   for (const std::uint32_t i : voxel_downsample(scan.points_lidar, features.points, spacing_m))
@@ -293,7 +337,12 @@ Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
   features.planes = voxel_downsample(scan.points_lidar, all, config.map_surface_spacing_m);
   features.surfaces =
       voxel_downsample(scan.points_lidar, features.planes, config.surface_spacing_m);
-  pick_points(scan, features.planes, features);
+  const bool are_points_spaced = config.surface_spacing_m == map_point_spacing_m;
+  pick_points(scan,
+              are_points_spaced
+                  ? features.surfaces
+                  : voxel_downsample(scan.points_lidar, features.planes, map_point_spacing_m),
+              features);
   return features;
 }
 
@@ -320,7 +369,7 @@ Features extract_features(const Scan& scan, const FeatureConfig& config) {
       voxel_downsample(scan.points_lidar, features.planes, config.plane_spacing_m);
   std::vector<std::uint32_t> all(scan.size());
   std::iota(all.begin(), all.end(), 0U);
-  pick_points(scan, all, features);
+  pick_points(scan, voxel_downsample(scan.points_lidar, all, map_point_spacing_m), features);
   return features;
 }
 

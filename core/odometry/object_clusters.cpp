@@ -2,6 +2,8 @@
 
 #include <tsl/robin_map.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <numeric>
 #include <optional>
 
@@ -26,6 +28,9 @@ std::uint64_t kind_of(SemanticClass label) {
 struct Cube {
   Eigen::Vector3i index;
   std::uint64_t kind;
+  /// Lowest and highest of its points [m].
+  float low_m;
+  float high_m;
 };
 
 std::uint64_t key_of(const Eigen::Vector3i& index, std::uint64_t kind) {
@@ -69,6 +74,28 @@ void join_neighbours(const std::vector<Cube>& cubes, const CubeTable& table, Set
   }
 }
 
+/// Objects in the order of their first cubes, which is that of their first points.
+std::vector<std::int32_t> number_objects(const std::vector<Cube>& cubes, Sets& sets,
+                                         ObjectClusters& objects) {
+  std::vector<std::int32_t> object_of_root(cubes.size(), ObjectClusters::none);
+  std::vector<std::int32_t> object_of_cube(cubes.size());
+  std::vector<Eigen::AlignedBox1f> heights;
+  for (std::size_t c = 0; c < cubes.size(); ++c) {
+    std::int32_t& number = object_of_root[sets.root(static_cast<std::uint32_t>(c))];
+    if (number == ObjectClusters::none) {
+      number = static_cast<std::int32_t>(heights.size());
+      heights.emplace_back();
+    }
+    object_of_cube[c] = number;
+    Eigen::AlignedBox1f& height = heights[static_cast<std::size_t>(number)];
+    height.extend(Eigen::AlignedBox1f::VectorType(cubes[c].low_m));
+    height.extend(Eigen::AlignedBox1f::VectorType(cubes[c].high_m));
+  }
+  objects.count = heights.size();
+  for (const Eigen::AlignedBox1f& height : heights) objects.height_m.push_back(height.sizes()[0]);
+  return object_of_cube;
+}
+
 }  // namespace
 
 ObjectClusters cluster_objects(std::span<const Eigen::Vector3f> points_lidar,
@@ -82,8 +109,9 @@ ObjectClusters cluster_objects(std::span<const Eigen::Vector3f> points_lidar,
   std::int32_t last_cube = ObjectClusters::none;
   for (std::size_t i = 0; i < points_lidar.size(); ++i) {
     if (!is_movable(labels[i])) continue;
-    const Cube cube{(points_lidar[i] * inverse_gap).array().floor().cast<int>(),
-                    kind_of(labels[i])};
+    const float z_m = points_lidar[i].z();
+    const Cube cube{(points_lidar[i] * inverse_gap).array().floor().cast<int>(), kind_of(labels[i]),
+                    z_m, z_m};
     const std::uint64_t key = key_of(cube.index, cube.kind);
     // Points that were measured one after the other mostly share a cube.
     if (key != last_key) {
@@ -92,16 +120,17 @@ ObjectClusters cluster_objects(std::span<const Eigen::Vector3f> points_lidar,
       last_key = key;
       last_cube = static_cast<std::int32_t>(entry->second);
     }
+    Cube& own = cubes[static_cast<std::size_t>(last_cube)];
+    own.low_m = std::min(own.low_m, z_m);
+    own.high_m = std::max(own.high_m, z_m);
     objects.of_point[i] = last_cube;
   }
   Sets sets(cubes.size());
   join_neighbours(cubes, table, sets);
-  std::vector<std::int32_t> object_of_root(cubes.size(), ObjectClusters::none);
-  for (std::int32_t& object : objects.of_point) {
-    if (object == ObjectClusters::none) continue;
-    std::int32_t& number = object_of_root[sets.root(static_cast<std::uint32_t>(object))];
-    if (number == ObjectClusters::none) number = static_cast<std::int32_t>(objects.count++);
-    object = number;
+  const std::vector<std::int32_t> object_of_cube = number_objects(cubes, sets, objects);
+  for (std::int32_t& of_point : objects.of_point) {
+    if (of_point != ObjectClusters::none)
+      of_point = object_of_cube[static_cast<std::size_t>(of_point)];
   }
   return objects;
 }

@@ -15,6 +15,8 @@ struct ObjectClusters {
   /// For every point of the scan its object, `none` for points that are not movable.
   std::vector<std::int32_t> of_point;
   std::size_t count = 0;
+  /// From the lowest to the highest point of every object [m].
+  std::vector<float> height_m{};
 };
 
 /// Groups movable points of the same kind (vehicles; people; two-wheelers and their riders) that

@@ -241,8 +241,7 @@ void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& predi
 
 FeatureSets Odometry::State::registered_features(ScanInParts& parts) const {
   const auto collected = [&] {
-    const UsablePoints usable(config, parts.scan, parts.objects, parts.motion_classes,
-                              parts.movable);
+    const UsablePoints usable(config, parts.objects, parts.motion_classes, parts.movable);
     FeatureSets sets =
         ScanFeatures(parts.scan, parts.sweep, parts.labels, parts.features).registered(usable);
     sets.sweep_prior = parts.sweep_prior;
@@ -389,7 +388,7 @@ SweepPrior Odometry::State::sweep_prior(std::int64_t time_ns, const SweepTimes& 
 
 void Odometry::State::extend_map(const ScanInParts& parts, const Step& step,
                                  const Eigen::Isometry3d& T_map_middle) {
-  const UsablePoints usable(config, parts.scan, parts.objects, parts.motion_classes, parts.movable);
+  const UsablePoints usable(config, parts.objects, parts.motion_classes, parts.movable);
   FeatureSets features = ScanFeatures(parts.scan, parts.sweep, parts.labels, parts.features)
                              .of_map(usable, step.motion);
   extend_local_map(map, features, T_map_middle);

@@ -6,6 +6,7 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -15,8 +16,8 @@ namespace {
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 /// Neighbours are looked up again once the point has moved this far since [m]; nearer than that
-/// they are nearly always the same ones.
-constexpr float same_neighbours_m = 0.02F;
+/// they are nearly always the same ones: the local map's points are 0.2 m apart.
+constexpr float same_neighbours_m = 0.04F;
 /// Motion that the coarse registration can find [m].
 constexpr double coarse_reach_m = 3.0;
 
@@ -38,28 +39,47 @@ std::optional<FittedSurface> fit(FeatureKind kind, const Neighbours& neighbours)
   return kind == FeatureKind::plane ? fit_plane(neighbours) : fit_surface(neighbours);
 }
 
+/// Takes a feature to where the pose puts it. Returns whether its neighbours are to be looked up.
+bool move_to(const OdometryResult& pose, const FeaturePoint& feature, Correspondence& found) {
+  found.sweep_part = feature.sweep_part;
+  found.point_lidar =
+      compensated(feature.position_lidar.cast<double>(), found.sweep_part, pose.sweep_correction);
+  const Eigen::Vector3f point_map = (pose.T_map_lidar * found.point_lidar).cast<float>();
+  if ((point_map - found.searched_map).norm() < same_neighbours_m) return false;
+  found.searched_map = point_map;
+  return true;
+}
+
+void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& map,
+             const RegistrationConfig& config, Correspondence& found) {
+  const Neighbours neighbours = map.nearest(found.searched_map, config.neighbours,
+                                            static_cast<float>(config.max_neighbour_distance_m));
+  found.in_known_space = neighbours.count > 0;
+  const auto surface = fit(kind, neighbours);
+  found.found = surface.has_value();
+  if (!surface) return;
+  found.surface = *surface;
+  found.inconsistency = semantic_inconsistency(neighbours, feature.label);
+}
+
 /// One correspondence a feature, in the features' order whatever the number of threads.
 void find_correspondences(std::span<const FeaturePoint> features, FeatureKind kind,
                           const FeatureMap& map, const OdometryResult& pose,
                           const RegistrationConfig& config, std::span<Correspondence> found) {
+  // The map's memory for so many features is on its way while the first of them are looked up.
+  constexpr std::size_t ahead = 16;
   const tbb::blocked_range<std::size_t> all(0, features.size(), 128);
   tbb::parallel_for(all, [&](const auto& range) {
-    for (std::size_t i = range.begin(); i != range.end(); ++i) {
-      const double part = features[i].sweep_part;
-      found[i].point_lidar =
-          compensated(features[i].position_lidar.cast<double>(), part, pose.sweep_correction);
-      const Eigen::Vector3f point_map = (pose.T_map_lidar * found[i].point_lidar).cast<float>();
-      if ((point_map - found[i].searched_map).norm() < same_neighbours_m) continue;
-      found[i].searched_map = point_map;
-      found[i].sweep_part = part;
-      const Neighbours neighbours = map.nearest(
-          point_map, config.neighbours, static_cast<float>(config.max_neighbour_distance_m));
-      found[i].in_known_space = neighbours.count > 0;
-      const auto surface = fit(kind, neighbours);
-      found[i].found = surface.has_value();
-      if (!surface) continue;
-      found[i].surface = *surface;
-      found[i].inconsistency = semantic_inconsistency(neighbours, features[i].label);
+    std::array<std::size_t, ahead> moved;
+    for (std::size_t i = range.begin(); i < range.end();) {
+      std::size_t count = 0;
+      for (; i < range.end() && count < ahead; ++i) {
+        if (!move_to(pose, features[i], found[i])) continue;
+        map.prefetch_near(found[i].searched_map);
+        moved[count++] = i;
+      }
+      for (std::size_t k = 0; k < count; ++k)
+        look_up(features[moved[k]], kind, map, config, found[moved[k]]);
     }
   });
 }
@@ -315,6 +335,7 @@ OdometryResult lost_at(const Eigen::Isometry3d& T_map_lidar_predicted) {
 
 Eigen::Vector3d compensated(const Eigen::Vector3d& point_lidar, double sweep_part,
                             const PoseTangent& sweep_twist) {
+  if (sweep_part == 0.0) return point_lidar;
   const Eigen::Vector3d t = sweep_part * sweep_twist.head<3>();
   const Eigen::Vector3d r = sweep_part * sweep_twist.tail<3>();
   const Eigen::Vector3d moved = t + r.cross(point_lidar);

@@ -8,30 +8,18 @@ namespace {
 /// Objects taller than this are no vehicles or people, whatever their labels say [m].
 constexpr float max_object_height_m = 5.0F;
 
-std::vector<bool> too_tall_objects(const Scan& scan, const ObjectClusters& objects) {
-  std::vector<Eigen::AlignedBox1f> heights(objects.count);
-  for (std::size_t i = 0; i < objects.of_point.size(); ++i) {
-    if (objects.of_point[i] == ObjectClusters::none) continue;
-    heights[static_cast<std::size_t>(objects.of_point[i])].extend(
-        Eigen::AlignedBox1f::VectorType(scan.points_lidar[i].z()));
-  }
-  std::vector<bool> too_tall(objects.count);
-  for (std::size_t k = 0; k < objects.count; ++k)
-    too_tall[k] = heights[k].sizes()[0] > max_object_height_m;
-  return too_tall;
-}
-
 }  // namespace
 
-UsablePoints::UsablePoints(const OdometryConfig& config, const Scan& scan,
-                           const ObjectClusters& objects,
+UsablePoints::UsablePoints(const OdometryConfig& config, const ObjectClusters& objects,
                            const std::vector<MotionClass>& motion_classes, MovableUse movable)
     : semantic_(config.weighting == Weighting::semantic), objects_(objects) {
   if (!semantic_ || !config.motion.use_range_image_history) {
     usable_.assign(objects.count, true);
     return;
   }
-  usable_ = too_tall_objects(scan, objects);
+  usable_.resize(objects.count);
+  for (std::size_t k = 0; k < objects.count; ++k)
+    usable_[k] = objects.height_m[k] > max_object_height_m;
   if (movable == MovableUse::none) return;
   for (std::size_t k = 0; k < objects.count; ++k)
     if (motion_classes[k] == MotionClass::parked) usable_[k] = true;

@@ -25,7 +25,7 @@ enum class MovableUse {
 class UsablePoints {
  public:
   /// `objects` must outlive this.
-  UsablePoints(const OdometryConfig& config, const Scan& scan, const ObjectClusters& objects,
+  UsablePoints(const OdometryConfig& config, const ObjectClusters& objects,
                const std::vector<MotionClass>& motion_classes, MovableUse movable);
 
   [[nodiscard]] bool operator()(std::size_t i) const {

@@ -43,6 +43,16 @@ TEST(ClusterObjects, TwoCarsApartAreTwoObjects) {
   EXPECT_NE(first, second);
 }
 
+TEST(ClusterObjects, KnowsHowHighEachObjectIs) {
+  Labelled scene;
+  scene.add_car(5.0F, 2.0F);
+  for (int k = 0; k <= 10; ++k) scene.add({5.0F, 10.0F, 0.3F * static_cast<float>(k) - 1.0F}, car);
+  const ObjectClusters objects = scene.objects();
+  ASSERT_EQ(objects.height_m.size(), 2U);
+  EXPECT_FLOAT_EQ(objects.height_m[0], 0.0F);
+  EXPECT_FLOAT_EQ(objects.height_m[1], 3.0F);
+}
+
 TEST(ClusterObjects, NeighbouringCubesAreOneObjectInEveryDirection) {
   for (int x = -1; x <= 1; ++x)
     for (int y = -1; y <= 1; ++y)

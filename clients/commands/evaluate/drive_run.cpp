@@ -1,6 +1,7 @@
 #include "clients/commands/evaluate/drive_run.hpp"
 
 #include <algorithm>
+#include <ctime>
 #include <numbers>
 #include <sstream>
 #include <utility>
@@ -13,6 +14,11 @@ namespace {
 MapperConfig weighted(MapperConfig config, const std::string& weighting) {
   config.odometry.weighting = weighting_from_name(weighting);
   return config;
+}
+
+/// Time of all threads of this process on processors [ms].
+double process_ms() {
+  return 1e3 * static_cast<double>(std::clock()) / static_cast<double>(CLOCKS_PER_SEC);
 }
 
 std::string in_words(const Eigen::Isometry3d& motion) {
@@ -48,6 +54,7 @@ Json to_json(const DriveResult& result) {
                {"median_ms", result.duration.quantile(0.5)},
                {"p99_ms", result.duration.quantile(0.99)},
                {"max_ms", result.duration.quantile(1.0)},
+               {"median_processor_ms", result.processor_time.quantile(0.5)},
                {"trajectory", nullptr},
                {"health", nullptr}};
   if (result.report) json.set("trajectory", to_json(*result.report));
@@ -74,16 +81,22 @@ void DriveRun::end_stage(std::string_view stage) {
   if (stage != "segment")
     scan_ms_ += std::chrono::duration<double, std::milli>(now - stage_began_).count();
   stage_began_ = now;
+  const double processor_ms = process_ms();
+  if (stage != "segment") scan_processor_ms_ += processor_ms - stage_began_processor_ms_;
+  stage_began_processor_ms_ = processor_ms;
 }
 
 const OdometryResult* DriveRun::map(Scan scan,
                                     const std::optional<Eigen::Isometry3d>& T_world_lidar_true) {
   const std::size_t place = scans_++;
   scan_ms_ = 0.0;
+  scan_processor_ms_ = 0.0;
   stage_began_ = Clock::now();
+  stage_began_processor_ms_ = process_ms();
   const std::optional<MappedScan> mapped = mapper_.process(std::move(scan));
   if (!mapped) return nullptr;
   duration_.ms.push_back(scan_ms_);
+  processor_time_.ms.push_back(scan_processor_ms_);
   last_ = mapped->odometry;
   places_.push_back(place);
   poses_.push_back({T_world_lidar_true, last_.T_map_lidar, last_.health});
@@ -122,6 +135,7 @@ DriveResult DriveRun::result() {
   }
   for (const auto& tile : mapper_.map_snapshot()->tiles) result.voxels += tile->voxels.size();
   result.duration = duration_;
+  result.processor_time = processor_time_;
   if (pairs.size() < 2) return result;
   result.report = report_trajectory(pairs);
   result.score = evaluation::health_score(poses_);

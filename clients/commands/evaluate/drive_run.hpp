@@ -58,6 +58,8 @@ struct DriveResult {
   std::size_t voxels = 0;
   /// Of each scan, without the time for labels.
   StageDurations duration;
+  /// The same in time of all processors together, which other programs hardly change.
+  StageDurations processor_time;
 
   [[nodiscard]] std::size_t count(OdometryHealth of) const;
 };
@@ -97,8 +99,11 @@ class DriveRun {
   OdometryResult last_;
   std::size_t scans_ = 0;
   Clock::time_point stage_began_;
+  double stage_began_processor_ms_ = 0.0;
   double scan_ms_ = 0.0;
+  double scan_processor_ms_ = 0.0;
   StageDurations duration_{.stage = "scan", .ms = {}};
+  StageDurations processor_time_{.stage = "scan", .ms = {}};
 };
 
 }  // namespace stillmap::cli
