@@ -12,8 +12,9 @@ namespace {
 
 constexpr std::uint32_t no_tile = std::numeric_limits<std::uint32_t>::max();
 
-std::uint16_t offset_step(double offset) {
-  return static_cast<std::uint16_t>(std::min(offset * 1024.0, 1023.0));
+std::uint8_t offset_step(double offset) {
+  constexpr double steps = PackedVoxel::offset_steps;
+  return static_cast<std::uint8_t>(std::min(offset * steps, steps - 1.0));
 }
 
 float confidence(const PointLabels& labels, std::size_t i) {

@@ -144,6 +144,8 @@ struct StaticMap::State {
   StaticMapConfig config;
   VoxelGrid grid;
   ScanSorter sorter;
+  /// When the scans were that voxels of resident tiles name.
+  ScanStamps stamps;
   tsl::robin_map<TileId, Resident, TileIdHash> tiles;
   /// In the tile store alone, and without any voxel to show. Other tiles that are not in `tiles`
   /// but in the view are there, too.
@@ -177,6 +179,7 @@ StaticMap::State::State(const StaticMapConfig& map_config)
 
 void StaticMap::State::clear(std::uint64_t map_id) {
   tiles.clear();
+  stamps.clear();
   hidden_non_resident.clear();
   non_resident_count = 0;
   unreadable.clear();
@@ -198,7 +201,7 @@ LiveTile* StaticMap::State::tile(TileId id) {
   if (is_known_non_resident(id)) {
     return reload(id) ? tiles.find(id)->second.live.get() : nullptr;
   }
-  Resident fresh{std::make_unique<LiveTile>(id), step};
+  Resident fresh{std::make_unique<LiveTile>(id, grid), step};
   return tiles.emplace(id, std::move(fresh)).first->second.live.get();
 }
 
@@ -250,13 +253,14 @@ void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_
   assert(scan.labels.empty() || scan.labels.classes.size() == scan.scan.size());
   if (state_->is_frozen) return;
   const auto batches = state_->sorter.sort(scan, T_map_lidar);
+  const std::uint32_t number = state_->stamps.add(scan.scan.stamp_ns);
   std::vector<LiveTile*> hit(batches.size());
   std::ranges::transform(batches, hit.begin(),
                          [&](const auto& batch) { return state_->tile(batch.tile); });
   // A tile belongs to one task, which takes its points in the order of the scan: the map does not
   // depend on how many threads there are.
   tbb::parallel_for(std::size_t{0}, hit.size(), [&](std::size_t i) {
-    if (hit[i] != nullptr) hit[i]->insert(batches[i].points, scan.scan.stamp_ns);
+    if (hit[i] != nullptr) hit[i]->insert(batches[i].points, number);
   });
   ++state_->step;
   for (LiveTile* const tile : hit) {
@@ -284,9 +288,10 @@ void StaticMap::clear_seen_through(const RangeImageView& view, std::int64_t stam
   };
   const std::vector<LiveTile*> near =
       state_->tiles_near(view.origin_map(), config.clearing_range_m);
+  const std::uint32_t scan = state_->stamps.add(stamp_ns);
   std::vector<std::uint8_t> hides(near.size());
   tbb::parallel_for(std::size_t{0}, near.size(), [&](std::size_t i) {
-    hides[i] = near[i]->clear_seen_through(is_free, stamp_ns, state_->rule(), state_->grid) ? 1 : 0;
+    hides[i] = near[i]->clear_seen_through(is_free, scan, state_->rule()) ? 1 : 0;
   });
   ++state_->step;
   for (std::size_t i = 0; i < near.size(); ++i) {
@@ -311,7 +316,7 @@ std::shared_ptr<const MapSnapshot> StaticMap::view() {
   const std::uint64_t version = state_->current->version + 1;
   std::vector<std::uint8_t> changed(touched.size());
   tbb::parallel_for(std::size_t{0}, touched.size(), [&](std::size_t i) {
-    changed[i] = touched[i]->publish(version, state_->rule(), state_->grid) ? 1 : 0;
+    changed[i] = touched[i]->publish(version, state_->rule(), state_->stamps) ? 1 : 0;
   });
   for (std::size_t i = 0; i < touched.size(); ++i) {
     if (changed[i] != 0) state_->edits[touched[i]->id()] = touched[i]->published();
@@ -334,7 +339,7 @@ void StaticMap::reset(std::uint64_t map_id) { state_->clear(map_id); }
 const StaticMapConfig& StaticMap::config() const { return state_->config; }
 
 void StaticMap::State::add_resident(TileId id, const TileRecord& record) {
-  tiles.emplace(id, Resident{std::make_unique<LiveTile>(id, record, grid), 0});
+  tiles.emplace(id, Resident{std::make_unique<LiveTile>(id, record, grid, stamps), 0});
 }
 
 bool StaticMap::State::reload(TileId id) {
@@ -375,7 +380,7 @@ void StaticMap::State::evict(TileId id) {
 }
 
 std::size_t StaticMap::State::memory_bytes() const {
-  std::size_t bytes = non_resident_count * non_resident_tile_bytes;
+  std::size_t bytes = non_resident_count * non_resident_tile_bytes + stamps.memory_bytes();
   for (const auto& [id, resident] : tiles) bytes += resident.live->memory_bytes();
   return bytes;
 }
@@ -407,7 +412,7 @@ MapCheckpoint StaticMap::checkpoint(CheckpointScope scope) {
   const std::vector<LiveTile*> wanted = state_->tiles_to_store(scope);
   std::vector<TileRecord> records(wanted.size());
   tbb::parallel_for(std::size_t{0}, wanted.size(), [&](std::size_t i) {
-    records[i] = wanted[i]->record(state_->rule(), state_->grid);
+    records[i] = wanted[i]->record(state_->rule(), state_->stamps);
   });
   state_->in_checkpoint.clear();
   for (std::size_t i = 0; i < wanted.size(); ++i) {
@@ -493,7 +498,7 @@ StaticMap::RemovedVoxels StaticMap::removed(const Eigen::AlignedBox3d& box_map,
       if (state_->is_known_non_resident(id)) all.non_resident.push_back(id);
       continue;
     }
-    std::ranges::copy_if(resident->second.live->removed(state_->rule(), state_->grid),
+    std::ranges::copy_if(resident->second.live->removed(state_->rule(), state_->stamps),
                          std::back_inserter(all.voxels), [&](const RemovedVoxel& voxel) {
                            return box_map.contains(voxel.position_map.cast<double>());
                          });
@@ -510,7 +515,7 @@ std::size_t StaticMap::restore_removed(RemovalReason reason, const Eigen::Aligne
     const auto resident = state_->tiles.find(id);
     if (resident == state_->tiles.end()) continue;
     LiveTile& live = *resident->second.live;
-    const std::size_t voxels = live.restore(reason, box_map, state_->rule(), state_->grid);
+    const std::size_t voxels = live.restore(reason, box_map, state_->rule());
     if (voxels > 0) state_->touch(live);
     restored += voxels;
   }

@@ -1,8 +1,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
-#include <compare>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -10,55 +8,12 @@
 #include <vector>
 
 #include "core/lidar/semantic_class.hpp"
+#include "core/map/packed_voxels.hpp"
 #include "core/map/tile_table.hpp"
+#include "core/map/voxel.hpp"
+#include "core/map/voxel_grid.hpp"
 
 namespace stillmap {
-
-class VoxelGrid;
-
-/// A voxel's place in its tile: column and row from the tile's corner, layer from map height 0.
-struct VoxelIndex {
-  std::uint16_t x = 0;
-  std::uint16_t y = 0;
-  std::int16_t z = 0;
-  friend auto operator<=>(const VoxelIndex&, const VoxelIndex&) = default;
-};
-
-/// Votes for the classes of a voxel. Only the strongest few are kept: the size is bounded, and the
-/// winner can still change.
-class ClassEvidence {
- public:
-  /// Adds `weight` (a confidence, 0..1) for `label`, which replaces the weakest candidate when it
-  /// is none yet. `unlabeled` and weights that are not positive are ignored.
-  void add(SemanticClass label, float weight);
-  /// The class with most evidence, `unlabeled` without any.
-  [[nodiscard]] SemanticClass winner() const;
-  /// The winner's share of all evidence kept, 0..1.
-  [[nodiscard]] float share() const;
-
-  struct Vote {
-    SemanticClass label = SemanticClass::unlabeled;
-    float weight = 0.0F;
-    friend bool operator==(const Vote&, const Vote&) = default;
-  };
-  static constexpr std::size_t candidates = 3;
-  /// The votes are scaled down to this total: however long a voxel was seen as one class, max_total
-  /// * ln 2 = 139 confident votes in a row for another one turn it (some ten scans of a lidar
-  /// nearby).
-  static constexpr float max_total = 200.0F;
-  std::array<Vote, candidates> votes{};
-  friend bool operator==(const ClassEvidence&, const ClassEvidence&) = default;
-};
-
-struct Voxel {
-  VoxelIndex index;
-  std::uint32_t point_count = 0;
-  /// Mean of the points seen in it, map frame [m].
-  Eigen::Vector3f mean_map = Eigen::Vector3f::Zero();
-  ClassEvidence evidence;
-  std::int64_t first_seen_ns = 0;
-  std::int64_t last_seen_ns = 0;
-};
 
 /// Identifies the state of a tile: tells a client whether its copy is current.
 struct TileInfo {
@@ -79,7 +34,7 @@ struct TileInfo {
 /// An immutable tile; voxels sorted by index.
 struct Tile {
   TileInfo info;
-  std::vector<Voxel> voxels;
+  PackedVoxels voxels;
 };
 
 /// An immutable state of the whole map; cheap to copy, safe to read from any thread.
@@ -131,11 +86,11 @@ struct RemovedVoxel {
 /// Hash of what a client sees of a tile: of every voxel its index, its winning class and its mean
 /// to an eighth of a voxel. Counts, evidence and times are not content: they change with every
 /// scan and no plan depends on them. Voxels must be sorted by index.
-[[nodiscard]] std::uint64_t content_hash(TileId tile, std::span<const Voxel> voxels,
-                                         const VoxelGrid& grid);
+[[nodiscard]] std::uint64_t content_hash(std::span<const PackedVoxel> voxels);
 
 /// The tile of these voxels, sorted by index, with its hash and bounds.
-[[nodiscard]] Tile make_tile(TileId id, std::uint64_t revision, std::vector<Voxel> voxels,
+[[nodiscard]] Tile make_tile(TileId id, std::uint64_t revision, PackedVoxels voxels);
+[[nodiscard]] Tile make_tile(TileId id, std::uint64_t revision, std::span<const Voxel> voxels,
                              const VoxelGrid& grid);
 
 /// The tile of this id; null when the snapshot has none.

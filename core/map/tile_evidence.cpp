@@ -8,10 +8,11 @@ std::vector<RemovedVoxel> removed_voxels(const TileEvidence& evidence, double vo
                                          double tile_size_m) {
   const VoxelGrid grid(voxel_size_m, tile_size_m);
   std::vector<RemovedVoxel> removed;
-  for (const HiddenVoxel& hidden : evidence.hidden) {
-    if (!hidden.reason) continue;
-    removed.push_back({hidden.voxel.mean_map, hidden.voxel.evidence.winner(), *hidden.reason,
-                       hidden.voxel.last_seen_ns});
+  for (std::size_t i = 0; i < evidence.hidden.size(); ++i) {
+    const auto reason = evidence.hidden_states[i].reason;
+    if (!reason) continue;
+    const Voxel voxel = evidence.hidden[i];
+    removed.push_back({voxel.mean_map, voxel.evidence.winner(), *reason, voxel.last_seen_ns});
   }
   for (const ExcludedVoxel& voxel : evidence.excluded) {
     const Eigen::Vector3d centre =

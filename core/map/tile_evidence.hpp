@@ -19,12 +19,12 @@ struct VoxelHistory {
   friend bool operator==(const VoxelHistory&, const VoxelHistory&) = default;
 };
 
-/// A voxel that is not in the planning view.
-struct HiddenVoxel {
-  Voxel voxel;
+/// Why a voxel is not in the planning view.
+struct HiddenState {
   VoxelHistory history;
   /// Empty: it was hit too rarely to be shown.
   std::optional<RemovalReason> reason;
+  friend bool operator==(const HiddenState&, const HiddenState&) = default;
 };
 
 /// A voxel that only movable objects hit.
@@ -33,6 +33,7 @@ struct ExcludedVoxel {
   SemanticClass label = SemanticClass::unlabeled;
   bool was_moving = false;
   std::int64_t last_seen_ns = 0;
+  friend bool operator==(const ExcludedVoxel&, const ExcludedVoxel&) = default;
 };
 
 /// State of a tile beyond the voxels that it shows: with both, mapping resumes as if the tile had
@@ -41,8 +42,9 @@ struct TileEvidence {
   TileId id;
   /// Of the tile's voxels, in their order.
   std::vector<VoxelHistory> shown;
-  /// Sorted by index.
-  std::vector<HiddenVoxel> hidden;
+  /// Voxels that are not in the planning view, sorted by index, and why.
+  PackedVoxels hidden;
+  std::vector<HiddenState> hidden_states;
   /// Sorted by index.
   std::vector<ExcludedVoxel> excluded;
 };

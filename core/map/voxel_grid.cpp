@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/map/tile.hpp"
+
 namespace stillmap {
 namespace {
 

@@ -1,15 +1,19 @@
 #pragma once
 
 #include <algorithm>
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <memory>
 #include <vector>
 
-#include "core/map/tile.hpp"
+#include "core/map/tile_table.hpp"
+#include "core/map/voxel.hpp"
 
 namespace stillmap {
+
+struct MapSnapshot;
 
 /// The map frame cut into tiles, and tiles into voxels.
 class VoxelGrid {
@@ -31,6 +35,8 @@ class VoxelGrid {
 
   [[nodiscard]] double voxel_size_m() const { return voxel_size_m_; }
   [[nodiscard]] double tile_size_m() const { return voxel_size_m_ * columns_; }
+  /// Voxels along the side of a tile.
+  [[nodiscard]] int columns() const { return columns_; }
 
   struct Index {
     TileId tile;

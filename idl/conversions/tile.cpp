@@ -50,8 +50,23 @@ Voxel voxel_at(const stillmap_msgs::msg::MapTile& message, std::size_t i) {
   voxel.index = {message.index_x()[i], message.index_y()[i], message.index_z()[i]};
   voxel.point_count = voxels.point_count()[i];
   voxel.mean_map = {voxels.x()[i], voxels.y()[i], voxels.z()[i]};
-  voxel.evidence.votes[0] = {static_cast<SemanticClass>(voxels.label()[i]), voxels.confidence()[i]};
+  voxel.evidence.add(static_cast<SemanticClass>(voxels.label()[i]), voxels.confidence()[i]);
   return voxel;
+}
+
+/// Nothing for sizes that no map has.
+std::optional<VoxelGrid> grid_of(const stillmap_msgs::msg::MapIdentity& identity) {
+  const double columns = identity.tile_size_m() / identity.voxel_size_m();
+  if (!(identity.voxel_size_m() > 0.0 && columns >= 0.5 &&
+        columns <= VoxelGrid::max_columns + 0.5)) {
+    return std::nullopt;
+  }
+  return VoxelGrid(identity.voxel_size_m(), identity.tile_size_m());
+}
+
+bool is_in_a_tile(const Voxel& voxel) {
+  return voxel.index.x < VoxelGrid::max_columns && voxel.index.y < VoxelGrid::max_columns &&
+         voxel.mean_map.allFinite();
 }
 
 }  // namespace
@@ -117,11 +132,14 @@ std::optional<Tile> from_wire(const stillmap_msgs::msg::MapTile& message) {
       message.index_z().size() != count) {
     return std::nullopt;
   }
-  Tile tile;
-  tile.info = from_state({message.tile_x(), message.tile_y()}, message.state());
-  tile.voxels.reserve(count);
-  for (std::size_t i = 0; i < count; ++i) tile.voxels.push_back(voxel_at(message, i));
-  return tile;
+  const auto grid = grid_of(message.identity());
+  if (!grid) return std::nullopt;
+  std::vector<Voxel> voxels;
+  voxels.reserve(count);
+  for (std::size_t i = 0; i < count; ++i) voxels.push_back(voxel_at(message, i));
+  if (!std::ranges::all_of(voxels, is_in_a_tile)) return std::nullopt;
+  const TileId id{message.tile_x(), message.tile_y()};
+  return Tile{from_state(id, message.state()), PackedVoxels(id, *grid, voxels)};
 }
 
 void resize(stillmap_msgs::msg::Voxels& voxels, std::size_t count) {

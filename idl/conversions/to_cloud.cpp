@@ -35,16 +35,16 @@ std::optional<std::uint32_t> add_if(PointCloud2Builder& builder, bool present, c
   return builder.add_field(name, type);
 }
 
-std::vector<const Voxel*> voxels_in(const MapSnapshot& view,
-                                    const Eigen::AlignedBox2f& window_map) {
-  std::vector<const Voxel*> inside;
+std::vector<Voxel> voxels_in(const MapSnapshot& view,
+                             const Eigen::AlignedBox2f& window_map) {
+  std::vector<Voxel> inside;
   constexpr double everywhere = std::numeric_limits<double>::infinity();
   const Eigen::Vector2d low = window_map.min().cast<double>();
   const Eigen::Vector2d high = window_map.max().cast<double>();
   for (const auto& tile : tiles_in_box(view, {Eigen::Vector3d(low.x(), low.y(), -everywhere),
                                               Eigen::Vector3d(high.x(), high.y(), everywhere)})) {
     for (const Voxel& voxel : tile->voxels) {
-      if (window_map.contains(voxel.mean_map.head<2>())) inside.push_back(&voxel);
+      if (window_map.contains(voxel.mean_map.head<2>())) inside.push_back(voxel);
     }
   }
   return inside;
@@ -112,13 +112,13 @@ sensor_msgs::msg::PointCloud2 to_cloud(const MapSnapshot& view,
   const auto confidence = builder.add_field("confidence", FieldType::float32);
   const auto label = builder.add_field("label", FieldType::uint8);
   builder.resize(voxels.size());
-  builder.fill(x, [&](std::size_t i) { return voxels[i]->mean_map.x(); });
-  builder.fill(y, [&](std::size_t i) { return voxels[i]->mean_map.y(); });
-  builder.fill(z, [&](std::size_t i) { return voxels[i]->mean_map.z(); });
-  builder.fill(rgb, [&](std::size_t i) { return packed_colour(voxels[i]->evidence.winner()); });
-  builder.fill(confidence, [&](std::size_t i) { return voxels[i]->evidence.share(); });
+  builder.fill(x, [&](std::size_t i) { return voxels[i].mean_map.x(); });
+  builder.fill(y, [&](std::size_t i) { return voxels[i].mean_map.y(); });
+  builder.fill(z, [&](std::size_t i) { return voxels[i].mean_map.z(); });
+  builder.fill(rgb, [&](std::size_t i) { return packed_colour(voxels[i].evidence.winner()); });
+  builder.fill(confidence, [&](std::size_t i) { return voxels[i].evidence.share(); });
   builder.fill(label, [&](std::size_t i) {
-    return static_cast<std::uint8_t>(voxels[i]->evidence.winner());
+    return static_cast<std::uint8_t>(voxels[i].evidence.winner());
   });
   builder.set_dense();
   return builder.take();

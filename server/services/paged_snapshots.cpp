@@ -15,7 +15,7 @@ std::size_t table_bytes(const MapSnapshot& view) {
 std::size_t own_bytes(const MapSnapshot& view, const MapSnapshot& newer) {
   std::size_t bytes = table_bytes(view);
   TileTable::for_each_difference(view.tiles, newer.tiles, [&](const auto& old, const auto&) {
-    if (old) bytes += sizeof(Tile) + old->voxels.capacity() * sizeof(Voxel);
+    if (old) bytes += sizeof(Tile) + old->voxels.memory_bytes();
   });
   return bytes;
 }

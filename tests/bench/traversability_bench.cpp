@@ -30,7 +30,7 @@ void update_one_tile(benchmark::State& state) {
   (void)traversability.update(map);
   const auto changed = map.tiles[map.tiles.size() / 2];
   Tile without = *changed;
-  without.voxels.resize(without.voxels.size() / 2);
+  without.voxels = without.voxels.first(without.voxels.size() / 2);
   const std::array<Tile, 2> states{*changed, without};
   std::uint64_t round = 0;
   for (auto _ : state) {

@@ -76,7 +76,11 @@ class ChangingMap {
     Tile tile = *whole_.tiles[i];
     is_halved_[i] = !is_halved_[i];
     std::size_t n = 0;
-    if (is_halved_[i]) std::erase_if(tile.voxels, [&](const Voxel&) { return ++n % 2 == 0; });
+    if (is_halved_[i]) {
+      std::vector<Voxel> voxels(tile.voxels.begin(), tile.voxels.end());
+      std::erase_if(voxels, [&](const Voxel&) { return ++n % 2 == 0; });
+      tile.voxels = PackedVoxels(tile.info.id, tile.voxels.grid(), voxels);
+    }
     tile.info.revision = ++now_.version;
     now_.tiles.set(std::make_shared<const Tile>(std::move(tile)));
     return std::make_shared<const MapSnapshot>(now_);

@@ -19,7 +19,7 @@ Tile tile(TileId id, std::uint64_t revision) {
   tile.info.id = id;
   tile.info.revision = revision;
   tile.info.voxel_count = 1;
-  tile.voxels.resize(1);
+  tile.voxels = PackedVoxels(id, {0.2, 20.0}, std::vector<Voxel>(1));
   return tile;
 }
 

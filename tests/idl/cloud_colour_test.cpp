@@ -43,10 +43,10 @@ TEST(CloudColour, OfAScanIsThatOfEachPointsClass) {
 }
 
 TEST(CloudColour, OfTheMapIsThatOfEachVoxelsClass) {
-  Voxel voxel{.index = {}, .point_count = 3, .mean_map = {1.0F, 2.0F, 3.0F}, .evidence = {}};
+  Voxel voxel{.index = {}, .point_count = 3, .mean_map = {0.1F, 0.05F, 0.15F}, .evidence = {}};
   voxel.evidence.add(SemanticClass::vegetation, 1.0F);
   Tile tile;
-  tile.voxels = {voxel};
+  tile.voxels = PackedVoxels({}, {0.2, 20.0}, {&voxel, 1});
   tile.info.bounds_map.extend(voxel.mean_map);
   const MapSnapshot view{.version = 1, .tiles = {std::make_shared<const Tile>(tile)}};
   const Eigen::AlignedBox2f window(Eigen::Vector2f(-10.0F, -10.0F), Eigen::Vector2f(10.0F, 10.0F));

@@ -200,11 +200,12 @@ TEST(LabelledScanToCloud, CarriesClassConfidenceAndMotion) {
 }
 
 TEST(MapToCloud, ShowsTheVoxelsInTheWindow) {
-  Voxel inside{.index = {}, .point_count = 3, .mean_map = {1.0F, 2.0F, 3.0F}, .evidence = {}};
+  const VoxelGrid grid(0.2, 20.0);
+  Voxel inside{.index = {5, 10, 15}, .point_count = 3, .mean_map = {1.1F, 2.1F, 3.1F}, .evidence = {}};
   inside.evidence.add(SemanticClass::building, 1.0F);
-  Voxel outside{.index = {}, .point_count = 3, .mean_map = {15.0F, 2.0F, 3.0F}, .evidence = {}};
+  Voxel outside{.index = {75, 10, 15}, .point_count = 3, .mean_map = {15.1F, 2.1F, 3.1F}, .evidence = {}};
   Tile tile;
-  tile.voxels = {inside, outside};
+  tile.voxels = PackedVoxels({}, grid, std::array{inside, outside});
   tile.info.bounds_map.extend(inside.mean_map);
   tile.info.bounds_map.extend(outside.mean_map);
   const MapSnapshot view{.version = 1, .tiles = {std::make_shared<const Tile>(tile)}};
@@ -212,7 +213,7 @@ TEST(MapToCloud, ShowsTheVoxelsInTheWindow) {
       to_cloud(view, {Eigen::Vector2f(-10.0F, -10.0F), Eigen::Vector2f(10.0F, 10.0F)}, 5, "map");
   const ScanFromCloud back = to_scan(cloud, {.fields = {}, .labels_are_classes = true});
   ASSERT_TRUE(back.scan);
-  EXPECT_THAT(back.scan->points_lidar, ElementsAre(inside.mean_map));
+  EXPECT_THAT(back.scan->points_lidar, ElementsAre(tile.voxels[0].mean_map));
   EXPECT_THAT(back.scan->labels, ElementsAre(SemanticClass::building));
 }
 

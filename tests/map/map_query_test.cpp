@@ -152,7 +152,7 @@ TEST_F(MapQueryTest, CoarseCellsAreWeightedMeansOfTheirVoxels) {
         Sum& sum = cells[{int(cell.x()), int(cell.y()), int(cell.z())}];
         sum.weighted += mean * voxel.point_count;
         sum.points += voxel.point_count;
-        for (const auto& vote : voxel.evidence.votes) sum.evidence[vote.label] += vote.weight;
+        for (const auto& vote : voxel.evidence.votes()) sum.evidence[vote.label] += vote.weight;
       }
     }
     MapQuery query;

@@ -27,7 +27,7 @@ TEST(ClassEvidence, WinnerHasMostWeightNotMostVotes) {
   evidence.add(road, 0.3F);
   evidence.add(sidewalk, 0.9F);
   EXPECT_EQ(evidence.winner(), sidewalk);
-  EXPECT_NEAR(evidence.share(), 0.9F / 1.5F, 1e-6F);
+  EXPECT_NEAR(evidence.share(), 0.9F / 1.5F, ClassEvidence::weight_step);
 }
 
 TEST(ClassEvidence, EqualWeightsGiveTheSameWinnerInEitherOrder) {
@@ -54,7 +54,7 @@ TEST(ClassEvidence, UselessVotesChangeNothing) {
 TEST(ClassEvidence, InfiniteConfidenceCountsAsOne) {
   ClassEvidence evidence;
   evidence.add(car, std::numeric_limits<float>::infinity());
-  EXPECT_EQ(evidence.votes[0], (ClassEvidence::Vote{car, 1.0F}));
+  EXPECT_EQ(evidence.votes()[0], (ClassEvidence::Vote{car, 1.0F}));
 }
 
 TEST(ClassEvidence, FrequentClassIsFoundAmongManyRareOnes) {

@@ -102,7 +102,8 @@ struct Rows {
 Rows rows_of(TileId id, const VoxelGrid& grid) {
   Rows rows{made_up_tile(id, grid), {}, {}};
   rows.encoded = encode_tile(rows.tile);
-  TileEvidence evidence{.id = id, .shown = {}, .hidden = {}, .excluded = {}};
+  TileEvidence evidence;
+  evidence.id = id;
   evidence.shown.assign(rows.tile.voxels.size(), {.hits = 3, .was_shown = true});
   rows.evidence = encode_evidence(evidence);
   return rows;

@@ -21,7 +21,7 @@ constexpr std::size_t tile_voxels = 1000;
 std::shared_ptr<const Tile> tile_of(TileId id, std::uint64_t revision) {
   Tile tile;
   tile.info = {.id = id, .revision = revision, .content_hash = revision, .bounds_map = {}};
-  tile.voxels.resize(tile_voxels);
+  tile.voxels = PackedVoxels(id, {0.2, 20.0}, std::vector<Voxel>(tile_voxels));
   tile.info.voxel_count = tile_voxels;
   return std::make_shared<const Tile>(std::move(tile));
 }
@@ -177,7 +177,7 @@ class TileWindow : public testing::Test {
     Tile tile;
     tile.info = {.id = id, .revision = revision, .content_hash = revision, .bounds_map = {}};
     tile.info.voxel_count = 1;
-    tile.voxels.resize(1);
+    tile.voxels = PackedVoxels(id, {0.2, 20.0}, std::vector<Voxel>(1));
     return std::make_shared<const Tile>(std::move(tile));
   }
   void change(TileId id) {

@@ -185,19 +185,19 @@ TEST(TraversabilityMap, OldViewsStayAsTheyWere) {
   EXPECT_EQ(test::look(*area.view("square"), 0.5, 0.5).cell.reason, BlockReason::obstacle);
 }
 
-TEST(TraversabilityMap, VoxelsThatCannotBeAreLeftOut) {
+TEST(TraversabilityMap, VoxelsBeyondTheTilesColumnsAreLeftOut) {
   VoxelWorld world;
   world.ground(-4, -4, 4, 4, road);
   MapSnapshot map = world.view();
   Tile broken = *map.tiles.front();
-  broken.voxels[5].mean_map.z() = std::numeric_limits<float>::quiet_NaN();
-  broken.voxels[9].index.x = 60'000;
+  std::vector<Voxel> voxels(broken.voxels.begin(), broken.voxels.end());
+  voxels.back().index.x = 255;
+  broken.voxels = PackedVoxels(broken.info.id, broken.voxels.grid(), voxels);
   broken.info.revision = 99;
   map.tiles.set(std::make_shared<const Tile>(broken));
   TraversabilityMap area({square_robot()});
   EXPECT_NO_THROW((void)area.update(map));
 }
-
 TEST(TraversabilityMap, RefusesWhatItCannotWorkWith) {
   RobotProfile broken = square_robot();
   broken.max_step_m = -1.0;

@@ -74,7 +74,7 @@ void CoarseCells::add(const Voxel& voxel) {
   Cell& cell = state_->cells[slot->second];
   cell.point_count += voxel.point_count;
   cell.weighted_sum += mean_map * voxel.point_count;
-  for (const auto& vote : voxel.evidence.votes) {
+  for (const auto& vote : voxel.evidence.votes()) {
     if (vote.weight > 0.0F) cell.evidence.at(static_cast<std::size_t>(vote.label)) += vote.weight;
   }
 }

@@ -117,13 +117,14 @@ bool fill_page(const Selection& from, Continuation& position, std::vector<QueryV
     const Tile& tile = *read;
     const VoxelFilter filter(from.query, from.region, tile);
     for (std::size_t v = i == position.tile ? position.voxel : 0; v < tile.voxels.size(); ++v) {
-      if (!filter.matches(tile.voxels[v])) continue;
+      const Voxel voxel = tile.voxels[v];
+      if (!filter.matches(voxel)) continue;
       if (page.size() == page_size) {
         position.tile = i;
         position.voxel = v;
         return true;
       }
-      page.push_back(query_voxel(tile.voxels[v]));
+      page.push_back(query_voxel(voxel));
     }
   }
   return false;

@@ -8,7 +8,7 @@ namespace stillmap {
 namespace {
 
 std::size_t bytes_of(const Tile& tile) {
-  return sizeof(Tile) + tile.voxels.capacity() * sizeof(Voxel);
+  return sizeof(Tile) + tile.voxels.memory_bytes();
 }
 
 bool is_state(const TileInfo& a, const TileInfo& b) {

@@ -194,6 +194,10 @@ SQLite::Database opened(const fs::path& file, Open open) {
 
 /// A stored tile's counts and bounds, for its new columns.
 void fill_in_infos(SQLite::Database& database) {
+  SQLite::Statement sizes(database, "SELECT voxel_size_m, tile_size_m FROM map");
+  if (!sizes.executeStep()) return;
+  const VoxelGrid grid =
+      stored_grid(sizes.getColumn(0).getDouble(), sizes.getColumn(1).getDouble());
   SQLite::Statement row(database, "SELECT x, y, encoded FROM tiles");
   SQLite::Statement update(database,
                            "UPDATE tiles SET voxel_count = ?, min_x = ?, min_y = ?, min_z = ?, "
@@ -201,7 +205,8 @@ void fill_in_infos(SQLite::Database& database) {
   while (row.executeStep()) {
     const SQLite::Column blob = row.getColumn(2);
     const TileInfo info = decode_tile({static_cast<const std::uint8_t*>(blob.getBlob()),
-                                       static_cast<std::size_t>(blob.getBytes())})
+                                       static_cast<std::size_t>(blob.getBytes())},
+                                      grid)
                               .info;
     update.bind(1, info.voxel_count);
     for (int axis = 0; axis < 3; ++axis) {

@@ -116,7 +116,9 @@ class SqliteMapStore : public MapStore {
       SavedMap map{
           read_map_row(database_), {}, read_trajectory(database_), read_metadata(database_)};
       map.view.tiles = TileTable(read_tiles(database_, map.view));
-      if (!has_first_schema(database_)) map.tile_evidence = read_tile_evidence(database_);
+      if (!has_first_schema(database_)) {
+        map.tile_evidence = read_tile_evidence(database_, map.view);
+      }
       check_consistency(map);
       remember(map);
       return map;

@@ -151,21 +151,12 @@ TileRow tile_row(const SQLite::Statement& row) {
   return {column_tile_id(row), column_state(row), column_blob(row, 4)};
 }
 
-VoxelGrid grid_of(const MapSnapshot& sizes) {
-  const double columns = sizes.tile_size_m / sizes.voxel_size_m;
-  if (!(columns >= 0.5 && columns <= VoxelGrid::max_columns + 0.5)) {
-    throw TileCodecError("the map has tiles of " + std::to_string(sizes.tile_size_m) +
-                         " m with voxels of " + std::to_string(sizes.voxel_size_m) + " m");
-  }
-  return {sizes.voxel_size_m, sizes.tile_size_m};
-}
-
 /// Throws TileCodecError, also when the tile is not the one that the row is of.
 std::shared_ptr<const Tile> checked_tile(const TileRow& row, const VoxelGrid& grid) {
   try {
-    Tile tile = decode_tile(row.encoded);
+    Tile tile = decode_tile(row.encoded, grid);
     if (tile.info.id != row.id || stored_state_of(tile.info) != row.state ||
-        content_hash(tile.info.id, tile.voxels, grid) != tile.info.content_hash) {
+        content_hash(tile.voxels.packed()) != tile.info.content_hash) {
       throw TileCodecError("does not agree with its content hash");
     }
     return std::make_shared<const Tile>(std::move(tile));
@@ -174,9 +165,10 @@ std::shared_ptr<const Tile> checked_tile(const TileRow& row, const VoxelGrid& gr
   }
 }
 
-std::shared_ptr<const TileEvidence> checked_evidence(TileId id, const Blob& encoded) {
+std::shared_ptr<const TileEvidence> checked_evidence(TileId id, const Blob& encoded,
+                                                     const VoxelGrid& grid) {
   try {
-    TileEvidence evidence = decode_evidence(encoded);
+    TileEvidence evidence = decode_evidence(encoded, grid);
     if (evidence.id != id) throw TileCodecError("has the evidence of another tile");
     return std::make_shared<const TileEvidence>(std::move(evidence));
   } catch (const TileCodecError& error) {
@@ -297,7 +289,7 @@ std::vector<std::shared_ptr<const Tile>> read_tiles(SQLite::Database& database,
                         "SELECT x, y, revision, content_hash, encoded FROM tiles ORDER BY x, y");
   while (row.executeStep()) rows.push_back(tile_row(row));
   if (rows.empty()) return {};
-  const VoxelGrid grid = grid_of(sizes);
+  const VoxelGrid grid = stored_grid(sizes.voxel_size_m, sizes.tile_size_m);
   std::vector<std::shared_ptr<const Tile>> tiles(rows.size());
   tbb::parallel_for(std::size_t{0}, rows.size(),
                     [&](std::size_t i) { tiles[i] = checked_tile(rows[i], grid); });
@@ -322,13 +314,15 @@ TileTable read_tile_infos(SQLite::Database& database) {
   return TileTable(std::move(tiles));
 }
 
-TileEvidenceMap read_tile_evidence(SQLite::Database& database) {
+TileEvidenceMap read_tile_evidence(SQLite::Database& database, const MapSnapshot& sizes) {
   std::vector<std::pair<TileId, Blob>> rows;
   SQLite::Statement row(database, "SELECT x, y, encoded FROM memories");
   while (row.executeStep()) rows.emplace_back(column_tile_id(row), column_blob(row, 2));
+  if (rows.empty()) return {};
+  const VoxelGrid grid = stored_grid(sizes.voxel_size_m, sizes.tile_size_m);
   std::vector<std::shared_ptr<const TileEvidence>> decoded(rows.size());
   tbb::parallel_for(std::size_t{0}, rows.size(), [&](std::size_t i) {
-    decoded[i] = checked_evidence(rows[i].first, rows[i].second);
+    decoded[i] = checked_evidence(rows[i].first, rows[i].second, grid);
   });
   TileEvidenceMap tile_evidence;
   for (std::size_t i = 0; i < rows.size(); ++i) tile_evidence.emplace(rows[i].first, decoded[i]);
@@ -380,10 +374,13 @@ TileRecord read_record(SQLite::Database& database, TileId id, const MapSnapshot&
   SQLite::Statement tile(
       database, "SELECT x, y, revision, content_hash, encoded FROM tiles WHERE x = ? AND y = ?");
   bind_id(tile, id);
-  if (tile.executeStep()) record.tile = checked_tile(tile_row(tile), grid_of(sizes));
+  const auto grid = [&] { return stored_grid(sizes.voxel_size_m, sizes.tile_size_m); };
+  if (tile.executeStep()) record.tile = checked_tile(tile_row(tile), grid());
   SQLite::Statement evidence(database, "SELECT x, y, encoded FROM memories WHERE x = ? AND y = ?");
   bind_id(evidence, id);
-  if (evidence.executeStep()) record.evidence = checked_evidence(id, column_blob(evidence, 2));
+  if (evidence.executeStep()) {
+    record.evidence = checked_evidence(id, column_blob(evidence, 2), grid());
+  }
   check_consistency(record.tile.get(), record.evidence.get(), id);
   return record;
 }

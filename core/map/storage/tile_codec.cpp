@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <cstring>
 #include <string>
 #include <vector>
 
+#include "core/map/storage/byte_planes.hpp"
+#include "core/map/storage/first_tile_format.hpp"
+#include "core/map/storage/packed_codec.hpp"
 #include "core/map/storage/tile_frame.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/voxel_grid.hpp"
@@ -16,130 +18,83 @@
 namespace stillmap {
 namespace {
 
-/// Writes or reads the fields of one record in turn: one list of fields serves both ways.
-class FieldWriter {
- public:
-  explicit FieldWriter(std::uint8_t* to) : to_(to) {}
-  template <typename Field>
-  void operator()(const Field& field) {
-    std::memcpy(to_, &field, sizeof(field));
-    to_ += sizeof(field);
-  }
-
- private:
-  std::uint8_t* to_;
+struct StoredGrid {
+  double voxel_size_m = 0.0;
+  std::uint16_t columns = 0;
 };
+constexpr std::size_t grid_bytes = 8 + 2;
 
-class FieldReader {
- public:
-  explicit FieldReader(const std::uint8_t* from) : from_(from) {}
-  template <typename Field>
-  void operator()(Field& field) {
-    std::memcpy(&field, from_, sizeof(field));
-    from_ += sizeof(field);
+StoredGrid to_stored(const VoxelGrid& grid) {
+  return {grid.voxel_size_m(), static_cast<std::uint16_t>(grid.columns())};
+}
+
+/// Means are within voxels: with other sizes they would silently be elsewhere.
+void check_sizes(const StoredGrid& stored, const VoxelGrid& grid) {
+  constexpr double rounding_m = 1e-9;
+  if (std::abs(stored.voxel_size_m - grid.voxel_size_m()) <= rounding_m &&
+      stored.columns == grid.columns()) {
+    return;
   }
+  throw TileCodecError("has " + std::to_string(stored.columns) + " voxels of " +
+                       std::to_string(stored.voxel_size_m) + " m to a side, its map has " +
+                       std::to_string(grid.columns()) + " of " +
+                       std::to_string(grid.voxel_size_m()) + " m");
+}
 
- private:
-  const std::uint8_t* from_;
+template <typename Visitor, typename AnyGrid>
+void visit_grid(Visitor&& visit, AnyGrid& grid) {
+  visit(grid.voxel_size_m);
+  visit(grid.columns);
+}
+
+struct TileHeader {
+  TileInfo info;
+  StoredGrid grid;
+  std::uint32_t stamps = 0;
 };
+constexpr std::size_t tile_header_bytes = 4 + 4 + 8 + 8 + 4 + grid_bytes + 4;
 
-/// Appends the records by byte planes: the first byte of all, the second byte of all, and so on,
-/// which compresses better than record after record. `visit(visitor, record)` lists the fields,
-/// `record_bytes` of them.
-template <std::size_t record_bytes, typename Record, typename Visit>
-void append_planes(std::vector<std::uint8_t>& bytes, const std::vector<Record>& records,
-                   Visit visit) {
-  const std::size_t count = records.size();
-  std::vector<std::uint8_t> planes(count * record_bytes);
-  std::array<std::uint8_t, record_bytes> record{};
-  for (std::size_t i = 0; i < count; ++i) {
-    visit(FieldWriter(record.data()), records[i]);
-    for (std::size_t k = 0; k < record_bytes; ++k) planes[k * count + i] = record[k];
-  }
-  bytes.insert(bytes.end(), planes.begin(), planes.end());
+template <typename Visitor, typename Header>
+void visit_tile_header(Visitor visit, Header& header) {
+  visit(header.info.id.x);
+  visit(header.info.id.y);
+  visit(header.info.revision);
+  visit(header.info.content_hash);
+  visit(header.info.voxel_count);
+  visit_grid(visit, header.grid);
+  visit(header.stamps);
 }
 
-/// Fills the records from planes that begin at `planes`; there are enough bytes for all.
-template <std::size_t record_bytes, typename Record, typename Visit>
-void read_planes(const std::uint8_t* planes, std::vector<Record>& records, Visit visit) {
-  const std::size_t count = records.size();
-  std::array<std::uint8_t, record_bytes> record{};
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t k = 0; k < record_bytes; ++k) record[k] = planes[k * count + i];
-    visit(FieldReader(record.data()), records[i]);
-  }
+struct EvidenceHeader {
+  TileId id;
+  StoredGrid grid;
+  std::uint32_t shown = 0;
+  std::uint32_t hidden = 0;
+  std::uint32_t hidden_stamps = 0;
+  std::uint32_t excluded = 0;
+  std::uint32_t excluded_stamps = 0;
+};
+constexpr std::size_t evidence_header_bytes = 4 + 4 + grid_bytes + 5 * 4;
+
+template <typename Visitor, typename Header>
+void visit_evidence_header(Visitor visit, Header& header) {
+  visit(header.id.x);
+  visit(header.id.y);
+  visit_grid(visit, header.grid);
+  visit(header.shown);
+  visit(header.hidden);
+  visit(header.hidden_stamps);
+  visit(header.excluded);
+  visit(header.excluded_stamps);
 }
 
-inline constexpr std::size_t stored_voxel_bytes =
-    3 * 2 + 4 + 3 * 4 + ClassEvidence::candidates * (1 + 4) + 16;
-
-/// Every field of a voxel, in the order in which it is stored.
-template <typename Visitor, typename AnyVoxel>
-void visit_voxel(Visitor&& visit, AnyVoxel& voxel) {
-  visit(voxel.index.x);
-  visit(voxel.index.y);
-  visit(voxel.index.z);
-  visit(voxel.point_count);
-  for (int axis = 0; axis < 3; ++axis) visit(voxel.mean_map[axis]);
-  for (auto& vote : voxel.evidence.votes) {
-    visit(vote.label);
-    visit(vote.weight);
-  }
-  visit(voxel.first_seen_ns);
-  visit(voxel.last_seen_ns);
-}
-
-static_assert(std::endian::native == std::endian::little,
-              "fields are copied as they lie in memory");
-
-constexpr std::uint8_t tile_format_version = 1;
-constexpr std::size_t tile_header_bytes = 4 + 4 + 8 + 8 + 4;
-
-template <typename Visitor, typename Info>
-void visit_header(Visitor visit, Info& info) {
-  visit(info.id.x);
-  visit(info.id.y);
-  visit(info.revision);
-  visit(info.content_hash);
-  visit(info.voxel_count);
-}
-
-constexpr auto visit_fields = [](auto visit, auto& voxel) { visit_voxel(visit, voxel); };
-
-bool is_possible(const Voxel& voxel) {
-  return voxel.index.x < VoxelGrid::max_columns && voxel.index.y < VoxelGrid::max_columns &&
-         voxel.point_count > 0 && voxel.mean_map.allFinite() &&
-         std::ranges::all_of(voxel.evidence.votes, [](const ClassEvidence::Vote& vote) {
-           return static_cast<std::size_t>(vote.label) < semantic_class_count &&
-                  vote.weight >= 0.0F && vote.weight <= ClassEvidence::max_total * 2.0F;
-         });
-}
-
-Tile from_content(const std::vector<std::uint8_t>& content) {
-  Tile tile;
-  visit_header(FieldReader(content.data()), tile.info);
-  const std::size_t count = tile.info.voxel_count;
-  if (content.size() != tile_header_bytes + count * stored_voxel_bytes) {
-    throw TileCodecError("has " + std::to_string(content.size()) + " bytes for " +
-                         std::to_string(count) + " voxels");
-  }
-  tile.voxels.resize(count);
-  read_planes<stored_voxel_bytes>(content.data() + tile_header_bytes, tile.voxels, visit_fields);
-  for (const Voxel& voxel : tile.voxels) tile.info.bounds_map.extend(voxel.mean_map);
-  return tile;
-}
-
-constexpr std::uint8_t evidence_format_version = 1;
-constexpr std::size_t evidence_header_bytes = 4 + 4 + 3 * 4;
 constexpr std::size_t history_bytes = 2 + 2 + 1;
-constexpr std::size_t hidden_bytes = stored_voxel_bytes + history_bytes + 1;
-constexpr std::size_t excluded_bytes = 3 * 2 + 1 + 1 + 8;
+constexpr std::size_t state_bytes = history_bytes + 1;
+constexpr std::size_t excluded_bytes = 2 * 2 + 1 + 1 + 4;
 /// Stands for no reason.
 constexpr std::uint8_t no_reason = 255;
 
 enum Flag : std::uint8_t { was_shown_flag = 1, is_restored_flag = 2 };
-
-using Counts = std::array<std::uint32_t, 3>;
 
 /// As they are stored: plain numbers.
 struct StoredHistory {
@@ -147,16 +102,15 @@ struct StoredHistory {
   std::uint16_t misses = 0;
   std::uint8_t flags = 0;
 };
-struct StoredHidden {
-  Voxel voxel;
+struct StoredHiddenState {
   StoredHistory history;
   std::uint8_t reason = no_reason;
 };
 struct StoredExcluded {
-  VoxelIndex index;
+  KeySteps::Step step;
   std::uint8_t label = 0;
   std::uint8_t was_moving = 0;
-  std::int64_t last_seen_ns = 0;
+  std::uint32_t stamp = 0;
 };
 
 constexpr auto visit_history = [](auto&& visit, auto& history) {
@@ -164,18 +118,16 @@ constexpr auto visit_history = [](auto&& visit, auto& history) {
   visit(history.misses);
   visit(history.flags);
 };
-constexpr auto visit_hidden = [](auto&& visit, auto& hidden) {
-  visit_voxel(visit, hidden.voxel);
-  visit_history(visit, hidden.history);
-  visit(hidden.reason);
+constexpr auto visit_state = [](auto&& visit, auto& state) {
+  visit_history(visit, state.history);
+  visit(state.reason);
 };
 constexpr auto visit_excluded = [](auto&& visit, auto& excluded) {
-  visit(excluded.index.x);
-  visit(excluded.index.y);
-  visit(excluded.index.z);
+  visit(excluded.step.columns);
+  visit(excluded.step.layers);
   visit(excluded.label);
   visit(excluded.was_moving);
-  visit(excluded.last_seen_ns);
+  visit(excluded.stamp);
 };
 
 StoredHistory to_stored(const VoxelHistory& history) {
@@ -184,14 +136,9 @@ StoredHistory to_stored(const VoxelHistory& history) {
   return {history.hits, history.misses, static_cast<std::uint8_t>(flags)};
 }
 
-StoredHidden to_stored(const HiddenVoxel& hidden) {
-  return {hidden.voxel, to_stored(hidden.history),
-          hidden.reason ? static_cast<std::uint8_t>(*hidden.reason) : no_reason};
-}
-
-StoredExcluded to_stored(const ExcludedVoxel& excluded) {
-  return {excluded.index, static_cast<std::uint8_t>(excluded.label),
-          static_cast<std::uint8_t>(excluded.was_moving ? 1 : 0), excluded.last_seen_ns};
+StoredHiddenState to_stored(const HiddenState& state) {
+  return {to_stored(state.history),
+          state.reason ? static_cast<std::uint8_t>(*state.reason) : no_reason};
 }
 
 VoxelHistory from_stored(const StoredHistory& stored) {
@@ -200,22 +147,12 @@ VoxelHistory from_stored(const StoredHistory& stored) {
           (stored.flags & is_restored_flag) != 0};
 }
 
-HiddenVoxel from_stored(const StoredHidden& stored) {
-  if (!is_possible(stored.voxel)) throw TileCodecError("has an impossible hidden voxel");
-  HiddenVoxel hidden{stored.voxel, from_stored(stored.history), std::nullopt};
-  if (stored.reason == no_reason) return hidden;
+HiddenState from_stored(const StoredHiddenState& stored) {
+  HiddenState state{from_stored(stored.history), std::nullopt};
+  if (stored.reason == no_reason) return state;
   if (stored.reason >= removal_reason_count) throw TileCodecError("has an unknown reason");
-  hidden.reason = static_cast<RemovalReason>(stored.reason);
-  return hidden;
-}
-
-ExcludedVoxel from_stored(const StoredExcluded& stored) {
-  if (stored.index.x >= VoxelGrid::max_columns || stored.index.y >= VoxelGrid::max_columns ||
-      stored.label >= semantic_class_count || stored.was_moving > 1) {
-    throw TileCodecError("has an impossible excluded place");
-  }
-  return {stored.index, static_cast<SemanticClass>(stored.label), stored.was_moving == 1,
-          stored.last_seen_ns};
+  state.reason = static_cast<RemovalReason>(stored.reason);
+  return state;
 }
 
 template <typename Stored, typename Value>
@@ -227,7 +164,7 @@ std::vector<Stored> all_to_stored(const std::vector<Value>& values) {
 
 /// Reads one list and moves on behind it.
 template <std::size_t record_bytes, typename Stored, typename Value, typename Visit>
-void read_list(const std::uint8_t*& from, std::uint32_t count, std::vector<Value>& values,
+void read_list(const std::uint8_t*& from, std::size_t count, std::vector<Value>& values,
                Visit visit) {
   std::vector<Stored> stored(count);
   read_planes<record_bytes>(from, stored, visit);
@@ -236,65 +173,135 @@ void read_list(const std::uint8_t*& from, std::uint32_t count, std::vector<Value
   std::ranges::transform(stored, values.begin(), [](const Stored& s) { return from_stored(s); });
 }
 
-template <typename Visitor, typename Id, typename AnyCounts>
-void visit_header(Visitor visit, Id& id, AnyCounts& counts) {
-  visit(id.x);
-  visit(id.y);
-  for (auto& count : counts) visit(count);
+SeenTimes times_of(const std::vector<ExcludedVoxel>& excluded) {
+  std::vector<std::int64_t> stamps_ns(excluded.size());
+  std::ranges::transform(excluded, stamps_ns.begin(), &ExcludedVoxel::last_seen_ns);
+  return seen_times(stamps_ns);
+}
+
+void append_excluded(std::vector<std::uint8_t>& bytes, const std::vector<ExcludedVoxel>& excluded,
+                     const SeenTimes& seen) {
+  append_stamps(bytes, seen.stamps_ns);
+  std::vector<StoredExcluded> stored;
+  KeySteps keys;
+  for (std::size_t i = 0; i < excluded.size(); ++i) {
+    stored.push_back({keys.step_to(voxel_key(excluded[i].index)),
+                      static_cast<std::uint8_t>(excluded[i].label),
+                      static_cast<std::uint8_t>(excluded[i].was_moving ? 1 : 0),
+                      seen.stamp_of[i]});
+  }
+  append_planes<excluded_bytes>(bytes, stored, visit_excluded);
+}
+
+std::vector<ExcludedVoxel> read_excluded(const std::uint8_t*& from, const EvidenceHeader& header) {
+  const std::vector<std::int64_t> stamps_ns = read_stamps(from, header.excluded_stamps);
+  std::vector<StoredExcluded> stored(header.excluded);
+  read_planes<excluded_bytes>(from, stored, visit_excluded);
+  std::vector<ExcludedVoxel> excluded;
+  excluded.reserve(stored.size());
+  KeySteps keys;
+  for (const StoredExcluded& one : stored) {
+    if (one.label >= semantic_class_count || one.was_moving > 1 || one.stamp >= stamps_ns.size()) {
+      throw TileCodecError("has an impossible excluded place");
+    }
+    excluded.push_back({voxel_index(keys.key_at(one.step)), static_cast<SemanticClass>(one.label),
+                        one.was_moving == 1, stamps_ns[one.stamp]});
+  }
+  return excluded;
+}
+
+void check_content(const std::vector<std::uint8_t>& content, std::size_t needed,
+                   const std::string& what) {
+  if (content.size() == needed) return;
+  throw TileCodecError("has " + what + " of " + std::to_string(content.size()) +
+                       " bytes instead of " + std::to_string(needed));
+}
+
+bool is_first_format(std::span<const std::uint8_t> bytes) {
+  return !bytes.empty() && bytes[0] == first_tile_format::format_version;
 }
 
 }  // namespace
 
-std::vector<std::uint8_t> encode_tile(const Tile& tile) {
-  std::vector<std::uint8_t> content(tile_header_bytes);
-  visit_header(FieldWriter(content.data()), tile.info);
-  append_planes<stored_voxel_bytes>(content, tile.voxels, visit_fields);
-  return to_frame(tile_format_version, content);
+VoxelGrid stored_grid(double voxel_size_m, double tile_size_m) {
+  const double columns = tile_size_m / voxel_size_m;
+  if (!(voxel_size_m > 0.0 && columns >= 0.5 && columns <= VoxelGrid::max_columns + 0.5)) {
+    throw TileCodecError("the map has tiles of " + std::to_string(tile_size_m) +
+                         " m with voxels of " + std::to_string(voxel_size_m) + " m");
+  }
+  return {voxel_size_m, tile_size_m};
 }
 
-Tile decode_tile(std::span<const std::uint8_t> bytes) {
-  Tile tile = from_content(from_frame(tile_format_version, bytes, tile_header_bytes));
-  if (!std::ranges::all_of(tile.voxels, is_possible)) {
-    throw TileCodecError("has an impossible voxel");
-  }
-  const auto not_ascending = [](const Voxel& a, const Voxel& b) { return a.index >= b.index; };
-  if (std::ranges::adjacent_find(tile.voxels, not_ascending) != tile.voxels.end()) {
-    throw TileCodecError("has voxels out of order");
-  }
+std::vector<std::uint8_t> encode_tile(const Tile& tile) {
+  std::vector<std::uint8_t> content(tile_header_bytes);
+  const auto stamps_ns = tile.voxels.stamps_ns();
+  const TileHeader header{tile.info, to_stored(tile.voxels.grid()),
+                          static_cast<std::uint32_t>(stamps_ns.size())};
+  visit_tile_header(FieldWriter(content.data()), header);
+  append_stamps(content, stamps_ns);
+  append_voxels(content, tile.voxels);
+  return to_frame(tile_format, content);
+}
+
+Tile decode_tile(std::span<const std::uint8_t> bytes, const VoxelGrid& grid) {
+  if (is_first_format(bytes)) return first_tile_format::decode_tile(bytes, grid);
+  const std::vector<std::uint8_t> content = from_frame(tile_format, bytes, tile_header_bytes);
+  TileHeader header;
+  visit_tile_header(FieldReader(content.data()), header);
+  const std::size_t count = header.info.voxel_count;
+  check_content(content,
+                tile_header_bytes + header.stamps * stamp_bytes + count * packed_voxel_bytes,
+                std::to_string(count) + " voxels and a content");
+  if (count > 0) check_sizes(header.grid, grid);
+  const std::uint8_t* from = content.data() + tile_header_bytes;
+  std::vector<std::int64_t> stamps_ns = read_stamps(from, header.stamps);
+  Tile tile{header.info, read_voxels(from, count, std::move(stamps_ns), header.info.id, grid)};
+  for (const Voxel& voxel : tile.voxels) tile.info.bounds_map.extend(voxel.mean_map);
   return tile;
 }
 
 std::vector<std::uint8_t> encode_evidence(const TileEvidence& evidence) {
   std::vector<std::uint8_t> content(evidence_header_bytes);
-  const Counts counts{static_cast<std::uint32_t>(evidence.shown.size()),
-                      static_cast<std::uint32_t>(evidence.hidden.size()),
-                      static_cast<std::uint32_t>(evidence.excluded.size())};
-  visit_header(FieldWriter(content.data()), evidence.id, counts);
+  const SeenTimes excluded_times = times_of(evidence.excluded);
+  const auto hidden_stamps_ns = evidence.hidden.stamps_ns();
+  const EvidenceHeader header{evidence.id,
+                              to_stored(evidence.hidden.grid()),
+                              static_cast<std::uint32_t>(evidence.shown.size()),
+                              static_cast<std::uint32_t>(evidence.hidden.size()),
+                              static_cast<std::uint32_t>(hidden_stamps_ns.size()),
+                              static_cast<std::uint32_t>(evidence.excluded.size()),
+                              static_cast<std::uint32_t>(excluded_times.stamps_ns.size())};
+  visit_evidence_header(FieldWriter(content.data()), header);
   append_planes<history_bytes>(content, all_to_stored<StoredHistory>(evidence.shown),
                                visit_history);
-  append_planes<hidden_bytes>(content, all_to_stored<StoredHidden>(evidence.hidden), visit_hidden);
-  append_planes<excluded_bytes>(content, all_to_stored<StoredExcluded>(evidence.excluded),
-                                visit_excluded);
-  return to_frame(evidence_format_version, content);
+  append_stamps(content, hidden_stamps_ns);
+  append_voxels(content, evidence.hidden);
+  append_planes<state_bytes>(content, all_to_stored<StoredHiddenState>(evidence.hidden_states),
+                             visit_state);
+  append_excluded(content, evidence.excluded, excluded_times);
+  return to_frame(tile_format, content);
 }
 
-TileEvidence decode_evidence(std::span<const std::uint8_t> bytes) {
-  const std::vector<std::uint8_t> content =
-      from_frame(evidence_format_version, bytes, evidence_header_bytes);
+TileEvidence decode_evidence(std::span<const std::uint8_t> bytes, const VoxelGrid& grid) {
+  if (is_first_format(bytes)) return first_tile_format::decode_evidence(bytes, grid);
+  const std::vector<std::uint8_t> content = from_frame(tile_format, bytes, evidence_header_bytes);
+  EvidenceHeader header;
+  visit_evidence_header(FieldReader(content.data()), header);
+  check_content(content,
+                evidence_header_bytes + header.shown * history_bytes +
+                    header.hidden_stamps * stamp_bytes +
+                    header.hidden * (packed_voxel_bytes + state_bytes) +
+                    header.excluded_stamps * stamp_bytes + header.excluded * excluded_bytes,
+                "evidence");
   TileEvidence evidence;
-  Counts counts{};
-  visit_header(FieldReader(content.data()), evidence.id, counts);
-  const std::size_t needed = evidence_header_bytes + std::size_t{counts[0]} * history_bytes +
-                             std::size_t{counts[1]} * hidden_bytes +
-                             std::size_t{counts[2]} * excluded_bytes;
-  if (content.size() != needed) {
-    throw TileCodecError("has evidence of " + std::to_string(content.size()) +
-                         " bytes instead of " + std::to_string(needed));
-  }
+  evidence.id = header.id;
   const std::uint8_t* from = content.data() + evidence_header_bytes;
-  read_list<history_bytes, StoredHistory>(from, counts[0], evidence.shown, visit_history);
-  read_list<hidden_bytes, StoredHidden>(from, counts[1], evidence.hidden, visit_hidden);
-  read_list<excluded_bytes, StoredExcluded>(from, counts[2], evidence.excluded, visit_excluded);
+  read_list<history_bytes, StoredHistory>(from, header.shown, evidence.shown, visit_history);
+  if (header.hidden > 0) check_sizes(header.grid, grid);
+  std::vector<std::int64_t> stamps_ns = read_stamps(from, header.hidden_stamps);
+  evidence.hidden = read_voxels(from, header.hidden, std::move(stamps_ns), header.id, grid);
+  read_list<state_bytes, StoredHiddenState>(from, header.hidden, evidence.hidden_states, visit_state);
+  evidence.excluded = read_excluded(from, header);
   return evidence;
 }
 

@@ -45,29 +45,14 @@ struct PoseRow {
   std::array<double, 7> values{};
 };
 
-/// A mean is summed in float and may lie a little outside of its cell; at the edge of the map a
-/// float is no finer than 8 mm.
-constexpr double mean_slack_m = 0.02;
-
-bool lies_in_its_cell(const Voxel& voxel, TileId tile, const VoxelGrid& grid) {
-  const Eigen::Array3d from_corner =
-      voxel.mean_map.cast<double>() - grid.corner_map(tile, voxel.index);
-  return (from_corner >= -mean_slack_m).all() &&
-         (from_corner <= grid.voxel_size_m() + mean_slack_m).all();
-}
-
-std::vector<std::string> voxel_faults(const Tile& tile, const VoxelGrid& grid, double columns) {
-  const auto is_outside = [&](const Voxel& voxel) {
-    return voxel.index.x >= columns || voxel.index.y >= columns;
-  };
-  const auto is_elsewhere = [&](const Voxel& voxel) {
-    return !lies_in_its_cell(voxel, tile.info.id, grid);
+std::vector<std::string> voxel_faults(const Tile& tile, const VoxelGrid& grid) {
+  const auto is_outside = [&](const PackedVoxel& voxel) {
+    const VoxelIndex index = voxel_index(voxel.key);
+    return index.x >= grid.columns() || index.y >= grid.columns();
   };
   std::vector<std::string> faults;
-  if (const auto count = std::ranges::count_if(tile.voxels, is_outside); count > 0) {
+  if (const auto count = std::ranges::count_if(tile.voxels.packed(), is_outside); count > 0) {
     faults.push_back("has " + std::to_string(count) + " voxels outside of the tile");
-  } else if (const auto far = std::ranges::count_if(tile.voxels, is_elsewhere); far > 0) {
-    faults.push_back("has " + std::to_string(far) + " voxels whose mean lies in another cell");
   }
   return faults;
 }
@@ -80,9 +65,8 @@ bool has_usable_sizes(const MapRow& map) {
 
 /// What is wrong with a tile that was decoded from `row`; `map` has usable sizes.
 std::vector<std::string> tile_faults(const Tile& tile, const TileRow& row, const MapRow& map) {
-  const VoxelGrid grid(map.voxel_size_m, map.tile_size_m);
   std::vector<std::string> faults =
-      voxel_faults(tile, grid, std::round(map.tile_size_m / map.voxel_size_m));
+      voxel_faults(tile, VoxelGrid(map.voxel_size_m, map.tile_size_m));
   if (tile.info.id != row.id) {
     faults.push_back("says that it is tile (" + std::to_string(tile.info.id.x) + ", " +
                      std::to_string(tile.info.id.y) + ")");
@@ -90,7 +74,7 @@ std::vector<std::string> tile_faults(const Tile& tile, const TileRow& row, const
   if (tile.info.revision != row.revision || tile.info.content_hash != row.content_hash) {
     faults.emplace_back("does not agree with its row's revision and hash");
   }
-  if (content_hash(tile.info.id, tile.voxels, grid) != tile.info.content_hash) {
+  if (content_hash(tile.voxels.packed()) != tile.info.content_hash) {
     faults.emplace_back("does not agree with its content hash");
   }
   if (row.revision > map.version) {
@@ -174,37 +158,40 @@ TileRow tile_row(const SQLite::Statement& row) {
           .encoded = std::span(bytes, bytes == nullptr ? 0 : size)};
 }
 
-void check_tile(const TileRow& row, const std::optional<MapRow>& map, MapCheck& check) {
+void check_tile(const TileRow& row, const MapRow& map, MapCheck& check) {
   try {
-    const Tile tile = decode_tile(row.encoded);
+    const Tile tile = decode_tile(row.encoded, {map.voxel_size_m, map.tile_size_m});
     check.voxels += tile.voxels.size();
-    const std::vector<std::string> faults =
-        map ? tile_faults(tile, row, *map) : std::vector<std::string>();
+    const std::vector<std::string> faults = tile_faults(tile, row, map);
     for (const std::string& what : faults) check.faults.push_back({"tile", row.id, what});
-    if (map && faults.empty()) ++check.sound_tiles;
+    if (faults.empty()) ++check.sound_tiles;
   } catch (const TileCodecError& error) {
     check.faults.push_back({"tile", row.id, error.what()});
   }
 }
 
-void check_tiles(SQLite::Database& database, MapCheck& check, const CheckProgress& progress) {
-  const auto total =
-      static_cast<std::size_t>(database.execAndGet("SELECT count(*) FROM tiles").getInt64());
-  const std::optional<MapRow> map = check_map_row(database, total, check);
+std::size_t count_tiles(SQLite::Database& database) {
+  return static_cast<std::size_t>(database.execAndGet("SELECT count(*) FROM tiles").getInt64());
+}
+
+/// Without the map's sizes tiles are counted and not read.
+void check_tiles(SQLite::Database& database, const std::optional<MapRow>& map, MapCheck& check,
+                 const CheckProgress& progress) {
+  const std::size_t total = count_tiles(database);
   SQLite::Statement row(database,
                         "SELECT x, y, revision, content_hash, encoded FROM tiles ORDER BY x, y");
   while (row.executeStep()) {
-    check_tile(tile_row(row), map, check);
+    if (map) check_tile(tile_row(row), *map, check);
     ++check.tiles;
     if (progress) progress(check.tiles, total);
   }
 }
 
 void check_evidence(TileId id, std::span<const std::uint8_t> encoded, std::int64_t shown,
-                    MapCheck& check) {
+                    const MapRow& map, MapCheck& check) {
   const auto fault = [&](const std::string& what) { check.faults.push_back({"tile", id, what}); };
   try {
-    const TileEvidence evidence = decode_evidence(encoded);
+    const TileEvidence evidence = decode_evidence(encoded, {map.voxel_size_m, map.tile_size_m});
     check.hidden_voxels += evidence.hidden.size() + evidence.excluded.size();
     if (evidence.id != id) fault("has the evidence of another tile");
     if (std::ssize(evidence.shown) != shown) {
@@ -216,7 +203,7 @@ void check_evidence(TileId id, std::span<const std::uint8_t> encoded, std::int64
   }
 }
 
-void check_tile_evidence(SQLite::Database& database, MapCheck& check) {
+void check_tile_evidence(SQLite::Database& database, const MapRow& map, MapCheck& check) {
   if (has_first_schema(database)) return;
   SQLite::Statement row(database,
                         "SELECT m.x, m.y, m.encoded, coalesce(t.voxel_count, 0) FROM memories m "
@@ -227,7 +214,7 @@ void check_tile_evidence(SQLite::Database& database, MapCheck& check) {
     const auto size = static_cast<std::size_t>(blob.getBytes());
     check_evidence({row.getColumn(0).getInt(), row.getColumn(1).getInt()},
                    std::span(bytes, bytes == nullptr ? 0 : size), row.getColumn(3).getInt64(),
-                   check);
+                   map, check);
   }
 }
 
@@ -259,13 +246,15 @@ MapCheck check_map_file(const std::filesystem::path& file, const CheckProgress& 
   // Sound pages in a format that is refused are not a damaged map. Damaged pages are read as far as
   // possible, to find the tiles that are left.
   if (check.is_sound()) copy.check_format();
+  std::optional<MapRow> map;
   guarded(check, "tiles", [&] {
     SQLite::Database database(copy.path().string());
-    check_tiles(database, check, progress);
+    map = check_map_row(database, count_tiles(database), check);
+    check_tiles(database, map, check, progress);
   });
   guarded(check, "tiles", [&] {
     SQLite::Database database(copy.path().string());
-    check_tile_evidence(database, check);
+    if (map && has_usable_sizes(*map)) check_tile_evidence(database, *map, check);
   });
   guarded(check, "trajectory", [&] {
     SQLite::Database database(copy.path().string());

@@ -24,6 +24,10 @@ namespace {
 
 enum Row : std::uint8_t { sizes, pose, tile, memory, metadata, rows };
 
+/// Added to a row whose content is of the newest format; without it, of the first one.
+constexpr std::uint8_t newest_format = 130;
+static_assert(newest_format % rows == 0);
+
 /// Bytes of a row that is as long as it says: a length of 16 bits before them.
 Bytes sized_bytes(ByteSource& source) { return source.take(source.value<std::uint16_t>()); }
 
@@ -52,10 +56,9 @@ void write_pose(SQLite::Database& database, ByteSource& source) {
 /// The tile encoded with the hash of its voxels; as it stands where it is none.
 std::vector<std::uint8_t> with_hash(std::vector<std::uint8_t> encoded, TileInfo& info) {
   try {
-    Tile decoded = decode_tile(encoded);
     const StaticMapConfig config = street_config();
-    decoded.info.content_hash =
-        content_hash(decoded.info.id, decoded.voxels, {config.voxel_size_m, config.tile_size_m});
+    Tile decoded = decode_tile(encoded, {config.voxel_size_m, config.tile_size_m});
+    decoded.info.content_hash = content_hash(decoded.voxels.packed());
     info = decoded.info;
     return encode_tile(decoded);
   } catch (const TileCodecError&) {
@@ -63,9 +66,9 @@ std::vector<std::uint8_t> with_hash(std::vector<std::uint8_t> encoded, TileInfo&
   }
 }
 
-void write_tile(SQLite::Database& database, ByteSource& source) {
+void write_tile(SQLite::Database& database, std::uint8_t format, ByteSource& source) {
   TileInfo info;
-  const auto encoded = with_hash(to_frame(1, sized_bytes(source)), info);
+  const auto encoded = with_hash(to_frame(format, sized_bytes(source)), info);
   SQLite::Statement insert(
       database,
       "INSERT OR REPLACE INTO tiles (x, y, revision, content_hash, encoded, voxel_count, min_x, "
@@ -83,14 +86,14 @@ void write_tile(SQLite::Database& database, ByteSource& source) {
   insert.exec();
 }
 
-void write_memory(SQLite::Database& database, ByteSource& source) {
+void write_memory(SQLite::Database& database, std::uint8_t format, ByteSource& source) {
   const Bytes content = sized_bytes(source);
   TileId id;
   if (content.size() >= sizeof(id)) std::memcpy(&id, content.data(), sizeof(id));
   SQLite::Statement insert(database, "INSERT OR REPLACE INTO memories VALUES (?, ?, ?)");
   insert.bind(1, id.x);
   insert.bind(2, id.y);
-  bind_blob(insert, 3, to_frame(1, content));
+  bind_blob(insert, 3, to_frame(format, content));
   insert.exec();
 }
 
@@ -103,11 +106,13 @@ void write_metadata(SQLite::Database& database, ByteSource& source) {
 
 /// What the tables themselves refuse, as NaN where they want a number, is in no file.
 void write_row(SQLite::Database& database, ByteSource& source) try {
-  const auto row = static_cast<Row>(source.byte() % rows);
+  const std::uint8_t choice = source.byte();
+  const auto row = static_cast<Row>(choice % rows);
+  const std::uint8_t format = choice >= newest_format ? tile_format : 1;
   if (row == sizes) write_sizes(database, source);
   if (row == pose) write_pose(database, source);
-  if (row == tile) write_tile(database, source);
-  if (row == memory) write_memory(database, source);
+  if (row == tile) write_tile(database, format, source);
+  if (row == memory) write_memory(database, format, source);
   if (row == metadata) write_metadata(database, source);
 } catch (const SQLite::Exception&) {
 }
@@ -144,8 +149,8 @@ void run(Bytes bytes) {
 }
 
 void append_row(std::string& bytes, Row row, const std::vector<std::uint8_t>& encoded) {
-  const std::vector<std::uint8_t> content = from_frame(1, encoded, 1);
-  bytes.push_back(static_cast<char>(row));
+  const std::vector<std::uint8_t> content = from_frame(tile_format, encoded, 1);
+  bytes.push_back(static_cast<char>(newest_format + row));
   append_value(bytes, static_cast<std::uint16_t>(content.size()));
   bytes.append(content.begin(), content.end());
 }
@@ -154,7 +159,7 @@ void append_row(std::string& bytes, Row row, const std::vector<std::uint8_t>& en
 Tile first_voxels(const Tile& whole) {
   constexpr std::size_t count = 20;
   Tile tile = whole;
-  tile.voxels.resize(std::min(count, tile.voxels.size()));
+  tile.voxels = tile.voxels.first(std::min(count, tile.voxels.size()));
   tile.info.voxel_count = static_cast<std::uint32_t>(tile.voxels.size());
   return tile;
 }

@@ -111,7 +111,7 @@ std::vector<Seed> seeds() {
   QueryOccupancy_Response occupancy;
   wire::write_answers({0.2, {PointOccupancy{}}, {BoxOccupancy{}}, {RayOccupancy{}}}, occupancy);
   Tile tile = *view.tiles.front();
-  tile.voxels.resize(4);
+  tile.voxels = tile.voxels.first(4);
   dds::ServerStatus status;
   status.counters.push_back({"scans_mapped", 3});
   return {

@@ -1,6 +1,8 @@
 // A number that says how the bytes are meant: an encoded tile or memory as it is stored, or what is
 // inside the zstd frame, whose checksum would keep any change from being looked at.
 
+#include <algorithm>
+
 #include "core/map/storage/tile_codec.hpp"
 #include "core/map/storage/tile_frame.hpp"
 #include "core/map/tile_evidence.hpp"
@@ -14,30 +16,40 @@ namespace tile_inputs {
 namespace {
 
 enum Kind : std::uint8_t { tile, tile_content, memory, memory_content, kinds };
-constexpr std::uint8_t format_version = 1;
+/// Added to a kind of content of the newest format; without it, of the first one.
+constexpr std::uint8_t newest_format = 128;
+static_assert(newest_format % kinds == 0);
 
-void decode(Kind kind, Bytes bytes) {
+void decode(Kind kind, std::uint8_t format_version, Bytes bytes) {
+  const StaticMapConfig config = street_config();
+  const VoxelGrid grid(config.voxel_size_m, config.tile_size_m);
   const bool is_content = kind == tile_content || kind == memory_content;
   std::vector<std::uint8_t> framed;
   if (is_content) framed = to_frame(format_version, bytes);
   const Bytes encoded = is_content ? Bytes(framed) : bytes;
   if (kind == tile || kind == tile_content) {
-    const Tile decoded = decode_tile(encoded);
-    require(decode_tile(encode_tile(decoded)).voxels.size() == decoded.voxels.size(),
+    const Tile decoded = decode_tile(encoded, grid);
+    const Tile back = decode_tile(encode_tile(decoded), grid);
+    require(std::ranges::equal(back.voxels.packed(), decoded.voxels.packed()),
             "a tile comes back from its encoding");
+    for (const Voxel& voxel : back.voxels) require(voxel.mean_map.allFinite(), "a mean is finite");
   } else {
-    const TileEvidence decoded = decode_evidence(encoded);
-    require(decode_evidence(encode_evidence(decoded)).hidden.size() == decoded.hidden.size(),
+    const TileEvidence decoded = decode_evidence(encoded, grid);
+    const TileEvidence back = decode_evidence(encode_evidence(decoded), grid);
+    require(back.shown == decoded.shown && back.hidden_states == decoded.hidden_states &&
+                back.excluded == decoded.excluded &&
+                std::ranges::equal(back.hidden.packed(), decoded.hidden.packed()),
             "a memory comes back from its encoding");
-    static_cast<void>(removed_voxels(decoded, 0.2, 20.0));
+    static_cast<void>(removed_voxels(decoded, config.voxel_size_m, config.tile_size_m));
   }
 }
 
 void run(Bytes bytes) {
   ByteSource source(bytes);
-  const auto kind = static_cast<Kind>(source.byte() % kinds);
+  const std::uint8_t choice = source.byte();
+  const std::uint8_t format_version = choice >= newest_format ? tile_format : 1;
   try {
-    decode(kind, source.rest());
+    decode(static_cast<Kind>(choice % kinds), format_version, source.rest());
   } catch (const TileCodecError&) {
   }
 }
@@ -48,12 +60,12 @@ std::vector<Seed> seeds() {
   const auto memory_bytes = encode_evidence(*map.tile_evidence.begin()->second);
   constexpr std::size_t min_bytes = 1;
   const auto content = [&](const std::vector<std::uint8_t>& framed) {
-    return text_of(from_frame(format_version, framed, min_bytes));
+    return text_of(from_frame(tile_format, framed, min_bytes));
   };
   return {{"tile", with_choice(tile, text_of(tile_bytes))},
-          {"tile_content", with_choice(tile_content, content(tile_bytes))},
+          {"tile_content", with_choice(newest_format + tile_content, content(tile_bytes))},
           {"memory", with_choice(memory, text_of(memory_bytes))},
-          {"memory_content", with_choice(memory_content, content(memory_bytes))}};
+          {"memory_content", with_choice(newest_format + memory_content, content(memory_bytes))}};
 }
 
 }  // namespace

@@ -1,0 +1,126 @@
+#include "core/map/packed_voxels.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <cassert>
+#include <cmath>
+#include <limits>
+
+namespace stillmap {
+namespace {
+
+constexpr int content_steps = 8;
+
+/// The eighth of the voxel in which the mean lies: of the middle of its step.
+std::uint32_t content_step(std::uint32_t sum, std::uint32_t points) {
+  constexpr std::uint32_t half_steps = 2 * PackedVoxel::offset_steps / content_steps;
+  return (2 * sum + points) / (half_steps * points);
+}
+
+/// The sum of offsets whose mean is nearest to `offset` [voxels] within its eighth of the voxel.
+std::uint16_t offset_sum(double offset, std::uint32_t points) {
+  const auto eighth = static_cast<std::uint32_t>(
+      std::clamp(std::floor(offset * content_steps), 0.0, content_steps - 1.0));
+  const double most = (PackedVoxel::offset_steps - 1.0) * points;
+  const double wanted = (offset * PackedVoxel::offset_steps - 0.5) * points;
+  auto sum = static_cast<std::uint32_t>(std::lround(std::clamp(wanted, 0.0, most)));
+  while (content_step(sum, points) > eighth) --sum;
+  while (content_step(sum, points) < eighth) ++sum;
+  return static_cast<std::uint16_t>(sum);
+}
+
+}  // namespace
+
+std::uint64_t content_word(const PackedVoxel& voxel) {
+  const std::uint32_t points = voxel.mean_points();
+  std::uint64_t mean = 0;
+  for (const std::uint32_t sum : voxel.offset_sum) {
+    mean = mean * content_steps + content_step(sum, points);
+  }
+  const VoxelIndex index = voxel_index(voxel.key);
+  return std::uint64_t{index.x} << 48 | std::uint64_t{index.y} << 32 |
+         std::uint64_t{static_cast<std::uint16_t>(index.z)} << 16 | mean << 5 |
+         static_cast<std::uint64_t>(voxel.evidence.winner());
+}
+
+PackedVoxel pack(const Voxel& voxel, TileId tile, const VoxelGrid& grid) {
+  constexpr std::uint32_t most = std::numeric_limits<std::uint16_t>::max();
+  PackedVoxel packed;
+  packed.key = voxel_key(voxel.index);
+  packed.point_count =
+      static_cast<std::uint16_t>(std::clamp(voxel.point_count, std::uint32_t{1}, most));
+  packed.evidence = voxel.evidence;
+  const Eigen::Vector3d offset =
+      (voxel.mean_map.cast<double>() - grid.corner_map(tile, voxel.index)) / grid.voxel_size_m();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    packed.offset_sum.at(axis) =
+        offset_sum(offset[static_cast<Eigen::Index>(axis)], packed.mean_points());
+  }
+  return packed;
+}
+
+SeenTimes seen_times(std::span<const std::int64_t> stamps_ns) {
+  SeenTimes seen;
+  seen.stamps_ns.assign(stamps_ns.begin(), stamps_ns.end());
+  std::ranges::sort(seen.stamps_ns);
+  const auto doubles = std::ranges::unique(seen.stamps_ns);
+  seen.stamps_ns.erase(doubles.begin(), doubles.end());
+  seen.stamp_of.reserve(stamps_ns.size());
+  for (const std::int64_t stamp_ns : stamps_ns) {
+    seen.stamp_of.push_back(static_cast<std::uint32_t>(
+        std::ranges::lower_bound(seen.stamps_ns, stamp_ns) - seen.stamps_ns.begin()));
+  }
+  return seen;
+}
+
+PackedVoxels::PackedVoxels(TileId tile, const VoxelGrid& grid, std::span<const Voxel> voxels)
+    : tile_(tile), grid_(grid) {
+  std::vector<std::int64_t> stamps_ns;
+  voxels_.reserve(voxels.size());
+  stamps_ns.reserve(2 * voxels.size());
+  for (const Voxel& voxel : voxels) {
+    voxels_.push_back(pack(voxel, tile, grid));
+    stamps_ns.push_back(voxel.first_seen_ns);
+    stamps_ns.push_back(voxel.last_seen_ns);
+  }
+  set_stamps(seen_times(stamps_ns));
+}
+
+PackedVoxels::PackedVoxels(TileId tile, const VoxelGrid& grid, std::vector<PackedVoxel> voxels,
+                           const SeenTimes& seen)
+    : tile_(tile), grid_(grid), voxels_(std::move(voxels)) {
+  set_stamps(seen);
+}
+
+void PackedVoxels::set_stamps(const SeenTimes& seen) {
+  assert(seen.stamp_of.size() == 2 * voxels_.size());
+  stamps_ns_ = seen.stamps_ns;
+  stamp_bits_ = static_cast<unsigned>(std::bit_width(std::max<std::size_t>(stamps_ns_.size(), 1) - 1));
+  stamp_words_.assign((seen.stamp_of.size() * stamp_bits_ + word_bits - 1) / word_bits, 0);
+  if (stamp_bits_ == 0) return;
+  std::size_t bit = 0;
+  for (const std::uint64_t stamp : seen.stamp_of) {
+    const std::size_t word = bit / word_bits;
+    const std::size_t shift = bit % word_bits;
+    stamp_words_[word] |= stamp << shift;
+    if (shift + stamp_bits_ > word_bits) stamp_words_[word + 1] |= stamp >> (word_bits - shift);
+    bit += stamp_bits_;
+  }
+}
+
+PackedVoxels PackedVoxels::first(std::size_t count) const {
+  std::vector<std::int64_t> stamps_ns;
+  for (std::size_t i = 0; i < count; ++i) {
+    stamps_ns.push_back(stamps_ns_[first_stamp(i)]);
+    stamps_ns.push_back(stamps_ns_[last_stamp(i)]);
+  }
+  return {tile_, grid_, std::vector<PackedVoxel>(voxels_.begin(), voxels_.begin() + static_cast<std::ptrdiff_t>(count)),
+          seen_times(stamps_ns)};
+}
+
+std::size_t PackedVoxels::memory_bytes() const {
+  return voxels_.capacity() * sizeof(PackedVoxel) + stamps_ns_.capacity() * sizeof(std::int64_t) +
+         stamp_words_.capacity() * sizeof(std::uint64_t);
+}
+
+}  // namespace stillmap

@@ -1,0 +1,203 @@
+#pragma once
+
+#include <array>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <span>
+#include <vector>
+
+#include "core/map/tile_table.hpp"
+#include "core/map/voxel.hpp"
+#include "core/map/voxel_grid.hpp"
+
+namespace stillmap {
+
+/// What is known of a voxel apart from times and visibility, in 20 bytes: as maps hold it in memory
+/// and on disk.
+struct PackedVoxel {
+  /// Offsets from the voxel's lowest corner are in these parts of a voxel.
+  static constexpr std::uint32_t offset_steps = 256;
+  /// The mean is that of the first so many points: whole numbers in 16 bits hold their sum.
+  static constexpr std::uint32_t max_mean_points = 255;
+
+  std::uint32_t key = 0;
+  /// Sums are whole numbers, so that the mean does not depend on the order of points.
+  std::array<std::uint16_t, 3> offset_sum{};
+  std::uint16_t point_count = 0;
+  ClassEvidence evidence;
+
+  [[nodiscard]] std::uint32_t mean_points() const {
+    return point_count < max_mean_points ? point_count : max_mean_points;
+  }
+  friend bool operator==(const PackedVoxel&, const PackedVoxel&) = default;
+};
+
+/// The mean of the voxel's points, map frame [m]; point_count > 0.
+[[nodiscard]] inline Eigen::Vector3f mean_map(const PackedVoxel& voxel, TileId tile,
+                                              const VoxelGrid& grid) {
+  constexpr double half_step = 0.5 / PackedVoxel::offset_steps;
+  const double share = 1.0 / (PackedVoxel::offset_steps * voxel.mean_points());
+  const VoxelIndex index = voxel_index(voxel.key);
+  const Eigen::Array3d corner(static_cast<double>(tile.x) * grid.columns() + index.x,
+                              static_cast<double>(tile.y) * grid.columns() + index.y, index.z);
+  const Eigen::Array3d sum(voxel.offset_sum[0], voxel.offset_sum[1], voxel.offset_sum[2]);
+  return (grid.voxel_size_m() * (corner + (sum * share + half_step))).matrix().cast<float>();
+}
+
+/// What a client sees of a voxel, in one word: 48 bits of index, three times 3 bits of mean, 5 bits
+/// of class.
+[[nodiscard]] std::uint64_t content_word(const PackedVoxel& voxel);
+
+/// The voxel without its times; its content word is that of the voxel's mean and class. A mean
+/// outside of the voxel is moved to its face.
+[[nodiscard]] PackedVoxel pack(const Voxel& voxel, TileId tile, const VoxelGrid& grid);
+
+/// When voxels were seen: numbers of stamps in a table.
+struct SeenTimes {
+  /// Ascending, each once.
+  std::vector<std::int64_t> stamps_ns;
+  /// For each voxel two: first seen, last seen.
+  std::vector<std::uint32_t> stamp_of;
+};
+
+/// Table and numbers for these stamps.
+[[nodiscard]] SeenTimes seen_times(std::span<const std::int64_t> stamps_ns);
+
+/// The voxels of a tile, immutable, in some 22 bytes each: 20 and the numbers of two stamps in as
+/// many bits as the tile has different ones. They are read by value.
+class PackedVoxels {
+ public:
+  class Iterator;
+  using iterator = Iterator;
+  using const_iterator = Iterator;
+  using value_type = Voxel;
+
+  PackedVoxels() = default;
+  PackedVoxels(TileId tile, const VoxelGrid& grid, std::span<const Voxel> voxels);
+  /// `seen` has two stamps for each voxel, all of them in its table.
+  PackedVoxels(TileId tile, const VoxelGrid& grid, std::vector<PackedVoxel> voxels,
+               const SeenTimes& seen);
+
+  [[nodiscard]] std::size_t size() const { return voxels_.size(); }
+  [[nodiscard]] bool empty() const { return voxels_.empty(); }
+  [[nodiscard]] Voxel operator[](std::size_t position) const {
+    const PackedVoxel& packed = voxels_[position];
+    return {.index = voxel_index(packed.key),
+            .point_count = packed.point_count,
+            .mean_map = stillmap::mean_map(packed, tile_, grid_),
+            .evidence = packed.evidence,
+            .first_seen_ns = stamps_ns_[first_stamp(position)],
+            .last_seen_ns = stamps_ns_[last_stamp(position)]};
+  }
+  [[nodiscard]] Voxel front() const { return (*this)[0]; }
+  [[nodiscard]] Voxel back() const { return (*this)[size() - 1]; }
+  [[nodiscard]] Iterator begin() const;
+  [[nodiscard]] Iterator end() const;
+
+  [[nodiscard]] std::span<const PackedVoxel> packed() const { return voxels_; }
+  /// Ascending, each once.
+  [[nodiscard]] std::span<const std::int64_t> stamps_ns() const { return stamps_ns_; }
+  /// Numbers of the voxel's stamps.
+  [[nodiscard]] std::uint32_t first_stamp(std::size_t position) const {
+    return stamp_of(2 * position);
+  }
+  [[nodiscard]] std::uint32_t last_stamp(std::size_t position) const {
+    return stamp_of(2 * position + 1);
+  }
+  [[nodiscard]] const VoxelGrid& grid() const { return grid_; }
+
+  /// The first ones.
+  [[nodiscard]] PackedVoxels first(std::size_t count) const;
+
+  /// On the heap.
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  [[nodiscard]] std::uint32_t stamp_of(std::size_t i) const {
+    if (stamp_bits_ == 0) return 0;
+    const std::size_t bit = i * stamp_bits_;
+    const std::size_t word = bit / word_bits;
+    const std::size_t shift = bit % word_bits;
+    std::uint64_t stamp = stamp_words_[word] >> shift;
+    if (shift + stamp_bits_ > word_bits) stamp |= stamp_words_[word + 1] << (word_bits - shift);
+    return static_cast<std::uint32_t>(stamp & ((std::uint64_t{1} << stamp_bits_) - 1));
+  }
+  void set_stamps(const SeenTimes& seen);
+
+  static constexpr std::size_t word_bits = 64;
+
+  TileId tile_;
+  VoxelGrid grid_{1.0, 1.0};
+  std::vector<PackedVoxel> voxels_;
+  std::vector<std::int64_t> stamps_ns_;
+  /// Numbers of stamps, two for each voxel, `stamp_bits_` each.
+  std::vector<std::uint64_t> stamp_words_;
+  unsigned stamp_bits_ = 0;
+};
+
+/// Random access to voxels by value; the container must outlive it.
+class PackedVoxels::Iterator {
+ public:
+  using iterator_concept = std::random_access_iterator_tag;
+  using iterator_category = std::input_iterator_tag;
+  using value_type = Voxel;
+  using difference_type = std::ptrdiff_t;
+  using reference = Voxel;
+  /// Holds the voxel that is pointed to.
+  struct pointer {
+    Voxel voxel;
+    const Voxel* operator->() const { return &voxel; }
+  };
+
+  Iterator() = default;
+  Iterator(const PackedVoxels* voxels, std::ptrdiff_t position)
+      : voxels_(voxels), position_(position) {}
+
+  [[nodiscard]] Voxel operator*() const {
+    return (*voxels_)[static_cast<std::size_t>(position_)];
+  }
+  [[nodiscard]] pointer operator->() const { return {**this}; }
+  [[nodiscard]] Voxel operator[](difference_type n) const { return *(*this + n); }
+  Iterator& operator++() { return *this += 1; }
+  Iterator& operator--() { return *this -= 1; }
+  Iterator operator++(int) {
+    Iterator before = *this;
+    ++*this;
+    return before;
+  }
+  Iterator operator--(int) {
+    Iterator before = *this;
+    --*this;
+    return before;
+  }
+  Iterator& operator+=(difference_type n) {
+    position_ += n;
+    return *this;
+  }
+  Iterator& operator-=(difference_type n) { return *this += -n; }
+  friend Iterator operator+(Iterator at, difference_type n) { return at += n; }
+  friend Iterator operator+(difference_type n, Iterator at) { return at += n; }
+  friend Iterator operator-(Iterator at, difference_type n) { return at -= n; }
+  friend difference_type operator-(const Iterator& a, const Iterator& b) {
+    return a.position_ - b.position_;
+  }
+  friend bool operator==(const Iterator& a, const Iterator& b) {
+    return a.position_ == b.position_;
+  }
+  friend auto operator<=>(const Iterator& a, const Iterator& b) {
+    return a.position_ <=> b.position_;
+  }
+
+ private:
+  const PackedVoxels* voxels_ = nullptr;
+  std::ptrdiff_t position_ = 0;
+};
+
+inline PackedVoxels::Iterator PackedVoxels::begin() const { return {this, 0}; }
+inline PackedVoxels::Iterator PackedVoxels::end() const {
+  return {this, static_cast<std::ptrdiff_t>(voxels_.size())};
+}
+
+}  // namespace stillmap

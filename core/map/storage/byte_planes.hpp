@@ -1,0 +1,69 @@
+#pragma once
+
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <vector>
+
+namespace stillmap {
+
+static_assert(std::endian::native == std::endian::little,
+              "fields are copied as they lie in memory");
+
+/// Writes or reads the fields of one record in turn: one list of fields serves both ways.
+class FieldWriter {
+ public:
+  explicit FieldWriter(std::uint8_t* to) : to_(to) {}
+  template <typename Field>
+  void operator()(const Field& field) {
+    std::memcpy(to_, &field, sizeof(field));
+    to_ += sizeof(field);
+  }
+
+ private:
+  std::uint8_t* to_;
+};
+
+class FieldReader {
+ public:
+  explicit FieldReader(const std::uint8_t* from) : from_(from) {}
+  template <typename Field>
+  void operator()(Field& field) {
+    std::memcpy(&field, from_, sizeof(field));
+    from_ += sizeof(field);
+  }
+
+ private:
+  const std::uint8_t* from_;
+};
+
+/// Appends the records by byte planes: the first byte of all, the second byte of all, and so on,
+/// which compresses better than record after record. `visit(visitor, record)` lists the fields,
+/// `record_bytes` of them.
+template <std::size_t record_bytes, typename Record, typename Visit>
+void append_planes(std::vector<std::uint8_t>& bytes, const std::vector<Record>& records,
+                   Visit visit) {
+  const std::size_t count = records.size();
+  std::vector<std::uint8_t> planes(count * record_bytes);
+  std::array<std::uint8_t, record_bytes> record{};
+  for (std::size_t i = 0; i < count; ++i) {
+    visit(FieldWriter(record.data()), records[i]);
+    for (std::size_t k = 0; k < record_bytes; ++k) planes[k * count + i] = record[k];
+  }
+  bytes.insert(bytes.end(), planes.begin(), planes.end());
+}
+
+/// Fills the records from planes that begin at `planes`; there are enough bytes for all.
+template <std::size_t record_bytes, typename Record, typename Visit>
+void read_planes(const std::uint8_t* planes, std::vector<Record>& records, Visit visit) {
+  const std::size_t count = records.size();
+  std::array<std::uint8_t, record_bytes> record{};
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t k = 0; k < record_bytes; ++k) record[k] = planes[k * count + i];
+    visit(FieldReader(record.data()), records[i]);
+  }
+}
+
+}  // namespace stillmap

@@ -1,0 +1,173 @@
+#include "core/map/storage/packed_codec.hpp"
+
+#include <utility>
+
+#include "core/map/storage/byte_planes.hpp"
+#include "core/map/storage/tile_codec.hpp"
+
+namespace stillmap {
+namespace {
+
+std::uint16_t zigzag(std::int16_t difference) {
+  return static_cast<std::uint16_t>(difference < 0 ? -(2 * difference + 1) : 2 * difference);
+}
+
+std::int16_t from_zigzag(std::uint16_t steps) {
+  return static_cast<std::int16_t>((steps & 1U) != 0 ? -(steps >> 1) - 1 : steps >> 1);
+}
+
+struct StoredVoxel {
+  KeySteps::Step step;
+  /// Whole part and rest of the sum of offsets, divided by the points of the mean: the first is
+  /// close to random, the second is small for few points.
+  std::array<std::uint8_t, 3> mean{};
+  std::array<std::uint8_t, 3> rest{};
+  std::uint16_t point_count = 0;
+  ClassEvidence::Bits evidence;
+  std::uint32_t first_stamp = 0;
+  /// Stamps after the first one, in a circle: time may go backwards.
+  std::uint32_t stamps_on = 0;
+};
+
+constexpr auto visit_voxel = [](auto&& visit, auto& voxel) {
+  visit(voxel.step.columns);
+  visit(voxel.step.layers);
+  for (auto& mean : voxel.mean) visit(mean);
+  for (auto& rest : voxel.rest) visit(rest);
+  visit(voxel.point_count);
+  for (auto& weight : voxel.evidence.weights) visit(weight);
+  visit(voxel.evidence.classes);
+  visit(voxel.first_stamp);
+  visit(voxel.stamps_on);
+};
+
+constexpr auto visit_number = [](auto&& visit, auto& number) { visit(number); };
+
+StoredVoxel to_stored(const PackedVoxel& voxel, KeySteps& keys) {
+  StoredVoxel stored;
+  stored.step = keys.step_to(voxel.key);
+  stored.point_count = voxel.point_count;
+  stored.evidence = voxel.evidence.bits();
+  const std::uint32_t points = voxel.mean_points();
+  for (std::size_t axis = 0; axis < 3 && points > 0; ++axis) {
+    stored.mean[axis] = static_cast<std::uint8_t>(voxel.offset_sum[axis] / points);
+    stored.rest[axis] = static_cast<std::uint8_t>(voxel.offset_sum[axis] % points);
+  }
+  return stored;
+}
+
+PackedVoxel from_stored(const StoredVoxel& stored, KeySteps& keys) {
+  PackedVoxel voxel;
+  voxel.key = keys.key_at(stored.step);
+  voxel.point_count = stored.point_count;
+  const auto evidence = ClassEvidence::of(stored.evidence);
+  if (voxel.point_count == 0 || !evidence) throw TileCodecError("has an impossible voxel");
+  voxel.evidence = *evidence;
+  const std::uint32_t points = voxel.mean_points();
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::uint32_t sum = stored.mean[axis] * points + stored.rest[axis];
+    if (stored.rest[axis] >= points || sum > (PackedVoxel::offset_steps - 1) * points) {
+      throw TileCodecError("has a mean outside of its voxel");
+    }
+    voxel.offset_sum[axis] = static_cast<std::uint16_t>(sum);
+  }
+  return voxel;
+}
+
+}  // namespace
+
+KeySteps::Step KeySteps::step_to(std::uint32_t key) {
+  const auto column = static_cast<std::uint16_t>(key >> 16);
+  const auto layer = static_cast<std::uint16_t>(key & 0xFFFFU);
+  Step step{.columns = static_cast<std::uint16_t>(column - column_)};
+  step.layers = step.columns == 0
+                    ? static_cast<std::uint16_t>(layer - layer_ - 1)
+                    : zigzag(static_cast<std::int16_t>(layer - lowest_layer_));
+  move_to(column, layer);
+  return step;
+}
+
+std::uint32_t KeySteps::key_at(const Step& step) {
+  const auto column = static_cast<std::uint16_t>(column_ + step.columns);
+  const auto layer = static_cast<std::uint16_t>(
+      step.columns == 0 ? layer_ + 1 + step.layers : lowest_layer_ + from_zigzag(step.layers));
+  move_to(column, layer);
+  return std::uint32_t{column} << 16 | layer;
+}
+
+void KeySteps::move_to(std::uint16_t column, std::uint16_t layer) {
+  if (column != column_) lowest_layer_ = layer;
+  column_ = column;
+  layer_ = layer;
+}
+
+void append_stamps(std::vector<std::uint8_t>& bytes, std::span<const std::int64_t> stamps_ns) {
+  std::vector<std::uint64_t> steps;
+  std::uint64_t last = 0;
+  for (const std::int64_t stamp_ns : stamps_ns) {
+    const auto bits = static_cast<std::uint64_t>(stamp_ns);
+    steps.push_back(bits - std::exchange(last, bits));
+  }
+  append_planes<stamp_bytes>(bytes, steps, visit_number);
+}
+
+std::vector<std::int64_t> read_stamps(const std::uint8_t*& from, std::size_t count) {
+  std::vector<std::uint64_t> steps(count);
+  read_planes<stamp_bytes>(from, steps, visit_number);
+  from += count * stamp_bytes;
+  std::vector<std::int64_t> stamps_ns;
+  stamps_ns.reserve(count);
+  std::uint64_t last = 0;
+  for (const std::uint64_t step : steps) {
+    last += step;
+    const auto stamp_ns = static_cast<std::int64_t>(last);
+    if (!stamps_ns.empty() && stamp_ns <= stamps_ns.back()) {
+      throw TileCodecError("has stamps out of order");
+    }
+    stamps_ns.push_back(stamp_ns);
+  }
+  return stamps_ns;
+}
+
+void append_voxels(std::vector<std::uint8_t>& bytes, const PackedVoxels& voxels) {
+  std::vector<StoredVoxel> stored;
+  stored.reserve(voxels.size());
+  const auto stamps = static_cast<std::uint32_t>(voxels.stamps_ns().size());
+  KeySteps keys;
+  for (std::size_t i = 0; i < voxels.size(); ++i) {
+    StoredVoxel& voxel = stored.emplace_back(to_stored(voxels.packed()[i], keys));
+    voxel.first_stamp = voxels.first_stamp(i);
+    const std::uint32_t last = voxels.last_stamp(i);
+    voxel.stamps_on = last - voxel.first_stamp + (last < voxel.first_stamp ? stamps : 0);
+  }
+  append_planes<packed_voxel_bytes>(bytes, stored, visit_voxel);
+}
+
+PackedVoxels read_voxels(const std::uint8_t*& from, std::size_t count,
+                         std::vector<std::int64_t> stamps_ns, TileId tile, const VoxelGrid& grid) {
+  std::vector<StoredVoxel> stored(count);
+  read_planes<packed_voxel_bytes>(from, stored, visit_voxel);
+  from += count * packed_voxel_bytes;
+  std::vector<PackedVoxel> voxels;
+  SeenTimes seen{std::move(stamps_ns), {}};
+  voxels.reserve(count);
+  seen.stamp_of.reserve(2 * count);
+  const std::size_t stamps = seen.stamps_ns.size();
+  KeySteps keys;
+  for (const StoredVoxel& voxel : stored) {
+    const PackedVoxel next = from_stored(voxel, keys);
+    if (!voxels.empty() && next.key <= voxels.back().key) {
+      throw TileCodecError("has voxels out of order");
+    }
+    if (voxel.first_stamp >= stamps || voxel.stamps_on >= stamps) {
+      throw TileCodecError("has a voxel without a stamp");
+    }
+    voxels.push_back(next);
+    seen.stamp_of.push_back(voxel.first_stamp);
+    seen.stamp_of.push_back(
+        static_cast<std::uint32_t>((std::size_t{voxel.first_stamp} + voxel.stamps_on) % stamps));
+  }
+  return {tile, grid, std::move(voxels), seen};
+}
+
+}  // namespace stillmap

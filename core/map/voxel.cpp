@@ -1,0 +1,94 @@
+#include "core/map/voxel.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stillmap {
+namespace {
+
+std::uint16_t steps_of(float weight) {
+  return static_cast<std::uint16_t>(std::lround(weight / ClassEvidence::weight_step));
+}
+
+const ClassEvidence::Vote& strongest_of(
+    const std::array<ClassEvidence::Vote, ClassEvidence::candidates>& votes) {
+  return *std::ranges::max_element(votes, [](const auto& a, const auto& b) {
+    return a.weight != b.weight ? a.weight < b.weight : a.label > b.label;
+  });
+}
+
+}  // namespace
+
+void ClassEvidence::set_label(std::size_t i, SemanticClass label) {
+  const int shift = class_bits * static_cast<int>(i);
+  bits_.classes = static_cast<std::uint16_t>((bits_.classes & ~(class_mask << shift)) |
+                                             static_cast<int>(label) << shift);
+}
+
+void ClassEvidence::add(SemanticClass added, float weight) {
+  if (added == SemanticClass::unlabeled || !(weight > 0.0F)) return;
+  std::size_t vote = 0;
+  while (vote < candidates && label(vote) != added) ++vote;
+  if (vote == candidates) {
+    // Space-saving algorithm: a new class inherits the weight of the one that it replaces, so that
+    // a recurring class is not shut out by earlier ones.
+    vote = static_cast<std::size_t>(std::ranges::min_element(bits_.weights) -
+                                    bits_.weights.begin());
+    set_label(vote, added);
+  }
+  const int steps = std::max<int>(1, steps_of(std::min(weight, 1.0F)));
+  bits_.weights.at(vote) = static_cast<std::uint16_t>(bits_.weights.at(vote) + steps);
+  scale_down();
+}
+
+void ClassEvidence::scale_down() {
+  const std::uint32_t all = total();
+  if (all <= max_steps) return;
+  const float scale = static_cast<float>(max_steps) / static_cast<float>(all);
+  for (std::uint16_t& kept : bits_.weights) {
+    kept = static_cast<std::uint16_t>(static_cast<float>(kept) * scale + 0.5F);
+  }
+}
+
+std::array<ClassEvidence::Vote, ClassEvidence::candidates> ClassEvidence::votes() const {
+  std::array<Vote, candidates> votes;
+  for (std::size_t i = 0; i < candidates; ++i) {
+    votes.at(i) = {label(i), static_cast<float>(bits_.weights.at(i)) * weight_step};
+  }
+  return votes;
+}
+
+ClassEvidence ClassEvidence::of(const std::array<Vote, candidates>& votes) {
+  ClassEvidence evidence;
+  const Vote& best = strongest_of(votes);
+  std::size_t winner = 0;
+  for (std::size_t i = 0; i < candidates; ++i) {
+    const Vote& vote = votes.at(i);
+    evidence.set_label(i, vote.label);
+    const int least = vote.weight > 0.0F ? 1 : 0;
+    evidence.bits_.weights.at(i) =
+        static_cast<std::uint16_t>(std::max<int>(least, steps_of(std::min(vote.weight, max_total))));
+    if (&vote == &best) winner = i;
+  }
+  evidence.scale_down();
+  // Rounding may have made another one as strong.
+  if (best.weight > 0.0F && evidence.strongest() != winner) {
+    evidence.bits_.weights.at(winner) = static_cast<std::uint16_t>(
+        evidence.bits_.weights.at(evidence.strongest()) + 1);
+  }
+  return evidence;
+}
+
+std::optional<ClassEvidence> ClassEvidence::of(const Bits& bits) {
+  ClassEvidence evidence;
+  evidence.bits_ = bits;
+  // Rounding adds a little to the greatest total.
+  if (evidence.total() > max_steps + candidates || (bits.classes >> (class_bits * candidates)) != 0)
+    return std::nullopt;
+  for (std::size_t i = 0; i < candidates; ++i) {
+    if (static_cast<std::size_t>(evidence.label(i)) >= semantic_class_count) return std::nullopt;
+  }
+  return evidence;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,121 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <compare>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "core/lidar/semantic_class.hpp"
+
+namespace stillmap {
+
+/// A voxel's place in its tile: column and row from the tile's corner, layer from map height 0.
+struct VoxelIndex {
+  std::uint16_t x = 0;
+  std::uint16_t y = 0;
+  std::int16_t z = 0;
+  friend auto operator<=>(const VoxelIndex&, const VoxelIndex&) = default;
+};
+
+/// Column, row and layer in 32 bits; keys sort as indices do. Columns and rows are below 256.
+[[nodiscard]] constexpr std::uint32_t voxel_key(VoxelIndex index) {
+  return std::uint32_t{index.x} << 24 | std::uint32_t{index.y} << 16 |
+         (static_cast<std::uint16_t>(index.z) ^ 0x8000U);
+}
+[[nodiscard]] constexpr VoxelIndex voxel_index(std::uint32_t key) {
+  return {static_cast<std::uint16_t>(key >> 24), static_cast<std::uint16_t>(key >> 16 & 0xFFU),
+          static_cast<std::int16_t>((key & 0xFFFFU) ^ 0x8000U)};
+}
+
+/// Votes for the classes of a voxel, in eight bytes. Only the strongest few are kept: the size is
+/// bounded, and the winner can still change.
+class ClassEvidence {
+ public:
+  /// Adds `weight` (a confidence, 0..1) for `label`, which replaces the weakest candidate when it
+  /// is none yet. `unlabeled` and weights that are not positive are ignored.
+  void add(SemanticClass label, float weight);
+  /// The class with most evidence, `unlabeled` without any.
+  [[nodiscard]] SemanticClass winner() const {
+    const std::size_t best = strongest();
+    return bits_.weights[best] > 0 ? label(best) : SemanticClass::unlabeled;
+  }
+  /// The winner's share of all evidence kept, 0..1.
+  [[nodiscard]] float share() const {
+    const std::uint32_t all = total();
+    return all == 0 ? 0.0F
+                    : static_cast<float>(bits_.weights[strongest()]) / static_cast<float>(all);
+  }
+
+  struct Vote {
+    SemanticClass label = SemanticClass::unlabeled;
+    float weight = 0.0F;
+    friend bool operator==(const Vote&, const Vote&) = default;
+  };
+  static constexpr std::size_t candidates = 3;
+  /// The votes are scaled down to this total: however long a voxel was seen as one class, max_total
+  /// * ln 2 = 139 confident votes in a row for another one turn it (some ten scans of a lidar
+  /// nearby).
+  static constexpr float max_total = 200.0F;
+  /// Weights are whole numbers of these steps; a vote counts one at least.
+  static constexpr float weight_step = 1.0F / 128.0F;
+  [[nodiscard]] std::array<Vote, candidates> votes() const;
+  /// Of these votes, rounded to steps such that the winner stays. Weights are 0 to 2 * max_total.
+  [[nodiscard]] static ClassEvidence of(const std::array<Vote, candidates>& votes);
+
+  /// As it lies in memory and is stored.
+  struct Bits {
+    /// In steps.
+    std::array<std::uint16_t, candidates> weights{};
+    /// Five bits a class, the first one's lowest.
+    std::uint16_t classes = 0;
+    friend bool operator==(const Bits&, const Bits&) = default;
+  };
+  [[nodiscard]] const Bits& bits() const { return bits_; }
+  /// Nothing for bits that no votes lead to.
+  [[nodiscard]] static std::optional<ClassEvidence> of(const Bits& bits);
+
+  friend bool operator==(const ClassEvidence&, const ClassEvidence&) = default;
+
+ private:
+  static constexpr int class_bits = 5;
+  static constexpr std::uint16_t class_mask = (1U << class_bits) - 1;
+  static constexpr std::uint32_t max_steps = static_cast<std::uint32_t>(max_total / weight_step);
+
+  [[nodiscard]] SemanticClass label(std::size_t i) const {
+    return static_cast<SemanticClass>(bits_.classes >> (class_bits * static_cast<int>(i)) &
+                                      class_mask);
+  }
+  void set_label(std::size_t i, SemanticClass label);
+  [[nodiscard]] std::uint32_t total() const {
+    return std::uint32_t{bits_.weights[0]} + bits_.weights[1] + bits_.weights[2];
+  }
+  /// Of equal votes that of the lower class, so that the order of votes does not matter.
+  [[nodiscard]] std::size_t strongest() const {
+    std::size_t best = 0;
+    for (std::size_t i = 1; i < candidates; ++i) {
+      const auto weight = bits_.weights[i];
+      const auto most = bits_.weights[best];
+      if (weight > most || (weight == most && label(i) < label(best))) best = i;
+    }
+    return best;
+  }
+  /// To the greatest total, where it is exceeded.
+  void scale_down();
+
+  Bits bits_;
+};
+
+struct Voxel {
+  VoxelIndex index;
+  /// Up to 65,535: that many or more.
+  std::uint32_t point_count = 0;
+  /// Mean of the points seen in it, map frame [m].
+  Eigen::Vector3f mean_map = Eigen::Vector3f::Zero();
+  ClassEvidence evidence;
+  std::int64_t first_seen_ns = 0;
+  std::int64_t last_seen_ns = 0;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,150 @@
+#include "core/map/live_tile.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <random>
+
+#include "core/map/storage/tile_codec.hpp"
+
+namespace stillmap {
+namespace {
+
+const VoxelGrid live_grid(0.2, 20.0);
+constexpr TileId live_id{2, -1};
+constexpr VisibilityRule rule;
+
+TilePoint point_in(std::uint32_t key, SemanticClass label = SemanticClass::road) {
+  return {.voxel_key = key, .offset = {10, 20, 30}, .label = label, .confidence = 1.0F};
+}
+
+/// Points at random in a few thousand voxels, some of them of things that move.
+std::vector<TilePoint> scan_of(std::uint32_t seed) {
+  std::mt19937 random(seed);
+  std::vector<TilePoint> points(3000);
+  for (TilePoint& point : points) {
+    const VoxelIndex index{static_cast<std::uint16_t>(random() % 100),
+                           static_cast<std::uint16_t>(random() % 20),
+                           static_cast<std::int16_t>(random() % 3)};
+    point.voxel_key = voxel_key(index);
+    for (auto& offset : point.offset) offset = static_cast<std::uint8_t>(random());
+    point.label = static_cast<SemanticClass>(random() % semantic_class_count);
+    point.motion = static_cast<Motion>(random() % 3);
+    point.confidence = static_cast<float>(random() % 1000) / 1000.0F;
+  }
+  return points;
+}
+
+bool every_fourth_is_free(const Eigen::Vector3f& position_map) {
+  return static_cast<int>(std::floor(position_map.x() * 5.0F)) % 4 == 0;
+}
+
+void expect_same(const TileRecord& a, const TileRecord& b) {
+  ASSERT_TRUE(a.tile && b.tile);
+  EXPECT_EQ(a.tile->info.content_hash, b.tile->info.content_hash);
+  EXPECT_TRUE(std::ranges::equal(a.tile->voxels.packed(), b.tile->voxels.packed()));
+  EXPECT_TRUE(std::ranges::equal(a.tile->voxels.stamps_ns(), b.tile->voxels.stamps_ns()));
+  EXPECT_EQ(a.evidence->shown, b.evidence->shown);
+  EXPECT_TRUE(std::ranges::equal(a.evidence->hidden.packed(), b.evidence->hidden.packed()));
+  EXPECT_EQ(a.evidence->hidden_states, b.evidence->hidden_states);
+  EXPECT_EQ(a.evidence->excluded, b.evidence->excluded);
+}
+
+TEST(LiveTile, GoesOnFromItsRecordAsIfItHadStayed) {
+  ScanStamps stamps;
+  ScanStamps reloaded_stamps;
+  LiveTile kept(live_id, live_grid);
+  auto reloaded = std::make_unique<LiveTile>(live_id, live_grid);
+  for (std::uint32_t scan = 0; scan < 40; ++scan) {
+    // Time goes back once.
+    const std::int64_t stamp_ns = 1'000'000'000LL * scan - (scan == 17 ? 5'000'000'001LL : 0);
+    const auto points = scan_of(scan);
+    const std::uint32_t number = stamps.add(stamp_ns);
+    kept.insert(points, number);
+    (void)kept.clear_seen_through(every_fourth_is_free, number, rule);
+    (void)kept.publish(scan + 1, rule, stamps);
+    const std::uint32_t other_number = reloaded_stamps.add(stamp_ns);
+    reloaded->insert(points, other_number);
+    (void)reloaded->clear_seen_through(every_fourth_is_free, other_number, rule);
+    (void)reloaded->publish(scan + 1, rule, reloaded_stamps);
+    const TileRecord record = reloaded->record(rule, reloaded_stamps);
+    expect_same(record, kept.record(rule, stamps));
+    // To the disk and back, into a table of stamps of its own.
+    const TileRecord stored{
+        std::make_shared<const Tile>(decode_tile(encode_tile(*record.tile), live_grid)),
+        std::make_shared<const TileEvidence>(
+            decode_evidence(encode_evidence(*record.evidence), live_grid))};
+    reloaded_stamps.clear();
+    reloaded = std::make_unique<LiveTile>(live_id, stored, live_grid, reloaded_stamps);
+    expect_same(reloaded->record(rule, reloaded_stamps), record);
+  }
+}
+
+TEST(LiveTile, FindsEveryVoxel) {
+  LiveTile tile(live_id, live_grid);
+  ScanStamps stamps;
+  std::mt19937 random(4);
+  std::map<std::uint32_t, int> points;
+  for (int i = 0; i < 100'000; ++i) {
+    const auto key = static_cast<std::uint32_t>(random() % 30'000) * 2'654'435'761U;
+    ++points[key];
+    tile.insert(std::array{point_in(key)}, stamps.add(i));
+    if (i % 7'000 == 0) (void)tile.publish(1, rule, stamps);
+  }
+  for (const auto& [key, count] : points) {
+    const float weight = tile.evidence(key).votes()[0].weight;
+    EXPECT_EQ(weight, static_cast<float>(count));
+    EXPECT_EQ(tile.evidence(key + 1).winner(), points.contains(key + 1) ? SemanticClass::road
+                                                                         : SemanticClass::unlabeled);
+  }
+}
+
+TEST(LiveTile, CountsEndAtTheirBounds) {
+  LiveTile tile(live_id, live_grid);
+  ScanStamps stamps;
+  TilePoint point = point_in(voxel_key({1, 2, 3}));
+  for (int i = 0; i < 255; ++i) tile.insert(std::array{point}, stamps.add(i));
+  point.offset = {255, 255, 255};
+  for (int i = 255; i < 70'000; ++i) tile.insert(std::array{point}, stamps.add(i));
+  ASSERT_TRUE(tile.publish(1, rule, stamps));
+  const PackedVoxel voxel = tile.published()->voxels.packed()[0];
+  EXPECT_EQ(voxel.point_count, 65'535);
+  EXPECT_EQ(voxel.offset_sum, (std::array<std::uint16_t, 3>{2'550, 5'100, 7'650}))
+      << "the mean is that of the first 255 points";
+  EXPECT_EQ(voxel.evidence.votes()[0].weight, ClassEvidence::max_total);
+  EXPECT_EQ(tile.record(rule, stamps).evidence->shown[0].hits, 65'535);
+  EXPECT_EQ(tile.published()->voxels[0].first_seen_ns, 0);
+  EXPECT_EQ(tile.published()->voxels[0].last_seen_ns, 69'999);
+}
+
+TEST(LiveTile, TakesFewBytesAVoxel) {
+  LiveTile tile(live_id, live_grid);
+  ScanStamps stamps;
+  for (std::uint32_t scan = 0; scan < 30; ++scan) {
+    std::vector<TilePoint> points = scan_of(scan);
+    for (TilePoint& point : points) point.motion = Motion::stationary;
+    tile.insert(points, stamps.add(scan));
+    (void)tile.publish(scan + 1, {.min_points = 1'000'000'000}, stamps);
+  }
+  const auto record = tile.record({.min_points = 1'000'000'000}, stamps);
+  const auto voxels = static_cast<double>(record.evidence->hidden.size());
+  ASSERT_GT(voxels, 3000.0);
+  EXPECT_LT(static_cast<double>(tile.memory_bytes() - sizeof(tile)) / voxels, 39.0);
+}
+
+TEST(ScanStamps, EachHasOneNumberWhateverTheOrder) {
+  ScanStamps stamps;
+  std::mt19937_64 random(2);
+  std::map<std::int64_t, std::uint32_t> numbers;
+  for (int i = 0; i < 5'000; ++i) {
+    const auto stamp_ns = i % 3 == 0 ? static_cast<std::int64_t>(random() % 10'000) : 2'000 + i;
+    const std::uint32_t number = stamps.add(stamp_ns);
+    EXPECT_EQ(numbers.try_emplace(stamp_ns, number).first->second, number);
+    EXPECT_EQ(stamps.stamp_ns(number), stamp_ns);
+  }
+}
+
+}  // namespace
+}  // namespace stillmap
