@@ -240,8 +240,8 @@ bool LiveTile::publish(std::uint64_t revision, const VisibilityRule& rule,
   unrecorded_voxels_ += changed_voxels(
       published_ ? published_->voxels.packed() : std::span<const PackedVoxel>(), next);
   if (next.empty()) return std::exchange(published_, nullptr) != nullptr;
-  Tile tile = make_tile(
-      id_, revision, PackedVoxels(id_, grid_, std::move(next), seen_times(shown, stamps)));
+  Tile tile = make_tile(id_, revision,
+                        PackedVoxels(id_, grid_, std::move(next), seen_times(shown, stamps)));
   tile.info.appeared_in = published_ ? published_->info.appeared_in : revision;
   published_ = std::make_shared<const Tile>(std::move(tile));
   return true;
@@ -301,10 +301,9 @@ std::size_t LiveTile::restore_excluded(RemovalReason reason, const Eigen::Aligne
     if (reason_of(excluded) != reason || size() >= PositionIndex::max_entries) continue;
     if (!box_map.contains(centre_map(key).cast<double>())) continue;
     LiveVoxel& voxel = add_fresh(key);
-    voxel.packed.point_count =
-        static_cast<std::uint16_t>(std::min(rule.min_points, most_counted));
-    voxel.packed.offset_sum.fill(static_cast<std::uint16_t>(
-        voxel.packed.mean_points() * (PackedVoxel::offset_steps / 2)));
+    voxel.packed.point_count = static_cast<std::uint16_t>(std::min(rule.min_points, most_counted));
+    voxel.packed.offset_sum.fill(
+        static_cast<std::uint16_t>(voxel.packed.mean_points() * (PackedVoxel::offset_steps / 2)));
     voxel.packed.evidence.add(excluded.label, 1.0F);
     voxel.first_scan = voxel.last_scan = excluded.last_scan;
     voxel.is_restored = 1;
@@ -329,12 +328,16 @@ LiveTile::LiveTile(TileId id, const TileRecord& record, const VoxelGrid& grid, S
   const std::size_t shown = published_ ? published_->voxels.size() : 0;
   sorted_.reserve(shown + (evidence ? evidence->hidden.size() : 0));
   if (published_) {
-    add(published_->voxels, [&](std::size_t i) {
-      return evidence ? evidence->shown[i] : history_of_shown(published_->voxels.packed()[i]);
-    }, stamps);
+    add(
+        published_->voxels,
+        [&](std::size_t i) {
+          return evidence ? evidence->shown[i] : history_of_shown(published_->voxels.packed()[i]);
+        },
+        stamps);
   }
   if (evidence) {
-    add(evidence->hidden, [&](std::size_t i) { return evidence->hidden_states[i].history; },
+    add(
+        evidence->hidden, [&](std::size_t i) { return evidence->hidden_states[i].history; },
         stamps);
     for (const ExcludedVoxel& voxel : evidence->excluded) {
       excluded_.emplace(voxel_key(voxel.index),
@@ -394,8 +397,8 @@ TileRecord LiveTile::record(const VisibilityRule& rule, const ScanStamps& stamps
   if (!published_) return {nullptr, std::move(evidence)};
   assert(shown.positions().size() == published_->voxels.size());
   // As published, with the current counts and times.
-  auto tile = std::make_shared<Tile>(Tile{
-      published_->info, PackedVoxels(id_, grid_, packed(shown), seen_times(shown, stamps))});
+  auto tile = std::make_shared<Tile>(
+      Tile{published_->info, PackedVoxels(id_, grid_, packed(shown), seen_times(shown, stamps))});
   tile->info.bounds_map.setEmpty();
   for (const Voxel& voxel : tile->voxels) tile->info.bounds_map.extend(voxel.mean_map);
   return {std::move(tile), std::move(evidence)};

@@ -17,16 +17,11 @@ std::uint32_t content_step(std::uint32_t sum, std::uint32_t points) {
   return (2 * sum + points) / (half_steps * points);
 }
 
-/// The sum of offsets whose mean is nearest to `offset` [voxels] within its eighth of the voxel.
+/// The sum of offsets whose mean is nearest to `offset` [voxels].
 std::uint16_t offset_sum(double offset, std::uint32_t points) {
-  const auto eighth = static_cast<std::uint32_t>(
-      std::clamp(std::floor(offset * content_steps), 0.0, content_steps - 1.0));
   const double most = (PackedVoxel::offset_steps - 1.0) * points;
   const double wanted = (offset * PackedVoxel::offset_steps - 0.5) * points;
-  auto sum = static_cast<std::uint32_t>(std::lround(std::clamp(wanted, 0.0, most)));
-  while (content_step(sum, points) > eighth) --sum;
-  while (content_step(sum, points) < eighth) ++sum;
-  return static_cast<std::uint16_t>(sum);
+  return static_cast<std::uint16_t>(std::lround(std::clamp(wanted, 0.0, most)));
 }
 
 }  // namespace
@@ -95,7 +90,8 @@ PackedVoxels::PackedVoxels(TileId tile, const VoxelGrid& grid, std::vector<Packe
 void PackedVoxels::set_stamps(const SeenTimes& seen) {
   assert(seen.stamp_of.size() == 2 * voxels_.size());
   stamps_ns_ = seen.stamps_ns;
-  stamp_bits_ = static_cast<unsigned>(std::bit_width(std::max<std::size_t>(stamps_ns_.size(), 1) - 1));
+  stamp_bits_ =
+      static_cast<unsigned>(std::bit_width(std::max<std::size_t>(stamps_ns_.size(), 1) - 1));
   stamp_words_.assign((seen.stamp_of.size() * stamp_bits_ + word_bits - 1) / word_bits, 0);
   if (stamp_bits_ == 0) return;
   std::size_t bit = 0;
@@ -114,7 +110,9 @@ PackedVoxels PackedVoxels::first(std::size_t count) const {
     stamps_ns.push_back(stamps_ns_[first_stamp(i)]);
     stamps_ns.push_back(stamps_ns_[last_stamp(i)]);
   }
-  return {tile_, grid_, std::vector<PackedVoxel>(voxels_.begin(), voxels_.begin() + static_cast<std::ptrdiff_t>(count)),
+  return {tile_, grid_,
+          std::vector<PackedVoxel>(voxels_.begin(),
+                                   voxels_.begin() + static_cast<std::ptrdiff_t>(count)),
           seen_times(stamps_ns)};
 }
 

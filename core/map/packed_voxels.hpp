@@ -50,8 +50,8 @@ struct PackedVoxel {
 /// of class.
 [[nodiscard]] std::uint64_t content_word(const PackedVoxel& voxel);
 
-/// The voxel without its times; its content word is that of the voxel's mean and class. A mean
-/// outside of the voxel is moved to its face.
+/// The voxel without its times. The mean of a packed voxel leads to the same packed voxel again,
+/// where a float is fine enough. A mean outside of the voxel is moved to its face.
 [[nodiscard]] PackedVoxel pack(const Voxel& voxel, TileId tile, const VoxelGrid& grid);
 
 /// When voxels were seen: numbers of stamps in a table.
@@ -155,9 +155,7 @@ class PackedVoxels::Iterator {
   Iterator(const PackedVoxels* voxels, std::ptrdiff_t position)
       : voxels_(voxels), position_(position) {}
 
-  [[nodiscard]] Voxel operator*() const {
-    return (*voxels_)[static_cast<std::size_t>(position_)];
-  }
+  [[nodiscard]] Voxel operator*() const { return (*voxels_)[static_cast<std::size_t>(position_)]; }
   [[nodiscard]] pointer operator->() const { return {**this}; }
   [[nodiscard]] Voxel operator[](difference_type n) const { return *(*this + n); }
   Iterator& operator++() { return *this += 1; }

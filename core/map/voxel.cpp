@@ -32,8 +32,8 @@ void ClassEvidence::add(SemanticClass added, float weight) {
   if (vote == candidates) {
     // Space-saving algorithm: a new class inherits the weight of the one that it replaces, so that
     // a recurring class is not shut out by earlier ones.
-    vote = static_cast<std::size_t>(std::ranges::min_element(bits_.weights) -
-                                    bits_.weights.begin());
+    vote =
+        static_cast<std::size_t>(std::ranges::min_element(bits_.weights) - bits_.weights.begin());
     set_label(vote, added);
   }
   const int steps = std::max<int>(1, steps_of(std::min(weight, 1.0F)));
@@ -66,15 +66,15 @@ ClassEvidence ClassEvidence::of(const std::array<Vote, candidates>& votes) {
     const Vote& vote = votes.at(i);
     evidence.set_label(i, vote.label);
     const int least = vote.weight > 0.0F ? 1 : 0;
-    evidence.bits_.weights.at(i) =
-        static_cast<std::uint16_t>(std::max<int>(least, steps_of(std::min(vote.weight, max_total))));
+    evidence.bits_.weights.at(i) = static_cast<std::uint16_t>(
+        std::max<int>(least, steps_of(std::min(vote.weight, max_total))));
     if (&vote == &best) winner = i;
   }
   evidence.scale_down();
   // Rounding may have made another one as strong.
   if (best.weight > 0.0F && evidence.strongest() != winner) {
-    evidence.bits_.weights.at(winner) = static_cast<std::uint16_t>(
-        evidence.bits_.weights.at(evidence.strongest()) + 1);
+    evidence.bits_.weights.at(winner) =
+        static_cast<std::uint16_t>(evidence.bits_.weights.at(evidence.strongest()) + 1);
   }
   return evidence;
 }

@@ -21,8 +21,8 @@ namespace stillmap::wire {
 [[nodiscard]] stillmap_msgs::msg::MapTile to_wire(const Tile& tile,
                                                   const dds::MapIdentity& identity);
 /// Of a voxel's evidence it has only the winning class, its weight being the confidence, and no
-/// times. Nothing for another format version, arrays of different lengths, sizes that no map has, or
-/// voxels outside of any tile.
+/// times. Nothing for another format version, arrays of different lengths, sizes that no map has,
+/// or voxels outside of any tile.
 [[nodiscard]] std::optional<Tile> from_wire(const stillmap_msgs::msg::MapTile& message);
 
 /// Gives all arrays this length.

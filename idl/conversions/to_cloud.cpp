@@ -35,8 +35,7 @@ std::optional<std::uint32_t> add_if(PointCloud2Builder& builder, bool present, c
   return builder.add_field(name, type);
 }
 
-std::vector<Voxel> voxels_in(const MapSnapshot& view,
-                             const Eigen::AlignedBox2f& window_map) {
+std::vector<Voxel> voxels_in(const MapSnapshot& view, const Eigen::AlignedBox2f& window_map) {
   std::vector<Voxel> inside;
   constexpr double everywhere = std::numeric_limits<double>::infinity();
   const Eigen::Vector2d low = window_map.min().cast<double>();
@@ -117,9 +116,8 @@ sensor_msgs::msg::PointCloud2 to_cloud(const MapSnapshot& view,
   builder.fill(z, [&](std::size_t i) { return voxels[i].mean_map.z(); });
   builder.fill(rgb, [&](std::size_t i) { return packed_colour(voxels[i].evidence.winner()); });
   builder.fill(confidence, [&](std::size_t i) { return voxels[i].evidence.share(); });
-  builder.fill(label, [&](std::size_t i) {
-    return static_cast<std::uint8_t>(voxels[i].evidence.winner());
-  });
+  builder.fill(
+      label, [&](std::size_t i) { return static_cast<std::uint8_t>(voxels[i].evidence.winner()); });
   builder.set_dense();
   return builder.take();
 }

@@ -201,9 +201,11 @@ TEST(LabelledScanToCloud, CarriesClassConfidenceAndMotion) {
 
 TEST(MapToCloud, ShowsTheVoxelsInTheWindow) {
   const VoxelGrid grid(0.2, 20.0);
-  Voxel inside{.index = {5, 10, 15}, .point_count = 3, .mean_map = {1.1F, 2.1F, 3.1F}, .evidence = {}};
+  Voxel inside{
+      .index = {5, 10, 15}, .point_count = 3, .mean_map = {1.1F, 2.1F, 3.1F}, .evidence = {}};
   inside.evidence.add(SemanticClass::building, 1.0F);
-  Voxel outside{.index = {75, 10, 15}, .point_count = 3, .mean_map = {15.1F, 2.1F, 3.1F}, .evidence = {}};
+  Voxel outside{
+      .index = {75, 10, 15}, .point_count = 3, .mean_map = {15.1F, 2.1F, 3.1F}, .evidence = {}};
   Tile tile;
   tile.voxels = PackedVoxels({}, grid, std::array{inside, outside});
   tile.info.bounds_map.extend(inside.mean_map);

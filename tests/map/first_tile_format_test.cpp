@@ -87,7 +87,8 @@ std::vector<FirstVoxel> any_voxels() {
 
 /// An eighth of a voxel, as the first format's hash had it.
 Eigen::Vector3i eighth(const Eigen::Vector3f& mean_map, VoxelIndex index) {
-  const Eigen::Vector3d offset = (mean_map.cast<double>() - first_grid.corner_map(first_id, index)) / 0.2;
+  const Eigen::Vector3d offset =
+      (mean_map.cast<double>() - first_grid.corner_map(first_id, index)) / 0.2;
   return (offset * 8).array().floor().cwiseMax(0.0).cwiseMin(7.0).cast<int>();
 }
 

@@ -96,8 +96,8 @@ TEST(LiveTile, FindsEveryVoxel) {
   for (const auto& [key, count] : points) {
     const float weight = tile.evidence(key).votes()[0].weight;
     EXPECT_EQ(weight, static_cast<float>(count));
-    EXPECT_EQ(tile.evidence(key + 1).winner(), points.contains(key + 1) ? SemanticClass::road
-                                                                         : SemanticClass::unlabeled);
+    EXPECT_EQ(tile.evidence(key + 1).winner(),
+              points.contains(key + 1) ? SemanticClass::road : SemanticClass::unlabeled);
   }
 }
 

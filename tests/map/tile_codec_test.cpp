@@ -56,7 +56,8 @@ TEST(TileCodec, EmptyTileSurvives) {
 TEST(TileCodec, EveryTruncationIsRefused) {
   const auto blob = encode_tile(street_tiles().front());
   for (std::size_t size = 0; size < blob.size(); ++size) {
-    EXPECT_THROW((void)decode_tile(std::span(blob).first(size), codec_grid), TileCodecError) << size;
+    EXPECT_THROW((void)decode_tile(std::span(blob).first(size), codec_grid), TileCodecError)
+        << size;
   }
 }
 
@@ -148,10 +149,10 @@ TileEvidence any_evidence() {
   TileEvidence evidence;
   evidence.id = evidence_tile;
   evidence.shown = {{1, 2, true, false}, {65535, 0, true, true}, {3, 1000, false, false}};
-  evidence.hidden = PackedVoxels(
-      evidence_tile, codec_grid,
-      std::array{voxel_at(1, SemanticClass::car), voxel_at(2, SemanticClass::fence),
-                 voxel_at(90, SemanticClass::pole)});
+  evidence.hidden =
+      PackedVoxels(evidence_tile, codec_grid,
+                   std::array{voxel_at(1, SemanticClass::car), voxel_at(2, SemanticClass::fence),
+                              voxel_at(90, SemanticClass::pole)});
   evidence.hidden_states = {{{4, 5, true, false}, RemovalReason::relabelled},
                             {{1, 9, true, false}, RemovalReason::seen_through},
                             {{1, 0, false, false}, std::nullopt}};
@@ -186,7 +187,8 @@ TEST(TileEvidence, SaysWhatIsRemovedAndWhy) {
 TEST(TileEvidence, EveryTruncationIsRefused) {
   const auto bytes = encode_evidence(any_evidence());
   for (std::size_t size = 0; size < bytes.size(); ++size) {
-    EXPECT_THROW((void)decode_evidence(std::span(bytes).first(size), codec_grid), TileCodecError) << size;
+    EXPECT_THROW((void)decode_evidence(std::span(bytes).first(size), codec_grid), TileCodecError)
+        << size;
   }
 }
 

@@ -60,8 +60,8 @@ PagedSnapshots::Snapshot view_with_tile(std::uint64_t version, std::size_t bytes
   view.version = version;
   Tile tile;
   tile.info.id = {1, 0};
-  tile.voxels = PackedVoxels(tile.info.id, {0.2, 20.0},
-                             std::vector<Voxel>(bytes / sizeof(PackedVoxel)));
+  tile.voxels =
+      PackedVoxels(tile.info.id, {0.2, 20.0}, std::vector<Voxel>(bytes / sizeof(PackedVoxel)));
   tile.info.voxel_count = static_cast<std::uint32_t>(tile.voxels.size());
   view.tiles = {shared, std::make_shared<const Tile>(std::move(tile))};
   return std::make_shared<const MapSnapshot>(std::move(view));

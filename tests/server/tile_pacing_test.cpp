@@ -192,7 +192,8 @@ class TileWindow : public testing::Test {
   std::map<TileId, std::uint64_t> take(dds::Reader<MapTile>& reader) {
     std::map<TileId, std::uint64_t> got;
     MapTile message;
-    for (std::chrono::milliseconds wait = dds::discovery_timeout; reader.take(message, {}, wait); wait = 300ms) {
+    for (std::chrono::milliseconds wait = dds::discovery_timeout; reader.take(message, {}, wait);
+         wait = 300ms) {
       got[{message.tile_x(), message.tile_y()}] = message.state().revision();
     }
     return got;

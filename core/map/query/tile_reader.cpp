@@ -7,9 +7,7 @@
 namespace stillmap {
 namespace {
 
-std::size_t bytes_of(const Tile& tile) {
-  return sizeof(Tile) + tile.voxels.memory_bytes();
-}
+std::size_t bytes_of(const Tile& tile) { return sizeof(Tile) + tile.voxels.memory_bytes(); }
 
 bool is_state(const TileInfo& a, const TileInfo& b) {
   return a.id == b.id && a.revision == b.revision && a.content_hash == b.content_hash;

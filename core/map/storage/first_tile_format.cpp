@@ -39,8 +39,7 @@ struct StoredExcluded {
   std::int64_t last_seen_ns = 0;
 };
 
-constexpr std::size_t voxel_bytes =
-    3 * 2 + 4 + 3 * 4 + ClassEvidence::candidates * (1 + 4) + 16;
+constexpr std::size_t voxel_bytes = 3 * 2 + 4 + 3 * 4 + ClassEvidence::candidates * (1 + 4) + 16;
 constexpr std::size_t history_bytes = 2 + 2 + 1;
 constexpr std::size_t hidden_bytes = voxel_bytes + history_bytes + 1;
 constexpr std::size_t excluded_bytes = 3 * 2 + 1 + 1 + 8;
@@ -103,8 +102,9 @@ Voxel from_stored(const StoredVoxel& stored, TileId tile, const VoxelGrid& grid)
   if (!lies_in_its_cell(stored, tile, grid)) {
     throw TileCodecError("has voxels whose mean lies in another cell");
   }
-  return {stored.index,          stored.point_count,   stored.mean_map,
-          ClassEvidence::of(stored.votes), stored.first_seen_ns, stored.last_seen_ns};
+  return {stored.index,         stored.point_count,
+          stored.mean_map,      ClassEvidence::of(stored.votes),
+          stored.first_seen_ns, stored.last_seen_ns};
 }
 
 VoxelHistory from_stored(const StoredHistory& stored) {
@@ -139,12 +139,48 @@ std::vector<Stored> read_list(const std::uint8_t*& from, std::uint32_t count, Vi
   return stored;
 }
 
+constexpr int content_steps = 8;
+
+/// The eighth of the voxel that the mean lies in, as the hash of the first format has it.
+Eigen::Array3i content_step(const Voxel& voxel, TileId tile, const VoxelGrid& grid) {
+  const Eigen::Array3d offset =
+      (voxel.mean_map.cast<double>() - grid.corner_map(tile, voxel.index)) / grid.voxel_size_m();
+  return (offset * content_steps).floor().max(0.0).min(content_steps - 1.0).cast<int>();
+}
+
+Eigen::Array3i content_step(const PackedVoxel& voxel) {
+  const auto mean = static_cast<int>(content_word(voxel) >> 5 & 0x1FFU);
+  return {mean / (content_steps * content_steps), mean / content_steps % content_steps,
+          mean % content_steps};
+}
+
+/// Rounded within the eighth of the voxel, so that the content hash stays.
+PackedVoxel packed(const Voxel& voxel, TileId tile, const VoxelGrid& grid) {
+  PackedVoxel packed = pack(voxel, tile, grid);
+  const Eigen::Array3i wanted = content_step(voxel, tile, grid);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::uint16_t& sum = packed.offset_sum.at(static_cast<std::size_t>(axis));
+    while (content_step(packed)[axis] > wanted[axis]) --sum;
+    while (content_step(packed)[axis] < wanted[axis]) ++sum;
+  }
+  return packed;
+}
+
 PackedVoxels packed(const std::vector<Voxel>& voxels, TileId tile, const VoxelGrid& grid) {
   const auto not_ascending = [](const Voxel& a, const Voxel& b) { return a.index >= b.index; };
   if (std::ranges::adjacent_find(voxels, not_ascending) != voxels.end()) {
     throw TileCodecError("has voxels out of order");
   }
-  return {tile, grid, voxels};
+  std::vector<PackedVoxel> all;
+  std::vector<std::int64_t> stamps_ns;
+  all.reserve(voxels.size());
+  stamps_ns.reserve(2 * voxels.size());
+  for (const Voxel& voxel : voxels) {
+    all.push_back(packed(voxel, tile, grid));
+    stamps_ns.push_back(voxel.first_seen_ns);
+    stamps_ns.push_back(voxel.last_seen_ns);
+  }
+  return {tile, grid, std::move(all), seen_times(stamps_ns)};
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ void write_metadata(SQLite::Database& database, const SavedMap& map);
 /// Without their voxels, from their index alone (`index_tile_infos`).
 [[nodiscard]] TileTable read_tile_infos(SQLite::Database& database);
 [[nodiscard]] TileEvidenceMap read_tile_evidence(SQLite::Database& database,
-                                                  const MapSnapshot& sizes);
+                                                 const MapSnapshot& sizes);
 /// The tiles that have evidence but show nothing, with null for each.
 [[nodiscard]] TileEvidenceMap read_hidden_tile_ids(SQLite::Database& database);
 [[nodiscard]] SharedTrajectory read_trajectory(SQLite::Database& database);

@@ -80,9 +80,8 @@ KeySteps::Step KeySteps::step_to(std::uint32_t key) {
   const auto column = static_cast<std::uint16_t>(key >> 16);
   const auto layer = static_cast<std::uint16_t>(key & 0xFFFFU);
   Step step{.columns = static_cast<std::uint16_t>(column - column_)};
-  step.layers = step.columns == 0
-                    ? static_cast<std::uint16_t>(layer - layer_ - 1)
-                    : zigzag(static_cast<std::int16_t>(layer - lowest_layer_));
+  step.layers = step.columns == 0 ? static_cast<std::uint16_t>(layer - layer_ - 1)
+                                  : zigzag(static_cast<std::int16_t>(layer - lowest_layer_));
   move_to(column, layer);
   return step;
 }

@@ -187,8 +187,7 @@ void append_excluded(std::vector<std::uint8_t>& bytes, const std::vector<Exclude
   for (std::size_t i = 0; i < excluded.size(); ++i) {
     stored.push_back({keys.step_to(voxel_key(excluded[i].index)),
                       static_cast<std::uint8_t>(excluded[i].label),
-                      static_cast<std::uint8_t>(excluded[i].was_moving ? 1 : 0),
-                      seen.stamp_of[i]});
+                      static_cast<std::uint8_t>(excluded[i].was_moving ? 1 : 0), seen.stamp_of[i]});
   }
   append_planes<excluded_bytes>(bytes, stored, visit_excluded);
 }
@@ -300,7 +299,8 @@ TileEvidence decode_evidence(std::span<const std::uint8_t> bytes, const VoxelGri
   if (header.hidden > 0) check_sizes(header.grid, grid);
   std::vector<std::int64_t> stamps_ns = read_stamps(from, header.hidden_stamps);
   evidence.hidden = read_voxels(from, header.hidden, std::move(stamps_ns), header.id, grid);
-  read_list<state_bytes, StoredHiddenState>(from, header.hidden, evidence.hidden_states, visit_state);
+  read_list<state_bytes, StoredHiddenState>(from, header.hidden, evidence.hidden_states,
+                                            visit_state);
   evidence.excluded = read_excluded(from, header);
   return evidence;
 }

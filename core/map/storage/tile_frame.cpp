@@ -39,8 +39,8 @@ std::vector<std::uint8_t> from_frame(std::uint8_t format_version,
                                      std::span<const std::uint8_t> frame, std::size_t min_bytes) {
   if (frame.empty()) throw TileCodecError("is empty");
   if (frame[0] != format_version) {
-    throw TileCodecError("has format " + std::to_string(frame[0]) + ", this program reads formats 1 to " +
-                         std::to_string(tile_format));
+    throw TileCodecError("has format " + std::to_string(frame[0]) +
+                         ", this program reads formats 1 to " + std::to_string(tile_format));
   }
   const std::span<const std::uint8_t> packed = frame.subspan(1);
   const unsigned long long size = ZSTD_getFrameContentSize(packed.data(), packed.size());

@@ -213,8 +213,8 @@ void check_tile_evidence(SQLite::Database& database, const MapRow& map, MapCheck
     const auto* bytes = static_cast<const std::uint8_t*>(blob.getBlob());
     const auto size = static_cast<std::size_t>(blob.getBytes());
     check_evidence({row.getColumn(0).getInt(), row.getColumn(1).getInt()},
-                   std::span(bytes, bytes == nullptr ? 0 : size), row.getColumn(3).getInt64(),
-                   map, check);
+                   std::span(bytes, bytes == nullptr ? 0 : size), row.getColumn(3).getInt64(), map,
+                   check);
   }
 }
 
