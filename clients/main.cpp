@@ -1,5 +1,5 @@
 #include "clients/commands/command.hpp"
-#include "core/process/openmp_waits.hpp"
+#include "config/loaders/openmp_waits.hpp"
 #include "idl/dds/dds_log.hpp"
 
 int main(int argc, char** argv) {

@@ -9,7 +9,7 @@
 #include <iostream>
 
 #include "config/loaders/model_file.hpp"
-#include "core/process/openmp_waits.hpp"
+#include "config/loaders/openmp_waits.hpp"
 #include "core/process/stop_signals.hpp"
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/dds_log.hpp"

@@ -97,8 +97,8 @@ Server::~Server() = default;
 
 // Requests and scans wait for the mapping thread: they end first, so that none waits for a thread
 // that has ended. The map is saved when nothing can change it any more, and before background
-// threads end: where other programs keep all cores busy, those of idle priority may need minutes for
-// what they have in work. The topics are closed after that, by the destructors.
+// threads end: where other programs keep all cores busy, those of idle priority may need minutes
+// for what they have in work. The topics are closed after that, by the destructors.
 void Server::stop() {
   parts_->throttle.release();
   parts_->metrics.reset();

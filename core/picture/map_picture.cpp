@@ -47,7 +47,7 @@ cv::Rect pixels_of(const Eigen::Vector3d& corner_map, double voxel_size_m,
 
 PixelView rasterize(const MapSnapshot& view, const PictureFrame& frame) {
   PixelView top{cv::Mat1f(frame.size, nothing), cv::Mat1f(frame.size, nothing),
-              cv::Mat1b(frame.size, 0)};
+                cv::Mat1b(frame.size, 0)};
   const VoxelGrid grid(view.voxel_size_m, view.tile_size_m);
   for (const auto& tile : view.tiles) {
     for (const Voxel& voxel : tile->voxels) {

@@ -34,9 +34,9 @@ RosGraph::RosGraph(Participant& participant, DiscoveryMonitor& monitor,
       participant_guid_(participant_guid),
       node_name_(participant.options().node_name),
       // As bytes: both layouts have one name.
-      writer_(participant.make_writer(
-          ros_discovery_topic, serialized_sample_type(ros_discovery_type),
-          {.transient_local = true, .depth = 1}, nullptr)),
+      writer_(participant.make_writer(ros_discovery_topic,
+                                      serialized_sample_type(ros_discovery_type),
+                                      {.transient_local = true, .depth = 1}, nullptr)),
       follower_([this](const std::stop_token& stop) { follow_peers(stop); }) {
   monitor_.watch_ros_peers([this] { wake_follower(); });
   // For those that came in the meantime.

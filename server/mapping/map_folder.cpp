@@ -18,14 +18,14 @@ namespace fs = std::filesystem;
 constexpr std::size_t max_name_bytes = 200;
 
 /// Of the files that stand beside a map file while it is used.
-constexpr std::array<std::string_view, 7> reserved_endings{
-    "-wal", "-shm", "-journal", ".new", ".empty", ".lock", ".other"};
+constexpr std::array<std::string_view, 7> reserved_endings{"-wal",   "-shm",  "-journal", ".new",
+                                                           ".empty", ".lock", ".other"};
 
 /// No path, nothing that SQLite, a shell or another system would read as more than a name.
 bool is_plain_name(const std::string& name) {
   const auto is_special = [](unsigned char c) {
-    return c < ' ' || c == 127 || std::string_view("/\\:?*%\"<>|").find(static_cast<char>(c)) !=
-                                      std::string_view::npos;
+    return c < ' ' || c == 127 ||
+           std::string_view("/\\:?*%\"<>|").find(static_cast<char>(c)) != std::string_view::npos;
   };
   const auto ends_as = [&](std::string_view ending) { return name.ends_with(ending); };
   return !name.empty() && name.size() <= max_name_bytes && name.front() != '.' &&
@@ -87,12 +87,12 @@ void MapFolder::check_room(const fs::path& running, const fs::path& replaced,
     if (!error) bytes += size;
   }
   if (maps <= limit_.max_maps && bytes <= limit_.max_bytes) return;
-  throw std::invalid_argument(
-      "with it, there would be " + std::to_string(maps) + " saved maps of " +
-      std::to_string(bytes >> 20) + " MiB in " + folder_.string() + ", and the limits are " +
-      std::to_string(limit_.max_maps) + " (map.saved_maps) and " +
-      std::to_string(limit_.max_bytes >> 20) +
-      " MiB (map.saved_maps_mib): remove some there, or raise the limits");
+  throw std::invalid_argument("with it, there would be " + std::to_string(maps) +
+                              " saved maps of " + std::to_string(bytes >> 20) + " MiB in " +
+                              folder_.string() + ", and the limits are " +
+                              std::to_string(limit_.max_maps) + " (map.saved_maps) and " +
+                              std::to_string(limit_.max_bytes >> 20) +
+                              " MiB (map.saved_maps_mib): remove some there, or raise the limits");
 }
 
 }  // namespace stillmap::server

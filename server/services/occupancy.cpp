@@ -1,4 +1,5 @@
 #include "idl/conversions/occupancy.hpp"
+
 #include "server/services/service_handlers.hpp"
 
 namespace stillmap::server {

@@ -1,6 +1,7 @@
+#include "idl/conversions/traversability.hpp"
+
 #include "core/map/query/region.hpp"
 #include "idl/conversions/path_query.hpp"
-#include "idl/conversions/traversability.hpp"
 #include "server/services/service_handlers.hpp"
 
 namespace stillmap::server {

@@ -6,9 +6,9 @@
 
 #include "clients/commands/model/benchmark_scan.hpp"
 #include "core/segmentation/int8_calibration.hpp"
-#include "core/segmentation/open_network.hpp"
 #include "core/segmentation/network_input.hpp"
 #include "core/segmentation/onednn_network.hpp"
+#include "core/segmentation/open_network.hpp"
 #include "core/segmentation/opencv_network.hpp"
 #include "core/segmentation/pixel_scores.hpp"
 #include "tests/segmentation/onnx_builder.hpp"

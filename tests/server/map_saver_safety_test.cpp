@@ -112,7 +112,9 @@ TEST_F(MapSaverSafetyTest, ALoadWhoseRunningMapCannotBeSavedChangesNothing) {
   class FailingSource : public test::LatestMapSource {
    public:
     using LatestMapSource::LatestMapSource;
-    RunCheckpoint checkpoint(CheckpointScope) override { throw MapFileError("city", "no space left"); }
+    RunCheckpoint checkpoint(CheckpointScope) override {
+      throw MapFileError("city", "no space left");
+    }
   };
   FailingSource source(latest_map_);
   MapSaver saver = this->saver();

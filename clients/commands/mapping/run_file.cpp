@@ -32,7 +32,8 @@ std::optional<RunState> RunFile::earlier() const {
   if (!said.contains(next_key)) return std::nullopt;
   if (said.at(dataset_key) != dataset_) {
     throw std::invalid_argument(file_.string() + " is of a run over " + said.at(dataset_key) +
-                                ", not over " + dataset_ + ": name that recording, or begin anew "
+                                ", not over " + dataset_ +
+                                ": name that recording, or begin anew "
                                 "with --force");
   }
   const auto scans = from_ranges(said.at(scans_key));

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <span>
 #include <vector>
 
 namespace stillmap {
@@ -46,13 +47,14 @@ template <std::size_t record_bytes, typename Record, typename Visit>
 void append_planes(std::vector<std::uint8_t>& bytes, const std::vector<Record>& records,
                    Visit visit) {
   const std::size_t count = records.size();
-  std::vector<std::uint8_t> planes(count * record_bytes);
+  const std::size_t begin = bytes.size();
+  bytes.resize(begin + count * record_bytes);
+  const std::span<std::uint8_t> planes = std::span(bytes).subspan(begin);
   std::array<std::uint8_t, record_bytes> record{};
   for (std::size_t i = 0; i < count; ++i) {
     visit(FieldWriter(record.data()), records[i]);
     for (std::size_t k = 0; k < record_bytes; ++k) planes[k * count + i] = record[k];
   }
-  bytes.insert(bytes.end(), planes.begin(), planes.end());
 }
 
 /// Fills the records from planes that begin at `planes`; there are enough bytes for all.

@@ -119,6 +119,10 @@ void sync_folder(const fs::path& file) {
   ::close(descriptor);
 }
 
+void set_number(SQLite::Database& database, const std::string& pragma, std::uint32_t number) {
+  database.exec("PRAGMA " + pragma + " = " + std::to_string(number));
+}
+
 /// Made under another name and then renamed, so that an incomplete file never has this name.
 void create(const fs::path& file) {
   const fs::path fresh = beside(file, ".new");
@@ -130,8 +134,8 @@ void create(const fs::path& file) {
   {
     SQLite::Database database(sqlite_name(fresh), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
     SQLite::Transaction transaction(database);
-    database.exec("PRAGMA application_id = " + std::to_string(application_id));
-    database.exec("PRAGMA user_version = " + std::to_string(schema_version));
+    set_number(database, "application_id", application_id);
+    set_number(database, "user_version", schema_version);
     database.exec(schema);
     database.exec(evidence_table);
     database.exec(tile_info_index);

@@ -56,8 +56,8 @@ MapFileError held_by(const fs::path& map_file, const Holder& holder) {
 }
 
 MapFileError not_lockable(const fs::path& map_file, const char* why) {
-  return {map_file, std::string("cannot be locked (") + why +
-                        "); its folder must exist and be writable"};
+  return {map_file,
+          std::string("cannot be locked (") + why + "); its folder must exist and be writable"};
 }
 
 /// Opens and locks it; -1 when it was removed meanwhile, by a holder that ended.
@@ -87,8 +87,8 @@ MapLock::MapLock(const fs::path& map_file) : lock_file_(beside(map_file, ".lock"
   while (descriptor_ < 0) descriptor_ = try_lock(lock_file_, map_file);
   const std::string holder = host_name() + " " + std::to_string(::getpid()) + "\n";
   const bool is_named =
-      ::ftruncate(descriptor_, 0) == 0 && ::pwrite(descriptor_, holder.data(), holder.size(), 0) ==
-                                              static_cast<ssize_t>(holder.size());
+      ::ftruncate(descriptor_, 0) == 0 &&
+      ::pwrite(descriptor_, holder.data(), holder.size(), 0) == static_cast<ssize_t>(holder.size());
   if (is_named) return;
   const std::string why = std::strerror(errno);
   ::close(descriptor_);

@@ -1,4 +1,4 @@
-#include "core/process/openmp_waits.hpp"
+#include "config/loaders/openmp_waits.hpp"
 
 #include <unistd.h>
 
