@@ -429,7 +429,6 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
                                        const std::optional<InertialMotion>& inertial) {
   assert(labels.empty() || labels.classes.size() == scan.size());
   State& state = *state_;
-  const OdometryConfig& config = state.config;
   const std::int64_t time_ns = scan.stamp_ns + std::llround(sweep.middle_s * 1e9);
   const SweepMotion expected_motion = sweep_motion(sweep, inertial);
   const double stamp_part = sweep.duration_s > 0.0 ? -sweep.middle_s / sweep.duration_s : 0.0;
@@ -462,14 +461,12 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   const Eigen::Isometry3d T_correction = motion_of(step.result.sweep_correction);
   deskew_to_middle(scan, sweep, T_correction);
   step.T_map_lidar_middle = T_map_middle;
-
   // Moving points stay out of the local map, eq. (9) and c > c_th.
   step.motion = classify_point_motion(scan, labels, parts.objects, parts.motion_classes,
-                                      T_map_middle, state.map, config);
-  if (step.result.health == OdometryHealth::lost) {
-    state.lost_scans += 1;
-  } else {
-    state.lost_scans = 0;
+                                      T_map_middle, state.map, state.config);
+  const bool is_lost = step.result.health == OdometryHealth::lost;
+  state.lost_scans = is_lost ? state.lost_scans + 1 : 0;
+  if (!is_lost) {
     state.extend_map(parts, step, T_map_middle);
     state.fits.add(step.result);
     state.update_state(time_ns, std::move(parts.view), T_map_middle);
