@@ -58,6 +58,7 @@ MapSaver::MapSaver(const LatestMap& latest_map, Statistics& statistics, const fs
 }
 
 MapStore& MapSaver::open_store() {
+  if (misplaced_) bring_back();
   if (!store_) store_ = open_map_file(file_);
   return *store_;
 }
@@ -90,7 +91,14 @@ std::optional<fs::path> MapSaver::put_stored_map_aside() {
 }
 
 std::shared_ptr<TileStore> MapSaver::tile_store() {
-  return memory_limit_bytes_ > 0 ? open_store().tile_store() : nullptr;
+  const std::scoped_lock lock(mutex_);
+  if (memory_limit_bytes_ > 0) tiles_ = tiles_of(open_store());
+  return tiles_;
+}
+
+std::shared_ptr<ReopenedTileStore> MapSaver::tiles_of(MapStore& store) const {
+  if (memory_limit_bytes_ == 0) return nullptr;
+  return std::make_shared<ReopenedTileStore>(store.tile_store());
 }
 
 void MapSaver::set_source(CheckpointSource& source) {
@@ -138,8 +146,8 @@ bool MapSaver::has_moved() const {
 bool MapSaver::is_saved() const {
   const auto view = latest_map_.view();
   const std::uint64_t poses = latest_map_.poses_added();
-  return poses == 0 || (view->map_id == saved_map_id_ && view->version == saved_version_ &&
-                        poses == saved_poses_);
+  return poses == 0 || (!misplaced_ && view->map_id == saved_map_id_ &&
+                        view->version == saved_version_ && poses == saved_poses_);
 }
 
 void MapSaver::save(CheckpointScope scope, bool has_ended) {
@@ -156,6 +164,7 @@ void MapSaver::save(CheckpointScope scope, bool has_ended) {
 }
 
 bool MapSaver::store(CheckpointScope scope, bool has_ended) {
+  MapStore& file = open_store();
   const std::uint64_t poses = latest_map_.poses_added();
   const bool is_standing = !has_moved();
   const Eigen::Isometry3d T_map_base = latest_map_.newest_pose().T_map_lidar;
@@ -169,7 +178,7 @@ bool MapSaver::store(CheckpointScope scope, bool has_ended) {
   checkpoint.map.is_partial = scope == CheckpointScope::changed_views;
   if (checkpoint.map.is_partial && checkpoint.map.tile_evidence.empty()) return false;
   if (has_ended) checkpoint.map.metadata[map_ended_key] = "yes";
-  const std::uint64_t bytes = open_store().save(checkpoint.map);
+  const std::uint64_t bytes = file.save(checkpoint.map);
   source_->checkpoint_stored(checkpoint.step);
   remember_as_saved(checkpoint.map.view, poses);
   if (is_standing) standing_allowance_.spend(bytes);
@@ -243,13 +252,15 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
   SavedMap map = read(source);
   if (map.view.tiles.empty()) throw MapFileError(target, no_map_yet);
   map.view.map_id = new_map_id();
-  const auto begin = prepare(map, memory_limit_bytes_ > 0 ? source.tile_store() : nullptr);
+  const std::shared_ptr<ReopenedTileStore> tiles = tiles_of(source);
+  const auto begin = prepare(map, tiles);
   if (!is_own && !file_.empty() && !is_empty() && !is_saved_whole()) {
     save(CheckpointScope::changed);
   }
   // The last step that can fail.
   source.begin_run(map.view.map_id);
   begin();
+  tiles_ = tiles;
   T_map_base_saved_.reset();
   if (!is_own) {
     // The datum of another map is that in its own file.
@@ -267,6 +278,7 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
 NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
   const std::scoped_lock lock(mutex_);
   NewMap begun{.map_id = new_map_id(), .kept_file = {}};
+  std::shared_ptr<ReopenedTileStore> tiles;
   if (!file_.empty()) {
     if (!discard && !is_empty() && !is_saved_whole()) save(CheckpointScope::changed);
     if (open_store().holds_map()) {
@@ -274,12 +286,18 @@ NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
       const std::uintmax_t bytes = fs::file_size(file_, unknown);
       if (!discard) folder_.check_room(file_, {}, unknown ? 0 : bytes);
       begun.kept_file = folder_.unused_file_for(file_);
-      put_aside(begun.kept_file);
+      tiles = put_aside(begun.kept_file);
+    } else {
+      tiles = tiles_of(open_store());
     }
   } else if (memory_limit_bytes_ > 0) {
-    store_ = open_scratch_map();
+    auto scratch = open_scratch_map();
+    tiles = tiles_of(*scratch);
+    store_ = std::move(scratch);
   }
-  begin(begun.map_id, memory_limit_bytes_ > 0 ? store_->tile_store() : nullptr);
+  // Nothing from here on can fail.
+  begin(begun.map_id, tiles);
+  tiles_ = tiles;
   saved_map_id_ = 0;
   stored_metadata_.clear();
   if (discard && !begun.kept_file.empty()) {
@@ -289,7 +307,7 @@ NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
   return begun;
 }
 
-void MapSaver::put_aside(const fs::path& kept) {
+std::shared_ptr<ReopenedTileStore> MapSaver::put_aside(const fs::path& kept) {
   open_store().complete_file();
   const fs::path fresh = file_.string() + ".empty";
   try {
@@ -305,14 +323,31 @@ void MapSaver::put_aside(const fs::path& kept) {
   }
   try {
     replace_map_file(fresh, file_);
-    // Its tile store, too, can be opened.
-    static_cast<void>(open_store().tile_store());
+    return tiles_of(open_store());
   } catch (const MapFileError&) {
-    store_.reset();
-    std::error_code not_moved;
-    fs::rename(kept, file_, not_moved);
+    misplaced_ = kept;
+    try {
+      bring_back();
+    } catch (const MapFileError&) {
+      // The disk lets it be neither of the two now; the next save tries again.
+    }
     throw;
   }
+}
+
+void MapSaver::bring_back() {
+  store_.reset();
+  try {
+    replace_map_file(*misplaced_, file_);
+  } catch (const MapFileError& error) {
+    throw MapFileError(file_, "holds the map of a reset that failed; the running one lies in " +
+                                  misplaced_->string() + " until it can be moved back (" +
+                                  error.what() + ")");
+  }
+  misplaced_.reset();
+  store_ = open_map_file(file_);
+  // Its connection knows the log under the old name.
+  if (tiles_) tiles_->reopen(store_->tile_store());
 }
 
 RunCheckpoint MapSaver::take(CheckpointScope scope) const {

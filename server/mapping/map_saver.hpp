@@ -48,6 +48,26 @@ struct NewMap {
   std::filesystem::path kept_file;
 };
 
+/// The tiles of one map, whose file may have to be opened again under it. Thread-safe.
+class ReopenedTileStore : public TileStore {
+ public:
+  explicit ReopenedTileStore(std::shared_ptr<TileStore> store) : store_(std::move(store)) {}
+  void reopen(std::shared_ptr<TileStore> store) {
+    const std::scoped_lock lock(mutex_);
+    store_ = std::move(store);
+  }
+  TileRecord load(TileId id) override { return current()->load(id); }
+
+ private:
+  [[nodiscard]] std::shared_ptr<TileStore> current() {
+    const std::scoped_lock lock(mutex_);
+    return store_;
+  }
+
+  std::mutex mutex_;
+  std::shared_ptr<TileStore> store_;
+};
+
 /// Bytes that may be written in an hour, beginning with an hour's worth. Not thread-safe.
 class WriteAllowance {
  public:
@@ -154,8 +174,14 @@ class MapSaver {
   [[nodiscard]] std::filesystem::path file_named(const std::string& name) const;
   void save_copy(const std::filesystem::path& target, bool overwrite);
   [[nodiscard]] bool is_empty() const;
-  /// Renames the current file, and puts an empty one in its place.
-  void put_aside(const std::filesystem::path& kept);
+  /// Renames the current file, and puts an empty one in its place, whose tiles it returns. Throws
+  /// MapFileError; then the current file is what it was, or becomes it again with the next use that
+  /// the disk allows.
+  std::shared_ptr<ReopenedTileStore> put_aside(const std::filesystem::path& kept);
+  /// Undoes `put_aside` where it failed half-way.
+  void bring_back();
+  /// What the map that the file holds is to read its tiles from; null without a memory limit.
+  [[nodiscard]] std::shared_ptr<ReopenedTileStore> tiles_of(MapStore& store) const;
   void remember_as_saved(const MapSnapshot& view, std::uint64_t poses);
   /// Of the current file; what `metadata_` does not say stays as it is.
   void remember_metadata(const SavedMap& map);
@@ -171,6 +197,10 @@ class MapSaver {
   CheckpointSource* source_ = nullptr;
   std::mutex mutex_;
   std::unique_ptr<MapStore> store_;
+  /// Of the running map.
+  std::shared_ptr<ReopenedTileStore> tiles_;
+  /// Where the current file lies while it could not be given its name again.
+  std::optional<std::filesystem::path> misplaced_;
   std::uint64_t saved_map_id_ = 0;
   std::uint64_t saved_version_ = 0;
   std::uint64_t saved_poses_ = 0;

@@ -1,5 +1,6 @@
 // Preloaded into a server (LD_PRELOAD), makes its disk fail: as long as the file $STILLMAP_FAULT
-// holds "full", "read_only" or "fsync", calls fail on files in $STILLMAP_FAULT_FOLDER.
+// holds "full", "read_only" or "fsync", calls fail on files in $STILLMAP_FAULT_FOLDER; with
+// "half_reset", no file there can be given the name city.stillmap.
 
 #include <dlfcn.h>
 #include <fcntl.h>
@@ -120,6 +121,10 @@ int open64(const char* path, int flags, ...) {
 int rename(const char* from, const char* to) noexcept {
   static auto* const real = next<int(const char*, const char*)>("rename");
   if (is_read_only(from)) return failing(EROFS);
+  if (std::string_view(to).ends_with("/city.stillmap") && is_watched(to) &&
+      fault() == "half_reset") {
+    return failing(EROFS);
+  }
   return real(from, to);
 }
 

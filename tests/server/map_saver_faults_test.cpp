@@ -152,22 +152,35 @@ class SavingProcess : public CheckpointSource {
 /// A saver with one voxel mapped, for one test in this process.
 class OneVoxel : public CheckpointSource {
  public:
-  explicit OneVoxel(const fs::path& file) : saver_(latest_map_, statistics_, file, {}) {
-    map_.reset(new_map_id());
+  explicit OneVoxel(const fs::path& file)
+      : saver_(latest_map_, statistics_, file, {}, {.memory_limit_mib = 64}) {
+    begin(new_map_id(), saver_.tile_store());
     LabelledScan scan;
     scan.scan.points_lidar.assign(5, Eigen::Vector3f(1.0F, 1.0F, 1.0F));
     scan.motion.assign(5, Motion::stationary);
     map_.insert(scan, Eigen::Isometry3d::Identity());
-    latest_map_.begin(map_.view(), {});
+    latest_map_.publish(map_.view());
     latest_map_.add_pose({.stamp_ns = 1}, OdometryHealth::good, "none");
     saver_.set_source(*this);
   }
   [[nodiscard]] MapSaver& saver() { return saver_; }
+  /// What its map reads tiles from.
+  [[nodiscard]] TileStore& tiles() { return *tiles_; }
 
-  RunCheckpoint checkpoint(CheckpointScope /*scope*/) override {
-    return {{*latest_map_.view(), {}, latest_map_.trajectory(), {}}, 0};
+  void begin(std::uint64_t map_id, const std::shared_ptr<TileStore>& tiles) {
+    tiles_ = tiles;
+    map_.use_tile_store(tiles);
+    map_.reset(map_id);
+    latest_map_.begin(map_.view(), {});
   }
-  void checkpoint_stored(std::uint64_t /*step*/) override {}
+
+  RunCheckpoint checkpoint(CheckpointScope scope) override {
+    const MapCheckpoint map = map_.checkpoint(scope);
+    RunCheckpoint checkpoint{to_saved_map(map), map.step};
+    checkpoint.map.trajectory = latest_map_.trajectory();
+    return checkpoint;
+  }
+  void checkpoint_stored(std::uint64_t step) override { map_.checkpoint_stored(step); }
   void checkpoint_failed() override {}
   [[nodiscard]] MemoryUse memory_use() override { return {}; }
 
@@ -175,6 +188,7 @@ class OneVoxel : public CheckpointSource {
   LatestMap latest_map_;
   Statistics statistics_;
   StaticMap map_{StaticMapConfig()};
+  std::shared_ptr<TileStore> tiles_;
   MapSaver saver_;
 };
 
@@ -205,13 +219,14 @@ struct SaverFault {
 
 void PrintTo(const SaverFault& fault, std::ostream* out) { *out << fault.name; }
 
-class MapSaverFaults : public testing::TestWithParam<SaverFault> {
+/// A folder on a disk that fails when it is told to.
+class FaultyDisk : public testing::Test {
  protected:
-  MapSaverFaults() {
+  FaultyDisk() {
     setenv("STILLMAP_FAULT", control_.c_str(), 1);
     setenv("STILLMAP_FAULT_FOLDER", folder_.path().c_str(), 1);
   }
-  ~MapSaverFaults() override {
+  ~FaultyDisk() override {
     unsetenv("STILLMAP_FAULT");
     unsetenv("STILLMAP_FAULT_FOLDER");
   }
@@ -221,6 +236,41 @@ class MapSaverFaults : public testing::TestWithParam<SaverFault> {
     std::ofstream(fresh) << fault;
     fs::rename(fresh, control_);
   }
+
+  ScratchFolder folder_;
+  // Where the faults do not reach it.
+  ScratchFolder control_folder_;
+  fs::path control_ = control_folder_ / "fault";
+  fs::path file_ = folder_ / "city.stillmap";
+};
+
+TEST_F(FaultyDisk, AResetThatFailsHalfWayLeavesOneWholeMap) {
+  OneVoxel running(file_);
+  running.saver().save_if_changed();
+  const auto reset = [&] {
+    running.saver().begin_anew(
+        false, [&](auto map_id, const auto& tiles) { running.begin(map_id, tiles); });
+  };
+  set_fault("half_reset");
+  EXPECT_THROW(reset(), MapFileError);
+  EXPECT_FALSE(fs::exists(file_));
+  EXPECT_THROW(running.saver().save_as("copy"), MapFileError);
+  EXPECT_EQ(running.tiles().load({0, 0}).tile->voxels.size(), 1U);
+  set_fault("");
+  EXPECT_EQ(running.saver().save_as(""), file_);
+  EXPECT_EQ(running.tiles().load({0, 0}).tile->voxels.size(), 1U);
+  EXPECT_EQ(open_map_file(file_)->load().trajectory.size(), 1U);
+  std::size_t maps = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder_.path())) {
+    maps += entry.path().extension() == ".stillmap" ? 1 : 0;
+  }
+  EXPECT_EQ(maps, 1U);
+  reset();
+  EXPECT_TRUE(open_map_file(file_)->load().trajectory.empty());
+}
+
+class MapSaverFaults : public FaultyDisk, public testing::WithParamInterface<SaverFault> {
+ protected:
   void wait_up_to(unsigned most_us) { usleep(static_cast<useconds_t>(random_() % most_us)); }
 
   /// Runs and ends a process; the stamps that it said were stored.
@@ -284,11 +334,6 @@ class MapSaverFaults : public testing::TestWithParam<SaverFault> {
     return stamps;
   }
 
-  ScratchFolder folder_;
-  // Where the faults do not reach it.
-  ScratchFolder control_folder_;
-  fs::path control_ = control_folder_ / "fault";
-  fs::path file_ = folder_ / "city.stillmap";
   std::mt19937 random_{std::random_device{}()};
 };
 
