@@ -10,12 +10,12 @@ namespace stillmap::server {
 
 class Metrics;
 
-/// Answers Prometheus over HTTP at /metrics, from its own threads, until destroyed. A request must
-/// come within a second and in 8 KiB; one client that keeps to that is answered within seconds
-/// beside a hundred that do not.
+/// Answers Prometheus over HTTP at /metrics, in a thread of its own, until destroyed. A request
+/// must come within a second and in 8 KiB, and its answer be taken within five: connections that
+/// stay silent, drip or do not read hold up nobody.
 class MetricsEndpoint {
  public:
-  /// `status` is called for every request, also by several threads. Throws std::runtime_error that
+  /// `status` is called for every request, in that thread. Throws std::runtime_error that
   /// names the address when it cannot be listened on.
   MetricsEndpoint(const std::string& address, Metrics& metrics,
                   std::function<dds::ServerStatus()> status);
@@ -25,8 +25,6 @@ class MetricsEndpoint {
   [[nodiscard]] const std::string& address() const { return address_; }
 
  private:
-  class Exposed;
-  std::shared_ptr<Exposed> exposed_;
   std::unique_ptr<class MetricsListener> listener_;
   std::string address_;
 };

@@ -13,6 +13,7 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "server/monitoring/metrics.hpp"
 #include "tests/slowdown.hpp"
@@ -115,6 +116,24 @@ TEST_F(MetricsEndpointTest, AnswersBesideConnectionsThatDrip) {
       std::this_thread::sleep_for(100ms);
     }
   });
+  expect_scrape_is_answered();
+}
+
+TEST_F(MetricsEndpointTest, SaysWhereTheMetricsAre) {
+  for (const auto& [request, answer] : std::vector<std::pair<std::string, std::string>>{
+           {"GET /elsewhere HTTP/1.1\r\nHost: robot\r\n\r\n", "HTTP/1.1 404"},
+           {"DELETE /metrics HTTP/1.1\r\nHost: robot\r\n\r\n", "HTTP/1.1 405"},
+           {"GET /metrics?all=1 HTTP/1.0\r\n\r\n", "HTTP/1.1 200"},
+           {"no request at all\r\n\r\n", ""}}) {
+    const Connection client(endpoint_.address());
+    client.send(request);
+    EXPECT_THAT(client.receive(scrape_timeout), StartsWith(answer)) << request;
+  }
+}
+
+TEST_F(MetricsEndpointTest, AcceptsFurtherConnectionsWhereTooManyWereOpen) {
+  std::list<Connection> silent;
+  for (int i = 0; i < 300; ++i) silent.emplace_back(endpoint_.address());
   expect_scrape_is_answered();
 }
 
