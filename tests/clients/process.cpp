@@ -6,15 +6,13 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <chrono>
 #include <cstdlib>
 #include <fstream>
 #include <iterator>
-#include <random>
-#include <sstream>
 #include <stdexcept>
-#include <thread>
 #include <vector>
+
+#include "tests/domain_lease.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -25,13 +23,6 @@ std::string content(const std::filesystem::path& file) {
 }
 
 int exit_code_of(int wait_status) { return WIFEXITED(wait_status) ? WEXITSTATUS(wait_status) : -1; }
-
-// Whether some socket of this machine has the UDP port, as /proc/net/udp lists them.
-bool is_used(int port) {
-  std::ostringstream end_of_address;
-  end_of_address << ":" << std::hex << std::uppercase << port << " ";
-  return content("/proc/net/udp").find(end_of_address.str()) != std::string::npos;
-}
 
 }  // namespace
 
@@ -80,14 +71,9 @@ int BackgroundProcess::wait() {
 }
 
 int free_domain() {
-  std::mt19937 random(std::random_device{}());
-  for (int attempt = 0; attempt < 1000; ++attempt) {
-    const int domain = std::uniform_int_distribution(100, 200)(random);
-    if (!is_used(7400 + 250 * domain)) return domain;
-    // For a second or so `stillmap doctor` listens to all domains at once.
-    std::this_thread::sleep_for(std::chrono::milliseconds(20));
-  }
-  throw std::runtime_error("no free DDS domain between 100 and 200");
+  // As long as the process that asked runs.
+  static std::vector<DomainLease> leases;
+  return leases.emplace_back(DomainLease::take()).domain();
 }
 
 }  // namespace stillmap::test

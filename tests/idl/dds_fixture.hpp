@@ -1,7 +1,6 @@
 #pragma once
 
 #include <fastrtps/xmlparser/XMLProfileManager.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cstddef>
@@ -9,6 +8,7 @@
 
 #include "idl/dds/dds_options.hpp"
 #include "sensor_msgs.h"
+#include "tests/domain_lease.hpp"
 #include "tests/eventually.hpp"
 
 namespace stillmap::dds {
@@ -24,11 +24,10 @@ inline sensor_msgs::msg::PointCloud2 cloud_of(std::size_t bytes, std::uint32_t n
   return cloud;
 }
 
-/// A domain that other tests on this machine hardly use: ctest runs every test in a process of its
-/// own. Domain 0 stays free for people.
+/// The domain of this process: ctest runs every test in a process of its own.
 inline std::uint32_t test_domain_id() {
-  constexpr std::uint32_t domains = 200;
-  return 20 + static_cast<std::uint32_t>(::getpid()) % domains;
+  static const test::DomainLease lease = test::DomainLease::take();
+  return static_cast<std::uint32_t>(lease.domain());
 }
 
 /// Makes two participants of one process talk as two processes do. Otherwise Fast DDS hands samples

@@ -1,0 +1,77 @@
+#pragma once
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <random>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <thread>
+#include <utility>
+
+namespace stillmap::test {
+
+/// A DDS domain that no other test of this machine takes as long as this lives, also when its
+/// process is killed.
+class DomainLease {
+ public:
+  /// Domain 0 stays free for people, the last ones for what a test runs beside.
+  static constexpr int first_domain = 20;
+  static constexpr int last_domain = 219;
+
+  static DomainLease take() {
+    std::mt19937 random(std::random_device{}());
+    for (int attempt = 0; attempt < 1000; ++attempt) {
+      const int domain = std::uniform_int_distribution(first_domain, last_domain)(random);
+      if (auto lease = try_to_take(domain)) return std::move(*lease);
+      // For a second or so `stillmap doctor` listens to all domains at once.
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));
+    }
+    throw std::runtime_error("no free DDS domain");
+  }
+
+  DomainLease(DomainLease&& other) noexcept
+      : domain_(other.domain_), file_(std::exchange(other.file_, -1)) {}
+  DomainLease& operator=(DomainLease&&) = delete;
+  ~DomainLease() {
+    if (file_ >= 0) ::close(file_);
+  }
+
+  [[nodiscard]] int domain() const { return domain_; }
+
+ private:
+  DomainLease(int domain, int file) : domain_(domain), file_(file) {}
+
+  static std::optional<DomainLease> try_to_take(int domain) {
+    const auto name =
+        std::filesystem::temp_directory_path() / ("stillmap-test-domain-" + std::to_string(domain));
+    DomainLease lease(domain, ::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
+    // Somebody else's process may still use it without a lease.
+    if (lease.file_ < 0 || ::flock(lease.file_, LOCK_EX | LOCK_NB) != 0 ||
+        is_used(7400 + 250 * domain)) {
+      return std::nullopt;
+    }
+    return lease;
+  }
+
+  /// Whether some socket of this machine has the UDP port, as /proc/net/udp lists them.
+  static bool is_used(int port) {
+    std::ostringstream end_of_address;
+    end_of_address << ":" << std::hex << std::uppercase << port << " ";
+    std::ifstream stream("/proc/net/udp");
+    const std::string sockets{std::istreambuf_iterator<char>(stream), {}};
+    return sockets.find(end_of_address.str()) != std::string::npos;
+  }
+
+  int domain_;
+  int file_;
+};
+
+}  // namespace stillmap::test
