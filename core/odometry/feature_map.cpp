@@ -168,7 +168,12 @@ FeatureMap::FeatureMap(const LocalMapConfig& config)
       radius_m_(static_cast<float>(config.radius_m)) {}
 
 Eigen::Vector3i FeatureMap::voxel_of(const Eigen::Vector3f& position_map) const {
-  return (position_map / voxel_size_m_).array().floor().cast<int>();
+  // Places that are not finite or out of the index's reach come to lie at its ends.
+  static constexpr float reach = 1U << 20U;
+  const auto clamped = [](float voxel) {
+    return static_cast<int>(voxel > -reach ? std::min(voxel, reach) : -reach);
+  };
+  return (position_map / voxel_size_m_).array().floor().unaryExpr(clamped);
 }
 
 void FeatureMap::insert(std::span<const LabelledPoint> points) {

@@ -95,6 +95,15 @@ TEST(FeatureMapNearest, FindsNothingInAnEmptyMap) {
   EXPECT_EQ(FeatureMap(roomy()).nearest({1.0F, 2.0F, 3.0F}, 5, 1.0F).count, 0);
 }
 
+TEST(FeatureMapNearest, FindsNothingWhereThereIsNoPlace) {
+  FeatureMap map(roomy());
+  map.insert(random_points(100, Eigen::Vector3f::Zero(), Eigen::Vector3f::Ones(), 23));
+  for (const float nowhere : {NAN, INFINITY, -INFINITY, 1e9F, -3e38F}) {
+    EXPECT_EQ(map.nearest({nowhere, 0.0F, 0.0F}, 1, 0.5F).count, 0) << nowhere;
+    EXPECT_EQ(map.nearest({0.0F, nowhere, nowhere}, 1, 0.5F).count, 0) << nowhere;
+  }
+}
+
 TEST(FeatureMapInsert, KeepsSpacingAndCapacityOfEveryVoxel) {
   LocalMapConfig config;
   config.min_spacing_m = 0.25;
