@@ -68,57 +68,62 @@ SeenTimes seen_times(std::span<const std::int64_t> stamps_ns) {
   return seen;
 }
 
-PackedVoxels::PackedVoxels(TileId tile, const VoxelGrid& grid, std::span<const Voxel> voxels)
-    : tile_(tile), grid_(grid) {
+PackedVoxels::PackedVoxels(TileId tile, const VoxelGrid& grid, std::span<const Voxel> voxels) {
+  std::vector<PackedVoxel> packed;
   std::vector<std::int64_t> stamps_ns;
-  voxels_.reserve(voxels.size());
+  packed.reserve(voxels.size());
   stamps_ns.reserve(2 * voxels.size());
   for (const Voxel& voxel : voxels) {
-    voxels_.push_back(pack(voxel, tile, grid));
+    packed.push_back(pack(voxel, tile, grid));
     stamps_ns.push_back(voxel.first_seen_ns);
     stamps_ns.push_back(voxel.last_seen_ns);
   }
-  set_stamps(seen_times(stamps_ns));
+  *this = PackedVoxels(tile, grid, std::move(packed), seen_times(stamps_ns));
 }
 
 PackedVoxels::PackedVoxels(TileId tile, const VoxelGrid& grid, std::vector<PackedVoxel> voxels,
-                           const SeenTimes& seen)
-    : tile_(tile), grid_(grid), voxels_(std::move(voxels)) {
-  set_stamps(seen);
+                           const SeenTimes& seen) {
+  auto content = std::make_shared<Content>(Content{
+      .tile = tile, .grid = grid, .voxels = std::move(voxels), .stamps_ns = {}, .stamp_words = {}});
+  content->set_stamps(seen);
+  content_ = std::move(content);
 }
 
-void PackedVoxels::set_stamps(const SeenTimes& seen) {
-  assert(seen.stamp_of.size() == 2 * voxels_.size());
-  stamps_ns_ = seen.stamps_ns;
-  stamp_bits_ =
-      static_cast<unsigned>(std::bit_width(std::max<std::size_t>(stamps_ns_.size(), 1) - 1));
-  stamp_words_.assign((seen.stamp_of.size() * stamp_bits_ + word_bits - 1) / word_bits, 0);
-  if (stamp_bits_ == 0) return;
+void PackedVoxels::Content::set_stamps(const SeenTimes& seen) {
+  assert(seen.stamp_of.size() == 2 * voxels.size());
+  stamps_ns = seen.stamps_ns;
+  stamp_bits =
+      static_cast<unsigned>(std::bit_width(std::max<std::size_t>(stamps_ns.size(), 1) - 1));
+  stamp_words.assign((seen.stamp_of.size() * stamp_bits + word_bits - 1) / word_bits, 0);
+  if (stamp_bits == 0) return;
   std::size_t bit = 0;
   for (const std::uint64_t stamp : seen.stamp_of) {
     const std::size_t word = bit / word_bits;
     const std::size_t shift = bit % word_bits;
-    stamp_words_[word] |= stamp << shift;
-    if (shift + stamp_bits_ > word_bits) stamp_words_[word + 1] |= stamp >> (word_bits - shift);
-    bit += stamp_bits_;
+    stamp_words[word] |= stamp << shift;
+    if (shift + stamp_bits > word_bits) stamp_words[word + 1] |= stamp >> (word_bits - shift);
+    bit += stamp_bits;
   }
 }
 
 PackedVoxels PackedVoxels::first(std::size_t count) const {
-  std::vector<std::int64_t> stamps_ns;
+  if (!content_) return {};
+  std::vector<std::int64_t> first_stamps_ns;
   for (std::size_t i = 0; i < count; ++i) {
-    stamps_ns.push_back(stamps_ns_[first_stamp(i)]);
-    stamps_ns.push_back(stamps_ns_[last_stamp(i)]);
+    first_stamps_ns.push_back(content_->stamps_ns[first_stamp(i)]);
+    first_stamps_ns.push_back(content_->stamps_ns[last_stamp(i)]);
   }
-  return {tile_, grid_,
-          std::vector<PackedVoxel>(voxels_.begin(),
-                                   voxels_.begin() + static_cast<std::ptrdiff_t>(count)),
-          seen_times(stamps_ns)};
+  const auto begin = content_->voxels.begin();
+  return {content_->tile, content_->grid,
+          std::vector<PackedVoxel>(begin, begin + static_cast<std::ptrdiff_t>(count)),
+          seen_times(first_stamps_ns)};
 }
 
 std::size_t PackedVoxels::memory_bytes() const {
-  return voxels_.capacity() * sizeof(PackedVoxel) + stamps_ns_.capacity() * sizeof(std::int64_t) +
-         stamp_words_.capacity() * sizeof(std::uint64_t);
+  if (!content_) return 0;
+  return sizeof(Content) + content_->voxels.capacity() * sizeof(PackedVoxel) +
+         content_->stamps_ns.capacity() * sizeof(std::int64_t) +
+         content_->stamp_words.capacity() * sizeof(std::uint64_t);
 }
 
 }  // namespace stillmap

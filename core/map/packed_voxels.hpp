@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <iterator>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -66,7 +67,8 @@ struct SeenTimes {
 [[nodiscard]] SeenTimes seen_times(std::span<const std::int64_t> stamps_ns);
 
 /// The voxels of a tile, immutable, in some 22 bytes each: 20 and the numbers of two stamps in as
-/// many bits as the tile has different ones. They are read by value.
+/// many bits as the tile has different ones. They are read by value. A copy costs one pointer, and
+/// no voxels take no more.
 class PackedVoxels {
  public:
   class Iterator;
@@ -80,33 +82,41 @@ class PackedVoxels {
   PackedVoxels(TileId tile, const VoxelGrid& grid, std::vector<PackedVoxel> voxels,
                const SeenTimes& seen);
 
-  [[nodiscard]] std::size_t size() const { return voxels_.size(); }
-  [[nodiscard]] bool empty() const { return voxels_.empty(); }
+  [[nodiscard]] std::size_t size() const { return content_ ? content_->voxels.size() : 0; }
+  [[nodiscard]] bool empty() const { return size() == 0; }
   [[nodiscard]] Voxel operator[](std::size_t position) const {
-    const PackedVoxel& packed = voxels_[position];
+    const Content& content = *content_;
+    const PackedVoxel& packed = content.voxels[position];
     return {.index = voxel_index(packed.key),
             .point_count = packed.point_count,
-            .mean_map = stillmap::mean_map(packed, tile_, grid_),
+            .mean_map = stillmap::mean_map(packed, content.tile, content.grid),
             .evidence = packed.evidence,
-            .first_seen_ns = stamps_ns_[first_stamp(position)],
-            .last_seen_ns = stamps_ns_[last_stamp(position)]};
+            .first_seen_ns = content.stamps_ns[content.stamp_of(2 * position)],
+            .last_seen_ns = content.stamps_ns[content.stamp_of(2 * position + 1)]};
   }
   [[nodiscard]] Voxel front() const { return (*this)[0]; }
   [[nodiscard]] Voxel back() const { return (*this)[size() - 1]; }
   [[nodiscard]] Iterator begin() const;
   [[nodiscard]] Iterator end() const;
 
-  [[nodiscard]] std::span<const PackedVoxel> packed() const { return voxels_; }
+  [[nodiscard]] std::span<const PackedVoxel> packed() const {
+    return content_ ? std::span<const PackedVoxel>(content_->voxels)
+                    : std::span<const PackedVoxel>();
+  }
   /// Ascending, each once.
-  [[nodiscard]] std::span<const std::int64_t> stamps_ns() const { return stamps_ns_; }
+  [[nodiscard]] std::span<const std::int64_t> stamps_ns() const {
+    return content_ ? std::span<const std::int64_t>(content_->stamps_ns)
+                    : std::span<const std::int64_t>();
+  }
   /// Numbers of the voxel's stamps.
   [[nodiscard]] std::uint32_t first_stamp(std::size_t position) const {
-    return stamp_of(2 * position);
+    return content_->stamp_of(2 * position);
   }
   [[nodiscard]] std::uint32_t last_stamp(std::size_t position) const {
-    return stamp_of(2 * position + 1);
+    return content_->stamp_of(2 * position + 1);
   }
-  [[nodiscard]] const VoxelGrid& grid() const { return grid_; }
+  /// Of the tile.
+  [[nodiscard]] VoxelGrid grid() const { return content_ ? content_->grid : VoxelGrid(1.0, 1.0); }
 
   /// The first ones.
   [[nodiscard]] PackedVoxels first(std::size_t count) const;
@@ -115,26 +125,31 @@ class PackedVoxels {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  [[nodiscard]] std::uint32_t stamp_of(std::size_t i) const {
-    if (stamp_bits_ == 0) return 0;
-    const std::size_t bit = i * stamp_bits_;
-    const std::size_t word = bit / word_bits;
-    const std::size_t shift = bit % word_bits;
-    std::uint64_t stamp = stamp_words_[word] >> shift;
-    if (shift + stamp_bits_ > word_bits) stamp |= stamp_words_[word + 1] << (word_bits - shift);
-    return static_cast<std::uint32_t>(stamp & ((std::uint64_t{1} << stamp_bits_) - 1));
-  }
-  void set_stamps(const SeenTimes& seen);
-
   static constexpr std::size_t word_bits = 64;
 
-  TileId tile_;
-  VoxelGrid grid_{1.0, 1.0};
-  std::vector<PackedVoxel> voxels_;
-  std::vector<std::int64_t> stamps_ns_;
-  /// Numbers of stamps, two for each voxel, `stamp_bits_` each.
-  std::vector<std::uint64_t> stamp_words_;
-  unsigned stamp_bits_ = 0;
+  struct Content {
+    TileId tile;
+    VoxelGrid grid;
+    std::vector<PackedVoxel> voxels;
+    std::vector<std::int64_t> stamps_ns;
+    /// Numbers of stamps, two for each voxel, `stamp_bits` each.
+    std::vector<std::uint64_t> stamp_words;
+    unsigned stamp_bits = 0;
+
+    [[nodiscard]] std::uint32_t stamp_of(std::size_t i) const {
+      if (stamp_bits == 0) return 0;
+      const std::size_t bit = i * stamp_bits;
+      const std::size_t word = bit / word_bits;
+      const std::size_t shift = bit % word_bits;
+      std::uint64_t stamp = stamp_words[word] >> shift;
+      if (shift + stamp_bits > word_bits) stamp |= stamp_words[word + 1] << (word_bits - shift);
+      return static_cast<std::uint32_t>(stamp & ((std::uint64_t{1} << stamp_bits) - 1));
+    }
+    void set_stamps(const SeenTimes& seen);
+  };
+
+  /// Null where nothing was put in.
+  std::shared_ptr<const Content> content_;
 };
 
 /// Random access to voxels by value; the container must outlive it.
@@ -195,7 +210,7 @@ class PackedVoxels::Iterator {
 
 inline PackedVoxels::Iterator PackedVoxels::begin() const { return {this, 0}; }
 inline PackedVoxels::Iterator PackedVoxels::end() const {
-  return {this, static_cast<std::ptrdiff_t>(voxels_.size())};
+  return {this, static_cast<std::ptrdiff_t>(size())};
 }
 
 }  // namespace stillmap
