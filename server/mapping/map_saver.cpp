@@ -92,13 +92,14 @@ std::optional<fs::path> MapSaver::put_stored_map_aside() {
 
 std::shared_ptr<TileStore> MapSaver::tile_store() {
   const std::scoped_lock lock(mutex_);
-  if (memory_limit_bytes_ > 0) tiles_ = tiles_of(open_store());
+  // All readers of the running map have the same.
+  if (memory_limit_bytes_ > 0 && !tiles_) tiles_ = tiles_of(open_store());
   return tiles_;
 }
 
-std::shared_ptr<ReopenedTileStore> MapSaver::tiles_of(MapStore& store) const {
+std::shared_ptr<MovableTileStore> MapSaver::tiles_of(MapStore& store) const {
   if (memory_limit_bytes_ == 0) return nullptr;
-  return std::make_shared<ReopenedTileStore>(store.tile_store());
+  return std::make_shared<MovableTileStore>(store.tile_store());
 }
 
 void MapSaver::set_source(CheckpointSource& source) {
@@ -116,6 +117,7 @@ void MapSaver::save_if_changed() {
 
 void MapSaver::save_at_end() {
   const std::scoped_lock lock(mutex_);
+  if (misplaced_) bring_back();
   // Nothing mapped: an empty map must not replace what the file holds.
   if (!file_.empty() && latest_map_.poses_added() > 0) save(CheckpointScope::changed, true);
 }
@@ -146,8 +148,8 @@ bool MapSaver::has_moved() const {
 bool MapSaver::is_saved() const {
   const auto view = latest_map_.view();
   const std::uint64_t poses = latest_map_.poses_added();
-  return poses == 0 || (!misplaced_ && view->map_id == saved_map_id_ &&
-                        view->version == saved_version_ && poses == saved_poses_);
+  return !misplaced_ && (poses == 0 || (view->map_id == saved_map_id_ &&
+                                        view->version == saved_version_ && poses == saved_poses_));
 }
 
 void MapSaver::save(CheckpointScope scope, bool has_ended) {
@@ -244,6 +246,8 @@ void MapSaver::save_copy(const fs::path& target, bool overwrite) {
 
 fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepare) {
   const std::scoped_lock lock(mutex_);
+  // It belongs under the name that the saver is about to leave.
+  if (misplaced_) bring_back();
   const fs::path target = file_named(name);
   const bool is_own = target == file_;
   auto target_lock = is_own ? nullptr : std::make_unique<MapLock>(target);
@@ -252,7 +256,7 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
   SavedMap map = read(source);
   if (map.view.tiles.empty()) throw MapFileError(target, no_map_yet);
   map.view.map_id = new_map_id();
-  const std::shared_ptr<ReopenedTileStore> tiles = tiles_of(source);
+  const std::shared_ptr<MovableTileStore> tiles = tiles_of(source);
   const auto begin = prepare(map, tiles);
   if (!is_own && !file_.empty() && !is_empty() && !is_saved_whole()) {
     save(CheckpointScope::changed);
@@ -278,7 +282,7 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
 NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
   const std::scoped_lock lock(mutex_);
   NewMap begun{.map_id = new_map_id(), .kept_file = {}};
-  std::shared_ptr<ReopenedTileStore> tiles;
+  std::shared_ptr<MovableTileStore> tiles;
   if (!file_.empty()) {
     if (!discard && !is_empty() && !is_saved_whole()) save(CheckpointScope::changed);
     if (open_store().holds_map()) {
@@ -307,7 +311,7 @@ NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
   return begun;
 }
 
-std::shared_ptr<ReopenedTileStore> MapSaver::put_aside(const fs::path& kept) {
+std::shared_ptr<MovableTileStore> MapSaver::put_aside(const fs::path& kept) {
   open_store().complete_file();
   const fs::path fresh = file_.string() + ".empty";
   try {
@@ -337,17 +341,27 @@ std::shared_ptr<ReopenedTileStore> MapSaver::put_aside(const fs::path& kept) {
 
 void MapSaver::bring_back() {
   store_.reset();
-  try {
-    replace_map_file(*misplaced_, file_);
-  } catch (const MapFileError& error) {
-    throw MapFileError(file_, "holds the map of a reset that failed; the running one lies in " +
-                                  misplaced_->string() + " until it can be moved back (" +
-                                  error.what() + ")");
+  std::string fault;
+  const auto move = [&] {
+    try {
+      replace_map_file(*misplaced_, file_);
+      return file_;
+    } catch (const MapFileError& error) {
+      fault = error.what();
+      return *misplaced_;
+    }
+  };
+  if (tiles_) {
+    tiles_->move_file(move);
+  } else {
+    static_cast<void>(move());
+  }
+  if (!fault.empty()) {
+    throw MapFileError(file_, "is not the running map since a reset failed; that lies in " +
+                                  misplaced_->string() + " until it can be moved back (" + fault +
+                                  ")");
   }
   misplaced_.reset();
-  store_ = open_map_file(file_);
-  // Its connection knows the log under the old name.
-  if (tiles_) tiles_->reopen(store_->tile_store());
 }
 
 RunCheckpoint MapSaver::take(CheckpointScope scope) const {

@@ -48,24 +48,28 @@ struct NewMap {
   std::filesystem::path kept_file;
 };
 
-/// The tiles of one map, whose file may have to be opened again under it. Thread-safe.
-class ReopenedTileStore : public TileStore {
+/// The tiles of one map, whose file may have to be moved under it. Thread-safe.
+class MovableTileStore : public TileStore {
  public:
-  explicit ReopenedTileStore(std::shared_ptr<TileStore> store) : store_(std::move(store)) {}
-  void reopen(std::shared_ptr<TileStore> store) {
+  explicit MovableTileStore(std::shared_ptr<TileStore> store) : store_(std::move(store)) {}
+  /// Closes the file for `move`, which returns where it lies after that. SQLite keeps to the log
+  /// that lay beside an open file.
+  void move_file(const std::function<std::filesystem::path()>& move) {
     const std::scoped_lock lock(mutex_);
-    store_ = std::move(store);
+    store_.reset();
+    file_ = move();
   }
-  TileRecord load(TileId id) override { return current()->load(id); }
+  TileRecord load(TileId id) override {
+    const std::scoped_lock lock(mutex_);
+    if (!store_) store_ = open_tile_store(file_);
+    return store_->load(id);
+  }
 
  private:
-  [[nodiscard]] std::shared_ptr<TileStore> current() {
-    const std::scoped_lock lock(mutex_);
-    return store_;
-  }
-
   std::mutex mutex_;
+  /// Null until it is needed, once it was moved.
   std::shared_ptr<TileStore> store_;
+  std::filesystem::path file_;
 };
 
 /// Bytes that may be written in an hour, beginning with an hour's worth. Not thread-safe.
@@ -177,11 +181,11 @@ class MapSaver {
   /// Renames the current file, and puts an empty one in its place, whose tiles it returns. Throws
   /// MapFileError; then the current file is what it was, or becomes it again with the next use that
   /// the disk allows.
-  std::shared_ptr<ReopenedTileStore> put_aside(const std::filesystem::path& kept);
+  std::shared_ptr<MovableTileStore> put_aside(const std::filesystem::path& kept);
   /// Undoes `put_aside` where it failed half-way.
   void bring_back();
   /// What the map that the file holds is to read its tiles from; null without a memory limit.
-  [[nodiscard]] std::shared_ptr<ReopenedTileStore> tiles_of(MapStore& store) const;
+  [[nodiscard]] std::shared_ptr<MovableTileStore> tiles_of(MapStore& store) const;
   void remember_as_saved(const MapSnapshot& view, std::uint64_t poses);
   /// Of the current file; what `metadata_` does not say stays as it is.
   void remember_metadata(const SavedMap& map);
@@ -198,7 +202,7 @@ class MapSaver {
   std::mutex mutex_;
   std::unique_ptr<MapStore> store_;
   /// Of the running map.
-  std::shared_ptr<ReopenedTileStore> tiles_;
+  std::shared_ptr<MovableTileStore> tiles_;
   /// Where the current file lies while it could not be given its name again.
   std::optional<std::filesystem::path> misplaced_;
   std::uint64_t saved_map_id_ = 0;

@@ -149,11 +149,18 @@ class SavingProcess : public CheckpointSource {
   std::mt19937 random_;
 };
 
-/// A saver with one voxel mapped, for one test in this process.
+enum class Begins { anew, stored };
+
+/// A saver with one voxel mapped, or what the file holds, for one test in this process.
 class OneVoxel : public CheckpointSource {
  public:
-  explicit OneVoxel(const fs::path& file)
+  explicit OneVoxel(const fs::path& file, Begins begins = Begins::anew)
       : saver_(latest_map_, statistics_, file, {}, {.memory_limit_mib = 64}) {
+    saver_.set_source(*this);
+    if (begins == Begins::stored) {
+      resume(*saver_.load(), saver_.tile_store());
+      return;
+    }
     begin(new_map_id(), saver_.tile_store());
     LabelledScan scan;
     scan.scan.points_lidar.assign(5, Eigen::Vector3f(1.0F, 1.0F, 1.0F));
@@ -161,7 +168,6 @@ class OneVoxel : public CheckpointSource {
     map_.insert(scan, Eigen::Isometry3d::Identity());
     latest_map_.publish(map_.view());
     latest_map_.add_pose({.stamp_ns = 1}, OdometryHealth::good, "none");
-    saver_.set_source(*this);
   }
   [[nodiscard]] MapSaver& saver() { return saver_; }
   /// What its map reads tiles from.
@@ -172,6 +178,15 @@ class OneVoxel : public CheckpointSource {
     map_.use_tile_store(tiles);
     map_.reset(map_id);
     latest_map_.begin(map_.view(), {});
+  }
+  void resume(const SavedMap& stored, const std::shared_ptr<TileStore>& tiles) {
+    tiles_ = tiles;
+    map_.resume(stored.view, stored.tile_evidence);
+    map_.use_tile_store(tiles);
+    latest_map_.begin(map_.view(), stored.trajectory);
+  }
+  void reset() {
+    saver_.begin_anew(false, [&](auto map_id, const auto& tiles) { begin(map_id, tiles); });
   }
 
   RunCheckpoint checkpoint(CheckpointScope scope) override {
@@ -247,12 +262,8 @@ class FaultyDisk : public testing::Test {
 TEST_F(FaultyDisk, AResetThatFailsHalfWayLeavesOneWholeMap) {
   OneVoxel running(file_);
   running.saver().save_if_changed();
-  const auto reset = [&] {
-    running.saver().begin_anew(
-        false, [&](auto map_id, const auto& tiles) { running.begin(map_id, tiles); });
-  };
   set_fault("half_reset");
-  EXPECT_THROW(reset(), MapFileError);
+  EXPECT_THROW(running.reset(), MapFileError);
   EXPECT_FALSE(fs::exists(file_));
   EXPECT_THROW(running.saver().save_as("copy"), MapFileError);
   EXPECT_EQ(running.tiles().load({0, 0}).tile->voxels.size(), 1U);
@@ -265,8 +276,43 @@ TEST_F(FaultyDisk, AResetThatFailsHalfWayLeavesOneWholeMap) {
     maps += entry.path().extension() == ".stillmap" ? 1 : 0;
   }
   EXPECT_EQ(maps, 1U);
-  reset();
+  running.reset();
   EXPECT_TRUE(open_map_file(file_)->load().trajectory.empty());
+}
+
+TEST_F(FaultyDisk, AResetThatFailsHalfWayLeavesTwoWholeMapsWhereAnotherIsLoaded) {
+  OneVoxel(folder_ / "other.stillmap").saver().save_at_end();
+  OneVoxel(file_).saver().save_at_end();
+  OneVoxel running(file_, Begins::stored);
+  set_fault("half_reset");
+  EXPECT_THROW(running.reset(), MapFileError);
+  const auto load_other = [&] {
+    running.saver().resume_from("other.stillmap", [&](const auto& stored, const auto& tiles) {
+      return [&running, stored, tiles] { running.resume(stored, tiles); };
+    });
+  };
+  EXPECT_THROW(load_other(), MapFileError);
+  set_fault("");
+  load_other();
+  running.saver().save_at_end();
+  const SavedMap other = open_map_file(folder_ / "other.stillmap")->load();
+  const SavedMap city = open_map_file(file_)->load();
+  EXPECT_NE(other.view.map_id, city.view.map_id);
+  EXPECT_EQ(other.view.tiles.size(), 1U);
+  EXPECT_EQ(city.view.tiles.size(), 1U);
+  EXPECT_EQ(city.trajectory.size(), 1U);
+}
+
+TEST_F(FaultyDisk, AResetThatFailsHalfWayIsUndoneAtTheEndWithoutAScan) {
+  OneVoxel(file_).saver().save_at_end();
+  {
+    OneVoxel running(file_, Begins::stored);
+    set_fault("half_reset");
+    EXPECT_THROW(running.reset(), MapFileError);
+    set_fault("");
+    running.saver().save_at_end();
+  }
+  EXPECT_EQ(open_map_file(file_)->load().view.tiles.size(), 1U);
 }
 
 class MapSaverFaults : public FaultyDisk, public testing::WithParamInterface<SaverFault> {

@@ -298,6 +298,10 @@ void replace_map_file(const fs::path& fresh, const fs::path& file) {
   }
 }
 
+std::shared_ptr<TileStore> open_tile_store(const fs::path& file) {
+  return std::make_shared<SqliteTileStore>(file, nullptr);
+}
+
 std::unique_ptr<MapStore> open_scratch_map() {
   auto folder = std::make_shared<const ScratchMapFolder>();
   const fs::path file = folder->path() / "map.stillmap";

@@ -82,6 +82,9 @@ class MapStore {
 /// Throws MapFileError.
 void replace_map_file(const std::filesystem::path& fresh, const std::filesystem::path& file);
 
+/// The tiles in a map file, read through a connection of their own. Throws MapFileError.
+[[nodiscard]] std::shared_ptr<TileStore> open_tile_store(const std::filesystem::path& file);
+
 /// Whether the file's header is that of a map file.
 [[nodiscard]] bool is_map_file(const std::filesystem::path& file);
 
