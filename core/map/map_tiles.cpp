@@ -21,7 +21,10 @@ TileRange range_round(const Eigen::Vector3d& position_map, double reach_m, doubl
 
 }  // namespace
 
-MapTiles::MapTiles(const VoxelGrid& grid) : grid_(grid) { clear(0); }
+MapTiles::MapTiles(const StaticMapConfig& config)
+    : grid_(config.voxel_size_m, config.tile_size_m), tile_size_m_(config.tile_size_m) {
+  clear(0);
+}
 
 void MapTiles::clear(std::uint64_t map_id) {
   residents_.clear();
@@ -35,7 +38,7 @@ void MapTiles::clear(std::uint64_t map_id) {
   ++step_;
   MapSnapshot empty;
   empty.map_id = map_id;
-  empty.tile_size_m = grid_.tile_size_m();
+  empty.tile_size_m = tile_size_m_;
   empty.voxel_size_m = grid_.voxel_size_m();
   current_ = std::make_shared<const MapSnapshot>(std::move(empty));
 }
@@ -62,7 +65,7 @@ void MapTiles::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evide
   }
   MapSnapshot current = view;
   current.voxel_size_m = grid_.voxel_size_m();
-  current.tile_size_m = grid_.tile_size_m();
+  current.tile_size_m = tile_size_m_;
   current_ = std::make_shared<const MapSnapshot>(std::move(current));
 }
 
@@ -153,7 +156,7 @@ std::shared_ptr<const MapSnapshot> MapTiles::view(const VisibilityRule& rule) {
   for (auto& [id, tile] : edits_) edits.push_back({id, std::move(tile)});
   edits_.clear();
   current_ = std::make_shared<const MapSnapshot>(
-      MapSnapshot{has_changed ? version : current_->version, current_->map_id, grid_.tile_size_m(),
+      MapSnapshot{has_changed ? version : current_->version, current_->map_id, tile_size_m_,
                   grid_.voxel_size_m(), current_->tiles.with(edits)});
   return current_;
 }

@@ -25,7 +25,8 @@ namespace stillmap {
 /// alone. Knows what the last view shows of each, and what is not stored yet. NOT thread-safe.
 class MapTiles {
  public:
-  explicit MapTiles(const VoxelGrid& grid);
+  /// Requires a configuration without faults.
+  explicit MapTiles(const StaticMapConfig& config);
 
   /// No tiles, as another map.
   void clear(std::uint64_t map_id);
@@ -100,6 +101,8 @@ class MapTiles {
   [[nodiscard]] std::size_t memory_bytes() const;
 
   VoxelGrid grid_;
+  /// As configured: the grid rounds to whole voxels.
+  double tile_size_m_;
   ScanStamps stamps_;
   tsl::robin_map<TileId, Resident, IdHash> residents_;
   /// In the tile store alone, and without any voxel to show. Other tiles that are not in

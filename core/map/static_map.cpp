@@ -34,12 +34,11 @@ std::string tile_size_fault(const StaticMapConfig& config) {
   return fault.str();
 }
 
-/// Requires config without faults.
-VoxelGrid usable_grid(const StaticMapConfig& config) {
+const StaticMapConfig& checked(const StaticMapConfig& config) {
   if (const std::string faults = config.faults(); !faults.empty()) {
     throw std::invalid_argument("static map: " + faults);
   }
-  return {config.voxel_size_m, config.tile_size_m};
+  return config;
 }
 
 bool is_same_size(double a_m, double b_m) { return std::abs(a_m - b_m) <= 1e-9; }
@@ -94,9 +93,7 @@ void check_sizes(const MapSnapshot& stored, const StaticMapConfig& config) {
 
 struct StaticMap::State {
   explicit State(const StaticMapConfig& map_config)
-      : config(map_config),
-        tiles(usable_grid(map_config)),
-        sorter(tiles.grid(), map_config.max_range_m) {}
+      : config(checked(map_config)), tiles(config), sorter(tiles.grid(), map_config.max_range_m) {}
 
   [[nodiscard]] VisibilityRule rule() const {
     return {config.min_points, config.misses_to_clear, config.misses_per_hit};
