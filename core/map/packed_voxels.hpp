@@ -35,11 +35,19 @@ struct PackedVoxel {
   friend bool operator==(const PackedVoxel&, const PackedVoxel&) = default;
 };
 
+/// 1 / (offset_steps n), for n points.
+inline constexpr auto share_of_points = [] {
+  std::array<double, PackedVoxel::max_mean_points + 1> shares{};
+  for (std::uint32_t n = 1; n < shares.size(); ++n)
+    shares[n] = 1.0 / (PackedVoxel::offset_steps * n);
+  return shares;
+}();
+
 /// The mean of the voxel's points, map frame [m]; point_count > 0.
 [[nodiscard]] inline Eigen::Vector3f mean_map(const PackedVoxel& voxel, TileId tile,
                                               const VoxelGrid& grid) {
   constexpr double half_step = 0.5 / PackedVoxel::offset_steps;
-  const double share = 1.0 / (PackedVoxel::offset_steps * voxel.mean_points());
+  const double share = share_of_points[voxel.mean_points()];
   const VoxelIndex index = voxel_index(voxel.key);
   const Eigen::Array3d corner(static_cast<double>(tile.x) * grid.columns() + index.x,
                               static_cast<double>(tile.y) * grid.columns() + index.y, index.z);

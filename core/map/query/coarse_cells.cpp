@@ -58,6 +58,16 @@ struct CoarseCells::State {
   double resolution_m = 0.0;
   tsl::robin_map<std::uint64_t, std::uint32_t, KeyHash> position;
   std::vector<Cell> cells;
+  /// Of the last voxel; voxels beside each other mostly come one after the other.
+  std::uint32_t last = 0;
+
+  Cell& cell_at(std::uint64_t key) {
+    if (!cells.empty() && cells[last].key == key) return cells[last];
+    const auto [slot, is_new] = position.try_emplace(key, static_cast<std::uint32_t>(cells.size()));
+    if (is_new) cells.emplace_back().key = key;
+    last = slot->second;
+    return cells[last];
+  }
 };
 
 CoarseCells::CoarseCells(double resolution_m) : state_(std::make_unique<State>()) {
@@ -65,16 +75,13 @@ CoarseCells::CoarseCells(double resolution_m) : state_(std::make_unique<State>()
 }
 CoarseCells::~CoarseCells() = default;
 
-void CoarseCells::add(const Voxel& voxel) {
-  const Eigen::Vector3d mean_map = voxel.mean_map.cast<double>();
-  const std::uint64_t key = cell_key((mean_map / state_->resolution_m).array().floor());
-  const auto [slot, is_new] =
-      state_->position.try_emplace(key, static_cast<std::uint32_t>(state_->cells.size()));
-  if (is_new) state_->cells.emplace_back().key = key;
-  Cell& cell = state_->cells[slot->second];
-  cell.point_count += voxel.point_count;
-  cell.weighted_sum += mean_map * voxel.point_count;
-  for (const auto& vote : voxel.evidence.votes()) {
+void CoarseCells::add(const Eigen::Vector3f& mean_map, std::uint32_t point_count,
+                      const ClassEvidence& evidence) {
+  const Eigen::Vector3d mean = mean_map.cast<double>();
+  Cell& cell = state_->cell_at(cell_key((mean / state_->resolution_m).array().floor()));
+  cell.point_count += point_count;
+  cell.weighted_sum += mean * point_count;
+  for (const auto& vote : evidence.votes()) {
     if (vote.weight > 0.0F) cell.evidence.at(static_cast<std::size_t>(vote.label)) += vote.weight;
   }
 }

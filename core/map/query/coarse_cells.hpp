@@ -20,7 +20,8 @@ class CoarseCells {
   CoarseCells(const CoarseCells&) = delete;
   CoarseCells& operator=(const CoarseCells&) = delete;
 
-  void add(const Voxel& voxel);
+  void add(const Eigen::Vector3f& mean_map, std::uint32_t point_count,
+           const ClassEvidence& evidence);
 
   /// All cells, in the order of x, then y, then z, whatever the order of adding.
   [[nodiscard]] std::vector<QueryVoxel> sorted() const;

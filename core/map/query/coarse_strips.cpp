@@ -44,11 +44,6 @@ CoarseStrips::CoarseStrips(std::span<const std::shared_ptr<const Tile>> tiles, d
   }
 }
 
-bool CoarseStrips::is_in(std::size_t strip, const Voxel& voxel) const {
-  const double cell = cell_of(voxel.mean_map.x());
-  return cell >= strips_[strip].first_cell && cell <= strips_[strip].last_cell;
-}
-
 double CoarseStrips::cell_of(float x_map) const {
   return std::floor(static_cast<double>(x_map) / resolution_m_);
 }

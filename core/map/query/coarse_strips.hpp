@@ -24,8 +24,12 @@ class CoarseStrips {
   [[nodiscard]] const std::vector<std::size_t>& tiles(std::size_t strip) const {
     return strips_[strip].tiles;
   }
-  /// Whether the voxel's cell lies in the strip.
-  [[nodiscard]] bool is_in(std::size_t strip, const Voxel& voxel) const;
+  /// Whether the cell of a mean (map frame [m]) lies in the strip.
+  [[nodiscard]] bool is_in(std::size_t strip, float x_map) const {
+    if (strips_.size() == 1) return true;
+    const double cell = cell_of(x_map);
+    return cell >= strips_[strip].first_cell && cell <= strips_[strip].last_cell;
+  }
 
  private:
   /// Cells first_cell .. last_cell in x.

@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <span>
 #include <vector>
 
+#include "core/map/packed_voxels.hpp"
 #include "core/map/query/coarse_cells.hpp"
 #include "core/map/query/coarse_strips.hpp"
 #include "core/map/query/query_checks.hpp"
@@ -25,15 +27,18 @@ class VoxelFilter {
         near_(region.restricted_to(tile.info.bounds_map.cast<double>())) {}
 
   [[nodiscard]] bool matches_all() const { return is_inside_ && matches_all_classes_; }
-  [[nodiscard]] bool matches(const Voxel& voxel) const {
-    return (is_inside_ || near_.contains(voxel.mean_map.cast<double>())) &&
+  [[nodiscard]] bool matches(const Eigen::Vector3f& mean_map, const ClassEvidence& evidence) const {
+    return (is_inside_ || near_.contains(mean_map.cast<double>())) &&
            (matches_all_classes_ ||
-            query_.classes.test(static_cast<std::size_t>(voxel.evidence.winner())));
+            query_.classes.test(static_cast<std::size_t>(evidence.winner())));
   }
   /// How many of the tile's voxels it matches.
   [[nodiscard]] std::uint32_t count(const Tile& tile) const {
+    const VoxelGrid grid = tile.voxels.grid();
     return static_cast<std::uint32_t>(
-        std::ranges::count_if(tile.voxels, [&](const Voxel& voxel) { return matches(voxel); }));
+        std::ranges::count_if(tile.voxels.packed(), [&](const PackedVoxel& voxel) {
+          return matches(mean_map(voxel, tile.info.id, grid), voxel.evidence);
+        }));
   }
 
  private:
@@ -95,10 +100,6 @@ std::vector<TileChange> tile_changes(const MapSnapshot& view, const MapQuery& qu
   return changes;
 }
 
-QueryVoxel query_voxel(const Voxel& voxel) {
-  return {voxel.mean_map, voxel.evidence.winner(), voxel.evidence.share(), voxel.point_count};
-}
-
 /// A valid query, and what its answer is read from.
 struct Selection {
   const MapSnapshot& view;
@@ -116,15 +117,18 @@ bool fill_page(const Selection& from, Continuation& position, std::vector<QueryV
     const auto read = from.reader.read(from.tiles[i]);
     const Tile& tile = *read;
     const VoxelFilter filter(from.query, from.region, tile);
-    for (std::size_t v = i == position.tile ? position.voxel : 0; v < tile.voxels.size(); ++v) {
-      const Voxel voxel = tile.voxels[v];
-      if (!filter.matches(voxel)) continue;
+    const std::span<const PackedVoxel> voxels = tile.voxels.packed();
+    const VoxelGrid grid = tile.voxels.grid();
+    for (std::size_t v = i == position.tile ? position.voxel : 0; v < voxels.size(); ++v) {
+      const PackedVoxel& voxel = voxels[v];
+      const Eigen::Vector3f mean = mean_map(voxel, tile.info.id, grid);
+      if (!filter.matches(mean, voxel.evidence)) continue;
       if (page.size() == page_size) {
         position.tile = i;
         position.voxel = v;
         return true;
       }
-      page.push_back(query_voxel(voxel));
+      page.push_back({mean, voxel.evidence.winner(), voxel.evidence.share(), voxel.point_count});
     }
   }
   return false;
@@ -137,8 +141,11 @@ std::vector<QueryVoxel> merge(const Selection& from, const CoarseStrips& strips,
   for (const std::size_t i : strips.tiles(strip)) {
     const auto tile = from.reader.read(from.tiles[i]);
     const VoxelFilter filter(from.query, from.region, *tile);
-    for (const Voxel& voxel : tile->voxels) {
-      if (strips.is_in(strip, voxel) && filter.matches(voxel)) cells.add(voxel);
+    const VoxelGrid grid = tile->voxels.grid();
+    for (const PackedVoxel& voxel : tile->voxels.packed()) {
+      const Eigen::Vector3f mean = mean_map(voxel, tile->info.id, grid);
+      if (strips.is_in(strip, mean.x()) && filter.matches(mean, voxel.evidence))
+        cells.add(mean, voxel.point_count, voxel.evidence);
     }
   }
   return cells.sorted();
