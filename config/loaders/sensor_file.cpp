@@ -62,6 +62,12 @@ void read_imu(YamlSection section, std::optional<ImuMount>& imu) {
   }
 }
 
+void read_motion_limits(YamlSection section, MotionLimits& limits) {
+  section.number("max_speed_m_s", limits.max_speed_m_s, {0.1, 10000});
+  section.number("max_acceleration_m_s2", limits.max_acceleration_m_s2, {0.1, 10000});
+  section.degrees("max_turn_rate_deg_s", limits.max_turn_rate_rad_s, {1, 10000});
+}
+
 void read_sensor(YamlSection& file, SensorModel& sensor) {
   file.require({"name", "rings", "fov_up_deg", "fov_down_deg"});
   file.text("name", sensor.name);
@@ -76,6 +82,7 @@ void read_sensor(YamlSection& file, SensorModel& sensor) {
   file.choice<RingSource>("ring_source", sensor.ring_source, ring_sources());
   file.number("intensity_scale", sensor.intensity_scale, {1e-9, 1e9});
   read_imu(file.section("imu"), sensor.imu);
+  read_motion_limits(file.section("motion_limits"), sensor.motion_limits);
   file.faults(sensor.faults());
 }
 
@@ -105,6 +112,12 @@ void save_sensor(const SensorModel& sensor, const fs::path& file) {
     yaml << YAML::Key << "time_offset_s" << YAML::Value << sensor.imu->time_offset_s
          << YAML::EndMap;
   }
+  const MotionLimits& limits = sensor.motion_limits;
+  yaml << YAML::Key << "motion_limits" << YAML::Value << YAML::BeginMap;
+  yaml << YAML::Key << "max_speed_m_s" << YAML::Value << limits.max_speed_m_s;
+  yaml << YAML::Key << "max_acceleration_m_s2" << YAML::Value << limits.max_acceleration_m_s2;
+  yaml << YAML::Key << "max_turn_rate_deg_s" << YAML::Value << limits.max_turn_rate_rad_s / degree
+       << YAML::EndMap;
   yaml << YAML::EndMap;
   std::ofstream out(file);
   out << yaml.c_str() << '\n';

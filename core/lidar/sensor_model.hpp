@@ -14,6 +14,14 @@ enum class RingSource { field, order, elevation };
 /// How a lidar's points lie: on rings that beams turn along, or anywhere (Livox, merged clouds).
 enum class ScanPattern { rings, irregular };
 
+/// What carries the lidar never exceeds. Poses beyond these are not believed; the defaults are
+/// beyond any vehicle or hand.
+struct MotionLimits {
+  double max_speed_m_s = 100.0;
+  double max_acceleration_m_s2 = 60.0;
+  double max_turn_rate_rad_s = 12.566370614359172;  // 720 deg/s
+};
+
 /// Geometry of a lidar. Angles in radians, elevation positive upwards.
 struct SensorModel {
   std::string name;
@@ -41,6 +49,7 @@ struct SensorModel {
   /// Of the IMU whose samples come beside the scans. Where it is not known, the IMU is taken to
   /// have the lidar's axes as far as that proves true, and tells nothing of gravity.
   std::optional<ImuMount> imu;
+  MotionLimits motion_limits;
 
   /// Every fault in words, one a line; empty when the model can be used.
   [[nodiscard]] std::string faults() const;

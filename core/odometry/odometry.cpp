@@ -9,6 +9,7 @@
 
 #include "core/odometry/features.hpp"
 #include "core/odometry/motion_classification.hpp"
+#include "core/odometry/motion_limits.hpp"
 #include "core/odometry/object_clusters.hpp"
 #include "core/odometry/pose_search.hpp"
 #include "core/odometry/registration.hpp"
@@ -113,6 +114,8 @@ struct Odometry::State {
                    FeatureSets& features, OdometryResult& result) const;
   [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
                                              const PosePrediction& prediction) const;
+  /// Believes no pose that the robot cannot have reached; the paper knows no limits.
+  void keep_to_limits(const PosePrediction& prediction, OdometryResult& result) const;
   /// Asks the points for a second opinion; the paper has none.
   void confirm(const FeatureSets& features, OdometryResult& result) const {
     if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
@@ -151,6 +154,8 @@ struct Odometry::State {
   /// Since the place is in doubt.
   std::optional<UnconfirmedStretch> stretch;
   bool started = false;
+  /// The last motion was none of the robot: a place was found again, or a prior corrected itself.
+  bool has_jumped = false;
   /// Scans in a row that could not be registered.
   int lost_scans = 0;
   ScanIntervals intervals;
@@ -283,11 +288,26 @@ void Odometry::State::judge_again(ScanInParts& parts,
   if (again.health != OdometryHealth::lost) result = again;
 }
 
+void Odometry::State::keep_to_limits(const PosePrediction& prediction,
+                                     OdometryResult& result) const {
+  if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
+  // A prior may move the robot anywhere, as one that corrects itself does.
+  if (prediction.is_prior || prediction.interval_s <= 0.0) return;
+  if (is_reachable(last, result.T_map_lidar, prediction.interval_s,
+                   prediction.is_known && !has_jumped, sensor.motion_limits))
+    return;
+  result = lost_at(prediction.T_map_lidar);
+  result.is_beyond_limits = true;
+}
+
 void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
                                    const Eigen::Isometry3d& T_map_lidar_now) {
   if (started) {
+    const double interval_s = intervals.since_last_s(stamp_ns);
+    has_jumped = !is_reachable(last, T_map_lidar_now, interval_s, last.interval_s > 0.0,
+                               sensor.motion_limits);
     last.motion = last.T_map_lidar.inverse() * T_map_lidar_now;
-    last.interval_s = intervals.since_last_s(stamp_ns);
+    last.interval_s = interval_s;
     intervals.add(stamp_ns);
   } else {
     intervals.begin(stamp_ns);
@@ -455,6 +475,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   step.result = state.find_pose(parts, prediction, features);
   state.judge_again(parts, T_map_lidar_predicted, features, step.result);
   state.confirm(features, step.result);
+  state.keep_to_limits(prediction, step.result);
   state.confirm_place(features, prediction, step.result);
   if (state.first_scan) state.straighten_first_scan(features, time_ns, sweep, step.result);
   const Eigen::Isometry3d T_map_middle = step.result.T_map_lidar;

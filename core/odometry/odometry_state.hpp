@@ -28,6 +28,8 @@ struct OdometryResult {
   /// The scan fits what was known before anything left the place in doubt. While it is false, scans
   /// agree at most with one another, and are no part of the map.
   bool is_confirmed = true;
+  /// The scan fits only where what carries the lidar cannot have come; it is lost.
+  bool is_beyond_limits = false;
   bool converged = false;
   int iterations = 0;
   int edge_correspondences = 0;

@@ -327,6 +327,7 @@ void MappingThread::map(QueuedScan queued) {
   const bool unlabelled = mapped->labelled.labels.empty();
   latest_map_.add_pose({stamp_ns, T_map_base(mapped->odometry)}, mapped->odometry.health,
                        unlabelled ? "none" : mapper_.label_source());
+  if (mapped->odometry.is_beyond_limits) statistics_.count("poses_beyond_motion_limits");
   statistics_.scan_mapped(mapped->label_provenance);
   if (is_map_frozen_) statistics_.count("scans_not_in_map");
   statistics_.add_latency("total", milliseconds(Clock::now() - queued.received));

@@ -26,6 +26,9 @@ void expect_same(const SensorModel& a, const SensorModel& b) {
   EXPECT_EQ(a.period_s, b.period_s);
   EXPECT_EQ(a.ring_source, b.ring_source);
   EXPECT_EQ(a.intensity_scale, b.intensity_scale);
+  EXPECT_EQ(a.motion_limits.max_speed_m_s, b.motion_limits.max_speed_m_s);
+  EXPECT_EQ(a.motion_limits.max_acceleration_m_s2, b.motion_limits.max_acceleration_m_s2);
+  EXPECT_NEAR(a.motion_limits.max_turn_rate_rad_s, b.motion_limits.max_turn_rate_rad_s, 1e-9);
   ASSERT_EQ(a.imu.has_value(), b.imu.has_value());
   if (!a.imu) return;
   EXPECT_TRUE(a.imu->R_lidar_imu.isApprox(b.imu->R_lidar_imu, 1e-5));
@@ -55,6 +58,8 @@ TEST(SensorFile, WhatIsSavedIsReadBack) {
       .R_lidar_imu =
           Eigen::AngleAxisd(2.0, Eigen::Vector3d(1.0, -2.0, 0.5).normalized()).toRotationMatrix(),
       .time_offset_s = 0.004};
+  sensor.motion_limits = {
+      .max_speed_m_s = 2.5, .max_acceleration_m_s2 = 1.25, .max_turn_rate_rad_s = 0.75};
   const auto file = write_file("saved.yaml", "");
   save_sensor(sensor, file);
   expect_same(load_sensor(file.string()), sensor);
