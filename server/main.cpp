@@ -41,6 +41,8 @@ int serve(const stillmap::ServerConfig& config) {
   stillmap::server::block_thread_failures(signals);
   // At a limit of file sizes, writing fails as on a full disk, instead of ending the server.
   static_cast<void>(std::signal(SIGXFSZ, SIG_IGN));
+  // A reader of the log that ends first (tee) must not keep the map from being saved.
+  static_cast<void>(std::signal(SIGPIPE, SIG_IGN));
   const bool adaptive_width = stillmap::server::segmentation_budget(config).count() > 0;
   auto labels = stillmap::open_segmenter(config.labels, config.mapper.sensor, adaptive_width);
   if (const std::string details = labels->details(); !details.empty()) {

@@ -70,6 +70,8 @@ class Connection : public std::enable_shared_from_this<Connection> {
  private:
   void reply() {
     answer_ = respond_(parser_.get());
+    // Its length is still said.
+    if (parser_.get().method() == http::verb::head) answer_.body().clear();
     stream_.expires_after(answer_timeout);
     http::async_write(stream_, answer_, [self = shared_from_this()](error_code, std::size_t) {
       error_code has_gone;
@@ -159,7 +161,9 @@ Answer exposition(Metrics& metrics, const std::function<dds::ServerStatus()>& st
     return answer_of(http::status::not_found, "Metrics are at /metrics.\n");
   }
   if (request.method() != http::verb::get) {
-    return answer_of(http::status::method_not_allowed, "Metrics are read with GET.\n");
+    Answer refusal = answer_of(http::status::method_not_allowed, "Metrics are read with GET.\n");
+    refusal.set(http::field::allow, "GET");
+    return refusal;
   }
   try {
     return answer_of(http::status::ok,
