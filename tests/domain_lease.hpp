@@ -18,7 +18,7 @@
 
 namespace stillmap::test {
 
-/// A DDS domain that no other test of this machine takes as long as this lives, also when its
+/// A DDS domain that no other test of this user takes as long as this lives, also when its
 /// process is killed.
 class DomainLease {
  public:
