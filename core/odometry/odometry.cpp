@@ -114,12 +114,14 @@ struct Odometry::State {
                    FeatureSets& features, OdometryResult& result) const;
   [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
                                              const PosePrediction& prediction) const;
-  /// Believes no pose that the robot cannot have reached; the paper knows no limits.
+  /// Believes no pose that the robot cannot have reached.
   void keep_to_limits(const PosePrediction& prediction, OdometryResult& result) const;
-  /// Asks the points for a second opinion; the paper has none.
-  void confirm(const FeatureSets& features, OdometryResult& result) const {
+  /// Asks the points for a second opinion, and the limits; the paper has neither.
+  void confirm(const FeatureSets& features, const PosePrediction& prediction,
+               OdometryResult& result) const {
     if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
     result = confirmed_by_points(result, features, map, config);
+    keep_to_limits(prediction, result);
   }
   /// Calls a pose good only where the map says so that is older than any doubt of the place.
   void confirm_place(const FeatureSets& features, const PosePrediction& prediction,
@@ -290,9 +292,9 @@ void Odometry::State::judge_again(ScanInParts& parts,
 
 void Odometry::State::keep_to_limits(const PosePrediction& prediction,
                                      OdometryResult& result) const {
-  if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
   // A prior may move the robot anywhere, as one that corrects itself does.
-  if (prediction.is_prior || prediction.interval_s <= 0.0) return;
+  if (result.health == OdometryHealth::lost || prediction.is_prior || prediction.interval_s <= 0.0)
+    return;
   if (is_reachable(last, result.T_map_lidar, prediction.interval_s,
                    prediction.is_known && !has_jumped, sensor.motion_limits))
     return;
@@ -474,8 +476,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   FeatureSets features;
   step.result = state.find_pose(parts, prediction, features);
   state.judge_again(parts, T_map_lidar_predicted, features, step.result);
-  state.confirm(features, step.result);
-  state.keep_to_limits(prediction, step.result);
+  state.confirm(features, prediction, step.result);
   state.confirm_place(features, prediction, step.result);
   if (state.first_scan) state.straighten_first_scan(features, time_ns, sweep, step.result);
   const Eigen::Isometry3d T_map_middle = step.result.T_map_lidar;
