@@ -167,13 +167,13 @@ void MapTiles::add(TileId id, const TileRecord& record) {
 
 bool MapTiles::reload(TileId id) {
   if (store_ == nullptr || unreadable_.contains(id)) return false;
-  const std::shared_ptr<const Tile> stub = shown(id);
+  const std::shared_ptr<const Tile> stand_in = shown(id);
   try {
     TileRecord record = store_->load(id);
-    if (record.tile && stub && stub->info.appeared_in != 0) {
+    if (record.tile && stand_in && stand_in->info.appeared_in != 0) {
       // The file does not know it.
       auto tile = std::make_shared<Tile>(*record.tile);
-      tile->info.appeared_in = stub->info.appeared_in;
+      tile->info.appeared_in = stand_in->info.appeared_in;
       record.tile = std::move(tile);
     }
     add(id, record);
@@ -185,7 +185,7 @@ bool MapTiles::reload(TileId id) {
   --non_resident_count_;
   hidden_non_resident_.erase(id);
   const auto& published = resident(id)->published();
-  if (stub || published) edits_[id] = published;
+  if (stand_in || published) edits_[id] = published;
   return true;
 }
 
