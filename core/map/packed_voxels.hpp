@@ -4,11 +4,11 @@
 #include <compare>
 #include <cstddef>
 #include <cstdint>
-#include <iterator>
 #include <memory>
 #include <span>
 #include <vector>
 
+#include "core/lidar/indexed_iterator.hpp"
 #include "core/map/tile_table.hpp"
 #include "core/map/voxel.hpp"
 #include "core/map/voxel_grid.hpp"
@@ -79,9 +79,8 @@ struct SeenTimes {
 /// no voxels take no more.
 class PackedVoxels {
  public:
-  class Iterator;
-  using iterator = Iterator;
-  using const_iterator = Iterator;
+  using const_iterator = IndexedIterator<PackedVoxels>;
+  using iterator = const_iterator;
   using value_type = Voxel;
 
   PackedVoxels() = default;
@@ -104,8 +103,8 @@ class PackedVoxels {
   }
   [[nodiscard]] Voxel front() const { return (*this)[0]; }
   [[nodiscard]] Voxel back() const { return (*this)[size() - 1]; }
-  [[nodiscard]] Iterator begin() const;
-  [[nodiscard]] Iterator end() const;
+  [[nodiscard]] const_iterator begin() const { return {this, 0}; }
+  [[nodiscard]] const_iterator end() const { return {this, size()}; }
 
   [[nodiscard]] std::span<const PackedVoxel> packed() const {
     return content_ ? std::span<const PackedVoxel>(content_->voxels)
@@ -159,66 +158,5 @@ class PackedVoxels {
   /// Null where nothing was put in.
   std::shared_ptr<const Content> content_;
 };
-
-/// Random access to voxels by value; the container must outlive it.
-class PackedVoxels::Iterator {
- public:
-  using iterator_concept = std::random_access_iterator_tag;
-  using iterator_category = std::input_iterator_tag;
-  using value_type = Voxel;
-  using difference_type = std::ptrdiff_t;
-  using reference = Voxel;
-  /// Holds the voxel that is pointed to.
-  struct pointer {
-    Voxel voxel;
-    const Voxel* operator->() const { return &voxel; }
-  };
-
-  Iterator() = default;
-  Iterator(const PackedVoxels* voxels, std::ptrdiff_t position)
-      : voxels_(voxels), position_(position) {}
-
-  [[nodiscard]] Voxel operator*() const { return (*voxels_)[static_cast<std::size_t>(position_)]; }
-  [[nodiscard]] pointer operator->() const { return {**this}; }
-  [[nodiscard]] Voxel operator[](difference_type n) const { return *(*this + n); }
-  Iterator& operator++() { return *this += 1; }
-  Iterator& operator--() { return *this -= 1; }
-  Iterator operator++(int) {
-    Iterator before = *this;
-    ++*this;
-    return before;
-  }
-  Iterator operator--(int) {
-    Iterator before = *this;
-    --*this;
-    return before;
-  }
-  Iterator& operator+=(difference_type n) {
-    position_ += n;
-    return *this;
-  }
-  Iterator& operator-=(difference_type n) { return *this += -n; }
-  friend Iterator operator+(Iterator at, difference_type n) { return at += n; }
-  friend Iterator operator+(difference_type n, Iterator at) { return at += n; }
-  friend Iterator operator-(Iterator at, difference_type n) { return at -= n; }
-  friend difference_type operator-(const Iterator& a, const Iterator& b) {
-    return a.position_ - b.position_;
-  }
-  friend bool operator==(const Iterator& a, const Iterator& b) {
-    return a.position_ == b.position_;
-  }
-  friend auto operator<=>(const Iterator& a, const Iterator& b) {
-    return a.position_ <=> b.position_;
-  }
-
- private:
-  const PackedVoxels* voxels_ = nullptr;
-  std::ptrdiff_t position_ = 0;
-};
-
-inline PackedVoxels::Iterator PackedVoxels::begin() const { return {this, 0}; }
-inline PackedVoxels::Iterator PackedVoxels::end() const {
-  return {this, static_cast<std::ptrdiff_t>(size())};
-}
 
 }  // namespace stillmap

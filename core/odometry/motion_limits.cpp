@@ -26,4 +26,16 @@ bool is_reachable(const RegisteredScan& last, const Eigen::Isometry3d& T_map_lid
          limits.max_acceleration_m_s2 * between_middles_s * interval_s + position_noise_m;
 }
 
+void keep_to_limits(const RegisteredScan& last, const PosePrediction& prediction,
+                    bool last_moved_within_limits, const MotionLimits& limits,
+                    OdometryResult& result) {
+  if (result.health == OdometryHealth::lost || prediction.is_prior || prediction.interval_s <= 0.0)
+    return;
+  if (is_reachable(last, result.T_map_lidar, prediction.interval_s,
+                   prediction.is_known && last_moved_within_limits, limits))
+    return;
+  result = lost_at(prediction.T_map_lidar);
+  result.is_beyond_limits = true;
+}
+
 }  // namespace stillmap

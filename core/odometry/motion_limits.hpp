@@ -13,4 +13,11 @@ namespace stillmap {
 [[nodiscard]] bool is_reachable(const RegisteredScan& last, const Eigen::Isometry3d& T_map_lidar,
                                 double interval_s, bool has_velocity, const MotionLimits& limits);
 
+/// Makes a pose lost, and says why, that the robot cannot have reached from the last scan's. One
+/// that a prior predicts may lie anywhere, as that of a source that corrects itself does.
+/// `last_moved_within_limits`: the last motion may tell the velocity.
+void keep_to_limits(const RegisteredScan& last, const PosePrediction& prediction,
+                    bool last_moved_within_limits, const MotionLimits& limits,
+                    OdometryResult& result);
+
 }  // namespace stillmap

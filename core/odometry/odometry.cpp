@@ -38,14 +38,6 @@ constexpr std::size_t min_static_features = 100;
 constexpr double judge_again_distance_m = 0.2;
 constexpr double judge_again_angle_rad = 0.01;
 
-OdometryConfig as_used(OdometryConfig config) {
-  // The paper's "no weighting" has no robust kernel either.
-  if (config.weighting == Weighting::none || config.paper_exact)
-    config.registration.robust_scale_m = 0.0;
-  if (config.paper_exact) config.motion.use_range_image_history = false;
-  return config;
-}
-
 bool is_registered_by_surfaces(const SensorModel& sensor, const OdometryConfig& config) {
   if (sensor.pattern == ScanPattern::irregular) return true;
   return !config.paper_exact && sensor.rings >= config.features.min_surface_rings;
@@ -75,7 +67,7 @@ struct ScanInParts {
 
 struct Odometry::State {
   State(const OdometryConfig& odometry_config, const SensorModel& sensor_model)
-      : config(as_used(odometry_config)),
+      : config(odometry_config.with_method()),
         sensor(sensor_model),
         map(odometry_config.local_map),
         history(odometry_config.motion),
@@ -114,14 +106,12 @@ struct Odometry::State {
                    FeatureSets& features, OdometryResult& result) const;
   [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
                                              const PosePrediction& prediction) const;
-  /// Believes no pose that the robot cannot have reached.
-  void keep_to_limits(const PosePrediction& prediction, OdometryResult& result) const;
   /// Asks the points for a second opinion, and the limits; the paper has neither.
   void confirm(const FeatureSets& features, const PosePrediction& prediction,
                OdometryResult& result) const {
     if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
     result = confirmed_by_points(result, features, map, config);
-    keep_to_limits(prediction, result);
+    keep_to_limits(last, prediction, !has_jumped, sensor.motion_limits, result);
   }
   /// Calls a pose good only where the map says so that is older than any doubt of the place.
   void confirm_place(const FeatureSets& features, const PosePrediction& prediction,
@@ -288,18 +278,6 @@ void Odometry::State::judge_again(ScanInParts& parts,
   const OdometryResult again =
       register_features(features, map, result.T_map_lidar, config, result.sweep_correction);
   if (again.health != OdometryHealth::lost) result = again;
-}
-
-void Odometry::State::keep_to_limits(const PosePrediction& prediction,
-                                     OdometryResult& result) const {
-  // A prior may move the robot anywhere, as one that corrects itself does.
-  if (result.health == OdometryHealth::lost || prediction.is_prior || prediction.interval_s <= 0.0)
-    return;
-  if (is_reachable(last, result.T_map_lidar, prediction.interval_s,
-                   prediction.is_known && !has_jumped, sensor.motion_limits))
-    return;
-  result = lost_at(prediction.T_map_lidar);
-  result.is_beyond_limits = true;
 }
 
 void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,

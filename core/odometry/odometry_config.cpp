@@ -100,4 +100,11 @@ std::string OdometryConfig::faults() const {
   return faults.text();
 }
 
+OdometryConfig OdometryConfig::with_method() const {
+  OdometryConfig used = *this;
+  if (weighting == Weighting::none || paper_exact) used.registration.robust_scale_m = 0.0;
+  if (paper_exact) used.motion.use_range_image_history = false;
+  return used;
+}
+
 }  // namespace stillmap

@@ -113,6 +113,9 @@ struct OdometryConfig {
 
   /// Every fault in words, one a line; empty when the configuration can be used.
   [[nodiscard]] std::string faults() const;
+  /// Without what the method that is selected does without: the paper's "no weighting" has no
+  /// robust kernel either.
+  [[nodiscard]] OdometryConfig with_method() const;
 };
 
 }  // namespace stillmap

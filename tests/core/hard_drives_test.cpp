@@ -86,12 +86,16 @@ TEST(HardDrives, RollingScansAreFollowedWhateverInstantTheStampIs) {
   }
 }
 
-TEST(HardDrives, ScansOfAnotherPlaceAreLostAndEnterNoMap) {
-  const SimulationConfig here = yard(LidarMotion::vehicle, false);
+SimulationConfig another_place() {
   SimulationConfig there = yard(LidarMotion::vehicle, false, 6);
   there.plan = simulation::crowded_avenue();
+  return there;
+}
+
+TEST(HardDrives, ScansOfAnotherPlaceAreLostAndEnterNoMap) {
+  const SimulationConfig here = yard(LidarMotion::vehicle, false);
   const Simulation first(here);
-  const Simulation second(there);
+  const Simulation second(another_place());
   Mapper mapper = mapper_of(here);
   for (int k = 0; k < 20; ++k) ASSERT_TRUE(mapper.process(first.scan(k).scan));
   const std::uint64_t version = mapper.map_snapshot()->version;
@@ -124,10 +128,8 @@ Scan covered(const Scan& scan) {
 
 TEST(HardDrives, ACoveredLidarThatIsCarriedElsewhereIsNotGoodThereAndMapsNothing) {
   const SimulationConfig here = yard(LidarMotion::vehicle, false);
-  SimulationConfig there = yard(LidarMotion::vehicle, false, 6);
-  there.plan = simulation::crowded_avenue();
   const Simulation first(here);
-  const Simulation second(there);
+  const Simulation second(another_place());
   Mapper mapper = mapper_of(here);
   for (int k = 0; k < 14; ++k) ASSERT_TRUE(mapper.process(first.scan(k).scan));
   const auto health_of = [&mapper](Scan scan) {

@@ -9,6 +9,7 @@
 
 #include "tests/clients/process.hpp"
 #include "tests/server/server_process.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -56,7 +57,7 @@ class PlainPublisher : public testing::Test {
 
 TEST_F(PlainPublisher, LargeScansOfAReliableOneArrive) {
   client_.wait_for_server(patience);
-  const std::uint64_t sent = publish(large, 10.0, 40, "5 reliable");
+  const std::uint64_t sent = publish(large, 10.0 / slowdown, 40, "5 reliable");
   EXPECT_EQ(sent, 40U);
   const auto received = [&] { return client_.status().counter("scans_received"); };
   EXPECT_TRUE(
