@@ -36,7 +36,8 @@ void ClassEvidence::add(SemanticClass added, float weight) {
         static_cast<std::size_t>(std::ranges::min_element(bits_.weights) - bits_.weights.begin());
     set_label(vote, added);
   }
-  const int steps = std::max<int>(1, steps_of(std::min(weight, 1.0F)));
+  const long parts = std::lround(std::min(weight, 1.0F) / (vote_steps * weight_step));
+  const int steps = std::max(1, static_cast<int>(parts) * vote_steps);
   bits_.weights.at(vote) = static_cast<std::uint16_t>(bits_.weights.at(vote) + steps);
   scale_down();
 }

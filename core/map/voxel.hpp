@@ -60,6 +60,12 @@ class ClassEvidence {
   static constexpr float max_total = 200.0F;
   /// Weights are whole numbers of these steps; a vote counts one at least.
   static constexpr float weight_step = 1.0F / 128.0F;
+  /// A vote is rounded to whole numbers of so many steps: finer ones tell no more, and take more
+  /// room on disk.
+  static constexpr int vote_steps = 8;
+  /// A vote of confidence 1, and the greatest total, in steps.
+  static constexpr std::uint32_t confident_steps = static_cast<std::uint32_t>(1.0F / weight_step);
+  static constexpr std::uint32_t max_steps = static_cast<std::uint32_t>(max_total / weight_step);
   [[nodiscard]] std::array<Vote, candidates> votes() const;
   /// Of these votes, rounded to steps such that the winner stays. Weights are 0 to 2 * max_total.
   [[nodiscard]] static ClassEvidence of(const std::array<Vote, candidates>& votes);
@@ -81,7 +87,6 @@ class ClassEvidence {
  private:
   static constexpr int class_bits = 5;
   static constexpr std::uint16_t class_mask = (1U << class_bits) - 1;
-  static constexpr std::uint32_t max_steps = static_cast<std::uint32_t>(max_total / weight_step);
 
   [[nodiscard]] SemanticClass label(std::size_t i) const {
     return static_cast<SemanticClass>(bits_.classes >> (class_bits * static_cast<int>(i)) &

@@ -5,6 +5,7 @@
 #include <cstring>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 #include "tests/fuzz/fuzz_target.hpp"
 
@@ -39,6 +40,10 @@ class ByteSource {
 };
 
 [[nodiscard]] inline std::string text_of(Bytes bytes) { return {bytes.begin(), bytes.end()}; }
+
+[[nodiscard]] inline std::vector<std::uint8_t> bytes_of(Bytes bytes) {
+  return {bytes.begin(), bytes.end()};
+}
 
 /// Appends a value as ByteSource reads it.
 template <typename T>

@@ -43,14 +43,14 @@ constexpr auto visit_voxel = [](auto&& visit, const FirstVoxel& voxel) {
 };
 
 template <typename Field>
-void append(std::vector<std::uint8_t>& bytes, const Field& field) {
-  const std::size_t end = bytes.size();
-  bytes.resize(end + sizeof(field));
-  FieldWriter(bytes.data() + end)(field);
+void append(PlaneBytes& content, const Field& field) {
+  const std::size_t end = content.bytes.size();
+  content.bytes.resize(end + sizeof(field));
+  FieldWriter(content.bytes.data() + end)(field);
 }
 
 std::vector<std::uint8_t> first_tile(const std::vector<FirstVoxel>& voxels) {
-  std::vector<std::uint8_t> content;
+  PlaneBytes content;
   append(content, first_id.x);
   append(content, first_id.y);
   append(content, std::uint64_t{12});
@@ -135,7 +135,7 @@ TEST(FirstTileFormat, ImpossibleVoxelsAreRefused) {
 TEST(FirstTileFormat, EvidenceIsRead) {
   std::vector<FirstVoxel> hidden = any_voxels();
   hidden.resize(3);
-  std::vector<std::uint8_t> content;
+  PlaneBytes content;
   append(content, first_id.x);
   append(content, first_id.y);
   append(content, std::uint32_t{1});

@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <array>
 #include <random>
+#include <span>
 #include <vector>
 
 #include "core/map/storage/packed_codec.hpp"
+#include "core/map/storage/tile_frame.hpp"
 #include "core/map/tile_evidence.hpp"
 #include "tests/map/map_worlds.hpp"
 
@@ -80,7 +82,7 @@ TEST(TileCodec, RandomBytesAreRefused) {
   for (int i = 0; i < 2000; ++i) {
     std::vector<std::uint8_t> bytes(random() % 200);
     for (auto& byte : bytes) byte = static_cast<std::uint8_t>(random());
-    if (!bytes.empty()) bytes[0] = static_cast<std::uint8_t>(1 + i % 2);
+    if (!bytes.empty()) bytes[0] = tile_formats.at(static_cast<std::size_t>(i) % 3);
     EXPECT_THROW((void)decode_tile(bytes, codec_grid), TileCodecError);
   }
 }
@@ -114,6 +116,34 @@ TEST(TileCodec, ImpossibleVoxelsAreRefused) {
   expect_refused([](Voxels, Seen, Info info) { info.voxel_count = 0xFFFFFFFF; });
   EXPECT_FALSE(ClassEvidence::of(ClassEvidence::Bits{{1, 0, 0}, 31}));
   EXPECT_FALSE(ClassEvidence::of(ClassEvidence::Bits{{20'000, 20'000, 0}, 1}));
+}
+
+/// An encoded tile or evidence as the second format stores it: with its voxels' first votes as they
+/// are. Their planes begin at `voxels_at` of the content.
+std::vector<std::uint8_t> in_second_format(const std::vector<std::uint8_t>& encoded,
+                                           std::size_t voxels_at,
+                                           std::span<const PackedVoxel> all) {
+  constexpr std::size_t first_votes_at = 2 * 2 + 3 + 3 + 2;
+  std::vector<std::uint8_t> content = from_frame(encoded, 1);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const std::uint16_t weight = all[i].evidence.bits().weights[0];
+    const std::size_t low = voxels_at + first_votes_at * all.size() + i;
+    content[low] = static_cast<std::uint8_t>(weight & 0xFFU);
+    content[low + all.size()] = static_cast<std::uint8_t>(weight >> 8);
+  }
+  return to_frame(2, {content, {}});
+}
+
+TEST(TileCodec, TheSecondFormatIsRead) {
+  for (const Tile& tile : street_tiles()) {
+    constexpr std::size_t header_bytes = 42;
+    const auto second = in_second_format(
+        encode_tile(tile), header_bytes + stamp_bytes * tile.voxels.stamps_ns().size(),
+        tile.voxels.packed());
+    const Tile back = decode_tile(second, codec_grid);
+    EXPECT_TRUE(std::ranges::equal(back.voxels.packed(), tile.voxels.packed()));
+    EXPECT_EQ(encode_tile(back), encode_tile(tile));
+  }
 }
 
 TEST(TileCodec, ATileOfOtherSizesThanItsMapIsRefused) {
@@ -172,6 +202,19 @@ TEST(TileEvidence, RoundTripLosesNothing) {
   }
   EXPECT_EQ(back.hidden_states, evidence.hidden_states);
   EXPECT_EQ(back.excluded, evidence.excluded);
+}
+
+TEST(TileEvidence, TheSecondFormatIsRead) {
+  const TileEvidence evidence = any_evidence();
+  constexpr std::size_t header_bytes = 38;
+  constexpr std::size_t shown_bytes = 5;
+  const std::size_t voxels_at = header_bytes + shown_bytes * evidence.shown.size() +
+                                stamp_bytes * evidence.hidden.stamps_ns().size();
+  const auto second =
+      in_second_format(encode_evidence(evidence), voxels_at, evidence.hidden.packed());
+  const TileEvidence back = decode_evidence(second, codec_grid);
+  EXPECT_TRUE(std::ranges::equal(back.hidden.packed(), evidence.hidden.packed()));
+  EXPECT_EQ(encode_evidence(back), encode_evidence(evidence));
 }
 
 TEST(TileEvidence, SaysWhatIsRemovedAndWhy) {

@@ -27,7 +27,8 @@ TEST(ClassEvidence, WinnerHasMostWeightNotMostVotes) {
   evidence.add(road, 0.3F);
   evidence.add(sidewalk, 0.9F);
   EXPECT_EQ(evidence.winner(), sidewalk);
-  EXPECT_NEAR(evidence.share(), 0.9F / 1.5F, ClassEvidence::weight_step);
+  EXPECT_NEAR(evidence.share(), 0.9F / 1.5F,
+              ClassEvidence::vote_steps * ClassEvidence::weight_step);
 }
 
 TEST(ClassEvidence, EqualWeightsGiveTheSameWinnerInEitherOrder) {

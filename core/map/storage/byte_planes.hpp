@@ -40,16 +40,23 @@ class FieldReader {
   const std::uint8_t* from_;
 };
 
+/// Bytes that are of one kind from each of these ends to the next.
+struct PlaneBytes {
+  std::vector<std::uint8_t> bytes;
+  /// Offsets, ascending.
+  std::vector<std::size_t> plane_ends;
+};
+
 /// Appends the records by byte planes: the first byte of all, the second byte of all, and so on,
 /// which compresses better than record after record. `visit(visitor, record)` lists the fields,
 /// `record_bytes` of them.
 template <std::size_t record_bytes, typename Record, typename Visit>
-void append_planes(std::vector<std::uint8_t>& bytes, const std::vector<Record>& records,
-                   Visit visit) {
+void append_planes(PlaneBytes& content, const std::vector<Record>& records, Visit visit) {
   const std::size_t count = records.size();
-  const std::size_t begin = bytes.size();
-  bytes.resize(begin + count * record_bytes);
-  const std::span<std::uint8_t> planes = std::span(bytes).subspan(begin);
+  const std::size_t begin = content.bytes.size();
+  content.bytes.resize(begin + count * record_bytes);
+  for (std::size_t k = 0; k <= record_bytes; ++k) content.plane_ends.push_back(begin + k * count);
+  const std::span<std::uint8_t> planes = std::span(content.bytes).subspan(begin);
   std::array<std::uint8_t, record_bytes> record{};
   for (std::size_t i = 0; i < count; ++i) {
     visit(FieldWriter(record.data()), records[i]);

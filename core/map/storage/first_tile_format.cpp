@@ -186,7 +186,7 @@ PackedVoxels packed(const std::vector<Voxel>& voxels, TileId tile, const VoxelGr
 }  // namespace
 
 Tile decode_tile(std::span<const std::uint8_t> frame, const VoxelGrid& grid) {
-  const auto content = from_frame(format_version, frame, tile_header_bytes);
+  const auto content = from_frame(frame, tile_header_bytes);
   Tile tile;
   FieldReader header(content.data());
   header(tile.info.id.x);
@@ -212,7 +212,7 @@ Tile decode_tile(std::span<const std::uint8_t> frame, const VoxelGrid& grid) {
 }
 
 TileEvidence decode_evidence(std::span<const std::uint8_t> frame, const VoxelGrid& grid) {
-  const auto content = from_frame(format_version, frame, evidence_header_bytes);
+  const auto content = from_frame(frame, evidence_header_bytes);
   TileEvidence evidence;
   std::array<std::uint32_t, 3> counts{};
   FieldReader header(content.data());

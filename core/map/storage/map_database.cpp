@@ -57,6 +57,9 @@ constexpr const char* schema = R"sql(
   CREATE TABLE metadata (key TEXT PRIMARY KEY, value TEXT NOT NULL);
 )sql";
 
+/// The last page of a tile is half empty: small pages waste little.
+constexpr std::uint32_t page_bytes = 1024;
+
 constexpr const char* evidence_table = R"sql(
   CREATE TABLE memories (
     x INTEGER NOT NULL, y INTEGER NOT NULL, encoded BLOB NOT NULL,
@@ -133,6 +136,7 @@ void create(const fs::path& file) {
   }
   {
     SQLite::Database database(sqlite_name(fresh), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    set_number(database, "page_size", page_bytes);
     SQLite::Transaction transaction(database);
     set_number(database, "application_id", application_id);
     set_number(database, "user_version", schema_version);

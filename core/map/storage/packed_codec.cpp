@@ -1,5 +1,6 @@
 #include "core/map/storage/packed_codec.hpp"
 
+#include <algorithm>
 #include <utility>
 
 #include "core/map/storage/byte_planes.hpp"
@@ -43,11 +44,20 @@ constexpr auto visit_voxel = [](auto&& visit, auto& voxel) {
 
 constexpr auto visit_number = [](auto&& visit, auto& number) { visit(number); };
 
+/// Between votes as they are and what lacks of one confident vote for each point; its own inverse.
+void turn_first_votes(StoredVoxel& voxel) {
+  auto& weights = voxel.evidence.weights;
+  const std::uint32_t most =
+      std::min(voxel.point_count * ClassEvidence::confident_steps, ClassEvidence::max_steps);
+  weights[0] = static_cast<std::uint16_t>(most - weights[0] - weights[1] - weights[2]);
+}
+
 StoredVoxel to_stored(const PackedVoxel& voxel, KeySteps& keys) {
   StoredVoxel stored;
   stored.step = keys.step_to(voxel.key);
   stored.point_count = voxel.point_count;
   stored.evidence = voxel.evidence.bits();
+  turn_first_votes(stored);
   const std::uint32_t points = voxel.mean_points();
   for (std::size_t axis = 0; axis < 3 && points > 0; ++axis) {
     stored.mean[axis] = static_cast<std::uint8_t>(voxel.offset_sum[axis] / points);
@@ -100,14 +110,14 @@ void KeySteps::move_to(std::uint16_t column, std::uint16_t layer) {
   layer_ = layer;
 }
 
-void append_stamps(std::vector<std::uint8_t>& bytes, std::span<const std::int64_t> stamps_ns) {
+void append_stamps(PlaneBytes& content, std::span<const std::int64_t> stamps_ns) {
   std::vector<std::uint64_t> steps;
   std::uint64_t last = 0;
   for (const std::int64_t stamp_ns : stamps_ns) {
     const auto bits = static_cast<std::uint64_t>(stamp_ns);
     steps.push_back(bits - std::exchange(last, bits));
   }
-  append_planes<stamp_bytes>(bytes, steps, visit_number);
+  append_planes<stamp_bytes>(content, steps, visit_number);
 }
 
 std::vector<std::int64_t> read_stamps(const std::uint8_t*& from, std::size_t count) {
@@ -128,7 +138,7 @@ std::vector<std::int64_t> read_stamps(const std::uint8_t*& from, std::size_t cou
   return stamps_ns;
 }
 
-void append_voxels(std::vector<std::uint8_t>& bytes, const PackedVoxels& voxels) {
+void append_voxels(PlaneBytes& content, const PackedVoxels& voxels) {
   std::vector<StoredVoxel> stored;
   stored.reserve(voxels.size());
   const auto stamps = static_cast<std::uint32_t>(voxels.stamps_ns().size());
@@ -139,11 +149,12 @@ void append_voxels(std::vector<std::uint8_t>& bytes, const PackedVoxels& voxels)
     const std::uint32_t last = voxels.last_stamp(i);
     voxel.stamps_on = last - voxel.first_stamp + (last < voxel.first_stamp ? stamps : 0);
   }
-  append_planes<packed_voxel_bytes>(bytes, stored, visit_voxel);
+  append_planes<packed_voxel_bytes>(content, stored, visit_voxel);
 }
 
 PackedVoxels read_voxels(const std::uint8_t*& from, std::size_t count,
-                         std::vector<std::int64_t> stamps_ns, TileId tile, const VoxelGrid& grid) {
+                         std::vector<std::int64_t> stamps_ns, TileId tile, const VoxelGrid& grid,
+                         FirstVotes first_votes) {
   std::vector<StoredVoxel> stored(count);
   read_planes<packed_voxel_bytes>(from, stored, visit_voxel);
   from += count * packed_voxel_bytes;
@@ -153,7 +164,8 @@ PackedVoxels read_voxels(const std::uint8_t*& from, std::size_t count,
   seen.stamp_of.reserve(2 * count);
   const std::size_t stamps = seen.stamps_ns.size();
   KeySteps keys;
-  for (const StoredVoxel& voxel : stored) {
+  for (StoredVoxel& voxel : stored) {
+    if (first_votes == FirstVotes::by_what_lacks) turn_first_votes(voxel);
     const PackedVoxel next = from_stored(voxel, keys);
     if (!voxels.empty() && next.key <= voxels.back().key) {
       throw TileCodecError("has voxels out of order");

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/map/packed_voxels.hpp"
+#include "core/map/storage/byte_planes.hpp"
 
 namespace stillmap {
 
@@ -32,7 +33,7 @@ class KeySteps {
 };
 
 /// Stamps, ascending, by what they differ: eight bytes each.
-void append_stamps(std::vector<std::uint8_t>& bytes, std::span<const std::int64_t> stamps_ns);
+void append_stamps(PlaneBytes& content, std::span<const std::int64_t> stamps_ns);
 /// Throws TileCodecError for stamps that do not ascend. `from` has enough bytes and moves on behind
 /// them.
 [[nodiscard]] std::vector<std::int64_t> read_stamps(const std::uint8_t*& from, std::size_t count);
@@ -40,12 +41,20 @@ void append_stamps(std::vector<std::uint8_t>& bytes, std::span<const std::int64_
 inline constexpr std::size_t stamp_bytes = 8;
 inline constexpr std::size_t packed_voxel_bytes = 2 * 2 + 3 + 3 + 2 + 4 * 2 + 2 * 4;
 
-/// The voxels by byte planes, without the table of stamps.
-void append_voxels(std::vector<std::uint8_t>& bytes, const PackedVoxels& voxels);
+/// How the votes for a voxel's first candidate class are stored.
+enum class FirstVotes : std::uint8_t {
+  as_they_are,
+  /// What all votes lack to one confident vote for each point, in a circle: nothing for most voxels
+  /// of a data set with labels.
+  by_what_lacks,
+};
+
+/// The voxels by byte planes, without the table of stamps; their first votes by what lacks.
+void append_voxels(PlaneBytes& content, const PackedVoxels& voxels);
 /// Throws TileCodecError for voxels that append_voxels did not write. `from` has enough bytes for
 /// `count` and moves on behind them.
 [[nodiscard]] PackedVoxels read_voxels(const std::uint8_t*& from, std::size_t count,
                                        std::vector<std::int64_t> stamps_ns, TileId tile,
-                                       const VoxelGrid& grid);
+                                       const VoxelGrid& grid, FirstVotes first_votes);
 
 }  // namespace stillmap

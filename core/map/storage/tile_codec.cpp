@@ -179,9 +179,9 @@ SeenTimes times_of(const std::vector<ExcludedVoxel>& excluded) {
   return seen_times(stamps_ns);
 }
 
-void append_excluded(std::vector<std::uint8_t>& bytes, const std::vector<ExcludedVoxel>& excluded,
+void append_excluded(PlaneBytes& content, const std::vector<ExcludedVoxel>& excluded,
                      const SeenTimes& seen) {
-  append_stamps(bytes, seen.stamps_ns);
+  append_stamps(content, seen.stamps_ns);
   std::vector<StoredExcluded> stored;
   KeySteps keys;
   for (std::size_t i = 0; i < excluded.size(); ++i) {
@@ -189,7 +189,7 @@ void append_excluded(std::vector<std::uint8_t>& bytes, const std::vector<Exclude
                       static_cast<std::uint8_t>(excluded[i].label),
                       static_cast<std::uint8_t>(excluded[i].was_moving ? 1 : 0), seen.stamp_of[i]});
   }
-  append_planes<excluded_bytes>(bytes, stored, visit_excluded);
+  append_planes<excluded_bytes>(content, stored, visit_excluded);
 }
 
 std::vector<ExcludedVoxel> read_excluded(const std::uint8_t*& from, const EvidenceHeader& header) {
@@ -216,6 +216,11 @@ void check_content(const std::vector<std::uint8_t>& content, std::size_t needed,
                        " bytes instead of " + std::to_string(needed));
 }
 
+/// The second format had them as they are, and was otherwise the same.
+FirstVotes first_votes_in(std::span<const std::uint8_t> frame) {
+  return frame[0] <= 2 ? FirstVotes::as_they_are : FirstVotes::by_what_lacks;
+}
+
 bool is_first_format(std::span<const std::uint8_t> bytes) {
   return !bytes.empty() && bytes[0] == first_tile_format::format_version;
 }
@@ -232,11 +237,11 @@ VoxelGrid stored_grid(double voxel_size_m, double tile_size_m) {
 }
 
 std::vector<std::uint8_t> encode_tile(const Tile& tile) {
-  std::vector<std::uint8_t> content(tile_header_bytes);
+  PlaneBytes content{std::vector<std::uint8_t>(tile_header_bytes), {}};
   const auto stamps_ns = tile.voxels.stamps_ns();
   const TileHeader header{tile.info, to_stored(tile.voxels.grid()),
                           static_cast<std::uint32_t>(stamps_ns.size())};
-  visit_tile_header(FieldWriter(content.data()), header);
+  visit_tile_header(FieldWriter(content.bytes.data()), header);
   append_stamps(content, stamps_ns);
   append_voxels(content, tile.voxels);
   return to_frame(tile_format, content);
@@ -244,7 +249,7 @@ std::vector<std::uint8_t> encode_tile(const Tile& tile) {
 
 Tile decode_tile(std::span<const std::uint8_t> bytes, const VoxelGrid& grid) {
   if (is_first_format(bytes)) return first_tile_format::decode_tile(bytes, grid);
-  const std::vector<std::uint8_t> content = from_frame(tile_format, bytes, tile_header_bytes);
+  const std::vector<std::uint8_t> content = from_frame(bytes, tile_header_bytes);
   TileHeader header;
   visit_tile_header(FieldReader(content.data()), header);
   const std::size_t count = header.info.voxel_count;
@@ -254,13 +259,14 @@ Tile decode_tile(std::span<const std::uint8_t> bytes, const VoxelGrid& grid) {
   if (count > 0) check_sizes(header.grid, grid);
   const std::uint8_t* from = content.data() + tile_header_bytes;
   std::vector<std::int64_t> stamps_ns = read_stamps(from, header.stamps);
-  Tile tile{header.info, read_voxels(from, count, std::move(stamps_ns), header.info.id, grid)};
+  Tile tile{header.info, read_voxels(from, count, std::move(stamps_ns), header.info.id, grid,
+                                     first_votes_in(bytes))};
   for (const Voxel& voxel : tile.voxels) tile.info.bounds_map.extend(voxel.mean_map);
   return tile;
 }
 
 std::vector<std::uint8_t> encode_evidence(const TileEvidence& evidence) {
-  std::vector<std::uint8_t> content(evidence_header_bytes);
+  PlaneBytes content{std::vector<std::uint8_t>(evidence_header_bytes), {}};
   const SeenTimes excluded_times = times_of(evidence.excluded);
   const auto hidden_stamps_ns = evidence.hidden.stamps_ns();
   const EvidenceHeader header{evidence.id,
@@ -270,7 +276,7 @@ std::vector<std::uint8_t> encode_evidence(const TileEvidence& evidence) {
                               static_cast<std::uint32_t>(hidden_stamps_ns.size()),
                               static_cast<std::uint32_t>(evidence.excluded.size()),
                               static_cast<std::uint32_t>(excluded_times.stamps_ns.size())};
-  visit_evidence_header(FieldWriter(content.data()), header);
+  visit_evidence_header(FieldWriter(content.bytes.data()), header);
   append_planes<history_bytes>(content, all_to_stored<StoredHistory>(evidence.shown),
                                visit_history);
   append_stamps(content, hidden_stamps_ns);
@@ -283,7 +289,7 @@ std::vector<std::uint8_t> encode_evidence(const TileEvidence& evidence) {
 
 TileEvidence decode_evidence(std::span<const std::uint8_t> bytes, const VoxelGrid& grid) {
   if (is_first_format(bytes)) return first_tile_format::decode_evidence(bytes, grid);
-  const std::vector<std::uint8_t> content = from_frame(tile_format, bytes, evidence_header_bytes);
+  const std::vector<std::uint8_t> content = from_frame(bytes, evidence_header_bytes);
   EvidenceHeader header;
   visit_evidence_header(FieldReader(content.data()), header);
   check_content(content,
@@ -298,7 +304,8 @@ TileEvidence decode_evidence(std::span<const std::uint8_t> bytes, const VoxelGri
   read_list<history_bytes, StoredHistory>(from, header.shown, evidence.shown, visit_history);
   if (header.hidden > 0) check_sizes(header.grid, grid);
   std::vector<std::int64_t> stamps_ns = read_stamps(from, header.hidden_stamps);
-  evidence.hidden = read_voxels(from, header.hidden, std::move(stamps_ns), header.id, grid);
+  evidence.hidden = read_voxels(from, header.hidden, std::move(stamps_ns), header.id, grid,
+                                first_votes_in(bytes));
   read_list<state_bytes, StoredHiddenState>(from, header.hidden, evidence.hidden_states,
                                             visit_state);
   evidence.excluded = read_excluded(from, header);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <stdexcept>
@@ -19,15 +20,18 @@ class TileCodecError : public std::runtime_error {
 /// The grid of a stored map; throws TileCodecError for sizes that no map has.
 [[nodiscard]] VoxelGrid stored_grid(double voxel_size_m, double tile_size_m);
 
-/// The format that is written; the first one is read, too.
-inline constexpr std::uint8_t tile_format = 2;
+/// The formats that are read, and the last of them is written. No bit that turns makes one of
+/// another: a frame's checksum does not cover its number.
+inline constexpr std::array<std::uint8_t, 3> tile_formats = {1, 2, 4};
+inline constexpr std::uint8_t tile_format = tile_formats.back();
 
 /// A tile as bytes, nothing lost: a version byte, then a zstd frame (with checksum) of
 ///   i32 x, i32 y, u64 revision, u64 content_hash, u32 voxel count, f64 voxel size [m], u16 voxels
 ///   to a side, u32 stamp count,
 ///   the stamps of its voxels, ascending, by their differences,
 ///   and the voxels, both by byte planes: the first byte of all, the second byte of all, and so on,
-///   which compresses better than one after the other.
+///   which compresses better than one after the other. The votes for a voxel's first candidate
+///   class are stored as what all its votes lack to one confident vote for each point.
 /// All little-endian. Bounds are not stored, they follow from the voxels.
 [[nodiscard]] std::vector<std::uint8_t> encode_tile(const Tile& tile);
 

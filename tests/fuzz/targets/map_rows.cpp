@@ -25,8 +25,7 @@ namespace {
 enum Row : std::uint8_t { sizes, pose, tile, memory, metadata, rows };
 
 /// Added to a row whose content is of the newest format; without it, of the first one.
-constexpr std::uint8_t newest_format = 130;
-static_assert(newest_format % rows == 0);
+constexpr std::uint8_t newest_format = rows * (tile_formats.size() - 1);
 
 /// Bytes of a row that is as long as it says: a length of 16 bits before them.
 Bytes sized_bytes(ByteSource& source) { return source.take(source.value<std::uint16_t>()); }
@@ -68,7 +67,7 @@ std::vector<std::uint8_t> with_hash(std::vector<std::uint8_t> encoded, TileInfo&
 
 void write_tile(SQLite::Database& database, std::uint8_t format, ByteSource& source) {
   TileInfo info;
-  const auto encoded = with_hash(to_frame(format, sized_bytes(source)), info);
+  const auto encoded = with_hash(to_frame(format, {bytes_of(sized_bytes(source)), {}}), info);
   SQLite::Statement insert(
       database,
       "INSERT OR REPLACE INTO tiles (x, y, revision, content_hash, encoded, voxel_count, min_x, "
@@ -93,7 +92,7 @@ void write_memory(SQLite::Database& database, std::uint8_t format, ByteSource& s
   SQLite::Statement insert(database, "INSERT OR REPLACE INTO memories VALUES (?, ?, ?)");
   insert.bind(1, id.x);
   insert.bind(2, id.y);
-  bind_blob(insert, 3, to_frame(format, content));
+  bind_blob(insert, 3, to_frame(format, {bytes_of(content), {}}));
   insert.exec();
 }
 
@@ -108,7 +107,7 @@ void write_metadata(SQLite::Database& database, ByteSource& source) {
 void write_row(SQLite::Database& database, ByteSource& source) try {
   const std::uint8_t choice = source.byte();
   const auto row = static_cast<Row>(choice % rows);
-  const std::uint8_t format = choice >= newest_format ? tile_format : 1;
+  const std::uint8_t format = tile_formats.at(choice / rows % tile_formats.size());
   if (row == sizes) write_sizes(database, source);
   if (row == pose) write_pose(database, source);
   if (row == tile) write_tile(database, format, source);
@@ -149,7 +148,7 @@ void run(Bytes bytes) {
 }
 
 void append_row(std::string& bytes, Row row, const std::vector<std::uint8_t>& encoded) {
-  const std::vector<std::uint8_t> content = from_frame(tile_format, encoded, 1);
+  const std::vector<std::uint8_t> content = from_frame(encoded, 1);
   bytes.push_back(static_cast<char>(newest_format + row));
   append_value(bytes, static_cast<std::uint16_t>(content.size()));
   bytes.append(content.begin(), content.end());

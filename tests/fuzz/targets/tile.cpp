@@ -17,15 +17,14 @@ namespace {
 
 enum Kind : std::uint8_t { tile, tile_content, memory, memory_content, kinds };
 /// Added to a kind of content of the newest format; without it, of the first one.
-constexpr std::uint8_t newest_format = 128;
-static_assert(newest_format % kinds == 0);
+constexpr std::uint8_t newest_format = kinds * (tile_formats.size() - 1);
 
 void decode(Kind kind, std::uint8_t format_version, Bytes bytes) {
   const StaticMapConfig config = street_config();
   const VoxelGrid grid(config.voxel_size_m, config.tile_size_m);
   const bool is_content = kind == tile_content || kind == memory_content;
   std::vector<std::uint8_t> framed;
-  if (is_content) framed = to_frame(format_version, bytes);
+  if (is_content) framed = to_frame(format_version, {bytes_of(bytes), {}});
   const Bytes encoded = is_content ? Bytes(framed) : bytes;
   if (kind == tile || kind == tile_content) {
     const Tile decoded = decode_tile(encoded, grid);
@@ -47,7 +46,7 @@ void decode(Kind kind, std::uint8_t format_version, Bytes bytes) {
 void run(Bytes bytes) {
   ByteSource source(bytes);
   const std::uint8_t choice = source.byte();
-  const std::uint8_t format_version = choice >= newest_format ? tile_format : 1;
+  const std::uint8_t format_version = tile_formats.at(choice / kinds % tile_formats.size());
   try {
     decode(static_cast<Kind>(choice % kinds), format_version, source.rest());
   } catch (const TileCodecError&) {
@@ -60,7 +59,7 @@ std::vector<Seed> seeds() {
   const auto memory_bytes = encode_evidence(*map.tile_evidence.begin()->second);
   constexpr std::size_t min_bytes = 1;
   const auto content = [&](const std::vector<std::uint8_t>& framed) {
-    return text_of(from_frame(tile_format, framed, min_bytes));
+    return text_of(from_frame(framed, min_bytes));
   };
   return {{"tile", with_choice(tile, text_of(tile_bytes))},
           {"tile_content", with_choice(newest_format + tile_content, content(tile_bytes))},
