@@ -166,7 +166,10 @@ void MapTiles::add(TileId id, const TileRecord& record) {
 }
 
 bool MapTiles::reload(TileId id) {
-  if (store_ == nullptr || unreadable_.contains(id)) return false;
+  if (store_ == nullptr) return false;
+  if (const auto fault = unreadable_.find(id);
+      fault != unreadable_.end() && !fault->second.is_next_attempt_due())
+    return false;
   const std::shared_ptr<const Tile> stand_in = shown(id);
   try {
     TileRecord record = store_->load(id);
@@ -179,9 +182,10 @@ bool MapTiles::reload(TileId id) {
     add(id, record);
   } catch (const std::runtime_error& fault) {
     // The tile is not mapped from now on: a new tile would replace the stored one.
-    unreadable_.emplace(id, fault.what());
+    unreadable_[id].set_text(fault.what());
     return false;
   }
+  unreadable_.erase(id);
   --non_resident_count_;
   hidden_non_resident_.erase(id);
   const auto& published = resident(id)->published();

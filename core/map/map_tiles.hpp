@@ -3,12 +3,14 @@
 #include <tsl/robin_map.h>
 
 #include <Eigen/Geometry>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <memory>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/lidar/voxel_index.hpp"
@@ -20,6 +22,23 @@
 #include "core/map/voxel_grid.hpp"
 
 namespace stillmap {
+
+/// Why a tile could not be read. It is tried again, less and less often: the disk may recover.
+class ReadFault {
+ public:
+  [[nodiscard]] const std::string& text() const { return text_; }
+  void set_text(std::string text) { text_ = std::move(text); }
+  /// To be asked whenever the tile is wanted: true for every 2^n-th time, and every 1024th.
+  [[nodiscard]] bool is_next_attempt_due() {
+    constexpr std::uint32_t longest_wait = 1024;
+    ++wanted_;
+    return std::has_single_bit(wanted_) || wanted_ % longest_wait == 0;
+  }
+
+ private:
+  std::string text_;
+  std::uint32_t wanted_ = 0;
+};
 
 /// The tiles of the map that is written to: those in memory, and those that are in the tile store
 /// alone. Knows what the last view shows of each, and what is not stored yet. NOT thread-safe.
@@ -70,7 +89,7 @@ class MapTiles {
   /// than `limit_bytes`. Returns how many.
   std::size_t evict(const Eigen::Vector2d& position_map, double range_m, std::size_t limit_bytes);
   /// Tiles that could not be read, with the reason.
-  [[nodiscard]] const std::map<TileId, std::string>& unreadable() const { return unreadable_; }
+  [[nodiscard]] const std::map<TileId, ReadFault>& unreadable() const { return unreadable_; }
   [[nodiscard]] MemoryUse memory_use() const;
 
   [[nodiscard]] std::vector<LiveTile*> to_store(CheckpointScope scope) const;
@@ -111,7 +130,7 @@ class MapTiles {
   /// Both kinds.
   std::size_t non_resident_count_ = 0;
   std::shared_ptr<TileStore> store_;
-  std::map<TileId, std::string> unreadable_;
+  std::map<TileId, ReadFault> unreadable_;
   /// Tiles with points since the last view; a tile may be named more than once.
   std::vector<LiveTile*> touched_;
   /// What the next view shows otherwise than the last one.

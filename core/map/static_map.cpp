@@ -58,14 +58,14 @@ std::string StaticMapConfig::faults() const {
            << " tiles (" << max_range_tiles * tile_size_m << ")\n";
   }
   if (!(clearing_range_m >= 0.0 && clearing_range_m <= 1000.0)) {
-    faults << "clear_range_m = " << clearing_range_m << "; must be 0 (off) to 1000\n";
+    faults << "clearing_range_m = " << clearing_range_m << "; must be 0 (off) to 1000\n";
   }
   if (!(clearing_margin_m >= voxel_size_m && clearing_margin_m <= 100.0)) {
-    faults << "clear_margin_m = " << clearing_margin_m << "; must be at least voxel_size_m ("
+    faults << "clearing_margin_m = " << clearing_margin_m << "; must be at least voxel_size_m ("
            << voxel_size_m << ") and at most 100\n";
   }
   if (!(clearing_margin_share >= 0.0 && clearing_margin_share <= 1.0)) {
-    faults << "clear_margin_share = " << clearing_margin_share << "; must be 0 to 1\n";
+    faults << "clearing_margin_share = " << clearing_margin_share << "; must be 0 to 1\n";
   }
   if (clearing_interval == 0 || clearing_interval > 1000) {
     faults << "clearing_interval = " << clearing_interval << "; must be 1 to 1000\n";
@@ -227,7 +227,8 @@ std::size_t StaticMap::evict(const Eigen::Vector3d& position_map, std::size_t li
 std::vector<std::string> StaticMap::unreadable_tiles() const {
   std::vector<std::string> faults;
   for (const auto& [id, fault] : state_->tiles.unreadable()) {
-    faults.push_back("tile (" + std::to_string(id.x) + ", " + std::to_string(id.y) + "): " + fault);
+    faults.push_back("tile (" + std::to_string(id.x) + ", " + std::to_string(id.y) +
+                     "): " + fault.text());
   }
   return faults;
 }

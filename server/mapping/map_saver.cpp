@@ -35,6 +35,10 @@ std::unique_ptr<MapStore> open_existing(const fs::path& file) {
   return open_map_file(file);
 }
 
+/// A map that uses more of its limit has far tiles that eviction could not take: it begins at 7/8
+/// of the map's share (MapTiles::evict), which is 3/4 of the limit.
+constexpr double eviction_share = 2.0 / 3.0;
+
 }  // namespace
 
 MapSaver::MapSaver(const LatestMap& latest_map, Statistics& statistics, const fs::path& file,
@@ -73,7 +77,7 @@ std::optional<SavedMap> MapSaver::load() {
     map.view.map_id = new_map_id();
   }
   store_->begin_run(map.view.map_id);
-  if (!map.view.tiles.empty()) saved_map_id_ = map.view.map_id;
+  if (!map.view.tiles.empty()) remember_as_saved(map.view, latest_map_.poses_added());
   remember_metadata(map);
   return map;
 }
@@ -82,7 +86,7 @@ SavedMap MapSaver::read(MapStore& store) const {
   return memory_limit_bytes_ > 0 ? store.load_non_resident() : store.load();
 }
 
-std::optional<fs::path> MapSaver::put_stored_map_aside() {
+std::optional<fs::path> MapSaver::set_saved_map_aside() {
   const std::scoped_lock lock(mutex_);
   if (file_.empty() || !store_->holds_map()) return std::nullopt;
   const fs::path kept = folder_.unused_file_for(file_);
@@ -119,7 +123,8 @@ void MapSaver::save_at_end() {
   const std::scoped_lock lock(mutex_);
   if (misplaced_) bring_back();
   // Nothing mapped: an empty map must not replace what the file holds.
-  if (!file_.empty() && latest_map_.poses_added() > 0) save(CheckpointScope::changed, true);
+  if (!file_.empty() && (latest_map_.poses_added() > 0 || !is_saved()))
+    save(CheckpointScope::changed, true);
 }
 
 void MapSaver::make_room() {
@@ -130,7 +135,8 @@ void MapSaver::make_room() {
 CheckpointScope MapSaver::scope() {
   // Evidence that is not stored cannot be evicted.
   const bool is_full =
-      memory_limit_bytes_ > 0 && source_->memory_use().bytes > memory_limit_bytes_ / 2;
+      memory_limit_bytes_ > 0 && static_cast<double>(source_->memory_use().bytes) >
+                                     eviction_share * static_cast<double>(memory_limit_bytes_);
   if (is_full || has_moved() || standing_allowance_.is_open(clock_.now())) {
     return CheckpointScope::changed;
   }
@@ -146,10 +152,12 @@ bool MapSaver::has_moved() const {
 }
 
 bool MapSaver::is_saved() const {
+  if (misplaced_) return false;
   const auto view = latest_map_.view();
   const std::uint64_t poses = latest_map_.poses_added();
-  return !misplaced_ && (poses == 0 || (view->map_id == saved_map_id_ &&
-                                        view->version == saved_version_ && poses == saved_poses_));
+  const bool is_nothing_mapped = poses == 0 && view->tiles.empty();
+  return is_nothing_mapped || (view->map_id == saved_map_id_ && view->version == saved_version_ &&
+                               poses == saved_poses_);
 }
 
 void MapSaver::save(CheckpointScope scope, bool has_ended) {

@@ -127,7 +127,7 @@ class MapSaver {
   [[nodiscard]] std::optional<SavedMap> load();
   /// Instead of `load`: a map that the file holds is renamed, and the file empty from now on.
   /// Returns the map's new name; nothing where the file holds none. Throws MapFileError.
-  std::optional<std::filesystem::path> put_stored_map_aside();
+  std::optional<std::filesystem::path> set_saved_map_aside();
   /// Backing store of tiles that are evicted from memory; null without a memory limit.
   [[nodiscard]] std::shared_ptr<TileStore> tile_store();
 

@@ -23,7 +23,7 @@ std::size_t tile_cache_bytes(const MapFileConfig& config) {
 
 std::optional<SavedMap> saved_map(MapSaver& saver, const ServerConfig& config) {
   if (!config.map.load_at_start) {
-    if (const auto kept = saver.put_stored_map_aside()) {
+    if (const auto kept = saver.set_saved_map_aside()) {
       spdlog::info("the map in {} is kept as {} (map.load_at_start is false)",
                    config.map.file.string(), kept->string());
     }

@@ -57,7 +57,7 @@ std::optional<Eigen::Isometry3d> pose_in_saved_map(const SharedTrajectory& store
 
 }  // namespace
 
-MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segmenter> label_source,
+MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
                              const std::optional<SavedMap>& stored,
                              const std::shared_ptr<TileStore>& tile_store, ScanQueue& queue,
                              Statistics& statistics, LatestMap& latest_map,
@@ -71,7 +71,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
       latest_map_(latest_map),
       outputs_(outputs),
       mapper_(config.mapper,
-              std::make_unique<AsyncSegmenter>(std::move(label_source), segmentation_budget(config),
+              std::make_unique<AsyncSegmenter>(std::move(segmenter), segmentation_budget(config),
                                                queue, statistics),
               {.stage_ended = [this](std::string_view stage) { stage_ended(stage); },
                .pose_found =
@@ -226,7 +226,7 @@ std::vector<RemovedVoxel> MappingThread::removed(const Eigen::AlignedBox3d& box_
   const TilesOfBox tiles = tiles_of(box_map);
   StaticMap::RemovedVoxels all;
   for (std::span<const TileId> left(tiles.ids); !left.empty();) {
-    run_on_some(left, [&](std::span<const TileId> some) {
+    run_on_some(tiles.map_id, left, [&](std::span<const TileId> some) {
       StaticMap::RemovedVoxels part = mapper_.static_map().removed(box_map, some);
       all.voxels.insert(all.voxels.end(), part.voxels.begin(), part.voxels.end());
       all.non_resident.insert(all.non_resident.end(), part.non_resident.begin(),
@@ -236,14 +236,14 @@ std::vector<RemovedVoxel> MappingThread::removed(const Eigen::AlignedBox3d& box_
   }
   if (tiles.tile_store == nullptr) return std::move(all.voxels);
   // From the disk in the caller's thread.
-  const StaticMapConfig& config = mapper_.static_map().config();
   for (const TileId id : all.non_resident) {
     const TileRecord record = tiles.tile_store->load(id);
     if (record.evidence == nullptr) continue;
-    std::ranges::copy_if(removed_voxels(*record.evidence, config.voxel_size_m, config.tile_size_m),
-                         std::back_inserter(all.voxels), [&](const RemovedVoxel& voxel) {
-                           return box_map.contains(voxel.position_map.cast<double>());
-                         });
+    std::ranges::copy_if(
+        removed_voxels(*record.evidence, map_config_.voxel_size_m, map_config_.tile_size_m),
+        std::back_inserter(all.voxels), [&](const RemovedVoxel& voxel) {
+          return box_map.contains(voxel.position_map.cast<double>());
+        });
   }
   return std::move(all.voxels);
 }
@@ -254,7 +254,7 @@ std::size_t MappingThread::restore_removed(RemovalReason reason, const Eigen::Al
   std::size_t restored = 0;
   for (std::span<const TileId> left(tiles.ids); !left.empty();) {
     bool is_full = false;
-    run_on_some(left, [&](std::span<const TileId> some) {
+    run_on_some(tiles.map_id, left, [&](std::span<const TileId> some) {
       restored += mapper_.static_map().restore_removed(reason, box_map, some);
       is_full = mapper_.static_map().memory_use().bytes > map_limit_bytes_;
       return !is_full;
@@ -270,7 +270,8 @@ MappingThread::TilesOfBox MappingThread::tiles_of(const Eigen::AlignedBox3d& box
   run_between_scans([&] {
     const StaticMap& map = mapper_.static_map();
     const std::size_t resident = map.memory_use().resident_tiles;
-    tiles = {map.tiles_in(box_map, max_stored_tiles + resident + 1), tile_store_};
+    tiles = {latest_map_.view()->map_id, map.tiles_in(box_map, max_stored_tiles + resident + 1),
+             tile_store_};
     // At least so many.
     non_resident = tiles.ids.size() - std::min(resident, tiles.ids.size());
   });
@@ -283,9 +284,12 @@ MappingThread::TilesOfBox MappingThread::tiles_of(const Eigen::AlignedBox3d& box
   return tiles;
 }
 
-void MappingThread::run_on_some(std::span<const TileId>& left,
+void MappingThread::run_on_some(std::uint64_t map_id, std::span<const TileId>& left,
                                 const std::function<bool(std::span<const TileId> some)>& action) {
   run_between_scans([&] {
+    if (latest_map_.view()->map_id != map_id) {
+      throw std::runtime_error("another map began meanwhile; ask again for that one");
+    }
     bool goes_on = true;
     while (!left.empty() && goes_on) {
       const auto some = left.first(std::min(left.size(), tiles_at_once));

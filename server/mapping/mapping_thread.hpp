@@ -46,7 +46,7 @@ class MappingThread : public CheckpointSource {
   /// Resumes `stored` when there is one: its map is extended, and the first scan is expected where
   /// its path ended. Evicted tiles go to `tile_store` and are reloaded from there; when it is null,
   /// none are evicted. Throws std::invalid_argument for a mapper configuration with faults.
-  MappingThread(const ServerConfig& config, std::unique_ptr<Segmenter> label_source,
+  MappingThread(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
                 const std::optional<SavedMap>& stored, const std::shared_ptr<TileStore>& tile_store,
                 ScanQueue& queue, Statistics& statistics, LatestMap& latest_map,
                 const MappingOutputs& outputs);
@@ -130,13 +130,14 @@ class MappingThread : public CheckpointSource {
   void publish_snapshot();
   /// The tiles that meet the box, and where those are stored that are not in memory.
   struct TilesOfBox {
+    std::uint64_t map_id = 0;
     std::vector<TileId> ids;
     std::shared_ptr<TileStore> tile_store;
   };
   [[nodiscard]] TilesOfBox tiles_of(const Eigen::AlignedBox3d& box_map);
   /// Takes tiles from the front of `left` and runs `action` on them in the thread that maps, until
-  /// a scan waits or it returns false.
-  void run_on_some(std::span<const TileId>& left,
+  /// a scan waits or it returns false. Throws std::runtime_error where the map is another one now.
+  void run_on_some(std::uint64_t map_id, std::span<const TileId>& left,
                    const std::function<bool(std::span<const TileId> some)>& action);
   /// Runs `action` in the thread that maps, after the scan in work, and waits for its end.
   void run_between_scans(std::function<void()> action);

@@ -127,16 +127,19 @@ bool TilePublisher::last_burst_acknowledged() {
 
 void TilePublisher::publish_tile(const std::shared_ptr<const Tile>& tile,
                                  const dds::MapIdentity& identity) {
+  std::uint64_t revision = tile->info.revision;
   // Keep-last writers always have room.
   try {
     const auto whole = reader_.read(tile);
     static_cast<void>(tiles_.write(wire::to_wire(*whole, identity)));
     token_bucket_.consume(message_bytes(*whole));
   } catch (const std::runtime_error&) {
-    // On the disk, and changed since or not to be read: the entry alone. A later view has it.
+    // On the disk, and changed since or not to be read now: the entry alone. The tile follows when
+    // it changes, or is in the window when that moves.
+    revision = 0;
   }
   static_cast<void>(index_.write(wire::to_wire(tile->info, identity)));
-  published_[tile->info.id] = {tile->info.revision, ++publications_};
+  published_[tile->info.id] = {revision, ++publications_};
   pending_.erase(tile->info.id);
 }
 

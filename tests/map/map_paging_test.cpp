@@ -248,13 +248,15 @@ class FaultyTileStore : public TileStore {
   FaultyTileStore(std::shared_ptr<TileStore> sound, TileId lost)
       : sound_(std::move(sound)), lost_(lost) {}
   TileRecord load(TileId id) override {
-    if (id == lost_) throw std::runtime_error("the disk is broken");
+    if (id == lost_ && !is_mended_) throw std::runtime_error("the disk is broken");
     return sound_->load(id);
   }
+  void mend() { is_mended_ = true; }
 
  private:
   std::shared_ptr<TileStore> sound_;
   TileId lost_;
+  bool is_mended_ = false;
 };
 
 TEST(MapPaging, ATileThatCannotBeReadStaysAsItIsStored) {
@@ -265,7 +267,8 @@ TEST(MapPaging, ATileThatCannotBeReadStaysAsItIsStored) {
 
   const auto store = open_map_file(folder / "map.stillmap");
   StaticMap after{StaticMapConfig{}};
-  after.use_tile_store(std::make_shared<FaultyTileStore>(store->tile_store(), TileId{2, 0}));
+  const auto faulty = std::make_shared<FaultyTileStore>(store->tile_store(), TileId{2, 0});
+  after.use_tile_store(faulty);
   const SavedMap non_resident = store->load_non_resident();
   after.resume(non_resident.view, non_resident.tile_evidence);
   Drive drive(after);
@@ -277,6 +280,10 @@ TEST(MapPaging, ATileThatCannotBeReadStaysAsItIsStored) {
                               [](const auto& tile) { return tile->info.id; });
   };
   EXPECT_EQ(tile_of(store->load())->info.content_hash, tile_of(whole)->info.content_hash);
+  // A disk that recovers is noticed.
+  faulty->mend();
+  for (int scan = 0; scan < 30; ++scan) drive.see(scan % 10);
+  EXPECT_THAT(after.unreadable_tiles(), testing::IsEmpty());
 }
 
 TEST(MapPaging, AFileOfTheFirstFormatIsReadAndUpgradedByTheFirstSave) {

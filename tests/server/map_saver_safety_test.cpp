@@ -167,7 +167,7 @@ TEST_F(MapSaverSafetyTest, AMapThatIsNotResumedIsKept) {
   save_far_map("city.stillmap");
   MapSaver saver = this->saver();
   saver.set_source(source_);
-  const auto kept = saver.put_stored_map_aside();
+  const auto kept = saver.set_saved_map_aside();
   ASSERT_TRUE(kept);
   map_scan(5.0F);
   saver.save_if_changed();

@@ -199,6 +199,29 @@ TEST_F(MapSaverTest, NamesOfOtherFilesAreRefused) {
   EXPECT_EQ(open_map_file(folder_ / "map.stillmap")->load().view.tiles.size(), 2U);
 }
 
+TEST_F(MapSaverTest, SavesWhatChangedBeforeTheFirstScan) {
+  map_scan(5.0F);
+  {
+    MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
+    saver.set_source(source_);
+    saver.save_as("");
+  }
+  LatestMap resumed;
+  test::LatestMapSource source(resumed);
+  MapSaver saver(resumed, statistics_, folder_ / "map.stillmap", {});
+  saver.set_source(source);
+  const SavedMap stored = *saver.load();
+  map_.reset(stored.view.map_id);
+  map_.resume(stored.view, stored.tile_evidence);
+  resumed.begin(map_.view(), stored.trajectory);
+  // As removed voxels that an operator restores.
+  map_.insert(scan_of(50.0F), Eigen::Isometry3d::Identity());
+  resumed.publish(map_.view());
+  EXPECT_EQ(resumed.poses_added(), 0U);
+  saver.save_as("");
+  EXPECT_EQ(open_map_file(folder_ / "map.stillmap")->load().view.tiles.size(), 2U);
+}
+
 /// A map whose tiles are stored as the mapping thread has them stored.
 class StaticMapSource : public CheckpointSource {
  public:
@@ -212,9 +235,14 @@ class StaticMapSource : public CheckpointSource {
   }
   void checkpoint_stored(std::uint64_t step) override { map_.checkpoint_stored(step); }
   void checkpoint_failed() override {}
-  [[nodiscard]] MemoryUse memory_use() override { return map_.memory_use(); }
+  [[nodiscard]] MemoryUse memory_use() override {
+    return use_bytes_ > 0 ? MemoryUse{.bytes = use_bytes_} : map_.memory_use();
+  }
+  /// Says from now on that the map takes so much.
+  void use(std::size_t bytes) { use_bytes_ = bytes; }
 
  private:
+  std::size_t use_bytes_ = 0;
   StaticMap& map_;
   LatestMap& latest_map_;
 };
@@ -223,6 +251,7 @@ class StaticMapSource : public CheckpointSource {
 class StandingRobot : public MapSaverTest {
  protected:
   static constexpr std::uint32_t mib_per_hour = 1;
+  static constexpr std::uint32_t paged_limit_mib = 512;
 
   StandingRobot() { saver_.set_source(static_source_); }
 
@@ -255,7 +284,11 @@ class StandingRobot : public MapSaverTest {
   std::filesystem::path file_ = folder_ / "map.stillmap";
   test::ManualClock clock_;
   StaticMapSource static_source_{map_, latest_map_};
-  MapSaver saver_{latest_map_, statistics_, file_, {}, {.standing_mib_per_hour = mib_per_hour},
+  MapSaver saver_{latest_map_,
+                  statistics_,
+                  file_,
+                  {},
+                  {.memory_limit_mib = paged_limit_mib, .standing_mib_per_hour = mib_per_hour},
                   clock_};
 };
 
@@ -269,6 +302,22 @@ TEST_F(StandingRobot, WritesNoMoreThanItsAllowance) {
   clock_.advance(std::chrono::hours(1));
   scan_and_save(20);
   EXPECT_GT(stored().trajectory.size(), quiet.trajectory.size() + 50);
+}
+
+TEST_F(StandingRobot, KeepsToItsAllowanceWithAMapThatIsLargerThanItsMemory) {
+  // Eviction keeps such a map between these shares of the limit.
+  const std::size_t limit_bytes = std::size_t{paged_limit_mib} << 20;
+  for (const double share : {0.57, 0.65}) {
+    static_source_.use(static_cast<std::size_t>(share * static_cast<double>(limit_bytes)));
+    stand();
+    const std::size_t quiet = stored().trajectory.size();
+    for (int i = 0; i < 50; ++i) scan_and_save(20);
+    EXPECT_EQ(stored().trajectory.size(), quiet) << share;
+  }
+  // What is not stored is in eviction's way.
+  static_source_.use(limit_bytes * 7 / 10);
+  scan_and_save(20);
+  EXPECT_EQ(stored().trajectory.size(), latest_map_.trajectory().size());
 }
 
 TEST_F(StandingRobot, StoresAtOnceWhatItSeesAppear) {
