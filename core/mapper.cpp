@@ -27,9 +27,9 @@ std::string MapperConfig::faults() const {
   return sensor.faults() + odometry.faults() + static_map.faults();
 }
 
-Mapper::Mapper(const MapperConfig& config, std::unique_ptr<Segmenter> label_source,
+Mapper::Mapper(const MapperConfig& config, std::unique_ptr<Segmenter> segmenter,
                MapperListeners listeners)
-    : Mapper(config, std::make_unique<BlockingSegmenter>(std::move(label_source)),
+    : Mapper(config, std::make_unique<BlockingSegmenter>(std::move(segmenter)),
              std::move(listeners)) {}
 
 Mapper::Mapper(const MapperConfig& config, std::unique_ptr<SegmentationPipeline> segmentation,

@@ -81,7 +81,7 @@ struct MapperListeners {
 class Mapper {
  public:
   /// Throws std::invalid_argument with `config.faults()`.
-  Mapper(const MapperConfig& config, std::unique_ptr<Segmenter> label_source,
+  Mapper(const MapperConfig& config, std::unique_ptr<Segmenter> segmenter,
          MapperListeners listeners = {});
   /// With labels that may come late: see LabelSynchronizer.
   Mapper(const MapperConfig& config, std::unique_ptr<SegmentationPipeline> segmentation,

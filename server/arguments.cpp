@@ -58,9 +58,12 @@ void add_operation_options(CLI::App& program, OperationArguments& operation) {
 
 /// Throws ConfigError with every fault, or ModelError.
 Arguments check_config(const std::string& file) {
-  const ServerConfig config = load_server_config(file);
+  ConfigReport report;
+  const ServerConfig config = load_server_config(file, report);
   const auto labels = open_segmenter(config.labels, config.mapper.sensor, true);
   std::cout << file << " can be used; labels by " << labels->name() << "\n";
+  if (report.changed.empty()) std::cout << "all is as by default\n";
+  for (const std::string& field : report.changed) std::cout << "not the default: " << field << "\n";
   return {.config = std::nullopt};
 }
 

@@ -115,9 +115,7 @@ std::string Interface::no_input_reason() const {
 
 dds::ServerStatus Interface::status() const {
   dds::ServerStatus status = report_.status();
-  for (const auto& [name, value] : participant_.service_faults().counts()) {
-    status.counters.push_back({.name = name, .value = value});
-  }
+  status.service_faults = participant_.service_faults().counts();
   return status;
 }
 

@@ -10,6 +10,7 @@
 #include "idl/dds/participant.hpp"
 #include "idl/dds/service_client.hpp"
 #include "idl/dds/transports.hpp"
+#include "idl/interface/participant_diagnostics.hpp"
 #include "idl/interface/services.hpp"
 #include "idl/interface/topics.hpp"
 #include "stillmap_msgs.h"
@@ -104,6 +105,7 @@ std::vector<OtherDomain> inspect_domains(const DoctorOptions& options,
     if (participants.size() == max_other_domains) continue;
     dds::DdsOptions dds = options.dds;
     dds.domain_id = id;
+    dds.participant_name = dds::survey_participant;
     // Leaves no segments in /dev/shm.
     dds.shared_memory = false;
     participants.push_back(std::make_unique<dds::Participant>(dds));

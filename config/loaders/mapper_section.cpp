@@ -107,9 +107,9 @@ void read_static_map(YamlSection section, StaticMapConfig& static_map) {
   section.integer("clearing_interval", static_map.clearing_interval, {1, 1000});
   section.integer("misses_to_clear", static_map.misses_to_clear, {1, 1000});
   section.integer("misses_per_hit", static_map.misses_per_hit, {1, 1000});
-  section.number("clear_range_m", static_map.clearing_range_m, {0, 1000});
-  section.number("clear_margin_m", static_map.clearing_margin_m, {0.01, 100});
-  section.number("clear_margin_share", static_map.clearing_margin_share, {0, 1});
+  section.number("clearing_range_m", static_map.clearing_range_m, {0, 1000});
+  section.number("clearing_margin_m", static_map.clearing_margin_m, {0.01, 100});
+  section.number("clearing_margin_share", static_map.clearing_margin_share, {0, 1});
   section.faults(static_map.faults());
 }
 

@@ -235,10 +235,10 @@ void read_occupancy(YamlSection section, OccupancyServiceConfig& occupancy) {
   section.boolean("enabled", occupancy.enabled);
   section.number("resolution_m", map.resolution_m, {0.02, 10});
   section.number("max_range_m", map.max_range_m, {1, 300});
-  section.number("clear_range_m", map.clear_range_m, {0, 300});
+  section.number("clearing_range_m", map.clearing_range_m, {0, 300});
   section.integer("clearing_interval", map.clearing_interval, {1, 1000});
-  section.number("clear_margin_m", map.clear_margin_m, {0, 100});
-  section.number("clear_margin_share", map.clear_margin_share, {0, 0.9});
+  section.number("clearing_margin_m", map.clearing_margin_m, {0, 100});
+  section.number("clearing_margin_share", map.clearing_margin_share, {0, 0.9});
   section.number("hit_probability", map.hit_probability, {0.501, 0.99});
   section.number("miss_probability", map.miss_probability, {0.01, 0.499});
   section.integer("queue_length", occupancy.queue_length, {1, 1000});

@@ -18,12 +18,7 @@ Cell cell_of(const Eigen::Vector3f& point, double cell_size_m) {
   return (point.cast<double>() / cell_size_m).array().floor().cast<int>();
 }
 
-// 21 bits an axis: 0.17 m cells reach 180 km from the origin.
-std::uint64_t key(const Cell& cell) {
-  constexpr std::uint64_t mask = (1U << 21U) - 1U;
-  const auto part = [](int value) { return static_cast<std::uint64_t>(value) & mask; };
-  return part(cell.x()) << 42U | part(cell.y()) << 21U | part(cell.z());
-}
+std::uint64_t key(const Cell& cell) { return packed_index(cell.x(), cell.y(), cell.z()); }
 
 // Radius search over map points, hashed into cells as large as the radius: all neighbours of a
 // point lie in the 27 cells around it.
@@ -55,7 +50,7 @@ class RadiusSearch {
   }
 
   double radius_m_;
-  std::unordered_map<std::uint64_t, std::vector<Eigen::Vector3f>> cells_;
+  std::unordered_map<std::uint64_t, std::vector<Eigen::Vector3f>, IndexHash> cells_;
 };
 
 std::optional<double> ratio(std::uint64_t part, std::uint64_t whole) {

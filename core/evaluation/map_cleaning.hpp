@@ -7,6 +7,8 @@
 #include <unordered_map>
 #include <vector>
 
+#include "core/lidar/voxel_index.hpp"
+
 namespace stillmap::evaluation {
 
 /// Ground truth of a map, from labelled scans at known poses: voxels with the number of moving,
@@ -33,7 +35,7 @@ class MapTruth {
 
  private:
   double voxel_size_m_;
-  std::unordered_map<std::uint64_t, Voxel> voxels_;
+  std::unordered_map<std::uint64_t, Voxel, IndexHash> voxels_;
 };
 
 /// Preservation and rejection rate of a cleaned map (H. Lim et al., ERASOR, RA-L 2021): a true

@@ -38,18 +38,18 @@ bool slides(const std::vector<Anchor>& right, const Anchor& now, const WrongPose
          limits.drift_share * (now.path_m - base.path_m);
 }
 
-bool is_called_good(const JudgedPose& pose) {
+bool is_called_good(const EvaluatedPose& pose) {
   return pose.health == OdometryHealth::good || pose.health == OdometryHealth::initialised;
 }
 
 }  // namespace
 
-std::vector<bool> wrong_poses(std::span<const JudgedPose> poses, const WrongPoseLimits& limits) {
+std::vector<bool> wrong_poses(std::span<const EvaluatedPose> poses, const WrongPoseLimits& limits) {
   std::vector<bool> wrong;
   wrong.reserve(poses.size());
   std::vector<Anchor> right;
   std::optional<Anchor> last;
-  for (const JudgedPose& pose : poses) {
+  for (const EvaluatedPose& pose : poses) {
     if (!pose.T_world_lidar_true || !pose.T_map_lidar.matrix().allFinite()) {
       wrong.push_back(true);
       continue;
@@ -69,7 +69,7 @@ std::vector<bool> wrong_poses(std::span<const JudgedPose> poses, const WrongPose
   return wrong;
 }
 
-HealthScore health_score(std::span<const JudgedPose> poses, const WrongPoseLimits& limits) {
+HealthScore health_score(std::span<const EvaluatedPose> poses, const WrongPoseLimits& limits) {
   const std::vector<bool> wrong = wrong_poses(poses, limits);
   HealthScore score;
   score.poses = poses.size();

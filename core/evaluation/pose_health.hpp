@@ -11,7 +11,7 @@
 namespace stillmap::evaluation {
 
 /// What odometry said of one scan, beside the truth.
-struct JudgedPose {
+struct EvaluatedPose {
   /// Pose of the lidar in any fixed frame; nothing where every pose is wrong, as for scans of a
   /// place that has nothing to do with the map.
   std::optional<Eigen::Isometry3d> T_world_lidar_true;
@@ -39,7 +39,7 @@ struct WrongPoseLimits {
 
 /// For every pose, in time order, whether it is wrong. The first one that has a truth is right by
 /// definition: it is where the map begins. A pose that is not finite is wrong.
-[[nodiscard]] std::vector<bool> wrong_poses(std::span<const JudgedPose> poses,
+[[nodiscard]] std::vector<bool> wrong_poses(std::span<const EvaluatedPose> poses,
                                             const WrongPoseLimits& limits = {});
 
 /// How far the health of poses can be believed. `degenerate` counts as neither good nor bad.
@@ -52,7 +52,7 @@ struct HealthScore {
   std::vector<std::size_t> right_called_bad;
 };
 
-[[nodiscard]] HealthScore health_score(std::span<const JudgedPose> poses,
+[[nodiscard]] HealthScore health_score(std::span<const EvaluatedPose> poses,
                                        const WrongPoseLimits& limits = {});
 
 }  // namespace stillmap::evaluation

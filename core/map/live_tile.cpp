@@ -15,7 +15,7 @@ namespace {
 constexpr std::uint16_t max_misses = 1000;
 /// So many points are looked up before they are added: their voxels are on their way meanwhile.
 constexpr std::size_t block_size = 64;
-constexpr std::uint32_t most_counted = std::numeric_limits<std::uint16_t>::max();
+constexpr std::uint32_t max_count = std::numeric_limits<std::uint16_t>::max();
 
 /// The first format does not store hits: the maximum is assumed, so that the voxel is not cleared
 /// too early.
@@ -151,14 +151,14 @@ void LiveTile::hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan)
   packed.evidence.add(point.label, point.confidence);
   voxel.last_scan = scan;
   if (point.motion == Motion::semi_static) return;
-  if (is_new_scan && voxel.hits < most_counted) ++voxel.hits;
+  if (is_new_scan && voxel.hits < max_count) ++voxel.hits;
   if (packed.point_count < PackedVoxel::max_mean_points) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       packed.offset_sum[axis] =
           static_cast<std::uint16_t>(packed.offset_sum[axis] + point.offset[axis]);
     }
   }
-  if (packed.point_count < most_counted) ++packed.point_count;
+  if (packed.point_count < max_count) ++packed.point_count;
 }
 
 void LiveTile::exclude(const TilePoint& point, std::uint32_t scan) {
@@ -199,7 +199,7 @@ bool LiveTile::is_seen_through(const LiveVoxel& voxel, const VisibilityRule& rul
 
 bool LiveTile::is_shown(const LiveVoxel& voxel, const VisibilityRule& rule) {
   if (voxel.is_restored != 0) return true;
-  return voxel.packed.point_count >= std::min(rule.min_points, most_counted) &&
+  return voxel.packed.point_count >= std::min(rule.min_points, max_count) &&
          !is_movable(voxel.packed.evidence.winner()) && !is_seen_through(voxel, rule);
 }
 
@@ -301,7 +301,7 @@ std::size_t LiveTile::restore_excluded(RemovalReason reason, const Eigen::Aligne
     if (reason_of(excluded) != reason || size() >= PositionIndex::max_entries) continue;
     if (!box_map.contains(centre_map(key).cast<double>())) continue;
     LiveVoxel& voxel = add_fresh(key);
-    voxel.packed.point_count = static_cast<std::uint16_t>(std::min(rule.min_points, most_counted));
+    voxel.packed.point_count = static_cast<std::uint16_t>(std::min(rule.min_points, max_count));
     voxel.packed.offset_sum.fill(
         static_cast<std::uint16_t>(voxel.packed.mean_points() * (PackedVoxel::offset_steps / 2)));
     voxel.packed.evidence.add(excluded.label, 1.0F);

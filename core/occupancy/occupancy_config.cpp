@@ -16,10 +16,10 @@ std::string outside(const char* field, double value, double low, double high, co
 std::string OccupancyConfig::faults() const {
   std::string text = outside("resolution_m", resolution_m, 0.02, 10.0, " m");
   text += outside("max_range_m", max_range_m, 1.0, 300.0, " m");
-  text += outside("clear_range_m", clear_range_m, 0.0, 300.0, " m");
+  text += outside("clearing_range_m", clearing_range_m, 0.0, 300.0, " m");
   text += outside("clearing_interval", clearing_interval, 1.0, 1000.0, "");
-  text += outside("clear_margin_m", clear_margin_m, 0.0, 100.0, " m");
-  text += outside("clear_margin_share", clear_margin_share, 0.0, 0.9, "");
+  text += outside("clearing_margin_m", clearing_margin_m, 0.0, 100.0, " m");
+  text += outside("clearing_margin_share", clearing_margin_share, 0.0, 0.9, "");
   text += outside("hit_probability", hit_probability, 0.501, 0.99, "");
   text += outside("miss_probability", miss_probability, 0.01, 0.499, "");
   return text;

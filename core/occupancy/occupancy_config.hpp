@@ -13,13 +13,13 @@ struct OccupancyConfig {
   /// Points beyond this range do not mark voxels as occupied.
   double max_range_m = 60.0;
   /// Rays mark the voxels that they traverse as free up to this range; 0 disables clearing.
-  double clear_range_m = 25.0;
+  double clearing_range_m = 25.0;
   /// One scan in this many clears: consecutive scans traverse nearly the same voxels.
   std::uint32_t clearing_interval = 3;
   /// Clearing ends this far, plus this share of the range, before the ray's point: near its end a
   /// ray grazes the surface that it hits.
-  double clear_margin_m = 0.5;
-  double clear_margin_share = 0.02;
+  double clearing_margin_m = 0.5;
+  double clearing_margin_share = 0.02;
   /// Inverse sensor model: occupancy probability given a hit, and given a ray that traverses the
   /// voxel.
   double hit_probability = 0.7;

@@ -118,7 +118,8 @@ void OccupancyMap::compute_update(const LabelledScan& scan, const Eigen::Isometr
                                   const ScanUpdateOptions& use, const ThrottleCallback& throttle) {
   ScanUpdateOptions options = use;
   const bool is_due = state_->scans++ % state_->config.clearing_interval == 0;
-  options.clear_free_space = use.clear_free_space && is_due && state_->config.clear_range_m > 0.0;
+  options.clear_free_space =
+      use.clear_free_space && is_due && state_->config.clearing_range_m > 0.0;
   state_->begin_update();
   compute_scan_update(state_->config, scan, T_map_lidar, options, state_->bricks, throttle);
   state_->pending = state_->bricks.sorted();

@@ -50,8 +50,8 @@ class HitsAndMisses {
 
   void clear_towards(const Eigen::Vector3d& p_lidar) {
     const double range_m = p_lidar.norm();
-    const double margin_m = config_.clear_margin_m + config_.clear_margin_share * range_m;
-    const double length_m = std::min(range_m - margin_m, config_.clear_range_m);
+    const double margin_m = config_.clearing_margin_m + config_.clearing_margin_share * range_m;
+    const double length_m = std::min(range_m - margin_m, config_.clearing_range_m);
     // Negated so that NaN fails.
     if (!(length_m > 0.0) || !std::isfinite(range_m)) return;
     const Eigen::Vector3d direction = T_map_lidar_.linear() * (p_lidar / range_m);

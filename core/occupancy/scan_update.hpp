@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
+#include "core/lidar/voxel_index.hpp"
 #include "core/map/throttle_callback.hpp"
 #include "core/occupancy/occupancy_config.hpp"
 #include "core/occupancy/octree_grid.hpp"
@@ -52,11 +53,6 @@ class VoxelBricks {
   [[nodiscard]] std::span<const VoxelBrick> sorted();
 
  private:
-  /// Spreads neighbouring bricks over the table.
-  struct KeyHash {
-    std::size_t operator()(std::uint64_t key) const { return key * 0x9E3779B97F4A7C15ULL >> 20U; }
-  };
-
   static constexpr std::uint64_t no_key = ~std::uint64_t{0};
 
   /// Octant or child index: one bit of each coordinate.
@@ -74,7 +70,7 @@ class VoxelBricks {
   [[nodiscard]] VoxelBrick& find_or_make(std::uint64_t key);
 
   std::vector<VoxelBrick> bricks_;
-  tsl::robin_map<std::uint64_t, std::uint32_t, KeyHash> index_;
+  tsl::robin_map<std::uint64_t, std::uint32_t, IndexHash> index_;
   std::uint64_t last_key_ = no_key;
   std::uint32_t last_ = 0;
 };

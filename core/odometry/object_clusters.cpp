@@ -7,6 +7,8 @@
 #include <numeric>
 #include <optional>
 
+#include "core/lidar/voxel_index.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -39,12 +41,6 @@ std::uint64_t key_of(const Eigen::Vector3i& index, std::uint64_t kind) {
   return kind << 60 | part(index.x()) << 40 | part(index.y()) << 20 | part(index.z());
 }
 
-struct KeyHash {
-  std::size_t operator()(std::uint64_t key) const noexcept {
-    return (key * 0x9e3779b97f4a7c15ULL) >> 16;
-  }
-};
-
 /// Disjoint sets of cubes.
 class Sets {
  public:
@@ -61,7 +57,7 @@ class Sets {
   std::vector<std::uint32_t> parent_;
 };
 
-using CubeTable = tsl::robin_map<std::uint64_t, std::uint32_t, KeyHash>;
+using CubeTable = tsl::robin_map<std::uint64_t, std::uint32_t, IndexHash>;
 
 void join_neighbours(const std::vector<Cube>& cubes, const CubeTable& table, Sets& sets) {
   for (std::uint32_t c = 0; c < cubes.size(); ++c) {

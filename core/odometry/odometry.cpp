@@ -33,10 +33,10 @@ constexpr double max_relocalization_reach_m = 60.0;
 constexpr double gap_acceleration_m_s2 = 1.5;
 /// Fewer static features than this are helped out by parked vehicles.
 constexpr std::size_t min_static_features = 100;
-/// Objects are judged again where the registered pose is farther than this from the predicted one
-/// [m, rad].
-constexpr double judge_again_distance_m = 0.2;
-constexpr double judge_again_angle_rad = 0.01;
+/// What moves is classified again where the registered pose is farther than this from the predicted
+/// one [m, rad].
+constexpr double reclassify_distance_m = 0.2;
+constexpr double reclassify_angle_rad = 0.01;
 
 bool is_registered_by_surfaces(const SensorModel& sensor, const OdometryConfig& config) {
   if (sensor.pattern == ScanPattern::irregular) return true;
@@ -100,10 +100,10 @@ struct Odometry::State {
   /// The pose, and the features that it was found by: few of them where these fit.
   [[nodiscard]] OdometryResult find_pose(ScanInParts& parts, const PosePrediction& prediction,
                                          FeatureSets& features) const;
-  /// Judges what moves at the registered pose where the predicted one was far from it, and
+  /// Classifies what moves at the registered pose where the predicted one was far from it, and
   /// registers again without that.
-  void judge_again(ScanInParts& parts, const Eigen::Isometry3d& T_map_lidar_predicted,
-                   FeatureSets& features, OdometryResult& result) const;
+  void reclassify_motion(ScanInParts& parts, const Eigen::Isometry3d& T_map_lidar_predicted,
+                         FeatureSets& features, OdometryResult& result) const;
   [[nodiscard]] OdometryResult estimate_pose(const FeatureSets& features,
                                              const PosePrediction& prediction) const;
   /// Asks the points for a second opinion, and the limits; the paper has neither.
@@ -196,7 +196,7 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
                       relocalization_reach_m);
   }
   // Until the place is known, few features tell it sooner.
-  OdometryResult found = search_pose(lost_scans > 0 ? thinned(features) : features, map, last,
+  OdometryResult found = search_pose(lost_scans > 0 ? downsampled(features) : features, map, last,
                                      prediction, fits, config);
   if (lost_scans > 0 && found.health != OdometryHealth::lost)
     found = register_features(features, map, found.T_map_lidar, config, found.sweep_correction);
@@ -264,12 +264,12 @@ OdometryResult Odometry::State::find_pose(ScanInParts& parts, const PosePredicti
   return estimate_pose(features, prediction);
 }
 
-void Odometry::State::judge_again(ScanInParts& parts,
-                                  const Eigen::Isometry3d& T_map_lidar_predicted,
-                                  FeatureSets& features, OdometryResult& result) const {
+void Odometry::State::reclassify_motion(ScanInParts& parts,
+                                        const Eigen::Isometry3d& T_map_lidar_predicted,
+                                        FeatureSets& features, OdometryResult& result) const {
   if (!parts.view || !started || result.health == OdometryHealth::lost) return;
   const PoseTangent off = boxminus(result.T_map_lidar, T_map_lidar_predicted);
-  if (off.head<3>().norm() < judge_again_distance_m && off.tail<3>().norm() < judge_again_angle_rad)
+  if (off.head<3>().norm() < reclassify_distance_m && off.tail<3>().norm() < reclassify_angle_rad)
     return;
   parts.view->move_to(result.T_map_lidar);
   parts.motion_classes = classify(parts.scan, parts.objects, parts.view, result.T_map_lidar);
@@ -348,17 +348,17 @@ void Odometry::State::confirm_place(const FeatureSets& features, const PosePredi
     const bool is_followed = lost_scans == 0 && distance_m < std::clamp(reach_m, 3.0, 15.0);
     if (!is_followed) stretch->jump(distance_m);
   }
-  using enum UnconfirmedStretch::Verdict;
-  const auto verdict = stretch->judge(features, config, result);
-  if (verdict == confirmed) {
+  using enum UnconfirmedStretch::Decision;
+  const auto decision = stretch->evaluate(features, config, result);
+  if (decision == confirmed) {
     UnconfirmedStretch::Trusted trusted = stretch->take_trusted();
     map = std::move(trusted.map);
     fits = trusted.fits;
   }
-  if (verdict == confirmed || verdict == settled) return stretch.reset();
+  if (decision == confirmed || decision == settled) return stretch.reset();
   result.is_confirmed = false;
   result.health = OdometryHealth::degenerate;
-  if (verdict == open) return;
+  if (decision == open) return;
   forget_stretch();
   result = lost_at(last.T_map_lidar);
 }
@@ -453,7 +453,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   Step step;
   FeatureSets features;
   step.result = state.find_pose(parts, prediction, features);
-  state.judge_again(parts, T_map_lidar_predicted, features, step.result);
+  state.reclassify_motion(parts, T_map_lidar_predicted, features, step.result);
   state.confirm(features, prediction, step.result);
   state.confirm_place(features, prediction, step.result);
   if (state.first_scan) state.straighten_first_scan(features, time_ns, sweep, step.result);

@@ -146,7 +146,7 @@ OdometryResult relocalize(const FeatureSets& features, std::span<const LabelledP
   try_coarsely_from(features, T_map_lidar_guess, search);
   if (search.best().share >= sure_match_ratio) return search.best().result;
   // Few features tell the place sooner.
-  const FeatureSets few = thinned(features);
+  const FeatureSets few = downsampled(features);
   Search places(few, map, config);
   places.try_from(search.best().share > 0.0 ? search.best().result.T_map_lidar : T_map_lidar_guess);
   for (const Eigen::Isometry3d& T :

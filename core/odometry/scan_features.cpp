@@ -63,16 +63,16 @@ FeatureSets ScanFeatures::of_map(const UsablePoints& usable,
   return sets;
 }
 
-FeatureSets thinned(FeatureSets features) {
+FeatureSets downsampled(FeatureSets features) {
   constexpr std::size_t enough = 1000;
-  const auto thin = [](std::vector<FeaturePoint>& points) {
+  const auto downsample = [](std::vector<FeaturePoint>& points) {
     if (points.size() <= enough) return;
     for (std::size_t k = 0; k < enough; ++k) points[k] = points[k * points.size() / enough];
     points.resize(enough);
   };
-  thin(features.edges);
-  thin(features.planes);
-  thin(features.surfaces);
+  downsample(features.edges);
+  downsample(features.planes);
+  downsample(features.surfaces);
   return features;
 }
 

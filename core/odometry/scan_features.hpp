@@ -67,7 +67,7 @@ class ScanFeatures {
 };
 
 /// Enough features to find a place by.
-[[nodiscard]] FeatureSets thinned(FeatureSets features);
+[[nodiscard]] FeatureSets downsampled(FeatureSets features);
 
 /// Adds edges and planes to the map, compensated for `sweep_twist` beyond what they were, and
 /// removes what is far from the lidar.

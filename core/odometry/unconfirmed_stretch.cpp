@@ -51,23 +51,23 @@ void UnconfirmedStretch::add_prior_map(std::span<const LabelledPoint> points_map
   insert_prior_map(points_map, trusted_.map);
 }
 
-UnconfirmedStretch::Verdict UnconfirmedStretch::judge(const FeatureSets& features,
-                                                      const OdometryConfig& config,
-                                                      OdometryResult& found) {
+UnconfirmedStretch::Decision UnconfirmedStretch::evaluate(const FeatureSets& features,
+                                                          const OdometryConfig& config,
+                                                          OdometryResult& found) {
   ++scans_since_jump_;
   count_good(found);
   if (found.health != OdometryHealth::good) {
     count_agreeing(false, found.T_map_lidar.translation());
     count_contradicting(false);
-    return is_overdue() ? Verdict::contradicted : Verdict::open;
+    return is_overdue() ? Decision::contradicted : Decision::open;
   }
   OdometryResult in_trusted_map =
       register_features(features, trusted_.map, found.T_map_lidar, config, found.sweep_correction);
   if (in_trusted_map.health == OdometryHealth::good)
     in_trusted_map = confirmed_by_points(in_trusted_map, features, trusted_.map, config);
-  const Verdict verdict = this->verdict(in_trusted_map, found);
-  if (verdict == Verdict::confirmed) found = in_trusted_map;
-  return verdict;
+  const Decision decision = decide(in_trusted_map, found);
+  if (decision == Decision::confirmed) found = in_trusted_map;
+  return decision;
 }
 
 bool UnconfirmedStretch::is_overdue() const {
@@ -89,7 +89,7 @@ void UnconfirmedStretch::count_agreeing(bool agrees, const Eigen::Vector3d& posi
   agreed_at_map_ = position_map;
 }
 
-UnconfirmedStretch::Verdict UnconfirmedStretch::verdict(const OdometryResult& in_trusted_map,
+UnconfirmedStretch::Decision UnconfirmedStretch::decide(const OdometryResult& in_trusted_map,
                                                         const OdometryResult& found) {
   const PoseTangent off = boxminus(in_trusted_map.T_map_lidar, found.T_map_lidar);
   const auto is_within = [&off](double distance_m, double angle_rad) {
@@ -98,22 +98,22 @@ UnconfirmedStretch::Verdict UnconfirmedStretch::verdict(const OdometryResult& in
   const bool stands = stands_on_trusted_map(in_trusted_map);
   const bool agrees = stands && trusted_.fits.confirms(in_trusted_map);
   if (agrees && !has_jumped_ && is_within(followed_distance_m, followed_angle_rad))
-    return Verdict::confirmed;
+    return Decision::confirmed;
   const bool is_same =
       (has_jumped_ ? agrees : stands) && is_within(same_distance_m, same_angle_rad);
   if (agrees && is_same && !has_jumped_far_ && trusted_.fits.fits(in_trusted_map))
-    return Verdict::confirmed;
+    return Decision::confirmed;
   count_agreeing(is_same, found.T_map_lidar.translation());
   if (agreeing_scans_ >= confirming_scans &&
       (!has_jumped_ || agreeing_path_m_ >= confirming_path_m))
-    return Verdict::confirmed;
+    return Decision::confirmed;
   // One that drives out of the trusted map fits it less and less, and stays where it puts it.
   const bool stays =
       in_trusted_map.health == OdometryHealth::good && is_within(same_distance_m, same_angle_rad);
   count_contradicting(!stays && in_trusted_map.overlap >= min_contradicting_overlap &&
                       (has_jumped_ || !trusted_.fits.believes(in_trusted_map)));
-  if (is_overdue() || contradicting_scans_ >= contradicting_scans) return Verdict::contradicted;
-  return !has_jumped_ && good_path_m_ >= settling_path_m ? Verdict::settled : Verdict::open;
+  if (is_overdue() || contradicting_scans_ >= contradicting_scans) return Decision::contradicted;
+  return !has_jumped_ && good_path_m_ >= settling_path_m ? Decision::settled : Decision::open;
 }
 
 }  // namespace stillmap

@@ -22,7 +22,7 @@ class UnconfirmedStretch {
     ScanIntervals intervals;
     FitStatistics fits;
   };
-  enum class Verdict {
+  enum class Decision {
     /// The scan lies on the trusted map.
     confirmed,
     /// The trusted map does not tell, or not yet.
@@ -42,8 +42,8 @@ class UnconfirmedStretch {
 
   /// Judges the stretch by a scan that was registered at `found`; one that is degenerate itself
   /// tells nothing. Where it is confirmed, `found` becomes the pose in the trusted map.
-  [[nodiscard]] Verdict judge(const FeatureSets& features, const OdometryConfig& config,
-                              OdometryResult& found);
+  [[nodiscard]] Decision evaluate(const FeatureSets& features, const OdometryConfig& config,
+                                  OdometryResult& found);
 
   /// Points that were stored before the stretch, and are near only now.
   void add_prior_map(std::span<const LabelledPoint> points_map);
@@ -52,7 +52,7 @@ class UnconfirmedStretch {
 
  private:
   [[nodiscard]] bool stands_on_trusted_map(const OdometryResult& in_trusted_map) const;
-  [[nodiscard]] Verdict verdict(const OdometryResult& in_trusted_map, const OdometryResult& found);
+  [[nodiscard]] Decision decide(const OdometryResult& in_trusted_map, const OdometryResult& found);
   [[nodiscard]] bool is_overdue() const;
 
   /// Counts the way on which scans showed all of their motion.

@@ -20,6 +20,11 @@ static_assert(static_cast<std::uint8_t>(dds::Severity::advice) == severities::WA
               static_cast<std::uint8_t>(dds::Severity::problem) == severities::ERROR);
 
 void add_lists(const dds::ServerStatus& status, stillmap_msgs::msg::Status& message) {
+  for (const dds::ServiceFault& fault : status.service_faults) {
+    auto& out = message.counters().emplace_back();
+    out.name(fault.fault + "_" + fault.service);
+    out.value(fault.count);
+  }
   for (const dds::NamedCounter& counter : status.counters) {
     auto& out = message.counters().emplace_back();
     out.name(counter.name);

@@ -19,6 +19,9 @@ namespace grid_codes = stillmap_msgs::msg::TraversabilityGrid_Constants;
 static_assert(static_cast<std::uint8_t>(CellState::unknown) == grid_codes::STATE_UNKNOWN &&
               static_cast<std::uint8_t>(CellState::free) == grid_codes::STATE_FREE &&
               static_cast<std::uint8_t>(CellState::lethal) == grid_codes::STATE_LETHAL);
+static_assert(occupancy_lethal == grid_codes::COST_LETHAL &&
+              occupancy_inscribed == grid_codes::COST_INSCRIBED &&
+              static_cast<std::uint8_t>(occupancy_unknown) == grid_codes::COST_UNKNOWN);
 static_assert(static_cast<std::uint8_t>(BlockReason::none) == grid_codes::REASON_NONE &&
               static_cast<std::uint8_t>(BlockReason::obstacle) == grid_codes::REASON_OBSTACLE &&
               static_cast<std::uint8_t>(BlockReason::low_headroom) ==

@@ -65,6 +65,8 @@ struct DdsOptions {
   std::uint32_t large_message_bytes_per_s = 0;
   /// Name of the participant, and of the node that ROS 2 tools show; empty: no ROS 2 node.
   std::string node_name;
+  /// Name of a participant without a node.
+  std::string participant_name = "stillmap";
   /// Folder of the identity that this process has in a secured domain; empty: no security.
   std::filesystem::path security;
 };

@@ -32,7 +32,7 @@ constexpr std::chrono::seconds tcp_user_timeout{5};
 
 DomainParticipantQos participant_qos(const DdsOptions& options) {
   DomainParticipantQos qos;
-  qos.name(options.node_name.empty() ? "stillmap" : options.node_name);
+  qos.name(options.node_name.empty() ? options.participant_name : options.node_name);
   // ROS 2 ignores participants without it.
   constexpr std::string_view enclave = "enclave=/;";
   qos.user_data().setValue({enclave.begin(), enclave.end()});

@@ -3,23 +3,31 @@
 namespace stillmap::dds {
 
 void ServiceFaults::unreadable_request(const std::string& service) {
-  count("unreadable_request_" + service);
+  add("unreadable_request", service);
 }
 
 void ServiceFaults::undelivered_reply(const std::string& service) {
-  count("undelivered_reply_" + service);
+  add("undelivered_reply", service);
 }
 
-void ServiceFaults::slow_client(const std::string& service) { count("slow_client_" + service); }
+void ServiceFaults::slow_client(const std::string& service) { add("slow_client", service); }
 
-std::map<std::string, std::uint64_t> ServiceFaults::counts() const {
+std::vector<ServiceFault> ServiceFaults::counts() const {
   const std::scoped_lock lock(mutex_);
-  return counts_;
+  std::vector<ServiceFault> faults;
+  for (const auto& [what, count] : counts_) faults.push_back({what.first, what.second, count});
+  return faults;
 }
 
-void ServiceFaults::count(const std::string& name) {
+std::uint64_t ServiceFaults::count(const std::string& fault, const std::string& service) const {
   const std::scoped_lock lock(mutex_);
-  ++counts_[name];
+  const auto found = counts_.find({fault, service});
+  return found == counts_.end() ? 0 : found->second;
+}
+
+void ServiceFaults::add(const char* fault, const std::string& service) {
+  const std::scoped_lock lock(mutex_);
+  ++counts_[{fault, service}];
 }
 
 }  // namespace stillmap::dds

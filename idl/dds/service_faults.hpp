@@ -1,11 +1,24 @@
 #pragma once
 
+#include <compare>
 #include <cstdint>
 #include <map>
 #include <mutex>
 #include <string>
+#include <utility>
+#include <vector>
 
 namespace stillmap::dds {
+
+/// What kept requests of a service from an answer, and how often.
+struct ServiceFault {
+  /// "unreadable_request", "undelivered_reply" or "slow_client".
+  std::string fault;
+  /// "stillmap/get_status".
+  std::string service;
+  std::uint64_t count = 0;
+  friend auto operator<=>(const ServiceFault&, const ServiceFault&) = default;
+};
 
 /// Counts the requests that a process could not answer. Thread-safe.
 class ServiceFaults {
@@ -18,14 +31,16 @@ class ServiceFaults {
   /// A request of a client that does not take the replies it has: it was refused.
   void slow_client(const std::string& service);
 
-  /// How often each occurred: "unreadable_request_stillmap/get_status".
-  [[nodiscard]] std::map<std::string, std::uint64_t> counts() const;
+  /// How often each occurred.
+  [[nodiscard]] std::vector<ServiceFault> counts() const;
+  /// How often this one occurred.
+  [[nodiscard]] std::uint64_t count(const std::string& fault, const std::string& service) const;
 
  private:
-  void count(const std::string& name);
+  void add(const char* fault, const std::string& service);
 
   mutable std::mutex mutex_;
-  std::map<std::string, std::uint64_t> counts_;
+  std::map<std::pair<std::string, std::string>, std::uint64_t> counts_;
 };
 
 }  // namespace stillmap::dds

@@ -45,10 +45,6 @@ std::string joined(const std::vector<std::string>& parts) {
   return text;
 }
 
-std::string short_name(const RemoteParticipant& peer) {
-  return peer.name.empty() ? "a participant without a name" : peer.name;
-}
-
 /// Who has the endpoint; nulls where it is gone.
 std::pair<const RemoteParticipant*, const Endpoint*> owner_of(
     const std::string& endpoint_guid, const std::vector<RemoteParticipant>& peers) {
@@ -78,7 +74,7 @@ Diagnostic lost_scans_diagnostic(const std::string& topic, const ScanLosses& los
   const std::uint64_t sent = losses.received + losses.lost;
   Diagnostic diagnostic{
       .severity = 2 * losses.lost >= sent ? Severity::problem : Severity::advice,
-      .what = topic + ": scans of " + (peer == nullptr ? "a publisher" : short_name(*peer)) +
+      .what = topic + ": scans of " + (peer == nullptr ? "a publisher" : display_name(*peer)) +
               " get lost on the way",
       .evidence =
           std::to_string(losses.lost) + " of its last " + std::to_string(sent) + " did not arrive",
@@ -126,6 +122,7 @@ std::vector<Diagnostic> security_diagnostics(const RemoteParticipant& self,
                                              const std::vector<RemoteParticipant>& peers) {
   std::vector<Diagnostic> diagnostics;
   for (const RemoteParticipant& peer : peers) {
+    if (peer.name == survey_participant) continue;
     if (peer.is_secured && !self.is_secured) {
       diagnostics.push_back(
           {.severity = Severity::problem,
@@ -159,7 +156,7 @@ std::vector<Diagnostic> silent_participant_diagnostics(
   std::vector<Diagnostic> diagnostics;
   for (const RemoteParticipant& peer : peers) {
     const bool is_explained = peer.refused || peer.is_secured != self.is_secured;
-    if (!peer.endpoints.empty() || is_explained) continue;
+    if (!peer.endpoints.empty() || is_explained || peer.name == survey_participant) continue;
     if (peer.is_on_this_host && self.uses_shared_memory) {
       diagnostics.push_back(
           {.severity = Severity::problem,

@@ -7,6 +7,10 @@
 
 namespace stillmap::dds {
 
+/// Name of a participant that looks into a domain for a moment, as the doctor does into all that it
+/// finds: without endpoints, and without an identity in secured ones. No diagnostic is about it.
+inline constexpr const char* survey_participant = "stillmap_survey";
+
 /// Of a writer and a reader that do not match.
 [[nodiscard]] Diagnostic to_diagnostic(const Mismatch& mismatch);
 

@@ -7,6 +7,7 @@
 
 #include "core/lidar/delivery_mode.hpp"
 #include "core/odometry/odometry_state.hpp"
+#include "idl/dds/service_faults.hpp"
 #include "idl/interface/diagnostic.hpp"
 
 namespace stillmap::dds {
@@ -78,6 +79,8 @@ struct ServerStatus {
   /// mapping, as "occupancy_not_cleared", and "unreadable_request_<service>" and
   /// "undelivered_reply_<service>" and "slow_client_<service>" once there are any.
   std::vector<NamedCounter> counters;
+  /// Of this process. On the wire they are counters "<fault>_<service>".
+  std::vector<ServiceFault> service_faults;
   /// In the order of the pipeline: wait in the queue, its stages, and "total"; then
   /// what runs beside it, as "occupancy".
   std::vector<StageLatency> latencies;

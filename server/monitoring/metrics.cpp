@@ -149,14 +149,9 @@ void Metrics::show(const dds::ServerStatus& status) {
 }
 
 void Metrics::show_service_faults(const dds::ServerStatus& status) {
-  // As dds::ServiceFaults names them.
-  for (const std::string fault : {"unreadable_request", "undelivered_reply", "slow_client"}) {
-    for (const dds::NamedCounter& counter : status.counters) {
-      if (!counter.name.starts_with(fault + "_")) continue;
-      prometheus::Counter& shown = service_faults_.Add(
-          {{"service", counter.name.substr(fault.size() + 1)}, {"fault", fault}});
-      shown.Increment(static_cast<double>(counter.value) - shown.Value());
-    }
+  for (const auto& [fault, service, count] : status.service_faults) {
+    prometheus::Counter& shown = service_faults_.Add({{"service", service}, {"fault", fault}});
+    shown.Increment(static_cast<double>(count) - shown.Value());
   }
 }
 

@@ -256,7 +256,8 @@ TEST_F(OperationTest, ChecksAConfigurationWithoutStarting) {
     return server.wait();
   };
   EXPECT_EQ(check("good.yaml"), 0) << content("check.log");
-  EXPECT_THAT(content("check.log"), HasSubstr("can be used"));
+  EXPECT_THAT(content("check.log"),
+              AllOf(HasSubstr("can be used"), HasSubstr("not the default: sensor")));
   EXPECT_EQ(check("bad.yaml"), 2);
   EXPECT_THAT(content("check.log"), AllOf(HasSubstr("vlp_61"), HasSubstr("save_period_s"),
                                           HasSubstr("metrics.address"), HasSubstr("log.level")));

@@ -47,12 +47,12 @@ class YardArea : public ::testing::Test {
     map_.reset();
     truth_.reset();
   }
-  static TraversabilityScore score(const std::string& robot) {
+  static evaluation::TraversabilityScore score(const std::string& robot) {
     TraversabilityMap area({load_robot_profile(robot)});
     const auto map = map_->view();
     (void)area.update(*map);
     const auto view = area.view(robot);
-    return score_traversability(
+    return evaluation::score_traversability(
         *view, simulated_traversability(*truth_, view->profile, view->cell_m, T_city_map_));
   }
   static std::optional<StaticMap> map_;
@@ -64,22 +64,22 @@ std::unique_ptr<simulation::CityTruth> YardArea::truth_;
 Eigen::Isometry3d YardArea::T_city_map_ = Eigen::Isometry3d::Identity();
 
 TEST_F(YardArea, WhatIsFreeForACarIsRoadWithFewExceptions) {
-  const TraversabilityScore score = YardArea::score("car");
+  const evaluation::TraversabilityScore score = YardArea::score("car");
   EXPECT_GT(*score.precision(true), 0.97);
   EXPECT_GT(*score.recall(), 0.85);
   // A car must not be sent into a house, over a kerb or onto grass.
-  const auto cells = [&](FalseFree cause) {
+  const auto cells = [&](evaluation::FalseFree cause) {
     return static_cast<double>(score.false_free.at(static_cast<std::size_t>(cause)));
   };
   const auto free = static_cast<double>(score.free_and_truly_free);
-  EXPECT_LT(cells(FalseFree::obstacle) / free, 0.01);
-  EXPECT_LT(cells(FalseFree::ground_class) / free, 0.005);
-  EXPECT_LT(cells(FalseFree::inferred) / free, 0.02);
+  EXPECT_LT(cells(evaluation::FalseFree::obstacle) / free, 0.01);
+  EXPECT_LT(cells(evaluation::FalseFree::ground_class) / free, 0.005);
+  EXPECT_LT(cells(evaluation::FalseFree::inferred) / free, 0.02);
 }
 
 TEST_F(YardArea, ATrackedRobotHasMoreRoomThanACar) {
-  const TraversabilityScore car = YardArea::score("car");
-  const TraversabilityScore tracked = YardArea::score("tracked");
+  const evaluation::TraversabilityScore car = YardArea::score("car");
+  const evaluation::TraversabilityScore tracked = YardArea::score("tracked");
   EXPECT_GT(tracked.free_and_truly_free, car.free_and_truly_free);
   EXPECT_GT(*tracked.precision(true), 0.9);
 }

@@ -46,6 +46,15 @@ TEST(ParticipantDiagnosticsTest, TellWhichSideLacksSecurity) {
   EXPECT_THAT(dds::security_diagnostics(secured, {secured}), IsEmpty());
 }
 
+TEST(ParticipantDiagnosticsTest, AreNotAboutADoctorThatLooksIn) {
+  dds::RemoteParticipant survey = participant(dds::survey_participant);
+  survey.endpoints.clear();
+  dds::RemoteParticipant secured = participant("server");
+  secured.is_secured = true;
+  EXPECT_THAT(dds::security_diagnostics(secured, {survey}), IsEmpty());
+  EXPECT_THAT(dds::silent_participant_diagnostics(participant("self"), {survey}), IsEmpty());
+}
+
 TEST(ParticipantDiagnosticsTest, BlameSharedMemoryForASilentPeerOnThisHost) {
   dds::RemoteParticipant silent = participant("server");
   silent.endpoints.clear();

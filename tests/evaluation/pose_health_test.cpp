@@ -12,15 +12,15 @@ namespace {
 
 using testing::Each;
 using testing::ElementsAre;
-using Drive = std::vector<JudgedPose>;
+using Drive = std::vector<EvaluatedPose>;
 
 Eigen::Isometry3d at(double x, double y = 0.0, double yaw_deg = 0.0) {
   return Eigen::Translation3d(x, y, 0.0) *
          Eigen::AngleAxisd(yaw_deg * std::numbers::pi / 180.0, Eigen::Vector3d::UnitZ());
 }
 
-JudgedPose judged(const Eigen::Isometry3d& T_true, const Eigen::Isometry3d& T_estimate,
-                  OdometryHealth health = OdometryHealth::good) {
+EvaluatedPose evaluated(const Eigen::Isometry3d& T_true, const Eigen::Isometry3d& T_estimate,
+                        OdometryHealth health = OdometryHealth::good) {
   return {T_true, T_estimate, health};
 }
 
@@ -28,7 +28,7 @@ JudgedPose judged(const Eigen::Isometry3d& T_true, const Eigen::Isometry3d& T_es
 Drive straight(int scans, double factor) {
   const Eigen::Isometry3d T_map_world = at(30.0, -20.0, 70.0);
   Drive drive;
-  for (int k = 0; k < scans; ++k) drive.push_back(judged(at(k), T_map_world * at(factor * k)));
+  for (int k = 0; k < scans; ++k) drive.push_back(evaluated(at(k), T_map_world * at(factor * k)));
   return drive;
 }
 
@@ -47,23 +47,23 @@ TEST(WrongPoses, BeginWhereADriveThatSlidesHasGoneTheWindow) {
 }
 
 TEST(WrongPoses, AreThoseOfAJumpUntilItIsMadeGood) {
-  const Drive drive{judged(at(0), at(0)),   judged(at(1), at(1)), judged(at(2), at(2.5)),
-                    judged(at(3), at(3.5)), judged(at(4), at(4)), judged(at(5), at(5.1))};
+  const Drive drive{evaluated(at(0), at(0)),   evaluated(at(1), at(1)), evaluated(at(2), at(2.5)),
+                    evaluated(at(3), at(3.5)), evaluated(at(4), at(4)), evaluated(at(5), at(5.1))};
   EXPECT_THAT(wrong_poses(drive), ElementsAre(false, false, true, true, false, false));
 }
 
 TEST(WrongPoses, AreNotThoseThatComeBackFromOnesCalledDegenerate) {
   using enum OdometryHealth;
   const Drive drive{
-      judged(at(0), at(0), initialised),        judged(at(1), at(1)),
-      judged(at(2), at(2, 0, 0.9), degenerate), judged(at(3), at(3, 0, 1.0), degenerate),
-      judged(at(4), at(4, 0, 2.5), degenerate), judged(at(5), at(5, 0, -0.5))};
+      evaluated(at(0), at(0), initialised),        evaluated(at(1), at(1)),
+      evaluated(at(2), at(2, 0, 0.9), degenerate), evaluated(at(3), at(3, 0, 1.0), degenerate),
+      evaluated(at(4), at(4, 0, 2.5), degenerate), evaluated(at(5), at(5, 0, -0.5))};
   EXPECT_THAT(wrong_poses(drive), ElementsAre(false, false, false, false, true, false));
 }
 
 TEST(WrongPoses, AreThoseThatAreTurned) {
-  const Drive drive{judged(at(0), at(0)), judged(at(1), at(1, 0, 0.9)),
-                    judged(at(2), at(2, 0, 3.0))};
+  const Drive drive{evaluated(at(0), at(0)), evaluated(at(1), at(1, 0, 0.9)),
+                    evaluated(at(2), at(2, 0, 3.0))};
   EXPECT_THAT(wrong_poses(drive), ElementsAre(false, false, true));
 }
 
@@ -74,10 +74,11 @@ TEST(WrongPoses, AreAllWithoutATruthAndDoNotMoveTheReference) {
 }
 
 TEST(WrongPoses, AreThoseAfterARecordingJumpsOnUnlessTheEstimateFollows) {
-  const Drive stays{judged(at(0), at(0)), judged(at(1), at(1)), judged(at(151), at(2)),
-                    judged(at(152), at(150))};
+  const Drive stays{evaluated(at(0), at(0)), evaluated(at(1), at(1)), evaluated(at(151), at(2)),
+                    evaluated(at(152), at(150))};
   EXPECT_THAT(wrong_poses(stays), ElementsAre(false, false, true, true));
-  const Drive follows{judged(at(0), at(0)), judged(at(1), at(1)), judged(at(151), at(151.1))};
+  const Drive follows{evaluated(at(0), at(0)), evaluated(at(1), at(1)),
+                      evaluated(at(151), at(151.1))};
   EXPECT_THAT(wrong_poses(follows), Each(false));
 }
 
@@ -91,10 +92,10 @@ TEST(WrongPoses, AreNoneOfNoDrive) { EXPECT_TRUE(wrong_poses({}).empty()); }
 
 TEST(HealthScore, CountsWhatIsCalledWhatItIsNot) {
   using enum OdometryHealth;
-  const Drive drive{judged(at(0), at(0), initialised), judged(at(1), at(1), good),
-                    judged(at(2), at(2), lost),        judged(at(3), at(3), degenerate),
-                    judged(at(4), at(9), good),        judged(at(5), at(9), lost),
-                    judged(at(6), at(9), degenerate),  judged(at(7), at(7), good)};
+  const Drive drive{evaluated(at(0), at(0), initialised), evaluated(at(1), at(1), good),
+                    evaluated(at(2), at(2), lost),        evaluated(at(3), at(3), degenerate),
+                    evaluated(at(4), at(9), good),        evaluated(at(5), at(9), lost),
+                    evaluated(at(6), at(9), degenerate),  evaluated(at(7), at(7), good)};
   const HealthScore score = health_score(drive);
   EXPECT_EQ(score.poses, 8U);
   EXPECT_EQ(score.wrong, 3U);

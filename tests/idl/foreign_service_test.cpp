@@ -54,9 +54,7 @@ std::optional<SaveMap_Response> read_reply(SerializedSample bytes) {
 class ForeignService : public testing::Test {
  protected:
   [[nodiscard]] std::uint64_t faults(const std::string& kind) const {
-    const auto counts = server_side_.service_faults().counts();
-    const auto found = counts.find(kind + "_" + service);
-    return found == counts.end() ? 0 : found->second;
+    return server_side_.service_faults().count(kind, service);
   }
 
   Participant server_side_{loopback(false)};

@@ -15,17 +15,18 @@ SHARED_MEMORY = ["--dds-profile",
 class Setup:
     """Where the programs are, and how long a drive is."""
 
-    def __init__(self, programs, lab_programs, recording, scans):
+    def __init__(self, programs, lab_programs, recording, scans, rate_hz=RATE_HZ):
         self.stillmap = os.path.join(programs, "stillmap")
         self.server = os.path.join(programs, "stillmap-server")
         self.robot = os.path.join(lab_programs, "lab_robot")
         self.clients = os.path.join(lab_programs, "lab_clients")
         self.recording = recording
         self.scans = scans
+        self.rate_hz = rate_hz
 
     @property
     def drive_s(self):
-        return self.scans / RATE_HZ
+        return self.scans / self.rate_hz
 
 
 class Watch(threading.Thread):
@@ -75,7 +76,7 @@ class Drive:
 
     def start_robot(self, flags=None):
         self.robot = self.home.start(self.setup.robot, self.setup.recording, "--scans",
-                                     str(self.setup.scans), "--rate", str(RATE_HZ), "--domain",
+                                     str(self.setup.scans), "--rate", str(self.setup.rate_hz), "--domain",
                                      DOMAIN, "--timeout", "60",
                                      *(self.flags if flags is None else flags))
         self.robot.wait_for_text("driving", 60)

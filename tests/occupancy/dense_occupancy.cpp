@@ -56,8 +56,8 @@ void DenseOccupancy::insert(const PlacedScan& placed, const ScanUpdateOptions& u
       hits.insert(key_of(p_map));
     }
     const double cleared_m =
-        std::min(range_m * (1.0 - config_.clear_margin_share) - config_.clear_margin_m,
-                 config_.clear_range_m);
+        std::min(range_m * (1.0 - config_.clearing_margin_share) - config_.clearing_margin_m,
+                 config_.clearing_range_m);
     if (!clears || cleared_m <= 0.0) continue;
     const Eigen::Vector3d end_map = lidar_map + cleared_m / range_m * (p_map - lidar_map);
     if (ends.insert(octant_of(end_map)).second) add_passed(lidar_map, end_map, passed);

@@ -18,9 +18,9 @@ OccupancyConfig small_config() {
   OccupancyConfig config;
   config.resolution_m = 0.25;
   config.max_range_m = 3.5;
-  config.clear_range_m = 2.5;
+  config.clearing_range_m = 2.5;
   config.clearing_interval = 2;
-  config.clear_margin_m = 0.2;
+  config.clearing_margin_m = 0.2;
   return config;
 }
 
@@ -150,11 +150,11 @@ TEST(OccupancyConfig, NamesEveryFault) {
   EXPECT_EQ(config.faults(), "");
   config.resolution_m = 0.0;
   config.hit_probability = 0.3;
-  config.clear_range_m = std::numeric_limits<double>::quiet_NaN();
+  config.clearing_range_m = std::numeric_limits<double>::quiet_NaN();
   const std::string said = message_of<std::invalid_argument>([&] { OccupancyMap map(config); });
   EXPECT_THAT(said, HasSubstr("occupancy.resolution_m is 0.0"));
   EXPECT_THAT(said, HasSubstr("occupancy.hit_probability"));
-  EXPECT_THAT(said, HasSubstr("occupancy.clear_range_m is nan"));
+  EXPECT_THAT(said, HasSubstr("occupancy.clearing_range_m is nan"));
 }
 
 }  // namespace

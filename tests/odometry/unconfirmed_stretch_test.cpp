@@ -8,11 +8,11 @@
 namespace stillmap {
 namespace {
 
-using enum UnconfirmedStretch::Verdict;
+using enum UnconfirmedStretch::Decision;
 using test::expect_near;
 using test::level_pose;
 using test::SurfaceWorld;
-using Verdict = UnconfirmedStretch::Verdict;
+using Decision = UnconfirmedStretch::Decision;
 
 /// A road of 40 m with a facade along it, so far to the left, and walls across it on both sides.
 SurfaceWorld road_with_walls(std::initializer_list<double> walls_x_m, double facade_y_m = 8.0) {
@@ -47,24 +47,24 @@ UnconfirmedStretch stretch_of_here() {
 
 /// What the stretch says of scans of a world that were registered with this error, which drive on
 /// by so much each [m].
-std::vector<Verdict> judged(UnconfirmedStretch& stretch, const SurfaceWorld& world, int scans,
-                            double step_m, const Eigen::Isometry3d& error) {
-  std::vector<Verdict> verdicts;
+std::vector<Decision> judged(UnconfirmedStretch& stretch, const SurfaceWorld& world, int scans,
+                             double step_m, const Eigen::Isometry3d& error) {
+  std::vector<Decision> decisions;
   for (int k = 0; k < scans; ++k) {
     const Eigen::Isometry3d T_true = level_pose(step_m * k, 0.0, 0.0);
     OdometryResult found = good_at(T_true * error);
     const auto seed = static_cast<unsigned>(20 + k);
-    verdicts.push_back(stretch.judge(world.features(T_true, 0.01, seed), {}, found));
-    if (verdicts.back() != open) break;
+    decisions.push_back(stretch.evaluate(world.features(T_true, 0.01, seed), {}, found));
+    if (decisions.back() != open) break;
   }
-  return verdicts;
+  return decisions;
 }
 
 TEST(UnconfirmedStretch, EndsWithTheFirstScanOnTheTrustedMapAndTakesItsPose) {
   UnconfirmedStretch stretch = stretch_of_here();
   const Eigen::Isometry3d T_true = level_pose(3.0, 0.5, 0.02);
   OdometryResult found = good_at(T_true * level_pose(0.3, 0.1, 0.02));
-  EXPECT_EQ(stretch.judge(here().features(T_true, 0.01, 3), {}, found), confirmed);
+  EXPECT_EQ(stretch.evaluate(here().features(T_true, 0.01, 3), {}, found), confirmed);
   expect_near(found.T_map_lidar, T_true, 0.02, 0.005);
 }
 
@@ -73,13 +73,13 @@ TEST(UnconfirmedStretch, EndsWithScansInARowThatAgreeInThePartThatIsKnown) {
   farther.planes.push_back(
       {{40.0, -8.0, -1.7}, {70.0, 0.0, 0.0}, {0.0, 24.0, 0.0}, SemanticClass::road});
   UnconfirmedStretch stretch = stretch_of_here();
-  const auto verdicts = judged(stretch, farther, 10, 0.5, Eigen::Isometry3d::Identity());
-  EXPECT_EQ(verdicts, (std::vector<Verdict>{open, open, open, open, confirmed}));
+  const auto decisions = judged(stretch, farther, 10, 0.5, Eigen::Isometry3d::Identity());
+  EXPECT_EQ(decisions, (std::vector<Decision>{open, open, open, open, confirmed}));
   // Looked for, it would be too little.
   UnconfirmedStretch jumped = stretch_of_here();
   jumped.jump(20.0);
   EXPECT_EQ(judged(jumped, farther, 15, 0.5, Eigen::Isometry3d::Identity()),
-            std::vector<Verdict>(15, open));
+            std::vector<Decision>(15, open));
 }
 
 TEST(UnconfirmedStretch, IsNotJudgedByScansThatDoNotShowTheirMotion) {
@@ -87,22 +87,23 @@ TEST(UnconfirmedStretch, IsNotJudgedByScansThatDoNotShowTheirMotion) {
   const Eigen::Isometry3d T_true = level_pose(3.0, 0.0, 0.0);
   OdometryResult found = good_at(T_true);
   found.health = OdometryHealth::degenerate;
-  EXPECT_EQ(stretch.judge(here().features(T_true, 0.01, 3), {}, found), open);
+  EXPECT_EQ(stretch.evaluate(here().features(T_true, 0.01, 3), {}, found), open);
 }
 
 TEST(UnconfirmedStretch, IsContradictedByScansInARowOfAnotherPlace) {
   UnconfirmedStretch stretch = stretch_of_here();
   const SurfaceWorld elsewhere = road_with_walls({-4.5, 3.0, 11.5, 20.0}, 5.5);
-  const auto verdicts = judged(stretch, elsewhere, 10, 0.0, Eigen::Isometry3d::Identity());
-  EXPECT_EQ(verdicts, (std::vector<Verdict>{open, open, open, open, contradicted}));
+  const auto decisions = judged(stretch, elsewhere, 10, 0.0, Eigen::Isometry3d::Identity());
+  EXPECT_EQ(decisions, (std::vector<Decision>{open, open, open, open, contradicted}));
 }
 
 TEST(UnconfirmedStretch, StaysOpenWhereTheTrustedMapKnowsNothing) {
   UnconfirmedStretch stretch = stretch_of_here();
   for (unsigned seed = 1; seed <= 30; ++seed) {
     OdometryResult found = good_at(level_pose(200.0, 0.0, 0.0));
-    EXPECT_EQ(stretch.judge(here().features(Eigen::Isometry3d::Identity(), 0.01, seed), {}, found),
-              open);
+    EXPECT_EQ(
+        stretch.evaluate(here().features(Eigen::Isometry3d::Identity(), 0.01, seed), {}, found),
+        open);
   }
 }
 
@@ -110,7 +111,7 @@ TEST(UnconfirmedStretch, SettlesOnceItsMotionWasSeenForLong) {
   UnconfirmedStretch followed = stretch_of_here();
   UnconfirmedStretch jumped = stretch_of_here();
   jumped.jump(20.0);
-  Verdict last = open;
+  Decision last = open;
   for (unsigned k = 0; k < 100; ++k) {
     EXPECT_EQ(last, open) << k;
     const FeatureSets features = here().features(Eigen::Isometry3d::Identity(), 0.01, k);
@@ -118,8 +119,8 @@ TEST(UnconfirmedStretch, SettlesOnceItsMotionWasSeenForLong) {
     // What shows no motion is no part of the way.
     if (k >= 10 && k < 20) found.health = OdometryHealth::degenerate;
     OdometryResult same = found;
-    EXPECT_NE(jumped.judge(features, {}, same), settled);
-    last = followed.judge(features, {}, found);
+    EXPECT_NE(jumped.evaluate(features, {}, same), settled);
+    last = followed.evaluate(features, {}, found);
     if (last == settled) {
       EXPECT_EQ(k, 61U);
       break;
@@ -138,7 +139,7 @@ TEST(UnconfirmedStretch, AJumpFarOffIsConfirmedOnTheWayAlone) {
   UnconfirmedStretch stands = stretch_of_here();
   stands.jump(20.0);
   const auto standing = judged(stands, here(), 30, 0.0, Eigen::Isometry3d::Identity());
-  EXPECT_EQ(standing, std::vector<Verdict>(30, open));
+  EXPECT_EQ(standing, std::vector<Decision>(30, open));
   UnconfirmedStretch drives = stretch_of_here();
   drives.jump(20.0);
   const auto driving = judged(drives, here(), 30, 0.5, Eigen::Isometry3d::Identity());

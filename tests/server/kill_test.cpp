@@ -21,7 +21,7 @@ using Seconds = std::chrono::duration<double>;
 
 constexpr double checkpoint_period_s = 0.5;
 /// A machine under load takes its time for a checkpoint.
-constexpr double slack_s = 4.0;
+constexpr double slack_s = 4.0 * slowdown;
 
 int wanted_kills() {
   const char* const text = std::getenv("STILLMAP_KILLS");

@@ -79,10 +79,10 @@ TEST(Metrics, GiveDropsByReasonAndOtherEventsApart) {
 TEST(Metrics, ShowTheFaultsOfServicesThatTheStatusHas) {
   Metrics metrics;
   dds::ServerStatus status;
-  status.counters = {{.name = "slow_client_stillmap/get_tiles", .value = 3},
-                     {.name = "unreadable_request_stillmap/reset", .value = 1}};
+  status.service_faults = {{"slow_client", "stillmap/get_tiles", 3},
+                           {"unreadable_request", "stillmap/reset", 1}};
   for (const double slow : {3.0, 5.0}) {
-    status.counters.front().value = static_cast<std::uint64_t>(slow);
+    status.service_faults.front().count = static_cast<std::uint64_t>(slow);
     const MetricFamily faults = family(metrics, "stillmap_service_faults_total", status);
     EXPECT_THAT(values_by(faults, "service"),
                 ElementsAre(Pair("stillmap/get_tiles", slow), Pair("stillmap/reset", 1.0)));

@@ -84,8 +84,8 @@ MapperConfig mapper_config(const MapperArguments& arguments, const SensorModel& 
   return config;
 }
 
-std::unique_ptr<Segmenter> label_source(const MapperArguments& arguments,
-                                        const ScanDataset& dataset) {
+std::unique_ptr<Segmenter> make_segmenter(const MapperArguments& arguments,
+                                          const ScanDataset& dataset) {
   LabelsConfig labels;
   if (!arguments.config_file.empty()) labels = load_server_config(arguments.config_file).labels;
   if (arguments.labels == "none") {

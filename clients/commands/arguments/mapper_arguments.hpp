@@ -51,7 +51,7 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments);
 [[nodiscard]] MapperConfig mapper_config(const MapperArguments& arguments,
                                          const SensorModel& suggested_sensor);
 /// Throws ConfigError, ModelError or std::invalid_argument.
-[[nodiscard]] std::unique_ptr<Segmenter> label_source(const MapperArguments& arguments,
-                                                      const ScanDataset& dataset);
+[[nodiscard]] std::unique_ptr<Segmenter> make_segmenter(const MapperArguments& arguments,
+                                                        const ScanDataset& dataset);
 
 }  // namespace stillmap::cli

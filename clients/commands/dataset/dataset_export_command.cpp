@@ -63,7 +63,7 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
   }
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
-  auto labels = label_source(arguments.mapper, dataset);
+  auto labels = make_segmenter(arguments.mapper, dataset);
   prepare_sequence_folder(arguments.out, arguments.force);
   Progress progress("export", "scans", total);
   return export_sequence(

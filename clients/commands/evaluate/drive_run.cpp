@@ -105,14 +105,14 @@ const OdometryResult* DriveRun::map(Scan scan,
 
 std::string DriveRun::last_error() const {
   if (poses_.size() < 2) return {};
-  const evaluation::JudgedPose& before = poses_[poses_.size() - 2];
-  const evaluation::JudgedPose& now = poses_.back();
+  const evaluation::EvaluatedPose& before = poses_[poses_.size() - 2];
+  const evaluation::EvaluatedPose& now = poses_.back();
   if (!before.T_world_lidar_true || !now.T_world_lidar_true) return {};
   const Eigen::Isometry3d truth = before.T_world_lidar_true->inverse() * *now.T_world_lidar_true;
   const Eigen::Isometry3d step = truth.inverse() * before.T_map_lidar.inverse() * now.T_map_lidar;
   std::ostringstream text;
   text << "step " << in_words(truth) << ", error " << in_words(step);
-  const evaluation::JudgedPose& first = poses_.front();
+  const evaluation::EvaluatedPose& first = poses_.front();
   if (!first.T_world_lidar_true) return text.str();
   const Eigen::Isometry3d since_first =
       first.T_world_lidar_true->inverse() * *now.T_world_lidar_true;
@@ -127,7 +127,7 @@ DriveResult DriveRun::result() {
   result.scans = scans_;
   result.rejected = scans_ - poses_.size();
   evaluation::PosePairs pairs;
-  for (const evaluation::JudgedPose& pose : poses_) {
+  for (const evaluation::EvaluatedPose& pose : poses_) {
     ++result.health[pose.health];
     if (!pose.T_world_lidar_true) continue;
     pairs.truth.push_back(*pose.T_world_lidar_true);

@@ -94,7 +94,7 @@ class DriveRun {
   std::string weighting_;
   Mapper mapper_;
   /// Of the scans that were mapped, and their places in the drive.
-  std::vector<evaluation::JudgedPose> poses_;
+  std::vector<evaluation::EvaluatedPose> poses_;
   std::vector<std::size_t> places_;
   OdometryResult last_;
   std::size_t scans_ = 0;

@@ -157,7 +157,7 @@ void write_picture(const EvaluateSegmentationArguments& arguments, const ScanDat
 evaluation::ConfusionMatrix run_model(const EvaluateSegmentationArguments& arguments) {
   const ScanDataset dataset(arguments.truth);
   const std::size_t scans = arguments.range.end(dataset) - arguments.range.first;
-  const std::unique_ptr<Segmenter> labels = label_source(arguments.mapper, dataset);
+  const std::unique_ptr<Segmenter> labels = make_segmenter(arguments.mapper, dataset);
   Progress progress("segment", "scans", scans);
   const SegmentationResult result =
       segment_dataset(dataset, arguments.range, *labels, [&](std::size_t seen) {

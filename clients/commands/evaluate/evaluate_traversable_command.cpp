@@ -24,10 +24,10 @@ struct EvaluateTraversableArguments {
 
 Json number(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
-Json to_json(const TraversabilityScore& score, double cell_m2) {
+Json to_json(const evaluation::TraversabilityScore& score, double cell_m2) {
   Json false_free = Json::object();
-  for (std::size_t i = 0; i < false_free_count; ++i) {
-    false_free.set(std::string(name(static_cast<FalseFree>(i))),
+  for (std::size_t i = 0; i < evaluation::false_free_count; ++i) {
+    false_free.set(std::string(name(static_cast<evaluation::FalseFree>(i))),
                    cell_m2 * static_cast<double>(score.false_free.at(i)));
   }
   Json false_lethal = Json::object();
@@ -45,7 +45,7 @@ Json to_json(const TraversabilityScore& score, double cell_m2) {
           {"false_lethal_m2", false_lethal}};
 }
 
-std::string describe(const TraversabilityScore& score, double cell_m2) {
+std::string describe(const evaluation::TraversabilityScore& score, double cell_m2) {
   const auto area = [&](std::uint64_t cells) {
     return fixed(cell_m2 * static_cast<double>(cells), 1);
   };
@@ -55,8 +55,8 @@ std::string describe(const TraversabilityScore& score, double cell_m2) {
   Table table({"against the true city", "m2"});
   table.add({"free, and truly so", area(score.free_and_truly_free)});
   table.add({"lethal, and truly so", area(score.lethal_and_truly_lethal)});
-  for (std::size_t i = 0; i < false_free_count; ++i) {
-    table.add({"false free: " + std::string(name(static_cast<FalseFree>(i))),
+  for (std::size_t i = 0; i < evaluation::false_free_count; ++i) {
+    table.add({"false free: " + std::string(name(static_cast<evaluation::FalseFree>(i))),
                area(score.false_free.at(i))});
   }
   for (std::size_t i = 0; i < block_reason_count; ++i) {
@@ -82,8 +82,8 @@ ExitCode run(const EvaluateTraversableArguments& arguments) {
   TraversabilityMap area({profile});
   (void)area.update(map.view);
   const TraversabilityView& view = *area.view(profile.name);
-  const TraversabilityScore score =
-      score_traversability(view, simulated_traversability(truth, profile, view.cell_m, T_city_map));
+  const evaluation::TraversabilityScore score = evaluation::score_traversability(
+      view, simulated_traversability(truth, profile, view.cell_m, T_city_map));
   const double cell_m2 = view.cell_m * view.cell_m;
   std::cout << (arguments.json ? to_json(score, cell_m2).dump(2) + "\n" : describe(score, cell_m2));
   return ExitCode::ok;

@@ -3,8 +3,8 @@
 namespace stillmap::cli {
 namespace {
 
-CellTruth true_cell(const simulation::TrueGround& ground, const RobotProfile& profile) {
-  CellTruth cell;
+evaluation::CellTruth true_cell(const simulation::TrueGround& ground, const RobotProfile& profile) {
+  evaluation::CellTruth cell;
   cell.is_edge = ground.is_edge;
   const bool has_step = ground.is_edge && ground.step_m > profile.max_step_m;
   if (ground.standing == simulation::Standing::fixed) {
@@ -22,9 +22,9 @@ CellTruth true_cell(const simulation::TrueGround& ground, const RobotProfile& pr
 
 }  // namespace
 
-TraversabilityTruth simulated_traversability(const simulation::CityTruth& truth,
-                                             const RobotProfile& profile, double cell_m,
-                                             const Eigen::Isometry3d& T_city_map) {
+evaluation::TraversabilityTruth simulated_traversability(const simulation::CityTruth& truth,
+                                                         const RobotProfile& profile, double cell_m,
+                                                         const Eigen::Isometry3d& T_city_map) {
   return [&truth, profile, cell_m, T_city_map](const Eigen::Vector3d& ground_map) {
     const Eigen::Vector3d ground_city = T_city_map * ground_map;
     return true_cell(

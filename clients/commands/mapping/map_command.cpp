@@ -288,7 +288,7 @@ ExitCode run(const MapArguments& arguments) {
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   const MappedBody body = body_of(arguments);
   static_cast<void>(arguments.range.end(dataset));
-  auto labels = label_source(arguments.mapper, dataset);
+  auto labels = make_segmenter(arguments.mapper, dataset);
   // Nothing above touched the folder.
   MapOutputFolder out(arguments.out, arguments.policy);
   const MappingResult result =

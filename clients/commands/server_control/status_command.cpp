@@ -44,7 +44,7 @@ std::string why_not_mapping(const dds::ServerStatus& status) {
 }
 
 /// What is wrong beside the reason, in one line: scans that get lost, peers that do not fit.
-std::string other_troubles(const dds::ServerStatus& status) {
+std::string other_diagnostics(const dds::ServerStatus& status) {
   std::string text;
   for (const dds::Diagnostic& diagnostic : status.diagnostics) {
     if (diagnostic.what != status.reason) text += "; " + diagnostic.what;
@@ -68,12 +68,12 @@ ExitCode run(const HealthArguments& arguments) {
     return say(ExitCode::failed, why);
   }
   if (const std::string why = why_not_mapping(status); arguments.mapping && !why.empty()) {
-    return say(ExitCode::failed, why + other_troubles(status));
+    return say(ExitCode::failed, why + other_diagnostics(status));
   }
   return say(ExitCode::ok, "up for " + fixed(status.uptime_s, 0) + " s, " +
                                fixed(status.mapped_hz, 1) + " scans/s mapped" +
                                (status.reason.empty() ? "" : ", " + status.reason) +
-                               other_troubles(status));
+                               other_diagnostics(status));
 }
 
 }  // namespace

@@ -12,7 +12,7 @@
 namespace stillmap::cli {
 namespace {
 
-SavedMap stored_map(const std::string& file) {
+SavedMap saved_map(const std::string& file) {
   if (!std::filesystem::exists(file)) {
     throw DatasetError(file, "does not exist; 'stillmap map' writes map files");
   }
@@ -23,7 +23,7 @@ class FileSource final : public TraversabilitySource {
  public:
   explicit FileSource(const TraversabilitySourceArguments& arguments)
       : traversability_({load_robot_profile(arguments.profile)}),
-        map_(stored_map(arguments.map_file)) {
+        map_(saved_map(arguments.map_file)) {
     update_stats_ = traversability_.update(map_.view);
   }
 

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "core/lidar/voxel_index.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -22,13 +24,6 @@ std::uint64_t cell_key(const Eigen::Vector3d& cell) {
   };
   return part(cell.x(), bias_xy) << 40 | part(cell.y(), bias_xy) << 16 | part(cell.z(), bias_z);
 }
-
-/// The library's own hash is the number itself: cells above each other would share a few slots.
-struct KeyHash {
-  std::size_t operator()(std::uint64_t key) const {
-    return static_cast<std::size_t>((key * 0x9E3779B97F4A7C15ULL) >> 32);
-  }
-};
 
 struct Cell {
   std::uint64_t key = 0;
@@ -56,7 +51,7 @@ QueryVoxel query_voxel(const Cell& cell) {
 
 struct CoarseCells::State {
   double resolution_m = 0.0;
-  tsl::robin_map<std::uint64_t, std::uint32_t, KeyHash> position;
+  tsl::robin_map<std::uint64_t, std::uint32_t, IndexHash> position;
   std::vector<Cell> cells;
   /// Of the last voxel; voxels beside each other mostly come one after the other.
   std::uint32_t last = 0;

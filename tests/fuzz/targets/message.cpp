@@ -11,6 +11,7 @@
 #include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"
 #include "idl/conversions/traversability.hpp"
+#include "idl/interface/services.hpp"
 #include "idl/interface/topics.hpp"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"
@@ -31,8 +32,19 @@ void read_as(Bytes bytes, const Read& read) {
 
 template <typename Response>
 void read_response(Bytes bytes) {
-  read_as<Response>(
-      bytes, [](const Response& response) { static_cast<void>(wire::from_response(response)); });
+  read_as<Response>(bytes, [](const Response& response) {
+    if constexpr (requires { wire::from_response(response); })
+      static_cast<void>(wire::from_response(response));
+  });
+}
+
+/// A number that says which service, then its reply.
+void read_reply(Bytes bytes) {
+  ByteSource source(bytes);
+  std::size_t service = source.byte();
+  dds::for_each_service([&]<typename Spec>(const Spec&) {
+    if (service-- == 0) read_response<typename Spec::Reply>(source.rest());
+  });
 }
 
 void read_odometry(Bytes bytes) {
@@ -75,7 +87,7 @@ void read_tf(Bytes bytes) {
   });
 }
 
-constexpr std::array<void (*)(Bytes), 12> readers = {
+constexpr std::array<void (*)(Bytes), 13> readers = {
     read_odometry,
     read_path,
     read_tile,
@@ -88,6 +100,7 @@ constexpr std::array<void (*)(Bytes), 12> readers = {
     read_response<QueryOccupancy_Response>,
     read_response<GetRemoved_Response>,
     read_tf,
+    read_reply,
 };
 
 void run(Bytes bytes) {

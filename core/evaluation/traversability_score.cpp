@@ -1,8 +1,8 @@
-#include "core/traversability/traversability_score.hpp"
+#include "core/evaluation/traversability_score.hpp"
 
 #include <numeric>
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 FalseFree cause_of(const TraversabilityCell& cell, const CellTruth& truth) {
@@ -78,4 +78,4 @@ TraversabilityScore score_traversability(const TraversabilityView& view,
   return score;
 }
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -7,7 +7,7 @@
 
 #include "core/traversability/traversability_view.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 
 /// True state of a cell for a view's robot.
 struct CellTruth {
@@ -59,4 +59,4 @@ struct TraversabilityScore {
 [[nodiscard]] TraversabilityScore score_traversability(const TraversabilityView& view,
                                                        const TraversabilityTruth& truth);
 
-}  // namespace stillmap
+}  // namespace stillmap::evaluation

@@ -1,4 +1,4 @@
-#include "core/traversability/traversability_score.hpp"
+#include "core/evaluation/traversability_score.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "tests/traversability/voxel_world.hpp"
 
-namespace stillmap {
+namespace stillmap::evaluation {
 namespace {
 
 using enum SemanticClass;
@@ -69,4 +69,4 @@ TEST(TraversabilityScore, NothingSeenHasNoScore) {
 }
 
 }  // namespace
-}  // namespace stillmap
+}  // namespace stillmap::evaluation
