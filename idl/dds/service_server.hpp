@@ -28,8 +28,11 @@ struct ServiceOptions {
   /// A call that comes again, as clients send it when its answer is late, is answered from memory:
   /// for services that change something.
   bool carries_out_once = false;
-  /// Called once a second without requests; must not throw.
+  /// Called once a second without requests.
   std::function<void()> idle = [] {};
+  /// Does the thread's work, and what is to be done where that throws: what `answer` throws is
+  /// refused in words, but the transport and `idle` can fail, too.
+  std::function<void(const std::function<void()>& work)> run = [](const auto& work) { work(); };
 };
 
 /// The server's end of one ROS 2 service, for clients of rmw_fastrtps and of rmw_cyclonedds. One
@@ -128,7 +131,9 @@ class ServiceServer {
         idle_(std::move(options.idle)),
         server_(participant, service, type_support<Request>(), type_support<Reply>(),
                 options.carries_out_once, make_refusal()),
-        thread_([this](const std::stop_token& stop) { serve(stop); }) {}
+        thread_([this, run = std::move(options.run)](const std::stop_token& stop) {
+          run([&] { serve(stop); });
+        }) {}
 
  private:
   void serve(const std::stop_token& stop) {

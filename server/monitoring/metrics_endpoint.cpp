@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "server/monitoring/metrics.hpp"
+#include "server/threads/thread_failure.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -104,7 +105,7 @@ class MetricsListener {
   MetricsListener(const std::string& address, Connection::Respond respond)
       : respond_(std::move(respond)), acceptor_(io_, endpoint_of(io_, address)), retry_(io_) {
     accept();
-    thread_ = std::jthread([this] { io_.run(); });
+    thread_ = std::jthread([this] { run_or_report([this] { io_.run(); }); });
   }
   ~MetricsListener() {
     io_.stop();

@@ -4,6 +4,7 @@
 
 #include "idl/dds/service_server.hpp"
 #include "server/services/service_handlers.hpp"
+#include "server/threads/thread_failure.hpp"
 
 namespace stillmap::server {
 
@@ -19,7 +20,8 @@ MapServices::MapServices(dds::Participant& participant, const std::string& name_
     servers_.push_back(std::make_shared<dds::ServiceServer<Request, Reply>>(
         participant, name, logged(context_.log, name, std::move(answer)),
         dds::ServiceOptions{.carries_out_once = handler.spec.effect == dds::ServiceEffect::modifies,
-                            .idle = [this, idle = handler.idle] { idle(context_); }}));
+                            .idle = [this, idle = handler.idle] { idle(context_); },
+                            .run = [](const auto& work) { run_or_report(work); }}));
   });
 }
 

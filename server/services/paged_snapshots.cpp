@@ -22,9 +22,10 @@ std::size_t own_bytes(const MapSnapshot& view, const MapSnapshot& newer) {
 
 }  // namespace
 
-PagedSnapshots::Snapshot PagedSnapshots::find(std::uint64_t version) const {
-  const auto found = std::ranges::find_if(
-      sessions_, [&](const Session& entry) { return entry.view->version == version; });
+PagedSnapshots::Snapshot PagedSnapshots::find(const MapVersion& map) const {
+  const auto found = std::ranges::find_if(sessions_, [&](const Session& entry) {
+    return entry.view->map_id == map.map_id && entry.view->version == map.version;
+  });
   return found == sessions_.end() ? nullptr : found->view;
 }
 

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/map/query/map_query.hpp"
 #include "core/map/tile.hpp"
 
 namespace stillmap::server {
@@ -28,8 +29,8 @@ class PagedSnapshots {
   /// Beyond `max_bytes`, the view that was asked for longest ago goes.
   explicit PagedSnapshots(std::size_t max_bytes = default_max_bytes) : max_bytes_(max_bytes) {}
 
-  /// Nothing when no answer of this version is under way.
-  [[nodiscard]] Snapshot find(std::uint64_t version) const;
+  /// Nothing when no answer from this state of this map is under way.
+  [[nodiscard]] Snapshot find(const MapVersion& map) const;
 
   /// A page was given, and there are more.
   void keep(const Snapshot& view, Clock::time_point now);

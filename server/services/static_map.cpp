@@ -20,8 +20,8 @@ constexpr std::uint32_t max_page_bytes = 8'000'000;
 /// The map that a page shows: that of the answer's first page, else the newest. A page after the
 /// first needs no history.
 MapState state_for(const ServiceContext& context, const MapQuery& query) {
-  const auto version = continuation_version(query.continuation);
-  auto view = version ? context.paged_snapshots->find(*version) : nullptr;
+  const auto map = continued_map(query.continuation);
+  auto view = map ? context.paged_snapshots->find(*map) : nullptr;
   return view ? MapState{std::move(view), nullptr} : context.latest_map.state();
 }
 

@@ -1,6 +1,10 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <functional>
+#include <future>
+#include <stdexcept>
+#include <string>
 #include <thread>
 
 #include "idl/dds/service_client.hpp"
@@ -84,6 +88,24 @@ TEST(Service, GivesUpWithoutAServer) {
   EXPECT_FALSE(client.call(request_for(""), 300ms));
   EXPECT_LT(std::chrono::steady_clock::now() - began, 5s);
   EXPECT_FALSE(client.wait_for_server(0ms));
+}
+
+TEST(Service, WhoseThreadFailsLeavesItToWhoRunsIt) {
+  Participant server_side(loopback(false));
+  std::promise<std::string> failure;
+  const Server server(server_side, "stillmap/save_map", echo,
+                      {.idle = [] { throw std::runtime_error("out of memory"); },
+                       .run =
+                           [&](const std::function<void()>& work) {
+                             try {
+                               work();
+                             } catch (const std::runtime_error& error) {
+                               failure.set_value(error.what());
+                             }
+                           }});
+  std::future<std::string> said = failure.get_future();
+  ASSERT_EQ(said.wait_for(discovery_timeout), std::future_status::ready);
+  EXPECT_EQ(said.get(), "out of memory");
 }
 
 /// A server that counts what it carries out, and answers a request for "late" only when it was

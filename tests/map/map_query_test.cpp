@@ -230,7 +230,10 @@ TEST_F(MapQueryTest, ContinuationOfAnotherVersionOrMapIsStale) {
   MapQuery query;
   query.max_bytes = 1000;
   query.continuation = query_map(view(), query).continuation;
-  EXPECT_EQ(continuation_version(query.continuation), view().version);
+  const auto continued = continued_map(query.continuation);
+  ASSERT_TRUE(continued);
+  EXPECT_EQ(continued->map_id, view().map_id);
+  EXPECT_EQ(continued->version, view().version);
   MapSnapshot later = view();
   ++later.version;
   MapQueryResult result = query_map(later, query);
@@ -266,7 +269,7 @@ TEST_F(MapQueryTest, DamagedContinuationsAreRefused) {
   for (const std::string& continuation : damaged) {
     query.continuation = continuation;
     EXPECT_EQ(query_map(view(), query).status, QueryStatus::invalid_request) << continuation;
-    EXPECT_EQ(continuation_version(continuation), std::nullopt);
+    EXPECT_FALSE(continued_map(continuation));
   }
 }
 

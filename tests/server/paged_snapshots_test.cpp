@@ -9,6 +9,7 @@ using namespace std::chrono_literals;
 
 PagedSnapshots::Snapshot view_of(std::uint64_t version) {
   MapSnapshot view;
+  view.map_id = 3;
   view.version = version;
   return std::make_shared<const MapSnapshot>(std::move(view));
 }
@@ -20,11 +21,13 @@ TEST(PagedSnapshots, LastUntilSoonAfterTheLastPage) {
   PagedSnapshots::Snapshot view = view_of(7);
   const std::weak_ptr<const MapSnapshot> watched = view;
   views.keep(view, begin);
-  EXPECT_EQ(views.find(7), view);
-  EXPECT_EQ(views.find(8), nullptr);
+  EXPECT_EQ(views.find({.map_id = 3, .version = 7}), view);
+  EXPECT_EQ(views.find({.map_id = 3, .version = 8}), nullptr);
+  EXPECT_EQ(views.find({.map_id = 4, .version = 7}), nullptr) << "of a map that was loaded since";
   views.end(view, begin);
   views.drop_expired(begin + PagedSnapshots::last_page_grace);
-  EXPECT_EQ(views.find(7), view) << "the last page may be asked for again";
+  EXPECT_EQ(views.find({.map_id = 3, .version = 7}), view)
+      << "the last page may be asked for again";
   views.drop_expired(begin + PagedSnapshots::last_page_grace + 1s);
   view.reset();
   EXPECT_TRUE(watched.expired());
@@ -37,7 +40,7 @@ TEST(PagedSnapshots, LastWhileAnotherClientGoesOnPaging) {
   views.end(view, begin);
   views.keep(view, begin + 1s);
   views.drop_expired(begin + PagedSnapshots::max_page_interval);
-  EXPECT_EQ(views.find(7), view);
+  EXPECT_EQ(views.find({.map_id = 3, .version = 7}), view);
   EXPECT_EQ(views.size(), 1U);
 }
 
@@ -49,14 +52,15 @@ TEST(PagedSnapshots, GoWhenTheirClientAsksNoMore) {
   views.keep(gone, begin);
   views.keep(slow, begin + PagedSnapshots::max_page_interval);
   views.drop_expired(begin + PagedSnapshots::max_page_interval + 1s);
-  EXPECT_EQ(views.find(1), slow);
-  EXPECT_EQ(views.find(2), nullptr);
+  EXPECT_EQ(views.find({.map_id = 3, .version = 1}), slow);
+  EXPECT_EQ(views.find({.map_id = 3, .version = 2}), nullptr);
 }
 
 /// A view with one tile of this many bytes of voxels, and one that all views share.
 PagedSnapshots::Snapshot view_with_tile(std::uint64_t version, std::size_t bytes) {
   static const auto shared = std::make_shared<const Tile>();
   MapSnapshot view;
+  view.map_id = 3;
   view.version = version;
   Tile tile;
   tile.info.id = {1, 0};
@@ -73,7 +77,7 @@ TEST(PagedSnapshots, OfManyClientsAreKeptWhileTheyTakeLittle) {
     views.keep(view_with_tile(version, 1000), begin);
   }
   EXPECT_EQ(views.size(), 200U);
-  EXPECT_NE(views.find(0), nullptr);
+  EXPECT_NE(views.find({.map_id = 3, .version = 0}), nullptr);
 }
 
 TEST(PagedSnapshots, AreLimitedInBytes) {
@@ -86,9 +90,10 @@ TEST(PagedSnapshots, AreLimitedInBytes) {
     EXPECT_LE(views.bytes(), 1'000'000U);
   }
   EXPECT_GT(views.size(), 5U);
-  EXPECT_EQ(views.find(0), first);
-  EXPECT_EQ(views.find(1), nullptr) << "one of those that were asked for longest ago";
-  EXPECT_NE(views.find(20), nullptr);
+  EXPECT_EQ(views.find({.map_id = 3, .version = 0}), first);
+  EXPECT_EQ(views.find({.map_id = 3, .version = 1}), nullptr)
+      << "one of those that were asked for longest ago";
+  EXPECT_NE(views.find({.map_id = 3, .version = 20}), nullptr);
 }
 
 TEST(PagedSnapshots, DoNotMindTheEndOfWhatIsGone) {

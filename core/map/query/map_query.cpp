@@ -240,10 +240,10 @@ MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query,
   return query_map(view, query, history, reader);
 }
 
-std::optional<std::uint64_t> continuation_version(const std::string& continuation) {
+std::optional<MapVersion> continued_map(const std::string& continuation) {
   const std::optional<Continuation> token = from_token(continuation);
   if (!token) return std::nullopt;
-  return token->map_version;
+  return MapVersion{token->map_id, token->map_version};
 }
 
 }  // namespace stillmap

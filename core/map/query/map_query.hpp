@@ -102,7 +102,13 @@ inline constexpr std::size_t query_voxel_bytes = 3 * sizeof(float) + 1 + sizeof(
 [[nodiscard]] MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query,
                                        const TileHistory* history = nullptr);
 
-/// The map version that a continuation was made from.
-[[nodiscard]] std::optional<std::uint64_t> continuation_version(const std::string& continuation);
+/// A state of a map: versions count in each map anew.
+struct MapVersion {
+  std::uint64_t map_id = 0;
+  std::uint64_t version = 0;
+};
+
+/// What a continuation was made from.
+[[nodiscard]] std::optional<MapVersion> continued_map(const std::string& continuation);
 
 }  // namespace stillmap

@@ -55,7 +55,7 @@ void run(Bytes bytes) {
   } else {
     query.continuation = to_token(next_continuation(source, query));
   }
-  static_cast<void>(continuation_version(query.continuation));
+  static_cast<void>(continued_map(query.continuation));
   const MapQueryResult page = query_map(street_view(), query);
   require(page.status == QueryStatus::ok || !page.reason.empty(), "a refusal says why");
 }
