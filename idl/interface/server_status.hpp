@@ -80,7 +80,7 @@ struct ServerStatus {
   /// "undelivered_reply_<service>" and "slow_client_<service>" once there are any.
   std::vector<NamedCounter> counters;
   /// Of this process. On the wire they are counters "<fault>_<service>".
-  std::vector<ServiceFault> service_faults;
+  std::vector<ServiceFault> service_faults{};
   /// In the order of the pipeline: wait in the queue, its stages, and "total"; then
   /// what runs beside it, as "occupancy".
   std::vector<StageLatency> latencies;
