@@ -108,7 +108,9 @@ bool ReplyWriter::is_slow(const GuidPrefix& client, std::size_t max_bytes, Clock
     is_overdue = is_overdue || now - reply.written >= patience();
   }
   if (bytes == 0) given_up_.erase(client);
-  return given_up_.contains(client) || (is_overdue && bytes >= max_bytes);
+  // On a slow network, its replies keep those of others waiting long before any is overdue.
+  const bool is_waited_for = is_overdue || rate_bytes_per_s_ > 0;
+  return given_up_.contains(client) || (is_waited_for && bytes >= max_bytes);
 }
 
 void ReplyWriter::send_heartbeat() {

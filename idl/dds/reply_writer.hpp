@@ -43,8 +43,8 @@ class ReplyWriter {
   [[nodiscard]] bool write(const ServiceCall& call, const SerializedSample& reply,
                            Clock::time_point now);
 
-  /// True when the process has not taken so many bytes of its replies for long, or when some of
-  /// them were given up and it has taken none since.
+  /// True when the process has not taken so many bytes of its replies for long, or at all where the
+  /// rate is limited, or when some of them were given up and it has taken none since.
   [[nodiscard]] bool is_slow(const GuidPrefix& client, std::size_t max_bytes,
                              Clock::time_point now);
 

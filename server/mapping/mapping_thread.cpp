@@ -78,6 +78,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
                    [this](std::int64_t stamp_ns, const OdometryResult& odometry) {
                      pose_found(stamp_ns, odometry);
                    }}),
+      imu_report_(statistics),
       frames_(config, outputs.static_transforms, statistics),
       odom_frame_(config.frames.odom) {
   // The whole path is the latest map's.
@@ -203,7 +204,9 @@ void MappingThread::checkpoint_failed() {
     mapper_.static_map().set_frozen(true);
     is_map_frozen_ = true;
     spdlog::error(
-        "the map fills its memory and cannot be saved: scans give poses, but do not enter it");
+        "the map fills its memory and cannot be saved: scans give poses, but enter neither it nor "
+        "the "
+        "octree");
   });
 }
 
@@ -327,7 +330,7 @@ void MappingThread::map(QueuedScan queued) {
   feed_imu(queued.scan);
   auto mapped = mapper_.process(std::move(queued.scan), prior_for(stamp_ns));
   if (!mapped) return drop(mapper_.last_rejection());
-  report_imu();
+  imu_report_.update(mapper_.inertial());
   const bool unlabelled = mapped->labelled.labels.empty();
   latest_map_.add_pose({stamp_ns, T_map_base(mapped->odometry)}, mapped->odometry.health,
                        unlabelled ? "none" : mapper_.label_source());
@@ -363,39 +366,10 @@ void MappingThread::feed_imu(const Scan& scan) {
   for (const ImuSample& sample : outputs_.imu->take(until_ns)) mapper_.add(sample);
 }
 
-void MappingThread::report_imu() {
-  const InertialTracker& imu = mapper_.inertial();
-  if (!imu.has_samples()) return;
-  const InertialCounts now = imu.counts();
-  const auto report = [&](const char* event, std::uint64_t InertialCounts::*count) {
-    if (now.*count > imu_counts_.*count) statistics_.count(event, now.*count - imu_counts_.*count);
-  };
-  report("imu_samples", &InertialCounts::samples);
-  report("imu_not_usable", &InertialCounts::not_usable);
-  report("imu_out_of_order", &InertialCounts::out_of_order);
-  report("imu_scans_helped", &InertialCounts::scans_helped);
-  report("imu_samples_missing", &InertialCounts::scans_without_samples);
-  report("imu_disbelieved", &InertialCounts::trust_losses);
-  if (now.trust_losses > imu_counts_.trust_losses) {
-    throttled_log_.warn("imu",
-                        "the IMU's rates are not the lidar's: scans are mapped without it until "
-                        "they are; check 'imu' in the sensor's file, and that rates are in rad/s");
-  }
-  if (imu.is_believed() && !imu_was_believed_) {
-    const GyroCalibration& calibration = imu.calibration();
-    spdlog::info(
-        "IMU: its rates are the lidar's, with a bias of {:.4f} {:.4f} {:.4f} rad/s and "
-        "{:.1f} ms late",
-        calibration.bias_imu().x(), calibration.bias_imu().y(), calibration.bias_imu().z(),
-        1e3 * calibration.time_offset_s());
-  }
-  imu_was_believed_ = imu.is_believed();
-  imu_counts_ = now;
-}
-
 void MappingThread::forward(MappedScan mapped) {
   const auto labelled = std::make_shared<const LabelledScan>(std::move(mapped.labelled));
-  if (outputs_.occupancy != nullptr && mapped.odometry.is_confirmed) {
+  const bool enters_map = mapped.odometry.is_confirmed && !is_map_frozen_;
+  if (outputs_.occupancy != nullptr && enters_map) {
     outputs_.occupancy->add({labelled, mapped.odometry.T_map_lidar, !mapped.unlabelled_may_move});
   }
   if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frames_.lidar());

@@ -14,6 +14,7 @@
 #include "core/map/storage/map_file.hpp"
 #include "core/mapper.hpp"
 #include "server/mapping/imu_receiver.hpp"
+#include "server/mapping/imu_report.hpp"
 #include "server/mapping/map_saver.hpp"
 #include "server/mapping/odometry_prior.hpp"
 #include "server/mapping/robot_frames.hpp"
@@ -96,8 +97,6 @@ class MappingThread : public CheckpointSource {
   void map(QueuedScan queued);
   /// Gives the mapper the IMU's samples up to the scan's last point.
   void feed_imu(const Scan& scan);
-  /// Counts and logs what became of them.
-  void report_imu();
   /// Runs the requests, and publishes the map when that is due.
   void end_round(bool is_idle);
   /// Publishes a new map, and starts a new octree from it.
@@ -159,6 +158,7 @@ class MappingThread : public CheckpointSource {
   /// Where evicted tiles are.
   std::shared_ptr<TileStore> tile_store_;
   ThrottledLog throttled_log_;
+  ImuReport imu_report_;
   RobotFrames frames_;
   std::string odom_frame_;
   /// Where there is a frame odom of our own.
@@ -169,9 +169,6 @@ class MappingThread : public CheckpointSource {
   std::string mounted_frame_;
   /// Of the scan in work: its lidar's motion by the prior.
   std::optional<Eigen::Isometry3d> motion_prior_;
-  /// As reported last.
-  InertialCounts imu_counts_;
-  bool imu_was_believed_ = false;
   std::chrono::steady_clock::time_point received_;
   std::chrono::steady_clock::time_point stage_began_;
   double labels_ms_ = 0.0;

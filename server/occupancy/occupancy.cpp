@@ -36,7 +36,12 @@ void OctomapPublisher::publish_when_due() {
   const bool has_changed = occupancy_.changes() != published_;
   // Encoding a whole octree without a reader would be wasted.
   if (readers == 0 && has_changed) forget_published();
-  if (readers > 0 && has_changed && is_due()) publish();
+  if (encoding_.valid()) return publish_when_encoded();
+  if (readers == 0 || !has_changed || !is_due()) return;
+  encoding_changes_ = occupancy_.changes();
+  encoding_map_ = map_;
+  // On the octree's thread of idle priority: it must not delay poses.
+  encoding_ = occupancy_.encode_in_background();
 }
 
 bool OctomapPublisher::is_due() {
@@ -53,12 +58,11 @@ void OctomapPublisher::forget_published() {
   published_ = 0;
 }
 
-void OctomapPublisher::publish() {
-  const std::uint64_t changes = occupancy_.changes();
-  // On the octree's thread of idle priority: encoding takes long and must not delay poses.
-  const EncodedOctree octree = occupancy_.encode_in_background().get();
-  if (occupancy_.maps_begun() != map_) return;
-  published_ = changes;
+void OctomapPublisher::publish_when_encoded() {
+  if (encoding_.wait_for(std::chrono::seconds(0)) != std::future_status::ready) return;
+  const EncodedOctree octree = encoding_.get();
+  if (encoding_map_ != map_) return;
+  published_ = encoding_changes_;
   // Keep-last writers always have room.
   static_cast<void>(writer_.write(wire::to_octomap(octree.data, octree.stamp_ns, map_frame_)));
 }

@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <future>
 #include <string>
 
 #include "config/loaders/server_config.hpp"
@@ -25,7 +26,7 @@ class OctomapPublisher {
   void publish_when_due();
   [[nodiscard]] bool is_due();
   void forget_published();
-  void publish();
+  void publish_when_encoded();
 
   OccupancyThread& occupancy_;
   std::string map_frame_;
@@ -33,6 +34,10 @@ class OctomapPublisher {
   /// OccupancyThread::changes() of what is kept for late joiners; 0: nothing is.
   std::uint64_t published_ = 0;
   std::uint64_t map_ = 0;
+  /// The octree that is being encoded, which may take long; the changes and the map in it.
+  std::future<EncodedOctree> encoding_;
+  std::uint64_t encoding_changes_ = 0;
+  std::uint64_t encoding_map_ = 0;
   int readers_ = 0;
   bool is_urgent_ = false;
   std::chrono::steady_clock::time_point last_;

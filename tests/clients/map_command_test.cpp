@@ -136,6 +136,10 @@ TEST_F(MapCommandTest, ASignalLeavesTheOldMapAndTheRunCanBeResumed) {
     how = " --resume --save-period 0.01";
   }
   EXPECT_EQ(run(map).exit_code, 2) << "an unfinished run is not thrown away unasked";
+  const ProcessResult other = run(map + " --resume --weighting geometric");
+  EXPECT_EQ(other.exit_code, 2);
+  EXPECT_THAT(other.err, AllOf(HasSubstr("weighting semantic"), HasSubstr("weighting geometric"),
+                               HasSubstr("--force")));
   const ProcessResult resumed = run(map + " --resume --json");
   ASSERT_EQ(resumed.exit_code, 0) << resumed.err;
   const nlohmann::json report = nlohmann::json::parse(resumed.out);

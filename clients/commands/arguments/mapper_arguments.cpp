@@ -62,10 +62,22 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
   add_segmentation_options(command, arguments);
 }
 
+const char* name(Weighting weighting) {
+  switch (weighting) {
+    case Weighting::none:
+      return "none";
+    case Weighting::geometric:
+      return "geometric";
+    case Weighting::semantic:
+      break;
+  }
+  return "semantic";
+}
+
 Weighting weighting_from_name(const std::string& weighting_name) {
-  if (weighting_name == "none") return Weighting::none;
-  if (weighting_name == "geometric") return Weighting::geometric;
-  if (weighting_name == "semantic") return Weighting::semantic;
+  for (const Weighting weighting : {Weighting::none, Weighting::geometric, Weighting::semantic}) {
+    if (weighting_name == name(weighting)) return weighting;
+  }
   throw std::invalid_argument("weighting '" + weighting_name +
                               "' is not known; there are none, geometric and semantic");
 }

@@ -45,6 +45,8 @@ void add_segmentation_options(CommandHandle command, MapperArguments& arguments)
 /// Adds these and --config, --sensor, --labels, --weighting.
 void add_mapper_options(CommandHandle command, MapperArguments& arguments);
 
+[[nodiscard]] const char* name(Weighting weighting);
+/// Throws std::invalid_argument.
 [[nodiscard]] Weighting weighting_from_name(const std::string& weighting_name);
 
 /// Throws ConfigError or std::invalid_argument.

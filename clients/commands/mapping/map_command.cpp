@@ -6,6 +6,7 @@
 #include <iostream>
 #include <memory>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -264,14 +265,27 @@ void write_report(const std::filesystem::path& file, const Json& report) {
   if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
 }
 
+/// What makes the parts of a run one map.
+RunIdentity run_identity(const MapArguments& arguments, const MapperConfig& config,
+                         const MappedBody& body, const Segmenter& labels) {
+  const Eigen::Vector3d t = body.T_body_lidar.translation();
+  const Eigen::Quaterniond q(body.T_body_lidar.rotation());
+  std::ostringstream settings;
+  settings << "sensor " << config.sensor.name << ", labels " << labels.name() << ", weighting "
+           << name(config.odometry.weighting) << ", voxels of " << config.static_map.voxel_size_m
+           << " m, lidar in " << body.frame << " at " << t.transpose() << " turned by "
+           << q.coeffs().transpose();
+  return {std::filesystem::weakly_canonical(arguments.dataset).string() + " from scan " +
+              std::to_string(arguments.range.first),
+          settings.str()};
+}
+
 /// Maps what is left to map; the run's file is closed after that.
 MappingResult map_into(const MapOutputFolder& out, const ScanDataset& dataset,
                        const MapArguments& arguments, const MapperConfig& config,
                        const MappedBody& body, std::unique_ptr<Segmenter> labels,
                        StopSignal& stop) {
-  RunFile run_file(out.run_file(),
-                   std::filesystem::weakly_canonical(arguments.dataset).string() + " from scan " +
-                       std::to_string(arguments.range.first),
+  RunFile run_file(out.run_file(), run_identity(arguments, config, body, *labels),
                    std::chrono::duration<double>(arguments.save_period_s));
   return map_with_progress(dataset, arguments, config, body, std::move(labels), run_file, stop);
 }

@@ -8,6 +8,7 @@ namespace stillmap::cli {
 namespace {
 
 constexpr const char* dataset_key = "run_dataset";
+constexpr const char* settings_key = "run_settings";
 constexpr const char* scans_key = "run_scans";
 constexpr const char* next_key = "run_next_scan";
 
@@ -18,10 +19,9 @@ std::chrono::steady_clock::time_point after(std::chrono::duration<double> period
 
 }  // namespace
 
-RunFile::RunFile(std::filesystem::path file, std::string dataset,
-                 std::chrono::duration<double> period)
+RunFile::RunFile(std::filesystem::path file, RunIdentity run, std::chrono::duration<double> period)
     : file_(std::move(file)),
-      dataset_(std::move(dataset)),
+      run_(std::move(run)),
       period_(period),
       store_(open_map_file(file_)),
       due_(after(period)) {}
@@ -30,11 +30,17 @@ std::optional<RunState> RunFile::earlier() const {
   RunState state{.map = store_->load(), .scan_of_pose = {}, .next_scan = 0};
   const auto& said = state.map.metadata;
   if (!said.contains(next_key)) return std::nullopt;
-  if (said.at(dataset_key) != dataset_) {
+  if (said.at(dataset_key) != run_.dataset) {
     throw std::invalid_argument(file_.string() + " is of a run over " + said.at(dataset_key) +
-                                ", not over " + dataset_ +
+                                ", not over " + run_.dataset +
                                 ": name that recording, or begin anew "
                                 "with --force");
+  }
+  // Older versions did not say.
+  if (said.contains(settings_key) && said.at(settings_key) != run_.settings) {
+    throw std::invalid_argument(file_.string() + " is of a run with " + said.at(settings_key) +
+                                ", not with " + run_.settings +
+                                ": ask for these, or begin anew with --force");
   }
   const auto scans = from_ranges(said.at(scans_key));
   const auto next = from_ranges(said.at(next_key));
@@ -47,7 +53,8 @@ std::optional<RunState> RunFile::earlier() const {
 }
 
 void RunFile::save(RunState state) {
-  state.map.metadata[dataset_key] = dataset_;
+  state.map.metadata[dataset_key] = run_.dataset;
+  state.map.metadata[settings_key] = run_.settings;
   state.map.metadata[scans_key] = to_ranges(state.scan_of_pose);
   state.map.metadata[next_key] = std::to_string(state.next_scan);
   store_->save(state.map);

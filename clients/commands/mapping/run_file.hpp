@@ -21,15 +21,21 @@ struct RunState {
   std::size_t next_scan = 0;
 };
 
+/// What a run is over, and how it maps, both in words: where they differ, runs are not one.
+struct RunIdentity {
+  std::string dataset;
+  std::string settings;
+};
+
 /// A mapping run on disk while it goes on: a map file that also says which scans are in it, so that
 /// a run which was killed can be resumed.
 class RunFile {
  public:
-  /// Opens or makes it. `dataset` identifies the recording. Throws MapFileError.
-  RunFile(std::filesystem::path file, std::string dataset, std::chrono::duration<double> period);
+  /// Opens or makes it. Throws MapFileError.
+  RunFile(std::filesystem::path file, RunIdentity run, std::chrono::duration<double> period);
 
   /// What an earlier run has left; nothing in a new file. Throws MapFileError, or
-  /// std::invalid_argument for a run over another recording.
+  /// std::invalid_argument for a run over another recording, or with other settings.
   [[nodiscard]] std::optional<RunState> earlier() const;
 
   /// Whether the last save is a period ago.
@@ -39,7 +45,7 @@ class RunFile {
 
  private:
   std::filesystem::path file_;
-  std::string dataset_;
+  RunIdentity run_;
   std::chrono::duration<double> period_;
   std::unique_ptr<MapStore> store_;
   std::chrono::steady_clock::time_point due_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <span>
+#include <sstream>
 #include <vector>
 
 #include "core/map/packed_voxels.hpp"
@@ -15,6 +16,12 @@
 
 namespace stillmap {
 namespace {
+
+/// Tiles that a first page reads to count what a query takes of each; a second or so.
+constexpr std::size_t max_counted_tiles = 10'000;
+
+/// Voxels that a page of a coarser answer merges, about; a second or so.
+constexpr std::uint64_t max_merged_voxels = 1'000'000;
 
 /// Selects the voxels of a tile that a query asks for.
 class VoxelFilter {
@@ -151,16 +158,38 @@ std::vector<QueryVoxel> merge(const Selection& from, const CoarseStrips& strips,
   return cells.sorted();
 }
 
+std::uint64_t voxel_count(const Selection& from, std::span<const std::size_t> tiles) {
+  std::uint64_t count = 0;
+  for (const std::size_t i : tiles) count += from.tiles[i]->info.voxel_count;
+  return count;
+}
+
+std::uint64_t voxel_count(const TilePointers& tiles) {
+  std::uint64_t count = 0;
+  for (const auto& tile : tiles) count += tile->info.voxel_count;
+  return count;
+}
+
 /// A page of a coarser answer. The answer is made strip by strip, so that a page merges its own
-/// part of the region; the first page counts the rest.
+/// part of the region and ends when that is much; the first page counts the rest where it is
+/// little.
 bool fill_coarse_page(const Selection& from, Continuation& position,
                       std::vector<QueryVoxel>& page) {
   const CoarseStrips strips(from.tiles, from.query.resolution_m, from.view.tile_size_m);
   const std::size_t page_size = from.query.max_bytes / query_voxel_bytes;
-  const bool counts = from.query.continuation.empty();
+  const bool is_first = from.query.continuation.empty();
+  if (is_first) position.total_voxels = voxel_count(from.tiles);
+  const bool counts = is_first && position.total_voxels <= max_merged_voxels;
   std::uint64_t total = 0;
+  std::uint64_t merged = 0;
   bool has_more = false;
   for (std::size_t strip = position.tile; strip < strips.size(); ++strip) {
+    if (merged >= max_merged_voxels && !counts) {
+      position.tile = strip;
+      position.voxel = 0;
+      return true;
+    }
+    merged += voxel_count(from, strips.tiles(strip));
     const std::vector<QueryVoxel> cells = merge(from, strips, strip);
     total += cells.size();
     if (has_more) continue;
@@ -207,6 +236,21 @@ Start start_of(const MapSnapshot& view, const MapQuery& query, const TileHistory
   return {token.value_or(Continuation()), token_refusal(view, query, token)};
 }
 
+/// Set where too many tiles must be read to tell what the answer has of each: all their voxels are
+/// wanted of none.
+std::optional<Refusal> size_refusal(const Selection& from) {
+  if (from.tiles.size() <= max_counted_tiles) return std::nullopt;
+  const auto counted = std::ranges::count_if(from.tiles, [&](const auto& tile) {
+    return !VoxelFilter(from.query, from.region, *tile).matches_all();
+  });
+  if (static_cast<std::size_t>(counted) <= max_counted_tiles) return std::nullopt;
+  std::ostringstream reason;
+  reason << "the region has " << counted << " tiles of which the query wants some of the voxels; "
+         << "at most " << max_counted_tiles
+         << " can be answered: ask for parts, for all classes, or with a coarser resolution_m";
+  return Refusal{QueryStatus::invalid_request, reason.str()};
+}
+
 /// Fills in the tiles and the number of voxels of the whole answer, for its first page.
 void add_tiles(const Selection& selection, const TileHistory* history, Continuation& position,
                MapQueryResult& result) {
@@ -225,8 +269,11 @@ MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query, const T
   const RegionShape region(query.region);
   const Selection selection{view, query, region, selected_tiles(view, query, region), reader};
   const bool is_coarse = is_coarser_than_map(view, query.resolution_m);
+  const bool counts_tiles = !is_coarse && query.continuation.empty();
+  if (counts_tiles) refusal = size_refusal(selection);
+  if (refusal) return result_of(view, refusal->status, std::move(refusal->reason));
   MapQueryResult result = result_of(view, QueryStatus::ok, {});
-  if (!is_coarse && query.continuation.empty()) add_tiles(selection, history, position, result);
+  if (counts_tiles) add_tiles(selection, history, position, result);
   const bool has_more = is_coarse ? fill_coarse_page(selection, position, result.voxels)
                                   : fill_page(selection, position, result.voxels);
   result.total_voxels = position.total_voxels;

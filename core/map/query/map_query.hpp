@@ -80,7 +80,8 @@ struct MapQueryResult {
   std::uint64_t map_version = 0;
   std::uint64_t map_id = 0;
   std::vector<QueryVoxel> voxels;
-  /// Voxels of the whole answer, all pages.
+  /// Voxels of the whole answer, all pages; at most so many at a coarser resolution where its
+  /// region has more than a million voxels.
   std::uint64_t total_voxels = 0;
   /// Tiles of the whole answer, on its first page: present tiles first, then removed ones. Empty at
   /// a coarser resolution, whose cells belong to no tile.
@@ -93,7 +94,9 @@ struct MapQueryResult {
 inline constexpr std::size_t query_voxel_bytes = 3 * sizeof(float) + 1 + sizeof(float) + 4;
 
 /// Answers `query` from one view. A voxel is in the region when its position is. A continuation
-/// made from another map or version is stale; a damaged one, or one of another query, is invalid.
+/// made from another map or version is stale; a damaged one, or one of another query, is invalid,
+/// and so are some of the voxels of each of more than 10,000 tiles. A page may end early, even
+/// without a voxel, where it took much work.
 /// `history` ends with this view; only the first page of a query with `since` needs it, and is
 /// refused without. Non-resident tiles are read through `reader`, one at a time; throws as it does.
 [[nodiscard]] MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query,
