@@ -339,10 +339,6 @@ LiveTile::LiveTile(TileId id, const TileRecord& record, const VoxelGrid& grid, S
     add(
         evidence->hidden, [&](std::size_t i) { return evidence->hidden_states[i].history; },
         stamps);
-    for (const ExcludedVoxel& voxel : evidence->excluded) {
-      excluded_.emplace(voxel_key(voxel.index),
-                        Excluded{stamps.add(voxel.last_seen_ns), voxel.label, voxel.was_moving});
-    }
   }
   const auto key = [](const LiveVoxel& voxel) { return voxel.packed.key; };
   // Stable: of a voxel that a file has twice, what is shown stays.
@@ -351,6 +347,14 @@ LiveTile::LiveTile(TileId id, const TileRecord& record, const VoxelGrid& grid, S
   sorted_.erase(doubles.begin(), doubles.end());
   if (sorted_.size() > PositionIndex::max_entries) sorted_.resize(PositionIndex::max_entries);
   index_.rebuild(sorted_.size(), sorted_.size(), key_at());
+  if (!evidence) return;
+  for (const ExcludedVoxel& voxel : evidence->excluded) {
+    // Of a place that a file has as a voxel, too, the voxel stays.
+    const std::uint32_t excluded_key = voxel_key(voxel.index);
+    if (index_.find(excluded_key, key_at()) != PositionIndex::none) continue;
+    excluded_.emplace(excluded_key,
+                      Excluded{stamps.add(voxel.last_seen_ns), voxel.label, voxel.was_moving});
+  }
 }
 
 void LiveTile::add(const PackedVoxels& known,

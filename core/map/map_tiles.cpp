@@ -166,10 +166,13 @@ void MapTiles::add(TileId id, const TileRecord& record) {
 }
 
 bool MapTiles::reload(TileId id) {
+  const auto fault = unreadable_.find(id);
+  if (fault != unreadable_.end() && !fault->second.is_next_attempt_due()) return false;
+  return reload_now(id);
+}
+
+bool MapTiles::reload_now(TileId id) {
   if (store_ == nullptr) return false;
-  if (const auto fault = unreadable_.find(id);
-      fault != unreadable_.end() && !fault->second.is_next_attempt_due())
-    return false;
   const std::shared_ptr<const Tile> stand_in = shown(id);
   try {
     TileRecord record = store_->load(id);

@@ -23,16 +23,19 @@
 
 namespace stillmap {
 
-/// Why a tile could not be read. It is tried again, less and less often: the disk may recover.
+/// Why a tile could not be read. It is tried again, not soon and less and less often: the disk may
+/// recover, and until then each attempt may take it long.
 class ReadFault {
  public:
   [[nodiscard]] const std::string& text() const { return text_; }
   void set_text(std::string text) { text_ = std::move(text); }
-  /// To be asked whenever the tile is wanted: true for every 2^n-th time, and every 1024th.
+  /// To be asked whenever the tile is wanted: true the 16th time, the 32nd, 64th and so on, and
+  /// every 1024th.
   [[nodiscard]] bool is_next_attempt_due() {
+    constexpr std::uint32_t first_wait = 16;
     constexpr std::uint32_t longest_wait = 1024;
     ++wanted_;
-    return std::has_single_bit(wanted_) || wanted_ % longest_wait == 0;
+    return (wanted_ >= first_wait && std::has_single_bit(wanted_)) || wanted_ % longest_wait == 0;
   }
 
  private:
@@ -81,8 +84,11 @@ class MapTiles {
   [[nodiscard]] std::shared_ptr<const MapSnapshot> view(const VisibilityRule& rule);
 
   void use_store(std::shared_ptr<TileStore> store) { store_ = std::move(store); }
-  /// Reads a non-resident tile from the tile store; false when it cannot be read.
+  /// Reads a non-resident tile from the tile store; false when it cannot be read, or could not
+  /// lately.
   bool reload(TileId id);
+  /// The same, however lately it could not.
+  bool reload_now(TileId id);
   /// Reloads the tiles whose footprint comes this near.
   void reload_near(const Eigen::Vector3d& position_map, double range_m);
   /// Evicts stored tiles that are farther than this, farthest first, until the map takes no more

@@ -255,17 +255,20 @@ StaticMap::RemovedVoxels StaticMap::removed(const Eigen::AlignedBox3d& box_map,
   return all;
 }
 
-std::size_t StaticMap::restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
-                                       std::span<const TileId> tiles) {
+StaticMap::RestoredVoxels StaticMap::restore_removed(RemovalReason reason,
+                                                     const Eigen::AlignedBox3d& box_map,
+                                                     std::span<const TileId> tiles) {
   state_->tiles.begin_step();
-  std::size_t restored = 0;
+  RestoredVoxels restored;
   for (const TileId id : tiles) {
-    if (state_->tiles.is_known_non_resident(id)) state_->tiles.reload(id);
+    if (state_->tiles.is_known_non_resident(id) && !state_->tiles.reload_now(id)) {
+      restored.unreadable.push_back(id);
+    }
     LiveTile* const tile = state_->tiles.resident(id);
     if (tile == nullptr) continue;
     const std::size_t voxels = tile->restore(reason, box_map, state_->rule());
     if (voxels > 0) state_->tiles.touch(*tile);
-    restored += voxels;
+    restored.count += voxels;
   }
   return restored;
 }

@@ -111,10 +111,16 @@ class StaticMap {
   /// these tiles.
   [[nodiscard]] RemovedVoxels removed(const Eigen::AlignedBox3d& box_map,
                                       std::span<const TileId> tiles) const;
+  /// What was shown again.
+  struct RestoredVoxels {
+    std::size_t count = 0;
+    /// Those of the tiles that could not be read.
+    std::vector<TileId> unreadable;
+  };
   /// Shows again what was removed for this reason in this part of these tiles; it stays until a
-  /// reset. Non-resident ones are reloaded. Returns how many voxels.
-  std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
-                              std::span<const TileId> tiles);
+  /// reset. Non-resident ones are reloaded.
+  RestoredVoxels restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
+                                 std::span<const TileId> tiles);
 
   /// Evidence of the voxel at a position (map frame [m]), shown in a view or not; no votes where
   /// nothing was seen. May be called from several threads, but not beside a change of the map.

@@ -76,8 +76,7 @@ struct ServerStatus {
   SegmentationStatus segmentation;
   /// "scans_received", "scans_mapped", "scans_lost" (which did not arrive) and "label_failures"
   /// once there are any, and "dropped_<reason>" for every reason that occurred; then events beside
-  /// mapping, as "occupancy_not_cleared", and "unreadable_request_<service>" and
-  /// "undelivered_reply_<service>" and "slow_client_<service>" once there are any.
+  /// mapping, as "occupancy_not_cleared". As read from the wire, `service_faults`, too.
   std::vector<NamedCounter> counters;
   /// Of this process. On the wire they are counters "<fault>_<service>".
   std::vector<ServiceFault> service_faults{};

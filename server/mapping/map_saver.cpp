@@ -46,7 +46,7 @@ MapSaver::MapSaver(const LatestMap& latest_map, Statistics& statistics, const fs
                    MonotonicClock& clock)
     : latest_map_(latest_map),
       statistics_(statistics),
-      file_(file.empty() ? file : fs::absolute(file)),
+      file_(file.empty() ? file : real_file(file)),
       folder_(file_, limits.saved_maps),
       metadata_(std::move(metadata)),
       memory_limit_bytes_(std::size_t{limits.memory_limit_mib} << 20),
@@ -123,8 +123,8 @@ void MapSaver::save_at_end() {
   const std::scoped_lock lock(mutex_);
   if (misplaced_) bring_back();
   // Nothing mapped: an empty map must not replace what the file holds.
-  if (!file_.empty() && (latest_map_.poses_added() > 0 || !is_saved()))
-    save(CheckpointScope::changed, true);
+  const bool is_map_empty = latest_map_.poses_added() == 0 && latest_map_.view()->tiles.empty();
+  if (!file_.empty() && !(is_map_empty && is_saved())) save(CheckpointScope::changed, true);
 }
 
 void MapSaver::make_room() {
@@ -213,7 +213,7 @@ fs::path MapSaver::file_named(const std::string& name) const {
     throw std::invalid_argument(
         "no map file is configured; set map.file in the server's configuration or --map-file");
   }
-  return name.empty() ? file_ : folder_.file_named(name);
+  return name.empty() ? file_ : real_file(folder_.file_named(name));
 }
 
 bool MapSaver::is_empty() const {

@@ -82,7 +82,10 @@ class WriteAllowance {
   /// Whether something may be written now; it may be larger than what is left, and is paid off
   /// before the next.
   [[nodiscard]] bool is_open(MonotonicClock::TimePoint now);
-  void spend(std::uint64_t bytes) { left_ -= static_cast<double>(bytes); }
+  /// What had to be written beyond it is paid off within two hours.
+  void spend(std::uint64_t bytes) {
+    left_ = std::max(left_ - static_cast<double>(bytes), -bytes_per_hour_);
+  }
 
  private:
   double bytes_per_hour_;
@@ -134,7 +137,7 @@ class MapSaver {
   /// Saves come from there; called once, before any of them. `source` must outlive the last.
   void set_source(CheckpointSource& source);
 
-  /// Saves to the current file, if there is one and scans were mapped since the last save; without
+  /// Saves to the current file, if there is one and the map changed since the last save; without
   /// one, to the temporary file when memory is running out. Throws MapFileError.
   void save_if_changed();
   /// The same when the run has ended: everything is stored.

@@ -254,17 +254,28 @@ std::vector<RemovedVoxel> MappingThread::removed(const Eigen::AlignedBox3d& box_
 std::size_t MappingThread::restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
                                            const std::function<void()>& make_room) {
   const TilesOfBox tiles = tiles_of(box_map);
-  std::size_t restored = 0;
+  StaticMap::RestoredVoxels restored;
   for (std::span<const TileId> left(tiles.ids); !left.empty();) {
     bool is_full = false;
     run_on_some(tiles.map_id, left, [&](std::span<const TileId> some) {
-      restored += mapper_.static_map().restore_removed(reason, box_map, some);
+      const auto part = mapper_.static_map().restore_removed(reason, box_map, some);
+      restored.count += part.count;
+      restored.unreadable.insert(restored.unreadable.end(), part.unreadable.begin(),
+                                 part.unreadable.end());
       is_full = mapper_.static_map().memory_use().bytes > map_limit_bytes_;
       return !is_full;
     });
     if (is_full) make_room();
   }
-  return restored;
+  if (!restored.unreadable.empty()) {
+    throw std::runtime_error(std::to_string(restored.count) + " voxels are shown again, but " +
+                             std::to_string(restored.unreadable.size()) +
+                             " tiles of the region cannot be read, the first of them (" +
+                             std::to_string(restored.unreadable.front().x) + ", " +
+                             std::to_string(restored.unreadable.front().y) +
+                             "); the status says why. Ask again when their disk can be read");
+  }
+  return restored.count;
 }
 
 MappingThread::TilesOfBox MappingThread::tiles_of(const Eigen::AlignedBox3d& box_map) {

@@ -82,7 +82,8 @@ class MappingThread : public CheckpointSource {
   [[nodiscard]] std::vector<RemovedVoxel> removed(const Eigen::AlignedBox3d& box_map);
   /// As StaticMap::restore_removed, tile by tile between scans. `make_room` is called where the map
   /// has grown to its memory limit: it is to store the map, so that tiles can be evicted. Throws
-  /// as `removed` and `make_room` do; what was restored until then stays.
+  /// as `removed` and `make_room` do, and std::runtime_error when tiles could not be read; what was
+  /// restored stays.
   std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
                               const std::function<void()>& make_room);
 

@@ -22,9 +22,12 @@ MapPublisher::MapPublisher(dds::Participant& participant, const dds::Topics& top
       cloud_worker_(std::chrono::duration<double>(config.publish.cloud_period_s),
                     [this](const std::stop_token&) { publish_cloud(); }) {}
 
-bool MapPublisher::has_changed(PathState& published) const {
-  const PathState now{.map_id = latest_map_.view()->map_id, .poses = latest_map_.poses_added()};
-  if (now == published || (now.poses == 0 && latest_map_.view()->tiles.empty())) return false;
+bool MapPublisher::has_changed(PathState& published, bool with_view) const {
+  const auto view = latest_map_.view();
+  const PathState now{.map_id = view->map_id,
+                      .poses = latest_map_.poses_added(),
+                      .version = with_view ? view->version : 0};
+  if (now == published || (now.poses == 0 && view->tiles.empty())) return false;
   published = now;
   return true;
 }
@@ -34,13 +37,13 @@ void MapPublisher::publish_tiles() {
 }
 
 void MapPublisher::publish_path() {
-  if (!has_changed(published_path_)) return;
+  if (!has_changed(published_path_, false)) return;
   // Keep-last writers always have room.
   static_cast<void>(path_.write(wire::to_path(latest_map_.trajectory(path_poses_), map_frame_)));
 }
 
 void MapPublisher::publish_cloud() {
-  if (!has_changed(published_cloud_)) return;
+  if (!has_changed(published_cloud_, true)) return;
   const StampedPose pose = latest_map_.newest_pose();
   const Eigen::Vector2f centre_map = pose.T_map_lidar.translation().head<2>().cast<float>();
   const Eigen::Vector2f half = Eigen::Vector2f::Constant(half_window_m_);

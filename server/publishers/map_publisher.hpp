@@ -25,10 +25,13 @@ class MapPublisher {
   struct PathState {
     std::uint64_t map_id = 0;
     std::uint64_t poses = 0;
+    /// Of the view, where that is published, too.
+    std::uint64_t version = 0;
     friend bool operator==(const PathState&, const PathState&) = default;
   };
   /// Whether there is a path, and another one than `published`, which then becomes it.
-  [[nodiscard]] bool has_changed(PathState& published) const;
+  /// `with_view`: or another view along it.
+  [[nodiscard]] bool has_changed(PathState& published, bool with_view) const;
 
   void publish_tiles();
   void publish_path();

@@ -99,7 +99,7 @@ class TilePublisher {
   std::set<TileId> pending_;
   /// What was published of a tile.
   struct Published {
-    /// 0: of another map, or the tile is gone.
+    /// 0: of another map, the tile is gone, or it could not be read.
     std::uint64_t revision = 0;
     /// Number of the publication that brought it.
     std::uint64_t publication = 0;

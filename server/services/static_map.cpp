@@ -1,6 +1,8 @@
 #include <algorithm>
 #include <charconv>
+#include <exception>
 #include <limits>
+#include <stdexcept>
 #include <string>
 #include <utility>
 
@@ -120,6 +122,7 @@ GetTiles_Response get_tiles(const ServiceContext& context, const GetTiles_Reques
     const dds::MapIdentity identity = wire::identity_of(view);
     response.identity(wire::to_wire(identity));
     std::size_t voxels = 0;
+    std::exception_ptr unreadable;
     for (const auto& id : request.ids()) {
       const auto known = find_tile(view, {id.x(), id.y()});
       if (known == nullptr) {
@@ -127,10 +130,18 @@ GetTiles_Response get_tiles(const ServiceContext& context, const GetTiles_Reques
       } else if (voxels > 0 && voxels + known->info.voxel_count > max_voxels_per_reply) {
         response.remaining().push_back(id);
       } else {
-        voxels += known->info.voxel_count;
-        response.tiles().push_back(wire::to_wire(*context.tiles.read(known), identity));
+        try {
+          response.tiles().push_back(wire::to_wire(*context.tiles.read(known), identity));
+          voxels += known->info.voxel_count;
+        } catch (const std::runtime_error&) {
+          // Of many tiles, the others are given: its client asks for this one again.
+          unreadable = std::current_exception();
+        }
       }
     }
+    const bool has_others =
+        !response.tiles().empty() || !response.missing().empty() || !response.remaining().empty();
+    if (unreadable && !has_others) std::rethrow_exception(unreadable);
   });
 }
 

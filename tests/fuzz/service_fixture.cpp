@@ -56,7 +56,7 @@ ServiceFixture::ServiceFixture()
               },
           .restore_removed =
               [this](RemovalReason reason, const auto& box_map) {
-                return map_.restore_removed(reason, box_map, map_.tiles_in(box_map));
+                return map_.restore_removed(reason, box_map, map_.tiles_in(box_map)).count;
               },
           .query_occupancy = [this](const OccupancyQuery& query) { return octree_.answer(query); },
           .encode_octomap =

@@ -109,10 +109,15 @@ std::size_t memory_in_use() {
 #endif
 }
 
-TEST(SlowClient, ThatIsStoppedLosesAndIsToldAndNobodyElseNotices) {
+/// By how many bytes a second large messages may take; 0: as many as there are.
+class SlowClient : public testing::TestWithParam<std::uint32_t> {};
+
+TEST_P(SlowClient, ThatIsStoppedLosesAndIsToldAndNobodyElseNotices) {
   // Forked before this process has threads.
   const StoppingClient stopping(test_domain_id());
-  Participant server_side(loopback(false));
+  DdsOptions options = loopback(false);
+  options.large_message_bytes_per_s = GetParam();
+  Participant server_side(options);
   ServiceServer<SaveMap_Request, SaveMap_Response> server(
       server_side, large_service, [](const SaveMap_Request&) {
         SaveMap_Response reply;
@@ -139,6 +144,9 @@ TEST(SlowClient, ThatIsStoppedLosesAndIsToldAndNobodyElseNotices) {
   EXPECT_LT(memory_in_use() - before, 220'000'000U);
   EXPECT_GE(stopping.refused(), least_refused);
 }
+
+INSTANTIATE_TEST_SUITE_P(Networks, SlowClient, testing::Values(0U, 40'000'000U),
+                         [](const auto& rate) { return rate.param == 0 ? "Fast" : "Slow"; });
 
 }  // namespace
 }  // namespace stillmap::dds

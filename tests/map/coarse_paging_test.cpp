@@ -124,5 +124,65 @@ TEST(CoarsePaging, APageMergesItsOwnPartOfTheRegion) {
   EXPECT_LT(store->loads, 5U * map.tiles.size());
 }
 
+TEST(CoarsePaging, NoPageMergesWholeCities) {
+  const MapSnapshot map = wide_map(60);
+  const auto store = std::make_shared<CountingTileStore>(map.tiles);
+  TileReader reader(store, 0);
+  // As full as tiles of real streets are.
+  constexpr std::uint32_t said_voxels = 3000;
+  MapSnapshot away = map;
+  std::vector<std::shared_ptr<const Tile>> stubs;
+  for (const auto& tile : map.tiles) {
+    auto stub = std::make_shared<Tile>(*without_voxels(*tile));
+    stub->info.voxel_count = said_voxels;
+    stubs.push_back(std::move(stub));
+  }
+  away.tiles = TileTable(std::move(stubs));
+  MapQuery query;
+  query.resolution_m = 0.5;
+  query.max_bytes = 8'000'000;
+  const std::size_t cells = points_by_cell(map, query.resolution_m).size();
+  std::size_t voxels = 0;
+  int pages = 0;
+  do {
+    const std::size_t before = store->loads;
+    const MapQueryResult page = query_map(away, query, nullptr, reader);
+    ASSERT_EQ(page.status, QueryStatus::ok) << page.reason;
+    EXPECT_EQ(page.total_voxels, said_voxels * map.tiles.size()) << "an upper bound";
+    // A million voxels, and the rest of a strip with what reaches into it.
+    EXPECT_LT(store->loads - before, 333U + 3U * 64U);
+    voxels += page.voxels.size();
+    ++pages;
+    query.continuation = page.continuation;
+  } while (!query.continuation.empty());
+  EXPECT_EQ(voxels, cells);
+  EXPECT_GT(pages, 5);
+}
+
+TEST(MapQuery, SomeVoxelsOfEachOfTooManyTilesAreRefused) {
+  const auto stub = without_voxels(*wide_map(2).tiles.front());
+  std::vector<std::shared_ptr<const Tile>> stubs;
+  for (int x = 0; x < 101; ++x) {
+    for (int y = 0; y < 100; ++y) {
+      auto tile = std::make_shared<Tile>(*stub);
+      tile->info.id = {x, y};
+      const Eigen::Vector3f corner(20.0F * static_cast<float>(x), 20.0F * static_cast<float>(y),
+                                   0.0F);
+      tile->info.bounds_map = {corner, corner + Eigen::Vector3f::Constant(19.0F)};
+      stubs.push_back(std::move(tile));
+    }
+  }
+  MapSnapshot map{.version = 1, .map_id = 7, .tile_size_m = 20.0, .voxel_size_m = 0.2, .tiles = {}};
+  map.tiles = TileTable(std::move(stubs));
+  TileReader reader(std::make_shared<CountingTileStore>(map.tiles), 0);
+  MapQuery query;
+  const Eigen::Vector3d far = Eigen::Vector3d::Constant(1e5);
+  query.region = BoxRegion{{-far, far}};
+  query.classes.set(static_cast<std::size_t>(SemanticClass::pole));
+  const MapQueryResult refused = query_map(map, query, nullptr, reader);
+  EXPECT_EQ(refused.status, QueryStatus::invalid_request);
+  EXPECT_NE(refused.reason.find("10100 tiles"), std::string::npos) << refused.reason;
+}
+
 }  // namespace
 }  // namespace stillmap

@@ -82,6 +82,27 @@ TEST(LiveTile, GoesOnFromItsRecordAsIfItHadStayed) {
   }
 }
 
+TEST(LiveTile, OfAVoxelThatAFileExcludesTooTheVoxelStays) {
+  ScanStamps stamps;
+  LiveTile tile(live_id, live_grid);
+  const VoxelIndex index{7, 8, 1};
+  const std::uint32_t scan = stamps.add(5);
+  for (int i = 0; i < 10; ++i) tile.insert(std::array{point_in(voxel_key(index))}, scan);
+  (void)tile.publish(1, rule, stamps);
+  TileRecord record = tile.record(rule, stamps);
+  TileEvidence evidence = *record.evidence;
+  evidence.excluded.push_back({index, SemanticClass::car, true, 5});
+  record.evidence = std::make_shared<const TileEvidence>(evidence);
+  LiveTile reloaded(live_id, record, live_grid, stamps);
+  const Eigen::AlignedBox3d everywhere(Eigen::Vector3d::Constant(-1e3),
+                                       Eigen::Vector3d::Constant(1e3));
+  EXPECT_EQ(reloaded.restore(RemovalReason::moving, everywhere, rule), 0U);
+  (void)reloaded.publish(2, rule, stamps);
+  const TileRecord back = reloaded.record(rule, stamps);
+  EXPECT_EQ(decode_tile(encode_tile(*back.tile), live_grid).voxels.size(), 1U);
+  EXPECT_TRUE(back.evidence->excluded.empty());
+}
+
 TEST(LiveTile, FindsEveryVoxel) {
   LiveTile tile(live_id, live_grid);
   ScanStamps stamps;

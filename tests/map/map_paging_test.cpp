@@ -209,8 +209,10 @@ TEST(MapPaging, ARestartGoesOnWithWhatWasHidden) {
   EXPECT_LE(after.memory_use().bytes, PagedMap::limit_bytes);
   EXPECT_GT(after.memory_use().resident_tiles, 5U);
   EXPECT_EQ(after.view()->tiles.size(), non_resident.view.tiles.size());
-  EXPECT_GT(after.restore_removed(RemovalReason::moving, test::everywhere(),
-                                  after.tiles_in(test::everywhere())),
+  EXPECT_GT(after
+                .restore_removed(RemovalReason::moving, test::everywhere(),
+                                 after.tiles_in(test::everywhere()))
+                .count,
             100U);
 }
 
@@ -229,7 +231,7 @@ TEST(MapPaging, RestoringInPartsKeepsToTheLimit) {
   for (std::span<const TileId> left(ids); !left.empty();) {
     const auto some = left.first(std::min<std::size_t>(left.size(), 8));
     left = left.subspan(some.size());
-    restored += map.map_.restore_removed(RemovalReason::moving, test::everywhere(), some);
+    restored += map.map_.restore_removed(RemovalReason::moving, test::everywhere(), some).count;
     peak_bytes = std::max(peak_bytes, map.map_.memory_use().bytes);
     if (map.map_.memory_use().bytes < PagedMap::limit_bytes) continue;
     const MapCheckpoint checkpoint = map.map_.checkpoint();
@@ -248,14 +250,17 @@ class FaultyTileStore : public TileStore {
   FaultyTileStore(std::shared_ptr<TileStore> sound, TileId lost)
       : sound_(std::move(sound)), lost_(lost) {}
   TileRecord load(TileId id) override {
+    if (id == lost_) ++attempts_;
     if (id == lost_ && !is_mended_) throw std::runtime_error("the disk is broken");
     return sound_->load(id);
   }
+  [[nodiscard]] int attempts() const { return attempts_; }
   void mend() { is_mended_ = true; }
 
  private:
   std::shared_ptr<TileStore> sound_;
   TileId lost_;
+  int attempts_ = 0;
   bool is_mended_ = false;
 };
 
@@ -274,12 +279,18 @@ TEST(MapPaging, ATileThatCannotBeReadStaysAsItIsStored) {
   Drive drive(after);
   for (int scan = 0; scan < 10; ++scan) drive.see(scan);
   EXPECT_THAT(after.unreadable_tiles(), testing::ElementsAre("tile (2, 0): the disk is broken"));
+  EXPECT_EQ(faulty->attempts(), 1) << "an attempt may take a broken disk long";
   store->save(to_saved_map(after.checkpoint()));
   const auto tile_of = [](const SavedMap& map) {
     return *std::ranges::find(map.view.tiles, TileId{2, 0},
                               [](const auto& tile) { return tile->info.id; });
   };
   EXPECT_EQ(tile_of(store->load())->info.content_hash, tile_of(whole)->info.content_hash);
+  // Who asks for it is told.
+  const auto restored = after.restore_removed(RemovalReason::moving, test::everywhere(),
+                                              after.tiles_in(test::everywhere()));
+  EXPECT_THAT(restored.unreadable, testing::ElementsAre(TileId{2, 0}));
+  EXPECT_EQ(faulty->attempts(), 2);
   // A disk that recovers is noticed.
   faulty->mend();
   for (int scan = 0; scan < 30; ++scan) drive.see(scan % 10);

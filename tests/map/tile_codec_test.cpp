@@ -112,6 +112,11 @@ TEST(TileCodec, ImpossibleVoxelsAreRefused) {
   expect_refused([](Voxels voxels, Seen, Info) { voxels[0].point_count = 0; });
   expect_refused([](Voxels, Seen seen, Info) { seen.stamps_ns = {6, 5}; });
   expect_refused([](Voxels, Seen seen, Info) { seen.stamps_ns = {}; });
+  expect_refused([](Voxels voxels, Seen seen, Info) {
+    for (std::size_t i = 0; i < 2 * voxels.size(); ++i) {
+      seen.stamps_ns.push_back(static_cast<std::int64_t>(6 + i));
+    }
+  });
   expect_refused([](Voxels, Seen, Info info) { info.voxel_count += 1; });
   expect_refused([](Voxels, Seen, Info info) { info.voxel_count = 0xFFFFFFFF; });
   EXPECT_FALSE(ClassEvidence::of(ClassEvidence::Bits{{1, 0, 0}, 31}));

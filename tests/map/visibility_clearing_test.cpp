@@ -134,7 +134,8 @@ TEST_F(VisibilityClearing, RemovedThingsCanBeShownAgain) {
   const int parked = removed(RemovalReason::semi_static);
   ASSERT_GT(parked, 50);
   const Eigen::AlignedBox3d left(Eigen::Vector3d(0, 0, -10), Eigen::Vector3d(30, 30, 10));
-  const auto restored = map_.restore_removed(RemovalReason::semi_static, left, map_.tiles_in(left));
+  const auto restored =
+      map_.restore_removed(RemovalReason::semi_static, left, map_.tiles_in(left)).count;
   EXPECT_GT(restored, 10U);
   EXPECT_EQ(shown(car), static_cast<int>(restored));
   EXPECT_EQ(removed(RemovalReason::semi_static), parked - static_cast<int>(restored));

@@ -187,6 +187,44 @@ TEST_F(MapSaverSafetyTest, TheFileOfAnotherProcessIsRefusedAndItsHolderNamed) {
               HasSubstr("in use"));
 }
 
+TEST_F(MapSaverSafetyTest, AFileHasOneLockWhateverItsNames) {
+  save_far_map("real.stillmap");
+  fs::create_symlink("real.stillmap", file_);
+  MapSaver first = this->saver();
+  first.set_source(source_);
+  const auto expect_locked = [&](const char* name) {
+    EXPECT_THAT(why_refused([&] { MapSaver(latest_map_, statistics_, folder_ / name, {}, {}); }),
+                HasSubstr("in use by process"))
+        << name;
+  };
+  expect_locked("real.stillmap");
+  expect_locked("city.stillmap");
+  map_scan(5.0F);
+  first.begin_anew(false, begin_);
+  map_scan(30.0F);
+  first.save_if_changed();
+  expect_locked("real.stillmap");
+  expect_locked("city.stillmap");
+  EXPECT_TRUE(fs::is_symlink(file_));
+  EXPECT_EQ(tile_in(file_), 1);
+}
+
+TEST_F(MapSaverSafetyTest, AnIdleRunLeavesTheMapItsId) {
+  save_far_map("city.stillmap");
+  std::uint64_t map_id = 0;
+  for (int run = 0; run < 3; ++run) {
+    MapSaver saver = this->saver();
+    saver.set_source(source_);
+    const SavedMap stored = *saver.load();
+    if (run > 1) {
+      EXPECT_EQ(stored.view.map_id, map_id);
+    }
+    map_id = stored.view.map_id;
+    prepare_(stored, nullptr)();
+    saver.save_at_end();
+  }
+}
+
 TEST_F(MapSaverSafetyTest, TheLockOfTheDeadIsTakenOver) {
   std::ofstream(folder_ / "city.stillmap.lock") << "elsewhere 4711\n";
   MapSaver saver = this->saver();

@@ -4,8 +4,13 @@
 
 #include <condition_variable>
 #include <mutex>
+#include <thread>
 
+#include "idl/dds/participant.hpp"
+#include "idl/dds/reader.hpp"
+#include "server/occupancy/occupancy.hpp"
 #include "tests/eventually.hpp"
+#include "tests/idl/dds_fixture.hpp"
 #include "tests/server/room_scans.hpp"
 
 namespace stillmap::test {
@@ -152,6 +157,36 @@ TEST_F(GatedOccupancyThreadTest, EndsWithAnEncodingUnderWay) {
     set_open(true);
   }
   EXPECT_EQ(encoded.wait_for(0s), std::future_status::ready) << "with an octree or an exception";
+}
+
+TEST_F(GatedOccupancyThreadTest, NoOctreeOfAnOldMapIsPublishedWhileAnotherIsEncoded) {
+  server::OccupancyThread thread(OccupancyServiceConfig{}, statistics_, gate(), scheduling);
+  dds::Participant participant(dds::loopback(false));
+  const auto topics = dds::Topics::in("stillmap");
+  ServerConfig config;
+  config.occupancy.publish_period_s = 1.0;
+  server::OctomapPublisher publisher(participant, topics, config, thread);
+  dds::Reader<octomap_msgs::msg::Octomap> early(participant, topics.octomap.dds_name,
+                                                topics.octomap.reader);
+  octomap_msgs::msg::Octomap octree;
+  thread.add(room(0));
+  ASSERT_TRUE(early.take(octree, {}, patience));
+  // The octree changed, and its next encoding waits.
+  thread.add(room(1));
+  ASSERT_TRUE(done(thread, 2));
+  set_open(false);
+  thread.add(room(2));
+  ASSERT_TRUE(waits());
+  std::this_thread::sleep_for(1500ms);
+  StaticMap map{StaticMapConfig{}};
+  thread.begin(map.view());
+  std::this_thread::sleep_for(500ms * slowdown);
+  dds::Reader<octomap_msgs::msg::Octomap> late(participant, topics.octomap.dds_name,
+                                               topics.octomap.reader);
+  EXPECT_FALSE(late.take(octree, {}, 1000ms)) << "of a map that is no more";
+  set_open(true);
+  ASSERT_TRUE(late.take(octree, {}, patience));
+  EXPECT_EQ(octree.data().size(), OccupancyMap(OccupancyConfig{}).encode(true).bytes.size());
 }
 
 TEST_F(OccupancyThreadTest, StopsClearingAndThenDropsScansWhenItCannotKeepUp) {

@@ -286,8 +286,15 @@ SavedMap to_saved_map(const MapCheckpoint& checkpoint) {
   return map;
 }
 
+fs::path real_file(const fs::path& file) {
+  std::error_code unknown;
+  const fs::path real = fs::weakly_canonical(fs::absolute(file), unknown);
+  // What cannot be resolved cannot be opened either, and that has better words for it.
+  return unknown ? fs::absolute(file) : real;
+}
+
 std::unique_ptr<MapStore> open_map_file(const fs::path& file) {
-  return std::make_unique<SqliteMapStore>(file);
+  return std::make_unique<SqliteMapStore>(real_file(file));
 }
 
 void replace_map_file(const fs::path& fresh, const fs::path& file) {
@@ -299,7 +306,7 @@ void replace_map_file(const fs::path& fresh, const fs::path& file) {
 }
 
 std::shared_ptr<TileStore> open_tile_store(const fs::path& file) {
-  return std::make_shared<SqliteTileStore>(file, nullptr);
+  return std::make_shared<SqliteTileStore>(real_file(file), nullptr);
 }
 
 std::unique_ptr<MapStore> open_scratch_map() {

@@ -73,6 +73,9 @@ class MapStore {
   virtual void copy_to(const std::filesystem::path& file) = 0;
 };
 
+/// The file itself, absolute, where a name is a link: its log and its lock lie beside that.
+[[nodiscard]] std::filesystem::path real_file(const std::filesystem::path& file);
+
 /// Opens or makes an SQLite map file (WAL; the file alone is complete after each save and may be
 /// copied). Throws MapFileError: no database, another program's, written by a newer version,
 /// damaged, or in a folder that cannot be written. Such a file is left untouched.

@@ -81,7 +81,7 @@ MapFileCopy::MapFileCopy(fs::path file) : file_(std::move(file)) {
   folder_ = fresh_folder(file_);
   copy_ = folder_ / "map.stillmap";
   try {
-    copy_with_log(file_, copy_);
+    copy_with_log(real_file(file_), copy_);
   } catch (const fs::filesystem_error& error) {
     std::error_code ignored;
     fs::remove_all(folder_, ignored);

@@ -84,8 +84,7 @@ int try_lock(const fs::path& lock_file, const fs::path& map_file) {
 }  // namespace
 
 // Of the file that a link leads to: two names of one map have one lock.
-MapLock::MapLock(const fs::path& map_file)
-    : lock_file_(beside(fs::weakly_canonical(map_file), ".lock")) {
+MapLock::MapLock(const fs::path& map_file) : lock_file_(beside(real_file(map_file), ".lock")) {
   while (descriptor_ < 0) descriptor_ = try_lock(lock_file_, map_file);
   const std::string holder = host_name() + " " + std::to_string(::getpid()) + "\n";
   const bool is_named =

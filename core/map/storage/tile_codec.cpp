@@ -216,6 +216,13 @@ void check_content(const std::vector<std::uint8_t>& content, std::size_t needed,
                        " bytes instead of " + std::to_string(needed));
 }
 
+/// Every voxel has two at most: more would fill memory for nothing.
+void check_stamps(std::size_t stamps, std::size_t max_stamps) {
+  if (stamps <= max_stamps) return;
+  throw TileCodecError("has " + std::to_string(stamps) + " stamps for at most " +
+                       std::to_string(max_stamps));
+}
+
 /// The second format had them as they are, and was otherwise the same.
 FirstVotes first_votes_in(std::span<const std::uint8_t> frame) {
   return frame[0] <= 2 ? FirstVotes::as_they_are : FirstVotes::by_what_lacks;
@@ -253,6 +260,7 @@ Tile decode_tile(std::span<const std::uint8_t> bytes, const VoxelGrid& grid) {
   TileHeader header;
   visit_tile_header(FieldReader(content.data()), header);
   const std::size_t count = header.info.voxel_count;
+  check_stamps(header.stamps, 2 * count);
   check_content(content,
                 tile_header_bytes + header.stamps * stamp_bytes + count * packed_voxel_bytes,
                 std::to_string(count) + " voxels and a content");
@@ -292,6 +300,8 @@ TileEvidence decode_evidence(std::span<const std::uint8_t> bytes, const VoxelGri
   const std::vector<std::uint8_t> content = from_frame(bytes, evidence_header_bytes);
   EvidenceHeader header;
   visit_evidence_header(FieldReader(content.data()), header);
+  check_stamps(header.hidden_stamps, 2 * std::size_t{header.hidden});
+  check_stamps(header.excluded_stamps, header.excluded);
   check_content(content,
                 evidence_header_bytes + header.shown * history_bytes +
                     header.hidden_stamps * stamp_bytes +
