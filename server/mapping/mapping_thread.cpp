@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -53,6 +54,16 @@ std::optional<Eigen::Isometry3d> pose_in_saved_map(const SharedTrajectory& store
   if (stored.empty()) return std::nullopt;
   const auto then = std::ranges::find(stored, stamp_ns, &StampedPose::stamp_ns);
   return then == stored.end() ? stored.back().T_map_lidar : then->T_map_lidar;
+}
+
+/// Why a restoration is not complete.
+std::string restored_in_part(const StaticMap::RestoredVoxels& restored) {
+  const TileId first = restored.unreadable.front();
+  std::ostringstream text;
+  text << restored.count << " voxels are shown again, but " << restored.unreadable.size()
+       << " tiles of the region cannot be read, the first of them (" << first.x << ", " << first.y
+       << "); the status says why. Ask again when their disk can be read";
+  return text.str();
 }
 
 }  // namespace
@@ -268,12 +279,7 @@ std::size_t MappingThread::restore_removed(RemovalReason reason, const Eigen::Al
     if (is_full) make_room();
   }
   if (!restored.unreadable.empty()) {
-    throw std::runtime_error(std::to_string(restored.count) + " voxels are shown again, but " +
-                             std::to_string(restored.unreadable.size()) +
-                             " tiles of the region cannot be read, the first of them (" +
-                             std::to_string(restored.unreadable.front().x) + ", " +
-                             std::to_string(restored.unreadable.front().y) +
-                             "); the status says why. Ask again when their disk can be read");
+    throw std::runtime_error(restored_in_part(restored));
   }
   return restored.count;
 }
