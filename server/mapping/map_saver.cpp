@@ -222,7 +222,7 @@ bool MapSaver::is_empty() const {
 
 fs::path MapSaver::save_as(const std::string& name, bool overwrite) {
   const std::scoped_lock lock(mutex_);
-  const fs::path target = file_named(name);
+  fs::path target = file_named(name);
   if (is_empty()) {
     throw std::invalid_argument("the map is empty: no scan was mapped yet; nothing is saved");
   }
@@ -256,7 +256,7 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
   const std::scoped_lock lock(mutex_);
   // It belongs under the name that the saver is about to leave.
   if (misplaced_) bring_back();
-  const fs::path target = file_named(name);
+  fs::path target = file_named(name);
   const bool is_own = target == file_;
   auto target_lock = is_own ? nullptr : std::make_unique<MapLock>(target);
   auto store = is_own ? nullptr : open_existing(target);

@@ -193,7 +193,9 @@ TEST_F(MapSaverSafetyTest, AFileHasOneLockWhateverItsNames) {
   MapSaver first = this->saver();
   first.set_source(source_);
   const auto expect_locked = [&](const char* name) {
-    EXPECT_THAT(why_refused([&] { MapSaver(latest_map_, statistics_, folder_ / name, {}, {}); }),
+    EXPECT_THAT(why_refused([&] {
+                  const MapSaver second(latest_map_, statistics_, folder_ / name, {}, {});
+                }),
                 HasSubstr("in use by process"))
         << name;
   };
