@@ -242,7 +242,7 @@ void upgrade_schema(SQLite::Database& database) {
   }
   database.exec(evidence_table);
   fill_in_infos(database);
-  database.exec("PRAGMA user_version = " + std::to_string(schema_version));
+  set_number(database, "user_version", schema_version);
   transaction.commit();
 }
 
