@@ -53,8 +53,10 @@ Eigen::Matrix3d left_jacobian(const Eigen::Vector3d& r) {
 
 PoseTangent twist_of(const Eigen::Isometry3d& T) {
   const Eigen::Vector3d r = so3_log(T.linear());
+  const Eigen::Matrix3d from_translation = left_jacobian(r).inverse();
   PoseTangent twist;
-  twist << left_jacobian(r).inverse() * T.translation(), r;
+  twist.head<3>() = from_translation * T.translation();
+  twist.tail<3>() = r;
   return twist;
 }
 
