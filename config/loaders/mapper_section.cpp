@@ -86,10 +86,9 @@ void read_motion(YamlSection section, MotionConfig& motion) {
 }
 
 void read_odometry(YamlSection section, OdometryConfig& odometry) {
-  section.choice<Weighting>("weighting", odometry.weighting,
-                            {{"none", Weighting::none},
-                             {"geometric", Weighting::geometric},
-                             {"semantic", Weighting::semantic}});
+  std::vector<YamlSection::Choice<Weighting>> weightings;
+  for (const auto& [name, weighting] : named_weightings) weightings.push_back({name, weighting});
+  section.choice("weighting", odometry.weighting, weightings);
   section.number("alpha", odometry.alpha, shares);
   section.boolean("paper_exact", odometry.paper_exact);
   read_features(section.section("features"), odometry.features);

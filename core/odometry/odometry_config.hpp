@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <string>
 
 namespace stillmap {
@@ -13,6 +14,17 @@ enum class Weighting {
   /// w = 1 - alpha d - beta c, eq. (10).
   semantic,
 };
+
+/// A weighting as configurations and command lines write it.
+struct NamedWeighting {
+  const char* name;
+  Weighting weighting;
+};
+
+/// Every weighting, in the order of Table I.
+inline constexpr std::array named_weightings{NamedWeighting{"none", Weighting::none},
+                                             NamedWeighting{"geometric", Weighting::geometric},
+                                             NamedWeighting{"semantic", Weighting::semantic}};
 
 /// Edge and plane points of a ring (LOAM V-A).
 struct FeatureConfig {

@@ -1,5 +1,6 @@
 #include "clients/commands/arguments/mapper_arguments.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 
 #include "config/loaders/model_file.hpp"
@@ -54,29 +55,23 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
               "files (must have them), model (the one that comes with Stillmap), none (pure "
               "geometry), or a folder with a model")
       .with_default();
+  std::vector<std::string> weighting_names;
+  for (const NamedWeighting& known : named_weightings) weighting_names.emplace_back(known.name);
   command
       .option("--weighting", arguments.weighting,
               "What a correspondence counts, the rows of the paper's Table I: none, "
               "geometric, semantic; default: as configured")
-      .one_of({"none", "geometric", "semantic"});
+      .one_of(weighting_names);
   add_segmentation_options(command, arguments);
 }
 
 const char* name(Weighting weighting) {
-  switch (weighting) {
-    case Weighting::none:
-      return "none";
-    case Weighting::geometric:
-      return "geometric";
-    case Weighting::semantic:
-      break;
-  }
-  return "semantic";
+  return std::ranges::find(named_weightings, weighting, &NamedWeighting::weighting)->name;
 }
 
 Weighting weighting_from_name(const std::string& weighting_name) {
-  for (const Weighting weighting : {Weighting::none, Weighting::geometric, Weighting::semantic}) {
-    if (weighting_name == name(weighting)) return weighting;
+  for (const auto& [known_name, weighting] : named_weightings) {
+    if (weighting_name == known_name) return weighting;
   }
   throw std::invalid_argument("weighting '" + weighting_name +
                               "' is not known; there are none, geometric and semantic");

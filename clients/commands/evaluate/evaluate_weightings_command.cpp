@@ -1,6 +1,5 @@
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <functional>
 #include <iostream>
 #include <memory>
@@ -32,13 +31,11 @@ struct WeightingResult {
   double median_ms = 0.0;
 };
 
-constexpr std::array weighting_names{"none", "geometric", "semantic"};
-
 /// One of the mappers that are compared, and its stage times.
 struct WeightingRun {
-  WeightingRun(const std::string& weighting_name, MapperConfig config, bool labelled)
-      : weighting(weighting_name) {
-    config.odometry.weighting = weighting_from_name(weighting_name);
+  WeightingRun(const NamedWeighting& row, MapperConfig config, bool labelled)
+      : weighting(row.name) {
+    config.odometry.weighting = row.weighting;
     std::unique_ptr<Segmenter> labels = std::make_unique<NullSegmenter>();
     if (labelled) labels = std::make_unique<PassthroughSegmenter>();
     mapper = std::make_unique<Mapper>(config, std::move(labels));
@@ -74,8 +71,8 @@ std::vector<WeightingResult> compare_weightings(const GroundTruthSequence& seque
                                                 const MapperConfig& config, std::size_t max_scans,
                                                 const std::function<bool(std::size_t)>& scan_done) {
   std::vector<WeightingRun> runs;
-  for (const char* weighting_name : weighting_names) {
-    runs.emplace_back(weighting_name, config, sequence.labelled);
+  for (const NamedWeighting& row : named_weightings) {
+    runs.emplace_back(row, config, sequence.labelled);
   }
   for (std::size_t i = 0; i < std::min(max_scans, sequence.size()); ++i) {
     const Scan scan = sequence.read(i);
