@@ -98,7 +98,7 @@ parity: build ## Our engines against PyTorch, every RangeNet++ network and size
 	PYTHONPATH=core/segmentation/training STILLMAP_TRAINING=core/segmentation/training \
 	  STILLMAP=$(BUILD)/bin/stillmap /usr/bin/python3 tests/training/parity.py
 
-tidy: programs ## clang-tidy over the sources changed since BASE (the commit before last), or over FILES
+tidy: programs ## clang-tidy over the sources changed since BASE (the commit before last), or over FILES (needs clang-tidy-16)
 	@BUILD=$(BUILD) BASE=$(BASE) FILES="$(FILES)" tests/tidy.sh
 
 format: ## Format the code

@@ -9,8 +9,10 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 build=${BUILD:-build/release}
 
-command -v clang-tidy > /dev/null || {
-  echo "tidy: clang-tidy is missing: apt-get install clang-tidy" >&2
+# Debian's default, clang 14, does not know C++20's aggregates in parentheses nor libstdc++'s ranges.
+clang_tidy=clang-tidy-16
+command -v "$clang_tidy" > /dev/null || {
+  echo "tidy: $clang_tidy is missing: apt-get install $clang_tidy" >&2
   exit 2
 }
 [ -f "$build/compile_commands.json" ] || {
@@ -51,7 +53,7 @@ done
 
 # How many warnings there are in headers that are not ours is of no interest.
 if printf '%s\0' "${known[@]}" | xargs -0 -n 1 -P "$(nproc)" \
-    clang-tidy -p "$database" --quiet --warnings-as-errors='*' 2> "$database/noise"; then
+    "$clang_tidy" -p "$database" --quiet --warnings-as-errors='*' 2> "$database/noise"; then
   echo "tidy: ${#known[@]} sources, no findings"
 else
   grep -vE '^[0-9]+ warnings? (generated|treated as errors?)' "$database/noise" >&2 || true

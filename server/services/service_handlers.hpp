@@ -69,6 +69,8 @@ struct ServiceHandler {
   /// Called once a second while there are no requests, on the thread of `answer`.
   void (*idle)(const ServiceContext& context) = [](const ServiceContext&) {};
 };
+template <typename Request, typename Reply, typename... Rest>
+ServiceHandler(dds::ServiceSpec<Request, Reply>, Rest...) -> ServiceHandler<Request, Reply>;
 
 /// A handler for every service.
 inline constexpr std::tuple service_handlers{

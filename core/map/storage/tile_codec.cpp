@@ -74,7 +74,7 @@ struct EvidenceHeader {
   std::uint32_t excluded = 0;
   std::uint32_t excluded_stamps = 0;
 };
-constexpr std::size_t evidence_header_bytes = 4 + 4 + grid_bytes + 5 * 4;
+constexpr std::size_t evidence_header_bytes = 4 + 4 + grid_bytes + 5 * std::size_t{4};
 
 template <typename Visitor, typename Header>
 void visit_evidence_header(Visitor visit, Header& header) {
