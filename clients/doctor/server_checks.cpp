@@ -93,11 +93,10 @@ dds::Diagnostic no_scans_diagnostic(const std::vector<Publisher>& found, const s
 void add_rejected_clouds(const dds::ServerStatus& status, Diagnostics& diagnostics) {
   const std::uint64_t received = status.counter("scans_received");
   for (const dds::NamedCounter& counter : status.counters) {
-    if (!counter.name.starts_with("dropped_bad_cloud_")) continue;
+    if (counter.name != dds::bad_clouds_counter) continue;
     diagnostics.push_back(
         {.severity = counter.value == received ? dds::Severity::problem : dds::Severity::advice,
-         .what =
-             "clouds are refused: " + counter.name.substr(std::string("dropped_bad_cloud_").size()),
+         .what = "clouds are refused: " + counter.detail,
          .evidence = std::to_string(counter.value) + " of " + std::to_string(received) + " scans" +
                      (status.reason.empty() ? "" : "; " + status.reason),
          .hint = "give the server the names of the cloud's fields (input.fields) "

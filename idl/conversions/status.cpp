@@ -22,12 +22,14 @@ static_assert(static_cast<std::uint8_t>(dds::Severity::advice) == severities::WA
 void add_lists(const dds::ServerStatus& status, stillmap_msgs::msg::Status& message) {
   for (const dds::ServiceFault& fault : status.service_faults) {
     auto& out = message.counters().emplace_back();
-    out.name(fault.fault + "_" + fault.service);
+    out.name(fault.fault);
+    out.detail(fault.service);
     out.value(fault.count);
   }
   for (const dds::NamedCounter& counter : status.counters) {
     auto& out = message.counters().emplace_back();
     out.name(counter.name);
+    out.detail(counter.detail);
     out.value(counter.value);
   }
   for (const dds::StageLatency& latency : status.latencies) {
@@ -63,7 +65,8 @@ void add_diagnostics(const stillmap_msgs::msg::Status& message, dds::ServerStatu
 
 void add_lists(const stillmap_msgs::msg::Status& message, dds::ServerStatus& status) {
   for (const auto& counter : message.counters()) {
-    status.counters.push_back({.name = counter.name(), .value = counter.value()});
+    status.counters.push_back(
+        {.name = counter.name(), .detail = counter.detail(), .value = counter.value()});
   }
   for (const auto& latency : message.latencies()) {
     status.latencies.push_back({.stage = latency.stage(),

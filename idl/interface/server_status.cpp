@@ -15,16 +15,22 @@ std::string every_nth_scan(std::uint32_t n) {
   return "every " + std::to_string(n).append(ending).append(" scan");
 }
 
-std::uint64_t ServerStatus::counter(std::string_view counter_name) const {
-  const auto found = std::ranges::find(counters, counter_name, &NamedCounter::name);
+std::uint64_t ServerStatus::counter(std::string_view name, std::string_view detail) const {
+  const auto found = std::ranges::find_if(counters, [&](const NamedCounter& counter) {
+    return counter.name == name && counter.detail == detail;
+  });
   return found == counters.end() ? 0 : found->value;
 }
 
 std::uint64_t ServerStatus::dropped() const {
   return std::accumulate(counters.begin(), counters.end(), std::uint64_t{0},
                          [](std::uint64_t sum, const NamedCounter& counter) {
-                           return counter.name.starts_with("dropped_") ? sum + counter.value : sum;
+                           return counter.name == scans_dropped_counter ? sum + counter.value : sum;
                          });
+}
+
+std::uint64_t ServerStatus::dropped(std::string_view reason) const {
+  return counter(scans_dropped_counter, reason);
 }
 
 }  // namespace stillmap::dds

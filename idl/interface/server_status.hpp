@@ -12,12 +12,21 @@
 
 namespace stillmap::dds {
 
-/// An event of the server's life and how often it happened, as "scans_mapped" or
-/// "dropped_queue_full".
+/// An event of the server's life and how often it happened, as "scans_mapped".
 struct NamedCounter {
   std::string name;
+  /// Which one, where a name has several: of "scans_dropped" the reason, of a service's fault the
+  /// service. Else empty.
+  std::string detail{};
   std::uint64_t value = 0;
 };
+
+/// Of scans that were received and not mapped, a counter for every reason that occurred.
+inline constexpr const char* scans_dropped_counter = "scans_dropped";
+
+/// Of clouds that could not be read as scans, a counter for every fault that occurred: "no_xyz".
+/// They are among the scans dropped.
+inline constexpr const char* bad_clouds_counter = "bad_clouds";
 
 /// Of checkpoints that failed since the last one that did not: while it is above 0, what is mapped
 /// is in memory alone.
@@ -75,10 +84,10 @@ struct ServerStatus {
   std::uint64_t voxel_count = 0;
   SegmentationStatus segmentation;
   /// "scans_received", "scans_mapped", "scans_lost" (which did not arrive) and "label_failures"
-  /// once there are any, and "dropped_<reason>" for every reason that occurred; then events beside
-  /// mapping, as "occupancy_not_cleared". As read from the wire, `service_faults`, too.
+  /// once there are any, scans_dropped_counter and bad_clouds_counter; then events beside mapping,
+  /// as "occupancy_not_cleared". As read from the wire, `service_faults`, too.
   std::vector<NamedCounter> counters;
-  /// Of this process. On the wire they are counters "<fault>_<service>".
+  /// Of this process. On the wire they are counters of the fault's name, the service their detail.
   std::vector<ServiceFault> service_faults{};
   /// In the order of the pipeline: wait in the queue, its stages, and "total"; then
   /// what runs beside it, as "occupancy".
@@ -98,9 +107,11 @@ struct ServerStatus {
   std::vector<Diagnostic> diagnostics;
 
   /// Value of a counter; 0 when it never counted.
-  [[nodiscard]] std::uint64_t counter(std::string_view counter_name) const;
-  /// Sum of all "dropped_" counters.
+  [[nodiscard]] std::uint64_t counter(std::string_view name, std::string_view detail = {}) const;
+  /// Scans dropped, for all reasons.
   [[nodiscard]] std::uint64_t dropped() const;
+  /// Scans dropped for this reason, as "queue_full".
+  [[nodiscard]] std::uint64_t dropped(std::string_view reason) const;
 };
 
 }  // namespace stillmap::dds

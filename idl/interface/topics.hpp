@@ -10,7 +10,7 @@
 namespace stillmap::dds {
 
 /// Version of every struct in stillmap_msgs.idl that carries one.
-inline constexpr std::uint8_t wire_format_version = 7;
+inline constexpr std::uint8_t wire_format_version = 8;
 
 /// A topic: its name as DDS sees it, its type, and the quality of service of its writer and
 /// readers.

@@ -135,7 +135,10 @@ void ScanReceiver::accept(const sensor_msgs::msg::PointCloud2& cloud, const std:
   }
   auto [from_cloud, cloud_changes] = lidar->reader.read(cloud);
   auto& [scan, fault, understood] = from_cloud;
-  if (!scan) return drop("bad_cloud_" + fault.counter, 1, "bad cloud: " + fault.reason);
+  if (!scan) {
+    statistics_.bad_cloud(fault.counter);
+    return drop("bad_cloud", 1, "bad cloud: " + fault.reason);
+  }
   report(*lidar, cloud_changes, *scan);
   if (sweeps_ != nullptr) return sweeps_->add(lidar->index, *std::move(scan), stop);
   queue_scan({*std::move(scan), frame, received}, stop);

@@ -86,7 +86,7 @@ void SweepInput::queue_sweeps(const std::stop_token& stop) {
 void SweepInput::queue(SweepMerger::Sweep sweep, const std::stop_token& stop) {
   for (const std::size_t lidar : sweep.missing) {
     const std::string& name = lidars_[lidar].name;
-    statistics_.count("sweeps_without_" + name);
+    statistics_.sweep_without(name);
     throttled_log_.warn("lidar_" + name, "no scan of lidar '" + name + "' on " +
                                              lidars_[lidar].topic +
                                              " in time: the sweep goes on without it");

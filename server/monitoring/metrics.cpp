@@ -65,6 +65,10 @@ Metrics::Metrics()
                          "Scans that were published and did not arrive")),
       scans_dropped(counters(registry_, "stillmap_scans_dropped_total",
                              "Scans that were not mapped, by reason")),
+      bad_clouds(counters(registry_, "stillmap_bad_clouds_total",
+                          "Clouds that could not be read as scans, by fault")),
+      sweeps_without(counters(registry_, "stillmap_sweeps_without_total",
+                              "Sweeps that a lidar had no scan in, by lidar")),
       events(
           counters(registry_, "stillmap_events_total", "What happened beside mapping, by event")),
       label_failures(

@@ -41,6 +41,10 @@ class Metrics {
   prometheus::Counter& scans_lost;
   /// Labels: reason.
   Counters& scans_dropped;
+  /// Labels: fault.
+  Counters& bad_clouds;
+  /// Labels: lidar.
+  Counters& sweeps_without;
   /// Labels: event.
   Counters& events;
   prometheus::Counter& label_failures;

@@ -68,6 +68,16 @@ void Statistics::scans_dropped(const std::string& reason, std::size_t count,
   last_drop_ = detail;
 }
 
+void Statistics::bad_cloud(const std::string& fault) {
+  const std::scoped_lock lock(mutex_);
+  member(bad_clouds_, metrics_->bad_clouds, "fault", fault).Increment();
+}
+
+void Statistics::sweep_without(const std::string& lidar) {
+  const std::scoped_lock lock(mutex_);
+  member(sweeps_without_, metrics_->sweeps_without, "lidar", lidar).Increment();
+}
+
 void Statistics::scans_lost(std::uint64_t count) {
   metrics_->scans_lost.Increment(static_cast<double>(count));
 }
@@ -138,8 +148,14 @@ std::vector<dds::NamedCounter> Statistics::counters() const {
   if (const double failures = metrics.label_failures.Value(); failures > 0.0) {
     add("label_failures", failures);
   }
-  // On the wire, all counters share one list.
-  for (const auto& [reason, counter] : dropped_) add("dropped_" + reason, counter->Value());
+  const auto add_each = [&](const char* name, const Counters& counters) {
+    for (const auto& [detail, counter] : counters) {
+      all.push_back({.name = name, .detail = detail, .value = whole(counter->Value())});
+    }
+  };
+  add_each(dds::scans_dropped_counter, dropped_);
+  add_each(dds::bad_clouds_counter, bad_clouds_);
+  add_each("sweeps_without", sweeps_without_);
   for (const auto& [event, counter] : events_) add(event, counter->Value());
   return all;
 }

@@ -39,8 +39,12 @@ class Statistics {
   /// The label source failed; `detail` is told in the status until it works again.
   void segmentation_failed(const std::string& detail);
   void segmentation_succeeded();
-  /// Counts "dropped_<reason>" in the status; the last `detail` is told there, too.
+  /// Counted by reason in the status; the last `detail` is told there, too.
   void scans_dropped(const std::string& reason, std::size_t count, const std::string& detail);
+  /// A cloud that is no scan; fault: "no_xyz". Its scan counts as dropped besides.
+  void bad_cloud(const std::string& fault);
+  /// A sweep that was put together without this lidar: "sweeps_without" in the status.
+  void sweep_without(const std::string& lidar);
   /// So many were published and did not arrive: "scans_lost" in the status.
   void scans_lost(std::uint64_t count);
   /// Counts an event that has nothing more to tell.
@@ -73,7 +77,7 @@ class Statistics {
   [[nodiscard]] std::string last_segmentation_failure() const;
 
  private:
-  /// By reason or event, in the order of first occurrence.
+  /// By the value of their label, in the order of first occurrence.
   using Counters = std::vector<std::pair<std::string, prometheus::Counter*>>;
   struct Stage {
     std::string name;
@@ -87,6 +91,8 @@ class Statistics {
   std::unique_ptr<Metrics> metrics_;
   mutable std::mutex mutex_;
   Counters dropped_;
+  Counters bad_clouds_;
+  Counters sweeps_without_;
   Counters events_;
   // In the order of first occurrence.
   std::vector<Stage> stages_;

@@ -48,7 +48,7 @@ class ChecksTest : public testing::Test {
     seen.status->points_topic = "points";
     seen.status->received_hz = 10.0;
     seen.status->scan_frame = "lidar";
-    seen.status->counters = {{"scans_received", 100}, {"scans_mapped", 100}};
+    seen.status->counters = {{"scans_received", "", 100}, {"scans_mapped", "", 100}};
     seen.status->stamp_ns = seen.asked_ns = 1'000'000'000'000;
     snapshot_.servers = {seen};
   }
@@ -62,7 +62,7 @@ class ChecksTest : public testing::Test {
   [[nodiscard]] dds::ServerStatus& status() { return *snapshot_.servers[0].status; }
   void no_scans() {
     status().received_hz = 0.0;
-    status().counters = {{"scans_received", 0}};
+    status().counters = {{"scans_received", "", 0}};
     snapshot_.participants[0].endpoints.clear();
   }
 
@@ -153,7 +153,7 @@ TEST_F(ChecksTest, SayWhyThereAreNoScans) {
 }
 
 TEST_F(ChecksTest, TellRefusedCloudsByReason) {
-  status().counters = {{"scans_received", 10}, {"dropped_bad_cloud_no_xyz", 10}};
+  status().counters = {{"scans_received", "", 10}, {"bad_clouds", "no_xyz", 10}};
   status().reason = "the last scan was dropped: bad cloud: no field x";
   EXPECT_THAT(check_scans(snapshot_),
               ElementsAre(AllOf(says("clouds are refused: no_xyz"), shows("10 of 10 scans"),

@@ -102,7 +102,8 @@ dds::ServerStatus some_status() {
                            .fresh_share = 0.25,
                            .propagated_share = 0.5,
                            .unlabelled_share = 0.125},
-          .counters = {{"scans_received", 8}, {"dropped_empty", 2}},
+          .counters = {{"scans_received", "", 8}, {"scans_dropped", "empty", 2}},
+          .service_faults = {{"slow_client", "stillmap/get_tiles", 3}},
           .latencies = {{"odometry", 1.0, 2.0, 3.0, 4}},
           .host = "robot",
           .sensor = "vlp_16",
@@ -149,6 +150,9 @@ TEST(StatusConversion, KeepsDiagnosticsCountersAndLatencies) {
   EXPECT_EQ(back->diagnostics[0].hint, "way out");
   EXPECT_EQ(back->diagnostics[1].severity, dds::Severity::problem);
   EXPECT_EQ(back->counter("scans_received"), 8U);
+  EXPECT_EQ(back->dropped("empty"), 2U);
+  EXPECT_EQ(back->dropped("queue_full"), 0U);
+  EXPECT_EQ(back->counter("slow_client", "stillmap/get_tiles"), 3U);
   EXPECT_EQ(back->counter("never_happened"), 0U);
   EXPECT_EQ(back->dropped(), 2U);
   ASSERT_EQ(back->latencies.size(), 1U);

@@ -12,7 +12,7 @@ TEST(ForeignRequest, ThatCannotBeReadIsCountedInTheStatus) {
   const ServiceSetup setup("latest");
   const ServerProcess server(setup.server_arguments());
   Client client(setup.client());
-  EXPECT_EQ(client.status().counter("unreadable_request_stillmap/save_map"), 0U);
+  EXPECT_EQ(client.status().counter("unreadable_request", "stillmap/save_map"), 0U);
 
   dds::VendorParticipant peer(dds::rti_connext);
   dds::ByteClient hostile(peer, "stillmap/save_map", "stillmap_msgs::srv::dds_::SaveMap");
@@ -21,7 +21,7 @@ TEST(ForeignRequest, ThatCannotBeReadIsCountedInTheStatus) {
   hostile.call({0, 1, 0, 0, 2, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF});
   EXPECT_TRUE(hostile.receive(patience));
   EXPECT_TRUE(eventually(
-      [&] { return client.status().counter("unreadable_request_stillmap/save_map") == 1; }));
+      [&] { return client.status().counter("unreadable_request", "stillmap/save_map") == 1; }));
 }
 
 TEST(ForeignRequest, ThatChangesTheMapIsCarriedOutOnceHoweverOftenItComes) {

@@ -55,10 +55,10 @@ TEST_F(HostileInput, BadCloudsAreCountedAndServiceGoesOn) {
   send(bad_type);
   send(PointCloud2());
   dds::ServerStatus now = status();
-  EXPECT_EQ(now.counter("dropped_bad_cloud_size_mismatch"), 1U);
-  EXPECT_EQ(now.counter("dropped_bad_cloud_no_xyz"), 1U);
-  EXPECT_EQ(now.counter("dropped_bad_cloud_bad_field"), 1U);
-  EXPECT_EQ(now.counter("dropped_bad_cloud_no_points"), 1U);
+  EXPECT_EQ(now.counter("bad_clouds", "size_mismatch"), 1U);
+  EXPECT_EQ(now.counter("bad_clouds", "no_xyz"), 1U);
+  EXPECT_EQ(now.counter("bad_clouds", "bad_field"), 1U);
+  EXPECT_EQ(now.counter("bad_clouds", "no_points"), 1U);
   EXPECT_THAT(now.reason, testing::HasSubstr("width 0"));
 
   send(room_scan(1));
@@ -71,7 +71,7 @@ TEST_F(HostileInput, ScansOutOfOrderOrRepeatedAreDropped) {
   for (const int index : {0, 1, 3, 2, 3, 4}) send(room_scan(index));
   const dds::ServerStatus now = status();
   EXPECT_EQ(now.counter("scans_mapped"), 4U);
-  EXPECT_EQ(now.counter("dropped_out_of_order"), 2U);
+  EXPECT_EQ(now.dropped("out_of_order"), 2U);
 }
 
 TEST_F(HostileInput, ScansWithoutAUsablePointAreDropped) {

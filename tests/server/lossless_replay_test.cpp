@@ -59,7 +59,7 @@ TEST(LatestDelivery, DropsTheOldestAndAccountsForEveryScan) {
   // What DDS itself replaced before the server saw it is not received; nothing else is missing.
   EXPECT_LE(status.counter("scans_received"), static_cast<std::uint64_t>(scans));
   EXPECT_GT(status.counter("scans_mapped"), 0U);
-  EXPECT_EQ(status.dropped(), status.counter("dropped_queue_full"));
+  EXPECT_EQ(status.dropped(), status.dropped("queue_full"));
 }
 
 }  // namespace

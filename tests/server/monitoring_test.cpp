@@ -67,11 +67,19 @@ TEST(Metrics, GiveDropsByReasonAndOtherEventsApart) {
   for (int scan = 0; scan < 9; ++scan) statistics.scan_received();
   statistics.scans_dropped("queue_full", 3, "too fast");
   statistics.scans_dropped("empty", 1, "no points");
+  statistics.scans_dropped("bad_cloud", 2, "no field x");
+  statistics.bad_cloud("no_xyz");
+  statistics.bad_cloud("bad_field");
+  statistics.sweep_without("rear");
   statistics.count("occupancy_not_cleared");
   Metrics& metrics = statistics.metrics();
   EXPECT_EQ(family(metrics, "stillmap_scans_received_total").metric.at(0).counter.value, 9.0);
   EXPECT_THAT(values_by(family(metrics, "stillmap_scans_dropped_total"), "reason"),
-              ElementsAre(Pair("empty", 1.0), Pair("queue_full", 3.0)));
+              ElementsAre(Pair("bad_cloud", 2.0), Pair("empty", 1.0), Pair("queue_full", 3.0)));
+  EXPECT_THAT(values_by(family(metrics, "stillmap_bad_clouds_total"), "fault"),
+              ElementsAre(Pair("bad_field", 1.0), Pair("no_xyz", 1.0)));
+  EXPECT_THAT(values_by(family(metrics, "stillmap_sweeps_without_total"), "lidar"),
+              ElementsAre(Pair("rear", 1.0)));
   EXPECT_THAT(values_by(family(metrics, "stillmap_events_total"), "event"),
               ElementsAre(Pair("occupancy_not_cleared", 1.0)));
 }

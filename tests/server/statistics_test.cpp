@@ -53,8 +53,8 @@ TEST(Statistics, CountsDropsByReason) {
   dds::ServerStatus status;
   statistics.report_to(status);
   EXPECT_EQ(status.counter("scans_received"), 3U);
-  EXPECT_EQ(status.counter("dropped_queue_full"), 3U);
-  EXPECT_EQ(status.counter("dropped_empty"), 1U);
+  EXPECT_EQ(status.dropped("queue_full"), 3U);
+  EXPECT_EQ(status.dropped("empty"), 1U);
   EXPECT_EQ(status.dropped(), 4U);
   statistics.scan_mapped(LabelProvenance::fresh);
   EXPECT_TRUE(statistics.last_drop().empty());

@@ -310,7 +310,7 @@ class Soak:
 
 
 def dropped_of(status):
-    return sum(n for name, n in status["counters"].items() if name.startswith("dropped"))
+    return sum(status["counters"].get("scans_dropped", {}).values())
 
 
 def curve(samples, columns=64, rows=8):

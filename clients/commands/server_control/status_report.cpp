@@ -1,5 +1,7 @@
 #include "clients/commands/server_control/status_report.hpp"
 
+#include <map>
+
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
 
@@ -29,9 +31,9 @@ std::string status_text(const dds::ServerStatus& status) {
         std::string(diagnostic.severity == dds::Severity::problem ? "problem    " : "advice     ") +
         diagnostic.what + "; " + diagnostic.hint + "\n";
   }
-  Table counters({"counter", "value"});
+  Table counters({"counter", "of", "value"});
   for (const dds::NamedCounter& counter : status.counters) {
-    counters.add({counter.name, std::to_string(counter.value)});
+    counters.add({counter.name, counter.detail, std::to_string(counter.value)});
   }
   Table latencies({"ms a scan", "p50", "p99", "max", "scans"});
   for (const dds::StageLatency& stage : status.latencies) {
@@ -56,9 +58,17 @@ Json to_json(const dds::SegmentationStatus& segmentation) {
 }  // namespace
 
 Json status_json(const dds::ServerStatus& status) {
+  // Those of one name are an object by what they are of: {"scans_dropped": {"queue_full": 3}}.
+  std::map<std::string, std::map<std::string, std::uint64_t>> detailed;
   Json counters = Json::object();
-  for (const dds::NamedCounter& counter : status.counters)
-    counters.set(counter.name, counter.value);
+  for (const dds::NamedCounter& counter : status.counters) {
+    if (counter.detail.empty()) {
+      counters.set(counter.name, counter.value);
+    } else {
+      detailed[counter.name][counter.detail] = counter.value;
+    }
+  }
+  for (const auto& [name, values] : detailed) counters.set(name, values);
   Json latencies = Json::object();
   for (const dds::StageLatency& stage : status.latencies) {
     latencies.set(stage.stage, {{"p50_ms", stage.p50_ms},

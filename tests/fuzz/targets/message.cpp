@@ -126,7 +126,7 @@ std::vector<Seed> seeds() {
   Tile tile = *view.tiles.front();
   tile.voxels = tile.voxels.first(4);
   dds::ServerStatus status;
-  status.counters.push_back({"scans_mapped", 3});
+  status.counters.push_back({"scans_mapped", "", 3});
   return {
       {"odometry", with_choice(0, to_cdr(wire::to_odometry(
                                       pose, Eigen::Matrix<double, 6, 6>::Identity(), "map", "l")))},

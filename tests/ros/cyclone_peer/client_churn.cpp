@@ -54,7 +54,7 @@ int ask_once_each(const ServerAddress& address, const std::string& service, cons
 int churn_clients(const ServerAddress& address, int clients) {
   using Reply = stillmap_msgs_srv_dds__GetStatus_Response_;
   stillmap_msgs_srv_dds__GetStatus_Request_ request{};
-  request.format_version = 7;
+  request.format_version = 8;
   return ask_once_each<Reply>(address, "get_status", request, clients, 0ms,
                               [](const Reply&) { return std::size_t{0}; });
 }

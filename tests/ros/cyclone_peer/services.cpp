@@ -14,7 +14,7 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr auto discovery_timeout = 60s * test::slowdown;
-constexpr std::uint8_t format_version = 7;
+constexpr std::uint8_t format_version = 8;
 
 // C structures of idlc's want pointers that they could write through.
 std::string no_text;
