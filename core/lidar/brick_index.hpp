@@ -76,7 +76,7 @@ class BrickIndex {
   }
 
  private:
-  using Brick = std::array<std::uint32_t, 4 * 4 * 2>;
+  using Brick = std::array<std::uint32_t, std::size_t{4} * 4 * 2>;
 
   tsl::robin_map<std::uint64_t, std::uint32_t, IndexHash> bricks_by_key_;
   std::vector<Brick> bricks_;
