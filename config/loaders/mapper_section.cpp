@@ -87,6 +87,7 @@ void read_motion(YamlSection section, MotionConfig& motion) {
 
 void read_odometry(YamlSection section, OdometryConfig& odometry) {
   std::vector<YamlSection::Choice<Weighting>> weightings;
+  weightings.reserve(named_weightings.size());
   for (const auto& [name, weighting] : named_weightings) weightings.push_back({name, weighting});
   section.choice("weighting", odometry.weighting, weightings);
   section.number("alpha", odometry.alpha, shares);

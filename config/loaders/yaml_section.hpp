@@ -77,6 +77,7 @@ class YamlSection {
   template <typename T>
   void choice(const std::string& name, T& value, const std::vector<Choice<T>>& choices) {
     std::vector<std::string> words;
+    words.reserve(choices.size());
     for (const Choice<T>& one : choices) words.push_back(one.name);
     if (const auto index = read_choice(name, words)) assign(name, value, choices[*index].value);
   }

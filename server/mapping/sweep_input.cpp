@@ -32,6 +32,7 @@ PrepareConfig range_of(const PrepareConfig& prepare) {
 std::vector<Eigen::Isometry3d> places_of(const ServerConfig& config) {
   const Eigen::Isometry3d T_merged_base = config.mount.T_base_lidar.inverse();
   std::vector<Eigen::Isometry3d> places;
+  places.reserve(config.lidars.size());
   for (const LidarConfig& lidar : config.lidars) {
     places.emplace_back(T_merged_base * lidar.T_base_lidar);
   }

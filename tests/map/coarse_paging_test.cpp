@@ -46,6 +46,7 @@ MapSnapshot wide_map(int side) {
         voxels[voxel.index] = voxel;
       }
       std::vector<Voxel> sorted;
+      sorted.reserve(voxels.size());
       for (const auto& [index, voxel] : voxels) sorted.push_back(voxel);
       tiles.push_back(std::make_shared<const Tile>(make_tile({x, y}, 1, std::move(sorted), grid)));
     }
@@ -57,6 +58,7 @@ MapSnapshot wide_map(int side) {
 
 MapSnapshot on_disk(const MapSnapshot& map) {
   std::vector<std::shared_ptr<const Tile>> stubs;
+  stubs.reserve(map.tiles.size());
   for (const auto& tile : map.tiles) stubs.push_back(without_voxels(*tile));
   MapSnapshot away = map;
   away.tiles = TileTable(std::move(stubs));
@@ -132,6 +134,7 @@ TEST(CoarsePaging, NoPageMergesWholeCities) {
   constexpr std::uint32_t said_voxels = 3000;
   MapSnapshot away = map;
   std::vector<std::shared_ptr<const Tile>> stubs;
+  stubs.reserve(map.tiles.size());
   for (const auto& tile : map.tiles) {
     auto stub = std::make_shared<Tile>(*without_voxels(*tile));
     stub->info.voxel_count = said_voxels;
@@ -162,6 +165,7 @@ TEST(CoarsePaging, NoPageMergesWholeCities) {
 TEST(MapQuery, SomeVoxelsOfEachOfTooManyTilesAreRefused) {
   const auto stub = without_voxels(*wide_map(2).tiles.front());
   std::vector<std::shared_ptr<const Tile>> stubs;
+  stubs.reserve(std::size_t{101} * 100);
   for (int x = 0; x < 101; ++x) {
     for (int y = 0; y < 100; ++y) {
       auto tile = std::make_shared<Tile>(*stub);

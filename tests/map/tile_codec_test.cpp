@@ -225,6 +225,7 @@ TEST(TileEvidence, TheSecondFormatIsRead) {
 TEST(TileEvidence, SaysWhatIsRemovedAndWhy) {
   const auto removed = removed_voxels(any_evidence(), 0.2, 20.0);
   std::vector<RemovalReason> reasons;
+  reasons.reserve(removed.size());
   for (const RemovedVoxel& voxel : removed) reasons.push_back(voxel.reason);
   EXPECT_THAT(reasons, testing::ElementsAre(RemovalReason::relabelled, RemovalReason::seen_through,
                                             RemovalReason::moving, RemovalReason::semi_static));

@@ -22,8 +22,10 @@ template <typename RangeOf>
 LabelledScan looking_ahead(std::int64_t stamp_ns, RangeOf range_of) {
   LabelledScan scan;
   scan.scan.stamp_ns = stamp_ns;
-  for (double elevation = -10.0; elevation < 2.0; elevation += 0.4) {
-    for (double azimuth = -10.0; azimuth < 10.0; azimuth += 0.2) {
+  for (int ring = 0; ring < 30; ++ring) {
+    const double elevation = -10.0 + 0.4 * ring;
+    for (int column = 0; column < 100; ++column) {
+      const double azimuth = -10.0 + 0.2 * column;
       const double e = elevation * degree, a = azimuth * degree;
       const auto [range_m, label, motion] = range_of(azimuth, elevation);
       const Vector3f direction(static_cast<float>(std::cos(e) * std::cos(a)),

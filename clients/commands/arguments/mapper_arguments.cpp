@@ -56,6 +56,7 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
               "geometry), or a folder with a model")
       .with_default();
   std::vector<std::string> weighting_names;
+  weighting_names.reserve(named_weightings.size());
   for (const NamedWeighting& known : named_weightings) weighting_names.emplace_back(known.name);
   command
       .option("--weighting", arguments.weighting,

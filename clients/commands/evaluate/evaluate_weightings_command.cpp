@@ -71,6 +71,7 @@ std::vector<WeightingResult> compare_weightings(const GroundTruthSequence& seque
                                                 const MapperConfig& config, std::size_t max_scans,
                                                 const std::function<bool(std::size_t)>& scan_done) {
   std::vector<WeightingRun> runs;
+  runs.reserve(named_weightings.size());
   for (const NamedWeighting& row : named_weightings) {
     runs.emplace_back(row, config, sequence.labelled);
   }
@@ -80,6 +81,7 @@ std::vector<WeightingResult> compare_weightings(const GroundTruthSequence& seque
     if (!scan_done(i + 1)) break;
   }
   std::vector<WeightingResult> results;
+  results.reserve(runs.size());
   for (const WeightingRun& run : runs) {
     results.push_back(run.result(sequence.truth));
   }
