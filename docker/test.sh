@@ -12,7 +12,7 @@ cd "$(dirname "$0")/.."
 scans=${STILLMAP_TEST_SCANS:-40}
 domain=54
 export STILLMAP_IMAGE=stillmap-test STILLMAP_SCANS=$scans DOCKER_BUILDKIT=1
-most_mb=300
+max_mb=300
 work=$(mktemp -d /tmp/stillmap_docker_test.XXXXXX)
 started_dockerd=
 made_base=
@@ -100,7 +100,7 @@ in_image() { "$docker" run --rm --network none "$STILLMAP_IMAGE" "$@"; }
 check_image() {
   local mb found
   mb=$("$docker" image inspect -f '{{.Size}}' "$STILLMAP_IMAGE" | awk '{ printf "%.0f", $1 / 1e6 }')
-  [ "$mb" -lt "$most_mb" ] || fail "the image has $mb MB, wanted are less than $most_mb"
+  [ "$mb" -lt "$max_mb" ] || fail "the image has $mb MB, wanted are less than $max_mb"
   pass "the image has $mb MB"
   found=$(in_image sh -c 'ls /usr/bin /usr/lib/*/ | grep -E "^(gcc|g\+\+|cc|ld|cmake|libvtk.*|libQt.*|libLLVM.*)$" || true')
   [ -z "$found" ] || fail "the image has $found"

@@ -68,7 +68,7 @@ class VoxelsAround {
     return x_.squared_gap[x] + y_.squared_gap[y] + z_.squared_gap[z];
   }
   /// To the nearest of those that need a step to the farther side.
-  [[nodiscard]] float least_farther_squared_gap() const {
+  [[nodiscard]] float min_farther_squared_gap() const {
     return std::min({x_.squared_gap[farther], y_.squared_gap[farther], z_.squared_gap[farther]});
   }
   /// The voxel's number, or BrickIndex::none.
@@ -241,7 +241,7 @@ Neighbours FeatureMap::nearest(const Eigen::Vector3f& position_map, int n,
   Nearest found(n);
   float limit = max_distance_m * max_distance_m;
   for (std::size_t v = 0; v < search_order.size(); ++v) {
-    if (v == nearest_voxels && voxels.least_farther_squared_gap() > limit) break;
+    if (v == nearest_voxels && voxels.min_farther_squared_gap() > limit) break;
     if (voxels.squared_gap(v) > limit) continue;
     const std::uint32_t number = voxels.number(v);
     if (number == BrickIndex::none) continue;

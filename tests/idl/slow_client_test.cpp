@@ -14,7 +14,8 @@
 // A client that asks and is stopped, as by SIGSTOP: it takes no reply and is still in the domain.
 
 // GCC brings no header for it.
-extern "C" std::size_t __sanitizer_get_current_allocated_bytes();
+extern "C" std::size_t
+__sanitizer_get_current_allocated_bytes();  // NOLINT(bugprone-reserved-identifier)
 
 namespace stillmap::dds {
 namespace {
@@ -26,7 +27,7 @@ using stillmap_msgs::srv::SaveMap_Response;
 constexpr auto large_service = "stillmap/save_map";
 constexpr int stopped_requests = 90;
 /// Of these; for the others there is room, or their replies are dropped later.
-constexpr int least_refused = 40;
+constexpr int min_refused = 40;
 constexpr std::size_t large_reply_bytes = 4'000'000;
 
 /// Asks 90 times, stops itself, and looks at the replies when it goes on, until enough of them say
@@ -80,7 +81,7 @@ class StoppingClient {
     int refused = 0;
     SerializedSample bytes;
     eprosima::fastdds::dds::SampleInfo info;
-    while (refused < least_refused && replies.take(bytes, info, {}, discovery_timeout)) {
+    while (refused < min_refused && replies.take(bytes, info, {}, discovery_timeout)) {
       SaveMap_Response reply;
       if (from_bytes(type_support<SaveMap_Response>(), bytes, &reply) &&
           reply.status().code() == 3 &&
@@ -129,7 +130,7 @@ TEST_P(SlowClient, ThatIsStoppedLosesAndIsToldAndNobodyElseNotices) {
   const auto refused = [&] {
     return server_side.service_faults().count("slow_client", large_service);
   };
-  EXPECT_TRUE(test::eventually([&] { return refused() >= least_refused; }, discovery_timeout));
+  EXPECT_TRUE(test::eventually([&] { return refused() >= min_refused; }, discovery_timeout));
   {
     Participant other_side(loopback(false));
     ServiceClient<SaveMap_Request, SaveMap_Response> other(other_side, large_service);
@@ -142,7 +143,7 @@ TEST_P(SlowClient, ThatIsStoppedLosesAndIsToldAndNobodyElseNotices) {
   }
   // All replies to both are 440 MB.
   EXPECT_LT(memory_in_use() - before, 220'000'000U);
-  EXPECT_GE(stopping.refused(), least_refused);
+  EXPECT_GE(stopping.refused(), min_refused);
 }
 
 INSTANTIATE_TEST_SUITE_P(Networks, SlowClient, testing::Values(0U, 40'000'000U),

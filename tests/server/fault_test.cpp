@@ -65,8 +65,8 @@ class PreloadedFaults {
 
 class DiskFault : public testing::TestWithParam<Fault> {
  protected:
-  double random_s(double most_s) {
-    return std::uniform_real_distribution<double>(0.0, most_s)(random_);
+  double random_s(double max_s) {
+    return std::uniform_real_distribution<double>(0.0, max_s)(random_);
   }
   bool one_in(int n) { return std::uniform_int_distribution<int>(1, n)(random_) == 1; }
 

@@ -317,7 +317,7 @@ TEST_F(FaultyDisk, AResetThatFailsHalfWayIsUndoneAtTheEndWithoutAScan) {
 
 class MapSaverFaults : public FaultyDisk, public testing::WithParamInterface<SaverFault> {
  protected:
-  void wait_up_to(unsigned most_us) { usleep(static_cast<useconds_t>(random_() % most_us)); }
+  void wait_up_to(unsigned max_us) { usleep(static_cast<useconds_t>(random_() % max_us)); }
 
   /// Runs and ends a process; the stamps that it said were stored.
   std::vector<std::int64_t> run_process(std::int64_t first_ns) {
