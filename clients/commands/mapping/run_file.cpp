@@ -84,7 +84,8 @@ std::optional<std::vector<std::size_t>> from_ranges(const std::string& text) {
     std::size_t last = first;
     char dash = '-';
     if (!numbers.eof() && !(numbers >> dash >> last)) return std::nullopt;
-    if (dash != '-' || !numbers.eof() || last < first || last >= max_indices) {
+    const bool ascends = indices.empty() || first > indices.back();
+    if (dash != '-' || !numbers.eof() || !ascends || last < first || last >= max_indices) {
       return std::nullopt;
     }
     for (std::size_t i = first; i <= last; ++i) indices.push_back(i);
