@@ -1,5 +1,5 @@
 // A number that says which message, then it as a bag keeps it: PointCloud2, a Velodyne's packets
-// (serialized, or as they come from the sensor), Livox's points.
+// (serialized, or as they come from the sensor), Livox's points, an IMU's sample.
 
 #include "core/dataset/velodyne_packets.hpp"
 #include "idl/bag/cdr_reader.hpp"
@@ -13,7 +13,7 @@ namespace stillmap::fuzz {
 namespace bag_message_inputs {
 namespace {
 
-enum Kind : std::uint8_t { cloud, velodyne_scan, livox, packets, kinds };
+enum Kind : std::uint8_t { cloud, velodyne_scan, livox, packets, imu, kinds };
 
 void check_scan(const Scan& scan) {
   const auto fits = [&](const auto& values) {
@@ -39,6 +39,7 @@ void run(Bytes bytes) {
   const Bytes message = source.rest();
   static_cast<void>(dds::header_stamp_ns(message));
   try {
+    if (kind == imu) return static_cast<void>(dds::decode_imu(message));
     check_scan(dds::decode_scan(static_cast<dds::ScanMessageType>(kind), message).frame.scan);
   } catch (const dds::CdrError&) {
   }

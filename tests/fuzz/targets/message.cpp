@@ -1,8 +1,11 @@
 // A number that says which message, then what comes over DDS: what the server reads beside scans
 // and requests, and all that a client reads.
 
+#include <type_traits>
+#include <utility>
 #include <variant>
 
+#include "idl/conversions/imu.hpp"
 #include "idl/conversions/map_query.hpp"
 #include "idl/conversions/occupancy.hpp"
 #include "idl/conversions/path_query.hpp"
@@ -11,8 +14,11 @@
 #include "idl/conversions/status.hpp"
 #include "idl/conversions/tile.hpp"
 #include "idl/conversions/traversability.hpp"
+#include "idl/dds/ros_nodes.hpp"
 #include "idl/interface/services.hpp"
 #include "idl/interface/topics.hpp"
+#include "rmw_dds_common.h"
+#include "rmw_dds_common_iron.h"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"
 #include "tests/fuzz/invariant.hpp"
@@ -87,7 +93,21 @@ void read_tf(Bytes bytes) {
   });
 }
 
-constexpr std::array<void (*)(Bytes), 13> readers = {
+void read_imu(Bytes bytes) {
+  read_as<sensor_msgs::msg::Imu>(bytes, [](const auto& message) {
+    const auto sample = wire::from_imu(message);
+    require(!sample || sample->angular_velocity_imu.allFinite(), "a rate of turn is finite");
+  });
+}
+
+/// What any ROS 2 process of the domain announces.
+void read_ros_nodes(Bytes bytes) {
+  for (const std::string& name : dds::ros_node_names(bytes_of(bytes))) {
+    require(name.find('/') != std::string::npos, "a node's name has its namespace");
+  }
+}
+
+constexpr std::array<void (*)(Bytes), 15> readers = {
     read_odometry,
     read_path,
     read_tile,
@@ -101,6 +121,8 @@ constexpr std::array<void (*)(Bytes), 13> readers = {
     read_response<GetRemoved_Response>,
     read_tf,
     read_reply,
+    read_imu,
+    read_ros_nodes,
 };
 
 void run(Bytes bytes) {
@@ -111,6 +133,17 @@ void run(Bytes bytes) {
 
 RemovedVoxel removed_voxel() {
   return {Eigen::Vector3f(1, 2, 3), SemanticClass::car, RemovalReason::semi_static, 99};
+}
+
+template <typename Info>
+std::string announcement_of_a_node() {
+  using Nodes = std::remove_cvref_t<decltype(std::declval<Info&>().node_entities_info_seq())>;
+  typename Nodes::value_type node;
+  node.node_namespace("/robot");
+  node.node_name("rviz2");
+  Info info;
+  info.node_entities_info_seq().push_back(node);
+  return to_cdr(info);
 }
 
 std::vector<Seed> seeds() {
@@ -142,6 +175,12 @@ std::vector<Seed> seeds() {
       {"nearest", with_choice(8, to_cdr(wire::to_response(NearestTraversable{}, 7)))},
       {"occupancy", with_choice(9, to_cdr(occupancy))},
       {"removed", with_choice(10, to_cdr(removed))},
+      {"imu", with_choice(13, to_cdr(wire::to_imu({.stamp_ns = 7}, "imu")))},
+      {"ros_nodes",
+       with_choice(14, announcement_of_a_node<rmw_dds_common::msg::ParticipantEntitiesInfo>())},
+      {"ros_nodes_iron",
+       with_choice(14,
+                   announcement_of_a_node<rmw_dds_common_iron::msg::ParticipantEntitiesInfo>())},
   };
 }
 
