@@ -359,7 +359,7 @@ class MapSaverFaults : public FaultyDisk, public testing::WithParamInterface<Sav
   }
 
   /// Every map file opens, and no two maps have anything in common; all stamps in them.
-  std::set<std::int64_t> check_files() const {
+  [[nodiscard]] std::set<std::int64_t> check_files() const {
     std::set<std::int64_t> stamps;
     for (const fs::directory_entry& entry : fs::directory_iterator(folder_.path())) {
       const fs::path& file = entry.path();
