@@ -1,10 +1,14 @@
 // What `make test-scale` measures on a running server, over DDS; prints one line of JSON.
 //
-//   scale_probe DOMAIN first-pose SCAN            drives until a pose comes
+//   scale_probe DOMAIN first-pose SCAN 0          drives until a pose comes
 //   scale_probe DOMAIN rate SCAN SECONDS          drives as fast as scans are taken
 //   scale_probe DOMAIN versions SCAN COUNT        asks for the versions of 1 km2, while driving
 //   scale_probe DOMAIN join SCAN WINDOW_M         joins late, and waits for the tiles in the window
-//   scale_probe DOMAIN load SCAN SECONDS          poses' age, idle and beside long requests
+//   scale_probe DOMAIN ages SCAN SECONDS          how old poses are when they arrive
+//   scale_probe DOMAIN crowd 0 0 MAP OTHER        17 clients at once, until stdin ends: they page,
+//   ask for
+//                                                 removed voxels, load the two maps in turns, reset
+//   scale_probe DOMAIN hang 0 0                   asks for the whole map without end: to be stopped
 //   scale_probe DOMAIN stand SCAN SECONDS         a lidar that stands, with noise
 //
 // SCAN is the first scan of the drive; "next_scan" in the output is where the next drive goes on.
@@ -16,11 +20,14 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <functional>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <random>
 #include <set>
+#include <span>
+#include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
@@ -196,21 +203,7 @@ json join(std::uint32_t domain, int scan, double window_m) {
           {"next_scan", drive.end()}};
 }
 
-/// Asks for removed voxels and coarse pages of 1 km2, again and again.
-void ask_much(Client& client, const std::stop_token& stop, std::atomic<int>& answers) {
-  const Eigen::Vector3d half(500.0, 500.0, 1e3);
-  while (!stop.stop_requested()) {
-    static_cast<void>(client.get_removed(BoxRegion{{-half, half}}));
-    MapQuery query;
-    query.region = BoxRegion{{-half, half}};
-    query.resolution_m = 0.5;
-    query.max_bytes = 500'000;
-    static_cast<void>(client.get_whole_static_map(query));
-    ++answers;
-  }
-}
-
-json load(std::uint32_t domain, int scan, std::chrono::seconds duration) {
+json ages(std::uint32_t domain, int scan, std::chrono::seconds duration) {
   Client client(client_options(domain));
   client.wait_for_server(patience);
   PublicationTimes times;
@@ -221,26 +214,117 @@ json load(std::uint32_t domain, int scan, std::chrono::seconds duration) {
     const std::scoped_lock lock(mutex);
     if (std::isfinite(age_ms)) ages_ms.push_back(age_ms);
   });
-  const auto take_ages = [&] {
-    std::this_thread::sleep_for(duration);
+  const auto take_ages = [&](std::chrono::seconds time) {
+    std::this_thread::sleep_for(time);
     const std::scoped_lock lock(mutex);
     return std::exchange(ages_ms, {});
   };
   Drive drive(domain, scan, 100ms, &times);
-  std::this_thread::sleep_for(1s);
-  static_cast<void>(std::exchange(ages_ms, {}));
-  const std::vector<double> idle_ms = take_ages();
-  std::atomic<int> answers = 0;
-  std::jthread asking([&](const std::stop_token& stop) { ask_much(client, stop, answers); });
-  const std::vector<double> busy_ms = take_ages();
-  asking = {};
-  return {{"answers", answers.load()},
-          {"idle_p99_ms", quantile(idle_ms, 0.99)},
-          {"idle_max_ms", quantile(idle_ms, 1.0)},
-          {"busy_p50_ms", quantile(busy_ms, 0.5)},
-          {"busy_p99_ms", quantile(busy_ms, 0.99)},
-          {"busy_max_ms", quantile(busy_ms, 1.0)},
+  static_cast<void>(take_ages(1s));
+  const std::vector<double> taken_ms = take_ages(duration);
+  return {{"poses", taken_ms.size()},
+          {"p50_ms", quantile(taken_ms, 0.5)},
+          {"p99_ms", quantile(taken_ms, 0.99)},
+          {"max_ms", quantile(taken_ms, 1.0)},
           {"next_scan", drive.end()}};
+}
+
+BoxRegion square_km() {
+  const Eigen::Vector3d half(500.0, 500.0, 1e3);
+  return {{-half, half}};
+}
+
+/// Clients that each ask for one thing again and again, from a thread of their own.
+class Crowd {
+ public:
+  explicit Crowd(std::uint32_t domain) : domain_(domain) {}
+
+  /// `ask(client, how often it asked)`; what the server refuses is counted.
+  void add(int clients, const std::function<void(Client&, int)>& ask) {
+    for (int i = 0; i < clients; ++i) {
+      threads_.emplace_back([this, ask](const std::stop_token& stop) {
+        Client client(client_options(domain_));
+        client.wait_for_server(patience);
+        ++ready_;
+        for (int asked = 0; !stop.stop_requested(); ++asked) {
+          try {
+            ask(client, asked);
+            ++answers_;
+          } catch (const std::runtime_error&) {
+            ++refusals_;
+          }
+        }
+      });
+    }
+  }
+  void wait_until_ready() const {
+    while (ready_ < threads_.size()) std::this_thread::sleep_for(1ms);
+  }
+  [[nodiscard]] json end() {
+    for (std::jthread& thread : threads_) thread.request_stop();
+    threads_.clear();
+    return {{"answers", answers_.load()}, {"refusals", refusals_.load()}};
+  }
+
+ private:
+  std::uint32_t domain_;
+  std::atomic<std::size_t> ready_ = 0;
+  std::atomic<int> answers_ = 0;
+  std::atomic<int> refusals_ = 0;
+  std::vector<std::jthread> threads_;
+};
+
+void page(Client& client, double resolution_m) {
+  MapQuery query;
+  query.region = square_km();
+  query.resolution_m = resolution_m;
+  query.max_bytes = 500'000;
+  static_cast<void>(client.get_whole_static_map(query));
+}
+
+/// With some time in each map, as an operator would.
+void change_map(Client& client, int asked, const std::string& map, const std::string& other) {
+  switch (asked % 3) {
+    case 0:
+      static_cast<void>(client.load_map(other));
+      break;
+    case 1:
+      static_cast<void>(client.reset());
+      break;
+    default:
+      static_cast<void>(client.load_map(map));
+      std::this_thread::sleep_for(2s);
+  }
+  std::this_thread::sleep_for(1s);
+}
+
+json crowd(std::uint32_t domain, const std::string& map, const std::string& other) {
+  Crowd clients(domain);
+  clients.add(6, [](Client& client, int) { page(client, 0.5); });
+  clients.add(4, [](Client& client, int) { page(client, 0.0); });
+  clients.add(4, [](Client& client, int) { static_cast<void>(client.get_removed(square_km())); });
+  clients.add(2, [](Client& client, int) {
+    static_cast<void>(client.get_tile_versions(square_km().box_map));
+  });
+  clients.add(1, [&](Client& client, int asked) { change_map(client, asked, map, other); });
+  clients.wait_until_ready();
+  std::puts("ready");
+  std::fflush(stdout);
+  while (std::getchar() != EOF) {
+  }
+  json result = clients.end();
+  Client last(client_options(domain));
+  last.wait_for_server(patience);
+  static_cast<void>(last.load_map(map));
+  return result;
+}
+
+json hang(std::uint32_t domain) {
+  Client client(client_options(domain));
+  client.wait_for_server(patience);
+  std::puts("ready");
+  std::fflush(stdout);
+  for (;;) page(client, 0.0);
 }
 
 json stand(std::uint32_t domain, int scan, std::chrono::seconds duration) {
@@ -260,13 +344,22 @@ json stand(std::uint32_t domain, int scan, std::chrono::seconds duration) {
   return {{"scans", sent}, {"next_scan", scan + sent}};
 }
 
-json run(std::uint32_t domain, const std::string& mode, int scan, int argument) {
+json run(std::span<const std::string> arguments) {
+  const auto number = [&](std::size_t i) {
+    return i < arguments.size() ? std::stoi(arguments[i]) : 0;
+  };
+  const auto domain = static_cast<std::uint32_t>(number(0));
+  const std::string& mode = arguments[1];
+  const int scan = number(2);
+  const std::chrono::seconds duration(number(3));
   if (mode == "first-pose") return first_pose(domain, scan);
-  if (mode == "rate") return rate(domain, scan, std::chrono::seconds(argument));
-  if (mode == "versions") return versions(domain, scan, argument);
-  if (mode == "join") return join(domain, scan, argument);
-  if (mode == "load") return load(domain, scan, std::chrono::seconds(argument));
-  if (mode == "stand") return stand(domain, scan, std::chrono::seconds(argument));
+  if (mode == "rate") return rate(domain, scan, duration);
+  if (mode == "versions") return versions(domain, scan, number(3));
+  if (mode == "join") return join(domain, scan, number(3));
+  if (mode == "ages") return ages(domain, scan, duration);
+  if (mode == "crowd") return crowd(domain, arguments.last(2)[0], arguments.last(2)[1]);
+  if (mode == "hang") return hang(domain);
+  if (mode == "stand") return stand(domain, scan, duration);
   throw std::runtime_error("unknown mode " + mode);
 }
 
@@ -274,14 +367,13 @@ json run(std::uint32_t domain, const std::string& mode, int scan, int argument) 
 }  // namespace stillmap::test
 
 int main(int argc, char** argv) {
-  if (argc < 4) {
-    std::fprintf(stderr, "usage: %s DOMAIN MODE SCAN [NUMBER]\n", argv[0]);
+  const std::vector<std::string> arguments(argv + 1, argv + argc);
+  if (arguments.size() < 4) {
+    std::fprintf(stderr, "usage: %s DOMAIN MODE SCAN NUMBER [MAP OTHER]\n", argv[0]);
     return 2;
   }
   try {
-    const auto line = stillmap::test::run(static_cast<std::uint32_t>(std::atoi(argv[1])), argv[2],
-                                          std::atoi(argv[3]), argc > 4 ? std::atoi(argv[4]) : 0);
-    std::puts(line.dump().c_str());
+    std::puts(stillmap::test::run(arguments).dump().c_str());
   } catch (const std::exception& fault) {
     std::fprintf(stderr, "scale_probe: %s\n", fault.what());
     return 1;
