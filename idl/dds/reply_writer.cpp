@@ -6,18 +6,10 @@
 #include <fastdds/rtps/interfaces/IReaderDataFilter.hpp>
 #include <mutex>
 
-#include "idl/dds/dds_error.hpp"
+#include "idl/dds/rtps_writer.hpp"
 
 // Replies are for one reader each, and what their writer holds must be bounded in bytes; DataWriter
-// offers neither. The RTPS writer beneath has both in its public interface. Fast DDS 2.9 exports
-// the function that finds it, but installs no header that declares it.
-namespace eprosima::fastrtps::rtps {
-class RTPSDomainImpl {
- public:
-  static RTPSWriter* find_local_writer(const GUID_t& writer_guid);
-};
-}  // namespace eprosima::fastrtps::rtps
-
+// offers neither. The RTPS writer beneath has both in its public interface.
 namespace stillmap::dds {
 namespace {
 
@@ -30,12 +22,6 @@ constexpr std::chrono::duration<double> min_patience = 500ms;
 constexpr double sending_margin = 2.0;
 
 GuidPrefix_t process_of(const ServiceCall& call) { return call.request_writer.guidPrefix; }
-
-RTPSWriter* find_rtps_writer(const GUID_t& guid) {
-  RTPSWriter* const found = RTPSDomainImpl::find_local_writer(guid);
-  if (found == nullptr) throw DdsError("Fast DDS does not find a writer that it just made");
-  return found;
-}
 
 }  // namespace
 
@@ -53,7 +39,7 @@ ReplyWriter::ReplyWriter(Participant& participant, const std::string& service,
     : rate_bytes_per_s_(participant.options().large_message_bytes_per_s),
       filter_(std::make_unique<ToAskingProcess>()),
       writer_(participant, reply_topic(service), type_name, service_qos()),
-      rtps_writer_(find_rtps_writer(writer_.guid())) {
+      rtps_writer_(&find_rtps_writer(writer_.guid())) {
   const std::scoped_lock lock(rtps_writer_->getMutex());
   rtps_writer_->reader_data_filter(filter_.get());
 }

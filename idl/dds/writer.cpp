@@ -52,7 +52,11 @@ void MatchedReaders::on_publication_matched(DataWriter*, const PublicationMatche
 
 UntypedWriter::UntypedWriter(Participant& participant, const std::string& topic,
                              const TypeSupport& type, const TopicQos& qos)
-    : topic_(topic), writer_(participant.make_writer(topic, type, qos, &readers_)) {}
+    : topic_(topic), writer_(participant.make_writer(topic, type, qos, &readers_)) {
+  const bool releases_acknowledged = qos.reliable && !qos.transient_local;
+  if (releases_acknowledged && !type->m_isGetKeyDefined)
+    acknowledged_.emplace(find_rtps_writer(writer_->guid()));
+}
 
 eprosima::fastrtps::rtps::GUID_t UntypedWriter::guid() const { return writer_->guid(); }
 
@@ -66,6 +70,7 @@ void UntypedWriter::forget_written() {
 }
 
 bool UntypedWriter::write_untyped(const void* sample) {
+  if (acknowledged_) acknowledged_->release();
   const ReturnCode code = writer_->write(mutable_sample(sample), HANDLE_NIL);
   if (code == ReturnCode::RETCODE_OK) return true;
   if (code == ReturnCode::RETCODE_TIMEOUT || code == ReturnCode::RETCODE_OUT_OF_RESOURCES) {
@@ -76,6 +81,7 @@ bool UntypedWriter::write_untyped(const void* sample) {
 }
 
 bool UntypedWriter::write_untyped(const void* sample, WriteParams& params) {
+  if (acknowledged_) acknowledged_->release();
   return writer_->write(mutable_sample(sample), params);
 }
 

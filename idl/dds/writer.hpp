@@ -6,10 +6,12 @@
 #include <condition_variable>
 #include <fastdds/dds/publisher/DataWriterListener.hpp>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <string>
 
 #include "idl/dds/participant.hpp"
+#include "idl/dds/rtps_writer.hpp"
 #include "idl/dds/type_support.hpp"
 
 namespace stillmap::dds {
@@ -61,6 +63,8 @@ class UntypedWriter {
  private:
   std::string topic_;
   MatchedReaders readers_;
+  std::optional<AcknowledgedSamples> acknowledged_;
+  // After what listens to it.
   Participant::WriterHandle writer_;
 };
 
