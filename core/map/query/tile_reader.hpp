@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <list>
 #include <memory>
 #include <mutex>
 #include <stdexcept>
+#include <unordered_map>
 
 #include "core/map/tile.hpp"
 #include "core/map/tile_evidence.hpp"
@@ -30,15 +32,26 @@ class TileReader {
   [[nodiscard]] std::shared_ptr<const Tile> read(const std::shared_ptr<const Tile>& tile);
 
  private:
+  using Cache = std::list<std::shared_ptr<const Tile>>;
+  struct StateHash {
+    std::size_t operator()(const TileInfo& info) const;
+  };
+  struct IsSameState {
+    bool operator()(const TileInfo& a, const TileInfo& b) const;
+  };
+
   [[nodiscard]] std::shared_ptr<TileStore> tile_store();
   [[nodiscard]] std::shared_ptr<const Tile> find_cached(const TileInfo& wanted);
   void cache(std::shared_ptr<const Tile> tile);
+  void drop_oldest();
 
   std::shared_ptr<TileStore> tile_store_;
   std::size_t cache_bytes_;
   std::mutex mutex_;
   /// Most recently used first.
-  std::list<std::shared_ptr<const Tile>> cache_;
+  Cache cache_;
+  /// Where each state is in it: thousands of small tiles fit in.
+  std::unordered_map<TileInfo, Cache::iterator, StateHash, IsSameState> entries_;
   std::size_t bytes_ = 0;
 };
 
