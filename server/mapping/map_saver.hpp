@@ -9,6 +9,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <shared_mutex>
 #include <string>
 
 #include "core/map/storage/map_file.hpp"
@@ -60,13 +61,18 @@ class MovableTileStore : public TileStore {
     file_ = move();
   }
   TileRecord load(TileId id) override {
+    {
+      // The mapper does not wait for other readers.
+      const std::shared_lock lock(mutex_);
+      if (store_) return store_->load(id);
+    }
     const std::scoped_lock lock(mutex_);
     if (!store_) store_ = open_tile_store(file_);
     return store_->load(id);
   }
 
  private:
-  std::mutex mutex_;
+  std::shared_mutex mutex_;
   /// Null until it is needed, once it was moved.
   std::shared_ptr<TileStore> store_;
   std::filesystem::path file_;

@@ -8,6 +8,7 @@
 #include <sqlite3.h>
 
 #include <algorithm>
+#include <condition_variable>
 #include <cstdlib>
 #include <mutex>
 #include <optional>
@@ -53,27 +54,62 @@ class ScratchMapFolder {
   fs::path path_;
 };
 
-/// Reads through a connection of its own, so that readers do not wait for a save.
+/// Reads through connections of its own, so that readers wait neither for a save nor for each
+/// other. All are opened at once: the file may lie under another name later, and another map under
+/// this.
 class SqliteTileStore : public TileStore {
  public:
   SqliteTileStore(const fs::path& file, std::shared_ptr<const ScratchMapFolder> folder)
-      : folder_(std::move(folder)), file_(file), database_(connect_to_map_database(file)) {}
+      : folder_(std::move(folder)), file_(file) {
+    connections_.reserve(max_readers);
+    while (connections_.size() < max_readers) {
+      connections_.push_back(connect_to_map_database(file));
+    }
+    for (SQLite::Database& connection : connections_) idle_.push_back(&connection);
+  }
 
   TileRecord load(TileId id) override {
-    const std::scoped_lock lock(mutex_);
+    const Use use(*this);
     try {
-      const SQLite::Transaction one_state(database_);
-      return read_record(database_, id, read_map_row(database_));
+      const SQLite::Transaction one_state(*use.database);
+      return read_record(*use.database, id, read_map_row(*use.database));
     } catch (const std::runtime_error& error) {
       throw unreadable(file_, error);
     }
   }
 
  private:
+  /// The mapper, the publisher of tiles and three services.
+  static constexpr std::size_t max_readers = 5;
+
+  /// A connection that no other reader has.
+  struct Use {
+    explicit Use(SqliteTileStore& its_store) : store(its_store) {
+      std::unique_lock lock(store.mutex_);
+      store.given_back_.wait(lock, [&] { return !store.idle_.empty(); });
+      database = store.idle_.back();
+      store.idle_.pop_back();
+    }
+    ~Use() {
+      {
+        const std::scoped_lock lock(store.mutex_);
+        store.idle_.push_back(database);
+      }
+      store.given_back_.notify_one();
+    }
+    Use(const Use&) = delete;
+    Use& operator=(const Use&) = delete;
+
+    SqliteTileStore& store;
+    SQLite::Database* database = nullptr;
+  };
+
   std::shared_ptr<const ScratchMapFolder> folder_;
   fs::path file_;
   std::mutex mutex_;
-  SQLite::Database database_;
+  std::condition_variable given_back_;
+  std::vector<SQLite::Database> connections_;
+  std::vector<SQLite::Database*> idle_;
 };
 
 class SqliteMapStore : public MapStore {
