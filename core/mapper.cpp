@@ -180,13 +180,14 @@ bool Mapper::has_enough_points(const Scan& scan) {
 void Mapper::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidence) {
   StaticMap prepared(config_.static_map);
   prepared.resume(view, tile_evidence);
-  resume(std::move(prepared));
+  static_cast<void>(resume(std::move(prepared)));
 }
 
-void Mapper::resume(StaticMap prepared) {
-  static_map_ = std::move(prepared);
+StaticMap Mapper::resume(StaticMap prepared) {
+  StaticMap until_now = std::exchange(static_map_, std::move(prepared));
   clear_scan_state();
   resumed_tiles_ = static_map_.view()->tiles;
+  return until_now;
 }
 
 void Mapper::reset(std::uint64_t map_id) {

@@ -113,8 +113,9 @@ class Mapper {
   /// near them. Throws std::invalid_argument for voxels or tiles of another size than configured,
   /// and is then as it was.
   void resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidence = {});
-  /// The same with a static map that resumed a stored one already, elsewhere: cannot fail.
-  void resume(StaticMap prepared);
+  /// The same with a static map that resumed a stored one already, elsewhere: cannot fail. Returns
+  /// the map until now, for another thread to free: that takes long for a large one.
+  [[nodiscard]] StaticMap resume(StaticMap prepared);
 
   /// Forgets poses and maps; the next scan starts map `map_id` at the origin.
   void reset(std::uint64_t map_id);

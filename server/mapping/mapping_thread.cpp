@@ -97,7 +97,8 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
   const bool is_odom_own = config.frames.odom_source == FramesConfig::OdomSource::own;
   if (!odom_frame_.empty() && is_odom_own) odom_.emplace();
   if (stored && !stored->view.tiles.empty()) {
-    resume({resumed(*stored, tile_store), stored->trajectory, tile_store});
+    PreparedMap prepared{resumed(*stored, tile_store), stored->trajectory, tile_store};
+    exchange(prepared);
   } else {
     tile_store_ = tile_store;
     mapper_.static_map().use_tile_store(tile_store);
@@ -117,13 +118,12 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
 }
 
 void MappingThread::reset(std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store) {
-  run_between_scans([&] {
-    tile_store_ = tile_store;
-    mapper_.static_map().use_tile_store(tile_store);
-    mapper_.reset(map_id);
-    begin_map({});
-    spdlog::info("reset: map {} begins", map_id);
-  });
+  StaticMap map(map_config_);
+  map.reset(map_id);
+  map.use_tile_store(tile_store);
+  PreparedMap prepared{std::move(map), {}, tile_store};
+  run_between_scans([&] { exchange(prepared); });
+  spdlog::info("reset: map {} begins", map_id);
 }
 
 std::function<void()> MappingThread::prepare(const SavedMap& stored,
@@ -131,11 +131,9 @@ std::function<void()> MappingThread::prepare(const SavedMap& stored,
   auto prepared =
       std::make_shared<PreparedMap>(resumed(stored, tile_store), stored.trajectory, tile_store);
   return [this, prepared = std::move(prepared)] {
-    run_between_scans([&] {
-      resume(std::move(*prepared));
-      const auto view = latest_map_.view();
-      spdlog::info("loaded: resuming with {} tiles as map {}", view->tiles.size(), view->map_id);
-    });
+    run_between_scans([&] { exchange(*prepared); });
+    const auto view = latest_map_.view();
+    spdlog::info("loaded: resuming with {} tiles as map {}", view->tiles.size(), view->map_id);
   };
 }
 
@@ -151,9 +149,9 @@ StaticMap MappingThread::resumed(const SavedMap& stored,
   return map;
 }
 
-void MappingThread::resume(PreparedMap prepared) {
+void MappingThread::exchange(PreparedMap& prepared) {
   tile_store_ = std::move(prepared.tile_store);
-  mapper_.resume(std::move(prepared.map));
+  prepared.map = mapper_.resume(std::move(prepared.map));
   begin_map(std::move(prepared.path));
 }
 

@@ -88,7 +88,7 @@ class MappingThread : public CheckpointSource {
                               const std::function<void()>& make_room);
 
  private:
-  /// A stored map that can take the running one's place.
+  /// A map that can take the running one's place.
   struct PreparedMap {
     StaticMap map;
     SharedTrajectory path;
@@ -109,8 +109,9 @@ class MappingThread : public CheckpointSource {
   /// The stored map, its tiles round the end of its path in memory.
   [[nodiscard]] StaticMap resumed(const SavedMap& stored,
                                   const std::shared_ptr<TileStore>& tile_store) const;
-  /// To be called in the thread that maps.
-  void resume(PreparedMap prepared);
+  /// To be called in the thread that maps. The map until now is left in `prepared`: the thread that
+  /// asked frees it.
+  void exchange(PreparedMap& prepared);
   /// Makes room, freezes the map or lets it grow again, and reports what it takes.
   void bound_memory();
   /// False where it is not known: then the scan is dropped.
