@@ -1,12 +1,23 @@
 #include "server/services/map_services.hpp"
 
+#include <functional>
 #include <utility>
 
 #include "idl/dds/service_server.hpp"
 #include "server/services/service_handlers.hpp"
+#include "server/threads/background_throttle.hpp"
 #include "server/threads/thread_failure.hpp"
 
 namespace stillmap::server {
+namespace {
+
+/// What clients ask for does not hold up poses where the cores are busy.
+void run_service(const std::function<void()>& work) {
+  static_cast<void>(use_scheduling(BackgroundScheduling::low));
+  run_or_report(work);
+}
+
+}  // namespace
 
 MapServices::MapServices(dds::Participant& participant, const std::string& name_space,
                          ServiceContext context)
@@ -21,7 +32,7 @@ MapServices::MapServices(dds::Participant& participant, const std::string& name_
         participant, name, logged(context_.log, name, std::move(answer)),
         dds::ServiceOptions{.carries_out_once = handler.spec.effect == dds::ServiceEffect::modifies,
                             .idle = [this, idle = handler.idle] { idle(context_); },
-                            .run = [](const auto& work) { run_or_report(work); }}));
+                            .run = run_service}));
   });
 }
 

@@ -1,7 +1,9 @@
 #include "server/threads/background_throttle.hpp"
 
 #include <sched.h>
+#include <sys/resource.h>
 #include <time.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <chrono>
@@ -19,6 +21,8 @@ constexpr auto work_between_rests = 2ms;
 constexpr int rest_ratio = 9;
 constexpr std::chrono::nanoseconds max_rest = 1s;
 constexpr auto poll_period = 1ms;
+/// Beyond the process's own nice value.
+constexpr int low_nice = 10;
 
 /// Processor time of the calling thread, which stands still while the scheduler prefers others.
 std::chrono::nanoseconds thread_cpu_time() {
@@ -27,10 +31,17 @@ std::chrono::nanoseconds thread_cpu_time() {
   return std::chrono::seconds(used.tv_sec) + std::chrono::nanoseconds(used.tv_nsec);
 }
 
+/// Nice values are a thread's own in Linux.
+bool add_nice(int more) {
+  const auto thread = static_cast<id_t>(::gettid());
+  return ::setpriority(PRIO_PROCESS, thread, ::getpriority(PRIO_PROCESS, thread) + more) == 0;
+}
+
 }  // namespace
 
 bool use_scheduling(BackgroundScheduling scheduling) {
   if (scheduling == BackgroundScheduling::normal) return true;
+  if (scheduling == BackgroundScheduling::low) return add_nice(low_nice);
   // A nice value is not enough: the network's threads wait for each other many times a scan, and a
   // thread that holds one of them up for a moment holds up both.
   const sched_param none{};

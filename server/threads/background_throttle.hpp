@@ -7,11 +7,11 @@
 
 namespace stillmap::server {
 
-/// When a background thread runs: beside all others, or, by SCHED_IDLE, on busy cores only when no
-/// other thread wants to.
-enum class BackgroundScheduling { normal, idle };
+/// When a background thread runs: beside all others, or on busy cores a tenth as much as those, by
+/// its nice value, or, by SCHED_IDLE, there only when no other thread wants to.
+enum class BackgroundScheduling { normal, low, idle };
 
-/// Applies it to the calling thread. False where the system refuses.
+/// Applies it to the calling thread, for good. False where the system refuses.
 bool use_scheduling(BackgroundScheduling scheduling);
 /// Gives all threads of this process that have idle scheduling the normal one. Where other programs
 /// keep all cores busy, a thread of idle priority needs minutes for what is left of its work.
