@@ -52,7 +52,7 @@ def pose_faults(poses, mapper, max_gap_s):
     return faults
 
 
-def faults_of(figures, max_gap_s, undisturbed):
+def faults_of(figures, max_gap_s, undisturbed, judges_times):
     """What does not hold, in words."""
     faults = []
     mapper = figures["mapper"]
@@ -63,7 +63,7 @@ def faults_of(figures, max_gap_s, undisturbed):
     if max_gap_s is None:
         return faults  # Nobody was there while the robot drove.
     faults += pose_faults(figures["poses"], mapper, max_gap_s)
-    if mapper["p50_ms"] > 1.5 * undisturbed["mapper"]["p50_ms"] + SLOWER_MS:
+    if judges_times and mapper["p50_ms"] > 1.5 * undisturbed["mapper"]["p50_ms"] + SLOWER_MS:
         faults.append("the mapper became slower")
     if mapper["mapped"] < 0.7 * undisturbed["mapper"]["mapped"]:
         faults.append(f"only {mapper['mapped']} of {figures['published']} scans were mapped")
@@ -132,7 +132,9 @@ def main():
         undisturbed = undisturbed or figures
         print_row(row_of(name, figures))
         allowed_gap_s = max_gap_s and max_gap_s * arguments.slowdown
-        for fault in faults_of(figures, allowed_gap_s, undisturbed):
+        # A sanitizer's own times tell nothing.
+        judges_times = arguments.slowdown == 1.0
+        for fault in faults_of(figures, allowed_gap_s, undisturbed, judges_times):
             failed = True
             print(f"  FAILED: {name}: {fault}", flush=True)
     raise SystemExit(1 if failed else 0)
