@@ -4,10 +4,12 @@
 //   scale_probe DOMAIN rate SCAN SECONDS          drives as fast as scans are taken
 //   scale_probe DOMAIN versions SCAN COUNT        asks for the versions of 1 km2, while driving
 //   scale_probe DOMAIN join SCAN WINDOW_M         joins late, and waits for the tiles in the window
-//   scale_probe DOMAIN ages SCAN SECONDS          how old poses are when they arrive
-//   scale_probe DOMAIN crowd 0 0 MAP OTHER        17 clients at once, until stdin ends: they page,
-//   ask for
-//                                                 removed voxels, load the two maps in turns, reset
+//   scale_probe DOMAIN park SCAN 0                drives to the end of a round
+//   scale_probe DOMAIN ages SCAN SECONDS          how old poses are when they arrive, parked there
+//   scale_probe DOMAIN crowd 0 0 [MAP OTHER]      16 clients at once, until stdin ends: they page
+//   and
+//                                                 ask for removed voxels and versions; one more
+//                                                 loads the two maps in turns, and resets
 //   scale_probe DOMAIN hang 0 0                   asks for the whole map without end: to be stopped
 //   scale_probe DOMAIN stand SCAN SECONDS         a lidar that stands, with noise
 //
@@ -20,6 +22,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <exception>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <mutex>
@@ -78,15 +81,23 @@ class PublicationTimes {
   std::map<std::int64_t, Clock::time_point> times_;
 };
 
-/// Publishes the drive on a thread, no faster than `period`.
+/// Where the path of a made map ends.
+constexpr int last_of_round = scans_a_round - 1;
+
+/// Publishes the drive on a thread, no faster than `period`; a lidar that is parked stands where
+/// the paths of all made maps end.
 class Drive {
  public:
-  Drive(std::uint32_t domain, int first, std::chrono::milliseconds period,
+  Drive(std::uint32_t domain, int first, std::chrono::milliseconds period, bool is_parked = false,
         PublicationTimes* times = nullptr)
-      : times_(times), publisher_({.dds = loopback(domain), .lossless = true}), next_(first) {
+      : is_parked_(is_parked),
+        times_(times),
+        publisher_({.dds = loopback(domain), .lossless = true}),
+        next_(first) {
     if (!publisher_.wait_for_subscriber(patience)) throw std::runtime_error("no server");
     thread_ = std::jthread([this, period](const std::stop_token& stop) { run(stop, period); });
   }
+  [[nodiscard]] int next() const { return next_; }
   /// The next scan of the drive, when this one has ended.
   [[nodiscard]] int end() {
     thread_ = {};
@@ -97,7 +108,9 @@ class Drive {
   void run(const std::stop_token& stop, std::chrono::milliseconds period) {
     auto due = Clock::now();
     while (!stop.stop_requested()) {
-      const Scan scan = seen_in_room(round_pose(next_));
+      StampedPose pose = round_pose(next_);
+      if (is_parked_) pose.T_map_lidar = round_pose(last_of_round).T_map_lidar;
+      const Scan scan = seen_in_room(pose);
       if (times_ != nullptr) times_->note(scan.stamp_ns);
       if (!publisher_.publish(scan, {}, 1s)) continue;
       ++next_;
@@ -106,6 +119,7 @@ class Drive {
     }
   }
 
+  bool is_parked_;
   PublicationTimes* times_;
   ScanPublisher publisher_;
   std::atomic<int> next_;
@@ -203,6 +217,14 @@ json join(std::uint32_t domain, int scan, double window_m) {
           {"next_scan", drive.end()}};
 }
 
+json park(std::uint32_t domain, int scan) {
+  Drive drive(domain, scan, 20ms);
+  const int last = (scan / scans_a_round + 1) * scans_a_round + last_of_round;
+  while (drive.next() < last) std::this_thread::sleep_for(1ms);
+  static_cast<void>(drive.end());
+  return {{"next_scan", last + 1}};
+}
+
 json ages(std::uint32_t domain, int scan, std::chrono::seconds duration) {
   Client client(client_options(domain));
   client.wait_for_server(patience);
@@ -219,7 +241,7 @@ json ages(std::uint32_t domain, int scan, std::chrono::seconds duration) {
     const std::scoped_lock lock(mutex);
     return std::exchange(ages_ms, {});
   };
-  Drive drive(domain, scan, 100ms, &times);
+  Drive drive(domain, scan, 100ms, true, &times);
   static_cast<void>(take_ages(1s));
   const std::vector<double> taken_ms = take_ages(duration);
   return {{"poses", taken_ms.size()},
@@ -239,19 +261,21 @@ class Crowd {
  public:
   explicit Crowd(std::uint32_t domain) : domain_(domain) {}
 
-  /// `ask(client, how often it asked)`; what the server refuses is counted.
-  void add(int clients, const std::function<void(Client&, int)>& ask) {
+  /// What the server refuses is counted, and the last refusal told.
+  void add(int clients, const std::function<void(Client&)>& ask) {
     for (int i = 0; i < clients; ++i) {
       threads_.emplace_back([this, ask](const std::stop_token& stop) {
         Client client(client_options(domain_));
         client.wait_for_server(patience);
         ++ready_;
-        for (int asked = 0; !stop.stop_requested(); ++asked) {
+        while (!stop.stop_requested()) {
           try {
-            ask(client, asked);
+            ask(client);
             ++answers_;
-          } catch (const std::runtime_error&) {
+          } catch (const std::runtime_error& refusal) {
             ++refusals_;
+            const std::scoped_lock lock(mutex_);
+            last_refusal_ = refusal.what();
           }
         }
       });
@@ -263,7 +287,9 @@ class Crowd {
   [[nodiscard]] json end() {
     for (std::jthread& thread : threads_) thread.request_stop();
     threads_.clear();
-    return {{"answers", answers_.load()}, {"refusals", refusals_.load()}};
+    return {{"answers", answers_.load()},
+            {"refusals", refusals_.load()},
+            {"last refusal", last_refusal_}};
   }
 
  private:
@@ -271,6 +297,8 @@ class Crowd {
   std::atomic<std::size_t> ready_ = 0;
   std::atomic<int> answers_ = 0;
   std::atomic<int> refusals_ = 0;
+  std::mutex mutex_;
+  std::string last_refusal_;
   std::vector<std::jthread> threads_;
 };
 
@@ -282,37 +310,32 @@ void page(Client& client, double resolution_m) {
   static_cast<void>(client.get_whole_static_map(query));
 }
 
-/// With some time in each map, as an operator would.
-void change_map(Client& client, int asked, const std::string& map, const std::string& other) {
-  switch (asked % 3) {
-    case 0:
-      static_cast<void>(client.load_map(other));
-      break;
-    case 1:
-      static_cast<void>(client.reset());
-      break;
-    default:
-      static_cast<void>(client.load_map(map));
-      std::this_thread::sleep_for(2s);
-  }
+/// An operator: the other map, an empty one, and back, with some time in each. What a reset keeps
+/// is the other map from then on.
+void change_map(Client& client, const std::string& map, std::string& other) {
+  static_cast<void>(client.load_map(other));
   std::this_thread::sleep_for(1s);
+  other = std::filesystem::path(client.reset().kept_file).filename();
+  std::this_thread::sleep_for(1s);
+  static_cast<void>(client.load_map(map));
+  std::this_thread::sleep_for(3s);
 }
 
-json crowd(std::uint32_t domain, const std::string& map, const std::string& other) {
+json crowd(std::uint32_t domain, const std::string& map, std::string other) {
   Crowd clients(domain);
-  clients.add(6, [](Client& client, int) { page(client, 0.5); });
-  clients.add(4, [](Client& client, int) { page(client, 0.0); });
-  clients.add(4, [](Client& client, int) { static_cast<void>(client.get_removed(square_km())); });
-  clients.add(2, [](Client& client, int) {
-    static_cast<void>(client.get_tile_versions(square_km().box_map));
-  });
-  clients.add(1, [&](Client& client, int asked) { change_map(client, asked, map, other); });
+  clients.add(6, [](Client& client) { page(client, 0.5); });
+  clients.add(4, [](Client& client) { page(client, 0.0); });
+  clients.add(4, [](Client& client) { static_cast<void>(client.get_removed(square_km())); });
+  clients.add(
+      2, [](Client& client) { static_cast<void>(client.get_tile_versions(square_km().box_map)); });
+  if (!map.empty()) clients.add(1, [&](Client& client) { change_map(client, map, other); });
   clients.wait_until_ready();
   std::puts("ready");
   std::fflush(stdout);
   while (std::getchar() != EOF) {
   }
   json result = clients.end();
+  if (map.empty()) return result;
   Client last(client_options(domain));
   last.wait_for_server(patience);
   static_cast<void>(last.load_map(map));
@@ -356,8 +379,12 @@ json run(std::span<const std::string> arguments) {
   if (mode == "rate") return rate(domain, scan, duration);
   if (mode == "versions") return versions(domain, scan, number(3));
   if (mode == "join") return join(domain, scan, number(3));
+  if (mode == "park") return park(domain, scan);
   if (mode == "ages") return ages(domain, scan, duration);
-  if (mode == "crowd") return crowd(domain, arguments.last(2)[0], arguments.last(2)[1]);
+  if (mode == "crowd") {
+    const bool changes_maps = arguments.size() > 5;
+    return crowd(domain, changes_maps ? arguments[4] : "", changes_maps ? arguments[5] : "");
+  }
   if (mode == "hang") return hang(domain);
   if (mode == "stand") return stand(domain, scan, duration);
   throw std::runtime_error("unknown mode " + mode);
