@@ -1,5 +1,6 @@
 #include "idl/dds/service_server.hpp"
 
+#include <algorithm>
 #include <utility>
 
 namespace stillmap::dds {
@@ -53,6 +54,21 @@ SerializedSample with_header(const ServiceCall& call, Make make) {
 }
 
 }  // namespace
+
+const SerializedSample* AnsweredRequests::find(const RequestId& id, Clock::time_point now) const {
+  const auto found = std::ranges::find(answers_, id, &Answer::id);
+  return found == answers_.end() || now - found->given > max_age ? nullptr : &found->reply;
+}
+
+void AnsweredRequests::add(const RequestId& id, SerializedSample reply, Clock::time_point now) {
+  bytes_ += reply.size();
+  answers_.push_back({.id = id, .reply = std::move(reply), .given = now});
+  while (!answers_.empty() && (answers_.size() > max_count || bytes_ > max_bytes ||
+                               now - answers_.front().given > max_age)) {
+    bytes_ -= answers_.front().reply.size();
+    answers_.pop_front();
+  }
+}
 
 UntypedServiceServer::UntypedServiceServer(Participant& participant, const std::string& service,
                                            TypeSupport request_type, TypeSupport reply_type,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <deque>
 #include <exception>
 #include <functional>
@@ -9,7 +10,6 @@
 #include <thread>
 #include <utility>
 
-#include "idl/dds/answered_requests.hpp"
 #include "idl/dds/reply_writer.hpp"
 #include "idl/dds/service_faults.hpp"
 #include "idl/dds/service_identity.hpp"
@@ -33,6 +33,36 @@ struct ServiceOptions {
   /// Does the thread's work, and what is to be done where that throws: what `answer` throws is
   /// refused in words, but the transport and `idle` can fail, too.
   std::function<void(const std::function<void()>& work)> run = [](const auto& work) { work(); };
+};
+
+/// The newest replies of a service, so that a call that comes again is answered again and not
+/// carried out again. One thread uses it.
+class AnsweredRequests {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  /// Beyond them, the oldest go.
+  static constexpr std::size_t max_count = 1000;
+  static constexpr std::size_t max_bytes = 4U << 20U;
+  /// Longer than a client waits for an answer.
+  static constexpr std::chrono::minutes max_age{10};
+
+  /// The reply to this call; null when it has not been answered, or too long ago.
+  [[nodiscard]] const SerializedSample* find(const RequestId& id, Clock::time_point now) const;
+
+  void add(const RequestId& id, SerializedSample reply, Clock::time_point now);
+
+  [[nodiscard]] std::size_t count() const { return answers_.size(); }
+
+ private:
+  struct Answer {
+    RequestId id;
+    SerializedSample reply;
+    Clock::time_point given;
+  };
+
+  std::deque<Answer> answers_;
+  std::size_t bytes_ = 0;
 };
 
 /// The server's end of one ROS 2 service, for clients of rmw_fastrtps and of rmw_cyclonedds. One
