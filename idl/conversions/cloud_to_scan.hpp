@@ -5,7 +5,7 @@
 
 #include "core/lidar/point_fields.hpp"
 #include "core/lidar/scan.hpp"
-#include "idl/conversions/cloud_layout.hpp"
+#include "idl/msg/wire_types.hpp"
 
 namespace stillmap::wire {
 
@@ -17,6 +17,14 @@ struct CloudReadOptions {
   /// The label field holds classes 0..19; otherwise original SemanticKITTI ids, of which only the
   /// class is kept (moving-car becomes car).
   bool labels_are_classes = false;
+};
+
+/// Why a cloud cannot be used.
+struct CloudFault {
+  /// One word for a counter: "size_mismatch".
+  std::string counter;
+  /// With the field and its value.
+  std::string reason;
 };
 
 /// Either a scan or a fault.
