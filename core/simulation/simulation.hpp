@@ -11,10 +11,24 @@
 #include "core/lidar/sensor_model.hpp"
 #include "core/simulation/city_plan.hpp"
 #include "core/simulation/lidar_flaws.hpp"
-#include "core/simulation/lidar_motion.hpp"
 #include "core/simulation/materials.hpp"
 
 namespace stillmap::simulation {
+
+/// How the lidar moves on top of the vehicle that carries it.
+enum class LidarMotion {
+  /// Fixed to the vehicle.
+  vehicle,
+  /// A robot that turns on the spot: quarter turns at 55 degrees a second, which begin and end
+  /// within a tenth of a second.
+  hard_turns,
+  /// In a hand, or on a walking robot: steps, sway, and glances to the sides.
+  handheld,
+};
+
+/// Motion of that name ("vehicle", "hard_turns", "handheld").
+/// @throws std::invalid_argument with the names that exist.
+[[nodiscard]] LidarMotion lidar_motion(const std::string& name);
 
 struct SimulationConfig {
   CityPlan plan = quiet_city();
