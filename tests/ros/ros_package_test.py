@@ -121,7 +121,7 @@ class RosPackageTest(ComparisonTest):
                 self.assertRegex(field.name, FIELD_NAME, made.full_name)
 
     def test_reasons_are_called_as_the_core_and_the_tools_call_them(self):
-        header = (SOURCE / "core/traversability/traversability_tile.hpp").read_text()
+        header = (SOURCE / "core/traversability/traversability_view.hpp").read_text()
         reasons = re.search(r"enum class BlockReason[^{]*{(.*?)}", header, re.DOTALL)[1]
         names = [name.upper() for name in re.findall(r"^\s*(\w+),$", reasons, re.MULTILINE)]
         grid = next(made for made in self.package if made.name == "TraversabilityGrid")
