@@ -67,7 +67,11 @@ class StoppingClient {
     static_cast<void>(asker.readers().wait_for_any(discovery_timeout));
     static_cast<void>(replies.events().wait_for_writer(discovery_timeout));
     const SaveMap_Request request;
+    SerializedSample first;
+    eprosima::fastdds::dds::SampleInfo info;
     for (int i = 0; i < stopped_requests; ++i) {
+      // Its reply shows that the server knows this reader, too.
+      if (i == 1) static_cast<void>(replies.take(first, info, {}, discovery_timeout));
       eprosima::fastrtps::rtps::WriteParams params;
       params.related_sample_identity().writer_guid() = replies.guid();
       static_cast<void>(asker.write(to_bytes(request_type, &request, 0), params));
