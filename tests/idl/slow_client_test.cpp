@@ -142,7 +142,8 @@ TEST_P(SlowClient, ThatIsStoppedLosesAndIsToldAndNobodyElseNotices) {
     for (int i = 0; i < 20; ++i) {
       const auto began = std::chrono::steady_clock::now();
       EXPECT_TRUE(other.call(SaveMap_Request(), discovery_timeout)) << i;
-      EXPECT_LT(std::chrono::steady_clock::now() - began, 2s * test::slowdown) << i;
+      // What clients wait by default.
+      EXPECT_LT(std::chrono::steady_clock::now() - began, 5s * test::slowdown) << i;
     }
   }
   // All replies to both are 440 MB.
