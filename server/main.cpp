@@ -17,6 +17,7 @@
 #include "server/mapping/async_segmenter.hpp"
 #include "server/monitoring/log.hpp"
 #include "server/server.hpp"
+#include "server/threads/background_throttle.hpp"
 #include "server/threads/thread_failure.hpp"
 
 namespace {
@@ -43,6 +44,7 @@ int serve(const stillmap::ServerConfig& config) {
   static_cast<void>(std::signal(SIGXFSZ, SIG_IGN));
   // A reader of the log that ends first (tee) must not keep the map from being saved.
   static_cast<void>(std::signal(SIGPIPE, SIG_IGN));
+  stillmap::server::start_tbb_workers();
   const bool adaptive_width = stillmap::server::segmentation_budget(config).count() > 0;
   auto labels = stillmap::open_segmenter(config.labels, config.mapper.sensor, adaptive_width);
   if (const std::string details = labels->details(); !details.empty()) {

@@ -2,6 +2,9 @@
 
 #include <sched.h>
 #include <sys/resource.h>
+#include <tbb/parallel_for.h>
+#include <tbb/partitioner.h>
+#include <tbb/task_arena.h>
 #include <time.h>
 #include <unistd.h>
 
@@ -10,6 +13,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <system_error>
+#include <thread>
 
 namespace stillmap::server {
 namespace {
@@ -46,6 +50,24 @@ bool use_scheduling(BackgroundScheduling scheduling) {
   // thread that holds one of them up for a moment holds up both.
   const sched_param none{};
   return sched_setscheduler(0, SCHED_IDLE, &none) == 0;
+}
+
+void start_tbb_workers() {
+  // Where the system grants fewer threads than that.
+  constexpr auto max_wait = 1s;
+  const int threads = tbb::this_task_arena::max_concurrency();
+  const auto deadline = std::chrono::steady_clock::now() + max_wait;
+  std::atomic<int> arrived = 0;
+  // Each thread has one of the tasks, as none ends before all have begun.
+  tbb::parallel_for(
+      0, threads,
+      [&](int) {
+        ++arrived;
+        while (arrived < threads && std::chrono::steady_clock::now() < deadline) {
+          std::this_thread::yield();
+        }
+      },
+      tbb::simple_partitioner());
 }
 
 void end_idle_scheduling() {

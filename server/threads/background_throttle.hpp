@@ -13,6 +13,9 @@ enum class BackgroundScheduling { normal, low, idle };
 
 /// Applies it to the calling thread, for good. False where the system refuses.
 bool use_scheduling(BackgroundScheduling scheduling);
+/// Starts oneTBB's workers, which inherit the calling thread's scheduling and keep it: were a
+/// background thread the first to need them, the mapper's work would be done at low priority, too.
+void start_tbb_workers();
 /// Gives all threads of this process that have idle scheduling the normal one. Where other programs
 /// keep all cores busy, a thread of idle priority needs minutes for what is left of its work.
 void end_idle_scheduling();

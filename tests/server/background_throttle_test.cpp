@@ -2,8 +2,12 @@
 
 #include <gtest/gtest.h>
 #include <sched.h>
+#include <sys/resource.h>
+#include <tbb/parallel_for.h>
+#include <tbb/task_arena.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -117,6 +121,44 @@ TEST(BackgroundThrottle, ThreadsThatAreToEndRunBesideAllOthers) {
   EXPECT_EQ(sched_getscheduler(thread_id), SCHED_IDLE);
   throttle.release();
   EXPECT_EQ(sched_getscheduler(thread_id), SCHED_OTHER);
+}
+
+int nice_of_this_thread() { return ::getpriority(PRIO_PROCESS, static_cast<id_t>(::gettid())); }
+
+TEST(BackgroundScheduling, LowIsANiceValueOfTheThreadAlone) {
+  const int before = nice_of_this_thread();
+  int within = before;
+  std::jthread([&] {
+    EXPECT_TRUE(use_scheduling(BackgroundScheduling::low));
+    within = nice_of_this_thread();
+  }).join();
+  EXPECT_EQ(within, std::min(before + 10, 19));
+  EXPECT_EQ(nice_of_this_thread(), before);
+}
+
+TEST(BackgroundScheduling, WorkersThatWereStartedBeforeKeepTheirPriority) {
+  const int before = nice_of_this_thread();
+  start_tbb_workers();
+  std::atomic<int> by_others = 0;
+  std::atomic<int> low = 0;
+  const auto low_thread = [&] {
+    static_cast<void>(use_scheduling(BackgroundScheduling::low));
+    const auto own = std::this_thread::get_id();
+    const auto deadline = std::chrono::steady_clock::now() + 10s;
+    while (by_others == 0 && std::chrono::steady_clock::now() < deadline) {
+      tbb::parallel_for(0, 100, [&](int) {
+        std::this_thread::sleep_for(1ms);
+        if (std::this_thread::get_id() == own) return;
+        ++by_others;
+        if (nice_of_this_thread() != before) ++low;
+      });
+    }
+  };
+  std::jthread(low_thread).join();
+  if (tbb::this_task_arena::max_concurrency() > 1) {
+    EXPECT_GT(by_others, 0);
+  }
+  EXPECT_EQ(low, 0);
 }
 
 }  // namespace
