@@ -230,7 +230,7 @@ RemovedVoxels Client::get_removed(const Region& region, std::uint32_t max_voxels
   request.max_voxels(max_voxels);
   const auto reply = connection_->call_ok(services::get_removed, std::move(request));
   return {connection_->require_readable(wire::from_response(reply), services::get_removed),
-          reply.total()};
+          reply.total(), reply.status().reason()};
 }
 
 std::uint64_t Client::restore_removed(RemovalReason reason, const BoxRegion& box) {

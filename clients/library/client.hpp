@@ -97,6 +97,8 @@ struct RemovedVoxels {
   std::vector<RemovedVoxel> voxels;
   /// Of the region, also those that did not come.
   std::uint64_t total = 0;
+  /// Why there may be more: tiles that the server cannot read. Empty where there are none.
+  std::string incomplete = {};
 };
 
 /// What changed in a region since the last update. Tiles are whole, including parts outside of the

@@ -49,7 +49,7 @@ class Mapping {
 
   /// As in MappingThread.
   void publish_now() { thread_->publish_now(); }
-  [[nodiscard]] std::vector<RemovedVoxel> removed(const Eigen::AlignedBox3d& box_map) {
+  [[nodiscard]] RemovedInBox removed(const Eigen::AlignedBox3d& box_map) {
     return thread_->removed(box_map);
   }
   std::size_t restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map) {

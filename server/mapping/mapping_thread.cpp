@@ -234,7 +234,7 @@ MemoryUse MappingThread::memory_use() {
   return use;
 }
 
-std::vector<RemovedVoxel> MappingThread::removed(const Eigen::AlignedBox3d& box_map) {
+RemovedInBox MappingThread::removed(const Eigen::AlignedBox3d& box_map) {
   const TilesOfBox tiles = tiles_of(box_map);
   StaticMap::RemovedVoxels all;
   for (std::span<const TileId> left(tiles.ids); !left.empty();) {
@@ -246,18 +246,7 @@ std::vector<RemovedVoxel> MappingThread::removed(const Eigen::AlignedBox3d& box_
       return true;
     });
   }
-  if (tiles.tile_store == nullptr) return std::move(all.voxels);
-  // From the disk in the caller's thread.
-  for (const TileId id : all.non_resident) {
-    const TileRecord record = tiles.tile_store->load(id);
-    if (record.evidence == nullptr) continue;
-    std::ranges::copy_if(
-        removed_voxels(*record.evidence, map_config_.voxel_size_m, map_config_.tile_size_m),
-        std::back_inserter(all.voxels), [&](const RemovedVoxel& voxel) {
-          return box_map.contains(voxel.position_map.cast<double>());
-        });
-  }
-  return std::move(all.voxels);
+  return {std::move(all.voxels), std::move(all.non_resident), tiles.tile_store};
 }
 
 std::size_t MappingThread::restore_removed(RemovalReason reason, const Eigen::AlignedBox3d& box_map,

@@ -40,6 +40,15 @@ struct MappingOutputs {
   BackgroundThrottle* throttle = nullptr;
 };
 
+/// What is kept out of the planning view: what of it is in memory, and the tiles that must be read
+/// for the rest.
+struct RemovedInBox {
+  std::vector<RemovedVoxel> voxels;
+  std::vector<TileId> on_disk;
+  /// Null without a memory limit.
+  std::shared_ptr<TileStore> tile_store;
+};
+
 /// The one thread that maps: takes scans from the queue, runs the mapper, and publishes the result
 /// as the latest map. Its other functions wait for the scan in work.
 class MappingThread : public CheckpointSource {
@@ -77,9 +86,8 @@ class MappingThread : public CheckpointSource {
 
   /// Voxels in the box (map frame [m]) that are removed from the planning view, in no order. Scans
   /// go on being mapped meanwhile: each tile is as it was at some moment of the call. Throws
-  /// std::invalid_argument for a box with more tiles on disk than one answer may read, or as the
-  /// tile store does.
-  [[nodiscard]] std::vector<RemovedVoxel> removed(const Eigen::AlignedBox3d& box_map);
+  /// std::invalid_argument for a box with more tiles on disk than one answer may read.
+  [[nodiscard]] RemovedInBox removed(const Eigen::AlignedBox3d& box_map);
   /// As StaticMap::restore_removed, tile by tile between scans. `make_room` is called where the map
   /// has grown to its memory limit: it is to store the map, so that tiles can be evicted. Throws
   /// as `removed` and `make_room` do, and std::runtime_error when tiles could not be read; what was

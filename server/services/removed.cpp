@@ -1,7 +1,11 @@
 #include <algorithm>
 #include <bitset>
+#include <iterator>
+#include <stdexcept>
+#include <string>
 
 #include "core/map/query/region.hpp"
+#include "core/map/tile_evidence.hpp"
 #include "idl/conversions/region.hpp"
 #include "idl/conversions/removed_voxels.hpp"
 #include "server/services/service_handlers.hpp"
@@ -41,14 +45,43 @@ Reasons reasons_of(const std::vector<std::uint8_t>& numbers) {
   return reasons.none() ? reasons.set() : reasons;
 }
 
+/// Adds those of tiles on disk. Returns why there may be more: tiles that cannot be read. Throws
+/// std::runtime_error where nothing was found instead.
+std::string add_from_disk(const MapSnapshot& view, const Eigen::AlignedBox3d& box_map,
+                          RemovedInBox& removed) {
+  if (removed.tile_store == nullptr) return {};
+  std::size_t unreadable = 0;
+  std::string first_fault;
+  for (const TileId id : removed.on_disk) {
+    try {
+      const TileRecord record = removed.tile_store->load(id);
+      if (record.evidence == nullptr) continue;
+      std::ranges::copy_if(removed_voxels(*record.evidence, view.voxel_size_m, view.tile_size_m),
+                           std::back_inserter(removed.voxels), [&](const RemovedVoxel& voxel) {
+                             return box_map.contains(voxel.position_map.cast<double>());
+                           });
+    } catch (const std::runtime_error& fault) {
+      if (unreadable++ == 0) first_fault = fault.what();
+    }
+  }
+  if (unreadable == 0) return {};
+  std::string incomplete =
+      std::to_string(unreadable) + " tiles cannot be read, the first: " + first_fault;
+  if (removed.voxels.empty()) throw std::runtime_error(incomplete);
+  return incomplete;
+}
+
 }  // namespace
 
 GetRemoved_Response get_removed(const ServiceContext& context, const GetRemoved_Request& request) {
   using Response = GetRemoved_Response;
-  return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
+  return answer<Response>(context, request, [&](const MapSnapshot& view, Response& response) {
     const RegionShape region(region_of(request.region()));
     const Reasons reasons = reasons_of(request.reasons());
-    std::vector<RemovedVoxel> removed = context.removed(region.bounds_map());
+    RemovedInBox in_box = context.removed(region.bounds_map());
+    const std::string incomplete = add_from_disk(view, region.bounds_map(), in_box);
+    response.status(reply_status(view, wire::ReplyCode::ok, incomplete));
+    std::vector<RemovedVoxel>& removed = in_box.voxels;
     std::erase_if(removed, [&](const RemovedVoxel& voxel) {
       return !reasons.test(static_cast<std::size_t>(voxel.reason)) ||
              !region.contains(voxel.position_map.cast<double>());

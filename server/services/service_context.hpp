@@ -12,6 +12,7 @@
 #include "idl/conversions/map_query.hpp"
 #include "idl/interface/server_status.hpp"
 #include "server/mapping/map_saver.hpp"
+#include "server/mapping/mapping_thread.hpp"
 #include "server/monitoring/service_log.hpp"
 #include "server/occupancy/occupancy_thread.hpp"
 #include "server/publishers/latest_map.hpp"
@@ -34,7 +35,7 @@ struct ServiceContext {
   /// Publishes what was mapped until now.
   std::function<void()> publish_now;
   /// What is kept out of the static map.
-  std::function<std::vector<RemovedVoxel>(const Eigen::AlignedBox3d& box_map)> removed;
+  std::function<RemovedInBox(const Eigen::AlignedBox3d& box_map)> removed;
   /// Returns how many voxels are shown again.
   std::function<std::size_t(RemovalReason reason, const Eigen::AlignedBox3d& box_map)>
       restore_removed;

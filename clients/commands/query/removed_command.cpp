@@ -30,6 +30,7 @@ struct RemovedArguments {
 struct RemovedResult {
   std::vector<RemovedVoxel> voxels;
   std::uint64_t total = 0;
+  std::string incomplete;
   MapSnapshot view;
 };
 
@@ -57,7 +58,7 @@ RemovedResult removed_in_file(const RemovedArguments& arguments) {
 RemovedResult removed_on_server(Client& client, const RemovedArguments& arguments) {
   const Region region = region_of(arguments.region, client, arguments.client.timeout());
   RemovedVoxels removed = client.get_removed(region);
-  RemovedResult found{std::move(removed.voxels), removed.total, {}};
+  RemovedResult found{std::move(removed.voxels), removed.total, std::move(removed.incomplete), {}};
   if (!arguments.picture.empty()) found.view = fetch_map(client);
   return found;
 }
@@ -68,7 +69,9 @@ Json to_json(const RemovedResult& found) {
     counts.set(std::string(name(reason)),
                std::ranges::count(found.voxels, reason, &RemovedVoxel::reason));
   }
-  return {{"total", found.total}, {"shown", found.voxels.size()}, {"reasons", counts}};
+  Json json{{"total", found.total}, {"shown", found.voxels.size()}, {"reasons", counts}};
+  if (!found.incomplete.empty()) json.set("incomplete", found.incomplete);
+  return json;
 }
 
 std::string describe(const RemovedResult& found) {
@@ -80,6 +83,7 @@ std::string describe(const RemovedResult& found) {
     const auto count = std::ranges::count(found.voxels, reason, &RemovedVoxel::reason);
     text.append("\n  ").append(name(reason)).append(": ").append(std::to_string(count));
   }
+  if (!found.incomplete.empty()) text.append("\nthere may be more: ").append(found.incomplete);
   return text + "\n";
 }
 
