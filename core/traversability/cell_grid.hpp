@@ -70,7 +70,8 @@ struct TileNeighbourhood {
   [[nodiscard]] T at(int x, int y, T none) const {
     const int column = (x + side) / side;
     const int row = (y + side) / side;
-    const TileT* tile = tiles.at(static_cast<std::size_t>(3 * row + column));
+    const int index = 3 * row + column;
+    const TileT* tile = tiles.at(static_cast<std::size_t>(index));
     if (tile == nullptr) return none;
     return T(tile->at(x - (column - 1) * side, y - (row - 1) * side));
   }

@@ -200,6 +200,7 @@ std::vector<fs::path> Bag::files_of_folder(const fs::path& folder) {
   const BagMetadata metadata = read_bag_metadata(folder / "metadata.yaml");
   compression_ = metadata.compression;
   std::vector<fs::path> files;
+  files.reserve(metadata.files.size());
   for (const std::string& file : metadata.files) files.push_back(folder / file);
   return files;
 }

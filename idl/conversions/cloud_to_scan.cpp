@@ -82,7 +82,7 @@ std::optional<PointColumn> find_column(const PointCloud2& cloud,
 
 std::optional<PointColumn> find_integer_column(const PointCloud2& cloud,
                                                const std::vector<std::string>& names) {
-  const auto column = find_column(cloud, names);
+  auto column = find_column(cloud, names);
   if (column && !is_integer(column->type)) {
     refuse("bad_field", "field " + names.front() + " has a floating-point datatype; it needs an " +
                             "integer one");

@@ -93,7 +93,7 @@ std::optional<ServiceCall> UntypedServiceServer::take(void* request, const std::
     if (waiting_bytes_ > max_waiting_bytes) {
       std::this_thread::sleep_for(poll_period);
     } else if (requests_.take(bytes, info, stop, waiting_.empty() ? timeout : poll_period)) {
-      if (const auto call = read(bytes, info, request)) return call;
+      if (auto call = read(bytes, info, request)) return call;
     }
   } while (Clock::now() < deadline && !stop.stop_requested());
   return std::nullopt;
