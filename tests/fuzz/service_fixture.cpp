@@ -52,7 +52,7 @@ ServiceFixture::ServiceFixture()
           .publish_now = [this] { latest_map_.publish(map_.view()); },
           .removed =
               [this](const auto& box_map) {
-                return RemovedInBox{map_.removed(box_map, map_.tiles_in(box_map)).voxels, {}, nullptr};
+                return server::RemovedInBox{map_.removed(box_map, map_.tiles_in(box_map)).voxels, {}, nullptr};
               },
           .restore_removed =
               [this](RemovalReason reason, const auto& box_map) {
