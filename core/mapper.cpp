@@ -58,6 +58,7 @@ std::optional<MappedScan> Mapper::process(
   if (!config_.prepare.deskew) scan.time_offset_s.clear();
   const SweepTimes sweep = sweep_times(scan, config_.sensor.period_s);
   const std::int64_t middle_ns = scan.stamp_ns + std::llround(sweep.middle_s * 1e9);
+  if (trajectory_.empty()) odometry_.expect_first_scan(middle_ns);
   const std::optional<InertialMotion> inertial = inertial_motion(scan.stamp_ns, sweep);
   odometry_.sweep_motion(sweep, inertial).move_to_middle(scan, sweep);
   const auto T_map_lidar_known = levelled(T_map_lidar_prior, scan.stamp_ns, sweep);
@@ -196,7 +197,7 @@ void Mapper::reset(std::uint64_t map_id) {
 }
 
 void Mapper::clear_scan_state() {
-  odometry_.reset();
+  odometry_.begin_map();
   label_synchronizer_.reset();
   trajectory_.clear();
   last_middle_.reset();

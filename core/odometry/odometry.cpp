@@ -392,7 +392,8 @@ void Odometry::State::extend_map(const ScanInParts& parts, const Step& step,
   FeatureSets features = ScanFeatures(parts.scan, parts.sweep, parts.labels, parts.features)
                              .of_map(usable, step.motion);
   extend_local_map(map, features, T_map_middle);
-  if (step.result.health == OdometryHealth::initialised && features.rolling)
+  const bool is_uncompensated = last.interval_s <= 0.0;
+  if (step.result.health == OdometryHealth::initialised && features.rolling && is_uncompensated)
     first_scan = {std::move(features), parts.sweep, T_map_middle};
 }
 
@@ -408,6 +409,7 @@ Odometry& Odometry::operator=(Odometry&&) noexcept = default;
 
 Eigen::Isometry3d Odometry::predict(std::int64_t stamp_ns,
                                     const std::optional<InertialMotion>& inertial) const {
+  if (!state_->started) return Eigen::Isometry3d::Identity();
   const double interval_s = state_->intervals.stamped_since_last_s(stamp_ns);
   return state_->last.T_map_lidar * state_->motion_to_middle(interval_s, inertial);
 }
@@ -432,9 +434,11 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   const std::int64_t time_ns = scan.stamp_ns + std::llround(sweep.middle_s * 1e9);
   const SweepMotion expected_motion = sweep_motion(sweep, inertial);
   const double stamp_part = sweep.duration_s > 0.0 ? -sweep.middle_s / sweep.duration_s : 0.0;
+  const bool begins_at_origin = !state.started && !T_map_lidar_prior;
   const Eigen::Isometry3d T_map_lidar_predicted =
-      T_map_lidar_prior
-          ? *T_map_lidar_prior * expected_motion.T_middle_at(stamp_part).inverse()
+      T_map_lidar_prior || begins_at_origin
+          ? T_map_lidar_prior.value_or(Eigen::Isometry3d::Identity()) *
+                expected_motion.T_middle_at(stamp_part).inverse()
           : state.last.T_map_lidar *
                 state.motion_to_middle(state.intervals.since_last_s(time_ns), inertial);
 
@@ -492,5 +496,26 @@ void Odometry::add_prior_map(std::span<const LabelledPoint> points_map) {
 }
 
 void Odometry::reset() { *state_ = State(state_->config, state_->sensor); }
+
+void Odometry::begin_map() {
+  State& state = *state_;
+  State next(state.config, state.sensor);
+  const bool has_velocity = state.last.interval_s > 0.0 && state.lost_scans == 0;
+  if (has_velocity && !state.has_jumped && !state.stretch) {
+    next.last.motion = state.last.motion;
+    next.last.interval_s = state.last.interval_s;
+    next.intervals = state.intervals;
+  }
+  state = std::move(next);
+}
+
+void Odometry::expect_first_scan(std::int64_t stamp_ns) {
+  State& state = *state_;
+  if (state.started || state.last.interval_s <= 0.0) return;
+  const double since_last_s = state.intervals.stamped_since_last_s(stamp_ns);
+  if (since_last_s > 0.0 && since_last_s <= max_prediction_s) return;
+  state.last = {};
+  state.intervals = ScanIntervals(state.sensor.period_s);
+}
 
 }  // namespace stillmap

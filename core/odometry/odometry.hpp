@@ -64,6 +64,13 @@ class Odometry {
   /// Forgets poses and local map.
   void reset();
 
+  /// The same for another map, but the lidar goes on as it moved: its velocity stays for a first
+  /// scan that follows at once.
+  void begin_map();
+  /// Where the first scan of a map comes at this time: forgets a velocity of too long ago, or of
+  /// another clock.
+  void expect_first_scan(std::int64_t stamp_ns);
+
  private:
   struct State;
   std::unique_ptr<State> state_;

@@ -86,6 +86,24 @@ TEST(HardDrives, RollingScansAreFollowedWhateverInstantTheStampIs) {
   }
 }
 
+TEST(HardDrives, AMapBegunOnTheWayIsFollowedFromItsFirstRollingScanOn) {
+  SimulationConfig config = yard(LidarMotion::hard_turns, true);
+  const Simulation simulation(config);
+  Mapper mapper = mapper_of(config);
+  for (int k = 0; k < 15; ++k) ASSERT_TRUE(mapper.process(simulation.scan(k).scan));
+  mapper.reset(2);
+  for (int k = 15; k < 20; ++k) {
+    const auto mapped = mapper.process(simulation.scan(k).scan);
+    ASSERT_TRUE(mapped);
+    const auto truth = [&](int scan) {
+      return simulation.T_map_lidar_at(scan * config.sensor.period_s);
+    };
+    const Eigen::Isometry3d since_reset = truth(15).inverse() * truth(k);
+    const Eigen::Isometry3d off = since_reset.inverse() * mapped->odometry.T_map_lidar;
+    EXPECT_LE(off.translation().norm(), 0.02) << "scan " << k;
+  }
+}
+
 SimulationConfig another_place() {
   SimulationConfig there = yard(LidarMotion::vehicle, false, 6);
   there.plan = simulation::crowded_avenue();

@@ -84,6 +84,36 @@ TEST_F(OdometrySequence, ResetStartsAnewAndRepeatsItselfToTheBit) {
     EXPECT_EQ(first[k].T_map_lidar.matrix(), second[k].T_map_lidar.matrix()) << "scan " << k;
 }
 
+TEST_F(OdometrySequence, KeepsItsVelocityForAnotherMap) {
+  Odometry odometry(OdometryConfig{}, test::test_lidar());
+  static_cast<void>(results(quiet(), odometry, true));
+  const Eigen::Isometry3d motion = odometry.motion_during(0.1);
+  const std::int64_t last_ns = quiet().scans.back().scan.stamp_ns;
+  odometry.begin_map();
+  // Another map at once.
+  odometry.begin_map();
+  expect_near(odometry.predict(last_ns + 100'000'000), Eigen::Isometry3d::Identity(), 1e-12, 1e-7);
+  odometry.expect_first_scan(last_ns + 100'000'000);
+  expect_near(odometry.motion_during(0.1), motion, 1e-12, 1e-7);
+  Scan next = quiet().scans.back().scan;
+  next.stamp_ns = last_ns + 100'000'000;
+  const auto first = test::register_scan(odometry, next, quiet().scans.back().labels());
+  EXPECT_EQ(first.result.health, OdometryHealth::initialised);
+  expect_near(first.result.T_map_lidar, Eigen::Isometry3d::Identity(), 1e-12, 1e-7);
+  expect_near(odometry.motion_during(0.1), motion, 1e-12, 1e-7);
+}
+
+TEST_F(OdometrySequence, ForgetsAVelocityOfAnotherTimeInAnotherMap) {
+  const std::int64_t last_ns = quiet().scans.back().scan.stamp_ns;
+  for (const std::int64_t stamp_ns : {std::int64_t{0}, last_ns, last_ns + 1'100'000'000}) {
+    Odometry odometry(OdometryConfig{}, test::test_lidar());
+    static_cast<void>(results(quiet(), odometry, true));
+    odometry.begin_map();
+    odometry.expect_first_scan(stamp_ns);
+    expect_near(odometry.motion_during(0.1), Eigen::Isometry3d::Identity(), 1e-12, 1e-12);
+  }
+}
+
 TEST_F(OdometrySequence, PredictsConstantVelocityUpToASecond) {
   Odometry odometry(OdometryConfig{}, test::test_lidar());
   EXPECT_TRUE(odometry.motion_during(0.1).isApprox(Eigen::Isometry3d::Identity()));
