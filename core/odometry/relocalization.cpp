@@ -6,6 +6,7 @@
 
 #include "core/odometry/correlative_search.hpp"
 #include "core/odometry/scan_features.hpp"
+#include "core/odometry/se3.hpp"
 
 namespace stillmap {
 namespace {
@@ -15,6 +16,9 @@ constexpr float match_distance_m = 0.25F;
 /// Share of such points at the guess that ends the search, and the smallest share that is accepted.
 constexpr double sure_match_ratio = 0.85;
 constexpr double min_match_ratio = 0.6;
+/// A pose as near as this to the guess is where it was expected [m, rad].
+constexpr double max_in_place_distance_m = 0.5;
+constexpr double max_in_place_angle_rad = 0.05;
 /// Another place, so far away [m], fits less well than by this share of the best.
 constexpr double min_other_place_m = 1.5;
 constexpr double max_other_share = 0.85;
@@ -60,6 +64,12 @@ double match_ratio(const FeatureSets& features, const LocalMap& map,
   count(features.planes);
   count(features.surfaces);
   return landmarks > 0 ? static_cast<double>(matched) / landmarks : 0.0;
+}
+
+bool is_in_place(const Eigen::Isometry3d& T_map_lidar, const Eigen::Isometry3d& T_map_lidar_guess) {
+  const PoseTangent off = boxminus(T_map_lidar, T_map_lidar_guess);
+  return off.head<3>().norm() < max_in_place_distance_m &&
+         off.tail<3>().norm() < max_in_place_angle_rad;
 }
 
 /// Registers a scan from many places, and keeps the pose that fits best.
@@ -134,6 +144,12 @@ void insert_prior_map(std::span<const LabelledPoint> points_map, LocalMap& map) 
 OdometryResult relocalize(const FeatureSets& features, std::span<const LabelledPoint> prior_map,
                           const LocalMap& map, const Eigen::Isometry3d& T_map_lidar_guess,
                           const OdometryConfig& config, double reach_m) {
+  // A robot that stands where it was expected needs no search.
+  const OdometryResult in_place = register_features(features, map, T_map_lidar_guess, config);
+  if (in_place.health != OdometryHealth::lost &&
+      is_in_place(in_place.T_map_lidar, T_map_lidar_guess) &&
+      match_ratio(features, map, in_place.T_map_lidar) >= sure_match_ratio)
+    return in_place;
   LocalMap coarse_map = make_coarse_map();
   insert_prior_map(prior_map, coarse_map);
   Search search(features, map, config);
