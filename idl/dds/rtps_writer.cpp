@@ -1,10 +1,11 @@
 #include "idl/dds/rtps_writer.hpp"
 
 #include <fastdds/rtps/common/CacheChange.h>
+#include <fastdds/rtps/history/WriterHistory.h>
 #include <fastdds/rtps/writer/RTPSWriter.h>
 
-#include <algorithm>
 #include <mutex>
+#include <utility>
 
 #include "idl/dds/dds_error.hpp"
 
@@ -20,6 +21,18 @@ namespace stillmap::dds {
 
 using namespace eprosima::fastrtps::rtps;
 
+namespace {
+
+/// The history of a writer, which Fast DDS gives to its own classes alone.
+class HiddenHistory : public RTPSWriter {
+ public:
+  static const WriterHistory& of(const RTPSWriter& writer) {
+    return *(writer.*(&HiddenHistory::mp_history));
+  }
+};
+
+}  // namespace
+
 RTPSWriter& find_rtps_writer(const GUID_t& guid) {
   RTPSWriter* const found = RTPSDomainImpl::find_local_writer(guid);
   if (found == nullptr) throw DdsError("Fast DDS does not find a writer that it just made");
@@ -34,16 +47,24 @@ AcknowledgedSamples::AcknowledgedSamples(RTPSWriter& writer) : writer_(writer) {
 
 void AcknowledgedSamples::release() {
   const std::scoped_lock lock(writer_.getMutex());
-  // They are acknowledged in their order.
-  for (SequenceNumber_t first = writer_.get_seq_num_min();
-       first != SequenceNumber_t::unknown() && first <= acknowledged_;
-       first = writer_.get_seq_num_min()) {
-    if (!writer_.remove_older_changes(1)) return;
+  const WriterHistory& history = HiddenHistory::of(writer_);
+  for (const SequenceNumber_t& number : std::exchange(put_off_, {})) {
+    CacheChange_t* change = nullptr;
+    if (history.get_change(number, writer_.getGuid(), &change)) {
+      inner_->onWriterChangeReceivedByAll(&writer_, change);
+    }
   }
 }
 
-void AcknowledgedSamples::onWriterChangeReceivedByAll(RTPSWriter*, CacheChange_t* change) {
-  acknowledged_ = std::max(acknowledged_, change->sequenceNumber);
+void AcknowledgedSamples::onWriterChangeReceivedByAll(RTPSWriter* writer, CacheChange_t* change) {
+  // It is linked while it waits to be sent; nobody links it without the writer's mutex. With an
+  // instance go other samples of it.
+  const bool waits_to_be_sent = change->writer_info.is_linked.load();
+  if (waits_to_be_sent || change->kind != ChangeKind_t::ALIVE) {
+    put_off_.push_back(change->sequenceNumber);
+  } else {
+    inner_->onWriterChangeReceivedByAll(writer, change);
+  }
 }
 
 void AcknowledgedSamples::onWriterMatched(RTPSWriter* writer, MatchingInfo& info) {

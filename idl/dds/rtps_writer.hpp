@@ -4,6 +4,8 @@
 #include <fastdds/rtps/common/SequenceNumber.h>
 #include <fastdds/rtps/writer/WriterListener.h>
 
+#include <vector>
+
 namespace eprosima::fastrtps::rtps {
 class RTPSWriter;
 }
@@ -14,11 +16,14 @@ namespace stillmap::dds {
 [[nodiscard]] eprosima::fastrtps::rtps::RTPSWriter& find_rtps_writer(
     const eprosima::fastrtps::rtps::GUID_t& guid);
 
-/// Puts off what Fast DDS does when all readers of a volatile writer have a sample: it removes that
-/// from the history. Where a reader goes, Fast DDS 2.9 does so with the writer's locators locked,
-/// which deadlocks with a thread that sends repairs or what is rate-limited (its pull request
-/// 3468), and the process hears nobody any more. Samples are released by `release` instead, in the
-/// thread that writes. For topics without keys.
+/// Puts off some of what Fast DDS does when all readers of a writer have a sample: it removes that
+/// from the history of a volatile writer, and an instance that was unregistered from any. Where a
+/// reader goes, Fast DDS 2.9 does so with the writer's locators locked. A sample that waits to be
+/// sent, for its turn under a limit of rate or once more for another reader, is removed under the
+/// lock of the thread that sends, which waits for the locators: a deadlock, and the process hears
+/// nobody any more. (Mended in Fast DDS 2.10.7, 2.14.5 and 3.1.1: its pull request 5432.) Such
+/// samples are removed by `release` instead, in the thread that writes; all others at once, since
+/// 2.9 counts wrongly for a reader of the same process that joins while the history has any.
 class AcknowledgedSamples : public eprosima::fastrtps::rtps::WriterListener {
  public:
   using RTPSWriter = eprosima::fastrtps::rtps::RTPSWriter;
@@ -26,7 +31,7 @@ class AcknowledgedSamples : public eprosima::fastrtps::rtps::WriterListener {
   /// Stands between the writer and its listener until the writer's end, which it must outlive.
   explicit AcknowledgedSamples(RTPSWriter& writer);
 
-  /// Removes from the history what all readers have.
+  /// Does what was put off.
   void release();
 
  private:
@@ -48,8 +53,8 @@ class AcknowledgedSamples : public eprosima::fastrtps::rtps::WriterListener {
 
   RTPSWriter& writer_;
   eprosima::fastrtps::rtps::WriterListener* inner_;
-  /// All up to this one; guarded by the writer's mutex.
-  eprosima::fastrtps::rtps::SequenceNumber_t acknowledged_;
+  /// Samples of which `inner_` has not been told; guarded by the writer's mutex.
+  std::vector<eprosima::fastrtps::rtps::SequenceNumber_t> put_off_;
 };
 
 }  // namespace stillmap::dds

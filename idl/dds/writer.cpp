@@ -53,9 +53,7 @@ void MatchedReaders::on_publication_matched(DataWriter*, const PublicationMatche
 UntypedWriter::UntypedWriter(Participant& participant, const std::string& topic,
                              const TypeSupport& type, const TopicQos& qos)
     : topic_(topic), writer_(participant.make_writer(topic, type, qos, &readers_)) {
-  const bool releases_acknowledged = qos.reliable && !qos.transient_local;
-  if (releases_acknowledged && !type->m_isGetKeyDefined)
-    acknowledged_.emplace(find_rtps_writer(writer_->guid()));
+  if (qos.reliable) acknowledged_.emplace(find_rtps_writer(writer_->guid()));
 }
 
 eprosima::fastrtps::rtps::GUID_t UntypedWriter::guid() const { return writer_->guid(); }
@@ -86,10 +84,12 @@ bool UntypedWriter::write_untyped(const void* sample, WriteParams& params) {
 }
 
 void UntypedWriter::dispose_untyped(const void* sample) {
+  if (acknowledged_) acknowledged_->release();
   writer_->dispose(mutable_sample(sample), HANDLE_NIL);
 }
 
 void UntypedWriter::unregister_untyped(const void* sample) {
+  if (acknowledged_) acknowledged_->release();
   writer_->unregister_instance(mutable_sample(sample), HANDLE_NIL);
 }
 

@@ -38,6 +38,13 @@ inline void talk_over_transports() {
   eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
 }
 
+/// What processes do that set nothing.
+inline void hand_over_in_process() {
+  eprosima::fastrtps::LibrarySettingsAttributes settings;
+  settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_FULL;
+  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
+}
+
 /// Only this machine, over UDP or with shared memory as well.
 inline DdsOptions loopback(bool shared_memory) {
   talk_over_transports();
