@@ -18,6 +18,9 @@ namespace {
 
 constexpr std::size_t max_removed_per_reply = 300'000;
 
+/// So many faults are the disk's, not a tile's.
+constexpr std::size_t max_unreadable_tiles = 8;
+
 /// Throws std::invalid_argument for a region with faults.
 Region region_of(const stillmap_msgs::msg::Region& message) {
   auto [region, fault] = wire::from_wire(message);
@@ -45,8 +48,8 @@ Reasons reasons_of(const std::vector<std::uint8_t>& numbers) {
   return reasons.none() ? reasons.set() : reasons;
 }
 
-/// Adds those of tiles on disk. Returns why there may be more: tiles that cannot be read. Throws
-/// std::runtime_error where nothing was found instead.
+/// Adds those of tiles on disk. Returns why there may be more: tiles that cannot be read. Gives a
+/// disk up that fails again and again: every further tile may take seconds.
 std::string add_from_disk(const MapSnapshot& view, const Eigen::AlignedBox3d& box_map,
                           RemovedInBox& removed) {
   if (removed.tile_store == nullptr) return {};
@@ -62,13 +65,14 @@ std::string add_from_disk(const MapSnapshot& view, const Eigen::AlignedBox3d& bo
                            });
     } catch (const std::runtime_error& fault) {
       if (unreadable++ == 0) first_fault = fault.what();
+      if (unreadable == max_unreadable_tiles) break;
     }
   }
   if (unreadable == 0) return {};
-  std::string incomplete =
-      std::to_string(unreadable) + " tiles cannot be read, the first: " + first_fault;
-  if (removed.voxels.empty()) throw std::runtime_error(incomplete);
-  return incomplete;
+  const std::string count = unreadable == max_unreadable_tiles
+                                ? "at least " + std::to_string(unreadable)
+                                : std::to_string(unreadable);
+  return count + " of the tiles cannot be read, the first: " + first_fault;
 }
 
 }  // namespace
@@ -80,12 +84,14 @@ GetRemoved_Response get_removed(const ServiceContext& context, const GetRemoved_
     const Reasons reasons = reasons_of(request.reasons());
     RemovedInBox in_box = context.removed(region.bounds_map());
     const std::string incomplete = add_from_disk(view, region.bounds_map(), in_box);
-    response.status(reply_status(view, wire::ReplyCode::ok, incomplete));
     std::vector<RemovedVoxel>& removed = in_box.voxels;
     std::erase_if(removed, [&](const RemovedVoxel& voxel) {
       return !reasons.test(static_cast<std::size_t>(voxel.reason)) ||
              !region.contains(voxel.position_map.cast<double>());
     });
+    // That nothing was removed must not be read from this.
+    if (removed.empty() && !incomplete.empty()) throw std::runtime_error(incomplete);
+    response.status(reply_status(view, wire::ReplyCode::ok, incomplete));
     response.total(removed.size());
     const std::size_t wanted = std::min<std::size_t>(request.max_voxels(), max_removed_per_reply);
     removed.resize(std::min(removed.size(), wanted));

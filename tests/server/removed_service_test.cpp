@@ -121,7 +121,7 @@ TEST(RemovedOnDisk, ATileThatCannotBeReadLosesItselfAlone) {
   client.wait_for_server(patience);
 
   const RemovedVoxels removed = client.get_removed(BoxRegion{});
-  EXPECT_THAT(removed.incomplete, HasSubstr("2 tiles cannot be read"));
+  EXPECT_THAT(removed.incomplete, HasSubstr("2 of the tiles cannot be read"));
   EXPECT_THAT(removed.incomplete, HasSubstr("(100, 0)"));
   std::set<int> kilometres;
   for (const RemovedVoxel& voxel : removed.voxels) {
@@ -129,12 +129,27 @@ TEST(RemovedOnDisk, ATileThatCannotBeReadLosesItselfAlone) {
   }
   EXPECT_THAT(kilometres, ElementsAre(1, 3));
   const BoxRegion there{{Eigen::Vector3d(2000, 0, -10), Eigen::Vector3d(2019, 19, 10)}};
-  EXPECT_THAT(refusal([&] { static_cast<void>(client.get_removed(there)); }), HasSubstr("(100, 0)"));
+  EXPECT_THAT(refusal([&] { static_cast<void>(client.get_removed(there)); }),
+              HasSubstr("(100, 0)"));
 
   std::vector<TileId> ids;
   for (const auto& tile : map.view.tiles) ids.push_back(tile->info.id);
   const TileSet tiles = client.get_tiles(ids);
   EXPECT_EQ(tiles.tiles.size(), ids.size() - 1);
+}
+
+TEST(RemovedOnDisk, ADiskThatFailsIsGivenUpSoon) {
+  const ServiceSetup setup("every", "memory_limit_mib: 64");
+  std::vector<double> places_x_m(20);
+  std::ranges::generate(places_x_m, [x_m = 0.0]() mutable { return x_m += 1000.0; });
+  open_map_file(setup.map_file())->save(far_places(places_x_m));
+  SQLite::Database(setup.map_file().string(), SQLite::OPEN_READWRITE)
+      .exec("UPDATE memories SET encoded = x'00'");
+  const ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  EXPECT_THAT(refusal([&] { static_cast<void>(client.get_removed(BoxRegion{})); }),
+              HasSubstr("at least 8 of the tiles cannot be read"));
 }
 
 }  // namespace
