@@ -1,5 +1,7 @@
 #include "server/services/map_services.hpp"
 
+#include <tbb/task_arena.h>
+
 #include <functional>
 #include <utility>
 
@@ -11,10 +13,12 @@
 namespace stillmap::server {
 namespace {
 
-/// What clients ask for does not hold up poses where the cores are busy.
+/// What clients ask for does not hold up poses where the cores are busy: neither on this thread nor
+/// on oneTBB's workers, which go to the mapper first.
 void run_service(const std::function<void()>& work) {
   static_cast<void>(use_scheduling(BackgroundScheduling::low));
-  run_or_report(work);
+  tbb::task_arena behind_the_mapper(tbb::task_arena::automatic, 1, tbb::task_arena::priority::low);
+  behind_the_mapper.execute([&] { run_or_report(work); });
 }
 
 }  // namespace

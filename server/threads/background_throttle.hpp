@@ -42,8 +42,8 @@ class BackgroundThrottle {
 
   [[nodiscard]] bool is_idle() const { return scans_in_progress_ == 0 || is_released_; }
 
-  /// Lets all background work run from now on, with normal priority: the server ends, and its
-  /// threads are to finish.
+  /// Lets all background work run from now on, none of it only while cores are idle: the server
+  /// ends, and its threads are to finish. Low priority stays; no thread may raise its own.
   void release() {
     is_released_ = true;
     end_idle_scheduling();

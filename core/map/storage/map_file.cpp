@@ -79,8 +79,8 @@ class SqliteTileStore : public TileStore {
   }
 
  private:
-  /// The mapper, the publisher of tiles and three services.
-  static constexpr std::size_t max_readers = 5;
+  /// The mapper, the publisher of tiles and the six services that read tiles: none waits.
+  static constexpr std::size_t max_readers = 8;
 
   /// A connection that no other reader has.
   struct Use {
