@@ -39,13 +39,14 @@ RTPSWriter& find_rtps_writer(const GUID_t& guid) {
   return *found;
 }
 
-AcknowledgedSamples::AcknowledgedSamples(RTPSWriter& writer) : writer_(writer) {
+RtpsWriterListener::RtpsWriterListener(RTPSWriter& writer, ReaderCallback reader_changed)
+    : writer_(writer), reader_changed_(std::move(reader_changed)) {
   const std::scoped_lock lock(writer_.getMutex());
   inner_ = writer_.getListener();
   writer_.set_listener(this);
 }
 
-void AcknowledgedSamples::release() {
+void RtpsWriterListener::release() {
   const std::scoped_lock lock(writer_.getMutex());
   const WriterHistory& history = HiddenHistory::of(writer_);
   for (const SequenceNumber_t& number : std::exchange(put_off_, {})) {
@@ -56,7 +57,7 @@ void AcknowledgedSamples::release() {
   }
 }
 
-void AcknowledgedSamples::onWriterChangeReceivedByAll(RTPSWriter* writer, CacheChange_t* change) {
+void RtpsWriterListener::onWriterChangeReceivedByAll(RTPSWriter* writer, CacheChange_t* change) {
   // It is linked while it waits to be sent; nobody links it without the writer's mutex. With an
   // instance go other samples of it.
   const bool waits_to_be_sent = change->writer_info.is_linked.load();
@@ -67,29 +68,30 @@ void AcknowledgedSamples::onWriterChangeReceivedByAll(RTPSWriter* writer, CacheC
   }
 }
 
-void AcknowledgedSamples::onWriterMatched(RTPSWriter* writer, MatchingInfo& info) {
+void RtpsWriterListener::onWriterMatched(RTPSWriter* writer, MatchingInfo& info) {
+  reader_changed_(info.remoteEndpointGuid, info.status == MATCHED_MATCHING);
   inner_->onWriterMatched(writer, info);
 }
 
-void AcknowledgedSamples::onWriterMatched(
+void RtpsWriterListener::onWriterMatched(
     RTPSWriter* writer, const eprosima::fastdds::dds::PublicationMatchedStatus& info) {
   inner_->onWriterMatched(writer, info);
 }
 
-void AcknowledgedSamples::on_offered_incompatible_qos(RTPSWriter* writer,
-                                                      eprosima::fastdds::dds::PolicyMask qos) {
+void RtpsWriterListener::on_offered_incompatible_qos(RTPSWriter* writer,
+                                                     eprosima::fastdds::dds::PolicyMask qos) {
   inner_->on_offered_incompatible_qos(writer, qos);
 }
 
-void AcknowledgedSamples::on_liveliness_lost(
+void RtpsWriterListener::on_liveliness_lost(
     RTPSWriter* writer, const eprosima::fastrtps::LivelinessLostStatus& status) {
   inner_->on_liveliness_lost(writer, status);
 }
 
-void AcknowledgedSamples::on_reader_discovery(RTPSWriter* writer,
-                                              ReaderDiscoveryInfo::DISCOVERY_STATUS reason,
-                                              const GUID& reader,
-                                              const ReaderProxyData* reader_info) {
+void RtpsWriterListener::on_reader_discovery(RTPSWriter* writer,
+                                             ReaderDiscoveryInfo::DISCOVERY_STATUS reason,
+                                             const GUID& reader,
+                                             const ReaderProxyData* reader_info) {
   inner_->on_reader_discovery(writer, reason, reader, reader_info);
 }
 

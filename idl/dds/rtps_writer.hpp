@@ -4,6 +4,7 @@
 #include <fastdds/rtps/common/SequenceNumber.h>
 #include <fastdds/rtps/writer/WriterListener.h>
 
+#include <functional>
 #include <vector>
 
 namespace eprosima::fastrtps::rtps {
@@ -16,6 +17,8 @@ namespace stillmap::dds {
 [[nodiscard]] eprosima::fastrtps::rtps::RTPSWriter& find_rtps_writer(
     const eprosima::fastrtps::rtps::GUID_t& guid);
 
+/// Stands between an RTPS writer and its listener, and tells which readers come and go.
+///
 /// Puts off some of what Fast DDS does when all readers of a writer have a sample: it removes that
 /// from the history of a volatile writer, and an instance that was unregistered from any. Where a
 /// reader goes, Fast DDS 2.9 does so with the writer's locators locked. A sample that waits to be
@@ -24,19 +27,20 @@ namespace stillmap::dds {
 /// nobody any more. (Mended in Fast DDS 2.10.7, 2.14.5 and 3.1.1: its pull request 5432.) Such
 /// samples are removed by `release` instead, in the thread that writes; all others at once, since
 /// 2.9 counts wrongly for a reader of the same process that joins while the history has any.
-class AcknowledgedSamples : public eprosima::fastrtps::rtps::WriterListener {
+class RtpsWriterListener : public eprosima::fastrtps::rtps::WriterListener {
  public:
   using RTPSWriter = eprosima::fastrtps::rtps::RTPSWriter;
+  using GUID = eprosima::fastrtps::rtps::GUID_t;
+  using ReaderCallback = std::function<void(const GUID& reader, bool is_matched)>;
 
-  /// Stands between the writer and its listener until the writer's end, which it must outlive.
-  explicit AcknowledgedSamples(RTPSWriter& writer);
+  /// Until the writer's end, which it must outlive. `reader_changed` is called for each reader that
+  /// comes or goes.
+  RtpsWriterListener(RTPSWriter& writer, ReaderCallback reader_changed);
 
   /// Does what was put off.
   void release();
 
  private:
-  using GUID = eprosima::fastrtps::rtps::GUID_t;
-
   void onWriterMatched(RTPSWriter* writer, eprosima::fastrtps::rtps::MatchingInfo& info) override;
   void onWriterMatched(RTPSWriter* writer,
                        const eprosima::fastdds::dds::PublicationMatchedStatus& info) override;
@@ -52,6 +56,7 @@ class AcknowledgedSamples : public eprosima::fastrtps::rtps::WriterListener {
                            const eprosima::fastrtps::rtps::ReaderProxyData* reader_info) override;
 
   RTPSWriter& writer_;
+  ReaderCallback reader_changed_;
   eprosima::fastrtps::rtps::WriterListener* inner_;
   /// Samples of which `inner_` has not been told; guarded by the writer's mutex.
   std::vector<eprosima::fastrtps::rtps::SequenceNumber_t> put_off_;

@@ -1,5 +1,7 @@
 #include "idl/dds/writer.hpp"
 
+#include <fastdds/rtps/writer/RTPSWriter.h>
+
 #include <algorithm>
 #include <fastdds/dds/publisher/DataWriter.hpp>
 
@@ -39,10 +41,17 @@ int MatchedReaders::count_of_participant(const Guid& endpoint) const {
   return static_cast<int>(std::ranges::count(readers_, endpoint.guidPrefix, &Guid::guidPrefix));
 }
 
-void MatchedReaders::on_publication_matched(DataWriter*, const PublicationMatchedStatus& status) {
-  const Guid reader = eprosima::fastrtps::rtps::iHandle2GUID(status.last_subscription_handle);
+void MatchedReaders::follow(eprosima::fastrtps::rtps::RTPSWriter& writer) {
   const std::scoped_lock lock(mutex_);
-  if (status.current_count_change > 0) {
+  writer_ = &writer;
+  std::erase_if(readers_,
+                [&](const Guid& reader) { return !writer.matched_reader_is_matched(reader); });
+}
+
+void MatchedReaders::update(const Guid& reader, bool is_matched) {
+  const std::scoped_lock lock(mutex_);
+  if (writer_ != nullptr) is_matched = writer_->matched_reader_is_matched(reader);
+  if (is_matched) {
     readers_.insert(reader);
   } else {
     readers_.erase(reader);
@@ -50,10 +59,20 @@ void MatchedReaders::on_publication_matched(DataWriter*, const PublicationMatche
   changed_.notify_all();
 }
 
+void MatchedReaders::on_publication_matched(DataWriter*, const PublicationMatchedStatus& status) {
+  update(eprosima::fastrtps::rtps::iHandle2GUID(status.last_subscription_handle),
+         status.current_count_change > 0);
+}
+
 UntypedWriter::UntypedWriter(Participant& participant, const std::string& topic,
                              const TypeSupport& type, const TopicQos& qos)
     : topic_(topic), writer_(participant.make_writer(topic, type, qos, &readers_)) {
-  if (qos.reliable) acknowledged_.emplace(find_rtps_writer(writer_->guid()));
+  auto& rtps_writer = find_rtps_writer(writer_->guid());
+  readers_.follow(rtps_writer);
+  const auto update = [this](const MatchedReaders::Guid& reader, bool is_matched) {
+    readers_.update(reader, is_matched);
+  };
+  if (qos.reliable) rtps_listener_.emplace(rtps_writer, update);
 }
 
 eprosima::fastrtps::rtps::GUID_t UntypedWriter::guid() const { return writer_->guid(); }
@@ -68,7 +87,7 @@ void UntypedWriter::forget_written() {
 }
 
 bool UntypedWriter::write_untyped(const void* sample) {
-  if (acknowledged_) acknowledged_->release();
+  if (rtps_listener_) rtps_listener_->release();
   const ReturnCode code = writer_->write(mutable_sample(sample), HANDLE_NIL);
   if (code == ReturnCode::RETCODE_OK) return true;
   if (code == ReturnCode::RETCODE_TIMEOUT || code == ReturnCode::RETCODE_OUT_OF_RESOURCES) {
@@ -79,17 +98,17 @@ bool UntypedWriter::write_untyped(const void* sample) {
 }
 
 bool UntypedWriter::write_untyped(const void* sample, WriteParams& params) {
-  if (acknowledged_) acknowledged_->release();
+  if (rtps_listener_) rtps_listener_->release();
   return writer_->write(mutable_sample(sample), params);
 }
 
 void UntypedWriter::dispose_untyped(const void* sample) {
-  if (acknowledged_) acknowledged_->release();
+  if (rtps_listener_) rtps_listener_->release();
   writer_->dispose(mutable_sample(sample), HANDLE_NIL);
 }
 
 void UntypedWriter::unregister_untyped(const void* sample) {
-  if (acknowledged_) acknowledged_->release();
+  if (rtps_listener_) rtps_listener_->release();
   writer_->unregister_instance(mutable_sample(sample), HANDLE_NIL);
 }
 

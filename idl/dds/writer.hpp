@@ -16,10 +16,17 @@
 
 namespace stillmap::dds {
 
-/// The readers that a writer has found.
+/// The readers that a writer has found. Where two are found at once, Fast DDS 2.9 may tell a
+/// DataWriterListener of one of them twice and of the other never: once the RTPS writer is known,
+/// that is asked, and tells its own listener of each.
 class MatchedReaders : public eprosima::fastdds::dds::DataWriterListener {
  public:
   using Guid = eprosima::fastrtps::rtps::GUID_t;
+
+  /// Believes this writer from now on, which must live as long.
+  void follow(eprosima::fastrtps::rtps::RTPSWriter& writer);
+  /// A reader came, or went.
+  void update(const Guid& reader, bool is_matched);
 
   [[nodiscard]] int count() const;
   [[nodiscard]] bool wait_for_any(std::chrono::milliseconds timeout) const;
@@ -34,6 +41,7 @@ class MatchedReaders : public eprosima::fastdds::dds::DataWriterListener {
 
   mutable std::mutex mutex_;
   mutable std::condition_variable changed_;
+  eprosima::fastrtps::rtps::RTPSWriter* writer_ = nullptr;
   std::set<Guid> readers_;
 };
 
@@ -63,7 +71,7 @@ class UntypedWriter {
  private:
   std::string topic_;
   MatchedReaders readers_;
-  std::optional<AcknowledgedSamples> acknowledged_;
+  std::optional<RtpsWriterListener> rtps_listener_;
   // After what listens to it.
   Participant::WriterHandle writer_;
 };

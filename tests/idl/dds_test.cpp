@@ -51,6 +51,23 @@ TEST_P(OverTransport, CarriesLargeCloudsWhole) {
   }
 }
 
+// Where two readers are found at once, Fast DDS may name the same one twice.
+TEST_P(OverTransport, ReadersAreThoseOfTheWriterWhateverItsEventsSay) {
+  Writer<PointCloud2> writer(here_, "rt/points", {});
+  auto reader = std::make_unique<Reader<PointCloud2>>(there_, "rt/points", TopicQos{});
+  ASSERT_TRUE(writer.readers().wait_for_any(discovery_timeout));
+  auto& readers = const_cast<MatchedReaders&>(writer.readers());
+  MatchedReaders::Guid stranger = writer.guid();
+  stranger.entityId = 0x77U;
+  readers.update(stranger, true);
+  EXPECT_FALSE(readers.has(stranger));
+  EXPECT_TRUE(readers.has(reader->guid()));
+  readers.update(reader->guid(), false);
+  EXPECT_TRUE(readers.has(reader->guid()));
+  reader.reset();
+  EXPECT_TRUE(test::eventually([&] { return readers.count() == 0; }, discovery_timeout));
+}
+
 TEST_P(OverTransport, FilteredReadersGetTheirTilesOnly) {
   const auto topic = Topics::in("stillmap").tile_index;
   const ContentFilter filter{.expression = "tile_x BETWEEN %0 AND %1 AND tile_y BETWEEN %2 AND %3",
