@@ -241,6 +241,8 @@ def main():
                         help="a server of an earlier version: without what its wire lacks")
     options = parser.parse_args()
     options.probe = f"{options.tools}/scale_probe"
+    # The server takes paths of its configuration from the configuration's folder.
+    options.maps = options.maps.resolve()
     options.maps.mkdir(parents=True, exist_ok=True)
     results = {}
     with tempfile.TemporaryDirectory(dir=options.maps) as scratch:
