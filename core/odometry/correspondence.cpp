@@ -46,8 +46,7 @@ Pca pca(const Neighbours& neighbours) {
 std::optional<FittedSurface> line_of(const Pca& fit) {
   // Written so that points all at one place are no line either.
   if (!(fit.eigenvalues[2] > line_dominance * fit.eigenvalues[1])) return std::nullopt;
-  const Eigen::Vector3d u = fit.eigenvectors.col(2);
-  return FittedSurface{fit.centre, Eigen::Matrix3d::Identity() - u * u.transpose()};
+  return FittedSurface{fit.centre, {fit.eigenvectors.col(0), fit.eigenvectors.col(1)}, 2};
 }
 
 std::optional<FittedSurface> plane_of(const Pca& fit, const Neighbours& neighbours) {
@@ -57,7 +56,7 @@ std::optional<FittedSurface> plane_of(const Pca& fit, const Neighbours& neighbou
     const Eigen::Vector3d d = neighbours.points[k].position_map.cast<double>() - fit.centre;
     if (std::abs(n.dot(d)) > plane_thickness_m) return std::nullopt;
   }
-  return FittedSurface{fit.centre, n * n.transpose()};
+  return FittedSurface{fit.centre, {n, Eigen::Vector3d::Zero()}, 1};
 }
 
 }  // namespace
@@ -105,12 +104,15 @@ double weight(Weighting weighting, double alpha, double distance_m, double incon
 
 Residual residual(const Eigen::Vector3d& point_lidar, const Eigen::Isometry3d& T_map_lidar,
                   const FittedSurface& surface) {
-  const Eigen::Vector3d rotated = T_map_lidar.linear() * point_lidar;
-  const Eigen::Vector3d point_map = rotated + T_map_lidar.translation();
+  const Eigen::Vector3d arm = T_map_lidar.linear() * point_lidar;
+  const Eigen::Vector3d off_centre = arm + T_map_lidar.translation() - surface.centre_map;
   Residual r;
-  r.vector = surface.projector * (point_map - surface.centre_map);
-  r.jacobian.leftCols<3>() = surface.projector;
-  r.jacobian.rightCols<3>() = -surface.projector * skew(rotated);
+  r.count = surface.normal_count;
+  for (std::size_t k = 0; k < r.count; ++k) {
+    r.distances[k] = surface.normals[k].dot(off_centre);
+    r.slopes[k].head<3>() = surface.normals[k];
+    r.slopes[k].tail<3>() = arm.cross(surface.normals[k]);
+  }
   return r;
 }
 

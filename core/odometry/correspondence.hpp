@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <optional>
 
 #include "core/odometry/feature_map.hpp"
@@ -9,12 +10,14 @@
 
 namespace stillmap {
 
-/// The edge line or plane that a feature point should lie on. Both are the set of points x with
-/// `projector * (x - centre_map) = 0`: projector = I - u u' for a line along u, n n' for a plane
-/// with normal n, so that the distances (8) and (12) are |projector * (x - centre_map)|.
+/// The edge line or plane that a feature point should lie on: the set of points x with
+/// n . (x - centre_map) = 0 for its normal, or for both normals of a line, which are at right
+/// angles to it and to each other. The distances (8) and (12) are the norm of these products.
 struct FittedSurface {
   Eigen::Vector3d centre_map;
-  Eigen::Matrix3d projector;
+  std::array<Eigen::Vector3d, 2> normals;
+  /// 1 for a plane, 2 for a line.
+  std::size_t normal_count = 1;
 };
 
 /// Line through neighbours by PCA, eq. (5)-(7) with the ordinary covariance (as printed, eq. 6 is
@@ -37,12 +40,18 @@ struct FittedSurface {
 [[nodiscard]] double weight(Weighting weighting, double alpha, double distance_m,
                             double inconsistency);
 
-/// Residual of a point against its surface and what the normal equations need of it.
+/// Residuals of a point against its surface, one along each normal, and what the normal equations
+/// need of them.
 struct Residual {
-  /// projector * (T p - centre) [m]; its norm is d of eq. (8) or (12).
-  Eigen::Vector3d vector;
-  /// Derivative of `vector` by the pose tangent (boxplus).
-  Eigen::Matrix<double, 3, 6> jacobian;
+  /// n . (T p - centre) [m]; the norm of both is d of eq. (8) or (12).
+  std::array<double, 2> distances{};
+  /// Derivatives of the distances by the pose tangent (boxplus).
+  std::array<PoseTangent, 2> slopes;
+  std::size_t count = 0;
+
+  [[nodiscard]] double squared_norm() const {
+    return distances[0] * distances[0] + distances[1] * distances[1];
+  }
 };
 
 [[nodiscard]] Residual residual(const Eigen::Vector3d& point_lidar,

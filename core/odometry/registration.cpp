@@ -84,6 +84,20 @@ void find_correspondences(std::span<const FeaturePoint> features, FeatureKind ki
   });
 }
 
+/// Sum of w s s' over slopes s, in columns of eight numbers: whole vector registers.
+class InformationSum {
+ public:
+  using Slope = Eigen::Matrix<double, 8, 1>;
+
+  void add(double w, const Slope& slope) {
+    for (int column = 0; column < 6; ++column) sum_.col(column) += w * slope[column] * slope;
+  }
+  [[nodiscard]] Matrix6d matrix() const { return sum_.topRows<6>(); }
+
+ private:
+  Eigen::Matrix<double, 8, 6> sum_ = Eigen::Matrix<double, 8, 6>::Zero();
+};
+
 /// J'WJ and J'We of eq. (13) over the correspondences whose residual is valid. A point's derivative
 /// by the sweep's motion (along the map's axes) is its sweep part times that by the pose.
 struct NormalEquations {
@@ -116,9 +130,8 @@ constexpr double fit_scale_m = 0.2;
 
 /// Whether the surface is a plane like the ground, in a map whose z points up.
 bool lies_on_level_plane(const FittedSurface& surface) {
-  constexpr double min_squared_cosine = 0.64;
-  // The trace is 1 for a plane and 2 for a line.
-  return surface.projector.trace() < 1.5 && surface.projector(2, 2) > min_squared_cosine;
+  constexpr double min_cosine = 0.8;
+  return surface.normal_count == 1 && std::abs(surface.normals[0].z()) > min_cosine;
 }
 
 NormalEquations build_normal_equations(std::span<const Correspondence> correspondences,
@@ -126,11 +139,13 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
                                        const Eigen::Isometry3d& T_map_lidar,
                                        const OdometryConfig& config) {
   NormalEquations equations;
+  InformationSum hessian, hessian_pose_sweep, hessian_sweep;
+  InformationSum::Slope slope = InformationSum::Slope::Zero();
   for (std::size_t i = 0; i < correspondences.size(); ++i) {
     const Correspondence& c = correspondences[i];
     if (!c.found) continue;
     const Residual r = residual(c.point_lidar, T_map_lidar, c.surface);
-    const double squared = r.vector.squaredNorm();
+    const double squared = r.squared_norm();
     const double distance = std::sqrt(squared);
     if (distance > config.registration.max_residual_m) continue;
     const double score = geman_mcclure(fit_scale_m, squared);
@@ -141,20 +156,24 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
     const double w = weight(config.weighting, config.alpha, distance, c.inconsistency) *
                      geman_mcclure(config.registration.robust_scale_m, squared);
     if (w <= 0.0) continue;
-    const Matrix6d jtj = w * r.jacobian.transpose() * r.jacobian;
-    const PoseTangent jtr = w * r.jacobian.transpose() * r.vector;
-    equations.hessian += jtj;
-    equations.gradient += jtr;
-    if (rolling) {
-      equations.hessian_pose_sweep += c.sweep_part * jtj;
-      equations.hessian_sweep += c.sweep_part * c.sweep_part * jtj;
-      equations.gradient_sweep += c.sweep_part * jtr;
+    for (std::size_t k = 0; k < r.count; ++k) {
+      slope.head<6>() = r.slopes[k];
+      const double pull = w * r.distances[k];
+      hessian.add(w, slope);
+      equations.gradient += pull * r.slopes[k];
+      if (!rolling) continue;
+      hessian_pose_sweep.add(c.sweep_part * w, slope);
+      hessian_sweep.add(c.sweep_part * c.sweep_part * w, slope);
+      equations.gradient_sweep += c.sweep_part * pull * r.slopes[k];
     }
     equations.weighted_squares += w * squared;
     equations.weights += w;
     equations.squared_ranges += w * c.point_lidar.squaredNorm();
     (i < edge_count ? equations.edges : equations.planes) += 1;
   }
+  equations.hessian = hessian.matrix();
+  equations.hessian_pose_sweep = hessian_pose_sweep.matrix();
+  equations.hessian_sweep = hessian_sweep.matrix();
   return equations;
 }
 
