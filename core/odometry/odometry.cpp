@@ -31,8 +31,6 @@ constexpr double relocalization_reach_m = 24.0;
 constexpr double max_relocalization_reach_m = 60.0;
 /// How far off its way a lidar may be after a gap of one second [m/s^2].
 constexpr double gap_acceleration_m_s2 = 1.5;
-/// Fewer static features than this are helped out by parked vehicles.
-constexpr std::size_t min_static_features = 100;
 /// What moves is classified again where the registered pose is farther than this from the predicted
 /// one [m, rad].
 constexpr double reclassify_distance_m = 0.2;
@@ -49,21 +47,6 @@ void move_points(Scan& scan, const Eigen::Isometry3d& T) {
 }
 
 }  // namespace
-
-/// A scan while it is registered.
-struct ScanInParts {
-  const Scan& scan;
-  const SweepTimes& sweep;
-  const PointLabels& labels;
-  Features features{};
-  /// Enough of the features' surfaces where the prediction is good; empty where that is not known.
-  std::vector<std::uint32_t> few_surfaces{};
-  ObjectClusters objects{};
-  std::optional<RangeImageView> view{};
-  std::vector<MotionClass> motion_classes{};
-  SweepPrior sweep_prior{};
-  MovableUse movable = MovableUse::none;
-};
 
 struct Odometry::State {
   State(const OdometryConfig& odometry_config, const SensorModel& sensor_model)
@@ -96,7 +79,6 @@ struct Odometry::State {
   /// Finds features, objects and the range image of a scan, and what its objects do, seen from the
   /// predicted pose.
   void take_apart(ScanInParts& parts, const PosePrediction& prediction) const;
-  [[nodiscard]] FeatureSets registered_features(ScanInParts& parts) const;
   /// The pose, and the features that it was found by: few of them where these fit.
   [[nodiscard]] OdometryResult find_pose(ScanInParts& parts, const PosePrediction& prediction,
                                          FeatureSets& features) const;
@@ -236,31 +218,16 @@ void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& predi
   parts.motion_classes = classify(parts.scan, parts.objects, parts.view, prediction.T_map_lidar);
 }
 
-FeatureSets Odometry::State::registered_features(ScanInParts& parts) const {
-  const auto collected = [&] {
-    const UsablePoints usable(config, parts.objects, parts.motion_classes, parts.movable);
-    FeatureSets sets =
-        ScanFeatures(parts.scan, parts.sweep, parts.labels, parts.features).registered(usable);
-    sets.sweep_prior = parts.sweep_prior;
-    return sets;
-  };
-  FeatureSets sets = collected();
-  if (sets.edges.size() + sets.planes.size() + sets.surfaces.size() >= min_static_features)
-    return sets;
-  parts.movable = MovableUse::parked;
-  return collected();
-}
-
 OdometryResult Odometry::State::find_pose(ScanInParts& parts, const PosePrediction& prediction,
                                           FeatureSets& features) const {
   if (!parts.few_surfaces.empty()) {
     std::swap(parts.features.surfaces, parts.few_surfaces);
-    features = registered_features(parts);
+    features = registered_features(parts, config);
     const OdometryResult found = register_features(features, map, prediction.T_map_lidar, config);
     if (fits.fits(found) && fits.believes(found)) return found;
     std::swap(parts.features.surfaces, parts.few_surfaces);
   }
-  features = registered_features(parts);
+  features = registered_features(parts, config);
   return estimate_pose(features, prediction);
 }
 
@@ -274,7 +241,7 @@ void Odometry::State::reclassify_motion(ScanInParts& parts,
   parts.view->move_to(result.T_map_lidar);
   parts.motion_classes = classify(parts.scan, parts.objects, parts.view, result.T_map_lidar);
   if (parts.movable == MovableUse::none) return;
-  features = registered_features(parts);
+  features = registered_features(parts, config);
   const OdometryResult again =
       register_features(features, map, result.T_map_lidar, config, result.sweep_correction);
   if (again.health != OdometryHealth::lost) result = again;
@@ -388,9 +355,7 @@ SweepPrior Odometry::State::sweep_prior(std::int64_t time_ns, const SweepTimes& 
 
 void Odometry::State::extend_map(const ScanInParts& parts, const Step& step,
                                  const Eigen::Isometry3d& T_map_middle) {
-  const UsablePoints usable(config, parts.objects, parts.motion_classes, parts.movable);
-  FeatureSets features = ScanFeatures(parts.scan, parts.sweep, parts.labels, parts.features)
-                             .of_map(usable, step.motion);
+  FeatureSets features = map_features(parts, step.motion, config);
   extend_local_map(map, features, T_map_middle);
   const bool is_uncompensated = last.interval_s <= 0.0;
   if (step.result.health == OdometryHealth::initialised && features.rolling && is_uncompensated)

@@ -59,7 +59,7 @@ void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& ma
   found.found = surface.has_value();
   if (!surface) return;
   found.surface = *surface;
-  found.inconsistency = semantic_inconsistency(neighbours, feature.label);
+  found.inconsistency = feature.confidence * semantic_inconsistency(neighbours, feature.label);
 }
 
 /// One correspondence a feature, in the features' order whatever the number of threads.

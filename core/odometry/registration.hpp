@@ -15,6 +15,8 @@ struct FeaturePoint {
   /// In the lidar's frame at the middle of the sweep, as far as the motion is known.
   Eigen::Vector3f position_lidar;
   SemanticClass label = SemanticClass::unlabeled;
+  /// Probability of the label: that share of an inconsistency counts, eq. (10).
+  float confidence = 1.0F;
   /// When the point was measured: -0.5 at the sweep's start, 0.5 at its end; 0 where unknown.
   float sweep_part = 0.0F;
 };

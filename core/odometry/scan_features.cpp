@@ -2,64 +2,116 @@
 
 #include <tbb/parallel_invoke.h>
 
+#include <algorithm>
+
 namespace stillmap {
 namespace {
 
 /// Objects taller than this are no vehicles or people, whatever their labels say [m].
 constexpr float max_object_height_m = 5.0F;
 
+/// Fewer static features than this are helped out by parked vehicles.
+constexpr std::size_t min_static_features = 100;
+
+/// Points that registration and local map may use.
+class UsablePoints {
+ public:
+  /// `parts` must outlive this.
+  UsablePoints(const ScanInParts& parts, const OdometryConfig& config)
+      : semantic_(config.weighting == Weighting::semantic), objects_(parts.objects) {
+    if (!semantic_ || !config.motion.use_range_image_history) {
+      usable_.assign(objects_.count, true);
+      return;
+    }
+    usable_.resize(objects_.count);
+    for (std::size_t k = 0; k < objects_.count; ++k) {
+      const bool is_parked =
+          parts.movable == MovableUse::parked && parts.motion_classes[k] == MotionClass::parked;
+      usable_[k] = is_parked || objects_.height_m[k] > max_object_height_m;
+    }
+  }
+
+  [[nodiscard]] bool operator()(std::size_t i) const {
+    const std::int32_t object = objects_.of_point[i];
+    return object == ObjectClusters::none || usable_[static_cast<std::size_t>(object)];
+  }
+  [[nodiscard]] bool operator()(std::size_t i, Motion motion) const {
+    return (*this)(i) && !(semantic_ && motion == Motion::highly_dynamic);
+  }
+
+ private:
+  bool semantic_;
+  const ObjectClusters& objects_;
+  std::vector<bool> usable_;
+};
+
+/// Makes feature points of a scan's points. Eq. (9) knows no confidence.
+class FeaturePoints {
+ public:
+  /// `parts` must outlive this.
+  FeaturePoints(const ScanInParts& parts, const OdometryConfig& config)
+      : parts_(parts),
+        counts_confidence_(!config.paper_exact && !parts.labels.confidence.empty()) {}
+
+  [[nodiscard]] bool rolling() const { return parts_.sweep.duration_s > 0.0; }
+  [[nodiscard]] FeaturePoint operator()(std::uint32_t i) const {
+    FeaturePoint point{.position_lidar = parts_.scan.points_lidar[i]};
+    if (!parts_.labels.empty()) point.label = parts_.labels.classes[i];
+    if (counts_confidence_) point.confidence = std::clamp(parts_.labels.confidence[i], 0.0F, 1.0F);
+    if (rolling())
+      point.sweep_part = static_cast<float>(parts_.sweep.part(parts_.scan.time_offset_s[i]));
+    return point;
+  }
+  /// Those of `indices` for which `is_used(i)` holds.
+  template <typename IsUsed>
+  [[nodiscard]] std::vector<FeaturePoint> of(const std::vector<std::uint32_t>& indices,
+                                             IsUsed is_used) const {
+    std::vector<FeaturePoint> points;
+    points.reserve(indices.size());
+    for (const std::uint32_t i : indices)
+      if (is_used(i)) points.push_back((*this)(i));
+    return points;
+  }
+
+ private:
+  const ScanInParts& parts_;
+  bool counts_confidence_;
+};
+
+bool all_points(std::uint32_t) { return true; }
+
+FeatureSets usable_features(const ScanInParts& parts, const OdometryConfig& config) {
+  const UsablePoints usable(parts, config);
+  const FeaturePoints points(parts, config);
+  return {.edges = points.of(parts.features.edges, usable),
+          .planes = points.of(parts.features.registered_planes, usable),
+          .surfaces = points.of(parts.features.surfaces, usable),
+          .points = points.of(parts.features.upright_points, all_points),
+          .level_points = points.of(parts.features.level_points, all_points),
+          .rolling = points.rolling(),
+          .sweep_prior = parts.sweep_prior};
+}
+
 }  // namespace
 
-UsablePoints::UsablePoints(const OdometryConfig& config, const ObjectClusters& objects,
-                           const std::vector<MotionClass>& motion_classes, MovableUse movable)
-    : semantic_(config.weighting == Weighting::semantic), objects_(objects) {
-  if (!semantic_ || !config.motion.use_range_image_history) {
-    usable_.assign(objects.count, true);
-    return;
-  }
-  usable_.resize(objects.count);
-  for (std::size_t k = 0; k < objects.count; ++k)
-    usable_[k] = objects.height_m[k] > max_object_height_m;
-  if (movable == MovableUse::none) return;
-  for (std::size_t k = 0; k < objects.count; ++k)
-    if (motion_classes[k] == MotionClass::parked) usable_[k] = true;
+FeatureSets registered_features(ScanInParts& parts, const OdometryConfig& config) {
+  FeatureSets sets = usable_features(parts, config);
+  if (sets.edges.size() + sets.planes.size() + sets.surfaces.size() >= min_static_features)
+    return sets;
+  parts.movable = MovableUse::parked;
+  return usable_features(parts, config);
 }
 
-FeaturePoint ScanFeatures::point(std::uint32_t i) const {
-  const double part = rolling() ? sweep_.part(scan_.time_offset_s[i]) : 0.0;
-  const SemanticClass label = labels_.empty() ? SemanticClass::unlabeled : labels_.classes[i];
-  return {scan_.points_lidar[i], label, static_cast<float>(part)};
-}
-
-FeatureSets ScanFeatures::registered(const UsablePoints& usable) const {
-  const auto collect = [&](const std::vector<std::uint32_t>& from, std::vector<FeaturePoint>& to) {
-    to.reserve(from.size());
-    for (const std::uint32_t i : from)
-      if (usable(i)) to.push_back(point(i));
-  };
+FeatureSets map_features(const ScanInParts& parts, const std::vector<Motion>& motion,
+                         const OdometryConfig& config) {
+  const UsablePoints usable(parts, config);
+  const FeaturePoints points(parts, config);
+  const auto stands = [&](std::uint32_t i) { return usable(i, motion[i]); };
   FeatureSets sets;
-  sets.rolling = rolling();
-  collect(features_.edges, sets.edges);
-  collect(features_.registered_planes, sets.planes);
-  collect(features_.surfaces, sets.surfaces);
-  for (const std::uint32_t i : features_.upright_points) sets.points.push_back(point(i));
-  for (const std::uint32_t i : features_.level_points) sets.level_points.push_back(point(i));
-  return sets;
-}
-
-FeatureSets ScanFeatures::of_map(const UsablePoints& usable,
-                                 const std::vector<Motion>& motion) const {
-  const auto collect = [&](const std::vector<std::uint32_t>& from, std::vector<FeaturePoint>& to) {
-    to.reserve(from.size());
-    for (const std::uint32_t i : from)
-      if (usable(i, motion[i])) to.push_back(point(i));
-  };
-  FeatureSets sets;
-  sets.rolling = rolling();
-  collect(features_.edges, sets.edges);
-  collect(features_.planes, sets.planes);
-  sets.points.reserve(features_.points.size());
-  for (const std::uint32_t i : features_.points) sets.points.push_back(point(i));
+  sets.edges = points.of(parts.features.edges, stands);
+  sets.planes = points.of(parts.features.planes, stands);
+  sets.points = points.of(parts.features.points, all_points);
+  sets.rolling = points.rolling();
   return sets;
 }
 

@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/prepare.hpp"
+#include "core/lidar/range_image_view.hpp"
 #include "core/odometry/features.hpp"
 #include "core/odometry/motion_classification.hpp"
 #include "core/odometry/object_clusters.hpp"
@@ -20,51 +22,28 @@ enum class MovableUse {
   parked,
 };
 
-/// Points that registration and local map may use: with semantics none on objects that could move,
-/// or (without earlier range images) those that pass eq. (9).
-class UsablePoints {
- public:
-  /// `objects` must outlive this.
-  UsablePoints(const OdometryConfig& config, const ObjectClusters& objects,
-               const std::vector<MotionClass>& motion_classes, MovableUse movable);
-
-  [[nodiscard]] bool operator()(std::size_t i) const {
-    const std::int32_t object = objects_.of_point[i];
-    return object == ObjectClusters::none || usable_[static_cast<std::size_t>(object)];
-  }
-  [[nodiscard]] bool operator()(std::size_t i, Motion motion) const {
-    return (*this)(i) && !(semantic_ && motion == Motion::highly_dynamic);
-  }
-
- private:
-  bool semantic_;
-  const ObjectClusters& objects_;
-  std::vector<bool> usable_;
+/// A scan that was moved to the middle of its sweep, while it is registered.
+struct ScanInParts {
+  const Scan& scan;
+  const SweepTimes& sweep;
+  const PointLabels& labels;
+  Features features{};
+  /// Enough of the features' surfaces where the prediction is good; empty where that is not known.
+  std::vector<std::uint32_t> few_surfaces{};
+  ObjectClusters objects{};
+  std::optional<RangeImageView> view{};
+  std::vector<MotionClass> motion_classes{};
+  SweepPrior sweep_prior{};
+  MovableUse movable = MovableUse::none;
 };
 
-/// Feature points of a scan that was moved to the middle of its sweep, with their labels.
-class ScanFeatures {
- public:
-  /// All must outlive this.
-  ScanFeatures(const Scan& scan, const SweepTimes& sweep, const PointLabels& labels,
-               const Features& features)
-      : scan_(scan), sweep_(sweep), labels_(labels), features_(features) {}
+/// The features that are registered: with semantics none on objects that could move, or (without
+/// earlier range images) those that pass eq. (9). Takes parked objects, too, where few are left.
+[[nodiscard]] FeatureSets registered_features(ScanInParts& parts, const OdometryConfig& config);
 
-  /// The usable points that are registered.
-  [[nodiscard]] FeatureSets registered(const UsablePoints& usable) const;
-  /// The usable points that enter the local map, without those that move. Edges and planes alone.
-  [[nodiscard]] FeatureSets of_map(const UsablePoints& usable,
-                                   const std::vector<Motion>& motion) const;
-
- private:
-  [[nodiscard]] bool rolling() const { return sweep_.duration_s > 0.0; }
-  [[nodiscard]] FeaturePoint point(std::uint32_t i) const;
-
-  const Scan& scan_;
-  const SweepTimes& sweep_;
-  const PointLabels& labels_;
-  const Features& features_;
-};
+/// Those that enter the local map, without points that move. Edges, planes and points alone.
+[[nodiscard]] FeatureSets map_features(const ScanInParts& parts, const std::vector<Motion>& motion,
+                                       const OdometryConfig& config);
 
 /// Enough features to find a place by.
 [[nodiscard]] FeatureSets downsampled(FeatureSets features);
