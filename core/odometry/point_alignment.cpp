@@ -14,17 +14,64 @@ namespace {
 /// Fewer matched points than this align nothing.
 constexpr int min_matched = 30;
 
+/// Sums over matched points of what the normal equations of point-to-point ICP are made of. A
+/// point's derivative by the pose tangent is [ I | -[arm]x ], arm being the point turned into the
+/// map's axes: their products need the weights' moments alone.
 struct Equations {
-  Eigen::Matrix<double, 6, 6> hessian = Eigen::Matrix<double, 6, 6>::Zero();
-  PoseTangent gradient = PoseTangent::Zero();
   double weights = 0.0;
+  Eigen::Vector3d weighted_arms = Eigen::Vector3d::Zero();
+  /// Sum of w arm arm'.
+  Eigen::Matrix3d arm_products = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  Eigen::Vector3d torque = Eigen::Vector3d::Zero();
+  /// Of points whose height alone counts: z, and the rotations about x and y.
+  Eigen::Matrix3d level_hessian = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d level_gradient = Eigen::Vector3d::Zero();
   int matched = 0;
 
+  void add_point(double weight, const Eigen::Vector3d& arm, const Eigen::Vector3d& residual) {
+    weights += weight;
+    const Eigen::Vector3d weighted = weight * arm;
+    weighted_arms += weighted;
+    arm_products += weighted * arm.transpose();
+    const Eigen::Vector3d pull = weight * residual;
+    force += pull;
+    torque += arm.cross(pull);
+    ++matched;
+  }
+  void add_level_point(double weight, const Eigen::Vector3d& arm, double residual_z) {
+    const Eigen::Vector3d slope(1.0, arm.y(), -arm.x());
+    const Eigen::Vector3d weighted = weight * slope;
+    level_hessian += weighted * slope.transpose();
+    level_gradient += residual_z * weighted;
+  }
   void add(const Equations& other) {
-    hessian += other.hessian;
-    gradient += other.gradient;
     weights += other.weights;
+    weighted_arms += other.weighted_arms;
+    arm_products += other.arm_products;
+    force += other.force;
+    torque += other.torque;
+    level_hessian += other.level_hessian;
+    level_gradient += other.level_gradient;
     matched += other.matched;
+  }
+
+  [[nodiscard]] Eigen::Matrix<double, 6, 6> hessian() const {
+    Eigen::Matrix<double, 6, 6> full;
+    full.topLeftCorner<3, 3>() = weights * Eigen::Matrix3d::Identity();
+    full.topRightCorner<3, 3>() = -skew(weighted_arms);
+    full.bottomLeftCorner<3, 3>() = skew(weighted_arms);
+    full.bottomRightCorner<3, 3>() =
+        arm_products.trace() * Eigen::Matrix3d::Identity() - arm_products;
+    full.block<3, 3>(2, 2) += level_hessian;
+    return full;
+  }
+  [[nodiscard]] PoseTangent gradient() const {
+    PoseTangent full;
+    full.head<3>() = force;
+    full.tail<3>() = torque;
+    full.segment<3>(2) += level_gradient;
+    return full;
   }
 };
 
@@ -87,7 +134,6 @@ Equations equations_of(const AlignedPoints& points, const FeatureMap& points_map
                        std::vector<Counterpart>& counterparts) {
   const tbb::blocked_range<std::size_t> all(0, points.positions_lidar.size(), 128);
   const double squared_kernel = config.kernel_m * config.kernel_m;
-  const Eigen::Vector3d height_alone(0.0, 0.0, 1.0);
   // The deterministic reduction: the same sums whatever the number of threads.
   return tbb::parallel_deterministic_reduce(
       all, Equations{},
@@ -98,21 +144,14 @@ Equations equations_of(const AlignedPoints& points, const FeatureMap& points_map
           const Eigen::Vector3f* const nearest = counterparts[i].find(
               points_map, point_map.cast<float>(), static_cast<float>(config.max_distance_m));
           if (nearest == nullptr) continue;
-          const bool is_level = i >= points.first_level;
           Eigen::Vector3d residual = point_map - nearest->cast<double>();
-          Eigen::Matrix<double, 3, 6> jacobian;
-          jacobian << Eigen::Matrix3d::Identity(), -skew(arm);
-          if (is_level) {
-            residual = residual.cwiseProduct(height_alone);
-            jacobian = height_alone.asDiagonal() * jacobian;
-          }
+          const bool is_level = i >= points.first_level;
+          if (is_level) residual.head<2>().setZero();
           const double ratio = squared_kernel / (squared_kernel + residual.squaredNorm());
-          const double weight = ratio * ratio;
-          sums.hessian += weight * jacobian.transpose() * jacobian;
-          sums.gradient += weight * jacobian.transpose() * residual;
-          if (is_level) continue;
-          sums.weights += weight;
-          ++sums.matched;
+          if (is_level)
+            sums.add_level_point(ratio * ratio, arm, residual.z());
+          else
+            sums.add_point(ratio * ratio, arm, residual);
         }
         return sums;
       },
@@ -140,8 +179,8 @@ PointAlignment align_points(const FeatureSets& features, const FeatureMap& point
     if (equations.matched < min_matched) return found;
     // What no point shows stays where it is.
     const Eigen::Matrix<double, 6, 6> damped =
-        equations.hessian + Eigen::Matrix<double, 6, 6>::Identity();
-    const PoseTangent step = -damped.ldlt().solve(equations.gradient);
+        equations.hessian() + Eigen::Matrix<double, 6, 6>::Identity();
+    const PoseTangent step = -damped.ldlt().solve(equations.gradient());
     if (!step.allFinite()) return found;
     found.T_map_lidar = boxplus(found.T_map_lidar, step);
     found.converged = step.head<3>().norm() < config.step_translation_m &&
