@@ -221,6 +221,7 @@ void FeatureMap::insert(const LabelledPoint& point, std::uint32_t block_number) 
   }
   block.push(point);
   ++size_;
+  if (block.movable == 1 && is_movable(point.label)) movable_blocks_.push_back(block_number);
 }
 
 Neighbours FeatureMap::nearest(const Eigen::Vector3f& position_map, int n,
@@ -291,6 +292,7 @@ void FeatureMap::remove_far_from(const Eigen::Vector3f& centre_map) {
     free_blocks_.push_back(number);
     return true;
   });
+  keep_movable_blocks();
 }
 
 std::vector<LabelledPoint> FeatureMap::points() const {
@@ -306,6 +308,7 @@ void FeatureMap::clear() {
   index_.clear();
   blocks_.clear();
   free_blocks_.clear();
+  movable_blocks_.clear();
   size_ = 0;
   kept_round_map_.reset();
 }

@@ -98,11 +98,17 @@ class FeatureMap {
   /// Position in `blocks_` of the voxel's block, made where there is none.
   [[nodiscard]] std::uint32_t block_at(const Eigen::Vector3i& voxel);
   [[nodiscard]] Neighbours neighbours_of(const Nearest& nearest) const;
+  /// Strikes those without movable points off `movable_blocks_`.
+  void keep_movable_blocks() {
+    std::erase_if(movable_blocks_, [this](std::uint32_t k) { return blocks_[k].movable == 0; });
+  }
 
   /// Voxel to its place in `blocks_`: what every look-up walks stays small.
   BrickIndex index_;
   std::vector<Block> blocks_;
   std::vector<std::uint32_t> free_blocks_;
+  /// Those of `blocks_` with movable points.
+  std::vector<std::uint32_t> movable_blocks_;
   std::size_t size_ = 0;
   /// Where voxels were last removed round.
   std::optional<Eigen::Vector3f> kept_round_map_;
@@ -114,8 +120,8 @@ class FeatureMap {
 
 template <typename Predicate>
 void FeatureMap::remove_movable_if(Predicate is_gone) {
-  for (Block& block : blocks_) {
-    if (block.movable == 0) continue;
+  for (const std::uint32_t number : movable_blocks_) {
+    Block& block = blocks_[number];
     for (int i = block.count - 1; i >= 0; --i) {
       if (!is_movable(block.label[static_cast<std::size_t>(i)]) || !is_gone(block.position(i)))
         continue;
@@ -123,6 +129,7 @@ void FeatureMap::remove_movable_if(Predicate is_gone) {
       --size_;
     }
   }
+  keep_movable_blocks();
 }
 
 }  // namespace stillmap
