@@ -45,8 +45,9 @@ std::optional<MappedScan> Mapper::process(
     Scan raw_scan, const std::optional<Eigen::Isometry3d>& T_map_lidar_prior) {
   if (!accepts(raw_scan)) return std::nullopt;
 
-  // Prepare: beam of every point, then only points that are measurements.
-  raw_scan.ring = assign_rings(raw_scan, config_.sensor);
+  // Prepare: beam of every point where odometry asks for it, then only points that are
+  // measurements.
+  if (odometry_.uses_rings()) raw_scan.ring = assign_rings(raw_scan, config_.sensor);
   Scan scan = drop_unusable_points(std::move(raw_scan), config_.prepare);
   if (!has_enough_points(scan)) return std::nullopt;
   end_stage("prepare");

@@ -390,6 +390,10 @@ Eigen::Isometry3d Odometry::motion_during(double period_s) const {
   return state_->motion_during(period_s);
 }
 
+bool Odometry::uses_rings() const {
+  return !is_registered_by_surfaces(state_->sensor, state_->config);
+}
+
 Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
                                        const PointLabels& labels,
                                        const std::optional<Eigen::Isometry3d>& T_map_lidar_prior,

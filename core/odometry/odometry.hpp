@@ -41,6 +41,9 @@ class Odometry {
   [[nodiscard]] SweepMotion sweep_motion(
       const SweepTimes& sweep, const std::optional<InertialMotion>& inertial = std::nullopt) const;
 
+  /// Whether features are those of rings: register_scan() then needs `scan.ring`.
+  [[nodiscard]] bool uses_rings() const;
+
   struct Step {
     OdometryResult result;
     /// Motion of every point of the scan (II-C.2).
@@ -50,9 +53,9 @@ class Odometry {
   };
 
   /// Registers a prepared scan, splits its points by motion, and adds it to the local map.
-  /// `scan.ring` must be known. The points come moved to the middle of the sweep by
-  /// sweep_motion(), with their times; they leave as if measured at the stamp, where the result's
-  /// pose is, by the motion that was found, and without times.
+  /// `scan.ring` must be known where uses_rings(). The points come moved to the middle of the sweep
+  /// by sweep_motion(), with their times; they leave as if measured at the stamp, where the
+  /// result's pose is, by the motion that was found, and without times.
   [[nodiscard]] Step register_scan(Scan& scan, const SweepTimes& sweep, const PointLabels& labels,
                                    const std::optional<Eigen::Isometry3d>& T_map_lidar_prior,
                                    const std::optional<InertialMotion>& inertial = std::nullopt);
