@@ -194,6 +194,26 @@ TEST(FeatureMapRemove, TakesOutTheMovablePointsOfAPlaceOnly) {
   EXPECT_LT(left, points.size());
 }
 
+TEST(RemoveMovable, FindsThoseOfVoxelsThatWereEmptiedAndFilledAgain) {
+  const auto none_stays = [](const Eigen::Vector3f&) { return true; };
+  const auto all_stay = [](const Eigen::Vector3f&) { return false; };
+  FeatureMap map(roomy());
+  for (int round = 0; round < 3; ++round) {
+    const auto points = random_points(500, Eigen::Vector3f::Zero(), {5.0F, 5.0F, 2.0F}, 71);
+    const auto fixed = static_cast<std::size_t>(std::ranges::count_if(
+        points, [](const LabelledPoint& point) { return !is_movable(point.label); }));
+    map.insert(points);
+    map.remove_movable_if(all_stay);
+    EXPECT_EQ(map.size(), points.size());
+    map.remove_movable_if(none_stays);
+    EXPECT_EQ(map.size(), fixed);
+    map.insert(points);
+    // Far away all voxels go, and their blocks are used by others.
+    map.remove_far_from({1000.0F * static_cast<float>(round + 1), 500.0F, 0.0F});
+    EXPECT_EQ(map.size(), 0U);
+  }
+}
+
 TEST(FeatureMapClear, LeavesNothing) {
   FeatureMap map(roomy());
   EXPECT_EQ(map.size(), 0U);
