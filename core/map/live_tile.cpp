@@ -1,8 +1,10 @@
 #include "core/map/live_tile.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cassert>
 #include <limits>
+#include <optional>
 #include <type_traits>
 #include <utility>
 
@@ -122,22 +124,37 @@ void LiveTile::insert(std::span<const TilePoint> points, std::uint32_t scan) {
 }
 
 void LiveTile::prefetch_voxels(std::span<const TilePoint> points) const {
-  for (const TilePoint& point : points) index_.prefetch_slot(point.voxel_key);
+  // Neighbours on a beam mostly share a voxel: asked for once.
+  std::array<std::uint32_t, block_size> keys;
+  std::size_t count = 0;
   for (const TilePoint& point : points) {
-    const std::uint32_t position = index_.likely_position(point.voxel_key);
+    if (count > 0 && keys[count - 1] == point.voxel_key) continue;
+    keys[count++] = point.voxel_key;
+    index_.prefetch_slot(point.voxel_key);
+  }
+  for (const std::uint32_t key : std::span(keys).first(count)) {
+    const std::uint32_t position = index_.likely_position(key);
     if (position != PositionIndex::none) prefetch(&at(position));
   }
 }
 
 void LiveTile::insert_block(std::span<const TilePoint> points, std::uint32_t scan) {
+  std::optional<std::uint32_t> key;
   LiveVoxel* voxel = nullptr;
+  Excluded* excluded = nullptr;
   for (const TilePoint& point : points) {
+    const bool makes_voxel = voxel == nullptr && point.motion == Motion::stationary;
     // Neighbours on a beam mostly share a voxel: no look-up for them.
-    if (voxel == nullptr || voxel->packed.key != point.voxel_key) voxel = find(point);
+    if (key != point.voxel_key || makes_voxel) {
+      key = point.voxel_key;
+      voxel = find(point);
+      excluded = nullptr;
+    }
     if (voxel != nullptr) {
       hit(*voxel, point, scan);
     } else if (point.motion != Motion::stationary) {
-      exclude(point, scan);
+      if (excluded == nullptr) excluded = &excluded_[point.voxel_key];
+      exclude(*excluded, point, scan);
     }
   }
 }
@@ -161,11 +178,10 @@ void LiveTile::hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan)
   if (packed.point_count < max_count) ++packed.point_count;
 }
 
-void LiveTile::exclude(const TilePoint& point, std::uint32_t scan) {
-  Excluded& excluded = excluded_[point.voxel_key];
-  excluded.label = point.label;
-  excluded.was_moving |= point.motion == Motion::highly_dynamic;
-  excluded.last_scan = scan;
+void LiveTile::exclude(Excluded& voxel, const TilePoint& point, std::uint32_t scan) {
+  voxel.label = point.label;
+  voxel.was_moving |= point.motion == Motion::highly_dynamic;
+  voxel.last_scan = scan;
 }
 
 bool LiveTile::clear_seen_through(const std::function<bool(const Eigen::Vector3f&)>& is_free,

@@ -137,7 +137,7 @@ class LiveTile {
   /// Asks for the memory of the voxels that these points hit.
   void prefetch_voxels(std::span<const TilePoint> points) const;
   static void hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan);
-  void exclude(const TilePoint& point, std::uint32_t scan);
+  static void exclude(Excluded& voxel, const TilePoint& point, std::uint32_t scan);
   std::size_t restore_excluded(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
                                const VisibilityRule& rule);
   [[nodiscard]] static VoxelHistory history(const LiveVoxel& voxel);
