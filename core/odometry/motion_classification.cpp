@@ -36,9 +36,10 @@ struct SampleObservation {
 SampleObservation observe_history(const Eigen::Vector3f& point_map,
                                   const RangeImageHistory& history, const RangeImageView& now) {
   SampleObservation seen;
-  for (std::size_t age = 0; age < history.size(); ++age) {
+  // What has moved is not asked for where it was before.
+  for (std::size_t age = 0; age < history.size() && !seen.moved; ++age) {
     const PastObservation observation = history.observation(age, point_map, now);
-    seen.moved |=
+    seen.moved =
         observation == PastObservation::free || observation == PastObservation::removed_in_front;
     if (age + 1 == history.size()) seen.was_there = observation == PastObservation::same;
   }
