@@ -12,11 +12,6 @@ namespace {
 
 constexpr std::uint32_t no_tile = std::numeric_limits<std::uint32_t>::max();
 
-std::uint8_t offset_step(double offset) {
-  constexpr double steps = PackedVoxel::offset_steps;
-  return static_cast<std::uint8_t>(std::min(offset * steps, steps - 1.0));
-}
-
 float confidence(const PointLabels& labels, std::size_t i) {
   return labels.confidence.empty() ? 1.0F : labels.confidence[i];
 }
@@ -41,34 +36,55 @@ std::span<const ScanSorter::Batch> ScanSorter::sort(const LabelledScan& scan,
   return batches_;
 }
 
+ScanSorter::PoseInVoxels::PoseInVoxels(const Eigen::Isometry3d& T_map_lidar, double voxel_size_m) {
+  const Eigen::Matrix4d in_voxels = T_map_lidar.matrix() / voxel_size_m;
+  x = in_voxels.col(0);
+  y = in_voxels.col(1);
+  z = in_voxels.col(2);
+  origin = in_voxels.col(3);
+  for (Eigen::Array4d* const column : {&x, &y, &z, &origin}) (*column)[3] = 0.0;
+}
+
 void ScanSorter::index_points(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
                               const Window& window) {
   window_indices_.resize(scan.scan.size());
   placed_.resize(scan.scan.size());
+  const PoseInVoxels pose(T_map_lidar, grid_.voxel_size_m());
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scan.scan.size(), 4096),
                     [&](const tbb::blocked_range<std::size_t>& range) {
-                      for (std::size_t i = range.begin(); i != range.end(); ++i) {
-                        index_point(i, scan, T_map_lidar, window);
-                      }
+                      for (std::size_t i = range.begin(); i != range.end(); ++i)
+                        index_point(i, scan, pose, window);
                     });
 }
 
-void ScanSorter::index_point(std::size_t i, const LabelledScan& scan,
-                             const Eigen::Isometry3d& T_map_lidar, const Window& window) {
+void ScanSorter::index_point(std::size_t i, const LabelledScan& scan, const PoseInVoxels& pose,
+                             const Window& window) {
+  constexpr double steps = PackedVoxel::offset_steps;
   window_indices_[i] = no_tile;
-  const Eigen::Vector3d p_lidar = scan.scan.points_lidar[i].cast<double>();
-  if (!(p_lidar.squaredNorm() <= max_range_m_ * max_range_m_)) return;
-  const Eigen::Vector3d p_map = T_map_lidar * p_lidar;
-  if (!grid_.holds(p_map)) return;
+  const Eigen::Vector3d p = scan.scan.points_lidar[i].cast<double>();
+  // Written so that NaN fails.
+  if (!(p.squaredNorm() <= max_range_m_ * max_range_m_)) return;
+  const Eigen::Array4d place = pose.x * p.x() + pose.y * p.y() + pose.z * p.z() + pose.origin;
+  if (!grid_.holds((place.head<3>() * grid_.voxel_size_m()).matrix())) return;
 
-  const auto [tile, voxel, offset] = grid_.index(p_map);
-  const std::int32_t row = tile.x - window.first.x;
-  const std::int32_t column = tile.y - window.first.y;
+  const Eigen::Array4d whole = place.floor();
+  const Eigen::Array4i voxel = whole.cast<int>();
+  const Eigen::Array4i offset = ((place - whole) * steps).min(steps - 1.0).cast<int>();
+  // From the window's corner.
+  const auto columns = static_cast<std::uint32_t>(grid_.columns());
+  const auto x = static_cast<std::uint32_t>(voxel[0] - window.first.x * grid_.columns());
+  const auto y = static_cast<std::uint32_t>(voxel[1] - window.first.y * grid_.columns());
+  const std::uint32_t row = x / columns;
+  const std::uint32_t column = y / columns;
   // Only a transform that is not rigid moves a point out of the window.
-  if (row < 0 || row >= window.side || column < 0 || column >= window.side) return;
-  window_indices_[i] = static_cast<std::uint32_t>(row * window.side + column);
-  placed_[i] = {voxel_key(voxel),
-                {offset_step(offset.x()), offset_step(offset.y()), offset_step(offset.z())},
+  const auto side = static_cast<std::uint32_t>(window.side);
+  if (row >= side || column >= side) return;
+  window_indices_[i] = row * side + column;
+  placed_[i] = {voxel_key({static_cast<std::uint16_t>(x - row * columns),
+                           static_cast<std::uint16_t>(y - column * columns),
+                           static_cast<std::int16_t>(voxel[2])}),
+                {static_cast<std::uint8_t>(offset[0]), static_cast<std::uint8_t>(offset[1]),
+                 static_cast<std::uint8_t>(offset[2])},
                 scan.label(i),
                 scan.motion[i],
                 confidence(scan.labels, i)};

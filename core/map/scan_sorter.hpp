@@ -34,9 +34,16 @@ class ScanSorter {
     std::int32_t side = 0;
   };
 
+  /// The pose in voxels, a vector register a column: place = x p.x + y p.y + z p.z + origin.
+  struct PoseInVoxels {
+    PoseInVoxels(const Eigen::Isometry3d& T_map_lidar, double voxel_size_m);
+
+    Eigen::Array4d x, y, z, origin;
+  };
+
   void index_points(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
                     const Window& window);
-  void index_point(std::size_t i, const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar,
+  void index_point(std::size_t i, const LabelledScan& scan, const PoseInVoxels& pose,
                    const Window& window);
   void group_by_tile(const Window& window);
 
