@@ -146,10 +146,6 @@ std::vector<bool> unreliable_points(std::span<const Eigen::Vector3f> ring) {
   return unreliable;
 }
 
-Eigen::Array3i cube_of(const Eigen::Vector3f& point, float inverse_spacing) {
-  return (point.array() * inverse_spacing).floor().cast<int>();
-}
-
 /// Cubes of space that are taken, 64 to a brick of 4 x 4 x 4: points that were measured one after
 /// the other mostly share a brick, and no look-up is needed for them.
 class TakenCubes {
@@ -157,10 +153,10 @@ class TakenCubes {
   TakenCubes() : slots_(initial_slots) {}
 
   /// Whether it was free until now.
-  bool take(const Eigen::Array3i& cube) {
-    const std::uint64_t brick = packed_index(cube.x() >> 2, cube.y() >> 2, cube.z() >> 2);
+  bool take(int x, int y, int z) {
+    const std::uint64_t brick = packed_index(x >> 2, y >> 2, z >> 2);
     if (brick != brick_) go_to(brick);
-    const int place = (cube.x() & 3) << 4 | (cube.y() & 3) << 2 | (cube.z() & 3);
+    const int place = (x & 3) << 4 | (y & 3) << 2 | (z & 3);
     const std::uint64_t bit = std::uint64_t{1} << place;
     const bool was_free = (taken_ & bit) == 0;
     taken_ |= bit;
@@ -226,12 +222,31 @@ namespace {
 std::vector<std::uint32_t> first_in_cubes(std::span<const Eigen::Vector3f> points,
                                           std::span<const std::uint32_t> chosen,
                                           float inverse_spacing) {
+  // So many cubes are worked out at once, in vector registers.
+  constexpr std::size_t block_size = 16;
+  using Block = Eigen::Array<float, block_size, 1>;
+  using Cubes = Eigen::Array<int, block_size, 1>;
   TakenCubes taken;
   std::vector<std::uint32_t> kept(chosen.size());
   std::size_t count = 0;
-  for (const std::uint32_t i : chosen) {
-    kept[count] = i;
-    count += taken.take(cube_of(points[i], inverse_spacing)) ? 1 : 0;
+  Block x = Block::Zero(), y = Block::Zero(), z = Block::Zero();
+  for (std::size_t begin = 0; begin < chosen.size(); begin += block_size) {
+    const auto some = chosen.subspan(begin, std::min(block_size, chosen.size() - begin));
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      const auto lane = static_cast<Eigen::Index>(k);
+      const Eigen::Vector3f& p = points[some[k]];
+      x[lane] = p.x();
+      y[lane] = p.y();
+      z[lane] = p.z();
+    }
+    const Cubes cube_x = (x * inverse_spacing).floor().cast<int>();
+    const Cubes cube_y = (y * inverse_spacing).floor().cast<int>();
+    const Cubes cube_z = (z * inverse_spacing).floor().cast<int>();
+    for (std::size_t k = 0; k < some.size(); ++k) {
+      const auto lane = static_cast<Eigen::Index>(k);
+      kept[count] = some[k];
+      count += taken.take(cube_x[lane], cube_y[lane], cube_z[lane]) ? 1 : 0;
+    }
   }
   kept.resize(count);
   return kept;
