@@ -57,7 +57,9 @@ class FeaturePoints {
   [[nodiscard]] FeaturePoint operator()(std::uint32_t i) const {
     FeaturePoint point{.position_lidar = parts_.scan.points_lidar[i]};
     if (!parts_.labels.empty()) point.label = parts_.labels.classes[i];
-    if (counts_confidence_) point.confidence = std::clamp(parts_.labels.confidence[i], 0.0F, 1.0F);
+    // Written so that NaN is 0.
+    if (counts_confidence_)
+      point.confidence = std::min(std::max(0.0F, parts_.labels.confidence[i]), 1.0F);
     if (rolling())
       point.sweep_part = static_cast<float>(parts_.sweep.part(parts_.scan.time_offset_s[i]));
     return point;

@@ -147,9 +147,10 @@ struct MovedThird {
     }
   }
 
-  [[nodiscard]] double error_m(const OdometryConfig& config) const {
-    const auto result = register_features(scan_world.features(T_true, 0.01, 6),
-                                          map_world.local_map(), T_true, config);
+  [[nodiscard]] double error_m(const OdometryConfig& config, float confidence = 1.0F) const {
+    FeatureSets features = scan_world.features(T_true, 0.01, 6);
+    for (FeaturePoint& point : features.planes) point.confidence = confidence;
+    const auto result = register_features(features, map_world.local_map(), T_true, config);
     EXPECT_NE(result.health, OdometryHealth::lost);
     return test::translation_error(result.T_map_lidar, T_true);
   }
@@ -167,6 +168,17 @@ TEST(RegisterFeatures, SemanticsHoldAgainstAMovedThirdOfTheScene) {
   EXPECT_LT(semantic, 0.6 * none);
   // As shipped.
   EXPECT_LT(scene.error_m(OdometryConfig{}), 0.5 * semantic);
+}
+
+TEST(RegisterFeatures, AnInconsistentLabelCountsByItsConfidence) {
+  const MovedThird scene;
+  OdometryConfig config = with_weighting(Weighting::semantic);
+  config.registration.robust_scale_m = 0.0;
+  const double sure = scene.error_m(config, 1.0F);
+  const double unsure = scene.error_m(config, 0.5F);
+  const double guessed = scene.error_m(config, 0.0F);
+  EXPECT_LT(1.2 * sure, unsure);
+  EXPECT_LT(1.2 * unsure, guessed);
 }
 
 }  // namespace

@@ -1,0 +1,84 @@
+#include "core/odometry/scan_features.hpp"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace stillmap {
+namespace {
+
+/// A scan of points one metre apart, on `cars` cars of ten points each, the rest on buildings.
+struct LabelledPoints {
+  explicit LabelledPoints(std::size_t count, std::size_t cars) {
+    for (std::size_t i = 0; i < count; ++i) {
+      const bool is_car = i < 10 * cars;
+      scan.points_lidar.emplace_back(static_cast<float>(i), 0.0F, 0.0F);
+      labels.classes.push_back(is_car ? SemanticClass::car : SemanticClass::building);
+      labels.confidence.push_back(0.25F);
+      parts.features.surfaces.push_back(static_cast<std::uint32_t>(i));
+      parts.features.planes.push_back(static_cast<std::uint32_t>(i));
+      parts.objects.of_point.push_back(is_car ? static_cast<std::int32_t>(i / 10)
+                                              : ObjectClusters::none);
+    }
+    parts.objects.count = cars;
+    parts.objects.height_m.assign(cars, 1.5F);
+    parts.motion_classes.assign(cars, MotionClass::undecided);
+  }
+
+  Scan scan{};
+  SweepTimes sweep{};
+  PointLabels labels{};
+  ScanInParts parts{.scan = scan, .sweep = sweep, .labels = labels};
+};
+
+TEST(RegisteredFeatures, HaveTheirLabelsConfidence) {
+  LabelledPoints points(200, 0);
+  points.labels.confidence[1] = 3.0F;
+  points.labels.confidence[2] = -1.0F;
+  points.labels.confidence[3] = std::numeric_limits<float>::quiet_NaN();
+  const FeatureSets sets = registered_features(points.parts, OdometryConfig{});
+  ASSERT_EQ(sets.surfaces.size(), 200U);
+  EXPECT_EQ(sets.surfaces[0].confidence, 0.25F);
+  EXPECT_EQ(sets.surfaces[1].confidence, 1.0F);
+  EXPECT_EQ(sets.surfaces[2].confidence, 0.0F);
+  EXPECT_EQ(sets.surfaces[3].confidence, 0.0F);
+}
+
+TEST(RegisteredFeatures, AreSureWhereNothingSaysOtherwiseAndInThePapersMethod) {
+  LabelledPoints points(200, 0);
+  OdometryConfig paper;
+  paper.paper_exact = true;
+  EXPECT_EQ(registered_features(points.parts, paper).surfaces[0].confidence, 1.0F);
+  points.labels.confidence.clear();
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces[0].confidence, 1.0F);
+}
+
+TEST(RegisteredFeatures, LeaveOutWhatCouldMoveUnlessLittleIsLeft) {
+  LabelledPoints enough(200, 5);
+  enough.parts.motion_classes[2] = MotionClass::parked;
+  EXPECT_EQ(registered_features(enough.parts, OdometryConfig{}).surfaces.size(), 150U);
+  LabelledPoints few(120, 5);
+  few.parts.motion_classes[2] = MotionClass::parked;
+  EXPECT_EQ(registered_features(few.parts, OdometryConfig{}).surfaces.size(), 80U)
+      << "the parked car helps out";
+  OdometryConfig none;
+  none.weighting = Weighting::none;
+  EXPECT_EQ(registered_features(enough.parts, none).surfaces.size(), 200U);
+}
+
+TEST(RegisteredFeatures, TakeObjectsThatAreTallerThanAnyVehicle) {
+  LabelledPoints points(200, 5);
+  points.parts.objects.height_m[0] = 12.0F;
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 160U);
+}
+
+TEST(MapFeatures, LeaveOutWhatMoves) {
+  LabelledPoints points(200, 0);
+  std::vector<Motion> motion(200, Motion::stationary);
+  motion[7] = Motion::highly_dynamic;
+  motion[8] = Motion::semi_static;
+  EXPECT_EQ(map_features(points.parts, motion, OdometryConfig{}).planes.size(), 199U);
+}
+
+}  // namespace
+}  // namespace stillmap
