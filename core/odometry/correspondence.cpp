@@ -16,66 +16,109 @@ constexpr double plane_thickness_m = 0.2;
 /// Neighbours nearly on one line do not say how their plane is turned about it.
 constexpr double min_plane_width_share = 0.05;
 
-struct Pca {
+/// Mean and covariance of the neighbours.
+struct Moments {
   Eigen::Vector3d centre;
-  /// Ascending.
-  Eigen::Vector3d eigenvalues;
-  Eigen::Matrix3d eigenvectors;
+  Eigen::Matrix3d covariance;
 };
 
-Pca pca(const Neighbours& neighbours) {
+Moments moments_of(const Neighbours& neighbours) {
   const auto count = static_cast<std::size_t>(neighbours.count);
-  Pca result;
-  result.centre.setZero();
+  Moments moments{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
   for (std::size_t k = 0; k < count; ++k)
-    result.centre += neighbours.points[k].position_map.cast<double>();
-  result.centre /= static_cast<double>(count);
-  Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
+    moments.centre += neighbours.points[k].position_map.cast<double>();
+  moments.centre /= static_cast<double>(count);
   for (std::size_t k = 0; k < count; ++k) {
-    const Eigen::Vector3d d = neighbours.points[k].position_map.cast<double>() - result.centre;
-    covariance += d * d.transpose();
+    const Eigen::Vector3d d = neighbours.points[k].position_map.cast<double>() - moments.centre;
+    moments.covariance += d * d.transpose();
   }
-  covariance /= static_cast<double>(count);
+  moments.covariance /= static_cast<double>(count);
+  return moments;
+}
+
+/// Smallest eigenvalue of a positive semidefinite matrix of trace 1, by Newton's method from 0: the
+/// characteristic polynomial rises and is concave up to there, so that no step goes too far.
+/// `minors` and `determinant` are its other two coefficients.
+double smallest_eigenvalue(double minors, double determinant) {
+  constexpr int max_steps = 20;
+  constexpr double precision = 1e-14;
+  double value = 0.0;
+  for (int k = 0; k < max_steps; ++k) {
+    const double polynomial = ((value - 1.0) * value + minors) * value - determinant;
+    const double slope = (3.0 * value - 2.0) * value + minors;
+    if (!(slope > 0.0)) break;
+    const double step = -polynomial / slope;
+    if (!(step > precision)) break;
+    value += step;
+  }
+  return value;
+}
+
+/// Null vector of a symmetric matrix of rank 2: the longest product of two of its rows, as long as
+/// that is.
+Eigen::Vector3d null_vector(const Eigen::Matrix3d& m) {
+  const Eigen::Vector3d candidates[] = {m.col(0).cross(m.col(1)), m.col(0).cross(m.col(2)),
+                                        m.col(1).cross(m.col(2))};
+  return *std::ranges::max_element(candidates, {}, &Eigen::Vector3d::squaredNorm);
+}
+
+/// The normal of what is flat and spread in two directions, by its covariance; no trigonometry, as
+/// a general solver has it.
+std::optional<Eigen::Vector3d> normal_of(const Eigen::Matrix3d& covariance) {
+  constexpr double least_length = 1e-9;
+  const double trace = covariance.trace();
+  if (!(trace > 0.0)) return std::nullopt;
+  const Eigen::Matrix3d m = covariance / trace;
+  const double minors = m(0, 0) * m(1, 1) - m(0, 1) * m(0, 1) + m(0, 0) * m(2, 2) -
+                        m(0, 2) * m(0, 2) + m(1, 1) * m(2, 2) - m(1, 2) * m(1, 2);
+  const double smallest = smallest_eigenvalue(minors, m.determinant());
+  // The others from their sum and product.
+  const double sum = 1.0 - smallest;
+  const double product = minors - smallest * sum;
+  const double largest = 0.5 * (sum + std::sqrt(std::max(0.0, sum * sum - 4.0 * product)));
+  if (!(sum - largest > min_plane_width_share * largest)) return std::nullopt;
+  const Eigen::Vector3d normal = null_vector(m - smallest * Eigen::Matrix3d::Identity());
+  const double length = normal.norm();
+  if (!(length > least_length)) return std::nullopt;
+  return normal / length;
+}
+
+std::optional<FittedSurface> line_of(const Moments& moments) {
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
-  solver.computeDirect(covariance);
-  result.eigenvalues = solver.eigenvalues();
-  result.eigenvectors = solver.eigenvectors();
-  return result;
-}
-
-std::optional<FittedSurface> line_of(const Pca& fit) {
+  solver.computeDirect(moments.covariance);
   // Written so that points all at one place are no line either.
-  if (!(fit.eigenvalues[2] > line_dominance * fit.eigenvalues[1])) return std::nullopt;
-  return FittedSurface{fit.centre, {fit.eigenvectors.col(0), fit.eigenvectors.col(1)}, 2};
+  if (!(solver.eigenvalues()[2] > line_dominance * solver.eigenvalues()[1])) return std::nullopt;
+  return FittedSurface{
+      moments.centre, {solver.eigenvectors().col(0), solver.eigenvectors().col(1)}, 2};
 }
 
-std::optional<FittedSurface> plane_of(const Pca& fit, const Neighbours& neighbours) {
-  if (!(fit.eigenvalues[1] > min_plane_width_share * fit.eigenvalues[2])) return std::nullopt;
-  const Eigen::Vector3d n = fit.eigenvectors.col(0);
+std::optional<FittedSurface> plane_of(const Moments& moments, const Neighbours& neighbours) {
+  const std::optional<Eigen::Vector3d> normal = normal_of(moments.covariance);
+  if (!normal) return std::nullopt;
   for (std::size_t k = 0; k < static_cast<std::size_t>(neighbours.count); ++k) {
-    const Eigen::Vector3d d = neighbours.points[k].position_map.cast<double>() - fit.centre;
-    if (std::abs(n.dot(d)) > plane_thickness_m) return std::nullopt;
+    const Eigen::Vector3d d = neighbours.points[k].position_map.cast<double>() - moments.centre;
+    if (std::abs(normal->dot(d)) > plane_thickness_m) return std::nullopt;
   }
-  return FittedSurface{fit.centre, {n, Eigen::Vector3d::Zero()}, 1};
+  return FittedSurface{moments.centre, {*normal, Eigen::Vector3d::Zero()}, 1};
 }
 
 }  // namespace
 
 std::optional<FittedSurface> fit_line(const Neighbours& neighbours) {
   if (neighbours.count < min_neighbours) return std::nullopt;
-  return line_of(pca(neighbours));
+  return line_of(moments_of(neighbours));
 }
 
 std::optional<FittedSurface> fit_plane(const Neighbours& neighbours) {
   if (neighbours.count < min_neighbours) return std::nullopt;
-  return plane_of(pca(neighbours), neighbours);
+  return plane_of(moments_of(neighbours), neighbours);
 }
 
 std::optional<FittedSurface> fit_surface(const Neighbours& neighbours) {
   if (neighbours.count < min_neighbours) return std::nullopt;
-  const Pca fit = pca(neighbours);
-  if (auto plane = plane_of(fit, neighbours)) return plane;
-  return line_of(fit);
+  const Moments moments = moments_of(neighbours);
+  if (auto plane = plane_of(moments, neighbours)) return plane;
+  return line_of(moments);
 }
 
 double semantic_inconsistency(const Neighbours& neighbours, SemanticClass label) {

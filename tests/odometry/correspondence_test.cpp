@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <vector>
@@ -132,6 +133,39 @@ TEST(FitPlane, NoisyPointsGiveThePlaneNearly) {
     EXPECT_LE(off_surface(*plane, truth.across), 0.15);
     EXPECT_LE(off_surface(*plane, plane->centre_map - truth.centre), 0.03);
   }
+}
+
+TEST(FitPlane, HasTheNormalThatAGeneralSolverFinds) {
+  std::mt19937 random(9);
+  int planes = 0;
+  for (int k = 0; k < 2000; ++k) {
+    // From nearly flat to a ball, and from wide to a line.
+    const Eigen::Isometry3d T = random_pose(random, 30.0);
+    const Eigen::Vector3d size(0.4, 0.4 * std::pow(0.5, k % 7), 0.15 * std::pow(0.5, k % 5));
+    std::vector<Eigen::Vector3d> points;
+    for (int i = 0; i < 5 + k % 4; ++i)
+      points.push_back(T * random_vector(random, 1.0).cwiseProduct(size));
+    const Neighbours neighbours = neighbours_at(points);
+    Eigen::Matrix3Xd at(3, neighbours.count);
+    for (int i = 0; i < neighbours.count; ++i)
+      at.col(i) = neighbours.points[static_cast<std::size_t>(i)].position_map.cast<double>();
+    const Eigen::Matrix3Xd off = at.colwise() - at.rowwise().mean();
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(off * off.transpose());
+    const Eigen::Vector3d values = solver.eigenvalues();
+    const Eigen::Vector3d normal = solver.eigenvectors().col(0);
+    const bool is_wide = values[1] > 0.05 * values[2];
+    const bool is_thin = (normal.transpose() * off).cwiseAbs().maxCoeff() <= 0.2;
+    const auto plane = fit_plane(neighbours);
+    ASSERT_EQ(plane.has_value(), is_wide && is_thin) << "case " << k;
+    if (!plane) continue;
+    ++planes;
+    EXPECT_EQ(plane->normal_count, 1U);
+    EXPECT_NEAR(plane->normals[0].norm(), 1.0, 1e-12);
+    // Where the two smallest eigenvalues are alike, the normal is anybody's guess.
+    const double gap = (values[1] - values[0]) / values[2];
+    EXPECT_LE(plane->normals[0].cross(normal).norm(), 1e-12 / (gap * gap)) << "case " << k;
+  }
+  EXPECT_GT(planes, 500);
 }
 
 TEST(FitPlane, RejectsWhatIsNoPlane) {
