@@ -41,7 +41,7 @@ void ClassEvidence::add(SemanticClass added, float weight) {
   const int parts = static_cast<int>(std::min(weight, 1.0F) * parts_per_weight + 0.5F);
   const int steps = std::max(1, parts * vote_steps);
   bits_.weights[vote] = static_cast<std::uint16_t>(bits_.weights[vote] + steps);
-  scale_down();
+  if (total() > max_steps) scale_down();
 }
 
 void ClassEvidence::scale_down() {

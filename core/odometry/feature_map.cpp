@@ -180,19 +180,27 @@ void FeatureMap::insert(std::span<const LabelledPoint> points) {
   // So many blocks are on their way at once.
   constexpr std::size_t ahead = 32;
   std::array<std::uint32_t, ahead> blocks;
+  // Points that were measured one after the other mostly share a brick.
+  std::optional<std::uint64_t> brick_key;
+  std::uint32_t brick = BrickIndex::none;
   for (std::size_t begin = 0; begin < points.size(); begin += ahead) {
     const auto some = points.subspan(begin, std::min(ahead, points.size() - begin));
     for (std::size_t i = 0; i < some.size(); ++i) {
-      blocks[i] = block_at(voxel_of(some[i].position_map));
+      const Eigen::Vector3i voxel = voxel_of(some[i].position_map);
+      const auto place = BrickIndex::place(voxel.x(), voxel.y(), voxel.z());
+      if (brick_key != place.brick_key) {
+        brick_key = place.brick_key;
+        brick = index_.brick_at(place.brick_key);
+      }
+      blocks[i] = block_at(place, brick);
       blocks_[blocks[i]].prefetch_first(5);
     }
     for (std::size_t i = 0; i < some.size(); ++i) insert(some[i], blocks[i]);
   }
 }
 
-std::uint32_t FeatureMap::block_at(const Eigen::Vector3i& voxel) {
-  const auto place = BrickIndex::place(voxel.x(), voxel.y(), voxel.z());
-  std::uint32_t& number = index_.number(index_.brick_at(place.brick_key), place.cell);
+std::uint32_t FeatureMap::block_at(BrickIndex::Part place, std::uint32_t brick) {
+  std::uint32_t& number = index_.number(brick, place.cell);
   if (number != BrickIndex::none) return number;
   if (free_blocks_.empty()) {
     free_blocks_.push_back(static_cast<std::uint32_t>(blocks_.size()));

@@ -95,8 +95,8 @@ class FeatureMap {
 
   [[nodiscard]] Eigen::Vector3i voxel_of(const Eigen::Vector3f& position_map) const;
   void insert(const LabelledPoint& point, std::uint32_t block);
-  /// Position in `blocks_` of the voxel's block, made where there is none.
-  [[nodiscard]] std::uint32_t block_at(const Eigen::Vector3i& voxel);
+  /// Position in `blocks_` of the block of a voxel of this brick, made where there is none.
+  [[nodiscard]] std::uint32_t block_at(BrickIndex::Part place, std::uint32_t brick);
   [[nodiscard]] Neighbours neighbours_of(const Nearest& nearest) const;
   /// Strikes those without movable points off `movable_blocks_`.
   void keep_movable_blocks() {

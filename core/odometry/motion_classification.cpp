@@ -22,10 +22,7 @@ constexpr int min_samples = 5;
 constexpr double parked_share = 0.6;
 
 std::vector<std::uint32_t> sample_objects(const Scan& scan, const ObjectClusters& objects) {
-  std::vector<std::uint32_t> movable;
-  for (std::uint32_t i = 0; i < scan.size(); ++i)
-    if (objects.of_point[i] != ObjectClusters::none) movable.push_back(i);
-  return voxel_downsample(scan.points_lidar, movable, sample_spacing_m);
+  return voxel_downsample(scan.points_lidar, objects.movable_points, sample_spacing_m);
 }
 
 struct SampleObservation {
@@ -169,8 +166,7 @@ std::vector<Motion> classify_point_motion(const Scan& scan, const PointLabels& l
   } else {
     moves = inconsistent_objects(scan, labels, objects, T_map_lidar, map, config);
   }
-  for (std::size_t i = 0; i < scan.size(); ++i) {
-    if (objects.of_point[i] == ObjectClusters::none) continue;
+  for (const std::uint32_t i : objects.movable_points) {
     const auto object = static_cast<std::size_t>(objects.of_point[i]);
     motion[i] = moves[object] ? Motion::highly_dynamic : Motion::semi_static;
   }

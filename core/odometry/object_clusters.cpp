@@ -120,13 +120,14 @@ ObjectClusters cluster_objects(std::span<const Eigen::Vector3f> points_lidar,
     own.low_m = std::min(own.low_m, z_m);
     own.high_m = std::max(own.high_m, z_m);
     objects.of_point[i] = last_cube;
+    objects.movable_points.push_back(static_cast<std::uint32_t>(i));
   }
   Sets sets(cubes.size());
   join_neighbours(cubes, table, sets);
   const std::vector<std::int32_t> object_of_cube = number_objects(cubes, sets, objects);
-  for (std::int32_t& of_point : objects.of_point) {
-    if (of_point != ObjectClusters::none)
-      of_point = object_of_cube[static_cast<std::size_t>(of_point)];
+  for (const std::uint32_t i : objects.movable_points) {
+    std::int32_t& of_point = objects.of_point[i];
+    of_point = object_of_cube[static_cast<std::size_t>(of_point)];
   }
   return objects;
 }

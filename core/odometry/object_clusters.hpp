@@ -15,6 +15,8 @@ struct ObjectClusters {
   /// For every point of the scan its object, `none` for points that are not movable.
   std::vector<std::int32_t> of_point;
   std::size_t count = 0;
+  /// Those that have one, in the order of the scan.
+  std::vector<std::uint32_t> movable_points{};
   /// From the lowest to the highest point of every object [m].
   std::vector<float> height_m{};
 };
