@@ -91,8 +91,8 @@ drives: programs ## Every drive, simulated and in RECORDINGS=FOLDER, into tests/
 	@/usr/bin/python3 tests/drives/drives.py --program $(BUILD)/bin/stillmap --results $(BUILD)/drives \
 	  $(if $(RECORDINGS),--recordings $(RECORDINGS)) $(DRIVES)
 
-ros-messages: ## Write config/ros/stillmap_msgs and the type hashes from idl/msg
-	/usr/bin/python3 config/ros/write_package.py idl/msg idl/dds/type_hash_table.inc
+ros-messages: ## Write config/ros/stillmap_msgs, type hashes and message definitions from idl/msg
+	/usr/bin/python3 config/ros/write_package.py idl/msg idl/dds/type_hash_table.inc idl/dds/message_definition_table.inc
 
 parity: build ## Our engines against PyTorch, every RangeNet++ network and size
 	PYTHONPATH=core/segmentation/training STILLMAP_TRAINING=core/segmentation/training \

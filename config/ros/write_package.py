@@ -1,25 +1,22 @@
 #!/usr/bin/env python3
-"""Writes stillmap_msgs/msg and stillmap_msgs/srv, which lie beside it, and the table of type hashes,
-from our IDL.
+"""Writes stillmap_msgs/msg and stillmap_msgs/srv, which lie beside it, and the tables of type hashes
+and of message definitions, from our IDL.
 
-    config/ros/write_package.py idl/msg idl/dds/type_hash_table.inc
+    config/ros/write_package.py idl/msg idl/dds/type_hash_table.inc idl/dds/message_definition_table.inc
 """
 
 import sys
 from pathlib import Path
 
 from interfaces import Structure, read_idl
+from message_definitions import definition_lines, definition_table
 from type_hashes import hash_table
 
 PACKAGE = "stillmap_msgs"
 
 
 def lines_of(structure: Structure) -> list[str]:
-    lines = [f"# {line}" for line in structure.comment]
-    lines += [f"{constant.type} {constant.name}={constant.value}"
-              for constant in structure.constants]
-    lines += [f"{field.type.removeprefix(f'{PACKAGE}/')} {field.name}" for field in structure.fields]
-    return lines
+    return [line.removeprefix(f"{PACKAGE}/") for line in definition_lines(structure)]
 
 
 def rosidl_type(ros_type: str) -> str:
@@ -66,7 +63,8 @@ def main():
         file.parent.mkdir(exist_ok=True)
         file.write_text("\n".join(lines) + "\n")
     Path(sys.argv[2]).write_text(hash_table(structures))
-    print(f"{len(texts)} files in {folder}, and {sys.argv[2]}")
+    Path(sys.argv[3]).write_text(definition_table(structures))
+    print(f"{len(texts)} files in {folder}, {sys.argv[2]} and {sys.argv[3]}")
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from interfaces import (Constant, Field, Structure, read_definitions, read_idl, read_message, read_package,
                         read_service)
+from message_definitions import definition_table
 from type_hashes import as_ros, hash_table, type_hashes
 
 try:
@@ -249,7 +250,8 @@ class TypeHashTest(ComparisonTest):
         standard = {made.full_name for made in as_ros(self.idl)
                     if made.package != PACKAGE.name}
         self.assertEqual(standard - set(HASHES_OF_ROS), {
-            "rmw_dds_common/msg/Gid", "rmw_dds_common/msg/NodeEntitiesInfo"})
+            "geometry_msgs/msg/PoseWithCovarianceStamped", "rmw_dds_common/msg/Gid",
+            "rmw_dds_common/msg/NodeEntitiesInfo"})
 
     def test_strings_and_bounds_count(self):
         def hash_of(text: str) -> str:
@@ -271,6 +273,27 @@ class TypeHashTest(ComparisonTest):
     def test_the_table_is_written(self):
         table = (SOURCE / "idl/dds/type_hash_table.inc").read_text()
         self.assertEqual(table, hash_table(self.idl), "run 'make ros-messages'")
+
+
+class MessageDefinitionTest(ComparisonTest):
+    """The definitions that MCAP files and Foxglove carry."""
+
+    def test_the_table_is_written(self):
+        idl = read_idl(sorted((SOURCE / "idl/msg").glob("*.idl")))
+        table = (SOURCE / "idl/dds/message_definition_table.inc").read_text()
+        self.assertEqual(table, definition_table(idl), "run 'make ros-messages'")
+
+    def test_they_say_what_our_idl_says(self):
+        table = (SOURCE / "idl/dds/message_definition_table.inc").read_text()
+        found = re.findall(r'\{"(\w+)/(\w+)/(\w+)", R"msg\((.*?)\)msg"\}', table, re.DOTALL)
+        theirs = [read_message(package, kind, name, text) for package, kind, name, text in found]
+        ours = as_ros(read_idl(sorted((SOURCE / "idl/msg").glob("*.idl"))))
+        # A .msg cannot say which fields are keys.
+        for made in ours:
+            for field in made.fields:
+                field.is_key = False
+        self.assert_same(ours, theirs)
+        self.assert_same(theirs, ours)
 
 
 class DifferencesTest(unittest.TestCase):
