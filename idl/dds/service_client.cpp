@@ -38,14 +38,32 @@ bool UntypedServiceClient::wait_for_server(std::chrono::milliseconds timeout) co
 
 bool UntypedServiceClient::call(const void* request, void* reply,
                                 std::chrono::milliseconds timeout) {
+  return exchange(to_bytes(request_type_, request, 0), timeout, {},
+                  [&](SerializedSample& answer) { return from_bytes(reply_type_, answer, reply); });
+}
+
+std::optional<SerializedSample> UntypedServiceClient::call(const SerializedSample& request,
+                                                           std::chrono::milliseconds timeout,
+                                                           const std::stop_token& stop) {
+  SerializedSample reply;
+  const bool answered = exchange(request, timeout, stop, [&](SerializedSample& answer) {
+    reply.swap(answer);
+    return true;
+  });
+  return answered ? std::optional(std::move(reply)) : std::nullopt;
+}
+
+bool UntypedServiceClient::exchange(const SerializedSample& request,
+                                    std::chrono::milliseconds timeout, const std::stop_token& stop,
+                                    const Accept& accept) {
   const auto now = Clock::now();
   if (!wait_for_server(timeout)) return false;
-  const SerializedSample bytes = to_bytes(request_type_, request, 0);
   sent_.clear();
   const RequestId id{.client = replies_.guid(), .number = ++call_number_};
   for (const auto deadline : {now + timeout / 2, now + timeout}) {
-    send(bytes, id);
-    if (receive(reply, deadline)) return true;
+    send(request, id);
+    if (receive(accept, stop, deadline)) return true;
+    if (stop.stop_requested()) return false;
   }
   return false;
 }
@@ -56,11 +74,12 @@ void UntypedServiceClient::send(const SerializedSample& request, const RequestId
   if (requests_.write(request, params)) sent_.push_back(params.sample_identity());
 }
 
-bool UntypedServiceClient::receive(void* reply, Clock::time_point deadline) {
+bool UntypedServiceClient::receive(const Accept& accept, const std::stop_token& stop,
+                                   Clock::time_point deadline) {
   SerializedSample bytes;
   eprosima::fastdds::dds::SampleInfo info;
-  while (replies_.take(bytes, info, {}, left_until(deadline))) {
-    if (is_ours(info.related_sample_identity) && from_bytes(reply_type_, bytes, reply)) return true;
+  while (replies_.take(bytes, info, stop, left_until(deadline))) {
+    if (is_ours(info.related_sample_identity) && accept(bytes)) return true;
   }
   return false;
 }

@@ -1,7 +1,9 @@
 #pragma once
 
+#include <functional>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -27,11 +29,22 @@ class UntypedServiceClient {
   /// Fills in `reply`; false after `timeout`. The objects must be of the service's types.
   [[nodiscard]] bool call(const void* request, void* reply, std::chrono::milliseconds timeout);
 
+  /// The same with bytes, neither of which is looked into. Nothing after `timeout` or, once the
+  /// request was sent, when a stop was requested.
+  [[nodiscard]] std::optional<SerializedSample> call(const SerializedSample& request,
+                                                     std::chrono::milliseconds timeout,
+                                                     const std::stop_token& stop);
+
  private:
   using Clock = std::chrono::steady_clock;
+  /// False for bytes that are no answer.
+  using Accept = std::function<bool(SerializedSample&)>;
 
+  [[nodiscard]] bool exchange(const SerializedSample& request, std::chrono::milliseconds timeout,
+                              const std::stop_token& stop, const Accept& accept);
   void send(const SerializedSample& request, const RequestId& id);
-  [[nodiscard]] bool receive(void* reply, Clock::time_point deadline);
+  [[nodiscard]] bool receive(const Accept& accept, const std::stop_token& stop,
+                             Clock::time_point deadline);
   [[nodiscard]] bool is_ours(const eprosima::fastrtps::rtps::SampleIdentity& answered) const;
 
   TypeSupport request_type_;
