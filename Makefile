@@ -14,7 +14,7 @@ FILES ?=
 TILES ?=
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages configure programs build deb demo test test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 drives ros-messages parity format format-check clean
+.PHONY: help packages web-packages configure programs web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 drives ros-messages parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -45,11 +45,27 @@ deb: programs ## Debian packages in build/release/packages
 	rm -rf $(BUILD)/packages/_CPack_Packages
 	@ls -lh $(BUILD)/packages
 
+web: ## Bundle the page that stillmap-gateway serves, into build/release/share/stillmap/web
+	@{ command -v node && command -v npm; } > /dev/null || $(MAKE) web-packages WEB_PACKAGES="nodejs npm"
+	cd clients/web && { [ node_modules/.package-lock.json -nt package-lock.json ] || npm ci; } && \
+	  node build.mjs $(CURDIR)/$(BUILD)/share/stillmap/web
+
+viewer: programs web ## A simulated drive in the browser: server, replay and gateway; the page at http://127.0.0.1:8765/
+	@mkdir -p demo && BUILD=$(BUILD) clients/viewer.sh
+
+web-packages:
+	sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; $$sudo apt-get update -q && \
+	  DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -yq --no-install-recommends $(WEB_PACKAGES)
+
 demo: programs ## Run the main job: simulated city, replay over DDS, server, planning client
 	BUILD=$(BUILD) clients/demo.sh
 
 test: build ## Build and run the tests
 	ctest --preset $(PRESET) -j $(JOBS)
+
+test-web: programs web ## The gateway with Foxglove's own client, and the page in headless Chromium
+	@command -v chromium > /dev/null || $(MAKE) web-packages WEB_PACKAGES=chromium
+	BUILD=$(CURDIR)/$(BUILD) node --test --test-concurrency=1 tests/gateway/web/
 
 test-dev: ## The tests under ASan and UBSan with assertions, warnings as errors
 	$(MAKE) test PRESET=dev

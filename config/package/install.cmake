@@ -1,7 +1,9 @@
 # `cmake --install`: what a user needs, under the prefix. Programs find it from where they lie
 # themselves. Components become Debian packages (deb.cmake).
 install(TARGETS stillmap-server RUNTIME DESTINATION bin COMPONENT server)
-install(TARGETS stillmap RUNTIME DESTINATION bin COMPONENT tools)
+install(TARGETS stillmap stillmap-gateway RUNTIME DESTINATION bin COMPONENT tools)
+# The page, where it was bundled (make web).
+install(DIRECTORY ${PROJECT_BINARY_DIR}/share/stillmap/web DESTINATION share/stillmap COMPONENT tools OPTIONAL)
 
 foreach(folder models robots sensors server dds ros)
   if(IS_DIRECTORY ${PROJECT_SOURCE_DIR}/config/${folder})
@@ -13,7 +15,7 @@ install(DIRECTORY ${PROJECT_SOURCE_DIR}/idl/msg/ DESTINATION share/stillmap/idl 
   FILES_MATCHING PATTERN "*.idl")
 
 # The pages link to each other by their folders.
-foreach(page . core core/segmentation idl server clients config config/dds docker tests)
+foreach(page . core core/segmentation idl server clients clients/gateway config config/dds docker tests)
   install(FILES ${PROJECT_SOURCE_DIR}/${page}/README.md DESTINATION share/doc/stillmap/${page}
     COMPONENT tools)
 endforeach()

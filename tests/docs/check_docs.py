@@ -25,7 +25,7 @@ import sys
 
 README_BYTES = 15 * 1024
 README_LINES = 250
-PROGRAMS = ("stillmap", "stillmap-server")
+PROGRAMS = ("stillmap", "stillmap-server", "stillmap-gateway")
 YAML_KINDS = {
     "server": "config/server/default.yaml",
     "dds": "config/dds/lan.yaml",
