@@ -32,11 +32,12 @@ BagMetadata metadata_of(const fs::path& file, const YAML::Node& document) {
   const YAML::Node bag = document["rosbag2_bagfile_information"];
   if (!bag.IsMap()) throw DatasetError(file, "has no rosbag2_bagfile_information: is it a bag's?");
   const auto storage = bag["storage_identifier"].as<std::string>("");
-  if (storage != "sqlite3") {
+  if (storage != "sqlite3" && storage != "mcap") {
     throw DatasetError(file, "storage_identifier is '" + storage +
-                                 "'; only sqlite3 is read: " + conversion_hint());
+                                 "'; sqlite3 and mcap are read: " + conversion_hint());
   }
   BagMetadata metadata;
+  metadata.storage = storage;
   metadata.compression = compression_of(file, bag);
   for (const YAML::Node& path : bag["relative_file_paths"]) {
     // Early versions put the bag's folder before the name.
@@ -45,7 +46,7 @@ BagMetadata metadata_of(const fs::path& file, const YAML::Node& document) {
   if (metadata.files.empty()) {
     throw DatasetError(file,
                        "relative_file_paths names no file; 'ros2 bag reindex' finds them, or "
-                       "give the .db3 file itself");
+                       "give the .db3 or .mcap file itself");
   }
   return metadata;
 }
@@ -72,7 +73,7 @@ std::string to_yaml(const BagMetadata& metadata) {
   yaml << YAML::BeginMap << YAML::Key << "rosbag2_bagfile_information" << YAML::Value
        << YAML::BeginMap;
   yaml << YAML::Key << "version" << YAML::Value << written_version;
-  yaml << YAML::Key << "storage_identifier" << YAML::Value << "sqlite3";
+  yaml << YAML::Key << "storage_identifier" << YAML::Value << metadata.storage;
   write_number(yaml, "duration", "nanoseconds", metadata.duration_ns);
   write_number(yaml, "starting_time", "nanoseconds_since_epoch", metadata.start_ns);
   yaml << YAML::Key << "message_count" << YAML::Value << messages;
@@ -104,8 +105,8 @@ BagMetadata read_bag_metadata(const fs::path& file) {
   try {
     return metadata_of(file, YAML::LoadFile(file.string()));
   } catch (const YAML::Exception& fault) {
-    throw DatasetError(
-        file, std::string("cannot be read: ") + fault.what() + "; give the .db3 file itself");
+    throw DatasetError(file, std::string("cannot be read: ") + fault.what() +
+                                 "; give the .db3 or .mcap file itself");
   }
 }
 

@@ -17,12 +17,17 @@ struct BagTopic {
   /// YAML, as rosbag2 stores it.
   std::string offered_qos_profiles;
   std::uint64_t messages = 0;
+  /// In .msg text with the types that it is made of, as MCAP stores it ("ros2msg"); empty where it
+  /// is not known.
+  std::string definition{};
 };
 
 enum class BagCompression { none, of_files, of_messages };
 
 /// The metadata.yaml of a bag (rosbag2, up to version 5 written and up to 9 read).
 struct BagMetadata {
+  /// "sqlite3" or "mcap".
+  std::string storage = "sqlite3";
   /// Names of the files in the bag's folder, in order.
   std::vector<std::string> files;
   BagCompression compression = BagCompression::none;
@@ -35,7 +40,7 @@ struct BagMetadata {
 /// is no metadata of a bag that can be read here, with the way out.
 [[nodiscard]] BagMetadata read_bag_metadata(const std::filesystem::path& file);
 
-/// Writes metadata.yaml as ROS 2 Humble does, for uncompressed SQLite storage; replaces the old one
+/// Writes metadata.yaml as ROS 2 Humble does, without compression of its own; replaces the old one
 /// in one step. Throws DatasetError.
 void write_bag_metadata(const std::filesystem::path& file, const BagMetadata& metadata);
 

@@ -129,12 +129,19 @@ std::vector<ImuSample> BagScanSource::imu() const {
   return samples;
 }
 
-ScanDataset open_sequence(const fs::path& path, const std::string& topic) {
-  if (is_bag(path)) return ScanDataset(std::make_shared<const BagScanSource>(path, topic));
+Recording open_recording(const fs::path& path, const std::string& topic) {
+  if (is_bag(path)) {
+    const auto bag = std::make_shared<const BagScanSource>(path, topic);
+    return {ScanDataset(bag), bag->faults()};
+  }
   if (!topic.empty()) {
     throw DatasetError(path, "is no bag, and only bags have topics: leave --topic-in out");
   }
-  return ScanDataset(path);
+  return {ScanDataset(path), {}};
+}
+
+ScanDataset open_sequence(const fs::path& path, const std::string& topic) {
+  return open_recording(path, topic).dataset;
 }
 
 }  // namespace stillmap::dds

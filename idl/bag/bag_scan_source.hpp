@@ -28,6 +28,8 @@ class BagScanSource final : public ScanSource {
   /// Of the bag's only topic of sensor_msgs/msg/Imu; nothing where there are several. Messages that
   /// are damaged are left out.
   [[nodiscard]] std::vector<ImuSample> imu() const override;
+  /// What of the bag's files cannot be read at all, in words; empty for a sound bag.
+  [[nodiscard]] std::vector<std::string> faults() const { return bag_.faults(); }
 
  private:
   [[nodiscard]] DecodedScan read_message(std::size_t i) const;
@@ -40,8 +42,17 @@ class BagScanSource final : public ScanSource {
   std::optional<SensorModel> sensor_;
 };
 
+/// A recording, and what of it cannot be read at all, in words.
+struct Recording {
+  ScanDataset dataset;
+  std::vector<std::string> faults;
+};
+
 /// A recording of whatever kind: a bag, or what ScanDataset reads. `topic` is for bags alone.
 /// Throws DatasetError.
+[[nodiscard]] Recording open_recording(const std::filesystem::path& path,
+                                       const std::string& topic = {});
+/// The same without its faults.
 [[nodiscard]] ScanDataset open_sequence(const std::filesystem::path& path,
                                         const std::string& topic = {});
 

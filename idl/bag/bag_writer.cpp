@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "core/dataset/dataset_error.hpp"
+#include "idl/bag/mcap_writer.hpp"
 
 namespace stillmap::dds {
 namespace {
@@ -51,28 +52,52 @@ std::string bag_name(const fs::path& folder) {
   return fs::absolute(plain).lexically_normal().filename().string();
 }
 
-}  // namespace
-
-struct BagWriter::Storage {
-  explicit Storage(const fs::path& file)
-      : database(file.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE) {
-    // A reader may look in meanwhile, and a commit costs one write.
-    database.exec("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;");
-    database.exec(tables);
+class SqliteStorage final : public BagStorage {
+ public:
+  SqliteStorage(const fs::path& file, const std::vector<BagTopic>& topics) : file_(file) {
+    writing(file_, [&] {
+      database_.emplace(file.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+      // A reader may look in meanwhile, and a commit costs one write.
+      database_->exec("PRAGMA journal_mode=WAL; PRAGMA synchronous=NORMAL;");
+      database_->exec(tables);
+      add_topics(topics);
+      insert_.emplace(*database_,
+                      "INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)");
+    });
   }
 
-  SQLite::Database database;
-  std::optional<SQLite::Statement> insert;
-  std::optional<SQLite::Transaction> transaction;
-};
+  void add(std::size_t topic, std::int64_t received_ns,
+           std::span<const std::uint8_t> message) override {
+    writing(file_, [&] {
+      if (!transaction_) transaction_.emplace(*database_);
+      insert_->bind(1, static_cast<std::int64_t>(topic + 1));
+      insert_->bind(2, received_ns);
+      // SQLite takes no address for NULL, which is no message.
+      const void* begin = message.empty() ? "" : static_cast<const void*>(message.data());
+      insert_->bindNoCopy(3, begin, static_cast<int>(message.size()));
+      insert_->exec();
+      insert_->reset();
+    });
+  }
 
-BagWriter::BagWriter(const fs::path& folder, const std::vector<BagTopic>& topics)
-    : folder_(new_folder(folder)), file_(folder / (bag_name(folder) + "_0.db3")) {
-  metadata_.files = {file_.filename().string()};
-  metadata_.topics = topics;
-  writing(file_, [&] {
-    storage_ = std::make_unique<Storage>(file_);
-    SQLite::Statement insert(storage_->database, "INSERT INTO topics VALUES (?, ?, ?, ?, ?)");
+  void commit() override {
+    if (!transaction_) return;
+    writing(file_, [&] { transaction_->commit(); });
+    transaction_.reset();
+  }
+
+  void finish() override {
+    commit();
+    writing(file_, [&] {
+      insert_.reset();
+      // The log becomes part of the file, which anything may then read, from anywhere.
+      database_->exec("PRAGMA journal_mode=DELETE");
+    });
+  }
+
+ private:
+  void add_topics(const std::vector<BagTopic>& topics) {
+    SQLite::Statement insert(*database_, "INSERT INTO topics VALUES (?, ?, ?, ?, ?)");
     for (std::size_t i = 0; i < topics.size(); ++i) {
       insert.bind(1, static_cast<std::int64_t>(i + 1));
       insert.bind(2, topics[i].name);
@@ -82,9 +107,29 @@ BagWriter::BagWriter(const fs::path& folder, const std::vector<BagTopic>& topics
       insert.exec();
       insert.reset();
     }
-    storage_->insert.emplace(storage_->database,
-                             "INSERT INTO messages (topic_id, timestamp, data) VALUES (?, ?, ?)");
-  });
+  }
+
+  fs::path file_;
+  std::optional<SQLite::Database> database_;
+  std::optional<SQLite::Statement> insert_;
+  std::optional<SQLite::Transaction> transaction_;
+};
+
+}  // namespace
+
+BagWriter::BagWriter(const fs::path& folder, const std::vector<BagTopic>& topics, BagFormat format,
+                     mcap::Compression compression)
+    : folder_(new_folder(folder)) {
+  const bool is_mcap = format == BagFormat::mcap;
+  const fs::path file = folder / (bag_name(folder) + (is_mcap ? "_0.mcap" : "_0.db3"));
+  metadata_.storage = is_mcap ? "mcap" : "sqlite3";
+  metadata_.files = {file.filename().string()};
+  metadata_.topics = topics;
+  if (is_mcap) {
+    storage_ = std::make_unique<McapWriter>(file, topics, compression);
+  } else {
+    storage_ = std::make_unique<SqliteStorage>(file, topics);
+  }
   write_bag_metadata(folder_ / "metadata.yaml", metadata_);
 }
 
@@ -99,17 +144,7 @@ BagWriter::~BagWriter() {
 void BagWriter::add(std::size_t topic, std::int64_t received_ns,
                     std::span<const std::uint8_t> message) {
   assert(storage_ && topic < metadata_.topics.size());
-  writing(file_, [&] {
-    if (!storage_->transaction) storage_->transaction.emplace(storage_->database);
-    SQLite::Statement& insert = *storage_->insert;
-    insert.bind(1, static_cast<std::int64_t>(topic + 1));
-    insert.bind(2, received_ns);
-    // SQLite takes no address for NULL, which is no message.
-    const void* begin = message.empty() ? "" : static_cast<const void*>(message.data());
-    insert.bindNoCopy(3, begin, static_cast<int>(message.size()));
-    insert.exec();
-    insert.reset();
-  });
+  storage_->add(topic, received_ns, message);
   const std::int64_t end_ns = metadata_.start_ns + metadata_.duration_ns;
   if (messages_ == 0) {
     metadata_.start_ns = received_ns;
@@ -123,20 +158,16 @@ void BagWriter::add(std::size_t topic, std::int64_t received_ns,
 }
 
 void BagWriter::commit() {
-  if (!storage_ || !storage_->transaction) return;
-  writing(file_, [&] { storage_->transaction->commit(); });
-  storage_->transaction.reset();
+  if (!storage_ || messages_ == committed_) return;
+  storage_->commit();
+  committed_ = messages_;
   write_bag_metadata(folder_ / "metadata.yaml", metadata_);
 }
 
 void BagWriter::finish() {
   if (!storage_) return;
   commit();
-  writing(file_, [&] {
-    storage_->insert.reset();
-    // The log becomes part of the file, which anything may then read, from anywhere.
-    storage_->database.exec("PRAGMA journal_mode=DELETE");
-  });
+  storage_->finish();
   storage_.reset();
 }
 

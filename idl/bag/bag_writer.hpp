@@ -9,16 +9,25 @@
 #include <vector>
 
 #include "idl/bag/bag_metadata.hpp"
+#include "idl/bag/bag_storage.hpp"
+#include "idl/bag/mcap_chunk.hpp"
 
 namespace stillmap::dds {
 
-/// Writes a rosbag2 as ROS 2 Humble does: a folder with metadata.yaml and one .db3 file. What was
-/// committed survives the end of the process at any moment, in SQLite's write-ahead log, and is
-/// read from there; finish() leaves a plain file. All throw DatasetError. One thread uses it.
+/// The file of a new bag.
+enum class BagFormat { sqlite, mcap };
+
+/// Writes a rosbag2 as ROS 2 does: a folder with metadata.yaml and one .db3 or .mcap file. What was
+/// committed survives the end of the process at any moment and is read from there (SQLite's
+/// write-ahead log, MCAP's chunks); finish() leaves a plain file. All throw DatasetError. One
+/// thread uses it.
 class BagWriter {
  public:
   /// Makes the folder, which must not be there yet, with the topics it will hold.
-  BagWriter(const std::filesystem::path& folder, const std::vector<BagTopic>& topics);
+  /// `compression` is of MCAP.
+  BagWriter(const std::filesystem::path& folder, const std::vector<BagTopic>& topics,
+            BagFormat format = BagFormat::sqlite,
+            mcap::Compression compression = mcap::Compression::none);
   /// Finishes, as well as it goes.
   ~BagWriter();
   BagWriter(const BagWriter&) = delete;
@@ -37,14 +46,12 @@ class BagWriter {
   [[nodiscard]] const std::vector<BagTopic>& topics() const { return metadata_.topics; }
 
  private:
-  struct Storage;
-
   std::filesystem::path folder_;
-  std::filesystem::path file_;
   BagMetadata metadata_;
   std::uint64_t messages_ = 0;
+  std::uint64_t committed_ = 0;
   std::uint64_t bytes_ = 0;
-  std::unique_ptr<Storage> storage_;
+  std::unique_ptr<BagStorage> storage_;
 };
 
 /// What a writer of a topic offers, as Humble's rosbag2 notes it (YAML), so that 'ros2 bag play'

@@ -100,6 +100,50 @@ TEST_F(RecordTest, ARecordedReplayIsTheRecordingAgain) {
   EXPECT_EQ(content("second.txt"), content("first.txt"));
 }
 
+std::vector<std::vector<std::uint8_t>> bytes_of(const dds::Bag& bag, const std::string& topic) {
+  std::vector<std::vector<std::uint8_t>> messages;
+  for (const dds::BagMessage& message : bag.messages(topic)) messages.push_back(bag.bytes(message));
+  return messages;
+}
+
+TEST_F(RecordTest, McapHoldsWhatSqliteHolds) {
+  constexpr int scans = 6;
+  simulate("city", scans, " --imu");
+  BackgroundProcess server(server_command(), folder_ / "server.log");
+  ASSERT_EQ(run("status" + patiently() + on_domain()).exit_code, 0) << content("server.log");
+  BackgroundProcess sqlite(stillmap_program() + " record " + path("sqlite") + on_domain(),
+                           folder_ / "sqlite.log");
+  BackgroundProcess mcap(
+      stillmap_program() + " record " + path("mcap") + " --format mcap" + on_domain(),
+      folder_ / "mcap.log");
+  for (const char* bag : {"sqlite", "mcap"}) {
+    ASSERT_TRUE(comes_to_hold(bag, "/stillmap/status", 1)) << content(std::string(bag) + ".log");
+  }
+  EXPECT_EQ(replay(path("city"), 3, "poses.txt").at("mapped"), scans);
+  for (const char* bag : {"sqlite", "mcap"}) {
+    EXPECT_TRUE(comes_to_hold(bag, "/stillmap/odometry", scans));
+    EXPECT_TRUE(comes_to_hold(bag, "/points", scans));
+  }
+  EXPECT_EQ(sqlite.stop(), 0) << content("sqlite.log");
+  EXPECT_EQ(mcap.stop(), 0) << content("mcap.log");
+  const dds::Bag expected(path("sqlite")), made(path("mcap") + "/mcap_0.mcap");
+  EXPECT_THAT(made.faults(), testing::IsEmpty());
+  for (const char* topic : {"/points", "/imu/data", "/stillmap/odometry"}) {
+    EXPECT_EQ(bytes_of(made, topic), bytes_of(expected, topic)) << topic;
+  }
+  const ProcessResult mapped = run("map " + path("mcap") + " --topic-in points --labels files" +
+                                   " --json --out " + path("out"));
+  EXPECT_EQ(mapped.exit_code, 0) << mapped.err;
+  EXPECT_EQ(line_count("out/poses_lidar.txt"), static_cast<std::size_t>(scans));
+}
+
+TEST_F(RecordTest, CompressionIsOfMcapAlone) {
+  const ProcessResult result = run("record " + path("bag") + " --compression zstd" + on_domain());
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.err, HasSubstr("--format mcap"));
+  EXPECT_FALSE(exists("bag"));
+}
+
 TEST_F(RecordTest, WithNothingToRecordItSaysSo) {
   const ProcessResult result = run("record " + path("bag") + " --for 0.5" + on_domain());
   EXPECT_EQ(result.exit_code, 1);

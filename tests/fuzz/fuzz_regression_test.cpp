@@ -59,13 +59,16 @@ TEST_P(FuzzRegression, KeptInputsAreTaken) {
   if (files == 0) GTEST_SKIP() << "nothing is kept for this target";
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Targets, FuzzRegression,
-    testing::Values(&point_cloud_target, &service_request_target, &continuation_target,
-                    &message_target, &octomap_target, &tile_target, &map_file_target,
-                    &map_rows_target, &cloud_file_target, &pose_file_target, &bag_message_target,
-                    &bag_file_target, &onnx_target, &model_folder_target, &config_file_target),
-    [](const auto& param_info) { return std::string(param_info.param->name); });
+INSTANTIATE_TEST_SUITE_P(Targets, FuzzRegression,
+                         testing::Values(&point_cloud_target, &service_request_target,
+                                         &continuation_target, &message_target, &octomap_target,
+                                         &tile_target, &map_file_target, &map_rows_target,
+                                         &cloud_file_target, &pose_file_target, &bag_message_target,
+                                         &bag_file_target, &mcap_file_target, &onnx_target,
+                                         &model_folder_target, &config_file_target),
+                         [](const auto& param_info) {
+                           return std::string(param_info.param->name);
+                         });
 
 }  // namespace
 }  // namespace stillmap::fuzz

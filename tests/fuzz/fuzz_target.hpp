@@ -38,6 +38,7 @@ extern const Target cloud_file_target;
 extern const Target pose_file_target;
 extern const Target bag_message_target;
 extern const Target bag_file_target;
+extern const Target mcap_file_target;
 extern const Target onnx_target;
 extern const Target model_folder_target;
 extern const Target config_file_target;

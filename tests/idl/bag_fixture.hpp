@@ -57,8 +57,10 @@ inline BagTopic cloud_topic(const std::string& name) {
 }
 
 /// A bag with these messages on /points.
-inline void write_bag(const std::filesystem::path& folder, const std::vector<Bytes>& messages) {
-  BagWriter writer(folder, {cloud_topic("/points")});
+inline void write_bag(const std::filesystem::path& folder, const std::vector<Bytes>& messages,
+                      BagFormat format = BagFormat::sqlite,
+                      mcap::Compression compression = mcap::Compression::none) {
+  BagWriter writer(folder, {cloud_topic("/points")}, format, compression);
   std::int64_t received_ns = 1'700'000'000'050'000'000;
   for (const Bytes& message : messages) writer.add(0, received_ns += 100'000'000, message);
   writer.finish();

@@ -6,10 +6,10 @@
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/live_export.hpp"
+#include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/dataset/sequence_export.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
-#include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -56,7 +56,7 @@ std::string describe(const DatasetExportArguments& arguments, const ExportSummar
 }
 
 ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopSignal& stop) {
-  const ScanDataset dataset = dds::open_sequence(arguments.source, arguments.topic_in);
+  const ScanDataset dataset = open_recording(arguments.source, arguments.topic_in);
   std::error_code ignored;
   if (std::filesystem::equivalent(arguments.source, arguments.out, ignored)) {
     throw std::invalid_argument(arguments.out + " is the source itself; name another folder");

@@ -3,9 +3,9 @@
 #include <numbers>
 
 #include "clients/commands/command.hpp"
+#include "clients/commands/dataset/recording.hpp"
 #include "clients/terminal/table.hpp"
 #include "config/loaders/sensor_file.hpp"
-#include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -17,8 +17,7 @@ struct DatasetSensorArguments {
 };
 
 ExitCode run(const DatasetSensorArguments& arguments) {
-  const SensorModel sensor =
-      dds::open_sequence(arguments.dataset, arguments.topic).suggested_sensor();
+  const SensorModel sensor = open_recording(arguments.dataset, arguments.topic).suggested_sensor();
   constexpr double degree = std::numbers::pi / 180.0;
   std::cout << sensor.name << ": " << sensor.rings << " rings from "
             << fixed(sensor.fov_up / degree, 2) << " to " << fixed(sensor.fov_down / degree, 2)

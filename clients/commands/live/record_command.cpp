@@ -18,6 +18,7 @@
 #include "clients/terminal/table.hpp"
 #include "idl/bag/bag_writer.hpp"
 #include "idl/dds/dds_options.hpp"
+#include "idl/dds/message_definition.hpp"
 #include "idl/dds/sample_losses.hpp"
 #include "idl/dds/serialized_sample.hpp"
 #include "idl/interface/topics.hpp"
@@ -42,6 +43,8 @@ struct RecorderOptions {
   std::vector<std::string> topics;
   /// New folder of the bag.
   std::filesystem::path folder;
+  dds::BagFormat format = dds::BagFormat::sqlite;
+  dds::mcap::Compression compression = dds::mcap::Compression::none;
 };
 
 struct RecordedTopic {
@@ -110,12 +113,14 @@ std::vector<dds::BagTopic> bag_topics(const std::vector<RecordableTopic>& topics
   std::vector<dds::BagTopic> in_bag;
   for (const RecordableTopic& topic : topics) {
     const dds::TopicQos& qos = topic.offered;
+    const std::string type = dds::ros_type_name(topic.type);
     in_bag.push_back({.name = ros_name(topic),
-                      .type = dds::ros_type_name(topic.type),
+                      .type = type,
                       .serialization_format = "cdr",
                       .offered_qos_profiles =
                           dds::offered_qos_yaml(qos.reliable, qos.transient_local, qos.depth),
-                      .messages = 0});
+                      .messages = 0,
+                      .definition = dds::message_definition(type)});
   }
   return in_bag;
 }
@@ -223,7 +228,8 @@ class Recorder {
 
  private:
   Recorder(const RecorderOptions& options, const std::vector<RecordableTopic>& topics)
-      : participant_(options.dds), bag_(options.folder, bag_topics(topics)) {
+      : participant_(options.dds),
+        bag_(options.folder, bag_topics(topics), options.format, options.compression) {
     for (const RecordableTopic& topic : topics) {
       inputs_.push_back(std::make_unique<Input>(participant_, topic));
     }
@@ -242,17 +248,32 @@ constexpr double bytes_a_mib = 1048576.0;
 struct RecordArguments {
   RecorderOptions recorder;
   std::string out;
+  std::string format = "sqlite";
+  /// Empty: that of the format.
+  std::string compression;
   ClientArguments client;
   /// 0: until it is stopped.
   double seconds = 0.0;
   bool json = false;
 };
 
+dds::mcap::Compression compression_named(const std::string& name) {
+  using dds::mcap::Compression;
+  if (name == "none") return Compression::none;
+  return name == "zstd" ? Compression::zstd : Compression::lz4;
+}
+
 RecorderOptions recorder_options(const RecordArguments& arguments) {
   RecorderOptions options = arguments.recorder;
   options.dds = arguments.client.dds(DdsRole::sensor);
   options.server_name = arguments.client.server_name;
   options.folder = arguments.out;
+  if (arguments.format == "mcap") {
+    options.format = dds::BagFormat::mcap;
+    options.compression = compression_named(arguments.compression);
+  } else if (!arguments.compression.empty()) {
+    throw std::invalid_argument("--compression is of MCAP alone: add --format mcap");
+  }
   return options;
 }
 
@@ -327,6 +348,11 @@ void add_record_command(CommandHandle program, Action& action) {
   CommandHandle command =
       program.command("record", "Record the sensor's and the server's topics to a ROS 2 bag");
   command.option("OUT", arguments->out, "New folder for the bag").required();
+  command.option("--format", arguments->format, "How the bag is stored")
+      .one_of({"sqlite", "mcap"})
+      .with_default();
+  command.option("--compression", arguments->compression, "Of MCAP's chunks; default: lz4")
+      .one_of({"none", "lz4", "zstd"});
   command.option("--topics", arguments->recorder.topics,
                  "ROS 2 names of the topics to record; default: all of the sensor and the server");
   command.option("--for", arguments->seconds, "Stop after so many seconds; default: at Ctrl-C")
@@ -342,9 +368,10 @@ void add_record_command(CommandHandle program, Action& action) {
       "  stillmap record tour\n"
       "  stillmap record tour --for 60 --topics points stillmap/odometry tf\n"
       "  stillmap replay tour --topic-in points\n"
-      "Writes what DDS carried, byte for byte, as ROS 2 Humble's rosbag2 in SQLite storage:\n"
-      "'ros2 bag info' and 'ros2 bag play' read it. A run that is killed keeps what it had a\n"
-      "second before. Samples that were lost on the way or for a slow disk are counted.");
+      "  stillmap record tour --format mcap    # for Foxglove, Lichtblick, and ROS 2 from Iron on\n"
+      "Writes what DDS carried, byte for byte, as ROS 2 Humble's rosbag2 in SQLite storage or as\n"
+      "MCAP: 'ros2 bag info' and 'ros2 bag play' read it. A run that is killed keeps what it had\n"
+      "a second before. Samples that were lost on the way or for a slow disk are counted.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -19,6 +19,7 @@
 #include "clients/commands/arguments/client_arguments.hpp"
 #include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/mapping/imu_feed.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
@@ -30,7 +31,6 @@
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/scan_dataset.hpp"
-#include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -340,7 +340,7 @@ std::optional<FrameTransform> mount_of(const ReplayArguments& arguments) {
 }
 
 ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
-  const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
+  const ScanDataset dataset = open_recording(arguments.dataset, arguments.topic_in);
   (void)arguments.replay.range.end(dataset);
   if (dataset.kitti_lidar()) std::cerr << "stillmap: " << dataset.kitti_lidar()->in_words() << "\n";
   ImuFeed imu(dataset.imu());

@@ -14,6 +14,7 @@
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/mapping/map_output_folder.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
@@ -28,7 +29,6 @@
 #include "core/map/storage/map_file.hpp"
 #include "core/map/tools/map_export.hpp"
 #include "core/picture/map_picture.hpp"
-#include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -298,7 +298,7 @@ ExitCode stopped_early(const MapOutputFolder& out, const std::string& what_is_th
 
 ExitCode run(const MapArguments& arguments) {
   StopSignal stop;
-  const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
+  const ScanDataset dataset = open_recording(arguments.dataset, arguments.topic_in);
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   const MappedBody body = body_of(arguments);
   static_cast<void>(arguments.range.end(dataset));

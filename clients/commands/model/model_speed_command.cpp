@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "clients/commands/command.hpp"
+#include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/model/benchmark_scan.hpp"
 #include "clients/commands/model/model_arguments.hpp"
 #include "clients/terminal/table.hpp"
@@ -25,7 +26,6 @@
 #include "core/segmentation/onednn_network.hpp"
 #include "core/segmentation/opencv_network.hpp"
 #include "core/segmentation/segmentation_network.hpp"
-#include "idl/bag/bag_scan_source.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -194,7 +194,7 @@ void time_model(const ModelDescription& model, const Scan& scan,
 
 ExitCode run(const ModelSpeedArguments& arguments) {
   const Scan scan = arguments.dataset.empty() ? benchmark_scan()
-                                              : dds::open_sequence(arguments.dataset).read(0).scan;
+                                              : open_recording(arguments.dataset, {}).read(0).scan;
   Table table({"network", "image", "engine", "project ms", "network ms", "k-NN ms", "total ms",
                "Gop/s", "peak", "%", "MB"});
   for (const std::string& model_path : arguments.models) {
