@@ -22,6 +22,14 @@ void ConfusionMatrix::add(std::span<const SemanticClass> truth,
   }
 }
 
+void ConfusionMatrix::add(const ConfusionMatrix& other) {
+  for (std::size_t truth = 0; truth < semantic_class_count; ++truth) {
+    for (std::size_t predicted = 0; predicted < semantic_class_count; ++predicted) {
+      counts_[truth][predicted] += other.counts_[truth][predicted];
+    }
+  }
+}
+
 std::uint64_t ConfusionMatrix::count(SemanticClass truth, SemanticClass predicted) const {
   return counts_[index(truth)][index(predicted)];
 }

@@ -16,6 +16,8 @@ class ConfusionMatrix {
  public:
   /// Counts one scan. Throws std::invalid_argument when the lengths differ.
   void add(std::span<const SemanticClass> truth, std::span<const SemanticClass> predicted);
+  /// Counts what another matrix has counted, too.
+  void add(const ConfusionMatrix& other);
 
   [[nodiscard]] std::uint64_t count(SemanticClass truth, SemanticClass predicted) const;
   /// Points counted.

@@ -130,6 +130,30 @@ TEST_F(EvaluateCommandTest, RunsTheNetworkOnAnImageOfTheWidthAskedFor) {
   EXPECT_EQ(run(command + " --columns 9000").exit_code, 2);
 }
 
+TEST_F(EvaluateCommandTest, ScoresSeveralSequencesEachTogetherAndByRange) {
+  simulate("city", 1);
+  simulate("other", 1);
+  const std::string truth = path("city") + " " + path("other");
+  const ProcessResult result = run("evaluate segmentation --json --columns 512 --truth " + truth);
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json json = nlohmann::json::parse(result.out);
+  ASSERT_EQ(json.at("sequences").size(), 2U);
+  std::uint64_t points = 0, near_and_far = 0;
+  for (const auto& one : json.at("sequences")) points += one.at("points").get<std::uint64_t>();
+  for (const auto& band : json.at("by_range"))
+    near_and_far += band.at("points").get<std::uint64_t>();
+  EXPECT_EQ(json.at("points"), points);
+  EXPECT_EQ(json.at("points"), near_and_far);
+  EXPECT_GT(json.at("by_range").at(0).at("points"), 1000);
+  const ProcessResult text = run("evaluate segmentation --columns 512 --truth " + truth);
+  EXPECT_THAT(text.out,
+              AllOf(HasSubstr("10-20 m"), HasSubstr("other"), HasSubstr("mean of groups")));
+  const ProcessResult both =
+      run("evaluate segmentation --truth " + truth + " --predictions " + path("city/labels"));
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_THAT(both.err, HasSubstr("--truth names 2"));
+}
+
 TEST_F(EvaluateCommandTest, RefusesPredictionsThatDoNotFit) {
   simulate("city", 2);
   const std::string command =

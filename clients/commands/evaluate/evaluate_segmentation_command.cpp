@@ -7,6 +7,7 @@
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/command.hpp"
+#include "clients/commands/evaluate/segmentation_report.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
@@ -14,7 +15,7 @@
 #include "core/dataset/binary_file.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/scan_dataset.hpp"
-#include "core/evaluation/confusion_matrix.hpp"
+#include "core/evaluation/segmentation_score.hpp"
 #include "core/picture/segmentation_picture.hpp"
 #include "core/segmentation/segmenter.hpp"
 
@@ -22,7 +23,7 @@ namespace stillmap::cli {
 namespace {
 
 struct SegmentationResult {
-  evaluation::ConfusionMatrix points;
+  evaluation::SegmentationScore score;
   std::size_t scans = 0;
   /// From scan to the class of every point.
   double median_ms = 0.0;
@@ -43,7 +44,7 @@ SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& 
       times.begin();
       const PointLabels found = labels.segment(frame.scan);
       times.end();
-      result.points.add(reduced_classes(frame.raw_labels), found.classes);
+      result.score.add(frame.scan.points_lidar, reduced_classes(frame.raw_labels), found.classes);
       result.scans += 1;
     }
     if (scan_done && !scan_done(index + 1 - range.first)) break;
@@ -53,53 +54,9 @@ SegmentationResult segment_dataset(const ScanDataset& dataset, const ScanRange& 
   return result;
 }
 
-std::string percent(const std::optional<double>& share) {
-  return share ? fixed(100.0 * *share, 2) : "-";
-}
-
-Json share_or_null(const std::optional<double>& share) {
-  return share ? Json(*share) : Json(nullptr);
-}
-
-Json to_json(const evaluation::ConfusionMatrix& matrix) {
-  Json by_class = Json::object();
-  for (std::size_t k = 1; k < semantic_class_count; ++k) {
-    const auto label = static_cast<SemanticClass>(k);
-    by_class.set(std::string(name(label)), share_or_null(matrix.iou(label)));
-  }
-  Json by_group = Json::object();
-  for (const evaluation::ClassGroup& group : evaluation::coarse_groups()) {
-    by_group.set(std::string(group.name), share_or_null(matrix.iou(group.classes)));
-  }
-  return {{"points", matrix.total()},
-          {"miou", matrix.mean_iou()},
-          {"miou_present", matrix.mean_iou_of_present().value_or(0.0)},
-          {"accuracy", matrix.accuracy().value_or(0.0)},
-          {"iou", by_class},
-          {"iou_of_groups", by_group}};
-}
-
-/// IoU of every class and of the coarse groups.
-std::string describe(const evaluation::ConfusionMatrix& matrix) {
-  Table classes({"class", "IoU %"});
-  for (std::size_t k = 1; k < semantic_class_count; ++k) {
-    const auto label = static_cast<SemanticClass>(k);
-    classes.add({std::string(name(label)), percent(matrix.iou(label))});
-  }
-  classes.add({"mean of 19", percent(matrix.mean_iou())});
-  classes.add({"mean of those seen", percent(matrix.mean_iou_of_present())});
-  classes.add({"accuracy", percent(matrix.accuracy())});
-  Table groups({"group", "IoU %"});
-  for (const evaluation::ClassGroup& group : evaluation::coarse_groups()) {
-    groups.add({std::string(group.name), percent(matrix.iou(group.classes))});
-  }
-  std::string text = classes.text();
-  text.append("\n").append(groups.text()).append(std::to_string(matrix.total()));
-  return text.append(" labelled points; unlabeled truth is left out, as in semantic-kitti-api\n");
-}
-
 struct EvaluateSegmentationArguments {
-  std::string truth, predictions, picture;
+  std::vector<std::string> truth;
+  std::string predictions, picture;
   MapperArguments mapper;
   ScanRange range;
   bool json = false;
@@ -120,24 +77,23 @@ std::vector<std::filesystem::path> label_files(const std::filesystem::path& fold
   return files;
 }
 
-evaluation::ConfusionMatrix compare_files(const EvaluateSegmentationArguments& arguments) {
-  const auto predictions = label_files(arguments.predictions, "predictions");
-  const std::filesystem::path truth_folder =
-      label_files(arguments.truth, "labels").front().parent_path();
+SequenceScore compare_files(const std::string& truth, const std::string& predicted) {
+  const auto predictions = label_files(predicted, "predictions");
+  const std::filesystem::path truth_folder = label_files(truth, "labels").front().parent_path();
   Progress progress("compare", "scans", predictions.size());
-  evaluation::ConfusionMatrix matrix;
+  SequenceScore compared{.sequence = truth};
   std::uint64_t done = 0;
   for (const std::filesystem::path& prediction : predictions) {
-    const auto predicted = read_values<std::uint32_t>(prediction);
-    const std::filesystem::path truth = truth_folder / prediction.filename();
-    if (!std::filesystem::exists(truth)) {
-      throw DatasetError(truth, "is missing: there is a prediction for it");
+    const auto classes = read_values<std::uint32_t>(prediction);
+    const std::filesystem::path file = truth_folder / prediction.filename();
+    if (!std::filesystem::exists(file)) {
+      throw DatasetError(file, "is missing: there is a prediction for it");
     }
-    matrix.add(reduced_classes(read_kitti_labels(truth, predicted.size())),
-               reduced_classes(predicted));
+    compared.score.add({}, reduced_classes(read_kitti_labels(file, classes.size())),
+                       reduced_classes(classes));
     progress.update(++done);
   }
-  return matrix;
+  return compared;
 }
 
 // Truth above prediction, of the first scan that was taken.
@@ -154,28 +110,39 @@ void write_picture(const EvaluateSegmentationArguments& arguments, const ScanDat
   write_segmentation_picture(arguments.picture, image, strips);
 }
 
-evaluation::ConfusionMatrix run_model(const EvaluateSegmentationArguments& arguments) {
-  const ScanDataset dataset(arguments.truth);
+SequenceScore run_model(const EvaluateSegmentationArguments& arguments, std::size_t number) {
+  const std::string& sequence = arguments.truth[number];
+  const ScanDataset dataset(sequence);
   const std::size_t scans = arguments.range.end(dataset) - arguments.range.first;
   const std::unique_ptr<Segmenter> labels = make_segmenter(arguments.mapper, dataset);
-  Progress progress("segment", "scans", scans);
+  Progress progress("segment " + sequence, "scans", scans);
   const SegmentationResult result =
       segment_dataset(dataset, arguments.range, *labels, [&](std::size_t seen) {
         progress.update(seen);
         return true;
       });
   if (result.scans == 0) throw DatasetError(dataset.file(arguments.range.first), "has no labels");
-  if (!arguments.picture.empty()) write_picture(arguments, dataset, *labels);
+  if (!arguments.picture.empty() && number == 0) write_picture(arguments, dataset, *labels);
   std::cerr << labels->name() << ": " << result.scans << " scans, from scan to classes "
             << fixed(result.median_ms, 1) << " ms (median), " << fixed(result.p99_ms, 1)
             << " ms (p99)\n";
-  return result.points;
+  return {sequence, result.score};
 }
 
 ExitCode run(const EvaluateSegmentationArguments& arguments) {
-  const evaluation::ConfusionMatrix matrix =
-      arguments.predictions.empty() ? run_model(arguments) : compare_files(arguments);
-  std::cout << (arguments.json ? to_json(matrix).dump(2) + "\n" : describe(matrix));
+  std::vector<SequenceScore> sequences;
+  if (arguments.predictions.empty()) {
+    for (std::size_t number = 0; number < arguments.truth.size(); ++number) {
+      sequences.push_back(run_model(arguments, number));
+    }
+  } else if (arguments.truth.size() == 1) {
+    sequences.push_back(compare_files(arguments.truth.front(), arguments.predictions));
+  } else {
+    throw std::invalid_argument("--predictions are those of one sequence, --truth names " +
+                                std::to_string(arguments.truth.size()));
+  }
+  std::cout << (arguments.json ? segmentation_json(sequences).dump(2) + "\n"
+                               : segmentation_text(sequences));
   return ExitCode::ok;
 }
 
@@ -184,17 +151,18 @@ ExitCode run(const EvaluateSegmentationArguments& arguments) {
 void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
   auto arguments = std::make_shared<EvaluateSegmentationArguments>();
   arguments->mapper.labels = "model";
-  CommandHandle command = evaluate.command("segmentation", "IoU of every class and their mean");
+  CommandHandle command =
+      evaluate.command("segmentation", "IoU of every class and their mean, near and far");
   command
       .option("--truth", arguments->truth,
-              "A sequence with labels, or a folder with true .label files")
+              "Sequences with labels, or a folder with true .label files")
       .required();
   const OptionHandle predictions =
       command.option("--predictions", arguments->predictions,
                      "Folder with predicted .label files (original ids); without it a model runs");
   command
       .option("--model", arguments->mapper.labels,
-              "Folder of the model to run; 'model' is the one that comes with Stillmap")
+              "Name or folder of the model to run; 'model' is the default one")
       .with_default()
       .excludes(predictions);
   command.option("--sensor", arguments->mapper.sensor,
@@ -209,6 +177,7 @@ void add_evaluate_segmentation_command(CommandHandle evaluate, Action& action) {
       "Examples:\n"
       "  stillmap evaluate segmentation --truth sequences/08 --predictions my_net/08\n"
       "  stillmap evaluate segmentation --truth city --picture city.png\n"
+      "  stillmap evaluate segmentation --model kitti --truth sequences/05 sequences/10\n"
       "Predictions pair with the truth by name, and every one needs its truth; scans without a\n"
       "prediction do not count. A model runs as in the server, votes of the neighbours included.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
