@@ -8,7 +8,13 @@
 namespace stillmap {
 namespace {
 
-/// Adds what the scan hit, and clears what it saw through when that is due.
+bool nothing_propagated(const PropagatedLabels& propagated) {
+  return std::ranges::all_of(propagated.origin,
+                             [](LabelOrigin origin) { return origin == LabelOrigin::none; });
+}
+
+}  // namespace
+
 void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar,
                  const SensorModel& sensor, StaticMap& map) {
   map.insert(labelled, T_map_lidar);
@@ -16,13 +22,6 @@ void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_li
   const RangeImageView view(labelled.scan, {}, sensor, T_map_lidar);
   map.clear_seen_through(view, labelled.scan.stamp_ns);
 }
-
-bool nothing_propagated(const PropagatedLabels& propagated) {
-  return std::ranges::all_of(propagated.origin,
-                             [](LabelOrigin origin) { return origin == LabelOrigin::none; });
-}
-
-}  // namespace
 
 LabelSynchronizer::LabelSynchronizer(std::unique_ptr<SegmentationPipeline> segmentation,
                                      const SensorModel& sensor)

@@ -13,6 +13,10 @@
 
 namespace stillmap {
 
+/// Adds what the scan hit to `map`, and clears what it saw through when that is due.
+void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar,
+                 const SensorModel& sensor, StaticMap& map);
+
 /// Matches scans with labels that may arrive after them. It owns the segmentation pipeline and
 /// decides which labels a scan is registered with (its own, else labels propagated from the map and
 /// from the last labelled scan), and when and with which labels the scan enters the static map. At

@@ -173,6 +173,22 @@ cv::Mat draw_voxels(const MapSnapshot& view, const PictureFrame& frame) {
 const cv::Scalar estimate_colour(255, 255, 255);
 const cv::Scalar truth_colour(255, 210, 60);
 
+const cv::Scalar closure_colour(70, 90, 255);
+
+/// Lines between the poses that closures join, with a dot at each end.
+void draw_closures(cv::Mat& picture, const PictureFrame& frame, const Trajectory& estimate,
+                   const MapPictureOptions& options) {
+  constexpr int radius_px = 4;
+  const auto pixel_of = [&](std::size_t pose) -> cv::Point {
+    return frame.pixel(estimate.at(pose).T_map_lidar.translation().head<2>());
+  };
+  for (const auto& [from, to] : options.closures) {
+    cv::line(picture, pixel_of(from), pixel_of(to), closure_colour, 2, cv::LINE_AA);
+    cv::circle(picture, pixel_of(from), radius_px, closure_colour, 1, cv::LINE_AA);
+    cv::circle(picture, pixel_of(to), radius_px, closure_colour, cv::FILLED, cv::LINE_AA);
+  }
+}
+
 Eigen::AlignedBox2d extent(const MapSnapshot& view, const Trajectory& estimate,
                            const MapPictureOptions& options) {
   Eigen::AlignedBox2d box = xy_bounds(view);
@@ -238,6 +254,7 @@ std::vector<LegendEntry> legend_entries(const MapSnapshot& view, const Trajector
   std::vector<LegendEntry> entries;
   if (!estimate.empty()) entries.push_back({"trajectory", estimate_colour});
   if (options.truth) entries.push_back({"truth", truth_colour});
+  if (!options.closures.empty()) entries.push_back({"closed loop", closure_colour});
   if (options.query_box_map) entries.push_back({"query", query_box_colour()});
   const ClassCounts counts = count_classes(view);
   for (std::size_t i = 0; i < counts.size(); ++i) {
@@ -260,6 +277,7 @@ void write_map_picture(const std::filesystem::path& file, const MapSnapshot& vie
   if (options.query_box_map) draw_box(picture, frame, *options.query_box_map);
   if (options.truth) draw_trajectory(picture, frame, *options.truth, truth_colour);
   draw_trajectory(picture, frame, estimate, estimate_colour);
+  draw_closures(picture, frame, estimate, options);
   draw_ends(picture, frame, estimate);
   draw_scale_bar(picture, frame.px_per_m);
 

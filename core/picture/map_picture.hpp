@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <filesystem>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "core/lidar/trajectory.hpp"
 #include "core/map/tile.hpp"
@@ -14,6 +16,9 @@ struct MapPictureOptions {
   int max_side_px = 1800;
   /// Drawn beside the estimate; in the map frame [m].
   std::optional<Trajectory> truth;
+  /// Joins poses of the estimate that were taken at one place, as a pose graph has them: numbers of
+  /// poses.
+  std::vector<std::pair<std::size_t, std::size_t>> closures;
   /// Outline of a query; map frame [m], infinite faces end at the picture's edge.
   std::optional<Eigen::AlignedBox3d> query_box_map;
 };

@@ -213,11 +213,33 @@ CityPlan test_yard() {
   return plan;
 }
 
+namespace {
+
+// A network whose route comes back to each of its streets, to three in the other direction, too;
+// 1.4 km round. Without vehicles: they would not give way where the route crosses itself.
+CityPlan street_circuit() {
+  CityPlan plan = quiet_city();
+  plan.name = "circuit";
+  plan.streets_along_v = streets({0, 110, 220}, {});
+  plan.streets_along_u = streets({0, 80}, {});
+  plan.route = {{0, 0},  {220, 0},  {220, 80}, {110, 80}, {110, 0},  {0, 0},
+                {0, 80}, {110, 80}, {110, 0},  {220, 0},  {220, 80}, {0, 80}};
+  plan.crossings = {{55, 0}};
+  plan.ego_start_m = 20.0;
+  plan.traffic.vehicles_per_km = 0.0;
+  plan.traffic.cyclists_per_km = 0.0;
+  plan.traffic.crossing_pedestrians = 0;
+  return plan;
+}
+
+}  // namespace
+
 CityPlan city_plan(const std::string& name) {
-  for (CityPlan plan : {quiet_city(), crowded_avenue(), test_yard()}) {
+  for (CityPlan plan : {quiet_city(), crowded_avenue(), test_yard(), street_circuit()}) {
     if (plan.name == name) return plan;
   }
-  throw std::invalid_argument("There is no city plan '" + name + "'; take quiet, crowd or yard.");
+  throw std::invalid_argument("There is no city plan '" + name +
+                              "'; take quiet, crowd, yard or circuit.");
 }
 
 std::vector<StreetSide> street_sides(const CityPlan& plan) {

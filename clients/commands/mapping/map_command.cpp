@@ -4,12 +4,14 @@
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <map>
 #include <memory>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "clients/commands/arguments/mapper_arguments.hpp"
 #include "clients/commands/arguments/mount_arguments.hpp"
@@ -39,6 +41,8 @@ struct MapOutput {
   /// What the poses are of.
   std::string frame;
   std::optional<TrajectoryReport> accuracy;
+  /// Before loops were closed.
+  std::optional<TrajectoryReport> odometry_accuracy;
 };
 
 // True poses of the body at the mapped scans, in its frame at the first of them.
@@ -81,8 +85,31 @@ std::string pose_file_of(const std::string& frame) {
   return frame == "lidar" ? "poses_lidar.txt" : "poses_base.txt";
 }
 
+/// The closures as pairs of poses of the run.
+std::vector<std::pair<std::size_t, std::size_t>> closed_poses(const MappingResult& result) {
+  std::map<std::size_t, std::size_t> pose_of_scan;
+  for (std::size_t i = 0; i < result.scan_of_pose.size(); ++i)
+    pose_of_scan[result.scan_of_pose[i]] = i;
+  std::vector<std::pair<std::size_t, std::size_t>> pairs;
+  for (const LoopClosure& closure : result.loops->closures)
+    pairs.emplace_back(pose_of_scan.at(closure.from_scan), pose_of_scan.at(closure.to_scan));
+  return pairs;
+}
+
+/// Writes the poses of the odometry, and where loops were closed, loops_before.png and
+/// loops_after.png: the graph over the map.
+void write_loops(const std::filesystem::path& folder, const MappingResult& result,
+                 MapPictureOptions picture) {
+  write_kitti_poses(folder / "poses_odometry.txt", result.odometry);
+  if (!result.odometry_view) return;
+  picture.closures = closed_poses(result);
+  write_map_picture(folder / "loops_before.png", *result.odometry_view, result.odometry, picture);
+  write_map_picture(folder / "loops_after.png", *result.view, result.trajectory, picture);
+}
+
 /// Writes poses_lidar.txt or poses_base.txt, poses_tum.txt, map.stillmap, map.ply, map.pcd, map.png
-/// and, with truth, trajectory.png and trajectory_error.png. Throws what their writers throw.
+/// and, with truth, trajectory.png and trajectory_error.png; what closed loops leave, where they
+/// were looked for. Throws what their writers throw.
 MapOutput write_map_output(const MapOutputFolder& out, const ScanDataset& dataset,
                            const MappingResult& result, const MapperConfig& config,
                            const MappedBody& body) {
@@ -99,7 +126,10 @@ MapOutput write_map_output(const MapOutputFolder& out, const ScanDataset& datase
     const evaluation::PosePairs pairs = pairs_of(*picture.truth, result.trajectory);
     output.accuracy = report_trajectory(pairs);
     draw_trajectories(folder, pairs, *output.accuracy, GroundPlane::xy);
+    if (result.loops)
+      output.odometry_accuracy = report_trajectory(pairs_of(*picture.truth, result.odometry));
   }
+  if (result.loops) write_loops(folder, result, picture);
   write_map_picture(folder / "map.png", *result.view, result.trajectory, picture);
   return output;
 }
@@ -147,6 +177,37 @@ std::string describe_stages(const std::vector<StageDurations>& stages) {
   return table.text();
 }
 
+Json closures_json(const std::vector<LoopClosure>& closures) {
+  Json json = Json::array();
+  for (const LoopClosure& closure : closures) {
+    Json transform = Json::array();
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 4; ++column)
+        transform.push_back(closure.T_from_to(row, column));
+    json.push_back({{"from_scan", closure.from_scan},
+                    {"to_scan", closure.to_scan},
+                    {"T_from_to", transform},
+                    {"score", closure.upright_fit},
+                    {"fit", closure.fit},
+                    {"overlap", closure.overlap},
+                    {"runner_up", closure.runner_up},
+                    {"jump_m", closure.jump_m},
+                    {"refusal", closure.refusal.empty() ? Json(nullptr) : Json(closure.refusal)}});
+  }
+  return json;
+}
+
+Json to_json(const LoopReport& loops, const std::optional<TrajectoryReport>& odometry) {
+  return {{"submaps", loops.submaps},
+          {"nodes", loops.nodes},
+          {"submaps_mib", loops.submap_mib},
+          {"kept_scans_mib", loops.scan_log_mib},
+          {"seconds", loops.seconds},
+          {"max_correction_m", loops.max_correction_m},
+          {"refused", closures_json(loops.refused)},
+          {"odometry_accuracy", odometry ? to_json(*odometry) : Json(nullptr)}};
+}
+
 /// Contents of report.json.
 Json to_json(const MappingResult& result, const MapOutput& output) {
   Json health = Json::object();
@@ -174,7 +235,22 @@ Json to_json(const MappingResult& result, const MapOutput& output) {
         {"recall", optional_number(result.moving.recall())},
         {"iou", optional_number(result.moving.iou())}}},
       {"accuracy", output.accuracy ? to_json(*output.accuracy) : Json(nullptr)},
+      {"closures", result.loops ? closures_json(result.loops->closures) : Json(nullptr)},
+      {"loops", result.loops ? to_json(*result.loops, output.odometry_accuracy) : Json(nullptr)},
       {"folder", output.folder.string()}};
+}
+
+std::string describe(const LoopReport& loops, const MapOutput& output) {
+  if (loops.closures.empty())
+    return "loops: none closed in " + std::to_string(loops.submaps) + " submaps\n";
+  std::string text = "loops: " + std::to_string(loops.closures.size()) + " closed in " +
+                     std::to_string(loops.submaps) + " submaps, poses moved by up to " +
+                     fixed(loops.max_correction_m, 2) + " m; " + fixed(loops.seconds, 1) + " s";
+  if (output.odometry_accuracy) {
+    text += "; ATE before " + fixed(output.odometry_accuracy->rigid_aligned.rmse_m, 3) +
+            " m, after " + fixed(output.accuracy->rigid_aligned.rmse_m, 3) + " m";
+  }
+  return text + "\n";
 }
 
 /// The same for people, shorter.
@@ -198,6 +274,7 @@ std::string describe(const MappingResult& result, const MapOutput& output) {
     text += "moving points found: " + fixed(100.0 * *recall, 1) + " %, right ones among them " +
             fixed(100.0 * result.moving.precision().value_or(0.0), 1) + " %\n";
   }
+  if (result.loops) text += describe(*result.loops, output);
   if (output.accuracy)
     text += "against the true poses of the sequence:\n" + describe(*output.accuracy);
   text += "written to " + output.folder.string() +
@@ -215,6 +292,7 @@ struct MapArguments {
   MountArguments mount;
   ScanRange range;
   OutputPolicy policy;
+  std::string loops = "on";
   double save_period_s = 30.0;
   bool json = false;
 };
@@ -241,6 +319,7 @@ MappedBody body_of(const MapArguments& arguments) {
 MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& arguments,
                                 const MapperConfig& config, const MappedBody& body,
                                 std::unique_ptr<Segmenter> labels, RunFile& run_file,
+                                const std::optional<std::filesystem::path>& loops_file,
                                 StopSignal& stop) {
   if (dataset.kitti_lidar()) std::cerr << "stillmap: " << dataset.kitti_lidar()->in_words() << "\n";
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
@@ -254,8 +333,14 @@ MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& 
     ++skipped;
     progress.say("stillmap: skipped: " + scan.reason);
   };
-  return map_dataset(dataset, arguments.range, config, body, std::move(labels), run_file, scan_done,
-                     scan_skipped);
+  std::optional<Progress> correction;
+  const auto scan_moved = [&](std::size_t done, std::size_t scans) {
+    if (!correction) correction.emplace("map by corrected poses", "scans", scans);
+    correction->update(done);
+  };
+  return map_dataset(
+      dataset, arguments.range, config, body, std::move(labels), run_file, loops_file,
+      {.scan_done = scan_done, .scan_skipped = scan_skipped, .scan_moved = scan_moved});
 }
 
 void write_report(const std::filesystem::path& file, const Json& report) {
@@ -274,7 +359,7 @@ RunIdentity run_identity(const MapArguments& arguments, const MapperConfig& conf
   settings << "sensor " << config.sensor.name << ", labels " << labels.name() << ", weighting "
            << name(config.odometry.weighting) << ", voxels of " << config.static_map.voxel_size_m
            << " m, lidar in " << body.frame << " at " << t.transpose() << " turned by "
-           << q.coeffs().transpose();
+           << q.coeffs().transpose() << (arguments.loops == "on" ? ", loops closed" : "");
   return {std::filesystem::weakly_canonical(arguments.dataset).string() + " from scan " +
               std::to_string(arguments.range.first),
           settings.str()};
@@ -287,7 +372,10 @@ MappingResult map_into(const MapOutputFolder& out, const ScanDataset& dataset,
                        StopSignal& stop) {
   RunFile run_file(out.run_file(), run_identity(arguments, config, body, *labels),
                    std::chrono::duration<double>(arguments.save_period_s));
-  return map_with_progress(dataset, arguments, config, body, std::move(labels), run_file, stop);
+  std::optional<std::filesystem::path> loops_file;
+  if (arguments.loops == "on") loops_file = out.kept_scans_file();
+  return map_with_progress(dataset, arguments, config, body, std::move(labels), run_file,
+                           loops_file, stop);
 }
 
 ExitCode stopped_early(const MapOutputFolder& out, const std::string& what_is_there) {
@@ -343,6 +431,12 @@ void add_map_command(CommandHandle program, Action& action) {
   command.flag("--resume", arguments->policy.resume,
                "Go on with the run that was stopped or killed in this folder");
   command
+      .option("--loops", arguments->loops,
+              "on: where the drive comes back to a place, poses and map are corrected; off: as "
+              "odometry has them")
+      .one_of({"on", "off"})
+      .with_default();
+  command
       .option("--save-period", arguments->save_period_s,
               "Seconds between saves of the run, for --resume")
       .with_default()
@@ -356,7 +450,11 @@ void add_map_command(CommandHandle program, Action& action) {
       "Writes map.stillmap (SQLite), map.ply, map.pcd, map.png, poses_lidar.txt (KITTI 3x4, lidar\n"
       "frame; poses_base.txt with --mount), poses_tum.txt (the same with stamps), report.json\n"
       "(timing, memory, accuracy), and with true poses in the sequence trajectory.png and\n"
-      "trajectory_error.png. A damaged file is named and skipped; its scan then has no pose.\n"
+      "trajectory_error.png. Where the drive comes back to a place, loops are closed: the poses\n"
+      "above are the corrected ones, poses_odometry.txt has those of before, report.json the\n"
+      "closures, loops_before.png and loops_after.png show them. The scans are kept in the folder\n"
+      "'unfinished' until then (some 0.1 MB a scan of 16 rings). A damaged file is named and "
+      "skipped; its scan then has no pose.\n"
       "Until the results are complete they are in the folder 'unfinished', and those that were\n"
       "there stay.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });

@@ -33,6 +33,10 @@ class MapOutputFolder {
   [[nodiscard]] const std::filesystem::path& unfinished() const { return unfinished_; }
   /// The run's state, in the unfinished folder.
   [[nodiscard]] std::filesystem::path run_file() const { return unfinished_ / "run.stillmap"; }
+  /// Scans that are kept until loops are closed, beside the run's state; removed with it.
+  [[nodiscard]] std::filesystem::path kept_scans_file() const {
+    return unfinished_ / "run.stillmap.scans";
+  }
   /// The map among the results, in the unfinished folder.
   [[nodiscard]] std::filesystem::path new_map_file() const { return unfinished_ / "map.stillmap"; }
   /// Whether the folder had a map before this run.

@@ -28,10 +28,11 @@ class MappingRun {
  public:
   MappingRun(const ScanDataset& dataset, bool strict, const MapperConfig& config,
              const MappedBody& body, std::unique_ptr<Segmenter> labels,
-             const ScanSkipped& scan_skipped)
+             const std::optional<std::filesystem::path>& loops_file,
+             const MappingListeners& listeners)
       : dataset_(dataset),
         strict_(strict),
-        scan_skipped_(scan_skipped),
+        listeners_(listeners),
         T_body_lidar_(body.T_body_lidar),
         prepare_(config.prepare),
         mapper_(config, std::move(labels),
@@ -40,18 +41,21 @@ class MappingRun {
         imu_(dataset.imu()),
         period_s_(config.sensor.period_s) {
     mapper_.reset(new_map_id());
+    if (loops_file) loops_.emplace(*loops_file, config.sensor);
   }
 
   /// Goes on where an earlier run was. Throws std::invalid_argument for another voxel size.
   void resume(RunState earlier) {
     mapper_.resume(earlier.map.view, earlier.map.tile_evidence);
     earlier_ = earlier.map.trajectory.to_vector();
+    if (loops_) loops_->resume(earlier.next_scan);
     result_.scan_of_pose = std::move(earlier.scan_of_pose);
     result_.resumed_at_scan = earlier.next_scan;
   }
 
   /// What changed since the last saved state.
   [[nodiscard]] RunState state(std::size_t next_scan) {
+    if (loops_) loops_->flush();
     MapCheckpoint checkpoint = mapper_.static_map().checkpoint();
     step_ = checkpoint.step;
     RunState state{to_saved_map(checkpoint), result_.scan_of_pose, next_scan};
@@ -86,12 +90,15 @@ class MappingRun {
     result_.scan_of_pose.push_back(index);
     result_.health[mapped->odometry.health] += 1;
     is_registered_ |= mapped->odometry.health != OdometryHealth::lost;
+    if (loops_) loops_->add(index, *mapped);
     if (!true_ids.empty())
       result_.moving += evaluation::moving_score(mapped->labelled.motion, true_ids);
   }
 
   MappingResult finish(bool stopped) {
-    result_.trajectory = path();
+    result_.trajectory = result_.odometry = path();
+    if (loops_ && loops_->finish()) correct();
+    if (loops_) result_.loops = loops_->report();
     SavedMap map = to_saved_map(mapper_.static_map().checkpoint(CheckpointScope::everything));
     result_.view = std::make_shared<const MapSnapshot>(std::move(map.view));
     result_.tile_evidence = std::move(map.tile_evidence);
@@ -103,6 +110,21 @@ class MappingRun {
   }
 
  private:
+  /// Puts the corrected poses, and the map by them, in place of those of the odometry.
+  void correct() {
+    const auto& T_map_lidar = loops_->T_map_lidar();
+    if (T_map_lidar.size() != result_.trajectory.size())
+      throw std::logic_error("as many corrected poses as scans are expected");
+    for (std::size_t i = 0; i < T_map_lidar.size(); ++i)
+      result_.trajectory[i].T_map_lidar = T_map_lidar[i] * T_body_lidar_.inverse();
+    result_.odometry_view = mapper_.map_snapshot();
+    const auto scan_moved = [&](std::size_t done) {
+      if (listeners_.scan_moved) listeners_.scan_moved(done, T_map_lidar.size());
+    };
+    mapper_.static_map() =
+        loops_->make_map(mapper_.static_map().config(), new_map_id(), scan_moved);
+  }
+
   /// Of the body, with what an earlier run has mapped.
   [[nodiscard]] Trajectory path() const {
     const Eigen::Isometry3d T_lidar_body = T_body_lidar_.inverse();
@@ -124,17 +146,18 @@ class MappingRun {
   }
 
   void skip(SkippedScan scan) {
-    if (scan_skipped_) scan_skipped_(scan);
+    if (listeners_.scan_skipped) listeners_.scan_skipped(scan);
     result_.skipped.push_back(std::move(scan));
   }
 
   const ScanDataset& dataset_;
   bool strict_;
-  const ScanSkipped& scan_skipped_;
+  const MappingListeners& listeners_;
   Eigen::Isometry3d T_body_lidar_;
   PrepareConfig prepare_;
   StageStopwatch times_;
   Mapper mapper_;
+  std::optional<LoopCorrection> loops_;
   ImuFeed imu_;
   double period_s_;
   Trajectory earlier_;
@@ -157,10 +180,11 @@ std::size_t ScanRange::end(const ScanDataset& dataset) const {
 MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
                           const MapperConfig& config, const MappedBody& body,
                           std::unique_ptr<Segmenter> labels, RunFile& run_file,
-                          const ScanDone& scan_done, const ScanSkipped& scan_skipped) {
+                          const std::optional<std::filesystem::path>& loops_file,
+                          const MappingListeners& listeners) {
   const std::size_t end = range.end(dataset);
   std::size_t index = range.first;
-  MappingRun run(dataset, range.strict, config, body, std::move(labels), scan_skipped);
+  MappingRun run(dataset, range.strict, config, body, std::move(labels), loops_file, listeners);
   // The map of a few scans is too thin to be found in, and soon made again.
   constexpr std::size_t min_resumed_scans = 10;
   if (auto earlier = run_file.earlier();
@@ -172,7 +196,7 @@ MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
   bool is_stopped = false;
   while (index < end && !is_stopped) {
     run.map_scan(index++);
-    is_stopped = scan_done && !scan_done(index - range.first) && index < end;
+    is_stopped = listeners.scan_done && !listeners.scan_done(index - range.first) && index < end;
     if (index == end || !(is_stopped || run_file.is_due())) continue;
     run_file.save(run.state(index));
     run.state_saved();

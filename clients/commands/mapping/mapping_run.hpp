@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <memory>
@@ -8,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/commands/mapping/loop_correction.hpp"
 #include "clients/commands/mapping/run_file.hpp"
 #include "clients/commands/stage_stopwatch.hpp"
 #include "core/dataset/scan_dataset.hpp"
@@ -43,8 +45,13 @@ struct MappedBody {
 };
 
 struct MappingResult {
-  /// Of the body.
+  /// Of the body; corrected where loops were closed.
   Trajectory trajectory;
+  /// Of the body as odometry had them, and the map by them where poses were corrected.
+  Trajectory odometry;
+  std::shared_ptr<const MapSnapshot> odometry_view;
+  /// Nothing where loops were not looked for.
+  std::optional<LoopReport> loops;
   /// Index in the data set of each pose of the trajectory.
   std::vector<std::size_t> scan_of_pose;
   std::shared_ptr<const MapSnapshot> view;
@@ -70,13 +77,22 @@ using ScanDone = std::function<bool(std::size_t seen)>;
 /// Called for every scan that is skipped.
 using ScanSkipped = std::function<void(const SkippedScan&)>;
 
+/// Whom a run tells how far it is; each may be empty.
+struct MappingListeners {
+  ScanDone scan_done;
+  ScanSkipped scan_skipped;
+  /// Called while the map is made again by corrected poses.
+  std::function<void(std::size_t done, std::size_t total)> scan_moved;
+};
+
 /// Maps a data set in this process. The run goes on from what `run_file` holds, and its state is
 /// saved there from time to time; what is reported of scans, but poses and map, is of the resumed
-/// part alone. Throws what reading and saving throw.
+/// part alone. With a `loops_file`, where scans are kept meanwhile, loops are closed: poses and map
+/// are corrected when all scans are mapped. Throws what reading and saving throw.
 [[nodiscard]] MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
                                         const MapperConfig& config, const MappedBody& body,
                                         std::unique_ptr<Segmenter> labels, RunFile& run_file,
-                                        const ScanDone& scan_done = {},
-                                        const ScanSkipped& scan_skipped = {});
+                                        const std::optional<std::filesystem::path>& loops_file,
+                                        const MappingListeners& listeners = {});
 
 }  // namespace stillmap::cli

@@ -74,7 +74,10 @@ void add_simulate_command(CommandHandle program, Action& action) {
   CommandHandle command = program.command(
       "simulate", "Make a sequence in a simulated city, with labels and true poses");
   command.option("OUT", arguments->out, "New folder for the sequence").required();
-  command.option("--preset", simulation.preset, "City: quiet, crowd or yard (one small block)")
+  command
+      .option("--preset", simulation.preset,
+              "City: quiet, crowd, yard (one small block) or circuit (a route that comes back to "
+              "every street, in both directions)")
       .with_default();
   command.option("--traffic", simulation.traffic,
                  "Factor on everything that moves (0: an empty city), or a preset's name");

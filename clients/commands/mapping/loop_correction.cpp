@@ -1,0 +1,99 @@
+#include "clients/commands/mapping/loop_correction.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <utility>
+
+#include "core/label_synchronizer.hpp"
+
+namespace stillmap::cli {
+namespace {
+
+/// Adds the time that it lives to a sum of seconds.
+class Timed {
+ public:
+  explicit Timed(double& seconds) : seconds_(seconds), began_(std::chrono::steady_clock::now()) {}
+  ~Timed() {
+    seconds_ += std::chrono::duration<double>(std::chrono::steady_clock::now() - began_).count();
+  }
+  Timed(const Timed&) = delete;
+  Timed& operator=(const Timed&) = delete;
+
+ private:
+  double& seconds_;
+  std::chrono::steady_clock::time_point began_;
+};
+
+constexpr double bytes_per_mib = 1024.0 * 1024.0;
+
+}  // namespace
+
+LoopCorrection::LoopCorrection(const std::filesystem::path& scan_log, const SensorModel& sensor)
+    : sensor_(sensor), log_(scan_log), closer_(LoopClosingConfig{}) {}
+
+void LoopCorrection::resume(std::size_t next_scan) {
+  const Timed timed(seconds_);
+  log_.truncate_from(next_scan);
+  log_.read([this](const LoggedScan& scan) {
+    index_.push_back(scan.index);
+    T_odom_lidar_.push_back(scan.T_odom_lidar);
+    closer_.add(scan.labelled, scan.T_odom_lidar, scan.is_confirmed);
+  });
+}
+
+void LoopCorrection::add(std::size_t index, const MappedScan& mapped) {
+  const Timed timed(seconds_);
+  const OdometryResult& odometry = mapped.odometry;
+  log_.append({.index = index,
+               .T_odom_lidar = odometry.T_map_lidar,
+               .is_confirmed = odometry.is_confirmed,
+               .labelled = mapped.labelled});
+  index_.push_back(index);
+  T_odom_lidar_.push_back(odometry.T_map_lidar);
+  closer_.add(mapped.labelled, odometry.T_map_lidar, odometry.is_confirmed);
+}
+
+bool LoopCorrection::finish() {
+  const Timed timed(seconds_);
+  closer_.finish();
+  T_map_lidar_ = closer_.corrected_poses();
+  return !closer_.closures().empty();
+}
+
+StaticMap LoopCorrection::make_map(const StaticMapConfig& config, std::uint64_t map_id,
+                                   const std::function<void(std::size_t done)>& scan_done) {
+  const Timed timed(seconds_);
+  StaticMap map(config);
+  map.reset(map_id);
+  std::size_t done = 0;
+  log_.read([&](const LoggedScan& scan) {
+    const Eigen::Isometry3d& T_map_lidar = T_map_lidar_.at(done++);
+    if (scan.is_confirmed) insert_scan(scan.labelled, T_map_lidar, sensor_, map);
+    scan_done(done);
+  });
+  return map;
+}
+
+LoopReport LoopCorrection::report() const {
+  LoopReport report{.closures = closer_.closures(),
+                    .refused = closer_.refused(),
+                    .submaps = closer_.submap_count(),
+                    .nodes = closer_.graph().T_map_node.size(),
+                    .submap_mib = static_cast<double>(closer_.submap_bytes()) / bytes_per_mib,
+                    .scan_log_mib = static_cast<double>(log_.bytes()) / bytes_per_mib,
+                    .max_correction_m = 0.0,
+                    .seconds = seconds_};
+  for (std::vector<LoopClosure>* const list : {&report.closures, &report.refused}) {
+    for (LoopClosure& closure : *list) {
+      closure.from_scan = index_.at(closure.from_scan);
+      closure.to_scan = index_.at(closure.to_scan);
+    }
+  }
+  for (std::size_t i = 0; i < T_map_lidar_.size(); ++i) {
+    const double moved_m = (T_map_lidar_[i].translation() - T_odom_lidar_[i].translation()).norm();
+    report.max_correction_m = std::max(report.max_correction_m, moved_m);
+  }
+  return report;
+}
+
+}  // namespace stillmap::cli

@@ -1,0 +1,308 @@
+#include "core/graph/loop_closer.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/graph/submap_registration.hpp"
+#include "core/odometry/se3.hpp"
+
+namespace stillmap {
+namespace {
+
+/// What a closure counts as, of way, for the drift between the places that it joins [m].
+constexpr double way_of_closure_m = 10.0;
+
+Eigen::Isometry2d in_plan(const Eigen::Isometry3d& T) {
+  const Eigen::Vector3d ahead = T.linear().col(0);
+  Eigen::Isometry2d plan = Eigen::Isometry2d::Identity();
+  plan.linear() = Eigen::Rotation2Dd(std::atan2(ahead.y(), ahead.x())).toRotationMatrix();
+  plan.translation() = T.translation().head<2>();
+  return plan;
+}
+
+/// An upright pose at this place of the plan and height.
+Eigen::Isometry3d in_space(const Eigen::Isometry2d& plan, double z_m) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear().topLeftCorner<2, 2>() = plan.linear();
+  T.translation() << plan.translation(), z_m;
+  return T;
+}
+
+AlignmentWindow window_after(const DriftModel& drift, double way_m) {
+  return {.reach_m = std::min(drift.offset_m + drift.share_of_way * way_m, drift.max_m),
+          .reach_rad =
+              std::min(drift.heading_rad + drift.heading_rad_per_m * way_m, drift.max_heading_rad)};
+}
+
+PoseEdge odometry_edge(std::size_t from, const Eigen::Isometry3d& T_from_to, double way_m,
+                       const DriftModel& drift) {
+  // A lidar that turns on the spot has no way, but errs.
+  const double way = std::max(way_m, 0.3);
+  Eigen::Matrix<double, 6, 1> variance;
+  variance << Eigen::Vector3d::Constant(drift.translation_m * drift.translation_m * way),
+      Eigen::Vector3d::Constant(drift.rotation_rad * drift.rotation_rad * way);
+  return {.from = from,
+          .to = from + 1,
+          .T_from_to = T_from_to,
+          .information = variance.cwiseInverse().asDiagonal(),
+          .is_loop = false};
+}
+
+double angle_of(const Eigen::Isometry3d& T) { return so3_log(T.linear()).norm(); }
+
+}  // namespace
+
+void LoopCloser::add(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar,
+                     bool is_confirmed) {
+  const std::size_t number = T_odom_lidar_.size();
+  T_odom_lidar_.push_back(T_odom_lidar);
+  if (!is_confirmed) return;
+  if (nodes_.empty()) {
+    nodes_.push_back({number, 0.0});
+    graph_.T_map_node.push_back(T_odom_lidar);
+  } else {
+    const Eigen::Isometry3d motion = T_odom_lidar_[nodes_.back().scan].inverse() * T_odom_lidar;
+    if (motion.translation().norm() >= config_.node_spacing_m ||
+        angle_of(motion) >= config_.node_turn_rad)
+      add_node(number, T_odom_lidar);
+  }
+  builder_.add(scan, T_odom_lidar);
+  const double begun_m = nodes_[first_node_of_submap_].way_m;
+  if (nodes_.back().way_m - begun_m >= config_.submap.length_m) close_submap();
+}
+
+void LoopCloser::add_node(std::size_t scan, const Eigen::Isometry3d& T_odom_lidar) {
+  const Node& last = nodes_.back();
+  const Eigen::Isometry3d motion = T_odom_lidar_[last.scan].inverse() * T_odom_lidar;
+  const double way_m = motion.translation().norm();
+  graph_.edges.push_back(odometry_edge(nodes_.size() - 1, motion, way_m, config_.drift));
+  graph_.T_map_node.push_back(graph_.T_map_node.back() * motion);
+  nodes_.push_back({scan, last.way_m + way_m});
+}
+
+void LoopCloser::finish() {
+  if (!builder_.empty()) close_submap();
+  for (Candidate& candidate : pending_) {
+    candidate.closure.refusal = "no second closure agreed with its jump";
+    refused_.push_back(std::move(candidate.closure));
+  }
+  pending_.clear();
+}
+
+void LoopCloser::close_submap() {
+  const std::size_t key = (first_node_of_submap_ + nodes_.size() - 1) / 2;
+  Submap submap = builder_.take(T_odom_lidar_[nodes_[key].scan]);
+  submap.key_node = key;
+  submap.way_m = nodes_[key].way_m;
+  UprightImage image(submap.points_submap);
+  submaps_.push_back({std::move(submap), std::move(image)});
+  first_node_of_submap_ = nodes_.size() - 1;
+  find_loops(submaps_.size() - 1);
+}
+
+void LoopCloser::find_loops(std::size_t to) {
+  const std::vector<double> ways_m = ways_from(to);
+  for (const std::size_t from : candidates(to, ways_m)) {
+    if (auto candidate = verify(from, to, ways_m[from])) judge(*std::move(candidate));
+  }
+  while (!pending_.empty() && pending_.front().to + config_.agreement_submaps <= to) {
+    pending_.front().closure.refusal = "no second closure agreed with its jump";
+    refused_.push_back(std::move(pending_.front().closure));
+    pending_.pop_front();
+  }
+}
+
+std::vector<std::size_t> LoopCloser::candidates(std::size_t to,
+                                                const std::vector<double>& ways_m) const {
+  const Eigen::Vector3d at_map = T_map_submap(submaps_[to]).translation();
+  std::vector<std::pair<double, std::size_t>> near;
+  for (std::size_t from = 0; from < to; ++from) {
+    if (submaps_[to].submap.way_m - submaps_[from].submap.way_m < config_.min_way_between_m) break;
+    const double distance_m =
+        (T_map_submap(submaps_[from]).translation() - at_map).head<2>().norm();
+    const double reach_m = window_after(config_.drift, ways_m[from]).reach_m;
+    if (distance_m < config_.max_distance_m + reach_m) near.emplace_back(distance_m, from);
+  }
+  std::ranges::sort(near);
+  std::vector<std::size_t> chosen;
+  for (const auto& [distance_m, from] : near)
+    if (chosen.size() < config_.max_candidates) chosen.push_back(from);
+  return chosen;
+}
+
+std::vector<double> LoopCloser::ways_from(std::size_t submap) const {
+  std::vector<double> ways(submaps_.size(), std::numeric_limits<double>::infinity());
+  ways[submap] = 0.0;
+  const auto shorten = [&ways](std::size_t a, std::size_t b, double way_m) {
+    const bool is_shorter = ways[a] + way_m < ways[b] || ways[b] + way_m < ways[a];
+    ways[b] = std::min(ways[b], ways[a] + way_m);
+    ways[a] = std::min(ways[a], ways[b] + way_m);
+    return is_shorter;
+  };
+  for (bool is_changing = true; is_changing;) {
+    is_changing = false;
+    for (std::size_t i = submaps_.size() - 1; i > 0; --i)
+      is_changing |= shorten(i, i - 1, submaps_[i].submap.way_m - submaps_[i - 1].submap.way_m);
+    for (const Joint& joint : joints_)
+      is_changing |= shorten(joint.from, joint.to, way_of_closure_m);
+    for (std::size_t i = 1; i < submaps_.size(); ++i)
+      is_changing |= shorten(i, i - 1, submaps_[i].submap.way_m - submaps_[i - 1].submap.way_m);
+  }
+  return ways;
+}
+
+std::optional<LoopCloser::Candidate> LoopCloser::verify(std::size_t from, std::size_t to,
+                                                        double way_m) {
+  const PlacedSubmap& a = submaps_[from];
+  const PlacedSubmap& b = submaps_[to];
+  const Eigen::Isometry3d T_a_b_expected = T_map_submap(a).inverse() * T_map_submap(b);
+  const PlanAlignments aligned =
+      align_in_plan(a.image, b.image, in_plan(T_a_b_expected), window_after(config_.drift, way_m));
+  Candidate candidate{.from = from, .to = to, .closure = {}, .edge = {}};
+  LoopClosure& closure = candidate.closure;
+  closure.from_scan = nodes_[a.submap.key_node].scan;
+  closure.to_scan = nodes_[b.submap.key_node].scan;
+  closure.runner_up = aligned.runner_up.score / std::max(aligned.best.score, 1e-9);
+  const auto offset_m = ground_offset_m(a.image, b.image, aligned.best.T_a_b);
+  if (!offset_m) return std::nullopt;
+
+  const SubmapTarget target(a.submap);
+  const Eigen::Isometry3d T_a_b_guess = in_space(aligned.best.T_a_b, *offset_m);
+  const OdometryResult found = target.register_submap(b.submap, T_a_b_guess);
+  closure.T_from_to = a.submap.T_submap_key.inverse() * found.T_map_lidar * b.submap.T_submap_key;
+  closure.jump_m = (T_a_b_expected.translation() - found.T_map_lidar.translation()).norm();
+  if (closure.jump_m < config_.min_jump_m && excursion_m(from, to) < config_.min_excursion_m)
+    return std::nullopt;
+  closure.refusal = fault_of(found, closure);
+  const Eigen::Isometry3d refinement = T_a_b_guess.inverse() * found.T_map_lidar;
+  if (closure.refusal.empty() && (refinement.translation().norm() > config_.max_refinement_m ||
+                                  angle_of(refinement) > config_.max_refinement_rad))
+    closure.refusal = "registration left the place that the plan showed";
+  if (closure.refusal.empty() && closure.runner_up > config_.max_runner_up) {
+    const OdometryResult other =
+        target.register_submap(b.submap, in_space(aligned.runner_up.T_a_b, *offset_m));
+    const double away_m =
+        (other.T_map_lidar.translation() - found.T_map_lidar.translation()).norm();
+    if (other.health != OdometryHealth::lost && away_m > 0.3 &&
+        other.upright_fit > found.upright_fit - config_.min_fit_margin)
+      closure.refusal = "another place fits nearly as well";
+  }
+  if (!closure.refusal.empty()) {
+    refused_.push_back(std::move(closure));
+    return std::nullopt;
+  }
+  // The error of the motion between keys is along the axes of the later key.
+  const Eigen::Matrix3d R = b.submap.T_submap_key.linear().transpose();
+  Matrix6d turn = Matrix6d::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = R;
+  candidate.edge = {.from = a.submap.key_node,
+                    .to = b.submap.key_node,
+                    .T_from_to = closure.T_from_to,
+                    .information = turn * edge_information(found) * turn.transpose(),
+                    .is_loop = true};
+  return candidate;
+}
+
+double LoopCloser::excursion_m(std::size_t from, std::size_t to) const {
+  const std::size_t first = submaps_[from].submap.key_node;
+  const Eigen::Vector3d left_map = graph_.T_map_node[first].translation();
+  double excursion = 0.0;
+  for (std::size_t n = first; n < submaps_[to].submap.key_node; ++n)
+    excursion = std::max(excursion, (graph_.T_map_node[n].translation() - left_map).norm());
+  return excursion;
+}
+
+std::string LoopCloser::fault_of(const OdometryResult& found, LoopClosure& closure) const {
+  closure.fit = found.fit;
+  closure.upright_fit = found.upright_fit;
+  closure.overlap = found.overlap;
+  if (found.health == OdometryHealth::lost) return "the submaps do not meet";
+  if (found.health != OdometryHealth::good) return "the submaps may slide along one another";
+  if (found.overlap < config_.min_overlap) return "too little of the submaps meets";
+  if (found.fit < config_.min_fit || found.upright_fit < config_.min_upright_fit)
+    return "the submaps do not fit";
+  return "";
+}
+
+void LoopCloser::judge(Candidate candidate) {
+  if (candidate.closure.jump_m <= config_.max_single_jump_m) return accept(std::move(candidate));
+  // Where the two would put the map's frame of the later place: the same for both.
+  const auto correction = [this](const Candidate& c) {
+    return graph_.T_map_node[c.edge.from] * c.edge.T_from_to *
+           graph_.T_map_node[c.edge.to].inverse();
+  };
+  const Eigen::Vector3d at_map = graph_.T_map_node[candidate.edge.to].translation();
+  const Eigen::Isometry3d mine = correction(candidate);
+  for (auto other = pending_.begin(); other != pending_.end(); ++other) {
+    if (other->to == candidate.to) continue;
+    const Eigen::Isometry3d theirs = correction(*other);
+    const double apart_m = (mine * at_map - theirs * at_map).norm();
+    if (apart_m > config_.agreement_m || angle_of(mine.inverse() * theirs) > config_.agreement_rad)
+      continue;
+    Candidate agreeing = std::move(*other);
+    pending_.erase(other);
+    accept(std::move(agreeing));
+    return accept(std::move(candidate));
+  }
+  pending_.push_back(std::move(candidate));
+}
+
+void LoopCloser::accept(Candidate candidate) {
+  joints_.push_back({candidate.from, candidate.to, graph_.edges.size()});
+  graph_.edges.push_back(candidate.edge);
+  closures_.push_back(std::move(candidate.closure));
+  solve();
+}
+
+void LoopCloser::solve() {
+  const PoseGraphConfig solver{.loop_scale = config_.loop_scale};
+  graph_.T_map_node = optimize(graph_, solver).T_map_node;
+  for (std::size_t k = 0; k < joints_.size(); ++k) {
+    const PoseEdge& edge = graph_.edges[joints_[k].edge];
+    const double squared = squared_error(edge, graph_.T_map_node[edge.from],
+                                         graph_.T_map_node[edge.to], EdgeError::geodesic);
+    if (squared < config_.max_squared_error) continue;
+    closures_[k].refusal = "the rest of the graph denies it";
+    refused_.push_back(std::move(closures_[k]));
+    closures_.erase(closures_.begin() + static_cast<std::ptrdiff_t>(k));
+    graph_.edges.erase(graph_.edges.begin() + static_cast<std::ptrdiff_t>(joints_[k].edge));
+    const std::size_t removed = joints_[k].edge;
+    joints_.erase(joints_.begin() + static_cast<std::ptrdiff_t>(k));
+    for (Joint& joint : joints_)
+      if (joint.edge > removed) --joint.edge;
+    return solve();
+  }
+}
+
+std::vector<Eigen::Isometry3d> LoopCloser::corrected_poses() const {
+  std::vector<Eigen::Isometry3d> poses = T_odom_lidar_;
+  if (closures_.empty()) return poses;
+  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+    const std::size_t first = nodes_[n].scan;
+    const bool is_last = n + 1 == nodes_.size();
+    const std::size_t end = is_last ? poses.size() : nodes_[n + 1].scan;
+    const Eigen::Isometry3d T_node_odom = T_odom_lidar_[first].inverse();
+    // What the motion to the next node is corrected by, spread over the scans between.
+    Eigen::Isometry3d rest = Eigen::Isometry3d::Identity();
+    if (!is_last) {
+      rest = (graph_.T_map_node[n] * T_node_odom * T_odom_lidar_[end]).inverse() *
+             graph_.T_map_node[n + 1];
+    }
+    for (std::size_t k = first; k < end; ++k) {
+      const double share = static_cast<double>(k - first) / static_cast<double>(end - first);
+      poses[k] = graph_.T_map_node[n] * T_node_odom * T_odom_lidar_[k] *
+                 scaled_motion(rest, is_last ? 0.0 : share);
+    }
+  }
+  return poses;
+}
+
+std::size_t LoopCloser::submap_bytes() const {
+  std::size_t bytes = 0;
+  for (const PlacedSubmap& placed : submaps_) bytes += placed.submap.bytes();
+  return bytes;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,195 @@
+#include "core/graph/scan_log.hpp"
+
+#include <zstd.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <span>
+#include <utility>
+
+#include "core/dataset/dataset_error.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr float step_m = 0.004F;
+constexpr std::uint64_t magic = 0x31474f4c4e414353;  // "SCANLOG1"
+/// Larger ones are damage.
+constexpr std::uint64_t max_points = 100'000'000;
+
+/// What stands before a scan's compressed points.
+struct Header {
+  std::uint64_t magic_number = magic;
+  std::uint64_t index = 0;
+  std::int64_t stamp_ns = 0;
+  /// Row by row, 3x4.
+  std::array<double, 12> pose{};
+  std::uint64_t points = 0;
+  std::uint64_t packed_bytes = 0;
+  std::uint32_t is_confirmed = 0;
+  std::uint32_t has_labels = 0;
+};
+
+/// Planes of bytes, one after the other: low and high bytes of the differences of x, y and z from
+/// point to point, classes, confidence, motion.
+constexpr std::size_t planes = 9;
+
+std::int16_t quantized(float value_m) {
+  constexpr float limit = 32767.0F;
+  return static_cast<std::int16_t>(std::lround(std::clamp(value_m / step_m, -limit, limit)));
+}
+
+std::vector<std::uint8_t> to_planes(const LabelledScan& labelled) {
+  const std::size_t count = labelled.scan.size();
+  std::vector<std::uint8_t> bytes(planes * count);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::uint16_t last = 0;
+    const std::size_t low = 2 * static_cast<std::size_t>(axis) * count;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto value = static_cast<std::uint16_t>(quantized(labelled.scan.points_lidar[i][axis]));
+      const auto difference = static_cast<std::uint16_t>(value - std::exchange(last, value));
+      bytes[low + i] = static_cast<std::uint8_t>(difference & 0xFFU);
+      bytes[low + count + i] = static_cast<std::uint8_t>(difference >> 8U);
+    }
+  }
+  for (std::size_t i = 0; i < count; ++i) {
+    bytes[6 * count + i] = static_cast<std::uint8_t>(labelled.label(i));
+    if (!labelled.labels.confidence.empty()) {
+      const float confidence = std::clamp(labelled.labels.confidence[i], 0.0F, 1.0F);
+      bytes[7 * count + i] = static_cast<std::uint8_t>(std::lround(255.0F * confidence));
+    }
+    bytes[8 * count + i] = static_cast<std::uint8_t>(labelled.motion[i]);
+  }
+  return bytes;
+}
+
+LabelledScan from_planes(std::span<const std::uint8_t> bytes, const Header& header) {
+  const std::size_t count = header.points;
+  LabelledScan labelled;
+  labelled.scan.stamp_ns = header.stamp_ns;
+  labelled.scan.points_lidar.resize(count);
+  labelled.motion.resize(count);
+  for (int axis = 0; axis < 3; ++axis) {
+    std::uint16_t last = 0;
+    const std::size_t low = 2 * static_cast<std::size_t>(axis) * count;
+    for (std::size_t i = 0; i < count; ++i) {
+      last = static_cast<std::uint16_t>(last + bytes[low + i] + (bytes[low + count + i] << 8));
+      labelled.scan.points_lidar[i][axis] = step_m * static_cast<std::int16_t>(last);
+    }
+  }
+  for (std::size_t i = 0; i < count; ++i)
+    labelled.motion[i] = static_cast<Motion>(bytes[8 * count + i]);
+  if (header.has_labels == 0) return labelled;
+  for (std::size_t i = 0; i < count; ++i) {
+    labelled.labels.classes.push_back(static_cast<SemanticClass>(bytes[6 * count + i]));
+    labelled.labels.confidence.push_back(static_cast<float>(bytes[7 * count + i]) / 255.0F);
+  }
+  return labelled;
+}
+
+Header header_of(const LoggedScan& scan) {
+  Header header;
+  header.index = scan.index;
+  header.stamp_ns = scan.labelled.scan.stamp_ns;
+  Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(header.pose.data()) =
+      scan.T_odom_lidar.matrix().topRows<3>();
+  header.points = scan.is_confirmed ? scan.labelled.scan.size() : 0;
+  header.is_confirmed = scan.is_confirmed ? 1U : 0U;
+  header.has_labels = scan.labelled.labels.empty() ? 0U : 1U;
+  return header;
+}
+
+bool read_header(std::istream& in, Header& header) {
+  in.read(reinterpret_cast<char*>(&header), sizeof(header));
+  return in && header.magic_number == magic && header.points <= max_points &&
+         header.packed_bytes <= ZSTD_compressBound(planes * header.points);
+}
+
+}  // namespace
+
+ScanLog::ScanLog(std::filesystem::path file) : file_(std::move(file)) {
+  if (!std::filesystem::exists(file_)) std::ofstream(file_, std::ios::binary);
+  stream_.open(file_, std::ios::in | std::ios::out | std::ios::binary);
+  if (!stream_) throw DatasetError(file_, "cannot be opened; check the folder and its rights");
+  scan_records();
+}
+
+void ScanLog::scan_records() {
+  const std::uintmax_t size = std::filesystem::file_size(file_);
+  stream_.clear();
+  while (end_ + sizeof(Header) <= size) {
+    Header header;
+    stream_.seekg(static_cast<std::streamoff>(end_));
+    if (!read_header(stream_, header)) break;
+    const std::uintmax_t next = end_ + sizeof(Header) + header.packed_bytes;
+    if (next > size) break;
+    records_.push_back({header.index, end_});
+    end_ = next;
+  }
+  stream_.clear();
+}
+
+void ScanLog::append(const LoggedScan& scan) {
+  Header header = header_of(scan);
+  std::vector<std::uint8_t> packed;
+  if (header.points > 0) {
+    const std::vector<std::uint8_t> bytes = to_planes(scan.labelled);
+    packed.resize(ZSTD_compressBound(bytes.size()));
+    const std::size_t size =
+        ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), 1);
+    if (ZSTD_isError(size) != 0U) throw DatasetError(file_, ZSTD_getErrorName(size));
+    packed.resize(size);
+  }
+  header.packed_bytes = packed.size();
+  stream_.seekp(static_cast<std::streamoff>(end_));
+  stream_.write(reinterpret_cast<const char*>(&header), sizeof(header));
+  stream_.write(reinterpret_cast<const char*>(packed.data()),
+                static_cast<std::streamsize>(packed.size()));
+  if (!stream_) throw DatasetError(file_, "cannot be written; check the space left");
+  records_.push_back({header.index, end_});
+  end_ += sizeof(header) + packed.size();
+}
+
+void ScanLog::flush() {
+  stream_.flush();
+  if (!stream_) throw DatasetError(file_, "cannot be written; check the space left");
+}
+
+void ScanLog::read(const std::function<void(LoggedScan)>& take) {
+  flush();
+  std::vector<std::uint8_t> packed, bytes;
+  for (const Record& record : records_) {
+    Header header;
+    stream_.seekg(static_cast<std::streamoff>(record.offset));
+    if (!read_header(stream_, header)) throw DatasetError(file_, "is damaged");
+    packed.resize(header.packed_bytes);
+    stream_.read(reinterpret_cast<char*>(packed.data()),
+                 static_cast<std::streamsize>(packed.size()));
+    bytes.resize(planes * header.points);
+    const std::size_t size =
+        bytes.empty() ? 0
+                      : ZSTD_decompress(bytes.data(), bytes.size(), packed.data(), packed.size());
+    if (!stream_ || size != bytes.size()) throw DatasetError(file_, "is damaged");
+    LoggedScan scan{.index = header.index,
+                    .T_odom_lidar = Eigen::Isometry3d::Identity(),
+                    .is_confirmed = header.is_confirmed != 0,
+                    .labelled = from_planes(bytes, header)};
+    scan.T_odom_lidar.matrix().topRows<3>() =
+        Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(header.pose.data());
+    take(std::move(scan));
+  }
+}
+
+void ScanLog::truncate_from(std::uint64_t index) {
+  while (!records_.empty() && records_.back().index >= index) {
+    end_ = records_.back().offset;
+    records_.pop_back();
+  }
+  flush();
+  std::error_code error;
+  std::filesystem::resize_file(file_, end_, error);
+  if (error) throw DatasetError(file_, "cannot be shortened: " + error.message());
+}
+
+}  // namespace stillmap

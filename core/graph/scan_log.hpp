@@ -1,0 +1,60 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <vector>
+
+#include "core/lidar/labelled_scan.hpp"
+
+namespace stillmap {
+
+/// A scan as it entered the map.
+struct LoggedScan {
+  /// Number of the scan in its sequence.
+  std::uint64_t index = 0;
+  Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
+  /// Only such scans have points.
+  bool is_confirmed = false;
+  /// Points [m] in steps of 4 mm, up to 131 m along each axis; classes; confidence in 1/255;
+  /// motion.
+  LabelledScan labelled;
+};
+
+/// Scans with labels and motion, compressed in a file that grows: what a map is made of again
+/// after its poses were corrected. What a killed process left incomplete at its end is dropped.
+class ScanLog {
+ public:
+  /// Opens or makes it. Throws DatasetError.
+  explicit ScanLog(std::filesystem::path file);
+
+  /// Throws DatasetError.
+  void append(const LoggedScan& scan);
+  /// What was appended is in the file. Throws DatasetError.
+  void flush();
+
+  /// Every scan in the order of their appending. Throws DatasetError for a file that is damaged.
+  void read(const std::function<void(LoggedScan)>& take);
+  /// Drops the scans from this number on. Throws DatasetError.
+  void truncate_from(std::uint64_t index);
+
+  [[nodiscard]] std::uintmax_t bytes() const { return end_; }
+
+ private:
+  /// Takes stock of complete records: their places.
+  void scan_records();
+
+  std::filesystem::path file_;
+  std::fstream stream_;
+  struct Record {
+    std::uint64_t index;
+    std::uintmax_t offset;
+  };
+  std::vector<Record> records_;
+  std::uintmax_t end_ = 0;
+};
+
+}  // namespace stillmap

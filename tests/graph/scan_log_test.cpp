@@ -1,0 +1,103 @@
+#include "core/graph/scan_log.hpp"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <random>
+
+#include "core/dataset/dataset_error.hpp"
+#include "tests/scratch_folder.hpp"
+
+namespace stillmap {
+namespace {
+
+LoggedScan random_scan(std::uint64_t index, bool has_labels) {
+  std::mt19937_64 random(index);
+  std::uniform_real_distribution<float> coordinate(-100.0F, 100.0F);
+  LoggedScan scan{.index = index,
+                  .T_odom_lidar = Eigen::Isometry3d(Eigen::Translation3d(1.0 * index, 2, 3)),
+                  .is_confirmed = true,
+                  .labelled = {}};
+  scan.labelled.scan.stamp_ns = static_cast<std::int64_t>(index) * 100'000'000;
+  for (int i = 0; i < 500; ++i) {
+    scan.labelled.scan.points_lidar.emplace_back(coordinate(random), coordinate(random),
+                                                 coordinate(random));
+    scan.labelled.motion.push_back(static_cast<Motion>(random() % 3));
+    if (!has_labels) continue;
+    scan.labelled.labels.classes.push_back(static_cast<SemanticClass>(random() % 20));
+    scan.labelled.labels.confidence.push_back(static_cast<float>(random() % 256) / 255.0F);
+  }
+  return scan;
+}
+
+void expect_same(const LoggedScan& read, const LoggedScan& written) {
+  EXPECT_EQ(read.index, written.index);
+  EXPECT_EQ(read.is_confirmed, written.is_confirmed);
+  EXPECT_EQ(read.T_odom_lidar.matrix(), written.T_odom_lidar.matrix());
+  EXPECT_EQ(read.labelled.scan.stamp_ns, written.labelled.scan.stamp_ns);
+  ASSERT_EQ(read.labelled.scan.size(), written.labelled.scan.size());
+  for (std::size_t i = 0; i < read.labelled.scan.size(); ++i) {
+    const Eigen::Vector3f off =
+        read.labelled.scan.points_lidar[i] - written.labelled.scan.points_lidar[i];
+    EXPECT_LE(off.cwiseAbs().maxCoeff(), 0.00201F);
+  }
+  EXPECT_EQ(read.labelled.motion, written.labelled.motion);
+  EXPECT_EQ(read.labelled.labels.classes, written.labelled.labels.classes);
+  EXPECT_EQ(read.labelled.labels.confidence, written.labelled.labels.confidence);
+}
+
+std::vector<LoggedScan> all_of(ScanLog& log) {
+  std::vector<LoggedScan> scans;
+  log.read([&](LoggedScan scan) { scans.push_back(std::move(scan)); });
+  return scans;
+}
+
+TEST(ScanLog, ScansComeBack) {
+  const ScratchFolder scratch;
+  ScanLog log(scratch / "scans");
+  const LoggedScan labelled = random_scan(3, true), plain = random_scan(5, false);
+  LoggedScan lost = random_scan(6, true);
+  lost.is_confirmed = false;
+  for (const LoggedScan& scan : {labelled, plain, lost}) log.append(scan);
+  const auto read = all_of(log);
+  ASSERT_EQ(read.size(), 3U);
+  expect_same(read[0], labelled);
+  expect_same(read[1], plain);
+  EXPECT_EQ(read[2].index, 6U);
+  EXPECT_TRUE(read[2].labelled.scan.empty());
+}
+
+TEST(ScanLog, AnotherProcessGoesOnWhereOneWasKilled) {
+  const ScratchFolder scratch;
+  {
+    ScanLog log(scratch / "scans");
+    for (std::uint64_t i = 0; i < 5; ++i) log.append(random_scan(i, true));
+  }
+  // The last record is cut through.
+  const auto size = std::filesystem::file_size(scratch / "scans");
+  std::filesystem::resize_file(scratch / "scans", size - 10);
+  ScanLog log(scratch / "scans");
+  EXPECT_EQ(all_of(log).size(), 4U);
+  log.truncate_from(3);
+  log.append(random_scan(3, false));
+  const auto read = all_of(log);
+  ASSERT_EQ(read.size(), 4U);
+  expect_same(read[3], random_scan(3, false));
+}
+
+TEST(ScanLog, DamageIsNamed) {
+  const ScratchFolder scratch;
+  ScanLog log(scratch / "scans");
+  log.append(random_scan(0, true));
+  log.flush();
+  std::fstream file(scratch / "scans", std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(400);
+  const std::string garbage(500, 'x');
+  file.write(garbage.data(), static_cast<std::streamsize>(garbage.size()));
+  file.close();
+  EXPECT_THROW(all_of(log), DatasetError);
+  EXPECT_THROW(ScanLog(scratch.path() / "no" / "folder"), DatasetError);
+}
+
+}  // namespace
+}  // namespace stillmap
