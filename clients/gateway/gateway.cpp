@@ -2,6 +2,7 @@
 
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/post.hpp>
+#include <chrono>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <random>
@@ -19,18 +20,22 @@ namespace {
 using stillmap_msgs::srv::GetStatus_Request;
 using stillmap_msgs::srv::GetStatus_Response;
 
+/// Or says that we may not ask.
+bool is_answered(dds::Participant& participant, const std::string& service,
+                 std::chrono::milliseconds timeout) {
+  dds::ServiceClient<GetStatus_Request, GetStatus_Response> client(participant, service);
+  GetStatus_Request request;
+  request.format_version(dds::wire_format_version);
+  return !client.refusal().empty() || client.call(request, timeout).has_value();
+}
+
 /// Over TCP, whoever is there first may have to join again: as the client library does.
 std::unique_ptr<dds::Participant> join_domain(const GatewayOptions& options) {
   auto participant = std::make_unique<dds::Participant>(options.dds);
   if (options.dds.transport != dds::NetworkTransport::tcp) return participant;
   const std::string service = dds::services::get_status.in(options.services.server_name);
-  using StatusClient = dds::ServiceClient<GetStatus_Request, GetStatus_Response>;
-  GetStatus_Request request;
-  request.format_version(dds::wire_format_version);
   TcpRejoinBackoff backoff(options.dds, options.services.timeout);
-  while (!backoff.timed_out()) {
-    StatusClient client(*participant, service);
-    if (!client.refusal().empty() || client.call(request, backoff.next_wait())) break;
+  while (!is_answered(*participant, service, backoff.next_wait()) && !backoff.timed_out()) {
     if (!backoff.rejoin_due()) continue;
     participant = nullptr;
     participant = std::make_unique<dds::Participant>(options.dds);

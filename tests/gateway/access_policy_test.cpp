@@ -12,7 +12,7 @@ RequestIdentity from(std::string_view host, std::string_view origin = {}) {
 }
 
 TEST(AccessPolicy, OnThisMachineAnswersUnderItsOwnNamesOnly) {
-  const AccessPolicy policy({});
+  const AccessPolicy policy(AccessOptions{});
   EXPECT_EQ(policy.judge(from("localhost:8765")), allowed);
   EXPECT_EQ(policy.judge(from("127.0.0.1:8765")), allowed);
   EXPECT_EQ(policy.judge(from("[::1]:8765")), allowed);

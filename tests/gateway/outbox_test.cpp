@@ -110,7 +110,8 @@ TEST(Outbox, MemoryIsBoundedWhateverComes) {
   std::uint64_t pushed = 0;
   std::uint64_t taken = 0;
   for (int i = 0; i < 20000; ++i) {
-    outbox.push(1 + random() % 3, message(random() % 600, i, std::to_string(random() % 9)));
+    outbox.push(static_cast<std::uint32_t>(1 + random() % 3),
+                message(random() % 600, i, std::to_string(random() % 9)));
     ++pushed;
     if (random() % 4 == 0 && next(outbox, random() % 2 == 0) >= 0) ++taken;
     ASSERT_LE(outbox.waiting_bytes(), 3 * limits.max_waiting_bytes);

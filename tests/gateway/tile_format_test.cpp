@@ -25,7 +25,10 @@ Tile random_tile(TileId id, std::size_t voxels) {
                                 id.y * map.tile_size_m + in_tile(random), height(random));
     const VoxelGrid::Index index = grid.index(p_map);
     if (index.tile != id) continue;
-    Voxel voxel{.index = index.voxel, .point_count = 3, .mean_map = p_map.cast<float>()};
+    Voxel voxel;
+    voxel.index = index.voxel;
+    voxel.point_count = 3;
+    voxel.mean_map = p_map.cast<float>();
     voxel.evidence.add(static_cast<SemanticClass>(1 + random() % 19), 1.0F);
     by_place.emplace(index.voxel, voxel);
   }

@@ -48,6 +48,7 @@ async function begin() {
     choice.replaceChildren(...state.profiles.map((name) => new Option(name)));
     if (state.profiles.includes(state.profile)) choice.value = state.profile;
     else state.profile = choice.value;
+    if (!state.grid) showGrid(await server.grid());
   } catch (error) {
     showConnection(error.message, false);
     setTimeout(begin, 3000);
@@ -75,11 +76,13 @@ connection.listen(`${prefix}/path`, ({ poses }) => {
   timeline.update(poses);
 });
 connection.listen(`${prefix}/status`, showStatus);
-connection.listen(`${prefix}/traversability`, (grid) => {
+connection.listen(`${prefix}/traversability`, showGrid);
+
+function showGrid(grid) {
   state.grid = grid;
   setGrid(tiles.material, grid);
   view.draw();
-});
+}
 
 const scanTopic = `${prefix}/scan`;
 function showScans() {

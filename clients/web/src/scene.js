@@ -51,8 +51,13 @@ export class View {
     this.controls.enableDamping = false;
     this.controls.maxPolarAngle = Math.PI / 2 - 0.02;
     this.controls.mouseButtons = { LEFT: MOUSE.PAN, MIDDLE: MOUSE.DOLLY, RIGHT: MOUSE.ROTATE };
-    this.controls.addEventListener("change", () => this.draw());
-    this.controls.addEventListener("start", () => { this.onMoved?.(); });
+    this.controls.addEventListener("start", () => { this.isHeld = true; });
+    this.controls.addEventListener("end", () => { this.isHeld = false; });
+    this.controls.addEventListener("change", () => {
+      // Not of a click that moves nothing.
+      if (this.isHeld) this.onMoved?.();
+      this.draw();
+    });
     this.robot = robotMarker(0xffffff);
     this.past = robotMarker(0x2f81f7);
     this.path = lineOf(0xffffff);

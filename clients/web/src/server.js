@@ -81,6 +81,11 @@ export class Server {
     return names ? names.split(", ") : [];
   }
 
+  /** The planning robot's grid, as nav_msgs/OccupancyGrid; it is published only when it changes. */
+  async grid() {
+    return (await this.connection.call(`${this.prefix}/get_map`, { structure_needs_at_least_one_member: 0 })).map;
+  }
+
   #area(profile, region) {
     return { format_version: this.formatVersion, profile, region, include_grid: true, include_outlines: false, max_cells: 0,
       min_outline_area_m2: 0 };
