@@ -4,9 +4,11 @@ import tempfile
 import unittest
 from pathlib import Path
 
+import numpy as np
 import torch
 import yaml
 
+from adjust_prior import adjust, offsets
 from model_folder import class_names, describe, export_onnx
 from networks import LightRangeNet, RangeNet
 from warm_start import check_description, load_weights
@@ -46,6 +48,23 @@ class WarmStart(unittest.TestCase):
             with torch.no_grad():
                 expected, found = network(images[0]), other.eval()(images[0])
             torch.testing.assert_close(found, expected, rtol=1e-3, atol=1e-3)
+
+    def test_an_adjusted_prior_changes_the_scores_by_so_much_and_nothing_else(self):
+        network = used(LightRangeNet(8, STAGES), 4)
+        change = np.linspace(-1, 1, 20).astype(np.float32)
+        adjust(self.exported(network), self.folder / "adjusted", change)
+        other, images = LightRangeNet(8, STAGES), torch.randn(2, 5, 16, 64)
+        load_weights(other, self.folder / "adjusted", [images])
+        with torch.no_grad():
+            expected = network(images) - torch.from_numpy(change)[:, None, None]
+            found = other.eval()(images)
+        torch.testing.assert_close(found, expected, rtol=1e-3, atol=1e-3)
+
+    def test_a_rare_class_loses_what_its_weight_gave(self):
+        change = offsets([0.1, 0.6, 0.3, 0.001], "log", 0.5)
+        self.assertEqual((change[0], change[1]), (0, 0))
+        expected = 0.5 * np.log(np.log(1.62) / np.log([1.32, 1.021]))
+        np.testing.assert_allclose(change[2:], expected, rtol=1e-4)
 
     def test_batch_norms_fit_the_images(self):
         network, other = used(LightRangeNet(8, STAGES, dropout=0), 2), LightRangeNet(8, STAGES)

@@ -42,9 +42,7 @@ def draw_motion(settings, random):
 
 
 def _change_remission(remission, settings, random):
-    """Random gain, offset, contrast and noise; None in the share of dropped remission."""
-    if random.random() < settings["remission_dropout"]:
-        return None
+    """Random gain, offset, contrast and noise."""
     jitter = settings["remission_jitter"]
     gain, power = np.exp(random.normal(0, jitter, 2))
     noise = random.normal(0, 0.1 * jitter, remission.size).astype(np.float32)
@@ -54,7 +52,7 @@ def _change_remission(remission, settings, random):
 
 def augment_points(points, remission, classes, motion, settings, random):
     """A scan as another sensor might measure it: drops points, limits the range, applies `motion`,
-    lifts the sensor, adds range noise. Remission may become None."""
+    lifts the sensor, adds range noise, changes remission."""
     keep = random.random(len(points)) >= random.uniform(0, settings["drop_points"])
     far = random.uniform(settings["max_range_m"], 120)
     keep &= (points**2).sum(axis=1) < far**2

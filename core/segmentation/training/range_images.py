@@ -25,6 +25,11 @@ class RangeImage:
     pixel: np.ndarray
 
 
+def elevation_rad(points):
+    """Elevation of points (n x 3, none at the origin) above the lidar's horizontal plane."""
+    return np.arcsin(points[:, 2] / np.sqrt((points**2).sum(axis=1)))
+
+
 def project(points, remission, model):
     """Spherical projection; a pixel keeps the nearest of its points.
 

@@ -6,6 +6,7 @@ import numpy as np
 import torch
 
 from augmentation import aim, augment_points, crop, draw_motion, drop_beams, in_sector
+from mixing import Objects, mix_bands, mix_sectors, turned
 from range_images import ImageModel, normalise, project
 from scans import IGNORED, ScanFiles
 
@@ -62,6 +63,11 @@ class TrainingSamples(torch.utils.data.Dataset):
 
     def __init__(self, scans, config):
         self.scans, self.config = scans, config
+        self.settings = config["augmentation"]
+        self.mix_share = self.settings.get("mix_scans", 0)
+        self.paste_share = self.settings.get("paste_objects", 0)
+        self.objects = Objects(scans) if self.paste_share else None
+        self.rows = np.array([image.rows for image in scans.images])
 
     def __len__(self):
         return len(self.scans)
@@ -69,32 +75,76 @@ class TrainingSamples(torch.utils.data.Dataset):
     def __getitem__(self, key):
         index, seed = key
         random = np.random.default_rng(seed)
-        settings = self.config["augmentation"]
+        settings = self.settings
         model = _drawn_width(self.scans.images[index], settings, random)
-        motion = draw_motion(settings, random)
-        scan, azimuth_rad = _part(self.scans.read(index), model, settings, motion, random)
-        points, remission, classes = augment_points(*scan, motion, settings, random)
-        known = remission if remission is not None else np.zeros(len(points), np.float32)
-        image = project(points, known, model)
+        scan, azimuth_rad = self._augmented(index, model, random)
+        points, remission, classes = self._mixed(scan, azimuth_rad, model, random)
+        image = project(points, remission, model)
         drop_beams(image, settings, random)
-        channels = _network_input(image, remission, self.config)
+        known = None if random.random() < settings["remission_dropout"] else remission
+        channels = _network_input(image, known, self.config)
         columns = settings["crop_columns"]
         channels, target = crop(channels, _target(image, classes), columns, azimuth_rad)
         return torch.from_numpy(channels), torch.from_numpy(target)
 
+    def _augmented(self, index, model, random):
+        """A sector of a scan, augmented, and the azimuth of its middle."""
+        motion = draw_motion(self.settings, random)
+        scan, azimuth_rad = _part(self.scans.read(index), model, self.settings, motion, random)
+        return augment_points(*scan, motion, self.settings, random), azimuth_rad
+
+    def _mixed(self, scan, azimuth_rad, model, random):
+        """The sector, perhaps with a part of another scan's, and with objects of others."""
+        width_rad = 2 * np.pi * self.settings["crop_columns"] / model.columns
+        if random.random() < self.mix_share:
+            other, other_rad = self._augmented(self._another(model.rows, random), model, random)
+            other = (turned(other[0], azimuth_rad - other_rad), *other[1:])
+            if random.random() < 0.5:
+                scan = mix_sectors(scan, other, azimuth_rad, width_rad, random)
+            else:
+                scan = mix_bands(scan, other, model, random)
+        if random.random() < self.paste_share:
+            for _ in range(random.integers(1, 4)):
+                scan = self.objects.set_into(scan, azimuth_rad, width_rad, random)
+        return scan
+
+    def _another(self, rows, random):
+        """A scan of a sensor with as many rows, of each folder as often as of the others."""
+        alike = np.flatnonzero(self.rows == rows)
+        folders = np.array(self.scans.folder)[alike]
+        return random.choice(alike[folders == random.choice(np.unique(folders))])
+
+
+def _spread_draws(members, count, random):
+    """`count` of `members`, each as often as the others, give or take one."""
+    whole, rest = divmod(count, len(members))
+    return np.concatenate([np.tile(members, whole), random.permutation(members)[:rest]])
+
 
 class BatchesBySensor(torch.utils.data.Sampler):
     """Batches in random order, each of scans with the same number of rows. The order and all
-    random draws depend on the seed and the epoch alone, so that a resumed run is reproducible."""
+    random draws depend on the seed and the epoch alone, so that a resumed run is reproducible.
 
-    def __init__(self, scans, batch, seed):
+    `draws`: number of scans of each folder in an epoch; None: every scan once."""
+
+    def __init__(self, scans, batch, seed, draws=None):
         self.scans, self.batch, self.seed, self.epoch = scans, batch, seed, 0
+        self.draws = draws
+
+    def _drawn(self, random):
+        if not self.draws:
+            return np.arange(len(self.scans))
+        folder = np.array(self.scans.folder)
+        return np.concatenate(
+            [_spread_draws(np.flatnonzero(folder == k), n, random) for k, n in enumerate(self.draws)]
+        )
 
     def batches(self):
         random = np.random.default_rng([self.seed, self.epoch])
-        rows = np.array([image.rows for image in self.scans.images])
+        drawn = self._drawn(random)
+        rows = np.array([self.scans.images[i].rows for i in drawn])
         for group in np.unique(rows):
-            members = random.permutation(np.flatnonzero(rows == group))
+            members = random.permutation(drawn[rows == group])
             for begin in range(0, len(members) - self.batch + 1, self.batch):
                 chosen = members[begin : begin + self.batch]
                 yield [(int(i), int(random.integers(2**31))) for i in chosen]

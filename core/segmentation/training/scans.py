@@ -56,8 +56,9 @@ class ScanFiles:
     """The labelled scans of one or more SemanticKITTI folders."""
 
     def __init__(self, folders, sequences, default_image):
-        self.files, self.images = [], []
-        for folder in map(Path, folders):
+        """`folder` holds each scan's place in `folders`."""
+        self.files, self.images, self.folder = [], [], []
+        for place, folder in enumerate(map(Path, folders)):
             for sequence in sorted((folder / "sequences").iterdir()):
                 # A name with a suffix is a sequence that is still being written.
                 if sequence.suffix or (sequences and sequence.name not in sequences):
@@ -68,6 +69,7 @@ class ScanFiles:
                     if label.exists():
                         self.files.append((scan, label))
                         self.images.append(image)
+                        self.folder.append(place)
         if not self.files:
             raise FileNotFoundError(f"no labelled scan in {folders} (sequences: {sequences or 'all'})")
 
@@ -76,6 +78,10 @@ class ScanFiles:
 
     def read(self, index):
         """Points (n x 3), remission (n) and class (n), without points that cannot be projected."""
+        return self.read_instances(index)[:3]
+
+    def read_instances(self, index):
+        """As `read`, and the instance id (n) of each point, 0 where it has none."""
         scan_file, label_file = self.files[index]
         scan = np.fromfile(scan_file, np.float32)
         labels = np.fromfile(label_file, np.uint32)
@@ -84,11 +90,21 @@ class ScanFiles:
         scan = scan.reshape(-1, 4)
         usable = np.isfinite(scan).all(axis=1) & (np.abs(scan[:, :3]).max(axis=1) > 1e-3)
         scan = scan[usable]
-        return scan[:, :3], scan[:, 3], classes_of(labels[usable])
+        labels = labels[usable]
+        return scan[:, :3], scan[:, 3], classes_of(labels), labels >> 16
+
+    def evenly_chosen(self, most):
+        """Indices of at most about `most` scans, as many of each folder as there are."""
+        folder = np.array(self.folder)
+        places = np.unique(folder)
+        for place in places:
+            members = np.flatnonzero(folder == place)
+            wanted = min(len(members), -(-most // len(places)))
+            yield from members[np.linspace(0, len(members) - 1, wanted).astype(int)]
 
     def class_shares(self, scans=200):
-        """Share of every class among all points, from scans spread evenly over the set."""
+        """Share of every class among all points, from scans spread evenly over each folder."""
         counts = np.zeros(len(CLASS_NAMES))
-        for index in np.unique(np.linspace(0, len(self) - 1, scans).astype(int)):
+        for index in self.evenly_chosen(scans):
             counts += np.bincount(self.read(index)[2], minlength=counts.size)
         return counts / counts.sum()

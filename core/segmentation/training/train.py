@@ -58,6 +58,12 @@ class Rate:
         return 0.5 * (1 + math.cos(math.pi * min(1.0, share)))
 
 
+def precision(config, device):
+    """A context in which convolutions run in bfloat16, where the configuration says so."""
+    reduced = config["optimiser"].get("bfloat16", False)
+    return torch.autocast(torch.device(device).type, torch.bfloat16, enabled=reduced)
+
+
 class Run:
     """A training run: network, optimiser, progress, and its files."""
 
@@ -66,7 +72,11 @@ class Run:
         self.scans = open_scans(config, "train")
         self.validation = open_scans(config, "validation")
         settings = config["optimiser"]
-        self.sampler = BatchesBySensor(self.scans, settings["batch"], config["seed"])
+        draws = config["data"].get("train_draws")
+        if draws and len(draws) != len(config["data"]["train"]):
+            raise SystemExit(f"data.train_draws has {len(draws)} numbers, data.train other folders")
+        self.sampler = BatchesBySensor(self.scans, settings["batch"], config["seed"], draws)
+        self.samples = TrainingSamples(self.scans, config)
         torch.manual_seed(config["seed"])
         self.network = make_network(config["network"], len(CLASS_NAMES)).to(device)
         self.network = self.network.to(memory_format=torch.channels_last)
@@ -88,9 +98,8 @@ class Run:
         # Imported here, since a run from random weights needs no ONNX.
         from warm_start import check_description, load_weights
 
-        samples = TrainingSamples(self.scans, self.config)
-        chosen = np.linspace(0, len(samples) - 1, 32).astype(int)
-        images = (samples[index, 0][0][None].to(self.device) for index in chosen)
+        chosen = list(self.scans.evenly_chosen(32))
+        images = (self.samples[index, 0][0][None].to(self.device) for index in chosen)
         try:
             check_description(file, self.config)
             load_weights(self.network, file, images)
@@ -144,8 +153,7 @@ class Run:
                     mean.copy_(now)
 
     def scores(self, channels):
-        reduced = self.config["optimiser"].get("bfloat16", False)
-        with torch.autocast(torch.device(self.device).type, torch.bfloat16, enabled=reduced):
+        with precision(self.config, self.device):
             return self.network(channels).float()
 
     def loss(self, scores, target):
@@ -157,7 +165,7 @@ class Run:
         self.network.train()
         self.sampler.epoch = self.epoch
         batches = torch.utils.data.DataLoader(
-            TrainingSamples(self.scans, self.config), batch_sampler=self.sampler, num_workers=1
+            self.samples, batch_sampler=self.sampler, num_workers=1
         )
         began, losses = time.time(), []
         for done, (channels, target) in enumerate(batches, 1):
@@ -176,20 +184,20 @@ class Run:
                 show_progress(self.epoch, done, len(self.sampler), np.mean(losses[-50:]), began)
         return float(np.mean(losses))
 
+    def predict(self, channels):
+        """The most probable class of every pixel, by the averaged weights."""
+        image = torch.from_numpy(channels)[None].to(self.device, memory_format=torch.channels_last)
+        with torch.no_grad(), precision(self.config, self.device):
+            return self.averaged(image).argmax(1)[0].cpu().numpy()
+
     def validate(self):
         confusion = Confusion()
         wanted = min(self.config["data"]["validation_scans"], len(self.validation))
         chosen = np.unique(np.linspace(0, len(self.validation) - 1, wanted).astype(int))
         for index in chosen:
             channels, target = plain_sample(self.validation, index, self.config)
-            confusion.add(target.ravel(), predict(self.averaged, channels, self.device).ravel())
+            confusion.add(target.ravel(), self.predict(channels).ravel())
         return confusion
-
-
-def predict(network, channels, device):
-    """The most probable class of every pixel."""
-    with torch.no_grad():
-        return network(torch.from_numpy(channels)[None].to(device)).argmax(1)[0].cpu().numpy()
 
 
 def write_whole(state, file):
@@ -215,16 +223,14 @@ def read_arguments():
     return parser.parse_args()
 
 
-def main():
-    arguments = read_arguments()
-    config = read_config(arguments.config, arguments.set)
-    torch.set_num_threads(config["threads"])
-    arguments.folder.mkdir(parents=True, exist_ok=True)
-    (arguments.folder / "config.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
-    run = Run(config, arguments.folder, arguments.device)
+def train(run):
+    """Begins or resumes the run, and trains it to its end."""
+    config, folder = run.config, run.folder
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "config.yaml").write_text(yaml.safe_dump(config, sort_keys=False))
     run.resume()
     parameters = sum(p.numel() for p in run.network.parameters())
-    print(f"{parameters / 1e6:.2f} M parameters, {len(run.scans)} scans, {arguments.device}")
+    print(f"{parameters / 1e6:.2f} M parameters, {len(run.scans)} scans, {run.device}")
     while run.epoch < config["optimiser"]["epochs"]:
         loss = run.train_epoch()
         confusion = run.validate()
@@ -234,8 +240,15 @@ def main():
         print(f"epoch {run.epoch}: loss {loss:.4f}, validation mIoU {100 * miou:.1f}")
         print("  " + confusion.table(), flush=True)
         run.save()
-        save_curves(run.history, run.folder / "curves.png")
+        save_curves(run.history, folder / "curves.png")
         save_labelled_images(run)
+
+
+def main():
+    arguments = read_arguments()
+    config = read_config(arguments.config, arguments.set)
+    torch.set_num_threads(config["threads"])
+    train(Run(config, arguments.folder, arguments.device))
 
 
 if __name__ == "__main__":
