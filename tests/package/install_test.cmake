@@ -11,7 +11,7 @@ file(REMOVE_RECURSE ${PREFIX})
 run(0 "" ${CMAKE_COMMAND} --install ${BUILD} --prefix ${PREFIX})
 foreach(file bin/stillmap bin/stillmap-server
         lib/systemd/system/stillmap-server.service etc/stillmap/server.yaml
-        share/stillmap/models/street/model.onnx share/stillmap/server/default.yaml
+        share/stillmap/models/street/model.onnx share/stillmap/models/kitti/model.onnx share/stillmap/server/default.yaml
         share/stillmap/idl/stillmap_msgs.idl share/doc/stillmap/README.md
         share/doc/stillmap/examples/follow_and_query.cpp)
   if(NOT EXISTS ${PREFIX}/${file})
