@@ -180,7 +180,7 @@ def parse(words):
     parser.add_argument("--program", default="build/release/bin/stillmap", help="stillmap")
     parser.add_argument("--results", type=pathlib.Path, default=pathlib.Path("build/release/drives"))
     parser.add_argument("--recordings", type=existing_folder,
-                        help="Folder with kitti_raw_0005 and avia_campus; missing ones are left out")
+                        help="Folder with kitti_raw_0005, avia_campus and vlp16; missing ones are left out")
     parser.add_argument("--against", metavar="NAME=PROGRAM", type=named_program, action="append", default=[],
                         help="Another odometry: PROGRAM SEQUENCE OUT writes OUT/poses_lidar.txt and OUT/ms.txt")
     parser.add_argument("--only", default="", help="Run only what has this in its name or group; the page keeps the others")

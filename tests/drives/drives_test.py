@@ -72,8 +72,12 @@ class Suite(unittest.TestCase):
             self.assertTrue((avia / "poses_lidar.txt").is_file())
             self.assertEqual(drives.with_poses(folder, folder / "results"), avia)
             self.assertIsNone(drives.with_poses(folder / "results", folder / "results"))
+            (folder / "vlp16").mkdir()
+            for name in ("1.5.pcd", "1.6.pcd", "README"):
+                (folder / "vlp16" / name).touch()
             runs = list(suite.recorded(folder, avia))
         self.assertEqual({run.scans for run in runs}, {2})
+        self.assertEqual([run.judged for run in runs if run.drive.endswith("vlp16")], [False])
         self.assertNotIn("other_place", {run.mutation for run in runs})
 
 

@@ -90,7 +90,9 @@ def mutated(extent):
 
 
 def scans_of(folder):
-    return sum(1 for file in (folder / "velodyne").iterdir() if file.suffix in (".bin", ".pcd", ".ply"))
+    scans = folder / "velodyne"
+    files = (scans if scans.is_dir() else folder).iterdir()
+    return sum(1 for file in files if file.suffix in (".bin", ".pcd", ".ply"))
 
 
 def recorded(folder, avia):
@@ -100,6 +102,11 @@ def recorded(folder, avia):
         base = Run("KITTI raw 0005, 64 beams, rolling", str(kitti), scans_of(kitti), judged=False)
         yield dataclasses.replace(base, labels="none")
         yield dataclasses.replace(base, labels="model")
+    vlp16 = folder / "vlp16"
+    if vlp16.is_dir():
+        # No poses come with it: sharpness of the map, and what health says.
+        yield Run("VLP-16, front half, turning on the spot", str(vlp16), scans_of(vlp16), labels="none",
+                  judged=False)
     if avia:
         base = Run("Livox Avia, on foot", str(avia), scans_of(avia), labels="none")
         yield base
