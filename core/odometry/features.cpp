@@ -345,6 +345,11 @@ void pick_points(const Scan& scan, std::vector<std::uint32_t> spaced, Features& 
 
 }  // namespace
 
+bool is_registered_by_surfaces(const SensorModel& sensor, const OdometryConfig& config) {
+  if (sensor.pattern == ScanPattern::irregular) return true;
+  return !config.paper_exact && sensor.rings >= config.features.min_surface_rings;
+}
+
 Features extract_surfaces(const Scan& scan, const FeatureConfig& config) {
   std::vector<std::uint32_t> all(scan.size());
   std::iota(all.begin(), all.end(), 0U);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/lidar/scan.hpp"
+#include "core/lidar/sensor_model.hpp"
 #include "core/odometry/odometry_config.hpp"
 
 namespace stillmap {
@@ -26,6 +27,11 @@ struct Features {
   std::vector<std::uint32_t> upright_points;
   std::vector<std::uint32_t> level_points;
 };
+
+/// Whether a lidar's scans are registered by surfaces, as those without rings are, or by the edges
+/// and planes of its rings.
+[[nodiscard]] bool is_registered_by_surfaces(const SensorModel& sensor,
+                                             const OdometryConfig& config);
 
 /// All points of a scan without rings, thinned: `planes` and `surfaces`.
 [[nodiscard]] Features extract_surfaces(const Scan& scan, const FeatureConfig& config);

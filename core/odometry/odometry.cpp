@@ -36,11 +36,6 @@ constexpr double gap_acceleration_m_s2 = 1.5;
 constexpr double reclassify_distance_m = 0.2;
 constexpr double reclassify_angle_rad = 0.01;
 
-bool is_registered_by_surfaces(const SensorModel& sensor, const OdometryConfig& config) {
-  if (sensor.pattern == ScanPattern::irregular) return true;
-  return !config.paper_exact && sensor.rings >= config.features.min_surface_rings;
-}
-
 void move_points(Scan& scan, const Eigen::Isometry3d& T) {
   const Eigen::Isometry3f T_float = T.cast<float>();
   for (Eigen::Vector3f& point : scan.points_lidar) point = T_float * point;
@@ -51,6 +46,7 @@ void move_points(Scan& scan, const Eigen::Isometry3d& T) {
 struct Odometry::State {
   State(const OdometryConfig& odometry_config, const SensorModel& sensor_model)
       : config(odometry_config.with_method()),
+        first_config(odometry_config.at_start()),
         sensor(sensor_model),
         map(odometry_config.local_map),
         history(odometry_config.motion),
@@ -64,6 +60,10 @@ struct Odometry::State {
                                                   const Eigen::Isometry3d& T_map_lidar) const;
   /// Whether the last velocity predicts the pose of a scan of this time.
   [[nodiscard]] bool has_velocity(std::int64_t stamp_ns) const;
+  /// What scans are registered by now.
+  [[nodiscard]] const OdometryConfig& method() const {
+    return fits.are_known() ? config : first_config;
+  }
   [[nodiscard]] bool is_searched_widely() const {
     return lost_scans == 0 || lost_scans % relocalization_interval == 1;
   }
@@ -92,7 +92,7 @@ struct Odometry::State {
   void confirm(const FeatureSets& features, const PosePrediction& prediction,
                OdometryResult& result) const {
     if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
-    result = confirmed_by_points(result, features, map, config);
+    result = confirmed_by_points(result, features, map, method());
     keep_to_limits(last, prediction, !has_jumped, sensor.motion_limits, result);
   }
   /// Calls a pose good only where the map says so that is older than any doubt of the place.
@@ -113,6 +113,8 @@ struct Odometry::State {
                     const Eigen::Isometry3d& T_map_lidar);
 
   OdometryConfig config;
+  /// Until enough scans are known to judge one by.
+  OdometryConfig first_config;
   SensorModel sensor;
   LocalMap map;
   struct FirstScan {
@@ -174,14 +176,14 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
                                               const PosePrediction& prediction) const {
   if (!started) {
     if (prior_map.empty()) return OdometryResult{.T_map_lidar = prediction.T_map_lidar};
-    return relocalize(features, prior_map, map, prediction.T_map_lidar, config,
+    return relocalize(features, prior_map, map, prediction.T_map_lidar, method(),
                       relocalization_reach_m);
   }
   // Until the place is known, few features tell it sooner.
   OdometryResult found = search_pose(lost_scans > 0 ? downsampled(features) : features, map, last,
-                                     prediction, fits, config);
+                                     prediction, fits, method());
   if (lost_scans > 0 && found.health != OdometryHealth::lost)
-    found = register_features(features, map, found.T_map_lidar, config, found.sweep_correction);
+    found = register_features(features, map, found.T_map_lidar, method(), found.sweep_correction);
   const bool is_believed = prediction.is_known || !fits.are_known()
                                ? fits.believes(found)
                                : fits.believes_relocalized(found);
@@ -191,7 +193,7 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
                                                         prediction.interval_s / last.interval_s
                                                   : 0.0;
     const OdometryResult again =
-        relocalize(features, points_of(map), map, prediction.T_map_lidar, config,
+        relocalize(features, points_of(map), map, prediction.T_map_lidar, method(),
                    std::min(relocalization_reach_m + driven_m, max_relocalization_reach_m));
     if (fits.believes_relocalized(again)) return again;
   }
@@ -243,7 +245,7 @@ void Odometry::State::reclassify_motion(ScanInParts& parts,
   if (parts.movable == MovableUse::none) return;
   features = registered_features(parts, config);
   const OdometryResult again =
-      register_features(features, map, result.T_map_lidar, config, result.sweep_correction);
+      register_features(features, map, result.T_map_lidar, method(), result.sweep_correction);
   if (again.health != OdometryHealth::lost) result = again;
 }
 
@@ -289,7 +291,7 @@ void Odometry::State::straighten_first_scan(const FeatureSets& features, std::in
     extend_local_map(map, first.features, last.T_map_lidar, velocity * first.sweep.duration_s);
     moving.sweep_prior.T_map_lidar_last = last.T_map_lidar;
     found = register_features(moving, map, last.T_map_lidar * motion_of(velocity * interval_s),
-                              config, velocity * sweep.duration_s);
+                              method(), velocity * sweep.duration_s);
     if (found.health == OdometryHealth::lost) return;
   }
   second = found;
@@ -429,6 +431,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   state.reclassify_motion(parts, T_map_lidar_predicted, features, step.result);
   state.confirm(features, prediction, step.result);
   state.confirm_place(features, prediction, step.result);
+  step.result = doubted_where_pulled(step.result, features, state.map, state.config);
   if (state.first_scan) state.straighten_first_scan(features, time_ns, sweep, step.result);
   const Eigen::Isometry3d T_map_middle = step.result.T_map_lidar;
   const Eigen::Isometry3d T_correction = motion_of(step.result.sweep_correction);
@@ -464,11 +467,11 @@ void Odometry::add_prior_map(std::span<const LabelledPoint> points_map) {
   if (!state.started) state.prior_map.assign(points_map.begin(), points_map.end());
 }
 
-void Odometry::reset() { *state_ = State(state_->config, state_->sensor); }
+void Odometry::reset() { *state_ = State(state_->first_config, state_->sensor); }
 
 void Odometry::begin_map() {
   State& state = *state_;
-  State next(state.config, state.sensor);
+  State next(state.first_config, state.sensor);
   const bool has_velocity = state.last.interval_s > 0.0 && state.lost_scans == 0;
   if (has_velocity && !state.has_jumped && !state.stretch) {
     next.last.motion = state.last.motion;

@@ -107,4 +107,10 @@ OdometryConfig OdometryConfig::with_method() const {
   return used;
 }
 
+OdometryConfig OdometryConfig::at_start() const {
+  OdometryConfig used = with_method();
+  if (!paper_exact) used.registration.robust_scale_m = registration.robust_scale_m;
+  return used;
+}
+
 }  // namespace stillmap

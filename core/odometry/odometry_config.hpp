@@ -128,6 +128,9 @@ struct OdometryConfig {
   /// Without what the method that is selected does without: the paper's "no weighting" has no
   /// robust kernel either.
   [[nodiscard]] OdometryConfig with_method() const;
+  /// The same for a map's first scans, which nothing else holds where traffic pulls them: with the
+  /// kernel, but for the paper's own method.
+  [[nodiscard]] OdometryConfig at_start() const;
 };
 
 }  // namespace stillmap

@@ -23,6 +23,9 @@ constexpr double min_gain_of_other_start = 1.01;
 /// A pose that the alignment of points moves by more than this is not confirmed [m, rad].
 constexpr double max_point_deviation_m = 0.2;
 constexpr double max_point_deviation_rad = 0.035;
+/// A pose that traffic pulls by more than this is not called good [m, rad].
+constexpr double max_pull_m = 0.1;
+constexpr double max_pull_rad = 0.01;
 /// Gaps longer than this are looked across from where the lidar was last, too [s].
 constexpr double short_gap_s = 1.0;
 /// After a gap of up to this the lidar may have gone straight on [s].
@@ -265,6 +268,22 @@ OdometryResult confirmed_by_points(const OdometryResult& found, const FeatureSet
   OdometryResult doubtful = opinions.front().pose;
   doubtful.health = OdometryHealth::degenerate;
   return doubtful;
+}
+
+OdometryResult doubted_where_pulled(OdometryResult found, const FeatureSets& features,
+                                    const LocalMap& map, const OdometryConfig& config) {
+  if (config.registration.robust_scale_m > 0.0 || found.health != OdometryHealth::good)
+    return found;
+  OdometryConfig robust = config;
+  robust.weighting = Weighting::geometric;
+  robust.registration.robust_scale_m = RegistrationConfig{}.robust_scale_m;
+  const OdometryResult other =
+      register_features(features, map, found.T_map_lidar, robust, found.sweep_correction);
+  const PoseTangent pull = boxminus(other.T_map_lidar, found.T_map_lidar);
+  const bool stays = other.health != OdometryHealth::lost && pull.head<3>().norm() < max_pull_m &&
+                     pull.tail<3>().norm() < max_pull_rad;
+  if (!stays) found.health = OdometryHealth::degenerate;
+  return found;
 }
 
 double distance_from_expected(const Eigen::Isometry3d& T_map_lidar, const RegisteredScan& last,

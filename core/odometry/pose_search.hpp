@@ -64,6 +64,12 @@ struct PosePrediction {
                                                  const FeatureSets& features, const LocalMap& map,
                                                  const OdometryConfig& config);
 
+/// `found`, but no pose that was found without a robust kernel is good unless it stays where it is
+/// with one: traffic pulls the one along, and not the other.
+[[nodiscard]] OdometryResult doubted_where_pulled(OdometryResult found, const FeatureSets& features,
+                                                  const LocalMap& map,
+                                                  const OdometryConfig& config);
+
 /// How far a pose is from the nearest one that motion before a gap leads to [m]: the prediction,
 /// the last pose, or straight on from it.
 [[nodiscard]] double distance_from_expected(const Eigen::Isometry3d& T_map_lidar,
