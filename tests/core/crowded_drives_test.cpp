@@ -48,7 +48,8 @@ TEST_P(CrowdedDrives, FindTheFirstMotionOfASparseLidar) {
 }
 
 INSTANTIATE_TEST_SUITE_P(WithAndWithoutLabels, CrowdedDrives,
-                         ::testing::Values(Weighting::semantic, Weighting::geometric));
+                         ::testing::Values(Weighting::semantic, Weighting::geometric,
+                                           Weighting::none));
 
 }  // namespace
 }  // namespace stillmap

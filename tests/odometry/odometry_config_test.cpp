@@ -86,5 +86,17 @@ TEST(OdometryConfig, AllFaultsAreListedOneALine) {
   EXPECT_EQ(std::ranges::count(faults, '\n'), 2);
 }
 
+TEST(OdometryConfig, BeginsAMapWithTheKernelUnlessTheMethodIsThePapers) {
+  OdometryConfig none;
+  none.weighting = Weighting::none;
+  EXPECT_EQ(none.with_method().registration.robust_scale_m, 0.0);
+  EXPECT_EQ(none.at_start().registration.robust_scale_m, none.registration.robust_scale_m);
+  EXPECT_EQ(none.at_start().at_start().registration.robust_scale_m,
+            none.registration.robust_scale_m)
+      << "a map that is begun again";
+  none.paper_exact = true;
+  EXPECT_EQ(none.at_start().registration.robust_scale_m, 0.0);
+}
+
 }  // namespace
 }  // namespace stillmap
