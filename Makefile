@@ -53,7 +53,7 @@ web: ## Bundle the page that stillmap-gateway serves, into build/release/share/s
 	  node build.mjs $(CURDIR)/$(BUILD)/share/stillmap/web
 
 viewer: programs web ## A simulated drive in the browser: server, replay and gateway; the page at http://127.0.0.1:8765/
-	@mkdir -p demo && BUILD=$(BUILD) clients/viewer.sh
+	@BUILD=$(BUILD) clients/viewer.sh
 
 web-packages:
 	sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; $$sudo apt-get update -q && \
@@ -67,7 +67,7 @@ test: build ## Build and run the tests
 
 test-web: programs web ## The gateway with Foxglove's own client, and the page in headless Chromium
 	@command -v chromium > /dev/null || $(MAKE) web-packages WEB_PACKAGES=chromium
-	BUILD=$(CURDIR)/$(BUILD) node --test --test-concurrency=1 tests/gateway/web/
+	BUILD=$(CURDIR)/$(BUILD) node --test tests/gateway/web/*.test.mjs
 
 test-dev: ## The tests under ASan and UBSan with assertions, warnings as errors
 	$(MAKE) test PRESET=dev
