@@ -19,8 +19,8 @@ void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_li
                  const SensorModel& sensor, StaticMap& map) {
   map.insert(labelled, T_map_lidar);
   if (!map.clearing_due()) return;
-  const RangeImageView view(labelled.scan, {}, sensor, T_map_lidar);
-  map.clear_seen_through(view, labelled.scan.stamp_ns);
+  map.clear_seen_through(RangeImageView(labelled.scan, {}, sensor, T_map_lidar),
+                         labelled.scan.stamp_ns);
 }
 
 LabelSynchronizer::LabelSynchronizer(std::unique_ptr<SegmentationPipeline> segmentation,

@@ -106,7 +106,9 @@ void read_static_map(YamlSection section, StaticMapConfig& static_map) {
   section.integer("min_points", static_map.min_points, {1, 1000000});
   section.integer("clearing_interval", static_map.clearing_interval, {1, 1000});
   section.integer("misses_to_clear", static_map.misses_to_clear, {1, 1000});
-  section.integer("misses_per_hit", static_map.misses_per_hit, {1, 1000});
+  section.number("misses_per_hit", static_map.misses_per_hit, {0, 1000});
+  section.integer("label_trust", static_map.label_trust, {1, 1000});
+  section.integer("free_space_history", static_map.free_space_history, {0, 1000});
   section.number("clearing_range_m", static_map.clearing_range_m, {0, 1000});
   section.number("clearing_margin_m", static_map.clearing_margin_m, {0.01, 100});
   section.number("clearing_margin_share", static_map.clearing_margin_share, {0, 1});

@@ -15,6 +15,8 @@ namespace {
 
 /// Misses of a voxel are counted up to here.
 constexpr std::uint16_t max_misses = 1000;
+/// So many hits halve the misses of a voxel: more than a vehicle that waits at a light brings.
+constexpr std::uint16_t hits_to_settle = 32;
 /// So many points are looked up before they are added: their voxels are on their way meanwhile.
 constexpr std::size_t block_size = 64;
 constexpr std::uint32_t max_count = std::numeric_limits<std::uint16_t>::max();
@@ -168,7 +170,11 @@ void LiveTile::hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan)
   packed.evidence.add(point.label, point.confidence);
   voxel.last_scan = scan;
   if (point.motion == Motion::semi_static) return;
-  if (is_new_scan && voxel.hits < max_count) ++voxel.hits;
+  if (is_new_scan && voxel.hits < max_count) {
+    ++voxel.hits;
+    // What stays where space was free for long becomes part of the static world in the end.
+    if (voxel.hits % hits_to_settle == 0) voxel.misses = (voxel.misses / 2U) & 0x3FFFU;
+  }
   if (packed.point_count < PackedVoxel::max_mean_points) {
     for (std::size_t axis = 0; axis < 3; ++axis) {
       packed.offset_sum[axis] =
@@ -184,19 +190,28 @@ void LiveTile::exclude(Excluded& voxel, const TilePoint& point, std::uint32_t sc
   voxel.last_scan = scan;
 }
 
-bool LiveTile::clear_seen_through(const std::function<bool(const Eigen::Vector3f&)>& is_free,
-                                  std::uint32_t scan, const VisibilityRule& rule) {
+void LiveTile::add_misses(LiveVoxel& voxel, std::uint32_t misses) {
+  if (voxel.misses + misses > max_misses) {
+    // Halved, so that something placed where space was free for long can still become visible.
+    voxel.misses = max_misses / 2;
+    voxel.hits /= 2;
+  }
+  voxel.misses = static_cast<std::uint16_t>(voxel.misses + misses) & 0x3FFFU;
+}
+
+bool LiveTile::clear_seen_through(const VisibilityTest& test, std::uint32_t scan,
+                                  const VisibilityRule& rule) {
   bool hides_one = false;
   const auto look_at = [&](LiveVoxel& voxel) {
-    if (voxel.last_scan == scan || voxel.is_restored != 0) return;
-    if (!is_free(mean_map(voxel))) return;
-    if (voxel.misses >= max_misses) {
-      // Halved, so that something placed where space was free for long can still become visible.
-      voxel.misses = max_misses / 2;
-      voxel.hits /= 2;
-    }
+    if (voxel.packed.point_count == 0 || voxel.is_restored != 0) return;
+    const bool is_new = voxel.first_scan > test.last_scan_cleared && test.times_free_before;
+    if (voxel.last_scan == scan && !is_new) return;
+    const Eigen::Vector3f position_map = mean_map(voxel);
+    std::uint32_t misses = is_new ? test.times_free_before(position_map) : 0;
+    if (voxel.last_scan != scan && test.is_free(position_map)) ++misses;
+    if (misses == 0) return;
     const bool was_hidden = is_seen_through(voxel, rule);
-    ++voxel.misses;
+    add_misses(voxel, misses);
     hides_one |= !was_hidden && is_seen_through(voxel, rule);
   };
   std::ranges::for_each(sorted_, look_at);
@@ -209,8 +224,10 @@ VoxelHistory LiveTile::history(const LiveVoxel& voxel) {
 }
 
 bool LiveTile::is_seen_through(const LiveVoxel& voxel, const VisibilityRule& rule) {
-  return voxel.is_restored == 0 && voxel.misses >= rule.misses_to_clear &&
-         voxel.misses > rule.misses_per_hit * voxel.hits;
+  const bool has_class = voxel.packed.evidence.winner() != SemanticClass::unlabeled;
+  const std::uint32_t trust = has_class ? rule.label_trust : 1;
+  return voxel.is_restored == 0 && voxel.misses >= trust * rule.misses_to_clear &&
+         voxel.misses > trust * rule.misses_per_hit * voxel.hits;
 }
 
 bool LiveTile::is_shown(const LiveVoxel& voxel, const VisibilityRule& rule) {

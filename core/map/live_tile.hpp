@@ -37,10 +37,22 @@ struct TilePoint {
 /// When a voxel is shown.
 struct VisibilityRule {
   /// Points that it was hit by.
-  std::uint32_t min_points = 2;
+  std::uint32_t min_points = 1;
   /// It is hidden once this many scans saw through it, and this many for each scan that hit it.
-  std::uint32_t misses_to_clear = 4;
-  std::uint32_t misses_per_hit = 2;
+  std::uint32_t misses_to_clear = 1;
+  double misses_per_hit = 0.1;
+  /// Times as many of both for voxels that have a class.
+  std::uint32_t label_trust = 3;
+};
+
+/// Whether scans saw through a position of the map frame [m].
+struct VisibilityTest {
+  /// A ray of this scan passed it.
+  std::function<bool(const Eigen::Vector3f& position_map)> is_free;
+  /// How many of the scans before it did, of those that are kept; empty: none are.
+  std::function<std::uint32_t(const Eigen::Vector3f& position_map)> times_free_before;
+  /// Voxels that no scan hit until this one are asked how often they were free before.
+  std::uint32_t last_scan_cleared = 0;
 };
 
 /// The mutable side of a tile: all evidence so far, also of voxels that no snapshot shows yet, in
@@ -55,10 +67,10 @@ class LiveTile {
   /// Points in voxels beyond the first 16,777,215 of a tile are left out.
   void insert(std::span<const TilePoint> points, std::uint32_t scan);
 
-  /// Counts a miss for each voxel that the scan saw through; `is_free` tells whether a ray passed a
-  /// position (map frame). True when this hides a voxel.
-  [[nodiscard]] bool clear_seen_through(const std::function<bool(const Eigen::Vector3f&)>& is_free,
-                                        std::uint32_t scan, const VisibilityRule& rule);
+  /// Counts a miss for each voxel that the scan saw through, and for each earlier scan that saw
+  /// through a voxel which came after it. True when this hides a voxel.
+  [[nodiscard]] bool clear_seen_through(const VisibilityTest& test, std::uint32_t scan,
+                                        const VisibilityRule& rule);
 
   /// Of the voxel; no votes when there is no such voxel.
   [[nodiscard]] ClassEvidence evidence(std::uint32_t voxel_key) const;
@@ -137,6 +149,7 @@ class LiveTile {
   /// Asks for the memory of the voxels that these points hit.
   void prefetch_voxels(std::span<const TilePoint> points) const;
   static void hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan);
+  static void add_misses(LiveVoxel& voxel, std::uint32_t misses);
   static void exclude(Excluded& voxel, const TilePoint& point, std::uint32_t scan);
   std::size_t restore_excluded(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
                                const VisibilityRule& rule);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cassert>
 #include <cmath>
+#include <deque>
 #include <memory>
 #include <sstream>
 #include <stdexcept>
@@ -72,9 +73,12 @@ std::string StaticMapConfig::faults() const {
   }
   if (misses_to_clear == 0 || misses_to_clear > 1000)
     faults << "misses_to_clear = " << misses_to_clear << "; must be 1 to 1000\n";
-  if (misses_per_hit == 0 || misses_per_hit > 1000) {
-    faults << "misses_per_hit = " << misses_per_hit << "; must be 1 to 1000\n";
-  }
+  if (!(misses_per_hit >= 0.0 && misses_per_hit <= 1000.0))
+    faults << "misses_per_hit = " << misses_per_hit << "; must be 0 to 1000\n";
+  if (label_trust == 0 || label_trust > 1000)
+    faults << "label_trust = " << label_trust << "; must be 1 to 1000\n";
+  if (free_space_history > 1000)
+    faults << "free_space_history = " << free_space_history << "; must be at most 1000\n";
   if (min_points == 0) faults << "min_points = 0; must be at least 1\n";
   return faults.str();
 }
@@ -96,8 +100,16 @@ struct StaticMap::State {
       : config(checked(map_config)), tiles(config), sorter(tiles.grid(), map_config.max_range_m) {}
 
   [[nodiscard]] VisibilityRule rule() const {
-    return {config.min_points, config.misses_to_clear, config.misses_per_hit};
+    return {config.min_points, config.misses_to_clear, config.misses_per_hit, config.label_trust};
   }
+  /// Whether a ray of the view passed this position.
+  [[nodiscard]] bool sees_through(const RangeImageView& view,
+                                  const Eigen::Vector3f& position_map) const;
+  /// How many of the views that are kept saw through this position.
+  [[nodiscard]] std::uint32_t times_free(const Eigen::Vector3f& position_map) const;
+  /// Keeps the view of a scan that cleared.
+  void keep(RangeImageView view, std::uint32_t scan);
+  void forget_views();
   /// Scans from a position reach tiles that are this near, with a margin of two tiles [m].
   [[nodiscard]] double reach_m() const { return config.max_range_m + 2.0 * config.tile_size_m; }
 
@@ -107,9 +119,37 @@ struct StaticMap::State {
   bool is_frozen = false;
   /// Scans so far.
   std::uint64_t inserted = 0;
+  /// Views of the last scans that cleared, newest last, and the number of the newest one.
+  std::deque<RangeImageView> past_views;
+  std::uint32_t last_scan_cleared = 0;
   /// Tiles of the checkpoint that was taken last.
   std::vector<TileId> in_checkpoint;
 };
+
+bool StaticMap::State::sees_through(const RangeImageView& view,
+                                    const Eigen::Vector3f& position_map) const {
+  const double range_m = (position_map - view.origin_map()).norm();
+  if (range_m > config.clearing_range_m) return false;
+  const auto observation = view.observe(position_map);
+  return observation && observation->nearest_m > range_m + config.clearing_margin_m +
+                                                     config.clearing_margin_share * range_m;
+}
+
+std::uint32_t StaticMap::State::times_free(const Eigen::Vector3f& position_map) const {
+  return static_cast<std::uint32_t>(std::ranges::count_if(
+      past_views, [&](const RangeImageView& view) { return sees_through(view, position_map); }));
+}
+
+void StaticMap::State::keep(RangeImageView view, std::uint32_t scan) {
+  past_views.push_back(std::move(view));
+  if (past_views.size() > config.free_space_history) past_views.pop_front();
+  last_scan_cleared = scan;
+}
+
+void StaticMap::State::forget_views() {
+  past_views.clear();
+  last_scan_cleared = 0;
+}
 
 StaticMap::StaticMap(const StaticMapConfig& config) : state_(std::make_unique<State>(config)) {}
 StaticMap::~StaticMap() = default;
@@ -145,23 +185,21 @@ bool StaticMap::clearing_due() const {
          state_->inserted % state_->config.clearing_interval == 0;
 }
 
-void StaticMap::clear_seen_through(const RangeImageView& view, std::int64_t stamp_ns) {
+void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns) {
   if (state_->is_frozen) return;
   const StaticMapConfig& config = state_->config;
-  const auto is_free = [&](const Eigen::Vector3f& position_map) {
-    const double range_m = (position_map - view.origin_map()).norm();
-    if (range_m > config.clearing_range_m) return false;
-    const auto observation = view.observe(position_map);
-    return observation && observation->nearest_m > range_m + config.clearing_margin_m +
-                                                       config.clearing_margin_share * range_m;
-  };
   MapTiles& tiles = state_->tiles;
   const std::vector<LiveTile*> near = tiles.near(view.origin_map(), config.clearing_range_m);
   const std::uint32_t scan = tiles.stamps().add(stamp_ns);
+  const VisibilityTest test{
+      .is_free = [&](const Eigen::Vector3f& p_map) { return state_->sees_through(view, p_map); },
+      .times_free_before = [&](const Eigen::Vector3f& p_map) { return state_->times_free(p_map); },
+      .last_scan_cleared = state_->last_scan_cleared};
   std::vector<std::uint8_t> hides(near.size());
   tbb::parallel_for(std::size_t{0}, near.size(), [&](std::size_t i) {
-    hides[i] = near[i]->clear_seen_through(is_free, scan, state_->rule()) ? 1 : 0;
+    hides[i] = near[i]->clear_seen_through(test, scan, state_->rule()) ? 1 : 0;
   });
+  state_->keep(std::move(view), scan);
   tiles.begin_step();
   for (std::size_t i = 0; i < near.size(); ++i) {
     // Counts changed in all of them; only tiles with a voxel to hide are published again.
@@ -183,6 +221,7 @@ void StaticMap::reset(std::uint64_t map_id) {
   state_->tiles.clear(map_id);
   state_->in_checkpoint.clear();
   state_->inserted = 0;
+  state_->forget_views();
 }
 
 const StaticMapConfig& StaticMap::config() const { return state_->config; }

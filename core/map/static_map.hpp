@@ -22,19 +22,25 @@ struct StaticMapConfig {
   /// Points farther from the lidar than this are not mapped.
   double max_range_m = 60.0;
   /// A voxel enters the view once it was hit this often.
-  std::uint32_t min_points = 2;
+  std::uint32_t min_points = 1;
   /// Visibility clearing runs on every n-th scan: consecutive scans see through the same voxels.
   std::uint32_t clearing_interval = 3;
   /// A voxel is hidden once this many of those scans saw through it, and this many for each scan
   /// that hit it.
-  std::uint32_t misses_to_clear = 4;
-  std::uint32_t misses_per_hit = 2;
+  std::uint32_t misses_to_clear = 1;
+  double misses_per_hit = 0.1;
+  /// Times as many of both for voxels that have a class: of one that cannot move, else they were
+  /// not shown.
+  std::uint32_t label_trust = 3;
+  /// So many of those scans are kept: those that saw free space where a voxel is now, before it was
+  /// hit for the first time, count as well.
+  std::uint32_t free_space_history = 16;
   /// Range of clearing round the lidar; 0 turns clearing off.
-  double clearing_range_m = 25.0;
+  double clearing_range_m = 60.0;
   /// A ray passes through a voxel when it ends at least this far behind it, plus this share of the
   /// range.
-  double clearing_margin_m = 0.5;
-  double clearing_margin_share = 0.02;
+  double clearing_margin_m = 0.3;
+  double clearing_margin_share = 0.01;
 
   /// Every fault in words, one a line; empty when the configuration can be used.
   [[nodiscard]] std::string faults() const;
@@ -91,9 +97,10 @@ class StaticMap {
 
   /// Whether visibility clearing is due for the scan inserted last.
   [[nodiscard]] bool clearing_due() const;
-  /// Visibility clearing: counts a miss for each voxel that this scan saw through. What stood there
-  /// is not part of the static world, whatever its class.
-  void clear_seen_through(const RangeImageView& view, std::int64_t stamp_ns);
+  /// Visibility clearing: counts a miss for each voxel that this scan saw through, and for each
+  /// voxel that is new as many as earlier scans saw through its place. What stood there is not part
+  /// of the static world, whatever its class.
+  void clear_seen_through(RangeImageView view, std::int64_t stamp_ns);
 
   /// The tiles whose footprint meets the box (map frame [m]), resident or not, also those that show
   /// nothing; sorted. Of those that show something, the first `max_shown`.

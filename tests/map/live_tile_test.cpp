@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <random>
+#include <set>
 
 #include "core/map/storage/tile_codec.hpp"
 
@@ -41,6 +42,16 @@ bool every_fourth_is_free(const Eigen::Vector3f& position_map) {
   return static_cast<int>(std::floor(position_map.x() * 5.0F)) % 4 == 0;
 }
 
+/// Of earlier scans some passed what is new.
+VisibilityTest visibility_after(std::uint32_t last_scan_cleared) {
+  return {.is_free = every_fourth_is_free,
+          .times_free_before =
+              [](const Eigen::Vector3f& position_map) {
+                return static_cast<std::uint32_t>(std::floor(position_map.y() * -5.0F)) % 3;
+              },
+          .last_scan_cleared = last_scan_cleared};
+}
+
 void expect_same(const TileRecord& a, const TileRecord& b) {
   ASSERT_TRUE(a.tile && b.tile);
   EXPECT_EQ(a.tile->info.content_hash, b.tile->info.content_hash);
@@ -57,17 +68,20 @@ TEST(LiveTile, GoesOnFromItsRecordAsIfItHadStayed) {
   ScanStamps reloaded_stamps;
   LiveTile kept(live_id, live_grid);
   auto reloaded = std::make_unique<LiveTile>(live_id, live_grid);
+  std::uint32_t last_number = 0;
+  std::uint32_t last_other_number = 0;
   for (std::uint32_t scan = 0; scan < 40; ++scan) {
     // Time goes back once.
     const std::int64_t stamp_ns = 1'000'000'000LL * scan - (scan == 17 ? 5'000'000'001LL : 0);
     const auto points = scan_of(scan);
     const std::uint32_t number = stamps.add(stamp_ns);
     kept.insert(points, number);
-    (void)kept.clear_seen_through(every_fourth_is_free, number, rule);
+    (void)kept.clear_seen_through(visibility_after(last_number), number, rule);
     (void)kept.publish(scan + 1, rule, stamps);
     const std::uint32_t other_number = reloaded_stamps.add(stamp_ns);
     reloaded->insert(points, other_number);
-    (void)reloaded->clear_seen_through(every_fourth_is_free, other_number, rule);
+    (void)reloaded->clear_seen_through(visibility_after(last_other_number), other_number, rule);
+    last_number = number;
     (void)reloaded->publish(scan + 1, rule, reloaded_stamps);
     const TileRecord record = reloaded->record(rule, reloaded_stamps);
     expect_same(record, kept.record(rule, stamps));
@@ -79,6 +93,58 @@ TEST(LiveTile, GoesOnFromItsRecordAsIfItHadStayed) {
     reloaded_stamps.clear();
     reloaded = std::make_unique<LiveTile>(live_id, stored, live_grid, reloaded_stamps);
     expect_same(reloaded->record(rule, reloaded_stamps), record);
+    last_other_number = reloaded_stamps.add(-1);
+  }
+}
+
+/// Whether the scan saw through this place, at random.
+bool is_free_in(std::uint32_t scan, const Eigen::Vector3f& position_map) {
+  const Eigen::Array3f place = (position_map.array() * 5.0F).floor();
+  const auto seed = static_cast<std::uint32_t>(1000.0F * place[0] + 100.0F * place[1] + place[2]);
+  return std::mt19937(seed + 77'777U * scan)() % 3 == 0;
+}
+
+TEST(LiveTile, CountsTheMissesOfLaterScansAndOfThoseKeptBefore) {
+  constexpr std::uint32_t scans = 30;
+  constexpr std::uint32_t kept_scans = 4;
+  LiveTile tile(live_id, live_grid);
+  ScanStamps stamps;
+  std::mt19937 random(3);
+  std::map<std::uint32_t, std::set<std::uint32_t>> scans_that_hit;
+  for (std::uint32_t scan = 0; scan < scans; ++scan) {
+    std::vector<TilePoint> points;
+    for (int i = 0; i < 100; ++i) {
+      const VoxelIndex index{static_cast<std::uint16_t>(random() % 20),
+                             static_cast<std::uint16_t>(random() % 20), 0};
+      points.push_back(point_in(voxel_key(index)));
+      scans_that_hit[voxel_key(index)].insert(scan);
+    }
+    tile.insert(points, stamps.add(scan));
+    const VisibilityTest test{
+        .is_free = [&](const Eigen::Vector3f& p_map) { return is_free_in(scan, p_map); },
+        .times_free_before =
+            [&](const Eigen::Vector3f& p_map) {
+              std::uint32_t times = 0;
+              for (std::uint32_t age = 1; age <= std::min(scan, kept_scans); ++age)
+                times += is_free_in(scan - age, p_map) ? 1 : 0;
+              return times;
+            },
+        .last_scan_cleared = scan == 0 ? 0 : scan - 1};
+    (void)tile.clear_seen_through(test, scan, rule);
+  }
+  (void)tile.publish(1, {.misses_to_clear = 1000}, stamps);
+  const TileRecord record = tile.record({.misses_to_clear = 1000}, stamps);
+  ASSERT_EQ(record.evidence->shown.size(), scans_that_hit.size());
+  for (std::size_t i = 0; i < record.tile->voxels.size(); ++i) {
+    const Voxel voxel = record.tile->voxels[i];
+    const std::set<std::uint32_t>& hits = scans_that_hit.at(voxel_key(voxel.index));
+    int misses = 0;
+    for (std::uint32_t scan = 0; scan < scans; ++scan) {
+      const bool is_asked = !hits.contains(scan) && scan + kept_scans >= *hits.begin();
+      misses += is_asked && is_free_in(scan, voxel.mean_map) ? 1 : 0;
+    }
+    EXPECT_EQ(record.evidence->shown[i].misses, misses);
+    EXPECT_EQ(record.evidence->shown[i].hits, hits.size());
   }
 }
 

@@ -58,7 +58,7 @@ LabelledScan street_scan(std::uint32_t seed, int columns) {
 }
 
 StaticMap street_map(int scans, int columns) {
-  StaticMap map{StaticMapConfig{}};
+  StaticMap map{StaticMapConfig{.min_points = 2}};
   for (int i = 0; i < scans; ++i) {
     const Eigen::Isometry3d T_map_lidar(Eigen::Translation3d(i, 0.0, lidar_height_m));
     map.insert(street_scan(static_cast<std::uint32_t>(i), columns), T_map_lidar);

@@ -45,7 +45,7 @@ TEST(StaticMap, AgreesWithAPlainMapOfVoxels) {
     Eigen::Vector3d mean = Eigen::Vector3d::Zero();
     std::uint32_t count = 0;
   };
-  const StaticMapConfig config;
+  const StaticMapConfig config{.min_points = 2};
   StaticMap map(config);
   std::map<std::tuple<int, int, int>, Sum> expected;
   std::mt19937 random(7);

@@ -144,7 +144,7 @@ void add_removed_command(CommandHandle program, Action& action) {
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "moving: only things that were seen moving were there. semi-static: things that stood, but\n"
-      "can move. seen through: shown once, but rays keep passing through it. relabelled: shown\n"
+      "can move. seen through: rays passed its place, before it came or later. relabelled: shown\n"
       "once, but later scans took it for something that can move.\n"
       "Examples:\n"
       "  stillmap removed city_map/map.stillmap --picture removed.png\n"
