@@ -237,12 +237,12 @@ std::vector<StandingMesh> City::standing_meshes() const {
   return standing;
 }
 
-City build_city(const GroundShape& ground, std::uint64_t seed) {
+City build_city(const GroundShape& ground, std::uint64_t seed, std::uint64_t day_seed) {
   City city;
   add_ground(city.fixed, ground);
   add_lane_markings(city.fixed, ground);
   fill_blocks(city, ground, Random(seed, 21));
-  park_vehicles(city, ground, Random(seed, 23));
+  park_vehicles(city, ground, Random(day_seed, 23));
   furnish_streets(city, ground, Random(seed, 22));
   return city;
 }

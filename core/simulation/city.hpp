@@ -56,8 +56,10 @@ struct City {
   [[nodiscard]] std::vector<StandingMesh> standing_meshes() const;
 };
 
-/// The standing city of the plan; the same seed gives the same city.
-[[nodiscard]] City build_city(const GroundShape& ground, std::uint64_t seed);
+/// The standing city of the plan; the same seed gives the same city, and the same `day_seed` the
+/// same parked vehicles in it.
+[[nodiscard]] City build_city(const GroundShape& ground, std::uint64_t seed,
+                              std::uint64_t day_seed);
 
 /// Houses, gardens and their enclosures, in the blocks between the streets.
 void fill_blocks(City& city, const GroundShape& ground, Random random);

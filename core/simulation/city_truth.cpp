@@ -35,7 +35,7 @@ SemanticClass class_of(Zone zone, const CityPlan& plan) {
 struct CityTruth::World {
   explicit World(const SimulationConfig& config)
       : ground(config.plan, config.seed),
-        city(build_city(ground, config.seed)),
+        city(build_city(ground, config.seed, config.day_seed())),
         scene(city.meshes(), city.standing_meshes()),
         standing(scene.with({})) {}
 

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/simulation/city.hpp"
+#include "core/simulation/random.hpp"
 #include "core/simulation/ray_scene.hpp"
 #include "core/simulation/traffic.hpp"
 
@@ -108,9 +109,10 @@ LidarMotion lidar_motion(const std::string& name) {
 struct Simulation::World {
   explicit World(SimulationConfig c)
       : config(std::move(c)),
+        day_seed(config.day_seed()),
         ground(config.plan, config.seed),
-        city(build_city(ground, config.seed)),
-        traffic(ground, config.seed, {0.0, (config.scans + 1) * config.sensor.period_s},
+        city(build_city(ground, config.seed, day_seed)),
+        traffic(ground, day_seed, {0.0, (config.scans + 1) * config.sensor.period_s},
                 city.instances),
         scene(all_meshes(city, traffic), city.standing_meshes()),
         firings(firings_of(config)) {
@@ -207,6 +209,7 @@ struct Simulation::World {
   [[nodiscard]] SimulatedScan collect(int index, const std::vector<Pixel>& pixels) const;
 
   SimulationConfig config;
+  std::uint64_t day_seed;
   GroundShape ground;
   City city;
   Traffic traffic;
@@ -244,7 +247,7 @@ std::vector<Pixel> Simulation::World::fire_revolution(int index) const {
     }
     snapshot.cast(std::span(rays).first(count), std::span(hits).first(count));
     for (std::size_t i = 0; i < count; ++i) {
-      const Random random(config.seed, 41, static_cast<std::uint64_t>(index), targets[i]);
+      const Random random(day_seed, 41, static_cast<std::uint64_t>(index), targets[i]);
       if (hits[i]) pixels[targets[i]] = pixel_of(*hits[i], bodies, rays[i], ring, random);
     }
   };
@@ -267,7 +270,7 @@ void Simulation::World::mix_edges(int index, std::vector<Pixel>& pixels) const {
     const float step_m = pixels[i + 1].range_m - pixels[i].range_m;
     const bool is_edge = std::abs(step_m) > min_step_m && std::abs(step_m) < max_step_m;
     if (!is_edge || pixels[i].range_m == 0.0F || pixels[i + 1].range_m == 0.0F) continue;
-    Random random(config.seed, 42, static_cast<std::uint64_t>(index), i);
+    Random random(day_seed, 42, static_cast<std::uint64_t>(index), i);
     if (!random.chance(config.flaws.mixed_share)) continue;
     pixels[i].range_m += static_cast<float>(random.uniform()) * step_m;
   }
@@ -296,6 +299,11 @@ SimulatedScan Simulation::World::collect(int index, const std::vector<Pixel>& pi
     }
   }
   return out;
+}
+
+std::uint64_t SimulationConfig::day_seed() const {
+  constexpr std::uint64_t stream = 51;
+  return day == 0 ? seed : Random(seed, stream, day).index(1U << 30U);
 }
 
 std::string SimulationConfig::faults() const {

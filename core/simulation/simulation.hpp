@@ -34,6 +34,8 @@ struct SimulationConfig {
   CityPlan plan = quiet_city();
   /// Determines city and traffic.
   std::uint64_t seed = 1;
+  /// Another day in the same city: other traffic, other parked vehicles, other noise.
+  std::uint64_t day = 0;
   SensorModel sensor = hdl_64e();
   /// Length of the sequence, one scan every `sensor.period_s`.
   int scans = 400;
@@ -50,6 +52,8 @@ struct SimulationConfig {
   LidarFlaws flaws;
   Materials materials = default_materials();
 
+  /// Seed of all that changes from day to day; that of the city on day 0.
+  [[nodiscard]] std::uint64_t day_seed() const;
   /// All faults, one a line; empty when the configuration is valid.
   [[nodiscard]] std::string faults() const;
 };

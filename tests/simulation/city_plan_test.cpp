@@ -83,16 +83,30 @@ TEST_F(Ground, FramesStandUprightOrLeanALittle) {
 }
 
 TEST_F(Ground, CityIsTheSameForTheSameSeedOnly) {
-  const City a = build_city(ground_, 5);
-  const City b = build_city(ground_, 5);
-  const City c = build_city(ground_, 6);
+  const City a = build_city(ground_, 5, 5);
+  const City b = build_city(ground_, 5, 5);
+  const City c = build_city(ground_, 6, 6);
   EXPECT_EQ(a.fixed.vertices, b.fixed.vertices);
   EXPECT_EQ(a.bodies.size(), b.bodies.size());
   EXPECT_NE(a.fixed.vertices, c.fixed.vertices);
 }
 
+TEST_F(Ground, AnotherDayParksOtherVehiclesInTheSameCity) {
+  const City monday = build_city(ground_, 5, 5);
+  const City tuesday = build_city(ground_, 5, 6);
+  EXPECT_EQ(monday.fixed.vertices, tuesday.fixed.vertices);
+  const auto parked = [](const City& city) {
+    std::vector<Eigen::Vector3d> places;
+    for (const Body& body : city.bodies)
+      if (body.label == 10) places.emplace_back(body.T_map_body.translation());
+    return places;
+  };
+  EXPECT_GT(parked(tuesday).size(), 10U);
+  EXPECT_NE(parked(monday), parked(tuesday));
+}
+
 TEST_F(Ground, ParkedVehiclesStandInBaysApartFromEachOther) {
-  const City city = build_city(ground_, 5);
+  const City city = build_city(ground_, 5, 5);
   std::vector<const Body*> parked;
   for (const Body& body : city.bodies) {
     if (body.label == 10) parked.push_back(&body);

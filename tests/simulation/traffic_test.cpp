@@ -44,7 +44,7 @@ class TrafficOn : public testing::TestWithParam<const char*> {
 
   CityPlan plan_ = city_plan(GetParam());
   GroundShape ground_{plan_, 2};
-  City city_ = build_city(ground_, 2);
+  City city_ = build_city(ground_, 2, 2);
   Traffic traffic_{ground_, 2, {0.0, 60.0}, city_.instances};
 };
 

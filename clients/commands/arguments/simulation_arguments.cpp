@@ -62,9 +62,11 @@ void check_seed(const std::string& option, std::uint64_t seed) {
 
 simulation::SimulationConfig simulation_config(const SimulationArguments& arguments) {
   check_seed("--seed", arguments.seed);
+  check_seed("--day", arguments.day);
   simulation::SimulationConfig config;
   config.plan = plan_of(arguments);
   config.seed = arguments.seed;
+  config.day = arguments.day;
   config.sensor = load_sensor(sensor_name(arguments.sensor));
   config.scans = arguments.scans;
   config.rolling = arguments.rolling;

@@ -15,6 +15,7 @@ struct SimulationArguments {
   std::string traffic;
   std::string sensor = "hdl_64e";
   std::uint64_t seed = 1;
+  std::uint64_t day = 0;
   int scans = 300;
   bool rolling = false;
   std::string motion = "vehicle";

@@ -50,10 +50,15 @@ ExitCode run(const SimulateArguments& arguments) {
   const simulation::Simulation simulation(config);
   const Written written = write_sequence(arguments.out, simulation, arguments.imu, stop);
   if (arguments.json) {
-    std::cout << Json{{"folder", arguments.out},      {"city", config.plan.name},
-                      {"sensor", config.sensor.name}, {"seed", config.seed},
-                      {"scans", written.scans},       {"points", written.points},
-                      {"rolling", config.rolling},    {"motion", arguments.simulation.motion}}
+    std::cout << Json{{"folder", arguments.out},
+                      {"city", config.plan.name},
+                      {"sensor", config.sensor.name},
+                      {"seed", config.seed},
+                      {"day", config.day},
+                      {"scans", written.scans},
+                      {"points", written.points},
+                      {"rolling", config.rolling},
+                      {"motion", arguments.simulation.motion}}
                      .dump(2)
               << "\n";
   } else {
@@ -86,6 +91,10 @@ void add_simulate_command(CommandHandle program, Action& action) {
               "hdl_64e (hdl64), hdl_32e, vlp_16 (vlp16) or a sensor file")
       .with_default();
   command.option("--seed", simulation.seed, "Another seed is another city and other traffic")
+      .with_default();
+  command
+      .option("--day", simulation.day,
+              "Another day in the same city: other traffic, other parked vehicles")
       .with_default();
   command.option("--scans", simulation.scans, "Scans to write, ten a second of driving")
       .above_zero()
