@@ -14,7 +14,7 @@ FILES ?=
 TILES ?=
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages web-packages configure programs web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 drives loops ros-messages parity format format-check clean
+.PHONY: help packages web-packages configure programs web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 relocalize drives loops ros-messages parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -104,6 +104,10 @@ bench: build ## Benchmarks of every stage
 table1: programs ## The paper's Table I on simulated streets, crowded and quiet
 	$(BUILD)/bin/stillmap evaluate weightings sim:crowd --seed 2 --scans 480
 	$(BUILD)/bin/stillmap evaluate weightings sim:quiet --seed 1 --scans 500
+
+relocalize: build ## Places of another day and of other cities, looked for in a map with no prior pose
+	@for sensor in VLP-16 HDL-64E; do \
+	  $(BUILD)/tests/bench/relocalization_bench --sensor $$sensor --folder $(BUILD) --scans 950 --seeds 1,2 --places 200 || exit 1; done
 
 drives: programs ## Every drive, simulated and in RECORDINGS=FOLDER, into tests/README.md: hours; goes on where it stopped
 	@/usr/bin/python3 tests/drives/drives.py --program $(BUILD)/bin/stillmap --results $(BUILD)/drives \

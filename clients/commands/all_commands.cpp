@@ -65,6 +65,7 @@ void add_commands(CommandHandle program, Action& action) {
   program.require_command();
   program.explain(introduction);
   add_map_command(program, action);
+  add_localize_command(program, action);
   add_traversable_command(program, action);
   add_plan_command(program, action);
   add_check_path_command(program, action);

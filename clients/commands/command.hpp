@@ -34,6 +34,7 @@ void add_commands(CommandHandle program, Action& action);
 
 // Each adds one subcommand to the program; when it is chosen, it sets `action`.
 void add_map_command(CommandHandle program, Action& action);
+void add_localize_command(CommandHandle program, Action& action);
 void add_traversable_command(CommandHandle program, Action& action);
 void add_plan_command(CommandHandle program, Action& action);
 void add_check_path_command(CommandHandle program, Action& action);

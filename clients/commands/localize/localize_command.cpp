@@ -1,0 +1,268 @@
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iostream>
+#include <memory>
+#include <numbers>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/commands/arguments/mapper_arguments.hpp"
+#include "clients/commands/arguments/mount_arguments.hpp"
+#include "clients/commands/command.hpp"
+#include "clients/commands/mapping/mapping_run.hpp"
+#include "clients/terminal/json.hpp"
+#include "clients/terminal/progress.hpp"
+#include "clients/terminal/stop_signal.hpp"
+#include "clients/terminal/table.hpp"
+#include "core/dataset/dataset_error.hpp"
+#include "core/localization/localizer.hpp"
+#include "core/map/storage/map_file.hpp"
+#include "core/picture/map_picture.hpp"
+#include "idl/bag/bag_scan_source.hpp"
+
+namespace stillmap::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+struct LocalizeArguments {
+  std::string map;
+  std::string dataset;
+  std::string topic_in;
+  MapperArguments mapper;
+  MountArguments mount;
+  ScanRange range;
+  int step = 1;
+  std::string picture;
+  bool json = false;
+};
+
+/// What became of one scan.
+struct LocalizedScan {
+  std::size_t index = 0;
+  std::int64_t stamp_ns = 0;
+  LocalizationResult result;
+  double ms = 0.0;
+};
+
+struct LoadedMap {
+  SavedMap saved;
+  std::shared_ptr<const PlaceIndex> index;
+  double load_ms = 0.0;
+  double index_ms = 0.0;
+};
+
+LoadedMap load_map(const std::string& file) {
+  if (!is_map_file(file))
+    throw std::invalid_argument(file + " is no map file: 'stillmap map' and a server write them");
+  LoadedMap map;
+  const auto load_began = Clock::now();
+  map.saved = open_map_file(file)->load();
+  map.load_ms = milliseconds_since(load_began);
+  const auto index_began = Clock::now();
+  map.index =
+      std::make_shared<const PlaceIndex>(std::make_shared<const MapSnapshot>(map.saved.view),
+                                         map.saved.trajectory, std::make_shared<TileReader>());
+  map.index_ms = milliseconds_since(index_began);
+  return map;
+}
+
+/// A place is told by its geometry: the network is not run unless it is asked for.
+MapperArguments labels_of(MapperArguments arguments, const ScanDataset& dataset) {
+  if (arguments.labels == "auto") arguments.labels = dataset.has_labels(0) ? "files" : "none";
+  return arguments;
+}
+
+/// Looks for scans of a data set, each for itself.
+class LocalizationRun {
+ public:
+  LocalizationRun(const ScanDataset& dataset, const LocalizeArguments& arguments,
+                  const Localizer& localizer)
+      : dataset_(dataset),
+        localizer_(localizer),
+        config_(mapper_config(arguments.mapper, dataset.suggested_sensor())),
+        segmenter_(make_segmenter(labels_of(arguments.mapper, dataset), dataset)),
+        T_body_lidar_(arguments.mount.T_base_lidar().value_or(Eigen::Isometry3d::Identity())),
+        is_strict_(arguments.range.strict) {}
+
+  /// Nothing for a scan that cannot be read; why is said.
+  std::optional<LocalizedScan> localize(std::size_t index, Progress& progress) {
+    try {
+      const Scan scan = drop_unusable_points(dataset_.read(index).scan, config_.prepare);
+      LocalizedScan localized{index, scan.stamp_ns, {}, 0.0};
+      const auto began = Clock::now();
+      const PointLabels labels = segmenter_->segment(scan);
+      localized.result = localizer_.localize(scan, labels, T_body_lidar_.linear());
+      localized.ms = milliseconds_since(began);
+      for (PlaceHypothesis& place : localized.result.places)
+        place.T_map_lidar = place.T_map_lidar * T_body_lidar_.inverse();
+      return localized;
+    } catch (const DatasetError& error) {
+      if (is_strict_) throw;
+      progress.say(std::string("stillmap: skipped: ") + error.what());
+      return std::nullopt;
+    }
+  }
+
+ private:
+  const ScanDataset& dataset_;
+  const Localizer& localizer_;
+  MapperConfig config_;
+  std::unique_ptr<Segmenter> segmenter_;
+  Eigen::Isometry3d T_body_lidar_;
+  bool is_strict_;
+};
+
+Json pose_json(const Eigen::Isometry3d& T) {
+  const Eigen::Quaterniond q(T.rotation());
+  const Eigen::Vector3d t = T.translation();
+  Json rows = Json::array();
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) rows.push_back(T.matrix()(row, column));
+  return {{"position", {t.x(), t.y(), t.z()}},
+          {"orientation_xyzw", {q.x(), q.y(), q.z(), q.w()}},
+          {"matrix_3x4", rows}};
+}
+
+double heading_deg(const Eigen::Isometry3d& T) {
+  return std::atan2(T.linear()(1, 0), T.linear()(0, 0)) * 180.0 / std::numbers::pi;
+}
+
+double score_of(const LocalizationResult& result, std::size_t place) {
+  return place < result.places.size() ? result.places[place].evidence.score() : 0.0;
+}
+
+Json to_json(const LocalizedScan& scan) {
+  const bool is_found = scan.result.status == LocalizationStatus::found;
+  Json json{{"scan", scan.index},
+            {"stamp_ns", scan.stamp_ns},
+            {"status", name(scan.result.status)},
+            {"pose", is_found ? pose_json(scan.result.places.front().T_map_lidar) : Json(nullptr)},
+            {"score", score_of(scan.result, 0)},
+            {"runner_up_score", score_of(scan.result, 1)},
+            {"ms", scan.ms}};
+  return json;
+}
+
+Json to_json(const std::vector<LocalizedScan>& scans, const LoadedMap& map, double median_ms) {
+  Json list = Json::array();
+  std::size_t found = 0;
+  for (const LocalizedScan& scan : scans) {
+    list.push_back(to_json(scan));
+    if (scan.result.status == LocalizationStatus::found) ++found;
+  }
+  return {{"map",
+           {{"map_id", map.saved.view.map_id},
+            {"places", map.index->nodes().size()},
+            {"load_ms", map.load_ms},
+            {"index_ms", map.index_ms},
+            {"index_bytes", map.index->memory_bytes()}}},
+          {"scans", list},
+          {"found", found},
+          {"median_ms", median_ms}};
+}
+
+double median_ms(const std::vector<LocalizedScan>& scans) {
+  std::vector<double> times;
+  for (const LocalizedScan& scan : scans) times.push_back(scan.ms);
+  const auto middle = times.begin() + static_cast<std::ptrdiff_t>(times.size() / 2);
+  std::nth_element(times.begin(), middle, times.end());
+  return times.empty() ? 0.0 : *middle;
+}
+
+std::string describe(const std::vector<LocalizedScan>& scans, const LoadedMap& map) {
+  Table table({"scan", "", "x", "y", "z", "heading", "score", "runner-up", "ms"});
+  std::size_t found = 0;
+  for (const LocalizedScan& scan : scans) {
+    std::vector<std::string> row{std::to_string(scan.index), name(scan.result.status)};
+    if (scan.result.status == LocalizationStatus::found) {
+      ++found;
+      const Eigen::Isometry3d& T = scan.result.places.front().T_map_lidar;
+      for (int axis = 0; axis < 3; ++axis) row.push_back(fixed(T.translation()[axis], 2));
+      row.push_back(fixed(heading_deg(T), 1));
+    } else {
+      row.insert(row.end(), 4, "-");
+    }
+    row.insert(row.end(), {fixed(score_of(scan.result, 0), 2), fixed(score_of(scan.result, 1), 2),
+                           fixed(scan.ms, 0)});
+    table.add(row);
+  }
+  return table.text() + std::to_string(found) + " of " + std::to_string(scans.size()) +
+         " scans found, " + fixed(median_ms(scans), 0) + " ms a scan (median); map read in " +
+         fixed(map.load_ms, 0) + " ms, made searchable in " + fixed(map.index_ms, 0) + " ms\n";
+}
+
+/// The map with the poses that were found.
+void write_picture(const std::string& file, const std::vector<LocalizedScan>& scans,
+                   const LoadedMap& map) {
+  Trajectory found;
+  for (const LocalizedScan& scan : scans) {
+    if (scan.result.status == LocalizationStatus::found)
+      found.push_back({scan.stamp_ns, scan.result.places.front().T_map_lidar});
+  }
+  write_map_picture(file, map.saved.view, found);
+}
+
+ExitCode run(const LocalizeArguments& arguments) {
+  StopSignal stop;
+  const LoadedMap map = load_map(arguments.map);
+  const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
+  const std::size_t end = arguments.range.end(dataset);
+  const Localizer localizer(map.index);
+  LocalizationRun run(dataset, arguments, localizer);
+  const auto step = static_cast<std::size_t>(arguments.step);
+  Progress progress("localize", "scans", (end - arguments.range.first + step - 1) / step);
+  std::vector<LocalizedScan> scans;
+  for (std::size_t index = arguments.range.first; index < end && !stop.requested(); index += step) {
+    if (auto scan = run.localize(index, progress)) scans.push_back(*std::move(scan));
+    progress.update((index - arguments.range.first) / step + 1);
+  }
+  if (!arguments.picture.empty()) write_picture(arguments.picture, scans, map);
+  std::cout << (arguments.json ? to_json(scans, map, median_ms(scans)).dump(2) + "\n"
+                               : describe(scans, map));
+  return stop.requested() ? ExitCode::failed : ExitCode::ok;
+}
+
+}  // namespace
+
+void add_localize_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<LocalizeArguments>();
+  CommandHandle command = program.command(
+      "localize", "Find scans in a map with no prior pose, each in the whole of it");
+  command.option("MAP", arguments->map, "A map file; it is only read").required();
+  command.option("DATASET", arguments->dataset, dataset_kinds).required();
+  command.option("--topic-in", arguments->topic_in, topic_in_help);
+  add_mapper_options(command, arguments->mapper);
+  add_mount_option(command, arguments->mount,
+                   "Poses of the robot, in a map that was made with the same --mount");
+  command.option("--start", arguments->range.first, "Number of the first scan");
+  command.option("--scans,--count", arguments->range.count, "Look for as many scans at most");
+  command.option("--step", arguments->step, "Every so many scans").above_zero().with_default();
+  command.flag("--strict", arguments->range.strict,
+               "Stop at the first damaged file instead of skipping it");
+  command.option("--picture", arguments->picture, "Draw map and found poses: a .png");
+  command.flag("--json", arguments->json, "Print JSON");
+  command.explain(
+      "Examples:\n"
+      "  stillmap localize city_map/map.stillmap city_next_day --start 120 --scans 5\n"
+      "  stillmap localize city.stillmap drive --step 10 --json | jq '.scans[] | {scan, pose}'\n"
+      "A scan is found, or several places fit it (ambiguous), or none does (not_found), or it or\n"
+      "the map shows too little to tell (no_evidence). A pose is given only where it is found: "
+      "the\n"
+      "map explains the scan, the scan sees what the map has there, and no other place comes near\n"
+      "that. With --labels auto scans without labels are looked for by their geometry alone, and "
+      "no\n"
+      "network runs. The score is the product of both shares; runner-up is that of the next best "
+      "place.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap::cli

@@ -1,0 +1,130 @@
+#include "core/localization/localization_query.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "core/localization/level_plane.hpp"
+#include "core/odometry/features.hpp"
+
+namespace stillmap {
+namespace {
+
+/// Cells of this size, all round and from straight down to straight up.
+constexpr float cells_per_rad = static_cast<float>(360.0 / std::numbers::pi);
+constexpr int columns = 720;
+constexpr int rows = 361;
+
+/// Ground that a lidar stands on is no steeper than this to it, and so far below [m].
+constexpr double max_slope = 0.4;
+constexpr double min_ground_share = 0.25;
+constexpr double min_lidar_height_m = 0.1;
+constexpr double max_lidar_height_m = 6.0;
+/// Level points that are fitted are as near as this [m].
+constexpr float max_ground_range_m = 25.0F;
+/// What stands up is taken as near as this [m].
+constexpr float max_landmark_range_m = 45.0F;
+
+struct Direction {
+  int column = 0;
+  int row = 0;
+};
+
+Direction direction_of(const Eigen::Vector3f& p) {
+  const float azimuth = std::atan2(p.y(), p.x());
+  const float elevation = std::atan2(p.z(), p.head<2>().norm());
+  return {static_cast<int>(std::lround(azimuth * cells_per_rad)),
+          static_cast<int>(std::lround(elevation * cells_per_rad)) + rows / 2};
+}
+
+std::size_t cell_of(int column, int row) {
+  const int wrapped = ((column % columns) + columns) % columns;
+  return static_cast<std::size_t>(std::clamp(row, 0, rows - 1) * columns + wrapped);
+}
+
+Scan turned(const Scan& scan, const Eigen::Matrix3d& R) {
+  Scan turned = scan;
+  const Eigen::Matrix3f rotation = R.cast<float>();
+  for (Eigen::Vector3f& p : turned.points_lidar) p = rotation * p;
+  return turned;
+}
+
+std::vector<Eigen::Vector3f> near_ground(const FeatureSets& features) {
+  std::vector<Eigen::Vector3f> near;
+  for (const FeaturePoint& point : features.level_points) {
+    if (point.position_lidar.norm() < max_ground_range_m) near.push_back(point.position_lidar);
+  }
+  return near;
+}
+
+Eigen::Isometry3d foot_of(const LevelPlane& ground_upright) {
+  const Eigen::Vector3d up =
+      Eigen::Vector3d(-ground_upright.slope.x(), -ground_upright.slope.y(), 1.0).normalized();
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  T.translation().z() = -ground_upright.height_m * up.z();
+  return T;
+}
+
+}  // namespace
+
+DirectionRanges::DirectionRanges(const std::vector<Eigen::Vector3f>& points_lidar)
+    : cells_(std::size_t{columns} * rows) {
+  for (const Eigen::Vector3f& p : points_lidar) {
+    const Direction direction = direction_of(p);
+    Ranges& ranges = cells_[cell_of(direction.column, direction.row)];
+    const float range = p.norm();
+    ranges.nearest = ranges.nearest == 0.0F ? range : std::min(ranges.nearest, range);
+    ranges.farthest = std::max(ranges.farthest, range);
+  }
+}
+
+const DirectionRanges::Ranges& DirectionRanges::at(int column, int row) const {
+  return cells_[cell_of(column, row)];
+}
+
+DirectionRanges::Sight DirectionRanges::look_at(const Eigen::Vector3f& p_lidar) const {
+  const float range = p_lidar.norm();
+  const float margin = 0.5F + 0.02F * range;
+  const Direction direction = direction_of(p_lidar);
+  bool is_seen = at(direction.column, direction.row).farthest > 0.0F;
+  bool is_beyond_all = is_seen;
+  for (int row = direction.row - 1; row <= direction.row + 1; ++row) {
+    for (int column = direction.column - 1; column <= direction.column + 1; ++column) {
+      const Ranges& ranges = at(column, row);
+      if (ranges.farthest == 0.0F) continue;
+      if (ranges.nearest < range + margin && ranges.farthest > range - margin) return Sight::hit;
+      is_beyond_all &= ranges.nearest > range + margin;
+    }
+  }
+  return is_beyond_all ? Sight::seen_through : Sight::unknown;
+}
+
+LocalizationQuery::LocalizationQuery(const Scan& scan, const PointLabels& labels,
+                                     const Eigen::Matrix3d& R_body_lidar)
+    : ranges_upright({}) {
+  const Scan upright = turned(scan, R_body_lidar);
+  ranges_upright = DirectionRanges(upright.points_lidar);
+  const Features features = extract_surfaces(upright, FeatureConfig{});
+  const auto collect = [&](const std::vector<std::uint32_t>& from, std::vector<FeaturePoint>& to) {
+    for (const std::uint32_t i : from) {
+      const SemanticClass label = labels.empty() ? SemanticClass::unlabeled : labels.classes[i];
+      if (!is_movable(label)) to.push_back({upright.points_lidar[i], label});
+    }
+  };
+  collect(features.upright_points, features_upright.points);
+  collect(features.level_points, features_upright.level_points);
+  const std::vector<Eigen::Vector3f> ground = near_ground(features_upright);
+  const auto plane = fit_level_plane(ground, max_slope, min_ground_share);
+  has_ground =
+      plane && -plane->height_m > min_lidar_height_m && -plane->height_m < max_lidar_height_m;
+  if (has_ground) T_foot_upright = foot_of(*plane);
+  const Eigen::Isometry3f T = T_foot_upright.cast<float>();
+  for (const FeaturePoint& point : features_upright.points) {
+    if (point.position_lidar.norm() < max_landmark_range_m)
+      landmarks_foot.push_back(T * point.position_lidar);
+  }
+}
+
+}  // namespace stillmap

@@ -1,0 +1,80 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/lidar/labelled_scan.hpp"
+#include "core/localization/place_index.hpp"
+#include "core/localization/place_search.hpp"
+#include "core/localization/pose_evidence.hpp"
+
+namespace stillmap {
+
+enum class LocalizationStatus {
+  /// One place fits, and no other nearly as well.
+  found,
+  /// Several places fit.
+  ambiguous,
+  /// No place fits.
+  not_found,
+  /// The scan shows too little, or the map has nothing to be found in.
+  no_evidence,
+};
+[[nodiscard]] const char* name(LocalizationStatus status);
+
+struct LocalizationConfig {
+  PlaceSearchConfig search;
+  /// Places that are registered.
+  std::size_t places = 8;
+  /// A pose is believed from here on.
+  double min_explained = 0.5;
+  double min_confirmed = 0.8;
+  double min_level = 0.6;
+  double min_score = 0.48;
+  /// No other place reaches this share of its score.
+  double max_other_share = 0.7;
+  /// Another place is at least so far away, or turned [m, rad].
+  double min_other_m = 1.5;
+  double min_other_rad = 0.26;
+  /// So much of the scan must stand up, and so much of the map must be in its sight.
+  int min_points = 60;
+  int min_map_points = 300;
+};
+
+/// A pose that was registered, with what speaks for it.
+struct PlaceHypothesis {
+  Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
+  PoseEvidence evidence;
+  /// Of the search, before registration.
+  double search_score = 0.0;
+};
+
+struct LocalizationResult {
+  LocalizationStatus status = LocalizationStatus::no_evidence;
+  /// The best first; places apart from one another.
+  std::vector<PlaceHypothesis> places;
+};
+
+/// Finds a scan in a whole map with no prior pose. Thread-safe.
+class Localizer {
+ public:
+  explicit Localizer(std::shared_ptr<const PlaceIndex> index,
+                     const LocalizationConfig& config = {});
+
+  /// `scan` is prepared (see drop_unusable_points), `labels` may be empty. Throws what the index's
+  /// tiles throw.
+  [[nodiscard]] LocalizationResult localize(
+      const Scan& scan, const PointLabels& labels,
+      const Eigen::Matrix3d& R_body_lidar = Eigen::Matrix3d::Identity()) const;
+
+ private:
+  [[nodiscard]] LocalizationStatus judge(const std::vector<PlaceHypothesis>& places) const;
+  [[nodiscard]] bool is_other_place(const PlaceHypothesis& a, const PlaceHypothesis& b) const;
+
+  std::shared_ptr<const PlaceIndex> index_;
+  LocalizationConfig config_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,126 @@
+#include "core/localization/pose_evidence.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/odometry/point_alignment.hpp"
+
+namespace stillmap {
+namespace {
+
+/// A point lies on the map when a point of it is as near as this [m].
+constexpr float max_distance_m = 0.35F;
+/// What of the scan is asked for is as near as this [m]: farther off a map is thin.
+constexpr float explained_range_m = 40.0F;
+/// What is higher is hardly traffic [m]; so many points of that tell a place by themselves.
+constexpr float max_traffic_height_m = 2.5F;
+constexpr int min_high_points = 80;
+/// A level point when the map's height differs by less [m].
+constexpr float max_level_distance_m = 0.25F;
+constexpr float ground_search_m = 0.6F;
+/// What of the map should be seen is as near as this [m].
+constexpr float visible_range_m = 35.0F;
+/// Ground is not asked for: beams graze it.
+constexpr float min_height_above_ground_m = 0.6F;
+/// Where the ground is not known, all of the map is asked for.
+constexpr float any_height_m = 1.0F;
+
+LocalMapConfig map_config() {
+  return {
+      .voxel_size_m = 1.0, .max_points_per_voxel = 32, .min_spacing_m = 0.15, .radius_m = 1000.0};
+}
+
+double share(int part, int whole) {
+  return whole > 0 ? static_cast<double>(part) / static_cast<double>(whole) : 0.0;
+}
+
+/// Whether the voxel would be looked for: it stands up, or would if it has no class.
+bool is_expected(const LabelledPoint& point, float height_over_ground_m) {
+  if (point.label != SemanticClass::unlabeled)
+    return !is_ground(point.label) && !is_movable(point.label);
+  return height_over_ground_m > min_height_above_ground_m;
+}
+
+}  // namespace
+
+MapSurroundings::MapSurroundings(std::span<const LabelledPoint> points_map)
+    : points_map_(points_map), points_(map_config()) {
+  points_.insert(points_map);
+}
+
+Eigen::Isometry3d MapSurroundings::align(const LocalizationQuery& query,
+                                         const Eigen::Isometry3d& T_map_upright) const {
+  const PointAlignmentConfig rough{.max_distance_m = 1.0, .kernel_m = 0.5, .max_iterations = 15};
+  const PointAlignmentConfig fine{.max_distance_m = 0.5, .kernel_m = 0.15, .max_iterations = 20};
+  const Eigen::Isometry3d T =
+      align_points(query.features_upright, points_, T_map_upright, PoseTangent::Zero(), rough)
+          .T_map_lidar;
+  return align_points(query.features_upright, points_, T, PoseTangent::Zero(), fine).T_map_lidar;
+}
+
+PoseEvidence MapSurroundings::evidence(const LocalizationQuery& query,
+                                       const Eigen::Isometry3d& T_map_upright) const {
+  const Eigen::Isometry3f T = T_map_upright.cast<float>();
+  PoseEvidence evidence;
+  ask_map(query, T, evidence);
+  ask_ground(query, T, evidence);
+  ask_scan(query, T, evidence);
+  return evidence;
+}
+
+void MapSurroundings::ask_map(const LocalizationQuery& query, const Eigen::Isometry3f& T,
+                              PoseEvidence& evidence) const {
+  const Eigen::Isometry3f T_foot_upright = query.T_foot_upright.cast<float>();
+  int explained = 0;
+  int high_points = 0;
+  int high_explained = 0;
+  for (const FeaturePoint& point : query.features_upright.points) {
+    if (point.position_lidar.norm() > explained_range_m) continue;
+    const bool is_explained =
+        points_.nearest(T * point.position_lidar, 1, max_distance_m).count > 0;
+    const bool is_high =
+        query.has_ground && (T_foot_upright * point.position_lidar).z() > max_traffic_height_m;
+    ++evidence.scan_points;
+    explained += is_explained ? 1 : 0;
+    high_points += is_high ? 1 : 0;
+    high_explained += is_high && is_explained ? 1 : 0;
+  }
+  evidence.explained = share(explained, evidence.scan_points);
+  if (high_points >= min_high_points)
+    evidence.explained = std::max(evidence.explained, share(high_explained, high_points));
+}
+
+void MapSurroundings::ask_ground(const LocalizationQuery& query, const Eigen::Isometry3f& T,
+                                 PoseEvidence& evidence) const {
+  int level = 0;
+  for (const FeaturePoint& point : query.features_upright.level_points) {
+    const Eigen::Vector3f p = T * point.position_lidar;
+    const Neighbours near = points_.nearest(p, 1, ground_search_m);
+    if (near.count == 0) continue;
+    ++evidence.level_points;
+    const float off_m = near.points[0].position_map.z() - p.z();
+    if (std::abs(off_m) < max_level_distance_m) ++level;
+  }
+  evidence.level = share(level, evidence.level_points);
+}
+
+void MapSurroundings::ask_scan(const LocalizationQuery& query, const Eigen::Isometry3f& T,
+                               PoseEvidence& evidence) const {
+  const Eigen::Isometry3f T_upright_map = T.inverse();
+  const Eigen::Isometry3f T_foot_map = query.T_foot_upright.cast<float>() * T_upright_map;
+  int confirmed = 0;
+  for (const LabelledPoint& point : points_map_) {
+    const Eigen::Vector3f p = T_upright_map * point.position_map;
+    if (p.squaredNorm() > visible_range_m * visible_range_m) continue;
+    const float height_m = (T_foot_map * point.position_map).z();
+    if (!is_expected(point, query.has_ground ? height_m : any_height_m)) continue;
+    const DirectionRanges::Sight sight = query.ranges_upright.look_at(p);
+    if (sight == DirectionRanges::Sight::unknown) continue;
+    ++evidence.map_points;
+    if (sight == DirectionRanges::Sight::hit) ++confirmed;
+  }
+  evidence.confirmed = share(confirmed, evidence.map_points);
+}
+
+}  // namespace stillmap

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <span>
+
+#include "core/localization/localization_query.hpp"
+#include "core/odometry/feature_map.hpp"
+
+namespace stillmap {
+
+/// What a scan and a map say of a pose, each of the other.
+struct PoseEvidence {
+  /// Share of what stands up in the scan that lies on the map: of all of it, or of what is too high
+  /// to be traffic, whichever is more, as without labels traffic hides in it.
+  double explained = 0.0;
+  /// Of what stands up in the map and would be seen from there, the share that the scan shows; the
+  /// rest it looks through.
+  double confirmed = 0.0;
+  /// Share of the scan's level points that lie on the map in height.
+  double level = 0.0;
+  /// Points that each share is of.
+  int scan_points = 0;
+  int map_points = 0;
+  int level_points = 0;
+
+  /// 0..1; low where any of them is.
+  [[nodiscard]] double score() const { return explained * confirmed; }
+};
+
+/// The map round a pose, to register a scan in.
+class MapSurroundings {
+ public:
+  explicit MapSurroundings(std::span<const LabelledPoint> points_map);
+
+  /// The pose that points align at, from a start near it; wherever they end where they do not.
+  [[nodiscard]] Eigen::Isometry3d align(const LocalizationQuery& query,
+                                        const Eigen::Isometry3d& T_map_upright) const;
+  [[nodiscard]] PoseEvidence evidence(const LocalizationQuery& query,
+                                      const Eigen::Isometry3d& T_map_upright) const;
+
+ private:
+  /// Each fills in its part; `T` is T_map_upright.
+  void ask_map(const LocalizationQuery& query, const Eigen::Isometry3f& T,
+               PoseEvidence& evidence) const;
+  void ask_ground(const LocalizationQuery& query, const Eigen::Isometry3f& T,
+                  PoseEvidence& evidence) const;
+  void ask_scan(const LocalizationQuery& query, const Eigen::Isometry3f& T,
+                PoseEvidence& evidence) const;
+
+  std::span<const LabelledPoint> points_map_;
+  FeatureMap points_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,250 @@
+// Found again anywhere: places of another day, and of other cities, looked for in a map with no
+// prior pose. Prints a table; see --help.
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "clients/terminal/command_line.hpp"
+#include "core/lidar/prepare.hpp"
+#include "core/localization/localizer.hpp"
+#include "core/map/map_id.hpp"
+#include "core/map/storage/map_file.hpp"
+#include "core/mapper.hpp"
+#include "core/segmentation/segmenter.hpp"
+#include "core/simulation/simulation.hpp"
+
+namespace stillmap::bench {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr double rad_per_deg = std::numbers::pi / 180.0;
+/// A place is right within these.
+constexpr double max_error_m = 0.5;
+constexpr double max_error_rad = 2.0 * rad_per_deg;
+
+struct Arguments {
+  std::string preset = "quiet";
+  std::string sensor = "VLP-16";
+  int scans = 300;
+  int places = 20;
+  std::vector<std::string> seeds{"1"};
+  std::string folder = std::filesystem::temp_directory_path();
+  bool without_labels = false;
+  bool unlabelled_map = false;
+  bool is_verbose = false;
+};
+
+SensorModel sensor_model(const std::string& name) {
+  for (const SensorModel& sensor : {hdl_64e(), hdl_32e(), vlp_16()})
+    if (sensor.name == name) return sensor;
+  throw std::invalid_argument("no sensor '" + name + "': there are HDL-64E, HDL-32E and VLP-16");
+}
+
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+simulation::SimulationConfig simulation_config(const Arguments& arguments, int seed) {
+  simulation::SimulationConfig config;
+  config.plan = simulation::city_plan(arguments.preset);
+  config.seed = static_cast<std::uint64_t>(seed);
+  config.sensor = sensor_model(arguments.sensor);
+  config.scans = arguments.scans;
+  return config;
+}
+
+/// The map of the first round, and where each of its scans truly was.
+struct FirstRound {
+  SavedMap map;
+  /// In the city's frame.
+  std::vector<Eigen::Isometry3d> T_city_lidar;
+
+  /// Where a pose of the city should be in the map: its drift is none of localization's.
+  [[nodiscard]] Eigen::Isometry3d expected(const Eigen::Isometry3d& T_city_query) const {
+    std::size_t best = 0;
+    const auto distance = [&](std::size_t k) {
+      return (T_city_lidar[k].translation() - T_city_query.translation()).squaredNorm();
+    };
+    for (std::size_t k = 0; k < T_city_lidar.size(); ++k)
+      if (distance(k) < distance(best)) best = k;
+    return map.trajectory[best].T_map_lidar * T_city_lidar[best].inverse() * T_city_query;
+  }
+};
+
+FirstRound first_round(const Arguments& arguments, int seed) {
+  const simulation::SimulationConfig config = simulation_config(arguments, seed);
+  const std::string name = arguments.preset + "_" + arguments.sensor + "_" + std::to_string(seed) +
+                           "_" + std::to_string(arguments.scans) +
+                           (arguments.unlabelled_map ? "_none" : "") + ".stillmap";
+  const std::filesystem::path file = std::filesystem::path(arguments.folder) / name;
+  const simulation::Simulation simulation(config);
+  FirstRound round;
+  for (int k = 0; k < config.scans; ++k)
+    round.T_city_lidar.push_back(simulation.T_map_lidar_at(k * config.sensor.period_s));
+  if (!std::filesystem::exists(file)) {
+    MapperConfig mapper_config;
+    mapper_config.sensor = config.sensor;
+    Mapper mapper(mapper_config, std::make_unique<PassthroughSegmenter>());
+    mapper.reset(new_map_id());
+    for (int k = 0; k < config.scans; ++k) {
+      Scan scan = simulation.scan(k).scan;
+      if (arguments.unlabelled_map) scan.labels.clear();
+      static_cast<void>(mapper.process(std::move(scan)));
+    }
+    SavedMap map = to_saved_map(mapper.static_map().checkpoint(CheckpointScope::everything));
+    map.trajectory = mapper.trajectory();
+    open_map_file(file)->save(map);
+  }
+  round.map = open_map_file(file)->load();
+  return round;
+}
+
+struct Tally {
+  int right = 0;
+  int wrong = 0;
+  int ambiguous = 0;
+  int not_found = 0;
+  std::vector<double> times_ms;
+};
+
+struct Ride {
+  double lateral_m = 0.0;
+  double turned_deg = 0.0;
+};
+
+Tally localize_places(const Arguments& arguments, const Localizer& localizer,
+                      const FirstRound& round, const simulation::SimulationConfig& config,
+                      bool is_same_city, const Ride& ride) {
+  simulation::SimulationConfig shifted = config;
+  shifted.T_base_lidar = Eigen::Translation3d(0.0, ride.lateral_m, config.lidar_height_m) *
+                         Eigen::AngleAxisd(ride.turned_deg * rad_per_deg, Eigen::Vector3d::UnitZ());
+  const simulation::Simulation simulation(shifted);
+  Tally tally;
+  for (int k = 0; k < arguments.places; ++k) {
+    const int index = static_cast<int>((k + 0.5) * config.scans / arguments.places);
+    const simulation::SimulatedScan simulated = simulation.scan(index);
+    const Scan scan = drop_unusable_points(simulated.scan, PrepareConfig{});
+    PointLabels labels;
+    if (!arguments.without_labels) labels.classes = scan.labels;
+    const auto start = Clock::now();
+    const LocalizationResult result = localizer.localize(scan, labels);
+    tally.times_ms.push_back(milliseconds_since(start));
+    double error_m = -1.0;
+    double error_deg = -1.0;
+    bool is_right = false;
+    int rank = -1;
+    const Eigen::Isometry3d T_expected = round.expected(simulated.T_map_lidar);
+    for (std::size_t p = 0; p < result.places.size(); ++p) {
+      const Eigen::Isometry3d off = T_expected.inverse() * result.places[p].T_map_lidar;
+      const double angle = Eigen::AngleAxisd(off.linear()).angle();
+      const bool is_near =
+          is_same_city && off.translation().norm() < max_error_m && angle < max_error_rad;
+      if (is_near && rank < 0) rank = static_cast<int>(p);
+      if (p > 0) continue;
+      error_m = off.translation().norm();
+      error_deg = angle / rad_per_deg;
+      is_right = is_near;
+    }
+    switch (result.status) {
+      case LocalizationStatus::found:
+        ++(is_right ? tally.right : tally.wrong);
+        break;
+      case LocalizationStatus::ambiguous:
+        ++tally.ambiguous;
+        break;
+      default:
+        ++tally.not_found;
+    }
+    if (!arguments.is_verbose) continue;
+    std::printf("  scan %4d %-10s rank %2d err %7.2f m %6.2f deg", index, name(result.status), rank,
+                error_m, error_deg);
+    for (std::size_t p = 0; p < std::min<std::size_t>(2, result.places.size()); ++p) {
+      const PlaceHypothesis& h = result.places[p];
+      std::printf(" | %.3f e %.2f c %.2f l %.2f s %.2f n %d/%d", h.evidence.score(),
+                  h.evidence.explained, h.evidence.confirmed, h.evidence.level, h.search_score,
+                  h.evidence.scan_points, h.evidence.map_points);
+    }
+    std::printf(" %.0f ms\n", tally.times_ms.back());
+  }
+  return tally;
+}
+
+void print(const std::string& what, Tally tally) {
+  std::ranges::sort(tally.times_ms);
+  const std::size_t count = tally.times_ms.size();
+  std::printf("| %-48s | %4d | %4d | %4d | %4d | %6.0f | %6.0f |\n", what.c_str(), tally.right,
+              tally.wrong, tally.ambiguous, tally.not_found, tally.times_ms[count / 2],
+              tally.times_ms.back());
+  std::fflush(stdout);
+}
+
+int print_table(const Arguments& arguments) {
+  std::printf(
+      "| places                                           | right| wrong| ambig| none | ms med | "
+      "ms max |\n");
+  for (const std::string& seed_text : arguments.seeds) {
+    const int seed = std::stoi(seed_text);
+    const FirstRound round = first_round(arguments, seed);
+    const auto start = Clock::now();
+    const auto view = std::make_shared<const MapSnapshot>(round.map.view);
+    const auto index = std::make_shared<const PlaceIndex>(view, round.map.trajectory,
+                                                          std::make_shared<TileReader>());
+    std::printf("seed %d: %zu voxels, %zu nodes, %zu blocks, index %.1f MB in %.0f ms\n", seed,
+                view->tiles.voxel_count(), index->nodes().size(), index->blocks().size(),
+                static_cast<double>(index->memory_bytes()) / 1e6, milliseconds_since(start));
+    const Localizer localizer(index);
+    simulation::SimulationConfig config = simulation_config(arguments, seed);
+    config.day = 1;
+    const std::string name =
+        arguments.preset + " " + arguments.sensor + " seed " + std::to_string(seed);
+    print(name + ", another day", localize_places(arguments, localizer, round, config, true, {}));
+    print(name + ", day 2, 3.2 m left, turned 180",
+          localize_places(arguments, localizer, round, config, true, {3.2, 180.0}));
+    config.seed += 1000;
+    print(name + ", another city", localize_places(arguments, localizer, round, config, false, {}));
+  }
+  return 0;
+}
+
+int run(int argc, char** argv) {
+  Arguments arguments;
+  cli::CommandLine line("relocalization_bench", "",
+                        "Places of another day and of another city, looked for in a map");
+  cli::CommandHandle root = line.root();
+  root.option("--preset", arguments.preset, "City: quiet, crowd or yard").with_default();
+  root.option("--sensor", arguments.sensor, "Sensor of both rounds").with_default();
+  root.option("--scans", arguments.scans, "Scans of the first round").with_default();
+  root.option("--places", arguments.places, "Places that are looked for").with_default();
+  root.option("--seeds", arguments.seeds, "Cities").comma_separated().with_default();
+  root.option("--folder", arguments.folder, "Where maps are kept").with_default();
+  root.flag("--without-labels", arguments.without_labels, "Scans without labels");
+  root.flag("--unlabelled-map", arguments.unlabelled_map, "A map made without labels");
+  root.flag("--verbose", arguments.is_verbose, "A line for each place");
+  switch (line.parse(argc, argv)) {
+    case cli::CommandLine::Parsed::command:
+      return print_table(arguments);
+    case cli::CommandLine::Parsed::answered:
+      return 0;
+    case cli::CommandLine::Parsed::wrong_usage:
+      break;
+  }
+  return 2;
+}
+
+}  // namespace
+}  // namespace stillmap::bench
+
+int main(int argc, char** argv) try {
+  return stillmap::bench::run(argc, argv);
+} catch (const std::exception& error) {
+  std::fprintf(stderr, "relocalization_bench: %s\n", error.what());
+  return 1;
+}

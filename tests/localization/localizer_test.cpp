@@ -1,0 +1,186 @@
+#include "core/localization/localizer.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <numbers>
+#include <utility>
+
+#include "core/lidar/prepare.hpp"
+#include "core/map/static_map.hpp"
+#include "core/simulation/simulation.hpp"
+
+namespace stillmap {
+namespace {
+
+constexpr double rad_per_deg = std::numbers::pi / 180.0;
+
+simulation::SimulationConfig yard(std::uint64_t seed, std::uint64_t day) {
+  simulation::SimulationConfig config;
+  config.plan = simulation::test_yard();
+  config.seed = seed;
+  config.day = day;
+  config.sensor = vlp_16();
+  config.firings = 900;
+  config.scans = 240;
+  return config;
+}
+
+PointLabels labels_of(const Scan& scan) {
+  return {scan.labels, std::vector<float>(scan.size(), 1.0F)};
+}
+
+struct StoredMap {
+  std::shared_ptr<const MapSnapshot> view;
+  Trajectory trajectory;
+};
+
+/// The yard of a day, mapped with true poses.
+StoredMap mapped_yard(std::uint64_t seed) {
+  StaticMapConfig map_config;
+  map_config.min_points = 1;
+  StaticMap map(map_config);
+  const simulation::Simulation simulation(yard(seed, 0));
+  StoredMap stored;
+  for (int k = 0; k < simulation.config().scans; k += 4) {
+    const simulation::SimulatedScan simulated = simulation.scan(k);
+    LabelledScan labelled{simulated.scan, labels_of(simulated.scan), {}};
+    for (const SemanticClass label : labelled.labels.classes)
+      labelled.motion.push_back(is_movable(label) ? Motion::highly_dynamic : Motion::stationary);
+    map.insert(labelled, simulated.T_map_lidar);
+    stored.trajectory.push_back({simulated.stamp_ns, simulated.T_map_lidar});
+  }
+  stored.view = map.view();
+  return stored;
+}
+
+const StoredMap& first_yard() {
+  static const StoredMap stored = mapped_yard(1);
+  return stored;
+}
+
+std::shared_ptr<const PlaceIndex> index_of(const StoredMap& stored) {
+  return std::make_shared<const PlaceIndex>(stored.view, stored.trajectory,
+                                            std::make_shared<TileReader>());
+}
+
+LocalizationResult localize(const Localizer& localizer, const simulation::SimulatedScan& simulated,
+                            bool is_labelled = true) {
+  const Scan scan = drop_unusable_points(simulated.scan, PrepareConfig{});
+  return localizer.localize(scan, is_labelled ? labels_of(scan) : PointLabels{});
+}
+
+void expect_right(const LocalizationResult& result, const Eigen::Isometry3d& T_map_lidar) {
+  ASSERT_EQ(result.status, LocalizationStatus::found);
+  const Eigen::Isometry3d off = T_map_lidar.inverse() * result.places.front().T_map_lidar;
+  EXPECT_LT(off.translation().norm(), 0.3);
+  EXPECT_LT(Eigen::AngleAxisd(off.linear()).angle(), 1.0 * rad_per_deg);
+}
+
+TEST(Localizer, FindsScansOfAnotherDay) {
+  const Localizer localizer(index_of(first_yard()));
+  const simulation::Simulation simulation(yard(1, 1));
+  for (const int k : {30, 95, 170, 225}) {
+    SCOPED_TRACE(k);
+    const simulation::SimulatedScan scan = simulation.scan(k);
+    expect_right(localize(localizer, scan), scan.T_map_lidar);
+  }
+}
+
+TEST(Localizer, FindsALidarThatLooksTheOtherWayBesideThePath) {
+  const Localizer localizer(index_of(first_yard()));
+  simulation::SimulationConfig config = yard(1, 1);
+  config.T_base_lidar = Eigen::Translation3d(0.0, 2.5, 1.5) *
+                        Eigen::AngleAxisd(std::numbers::pi, Eigen::Vector3d::UnitZ());
+  const simulation::Simulation simulation(config);
+  for (const int k : {40, 130}) {
+    SCOPED_TRACE(k);
+    const simulation::SimulatedScan scan = simulation.scan(k);
+    expect_right(localize(localizer, scan), scan.T_map_lidar);
+  }
+}
+
+TEST(Localizer, FindsNoScanOfAnotherCity) {
+  const Localizer localizer(index_of(first_yard()));
+  const simulation::Simulation simulation(yard(2, 0));
+  for (int k = 10; k < 240; k += 30)
+    EXPECT_NE(localize(localizer, simulation.scan(k)).status, LocalizationStatus::found) << k;
+}
+
+TEST(Localizer, SaysAmbiguousWhereTheMapHoldsAPlaceTwice) {
+  StoredMap twice = first_yard();
+  // Whole tiles farther on: the same places again.
+  constexpr int tiles_apart = 40;
+  std::vector<TileTable::SharedTile> tiles(twice.view->tiles.begin(), twice.view->tiles.end());
+  const std::size_t count = tiles.size();
+  const VoxelGrid grid(twice.view->voxel_size_m, twice.view->tile_size_m);
+  const auto shift_m = static_cast<float>(tiles_apart * grid.tile_size_m());
+  for (std::size_t k = 0; k < count; ++k) {
+    std::vector<Voxel> voxels(tiles[k]->voxels.begin(), tiles[k]->voxels.end());
+    for (Voxel& voxel : voxels) voxel.mean_map.x() += shift_m;
+    const TileId id{tiles[k]->info.id.x + tiles_apart, tiles[k]->info.id.y};
+    tiles.push_back(std::make_shared<const Tile>(make_tile(id, 1, voxels, grid)));
+  }
+  MapSnapshot view = *twice.view;
+  view.tiles = TileTable(std::move(tiles));
+  twice.view = std::make_shared<const MapSnapshot>(std::move(view));
+  for (std::size_t k = 0, poses = twice.trajectory.size(); k < poses; ++k) {
+    StampedPose pose = twice.trajectory[k];
+    pose.T_map_lidar.translation().x() += static_cast<double>(shift_m);
+    twice.trajectory.push_back(pose);
+  }
+  const Localizer localizer(index_of(twice));
+  const simulation::Simulation simulation(yard(1, 1));
+  EXPECT_EQ(localize(localizer, simulation.scan(95)).status, LocalizationStatus::ambiguous);
+}
+
+TEST(Localizer, NeedsNoTrajectory) {
+  StoredMap stored = first_yard();
+  stored.trajectory.clear();
+  const Localizer localizer(index_of(stored));
+  const simulation::SimulatedScan scan = simulation::Simulation(yard(1, 1)).scan(95);
+  expect_right(localize(localizer, scan), scan.T_map_lidar);
+}
+
+TEST(Localizer, FindsNothingInAnEmptyMap) {
+  StoredMap empty{std::make_shared<const MapSnapshot>(), {}};
+  const simulation::SimulatedScan scan = simulation::Simulation(yard(1, 1)).scan(95);
+  EXPECT_EQ(localize(Localizer(index_of(empty)), scan).status, LocalizationStatus::no_evidence);
+  // With a path, but without a voxel.
+  empty.trajectory = first_yard().trajectory;
+  EXPECT_NE(localize(Localizer(index_of(empty)), scan).status, LocalizationStatus::found);
+}
+
+TEST(Localizer, FindsNothingInOneTileOfAMap) {
+  StoredMap stored = first_yard();
+  MapSnapshot view = *stored.view;
+  view.tiles = TileTable{stored.view->tiles.front()};
+  stored.view = std::make_shared<const MapSnapshot>(std::move(view));
+  const simulation::SimulatedScan scan = simulation::Simulation(yard(1, 1)).scan(95);
+  EXPECT_NE(localize(Localizer(index_of(stored)), scan).status, LocalizationStatus::found);
+}
+
+TEST(Localizer, PassesOverPosesThatAreNone) {
+  StoredMap stored = first_yard();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  stored.trajectory[5].T_map_lidar.translation().x() = nan;
+  stored.trajectory[6].T_map_lidar.translation().y() = 1e12;
+  const Localizer localizer(index_of(stored));
+  const simulation::SimulatedScan scan = simulation::Simulation(yard(1, 1)).scan(170);
+  expect_right(localize(localizer, scan), scan.T_map_lidar);
+}
+
+TEST(Localizer, AScanWithoutPointsIsNoEvidence) {
+  const Localizer localizer(index_of(first_yard()));
+  EXPECT_EQ(localizer.localize({}, {}).status, LocalizationStatus::no_evidence);
+  Scan level;
+  for (int k = 0; k < 500; ++k)
+    level.points_lidar.emplace_back(0.1F * static_cast<float>(k % 50),
+                                    0.5F * static_cast<float>(k / 50), -1.7F);
+  EXPECT_EQ(localizer.localize(level, {}).status, LocalizationStatus::no_evidence);
+}
+
+}  // namespace
+}  // namespace stillmap
