@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 #include <span>
 #include <utility>
 
@@ -88,6 +89,21 @@ LabelledScan from_planes(std::span<const std::uint8_t> bytes, const Header& head
   return labelled;
 }
 
+/// With a checksum: planes of noise would decompress to other noise.
+std::vector<std::uint8_t> compressed(std::span<const std::uint8_t> bytes,
+                                     const std::filesystem::path& file) {
+  const std::unique_ptr<ZSTD_CCtx, std::size_t (*)(ZSTD_CCtx*)> context(ZSTD_createCCtx(),
+                                                                        ZSTD_freeCCtx);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_compressionLevel, 1);
+  ZSTD_CCtx_setParameter(context.get(), ZSTD_c_checksumFlag, 1);
+  std::vector<std::uint8_t> packed(ZSTD_compressBound(bytes.size()) + sizeof(std::uint32_t));
+  const std::size_t size =
+      ZSTD_compress2(context.get(), packed.data(), packed.size(), bytes.data(), bytes.size());
+  if (ZSTD_isError(size) != 0U) throw DatasetError(file, ZSTD_getErrorName(size));
+  packed.resize(size);
+  return packed;
+}
+
 Header header_of(const LoggedScan& scan) {
   Header header;
   header.index = scan.index;
@@ -103,7 +119,7 @@ Header header_of(const LoggedScan& scan) {
 bool read_header(std::istream& in, Header& header) {
   in.read(reinterpret_cast<char*>(&header), sizeof(header));
   return in && header.magic_number == magic && header.points <= max_points &&
-         header.packed_bytes <= ZSTD_compressBound(planes * header.points);
+         header.packed_bytes <= ZSTD_compressBound(planes * header.points) + sizeof(std::uint32_t);
 }
 
 }  // namespace
@@ -133,14 +149,7 @@ void ScanLog::scan_records() {
 void ScanLog::append(const LoggedScan& scan) {
   Header header = header_of(scan);
   std::vector<std::uint8_t> packed;
-  if (header.points > 0) {
-    const std::vector<std::uint8_t> bytes = to_planes(scan.labelled);
-    packed.resize(ZSTD_compressBound(bytes.size()));
-    const std::size_t size =
-        ZSTD_compress(packed.data(), packed.size(), bytes.data(), bytes.size(), 1);
-    if (ZSTD_isError(size) != 0U) throw DatasetError(file_, ZSTD_getErrorName(size));
-    packed.resize(size);
-  }
+  if (header.points > 0) packed = compressed(to_planes(scan.labelled), file_);
   header.packed_bytes = packed.size();
   stream_.seekp(static_cast<std::streamoff>(end_));
   stream_.write(reinterpret_cast<const char*>(&header), sizeof(header));

