@@ -19,12 +19,10 @@ PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.tx
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
 
-# Slim images have no folder for manuals, and Java's package does not install without it. NodeSource's nodejs has
-# npm in it, and conflicts with Debian's.
+# Slim images have no folder for manuals, and Java's package does not install without it.
 packages: ## Install the Debian packages that are missing
 	@missing=$$(for p in $(PACKAGES); do \
-	    dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'ok installed' || \
-	    { [ $$p = npm ] && command -v npm >/dev/null; } || echo $$p; done); \
+	    dpkg-query -W -f='$${Status}' $$p 2>/dev/null | grep -q 'ok installed' || echo $$p; done); \
 	if [ -n "$$missing" ]; then \
 	  echo "Installing:" $$missing; \
 	  sudo=; [ "$$(id -u)" = 0 ] || sudo=sudo; \

@@ -8,6 +8,9 @@ set(CPACK_STRIP_FILES ON)
 set(CPACK_SET_DESTDIR ON)
 set(CPACK_INSTALL_PREFIX /usr)
 set(CPACK_COMPONENTS_ALL data server tools)
+if(TARGET stillmap_python)
+  list(APPEND CPACK_COMPONENTS_ALL python)
+endif()
 set(CPACK_COMPONENTS_GROUPING IGNORE)
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
@@ -35,4 +38,12 @@ set(CPACK_DEBIAN_TOOLS_PACKAGE_DEPENDS "${same_version}")
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SUGGESTS stillmap-server)
 set(CPACK_COMPONENT_TOOLS_DESCRIPTION
   "The command line: replays recordings, asks for maps, plans paths, simulates a city.")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-stillmap)
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
+# The module is built for one version of Python.
+set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+  "${same_version}, python3-numpy, python3 (>= ${STILLMAP_PYTHON_VERSION}), python3 (<< ${STILLMAP_PYTHON_NEXT_VERSION})")
+set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "stillmap, python3-matplotlib")
+set(CPACK_COMPONENT_PYTHON_DESCRIPTION
+  "The Python module: map files, recordings, the mapper and servers, as NumPy arrays.")
 include(CPack)

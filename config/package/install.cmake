@@ -14,6 +14,17 @@ endforeach()
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/idl/msg/ DESTINATION share/stillmap/idl COMPONENT data
   FILES_MATCHING PATTERN "*.idl")
 
+if(TARGET stillmap_python)
+  # Where Debian's Python looks for packages, beneath any prefix.
+  set(python_packages lib/python3/dist-packages)
+  install(TARGETS stillmap_python LIBRARY DESTINATION ${python_packages}/stillmap COMPONENT python)
+  install(DIRECTORY ${PROJECT_SOURCE_DIR}/clients/python/stillmap DESTINATION ${python_packages} COMPONENT python
+    FILES_MATCHING PATTERN "*.py" PATTERN "*.pyi" PATTERN "py.typed")
+  install(FILES ${PROJECT_SOURCE_DIR}/clients/python/recording_to_picture.ipynb
+    DESTINATION share/doc/python3-stillmap/examples COMPONENT python)
+  install(FILES ${PROJECT_SOURCE_DIR}/LICENSE DESTINATION share/doc/python3-stillmap RENAME copyright COMPONENT python)
+endif()
+
 # The pages link to each other by their folders.
 foreach(page . core core/segmentation idl server clients clients/gateway config config/dds docker tests)
   install(FILES ${PROJECT_SOURCE_DIR}/${page}/README.md DESTINATION share/doc/stillmap/${page}

@@ -1,0 +1,223 @@
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <condition_variable>
+#include <filesystem>
+#include <mutex>
+
+#include "clients/library/client.hpp"
+#include "clients/python/bindings.hpp"
+#include "clients/python/map.hpp"
+#include "clients/python/traversability.hpp"
+#include "config/loaders/dds_profile.hpp"
+
+namespace stillmap::python {
+namespace {
+
+std::chrono::milliseconds duration_of(double seconds) {
+  return std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * seconds));
+}
+
+std::unique_ptr<Client> connect(std::uint32_t domain, const std::string& server,
+                                const std::string& profile,
+                                const std::vector<std::string>& interfaces,
+                                const std::vector<std::string>& peers,
+                                const std::string& discovery_server,
+                                const std::optional<std::filesystem::path>& security,
+                                double timeout_s) {
+  const py::gil_scoped_release released;
+  const DdsNetworkConfig network{.profile = profile,
+                                 .shared_memory = {},
+                                 .interfaces = interfaces,
+                                 .peers = peers,
+                                 .discovery_server = discovery_server,
+                                 .socket_buffer_bytes = 0};
+  ClientOptions options{.dds = dds_options(network, DdsRole::client),
+                        .server_name = server,
+                        .request_timeout = duration_of(timeout_s)};
+  options.dds.domain_id = domain;
+  options.dds.security = security.value_or("");
+  auto client = std::make_unique<Client>(options);
+  client->wait_for_server(options.request_timeout);
+  return client;
+}
+
+py::dict status(Client& client) {
+  dds::ServerStatus now;
+  {
+    const py::gil_scoped_release released;
+    now = client.status();
+  }
+  py::dict fields, counters;
+  for (const dds::NamedCounter& counter : now.counters) {
+    const std::string key =
+        counter.detail.empty() ? counter.name : counter.name + "/" + counter.detail;
+    counters[py::str(key)] = counter.value;
+  }
+  fields["stamp_ns"] = now.stamp_ns;
+  fields["software_version"] = now.software_version;
+  fields["health"] = std::string(name(now.health));
+  fields["reason"] = now.reason;
+  fields["label_source"] = now.label_source;
+  fields["sensor"] = now.sensor;
+  fields["received_hz"] = now.received_hz;
+  fields["mapped_hz"] = now.mapped_hz;
+  fields["map_id"] = now.map_id;
+  fields["map_version"] = now.map_version;
+  fields["tile_count"] = now.tile_count;
+  fields["voxel_count"] = now.voxel_count;
+  fields["counters"] = counters;
+  return fields;
+}
+
+py::object query_server(Client& client, const Region& region,
+                        const std::vector<std::string>& classes, double resolution_m) {
+  MapQuery query;
+  query.region = region;
+  query.classes = classes_from(classes);
+  query.resolution_m = resolution_m;
+  MapQueryResult result;
+  {
+    const py::gil_scoped_release released;
+    result = client.get_whole_static_map(query);
+  }
+  return query_answer(std::move(result));
+}
+
+/// The newest message of a subscription. Throws ServiceTimeout with `fault`.
+template <typename Message, typename Subscribe>
+Message newest_of(Subscribe subscribe, double timeout_s, const char* fault) {
+  std::mutex mutex;
+  std::condition_variable arrived;
+  std::optional<Message> newest;
+  const Subscription subscription = subscribe([&](const Message& message) {
+    const std::lock_guard lock(mutex);
+    newest = message;
+    arrived.notify_one();
+  });
+  std::unique_lock lock(mutex);
+  if (!arrived.wait_for(lock, duration_of(timeout_s), [&] { return newest.has_value(); })) {
+    throw ServiceTimeout(fault);
+  }
+  return *newest;
+}
+
+Trajectory path_of(Client& client, double timeout_s) {
+  return newest_of<Trajectory>([&](auto arrived) { return client.subscribe_path(arrived); },
+                               timeout_s, "the server has no pose yet: it has mapped no scan");
+}
+
+Map whole_map(Client& client) {
+  const TileVersions versions = client.get_tile_versions();
+  std::vector<TileId> ids;
+  for (const TileInfo& info : versions.tiles) ids.push_back(info.id);
+  TileSet set = client.get_tiles(ids);
+  std::vector<std::shared_ptr<const Tile>> tiles;
+  for (Tile& tile : set.tiles) tiles.push_back(std::make_shared<const Tile>(std::move(tile)));
+  auto view = std::make_shared<MapSnapshot>();
+  view->version = set.map.version;
+  view->map_id = set.map.map_id;
+  view->tile_size_m = versions.map.tile_size_m;
+  view->voxel_size_m = versions.map.voxel_size_m;
+  view->tiles = TileTable(std::move(tiles));
+  return {.view = std::move(view), .trajectory = {}, .metadata = {}, .read_evidence = {}};
+}
+
+py::object grid(Client& client, const Region& region, const std::string& robot) {
+  TraversabilityAnswer answer;
+  {
+    const py::gil_scoped_release released;
+    answer = client.get_traversable_area({.profile = robot, .region = region});
+  }
+  return grid_of(answer);
+}
+
+py::object check(Client& client, const InArray<double>& positions_map,
+                 const std::optional<InArray<double>>& headings_rad, const std::string& robot) {
+  PathQuery query = path_query_from(positions_map, headings_rad);
+  query.profile = robot;
+  PathCheck result;
+  {
+    const py::gil_scoped_release released;
+    result = client.check_path(query);
+  }
+  return check_of(result);
+}
+
+py::object nearest(Client& client, double x_m, double y_m, const std::string& robot,
+                   double max_distance_m) {
+  NearestTraversable result;
+  {
+    const py::gil_scoped_release released;
+    result = client.nearest_traversable(robot, {x_m, y_m}, max_distance_m);
+  }
+  return nearest_of(result);
+}
+
+py::object removed(Client& client, const Region& region, std::uint32_t max_voxels) {
+  RemovedVoxels result;
+  {
+    const py::gil_scoped_release released;
+    result = client.get_removed(region, max_voxels);
+  }
+  return removed_arrays(result.voxels);
+}
+
+void bind_map_requests(py::class_<Client>& client) {
+  client
+      .def("query", &query_server, py::arg("region"),
+           py::arg("classes") = std::vector<std::string>{}, py::arg("resolution_m") = 0.0,
+           "Voxels of a region of the static map, all of one version: a QueryAnswer. classes: "
+           "names, none are all. resolution_m: 0 is the map's own.")
+      .def("map", &whole_map, py::call_guard<py::gil_scoped_release>(),
+           "The whole static map as it is now, for arrays, traversability and plans: a Map.")
+      .def("removed", &removed, py::arg("region") = BoxRegion{}, py::arg("max_voxels") = 300'000,
+           "What the server keeps out of its map, and why: as Map.removed().")
+      .def(
+          "trajectory",
+          [](Client& asked, double timeout_s) {
+            Trajectory path;
+            {
+              const py::gil_scoped_release released;
+              path = path_of(asked, timeout_s);
+            }
+            return trajectory_of(path);
+          },
+          py::arg("timeout_s") = 5.0, "The path since the map began, at most 1 s old.")
+      .def(
+          "save_map",
+          [](Client& asked, const std::string& file, bool overwrite) {
+            return asked.save_map(file, overwrite);
+          },
+          py::arg("file") = "", py::arg("overwrite") = false,
+          py::call_guard<py::gil_scoped_release>(),
+          "Has the server save its map; returns the file's name on the server's machine.");
+}
+
+}  // namespace
+
+void bind_client(py::module_& module) {
+  py::class_<Client> client(module, "Client",
+                            "A client of one stillmap-server. Calls may come from any thread and "
+                            "wait for the answer without the interpreter's lock; they raise "
+                            "ServiceTimeout without one, ServiceError for a refusal.");
+  client
+      .def(py::init(&connect), py::arg("domain") = 0, py::arg("server") = "stillmap",
+           py::arg("profile") = "lan", py::arg("interfaces") = std::vector<std::string>{},
+           py::arg("peers") = std::vector<std::string>{}, py::arg("discovery_server") = "",
+           py::arg("security") = py::none(), py::arg("timeout_s") = 5.0,
+           "Joins the DDS domain and waits for the server. server: first part of its topic names. "
+           "profile: kind of network (host, lan, wifi, wan, no_multicast, or a file). security: "
+           "folder of our identity in a secured domain. Raises ConfigError, DdsError, "
+           "ServiceTimeout.")
+      .def("status", &status, "State of the server: health, rates, counters, size of the map.")
+      .def("grid", &grid, py::arg("region") = BoxRegion{}, py::arg("robot") = "car",
+           "Where a robot of the server's can go in a region: as Traversability.grid().")
+      .def("nearest", &nearest, py::arg("x_m"), py::arg("y_m"), py::arg("robot") = "car",
+           py::arg("max_distance_m") = 100.0, "As Traversability.nearest().")
+      .def("check_path", &check, py::arg("positions_map"), py::arg("headings_rad") = py::none(),
+           py::arg("robot") = "car", "As Traversability.check_path().");
+  bind_map_requests(client);
+}
+
+}  // namespace stillmap::python

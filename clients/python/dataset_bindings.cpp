@@ -1,0 +1,177 @@
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <filesystem>
+
+#include "clients/python/arrays.hpp"
+#include "clients/python/bindings.hpp"
+#include "clients/python/scan.hpp"
+#include "config/loaders/sensor_file.hpp"
+#include "core/dataset/scan_dataset.hpp"
+#include "idl/bag/bag_scan_source.hpp"
+
+namespace stillmap::python {
+namespace {
+
+/// On the scan's own memory, which the array keeps alive.
+template <typename Scalar, typename Element>
+py::object view_of(const std::vector<Element>& values, const py::object& owner,
+                   py::ssize_t columns = 0) {
+  if (values.empty()) return py::none();
+  std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(values.size())};
+  if (columns > 0) shape.push_back(columns);
+  return py::array_t<Scalar>(shape, reinterpret_cast<const Scalar*>(values.data()), owner);
+}
+
+template <typename Scalar, auto member>
+py::object scan_values(const py::object& self) {
+  return view_of<Scalar>(self.cast<const DatasetFrame&>().scan.*member, self);
+}
+
+std::size_t index_from(const ScanDataset& dataset, py::ssize_t index) {
+  const auto size = static_cast<py::ssize_t>(dataset.size());
+  if (index < 0) index += size;
+  if (index < 0 || index >= size) {
+    throw py::index_error("scan " + std::to_string(index) + " of " + std::to_string(size));
+  }
+  return static_cast<std::size_t>(index);
+}
+
+void bind_scan(py::module_& module) {
+  py::class_<DatasetFrame>(module, "Scan",
+                           "One revolution of the lidar. Arrays are None where "
+                           "nothing is known; they share the scan's memory.")
+      .def(py::init(&frame_from_arrays), py::arg("points_lidar"), py::arg("stamp_ns") = 0,
+           py::arg("intensity") = py::none(), py::arg("time_offset_s") = py::none(),
+           py::arg("ring") = py::none(), py::arg("labels") = py::none())
+      .def_property_readonly("stamp_ns", [](const DatasetFrame& f) { return f.scan.stamp_ns; })
+      .def_property_readonly(
+          "points_lidar",
+          [](const py::object& self) {
+            const auto& points = self.cast<const DatasetFrame&>().scan.points_lidar;
+            return py::array_t<float>({static_cast<py::ssize_t>(points.size()), py::ssize_t{3}},
+                                      reinterpret_cast<const float*>(points.data()), self);
+          },
+          "(n, 3) float32: lidar frame, x forward, y left, z up [m].")
+      .def_property_readonly("intensity", &scan_values<float, &Scan::intensity>,
+                             "(n,) float32, 0..1, or None.")
+      .def_property_readonly("time_offset_s", &scan_values<float, &Scan::time_offset_s>,
+                             "(n,) float32: from stamp_ns on [s], or None.")
+      .def_property_readonly("ring", &scan_values<std::uint16_t, &Scan::ring>,
+                             "(n,) uint16 in the source's own order, or None.")
+      .def_property_readonly("labels", &scan_values<std::uint8_t, &Scan::labels>,
+                             "(n,) uint8: index of CLASS_NAMES, or None.")
+      .def_property_readonly(
+          "raw_labels",
+          [](const py::object& self) {
+            return view_of<std::uint32_t>(self.cast<const DatasetFrame&>().raw_labels, self);
+          },
+          "(n,) uint32: original SemanticKITTI labels, instances in the high 16 bits, or None.")
+      .def("__len__", [](const DatasetFrame& frame) { return frame.scan.size(); });
+}
+
+}  // namespace
+
+DatasetFrame frame_from_arrays(const InArray<float>& points_lidar, std::int64_t stamp_ns,
+                               const std::optional<InArray<float>>& intensity,
+                               const std::optional<InArray<float>>& time_offset_s,
+                               const std::optional<InArray<std::uint16_t>>& ring,
+                               const std::optional<InArray<std::uint8_t>>& labels) {
+  DatasetFrame frame;
+  Scan& scan = frame.scan;
+  scan.stamp_ns = stamp_ns;
+  scan.points_lidar = points_from(points_lidar, "points_lidar");
+  const std::size_t size = scan.points_lidar.size();
+  scan.intensity = values_from(intensity, "intensity", size);
+  scan.time_offset_s = values_from(time_offset_s, "time_offset_s", size);
+  scan.ring = values_from(ring, "ring", size);
+  for (const std::uint8_t label : values_from(labels, "labels", size)) {
+    if (label >= semantic_class_count) {
+      throw std::invalid_argument("labels has the class " + std::to_string(label) +
+                                  "; there are 0 to " + std::to_string(semantic_class_count - 1));
+    }
+    scan.labels.push_back(static_cast<SemanticClass>(label));
+  }
+  return frame;
+}
+
+void bind_dataset(py::module_& module) {
+  bind_scan(module);
+  py::class_<SensorModel>(module, "Sensor", "Description of a lidar.")
+      .def_readonly("name", &SensorModel::name)
+      .def_readonly("rings", &SensorModel::rings)
+      .def_readonly("period_s", &SensorModel::period_s, "Of one revolution [s].");
+  module.def(
+      "load_sensor", [](const std::string& name_or_file) { return load_sensor(name_or_file); },
+      py::arg("name_or_file"),
+      "hdl_64e, hdl_32e, vlp_16, or a file like those in config/sensors. Raises ConfigError.");
+  py::class_<dds::Recording>(
+      module, "Dataset", "A sequence or bag, read scan by scan: dataset[3], for scan in dataset.")
+      .def("__len__", [](const dds::Recording& r) { return r.dataset.size(); })
+      .def(
+          "__getitem__",
+          [](const dds::Recording& recording, py::ssize_t index) {
+            const std::size_t i = index_from(recording.dataset, index);
+            const py::gil_scoped_release released;
+            return recording.dataset.read(i);
+          },
+          "Reads a scan. Raises DatasetError for a damaged one; the others can still be read.")
+      .def_property_readonly(
+          "stamps_ns",
+          [](const dds::Recording& recording) {
+            std::vector<std::int64_t> stamps_ns(recording.dataset.size());
+            for (std::size_t i = 0; i < stamps_ns.size(); ++i)
+              stamps_ns[i] = recording.dataset.stamp_ns(i);
+            return array_of<std::int64_t>(std::move(stamps_ns));
+          },
+          "(n,) int64 [ns].")
+      .def_property_readonly(
+          "sensor",
+          [](const dds::Recording& recording) { return recording.dataset.suggested_sensor(); },
+          "The sensor as the recording suggests it, for a Mapper.")
+      .def_property_readonly(
+          "truth",
+          [](const dds::Recording& recording) -> std::optional<PythonTrajectory> {
+            const auto truth = recording.dataset.truth();
+            return truth ? std::optional(trajectory_of(*truth)) : std::nullopt;
+          },
+          "True poses of the lidar in the frame of the first one, or None.")
+      .def_property_readonly(
+          "imu",
+          [](const dds::Recording& recording) {
+            std::vector<ImuSample> samples;
+            {
+              const py::gil_scoped_release released;
+              samples = recording.dataset.imu();
+            }
+            return imu_arrays(samples);
+          },
+          "(stamp_ns (n,) int64, angular_velocity_imu (n, 3) [rad/s], acceleration_imu (n, 3) "
+          "[m/s^2]).")
+      .def_readonly("faults", &dds::Recording::faults,
+                    "What of a bag cannot be read at all, in words.");
+  module.def(
+      "open_dataset",
+      [](const std::filesystem::path& path, const std::string& topic) {
+        const py::gil_scoped_release released;
+        return std::make_unique<dds::Recording>(dds::open_recording(path, topic));
+      },
+      py::arg("path"), py::arg("topic") = "",
+      "Opens a KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag "
+      "(SQLite or MCAP). topic: of a bag with several topics of scans. Raises DatasetError.");
+}
+
+py::tuple imu_arrays(const std::vector<ImuSample>& samples) {
+  std::vector<std::int64_t> stamps_ns;
+  std::vector<Eigen::Vector3d> rates, accelerations;
+  for (const ImuSample& sample : samples) {
+    stamps_ns.push_back(sample.stamp_ns);
+    rates.push_back(sample.angular_velocity_imu);
+    accelerations.push_back(sample.acceleration_imu);
+  }
+  return py::make_tuple(array_of<std::int64_t>(std::move(stamps_ns)),
+                        array_of<double>(std::move(rates), 3),
+                        array_of<double>(std::move(accelerations), 3));
+}
+
+}  // namespace stillmap::python

@@ -1,0 +1,150 @@
+#include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
+
+#include <filesystem>
+
+#include "clients/python/bindings.hpp"
+#include "clients/python/map.hpp"
+#include "clients/python/scan.hpp"
+#include "config/loaders/model_file.hpp"
+#include "config/loaders/sensor_file.hpp"
+#include "config/loaders/server_config.hpp"
+#include "core/map/map_id.hpp"
+#include "core/map/storage/map_file.hpp"
+#include "core/mapper.hpp"
+
+namespace stillmap::python {
+namespace {
+
+LabelsConfig labels_from(LabelsConfig labels, const std::string& source) {
+  if (source == "none") {
+    labels.source = LabelProvider::none;
+  } else if (source == "scan") {
+    labels.source = LabelProvider::stream;
+  } else {
+    labels.source = LabelProvider::model;
+    if (source != "model") labels.model = source;
+  }
+  return labels;
+}
+
+std::unique_ptr<Mapper> make_mapper(const SensorModel& sensor, const std::string& labels,
+                                    const std::optional<std::filesystem::path>& config_file) {
+  const py::gil_scoped_release released;
+  ServerConfig config;
+  if (config_file) config = load_server_config(*config_file);
+  config.mapper.sensor = sensor;
+  auto mapper = std::make_unique<Mapper>(
+      config.mapper, open_segmenter(labels_from(config.labels, labels), sensor));
+  mapper->reset(new_map_id());
+  return mapper;
+}
+
+std::optional<MappedScan> process(Mapper& mapper, const DatasetFrame& frame,
+                                  const std::optional<InArray<double>>& T_map_lidar_prior) {
+  std::optional<Eigen::Isometry3d> prior;
+  if (T_map_lidar_prior) prior = transform_from(*T_map_lidar_prior, "T_map_lidar_prior");
+  const py::gil_scoped_release released;
+  return mapper.process(frame.scan, prior);
+}
+
+Map current_map(Mapper& mapper) {
+  Map map{.view = mapper.map_snapshot(),
+          .trajectory = mapper.trajectory(),
+          .metadata = {},
+          .read_evidence = {}};
+  auto evidence = std::make_shared<const TileEvidenceMap>(
+      to_saved_map(mapper.static_map().checkpoint(CheckpointScope::everything)).tile_evidence);
+  map.read_evidence = [evidence] { return *evidence; };
+  return map;
+}
+
+void save(Mapper& mapper, const std::filesystem::path& file) {
+  const py::gil_scoped_release released;
+  if (std::filesystem::exists(file)) {
+    throw MapFileError(file, "is there already; name a new file, or remove it");
+  }
+  SavedMap map = to_saved_map(mapper.static_map().checkpoint(CheckpointScope::everything));
+  map.trajectory = mapper.trajectory();
+  map.is_partial = false;
+  map.metadata = {{"label_source", mapper.label_source()}};
+  const auto store = open_map_file(file);
+  static_cast<void>(store->save(map));
+  store->complete_file();
+}
+
+void add_imu(Mapper& mapper, std::int64_t stamp_ns,
+             const std::array<double, 3>& angular_velocity_imu,
+             const std::array<double, 3>& acceleration_imu) {
+  mapper.add(ImuSample{stamp_ns, Eigen::Vector3d(angular_velocity_imu.data()),
+                       Eigen::Vector3d(acceleration_imu.data())});
+}
+
+void bind_mapped_scan(py::module_& module) {
+  py::class_<MappedScan>(module, "MappedScan", "What became of a scan.")
+      .def_property_readonly(
+          "T_map_lidar", [](const MappedScan& s) { return array_from(s.odometry.T_map_lidar); },
+          "(4, 4) float64: takes points of the lidar frame to the map frame [m].")
+      .def_property_readonly(
+          "covariance",
+          [](const MappedScan& s) { return array_from(Eigen::MatrixXd(s.odometry.covariance)); },
+          "(6, 6): of translation [m] and rotation [rad], map frame.")
+      .def_property_readonly(
+          "health", [](const MappedScan& s) { return std::string(name(s.odometry.health)); },
+          "\"initialised\", \"good\", \"degenerate\" (some of the motion is not observable) or "
+          "\"lost\" (the pose is a prediction).")
+      .def_property_readonly(
+          "fit", [](const MappedScan& s) { return s.odometry.fit; },
+          "How well the scan lies on the map, 0..1.")
+      .def_property_readonly("stamp_ns",
+                             [](const MappedScan& s) { return s.labelled.scan.stamp_ns; })
+      .def_property_readonly(
+          "points_lidar",
+          [](const MappedScan& s) { return array_of<float>(s.labelled.scan.points_lidar, 3); },
+          "(n, 3) float32: the usable points, motion-compensated, lidar frame [m].")
+      .def_property_readonly(
+          "label",
+          [](const MappedScan& s) { return array_of<std::uint8_t>(s.labelled.labels.classes); },
+          "(n,) uint8: index of CLASS_NAMES; empty without labels.")
+      .def_property_readonly(
+          "confidence",
+          [](const MappedScan& s) { return array_of<float>(s.labelled.labels.confidence); },
+          "(n,) float32, 0..1.")
+      .def_property_readonly(
+          "motion", [](const MappedScan& s) { return array_of<std::uint8_t>(s.labelled.motion); },
+          "(n,) uint8: index of MOTIONS.")
+      .def("__len__", [](const MappedScan& s) { return s.labelled.scan.size(); });
+}
+
+}  // namespace
+
+void bind_mapper(py::module_& module) {
+  module.attr("MOTIONS") = py::make_tuple("stationary", "semi_static", "highly_dynamic");
+  bind_mapped_scan(module);
+  py::class_<Mapper>(module, "Mapper",
+                     "The server's pipeline in this process: poses, classes and a static map of "
+                     "scans, one after the other. One thread uses it.")
+      .def(py::init(&make_mapper), py::arg("sensor"), py::arg("labels") = "none",
+           py::arg("config") = py::none(),
+           "sensor: a Sensor. labels: \"none\" (pure geometry), \"scan\" (those of the scans), "
+           "\"model\" (the network that comes with Stillmap), or a folder with a model. config: a "
+           "server file whose mapper settings are used. Raises ConfigError, ValueError.")
+      .def("process", &process, py::arg("scan"), py::arg("T_map_lidar_prior") = py::none(),
+           "Maps a Scan. T_map_lidar_prior: (4, 4), replaces the constant-velocity prediction. "
+           "None for a scan that cannot be mapped; last_rejection says why.")
+      .def_property_readonly("last_rejection",
+                             [](const Mapper& mapper) { return mapper.last_rejection().reason; })
+      .def("add_imu", &add_imu, py::arg("stamp_ns"), py::arg("angular_velocity_imu"),
+           py::arg("acceleration_imu"),
+           "A sample of the IMU [rad/s, m/s^2], before the scans that end after it.")
+      .def_property_readonly(
+          "trajectory", [](const Mapper& mapper) { return trajectory_of(mapper.trajectory()); },
+          "Poses of the lidar so far.")
+      .def_property_readonly("label_source", &Mapper::label_source)
+      .def("map", &current_map, "The static map as it is now.")
+      .def("save", &save, py::arg("file"),
+           "Writes a new map file, which servers resume and open_map() reads. Raises "
+           "MapFileError.");
+}
+
+}  // namespace stillmap::python

@@ -1,0 +1,60 @@
+"""Recordings scan by scan."""
+
+import numpy as np
+import pytest
+import stillmap
+
+
+def test_scans_are_the_files(city):
+    dataset = stillmap.open_dataset(city)
+    files = sorted((city / "velodyne").glob("*.bin"))
+    assert len(dataset) == len(files)
+    for scan, file in zip(dataset, files):
+        values = np.fromfile(file, np.float32).reshape(-1, 4)
+        np.testing.assert_array_equal(scan.points_lidar, values[:, :3])
+        assert len(scan.intensity) == len(scan) and scan.intensity.max() <= 1.0
+        assert scan.labels is not None and scan.raw_labels is not None
+    assert dataset.sensor.name == "VLP-16"
+    assert len(dataset.truth) == len(dataset)
+    assert dataset.faults == []
+
+
+def test_places_count_as_in_a_list(city):
+    dataset = stillmap.open_dataset(city)
+    np.testing.assert_array_equal(dataset[-1].points_lidar, dataset[len(dataset) - 1].points_lidar)
+    assert dataset.stamps_ns[3] == dataset[3].stamp_ns
+    with pytest.raises(IndexError):
+        dataset[len(dataset)]
+
+
+def test_the_imu_lies_beside(city):
+    stamps_ns, rates, accelerations = stillmap.open_dataset(city).imu
+    assert len(stamps_ns) > 50 and rates.shape == accelerations.shape == (len(stamps_ns), 3)
+    assert abs(np.median(np.linalg.norm(accelerations, axis=1)) - 9.8) < 0.5
+
+
+def test_points_stay_when_the_scan_is_gone(city):
+    points = stillmap.open_dataset(city)[0].points_lidar
+    again = stillmap.open_dataset(city)[0].points_lidar
+    np.testing.assert_array_equal(points, again)
+
+
+def test_scans_are_made_of_arrays():
+    points = np.arange(30, dtype=float).reshape(10, 3)
+    scan = stillmap.Scan(points, stamp_ns=7, ring=np.arange(10), labels=np.full(10, 9))
+    np.testing.assert_array_equal(scan.points_lidar, points.astype(np.float32))
+    assert scan.stamp_ns == 7 and scan.intensity is None and list(scan.ring) == list(range(10))
+    with pytest.raises(ValueError, match=r"points_lidar has the shape \(10, 4\); \(n, 3\)"):
+        stillmap.Scan(np.zeros((10, 4)))
+    with pytest.raises(ValueError, match="intensity has the shape"):
+        stillmap.Scan(points, intensity=np.zeros(9))
+    with pytest.raises(ValueError, match="class 20"):
+        stillmap.Scan(points, labels=np.full(10, 20))
+
+
+def test_faults_name_the_file(tmp_path):
+    with pytest.raises(stillmap.DatasetError, match="missing"):
+        stillmap.open_dataset(tmp_path / "missing")
+    (tmp_path / "a.mcap").write_bytes(b"this is none")
+    with pytest.raises(stillmap.DatasetError, match="no MCAP file"):
+        stillmap.open_dataset(tmp_path / "a.mcap")

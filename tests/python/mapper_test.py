@@ -1,0 +1,109 @@
+"""The mapper on arrays, against `stillmap map` of the same scans."""
+
+import threading
+import time
+
+import numpy as np
+import pytest
+import stillmap
+
+
+def read_poses(file):
+    rows = np.loadtxt(file).reshape(-1, 3, 4)
+    last = np.broadcast_to([0.0, 0, 0, 1], (len(rows), 1, 4))
+    return np.concatenate([rows, last], axis=1)
+
+
+@pytest.fixture(scope="module")
+def run(city):
+    dataset = stillmap.open_dataset(city)
+    mapper = stillmap.Mapper(dataset.sensor, labels="scan")
+    # Arrays of one's own, as another program would have them.
+    mapped = [
+        mapper.process(stillmap.Scan(scan.points_lidar.copy(), scan.stamp_ns, scan.intensity,
+                                     scan.time_offset_s, scan.ring, scan.labels))
+        for scan in dataset
+    ]
+    return mapper, mapped
+
+
+def test_poses_are_those_of_the_command_line(city, tmp_path):
+    from conftest import run as stillmap_program
+    bare = tmp_path / "bare"
+    bare.mkdir()
+    for name in ("velodyne", "labels", "times.txt", "time_offsets", "rings", "calib.txt"):
+        if (city / name).exists():
+            (bare / name).symlink_to(city / name)
+    stillmap_program("map", bare, "--labels", "files", "--loops", "off", "--out", tmp_path / "out", "--json")
+    dataset = stillmap.open_dataset(bare)
+    mapper = stillmap.Mapper(dataset.sensor, labels="scan")
+    for scan in dataset:
+        assert mapper.process(scan) is not None
+    expected = read_poses(tmp_path / "out" / "poses_lidar.txt")
+    np.testing.assert_allclose(mapper.trajectory.T_map_body, expected, atol=1e-6)
+
+
+def test_every_point_is_told_of(run):
+    mapper, mapped = run
+    for scan in mapped[1:]:
+        assert scan.health in ("good", "degenerate")
+        assert len(scan.points_lidar) == len(scan.label) == len(scan.motion) == len(scan)
+        assert scan.covariance.shape == (6, 6)
+        assert np.all(np.linalg.eigvalsh(scan.covariance) > -1e-12)
+    assert len(mapper.trajectory) == len(mapped)
+    assert mapper.label_source == "stream"
+
+
+def test_the_map_is_saved_and_read_again(run, tmp_path):
+    mapper, _ = run
+    map = mapper.map()
+    mapper.save(tmp_path / "made.stillmap")
+    again = stillmap.open_map(tmp_path / "made.stillmap")
+    assert len(again) == len(map) > 1000
+    np.testing.assert_array_equal(again.voxels().position_map, map.voxels().position_map)
+    # Rotations are stored as quaternions.
+    np.testing.assert_allclose(again.trajectory.T_map_body, mapper.trajectory.T_map_body, atol=1e-12)
+    assert len(again.removed().label) == len(map.removed().label)
+    with pytest.raises(stillmap.MapFileError, match="already"):
+        mapper.save(tmp_path / "made.stillmap")
+
+
+def test_scans_that_cannot_be_mapped_are_none_with_a_reason(city):
+    dataset = stillmap.open_dataset(city)
+    mapper = stillmap.Mapper(dataset.sensor)
+    assert mapper.process(stillmap.Scan(np.zeros((0, 3)))) is None
+    assert mapper.last_rejection
+    assert mapper.process(dataset[0]) is not None
+
+
+def test_wrong_settings_are_refused(city):
+    sensor = stillmap.open_dataset(city).sensor
+    with pytest.raises(stillmap.Error):
+        stillmap.load_sensor("sonar")
+    with pytest.raises(stillmap.Error):
+        stillmap.Mapper(sensor, labels="/nowhere/model")
+    mapper = stillmap.Mapper(sensor)
+    with pytest.raises(ValueError, match="rotation"):
+        mapper.process(stillmap.Scan(np.zeros((0, 3))), np.diag([2.0, 2, 2, 1]))
+
+
+def test_other_threads_run_meanwhile(city):
+    dataset = stillmap.open_dataset(city)
+    mapper = stillmap.Mapper(dataset.sensor)
+    gaps, end = [], threading.Event()
+
+    def tick():
+        last = time.monotonic()
+        while not end.is_set():
+            time.sleep(0.0005)
+            now = time.monotonic()
+            gaps.append(now - last)
+            last = now
+
+    ticking = threading.Thread(target=tick)
+    ticking.start()
+    for scan in dataset:
+        mapper.process(scan)
+    end.set()
+    ticking.join()
+    assert len(gaps) > len(dataset)
