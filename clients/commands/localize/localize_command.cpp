@@ -53,17 +53,17 @@ struct LocalizedScan {
   double ms = 0.0;
 };
 
-struct LoadedMap {
+struct SearchableMap {
   SavedMap saved;
   std::shared_ptr<const PlaceIndex> index;
   double load_ms = 0.0;
   double index_ms = 0.0;
 };
 
-LoadedMap load_map(const std::string& file) {
+SearchableMap load_map(const std::string& file) {
   if (!is_map_file(file))
     throw std::invalid_argument(file + " is no map file: 'stillmap map' and a server write them");
-  LoadedMap map;
+  SearchableMap map;
   const auto load_began = Clock::now();
   map.saved = open_map_file(file)->load();
   map.load_ms = milliseconds_since(load_began);
@@ -152,7 +152,7 @@ Json to_json(const LocalizedScan& scan) {
   return json;
 }
 
-Json to_json(const std::vector<LocalizedScan>& scans, const LoadedMap& map, double median_ms) {
+Json to_json(const std::vector<LocalizedScan>& scans, const SearchableMap& map, double median_ms) {
   Json list = Json::array();
   std::size_t found = 0;
   for (const LocalizedScan& scan : scans) {
@@ -178,7 +178,7 @@ double median_ms(const std::vector<LocalizedScan>& scans) {
   return times.empty() ? 0.0 : *middle;
 }
 
-std::string describe(const std::vector<LocalizedScan>& scans, const LoadedMap& map) {
+std::string describe(const std::vector<LocalizedScan>& scans, const SearchableMap& map) {
   Table table({"scan", "", "x", "y", "z", "heading", "score", "runner-up", "ms"});
   std::size_t found = 0;
   for (const LocalizedScan& scan : scans) {
@@ -202,7 +202,7 @@ std::string describe(const std::vector<LocalizedScan>& scans, const LoadedMap& m
 
 /// The map with the poses that were found.
 void write_picture(const std::string& file, const std::vector<LocalizedScan>& scans,
-                   const LoadedMap& map) {
+                   const SearchableMap& map) {
   Trajectory found;
   for (const LocalizedScan& scan : scans) {
     if (scan.result.status == LocalizationStatus::found)
@@ -213,7 +213,7 @@ void write_picture(const std::string& file, const std::vector<LocalizedScan>& sc
 
 ExitCode run(const LocalizeArguments& arguments) {
   StopSignal stop;
-  const LoadedMap map = load_map(arguments.map);
+  const SearchableMap map = load_map(arguments.map);
   const ScanDataset dataset = dds::open_sequence(arguments.dataset, arguments.topic_in);
   const std::size_t end = arguments.range.end(dataset);
   const Localizer localizer(map.index);
