@@ -21,8 +21,8 @@ enum class ExitCode {
 
 /// Help texts: the kinds of data set, and how the topic of a bag is chosen.
 inline constexpr const char* dataset_kinds =
-    "A KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag (folder "
-    "or .db3)";
+    "A KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag (folder, "
+    ".db3 or .mcap)";
 inline constexpr const char* topic_in_help =
     "The bag's topic to read; needed when it has several with scans";
 

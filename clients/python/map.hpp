@@ -9,8 +9,8 @@
 #include "clients/python/arrays.hpp"
 #include "core/lidar/trajectory.hpp"
 #include "core/map/query/map_query.hpp"
-#include "core/map/tile.hpp"
 #include "core/map/static_map.hpp"
+#include "core/map/tile.hpp"
 #include "core/map/tile_evidence.hpp"
 
 namespace stillmap::python {
