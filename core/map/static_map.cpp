@@ -61,9 +61,8 @@ std::string StaticMapConfig::faults() const {
   if (!(clearing_range_m >= 0.0 && clearing_range_m <= 1000.0)) {
     faults << "clearing_range_m = " << clearing_range_m << "; must be 0 (off) to 1000\n";
   }
-  if (!(clearing_margin_m >= voxel_size_m && clearing_margin_m <= 100.0)) {
-    faults << "clearing_margin_m = " << clearing_margin_m << "; must be at least voxel_size_m ("
-           << voxel_size_m << ") and at most 100\n";
+  if (!(clearing_margin_m > 0.0 && clearing_margin_m <= 100.0)) {
+    faults << "clearing_margin_m = " << clearing_margin_m << "; must be above 0 and at most 100\n";
   }
   if (!(clearing_margin_share >= 0.0 && clearing_margin_share <= 1.0)) {
     faults << "clearing_margin_share = " << clearing_margin_share << "; must be 0 to 1\n";
@@ -131,8 +130,9 @@ bool StaticMap::State::sees_through(const RangeImageView& view,
   const double range_m = (position_map - view.origin_map()).norm();
   if (range_m > config.clearing_range_m) return false;
   const auto observation = view.observe(position_map);
-  return observation && observation->nearest_m > range_m + config.clearing_margin_m +
-                                                     config.clearing_margin_share * range_m;
+  const double margin_m = std::max(config.clearing_margin_m, config.voxel_size_m);
+  return observation &&
+         observation->nearest_m > range_m + margin_m + config.clearing_margin_share * range_m;
 }
 
 std::uint32_t StaticMap::State::times_free(const Eigen::Vector3f& position_map) const {

@@ -37,8 +37,8 @@ struct StaticMapConfig {
   std::uint32_t free_space_history = 16;
   /// Range of clearing round the lidar; 0 turns clearing off.
   double clearing_range_m = 60.0;
-  /// A ray passes through a voxel when it ends at least this far behind it, plus this share of the
-  /// range.
+  /// A ray passes through a voxel when it ends at least this far behind it (a voxel, where those are
+  /// larger), plus this share of the range.
   double clearing_margin_m = 0.3;
   double clearing_margin_share = 0.01;
 

@@ -74,6 +74,7 @@ std::size_t voxels_in(const MapSnapshot& view) {
 }
 
 /// Share of the voxels that are of the class that most votes of a reference map give them.
+/// Of voxels that several points hit: a single one has but the vote of its own scan.
 double share_of_agreeing_voxels(const MapSnapshot& view, const MapSnapshot& reference) {
   std::size_t common = 0, agreeing = 0;
   for (const auto& tile : view.tiles) {
@@ -83,6 +84,7 @@ double share_of_agreeing_voxels(const MapSnapshot& view, const MapSnapshot& refe
     for (const Voxel& voxel : tile->voxels) {
       const auto same = std::ranges::lower_bound((*other)->voxels, voxel.index, {}, &Voxel::index);
       if (same == (*other)->voxels.end() || same->index != voxel.index) continue;
+      if (voxel.point_count < 2) continue;
       ++common;
       agreeing += same->evidence.winner() == voxel.evidence.winner() ? 1U : 0U;
     }

@@ -22,6 +22,8 @@ using stillmap_msgs::msg::MapTile;
 using Clock = std::chrono::steady_clock;
 
 constexpr int readers = 150;
+/// As many of them as come in this time: a slow machine needs a second each.
+constexpr auto duration = 40s;
 constexpr std::size_t cloud_bytes = 300'000;
 constexpr auto stall = 15s * test::slowdown;
 
@@ -64,7 +66,8 @@ void let_readers_come_and_go(const DdsOptions& options, const TopicQos& qos,
   Participant there(options);
   const std::stop_token never;
   T sample;
-  for (int i = 0; i < readers; ++i) {
+  const auto end = Clock::now() + duration;
+  for (int i = 0; i < readers && Clock::now() < end; ++i) {
     const int before = busy.written();
     Reader<T> reader(there, "rt/samples", qos);
     static_cast<void>(reader.take(sample, never, 50ms));

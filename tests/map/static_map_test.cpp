@@ -232,7 +232,7 @@ TEST(StaticMap, RestoredMapGoesOnLikeTheOriginal) {
   StaticMap original = test::street_map(3, 200);
   MapSnapshot stored = *original.view();
   stored.map_id = 77;
-  StaticMap restored(StaticMapConfig{});
+  StaticMap restored(original.config());
   restored.resume(stored);
   EXPECT_EQ(restored.view()->version, stored.version);
   EXPECT_EQ(restored.view()->map_id, 77U);
