@@ -70,6 +70,17 @@ void bind_scan(py::module_& module) {
       .def("__len__", [](const DatasetFrame& frame) { return frame.scan.size(); });
 }
 
+void bind_sensor(py::module_& module) {
+  py::class_<SensorModel>(module, "Sensor", "Description of a lidar.")
+      .def_readonly("name", &SensorModel::name)
+      .def_readonly("rings", &SensorModel::rings)
+      .def_readonly("period_s", &SensorModel::period_s, "Of one revolution [s].");
+  module.def(
+      "load_sensor", [](const std::string& name_or_file) { return load_sensor(name_or_file); },
+      py::arg("name_or_file"),
+      "hdl_64e, hdl_32e, vlp_16, or a file like those in config/sensors. Raises ConfigError.");
+}
+
 }  // namespace
 
 DatasetFrame frame_from_arrays(const InArray<float>& points_lidar, std::int64_t stamp_ns,
@@ -97,14 +108,7 @@ DatasetFrame frame_from_arrays(const InArray<float>& points_lidar, std::int64_t 
 
 void bind_dataset(py::module_& module) {
   bind_scan(module);
-  py::class_<SensorModel>(module, "Sensor", "Description of a lidar.")
-      .def_readonly("name", &SensorModel::name)
-      .def_readonly("rings", &SensorModel::rings)
-      .def_readonly("period_s", &SensorModel::period_s, "Of one revolution [s].");
-  module.def(
-      "load_sensor", [](const std::string& name_or_file) { return load_sensor(name_or_file); },
-      py::arg("name_or_file"),
-      "hdl_64e, hdl_32e, vlp_16, or a file like those in config/sensors. Raises ConfigError.");
+  bind_sensor(module);
   py::class_<dds::Recording>(
       module, "Dataset", "A sequence or bag, read scan by scan: dataset[3], for scan in dataset.")
       .def("__len__", [](const dds::Recording& r) { return r.dataset.size(); })

@@ -392,6 +392,16 @@ Eigen::Isometry3d Odometry::motion_during(double period_s) const {
   return state_->motion_during(period_s);
 }
 
+namespace {
+
+/// What users see is at the stamp: takes points and pose there from the middle of the sweep.
+void move_to_stamp(const Eigen::Isometry3d& T_middle_stamp, Scan& scan, OdometryResult& result) {
+  move_points(scan, T_middle_stamp.inverse());
+  result.T_map_lidar = result.T_map_lidar * T_middle_stamp;
+}
+
+}  // namespace
+
 bool Odometry::uses_rings() const {
   return !is_registered_by_surfaces(state_->sensor, state_->config);
 }
@@ -449,12 +459,9 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
     state.last.features = std::move(features);
   }
 
-  // What users see is at the stamp.
   if (sweep.middle_s != 0.0) {
-    const Eigen::Isometry3d T_middle_stamp =
-        scaled_motion(T_correction, stamp_part) * expected_motion.T_middle_at(stamp_part);
-    move_points(scan, T_middle_stamp.inverse());
-    step.result.T_map_lidar = T_map_middle * T_middle_stamp;
+    move_to_stamp(scaled_motion(T_correction, stamp_part) * expected_motion.T_middle_at(stamp_part),
+                  scan, step.result);
   }
   scan.time_offset_s.clear();
   return step;

@@ -120,7 +120,12 @@ export class Client {
     return id;
   }
 
-  first(topic) { return new Promise((resolve) => { this.listen(topic, resolve); }); }
+  /** The first message of a topic that is as wanted. */
+  first(topic, isWanted = () => true) {
+    return new Promise((resolve) => {
+      this.listen(topic, (message) => { if (isWanted(message)) resolve(message); });
+    });
+  }
 
   async call(name, request) {
     const { id, request: { schema }, response } = this.services.get(name);
