@@ -14,7 +14,7 @@ FILES ?=
 TILES ?=
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages web-packages configure programs web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 relocalize drives loops ros-messages parity format format-check clean
+.PHONY: help packages web-packages configure programs packaged web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 relocalize drives loops ros-messages parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -37,10 +37,13 @@ configure: packages
 programs: configure ## Build what users run, in build/release: stillmap and stillmap-server
 	cmake --build --preset $(PRESET) -j $(JOBS) --target programs
 
+packaged: configure
+	cmake --build --preset $(PRESET) -j $(JOBS) --target packaged
+
 build: configure ## Build everything: programs, tests, benchmarks (PRESET=dev, tsan for others)
 	cmake --build --preset $(PRESET) -j $(JOBS)
 
-deb: programs ## Debian packages in build/release/packages
+deb: packaged ## Debian packages in build/release/packages
 	cpack --config $(BUILD)/CPackConfig.cmake -B $(BUILD)/packages -G DEB
 	rm -rf $(BUILD)/packages/_CPack_Packages
 	@ls -lh $(BUILD)/packages
@@ -50,7 +53,7 @@ web: ## Bundle the page that stillmap-gateway serves, into build/release/share/s
 	cd clients/web && { [ node_modules/.package-lock.json -nt package-lock.json ] || npm ci; } && \
 	  node build.mjs $(CURDIR)/$(BUILD)/share/stillmap/web
 
-viewer: programs web ## A simulated drive in the browser: server, replay and gateway; the page at http://127.0.0.1:8765/
+viewer: packaged web ## A simulated drive in the browser: server, replay and gateway; the page at http://127.0.0.1:8765/
 	@BUILD=$(BUILD) clients/viewer.sh
 
 web-packages:
@@ -63,7 +66,7 @@ demo: programs ## Run the main job: simulated city, replay over DDS, server, pla
 test: build ## Build and run the tests
 	ctest --preset $(PRESET) -j $(JOBS)
 
-test-web: programs web ## The gateway with Foxglove's own client, and the page in headless Chromium
+test-web: packaged web ## The gateway with Foxglove's own client, and the page in headless Chromium
 	@command -v chromium > /dev/null || $(MAKE) web-packages WEB_PACKAGES=chromium
 	BUILD=$(CURDIR)/$(BUILD) node --test tests/gateway/web/*.test.mjs
 

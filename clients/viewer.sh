@@ -33,7 +33,7 @@ free_domain() {
 }
 
 for program in stillmap stillmap-server stillmap-gateway; do
-  [ -x "$bin/$program" ] || { echo "viewer: $bin/$program is missing: run 'make programs'" >&2; exit 1; }
+  [ -x "$bin/$program" ] || { echo "viewer: $bin/$program is missing: run 'make viewer'" >&2; exit 1; }
 done
 mkdir -p "$demo"
 domain=${ROS_DOMAIN_ID:-$(free_domain)}
