@@ -402,6 +402,11 @@ ExitCode run(const MapArguments& arguments) {
     std::cerr << "stillmap: no scan of " << arguments.dataset << " could be mapped\n";
     return ExitCode::bad_input;
   }
+  if (arguments.loops == "on" && !result.loops) {
+    std::cerr
+        << "stillmap: loops are left open, since the sequence's stamps were set back and poses "
+           "of before were dropped\n";
+  }
   const MapOutput output = write_map_output(out, dataset, result, config, body);
   const Json report = to_json(result, output);
   write_report(out.unfinished() / "report.json", report);

@@ -1,6 +1,7 @@
 #include "clients/commands/mapping/mapping_run.hpp"
 
 #include <algorithm>
+#include <cassert>
 #include <stdexcept>
 #include <utility>
 
@@ -97,8 +98,12 @@ class MappingRun {
 
   MappingResult finish(bool stopped) {
     result_.trajectory = result_.odometry = path();
-    if (loops_ && loops_->finish()) correct();
-    if (loops_) result_.loops = loops_->report();
+    // Poses are dropped where a recording's clock was set back: which scans the others are of is
+    // not known then, and loops stay open.
+    if (loops_ && result_.trajectory.size() == result_.scan_of_pose.size()) {
+      if (loops_->finish()) correct();
+      result_.loops = loops_->report();
+    }
     SavedMap map = to_saved_map(mapper_.static_map().checkpoint(CheckpointScope::everything));
     result_.view = std::make_shared<const MapSnapshot>(std::move(map.view));
     result_.tile_evidence = std::move(map.tile_evidence);
@@ -113,8 +118,7 @@ class MappingRun {
   /// Puts the corrected poses, and the map by them, in place of those of the odometry.
   void correct() {
     const auto& T_map_lidar = loops_->T_map_lidar();
-    if (T_map_lidar.size() != result_.trajectory.size())
-      throw std::logic_error("as many corrected poses as scans are expected");
+    assert(T_map_lidar.size() == result_.trajectory.size());
     for (std::size_t i = 0; i < T_map_lidar.size(); ++i)
       result_.trajectory[i].T_map_lidar = T_map_lidar[i] * T_body_lidar_.inverse();
     result_.odometry_view = mapper_.map_snapshot();
