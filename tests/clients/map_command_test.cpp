@@ -192,6 +192,19 @@ TEST_F(MapCommandTest, NamesADamagedFileAndGoesOn) {
   EXPECT_EQ(report.at("skipped").at(0).at("counter"), "unreadable");
 }
 
+TEST_F(MapCommandTest, LeavesLoopsOpenWhereStampsWereSetBack) {
+  simulate("city", 24);
+  std::ofstream times(folder_ / "city/times.txt", std::ios::trunc);
+  for (int k = 0; k < 24; ++k) times << (k < 8 ? 100.0 : 0.0) + 0.1 * k << "\n";
+  times.close();
+  const ProcessResult result = map_city();
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("loops are left open"));
+  const nlohmann::json report = nlohmann::json::parse(content("out/report.json"));
+  EXPECT_TRUE(report.at("loops").is_null());
+  EXPECT_TRUE(exists("out/map.stillmap"));
+}
+
 TEST_F(MapCommandTest, StopsAtADamagedFileWhenStrict) {
   simulate("city", 3);
   truncate("city/labels/000001.label", 10);

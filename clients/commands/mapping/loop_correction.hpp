@@ -40,6 +40,7 @@ class LoopCorrection {
   /// The scan of this number in the data set. Throws DatasetError.
   void add(std::size_t index, const MappedScan& mapped);
   void flush() { log_.flush(); }
+  [[nodiscard]] std::size_t scan_count() const { return index_.size(); }
 
   /// The run ended. Returns whether poses changed.
   [[nodiscard]] bool finish();

@@ -54,6 +54,11 @@ class MappingRun {
     result_.resumed_at_scan = earlier.next_scan;
   }
 
+  /// Begins with this scan: what an earlier run has kept is of no use.
+  void begin(std::size_t first_scan) {
+    if (loops_) loops_->resume(first_scan);
+  }
+
   /// What changed since the last saved state.
   [[nodiscard]] RunState state(std::size_t next_scan) {
     if (loops_) loops_->flush();
@@ -88,6 +93,7 @@ class MappingRun {
       return;
     }
     times_.end();
+    forget_dropped_poses();
     result_.scan_of_pose.push_back(index);
     result_.health[mapped->odometry.health] += 1;
     is_registered_ |= mapped->odometry.health != OdometryHealth::lost;
@@ -98,9 +104,8 @@ class MappingRun {
 
   MappingResult finish(bool stopped) {
     result_.trajectory = result_.odometry = path();
-    // Poses are dropped where a recording's clock was set back: which scans the others are of is
-    // not known then, and loops stay open.
-    if (loops_ && result_.trajectory.size() == result_.scan_of_pose.size()) {
+    // Submaps hold dropped poses, too: loops stay open then.
+    if (loops_ && loops_->scan_count() == result_.trajectory.size()) {
       if (loops_->finish()) correct();
       result_.loops = loops_->report();
     }
@@ -115,6 +120,12 @@ class MappingRun {
   }
 
  private:
+  /// Where the stamps were set back, the mapper drops the poses of times to come.
+  void forget_dropped_poses() {
+    const std::size_t before = earlier_.size() + mapper_.trajectory().size() - 1;
+    result_.scan_of_pose.resize(std::min(before, result_.scan_of_pose.size()));
+  }
+
   /// Puts the corrected poses, and the map by them, in place of those of the odometry.
   void correct() {
     const auto& T_map_lidar = loops_->T_map_lidar();
@@ -195,6 +206,8 @@ MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
       earlier && earlier->scan_of_pose.size() >= min_resumed_scans) {
     index = earlier->next_scan;
     run.resume(*std::move(earlier));
+  } else {
+    run.begin(index);
   }
   const auto began = std::chrono::steady_clock::now();
   bool is_stopped = false;
