@@ -7,7 +7,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/lidar/sweep_merger.hpp"
 #include "core/odometry/features.hpp"
+#include "core/odometry/first_scan.hpp"
 #include "core/odometry/motion_classification.hpp"
 #include "core/odometry/motion_limits.hpp"
 #include "core/odometry/object_clusters.hpp"
@@ -29,17 +31,10 @@ constexpr double max_prediction_s = 1.0;
 constexpr int relocalization_interval = 5;
 constexpr double relocalization_reach_m = 24.0;
 constexpr double max_relocalization_reach_m = 60.0;
-/// How far off its way a lidar may be after a gap of one second [m/s^2].
-constexpr double gap_acceleration_m_s2 = 1.5;
 /// What moves is classified again where the registered pose is farther than this from the predicted
 /// one [m, rad].
 constexpr double reclassify_distance_m = 0.2;
 constexpr double reclassify_angle_rad = 0.01;
-
-void move_points(Scan& scan, const Eigen::Isometry3d& T) {
-  const Eigen::Isometry3f T_float = T.cast<float>();
-  for (Eigen::Vector3f& point : scan.points_lidar) point = T_float * point;
-}
 
 }  // namespace
 
@@ -54,10 +49,16 @@ struct Odometry::State {
 
   /// The range image of the scan for the history; nothing where none is kept.
   [[nodiscard]] std::optional<RangeImageView> view_of(const Scan& scan, const PointLabels& labels,
-                                                      const Eigen::Isometry3d& T_map_lidar) const;
-  [[nodiscard]] std::vector<MotionClass> classify(const Scan& scan, const ObjectClusters& objects,
-                                                  const std::optional<RangeImageView>& now,
-                                                  const Eigen::Isometry3d& T_map_lidar) const;
+                                                      const Eigen::Isometry3d& T_map_lidar) const {
+    if (labels.empty() || !config.motion.use_range_image_history) return std::nullopt;
+    return RangeImageView(scan, labels.classes, sensor, T_map_lidar);
+  }
+  [[nodiscard]] std::vector<MotionClass> classify(const ScanInParts& parts,
+                                                  const Eigen::Isometry3d& T_map_lidar) const {
+    if (!parts.view) return std::vector<MotionClass>(parts.objects.count, MotionClass::undecided);
+    return classify_motion(parts.scan, parts.objects, T_map_lidar, history, *parts.view,
+                           config.motion);
+  }
   /// Whether the last velocity predicts the pose of a scan of this time.
   [[nodiscard]] bool has_velocity(std::int64_t stamp_ns) const;
   /// What scans are registered by now.
@@ -76,6 +77,11 @@ struct Odometry::State {
   /// motion_during() since the last pose, turned as the IMU says.
   [[nodiscard]] Eigen::Isometry3d motion_to_middle(
       double interval_s, const std::optional<InertialMotion>& inertial) const;
+  /// Where a scan is, by a prior or the map's origin, else by the last motion.
+  [[nodiscard]] PosePrediction predict(std::int64_t time_ns,
+                                       const std::optional<Eigen::Isometry3d>& T_map_lidar_known,
+                                       bool is_prior,
+                                       const std::optional<InertialMotion>& inertial) const;
   /// Finds features, objects and the range image of a scan, and what its objects do, seen from the
   /// predicted pose.
   void take_apart(ScanInParts& parts, const PosePrediction& prediction) const;
@@ -92,23 +98,24 @@ struct Odometry::State {
   void confirm(const FeatureSets& features, const PosePrediction& prediction,
                OdometryResult& result) const {
     if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
+    if (!fits.are_known()) result = led_by_points(result, features, map, method());
     result = confirmed_by_points(result, features, map, method());
     keep_to_limits(last, prediction, !has_jumped, sensor.motion_limits, result);
   }
   /// Calls a pose good only where the map says so that is older than any doubt of the place.
   void confirm_place(const FeatureSets& features, const PosePrediction& prediction,
                      OdometryResult& result);
+  /// Takes this scan for the first one where no other could be registered to that.
+  void begin_anew(const FeatureSets& features, OdometryResult& result);
   /// Local map and velocity as they were before the stretch.
   void forget_stretch();
   [[nodiscard]] SweepPrior sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,
                                        const SweepMotion& motion) const;
   void extend_map(const ScanInParts& parts, const Step& step,
                   const Eigen::Isometry3d& T_map_middle);
-  /// Builds the local map anew from the first scan, compensated for the motion that the second one
-  /// shows, and registers that one again; the two converge together. `features` are those of the
-  /// second scan, not compensated.
-  void straighten_first_scan(const FeatureSets& features, std::int64_t time_ns,
-                             const SweepTimes& sweep, OdometryResult& second);
+  /// The first scan by the motion to the second, where that one rolled.
+  void straighten(const FeatureSets& features, std::int64_t time_ns, const SweepTimes& sweep,
+                  OdometryResult& second);
   void update_state(std::int64_t stamp_ns, std::optional<RangeImageView> view,
                     const Eigen::Isometry3d& T_map_lidar);
 
@@ -117,12 +124,6 @@ struct Odometry::State {
   OdometryConfig first_config;
   SensorModel sensor;
   LocalMap map;
-  struct FirstScan {
-    FeatureSets features;
-    SweepTimes sweep;
-    Eigen::Isometry3d T_map_stamp;
-  };
-  /// A first scan that rolled at an unknown velocity, until the second one tells it.
   std::optional<FirstScan> first_scan;
   /// Points of a prior map, until the first scan is registered against it.
   std::vector<LabelledPoint> prior_map;
@@ -130,6 +131,7 @@ struct Odometry::State {
   /// Since the place is in doubt.
   std::optional<UnconfirmedStretch> stretch;
   bool started = false;
+  bool has_prior_map = false;
   /// The last motion was none of the robot: a place was found again, or a prior corrected itself.
   bool has_jumped = false;
   /// Scans in a row that could not be registered.
@@ -138,19 +140,6 @@ struct Odometry::State {
   RegisteredScan last;
   FitStatistics fits;
 };
-
-std::optional<RangeImageView> Odometry::State::view_of(const Scan& scan, const PointLabels& labels,
-                                                       const Eigen::Isometry3d& T_map_lidar) const {
-  if (labels.empty() || !config.motion.use_range_image_history) return std::nullopt;
-  return RangeImageView(scan, labels.classes, sensor, T_map_lidar);
-}
-
-std::vector<MotionClass> Odometry::State::classify(const Scan& scan, const ObjectClusters& objects,
-                                                   const std::optional<RangeImageView>& now,
-                                                   const Eigen::Isometry3d& T_map_lidar) const {
-  if (!now) return std::vector<MotionClass>(objects.count, MotionClass::undecided);
-  return classify_motion(scan, objects, T_map_lidar, history, *now, config.motion);
-}
 
 bool Odometry::State::has_velocity(std::int64_t stamp_ns) const {
   return last.interval_s > 0.0 && lost_scans == 0 &&
@@ -172,10 +161,28 @@ Eigen::Isometry3d Odometry::State::motion_to_middle(
   return motion_of(twist);
 }
 
+PosePrediction Odometry::State::predict(std::int64_t time_ns,
+                                        const std::optional<Eigen::Isometry3d>& T_map_lidar_known,
+                                        bool is_prior,
+                                        const std::optional<InertialMotion>& inertial) const {
+  const double interval_s = intervals.since_last_s(time_ns);
+  return {.T_map_lidar = T_map_lidar_known
+                             ? *T_map_lidar_known
+                             : last.T_map_lidar * motion_to_middle(interval_s, inertial),
+          .interval_s = interval_s,
+          .is_known = is_prior || has_velocity(time_ns),
+          .is_prior = is_prior,
+          .lost_scans = lost_scans,
+          .is_searched_widely = is_searched_widely()};
+}
+
 OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
                                               const PosePrediction& prediction) const {
   if (!started) {
-    if (prior_map.empty()) return OdometryResult{.T_map_lidar = prediction.T_map_lidar};
+    if (prior_map.empty()) {
+      return can_begin_map(features, config) ? OdometryResult{.T_map_lidar = prediction.T_map_lidar}
+                                             : lost_at(prediction.T_map_lidar);
+    }
     return relocalize(features, prior_map, map, prediction.T_map_lidar, method(),
                       relocalization_reach_m);
   }
@@ -188,6 +195,10 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
                                ? fits.believes(found)
                                : fits.believes_relocalized(found);
   if (found.health != OdometryHealth::lost && is_believed) return found;
+  if (is_foretold(found, features, map, prediction, fits, config)) {
+    found.health = OdometryHealth::degenerate;
+    return found;
+  }
   if (lost_scans > 0 && is_searched_widely()) {
     const double driven_m = last.interval_s > 0.0 ? last.motion.translation().norm() *
                                                         prediction.interval_s / last.interval_s
@@ -217,7 +228,7 @@ void Odometry::State::take_apart(ScanInParts& parts, const PosePrediction& predi
                                         config.motion.object_gap_m);
       },
       [&] { parts.view = view_of(parts.scan, parts.labels, prediction.T_map_lidar); });
-  parts.motion_classes = classify(parts.scan, parts.objects, parts.view, prediction.T_map_lidar);
+  parts.motion_classes = classify(parts, prediction.T_map_lidar);
 }
 
 OdometryResult Odometry::State::find_pose(ScanInParts& parts, const PosePrediction& prediction,
@@ -241,7 +252,7 @@ void Odometry::State::reclassify_motion(ScanInParts& parts,
   if (off.head<3>().norm() < reclassify_distance_m && off.tail<3>().norm() < reclassify_angle_rad)
     return;
   parts.view->move_to(result.T_map_lidar);
-  parts.motion_classes = classify(parts.scan, parts.objects, parts.view, result.T_map_lidar);
+  parts.motion_classes = classify(parts, result.T_map_lidar);
   if (parts.movable == MovableUse::none) return;
   features = registered_features(parts, config);
   const OdometryResult again =
@@ -274,27 +285,14 @@ void Odometry::State::update_state(std::int64_t stamp_ns, std::optional<RangeIma
   history.add(*std::move(view));
 }
 
-void Odometry::State::straighten_first_scan(const FeatureSets& features, std::int64_t time_ns,
-                                            const SweepTimes& sweep, OdometryResult& second) {
-  constexpr int rounds = 4;
+void Odometry::State::straighten(const FeatureSets& features, std::int64_t time_ns,
+                                 const SweepTimes& sweep, OdometryResult& second) {
+  if (!first_scan) return;
   const FirstScan first = *std::exchange(first_scan, std::nullopt);
   const double interval_s = intervals.stamped_since_last_s(time_ns);
   if (second.health == OdometryHealth::lost || interval_s > max_prediction_s || !features.rolling)
     return;
-  OdometryResult found = second;
-  FeatureSets moving = features;
-  for (int round = 0; round < rounds; ++round) {
-    const PoseTangent velocity =
-        twist_of(last.T_map_lidar.inverse() * found.T_map_lidar) / interval_s;
-    last.T_map_lidar = first.T_map_stamp * motion_of(velocity * first.sweep.middle_s);
-    map.clear();
-    extend_local_map(map, first.features, last.T_map_lidar, velocity * first.sweep.duration_s);
-    moving.sweep_prior.T_map_lidar_last = last.T_map_lidar;
-    found = register_features(moving, map, last.T_map_lidar * motion_of(velocity * interval_s),
-                              method(), velocity * sweep.duration_s);
-    if (found.health == OdometryHealth::lost) return;
-  }
-  second = found;
+  straighten_first_scan(first, features, interval_s, sweep, method(), map, last, second);
 }
 
 void Odometry::State::confirm_place(const FeatureSets& features, const PosePrediction& prediction,
@@ -311,11 +309,8 @@ void Odometry::State::confirm_place(const FeatureSets& features, const PosePredi
   if (!stretch && !is_doubtful) return;
   if (!stretch) stretch.emplace(UnconfirmedStretch::Trusted{map, last, intervals, fits});
   if (is_jump) {
-    // Across a gap it may have braked, sped up or turned; once lost it may be anywhere.
     const double distance_m = distance_from_expected(result.T_map_lidar, last, prediction);
-    const double reach_m = gap_acceleration_m_s2 * std::pow(prediction.interval_s, 2);
-    const bool is_followed = lost_scans == 0 && distance_m < std::clamp(reach_m, 3.0, 15.0);
-    if (!is_followed) stretch->jump(distance_m);
+    if (!is_followed(distance_m, prediction)) stretch->jump(distance_m);
   }
   using enum UnconfirmedStretch::Decision;
   const auto decision = stretch->evaluate(features, config, result);
@@ -330,6 +325,17 @@ void Odometry::State::confirm_place(const FeatureSets& features, const PosePredi
   if (decision == open) return;
   forget_stretch();
   result = lost_at(last.T_map_lidar);
+}
+
+void Odometry::State::begin_anew(const FeatureSets& features, OdometryResult& result) {
+  const bool has_first_alone = started && last.interval_s <= 0.0 && !has_prior_map;
+  const bool is_lost_again = lost_scans > 0 && result.health == OdometryHealth::lost;
+  if (!has_first_alone || !is_lost_again || !can_begin_map(features, config)) return;
+  map.clear();
+  history = RangeImageHistory(config.motion);
+  first_scan.reset();
+  started = false;
+  result = OdometryResult{.T_map_lidar = last.T_map_lidar};
 }
 
 void Odometry::State::forget_stretch() {
@@ -415,21 +421,14 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   const std::int64_t time_ns = scan.stamp_ns + std::llround(sweep.middle_s * 1e9);
   const SweepMotion expected_motion = sweep_motion(sweep, inertial);
   const double stamp_part = sweep.duration_s > 0.0 ? -sweep.middle_s / sweep.duration_s : 0.0;
-  const bool begins_at_origin = !state.started && !T_map_lidar_prior;
-  const Eigen::Isometry3d T_map_lidar_predicted =
-      T_map_lidar_prior || begins_at_origin
-          ? T_map_lidar_prior.value_or(Eigen::Isometry3d::Identity()) *
-                expected_motion.T_middle_at(stamp_part).inverse()
-          : state.last.T_map_lidar *
-                state.motion_to_middle(state.intervals.since_last_s(time_ns), inertial);
+  std::optional<Eigen::Isometry3d> T_map_middle_known = T_map_lidar_prior;
+  if (!state.started && !T_map_lidar_prior) T_map_middle_known = Eigen::Isometry3d::Identity();
+  if (T_map_middle_known)
+    *T_map_middle_known = *T_map_middle_known * expected_motion.T_middle_at(stamp_part).inverse();
+  const PosePrediction prediction =
+      state.predict(time_ns, T_map_middle_known, T_map_lidar_prior.has_value(), inertial);
 
   // Features F_e and F_p, without those on objects that may be moving.
-  const PosePrediction prediction{.T_map_lidar = T_map_lidar_predicted,
-                                  .interval_s = state.intervals.since_last_s(time_ns),
-                                  .is_known = T_map_lidar_prior || state.has_velocity(time_ns),
-                                  .is_prior = T_map_lidar_prior.has_value(),
-                                  .lost_scans = state.lost_scans,
-                                  .is_searched_widely = state.is_searched_widely()};
   ScanInParts parts{.scan = scan, .sweep = sweep, .labels = labels};
   state.take_apart(parts, prediction);
   parts.sweep_prior = state.sweep_prior(time_ns, sweep, expected_motion);
@@ -438,24 +437,24 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   Step step;
   FeatureSets features;
   step.result = state.find_pose(parts, prediction, features);
-  state.reclassify_motion(parts, T_map_lidar_predicted, features, step.result);
+  state.reclassify_motion(parts, prediction.T_map_lidar, features, step.result);
   state.confirm(features, prediction, step.result);
   state.confirm_place(features, prediction, step.result);
+  state.begin_anew(features, step.result);
   step.result = doubted_where_pulled(step.result, features, state.map, state.config);
-  if (state.first_scan) state.straighten_first_scan(features, time_ns, sweep, step.result);
-  const Eigen::Isometry3d T_map_middle = step.result.T_map_lidar;
+  state.straighten(features, time_ns, sweep, step.result);
+  step.T_map_lidar_middle = step.result.T_map_lidar;
   const Eigen::Isometry3d T_correction = motion_of(step.result.sweep_correction);
   deskew_to_middle(scan, sweep, T_correction);
-  step.T_map_lidar_middle = T_map_middle;
   // Moving points stay out of the local map, eq. (9) and c > c_th.
   step.motion = classify_point_motion(scan, labels, parts.objects, parts.motion_classes,
-                                      T_map_middle, state.map, state.config);
+                                      step.T_map_lidar_middle, state.map, state.config);
   const bool is_lost = step.result.health == OdometryHealth::lost;
   state.lost_scans = is_lost ? state.lost_scans + 1 : 0;
   if (!is_lost) {
-    state.extend_map(parts, step, T_map_middle);
+    state.extend_map(parts, step, step.T_map_lidar_middle);
     state.fits.add(step.result);
-    state.update_state(time_ns, std::move(parts.view), T_map_middle);
+    state.update_state(time_ns, std::move(parts.view), step.T_map_lidar_middle);
     state.last.features = std::move(features);
   }
 
@@ -470,6 +469,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
 void Odometry::add_prior_map(std::span<const LabelledPoint> points_map) {
   State& state = *state_;
   insert_prior_map(points_map, state.map);
+  state.has_prior_map |= !points_map.empty();
   if (state.stretch) state.stretch->add_prior_map(points_map);
   if (!state.started) state.prior_map.assign(points_map.begin(), points_map.end());
 }

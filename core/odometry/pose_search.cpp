@@ -23,6 +23,11 @@ constexpr double min_gain_of_other_start = 1.01;
 /// A pose that the alignment of points moves by more than this is not confirmed [m, rad].
 constexpr double max_point_deviation_m = 0.2;
 constexpr double max_point_deviation_rad = 0.035;
+/// The same of the first scans, and how much better the points must fit elsewhere: by this share,
+/// times how well the features fit.
+constexpr double max_first_deviation_m = 0.1;
+constexpr double max_first_deviation_rad = 0.01;
+constexpr double min_first_gain = 0.25;
 /// A pose that traffic pulls by more than this is not called good [m, rad].
 constexpr double max_pull_m = 0.1;
 constexpr double max_pull_rad = 0.01;
@@ -30,6 +35,16 @@ constexpr double max_pull_rad = 0.01;
 constexpr double short_gap_s = 1.0;
 /// After a gap of up to this the lidar may have gone straight on [s].
 constexpr double max_gap_s = 10.0;
+/// How far off its way a lidar may be after a gap of one second [m/s^2], at least and at most [m].
+constexpr double gap_acceleration_m_s2 = 1.5;
+constexpr double min_gap_reach_m = 3.0;
+constexpr double max_gap_reach_m = 15.0;
+/// After so few lost scans, so near to where its motion led [m], it was followed.
+constexpr int max_missed_scans = 2;
+constexpr double missed_distance_m = 0.5;
+/// Registration and motion agree on a pose [m, rad].
+constexpr double foretold_distance_m = 0.1;
+constexpr double foretold_angle_rad = 0.01;
 /// Where these fail, poses so far from the last one are judged by the landmarks alone [m], and so
 /// many are tried.
 constexpr double proposal_reach_m = 6.0;
@@ -44,6 +59,9 @@ constexpr double min_believed_overlap = 0.1;
 /// been is not believed. Simulated drives with hard turns fall to 0.58; scans of another city, or
 /// of the wrong place in this one, reach 0.32.
 constexpr double min_believed_fit_share = 0.5;
+/// The same, and the share of the scan in known space, where the motion foretold the place.
+constexpr double min_foretold_fit_share = 0.35;
+constexpr double min_foretold_overlap = 0.5;
 /// The same, where nothing told the place: streets look alike. A street 3 m off reaches 0.54, the
 /// right place across a gap of 33 m 0.77.
 constexpr double min_relocalized_fit_share = 0.65;
@@ -240,6 +258,11 @@ bool FitStatistics::believes(const OdometryResult& result) const {
          result.overlap >= min_believed_overlap;
 }
 
+bool FitStatistics::believes_foretold(const OdometryResult& result) const {
+  return result.upright_fit >= min_foretold_fit_share * mean_upright_fit_ &&
+         result.overlap >= min_foretold_overlap;
+}
+
 bool FitStatistics::believes_relocalized(const OdometryResult& result) const {
   return result.upright_fit >= min_relocalized_fit_share * mean_upright_fit_;
 }
@@ -270,6 +293,33 @@ OdometryResult confirmed_by_points(const OdometryResult& found, const FeatureSet
   return doubtful;
 }
 
+OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& features,
+                             const LocalMap& map, const OdometryConfig& config) {
+  PointAlignmentConfig alignment{.without_movable = labels_tell_enough(features, config)};
+  const auto aligned_from = [&](const Eigen::Isometry3d& T_map_lidar) {
+    return align_points(features, map.points, T_map_lidar, found.sweep_correction, alignment);
+  };
+  const PointAlignment aligned =
+      aligned_from(align_points_around(features, map, found.T_map_lidar, config));
+  alignment.max_iterations = 1;
+  const double fit_there = aligned_from(found.T_map_lidar).fit;
+  const PoseTangent off = boxminus(aligned.T_map_lidar, found.T_map_lidar);
+  const bool agrees = off.head<3>().norm() < max_first_deviation_m &&
+                      off.tail<3>().norm() < max_first_deviation_rad;
+  const double min_gain = 1.0 + min_first_gain * found.fit;
+  if (agrees || aligned.fit < min_gain * fit_there) return found;
+  // What the features say of that pose, which they do not move.
+  OdometryConfig in_place = config;
+  in_place.registration.max_iterations = 1;
+  OdometryResult result =
+      register_features(features, map, aligned.T_map_lidar, in_place, found.sweep_correction);
+  if (result.health == OdometryHealth::lost) return found;
+  result.T_map_lidar = aligned.T_map_lidar;
+  result.sweep_correction = found.sweep_correction;
+  result.health = OdometryHealth::degenerate;
+  return result;
+}
+
 OdometryResult doubted_where_pulled(OdometryResult found, const FeatureSets& features,
                                     const LocalMap& map, const OdometryConfig& config) {
   if (config.registration.robust_scale_m > 0.0 || found.health != OdometryHealth::good)
@@ -292,6 +342,23 @@ double distance_from_expected(const Eigen::Isometry3d& T_map_lidar, const Regist
   for (const Eigen::Isometry3d& T : starts_without_prediction(last, prediction))
     nearest_m = std::min(nearest_m, (T_map_lidar.translation() - T.translation()).norm());
   return nearest_m;
+}
+
+bool is_followed(double distance_m, const PosePrediction& prediction) {
+  if (prediction.lost_scans > 0)
+    return prediction.lost_scans <= max_missed_scans && distance_m < missed_distance_m;
+  const double reach_m = gap_acceleration_m_s2 * std::pow(prediction.interval_s, 2);
+  return distance_m < std::clamp(reach_m, min_gap_reach_m, max_gap_reach_m);
+}
+
+bool is_foretold(const OdometryResult& found, const FeatureSets& features, const LocalMap& map,
+                 const PosePrediction& prediction, const FitStatistics& fits,
+                 const OdometryConfig& config) {
+  if (config.paper_exact || !prediction.is_known || prediction.is_prior) return false;
+  if (found.health != OdometryHealth::good || !fits.believes_foretold(found)) return false;
+  const PoseTangent off = boxminus(found.T_map_lidar, prediction.T_map_lidar);
+  return off.head<3>().norm() < foretold_distance_m && off.tail<3>().norm() < foretold_angle_rad &&
+         confirmed_by_points(found, features, map, config).health == OdometryHealth::good;
 }
 
 OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,

@@ -20,6 +20,8 @@ class FitStatistics {
   [[nodiscard]] bool fits_poorly(const OdometryResult& result) const;
   /// Whether a pose can be believed; all can before enough fits are known.
   [[nodiscard]] bool believes(const OdometryResult& result) const;
+  /// The same, where registration came to the place that motion foretold (see is_foretold).
+  [[nodiscard]] bool believes_foretold(const OdometryResult& result) const;
   /// The same, where no prediction told the place: by what stands up in it alone, and more of that.
   [[nodiscard]] bool believes_relocalized(const OdometryResult& result) const;
   /// Whether enough of all its features fits to tell a place by, where part of it lies in unknown
@@ -64,6 +66,12 @@ struct PosePrediction {
                                                  const FeatureSets& features, const LocalMap& map,
                                                  const OdometryConfig& config);
 
+/// A pose of one of the first scans, `found` by features: what of a sparse lidar's rings lies on
+/// the road goes along with it, and pulls two sparse scans together by up to a metre. Where the
+/// points align clearly better some way off, that pose, degenerate.
+[[nodiscard]] OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& features,
+                                           const LocalMap& map, const OdometryConfig& config);
+
 /// `found`, but no pose that was found without a robust kernel is good unless it stays where it is
 /// with one: traffic pulls the one along, and not the other.
 [[nodiscard]] OdometryResult doubted_where_pulled(OdometryResult found, const FeatureSets& features,
@@ -75,6 +83,18 @@ struct PosePrediction {
 [[nodiscard]] double distance_from_expected(const Eigen::Isometry3d& T_map_lidar,
                                             const RegisteredScan& last,
                                             const PosePrediction& prediction);
+
+/// Whether a pose so far from where motion led (see distance_from_expected) belongs to the same
+/// drive: across a gap the lidar may have braked, sped up or turned; once lost it may be anywhere,
+/// unless traffic hid what it knew for a moment.
+[[nodiscard]] bool is_followed(double distance_m, const PosePrediction& prediction);
+
+/// Whether registration came by itself to where motion led, and the points agree: then the lidar is
+/// there, however little dense traffic leaves of what the map knows. Never of a prior's pose, which
+/// is no witness of its own, and not in the paper.
+[[nodiscard]] bool is_foretold(const OdometryResult& found, const FeatureSets& features,
+                               const LocalMap& map, const PosePrediction& prediction,
+                               const FitStatistics& fits, const OdometryConfig& config);
 
 /// All starts that may lead to the pose, the cheapest first, until one fits.
 [[nodiscard]] OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,

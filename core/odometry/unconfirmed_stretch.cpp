@@ -110,8 +110,11 @@ UnconfirmedStretch::Decision UnconfirmedStretch::decide(const OdometryResult& in
   // One that drives out of the trusted map fits it less and less, and stays where it puts it.
   const bool stays =
       in_trusted_map.health == OdometryHealth::good && is_within(same_distance_m, same_angle_rad);
+  // Where little of a place stands out of traffic, what was seen since does not fit either.
+  const bool is_elsewhere = has_jumped_ || (!trusted_.fits.believes(in_trusted_map) &&
+                                            trusted_.fits.believes_relocalized(found));
   count_contradicting(!stays && in_trusted_map.overlap >= min_contradicting_overlap &&
-                      (has_jumped_ || !trusted_.fits.believes(in_trusted_map)));
+                      is_elsewhere);
   if (is_overdue() || contradicting_scans_ >= contradicting_scans) return Decision::contradicted;
   return !has_jumped_ && good_path_m_ >= settling_path_m ? Decision::settled : Decision::open;
 }

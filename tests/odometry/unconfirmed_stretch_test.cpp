@@ -32,7 +32,7 @@ SurfaceWorld road_with_walls(std::initializer_list<double> walls_x_m, double fac
 SurfaceWorld here() { return road_with_walls({-8.0, -1.0, 7.0, 16.0, 24.0}); }
 
 OdometryResult good_at(const Eigen::Isometry3d& T_map_lidar) {
-  return {.T_map_lidar = T_map_lidar, .health = OdometryHealth::good};
+  return {.T_map_lidar = T_map_lidar, .health = OdometryHealth::good, .upright_fit = 0.9};
 }
 
 /// A stretch after scans of `here()` that fitted its map.
@@ -95,6 +95,18 @@ TEST(UnconfirmedStretch, IsContradictedByScansInARowOfAnotherPlace) {
   const SurfaceWorld elsewhere = road_with_walls({-4.5, 3.0, 11.5, 20.0}, 5.5);
   const auto decisions = judged(stretch, elsewhere, 10, 0.0, Eigen::Isometry3d::Identity());
   EXPECT_EQ(decisions, (std::vector<Decision>{open, open, open, open, contradicted}));
+}
+
+TEST(UnconfirmedStretch, IsNotContradictedWhereTrafficHidesThePlaceFromWhatWasSeenSince) {
+  UnconfirmedStretch stretch = stretch_of_here();
+  const SurfaceWorld hidden = road_with_walls({-4.5, 3.0, 11.5, 20.0}, 5.5);
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    OdometryResult found = good_at(Eigen::Isometry3d::Identity());
+    found.upright_fit = 0.4;
+    EXPECT_EQ(
+        stretch.evaluate(hidden.features(Eigen::Isometry3d::Identity(), 0.01, seed), {}, found),
+        open);
+  }
 }
 
 TEST(UnconfirmedStretch, StaysOpenWhereTheTrustedMapKnowsNothing) {
