@@ -49,6 +49,7 @@ std::optional<MappedScan> Mapper::process(
   // measurements.
   if (odometry_.uses_rings()) raw_scan.ring = assign_rings(raw_scan, config_.sensor);
   Scan scan = drop_unusable_points(std::move(raw_scan), config_.prepare);
+  turn_up(scan, config_.sensor.elevation_offset);
   if (!has_enough_points(scan)) return std::nullopt;
   end_stage("prepare");
 

@@ -75,6 +75,7 @@ void read_sensor(YamlSection& file, SensorModel& sensor) {
   file.degrees("fov_up_deg", sensor.fov_up, {-90, 90});
   file.degrees("fov_down_deg", sensor.fov_down, {-90, 90});
   file.degrees_list("beam_elevations_deg", sensor.beam_elevations, {-90, 90});
+  file.degrees("elevation_offset_deg", sensor.elevation_offset, {-5, 5});
   file.integer("columns", sensor.columns, {16, 65536});
   file.number("min_range_m", sensor.min_range_m, {0, 1000});
   file.number("max_range_m", sensor.max_range_m, {0.1, 10000});
@@ -98,6 +99,7 @@ void save_sensor(const SensorModel& sensor, const fs::path& file) {
   yaml << YAML::Key << "beam_elevations_deg" << YAML::Value << YAML::Flow << YAML::BeginSeq;
   for (const double elevation : sensor.beam_elevations) yaml << elevation / degree;
   yaml << YAML::EndSeq;
+  yaml << YAML::Key << "elevation_offset_deg" << YAML::Value << sensor.elevation_offset / degree;
   yaml << YAML::Key << "columns" << YAML::Value << sensor.columns;
   yaml << YAML::Key << "min_range_m" << YAML::Value << sensor.min_range_m;
   yaml << YAML::Key << "max_range_m" << YAML::Value << sensor.max_range_m;

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <vector>
 
+#include "core/lidar/prepare.hpp"
 #include "core/lidar/rings.hpp"
 #include "core/lidar/sensor_model.hpp"
 
@@ -108,14 +109,7 @@ double correlation_with_kitti(std::vector<double> elevations) {
 }  // namespace
 
 void KittiLidar::correct(Scan& scan) const {
-  const auto up = static_cast<float>(std::sin(elevation_offset));
-  const auto along = static_cast<float>(std::cos(elevation_offset));
-  for (Eigen::Vector3f& p : scan.points_lidar) {
-    const float across = std::hypot(p.x(), p.y());
-    if (!(across > 0.0F)) continue;
-    const float stretch = along - up * p.z() / across;
-    p = {p.x() * stretch, p.y() * stretch, p.z() * along + across * up};
-  }
+  turn_up(scan, elevation_offset);
   if (sweep_duration_s <= 0.0) return;
   scan.time_offset_s.clear();
   scan.time_offset_s.reserve(scan.size());

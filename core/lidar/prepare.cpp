@@ -120,6 +120,18 @@ Scan drop_unusable_points(Scan scan, const PrepareConfig& config) {
   return scan;
 }
 
+void turn_up(Scan& scan, double angle_rad) {
+  if (angle_rad == 0.0) return;
+  const auto up = static_cast<float>(std::sin(angle_rad));
+  const auto along = static_cast<float>(std::cos(angle_rad));
+  for (Eigen::Vector3f& p : scan.points_lidar) {
+    const float across = std::hypot(p.x(), p.y());
+    if (!(across > 0.0F)) continue;
+    const float stretch = along - up * p.z() / across;
+    p = {p.x() * stretch, p.y() * stretch, p.z() * along + across * up};
+  }
+}
+
 double SweepTimes::part(float time_offset_s) const {
   if (duration_s <= 0.0) return 0.0;
   const double part = (time_offset_s - middle_s) / duration_s;

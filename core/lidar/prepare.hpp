@@ -25,6 +25,10 @@ struct PrepareConfig {
 /// per-point vectors stay aligned.
 [[nodiscard]] Scan drop_unusable_points(Scan scan, const PrepareConfig& config);
 
+/// Turns every point up by this angle [rad], about the horizontal axis across its direction: what
+/// SensorModel::elevation_offset asks for.
+void turn_up(Scan& scan, double angle_rad);
+
 /// When a sweep was measured, relative to the scan's stamp [s].
 struct SweepTimes {
   double middle_s = 0.0;

@@ -14,6 +14,8 @@ constexpr double degrees(double radians) { return radians * 180.0 / std::numbers
 
 constexpr int max_rings = 1024;
 constexpr int max_columns = 65536;
+/// More is no fault of a lidar, but of how it is mounted.
+constexpr double max_elevation_offset = radians(5.0);
 
 void check_beams(const SensorModel& sensor, std::ostream& faults) {
   const auto& beams = sensor.beam_elevations;
@@ -62,6 +64,10 @@ std::string SensorModel::faults() const {
   }
   check_field_of_view(*this, faults);
   check_beams(*this, faults);
+  if (!(std::abs(elevation_offset) <= max_elevation_offset)) {
+    faults << "elevation_offset = " << degrees(elevation_offset) << " deg; must be within -"
+           << degrees(max_elevation_offset) << ".." << degrees(max_elevation_offset) << '\n';
+  }
   if (!(min_range_m >= 0.0 && std::isfinite(min_range_m))) {
     faults << "min_range_m = " << min_range_m << "; must be 0 or more\n";
   }

@@ -34,6 +34,8 @@ struct SensorModel {
   /// Elevation of each beam from the highest to the lowest [rad]; empty: evenly spaced, each in
   /// the middle of its share of the field of view.
   std::vector<double> beam_elevations;
+  /// What every elevation that it measures is too low by [rad].
+  double elevation_offset = 0.0;
   /// Range image of this sensor: columns over 360 degrees (rows = rings).
   int columns = 1024;
   double min_range_m = 0.5;

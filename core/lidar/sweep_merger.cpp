@@ -65,6 +65,7 @@ SensorModel merged_sensor(std::span<const PlacedSensor> sensors) {
   merged.pattern = ScanPattern::irregular;
   merged.ring_source = RingSource::elevation;
   merged.intensity_scale = 1.0F;
+  merged.elevation_offset = 0.0;
   merged.fov_up = -std::numbers::pi / 2.0;
   merged.fov_down = std::numbers::pi / 2.0;
   for (const PlacedSensor& placed : sensors) {

@@ -24,7 +24,7 @@ struct PlacedSensor {
 [[nodiscard]] Eigen::Isometry3d merged_frame(std::span<const Eigen::Isometry3d> T_base_lidars);
 
 /// The lidar that would have measured the merged scan: without rings, with a field of view that
-/// holds those of all.
+/// holds those of all, and without their offsets of elevation, which the parts are rid of.
 [[nodiscard]] SensorModel merged_sensor(std::span<const PlacedSensor> sensors);
 
 /// The scan's points in another frame.

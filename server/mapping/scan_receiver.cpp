@@ -87,6 +87,7 @@ double SweepInput::now_s() const {
 
 void SweepInput::add(std::size_t lidar, Scan scan, const std::stop_token& stop) {
   scan = drop_unusable_points(std::move(scan), usable_);
+  turn_up(scan, lidars_[lidar].sensor.elevation_offset);
   move_points(scan, T_merged_lidars_[lidar]);
   std::unique_lock lock(mutex_);
   const std::size_t lost = merger_.add(lidar, std::move(scan), now_s());

@@ -209,5 +209,19 @@ TEST_F(DatasetCommandTest, ALiveExportThatGetsNoPosesSaysSo) {
   EXPECT_THAT(content("export.log"), HasSubstr("the server did not map"));
 }
 
+TEST_F(DatasetCommandTest, SensorFindsTheOffsetOfElevationsFromADrive) {
+  simulate("drive", 20);
+  const ProcessResult found =
+      run("dataset sensor " + path("drive") + " --calibrate --out " + path("lidar.yaml"));
+  ASSERT_EQ(found.exit_code, 0) << found.err;
+  EXPECT_THAT(found.out, HasSubstr("occupied voxels"));
+  EXPECT_THAT(found.out, HasSubstr("elevation offset: "));
+  EXPECT_THAT(content("lidar.yaml"), HasSubstr("elevation_offset_deg: "));
+  simulate("short", 5);
+  const ProcessResult refused = run("dataset sensor " + path("short") + " --calibrate");
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("20 scans or more, not of 5"));
+}
+
 }  // namespace
 }  // namespace stillmap::test

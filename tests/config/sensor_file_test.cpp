@@ -20,6 +20,7 @@ void expect_same(const SensorModel& a, const SensorModel& b) {
   EXPECT_NEAR(a.fov_down, b.fov_down, 1e-12);
   EXPECT_THAT(a.beam_elevations,
               ::testing::Pointwise(::testing::DoubleNear(1e-12), b.beam_elevations));
+  EXPECT_NEAR(a.elevation_offset, b.elevation_offset, 1e-9);
   EXPECT_EQ(a.columns, b.columns);
   EXPECT_EQ(a.min_range_m, b.min_range_m);
   EXPECT_EQ(a.max_range_m, b.max_range_m);
@@ -52,6 +53,7 @@ TEST(SensorFile, WhatIsSavedIsReadBack) {
   SensorModel sensor = hdl_64e();
   sensor.name = "a name: with {yaml} in it";
   sensor.max_range_m = 77.25;
+  sensor.elevation_offset = 0.0036;
   sensor.ring_source = RingSource::field;
   sensor.intensity_scale = 1.0F / 255.0F;
   sensor.imu = ImuMount{

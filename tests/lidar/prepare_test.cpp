@@ -105,6 +105,31 @@ Eigen::Isometry3d pose(double angle, const Eigen::Vector3d& axis, const Eigen::V
   return T;
 }
 
+TEST(TurnUp, ChangesTheElevationOfEveryPointAlone) {
+  constexpr double angle_rad = 0.0036;
+  const auto elevation = [](const Eigen::Vector3f& p) {
+    return std::atan2(p.z(), std::hypot(p.x(), p.y()));
+  };
+  const std::vector<Eigen::Vector3f> points{
+      {30, 0, -1.7F}, {-3, 4, 0}, {0.5F, -60, 12}, {1, 1, -9}};
+  Scan scan = numbered_scan(points);
+  turn_up(scan, angle_rad);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3f& p = scan.points_lidar[i];
+    EXPECT_NEAR(elevation(p) - elevation(points[i]), angle_rad, 1e-6);
+    EXPECT_NEAR(p.norm(), points[i].norm(), 1e-5);
+    EXPECT_NEAR(std::atan2(p.y(), p.x()), std::atan2(points[i].y(), points[i].x()), 1e-6);
+  }
+}
+
+TEST(TurnUp, LeavesPointsThatHaveNoDirection) {
+  Scan scan = numbered_scan({{0, 0, 5}, {nan, 1, 1}, {0, 0, 0}});
+  turn_up(scan, 0.01);
+  EXPECT_EQ(scan.points_lidar[0], Eigen::Vector3f(0, 0, 5));
+  EXPECT_TRUE(std::isnan(scan.points_lidar[1].x()));
+  EXPECT_EQ(scan.points_lidar[2], Eigen::Vector3f(0, 0, 0));
+}
+
 TEST(Deskew, AgreesWithTheMatrixExponential) {
   std::mt19937 random(3);
   std::uniform_real_distribution<double> any(-1.0, 1.0);

@@ -1,27 +1,77 @@
+#include <algorithm>
 #include <iostream>
 #include <memory>
 #include <numbers>
+#include <stdexcept>
+#include <string>
 
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/recording.hpp"
+#include "clients/terminal/progress.hpp"
 #include "clients/terminal/table.hpp"
 #include "config/loaders/sensor_file.hpp"
+#include "core/elevation_calibration.hpp"
 
 namespace stillmap::cli {
 namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+/// Fewer scans show too little of a place from elsewhere.
+constexpr int min_calibration_scans = 20;
 
 struct DatasetSensorArguments {
   std::string dataset;
   std::string topic;
   std::string out;
+  bool calibrates = false;
+  int scans = 100;
 };
 
+/// Finds the sensor's offset of elevation and says what was found.
+void calibrate(const ScanDataset& recording, int max_scans, SensorModel& sensor) {
+  const std::size_t scans = std::min(static_cast<std::size_t>(max_scans), recording.size());
+  if (scans < std::size_t{min_calibration_scans}) {
+    throw std::invalid_argument("--calibrate needs a drive of " +
+                                std::to_string(min_calibration_scans) + " scans or more, not of " +
+                                std::to_string(scans));
+  }
+  MapperConfig mapper;
+  mapper.sensor = sensor;
+  mapper.prepare.min_range_m = sensor.min_range_m;
+  mapper.prepare.max_range_m = sensor.max_range_m;
+  mapper.odometry.weighting = Weighting::none;
+  const ElevationCalibrationConfig config;
+  Progress progress("calibrate", "scans", config.trials() * scans);
+  std::size_t driven = 0;
+  const ElevationCalibration found = calibrate_elevation(
+      mapper, scans,
+      [&](std::size_t k) {
+        progress.update(++driven);
+        return recording.read(k).scan;
+      },
+      config);
+  Table table({"turned up by [deg]", "occupied voxels"});
+  for (const ElevationCalibration::Trial& trial : found.trials)
+    table.add({fixed(trial.offset / degree, 2), std::to_string(trial.voxels)});
+  std::cout << table.text();
+  if (!found.offset) {
+    std::cout << "elevation offset: not to be told from this drive; it needs places that are seen "
+                 "from near and far\n";
+    return;
+  }
+  sensor.elevation_offset = *found.offset;
+  std::cout << "elevation offset: " << fixed(*found.offset / degree, 3)
+            << " degrees (1 sigma: " << fixed(found.sigma / degree, 3) << "), which saves "
+            << fixed(100.0 * found.saving, 2) << " % of the voxels\n";
+}
+
 ExitCode run(const DatasetSensorArguments& arguments) {
-  const SensorModel sensor = open_recording(arguments.dataset, arguments.topic).suggested_sensor();
-  constexpr double degree = std::numbers::pi / 180.0;
+  const ScanDataset recording = open_recording(arguments.dataset, arguments.topic);
+  SensorModel sensor = recording.suggested_sensor();
   std::cout << sensor.name << ": " << sensor.rings << " rings from "
             << fixed(sensor.fov_up / degree, 2) << " to " << fixed(sensor.fov_down / degree, 2)
             << " degrees of elevation\n";
+  if (arguments.calibrates) calibrate(recording, arguments.scans, sensor);
   if (!arguments.out.empty()) {
     save_sensor(sensor, arguments.out);
     std::cout << "written to " << arguments.out << ": name it as 'sensor' in the server's file\n";
@@ -37,12 +87,23 @@ void add_dataset_sensor_command(CommandHandle dataset, Action& action) {
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic, topic_in_help);
   command.option("--out", arguments->out, "Write a sensor file (YAML) for the server");
+  command.flag("--calibrate", arguments->calibrates,
+               "Find by how much the vertical angles are off, by driving several times");
+  command.option("--scans", arguments->scans, "Scans to calibrate by")
+      .between(min_calibration_scans, 10000)
+      .with_default();
   command.explain(
-      "Example:\n"
+      "Examples:\n"
       "  stillmap dataset sensor bag --out my_lidar.yaml\n"
+      "  stillmap dataset sensor bag --calibrate --out my_lidar.yaml\n"
       "Reads the first scan: the elevations of its rings, or where it numbers none, the field of\n"
       "view that its points fill, in 40 bands. Check the ranges in the file against the sensor's\n"
-      "data sheet.");
+      "data sheet.\n"
+      "--calibrate drives the first scans once for each of some offsets of elevation, and takes "
+      "the\n"
+      "one with which the map has fewest occupied voxels: vertical angles that are off bend what "
+      "is\n"
+      "seen from farther away. It wants a drive of some 50 m, the sensor's file gets the offset.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

@@ -81,7 +81,7 @@ SequenceScore compare_files(const std::string& truth, const std::string& predict
   const auto predictions = label_files(predicted, "predictions");
   const std::filesystem::path truth_folder = label_files(truth, "labels").front().parent_path();
   Progress progress("compare", "scans", predictions.size());
-  SequenceScore compared{.sequence = truth};
+  SequenceScore compared{.sequence = truth, .score = {}};
   std::uint64_t done = 0;
   for (const std::filesystem::path& prediction : predictions) {
     const auto classes = read_values<std::uint32_t>(prediction);

@@ -96,7 +96,8 @@ class LocalizationRun {
   /// Nothing for a scan that cannot be read; why is said.
   std::optional<LocalizedScan> localize(std::size_t index, Progress& progress) {
     try {
-      const Scan scan = drop_unusable_points(dataset_.read(index).scan, config_.prepare);
+      Scan scan = drop_unusable_points(dataset_.read(index).scan, config_.prepare);
+      turn_up(scan, config_.sensor.elevation_offset);
       LocalizedScan localized{index, scan.stamp_ns, {}, 0.0};
       const auto began = Clock::now();
       const PointLabels labels = segmenter_->segment(scan);

@@ -114,7 +114,10 @@ MapOutput write_map_output(const MapOutputFolder& out, const ScanDataset& datase
                            const MappingResult& result, const MapperConfig& config,
                            const MappedBody& body) {
   const std::filesystem::path& folder = out.unfinished();
-  MapOutput output{.folder = out.path(), .frame = body.frame, .accuracy = std::nullopt};
+  MapOutput output{.folder = out.path(),
+                   .frame = body.frame,
+                   .accuracy = std::nullopt,
+                   .odometry_accuracy = std::nullopt};
   write_kitti_poses(folder / pose_file_of(body.frame), result.trajectory);
   write_tum(folder / "poses_tum.txt", result.trajectory, body.frame);
   save_map(out.new_map_file(), result, config);
