@@ -33,6 +33,8 @@ struct Cube {
   /// Lowest and highest of its points [m].
   float low_m;
   float high_m;
+  std::uint32_t points = 0;
+  std::uint32_t cars = 0;
 };
 
 std::uint64_t key_of(const Eigen::Vector3i& index, std::uint64_t kind) {
@@ -70,25 +72,43 @@ void join_neighbours(const std::vector<Cube>& cubes, const CubeTable& table, Set
   }
 }
 
+/// What the cubes of an object make together.
+struct Shape {
+  Eigen::AlignedBox3f box;
+  std::uint32_t points = 0;
+  std::uint32_t cars = 0;
+
+  void add(const Cube& cube, float gap_m) {
+    const Eigen::Vector3f corner = cube.index.cast<float>() * gap_m;
+    box.extend(Eigen::Vector3f(corner.x(), corner.y(), cube.low_m));
+    box.extend(Eigen::Vector3f(corner.x() + gap_m, corner.y() + gap_m, cube.high_m));
+    points += cube.points;
+    cars += cube.cars;
+  }
+};
+
 /// Objects in the order of their first cubes, which is that of their first points.
-std::vector<std::int32_t> number_objects(const std::vector<Cube>& cubes, Sets& sets,
+std::vector<std::int32_t> number_objects(const std::vector<Cube>& cubes, float gap_m, Sets& sets,
                                          ObjectClusters& objects) {
   std::vector<std::int32_t> object_of_root(cubes.size(), ObjectClusters::none);
   std::vector<std::int32_t> object_of_cube(cubes.size());
-  std::vector<Eigen::AlignedBox1f> heights;
+  std::vector<Shape> shapes;
   for (std::size_t c = 0; c < cubes.size(); ++c) {
     std::int32_t& number = object_of_root[sets.root(static_cast<std::uint32_t>(c))];
     if (number == ObjectClusters::none) {
-      number = static_cast<std::int32_t>(heights.size());
-      heights.emplace_back();
+      number = static_cast<std::int32_t>(shapes.size());
+      shapes.emplace_back();
     }
     object_of_cube[c] = number;
-    Eigen::AlignedBox1f& height = heights[static_cast<std::size_t>(number)];
-    height.extend(Eigen::AlignedBox1f::VectorType(cubes[c].low_m));
-    height.extend(Eigen::AlignedBox1f::VectorType(cubes[c].high_m));
+    shapes[static_cast<std::size_t>(number)].add(cubes[c], gap_m);
   }
-  objects.count = heights.size();
-  for (const Eigen::AlignedBox1f& height : heights) objects.height_m.push_back(height.sizes()[0]);
+  objects.count = shapes.size();
+  for (const Shape& shape : shapes) {
+    const Eigen::Vector3f sizes_m = shape.box.sizes();
+    objects.height_m.push_back(sizes_m.z());
+    objects.length_m.push_back(sizes_m.head<2>().norm());
+    objects.is_car.push_back(2 * shape.cars > shape.points);
+  }
   return object_of_cube;
 }
 
@@ -119,12 +139,15 @@ ObjectClusters cluster_objects(std::span<const Eigen::Vector3f> points_lidar,
     Cube& own = cubes[static_cast<std::size_t>(last_cube)];
     own.low_m = std::min(own.low_m, z_m);
     own.high_m = std::max(own.high_m, z_m);
+    ++own.points;
+    own.cars += labels[i] == SemanticClass::car ? 1 : 0;
     objects.of_point[i] = last_cube;
     objects.movable_points.push_back(static_cast<std::uint32_t>(i));
   }
   Sets sets(cubes.size());
   join_neighbours(cubes, table, sets);
-  const std::vector<std::int32_t> object_of_cube = number_objects(cubes, sets, objects);
+  const std::vector<std::int32_t> object_of_cube =
+      number_objects(cubes, static_cast<float>(gap_m), sets, objects);
   for (const std::uint32_t i : objects.movable_points) {
     std::int32_t& of_point = objects.of_point[i];
     of_point = object_of_cube[static_cast<std::size_t>(of_point)];

@@ -19,6 +19,10 @@ struct ObjectClusters {
   std::vector<std::uint32_t> movable_points{};
   /// From the lowest to the highest point of every object [m].
   std::vector<float> height_m{};
+  /// Diagonal of its bounding box in the lidar's xy plane, to a cube's size [m].
+  std::vector<float> length_m{};
+  /// Whether most of its points are labelled car.
+  std::vector<bool> is_car{};
 };
 
 /// Groups movable points of the same kind (vehicles; people; two-wheelers and their riders) that

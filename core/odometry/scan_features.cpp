@@ -7,8 +7,10 @@
 namespace stillmap {
 namespace {
 
-/// Objects taller than this are no vehicles or people, whatever their labels say [m].
+/// Objects taller than this are no vehicles or people, and longer ones no cars but walls, or cars
+/// that are parked in a row, whatever their labels say [m].
 constexpr float max_object_height_m = 5.0F;
+constexpr float max_car_length_m = 15.0F;
 
 /// Fewer static features than this are helped out by parked vehicles.
 constexpr std::size_t min_static_features = 100;
@@ -27,7 +29,9 @@ class UsablePoints {
     for (std::size_t k = 0; k < objects_.count; ++k) {
       const bool is_parked =
           parts.movable == MovableUse::parked && parts.motion_classes[k] == MotionClass::parked;
-      usable_[k] = is_parked || objects_.height_m[k] > max_object_height_m;
+      const bool is_fixture = objects_.height_m[k] > max_object_height_m ||
+                              (objects_.is_car[k] && objects_.length_m[k] > max_car_length_m);
+      usable_[k] = is_parked || is_fixture;
     }
   }
 

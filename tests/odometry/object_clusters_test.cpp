@@ -53,6 +53,18 @@ TEST(ClusterObjects, KnowsHowHighEachObjectIs) {
   EXPECT_FLOAT_EQ(objects.height_m[1], 3.0F);
 }
 
+TEST(ClusterObjects, KnowsHowLongEachObjectIsAndWhetherItIsACar) {
+  Labelled scene;
+  for (int k = 0; k <= 120; ++k) scene.add({0.25F * static_cast<float>(k), 6.0F, 0.0F}, car);
+  scene.add_car(5.0F, -3.0F, truck);
+  const ObjectClusters objects = scene.objects();
+  ASSERT_EQ(objects.count, 2U);
+  EXPECT_NEAR(objects.length_m[0], 30.0F, 1.0F);
+  EXPECT_NEAR(objects.length_m[1], 4.0F, 1.0F);
+  EXPECT_TRUE(objects.is_car[0]);
+  EXPECT_FALSE(objects.is_car[1]);
+}
+
 TEST(ClusterObjects, NeighbouringCubesAreOneObjectInEveryDirection) {
   for (int x = -1; x <= 1; ++x)
     for (int y = -1; y <= 1; ++y)

@@ -22,6 +22,8 @@ struct LabelledPoints {
     }
     parts.objects.count = cars;
     parts.objects.height_m.assign(cars, 1.5F);
+    parts.objects.length_m.assign(cars, 4.0F);
+    parts.objects.is_car.assign(cars, true);
     parts.motion_classes.assign(cars, MotionClass::undecided);
   }
 
@@ -70,6 +72,14 @@ TEST(RegisteredFeatures, TakeObjectsThatAreTallerThanAnyVehicle) {
   LabelledPoints points(200, 5);
   points.parts.objects.height_m[0] = 12.0F;
   EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 160U);
+}
+
+TEST(RegisteredFeatures, TakeCarsThatAreLongerThanAnyCar) {
+  LabelledPoints points(200, 5);
+  points.parts.objects.length_m[0] = 30.0F;
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 160U);
+  points.parts.objects.is_car[0] = false;
+  EXPECT_EQ(registered_features(points.parts, OdometryConfig{}).surfaces.size(), 150U) << "a tram";
 }
 
 TEST(MapFeatures, LeaveOutWhatMoves) {
