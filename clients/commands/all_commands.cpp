@@ -11,7 +11,7 @@ constexpr const char* introduction =
     "  stillmap query --around-robot 50           and ask that server for its map\n"
     "'stillmap COMMAND --help' shows a command's options and examples.\n"
     "Exit codes: 0 success; 1 the run failed; 2 wrong usage or input; 3 no server or no answer;\n"
-    "4 'plan' found no path.";
+    "4 'plan' found no path; 5 a drive or map was not recognised in another map.";
 
 }  // namespace
 
@@ -86,6 +86,7 @@ void add_commands(CommandHandle program, Action& action) {
   add_load_command(program, action);
   add_reset_command(program, action);
   add_map_info_command(program, action);
+  add_sessions_command(program, action);
   add_map_check_command(program, action);
   add_map_diff_command(program, action);
   add_map_export_command(program, action);

@@ -8,6 +8,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/segmentation/model_error.hpp"
+#include "core/session/map_alignment.hpp"
 #include "idl/dds/dds_error.hpp"
 
 namespace stillmap::cli {
@@ -46,6 +47,8 @@ ExitCode run_action(const Action& action) {
     return report(error, ExitCode::bad_input);
   } catch (const dds::SecurityError& error) {
     return report(error, ExitCode::bad_input);
+  } catch (const MapNotRecognized& error) {
+    return report(error, ExitCode::not_recognized);
   } catch (const std::invalid_argument& error) {
     return report(error, ExitCode::bad_input);
   } catch (const std::exception& error) {

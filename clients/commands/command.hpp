@@ -17,11 +17,14 @@ enum class ExitCode {
   no_server = 3,
   /// There is no path to plan.
   no_path = 4,
+  /// A drive or a map was not recognised in another map.
+  not_recognized = 5,
 };
 
 /// Help texts: the kinds of data set, and how the topic of a bag is chosen.
 inline constexpr const char* dataset_kinds =
-    "A KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag (folder, "
+    "A KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag "
+    "(folder, "
     ".db3 or .mcap)";
 inline constexpr const char* topic_in_help =
     "The bag's topic to read; needed when it has several with scans";
@@ -55,6 +58,7 @@ void add_save_command(CommandHandle program, Action& action);
 void add_load_command(CommandHandle program, Action& action);
 void add_reset_command(CommandHandle program, Action& action);
 void add_map_info_command(CommandHandle program, Action& action);
+void add_sessions_command(CommandHandle program, Action& action);
 void add_map_check_command(CommandHandle program, Action& action);
 void add_map_diff_command(CommandHandle program, Action& action);
 void add_map_export_command(CommandHandle program, Action& action);

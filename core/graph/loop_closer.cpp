@@ -5,7 +5,6 @@
 #include <limits>
 #include <utility>
 
-#include "core/graph/submap_registration.hpp"
 #include "core/odometry/se3.hpp"
 
 namespace stillmap {
@@ -13,28 +12,6 @@ namespace {
 
 /// What a closure counts as, of way, for the drift between the places that it joins [m].
 constexpr double way_of_closure_m = 10.0;
-
-Eigen::Isometry2d in_plan(const Eigen::Isometry3d& T) {
-  const Eigen::Vector3d ahead = T.linear().col(0);
-  Eigen::Isometry2d plan = Eigen::Isometry2d::Identity();
-  plan.linear() = Eigen::Rotation2Dd(std::atan2(ahead.y(), ahead.x())).toRotationMatrix();
-  plan.translation() = T.translation().head<2>();
-  return plan;
-}
-
-/// An upright pose at this place of the plan and height.
-Eigen::Isometry3d in_space(const Eigen::Isometry2d& plan, double z_m) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear().topLeftCorner<2, 2>() = plan.linear();
-  T.translation() << plan.translation(), z_m;
-  return T;
-}
-
-AlignmentWindow window_after(const DriftModel& drift, double way_m) {
-  return {.reach_m = std::min(drift.offset_m + drift.share_of_way * way_m, drift.max_m),
-          .reach_rad =
-              std::min(drift.heading_rad + drift.heading_rad_per_m * way_m, drift.max_heading_rad)};
-}
 
 PoseEdge odometry_edge(std::size_t from, const Eigen::Isometry3d& T_from_to, double way_m,
                        const DriftModel& drift) {
@@ -96,8 +73,7 @@ void LoopCloser::close_submap() {
   Submap submap = builder_.take(T_odom_lidar_[nodes_[key].scan]);
   submap.key_node = key;
   submap.way_m = nodes_[key].way_m;
-  UprightImage image(submap.points_submap);
-  submaps_.push_back({std::move(submap), std::move(image)});
+  submaps_.emplace_back(std::move(submap));
   first_node_of_submap_ = nodes_.size() - 1;
   find_loops(submaps_.size() - 1);
 }
@@ -158,51 +134,31 @@ std::optional<LoopCloser::Candidate> LoopCloser::verify(std::size_t from, std::s
   const PlacedSubmap& a = submaps_[from];
   const PlacedSubmap& b = submaps_[to];
   const Eigen::Isometry3d T_a_b_expected = T_map_submap(a).inverse() * T_map_submap(b);
-  const PlanAlignments aligned =
-      align_in_plan(a.image, b.image, in_plan(T_a_b_expected), window_after(config_.drift, way_m));
-  Candidate candidate{.from = from, .to = to, .closure = {}, .edge = {}};
-  LoopClosure& closure = candidate.closure;
-  closure.from_scan = nodes_[a.submap.key_node].scan;
-  closure.to_scan = nodes_[b.submap.key_node].scan;
-  closure.runner_up = aligned.runner_up.score / std::max(aligned.best.score, 1e-9);
-  const auto offset_m = ground_offset_m(a.image, b.image, aligned.best.T_a_b);
-  if (!offset_m) return std::nullopt;
-
-  const SubmapTarget target(a.submap);
-  const Eigen::Isometry3d T_a_b_guess = in_space(aligned.best.T_a_b, *offset_m);
-  const OdometryResult found = target.register_submap(b.submap, T_a_b_guess);
-  closure.T_from_to = a.submap.T_submap_key.inverse() * found.T_map_lidar * b.submap.T_submap_key;
-  closure.jump_m = (T_a_b_expected.translation() - found.T_map_lidar.translation()).norm();
-  if (closure.jump_m < config_.min_jump_m && excursion_m(from, to) < config_.min_excursion_m)
+  const auto match =
+      match_submaps(a, b, T_a_b_expected, window_after(config_.drift, way_m), config_.match);
+  if (!match ||
+      (match->jump_m < config_.min_jump_m && excursion_m(from, to) < config_.min_excursion_m))
     return std::nullopt;
-  closure.refusal = fault_of(found, closure);
-  const Eigen::Isometry3d refinement = T_a_b_guess.inverse() * found.T_map_lidar;
-  if (closure.refusal.empty() && (refinement.translation().norm() > config_.max_refinement_m ||
-                                  angle_of(refinement) > config_.max_refinement_rad))
-    closure.refusal = "registration left the place that the plan showed";
-  if (closure.refusal.empty() && closure.runner_up > config_.max_runner_up) {
-    const OdometryResult other =
-        target.register_submap(b.submap, in_space(aligned.runner_up.T_a_b, *offset_m));
-    const double away_m =
-        (other.T_map_lidar.translation() - found.T_map_lidar.translation()).norm();
-    if (other.health != OdometryHealth::lost && away_m > 0.3 &&
-        other.upright_fit > found.upright_fit - config_.min_fit_margin)
-      closure.refusal = "another place fits nearly as well";
-  }
+  LoopClosure closure{
+      .from_scan = nodes_[a.submap.key_node].scan,
+      .to_scan = nodes_[b.submap.key_node].scan,
+      .T_from_to = a.submap.T_submap_key.inverse() * match->T_a_b * b.submap.T_submap_key,
+      .fit = match->fit,
+      .upright_fit = match->upright_fit,
+      .overlap = match->overlap,
+      .runner_up = match->runner_up,
+      .jump_m = match->jump_m,
+      .refusal = match->refusal};
   if (!closure.refusal.empty()) {
     refused_.push_back(std::move(closure));
     return std::nullopt;
   }
-  // The error of the motion between keys is along the axes of the later key.
-  const Eigen::Matrix3d R = b.submap.T_submap_key.linear().transpose();
-  Matrix6d turn = Matrix6d::Zero();
-  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = R;
-  candidate.edge = {.from = a.submap.key_node,
-                    .to = b.submap.key_node,
-                    .T_from_to = closure.T_from_to,
-                    .information = turn * edge_information(found) * turn.transpose(),
-                    .is_loop = true};
-  return candidate;
+  const PoseEdge edge{.from = a.submap.key_node,
+                      .to = b.submap.key_node,
+                      .T_from_to = closure.T_from_to,
+                      .information = match->key_information,
+                      .is_loop = true};
+  return Candidate{from, to, std::move(closure), edge};
 }
 
 double LoopCloser::excursion_m(std::size_t from, std::size_t to) const {
@@ -212,18 +168,6 @@ double LoopCloser::excursion_m(std::size_t from, std::size_t to) const {
   for (std::size_t n = first; n < submaps_[to].submap.key_node; ++n)
     excursion = std::max(excursion, (graph_.T_map_node[n].translation() - left_map).norm());
   return excursion;
-}
-
-std::string LoopCloser::fault_of(const OdometryResult& found, LoopClosure& closure) const {
-  closure.fit = found.fit;
-  closure.upright_fit = found.upright_fit;
-  closure.overlap = found.overlap;
-  if (found.health == OdometryHealth::lost) return "the submaps do not meet";
-  if (found.health != OdometryHealth::good) return "the submaps may slide along one another";
-  if (found.overlap < config_.min_overlap) return "too little of the submaps meets";
-  if (found.fit < config_.min_fit || found.upright_fit < config_.min_upright_fit)
-    return "the submaps do not fit";
-  return "";
 }
 
 void LoopCloser::judge(Candidate candidate) {
@@ -277,8 +221,12 @@ void LoopCloser::solve() {
 }
 
 std::vector<Eigen::Isometry3d> LoopCloser::corrected_poses() const {
+  return closures_.empty() ? T_odom_lidar_ : poses_by(graph_.T_map_node);
+}
+
+std::vector<Eigen::Isometry3d> LoopCloser::poses_by(
+    const std::vector<Eigen::Isometry3d>& T_map_node) const {
   std::vector<Eigen::Isometry3d> poses = T_odom_lidar_;
-  if (closures_.empty()) return poses;
   for (std::size_t n = 0; n < nodes_.size(); ++n) {
     const std::size_t first = nodes_[n].scan;
     const bool is_last = n + 1 == nodes_.size();
@@ -286,13 +234,13 @@ std::vector<Eigen::Isometry3d> LoopCloser::corrected_poses() const {
     const Eigen::Isometry3d T_node_odom = T_odom_lidar_[first].inverse();
     // What the motion to the next node is corrected by, spread over the scans between.
     Eigen::Isometry3d rest = Eigen::Isometry3d::Identity();
-    if (!is_last) {
-      rest = (graph_.T_map_node[n] * T_node_odom * T_odom_lidar_[end]).inverse() *
-             graph_.T_map_node[n + 1];
-    }
-    for (std::size_t k = first; k < end; ++k) {
-      const double share = static_cast<double>(k - first) / static_cast<double>(end - first);
-      poses[k] = graph_.T_map_node[n] * T_node_odom * T_odom_lidar_[k] *
+    if (!is_last)
+      rest = (T_map_node[n] * T_node_odom * T_odom_lidar_[end]).inverse() * T_map_node[n + 1];
+    // Scans before the first node go with it.
+    for (std::size_t k = n == 0 ? 0 : first; k < end; ++k) {
+      const double share =
+          k < first ? 0.0 : static_cast<double>(k - first) / static_cast<double>(end - first);
+      poses[k] = T_map_node[n] * T_node_odom * T_odom_lidar_[k] *
                  scaled_motion(rest, is_last ? 0.0 : share);
     }
   }

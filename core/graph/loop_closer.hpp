@@ -9,27 +9,11 @@
 
 #include "core/graph/pose_graph.hpp"
 #include "core/graph/submap.hpp"
-#include "core/graph/upright_image.hpp"
+#include "core/graph/submap_match.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/trajectory.hpp"
-#include "core/odometry/odometry_state.hpp"
 
 namespace stillmap {
-
-/// How far odometry may have gone astray: what a loop closure must not contradict.
-struct DriftModel {
-  /// Of a way, along with what any closure may be off [m].
-  double share_of_way = 0.01;
-  double offset_m = 2.0;
-  double max_m = 25.0;
-  /// Of the heading [rad], [rad/m].
-  double heading_rad = 0.026;
-  double heading_rad_per_m = 0.00006;
-  double max_heading_rad = 0.2;
-  /// Standard deviations of the odometry over a way of one metre: they grow with its root.
-  double translation_m = 0.01;
-  double rotation_rad = 0.0004;
-};
 
 struct LoopClosingConfig {
   SubmapConfig submap;
@@ -48,17 +32,7 @@ struct LoopClosingConfig {
   double max_distance_m = 15.0;
   /// So many of the nearest are tried.
   std::size_t max_candidates = 2;
-  /// What a registration must reach (see OdometryResult).
-  double min_overlap = 0.5;
-  double min_fit = 0.4;
-  double min_upright_fit = 0.5;
-  /// The runner-up of the plan alignment may reach this share of the best one's score; above it, it
-  /// must lead to the same pose, or fit worse by `min_fit_margin`.
-  double max_runner_up = 0.75;
-  double min_fit_margin = 0.08;
-  /// Registration moves what the plan alignment found by at most this.
-  double max_refinement_m = 1.5;
-  double max_refinement_rad = 0.06;
+  SubmapMatchConfig match;
   /// A jump larger than this needs a second closure that agrees to `agreement_m` and
   /// `agreement_rad`, from one of the next submaps.
   double max_single_jump_m = 1.0;
@@ -106,26 +80,28 @@ class LoopCloser {
   [[nodiscard]] const std::vector<LoopClosure>& refused() const { return refused_; }
   /// Poses of all scans added so far, corrected. Without closures: as they were.
   [[nodiscard]] std::vector<Eigen::Isometry3d> corrected_poses() const;
+  /// The same with these poses of the graph's nodes, in whatever frame they are.
+  [[nodiscard]] std::vector<Eigen::Isometry3d> poses_by(
+      const std::vector<Eigen::Isometry3d>& T_map_node) const;
   [[nodiscard]] const PoseGraph& graph() const { return graph_; }
-  [[nodiscard]] std::size_t submap_count() const { return submaps_.size(); }
+  /// A node of the graph.
+  struct Node {
+    /// Number of its scan, and the way of the lidar until there [m].
+    std::size_t scan = 0;
+    double way_m = 0.0;
+  };
+  [[nodiscard]] const std::vector<Node>& nodes() const { return nodes_; }
+  [[nodiscard]] const std::vector<PlacedSubmap>& submaps() const { return submaps_; }
   /// Memory of the submaps.
   [[nodiscard]] std::size_t submap_bytes() const;
 
  private:
-  struct PlacedSubmap {
-    Submap submap;
-    UprightImage image;
-  };
   /// A closure between submaps, before it is believed.
   struct Candidate {
     std::size_t from = 0;
     std::size_t to = 0;
     LoopClosure closure;
     PoseEdge edge;
-  };
-  struct Node {
-    std::size_t scan = 0;
-    double way_m = 0.0;
   };
 
   void add_node(std::size_t scan, const Eigen::Isometry3d& T_odom_lidar);
@@ -138,8 +114,6 @@ class LoopCloser {
   /// How far the lidar went away from the one place before it came to the other [m].
   [[nodiscard]] double excursion_m(std::size_t from, std::size_t to) const;
   [[nodiscard]] std::optional<Candidate> verify(std::size_t from, std::size_t to, double way_m);
-  /// Whether what was found is told from its runner-up; fills in what it is judged by.
-  [[nodiscard]] std::string fault_of(const OdometryResult& found, LoopClosure& closure) const;
   void judge(Candidate candidate);
   void accept(Candidate candidate);
   /// Solves, and takes out what the graph denies.

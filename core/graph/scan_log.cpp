@@ -165,29 +165,28 @@ void ScanLog::flush() {
   if (!stream_) throw DatasetError(file_, "cannot be written; check the space left");
 }
 
-void ScanLog::read(const std::function<void(LoggedScan)>& take) {
+LoggedScan ScanLog::at(std::size_t place) {
   flush();
-  std::vector<std::uint8_t> packed, bytes;
-  for (const Record& record : records_) {
-    Header header;
-    stream_.seekg(static_cast<std::streamoff>(record.offset));
-    if (!read_header(stream_, header)) throw DatasetError(file_, "is damaged");
-    packed.resize(header.packed_bytes);
-    stream_.read(reinterpret_cast<char*>(packed.data()),
-                 static_cast<std::streamsize>(packed.size()));
-    bytes.resize(planes * header.points);
-    const std::size_t size =
-        bytes.empty() ? 0
-                      : ZSTD_decompress(bytes.data(), bytes.size(), packed.data(), packed.size());
-    if (!stream_ || size != bytes.size()) throw DatasetError(file_, "is damaged");
-    LoggedScan scan{.index = header.index,
-                    .T_odom_lidar = Eigen::Isometry3d::Identity(),
-                    .is_confirmed = header.is_confirmed != 0,
-                    .labelled = from_planes(bytes, header)};
-    scan.T_odom_lidar.matrix().topRows<3>() =
-        Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(header.pose.data());
-    take(std::move(scan));
-  }
+  Header header;
+  stream_.seekg(static_cast<std::streamoff>(records_.at(place).offset));
+  if (!read_header(stream_, header)) throw DatasetError(file_, "is damaged");
+  std::vector<std::uint8_t> packed(header.packed_bytes);
+  stream_.read(reinterpret_cast<char*>(packed.data()), static_cast<std::streamsize>(packed.size()));
+  std::vector<std::uint8_t> bytes(planes * header.points);
+  const std::size_t size =
+      bytes.empty() ? 0 : ZSTD_decompress(bytes.data(), bytes.size(), packed.data(), packed.size());
+  if (!stream_ || size != bytes.size()) throw DatasetError(file_, "is damaged");
+  LoggedScan scan{.index = header.index,
+                  .T_odom_lidar = Eigen::Isometry3d::Identity(),
+                  .is_confirmed = header.is_confirmed != 0,
+                  .labelled = from_planes(bytes, header)};
+  scan.T_odom_lidar.matrix().topRows<3>() =
+      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(header.pose.data());
+  return scan;
+}
+
+void ScanLog::read(const std::function<void(LoggedScan)>& take) {
+  for (std::size_t place = 0; place < records_.size(); ++place) take(at(place));
 }
 
 void ScanLog::truncate_from(std::uint64_t index) {

@@ -36,6 +36,10 @@ class ScanLog {
   /// What was appended is in the file. Throws DatasetError.
   void flush();
 
+  [[nodiscard]] std::size_t size() const { return records_.size(); }
+  /// The scan at this place in the order of their appending. Throws DatasetError where the file is
+  /// damaged.
+  [[nodiscard]] LoggedScan at(std::size_t place);
   /// Every scan in the order of their appending. Throws DatasetError for a file that is damaged.
   void read(const std::function<void(LoggedScan)>& take);
   /// Drops the scans from this number on. Throws DatasetError.

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cassert>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <type_traits>
@@ -117,6 +118,13 @@ ClassEvidence LiveTile::evidence(std::uint32_t voxel_key) const {
   return position == PositionIndex::none ? ClassEvidence() : at(position).packed.evidence;
 }
 
+void LiveTile::enter_session(std::uint32_t session, std::uint32_t max_scans,
+                             const VisibilityRule& rule) {
+  if (std::exchange(session_, session) == session) return;
+  for (auto* const voxels : {&sorted_, &fresh_})
+    for (LiveVoxel& voxel : *voxels) forget_beyond(voxel, max_scans, rule);
+}
+
 void LiveTile::insert(std::span<const TilePoint> points, std::uint32_t scan) {
   for (std::size_t begin = 0; begin < points.size(); begin += block_size) {
     const auto block = points.subspan(begin, std::min(block_size, points.size() - begin));
@@ -199,6 +207,28 @@ void LiveTile::add_misses(LiveVoxel& voxel, std::uint32_t misses) {
   voxel.misses = static_cast<std::uint16_t>(voxel.misses + misses) & 0x3FFFU;
 }
 
+void LiveTile::forget_beyond(LiveVoxel& voxel, std::uint32_t max_scans,
+                             const VisibilityRule& rule) {
+  const bool was_seen_through = is_seen_through(voxel, rule);
+  const double max_missing =
+      std::max<double>(trust_in(voxel, rule) * rule.misses_to_clear,
+                       trust_in(voxel, rule) * rule.misses_per_hit * max_scans);
+  const double share = std::min({1.0, max_scans / std::max<double>(voxel.hits, 1.0),
+                                 max_missing / std::max<double>(voxel.misses, 1.0)});
+  if (share >= 1.0) return;
+  const auto shortened = [share](unsigned count) {
+    return static_cast<unsigned>(std::lround(share * count));
+  };
+  voxel.hits =
+      static_cast<std::uint16_t>(std::max(shortened(voxel.hits), voxel.hits > 0 ? 1U : 0U));
+  voxel.misses = shortened(voxel.misses) & 0x3FFFU;
+  // Rounding must not show or hide it.
+  while (was_seen_through && !is_seen_through(voxel, rule) && voxel.misses < max_misses)
+    voxel.misses = (voxel.misses + 1U) & 0x3FFFU;
+  while (!was_seen_through && is_seen_through(voxel, rule))
+    voxel.misses = (voxel.misses - 1U) & 0x3FFFU;
+}
+
 bool LiveTile::clear_seen_through(const VisibilityTest& test, std::uint32_t scan,
                                   const VisibilityRule& rule) {
   bool hides_one = false;
@@ -223,9 +253,13 @@ VoxelHistory LiveTile::history(const LiveVoxel& voxel) {
   return {voxel.hits, voxel.misses, voxel.was_shown != 0, voxel.is_restored != 0};
 }
 
-bool LiveTile::is_seen_through(const LiveVoxel& voxel, const VisibilityRule& rule) {
+std::uint32_t LiveTile::trust_in(const LiveVoxel& voxel, const VisibilityRule& rule) {
   const bool has_class = voxel.packed.evidence.winner() != SemanticClass::unlabeled;
-  const std::uint32_t trust = has_class ? rule.label_trust : 1;
+  return has_class ? rule.label_trust : 1;
+}
+
+bool LiveTile::is_seen_through(const LiveVoxel& voxel, const VisibilityRule& rule) {
+  const std::uint32_t trust = trust_in(voxel, rule);
   return voxel.is_restored == 0 && voxel.misses >= trust * rule.misses_to_clear &&
          voxel.misses > trust * rule.misses_per_hit * voxel.hits;
 }

@@ -64,6 +64,11 @@ class LiveTile {
   /// Restores a tile from its record; adds the stamps that its voxels name.
   LiveTile(TileId id, const TileRecord& record, const VoxelGrid& grid, ScanStamps& stamps);
 
+  /// What follows is of this session of the map: where the tile has evidence of an earlier one, it
+  /// counts as that of `max_scans` scans at most, for or against a voxel. What is shown does not
+  /// change by that.
+  void enter_session(std::uint32_t session, std::uint32_t max_scans, const VisibilityRule& rule);
+
   /// Points in voxels beyond the first 16,777,215 of a tile are left out.
   void insert(std::span<const TilePoint> points, std::uint32_t scan);
 
@@ -150,10 +155,12 @@ class LiveTile {
   void prefetch_voxels(std::span<const TilePoint> points) const;
   static void hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan);
   static void add_misses(LiveVoxel& voxel, std::uint32_t misses);
+  static void forget_beyond(LiveVoxel& voxel, std::uint32_t max_scans, const VisibilityRule& rule);
   static void exclude(Excluded& voxel, const TilePoint& point, std::uint32_t scan);
   std::size_t restore_excluded(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
                                const VisibilityRule& rule);
   [[nodiscard]] static VoxelHistory history(const LiveVoxel& voxel);
+  [[nodiscard]] static std::uint32_t trust_in(const LiveVoxel& voxel, const VisibilityRule& rule);
   [[nodiscard]] static bool is_seen_through(const LiveVoxel& voxel, const VisibilityRule& rule);
   [[nodiscard]] static bool is_shown(const LiveVoxel& voxel, const VisibilityRule& rule);
   /// Nothing for voxels that are shown, or were hit too rarely to be.
@@ -171,6 +178,7 @@ class LiveTile {
 
   TileId id_;
   VoxelGrid grid_;
+  std::uint32_t session_ = 0;
   /// By key; no larger than what it holds.
   std::vector<LiveVoxel> sorted_;
   /// Those that came since the last publication, in no order.

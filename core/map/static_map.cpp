@@ -109,6 +109,9 @@ struct StaticMap::State {
   /// Keeps the view of a scan that cleared.
   void keep(RangeImageView view, std::uint32_t scan);
   void forget_views();
+  void enter_session(LiveTile& tile) const {
+    if (session > 0) tile.enter_session(session, max_earlier_scans, rule());
+  }
   /// Scans from a position reach tiles that are this near, with a margin of two tiles [m].
   [[nodiscard]] double reach_m() const { return config.max_range_m + 2.0 * config.tile_size_m; }
 
@@ -116,6 +119,10 @@ struct StaticMap::State {
   MapTiles tiles;
   ScanSorter sorter;
   bool is_frozen = false;
+  /// 0: the first one.
+  std::uint32_t session = 0;
+  /// What scans of earlier sessions count at most.
+  std::uint32_t max_earlier_scans = 0;
   /// Scans so far.
   std::uint64_t inserted = 0;
   /// Views of the last scans that cleared, newest last, and the number of the newest one.
@@ -169,13 +176,21 @@ void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_
   // A tile belongs to one task, which takes its points in the order of the scan: the map does not
   // depend on how many threads there are.
   tbb::parallel_for(std::size_t{0}, hit.size(), [&](std::size_t i) {
-    if (hit[i] != nullptr) hit[i]->insert(batches[i].points, number);
+    if (hit[i] == nullptr) return;
+    state_->enter_session(*hit[i]);
+    hit[i]->insert(batches[i].points, number);
   });
   tiles.begin_step();
   for (LiveTile* const tile : hit) {
     if (tile != nullptr) tiles.touch(*tile);
   }
   ++state_->inserted;
+}
+
+void StaticMap::begin_session(std::uint32_t max_scans) {
+  ++state_->session;
+  state_->max_earlier_scans = max_scans;
+  state_->forget_views();
 }
 
 void StaticMap::set_frozen(bool is_frozen) { state_->is_frozen = is_frozen; }
@@ -197,6 +212,7 @@ void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns) {
       .last_scan_cleared = state_->last_scan_cleared};
   std::vector<std::uint8_t> hides(near.size());
   tbb::parallel_for(std::size_t{0}, near.size(), [&](std::size_t i) {
+    state_->enter_session(*near[i]);
     hides[i] = near[i]->clear_seen_through(test, scan, state_->rule()) ? 1 : 0;
   });
   state_->keep(std::move(view), scan);
@@ -221,6 +237,7 @@ void StaticMap::reset(std::uint64_t map_id) {
   state_->tiles.clear(map_id);
   state_->in_checkpoint.clear();
   state_->inserted = 0;
+  state_->session = 0;
   state_->forget_views();
 }
 

@@ -37,8 +37,8 @@ struct StaticMapConfig {
   std::uint32_t free_space_history = 16;
   /// Range of clearing round the lidar; 0 turns clearing off.
   double clearing_range_m = 60.0;
-  /// A ray passes through a voxel when it ends at least this far behind it (a voxel, where those are
-  /// larger), plus this share of the range.
+  /// A ray passes through a voxel when it ends at least this far behind it (a voxel, where those
+  /// are larger), plus this share of the range.
   double clearing_margin_m = 0.3;
   double clearing_margin_share = 0.01;
 
@@ -94,6 +94,12 @@ class StaticMap {
   /// finite, beyond `max_range_m`, or farther than 100 km from the map's origin are left out.
   /// `scan.motion` is as long as the scan. The result does not depend on the number of threads.
   void insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar);
+
+  /// What follows is another session of this map. Scans of those before count as `max_scans` at
+  /// most, for or against a voxel, so that what is gone goes, however often it was seen before;
+  /// what is shown stays until a scan says otherwise. Tiles that no scan of the session reaches
+  /// stay as they are.
+  void begin_session(std::uint32_t max_scans);
 
   /// Whether visibility clearing is due for the scan inserted last.
   [[nodiscard]] bool clearing_due() const;

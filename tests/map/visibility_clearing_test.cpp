@@ -208,6 +208,39 @@ TEST_F(VisibilityClearing, AStoredMapKeepsItsWeight) {
   EXPECT_EQ(shown(fence), before);
 }
 
+TEST_F(VisibilityClearing, WhatIsGoneInAnotherSessionGoesHoweverOftenItWasSeen) {
+  see(ghost, 300);
+  const int before = shown(fence);
+  ASSERT_GT(before, 50);
+  see(wall, 10);
+  ASSERT_EQ(shown(fence), before) << "within a session it has its weight";
+  map_.begin_session(20);
+  EXPECT_EQ(shown(fence), before);
+  see(wall, 10);
+  EXPECT_LT(shown(fence), before / 10);
+  EXPECT_GT(shown(building), 100);
+}
+
+TEST_F(VisibilityClearing, WhatIsThereInAnotherSessionAppearsHoweverOftenItWasNot) {
+  see(ghost, 2);
+  const int before = shown(fence);
+  see(wall, 300);
+  ASSERT_LT(shown(fence), before / 10);
+  map_.begin_session(20);
+  EXPECT_LT(shown(fence), before / 10);
+  see(ghost, 25);
+  EXPECT_GE(shown(fence), before * 9 / 10);
+}
+
+TEST_F(VisibilityClearing, TilesThatNoScanOfASessionReachesStay) {
+  see(ghost, 300);
+  const MapCheckpoint first = map_.checkpoint();
+  map_.checkpoint_stored(first.step);
+  map_.begin_session(20);
+  EXPECT_TRUE(map_.checkpoint().records.empty());
+  EXPECT_EQ(map_.view()->version, first.view->version);
+}
+
 TEST_F(VisibilityClearing, OffItLeavesEverything) {
   StaticMapConfig config;
   config.clearing_range_m = 0.0;

@@ -60,24 +60,32 @@ bool LoopCorrection::finish() {
   return !closer_.closures().empty();
 }
 
-StaticMap LoopCorrection::make_map(const StaticMapConfig& config, std::uint64_t map_id,
-                                   const std::function<void(std::size_t done)>& scan_done) {
+MapAlignment LoopCorrection::align(const std::shared_ptr<const PlaceIndex>& map,
+                                   const Eigen::Matrix3d& R_body_lidar) {
+  const auto scan_at = [this](std::size_t scan) { return log_.at(scan).labelled; };
+  MapAlignment alignment = MapAligner(map).align(closer_, scan_at, R_body_lidar);
+  for (std::vector<MapClosure>* const list : {&alignment.closures, &alignment.refused})
+    for (MapClosure& closure : *list) closure.scan = index_.at(closure.scan);
+  return alignment;
+}
+
+void LoopCorrection::insert_into(StaticMap& map, const std::vector<Eigen::Isometry3d>& T_map_lidar,
+                                 std::int64_t clock_offset_ns,
+                                 const std::function<void(std::size_t done)>& scan_done) {
   const Timed timed(seconds_);
-  StaticMap map(config);
-  map.reset(map_id);
   std::size_t done = 0;
-  log_.read([&](const LoggedScan& scan) {
-    const Eigen::Isometry3d& T_map_lidar = T_map_lidar_.at(done++);
-    if (scan.is_confirmed) insert_scan(scan.labelled, T_map_lidar, sensor_, map);
+  log_.read([&](LoggedScan scan) {
+    scan.labelled.scan.stamp_ns += clock_offset_ns;
+    const Eigen::Isometry3d& T = T_map_lidar.at(done++);
+    if (scan.is_confirmed) insert_scan(scan.labelled, T, sensor_, map);
     scan_done(done);
   });
-  return map;
 }
 
 LoopReport LoopCorrection::report() const {
   LoopReport report{.closures = closer_.closures(),
                     .refused = closer_.refused(),
-                    .submaps = closer_.submap_count(),
+                    .submaps = closer_.submaps().size(),
                     .nodes = closer_.graph().T_map_node.size(),
                     .submap_mib = static_cast<double>(closer_.submap_bytes()) / bytes_per_mib,
                     .scan_log_mib = static_cast<double>(log_.bytes()) / bytes_per_mib,

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <vector>
 
 #include "core/graph/loop_closer.hpp"
@@ -11,6 +12,7 @@
 #include "core/lidar/sensor_model.hpp"
 #include "core/map/static_map.hpp"
 #include "core/mapper.hpp"
+#include "core/session/map_alignment.hpp"
 
 namespace stillmap::cli {
 
@@ -46,9 +48,14 @@ class LoopCorrection {
   [[nodiscard]] bool finish();
   /// Poses of all scans that were added.
   [[nodiscard]] const std::vector<Eigen::Isometry3d>& T_map_lidar() const { return T_map_lidar_; }
-  /// The map by the corrected poses. `scan_done` is called after every scan. Throws DatasetError.
-  [[nodiscard]] StaticMap make_map(const StaticMapConfig& config, std::uint64_t map_id,
-                                   const std::function<void(std::size_t done)>& scan_done);
+  /// Where the drive lies in an earlier map, after `finish`. Throws DatasetError.
+  [[nodiscard]] MapAlignment align(const std::shared_ptr<const PlaceIndex>& map,
+                                   const Eigen::Matrix3d& R_body_lidar);
+  /// Adds all scans to a map by these poses, their stamps later by `clock_offset_ns`. `scan_done`
+  /// is called after every scan. Throws DatasetError.
+  void insert_into(StaticMap& map, const std::vector<Eigen::Isometry3d>& T_map_lidar,
+                   std::int64_t clock_offset_ns,
+                   const std::function<void(std::size_t done)>& scan_done);
   [[nodiscard]] LoopReport report() const;
 
  private:

@@ -1,5 +1,3 @@
-#include <sys/resource.h>
-
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -17,33 +15,25 @@
 #include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/recording.hpp"
+#include "clients/commands/mapping/earlier_map.hpp"
 #include "clients/commands/mapping/map_output_folder.hpp"
+#include "clients/commands/mapping/map_report.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
-#include "clients/commands/mapping/trajectory_report.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
-#include "clients/terminal/table.hpp"
 #include "config/loaders/server_config.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/frames/rigid_motion.hpp"
+#include "core/map/map_id.hpp"
 #include "core/map/storage/map_file.hpp"
+#include "core/map/storage/map_sessions.hpp"
 #include "core/map/tools/map_export.hpp"
 #include "core/picture/map_picture.hpp"
 
 namespace stillmap::cli {
 namespace {
-
-/// Results of a mapping run, with its errors where the sequence has true poses.
-struct MapOutput {
-  std::filesystem::path folder;
-  /// What the poses are of.
-  std::string frame;
-  std::optional<TrajectoryReport> accuracy;
-  /// Before loops were closed.
-  std::optional<TrajectoryReport> odometry_accuracy;
-};
 
 // True poses of the body at the mapped scans, in its frame at the first of them.
 std::optional<Trajectory> truth_of(const ScanDataset& dataset, const MappingResult& result,
@@ -69,20 +59,36 @@ evaluation::PosePairs pairs_of(const Trajectory& truth, const Trajectory& estima
   return evaluation::pair_by_index(pairs.truth, pairs.estimate);
 }
 
-void save_map(const std::filesystem::path& file, const MappingResult& result,
-              const MapperConfig& config) {
-  open_map_file(file)->save({.view = *result.view,
-                             .tile_evidence = result.tile_evidence,
-                             .trajectory = result.trajectory,
-                             .metadata = {{"sensor", config.sensor.name},
-                                          {"label_source", result.label_source},
-                                          {"software", "stillmap " STILLMAP_VERSION},
-                                          {map_ended_key, "yes"}}});
+/// Saves a drive into a copy of the map that it was put onto.
+void save_session(const std::filesystem::path& file, const EarlierMap& earlier,
+                  const MappingResult& result, SavedMap map, const std::string& source) {
+  const std::int64_t clock_offset_ns = result.session->clock_offset_ns;
+  map.trajectory = earlier.saved().trajectory;
+  for (StampedPose pose : result.trajectory) {
+    pose.stamp_ns += clock_offset_ns;
+    map.trajectory.push_back(pose);
+  }
+  map.view.map_id = new_map_id();
+  map.is_partial = true;
+  earlier.copy_to(file);
+  add_map_session(file, map,
+                  {.source = source,
+                   .clock_offset_ns = clock_offset_ns,
+                   .closures = result.session->alignment.closures.size()});
 }
 
-/// Name of the file with KITTI's form of the poses.
-std::string pose_file_of(const std::string& frame) {
-  return frame == "lidar" ? "poses_lidar.txt" : "poses_base.txt";
+void save_map(const std::filesystem::path& file, const EarlierMap* earlier,
+              const MappingResult& result, const MapperConfig& config, const std::string& source) {
+  SavedMap map{.view = *result.view,
+               .tile_evidence = result.tile_evidence,
+               .trajectory = result.trajectory,
+               .metadata = {{"sensor", config.sensor.name},
+                            {"label_source", result.label_source},
+                            {"software", "stillmap " STILLMAP_VERSION},
+                            {map_ended_key, "yes"}}};
+  if (earlier != nullptr) return save_session(file, *earlier, result, std::move(map), source);
+  open_map_file(file)->save(map);
+  write_first_session(file, source);
 }
 
 /// The closures as pairs of poses of the run.
@@ -111,6 +117,7 @@ void write_loops(const std::filesystem::path& folder, const MappingResult& resul
 /// and, with truth, trajectory.png and trajectory_error.png; what closed loops leave, where they
 /// were looked for. Throws what their writers throw.
 MapOutput write_map_output(const MapOutputFolder& out, const ScanDataset& dataset,
+                           const std::string& source, const EarlierMap* earlier,
                            const MappingResult& result, const MapperConfig& config,
                            const MappedBody& body) {
   const std::filesystem::path& folder = out.unfinished();
@@ -120,11 +127,15 @@ MapOutput write_map_output(const MapOutputFolder& out, const ScanDataset& datase
                    .odometry_accuracy = std::nullopt};
   write_kitti_poses(folder / pose_file_of(body.frame), result.trajectory);
   write_tum(folder / "poses_tum.txt", result.trajectory, body.frame);
-  save_map(out.new_map_file(), result, config);
+  save_map(out.new_map_file(), earlier, result, config, source);
   export_ply(*result.view, folder / "map.ply");
   export_pcd(*result.view, folder / "map.pcd");
   MapPictureOptions picture;
   picture.truth = truth_of(dataset, result, body);
+  if (picture.truth && earlier != nullptr) {
+    for (StampedPose& pose : *picture.truth)
+      pose.T_map_lidar = result.trajectory.front().T_map_lidar * pose.T_map_lidar;
+  }
   if (picture.truth) {
     const evaluation::PosePairs pairs = pairs_of(*picture.truth, result.trajectory);
     output.accuracy = report_trajectory(pairs);
@@ -137,156 +148,6 @@ MapOutput write_map_output(const MapOutputFolder& out, const ScanDataset& datase
   return output;
 }
 
-double peak_memory_mb() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts kB
-}
-
-std::uint64_t voxel_count(const MapSnapshot& view) {
-  std::uint64_t count = 0;
-  for (const auto& tile : view.tiles) count += tile->info.voxel_count;
-  return count;
-}
-
-Json optional_number(const std::optional<double>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-Json stages_json(const std::vector<StageDurations>& stages) {
-  Json json = Json::object();
-  for (const StageDurations& stage : stages) {
-    json.set(stage.stage, {{"median_ms", stage.quantile(0.5)},
-                           {"p95_ms", stage.quantile(0.95)},
-                           {"p99_ms", stage.quantile(0.99)}});
-  }
-  return json;
-}
-
-Json skipped_json(const std::vector<SkippedScan>& skipped) {
-  Json json = Json::array();
-  for (const SkippedScan& scan : skipped) {
-    json.push_back({{"scan", scan.index}, {"counter", scan.counter}, {"reason", scan.reason}});
-  }
-  return json;
-}
-
-std::string describe_stages(const std::vector<StageDurations>& stages) {
-  Table table({"ms a scan", "median", "p95", "p99"});
-  for (const StageDurations& stage : stages) {
-    table.add({stage.stage, fixed(stage.quantile(0.5), 1), fixed(stage.quantile(0.95), 1),
-               fixed(stage.quantile(0.99), 1)});
-  }
-  return table.text();
-}
-
-Json closures_json(const std::vector<LoopClosure>& closures) {
-  Json json = Json::array();
-  for (const LoopClosure& closure : closures) {
-    Json transform = Json::array();
-    for (int row = 0; row < 3; ++row)
-      for (int column = 0; column < 4; ++column)
-        transform.push_back(closure.T_from_to(row, column));
-    json.push_back({{"from_scan", closure.from_scan},
-                    {"to_scan", closure.to_scan},
-                    {"T_from_to", transform},
-                    {"score", closure.upright_fit},
-                    {"fit", closure.fit},
-                    {"overlap", closure.overlap},
-                    {"runner_up", closure.runner_up},
-                    {"jump_m", closure.jump_m},
-                    {"refusal", closure.refusal.empty() ? Json(nullptr) : Json(closure.refusal)}});
-  }
-  return json;
-}
-
-Json to_json(const LoopReport& loops, const std::optional<TrajectoryReport>& odometry) {
-  return {{"submaps", loops.submaps},
-          {"nodes", loops.nodes},
-          {"submaps_mib", loops.submap_mib},
-          {"kept_scans_mib", loops.scan_log_mib},
-          {"seconds", loops.seconds},
-          {"max_correction_m", loops.max_correction_m},
-          {"refused", closures_json(loops.refused)},
-          {"odometry_accuracy", odometry ? to_json(*odometry) : Json(nullptr)}};
-}
-
-/// Contents of report.json.
-Json to_json(const MappingResult& result, const MapOutput& output) {
-  Json health = Json::object();
-  for (const auto& [state, count] : result.health) health.set(name(state), count);
-  const StageDurations& total = result.stages.back();
-  return {
-      {"scans", result.trajectory.size()},
-      {"seconds", result.seconds},
-      {"interrupted", result.stopped},
-      {"resumed_at_scan", result.resumed_at_scan ? Json(*result.resumed_at_scan) : Json(nullptr)},
-      {"median_ms", total.quantile(0.5)},
-      {"p95_ms", total.quantile(0.95)},
-      {"p99_ms", total.quantile(0.99)},
-      {"stages", stages_json(result.stages)},
-      {"peak_memory_mb", peak_memory_mb()},
-      {"label_source", result.label_source},
-      {"health", health},
-      {"skipped", skipped_json(result.skipped)},
-      {"tiles", result.view->tiles.size()},
-      {"voxels", voxel_count(*result.view)},
-      {"voxel_size_m", result.view->voxel_size_m},
-      {"poses_frame", output.frame + "; the map is its frame at the first pose"},
-      {"moving_points",
-       {{"precision", optional_number(result.moving.precision())},
-        {"recall", optional_number(result.moving.recall())},
-        {"iou", optional_number(result.moving.iou())}}},
-      {"accuracy", output.accuracy ? to_json(*output.accuracy) : Json(nullptr)},
-      {"closures", result.loops ? closures_json(result.loops->closures) : Json(nullptr)},
-      {"loops", result.loops ? to_json(*result.loops, output.odometry_accuracy) : Json(nullptr)},
-      {"folder", output.folder.string()}};
-}
-
-std::string describe(const LoopReport& loops, const MapOutput& output) {
-  if (loops.closures.empty())
-    return "loops: none closed in " + std::to_string(loops.submaps) + " submaps\n";
-  std::string text = "loops: " + std::to_string(loops.closures.size()) + " closed in " +
-                     std::to_string(loops.submaps) + " submaps, poses moved by up to " +
-                     fixed(loops.max_correction_m, 2) + " m; " + fixed(loops.seconds, 1) + " s";
-  if (output.odometry_accuracy) {
-    text += "; ATE before " + fixed(output.odometry_accuracy->rigid_aligned.rmse_m, 3) +
-            " m, after " + fixed(output.accuracy->rigid_aligned.rmse_m, 3) + " m";
-  }
-  return text + "\n";
-}
-
-/// The same for people, shorter.
-std::string describe(const MappingResult& result, const MapOutput& output) {
-  std::string text = describe_stages(result.stages);
-  text += std::to_string(result.trajectory.size()) + " scans mapped in " +
-          fixed(result.seconds, 1) + " s, " + std::to_string(result.skipped.size()) +
-          " skipped; labels: " + result.label_source + "; odometry";
-  for (const auto& [state, count] : result.health) {
-    text += std::string(" ") + name(state) + " " + std::to_string(count);
-  }
-  if (result.imu.samples > 0) {
-    text += "; IMU: " + std::to_string(result.imu.samples) + " samples helped " +
-            std::to_string(result.imu.scans_helped) + " scans";
-  }
-  text += "\nmap: " + std::to_string(voxel_count(*result.view)) + " voxels of " +
-          fixed(result.view->voxel_size_m, 2) + " m in " +
-          std::to_string(result.view->tiles.size()) + " tiles; peak memory " +
-          fixed(peak_memory_mb(), 0) + " MB\n";
-  if (const auto recall = result.moving.recall()) {
-    text += "moving points found: " + fixed(100.0 * *recall, 1) + " %, right ones among them " +
-            fixed(100.0 * result.moving.precision().value_or(0.0), 1) + " %\n";
-  }
-  if (result.loops) text += describe(*result.loops, output);
-  if (output.accuracy)
-    text += "against the true poses of the sequence:\n" + describe(*output.accuracy);
-  text += "written to " + output.folder.string() +
-          ": map.stillmap map.ply map.pcd map.png report.json, and " + pose_file_of(output.frame) +
-          ", poses_tum.txt (frame '" + output.frame +
-          "'; the map is its place at the first pose)\n";
-  return text;
-}
-
 struct MapArguments {
   std::string dataset;
   std::string topic_in;
@@ -296,6 +157,7 @@ struct MapArguments {
   ScanRange range;
   OutputPolicy policy;
   std::string loops = "on";
+  std::string onto;
   double save_period_s = 30.0;
   bool json = false;
 };
@@ -323,7 +185,7 @@ MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& 
                                 const MapperConfig& config, const MappedBody& body,
                                 std::unique_ptr<Segmenter> labels, RunFile& run_file,
                                 const std::optional<std::filesystem::path>& loops_file,
-                                StopSignal& stop) {
+                                const EarlierMap* earlier, StopSignal& stop) {
   if (dataset.kitti_lidar()) std::cerr << "stillmap: " << dataset.kitti_lidar()->in_words() << "\n";
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
   Progress progress("map", "scans", total);
@@ -342,7 +204,7 @@ MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& 
     correction->update(done);
   };
   return map_dataset(
-      dataset, arguments.range, config, body, std::move(labels), run_file, loops_file,
+      dataset, arguments.range, config, body, std::move(labels), run_file, loops_file, earlier,
       {.scan_done = scan_done, .scan_skipped = scan_skipped, .scan_moved = scan_moved});
 }
 
@@ -355,14 +217,16 @@ void write_report(const std::filesystem::path& file, const Json& report) {
 
 /// What makes the parts of a run one map.
 RunIdentity run_identity(const MapArguments& arguments, const MapperConfig& config,
-                         const MappedBody& body, const Segmenter& labels) {
+                         const MappedBody& body, const Segmenter& labels,
+                         const EarlierMap* earlier) {
   const Eigen::Vector3d t = body.T_body_lidar.translation();
   const Eigen::Quaterniond q(body.T_body_lidar.rotation());
   std::ostringstream settings;
   settings << "sensor " << config.sensor.name << ", labels " << labels.name() << ", weighting "
            << name(config.odometry.weighting) << ", voxels of " << config.static_map.voxel_size_m
            << " m, lidar in " << body.frame << " at " << t.transpose() << " turned by "
-           << q.coeffs().transpose() << (arguments.loops == "on" ? ", loops closed" : "");
+           << q.coeffs().transpose() << (arguments.loops == "on" ? ", loops closed" : "")
+           << (earlier == nullptr ? "" : ", onto " + earlier->identity());
   return {std::filesystem::weakly_canonical(arguments.dataset).string() + " from scan " +
               std::to_string(arguments.range.first),
           settings.str()};
@@ -372,13 +236,43 @@ RunIdentity run_identity(const MapArguments& arguments, const MapperConfig& conf
 MappingResult map_into(const MapOutputFolder& out, const ScanDataset& dataset,
                        const MapArguments& arguments, const MapperConfig& config,
                        const MappedBody& body, std::unique_ptr<Segmenter> labels,
-                       StopSignal& stop) {
-  RunFile run_file(out.run_file(), run_identity(arguments, config, body, *labels),
+                       const EarlierMap* earlier, StopSignal& stop) {
+  RunFile run_file(out.run_file(), run_identity(arguments, config, body, *labels, earlier),
                    std::chrono::duration<double>(arguments.save_period_s));
   std::optional<std::filesystem::path> loops_file;
   if (arguments.loops == "on") loops_file = out.kept_scans_file();
   return map_with_progress(dataset, arguments, config, body, std::move(labels), run_file,
-                           loops_file, stop);
+                           loops_file, earlier, stop);
+}
+
+/// The map to go on in, where one is named. Throws what EarlierMap throws, and
+/// std::invalid_argument for options that do not go with it.
+std::unique_ptr<const EarlierMap> earlier_map(const MapArguments& arguments,
+                                              const MapperConfig& config) {
+  if (arguments.onto.empty()) return nullptr;
+  if (arguments.loops != "on")
+    throw std::invalid_argument("--onto needs --loops on: a drive is put onto a map by closures");
+  std::error_code not_there;
+  if (std::filesystem::equivalent(
+          arguments.onto, std::filesystem::path(arguments.out) / "map.stillmap", not_there)) {
+    throw std::invalid_argument(arguments.onto +
+                                " is the map of --out, too, and would be replaced: the map that a "
+                                "drive goes on in stays as it is; name another --out");
+  }
+  return std::make_unique<const EarlierMap>(arguments.onto, config.static_map);
+}
+
+/// The same; what is not recognised leaves nothing to resume.
+MappingResult map_or_discard(MapOutputFolder& out, const ScanDataset& dataset,
+                             const MapArguments& arguments, const MapperConfig& config,
+                             const MappedBody& body, std::unique_ptr<Segmenter> labels,
+                             const EarlierMap* earlier, StopSignal& stop) {
+  try {
+    return map_into(out, dataset, arguments, config, body, std::move(labels), earlier, stop);
+  } catch (const MapNotRecognized&) {
+    out.discard_run();
+    throw;
+  }
 }
 
 ExitCode stopped_early(const MapOutputFolder& out, const std::string& what_is_there) {
@@ -394,13 +288,15 @@ ExitCode run(const MapArguments& arguments) {
   const MappedBody body = body_of(arguments);
   static_cast<void>(arguments.range.end(dataset));
   auto labels = make_segmenter(arguments.mapper, dataset);
+  const std::unique_ptr<const EarlierMap> earlier = earlier_map(arguments, config);
   // Nothing above touched the folder.
   MapOutputFolder out(arguments.out, arguments.policy);
   const MappingResult result =
-      map_into(out, dataset, arguments, config, body, std::move(labels), stop);
+      map_or_discard(out, dataset, arguments, config, body, std::move(labels), earlier.get(), stop);
   if (result.stopped && out.had_map()) {
     return stopped_early(out, out.path().string() + " holds the map that it held before");
   }
+  if (result.stopped && earlier) return stopped_early(out, "no map was written yet");
   if (result.trajectory.empty()) {
     std::cerr << "stillmap: no scan of " << arguments.dataset << " could be mapped\n";
     return ExitCode::bad_input;
@@ -410,7 +306,8 @@ ExitCode run(const MapArguments& arguments) {
         << "stillmap: loops are left open, since the sequence's stamps were set back and poses "
            "of before were dropped\n";
   }
-  const MapOutput output = write_map_output(out, dataset, result, config, body);
+  const MapOutput output =
+      write_map_output(out, dataset, arguments.dataset, earlier.get(), result, config, body);
   const Json report = to_json(result, output);
   write_report(out.unfinished() / "report.json", report);
   out.publish(result.stopped);
@@ -444,6 +341,9 @@ void add_map_command(CommandHandle program, Action& action) {
               "odometry has them")
       .one_of({"on", "off"})
       .with_default();
+  command.option("--onto", arguments->onto,
+                 "A map made earlier: the drive goes on in a copy of it, as another session, where "
+                 "it is recognised; this file is only read");
   command
       .option("--save-period", arguments->save_period_s,
               "Seconds between saves of the run, for --resume")
@@ -455,6 +355,7 @@ void add_map_command(CommandHandle program, Action& action) {
       "  stillmap map sequences/00 --out kitti00 --scans 500\n"
       "  stillmap map my_vlp16_pcds --sensor vlp_16 --labels none --out campus\n"
       "  stillmap map city --weighting none --out plain --json | jq .accuracy\n"
+      "  stillmap map tuesday --onto monday/map.stillmap --out both\n"
       "Writes map.stillmap (SQLite), map.ply, map.pcd, map.png, poses_lidar.txt (KITTI 3x4, lidar\n"
       "frame; poses_base.txt with --mount), poses_tum.txt (the same with stamps), report.json\n"
       "(timing, memory, accuracy), and with true poses in the sequence trajectory.png and\n"
@@ -463,6 +364,11 @@ void add_map_command(CommandHandle program, Action& action) {
       "closures, loops_before.png and loops_after.png show them. The scans are kept in the folder\n"
       "'unfinished' until then (some 0.1 MB a scan of 16 rings). A damaged file is named and "
       "skipped; its scan then has no pose.\n"
+      "With --onto the drive is looked for in the map, scan by scan until some agree, then submap "
+      "by\n"
+      "submap; poses and map are in the earlier map's frame, what is gone is removed, what is new\n"
+      "is added, and what the drive did not see stays. Exit code 5: it was not recognised, and\n"
+      "nothing was written. 'stillmap sessions' lists the drives of a map and withdraws one.\n"
       "Until the results are complete they are in the folder 'unfinished', and those that were\n"
       "there stay.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });

@@ -71,6 +71,11 @@ MapOutputFolder::~MapOutputFolder() {
   if (!holds_run(run_file())) fs::remove_all(unfinished_, ignored);
 }
 
+void MapOutputFolder::discard_run() {
+  std::error_code ignored;
+  fs::remove_all(unfinished_, ignored);
+}
+
 void MapOutputFolder::publish(bool keep_run) {
   replace_map_file(new_map_file(), folder_ / new_map_file().filename());
   std::error_code error;

@@ -42,6 +42,9 @@ class MapOutputFolder {
   /// Whether the folder had a map before this run.
   [[nodiscard]] bool had_map() const { return had_map_; }
 
+  /// Removes what the run has left: it is not to be resumed.
+  void discard_run();
+
   /// Moves the results to their place, the map first. With `keep_run`, the run can still be
   /// resumed. Throws MapFileError or DatasetError.
   void publish(bool keep_run);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cassert>
+#include <chrono>
 #include <stdexcept>
 #include <utility>
 
@@ -29,10 +30,11 @@ class MappingRun {
  public:
   MappingRun(const ScanDataset& dataset, bool strict, const MapperConfig& config,
              const MappedBody& body, std::unique_ptr<Segmenter> labels,
-             const std::optional<std::filesystem::path>& loops_file,
+             const std::optional<std::filesystem::path>& loops_file, const EarlierMap* earlier_map,
              const MappingListeners& listeners)
       : dataset_(dataset),
         strict_(strict),
+        earlier_map_(earlier_map),
         listeners_(listeners),
         T_body_lidar_(body.T_body_lidar),
         prepare_(config.prepare),
@@ -105,11 +107,22 @@ class MappingRun {
   MappingResult finish(bool stopped) {
     result_.trajectory = result_.odometry = path();
     // Submaps hold dropped poses, too: loops stay open then.
-    if (loops_ && loops_->scan_count() == result_.trajectory.size()) {
-      if (loops_->finish()) correct();
+    const bool has_all_scans = loops_ && loops_->scan_count() == result_.trajectory.size();
+    if (has_all_scans) {
+      const bool has_loops = loops_->finish();
+      if (earlier_map_ != nullptr && !stopped) {
+        put_onto_earlier_map();
+      } else if (has_loops) {
+        correct();
+      }
       result_.loops = loops_->report();
+    } else if (earlier_map_ != nullptr && !stopped) {
+      throw std::invalid_argument(
+          "the sequence's stamps were set back, and poses of before were dropped: it cannot be put "
+          "onto a map in one piece; map it from the scan on where they are (--start)");
     }
-    SavedMap map = to_saved_map(mapper_.static_map().checkpoint(CheckpointScope::everything));
+    SavedMap map = to_saved_map(mapper_.static_map().checkpoint(
+        result_.session ? CheckpointScope::changed : CheckpointScope::everything));
     result_.view = std::make_shared<const MapSnapshot>(std::move(map.view));
     result_.tile_evidence = std::move(map.tile_evidence);
     result_.label_source = mapper_.label_source();
@@ -128,16 +141,48 @@ class MappingRun {
 
   /// Puts the corrected poses, and the map by them, in place of those of the odometry.
   void correct() {
-    const auto& T_map_lidar = loops_->T_map_lidar();
+    result_.odometry_view = mapper_.map_snapshot();
+    StaticMap map(mapper_.static_map().config());
+    map.reset(new_map_id());
+    move_scans(loops_->T_map_lidar(), 0, std::move(map));
+  }
+
+  /// Finds the drive in the earlier map and adds its scans there. Throws MapNotRecognized.
+  void put_onto_earlier_map() {
+    // What earlier scans say of a place is worth that of two seconds: the rest would outvote what
+    // is seen when passing by.
+    constexpr std::uint32_t max_earlier_scans = 20;
+    const auto began = std::chrono::steady_clock::now();
+    SessionReport session;
+    session.alignment = loops_->align(earlier_map_->index(), T_body_lidar_.linear());
+    if (!session.alignment.is_recognized()) {
+      throw MapNotRecognized(
+          "the drive was not recognised in " + earlier_map_->file().string() + ": " +
+          session.alignment.in_words() +
+          "; nothing was written. Where it is of another place, map it by itself, without --onto; "
+          "else it must come through the mapped place for some 50 m");
+    }
+    if (!result_.trajectory.empty())
+      session.clock_offset_ns = earlier_map_->clock_offset_ns(result_.trajectory.front().stamp_ns);
+    StaticMap map(mapper_.static_map().config());
+    map.resume(earlier_map_->saved().view, earlier_map_->saved().tile_evidence);
+    map.begin_session(max_earlier_scans);
+    move_scans(session.alignment.T_map_lidar, session.clock_offset_ns, std::move(map));
+    session.seconds =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+    result_.session = std::move(session);
+  }
+
+  /// Makes these the poses of the run, and a map with its scans by them the map.
+  void move_scans(const std::vector<Eigen::Isometry3d>& T_map_lidar, std::int64_t clock_offset_ns,
+                  StaticMap map) {
     assert(T_map_lidar.size() == result_.trajectory.size());
     for (std::size_t i = 0; i < T_map_lidar.size(); ++i)
       result_.trajectory[i].T_map_lidar = T_map_lidar[i] * T_body_lidar_.inverse();
-    result_.odometry_view = mapper_.map_snapshot();
-    const auto scan_moved = [&](std::size_t done) {
+    loops_->insert_into(map, T_map_lidar, clock_offset_ns, [&](std::size_t done) {
       if (listeners_.scan_moved) listeners_.scan_moved(done, T_map_lidar.size());
-    };
-    mapper_.static_map() =
-        loops_->make_map(mapper_.static_map().config(), new_map_id(), scan_moved);
+    });
+    mapper_.static_map() = std::move(map);
   }
 
   /// Of the body, with what an earlier run has mapped.
@@ -167,6 +212,7 @@ class MappingRun {
 
   const ScanDataset& dataset_;
   bool strict_;
+  const EarlierMap* earlier_map_;
   const MappingListeners& listeners_;
   Eigen::Isometry3d T_body_lidar_;
   PrepareConfig prepare_;
@@ -196,10 +242,11 @@ MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
                           const MapperConfig& config, const MappedBody& body,
                           std::unique_ptr<Segmenter> labels, RunFile& run_file,
                           const std::optional<std::filesystem::path>& loops_file,
-                          const MappingListeners& listeners) {
+                          const EarlierMap* earlier_map, const MappingListeners& listeners) {
   const std::size_t end = range.end(dataset);
   std::size_t index = range.first;
-  MappingRun run(dataset, range.strict, config, body, std::move(labels), loops_file, listeners);
+  MappingRun run(dataset, range.strict, config, body, std::move(labels), loops_file, earlier_map,
+                 listeners);
   // The map of a few scans is too thin to be found in, and soon made again.
   constexpr std::size_t min_resumed_scans = 10;
   if (auto earlier = run_file.earlier();

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/commands/mapping/earlier_map.hpp"
 #include "clients/commands/mapping/loop_correction.hpp"
 #include "clients/commands/mapping/run_file.hpp"
 #include "clients/commands/stage_stopwatch.hpp"
@@ -52,6 +53,9 @@ struct MappingResult {
   std::shared_ptr<const MapSnapshot> odometry_view;
   /// Nothing where loops were not looked for.
   std::optional<LoopReport> loops;
+  /// Of a drive that was put onto an earlier map: poses and view are that map's, the evidence is
+  /// that of the tiles that changed.
+  std::optional<SessionReport> session;
   /// Index in the data set of each pose of the trajectory.
   std::vector<std::size_t> scan_of_pose;
   std::shared_ptr<const MapSnapshot> view;
@@ -88,11 +92,13 @@ struct MappingListeners {
 /// Maps a data set in this process. The run goes on from what `run_file` holds, and its state is
 /// saved there from time to time; what is reported of scans, but poses and map, is of the resumed
 /// part alone. With a `loops_file`, where scans are kept meanwhile, loops are closed: poses and map
-/// are corrected when all scans are mapped. Throws what reading and saving throw.
+/// are corrected when all scans are mapped. With an `earlier` map, too, the drive is put onto it,
+/// unless it was stopped. Throws what reading and saving throw, and MapNotRecognized.
 [[nodiscard]] MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
                                         const MapperConfig& config, const MappedBody& body,
                                         std::unique_ptr<Segmenter> labels, RunFile& run_file,
                                         const std::optional<std::filesystem::path>& loops_file,
+                                        const EarlierMap* earlier = nullptr,
                                         const MappingListeners& listeners = {});
 
 }  // namespace stillmap::cli

@@ -1,0 +1,43 @@
+#include "clients/commands/mapping/earlier_map.hpp"
+
+#include <stdexcept>
+#include <utility>
+
+#include "core/map/query/tile_reader.hpp"
+
+namespace stillmap::cli {
+
+EarlierMap::EarlierMap(std::filesystem::path file, const StaticMapConfig& config)
+    : file_(std::move(file)), copy_(file_), saved_(copy_.load()) {
+  if (saved_.view.tiles.empty()) {
+    throw std::invalid_argument(file_.string() +
+                                " is an empty map: nothing can be recognised in it; leave out "
+                                "--onto, or name another map");
+  }
+  try {
+    check_sizes(saved_.view, config);
+  } catch (const std::invalid_argument& error) {
+    throw std::invalid_argument(file_.string() + ": " + error.what());
+  }
+  index_ = std::make_shared<const PlaceIndex>(std::make_shared<const MapSnapshot>(saved_.view),
+                                              saved_.trajectory, std::make_shared<TileReader>());
+}
+
+std::string EarlierMap::identity() const {
+  return std::filesystem::weakly_canonical(file_).string() + " (id " +
+         std::to_string(saved_.view.map_id) + ", version " + std::to_string(saved_.view.version) +
+         ")";
+}
+
+std::int64_t EarlierMap::clock_offset_ns(std::int64_t first_stamp_ns) const {
+  constexpr std::int64_t between_sessions_ns = 1'000'000'000;
+  if (saved_.trajectory.empty()) return 0;
+  const std::int64_t last_ns = saved_.trajectory.back().stamp_ns;
+  return first_stamp_ns > last_ns ? 0 : last_ns + between_sessions_ns - first_stamp_ns;
+}
+
+void EarlierMap::copy_to(const std::filesystem::path& file) const {
+  open_map_file(copy_.path())->copy_to(file);
+}
+
+}  // namespace stillmap::cli

@@ -1,0 +1,206 @@
+#include "clients/commands/mapping/map_report.hpp"
+
+#include <sys/resource.h>
+
+#include <vector>
+
+#include "clients/terminal/table.hpp"
+
+namespace stillmap::cli {
+namespace {
+
+double peak_memory_mb() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024.0;  // Linux counts kB
+}
+
+std::uint64_t voxel_count(const MapSnapshot& view) {
+  std::uint64_t count = 0;
+  for (const auto& tile : view.tiles) count += tile->info.voxel_count;
+  return count;
+}
+
+Json optional_number(const std::optional<double>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+Json stages_json(const std::vector<StageDurations>& stages) {
+  Json json = Json::object();
+  for (const StageDurations& stage : stages) {
+    json.set(stage.stage, {{"median_ms", stage.quantile(0.5)},
+                           {"p95_ms", stage.quantile(0.95)},
+                           {"p99_ms", stage.quantile(0.99)}});
+  }
+  return json;
+}
+
+Json skipped_json(const std::vector<SkippedScan>& skipped) {
+  Json json = Json::array();
+  for (const SkippedScan& scan : skipped) {
+    json.push_back({{"scan", scan.index}, {"counter", scan.counter}, {"reason", scan.reason}});
+  }
+  return json;
+}
+
+std::string describe_stages(const std::vector<StageDurations>& stages) {
+  Table table({"ms a scan", "median", "p95", "p99"});
+  for (const StageDurations& stage : stages) {
+    table.add({stage.stage, fixed(stage.quantile(0.5), 1), fixed(stage.quantile(0.95), 1),
+               fixed(stage.quantile(0.99), 1)});
+  }
+  return table.text();
+}
+
+Json closures_json(const std::vector<LoopClosure>& closures) {
+  Json json = Json::array();
+  for (const LoopClosure& closure : closures) {
+    Json transform = Json::array();
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 4; ++column)
+        transform.push_back(closure.T_from_to(row, column));
+    json.push_back({{"from_scan", closure.from_scan},
+                    {"to_scan", closure.to_scan},
+                    {"T_from_to", transform},
+                    {"score", closure.upright_fit},
+                    {"fit", closure.fit},
+                    {"overlap", closure.overlap},
+                    {"runner_up", closure.runner_up},
+                    {"jump_m", closure.jump_m},
+                    {"refusal", closure.refusal.empty() ? Json(nullptr) : Json(closure.refusal)}});
+  }
+  return json;
+}
+
+Json map_closures_json(const std::vector<MapClosure>& closures) {
+  Json json = Json::array();
+  for (const MapClosure& closure : closures) {
+    Json transform = Json::array();
+    for (int row = 0; row < 3; ++row)
+      for (int column = 0; column < 4; ++column)
+        transform.push_back(closure.T_map_lidar(row, column));
+    json.push_back({{"scan", closure.scan},
+                    {"T_map_lidar", transform},
+                    {"score", closure.upright_fit},
+                    {"fit", closure.fit},
+                    {"overlap", closure.overlap},
+                    {"runner_up", closure.runner_up},
+                    {"jump_m", closure.jump_m},
+                    {"refusal", closure.refusal.empty() ? Json(nullptr) : Json(closure.refusal)}});
+  }
+  return json;
+}
+
+Json to_json(const SessionReport& session) {
+  return {{"localized", session.alignment.localized},
+          {"found", session.alignment.found},
+          {"closures", map_closures_json(session.alignment.closures)},
+          {"refused", map_closures_json(session.alignment.refused)},
+          {"clock_offset_ns", session.clock_offset_ns},
+          {"seconds", session.seconds}};
+}
+
+Json to_json(const LoopReport& loops, const std::optional<TrajectoryReport>& odometry) {
+  return {{"submaps", loops.submaps},
+          {"nodes", loops.nodes},
+          {"submaps_mib", loops.submap_mib},
+          {"kept_scans_mib", loops.scan_log_mib},
+          {"seconds", loops.seconds},
+          {"max_correction_m", loops.max_correction_m},
+          {"refused", closures_json(loops.refused)},
+          {"odometry_accuracy", odometry ? to_json(*odometry) : Json(nullptr)}};
+}
+
+std::string describe(const LoopReport& loops, const MapOutput& output) {
+  if (loops.closures.empty())
+    return "loops: none closed in " + std::to_string(loops.submaps) + " submaps\n";
+  std::string text = "loops: " + std::to_string(loops.closures.size()) + " closed in " +
+                     std::to_string(loops.submaps) + " submaps, poses moved by up to " +
+                     fixed(loops.max_correction_m, 2) + " m; " + fixed(loops.seconds, 1) + " s";
+  if (output.odometry_accuracy) {
+    text += "; ATE before " + fixed(output.odometry_accuracy->rigid_aligned.rmse_m, 3) +
+            " m, after " + fixed(output.accuracy->rigid_aligned.rmse_m, 3) + " m";
+  }
+  return text + "\n";
+}
+
+std::string describe(const SessionReport& session) {
+  std::string text = "onto the earlier map: " + session.alignment.in_words() + "; " +
+                     fixed(session.seconds, 1) + " s";
+  if (session.clock_offset_ns != 0) {
+    text += "; stamps of the drive are not after the map's: in the map they are later by " +
+            fixed(static_cast<double>(session.clock_offset_ns) / 1e9, 3) + " s";
+  }
+  return text + "\n";
+}
+
+}  // namespace
+
+std::string pose_file_of(const std::string& frame) {
+  return frame == "lidar" ? "poses_lidar.txt" : "poses_base.txt";
+}
+
+Json to_json(const MappingResult& result, const MapOutput& output) {
+  Json health = Json::object();
+  for (const auto& [state, count] : result.health) health.set(name(state), count);
+  const StageDurations& total = result.stages.back();
+  return {
+      {"scans", result.trajectory.size()},
+      {"seconds", result.seconds},
+      {"interrupted", result.stopped},
+      {"resumed_at_scan", result.resumed_at_scan ? Json(*result.resumed_at_scan) : Json(nullptr)},
+      {"median_ms", total.quantile(0.5)},
+      {"p95_ms", total.quantile(0.95)},
+      {"p99_ms", total.quantile(0.99)},
+      {"stages", stages_json(result.stages)},
+      {"peak_memory_mb", peak_memory_mb()},
+      {"label_source", result.label_source},
+      {"health", health},
+      {"skipped", skipped_json(result.skipped)},
+      {"tiles", result.view->tiles.size()},
+      {"voxels", voxel_count(*result.view)},
+      {"voxel_size_m", result.view->voxel_size_m},
+      {"poses_frame", output.frame + "; the map is its frame at the first pose"},
+      {"moving_points",
+       {{"precision", optional_number(result.moving.precision())},
+        {"recall", optional_number(result.moving.recall())},
+        {"iou", optional_number(result.moving.iou())}}},
+      {"accuracy", output.accuracy ? to_json(*output.accuracy) : Json(nullptr)},
+      {"closures", result.loops ? closures_json(result.loops->closures) : Json(nullptr)},
+      {"loops", result.loops ? to_json(*result.loops, output.odometry_accuracy) : Json(nullptr)},
+      {"onto", result.session ? to_json(*result.session) : Json(nullptr)},
+      {"folder", output.folder.string()}};
+}
+
+std::string describe(const MappingResult& result, const MapOutput& output) {
+  std::string text = describe_stages(result.stages);
+  text += std::to_string(result.trajectory.size()) + " scans mapped in " +
+          fixed(result.seconds, 1) + " s, " + std::to_string(result.skipped.size()) +
+          " skipped; labels: " + result.label_source + "; odometry";
+  for (const auto& [state, count] : result.health) {
+    text += std::string(" ") + name(state) + " " + std::to_string(count);
+  }
+  if (result.imu.samples > 0) {
+    text += "; IMU: " + std::to_string(result.imu.samples) + " samples helped " +
+            std::to_string(result.imu.scans_helped) + " scans";
+  }
+  text += "\nmap: " + std::to_string(voxel_count(*result.view)) + " voxels of " +
+          fixed(result.view->voxel_size_m, 2) + " m in " +
+          std::to_string(result.view->tiles.size()) + " tiles; peak memory " +
+          fixed(peak_memory_mb(), 0) + " MB\n";
+  if (const auto recall = result.moving.recall()) {
+    text += "moving points found: " + fixed(100.0 * *recall, 1) + " %, right ones among them " +
+            fixed(100.0 * result.moving.precision().value_or(0.0), 1) + " %\n";
+  }
+  if (result.loops) text += describe(*result.loops, output);
+  if (result.session) text += describe(*result.session);
+  if (output.accuracy)
+    text += "against the true poses of the sequence:\n" + describe(*output.accuracy);
+  text += "written to " + output.folder.string() +
+          ": map.stillmap map.ply map.pcd map.png report.json, and " + pose_file_of(output.frame) +
+          ", poses_tum.txt (frame '" + output.frame +
+          "'; the map is its place at the first pose)\n";
+  return text;
+}
+
+}  // namespace stillmap::cli

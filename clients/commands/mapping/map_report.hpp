@@ -1,0 +1,31 @@
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "clients/commands/mapping/mapping_run.hpp"
+#include "clients/commands/mapping/trajectory_report.hpp"
+#include "clients/terminal/json.hpp"
+
+namespace stillmap::cli {
+
+/// Results of a mapping run, with its errors where the sequence has true poses.
+struct MapOutput {
+  std::filesystem::path folder;
+  /// What the poses are of.
+  std::string frame;
+  std::optional<TrajectoryReport> accuracy;
+  /// Before loops were closed.
+  std::optional<TrajectoryReport> odometry_accuracy;
+};
+
+/// Name of the file with KITTI's form of the poses.
+[[nodiscard]] std::string pose_file_of(const std::string& frame);
+
+/// Contents of report.json.
+[[nodiscard]] Json to_json(const MappingResult& result, const MapOutput& output);
+/// The same for people, shorter.
+[[nodiscard]] std::string describe(const MappingResult& result, const MapOutput& output);
+
+}  // namespace stillmap::cli

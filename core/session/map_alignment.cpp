@@ -1,0 +1,259 @@
+#include "core/session/map_alignment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <utility>
+
+#include "core/odometry/se3.hpp"
+
+namespace stillmap {
+namespace {
+
+double angle_of(const Eigen::Isometry3d& T) { return so3_log(T.linear()).norm(); }
+
+/// Along the drive, between nodes [m].
+double way_between_m(const LoopCloser& drive, std::size_t a, std::size_t b) {
+  return std::abs(drive.nodes()[a].way_m - drive.nodes()[b].way_m);
+}
+
+/// Where the drive has a node, by another one whose pose in the map is known.
+Eigen::Isometry3d carried_to(const LoopCloser& drive, std::size_t node, std::size_t from,
+                             const Eigen::Isometry3d& T_map_from) {
+  const auto& T_drive_node = drive.graph().T_map_node;
+  return T_map_from * T_drive_node[from].inverse() * T_drive_node[node];
+}
+
+/// The drive's submap turned upright by the map's vertical.
+PlacedSubmap levelled(const Submap& submap, const Eigen::Isometry3d& T_map_key) {
+  Submap turned = submap;
+  turned.T_submap_key = upright_from_key(T_map_key);
+  const Eigen::Isometry3f T = (turned.T_submap_key * submap.T_submap_key.inverse()).cast<float>();
+  for (Eigen::Vector3f& p : turned.points_submap) p = T * p;
+  return PlacedSubmap(std::move(turned));
+}
+
+}  // namespace
+
+std::string MapAlignment::in_words() const {
+  std::string text = std::to_string(localized) +
+                     " of its scans were looked for in the whole map, " + std::to_string(found) +
+                     " were found, " + std::to_string(agreeing) + " of these agree";
+  if (!closures.empty() || !refused.empty()) {
+    text += "; " + std::to_string(closures.size()) + " of " +
+            std::to_string(closures.size() + refused.size()) + " submaps fit";
+    if (!refused.empty()) text += " (" + refused.back().refusal + ")";
+  }
+  return text;
+}
+
+MapAlignment MapAligner::align(const LoopCloser& drive, const ScanSource& scan_at,
+                               const Eigen::Matrix3d& R_body_lidar) const {
+  MapAlignment alignment;
+  std::vector<Anchor> anchors = localize(drive, scan_at, R_body_lidar, alignment);
+  if (alignment.agreeing < config_.min_agreeing) return alignment;
+  std::vector<Found> found = close(drive, std::move(anchors), alignment);
+  if (found.size() >= config_.min_closures) {
+    const std::vector<Eigen::Isometry3d> T_map_node = solve(drive, std::move(found), alignment);
+    if (alignment.closures.size() >= config_.min_closures)
+      alignment.T_map_lidar = drive.poses_by(T_map_node);
+  } else {
+    for (Found& closure : found) alignment.closures.push_back(std::move(closure.closure));
+  }
+  return alignment;
+}
+
+std::vector<MapAligner::Anchor> MapAligner::localize(const LoopCloser& drive,
+                                                     const ScanSource& scan_at,
+                                                     const Eigen::Matrix3d& R_body_lidar,
+                                                     MapAlignment& alignment) const {
+  std::vector<Anchor> found;
+  if (drive.nodes().empty()) return found;
+  const double way_m = drive.nodes().back().way_m;
+  const double spacing_m = std::max(config_.localization_spacing_m,
+                                    way_m / static_cast<double>(config_.max_localizations));
+  double next_m = 0.0;
+  for (std::size_t node = 0; node < drive.nodes().size(); ++node) {
+    if (drive.nodes()[node].way_m < next_m) continue;
+    next_m = drive.nodes()[node].way_m + spacing_m;
+    const LabelledScan scan = scan_at(drive.nodes()[node].scan);
+    const LocalizationResult result = localizer_.localize(scan.scan, scan.labels, R_body_lidar);
+    ++alignment.localized;
+    if (result.status != LocalizationStatus::found) continue;
+    ++alignment.found;
+    found.push_back({node, result.places.front().T_map_lidar});
+    std::vector<Anchor> best = agreeing(drive, found);
+    alignment.agreeing = std::max(alignment.agreeing, best.size());
+    if (best.size() >= config_.min_agreeing && 2 * best.size() > found.size()) return best;
+  }
+  // Some agree, but as many say something else.
+  if (alignment.agreeing >= config_.min_agreeing) alignment.agreeing = 1;
+  return {};
+}
+
+bool MapAligner::agree(const LoopCloser& drive, const Anchor& a, const Anchor& b) const {
+  const double way_m = way_between_m(drive, a.node, b.node);
+  const Eigen::Isometry3d off =
+      b.T_map_node.inverse() * carried_to(drive, b.node, a.node, a.T_map_node);
+  return off.translation().norm() < config_.agreement_m + config_.drift.share_of_way * way_m &&
+         angle_of(off) < config_.agreement_rad + config_.drift.heading_rad_per_m * way_m;
+}
+
+std::vector<MapAligner::Anchor> MapAligner::agreeing(const LoopCloser& drive,
+                                                     const std::vector<Anchor>& found) const {
+  std::vector<Anchor> same;
+  std::ranges::copy_if(found, std::back_inserter(same),
+                       [&](const Anchor& anchor) { return agree(drive, found.back(), anchor); });
+  return same;
+}
+
+MapAligner::NextSubmap MapAligner::take_nearest(const LoopCloser& drive,
+                                                const std::vector<Anchor>& anchors,
+                                                std::vector<std::size_t>& open) {
+  double least_m = std::numeric_limits<double>::infinity();
+  NextSubmap next;
+  std::size_t place = 0;
+  for (std::size_t k = 0; k < open.size(); ++k) {
+    for (const Anchor& anchor : anchors) {
+      const double way_m =
+          way_between_m(drive, drive.submaps()[open[k]].submap.key_node, anchor.node);
+      if (way_m >= least_m) continue;
+      least_m = way_m;
+      next = {open[k], anchor};
+      place = k;
+    }
+  }
+  open.erase(open.begin() + static_cast<std::ptrdiff_t>(place));
+  return next;
+}
+
+bool MapAligner::confirm(const LoopCloser& drive, const Found& a, const Found& b) const {
+  const Eigen::Isometry3d off =
+      a.anchor.T_map_node.inverse() *
+      carried_to(drive, a.anchor.node, b.anchor.node, b.anchor.T_map_node);
+  return off.translation().norm() < config_.second_agreement_m &&
+         angle_of(off) < config_.second_agreement_rad;
+}
+
+std::vector<MapAligner::Found> MapAligner::close(const LoopCloser& drive,
+                                                 std::vector<Anchor> anchors,
+                                                 MapAlignment& alignment) const {
+  std::vector<Found> accepted;
+  // The last one that jumped, which waits for another one.
+  std::vector<Found> waiting;
+  const auto refuse = [&](Found& found, const char* why) {
+    if (why != nullptr) found.closure.refusal = why;
+    alignment.refused.push_back(found.closure);
+  };
+  constexpr const char* alone = "no second closure agreed with its jump";
+  std::vector<std::size_t> open(drive.submaps().size());
+  std::iota(open.begin(), open.end(), std::size_t{0});
+  while (!open.empty()) {
+    const NextSubmap next = take_nearest(drive, anchors, open);
+    std::optional<Found> found = match(drive, next.submap, next.nearest);
+    if (!found) continue;
+    if (!found->closure.refusal.empty()) {
+      refuse(*found, nullptr);
+      continue;
+    }
+    const bool jumps = found->closure.jump_m > config_.max_single_jump_m;
+    const bool is_confirmed = !waiting.empty() && confirm(drive, *found, waiting.front());
+    if (jumps && !is_confirmed) {
+      for (Found& other : waiting) refuse(other, alone);
+      waiting.assign(1, *std::move(found));
+      continue;
+    }
+    if (is_confirmed) {
+      anchors.push_back(waiting.front().anchor);
+      accepted.push_back(std::move(waiting.front()));
+      waiting.clear();
+    }
+    anchors.push_back(found->anchor);
+    accepted.push_back(*std::move(found));
+  }
+  for (Found& other : waiting) refuse(other, alone);
+  return accepted;
+}
+
+std::optional<MapAligner::Found> MapAligner::match(const LoopCloser& drive, std::size_t submap,
+                                                   const Anchor& nearest) const {
+  const Submap& own = drive.submaps()[submap].submap;
+  const std::size_t node = own.key_node;
+  const Eigen::Isometry3d T_map_key = carried_to(drive, node, nearest.node, nearest.T_map_node);
+  const PlacedSubmap piece = piece_round(T_map_key);
+  const PlacedSubmap mine = levelled(own, T_map_key);
+  // Both frames are that of the expected pose, upright.
+  const auto match = match_submaps(
+      piece, mine, Eigen::Isometry3d::Identity(),
+      window_after(config_.drift, way_between_m(drive, node, nearest.node)), config_.match);
+  if (!match) return std::nullopt;
+  const Eigen::Isometry3d T_map_piece = T_map_key * piece.submap.T_submap_key.inverse();
+  const Eigen::Isometry3d found = T_map_piece * match->T_a_b * mine.submap.T_submap_key;
+  return Found{.closure = {.scan = drive.nodes()[node].scan,
+                           .T_map_lidar = found,
+                           .fit = match->fit,
+                           .upright_fit = match->upright_fit,
+                           .overlap = match->overlap,
+                           .runner_up = match->runner_up,
+                           .jump_m = match->jump_m,
+                           .refusal = match->refusal},
+               .anchor = {node, found},
+               // Node 0 of the joint graph is the map's frame.
+               .edge = {.from = 0,
+                        .to = node + 1,
+                        .T_from_to = found,
+                        .information = match->key_information,
+                        .is_loop = true}};
+}
+
+PlacedSubmap MapAligner::piece_round(const Eigen::Isometry3d& T_map_key) const {
+  Submap piece;
+  piece.T_submap_key = upright_from_key(T_map_key);
+  const Eigen::Isometry3d T_piece_map = piece.T_submap_key * T_map_key.inverse();
+  const auto points = map_->points_near(T_map_key.translation().head<2>(), config_.piece_radius_m);
+  piece.points_submap.reserve(points.size());
+  piece.classes.reserve(points.size());
+  for (const LabelledPoint& point : points) {
+    piece.points_submap.push_back((T_piece_map * point.position_map.cast<double>()).cast<float>());
+    piece.classes.push_back(point.label);
+  }
+  return PlacedSubmap(std::move(piece));
+}
+
+std::vector<Eigen::Isometry3d> MapAligner::solve(const LoopCloser& drive,
+                                                 std::vector<Found> closures,
+                                                 MapAlignment& alignment) const {
+  PoseGraph graph;
+  const auto& T_drive_node = drive.graph().T_map_node;
+  const Anchor& first = closures.front().anchor;
+  graph.T_map_node.push_back(Eigen::Isometry3d::Identity());
+  for (std::size_t n = 0; n < T_drive_node.size(); ++n)
+    graph.T_map_node.push_back(carried_to(drive, n, first.node, first.T_map_node));
+  for (PoseEdge edge : drive.graph().edges) {
+    ++edge.from;
+    ++edge.to;
+    graph.edges.push_back(edge);
+  }
+  const std::size_t own_edges = graph.edges.size();
+  for (const Found& found : closures) graph.edges.push_back(found.edge);
+  while (!closures.empty()) {
+    graph.T_map_node = optimize(graph, {.loop_scale = config_.loop_scale}).T_map_node;
+    const auto denied = std::ranges::find_if(closures, [&](const Found& found) {
+      return squared_error(found.edge, graph.T_map_node[0], graph.T_map_node[found.edge.to],
+                           EdgeError::geodesic) >= config_.max_squared_error;
+    });
+    if (denied == closures.end()) break;
+    denied->closure.refusal = "the rest of the graph denies it";
+    alignment.refused.push_back(std::move(denied->closure));
+    graph.edges.erase(graph.edges.begin() + static_cast<std::ptrdiff_t>(own_edges) +
+                      (denied - closures.begin()));
+    closures.erase(denied);
+  }
+  for (Found& found : closures) alignment.closures.push_back(std::move(found.closure));
+  std::ranges::sort(alignment.closures, {}, &MapClosure::scan);
+  graph.T_map_node.erase(graph.T_map_node.begin());
+  return graph.T_map_node;
+}
+
+}  // namespace stillmap
