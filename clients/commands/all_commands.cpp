@@ -86,6 +86,7 @@ void add_commands(CommandHandle program, Action& action) {
   add_load_command(program, action);
   add_reset_command(program, action);
   add_map_info_command(program, action);
+  add_merge_command(program, action);
   add_sessions_command(program, action);
   add_map_check_command(program, action);
   add_map_diff_command(program, action);

@@ -58,6 +58,7 @@ void add_save_command(CommandHandle program, Action& action);
 void add_load_command(CommandHandle program, Action& action);
 void add_reset_command(CommandHandle program, Action& action);
 void add_map_info_command(CommandHandle program, Action& action);
+void add_merge_command(CommandHandle program, Action& action);
 void add_sessions_command(CommandHandle program, Action& action);
 void add_map_check_command(CommandHandle program, Action& action);
 void add_map_diff_command(CommandHandle program, Action& action);

@@ -38,7 +38,7 @@ PlacedSubmap levelled(const Submap& submap, const Eigen::Isometry3d& T_map_key) 
 
 std::string MapAlignment::in_words() const {
   std::string text = std::to_string(localized) +
-                     " of its scans were looked for in the whole map, " + std::to_string(found) +
+                     " places of it were looked for in the whole map, " + std::to_string(found) +
                      " were found, " + std::to_string(agreeing) + " of these agree";
   if (!closures.empty() || !refused.empty()) {
     text += "; " + std::to_string(closures.size()) + " of " +
@@ -52,15 +52,23 @@ MapAlignment MapAligner::align(const LoopCloser& drive, const ScanSource& scan_a
                                const Eigen::Matrix3d& R_body_lidar) const {
   MapAlignment alignment;
   std::vector<Anchor> anchors = localize(drive, scan_at, R_body_lidar, alignment);
-  if (alignment.agreeing < config_.min_agreeing) return alignment;
-  std::vector<Found> found = close(drive, std::move(anchors), alignment);
+  if (anchors.empty()) return alignment;
+  const std::vector<Found> found = close(drive, std::move(anchors), alignment);
+  Solution solution{{}, found, {}};
   if (found.size() >= config_.min_closures) {
-    const std::vector<Eigen::Isometry3d> T_map_node = solve(drive, std::move(found), alignment);
-    if (alignment.closures.size() >= config_.min_closures)
-      alignment.T_map_lidar = drive.poses_by(T_map_node);
-  } else {
-    for (Found& closure : found) alignment.closures.push_back(std::move(closure.closure));
+    // Odometry that drifts by more than assumed must not make closures wrong.
+    for (const double odometry_scale : {1.0, 3.0, 10.0}) {
+      solution = solve(drive, found, odometry_scale);
+      if (static_cast<double>(solution.denied.size()) <=
+          config_.max_denied * static_cast<double>(found.size()))
+        break;
+    }
+    if (solution.believed.size() >= config_.min_closures)
+      alignment.T_map_lidar = drive.poses_by(solution.T_map_node);
   }
+  for (const Found& closure : solution.believed) alignment.closures.push_back(closure.closure);
+  for (const Found& closure : solution.denied) alignment.refused.push_back(closure.closure);
+  std::ranges::sort(alignment.closures, {}, &MapClosure::scan);
   return alignment;
 }
 
@@ -87,8 +95,6 @@ std::vector<MapAligner::Anchor> MapAligner::localize(const LoopCloser& drive,
     alignment.agreeing = std::max(alignment.agreeing, best.size());
     if (best.size() >= config_.min_agreeing && 2 * best.size() > found.size()) return best;
   }
-  // Some agree, but as many say something else.
-  if (alignment.agreeing >= config_.min_agreeing) alignment.agreeing = 1;
   return {};
 }
 
@@ -221,39 +227,37 @@ PlacedSubmap MapAligner::piece_round(const Eigen::Isometry3d& T_map_key) const {
   return PlacedSubmap(std::move(piece));
 }
 
-std::vector<Eigen::Isometry3d> MapAligner::solve(const LoopCloser& drive,
-                                                 std::vector<Found> closures,
-                                                 MapAlignment& alignment) const {
+MapAligner::Solution MapAligner::solve(const LoopCloser& drive, const std::vector<Found>& closures,
+                                       double odometry_scale) const {
   PoseGraph graph;
-  const auto& T_drive_node = drive.graph().T_map_node;
   const Anchor& first = closures.front().anchor;
   graph.T_map_node.push_back(Eigen::Isometry3d::Identity());
-  for (std::size_t n = 0; n < T_drive_node.size(); ++n)
+  for (std::size_t n = 0; n < drive.nodes().size(); ++n)
     graph.T_map_node.push_back(carried_to(drive, n, first.node, first.T_map_node));
   for (PoseEdge edge : drive.graph().edges) {
     ++edge.from;
     ++edge.to;
+    if (!edge.is_loop) edge.information /= odometry_scale * odometry_scale;
     graph.edges.push_back(edge);
   }
-  const std::size_t own_edges = graph.edges.size();
+  const auto own_edges = static_cast<std::ptrdiff_t>(graph.edges.size());
   for (const Found& found : closures) graph.edges.push_back(found.edge);
-  while (!closures.empty()) {
+  Solution solution{{}, closures, {}};
+  const auto error_of = [&graph](const Found& found) {
+    return squared_error(found.edge, graph.T_map_node[0], graph.T_map_node[found.edge.to],
+                         EdgeError::geodesic);
+  };
+  while (!solution.believed.empty()) {
     graph.T_map_node = optimize(graph, {.loop_scale = config_.loop_scale}).T_map_node;
-    const auto denied = std::ranges::find_if(closures, [&](const Found& found) {
-      return squared_error(found.edge, graph.T_map_node[0], graph.T_map_node[found.edge.to],
-                           EdgeError::geodesic) >= config_.max_squared_error;
-    });
-    if (denied == closures.end()) break;
-    denied->closure.refusal = "the rest of the graph denies it";
-    alignment.refused.push_back(std::move(denied->closure));
-    graph.edges.erase(graph.edges.begin() + static_cast<std::ptrdiff_t>(own_edges) +
-                      (denied - closures.begin()));
-    closures.erase(denied);
+    const auto worst = std::ranges::max_element(solution.believed, {}, error_of);
+    if (error_of(*worst) < config_.max_squared_error) break;
+    worst->closure.refusal = "the rest of the graph denies it";
+    graph.edges.erase(graph.edges.begin() + own_edges + (worst - solution.believed.begin()));
+    solution.denied.push_back(*worst);
+    solution.believed.erase(worst);
   }
-  for (Found& found : closures) alignment.closures.push_back(std::move(found.closure));
-  std::ranges::sort(alignment.closures, {}, &MapClosure::scan);
-  graph.T_map_node.erase(graph.T_map_node.begin());
-  return graph.T_map_node;
+  solution.T_map_node.assign(graph.T_map_node.begin() + 1, graph.T_map_node.end());
+  return solution;
 }
 
 }  // namespace stillmap

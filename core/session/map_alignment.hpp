@@ -41,6 +41,8 @@ struct MapAlignmentConfig {
   double second_agreement_rad = 0.02;
   /// The drive lies in the map when so many of its submaps do.
   std::size_t min_closures = 2;
+  /// The graph may deny this share of the closures; where it denies more, odometry is trusted less.
+  double max_denied = 0.2;
   /// Cauchy kernel, and the squared error above which the graph denies a closure: see
   /// LoopClosingConfig.
   double loop_scale = 2.5;
@@ -106,7 +108,7 @@ class MapAligner {
     Anchor anchor;
     PoseEdge edge;
   };
-  /// Those that agree; fewer than enough where the drive is not found.
+  /// Those that agree; none where these are too few, or as many say something else.
   [[nodiscard]] std::vector<Anchor> localize(const LoopCloser& drive, const ScanSource& scan_at,
                                              const Eigen::Matrix3d& R_body_lidar,
                                              MapAlignment& alignment) const;
@@ -132,10 +134,15 @@ class MapAligner {
                                            const Anchor& nearest) const;
   /// The map round a pose, in its upright frame; the key is the pose.
   [[nodiscard]] PlacedSubmap piece_round(const Eigen::Isometry3d& T_map_key) const;
-  /// Poses of the drive's nodes; takes out of `closures` what the graph denies.
-  [[nodiscard]] std::vector<Eigen::Isometry3d> solve(const LoopCloser& drive,
-                                                     std::vector<Found> closures,
-                                                     MapAlignment& alignment) const;
+  /// Poses of the drive's nodes, and the closures that the graph denies.
+  struct Solution {
+    std::vector<Eigen::Isometry3d> T_map_node;
+    std::vector<Found> believed;
+    std::vector<Found> denied;
+  };
+  /// With standard deviations of the odometry that are so many times larger.
+  [[nodiscard]] Solution solve(const LoopCloser& drive, const std::vector<Found>& closures,
+                               double odometry_scale) const;
 
   std::shared_ptr<const PlaceIndex> map_;
   Localizer localizer_;

@@ -7,15 +7,15 @@
 
 namespace stillmap::cli {
 
-EarlierMap::EarlierMap(std::filesystem::path file, const StaticMapConfig& config)
+EarlierMap::EarlierMap(std::filesystem::path file, const std::optional<StaticMapConfig>& sizes)
     : file_(std::move(file)), copy_(file_), saved_(copy_.load()) {
   if (saved_.view.tiles.empty()) {
     throw std::invalid_argument(file_.string() +
-                                " is an empty map: nothing can be recognised in it; leave out "
-                                "--onto, or name another map");
+                                " is an empty map: nothing can be recognised in it; name "
+                                "another one");
   }
   try {
-    check_sizes(saved_.view, config);
+    if (sizes) check_sizes(saved_.view, *sizes);
   } catch (const std::invalid_argument& error) {
     throw std::invalid_argument(file_.string() + ": " + error.what());
   }

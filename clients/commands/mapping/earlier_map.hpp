@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "core/localization/place_index.hpp"
@@ -12,12 +13,13 @@
 
 namespace stillmap::cli {
 
-/// The map that a drive goes on in. The file is copied when it is named, and never changed.
+/// The map that a drive, or another map, is put onto. The file is copied when it is named, and
+/// never changed.
 class EarlierMap {
  public:
   /// Throws MapFileError for what is no map file, and std::invalid_argument for an empty map, or
-  /// one with voxels or tiles of other sizes than configured.
-  EarlierMap(std::filesystem::path file, const StaticMapConfig& config);
+  /// one whose voxels or tiles are of other sizes than those given.
+  EarlierMap(std::filesystem::path file, const std::optional<StaticMapConfig>& sizes);
 
   [[nodiscard]] const std::filesystem::path& file() const { return file_; }
   [[nodiscard]] const SavedMap& saved() const { return saved_; }

@@ -91,15 +91,6 @@ Json map_closures_json(const std::vector<MapClosure>& closures) {
   return json;
 }
 
-Json to_json(const SessionReport& session) {
-  return {{"localized", session.alignment.localized},
-          {"found", session.alignment.found},
-          {"closures", map_closures_json(session.alignment.closures)},
-          {"refused", map_closures_json(session.alignment.refused)},
-          {"clock_offset_ns", session.clock_offset_ns},
-          {"seconds", session.seconds}};
-}
-
 Json to_json(const LoopReport& loops, const std::optional<TrajectoryReport>& odometry) {
   return {{"submaps", loops.submaps},
           {"nodes", loops.nodes},
@@ -135,6 +126,15 @@ std::string describe(const SessionReport& session) {
 }
 
 }  // namespace
+
+Json to_json(const SessionReport& session) {
+  return {{"localized", session.alignment.localized},
+          {"found", session.alignment.found},
+          {"closures", map_closures_json(session.alignment.closures)},
+          {"refused", map_closures_json(session.alignment.refused)},
+          {"clock_offset_ns", session.clock_offset_ns},
+          {"seconds", session.seconds}};
+}
 
 std::string pose_file_of(const std::string& frame) {
   return frame == "lidar" ? "poses_lidar.txt" : "poses_base.txt";

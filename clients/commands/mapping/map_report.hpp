@@ -23,6 +23,8 @@ struct MapOutput {
 /// Name of the file with KITTI's form of the poses.
 [[nodiscard]] std::string pose_file_of(const std::string& frame);
 
+/// Where a drive or a map was put onto another map.
+[[nodiscard]] Json to_json(const SessionReport& session);
 /// Contents of report.json.
 [[nodiscard]] Json to_json(const MappingResult& result, const MapOutput& output);
 /// The same for people, shorter.

@@ -1,0 +1,156 @@
+#include <chrono>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+#include "clients/commands/command.hpp"
+#include "clients/commands/mapping/earlier_map.hpp"
+#include "clients/commands/mapping/map_report.hpp"
+#include "clients/terminal/json.hpp"
+#include "clients/terminal/table.hpp"
+#include "core/map/map_id.hpp"
+#include "core/map/query/tile_reader.hpp"
+#include "core/map/storage/map_lock.hpp"
+#include "core/map/storage/map_sessions.hpp"
+#include "core/session/map_merge.hpp"
+
+namespace stillmap::cli {
+namespace {
+
+struct MergeArguments {
+  std::string map;
+  std::string other;
+  std::string out;
+  bool force = false;
+  bool json = false;
+};
+
+StaticMapConfig sizes_of(const SavedMap& map) {
+  StaticMapConfig config;
+  config.voxel_size_m = map.view.voxel_size_m;
+  config.tile_size_m = map.view.tile_size_m;
+  return config;
+}
+
+/// Throws std::invalid_argument for a file that must not be written.
+void check_out(const MergeArguments& arguments) {
+  for (const std::string& given : {arguments.map, arguments.other}) {
+    std::error_code not_there;
+    if (std::filesystem::equivalent(given, arguments.out, not_there)) {
+      throw std::invalid_argument(
+          arguments.out + " is one of the maps, which stay as they are: " + "name another --out");
+    }
+  }
+  if (std::filesystem::exists(arguments.out) && !arguments.force) {
+    throw std::invalid_argument(arguments.out +
+                                " exists already: choose another --out, or --force to replace it");
+  }
+}
+
+/// The other map, its sizes those of the first. Throws what EarlierMap throws.
+std::unique_ptr<const EarlierMap> other_map(const MergeArguments& arguments,
+                                            const EarlierMap& map) {
+  auto other = std::make_unique<const EarlierMap>(arguments.other, sizes_of(map.saved()));
+  if (other->saved().trajectory.empty()) {
+    throw std::invalid_argument(arguments.other +
+                                " has no path: what could be seen along it is what it would be "
+                                "recognised by; name it first, and the other map second");
+  }
+  return other;
+}
+
+/// "B.stillmap (monday, tuesday)".
+std::string source_of(const std::string& file) {
+  std::string names;
+  for (const MapSession& session : read_map_sessions(file)) {
+    if (!session.source.empty()) names += (names.empty() ? "" : ", ") + session.source;
+  }
+  return file + (names.empty() ? "" : " (" + names + ")");
+}
+
+void save_merged(const MergeArguments& arguments, const EarlierMap& map, const SavedMap& merged,
+                 std::int64_t clock_offset_ns, std::size_t closures) {
+  const MapLock lock(arguments.out);
+  const std::filesystem::path fresh = arguments.out + ".merged";
+  try {
+    map.copy_to(fresh);
+    add_map_session(fresh, merged,
+                    {.source = source_of(arguments.other),
+                     .clock_offset_ns = clock_offset_ns,
+                     .closures = closures});
+    replace_map_file(fresh, arguments.out);
+  } catch (...) {
+    std::error_code ignored;
+    std::filesystem::remove(fresh, ignored);
+    throw;
+  }
+}
+
+ExitCode run(const MergeArguments& arguments) {
+  check_out(arguments);
+  const auto began = std::chrono::steady_clock::now();
+  const EarlierMap map(arguments.map, std::nullopt);
+  const auto other = other_map(arguments, map);
+  const MapAlignment alignment = align_maps(map.index(), *other->index(), other->saved().trajectory,
+                                            map.saved().view.voxel_size_m);
+  if (!alignment.is_recognized()) {
+    throw MapNotRecognized(arguments.other + " was not recognised in " + arguments.map + ": " +
+                           alignment.in_words() +
+                           "; nothing was written. Maps are merged where their paths come through "
+                           "the same place for some 50 m");
+  }
+  const std::int64_t clock_offset_ns =
+      map.clock_offset_ns(other->saved().trajectory.front().stamp_ns);
+  SavedMap merged = merged_map(map.saved(), other->saved(), alignment.T_map_lidar, clock_offset_ns);
+  merged.view.map_id = new_map_id();
+  merged.metadata = map.saved().metadata;
+  save_merged(arguments, map, merged, clock_offset_ns, alignment.closures.size());
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
+  if (arguments.json) {
+    Json report = to_json(SessionReport{alignment, clock_offset_ns, seconds});
+    report.set("changed_tiles", merged.tile_evidence.size());
+    report.set("file", arguments.out);
+    std::cout << report.dump(2) << "\n";
+  } else {
+    std::cout << arguments.other << " lies in " << arguments.map << ": " << alignment.in_words()
+              << "\n"
+              << merged.tile_evidence.size() << " tiles have voxels of it; written to "
+              << arguments.out << " in " << fixed(seconds, 1) << " s\n";
+  }
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_merge_command(CommandHandle program, Action& action) {
+  auto arguments = std::make_shared<MergeArguments>();
+  CommandHandle command = program.command(
+      "merge", "Put one map into another one of the same place, with no prior where it lies");
+  command.option("MAP", arguments->map, "A map file; the result is in its frame").required();
+  command.option("OTHER", arguments->other, "Another map file, made apart; it needs its path")
+      .required();
+  command.option("--out", arguments->out, "Where the map of both is written").required();
+  command.flag("--force", arguments->force, "Replace the file --out where it exists");
+  command.flag("--json", arguments->json, "Print JSON: where the maps were joined");
+  command.explain(
+      "Examples:\n"
+      "  stillmap merge north.stillmap south.stillmap --out city.stillmap\n"
+      "  stillmap merge a.stillmap b.stillmap --out c.stillmap --json | jq "
+      "'.closures[].T_map_lidar'\n"
+      "What could be seen along the path of OTHER is looked for in MAP, place by place until some\n"
+      "agree, then stretch by stretch of 25 m; each voxel moves with the pose that saw it last. "
+      "Both\n"
+      "files are only read; voxels must have one size. What one of the maps alone has stays: a "
+      "map\n"
+      "does not tell where its lidar saw free space. To bring a map up to date, put the newer\n"
+      "recording onto it ('stillmap map --onto'). OTHER is a session of the result, which "
+      "'stillmap\n"
+      "sessions' can withdraw. Exit code 5: it was not recognised, and nothing was written.");
+  command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
+}
+
+}  // namespace stillmap::cli

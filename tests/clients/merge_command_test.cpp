@@ -1,0 +1,89 @@
+#include "core/map/storage/map_file.hpp"
+#include "tests/clients/command_test.hpp"
+
+namespace stillmap::test {
+namespace {
+
+/// Two maps of one drive: of its first and its last part, which share some of the way.
+class MergeCommandTest : public CommandTest {
+ protected:
+  void SetUp() override {
+    CommandTest::SetUp();
+    simulate("yard", 130, " --seed 21");
+    for (const auto& [name, part] :
+         {std::pair<std::string, std::string>{"a", "--scans 90"}, {"b", "--start 30"}}) {
+      const ProcessResult mapped = run("map " + path("yard") + " " + part + " --out " + path(name));
+      ASSERT_EQ(mapped.exit_code, 0) << mapped.err;
+    }
+  }
+  [[nodiscard]] std::string map(const std::string& name) const {
+    return path(name + "/map.stillmap");
+  }
+};
+
+TEST_F(MergeCommandTest, PutsOneMapIntoTheOtherAndCanWithdrawIt) {
+  const std::string a_before = content("a/map.stillmap"), b_before = content("b/map.stillmap");
+  const ProcessResult merged =
+      run("merge " + map("a") + " " + map("b") + " --out " + path("c.stillmap") + " --json");
+  ASSERT_EQ(merged.exit_code, 0) << merged.err;
+  const nlohmann::json report = nlohmann::json::parse(merged.out);
+  EXPECT_GE(report.at("closures").size(), 2U);
+  EXPECT_EQ(content("a/map.stillmap"), a_before);
+  EXPECT_EQ(content("b/map.stillmap"), b_before);
+  EXPECT_EQ(run("map-check " + path("c.stillmap")).exit_code, 0);
+
+  // By one drive in one map: the poses of b in c are those of the scans in a.
+  const SavedMap a = open_map_file(map("a"))->load(), c = open_map_file(path("c.stillmap"))->load();
+  ASSERT_EQ(c.trajectory.size(), 90U + 100U);
+  for (std::size_t scan = 30; scan < 90; ++scan) {
+    const Eigen::Isometry3d off =
+        a.trajectory[scan].T_map_lidar.inverse() * c.trajectory[90 + scan - 30].T_map_lidar;
+    EXPECT_LT(off.translation().norm(), 0.1) << scan;
+  }
+
+  const ProcessResult sessions = run("sessions " + path("c.stillmap") + " --json");
+  const nlohmann::json list = nlohmann::json::parse(sessions.out);
+  ASSERT_EQ(list.size(), 2U);
+  EXPECT_THAT(list[1].at("source"), HasSubstr(path("yard")));
+  ASSERT_EQ(
+      run("sessions " + path("c.stillmap") + " --withdraw 2 --out " + path("d.stillmap")).exit_code,
+      0);
+  EXPECT_THAT(run("map-diff --tolerance 0 " + map("a") + " " + path("d.stillmap")).out,
+              HasSubstr("nothing changed"));
+}
+
+TEST_F(MergeCommandTest, NamesWhatItCannotMerge) {
+  write("text.stillmap", "no map at all");
+  open_map_file(folder_ / "empty.stillmap")->save(SavedMap{});
+  SavedMap pathless = open_map_file(map("b"))->load();
+  pathless.trajectory = {};
+  open_map_file(folder_ / "pathless.stillmap")->save(pathless);
+  StaticMapConfig coarse;
+  coarse.voxel_size_m = 0.4;
+  StaticMap coarse_map(coarse);
+  LabelledScan scan;
+  scan.scan.points_lidar.emplace_back(1.0F, 2.0F, 3.0F);
+  scan.motion.push_back(Motion::stationary);
+  coarse_map.insert(scan, Eigen::Isometry3d::Identity());
+  open_map_file(folder_ / "coarse.stillmap")
+      ->save(to_saved_map(coarse_map.checkpoint(CheckpointScope::everything)));
+  write("there.stillmap", "something");
+  for (const auto& [arguments, fault] : {
+           std::pair{map("a") + " " + path("none.stillmap"), std::string("none.stillmap")},
+           std::pair{path("text.stillmap") + " " + map("a"), std::string("text.stillmap")},
+           std::pair{map("a") + " " + path("empty.stillmap"), std::string("is an empty map")},
+           std::pair{map("a") + " " + path("pathless.stillmap"), std::string("has no path")},
+           std::pair{map("a") + " " + path("coarse.stillmap"), std::string("voxel_size_m 0.4")},
+       }) {
+    const ProcessResult refused = run("merge " + arguments + " --out " + path("c.stillmap"));
+    EXPECT_EQ(refused.exit_code, 2) << arguments;
+    EXPECT_THAT(refused.err, HasSubstr(fault)) << arguments;
+    EXPECT_FALSE(exists("c.stillmap"));
+  }
+  const std::string both = "merge " + map("a") + " " + map("b") + " --out ";
+  EXPECT_THAT(run(both + path("there.stillmap")).err, HasSubstr("exists already"));
+  EXPECT_THAT(run(both + map("b") + " --force").err, HasSubstr("stay as they are"));
+}
+
+}  // namespace
+}  // namespace stillmap::test
