@@ -8,7 +8,7 @@ class SimulateCommandTest : public CommandTest {};
 TEST_F(SimulateCommandTest, WritesASequenceWithTruth) {
   simulate("city", 3);
   for (const char* file : {"city/velodyne/000002.bin", "city/labels/000002.label", "city/times.txt",
-                           "city/calib.txt", "city/poses.txt"}) {
+                           "city/calib.txt", "city/poses.txt", "city/first_pose_city.txt"}) {
     EXPECT_TRUE(exists(file)) << file;
   }
   EXPECT_FALSE(exists("city/velodyne/000003.bin"));

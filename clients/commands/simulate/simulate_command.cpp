@@ -8,6 +8,7 @@
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
 #include "core/dataset/imu_file.hpp"
+#include "core/dataset/kitti_files.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
 #include "core/simulation/simulated_imu.hpp"
 
@@ -40,6 +41,8 @@ Written write_sequence(const std::string& folder, const simulation::Simulation& 
     progress.update(static_cast<std::uint64_t>(written.scans));
   }
   writer.finish();
+  const Eigen::Isometry3d T_city_first = simulation.T_map_lidar_at(0.0);
+  write_poses(std::filesystem::path(folder) / "first_pose_city.txt", {&T_city_first, 1});
   if (imu) write_imu_csv(std::filesystem::path(folder) / "imu.csv", simulated_imu(simulation));
   return written;
 }
@@ -116,6 +119,8 @@ void add_simulate_command(CommandHandle program, Action& action) {
       "  stillmap simulate city --scans 300\n"
       "  stillmap simulate avenue --preset crowd --seed 7 --sensor vlp_16\n"
       "  stillmap simulate empty --traffic 0 --scans 50 --rolling\n"
+      "poses.txt begins at the first scan, as KITTI's do; first_pose_city.txt has the pose of its\n"
+      "lidar in the city, in which all days are.\n"
       "The same options give the same files, bit by bit.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
