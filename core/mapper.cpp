@@ -15,6 +15,9 @@ namespace {
 /// than it sees [m].
 constexpr double prior_map_update_distance_m = 20.0;
 
+/// How far from where it was found a lidar may have driven, until the next scan [m].
+constexpr double relocation_reach_m = 4.0;
+
 MapperConfig checked(const MapperConfig& config) {
   if (const std::string faults = config.faults(); !faults.empty())
     throw std::invalid_argument(faults);
@@ -60,7 +63,8 @@ std::optional<MappedScan> Mapper::process(
   if (!config_.prepare.deskew) scan.time_offset_s.clear();
   const SweepTimes sweep = sweep_times(scan, config_.sensor.period_s);
   const std::int64_t middle_ns = scan.stamp_ns + std::llround(sweep.middle_s * 1e9);
-  if (trajectory_.empty()) odometry_.expect_first_scan(middle_ns);
+  if (trajectory_.empty() || scans_to_confirm_ > 0) odometry_.expect_first_scan(middle_ns);
+  const std::optional<Scan> with_times = hands_out_scans_ ? std::optional(scan) : std::nullopt;
   const std::optional<InertialMotion> inertial = inertial_motion(scan.stamp_ns, sweep);
   odometry_.sweep_motion(sweep, inertial).move_to_middle(scan, sweep);
   const auto T_map_lidar_known = levelled(T_map_lidar_prior, scan.stamp_ns, sweep);
@@ -68,13 +72,19 @@ std::optional<MappedScan> Mapper::process(
       T_map_lidar_known.value_or(odometry_.predict(middle_ns, inertial));
   LabelSynchronizer::Labels labels = label_synchronizer_.labels_for(
       scan, std::move(submission), T_map_lidar_expected, static_map_);
+  if (with_times && listeners_.scan_prepared) {
+    const bool are_own = labels.provenance == LabelProvenance::fresh;
+    listeners_.scan_prepared(*with_times, are_own ? labels.labels : PointLabels{});
+  }
   end_stage("segment");
 
   // Register: the pose, and what moves.
   add_prior_map_near(T_map_lidar_expected.translation());
   Odometry::Step step =
       odometry_.register_scan(scan, sweep, labels.labels, T_map_lidar_known, inertial);
+  confirm_relocation(step.result);
   teach_inertial(middle_ns, step);
+  is_placed_ |= step.result.health != OdometryHealth::lost;
   end_stage("odometry");
   if (listeners_.pose_found) listeners_.pose_found(scan.stamp_ns, step.result);
 
@@ -207,6 +217,33 @@ void Mapper::clear_scan_state() {
   clock_ = {};
   resumed_tiles_ = {};
   prior_map_added_at_map_.reset();
+  is_placed_ = false;
+  scans_to_confirm_ = 0;
+}
+
+void Mapper::relocate(Odometry followed, int confirming_scans) {
+  odometry_ = std::move(followed);
+  odometry_.begin_map(relocation_reach_m);
+  scans_to_confirm_ = confirming_scans;
+  confirming_scans_ = 0;
+  is_placed_ = false;
+  last_middle_.reset();
+  inertial_.forget_motion();
+  // Of this run, too.
+  resumed_tiles_ = static_map_.view()->tiles;
+  prior_map_added_at_map_.reset();
+}
+
+void Mapper::confirm_relocation(OdometryResult& result) {
+  if (scans_to_confirm_ == 0) return;
+  const bool fits = result.health == OdometryHealth::good && result.is_confirmed;
+  confirming_scans_ = fits ? confirming_scans_ + 1 : 0;
+  if (confirming_scans_ >= scans_to_confirm_) {
+    scans_to_confirm_ = 0;
+    return;
+  }
+  result.is_confirmed = false;
+  if (fits) result.health = OdometryHealth::degenerate;
 }
 
 void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {

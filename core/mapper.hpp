@@ -73,6 +73,9 @@ struct MapperListeners {
   StageListener stage_ended;
   /// The pose is known; the scan is not in the static map yet.
   std::function<void(std::int64_t stamp_ns, const OdometryResult& odometry)> pose_found;
+  /// A prepared scan with its times, in the order of the stages before it is registered, and the
+  /// labels of its own, if any; only where Mapper::hand_out_scans() asked for it.
+  std::function<void(const Scan& scan, const PointLabels& labels)> scan_prepared{};
 };
 
 /// The pipeline of a scan: prepare, label, deskew, register, insert into the static map. One thread
@@ -104,6 +107,17 @@ class Mapper {
   void limit_trajectory(std::size_t poses) { max_poses_ = poses; }
   [[nodiscard]] std::string label_source() const { return label_synchronizer_.name(); }
   [[nodiscard]] std::shared_ptr<const MapSnapshot> map_snapshot() { return static_map_.view(); }
+
+  /// Whether a scan was registered since the map began or the lidar was relocated: before, nothing
+  /// but its prior tells where it is.
+  [[nodiscard]] bool is_placed() const { return is_placed_; }
+  /// Whether the next scans are given to MapperListeners::scan_prepared.
+  void hand_out_scans(bool is_wanted) { hands_out_scans_ = is_wanted; }
+  /// The lidar is somewhere else in the map than it seemed to be: the next scan is looked for
+  /// within some metres of its prior, which it needs, and no scan enters the map before as many in
+  /// a row as this fitted there. `followed` has followed the lidar until now, in any frame: its
+  /// velocity is kept.
+  void relocate(Odometry followed, int confirming_scans = 5);
 
   /// What is stored of it, what of it is in memory, and what was removed from it.
   [[nodiscard]] StaticMap& static_map() { return static_map_; }
@@ -139,6 +153,8 @@ class Mapper {
   [[nodiscard]] std::optional<InertialMotion> inertial_motion(std::int64_t stamp_ns,
                                                               const SweepTimes& sweep);
   void teach_inertial(std::int64_t middle_ns, const Odometry::Step& step);
+  /// Where the lidar was relocated, a scan is no part of the map until enough of them fitted.
+  void confirm_relocation(OdometryResult& result);
   void end_stage(std::string_view stage) const;
 
   MapperConfig config_;
@@ -152,6 +168,11 @@ class Mapper {
   /// Tiles of a resumed map, and where their points were last added to the odometry's local map.
   TileTable resumed_tiles_;
   std::optional<Eigen::Vector3d> prior_map_added_at_map_;
+  bool is_placed_ = false;
+  bool hands_out_scans_ = false;
+  /// Scans that are to fit after a relocation, and how many of them; 0: none.
+  int scans_to_confirm_ = 0;
+  int confirming_scans_ = 0;
   Trajectory trajectory_;
   std::size_t max_poses_ = std::numeric_limits<std::size_t>::max() / 2;
   ScanClock clock_;

@@ -104,6 +104,7 @@ DirectionRanges::Sight DirectionRanges::look_at(const Eigen::Vector3f& p_lidar) 
 LocalizationQuery::LocalizationQuery(const Scan& scan, const PointLabels& labels,
                                      const Eigen::Matrix3d& R_body_lidar)
     : ranges_upright({}) {
+  T_upright_lidar.linear() = R_body_lidar;
   const Scan upright = turned(scan, R_body_lidar);
   ranges_upright = DirectionRanges(upright.points_lidar);
   const Features features = extract_surfaces(upright, FeatureConfig{});

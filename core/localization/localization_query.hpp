@@ -43,6 +43,8 @@ struct LocalizationQuery {
   LocalizationQuery(const Scan& scan, const PointLabels& labels,
                     const Eigen::Matrix3d& R_body_lidar);
 
+  /// A rotation.
+  Eigen::Isometry3d T_upright_lidar = Eigen::Isometry3d::Identity();
   /// For the alignment of points: on what stands up, and on level ground.
   FeatureSets features_upright;
   /// What stands up and cannot move by its label.

@@ -30,53 +30,63 @@ const char* name(LocalizationStatus status) {
 Localizer::Localizer(std::shared_ptr<const PlaceIndex> index, const LocalizationConfig& config)
     : index_(std::move(index)), config_(config) {}
 
-LocalizationResult Localizer::localize(const Scan& scan, const PointLabels& labels,
-                                       const Eigen::Matrix3d& R_body_lidar) const {
-  const LocalizationQuery query(scan, labels, R_body_lidar);
+LocalizationResult Localizer::localize(const LocalizationQuery& query,
+                                       const std::optional<SearchRegion>& region) const {
   if (index_->empty() ||
       query.features_upright.points.size() < static_cast<std::size_t>(config_.min_points))
     return {};
   const std::vector<PlaceCandidate> candidates =
-      search_places(query, *index_, config_.places, config_.search);
+      search_places(query, *index_, config_.places, config_.search, region);
   std::vector<PlaceHypothesis> places(candidates.size());
-  Eigen::Isometry3d T_upright_lidar = Eigen::Isometry3d::Identity();
-  T_upright_lidar.linear() = R_body_lidar;
   tbb::parallel_for(std::size_t{0}, candidates.size(), [&](std::size_t k) {
-    const auto points = index_->points_near(candidates[k].position_map, surroundings_m);
-    const MapSurroundings surroundings(points);
-    const Eigen::Isometry3d T =
-        surroundings.align(query, T_map_upright(candidates[k], query, *index_));
-    places[k] = {T * T_upright_lidar, surroundings.evidence(query, T), candidates[k].score};
+    places[k] =
+        align_at(query, T_map_upright(candidates[k], query, *index_) * query.T_upright_lidar);
+    places[k].search_score = candidates[k].score;
   });
   std::ranges::stable_sort(places, [](const PlaceHypothesis& a, const PlaceHypothesis& b) {
     return a.evidence.score() > b.evidence.score();
   });
   std::vector<PlaceHypothesis> apart;
   for (const PlaceHypothesis& place : places) {
-    if (std::ranges::all_of(
-            apart, [&](const PlaceHypothesis& other) { return is_other_place(place, other); }))
+    if (std::ranges::all_of(apart, [&](const PlaceHypothesis& other) {
+          return is_other_place(place.T_map_lidar, other.T_map_lidar, config_);
+        }))
       apart.push_back(place);
   }
-  const LocalizationStatus status = judge(apart);
+  const LocalizationStatus status = judge_places(apart, config_);
   return {status, std::move(apart)};
 }
 
-LocalizationStatus Localizer::judge(const std::vector<PlaceHypothesis>& places) const {
-  if (places.empty()) return LocalizationStatus::not_found;
-  const PoseEvidence& best = places.front().evidence;
-  if (best.map_points < config_.min_map_points || best.explained < config_.min_explained ||
-      best.confirmed < config_.min_confirmed || best.level < config_.min_level ||
-      best.score() < config_.min_score)
+PlaceHypothesis Localizer::align_at(const LocalizationQuery& query,
+                                    const Eigen::Isometry3d& T_map_lidar) const {
+  const auto points = index_->points_near(T_map_lidar.translation().head<2>(), surroundings_m);
+  const MapSurroundings surroundings(points);
+  const Eigen::Isometry3d T =
+      surroundings.align(query, T_map_lidar * query.T_upright_lidar.inverse());
+  return {T * query.T_upright_lidar, surroundings.evidence(query, T), 0.0};
+}
+
+bool is_believed(const PoseEvidence& evidence, const LocalizationConfig& config) {
+  return evidence.map_points >= config.min_map_points &&
+         evidence.explained >= config.min_explained && evidence.confirmed >= config.min_confirmed &&
+         evidence.level >= config.min_level && evidence.score() >= config.min_score;
+}
+
+LocalizationStatus judge_places(std::span<const PlaceHypothesis> places,
+                                const LocalizationConfig& config) {
+  if (places.empty() || !is_believed(places.front().evidence, config))
     return LocalizationStatus::not_found;
-  if (places.size() > 1 && places[1].evidence.score() > config_.max_other_share * best.score())
+  const double score = places.front().evidence.score();
+  if (places.size() > 1 && places[1].evidence.score() > config.max_other_share * score)
     return LocalizationStatus::ambiguous;
   return LocalizationStatus::found;
 }
 
-bool Localizer::is_other_place(const PlaceHypothesis& a, const PlaceHypothesis& b) const {
-  const Eigen::Isometry3d off = a.T_map_lidar.inverse() * b.T_map_lidar;
-  return off.translation().norm() > config_.min_other_m ||
-         Eigen::AngleAxisd(off.linear()).angle() > config_.min_other_rad;
+bool is_other_place(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b,
+                    const LocalizationConfig& config) {
+  const Eigen::Isometry3d off = a.inverse() * b;
+  return off.translation().norm() > config.min_other_m ||
+         Eigen::AngleAxisd(off.linear()).angle() > config.min_other_rad;
 }
 
 }  // namespace stillmap

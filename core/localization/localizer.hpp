@@ -2,10 +2,13 @@
 
 #include <Eigen/Geometry>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
+#include "core/localization/localization_query.hpp"
 #include "core/localization/place_index.hpp"
 #include "core/localization/place_search.hpp"
 #include "core/localization/pose_evidence.hpp"
@@ -51,6 +54,15 @@ struct PlaceHypothesis {
   double search_score = 0.0;
 };
 
+/// Whether two poses are of different places.
+[[nodiscard]] bool is_other_place(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b,
+                                  const LocalizationConfig& config);
+/// What evidence says of places apart from one another, the best first.
+[[nodiscard]] LocalizationStatus judge_places(std::span<const PlaceHypothesis> places,
+                                              const LocalizationConfig& config);
+/// Whether a pose can be believed by its evidence alone, whatever other places there are.
+[[nodiscard]] bool is_believed(const PoseEvidence& evidence, const LocalizationConfig& config);
+
 struct LocalizationResult {
   LocalizationStatus status = LocalizationStatus::no_evidence;
   /// The best first; places apart from one another.
@@ -67,12 +79,20 @@ class Localizer {
   /// tiles throw.
   [[nodiscard]] LocalizationResult localize(
       const Scan& scan, const PointLabels& labels,
-      const Eigen::Matrix3d& R_body_lidar = Eigen::Matrix3d::Identity()) const;
+      const Eigen::Matrix3d& R_body_lidar = Eigen::Matrix3d::Identity()) const {
+    return localize(LocalizationQuery(scan, labels, R_body_lidar));
+  }
+  /// The same, in a part of the map where one is given.
+  [[nodiscard]] LocalizationResult localize(
+      const LocalizationQuery& query,
+      const std::optional<SearchRegion>& region = std::nullopt) const;
+  /// Registers a scan at a pose within a metre of its own, and asks for evidence there.
+  [[nodiscard]] PlaceHypothesis align_at(const LocalizationQuery& query,
+                                         const Eigen::Isometry3d& T_map_lidar) const;
+
+  [[nodiscard]] const LocalizationConfig& config() const { return config_; }
 
  private:
-  [[nodiscard]] LocalizationStatus judge(const std::vector<PlaceHypothesis>& places) const;
-  [[nodiscard]] bool is_other_place(const PlaceHypothesis& a, const PlaceHypothesis& b) const;
-
   std::shared_ptr<const PlaceIndex> index_;
   LocalizationConfig config_;
 };

@@ -73,8 +73,8 @@ constexpr int parts_y = PlaceIndex::block_height / part_side;
 class CoarseSearch {
  public:
   CoarseSearch(const LocalizationQuery& query, const PlaceIndex& index,
-               const PlaceSearchConfig& config)
-      : query_(query), index_(index) {
+               const PlaceSearchConfig& config, const std::optional<SearchRegion>& region)
+      : query_(query), index_(index), region_(region), heading_step_rad_(config.heading_step_rad) {
     const auto landmarks = some_of(query.landmarks_foot, config.coarse_landmarks);
     count_ = landmarks.size();
     headings_ =
@@ -130,7 +130,19 @@ class CoarseSearch {
     return counts;
   }
 
+  /// Whether a place of the block may be in the region.
+  [[nodiscard]] bool is_in_region(const PlaceIndex::Block& block) const {
+    if (!region_) return true;
+    const double cell_m = index_.coarse().config().cell_m;
+    const Eigen::Vector2d low = cell_m * Eigen::Vector2d(block.first_x, block.first_y);
+    const Eigen::Vector2d high =
+        low + cell_m * Eigen::Vector2d(PlaceIndex::block_width, PlaceIndex::block_height);
+    const Eigen::Vector2d nearest = region_->centre_map.cwiseMax(low).cwiseMin(high);
+    return (nearest - region_->centre_map).norm() <= region_->radius_m + cell_m;
+  }
+
   [[nodiscard]] std::vector<PlaceCandidate> search(const PlaceIndex::Block& block) const {
+    if (!is_in_region(block)) return {};
     const LayeredCells::Window window = index_.coarse().window(
         block.first_x - max_reach, block.first_y - max_reach,
         PlaceIndex::block_width + 2 * max_reach, PlaceIndex::block_height + 2 * max_reach);
@@ -143,9 +155,10 @@ class CoarseSearch {
     const double cell_m = index_.coarse().config().cell_m;
     for (const Best& b : best) {
       if (b.hits == 0) continue;
-      found.push_back(
-          {cell_m * Eigen::Vector2d(block.first_x + b.x + 0.5, block.first_y + b.y + 0.5),
-           heading_rad(b.heading), block.node, static_cast<double>(b.hits) / count_as_double()});
+      const Eigen::Vector2d position_map =
+          cell_m * Eigen::Vector2d(block.first_x + b.x + 0.5, block.first_y + b.y + 0.5);
+      found.push_back({position_map, heading_rad(b.heading), block.node,
+                       static_cast<double>(b.hits) / count_as_double()});
     }
     return found;
   }
@@ -160,15 +173,25 @@ class CoarseSearch {
         if (counts.at(x, y) <= b.hits) continue;
         if (block.is_searched[static_cast<std::size_t>(y * PlaceIndex::block_width + x)] == 0)
           continue;
+        if (region_ && !is_in_region(block, x, y, heading)) continue;
         b = {counts.at(x, y), heading, x, y};
       }
     }
+  }
+
+  [[nodiscard]] bool is_in_region(const PlaceIndex::Block& block, int x, int y, int heading) const {
+    const double cell_m = index_.coarse().config().cell_m;
+    const Eigen::Vector2d position_map =
+        cell_m * Eigen::Vector2d(block.first_x + x + 0.5, block.first_y + y + 0.5);
+    return region_->contains(position_map, heading_rad(heading), cell_m, heading_step_rad_);
   }
 
   [[nodiscard]] double count_as_double() const { return static_cast<double>(count_); }
 
   const LocalizationQuery& query_;
   const PlaceIndex& index_;
+  const std::optional<SearchRegion>& region_;
+  double heading_step_rad_;
   std::size_t count_ = 0;
   int headings_ = 0;
   std::vector<TurnedLandmarks> turned_;
@@ -259,11 +282,19 @@ std::vector<PlaceCandidate> spread(std::vector<PlaceCandidate> all, std::size_t 
 
 }  // namespace
 
+bool SearchRegion::contains(const Eigen::Vector2d& position_map, double heading_map_rad,
+                            double margin_m, double margin_rad) const {
+  const double turn_rad = std::remainder(heading_map_rad - heading_rad, 2.0 * std::numbers::pi);
+  return (position_map - centre_map).norm() <= radius_m + margin_m &&
+         std::abs(turn_rad) <= max_turn_rad + margin_rad;
+}
+
 std::vector<PlaceCandidate> search_places(const LocalizationQuery& query, const PlaceIndex& index,
-                                          std::size_t count, const PlaceSearchConfig& config) {
+                                          std::size_t count, const PlaceSearchConfig& config,
+                                          const std::optional<SearchRegion>& region) {
   if (index.empty() || query.landmarks_foot.empty()) return {};
   std::vector<PlaceCandidate> places =
-      spread(CoarseSearch(query, index, config).run(), config.coarse_candidates, config);
+      spread(CoarseSearch(query, index, config, region).run(), config.coarse_candidates, config);
   const FineSearch fine(query, index, config);
   tbb::parallel_for(std::size_t{0}, places.size(),
                     [&](std::size_t k) { places[k] = fine.refine(places[k]); });

@@ -26,13 +26,10 @@ namespace {
 
 /// Time beyond which the last velocity is not extrapolated [s].
 constexpr double max_prediction_s = 1.0;
-/// The second scan that is lost, and one of so many after it, are looked for all round: up to this
-/// far away, and farther by what the lidar may have driven since [m].
-constexpr int relocalization_interval = 5;
+/// A lost scan is looked for up to so far away, and farther by what was driven since [m].
 constexpr double relocalization_reach_m = 24.0;
 constexpr double max_relocalization_reach_m = 60.0;
-/// What moves is classified again where the registered pose is farther than this from the predicted
-/// one [m, rad].
+/// Motion is classified again where the pose is farther than this from the predicted one [m, rad].
 constexpr double reclassify_distance_m = 0.2;
 constexpr double reclassify_angle_rad = 0.01;
 
@@ -43,6 +40,7 @@ struct Odometry::State {
       : config(odometry_config.with_method()),
         first_config(odometry_config.at_start()),
         sensor(sensor_model),
+        first_reach_m(odometry_config.first_reach_m),
         map(odometry_config.local_map),
         history(odometry_config.motion),
         intervals(sensor_model.period_s) {}
@@ -66,7 +64,7 @@ struct Odometry::State {
     return fits.are_known() ? config : first_config;
   }
   [[nodiscard]] bool is_searched_widely() const {
-    return lost_scans == 0 || lost_scans % relocalization_interval == 1;
+    return lost_scans == 0 || lost_scans % config.relocalization_interval == 1;
   }
   [[nodiscard]] Eigen::Isometry3d motion_during(double period_s) const;
   /// The IMU's rotation once the first scans have told the velocity; before that the first scan is
@@ -123,6 +121,7 @@ struct Odometry::State {
   /// Until enough scans are known to judge one by.
   OdometryConfig first_config;
   SensorModel sensor;
+  double first_reach_m;
   LocalMap map;
   std::optional<FirstScan> first_scan;
   /// Points of a prior map, until the first scan is registered against it.
@@ -184,7 +183,7 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
                                              : lost_at(prediction.T_map_lidar);
     }
     return relocalize(features, prior_map, map, prediction.T_map_lidar, method(),
-                      relocalization_reach_m);
+                      is_searched_widely() ? first_reach_m : 0.0);
   }
   // Until the place is known, few features tell it sooner.
   OdometryResult found = search_pose(lost_scans > 0 ? downsampled(features) : features, map, last,
@@ -476,9 +475,10 @@ void Odometry::add_prior_map(std::span<const LabelledPoint> points_map) {
 
 void Odometry::reset() { *state_ = State(state_->first_config, state_->sensor); }
 
-void Odometry::begin_map() {
+void Odometry::begin_map(const std::optional<double>& reach_m) {
   State& state = *state_;
   State next(state.first_config, state.sensor);
+  if (reach_m) next.first_reach_m = *reach_m;
   const bool has_velocity = state.last.interval_s > 0.0 && state.lost_scans == 0;
   if (has_velocity && !state.has_jumped && !state.stretch) {
     next.last.motion = state.last.motion;

@@ -68,8 +68,9 @@ class Odometry {
   void reset();
 
   /// The same for another map, but the lidar goes on as it moved: its velocity stays for a first
-  /// scan that follows at once.
-  void begin_map();
+  /// scan that follows at once. That one is looked for up to `reach_m` from its prior, where that
+  /// is given, instead of OdometryConfig::first_reach_m.
+  void begin_map(const std::optional<double>& reach_m = std::nullopt);
   /// Where the first scan of a map comes at this time: forgets a velocity of too long ago, or of
   /// another clock.
   void expect_first_scan(std::int64_t stamp_ns);

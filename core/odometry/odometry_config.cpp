@@ -93,6 +93,9 @@ void check(const MotionConfig& c, FaultList& faults) {
 std::string OdometryConfig::faults() const {
   FaultList faults;
   faults.require(alpha >= 0.0 && alpha <= 1.0, "alpha", alpha, "within 0..1");
+  faults.require(first_reach_m >= 0.0, "first_reach_m", first_reach_m, "0 or more");
+  faults.require(relocalization_interval >= 2, "relocalization_interval", relocalization_interval,
+                 "2 or more");
   check(features, faults);
   check(local_map, faults);
   check(registration, local_map, faults);

@@ -122,6 +122,12 @@ struct OdometryConfig {
   LocalMapConfig local_map;
   RegistrationConfig registration;
   MotionConfig motion;
+  /// The first scan in a prior map is looked for so far from its prior along x and y [m]; 0: within
+  /// some metres, where it must fit well.
+  double first_reach_m = 24.0;
+  /// Of scans in a row that are lost, the second and one of so many after it are looked for all
+  /// round, which takes seconds.
+  int relocalization_interval = 5;
 
   /// Every fault in words, one a line; empty when the configuration can be used.
   [[nodiscard]] std::string faults() const;

@@ -161,6 +161,11 @@ OdometryResult relocalize(const FeatureSets& features, std::span<const LabelledP
   };
   try_coarsely_from(features, T_map_lidar_guess, search);
   if (search.best().share >= sure_match_ratio) return search.best().result;
+  // Against an empty map the registration returns the guess as lost.
+  const auto lost = [&] {
+    return register_features(features, make_coarse_map(), T_map_lidar_guess, config);
+  };
+  if (reach_m <= 0.0) return lost();
   // Few features tell the place sooner.
   const FeatureSets few = downsampled(features);
   Search places(few, map, config);
@@ -175,8 +180,7 @@ OdometryResult relocalize(const FeatureSets& features, std::span<const LabelledP
   for (const Eigen::Vector3d& place : offsets_around(refinement_radius_m))
     search.try_from(Eigen::Translation3d(place) * T_map_lidar_best);
   if (search.best().share >= min_match_ratio && places.is_unique()) return search.best().result;
-  // Against an empty map the registration returns the guess as lost.
-  return register_features(features, make_coarse_map(), T_map_lidar_guess, config);
+  return lost();
 }
 
 }  // namespace stillmap
