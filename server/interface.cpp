@@ -57,6 +57,8 @@ ServiceContext Interface::service_context(const ServerConfig& config,
           [&mapping](RemovalReason reason, const Eigen::AlignedBox3d& box_map) {
             return mapping.restore_removed(reason, box_map);
           },
+      .localize =
+          [&mapping](const LocalizationQuestion& question) { return mapping.localize(question); },
       .query_occupancy = {},
       .encode_octomap = {},
       .traversability = context.traversability.views(),

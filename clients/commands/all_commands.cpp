@@ -85,6 +85,7 @@ void add_commands(CommandHandle program, Action& action) {
   add_save_command(program, action);
   add_load_command(program, action);
   add_reset_command(program, action);
+  add_locate_command(program, action);
   add_map_info_command(program, action);
   add_merge_command(program, action);
   add_sessions_command(program, action);

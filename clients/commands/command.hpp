@@ -57,6 +57,7 @@ void add_discovery_server_command(CommandHandle program, Action& action);
 void add_save_command(CommandHandle program, Action& action);
 void add_load_command(CommandHandle program, Action& action);
 void add_reset_command(CommandHandle program, Action& action);
+void add_locate_command(CommandHandle program, Action& action);
 void add_map_info_command(CommandHandle program, Action& action);
 void add_merge_command(CommandHandle program, Action& action);
 void add_sessions_command(CommandHandle program, Action& action);

@@ -240,6 +240,11 @@ std::uint64_t Client::restore_removed(RemovalReason reason, const BoxRegion& box
   return connection_->call_ok(services::restore_removed, std::move(request)).restored();
 }
 
+LocalizationAnswer Client::localize(const LocalizationQuestion& question) {
+  const auto reply = connection_->call_ok(services::localize, wire::to_request(question));
+  return connection_->require_readable(wire::from_response(reply), services::localize);
+}
+
 std::string Client::save_map(const std::string& file, bool overwrite) {
   SaveMap_Request request;
   request.file(file);

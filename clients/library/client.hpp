@@ -20,6 +20,7 @@
 #include "core/traversability/traversability_query.hpp"
 #include "core/traversability/traversability_view.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
+#include "idl/conversions/localization.hpp"
 #include "idl/dds/dds_options.hpp"
 #include "idl/interface/map_identity.hpp"
 #include "idl/interface/server_status.hpp"
@@ -190,6 +191,11 @@ class Client {
   [[nodiscard]] RemovedVoxels get_removed(const Region& region, std::uint32_t max_voxels = 300'000);
   /// Has the server show again what was removed for this reason in a box; returns how many voxels.
   std::uint64_t restore_removed(RemovalReason reason, const BoxRegion& box);
+
+  /// Where the server's last scan is in its map; a place that was not found is an answer, too. With
+  /// `apply` the server goes on there once the scans that follow confirm it; otherwise nothing
+  /// changes.
+  [[nodiscard]] LocalizationAnswer localize(const LocalizationQuestion& question = {});
 
   /// Has the server save its map; returns the file's name on the server's machine. An empty name
   /// means the file that it saves to anyhow. Another map of that name is refused, unless

@@ -171,6 +171,7 @@ void read_topics(YamlSection section, TopicsConfig& topics) {
   section.text("namespace", topics.name_space);
   section.text("odometry_prior", topics.odometry_prior);
   section.text("imu", topics.imu);
+  section.text("initial_pose", topics.initial_pose);
   if (!is_topic_name(topics.points))
     section.fault("points", "'" + topics.points + "'" + topic_rule);
   if (!is_topic_name(topics.name_space)) {
@@ -181,6 +182,9 @@ void read_topics(YamlSection section, TopicsConfig& topics) {
   }
   if (!topics.imu.empty() && !is_topic_name(topics.imu)) {
     section.fault("imu", "'" + topics.imu + "'" + topic_rule);
+  }
+  if (!topics.initial_pose.empty() && !is_topic_name(topics.initial_pose)) {
+    section.fault("initial_pose", "'" + topics.initial_pose + "'" + topic_rule);
   }
 }
 

@@ -108,6 +108,8 @@ struct TopicsConfig {
   std::string odometry_prior = "odom_prior";
   /// A sensor_msgs/Imu fixed to the lidar; empty: none.
   std::string imu = "imu/data";
+  /// A geometry_msgs/PoseWithCovarianceStamped that says where the robot is; empty: none.
+  std::string initial_pose = "initialpose";
 };
 
 /// What the numbers in a cloud's label field are.

@@ -26,6 +26,11 @@ Names inputs(const TopicNames& names) {
   return topics;
 }
 
+/// What an operator publishes, and the server reads.
+Names set_by_operators(const TopicNames& names) {
+  return names.initial_pose.empty() ? Names{} : Names{"rt/" + names.initial_pose};
+}
+
 void allow_calling(Access& access, const std::string& service) {
   access.publish.push_back(request_topic(service));
   access.subscribe.push_back(reply_topic(service));
@@ -85,6 +90,7 @@ Access access_of(Role role, const TopicNames& names) {
     case Role::server:
       append(access.publish, outputs);
       append(access.subscribe, inputs(names));
+      append(access.subscribe, set_by_operators(names));
       access.subscribe.push_back(tf_static);
       for_each_service([&](const auto& service) { allow_serving(access, service.in(name_space)); });
       break;
@@ -99,6 +105,8 @@ Access access_of(Role role, const TopicNames& names) {
     case Role::operator_of_server:
       append(access.subscribe, outputs);
       append(access.subscribe, inputs(names));
+      append(access.subscribe, set_by_operators(names));
+      if (role == Role::operator_of_server) append(access.publish, set_by_operators(names));
       for_each_service([&](const auto& service) {
         const bool may_call =
             role == Role::operator_of_server || service.effect == ServiceEffect::reads;

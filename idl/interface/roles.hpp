@@ -17,7 +17,7 @@ enum class Role {
   sensor,
   /// Reads every topic, and calls the services that change nothing.
   planner,
-  /// A planner that may also reset, save, load and restore.
+  /// A planner that may also reset, save, load and restore, and say where the robot is.
   operator_of_server,
 };
 
@@ -34,6 +34,8 @@ struct TopicNames {
   std::string odometry_prior = "odom_prior";
   /// Empty: none.
   std::string imu = "imu/data";
+  /// Empty: none.
+  std::string initial_pose = "initialpose";
   std::string name_space = "stillmap";
 };
 

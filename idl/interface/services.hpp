@@ -4,6 +4,7 @@
 #include <string_view>
 #include <tuple>
 
+#include "localize.h"
 #include "nav_msgs.h"
 #include "octomap_msgs.h"
 #include "removed_voxels.h"
@@ -81,6 +82,9 @@ inline constexpr ServiceSpec<srv::CheckPath_Request, srv::CheckPath_Response> ch
     "check_path", reads};
 inline constexpr ServiceSpec<srv::NearestTraversable_Request, srv::NearestTraversable_Response>
     nearest_traversable{"nearest_traversable", reads};
+/// It may set the robot somewhere else.
+inline constexpr ServiceSpec<srv::Localize_Request, srv::Localize_Response> localize{"localize",
+                                                                                     modifies};
 /// The traversability grid, as Nav2 asks for maps.
 inline constexpr ServiceSpec<GetMap_Request, GetMap_Response> get_map{"get_map", reads};
 
@@ -99,6 +103,7 @@ inline constexpr std::tuple all{get_static_map,
                                 get_traversable_area,
                                 check_path,
                                 nearest_traversable,
+                                localize,
                                 get_map};
 
 }  // namespace services

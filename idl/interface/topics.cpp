@@ -60,6 +60,11 @@ TopicSpec<nav_msgs::msg::Odometry> odometry_prior_topic(const std::string& ros_n
           .reader = {.accept_best_effort = true, .depth = depth}};
 }
 
+TopicSpec<geometry_msgs::msg::PoseWithCovarianceStamped> initial_pose_topic(
+    const std::string& ros_name) {
+  return symmetric<geometry_msgs::msg::PoseWithCovarianceStamped>("rt/" + ros_name, {.depth = 1});
+}
+
 TopicSpec<sensor_msgs::msg::Imu> imu_topic(const std::string& ros_name, DeliveryMode delivery) {
   const bool every = delivery == DeliveryMode::every;
   // A second and more at 400 Hz.

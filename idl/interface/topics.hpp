@@ -66,6 +66,11 @@ void for_each_topic(const Topics& topics, Visit&& visit) {
 /// The odometry prior (nav_msgs/Odometry) as the server reads it.
 [[nodiscard]] TopicSpec<nav_msgs::msg::Odometry> odometry_prior_topic(const std::string& ros_name);
 
+/// The pose that an operator sets (geometry_msgs/PoseWithCovarianceStamped), as RViz2 and Nav2
+/// write it and the server reads it.
+[[nodiscard]] TopicSpec<geometry_msgs::msg::PoseWithCovarianceStamped> initial_pose_topic(
+    const std::string& ros_name);
+
 /// Samples of the IMU (sensor_msgs/Imu) as the server reads them: a publisher that waits for the
 /// server's scans (`every`) is to wait for its samples, too.
 [[nodiscard]] TopicSpec<sensor_msgs::msg::Imu> imu_topic(const std::string& ros_name,

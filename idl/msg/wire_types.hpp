@@ -11,7 +11,8 @@ class Header;
 }
 namespace geometry_msgs::msg {
 class Pose;
-}
+class PoseWithCovarianceStamped;
+}  // namespace geometry_msgs::msg
 namespace nav_msgs::msg {
 class OccupancyGrid;
 class Odometry;

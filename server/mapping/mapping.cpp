@@ -9,7 +9,8 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
     : label_source_(segmenter->name()),
       storage_(context.storage),
       scans_(config.input.queue_length),
-      poses_(context.participant, context.topics, config.frames) {
+      poses_(context.participant, context.topics, config.frames),
+      place_finder_(config, storage_.latest_map(), storage_.tiles(), context.statistics) {
   if (config.publish.scan) labelled_scans_.emplace(context.participant, context.topics);
   if (!config.topics.odometry_prior.empty()) {
     prior_.emplace(context.participant, config.topics.odometry_prior, context.statistics);
@@ -19,6 +20,10 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
   }
   if (!config.topics.imu.empty())
     imu_.emplace(context.participant, config.topics.imu, config.input.delivery);
+  if (!config.topics.initial_pose.empty()) {
+    initial_pose_.emplace(context.participant, config.topics.initial_pose, config.frames.map,
+                          place_finder_, context.statistics);
+  }
   const MappingOutputs outputs{
       .poses = &poses_,
       .scans = labelled_scans_ ? &*labelled_scans_ : nullptr,
@@ -26,6 +31,7 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
       .static_transforms = static_transforms_ ? &*static_transforms_ : nullptr,
       .imu = imu_ ? &*imu_ : nullptr,
       .occupancy = context.occupancy,
+      .place_finder = &place_finder_,
       .throttle = &context.throttle};
   thread_.emplace(config, std::move(segmenter), storage_.take_loaded(),
                   storage_.saver().tile_store(), scans_, context.statistics, storage_.latest_map(),

@@ -9,6 +9,7 @@
 #include "config/loaders/server_config.hpp"
 #include "idl/dds/participant.hpp"
 #include "idl/interface/topics.hpp"
+#include "server/localization/initial_pose_receiver.hpp"
 #include "server/mapping/imu_receiver.hpp"
 #include "server/mapping/map_storage.hpp"
 #include "server/mapping/mapping_thread.hpp"
@@ -56,6 +57,11 @@ class Mapping {
     return thread_->restore_removed(reason, box_map, [this] { storage_.saver().make_room(); });
   }
 
+  /// As PlaceFinder.
+  [[nodiscard]] LocalizationAnswer localize(const LocalizationQuestion& question) {
+    return place_finder_.localize(question);
+  }
+
   /// As MappingThread::reset, for MapSaver::begin_anew.
   void reset(std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store);
   /// As MappingThread::prepare, for MapSaver::resume_from.
@@ -72,6 +78,8 @@ class Mapping {
   /// Only where the robot has a frame of its own.
   std::optional<StaticTransforms> static_transforms_;
   std::optional<ImuReceiver> imu_;
+  PlaceFinder place_finder_;
+  std::optional<InitialPoseReceiver> initial_pose_;
   // Each uses what stands above it, and stops before it.
   std::optional<MappingThread> thread_;
   std::optional<CheckpointWorker> checkpoints_;

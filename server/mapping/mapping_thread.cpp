@@ -81,14 +81,17 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
       statistics_(statistics),
       latest_map_(latest_map),
       outputs_(outputs),
-      mapper_(config.mapper,
-              std::make_unique<AsyncSegmenter>(std::move(segmenter), segmentation_budget(config),
-                                               queue, statistics),
-              {.stage_ended = [this](std::string_view stage) { stage_ended(stage); },
-               .pose_found =
-                   [this](std::int64_t stamp_ns, const OdometryResult& odometry) {
-                     pose_found(stamp_ns, odometry);
-                   }}),
+      mapper_(
+          outputs.place_finder != nullptr ? mapper_config_beside_finder(config) : config.mapper,
+          std::make_unique<AsyncSegmenter>(std::move(segmenter), segmentation_budget(config), queue,
+                                           statistics),
+          {.stage_ended = [this](std::string_view stage) { stage_ended(stage); },
+           .pose_found = [this](std::int64_t stamp_ns,
+                                const OdometryResult& odometry) { pose_found(stamp_ns, odometry); },
+           .scan_prepared =
+               [this](const Scan& scan, const PointLabels& labels) {
+                 outputs_.place_finder->add(scan, labels, frames_.T_base_lidar(), mapper_);
+               }}),
       imu_report_(statistics),
       frames_(config, outputs.static_transforms, statistics),
       odom_frame_(config.frames.odom) {
@@ -160,6 +163,7 @@ void MappingThread::begin_map(SharedTrajectory trajectory) {
   is_map_frozen_ = false;
   latest_map_.begin(mapper_.map_snapshot(), std::move(trajectory));
   if (odom_) odom_->begin_map();
+  if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
   if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
 }
 
@@ -213,9 +217,8 @@ void MappingThread::checkpoint_failed() {
     mapper_.static_map().set_frozen(true);
     is_map_frozen_ = true;
     spdlog::error(
-        "the map fills its memory and cannot be saved: scans give poses, but enter neither it nor "
-        "the "
-        "octree");
+        "the map fills its memory and cannot be saved: scans give poses, but enter neither it "
+        "nor the octree");
   });
 }
 
@@ -338,6 +341,8 @@ void MappingThread::map(QueuedScan queued) {
   const bool unlabelled = mapped->labelled.labels.empty();
   latest_map_.add_pose({stamp_ns, T_map_base(mapped->odometry)}, mapped->odometry.health,
                        unlabelled ? "none" : mapper_.label_source());
+  if (outputs_.place_finder != nullptr)
+    outputs_.place_finder->update(stamp_ns, mapped->odometry, mapper_);
   if (mapped->odometry.is_beyond_limits) statistics_.count("poses_beyond_motion_limits");
   statistics_.scan_mapped(mapped->label_provenance);
   if (is_map_frozen_) statistics_.count("scans_not_in_map");
@@ -376,15 +381,24 @@ void MappingThread::forward(MappedScan mapped) {
   if (outputs_.occupancy != nullptr && enters_map) {
     outputs_.occupancy->add({labelled, mapped.odometry.T_map_lidar, !mapped.unlabelled_may_move});
   }
+  if (outputs_.place_finder != nullptr) {
+    const bool has_own_labels = mapped.label_provenance == LabelProvenance::fresh;
+    outputs_.place_finder->keep_last(labelled, has_own_labels, frames_.T_base_lidar());
+  }
   if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frames_.lidar());
 }
 
 std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) {
   motion_prior_.reset();
+  if (outputs_.place_finder != nullptr) {
+    if (const auto T_map_lidar = outputs_.place_finder->relocate(mapper_, stamp_ns))
+      return T_map_lidar;
+  }
   if (!mapper_.trajectory().empty()) {
     motion_prior_ = motion_prior(stamp_ns);
-    if (!motion_prior_) return std::nullopt;
-    return mapper_.trajectory().back().T_map_lidar * *motion_prior_;
+    if (motion_prior_) return mapper_.trajectory().back().T_map_lidar * *motion_prior_;
+    if (!mapper_.is_placed()) return mapper_.trajectory().back().T_map_lidar;
+    return std::nullopt;
   }
   const auto T_map_base_stored = pose_in_saved_map(latest_map_.trajectory(), stamp_ns);
   if (T_map_base_stored) return *T_map_base_stored * frames_.T_base_lidar();

@@ -13,6 +13,7 @@
 #include "core/frames/odom_frame.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "core/mapper.hpp"
+#include "server/localization/place_finder.hpp"
 #include "server/mapping/imu_receiver.hpp"
 #include "server/mapping/imu_report.hpp"
 #include "server/mapping/map_saver.hpp"
@@ -37,6 +38,7 @@ struct MappingOutputs {
   const StaticTransforms* static_transforms = nullptr;
   ImuReceiver* imu = nullptr;
   OccupancyThread* occupancy = nullptr;
+  PlaceFinder* place_finder = nullptr;
   BackgroundThrottle* throttle = nullptr;
 };
 

@@ -119,6 +119,16 @@ void Statistics::map_save_failed(const std::string& why) {
   metrics_->checkpoints_failing.Increment();
 }
 
+void Statistics::set_place_search(const std::string& text) {
+  const std::scoped_lock lock(mutex_);
+  place_search_ = text;
+}
+
+std::string Statistics::place_search() const {
+  const std::scoped_lock lock(mutex_);
+  return place_search_;
+}
+
 void Statistics::set_map_memory(const MemoryUse& memory, std::size_t unreadable_tiles) {
   metrics_->map_memory_bytes.Set(static_cast<double>(memory.bytes));
   metrics_->map_tiles_evicted.Set(static_cast<double>(memory.non_resident_tiles));

@@ -56,6 +56,9 @@ class Statistics {
   /// `why` is told in the status until a save succeeds.
   void map_save_failed(const std::string& why);
 
+  /// How the search for a lidar that is lost goes, in words; empty: there is none.
+  void set_place_search(const std::string& text);
+
   /// What the static map takes now, and how many of its tiles cannot be read.
   void set_map_memory(const MemoryUse& memory, std::size_t unreadable_tiles);
 
@@ -73,6 +76,7 @@ class Statistics {
   [[nodiscard]] std::string last_drop() const;
   /// Why the last save of the map failed; empty once a later one succeeded.
   [[nodiscard]] std::string last_save_failure() const;
+  [[nodiscard]] std::string place_search() const;
   /// Why the last segmentation failed; empty once a later one worked.
   [[nodiscard]] std::string last_segmentation_failure() const;
 
@@ -106,6 +110,7 @@ class Statistics {
   dds::SegmentationStatus segmentation_;
   std::string last_segmentation_failure_;
   std::string last_save_failure_;
+  std::string place_search_;
 };
 
 }  // namespace stillmap::server

@@ -141,7 +141,9 @@ std::string ServerReport::reason(const dds::ServerStatus& status) const {
     return "the last scan was dropped: " + drop;
   }
   if (status.health == OdometryHealth::lost) {
-    return "the odometry is lost: the last scan does not fit the map";
+    const std::string search = statistics_.place_search();
+    return "the odometry is lost: the last scan does not fit the map" +
+           (search.empty() ? search : "; " + search);
   }
   if (const std::string failure = statistics_.last_segmentation_failure(); !failure.empty()) {
     return "the last scan could not be segmented: " + failure;

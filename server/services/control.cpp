@@ -1,3 +1,4 @@
+#include "idl/conversions/localization.hpp"
 #include "idl/conversions/status.hpp"
 #include "server/services/service_handlers.hpp"
 
@@ -30,6 +31,13 @@ LoadMap_Response load_map(const ServiceContext& context, const LoadMap_Request& 
     response.file(file.string());
     response.tile_count(view->tiles.size());
     response.pose_count(context.latest_map.trajectory().size());
+  });
+}
+
+Localize_Response localize(const ServiceContext& context, const Localize_Request& request) {
+  using Response = Localize_Response;
+  return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
+    wire::write_answer(context.localize(wire::from_request(request)), response);
   });
 }
 

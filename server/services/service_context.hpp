@@ -39,6 +39,8 @@ struct ServiceContext {
   /// Returns how many voxels are shown again.
   std::function<std::size_t(RemovalReason reason, const Eigen::AlignedBox3d& box_map)>
       restore_removed;
+  /// Where the last scan is in the map.
+  std::function<LocalizationAnswer(const LocalizationQuestion&)> localize;
   /// Both are empty when the server keeps no octree.
   std::function<OccupancyAnswers(const OccupancyQuery&)> query_occupancy;
   std::function<EncodedOctree(bool binary)> encode_octomap;

@@ -57,6 +57,9 @@ void drop_expired_pages(const ServiceContext& context);
 /// The free cell nearest to a position.
 [[nodiscard]] srv::NearestTraversable_Response nearest_traversable(
     const ServiceContext& context, const srv::NearestTraversable_Request& request);
+/// Where the server's last scan is in its map; can set the robot there.
+[[nodiscard]] srv::Localize_Response localize(const ServiceContext& context,
+                                              const srv::Localize_Request& request);
 /// The traversability grid as Nav2 asks for maps; of no size when there is none.
 [[nodiscard]] nav_msgs::srv::GetMap_Response get_map(const ServiceContext& context,
                                                      const nav_msgs::srv::GetMap_Request& request);
@@ -89,6 +92,7 @@ inline constexpr std::tuple service_handlers{
     ServiceHandler{dds::services::get_traversable_area, get_traversable_area},
     ServiceHandler{dds::services::check_path, check_path},
     ServiceHandler{dds::services::nearest_traversable, nearest_traversable},
+    ServiceHandler{dds::services::localize, localize},
     ServiceHandler{dds::services::get_map, get_map}};
 static_assert(std::tuple_size_v<decltype(service_handlers)> ==
                   std::tuple_size_v<decltype(dds::services::all)>,

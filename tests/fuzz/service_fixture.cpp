@@ -52,11 +52,17 @@ ServiceFixture::ServiceFixture()
           .publish_now = [this] { latest_map_.publish(map_.view()); },
           .removed =
               [this](const auto& box_map) {
-                return server::RemovedInBox{map_.removed(box_map, map_.tiles_in(box_map)).voxels, {}, nullptr};
+                return server::RemovedInBox{
+                    map_.removed(box_map, map_.tiles_in(box_map)).voxels, {}, nullptr};
               },
           .restore_removed =
               [this](RemovalReason reason, const auto& box_map) {
                 return map_.restore_removed(reason, box_map, map_.tiles_in(box_map)).count;
+              },
+          .localize =
+              [](const LocalizationQuestion& question) {
+                return LocalizationAnswer{.outcome = LocalizationStatus::found,
+                                          .applied = question.apply};
               },
           .query_occupancy = [this](const OccupancyQuery& query) { return octree_.answer(query); },
           .encode_octomap =

@@ -9,8 +9,11 @@
 namespace stillmap::dds {
 namespace {
 
-const TopicNames names{
-    .points = "lidar/points", .odometry_prior = "odom", .imu = "imu", .name_space = "car_7"};
+const TopicNames names{.points = "lidar/points",
+                       .odometry_prior = "odom",
+                       .imu = "imu",
+                       .initial_pose = "set_pose",
+                       .name_space = "car_7"};
 
 // Another reading of the list: a size that comes from the struct itself.
 constexpr std::size_t topic_count = sizeof(Topics) / sizeof(TopicSpec<stillmap_msgs::msg::Status>);
@@ -31,6 +34,8 @@ TEST(RolesTest, LetTheServerDoAllThatItDoes) {
   EXPECT_TRUE(server.may_subscribe("rt/odom"));
   EXPECT_TRUE(server.may_subscribe("rt/tf_static"));
   EXPECT_TRUE(server.may_subscribe("rt/imu"));
+  EXPECT_TRUE(server.may_subscribe("rt/set_pose"));
+  EXPECT_FALSE(server.may_publish("rt/set_pose"));
 }
 
 TEST(RolesTest, LetAPlannerReadEverythingAndChangeNothing) {
@@ -47,11 +52,14 @@ TEST(RolesTest, LetAPlannerReadEverythingAndChangeNothing) {
     EXPECT_EQ(planner.may_subscribe(reply_topic(service)), reads) << service;
     EXPECT_TRUE(boss.may_publish(request_topic(service))) << service;
   });
-  for (const char* service : {"save_map", "load_map", "reset", "restore_removed"}) {
+  for (const char* service : {"save_map", "load_map", "reset", "restore_removed", "localize"}) {
     EXPECT_FALSE(planner.may_publish(request_topic(std::string("car_7/") + service))) << service;
   }
   EXPECT_FALSE(planner.may_publish("rt/lidar/points"));
   EXPECT_FALSE(boss.may_publish("rt/lidar/points"));
+  EXPECT_FALSE(planner.may_publish("rt/set_pose"));
+  EXPECT_TRUE(planner.may_subscribe("rt/set_pose"));
+  EXPECT_TRUE(boss.may_publish("rt/set_pose"));
 }
 
 TEST(RolesTest, LetASensorSendAndSeeHowItIsTaken) {
@@ -64,6 +72,7 @@ TEST(RolesTest, LetASensorSendAndSeeHowItIsTaken) {
   EXPECT_TRUE(sensor.may_publish(request_topic("car_7/get_status")));
   EXPECT_FALSE(sensor.may_publish(request_topic("car_7/reset")));
   EXPECT_FALSE(sensor.may_publish("rt/points"));
+  EXPECT_FALSE(sensor.may_publish("rt/set_pose"));
 }
 
 TEST(RolesTest, HaveNames) {

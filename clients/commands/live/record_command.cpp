@@ -22,6 +22,7 @@
 #include "idl/dds/sample_losses.hpp"
 #include "idl/dds/serialized_sample.hpp"
 #include "idl/interface/topics.hpp"
+#include "initial_pose.h"
 #include "nav_msgs.h"
 #include "octomap_msgs.h"
 #include "sensor_msgs.h"
@@ -39,6 +40,7 @@ struct RecorderOptions {
   std::string points_topic = "points";
   std::string odometry_topic = "odom_prior";
   std::string imu_topic = "imu/data";
+  std::string initial_pose_topic = "initialpose";
   /// ROS 2 names to record; empty: all topics of the sensor and the server.
   std::vector<std::string> topics;
   /// New folder of the bag.
@@ -82,7 +84,8 @@ std::vector<RecordableTopic> recordable_topics(const RecorderOptions& options) {
   std::vector<RecordableTopic> topics{
       recordable(dds::points_topic(options.points_topic, DeliveryMode::latest, max_waiting)),
       recordable(dds::odometry_prior_topic(options.odometry_topic)),
-      recordable(dds::imu_topic(options.imu_topic, DeliveryMode::latest))};
+      recordable(dds::imu_topic(options.imu_topic, DeliveryMode::latest)),
+      recordable(dds::initial_pose_topic(options.initial_pose_topic))};
   dds::for_each_topic(dds::Topics::in(options.server_name),
                       [&](const auto& topic) { topics.push_back(recordable(topic)); });
   return topics;
@@ -361,6 +364,10 @@ void add_record_command(CommandHandle program, Action& action) {
   command.option("--odometry", arguments->recorder.odometry_topic, "The odometry prior's topic")
       .with_default();
   command.option("--imu", arguments->recorder.imu_topic, "The IMU's topic").with_default();
+  command
+      .option("--initial-pose", arguments->recorder.initial_pose_topic,
+              "The topic on which operators say where the robot is")
+      .with_default();
   add_client_options(command, arguments->client);
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(

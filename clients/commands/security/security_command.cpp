@@ -29,6 +29,7 @@ void save_topic_names(const dds::TopicNames& names, const std::filesystem::path&
   out << Json{{"points", names.points},
               {"odometry_prior", names.odometry_prior},
               {"imu", names.imu},
+              {"initial_pose", names.initial_pose},
               {"namespace", names.name_space}}
              .dump(2)
       << "\n";
@@ -45,6 +46,7 @@ dds::TopicNames load_topic_names(const std::filesystem::path& authority_folder) 
     return {.points = json.at("points"),
             .odometry_prior = json.at("odometry_prior"),
             .imu = json.value("imu", std::string()),
+            .initial_pose = json.value("initial_pose", std::string()),
             .name_space = json.at("namespace")};
   } catch (const nlohmann::json::exception& error) {
     throw dds::SecurityError(file.string() + " does not name the topics (" + error.what() +
@@ -184,6 +186,10 @@ void add_security_init_command(CommandHandle security, Action& action) {
               "Topic of the odometry prior; empty: none")
       .with_default();
   command.option("--imu", arguments->names.imu, "Topic of the IMU; empty: none").with_default();
+  command
+      .option("--initial-pose", arguments->names.initial_pose,
+              "Topic on which operators say where the robot is; empty: none")
+      .with_default();
   command.option("--server", arguments->names.name_space, "First part of the server's topic names")
       .with_default();
   command.option("--days", arguments->days, "How long the identities are valid")

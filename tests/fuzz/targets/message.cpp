@@ -6,6 +6,7 @@
 #include <variant>
 
 #include "idl/conversions/imu.hpp"
+#include "idl/conversions/localization.hpp"
 #include "idl/conversions/map_query.hpp"
 #include "idl/conversions/occupancy.hpp"
 #include "idl/conversions/path_query.hpp"
@@ -17,6 +18,7 @@
 #include "idl/dds/ros_nodes.hpp"
 #include "idl/interface/services.hpp"
 #include "idl/interface/topics.hpp"
+#include "initial_pose.h"
 #include "rmw_dds_common.h"
 #include "rmw_dds_common_iron.h"
 #include "tests/fuzz/byte_source.hpp"
@@ -100,6 +102,18 @@ void read_imu(Bytes bytes) {
   });
 }
 
+/// What anybody with RViz2 may say.
+void read_initial_pose(Bytes bytes) {
+  read_as<geometry_msgs::msg::PoseWithCovarianceStamped>(bytes, [](const auto& message) {
+    const wire::InitialPose initial = wire::from_message(message);
+    require(initial.guess.has_value() == initial.fault.empty(), "a pose, or what is wrong with it");
+    if (!initial.guess) return;
+    require(initial.guess->T_map_base.matrix().allFinite(), "a pose is finite");
+    require(initial.guess->radius_m > 0.0 && initial.guess->radius_m <= 50.0,
+            "a pose is looked for near it");
+  });
+}
+
 /// What any ROS 2 process of the domain announces.
 void read_ros_nodes(Bytes bytes) {
   for (const std::string& name : dds::ros_node_names(bytes_of(bytes))) {
@@ -107,7 +121,7 @@ void read_ros_nodes(Bytes bytes) {
   }
 }
 
-constexpr std::array<void (*)(Bytes), 15> readers = {
+constexpr std::array<void (*)(Bytes), 17> readers = {
     read_odometry,
     read_path,
     read_tile,
@@ -123,6 +137,8 @@ constexpr std::array<void (*)(Bytes), 15> readers = {
     read_reply,
     read_imu,
     read_ros_nodes,
+    read_response<Localize_Response>,
+    read_initial_pose,
 };
 
 void run(Bytes bytes) {
@@ -156,6 +172,11 @@ std::vector<Seed> seeds() {
   wire::write_removed({removed_voxel()}, removed);
   QueryOccupancy_Response occupancy;
   wire::write_answers({0.2, {PointOccupancy{}}, {BoxOccupancy{}}, {RayOccupancy{}}}, occupancy);
+  Localize_Response localized;
+  wire::write_answer({}, localized);
+  geometry_msgs::msg::PoseWithCovarianceStamped initial_pose;
+  initial_pose.header().frame_id("map");
+  initial_pose.pose().pose().orientation().w(1.0);
   Tile tile = *view.tiles.front();
   tile.voxels = tile.voxels.first(4);
   dds::ServerStatus status;
@@ -176,6 +197,8 @@ std::vector<Seed> seeds() {
       {"occupancy", with_choice(9, to_cdr(occupancy))},
       {"removed", with_choice(10, to_cdr(removed))},
       {"imu", with_choice(13, to_cdr(wire::to_imu({.stamp_ns = 7}, "imu")))},
+      {"localize", with_choice(15, to_cdr(localized))},
+      {"initial_pose", with_choice(16, to_cdr(initial_pose))},
       {"ros_nodes",
        with_choice(14, announcement_of_a_node<rmw_dds_common::msg::ParticipantEntitiesInfo>())},
       {"ros_nodes_iron",

@@ -5,6 +5,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "idl/conversions/localization.hpp"
 #include "idl/conversions/map_query.hpp"
 #include "idl/conversions/occupancy.hpp"
 #include "idl/conversions/path_query.hpp"
@@ -169,6 +170,9 @@ std::vector<Seed> seeds() {
   all.push_back(seed("status", dds::services::get_status, versioned<GetStatus_Request>()));
   all.push_back(seed("octomap", dds::services::octomap_binary, {}));
   all.push_back(seed("map", dds::services::get_map, {}));
+  const LocalizationQuestion question{
+      .guess = PlaceGuess{.T_map_base = Eigen::Isometry3d::Identity(), .radius_m = 20.0}};
+  all.push_back(seed("localize", dds::services::localize, wire::to_request(question)));
   all.push_back(seed("reset", dds::services::reset, versioned<Reset_Request>()));
   return all;
 }
