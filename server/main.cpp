@@ -50,6 +50,8 @@ int serve(const stillmap::ServerConfig& config) {
   if (const std::string details = labels->details(); !details.empty()) {
     spdlog::info("labels by {}: {}", labels->name(), details);
   }
+  if (const auto hint = stillmap::better_model(config.labels, config.mapper.sensor); !hint.empty())
+    spdlog::info("{}; labels.model chooses", hint);
   stillmap::server::Server server(config, std::move(labels));
   spdlog::info("ready: scans from rt/{}, domain {}", config.topics.points, config.dds.domain_id);
   notify_systemd("READY=1");

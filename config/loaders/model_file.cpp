@@ -84,6 +84,17 @@ void read_knn(YamlSection section, std::optional<KnnConfig>& knn) {
   if (use) knn = read;
 }
 
+std::optional<TrainedSensors> read_trained_for(YamlSection section) {
+  TrainedSensors seen;
+  section.require({"min_beams", "max_beams", "fov_up_deg", "fov_down_deg"});
+  section.integer("min_beams", seen.min_rings, {1, 512});
+  section.integer("max_beams", seen.max_rings, {static_cast<double>(seen.min_rings), 512});
+  section.degrees("fov_up_deg", seen.fov_up, {-90, 90});
+  section.degrees("fov_down_deg", seen.fov_down, {-90, 90});
+  if (seen.fov_up <= seen.fov_down) section.fault("fov_down_deg", "must be below fov_up_deg");
+  return seen;
+}
+
 void read_model(YamlSection file, ModelDescription& model) {
   file.require({"name", "licence", "image", "statistics", "classes"});
   file.text("name", model.name);
@@ -91,6 +102,7 @@ void read_model(YamlSection file, ModelDescription& model) {
   file.text("sensor", model.sensor);
   file.text("training", model.training);
   file.text("accuracy", model.accuracy);
+  if (file.has("trained_for")) model.trained_for = read_trained_for(file.section("trained_for"));
   read_image(file.section("image"), model);
   read_statistics(file.section("statistics"), model.statistics);
   read_classes(file.section("classes"), model.classes);
@@ -115,6 +127,24 @@ std::unique_ptr<Segmenter> open_network_labels(const LabelsConfig& labels,
 }
 
 }  // namespace
+
+std::string better_model(const LabelsConfig& labels, const SensorModel& sensor) {
+  if (labels.source == LabelProvider::stream || labels.source == LabelProvider::none) return {};
+  const ModelDescription used = load_uncalibrated_model(find_model(labels.model));
+  ModelDescription best = used;
+  for (const fs::path& folder : known_models()) {
+    try {
+      const ModelDescription other = load_uncalibrated_model(folder);
+      if (fits_better(other, best, sensor)) best = other;
+    } catch (const ConfigError&) {
+      // Whoever names it is told what is wrong with it.
+    }
+  }
+  if (best.name == used.name) return {};
+  return "the model '" + best.name + "' (" + best.licence +
+         ") was trained for lidars more like this one: " + in_words(*best.trained_for) + ", '" +
+         used.name + "' for " + in_words(*used.trained_for);
+}
 
 ModelDescription load_uncalibrated_model(const fs::path& folder) {
   if (!fs::is_directory(folder)) {

@@ -2,6 +2,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <string>
 
 #include "config/loaders/config_error.hpp"
 #include "config/loaders/server_config.hpp"
@@ -22,5 +23,11 @@ namespace stillmap {
 [[nodiscard]] std::unique_ptr<Segmenter> open_segmenter(const LabelsConfig& labels,
                                                         const SensorModel& sensor,
                                                         bool adaptive_width = false);
+
+/// What to tell, once, where the network of another model that known_models() lists was trained for
+/// lidars more like this one than the configured one: its name, both models' lidars and its
+/// licence. Empty where there is none, or no network is asked for. Throws ConfigError for the
+/// configured model.
+[[nodiscard]] std::string better_model(const LabelsConfig& labels, const SensorModel& sensor);
 
 }  // namespace stillmap

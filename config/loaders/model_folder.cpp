@@ -1,6 +1,7 @@
 #include "config/loaders/model_folder.hpp"
 
 #include <cstdlib>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,20 @@ fs::path find_model(const fs::path& model) {
                      "' is not known; give a model's folder, or set STILLMAP_MODELS to the folder "
                      "that holds it. Looked in:" +
                      tried});
+}
+
+std::vector<fs::path> known_models() {
+  std::map<std::string, fs::path> folder_of_name;
+  for (const fs::path& place : model_search_paths()) {
+    std::error_code none;
+    for (const auto& entry : fs::directory_iterator(place, none)) {
+      if (fs::exists(entry.path() / "model.yaml", none))
+        folder_of_name.try_emplace(entry.path().filename().string(), entry.path());
+    }
+  }
+  std::vector<fs::path> folders;
+  for (const auto& [name, folder] : folder_of_name) folders.push_back(folder);
+  return folders;
 }
 
 }  // namespace stillmap

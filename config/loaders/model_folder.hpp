@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 namespace stillmap {
 
@@ -9,5 +10,8 @@ namespace stillmap {
 /// program's bin, and in config/models of the sources that it was built from. Throws ConfigError
 /// that lists these places.
 [[nodiscard]] std::filesystem::path find_model(const std::filesystem::path& model);
+
+/// The folders of all models that can be named so, by their names.
+[[nodiscard]] std::vector<std::filesystem::path> known_models();
 
 }  // namespace stillmap

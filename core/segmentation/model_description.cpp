@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <sstream>
 #include <string_view>
 
 #include "core/segmentation/model_error.hpp"
@@ -35,6 +36,25 @@ std::string statistics_faults(const InputStatistics& statistics) {
   return faults;
 }
 
+/// How far the sensor lies outside of what the model has seen: factors of 2 in beams and in
+/// columns, and the share of its field of view.
+double misfit(const ModelDescription& model, const SensorModel& sensor) {
+  const TrainedSensors& seen = *model.trained_for;
+  const int nearest_rings = std::clamp(sensor.rings, seen.min_rings, seen.max_rings);
+  const double beams = std::abs(std::log2(static_cast<double>(sensor.rings) / nearest_rings));
+  const double beyond =
+      std::max(0.0, sensor.fov_up - seen.fov_up) + std::max(0.0, seen.fov_down - sensor.fov_down);
+  const double columns = std::log2(static_cast<double>(sensor.columns) / model.columns);
+  return beams + beyond / (sensor.fov_up - sensor.fov_down) + std::max(0.0, columns);
+}
+
+/// Angle for people.
+std::string degrees(double radians) {
+  std::ostringstream text;
+  text << std::showpos << std::round(10.0 * radians * 180.0 / std::numbers::pi) / 10.0;
+  return text.str();
+}
+
 std::string between(const char* field, int value, int max) {
   if (value >= 1 && value <= max) return {};
   return std::string(field) + " is " + std::to_string(value) + ", but must be 1.." +
@@ -51,6 +71,11 @@ std::string ModelDescription::faults() const {
     faults += "fov_down must be below fov_up, both within -90..90 degrees\n";
   }
   faults += statistics_faults(statistics);
+  if (trained_for &&
+      !(trained_for->min_rings >= 1 && trained_for->min_rings <= trained_for->max_rings &&
+        trained_for->fov_down < trained_for->fov_up)) {
+    faults += "trained_for must have min_beams up to max_beams, and fov_down below fov_up\n";
+  }
   if (classes.empty() || classes.size() > PixelOutputs::max_outputs) {
     faults += "classes has " + std::to_string(classes.size()) + " entries, but must have 1.." +
               std::to_string(PixelOutputs::max_outputs) + "\n";
@@ -63,6 +88,26 @@ void require_valid(const ModelDescription& model) {
   if (const std::string faults = model.faults(); !faults.empty()) {
     throw ModelError(model.network_file, "has a description that cannot be used:\n" + faults);
   }
+}
+
+std::string in_words(const TrainedSensors& seen) {
+  return (seen.min_rings < seen.max_rings ? std::to_string(seen.min_rings) + " to " : "") +
+         std::to_string(seen.max_rings) + " beams from " + degrees(seen.fov_up) + " to " +
+         degrees(seen.fov_down) + " degrees";
+}
+
+bool fits_better(const ModelDescription& model, const ModelDescription& other,
+                 const SensorModel& sensor) {
+  if (!model.trained_for || !other.trained_for || sensor.pattern == ScanPattern::irregular)
+    return false;
+  // Less than what sensors of one type differ by.
+  constexpr double as_good = 0.1;
+  const double difference = misfit(other, sensor) - misfit(model, sensor);
+  if (std::abs(difference) > as_good) return difference > 0.0;
+  const auto variety = [](const TrainedSensors& seen) {
+    return static_cast<double>(seen.max_rings) / seen.min_rings;
+  };
+  return variety(*model.trained_for) < variety(*other.trained_for);
 }
 
 ModelDescription for_sensor(ModelDescription model, const SensorModel& sensor) {

@@ -28,6 +28,14 @@ struct InputStatistics {
   std::array<float, input_channels> deviation{};
 };
 
+/// Lidars whose scans a model has seen, or ones between them. Angles in radians.
+struct TrainedSensors {
+  int min_rings = 1;
+  int max_rings = 1;
+  double fov_up = 0.0;
+  double fov_down = 0.0;
+};
+
 /// A network's input, output and post-processing; model.yaml in a model folder.
 struct ModelDescription {
   std::string name;
@@ -36,6 +44,8 @@ struct ModelDescription {
   std::string sensor;
   std::string training;
   std::string accuracy;
+  /// Nothing where that is not known.
+  std::optional<TrainedSensors> trained_for;
   /// The weights, an ONNX file.
   std::filesystem::path network_file;
 
@@ -71,6 +81,16 @@ struct ModelDescription {
 
 /// Throws ModelError when the description has faults.
 void require_valid(const ModelDescription& model);
+
+/// "16 to 64 beams from +15 to -31.4 degrees".
+[[nodiscard]] std::string in_words(const TrainedSensors& seen);
+
+/// Whether `model` is made for this sensor more than `other`: its scans are less beyond what the
+/// model has seen (a factor of 2 in beams or in columns counts as much as the whole field of view);
+/// of two that have seen such scans, the one that has seen fewer other sensors. False where one of
+/// them does not say what it was trained for, and for irregular patterns.
+[[nodiscard]] bool fits_better(const ModelDescription& model, const ModelDescription& other,
+                               const SensorModel& sensor);
 
 /// The model with the image for this sensor. With follow_sensor: the sensor's rings as rows over
 /// its field of view, and for sensors of few rings a limit on the columns. Else unchanged.

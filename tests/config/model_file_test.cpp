@@ -71,6 +71,34 @@ TEST(ModelFile, ReadsItsCalibrationAndWhetherItFollowsTheSensor) {
   EXPECT_EQ(model.int8->range_of_channels.at("a"), (std::vector{2.0F, 3.0F}));
 }
 
+TEST(ModelFile, ReadsWhatItWasTrainedFor) {
+  EXPECT_FALSE(load_model(sound).trained_for.has_value());
+  const std::string field =
+      "trained_for: {min_beams: 16, max_beams: 64, fov_up_deg: 15, fov_down_deg: -31.4}\n";
+  const ModelDescription model = load_model(sound + field);
+  ASSERT_TRUE(model.trained_for.has_value());
+  EXPECT_EQ(in_words(*model.trained_for), "16 to 64 beams from +15 to -31.4 degrees");
+  EXPECT_THAT(refusal_of(sound + field, "max_beams: 64", "max_beams: 8"),
+              HasSubstr("trained_for.max_beams"));
+  EXPECT_THAT(refusal_of(sound + field, "fov_up_deg: 15", "fov_up_deg: -40"),
+              HasSubstr("trained_for.fov_down_deg"));
+}
+
+TEST(BetterModel, IsTheOneThatWasTrainedForSuchLidarsMostOfAll) {
+  const auto better = [](const char* used, const SensorModel& sensor) {
+    return better_model({.source = LabelProvider::model, .model = used}, sensor);
+  };
+  EXPECT_THAT(better("street", hdl_64e()),
+              AllOf(HasSubstr("'kitti'"), HasSubstr("not for commercial use")));
+  EXPECT_EQ(better("street", vlp_16()), "");
+  EXPECT_THAT(better("kitti", vlp_16()), HasSubstr("'street'"));
+  EXPECT_EQ(better("kitti", hdl_64e()), "");
+  EXPECT_EQ(better_model({.source = LabelProvider::stream, .model = "street"}, hdl_64e()), "");
+  SensorModel irregular = vlp_16();
+  irregular.pattern = ScanPattern::irregular;
+  EXPECT_EQ(better("kitti", irregular), "");
+}
+
 TEST(ModelFile, CanSwitchTheVotesOff) {
   std::string yaml = sound;
   yaml.replace(yaml.find("{neighbours: 7}"), 15, "{use: false}");

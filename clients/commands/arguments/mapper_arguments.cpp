@@ -18,7 +18,9 @@ void add_engine_options(CommandHandle command, EngineArguments& arguments) {
       .option("--precision", arguments.precision,
               "Numbers of the network: auto (int8 where the model is calibrated), fp32, int8")
       .one_of({"auto", "fp32", "int8"});
-  command.option("--threads", arguments.threads, "Threads of oneDNN for one scan; default: all")
+  command
+      .option("--threads", arguments.threads,
+              "Threads of oneDNN for one scan, one scan at a time; default: all cores, as is best")
       .between(0, 1024);
 }
 
@@ -92,8 +94,9 @@ MapperConfig mapper_config(const MapperArguments& arguments, const SensorModel& 
   return config;
 }
 
-std::unique_ptr<Segmenter> make_segmenter(const MapperArguments& arguments,
-                                          const ScanDataset& dataset) {
+namespace {
+
+LabelsConfig labels_config(const MapperArguments& arguments, const ScanDataset& dataset) {
   LabelsConfig labels;
   if (!arguments.config_file.empty()) labels = load_server_config(arguments.config_file).labels;
   if (arguments.labels == "none") {
@@ -114,7 +117,26 @@ std::unique_ptr<Segmenter> make_segmenter(const MapperArguments& arguments,
   }
   if (arguments.columns > 0) labels.image_columns = static_cast<int>(arguments.columns);
   set_engine(arguments.engine, labels.engine);
-  return open_segmenter(labels, mapper_config(arguments, dataset.suggested_sensor()).sensor);
+  return labels;
+}
+
+}  // namespace
+
+std::unique_ptr<Segmenter> make_segmenter(const MapperArguments& arguments,
+                                          const ScanDataset& dataset) {
+  return open_segmenter(labels_config(arguments, dataset),
+                        mapper_config(arguments, dataset.suggested_sensor()).sensor);
+}
+
+std::string describe_model(const MapperArguments& arguments, const ScanDataset& dataset,
+                           const Segmenter& segmenter) {
+  if (segmenter.details().empty()) return {};
+  std::string text = "stillmap: labels by " + segmenter.name() + ": " + segmenter.details() + "\n";
+  const std::string better =
+      better_model(labels_config(arguments, dataset),
+                   mapper_config(arguments, dataset.suggested_sensor()).sensor);
+  if (!better.empty()) text += "stillmap: " + better + "; --labels chooses\n";
+  return text;
 }
 
 }  // namespace stillmap::cli

@@ -55,5 +55,9 @@ void add_mapper_options(CommandHandle command, MapperArguments& arguments);
 /// Throws ConfigError, ModelError or std::invalid_argument.
 [[nodiscard]] std::unique_ptr<Segmenter> make_segmenter(const MapperArguments& arguments,
                                                         const ScanDataset& dataset);
+/// Lines that tell which model labels the scans, and whether another one was trained for lidars
+/// more like theirs; empty without a network.
+[[nodiscard]] std::string describe_model(const MapperArguments& arguments,
+                                         const ScanDataset& dataset, const Segmenter& segmenter);
 
 }  // namespace stillmap::cli

@@ -64,6 +64,7 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   auto labels = make_segmenter(arguments.mapper, dataset);
+  std::cerr << describe_model(arguments.mapper, dataset, *labels);
   prepare_sequence_folder(arguments.out, arguments.force);
   Progress progress("export", "scans", total);
   return export_sequence(

@@ -289,6 +289,7 @@ ExitCode run(const MapArguments& arguments) {
   static_cast<void>(arguments.range.end(dataset));
   auto labels = make_segmenter(arguments.mapper, dataset);
   const std::unique_ptr<const EarlierMap> earlier = earlier_map(arguments, config);
+  std::cerr << describe_model(arguments.mapper, dataset, *labels);
   // Nothing above touched the folder.
   MapOutputFolder out(arguments.out, arguments.policy);
   const MappingResult result =

@@ -24,6 +24,7 @@ void print_description(const ModelDescription& model) {
   line("name      ", model.name);
   line("licence   ", model.licence);
   line("sensor    ", model.sensor);
+  if (model.trained_for) line("trained   ", "for " + in_words(*model.trained_for));
   line("training  ", model.training);
   line("accuracy  ", model.accuracy);
   const std::string least = std::to_string(model.min_columns);
