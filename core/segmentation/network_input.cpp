@@ -8,6 +8,35 @@
 #include "core/segmentation/model_error.hpp"
 
 namespace stillmap {
+namespace {
+
+/// The factor that brings a scan's intensity to the scale of the training set: 1 where its bright
+/// points are about as bright. 0 where all points are alike, as where a driver fills the field with
+/// zeros: it tells nothing.
+float remission_factor(std::span<const float> intensity, const InputStatistics& statistics) {
+  constexpr std::size_t samples = 4096, min_points = 1000;
+  constexpr float usual_factor = 3.0F;
+  if (intensity.size() < min_points) return 1.0F;
+  std::vector<float> sample;
+  const std::size_t step = intensity.size() / samples + 1;
+  for (std::size_t i = 0; i < intensity.size(); i += step)
+    if (std::isfinite(intensity[i])) sample.push_back(intensity[i]);
+  if (sample.empty()) return 0.0F;
+  const auto at_share = [&sample](std::size_t percent) {
+    const auto place =
+        sample.begin() + static_cast<std::ptrdiff_t>((sample.size() - 1) * percent / 100);
+    std::ranges::nth_element(sample, place);
+    return *place;
+  };
+  const float dark = at_share(10), bright = at_share(90);
+  if (bright <= dark || bright <= 0.0F) return 0.0F;
+  // The same share of a normal distribution.
+  const float usual = statistics.mean.back() + 1.28F * statistics.deviation.back();
+  const bool is_usual = bright < usual * usual_factor && bright > usual / usual_factor;
+  return is_usual || usual <= 0.0F ? 1.0F : usual / bright;
+}
+
+}  // namespace
 
 std::vector<float> make_network_input(const Scan& scan, const RangeImage& image,
                                       const ModelDescription& model) {
@@ -15,13 +44,15 @@ std::vector<float> make_network_input(const Scan& scan, const RangeImage& image,
   assert(scan.intensity.empty() || scan.intensity.size() == scan.size());
   const std::size_t pixels = image.pixel_count();
   const InputStatistics& statistics = model.statistics;
+  const float factor = remission_factor(scan.intensity, statistics);
+  const bool has_remission = !scan.intensity.empty() && factor > 0.0F;
   std::vector<float> input(input_channels * pixels, 0.0F);
   for (std::size_t pixel = 0; pixel < pixels; ++pixel) {
     const std::int32_t nearest = image.nearest()[pixel];
     if (nearest == RangeImage::none || (model.mask_first_point && nearest == 0)) continue;
     const auto point = static_cast<std::size_t>(nearest);
     const Eigen::Vector3f& p_lidar = scan.points_lidar[point];
-    const float remission = scan.intensity.empty() ? statistics.mean.back() : scan.intensity[point];
+    const float remission = has_remission ? factor * scan.intensity[point] : statistics.mean.back();
     const std::array<float, input_channels> values{image.range_m()[pixel], p_lidar.x(), p_lidar.y(),
                                                    p_lidar.z(), remission};
     for (std::size_t c = 0; c < input_channels; ++c) {

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 #include "tests/segmentation/sample_model.hpp"
@@ -67,6 +69,42 @@ TEST(NetworkInput, TakesTheMeanRemissionWhenThereIsNone) {
   scan.intensity.clear();
   for (std::size_t i = 4 * pixels; i < 5 * pixels; ++i) {
     EXPECT_EQ(make_network_input(scan, image, model)[i], 0.0F);
+  }
+}
+
+TEST(NetworkInput, IntensityOfAnotherScaleIsBroughtToTheModels) {
+  const Scan scan = random_scan(3000, 2);
+  const RangeImage image = project(scan, model);
+  const std::vector<float> plain = make_network_input(scan, image, model);
+  const auto scaled = [&](float factor) {
+    Scan other = scan;
+    for (float& intensity : other.intensity) intensity *= factor;
+    return make_network_input(other, image, model);
+  };
+  const std::vector<float> raw_counts = scaled(255.0F), dark = scaled(0.02F);
+  float difference = 0.0F, change = 0.0F;
+  for (std::size_t i = 4 * pixels; i < 5 * pixels; ++i) {
+    difference = std::max(difference, std::abs(raw_counts[i] - dark[i]));
+    change = std::max(change, std::abs(raw_counts[i]));
+  }
+  EXPECT_LT(difference, 1e-3F);
+  EXPECT_LT(change, 10.0F);
+  // Of about the model's own scale it stays as it is.
+  const float mean = model.statistics.mean[4], deviation = model.statistics.deviation[4];
+  const std::vector<float> darker = scaled(0.7F);
+  for (std::size_t i = 4 * pixels; i < 5 * pixels; ++i) {
+    if (plain[i] != 0.0F)
+      EXPECT_NEAR(darker[i] * deviation + mean, 0.7F * (plain[i] * deviation + mean), 1e-4F);
+  }
+}
+
+TEST(NetworkInput, IntensityThatIsTheSameEverywhereIsNone) {
+  Scan scan = random_scan(3000, 2);
+  const RangeImage image = project(scan, model);
+  for (const float value : {0.0F, 0.4F, std::numeric_limits<float>::quiet_NaN()}) {
+    std::ranges::fill(scan.intensity, value);
+    const std::vector<float> input = make_network_input(scan, image, model);
+    for (std::size_t i = 4 * pixels; i < 5 * pixels; ++i) ASSERT_EQ(input[i], 0.0F);
   }
 }
 
