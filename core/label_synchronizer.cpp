@@ -33,15 +33,20 @@ LabelSynchronizer::Submission LabelSynchronizer::submit(const Scan& scan, Static
   for (auto& [stamp_ns, labels] : output.finished) {
     if (stamp_ns == scan.stamp_ns) {
       submission.own = std::move(labels);
-    } else if (pending_ && pending_->labelled.scan.stamp_ns == stamp_ns) {
-      insert_late_labels(std::move(labels), map);
+    } else {
+      insert_late_labels(stamp_ns, std::move(labels), map);
     }
   }
   return submission;
 }
 
-void LabelSynchronizer::insert_late_labels(PointLabels labels, StaticMap& map) {
-  PosedScan late = *std::exchange(pending_, std::nullopt);
+void LabelSynchronizer::insert_late_labels(std::int64_t stamp_ns, PointLabels labels,
+                                           StaticMap& map) {
+  const auto found = std::ranges::find(
+      pending_, stamp_ns, [](const PosedScan& pending) { return pending.labelled.scan.stamp_ns; });
+  if (found == pending_.end()) return;
+  PosedScan late = std::move(*found);
+  pending_.erase(found);
   late.labelled.labels = std::move(labels);
   LabelledScan& labelled = late.labelled;
   // Motion was classified without these labels: movable points count as semi-static at most, which
@@ -81,7 +86,8 @@ LabelSynchronizer::Labels LabelSynchronizer::labels_for(
 void LabelSynchronizer::insert(const LabelledScan& labelled, const Labels& labels,
                                const Eigen::Isometry3d& T_map_lidar, StaticMap& map) {
   if (labels.pending) {
-    pending_ = PosedScan{labelled, T_map_lidar};
+    if (pending_.size() == max_pending) pending_.pop_front();
+    pending_.push_back({labelled, T_map_lidar});
     return;
   }
   if (labels.provenance == LabelProvenance::propagated) {
@@ -90,7 +96,7 @@ void LabelSynchronizer::insert(const LabelledScan& labelled, const Labels& label
   }
   // While labels of another scan are pending, a scan without any stays out: its moving objects
   // cannot be told from what stands still.
-  if (labels.provenance == LabelProvenance::none && pending_) return;
+  if (labels.provenance == LabelProvenance::none && !pending_.empty()) return;
   insert_scan(labelled, T_map_lidar, sensor_, map);
   if (labels.provenance == LabelProvenance::fresh && segmentation_->may_skip_scans()) {
     remember_labelled({labelled, T_map_lidar});
@@ -115,7 +121,7 @@ void LabelSynchronizer::remember_labelled(PosedScan posed) {
 }
 
 void LabelSynchronizer::reset() {
-  pending_.reset();
+  pending_.clear();
   last_labelled_.reset();
   last_labelled_image_.reset();
 }

@@ -1,6 +1,9 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
 #include <memory>
 #include <optional>
 #include <string>
@@ -19,11 +22,14 @@ void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_li
 
 /// Matches scans with labels that may arrive after them. It owns the segmentation pipeline and
 /// decides which labels a scan is registered with (its own, else labels propagated from the map and
-/// from the last labelled scan), and when and with which labels the scan enters the static map. At
-/// most one scan waits for its labels: where another one becomes pending first, the earlier scan
-/// stays out of the static map. NOT thread safe.
+/// from the last labelled scan), and when and with which labels the scan enters the static map. The
+/// labels of several scans may be on their way, and come in any order; where that are more than
+/// max_pending, the earliest scan stays out of the static map. NOT thread safe.
 class LabelSynchronizer {
  public:
+  /// As many as a machine's cores may work on at a time; a scan takes some 5 MB.
+  static constexpr std::size_t max_pending = 16;
+
   LabelSynchronizer(std::unique_ptr<SegmentationPipeline> segmentation, const SensorModel& sensor);
 
   /// Name of the label source, for the status.
@@ -67,7 +73,7 @@ class LabelSynchronizer {
   void insert(const LabelledScan& labelled, const Labels& labels,
               const Eigen::Isometry3d& T_map_lidar, StaticMap& map);
 
-  /// Forgets the pending and the last labelled scan.
+  /// Forgets all pending and the last labelled scan.
   void reset();
 
  private:
@@ -76,15 +82,15 @@ class LabelSynchronizer {
     Eigen::Isometry3d T_map_lidar;
   };
 
-  void insert_late_labels(PointLabels labels, StaticMap& map);
+  void insert_late_labels(std::int64_t stamp_ns, PointLabels labels, StaticMap& map);
   void insert_propagated(const LabelledScan& labelled, const Labels& labels,
                          const Eigen::Isometry3d& T_map_lidar, StaticMap& map) const;
   void remember_labelled(PosedScan posed);
 
   std::unique_ptr<SegmentationPipeline> segmentation_;
   SensorModel sensor_;
-  /// The scan whose own labels are still to come.
-  std::optional<PosedScan> pending_;
+  /// The scans whose own labels are still to come, the earliest first.
+  std::deque<PosedScan> pending_;
   /// The newest scan with labels of its own; its range image is made when labels are first
   /// propagated from it.
   std::optional<PosedScan> last_labelled_;

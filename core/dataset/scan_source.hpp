@@ -21,7 +21,8 @@ struct DatasetFrame {
   std::vector<std::uint32_t> raw_labels;
 };
 
-/// Scans that do not come from files of one scan each, such as those of a bag. One thread reads.
+/// Scans that do not come from files of one scan each, such as those of a bag. Read by one
+/// thread at a time.
 class ScanSource {
  public:
   ScanSource() = default;

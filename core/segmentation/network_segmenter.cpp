@@ -1,5 +1,7 @@
 #include "core/segmentation/network_segmenter.hpp"
 
+#include <tbb/task_arena.h>
+
 #include <algorithm>
 #include <cassert>
 #include <span>
@@ -51,13 +53,19 @@ NetworkSegmenter::NetworkSegmenter(ModelDescription model,
                                    std::unique_ptr<SegmentationNetwork> network, std::string remark)
     : model_(std::move(model)), remark_(std::move(remark)) {
   assert(network && model_.faults().empty());
-  levels_.push_back({.columns = model_.columns, .network = std::move(network)});
+  levels_.push_back({.columns = model_.columns, .network = std::move(network), .idle = {}});
 }
 
 void NetworkSegmenter::add_lower_resolution(int columns,
                                             std::unique_ptr<SegmentationNetwork> network) {
   assert(network && columns > 0 && columns < levels_.back().columns);
-  levels_.push_back({.columns = columns, .network = std::move(network)});
+  levels_.push_back({.columns = columns, .network = std::move(network), .idle = {}});
+}
+
+void NetworkSegmenter::allow_concurrent_scans(std::size_t scans, OpenOneThreaded open) {
+  assert(scans > 0 && open);
+  concurrent_scans_ = scans;
+  open_one_threaded_ = std::move(open);
 }
 
 // An estimate: cost in proportion to the pixels. Measured with the default model: 0.7 and 0.54 of
@@ -71,8 +79,18 @@ std::vector<double> NetworkSegmenter::relative_costs() const {
 }
 
 void NetworkSegmenter::set_resolution_level(std::size_t resolution_level) {
+  const std::scoped_lock lock(mutex_);
   current_level_ = std::min(resolution_level, levels_.size() - 1);
-  model_.columns = levels_[current_level_].columns;
+}
+
+void NetworkSegmenter::set_parallelism(Parallelism parallelism) {
+  const std::scoped_lock lock(mutex_);
+  parallelism_ = parallelism;
+}
+
+int NetworkSegmenter::image_columns() const {
+  const std::scoped_lock lock(mutex_);
+  return levels_[current_level_].columns;
 }
 
 std::string NetworkSegmenter::details() const {
@@ -84,24 +102,81 @@ std::string NetworkSegmenter::details() const {
 
 PointLabels NetworkSegmenter::segment(const Scan& scan) {
   if (scan.empty()) return {};
-  const RangeImage image(scan.points_lidar, model_.projection());
-  PixelOutputs outputs =
-      levels_[current_level_].network->run(make_network_input(scan, image, model_));
+  std::unique_lock lock(mutex_);
+  const std::size_t level = current_level_;
+  const int columns = levels_[level].columns;
+  const Parallelism parallelism = parallelism_;
+  lock.unlock();
+  if (parallelism == Parallelism::across_scans && concurrent_scans_ > 1) {
+    if (auto network = take_one_threaded(level)) {
+      // The loops of the projection and of the votes in this thread, too.
+      tbb::task_arena this_thread(1);
+      PointLabels labels =
+          this_thread.execute([&] { return segment_with(*network, columns, scan); });
+      lock.lock();
+      levels_[level].idle.push_back(std::move(network));
+      return labels;
+    }
+  }
+  const std::scoped_lock all_threads(all_threads_);
+  return segment_with(*levels_[level].network, columns, scan);
+}
+
+std::unique_ptr<SegmentationNetwork> NetworkSegmenter::take_one_threaded(std::size_t level) {
+  {
+    const std::scoped_lock lock(mutex_);
+    Networks& idle = levels_[level].idle;
+    if (!idle.empty()) {
+      auto network = std::move(idle.back());
+      idle.pop_back();
+      return network;
+    }
+  }
+  try {
+    return open_one_threaded_(levels_[level].columns);
+  } catch (const ModelError&) {
+    // The model was read before: its file is gone, and its network is still here.
+    return nullptr;
+  }
+}
+
+PointLabels NetworkSegmenter::segment_with(SegmentationNetwork& network, int columns,
+                                           const Scan& scan) const {
+  ProjectionModel projection = model_.projection();
+  projection.columns = columns;
+  const RangeImage image(scan.points_lidar, projection);
+  PixelOutputs outputs = network.run(make_network_input(scan, image, model_));
   const PixelLabels pixels = pixel_labels(std::move(outputs), model_);
   return model_.knn ? knn_labels(image, pixels, *model_.knn) : labels_of_own_pixel(image, pixels);
 }
 
-std::unique_ptr<Segmenter> open_model(const ModelDescription& model, const EngineOptions& choice) {
+namespace {
+
+/// With a network of one thread for each scan at a time, where the engine leaves the choice.
+std::unique_ptr<NetworkSegmenter> open_finest(const ModelDescription& model,
+                                              const EngineOptions& choice) {
   OpenedNetwork opened = open_network(model, choice);
-  return std::make_unique<NetworkSegmenter>(model, std::move(opened.network),
-                                            std::move(opened.remark));
+  const int threads = opened.threads;
+  auto segmenter = std::make_unique<NetworkSegmenter>(model, std::move(opened.network),
+                                                      std::move(opened.remark));
+  if (choice.threads != 0 || threads < 2) return segmenter;
+  EngineOptions one_thread = choice;
+  one_thread.threads = 1;
+  segmenter->allow_concurrent_scans(
+      static_cast<std::size_t>(threads),
+      [model, one_thread](int columns) { return open_with_columns(model, columns, one_thread); });
+  return segmenter;
+}
+
+}  // namespace
+
+std::unique_ptr<Segmenter> open_model(const ModelDescription& model, const EngineOptions& choice) {
+  return open_finest(model, choice);
 }
 
 std::unique_ptr<Segmenter> open_multi_resolution_model(const ModelDescription& model,
                                                        const EngineOptions& choice) {
-  OpenedNetwork opened = open_network(model, choice);
-  auto segmenter = std::make_unique<NetworkSegmenter>(model, std::move(opened.network),
-                                                      std::move(opened.remark));
+  std::unique_ptr<NetworkSegmenter> segmenter = open_finest(model, choice);
   const int min_columns = model.min_columns;
   if (min_columns == 0 || min_columns >= model.columns) return segmenter;
   if (const int columns = intermediate_columns(model); columns > min_columns) {

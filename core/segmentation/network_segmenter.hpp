@@ -1,6 +1,9 @@
 #pragma once
 
+#include <cstddef>
+#include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -21,6 +24,12 @@ class NetworkSegmenter final : public Segmenter {
   NetworkSegmenter(ModelDescription model, std::unique_ptr<SegmentationNetwork> network,
                    std::string remark = {});
 
+  /// Opens the model's network for one thread, with so many columns. Throws ModelError.
+  using OpenOneThreaded = std::function<std::unique_ptr<SegmentationNetwork>(int columns)>;
+  /// Lets so many scans be segmented at a time. Their networks are opened when they are first
+  /// wanted; while one cannot be, scans take turns with the network of all threads.
+  void allow_concurrent_scans(std::size_t scans, OpenOneThreaded open);
+
   /// Adds a resolution level: the same model with fewer columns than all levels before.
   void add_lower_resolution(int columns, std::unique_ptr<SegmentationNetwork> network);
 
@@ -28,20 +37,37 @@ class NetworkSegmenter final : public Segmenter {
   [[nodiscard]] std::string details() const override;
   [[nodiscard]] std::vector<double> relative_costs() const override;
   void set_resolution_level(std::size_t resolution_level) override;
-  [[nodiscard]] int image_columns() const override { return model_.columns; }
+  [[nodiscard]] std::size_t concurrent_scans() const override { return concurrent_scans_; }
+  void set_parallelism(Parallelism parallelism) override;
+  [[nodiscard]] int image_columns() const override;
   [[nodiscard]] PointLabels segment(const Scan& scan) override;
 
  private:
+  using Networks = std::vector<std::unique_ptr<SegmentationNetwork>>;
   struct Level {
     int columns = 0;
+    /// Of all threads.
     std::unique_ptr<SegmentationNetwork> network;
+    /// Of one thread each, those that do not run.
+    Networks idle;
   };
 
-  /// With the columns of the current level.
-  ModelDescription model_;
-  std::vector<Level> levels_;
-  std::size_t current_level_ = 0;
+  [[nodiscard]] PointLabels segment_with(SegmentationNetwork& network, int columns,
+                                         const Scan& scan) const;
+  /// A network of one thread that does not run; nothing where the model cannot be opened any more.
+  [[nodiscard]] std::unique_ptr<SegmentationNetwork> take_one_threaded(std::size_t level);
+
+  const ModelDescription model_;
   std::string remark_;
+  std::size_t concurrent_scans_ = 1;
+  OpenOneThreaded open_one_threaded_;
+  std::vector<Level> levels_;
+  /// Of all below, and of the idle networks.
+  mutable std::mutex mutex_;
+  Parallelism parallelism_ = Parallelism::within_scan;
+  std::size_t current_level_ = 0;
+  /// Held while a network of all threads runs.
+  std::mutex all_threads_;
 };
 
 /// Loads the network that `model` describes. Throws ModelError naming the file and the fault.

@@ -83,10 +83,11 @@ std::vector<float> OneDnnNetwork::probabilities(std::span<const float> input) {
                           ScoreLayout::pixels);
 }
 
+int OneDnnNetwork::threads() const { return state_->plan->threads(); }
+
 std::string OneDnnNetwork::engine() const {
-  const int threads = state_->plan->threads();
   return std::string("oneDNN ") + (state_->precision == Precision::int8 ? "int8, " : "fp32, ") +
-         std::to_string(threads) + (threads == 1 ? " thread" : " threads");
+         std::to_string(threads()) + (threads() == 1 ? " thread" : " threads");
 }
 
 void OneDnnNetwork::observe(std::span<const float> input, const Observer& observer) {

@@ -30,6 +30,8 @@ class OneDnnNetwork final : public SegmentationNetwork {
   [[nodiscard]] std::vector<float> probabilities(std::span<const float> input) override;
   [[nodiscard]] std::string engine() const override;
 
+  [[nodiscard]] int threads() const;
+
   /// Runs the network and calls `observer` with each tensor that it stores in floating point: name,
   /// values (rows x columns x channels), number of channels.
   using Observer = std::function<void(const std::string&, std::span<const float>, std::size_t)>;

@@ -21,7 +21,10 @@ Precision precision_of(const ModelDescription& model, PrecisionMode wanted) {
 OpenedNetwork open_with_onednn(const ModelDescription& model, const EngineOptions& choice) {
   const Precision precision = precision_of(model, choice.precision);
   const bool could_be_faster = choice.precision == PrecisionMode::automatic && !model.int8;
-  return {.network = std::make_unique<OneDnnNetwork>(model, precision, choice.threads),
+  auto network = std::make_unique<OneDnnNetwork>(model, precision, choice.threads);
+  const int threads = network->threads();
+  return {.network = std::move(network),
+          .threads = threads,
           .remark = could_be_faster
                         ? "int8 would be faster, but the model is not calibrated for it: "
                           "'stillmap model calibrate' does it"
@@ -34,7 +37,8 @@ OpenedNetwork open_with_opencv(const ModelDescription& model, const EngineOption
     throw ModelError(model.network_file,
                      "cannot run in int8 on OpenCV; use precision: auto or fp32");
   }
-  return {.network = std::make_unique<OpenCvNetwork>(model), .remark = std::move(remark)};
+  return {
+      .network = std::make_unique<OpenCvNetwork>(model), .threads = 1, .remark = std::move(remark)};
 }
 
 }  // namespace

@@ -32,6 +32,9 @@ struct EngineOptions {
 
 struct OpenedNetwork {
   std::unique_ptr<SegmentationNetwork> network;
+  /// Threads that one image is worked on by. The same network opened with one thread may run beside
+  /// others, where this is above 1; OpenCV's has the process's threads and says 1.
+  int threads = 1;
   /// Why a faster engine or precision could not be used; empty when it is the fastest.
   std::string remark;
 };

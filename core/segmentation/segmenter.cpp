@@ -24,8 +24,9 @@ std::string FallbackSegmenter::name() const {
 }
 
 PointLabels FallbackSegmenter::segment(const Scan& scan) {
-  uses_stream_ = !scan.labels.empty();
-  return uses_stream_ ? PassthroughSegmenter().segment(scan) : fallback_->segment(scan);
+  const bool has_labels = !scan.labels.empty();
+  uses_stream_ = has_labels;
+  return has_labels ? PassthroughSegmenter().segment(scan) : fallback_->segment(scan);
 }
 
 }  // namespace stillmap

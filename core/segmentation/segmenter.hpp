@@ -1,6 +1,8 @@
 #pragma once
 
+#include <atomic>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
@@ -8,6 +10,15 @@
 #include "core/lidar/labelled_scan.hpp"
 
 namespace stillmap {
+
+/// How the processor's cores share the work.
+enum class Parallelism : std::uint8_t {
+  /// All cores work on one scan: its labels come soonest where the cores are free.
+  within_scan,
+  /// Each core has a scan of its own. No thread waits for another one, which has to wait for its
+  /// turn beside other programs: the most scans a second.
+  across_scans,
+};
 
 /// Source of the points' classes: labels that come with the scans, a network, or none.
 class Segmenter {
@@ -25,6 +36,11 @@ class Segmenter {
   [[nodiscard]] virtual std::vector<double> relative_costs() const { return {1.0}; }
   /// Sets the resolution for the next scans: an index into relative_costs().
   virtual void set_resolution_level(std::size_t /*resolution_level*/) {}
+  /// How many scans it works on at a time with Parallelism::across_scans, each asked for by a
+  /// thread of its own. 1: segment() is for one thread, and set_parallelism() does nothing.
+  [[nodiscard]] virtual std::size_t concurrent_scans() const { return 1; }
+  /// For the next scans. May be called while segment() works.
+  virtual void set_parallelism(Parallelism /*parallelism*/) {}
   /// Current width of its range images; 0 when it uses none.
   [[nodiscard]] virtual int image_columns() const { return 0; }
 
@@ -60,6 +76,12 @@ class FallbackSegmenter final : public Segmenter {
   void set_resolution_level(std::size_t resolution_level) override {
     fallback_->set_resolution_level(resolution_level);
   }
+  [[nodiscard]] std::size_t concurrent_scans() const override {
+    return fallback_->concurrent_scans();
+  }
+  void set_parallelism(Parallelism parallelism) override {
+    fallback_->set_parallelism(parallelism);
+  }
   [[nodiscard]] int image_columns() const override {
     return uses_stream_ ? 0 : fallback_->image_columns();
   }
@@ -68,7 +90,7 @@ class FallbackSegmenter final : public Segmenter {
  private:
   std::unique_ptr<Segmenter> fallback_;
   /// The last scan had labels of its own.
-  bool uses_stream_ = false;
+  std::atomic<bool> uses_stream_ = false;
 };
 
 }  // namespace stillmap

@@ -2,6 +2,7 @@
 
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <exception>
 #include <utility>
 
@@ -33,19 +34,23 @@ AsyncSegmenter::AsyncSegmenter(std::unique_ptr<Segmenter> source, std::chrono::m
       budget_(budget),
       queue_(queue),
       statistics_(statistics),
-      rate_controller_(source_->relative_costs()) {
+      rate_controller_(source_->relative_costs()),
+      parallelism_controller_(source_->concurrent_scans()),
+      submitted_(source_->concurrent_scans()) {
   report_rate();
   if (!may_skip_scans()) return;
-  worker_.emplace(
-      submitted_,
-      [this](const Scan& submitted) {
-        ScanLabels labels = segment(submitted);
-        const std::scoped_lock lock(mutex_);
-        finished_.push_back(std::move(labels));
-        busy_ = false;
-        finished_changed_.notify_all();
-      },
-      WorkerOptions{.finishes_queue = true});
+  for (std::size_t i = 0; i < source_->concurrent_scans(); ++i) {
+    workers_.emplace_back(
+        submitted_,
+        [this](const Submitted& submitted) {
+          ScanLabels labels = segment(submitted.scan);
+          const std::scoped_lock lock(mutex_);
+          finished_.push_back(std::move(labels));
+          in_work_.erase(submitted.number);
+          finished_changed_.notify_all();
+        },
+        WorkerOptions{.finishes_queue = true});
+  }
 }
 
 SegmentationPipeline::Output AsyncSegmenter::submit(const Scan& scan) {
@@ -56,22 +61,26 @@ SegmentationPipeline::Output AsyncSegmenter::submit(const Scan& scan) {
   }
   std::unique_lock lock(mutex_);
   if (is_due()) {
-    busy_ = true;
+    const std::uint64_t number = ++submissions_;
+    in_work_.insert(number);
     scans_since_segmented_ = 0;
-    submitted_.push_dropping_oldest(scan);
+    submitted_.push_dropping_oldest({number, scan});
     if (should_wait()) {
-      const bool in_time = finished_changed_.wait_for(lock, budget_, [this] { return !busy_; });
+      const bool in_time =
+          finished_changed_.wait_for(lock, budget_, [&] { return !in_work_.contains(number); });
       misses_ = in_time ? 0 : misses_ + 1;
     }
-    output.pending = busy_;
+    output.pending = in_work_.contains(number);
   }
   output.finished = std::exchange(finished_, {});
+  std::ranges::sort(output.finished, {}, &ScanLabels::stamp_ns);
   return output;
 }
 
 bool AsyncSegmenter::is_due() {
   ++scans_since_segmented_;
-  if (busy_ || scans_since_segmented_ < rate_controller_.every()) return false;
+  if (in_work_.size() >= parallelism_controller_.scans_at_a_time()) return false;
+  if (scans_since_segmented_ < rate_controller_.every()) return false;
   return queue_.waiting() == 0 ||
          scans_since_segmented_ >= rate_controller_.every() + max_postponed_scans;
 }
@@ -83,37 +92,55 @@ bool AsyncSegmenter::should_wait() {
 }
 
 ScanLabels AsyncSegmenter::segment(const Scan& scan) {
+  std::unique_lock lock(mutex_);
+  const Parallelism parallelism = parallelism_controller_.parallelism();
+  lock.unlock();
   const auto began = Clock::now();
   try {
     ScanLabels labels{scan.stamp_ns, source_->segment(scan)};
     statistics_.segmentation_succeeded();
-    record_duration(milliseconds(Clock::now() - began));
+    record_duration(parallelism, milliseconds(Clock::now() - began));
     return labels;
   } catch (const std::exception& error) {
     statistics_.segmentation_failed(error.what());
+    const std::scoped_lock failed(mutex_);
     throttled_log_.warn("label_failure", std::string("segmentation failed: ") + error.what());
     return {scan.stamp_ns, {}};
   }
 }
 
-void AsyncSegmenter::record_duration(double network_ms) {
+void AsyncSegmenter::record_duration(Parallelism parallelism, double network_ms) {
   statistics_.add_latency("network", network_ms);
   const std::scoped_lock lock(mutex_);
+  latency_ms_.add(network_ms);
+  parallelism_controller_.add_measurement(parallelism, network_ms / relative_cost(),
+                                          rate_controller_.room_ms());
+  source_->set_parallelism(parallelism_controller_.parallelism());
+  // Resolution and rate are fitted to a parallelism that stays.
+  if (parallelism_controller_.is_settled()) adapt_rate(network_ms);
+  report_rate();
+}
+
+double AsyncSegmenter::relative_cost() const {
+  return source_->relative_costs()[rate_controller_.resolution_level()];
+}
+
+void AsyncSegmenter::adapt_rate(double network_ms) {
   const std::pair before(rate_controller_.resolution_level(), rate_controller_.every());
   // The sensor's period, not that of the submitted scans: an overloaded server drops scans. Where
   // every scan is segmented, none comes too fast.
-  rate_controller_.add_measurement(network_ms, statistics_.other_stages_ms(),
-                                   may_skip_scans() ? statistics_.receive_period_ms() : 0.0);
+  rate_controller_.add_measurement(
+      network_ms / static_cast<double>(parallelism_controller_.scans_at_a_time()),
+      statistics_.other_stages_ms(), may_skip_scans() ? statistics_.receive_period_ms() : 0.0);
   const std::pair now(rate_controller_.resolution_level(), rate_controller_.every());
   source_->set_resolution_level(now.first);
-  report_rate();
   if (now != before) log_rate_change(now > before);
 }
 
 void AsyncSegmenter::report_rate() {
   statistics_.set_segmentation_status(
       {.interval = rate_controller_.every(),
-       .inference_ms = rate_controller_.network_ms(),
+       .inference_ms = latency_ms_.value(),
        .image_columns = static_cast<std::uint32_t>(source_->image_columns()),
        .full_columns = static_cast<std::uint32_t>(full_columns_),
        .fresh_share = 0.0,
@@ -127,9 +154,8 @@ void AsyncSegmenter::log_rate_change(bool is_slower) const {
               "{} is segmented now{}: that takes {:.0f} ms, all else {:.0f} ms, and scans come "
               "every {:.0f} ms",
               dds::every_nth_scan(rate_controller_.every()),
-              columns > 0 ? " in " + std::to_string(columns) + " columns" : "",
-              rate_controller_.network_ms(), statistics_.other_stages_ms(),
-              rate_controller_.period_ms());
+              columns > 0 ? " in " + std::to_string(columns) + " columns" : "", latency_ms_.value(),
+              statistics_.other_stages_ms(), rate_controller_.period_ms());
 }
 
 }  // namespace stillmap::server

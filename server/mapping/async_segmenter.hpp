@@ -2,14 +2,17 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
+#include <deque>
 #include <memory>
 #include <mutex>
-#include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
 #include "config/loaders/server_config.hpp"
 #include "core/segmentation_pipeline.hpp"
+#include "server/mapping/parallelism_controller.hpp"
 #include "server/mapping/scan_queue.hpp"
 #include "server/mapping/segmentation_rate_controller.hpp"
 #include "server/monitoring/log.hpp"
@@ -21,8 +24,9 @@ namespace stillmap::server {
 /// How long a scan of this server may wait for its labels; 0: as long as it takes.
 [[nodiscard]] std::chrono::milliseconds segmentation_budget(const ServerConfig& config);
 
-/// Runs a segmenter that may be slower than the sensor on a thread of its own: at a resolution that
-/// keeps the sensor's rate, then for every n-th scan, and for none while others wait to be mapped.
+/// Runs a segmenter that may be slower than the sensor on threads of its own: with all cores on one
+/// scan or a core for each of several (ParallelismController), at a resolution that keeps the
+/// sensor's rate, then for every n-th scan, and for none while others wait to be mapped.
 /// The mapping thread waits for labels up to the budget, and not at all when the last ones took
 /// longer than that. Exceptions of the segmenter are counted and leave a scan without labels.
 class AsyncSegmenter final : public SegmentationPipeline {
@@ -39,9 +43,17 @@ class AsyncSegmenter final : public SegmentationPipeline {
  private:
   using Clock = std::chrono::steady_clock;
 
+  struct Submitted {
+    std::uint64_t number = 0;
+    Scan scan;
+  };
+
   /// The scan's labels, none after a failure.
   [[nodiscard]] ScanLabels segment(const Scan& scan);
-  void record_duration(double network_ms);
+  void record_duration(Parallelism parallelism, double network_ms);
+  void adapt_rate(double network_ms);
+  /// Of the present resolution.
+  [[nodiscard]] double relative_cost() const;
   void report_rate();
   void log_rate_change(bool is_slower) const;
   /// Whether the scan that is submitted now is to be segmented.
@@ -54,22 +66,26 @@ class AsyncSegmenter final : public SegmentationPipeline {
   std::chrono::milliseconds budget_;
   const ScanQueue& queue_;
   Statistics& statistics_;
-  /// Used where the source runs.
-  ThrottledLog throttled_log_;
 
+  /// Of all below.
   std::mutex mutex_;
+  ThrottledLog throttled_log_;
   std::condition_variable finished_changed_;
   SegmentationRateController rate_controller_;
+  ParallelismController parallelism_controller_;
+  /// From a scan to its labels, whatever was worked on beside it.
+  RecentMedian latency_ms_{5};
   std::uint32_t scans_since_segmented_ = 0;
   /// Scans in a row whose labels came after the budget; scans since then that did not wait.
   std::uint32_t misses_ = 0;
   std::uint32_t scans_without_wait_ = 0;
-  /// A scan was submitted, and its labels are not in `finished_` yet.
-  bool busy_ = false;
+  std::uint64_t submissions_ = 0;
+  /// Numbers of the scans that were submitted and whose labels are not in `finished_` yet.
+  std::set<std::uint64_t> in_work_;
   std::vector<ScanLabels> finished_;
-  BoundedQueue<Scan> submitted_{1};
-  // Last: stops before what it uses is gone, after the scan in work.
-  std::optional<Worker<Scan>> worker_;
+  BoundedQueue<Submitted> submitted_;
+  // Last: they stop before what they use is gone, after the scans in work.
+  std::deque<Worker<Submitted>> workers_;
 };
 
 }  // namespace stillmap::server

@@ -32,13 +32,13 @@ void SegmentationRateController::add_measurement(double network_ms, double other
   runs_ = std::min(runs_ + 1, max_patience);
   if (period_ms > 0.0) period_ms_.add(period_ms);
   const double usual_period_ms = period_ms_.value();
-  if (usual_period_ms <= 0.0 || network_ms_.size() < min_runs) return;
-  const double room_ms =
-      std::max(usual_period_ms - other_stages_ms, min_room_share * usual_period_ms);
-  if (network_ms_.value() > late_share * rate_.every * room_ms) {
-    change_to(first_within(late_share, room_ms));
+  if (usual_period_ms <= 0.0) return;
+  room_ms_ = std::max(usual_period_ms - other_stages_ms, min_room_share * usual_period_ms);
+  if (network_ms_.size() < min_runs) return;
+  if (network_ms_.value() > late_share * rate_.every * room_ms_) {
+    change_to(first_within(late_share, room_ms_));
   } else {
-    Rate faster = std::min(rate_, first_within(spare_share, room_ms));
+    Rate faster = std::min(rate_, first_within(spare_share, room_ms_));
     // Where a finer resolution would fit for every scan, the present one does.
     if (faster.resolution_level < rate_.resolution_level && runs_ < patience_) {
       faster = {.resolution_level = rate_.resolution_level, .every = 1};

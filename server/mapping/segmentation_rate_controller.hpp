@@ -30,6 +30,8 @@ class SegmentationRateController {
   [[nodiscard]] std::size_t resolution_level() const { return rate_.resolution_level; }
   /// What a scan takes at the present resolution; before the first run at it, the expected time.
   [[nodiscard]] double network_ms() const;
+  /// What a scan may take to keep the sensor's rate; 0 while that is not known.
+  [[nodiscard]] double room_ms() const { return room_ms_; }
   /// Time from scan to scan as the sensor sends them.
   [[nodiscard]] double period_ms() const { return period_ms_.value(); }
 
@@ -54,6 +56,7 @@ class SegmentationRateController {
   /// At the present resolution level.
   RecentMedian network_ms_{median_window};
   RecentMedian period_ms_{9};
+  double room_ms_ = 0.0;
   Rate rate_;
   /// Expected time at a new resolution level, from the time at the one before.
   double expected_ms_ = 0.0;

@@ -11,7 +11,7 @@
 
 namespace stillmap::server {
 
-/// A bounded queue between the threads that produce items and the one that takes them. The producer
+/// A bounded queue between the threads that produce items and those that take them. The producer
 /// chooses what happens when it is full: the oldest items are dropped, or the producer waits.
 template <typename T>
 class BoundedQueue {

@@ -26,10 +26,11 @@ struct WorkerOptions {
 };
 
 /// Takes items from a queue and hands them to `handle`, one at a time, on a thread of its own.
+/// Several may take from one queue, where `handle` stands that.
 template <typename T>
 class Worker {
  public:
-  /// The queue must outlive the worker, which is the only one to take from it. What `handle` and
+  /// The queue must outlive the worker. What `handle` and
   /// the options throw ends the worker and is reported (run_or_report).
   Worker(BoundedQueue<T>& queue, std::function<void(T)> handle, WorkerOptions options = {})
       : queue_(queue),

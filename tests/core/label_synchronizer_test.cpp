@@ -57,6 +57,9 @@ class LabelSynchronizerTest : public testing::Test {
   [[nodiscard]] SemanticClass class_in_map() const {
     return map_.evidence_at(place.cast<double>()).winner();
   }
+  [[nodiscard]] float weight_in_map() const {
+    return map_.evidence_at(place.cast<double>()).votes().front().weight;
+  }
   [[nodiscard]] std::size_t voxels_in_map() {
     std::size_t voxels = 0;
     for (const auto& tile : map_.view()->tiles) voxels += tile->voxels.size();
@@ -139,12 +142,23 @@ TEST_F(LabelSynchronizerTest, PureGeometryStaysOutWhileAnotherScanIsPending) {
   EXPECT_EQ(voxels_in_map(), 0U);
 }
 
-TEST_F(LabelSynchronizerTest, TheNewestPendingScanReplacesTheOneBefore) {
+TEST_F(LabelSynchronizerTest, SeveralScansWaitForTheirLabelsWhichComeInAnyOrder) {
   process(1, pending());
   process(2, pending());
-  process(3, finished(1, one_label(road)));
   EXPECT_EQ(voxels_in_map(), 0U);
-  process(4, finished(2, one_label(road)));
+  process(3, finished(2, one_label(road), true));
+  EXPECT_EQ(class_in_map(), road);
+  const float weight = weight_in_map();
+  process(4, finished(1, one_label(road), true));
+  EXPECT_GT(weight_in_map(), weight);
+}
+
+TEST_F(LabelSynchronizerTest, OfTooManyPendingScansTheEarliestStaysOut) {
+  constexpr auto count = static_cast<std::int64_t>(LabelSynchronizer::max_pending) + 1;
+  for (std::int64_t number = 1; number <= count; ++number) process(number, pending());
+  process(count + 1, finished(1, one_label(road), true));
+  EXPECT_EQ(voxels_in_map(), 0U);
+  process(count + 2, finished(count, one_label(road), true));
   EXPECT_EQ(class_in_map(), road);
 }
 

@@ -4,7 +4,10 @@
 
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <limits>
+#include <thread>
+#include <vector>
 
 #include "core/lidar/range_image.hpp"
 #include "tests/segmentation/onnx_builder.hpp"
@@ -178,6 +181,47 @@ TEST(NetworkSegmenter, OpensAModelInAllItsWidths) {
   EXPECT_EQ(labels->segment(scan).classes, open_model(narrow)->segment(scan).classes);
   model.min_columns = 112;
   EXPECT_EQ(open_multi_resolution_model(model)->relative_costs(), (std::vector{1.0, 0.875}));
+}
+
+TEST(NetworkSegmenter, GivesTheSameLabelsForSeveralScansAtATime) {
+  ModelDescription model = test::describe_family(16, 128, 20);
+  model.network_file = write_model(test::light_bytes(8, 0, 0, 20));
+  model.min_columns = 32;
+  const auto labels = open_multi_resolution_model(model);
+  if (labels->concurrent_scans() == 1) GTEST_SKIP() << "one core";
+  std::vector<Scan> scans;
+  std::vector<std::vector<SemanticClass>> expected;
+  for (const unsigned seed : {1U, 2U, 3U, 4U}) {
+    scans.push_back(random_scan(600, seed));
+    expected.push_back(labels->segment(scans.back()).classes);
+  }
+  labels->set_parallelism(Parallelism::across_scans);
+  std::vector<std::jthread> threads;
+  for (std::size_t n = 0; n < scans.size(); ++n) {
+    threads.emplace_back([&, n] {
+      for (int i = 0; i < 20; ++i) EXPECT_EQ(labels->segment(scans[n]).classes, expected[n]);
+    });
+  }
+}
+
+TEST(NetworkSegmenter, KeepsTheNumberOfThreadsThatIsSet) {
+  ModelDescription model = test::describe_family(16, 128, 20);
+  model.network_file = write_model(test::light_bytes(8, 0, 0, 20));
+  EXPECT_EQ(open_model(model, {.threads = 2})->concurrent_scans(), 1U);
+  EXPECT_EQ(open_model(model, {.engine = EngineOptions::Engine::opencv})->concurrent_scans(), 1U);
+}
+
+TEST(NetworkSegmenter, ScansTakeTurnsWhereTheModelCannotBeOpenedAgain) {
+  ModelDescription model = test::describe_family(16, 128, 20);
+  model.network_file = write_model(test::light_bytes(8, 0, 0, 20));
+  const auto labels = open_model(model);
+  const Scan scan = random_scan(600, 4);
+  const std::vector<SemanticClass> expected = labels->segment(scan).classes;
+  std::filesystem::remove(model.network_file);
+  labels->set_parallelism(Parallelism::across_scans);
+  std::vector<std::jthread> threads;
+  for (int n = 0; n < 3; ++n)
+    threads.emplace_back([&] { EXPECT_EQ(labels->segment(scan).classes, expected); });
 }
 
 TEST(NetworkSegmenter, LeavesPointsUnlabeledWhereTheNetworkFails) {

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <set>
+#include <thread>
+
 #include "tests/server/slow_segmenter.hpp"
 
 namespace stillmap::server {
@@ -75,6 +78,37 @@ TEST_F(AsyncSegmenterTest, CatchingUpComesFirstButNotForEver) {
   EXPECT_EQ(segmented, 3);
   ASSERT_TRUE(queue_.try_pop().has_value());
   EXPECT_FALSE(labels->submit(scan_at(33)).finished.empty());
+}
+
+TEST_F(AsyncSegmenterTest, CoresTakeAScanEachWhereTheyAreTooSlowTogether) {
+  source_.concurrent_scans = 3;
+  source_.delay_ms = 60;
+  const auto labels = make_segmenter(1ms);
+  std::set<std::int64_t> pending;
+  const auto deadline = Clock::now() + 60s;
+  for (int k = 0; source_.max_in_work < 3 && Clock::now() < deadline; ++k) {
+    statistics_.scan_received();
+    const auto output = labels->submit(scan_at(k));
+    for (const ScanLabels& finished : output.finished) {
+      EXPECT_FALSE(finished.labels.empty());
+      EXPECT_EQ(finished.stamp_ns == k ? 1U : pending.erase(finished.stamp_ns), 1U);
+    }
+    if (output.pending) pending.insert(k);
+    std::this_thread::sleep_for(10ms);
+  }
+  EXPECT_EQ(source_.max_in_work, 3);
+}
+
+TEST_F(AsyncSegmenterTest, CoresStayTogetherWhereTheyKeepTheRate) {
+  source_.concurrent_scans = 3;
+  source_.delay_ms = 1;
+  const auto labels = make_segmenter(5s);
+  for (int k = 0; k < 20; ++k) {
+    statistics_.scan_received();
+    static_cast<void>(labels->submit(scan_at(k)));
+    std::this_thread::sleep_for(10ms);
+  }
+  EXPECT_EQ(source_.max_in_work, 1);
 }
 
 TEST_F(AsyncSegmenterTest, WithoutABudgetEveryScanGetsItsLabels) {

@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "clients/commands/mapping/scans_ahead.hpp"
 #include "core/dataset/dataset_error.hpp"
 
 namespace stillmap::cli {
@@ -19,8 +20,12 @@ class SequenceExporter {
         strict_(strict),
         scan_skipped_(scan_skipped),
         prepare_(config.prepare),
-        mapper_(config, std::move(labels)),
+        scans_(dataset, config, std::move(labels)),
+        mapper_(config, scans_.segmenter()),
         output_(folder) {}
+
+  /// Before the first scan: which ones export_scan() will get, in their order.
+  void expect(std::size_t first, std::size_t end) { scans_.start(first, end); }
 
   void export_scan(std::size_t index) {
     const std::optional<DatasetFrame> frame = read(index);
@@ -55,7 +60,7 @@ class SequenceExporter {
  private:
   std::optional<DatasetFrame> read(std::size_t index) {
     try {
-      return dataset_.read(index);
+      return scans_.read();
     } catch (const DatasetError& error) {
       if (strict_) throw;
       ++damaged_;
@@ -68,6 +73,7 @@ class SequenceExporter {
   bool strict_;
   const ScanSkipped& scan_skipped_;
   PrepareConfig prepare_;
+  ScansAhead scans_;
   Mapper mapper_;
   SequenceOutput output_;
   Eigen::Isometry3d T_map_lidar_ = Eigen::Isometry3d::Identity();
@@ -123,6 +129,7 @@ ExportSummary export_sequence(const ScanDataset& dataset, const ScanRange& range
                               const ScanSkipped& scan_skipped) {
   const std::size_t end = range.end(dataset);
   SequenceExporter run(dataset, range.strict, config, std::move(labels), folder, scan_skipped);
+  run.expect(range.first, end);
   bool keep_running = true;
   for (std::size_t index = range.first; index < end && keep_running; ++index) {
     run.export_scan(index);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "clients/commands/mapping/imu_feed.hpp"
+#include "clients/commands/mapping/scans_ahead.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/map/map_id.hpp"
 #include "core/map/storage/map_file.hpp"
@@ -38,7 +39,8 @@ class MappingRun {
         listeners_(listeners),
         T_body_lidar_(body.T_body_lidar),
         prepare_(config.prepare),
-        mapper_(config, std::move(labels),
+        scans_(dataset, config, std::move(labels)),
+        mapper_(config, scans_.segmenter(),
                 {.stage_ended = [this](std::string_view stage) { times_.end_stage(stage); },
                  .pose_found = {}}),
         imu_(dataset.imu()),
@@ -60,6 +62,9 @@ class MappingRun {
   void begin(std::size_t first_scan) {
     if (loops_) loops_->resume(first_scan);
   }
+
+  /// Before the first scan: which ones map_scan() will get, in their order.
+  void expect(std::size_t first_scan, std::size_t end) { scans_.start(first_scan, end); }
 
   /// What changed since the last saved state.
   [[nodiscard]] RunState state(std::size_t next_scan) {
@@ -197,7 +202,7 @@ class MappingRun {
 
   std::optional<DatasetFrame> read(std::size_t index) {
     try {
-      return dataset_.read(index);
+      return scans_.read();
     } catch (const DatasetError& error) {
       if (strict_) throw;
       skip({index, "unreadable", error.what()});
@@ -217,6 +222,7 @@ class MappingRun {
   Eigen::Isometry3d T_body_lidar_;
   PrepareConfig prepare_;
   StageStopwatch times_;
+  ScansAhead scans_;
   Mapper mapper_;
   std::optional<LoopCorrection> loops_;
   ImuFeed imu_;
@@ -258,6 +264,7 @@ MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
   }
   const auto began = std::chrono::steady_clock::now();
   bool is_stopped = false;
+  run.expect(index, end);
   while (index < end && !is_stopped) {
     run.map_scan(index++);
     is_stopped = listeners.scan_done && !listeners.scan_done(index - range.first) && index < end;

@@ -15,6 +15,7 @@
 #include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/model/benchmark_scan.hpp"
 #include "clients/commands/model/model_arguments.hpp"
+#include "clients/commands/model/speed_beside_load.hpp"
 #include "clients/terminal/table.hpp"
 #include "core/lidar/range_image.hpp"
 #include "core/lidar/scan.hpp"
@@ -153,14 +154,18 @@ struct ModelSpeedArguments {
   std::vector<std::string> columns{"1024"};
   std::string dataset;
   std::uint32_t threads = 0;
+  std::vector<std::string> beside;
   bool skip_opencv = false;
 };
 
-std::uint32_t whole_number(const std::string& text) {
+/// What a list holds, each from 1 to `max`.
+std::uint32_t whole_number(const std::string& option, const std::string& text, std::uint32_t max) {
   std::uint32_t number = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error == std::errc() && end == text.data() + text.size() && number > 0) return number;
-  throw std::invalid_argument("--columns: '" + text + "' is no number of columns");
+  const bool is_number = error == std::errc() && end == text.data() + text.size();
+  if (is_number && number > 0 && number <= max) return number;
+  throw std::invalid_argument(option + ": '" + text + "' is no number from 1 to " +
+                              std::to_string(max));
 }
 
 std::vector<std::string> row(const ModelDescription& model, const std::string& engine,
@@ -192,15 +197,69 @@ void time_model(const ModelDescription& model, const Scan& scan,
   }
 }
 
+/// In words for a table.
+std::string layout(const SpeedBesideLoad& speed, std::size_t threads) {
+  return speed.parallelism == Parallelism::within_scan
+             ? "1 scan on " + std::to_string(threads) + " threads"
+             : std::to_string(threads) + " scans on 1 thread each";
+}
+
+void time_beside_load(const ModelDescription& model, const Scan& scan,
+                      const std::vector<std::size_t>& loops, Table& table) {
+  constexpr int rounds = 5;
+  constexpr double turn_s = 1.0;
+  const std::unique_ptr<Segmenter> segmenter = open_model(model);
+  const std::size_t threads = segmenter->concurrent_scans();
+  if (threads < 2) {
+    throw ModelError(model.network_file,
+                     "has one thread here, so there is no choice to measure: --beside needs two "
+                     "cores and a network that oneDNN runs");
+  }
+  std::cerr << "stillmap: timing " << model.name << ", " << model.columns
+            << " columns, beside busy loops\n";
+  for (const SpeedBesideLoad& speed :
+       measure_beside_load(*segmenter, scan, loops, rounds, turn_s)) {
+    const auto scans = static_cast<double>(speed.scans);
+    table.add({model.name, std::to_string(model.rows) + "x" + std::to_string(model.columns),
+               std::to_string(speed.loops), layout(speed, threads), fixed(speed.scan_ms, 1),
+               fixed(scans / speed.wall_s, 1), fixed(1e3 * speed.cpu_s / scans, 1),
+               fixed(speed.of_fair_share, 2)});
+  }
+}
+
+ExitCode run_beside_load(const ModelSpeedArguments& arguments, const Scan& scan) {
+  constexpr std::uint32_t max_loops = 64;
+  std::vector<std::size_t> loops{0};
+  for (const std::string& count : arguments.beside)
+    loops.push_back(whole_number("--beside", count, max_loops));
+  Table table({"network", "image", "busy loops", "layout", "scan ms", "scans/s", "CPU ms a scan",
+               "of fair share"});
+  for (const std::string& model_path : arguments.models) {
+    for (const std::string& columns : arguments.columns) {
+      const std::uint32_t width = whole_number("--columns", columns, max_image_columns);
+      time_beside_load(load_model({.model = model_path, .rows = 0, .columns = width}), scan, loops,
+                       table);
+    }
+  }
+  std::cout << table.text()
+            << "scan ms: median from a scan to its labels. of fair share: scans a second, relative "
+               "to as\nmany threads that get as much of the cores as each loop, and use it as the "
+               "better layout does\nalone. The server chooses between the layouts as it runs.\n";
+  return ExitCode::ok;
+}
+
 ExitCode run(const ModelSpeedArguments& arguments) {
   const Scan scan = arguments.dataset.empty() ? benchmark_scan()
                                               : open_recording(arguments.dataset, {}).read(0).scan;
+  if (!arguments.beside.empty()) return run_beside_load(arguments, scan);
   Table table({"network", "image", "engine", "project ms", "network ms", "k-NN ms", "total ms",
                "Gop/s", "peak", "%", "MB"});
   for (const std::string& model_path : arguments.models) {
     for (const std::string& columns : arguments.columns) {
       const ModelDescription model =
-          load_model({.model = model_path, .rows = 0, .columns = whole_number(columns)});
+          load_model({.model = model_path,
+                      .rows = 0,
+                      .columns = whole_number("--columns", columns, max_image_columns)});
       try {
         time_model(model, scan, arguments, table);
       } catch (const ModelError& error) {
@@ -228,11 +287,18 @@ void add_model_speed_command(CommandHandle model, Action& action) {
                  "Data set whose first scan is taken; default: one of 64 x 1900 made-up points");
   command.option("--threads", arguments->threads, "Threads of oneDNN; default: all")
       .between(0, 1024);
+  command
+      .option(
+          "--beside", arguments->beside,
+          "Numbers of busy loops: time from scan to labels and scans a second beside them, with "
+          "all threads on one scan and with a scan on each, oneDNN alone: 1,2,4")
+      .comma_separated();
   command.flag("--skip-opencv", arguments->skip_opencv, "Leave the slow reference engine out");
   command.explain(
       "Examples:\n"
       "  stillmap model speed street --columns 512,1024,2048\n"
       "  stillmap model speed rangenet21.onnx rangenet53.onnx --columns 2048 --skip-opencv\n"
+      "  stillmap model speed street --columns 2048 --beside 1,2,4\n"
       "Run it on an idle machine.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
