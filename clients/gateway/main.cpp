@@ -28,6 +28,7 @@ struct Arguments {
   std::string page;
   bool no_page = false;
   bool trust_network = false;
+  bool local_names = false;
 };
 
 constexpr std::chrono::milliseconds stop_check_period{100};
@@ -74,7 +75,7 @@ gateway::WebServerOptions web_options(const Arguments& arguments) {
   }
   gateway::WebServerOptions web = arguments.gateway.web;
   web.address = arguments.listen;
-  web.access.local_only = gateway::is_local_address(arguments.listen);
+  web.access.local_only = arguments.local_names || gateway::is_local_address(arguments.listen);
   if (!arguments.token_file.empty()) web.access.token = token_in(arguments.token_file);
   web.tls = {.certificate = arguments.tls_certificate, .key = arguments.tls_key};
   return web;
@@ -104,7 +105,8 @@ gateway::GatewayOptions gateway_options(const Arguments& arguments) {
 void print_addresses(const gateway::GatewayOptions& options, std::uint16_t port) {
   const bool over_tls = !options.web.tls.certificate.empty();
   const std::string& address = options.web.address;
-  std::string host = options.web.access.local_only ? address.substr(0, address.rfind(':')) : "HOST";
+  std::string host = options.web.access.local_only ? "localhost" : "HOST";
+  if (gateway::is_local_address(address)) host = address.substr(0, address.rfind(':'));
   host.append(":").append(std::to_string(port)).append("/");
   if (!options.web.access.token.empty()) host += "?token=" + options.web.access.token;
   if (!options.page.empty()) std::cout << (over_tls ? "https://" : "http://") << host << "\n";
@@ -131,6 +133,10 @@ void add_options(stillmap::cli::CommandHandle command, Arguments& arguments) {
                  "Ask clients for the token in this file: ?token=TOKEN or 'Authorization: Bearer'");
   command.flag("--trust-network", arguments.trust_network,
                "Listen to other machines without TLS and token");
+  command.flag(
+      "--local-names", arguments.local_names,
+      "Answer as localhost and 127.0.0.1 only, whatever it listens on: for a container's port "
+      "that is mapped to this machine");
   command
       .option("--origin", arguments.gateway.web.access.origins,
               "HOST or HOST:PORT of another page that may connect, beside app.foxglove.dev and "
