@@ -10,6 +10,7 @@ KILLS ?= 50
 RECORDINGS ?=
 DRIVES ?=
 BASE ?= HEAD~1
+PAGE ?= web
 FILES ?=
 TILES ?=
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
@@ -43,7 +44,7 @@ packaged: configure
 build: configure ## Build everything: programs, tests, benchmarks (PRESET=dev, tsan for others)
 	cmake --build --preset $(PRESET) -j $(JOBS)
 
-deb: packaged ## Debian packages in build/release/packages
+deb: packaged $(PAGE) ## Debian packages in build/release/packages (PAGE= leaves the web page out)
 	cpack --config $(BUILD)/CPackConfig.cmake -B $(BUILD)/packages -G DEB
 	rm -rf $(BUILD)/packages/_CPack_Packages
 	@ls -lh $(BUILD)/packages
@@ -88,7 +89,7 @@ test-network: build ## Loss, slow links, outages, TCP, dead and late subscribers
 	/usr/bin/python3 tests/network/run.py --programs $(BUILD)/bin --lab $(BUILD)/tests/network
 
 image: ## Docker image stillmap, from source
-	DOCKER_BUILDKIT=1 docker build -f docker/Dockerfile --build-arg JOBS=$(JOBS) -t stillmap .
+	docker/build_image.sh stillmap --build-arg JOBS=$(JOBS)
 
 test-docker: ## Docker: the image, and the deployments of docker/ end to end (root where no dockerd runs)
 	docker/test.sh

@@ -1,6 +1,6 @@
 #!/bin/sh
-# `docker run IMAGE` is the server, `docker run IMAGE replay /dataset` a command of stillmap, and
-# `docker run IMAGE sh` a shell. ROS_DOMAIN_ID holds for all of them.
+# `docker run IMAGE` is the server, `docker run IMAGE stillmap-gateway` the gateway, `docker run IMAGE replay
+# /dataset` a command of stillmap, and `docker run IMAGE sh` a shell. ROS_DOMAIN_ID holds for all of them.
 set -eu
 case ${1-stillmap-server} in
   stillmap-server)
@@ -8,7 +8,7 @@ case ${1-stillmap-server} in
     set -- stillmap-server --config "${STILLMAP_CONFIG:-/etc/stillmap/server.yaml}" "$@"
     [ -z "${ROS_DOMAIN_ID-}" ] || set -- "$@" --domain "$ROS_DOMAIN_ID"
     ;;
-  stillmap | sh | bash | /*) ;;
+  stillmap | stillmap-gateway | sh | bash | /*) ;;
   *) set -- stillmap "$@" ;;
 esac
 exec "$@"

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Inside the image: installs the server and the command line from the folder of packages $1.
+# Inside the image: installs server, command line and gateway from the folder of packages $1.
 set -eu
 
 # OpenCV's core asks for libglx0, whose package asks for Mesa's drivers with all of LLVM: 190 MB for

@@ -31,6 +31,15 @@ stillmap-server --config /etc/stillmap/server.yaml --domain "$ROS_DOMAIN_ID" --d
   --map-file map.stillmap > server.log 2>&1 &
 server=$!
 check "a server that is alive" stillmap health --timeout 30
+stillmap-gateway --domain "$ROS_DOMAIN_ID" --listen 127.0.0.1:0 > gateway.log 2>&1 &
+gateway=$!
+# Debian without anything has no client of HTTP but bash.
+check "the page of stillmap-gateway" timeout 30 bash -c '
+  until port=$(grep -oP "http://127.0.0.1:\K\d+" gateway.log); do kill -0 "$1" || { cat gateway.log; exit 1; }; sleep 0.1; done
+  exec 3<> "/dev/tcp/127.0.0.1/$port"
+  printf "GET / HTTP/1.0\r\nHost: localhost\r\n\r\n" >&3
+  grep -qE "src=.*main-[0-9A-Z]{8}\.js" <&3' bash "$gateway"
+kill "$gateway"
 check "a replay through the server" stillmap replay city --lossless --timeout 30
 check "every scan mapped" sh -c "stillmap status --json | grep -q '\"scans_mapped\": 20'"
 kill "$server"
