@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Builds the image, and runs the deployments of docker/*.compose.yaml end to end: replay (map, path and
 # pictures in a volume), fleet (discovery server, no multicast), robot (host's network, also with shared
-# memory). Starts dockerd, and makes the base image, where there is none; leaves neither.
+# memory), viewer (the page, and what comes through the gateway). Starts dockerd, and makes the base image,
+# where there is none; leaves neither.
 #
 # STILLMAP_PACKAGES   folder of .deb files (`make deb`) to build the image from, instead of the sources
 # STILLMAP_TEST_SCANS length of the simulated sequences (40)
@@ -11,8 +12,10 @@ cd "$(dirname "$0")/.."
 
 scans=${STILLMAP_TEST_SCANS:-40}
 domain=54
+# Of this machine, where a viewer of somebody else may be at the usual one.
+viewer_port=$((20000 + RANDOM % 10000))
 export STILLMAP_IMAGE=stillmap-test STILLMAP_SCANS=$scans DOCKER_BUILDKIT=1
-max_mb=300
+max_mb=320
 work=$(mktemp -d /tmp/stillmap_docker_test.XXXXXX)
 started_dockerd=
 made_base=
@@ -66,6 +69,7 @@ clean_up() {
   {
     compose -p stillmap_replay_test -f docker/replay.compose.yaml down -v -t 20
     compose -p stillmap_fleet_test -f docker/fleet.compose.yaml down -v -t 20
+    compose -p stillmap_viewer_test -f docker/viewer.compose.yaml down -v -t 20
     stop_robot
     [ -n "${KEEP_IMAGE-}" ] || "$docker" rmi "$STILLMAP_IMAGE"
     [ -z "$made_base" ] || "$docker" rmi debian:bookworm-slim
@@ -91,8 +95,8 @@ build_image() {
     cp "$STILLMAP_PACKAGES"/*.deb docker/packages/
   fi
   # The host's network: a mirror that only the host reaches is reached.
-  "$docker" build -q --network host -f docker/Dockerfile --build-arg PACKAGES=$from \
-    --build-arg JOBS="$(nproc)" -t "$STILLMAP_IMAGE" . > /dev/null || fail "the image does not build"
+  DOCKER=$docker docker/build_image.sh "$STILLMAP_IMAGE" -q --network host --build-arg PACKAGES=$from \
+    --build-arg JOBS="$(nproc)" > /dev/null || fail "the image does not build"
 }
 
 in_image() { "$docker" run --rm --network none "$STILLMAP_IMAGE" "$@"; }
@@ -192,6 +196,30 @@ test_fleet() {
   pass "fleet: who looks for the server by multicast does not find it"
 }
 
+test_viewer() {
+  local run=(compose -p stillmap_viewer_test -f docker/viewer.compose.yaml) up line gateway health
+  export STILLMAP_PORT=$viewer_port
+  "${run[@]}" up -d > "$work/viewer.log" 2>&1 &
+  up=$!
+  # Beside it, as the page opens before anything else is there. Its seconds begin with `up`.
+  python3 docker/viewer_test.py "$viewer_port" > "$work/viewer_test.log" 2>&1 ||
+    { cat "$work/viewer.log" "$work/viewer_test.log" >&2; "${run[@]}" logs --tail 20 >&2; fail "the viewer shows no drive"; }
+  wait "$up" || { cat "$work/viewer.log" >&2; fail "the viewer does not start"; }
+  while read -r line; do pass "viewer: after $line"; done < "$work/viewer_test.log"
+  gateway=$(container stillmap_viewer_test viewer gateway)
+  for _ in $(seq 20); do
+    health=$("$docker" inspect -f '{{.State.Health.Status}}' "$gateway")
+    [ "$health" = starting ] || break
+    sleep 1
+  done
+  [ "$health" = healthy ] || fail "Docker finds the gateway $health"
+  [ "$("$docker" port "$gateway")" = "8765/tcp -> 127.0.0.1:$viewer_port" ] ||
+    fail "others reach the gateway's port: $("$docker" port "$gateway")"
+  pass "viewer: Docker finds the gateway healthy, at this machine's port only"
+  "${run[@]}" down -v -t 20 > /dev/null 2>&1
+  unset STILLMAP_PORT
+}
+
 robot=(-p stillmap_robot_test -f docker/robot.compose.yaml)
 
 stop_robot() {
@@ -223,6 +251,7 @@ test_robot() {
 }
 
 docker=$(find_docker) || fail "no docker client with BuildKit: apt-get install docker.io, or the buildx plugin"
+command -v python3 > /dev/null || fail "python3 is missing: apt-get install python3-minimal"
 command -v docker-compose > /dev/null || "$docker" compose version > /dev/null 2>&1 ||
   fail "docker-compose is missing: apt-get install docker-compose"
 trap clean_up EXIT
@@ -233,6 +262,7 @@ test_packages
 build_image
 check_image
 test_replay
+test_viewer
 test_robot
 test_fleet
 echo "docker test: $passed checks passed"
