@@ -86,14 +86,16 @@ TEST(ModelFile, ReadsWhatItWasTrainedFor) {
 
 TEST(BetterModel, IsTheOneThatWasTrainedForSuchLidarsMostOfAll) {
   const auto better = [](const char* used, const SensorModel& sensor) {
-    return better_model({.source = LabelProvider::model, .model = used}, sensor);
+    return better_model({.source = LabelProvider::model, .model = used, .engine = {}}, sensor);
   };
   EXPECT_THAT(better("street", hdl_64e()),
               AllOf(HasSubstr("'kitti'"), HasSubstr("not for commercial use")));
   EXPECT_EQ(better("street", vlp_16()), "");
   EXPECT_THAT(better("kitti", vlp_16()), HasSubstr("'street'"));
   EXPECT_EQ(better("kitti", hdl_64e()), "");
-  EXPECT_EQ(better_model({.source = LabelProvider::stream, .model = "street"}, hdl_64e()), "");
+  EXPECT_EQ(
+      better_model({.source = LabelProvider::stream, .model = "street", .engine = {}}, hdl_64e()),
+      "");
   SensorModel irregular = vlp_16();
   irregular.pattern = ScanPattern::irregular;
   EXPECT_EQ(better("kitti", irregular), "");

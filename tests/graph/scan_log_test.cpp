@@ -14,10 +14,11 @@ namespace {
 LoggedScan random_scan(std::uint64_t index, bool has_labels) {
   std::mt19937_64 random(index);
   std::uniform_real_distribution<float> coordinate(-100.0F, 100.0F);
-  LoggedScan scan{.index = index,
-                  .T_odom_lidar = Eigen::Isometry3d(Eigen::Translation3d(1.0 * index, 2, 3)),
-                  .is_confirmed = true,
-                  .labelled = {}};
+  LoggedScan scan{
+      .index = index,
+      .T_odom_lidar = Eigen::Isometry3d(Eigen::Translation3d(static_cast<double>(index), 2, 3)),
+      .is_confirmed = true,
+      .labelled = {}};
   scan.labelled.scan.stamp_ns = static_cast<std::int64_t>(index) * 100'000'000;
   for (int i = 0; i < 500; ++i) {
     scan.labelled.scan.points_lidar.emplace_back(coordinate(random), coordinate(random),

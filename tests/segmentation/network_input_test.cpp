@@ -93,8 +93,8 @@ TEST(NetworkInput, IntensityOfAnotherScaleIsBroughtToTheModels) {
   const float mean = model.statistics.mean[4], deviation = model.statistics.deviation[4];
   const std::vector<float> darker = scaled(0.7F);
   for (std::size_t i = 4 * pixels; i < 5 * pixels; ++i) {
-    if (plain[i] != 0.0F)
-      EXPECT_NEAR(darker[i] * deviation + mean, 0.7F * (plain[i] * deviation + mean), 1e-4F);
+    if (plain[i] == 0.0F) continue;
+    EXPECT_NEAR(darker[i] * deviation + mean, 0.7F * (plain[i] * deviation + mean), 1e-4F);
   }
 }
 
