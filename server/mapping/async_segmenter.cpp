@@ -88,6 +88,8 @@ bool AsyncSegmenter::is_due() {
 // A source that was late several times is too slow to wait for. But one that runs beside the
 // odometry takes longer than one that is waited for, so waiting is tried again every few scans.
 bool AsyncSegmenter::should_wait() {
+  // While the mapping thread waits, it submits no other scan to work on beside this one.
+  if (parallelism_controller_.scans_at_a_time() > 1) return false;
   return misses_ < max_misses || ++scans_without_wait_ % scans_until_retry == 0;
 }
 
@@ -122,7 +124,8 @@ void AsyncSegmenter::record_duration(Parallelism parallelism, double network_ms)
 }
 
 double AsyncSegmenter::relative_cost() const {
-  return source_->relative_costs()[rate_controller_.resolution_level()];
+  const std::vector<double> costs = source_->relative_costs();
+  return costs[rate_controller_.resolution_level()] / costs.back();
 }
 
 void AsyncSegmenter::adapt_rate(double network_ms) {

@@ -24,11 +24,11 @@ namespace stillmap::server {
 /// How long a scan of this server may wait for its labels; 0: as long as it takes.
 [[nodiscard]] std::chrono::milliseconds segmentation_budget(const ServerConfig& config);
 
-/// Runs a segmenter that may be slower than the sensor on threads of its own: with all cores on one
-/// scan or a core for each of several (ParallelismController), at a resolution that keeps the
-/// sensor's rate, then for every n-th scan, and for none while others wait to be mapped.
-/// The mapping thread waits for labels up to the budget, and not at all when the last ones took
-/// longer than that. Exceptions of the segmenter are counted and leave a scan without labels.
+/// Runs a segmenter that may be slower than the sensor on threads of its own: at a resolution that
+/// keeps the sensor's rate, then with a core for each of several scans (ParallelismController),
+/// then for every n-th scan, and for none while others wait to be mapped. The mapping thread waits
+/// for labels up to the budget, and not at all when the last ones took longer than that. Exceptions
+/// of the segmenter are counted and leave a scan without labels.
 class AsyncSegmenter final : public SegmentationPipeline {
  public:
   /// With a budget of 0 the source runs in the caller's thread and gets every scan. `queue` holds
@@ -52,7 +52,7 @@ class AsyncSegmenter final : public SegmentationPipeline {
   [[nodiscard]] ScanLabels segment(const Scan& scan);
   void record_duration(Parallelism parallelism, double network_ms);
   void adapt_rate(double network_ms);
-  /// Of the present resolution.
+  /// Of the present resolution, relative to the coarsest one.
   [[nodiscard]] double relative_cost() const;
   void report_rate();
   void log_rate_change(bool is_slower) const;

@@ -8,18 +8,19 @@
 namespace stillmap::server {
 
 /// Chooses whether all cores work on one scan or each on a scan of its own. All cores on one scan
-/// are sooner done with it, and are the choice as long as they keep the sensor's rate. Beside other
-/// load they wait for each other at the end of every layer: where that costs the rate, every core
-/// gets a scan of its own, whose labels come later, but for more of the scans.
+/// are sooner done with it, and are the choice as long as they keep the sensor's rate, if only at
+/// the coarsest resolution: then scans are registered with labels of their own. Beside other load
+/// they wait for each other at the end of every layer: where that costs the rate, every core gets a
+/// scan of its own, whose labels come later, but for more of the scans.
 class ParallelismController {
  public:
   /// How many scans can be segmented at a time; with 1 there is nothing to choose.
   explicit ParallelismController(std::size_t concurrent_scans)
       : concurrent_scans_(concurrent_scans) {}
 
-  /// A scan was segmented as `parallelism` says: in `finest_ms`, or it would have been at the
-  /// finest resolution. To keep the sensor's rate, it has `room_ms` (0: not known).
-  void add_measurement(Parallelism parallelism, double finest_ms, double room_ms);
+  /// A scan was segmented as `parallelism` says: in `coarsest_ms`, or it would have been at the
+  /// coarsest resolution. To keep the sensor's rate, it has `room_ms` (0: not known).
+  void add_measurement(Parallelism parallelism, double coarsest_ms, double room_ms);
 
   [[nodiscard]] Parallelism parallelism() const { return parallelism_; }
   /// How many scans may be in work at a time.
@@ -28,7 +29,7 @@ class ParallelismController {
   }
   /// False after a change, until it has shown what it is worth.
   [[nodiscard]] bool is_settled() const {
-    return concurrent_scans_ < 2 || finest_ms_.size() >= min_runs;
+    return concurrent_scans_ < 2 || coarsest_ms_.size() >= min_runs;
   }
 
  private:
@@ -49,7 +50,7 @@ class ParallelismController {
   std::size_t concurrent_scans_;
   Parallelism parallelism_ = Parallelism::within_scan;
   /// From scan to labels, since the last change.
-  RecentMedian finest_ms_{median_window};
+  RecentMedian coarsest_ms_{median_window};
   /// What a scan took when all cores shared it last.
   double within_scan_ms_ = 0.0;
   /// Scans since the last change, and how many it takes before the other parallelism is tried:
