@@ -33,14 +33,15 @@ class McapCore : public testing::Test {
     }
   }
 
-  /// Installs them in the build folder, as package-lock.json has them, unless they are there.
+  /// Installs them in the build folder, as package-lock.json has them, unless they are there: npm
+  /// writes its own list of them last. Tests run beside each other, and the lock lets one install.
   static bool has_modules() {
     static const bool has = [] {
-      const fs::path folder(STILLMAP_NODE_FOLDER);
-      if (std::system("node --version > /dev/null 2>&1") != 0) return false;
-      if (fs::exists(folder / "node_modules" / "@mcap" / "core")) return true;
-      const std::string install = "npm ci --ignore-scripts --no-audit --no-fund --prefix '" +
-                                  folder.string() + "' > /dev/null 2>&1";
+      const std::string install =
+          "cd '" STILLMAP_NODE_FOLDER
+          "' && node --version > /dev/null 2>&1 && "
+          "flock install.lock sh -c '[ -e node_modules/.package-lock.json ] || "
+          "npm ci --ignore-scripts --no-audit --no-fund > /dev/null 2>&1'";
       return std::system(install.c_str()) == 0;
     }();
     return has;
