@@ -115,11 +115,15 @@ void AsyncSegmenter::record_duration(Parallelism parallelism, double network_ms)
   statistics_.add_latency("network", network_ms);
   const std::scoped_lock lock(mutex_);
   latency_ms_.add(network_ms);
+  const std::pair before(parallelism_controller_.parallelism(),
+                         rate_controller_.resolution_level());
   parallelism_controller_.add_measurement(parallelism, network_ms / relative_cost(),
                                           rate_controller_.room_ms());
   source_->set_parallelism(parallelism_controller_.parallelism());
   // Resolution and rate are fitted to a parallelism that stays.
   if (parallelism_controller_.is_settled()) adapt_rate(network_ms);
+  const std::pair now(parallelism_controller_.parallelism(), rate_controller_.resolution_level());
+  if (now != before) latency_ms_ = RecentMedian(latency_window);
   report_rate();
 }
 
@@ -140,10 +144,16 @@ void AsyncSegmenter::adapt_rate(double network_ms) {
   if (now != before) log_rate_change(now > before);
 }
 
+double AsyncSegmenter::latency_ms() const {
+  if (latency_ms_.size() > 0) return latency_ms_.value();
+  return rate_controller_.network_ms() *
+         static_cast<double>(parallelism_controller_.scans_at_a_time());
+}
+
 void AsyncSegmenter::report_rate() {
   statistics_.set_segmentation_status(
       {.interval = rate_controller_.every(),
-       .inference_ms = latency_ms_.value(),
+       .inference_ms = latency_ms(),
        .image_columns = static_cast<std::uint32_t>(source_->image_columns()),
        .full_columns = static_cast<std::uint32_t>(full_columns_),
        .fresh_share = 0.0,

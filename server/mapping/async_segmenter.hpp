@@ -42,6 +42,7 @@ class AsyncSegmenter final : public SegmentationPipeline {
 
  private:
   using Clock = std::chrono::steady_clock;
+  static constexpr std::size_t latency_window = 5;
 
   struct Submitted {
     std::uint64_t number = 0;
@@ -52,6 +53,8 @@ class AsyncSegmenter final : public SegmentationPipeline {
   [[nodiscard]] ScanLabels segment(const Scan& scan);
   void record_duration(Parallelism parallelism, double network_ms);
   void adapt_rate(double network_ms);
+  /// What a scan takes; before the first one at a new resolution or parallelism, the expected time.
+  [[nodiscard]] double latency_ms() const;
   /// Of the present resolution, relative to the coarsest one.
   [[nodiscard]] double relative_cost() const;
   void report_rate();
@@ -73,8 +76,9 @@ class AsyncSegmenter final : public SegmentationPipeline {
   std::condition_variable finished_changed_;
   SegmentationRateController rate_controller_;
   ParallelismController parallelism_controller_;
-  /// From a scan to its labels, whatever was worked on beside it.
-  RecentMedian latency_ms_{5};
+  /// From a scan to its labels at the present resolution and parallelism, whatever was worked on
+  /// beside it.
+  RecentMedian latency_ms_{latency_window};
   std::uint32_t scans_since_segmented_ = 0;
   /// Scans in a row whose labels came after the budget; scans since then that did not wait.
   std::uint32_t misses_ = 0;
