@@ -112,6 +112,9 @@ class LiveTile {
   [[nodiscard]] const std::shared_ptr<const Tile>& published() const { return published_; }
 
  private:
+  /// Takes voxels out, and puts them elsewhere.
+  friend class TileCorrection;
+
   static constexpr std::size_t min_changed_voxels = 16;
 
   struct LiveVoxel {

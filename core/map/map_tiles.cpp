@@ -96,6 +96,34 @@ double MapTiles::distance_m(TileId id, const Eigen::Vector2d& position_map) cons
   return footprint.exteriorDistance(position_map);
 }
 
+std::vector<LiveTile*> MapTiles::residents() const {
+  std::vector<LiveTile*> all;
+  all.reserve(residents_.size());
+  for (const auto& [id, resident] : residents_) all.push_back(resident.live.get());
+  std::ranges::sort(all, {}, &LiveTile::id);
+  return all;
+}
+
+std::vector<TileId> MapTiles::non_resident_near(const Eigen::Vector3d& position_map,
+                                                double range_m) const {
+  std::vector<TileId> found;
+  const TileRange range = range_round(position_map, range_m, grid_.tile_size_m());
+  for (TileId id = range.first; id.x <= range.last.x; ++id.x) {
+    for (id.y = range.first.y; id.y <= range.last.y; ++id.y) {
+      if (distance_m(id, position_map.head<2>()) <= range_m && is_known_non_resident(id))
+        found.push_back(id);
+    }
+  }
+  return found;
+}
+
+std::size_t MapTiles::expected_bytes(TileId id) const {
+  // Shown and not, live and published.
+  constexpr std::size_t voxel_bytes = 80;
+  const auto tile = shown(id);
+  return voxel_bytes * (tile ? tile->info.voxel_count : 100);
+}
+
 std::vector<LiveTile*> MapTiles::near(const Eigen::Vector3f& position_map, double range_m) const {
   const Eigen::Vector2d position = position_map.head<2>().cast<double>();
   std::vector<LiveTile*> found;

@@ -65,6 +65,13 @@ class MapTiles {
   /// Null when it is not in memory.
   [[nodiscard]] LiveTile* resident(TileId id) const;
   [[nodiscard]] bool is_known_non_resident(TileId id) const;
+  /// All tiles in memory, sorted by id.
+  [[nodiscard]] std::vector<LiveTile*> residents() const;
+  /// Tiles of the tile store alone whose footprint comes this near.
+  [[nodiscard]] std::vector<TileId> non_resident_near(const Eigen::Vector3d& position_map,
+                                                      double range_m) const;
+  /// About what a tile of the tile store will take in memory.
+  [[nodiscard]] std::size_t expected_bytes(TileId id) const;
   /// Tiles in memory whose footprint comes this near.
   [[nodiscard]] std::vector<LiveTile*> near(const Eigen::Vector3f& position_map,
                                             double range_m) const;

@@ -6,7 +6,10 @@
 #include <cassert>
 #include <cmath>
 #include <deque>
+#include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -16,6 +19,7 @@
 #include "core/map/live_tile.hpp"
 #include "core/map/map_tiles.hpp"
 #include "core/map/scan_sorter.hpp"
+#include "core/map/tile_correction.hpp"
 #include "core/map/tile_evidence.hpp"
 #include "core/map/voxel_grid.hpp"
 
@@ -113,6 +117,8 @@ struct StaticMap::State {
     if (session > 0) tile.enter_session(session, max_earlier_scans, rule());
   }
   /// Scans from a position reach tiles that are this near, with a margin of two tiles [m].
+  /// Non-resident tiles with voxels that the correction may move.
+  [[nodiscard]] std::set<TileId> to_reload(const MapCorrection& correction) const;
   [[nodiscard]] double reach_m() const { return config.max_range_m + 2.0 * config.tile_size_m; }
 
   StaticMapConfig config;
@@ -221,6 +227,66 @@ void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns) {
     // Counts changed in all of them; only tiles with a voxel to hide are published again.
     tiles.touch(*near[i], hides[i] != 0);
   }
+}
+
+std::set<TileId> StaticMap::State::to_reload(const MapCorrection& correction) const {
+  std::set<TileId> wanted;
+  std::optional<Eigen::Vector3d> last_map;
+  for (const MapCorrection::Pose& pose : correction.poses()) {
+    const bool is_near = last_map && (pose.position_map - *last_map).norm() < config.tile_size_m;
+    if (is_near || MapCorrection::max_shift_m(pose, config.max_range_m) < 0.5 * config.voxel_size_m)
+      continue;
+    last_map = pose.position_map;
+    const Eigen::Vector3d corrected_map = pose.T_new_old * pose.position_map;
+    for (const Eigen::Vector3d& position_map : {pose.position_map, corrected_map}) {
+      const auto near =
+          tiles.non_resident_near(position_map, config.max_range_m + config.tile_size_m);
+      wanted.insert(near.begin(), near.end());
+    }
+  }
+  return wanted;
+}
+
+std::optional<CorrectedMap> StaticMap::correct(const MapCorrection& correction,
+                                               std::size_t limit_bytes) {
+  MapTiles& tiles = state_->tiles;
+  const std::set<TileId> stored = state_->to_reload(correction);
+  std::size_t bytes = stored.empty() ? 0 : tiles.memory_use().bytes;
+  for (const TileId id : stored) bytes += tiles.expected_bytes(id);
+  if (bytes > limit_bytes) return std::nullopt;
+  for (const TileId id : stored) static_cast<void>(tiles.reload(id));
+
+  const TileCorrection mover(correction, tiles.grid(), tiles.stamps(),
+                             [&tiles](TileId id) { return !tiles.is_known_non_resident(id); });
+  const std::vector<LiveTile*> sources = tiles.residents();
+  std::vector<TileCorrection::Moved> taken(sources.size());
+  tbb::parallel_for(std::size_t{0}, sources.size(),
+                    [&](std::size_t i) { taken[i] = mover.take(*sources[i]); });
+  CorrectedMap corrected;
+  std::map<TileId, TileCorrection::Moved> parts;
+  std::set<TileId> changed;
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (taken[i].voxels.empty() && taken[i].places.empty()) continue;
+    changed.insert(sources[i]->id());
+    corrected.moved_voxels += taken[i].voxels.size();
+    for (auto& voxel : taken[i].voxels) parts[voxel.tile].voxels.push_back(voxel);
+    for (auto& place : taken[i].places) parts[place.tile].places.push_back(place);
+    taken[i] = {};
+  }
+  std::vector<std::pair<LiveTile*, TileCorrection::Moved*>> targets;
+  for (auto& [id, moved] : parts) {
+    targets.emplace_back(tiles.tile(id), &moved);
+    changed.insert(id);
+  }
+  tbb::parallel_for(std::size_t{0}, targets.size(), [&](std::size_t i) {
+    state_->enter_session(*targets[i].first);
+    mover.put(*targets[i].first, std::move(*targets[i].second));
+  });
+  tiles.begin_step();
+  for (const TileId id : changed) tiles.touch(*tiles.resident(id));
+  corrected.changed_tiles = changed.size();
+  state_->forget_views();
+  return corrected;
 }
 
 ClassEvidence StaticMap::evidence_at(const Eigen::Vector3d& position_map) const {

@@ -4,12 +4,14 @@
 #include <limits>
 #include <map>
 #include <memory>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/range_image_view.hpp"
+#include "core/map/map_correction.hpp"
 #include "core/map/tile.hpp"
 #include "core/map/tile_evidence.hpp"
 
@@ -107,6 +109,13 @@ class StaticMap {
   /// voxel that is new as many as earlier scans saw through its place. What stood there is not part
   /// of the static world, whatever its class.
   void clear_seen_through(RangeImageView view, std::int64_t stamp_ns);
+
+  /// Moves what was seen from poses that were wrong, by TileCorrection. Non-resident tiles that
+  /// change are reloaded: nothing, and the map stays as it is, where it would then take more than
+  /// `limit_bytes`. What cannot be read, or would go where a tile cannot be, stays where it is.
+  std::optional<CorrectedMap> correct(
+      const MapCorrection& correction,
+      std::size_t limit_bytes = std::numeric_limits<std::size_t>::max());
 
   /// The tiles whose footprint meets the box (map frame [m]), resident or not, also those that show
   /// nothing; sorted. Of those that show something, the first `max_shown`.
