@@ -120,6 +120,16 @@ void LabelSynchronizer::remember_labelled(PosedScan posed) {
   last_labelled_image_.reset();
 }
 
+void LabelSynchronizer::correct(const MapCorrection& correction) {
+  const auto move = [&correction](PosedScan& posed) {
+    if (const auto* const T_new_old = correction.at(posed.labelled.scan.stamp_ns))
+      posed.T_map_lidar = *T_new_old * posed.T_map_lidar;
+  };
+  std::ranges::for_each(pending_, move);
+  if (last_labelled_) move(*last_labelled_);
+  last_labelled_image_.reset();
+}
+
 void LabelSynchronizer::reset() {
   pending_.clear();
   last_labelled_.reset();

@@ -11,6 +11,7 @@
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/map/label_propagation.hpp"
+#include "core/map/map_correction.hpp"
 #include "core/map/static_map.hpp"
 #include "core/segmentation_pipeline.hpp"
 
@@ -72,6 +73,9 @@ class LabelSynchronizer {
   /// labels are pending is kept until submit() receives them. `labelled` holds `labels.labels`.
   void insert(const LabelledScan& labelled, const Labels& labels,
               const Eigen::Isometry3d& T_map_lidar, StaticMap& map);
+
+  /// Moves the scans that it keeps.
+  void correct(const MapCorrection& correction);
 
   /// Forgets all pending and the last labelled scan.
   void reset();

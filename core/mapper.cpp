@@ -67,9 +67,10 @@ std::optional<MappedScan> Mapper::process(
   const std::optional<Scan> with_times = hands_out_scans_ ? std::optional(scan) : std::nullopt;
   const std::optional<InertialMotion> inertial = inertial_motion(scan.stamp_ns, sweep);
   odometry_.sweep_motion(sweep, inertial).move_to_middle(scan, sweep);
-  const auto T_map_lidar_known = levelled(T_map_lidar_prior, scan.stamp_ns, sweep);
+  const auto T_odom_lidar_known =
+      in_odometry_frame(levelled(T_map_lidar_prior, scan.stamp_ns, sweep));
   const Eigen::Isometry3d T_map_lidar_expected =
-      T_map_lidar_known.value_or(odometry_.predict(middle_ns, inertial));
+      T_map_odom_ * T_odom_lidar_known.value_or(odometry_.predict(middle_ns, inertial));
   LabelSynchronizer::Labels labels = label_synchronizer_.labels_for(
       scan, std::move(submission), T_map_lidar_expected, static_map_);
   if (with_times && listeners_.scan_prepared) {
@@ -81,7 +82,9 @@ std::optional<MappedScan> Mapper::process(
   // Register: the pose, and what moves.
   add_prior_map_near(T_map_lidar_expected.translation());
   Odometry::Step step =
-      odometry_.register_scan(scan, sweep, labels.labels, T_map_lidar_known, inertial);
+      odometry_.register_scan(scan, sweep, labels.labels, T_odom_lidar_known, inertial);
+  const Eigen::Isometry3d T_odom_lidar = step.result.T_map_lidar;
+  move_to_map(step.result);
   confirm_relocation(step.result);
   teach_inertial(middle_ns, step);
   is_placed_ |= step.result.health != OdometryHealth::lost;
@@ -92,7 +95,8 @@ std::optional<MappedScan> Mapper::process(
   MappedScan mapped{step.result,
                     labels.provenance,
                     {std::move(scan), std::move(labels.labels), std::move(step.motion)},
-                    labels.unlabelled_may_move()};
+                    labels.unlabelled_may_move(),
+                    T_odom_lidar};
   if (step.result.is_confirmed)
     label_synchronizer_.insert(mapped.labelled, labels, step.result.T_map_lidar, static_map_);
   trajectory_.push_back({mapped.labelled.scan.stamp_ns, step.result.T_map_lidar});
@@ -102,6 +106,42 @@ std::optional<MappedScan> Mapper::process(
   }
   end_stage("static_map");
   return mapped;
+}
+
+std::optional<Eigen::Isometry3d> Mapper::in_odometry_frame(
+    const std::optional<Eigen::Isometry3d>& T_map_lidar) const {
+  if (!T_map_lidar || !is_corrected_) return T_map_lidar;
+  return T_map_odom_.inverse() * *T_map_lidar;
+}
+
+void Mapper::move_to_map(OdometryResult& result) const {
+  if (!is_corrected_) return;
+  result.T_map_lidar = T_map_odom_ * result.T_map_lidar;
+  Eigen::Matrix<double, 6, 6> turn = Eigen::Matrix<double, 6, 6>::Zero();
+  turn.topLeftCorner<3, 3>() = T_map_odom_.linear();
+  turn.bottomRightCorner<3, 3>() = T_map_odom_.linear();
+  result.covariance = turn * result.covariance * turn.transpose();
+}
+
+std::optional<CorrectedMap> Mapper::correct(const MapCorrection& correction,
+                                            std::size_t limit_bytes) {
+  const auto corrected = static_map_.correct(correction, limit_bytes);
+  if (!corrected) return std::nullopt;
+  for (StampedPose& pose : trajectory_) {
+    if (const auto* const T_new_old = correction.at(pose.stamp_ns))
+      pose.T_map_lidar = *T_new_old * pose.T_map_lidar;
+  }
+  label_synchronizer_.correct(correction);
+  T_map_odom_ = correction.latest() * T_map_odom_;
+  is_corrected_ = true;
+  if (prior_map_added_at_map_)
+    prior_map_added_at_map_ = correction.latest() * *prior_map_added_at_map_;
+  return corrected;
+}
+
+void Mapper::forget_corrections() {
+  T_map_odom_ = Eigen::Isometry3d::Identity();
+  is_corrected_ = false;
 }
 
 std::optional<InertialMotion> Mapper::inertial_motion(std::int64_t stamp_ns,
@@ -210,6 +250,7 @@ void Mapper::reset(std::uint64_t map_id) {
 
 void Mapper::clear_scan_state() {
   odometry_.begin_map();
+  forget_corrections();
   label_synchronizer_.reset();
   trajectory_.clear();
   last_middle_.reset();
@@ -223,6 +264,7 @@ void Mapper::clear_scan_state() {
 
 void Mapper::relocate(Odometry followed, int confirming_scans) {
   odometry_ = std::move(followed);
+  forget_corrections();
   odometry_.begin_map(relocation_reach_m);
   scans_to_confirm_ = confirming_scans;
   confirming_scans_ = 0;
@@ -261,7 +303,12 @@ void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {
     const Eigen::AlignedBox3d bounds_map = tile->info.bounds_map.cast<double>();
     if (bounds_map.exteriorDistance(position_map) > config_.static_map.max_range_m) continue;
     for (const Voxel& voxel : tile->voxels) {
-      points_map.push_back({voxel.mean_map, voxel.evidence.winner()});
+      points_map.push_back(
+          {is_corrected_
+               ? Eigen::Vector3f(
+                     (T_map_odom_.inverse() * voxel.mean_map.cast<double>()).cast<float>())
+               : voxel.mean_map,
+           voxel.evidence.winner()});
     }
   }
   odometry_.add_prior_map(points_map);

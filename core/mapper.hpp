@@ -13,6 +13,7 @@
 #include "core/lidar/prepare.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/lidar/trajectory.hpp"
+#include "core/map/map_correction.hpp"
 #include "core/map/static_map.hpp"
 #include "core/odometry/odometry.hpp"
 #include "core/odometry/odometry_state.hpp"
@@ -38,6 +39,8 @@ struct MappedScan {
   LabelledScan labelled;
   /// Points without a class may be movers that came into sight: they make no voxels.
   bool unlabelled_may_move = false;
+  /// The same pose in the odometry's own frame, which no correction of the map moves.
+  Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
 };
 
 /// Why a scan was not mapped.
@@ -122,6 +125,13 @@ class Mapper {
   /// What is stored of it, what of it is in memory, and what was removed from it.
   [[nodiscard]] StaticMap& static_map() { return static_map_; }
 
+  /// Poses of this map were wrong by that: moves the static map, the poses so far, and all that
+  /// follow by the last of them. Odometry goes on in its own frame and never hears of it. Nothing,
+  /// and all stays as it is, where StaticMap::correct does nothing.
+  std::optional<CorrectedMap> correct(
+      const MapCorrection& correction,
+      std::size_t limit_bytes = std::numeric_limits<std::size_t>::max());
+
   /// Forgets poses and takes over a stored static map; the next scans extend it. The next scan is
   /// looked for in it, round its prior or the map's origin, and all register against what is stored
   /// near them. Throws std::invalid_argument for voxels or tiles of another size than configured,
@@ -149,6 +159,12 @@ class Mapper {
   [[nodiscard]] std::optional<Eigen::Isometry3d> levelled(
       const std::optional<Eigen::Isometry3d>& T_map_lidar_prior, std::int64_t stamp_ns,
       const SweepTimes& sweep) const;
+  [[nodiscard]] std::optional<Eigen::Isometry3d> in_odometry_frame(
+      const std::optional<Eigen::Isometry3d>& T_map_lidar) const;
+  /// What odometry says in its own frame, in the map.
+  void move_to_map(OdometryResult& result) const;
+  /// Odometry begins in the frame of the map.
+  void forget_corrections();
   /// Rotation by the IMU from the last pose on.
   [[nodiscard]] std::optional<InertialMotion> inertial_motion(std::int64_t stamp_ns,
                                                               const SweepTimes& sweep);
@@ -161,9 +177,12 @@ class Mapper {
   MapperListeners listeners_;
   LabelSynchronizer label_synchronizer_;
   InertialTracker inertial_;
-  /// Of the last scan that was registered, in the middle of its sweep.
+  /// Of the last scan that was registered, in the middle of its sweep; in the odometry's frame.
   std::optional<StampedPose> last_middle_;
   Odometry odometry_;
+  /// Corrections of the map so far.
+  Eigen::Isometry3d T_map_odom_ = Eigen::Isometry3d::Identity();
+  bool is_corrected_ = false;
   StaticMap static_map_;
   /// Tiles of a resumed map, and where their points were last added to the odometry's local map.
   TileTable resumed_tiles_;

@@ -27,6 +27,9 @@ class OdomFrame {
   OdomPose update(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map_base, OdometryHealth health,
                   const std::optional<Eigen::Isometry3d>& motion_prior = std::nullopt);
 
+  /// The map was corrected; poses in odom stay as they are.
+  void correct_map(const Eigen::Isometry3d& T_new_old) { T_map_base_ = T_new_old * T_map_base_; }
+
   /// Poses are from now on in another map.
   void begin_map() { is_connected_ = false; }
 

@@ -1,0 +1,47 @@
+#include "core/graph/live_loop_closer.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace stillmap {
+
+std::optional<MapCorrection> LiveLoopCloser::add(const LabelledScan& scan,
+                                                 const Eigen::Isometry3d& T_odom_lidar,
+                                                 bool is_confirmed) {
+  if (!end_reason_.empty()) return std::nullopt;
+  const std::int64_t stamp_ns = scan.scan.stamp_ns;
+  if (!stamps_ns_.empty() && stamp_ns <= stamps_ns_.back()) {
+    // Voxels name the times at which they were seen, and these are two times now.
+    end_reason_ = "the clock of the scans was set back";
+    return std::nullopt;
+  }
+  stamps_ns_.push_back(stamp_ns);
+  T_map_lidar_.push_back(T_map_odom_ * T_odom_lidar);
+  closer_.add(scan, T_odom_lidar, is_confirmed);
+  if (closer_.submaps().size() == known_submaps_) return std::nullopt;
+  known_submaps_ = closer_.submaps().size();
+  if (closer_.submap_bytes() > config_.max_submap_bytes)
+    end_reason_ = "what is kept of the drive to find loops by has reached its limit";
+  return correction();
+}
+
+std::optional<MapCorrection> LiveLoopCloser::correction() {
+  // Without any, also where the last one was denied, poses are the odometry's.
+  if (closer_.closures().empty() && known_closures_ == 0) return std::nullopt;
+  const std::vector<Eigen::Isometry3d> corrected = closer_.corrected_poses();
+  std::vector<MapCorrection::Pose> poses(corrected.size());
+  double max_shift_m = 0.0;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    poses[i] = {stamps_ns_[i], T_map_lidar_[i].translation(),
+                corrected[i] * T_map_lidar_[i].inverse()};
+    max_shift_m = std::max(max_shift_m, MapCorrection::max_shift_m(poses[i], config_.range_m));
+  }
+  if (max_shift_m < config_.min_shift_m) return std::nullopt;
+  known_closures_ = closer_.closures().size();
+  T_map_lidar_ = corrected;
+  MapCorrection correction(std::move(poses));
+  T_map_odom_ = correction.latest() * T_map_odom_;
+  return correction;
+}
+
+}  // namespace stillmap

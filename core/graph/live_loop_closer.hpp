@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/graph/loop_closer.hpp"
+#include "core/map/map_correction.hpp"
+
+namespace stillmap {
+
+struct LiveLoopConfig {
+  LoopClosingConfig closing;
+  /// A correction that moves nothing by this much waits for the next one: half a voxel [m].
+  double min_shift_m = 0.1;
+  /// How far from the lidar things are that a turn is to move by that [m].
+  double range_m = 20.0;
+  /// Of all submaps: beyond it loops stay open.
+  std::size_t max_submap_bytes = std::size_t{1} << 30;
+};
+
+/// Closes the loops of a map that grows meanwhile: says what of it must be moved. NOT thread safe.
+class LiveLoopCloser {
+ public:
+  explicit LiveLoopCloser(const LiveLoopConfig& config)
+      : config_(config), closer_(config.closing) {}
+
+  /// The next scan of the map, by a pose that no correction moved. A correction is of the map as
+  /// the corrections before have left it, and is taken to be carried out.
+  [[nodiscard]] std::optional<MapCorrection> add(const LabelledScan& scan,
+                                                 const Eigen::Isometry3d& T_odom_lidar,
+                                                 bool is_confirmed);
+
+  /// Believed so far.
+  [[nodiscard]] const std::vector<LoopClosure>& closures() const { return closer_.closures(); }
+  [[nodiscard]] std::size_t submap_bytes() const { return closer_.submap_bytes(); }
+  /// Why no more loops are closed; empty while they are.
+  [[nodiscard]] const std::string& end_reason() const { return end_reason_; }
+
+ private:
+  [[nodiscard]] std::optional<MapCorrection> correction();
+
+  LiveLoopConfig config_;
+  LoopCloser closer_;
+  std::vector<std::int64_t> stamps_ns_;
+  /// As they are in the map.
+  std::vector<Eigen::Isometry3d> T_map_lidar_;
+  /// Of scans to come.
+  Eigen::Isometry3d T_map_odom_ = Eigen::Isometry3d::Identity();
+  /// How many were believed when poses were corrected last.
+  std::size_t known_closures_ = 0;
+  std::size_t known_submaps_ = 0;
+  std::string end_reason_;
+};
+
+}  // namespace stillmap

@@ -1,0 +1,119 @@
+#include "core/graph/live_loop_closer.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/graph/street_world.hpp"
+
+namespace stillmap {
+namespace {
+
+/// A drive round the street, whose odometry turns and sinks by a little too much every metre; and a
+/// map of poses that carries out what it is told.
+class LiveDrive {
+ public:
+  explicit LiveDrive(std::uint64_t seed, const LiveLoopConfig& config = {})
+      : world_(seed), closer_(config) {}
+
+  void go(double ways_m) {
+    Eigen::Isometry3d T_drift = Eigen::Isometry3d::Identity();
+    T_drift.translate(Eigen::Vector3d(0, 0, 0.003));
+    T_drift.rotate(Eigen::AngleAxisd(0.0001, Eigen::Vector3d::UnitZ()));
+    for (; way_m_ < ways_m; way_m_ += 1.0) {
+      const Eigen::Isometry3d T = T_map_first_.inverse() * world_.T_map_lidar_at(way_m_, false);
+      if (!truth.empty()) T_odom_lidar_ = T_odom_lidar_ * truth.back().inverse() * T * T_drift;
+      truth.push_back(T);
+      add(T);
+    }
+  }
+
+  void add(const Eigen::Isometry3d& T_truth) {
+    LabelledScan scan = world_.scan_at(T_map_first_ * T_truth, 100 + in_map.size());
+    scan.scan.stamp_ns = stamp_ns(in_map.size()) + clock_offset_ns;
+    // As a mapper does.
+    in_map.push_back(T_map_odom * T_odom_lidar_);
+    const auto correction = closer_.add(scan, T_odom_lidar_, true);
+    if (!correction) return;
+    ++corrections;
+    for (std::size_t i = 0; i < in_map.size(); ++i) {
+      const auto* const T_new_old = correction->at(stamp_ns(i));
+      ASSERT_NE(T_new_old, nullptr);
+      EXPECT_TRUE(correction->poses()[i].position_map.isApprox(in_map[i].translation(), 1e-9) ||
+                  in_map[i].translation().norm() < 1e-6);
+      in_map[i] = *T_new_old * in_map[i];
+    }
+    T_map_odom = correction->latest() * T_map_odom;
+  }
+
+  [[nodiscard]] double rmse_m() const {
+    double sum = 0.0;
+    for (std::size_t i = 0; i < truth.size(); ++i)
+      sum += (in_map[i].translation() - truth[i].translation()).squaredNorm();
+    return std::sqrt(sum / static_cast<double>(truth.size()));
+  }
+  [[nodiscard]] const LiveLoopCloser& closer() const { return closer_; }
+
+  std::vector<Eigen::Isometry3d> truth;
+  std::vector<Eigen::Isometry3d> in_map;
+  Eigen::Isometry3d T_map_odom = Eigen::Isometry3d::Identity();
+  std::int64_t clock_offset_ns = 0;
+  int corrections = 0;
+
+ private:
+  static std::int64_t stamp_ns(std::size_t i) {
+    return 1'000'000'000 + static_cast<std::int64_t>(i) * 100'000'000;
+  }
+
+  StreetWorld world_;
+  LiveLoopCloser closer_;
+  Eigen::Isometry3d T_map_first_ = world_.T_map_lidar_at(0.0, false);
+  Eigen::Isometry3d T_odom_lidar_ = Eigen::Isometry3d::Identity();
+  double way_m_ = 0.0;
+};
+
+TEST(LiveLoopCloser, TheMapIsMovedAsSoonAsAPlaceIsSeenAgain) {
+  LiveDrive drive(11);
+  drive.go(0.95 * StreetWorld::length_m);
+  EXPECT_EQ(drive.corrections, 0);
+  const double open_m = drive.rmse_m();
+  drive.go(1.5 * StreetWorld::length_m);
+  EXPECT_GE(drive.corrections, 1);
+  EXPECT_GE(drive.closer().closures().size(), 3U);
+  EXPECT_LT(drive.rmse_m(), 0.6 * open_m);
+  // What follows is where it belongs, too.
+  EXPECT_LT((drive.in_map.back().translation() - drive.truth.back().translation()).norm(), 0.5);
+}
+
+TEST(LiveLoopCloser, SmallCorrectionsWaitForOneAnother) {
+  LiveLoopConfig patient;
+  patient.min_shift_m = 100.0;
+  LiveDrive drive(11, patient);
+  drive.go(1.4 * StreetWorld::length_m);
+  EXPECT_FALSE(drive.closer().closures().empty());
+  EXPECT_EQ(drive.corrections, 0);
+  EXPECT_TRUE(drive.T_map_odom.isApprox(Eigen::Isometry3d::Identity()));
+}
+
+TEST(LiveLoopCloser, AClockThatIsSetBackLeavesLoopsOpen) {
+  LiveDrive drive(11);
+  drive.go(0.5 * StreetWorld::length_m);
+  drive.clock_offset_ns = -10'000'000'000;
+  drive.go(1.5 * StreetWorld::length_m);
+  EXPECT_EQ(drive.corrections, 0);
+  EXPECT_THAT(drive.closer().end_reason(), testing::HasSubstr("set back"));
+}
+
+TEST(LiveLoopCloser, MemoryIsBounded) {
+  LiveLoopConfig small;
+  small.max_submap_bytes = 1'000'000;
+  LiveDrive drive(11, small);
+  drive.go(0.6 * StreetWorld::length_m);
+  const std::size_t bytes = drive.closer().submap_bytes();
+  EXPECT_THAT(drive.closer().end_reason(), testing::HasSubstr("limit"));
+  drive.go(1.5 * StreetWorld::length_m);
+  EXPECT_EQ(drive.closer().submap_bytes(), bytes);
+  EXPECT_EQ(drive.corrections, 0);
+}
+
+}  // namespace
+}  // namespace stillmap
