@@ -16,6 +16,7 @@
 #include "initial_pose.h"
 #include "tests/localization/yard_map.hpp"
 #include "tests/server/server_process.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -29,6 +30,8 @@ using geometry_msgs::msg::PoseWithCovarianceStamped;
 constexpr int mapped_scans = 180;
 /// More than 60 m from there.
 constexpr int elsewhere = 60;
+/// For one look at the whole map. Under a sanitizer that takes a minute.
+constexpr std::chrono::seconds search_patience(slowdown == 1 ? 2 : 20);
 
 /// A scan of the next day by its stamp, too: the server knows a recording that is played again.
 simulation::SimulatedScan tomorrow(const simulation::Simulation& simulation, int k) {
@@ -119,7 +122,7 @@ class Relocation : public testing::Test {
       if (!is_searching) continue;
       static_cast<void>(eventually(
           [&] { return is_done() || counter("places_tried") > before.counter("places_tried"); },
-          2s));
+          search_patience));
     }
     return k;
   }
