@@ -157,6 +157,8 @@ struct MapFileConfig {
   std::uint32_t standing_mib_per_hour = 3;
   /// Resume the map in `file` when it exists; else start empty.
   bool load_at_start = true;
+  /// Correct map and path where the robot comes back to a place of a map that this run began.
+  bool close_loops = true;
   /// How many maps, and how many MiB of them, clients may have saved or kept beside `file`.
   std::uint32_t saved_maps = 100;
   std::uint32_t saved_maps_mib = 51200;

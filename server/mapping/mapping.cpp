@@ -3,6 +3,15 @@
 #include <utility>
 
 namespace stillmap::server {
+namespace {
+
+LiveLoopConfig live_loops(const ServerConfig& config) {
+  LiveLoopConfig loops;
+  loops.min_shift_m = 0.5 * config.mapper.static_map.voxel_size_m;
+  return loops;
+}
+
+}  // namespace
 
 Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
                  const MappingContext& context)
@@ -24,6 +33,7 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
     initial_pose_.emplace(context.participant, config.topics.initial_pose, config.frames.map,
                           place_finder_, context.statistics);
   }
+  if (config.map.close_loops) loops_.emplace(live_loops(config), context.statistics);
   const MappingOutputs outputs{
       .poses = &poses_,
       .scans = labelled_scans_ ? &*labelled_scans_ : nullptr,
@@ -32,6 +42,7 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
       .imu = imu_ ? &*imu_ : nullptr,
       .occupancy = context.occupancy,
       .place_finder = &place_finder_,
+      .loops = loops_ ? &*loops_ : nullptr,
       .throttle = &context.throttle};
   thread_.emplace(config, std::move(segmenter), storage_.take_loaded(),
                   storage_.saver().tile_store(), scans_, context.statistics, storage_.latest_map(),

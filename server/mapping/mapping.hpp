@@ -11,6 +11,7 @@
 #include "idl/interface/topics.hpp"
 #include "server/localization/initial_pose_receiver.hpp"
 #include "server/mapping/imu_receiver.hpp"
+#include "server/mapping/loop_corrector.hpp"
 #include "server/mapping/map_storage.hpp"
 #include "server/mapping/mapping_thread.hpp"
 #include "server/mapping/odometry_prior.hpp"
@@ -79,6 +80,7 @@ class Mapping {
   std::optional<StaticTransforms> static_transforms_;
   std::optional<ImuReceiver> imu_;
   PlaceFinder place_finder_;
+  std::optional<LoopCorrector> loops_;
   std::optional<InitialPoseReceiver> initial_pose_;
   // Each uses what stands above it, and stops before it.
   std::optional<MappingThread> thread_;

@@ -164,7 +164,37 @@ void MappingThread::begin_map(SharedTrajectory trajectory) {
   latest_map_.begin(mapper_.map_snapshot(), std::move(trajectory));
   if (odom_) odom_->begin_map();
   if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
+  if (outputs_.loops != nullptr) outputs_.loops->begin_map(latest_map_.view()->tiles.empty());
   if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
+}
+
+void MappingThread::close_loops() {
+  if (outputs_.loops == nullptr || is_map_frozen_) return;
+  const auto correction = outputs_.loops->take();
+  if (!correction) return;
+  const auto began = Clock::now();
+  const auto corrected = mapper_.correct(*correction, map_limit_bytes_);
+  if (!corrected) {
+    outputs_.loops->end_map();
+    statistics_.count("map_corrections_refused");
+    spdlog::error(
+        "loops stay open: to move what was seen on the way, more of the map would have to be in "
+        "memory than map.memory_limit_mib allows");
+    return;
+  }
+  latest_map_.correct(*correction, mapper_.map_snapshot());
+  if (odom_) odom_->correct_map(correction->latest());
+  T_map_odom_ = correction->latest() * T_map_odom_;
+  // What it looks at is not there any more.
+  if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
+  if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
+  statistics_.count("map_corrections");
+  const double ms = milliseconds(Clock::now() - began);
+  statistics_.add_latency("correction", ms);
+  spdlog::info(
+      "map corrected in {:.0f} ms: {} voxels moved, {} tiles changed; the robot by {:.2f} m", ms,
+      corrected->moved_voxels, corrected->changed_tiles,
+      MapCorrection::max_shift_m(correction->poses().back(), 0.0));
 }
 
 void MappingThread::publish_now() {
@@ -320,6 +350,7 @@ void MappingThread::run_between_scans(std::function<void()> action) {
 }
 
 void MappingThread::end_round(bool is_idle) {
+  close_loops();
   run_requests();
   if (is_idle || Clock::now() - snapshot_published_ >= publish_period_) publish_snapshot();
 }
@@ -385,14 +416,18 @@ void MappingThread::forward(MappedScan mapped) {
     const bool has_own_labels = mapped.label_provenance == LabelProvenance::fresh;
     outputs_.place_finder->keep_last(labelled, has_own_labels, frames_.T_base_lidar());
   }
+  if (outputs_.loops != nullptr)
+    outputs_.loops->add(labelled, mapped.T_odom_lidar, mapped.odometry.is_confirmed);
   if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frames_.lidar());
 }
 
 std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) {
   motion_prior_.reset();
   if (outputs_.place_finder != nullptr) {
-    if (const auto T_map_lidar = outputs_.place_finder->relocate(mapper_, stamp_ns))
+    if (const auto T_map_lidar = outputs_.place_finder->relocate(mapper_, stamp_ns)) {
+      if (outputs_.loops != nullptr) outputs_.loops->end_map();
       return T_map_lidar;
+    }
   }
   if (!mapper_.trajectory().empty()) {
     motion_prior_ = motion_prior(stamp_ns);

@@ -16,6 +16,7 @@
 #include "server/localization/place_finder.hpp"
 #include "server/mapping/imu_receiver.hpp"
 #include "server/mapping/imu_report.hpp"
+#include "server/mapping/loop_corrector.hpp"
 #include "server/mapping/map_saver.hpp"
 #include "server/mapping/odometry_prior.hpp"
 #include "server/mapping/robot_frames.hpp"
@@ -39,6 +40,7 @@ struct MappingOutputs {
   ImuReceiver* imu = nullptr;
   OccupancyThread* occupancy = nullptr;
   PlaceFinder* place_finder = nullptr;
+  LoopCorrector* loops = nullptr;
   BackgroundThrottle* throttle = nullptr;
 };
 
@@ -110,6 +112,8 @@ class MappingThread : public CheckpointSource {
   void feed_imu(const Scan& scan);
   /// Runs the requests, and publishes the map when that is due.
   void end_round(bool is_idle);
+  /// Moves map and path where a place was seen again.
+  void close_loops();
   /// Publishes a new map, and starts a new octree from it.
   void begin_map(SharedTrajectory trajectory);
   void forward(MappedScan mapped);

@@ -16,6 +16,28 @@ void LatestMap::begin(std::shared_ptr<const MapSnapshot> view, SharedTrajectory 
   health_ = OdometryHealth::initialised;
 }
 
+void LatestMap::correct(const MapCorrection& correction, std::shared_ptr<const MapSnapshot> view) {
+  publish(std::move(view));
+  SharedTrajectory corrected = trajectory();
+  const SharedTrajectory before = corrected;
+  const std::size_t begin = [this] {
+    const std::scoped_lock lock(mutex_);
+    return session_begin_;
+  }();
+  corrected.truncate(begin);
+  for (std::size_t i = begin; i < before.size(); ++i) {
+    StampedPose pose = before[i];
+    if (const auto* const T_new_old = correction.at(pose.stamp_ns))
+      pose.T_map_lidar = *T_new_old * pose.T_map_lidar;
+    corrected.push_back(pose);
+  }
+  // Only the mapping thread adds poses: none came meanwhile.
+  const std::scoped_lock lock(mutex_);
+  trajectory_ = std::move(corrected);
+  // The path is another one, though no pose was added.
+  ++poses_added_;
+}
+
 void LatestMap::publish(std::shared_ptr<const MapSnapshot> view) {
   // Only the mapping thread publishes views, so the state cannot change between the two locks.
   const MapState before = state();

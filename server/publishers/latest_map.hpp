@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/lidar/shared_trajectory.hpp"
+#include "core/map/map_correction.hpp"
 #include "core/map/query/tile_history.hpp"
 #include "core/map/tile.hpp"
 #include "core/odometry/odometry_state.hpp"
@@ -26,6 +27,9 @@ class LatestMap {
   /// Removes poses of this session with the same or later stamps first: a clock that was set back
   /// replaces what it said. A lost pose changes health and label source alone.
   void add_pose(const StampedPose& pose, OdometryHealth health, const std::string& label_source);
+
+  /// The poses of this session were wrong by that; published with the view that it led to.
+  void correct(const MapCorrection& correction, std::shared_ptr<const MapSnapshot> view);
 
   /// Never null once `begin` was called.
   [[nodiscard]] std::shared_ptr<const MapSnapshot> view() const;

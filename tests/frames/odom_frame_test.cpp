@@ -87,6 +87,15 @@ TEST(OdomFrame, DoesNotJumpWithAnotherMap) {
   EXPECT_TRUE(frame.update(21 * period_ns, next, good).T_odom_base.isApprox(on_road(21), 1e-6));
 }
 
+TEST(OdomFrame, DoesNotMoveWhenTheMapIsCorrected) {
+  OdomFrame frame = driven(20);
+  const Eigen::Isometry3d T_new_old = from_xyz_rpy({0.6, -0.4, 0.1}, {0.0, 0.0, 0.01});
+  frame.correct_map(T_new_old);
+  const OdomPose pose = frame.update(20 * period_ns, T_new_old * on_road(20), good);
+  EXPECT_TRUE(pose.T_odom_base.isApprox(on_road(20), 1e-9));
+  EXPECT_TRUE(pose.T_map_odom.isApprox(T_new_old, 1e-9));
+}
+
 TEST(OdomFrame, DoesNotJumpWithOneWrongPose) {
   OdomFrame frame = driven(20);
   const Eigen::Isometry3d aside = Eigen::Translation3d(0.0, 4.0, 0.0) * on_road(20);

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+
+#include "core/graph/live_loop_closer.hpp"
+#include "core/lidar/labelled_scan.hpp"
+#include "core/map/map_correction.hpp"
+#include "server/monitoring/statistics.hpp"
+#include "server/threads/bounded_queue.hpp"
+#include "server/threads/worker.hpp"
+
+namespace stillmap::server {
+
+/// Finds places that the robot comes back to, on a thread of its own, for the mapping thread to
+/// correct the map by. All functions are the mapping thread's.
+class LoopCorrector {
+ public:
+  /// The statistics must outlive it.
+  LoopCorrector(const LiveLoopConfig& config, Statistics& statistics);
+
+  /// Another map began. In one that was loaded no loops are closed: poses of earlier runs are not
+  /// known scan by scan.
+  void begin_map(bool is_new);
+  /// The robot was set elsewhere: what odometry says of the way until there is not true.
+  void end_map() { begin_map(false); }
+  /// A scan of the map; the oldest that waits gives way where the search does not keep up.
+  void add(std::shared_ptr<const LabelledScan> labelled, const Eigen::Isometry3d& T_odom_lidar,
+           bool is_confirmed);
+  /// What is to be moved, once; it has to be.
+  [[nodiscard]] std::optional<MapCorrection> take();
+
+ private:
+  struct ScanOfMap {
+    std::uint64_t map = 0;
+    std::shared_ptr<const LabelledScan> labelled;
+    Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
+    bool is_confirmed = false;
+  };
+
+  // Of the worker.
+  void look_at(const ScanOfMap& scan);
+
+  LiveLoopConfig config_;
+  Statistics& statistics_;
+  /// Maps are numbered; 0: loops stay open.
+  std::uint64_t map_ = 0;
+  std::uint64_t maps_ = 0;
+
+  std::mutex mutex_;
+  struct Found {
+    std::uint64_t map = 0;
+    MapCorrection correction;
+  };
+  std::optional<Found> found_;
+
+  // Of the worker.
+  std::uint64_t closed_map_ = 0;
+  std::optional<LiveLoopCloser> closer_;
+  std::size_t reported_ = 0;
+
+  BoundedQueue<ScanOfMap> scans_;
+  // Last: stops before what it uses is gone.
+  std::optional<Worker<ScanOfMap>> worker_;
+};
+
+}  // namespace stillmap::server

@@ -1,0 +1,111 @@
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <map>
+#include <mutex>
+
+#include "core/map/storage/map_file.hpp"
+#include "core/simulation/simulation.hpp"
+#include "tests/server/server_process.hpp"
+#include "tests/slowdown.hpp"
+
+namespace stillmap::test {
+namespace {
+
+/// Twice round some blocks by a lidar of 16 rings, whose odometry is 0.3 m off after a round.
+simulation::SimulationConfig two_rounds() {
+  simulation::SimulationConfig config;
+  config.seed = 1;
+  config.sensor = vlp_16();
+  config.scans = 1250;
+  return config;
+}
+
+/// Of the worst pose, after the best rigid fit.
+double error_m(const std::vector<StampedPose>& path,
+               const std::map<std::int64_t, Eigen::Isometry3d>& truth) {
+  Eigen::Matrix3Xd estimated(3, path.size());
+  Eigen::Matrix3Xd actual(3, path.size());
+  for (std::size_t i = 0; i < path.size(); ++i) {
+    estimated.col(static_cast<Eigen::Index>(i)) = path[i].T_map_lidar.translation();
+    actual.col(static_cast<Eigen::Index>(i)) = truth.at(path[i].stamp_ns).translation();
+  }
+  const Eigen::Matrix4d fit = Eigen::umeyama(estimated, actual, false);
+  return ((fit.topLeftCorner<3, 3>() * estimated).colwise() + fit.topRightCorner<3, 1>() - actual)
+      .colwise()
+      .norm()
+      .maxCoeff();
+}
+
+/// Tiles as a client has them that follows the topic.
+class Follower {
+ public:
+  explicit Follower(Client& client)
+      : subscription_(
+            client.subscribe_tile_index([this](const dds::MapIdentity&, const TileInfo& info) {
+              const std::scoped_lock lock(mutex_);
+              if (info.voxel_count == 0) {
+                hashes_.erase(info.id);
+              } else {
+                hashes_[info.id] = info.content_hash;
+              }
+            })) {}
+  [[nodiscard]] std::map<TileId, std::uint64_t> hashes() {
+    const std::scoped_lock lock(mutex_);
+    return hashes_;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::map<TileId, std::uint64_t> hashes_;
+  Subscription subscription_;
+};
+
+TEST(LoopService, APlaceSeenAgainCorrectsTheMapThatIsServedAndStored) {
+  if (slowdown > 1) GTEST_SKIP() << "1250 scans take an hour under a sanitizer";
+  const ServiceSetup setup("every");
+  setup.add("labels: {source: none}\noccupancy: {enabled: false}\n");
+  ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  Follower follower(client);
+  std::mutex mutex;
+  std::vector<StampedPose> as_published;
+  const Subscription odometry = client.subscribe_odometry([&](const OdometryUpdate& update) {
+    const std::scoped_lock lock(mutex);
+    as_published.push_back(update.pose);
+  });
+  ScanPublisher publisher(setup.publisher(true));
+  ASSERT_TRUE(publisher.wait_for_subscriber(patience));
+  const simulation::Simulation simulation(two_rounds());
+  std::map<std::int64_t, Eigen::Isometry3d> truth;
+  const auto corrections = [&] { return client.status().counter("map_corrections"); };
+  for (int k = 0; k < two_rounds().scans; ++k) {
+    const simulation::SimulatedScan scan = simulation.scan(k);
+    truth[scan.scan.stamp_ns] = scan.T_map_lidar;
+    ASSERT_TRUE(publisher.publish(scan.scan, {}, patience));
+    // No faster than the search for loops, which leaves scans out else.
+    if (k % 10 == 9) {
+      ASSERT_TRUE(wait_for_scans(client, static_cast<std::uint64_t>(k) + 1));
+    }
+  }
+  ASSERT_TRUE(eventually([&] { return corrections() > 0; }));
+  EXPECT_GT(client.status().counter("loops_closed"), 0U);
+
+  // Who followed the map through the correction has what the file has.
+  static_cast<void>(client.save_map());
+  const SavedMap saved = open_map_file(setup.map_file())->load();
+  std::map<TileId, std::uint64_t> stored;
+  for (const auto& tile : saved.view.tiles) stored[tile->info.id] = tile->info.content_hash;
+  EXPECT_TRUE(eventually([&] { return follower.hashes() == stored; }))
+      << follower.hashes().size() << " and " << stored.size() << " tiles";
+
+  const std::vector<StampedPose> path(saved.trajectory.begin(), saved.trajectory.end());
+  ASSERT_EQ(path.size(), truth.size());
+  const std::scoped_lock lock(mutex);
+  EXPECT_LT(error_m(path, truth), 0.6 * error_m(as_published, truth));
+  EXPECT_LT(error_m(path, truth), 0.12);
+}
+
+}  // namespace
+}  // namespace stillmap::test
