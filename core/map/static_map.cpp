@@ -395,6 +395,14 @@ StaticMap::RestoredVoxels StaticMap::restore_removed(RemovalReason reason,
   return restored;
 }
 
+std::string StaticMap::RestoredVoxels::unreadable_text() const {
+  std::ostringstream text;
+  text << count << " voxels are shown again, but " << unreadable.size()
+       << " tiles of the region cannot be read, the first of them (" << unreadable.front().x << ", "
+       << unreadable.front().y << "); the status says why. Ask again when their disk can be read";
+  return text.str();
+}
+
 void StaticMap::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidence) {
   check_sizes(view, state_->config);
   reset(view.map_id);

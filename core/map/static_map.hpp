@@ -138,6 +138,8 @@ class StaticMap {
     std::size_t count = 0;
     /// Those of the tiles that could not be read.
     std::vector<TileId> unreadable;
+    /// Why it is not complete, where any could not.
+    [[nodiscard]] std::string unreadable_text() const;
   };
   /// Shows again what was removed for this reason in this part of these tiles; it stays until a
   /// reset. Non-resident ones are reloaded.

@@ -46,6 +46,16 @@ std::optional<MapCorrection> LoopCorrector::take() {
   return std::move(found->correction);
 }
 
+void LoopCorrector::report(const MapCorrection& correction, const CorrectedMap& corrected,
+                           double ms) {
+  statistics_.count("map_corrections");
+  statistics_.add_latency("correction", ms);
+  spdlog::info(
+      "map corrected in {:.0f} ms: {} voxels moved, {} tiles changed; the robot by {:.2f} m", ms,
+      corrected.moved_voxels, corrected.changed_tiles,
+      MapCorrection::max_shift_m(correction.poses().back(), 0.0));
+}
+
 void LoopCorrector::look_at(const ScanOfMap& scan) {
   if (std::exchange(closed_map_, scan.map) != scan.map) {
     closer_.emplace(config_);

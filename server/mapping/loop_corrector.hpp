@@ -32,6 +32,8 @@ class LoopCorrector {
            bool is_confirmed);
   /// What is to be moved, once; it has to be.
   [[nodiscard]] std::optional<MapCorrection> take();
+  /// It was moved, within this time.
+  void report(const MapCorrection& correction, const CorrectedMap& corrected, double ms);
 
  private:
   struct ScanOfMap {

@@ -6,7 +6,6 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
-#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -43,27 +42,6 @@ constexpr std::size_t no_limit = std::numeric_limits<std::size_t>::max();
 std::size_t map_share_bytes(const MapFileConfig& config) {
   if (config.memory_limit_mib == 0) return no_limit;
   return (std::size_t{config.memory_limit_mib} << 20) / 4 * 3;
-}
-
-// Expected pose of the first scan in a map that was loaded: the stored pose of its very stamp, when
-// a recording is played again, else the last one, where the robot was switched off: a stamp that
-// merely lies within the stored path's times may be that of a clock not set yet. Nothing without a
-// stored path.
-std::optional<Eigen::Isometry3d> pose_in_saved_map(const SharedTrajectory& stored,
-                                                   std::int64_t stamp_ns) {
-  if (stored.empty()) return std::nullopt;
-  const auto then = std::ranges::find(stored, stamp_ns, &StampedPose::stamp_ns);
-  return then == stored.end() ? stored.back().T_map_lidar : then->T_map_lidar;
-}
-
-/// Why a restoration is not complete.
-std::string restored_in_part(const StaticMap::RestoredVoxels& restored) {
-  const TileId first = restored.unreadable.front();
-  std::ostringstream text;
-  text << restored.count << " voxels are shown again, but " << restored.unreadable.size()
-       << " tiles of the region cannot be read, the first of them (" << first.x << ", " << first.y
-       << "); the status says why. Ask again when their disk can be read";
-  return text.str();
 }
 
 }  // namespace
@@ -185,16 +163,9 @@ void MappingThread::close_loops() {
   latest_map_.correct(*correction, mapper_.map_snapshot());
   if (odom_) odom_->correct_map(correction->latest());
   T_map_odom_ = correction->latest() * T_map_odom_;
-  // What it looks at is not there any more.
   if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
   if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
-  statistics_.count("map_corrections");
-  const double ms = milliseconds(Clock::now() - began);
-  statistics_.add_latency("correction", ms);
-  spdlog::info(
-      "map corrected in {:.0f} ms: {} voxels moved, {} tiles changed; the robot by {:.2f} m", ms,
-      corrected->moved_voxels, corrected->changed_tiles,
-      MapCorrection::max_shift_m(correction->poses().back(), 0.0));
+  outputs_.loops->report(*correction, *corrected, milliseconds(Clock::now() - began));
 }
 
 void MappingThread::publish_now() {
@@ -299,7 +270,7 @@ std::size_t MappingThread::restore_removed(RemovalReason reason, const Eigen::Al
     if (is_full) make_room();
   }
   if (!restored.unreadable.empty()) {
-    throw std::runtime_error(restored_in_part(restored));
+    throw std::runtime_error(restored.unreadable_text());
   }
   return restored.count;
 }
@@ -435,7 +406,7 @@ std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns)
     if (!mapper_.is_placed()) return mapper_.trajectory().back().T_map_lidar;
     return std::nullopt;
   }
-  const auto T_map_base_stored = pose_in_saved_map(latest_map_.trajectory(), stamp_ns);
+  const auto T_map_base_stored = latest_map_.pose_in_loaded_path(stamp_ns);
   if (T_map_base_stored) return *T_map_base_stored * frames_.T_base_lidar();
   // A map begins where the robot stands, whichever way its lidar looks.
   if (frames_.has_base()) return frames_.T_base_lidar();

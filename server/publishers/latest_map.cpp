@@ -1,5 +1,6 @@
 #include "server/publishers/latest_map.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <utility>
 
@@ -104,6 +105,13 @@ Trajectory LatestMap::trajectory(std::size_t max_poses) const {
   for (std::size_t i = 0; i < last; i += stride) chosen.push_back(whole[i]);
   chosen.push_back(whole.back());
   return chosen;
+}
+
+std::optional<Eigen::Isometry3d> LatestMap::pose_in_loaded_path(std::int64_t stamp_ns) const {
+  const SharedTrajectory path = trajectory();
+  if (path.empty()) return std::nullopt;
+  const auto then = std::ranges::find(path, stamp_ns, &StampedPose::stamp_ns);
+  return then == path.end() ? path.back().T_map_lidar : then->T_map_lidar;
 }
 
 std::size_t LatestMap::poses_stored() const {

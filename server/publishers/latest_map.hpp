@@ -51,6 +51,11 @@ class LatestMap {
   [[nodiscard]] Trajectory trajectory(std::size_t max_poses) const;
   /// The newest pose that was not lost; the origin before the first.
   [[nodiscard]] StampedPose newest_pose() const;
+  /// Expected pose of the first scan in a map that was loaded: the stored pose of its very stamp,
+  /// when a recording is played again, else the last one, where the robot was switched off: a stamp
+  /// that merely lies within the stored path's times may be that of a clock not set yet. Nothing
+  /// without a stored path.
+  [[nodiscard]] std::optional<Eigen::Isometry3d> pose_in_loaded_path(std::int64_t stamp_ns) const;
   /// Poses of the path.
   [[nodiscard]] std::size_t poses_stored() const;
   /// Poses added so far, over all maps: changes with every scan.
