@@ -99,23 +99,25 @@ std::optional<MappedScan> Mapper::process(
                     T_odom_lidar};
   if (step.result.is_confirmed)
     label_synchronizer_.insert(mapped.labelled, labels, step.result.T_map_lidar, static_map_);
-  trajectory_.push_back({mapped.labelled.scan.stamp_ns, step.result.T_map_lidar});
-  if (trajectory_.size() > 2 * max_poses_) {
-    trajectory_.erase(trajectory_.begin(),
-                      trajectory_.end() - static_cast<std::ptrdiff_t>(max_poses_));
-  }
+  remember({mapped.labelled.scan.stamp_ns, step.result.T_map_lidar});
   end_stage("static_map");
   return mapped;
 }
 
+void Mapper::remember(const StampedPose& pose) {
+  trajectory_.push_back(pose);
+  if (trajectory_.size() <= 2 * max_poses_) return;
+  trajectory_.erase(trajectory_.begin(),
+                    trajectory_.end() - static_cast<std::ptrdiff_t>(max_poses_));
+}
+
 std::optional<Eigen::Isometry3d> Mapper::in_odometry_frame(
     const std::optional<Eigen::Isometry3d>& T_map_lidar) const {
-  if (!T_map_lidar || !is_corrected_) return T_map_lidar;
+  if (!T_map_lidar) return std::nullopt;
   return T_map_odom_.inverse() * *T_map_lidar;
 }
 
 void Mapper::move_to_map(OdometryResult& result) const {
-  if (!is_corrected_) return;
   result.T_map_lidar = T_map_odom_ * result.T_map_lidar;
   Eigen::Matrix<double, 6, 6> turn = Eigen::Matrix<double, 6, 6>::Zero();
   turn.topLeftCorner<3, 3>() = T_map_odom_.linear();
@@ -133,15 +135,9 @@ std::optional<CorrectedMap> Mapper::correct(const MapCorrection& correction,
   }
   label_synchronizer_.correct(correction);
   T_map_odom_ = correction.latest() * T_map_odom_;
-  is_corrected_ = true;
   if (prior_map_added_at_map_)
     prior_map_added_at_map_ = correction.latest() * *prior_map_added_at_map_;
   return corrected;
-}
-
-void Mapper::forget_corrections() {
-  T_map_odom_ = Eigen::Isometry3d::Identity();
-  is_corrected_ = false;
 }
 
 std::optional<InertialMotion> Mapper::inertial_motion(std::int64_t stamp_ns,
@@ -250,7 +246,7 @@ void Mapper::reset(std::uint64_t map_id) {
 
 void Mapper::clear_scan_state() {
   odometry_.begin_map();
-  forget_corrections();
+  T_map_odom_ = Eigen::Isometry3d::Identity();
   label_synchronizer_.reset();
   trajectory_.clear();
   last_middle_.reset();
@@ -264,7 +260,7 @@ void Mapper::clear_scan_state() {
 
 void Mapper::relocate(Odometry followed, int confirming_scans) {
   odometry_ = std::move(followed);
-  forget_corrections();
+  T_map_odom_ = Eigen::Isometry3d::Identity();
   odometry_.begin_map(relocation_reach_m);
   scans_to_confirm_ = confirming_scans;
   confirming_scans_ = 0;
@@ -296,22 +292,19 @@ void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {
   prior_map_added_at_map_ = position_map;
   static_map_.reload_near(position_map);
   const auto view = static_map_.view();
-  std::vector<LabelledPoint> points_map;
+  const Eigen::Isometry3d T_odom_map = T_map_odom_.inverse();
+  std::vector<LabelledPoint> points_odom;
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(config_.static_map.max_range_m);
   for (const auto& tile : tiles_in_box(*view, {position_map - reach, position_map + reach})) {
     if (resumed_tiles_.find(tile->info.id) == nullptr) continue;
     const Eigen::AlignedBox3d bounds_map = tile->info.bounds_map.cast<double>();
     if (bounds_map.exteriorDistance(position_map) > config_.static_map.max_range_m) continue;
     for (const Voxel& voxel : tile->voxels) {
-      points_map.push_back(
-          {is_corrected_
-               ? Eigen::Vector3f(
-                     (T_map_odom_.inverse() * voxel.mean_map.cast<double>()).cast<float>())
-               : voxel.mean_map,
-           voxel.evidence.winner()});
+      const Eigen::Vector3d p_odom = T_odom_map * voxel.mean_map.cast<double>();
+      points_odom.push_back({p_odom.cast<float>(), voxel.evidence.winner()});
     }
   }
-  odometry_.add_prior_map(points_map);
+  odometry_.add_prior_map(points_odom);
 }
 
 void Mapper::end_stage(std::string_view stage) const {

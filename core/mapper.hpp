@@ -163,8 +163,7 @@ class Mapper {
       const std::optional<Eigen::Isometry3d>& T_map_lidar) const;
   /// What odometry says in its own frame, in the map.
   void move_to_map(OdometryResult& result) const;
-  /// Odometry begins in the frame of the map.
-  void forget_corrections();
+  void remember(const StampedPose& pose);
   /// Rotation by the IMU from the last pose on.
   [[nodiscard]] std::optional<InertialMotion> inertial_motion(std::int64_t stamp_ns,
                                                               const SweepTimes& sweep);
@@ -182,7 +181,6 @@ class Mapper {
   Odometry odometry_;
   /// Corrections of the map so far.
   Eigen::Isometry3d T_map_odom_ = Eigen::Isometry3d::Identity();
-  bool is_corrected_ = false;
   StaticMap static_map_;
   /// Tiles of a resumed map, and where their points were last added to the odometry's local map.
   TileTable resumed_tiles_;

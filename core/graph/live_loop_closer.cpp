@@ -10,19 +10,36 @@ std::optional<MapCorrection> LiveLoopCloser::add(const LabelledScan& scan,
                                                  bool is_confirmed) {
   if (!end_reason_.empty()) return std::nullopt;
   const std::int64_t stamp_ns = scan.scan.stamp_ns;
-  if (!stamps_ns_.empty() && stamp_ns <= stamps_ns_.back()) {
+  if (stamp_ns <= std::exchange(last_stamp_ns_, stamp_ns)) {
     // Voxels name the times at which they were seen, and these are two times now.
-    end_reason_ = "the clock of the scans was set back";
+    end("the clock of the scans was set back");
     return std::nullopt;
   }
+  if (!has_moved(T_odom_lidar)) return std::nullopt;
   stamps_ns_.push_back(stamp_ns);
+  T_odom_lidar_last_ = T_odom_lidar;
   T_map_lidar_.push_back(T_map_odom_ * T_odom_lidar);
   closer_.add(scan, T_odom_lidar, is_confirmed);
   if (closer_.submaps().size() == known_submaps_) return std::nullopt;
   known_submaps_ = closer_.submaps().size();
+  auto found = correction();
   if (closer_.submap_bytes() > config_.max_submap_bytes)
-    end_reason_ = "what is kept of the drive to find loops by has reached its limit";
-  return correction();
+    end("what is kept of the drive to find loops by has reached its limit");
+  return found;
+}
+
+bool LiveLoopCloser::has_moved(const Eigen::Isometry3d& T_odom_lidar) const {
+  if (stamps_ns_.empty()) return true;
+  const Eigen::Isometry3d motion = T_odom_lidar_last_.inverse() * T_odom_lidar;
+  return motion.translation().norm() >= config_.scan_spacing_m ||
+         Eigen::AngleAxisd(motion.linear()).angle() >= config_.scan_turn_rad;
+}
+
+void LiveLoopCloser::end(const char* reason) {
+  end_reason_ = reason;
+  closer_ = LoopCloser(config_.closing);
+  stamps_ns_ = {};
+  T_map_lidar_ = {};
 }
 
 std::optional<MapCorrection> LiveLoopCloser::correction() {

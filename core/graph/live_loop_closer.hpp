@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -18,6 +19,10 @@ struct LiveLoopConfig {
   double min_shift_m = 0.1;
   /// How far from the lidar things are that a turn is to move by that [m].
   double range_m = 20.0;
+  /// Scans nearer than this to the last one that was looked at are not: a robot may stand for days
+  /// [m, rad].
+  double scan_spacing_m = 0.1;
+  double scan_turn_rad = 0.02;
   /// Of all submaps: beyond it loops stay open.
   std::size_t max_submap_bytes = std::size_t{1} << 30;
 };
@@ -37,15 +42,23 @@ class LiveLoopCloser {
   /// Believed so far.
   [[nodiscard]] const std::vector<LoopClosure>& closures() const { return closer_.closures(); }
   [[nodiscard]] std::size_t submap_bytes() const { return closer_.submap_bytes(); }
+  [[nodiscard]] std::size_t scans_looked_at() const { return stamps_ns_.size(); }
   /// Why no more loops are closed; empty while they are.
   [[nodiscard]] const std::string& end_reason() const { return end_reason_; }
 
  private:
   [[nodiscard]] std::optional<MapCorrection> correction();
 
+  [[nodiscard]] bool has_moved(const Eigen::Isometry3d& T_odom_lidar) const;
+  /// Frees what was kept to find loops by.
+  void end(const char* reason);
+
   LiveLoopConfig config_;
   LoopCloser closer_;
+  std::int64_t last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
+  /// Of the scans that were looked at.
   std::vector<std::int64_t> stamps_ns_;
+  Eigen::Isometry3d T_odom_lidar_last_ = Eigen::Isometry3d::Identity();
   /// As they are in the map.
   std::vector<Eigen::Isometry3d> T_map_lidar_;
   /// Of scans to come.

@@ -30,6 +30,8 @@ class LoopCorrector {
   /// A scan of the map; the oldest that waits gives way where the search does not keep up.
   void add(std::shared_ptr<const LabelledScan> labelled, const Eigen::Isometry3d& T_odom_lidar,
            bool is_confirmed);
+  /// Scans that are not looked at yet.
+  [[nodiscard]] std::size_t waiting() const { return scans_.waiting(); }
   /// What is to be moved, once; it has to be.
   [[nodiscard]] std::optional<MapCorrection> take();
   /// It was moved, within this time.

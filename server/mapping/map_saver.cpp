@@ -145,6 +145,8 @@ CheckpointScope MapSaver::scope() {
 
 bool MapSaver::has_moved() const {
   if (!T_map_base_saved_ || latest_map_.view()->map_id != saved_map_id_) return true;
+  // A part of a corrected map with a part of the one before is none.
+  if (latest_map_.corrections() != saved_corrections_) return true;
   const Eigen::Isometry3d motion =
       T_map_base_saved_->inverse() * latest_map_.newest_pose().T_map_lidar;
   return motion.translation().norm() > standing_distance_m ||
@@ -156,8 +158,9 @@ bool MapSaver::is_saved() const {
   const auto view = latest_map_.view();
   const std::uint64_t poses = latest_map_.poses_added();
   const bool is_nothing_mapped = poses == 0 && view->tiles.empty();
-  return is_nothing_mapped || (view->map_id == saved_map_id_ && view->version == saved_version_ &&
-                               poses == saved_poses_);
+  return is_nothing_mapped ||
+         (view->map_id == saved_map_id_ && view->version == saved_version_ &&
+          poses == saved_poses_ && latest_map_.corrections() == saved_corrections_);
 }
 
 void MapSaver::save(CheckpointScope scope, bool has_ended) {
@@ -176,6 +179,7 @@ void MapSaver::save(CheckpointScope scope, bool has_ended) {
 bool MapSaver::store(CheckpointScope scope, bool has_ended) {
   MapStore& file = open_store();
   const std::uint64_t poses = latest_map_.poses_added();
+  const std::uint64_t corrections = latest_map_.corrections();
   const bool is_standing = !has_moved();
   const Eigen::Isometry3d T_map_base = latest_map_.newest_pose().T_map_lidar;
   RunCheckpoint checkpoint = take(scope);
@@ -193,7 +197,10 @@ bool MapSaver::store(CheckpointScope scope, bool has_ended) {
   remember_as_saved(checkpoint.map.view, poses);
   if (is_standing) standing_allowance_.spend(bytes);
   is_partial_ = checkpoint.map.is_partial;
-  if (!is_partial_) T_map_base_saved_ = T_map_base;
+  if (!is_partial_) {
+    T_map_base_saved_ = T_map_base;
+    saved_corrections_ = corrections;
+  }
   return true;
 }
 

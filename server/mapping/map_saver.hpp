@@ -217,6 +217,8 @@ class MapSaver {
   std::uint64_t saved_map_id_ = 0;
   std::uint64_t saved_version_ = 0;
   std::uint64_t saved_poses_ = 0;
+  /// Corrections of the path that are stored whole.
+  std::uint64_t saved_corrections_ = 0;
   /// The last save left out what a standing robot gathered.
   bool is_partial_ = false;
   WriteAllowance standing_allowance_;

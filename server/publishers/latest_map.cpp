@@ -35,8 +35,7 @@ void LatestMap::correct(const MapCorrection& correction, std::shared_ptr<const M
   // Only the mapping thread adds poses: none came meanwhile.
   const std::scoped_lock lock(mutex_);
   trajectory_ = std::move(corrected);
-  // The path is another one, though no pose was added.
-  ++poses_added_;
+  ++corrections_;
 }
 
 void LatestMap::publish(std::shared_ptr<const MapSnapshot> view) {
@@ -122,6 +121,11 @@ std::size_t LatestMap::poses_stored() const {
 std::uint64_t LatestMap::poses_added() const {
   const std::scoped_lock lock(mutex_);
   return poses_added_;
+}
+
+std::uint64_t LatestMap::corrections() const {
+  const std::scoped_lock lock(mutex_);
+  return corrections_;
 }
 
 OdometryHealth LatestMap::health() const {

@@ -60,6 +60,8 @@ class LatestMap {
   [[nodiscard]] std::size_t poses_stored() const;
   /// Poses added so far, over all maps: changes with every scan.
   [[nodiscard]] std::uint64_t poses_added() const;
+  /// How often the path was corrected, over all maps.
+  [[nodiscard]] std::uint64_t corrections() const;
   [[nodiscard]] OdometryHealth health() const;
   [[nodiscard]] std::string label_source() const;
 
@@ -72,6 +74,7 @@ class LatestMap {
   /// Where the poses of this session begin in it.
   std::size_t session_begin_ = 0;
   std::uint64_t poses_added_ = 0;
+  std::uint64_t corrections_ = 0;
   OdometryHealth health_ = OdometryHealth::initialised;
   std::string label_source_;
 };

@@ -43,6 +43,24 @@ TEST(LatestMap, KeepsThePathOfEarlierRunsWhateverTheClockSays) {
   EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{10, 20, 30, 1}));
 }
 
+TEST(LatestMap, CorrectsThePosesOfThisSessionAlone) {
+  LatestMap latest_map;
+  latest_map.begin(std::make_shared<const MapSnapshot>(), {{.stamp_ns = 1}, {.stamp_ns = 50}});
+  add(latest_map, 20);
+  add(latest_map, 30);
+  const MapCorrection correction(
+      {{25, Eigen::Vector3d::Zero(), Eigen::Isometry3d(Eigen::Translation3d(1, 2, 3))}});
+  const auto view = std::make_shared<const MapSnapshot>(MapSnapshot{.version = 7, .tiles = {}});
+  latest_map.correct(correction, view);
+  EXPECT_EQ(latest_map.view(), view);
+  EXPECT_EQ(latest_map.corrections(), 1U);
+  const SharedTrajectory path = latest_map.trajectory();
+  ASSERT_EQ(path.size(), 4U);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_TRUE(path[i].T_map_lidar.translation().isZero()) << i;
+  EXPECT_EQ(path[3].T_map_lidar.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(latest_map.newest_pose().T_map_lidar.translation(), Eigen::Vector3d(1, 2, 3));
+}
+
 TEST(LatestMap, KeepsLostPosesOutOfThePath) {
   LatestMap latest_map;
   latest_map.begin(std::make_shared<const MapSnapshot>(), {{.stamp_ns = 1}, {.stamp_ns = 2}});

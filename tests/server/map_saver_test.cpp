@@ -328,6 +328,19 @@ TEST_F(StandingRobot, StoresAtOnceWhatItSeesAppear) {
   EXPECT_EQ(stored().view.tiles.voxel_count(), 60U);
 }
 
+TEST_F(StandingRobot, StoresEverythingWhenItsMapWasCorrected) {
+  stand();
+  scan_and_save(22);
+  ASSERT_EQ(stored().view.tiles.voxel_count(), 20U);
+  const MapCorrection nothing_moves({{0, Eigen::Vector3d::Zero(), Eigen::Isometry3d::Identity()}});
+  latest_map_.correct(nothing_moves, map_.view());
+  saver_.save_if_changed();
+  EXPECT_EQ(stored().view.tiles.voxel_count(), 22U);
+  EXPECT_EQ(stored().trajectory.size(), latest_map_.trajectory().size());
+  scan_and_save(24);
+  EXPECT_EQ(stored().view.tiles.voxel_count(), 22U) << "and goes on as before";
+}
+
 TEST_F(StandingRobot, StoresEverythingWhenItMovesOnAndAtTheEnd) {
   stand();
   scan_and_save(22);
