@@ -15,7 +15,7 @@ FILES ?=
 TILES ?=
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages web-packages configure programs packaged web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 relocalize drives loops sessions ros-messages parity format format-check clean
+.PHONY: help packages web-packages configure programs packaged web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 relocalize drives loops loops-served sessions ros-messages parity format format-check clean
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
@@ -117,6 +117,9 @@ drives: programs ## Every drive, simulated and in RECORDINGS=FOLDER, into tests/
 
 loops: programs ## Drives that come back to where they were: poses before and after, every closure against the truth
 	@/usr/bin/python3 tests/loops/loops.py --program $(BUILD)/bin/stillmap --results $(BUILD)/loops
+
+loops-served: programs ## The same drives through servers with and without loops: paths, maps, pauses
+	@/usr/bin/python3 tests/loops/served.py --programs $(BUILD)/bin --results $(BUILD)/loops
 
 sessions: programs ## Drives of another day put onto a map: every pose and closure against the truth, growth, withdrawal
 	@/usr/bin/python3 tests/loops/sessions.py --program $(BUILD)/bin/stillmap --results $(BUILD)/sessions
