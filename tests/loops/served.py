@@ -42,6 +42,9 @@ def serve(arguments, sequence, sensor, folder, closes):
         server = subprocess.Popen([arguments.programs / "stillmap-server", "--config", folder / "server.yaml"],
                                   stderr=log)
     try:
+        time.sleep(1)
+        if server.poll() is not None:
+            sys.exit(f"the server did not start:\n{(folder / 'server.log').read_text()}")
         replay = [arguments.programs / "stillmap", "replay", sequence, "--lossless", "--timeout", 60, *on_domain]
         call(replay + (["--rate", arguments.rate] if arguments.rate else [])
              + ([] if arguments.labels else ["--no-labels"]))
