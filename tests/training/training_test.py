@@ -14,10 +14,12 @@ import torch
 import yaml
 
 from augmentation import aim, augment_points, crop, draw_motion, drop_beams, in_sector
+from export import trained_for
 from losses import class_weights, lovasz_softmax, weighted_cross_entropy
 from range_images import ImageModel, normalise, project
 from networks import make_network
 from samples import TrainingSamples
+from scans import ScanFiles
 from train import Run
 from validation import Confusion
 
@@ -225,6 +227,19 @@ class Widths(unittest.TestCase):
         self.assertEqual((channels.abs().max(), target.max()), (0, 0))
 
 
+class Sensors(unittest.TestCase):
+    def test_are_told_as_all_that_the_scans_were_of(self):
+        scans = ScanFiles.__new__(ScanFiles)
+        scans.images = [ImageModel(64, 2048, 3, -25), ImageModel(16, 2048, np.float32(15), -15)]
+        self.assertEqual(
+            yaml.safe_load(yaml.safe_dump(scans.trained_for())),
+            {"min_beams": 16, "max_beams": 64, "fov_up_deg": 15, "fov_down_deg": -25},
+        )
+
+    def test_of_a_run_of_an_older_trainer_are_not_guessed(self):
+        self.assertEqual(trained_for({"config": {}}), {})
+
+
 class Numbers(unittest.TestCase):
     def test_are_of_16_bits_where_asked_for(self):
         torch.manual_seed(1)
@@ -285,7 +300,13 @@ class Training(unittest.TestCase):
         self.assertEqual(result.returncode, 0, result.stderr)
         self.assertIn("onednn   int8", result.stdout)
         self.assertTrue((self.root / "model" / "int8.yaml").exists())
-        image = yaml.safe_load((self.root / "model" / "model.yaml").read_text())["image"]
+        description = yaml.safe_load((self.root / "model" / "model.yaml").read_text())
+        # The sequence has no sensor.yaml, and so the rows and the field of view of the configuration.
+        self.assertEqual(
+            description["trained_for"],
+            {"min_beams": 64, "max_beams": 64, "fov_up_deg": 3, "fov_down_deg": -25},
+        )
+        image = description["image"]
         self.assertEqual((image["columns"], image["min_columns"]), (256, 128))
         # A run from that model begins where this one ended.
         self.train(1, "next", f"start_from={self.root / 'model'}")

@@ -25,6 +25,11 @@ def load_run(folder):
     return network.eval(), state
 
 
+def trained_for(state):
+    """The lidars whose scans the run saw; nothing of a run that an older trainer made."""
+    return {"trained_for": state["trained_for"]} if "trained_for" in state else {}
+
+
 def describe_run(arguments, state):
     config = state["config"]
     image = {**config["image"]}
@@ -39,6 +44,7 @@ def describe_run(arguments, state):
         "name": arguments.name or arguments.folder.name,
         "licence": arguments.licence,
         "sensor": arguments.sensor,
+        **trained_for(state),
         "training": arguments.training or f"{state['epoch']} epochs; see config.yaml of the run",
         "accuracy": arguments.accuracy or f"validation mIoU {100 * best:.1f} % of pixels",
     }

@@ -28,8 +28,9 @@ def export_onnx(network, file, rows, columns, free_size):
 
 
 def describe(words, image, mean, deviation, classes, knn, follow_sensor=False):
-    """The content of model.yaml. `words`: name, licence, sensor, training, accuracy; `classes`: name
-    of the class of each output; `knn`: None, or neighbours, window, sigma, cutoff_m."""
+    """The content of model.yaml. `words`: name, licence, sensor, trained_for, training,
+    accuracy; `classes`: name of the class of each output; `knn`: None, or neighbours, window, sigma,
+    cutoff_m."""
     return {
         **words,
         "image": {**image, "follow_sensor": follow_sensor},

@@ -102,6 +102,16 @@ class ScanFiles:
             wanted = min(len(members), -(-most // len(places)))
             yield from members[np.linspace(0, len(members) - 1, wanted).astype(int)]
 
+    def trained_for(self):
+        """The lidars of the scans, as model.yaml tells them: fewest and most beams, and the field of
+        view [degrees] that holds all of theirs."""
+        return {
+            "min_beams": min(int(image.rows) for image in self.images),
+            "max_beams": max(int(image.rows) for image in self.images),
+            "fov_up_deg": max(float(image.fov_up_deg) for image in self.images),
+            "fov_down_deg": min(float(image.fov_down_deg) for image in self.images),
+        }
+
     def class_shares(self, scans=200):
         """Share of every class among all points, from scans spread evenly over each folder."""
         counts = np.zeros(len(CLASS_NAMES))

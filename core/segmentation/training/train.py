@@ -40,6 +40,10 @@ def read_config(file, changes):
     return config
 
 
+# What export.py needs of a run.
+BEST_HOLDS = ("config", "trained_for", "averaged", "epoch", "history")
+
+
 class Rate:
     """Learning rate at each step, as a factor of the highest."""
 
@@ -126,6 +130,7 @@ class Run:
     def save(self):
         state = {
             "config": self.config,
+            "trained_for": self.scans.trained_for(),
             "network": self.network.state_dict(),
             "averaged": self.averaged.state_dict(),
             "optimiser": self.optimiser.state_dict(),
@@ -136,7 +141,7 @@ class Run:
         }
         write_whole(state, self.folder / "last.pt")
         if self.history[-1]["miou"] >= max(entry["miou"] for entry in self.history):
-            best = {key: state[key] for key in ("config", "averaged", "epoch", "history")}
+            best = {key: state[key] for key in BEST_HOLDS}
             write_whole(best, self.folder / "best.pt")
 
     def average(self):

@@ -175,8 +175,9 @@ def main():
     after = run.validate()
     print(f"after: validation mIoU {100 * after.mean_iou():.1f}\n  {after.table()}")
     history = [{"epoch": 1, "loss": math.nan, "miou": after.mean_iou()}]
-    state = {"config": config, "averaged": run.averaged.state_dict(), "epoch": 1}
-    write_whole({**state, "history": history}, arguments.folder / "best.pt")
+    state = {"config": config, "trained_for": run.scans.trained_for(), "epoch": 1}
+    state = {**state, "averaged": run.averaged.state_dict(), "history": history}
+    write_whole(state, arguments.folder / "best.pt")
 
 
 if __name__ == "__main__":
