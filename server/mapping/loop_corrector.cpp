@@ -17,8 +17,11 @@ constexpr std::size_t max_waiting_scans = 20;
 
 }  // namespace
 
-LoopCorrector::LoopCorrector(const LiveLoopConfig& config, Statistics& statistics)
-    : config_(config), statistics_(statistics), scans_(max_waiting_scans) {
+LoopCorrector::LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Statistics& statistics)
+    : config_(config),
+      is_lossless_(is_lossless),
+      statistics_(statistics),
+      scans_(max_waiting_scans) {
   worker_.emplace(
       scans_, [this](const ScanOfMap& scan) { look_at(scan); }, WorkerOptions{.on_start = [] {
         static_cast<void>(use_scheduling(BackgroundScheduling::low));
@@ -34,8 +37,13 @@ void LoopCorrector::begin_map(bool is_new) {
 void LoopCorrector::add(std::shared_ptr<const LabelledScan> labelled,
                         const Eigen::Isometry3d& T_odom_lidar, bool is_confirmed) {
   if (map_ == 0) return;
-  const std::size_t left_out =
-      scans_.push_dropping_oldest({map_, std::move(labelled), T_odom_lidar, is_confirmed});
+  ScanOfMap scan{map_, std::move(labelled), T_odom_lidar, is_confirmed};
+  if (is_lossless_) {
+    // The worker outlives mapping: there is nothing to stop for.
+    static_cast<void>(scans_.push_blocking(std::move(scan), {}));
+    return;
+  }
+  const std::size_t left_out = scans_.push_dropping_oldest(std::move(scan));
   if (left_out > 0) statistics_.count("scans_not_in_loops", left_out);
 }
 

@@ -19,15 +19,16 @@ namespace stillmap::server {
 /// correct the map by. All functions are the mapping thread's.
 class LoopCorrector {
  public:
-  /// The statistics must outlive it.
-  LoopCorrector(const LiveLoopConfig& config, Statistics& statistics);
+  /// The statistics must outlive it. `is_lossless`: mapping waits where the search does not keep
+  /// up; else the oldest scan that waits for it gives way.
+  LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Statistics& statistics);
 
   /// Another map began. In one that was loaded no loops are closed: poses of earlier runs are not
   /// known scan by scan.
   void begin_map(bool is_new);
   /// The robot was set elsewhere: what odometry says of the way until there is not true.
   void end_map() { begin_map(false); }
-  /// A scan of the map; the oldest that waits gives way where the search does not keep up.
+  /// A scan of the map.
   void add(std::shared_ptr<const LabelledScan> labelled, const Eigen::Isometry3d& T_odom_lidar,
            bool is_confirmed);
   /// Scans that are not looked at yet.
@@ -49,6 +50,7 @@ class LoopCorrector {
   void look_at(const ScanOfMap& scan);
 
   LiveLoopConfig config_;
+  bool is_lossless_;
   Statistics& statistics_;
   /// Maps are numbered; 0: loops stay open.
   std::uint64_t map_ = 0;

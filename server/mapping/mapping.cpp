@@ -33,7 +33,10 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
     initial_pose_.emplace(context.participant, config.topics.initial_pose, config.frames.map,
                           place_finder_, context.statistics);
   }
-  if (config.map.close_loops) loops_.emplace(live_loops(config), context.statistics);
+  if (config.map.close_loops) {
+    loops_.emplace(live_loops(config), config.input.delivery == DeliveryMode::every,
+                   context.statistics);
+  }
   const MappingOutputs outputs{
       .poses = &poses_,
       .scans = labelled_scans_ ? &*labelled_scans_ : nullptr,
