@@ -14,7 +14,9 @@ constexpr double line_dominance = 3.0;
 /// No neighbour lies farther from its plane than this [m] (A-LOAM).
 constexpr double plane_thickness_m = 0.2;
 /// Neighbours nearly on one line do not say how their plane is turned about it.
-constexpr double min_plane_width_share = 0.05;
+constexpr double min_plane_width_share = 0.1;
+/// A line is an edge when it crosses the rings at an angle with at least this sine.
+constexpr double min_sine_to_ring = 0.5;
 
 /// Mean and covariance of the neighbours.
 struct Moments {
@@ -119,6 +121,23 @@ std::optional<FittedSurface> fit_surface(const Neighbours& neighbours) {
   const Moments moments = moments_of(neighbours);
   if (auto plane = plane_of(moments, neighbours)) return plane;
   return line_of(moments);
+}
+
+FittedSurface weighed_ring_line(const FittedSurface& line, const Eigen::Vector3d& point_lidar,
+                                const Eigen::Matrix3d& R_map_lidar, double across_rings_weight) {
+  const double level_m = point_lidar.head<2>().norm();
+  if (line.normal_count != 2 || across_rings_weight == 1.0 || !(level_m > 0.0)) return line;
+  // Where the next ring would meet a surface that faces the lidar.
+  const Eigen::Vector3d across_lidar(-point_lidar.x() * point_lidar.z() / level_m,
+                                     -point_lidar.y() * point_lidar.z() / level_m, level_m);
+  const Eigen::Vector3d across_map = R_map_lidar * across_lidar.normalized();
+  const Eigen::Vector3d along_map = line.normals[0].cross(line.normals[1]);
+  if (std::abs(across_map.dot(along_map)) >= min_sine_to_ring) return line;
+  const Eigen::Vector3d along_ray_map = across_map.cross(along_map).normalized();
+  return {line.centre_map,
+          {along_ray_map, along_map.cross(along_ray_map)},
+          2,
+          {1.0, across_rings_weight}};
 }
 
 double semantic_inconsistency(const Neighbours& neighbours, SemanticClass label) {

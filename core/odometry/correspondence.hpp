@@ -18,6 +18,8 @@ struct FittedSurface {
   std::array<Eigen::Vector3d, 2> normals;
   /// 1 for a plane, 2 for a line.
   std::size_t normal_count = 1;
+  /// What the distance along each normal counts, 0..1, beside the weight of eq. (10).
+  std::array<double, 2> weights{1.0, 1.0};
 };
 
 /// Line through neighbours by PCA, eq. (5)-(7) with the ordinary covariance (as printed, eq. 6 is
@@ -30,6 +32,15 @@ struct FittedSurface {
 
 /// The plane where there is one, else the line.
 [[nodiscard]] std::optional<FittedSurface> fit_surface(const Neighbours& neighbours);
+
+/// A line as a lidar sees it that turns about its z axis, from a point of its scan. One that runs
+/// along the lidar's rings may be no edge: any wall shows such lines, which rise or fall as the
+/// lidar comes nearer, and take it along. Of such a line the distance across the rings counts
+/// `across_rings_weight`, that along the ray 1; one that crosses the rings stays as it is.
+[[nodiscard]] FittedSurface weighed_ring_line(const FittedSurface& line,
+                                              const Eigen::Vector3d& point_lidar,
+                                              const Eigen::Matrix3d& R_map_lidar,
+                                              double across_rings_weight);
 
 /// c of eq. (9): the share of neighbours with another class than `label`. 0 when `label` or all
 /// neighbours are unlabeled, since no label contradicts nothing.

@@ -69,6 +69,8 @@ void check(const RegistrationConfig& c, const LocalMapConfig& map, FaultList& fa
                  c.sweep_rotation_rad, "above 0");
   faults.require(c.min_correspondences >= 6, "registration.min_correspondences",
                  c.min_correspondences, "6 or more");
+  faults.require(c.across_rings_weight >= 0.0 && c.across_rings_weight <= 1.0,
+                 "registration.across_rings_weight", c.across_rings_weight, "within 0..1");
   faults.require(c.min_observability >= 0.0 && c.min_observability < 1.0,
                  "registration.min_observability", c.min_observability, "within 0..1");
 }
@@ -106,7 +108,10 @@ std::string OdometryConfig::faults() const {
 OdometryConfig OdometryConfig::with_method() const {
   OdometryConfig used = *this;
   if (weighting == Weighting::none || paper_exact) used.registration.robust_scale_m = 0.0;
-  if (paper_exact) used.motion.use_range_image_history = false;
+  if (paper_exact) {
+    used.motion.use_range_image_history = false;
+    used.registration.across_rings_weight = 1.0;
+  }
   return used;
 }
 

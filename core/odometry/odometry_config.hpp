@@ -84,6 +84,10 @@ struct RegistrationConfig {
   /// [m, rad]. 0 metres: the motion within the sweep is not estimated.
   double sweep_translation_m = 0.03;
   double sweep_rotation_rad = 0.01;
+  /// What the distance across the rings counts, 0..1, of a line that runs along a ring of the
+  /// lidar: any surface shows such lines, where the lidar happens to look. Not in the paper; 1
+  /// switches it off.
+  double across_rings_weight = 0.1;
   /// Fewer correspondences than this give no pose.
   int min_correspondences = 50;
   /// A direction is degenerate when one metre (or radian, times the scan's mean range) along it

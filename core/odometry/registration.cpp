@@ -51,14 +51,16 @@ bool move_to(const OdometryResult& pose, const FeaturePoint& feature, Correspond
 }
 
 void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& map,
-             const RegistrationConfig& config, Correspondence& found) {
+             const RegistrationConfig& config, const Eigen::Matrix3d& R_map_lidar,
+             Correspondence& found) {
   const Neighbours neighbours = map.nearest(found.searched_map, config.neighbours,
                                             static_cast<float>(config.max_neighbour_distance_m));
   found.in_known_space = neighbours.count > 0;
   const auto surface = fit(kind, neighbours);
   found.found = surface.has_value();
   if (!surface) return;
-  found.surface = *surface;
+  found.surface =
+      weighed_ring_line(*surface, found.point_lidar, R_map_lidar, config.across_rings_weight);
   found.inconsistency = feature.confidence * semantic_inconsistency(neighbours, feature.label);
 }
 
@@ -79,7 +81,7 @@ void find_correspondences(std::span<const FeaturePoint> features, FeatureKind ki
         moved[count++] = i;
       }
       for (std::size_t k = 0; k < count; ++k)
-        look_up(features[moved[k]], kind, map, config, found[moved[k]]);
+        look_up(features[moved[k]], kind, map, config, pose.T_map_lidar.linear(), found[moved[k]]);
     }
   });
 }
@@ -157,18 +159,20 @@ NormalEquations build_normal_equations(std::span<const Correspondence> correspon
                      geman_mcclure(config.registration.robust_scale_m, squared);
     if (w <= 0.0) continue;
     for (std::size_t k = 0; k < r.count; ++k) {
+      const double w_k = w * c.surface.weights[k];
+      if (w_k == 0.0) continue;
       slope.head<6>() = r.slopes[k];
-      const double pull = w * r.distances[k];
-      hessian.add(w, slope);
+      const double pull = w_k * r.distances[k];
+      hessian.add(w_k, slope);
       equations.gradient += pull * r.slopes[k];
+      equations.weighted_squares += pull * r.distances[k];
       if (!rolling) continue;
-      hessian_pose_sweep.add(c.sweep_part * w, slope);
-      hessian_sweep.add(c.sweep_part * c.sweep_part * w, slope);
+      hessian_pose_sweep.add(c.sweep_part * w_k, slope);
+      hessian_sweep.add(c.sweep_part * c.sweep_part * w_k, slope);
       equations.gradient_sweep += c.sweep_part * pull * r.slopes[k];
     }
-    equations.weighted_squares += w * squared;
-    equations.weights += w;
-    equations.squared_ranges += w * c.point_lidar.squaredNorm();
+    equations.weights += w * c.surface.weights[0];
+    equations.squared_ranges += w * c.surface.weights[0] * c.point_lidar.squaredNorm();
     (i < edge_count ? equations.edges : equations.planes) += 1;
   }
   equations.hessian = hessian.matrix();
@@ -365,7 +369,8 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
                                  const Eigen::Isometry3d& T_map_lidar_predicted,
                                  const OdometryConfig& config,
                                  const PoseTangent& sweep_correction) {
-  const RegistrationConfig& limits = config.registration;
+  RegistrationConfig limits = config.registration;
+  if (!features.in_rings) limits.across_rings_weight = 1.0;
   OdometryResult result;
   result.T_map_lidar = T_map_lidar_predicted;
   result.sweep_correction = sweep_correction;

@@ -50,6 +50,8 @@ struct FeatureSets {
   /// The points were measured one after the other: their motion within the sweep is estimated too.
   bool rolling = false;
   SweepPrior sweep_prior;
+  /// By a lidar that turns about its z axis and sees rings.
+  bool in_rings = false;
 };
 
 /// The local map's feature sets M_e and M_p, and points of any kind for the alignment of points.

@@ -95,7 +95,8 @@ FeatureSets usable_features(const ScanInParts& parts, const OdometryConfig& conf
           .points = points.of(parts.features.upright_points, all_points),
           .level_points = points.of(parts.features.level_points, all_points),
           .rolling = points.rolling(),
-          .sweep_prior = parts.sweep_prior};
+          .sweep_prior = parts.sweep_prior,
+          .in_rings = !parts.scan.ring.empty()};
 }
 
 }  // namespace
@@ -118,6 +119,7 @@ FeatureSets map_features(const ScanInParts& parts, const std::vector<Motion>& mo
   sets.planes = points.of(parts.features.planes, stands);
   sets.points = points.of(parts.features.points, all_points);
   sets.rolling = points.rolling();
+  sets.in_rings = !parts.scan.ring.empty();
   return sets;
 }
 

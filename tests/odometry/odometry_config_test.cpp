@@ -63,6 +63,8 @@ INSTANTIATE_TEST_SUITE_P(
                   [](C& c) { c.registration.robust_scale_m = -1.0; }},
         FaultCase{"registration.min_correspondences",
                   [](C& c) { c.registration.min_correspondences = 5; }},
+        FaultCase{"registration.across_rings_weight",
+                  [](C& c) { c.registration.across_rings_weight = 1.5; }},
         FaultCase{"registration.min_observability",
                   [](C& c) { c.registration.min_observability = 1.0; }},
         FaultCase{"motion.inconsistency_threshold",
