@@ -67,6 +67,8 @@ void check(const RegistrationConfig& c, const LocalMapConfig& map, FaultList& fa
                  c.sweep_translation_m, "0 or more");
   faults.require(c.sweep_rotation_rad > 0.0, "registration.sweep_rotation_rad",
                  c.sweep_rotation_rad, "above 0");
+  faults.require(c.sweep_tilt_rad > 0.0, "registration.sweep_tilt_rad", c.sweep_tilt_rad,
+                 "above 0");
   faults.require(c.min_correspondences >= 6, "registration.min_correspondences",
                  c.min_correspondences, "6 or more");
   faults.require(c.across_rings_weight >= 0.0 && c.across_rings_weight <= 1.0,

@@ -81,9 +81,13 @@ struct RegistrationConfig {
   /// switches it off. Weighting::none goes without it [m].
   double robust_scale_m = 0.1;
   /// How far the motion within a sweep differs from that since the last pose: standard deviations
-  /// [m, rad]. 0 metres: the motion within the sweep is not estimated.
+  /// [m, rad], the rotation's about the map's z. 0 metres: the motion within the sweep is not
+  /// estimated.
   double sweep_translation_m = 0.03;
-  double sweep_rotation_rad = 0.01;
+  double sweep_rotation_rad = 0.005;
+  /// The same of the rotation about level axes of the map, whose z points up: few rings hardly tell
+  /// a tilt within the sweep from one of the lidar, and what they take for it adds up [rad].
+  double sweep_tilt_rad = 0.003;
   /// What the distance across the rings counts, 0..1, of a line that runs along a ring of the
   /// lidar: any surface shows such lines, where the lidar happens to look. Not in the paper; 1
   /// switches it off.

@@ -213,9 +213,10 @@ void add_sweep_prior(const SweepPrior& prior, const OdometryResult& at,
   const PoseTangent deviation = at.sweep_correction - change;
   PoseTangent weight;
   weight.head<3>().setConstant(std::pow(expected_residual_m / config.sweep_translation_m, 2));
-  const double rotation_rad =
-      prior.rotation_is_measured ? measured_rotation_rad : config.sweep_rotation_rad;
-  weight.tail<3>().setConstant(std::pow(expected_residual_m / rotation_rad, 2));
+  Eigen::Vector3d rotation_rad(config.sweep_tilt_rad, config.sweep_tilt_rad,
+                               config.sweep_rotation_rad);
+  if (prior.rotation_is_measured) rotation_rad.setConstant(measured_rotation_rad);
+  weight.tail<3>() = (expected_residual_m * rotation_rad.cwiseInverse()).cwiseAbs2();
   weight *= correspondences / independent_correspondences;
   const PoseTangent weighted = weight.cwiseProduct(rotated(at.T_map_lidar.linear(), deviation));
   equations.hessian_sweep.diagonal() += weight;
