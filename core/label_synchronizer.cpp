@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/lidar/range_image_view.hpp"
-
 namespace stillmap {
 namespace {
 
@@ -13,21 +11,24 @@ bool nothing_propagated(const PropagatedLabels& propagated) {
                              [](LabelOrigin origin) { return origin == LabelOrigin::none; });
 }
 
-}  // namespace
-
-void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar,
-                 const SensorModel& sensor, StaticMap& map) {
-  map.insert(labelled, T_map_lidar);
-  if (!map.clearing_due()) return;
-  map.clear_seen_through(RangeImageView(labelled.scan, {}, sensor, T_map_lidar),
-                         labelled.scan.stamp_ns);
+void insert_propagated(const LabelledScan& labelled, const LabelSynchronizer::Labels& labels,
+                       const Eigen::Isometry3d& T_map_lidar, LendableMap& map) {
+  LabelledScan known{labelled.scan, labels.evidence, labelled.motion};
+  // A point without a class may be a moving object that has just come into sight: it makes no
+  // voxel.
+  for (std::size_t i = 0; i < known.motion.size(); ++i) {
+    if (known.label(i) == SemanticClass::unlabeled) known.motion[i] = Motion::highly_dynamic;
+  }
+  map.insert(known, T_map_lidar);
 }
+
+}  // namespace
 
 LabelSynchronizer::LabelSynchronizer(std::unique_ptr<SegmentationPipeline> segmentation,
                                      const SensorModel& sensor)
     : segmentation_(std::move(segmentation)), sensor_(sensor) {}
 
-LabelSynchronizer::Submission LabelSynchronizer::submit(const Scan& scan, StaticMap& map) {
+LabelSynchronizer::Submission LabelSynchronizer::submit(const Scan& scan, LendableMap& map) {
   SegmentationPipeline::Output output = segmentation_->submit(scan);
   Submission submission{.own = std::nullopt, .pending = output.pending};
   for (auto& [stamp_ns, labels] : output.finished) {
@@ -41,7 +42,7 @@ LabelSynchronizer::Submission LabelSynchronizer::submit(const Scan& scan, Static
 }
 
 void LabelSynchronizer::insert_late_labels(std::int64_t stamp_ns, PointLabels labels,
-                                           StaticMap& map) {
+                                           LendableMap& map) {
   const auto found = std::ranges::find(
       pending_, stamp_ns, [](const PosedScan& pending) { return pending.labelled.scan.stamp_ns; });
   if (found == pending_.end()) return;
@@ -56,13 +57,13 @@ void LabelSynchronizer::insert_late_labels(std::int64_t stamp_ns, PointLabels la
     if (labelled.motion[i] == Motion::highly_dynamic && movable) continue;
     labelled.motion[i] = movable ? Motion::semi_static : Motion::stationary;
   }
-  insert_scan(labelled, late.T_map_lidar, sensor_, map);
+  map.insert(labelled, late.T_map_lidar);
   if (!labelled.labels.empty()) remember_labelled(std::move(late));
 }
 
 LabelSynchronizer::Labels LabelSynchronizer::labels_for(
     const Scan& scan, Submission submission, const Eigen::Isometry3d& T_map_lidar_predicted,
-    const StaticMap& map) {
+    const StaticMap* map) {
   Labels labels;
   labels.pending = submission.pending;
   if (submission.own && (!submission.own->empty() || !segmentation_->may_skip_scans())) {
@@ -84,7 +85,7 @@ LabelSynchronizer::Labels LabelSynchronizer::labels_for(
 }
 
 void LabelSynchronizer::insert(const LabelledScan& labelled, const Labels& labels,
-                               const Eigen::Isometry3d& T_map_lidar, StaticMap& map) {
+                               const Eigen::Isometry3d& T_map_lidar, LendableMap& map) {
   if (labels.pending) {
     if (pending_.size() == max_pending) pending_.pop_front();
     pending_.push_back({labelled, T_map_lidar});
@@ -97,22 +98,10 @@ void LabelSynchronizer::insert(const LabelledScan& labelled, const Labels& label
   // While labels of another scan are pending, a scan without any stays out: its moving objects
   // cannot be told from what stands still.
   if (labels.provenance == LabelProvenance::none && !pending_.empty()) return;
-  insert_scan(labelled, T_map_lidar, sensor_, map);
+  map.insert(labelled, T_map_lidar);
   if (labels.provenance == LabelProvenance::fresh && segmentation_->may_skip_scans()) {
     remember_labelled({labelled, T_map_lidar});
   }
-}
-
-void LabelSynchronizer::insert_propagated(const LabelledScan& labelled, const Labels& labels,
-                                          const Eigen::Isometry3d& T_map_lidar,
-                                          StaticMap& map) const {
-  LabelledScan known{labelled.scan, labels.evidence, labelled.motion};
-  // A point without a class may be a moving object that has just come into sight: it makes no
-  // voxel.
-  for (std::size_t i = 0; i < known.motion.size(); ++i) {
-    if (known.label(i) == SemanticClass::unlabeled) known.motion[i] = Motion::highly_dynamic;
-  }
-  insert_scan(known, T_map_lidar, sensor_, map);
 }
 
 void LabelSynchronizer::remember_labelled(PosedScan posed) {
@@ -121,12 +110,8 @@ void LabelSynchronizer::remember_labelled(PosedScan posed) {
 }
 
 void LabelSynchronizer::correct(const MapCorrection& correction) {
-  const auto move = [&correction](PosedScan& posed) {
-    if (const auto* const T_new_old = correction.at(posed.labelled.scan.stamp_ns))
-      posed.T_map_lidar = *T_new_old * posed.T_map_lidar;
-  };
-  std::ranges::for_each(pending_, move);
-  if (last_labelled_) move(*last_labelled_);
+  for (PosedScan& scan : pending_) scan.correct(correction);
+  if (last_labelled_) last_labelled_->correct(correction);
   last_labelled_image_.reset();
 }
 

@@ -8,18 +8,14 @@
 #include <optional>
 #include <string>
 
+#include "core/lendable_map.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/sensor_model.hpp"
 #include "core/map/label_propagation.hpp"
 #include "core/map/map_correction.hpp"
-#include "core/map/static_map.hpp"
 #include "core/segmentation_pipeline.hpp"
 
 namespace stillmap {
-
-/// Adds what the scan hit to `map`, and clears what it saw through when that is due.
-void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar,
-                 const SensorModel& sensor, StaticMap& map);
 
 /// Matches scans with labels that may arrive after them. It owns the segmentation pipeline and
 /// decides which labels a scan is registered with (its own, else labels propagated from the map and
@@ -46,7 +42,7 @@ class LabelSynchronizer {
 
   /// Submits a prepared scan. An earlier scan whose labels have arrived since enters `map` with
   /// them.
-  [[nodiscard]] Submission submit(const Scan& scan, StaticMap& map);
+  [[nodiscard]] Submission submit(const Scan& scan, LendableMap& map);
 
   /// The labels that a scan is registered with.
   struct Labels {
@@ -64,15 +60,16 @@ class LabelSynchronizer {
     }
   };
 
-  /// `scan` is the submitted one after motion compensation; the predicted pose places it in `map`.
+  /// `scan` is the submitted one after motion compensation; the predicted pose places it in `map`,
+  /// which may be null: then labels come from the last labelled scan alone.
   [[nodiscard]] Labels labels_for(const Scan& scan, Submission submission,
                                   const Eigen::Isometry3d& T_map_lidar_predicted,
-                                  const StaticMap& map);
+                                  const StaticMap* map);
 
   /// Inserts a registered scan into `map`: with `labels` where they are final; a scan whose own
   /// labels are pending is kept until submit() receives them. `labelled` holds `labels.labels`.
   void insert(const LabelledScan& labelled, const Labels& labels,
-              const Eigen::Isometry3d& T_map_lidar, StaticMap& map);
+              const Eigen::Isometry3d& T_map_lidar, LendableMap& map);
 
   /// Moves the scans that it keeps.
   void correct(const MapCorrection& correction);
@@ -81,14 +78,7 @@ class LabelSynchronizer {
   void reset();
 
  private:
-  struct PosedScan {
-    LabelledScan labelled;
-    Eigen::Isometry3d T_map_lidar;
-  };
-
-  void insert_late_labels(std::int64_t stamp_ns, PointLabels labels, StaticMap& map);
-  void insert_propagated(const LabelledScan& labelled, const Labels& labels,
-                         const Eigen::Isometry3d& T_map_lidar, StaticMap& map) const;
+  void insert_late_labels(std::int64_t stamp_ns, PointLabels labels, LendableMap& map);
   void remember_labelled(PosedScan posed);
 
   std::unique_ptr<SegmentationPipeline> segmentation_;

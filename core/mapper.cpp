@@ -42,7 +42,7 @@ Mapper::Mapper(const MapperConfig& config, std::unique_ptr<SegmentationPipeline>
       label_synchronizer_(std::move(segmentation), config.sensor),
       inertial_(config.sensor.imu),
       odometry_(config.odometry, config.sensor),
-      static_map_(config.static_map) {}
+      static_map_(config.static_map, config.sensor) {}
 
 std::optional<MappedScan> Mapper::process(
     Scan raw_scan, const std::optional<Eigen::Isometry3d>& T_map_lidar_prior) {
@@ -72,7 +72,7 @@ std::optional<MappedScan> Mapper::process(
   const Eigen::Isometry3d T_map_lidar_expected =
       T_map_odom_ * T_odom_lidar_known.value_or(odometry_.predict(middle_ns, inertial));
   LabelSynchronizer::Labels labels = label_synchronizer_.labels_for(
-      scan, std::move(submission), T_map_lidar_expected, static_map_);
+      scan, std::move(submission), T_map_lidar_expected, static_map_.readable());
   if (with_times && listeners_.scan_prepared) {
     const bool are_own = labels.provenance == LabelProvenance::fresh;
     listeners_.scan_prepared(*with_times, are_own ? labels.labels : PointLabels{});
@@ -127,17 +127,23 @@ void Mapper::move_to_map(OdometryResult& result) const {
 
 std::optional<CorrectedMap> Mapper::correct(const MapCorrection& correction,
                                             std::size_t limit_bytes) {
-  const auto corrected = static_map_.correct(correction, limit_bytes);
-  if (!corrected) return std::nullopt;
+  const auto corrected = lend_static_map().correct(correction, limit_bytes);
+  take_back_static_map(corrected ? &correction : nullptr);
+  return corrected;
+}
+
+void Mapper::take_back_static_map(const MapCorrection* correction) {
+  static_map_.take_back();
+  if (correction == nullptr) return;
   for (StampedPose& pose : trajectory_) {
-    if (const auto* const T_new_old = correction.at(pose.stamp_ns))
+    if (const auto* const T_new_old = correction->at(pose.stamp_ns))
       pose.T_map_lidar = *T_new_old * pose.T_map_lidar;
   }
-  label_synchronizer_.correct(correction);
-  T_map_odom_ = correction.latest() * T_map_odom_;
+  label_synchronizer_.correct(*correction);
+  static_map_.correct(*correction);
+  T_map_odom_ = correction->latest() * T_map_odom_;
   if (prior_map_added_at_map_)
-    prior_map_added_at_map_ = correction.latest() * *prior_map_added_at_map_;
-  return corrected;
+    prior_map_added_at_map_ = correction->latest() * *prior_map_added_at_map_;
 }
 
 std::optional<InertialMotion> Mapper::inertial_motion(std::int64_t stamp_ns,
@@ -233,14 +239,14 @@ void Mapper::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidenc
 }
 
 StaticMap Mapper::resume(StaticMap prepared) {
-  StaticMap until_now = std::exchange(static_map_, std::move(prepared));
+  StaticMap until_now = std::exchange(static_map_.map(), std::move(prepared));
   clear_scan_state();
-  resumed_tiles_ = static_map_.view()->tiles;
+  resumed_tiles_ = static_map_.map().view()->tiles;
   return until_now;
 }
 
 void Mapper::reset(std::uint64_t map_id) {
-  static_map_.reset(map_id);
+  static_map_.map().reset(map_id);
   clear_scan_state();
 }
 
@@ -248,6 +254,7 @@ void Mapper::clear_scan_state() {
   odometry_.begin_map();
   T_map_odom_ = Eigen::Isometry3d::Identity();
   label_synchronizer_.reset();
+  static_map_.forget_kept();
   trajectory_.clear();
   last_middle_.reset();
   inertial_.forget_motion();
@@ -268,7 +275,7 @@ void Mapper::relocate(Odometry followed, int confirming_scans) {
   last_middle_.reset();
   inertial_.forget_motion();
   // Of this run, too.
-  resumed_tiles_ = static_map_.view()->tiles;
+  resumed_tiles_ = static_map_.map().view()->tiles;
   prior_map_added_at_map_.reset();
 }
 
@@ -285,13 +292,14 @@ void Mapper::confirm_relocation(OdometryResult& result) {
 }
 
 void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {
-  if (resumed_tiles_.empty()) return;
+  if (resumed_tiles_.empty() || static_map_.is_lent()) return;
   if (prior_map_added_at_map_ &&
       (position_map - *prior_map_added_at_map_).norm() < prior_map_update_distance_m)
     return;
   prior_map_added_at_map_ = position_map;
-  static_map_.reload_near(position_map);
-  const auto view = static_map_.view();
+  StaticMap& map = static_map_.map();
+  map.reload_near(position_map);
+  const auto view = map.view();
   const Eigen::Isometry3d T_odom_map = T_map_odom_.inverse();
   std::vector<LabelledPoint> points_odom;
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(config_.static_map.max_range_m);

@@ -9,6 +9,7 @@
 
 #include "core/inertial/inertial_tracker.hpp"
 #include "core/label_synchronizer.hpp"
+#include "core/lendable_map.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/prepare.hpp"
 #include "core/lidar/sensor_model.hpp"
@@ -109,7 +110,9 @@ class Mapper {
   /// Keeps at least this many of the last poses, and at most twice as many.
   void limit_trajectory(std::size_t poses) { max_poses_ = poses; }
   [[nodiscard]] std::string label_source() const { return label_synchronizer_.name(); }
-  [[nodiscard]] std::shared_ptr<const MapSnapshot> map_snapshot() { return static_map_.view(); }
+  [[nodiscard]] std::shared_ptr<const MapSnapshot> map_snapshot() {
+    return static_map_.map().view();
+  }
 
   /// Whether a scan was registered since the map began or the lidar was relocated: before, nothing
   /// but its prior tells where it is.
@@ -123,7 +126,7 @@ class Mapper {
   void relocate(Odometry followed, int confirming_scans = 5);
 
   /// What is stored of it, what of it is in memory, and what was removed from it.
-  [[nodiscard]] StaticMap& static_map() { return static_map_; }
+  [[nodiscard]] StaticMap& static_map() { return static_map_.map(); }
 
   /// Poses of this map were wrong by that: moves the static map, the poses so far, and all that
   /// follow by the last of them. Odometry goes on in its own frame and never hears of it. Nothing,
@@ -131,6 +134,16 @@ class Mapper {
   std::optional<CorrectedMap> correct(
       const MapCorrection& correction,
       std::size_t limit_bytes = std::numeric_limits<std::size_t>::max());
+
+  /// The same in two steps: lends the static map to another thread, which corrects it while scans
+  /// go on to be registered. Until it is taken back only process() may be called, and what tells
+  /// of poses; scans are kept, as many as kept_scans(), and enter the map afterwards.
+  [[nodiscard]] StaticMap& lend_static_map() { return static_map_.lend(); }
+  /// Null: nothing was moved.
+  void take_back_static_map(const MapCorrection* correction);
+  [[nodiscard]] std::size_t kept_scans() const { return static_map_.kept_scans(); }
+  /// All scans that were kept enter the map, which must not be lent.
+  void insert_kept_scans() { static_map_.insert_kept(); }
 
   /// Forgets poses and takes over a stored static map; the next scans extend it. The next scan is
   /// looked for in it, round its prior or the map's origin, and all register against what is stored
@@ -181,7 +194,7 @@ class Mapper {
   Odometry odometry_;
   /// Corrections of the map so far.
   Eigen::Isometry3d T_map_odom_ = Eigen::Isometry3d::Identity();
-  StaticMap static_map_;
+  LendableMap static_map_;
   /// Tiles of a resumed map, and where their points were last added to the odometry's local map.
   TileTable resumed_tiles_;
   std::optional<Eigen::Vector3d> prior_map_added_at_map_;

@@ -125,10 +125,10 @@ struct PropagatedLabel {
   LabelOrigin origin = LabelOrigin::none;
 };
 
-PropagatedLabel propagate(const Eigen::Vector3d& point_map, double range_m, const StaticMap& map,
+PropagatedLabel propagate(const Eigen::Vector3d& point_map, double range_m, const StaticMap* map,
                           const std::optional<LabelledRangeImage>& last_labelled,
                           const LabelPropagationConfig& config) {
-  const ClassEvidence evidence = map.evidence_at(point_map);
+  const ClassEvidence evidence = map == nullptr ? ClassEvidence() : map->evidence_at(point_map);
   const SemanticClass known = evidence.winner();
   std::optional<LabelledRangeImage::Neighbour> neighbour;
   if (last_labelled && known == SemanticClass::unlabeled) {
@@ -148,7 +148,7 @@ PropagatedLabel propagate(const Eigen::Vector3d& point_map, double range_m, cons
 }  // namespace
 
 PropagatedLabels propagate_labels(const Scan& scan, const Eigen::Isometry3d& T_map_lidar,
-                                  const StaticMap& map,
+                                  const StaticMap* map,
                                   const std::optional<LabelledRangeImage>& last_labelled,
                                   const LabelPropagationConfig& config) {
   PropagatedLabels propagated;

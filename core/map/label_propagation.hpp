@@ -79,10 +79,10 @@ struct PropagatedLabels {
 
 /// Labels for a scan without labels of its own. A point takes the class of its voxel in the map.
 /// Where the map has none (moving objects, new ground), or beside movable points, it takes the
-/// label of the nearest point of the last labelled scan, if there is one. `T_map_lidar` may be a
-/// prediction.
+/// label of the nearest point of the last labelled scan, if there is one. `map` may be null,
+/// `T_map_lidar` a prediction.
 [[nodiscard]] PropagatedLabels propagate_labels(
-    const Scan& scan, const Eigen::Isometry3d& T_map_lidar, const StaticMap& map,
+    const Scan& scan, const Eigen::Isometry3d& T_map_lidar, const StaticMap* map,
     const std::optional<LabelledRangeImage>& last_labelled,
     const LabelPropagationConfig& config = {});
 

@@ -70,6 +70,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
                [this](const Scan& scan, const PointLabels& labels) {
                  outputs_.place_finder->add(scan, labels, frames_.T_base_lidar(), mapper_);
                }}),
+      corrector_(mapper_, map_limit_bytes_),
       imu_report_(statistics),
       frames_(config, outputs.static_transforms, statistics),
       odom_frame_(config.frames.odom) {
@@ -95,7 +96,8 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
       },
       WorkerOptions{.on_idle = [this] { end_round(true); },
                     .idle_period = idle_period,
-                    .on_failure = [this] { run_requests_elsewhere(); }});
+                    // Then only checkpoints are wanted.
+                    .on_failure = [this] { requests_.close([this] { end_correction(); }); }});
 }
 
 void MappingThread::reset(std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store) {
@@ -103,7 +105,7 @@ void MappingThread::reset(std::uint64_t map_id, const std::shared_ptr<TileStore>
   map.reset(map_id);
   map.use_tile_store(tile_store);
   PreparedMap prepared{std::move(map), {}, tile_store};
-  run_between_scans([&] { exchange(prepared); });
+  requests_.run([&] { exchange(prepared); });
   spdlog::info("reset: map {} begins", map_id);
 }
 
@@ -112,7 +114,7 @@ std::function<void()> MappingThread::prepare(const SavedMap& stored,
   auto prepared =
       std::make_shared<PreparedMap>(resumed(stored, tile_store), stored.trajectory, tile_store);
   return [this, prepared = std::move(prepared)] {
-    run_between_scans([&] { exchange(*prepared); });
+    requests_.run([&] { exchange(*prepared); });
     const auto view = latest_map_.view();
     spdlog::info("loaded: resuming with {} tiles as map {}", view->tiles.size(), view->map_id);
   };
@@ -146,13 +148,14 @@ void MappingThread::begin_map(SharedTrajectory trajectory) {
   if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
 }
 
-void MappingThread::close_loops() {
-  if (outputs_.loops == nullptr || is_map_frozen_) return;
-  const auto correction = outputs_.loops->take();
-  if (!correction) return;
-  const auto began = Clock::now();
-  const auto corrected = mapper_.correct(*correction, map_limit_bytes_);
-  if (!corrected) {
+void MappingThread::close_loops(bool waits) {
+  if (const auto result = corrector_.take(waits)) follow(*result);
+  if (outputs_.loops == nullptr || corrector_.is_running() || is_map_frozen_ || waits) return;
+  if (auto correction = outputs_.loops->take()) corrector_.begin(*std::move(correction));
+}
+
+void MappingThread::follow(const MapCorrector::Result& result) {
+  if (!result.corrected) {
     outputs_.loops->end_map();
     statistics_.count("map_corrections_refused");
     spdlog::error(
@@ -160,35 +163,35 @@ void MappingThread::close_loops() {
         "memory than map.memory_limit_mib allows");
     return;
   }
-  latest_map_.correct(*correction, mapper_.map_snapshot());
-  if (odom_) odom_->correct_map(correction->latest());
-  T_map_odom_ = correction->latest() * T_map_odom_;
+  latest_map_.correct(result.correction, result.view);
+  if (odom_) odom_->correct_map(result.correction.latest());
+  T_map_odom_ = result.correction.latest() * T_map_odom_;
   if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
-  if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
-  outputs_.loops->report(*correction, *corrected, milliseconds(Clock::now() - began));
+  octree_is_behind_ = outputs_.occupancy != nullptr;
+  outputs_.loops->report(result.correction, *result.corrected, result.ms);
 }
 
 void MappingThread::publish_now() {
-  run_between_scans([this] { publish_snapshot(); });
+  requests_.run([this] { publish_snapshot(); });
 }
 
 void MappingThread::stop() {
   if (!worker_) return;
   worker_.reset();
-  // Of a worker that failed, only checkpoints are wanted.
-  if (!has_stopped_) publish_snapshot();
-  run_requests_elsewhere();
+  requests_.close([this] {
+    end_correction();
+    publish_snapshot();
+  });
 }
 
-void MappingThread::run_requests_elsewhere() {
-  const std::scoped_lock lock(requests_mutex_);
-  has_stopped_ = true;
-  for (std::packaged_task<void()>& task : std::exchange(requests_, {})) task();
+void MappingThread::end_correction() {
+  close_loops(true);
+  mapper_.insert_kept_scans();
 }
 
 RunCheckpoint MappingThread::checkpoint(CheckpointScope scope) {
   MapCheckpoint map;
-  run_between_scans([&] {
+  requests_.run([&] {
     const auto began = Clock::now();
     map = mapper_.static_map().checkpoint(scope);
     latest_map_.publish(map.view);
@@ -200,7 +203,7 @@ RunCheckpoint MappingThread::checkpoint(CheckpointScope scope) {
 }
 
 void MappingThread::checkpoint_stored(std::uint64_t step) {
-  run_between_scans([&] {
+  requests_.run([&] {
     mapper_.static_map().checkpoint_stored(step);
     bound_memory();
     if (!is_map_frozen_) return;
@@ -211,7 +214,7 @@ void MappingThread::checkpoint_stored(std::uint64_t step) {
 }
 
 void MappingThread::checkpoint_failed() {
-  run_between_scans([&] {
+  requests_.run([&] {
     bound_memory();
     const bool is_full = mapper_.static_map().memory_use().bytes > map_limit_bytes_;
     if (!is_full || is_map_frozen_) return;
@@ -234,7 +237,7 @@ void MappingThread::bound_memory() {
 
 MemoryUse MappingThread::memory_use() {
   MemoryUse use;
-  run_between_scans([&] { use = mapper_.static_map().memory_use(); });
+  requests_.run([&] { use = mapper_.static_map().memory_use(); });
   return use;
 }
 
@@ -278,7 +281,7 @@ std::size_t MappingThread::restore_removed(RemovalReason reason, const Eigen::Al
 MappingThread::TilesOfBox MappingThread::tiles_of(const Eigen::AlignedBox3d& box_map) {
   TilesOfBox tiles;
   std::size_t non_resident = 0;
-  run_between_scans([&] {
+  requests_.run([&] {
     const StaticMap& map = mapper_.static_map();
     const std::size_t resident = map.memory_use().resident_tiles;
     tiles = {latest_map_.view()->map_id, map.tiles_in(box_map, max_stored_tiles + resident + 1),
@@ -297,7 +300,7 @@ MappingThread::TilesOfBox MappingThread::tiles_of(const Eigen::AlignedBox3d& box
 
 void MappingThread::run_on_some(std::uint64_t map_id, std::span<const TileId>& left,
                                 const std::function<bool(std::span<const TileId> some)>& action) {
-  run_between_scans([&] {
+  requests_.run([&] {
     if (latest_map_.view()->map_id != map_id) {
       throw std::runtime_error("another map began meanwhile; ask again for that one");
     }
@@ -310,19 +313,15 @@ void MappingThread::run_on_some(std::uint64_t map_id, std::span<const TileId>& l
   });
 }
 
-void MappingThread::run_between_scans(std::function<void()> action) {
-  std::future<void> done;
-  {
-    const std::scoped_lock lock(requests_mutex_);
-    if (has_stopped_) return action();
-    done = requests_.emplace_back(std::move(action)).get_future();
-  }
-  done.get();
-}
-
 void MappingThread::end_round(bool is_idle) {
-  close_loops();
-  run_requests();
+  close_loops(false);
+  if (is_idle && !corrector_.is_running()) mapper_.insert_kept_scans();
+  if (corrector_.is_running() || mapper_.kept_scans() > 0) return;
+  if (std::exchange(octree_is_behind_, false)) {
+    publish_snapshot();
+    outputs_.occupancy->begin(latest_map_.view());
+  }
+  requests_.run_waiting();
   if (is_idle || Clock::now() - snapshot_published_ >= publish_period_) publish_snapshot();
 }
 
@@ -379,8 +378,9 @@ void MappingThread::feed_imu(const Scan& scan) {
 
 void MappingThread::forward(MappedScan mapped) {
   const auto labelled = std::make_shared<const LabelledScan>(std::move(mapped.labelled));
-  const bool enters_map = mapped.odometry.is_confirmed && !is_map_frozen_;
-  if (outputs_.occupancy != nullptr && enters_map) {
+  const bool enters_map =
+      mapped.odometry.is_confirmed && !is_map_frozen_ && !corrector_.is_running();
+  if (outputs_.occupancy != nullptr && enters_map && !octree_is_behind_) {
     outputs_.occupancy->add({labelled, mapped.odometry.T_map_lidar, !mapped.unlabelled_may_move});
   }
   if (outputs_.place_finder != nullptr) {
@@ -394,7 +394,8 @@ void MappingThread::forward(MappedScan mapped) {
 
 std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) {
   motion_prior_.reset();
-  if (outputs_.place_finder != nullptr) {
+  // What is found in a map that is being corrected is forgotten.
+  if (outputs_.place_finder != nullptr && !corrector_.is_running()) {
     if (const auto T_map_lidar = outputs_.place_finder->relocate(mapper_, stamp_ns)) {
       if (outputs_.loops != nullptr) outputs_.loops->end_map();
       return T_map_lidar;
@@ -490,11 +491,6 @@ void MappingThread::publish_snapshot() {
   if (outputs_.occupancy != nullptr && map_limit_bytes_ != no_limit) {
     outputs_.occupancy->follow(latest_map_.view());
   }
-}
-
-void MappingThread::run_requests() {
-  const std::scoped_lock lock(requests_mutex_);
-  for (std::packaged_task<void()>& task : std::exchange(requests_, {})) task();
 }
 
 }  // namespace stillmap::server

@@ -1,9 +1,7 @@
 #pragma once
 
 #include <functional>
-#include <future>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <string>
@@ -17,6 +15,7 @@
 #include "server/mapping/imu_receiver.hpp"
 #include "server/mapping/imu_report.hpp"
 #include "server/mapping/loop_corrector.hpp"
+#include "server/mapping/map_corrector.hpp"
 #include "server/mapping/map_saver.hpp"
 #include "server/mapping/odometry_prior.hpp"
 #include "server/mapping/robot_frames.hpp"
@@ -27,6 +26,7 @@
 #include "server/publishers/latest_map.hpp"
 #include "server/publishers/scan_publishers.hpp"
 #include "server/threads/background_throttle.hpp"
+#include "server/threads/request_queue.hpp"
 #include "server/threads/worker.hpp"
 
 namespace stillmap::server {
@@ -112,8 +112,13 @@ class MappingThread : public CheckpointSource {
   void feed_imu(const Scan& scan);
   /// Runs the requests, and publishes the map when that is due.
   void end_round(bool is_idle);
-  /// Moves map and path where a place was seen again.
-  void close_loops();
+  /// Has map and path moved where a place was seen again, beside mapping. `waits`: for one that is
+  /// being moved; none is begun.
+  void close_loops(bool waits);
+  /// Waits for one that is being moved, and for the scans that were kept.
+  void end_correction();
+  /// Path and frames follow a map that was moved.
+  void follow(const MapCorrector::Result& result);
   /// Publishes a new map, and starts a new octree from it.
   void begin_map(SharedTrajectory trajectory);
   void forward(MappedScan mapped);
@@ -154,12 +159,6 @@ class MappingThread : public CheckpointSource {
   /// a scan waits or it returns false. Throws std::runtime_error where the map is another one now.
   void run_on_some(std::uint64_t map_id, std::span<const TileId>& left,
                    const std::function<bool(std::span<const TileId> some)>& action);
-  /// Runs `action` in the thread that maps, after the scan in work, and waits for its end.
-  void run_between_scans(std::function<void()> action);
-  void run_requests();
-  /// Runs those that wait, and from now on each in the thread that asks: this one has ended.
-  void run_requests_elsewhere();
-
   /// Limit of the memory that the static map takes.
   std::size_t map_limit_bytes_;
   StaticMapConfig map_config_;
@@ -171,6 +170,9 @@ class MappingThread : public CheckpointSource {
   LatestMap& latest_map_;
   MappingOutputs outputs_;
   Mapper mapper_;
+  MapCorrector corrector_;
+  /// Of a corrected map, until the scans that were kept meanwhile are in it.
+  bool octree_is_behind_ = false;
   /// Where evicted tiles are.
   std::shared_ptr<TileStore> tile_store_;
   ThrottledLog throttled_log_;
@@ -189,9 +191,8 @@ class MappingThread : public CheckpointSource {
   std::chrono::steady_clock::time_point stage_began_;
   double labels_ms_ = 0.0;
   std::chrono::steady_clock::time_point snapshot_published_;
-  std::mutex requests_mutex_;
-  bool has_stopped_ = false;
-  std::vector<std::packaged_task<void()>> requests_;
+  /// Run after the scan in work.
+  RequestQueue requests_;
   // Last: stops before what it uses is gone.
   std::optional<Worker<QueuedScan>> worker_;
 };

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <optional>
+
 #include "core/mapper.hpp"
 #include "core/segmentation/segmenter.hpp"
 #include "tests/odometry/box_sequence.hpp"
@@ -80,6 +83,87 @@ TEST(CorrectedMapper, APriorIsOneInTheCorrectedMap) {
     test::expect_near(mapped->odometry.T_map_lidar, T_new_old * sequence().T_map_lidar[k], 0.2,
                       0.01);
   }
+}
+
+/// Voxels of `view` that `other` has in the same tile, too.
+std::size_t voxels_in_both(const MapSnapshot& view, const MapSnapshot& other) {
+  std::size_t met = 0;
+  for (const auto& tile : view.tiles) {
+    const auto there = other.tiles.find(tile->info.id);
+    if (there == nullptr) continue;
+    for (const Voxel& voxel : tile->voxels) {
+      met += std::ranges::any_of(there->voxels, [&](const Voxel& known) {
+        return known.index == voxel.index && known.point_count == voxel.point_count;
+      });
+    }
+  }
+  return met;
+}
+
+TEST(CorrectedMapper, ScansThatComeWhileTheMapIsLentEnterItAsThoseThatComeAfterwards) {
+  Mapper waited = box_mapper();
+  Mapper lent = box_mapper();
+  std::optional<MapCorrection> correction;
+  StaticMap* elsewhere = nullptr;
+  for (std::size_t k = 0; k < sequence().scans.size(); ++k) {
+    const auto a = waited.process(sequence().scans[k].scan);
+    const auto b = lent.process(sequence().scans[k].scan);
+    ASSERT_TRUE(a && b);
+    test::expect_near(b->T_odom_lidar, a->T_odom_lidar, 1e-12, 1e-12);
+    if (k > 11 && k <= 16) {
+      EXPECT_EQ(lent.kept_scans(), k - 11);
+      test::expect_near(T_new_old * b->odometry.T_map_lidar, a->odometry.T_map_lidar, 1e-9, 1e-9);
+    }
+    if (k == 11) {
+      correction = of_all(lent);
+      ASSERT_TRUE(waited.correct(*correction));
+      elsewhere = &lent.lend_static_map();
+    }
+    if (k == 16) {
+      ASSERT_TRUE(elsewhere->correct(*correction));
+      lent.take_back_static_map(&*correction);
+    }
+    if (k > 16) {
+      EXPECT_EQ(lent.kept_scans(), k >= 21 ? 0 : 21 - k);
+      test::expect_near(b->odometry.T_map_lidar, a->odometry.T_map_lidar, 1e-9, 1e-9);
+    }
+  }
+  for (std::size_t i = 0; i < waited.trajectory().size(); ++i) {
+    test::expect_near(lent.trajectory()[i].T_map_lidar, waited.trajectory()[i].T_map_lidar, 1e-9,
+                      1e-9);
+  }
+  const auto view = waited.map_snapshot();
+  const auto voxels = static_cast<double>(view->tiles.voxel_count());
+  EXPECT_GT(static_cast<double>(voxels_in_both(*view, *lent.map_snapshot())), 0.999 * voxels);
+}
+
+TEST(CorrectedMapper, WhereNothingWasMovedScansThatWereKeptEnterTheMapAsTheyAre) {
+  Mapper undisturbed = box_mapper();
+  Mapper lent = box_mapper();
+  for (std::size_t k = 0; k < 12; ++k) {
+    if (k == 4) static_cast<void>(lent.lend_static_map());
+    ASSERT_TRUE(undisturbed.process(sequence().scans[k].scan));
+    ASSERT_TRUE(lent.process(sequence().scans[k].scan));
+  }
+  lent.take_back_static_map(nullptr);
+  EXPECT_EQ(lent.kept_scans(), 8U);
+  lent.insert_kept_scans();
+  EXPECT_EQ(lent.kept_scans(), 0U);
+  const auto view = undisturbed.map_snapshot();
+  EXPECT_EQ(voxels_in_both(*view, *lent.map_snapshot()), view->tiles.voxel_count());
+}
+
+TEST(CorrectedMapper, AnotherMapHasNoneOfTheScansThatWereKept) {
+  Mapper mapper = box_mapper();
+  for (std::size_t k = 0; k < 6; ++k) {
+    if (k == 3) static_cast<void>(mapper.lend_static_map());
+    ASSERT_TRUE(mapper.process(sequence().scans[k].scan));
+  }
+  mapper.take_back_static_map(nullptr);
+  mapper.reset(77);
+  EXPECT_EQ(mapper.kept_scans(), 0U);
+  mapper.insert_kept_scans();
+  EXPECT_TRUE(mapper.map_snapshot()->tiles.empty());
 }
 
 TEST(CorrectedMapper, AnotherMapBeginsUncorrected) {

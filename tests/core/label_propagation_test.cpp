@@ -83,7 +83,7 @@ Scores propagate_through_the_city(int every) {
       continue;
     }
     if (k < 10) continue;
-    const PropagatedLabels propagated = propagate_labels(now.scan, now.T_map_lidar, map, last);
+    const PropagatedLabels propagated = propagate_labels(now.scan, now.T_map_lidar, &map, last);
     for (std::size_t i = 0; i < now.scan.size(); ++i) {
       const SemanticClass truth = now.scan.labels[i];
       if (truth == SemanticClass::unlabeled || now.scan.points_lidar[i].norm() > 50.0F) continue;
@@ -133,7 +133,7 @@ Scan one_point(const Eigen::Vector3f& point_lidar) {
 
 PropagatedLabels propagated_to(const Eigen::Vector3f& point, const StaticMap& map,
                                const std::optional<LabelledRangeImage>& last) {
-  return propagate_labels(one_point(point), Eigen::Isometry3d::Identity(), map, last);
+  return propagate_labels(one_point(point), Eigen::Isometry3d::Identity(), &map, last);
 }
 
 StaticMap map_with(const Eigen::Vector3f& point, SemanticClass label) {
@@ -188,8 +188,9 @@ TEST(PropagatedLabels, EgoMotionIsTakenOut) {
   T_map_now.rotate(Eigen::AngleAxisd(1.2, Eigen::Vector3d::UnitZ()));
   const auto last = view_with({20, 1, 0}, SemanticClass::pole);
   const Eigen::Vector3d seen_now = T_map_now.inverse() * Eigen::Vector3d(20, 1, 0);
-  const PropagatedLabels propagated = propagate_labels(one_point(seen_now.cast<float>()), T_map_now,
-                                                       StaticMap(StaticMapConfig{}), last);
+  const StaticMap map(StaticMapConfig{});
+  const PropagatedLabels propagated =
+      propagate_labels(one_point(seen_now.cast<float>()), T_map_now, &map, last);
   EXPECT_EQ(propagated.labels.classes[0], SemanticClass::pole);
 }
 

@@ -49,20 +49,21 @@ class LabelSynchronizerTest : public testing::Test {
     pipeline_.next = std::move(output);
     const Scan scan = scan_at(number);
     auto submission = synchronizer_.submit(scan, map_);
-    auto labels = synchronizer_.labels_for(scan, std::move(submission), at_origin_, map_);
+    auto labels =
+        synchronizer_.labels_for(scan, std::move(submission), at_origin_, map_.readable());
     synchronizer_.insert({scan, labels.labels, {motion}}, labels, at_origin_, map_);
     return labels;
   }
 
   [[nodiscard]] SemanticClass class_in_map() const {
-    return map_.evidence_at(place.cast<double>()).winner();
+    return map_.readable()->evidence_at(place.cast<double>()).winner();
   }
   [[nodiscard]] float weight_in_map() const {
-    return map_.evidence_at(place.cast<double>()).votes().front().weight;
+    return map_.readable()->evidence_at(place.cast<double>()).votes().front().weight;
   }
   [[nodiscard]] std::size_t voxels_in_map() {
     std::size_t voxels = 0;
-    for (const auto& tile : map_.view()->tiles) voxels += tile->voxels.size();
+    for (const auto& tile : map_.map().view()->tiles) voxels += tile->voxels.size();
     return voxels;
   }
 
@@ -79,7 +80,7 @@ class LabelSynchronizerTest : public testing::Test {
  protected:
   ScriptedPipeline& pipeline_;
   LabelSynchronizer synchronizer_;
-  StaticMap map_{StaticMapConfig{.min_points = 1}};
+  LendableMap map_{StaticMapConfig{.min_points = 1}, hdl_64e()};
   const Eigen::Isometry3d at_origin_ = Eigen::Isometry3d::Identity();
 };
 
@@ -122,11 +123,26 @@ TEST_F(LabelSynchronizerTest, PointsWithoutAClassMakeNoVoxelsBesidePropagatedLab
   Scan scan = scan_at(2);
   scan.points_lidar.emplace_back(-30.0F, 5.0F, 0.0F);
   const auto labels =
-      synchronizer_.labels_for(scan, synchronizer_.submit(scan, map_), at_origin_, map_);
+      synchronizer_.labels_for(scan, synchronizer_.submit(scan, map_), at_origin_, map_.readable());
   ASSERT_EQ(labels.labels.classes[1], unlabeled);
   synchronizer_.insert({scan, labels.labels, {Motion::stationary, Motion::stationary}}, labels,
                        at_origin_, map_);
   EXPECT_EQ(voxels_in_map(), voxels);
+}
+
+TEST_F(LabelSynchronizerTest, AMapThatIsLentIsNotAskedForLabels) {
+  process(1, finished(1, one_label(road)));
+  const float weight = weight_in_map();
+  StaticMap& elsewhere = map_.lend();
+  const auto labels = process(2, {});
+  EXPECT_EQ(labels.provenance, LabelProvenance::propagated);
+  EXPECT_EQ(labels.labels.classes[0], road);
+  // By the last scan, and so new to the map, which has it only afterwards.
+  EXPECT_GT(labels.evidence.confidence[0], 0.0F);
+  EXPECT_EQ(elsewhere.evidence_at(place.cast<double>()).votes().front().weight, weight);
+  map_.take_back();
+  map_.insert_kept();
+  EXPECT_GT(weight_in_map(), weight);
 }
 
 TEST_F(LabelSynchronizerTest, ASourceThatFailsGivesPureGeometry) {
@@ -166,7 +182,7 @@ TEST_F(LabelSynchronizerTest, ResetForgetsThePendingAndTheLastLabelledScan) {
   process(1, finished(1, one_label(person)), Motion::highly_dynamic);
   process(2, pending());
   synchronizer_.reset();
-  map_.reset(2);
+  map_.map().reset(2);
   const auto labels = process(3, finished(2, one_label(road)));
   EXPECT_EQ(labels.provenance, LabelProvenance::none);
   EXPECT_EQ(class_in_map(), unlabeled);

@@ -103,10 +103,10 @@ def row_of(arguments, sequence, folder, status, reference):
                                  "--map", folder / "map.stillmap", "--json"]))
         kept = f"{100 * found['preservation_rate']:.1f} %, {100 * found['rejection_rate']:.1f} %"
     counters = status["counters"]
-    pause = f"{status['latencies']['correction']['max_ms']:.0f}" if "correction" in status["latencies"] else "-"
+    longest = {stage: f"{time['max_ms']:.0f}" for stage, time in status["latencies"].items()}
     return errors["ate_rmse_m"], (
         f"{errors['ate_rmse_m']:.3f}, {errors['ate_max_m']:.3f} | {status['voxels']:,} | {kept} | "
-        f"{counters.get('loops_closed', 0)} | {counters.get('map_corrections', 0)} | {pause} |")
+        f"{counters.get('loops_closed', 0)} | {counters.get('map_corrections', 0)} | {longest.get('correction', '-')} | {longest['pose']} |")
 
 
 def main():
@@ -121,7 +121,7 @@ def main():
     parser.add_argument("--domain", type=int, default=87, help="DDS domain, of nobody else")
     arguments = parser.parse_args()
     print("| drive | loops | ATE, worst pose [m] | voxels | fixed preserved, moving rejected | closed | corrections | "
-          "longest pause [ms] |\n|---|---|---|---|---|---|---|---|", flush=True)
+          "longest correction [ms] | scan to pose [ms] |\n|---|---|---|---|---|---|---|---|---|", flush=True)
     is_worse = False
     drives = ([(arguments.sequence.name, None, arguments.sensor, arguments.labels)] if arguments.sequence else
               [drive for drive in DRIVES if arguments.only in drive[0]])

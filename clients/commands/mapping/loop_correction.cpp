@@ -4,7 +4,7 @@
 #include <chrono>
 #include <utility>
 
-#include "core/label_synchronizer.hpp"
+#include "core/lendable_map.hpp"
 
 namespace stillmap::cli {
 namespace {

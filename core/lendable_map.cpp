@@ -1,0 +1,57 @@
+#include "core/lendable_map.hpp"
+
+#include <algorithm>
+#include <cassert>
+#include <utility>
+
+#include "core/lidar/range_image_view.hpp"
+
+namespace stillmap {
+
+void PosedScan::correct(const MapCorrection& correction) {
+  if (const auto* const T_new_old = correction.at(labelled.scan.stamp_ns))
+    T_map_lidar = *T_new_old * T_map_lidar;
+}
+
+void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar,
+                 const SensorModel& sensor, StaticMap& map) {
+  map.insert(labelled, T_map_lidar);
+  if (!map.clearing_due()) return;
+  map.clear_seen_through(RangeImageView(labelled.scan, {}, sensor, T_map_lidar),
+                         labelled.scan.stamp_ns);
+}
+
+void LendableMap::insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar) {
+  // More than come, so that the last of them waits for as long as the map was lent, and no pose
+  // for all of them.
+  constexpr std::size_t inserted_with_each = 2;
+  if (!is_lent_ && kept_.empty()) return insert_scan(labelled, T_map_lidar, sensor_, map_);
+  kept_.push_back({labelled, T_map_lidar});
+  if (!is_lent_) insert_kept(inserted_with_each);
+}
+
+StaticMap& LendableMap::lend() {
+  assert(!is_lent_);
+  is_lent_ = true;
+  return map_;
+}
+
+void LendableMap::insert_kept(std::size_t max_scans) {
+  assert(!is_lent_);
+  for (; max_scans > 0 && !kept_.empty(); --max_scans) {
+    const PosedScan& scan = kept_.front();
+    insert_scan(scan.labelled, scan.T_map_lidar, sensor_, map_);
+    kept_.pop_front();
+  }
+}
+
+void LendableMap::correct(const MapCorrection& correction) {
+  for (PosedScan& scan : kept_) scan.correct(correction);
+}
+
+StaticMap& LendableMap::map() {
+  assert(!is_lent_);
+  return map_;
+}
+
+}  // namespace stillmap

@@ -1,0 +1,38 @@
+#include "server/mapping/map_corrector.hpp"
+
+#include <chrono>
+#include <utility>
+
+#include "server/mapping/milliseconds.hpp"
+
+namespace stillmap::server {
+
+void MapCorrector::begin(MapCorrection correction) {
+  work_ = std::async(std::launch::async,
+                     [correction = std::move(correction), &map = mapper_.lend_static_map(),
+                      limit_bytes = limit_bytes_]() mutable {
+                       const auto began = std::chrono::steady_clock::now();
+                       Result result{std::move(correction), std::nullopt, nullptr, 0.0};
+                       result.corrected = map.correct(result.correction, limit_bytes);
+                       result.view = map.view();
+                       result.ms = milliseconds(std::chrono::steady_clock::now() - began);
+                       return result;
+                     });
+}
+
+std::optional<MapCorrector::Result> MapCorrector::take(bool waits) {
+  if (!is_running()) return std::nullopt;
+  const bool is_full = mapper_.kept_scans() >= max_kept_scans;
+  if (!waits && !is_full && work_.wait_for(std::chrono::seconds(0)) != std::future_status::ready)
+    return std::nullopt;
+  try {
+    Result result = work_.get();
+    mapper_.take_back_static_map(result.corrected ? &result.correction : nullptr);
+    return result;
+  } catch (...) {
+    mapper_.take_back_static_map(nullptr);
+    throw;
+  }
+}
+
+}  // namespace stillmap::server

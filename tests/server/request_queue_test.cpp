@@ -1,0 +1,42 @@
+#include "server/threads/request_queue.hpp"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <stdexcept>
+#include <thread>
+
+namespace stillmap::server {
+namespace {
+
+TEST(RequestQueue, RunsInTheOneThreadAndTellsWhatWasThrown) {
+  RequestQueue requests;
+  std::atomic<bool> has_ended = false;
+  std::thread::id ran_in;
+  std::jthread asks([&] {
+    requests.run([&] { ran_in = std::this_thread::get_id(); });
+    EXPECT_THROW(requests.run([] { throw std::runtime_error("no"); }), std::runtime_error);
+    has_ended = true;
+  });
+  while (!has_ended) requests.run_waiting();
+  EXPECT_EQ(ran_in, std::this_thread::get_id());
+}
+
+TEST(RequestQueue, RunsThoseThatWaitAndAllLaterOnesOnceItIsClosed) {
+  RequestQueue requests;
+  std::string order;
+  std::atomic<bool> asks_now = false;
+  std::jthread asks([&] {
+    asks_now = true;
+    requests.run([&] { order += 'b'; });
+  });
+  while (!asks_now) std::this_thread::yield();
+  requests.close([&] { order += 'a'; });
+  asks.join();
+  requests.close([&] { order += 'x'; });
+  requests.run([&] { order += 'c'; });
+  EXPECT_EQ(order, "abc");
+}
+
+}  // namespace
+}  // namespace stillmap::server
