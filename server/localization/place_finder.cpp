@@ -1,10 +1,8 @@
 #include "server/localization/place_finder.hpp"
 
 #include <spdlog/spdlog.h>
-#include <tbb/task_arena.h>
 
 #include <exception>
-#include <functional>
 #include <stdexcept>
 #include <utility>
 
@@ -36,12 +34,6 @@ constexpr std::chrono::seconds max_unused{60};
 
 double milliseconds_since(Clock::time_point began) {
   return std::chrono::duration<double, std::milli>(Clock::now() - began).count();
-}
-
-/// On oneTBB's workers that the mapper leaves idle.
-void run_behind_the_mapper(const std::function<void()>& work) {
-  tbb::task_arena arena(tbb::task_arena::automatic, 1, tbb::task_arena::priority::low);
-  arena.execute(work);
 }
 
 }  // namespace

@@ -4,20 +4,31 @@
 #include <utility>
 
 #include "server/mapping/milliseconds.hpp"
+#include "server/threads/background_throttle.hpp"
 
 namespace stillmap::server {
 
+namespace {
+
+MapCorrector::Result corrected(StaticMap& map, MapCorrection correction, std::size_t limit_bytes) {
+  const auto began = std::chrono::steady_clock::now();
+  MapCorrector::Result result{std::move(correction), std::nullopt, nullptr, 0.0};
+  run_behind_the_mapper([&] {
+    result.corrected = map.correct(result.correction, limit_bytes);
+    result.view = map.view();
+  });
+  result.ms = milliseconds(std::chrono::steady_clock::now() - began);
+  return result;
+}
+
+}  // namespace
+
+// Not at a lower priority: mapping waits for it in the end.
 void MapCorrector::begin(MapCorrection correction) {
-  work_ = std::async(std::launch::async,
-                     [correction = std::move(correction), &map = mapper_.lend_static_map(),
-                      limit_bytes = limit_bytes_]() mutable {
-                       const auto began = std::chrono::steady_clock::now();
-                       Result result{std::move(correction), std::nullopt, nullptr, 0.0};
-                       result.corrected = map.correct(result.correction, limit_bytes);
-                       result.view = map.view();
-                       result.ms = milliseconds(std::chrono::steady_clock::now() - began);
-                       return result;
-                     });
+  work_ = std::async(std::launch::async, [this, &map = mapper_.lend_static_map(),
+                                          correction = std::move(correction)]() mutable {
+    return corrected(map, std::move(correction), limit_bytes_);
+  });
 }
 
 std::optional<MapCorrector::Result> MapCorrector::take(bool waits) {

@@ -70,6 +70,11 @@ void start_tbb_workers() {
       tbb::simple_partitioner());
 }
 
+void run_behind_the_mapper(const std::function<void()>& work) {
+  tbb::task_arena arena(tbb::task_arena::automatic, 1, tbb::task_arena::priority::low);
+  arena.execute(work);
+}
+
 void end_idle_scheduling() {
   std::error_code none;
   for (const auto& thread : std::filesystem::directory_iterator("/proc/self/task", none)) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <atomic>
+#include <functional>
 
 #include "core/map/throttle_callback.hpp"
 #include "server/threads/monotonic_clock.hpp"
@@ -16,6 +17,8 @@ bool use_scheduling(BackgroundScheduling scheduling);
 /// Starts oneTBB's workers, which inherit the calling thread's scheduling and keep it: were a
 /// background thread the first to need them, the mapper's work would be done at low priority, too.
 void start_tbb_workers();
+/// Runs the parallel loops of `work` on oneTBB's workers that the mapper leaves idle.
+void run_behind_the_mapper(const std::function<void()>& work);
 /// Gives all threads of this process that have idle scheduling the normal one. Where other programs
 /// keep all cores busy, a thread of idle priority needs minutes for what is left of its work.
 void end_idle_scheduling();
