@@ -36,7 +36,8 @@ class TraversabilityService : public testing::Test {
     EXPECT_TRUE(wait_for_scans(client_, 12));
     EXPECT_TRUE(eventually([&] {
       const auto answer = client_.get_traversable_area(query_of(BoxRegion{}));
-      return answer.grid.status == TraversabilityStatus::ok &&
+      // Version 0 is the map before it is published for the first time.
+      return answer.grid.status == TraversabilityStatus::ok && answer.grid.map_version > 0 &&
              answer.grid.map_version == client_.status().map_version;
     }));
   }
