@@ -22,12 +22,8 @@ void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_li
 }
 
 void LendableMap::insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar) {
-  // More than come, so that the last of them waits for as long as the map was lent, and no pose
-  // for all of them.
-  constexpr std::size_t inserted_with_each = 2;
   if (!is_lent_ && kept_.empty()) return insert_scan(labelled, T_map_lidar, sensor_, map_);
   kept_.push_back({labelled, T_map_lidar});
-  if (!is_lent_) insert_kept(inserted_with_each);
 }
 
 StaticMap& LendableMap::lend() {
@@ -39,9 +35,9 @@ StaticMap& LendableMap::lend() {
 void LendableMap::insert_kept(std::size_t max_scans) {
   assert(!is_lent_);
   for (; max_scans > 0 && !kept_.empty(); --max_scans) {
-    const PosedScan& scan = kept_.front();
-    insert_scan(scan.labelled, scan.T_map_lidar, sensor_, map_);
+    const PosedScan scan = std::move(kept_.front());
     kept_.pop_front();
+    insert_scan(scan.labelled, scan.T_map_lidar, sensor_, map_);
   }
 }
 

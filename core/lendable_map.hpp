@@ -26,8 +26,8 @@ void insert_scan(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_li
                  const SensorModel& sensor, StaticMap& map);
 
 /// The static map of a mapper, which can be lent to another thread. Meanwhile nothing here touches
-/// it, and scans that would enter it are kept; they enter it afterwards in their order, two with
-/// each scan that comes. NOT thread safe.
+/// it, and scans that would enter it are kept, as are those that come before all of them were
+/// inserted afterwards: scans enter it in their order. NOT thread safe.
 class LendableMap {
  public:
   LendableMap(const StaticMapConfig& config, const SensorModel& sensor)
@@ -41,7 +41,7 @@ class LendableMap {
   [[nodiscard]] bool is_lent() const { return is_lent_; }
   /// Scans that wait to enter the map.
   [[nodiscard]] std::size_t kept_scans() const { return kept_.size(); }
-  /// The oldest of them enter the map, which must not be lent.
+  /// The oldest of them enter the map, which must not be lent. One that cannot is gone.
   void insert_kept(std::size_t max_scans = std::numeric_limits<std::size_t>::max());
   /// Moves the scans that are kept.
   void correct(const MapCorrection& correction);

@@ -134,16 +134,18 @@ class Mapper {
   std::optional<CorrectedMap> correct(
       const MapCorrection& correction,
       std::size_t limit_bytes = std::numeric_limits<std::size_t>::max());
-
   /// The same in two steps: lends the static map to another thread, which corrects it while scans
-  /// go on to be registered. Until it is taken back only process() may be called, and what tells
-  /// of poses; scans are kept, as many as kept_scans(), and enter the map afterwards.
+  /// go on to be registered. Until it is taken back only process() and add() may be called, and
+  /// what tells of poses. Scans are kept meanwhile; they and those after them enter the map when
+  /// insert_kept_scans() is called.
   [[nodiscard]] StaticMap& lend_static_map() { return static_map_.lend(); }
   /// Null: nothing was moved.
   void take_back_static_map(const MapCorrection* correction);
   [[nodiscard]] std::size_t kept_scans() const { return static_map_.kept_scans(); }
-  /// All scans that were kept enter the map, which must not be lent.
-  void insert_kept_scans() { static_map_.insert_kept(); }
+  /// The oldest of them enter the map, which must not be lent.
+  void insert_kept_scans(std::size_t max_scans = std::numeric_limits<std::size_t>::max()) {
+    static_map_.insert_kept(max_scans);
+  }
 
   /// Forgets poses and takes over a stored static map; the next scans extend it. The next scan is
   /// looked for in it, round its prior or the map's origin, and all register against what is stored

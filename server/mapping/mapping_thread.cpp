@@ -148,10 +148,20 @@ void MappingThread::begin_map(SharedTrajectory trajectory) {
   if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
 }
 
-void MappingThread::close_loops(bool waits) {
-  if (const auto result = corrector_.take(waits)) follow(*result);
-  if (outputs_.loops == nullptr || corrector_.is_running() || is_map_frozen_ || waits) return;
+void MappingThread::close_loops() {
+  if (outputs_.loops == nullptr || is_map_frozen_) return;
   if (auto correction = outputs_.loops->take()) corrector_.begin(*std::move(correction));
+}
+
+bool MappingThread::take_corrected(bool is_idle) {
+  // More than come with a scan; and while none waits, all.
+  constexpr std::size_t with_each_scan = 2;
+  if (const auto result = corrector_.take(false)) follow(*result);
+  if (corrector_.is_running()) return false;
+  do {
+    mapper_.insert_kept_scans(with_each_scan);
+  } while (is_idle && mapper_.kept_scans() > 0 && queue_.waiting() == 0);
+  return mapper_.kept_scans() == 0;
 }
 
 void MappingThread::follow(const MapCorrector::Result& result) {
@@ -185,7 +195,7 @@ void MappingThread::stop() {
 }
 
 void MappingThread::end_correction() {
-  close_loops(true);
+  if (const auto result = corrector_.take(true)) follow(*result);
   mapper_.insert_kept_scans();
 }
 
@@ -314,15 +324,14 @@ void MappingThread::run_on_some(std::uint64_t map_id, std::span<const TileId>& l
 }
 
 void MappingThread::end_round(bool is_idle) {
-  close_loops(false);
-  if (is_idle && !corrector_.is_running()) mapper_.insert_kept_scans();
-  if (corrector_.is_running() || mapper_.kept_scans() > 0) return;
+  if (!take_corrected(is_idle)) return;
   if (std::exchange(octree_is_behind_, false)) {
     publish_snapshot();
     outputs_.occupancy->begin(latest_map_.view());
   }
   requests_.run_waiting();
   if (is_idle || Clock::now() - snapshot_published_ >= publish_period_) publish_snapshot();
+  close_loops();
 }
 
 void MappingThread::map(QueuedScan queued) {
@@ -378,8 +387,7 @@ void MappingThread::feed_imu(const Scan& scan) {
 
 void MappingThread::forward(MappedScan mapped) {
   const auto labelled = std::make_shared<const LabelledScan>(std::move(mapped.labelled));
-  const bool enters_map =
-      mapped.odometry.is_confirmed && !is_map_frozen_ && !corrector_.is_running();
+  const bool enters_map = mapped.odometry.is_confirmed && !is_map_frozen_;
   if (outputs_.occupancy != nullptr && enters_map && !octree_is_behind_) {
     outputs_.occupancy->add({labelled, mapped.odometry.T_map_lidar, !mapped.unlabelled_may_move});
   }
@@ -394,8 +402,10 @@ void MappingThread::forward(MappedScan mapped) {
 
 std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) {
   motion_prior_.reset();
-  // What is found in a map that is being corrected is forgotten.
-  if (outputs_.place_finder != nullptr && !corrector_.is_running()) {
+  if (corrector_.is_running()) {
+    // What is found in a map that is being corrected is forgotten.
+    mapper_.hand_out_scans(false);
+  } else if (outputs_.place_finder != nullptr) {
     if (const auto T_map_lidar = outputs_.place_finder->relocate(mapper_, stamp_ns)) {
       if (outputs_.loops != nullptr) outputs_.loops->end_map();
       return T_map_lidar;

@@ -54,7 +54,8 @@ struct RemovedInBox {
 };
 
 /// The one thread that maps: takes scans from the queue, runs the mapper, and publishes the result
-/// as the latest map. Its other functions wait for the scan in work.
+/// as the latest map. Its other functions wait for the scan in work, and while the map is
+/// corrected.
 class MappingThread : public CheckpointSource {
  public:
   /// Resumes `stored` when there is one: its map is extended, and the first scan is expected where
@@ -112,10 +113,11 @@ class MappingThread : public CheckpointSource {
   void feed_imu(const Scan& scan);
   /// Runs the requests, and publishes the map when that is due.
   void end_round(bool is_idle);
-  /// Has map and path moved where a place was seen again, beside mapping. `waits`: for one that is
-  /// being moved; none is begun.
-  void close_loops(bool waits);
-  /// Waits for one that is being moved, and for the scans that were kept.
+  /// Has the map moved where a place was seen again, beside mapping.
+  void close_loops();
+  /// Goes on with a map that was moved. False until all scans are in it: nobody else may have it.
+  [[nodiscard]] bool take_corrected(bool is_idle);
+  /// Waits for a map that is being moved.
   void end_correction();
   /// Path and frames follow a map that was moved.
   void follow(const MapCorrector::Result& result);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <exception>
 #include <functional>
 #include <future>
 #include <mutex>
@@ -29,13 +30,19 @@ class RequestQueue {
   }
 
   /// The one thread has ended: runs `first`, unless it was closed already, and those that wait;
-  /// from now on each runs in the thread that asks, one at a time.
+  /// from now on each runs in the thread that asks, one at a time. Throws what `first` throws.
   void close(const std::function<void()>& first) {
+    std::exception_ptr fault;
     {
       const std::scoped_lock lock(mutex_);
-      if (!std::exchange(is_closed_, true)) first();
+      try {
+        if (!std::exchange(is_closed_, true)) first();
+      } catch (...) {
+        fault = std::current_exception();
+      }
     }
     run_waiting();
+    if (fault) std::rethrow_exception(fault);
   }
 
  private:

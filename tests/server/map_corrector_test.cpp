@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <future>
+#include <map>
+#include <thread>
+
 #include "core/segmentation/segmenter.hpp"
 #include "tests/odometry/box_sequence.hpp"
 #include "tests/odometry/poses.hpp"
@@ -10,6 +14,24 @@ namespace stillmap::server {
 namespace {
 
 const Eigen::Isometry3d T_new_old(Eigen::Translation3d(2.0, -1.0, 0.3));
+
+/// Keeps what a checkpoint holds, and hands it out once it is released: so long a correction lasts.
+class HeldStore : public TileStore {
+ public:
+  explicit HeldStore(const MapCheckpoint& checkpoint) {
+    for (const auto& [id, record] : checkpoint.records) records_[id] = record;
+  }
+  void release() { release_.set_value(); }
+  TileRecord load(TileId id) override {
+    released_.wait();
+    return records_.at(id);
+  }
+
+ private:
+  std::map<TileId, TileRecord> records_;
+  std::promise<void> release_;
+  std::shared_future<void> released_{release_.get_future()};
+};
 
 class MapCorrectorTest : public testing::Test {
  protected:
@@ -26,6 +48,17 @@ class MapCorrectorTest : public testing::Test {
     return MapCorrection({{.stamp_ns = mapper_.trajectory().front().stamp_ns,
                            .position_map = Eigen::Vector3d::Zero(),
                            .T_new_old = T_new_old}});
+  }
+
+  /// All tiles are only there from now on.
+  std::shared_ptr<HeldStore> evict() {
+    StaticMap& map = mapper_.static_map();
+    const MapCheckpoint checkpoint = map.checkpoint(CheckpointScope::everything);
+    auto store = std::make_shared<HeldStore>(checkpoint);
+    map.use_tile_store(store);
+    map.checkpoint_stored(checkpoint.step);
+    EXPECT_GT(map.evict({5000.0, 0.0, 0.0}, 0), 0U);
+    return store;
   }
 
   test::BoxSequence sequence_{test::street_with_traffic(), 30};
@@ -54,20 +87,36 @@ TEST_F(MapCorrectorTest, CorrectsBesideTheScansThatCome) {
 
 TEST_F(MapCorrectorTest, WaitsWhereTheMapperWouldKeepTooManyScans) {
   map(5);
+  const auto store = evict();
   corrector_.begin(correction());
-  std::size_t kept = 0;
-  for (std::size_t k = 0; k < 25 && corrector_.is_running(); ++k) {
+  for (std::size_t kept = 0; kept < 20; ++kept) {
+    EXPECT_FALSE(corrector_.take(false)) << kept;
     map(1);
-    kept = std::max(kept, mapper_.kept_scans());
-    static_cast<void>(corrector_.take(false));
   }
+  ASSERT_EQ(mapper_.kept_scans(), 20U);
+  const std::jthread releases([&store] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(50));
+    store->release();
+  });
+  const auto result = corrector_.take(false);
+  ASSERT_TRUE(result && result->corrected);
+  EXPECT_GT(result->corrected->moved_voxels, 0U);
   EXPECT_FALSE(corrector_.is_running());
-  EXPECT_LE(kept, 20U);
 }
 
-TEST_F(MapCorrectorTest, NobodyNeedsToTakeTheLastOne) {
+TEST_F(MapCorrectorTest, ARefusedCorrectionMovesNothing) {
   map(5);
-  corrector_.begin(correction());
+  const auto store = evict();
+  store->release();
+  MapCorrector refused(mapper_, 1);
+  const Eigen::Isometry3d T_map_lidar = mapper_.trajectory().back().T_map_lidar;
+  refused.begin(correction());
+  map(1);
+  const auto result = refused.take(true);
+  ASSERT_TRUE(result);
+  EXPECT_FALSE(result->corrected);
+  test::expect_near(mapper_.trajectory()[4].T_map_lidar, T_map_lidar, 1e-12, 1e-12);
+  EXPECT_EQ(mapper_.kept_scans(), 1U);
 }
 
 }  // namespace

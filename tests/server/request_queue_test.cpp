@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <stdexcept>
+#include <string>
 #include <thread>
 
 namespace stillmap::server {
@@ -36,6 +37,20 @@ TEST(RequestQueue, RunsThoseThatWaitAndAllLaterOnesOnceItIsClosed) {
   requests.close([&] { order += 'x'; });
   requests.run([&] { order += 'c'; });
   EXPECT_EQ(order, "abc");
+}
+
+TEST(RequestQueue, NobodyIsLeftWaitingWhereClosingFails) {
+  RequestQueue requests;
+  std::atomic<bool> asks_now = false;
+  std::atomic<bool> has_run = false;
+  std::jthread asks([&] {
+    asks_now = true;
+    requests.run([&] { has_run = true; });
+  });
+  while (!asks_now) std::this_thread::yield();
+  EXPECT_THROW(requests.close([] { throw std::runtime_error("full"); }), std::runtime_error);
+  asks.join();
+  EXPECT_TRUE(has_run);
 }
 
 }  // namespace
