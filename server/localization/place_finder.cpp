@@ -42,8 +42,10 @@ std::shared_ptr<const Localizer> SearchableMap::localizer() {
   const std::scoped_lock lock(mutex_);
   const auto view = latest_map_.view();
   used_ = Clock::now();
+  const std::uint64_t corrections = latest_map_.corrections();
   const bool is_same = view->map_id == map_id_ && view->version == map_version_;
-  const bool is_recent = view->map_id == map_id_ && used_ - built_ < max_age;
+  const bool is_recent =
+      view->map_id == map_id_ && corrections == corrections_ && used_ - built_ < max_age;
   if (localizer_ && (is_same || is_recent)) return localizer_;
   localizer_.reset();
   // The reader outlives the index, and whoever uses it.
@@ -52,6 +54,7 @@ std::shared_ptr<const Localizer> SearchableMap::localizer() {
       std::make_shared<const PlaceIndex>(view, latest_map_.trajectory(), tiles));
   map_id_ = view->map_id;
   map_version_ = view->version;
+  corrections_ = corrections;
   built_ = Clock::now();
   return localizer_;
 }
@@ -147,6 +150,19 @@ void PlaceFinder::forget() {
   const std::scoped_lock lock(mutex_);
   end_search();
   found_.reset();
+}
+
+void PlaceFinder::map_corrected() {
+  lost_since_ns_.reset();
+  const std::scoped_lock lock(mutex_);
+  std::optional<PlaceGuess> guess = guess_;
+  if (found_ && last_.scan) {
+    guess = PlaceGuess{
+        .T_map_base = found_->T_map_odom * found_->odometry.predict(last_.scan->scan.stamp_ns),
+        .radius_m = applied_radius_m};
+  }
+  if (guess) return begin_search(guess);
+  end_search();
 }
 
 void PlaceFinder::look_near(const PlaceGuess& guess) {

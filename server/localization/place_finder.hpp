@@ -45,6 +45,7 @@ class SearchableMap {
   std::shared_ptr<const Localizer> localizer_;
   std::uint64_t map_id_ = 0;
   std::uint64_t map_version_ = 0;
+  std::uint64_t corrections_ = 0;
   std::chrono::steady_clock::time_point built_;
   std::chrono::steady_clock::time_point used_;
 };
@@ -74,6 +75,9 @@ class PlaceFinder {
   void update(std::int64_t stamp_ns, const OdometryResult& odometry, const Mapper& mapper);
   /// Of the mapping thread: another map began.
   void forget();
+  /// Of the mapping thread: the map was corrected, and a place that was found in it may not be
+  /// where it was. What was asked for is looked for again.
+  void map_corrected();
 
   /// The robot is looked for round this pose from the next scan on, and set there when it is found;
   /// otherwise the log says why not.

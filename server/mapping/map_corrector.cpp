@@ -46,4 +46,13 @@ std::optional<MapCorrector::Result> MapCorrector::take(bool waits) {
   }
 }
 
+bool MapCorrector::insert_kept(const std::function<bool()>& has_time) {
+  constexpr std::size_t at_once = 2;
+  if (is_running()) return false;
+  do {
+    mapper_.insert_kept_scans(at_once);
+  } while (mapper_.kept_scans() > 0 && has_time());
+  return mapper_.kept_scans() == 0;
+}
+
 }  // namespace stillmap::server

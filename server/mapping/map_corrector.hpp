@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <future>
 #include <memory>
 #include <optional>
@@ -37,6 +38,9 @@ class MapCorrector {
   /// for the end where that is wanted, or the mapper would keep too many scans. Throws what the
   /// correction threw.
   [[nodiscard]] std::optional<Result> take(bool waits);
+  /// Some of the scans that were kept enter the map, more than come with each that does; all while
+  /// there is time. True once none is left: then the mapper's map is nobody else's.
+  [[nodiscard]] bool insert_kept(const std::function<bool()>& has_time);
 
  private:
   /// A scan takes some 5 MB.

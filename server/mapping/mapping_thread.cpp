@@ -154,14 +154,8 @@ void MappingThread::close_loops() {
 }
 
 bool MappingThread::take_corrected(bool is_idle) {
-  // More than come with a scan; and while none waits, all.
-  constexpr std::size_t with_each_scan = 2;
   if (const auto result = corrector_.take(false)) follow(*result);
-  if (corrector_.is_running()) return false;
-  do {
-    mapper_.insert_kept_scans(with_each_scan);
-  } while (is_idle && mapper_.kept_scans() > 0 && queue_.waiting() == 0);
-  return mapper_.kept_scans() == 0;
+  return corrector_.insert_kept([&] { return is_idle && queue_.waiting() == 0; });
 }
 
 void MappingThread::follow(const MapCorrector::Result& result) {
@@ -176,7 +170,7 @@ void MappingThread::follow(const MapCorrector::Result& result) {
   latest_map_.correct(result.correction, result.view);
   if (odom_) odom_->correct_map(result.correction.latest());
   T_map_odom_ = result.correction.latest() * T_map_odom_;
-  if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
+  if (outputs_.place_finder != nullptr) outputs_.place_finder->map_corrected();
   octree_is_behind_ = outputs_.occupancy != nullptr;
   outputs_.loops->report(result.correction, *result.corrected, result.ms);
 }
@@ -403,7 +397,7 @@ void MappingThread::forward(MappedScan mapped) {
 std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns) {
   motion_prior_.reset();
   if (corrector_.is_running()) {
-    // What is found in a map that is being corrected is forgotten.
+    // What is found in a map that is being corrected must be looked for again.
     mapper_.hand_out_scans(false);
   } else if (outputs_.place_finder != nullptr) {
     if (const auto T_map_lidar = outputs_.place_finder->relocate(mapper_, stamp_ns)) {

@@ -91,6 +91,7 @@ TEST_F(MapCorrectorTest, WaitsWhereTheMapperWouldKeepTooManyScans) {
   corrector_.begin(correction());
   for (std::size_t kept = 0; kept < 20; ++kept) {
     EXPECT_FALSE(corrector_.take(false)) << kept;
+    EXPECT_FALSE(corrector_.insert_kept([] { return true; }));
     map(1);
   }
   ASSERT_EQ(mapper_.kept_scans(), 20U);
@@ -102,6 +103,11 @@ TEST_F(MapCorrectorTest, WaitsWhereTheMapperWouldKeepTooManyScans) {
   ASSERT_TRUE(result && result->corrected);
   EXPECT_GT(result->corrected->moved_voxels, 0U);
   EXPECT_FALSE(corrector_.is_running());
+  // Two at once, and while there is time.
+  EXPECT_FALSE(corrector_.insert_kept([] { return false; }));
+  EXPECT_EQ(mapper_.kept_scans(), 18U);
+  EXPECT_TRUE(corrector_.insert_kept([] { return true; }));
+  EXPECT_EQ(mapper_.kept_scans(), 0U);
 }
 
 TEST_F(MapCorrectorTest, ARefusedCorrectionMovesNothing) {
