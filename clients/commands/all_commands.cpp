@@ -89,6 +89,7 @@ void add_commands(CommandHandle program, Action& action) {
   add_map_info_command(program, action);
   add_merge_command(program, action);
   add_sessions_command(program, action);
+  add_loops_command(program, action);
   add_map_check_command(program, action);
   add_map_diff_command(program, action);
   add_map_export_command(program, action);

@@ -37,6 +37,7 @@ void add_commands(CommandHandle program, Action& action);
 
 // Each adds one subcommand to the program; when it is chosen, it sets `action`.
 void add_map_command(CommandHandle program, Action& action);
+void add_loops_command(CommandHandle program, Action& action);
 void add_localize_command(CommandHandle program, Action& action);
 void add_traversable_command(CommandHandle program, Action& action);
 void add_plan_command(CommandHandle program, Action& action);

@@ -148,7 +148,7 @@ std::optional<LoopCloser::Candidate> LoopCloser::verify(std::size_t from, std::s
       .overlap = match->overlap,
       .runner_up = match->runner_up,
       .jump_m = match->jump_m,
-      .refusal = match->refusal};
+      .refusal = is_denied(from, to) ? "denied by who maps" : match->refusal};
   if (!closure.refusal.empty()) {
     refused_.push_back(std::move(closure));
     return std::nullopt;
@@ -159,6 +159,21 @@ std::optional<LoopCloser::Candidate> LoopCloser::verify(std::size_t from, std::s
                       .information = match->key_information,
                       .is_loop = true};
   return Candidate{from, to, std::move(closure), edge};
+}
+
+bool LoopCloser::is_denied(std::size_t from, std::size_t to) const {
+  return std::ranges::any_of(denied_, [&](const DeniedLoop& denied) {
+    return is_about(denied.from_scan, from) && is_about(denied.to_scan, to);
+  });
+}
+
+bool LoopCloser::is_about(std::size_t scan, std::size_t submap) const {
+  const auto key_scan = [this](std::size_t s) { return nodes_[submaps_[s].submap.key_node].scan; };
+  const std::size_t first = submap == 0 ? 0 : key_scan(submap - 1);
+  // Of the newest one half is behind its key, and the next key as far ahead of its end.
+  const std::size_t last = submap + 1 < submaps_.size() ? key_scan(submap + 1)
+                                                        : 2 * nodes_.back().scan - key_scan(submap);
+  return first <= scan && scan <= last;
 }
 
 double LoopCloser::excursion_m(std::size_t from, std::size_t to) const {

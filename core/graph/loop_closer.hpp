@@ -63,12 +63,22 @@ struct LoopClosure {
   std::string refusal;
 };
 
+/// A closure that somebody knows to be wrong: scans as in LoopClosure.
+struct DeniedLoop {
+  std::size_t from_scan = 0;
+  std::size_t to_scan = 0;
+};
+
 /// Cuts a drive into submaps, finds places that it comes back to, and corrects its poses by a pose
 /// graph. Poses go in as odometry has them, in order; odometry never hears of the correction. The
 /// same scans give the same result. NOT thread safe.
 class LoopCloser {
  public:
   explicit LoopCloser(const LoopClosingConfig& config) : config_(config), builder_(config.submap) {}
+
+  /// From now on nothing joins the submaps of these scans, nor their neighbours on the way: what
+  /// looks alike does so from there, too. The scans may be still to come.
+  void deny(const DeniedLoop& denied) { denied_.push_back(denied); }
 
   /// The next scan of the drive. One that is not confirmed has a pose, but no part in submaps.
   void add(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar, bool is_confirmed);
@@ -114,6 +124,9 @@ class LoopCloser {
   /// How far the lidar went away from the one place before it came to the other [m].
   [[nodiscard]] double excursion_m(std::size_t from, std::size_t to) const;
   [[nodiscard]] std::optional<Candidate> verify(std::size_t from, std::size_t to, double way_m);
+  [[nodiscard]] bool is_denied(std::size_t from, std::size_t to) const;
+  /// Whether the scan is of this submap or one of its neighbours.
+  [[nodiscard]] bool is_about(std::size_t scan, std::size_t submap) const;
   void judge(Candidate candidate);
   void accept(Candidate candidate);
   /// Solves, and takes out what the graph denies.
@@ -138,6 +151,7 @@ class LoopCloser {
   };
   std::vector<Joint> joints_;
   std::vector<LoopClosure> refused_;
+  std::vector<DeniedLoop> denied_;
 };
 
 }  // namespace stillmap

@@ -106,12 +106,45 @@ TEST_F(MapCommandTest, DoesNotWriteOverAMapUnlessForced) {
   EXPECT_EQ(line_count("out/poses_lidar.txt"), 2U);
 }
 
+TEST_F(MapCommandTest, ListsClosedAndRefusedLoops) {
+  simulate("city", 3);
+  ASSERT_EQ(map_city("--deny-loop 0:2").exit_code, 0);
+  const std::string loops = "loops " + path("out");
+  EXPECT_EQ(run(loops).out, "0 closed, 0 refused\n");
+  EXPECT_EQ(run("loops " + path("city")).exit_code, 2) << "there is no report";
+
+  std::filesystem::create_directory(folder_ / "made");
+  const std::string made = "loops " + path("made");
+  write("made/report.json",
+        R"({"closures": [{"from_scan": 12, "to_scan": 340, "jump_m": 0.26, "overlap": 0.81,
+            "score": 0.93, "runner_up": 0.4, "refusal": null}],
+            "loops": {"refused": [{"from_scan": 20, "to_scan": 350, "jump_m": 4,
+            "refusal": "denied by who maps"}]}})");
+  EXPECT_THAT(run(made).out, AllOf(HasSubstr("12:340"), HasSubstr("0.26"), HasSubstr("closed"),
+                                   HasSubstr("1 closed, 1 refused"), Not(HasSubstr("20:350"))));
+  EXPECT_THAT(run(made + " --refused").out,
+              AllOf(HasSubstr("20:350"), HasSubstr("refused: denied by who maps")));
+  const nlohmann::json json = nlohmann::json::parse(run(made + " --json").out);
+  EXPECT_EQ(json.at("closures").at(0).at("to_scan"), 340);
+  for (const char* damaged :
+       {"", "{", "[]", R"({"closures": null, "loops": null})", R"({"closures": [], "loops": 3})",
+        R"({"closures": 3, "loops": {}})"}) {
+    write("made/report.json", damaged);
+    EXPECT_EQ(run(made).exit_code, 2) << damaged;
+  }
+  // What somebody wrote by hand is no reason to fall over.
+  write("made/report.json", R"({"closures": [7, {"jump_m": "far"}], "loops": {"refused": 3}})");
+  EXPECT_EQ(run(made + " --refused").exit_code, 0);
+}
+
 TEST_F(MapCommandTest, WhatIsRefusedLeavesTheOldMap) {
   simulate("city", 3);
   ASSERT_EQ(map_city().exit_code, 0);
   const std::string before = content("out/map.stillmap");
   for (const char* wrong :
-       {"--labels nosuchmodel", "--start 9", "--sensor vlp_17", "--config no.yaml", "--resume"}) {
+       {"--labels nosuchmodel", "--start 9", "--sensor vlp_17", "--config no.yaml", "--resume",
+        "--deny-loop 12", "--deny-loop 12:", "--deny-loop 12:x", "--deny-loop 12:12",
+        "--deny-loop 12:40x", "--deny-loop 1:2 --loops off"}) {
     EXPECT_EQ(map_city(std::string(wrong) + " --force").exit_code, 2) << wrong;
     EXPECT_EQ(content("out/map.stillmap"), before) << wrong;
   }

@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "core/odometry/se3.hpp"
 #include "tests/graph/street_world.hpp"
 
@@ -63,6 +66,34 @@ TEST(LoopCloser, SecondRoundTakesTheDriftOut) {
   EXPECT_GT(rmse_m(two_rounds.odometry, two_rounds), 0.8);
   EXPECT_LT(rmse_m(closer.corrected_poses(), two_rounds),
             0.35 * rmse_m(two_rounds.odometry, two_rounds));
+}
+
+TEST(LoopCloser, NothingJoinsPlacesOfWhichThatIsDenied) {
+  const StreetWorld world(11);
+  const Drive two_rounds = drive(world, 1.5 * StreetWorld::length_m, 0.0001, 0.003);
+  const LoopCloser before = closed(world, two_rounds, 100);
+  ASSERT_GE(before.closures().size(), 3U);
+  const LoopClosure& wrong = before.closures().at(1);
+  LoopCloser closer(LoopClosingConfig{});
+  closer.deny({wrong.from_scan, wrong.to_scan});
+  const Eigen::Isometry3d T_map_first = world.T_map_lidar_at(0.0, false);
+  for (std::size_t i = 0; i < two_rounds.truth.size(); ++i)
+    closer.add(world.scan_at(T_map_first * two_rounds.truth[i], 100 + i), two_rounds.odometry[i],
+               true);
+  closer.finish();
+  const auto is_near = [&wrong](const LoopClosure& closure) {
+    // A submap is 25 m long, and a scan is a metre.
+    return std::abs(static_cast<double>(closure.from_scan) -
+                    static_cast<double>(wrong.from_scan)) <= 20.0 &&
+           std::abs(static_cast<double>(closure.to_scan) - static_cast<double>(wrong.to_scan)) <=
+               20.0;
+  };
+  EXPECT_TRUE(std::ranges::none_of(closer.closures(), is_near));
+  EXPECT_FALSE(closer.closures().empty()) << "the others stay";
+  EXPECT_TRUE(std::ranges::any_of(closer.refused(), [&](const LoopClosure& closure) {
+    return closure.from_scan == wrong.from_scan && closure.to_scan == wrong.to_scan &&
+           closure.refusal == "denied by who maps";
+  }));
 }
 
 TEST(LoopCloser, PosesStayAsTheyAreWithoutALoop) {

@@ -28,14 +28,26 @@ constexpr double bytes_per_mib = 1024.0 * 1024.0;
 
 }  // namespace
 
-LoopCorrection::LoopCorrection(const std::filesystem::path& scan_log, const SensorModel& sensor)
-    : sensor_(sensor), log_(scan_log), closer_(LoopClosingConfig{}) {}
+LoopCorrection::LoopCorrection(LoopOptions options, const SensorModel& sensor)
+    : denied_(std::move(options.denied)),
+      sensor_(sensor),
+      log_(options.scans_file),
+      closer_(LoopClosingConfig{}) {}
+
+void LoopCorrection::number(std::size_t index) {
+  index_.push_back(index);
+  if (index_.size() > 1) return;
+  // The few scans that are skipped do not matter: a submap has more.
+  for (const DeniedLoop& denied : denied_) {
+    if (denied.from_scan >= index) closer_.deny({denied.from_scan - index, denied.to_scan - index});
+  }
+}
 
 void LoopCorrection::resume(std::size_t next_scan) {
   const Timed timed(seconds_);
   log_.truncate_from(next_scan);
   log_.read([this](const LoggedScan& scan) {
-    index_.push_back(scan.index);
+    number(scan.index);
     T_odom_lidar_.push_back(scan.T_odom_lidar);
     closer_.add(scan.labelled, scan.T_odom_lidar, scan.is_confirmed);
   });
@@ -48,7 +60,7 @@ void LoopCorrection::add(std::size_t index, const MappedScan& mapped) {
                .T_odom_lidar = odometry.T_map_lidar,
                .is_confirmed = odometry.is_confirmed,
                .labelled = mapped.labelled});
-  index_.push_back(index);
+  number(index);
   T_odom_lidar_.push_back(odometry.T_map_lidar);
   closer_.add(mapped.labelled, odometry.T_map_lidar, odometry.is_confirmed);
 }

@@ -30,12 +30,20 @@ struct LoopReport {
   double seconds = 0.0;
 };
 
+/// How loops are closed.
+struct LoopOptions {
+  /// Where the scans are kept meanwhile.
+  std::filesystem::path scans_file;
+  /// Scans as they are numbered in the data set.
+  std::vector<DeniedLoop> denied;
+};
+
 /// Finds loops while a run goes on, and keeps its scans in a file until it ends, since the map is
 /// made of them again where poses were corrected.
 class LoopCorrection {
  public:
   /// Throws DatasetError.
-  LoopCorrection(const std::filesystem::path& scan_log, const SensorModel& sensor);
+  LoopCorrection(LoopOptions options, const SensorModel& sensor);
 
   /// Goes on with the scans before this number, which are in the file. Throws DatasetError.
   void resume(std::size_t next_scan);
@@ -59,6 +67,10 @@ class LoopCorrection {
   [[nodiscard]] LoopReport report() const;
 
  private:
+  /// One more scan, by its number in the data set.
+  void number(std::size_t index);
+
+  std::vector<DeniedLoop> denied_;
   SensorModel sensor_;
   ScanLog log_;
   LoopCloser closer_;

@@ -1,3 +1,4 @@
+#include <charconv>
 #include <chrono>
 #include <filesystem>
 #include <fstream>
@@ -8,6 +9,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <utility>
 #include <vector>
 
@@ -157,6 +159,7 @@ struct MapArguments {
   ScanRange range;
   OutputPolicy policy;
   std::string loops = "on";
+  std::vector<std::string> denied_loops;
   std::string onto;
   double save_period_s = 30.0;
   bool json = false;
@@ -184,8 +187,8 @@ MappedBody body_of(const MapArguments& arguments) {
 MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& arguments,
                                 const MapperConfig& config, const MappedBody& body,
                                 std::unique_ptr<Segmenter> labels, RunFile& run_file,
-                                const std::optional<std::filesystem::path>& loops_file,
-                                const EarlierMap* earlier, StopSignal& stop) {
+                                const std::optional<LoopOptions>& loops, const EarlierMap* earlier,
+                                StopSignal& stop) {
   if (dataset.kitti_lidar()) std::cerr << "stillmap: " << dataset.kitti_lidar()->in_words() << "\n";
   const std::size_t total = arguments.range.end(dataset) - arguments.range.first;
   Progress progress("map", "scans", total);
@@ -204,7 +207,7 @@ MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& 
     correction->update(done);
   };
   return map_dataset(
-      dataset, arguments.range, config, body, std::move(labels), run_file, loops_file, earlier,
+      dataset, arguments.range, config, body, std::move(labels), run_file, loops, earlier,
       {.scan_done = scan_done, .scan_skipped = scan_skipped, .scan_moved = scan_moved});
 }
 
@@ -213,6 +216,29 @@ void write_report(const std::filesystem::path& file, const Json& report) {
   out << report.dump(2) << "\n";
   out.close();
   if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
+}
+
+/// Throws std::invalid_argument for what is not FROM:TO, and where loops are left open.
+std::vector<DeniedLoop> denied_loops(const MapArguments& arguments) {
+  if (!arguments.denied_loops.empty() && arguments.loops != "on")
+    throw std::invalid_argument("--deny-loop needs --loops on: nothing is closed without it");
+  std::vector<DeniedLoop> all;
+  for (const std::string& text : arguments.denied_loops) {
+    DeniedLoop denied;
+    const char* const end = text.data() + text.size();
+    const auto [colon, fault] = std::from_chars(text.data(), end, denied.from_scan);
+    const bool has_first = fault == std::errc() && colon != end && *colon == ':';
+    const auto [rest, other_fault] =
+        std::from_chars(has_first ? colon + 1 : end, end, denied.to_scan);
+    if (!has_first || other_fault != std::errc() || rest != end ||
+        denied.from_scan >= denied.to_scan) {
+      throw std::invalid_argument("--deny-loop " + text +
+                                  ": must be FROM:TO, two scans of which the second came later, "
+                                  "as 'stillmap loops' lists them");
+    }
+    all.push_back(denied);
+  }
+  return all;
 }
 
 /// What makes the parts of a run one map.
@@ -227,6 +253,7 @@ RunIdentity run_identity(const MapArguments& arguments, const MapperConfig& conf
            << " m, lidar in " << body.frame << " at " << t.transpose() << " turned by "
            << q.coeffs().transpose() << (arguments.loops == "on" ? ", loops closed" : "")
            << (earlier == nullptr ? "" : ", onto " + earlier->identity());
+  for (const std::string& denied : arguments.denied_loops) settings << ", not " << denied;
   return {std::filesystem::weakly_canonical(arguments.dataset).string() + " from scan " +
               std::to_string(arguments.range.first),
           settings.str()};
@@ -239,10 +266,10 @@ MappingResult map_into(const MapOutputFolder& out, const ScanDataset& dataset,
                        const EarlierMap* earlier, StopSignal& stop) {
   RunFile run_file(out.run_file(), run_identity(arguments, config, body, *labels, earlier),
                    std::chrono::duration<double>(arguments.save_period_s));
-  std::optional<std::filesystem::path> loops_file;
-  if (arguments.loops == "on") loops_file = out.kept_scans_file();
-  return map_with_progress(dataset, arguments, config, body, std::move(labels), run_file,
-                           loops_file, earlier, stop);
+  std::optional<LoopOptions> loops;
+  if (arguments.loops == "on") loops = {out.kept_scans_file(), denied_loops(arguments)};
+  return map_with_progress(dataset, arguments, config, body, std::move(labels), run_file, loops,
+                           earlier, stop);
 }
 
 /// The map to go on in, where one is named. Throws what EarlierMap throws, and
@@ -287,6 +314,7 @@ ExitCode run(const MapArguments& arguments) {
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   const MappedBody body = body_of(arguments);
   static_cast<void>(arguments.range.end(dataset));
+  static_cast<void>(denied_loops(arguments));
   auto labels = make_segmenter(arguments.mapper, dataset);
   const std::unique_ptr<const EarlierMap> earlier = earlier_map(arguments, config);
   std::cerr << describe_model(arguments.mapper, dataset, *labels);
@@ -342,6 +370,9 @@ void add_map_command(CommandHandle program, Action& action) {
               "odometry has them")
       .one_of({"on", "off"})
       .with_default();
+  command.option("--deny-loop", arguments->denied_loops,
+                 "FROM:TO, a closure that is wrong, as 'stillmap loops' lists it: nothing joins "
+                 "these places again; may be given several times");
   command.option("--onto", arguments->onto,
                  "A map made earlier: the drive goes on in a copy of it, as another session, where "
                  "it is recognised; this file is only read");
@@ -362,7 +393,8 @@ void add_map_command(CommandHandle program, Action& action) {
       "(timing, memory, accuracy), and with true poses in the sequence trajectory.png and\n"
       "trajectory_error.png. Where the drive comes back to a place, loops are closed: the poses\n"
       "above are the corrected ones, poses_odometry.txt has those of before, report.json the\n"
-      "closures, loops_before.png and loops_after.png show them. The scans are kept in the folder\n"
+      "closures ('stillmap loops' lists them, --deny-loop undoes one),\n"
+      "loops_before.png and loops_after.png show them. The scans are kept in the folder\n"
       "'unfinished' until then (some 0.1 MB a scan of 16 rings). A damaged file is named and "
       "skipped; its scan then has no pose.\n"
       "With --onto the drive is looked for in the map, scan by scan until some agree, then submap "

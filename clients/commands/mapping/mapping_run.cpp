@@ -31,7 +31,7 @@ class MappingRun {
  public:
   MappingRun(const ScanDataset& dataset, bool strict, const MapperConfig& config,
              const MappedBody& body, std::unique_ptr<Segmenter> labels,
-             const std::optional<std::filesystem::path>& loops_file, const EarlierMap* earlier_map,
+             const std::optional<LoopOptions>& loops, const EarlierMap* earlier_map,
              const MappingListeners& listeners)
       : dataset_(dataset),
         strict_(strict),
@@ -46,7 +46,7 @@ class MappingRun {
         imu_(dataset.imu()),
         period_s_(config.sensor.period_s) {
     mapper_.reset(new_map_id());
-    if (loops_file) loops_.emplace(*loops_file, config.sensor);
+    if (loops) loops_.emplace(*loops, config.sensor);
   }
 
   /// Goes on where an earlier run was. Throws std::invalid_argument for another voxel size.
@@ -247,11 +247,11 @@ std::size_t ScanRange::end(const ScanDataset& dataset) const {
 MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
                           const MapperConfig& config, const MappedBody& body,
                           std::unique_ptr<Segmenter> labels, RunFile& run_file,
-                          const std::optional<std::filesystem::path>& loops_file,
-                          const EarlierMap* earlier_map, const MappingListeners& listeners) {
+                          const std::optional<LoopOptions>& loops, const EarlierMap* earlier_map,
+                          const MappingListeners& listeners) {
   const std::size_t end = range.end(dataset);
   std::size_t index = range.first;
-  MappingRun run(dataset, range.strict, config, body, std::move(labels), loops_file, earlier_map,
+  MappingRun run(dataset, range.strict, config, body, std::move(labels), loops, earlier_map,
                  listeners);
   // The map of a few scans is too thin to be found in, and soon made again.
   constexpr std::size_t min_resumed_scans = 10;

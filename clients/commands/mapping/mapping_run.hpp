@@ -91,13 +91,13 @@ struct MappingListeners {
 
 /// Maps a data set in this process. The run goes on from what `run_file` holds, and its state is
 /// saved there from time to time; what is reported of scans, but poses and map, is of the resumed
-/// part alone. With a `loops_file`, where scans are kept meanwhile, loops are closed: poses and map
+/// part alone. With `loops`, these are closed: poses and map
 /// are corrected when all scans are mapped. With an `earlier` map, too, the drive is put onto it,
 /// unless it was stopped. Throws what reading and saving throw, and MapNotRecognized.
 [[nodiscard]] MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
                                         const MapperConfig& config, const MappedBody& body,
                                         std::unique_ptr<Segmenter> labels, RunFile& run_file,
-                                        const std::optional<std::filesystem::path>& loops_file,
+                                        const std::optional<LoopOptions>& loops,
                                         const EarlierMap* earlier = nullptr,
                                         const MappingListeners& listeners = {});
 
