@@ -11,6 +11,7 @@
 #include "core/lidar/prepare.hpp"
 #include "core/simulation/simulation.hpp"
 #include "tests/localization/yard_map.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap::test {
 namespace {
@@ -56,7 +57,7 @@ TEST(Localizer, FindsALidarThatLooksTheOtherWayBesideThePath) {
 TEST(Localizer, FindsNoScanOfAnotherCity) {
   const Localizer localizer(index_of(first_yard()));
   const simulation::Simulation simulation(yard(2, 0));
-  for (int k = 10; k < 240; k += 30)
+  for (int k = 10; k < 240; k += 30 * slowdown)
     EXPECT_NE(localize(localizer, simulation.scan(k)).status, LocalizationStatus::found) << k;
 }
 
