@@ -18,6 +18,13 @@ constexpr double prior_map_update_distance_m = 20.0;
 /// How far from where it was found a lidar may have driven, until the next scan [m].
 constexpr double relocation_reach_m = 4.0;
 
+/// The tiles themselves would keep their voxels in memory, evicted or not.
+std::set<TileId> tile_ids(const MapSnapshot& view) {
+  std::set<TileId> ids;
+  for (const auto& tile : view.tiles) ids.insert(ids.end(), tile->info.id);
+  return ids;
+}
+
 MapperConfig checked(const MapperConfig& config) {
   if (const std::string faults = config.faults(); !faults.empty())
     throw std::invalid_argument(faults);
@@ -241,7 +248,7 @@ void Mapper::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidenc
 StaticMap Mapper::resume(StaticMap prepared) {
   StaticMap until_now = std::exchange(static_map_.map(), std::move(prepared));
   clear_scan_state();
-  resumed_tiles_ = static_map_.map().view()->tiles;
+  resumed_tiles_ = tile_ids(*static_map_.map().view());
   return until_now;
 }
 
@@ -275,7 +282,7 @@ void Mapper::relocate(Odometry followed, int confirming_scans) {
   last_middle_.reset();
   inertial_.forget_motion();
   // Of this run, too.
-  resumed_tiles_ = static_map_.map().view()->tiles;
+  resumed_tiles_ = tile_ids(*static_map_.map().view());
   prior_map_added_at_map_.reset();
 }
 
@@ -304,7 +311,7 @@ void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {
   std::vector<LabelledPoint> points_odom;
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(config_.static_map.max_range_m);
   for (const auto& tile : tiles_in_box(*view, {position_map - reach, position_map + reach})) {
-    if (resumed_tiles_.find(tile->info.id) == nullptr) continue;
+    if (!resumed_tiles_.contains(tile->info.id)) continue;
     const Eigen::AlignedBox3d bounds_map = tile->info.bounds_map.cast<double>();
     if (bounds_map.exteriorDistance(position_map) > config_.static_map.max_range_m) continue;
     for (const Voxel& voxel : tile->voxels) {

@@ -4,6 +4,7 @@
 #include <limits>
 #include <memory>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 
@@ -198,7 +199,7 @@ class Mapper {
   Eigen::Isometry3d T_map_odom_ = Eigen::Isometry3d::Identity();
   LendableMap static_map_;
   /// Tiles of a resumed map, and where their points were last added to the odometry's local map.
-  TileTable resumed_tiles_;
+  std::set<TileId> resumed_tiles_;
   std::optional<Eigen::Vector3d> prior_map_added_at_map_;
   bool is_placed_ = false;
   bool hands_out_scans_ = false;

@@ -18,6 +18,11 @@ constexpr std::uint8_t service_request_op = 2;
 /// Channels, subscriptions or ids in one message.
 constexpr std::size_t max_listed = 1000;
 
+/// What it quotes of a client or a server may be cut within a character.
+std::string text_of_message(const Json& message) {
+  return message.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
 template <typename T>
 void put(T value, std::uint8_t* to) {
   for (std::size_t i = 0; i < sizeof(T); ++i) {
@@ -97,14 +102,13 @@ Json half_of_service(const std::string& type, const char* half) {
 }  // namespace
 
 std::string server_info(const std::string& name, const std::string& session) {
-  return Json{{"op", "serverInfo"},
-              {"name", name},
-              {"capabilities", {"clientPublish", "services"}},
-              {"supportedEncodings", {"cdr"}},
-              // Lichtblick and Foxglove look for it to tell ROS 1 from ROS 2.
-              {"metadata", {{"ROS_DISTRO", "humble"}}},
-              {"sessionId", session}}
-      .dump();
+  return text_of_message({{"op", "serverInfo"},
+                          {"name", name},
+                          {"capabilities", {"clientPublish", "services"}},
+                          {"supportedEncodings", {"cdr"}},
+                          // Lichtblick and Foxglove look for it to tell ROS 1 from ROS 2.
+                          {"metadata", {{"ROS_DISTRO", "humble"}}},
+                          {"sessionId", session}});
 }
 
 std::string advertise(std::span<const ChannelInfo> channels) {
@@ -117,7 +121,7 @@ std::string advertise(std::span<const ChannelInfo> channels) {
                     {"schemaEncoding", "ros2msg"},
                     {"schema", dds::message_definition(channel.type)}});
   }
-  return Json{{"op", "advertise"}, {"channels", list}}.dump();
+  return text_of_message({{"op", "advertise"}, {"channels", list}});
 }
 
 std::string advertise_services(std::span<const ServiceInfo> services) {
@@ -134,30 +138,29 @@ std::string advertise_services(std::span<const ServiceInfo> services) {
                     {"request", std::move(request)},
                     {"response", std::move(response)}});
   }
-  return Json{{"op", "advertiseServices"}, {"services", list}}.dump();
+  return text_of_message({{"op", "advertiseServices"}, {"services", list}});
 }
 
 std::string status(StatusLevel level, const std::string& text, const std::string& id) {
   Json message{{"op", "status"}, {"level", static_cast<int>(level)}, {"message", text}};
   if (!id.empty()) message["id"] = id;
-  return message.dump();
+  return text_of_message(message);
 }
 
 std::string remove_status(const std::string& id) {
-  return Json{{"op", "removeStatus"}, {"statusIds", Json::array({id})}}.dump();
+  return text_of_message({{"op", "removeStatus"}, {"statusIds", Json::array({id})}});
 }
 
 std::string service_call_failure(std::uint32_t service, std::uint32_t call,
                                  const std::string& why) {
-  return Json{
-      {"op", "serviceCallFailure"}, {"serviceId", service}, {"callId", call}, {"message", why}}
-      .dump();
+  return text_of_message(
+      {{"op", "serviceCallFailure"}, {"serviceId", service}, {"callId", call}, {"message", why}});
 }
 
 std::string no_parameters(const std::string& request_id) {
   Json message{{"op", "parameterValues"}, {"parameters", Json::array()}};
   if (!request_id.empty()) message["id"] = request_id;
-  return message.dump();
+  return text_of_message(message);
 }
 
 MessageHeader message_header(std::uint32_t subscription, std::int64_t time_ns) {

@@ -30,7 +30,8 @@ void Session::begin(const std::string& server, const std::string& id) {
 void Session::take_text(std::string_view text) {
   try {
     std::visit([this](const auto& message) { handle(message); }, parse_text(text));
-  } catch (const ProtocolError& error) {
+  } catch (const std::exception& error) {
+    // Whatever it is: one client's message ends nothing of the others'.
     refuse(error.what());
   }
 }
@@ -38,7 +39,8 @@ void Session::take_text(std::string_view text) {
 void Session::take_binary(std::span<const std::uint8_t> bytes) {
   try {
     std::visit([this](const auto& message) { handle(message); }, parse_binary(bytes));
-  } catch (const ProtocolError& error) {
+  } catch (const std::exception& error) {
+    // Whatever it is: one client's message ends nothing of the others'.
     refuse(error.what());
   }
 }

@@ -139,31 +139,7 @@ MapQueryResult Client::get_whole_static_map(
 }
 
 TileVersions Client::get_tile_versions(const Eigen::AlignedBox3d& box_map) {
-  GetTileVersions_Request request;
-  request.min_x(box_map.min().x());
-  request.min_y(box_map.min().y());
-  request.max_x(box_map.max().x());
-  request.max_y(box_map.max().y());
-  TileVersions versions;
-  for (bool has_more = true; has_more;) {
-    const bool is_first = request.continuation().empty();
-    const auto reply =
-        connection_->call_ok(services::get_tile_versions, GetTileVersions_Request(request));
-    const dds::MapIdentity map = wire::from_wire(reply.identity());
-    if (is_first) versions = {.map = map, .tiles = {}};
-    if (map.map_id != versions.map.map_id) {
-      // Another map than on the pages before: from the beginning.
-      request.continuation().clear();
-      continue;
-    }
-    for (const auto& message : reply.tiles()) {
-      versions.tiles.push_back(
-          connection_->require_readable(wire::from_wire(message), services::get_tile_versions));
-    }
-    request.continuation(reply.continuation());
-    has_more = !reply.continuation().empty();
-  }
-  return versions;
+  return connection_->list_tiles(box_map);
 }
 
 TileVersions Client::get_tile_versions() { return get_tile_versions(unbounded_box()); }
@@ -369,7 +345,7 @@ Subscription Client::subscribe_region(const Region& region,
   Connection& connection = *connection_;
   return make_region_subscription(
       connection.participant, connection.topics.tile_index, region,
-      get_tile_versions(shape.bounds_map()),
+      [&connection, box_map = shape.bounds_map()] { return connection.list_tiles(box_map); },
       [&connection](std::span<const TileId> ids) { return connection.fetch_tiles(ids); },
       std::move(update_arrived));
 }

@@ -59,6 +59,33 @@ TileSet Client::Connection::fetch_tiles(std::span<const TileId> ids) {
   return set;
 }
 
+TileVersions Client::Connection::list_tiles(const Eigen::AlignedBox3d& box_map) {
+  GetTileVersions_Request request;
+  request.min_x(box_map.min().x());
+  request.min_y(box_map.min().y());
+  request.max_x(box_map.max().x());
+  request.max_y(box_map.max().y());
+  TileVersions versions;
+  for (bool has_more = true; has_more;) {
+    const bool is_first = request.continuation().empty();
+    const auto reply = call_ok(dds::services::get_tile_versions, GetTileVersions_Request(request));
+    const dds::MapIdentity map = wire::from_wire(reply.identity());
+    if (is_first) versions = {.map = map, .tiles = {}};
+    if (map.map_id != versions.map.map_id) {
+      // Another map than on the pages before: from the beginning.
+      request.continuation().clear();
+      continue;
+    }
+    for (const auto& message : reply.tiles()) {
+      versions.tiles.push_back(
+          require_readable(wire::from_wire(message), dds::services::get_tile_versions));
+    }
+    request.continuation(reply.continuation());
+    has_more = !reply.continuation().empty();
+  }
+  return versions;
+}
+
 ServiceError Client::Connection::malformed_reply(const std::string& service) {
   return ServiceError("the answer of " + service +
                       " cannot be understood; client and server must have the same version");

@@ -91,6 +91,9 @@ struct Client::Connection {
   /// These tiles with their voxels, in as many requests as the server's answers need.
   [[nodiscard]] TileSet fetch_tiles(std::span<const TileId> ids);
 
+  /// The tiles whose footprint meets the box (map frame [m]), all of one map.
+  [[nodiscard]] TileVersions list_tiles(const Eigen::AlignedBox3d& box_map);
+
   [[nodiscard]] static ServiceError malformed_reply(const std::string& service);
   /// What is known of a call without an answer.
   struct Unanswered {

@@ -29,7 +29,7 @@ dds::ContentFilter filter_for(const Region& region, double tile_size_m) {
 
 RegionTracker tracker_of(const Region& region, const TileVersions& present) {
   RegionTracker tracker(region, present.map.tile_size_m);
-  for (const TileInfo& info : present.tiles) tracker.add_index_entry(present.map, info);
+  tracker.add_present(present);
   return tracker;
 }
 
@@ -38,9 +38,10 @@ class RegionReceiver final : public Subscription::Receiver {
  public:
   RegionReceiver(dds::Participant& participant,
                  const dds::TopicSpec<stillmap_msgs::msg::TileInfo>& index, const Region& region,
-                 const TileVersions& present, FetchTiles fetch,
+                 const TileVersions& present, ListTiles list, FetchTiles fetch,
                  std::function<void(const RegionUpdate&)> update_arrived)
       : tracker_(tracker_of(region, present)),
+        list_(std::move(list)),
         fetch_(std::move(fetch)),
         update_arrived_(std::move(update_arrived)),
         reader_(participant, index.dds_name, index.reader,
@@ -53,6 +54,7 @@ class RegionReceiver final : public Subscription::Receiver {
     if (tracker_.has_update()) deliver_update();
     while (!stop.stop_requested()) {
       collect_entries(stop);
+      if (tracker_.lacks_present() && !stop.stop_requested()) list_present();
       if (tracker_.has_update() && !stop.stop_requested()) deliver_update();
     }
   }
@@ -68,6 +70,14 @@ class RegionReceiver final : public Subscription::Receiver {
       if (!first) first = Clock::now();
       if (Clock::now() - *first > max_batch_duration) return;
       pause = batch_gap;
+    }
+  }
+
+  void list_present() {
+    try {
+      tracker_.add_present(list_());
+    } catch (const ServiceError&) {
+      // The server is gone or busy: once more after the next entries, or a second.
     }
   }
 
@@ -90,6 +100,7 @@ class RegionReceiver final : public Subscription::Receiver {
   }
 
   RegionTracker tracker_;
+  ListTiles list_;
   FetchTiles fetch_;
   std::function<void(const RegionUpdate&)> update_arrived_;
   stillmap_msgs::msg::TileInfo sample_;
@@ -101,12 +112,19 @@ class RegionReceiver final : public Subscription::Receiver {
 }  // namespace
 
 void RegionTracker::add_index_entry(const dds::MapIdentity& map, const TileInfo& info) {
-  if (!region_.may_intersect(tile_footprint(info.id, tile_size_m_))) return;
   if (map.map_id != map_.map_id) clear();
   map_ = map;
+  if (!region_.may_intersect(tile_footprint(info.id, tile_size_m_))) return;
   if (info.voxel_count == 0) return remove(info.id);
   const auto known = known_.find(info.id);
   if (known == known_.end() || known->second < info.revision) pending_.insert(info.id);
+}
+
+void RegionTracker::add_present(const TileVersions& present) {
+  if (present.map.map_id != map_.map_id) clear();
+  map_ = present.map;
+  listed_map_id_ = present.map.map_id;
+  for (const TileInfo& info : present.tiles) add_index_entry(present.map, info);
 }
 
 void RegionTracker::clear() {
@@ -139,11 +157,12 @@ RegionUpdate RegionTracker::take_update(TileSet fetched) {
 
 Subscription make_region_subscription(dds::Participant& participant,
                                       const dds::TopicSpec<stillmap_msgs::msg::TileInfo>& index,
-                                      const Region& region, const TileVersions& present,
-                                      FetchTiles fetch,
+                                      const Region& region, ListTiles list, FetchTiles fetch,
                                       std::function<void(const RegionUpdate&)> update_arrived) {
-  return Subscription(std::make_unique<RegionReceiver>(
-      participant, index, region, present, std::move(fetch), std::move(update_arrived)));
+  const TileVersions present = list();
+  return Subscription(std::make_unique<RegionReceiver>(participant, index, region, present,
+                                                       std::move(list), std::move(fetch),
+                                                       std::move(update_arrived)));
 }
 
 }  // namespace stillmap

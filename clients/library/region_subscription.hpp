@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <map>
 #include <set>
@@ -23,6 +24,11 @@ class RegionTracker {
 
   /// An entry of a tile that was fetched in this state, or a newer one, changes nothing.
   void add_index_entry(const dds::MapIdentity& map, const TileInfo& info);
+  /// All tiles of the region.
+  void add_present(const TileVersions& present);
+  /// Whether another map began since then: the index has only tiles of it that are round the robot,
+  /// or changed.
+  [[nodiscard]] bool lacks_present() const { return listed_map_id_ != map_.map_id; }
 
   /// Tiles that changed and are not fetched yet.
   [[nodiscard]] std::vector<TileId> pending() const { return {pending_.begin(), pending_.end()}; }
@@ -39,6 +45,7 @@ class RegionTracker {
   RegionShape region_;
   double tile_size_m_;
   dds::MapIdentity map_;
+  std::uint64_t listed_map_id_ = 0;
   /// With their revisions.
   std::map<TileId, std::uint64_t> known_;
   std::set<TileId> pending_;
@@ -46,14 +53,15 @@ class RegionTracker {
 };
 
 using FetchTiles = std::function<TileSet(std::span<const TileId>)>;
+using ListTiles = std::function<TileVersions()>;
 
 /// A reader of the region's part of the tile index, and the thread that makes updates of its
-/// entries, fetching changed tiles. `present` are the region's tiles: the first update has them,
-/// since the index has but those round the robot. `fetch` may throw ServiceError; it is then called
-/// again later.
+/// entries, fetching changed tiles. `list` tells the region's tiles: the first update has them,
+/// and that of another map, since the index has but those round the robot. Throws what `list`
+/// throws; later `list` and `fetch` may throw ServiceError, and are then called again.
 [[nodiscard]] Subscription make_region_subscription(
     dds::Participant& participant, const dds::TopicSpec<stillmap_msgs::msg::TileInfo>& index,
-    const Region& region, const TileVersions& present, FetchTiles fetch,
+    const Region& region, ListTiles list, FetchTiles fetch,
     std::function<void(const RegionUpdate&)> update_arrived);
 
 }  // namespace stillmap

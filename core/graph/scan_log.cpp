@@ -36,19 +36,25 @@ struct Header {
 /// point to point, classes, confidence, motion.
 constexpr std::size_t planes = 9;
 
-std::int16_t quantized(float value_m) {
-  constexpr float limit = 32767.0F;
-  return static_cast<std::int16_t>(std::lround(std::clamp(value_m / step_m, -limit, limit)));
+constexpr float max_steps = 32767.0F;
+
+/// What is farther than that along an axis is nearer on its ray: seen through as far as it matters,
+/// and in no other direction.
+Eigen::Vector3f in_steps(const Eigen::Vector3f& point_m) {
+  const Eigen::Vector3f steps = point_m / step_m;
+  return steps * std::min(1.0F, max_steps / std::max(steps.cwiseAbs().maxCoeff(), 1.0F));
 }
 
 std::vector<std::uint8_t> to_planes(const LabelledScan& labelled) {
   const std::size_t count = labelled.scan.size();
   std::vector<std::uint8_t> bytes(planes * count);
+  std::vector<Eigen::Vector3f> steps(count);
+  std::ranges::transform(labelled.scan.points_lidar, steps.begin(), in_steps);
   for (int axis = 0; axis < 3; ++axis) {
     std::uint16_t last = 0;
     const std::size_t low = 2 * static_cast<std::size_t>(axis) * count;
     for (std::size_t i = 0; i < count; ++i) {
-      const auto value = static_cast<std::uint16_t>(quantized(labelled.scan.points_lidar[i][axis]));
+      const auto value = static_cast<std::uint16_t>(std::lround(steps[i][axis]));
       const auto difference = static_cast<std::uint16_t>(value - std::exchange(last, value));
       bytes[low + i] = static_cast<std::uint8_t>(difference & 0xFFU);
       bytes[low + count + i] = static_cast<std::uint8_t>(difference >> 8U);
@@ -71,6 +77,8 @@ LabelledScan from_planes(std::span<const std::uint8_t> bytes, const Header& head
   labelled.scan.stamp_ns = header.stamp_ns;
   labelled.scan.points_lidar.resize(count);
   labelled.motion.resize(count);
+  std::vector<Eigen::Vector3f> steps(count);
+  std::ranges::transform(labelled.scan.points_lidar, steps.begin(), in_steps);
   for (int axis = 0; axis < 3; ++axis) {
     std::uint16_t last = 0;
     const std::size_t low = 2 * static_cast<std::size_t>(axis) * count;

@@ -14,6 +14,8 @@ constexpr std::int64_t up_window_ns = 500'000'000;
 /// rate is a bias when it is the mean over at least this time [rad, s].
 constexpr double max_rest_rotation_rad = 0.0015;
 constexpr double min_rest_s = 0.08;
+/// What is not steady for so long is no rest.
+constexpr double max_rest_s = 0.25;
 
 double seconds(std::int64_t ns) { return static_cast<double>(ns) * 1e-9; }
 std::int64_t nanoseconds(double s) { return std::llround(s * 1e9); }
@@ -95,10 +97,22 @@ void InertialTracker::learn(std::int64_t from_ns, std::int64_t to_ns,
   if (last_rate) trust_.add(registered, missing, registered - duration_s * *last_rate);
   (void)calibration_.learn_from_rotation(R_lidar_imu_.conjugate() * missing, duration_s,
                                          *rate_to - *rate_from);
-  if (registered.norm() > max_rest_rotation_rad) return;
-  const auto mean = track_.steady_mean(imu_time(from_ns), imu_time(to_ns));
-  if (mean && mean->duration_s >= min_rest_s)
-    calibration_.learn_at_rest(mean->angular_velocity_imu);
+  learn_at_rest(from_ns, to_ns, registered);
+}
+
+void InertialTracker::learn_at_rest(std::int64_t from_ns, std::int64_t to_ns,
+                                    const Eigen::Vector3d& registered) {
+  // Scans of a fast lidar come too close together for a mean of their own.
+  if (!rest_ || rest_->to_ns != from_ns)
+    rest_ = Rest{.from_ns = from_ns, .to_ns = from_ns, .rotation = Eigen::Vector3d::Zero()};
+  rest_->to_ns = to_ns;
+  rest_->rotation += registered;
+  if (rest_->rotation.norm() > max_rest_rotation_rad) return rest_.reset();
+  const auto mean = track_.steady_mean(imu_time(rest_->from_ns), imu_time(to_ns));
+  if (!mean && seconds(to_ns - rest_->from_ns) > max_rest_s) return rest_.reset();
+  if (!mean || mean->duration_s < min_rest_s) return;
+  calibration_.learn_at_rest(mean->angular_velocity_imu);
+  rest_.reset();
 }
 
 }  // namespace stillmap

@@ -47,7 +47,10 @@ class InertialTracker {
   void learn(std::int64_t from_ns, std::int64_t to_ns, const Eigen::Matrix3d& R_from_to);
 
   /// The next pose does not go on from the last one that was learnt.
-  void forget_motion() { last_rate_lidar_.reset(); }
+  void forget_motion() {
+    last_rate_lidar_.reset();
+    rest_.reset();
+  }
 
   /// False before the first sample.
   [[nodiscard]] bool has_samples() const { return counts_.samples > 0; }
@@ -61,6 +64,8 @@ class InertialTracker {
  private:
   [[nodiscard]] std::optional<Eigen::Matrix3d> rotation_lidar(std::int64_t from_ns,
                                                               std::int64_t to_ns) const;
+  /// Poses of which the second one is turned by `registered` [rad].
+  void learn_at_rest(std::int64_t from_ns, std::int64_t to_ns, const Eigen::Vector3d& registered);
 
   bool mount_is_known_;
   Eigen::Quaterniond R_lidar_imu_;
@@ -70,6 +75,13 @@ class InertialTracker {
   InertialCounts counts_;
   /// Mean rate of turn between the last two poses [rad/s].
   std::optional<Eigen::Vector3d> last_rate_lidar_;
+  /// Poses in a row that hardly turned, until they are far enough apart to learn from.
+  struct Rest {
+    std::int64_t from_ns = 0;
+    std::int64_t to_ns = 0;
+    Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
+  };
+  std::optional<Rest> rest_;
 };
 
 }  // namespace stillmap

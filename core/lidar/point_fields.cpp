@@ -12,6 +12,9 @@ namespace stillmap {
 namespace {
 
 constexpr double max_offset_s = 10.0;
+/// A stamp that is farther from its points' times than this is of another clock [s]: the pose at
+/// the stamp is told from the sweep's own motion.
+constexpr double max_from_stamp_s = 1.0;
 /// Outside these durations another unit is tried.
 constexpr double min_scan_s = 1e-3;
 constexpr double max_scan_s = 5.0;
@@ -168,10 +171,12 @@ PointTimes point_times(std::span<const double> times, TimeType type, std::int64_
   const double middle_s = middle * unit.seconds;
   const double stamp_s = static_cast<double>(stamp_ns) * 1e-9;
   const std::string name = unit.name;
-  if (std::abs(middle_s) <= max_offset_s) {
+  // A simulator's clock begins at 0, and its times are small, too.
+  const bool is_clock = std::abs(middle_s - stamp_s) < 0.5 * std::abs(middle_s);
+  if (std::abs(middle_s) <= max_from_stamp_s && !is_clock) {
     return {offsets_from(0.0, middle_s, times_s), name + " from the stamp"};
   }
-  if (std::abs(middle_s - stamp_s) <= max_offset_s) {
+  if (std::abs(middle_s - stamp_s) <= max_from_stamp_s) {
     return {offsets_from(stamp_s, middle_s, times_s), name + " on the stamp's clock"};
   }
   return {offsets_from(earliest_near(middle_s, times_s), middle_s, times_s),

@@ -14,6 +14,9 @@ namespace {
 /// Points whose time lies more periods than this from the stamp have a wrong time and are not
 /// moved.
 constexpr double max_periods = 2.0;
+/// Of a sweep, wherever the stamp is: from the median of its times.
+constexpr double max_periods_from_median = 1.25;
+constexpr std::size_t median_samples = 1000;
 
 class Usable {
  public:
@@ -138,12 +141,29 @@ double SweepTimes::part(float time_offset_s) const {
   return std::abs(part) <= 0.5 + 1e-6 ? part : 0.0;
 }
 
+namespace {
+
+/// Of some thousand times, spread over the scan; 0 of none.
+float median_time_s(const std::vector<float>& times_s) {
+  std::vector<float> sample;
+  const std::size_t step = times_s.size() / median_samples + 1;
+  for (std::size_t i = 0; i < times_s.size(); i += step)
+    if (std::isfinite(times_s[i])) sample.push_back(times_s[i]);
+  if (sample.empty()) return 0.0F;
+  const auto middle = sample.begin() + static_cast<std::ptrdiff_t>(sample.size() / 2);
+  std::ranges::nth_element(sample, middle);
+  return *middle;
+}
+
+}  // namespace
+
 SweepTimes sweep_times(const Scan& scan, double period_s) {
   double first_s = 0.0;
   double last_s = 0.0;
   bool any = false;
+  const float median_s = median_time_s(scan.time_offset_s);
   for (const float t : scan.time_offset_s) {
-    if (!(std::abs(t) <= max_periods * period_s)) continue;
+    if (!(std::abs(t - median_s) <= max_periods_from_median * period_s)) continue;
     first_s = any ? std::min<double>(first_s, t) : t;
     last_s = any ? std::max<double>(last_s, t) : t;
     any = true;

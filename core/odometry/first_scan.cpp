@@ -14,6 +14,8 @@ void straighten_first_scan(const FirstScan& first, const FeatureSets& features, 
                            const SweepTimes& sweep, const OdometryConfig& config, LocalMap& map,
                            RegisteredScan& last, OdometryResult& second) {
   constexpr int rounds = 4;
+  const LocalMap map_before = map;
+  const Eigen::Isometry3d T_map_lidar_before = last.T_map_lidar;
   OdometryResult found = second;
   FeatureSets moving = features;
   for (int round = 0; round < rounds; ++round) {
@@ -25,7 +27,10 @@ void straighten_first_scan(const FirstScan& first, const FeatureSets& features, 
     moving.sweep_prior.T_map_lidar_last = last.T_map_lidar;
     found = register_features(moving, map, last.T_map_lidar * motion_of(velocity * interval_s),
                               config, velocity * sweep.duration_s);
-    if (found.health == OdometryHealth::lost) return;
+    if (found.health != OdometryHealth::lost) continue;
+    map = map_before;
+    last.T_map_lidar = T_map_lidar_before;
+    return;
   }
   second = found;
 }

@@ -134,6 +134,13 @@ TEST_F(DatasetCommandTest, DoesNotWriteOverAnythingUnlessForced) {
   EXPECT_FALSE(exists("copy/labels/000001.label"));
   EXPECT_EQ(content("copy/notes.txt"), "mine");
   EXPECT_EQ(run("dataset export " + path("city") + " " + path("city") + " --force").exit_code, 2);
+  // A part of what would be replaced.
+  for (const char* part : {"city/velodyne", "city/velodyne/000000.bin", "copy/../city/velodyne"}) {
+    const ProcessResult of_part =
+        run("dataset export " + path(part) + " " + path("city") + " --labels none --force");
+    EXPECT_EQ(of_part.exit_code, 2) << part;
+    EXPECT_THAT(of_part.err, HasSubstr("the source stays as it is")) << part;
+  }
   EXPECT_TRUE(exists("city/velodyne/000001.bin"));
 
   const std::string to_cloud = "dataset aggregate " + path("city") + " " + path("city.ply");

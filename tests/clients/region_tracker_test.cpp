@@ -91,6 +91,23 @@ TEST(RegionTracker, AnotherMapReplacesAllTiles) {
   EXPECT_THAT(ids(update.changed), ElementsAre(TileId{1, 0}));
 }
 
+TEST(RegionTracker, LacksWhatTheIndexOfAnotherMapDoesNotHave) {
+  RegionTracker tracker = two_tiles();
+  tracker.add_present({.map = first_map, .tiles = {info({0, 0}), info({1, 0})}});
+  EXPECT_FALSE(tracker.lacks_present());
+  (void)tracker.take_update(tiles(first_map, {{0, 0}, {1, 0}}));
+  tracker.add_index_entry(first_map, info({1, 0}, 5, 2));
+  EXPECT_FALSE(tracker.lacks_present());
+  // The server was killed: what it has loaded is another map, whose index begins round the robot,
+  // which is not in the region.
+  tracker.add_index_entry(second_map, info({9, 9}));
+  EXPECT_TRUE(tracker.lacks_present());
+  tracker.add_present({.map = second_map, .tiles = {info({0, 0}), info({1, 0}), info({2, 0})}});
+  EXPECT_FALSE(tracker.lacks_present());
+  EXPECT_THAT(tracker.pending(), ElementsAre(TileId{0, 0}, TileId{1, 0}));
+  EXPECT_EQ(tracker.take_update(tiles(second_map, {{0, 0}, {1, 0}})).changed.size(), 2U);
+}
+
 TEST(RegionTracker, LeavesTilesOfAMapThatTheIndexHasNotSpokenOf) {
   RegionTracker tracker = two_tiles();
   tracker.add_index_entry(first_map, info({0, 0}));

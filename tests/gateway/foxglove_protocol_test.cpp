@@ -82,6 +82,14 @@ TEST(FoxgloveProtocol, NamesWhatIsWrong) {
   EXPECT_EQ(text_as<NotOffered>(R"({"op":"fetchAsset"})").op, "fetchAsset");
 }
 
+TEST(FoxgloveProtocol, SaysAgainWhatIsCutWithinACharacter) {
+  const std::string op = std::string(63, 'a') + "\u00e9";
+  const auto refused = text_as<NotOffered>(R"({"op":")" + op + R"("})");
+  const std::string text = status(StatusLevel::error, "no '" + refused.op + "' here", refused.op);
+  EXPECT_TRUE(nlohmann::json::accept(text)) << text;
+  EXPECT_TRUE(nlohmann::json::accept(service_call_failure(1, 2, "\xc3\x28\xff")));
+}
+
 TEST(FoxgloveProtocol, RefusesListsWithoutAnEnd) {
   std::string text = R"({"op":"unsubscribe","subscriptionIds":[0)";
   for (int i = 0; i < 5000; ++i) text += ",1";

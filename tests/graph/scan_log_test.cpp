@@ -68,6 +68,20 @@ TEST(ScanLog, ScansComeBack) {
   EXPECT_TRUE(read[2].labelled.scan.empty());
 }
 
+TEST(ScanLog, WhatIsTooFarStaysOnItsRay) {
+  const ScratchFolder scratch;
+  ScanLog log(scratch / "scans");
+  LoggedScan scan = random_scan(3, false);
+  const Eigen::Vector3f far(180.0F, 60.0F, 5.0F);
+  scan.labelled.scan.points_lidar[7] = far;
+  log.append(scan);
+  const auto read = all_of(log);
+  ASSERT_EQ(read.size(), 1U);
+  const Eigen::Vector3f& kept = read[0].labelled.scan.points_lidar[7];
+  EXPECT_GT(kept.norm(), 131.0F);
+  EXPECT_LT(kept.normalized().cross(far.normalized()).norm(), 1e-4F);
+}
+
 TEST(ScanLog, AnotherProcessGoesOnWhereOneWasKilled) {
   const ScratchFolder scratch;
   {

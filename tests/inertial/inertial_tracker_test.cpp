@@ -102,6 +102,27 @@ TEST(InertialTracker, SaysNothingWhereSamplesAreMissing) {
   EXPECT_EQ(tracker.counts().scans_without_samples, 1U);
 }
 
+TEST(InertialTracker, LearnsTheBiasAtRestWhateverTheRateOfTheLidar) {
+  const Eigen::Vector3d bias_imu(0.02, -0.01, 0.005);
+  for (const std::int64_t period_ms : {100, 50, 25}) {
+    InertialTracker tracker(ImuMount{});
+    std::mt19937 random(11);
+    std::normal_distribution<double> noise(0.0, 0.001);
+    std::int64_t sampled_ms = 0;
+    for (std::int64_t now_ms = period_ms; now_ms <= 2000; now_ms += period_ms) {
+      for (; sampled_ms <= now_ms + 50; sampled_ms += 5) {
+        ImuSample sample;
+        sample.stamp_ns = sampled_ms * per_ms;
+        sample.angular_velocity_imu = bias_imu + Eigen::Vector3d::Constant(noise(random));
+        sample.acceleration_imu = {0.0, 0.0, 9.81 + noise(random)};
+        tracker.add(sample);
+      }
+      tracker.learn((now_ms - period_ms) * per_ms, now_ms * per_ms, Eigen::Matrix3d::Identity());
+    }
+    EXPECT_LT((tracker.calibration().bias_imu() - bias_imu).norm(), 5e-4) << period_ms;
+  }
+}
+
 TEST(InertialTracker, TellsUpAtRestAlongTheLidarsAxes) {
   const Eigen::Quaterniond R_lidar_imu = rotation_by({0.4, -1.0, 2.0});
   const Imu imu{.mount = {R_lidar_imu.toRotationMatrix(), 0.0}};

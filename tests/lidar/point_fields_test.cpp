@@ -42,6 +42,20 @@ TEST(PointTimes, TakesTimesOfAnotherClockRelativeToTheEarliest) {
   EXPECT_THAT(times.remark, HasSubstr("another clock"));
 }
 
+TEST(PointTimes, TakesASimulatorsClockForWhatItIs) {
+  for (const double now_s : {0.0, 0.3, 5.2, 900.0}) {
+    const auto stamp = static_cast<std::int64_t>(now_s * 1e9);
+    EXPECT_THAT(
+        offsets({now_s, now_s + 0.05, now_s + 0.1}, TimeType::float64, stamp),
+        ElementsAre(FloatNear(0.0F, 1e-6F), FloatNear(0.05F, 1e-6F), FloatNear(0.1F, 1e-6F)))
+        << now_s;
+  }
+}
+
+TEST(PointTimes, AStampSecondsFromItsPointsIsOfAnotherClock) {
+  EXPECT_THAT(offsets({1.6e9 - 3.0, 1.6e9 - 2.9}), ElementsAre(0.0F, FloatNear(0.1F, 1e-6F)));
+}
+
 TEST(PointTimes, PassesBrokenTimesOn) {
   const auto broken = offsets({NAN, 0.1, 0.1, INFINITY}, TimeType::float32, 0);
   EXPECT_TRUE(std::isnan(broken[0]));

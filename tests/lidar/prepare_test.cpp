@@ -199,6 +199,22 @@ TEST(Deskew, LeavesPointsOfBrokenClocksWhereTheyAre) {
   EXPECT_EQ(deskew(scan, T, 0.1).points_lidar, scan.points_lidar);
 }
 
+TEST(SweepTimes, AreThoseOfTheSweepWhereverTheStampIs) {
+  for (const float begin_s : {0.0F, -0.05F, -0.1F, -0.25F, 0.3F, -0.8F}) {
+    Scan scan;
+    for (int i = 0; i <= 2000; ++i)
+      scan.time_offset_s.push_back(begin_s + 0.1F * static_cast<float>(i) / 2000.0F);
+    scan.time_offset_s.push_back(nan);
+    scan.time_offset_s.push_back(begin_s + 3.0F);
+    const SweepTimes sweep = sweep_times(scan, 0.1);
+    EXPECT_NEAR(sweep.middle_s, begin_s + 0.05, 1e-6) << begin_s;
+    EXPECT_NEAR(sweep.duration_s, 0.1, 1e-6) << begin_s;
+    EXPECT_NEAR(sweep.part(begin_s), -0.5, 1e-4) << begin_s;
+    EXPECT_EQ(sweep.part(begin_s + 3.0F), 0.0) << begin_s;
+  }
+  EXPECT_EQ(sweep_times(Scan{}, 0.1).duration_s, 0.0);
+}
+
 TEST(UsablePoints, AreThoseThatAreKept) {
   const float nan = std::numeric_limits<float>::quiet_NaN();
   Scan scan;

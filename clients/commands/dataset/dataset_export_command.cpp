@@ -65,7 +65,7 @@ ExportSummary export_from_dataset(const DatasetExportArguments& arguments, StopS
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
   auto labels = make_segmenter(arguments.mapper, dataset);
   std::cerr << describe_model(arguments.mapper, dataset, *labels);
-  prepare_sequence_folder(arguments.out, arguments.force);
+  prepare_sequence_folder(arguments.out, arguments.force, arguments.source);
   Progress progress("export", "scans", total);
   return export_sequence(
       dataset, arguments.range, config, std::move(labels), arguments.out,

@@ -81,9 +81,18 @@ class SequenceExporter {
   std::size_t without_pose_ = 0;
 };
 
+/// Whether it is this folder or file, or beneath it.
+bool is_within(const std::filesystem::path& path, const std::filesystem::path& folder) {
+  if (path.empty()) return false;
+  const std::filesystem::path whole = std::filesystem::weakly_canonical(path);
+  const std::filesystem::path above = std::filesystem::weakly_canonical(folder);
+  return std::mismatch(above.begin(), above.end(), whole.begin(), whole.end()).first == above.end();
+}
+
 }  // namespace
 
-void prepare_sequence_folder(const std::filesystem::path& folder, bool force) {
+void prepare_sequence_folder(const std::filesystem::path& folder, bool force,
+                             const std::filesystem::path& source) {
   constexpr std::array parts{"velodyne",  "labels",       "labels.bak",
                              "rings",     "time_offsets", "calib.txt",
                              "times.txt", "poses.txt",    "poses_lidar.txt"};
@@ -92,6 +101,13 @@ void prepare_sequence_folder(const std::filesystem::path& folder, bool force) {
     throw std::invalid_argument(folder.string() +
                                 " holds a sequence already; name another folder, or replace it "
                                 "and its labels with --force");
+  }
+  for (const char* part : parts) {
+    if (is_within(source, folder / part)) {
+      throw std::invalid_argument(source.string() + " is a part of " + folder.string() +
+                                  ", which would be replaced: the source stays as it is; name "
+                                  "another folder");
+    }
   }
   for (const char* part : parts) std::filesystem::remove_all(folder / part);
 }

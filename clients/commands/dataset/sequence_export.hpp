@@ -16,8 +16,9 @@ namespace stillmap::cli {
 
 /// Prepares the folder for a new sequence. Throws std::invalid_argument when `folder` holds one
 /// already and `force` is not set; with `force`, removes the files of that sequence and nothing
-/// else.
-void prepare_sequence_folder(const std::filesystem::path& folder, bool force);
+/// else, and throws as well where the `source` of the new one is among them.
+void prepare_sequence_folder(const std::filesystem::path& folder, bool force,
+                             const std::filesystem::path& source = {});
 
 /// Counts of an export.
 struct ExportSummary {
