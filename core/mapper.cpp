@@ -132,13 +132,6 @@ void Mapper::move_to_map(OdometryResult& result) const {
   result.covariance = turn * result.covariance * turn.transpose();
 }
 
-std::optional<CorrectedMap> Mapper::correct(const MapCorrection& correction,
-                                            std::size_t limit_bytes) {
-  const auto corrected = lend_static_map().correct(correction, limit_bytes);
-  take_back_static_map(corrected ? &correction : nullptr);
-  return corrected;
-}
-
 void Mapper::take_back_static_map(const MapCorrection* correction) {
   static_map_.take_back();
   if (correction == nullptr) return;

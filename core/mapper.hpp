@@ -129,18 +129,14 @@ class Mapper {
   /// What is stored of it, what of it is in memory, and what was removed from it.
   [[nodiscard]] StaticMap& static_map() { return static_map_.map(); }
 
-  /// Poses of this map were wrong by that: moves the static map, the poses so far, and all that
-  /// follow by the last of them. Odometry goes on in its own frame and never hears of it. Nothing,
-  /// and all stays as it is, where StaticMap::correct does nothing.
-  std::optional<CorrectedMap> correct(
-      const MapCorrection& correction,
-      std::size_t limit_bytes = std::numeric_limits<std::size_t>::max());
-  /// The same in two steps: lends the static map to another thread, which corrects it while scans
-  /// go on to be registered. Until it is taken back only process() and add() may be called, and
-  /// what tells of poses. Scans are kept meanwhile; they and those after them enter the map when
-  /// insert_kept_scans() is called.
+  /// Lends the static map to another thread, which corrects it while scans go on to be registered.
+  /// Until it is taken back only process() and add() may be called, and what tells of poses. Scans
+  /// are kept meanwhile; they and those after them enter the map when insert_kept_scans() is
+  /// called.
   [[nodiscard]] StaticMap& lend_static_map() { return static_map_.lend(); }
-  /// Null: nothing was moved.
+  /// Poses of this map were wrong by that, and the static map was corrected: the poses so far and
+  /// the scans that were kept follow, and all that come by the last of them. Odometry goes on in
+  /// its own frame and never hears of it. Null: nothing was moved.
   void take_back_static_map(const MapCorrection* correction);
   [[nodiscard]] std::size_t kept_scans() const { return static_map_.kept_scans(); }
   /// The oldest of them enter the map, which must not be lent.

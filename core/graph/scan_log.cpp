@@ -77,8 +77,6 @@ LabelledScan from_planes(std::span<const std::uint8_t> bytes, const Header& head
   labelled.scan.stamp_ns = header.stamp_ns;
   labelled.scan.points_lidar.resize(count);
   labelled.motion.resize(count);
-  std::vector<Eigen::Vector3f> steps(count);
-  std::ranges::transform(labelled.scan.points_lidar, steps.begin(), in_steps);
   for (int axis = 0; axis < 3; ++axis) {
     std::uint16_t last = 0;
     const std::size_t low = 2 * static_cast<std::size_t>(axis) * count;

@@ -144,7 +144,8 @@ TEST_F(MapCommandTest, WhatIsRefusedLeavesTheOldMap) {
   for (const char* wrong :
        {"--labels nosuchmodel", "--start 9", "--sensor vlp_17", "--config no.yaml", "--resume",
         "--deny-loop 12", "--deny-loop 12:", "--deny-loop 12:x", "--deny-loop 12:12",
-        "--deny-loop 12:40x", "--deny-loop 1:2 --loops off"}) {
+        "--deny-loop 12:40x", "--deny-loop 1:2 --loops off", "--deny-loop 0:2 --start 1",
+        "--deny-loop 0:2 --scans 2"}) {
     EXPECT_EQ(map_city(std::string(wrong) + " --force").exit_code, 2) << wrong;
     EXPECT_EQ(content("out/map.stillmap"), before) << wrong;
   }

@@ -37,10 +37,10 @@ LoopCorrection::LoopCorrection(LoopOptions options, const SensorModel& sensor)
 void LoopCorrection::number(std::size_t index) {
   index_.push_back(index);
   if (index_.size() > 1) return;
-  // The few scans that are skipped do not matter: a submap has more.
-  for (const DeniedLoop& denied : denied_) {
-    if (denied.from_scan >= index) closer_.deny({denied.from_scan - index, denied.to_scan - index});
-  }
+  // Scans that are skipped do not matter: a submap has more. The first ones may be among them.
+  for (const DeniedLoop& denied : denied_)
+    closer_.deny(
+        {std::max(denied.from_scan, index) - index, std::max(denied.to_scan, index) - index});
 }
 
 void LoopCorrection::resume(std::size_t next_scan) {

@@ -218,7 +218,8 @@ void write_report(const std::filesystem::path& file, const Json& report) {
   if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
 }
 
-/// Throws std::invalid_argument for what is not FROM:TO, and where loops are left open.
+/// Throws std::invalid_argument for what is not FROM:TO or not of this run's scans, and where loops
+/// are left open.
 std::vector<DeniedLoop> denied_loops(const MapArguments& arguments) {
   if (!arguments.denied_loops.empty() && arguments.loops != "on")
     throw std::invalid_argument("--deny-loop needs --loops on: nothing is closed without it");
@@ -235,6 +236,12 @@ std::vector<DeniedLoop> denied_loops(const MapArguments& arguments) {
       throw std::invalid_argument("--deny-loop " + text +
                                   ": must be FROM:TO, two scans of which the second came later, "
                                   "as 'stillmap loops' lists them");
+    }
+    const std::size_t count = arguments.range.count;
+    if (denied.from_scan < arguments.range.first ||
+        (count != SIZE_MAX && denied.to_scan >= arguments.range.first + count)) {
+      throw std::invalid_argument("--deny-loop " + text +
+                                  ": is not of the scans that --start and --scans take");
     }
     all.push_back(denied);
   }
