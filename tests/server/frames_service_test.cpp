@@ -21,6 +21,8 @@ using namespace std::chrono_literals;
 using ::testing::HasSubstr;
 
 constexpr double deg = std::numbers::pi / 180.0;
+/// Of the odometry in a bare hall seen with 16 rings; a mount that is ignored is 15 times as much.
+constexpr double max_rotation_error_rad = 1.0 * deg;
 /// Of the room, beneath the lidar of room_pose().
 constexpr double ground_z_m = -1.5;
 
@@ -86,7 +88,7 @@ class Frames : public testing::Test {
       const Eigen::Isometry3d T_error =
           (T_start * T_room_base(i)).inverse() * update.pose.T_map_lidar;
       EXPECT_LT(T_error.translation().norm(), 0.1) << i;
-      EXPECT_LT(Eigen::AngleAxisd(T_error.linear()).angle(), 1.0 * deg) << i;
+      EXPECT_LT(Eigen::AngleAxisd(T_error.linear()).angle(), max_rotation_error_rad) << i;
     }
   }
 
@@ -149,7 +151,9 @@ TEST_F(Frames, TheMapIsLevelAndItsGroundIsWhereTheRobotStands) {
   for (const auto& [id, tile] : tiles) {
     for (const Voxel& voxel : tile.voxels) {
       if (voxel.evidence.winner() != SemanticClass::road) continue;
-      EXPECT_NEAR(voxel.mean_map.z(), 0.0, 0.15) << voxel.mean_map.transpose();
+      const double range_m = voxel.mean_map.head<2>().norm();
+      EXPECT_NEAR(voxel.mean_map.z(), 0.0, 0.1 + max_rotation_error_rad * range_m)
+          << voxel.mean_map.transpose();
       ++ground_voxels;
     }
   }
