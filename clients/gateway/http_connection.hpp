@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "clients/gateway/access_policy.hpp"
+#include "clients/gateway/connection_limit.hpp"
 #include "clients/gateway/web_site.hpp"
 #include "clients/gateway/websocket_connection.hpp"
 
@@ -28,11 +29,14 @@ template <typename Stream>
 class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream>> {
  public:
   HttpConnection(Stream stream, std::shared_ptr<const ServerContext> context,
-                 std::shared_ptr<void> lease)
+                 std::shared_ptr<ConnectionLimit::Lease> lease)
       : stream_(std::move(stream)), context_(std::move(context)), lease_(std::move(lease)) {}
 
   /// With TLS, its handshake comes first.
   void begin() {
+    lease_->close_with([weak = this->weak_from_this()] {
+      if (const auto self = weak.lock()) boost::beast::get_lowest_layer(self->stream_).close();
+    });
     if constexpr (is_tls) {
       boost::beast::get_lowest_layer(stream_).expires_after(handshake_timeout);
       stream_.async_handshake(Stream::server, [self = this->shared_from_this()](error_code error) {
@@ -70,10 +74,13 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
     const auto verdict = context_->access.judge(identity_of(request));
     if (verdict != AccessPolicy::Verdict::allowed) {
       const bool needs_token = verdict == AccessPolicy::Verdict::no_token;
-      return write(text_response(request,
-                                 needs_token ? http::status::unauthorized : http::status::forbidden,
-                                 std::string(in_words(verdict))));
+      HttpResponse refusal =
+          text_response(request, needs_token ? http::status::unauthorized : http::status::forbidden,
+                        std::string(in_words(verdict)));
+      refusal.keep_alive(false);
+      return write(std::move(refusal));
     }
+    lease_->raise(ConnectionLimit::Standing::allowed);
     if (boost::beast::websocket::is_upgrade(request)) return upgrade(std::move(request));
     // An answer may take as long as the server behind us.
     boost::beast::get_lowest_layer(stream_).expires_never();
@@ -96,6 +103,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
           "WebSockets speak foxglove.sdk.v1 or foxglove.websocket.v1 (Sec-WebSocket-Protocol).\n"));
     }
     boost::beast::get_lowest_layer(stream_).expires_never();
+    lease_->raise(ConnectionLimit::Standing::session);
     std::make_shared<WebSocketConnection<Stream>>(std::move(stream_), std::move(lease_))
         ->begin(std::move(request), std::string(protocol), context_->make_session);
   }
@@ -128,7 +136,7 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection<Stream
 
   Stream stream_;
   std::shared_ptr<const ServerContext> context_;
-  std::shared_ptr<void> lease_;
+  std::shared_ptr<ConnectionLimit::Lease> lease_;
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::string_body>> parser_;
   std::optional<HttpResponse> response_;

@@ -1,7 +1,9 @@
 #include "clients/gateway/service_bridge.hpp"
 
+#include <algorithm>
 #include <condition_variable>
 #include <deque>
+#include <list>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -16,8 +18,9 @@ namespace {
 
 using eprosima::fastdds::dds::TypeSupport;
 
-/// Calls of all clients that wait for one service.
-constexpr std::size_t max_waiting_calls = 64;
+/// Calls that wait for one service: of all clients, and of each.
+constexpr std::size_t max_waiting_calls = 256;
+constexpr std::size_t max_waiting_calls_of_client = 16;
 
 bool is_sample_of(const TypeSupport& type, dds::SerializedSample& bytes) {
   TypeSupport mutable_type = type;
@@ -29,9 +32,10 @@ bool is_sample_of(const TypeSupport& type, dds::SerializedSample& bytes) {
 
 }  // namespace
 
-/// The calls of one service. Its thread and its endpoints are made with the first.
+/// The calls of one service, clients in turn. Its thread and its endpoints are made with the first.
 class ServiceBridge::Caller {
  public:
+  using Clock = std::chrono::steady_clock;
   struct Service {
     /// ROS 2 name without the first slash.
     std::string name;
@@ -39,8 +43,11 @@ class ServiceBridge::Caller {
     TypeSupport reply;
   };
   struct Call {
+    Client client;
     dds::SerializedSample request;
     std::function<void(Answer)> answered;
+    /// Set by add().
+    Clock::time_point deadline;
   };
 
   Caller(dds::Participant& participant, Service service, std::chrono::milliseconds timeout)
@@ -48,9 +55,15 @@ class ServiceBridge::Caller {
 
   /// False when too many wait.
   [[nodiscard]] bool add(Call call) {
+    call.deadline = Clock::now() + timeout_;
     const std::scoped_lock lock(mutex_);
-    if (calls_.size() >= max_waiting_calls) return false;
-    calls_.push_back(std::move(call));
+    auto queue = std::ranges::find_if(
+        waiting_, [&](const Queue& other) { return is_same(other.front().client, call.client); });
+    if (waiting_count_ >= max_waiting_calls) return false;
+    if (queue == waiting_.end()) queue = waiting_.emplace(waiting_.end());
+    if (queue->size() >= max_waiting_calls_of_client) return false;
+    queue->push_back(std::move(call));
+    ++waiting_count_;
     changed_.notify_one();
     if (!thread_.joinable()) {
       thread_ = std::jthread([this](const std::stop_token& stop) { run(stop); });
@@ -59,28 +72,42 @@ class ServiceBridge::Caller {
   }
 
  private:
+  /// Of one client; never empty.
+  using Queue = std::deque<Call>;
+
+  static bool is_same(const Client& a, const Client& b) {
+    return !a.owner_before(b) && !b.owner_before(a);
+  }
+
   void run(const std::stop_token& stop) {
     while (std::optional<Call> call = next(stop)) {
-      call->answered(answer(call->request, stop));
+      // Nobody knows any more that it was asked for: a reset that comes late is worse than none.
+      if (call->client.expired()) continue;
+      call->answered(answer(*call, stop));
     }
   }
 
   std::optional<Call> next(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
-    if (!changed_.wait(lock, stop, [this] { return !calls_.empty(); })) return std::nullopt;
-    std::optional<Call> call = std::move(calls_.front());
-    calls_.pop_front();
+    if (!changed_.wait(lock, stop, [this] { return !waiting_.empty(); })) return std::nullopt;
+    Queue queue = std::move(waiting_.front());
+    waiting_.pop_front();
+    std::optional<Call> call = std::move(queue.front());
+    queue.pop_front();
+    if (!queue.empty()) waiting_.push_back(std::move(queue));
+    --waiting_count_;
     return call;
   }
 
-  [[nodiscard]] Answer answer(dds::SerializedSample& request, const std::stop_token& stop) {
-    if (!is_sample_of(service_.request, request)) {
+  [[nodiscard]] Answer answer(Call& call, const std::stop_token& stop) {
+    if (!is_sample_of(service_.request, call.request)) {
       return "the request is no " + dds::ros_type_name(service_.request) + " in CDR";
     }
+    if (time_left(call).count() <= 0) return no_answer("it waited for other calls: ask again");
     try {
       if (!client_) client_.emplace(participant_, service_.name, service_.request, service_.reply);
-      const bool found = wait_for_server(stop);
-      auto reply = found ? client_->call(request, timeout_, stop) : std::nullopt;
+      const bool found = wait_for_server(call, stop);
+      auto reply = found ? client_->call(call.request, time_left(call), stop) : std::nullopt;
       if (reply) return *std::move(reply);
       return found ? no_answer("a server is there but too busy, or it was just killed")
                    : no_answer("no server found ('stillmap doctor' looks for the reason)");
@@ -89,10 +116,14 @@ class ServiceBridge::Caller {
     }
   }
 
-  [[nodiscard]] bool wait_for_server(const std::stop_token& stop) const {
+  [[nodiscard]] static std::chrono::milliseconds time_left(const Call& call) {
+    return std::chrono::ceil<std::chrono::milliseconds>(call.deadline - Clock::now());
+  }
+
+  [[nodiscard]] bool wait_for_server(const Call& call, const std::stop_token& stop) const {
     constexpr std::chrono::milliseconds period(100);
-    for (auto left = timeout_; left.count() > 0 && !stop.stop_requested(); left -= period) {
-      if (client_->wait_for_server(period)) return true;
+    while (time_left(call).count() > 0 && !stop.stop_requested()) {
+      if (client_->wait_for_server(std::min(period, time_left(call)))) return true;
     }
     return false;
   }
@@ -109,7 +140,9 @@ class ServiceBridge::Caller {
   std::optional<dds::UntypedServiceClient> client_;
   std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::deque<Call> calls_;
+  /// The client whose turn it is first.
+  std::list<Queue> waiting_;
+  std::size_t waiting_count_ = 0;
   std::jthread thread_;
 };
 
@@ -131,12 +164,18 @@ ServiceBridge::ServiceBridge(dds::Participant& participant, const ServiceChoice&
 
 ServiceBridge::~ServiceBridge() = default;
 
-void ServiceBridge::call(std::uint32_t service, dds::SerializedSample request,
+void ServiceBridge::call(std::uint32_t service, Client client, dds::SerializedSample request,
                          std::function<void(Answer)> answered) {
   const auto hand_back = [post = post_, answered](Answer answer) {
     post([answered, answer = std::move(answer)]() mutable { answered(std::move(answer)); });
   };
-  if (callers_.at(service - 1)->add({std::move(request), hand_back})) return;
+  if (callers_.at(service - 1)
+          ->add({.client = std::move(client),
+                 .request = std::move(request),
+                 .answered = hand_back,
+                 .deadline = {}})) {
+    return;
+  }
   answered("too many calls of " + infos_.at(service - 1).name + " wait; ask again later");
 }
 

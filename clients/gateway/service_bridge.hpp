@@ -19,12 +19,13 @@ struct ServiceChoice {
   std::string server_name = "stillmap";
   /// Also those that change, save or replace the map.
   bool with_control = false;
-  /// Longest wait for an answer.
+  /// Longest wait for an answer, from when the gateway has the request.
   std::chrono::milliseconds timeout{10000};
 };
 
 /// Calls the server's services with requests in CDR, each service in a thread of its own, one call
-/// after the other. One thread uses it, that of `post`.
+/// after the other, clients in turn. A call whose client is gone, or whose time is up, before its
+/// turn comes is not made. One thread uses it, that of `post`.
 class ServiceBridge {
  public:
   ServiceBridge(dds::Participant& participant, const ServiceChoice& choice, Post post);
@@ -40,8 +41,10 @@ class ServiceBridge {
 
   /// The reply in CDR, or why there is none.
   using Answer = std::variant<dds::SerializedSample, std::string>;
-  /// `answered` is called once, in the thread of `post`.
-  void call(std::uint32_t service, dds::SerializedSample request,
+  /// Whoever asks, for as long as it lives.
+  using Client = std::weak_ptr<const void>;
+  /// `answered` is called once, in the thread of `post`, unless the client has gone.
+  void call(std::uint32_t service, Client client, dds::SerializedSample request,
             std::function<void(Answer)> answered);
 
  private:

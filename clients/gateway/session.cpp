@@ -114,7 +114,7 @@ void Session::handle(const ServiceCall& call) {
   if (call.encoding != "cdr") return fail("requests are taken in cdr");
   if (calls_under_way_ >= max_calls_under_way) return fail("too many calls wait for an answer");
   ++calls_under_way_;
-  bridges_.services.call(call.service, {call.bytes.begin(), call.bytes.end()},
+  bridges_.services.call(call.service, weak_from_this(), {call.bytes.begin(), call.bytes.end()},
                          [self = weak_from_this(), service = call.service,
                           number = call.call](const ServiceBridge::Answer& reply) {
                            if (const auto session = self.lock())

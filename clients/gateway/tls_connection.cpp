@@ -9,7 +9,8 @@
 namespace stillmap::gateway {
 
 void serve_over_tls(boost::beast::tcp_stream stream, boost::asio::ssl::context& tls,
-                    std::shared_ptr<const ServerContext> context, std::shared_ptr<void> lease) {
+                    std::shared_ptr<const ServerContext> context,
+                    std::shared_ptr<ConnectionLimit::Lease> lease) {
   using TlsStream = boost::beast::ssl_stream<boost::beast::tcp_stream>;
   std::make_shared<HttpConnection<TlsStream>>(TlsStream(std::move(stream), tls), std::move(context),
                                               std::move(lease))

@@ -1,7 +1,6 @@
 #include "clients/gateway/topic_bridge.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <exception>
 #include <optional>
@@ -99,7 +98,8 @@ class TopicBridge::Reading {
   struct Events {
     /// Calls its argument's `done` once the message is handed on.
     std::function<void(MessagePtr, std::function<void()> done)> arrived;
-    std::function<void(std::string)> failed;
+    /// Nothing more comes. The reason is empty where it was told to stop.
+    std::function<void(std::string)> ended;
   };
 
   Reading(dds::Participant& participant, const ForwardedTopic& topic, Events events)
@@ -109,16 +109,16 @@ class TopicBridge::Reading {
         thread_([this](const std::stop_token& stop) { run(stop); }) {}
 
   void request_stop() { thread_.request_stop(); }
-  [[nodiscard]] bool has_ended() const { return has_ended_; }
 
  private:
   void run(const std::stop_token& stop) {
+    std::string fault;
     try {
       read(stop);
     } catch (const std::exception& error) {
-      events_.failed(error.what());
+      fault = error.what();
     }
-    has_ended_ = true;
+    events_.ended(std::move(fault));
   }
 
   /// As offered by the server; publishers that offer less are read, too, with the weakest request.
@@ -163,7 +163,6 @@ class TopicBridge::Reading {
   dds::Participant& participant_;
   ForwardedTopic topic_;
   Events events_;
-  std::atomic<bool> has_ended_ = false;
   std::jthread thread_;
 };
 
@@ -207,13 +206,17 @@ const ForwardedTopic& TopicBridge::topic(std::uint32_t channel) const {
 }
 
 void TopicBridge::listen(std::uint32_t id, TopicListener& listener, std::uint32_t subscription) {
-  forget_ended();
   Channel& channel = channels_.at(id - 1);
   channel.listeners.push_back({&listener, subscription});
   for (const std::string& key : channel.latched.order) {
     listener.message_arrived(subscription, channel.latched.newest.at(key));
   }
-  if (channel.reading) return;
+  if (!channel.reading) begin_reading(id);
+}
+
+void TopicBridge::begin_reading(std::uint32_t id) {
+  Channel& channel = channels_.at(id - 1);
+  channel.is_stopping = false;
   channel.reading = std::make_unique<Reading>(
       participant_, channel.topic,
       Reading::Events{.arrived =
@@ -223,9 +226,9 @@ void TopicBridge::listen(std::uint32_t id, TopicListener& listener, std::uint32_
                               done();
                             });
                           },
-                      .failed =
+                      .ended =
                           [this, id](std::string why) {
-                            post_([this, id, why = std::move(why)] { fail(id, why); });
+                            post_([this, id, why = std::move(why)] { reading_ended(id, why); });
                           }});
 }
 
@@ -235,31 +238,35 @@ void TopicBridge::stop_listening(std::uint32_t id, const TopicListener& listener
   std::erase_if(channel.listeners, [&](const Listener& entry) {
     return entry.listener == &listener && entry.subscription == subscription;
   });
-  if (!channel.listeners.empty() || !channel.reading) return;
-  channel.reading->request_stop();
-  ending_.push_back(std::move(channel.reading));
+  if (!channel.listeners.empty()) return;
   channel.latched = {};
-  forget_ended();
+  if (!channel.reading) return;
+  channel.reading->request_stop();
+  channel.is_stopping = true;
 }
 
 void TopicBridge::deliver(std::uint32_t id, const MessagePtr& message) {
   Channel& channel = channels_.at(id - 1);
-  // The last one may have gone meanwhile.
-  if (channel.listeners.empty()) return;
+  // The last one may have gone meanwhile, and others come who get theirs from the next reader.
+  if (channel.is_stopping) return;
   if (channel.topic.qos.transient_local) channel.latched.add(message);
   for (const Listener& entry : channel.listeners) {
     entry.listener->message_arrived(entry.subscription, message);
   }
 }
 
-void TopicBridge::fail(std::uint32_t id, const std::string& why) {
-  for (const Listener& entry : channels_.at(id - 1).listeners) {
+void TopicBridge::reading_ended(std::uint32_t id, const std::string& why) {
+  Channel& channel = channels_.at(id - 1);
+  const bool was_stopped = channel.is_stopping;
+  channel.reading = nullptr;
+  if (was_stopped) {
+    if (!channel.listeners.empty()) begin_reading(id);
+    return;
+  }
+  // Whoever listens next tries again.
+  for (const Listener& entry : channel.listeners) {
     entry.listener->topic_failed(entry.subscription, why);
   }
-}
-
-void TopicBridge::forget_ended() {
-  std::erase_if(ending_, [](const auto& reading) { return reading->has_ended(); });
 }
 
 }  // namespace stillmap::gateway

@@ -61,7 +61,8 @@ class TopicListener {
 /// Reads topics while somebody listens, each in a thread of its own, and hands every sample to all
 /// listeners without decoding or copying it. A reader waits until its sample is handed on: what
 /// comes faster waits in DDS, newest only. Who listens to a latched topic gets its last samples
-/// first. One thread uses it, that of `post`.
+/// first. A topic has one reader at most: who listens again while it still goes waits for the next,
+/// so that coming and going in a loop costs one thread. One thread uses it, that of `post`.
 class TopicBridge {
  public:
   TopicBridge(dds::Participant& participant, const TopicChoice& choice, Post post);
@@ -98,18 +99,18 @@ class TopicBridge {
     std::vector<Listener> listeners;
     Latched latched;
     std::unique_ptr<Reading> reading;
+    /// Nobody listened any more; its thread ends.
+    bool is_stopping = false;
   };
 
+  void begin_reading(std::uint32_t channel);
   void deliver(std::uint32_t channel, const MessagePtr& message);
-  void fail(std::uint32_t channel, const std::string& why);
-  void forget_ended();
+  void reading_ended(std::uint32_t channel, const std::string& why);
 
   dds::Participant& participant_;
   Post post_;
   std::vector<ChannelInfo> infos_;
   std::vector<Channel> channels_;
-  /// Stopped, not joined yet.
-  std::vector<std::unique_ptr<Reading>> ending_;
 };
 
 }  // namespace stillmap::gateway

@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "clients/gateway/connection_limit.hpp"
 #include "clients/gateway/http_connection.hpp"
 #include "clients/gateway/tls_connection.hpp"
 #include "clients/gateway/websocket_connection.hpp"
@@ -17,8 +18,7 @@ using boost::asio::ip::tcp;
 using boost::system::error_code;
 namespace ssl = boost::asio::ssl;
 
-/// At a time; more wait to be accepted.
-constexpr int max_connections = 256;
+constexpr std::size_t max_connections = 256;
 /// Before connections are accepted again after that failed, as without free file descriptors.
 constexpr std::chrono::milliseconds retry_period(200);
 
@@ -73,20 +73,30 @@ class WebServer::Listener : public std::enable_shared_from_this<Listener> {
         acceptor_(io, endpoint_of(options.address)),
         retry_(io) {}
 
+  void begin() {
+    limit_ = std::make_shared<ConnectionLimit>(max_connections, [weak = weak_from_this()] {
+      if (const auto self = weak.lock()) self->accept();
+    });
+    accept();
+  }
+
   void accept() {
-    if (is_accepting_ || has_ended_) return;
+    if (is_accepting_ || has_ended_ || limit_->is_reached()) return;
     is_accepting_ = true;
     acceptor_.async_accept([self = shared_from_this()](error_code error, tcp::socket socket) {
       self->is_accepting_ = false;
       if (self->has_ended_) return;
       if (error) return self->accept_later();
       self->serve(std::move(socket));
-      if (self->connections_ < max_connections) self->accept();
+      if (!self->limit_->is_reached()) return self->accept();
+      // Its end lets the next one in.
+      self->limit_->close_one();
     });
   }
 
   void end() {
     has_ended_ = true;
+    limit_->end();
     error_code none;
     acceptor_.close(none);
     retry_.cancel();
@@ -95,26 +105,15 @@ class WebServer::Listener : public std::enable_shared_from_this<Listener> {
   [[nodiscard]] std::uint16_t port() const { return acceptor_.local_endpoint().port(); }
 
  private:
-  /// Counts a connection until it is gone.
-  std::shared_ptr<void> lease() {
-    ++connections_;
-    return {nullptr, [weak = weak_from_this()](void*) {
-              const auto self = weak.lock();
-              if (!self) return;
-              --self->connections_;
-              self->accept();
-            }};
-  }
-
   void serve(tcp::socket socket) {
     boost::beast::tcp_stream stream(std::move(socket));
     if (!tls_) {
       std::make_shared<HttpConnection<boost::beast::tcp_stream>>(std::move(stream), context_,
-                                                                 lease())
+                                                                 limit_->lend())
           ->begin();
       return;
     }
-    serve_over_tls(std::move(stream), *tls_, context_, lease());
+    serve_over_tls(std::move(stream), *tls_, context_, limit_->lend());
   }
 
   void accept_later() {
@@ -128,7 +127,7 @@ class WebServer::Listener : public std::enable_shared_from_this<Listener> {
   std::optional<ssl::context> tls_;
   tcp::acceptor acceptor_;
   boost::asio::steady_timer retry_;
-  int connections_ = 0;
+  std::shared_ptr<ConnectionLimit> limit_;
   bool is_accepting_ = false;
   bool has_ended_ = false;
 };
@@ -142,7 +141,7 @@ WebServer::WebServer(boost::asio::io_context& io, const WebServerOptions& option
                                 error.what() +
                                 "): is the port taken, or the address not this machine's?");
   }
-  listener_->accept();
+  listener_->begin();
 }
 
 WebServer::~WebServer() { listener_->end(); }

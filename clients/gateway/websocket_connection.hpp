@@ -53,7 +53,10 @@ class WebSocketConnection : public std::enable_shared_from_this<WebSocketConnect
       response.set(boost::beast::http::field::sec_websocket_protocol, protocol);
     }));
     socket_.read_message_max(max_message_bytes);
-    socket_.auto_fragment(false);
+    // Between the parts of a message, pings and their answers find their way: one that takes longer
+    // than the idle timeout would else end the connection.
+    socket_.auto_fragment(true);
+    socket_.write_buffer_bytes(fragment_bytes);
     limit_unsent_bytes();
     socket_.async_accept(request_, [self = this->shared_from_this(), make_session](auto error) {
       if (!error) self->start(make_session);
@@ -67,6 +70,7 @@ class WebSocketConnection : public std::enable_shared_from_this<WebSocketConnect
   static constexpr std::chrono::seconds idle_timeout{30};
   static constexpr std::chrono::seconds report_period{5};
   static constexpr std::size_t max_message_bytes = 1U << 20U;
+  static constexpr std::size_t fragment_bytes = 128U << 10U;
   /// Large messages that take longer than this are followed by a pause of as long.
   static constexpr std::chrono::milliseconds noticeable_write{50};
 

@@ -39,19 +39,27 @@ function showConnection(text, isGood) {
   element("connection").classList.toggle("bad", !isGood);
 }
 
-/** The whole map and the robots; again after each time that the connection was lost. */
+const beginAgainMs = 3000;
+let begun = 0;
+
+/** The whole map and the robots; again after each time that the connection was lost. Only the last call goes on. */
 async function begin() {
+  const own = ++begun;
+  const isLast = () => own === begun;
   try {
     await tiles.list();
-    state.profiles = await server.profiles();
+    const profiles = await server.profiles();
+    if (!isLast()) return;
+    state.profiles = profiles;
     const choice = element("profile");
     choice.replaceChildren(...state.profiles.map((name) => new Option(name)));
     if (state.profiles.includes(state.profile)) choice.value = state.profile;
     else state.profile = choice.value;
     if (!state.grid) showGrid(await server.grid());
   } catch (error) {
+    if (!isLast()) return;
     showConnection(error.message, false);
-    setTimeout(begin, 3000);
+    setTimeout(() => { if (isLast()) begin(); }, beginAgainMs);
   }
 }
 

@@ -22,6 +22,8 @@ export function decodeTile(buffer) {
   return tile;
 }
 
+const keyOf = (info) => `${info.tile_x}/${info.tile_y}`;
+
 export class MapTiles {
   /** `changed()` when something is to be drawn anew. */
   constructor(connection, prefix, formatVersion, changed) {
@@ -50,8 +52,9 @@ export class MapTiles {
     this.listing = setTimeout(() => this.list().catch(() => {}).finally(() => { this.listing = undefined; }), refetchMs);
   }
 
-  /** Asks which tiles the whole map has: the topic has only those round the robot. */
+  /** Asks which tiles the whole map has: the topic has only those round the robot. Tiles that it no longer has go. */
   async list() {
+    const unlisted = new Map([...this.tiles.values()].map((tile) => [tile.key, tile.revision]));
     let continuation = "";
     do {
       const reply = await this.connection.call(`${this.prefix}/get_tile_versions`, { format_version: this.formatVersion,
@@ -61,15 +64,22 @@ export class MapTiles {
         for (const key of [...this.tiles.keys()]) this.#remove(key);
         this.mapId = reply.identity.map_id;
       }
-      for (const info of reply.tiles) this.#entry(info);
+      for (const info of reply.tiles) {
+        unlisted.delete(keyOf(info));
+        this.#entry(info);
+      }
       continuation = reply.continuation;
     } while (continuation);
+    for (const [key, revision] of unlisted) {
+      // What the topic said meanwhile is newer.
+      if (this.tiles.get(key)?.revision === revision) this.#remove(key);
+    }
   }
 
   get pending() { return [...this.tiles.values()].filter((tile) => tile.wanted !== tile.shown).length; }
 
   #entry(info) {
-    const key = `${info.tile_x}/${info.tile_y}`;
+    const key = keyOf(info);
     const known = this.tiles.get(key);
     if (known && known.revision > info.state.revision) return;
     if (info.state.voxel_count === 0) { this.#remove(key); return; }
