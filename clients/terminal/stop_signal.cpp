@@ -4,7 +4,9 @@
 #include <sys/signalfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <limits>
 #include <system_error>
 
 #include "core/process/stop_signals.hpp"
@@ -22,7 +24,8 @@ StopSignal::~StopSignal() { close(signal_fd_); }
 bool StopSignal::wait_for(std::chrono::milliseconds timeout) {
   // The signal is never read, so it stays pending and every later question gets the same answer.
   pollfd waiting{.fd = signal_fd_, .events = POLLIN, .revents = 0};
-  return poll(&waiting, 1, static_cast<int>(timeout.count())) > 0;
+  constexpr std::chrono::milliseconds::rep max_ms = std::numeric_limits<int>::max();
+  return poll(&waiting, 1, static_cast<int>(std::min(timeout.count(), max_ms))) > 0;
 }
 
 }  // namespace stillmap::cli

@@ -20,6 +20,7 @@
 #include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/recording.hpp"
+#include "clients/commands/live/replay_clock.hpp"
 #include "clients/commands/mapping/imu_feed.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
@@ -134,32 +135,17 @@ Trajectory PoseLog::poses_of(const std::vector<std::int64_t>& stamps_ns) const {
   return trajectory;
 }
 
-using Clock = std::chrono::steady_clock;
+using Clock = ReplayClock::Clock;
 
 constexpr std::chrono::milliseconds publish_step{500};
 constexpr std::chrono::milliseconds imu_patience{1000};
 constexpr std::chrono::milliseconds status_period{100};
 
-/// When a scan of a sequence is due.
-class ReplayClock {
- public:
-  ReplayClock(std::int64_t first_stamp_ns, double rate)
-      : first_stamp_ns_(first_stamp_ns), rate_(rate), began_(Clock::now()) {}
-
-  /// Waits until the scan is due; returns true when a signal arrived first.
-  [[nodiscard]] bool wait_or_stop(std::int64_t stamp_ns, StopSignal& stop) const {
-    if (rate_ <= 0.0) return stop.requested();
-    const double due_ns = std::max(0.0, static_cast<double>(stamp_ns - first_stamp_ns_) / rate_);
-    const auto due = began_ + std::chrono::nanoseconds(static_cast<std::int64_t>(due_ns));
-    const auto left = std::chrono::ceil<std::chrono::milliseconds>(due - Clock::now());
-    return stop.wait_for(std::max(left, std::chrono::milliseconds(0)));
-  }
-
- private:
-  std::int64_t first_stamp_ns_;
-  double rate_;
-  Clock::time_point began_;
-};
+/// Returns true when a signal arrived first.
+[[nodiscard]] bool wait_or_stop(Clock::time_point due, StopSignal& stop) {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(due - Clock::now());
+  return stop.wait_for(std::max(left, std::chrono::milliseconds(0)));
+}
 
 std::optional<DatasetFrame> read_scan(const ScanDataset& dataset, std::size_t index,
                                       const ReplayOptions& options, ReplayResult& result,
@@ -220,13 +206,13 @@ ReplayResult replay_dataset(const ScanDataset& dataset, ImuFeed imu, const Repla
                             const ScanSkipped& scan_skipped) {
   const std::size_t end = options.range.end(dataset);
   const auto began = Clock::now();
-  const ReplayClock clock(dataset.stamp_ns(options.range.first), options.rate);
+  ReplayClock clock(began, dataset.stamp_ns(options.range.first), options.rate);
   ReplayResult result;
   for (std::size_t index = options.range.first; index < end && !result.stopped; ++index) {
     const auto frame = read_scan(dataset, index, options, result, scan_skipped);
     if (frame) {
       const auto samples = imu.take_up_to_end_of(frame->scan, dataset.suggested_sensor().period_s);
-      result.stopped = clock.wait_or_stop(dataset.stamp_ns(index), stop) ||
+      result.stopped = wait_or_stop(clock.due(frame->scan.stamp_ns), stop) ||
                        !publish(publisher, samples, options, stop) ||
                        !publish(publisher, *frame, options, stop);
       if (!result.stopped) result.published_stamps_ns.push_back(frame->scan.stamp_ns);
@@ -463,6 +449,7 @@ void add_replay_command(CommandHandle program, Action& action) {
       "  stillmap replay city --lossless --out poses_lidar.txt\n"
       "  stillmap replay city --mount 1.2,0,1.4,0,15,0   # for a server with mount: {source: "
       "tf_static}\n"
+      "Of a pause in the recording, 10 s are waited at most.\n"
       "Ends when the server has processed what was sent, and prints the counts. Exit code 1\n"
       "when a lossless replay lost something, 3 when no server answers or it stops taking scans.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
