@@ -155,7 +155,7 @@ ScanDataset::ScanDataset(const fs::path& path) : files_(scans_of(path)), lines_(
   } else {
     stamps_ns_ = stamps_from_names(files_);
   }
-  learn_from_first_scan();
+  learn_from_sample();
 }
 
 ScanDataset::ScanDataset(std::shared_ptr<const ScanSource> source) : source_(std::move(source)) {
@@ -163,25 +163,48 @@ ScanDataset::ScanDataset(std::shared_ptr<const ScanSource> source) : source_(std
     files_.push_back(source_->name(i));
     stamps_ns_.push_back(source_->stamp_ns(i));
   }
-  learn_from_first_scan();
+  learn_from_sample();
 }
 
-void ScanDataset::learn_from_first_scan() {
-  const Scan first = read_unscaled(0).scan;
-  intensity_scale_ = 1.0F / intensity_full_scale(first.intensity);
+std::vector<std::size_t> ScanDataset::sample() const {
+  constexpr std::size_t max_samples = 9;
+  const std::size_t count = std::min(max_samples, size());
+  std::vector<std::size_t> indices;
+  for (std::size_t k = 0; k < count; ++k) {
+    indices.push_back(count > 1 ? k * (size() - 1) / (count - 1) : 0);
+  }
+  return indices;
+}
+
+void ScanDataset::learn_from_sample() {
+  // The first scan of a recording is often part of one, and any may be damaged.
+  std::vector<std::pair<std::size_t, std::size_t>> readable;
+  float full_scale = 0.0F;
+  std::optional<DatasetError> fault;
+  for (const std::size_t i : sample()) {
+    try {
+      const Scan scan = read_unscaled(i).scan;
+      readable.emplace_back(scan.size(), i);
+      full_scale = std::max(full_scale, intensity_full_scale(scan.intensity));
+    } catch (const DatasetError& error) {
+      if (!fault) fault = error;
+    }
+  }
+  if (readable.empty()) throw DatasetError(*fault);
+  std::ranges::sort(readable);
+  const Scan typical = read_unscaled(readable[readable.size() / 2].second).scan;
+  intensity_scale_ = 1.0F / full_scale;
   const auto known = source_ ? source_->sensor() : std::nullopt;
-  suggested_sensor_ = known ? *known : guess_sensor(first, files_.front().extension() == ".bin");
-  if (first.time_offset_s.empty() && first.ring.empty()) kitti_lidar_ = find_kitti_lidar();
+  suggested_sensor_ = known ? *known : guess_sensor(typical, files_.front().extension() == ".bin");
+  if (typical.time_offset_s.empty() && typical.ring.empty()) kitti_lidar_ = find_kitti_lidar();
 }
 
 std::optional<KittiLidar> ScanDataset::find_kitti_lidar() const {
-  constexpr std::size_t samples = 9;
   if (source_ || files_.front().extension() != ".bin") return std::nullopt;
   std::vector<Scan> scans;
-  for (std::size_t k = 0; k < std::min(samples, size()); ++k) {
+  for (const std::size_t i : sample()) {
     try {
-      scans.push_back(
-          read_kitti_bin(file(size() > samples ? k * (size() - 1) / (samples - 1) : k)));
+      scans.push_back(read_kitti_bin(file(i)));
     } catch (const DatasetError&) {
       // Whoever reads that scan is told.
       continue;

@@ -22,14 +22,15 @@ namespace stillmap {
 /// - a folder of .bin, .pcd or .ply files, in natural order ("2" before "10");
 /// - a single such file;
 /// - any ScanSource, such as a bag's topic.
-/// Intensity is scaled to 0..1, by a factor that the first scan decides for all. Files of KITTI's
+/// Intensity is scaled to 0..1, by one factor for all that some of them decide. Files of KITTI's
 /// own lidar are corrected (see KittiLidar), unless they come with files of our own.
 class ScanDataset {
  public:
-  /// Throws DatasetError when there is no scan to be found. Reads the first scan.
+  /// Throws DatasetError when there is no scan to be found, or none of some from all over it can be
+  /// read.
   explicit ScanDataset(const std::filesystem::path& path);
 
-  /// Throws DatasetError when there is no scan, or the first cannot be read.
+  /// Throws DatasetError when there is no scan, or none of some from all over it can be read.
   explicit ScanDataset(std::shared_ptr<const ScanSource> source);
 
   [[nodiscard]] std::size_t size() const { return files_.size(); }
@@ -53,7 +54,7 @@ class ScanDataset {
   /// file is damaged.
   [[nodiscard]] std::vector<ImuSample> imu() const;
 
-  /// A guess from the kind of file and the first scan's rings or elevations.
+  /// A guess from the kind of file and the rings or elevations of a scan of usual size.
   [[nodiscard]] SensorModel suggested_sensor() const { return suggested_sensor_; }
 
   /// What read() corrects, where the files are recognised as those of KITTI's lidar.
@@ -64,9 +65,10 @@ class ScanDataset {
   [[nodiscard]] std::filesystem::path beside(std::size_t i, const char* folder,
                                              const char* extension) const;
 
-  /// Takes scale and sensor from the first scan.
-  void learn_from_first_scan();
-  /// Looks at some of the scans.
+  /// A few scans from all over the dataset.
+  [[nodiscard]] std::vector<std::size_t> sample() const;
+  /// Takes scale and sensor from them.
+  void learn_from_sample();
   [[nodiscard]] std::optional<KittiLidar> find_kitti_lidar() const;
   /// Time between scans; 0.1 where the stamps say nothing [s].
   [[nodiscard]] double period_s() const;

@@ -3,6 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <numbers>
+
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
@@ -183,6 +186,43 @@ TEST(ScanDataset, OneDamagedScanLeavesTheOthersReadable) {
   const ScanDataset dataset(folder.path());
   EXPECT_THROW((void)dataset.read(1), DatasetError);
   EXPECT_EQ(dataset.read(2).scan.size(), 1U);
+}
+
+/// As a lidar sees it whose rings count from the top.
+Scan ringed_scan(const SensorModel& sensor, int first_ring, std::int64_t stamp_ns) {
+  Scan scan;
+  scan.stamp_ns = stamp_ns;
+  for (int ring = first_ring; ring < sensor.rings; ++ring) {
+    const double elevation = sensor.beam_elevation(ring);
+    for (int column = 0; column < 200; ++column) {
+      const double azimuth = 2.0 * std::numbers::pi * column / 200.0;
+      const Eigen::Vector3d direction(std::cos(elevation) * std::cos(azimuth),
+                                      std::cos(elevation) * std::sin(azimuth), std::sin(elevation));
+      scan.points_lidar.push_back((10.0 * direction).cast<float>());
+      scan.ring.push_back(static_cast<std::uint16_t>(ring));
+      scan.intensity.push_back(0.5F);
+    }
+  }
+  return scan;
+}
+
+TEST(ScanDataset, APartialFirstScanAndADamagedOneDoNotDecideWhichSensorItWas) {
+  const ScratchFolder folder;
+  KittiSequenceWriter writer(folder.path() / "sequence");
+  for (int i = 0; i < 6; ++i) {
+    writer.add(ringed_scan(hdl_32e(), i == 0 ? 22 : 0, 100 * i), {}, pose_at(i, 0.0));
+  }
+  EXPECT_EQ(ScanDataset(folder.path() / "sequence").suggested_sensor().name, "HDL-32E");
+  std::filesystem::resize_file(folder.path() / "sequence/velodyne/000000.bin", 7);
+  const ScanDataset dataset(folder.path() / "sequence");
+  EXPECT_EQ(dataset.suggested_sensor().name, "HDL-32E");
+  EXPECT_THROW((void)dataset.read(0), DatasetError);
+  EXPECT_EQ(dataset.read(1).scan.ring.size(), 6400U);
+  for (int i = 1; i < 6; ++i) {
+    std::filesystem::resize_file(
+        folder.path() / "sequence/velodyne" / ("00000" + std::to_string(i) + ".bin"), 7);
+  }
+  EXPECT_THROW(ScanDataset(folder.path() / "sequence"), DatasetError);
 }
 
 TEST(ScanDataset, FaultsSayWhatToDo) {
