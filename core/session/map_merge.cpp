@@ -147,9 +147,13 @@ class Mover {
  public:
   Mover(const SavedMap& other, const std::vector<Eigen::Isometry3d>& T_map_pose,
         std::int64_t clock_offset_ns, const VoxelGrid& grid)
-      : path_(other.trajectory), clock_offset_ns_(clock_offset_ns), grid_(grid) {
-    for (std::size_t i = 0; i < path_.size(); ++i)
-      T_map_other_.push_back(T_map_pose[i] * path_[i].T_map_lidar.inverse());
+      : clock_offset_ns_(clock_offset_ns), grid_(grid) {
+    for (std::size_t i = 0; i < other.trajectory.size(); ++i) {
+      const StampedPose& pose = other.trajectory[i];
+      corrections_.push_back({pose.stamp_ns, T_map_pose[i] * pose.T_map_lidar.inverse()});
+    }
+    // Of several runs, whose clocks may have begun anew.
+    std::ranges::stable_sort(corrections_, {}, &Correction::stamp_ns);
   }
 
   void add(MergedVoxel merged, std::map<TileId, MergedTile>& tiles) const {
@@ -175,14 +179,20 @@ class Mover {
   }
 
  private:
+  struct Correction {
+    std::int64_t stamp_ns = 0;
+    Eigen::Isometry3d T_map_other;
+  };
+
   [[nodiscard]] const Eigen::Isometry3d& correction_at(std::int64_t stamp_ns) const {
-    return T_map_other_[std::min(path_.lower_bound(stamp_ns), path_.size() - 1)];
+    const auto found = std::ranges::lower_bound(corrections_, stamp_ns, {}, &Correction::stamp_ns);
+    return (found == corrections_.end() ? corrections_.back() : *found).T_map_other;
   }
 
-  const SharedTrajectory& path_;
   std::int64_t clock_offset_ns_;
   VoxelGrid grid_;
-  std::vector<Eigen::Isometry3d> T_map_other_;
+  /// Of the other map's path, sorted.
+  std::vector<Correction> corrections_;
 };
 
 /// All of it as hidden: what is to be shown the map itself decides.

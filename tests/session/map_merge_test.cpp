@@ -79,6 +79,20 @@ TEST(MapMerge, WhatOneOfThemAloneHasStays) {
   EXPECT_EQ(classes, (std::set{SemanticClass::building, SemanticClass::fence}));
 }
 
+TEST(MapMerge, APathOfTwoRunsWhoseClockBeganAnewMovesEachVoxelByItsOwnRun) {
+  const SavedMap map = wall_map(8.05, SemanticClass::building, 100);
+  SavedMap other = wall_map(5.05, SemanticClass::building, 4);
+  other.trajectory = {{50, Eigen::Isometry3d::Identity()},
+                      {60, Eigen::Isometry3d::Identity()},
+                      {4, Eigen::Isometry3d::Identity()}};
+  const Eigen::Isometry3d T_map_first(Eigen::Translation3d(90.0, 0.0, 0.0));
+  const Eigen::Isometry3d T_map_second(Eigen::Translation3d(3.0, 0.0, 0.0));
+  const SavedMap merged = merged_map(map, other, {T_map_first, T_map_first, T_map_second}, 200);
+  EXPECT_EQ(points_of(merged), 2 * points_of(map));
+  for (const auto& tile : merged.view.tiles)
+    for (const Voxel& voxel : tile->voxels) EXPECT_NEAR(voxel.mean_map.x(), 8.05, 0.01);
+}
+
 TEST(MapMerge, ViewsDoNotSeeThroughWalls) {
   std::vector<LabelledPoint> points;
   for (float y = -6.0F; y < 6.0F; y += 0.2F) {

@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 #include <iostream>
@@ -102,8 +103,8 @@ ExitCode run(const MergeArguments& arguments) {
                            "; nothing was written. Maps are merged where their paths come through "
                            "the same place for some 50 m");
   }
-  const std::int64_t clock_offset_ns =
-      map.clock_offset_ns(other->saved().trajectory.front().stamp_ns);
+  const std::int64_t clock_offset_ns = map.clock_offset_ns(
+      std::ranges::min(other->saved().trajectory, {}, &StampedPose::stamp_ns).stamp_ns);
   SavedMap merged = merged_map(map.saved(), other->saved(), alignment.T_map_lidar, clock_offset_ns);
   merged.view.map_id = new_map_id();
   merged.metadata = map.saved().metadata;

@@ -1,5 +1,6 @@
 #include "clients/commands/mapping/earlier_map.hpp"
 
+#include <algorithm>
 #include <stdexcept>
 #include <utility>
 
@@ -32,7 +33,9 @@ std::string EarlierMap::identity() const {
 std::int64_t EarlierMap::clock_offset_ns(std::int64_t first_stamp_ns) const {
   constexpr std::int64_t between_sessions_ns = 1'000'000'000;
   if (saved_.trajectory.empty()) return 0;
-  const std::int64_t last_ns = saved_.trajectory.back().stamp_ns;
+  // Of several runs, whose clocks may have begun anew.
+  const std::int64_t last_ns =
+      std::ranges::max(saved_.trajectory, {}, &StampedPose::stamp_ns).stamp_ns;
   return first_stamp_ns > last_ns ? 0 : last_ns + between_sessions_ns - first_stamp_ns;
 }
 
