@@ -140,6 +140,17 @@ FittedSurface weighed_ring_line(const FittedSurface& line, const Eigen::Vector3d
           {1.0, across_rings_weight}};
 }
 
+double extrapolation(const FittedSurface& plane, const Neighbours& neighbours,
+                     const Eigen::Vector3d& point_map) {
+  const Eigen::Vector3d& normal = plane.normals[0];
+  const Eigen::Vector3d off_centre = point_map - plane.centre_map;
+  const Eigen::Vector3d along = off_centre - normal.dot(off_centre) * normal;
+  const Eigen::Matrix3d covariance = moments_of(neighbours).covariance;
+  // As thick as it is wide, which changes nothing along it, and can be inverted.
+  const Eigen::Matrix3d thick = covariance + covariance.trace() * normal * normal.transpose();
+  return std::sqrt(std::max(0.0, along.dot(thick.inverse() * along)));
+}
+
 double semantic_inconsistency(const Neighbours& neighbours, SemanticClass label) {
   if (label == SemanticClass::unlabeled) return 0.0;
   int labelled = 0;

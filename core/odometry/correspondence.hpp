@@ -42,6 +42,11 @@ struct FittedSurface {
                                               const Eigen::Matrix3d& R_map_lidar,
                                               double across_rings_weight);
 
+/// How far a point lies from the middle of the neighbours of its plane, along the plane, in
+/// standard deviations of theirs (Mahalanobis distance).
+[[nodiscard]] double extrapolation(const FittedSurface& plane, const Neighbours& neighbours,
+                                   const Eigen::Vector3d& point_map);
+
 /// c of eq. (9): the share of neighbours with another class than `label`. 0 when `label` or all
 /// neighbours are unlabeled, since no label contradicts nothing.
 [[nodiscard]] double semantic_inconsistency(const Neighbours& neighbours, SemanticClass label);

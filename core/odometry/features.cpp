@@ -285,24 +285,36 @@ std::vector<std::uint32_t> few_surfaces(const Scan& scan, const FeatureConfig& c
 
 namespace {
 
-/// Height of what stands in every column of the scan.
+/// Where every column of the scan has points, in slices of its height.
 class ColumnHeights {
  public:
   ColumnHeights(std::span<const Eigen::Vector3f> points, std::span<const std::uint32_t> chosen) {
-    heights_.reserve(chosen.size());
+    slices_.reserve(chosen.size());
     for (const std::uint32_t i : chosen) {
       const float z = points[i].z();
-      const auto [entry, is_new] = heights_.try_emplace(column_of(points[i]), Range{z, z});
+      const auto [entry, is_new] = slices_.try_emplace(key_of(points[i], slice_of(z)), Range{z, z});
       if (is_new) continue;
       entry.value().low = std::min(entry->second.low, z);
       entry.value().high = std::max(entry->second.high, z);
     }
   }
-  /// The column that the point stands in is higher than level ground.
+  /// What the point lies on is higher than level ground. A ceiling above a floor is not.
   [[nodiscard]] bool stands_up(const Eigen::Vector3f& point) const {
     constexpr float min_height_m = 0.6F;
-    const auto entry = heights_.find(column_of(point));
-    return entry != heights_.end() && entry->second.high - entry->second.low > min_height_m;
+    // So far above and below the next rings of a sparse lidar meet a wall.
+    constexpr float min_reach_m = 1.25F;
+    constexpr float ring_step_rad = 0.045F;
+    const float reach_m = std::max(min_reach_m, ring_step_rad * point.head<2>().norm());
+    Range range{point.z(), point.z()};
+    const int last = slice_of(point.z() + reach_m);
+    for (int slice = slice_of(point.z() - reach_m); slice <= last; ++slice) {
+      const auto entry = slices_.find(key_of(point, slice));
+      if (entry == slices_.end()) continue;
+      range.low = std::min(range.low, entry->second.low);
+      range.high = std::max(range.high, entry->second.high);
+      if (range.high - range.low > min_height_m) return true;
+    }
+    return false;
   }
 
  private:
@@ -310,12 +322,16 @@ class ColumnHeights {
     float low;
     float high;
   };
-  static std::uint64_t column_of(const Eigen::Vector3f& point) {
+  static int slice_of(float z) {
+    constexpr float slice_m = 0.5F;
+    return static_cast<int>(std::floor(z / slice_m));
+  }
+  static std::uint64_t key_of(const Eigen::Vector3f& point, int slice) {
     // Columns of 1 m.
     return packed_index(static_cast<int>(std::floor(point.x())),
-                        static_cast<int>(std::floor(point.y())), 0);
+                        static_cast<int>(std::floor(point.y())), slice);
   }
-  tsl::robin_map<std::uint64_t, Range, IndexHash> heights_;
+  tsl::robin_map<std::uint64_t, Range, IndexHash> slices_;
 };
 
 /// So many of them, spread evenly.

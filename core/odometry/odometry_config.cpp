@@ -73,6 +73,8 @@ void check(const RegistrationConfig& c, const LocalMapConfig& map, FaultList& fa
                  c.min_correspondences, "6 or more");
   faults.require(c.across_rings_weight >= 0.0 && c.across_rings_weight <= 1.0,
                  "registration.across_rings_weight", c.across_rings_weight, "within 0..1");
+  faults.require(c.max_extrapolation >= 0.0 && c.max_extrapolation <= 100.0,
+                 "registration.max_extrapolation", c.max_extrapolation, "within 0..100");
   faults.require(c.min_observability >= 0.0 && c.min_observability < 1.0,
                  "registration.min_observability", c.min_observability, "within 0..1");
 }
@@ -113,6 +115,7 @@ OdometryConfig OdometryConfig::with_method() const {
   if (paper_exact) {
     used.motion.use_range_image_history = false;
     used.registration.across_rings_weight = 1.0;
+    used.registration.max_extrapolation = 0.0;
   }
   return used;
 }

@@ -80,6 +80,16 @@ double agreement(const OdometryResult& result) {
   return result.upright_fit * std::min(1.0, result.overlap / enough_overlap);
 }
 
+/// A pose with what a motion of it along the level axes of the map, and about its z, makes of
+/// another one. Points are on the lidar's rings, which tilt and rise with the lidar and lie best on
+/// those of the scans before where it does neither: of both, the alignment of points tells nothing.
+Eigen::Isometry3d moved_level(const Eigen::Isometry3d& T_map_lidar,
+                              const Eigen::Isometry3d& T_map_lidar_target) {
+  PoseTangent motion = boxminus(T_map_lidar_target, T_map_lidar);
+  motion.segment<3>(2).setZero();
+  return boxplus(T_map_lidar, motion);
+}
+
 /// Whether two starts have come to the same pose: a worse fit is then the scene's.
 bool agree(const OdometryResult& a, const OdometryResult& b) {
   constexpr double max_distance_m = 0.03;
@@ -103,9 +113,13 @@ bool labels_tell_enough(const FeatureSets& features, const OdometryConfig& confi
 /// nearer each other.
 class BestStart {
  public:
-  BestStart(const Eigen::Isometry3d& T_map_lidar_predicted, const FeatureSets& features,
-            const LocalMap& map, const FitStatistics& fits, const OdometryConfig& config)
-      : features_(features),
+  /// `is_first_motion`: the map is one scan, and `T_map_lidar_predicted` that one's pose.
+  BestStart(const Eigen::Isometry3d& T_map_lidar_predicted, bool is_first_motion,
+            const FeatureSets& features, const LocalMap& map, const FitStatistics& fits,
+            const OdometryConfig& config)
+      : T_map_lidar_predicted_(T_map_lidar_predicted),
+        is_first_motion_(is_first_motion),
+        features_(features),
         map_(map),
         fits_(fits),
         in_place_{.max_iterations = 1, .without_movable = labels_tell_enough(features, config)},
@@ -128,12 +142,18 @@ class BestStart {
 
  private:
   [[nodiscard]] double score_of(const OdometryResult& result) const {
+    // One scan is all rings: features tell how the lidar tilted, points which way it went.
+    const Eigen::Isometry3d T_map_lidar =
+        is_first_motion_ ? moved_level(T_map_lidar_predicted_, result.T_map_lidar)
+                         : result.T_map_lidar;
     const double fit =
-        align_points(features_, map_.points, result.T_map_lidar, result.sweep_correction, in_place_)
-            .fit;
-    return agreement(result) * fit * fit;
+        align_points(features_, map_.points, T_map_lidar, result.sweep_correction, in_place_).fit;
+    const double score = agreement(result) * fit * fit;
+    return is_first_motion_ ? result.fit * score : score;
   }
 
+  Eigen::Isometry3d T_map_lidar_predicted_;
+  bool is_first_motion_;
   const FeatureSets& features_;
   const LocalMap& map_;
   const FitStatistics& fits_;
@@ -303,7 +323,8 @@ OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& fea
       aligned_from(align_points_around(features, map, found.T_map_lidar, config));
   alignment.max_iterations = 1;
   const double fit_there = aligned_from(found.T_map_lidar).fit;
-  const PoseTangent off = boxminus(aligned.T_map_lidar, found.T_map_lidar);
+  const Eigen::Isometry3d T_led = moved_level(found.T_map_lidar, aligned.T_map_lidar);
+  const PoseTangent off = boxminus(T_led, found.T_map_lidar);
   const bool agrees = off.head<3>().norm() < max_first_deviation_m &&
                       off.tail<3>().norm() < max_first_deviation_rad;
   const double min_gain = 1.0 + min_first_gain * found.fit;
@@ -311,10 +332,9 @@ OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& fea
   // What the features say of that pose, which they do not move.
   OdometryConfig in_place = config;
   in_place.registration.max_iterations = 1;
-  OdometryResult result =
-      register_features(features, map, aligned.T_map_lidar, in_place, found.sweep_correction);
+  OdometryResult result = register_features(features, map, T_led, in_place, found.sweep_correction);
   if (result.health == OdometryHealth::lost) return found;
-  result.T_map_lidar = aligned.T_map_lidar;
+  result.T_map_lidar = T_led;
   result.sweep_correction = found.sweep_correction;
   result.health = OdometryHealth::degenerate;
   return result;
@@ -364,7 +384,8 @@ bool is_foretold(const OdometryResult& found, const FeatureSets& features, const
 OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
                            const RegisteredScan& last, const PosePrediction& prediction,
                            const FitStatistics& fits, const OdometryConfig& config) {
-  BestStart best(prediction.T_map_lidar, features, map, fits, config);
+  const bool is_first_motion = last.interval_s <= 0.0;
+  BestStart best(prediction.T_map_lidar, is_first_motion, features, map, fits, config);
   if (prediction.is_known) {
     const OdometryResult direct = register_features(features, map, prediction.T_map_lidar, config);
     if (best.take(direct) || config.paper_exact) return best.result();
@@ -377,7 +398,7 @@ OdometryResult search_pose(const FeatureSets& features, const LocalMap& map,
       if (best.take(register_in_two_stages(features, map, T, config))) return best.result();
     }
   }
-  if (last.interval_s <= 0.0 && !config.paper_exact) {
+  if (is_first_motion && !config.paper_exact) {
     search_first_motion(features, map, last, prediction.T_map_lidar, config, best);
     return best.result();
   }

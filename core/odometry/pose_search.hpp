@@ -68,7 +68,8 @@ struct PosePrediction {
 
 /// A pose of one of the first scans, `found` by features: what of a sparse lidar's rings lies on
 /// the road goes along with it, and pulls two sparse scans together by up to a metre. Where the
-/// points align clearly better some way off, that pose, degenerate.
+/// points align clearly better some way off, the pose there, degenerate, with its tilt and height
+/// as the features have them.
 [[nodiscard]] OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& features,
                                            const LocalMap& map, const OdometryConfig& config);
 

@@ -57,8 +57,11 @@ void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& ma
                                             static_cast<float>(config.max_neighbour_distance_m));
   found.in_known_space = neighbours.count > 0;
   const auto surface = fit(kind, neighbours);
-  found.found = surface.has_value();
-  if (!surface) return;
+  found.found =
+      surface && (config.max_extrapolation == 0.0 || surface->normal_count != 1 ||
+                  extrapolation(*surface, neighbours, found.searched_map.cast<double>()) <=
+                      config.max_extrapolation);
+  if (!found.found) return;
   found.surface =
       weighed_ring_line(*surface, found.point_lidar, R_map_lidar, config.across_rings_weight);
   found.inconsistency = feature.confidence * semantic_inconsistency(neighbours, feature.label);

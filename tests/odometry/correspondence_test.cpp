@@ -169,6 +169,30 @@ TEST(FitPlane, HasTheNormalThatAGeneralSolverFinds) {
   EXPECT_GT(planes, 500);
 }
 
+TEST(Extrapolation, IsInStandardDeviationsOfThePlanesNeighboursAlongIt) {
+  std::mt19937 random(17);
+  for (int k = 0; k < 50; ++k) {
+    const PlaneCase plane = random_plane(random);
+    const Neighbours neighbours = neighbours_at(plane_points(plane, 0.0, random));
+    const auto fitted = fit_plane(neighbours);
+    ASSERT_TRUE(fitted);
+    // Four of five points lie 0.4 m along and 0.3 m across from the middle.
+    const double along_m = 0.4 * std::sqrt(0.8);
+    const double across_m = 0.3 * std::sqrt(0.8);
+    const auto at = [&](double along, double across, double above_m) {
+      return extrapolation(*fitted, neighbours,
+                           plane.centre + along * along_m * plane.along +
+                               across * across_m * plane.across + above_m * plane.normal());
+    };
+    EXPECT_NEAR(at(0.0, 0.0, 0.0), 0.0, 1e-3);
+    EXPECT_NEAR(at(2.0, 0.0, 0.0), 2.0, 1e-3);
+    EXPECT_NEAR(at(0.0, -1.5, 0.0), 1.5, 1e-3);
+    EXPECT_NEAR(at(3.0, 4.0, 0.0), 5.0, 1e-3);
+    // How far off the plane is what registration is to find out.
+    EXPECT_NEAR(at(1.0, 0.0, 0.5), 1.0, 1e-3);
+  }
+}
+
 TEST(FitPlane, RejectsWhatIsNoPlane) {
   std::mt19937 random(6);
   const PlaneCase truth = random_plane(random);

@@ -64,6 +64,8 @@ INSTANTIATE_TEST_SUITE_P(
         FaultCase{"registration.min_correspondences",
                   [](C& c) { c.registration.min_correspondences = 5; }},
         FaultCase{"registration.sweep_tilt_rad", [](C& c) { c.registration.sweep_tilt_rad = 0.0; }},
+        FaultCase{"registration.max_extrapolation",
+                  [](C& c) { c.registration.max_extrapolation = -1.0; }},
         FaultCase{"registration.across_rings_weight",
                   [](C& c) { c.registration.across_rings_weight = 1.5; }},
         FaultCase{"registration.min_observability",
