@@ -3,12 +3,13 @@
 #include <functional>
 #include <list>
 #include <memory>
+#include <optional>
 
 namespace stillmap::gateway {
 
 /// At most so many connections at a time. Where all are taken, the oldest of those that have shown
-/// least is closed for the next: whoever opens many without the token keeps nobody out who has it.
-/// One thread uses it.
+/// least is closed, but for the newest one: whoever opens many without the token keeps nobody out
+/// who has it. One thread uses it.
 class ConnectionLimit : public std::enable_shared_from_this<ConnectionLimit> {
  public:
   enum class Standing {
@@ -37,18 +38,19 @@ class ConnectionLimit : public std::enable_shared_from_this<ConnectionLimit> {
     friend class ConnectionLimit;
 
     std::shared_ptr<ConnectionLimit> limit_;
-    std::list<Lease*>::iterator place_;
+    /// Nothing once it is closed.
+    std::optional<std::list<Lease*>::iterator> place_;
     Standing standing_ = Standing::unknown;
     std::function<void()> close_;
   };
 
-  /// `freed` is called whenever a connection has ended.
+  /// `freed` is called whenever a connection has ended by itself.
   ConnectionLimit(std::size_t max_connections, std::function<void()> freed)
       : max_connections_(max_connections), freed_(std::move(freed)) {}
 
   [[nodiscard]] std::shared_ptr<Lease> lend();
   [[nodiscard]] bool is_reached() const { return leases_.size() >= max_connections_; }
-  /// Closes a connection, which ends later; none where all are sessions or are closed already.
+  /// Closes a connection, which counts no more; none where all but the newest are sessions.
   void close_one();
   /// `freed` is called no more.
   void end() { freed_ = nullptr; }

@@ -107,7 +107,10 @@ class ServiceBridge::Caller {
     try {
       if (!client_) client_.emplace(participant_, service_.name, service_.request, service_.reply);
       const bool found = wait_for_server(call, stop);
-      auto reply = found ? client_->call(call.request, time_left(call), stop) : std::nullopt;
+      if (call.client.expired()) return std::string();
+      auto reply = found && time_left(call).count() > 0
+                       ? client_->call(call.request, time_left(call), stop)
+                       : std::nullopt;
       if (reply) return *std::move(reply);
       return found ? no_answer("a server is there but too busy, or it was just killed")
                    : no_answer("no server found ('stillmap doctor' looks for the reason)");

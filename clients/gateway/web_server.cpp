@@ -88,9 +88,9 @@ class WebServer::Listener : public std::enable_shared_from_this<Listener> {
       if (self->has_ended_) return;
       if (error) return self->accept_later();
       self->serve(std::move(socket));
-      if (!self->limit_->is_reached()) return self->accept();
-      // Its end lets the next one in.
-      self->limit_->close_one();
+      if (self->limit_->is_reached()) self->limit_->close_one();
+      // Where that closed none, the end of one lets the next in.
+      self->accept();
     });
   }
 

@@ -179,13 +179,13 @@ std::vector<std::size_t> ScanDataset::sample() const {
 void ScanDataset::learn_from_sample() {
   // The first scan of a recording is often part of one, and any may be damaged.
   std::vector<std::pair<std::size_t, std::size_t>> readable;
-  float full_scale = 0.0F;
+  std::vector<float> full_scales;
   std::optional<DatasetError> fault;
   for (const std::size_t i : sample()) {
     try {
       const Scan scan = read_unscaled(i).scan;
       readable.emplace_back(scan.size(), i);
-      full_scale = std::max(full_scale, intensity_full_scale(scan.intensity));
+      full_scales.push_back(intensity_full_scale(scan.intensity));
     } catch (const DatasetError& error) {
       if (!fault) fault = error;
     }
@@ -193,7 +193,9 @@ void ScanDataset::learn_from_sample() {
   if (readable.empty()) throw DatasetError(*fault);
   std::ranges::sort(readable);
   const Scan typical = read_unscaled(readable[readable.size() / 2].second).scan;
-  intensity_scale_ = 1.0F / full_scale;
+  // The brightest but one of many: dark scans say too little, broken ones too much.
+  std::ranges::sort(full_scales);
+  intensity_scale_ = 1.0F / full_scales[full_scales.size() - (full_scales.size() > 2 ? 2 : 1)];
   const auto known = source_ ? source_->sensor() : std::nullopt;
   suggested_sensor_ = known ? *known : guess_sensor(typical, files_.front().extension() == ".bin");
   if (typical.time_offset_s.empty() && typical.ring.empty()) kitti_lidar_ = find_kitti_lidar();

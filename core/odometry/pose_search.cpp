@@ -90,6 +90,14 @@ Eigen::Isometry3d moved_level(const Eigen::Isometry3d& T_map_lidar,
   return boxplus(T_map_lidar, motion);
 }
 
+/// The second pose, tilted against the map's z as the first one is.
+Eigen::Isometry3d with_tilt_of(const Eigen::Isometry3d& T_map_lidar,
+                               const Eigen::Isometry3d& T_map_lidar_target) {
+  PoseTangent motion = boxminus(T_map_lidar_target, T_map_lidar);
+  motion.segment<2>(3).setZero();
+  return boxplus(T_map_lidar, motion);
+}
+
 /// Whether two starts have come to the same pose: a worse fit is then the scene's.
 bool agree(const OdometryResult& a, const OdometryResult& b) {
   constexpr double max_distance_m = 0.03;
@@ -113,7 +121,7 @@ bool labels_tell_enough(const FeatureSets& features, const OdometryConfig& confi
 /// nearer each other.
 class BestStart {
  public:
-  /// `is_first_motion`: the map is one scan, and `T_map_lidar_predicted` that one's pose.
+  /// `is_first_motion`: of the second scan, whose tilt is yet to be found.
   BestStart(const Eigen::Isometry3d& T_map_lidar_predicted, bool is_first_motion,
             const FeatureSets& features, const LocalMap& map, const FitStatistics& fits,
             const OdometryConfig& config)
@@ -142,9 +150,9 @@ class BestStart {
 
  private:
   [[nodiscard]] double score_of(const OdometryResult& result) const {
-    // One scan is all rings: features tell how the lidar tilted, points which way it went.
+    // One scan is all rings: features tell how the lidar tilted, points where it went.
     const Eigen::Isometry3d T_map_lidar =
-        is_first_motion_ ? moved_level(T_map_lidar_predicted_, result.T_map_lidar)
+        is_first_motion_ ? with_tilt_of(T_map_lidar_predicted_, result.T_map_lidar)
                          : result.T_map_lidar;
     const double fit =
         align_points(features_, map_.points, T_map_lidar, result.sweep_correction, in_place_).fit;
@@ -327,6 +335,7 @@ OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& fea
   const PoseTangent off = boxminus(T_led, found.T_map_lidar);
   const bool agrees = off.head<3>().norm() < max_first_deviation_m &&
                       off.tail<3>().norm() < max_first_deviation_rad;
+  // Whether traffic pulls the features shows where nothing holds the points.
   const double min_gain = 1.0 + min_first_gain * found.fit;
   if (agrees || aligned.fit < min_gain * fit_there) return found;
   // What the features say of that pose, which they do not move.

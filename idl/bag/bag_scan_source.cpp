@@ -87,7 +87,19 @@ BagScanSource::BagScanSource(const fs::path& path, const std::string& topic)
   if (!stamped) {
     std::ranges::transform(messages_, stamps_ns_.begin(), &BagMessage::received_ns);
   }
-  sensor_ = read_message(0).sensor;
+  sensor_ = sensor_of_first_readable();
+}
+
+std::optional<SensorModel> BagScanSource::sensor_of_first_readable() const {
+  constexpr std::size_t max_tries = 9;
+  for (std::size_t i = 0; i < std::min(messages_.size(), max_tries); ++i) {
+    try {
+      return read_message(i).sensor;
+    } catch (const DatasetError&) {
+      // Whoever reads that scan is told.
+    }
+  }
+  return std::nullopt;
 }
 
 fs::path BagScanSource::name(std::size_t i) const {

@@ -32,6 +32,8 @@ class BagScanSource final : public ScanSource {
   [[nodiscard]] std::vector<std::string> faults() const { return bag_.faults(); }
 
  private:
+  /// A damaged message says nothing.
+  [[nodiscard]] std::optional<SensorModel> sensor_of_first_readable() const;
   [[nodiscard]] DecodedScan read_message(std::size_t i) const;
 
   Bag bag_;

@@ -43,6 +43,17 @@ TEST(ReplayClock, AClockThatIsSetBackDelaysNothingAndHurriesNothing) {
             (std::vector<Milliseconds>{0ms, 0ms, 1000ms, 2000ms}));
 }
 
+TEST(ReplayClock, StampsOutOfOrderTakeNoLonger) {
+  constexpr std::int64_t ms_ns = 1'000'000;
+  EXPECT_EQ(due_times({0, -50 * ms_ns, 100 * ms_ns, 50 * ms_ns, 200 * ms_ns}, 1.0),
+            (std::vector<Milliseconds>{0ms, -50ms, 100ms, 50ms, 200ms}));
+}
+
+TEST(ReplayClock, TakesRatesThatMakeNoSense) {
+  const std::vector<Milliseconds> times = due_times({0, second_ns}, 1e-30);
+  EXPECT_EQ(times.back(), Milliseconds(ReplayClock::max_wait));
+}
+
 TEST(ReplayClock, TakesStampsThatMakeNoSense) {
   constexpr std::int64_t first_ns = std::numeric_limits<std::int64_t>::min();
   constexpr std::int64_t last_ns = std::numeric_limits<std::int64_t>::max();

@@ -4,28 +4,31 @@
 
 #include <map>
 #include <set>
+#include <vector>
 
 namespace stillmap::gateway {
 namespace {
 
 using Standing = ConnectionLimit::Standing;
 
-/// Connections by number, which end at once where they are closed.
+/// Connections by number, as a server has them: each is taken in while there is room, and where
+/// that makes too many, one is closed.
 class Connections {
  public:
   explicit Connections(std::size_t max)
       : limit_(std::make_shared<ConnectionLimit>(max, [this] { ++freed_; })) {}
 
-  /// Makes room first where there is none; false where that is not to be had.
+  /// False where it would have to wait.
   bool open(int number, Standing standing) {
-    if (limit_->is_reached()) limit_->close_one();
     if (limit_->is_reached()) return false;
     auto lease = limit_->lend();
-    lease->raise(standing);
     lease->close_with([this, number] { leases_.erase(number); });
     leases_[number] = std::move(lease);
+    if (limit_->is_reached()) limit_->close_one();
+    if (leases_.contains(number)) leases_.at(number)->raise(standing);
     return true;
   }
+  void end(int number) { leases_.erase(number); }
 
   [[nodiscard]] std::set<int> numbers() const {
     std::set<int> numbers;
@@ -33,8 +36,6 @@ class Connections {
     return numbers;
   }
   [[nodiscard]] int freed() const { return freed_; }
-  [[nodiscard]] ConnectionLimit& limit() { return *limit_; }
-  ConnectionLimit::Lease& lease(int number) { return *leases_.at(number); }
 
  private:
   int freed_ = 0;
@@ -49,47 +50,55 @@ TEST(ConnectionLimit, AFloodOfStrangersKeepsNobodyOutAndEndsNoSession) {
   for (int stranger = 10; stranger < 100; ++stranger) {
     ASSERT_TRUE(connections.open(stranger, Standing::unknown)) << stranger;
   }
-  EXPECT_EQ(connections.numbers(), (std::set{0, 1, 98, 99}));
-  EXPECT_TRUE(connections.open(2, Standing::allowed));
-  EXPECT_TRUE(connections.open(3, Standing::session));
-  EXPECT_EQ(connections.numbers(), (std::set{0, 1, 2, 3}));
-  EXPECT_EQ(connections.freed(), 90);
+  EXPECT_EQ(connections.numbers(), (std::set{0, 1, 99}));
+  ASSERT_TRUE(connections.open(2, Standing::session));
+  EXPECT_EQ(connections.numbers(), (std::set{0, 1, 2}));
+  ASSERT_TRUE(connections.open(3, Standing::session));
+  EXPECT_EQ(connections.numbers(), (std::set{0, 2, 3}));
+  EXPECT_EQ(connections.freed(), 0);
 }
 
-TEST(ConnectionLimit, TheOldestOfThoseThatShowedLeastGoes) {
+TEST(ConnectionLimit, SessionsTakeEveryPlaceAndAreNotClosedForOthers) {
   Connections connections(3);
-  for (const int number : {0, 1, 2}) ASSERT_TRUE(connections.open(number, Standing::unknown));
-  connections.lease(0).raise(Standing::allowed);
-  connections.limit().close_one();
-  EXPECT_EQ(connections.numbers(), (std::set{0, 2}));
-  // What was shown is not forgotten.
-  connections.lease(2).raise(Standing::session);
-  connections.lease(2).raise(Standing::allowed);
-  connections.limit().close_one();
-  EXPECT_EQ(connections.numbers(), (std::set{2}));
+  for (const int number : {0, 1, 2}) ASSERT_TRUE(connections.open(number, Standing::session));
+  EXPECT_FALSE(connections.open(3, Standing::session));
+  EXPECT_EQ(connections.numbers(), (std::set{0, 1, 2}));
+  connections.end(1);
+  EXPECT_EQ(connections.freed(), 1);
+  EXPECT_TRUE(connections.open(3, Standing::session));
+  EXPECT_EQ(connections.numbers(), (std::set{0, 2, 3}));
 }
 
-TEST(ConnectionLimit, SessionsAreNotClosedForOthers) {
-  Connections connections(2);
-  ASSERT_TRUE(connections.open(0, Standing::session));
-  ASSERT_TRUE(connections.open(1, Standing::session));
-  EXPECT_FALSE(connections.open(2, Standing::session));
-  EXPECT_EQ(connections.numbers(), (std::set{0, 1}));
+TEST(ConnectionLimit, WhatWasShownIsNotForgotten) {
+  const auto limit = std::make_shared<ConnectionLimit>(3, [] {});
+  std::set<int> closed;
+  std::vector<std::shared_ptr<ConnectionLimit::Lease>> leases;
+  for (const int number : {0, 1, 2}) {
+    leases.push_back(limit->lend());
+    leases.back()->close_with([&closed, number] { closed.insert(number); });
+  }
+  leases[0]->raise(Standing::session);
+  leases[0]->raise(Standing::allowed);
+  limit->close_one();
+  EXPECT_EQ(closed, (std::set{1}));
+  limit->close_one();
+  EXPECT_EQ(closed, (std::set{1}));
 }
 
-TEST(ConnectionLimit, AConnectionThatIsBeingClosedIsNotClosedAgain) {
-  const auto limit = std::make_shared<ConnectionLimit>(2, [] {});
+TEST(ConnectionLimit, AConnectionThatIsClosedCountsNoMoreThoughItEndsLater) {
+  int freed = 0;
+  const auto limit = std::make_shared<ConnectionLimit>(2, [&] { ++freed; });
   int closed = 0;
-  const auto slow = limit->lend();
+  auto slow = limit->lend();
   slow->close_with([&] { ++closed; });
+  const auto quick = limit->lend();
+  EXPECT_TRUE(limit->is_reached());
   limit->close_one();
   limit->close_one();
   EXPECT_EQ(closed, 1);
-  const auto quick = limit->lend();
-  bool is_closed = false;
-  quick->close_with([&] { is_closed = true; });
-  limit->close_one();
-  EXPECT_TRUE(is_closed);
+  EXPECT_FALSE(limit->is_reached());
+  slow = nullptr;
+  EXPECT_EQ(freed, 0);
 }
 
 }  // namespace

@@ -30,6 +30,11 @@ class PostedWork {
         timeout);
   }
 
+  [[nodiscard]] bool has_some() {
+    const std::scoped_lock lock(mutex_);
+    return !waiting_.empty();
+  }
+
  private:
   void do_all() {
     while (const std::function<void()> work = next()) work();

@@ -54,15 +54,24 @@ export class MapTiles {
 
   /** Asks which tiles the whole map has: the topic has only those round the robot. Tiles that it no longer has go. */
   async list() {
+    while (!await this.#listOnce());
+  }
+
+  /** False where another map began meanwhile. */
+  async #listOnce() {
+    const mapBefore = this.mapId;
     const unlisted = new Map([...this.tiles.values()].map((tile) => [tile.key, tile.revision]));
+    let listed;
     let continuation = "";
     do {
       const reply = await this.connection.call(`${this.prefix}/get_tile_versions`, { format_version: this.formatVersion,
         min_x: -everywhere, min_y: -everywhere, max_x: everywhere, max_y: everywhere, continuation });
       if (reply.status.code !== 0) throw new Error(reply.status.reason);
-      if (this.mapId !== reply.identity.map_id) {
+      listed ??= reply.identity.map_id;
+      if (reply.identity.map_id !== listed) return false;
+      if (this.mapId !== listed) {
         for (const key of [...this.tiles.keys()]) this.#remove(key);
-        this.mapId = reply.identity.map_id;
+        this.mapId = listed;
       }
       for (const info of reply.tiles) {
         unlisted.delete(keyOf(info));
@@ -70,10 +79,13 @@ export class MapTiles {
       }
       continuation = reply.continuation;
     } while (continuation);
+    // Of another map they went before.
+    if (mapBefore !== listed || this.mapId !== listed) return true;
     for (const [key, revision] of unlisted) {
       // What the topic said meanwhile is newer.
       if (this.tiles.get(key)?.revision === revision) this.#remove(key);
     }
+    return true;
   }
 
   get pending() { return [...this.tiles.values()].filter((tile) => tile.wanted !== tile.shown).length; }
