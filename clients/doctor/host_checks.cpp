@@ -18,13 +18,14 @@ bool needs_udp(const SystemSnapshot& snapshot) {
 
 std::string mebibytes(std::uint64_t bytes) { return std::to_string(bytes >> 20U) + " MiB"; }
 
-std::uint64_t bytes_of(const std::vector<SharedMemorySegment>& segments) {
-  return std::accumulate(
-      segments.begin(), segments.end(), std::uint64_t{0},
-      [](std::uint64_t sum, const SharedMemorySegment& segment) { return sum + segment.bytes; });
+std::uint64_t bytes_of(const std::vector<dds::SharedMemorySegment>& segments) {
+  return std::accumulate(segments.begin(), segments.end(), std::uint64_t{0},
+                         [](std::uint64_t sum, const dds::SharedMemorySegment& segment) {
+                           return sum + segment.bytes;
+                         });
 }
 
-dds::Diagnostic stale_segments_diagnostic(const std::vector<SharedMemorySegment>& stale) {
+dds::Diagnostic stale_segments_diagnostic(const std::vector<dds::SharedMemorySegment>& stale) {
   return {.severity = dds::Severity::advice,
           .what = std::to_string(stale.size()) + " shared memory segments of dead processes",
           .evidence = mebibytes(bytes_of(stale)) +
@@ -32,7 +33,7 @@ dds::Diagnostic stale_segments_diagnostic(const std::vector<SharedMemorySegment>
           .hint = "stillmap doctor --clean"};
 }
 
-dds::Diagnostic foreign_segments_diagnostic(const std::vector<SharedMemorySegment>& foreign,
+dds::Diagnostic foreign_segments_diagnostic(const std::vector<dds::SharedMemorySegment>& foreign,
                                             std::uint32_t user) {
   return {.severity = dds::Severity::advice,
           .what = "other users run DDS on this machine",
@@ -58,8 +59,8 @@ Diagnostics check_shared_memory(const SystemSnapshot& snapshot) {
                            .hint = "sudo chmod 1777 /dev/shm (in a container: mount a tmpfs "
                                    "there), or use --udp-only and dds.shared_memory: false"});
   }
-  std::vector<SharedMemorySegment> stale, foreign;
-  for (const SharedMemorySegment& segment : host.segments) {
+  std::vector<dds::SharedMemorySegment> stale, foreign;
+  for (const dds::SharedMemorySegment& segment : host.segments) {
     if (segment.is_stale) {
       stale.push_back(segment);
     } else if (segment.owner != host.user) {

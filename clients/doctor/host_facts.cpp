@@ -1,10 +1,7 @@
 #include "clients/doctor/host_facts.hpp"
 
 #include <arpa/inet.h>
-#include <fcntl.h>
 #include <net/if.h>
-#include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -19,53 +16,6 @@ namespace stillmap::cli {
 namespace {
 
 namespace fs = std::filesystem;
-
-// A file beside the segment, which the living process holds locked: "_el" by its owner, "_sl" by
-// those who use it.
-bool is_locked(const fs::path& lock_file) {
-  const int descriptor = ::open(lock_file.c_str(), O_RDONLY | O_CLOEXEC);
-  // What cannot be looked at may be alive.
-  if (descriptor < 0) return errno != ENOENT;
-  const bool was_free = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0;
-  ::close(descriptor);
-  return !was_free;
-}
-
-bool is_segment_name(const std::string& name) {
-  return name.starts_with("fastrtps_") && !name.ends_with("_el") && !name.ends_with("_sl");
-}
-
-fs::path beside(const fs::path& file, const std::string& ending) { return file.string() + ending; }
-
-void remove_file(const fs::path& file) {
-  std::error_code ignored;
-  fs::remove(file, ignored);
-}
-
-void remove_segment(const fs::path& folder, const std::string& name) {
-  const fs::path file = folder / name;
-  remove_file(file);
-  remove_file(beside(file, "_el"));
-  remove_file(beside(file, "_sl"));
-  remove_file(folder / ("sem." + name + "_mutex"));
-}
-
-/// The segments of Fast DDS in a folder of shared memory.
-std::vector<SharedMemorySegment> shared_memory_segments(const fs::path& folder) {
-  std::vector<SharedMemorySegment> segments;
-  std::error_code error;
-  for (const auto& entry : fs::directory_iterator(folder, error)) {
-    const std::string name = entry.path().filename().string();
-    struct stat facts {};
-    if (!is_segment_name(name) || ::stat(entry.path().c_str(), &facts) != 0) continue;
-    segments.push_back({.name = name,
-                        .bytes = static_cast<std::uint64_t>(facts.st_size),
-                        .owner = facts.st_uid,
-                        .is_stale = !is_locked(beside(entry.path(), "_el")) &&
-                                    !is_locked(beside(entry.path(), "_sl"))});
-  }
-  return segments;
-}
 
 /// Why nothing can be written there; empty when it can.
 std::string write_fault(const fs::path& folder) {
@@ -151,21 +101,10 @@ HostFacts read_host_facts(const fs::path& root) {
           .user = ::geteuid(),
           .max_receive_buffer_bytes = number_in(root / "proc/sys/net/core/rmem_max"),
           .shared_memory_fault = write_fault(root / "dev/shm"),
-          .segments = shared_memory_segments(root / "dev/shm"),
+          .segments = dds::shared_memory_segments(root / "dev/shm"),
           .interfaces = interfaces_in(root / "sys/class/net"),
           .has_multicast_route = takes_multicast(root / "proc/net/route"),
           .udp_ports = ports_in(root / "proc/net/udp")};
-}
-
-int remove_stale_segments(const fs::path& root) {
-  const fs::path folder = root / "dev/shm";
-  int removed = 0;
-  for (const SharedMemorySegment& segment : shared_memory_segments(folder)) {
-    if (!segment.is_stale) continue;
-    remove_segment(folder, segment.name);
-    if (!fs::exists(folder / segment.name)) ++removed;
-  }
-  return removed;
 }
 
 }  // namespace stillmap::cli

@@ -6,16 +6,9 @@
 #include <string>
 #include <vector>
 
-namespace stillmap::cli {
+#include "idl/dds/shared_memory_segments.hpp"
 
-/// A segment of Fast DDS in /dev/shm.
-struct SharedMemorySegment {
-  std::string name;
-  std::uint64_t bytes = 0;
-  std::uint32_t owner = 0;
-  /// Nobody holds its lock: the process that made it is gone.
-  bool is_stale = false;
-};
+namespace stillmap::cli {
 
 struct NetworkInterface {
   std::string name;
@@ -32,7 +25,7 @@ struct HostFacts {
   std::optional<std::uint32_t> max_receive_buffer_bytes;
   /// Why /dev/shm cannot be used; empty when it can.
   std::string shared_memory_fault;
-  std::vector<SharedMemorySegment> segments;
+  std::vector<dds::SharedMemorySegment> segments;
   std::vector<NetworkInterface> interfaces;
   /// Some route takes multicast packets.
   bool has_multicast_route = false;
@@ -42,8 +35,5 @@ struct HostFacts {
 
 /// Reads /proc, /sys and /dev/shm under `root`: "/" for the machine itself.
 [[nodiscard]] HostFacts read_host_facts(const std::filesystem::path& root);
-
-/// Removes the stale segments with their locks, where that is allowed; returns how many.
-int remove_stale_segments(const std::filesystem::path& root);
 
 }  // namespace stillmap::cli

@@ -92,10 +92,10 @@ struct RegistrationConfig {
   /// lidar: any surface shows such lines, where the lidar happens to look. Not in the paper; 1
   /// switches it off.
   double across_rings_weight = 0.1;
-  /// A plane tells nothing of a point that lies farther than this from the middle of its
-  /// neighbours, along the plane, in standard deviations of theirs (a Mahalanobis distance): the
-  /// few rings of the scans before, which err together, turn the plane about themselves, and the
-  /// next ring comes to lie beyond them. Not in the paper; 0 switches it off.
+  /// Of a lidar with rings: a plane tells nothing of a point that lies farther than this from the
+  /// middle of its neighbours, along the plane, in standard deviations of theirs (a Mahalanobis
+  /// distance): the few rings of the scans before, which err together, turn the plane about
+  /// themselves, and the next ring comes to lie beyond them. Not in the paper; 0 switches it off.
   double max_extrapolation = 1.5;
   /// Fewer correspondences than this give no pose.
   int min_correspondences = 50;

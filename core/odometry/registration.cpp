@@ -374,7 +374,10 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
                                  const OdometryConfig& config,
                                  const PoseTangent& sweep_correction) {
   RegistrationConfig limits = config.registration;
-  if (!features.in_rings) limits.across_rings_weight = 1.0;
+  if (!features.in_rings) {
+    limits.across_rings_weight = 1.0;
+    limits.max_extrapolation = 0.0;
+  }
   OdometryResult result;
   result.T_map_lidar = T_map_lidar_predicted;
   result.sweep_correction = sweep_correction;

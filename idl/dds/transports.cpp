@@ -11,6 +11,7 @@
 
 #include <cerrno>
 #include <charconv>
+#include <chrono>
 #include <cstring>
 #include <filesystem>
 #include <memory>
@@ -18,6 +19,7 @@
 #include <string>
 
 #include "idl/dds/dds_error.hpp"
+#include "idl/dds/shared_memory_segments.hpp"
 
 namespace stillmap::dds {
 
@@ -25,19 +27,36 @@ using namespace eprosima::fastdds::rtps;
 
 namespace {
 
-/// Without room for it, a process that writes into its segment ends with a bus error.
+constexpr const char* shared_memory_folder = "/dev/shm";
+
+/// Nothing where there is no such folder.
+std::optional<std::uint64_t> free_shared_memory_mib() {
+  struct statvfs room {};
+  if (statvfs(shared_memory_folder, &room) != 0) return std::nullopt;
+  return (std::uint64_t{room.f_bavail} * room.f_frsize) >> 20U;
+}
+
+/// Without room for it, a process that writes into its segment ends with a bus error. Where there
+/// is none, what processes left that were killed goes first: a server that is killed and started
+/// again for weeks would else fill the folder, and then start no more.
 void require_shared_memory_room(std::uint64_t segment_mib) {
   // Beside the segment: the ports' queues.
   constexpr std::uint64_t margin_mib = 4;
-  struct statvfs room {};
-  if (statvfs("/dev/shm", &room) != 0) return;
-  const std::uint64_t free_mib = (std::uint64_t{room.f_bavail} * room.f_frsize) >> 20U;
-  if (free_mib >= segment_mib + margin_mib) return;
-  throw DdsError("/dev/shm has " + std::to_string(free_mib) + " MiB free, shared memory takes " +
-                 std::to_string(segment_mib + margin_mib) +
-                 ": remove stale /dev/shm/fastrtps_* files, give a container more (docker run "
-                 "--shm-size 256m), or switch it off with a DDS profile that says shared_memory: "
-                 "false");
+  constexpr std::chrono::seconds min_age(10);
+  const std::uint64_t needed_mib = segment_mib + margin_mib;
+  const auto is_enough = [&] {
+    return free_shared_memory_mib().value_or(needed_mib) >= needed_mib;
+  };
+  if (is_enough()) return;
+  remove_stale_segments(shared_memory_folder, min_age);
+  if (is_enough()) return;
+  throw DdsError(
+      "/dev/shm has " + std::to_string(free_shared_memory_mib().value_or(0)) +
+      " MiB free, shared memory takes " + std::to_string(needed_mib) +
+      ", and of dead processes there is nothing that may be removed: remove other users' "
+      "stale /dev/shm/fastrtps_* files, give a container more (docker run "
+      "--shm-size 256m), or switch it off with a DDS profile that says shared_memory: "
+      "false");
 }
 
 // Of a peer without a port, as many processes are looked for.

@@ -13,6 +13,7 @@ namespace stillmap::cli {
 namespace {
 
 namespace fs = std::filesystem;
+using namespace std::chrono_literals;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -81,10 +82,13 @@ TEST_F(HostFactsTest, TellSegmentsOfTheDeadFromThoseOfTheLiving) {
   const int lock = ::open((root_ / "dev/shm/fastrtps_0123456789abcdef_el").c_str(), O_RDONLY);
   ASSERT_EQ(::flock(lock, LOCK_EX | LOCK_NB), 0);
   EXPECT_FALSE(facts().segments[0].is_stale);
-  EXPECT_EQ(remove_stale_segments(root_.path()), 0);
+  EXPECT_EQ(dds::remove_stale_segments(root_ / "dev/shm", 0s), 0);
   EXPECT_TRUE(exists("dev/shm/fastrtps_0123456789abcdef"));
   ::close(lock);
-  EXPECT_EQ(remove_stale_segments(root_.path()), 1);
+  // It may be about to be locked.
+  EXPECT_EQ(dds::remove_stale_segments(root_ / "dev/shm", 60s), 0);
+  EXPECT_TRUE(exists("dev/shm/fastrtps_0123456789abcdef"));
+  EXPECT_EQ(dds::remove_stale_segments(root_ / "dev/shm", 0s), 1);
   EXPECT_FALSE(exists("dev/shm/fastrtps_0123456789abcdef"));
   EXPECT_FALSE(exists("dev/shm/fastrtps_0123456789abcdef_el"));
   EXPECT_TRUE(exists("dev/shm/sem.other"));

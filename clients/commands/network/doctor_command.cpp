@@ -152,7 +152,9 @@ DoctorOptions options_of(const DoctorArguments& arguments) {
 
 ExitCode run(const DoctorArguments& arguments) {
   if (arguments.clean) {
-    std::cerr << "removed " << remove_stale_segments(arguments.host_root)
+    std::cerr << "removed "
+              << dds::remove_stale_segments(std::filesystem::path(arguments.host_root) / "dev/shm",
+                                            std::chrono::seconds(0))
               << " shared memory segments of dead processes\n";
   }
   const SystemSnapshot snapshot = collect_snapshot(options_of(arguments));

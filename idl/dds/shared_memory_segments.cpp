@@ -1,0 +1,73 @@
+#include "idl/dds/shared_memory_segments.hpp"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <ctime>
+#include <system_error>
+
+namespace stillmap::dds {
+namespace {
+
+namespace fs = std::filesystem;
+
+// A file beside the segment, which the living process holds locked: "_el" by its owner, "_sl" by
+// those who use it.
+bool is_locked(const fs::path& lock_file) {
+  const int descriptor = ::open(lock_file.c_str(), O_RDONLY | O_CLOEXEC);
+  // What cannot be looked at may be alive.
+  if (descriptor < 0) return errno != ENOENT;
+  const bool was_free = ::flock(descriptor, LOCK_EX | LOCK_NB) == 0;
+  ::close(descriptor);
+  return !was_free;
+}
+
+bool is_segment_name(const std::string& name) {
+  return name.starts_with("fastrtps_") && !name.ends_with("_el") && !name.ends_with("_sl");
+}
+
+fs::path beside(const fs::path& file, const std::string& ending) { return file.string() + ending; }
+
+void remove_segment(const fs::path& folder, const std::string& name) {
+  const fs::path file = folder / name;
+  std::error_code ignored;
+  for (const fs::path& part :
+       {file, beside(file, "_el"), beside(file, "_sl"), folder / ("sem." + name + "_mutex")}) {
+    fs::remove(part, ignored);
+  }
+}
+
+}  // namespace
+
+std::vector<SharedMemorySegment> shared_memory_segments(const fs::path& folder) {
+  std::vector<SharedMemorySegment> segments;
+  const std::time_t now = std::time(nullptr);
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(folder, error)) {
+    const std::string name = entry.path().filename().string();
+    struct stat facts {};
+    if (!is_segment_name(name) || ::stat(entry.path().c_str(), &facts) != 0) continue;
+    segments.push_back({.name = name,
+                        .bytes = static_cast<std::uint64_t>(facts.st_size),
+                        .owner = facts.st_uid,
+                        .age = std::chrono::seconds(now - facts.st_mtim.tv_sec),
+                        .is_stale = !is_locked(beside(entry.path(), "_el")) &&
+                                    !is_locked(beside(entry.path(), "_sl"))});
+  }
+  return segments;
+}
+
+int remove_stale_segments(const fs::path& folder, std::chrono::seconds min_age) {
+  int removed = 0;
+  for (const SharedMemorySegment& segment : shared_memory_segments(folder)) {
+    if (!segment.is_stale || segment.age < min_age) continue;
+    remove_segment(folder, segment.name);
+    if (!fs::exists(folder / segment.name)) ++removed;
+  }
+  return removed;
+}
+
+}  // namespace stillmap::dds
