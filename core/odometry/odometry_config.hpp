@@ -92,7 +92,7 @@ struct RegistrationConfig {
   /// lidar: any surface shows such lines, where the lidar happens to look. Not in the paper; 1
   /// switches it off.
   double across_rings_weight = 0.1;
-  /// Of a lidar with rings: a plane tells nothing of a point that lies farther than this from the
+  /// Of a lidar with rings: a plane tells little of a point that lies farther than this from the
   /// middle of its neighbours, along the plane, in standard deviations of theirs (a Mahalanobis
   /// distance): the few rings of the scans before, which err together, turn the plane about
   /// themselves, and the next ring comes to lie beyond them. Not in the paper; 0 switches it off.

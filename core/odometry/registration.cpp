@@ -21,6 +21,9 @@ constexpr float same_neighbours_m = 0.04F;
 /// Motion that the coarse registration can find [m].
 constexpr double coarse_reach_m = 3.0;
 
+/// What a plane counts for a point beyond its neighbours: far walls may be all that shows a motion.
+constexpr double extrapolated_weight = 0.05;
+
 struct Correspondence {
   Eigen::Vector3d point_lidar;
   FittedSurface surface;
@@ -57,13 +60,15 @@ void look_up(const FeaturePoint& feature, FeatureKind kind, const FeatureMap& ma
                                             static_cast<float>(config.max_neighbour_distance_m));
   found.in_known_space = neighbours.count > 0;
   const auto surface = fit(kind, neighbours);
-  found.found =
-      surface && (config.max_extrapolation == 0.0 || surface->normal_count != 1 ||
-                  extrapolation(*surface, neighbours, found.searched_map.cast<double>()) <=
-                      config.max_extrapolation);
-  if (!found.found) return;
+  found.found = surface.has_value();
+  if (!surface) return;
   found.surface =
       weighed_ring_line(*surface, found.point_lidar, R_map_lidar, config.across_rings_weight);
+  if (config.max_extrapolation > 0.0 && surface->normal_count == 1 &&
+      extrapolation(*surface, neighbours, found.searched_map.cast<double>()) >
+          config.max_extrapolation) {
+    found.surface.weights[0] = extrapolated_weight;
+  }
   found.inconsistency = feature.confidence * semantic_inconsistency(neighbours, feature.label);
 }
 
