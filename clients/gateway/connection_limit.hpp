@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <list>
 #include <memory>
 #include <optional>
+#include <utility>
 
 namespace stillmap::gateway {
 

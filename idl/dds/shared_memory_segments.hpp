@@ -13,7 +13,7 @@ struct SharedMemorySegment {
   std::string name;
   std::uint64_t bytes = 0;
   std::uint32_t owner = 0;
-  /// Since it was written to.
+  /// Since it was made: what is written to its memory does not count.
   std::chrono::seconds age{0};
   /// Nobody holds its lock: the process that made it is gone.
   bool is_stale = false;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <iterator>
 
@@ -34,74 +35,63 @@ class Listener : public TopicListener {
 
 class TopicBridgeTest : public testing::Test {
  protected:
-  [[nodiscard]] std::uint32_t channel_of(const std::string& topic) const {
-    for (const ChannelInfo& channel : bridge_.channels()) {
-      if (channel.topic == topic) return channel.id;
-    }
-    throw std::out_of_range(topic);
+  /// Of the server's path, a latched topic.
+  [[nodiscard]] std::uint32_t channel() const {
+    return std::ranges::find(bridge_.channels(), "/stillmap/path", &ChannelInfo::topic)->id;
   }
 
+  dds::Topics names_ = dds::Topics::in("stillmap");
+  dds::Participant server_side_{dds::loopback(true)};
+  dds::Writer<nav_msgs::msg::Path> path_{server_side_, names_.path.dds_name, names_.path.writer};
   PostedWork work_;
   dds::Participant participant_{dds::loopback(true)};
   TopicBridge bridge_{participant_, {}, work_.post()};
 };
 
 TEST_F(TopicBridgeTest, ComingAndGoingInALoopCostsNoThreads) {
-  const std::uint32_t channel = channel_of("/stillmap/path");
   Listener listener;
-  bridge_.listen(channel, listener, 1);
+  bridge_.listen(channel(), listener, 1);
   const int threads = thread_count();
   for (int i = 0; i < 300; ++i) {
-    bridge_.stop_listening(channel, listener, 1);
-    bridge_.listen(channel, listener, 1);
+    bridge_.stop_listening(channel(), listener, 1);
+    bridge_.listen(channel(), listener, 1);
     EXPECT_LE(thread_count(), threads + 1) << i;
   }
   // Who came last is served.
-  const dds::Topics names = dds::Topics::in("stillmap");
-  dds::Participant other(dds::loopback(true));
-  dds::Writer<nav_msgs::msg::Path> writer(other, names.path.dds_name, names.path.writer);
-  ASSERT_TRUE(writer.write(nav_msgs::msg::Path()));
+  ASSERT_TRUE(path_.write(nav_msgs::msg::Path()));
   EXPECT_TRUE(work_.eventually([&] { return listener.arrived > 0; }));
   EXPECT_EQ(listener.failure, "");
 }
 
 TEST_F(TopicBridgeTest, WhoListensAgainGetsTheLastSampleOfALatchedTopicOnce) {
-  const std::uint32_t channel = channel_of("/stillmap/path");
-  const dds::Topics names = dds::Topics::in("stillmap");
-  dds::Participant other(dds::loopback(true));
-  dds::Writer<nav_msgs::msg::Path> writer(other, names.path.dds_name, names.path.writer);
-  ASSERT_TRUE(writer.write(nav_msgs::msg::Path()));
+  ASSERT_TRUE(path_.write(nav_msgs::msg::Path()));
   Listener first;
-  bridge_.listen(channel, first, 1);
+  bridge_.listen(channel(), first, 1);
   ASSERT_TRUE(work_.eventually([&] { return first.arrived == 1; }));
-  bridge_.stop_listening(channel, first, 1);
+  bridge_.stop_listening(channel(), first, 1);
   Listener second;
-  bridge_.listen(channel, second, 2);
+  bridge_.listen(channel(), second, 2);
   EXPECT_TRUE(work_.eventually([&] { return second.arrived == 1; }));
   Listener third;
-  bridge_.listen(channel, third, 3);
+  bridge_.listen(channel(), third, 3);
   EXPECT_EQ(third.arrived, 1);
-  ASSERT_TRUE(writer.write(nav_msgs::msg::Path()));
+  ASSERT_TRUE(path_.write(nav_msgs::msg::Path()));
   ASSERT_TRUE(work_.eventually([&] { return third.arrived == 2; }));
   EXPECT_EQ(second.arrived, 2);
   EXPECT_EQ(first.arrived, 1);
 }
 
 TEST_F(TopicBridgeTest, WhatCameForWhoHasLeftGoesToNobodyTwice) {
-  const std::uint32_t channel = channel_of("/stillmap/path");
-  const dds::Topics names = dds::Topics::in("stillmap");
-  dds::Participant other(dds::loopback(true));
-  dds::Writer<nav_msgs::msg::Path> writer(other, names.path.dds_name, names.path.writer);
-  ASSERT_TRUE(writer.write(nav_msgs::msg::Path()));
+  ASSERT_TRUE(path_.write(nav_msgs::msg::Path()));
   Listener first;
-  bridge_.listen(channel, first, 1);
+  bridge_.listen(channel(), first, 1);
   // Its sample comes, but is not handed on before it leaves.
   ASSERT_TRUE(test::eventually([&] { return work_.has_some(); }));
-  bridge_.stop_listening(channel, first, 1);
+  bridge_.stop_listening(channel(), first, 1);
   Listener second;
-  bridge_.listen(channel, second, 2);
+  bridge_.listen(channel(), second, 2);
   ASSERT_TRUE(work_.eventually([&] { return second.arrived > 0; }));
-  ASSERT_TRUE(writer.write(nav_msgs::msg::Path()));
+  ASSERT_TRUE(path_.write(nav_msgs::msg::Path()));
   ASSERT_TRUE(work_.eventually([&] { return second.arrived >= 2; }));
   EXPECT_EQ(second.arrived, 2);
   EXPECT_EQ(first.arrived, 0);
@@ -111,12 +101,11 @@ TEST_F(TopicBridgeTest, ATopicThatCouldNotBeReadIsTriedAgainForWhoListensNext) {
   // Another type under the topic's name: this participant cannot read it.
   const dds::Writer<nav_msgs::msg::Odometry> wrong(participant_,
                                                    dds::Topics::in("stillmap").path.dds_name, {});
-  const std::uint32_t channel = channel_of("/stillmap/path");
   Listener first;
-  bridge_.listen(channel, first, 1);
+  bridge_.listen(channel(), first, 1);
   ASSERT_TRUE(work_.eventually([&] { return !first.failure.empty(); }));
   Listener second;
-  bridge_.listen(channel, second, 2);
+  bridge_.listen(channel(), second, 2);
   EXPECT_TRUE(work_.eventually([&] { return !second.failure.empty(); }));
 }
 
