@@ -82,9 +82,9 @@ class DiskFault : public testing::TestWithParam<Fault> {
     }
   }
 
-  /// Stamp of the newest pose that the server said was saved; 0 where the disturbances began
+  /// Drives on from scan `next`. Stamp of the newest pose that the server said was saved; 0 where the disturbances began
   /// another map after that.
-  std::int64_t run_server(const ServiceSetup& setup, const PreloadedFaults& faults, int first);
+  std::int64_t run_server(const ServiceSetup& setup, const PreloadedFaults& faults, int& next);
   void check_files(const fs::path& folder);
 
   std::mt19937 random_{std::random_device{}()};
@@ -96,15 +96,15 @@ std::int64_t newest_ns(const fs::path& file) {
 }
 
 std::int64_t DiskFault::run_server(const ServiceSetup& setup, const PreloadedFaults& faults,
-                                   int first) {
+                                   int& next) {
   ServerProcess server(setup.server_arguments());
   Client client(setup.client());
   client.wait_for_server(patience);
   ScanPublisher publisher(setup.publisher(true));
   EXPECT_TRUE(publisher.wait_for_subscriber(patience));
   std::jthread driver([&](const std::stop_token& stop) {
-    for (int i = first; !stop.stop_requested(); ++i) {
-      if (!publisher.publish(room_scan(i), {}, std::chrono::milliseconds(200))) continue;
+    for (; !stop.stop_requested(); ++next) {
+      if (!publisher.publish(room_scan(next), {}, std::chrono::milliseconds(200))) continue;
       std::this_thread::sleep_for(std::chrono::milliseconds(20));
     }
   });
@@ -150,8 +150,9 @@ TEST_P(DiskFault, AtAnyMomentNoFileIsLostAndNoneHoldsAnotherMap) {
   const ServiceSetup setup("every", "save_period_s: 0.2, saved_maps: 100000");
   const fs::path folder = setup.map_file().parent_path();
   const PreloadedFaults faults(folder);
+  int next = 1;
   for (int round = 0; round < rounds(); ++round) {
-    const std::int64_t saved_ns = run_server(setup, faults, 1 + round * 1000);
+    const std::int64_t saved_ns = run_server(setup, faults, next);
     ASSERT_GE(newest_ns(setup.map_file()), saved_ns) << "round " << round;
     check_files(folder);
     if (HasFailure()) FAIL() << "round " << round << " of " << GetParam().name;

@@ -74,8 +74,9 @@ struct Loss {
   double lost_s = 0.0;
 };
 
-/// Maps from scan `first` on until the server is killed; what its file lost.
-Loss kill_while_mapping(const ServiceSetup& setup, int first, double after_s) {
+/// Maps from scan `next` on, which goes on with the drive, until the server is killed; what its
+/// file lost.
+Loss kill_while_mapping(const ServiceSetup& setup, int& next, double after_s) {
   SeenByClient seen;
   ServerProcess server(setup.server_arguments());
   Clock::time_point killed;
@@ -89,9 +90,9 @@ Loss kill_while_mapping(const ServiceSetup& setup, int first, double after_s) {
     ScanPublisher publisher(setup.publisher(true));
     EXPECT_TRUE(publisher.wait_for_subscriber(patience));
     std::jthread driver([&](const std::stop_token& stop) {
-      for (int i = first; !stop.stop_requested(); ++i) {
+      for (; !stop.stop_requested(); ++next) {
         // A full history makes it wait; once the server is dead nothing more can be sent.
-        if (!publisher.publish(room_scan(i), {}, std::chrono::milliseconds(200))) continue;
+        if (!publisher.publish(room_scan(next), {}, std::chrono::milliseconds(200))) continue;
         std::this_thread::sleep_for(std::chrono::milliseconds(30));
       }
     });
@@ -125,8 +126,9 @@ TEST(Kill, AtAnyMomentTheFileOpensAndAtMostACheckpointPeriodIsLost) {
   std::uniform_real_distribution<double> after_s(0.0, 2.0);
   std::vector<double> losses;
   std::optional<SavedMap> stored;
+  int next = 0;
   for (int kill = 0; kill < wanted_kills(); ++kill) {
-    Loss loss = kill_while_mapping(setup, kill * 1000, after_s(random));
+    Loss loss = kill_while_mapping(setup, next, after_s(random));
     EXPECT_LE(loss.lost_s, checkpoint_period_s + slack_s);
     if (stored) expect_goes_on(*stored, loss.stored);
     stored = std::move(loss.stored);

@@ -17,6 +17,9 @@ constexpr double pillar_radius_m = 0.4;
 constexpr std::array<std::array<double, 2>, 8> pillars = {
     {{-18, 6}, {-11, -7}, {-4, 9}, {3, -5}, {8, 7}, {13, -9}, {18, 4}, {22, -3}}};
 constexpr int columns = 720;
+/// The drive goes to and fro so far from the hall's middle: however long it takes, it stays inside.
+constexpr double reach_m = 12.0;
+constexpr double metres_a_scan = 0.15;
 
 struct Hit {
   double range_m = std::numeric_limits<double>::infinity();
@@ -62,7 +65,8 @@ Eigen::Vector3d ray(double elevation, double azimuth) {
 StampedPose room_pose(int index) {
   return {.stamp_ns = 1'700'000'000'000'000'000 + index * std::int64_t{100'000'000},
           .T_map_lidar = Eigen::Isometry3d(
-              Eigen::Translation3d(0.15 * index, 0.3 * std::sin(0.1 * index), 0.0) *
+              Eigen::Translation3d(reach_m * std::sin(metres_a_scan / reach_m * index),
+                               0.3 * std::sin(0.1 * index), 0.0) *
               Eigen::AngleAxisd(0.01 * index, Eigen::Vector3d::UnitZ()))};
 }
 

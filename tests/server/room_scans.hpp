@@ -5,7 +5,7 @@
 
 namespace stillmap::test {
 
-/// True pose of the lidar at scan `index` of a slow drive through a hall with pillars.
+/// True pose of the lidar at scan `index` of a slow drive to and fro in a hall with pillars.
 [[nodiscard]] StampedPose room_pose(int index);
 
 /// What a 16-beam lidar sees there: ground (road), walls (building), pillars (pole).
