@@ -152,6 +152,7 @@ void add_options(stillmap::cli::CommandHandle command, Arguments& arguments) {
       .option("--odometry", arguments.gateway.topics.odometry_prior, "The odometry prior's topic")
       .with_default();
   command.option("--imu", arguments.gateway.topics.imu, "The IMU's topic").with_default();
+  command.option("--gnss", arguments.gateway.topics.gnss, "A GNSS receiver's topic").with_default();
   stillmap::cli::add_client_options(command, arguments.client);
   command.explain(
       "Examples:\n"

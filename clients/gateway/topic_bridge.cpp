@@ -89,6 +89,7 @@ std::vector<ForwardedTopic> forwarded_topics(const TopicChoice& choice) {
   topics.push_back(sensor_topic(dds::points_topic(choice.points, DeliveryMode::latest, 1)));
   topics.push_back(sensor_topic(dds::odometry_prior_topic(choice.odometry_prior)));
   topics.push_back(sensor_topic(dds::imu_topic(choice.imu, DeliveryMode::latest)));
+  topics.push_back(sensor_topic(dds::gnss_topic(choice.gnss, DeliveryMode::latest)));
   return topics;
 }
 

@@ -22,6 +22,7 @@ struct TopicChoice {
   std::string points = "points";
   std::string odometry_prior = "odom_prior";
   std::string imu = "imu/data";
+  std::string gnss = "fix";
 };
 
 /// Which waiting message a newer one replaces.

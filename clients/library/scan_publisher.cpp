@@ -5,6 +5,7 @@
 
 #include "clients/library/connection.hpp"
 #include "clients/library/tcp_rejoin_backoff.hpp"
+#include "idl/conversions/gnss.hpp"
 #include "idl/conversions/imu.hpp"
 #include "idl/conversions/pose.hpp"
 #include "idl/conversions/to_cloud.hpp"
@@ -21,6 +22,7 @@ struct ScanPublisher::Connection {
         writer(*own, topic.dds_name, topic.writer) {
     publish_mount(*own);
     open_imu(*own);
+    open_gnss(*own);
   }
 
   Connection(dds::Participant& shared, const ScanPublisherOptions& publisher_options)
@@ -29,6 +31,7 @@ struct ScanPublisher::Connection {
         writer(shared, topic.dds_name, topic.writer) {
     publish_mount(shared);
     open_imu(shared);
+    open_gnss(shared);
   }
 
   void publish_mount(dds::Participant& participant) {
@@ -53,6 +56,13 @@ struct ScanPublisher::Connection {
     imu_writer.emplace(participant, imu.dds_name, imu.writer);
   }
 
+  void open_gnss(dds::Participant& participant) {
+    if (options.gnss_topic.empty()) return;
+    const auto gnss = dds::gnss_topic(
+        options.gnss_topic, options.lossless ? DeliveryMode::every : DeliveryMode::latest);
+    gnss_writer.emplace(participant, gnss.dds_name, gnss.writer);
+  }
+
   ScanPublisherOptions options;
   bool has_written = false;
   std::unique_ptr<dds::Participant> own;
@@ -60,6 +70,7 @@ struct ScanPublisher::Connection {
   dds::Writer<sensor_msgs::msg::PointCloud2> writer;
   std::optional<dds::Writer<tf2_msgs::msg::TFMessage>> mount_writer;
   std::optional<dds::Writer<sensor_msgs::msg::Imu>> imu_writer;
+  std::optional<dds::Writer<sensor_msgs::msg::NavSatFix>> gnss_writer;
 };
 
 ScanPublisher::ScanPublisher(const ScanPublisherOptions& options)
@@ -116,6 +127,22 @@ std::size_t ScanPublisher::publish(std::span<const ImuSample> samples,
   while (written < samples.size()) {
     const auto message = wire::to_imu(samples[written], connection_->options.imu_frame);
     if (connection_->imu_writer->write(message)) {
+      ++written;
+    } else if (std::chrono::steady_clock::now() >= deadline) {
+      break;
+    }
+  }
+  return written;
+}
+
+std::size_t ScanPublisher::publish(std::span<const GnssFix> fixes,
+                                   std::chrono::milliseconds timeout) {
+  assert(connection_->gnss_writer);
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  connection_->has_written = true;
+  std::size_t written = 0;
+  while (written < fixes.size()) {
+    if (connection_->gnss_writer->write(wire::to_nav_sat_fix(fixes[written], "gnss"))) {
       ++written;
     } else if (std::chrono::steady_clock::now() >= deadline) {
       break;

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "core/frames/frame_tree.hpp"
+#include "core/geodesy/gnss_fix.hpp"
 #include "core/inertial/imu_sample.hpp"
 #include "core/lidar/scan.hpp"
 #include "idl/dds/dds_options.hpp"
@@ -23,6 +24,8 @@ struct ScanPublisherOptions {
   std::string points_topic = "points";
   /// ROS 2 name of the IMU's topic; empty: no samples are published.
   std::string imu_topic{};
+  /// The same of a GNSS receiver's fixes.
+  std::string gnss_topic{};
   /// header.frame_id of the clouds.
   std::string lidar_frame = "lidar";
   /// Published on /tf_static, as a robot does: where the lidar sits.
@@ -36,8 +39,8 @@ struct ScanPublisherOptions {
   int max_scans_in_flight = 4;
 };
 
-/// Publishes scans as sensor_msgs/PointCloud2, as a lidar driver does, and samples of the IMU
-/// beside it as sensor_msgs/Imu. One thread uses it.
+/// Publishes scans as sensor_msgs/PointCloud2, as a lidar driver does, samples of the IMU beside it
+/// as sensor_msgs/Imu, and fixes of a receiver as sensor_msgs/NavSatFix. One thread uses it.
 class ScanPublisher {
  public:
   /// Joins the domain. Throws DdsError when the domain or an interface cannot be used.
@@ -74,6 +77,10 @@ class ScanPublisher {
   /// Writes samples of the IMU; the options must name its topic. Lossless: waits as for a scan, and
   /// returns how many were written before the timeout.
   [[nodiscard]] std::size_t publish(std::span<const ImuSample> samples,
+                                    std::chrono::milliseconds timeout = std::chrono::seconds(10));
+
+  /// The same with fixes of a receiver.
+  [[nodiscard]] std::size_t publish(std::span<const GnssFix> fixes,
                                     std::chrono::milliseconds timeout = std::chrono::seconds(10));
 
   /// True once every subscriber acknowledged every scan written; false after `timeout`.

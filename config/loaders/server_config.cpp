@@ -12,8 +12,8 @@
 #include "config/loaders/sensor_file.hpp"
 #include "config/loaders/yaml_section.hpp"
 #include "core/frames/rigid_motion.hpp"
+#include "core/geodesy/datum.hpp"
 #include "core/lidar/sweep_merger.hpp"
-#include "core/map/datum.hpp"
 #include "core/segmentation/model_description.hpp"
 
 namespace stillmap {
@@ -110,6 +110,18 @@ Eigen::Isometry3d read_extrinsic(YamlSection& section) {
   return from_xyz_rpy(xyz_m, rpy_deg * radians_per_degree);
 }
 
+void read_gnss(YamlSection section, GnssReceiverConfig& gnss) {
+  std::vector<double> antenna_m;
+  section.number_list("antenna_m", antenna_m, {-100, 100});
+  if (antenna_m.size() == 3) {
+    gnss.antenna_base = Eigen::Map<const Eigen::Vector3d>(antenna_m.data());
+  } else if (!antenna_m.empty()) {
+    section.fault("antenna_m", "has " + std::to_string(antenna_m.size()) +
+                                   " numbers; wanted are three, or none");
+  }
+  section.number("max_sigma_m", gnss.max_sigma_m, {0.01, 1000});
+}
+
 void read_mount(YamlSection section, const FramesConfig& frames, MountConfig& mount) {
   using Source = MountConfig::Source;
   section.choice<Source>(
@@ -171,6 +183,7 @@ void read_topics(YamlSection section, TopicsConfig& topics) {
   section.text("namespace", topics.name_space);
   section.text("odometry_prior", topics.odometry_prior);
   section.text("imu", topics.imu);
+  section.text("gnss", topics.gnss);
   section.text("initial_pose", topics.initial_pose);
   if (!is_topic_name(topics.points))
     section.fault("points", "'" + topics.points + "'" + topic_rule);
@@ -182,6 +195,9 @@ void read_topics(YamlSection section, TopicsConfig& topics) {
   }
   if (!topics.imu.empty() && !is_topic_name(topics.imu)) {
     section.fault("imu", "'" + topics.imu + "'" + topic_rule);
+  }
+  if (!topics.gnss.empty() && !is_topic_name(topics.gnss)) {
+    section.fault("gnss", "'" + topics.gnss + "'" + topic_rule);
   }
   if (!topics.initial_pose.empty() && !is_topic_name(topics.initial_pose)) {
     section.fault("initial_pose", "'" + topics.initial_pose + "'" + topic_rule);
@@ -353,6 +369,7 @@ void read_server(YamlSection file, const fs::path& folder, ServerConfig& config)
   read_mount(file.section("mount"), config.frames, config.mount);
   read_dds(file.section("dds"), folder, config.dds);
   read_topics(file.section("topics"), config.topics);
+  read_gnss(file.section("gnss"), config.gnss);
   if (config.frames.odom_source == FramesConfig::OdomSource::prior &&
       config.topics.odometry_prior.empty()) {
     file.fault("frames", "odom_source: prior needs topics.odometry_prior");

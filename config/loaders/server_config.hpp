@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -108,8 +109,19 @@ struct TopicsConfig {
   std::string odometry_prior = "odom_prior";
   /// A sensor_msgs/Imu fixed to the lidar; empty: none.
   std::string imu = "imu/data";
+  /// A sensor_msgs/NavSatFix of a receiver on the robot; empty: none.
+  std::string gnss;
   /// A geometry_msgs/PoseWithCovarianceStamped that says where the robot is; empty: none.
   std::string initial_pose = "initialpose";
+};
+
+/// The receiver of topics.gnss.
+struct GnssReceiverConfig {
+  /// Its antenna in the base frame, or by the lidar without one [m]; nothing: somewhere on the
+  /// robot.
+  std::optional<Eigen::Vector3d> antenna_base;
+  /// Fixes that are said to be worse than this, east and north, are not used [m].
+  double max_sigma_m = 20.0;
 };
 
 /// What the numbers in a cloud's label field are.
@@ -217,6 +229,7 @@ struct ServerConfig {
   std::vector<LidarConfig> lidars;
   DdsConfig dds;
   TopicsConfig topics;
+  GnssReceiverConfig gnss;
   InputConfig input;
   PublishConfig publish;
   MapFileConfig map;

@@ -91,6 +91,8 @@ def as_ros(structures: list[Structure]) -> list[Structure]:
             field.type = field.type.replace("rmw_dds_common_iron/", "rmw_dds_common/")
             if structure.full_name in SIGNED_DATA and field.name == "data":
                 field.type = "int8[]"
+            if structure.full_name == "sensor_msgs/msg/NavSatStatus" and field.name == "status":
+                field.type = "int8"
         package = structure.package.removesuffix("_iron")
         made.append(replace(structure, package=package, fields=fields))
     return made

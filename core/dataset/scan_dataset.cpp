@@ -11,6 +11,7 @@
 
 #include "core/dataset/binary_file.hpp"
 #include "core/dataset/file_stamp.hpp"
+#include "core/dataset/gnss_file.hpp"
 #include "core/dataset/imu_file.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/point_cloud_files.hpp"
@@ -277,6 +278,12 @@ std::vector<ImuSample> ScanDataset::imu() const {
   if (source_) return source_->imu();
   const fs::path file = imu_file_in(sequence_.empty() ? files_.front().parent_path() : sequence_);
   return file.empty() ? std::vector<ImuSample>{} : read_imu_file(file);
+}
+
+std::vector<GnssFix> ScanDataset::gnss() const {
+  if (source_) return source_->gnss();
+  const fs::path file = (sequence_.empty() ? files_.front().parent_path() : sequence_) / "gnss.csv";
+  return fs::exists(file) ? read_gnss_csv(file) : std::vector<GnssFix>{};
 }
 
 std::optional<Trajectory> ScanDataset::truth() const {

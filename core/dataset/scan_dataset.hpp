@@ -54,6 +54,11 @@ class ScanDataset {
   /// file is damaged.
   [[nodiscard]] std::vector<ImuSample> imu() const;
 
+  /// Fixes of a GNSS receiver by the scans' clock: gnss.csv beside velodyne/ or the scans' files
+  /// (see read_gnss_csv), or those of the source; empty without any. Throws DatasetError when the
+  /// file is damaged.
+  [[nodiscard]] std::vector<GnssFix> gnss() const;
+
   /// A guess from the kind of file and the rings or elevations of a scan of usual size.
   [[nodiscard]] SensorModel suggested_sensor() const { return suggested_sensor_; }
 

@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/geodesy/gnss_fix.hpp"
 #include "core/inertial/imu_sample.hpp"
 #include "core/lidar/scan.hpp"
 #include "core/lidar/sensor_model.hpp"
@@ -42,6 +43,8 @@ class ScanSource {
   /// Samples of the IMU that was recorded beside the scans, in the order of the recording; empty
   /// without one.
   [[nodiscard]] virtual std::vector<ImuSample> imu() const { return {}; }
+  /// The same of a GNSS receiver.
+  [[nodiscard]] virtual std::vector<GnssFix> gnss() const { return {}; }
 };
 
 }  // namespace stillmap

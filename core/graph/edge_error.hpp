@@ -100,4 +100,54 @@ class ChordalError {
   double root_tau_ = 0.0;
 };
 
+/// Error of the place that a node gives to its point, times the square root of the information.
+class PositionError {
+ public:
+  static constexpr int size = 3;
+
+  explicit PositionError(const PositionMeasurement& position)
+      : point_node_(position.point_node),
+        position_enu_(position.position_enu),
+        root_information_(position.information.llt().matrixU()) {}
+
+  template <typename T>
+  bool operator()(const T* q_node, const T* t_node, const T* q_map, const T* t_map,
+                  T* residuals) const {
+    const Eigen::Map<const Eigen::Quaternion<T>> q_map_node(q_node), q_enu_map(q_map);
+    const Eigen::Map<const Eigen::Matrix<T, 3, 1>> t_map_node(t_node), t_enu_map(t_map);
+    const Eigen::Matrix<T, 3, 1> point_map =
+        q_map_node * point_node_.template cast<T>() + t_map_node;
+    const Eigen::Matrix<T, 3, 1> error =
+        q_enu_map * point_map + t_enu_map - position_enu_.template cast<T>();
+    Eigen::Map<Eigen::Matrix<T, 3, 1>> out(residuals);
+    out = root_information_.template cast<T>() * error;
+    return true;
+  }
+
+ private:
+  Eigen::Vector3d point_node_;
+  Eigen::Vector3d position_enu_;
+  Eigen::Matrix3d root_information_;
+};
+
+/// What a rotation tilts the vertical by, east and north, in standard deviations.
+class TiltError {
+ public:
+  static constexpr int size = 2;
+
+  explicit TiltError(double sigma_rad) : sigma_rad_(sigma_rad) {}
+
+  template <typename T>
+  bool operator()(const T* q_map, T* residuals) const {
+    const Eigen::Map<const Eigen::Quaternion<T>> q_enu_map(q_map);
+    const Eigen::Matrix<T, 3, 1> up = q_enu_map * Eigen::Matrix<T, 3, 1>(T(0.0), T(0.0), T(1.0));
+    residuals[0] = up.x() / T(sigma_rad_);
+    residuals[1] = up.y() / T(sigma_rad_);
+    return true;
+  }
+
+ private:
+  double sigma_rad_;
+};
+
 }  // namespace stillmap

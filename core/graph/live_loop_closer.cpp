@@ -7,7 +7,8 @@ namespace stillmap {
 
 std::optional<MapCorrection> LiveLoopCloser::add(const LabelledScan& scan,
                                                  const Eigen::Isometry3d& T_odom_lidar,
-                                                 bool is_confirmed) {
+                                                 bool is_confirmed,
+                                                 const Eigen::Vector3d& antenna_lidar) {
   if (!end_reason_.empty()) return std::nullopt;
   const std::int64_t stamp_ns = scan.scan.stamp_ns;
   if (stamp_ns <= std::exchange(last_stamp_ns_, stamp_ns)) {
@@ -19,13 +20,23 @@ std::optional<MapCorrection> LiveLoopCloser::add(const LabelledScan& scan,
   stamps_ns_.push_back(stamp_ns);
   T_odom_lidar_last_ = T_odom_lidar;
   T_map_lidar_.push_back(T_map_odom_ * T_odom_lidar);
+  if (is_confirmed) {
+    gnss_.add_scan(stamps_ns_.size() - 1, stamp_ns, T_odom_lidar, antenna_lidar);
+  }
   closer_.add(scan, T_odom_lidar, is_confirmed);
+  for (const PositionAtScan& position : gnss_.take()) closer_.add(position);
   if (closer_.submaps().size() == known_submaps_) return std::nullopt;
   known_submaps_ = closer_.submaps().size();
   auto found = correction();
   if (closer_.submap_bytes() > config_.max_submap_bytes)
     end("what is kept of the drive to find loops by has reached its limit");
   return found;
+}
+
+std::optional<MapOnEarth> LiveLoopCloser::on_earth() const {
+  const auto& T_enu_map = closer_.T_enu_map();
+  if (!T_enu_map) return std::nullopt;
+  return MapOnEarth{gnss_.enu()->datum_of(*T_enu_map), gnss_.enu()->T_earth(*T_enu_map)};
 }
 
 bool LiveLoopCloser::has_moved(const Eigen::Isometry3d& T_odom_lidar) const {
@@ -44,7 +55,7 @@ void LiveLoopCloser::end(const char* reason) {
 
 std::optional<MapCorrection> LiveLoopCloser::correction() {
   // Without any, also where the last one was denied, poses are the odometry's.
-  if (closer_.closures().empty() && known_closures_ == 0) return std::nullopt;
+  if (!closer_.is_corrected() && known_closures_ == 0) return std::nullopt;
   const std::vector<Eigen::Isometry3d> corrected = closer_.corrected_poses();
   std::vector<MapCorrection::Pose> poses(corrected.size());
   double max_shift_m = 0.0;

@@ -15,6 +15,7 @@ namespace stillmap {
 
 struct LiveLoopConfig {
   LoopClosingConfig closing;
+  GnssConfig gnss;
   /// A correction that moves nothing by this much waits for the next one: half a voxel [m].
   double min_shift_m = 0.1;
   /// How far from the lidar things are that a turn is to move by that [m].
@@ -27,20 +28,35 @@ struct LiveLoopConfig {
   std::size_t max_submap_bytes = std::size_t{1} << 30;
 };
 
-/// Closes the loops of a map that grows meanwhile: says what of it must be moved. NOT thread safe.
+/// Where a map lies on the earth.
+struct MapOnEarth {
+  Datum datum;
+  /// The map in `earth` of REP 105 (ECEF).
+  Eigen::Isometry3d T_earth_map = Eigen::Isometry3d::Identity();
+};
+
+/// Closes the loops of a map that grows meanwhile, and uses the fixes of a receiver: says what of
+/// the map must be moved. NOT thread safe.
 class LiveLoopCloser {
  public:
   explicit LiveLoopCloser(const LiveLoopConfig& config)
-      : config_(config), closer_(config.closing) {}
+      : config_(config), closer_(config.closing), gnss_(config.gnss) {}
 
-  /// The next scan of the map, by a pose that no correction moved. A correction is of the map as
+  /// A fix, before or after the scans around it. Returns why it is not used; empty where it is.
+  [[nodiscard]] std::string add(const GnssFix& fix) { return gnss_.add(fix); }
+
+  /// The next scan of the map, by a pose that no correction moved, with the place of the receiver's
+  /// antenna on its lidar. A correction is of the map as
   /// the corrections before have left it, and is taken to be carried out.
   [[nodiscard]] std::optional<MapCorrection> add(const LabelledScan& scan,
                                                  const Eigen::Isometry3d& T_odom_lidar,
-                                                 bool is_confirmed);
+                                                 bool is_confirmed,
+                                                 const Eigen::Vector3d& antenna_lidar = {0, 0, 0});
 
   /// Believed so far.
   [[nodiscard]] const std::vector<LoopClosure>& closures() const { return closer_.closures(); }
+  /// By the corrections until now; nothing while it is not known.
+  [[nodiscard]] std::optional<MapOnEarth> on_earth() const;
   [[nodiscard]] std::size_t submap_bytes() const { return closer_.submap_bytes(); }
   [[nodiscard]] std::size_t scans_looked_at() const { return stamps_ns_.size(); }
   /// Why no more loops are closed; empty while they are.
@@ -55,6 +71,7 @@ class LiveLoopCloser {
 
   LiveLoopConfig config_;
   LoopCloser closer_;
+  GnssTrack gnss_;
   std::int64_t last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
   /// Of the scans that were looked at.
   std::vector<std::int64_t> stamps_ns_;

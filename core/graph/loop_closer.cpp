@@ -27,6 +27,10 @@ PoseEdge odometry_edge(std::size_t from, const Eigen::Isometry3d& T_from_to, dou
           .is_loop = false};
 }
 
+double horizontal_sigma_m(const Eigen::Matrix3d& covariance_enu) {
+  return std::sqrt(0.5 * covariance_enu.topLeftCorner<2, 2>().trace());
+}
+
 double angle_of(const Eigen::Isometry3d& T) { return so3_log(T.linear()).norm(); }
 
 }  // namespace
@@ -59,6 +63,57 @@ void LoopCloser::add_node(std::size_t scan, const Eigen::Isometry3d& T_odom_lida
   nodes_.push_back({scan, last.way_m + way_m});
 }
 
+void LoopCloser::add(const PositionAtScan& position) {
+  if (nodes_.empty() || position.scan < nodes_.front().scan) return;
+  const auto after = std::ranges::upper_bound(nodes_, position.scan, {}, &Node::scan);
+  const auto node = static_cast<std::size_t>(after - nodes_.begin()) - 1;
+  const Eigen::Isometry3d T_node_scan =
+      T_odom_lidar_[nodes_[node].scan].inverse() * T_odom_lidar_[position.scan];
+  const PositionMeasurement measured{.node = node,
+                                     .point_node = T_node_scan * position.antenna_lidar,
+                                     .position_enu = position.position_enu,
+                                     .information = position.covariance_enu.inverse()};
+  const double sigma_m = horizontal_sigma_m(position.covariance_enu);
+  const double spacing_m =
+      std::max(config_.position_spacing_m, config_.position_spacing_sigmas * sigma_m);
+  if (positions_.empty() ||
+      nodes_[node].way_m - nodes_[positions_.back().node].way_m >= spacing_m) {
+    positions_.push_back(measured);
+    return;
+  }
+  // A receiver that has just got better is not bound by what it said before.
+  constexpr double clearly_better = 0.5;
+  const double last_sigma_m = horizontal_sigma_m(positions_.back().information.inverse());
+  if (positions_.size() > known_positions_ && sigma_m < clearly_better * last_sigma_m)
+    positions_.back() = measured;
+}
+
+LoopCloser::PositionCounts LoopCloser::position_counts() const {
+  if (!T_enu_map_) return {};
+  PositionCounts counts{.used = graph_.positions.size(), .in_doubt = 0};
+  for (const PositionMeasurement& position : graph_.positions) {
+    const double squared = squared_error(position, graph_.T_map_node[position.node], *T_enu_map_);
+    if (squared > config_.max_squared_position_error) ++counts.in_doubt;
+  }
+  return counts;
+}
+
+void LoopCloser::use_positions() {
+  if (positions_.size() == known_positions_) return;
+  known_positions_ = positions_.size();
+  std::vector<PointOnEarth> points;
+  for (const PositionMeasurement& position : positions_) {
+    points.push_back({graph_.T_map_node[position.node] * position.point_node, position.position_enu,
+                      horizontal_sigma_m(position.information.inverse())});
+  }
+  // Of the whole way each time: within their slack positions do not turn the map.
+  if (const auto T_enu_map = align_to_earth(points, config_.earth)) T_enu_map_ = T_enu_map;
+  if (!T_enu_map_) return;
+  graph_.positions = positions_;
+  graph_.T_enu_map = *T_enu_map_;
+  solve();
+}
+
 void LoopCloser::finish() {
   if (!builder_.empty()) close_submap();
   for (Candidate& candidate : pending_) {
@@ -76,6 +131,7 @@ void LoopCloser::close_submap() {
   submaps_.emplace_back(std::move(submap));
   first_node_of_submap_ = nodes_.size() - 1;
   find_loops(submaps_.size() - 1);
+  use_positions();
 }
 
 void LoopCloser::find_loops(std::size_t to) {
@@ -216,8 +272,19 @@ void LoopCloser::accept(Candidate candidate) {
 }
 
 void LoopCloser::solve() {
-  const PoseGraphConfig solver{.loop_scale = config_.loop_scale};
-  graph_.T_map_node = optimize(graph_, solver).T_map_node;
+  // Where odometry has drifted far from the positions, all of them are far off, and the kernel
+  // would take them for reflections: it is narrowed step by step (A. Blake and A. Zisserman,
+  // "Visual reconstruction", 1987: graduated non-convexity).
+  const auto widths = graph_.positions.empty() ? std::vector<double>{1.0}
+                                               : std::vector<double>{1000.0, 30.0, 5.0, 1.0};
+  for (const double width : widths) {
+    const PoseGraphConfig solver{.loop_scale = config_.loop_scale,
+                                 .position_scale = width * config_.position_scale,
+                                 .position_slack = config_.position_slack};
+    PoseGraphSolution solution = optimize(graph_, solver);
+    graph_.T_map_node = std::move(solution.T_map_node);
+    if (T_enu_map_) T_enu_map_ = graph_.T_enu_map = solution.T_enu_map;
+  }
   for (std::size_t k = 0; k < joints_.size(); ++k) {
     const PoseEdge& edge = graph_.edges[joints_[k].edge];
     const double squared = squared_error(edge, graph_.T_map_node[edge.from],
@@ -236,7 +303,7 @@ void LoopCloser::solve() {
 }
 
 std::vector<Eigen::Isometry3d> LoopCloser::corrected_poses() const {
-  return closures_.empty() ? T_odom_lidar_ : poses_by(graph_.T_map_node);
+  return is_corrected() ? poses_by(graph_.T_map_node) : T_odom_lidar_;
 }
 
 std::vector<Eigen::Isometry3d> LoopCloser::poses_by(

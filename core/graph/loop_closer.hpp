@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "core/geodesy/earth_alignment.hpp"
+#include "core/geodesy/gnss_track.hpp"
 #include "core/graph/pose_graph.hpp"
 #include "core/graph/submap.hpp"
 #include "core/graph/submap_match.hpp"
@@ -43,6 +45,15 @@ struct LoopClosingConfig {
   /// a closure.
   double loop_scale = 2.5;
   double max_squared_error = 60.0;
+  /// Positions count once on so much way, and once on so many of their standard deviations: errors
+  /// of a satellite receiver stay the same for a minute [m].
+  double position_spacing_m = 5.0;
+  double position_spacing_sigmas = 10.0;
+  /// See PoseGraphConfig; and the squared error (of three) above which one is in doubt.
+  double position_scale = 1.5;
+  double position_slack = 1.0;
+  double max_squared_position_error = 25.0;
+  EarthAlignmentConfig earth;
 };
 
 /// A revisited place.
@@ -70,8 +81,9 @@ struct DeniedLoop {
 };
 
 /// Cuts a drive into submaps, finds places that it comes back to, and corrects its poses by a pose
-/// graph. Poses go in as odometry has them, in order; odometry never hears of the correction. The
-/// same scans give the same result. NOT thread safe.
+/// graph, in which measured positions take part, too, once it is known where the map lies. Poses go
+/// in as odometry has them, in order; odometry never hears of the correction. The same scans give
+/// the same result. NOT thread safe.
 class LoopCloser {
  public:
   explicit LoopCloser(const LoopClosingConfig& config) : config_(config), builder_(config.submap) {}
@@ -82,13 +94,25 @@ class LoopCloser {
 
   /// The next scan of the drive. One that is not confirmed has a pose, but no part in submaps.
   void add(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar, bool is_confirmed);
+  /// A position of one of the scans added so far. Those of scans before the first node say nothing.
+  void add(const PositionAtScan& position);
   /// The drive ended: its last stretch becomes a submap, too.
   void finish();
 
   /// Those that are believed.
   [[nodiscard]] const std::vector<LoopClosure>& closures() const { return closures_; }
   [[nodiscard]] const std::vector<LoopClosure>& refused() const { return refused_; }
-  /// Poses of all scans added so far, corrected. Without closures: as they were.
+  /// Whether closures or positions correct the poses.
+  [[nodiscard]] bool is_corrected() const { return !closures_.empty() || T_enu_map_.has_value(); }
+  /// Where the map lies in the frame of the positions; nothing while that is not known.
+  [[nodiscard]] const std::optional<Eigen::Isometry3d>& T_enu_map() const { return T_enu_map_; }
+  /// Positions that take part, and how many of them the rest of the graph puts elsewhere.
+  struct PositionCounts {
+    std::size_t used = 0;
+    std::size_t in_doubt = 0;
+  };
+  [[nodiscard]] PositionCounts position_counts() const;
+  /// Poses of all scans added so far, corrected. Without closures and positions: as they were.
   [[nodiscard]] std::vector<Eigen::Isometry3d> corrected_poses() const;
   /// The same with these poses of the graph's nodes, in whatever frame they are.
   [[nodiscard]] std::vector<Eigen::Isometry3d> poses_by(
@@ -129,6 +153,8 @@ class LoopCloser {
   [[nodiscard]] bool is_about(std::size_t scan, std::size_t submap) const;
   void judge(Candidate candidate);
   void accept(Candidate candidate);
+  /// Has the new positions take part, once it is known where the map lies.
+  void use_positions();
   /// Solves, and takes out what the graph denies.
   void solve();
   [[nodiscard]] Eigen::Isometry3d T_map_submap(const PlacedSubmap& placed) const {
@@ -152,6 +178,10 @@ class LoopCloser {
   std::vector<Joint> joints_;
   std::vector<LoopClosure> refused_;
   std::vector<DeniedLoop> denied_;
+  /// Those of the newest node may still be replaced by better ones.
+  std::vector<PositionMeasurement> positions_;
+  std::size_t known_positions_ = 0;
+  std::optional<Eigen::Isometry3d> T_enu_map_;
 };
 
 }  // namespace stillmap

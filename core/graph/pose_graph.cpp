@@ -3,6 +3,7 @@
 #include <ceres/ceres.h>
 
 #include <Eigen/Cholesky>
+#include <cmath>
 #include <memory>
 #include <stdexcept>
 #include <string>
@@ -50,6 +51,50 @@ void add_edges(const PoseGraph& graph, const PoseGraphConfig& config, std::vecto
   }
 }
 
+/// Cauchy's kernel of what a residual's norm is above a slack; without a scale its square.
+class SlackLoss : public ceres::LossFunction {
+ public:
+  SlackLoss(double slack, double scale) : slack_(slack), scale_(scale) {}
+
+  /// rho, rho' and rho'' at s, the squared norm.
+  void Evaluate(double s, double rho[3]) const override {
+    const double norm = std::sqrt(s);
+    if (norm <= slack_) {
+      rho[0] = rho[1] = rho[2] = 0.0;
+      return;
+    }
+    const double beyond = (norm - slack_) * (norm - slack_);
+    const double slope = norm > 0.0 ? 1.0 - slack_ / norm : 1.0;
+    const double curvature = norm > 0.0 ? 0.5 * slack_ / (norm * s) : 0.0;
+    const double b = scale_ > 0.0 ? 1.0 / (scale_ * scale_) : 0.0;
+    const double weight = 1.0 / (1.0 + b * beyond);
+    rho[0] = b > 0.0 ? std::log1p(b * beyond) / b : beyond;
+    rho[1] = weight * slope;
+    rho[2] = weight * curvature - b * weight * weight * slope * slope;
+  }
+
+ private:
+  double slack_;
+  double scale_;
+};
+
+void add_positions(const PoseGraph& graph, const PoseGraphConfig& config,
+                   std::vector<NodeState>& nodes, NodeState& map, ceres::Problem& problem) {
+  double* const q_map = map.q_map_node.coeffs().data();
+  for (const PositionMeasurement& position : graph.positions) {
+    NodeState& node = nodes[position.node];
+    using Cost = ceres::AutoDiffCostFunction<PositionError, PositionError::size, 4, 3, 4, 3>;
+    problem.AddResidualBlock(new Cost(new PositionError(position)),
+                             new SlackLoss(config.position_slack, config.position_scale),
+                             node.q_map_node.coeffs().data(), node.t_map_node.data(), q_map,
+                             map.t_map_node.data());
+  }
+  if (graph.positions.empty()) return;
+  using Cost = ceres::AutoDiffCostFunction<TiltError, TiltError::size, 4>;
+  problem.AddResidualBlock(new Cost(new TiltError(config.map_tilt_sigma_rad)), nullptr, q_map);
+  problem.SetManifold(q_map, new ceres::EigenQuaternionManifold);
+}
+
 void hold_to_manifold(std::vector<NodeState>& nodes, ceres::Problem& problem) {
   for (NodeState& node : nodes) {
     double* const q = node.q_map_node.coeffs().data();
@@ -91,6 +136,15 @@ std::string faults_of(const PoseEdge& edge, std::size_t nodes, EdgeError error) 
   return "";
 }
 
+std::string faults_of(const PositionMeasurement& position, std::size_t nodes) {
+  if (position.node >= nodes) return "is of none of the " + std::to_string(nodes) + " nodes";
+  if (!position.point_node.allFinite() || !position.position_enu.allFinite())
+    return "is not finite";
+  if (!position.information.allFinite() || position.information.llt().info() != Eigen::Success)
+    return "has an information matrix that is not positive definite";
+  return "";
+}
+
 }  // namespace
 
 std::string PoseGraph::faults(EdgeError error) const {
@@ -108,6 +162,13 @@ std::string PoseGraph::faults(EdgeError error) const {
     out += "the edge from node " + std::to_string(edge.from) + " to " + std::to_string(edge.to) +
            " " + fault + "\n";
   }
+  for (const PositionMeasurement& position : positions) {
+    const std::string fault = faults_of(position, T_map_node.size());
+    if (fault.empty()) continue;
+    if (out.size() > max_characters) return out + "and so on\n";
+    out += "a position of node " + std::to_string(position.node) + " " + fault + "\n";
+  }
+  if (!T_enu_map.matrix().allFinite()) out += "the map's place is not finite\n";
   if (!out.empty()) return out;
   if (const std::size_t count = connected_nodes(*this); count < T_map_node.size()) {
     out = "only " + std::to_string(count) + " of " + std::to_string(T_map_node.size()) +
@@ -129,6 +190,16 @@ double squared_error(const PoseEdge& edge, const Eigen::Isometry3d& T_map_from,
   return residuals.squaredNorm();
 }
 
+double squared_error(const PositionMeasurement& position, const Eigen::Isometry3d& T_map_node,
+                     const Eigen::Isometry3d& T_enu_map) {
+  const NodeState node(T_map_node), map(T_enu_map);
+  Eigen::Vector3d residuals;
+  PositionError error(position);
+  error(node.q_map_node.coeffs().data(), node.t_map_node.data(), map.q_map_node.coeffs().data(),
+        map.t_map_node.data(), residuals.data());
+  return residuals.squaredNorm();
+}
+
 double cost_of(const PoseGraph& graph, EdgeError error) {
   double cost = 0.0;
   for (const PoseEdge& edge : graph.edges)
@@ -139,10 +210,13 @@ double cost_of(const PoseGraph& graph, EdgeError error) {
 PoseGraphSolution optimize(const PoseGraph& graph, const PoseGraphConfig& config) {
   if (const std::string faults = graph.faults(config.error); !faults.empty())
     throw std::invalid_argument(faults);
-  if (graph.edges.empty()) return {.T_map_node = graph.T_map_node, .converged = true};
+  if (graph.edges.empty())
+    return {.T_map_node = graph.T_map_node, .T_enu_map = graph.T_enu_map, .converged = true};
   std::vector<NodeState> nodes(graph.T_map_node.begin(), graph.T_map_node.end());
+  NodeState map(graph.T_enu_map);
   ceres::Problem problem;
   add_edges(graph, config, nodes, problem);
+  add_positions(graph, config, nodes, map, problem);
   hold_to_manifold(nodes, problem);
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
@@ -156,6 +230,7 @@ PoseGraphSolution optimize(const PoseGraph& graph, const PoseGraphConfig& config
   ceres::Solver::Summary summary;
   ceres::Solve(options, &problem, &summary);
   PoseGraphSolution solution{.T_map_node = {},
+                             .T_enu_map = graph.positions.empty() ? graph.T_enu_map : map.pose(),
                              .initial_cost = 2.0 * summary.initial_cost,
                              .cost = 2.0 * summary.final_cost,
                              .iterations = static_cast<int>(summary.iterations.size()),

@@ -123,15 +123,18 @@ DatasetFrame BagScanSource::read(std::size_t i) const {
   return frame;
 }
 
-std::vector<ImuSample> BagScanSource::imu() const {
-  const auto is_imu = [](const BagTopic& topic) {
-    return topic.messages > 0 && topic.type == imu_message_type &&
-           topic.serialization_format == "cdr";
+std::vector<BagMessage> BagScanSource::only_messages_of(std::string_view type) const {
+  const auto is_such = [type](const BagTopic& topic) {
+    return topic.messages > 0 && topic.type == type && topic.serialization_format == "cdr";
   };
   const std::vector<BagTopic>& topics = bag_.topics();
-  if (std::ranges::count_if(topics, is_imu) != 1) return {};
+  if (std::ranges::count_if(topics, is_such) != 1) return {};
+  return bag_.messages(std::ranges::find_if(topics, is_such)->name);
+}
+
+std::vector<ImuSample> BagScanSource::imu() const {
   std::vector<ImuSample> samples;
-  for (const BagMessage& message : bag_.messages(std::ranges::find_if(topics, is_imu)->name)) {
+  for (const BagMessage& message : only_messages_of(imu_message_type)) {
     try {
       samples.push_back(decode_imu(bag_.bytes(message)));
     } catch (const CdrError&) {
@@ -139,6 +142,18 @@ std::vector<ImuSample> BagScanSource::imu() const {
     }
   }
   return samples;
+}
+
+std::vector<GnssFix> BagScanSource::gnss() const {
+  std::vector<GnssFix> fixes;
+  for (const BagMessage& message : only_messages_of(gnss_message_type)) {
+    try {
+      if (const auto fix = decode_gnss(bag_.bytes(message))) fixes.push_back(*fix);
+    } catch (const CdrError&) {
+      // Others say where the robot was.
+    }
+  }
+  return fixes;
 }
 
 Recording open_recording(const fs::path& path, const std::string& topic) {

@@ -28,6 +28,8 @@ class BagScanSource final : public ScanSource {
   /// Of the bag's only topic of sensor_msgs/msg/Imu; nothing where there are several. Messages that
   /// are damaged are left out.
   [[nodiscard]] std::vector<ImuSample> imu() const override;
+  /// Likewise of sensor_msgs/msg/NavSatFix.
+  [[nodiscard]] std::vector<GnssFix> gnss() const override;
   /// What of the bag's files cannot be read at all, in words; empty for a sound bag.
   [[nodiscard]] std::vector<std::string> faults() const { return bag_.faults(); }
 
@@ -35,6 +37,8 @@ class BagScanSource final : public ScanSource {
   /// A damaged message says nothing.
   [[nodiscard]] std::optional<SensorModel> sensor_of_first_readable() const;
   [[nodiscard]] DecodedScan read_message(std::size_t i) const;
+  /// Of the only topic of this type; none where there are several.
+  [[nodiscard]] std::vector<BagMessage> only_messages_of(std::string_view type) const;
 
   Bag bag_;
   BagTopic topic_;

@@ -7,6 +7,7 @@
 #include "core/dataset/velodyne_packets.hpp"
 #include "idl/bag/cdr_reader.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
+#include "idl/conversions/gnss.hpp"
 #include "sensor_msgs.h"
 
 namespace stillmap::dds {
@@ -161,6 +162,20 @@ ImuSample decode_imu(std::span<const std::uint8_t> message) {
   sample.acceleration_imu = vector();
   skip(covariance);
   return sample;
+}
+
+std::optional<GnssFix> decode_gnss(std::span<const std::uint8_t> message) {
+  CdrReader cdr(message);
+  sensor_msgs::msg::NavSatFix fix;
+  read_header(cdr, fix.header());
+  fix.status().status(cdr.value<std::uint8_t>());
+  fix.status().service(cdr.value<std::uint16_t>());
+  fix.latitude(cdr.value<double>());
+  fix.longitude(cdr.value<double>());
+  fix.altitude(cdr.value<double>());
+  for (double& value : fix.position_covariance()) value = cdr.value<double>();
+  fix.position_covariance_type(cdr.value<std::uint8_t>());
+  return wire::from_nav_sat_fix(fix).fix;
 }
 
 std::optional<std::int64_t> header_stamp_ns(std::span<const std::uint8_t> message) {

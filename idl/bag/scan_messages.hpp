@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "core/dataset/scan_source.hpp"
+#include "core/geodesy/gnss_fix.hpp"
 #include "core/inertial/imu_sample.hpp"
 #include "core/lidar/sensor_model.hpp"
 
@@ -39,6 +40,12 @@ inline constexpr std::string_view imu_message_type = "sensor_msgs/msg/Imu";
 
 /// Reads a serialized sensor_msgs/msg/Imu. Throws CdrError for bytes that are none.
 [[nodiscard]] ImuSample decode_imu(std::span<const std::uint8_t> message);
+
+inline constexpr std::string_view gnss_message_type = "sensor_msgs/msg/NavSatFix";
+
+/// Reads a serialized sensor_msgs/msg/NavSatFix; nothing where the receiver had no fix, or none
+/// that can be used. Throws CdrError for bytes that are none.
+[[nodiscard]] std::optional<GnssFix> decode_gnss(std::span<const std::uint8_t> message);
 
 /// The stamp of a message that begins with a std_msgs/Header; 12 bytes are enough. Nothing when
 /// there is none.

@@ -23,6 +23,7 @@ Names inputs(const TopicNames& names) {
   Names topics{"rt/" + names.points};
   if (!names.odometry_prior.empty()) topics.push_back("rt/" + names.odometry_prior);
   if (!names.imu.empty()) topics.push_back("rt/" + names.imu);
+  if (!names.gnss.empty()) topics.push_back("rt/" + names.gnss);
   return topics;
 }
 

@@ -34,6 +34,7 @@ struct TopicNames {
   std::string odometry_prior = "odom_prior";
   /// Empty: none.
   std::string imu = "imu/data";
+  std::string gnss = "fix";
   /// Empty: none.
   std::string initial_pose = "initialpose";
   std::string name_space = "stillmap";

@@ -74,4 +74,13 @@ TopicSpec<sensor_msgs::msg::Imu> imu_topic(const std::string& ros_name, Delivery
           .reader = {.accept_best_effort = !every, .depth = depth, .keep_all = every}};
 }
 
+TopicSpec<sensor_msgs::msg::NavSatFix> gnss_topic(const std::string& ros_name,
+                                                  DeliveryMode delivery) {
+  const bool every = delivery == DeliveryMode::every;
+  constexpr int depth = 50;
+  return {.dds_name = "rt/" + ros_name,
+          .writer = {.depth = depth, .keep_all = every},
+          .reader = {.accept_best_effort = !every, .depth = depth, .keep_all = every}};
+}
+
 }  // namespace stillmap::dds

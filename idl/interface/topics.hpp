@@ -76,4 +76,8 @@ void for_each_topic(const Topics& topics, Visit&& visit) {
 [[nodiscard]] TopicSpec<sensor_msgs::msg::Imu> imu_topic(const std::string& ros_name,
                                                          DeliveryMode delivery);
 
+/// Fixes of a GNSS receiver (sensor_msgs/NavSatFix), likewise.
+[[nodiscard]] TopicSpec<sensor_msgs::msg::NavSatFix> gnss_topic(const std::string& ros_name,
+                                                                DeliveryMode delivery);
+
 }  // namespace stillmap::dds

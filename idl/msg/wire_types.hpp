@@ -4,6 +4,7 @@
 
 namespace sensor_msgs::msg {
 class Imu;
+class NavSatFix;
 class PointCloud2;
 }  // namespace sensor_msgs::msg
 namespace std_msgs::msg {

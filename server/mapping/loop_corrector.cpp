@@ -14,13 +14,17 @@ namespace {
 
 /// A search takes a second or two, in which a lidar sends so many scans.
 constexpr std::size_t max_waiting_scans = 20;
+/// A minute at 10 Hz.
+constexpr std::size_t max_waiting_fixes = 600;
 
 }  // namespace
 
-LoopCorrector::LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Statistics& statistics)
+LoopCorrector::LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Statistics& statistics,
+                             const Eigen::Vector3d& antenna_base)
     : config_(config),
       is_lossless_(is_lossless),
       statistics_(statistics),
+      antenna_base_(antenna_base),
       scans_(max_waiting_scans) {
   worker_.emplace(
       scans_, [this](const ScanOfMap& scan) { look_at(scan); }, WorkerOptions{.on_start = [] {
@@ -32,12 +36,22 @@ void LoopCorrector::begin_map(bool is_new) {
   map_ = is_new ? ++maps_ : 0;
   const std::scoped_lock lock(mutex_);
   found_.reset();
+  place_.reset();
+}
+
+void LoopCorrector::add(const GnssFix& fix) {
+  const std::scoped_lock lock(mutex_);
+  // Nobody looks at scans: the robot stands, or loops stay open.
+  if (fixes_.size() >= max_waiting_fixes) fixes_.erase(fixes_.begin());
+  fixes_.push_back(fix);
 }
 
 void LoopCorrector::add(std::shared_ptr<const LabelledScan> labelled,
-                        const Eigen::Isometry3d& T_odom_lidar, bool is_confirmed) {
+                        const Eigen::Isometry3d& T_odom_lidar,
+                        const Eigen::Isometry3d& T_base_lidar, bool is_confirmed) {
   if (map_ == 0) return;
-  ScanOfMap scan{map_, std::move(labelled), T_odom_lidar, is_confirmed};
+  ScanOfMap scan{map_, std::move(labelled), T_odom_lidar, T_base_lidar.inverse() * antenna_base_,
+                 is_confirmed};
   if (is_lossless_) {
     // The worker outlives mapping: there is nothing to stop for.
     static_cast<void>(scans_.push_blocking(std::move(scan), {}));
@@ -52,6 +66,13 @@ std::optional<MapCorrection> LoopCorrector::take() {
   auto found = std::exchange(found_, std::nullopt);
   if (!found || found->map != map_) return std::nullopt;
   return std::move(found->correction);
+}
+
+std::optional<MapOnEarth> LoopCorrector::take_place() {
+  const std::scoped_lock lock(mutex_);
+  const auto place = std::exchange(place_, std::nullopt);
+  if (!place || place->map != map_) return std::nullopt;
+  return place->place;
 }
 
 void LoopCorrector::report(const MapCorrection& correction, const CorrectedMap& corrected,
@@ -71,10 +92,37 @@ void LoopCorrector::look_at(const ScanOfMap& scan) {
   }
   const auto began = std::chrono::steady_clock::now();
   const bool had_ended = !closer_->end_reason().empty();
-  auto correction = closer_->add(*scan.labelled, scan.T_odom_lidar, scan.is_confirmed);
+  hand_on_fixes();
+  auto correction =
+      closer_->add(*scan.labelled, scan.T_odom_lidar, scan.is_confirmed, scan.antenna_lidar);
   statistics_.add_latency("loops", milliseconds(std::chrono::steady_clock::now() - began));
   if (!had_ended && !closer_->end_reason().empty())
     spdlog::warn("loops stay open from here on: {}", closer_->end_reason());
+  report_closures();
+  const std::scoped_lock lock(mutex_);
+  if (const auto place = closer_->on_earth()) place_ = Place{scan.map, *place};
+  if (!correction) return;
+  // Of two that were not taken yet the second is of the map after the first.
+  if (found_ && found_->map == scan.map)
+    found_->correction = combined(found_->correction, *correction);
+  else
+    found_ = Found{scan.map, *std::move(correction)};
+}
+
+void LoopCorrector::hand_on_fixes() {
+  std::vector<GnssFix> fixes;
+  {
+    const std::scoped_lock lock(mutex_);
+    fixes.swap(fixes_);
+  }
+  for (const GnssFix& fix : fixes) {
+    const std::string refusal = closer_->add(fix);
+    statistics_.count(refusal.empty() ? "gnss_fixes" : "gnss_fixes_refused");
+    if (!refusal.empty()) throttled_log_.warn("gnss", "a GNSS fix is not used: " + refusal);
+  }
+}
+
+void LoopCorrector::report_closures() {
   const auto& closures = closer_->closures();
   for (std::size_t i = reported_; i < closures.size(); ++i) {
     statistics_.count("loops_closed");
@@ -83,13 +131,6 @@ void LoopCorrector::look_at(const ScanOfMap& scan) {
   }
   // One that was denied again is missing in the middle; it was counted.
   reported_ = std::max(reported_, closures.size());
-  if (!correction) return;
-  // Of two that were not taken yet the second is of the map after the first.
-  const std::scoped_lock lock(mutex_);
-  if (found_ && found_->map == scan.map)
-    found_->correction = combined(found_->correction, *correction);
-  else
-    found_ = Found{scan.map, *std::move(correction)};
 }
 
 }  // namespace stillmap::server

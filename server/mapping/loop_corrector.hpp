@@ -5,10 +5,12 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <vector>
 
 #include "core/graph/live_loop_closer.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/map/map_correction.hpp"
+#include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/threads/bounded_queue.hpp"
 #include "server/threads/worker.hpp"
@@ -21,7 +23,12 @@ class LoopCorrector {
  public:
   /// The statistics must outlive it. `is_lossless`: mapping waits where the search does not keep
   /// up; else the oldest scan that waits for it gives way.
-  LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Statistics& statistics);
+  /// `antenna_base`: of the receiver whose fixes it gets, on the robot [m].
+  LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Statistics& statistics,
+                const Eigen::Vector3d& antenna_base = {0, 0, 0});
+
+  /// A fix of the receiver. Thread-safe, unlike the others.
+  void add(const GnssFix& fix);
 
   /// Another map began. In one that was loaded no loops are closed: poses of earlier runs are not
   /// known scan by scan.
@@ -30,11 +37,13 @@ class LoopCorrector {
   void end_map() { begin_map(false); }
   /// A scan of the map.
   void add(std::shared_ptr<const LabelledScan> labelled, const Eigen::Isometry3d& T_odom_lidar,
-           bool is_confirmed);
+           const Eigen::Isometry3d& T_base_lidar, bool is_confirmed);
   /// Scans that are not looked at yet.
   [[nodiscard]] std::size_t waiting() const { return scans_.waiting(); }
   /// What is to be moved, once; it has to be.
   [[nodiscard]] std::optional<MapCorrection> take();
+  /// Where the map lies, when that was found out or found out better; once.
+  [[nodiscard]] std::optional<MapOnEarth> take_place();
   /// It was moved, within this time.
   void report(const MapCorrection& correction, const CorrectedMap& corrected, double ms);
 
@@ -43,15 +52,19 @@ class LoopCorrector {
     std::uint64_t map = 0;
     std::shared_ptr<const LabelledScan> labelled;
     Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
+    Eigen::Vector3d antenna_lidar = Eigen::Vector3d::Zero();
     bool is_confirmed = false;
   };
 
   // Of the worker.
   void look_at(const ScanOfMap& scan);
+  void hand_on_fixes();
+  void report_closures();
 
   LiveLoopConfig config_;
   bool is_lossless_;
   Statistics& statistics_;
+  Eigen::Vector3d antenna_base_;
   /// Maps are numbered; 0: loops stay open.
   std::uint64_t map_ = 0;
   std::uint64_t maps_ = 0;
@@ -62,11 +75,18 @@ class LoopCorrector {
     MapCorrection correction;
   };
   std::optional<Found> found_;
+  struct Place {
+    std::uint64_t map = 0;
+    MapOnEarth place;
+  };
+  std::optional<Place> place_;
+  std::vector<GnssFix> fixes_;
 
   // Of the worker.
   std::uint64_t closed_map_ = 0;
   std::optional<LiveLoopCloser> closer_;
   std::size_t reported_ = 0;
+  ThrottledLog throttled_log_;
 
   BoundedQueue<ScanOfMap> scans_;
   // Last: stops before what it uses is gone.

@@ -381,7 +381,10 @@ void MapSaver::bring_back() {
 
 RunCheckpoint MapSaver::take(CheckpointScope scope) const {
   RunCheckpoint checkpoint = source_->checkpoint(scope);
-  checkpoint.map.metadata = metadata_;
+  // What is configured, then what the run found out, then what the file had.
+  auto metadata = metadata_;
+  metadata.merge(checkpoint.map.metadata);
+  checkpoint.map.metadata = std::move(metadata);
   checkpoint.map.metadata.insert(stored_metadata_.begin(), stored_metadata_.end());
   return checkpoint;
 }

@@ -8,6 +8,10 @@ namespace {
 LiveLoopConfig live_loops(const ServerConfig& config) {
   LiveLoopConfig loops;
   loops.min_shift_m = 0.5 * config.mapper.static_map.voxel_size_m;
+  loops.gnss.max_sigma_m = config.gnss.max_sigma_m;
+  // Somewhere on the robot: a fix says no more of the lidar than that.
+  constexpr double size_of_robot_m = 1.0;
+  if (!config.gnss.antenna_base) loops.gnss.min_sigma_m = size_of_robot_m;
   return loops;
 }
 
@@ -35,7 +39,12 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
   }
   if (config.map.close_loops) {
     loops_.emplace(live_loops(config), config.input.delivery == DeliveryMode::every,
-                   context.statistics);
+                   context.statistics, config.gnss.antenna_base.value_or(Eigen::Vector3d::Zero()));
+  }
+  if (loops_ && !config.topics.gnss.empty()) {
+    gnss_.emplace(context.participant, config.topics.gnss, config.input.delivery, *loops_,
+                  context.statistics);
+    earth_.emplace(context.participant, context.topics, config.frames.map);
   }
   const MappingOutputs outputs{
       .poses = &poses_,
@@ -46,6 +55,7 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
       .occupancy = context.occupancy,
       .place_finder = &place_finder_,
       .loops = loops_ ? &*loops_ : nullptr,
+      .earth = earth_ ? &*earth_ : nullptr,
       .throttle = &context.throttle};
   thread_.emplace(config, std::move(segmenter), storage_.take_loaded(),
                   storage_.saver().tile_store(), scans_, context.statistics, storage_.latest_map(),

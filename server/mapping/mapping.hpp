@@ -10,6 +10,8 @@
 #include "idl/dds/participant.hpp"
 #include "idl/interface/topics.hpp"
 #include "server/localization/initial_pose_receiver.hpp"
+#include "server/mapping/earth_frame.hpp"
+#include "server/mapping/gnss_receiver.hpp"
 #include "server/mapping/imu_receiver.hpp"
 #include "server/mapping/loop_corrector.hpp"
 #include "server/mapping/map_storage.hpp"
@@ -81,6 +83,8 @@ class Mapping {
   std::optional<ImuReceiver> imu_;
   PlaceFinder place_finder_;
   std::optional<LoopCorrector> loops_;
+  std::optional<GnssReceiver> gnss_;
+  std::optional<EarthFrame> earth_;
   std::optional<InitialPoseReceiver> initial_pose_;
   // Each uses what stands above it, and stops before it.
   std::optional<MappingThread> thread_;

@@ -23,10 +23,6 @@ using Clock = std::chrono::steady_clock;
 // How long a request, or the snapshot after the last scan, may wait while no scan comes.
 constexpr std::chrono::milliseconds idle_period{50};
 
-// No robot is faster; a prior that says so begins anew, or is broken.
-constexpr double max_speed_m_s = 150.0;
-constexpr double max_jump_m = 1.0;
-
 // Of the mapper's own poses; stamps that are set back are looked for among them.
 constexpr std::size_t mapper_poses = 1000;
 
@@ -73,6 +69,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
       corrector_(mapper_, map_limit_bytes_),
       imu_report_(statistics),
       frames_(config, outputs.static_transforms, statistics),
+      prior_(outputs.prior, frames_, config.frames.odom, statistics),
       odom_frame_(config.frames.odom) {
   // The whole path is the latest map's.
   mapper_.limit_trajectory(mapper_poses);
@@ -145,11 +142,14 @@ void MappingThread::begin_map(SharedTrajectory trajectory) {
   if (odom_) odom_->begin_map();
   if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
   if (outputs_.loops != nullptr) outputs_.loops->begin_map(latest_map_.view()->tiles.empty());
+  if (outputs_.earth != nullptr) outputs_.earth->forget();
   if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
 }
 
 void MappingThread::close_loops() {
   if (outputs_.loops == nullptr || is_map_frozen_) return;
+  if (const auto place = outputs_.loops->take_place(); place && outputs_.earth != nullptr)
+    outputs_.earth->publish(latest_map_.newest_pose().stamp_ns, *place);
   if (auto correction = outputs_.loops->take()) corrector_.begin(*std::move(correction));
 }
 
@@ -169,7 +169,7 @@ void MappingThread::follow(const MapCorrector::Result& result) {
   }
   latest_map_.correct(result.correction, result.view);
   if (odom_) odom_->correct_map(result.correction.latest());
-  T_map_odom_ = result.correction.latest() * T_map_odom_;
+  prior_.correct_map(result.correction.latest());
   if (outputs_.place_finder != nullptr) outputs_.place_finder->map_corrected();
   octree_is_behind_ = outputs_.occupancy != nullptr;
   outputs_.loops->report(result.correction, *result.corrected, result.ms);
@@ -195,7 +195,9 @@ void MappingThread::end_correction() {
 
 RunCheckpoint MappingThread::checkpoint(CheckpointScope scope) {
   MapCheckpoint map;
+  std::string datum;
   requests_.run([&] {
+    if (outputs_.earth != nullptr) datum = outputs_.earth->datum();
     const auto began = Clock::now();
     map = mapper_.static_map().checkpoint(scope);
     latest_map_.publish(map.view);
@@ -203,6 +205,7 @@ RunCheckpoint MappingThread::checkpoint(CheckpointScope scope) {
   });
   RunCheckpoint checkpoint{to_saved_map(map), map.step};
   checkpoint.map.trajectory = latest_map_.trajectory();
+  if (!datum.empty()) checkpoint.map.metadata["datum"] = datum;
   return checkpoint;
 }
 
@@ -390,7 +393,8 @@ void MappingThread::forward(MappedScan mapped) {
     outputs_.place_finder->keep_last(labelled, has_own_labels, frames_.T_base_lidar());
   }
   if (outputs_.loops != nullptr)
-    outputs_.loops->add(labelled, mapped.T_odom_lidar, mapped.odometry.is_confirmed);
+    outputs_.loops->add(labelled, mapped.T_odom_lidar, frames_.T_base_lidar(),
+                        mapped.odometry.is_confirmed);
   if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frames_.lidar());
 }
 
@@ -406,7 +410,7 @@ std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns)
     }
   }
   if (!mapper_.trajectory().empty()) {
-    motion_prior_ = motion_prior(stamp_ns);
+    motion_prior_ = prior_.lidar_motion(mapper_.trajectory().back().stamp_ns, stamp_ns);
     if (motion_prior_) return mapper_.trajectory().back().T_map_lidar * *motion_prior_;
     if (!mapper_.is_placed()) return mapper_.trajectory().back().T_map_lidar;
     return std::nullopt;
@@ -416,49 +420,6 @@ std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns)
   // A map begins where the robot stands, whichever way its lidar looks.
   if (frames_.has_base()) return frames_.T_base_lidar();
   return std::nullopt;
-}
-
-std::optional<Eigen::Isometry3d> MappingThread::motion_prior(std::int64_t stamp_ns) {
-  if (outputs_.prior == nullptr) return std::nullopt;
-  const std::int64_t last_ns = mapper_.trajectory().back().stamp_ns;
-  const auto motion = outputs_.prior->motion(last_ns, stamp_ns);
-  if (!motion) return std::nullopt;
-  const double distance_m = motion->T_before_after.translation().norm();
-  const double interval_s = 1e-9 * static_cast<double>(stamp_ns - last_ns);
-  if (!(distance_m <= max_jump_m + max_speed_m_s * interval_s)) {
-    refuse_prior("odometry_prior_jumps", "it jumps by " + std::to_string(distance_m) + " m in " +
-                                             std::to_string(interval_s) + " s");
-    return std::nullopt;
-  }
-  const auto T_lidar_frame = frames_.T_lidar_frame(motion->frame);
-  if (T_lidar_frame) return motion_of_frame(*T_lidar_frame, motion->T_before_after);
-  refuse_prior(
-      "odometry_prior_unknown_frame",
-      "it moves the frame '" + motion->frame +
-          "' (child_frame_id), and where that is on the robot is not known; set frames.base "
-          "and mount, or publish it on /tf_static beneath frames.base");
-  return std::nullopt;
-}
-
-OdomPose MappingThread::pose_in_priors_odom(std::int64_t stamp_ns,
-                                            const Eigen::Isometry3d& T_map_base) {
-  const auto prior = outputs_.prior != nullptr ? outputs_.prior->pose_at(stamp_ns) : std::nullopt;
-  const auto T_lidar_frame = prior ? frames_.T_lidar_frame(prior->frame) : std::nullopt;
-  if (prior && prior->odom_frame != odom_frame_) {
-    refuse_prior("odometry_prior_unknown_frame",
-                 "its poses are in the frame '" + prior->odom_frame +
-                     "' (header.frame_id), and frames.odom is '" + odom_frame_ + "'");
-  } else if (T_lidar_frame) {
-    const Eigen::Isometry3d T_base_frame = frames_.T_base_lidar() * *T_lidar_frame;
-    T_map_odom_ = T_map_base * T_base_frame * prior->T_odom_frame.inverse();
-  }
-  // Without a pose of this time, odom stays where it was in the map: it hardly moves.
-  return {.T_map_odom = T_map_odom_, .T_odom_base = T_map_odom_.inverse() * T_map_base};
-}
-
-void MappingThread::refuse_prior(const std::string& counter, const std::string& reason) {
-  statistics_.count(counter);
-  throttled_log_.warn(counter, "the odometry prior is not used: " + reason);
 }
 
 void MappingThread::stage_ended(std::string_view stage) {
@@ -482,7 +443,7 @@ void MappingThread::pose_found(std::int64_t stamp_ns, const OdometryResult& odom
     if (motion_prior_) motion_base = motion_of_frame(frames_.T_base_lidar(), *motion_prior_);
     pose.odom = odom_->update(stamp_ns, pose.T_map_base, odometry.health, motion_base);
   } else if (!odom_frame_.empty()) {
-    pose.odom = pose_in_priors_odom(stamp_ns, pose.T_map_base);
+    pose.odom = prior_.pose_in_odom(stamp_ns, pose.T_map_base);
     pose.is_odom_own = false;
   }
   if (outputs_.poses != nullptr) outputs_.poses->publish(pose);

@@ -12,6 +12,7 @@
 #include "core/map/storage/map_file.hpp"
 #include "core/mapper.hpp"
 #include "server/localization/place_finder.hpp"
+#include "server/mapping/earth_frame.hpp"
 #include "server/mapping/imu_receiver.hpp"
 #include "server/mapping/imu_report.hpp"
 #include "server/mapping/loop_corrector.hpp"
@@ -19,6 +20,7 @@
 #include "server/mapping/map_saver.hpp"
 #include "server/mapping/odometry_prior.hpp"
 #include "server/mapping/robot_frames.hpp"
+#include "server/mapping/robot_prior.hpp"
 #include "server/mapping/scan_queue.hpp"
 #include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
@@ -41,6 +43,7 @@ struct MappingOutputs {
   OccupancyThread* occupancy = nullptr;
   PlaceFinder* place_finder = nullptr;
   LoopCorrector* loops = nullptr;
+  EarthFrame* earth = nullptr;
   BackgroundThrottle* throttle = nullptr;
 };
 
@@ -139,15 +142,9 @@ class MappingThread : public CheckpointSource {
   [[nodiscard]] bool locate_lidar(const QueuedScan& queued);
   /// Expected pose of the lidar; nothing where the mapper is to predict it from its own poses.
   [[nodiscard]] std::optional<Eigen::Isometry3d> prior_for(std::int64_t stamp_ns);
-  /// Motion of the lidar since the last scan by another odometry.
-  [[nodiscard]] std::optional<Eigen::Isometry3d> motion_prior(std::int64_t stamp_ns);
   [[nodiscard]] Eigen::Isometry3d T_map_base(const OdometryResult& odometry) const {
     return odometry.T_map_lidar * frames_.T_base_lidar().inverse();
   }
-  /// Base in odom by the prior's poses.
-  [[nodiscard]] OdomPose pose_in_priors_odom(std::int64_t stamp_ns,
-                                             const Eigen::Isometry3d& T_map_base);
-  void refuse_prior(const std::string& counter, const std::string& reason);
   void drop(const ScanRejection& rejection);
   void publish_snapshot();
   /// The tiles that meet the box, and where those are stored that are not in memory.
@@ -180,11 +177,10 @@ class MappingThread : public CheckpointSource {
   ThrottledLog throttled_log_;
   ImuReport imu_report_;
   RobotFrames frames_;
+  RobotPrior prior_;
   std::string odom_frame_;
   /// Where there is a frame odom of our own.
   std::optional<OdomFrame> odom_;
-  /// Where it is the prior's.
-  Eigen::Isometry3d T_map_odom_ = Eigen::Isometry3d::Identity();
   /// The frame of the lidar whose place is on /tf_static.
   std::string mounted_frame_;
   /// Of the scan in work: its lidar's motion by the prior.

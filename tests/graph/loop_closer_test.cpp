@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "core/odometry/se3.hpp"
 #include "tests/graph/street_world.hpp"
@@ -145,6 +146,57 @@ TEST(LoopCloser, UnconfirmedScansHaveAPoseAndNoPart) {
   const auto poses = closer.corrected_poses();
   ASSERT_EQ(poses.size(), rounds.truth.size());
   EXPECT_LT(rmse_m(poses, rounds), 0.5 * rmse_m(rounds.odometry, rounds));
+}
+
+/// Where the map of these drives lies.
+const Eigen::Isometry3d T_enu_map_true =
+    Eigen::Translation3d(300.0, -200.0, 4.0) * Eigen::AngleAxisd(-2.0, Eigen::Vector3d::UnitZ());
+
+LoopCloser closed_with_fixes(const StreetWorld& world, const Drive& drive, double sigma_m) {
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal(0.0, sigma_m);
+  const Eigen::Vector3d antenna_lidar(-0.4, 0.3, 0.5);
+  LoopCloser closer(LoopClosingConfig{});
+  const Eigen::Isometry3d T_map_first = world.T_map_lidar_at(0.0, false);
+  for (std::size_t i = 0; i < drive.truth.size(); ++i) {
+    closer.add(world.scan_at(T_map_first * drive.truth[i], i), drive.odometry[i], true);
+    PositionAtScan position{.scan = i,
+                            .antenna_lidar = antenna_lidar,
+                            .position_enu = T_enu_map_true * drive.truth[i] * antenna_lidar,
+                            .covariance_enu = sigma_m * sigma_m * Eigen::Matrix3d::Identity()};
+    for (double& axis : position.position_enu) axis += normal(random);
+    closer.add(position);
+  }
+  closer.finish();
+  return closer;
+}
+
+TEST(LoopCloser, PositionsTakeTheDriftOutAndSayWhereTheMapLies) {
+  const StreetWorld world(12);
+  const Drive arc = drive(world, 0.6 * StreetWorld::length_m, 0.0003, 0.005);
+  const LoopCloser closer = closed_with_fixes(world, arc, 0.05);
+  EXPECT_TRUE(closer.closures().empty());
+  ASSERT_TRUE(closer.T_enu_map());
+  EXPECT_GT(closer.position_counts().used, 20U);
+  EXPECT_LE(closer.position_counts().in_doubt, 2U);
+  EXPECT_GT(rmse_m(arc.odometry, arc), 1.5);
+  const auto corrected = closer.corrected_poses();
+  double sum = 0.0;
+  for (std::size_t i = 0; i < corrected.size(); ++i) {
+    sum += (*closer.T_enu_map() * corrected[i].translation() -
+            T_enu_map_true * arc.truth[i].translation())
+               .squaredNorm();
+  }
+  EXPECT_LT(std::sqrt(sum / static_cast<double>(corrected.size())), 0.15) << "on the earth";
+}
+
+// What errs by more than the map has drifted is not to bend it.
+TEST(LoopCloser, PositionsThatAgreeWithTheMapHardlyBendIt) {
+  const StreetWorld world(12);
+  const Drive arc = drive(world, 0.6 * StreetWorld::length_m, 0.0, 0.0);
+  const LoopCloser closer = closed_with_fixes(world, arc, 2.0);
+  ASSERT_TRUE(closer.T_enu_map());
+  EXPECT_LT(rmse_m(closer.corrected_poses(), arc), 0.5);
 }
 
 TEST(LoopCloser, NothingGivesNothing) {

@@ -159,6 +159,72 @@ TEST(PoseGraph, KernelHoldsOneWrongClosureOff) {
   EXPECT_GT(without_m, 2.0 * with_kernel_m);
 }
 
+/// The graph of a line of nodes, a metre each, and a position of every fifth.
+PoseGraph line_with_positions(const Eigen::Isometry3d& T_enu_map) {
+  PoseGraph graph;
+  for (std::size_t i = 0; i < 30; ++i) {
+    const Eigen::Vector3d at(static_cast<double>(i), 2.0 * std::sin(0.2 * static_cast<double>(i)),
+                             0);
+    graph.T_map_node.emplace_back(Eigen::Translation3d(at));
+    if (i > 0) {
+      graph.edges.push_back({i - 1, i, graph.T_map_node[i - 1].inverse() * graph.T_map_node[i],
+                             1e4 * Matrix6d::Identity(), false});
+    }
+    if (i % 5 != 0) continue;
+    const Eigen::Vector3d point_node(0.2, -0.1, 1.0);
+    graph.positions.push_back({i, point_node, T_enu_map * graph.T_map_node[i] * point_node,
+                               100.0 * Eigen::Matrix3d::Identity()});
+  }
+  graph.T_enu_map = T_enu_map;
+  return graph;
+}
+
+TEST(PoseGraph, PositionsFindWhereTheMapLies) {
+  const Eigen::Isometry3d T_enu_map =
+      Eigen::Translation3d(100.0, 50.0, 3.0) * Eigen::AngleAxisd(1.0, Eigen::Vector3d::UnitZ());
+  PoseGraph graph = line_with_positions(T_enu_map);
+  graph.T_enu_map = T_enu_map * motion_of((PoseTangent() << 0.5, -0.4, 0.2, 0, 0, 0.05).finished());
+  const PoseGraphSolution solution = optimize(graph, {.position_scale = 1.5});
+  EXPECT_LT((solution.T_enu_map.matrix() - T_enu_map.matrix()).norm(), 1e-4);
+  for (const PositionMeasurement& position : graph.positions) {
+    EXPECT_LT(squared_error(position, solution.T_map_node[position.node], solution.T_enu_map),
+              1e-6);
+  }
+}
+
+TEST(PoseGraph, WithinTheirSlackPositionsDoNotPull) {
+  PoseGraph graph = line_with_positions(Eigen::Isometry3d::Identity());
+  // Of 0.1 m each: one standard deviation is the slack.
+  graph.positions[3].position_enu.y() += 0.09;
+  const PoseGraphConfig slack{.position_scale = 1.5, .position_slack = 1.0};
+  const auto unmoved = optimize(graph, slack).T_map_node;
+  for (std::size_t i = 0; i < unmoved.size(); ++i)
+    EXPECT_LT((unmoved[i].matrix() - graph.T_map_node[i].matrix()).norm(), 1e-9);
+  graph.positions[3].position_enu.y() += 0.2;
+  const PositionMeasurement& pulling = graph.positions[3];
+  const PoseGraphSolution moved = optimize(graph, slack);
+  EXPECT_LT(squared_error(pulling, moved.T_map_node[15], moved.T_enu_map),
+            0.8 * squared_error(pulling, graph.T_map_node[15], graph.T_enu_map));
+  // And one that is far off pulls less than one that is near.
+  graph.positions[3].position_enu.y() += 100.0;
+  const auto far = optimize(graph, slack).T_map_node;
+  EXPECT_LT((far[15].translation() - graph.T_map_node[15].translation()).norm(), 0.05);
+}
+
+TEST(PoseGraph, FaultsOfPositionsAreNamed) {
+  PoseGraph graph = line_with_positions(Eigen::Isometry3d::Identity());
+  EXPECT_EQ(graph.faults(), "");
+  graph.positions[0].node = 99;
+  EXPECT_NE(graph.faults().find("of none of the 30 nodes"), std::string::npos);
+  graph.positions[0].node = 0;
+  graph.positions[1].position_enu.x() = std::nan("");
+  EXPECT_NE(graph.faults().find("position of node 5 is not finite"), std::string::npos);
+  graph.positions[1].position_enu.x() = 0.0;
+  graph.positions[1].information.setZero();
+  EXPECT_NE(graph.faults().find("not positive definite"), std::string::npos);
+  EXPECT_THROW((void)optimize(graph, {}), std::invalid_argument);
+}
+
 TEST(PoseGraph, ChordalInitializationNeedsNoPoses) {
   std::vector<Eigen::Isometry3d> truth;
   PoseGraph graph = noisy_rounds(60, 3, 0.02, 0.01, truth);

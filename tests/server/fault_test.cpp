@@ -82,8 +82,8 @@ class DiskFault : public testing::TestWithParam<Fault> {
     }
   }
 
-  /// Drives on from scan `next`. Stamp of the newest pose that the server said was saved; 0 where the disturbances began
-  /// another map after that.
+  /// Drives on from scan `next`. Stamp of the newest pose that the server said was saved; 0 where
+  /// the disturbances began another map after that.
   std::int64_t run_server(const ServiceSetup& setup, const PreloadedFaults& faults, int& next);
   void check_files(const fs::path& folder);
 

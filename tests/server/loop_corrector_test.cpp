@@ -24,7 +24,7 @@ class Round {
       auto scan = std::make_shared<LabelledScan>(
           world_.scan_at(T_map_lidar, static_cast<std::uint64_t>(way_m_)));
       scan->scan.stamp_ns = static_cast<std::int64_t>(1e8 * (10.0 + way_m_));
-      loops_.add(scan, T_odom_lidar_, true);
+      loops_.add(scan, T_odom_lidar_, Eigen::Isometry3d::Identity(), true);
       if (!takes) continue;
       if (auto correction = loops_.take()) corrections.push_back(*std::move(correction));
     }
@@ -87,7 +87,8 @@ TEST(LoopCorrector, LeavesOutScansOfALiveSensorThatItCannotLookAt) {
     auto scan = std::make_shared<LabelledScan>();
     if (k % 100 == 0) *scan = world.scan_at(world.T_map_lidar_at(k, false), 1);
     scan->scan.stamp_ns = 1 + k;
-    loops.add(scan, Eigen::Isometry3d(Eigen::Translation3d(k, 0, 0)), true);
+    loops.add(scan, Eigen::Isometry3d(Eigen::Translation3d(k, 0, 0)), Eigen::Isometry3d::Identity(),
+              true);
     EXPECT_LE(loops.waiting(), 20U);
   }
   ASSERT_TRUE(test::eventually([&] { return loops.waiting() == 0; }));

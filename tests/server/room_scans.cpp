@@ -66,7 +66,7 @@ StampedPose room_pose(int index) {
   return {.stamp_ns = 1'700'000'000'000'000'000 + index * std::int64_t{100'000'000},
           .T_map_lidar = Eigen::Isometry3d(
               Eigen::Translation3d(reach_m * std::sin(metres_a_scan / reach_m * index),
-                               0.3 * std::sin(0.1 * index), 0.0) *
+                                   0.3 * std::sin(0.1 * index), 0.0) *
               Eigen::AngleAxisd(0.01 * index, Eigen::Vector3d::UnitZ()))};
 }
 

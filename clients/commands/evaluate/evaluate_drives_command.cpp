@@ -15,7 +15,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/evaluate/drive_run.hpp"
 #include "clients/commands/evaluate/ground_truth_sequence.hpp"
-#include "clients/commands/mapping/imu_feed.hpp"
+#include "clients/commands/mapping/sample_feed.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
@@ -168,7 +168,7 @@ std::vector<DriveResult> run_drive(const MutatedDrive& drive,
   std::deque<DriveRun> runs;
   for (const std::string& weighting : arguments.weightings)
     runs.emplace_back(weighting, config, std::make_unique<SharedSegmenter>(labels));
-  ImuFeed imu(spoilt(drive.sequence.imu, arguments.imu));
+  SampleFeed<ImuSample> imu(spoilt(drive.sequence.imu, arguments.imu));
   std::size_t seen = 0;
   for (const evaluation::MutatedScan& mutated : drive.scans) {
     const GroundTruthSequence& source =

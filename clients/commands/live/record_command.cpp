@@ -40,6 +40,7 @@ struct RecorderOptions {
   std::string points_topic = "points";
   std::string odometry_topic = "odom_prior";
   std::string imu_topic = "imu/data";
+  std::string gnss_topic = "fix";
   std::string initial_pose_topic = "initialpose";
   /// ROS 2 names to record; empty: all topics of the sensor and the server.
   std::vector<std::string> topics;
@@ -85,6 +86,7 @@ std::vector<RecordableTopic> recordable_topics(const RecorderOptions& options) {
       recordable(dds::points_topic(options.points_topic, DeliveryMode::latest, max_waiting)),
       recordable(dds::odometry_prior_topic(options.odometry_topic)),
       recordable(dds::imu_topic(options.imu_topic, DeliveryMode::latest)),
+      recordable(dds::gnss_topic(options.gnss_topic, DeliveryMode::latest)),
       recordable(dds::initial_pose_topic(options.initial_pose_topic))};
   dds::for_each_topic(dds::Topics::in(options.server_name),
                       [&](const auto& topic) { topics.push_back(recordable(topic)); });
@@ -364,6 +366,8 @@ void add_record_command(CommandHandle program, Action& action) {
   command.option("--odometry", arguments->recorder.odometry_topic, "The odometry prior's topic")
       .with_default();
   command.option("--imu", arguments->recorder.imu_topic, "The IMU's topic").with_default();
+  command.option("--gnss", arguments->recorder.gnss_topic, "A GNSS receiver's topic")
+      .with_default();
   command
       .option("--initial-pose", arguments->recorder.initial_pose_topic,
               "The topic on which operators say where the robot is")

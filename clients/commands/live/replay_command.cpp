@@ -21,9 +21,9 @@
 #include "clients/commands/command.hpp"
 #include "clients/commands/dataset/recording.hpp"
 #include "clients/commands/live/replay_clock.hpp"
-#include "clients/commands/mapping/imu_feed.hpp"
 #include "clients/commands/mapping/mapping_run.hpp"
 #include "clients/commands/mapping/pose_files.hpp"
+#include "clients/commands/mapping/sample_feed.hpp"
 #include "clients/library/client.hpp"
 #include "clients/library/scan_publisher.hpp"
 #include "clients/terminal/json.hpp"
@@ -176,8 +176,15 @@ void require_progress(Clock::time_point began, const ReplayOptions& options) {
       "delivery: every");
 }
 
-// The samples first: the server waits for those of a scan's sweep, but not long.
-bool publish(ScanPublisher& publisher, std::span<const ImuSample> samples,
+/// What was recorded beside the scans.
+struct SensorFeeds {
+  SampleFeed<ImuSample> imu;
+  SampleFeed<GnssFix> gnss;
+};
+
+// Samples before their scan: the server waits for those of a scan's sweep, but not long.
+template <typename Sample>
+bool publish(ScanPublisher& publisher, std::span<const Sample> samples,
              const ReplayOptions& options, StopSignal& stop) {
   const auto began = Clock::now();
   while (!samples.empty()) {
@@ -201,8 +208,9 @@ bool publish(ScanPublisher& publisher, const DatasetFrame& frame, const ReplayOp
 
 /// Publishes the scans of a sequence at the times of their stamps. Throws ServiceTimeout when the
 /// server stops taking scans, DatasetError as ScanRange says.
-ReplayResult replay_dataset(const ScanDataset& dataset, ImuFeed imu, const ReplayOptions& options,
-                            ScanPublisher& publisher, StopSignal& stop, const ScanDone& scan_done,
+ReplayResult replay_dataset(const ScanDataset& dataset, SensorFeeds feeds,
+                            const ReplayOptions& options, ScanPublisher& publisher,
+                            StopSignal& stop, const ScanDone& scan_done,
                             const ScanSkipped& scan_skipped) {
   const std::size_t end = options.range.end(dataset);
   const auto began = Clock::now();
@@ -211,9 +219,12 @@ ReplayResult replay_dataset(const ScanDataset& dataset, ImuFeed imu, const Repla
   for (std::size_t index = options.range.first; index < end && !result.stopped; ++index) {
     const auto frame = read_scan(dataset, index, options, result, scan_skipped);
     if (frame) {
-      const auto samples = imu.take_up_to_end_of(frame->scan, dataset.suggested_sensor().period_s);
+      const double period_s = dataset.suggested_sensor().period_s;
+      const auto samples = feeds.imu.take_up_to_end_of(frame->scan, period_s);
+      const auto fixes = feeds.gnss.take_up_to_end_of(frame->scan, period_s);
       result.stopped = wait_or_stop(clock.due(frame->scan.stamp_ns), stop) ||
                        !publish(publisher, samples, options, stop) ||
+                       !publish(publisher, fixes, options, stop) ||
                        !publish(publisher, *frame, options, stop);
       if (!result.stopped) result.published_stamps_ns.push_back(frame->scan.stamp_ns);
     }
@@ -260,6 +271,7 @@ struct ReplayArguments {
   std::string base_frame = "base_link";
   MountArguments mount;
   std::string imu_topic = "imu/data";
+  std::string gnss_topic = "fix";
   std::string out;
   std::uint32_t subscribers = 1;
   bool lossless = false;
@@ -305,13 +317,13 @@ ReplayOptions replay_options(const ReplayArguments& arguments) {
   return options;
 }
 
-ReplayResult publish_with_progress(const ScanDataset& dataset, ImuFeed imu,
+ReplayResult publish_with_progress(const ScanDataset& dataset, SensorFeeds feeds,
                                    const ReplayArguments& arguments, ScanPublisher& publisher,
                                    StopSignal& stop) {
   const ScanRange& range = arguments.replay.range;
   Progress progress("replay", "scans", range.end(dataset) - range.first);
   return replay_dataset(
-      dataset, std::move(imu), replay_options(arguments), publisher, stop,
+      dataset, std::move(feeds), replay_options(arguments), publisher, stop,
       [&](std::size_t seen) {
         progress.update(seen);
         return true;
@@ -329,22 +341,24 @@ ReplayOutcome replay(const ReplayArguments& arguments, StopSignal& stop) {
   const ScanDataset dataset = open_recording(arguments.dataset, arguments.topic_in);
   (void)arguments.replay.range.end(dataset);
   if (dataset.kitti_lidar()) std::cerr << "stillmap: " << dataset.kitti_lidar()->in_words() << "\n";
-  ImuFeed imu(dataset.imu());
+  SensorFeeds feeds{SampleFeed(dataset.imu()), SampleFeed(dataset.gnss())};
+  const bool has_imu = !feeds.imu.empty();
   Client client = connect(arguments.client);
   PoseLog poses(client);
   ScanPublisher publisher(client, {.dds = arguments.client.dds(DdsRole::sensor),
                                    .points_topic = arguments.topic,
-                                   .imu_topic = imu.empty() ? "" : arguments.imu_topic,
+                                   .imu_topic = has_imu ? arguments.imu_topic : "",
+                                   .gnss_topic = feeds.gnss.empty() ? "" : arguments.gnss_topic,
                                    .lidar_frame = arguments.frame,
                                    .mount = mount_of(arguments),
                                    .lossless = arguments.lossless});
   require_subscribers(publisher, arguments, stop);
   // Found with the scans' subscriber; a server need not have one.
-  if (!imu.empty()) (void)publisher.wait_for_imu_subscriber(imu_patience);
+  if (has_imu) (void)publisher.wait_for_imu_subscriber(imu_patience);
   const dds::ServerStatus before = client.status();
   if (arguments.lossless) require_lossless(before);
   ReplayOutcome outcome;
-  outcome.replay = publish_with_progress(dataset, std::move(imu), arguments, publisher, stop);
+  outcome.replay = publish_with_progress(dataset, std::move(feeds), arguments, publisher, stop);
   const std::vector<std::int64_t>& stamps_ns = outcome.replay.published_stamps_ns;
   // A lossy topic loses scans that are not counted, so the wait for them is short.
   const auto idle_timeout =
@@ -432,6 +446,10 @@ void add_replay_command(CommandHandle program, Action& action) {
   command
       .option("--imu-topic", arguments->imu_topic,
               "ROS 2 name of the topic for the samples of an IMU, where the sequence has any")
+      .with_default();
+  command
+      .option("--gnss-topic", arguments->gnss_topic,
+              "The same for the fixes of a GNSS receiver; the server's topics.gnss")
       .with_default();
   command
       .option("--subscribers", arguments->subscribers,

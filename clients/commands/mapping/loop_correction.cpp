@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "core/lendable_map.hpp"
@@ -30,9 +31,14 @@ constexpr double bytes_per_mib = 1024.0 * 1024.0;
 
 LoopCorrection::LoopCorrection(LoopOptions options, const SensorModel& sensor)
     : denied_(std::move(options.denied)),
+      fixes_(std::move(options.fixes)),
+      antenna_lidar_(options.antenna_lidar),
+      gnss_(options.gnss),
       sensor_(sensor),
       log_(options.scans_file),
-      closer_(LoopClosingConfig{}) {}
+      closer_(LoopClosingConfig{}) {
+  std::ranges::stable_sort(fixes_, {}, &GnssFix::stamp_ns);
+}
 
 void LoopCorrection::number(std::size_t index) {
   index_.push_back(index);
@@ -48,8 +54,7 @@ void LoopCorrection::resume(std::size_t next_scan) {
   log_.truncate_from(next_scan);
   log_.read([this](const LoggedScan& scan) {
     number(scan.index);
-    T_odom_lidar_.push_back(scan.T_odom_lidar);
-    closer_.add(scan.labelled, scan.T_odom_lidar, scan.is_confirmed);
+    close(scan.labelled, scan.T_odom_lidar, scan.is_confirmed);
   });
 }
 
@@ -61,15 +66,30 @@ void LoopCorrection::add(std::size_t index, const MappedScan& mapped) {
                .is_confirmed = odometry.is_confirmed,
                .labelled = mapped.labelled});
   number(index);
-  T_odom_lidar_.push_back(odometry.T_map_lidar);
-  closer_.add(mapped.labelled, odometry.T_map_lidar, odometry.is_confirmed);
+  close(mapped.labelled, odometry.T_map_lidar, odometry.is_confirmed);
+}
+
+void LoopCorrection::close(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar,
+                           bool is_confirmed) {
+  const std::size_t number = T_odom_lidar_.size();
+  const std::int64_t stamp_ns = scan.scan.stamp_ns;
+  T_odom_lidar_.push_back(T_odom_lidar);
+  closer_.add(scan, T_odom_lidar, is_confirmed);
+  for (; next_fix_ < fixes_.size() && fixes_[next_fix_].stamp_ns <= stamp_ns; ++next_fix_) {
+    const std::string refusal = gnss_.add(fixes_[next_fix_]);
+    if (refusal.empty()) continue;
+    if (refused_fixes_++ == 0) refusal_ = refusal;
+  }
+  if (!is_confirmed) return;
+  gnss_.add_scan(number, stamp_ns, T_odom_lidar, antenna_lidar_);
+  for (const PositionAtScan& position : gnss_.take()) closer_.add(position);
 }
 
 bool LoopCorrection::finish() {
   const Timed timed(seconds_);
   closer_.finish();
   T_map_lidar_ = closer_.corrected_poses();
-  return !closer_.closures().empty();
+  return closer_.is_corrected();
 }
 
 MapAlignment LoopCorrection::align(const std::shared_ptr<const PlaceIndex>& map,
@@ -94,6 +114,20 @@ void LoopCorrection::insert_into(StaticMap& map, const std::vector<Eigen::Isomet
   });
 }
 
+GnssReport LoopCorrection::gnss_report() const {
+  GnssReport report{.fixes = fixes_.size(),
+                    .refusal = refusal_,
+                    .refused = refused_fixes_,
+                    .placed = gnss_.placed(),
+                    .positions = closer_.position_counts(),
+                    .datum = std::nullopt};
+  if (const auto& T_enu_map = closer_.T_enu_map()) {
+    report.datum = gnss_.enu()->datum_of(*T_enu_map);
+    report.tilt_rad = std::acos(std::clamp(T_enu_map->linear()(2, 2), -1.0, 1.0));
+  }
+  return report;
+}
+
 LoopReport LoopCorrection::report() const {
   LoopReport report{.closures = closer_.closures(),
                     .refused = closer_.refused(),
@@ -102,7 +136,9 @@ LoopReport LoopCorrection::report() const {
                     .submap_mib = static_cast<double>(closer_.submap_bytes()) / bytes_per_mib,
                     .scan_log_mib = static_cast<double>(log_.bytes()) / bytes_per_mib,
                     .max_correction_m = 0.0,
-                    .seconds = seconds_};
+                    .seconds = seconds_,
+                    .gnss = std::nullopt};
+  if (!fixes_.empty()) report.gnss = gnss_report();
   for (std::vector<LoopClosure>* const list : {&report.closures, &report.refused}) {
     for (LoopClosure& closure : *list) {
       closure.from_scan = index_.at(closure.from_scan);

@@ -5,8 +5,12 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
+#include "core/geodesy/datum.hpp"
+#include "core/geodesy/gnss_track.hpp"
 #include "core/graph/loop_closer.hpp"
 #include "core/graph/scan_log.hpp"
 #include "core/lidar/sensor_model.hpp"
@@ -15,6 +19,21 @@
 #include "core/session/map_alignment.hpp"
 
 namespace stillmap::cli {
+
+/// What became of a receiver's fixes in a run.
+struct GnssReport {
+  std::size_t fixes = 0;
+  /// Why the first one of those that were not used was not; and how many.
+  std::string refusal;
+  std::size_t refused = 0;
+  /// Put between scans; of these in the graph; of these in doubt.
+  std::size_t placed = 0;
+  LoopCloser::PositionCounts positions;
+  /// Where the map's frame lies; nothing where that did not become known.
+  std::optional<Datum> datum;
+  /// What the map's z axis is off the vertical [rad].
+  double tilt_rad = 0.0;
+};
 
 /// What closing loops found and cost in a run.
 struct LoopReport {
@@ -28,6 +47,8 @@ struct LoopReport {
   /// How far the correction moved a pose at most [m].
   double max_correction_m = 0.0;
   double seconds = 0.0;
+  /// Nothing without a receiver.
+  std::optional<GnssReport> gnss;
 };
 
 /// How loops are closed.
@@ -36,6 +57,11 @@ struct LoopOptions {
   std::filesystem::path scans_file;
   /// Scans as they are numbered in the data set.
   std::vector<DeniedLoop> denied;
+  /// Of a receiver on the robot, by the scans' clock.
+  std::vector<GnssFix> fixes;
+  /// Of its antenna on the lidar [m].
+  Eigen::Vector3d antenna_lidar = Eigen::Vector3d::Zero();
+  GnssConfig gnss;
 };
 
 /// Finds loops while a run goes on, and keeps its scans in a file until it ends, since the map is
@@ -69,8 +95,18 @@ class LoopCorrection {
  private:
   /// One more scan, by its number in the data set.
   void number(std::size_t index);
+  /// The same to the closer, with the fixes until then.
+  void close(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar, bool is_confirmed);
+  [[nodiscard]] GnssReport gnss_report() const;
 
   std::vector<DeniedLoop> denied_;
+  /// By their stamps.
+  std::vector<GnssFix> fixes_;
+  std::size_t next_fix_ = 0;
+  std::string refusal_;
+  std::size_t refused_fixes_ = 0;
+  Eigen::Vector3d antenna_lidar_;
+  GnssTrack gnss_;
   SensorModel sensor_;
   ScanLog log_;
   LoopCloser closer_;

@@ -88,6 +88,8 @@ void save_map(const std::filesystem::path& file, const EarlierMap* earlier,
                             {"label_source", result.label_source},
                             {"software", "stillmap " STILLMAP_VERSION},
                             {map_ended_key, "yes"}}};
+  if (result.loops && result.loops->gnss && result.loops->gnss->datum)
+    map.metadata["datum"] = to_text(*result.loops->gnss->datum);
   if (earlier != nullptr) return save_session(file, *earlier, result, std::move(map), source);
   open_map_file(file)->save(map);
   write_first_session(file, source);
@@ -161,6 +163,8 @@ struct MapArguments {
   std::string loops = "on";
   std::vector<std::string> denied_loops;
   std::string onto;
+  std::string gnss = "on";
+  std::vector<double> antenna;
   double save_period_s = 30.0;
   bool json = false;
 };
@@ -248,6 +252,17 @@ std::vector<DeniedLoop> denied_loops(const MapArguments& arguments) {
   return all;
 }
 
+/// Where the antenna is on the lidar; nothing where that is not known. Throws
+/// std::invalid_argument.
+std::optional<Eigen::Vector3d> antenna_lidar(const MapArguments& arguments,
+                                             const MappedBody& body) {
+  if (arguments.antenna.empty()) return std::nullopt;
+  const Eigen::Vector3d antenna_body = Eigen::Map<const Eigen::Vector3d>(arguments.antenna.data());
+  if (constexpr double largest_m = 1000.0; !(antenna_body.cwiseAbs().maxCoeff() <= largest_m))
+    throw std::invalid_argument("--antenna needs finite numbers: x,y,z in metres");
+  return body.T_body_lidar.inverse() * antenna_body;
+}
+
 /// What makes the parts of a run one map.
 RunIdentity run_identity(const MapArguments& arguments, const MapperConfig& config,
                          const MappedBody& body, const Segmenter& labels,
@@ -259,7 +274,9 @@ RunIdentity run_identity(const MapArguments& arguments, const MapperConfig& conf
            << name(config.odometry.weighting) << ", voxels of " << config.static_map.voxel_size_m
            << " m, lidar in " << body.frame << " at " << t.transpose() << " turned by "
            << q.coeffs().transpose() << (arguments.loops == "on" ? ", loops closed" : "")
+           << (arguments.gnss == "on" ? "" : ", without GNSS")
            << (earlier == nullptr ? "" : ", onto " + earlier->identity());
+  for (const double metres : arguments.antenna) settings << ", antenna " << metres;
   for (const std::string& denied : arguments.denied_loops) settings << ", not " << denied;
   return {std::filesystem::weakly_canonical(arguments.dataset).string() + " from scan " +
               std::to_string(arguments.range.first),
@@ -274,7 +291,17 @@ MappingResult map_into(const MapOutputFolder& out, const ScanDataset& dataset,
   RunFile run_file(out.run_file(), run_identity(arguments, config, body, *labels, earlier),
                    std::chrono::duration<double>(arguments.save_period_s));
   std::optional<LoopOptions> loops;
-  if (arguments.loops == "on") loops = {out.kept_scans_file(), denied_loops(arguments)};
+  if (arguments.loops == "on") {
+    const auto antenna = antenna_lidar(arguments, body);
+    loops = {.scans_file = out.kept_scans_file(),
+             .denied = denied_loops(arguments),
+             .fixes = arguments.gnss == "on" ? dataset.gnss() : std::vector<GnssFix>{},
+             .antenna_lidar = antenna.value_or(Eigen::Vector3d::Zero()),
+             .gnss = {}};
+    // It is somewhere on the robot: a fix says no more of the lidar than that.
+    constexpr double size_of_robot_m = 1.0;
+    if (!antenna) loops->gnss.min_sigma_m = size_of_robot_m;
+  }
   return map_with_progress(dataset, arguments, config, body, std::move(labels), run_file, loops,
                            earlier, stop);
 }
@@ -322,6 +349,7 @@ ExitCode run(const MapArguments& arguments) {
   const MappedBody body = body_of(arguments);
   static_cast<void>(arguments.range.end(dataset));
   static_cast<void>(denied_loops(arguments));
+  static_cast<void>(antenna_lidar(arguments, body));
   auto labels = make_segmenter(arguments.mapper, dataset);
   const std::unique_ptr<const EarlierMap> earlier = earlier_map(arguments, config);
   std::cerr << describe_model(arguments.mapper, dataset, *labels);
@@ -353,6 +381,21 @@ ExitCode run(const MapArguments& arguments) {
 
 }  // namespace
 
+void add_gnss_options(CommandHandle command, MapArguments& arguments) {
+  command
+      .option("--gnss", arguments.gnss,
+              "on: fixes of a receiver beside the scans (gnss.csv, a bag's only NavSatFix) say "
+              "where the map lies on the earth, and correct it; off: they are not read")
+      .one_of({"on", "off"})
+      .with_default();
+  command
+      .option("--antenna", arguments.antenna,
+              "x,y,z [m] of the receiver's antenna on the robot, or by the lidar without --mount; "
+              "without it no fix is taken for better than 1 m")
+      .exactly(3)
+      .comma_separated();
+}
+
 void add_map_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<MapArguments>();
   CommandHandle command = program.command(
@@ -383,6 +426,7 @@ void add_map_command(CommandHandle program, Action& action) {
   command.option("--onto", arguments->onto,
                  "A map made earlier: the drive goes on in a copy of it, as another session, where "
                  "it is recognised; this file is only read");
+  add_gnss_options(command, *arguments);
   command
       .option("--save-period", arguments->save_period_s,
               "Seconds between saves of the run, for --resume")
@@ -404,6 +448,7 @@ void add_map_command(CommandHandle program, Action& action) {
       "loops_before.png and loops_after.png show them. The scans are kept in the folder\n"
       "'unfinished' until then (some 0.1 MB a scan of 16 rings). A damaged file is named and "
       "skipped; its scan then has no pose.\n"
+      "A receiver's fixes make report.json's gnss.datum, which map.stillmap keeps for GeoTIFFs.\n"
       "With --onto the drive is looked for in the map, scan by scan until some agree, then submap "
       "by\n"
       "submap; poses and map are in the earlier map's frame, what is gone is removed, what is new\n"

@@ -2,6 +2,7 @@
 
 #include <sys/resource.h>
 
+#include <numbers>
 #include <vector>
 
 #include "clients/terminal/table.hpp"
@@ -91,6 +92,17 @@ Json map_closures_json(const std::vector<MapClosure>& closures) {
   return json;
 }
 
+Json to_json(const GnssReport& gnss) {
+  return {{"fixes", gnss.fixes},
+          {"refused", gnss.refused},
+          {"refusal", gnss.refusal.empty() ? Json(nullptr) : Json(gnss.refusal)},
+          {"between_scans", gnss.placed},
+          {"in_graph", gnss.positions.used},
+          {"in_doubt", gnss.positions.in_doubt},
+          {"datum", gnss.datum ? Json(to_text(*gnss.datum)) : Json(nullptr)},
+          {"tilt_deg", gnss.tilt_rad * 180.0 / std::numbers::pi}};
+}
+
 Json to_json(const LoopReport& loops, const std::optional<TrajectoryReport>& odometry) {
   return {{"submaps", loops.submaps},
           {"nodes", loops.nodes},
@@ -99,11 +111,23 @@ Json to_json(const LoopReport& loops, const std::optional<TrajectoryReport>& odo
           {"seconds", loops.seconds},
           {"max_correction_m", loops.max_correction_m},
           {"refused", closures_json(loops.refused)},
+          {"gnss", loops.gnss ? to_json(*loops.gnss) : Json(nullptr)},
           {"odometry_accuracy", odometry ? to_json(*odometry) : Json(nullptr)}};
 }
 
+std::string describe(const GnssReport& gnss) {
+  std::string text = "GNSS: " + std::to_string(gnss.placed) + " of " + std::to_string(gnss.fixes) +
+                     " fixes lie between scans";
+  if (gnss.refused > 0)
+    text += ", " + std::to_string(gnss.refused) + " were refused (" + gnss.refusal + ")";
+  if (!gnss.datum) return text + "; they do not tell yet where the map lies\n";
+  return text + ", " + std::to_string(gnss.positions.used) + " correct the map, " +
+         std::to_string(gnss.positions.in_doubt) + " of these in doubt; the map's datum is " +
+         to_text(*gnss.datum) + "\n";
+}
+
 std::string describe(const LoopReport& loops, const MapOutput& output) {
-  if (loops.closures.empty())
+  if (loops.closures.empty() && loops.max_correction_m == 0.0)
     return "loops: none closed in " + std::to_string(loops.submaps) + " submaps\n";
   std::string text = "loops: " + std::to_string(loops.closures.size()) + " closed in " +
                      std::to_string(loops.submaps) + " submaps, poses moved by up to " +
@@ -193,6 +217,7 @@ std::string describe(const MappingResult& result, const MapOutput& output) {
             fixed(100.0 * result.moving.precision().value_or(0.0), 1) + " %\n";
   }
   if (result.loops) text += describe(*result.loops, output);
+  if (result.loops && result.loops->gnss) text += describe(*result.loops->gnss);
   if (result.session) text += describe(*result.session);
   if (output.accuracy)
     text += "against the true poses of the sequence:\n" + describe(*output.accuracy);

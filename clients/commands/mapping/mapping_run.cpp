@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "clients/commands/mapping/imu_feed.hpp"
+#include "clients/commands/mapping/sample_feed.hpp"
 #include "clients/commands/mapping/scans_ahead.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/map/map_id.hpp"
@@ -225,7 +225,7 @@ class MappingRun {
   ScansAhead scans_;
   Mapper mapper_;
   std::optional<LoopCorrection> loops_;
-  ImuFeed imu_;
+  SampleFeed<ImuSample> imu_;
   double period_s_;
   Trajectory earlier_;
   bool is_registered_ = false;

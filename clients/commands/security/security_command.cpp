@@ -29,6 +29,7 @@ void save_topic_names(const dds::TopicNames& names, const std::filesystem::path&
   out << Json{{"points", names.points},
               {"odometry_prior", names.odometry_prior},
               {"imu", names.imu},
+              {"gnss", names.gnss},
               {"initial_pose", names.initial_pose},
               {"namespace", names.name_space}}
              .dump(2)
@@ -46,6 +47,7 @@ dds::TopicNames load_topic_names(const std::filesystem::path& authority_folder) 
     return {.points = json.at("points"),
             .odometry_prior = json.at("odometry_prior"),
             .imu = json.value("imu", std::string()),
+            .gnss = json.value("gnss", std::string()),
             .initial_pose = json.value("initial_pose", std::string()),
             .name_space = json.at("namespace")};
   } catch (const nlohmann::json::exception& error) {
@@ -186,6 +188,8 @@ void add_security_init_command(CommandHandle security, Action& action) {
               "Topic of the odometry prior; empty: none")
       .with_default();
   command.option("--imu", arguments->names.imu, "Topic of the IMU; empty: none").with_default();
+  command.option("--gnss", arguments->names.gnss, "Topic of a GNSS receiver; empty: none")
+      .with_default();
   command
       .option("--initial-pose", arguments->names.initial_pose,
               "Topic on which operators say where the robot is; empty: none")

@@ -7,9 +7,11 @@
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
 #include "clients/terminal/stop_signal.hpp"
+#include "core/dataset/gnss_file.hpp"
 #include "core/dataset/imu_file.hpp"
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
+#include "core/simulation/simulated_gnss.hpp"
 #include "core/simulation/simulated_imu.hpp"
 
 namespace stillmap::cli {
@@ -19,6 +21,8 @@ struct SimulateArguments {
   std::string out;
   SimulationArguments simulation;
   bool imu = false;
+  /// Wander of the receiver [m]; 0: none.
+  double gnss_m = 0.0;
   bool json = false;
 };
 
@@ -27,8 +31,9 @@ struct Written {
   std::uint64_t points = 0;
 };
 
-Written write_sequence(const std::string& folder, const simulation::Simulation& simulation,
-                       bool imu, StopSignal& stop) {
+Written write_sequence(const SimulateArguments& arguments, const simulation::Simulation& simulation,
+                       StopSignal& stop) {
+  const std::filesystem::path folder = arguments.out;
   KittiSequenceWriter writer(folder);
   const int scans = simulation.config().scans;
   Progress progress("simulate", "scans", static_cast<std::uint64_t>(scans));
@@ -42,8 +47,11 @@ Written write_sequence(const std::string& folder, const simulation::Simulation& 
   }
   writer.finish();
   const Eigen::Isometry3d T_city_first = simulation.T_map_lidar_at(0.0);
-  write_poses(std::filesystem::path(folder) / "first_pose_city.txt", {&T_city_first, 1});
-  if (imu) write_imu_csv(std::filesystem::path(folder) / "imu.csv", simulated_imu(simulation));
+  write_poses(folder / "first_pose_city.txt", {&T_city_first, 1});
+  if (arguments.imu) write_imu_csv(folder / "imu.csv", simulated_imu(simulation));
+  if (arguments.gnss_m > 0.0) {
+    write_gnss_csv(folder / "gnss.csv", simulated_gnss(simulation, {.wander_m = arguments.gnss_m}));
+  }
   return written;
 }
 
@@ -51,7 +59,7 @@ ExitCode run(const SimulateArguments& arguments) {
   StopSignal stop;
   const simulation::SimulationConfig config = simulation_config(arguments.simulation);
   const simulation::Simulation simulation(config);
-  const Written written = write_sequence(arguments.out, simulation, arguments.imu, stop);
+  const Written written = write_sequence(arguments, simulation, stop);
   if (arguments.json) {
     std::cout << Json{{"folder", arguments.out},
                       {"city", config.plan.name},
@@ -113,6 +121,11 @@ void add_simulate_command(CommandHandle program, Action& action) {
                    "Not upright above the middle of its vehicle, but there");
   command.flag("--imu", arguments->imu,
                "Write imu.csv, too: an IMU at the lidar, 200 Hz, with noise and bias");
+  command
+      .option("--gnss", arguments->gnss_m,
+              "Write gnss.csv, too: an antenna at the lidar, 5 Hz, that errs by so many metres for "
+              "a minute, and by more beside houses (0.02: with corrections, 1.5: without)")
+      .above_zero();
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(
       "Examples:\n"

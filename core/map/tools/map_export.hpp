@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "core/map/datum.hpp"
+#include "core/geodesy/datum.hpp"
 #include "core/map/query/map_query.hpp"
 #include "core/map/tile.hpp"
 

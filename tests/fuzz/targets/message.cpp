@@ -5,6 +5,7 @@
 #include <utility>
 #include <variant>
 
+#include "idl/conversions/gnss.hpp"
 #include "idl/conversions/imu.hpp"
 #include "idl/conversions/localization.hpp"
 #include "idl/conversions/map_query.hpp"
@@ -102,6 +103,13 @@ void read_imu(Bytes bytes) {
   });
 }
 
+void read_gnss(Bytes bytes) {
+  read_as<sensor_msgs::msg::NavSatFix>(bytes, [](const auto& message) {
+    const wire::ReceivedFix received = wire::from_nav_sat_fix(message);
+    require(!received.fix || fault_of(*received.fix).empty(), "a fix can be used");
+  });
+}
+
 /// What anybody with RViz2 may say.
 void read_initial_pose(Bytes bytes) {
   read_as<geometry_msgs::msg::PoseWithCovarianceStamped>(bytes, [](const auto& message) {
@@ -121,7 +129,7 @@ void read_ros_nodes(Bytes bytes) {
   }
 }
 
-constexpr std::array<void (*)(Bytes), 17> readers = {
+constexpr std::array<void (*)(Bytes), 18> readers = {
     read_odometry,
     read_path,
     read_tile,
@@ -139,6 +147,7 @@ constexpr std::array<void (*)(Bytes), 17> readers = {
     read_ros_nodes,
     read_response<Localize_Response>,
     read_initial_pose,
+    read_gnss,
 };
 
 void run(Bytes bytes) {
@@ -197,6 +206,7 @@ std::vector<Seed> seeds() {
       {"occupancy", with_choice(9, to_cdr(occupancy))},
       {"removed", with_choice(10, to_cdr(removed))},
       {"imu", with_choice(13, to_cdr(wire::to_imu({.stamp_ns = 7}, "imu")))},
+      {"gnss", with_choice(17, to_cdr(wire::to_nav_sat_fix({.latitude_deg = 49.0}, "gnss")))},
       {"localize", with_choice(15, to_cdr(localized))},
       {"initial_pose", with_choice(16, to_cdr(initial_pose))},
       {"ros_nodes",

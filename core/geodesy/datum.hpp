@@ -19,5 +19,7 @@ struct Datum {
 /// fault in `text`. Latitudes beyond 84 degrees are refused: the transverse Mercator projection
 /// degenerates at the poles.
 [[nodiscard]] Datum datum_from_text(const std::string& text);
+/// What datum_from_text() reads back to the millimetre.
+[[nodiscard]] std::string to_text(const Datum& datum);
 
 }  // namespace stillmap

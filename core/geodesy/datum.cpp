@@ -1,6 +1,7 @@
-#include "core/map/datum.hpp"
+#include "core/geodesy/datum.hpp"
 
 #include <cmath>
+#include <iomanip>
 #include <sstream>
 #include <stdexcept>
 #include <vector>
@@ -47,6 +48,17 @@ Datum datum_from_text(const std::string& text) {
   if (!(std::abs(datum.altitude_m) <= max_altitude_m)) refuse(text, "has no usable altitude");
   if (!(std::abs(datum.x_axis_azimuth_deg) <= 360.0)) refuse(text, "has no usable azimuth");
   return datum;
+}
+
+std::string to_text(const Datum& datum) {
+  constexpr int degree_digits = 8;
+  constexpr int metre_digits = 3;
+  constexpr int azimuth_digits = 4;
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(degree_digits) << datum.latitude_deg << ','
+       << datum.longitude_deg << ',' << std::setprecision(metre_digits) << datum.altitude_m << ','
+       << std::setprecision(azimuth_digits) << datum.x_axis_azimuth_deg;
+  return text.str();
 }
 
 }  // namespace stillmap

@@ -1,0 +1,38 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "core/lidar/scan.hpp"
+
+namespace stillmap::cli {
+
+/// Until when samples are handed out with a scan: just after its last point, where `period_s` is
+/// the lidar's.
+[[nodiscard]] std::int64_t end_of_samples_ns(const Scan& scan, double period_s);
+
+/// The samples of a recorded IMU or receiver (whatever has a `stamp_ns`), handed out with the
+/// scans.
+template <typename Sample>
+class SampleFeed {
+ public:
+  explicit SampleFeed(std::vector<Sample> samples) : samples_(std::move(samples)) {}
+
+  [[nodiscard]] bool empty() const { return samples_.empty(); }
+  /// Those that were not taken yet, up to just after the scan's last point.
+  [[nodiscard]] std::span<const Sample> take_up_to_end_of(const Scan& scan, double period_s) {
+    const std::int64_t end_ns = end_of_samples_ns(scan, period_s);
+    const std::size_t first = next_;
+    while (next_ < samples_.size() && samples_[next_].stamp_ns <= end_ns) ++next_;
+    return std::span(samples_).subspan(first, next_ - first);
+  }
+
+ private:
+  std::vector<Sample> samples_;
+  std::size_t next_ = 0;
+};
+
+}  // namespace stillmap::cli

@@ -1,0 +1,34 @@
+#include "core/geodesy/gnss_fix.hpp"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+
+namespace stillmap {
+namespace {
+
+constexpr double max_latitude_deg = 84.0;
+constexpr double max_altitude_m = 1e5;
+
+std::string named(const char* field, double value) {
+  return std::string(field) + " is " + std::to_string(value);
+}
+
+}  // namespace
+
+std::string fault_of(const GnssFix& fix) {
+  // Negated, so that NaN is refused too.
+  if (!(std::abs(fix.latitude_deg) <= max_latitude_deg))
+    return named("the latitude", fix.latitude_deg) + ", beyond 84 degrees";
+  if (!(std::abs(fix.longitude_deg) <= 360.0))
+    return named("the longitude", fix.longitude_deg) + ", beyond 360 degrees";
+  if (!(std::abs(fix.altitude_m) <= max_altitude_m) && !std::isnan(fix.altitude_m))
+    return named("the altitude", fix.altitude_m) + ", beyond 100 km";
+  if (!fix.covariance_enu.allFinite()) return "the covariance is not finite";
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(fix.covariance_enu,
+                                                            Eigen::EigenvaluesOnly);
+  if (!(axes.eigenvalues().minCoeff() >= 0.0))
+    return named("the smallest eigenvalue of the covariance", axes.eigenvalues().minCoeff());
+  return "";
+}
+
+}  // namespace stillmap

@@ -1,0 +1,74 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/geodesy/east_north_up.hpp"
+#include "core/geodesy/gnss_fix.hpp"
+
+namespace stillmap {
+
+struct GnssConfig {
+  /// Fixes that are said to be worse than this, east and north, are not used [m].
+  double max_sigma_m = 20.0;
+  /// None is believed to be better than this [m].
+  double min_sigma_m = 0.02;
+};
+
+/// A fix, by the scan after it.
+struct PositionAtScan {
+  /// Number of the scan.
+  std::size_t scan = 0;
+  /// The antenna in the frame of that scan's lidar [m]: where it was a moment before.
+  Eigen::Vector3d antenna_lidar = Eigen::Vector3d::Zero();
+  /// About the track's first fix [m].
+  Eigen::Vector3d position_enu = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d covariance_enu = Eigen::Matrix3d::Identity();
+};
+
+/// Puts the fixes of a receiver on the robot between the scans around them. Fixes and scans come in
+/// their own order, each after the other or before it, by one clock. NOT thread safe.
+class GnssTrack {
+ public:
+  explicit GnssTrack(const GnssConfig& config) : config_(config) {}
+
+  /// Returns why it is not used; empty where it is.
+  [[nodiscard]] std::string add(const GnssFix& fix);
+  /// Scans have rising numbers. `antenna_lidar`: where the antenna is on the lidar [m]. Where the
+  /// scans' clock is set back, what waits is dropped.
+  void add_scan(std::size_t scan, std::int64_t stamp_ns, const Eigen::Isometry3d& T_odom_lidar,
+                const Eigen::Vector3d& antenna_lidar);
+  /// Fixes that lie between two scans now; each once.
+  [[nodiscard]] std::vector<PositionAtScan> take();
+
+  /// The frame of the positions; nothing before the first fix.
+  [[nodiscard]] const std::optional<EastNorthUp>& enu() const { return enu_; }
+  /// Fixes that were put between scans.
+  [[nodiscard]] std::size_t placed() const { return placed_; }
+  /// Those that no two scans lie around.
+  [[nodiscard]] std::size_t misplaced() const { return misplaced_; }
+
+ private:
+  struct ScanPose {
+    std::size_t scan = 0;
+    std::int64_t stamp_ns = 0;
+    Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
+    Eigen::Vector3d antenna_odom = Eigen::Vector3d::Zero();
+  };
+  [[nodiscard]] std::optional<PositionAtScan> between_scans(const GnssFix& fix) const;
+
+  GnssConfig config_;
+  std::optional<EastNorthUp> enu_;
+  std::deque<GnssFix> waiting_;
+  /// The newest.
+  std::deque<ScanPose> scans_;
+  std::size_t placed_ = 0;
+  std::size_t misplaced_ = 0;
+};
+
+}  // namespace stillmap

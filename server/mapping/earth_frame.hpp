@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "core/graph/live_loop_closer.hpp"
+#include "idl/dds/writer.hpp"
+#include "idl/interface/topics.hpp"
+#include "tf2_msgs.h"
+
+namespace stillmap::server {
+
+/// Tells where the running map lies on the earth: on /tf_static from `earth` (REP 105, ECEF) to the
+/// map, in the log, and in the map's file. Used by the mapping thread.
+class EarthFrame {
+ public:
+  EarthFrame(dds::Participant& participant, const dds::Topics& topics, std::string map_frame);
+
+  /// Another map began.
+  void forget() { place_.reset(); }
+  /// A better place of the map; one that hardly differs from the last is not told.
+  void publish(std::int64_t stamp_ns, const MapOnEarth& place);
+  /// As datum_from_text() reads it; empty where it is not known.
+  [[nodiscard]] std::string datum() const { return place_ ? to_text(place_->datum) : ""; }
+
+ private:
+  std::string map_frame_;
+  dds::Writer<tf2_msgs::msg::TFMessage> tf_static_;
+  std::optional<MapOnEarth> place_;
+};
+
+}  // namespace stillmap::server

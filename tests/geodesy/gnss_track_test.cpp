@@ -1,0 +1,121 @@
+#include "core/geodesy/gnss_track.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+namespace stillmap {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr std::int64_t second_ns = 1'000'000'000;
+const EastNorthUp earth(49.0, 8.4, 115.0);
+const Eigen::Vector3d antenna_lidar(0.5, -0.2, 1.0);
+
+/// A robot that drives 10 m/s east and turns left.
+Eigen::Isometry3d T_odom_lidar_at(double time_s) {
+  return Eigen::Translation3d(10.0 * time_s, 0.0, 0.0) *
+         Eigen::AngleAxisd(0.1 * time_s, Eigen::Vector3d::UnitZ());
+}
+
+GnssFix fix_at(double time_s, double sigma_m = 0.5) {
+  GnssFix fix = earth.fix_at(T_odom_lidar_at(time_s) * antenna_lidar);
+  fix.stamp_ns = std::llround(time_s * 1e9);
+  fix.covariance_enu = Eigen::Vector3d::Constant(sigma_m * sigma_m).asDiagonal();
+  return fix;
+}
+
+class GnssTracks : public testing::Test {
+ protected:
+  void scan(std::size_t number, double time_s) {
+    track_.add_scan(number, std::llround(time_s * 1e9), T_odom_lidar_at(time_s), antenna_lidar);
+  }
+
+  GnssTrack track_{GnssConfig{}};
+};
+
+TEST_F(GnssTracks, AFixIsPutBetweenTheScansAroundIt) {
+  scan(0, 0.0);
+  scan(1, 0.1);
+  EXPECT_EQ(track_.add(fix_at(0.03)), "");
+  const auto placed = track_.take();
+  ASSERT_EQ(placed.size(), 1U);
+  EXPECT_EQ(placed[0].scan, 1U);
+  const Eigen::Vector3d antenna_odom = T_odom_lidar_at(0.1) * placed[0].antenna_lidar;
+  EXPECT_LT((antenna_odom - T_odom_lidar_at(0.03) * antenna_lidar).norm(), 1e-3);
+  EXPECT_LT(placed[0].position_enu.norm(), 1e-6) << "the first fix is the origin";
+  EXPECT_TRUE(track_.take().empty()) << "each once";
+  EXPECT_EQ(track_.placed(), 1U);
+}
+
+TEST_F(GnssTracks, FixesWaitForTheScanAfterThemAndMayComeLate) {
+  scan(0, 0.0);
+  ASSERT_EQ(track_.add(fix_at(0.05)), "");
+  EXPECT_TRUE(track_.take().empty());
+  for (std::size_t k = 1; k <= 30; ++k) scan(k, 0.1 * static_cast<double>(k));
+  ASSERT_EQ(track_.add(fix_at(1.0)), "");
+  const auto placed = track_.take();
+  ASSERT_EQ(placed.size(), 2U);
+  EXPECT_EQ(placed[0].scan, 1U);
+  EXPECT_EQ(placed[1].scan, 10U);
+  EXPECT_LT((placed[1].antenna_lidar - antenna_lidar).norm(), 1e-9) << "of the scan's own time";
+}
+
+TEST_F(GnssTracks, WhereNoScansLieAroundItAFixIsNotUsed) {
+  scan(0, 10.0);
+  ASSERT_EQ(track_.add(fix_at(9.0)), "");
+  EXPECT_TRUE(track_.take().empty());
+  scan(1, 15.0);
+  ASSERT_EQ(track_.add(fix_at(12.0)), "");
+  EXPECT_TRUE(track_.take().empty()) << "nobody knows how it drove for 5 s";
+  EXPECT_EQ(track_.misplaced(), 2U);
+}
+
+TEST_F(GnssTracks, AStandingRobotHasGapsThatDoNotMatter) {
+  const Eigen::Isometry3d T = T_odom_lidar_at(1.0);
+  track_.add_scan(0, 0, T, antenna_lidar);
+  track_.add_scan(1, 100 * second_ns, T, antenna_lidar);
+  ASSERT_EQ(track_.add(fix_at(50.0)), "");
+  ASSERT_EQ(track_.take().size(), 1U);
+}
+
+TEST_F(GnssTracks, AClockThatIsSetBackDropsWhatWaits) {
+  scan(0, 100.0);
+  ASSERT_EQ(track_.add(fix_at(200.0)), "");
+  scan(1, 5.0);
+  scan(2, 5.1);
+  ASSERT_EQ(track_.add(fix_at(5.05)), "");
+  const auto placed = track_.take();
+  ASSERT_EQ(placed.size(), 1U);
+  EXPECT_EQ(placed[0].scan, 2U);
+  EXPECT_EQ(track_.misplaced(), 1U);
+}
+
+TEST_F(GnssTracks, RefusesBadFixesAndBelievesNoneTooMuch) {
+  EXPECT_THAT(track_.add(fix_at(0.0, 50.0)), HasSubstr("50.000000 m"));
+  GnssFix fix = fix_at(0.0);
+  fix.latitude_deg = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(track_.add(fix), HasSubstr("latitude"));
+  EXPECT_FALSE(track_.enu());
+  scan(0, 0.0);
+  ASSERT_EQ(track_.add(fix_at(0.0, 0.0)), "") << "a receiver that says it errs by nothing";
+  fix = fix_at(0.0);
+  fix.altitude_m = std::numeric_limits<double>::quiet_NaN();
+  ASSERT_EQ(track_.add(fix), "");
+  const auto placed = track_.take();
+  ASSERT_EQ(placed.size(), 2U);
+  EXPECT_NEAR(placed[0].covariance_enu(0, 0), 0.02 * 0.02, 1e-12);
+  EXPECT_TRUE(placed[1].position_enu.allFinite());
+  EXPECT_GT(placed[1].covariance_enu(2, 2), 1e6) << "nothing is known of its height";
+}
+
+TEST_F(GnssTracks, WithoutScansItDoesNotGrow) {
+  for (int k = 0; k < 5000; ++k) ASSERT_EQ(track_.add(fix_at(k)), "");
+  EXPECT_EQ(track_.misplaced(), 4000U);
+}
+
+}  // namespace
+}  // namespace stillmap
