@@ -396,6 +396,14 @@ void add_gnss_options(CommandHandle command, MapArguments& arguments) {
       .comma_separated();
 }
 
+void add_save_option(CommandHandle command, MapArguments& arguments) {
+  command
+      .option("--save-period", arguments.save_period_s,
+              "Seconds between saves of the run, for --resume")
+      .with_default()
+      .above_zero();
+}
+
 void add_map_command(CommandHandle program, Action& action) {
   auto arguments = std::make_shared<MapArguments>();
   CommandHandle command = program.command(
@@ -427,11 +435,7 @@ void add_map_command(CommandHandle program, Action& action) {
                  "A map made earlier: the drive goes on in a copy of it, as another session, where "
                  "it is recognised; this file is only read");
   add_gnss_options(command, *arguments);
-  command
-      .option("--save-period", arguments->save_period_s,
-              "Seconds between saves of the run, for --resume")
-      .with_default()
-      .above_zero();
+  add_save_option(command, *arguments);
   command.flag("--json", arguments->json, "Print report.json instead of the summary");
   command.explain(
       "Examples:\n"
