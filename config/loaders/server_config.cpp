@@ -378,6 +378,8 @@ void read_server(YamlSection file, const fs::path& folder, ServerConfig& config)
   read_lidars(file, folder, config);
   read_publish(file.section("publish"), config.publish);
   read_map(file.section("map"), config.map);
+  if (!config.topics.gnss.empty() && !config.map.close_loops)
+    file.fault("topics", "gnss corrects the map: it needs map.close_loops");
   read_occupancy(file.section("occupancy"), config.occupancy);
   read_traversability(file.section("traversability"), folder, config.traversability);
   read_log(file.section("log"), config.log);

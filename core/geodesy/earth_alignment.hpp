@@ -15,7 +15,7 @@ struct PointOnEarth {
 };
 
 struct EarthAlignmentConfig {
-  std::size_t min_points = 8;
+  std::size_t min_points = 6;
   /// How well the map's heading must be known [rad].
   double max_heading_sigma_rad = 0.03;
   /// Errors of neighbouring fixes are the same: the way must be longer than they are by this.

@@ -26,7 +26,9 @@ std::string fault_of(const GnssFix& fix) {
   if (!fix.covariance_enu.allFinite()) return "the covariance is not finite";
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(fix.covariance_enu,
                                                             Eigen::EigenvaluesOnly);
-  if (!(axes.eigenvalues().minCoeff() >= 0.0))
+  // One that is known along two axes alone has eigenvalues about zero.
+  constexpr double rounding = 1e-9;
+  if (!(axes.eigenvalues().minCoeff() >= -rounding * axes.eigenvalues().maxCoeff()))
     return named("the smallest eigenvalue of the covariance", axes.eigenvalues().minCoeff());
   return "";
 }

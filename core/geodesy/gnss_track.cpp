@@ -15,7 +15,7 @@ constexpr std::size_t max_waiting = 1000;
 /// Between scans that are farther apart than both nobody knows where the antenna was.
 constexpr std::int64_t max_gap_ns = 1'500'000'000;
 constexpr double max_gap_m = 0.5;
-/// Of a height that is not known [m].
+/// Of a height that is not known: one that is said to be worse is taken for that [m].
 constexpr double unknown_sigma_m = 1e4;
 
 double horizontal_sigma_m(const GnssFix& fix) {
@@ -41,7 +41,9 @@ std::string GnssTrack::add(const GnssFix& fix) {
   }
   waiting_.push_back(fix);
   waiting_.back().covariance_enu.diagonal().array() += config_.min_sigma_m * config_.min_sigma_m;
-  if (std::isnan(fix.altitude_m)) {
+  const bool has_height =
+      !std::isnan(fix.altitude_m) && fix.covariance_enu(2, 2) < unknown_sigma_m * unknown_sigma_m;
+  if (!has_height) {
     waiting_.back().covariance_enu.row(2).setZero();
     waiting_.back().covariance_enu.col(2).setZero();
     waiting_.back().covariance_enu(2, 2) = unknown_sigma_m * unknown_sigma_m;

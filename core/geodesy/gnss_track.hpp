@@ -14,9 +14,12 @@
 namespace stillmap {
 
 struct GnssConfig {
+  /// `min_sigma_m` where nobody knows where on the robot the antenna is [m].
+  static constexpr double size_of_robot_m = 1.0;
+
   /// Fixes that are said to be worse than this, east and north, are not used [m].
   double max_sigma_m = 20.0;
-  /// None is believed to be better than this [m].
+  /// None is believed to be better than this along any axis [m].
   double min_sigma_m = 0.02;
 };
 

@@ -55,6 +55,8 @@ class LiveLoopCloser {
 
   /// Believed so far.
   [[nodiscard]] const std::vector<LoopClosure>& closures() const { return closer_.closures(); }
+  /// What became of the fixes.
+  [[nodiscard]] const GnssTrack& gnss() const { return gnss_; }
   /// By the corrections until now; nothing while it is not known.
   [[nodiscard]] std::optional<MapOnEarth> on_earth() const;
   [[nodiscard]] std::size_t submap_bytes() const { return closer_.submap_bytes(); }

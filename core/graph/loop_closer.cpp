@@ -271,20 +271,36 @@ void LoopCloser::accept(Candidate candidate) {
   solve();
 }
 
-void LoopCloser::solve() {
+void LoopCloser::place_nodes() {
+  if (graph_.positions.empty()) {
+    graph_.T_map_node = optimize(graph_, {.loop_scale = config_.loop_scale}).T_map_node;
+    return;
+  }
   // Where odometry has drifted far from the positions, all of them are far off, and the kernel
   // would take them for reflections: it is narrowed step by step (A. Blake and A. Zisserman,
-  // "Visual reconstruction", 1987: graduated non-convexity).
-  const auto widths = graph_.positions.empty() ? std::vector<double>{1.0}
-                                               : std::vector<double>{1000.0, 30.0, 5.0, 1.0};
-  for (const double width : widths) {
+  // "Visual reconstruction", 1987: graduated non-convexity), while those that it puts in doubt are
+  // few.
+  for (const double width : {1000.0, 30.0, 5.0, 1.0}) {
     const PoseGraphConfig solver{.loop_scale = config_.loop_scale,
                                  .position_scale = width * config_.position_scale,
                                  .position_slack = config_.position_slack};
+    PoseGraph wider = graph_;
     PoseGraphSolution solution = optimize(graph_, solver);
     graph_.T_map_node = std::move(solution.T_map_node);
-    if (T_enu_map_) T_enu_map_ = graph_.T_enu_map = solution.T_enu_map;
+    T_enu_map_ = graph_.T_enu_map = solution.T_enu_map;
+    const PositionCounts counts = position_counts();
+    const bool is_first = width > 100.0;
+    if (is_first || static_cast<double>(counts.in_doubt) <=
+                        config_.max_doubted_share * static_cast<double>(counts.used))
+      continue;
+    graph_ = std::move(wider);
+    T_enu_map_ = graph_.T_enu_map;
+    return;
   }
+}
+
+void LoopCloser::solve() {
+  place_nodes();
   for (std::size_t k = 0; k < joints_.size(); ++k) {
     const PoseEdge& edge = graph_.edges[joints_[k].edge];
     const double squared = squared_error(edge, graph_.T_map_node[edge.from],

@@ -53,6 +53,8 @@ struct LoopClosingConfig {
   double position_scale = 1.5;
   double position_slack = 1.0;
   double max_squared_position_error = 25.0;
+  /// More than this share of them are not reflections: odometry is worse than it says.
+  double max_doubted_share = 0.25;
   EarthAlignmentConfig earth;
 };
 
@@ -155,6 +157,8 @@ class LoopCloser {
   void accept(Candidate candidate);
   /// Has the new positions take part, once it is known where the map lies.
   void use_positions();
+  /// Poses of the nodes, and where the map lies.
+  void place_nodes();
   /// Solves, and takes out what the graph denies.
   void solve();
   [[nodiscard]] Eigen::Isometry3d T_map_submap(const PlacedSubmap& placed) const {

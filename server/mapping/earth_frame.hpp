@@ -15,18 +15,25 @@ namespace stillmap::server {
 /// map, in the log, and in the map's file. Used by the mapping thread.
 class EarthFrame {
  public:
+  /// The participant must outlive it.
   EarthFrame(dds::Participant& participant, const dds::Topics& topics, std::string map_frame);
 
-  /// Another map began.
-  void forget() { place_.reset(); }
+  /// Another map began: who joins from now on is not told where the last one lay.
+  void forget() {
+    place_.reset();
+    tf_static_.reset();
+  }
   /// A better place of the map; one that hardly differs from the last is not told.
   void publish(std::int64_t stamp_ns, const MapOnEarth& place);
   /// As datum_from_text() reads it; empty where it is not known.
   [[nodiscard]] std::string datum() const { return place_ ? to_text(place_->datum) : ""; }
 
  private:
+  dds::Participant& participant_;
+  dds::TopicSpec<tf2_msgs::msg::TFMessage> topic_;
   std::string map_frame_;
-  dds::Writer<tf2_msgs::msg::TFMessage> tf_static_;
+  /// While the place is known.
+  std::optional<dds::Writer<tf2_msgs::msg::TFMessage>> tf_static_;
   std::optional<MapOnEarth> place_;
 };
 

@@ -41,8 +41,11 @@ void LoopCorrector::begin_map(bool is_new) {
 
 void LoopCorrector::add(const GnssFix& fix) {
   const std::scoped_lock lock(mutex_);
-  // Nobody looks at scans: the robot stands, or loops stay open.
-  if (fixes_.size() >= max_waiting_fixes) fixes_.erase(fixes_.begin());
+  // Nobody looks at scans: there are none, or the map was loaded.
+  if (fixes_.size() >= max_waiting_fixes) {
+    fixes_.erase(fixes_.begin());
+    statistics_.count("gnss_fixes_unused");
+  }
   fixes_.push_back(fix);
 }
 
@@ -88,7 +91,7 @@ void LoopCorrector::report(const MapCorrection& correction, const CorrectedMap& 
 void LoopCorrector::look_at(const ScanOfMap& scan) {
   if (std::exchange(closed_map_, scan.map) != scan.map) {
     closer_.emplace(config_);
-    reported_ = 0;
+    reported_ = reported_placed_ = reported_misplaced_ = 0;
   }
   const auto began = std::chrono::steady_clock::now();
   const bool had_ended = !closer_->end_reason().empty();
@@ -98,6 +101,7 @@ void LoopCorrector::look_at(const ScanOfMap& scan) {
   statistics_.add_latency("loops", milliseconds(std::chrono::steady_clock::now() - began));
   if (!had_ended && !closer_->end_reason().empty())
     spdlog::warn("loops stay open from here on: {}", closer_->end_reason());
+  report_fixes();
   report_closures();
   const std::scoped_lock lock(mutex_);
   if (const auto place = closer_->on_earth()) place_ = Place{scan.map, *place};
@@ -117,9 +121,20 @@ void LoopCorrector::hand_on_fixes() {
   }
   for (const GnssFix& fix : fixes) {
     const std::string refusal = closer_->add(fix);
-    statistics_.count(refusal.empty() ? "gnss_fixes" : "gnss_fixes_refused");
-    if (!refusal.empty()) throttled_log_.warn("gnss", "a GNSS fix is not used: " + refusal);
+    if (refusal.empty()) continue;
+    statistics_.count("gnss_fixes_refused");
+    throttled_log_.warn("gnss", "a GNSS fix is not used: " + refusal);
   }
+}
+
+void LoopCorrector::report_fixes() {
+  const GnssTrack& gnss = closer_->gnss();
+  const auto count_new = [this](const char* counter, std::size_t now, std::size_t& reported) {
+    if (now > reported) statistics_.count(counter, now - reported);
+    reported = now;
+  };
+  count_new("gnss_fixes", gnss.placed(), reported_placed_);
+  count_new("gnss_fixes_between_no_scans", gnss.misplaced(), reported_misplaced_);
 }
 
 void LoopCorrector::report_closures() {

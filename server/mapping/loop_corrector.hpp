@@ -27,7 +27,9 @@ class LoopCorrector {
   LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Statistics& statistics,
                 const Eigen::Vector3d& antenna_base = {0, 0, 0});
 
-  /// A fix of the receiver. Thread-safe, unlike the others.
+  /// A fix of the receiver. Thread-safe, unlike the others. Counted are those that are used
+  /// ("gnss_fixes"), refused ("gnss_fixes_refused"), not between two scans of a moving robot
+  /// ("gnss_fixes_between_no_scans"), and never looked at ("gnss_fixes_unused").
   void add(const GnssFix& fix);
 
   /// Another map began. In one that was loaded no loops are closed: poses of earlier runs are not
@@ -59,6 +61,7 @@ class LoopCorrector {
   // Of the worker.
   void look_at(const ScanOfMap& scan);
   void hand_on_fixes();
+  void report_fixes();
   void report_closures();
 
   LiveLoopConfig config_;
@@ -86,6 +89,8 @@ class LoopCorrector {
   std::uint64_t closed_map_ = 0;
   std::optional<LiveLoopCloser> closer_;
   std::size_t reported_ = 0;
+  std::size_t reported_placed_ = 0;
+  std::size_t reported_misplaced_ = 0;
   ThrottledLog throttled_log_;
 
   BoundedQueue<ScanOfMap> scans_;

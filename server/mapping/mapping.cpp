@@ -9,9 +9,7 @@ LiveLoopConfig live_loops(const ServerConfig& config) {
   LiveLoopConfig loops;
   loops.min_shift_m = 0.5 * config.mapper.static_map.voxel_size_m;
   loops.gnss.max_sigma_m = config.gnss.max_sigma_m;
-  // Somewhere on the robot: a fix says no more of the lidar than that.
-  constexpr double size_of_robot_m = 1.0;
-  if (!config.gnss.antenna_base) loops.gnss.min_sigma_m = size_of_robot_m;
+  if (!config.gnss.antenna_base) loops.gnss.min_sigma_m = GnssConfig::size_of_robot_m;
   return loops;
 }
 

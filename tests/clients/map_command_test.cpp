@@ -137,6 +137,35 @@ TEST_F(MapCommandTest, ListsClosedAndRefusedLoops) {
   EXPECT_EQ(run(made + " --refused").exit_code, 0);
 }
 
+TEST_F(MapCommandTest, AReceiverSaysWhereTheMapLies) {
+  ASSERT_EQ(run("simulate " + path("city") +
+                " --preset quiet --seed 3 --sensor vlp_16 --scans 120 --gnss 0.02")
+                .exit_code,
+            0);
+  const ProcessResult result = map_city("--json --labels files --antenna 0,0,0");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const nlohmann::json report = nlohmann::json::parse(result.out);
+  const nlohmann::json& gnss = report.at("loops").at("gnss");
+  EXPECT_EQ(gnss.at("fixes"), 61);
+  EXPECT_GE(gnss.at("in_graph"), 8);
+  ASSERT_TRUE(gnss.at("datum").is_string()) << gnss;
+  EXPECT_THAT(gnss.at("datum").get<std::string>(), testing::StartsWith("49.0"));
+  EXPECT_LT(report.at("accuracy").at("ate_rmse_m"), 0.5);
+  // The file has it, so that a GeoTIFF needs no --datum.
+  EXPECT_EQ(run("map-export " + path("out/map.stillmap") + " -o " + path("map.tif")).exit_code, 0);
+  EXPECT_TRUE(exists("map.tif"));
+
+  const ProcessResult without = map_city("--json --labels files --gnss off --force");
+  EXPECT_TRUE(nlohmann::json::parse(without.out).at("loops").at("gnss").is_null());
+  EXPECT_EQ(map_city("--antenna 0,0,0 --gnss off --force").exit_code, 2);
+  EXPECT_EQ(map_city("--antenna 0,0,nan --force").exit_code, 2);
+  write("city/gnss.csv", "1,49,8\n");
+  const ProcessResult damaged = map_city("--labels files --force");
+  EXPECT_NE(damaged.exit_code, 0);
+  EXPECT_THAT(damaged.err, HasSubstr("gnss.csv"));
+  EXPECT_TRUE(exists("out/map.stillmap"));
+}
+
 TEST_F(MapCommandTest, WhatIsRefusedLeavesTheOldMap) {
   simulate("city", 3);
   ASSERT_EQ(map_city().exit_code, 0);

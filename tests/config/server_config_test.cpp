@@ -232,6 +232,8 @@ TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
   EXPECT_THAT(refusal_of("dds: {profile: ether}"), HasSubstr("DDS profile 'ether'"));
   EXPECT_THAT(refusal_of("topics: {points: 'a b'}"), HasSubstr("topics.points"));
   EXPECT_THAT(refusal_of("topics: {gnss: '/fix'}"), HasSubstr("topics.gnss"));
+  EXPECT_THAT(refusal_of("topics: {gnss: fix}\nmap: {close_loops: false}"),
+              HasSubstr("needs map.close_loops"));
   EXPECT_THAT(refusal_of("gnss: {antenna_m: [1, 2]}"), HasSubstr("wanted are three"));
   EXPECT_THAT(refusal_of("gnss: {max_sigma_m: 0}"), HasSubstr("gnss.max_sigma_m"));
   EXPECT_THAT(refusal_of("frames: {map: ''}"), HasSubstr("frames.map"));

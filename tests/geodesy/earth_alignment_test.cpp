@@ -59,7 +59,7 @@ TEST(EarthAlignment, ReflectionsDoNotTurnIt) {
 
 TEST(EarthAlignment, SaysNothingOfAWayThatIsTooShort) {
   EXPECT_FALSE(align_to_earth({}));
-  EXPECT_FALSE(align_to_earth(points_of_way(30.0, 0.02, 0.0))) << "too few";
+  EXPECT_FALSE(align_to_earth(points_of_way(25.0, 0.02, 0.0))) << "too few";
   EXPECT_FALSE(align_to_earth(points_of_way(60.0, 5.0, 1.0))) << "as long as the fixes err";
   std::vector<PointOnEarth> standing(100);
   EXPECT_FALSE(align_to_earth(standing));

@@ -28,6 +28,8 @@ TEST(GnssFix, SaysWhichFieldIsAtFault) {
   EXPECT_THAT(fault([](GnssFix& f) { f.covariance_enu(0, 1) = nan; }), HasSubstr("not finite"));
   EXPECT_THAT(fault([](GnssFix& f) { f.covariance_enu(2, 2) = -1.0; }), HasSubstr("eigenvalue"));
   EXPECT_EQ(fault([](GnssFix& f) { f.covariance_enu.setZero(); }), "");
+  const Eigen::Vector3d along(1.3, 0.7, 0.1);
+  EXPECT_EQ(fault([&](GnssFix& f) { f.covariance_enu = along * along.transpose(); }), "");
 }
 
 }  // namespace

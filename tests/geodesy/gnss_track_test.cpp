@@ -105,11 +105,17 @@ TEST_F(GnssTracks, RefusesBadFixesAndBelievesNoneTooMuch) {
   fix = fix_at(0.0);
   fix.altitude_m = std::numeric_limits<double>::quiet_NaN();
   ASSERT_EQ(track_.add(fix), "");
+  fix = fix_at(0.0);
+  fix.covariance_enu(2, 2) = 1e300;
+  ASSERT_EQ(track_.add(fix), "");
   const auto placed = track_.take();
-  ASSERT_EQ(placed.size(), 2U);
+  ASSERT_EQ(placed.size(), 3U);
   EXPECT_NEAR(placed[0].covariance_enu(0, 0), 0.02 * 0.02, 1e-12);
-  EXPECT_TRUE(placed[1].position_enu.allFinite());
-  EXPECT_GT(placed[1].covariance_enu(2, 2), 1e6) << "nothing is known of its height";
+  for (std::size_t k = 1; k < 3; ++k) {
+    EXPECT_TRUE(placed[k].position_enu.allFinite());
+    EXPECT_NEAR(placed[k].covariance_enu(2, 2), 1e8, 1.0) << "nothing is known of its height";
+    EXPECT_TRUE(placed[k].covariance_enu.inverse().allFinite());
+  }
 }
 
 TEST_F(GnssTracks, WithoutScansItDoesNotGrow) {

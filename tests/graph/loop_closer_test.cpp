@@ -152,11 +152,12 @@ TEST(LoopCloser, UnconfirmedScansHaveAPoseAndNoPart) {
 const Eigen::Isometry3d T_enu_map_true =
     Eigen::Translation3d(300.0, -200.0, 4.0) * Eigen::AngleAxisd(-2.0, Eigen::Vector3d::UnitZ());
 
-LoopCloser closed_with_fixes(const StreetWorld& world, const Drive& drive, double sigma_m) {
+LoopCloser closed_with_fixes(const StreetWorld& world, const Drive& drive, double sigma_m,
+                             const LoopClosingConfig& config = {}) {
   std::mt19937_64 random(9);
   std::normal_distribution<double> normal(0.0, sigma_m);
   const Eigen::Vector3d antenna_lidar(-0.4, 0.3, 0.5);
-  LoopCloser closer(LoopClosingConfig{});
+  LoopCloser closer(config);
   const Eigen::Isometry3d T_map_first = world.T_map_lidar_at(0.0, false);
   for (std::size_t i = 0; i < drive.truth.size(); ++i) {
     closer.add(world.scan_at(T_map_first * drive.truth[i], i), drive.odometry[i], true);
@@ -171,6 +172,17 @@ LoopCloser closed_with_fixes(const StreetWorld& world, const Drive& drive, doubl
   return closer;
 }
 
+double rmse_on_earth_m(const LoopCloser& closer, const Drive& drive) {
+  const auto corrected = closer.corrected_poses();
+  double sum = 0.0;
+  for (std::size_t i = 0; i < corrected.size(); ++i) {
+    sum += (*closer.T_enu_map() * corrected[i].translation() -
+            T_enu_map_true * drive.truth[i].translation())
+               .squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(corrected.size()));
+}
+
 TEST(LoopCloser, PositionsTakeTheDriftOutAndSayWhereTheMapLies) {
   const StreetWorld world(12);
   const Drive arc = drive(world, 0.6 * StreetWorld::length_m, 0.0003, 0.005);
@@ -180,14 +192,21 @@ TEST(LoopCloser, PositionsTakeTheDriftOutAndSayWhereTheMapLies) {
   EXPECT_GT(closer.position_counts().used, 20U);
   EXPECT_LE(closer.position_counts().in_doubt, 2U);
   EXPECT_GT(rmse_m(arc.odometry, arc), 1.5);
-  const auto corrected = closer.corrected_poses();
-  double sum = 0.0;
-  for (std::size_t i = 0; i < corrected.size(); ++i) {
-    sum += (*closer.T_enu_map() * corrected[i].translation() -
-            T_enu_map_true * arc.truth[i].translation())
-               .squaredNorm();
-  }
-  EXPECT_LT(std::sqrt(sum / static_cast<double>(corrected.size())), 0.15) << "on the earth";
+  EXPECT_LT(rmse_on_earth_m(closer, arc), 0.15);
+}
+
+// Odometry that is many times worse than the graph takes it for, on a short way: most positions are
+// far off, and that many are not reflections.
+TEST(LoopCloser, PositionsAreBelievedWhereMostOfThemContradictOdometry) {
+  const StreetWorld world(12);
+  const Drive arc = drive(world, 0.15 * StreetWorld::length_m, 0.006, 0.0);
+  EXPECT_GT(rmse_m(arc.odometry, arc), 0.8);
+  const double believed_m = rmse_on_earth_m(closed_with_fixes(world, arc, 0.02), arc);
+  LoopClosingConfig doubting;
+  doubting.max_doubted_share = 1.0;
+  const double doubted_m = rmse_on_earth_m(closed_with_fixes(world, arc, 0.02, doubting), arc);
+  EXPECT_LT(believed_m, 0.15 * rmse_m(arc.odometry, arc));
+  EXPECT_GT(doubted_m, 1.5 * believed_m);
 }
 
 // What errs by more than the map has drifted is not to bend it.

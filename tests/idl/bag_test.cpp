@@ -11,6 +11,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 #include "idl/bag/cdr_reader.hpp"
+#include "idl/conversions/gnss.hpp"
 #include "idl/conversions/imu.hpp"
 #include "tests/idl/bag_fixture.hpp"
 #include "tests/scratch_folder.hpp"
@@ -70,6 +71,35 @@ TEST(Bag, ReadsTheImuBesideTheScansInEitherByteOrder) {
     EXPECT_EQ(read.stamp_ns, sample.stamp_ns);
     EXPECT_EQ(read.angular_velocity_imu, sample.angular_velocity_imu);
     EXPECT_EQ(read.acceleration_imu, sample.acceleration_imu);
+  }
+}
+
+TEST(Bag, ReadsAReceiversFixesBesideTheScansInEitherByteOrder) {
+  const ScratchFolder folder;
+  GnssFix fix{.stamp_ns = 1'700'000'000'123'456'789,
+              .latitude_deg = 49.1,
+              .longitude_deg = -8.2,
+              .altitude_m = 115.5};
+  fix.covariance_enu.diagonal() << 4.0, 3.0, 9.0;
+  BagTopic gnss = cloud_topic("/fix");
+  gnss.type = "sensor_msgs/msg/NavSatFix";
+  BagWriter writer(folder / "bag", {cloud_topic("/points"), gnss});
+  writer.add(0, 1, bag_message(0));
+  writer.add(1, 2, serialized(wire::to_nav_sat_fix(fix, "a_frame")));
+  writer.add(1, 3, serialized(wire::to_nav_sat_fix(fix, "f"), false));
+  auto none = wire::to_nav_sat_fix(fix, "f");
+  none.status().status(0xFF);
+  writer.add(1, 4, serialized(none));
+  writer.add(1, 5, Bytes{0, 1, 0, 0, 7});
+  writer.finish();
+  const std::vector<GnssFix> fixes = open_sequence(folder / "bag").gnss();
+  ASSERT_EQ(fixes.size(), 2U) << "no fix and the damaged message are left out";
+  for (const GnssFix& read : fixes) {
+    EXPECT_EQ(read.stamp_ns, fix.stamp_ns);
+    EXPECT_EQ(read.latitude_deg, fix.latitude_deg);
+    EXPECT_EQ(read.longitude_deg, fix.longitude_deg);
+    EXPECT_EQ(read.altitude_m, fix.altitude_m);
+    EXPECT_EQ(read.covariance_enu, fix.covariance_enu);
   }
 }
 

@@ -31,9 +31,9 @@ constexpr double bytes_per_mib = 1024.0 * 1024.0;
 
 LoopCorrection::LoopCorrection(LoopOptions options, const SensorModel& sensor)
     : denied_(std::move(options.denied)),
-      fixes_(std::move(options.fixes)),
-      antenna_lidar_(options.antenna_lidar),
-      gnss_(options.gnss),
+      fixes_(std::move(options.gnss.fixes)),
+      antenna_lidar_(options.gnss.antenna_lidar),
+      gnss_(options.gnss.config),
       sensor_(sensor),
       log_(options.scans_file),
       closer_(LoopClosingConfig{}) {

@@ -51,17 +51,22 @@ struct LoopReport {
   std::optional<GnssReport> gnss;
 };
 
+/// A receiver on the robot.
+struct GnssOptions {
+  /// By the scans' clock.
+  std::vector<GnssFix> fixes;
+  /// Where its antenna is on the lidar [m].
+  Eigen::Vector3d antenna_lidar = Eigen::Vector3d::Zero();
+  GnssConfig config;
+};
+
 /// How loops are closed.
 struct LoopOptions {
   /// Where the scans are kept meanwhile.
   std::filesystem::path scans_file;
   /// Scans as they are numbered in the data set.
   std::vector<DeniedLoop> denied;
-  /// Of a receiver on the robot, by the scans' clock.
-  std::vector<GnssFix> fixes;
-  /// Of its antenna on the lidar [m].
-  Eigen::Vector3d antenna_lidar = Eigen::Vector3d::Zero();
-  GnssConfig gnss;
+  GnssOptions gnss;
 };
 
 /// Finds loops while a run goes on, and keeps its scans in a file until it ends, since the map is

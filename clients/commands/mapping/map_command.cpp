@@ -252,15 +252,33 @@ std::vector<DeniedLoop> denied_loops(const MapArguments& arguments) {
   return all;
 }
 
-/// Where the antenna is on the lidar; nothing where that is not known. Throws
-/// std::invalid_argument.
-std::optional<Eigen::Vector3d> antenna_lidar(const MapArguments& arguments,
-                                             const MappedBody& body) {
-  if (arguments.antenna.empty()) return std::nullopt;
-  const Eigen::Vector3d antenna_body = Eigen::Map<const Eigen::Vector3d>(arguments.antenna.data());
-  if (constexpr double largest_m = 1000.0; !(antenna_body.cwiseAbs().maxCoeff() <= largest_m))
-    throw std::invalid_argument("--antenna needs finite numbers: x,y,z in metres");
-  return body.T_body_lidar.inverse() * antenna_body;
+/// A receiver's fixes, and where its antenna is by the command line or the server's file. A drive
+/// that is put onto a map has the place of that map. Throws std::invalid_argument, and DatasetError
+/// for a damaged file.
+GnssOptions gnss_options(const MapArguments& arguments, const ScanDataset& dataset,
+                         const MappedBody& body) {
+  const bool is_used = arguments.loops == "on" && arguments.gnss == "on" && arguments.onto.empty();
+  if (!arguments.antenna.empty() && !is_used)
+    throw std::invalid_argument(
+        "--antenna needs --loops on and --gnss on, and goes not with --onto");
+  const std::string& file = arguments.mapper.config_file;
+  GnssReceiverConfig receiver = file.empty() ? GnssReceiverConfig{} : load_server_config(file).gnss;
+  if (!arguments.antenna.empty())
+    receiver.antenna_base = Eigen::Map<const Eigen::Vector3d>(arguments.antenna.data());
+  GnssOptions options;
+  options.config.max_sigma_m = receiver.max_sigma_m;
+  if (receiver.antenna_base) {
+    // Eigen's maxCoeff may step over NaN.
+    constexpr double largest_m = 1000.0;
+    if (!receiver.antenna_base->allFinite() ||
+        receiver.antenna_base->cwiseAbs().maxCoeff() > largest_m)
+      throw std::invalid_argument("--antenna needs finite numbers: x,y,z in metres");
+    options.antenna_lidar = body.T_body_lidar.inverse() * *receiver.antenna_base;
+  } else {
+    options.config.min_sigma_m = GnssConfig::size_of_robot_m;
+  }
+  if (is_used) options.fixes = dataset.gnss();
+  return options;
 }
 
 /// What makes the parts of a run one map.
@@ -291,17 +309,9 @@ MappingResult map_into(const MapOutputFolder& out, const ScanDataset& dataset,
   RunFile run_file(out.run_file(), run_identity(arguments, config, body, *labels, earlier),
                    std::chrono::duration<double>(arguments.save_period_s));
   std::optional<LoopOptions> loops;
-  if (arguments.loops == "on") {
-    const auto antenna = antenna_lidar(arguments, body);
-    loops = {.scans_file = out.kept_scans_file(),
-             .denied = denied_loops(arguments),
-             .fixes = arguments.gnss == "on" ? dataset.gnss() : std::vector<GnssFix>{},
-             .antenna_lidar = antenna.value_or(Eigen::Vector3d::Zero()),
-             .gnss = {}};
-    // It is somewhere on the robot: a fix says no more of the lidar than that.
-    constexpr double size_of_robot_m = 1.0;
-    if (!antenna) loops->gnss.min_sigma_m = size_of_robot_m;
-  }
+  if (arguments.loops == "on")
+    loops = {out.kept_scans_file(), denied_loops(arguments),
+             gnss_options(arguments, dataset, body)};
   return map_with_progress(dataset, arguments, config, body, std::move(labels), run_file, loops,
                            earlier, stop);
 }
@@ -349,7 +359,7 @@ ExitCode run(const MapArguments& arguments) {
   const MappedBody body = body_of(arguments);
   static_cast<void>(arguments.range.end(dataset));
   static_cast<void>(denied_loops(arguments));
-  static_cast<void>(antenna_lidar(arguments, body));
+  static_cast<void>(gnss_options(arguments, dataset, body));
   auto labels = make_segmenter(arguments.mapper, dataset);
   const std::unique_ptr<const EarlierMap> earlier = earlier_map(arguments, config);
   std::cerr << describe_model(arguments.mapper, dataset, *labels);
@@ -452,7 +462,8 @@ void add_map_command(CommandHandle program, Action& action) {
       "loops_before.png and loops_after.png show them. The scans are kept in the folder\n"
       "'unfinished' until then (some 0.1 MB a scan of 16 rings). A damaged file is named and "
       "skipped; its scan then has no pose.\n"
-      "A receiver's fixes make report.json's gnss.datum, which map.stillmap keeps for GeoTIFFs.\n"
+      "A receiver's fixes make report.json's loops.gnss.datum, which map.stillmap keeps for "
+      "GeoTIFFs.\n"
       "With --onto the drive is looked for in the map, scan by scan until some agree, then submap "
       "by\n"
       "submap; poses and map are in the earlier map's frame, what is gone is removed, what is new\n"
