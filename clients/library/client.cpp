@@ -21,6 +21,7 @@
 #include "idl/conversions/tile.hpp"
 #include "idl/conversions/traversability.hpp"
 #include "sensor_msgs.h"
+#include "submaps.h"
 
 namespace stillmap {
 
@@ -306,6 +307,15 @@ Subscription Client::subscribe_path(std::function<void(const Trajectory&)> path_
       connection_->participant, connection_->topics.path,
       [arrived = std::move(path_arrived)](const nav_msgs::msg::Path& message) {
         arrived(wire::from_path(message));
+      });
+}
+
+Subscription Client::subscribe_submaps(std::function<void(const SubmapsOfMap&)> submaps_arrived) {
+  return subscribe<stillmap_msgs::msg::SubmapList>(
+      connection_->participant, connection_->topics.submaps,
+      [arrived = std::move(submaps_arrived)](const stillmap_msgs::msg::SubmapList& message) {
+        const auto submaps = wire::from_wire(message);
+        if (submaps) arrived(*submaps);
       });
 }
 

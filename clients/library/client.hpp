@@ -21,6 +21,7 @@
 #include "core/traversability/traversability_view.hpp"
 #include "idl/conversions/cloud_to_scan.hpp"
 #include "idl/conversions/localization.hpp"
+#include "idl/conversions/submaps.hpp"
 #include "idl/dds/dds_options.hpp"
 #include "idl/interface/map_identity.hpp"
 #include "idl/interface/server_status.hpp"
@@ -220,6 +221,10 @@ class Client {
       std::function<void(const dds::ServerStatus&)> status_arrived);
   /// The whole path since the map began, at most once a second.
   [[nodiscard]] Subscription subscribe_path(std::function<void(const Trajectory&)> path_arrived);
+  /// Where the submaps of the map lie: at once as they are now, and whenever there is another one
+  /// or loop closing has moved them. Nothing comes from a server that closes no loops.
+  [[nodiscard]] Subscription subscribe_submaps(
+      std::function<void(const SubmapsOfMap&)> submaps_arrived);
   /// The newest version of every tile, first those that exist already.
   [[nodiscard]] Subscription subscribe_tiles(
       std::function<void(const dds::MapIdentity&, const Tile&)> tile_arrived);

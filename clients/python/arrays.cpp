@@ -104,6 +104,10 @@ py::array_t<double> array_from(const Eigen::MatrixXd& matrix) {
   return array;
 }
 
+py::object namespace_of(const py::dict& fields) {
+  return py::module_::import("types").attr("SimpleNamespace")(**fields);
+}
+
 PythonTrajectory trajectory_of(const Trajectory& trajectory) {
   std::vector<std::int64_t> stamps_ns;
   for (const StampedPose& pose : trajectory) stamps_ns.push_back(pose.stamp_ns);

@@ -69,6 +69,9 @@ std::vector<T> values_from(const std::optional<InArray<T>>& array, const std::st
 [[nodiscard]] py::array_t<double> array_from(std::span<const StampedPose> poses);
 [[nodiscard]] py::array_t<double> array_from(const Eigen::MatrixXd& matrix);
 
+/// An object with these fields (types.SimpleNamespace).
+[[nodiscard]] py::object namespace_of(const py::dict& fields);
+
 /// Arrays of what Python calls a trajectory.
 struct PythonTrajectory {
   py::array_t<std::int64_t> stamp_ns;

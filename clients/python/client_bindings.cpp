@@ -1,9 +1,11 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <array>
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
+#include <numbers>
 
 #include "clients/library/client.hpp"
 #include "clients/python/bindings.hpp"
@@ -163,6 +165,78 @@ py::object removed(Client& client, const Region& region, std::uint32_t max_voxel
   return removed_arrays(result.voxels);
 }
 
+py::object submaps(Client& client, double timeout_s) {
+  SubmapsOfMap now;
+  {
+    const py::gil_scoped_release released;
+    now = newest_of<SubmapsOfMap>([&](auto arrived) { return client.subscribe_submaps(arrived); },
+                                  timeout_s,
+                                  "the server tells no submaps: it closes no loops "
+                                  "(map.close_loops: false), or is older");
+  }
+  Trajectory poses;
+  std::vector<double> ways_m, jumps_m;
+  for (const SubmapList::Entry& entry : now.list.submaps) {
+    poses.push_back({entry.stamp_ns, entry.T_map_submap});
+    ways_m.push_back(entry.way_m);
+  }
+  std::vector<std::array<std::int64_t, 2>> loops;
+  for (const SubmapList::Loop& loop : now.list.loops) {
+    loops.push_back({static_cast<std::int64_t>(loop.from), static_cast<std::int64_t>(loop.to)});
+    jumps_m.push_back(loop.jump_m);
+  }
+  py::dict fields;
+  fields["map_id"] = now.map_id;
+  fields["graph_revision"] = now.list.graph_revision;
+  fields["trajectory"] = trajectory_of(poses);
+  fields["way_m"] = array_of<double>(std::move(ways_m));
+  fields["loops"] = array_of<std::int64_t>(std::move(loops), 2);
+  fields["jump_m"] = array_of<double>(std::move(jumps_m));
+  return namespace_of(fields);
+}
+
+py::object localize(Client& client, const std::optional<std::array<double, 3>>& near,
+                    double radius_m, double max_turn_rad, bool apply) {
+  LocalizationQuestion question{.guess = std::nullopt, .apply = apply};
+  if (near) {
+    const auto& [x_m, y_m, heading_rad] = *near;
+    question.guess =
+        PlaceGuess{.T_map_base = Eigen::Translation3d(x_m, y_m, 0.0) *
+                                 Eigen::AngleAxisd(heading_rad, Eigen::Vector3d::UnitZ()),
+                   .radius_m = radius_m,
+                   .max_turn_rad = max_turn_rad};
+  }
+  LocalizationAnswer answer;
+  {
+    const py::gil_scoped_release released;
+    answer = client.localize(question);
+  }
+  const bool is_found = answer.outcome == LocalizationStatus::found;
+  py::dict fields;
+  fields["outcome"] = std::string(name(answer.outcome));
+  fields["T_map_base"] = is_found ? py::object(array_from(answer.T_map_base)) : py::none();
+  fields["stamp_ns"] = answer.stamp_ns;
+  fields["score"] = answer.score;
+  fields["runner_up_score"] = answer.runner_up_score;
+  fields["applied"] = answer.applied;
+  return namespace_of(fields);
+}
+
+void bind_place_requests(py::class_<Client>& client) {
+  client
+      .def("submaps", &submaps, py::arg("timeout_s") = 5.0,
+           "Where the submaps of the running map lie, and the loops that join them: map_id, "
+           "graph_revision (how often loop closing has moved them), trajectory (their poses, a "
+           "Trajectory), way_m (n,), loops (m, 2) indices of submaps, jump_m (m,). Raises "
+           "ServiceTimeout where the server closes no loops.")
+      .def("localize", &localize, py::arg("near") = py::none(), py::arg("radius_m") = 20.0,
+           py::arg("max_turn_rad") = std::numbers::pi, py::arg("apply") = false,
+           "Where the server's last scan is in its map: outcome ('found', 'ambiguous', "
+           "'not_found', 'no_evidence'), T_map_base (4, 4; None unless found), stamp_ns, score, "
+           "runner_up_score, applied. near: x, y [m] and heading [rad] in the map frame; None: "
+           "anywhere. apply: the server goes on there once the next scans confirm it.");
+}
+
 void bind_map_requests(py::class_<Client>& client) {
   client
       .def("query", &query_server, py::arg("region"),
@@ -218,6 +292,7 @@ void bind_client(py::module_& module) {
       .def("check_path", &check, py::arg("positions_map"), py::arg("headings_rad") = py::none(),
            py::arg("robot") = "car", "As Traversability.check_path().");
   bind_map_requests(client);
+  bind_place_requests(client);
 }
 
 }  // namespace stillmap::python

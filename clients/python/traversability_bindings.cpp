@@ -21,10 +21,6 @@ void require_answer(TraversabilityStatus status, const std::string& reason) {
   throw std::invalid_argument(reason);
 }
 
-py::object namespace_of(const py::dict& fields) {
-  return py::module_::import("types").attr("SimpleNamespace")(**fields);
-}
-
 template <typename Scalar, typename Value>
 py::array_t<Scalar> cells_of(const TraversabilityAnswer& answer, Value value) {
   py::array_t<Scalar> array({answer.grid.height, answer.grid.width});

@@ -39,6 +39,26 @@ std::optional<MapOnEarth> LiveLoopCloser::on_earth() const {
   return MapOnEarth{gnss_.enu()->datum_of(*T_enu_map), gnss_.enu()->T_earth(*T_enu_map)};
 }
 
+SubmapList LiveLoopCloser::submaps() const {
+  if (!end_reason_.empty()) return last_submaps_;
+  SubmapList list{.graph_revision = corrections_, .submaps = {}, .loops = {}};
+  for (const PlacedSubmap& placed : closer_.submaps()) {
+    const LoopCloser::Node& key = closer_.nodes()[placed.submap.key_node];
+    list.submaps.push_back({stamps_ns_[key.scan], key.way_m, T_map_lidar_[key.scan]});
+  }
+  for (std::size_t i = 0; i < closer_.joints().size(); ++i) {
+    const LoopCloser::Joint& joint = closer_.joints()[i];
+    const LoopClosure& closure = closer_.closures()[i];
+    list.loops.push_back({.from = joint.from,
+                          .to = joint.to,
+                          .T_from_to = closure.T_from_to,
+                          .overlap = closure.overlap,
+                          .upright_fit = closure.upright_fit,
+                          .jump_m = closure.jump_m});
+  }
+  return list;
+}
+
 bool LiveLoopCloser::has_moved(const Eigen::Isometry3d& T_odom_lidar) const {
   if (stamps_ns_.empty()) return true;
   const Eigen::Isometry3d motion = T_odom_lidar_last_.inverse() * T_odom_lidar;
@@ -47,6 +67,7 @@ bool LiveLoopCloser::has_moved(const Eigen::Isometry3d& T_odom_lidar) const {
 }
 
 void LiveLoopCloser::end(const char* reason) {
+  last_submaps_ = submaps();
   end_reason_ = reason;
   closer_ = LoopCloser(config_.closing);
   stamps_ns_ = {};
@@ -67,6 +88,7 @@ std::optional<MapCorrection> LiveLoopCloser::correction() {
   if (max_shift_m < config_.min_shift_m) return std::nullopt;
   known_closures_ = closer_.closures().size();
   T_map_lidar_ = corrected;
+  ++corrections_;
   MapCorrection correction(std::move(poses));
   T_map_odom_ = correction.latest() * T_map_odom_;
   return correction;

@@ -10,6 +10,7 @@
 
 #include "core/graph/loop_closer.hpp"
 #include "core/map/map_correction.hpp"
+#include "core/map/submap_list.hpp"
 
 namespace stillmap {
 
@@ -59,6 +60,14 @@ class LiveLoopCloser {
   [[nodiscard]] const GnssTrack& gnss() const { return gnss_; }
   /// By the corrections until now; nothing while it is not known.
   [[nodiscard]] std::optional<MapOnEarth> on_earth() const;
+  /// The submaps as they are in the map once the last correction is carried out; after the end, as
+  /// they were then.
+  [[nodiscard]] SubmapList submaps() const;
+  [[nodiscard]] std::size_t submap_count() const {
+    return end_reason_.empty() ? closer_.submaps().size() : last_submaps_.submaps.size();
+  }
+  /// How many there were.
+  [[nodiscard]] std::uint64_t corrections() const { return corrections_; }
   [[nodiscard]] std::size_t submap_bytes() const { return closer_.submap_bytes(); }
   [[nodiscard]] std::size_t scans_looked_at() const { return stamps_ns_.size(); }
   /// Why no more loops are closed; empty while they are.
@@ -85,7 +94,9 @@ class LiveLoopCloser {
   /// How many were believed when poses were corrected last.
   std::size_t known_closures_ = 0;
   std::size_t known_submaps_ = 0;
+  std::uint64_t corrections_ = 0;
   std::string end_reason_;
+  SubmapList last_submaps_;
 };
 
 }  // namespace stillmap

@@ -130,6 +130,14 @@ class LoopCloser {
   [[nodiscard]] const std::vector<PlacedSubmap>& submaps() const { return submaps_; }
   /// Memory of the submaps.
   [[nodiscard]] std::size_t submap_bytes() const;
+  /// Submaps that a closure joins, and the number of its edge in the graph.
+  struct Joint {
+    std::size_t from = 0;
+    std::size_t to = 0;
+    std::size_t edge = 0;
+  };
+  /// Of each of `closures()`.
+  [[nodiscard]] const std::vector<Joint>& joints() const { return joints_; }
 
  private:
   /// A closure between submaps, before it is believed.
@@ -175,10 +183,6 @@ class LoopCloser {
   /// Those that wait for a second one.
   std::deque<Candidate> pending_;
   std::vector<LoopClosure> closures_;
-  /// Submaps and number of the graph's edge of each closure.
-  struct Joint {
-    std::size_t from, to, edge;
-  };
   std::vector<Joint> joints_;
   std::vector<LoopClosure> refused_;
   std::vector<DeniedLoop> denied_;

@@ -41,6 +41,7 @@ Topics Topics::in(const std::string& name_space) {
       .tiles = symmetric<stillmap_msgs::msg::MapTile>(prefix + "tiles", large_keyed),
       .status = symmetric<stillmap_msgs::msg::Status>(prefix + "status", latched),
       .octomap = symmetric<octomap_msgs::msg::Octomap>(prefix + "octomap", large),
+      .submaps = symmetric<stillmap_msgs::msg::SubmapList>(prefix + "submaps", large),
       .traversability = symmetric<nav_msgs::msg::OccupancyGrid>(prefix + "traversability", large),
   };
 }

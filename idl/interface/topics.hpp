@@ -37,6 +37,8 @@ struct Topics {
   TopicSpec<stillmap_msgs::msg::MapTile> tiles;
   TopicSpec<stillmap_msgs::msg::Status> status;
   TopicSpec<octomap_msgs::msg::Octomap> octomap;
+  /// What loop closing moves, after each time that it did, and when one is added.
+  TopicSpec<stillmap_msgs::msg::SubmapList> submaps;
   /// Where the robot of `traversability.grid_profile` can go.
   TopicSpec<nav_msgs::msg::OccupancyGrid> traversability;
 
@@ -50,10 +52,10 @@ template <typename Visit>
 void for_each_topic(const Topics& topics, Visit&& visit) {
   // Every field by name: one more in Topics, and this does not compile.
   const auto& [odometry, local_odometry, tf, tf_static, path, scan, static_cloud, tile_index, tiles,
-               status, octomap, traversability] = topics;
+               status, octomap, submaps, traversability] = topics;
   const auto visit_all = [&](const auto&... topic) { (visit(topic), ...); };
   visit_all(odometry, local_odometry, tf, tf_static, path, scan, static_cloud, tile_index, tiles,
-            status, octomap, traversability);
+            status, octomap, submaps, traversability);
 }
 
 /// Incoming scans as the server reads them: reliably from whoever offers that, since large samples

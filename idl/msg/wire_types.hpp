@@ -35,5 +35,6 @@ class TileChange;
 class MapTile;
 class MapIdentity;
 class Status;
+class SubmapList;
 class Voxels;
 }  // namespace stillmap_msgs::msg

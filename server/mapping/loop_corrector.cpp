@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <deque>
 #include <utility>
 
 #include "server/mapping/milliseconds.hpp"
@@ -27,16 +28,26 @@ LoopCorrector::LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Sta
       antenna_base_(antenna_base),
       scans_(max_waiting_scans) {
   worker_.emplace(
-      scans_, [this](const ScanOfMap& scan) { look_at(scan); }, WorkerOptions{.on_start = [] {
-        static_cast<void>(use_scheduling(BackgroundScheduling::low));
-      }});
+      scans_, [this](const ScanOfMap& scan) { look_at(scan); },
+      WorkerOptions{
+          .on_start = [] { static_cast<void>(use_scheduling(BackgroundScheduling::low)); },
+          .on_failure = [this] { failed_.request_stop(); }});
 }
 
 void LoopCorrector::begin_map(bool is_new) {
   map_ = is_new ? ++maps_ : 0;
+  // The worker frees what it kept of the last one.
+  scans_.edit([](std::deque<ScanOfMap>& scans) {
+    scans.clear();
+    scans.emplace_back();
+  });
   const std::scoped_lock lock(mutex_);
   found_.reset();
   place_.reset();
+  submaps_.reset();
+  map_revision_ = 0;
+  last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
+  is_clock_set_back_ = false;
 }
 
 void LoopCorrector::add(const GnssFix& fix) {
@@ -53,11 +64,13 @@ void LoopCorrector::add(std::shared_ptr<const LabelledScan> labelled,
                         const Eigen::Isometry3d& T_odom_lidar,
                         const Eigen::Isometry3d& T_base_lidar, bool is_confirmed) {
   if (map_ == 0) return;
+  const std::int64_t stamp_ns = labelled->scan.stamp_ns;
+  if (stamp_ns <= std::exchange(last_stamp_ns_, stamp_ns)) is_clock_set_back_ = true;
   ScanOfMap scan{map_, std::move(labelled), T_odom_lidar, T_base_lidar.inverse() * antenna_base_,
                  is_confirmed};
   if (is_lossless_) {
-    // The worker outlives mapping: there is nothing to stop for.
-    static_cast<void>(scans_.push_blocking(std::move(scan), {}));
+    // The worker outlives mapping: there is nothing else to stop for.
+    static_cast<void>(scans_.push_blocking(std::move(scan), failed_.get_token()));
     return;
   }
   const std::size_t left_out = scans_.push_dropping_oldest(std::move(scan));
@@ -67,19 +80,28 @@ void LoopCorrector::add(std::shared_ptr<const LabelledScan> labelled,
 std::optional<MapCorrection> LoopCorrector::take() {
   const std::scoped_lock lock(mutex_);
   auto found = std::exchange(found_, std::nullopt);
-  if (!found || found->map != map_) return std::nullopt;
+  if (!found || found->map != map_ || is_clock_set_back_) return std::nullopt;
+  taken_revision_ = found->graph_revision;
   return std::move(found->correction);
 }
 
 std::optional<MapOnEarth> LoopCorrector::take_place() {
   const std::scoped_lock lock(mutex_);
-  const auto place = std::exchange(place_, std::nullopt);
-  if (!place || place->map != map_) return std::nullopt;
-  return place->place;
+  if (!place_ || place_->map != map_ || place_->graph_revision != map_revision_)
+    return std::nullopt;
+  return std::exchange(place_, std::nullopt)->place;
+}
+
+std::optional<SubmapList> LoopCorrector::take_submaps() {
+  const std::scoped_lock lock(mutex_);
+  if (!submaps_ || submaps_->map != map_ || submaps_->list.graph_revision != map_revision_)
+    return std::nullopt;
+  return std::exchange(submaps_, std::nullopt)->list;
 }
 
 void LoopCorrector::report(const MapCorrection& correction, const CorrectedMap& corrected,
                            double ms) {
+  map_revision_ = taken_revision_;
   statistics_.count("map_corrections");
   statistics_.add_latency("correction", ms);
   spdlog::info(
@@ -89,9 +111,14 @@ void LoopCorrector::report(const MapCorrection& correction, const CorrectedMap& 
 }
 
 void LoopCorrector::look_at(const ScanOfMap& scan) {
+  if (scan.labelled == nullptr) {
+    closer_.reset();
+    closed_map_ = 0;
+    return;
+  }
   if (std::exchange(closed_map_, scan.map) != scan.map) {
     closer_.emplace(config_);
-    reported_ = reported_placed_ = reported_misplaced_ = 0;
+    reported_ = reported_placed_ = reported_misplaced_ = handed_on_submaps_ = 0;
   }
   const auto began = std::chrono::steady_clock::now();
   const bool had_ended = !closer_->end_reason().empty();
@@ -103,14 +130,22 @@ void LoopCorrector::look_at(const ScanOfMap& scan) {
     spdlog::warn("loops stay open from here on: {}", closer_->end_reason());
   report_fixes();
   report_closures();
+  hand_on_submaps(scan.map);
   const std::scoped_lock lock(mutex_);
-  if (const auto place = closer_->on_earth()) place_ = Place{scan.map, *place};
+  if (const auto place = closer_->on_earth())
+    place_ = Place{scan.map, *place, closer_->corrections()};
   if (!correction) return;
   // Of two that were not taken yet the second is of the map after the first.
-  if (found_ && found_->map == scan.map)
-    found_->correction = combined(found_->correction, *correction);
-  else
-    found_ = Found{scan.map, *std::move(correction)};
+  if (found_ && found_->map == scan.map) correction = combined(found_->correction, *correction);
+  found_ = Found{scan.map, *std::move(correction), closer_->corrections()};
+}
+
+void LoopCorrector::hand_on_submaps(std::uint64_t map) {
+  const std::size_t submaps = closer_->submap_count();
+  if (submaps == std::exchange(handed_on_submaps_, submaps)) return;
+  SubmapList list = closer_->submaps();
+  const std::scoped_lock lock(mutex_);
+  submaps_ = Submaps{map, std::move(list)};
 }
 
 void LoopCorrector::hand_on_fixes() {

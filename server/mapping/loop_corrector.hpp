@@ -2,14 +2,17 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <stop_token>
 #include <vector>
 
 #include "core/graph/live_loop_closer.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/map/map_correction.hpp"
+#include "core/map/submap_list.hpp"
 #include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/threads/bounded_queue.hpp"
@@ -42,16 +45,22 @@ class LoopCorrector {
            const Eigen::Isometry3d& T_base_lidar, bool is_confirmed);
   /// Scans that are not looked at yet.
   [[nodiscard]] std::size_t waiting() const { return scans_.waiting(); }
-  /// What is to be moved, once; it has to be.
+  /// What is to be moved, once; it has to be. Nothing after a clock that was set back: what was
+  /// seen since then would be taken for what was seen before.
   [[nodiscard]] std::optional<MapCorrection> take();
-  /// Where the map lies, when that was found out or found out better; once.
+  /// Where the map lies, when that was found out or found out better; once, and only as the map is:
+  /// not between a correction and its report.
   [[nodiscard]] std::optional<MapOnEarth> take_place();
+  /// The submaps, by poses of the lidar, where there is another one or they were moved; once, and
+  /// only as the map has them: not between a correction and its report.
+  [[nodiscard]] std::optional<SubmapList> take_submaps();
   /// It was moved, within this time.
   void report(const MapCorrection& correction, const CorrectedMap& corrected, double ms);
 
  private:
   struct ScanOfMap {
     std::uint64_t map = 0;
+    /// Null: another map begins.
     std::shared_ptr<const LabelledScan> labelled;
     Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
     Eigen::Vector3d antenna_lidar = Eigen::Vector3d::Zero();
@@ -63,6 +72,7 @@ class LoopCorrector {
   void hand_on_fixes();
   void report_fixes();
   void report_closures();
+  void hand_on_submaps(std::uint64_t map);
 
   LiveLoopConfig config_;
   bool is_lossless_;
@@ -71,18 +81,31 @@ class LoopCorrector {
   /// Maps are numbered; 0: loops stay open.
   std::uint64_t map_ = 0;
   std::uint64_t maps_ = 0;
+  /// Of the map's scans: corrections tell them apart by their stamps.
+  std::int64_t last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
+  bool is_clock_set_back_ = false;
+  /// Of the graph, as the correction that was taken last makes the map, and as the map is.
+  std::uint64_t taken_revision_ = 0;
+  std::uint64_t map_revision_ = 0;
 
   std::mutex mutex_;
   struct Found {
     std::uint64_t map = 0;
     MapCorrection correction;
+    std::uint64_t graph_revision = 0;
   };
   std::optional<Found> found_;
   struct Place {
     std::uint64_t map = 0;
     MapOnEarth place;
+    std::uint64_t graph_revision = 0;
   };
   std::optional<Place> place_;
+  struct Submaps {
+    std::uint64_t map = 0;
+    SubmapList list;
+  };
+  std::optional<Submaps> submaps_;
   std::vector<GnssFix> fixes_;
 
   // Of the worker.
@@ -91,8 +114,11 @@ class LoopCorrector {
   std::size_t reported_ = 0;
   std::size_t reported_placed_ = 0;
   std::size_t reported_misplaced_ = 0;
+  std::size_t handed_on_submaps_ = 0;
   ThrottledLog throttled_log_;
 
+  /// The worker ended by a fault: nobody takes scans any more.
+  std::stop_source failed_;
   BoundedQueue<ScanOfMap> scans_;
   // Last: stops before what it uses is gone.
   std::optional<Worker<ScanOfMap>> worker_;

@@ -38,6 +38,7 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
   if (config.map.close_loops) {
     loops_.emplace(live_loops(config), config.input.delivery == DeliveryMode::every,
                    context.statistics, config.gnss.antenna_base.value_or(Eigen::Vector3d::Zero()));
+    submaps_.emplace(context.participant, context.topics);
   }
   if (loops_ && !config.topics.gnss.empty()) {
     gnss_.emplace(context.participant, config.topics.gnss, config.input.delivery, *loops_,
@@ -54,6 +55,7 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
       .place_finder = &place_finder_,
       .loops = loops_ ? &*loops_ : nullptr,
       .earth = earth_ ? &*earth_ : nullptr,
+      .submaps = submaps_ ? &*submaps_ : nullptr,
       .throttle = &context.throttle};
   thread_.emplace(config, std::move(segmenter), storage_.take_loaded(),
                   storage_.saver().tile_store(), scans_, context.statistics, storage_.latest_map(),

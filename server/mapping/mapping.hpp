@@ -85,6 +85,7 @@ class Mapping {
   std::optional<LoopCorrector> loops_;
   std::optional<GnssReceiver> gnss_;
   std::optional<EarthFrame> earth_;
+  std::optional<SubmapPublisher> submaps_;
   std::optional<InitialPoseReceiver> initial_pose_;
   // Each uses what stands above it, and stops before it.
   std::optional<MappingThread> thread_;

@@ -32,6 +32,10 @@ constexpr std::size_t tiles_at_once = 8;
 // Tiles of one request that may have to be read from the disk.
 constexpr std::size_t max_stored_tiles = 4000;
 
+// Fewer than after which a mapper believes a clock (ScanClock), and more than a sender that starts
+// over repeats.
+constexpr int steps_of_set_clock = 5;
+
 constexpr std::size_t no_limit = std::numeric_limits<std::size_t>::max();
 
 // The rest of the limit is for copies: in the writers' histories, and for queries.
@@ -70,6 +74,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
       imu_report_(statistics),
       frames_(config, outputs.static_transforms, statistics),
       prior_(outputs.prior, frames_, config.frames.odom, statistics),
+      map_frame_(config.frames.map),
       odom_frame_(config.frames.odom) {
   // The whole path is the latest map's.
   mapper_.limit_trajectory(mapper_poses);
@@ -143,6 +148,7 @@ void MappingThread::begin_map(SharedTrajectory trajectory) {
   if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
   if (outputs_.loops != nullptr) outputs_.loops->begin_map(latest_map_.view()->tiles.empty());
   if (outputs_.earth != nullptr) outputs_.earth->forget();
+  publish_submaps({});
   if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
 }
 
@@ -150,7 +156,16 @@ void MappingThread::close_loops() {
   if (outputs_.loops == nullptr || is_map_frozen_) return;
   if (const auto place = outputs_.loops->take_place(); place && outputs_.earth != nullptr)
     outputs_.earth->publish(latest_map_.newest_pose().stamp_ns, *place);
+  if (const auto submaps = outputs_.loops->take_submaps()) publish_submaps(*submaps);
   if (auto correction = outputs_.loops->take()) corrector_.begin(*std::move(correction));
+}
+
+void MappingThread::publish_submaps(const SubmapList& submaps) {
+  if (outputs_.submaps == nullptr) return;
+  outputs_.submaps->publish({.map_id = latest_map_.view()->map_id,
+                             .frame = map_frame_,
+                             .child_frame = frames_.base(),
+                             .list = of_frame(submaps, frames_.T_base_lidar().inverse())});
 }
 
 bool MappingThread::take_corrected(bool is_idle) {
@@ -195,16 +210,18 @@ void MappingThread::end_correction() {
 
 RunCheckpoint MappingThread::checkpoint(CheckpointScope scope) {
   MapCheckpoint map;
+  SharedTrajectory path;
   std::string datum;
   requests_.run([&] {
     if (outputs_.earth != nullptr) datum = outputs_.earth->datum();
     const auto began = Clock::now();
     map = mapper_.static_map().checkpoint(scope);
     latest_map_.publish(map.view);
+    path = latest_map_.trajectory();
     statistics_.add_latency("checkpoint", milliseconds(Clock::now() - began));
   });
   RunCheckpoint checkpoint{to_saved_map(map), map.step};
-  checkpoint.map.trajectory = latest_map_.trajectory();
+  checkpoint.map.trajectory = std::move(path);
   if (!datum.empty()) checkpoint.map.metadata["datum"] = datum;
   return checkpoint;
 }
@@ -341,9 +358,13 @@ void MappingThread::map(QueuedScan queued) {
   statistics_.add_latency("queue", milliseconds(began - queued.received));
   const std::int64_t stamp_ns = queued.scan.stamp_ns;
   if (!locate_lidar(queued)) return drop({"unknown_frame", frames_.missing()});
+  // A clock that is being set back: a correction, which tells times apart, is to meet none of after
+  // that. Now no scan waits for it: none is mapped until the mapper believes the clock.
+  if (corrector_.is_running() && steps_back_ >= steps_of_set_clock) end_correction();
   feed_imu(queued.scan);
   auto mapped = mapper_.process(std::move(queued.scan), prior_for(stamp_ns));
   if (!mapped) return drop(mapper_.last_rejection());
+  steps_back_ = 0;
   imu_report_.update(mapper_.inertial());
   const bool unlabelled = mapped->labelled.labels.empty();
   latest_map_.add_pose({stamp_ns, T_map_base(mapped->odometry)}, mapped->odometry.health,
@@ -359,6 +380,7 @@ void MappingThread::map(QueuedScan queued) {
 }
 
 void MappingThread::drop(const ScanRejection& rejection) {
+  if (rejection.counter == "out_of_order") ++steps_back_;
   statistics_.scans_dropped(rejection.counter, 1, rejection.reason);
   throttled_log_.warn(rejection.counter, "scan dropped: " + rejection.reason);
 }

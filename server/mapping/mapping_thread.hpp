@@ -27,6 +27,7 @@
 #include "server/occupancy/occupancy_thread.hpp"
 #include "server/publishers/latest_map.hpp"
 #include "server/publishers/scan_publishers.hpp"
+#include "server/publishers/submap_publisher.hpp"
 #include "server/threads/background_throttle.hpp"
 #include "server/threads/request_queue.hpp"
 #include "server/threads/worker.hpp"
@@ -44,6 +45,7 @@ struct MappingOutputs {
   PlaceFinder* place_finder = nullptr;
   LoopCorrector* loops = nullptr;
   EarthFrame* earth = nullptr;
+  SubmapPublisher* submaps = nullptr;
   BackgroundThrottle* throttle = nullptr;
 };
 
@@ -118,6 +120,8 @@ class MappingThread : public CheckpointSource {
   void end_round(bool is_idle);
   /// Has the map moved where a place was seen again, beside mapping.
   void close_loops();
+  /// Those of the running map, by poses of the lidar.
+  void publish_submaps(const SubmapList& submaps);
   /// Goes on with a map that was moved. False until all scans are in it: nobody else may have it.
   [[nodiscard]] bool take_corrected(bool is_idle);
   /// Waits for a map that is being moved.
@@ -178,6 +182,7 @@ class MappingThread : public CheckpointSource {
   ImuReport imu_report_;
   RobotFrames frames_;
   RobotPrior prior_;
+  std::string map_frame_;
   std::string odom_frame_;
   /// Where there is a frame odom of our own.
   std::optional<OdomFrame> odom_;
@@ -188,6 +193,8 @@ class MappingThread : public CheckpointSource {
   std::chrono::steady_clock::time_point received_;
   std::chrono::steady_clock::time_point stage_began_;
   double labels_ms_ = 0.0;
+  /// Scans in a row with stamps of before the last one.
+  int steps_back_ = 0;
   std::chrono::steady_clock::time_point snapshot_published_;
   /// Run after the scan in work.
   RequestQueue requests_;

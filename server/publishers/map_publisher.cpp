@@ -26,6 +26,7 @@ bool MapPublisher::has_changed(PathState& published, bool with_view) const {
   const auto view = latest_map_.view();
   const PathState now{.map_id = view->map_id,
                       .poses = latest_map_.poses_added(),
+                      .corrections = latest_map_.corrections(),
                       .version = with_view ? view->version : 0};
   if (now == published || (now.poses == 0 && view->tiles.empty())) return false;
   published = now;

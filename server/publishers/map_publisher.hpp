@@ -21,10 +21,11 @@ class MapPublisher {
                const LatestMap& latest_map, TileReader& tiles);
 
  private:
-  /// Changes with every pose, and when a map was loaded.
+  /// Changes with every pose, and when a map was loaded or corrected.
   struct PathState {
     std::uint64_t map_id = 0;
     std::uint64_t poses = 0;
+    std::uint64_t corrections = 0;
     /// Of the view, where that is published, too.
     std::uint64_t version = 0;
     friend bool operator==(const PathState&, const PathState&) = default;

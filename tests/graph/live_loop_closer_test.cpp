@@ -84,6 +84,36 @@ TEST(LiveLoopCloser, TheMapIsMovedAsSoonAsAPlaceIsSeenAgain) {
   EXPECT_LT((drive.in_map.back().translation() - drive.truth.back().translation()).norm(), 0.5);
 }
 
+TEST(LiveLoopCloser, SubmapsLieWhereTheMapHasThem) {
+  LiveDrive drive(11);
+  EXPECT_TRUE(drive.closer().submaps().submaps.empty());
+  std::size_t joined = 0;
+  for (double way_m = 60.0; way_m < 1.4 * StreetWorld::length_m; way_m += 20.0) {
+    drive.go(way_m);
+    const SubmapList list = drive.closer().submaps();
+    ASSERT_EQ(list.submaps.size(), drive.closer().submap_count());
+    EXPECT_EQ(list.graph_revision, static_cast<std::uint64_t>(drive.corrections));
+    EXPECT_EQ(list.loops.size(), drive.closer().closures().size());
+    double last_m = -1.0;
+    for (const SubmapList::Entry& submap : list.submaps) {
+      const auto scan = static_cast<std::size_t>((submap.stamp_ns - 1'000'000'000) / 100'000'000);
+      EXPECT_TRUE(submap.T_map_submap.isApprox(drive.in_map.at(scan), 1e-9));
+      EXPECT_GT(submap.way_m, last_m);
+      last_m = submap.way_m;
+    }
+    for (const SubmapList::Loop& loop : list.loops) {
+      ASSERT_LT(loop.from, loop.to);
+      ASSERT_LT(loop.to, list.submaps.size());
+      const Eigen::Isometry3d T_from_to =
+          list.submaps[loop.from].T_map_submap.inverse() * list.submaps[loop.to].T_map_submap;
+      EXPECT_LT((T_from_to.translation() - loop.T_from_to.translation()).norm(), 0.5);
+    }
+    joined += list.loops.size();
+  }
+  EXPECT_GT(drive.corrections, 0);
+  EXPECT_GT(joined, 0U);
+}
+
 TEST(LiveLoopCloser, SmallCorrectionsWaitForOneAnother) {
   LiveLoopConfig patient;
   patient.min_shift_m = 100.0;
@@ -101,6 +131,8 @@ TEST(LiveLoopCloser, AClockThatIsSetBackLeavesLoopsOpen) {
   drive.go(1.5 * StreetWorld::length_m);
   EXPECT_EQ(drive.corrections, 0);
   EXPECT_THAT(drive.closer().end_reason(), testing::HasSubstr("set back"));
+  EXPECT_EQ(drive.closer().submaps().submaps.size(), drive.closer().submap_count());
+  EXPECT_GT(drive.closer().submap_count(), 0U) << "those of before";
 }
 
 TEST(LiveLoopCloser, ARobotThatStandsAddsNothing) {
@@ -119,6 +151,7 @@ TEST(LiveLoopCloser, MemoryIsBounded) {
   drive.go(0.6 * StreetWorld::length_m);
   EXPECT_THAT(drive.closer().end_reason(), testing::HasSubstr("limit"));
   EXPECT_EQ(drive.closer().submap_bytes(), 0U);
+  EXPECT_GT(drive.closer().submaps().submaps.size(), 0U) << "clients keep the places";
   drive.go(1.5 * StreetWorld::length_m);
   EXPECT_EQ(drive.closer().submap_bytes(), 0U);
   EXPECT_EQ(drive.corrections, 0);

@@ -10,6 +10,7 @@
 #include "idl/interface/services.hpp"
 #include "idl/interface/topics.hpp"
 #include "sensor_msgs.h"
+#include "submaps.h"
 #include "tf2_msgs.h"
 
 namespace stillmap::dds {

@@ -36,6 +36,26 @@ def test_the_path_is_there(client):
     assert np.all(np.diff(path.stamp_ns) > 0)
 
 
+def test_submaps_come_as_arrays(client):
+    submaps = client.submaps(PATIENCE_S)
+    assert submaps.map_id == client.status()["map_id"] and submaps.graph_revision == 0
+    n = len(submaps.trajectory)
+    assert submaps.trajectory.T_map_body.shape == (n, 4, 4) and submaps.way_m.shape == (n,)
+    assert submaps.loops.shape == (0, 2) and submaps.jump_m.shape == (0,)
+
+
+def test_the_robot_is_found_where_it_is(client):
+    here = client.trajectory(PATIENCE_S).T_map_body[-1]
+    heading = np.arctan2(here[1, 0], here[0, 0])
+    found = client.localize(near=(here[0, 3], here[1, 3], heading), radius_m=10.0)
+    assert found.outcome in ("found", "ambiguous", "not_found", "no_evidence")
+    assert (found.T_map_base is not None) == (found.outcome == "found") and not found.applied
+    if found.outcome == "found":
+        np.testing.assert_allclose(found.T_map_base[:2, 3], here[:2, 3], atol=0.5)
+    with pytest.raises(stillmap.ServiceError, match="radius"):
+        client.localize(near=(0.0, 0.0, 0.0), radius_m=-1.0)
+
+
 def test_traversability_is_that_of_the_servers_map(client):
     end = time.monotonic() + PATIENCE_S
     while True:

@@ -238,7 +238,8 @@ class CyclonePeerTest(unittest.TestCase):
         latched = {topic for topic, facts in writers.items()
                    if facts["durability"] == "TRANSIENT_LOCAL"}
         self.assertEqual(latched, {f"rt/stillmap/{name}" for name in (
-            "path", "static_cloud", "tile_index", "tiles", "traversability", "octomap", "status")})
+            "path", "static_cloud", "tile_index", "tiles", "traversability", "octomap", "status",
+            "submaps")})
         for facts in graph.all("writer") + graph.all("reader"):
             self.assertRegex(facts["topic"], r"^(rt|rq|rr)/")
             self.assertRegex(facts["type"], r"^\w+::(msg|srv)::dds_::\w+_$")

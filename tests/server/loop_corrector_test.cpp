@@ -62,6 +62,33 @@ TEST(LoopCorrector, SaysBesideTheDriveWhatIsToBeMoved) {
   EXPECT_GT(round.corrections.front().latest().translation().norm(), 0.1);
 }
 
+TEST(LoopCorrector, TellsSubmapsOnlyAsTheMapHasThem) {
+  Statistics statistics;
+  LoopCorrector loops({}, true, statistics);
+  loops.begin_map(true);
+  Round round(loops);
+  round.takes = false;
+  round.go(0.5 * StreetWorld::length_m);
+  std::optional<SubmapList> list;
+  ASSERT_TRUE(test::eventually([&] { return (list = loops.take_submaps()).has_value(); }));
+  EXPECT_GE(list->submaps.size(), 2U);
+  EXPECT_EQ(list->graph_revision, 0U);
+  EXPECT_FALSE(loops.take_submaps()) << "nothing changed";
+
+  round.go(1.25 * StreetWorld::length_m);
+  std::optional<MapCorrection> correction;
+  ASSERT_TRUE(test::eventually([&] { return (correction = loops.take()).has_value(); }));
+  EXPECT_FALSE(loops.take_submaps()) << "the map is not moved yet";
+  loops.report(*correction, {}, 1.0);
+  list = loops.take_submaps();
+  ASSERT_TRUE(list);
+  EXPECT_GT(list->graph_revision, 0U);
+  EXPECT_FALSE(list->loops.empty());
+
+  loops.begin_map(true);
+  EXPECT_FALSE(loops.take_submaps()) << "of the map before";
+}
+
 TEST(LoopCorrector, SaysNothingOfAMapThatWasLoadedOrIsNoMore) {
   Statistics statistics;
   LoopCorrector loops({}, true, statistics);
@@ -75,6 +102,21 @@ TEST(LoopCorrector, SaysNothingOfAMapThatWasLoadedOrIsNoMore) {
   round.go(1.25 * StreetWorld::length_m);
   ASSERT_TRUE(test::eventually([&] { return closed(statistics) > 0; }));
   loops.begin_map(true);
+  EXPECT_FALSE(loops.take());
+}
+
+TEST(LoopCorrector, MovesNothingByTimesThatCameTwice) {
+  Statistics statistics;
+  LoopCorrector loops({}, true, statistics);
+  loops.begin_map(true);
+  Round round(loops);
+  round.takes = false;
+  round.go(1.25 * StreetWorld::length_m);
+  ASSERT_TRUE(test::eventually([&] { return closed(statistics) > 0; }));
+  auto again = std::make_shared<LabelledScan>();
+  again->scan.stamp_ns = 1;
+  loops.add(again, Eigen::Isometry3d::Identity(), Eigen::Isometry3d::Identity(), true);
+  ASSERT_TRUE(test::eventually([&] { return loops.waiting() == 0; }));
   EXPECT_FALSE(loops.take());
 }
 

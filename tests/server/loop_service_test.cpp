@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <algorithm>
 #include <map>
 #include <mutex>
 
@@ -92,6 +93,17 @@ TEST(LoopService, APlaceSeenAgainCorrectsTheMapThatIsServedAndStored) {
   ASSERT_TRUE(eventually([&] { return corrections() > 0; }));
   EXPECT_GT(client.status().counter("loops_closed"), 0U);
 
+  // Who joins now is told where the submaps lie, as the map has them.
+  SubmapsOfMap submaps;
+  const Subscription joining = client.subscribe_submaps([&](const SubmapsOfMap& arrived) {
+    const std::scoped_lock lock(mutex);
+    submaps = arrived;
+  });
+  ASSERT_TRUE(eventually([&] {
+    const std::scoped_lock lock(mutex);
+    return submaps.list.graph_revision > 0 && !submaps.list.loops.empty();
+  }));
+
   // Who followed the map through the correction has what the file has.
   static_cast<void>(client.save_map());
   const SavedMap saved = open_map_file(setup.map_file())->load();
@@ -102,7 +114,29 @@ TEST(LoopService, APlaceSeenAgainCorrectsTheMapThatIsServedAndStored) {
 
   const std::vector<StampedPose> path(saved.trajectory.begin(), saved.trajectory.end());
   ASSERT_EQ(path.size(), truth.size());
+
+  // The path that is published is the corrected one, also when no scan comes any more.
+  Trajectory published;
+  const Subscription paths = client.subscribe_path([&](const Trajectory& arrived) {
+    const std::scoped_lock lock(mutex);
+    published = arrived;
+  });
+  EXPECT_TRUE(eventually([&] {
+    const std::scoped_lock lock(mutex);
+    return !published.empty() && std::ranges::all_of(published, [&](const StampedPose& pose) {
+      const auto stored = std::ranges::find(path, pose.stamp_ns, &StampedPose::stamp_ns);
+      return stored != path.end() && pose.T_map_lidar.isApprox(stored->T_map_lidar, 1e-9);
+    });
+  }));
   const std::scoped_lock lock(mutex);
+  EXPECT_EQ(submaps.map_id, saved.view.map_id);
+  EXPECT_EQ(submaps.list.graph_revision, corrections());
+  EXPECT_GT(submaps.list.submaps.size(), 4U);
+  for (const SubmapList::Entry& submap : submaps.list.submaps) {
+    const auto pose = std::ranges::find(path, submap.stamp_ns, &StampedPose::stamp_ns);
+    ASSERT_NE(pose, path.end());
+    EXPECT_TRUE(submap.T_map_submap.isApprox(pose->T_map_lidar, 1e-9));
+  }
   EXPECT_LT(error_m(path, truth), 0.6 * error_m(as_published, truth));
   EXPECT_LT(error_m(path, truth), 0.12);
 }

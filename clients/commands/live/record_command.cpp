@@ -27,6 +27,7 @@
 #include "octomap_msgs.h"
 #include "sensor_msgs.h"
 #include "stillmap_msgs.h"
+#include "submaps.h"
 #include "tf2_msgs.h"
 
 namespace stillmap::cli {

@@ -83,6 +83,7 @@ connection.listen(`${prefix}/path`, ({ poses }) => {
   if (!frames.newest && poses.length > 0) showRobot(matrixOfPose(poses.at(-1).pose));
   timeline.update(poses);
 });
+connection.listen(`${prefix}/submaps`, (list) => view.showSubmaps(list));
 connection.listen(`${prefix}/status`, showStatus);
 connection.listen(`${prefix}/traversability`, showGrid);
 
@@ -137,6 +138,7 @@ element("colour").addEventListener("change", ({ target }) => {
 element("profile").addEventListener("change", ({ target }) => { state.profile = target.value; });
 element("show-map").addEventListener("change", ({ target }) => { tiles.group.visible = target.checked; view.draw(); });
 element("show-path").addEventListener("change", ({ target }) => { view.path.visible = target.checked; view.draw(); });
+element("show-loops").addEventListener("change", ({ target }) => { view.graph.visible = target.checked; view.draw(); });
 element("show-scan").addEventListener("change", ({ target }) => {
   view.scan.visible = target.checked;
   // What is not shown is not sent either: scans are most of the traffic.

@@ -1,6 +1,6 @@
 // The picture: map, robot, path, scan and what is drawn on them; rendered when something changed.
 import { AxesHelper, BufferAttribute, BufferGeometry, Color, ConeGeometry, Frustum, Group, Line, LineLoop, LineBasicMaterial,
-  Matrix4, Mesh, MeshBasicMaterial, MOUSE, PerspectiveCamera, Points, PointsMaterial, Raycaster, Scene, SphereGeometry, Vector2,
+  LineSegments, Matrix4, Mesh, MeshBasicMaterial, MOUSE, PerspectiveCamera, Points, PointsMaterial, Raycaster, Scene, SphereGeometry, Vector2,
   Vector3, WebGLRenderer } from "three";
 import { MapControls } from "three/examples/jsm/controls/MapControls.js";
 import { classes } from "./classes.js";
@@ -23,6 +23,19 @@ function setPositions(object, positions) {
   object.geometry.dispose();
   object.geometry = new BufferGeometry();
   object.geometry.setAttribute("position", new BufferAttribute(positions, 3));
+}
+
+/** Submaps, and a line for each loop that joins two. */
+function submapGraph() {
+  const graph = new Group();
+  const places = new Points(new BufferGeometry(), new PointsMaterial({ size: 7, sizeAttenuation: false, color: 0xffd54f, depthTest: false }));
+  const loops = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ color: 0x00e676, depthTest: false }));
+  for (const part of [places, loops]) {
+    part.frustumCulled = false;
+    part.renderOrder = 1;
+  }
+  graph.add(places, loops);
+  return Object.assign(graph, { places, loops });
 }
 
 function robotMarker(colour) {
@@ -70,7 +83,8 @@ export class View {
     this.scan = new Points(new BufferGeometry(), new PointsMaterial({ size: 2, sizeAttenuation: false, vertexColors: true }));
     this.scan.matrixAutoUpdate = false;
     this.scan.frustumCulled = false;
-    this.scene.add(this.robot, this.past, this.path, this.plan, this.outline, this.picked, this.scan);
+    this.graph = submapGraph();
+    this.scene.add(this.robot, this.past, this.graph, this.path, this.plan, this.outline, this.picked, this.scan);
     this.budget = 1_500_000;
     this.frames = 0;
     this.isFollowing = true;
@@ -155,6 +169,14 @@ export class View {
 
   showLine(line, positions) {
     setPositions(line, positions);
+    this.draw();
+  }
+
+  /** A stillmap_msgs/SubmapList. */
+  showSubmaps({ submaps, loops }) {
+    const places = submaps.map(({ pose: { position: { x, y, z } } }) => [x, y, z]);
+    setPositions(this.graph.places, new Float32Array(places.flat()));
+    setPositions(this.graph.loops, new Float32Array(loops.flatMap((loop) => [...places[loop.from_submap], ...places[loop.to_submap]])));
     this.draw();
   }
 

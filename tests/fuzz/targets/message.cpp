@@ -14,6 +14,7 @@
 #include "idl/conversions/pose.hpp"
 #include "idl/conversions/removed_voxels.hpp"
 #include "idl/conversions/status.hpp"
+#include "idl/conversions/submaps.hpp"
 #include "idl/conversions/tile.hpp"
 #include "idl/conversions/traversability.hpp"
 #include "idl/dds/ros_nodes.hpp"
@@ -22,6 +23,7 @@
 #include "initial_pose.h"
 #include "rmw_dds_common.h"
 #include "rmw_dds_common_iron.h"
+#include "submaps.h"
 #include "tests/fuzz/byte_source.hpp"
 #include "tests/fuzz/cdr.hpp"
 #include "tests/fuzz/invariant.hpp"
@@ -122,6 +124,17 @@ void read_initial_pose(Bytes bytes) {
   });
 }
 
+void read_submaps(Bytes bytes) {
+  read_as<stillmap_msgs::msg::SubmapList>(bytes, [](const auto& message) {
+    const auto submaps = wire::from_wire(message);
+    if (!submaps) return;
+    for (const SubmapList::Entry& entry : submaps->list.submaps)
+      require(entry.T_map_submap.matrix().allFinite(), "a pose is finite");
+    for (const SubmapList::Loop& loop : submaps->list.loops)
+      require(loop.to < submaps->list.submaps.size(), "a loop joins submaps");
+  });
+}
+
 /// What any ROS 2 process of the domain announces.
 void read_ros_nodes(Bytes bytes) {
   for (const std::string& name : dds::ros_node_names(bytes_of(bytes))) {
@@ -129,7 +142,7 @@ void read_ros_nodes(Bytes bytes) {
   }
 }
 
-constexpr std::array<void (*)(Bytes), 18> readers = {
+constexpr std::array<void (*)(Bytes), 19> readers = {
     read_odometry,
     read_path,
     read_tile,
@@ -148,6 +161,7 @@ constexpr std::array<void (*)(Bytes), 18> readers = {
     read_response<Localize_Response>,
     read_initial_pose,
     read_gnss,
+    read_submaps,
 };
 
 void run(Bytes bytes) {
@@ -158,6 +172,14 @@ void run(Bytes bytes) {
 
 RemovedVoxel removed_voxel() {
   return {Eigen::Vector3f(1, 2, 3), SemanticClass::car, RemovalReason::semi_static, 99};
+}
+
+/// Two, and a loop between them.
+SubmapsOfMap two_submaps() {
+  SubmapsOfMap submaps{.map_id = 7, .frame = "map", .child_frame = "base_link", .list = {}};
+  submaps.list.submaps.resize(2);
+  submaps.list.loops.push_back({.from = 0, .to = 1});
+  return submaps;
 }
 
 template <typename Info>
@@ -207,6 +229,7 @@ std::vector<Seed> seeds() {
       {"removed", with_choice(10, to_cdr(removed))},
       {"imu", with_choice(13, to_cdr(wire::to_imu({.stamp_ns = 7}, "imu")))},
       {"gnss", with_choice(17, to_cdr(wire::to_nav_sat_fix({.latitude_deg = 49.0}, "gnss")))},
+      {"submaps", with_choice(18, to_cdr(wire::to_wire(two_submaps())))},
       {"localize", with_choice(15, to_cdr(localized))},
       {"initial_pose", with_choice(16, to_cdr(initial_pose))},
       {"ros_nodes",

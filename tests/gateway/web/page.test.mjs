@@ -11,6 +11,9 @@ const pictures = process.env.STILLMAP_PICTURES;
 const flags = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
   "--disable-background-networking", "--disable-component-update", "--disable-sync"];
 
+/** Of the drive: more way than one submap has. */
+const scans = 45;
+
 /** Of a page's answers, what came over the network and not from the browser's cache. */
 function countTransfers(page) {
   const counts = { bytes: 0, tiles: 0 };
@@ -45,7 +48,7 @@ describe("page", () => {
     stack.startServer("--delivery", "every");
     const port = await stack.startGateway();
     url = `http://127.0.0.1:${port}/`;
-    await stack.replay(stack.simulate(20), "--lossless").ended;
+    await stack.replay(stack.simulate(scans), "--lossless").ended;
     browser = await puppeteer.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true,
       protocolTimeout: patienceMs, args: [...flags, `--user-data-dir=${stack.folder}/browser`] });
     page = await browser.newPage();
@@ -92,8 +95,22 @@ describe("page", () => {
 
   it("knows robot, path, robots and health", async () => {
     await eventually("the robots", () => evaluate(() => window.stillmap.state.profiles.length === 2));
-    await eventually("the path", () => evaluate(() => window.stillmap.timeline.poses.length === 20));
+    await eventually("the path", () => evaluate((expected) => window.stillmap.timeline.poses.length === expected, scans));
     await eventually("the health", () => evaluate(() => /health\s*good/.test(document.getElementById("status").innerText)));
+  });
+
+  it("shows the submaps that the server has", async () => {
+    const { submaps } = await eventually("a submap", () => {
+      const list = stack.ask("loops");
+      return list.submaps.length > 0 && list;
+    });
+    const shown = () => evaluate(() => [...window.stillmap.view.graph.places.geometry.getAttribute("position")?.array ?? []]);
+    const [x, y, z] = await eventually("all of them", async () => (await shown()).length === 3 * submaps.length && shown());
+    submaps[0].position_m.forEach((value, axis) => assert.ok(Math.abs(value - [x, y, z][axis]) < 0.01, `${value}`));
+    await picture("submaps");
+    await page.click("#show-loops");
+    assert.ok(!await evaluate(() => window.stillmap.view.graph.visible));
+    await page.click("#show-loops");
   });
 
   /** Clicks where the first voxel of a class is, or any ground. */
@@ -194,7 +211,7 @@ describe("page", () => {
 
   it("follows the map while it grows", async () => {
     const frames = await evaluate(() => window.stillmap.view.frames);
-    await stack.replay(stack.simulate(20), "--lossless").ended;
+    await stack.replay(stack.simulate(scans), "--lossless").ended;
     await eventually("new frames", () => evaluate((before) => window.stillmap.view.frames > before, frames));
     await eventually("all voxels", async () => await whole() === stack.ask("status").voxels);
   });
