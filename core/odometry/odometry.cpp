@@ -397,16 +397,6 @@ Eigen::Isometry3d Odometry::motion_during(double period_s) const {
   return state_->motion_during(period_s);
 }
 
-namespace {
-
-/// What users see is at the stamp: takes points and pose there from the middle of the sweep.
-void move_to_stamp(const Eigen::Isometry3d& T_middle_stamp, Scan& scan, OdometryResult& result) {
-  move_points(scan, T_middle_stamp.inverse());
-  result.T_map_lidar = result.T_map_lidar * T_middle_stamp;
-}
-
-}  // namespace
-
 bool Odometry::uses_rings() const {
   return !is_registered_by_surfaces(state_->sensor, state_->config);
 }
@@ -419,11 +409,12 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   State& state = *state_;
   const std::int64_t time_ns = scan.stamp_ns + std::llround(sweep.middle_s * 1e9);
   const SweepMotion expected_motion = sweep_motion(sweep, inertial);
-  const double stamp_part = sweep.duration_s > 0.0 ? -sweep.middle_s / sweep.duration_s : 0.0;
+  const auto T_middle_stamp = [&] {
+    return motion_to_stamp(sweep, expected_motion, state.motion_during(std::abs(sweep.middle_s)));
+  };
   std::optional<Eigen::Isometry3d> T_map_middle_known = T_map_lidar_prior;
   if (!state.started && !T_map_lidar_prior) T_map_middle_known = Eigen::Isometry3d::Identity();
-  if (T_map_middle_known)
-    *T_map_middle_known = *T_map_middle_known * expected_motion.T_middle_at(stamp_part).inverse();
+  if (T_map_middle_known) *T_map_middle_known = *T_map_middle_known * T_middle_stamp().inverse();
   const PosePrediction prediction =
       state.predict(time_ns, T_map_middle_known, T_map_lidar_prior.has_value(), inertial);
 
@@ -457,9 +448,12 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
     state.last.features = std::move(features);
   }
 
+  // What users see is at the stamp: points and pose go there from the middle of the sweep.
   if (sweep.middle_s != 0.0) {
-    move_to_stamp(scaled_motion(T_correction, stamp_part) * expected_motion.T_middle_at(stamp_part),
-                  scan, step.result);
+    const double stamp_part = sweep.duration_s > 0.0 ? -sweep.middle_s / sweep.duration_s : 0.0;
+    const Eigen::Isometry3d T = scaled_motion(T_correction, stamp_part) * T_middle_stamp();
+    move_points(scan, T.inverse());
+    step.result.T_map_lidar = step.result.T_map_lidar * T;
   }
   scan.time_offset_s.clear();
   return step;

@@ -53,4 +53,10 @@ void SweepMotion::move_to_middle(Scan& scan, const SweepTimes& sweep) const {
   });
 }
 
+Eigen::Isometry3d motion_to_stamp(const SweepTimes& sweep, const SweepMotion& motion,
+                                  const Eigen::Isometry3d& T_earlier_later) {
+  if (sweep.duration_s > 0.0) return motion.T_middle_at(-sweep.middle_s / sweep.duration_s);
+  return sweep.middle_s < 0.0 ? T_earlier_later : T_earlier_later.inverse();
+}
+
 }  // namespace stillmap

@@ -33,4 +33,9 @@ class SweepMotion {
   std::vector<Eigen::Matrix3f> R_middle_at_;
 };
 
+/// From the middle of a sweep to its stamp. Where all points are of one time, that is the motion
+/// from the earlier of these two to the later.
+[[nodiscard]] Eigen::Isometry3d motion_to_stamp(const SweepTimes& sweep, const SweepMotion& motion,
+                                                const Eigen::Isometry3d& T_earlier_later);
+
 }  // namespace stillmap

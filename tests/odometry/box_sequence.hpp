@@ -13,13 +13,17 @@ struct BoxSequence {
 
   BoxSequence(const BoxWorld& world, int count) {
     for (int k = 0; k < count; ++k) {
-      const double x = 0.6 * k;
-      const double y = 1.0 - std::cos(x / 8.0);
-      const double heading = std::atan(std::sin(x / 8.0) / 8.0);
-      T_map_lidar.push_back(Eigen::Translation3d(x, y, 0.0) *
-                            Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ()));
+      T_map_lidar.push_back(T_map_lidar_at(k));
       scans.push_back(world.scan(test_lidar(), T_map_lidar.back(), 0.1 * k));
     }
+  }
+
+  /// Also between scans.
+  [[nodiscard]] static Eigen::Isometry3d T_map_lidar_at(double scan) {
+    const double x = 0.6 * scan;
+    const double y = 1.0 - std::cos(x / 8.0);
+    const double heading = std::atan(std::sin(x / 8.0) / 8.0);
+    return Eigen::Translation3d(x, y, 0.0) * Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitZ());
   }
 };
 

@@ -158,6 +158,24 @@ TEST_F(OdometrySequence, PriorReplacesThePrediction) {
   expect_near(step.result.T_map_lidar, T_true, 0.1, 0.01);
 }
 
+// A flash lidar, say, whose stamp is that of the message.
+TEST_F(OdometrySequence, PosesAreAtTheStampWhenAllPointsAreOfAnotherTime) {
+  for (const double late_scans : {0.5, -0.5}) {
+    Odometry odometry(OdometryConfig{}, test::test_lidar());
+    for (std::size_t k = 0; k < quiet().scans.size(); ++k) {
+      Scan scan = quiet().scans[k].scan;
+      scan.stamp_ns += std::llround(0.1e9 * late_scans);
+      scan.time_offset_s.assign(scan.size(), static_cast<float>(-0.1 * late_scans));
+      const auto step = odometry.register_scan(scan, sweep_times(scan, 0.1),
+                                               quiet().scans[k].labels(), std::nullopt);
+      // The first two do not know how the lidar moves.
+      if (k < 2) continue;
+      expect_near(step.result.T_map_lidar,
+                  BoxSequence::T_map_lidar_at(static_cast<double>(k) + late_scans), 0.1, 0.01);
+    }
+  }
+}
+
 TEST_F(OdometrySequence, FindsTheFirstMotionOfAFastStart) {
   // 54 km/h: farther in a scan than a plane's neighbours are looked for.
   for (const double ahead_m : {1.5, -1.5}) {
