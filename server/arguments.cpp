@@ -116,6 +116,7 @@ struct ServerArguments {
 
 void add_server_options(CLI::App& program, ServerArguments& server) {
   program.add_option("--domain", server.domain_id, "DDS domain, instead of the file's")
+      ->envname("ROS_DOMAIN_ID")
       ->check(CLI::Range(std::uint32_t{0}, dds::max_domain_id));
   program
       .add_option("--security", server.security,

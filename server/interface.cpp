@@ -77,6 +77,8 @@ ServiceContext Interface::service_context(const ServerConfig& config,
 void Interface::stop() {
   services_.reset();
   status_publisher_.reset();
+  // Together: one may hold what another waits for.
+  for (ScanReceiver& receiver : receivers_) receiver.request_stop();
   receivers_.clear();
 }
 

@@ -19,6 +19,8 @@ using Outcome = GlobalLocalization::Outcome;
 constexpr std::int64_t patience_ns = 3'000'000'000;
 /// A search of a second's length, at 20 Hz.
 constexpr std::size_t max_waiting_scans = 20;
+/// Of one search to the next, at most.
+constexpr int max_followed_scans = 20;
 /// So many searches in a row, and then one a second.
 constexpr int eager_searches = 20;
 constexpr std::chrono::seconds pause{1};
@@ -167,7 +169,11 @@ void PlaceFinder::map_corrected() {
 
 void PlaceFinder::look_near(const PlaceGuess& guess) {
   const std::scoped_lock lock(mutex_);
-  begin_search(guess);
+  // Who says the same again and again is not to have it looked for from the beginning.
+  const bool is_same = guess_ && guess_->T_map_base.isApprox(guess.T_map_base) &&
+                       guess_->radius_m == guess.radius_m &&
+                       guess_->max_turn_rad == guess.max_turn_rad;
+  if (search_ == 0 || !is_same) begin_search(guess);
 }
 
 void PlaceFinder::keep_last(std::shared_ptr<const LabelledScan> scan, bool has_own_labels,
@@ -217,8 +223,11 @@ void PlaceFinder::handle(const LostScan& lost) {
   }
   run_behind_the_mapper([&] {
     localization_->follow(lost.scan, lost.labels);
-    // What was driven meanwhile comes first: the newest scan is looked for.
-    if (scans_.waiting() == 0 && is_due()) look_for(lost);
+    // What was driven meanwhile comes first: the newest scan is looked for, and one now and then
+    // where following takes as long as the scans are apart.
+    ++followed_scans_;
+    if ((scans_.waiting() == 0 || followed_scans_ >= max_followed_scans) && is_due())
+      look_for(lost);
   });
 }
 
@@ -240,6 +249,7 @@ GlobalLocalization::Regions PlaceFinder::regions(const LostScan& lost) const {
 }
 
 void PlaceFinder::look_for(const LostScan& lost) {
+  followed_scans_ = 0;
   try {
     const auto began = Clock::now();
     const Outcome outcome =

@@ -142,6 +142,7 @@ class PlaceFinder {
   std::optional<GlobalLocalization> localization_;
   std::uint64_t localized_search_ = 0;
   std::chrono::steady_clock::time_point searched_;
+  int followed_scans_ = 0;
   ThrottledLog throttled_log_;
   BoundedQueue<LostScan> scans_;
   // Last: stops before what it uses is gone.

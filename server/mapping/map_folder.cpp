@@ -80,8 +80,10 @@ void MapFolder::check_room(const fs::path& running, const fs::path& replaced,
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_, error)) {
     const fs::path& file = entry.path();
-    // Opening the running map's file and closing it again would release SQLite's locks on it.
-    if (file == running || file == replaced || !is_map_file(file)) continue;
+    // Opening the running map's file and closing it again would release SQLite's locks on it. It
+    // may have other names.
+    const bool is_running = fs::equivalent(file, running, error);
+    if (is_running || fs::equivalent(file, replaced, error) || !is_map_file(file)) continue;
     ++maps;
     const std::uintmax_t size = entry.file_size(error);
     if (!error) bytes += size;

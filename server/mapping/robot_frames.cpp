@@ -24,9 +24,18 @@ RobotFrames::RobotFrames(const ServerConfig& config, const StaticTransforms* sta
       T_base_lidar_(config.mount.T_base_lidar) {}
 
 bool RobotFrames::locate_lidar(const std::string& cloud_frame, bool map_begins) {
+  const std::string& lidar = frames_.lidar.empty() ? cloud_frame : frames_.lidar;
+  const bool is_other = lidar != lidar_;
+  const bool is_configured = mount_.source == MountConfig::Source::configuration;
+  other_lidar_.clear();
+  if (is_located_ && is_other && !map_begins && !is_configured) {
+    other_lidar_ = lidar;
+    return false;
+  }
   cloud_frame_ = cloud_frame;
-  lidar_ = frames_.lidar.empty() ? cloud_frame : frames_.lidar;
-  if (mount_.source == MountConfig::Source::configuration) return true;
+  lidar_ = lidar;
+  if (is_configured) return true;
+  if (is_other) is_located_ = false;
   const std::optional<Eigen::Isometry3d> T_base_lidar = published_mount();
   if (!T_base_lidar) return is_located_;
   if (is_located_ && !map_begins) {
@@ -63,6 +72,10 @@ std::optional<Eigen::Isometry3d> RobotFrames::published_mount() {
 }
 
 std::string RobotFrames::missing() const {
+  if (!other_lidar_.empty()) {
+    return "the map is made of clouds of '" + lidar_ + "', and these are of '" + other_lidar_ +
+           "': give each lidar a topic of its own, or list both under 'sensors'";
+  }
   std::string text = "no transform " + frames_.base + " -> " + lidar_ +
                      " on /tf_static; frames there: " +
                      (static_transforms_ ? static_transforms_->known_frames() : "none");

@@ -49,6 +49,8 @@ class RobotFrames {
   ThrottledLog throttled_log_;
   std::string cloud_frame_;
   std::string lidar_;
+  /// Of the cloud that was refused last, where the map is made of another lidar's; else empty.
+  std::string other_lidar_;
   Eigen::Isometry3d T_base_lidar_ = Eigen::Isometry3d::Identity();
   bool is_located_ = false;
   /// When the transform was first missed.

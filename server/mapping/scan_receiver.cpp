@@ -259,9 +259,11 @@ void ScanReceiver::queue_scan(QueuedScan queued, const std::stop_token& stop) {
 }
 
 void ScanReceiver::report(Lidar& lidar, const std::string& cloud_changes, const Scan& scan) {
-  if (!cloud_changes.empty()) spdlog::info("clouds on {}: {}", topic_, cloud_changes);
+  // Of two publishers in turn, say, every cloud is another than the last.
+  const bool is_new = !cloud_changes.empty() && layouts_.add(lidar.name + cloud_changes);
+  if (is_new) spdlog::info("clouds on {}: {}", topic_, cloud_changes);
   const bool due = lidar.scans_read++ % scans_between_checks == 0;
-  if (!due && cloud_changes.empty()) return;
+  if (!due && !is_new) return;
   const std::string misfit = sensor_mismatch(scan, lidar.sensor);
   if (misfit.empty()) return;
   statistics_.count("sensor_mismatch");

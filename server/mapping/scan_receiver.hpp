@@ -72,6 +72,9 @@ class ScanReceiver {
                const std::string& ros_topic, SweepInput& sweeps, ScanQueue& queue,
                Statistics& statistics);
 
+  /// Ends soon; the destructor waits for that.
+  void request_stop() { worker_.request_stop(); }
+
   /// Why no scan has arrived yet; empty once one has.
   [[nodiscard]] std::string no_input_reason() const;
 
@@ -114,6 +117,8 @@ class ScanReceiver {
   ScanQueue& queue_;
   Statistics& statistics_;
   ThrottledLog throttled_log_;
+  /// What was told of clouds.
+  NewLines layouts_;
   dds::SampleLosses losses_;
   ScanLossWindow recent_losses_;
   dds::Reader<sensor_msgs::msg::PointCloud2> reader_;

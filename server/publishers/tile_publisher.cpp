@@ -47,36 +47,34 @@ void TilePublisher::publish(const std::shared_ptr<const MapSnapshot>& latest,
       view.tile_size_m > 0.0 ? tile_range({centre_map - half, centre_map + half}, view.tile_size_m)
                              : TileRange{};
   const bool is_same_window = window.first == window_.first && window.last == window_.last;
-  if (latest == last_view_ && is_same_window && pending_.empty()) return;
+  if (latest == last_view_ && is_same_window && pending_.empty() && gone_.empty()) return;
   const dds::MapIdentity identity = wire::identity_of(view);
   window_ = window;
   const bool is_other_map = !last_view_ || view.map_id != last_view_->map_id;
-  is_other_map ? begin_map(view, identity) : note_changes(view, identity);
+  is_other_map ? begin_map(view) : note_changes(view);
   if (is_other_map || !is_same_window) note_window(view);
   last_view_ = latest;
   publish_pending(view, identity);
 }
 
-void TilePublisher::begin_map(const MapSnapshot& view, const dds::MapIdentity& identity) {
+void TilePublisher::begin_map(const MapSnapshot& view) {
   pending_.clear();
+  gone_.clear();
   for (auto& [id, known] : published_) {
     known.revision = 0;
-    if (view.tiles.find(id) == nullptr) {
-      publish_gone(id, view, identity);
-    } else {
-      pending_.insert(id);
-    }
+    (view.tiles.find(id) == nullptr ? gone_ : pending_).insert(id);
   }
 }
 
-void TilePublisher::note_changes(const MapSnapshot& view, const dds::MapIdentity& identity) {
+void TilePublisher::note_changes(const MapSnapshot& view) {
   TileTable::for_each_difference(
       last_view_->tiles, view.tiles, [&](const auto& before, const auto& after) {
         if (after == nullptr) {
           pending_.erase(before->info.id);
-          publish_gone(before->info.id, view, identity);
+          gone_.insert(before->info.id);
         } else if (before == nullptr || before->info.revision != after->info.revision) {
           // Tiles that were evicted or reloaded are the same to readers.
+          gone_.erase(after->info.id);
           pending_.insert(after->info.id);
         }
       });
@@ -111,6 +109,7 @@ TilePublisher::TilePointers TilePublisher::pending_tiles(const MapSnapshot& view
 
 void TilePublisher::publish_pending(const MapSnapshot& view, const dds::MapIdentity& identity) {
   if (!last_burst_acknowledged()) return;
+  for (const TileId id : std::exchange(gone_, {})) publish_gone(id, view, identity);
   release_far_tiles(identity);
   if (pending_.empty()) return;
   last_burst_ = std::chrono::steady_clock::now();

@@ -46,9 +46,9 @@ class TokenBucket {
 /// of large messages, new tiles take half of it: those published longest ago go first, and a tile
 /// that changes while it waits is sent once, in its newest state.
 ///
-/// A tile is never replaced while a reader is still receiving it (unless that takes longer than a
-/// lease): Fast DDS 2.9 readers abort when they have some fragments of a keyed sample and are then
-/// told that the rest will not come.
+/// A tile is never replaced or disposed while a reader is still receiving it (unless that takes
+/// longer than a lease): Fast DDS 2.9 readers abort when they have some fragments of a keyed sample
+/// and are then told that the rest will not come.
 class TilePublisher {
  public:
   /// Tiles outside the window that late joiners get, too.
@@ -61,8 +61,8 @@ class TilePublisher {
   /// Publishes what is new in the view, as far as the rate allows now; call it again with the same
   /// view to continue. `robot_map` is where the window is [m].
   void publish(const std::shared_ptr<const MapSnapshot>& latest, const Eigen::Vector2d& robot_map);
-  /// Tiles that are not published yet.
-  [[nodiscard]] std::size_t waiting() const { return pending_.size(); }
+  /// Tiles that are not published yet, and those that readers still take to be there.
+  [[nodiscard]] std::size_t waiting() const { return pending_.size() + gone_.size(); }
   /// Tiles that late joiners get.
   [[nodiscard]] std::size_t held() const { return published_.size(); }
 
@@ -70,9 +70,9 @@ class TilePublisher {
   using TilePointers = std::vector<std::shared_ptr<const Tile>>;
 
   /// Another map, or the first: what was published is not of it.
-  void begin_map(const MapSnapshot& view, const dds::MapIdentity& identity);
+  void begin_map(const MapSnapshot& view);
   /// Notes what differs from the last view.
-  void note_changes(const MapSnapshot& view, const dds::MapIdentity& identity);
+  void note_changes(const MapSnapshot& view);
   /// Notes the window's tiles that are not published.
   void note_window(const MapSnapshot& view);
   [[nodiscard]] bool is_in_window(TileId id) const;
@@ -97,6 +97,8 @@ class TilePublisher {
   std::shared_ptr<const MapSnapshot> last_view_;
   TileRange window_;
   std::set<TileId> pending_;
+  /// Those that no longer exist, and readers were not told.
+  std::set<TileId> gone_;
   /// What was published of a tile.
   struct Published {
     /// 0: of another map, the tile is gone, or it could not be read.

@@ -24,6 +24,9 @@ class PeriodicWorker {
   /// For rounds that say themselves when the next one is due.
   explicit PeriodicWorker(Round round, MonotonicClock& clock = MonotonicClock::steady());
 
+  /// Ends soon; the destructor waits for that.
+  void request_stop() { thread_.request_stop(); }
+
  private:
   std::jthread thread_;
 };

@@ -45,24 +45,29 @@ std::vector<std::shared_ptr<const Tile>> tiles_round(const MapSnapshot& map,
 
 }  // namespace
 
-void TraversabilitySnapshot::publish(Views views, const TileRange& window) {
+void TraversabilitySnapshot::publish(Views views, std::shared_ptr<const MapSnapshot> map,
+                                     const TileRange& window) {
   const std::scoped_lock lock(mutex_);
   views_ = std::move(views);
+  map_ = std::move(map);
   window_ = window;
 }
 
-std::shared_ptr<const TraversabilityView> TraversabilitySnapshot::view(
-    const std::string& profile) const {
+bool TraversabilitySnapshot::Known::has(const Tile& tile) const {
+  const TileId id = tile.info.id;
+  if (is_non_resident(tile) || id.x < window.first.x || id.x > window.last.x ||
+      id.y < window.first.y || id.y > window.last.y)
+    return false;
+  const auto then = map ? map->tiles.find(id) : nullptr;
+  return then == nullptr || !is_non_resident(*then);
+}
+
+TraversabilitySnapshot::Known TraversabilitySnapshot::known(const std::string& profile) const {
   const std::scoped_lock lock(mutex_);
   const auto found = std::ranges::find_if(
       views_, [&](const auto& candidate) { return candidate->profile.name == profile; });
   if (found == views_.end()) throw std::invalid_argument(unknown_profile(profile, views_));
-  return *found;
-}
-
-TileRange TraversabilitySnapshot::window() const {
-  const std::scoped_lock lock(mutex_);
-  return window_;
+  return {*found, map_, window_};
 }
 
 TraversabilityCache::TraversabilityCache(const TraversabilitySnapshot& snapshot,
@@ -71,17 +76,12 @@ TraversabilityCache::TraversabilityCache(const TraversabilitySnapshot& snapshot,
 
 std::shared_ptr<const TraversabilityView> TraversabilityCache::view(
     const std::string& profile, const Eigen::AlignedBox2d& box_map) const {
-  const auto kept = snapshot_.view(profile);
+  const TraversabilitySnapshot::Known kept = snapshot_.known(profile);
   const auto map = latest_map_.view();
-  if (map->tiles.empty()) return kept;
-  const TileRange window = snapshot_.window();
-  const auto is_kept = [&](const auto& tile) {
-    const TileId id = tile->info.id;
-    return !is_non_resident(*tile) && id.x >= window.first.x && id.x <= window.last.x &&
-           id.y >= window.first.y && id.y <= window.last.y;
-  };
+  if (map->tiles.empty()) return kept.view;
   auto tiles = tiles_round(*map, box_map);
-  if (std::ranges::all_of(tiles, is_kept)) return kept;
+  if (std::ranges::all_of(tiles, [&](const auto& tile) { return kept.has(*tile); }))
+    return kept.view;
   if (tiles.size() > max_tiles) {
     throw std::invalid_argument(
         "the region has " + std::to_string(tiles.size()) +
@@ -91,7 +91,7 @@ std::shared_ptr<const TraversabilityView> TraversabilityCache::view(
   for (auto& tile : tiles) tile = tiles_.read(tile);
   MapSnapshot part = *map;
   part.tiles = TileTable(std::move(tiles));
-  TraversabilityMap computed({kept->profile});
+  TraversabilityMap computed({kept.view->profile});
   static_cast<void>(computed.update(part));
   return computed.view(profile);
 }

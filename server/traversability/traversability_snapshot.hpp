@@ -20,16 +20,30 @@ class TraversabilitySnapshot {
   /// One view a robot.
   using Views = std::vector<std::shared_ptr<const TraversabilityView>>;
 
-  /// `window`: the tiles that they know of, where those are in memory.
-  void publish(Views views, const TileRange& window);
+  /// `map`: that they were computed from, where its tiles are in memory and in the window; null
+  /// before the first.
+  void publish(Views views, std::shared_ptr<const MapSnapshot> map, const TileRange& window);
 
+  /// A view, and what of the map it knows.
+  struct Known {
+    std::shared_ptr<const TraversabilityView> view;
+    std::shared_ptr<const MapSnapshot> map;
+    TileRange window;
+
+    /// Whether the view has the tile's surface: one that was read from the disk since is not in it,
+    /// one that is new will be.
+    [[nodiscard]] bool has(const Tile& tile) const;
+  };
   /// Throws std::invalid_argument for an unknown robot, naming the known ones.
-  [[nodiscard]] std::shared_ptr<const TraversabilityView> view(const std::string& profile) const;
-  [[nodiscard]] TileRange window() const;
+  [[nodiscard]] Known known(const std::string& profile) const;
+  [[nodiscard]] std::shared_ptr<const TraversabilityView> view(const std::string& profile) const {
+    return known(profile).view;
+  }
 
  private:
   mutable std::mutex mutex_;
   Views views_;
+  std::shared_ptr<const MapSnapshot> map_;
   TileRange window_;
 };
 

@@ -90,7 +90,7 @@ void TraversabilityThread::publish() {
   for (const RobotProfile& robot : traversability_.profiles()) {
     views.push_back(traversability_.view(robot.name));
   }
-  snapshot_.publish(std::move(views), window_);
+  snapshot_.publish(std::move(views), known_, window_);
 }
 
 }  // namespace stillmap::server

@@ -96,5 +96,17 @@ TEST(RobotFrames, TakesTheLidarForTheBaseOnlyWhereThatIsConfiguredAndAfterTheWai
   EXPECT_EQ(hasty.base(), "base_link");
 }
 
+TEST(RobotFrames, AMapIsMadeOfOneLidar) {
+  Statistics statistics;
+  RobotFrames frames(from_tf_static(0.0, true), nullptr, statistics);
+  ASSERT_TRUE(frames.locate_lidar("front", true));
+  EXPECT_FALSE(frames.locate_lidar("rear", false));
+  EXPECT_THAT(frames.missing(), AllOf(HasSubstr("front"), HasSubstr("rear"), HasSubstr("sensors")));
+  EXPECT_EQ(frames.lidar(), "front");
+  EXPECT_TRUE(frames.locate_lidar("front", false));
+  EXPECT_TRUE(frames.locate_lidar("rear", true)) << "of another map";
+  EXPECT_EQ(frames.lidar(), "rear");
+}
+
 }  // namespace
 }  // namespace stillmap::server

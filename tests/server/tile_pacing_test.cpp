@@ -130,6 +130,25 @@ TEST_F(TilePacing, ATileThatKeepsChangingDoesNotHoldUpTheOthers) {
   expect_all_arrive(tiles);
 }
 
+// Its reader aborts where the rest of a keyed sample will not come.
+TEST_F(TilePacing, ATileThatIsStillReceivedIsNotDisposed) {
+  ASSERT_TRUE(reader_.events().wait_for_writer(dds::discovery_timeout));
+  const auto row = row_of_tiles(20, 1);
+  publisher_.publish(row, Eigen::Vector2d::Zero());
+  const std::size_t waiting = publisher_.waiting();
+  auto without_first = std::make_shared<MapSnapshot>(*row_of_tiles(0, 2));
+  for (int x = 1; x < 20; ++x) without_first->tiles.set(tile_of({x, 0}, 1));
+  publisher_.publish(without_first, Eigen::Vector2d::Zero());
+  EXPECT_EQ(publisher_.waiting(), waiting + 1);
+  const auto began = Clock::now();
+  while (publisher_.waiting() > 0 && Clock::now() - began < dds::discovery_timeout) {
+    std::this_thread::sleep_for(50ms);
+    publisher_.publish(without_first, Eigen::Vector2d::Zero());
+  }
+  EXPECT_EQ(publisher_.waiting(), 0U);
+  expect_all_arrive(20);
+}
+
 TEST_F(TilePacing, WhatChangesWhileItWaitsIsSentAsItIsThen) {
   constexpr std::size_t tiles = 20;
   publisher_.publish(row_of_tiles(static_cast<int>(tiles), 1), Eigen::Vector2d::Zero());

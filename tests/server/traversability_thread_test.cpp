@@ -127,6 +127,33 @@ TEST_F(TraversabilityThreadTest, UpdatesOnceAPeriodHoweverOftenTheMapChanges) {
   EXPECT_EQ(updates_, 2);
 }
 
+TEST_F(TraversabilityThreadTest, KnowsWhichTilesItHas) {
+  const std::shared_ptr<const MapSnapshot> all = latest_map_.view();
+  const std::shared_ptr<const Tile> tile = *all->tiles.begin();
+  Tile on_disk = *tile;
+  on_disk.voxels = {};
+  ASSERT_TRUE(is_non_resident(on_disk));
+  auto without = std::make_shared<MapSnapshot>(*all);
+  without->tiles.set(std::make_shared<const Tile>(on_disk));
+  const TileRange everywhere{{-100, -100}, {100, 100}};
+  const auto views = [&] {
+    TraversabilityMap map({small_robot()});
+    static_cast<void>(map.update(*all));
+    return TraversabilitySnapshot::Views{map.view("small")};
+  };
+  snapshot_.publish(views(), all, everywhere);
+  EXPECT_TRUE(snapshot_.known("small").has(*tile));
+  EXPECT_FALSE(snapshot_.known("small").has(on_disk)) << "evicted since";
+  snapshot_.publish(views(), all, {{50, 50}, {60, 60}});
+  EXPECT_FALSE(snapshot_.known("small").has(*tile)) << "outside of the window";
+  // Read from the disk since the view was made: the view has nothing there.
+  snapshot_.publish(views(), without, everywhere);
+  EXPECT_FALSE(snapshot_.known("small").has(*tile));
+  // A tile that is new will be in the next view.
+  snapshot_.publish(views(), std::make_shared<MapSnapshot>(), everywhere);
+  EXPECT_TRUE(snapshot_.known("small").has(*tile));
+}
+
 TEST_F(TraversabilityThreadTest, FollowsToAnotherMap) {
   start(0s);
   ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
