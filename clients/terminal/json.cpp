@@ -67,6 +67,9 @@ void Json::append(Json array) {
   for (nlohmann::json& value : array.value_->json) value_->json.push_back(std::move(value));
 }
 
-std::string Json::dump(int indent) const { return value_->json.dump(indent); }
+// File names and what damaged files hold may be anything: JSON is not to fail for them.
+std::string Json::dump(int indent) const {
+  return value_->json.dump(indent, ' ', false, nlohmann::json::error_handler_t::replace);
+}
 
 }  // namespace stillmap::cli

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace stillmap {
@@ -15,5 +17,10 @@ struct ConfigReport {
   /// Fields that the file sets to something else than the default.
   std::vector<std::string> changed;
 };
+
+/// Whether the file leaves this field out.
+[[nodiscard]] inline bool is_left_out(const ConfigReport& report, std::string_view field) {
+  return std::ranges::find(report.left_out, field) != report.left_out.end();
+}
 
 }  // namespace stillmap

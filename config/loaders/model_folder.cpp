@@ -27,12 +27,14 @@ std::vector<fs::path> model_search_paths() {
 }  // namespace
 
 fs::path find_model(const fs::path& model) {
-  if (model.has_parent_path() || fs::is_directory(model)) return model;
+  // A data set's folder may have a model's name.
+  if (model.has_parent_path() || fs::exists(model / "model.yaml")) return model;
   std::string tried;
   for (const fs::path& place : model_search_paths()) {
     if (fs::exists(place / model / "model.yaml")) return place / model;
     tried.append("\n  ").append(place.string());
   }
+  if (fs::is_directory(model)) return model;
   throw ConfigError({"model '" + model.string() +
                      "' is not known; give a model's folder, or set STILLMAP_MODELS to the folder "
                      "that holds it. Looked in:" +

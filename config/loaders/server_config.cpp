@@ -178,7 +178,8 @@ bool is_topic_name(const std::string& name) {
          name.front() != '/' && name.back() != '/' && name.find("//") == std::string::npos;
 }
 
-void read_topics(YamlSection section, TopicsConfig& topics) {
+/// Whether the file names the topic of the one lidar.
+bool read_topics(YamlSection section, TopicsConfig& topics) {
   section.text("points", topics.points);
   section.text("namespace", topics.name_space);
   section.text("odometry_prior", topics.odometry_prior);
@@ -202,6 +203,7 @@ void read_topics(YamlSection section, TopicsConfig& topics) {
   if (!topics.initial_pose.empty() && !is_topic_name(topics.initial_pose)) {
     section.fault("initial_pose", "'" + topics.initial_pose + "'" + topic_rule);
   }
+  return section.has("points");
 }
 
 void read_fields(YamlSection section, PointFieldNames& fields) {
@@ -368,7 +370,7 @@ void read_server(YamlSection file, const fs::path& folder, ServerConfig& config)
   read_frames(file.section("frames"), config.frames);
   read_mount(file.section("mount"), config.frames, config.mount);
   read_dds(file.section("dds"), folder, config.dds);
-  read_topics(file.section("topics"), config.topics);
+  const bool names_points = read_topics(file.section("topics"), config.topics);
   read_gnss(file.section("gnss"), config.gnss);
   if (config.frames.odom_source == FramesConfig::OdomSource::prior &&
       config.topics.odometry_prior.empty()) {
@@ -376,6 +378,10 @@ void read_server(YamlSection file, const fs::path& folder, ServerConfig& config)
   }
   read_input(file.section("input"), config.input);
   read_lidars(file, folder, config);
+  if (names_points && !config.lidars.empty()) {
+    file.fault("topics",
+               "points is of one lidar, and each of 'sensors' has its topic: leave it out");
+  }
   read_publish(file.section("publish"), config.publish);
   read_map(file.section("map"), config.map);
   if (!config.topics.gnss.empty() && !config.map.close_loops)
@@ -417,6 +423,7 @@ ServerConfig load_server_config(const fs::path& file, ConfigReport& report) {
   read_server(YamlSection(yaml), file.parent_path(), config);
   yaml.require_no_faults();
   report = std::move(yaml.report);
+  take_range_of_sensor(report, config.mapper);
   return config;
 }
 

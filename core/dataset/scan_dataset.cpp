@@ -30,17 +30,35 @@ bool is_scan_file(const fs::path& file, std::string_view extension) {
   return file.extension() == extension && fs::is_regular_file(file, error);
 }
 
-/// The files of one kind in natural order: of the first kind that the folder has.
+/// By the stamps that names carry ("12.5" after "12.25"); where one carries none, in natural order.
+std::vector<fs::path> sorted(std::vector<fs::path> files) {
+  struct Stamped {
+    std::int64_t stamp_ns = 0;
+    std::size_t place = 0;
+  };
+  std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
+    return natural_less(a.filename().string(), b.filename().string());
+  });
+  std::vector<Stamped> stamped;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const auto stamp_ns = stamp_ns_from_name(files[i].stem().string());
+    if (!stamp_ns) return files;
+    stamped.push_back({*stamp_ns, i});
+  }
+  std::ranges::stable_sort(stamped, {}, &Stamped::stamp_ns);
+  std::vector<fs::path> ordered;
+  for (const Stamped& one : stamped) ordered.push_back(std::move(files[one.place]));
+  return ordered;
+}
+
+/// The files of one kind, in order: of the first kind that the folder has.
 std::vector<fs::path> scans_in(const fs::path& folder) {
   for (const std::string_view extension : {".bin", ".pcd", ".ply"}) {
     std::vector<fs::path> files;
     for (const auto& entry : fs::directory_iterator(folder)) {
       if (is_scan_file(entry.path(), extension)) files.push_back(entry.path());
     }
-    std::ranges::sort(files, [](const fs::path& a, const fs::path& b) {
-      return natural_less(a.filename().string(), b.filename().string());
-    });
-    if (!files.empty()) return files;
+    if (!files.empty()) return sorted(std::move(files));
   }
   return {};
 }
@@ -184,9 +202,10 @@ void ScanDataset::learn_from_sample() {
   std::optional<DatasetError> fault;
   for (const std::size_t i : sample()) {
     try {
-      const Scan scan = read_unscaled(i).scan;
-      readable.emplace_back(scan.size(), i);
-      full_scales.push_back(intensity_full_scale(scan.intensity));
+      const DatasetFrame frame = read_unscaled(i);
+      if (readable.empty()) has_labels_ = !frame.raw_labels.empty();
+      readable.emplace_back(frame.scan.size(), i);
+      full_scales.push_back(intensity_full_scale(frame.scan.intensity));
     } catch (const DatasetError& error) {
       if (!fault) fault = error;
     }
@@ -265,11 +284,16 @@ DatasetFrame ScanDataset::read_unscaled(std::size_t i) const {
 }
 
 DatasetFrame ScanDataset::read(std::size_t i) const {
+  DatasetFrame frame = read_uncorrected(i);
+  if (kitti_lidar_) kitti_lidar_->correct(frame.scan);
+  return frame;
+}
+
+DatasetFrame ScanDataset::read_uncorrected(std::size_t i) const {
   DatasetFrame frame = read_unscaled(i);
   if (intensity_scale_ != 1.0F) {
     for (float& value : frame.scan.intensity) value *= intensity_scale_;
   }
-  if (kitti_lidar_) kitti_lidar_->correct(frame.scan);
   frame.scan.labels = reduced_classes(frame.raw_labels);
   return frame;
 }

@@ -19,7 +19,8 @@ namespace stillmap {
 /// - a SemanticKITTI sequence: velodyne/*.bin, and where present labels/*.label, times.txt,
 ///   calib.txt and poses.txt (camera frame) or poses_lidar.txt (lidar frame), and our own
 ///   time_offsets/ and rings/ (see KittiSequenceWriter);
-/// - a folder of .bin, .pcd or .ply files, in natural order ("2" before "10");
+/// - a folder of .bin, .pcd or .ply files, in the order of the stamps in their names, else in
+///   natural order ("2" before "10");
 /// - a single such file;
 /// - any ScanSource, such as a bag's topic.
 /// Intensity is scaled to 0..1, by one factor for all that some of them decide. Files of KITTI's
@@ -39,10 +40,16 @@ class ScanDataset {
   /// From times.txt, else from the file's name, else 0.1 s apart from 0.
   [[nodiscard]] std::int64_t stamp_ns(std::size_t i) const { return stamps_ns_.at(i); }
 
+  /// Whether scans come with labels: as the first of some from all over the dataset that can be
+  /// read.
+  [[nodiscard]] bool has_labels() const { return has_labels_; }
+  /// Whether this one does. Throws as read() does.
   [[nodiscard]] bool has_labels(std::size_t i) const;
 
   /// Throws DatasetError when a file of the scan is damaged; the others can still be read.
   [[nodiscard]] DatasetFrame read(std::size_t i) const;
+  /// The same without the corrections of kitti_lidar(): points as they are in the file.
+  [[nodiscard]] DatasetFrame read_uncorrected(std::size_t i) const;
 
   /// True poses, one a scan, in the lidar frame of the pose file's first line; nothing without a
   /// pose file. Throws DatasetError when it is damaged, has too few lines, or is in the camera
@@ -72,7 +79,7 @@ class ScanDataset {
 
   /// A few scans from all over the dataset.
   [[nodiscard]] std::vector<std::size_t> sample() const;
-  /// Takes scale and sensor from them.
+  /// Takes scale, sensor and whether there are labels from them.
   void learn_from_sample();
   [[nodiscard]] std::optional<KittiLidar> find_kitti_lidar() const;
   /// Time between scans; 0.1 where the stamps say nothing [s].
@@ -87,6 +94,7 @@ class ScanDataset {
   std::vector<std::size_t> lines_;
   std::vector<std::int64_t> stamps_ns_;
   float intensity_scale_ = 1.0F;
+  bool has_labels_ = false;
   SensorModel suggested_sensor_;
   std::optional<KittiLidar> kitti_lidar_;
 };

@@ -3,7 +3,10 @@
 #include <sstream>
 #include <vector>
 
+#include "core/dataset/kitti_files.hpp"
+#include "core/dataset/scan_dataset.hpp"
 #include "tests/clients/command_test.hpp"
+#include "tests/dataset/kitti_lidar_scan.hpp"
 #include "tests/slowdown.hpp"
 
 namespace stillmap::test {
@@ -119,6 +122,22 @@ TEST_F(DatasetCommandTest, EveryScanAndPointIsWrittenEvenWhenOdometryCannotUseTh
   EXPECT_THAT(result.out, HasSubstr("1 scans with the pose of the scan before"));
   EXPECT_TRUE(same("copy/velodyne/000001.bin", "city/velodyne/000001.bin"));
   EXPECT_EQ(line_count("copy/poses.txt"), 3U);
+}
+
+TEST_F(DatasetCommandTest, PointsOfKittisLidarAreWrittenAsTheyAreAndCorrectedOnce) {
+  for (const double way_m : {0.0, 0.5}) {
+    std::filesystem::create_directories(folder_ / "drive");
+    for (const char* name : {"drive/000000.bin", "drive/000001.bin", "drive/000002.bin"})
+      write_kitti_bin(folder_ / name, draw({.way_m = way_m}));
+    const ProcessResult exported =
+        run("dataset export " + path("drive") + " " + path("copy") + " --labels none --force");
+    ASSERT_EQ(exported.exit_code, 0) << exported.err;
+    expect_same_points("drive/000001.bin", "copy/velodyne/000001.bin");
+    const ScanDataset before(folder_ / "drive"), after(folder_ / "copy");
+    ASSERT_TRUE(before.kitti_lidar() && after.kitti_lidar());
+    EXPECT_EQ(before.read(1).scan.points_lidar, after.read(1).scan.points_lidar);
+    EXPECT_EQ(before.read(1).scan.time_offset_s, after.read(1).scan.time_offset_s);
+  }
 }
 
 TEST_F(DatasetCommandTest, DoesNotWriteOverAnythingUnlessForced) {

@@ -106,6 +106,77 @@ TEST_F(MapCommandTest, DoesNotWriteOverAMapUnlessForced) {
   EXPECT_EQ(line_count("out/poses_lidar.txt"), 2U);
 }
 
+TEST_F(MapCommandTest, ANameThatIsNoTextCostsNoResults) {
+  simulate("city", 3);
+  const std::string out = path("caf\xE9");
+  ASSERT_EQ(run("map " + path("city") + " --out " + out).exit_code, 0);
+  EXPECT_TRUE(std::filesystem::exists(out + "/map.stillmap"));
+  EXPECT_TRUE(nlohmann::json::accept(content("caf\xE9/report.json")));
+}
+
+TEST_F(MapCommandTest, ADamagedFirstScanIsSkippedAsAnyOther) {
+  simulate("city", 4);
+  ASSERT_EQ(run("map " + path("city") + " --out " + path("made")).exit_code, 0);
+  std::filesystem::create_directory(folder_ / "clouds");
+  for (const char* name : {"1.ply", "2.ply"})
+    std::filesystem::copy_file(folder_ / "made/map.ply", folder_ / "clouds" / name);
+  write("clouds/0.ply", "ply\nformat");
+  const ProcessResult result = run("map " + path("clouds") + " --labels auto --out " + path("out"));
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_THAT(result.err, HasSubstr("skipped"));
+  EXPECT_EQ(line_count("out/poses_lidar.txt"), 2U);
+}
+
+TEST_F(MapCommandTest, AFaultyTruthIsSaidBeforeAnythingIsMapped) {
+  simulate("city", 3);
+  std::filesystem::remove(folder_ / "city/calib.txt");
+  const ProcessResult refused = map_city();
+  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_THAT(refused.err, HasSubstr("calib.txt"));
+  EXPECT_FALSE(exists("out"));
+}
+
+TEST_F(MapCommandTest, ReplacesAllResultsOfAnEarlierRun) {
+  simulate("city", 4);
+  ASSERT_EQ(map_city().exit_code, 0);
+  ASSERT_TRUE(exists("out/trajectory.png"));
+  ASSERT_TRUE(exists("out/poses_odometry.txt"));
+  write("out/notes.txt", "mine");
+  std::filesystem::remove(folder_ / "city/poses.txt");
+  ASSERT_EQ(map_city("--force --loops off --mount 0,0,1,0,0,0").exit_code, 0);
+  for (const char* old : {"trajectory.png", "poses_odometry.txt", "poses_lidar.txt"})
+    EXPECT_FALSE(exists(std::string("out/") + old)) << old;
+  EXPECT_TRUE(exists("out/poses_base.txt"));
+  EXPECT_EQ(content("out/notes.txt"), "mine");
+}
+
+TEST_F(MapCommandTest, AConfigurationWithoutASensorLeavesItToTheRecording) {
+  simulate("city", 3);
+  write("server.yaml", "log: {level: info}\n");
+  ASSERT_EQ(map_city("--config " + path("server.yaml")).exit_code, 0);
+  ASSERT_EQ(run("map " + path("city") + " --out " + path("plain")).exit_code, 0);
+  EXPECT_EQ(content("out/poses_lidar.txt"), content("plain/poses_lidar.txt"));
+}
+
+TEST_F(MapCommandTest, ReadersOfAMapLeaveItAlone) {
+  simulate("city", 4);
+  ASSERT_EQ(map_city().exit_code, 0);
+  std::filesystem::create_directory(folder_ / "kept");
+  std::filesystem::copy_file(folder_ / "out/map.stillmap", folder_ / "kept/map.stillmap");
+  // What a server that was killed leaves.
+  write("kept/map.stillmap-wal", "");
+  const std::string before = content("kept/map.stillmap");
+  const std::string map = path("kept/map.stillmap");
+  EXPECT_EQ(run("localize " + map + " " + path("city") + " --scans 1").exit_code, 0);
+  EXPECT_NE(run("plan --map " + map + " --from 0,0 --to 3,0").exit_code, 2);
+  EXPECT_NE(run("traversable " + map).exit_code, 2);
+  EXPECT_NE(run("octomap --map " + map + " --point 0,0,0").exit_code, 2);
+  EXPECT_EQ(run("evaluate map --map " + map + " --truth " + path("city")).exit_code, 0);
+  EXPECT_EQ(content("kept/map.stillmap"), before);
+  EXPECT_TRUE(exists("kept/map.stillmap-wal"));
+  EXPECT_FALSE(exists("kept/map.stillmap-shm"));
+}
+
 TEST_F(MapCommandTest, ListsClosedAndRefusedLoops) {
   simulate("city", 3);
   ASSERT_EQ(map_city("--deny-loop 0:2").exit_code, 0);

@@ -1,3 +1,4 @@
+#include <cstdlib>
 #include <vector>
 
 #include "tests/clients/command_test.hpp"
@@ -22,7 +23,7 @@ TEST_F(ServiceCommandTest, WithoutAServerIsExitCodeThree) {
   for (const std::string& command :
        {std::string("status"), std::string("query"), std::string("save"), std::string("reset"),
         std::string("watch"), std::string("traversable"), std::string("nearest --to 0 0"),
-        std::string("check-path --path 0 0 1 0"), "replay " + path("city")}) {
+        std::string("check-path --path 0 0 1 0"), std::string("loops"), "replay " + path("city")}) {
     const ProcessResult result = run(command + on_domain() + " --timeout 0.5");
     EXPECT_EQ(result.exit_code, 3) << command;
     EXPECT_THAT(result.err, HasSubstr(std::to_string(domain_))) << command;
@@ -148,6 +149,12 @@ TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
   EXPECT_EQ(watched.exit_code, 0) << watched.err;
   EXPECT_THAT(watched.out, HasSubstr("\"change\":\"appeared\""));
 
+  const nlohmann::json submaps = nlohmann::json::parse(run("loops --json" + on_domain()).out);
+  EXPECT_EQ(submaps.at("map_id"), status.at("map_id"));
+  EXPECT_EQ(submaps.at("submaps"), nlohmann::json::array()) << "five scans are no submap";
+  EXPECT_THAT(run("loops" + on_domain()).out, HasSubstr("0 submaps, 0 loops closed"));
+  EXPECT_EQ(run("loops --refused" + on_domain()).exit_code, 2);
+
   EXPECT_EQ(run("save saved.stillmap" + on_domain()).exit_code, 0);
   EXPECT_TRUE(exists("saved.stillmap"));
   const nlohmann::json loaded =
@@ -161,6 +168,25 @@ TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
   const nlohmann::json empty = nlohmann::json::parse(run("status --json" + on_domain()).out);
   EXPECT_EQ(empty.at("voxels"), 0);
   EXPECT_NE(empty.at("map_id"), status.at("map_id"));
+  const nlohmann::json none = nlohmann::json::parse(run("loops --json" + on_domain()).out);
+  EXPECT_EQ(none.at("map_id"), empty.at("map_id"));
+}
+
+TEST_F(ServiceCommandTest, ServerAndClientsMeetInTheDomainOfRos) {
+  ASSERT_EQ(setenv("ROS_DOMAIN_ID", std::to_string(domain_).c_str(), 1), 0);
+  BackgroundProcess server(stillmap_server_program() + " --map-file " + path("server.stillmap"),
+                           folder_ / "server.log");
+  EXPECT_EQ(run("status" + patiently()).exit_code, 0) << content("server.log");
+  EXPECT_EQ(unsetenv("ROS_DOMAIN_ID"), 0);
+}
+
+TEST_F(ServiceCommandTest, AServerThatClosesNoLoopsHasNoSubmaps) {
+  write("open.yaml", "map: {close_loops: false}\n");
+  BackgroundProcess server(server_command("--config " + path("open.yaml")), folder_ / "server.log");
+  ASSERT_EQ(run("status" + patiently() + on_domain()).exit_code, 0) << content("server.log");
+  const ProcessResult none = run("loops --timeout 2" + on_domain());
+  EXPECT_EQ(none.exit_code, 3);
+  EXPECT_THAT(none.err, HasSubstr("map.close_loops"));
 }
 
 TEST_F(ServiceCommandTest, AsksARunningServerWhereARobotCanGo) {

@@ -5,8 +5,10 @@
 
 #include <numbers>
 
+#include "config/loaders/model_folder.hpp"
 #include "core/segmentation/model_error.hpp"
 #include "tests/config/config_files.hpp"
+#include "tests/scratch_folder.hpp"
 
 namespace stillmap {
 namespace {
@@ -150,6 +152,16 @@ TEST(Segmenter, NamesTheNetworkFileThatIsMissing) {
   } catch (const ModelError& error) {
     EXPECT_THAT(error.what(), HasSubstr("model.onnx"));
   }
+}
+
+TEST(ModelFolder, AFolderOfAnotherKindHidesNoModel) {
+  const ScratchFolder folder;
+  std::filesystem::create_directory(folder.path() / "street");
+  const std::filesystem::path before = std::filesystem::current_path();
+  std::filesystem::current_path(folder.path());
+  const std::filesystem::path found = find_model("street");
+  std::filesystem::current_path(before);
+  EXPECT_TRUE(std::filesystem::exists(found / "model.yaml")) << found;
 }
 
 }  // namespace

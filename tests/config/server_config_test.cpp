@@ -148,6 +148,8 @@ TEST(ServerConfig, RefusesLidarsThatCannotBeToldApart) {
   EXPECT_THAT(refusal_of("sensors: [" + front + "]\n"), HasSubstr("frames.base"));
   EXPECT_THAT(refusal_of(base + "sensor: vlp_16\nsensors: [" + front + "]\n"),
               HasSubstr("leave one of the two out"));
+  EXPECT_THAT(refusal_of(base + "topics: {points: lidar}\nsensors: [" + front + "]\n"),
+              HasSubstr("points is of one lidar"));
   EXPECT_THAT(refusal_of(base + "mount: {xyz_m: [1, 0, 0]}\nsensors: [" + front + "]\n"),
               HasSubstr("leave one of the two out"));
 }
@@ -238,6 +240,24 @@ TEST(ServerConfig, RefusesValuesThatDoNotFitTogether) {
   EXPECT_THAT(refusal_of("gnss: {max_sigma_m: 0}"), HasSubstr("gnss.max_sigma_m"));
   EXPECT_THAT(refusal_of("frames: {map: ''}"), HasSubstr("frames.map"));
   EXPECT_THAT(refusal_of("map: {datum: '48'}"), HasSubstr("latitude,longitude"));
+}
+
+TEST(ServerConfig, PointsBeyondTheSensorsRangeAreDroppedUnlessTheFileSaysOtherwise) {
+  static_cast<void>(write_file("near.yaml", R"(
+name: near
+rings: 16
+fov_up_deg: 16
+fov_down_deg: -16
+min_range_m: 2
+max_range_m: 35
+)"));
+  const ServerConfig near = load("sensor: near.yaml");
+  EXPECT_EQ(near.mapper.prepare.min_range_m, 2.0);
+  EXPECT_EQ(near.mapper.prepare.max_range_m, 35.0);
+  const ServerConfig told = load("sensor: near.yaml\nprepare: {max_range_m: 20}");
+  EXPECT_EQ(told.mapper.prepare.min_range_m, 2.0);
+  EXPECT_EQ(told.mapper.prepare.max_range_m, 20.0);
+  EXPECT_EQ(load("log: {level: info}").mapper.prepare.max_range_m, 120.0);
 }
 
 TEST(ServerConfig, FindsTheRobotsOfItsAreas) {

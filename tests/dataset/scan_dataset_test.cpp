@@ -10,6 +10,7 @@
 #include "core/dataset/kitti_files.hpp"
 #include "core/dataset/kitti_sequence_writer.hpp"
 #include "core/dataset/point_cloud_files.hpp"
+#include "tests/dataset/kitti_lidar_scan.hpp"
 #include "tests/scratch_folder.hpp"
 
 namespace stillmap {
@@ -128,6 +129,37 @@ TEST(ScanDataset, TakesStampsFromFileNames) {
   const ScanDataset dataset(folder.path());
   EXPECT_EQ(dataset.stamp_ns(0), 1'539'765'928'346'003'000);
   EXPECT_EQ(dataset.read(1).scan.stamp_ns, 1'539'765'928'446'003'001);
+}
+
+TEST(ScanDataset, OrdersStampsByTheirTime) {
+  const ScratchFolder folder;
+  // As Python writes a float.
+  for (const char* name : {"12.5.pcd", "12.25.pcd", "12.05.pcd", "12.1.pcd", "9.75.pcd"})
+    (void)folder.file(name, pcd());
+  const ScanDataset dataset(folder.path());
+  EXPECT_THAT(names_of(dataset),
+              ElementsAre("9.75.pcd", "12.05.pcd", "12.1.pcd", "12.25.pcd", "12.5.pcd"));
+  for (std::size_t i = 1; i < dataset.size(); ++i)
+    EXPECT_GT(dataset.stamp_ns(i), dataset.stamp_ns(i - 1));
+}
+
+TEST(ScanDataset, ADamagedFirstScanSaysNothingOfTheOthersLabels) {
+  const ScratchFolder folder;
+  (void)folder.file("0.pcd", pcd().substr(0, 40));
+  for (const char* name : {"1.pcd", "2.pcd"}) (void)folder.file(name, pcd());
+  const ScanDataset dataset(folder.path());
+  EXPECT_FALSE(dataset.has_labels());
+  EXPECT_THROW(static_cast<void>(dataset.has_labels(0)), DatasetError);
+}
+
+TEST(ScanDataset, TellsWhatTheFilesOfKittisLidarHold) {
+  const ScratchFolder folder;
+  const Scan drawn = test::draw({.way_m = 0.5});
+  for (const char* name : {"0.bin", "1.bin", "2.bin"}) write_kitti_bin(folder.path() / name, drawn);
+  const ScanDataset dataset(folder.path());
+  ASSERT_TRUE(dataset.kitti_lidar());
+  EXPECT_EQ(dataset.read_uncorrected(1).scan.points_lidar, drawn.points_lidar);
+  EXPECT_NE(dataset.read(1).scan.points_lidar, drawn.points_lidar);
 }
 
 TEST(ScanDataset, ReadsASingleFile) {

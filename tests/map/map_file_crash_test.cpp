@@ -8,6 +8,7 @@
 
 #include "tests/map/saved_maps.hpp"
 #include "tests/scratch_folder.hpp"
+#include "tests/slowdown.hpp"
 
 namespace stillmap {
 namespace {
@@ -52,7 +53,7 @@ TEST(MapFileCrash, KilledWhileSavingTheLastSaveOrTheNextOneIsThere) {
   std::vector<SavedMap> maps;
   for (int i = 0; i < states; ++i) maps.push_back(test::saved_map(i));
   std::mt19937 random(4);
-  std::uniform_int_distribution<useconds_t> delay_us(2'000, 150'000);
+  std::uniform_int_distribution<useconds_t> delay_us(2'000, 150'000 * test::slowdown);
   int kills_after_a_save = 0;
   std::string before = "nothing";
   for (int kill_count = 0; kill_count < 20; ++kill_count) {

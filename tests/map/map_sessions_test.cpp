@@ -8,6 +8,7 @@
 #include <string>
 
 #include "core/map/static_map.hpp"
+#include "core/map/tools/map_check.hpp"
 #include "tests/map/map_worlds.hpp"
 #include "tests/map/saved_maps.hpp"
 #include "tests/scratch_folder.hpp"
@@ -212,6 +213,24 @@ TEST_F(MapSessionsTest, DamagedRowsAreAnErrorOrNone) {
       .exec("DROP TABLE sessions; CREATE TABLE sessions (other INTEGER)");
   EXPECT_THAT([&] { static_cast<void>(read_map_sessions(file_)); },
               ThrowsMessage<MapFileError>(HasSubstr("sessions cannot be read")));
+}
+
+TEST_F(MapSessionsTest, ACheckLooksAtWhatAWithdrawalWouldBringBack) {
+  add_session("tuesday", 8, 10.0F);
+  EXPECT_TRUE(check_map_file(file_).is_sound());
+  for (const char* column : {"encoded", "evidence"}) {
+    SQLite::Database database(file_.string(), SQLite::OPEN_READWRITE);
+    database.exec("CREATE TABLE kept AS SELECT * FROM session_tiles");
+    database.exec(std::string("UPDATE session_tiles SET ") + column + " = x'0102' WHERE " + column +
+                  " IS NOT NULL");
+    const MapCheck check = check_map_file(file_);
+    ASSERT_FALSE(check.faults.empty()) << column;
+    EXPECT_THAT(check.faults.front().what, HasSubstr("before the newest session"));
+    database.exec("DELETE FROM session_tiles");
+    database.exec("INSERT INTO session_tiles SELECT * FROM kept");
+    database.exec("DROP TABLE kept");
+  }
+  EXPECT_TRUE(check_map_file(file_).is_sound());
 }
 
 }  // namespace

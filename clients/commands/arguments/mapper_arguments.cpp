@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "config/loaders/mapper_section.hpp"
 #include "config/loaders/model_file.hpp"
 #include "config/loaders/sensor_file.hpp"
 #include "config/loaders/server_config.hpp"
@@ -49,8 +50,10 @@ void add_segmentation_options(CommandHandle command, MapperArguments& arguments)
 void add_mapper_options(CommandHandle command, MapperArguments& arguments) {
   command.option("--config", arguments.config_file,
                  "Server file (config/server/*.yaml); its mapper settings are used");
-  command.option("--sensor", arguments.sensor,
-                 "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: as the data set suggests");
+  command.option(
+      "--sensor", arguments.sensor,
+      "hdl_64e, hdl_32e, vlp_16 or a sensor file; default: that of --config, else as the data "
+      "set suggests");
   command
       .option("--labels", arguments.labels,
               "Where classes come from: auto (the data set's, if it has any, else the model's), "
@@ -81,13 +84,18 @@ Weighting weighting_from_name(const std::string& weighting_name) {
 }
 
 MapperConfig mapper_config(const MapperArguments& arguments, const SensorModel& suggested_sensor) {
-  MapperConfig config;
-  if (arguments.config_file.empty()) {
+  ServerConfig server;
+  ConfigReport report{.faults = {},
+                      .left_out = {"sensor", "prepare.min_range_m", "prepare.max_range_m"},
+                      .changed = {}};
+  if (!arguments.config_file.empty()) server = load_server_config(arguments.config_file, report);
+  MapperConfig& config = server.mapper;
+  if (!arguments.sensor.empty()) {
+    config.sensor = load_sensor(arguments.sensor);
+    take_range_of_sensor(report, config);
+  } else if (is_left_out(report, "sensor") && server.lidars.empty()) {
     config.sensor = suggested_sensor;
-  } else {
-    config = load_server_config(arguments.config_file).mapper;
   }
-  if (!arguments.sensor.empty()) config.sensor = load_sensor(arguments.sensor);
   if (!arguments.weighting.empty()) {
     config.odometry.weighting = weighting_from_name(arguments.weighting);
   }
@@ -102,7 +110,7 @@ LabelsConfig labels_config(const MapperArguments& arguments, const ScanDataset& 
   if (arguments.labels == "none") {
     labels.source = LabelProvider::none;
   } else if (arguments.labels == "files") {
-    if (!dataset.has_labels(0)) {
+    if (!dataset.has_labels()) {
       throw std::invalid_argument(dataset.file(0).string() +
                                   " has no labels: use --labels model or none");
     }
@@ -113,7 +121,7 @@ LabelsConfig labels_config(const MapperArguments& arguments, const ScanDataset& 
     labels.source = LabelProvider::model;
     labels.model = arguments.labels;
   } else if (labels.source == LabelProvider::automatic) {
-    labels.source = dataset.has_labels(0) ? LabelProvider::stream : LabelProvider::model;
+    labels.source = dataset.has_labels() ? LabelProvider::stream : LabelProvider::model;
   }
   if (arguments.columns > 0) labels.image_columns = static_cast<int>(arguments.columns);
   set_engine(arguments.engine, labels.engine);

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "config/loaders/server_config.hpp"
 #include "core/frames/rigid_motion.hpp"
 
 namespace stillmap::cli {
@@ -22,6 +23,23 @@ std::optional<Eigen::Isometry3d> MountArguments::T_base_lidar() const {
   constexpr double radians_per_degree = std::numbers::pi / 180.0;
   return from_xyz_rpy({xyz_rpy[0], xyz_rpy[1], xyz_rpy[2]},
                       radians_per_degree * Eigen::Vector3d(xyz_rpy[3], xyz_rpy[4], xyz_rpy[5]));
+}
+
+MappedBody body_of(const MountArguments& mount, const std::string& file) {
+  const ServerConfig server = file.empty() ? ServerConfig{} : load_server_config(file);
+  if (!server.lidars.empty()) {
+    throw std::invalid_argument(file + " lists several lidars ('sensors'), but a sequence is of " +
+                                "one: give a file with 'sensor' and 'mount'");
+  }
+  const std::string base = server.frames.base.empty() ? "base_link" : server.frames.base;
+  if (const auto T_base_lidar = mount.T_base_lidar()) return {base, *T_base_lidar};
+  if (server.frames.base.empty()) return {};
+  if (server.mount.source == MountConfig::Source::tf_static) {
+    throw std::invalid_argument(file +
+                                " takes the lidar's place from /tf_static, which a sequence "
+                                "does not have: give it with --mount");
+  }
+  return {base, server.mount.T_base_lidar};
 }
 
 void add_mount_option(CommandHandle command, MountArguments& arguments, const std::string& help) {

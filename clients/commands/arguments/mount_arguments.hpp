@@ -18,6 +18,18 @@ struct MountArguments {
   [[nodiscard]] std::optional<Eigen::Isometry3d> T_base_lidar() const;
 };
 
+/// What the poses of a run are of.
+struct MappedBody {
+  std::string frame = "lidar";
+  /// Where the lidar sits on it. The map begins where the body stands.
+  Eigen::Isometry3d T_body_lidar = Eigen::Isometry3d::Identity();
+};
+
+/// The robot, where the command line or the server's file (empty: none) says where its lidar sits,
+/// else the lidar. Throws std::invalid_argument for a file of several lidars, or one that takes the
+/// place from /tf_static, and ConfigError.
+[[nodiscard]] MappedBody body_of(const MountArguments& mount, const std::string& config_file);
+
 /// Adds --mount; `help` says what it is for.
 void add_mount_option(CommandHandle command, MountArguments& arguments, const std::string& help);
 

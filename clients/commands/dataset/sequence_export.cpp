@@ -43,7 +43,10 @@ class SequenceExporter {
                      dataset_.file(index).string() +
                          " takes the pose of the scan before: " + mapper_.last_rejection().reason});
     }
-    output_.add(frame->scan, std::move(raw_labels), T_map_lidar_);
+    // What reading corrects is corrected again when the export is read.
+    const bool is_corrected = dataset_.kitti_lidar().has_value();
+    output_.add(is_corrected ? dataset_.read_uncorrected(index).scan : frame->scan,
+                std::move(raw_labels), T_map_lidar_);
   }
 
   ExportSummary finish(bool stopped) {
@@ -93,9 +96,9 @@ bool is_within(const std::filesystem::path& path, const std::filesystem::path& f
 
 void prepare_sequence_folder(const std::filesystem::path& folder, bool force,
                              const std::filesystem::path& source) {
-  constexpr std::array parts{"velodyne",  "labels",       "labels.bak",
-                             "rings",     "time_offsets", "calib.txt",
-                             "times.txt", "poses.txt",    "poses_lidar.txt"};
+  constexpr std::array parts{"velodyne",        "labels",    "labels.bak", "rings",
+                             "time_offsets",    "calib.txt", "times.txt",  "poses.txt",
+                             "poses_lidar.txt", "imu.csv",   "imu.txt",    "gnss.csv"};
   if (!std::filesystem::exists(folder / parts.front())) return;
   if (!force) {
     throw std::invalid_argument(folder.string() +

@@ -10,7 +10,7 @@
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/scan_dataset.hpp"
 #include "core/evaluation/map_cleaning.hpp"
-#include "core/map/storage/map_file.hpp"
+#include "core/map/storage/map_file_copy.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -120,7 +120,7 @@ ExitCode run(const EvaluateMapArguments& arguments) {
     throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
   }
   const ScanDataset dataset(arguments.truth);
-  const SavedMap map = open_map_file(arguments.map)->load();
+  const SavedMap map = read_map_file(arguments.map);
   const evaluation::MapTruth truth =
       true_map(arguments, dataset, poses_for_truth(arguments, dataset, map));
   const evaluation::MapCleaningScore score =

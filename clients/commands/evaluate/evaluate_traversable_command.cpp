@@ -9,7 +9,7 @@
 #include "clients/terminal/table.hpp"
 #include "config/loaders/robot_profile.hpp"
 #include "core/dataset/dataset_error.hpp"
-#include "core/map/storage/map_file.hpp"
+#include "core/map/storage/map_file_copy.hpp"
 #include "core/traversability/traversability_map.hpp"
 
 namespace stillmap::cli {
@@ -74,7 +74,7 @@ ExitCode run(const EvaluateTraversableArguments& arguments) {
   if (!std::filesystem::exists(arguments.map)) {
     throw DatasetError(arguments.map, "does not exist; 'stillmap map' writes map files");
   }
-  const SavedMap map = open_map_file(arguments.map)->load();
+  const SavedMap map = read_map_file(arguments.map);
   const simulation::SimulationConfig config = simulation_config(arguments.simulation);
   // The map's frame is the lidar's at the first scan.
   const Eigen::Isometry3d T_city_map = simulation::Simulation(config).T_map_lidar_at(0.0);

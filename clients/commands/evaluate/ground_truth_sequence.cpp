@@ -92,7 +92,7 @@ GroundTruthSequence open_recorded(const std::string& name) {
   GroundTruthSequence sequence;
   sequence.name = name;
   sequence.sensor = dataset->suggested_sensor();
-  sequence.labelled = dataset->has_labels(0);
+  sequence.labelled = dataset->has_labels();
   sequence.imu = dataset->imu();
   sequence.read = [dataset](std::size_t i) { return dataset->read(i).scan; };
   for (std::size_t i = 0; i < dataset->size(); ++i)

@@ -20,7 +20,7 @@
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/localization/localizer.hpp"
-#include "core/map/storage/map_file.hpp"
+#include "core/map/storage/map_file_copy.hpp"
 #include "core/picture/map_picture.hpp"
 #include "idl/bag/bag_scan_source.hpp"
 
@@ -65,7 +65,7 @@ SearchableMap load_map(const std::string& file) {
     throw std::invalid_argument(file + " is no map file: 'stillmap map' and a server write them");
   SearchableMap map;
   const auto load_began = Clock::now();
-  map.saved = open_map_file(file)->load();
+  map.saved = read_map_file(file);
   map.load_ms = milliseconds_since(load_began);
   const auto index_began = Clock::now();
   map.index =
@@ -77,7 +77,7 @@ SearchableMap load_map(const std::string& file) {
 
 /// A place is told by its geometry: the network is not run unless it is asked for.
 MapperArguments labels_of(MapperArguments arguments, const ScanDataset& dataset) {
-  if (arguments.labels == "auto") arguments.labels = dataset.has_labels(0) ? "files" : "none";
+  if (arguments.labels == "auto") arguments.labels = dataset.has_labels() ? "files" : "none";
   return arguments;
 }
 
@@ -90,7 +90,7 @@ class LocalizationRun {
         localizer_(localizer),
         config_(mapper_config(arguments.mapper, dataset.suggested_sensor())),
         segmenter_(make_segmenter(labels_of(arguments.mapper, dataset), dataset)),
-        T_body_lidar_(arguments.mount.T_base_lidar().value_or(Eigen::Isometry3d::Identity())),
+        T_body_lidar_(body_of(arguments.mount, arguments.mapper.config_file).T_body_lidar),
         is_strict_(arguments.range.strict) {}
 
   /// Nothing for a scan that cannot be read; why is said.
@@ -242,8 +242,9 @@ void add_localize_command(CommandHandle program, Action& action) {
   command.option("DATASET", arguments->dataset, dataset_kinds).required();
   command.option("--topic-in", arguments->topic_in, topic_in_help);
   add_mapper_options(command, arguments->mapper);
-  add_mount_option(command, arguments->mount,
-                   "Poses of the robot, in a map that was made with the same --mount");
+  add_mount_option(
+      command, arguments->mount,
+      "Poses of the robot, in a map that was made with the same --mount (or --config)");
   command.option("--start", arguments->range.first, "Number of the first scan");
   command.option("--scans,--count", arguments->range.count, "Look for as many scans at most");
   command.option("--step", arguments->step, "Every so many scans").above_zero().with_default();

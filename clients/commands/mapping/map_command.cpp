@@ -169,25 +169,6 @@ struct MapArguments {
   bool json = false;
 };
 
-/// The robot, where the command line or the server's file says where its lidar sits.
-MappedBody body_of(const MapArguments& arguments) {
-  const std::string& file = arguments.mapper.config_file;
-  const ServerConfig server = file.empty() ? ServerConfig{} : load_server_config(file);
-  if (!server.lidars.empty()) {
-    throw std::invalid_argument(file + " lists several lidars ('sensors'), but a sequence is of " +
-                                "one: give a file with 'sensor' and 'mount'");
-  }
-  const std::string base = server.frames.base.empty() ? "base_link" : server.frames.base;
-  if (const auto T_base_lidar = arguments.mount.T_base_lidar()) return {base, *T_base_lidar};
-  if (server.frames.base.empty()) return {};
-  if (server.mount.source == MountConfig::Source::tf_static) {
-    throw std::invalid_argument(file +
-                                " takes the lidar's place from /tf_static, which a sequence "
-                                "does not have: give it with --mount");
-  }
-  return {base, server.mount.T_base_lidar};
-}
-
 MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& arguments,
                                 const MapperConfig& config, const MappedBody& body,
                                 std::unique_ptr<Segmenter> labels, RunFile& run_file,
@@ -356,10 +337,11 @@ ExitCode run(const MapArguments& arguments) {
   StopSignal stop;
   const ScanDataset dataset = open_recording(arguments.dataset, arguments.topic_in);
   const MapperConfig config = mapper_config(arguments.mapper, dataset.suggested_sensor());
-  const MappedBody body = body_of(arguments);
+  const MappedBody body = body_of(arguments.mount, arguments.mapper.config_file);
   static_cast<void>(arguments.range.end(dataset));
   static_cast<void>(denied_loops(arguments));
   static_cast<void>(gnss_options(arguments, dataset, body));
+  static_cast<void>(dataset.truth());
   auto labels = make_segmenter(arguments.mapper, dataset);
   const std::unique_ptr<const EarlierMap> earlier = earlier_map(arguments, config);
   std::cerr << describe_model(arguments.mapper, dataset, *labels);

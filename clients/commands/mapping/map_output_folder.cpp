@@ -1,5 +1,6 @@
 #include "clients/commands/mapping/map_output_folder.hpp"
 
+#include <array>
 #include <stdexcept>
 #include <string>
 #include <system_error>
@@ -13,6 +14,11 @@ namespace stillmap::cli {
 namespace {
 
 namespace fs = std::filesystem;
+
+/// Results that not every run has.
+constexpr std::array may_be_left_out{
+    "poses_lidar.txt",      "poses_base.txt",   "poses_odometry.txt", "trajectory.png",
+    "trajectory_error.png", "loops_before.png", "loops_after.png"};
 
 void make(const fs::path& folder) {
   std::error_code error;
@@ -83,6 +89,10 @@ void MapOutputFolder::publish(bool keep_run) {
   std::vector<fs::path> results;
   for (const fs::directory_entry& entry : fs::directory_iterator(unfinished_, error)) {
     if (!entry.path().filename().string().starts_with(run_name)) results.push_back(entry.path());
+  }
+  // Pictures and poses of an earlier run would be taken for this one's.
+  for (const char* const name : may_be_left_out) {
+    if (!fs::exists(unfinished_ / name)) fs::remove(folder_ / name, error);
   }
   for (const fs::path& result : results) {
     fs::rename(result, folder_ / result.filename(), error);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/mapping/earlier_map.hpp"
 #include "clients/commands/mapping/loop_correction.hpp"
 #include "clients/commands/mapping/run_file.hpp"
@@ -36,13 +37,6 @@ struct SkippedScan {
   std::size_t index = 0;
   std::string counter;
   std::string reason;
-};
-
-/// What the poses of a run are of.
-struct MappedBody {
-  std::string frame = "lidar";
-  /// Where the lidar sits on it. The map begins where the body stands.
-  Eigen::Isometry3d T_body_lidar = Eigen::Isometry3d::Identity();
 };
 
 struct MappingResult {

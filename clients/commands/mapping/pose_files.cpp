@@ -98,9 +98,10 @@ void write_tum(const std::filesystem::path& file, const Trajectory& trajectory,
   for (const StampedPose& pose : trajectory) {
     const Eigen::Quaterniond q(pose.T_map_lidar.linear());
     const Eigen::Vector3d t = pose.T_map_lidar.translation();
-    out << pose.stamp_ns / ns_per_s << "." << std::setw(9) << std::setfill('0')
-        << pose.stamp_ns % ns_per_s << " " << t.x() << " " << t.y() << " " << t.z() << " " << q.x()
-        << " " << q.y() << " " << q.z() << " " << q.w() << "\n";
+    out << (pose.stamp_ns < 0 ? "-" : "") << std::abs(pose.stamp_ns / ns_per_s) << "."
+        << std::setw(9) << std::setfill('0') << std::abs(pose.stamp_ns % ns_per_s) << " " << t.x()
+        << " " << t.y() << " " << t.z() << " " << q.x() << " " << q.y() << " " << q.z() << " "
+        << q.w() << "\n";
   }
   out.close();
   if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");

@@ -10,7 +10,7 @@
 #include "clients/commands/command.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/table.hpp"
-#include "core/map/storage/map_file.hpp"
+#include "core/map/storage/map_file_copy.hpp"
 #include "core/occupancy/occupancy_map.hpp"
 #include "core/occupancy/occupancy_query.hpp"
 #include "core/occupancy/octomap_data.hpp"
@@ -204,7 +204,7 @@ OccupancyMap open_map(const OctomapArguments& arguments) {
   OccupancyConfig config;
   config.resolution_m = arguments.resolution_m;
   OccupancyMap map(config);
-  map.insert(open_map_file(file)->load().view);
+  map.insert(read_map_file(file).view);
   return map;
 }
 

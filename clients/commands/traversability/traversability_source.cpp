@@ -8,6 +8,7 @@
 #include "config/loaders/config_error.hpp"
 #include "config/loaders/robot_profile.hpp"
 #include "core/dataset/dataset_error.hpp"
+#include "core/map/storage/map_file_copy.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -16,7 +17,7 @@ SavedMap saved_map(const std::string& file) {
   if (!std::filesystem::exists(file)) {
     throw DatasetError(file, "does not exist; 'stillmap map' writes map files");
   }
-  return open_map_file(file)->load();
+  return read_map_file(file);
 }
 
 class FileSource final : public TraversabilitySource {

@@ -218,6 +218,29 @@ void check_tile_evidence(SQLite::Database& database, const MapRow& map, MapCheck
   }
 }
 
+/// Tiles as they were before the newest session, which may be withdrawn.
+void check_session_tiles(SQLite::Database& database, const MapRow& map, MapCheck& check) {
+  if (!database.tableExists("session_tiles")) return;
+  MapCheck of_session;
+  SQLite::Statement row(database,
+                        "SELECT x, y, revision, content_hash, encoded, evidence, "
+                        "coalesce(voxel_count, 0) FROM session_tiles");
+  while (row.executeStep()) {
+    const TileRow tile = tile_row(row);
+    if (!row.isColumnNull(4)) check_tile(tile, map, of_session);
+    if (row.isColumnNull(5)) continue;
+    const SQLite::Column blob = row.getColumn(5);
+    check_evidence(tile.id,
+                   std::span(static_cast<const std::uint8_t*>(blob.getBlob()),
+                             static_cast<std::size_t>(blob.getBytes())),
+                   row.getColumn(6).getInt64(), map, of_session);
+  }
+  for (MapFault& fault : of_session.faults) {
+    fault.what = "as it was before the newest session: " + fault.what;
+    check.faults.push_back(std::move(fault));
+  }
+}
+
 void check_trajectory(SQLite::Database& database, MapCheck& check) {
   SQLite::Statement row(
       database, "SELECT stamp_ns, x, y, z, qx, qy, qz, qw FROM trajectory ORDER BY position");
@@ -254,7 +277,9 @@ MapCheck check_map_file(const std::filesystem::path& file, const CheckProgress& 
   });
   guarded(check, "tiles", [&] {
     SQLite::Database database(copy.path().string());
-    if (map && has_usable_sizes(*map)) check_tile_evidence(database, *map, check);
+    if (!map || !has_usable_sizes(*map)) return;
+    check_tile_evidence(database, *map, check);
+    check_session_tiles(database, *map, check);
   });
   guarded(check, "trajectory", [&] {
     SQLite::Database database(copy.path().string());
