@@ -18,7 +18,7 @@ PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.tx
 .PHONY: help packages web-packages configure programs packaged web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 relocalize drives loops loops-served sessions ros-messages parity format format-check clean
 
 help: ## Show this list
-	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | column -ts $$'\t'
+	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | awk -F '\t' '{ printf "%-16s%s\n", $$1, $$2 }'
 
 # Slim images have no folder for manuals, and Java's package does not install without it.
 packages: ## Install the Debian packages that are missing

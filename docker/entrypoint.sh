@@ -5,8 +5,10 @@ set -eu
 case ${1-stillmap-server} in
   stillmap-server)
     [ $# -eq 0 ] || shift
-    set -- stillmap-server --config "${STILLMAP_CONFIG:-/etc/stillmap/server.yaml}" "$@"
-    [ -z "${ROS_DOMAIN_ID-}" ] || set -- "$@" --domain "$ROS_DOMAIN_ID"
+    case " $* " in
+      *" --config "* | *" --config="* | *" --check-config "*) set -- stillmap-server "$@" ;;
+      *) set -- stillmap-server --config "${STILLMAP_CONFIG:-/etc/stillmap/server.yaml}" "$@" ;;
+    esac
     ;;
   stillmap | stillmap-gateway | sh | bash | /*) ;;
   *) set -- stillmap "$@" ;;

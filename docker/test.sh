@@ -75,7 +75,8 @@ clean_up() {
     [ -z "$made_base" ] || "$docker" rmi debian:bookworm-slim
     [ -z "$started_dockerd" ] || { kill "$started_dockerd"; wait "$started_dockerd"; }
   } > /dev/null 2>&1 || true
-  rm -rf docker/packages "$work"
+  [ -z "${made_packages-}" ] || rm -rf docker/packages
+  rm -rf "$work"
   exit "$status"
 }
 
@@ -91,6 +92,8 @@ build_image() {
   local from=built
   if [ -n "${STILLMAP_PACKAGES-}" ]; then
     from=given
+    [ ! -e docker/packages ] || fail "docker/packages is there: move it away, it would be taken for the test's"
+    made_packages=yes
     mkdir -p docker/packages
     cp "$STILLMAP_PACKAGES"/*.deb docker/packages/
   fi
