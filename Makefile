@@ -17,6 +17,9 @@ PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.tx
 
 .PHONY: help packages web-packages configure programs packaged web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 relocalize drives loops loops-served sessions ros-messages parity format format-check clean
 
+# They have domains of their own, named in files; the variable would come before these.
+test test-dev test-tsan test-kill test-scale test-network fuzz soak bench relocalize loops-served parity: export ROS_DOMAIN_ID :=
+
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | awk -F '\t' '{ printf "%-16s%s\n", $$1, $$2 }'
 

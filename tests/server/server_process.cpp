@@ -57,7 +57,9 @@ void ServiceSetup::add(const std::string& yaml) const {
 }
 
 std::vector<std::string> ServiceSetup::server_arguments() const {
-  return {"--config", (folder_ / "server.yaml").string()};
+  // Also where ROS_DOMAIN_ID is set, which comes before the file.
+  return {"--config", (folder_ / "server.yaml").string(), "--domain",
+          std::to_string(dds::test_domain_id())};
 }
 
 dds::DdsOptions ServiceSetup::dds() const { return dds::loopback(true); }
