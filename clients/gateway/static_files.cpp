@@ -2,11 +2,14 @@
 
 #include <xxhash.h>
 
+#include <algorithm>
 #include <array>
+#include <cstddef>
 #include <fstream>
 #include <iterator>
-#include <regex>
 #include <stdexcept>
+#include <string>
+#include <string_view>
 #include <utility>
 
 namespace stillmap::gateway {
@@ -35,8 +38,13 @@ std::string read(const fs::path& file) {
 
 /// As the bundler names files: main-4XQ7ABCD.js.
 bool has_hash_in_name(const fs::path& file) {
-  static const std::regex pattern(".*-[0-9A-Z]{8}\\.\\w+");
-  return std::regex_match(file.filename().string(), pattern);
+  constexpr std::size_t hash_characters = 8;
+  const std::string stem = file.stem().string();
+  if (!file.has_extension() || stem.size() <= hash_characters) return false;
+  const std::string_view end = std::string_view(stem).substr(stem.size() - hash_characters - 1);
+  return end.front() == '-' && std::ranges::all_of(end.substr(1), [](char c) {
+           return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z');
+         });
 }
 
 }  // namespace
