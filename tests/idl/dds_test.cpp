@@ -110,6 +110,9 @@ TEST_P(OverTransport, OutlivesFilteredReadersThatComeAndGo) {
     for (std::uint64_t i = 0; !stop.stop_requested(); ++i) {
       const TileId id{static_cast<std::int32_t>(i % 8) - 4, 0};
       static_cast<void>(writer.write(wire::to_wire(tile_info(id, i), MapIdentity())));
+      // Without a pause this thread holds the writer's lock nearly always, and on a busy machine no
+      // reader is answered for longer than the test waits.
+      std::this_thread::sleep_for(100us);
     }
   });
   stillmap_msgs::msg::TileInfo message;
