@@ -83,11 +83,15 @@ std::optional<MapCorrection> LiveLoopCloser::correction() {
   for (std::size_t i = 0; i < poses.size(); ++i) {
     poses[i] = {stamps_ns_[i], T_map_lidar_[i].translation(),
                 corrected[i] * T_map_lidar_[i].inverse()};
-    max_shift_m = std::max(max_shift_m, MapCorrection::max_shift_m(poses[i], config_.range_m));
+    const double shift_m = MapCorrection::max_shift_m(poses[i], config_.range_m);
+    max_shift_m = std::max(max_shift_m, shift_m);
+    // What was seen from there stays where it is: the pose, too, until both move.
+    if (shift_m < config_.min_shift_m) poses[i].T_new_old = Eigen::Isometry3d::Identity();
   }
   if (max_shift_m < config_.min_shift_m) return std::nullopt;
   known_closures_ = closer_.closures().size();
-  T_map_lidar_ = corrected;
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    T_map_lidar_[i] = poses[i].T_new_old * T_map_lidar_[i];
   ++corrections_;
   MapCorrection correction(std::move(poses));
   T_map_odom_ = correction.latest() * T_map_odom_;

@@ -36,18 +36,19 @@ double angle_of(const Eigen::Isometry3d& T) { return so3_log(T.linear()).norm();
 }  // namespace
 
 void LoopCloser::add(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar,
-                     bool is_confirmed) {
-  const std::size_t number = T_odom_lidar_.size();
+                     bool is_confirmed, std::size_t number) {
+  const std::size_t index = T_odom_lidar_.size();
   T_odom_lidar_.push_back(T_odom_lidar);
+  numbers_.push_back(number);
   if (!is_confirmed) return;
   if (nodes_.empty()) {
-    nodes_.push_back({number, 0.0});
+    nodes_.push_back({index, 0.0});
     graph_.T_map_node.push_back(T_odom_lidar);
   } else {
     const Eigen::Isometry3d motion = T_odom_lidar_[nodes_.back().scan].inverse() * T_odom_lidar;
     if (motion.translation().norm() >= config_.node_spacing_m ||
         angle_of(motion) >= config_.node_turn_rad)
-      add_node(number, T_odom_lidar);
+      add_node(index, T_odom_lidar);
   }
   builder_.add(scan, T_odom_lidar);
   const double begun_m = nodes_[first_node_of_submap_].way_m;
@@ -223,13 +224,16 @@ bool LoopCloser::is_denied(std::size_t from, std::size_t to) const {
   });
 }
 
-bool LoopCloser::is_about(std::size_t scan, std::size_t submap) const {
-  const auto key_scan = [this](std::size_t s) { return nodes_[submaps_[s].submap.key_node].scan; };
-  const std::size_t first = submap == 0 ? 0 : key_scan(submap - 1);
+bool LoopCloser::is_about(std::size_t number, std::size_t submap) const {
+  const auto key_number = [this](std::size_t s) {
+    return numbers_[nodes_[submaps_[s].submap.key_node].scan];
+  };
+  const std::size_t first = submap == 0 ? 0 : key_number(submap - 1);
   // Of the newest one half is behind its key, and the next key as far ahead of its end.
-  const std::size_t last = submap + 1 < submaps_.size() ? key_scan(submap + 1)
-                                                        : 2 * nodes_.back().scan - key_scan(submap);
-  return first <= scan && scan <= last;
+  const std::size_t last = submap + 1 < submaps_.size()
+                               ? key_number(submap + 1)
+                               : 2 * numbers_[nodes_.back().scan] - key_number(submap);
+  return first <= number && number <= last;
 }
 
 double LoopCloser::excursion_m(std::size_t from, std::size_t to) const {

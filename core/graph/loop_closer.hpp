@@ -76,7 +76,7 @@ struct LoopClosure {
   std::string refusal;
 };
 
-/// A closure that somebody knows to be wrong: scans as in LoopClosure.
+/// A closure that somebody knows to be wrong: scans by the numbers of `LoopCloser::add`.
 struct DeniedLoop {
   std::size_t from_scan = 0;
   std::size_t to_scan = 0;
@@ -95,7 +95,13 @@ class LoopCloser {
   void deny(const DeniedLoop& denied) { denied_.push_back(denied); }
 
   /// The next scan of the drive. One that is not confirmed has a pose, but no part in submaps.
-  void add(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar, bool is_confirmed);
+  /// `number`: what DeniedLoop names it by, larger than that of the last one.
+  void add(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar, bool is_confirmed,
+           std::size_t number);
+  /// The same, numbered by the calls.
+  void add(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar, bool is_confirmed) {
+    add(scan, T_odom_lidar, is_confirmed, T_odom_lidar_.size());
+  }
   /// A position of one of the scans added so far. Those of scans before the first node say nothing.
   void add(const PositionAtScan& position);
   /// The drive ended: its last stretch becomes a submap, too.
@@ -159,8 +165,8 @@ class LoopCloser {
   [[nodiscard]] double excursion_m(std::size_t from, std::size_t to) const;
   [[nodiscard]] std::optional<Candidate> verify(std::size_t from, std::size_t to, double way_m);
   [[nodiscard]] bool is_denied(std::size_t from, std::size_t to) const;
-  /// Whether the scan is of this submap or one of its neighbours.
-  [[nodiscard]] bool is_about(std::size_t scan, std::size_t submap) const;
+  /// Whether the scan of this number is of this submap or one of its neighbours.
+  [[nodiscard]] bool is_about(std::size_t number, std::size_t submap) const;
   void judge(Candidate candidate);
   void accept(Candidate candidate);
   /// Has the new positions take part, once it is known where the map lies.
@@ -176,6 +182,8 @@ class LoopCloser {
   LoopClosingConfig config_;
   SubmapBuilder builder_;
   std::vector<Eigen::Isometry3d> T_odom_lidar_;
+  /// Of the scans.
+  std::vector<std::size_t> numbers_;
   std::vector<Node> nodes_;
   std::size_t first_node_of_submap_ = 0;
   PoseGraph graph_;

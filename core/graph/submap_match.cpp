@@ -49,7 +49,9 @@ Matrix6d along_key_axes(const Matrix6d& information, const Submap& submap) {
 AlignmentWindow window_after(const DriftModel& drift, double way_m) {
   return {.reach_m = std::min(drift.offset_m + drift.share_of_way * way_m, drift.max_m),
           .reach_rad =
-              std::min(drift.heading_rad + drift.heading_rad_per_m * way_m, drift.max_heading_rad)};
+              std::min(drift.heading_rad + drift.heading_rad_per_m * way_m, drift.max_heading_rad),
+          .reach_height_m =
+              std::min(drift.height_offset_m + drift.height_share_of_way * way_m, drift.max_m)};
 }
 
 std::optional<SubmapMatch> match_submaps(const PlacedSubmap& a, const PlacedSubmap& b,
@@ -74,6 +76,11 @@ std::optional<SubmapMatch> match_submaps(const PlacedSubmap& a, const PlacedSubm
       .refusal = fault_of(found, config)};
   if (!match.refusal.empty()) return match;
 
+  const double height_m = found.T_map_lidar.translation().z() - T_a_b_expected.translation().z();
+  if (std::abs(height_m) > window.reach_height_m) {
+    match.refusal = "it is higher or lower than odometry can have drifted: another storey";
+    return match;
+  }
   const Eigen::Isometry3d refinement = T_a_b_guess.inverse() * found.T_map_lidar;
   if (refinement.translation().norm() > config.max_refinement_m ||
       so3_log(refinement.linear()).norm() > config.max_refinement_rad) {

@@ -17,6 +17,9 @@ struct DriftModel {
   double share_of_way = 0.01;
   double offset_m = 2.0;
   double max_m = 25.0;
+  /// The same in height: a storey of a car park is 3 m above the last one, 200 m of way before.
+  double height_share_of_way = 0.005;
+  double height_offset_m = 1.0;
   /// Of the heading [rad], [rad/m].
   double heading_rad = 0.026;
   double heading_rad_per_m = 0.00006;

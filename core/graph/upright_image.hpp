@@ -51,6 +51,8 @@ class UprightImage {
 struct AlignmentWindow {
   double reach_m = 5.0;
   double reach_rad = 0.05;
+  /// In height: beyond it the place that looks alike is another storey.
+  double reach_height_m = 2.5;
 };
 
 /// Where one submap lies in another, in plan.

@@ -38,6 +38,10 @@ class LiveDrive {
     for (std::size_t i = 0; i < in_map.size(); ++i) {
       const auto* const T_new_old = correction->at(stamp_ns(i));
       ASSERT_NE(T_new_old, nullptr);
+      // What moves by less would not be moved in the map, and never be made up for.
+      EXPECT_TRUE(T_new_old->isApprox(Eigen::Isometry3d::Identity(), 0.0) ||
+                  MapCorrection::max_shift_m(correction->poses()[i], LiveLoopConfig().range_m) >=
+                      LiveLoopConfig().min_shift_m);
       EXPECT_TRUE(correction->poses()[i].position_map.isApprox(in_map[i].translation(), 1e-9) ||
                   in_map[i].translation().norm() < 1e-6);
       in_map[i] = *T_new_old * in_map[i];

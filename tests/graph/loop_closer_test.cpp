@@ -97,6 +97,40 @@ TEST(LoopCloser, NothingJoinsPlacesOfWhichThatIsDenied) {
   }));
 }
 
+// A ramp of a car park: each round is 3 m above the last one, between the same walls.
+TEST(LoopCloser, TheStoreyAboveIsAnotherPlace) {
+  const StreetWorld world(11);
+  Drive ramp = drive(world, 2.0 * StreetWorld::length_m, 0.0, 0.0);
+  for (std::size_t i = 0; i < ramp.odometry.size(); ++i)
+    ramp.odometry[i].pretranslate(
+        Eigen::Vector3d(0.0, 0.0, 3.0 * static_cast<double>(i) / StreetWorld::length_m));
+  const LoopCloser closer = closed(world, ramp, 100);
+  EXPECT_TRUE(closer.closures().empty());
+  EXPECT_TRUE(std::ranges::any_of(closer.refused(), [](const LoopClosure& closure) {
+    return closure.refusal.find("another storey") != std::string::npos;
+  }));
+}
+
+// As a run that skips damaged scans numbers those that are left.
+TEST(LoopCloser, DeniedLoopsAreNamedByTheNumbersOfTheScans) {
+  const StreetWorld world(11);
+  const Drive two_rounds = drive(world, 1.5 * StreetWorld::length_m, 0.0001, 0.003);
+  const LoopCloser before = closed(world, two_rounds, 100);
+  const LoopClosure& wrong = before.closures().at(1);
+  constexpr std::size_t skipped = 200;
+  LoopCloser closer(LoopClosingConfig{});
+  closer.deny({wrong.from_scan, wrong.to_scan + skipped});
+  const Eigen::Isometry3d T_map_first = world.T_map_lidar_at(0.0, false);
+  for (std::size_t i = 0; i < two_rounds.truth.size(); ++i)
+    closer.add(world.scan_at(T_map_first * two_rounds.truth[i], 100 + i), two_rounds.odometry[i],
+               true, i < 200 ? i : i + skipped);
+  closer.finish();
+  EXPECT_TRUE(std::ranges::any_of(closer.refused(), [&](const LoopClosure& closure) {
+    return closure.from_scan == wrong.from_scan && closure.to_scan == wrong.to_scan &&
+           closure.refusal == "denied by who maps";
+  }));
+}
+
 TEST(LoopCloser, PosesStayAsTheyAreWithoutALoop) {
   const StreetWorld world(12);
   const Drive arc = drive(world, 0.6 * StreetWorld::length_m, 0.0001, 0.003);
