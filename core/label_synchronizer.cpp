@@ -48,6 +48,8 @@ void LabelSynchronizer::insert_late_labels(std::int64_t stamp_ns, PointLabels la
   if (found == pending_.end()) return;
   PosedScan late = std::move(*found);
   pending_.erase(found);
+  // The network failed: its movers cannot be told from what stands still.
+  if (labels.empty()) return;
   late.labelled.labels = std::move(labels);
   LabelledScan& labelled = late.labelled;
   // Motion was classified without these labels: movable points count as semi-static at most, which
@@ -58,7 +60,7 @@ void LabelSynchronizer::insert_late_labels(std::int64_t stamp_ns, PointLabels la
     labelled.motion[i] = movable ? Motion::semi_static : Motion::stationary;
   }
   map.insert(labelled, late.T_map_lidar);
-  if (!labelled.labels.empty()) remember_labelled(std::move(late));
+  remember_labelled(std::move(late));
 }
 
 LabelSynchronizer::Labels LabelSynchronizer::labels_for(

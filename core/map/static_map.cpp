@@ -263,7 +263,12 @@ std::optional<CorrectedMap> StaticMap::correct(const MapCorrection& correction,
   tbb::parallel_for(std::size_t{0}, sources.size(),
                     [&](std::size_t i) { taken[i] = mover.take(*sources[i]); });
   CorrectedMap corrected;
+  // To the voxel: of a map that moves as a whole, these are as large as itself.
+  std::map<TileId, std::size_t> sizes;
+  for (const TileCorrection::Moved& moved : taken)
+    for (const TileCorrection::Voxel& voxel : moved.voxels) ++sizes[voxel.tile];
   std::map<TileId, TileCorrection::Moved> parts;
+  for (const auto& [id, size] : sizes) parts[id].voxels.reserve(size);
   std::set<TileId> changed;
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if (taken[i].voxels.empty() && taken[i].places.empty()) continue;
@@ -358,6 +363,11 @@ std::vector<std::string> StaticMap::unreadable_tiles() const {
 std::vector<TileId> StaticMap::tiles_in(const Eigen::AlignedBox3d& box_map,
                                         std::size_t max_shown) const {
   return state_->tiles.in(box_map, max_shown);
+}
+
+std::size_t StaticMap::non_resident_among(std::span<const TileId> tiles) const {
+  const auto is_away = [this](TileId id) { return state_->tiles.is_known_non_resident(id); };
+  return static_cast<std::size_t>(std::ranges::count_if(tiles, is_away));
 }
 
 StaticMap::RemovedVoxels StaticMap::removed(const Eigen::AlignedBox3d& box_map,

@@ -122,6 +122,8 @@ class StaticMap {
   [[nodiscard]] std::vector<TileId> tiles_in(
       const Eigen::AlignedBox3d& box_map,
       std::size_t max_shown = std::numeric_limits<std::size_t>::max()) const;
+  /// How many of these tiles are in the tile store alone.
+  [[nodiscard]] std::size_t non_resident_among(std::span<const TileId> tiles) const;
   /// What of tiles is kept out of the planning view.
   struct RemovedVoxels {
     /// In no order.

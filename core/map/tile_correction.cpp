@@ -100,6 +100,7 @@ TileCorrection::Moved TileCorrection::take(LiveTile& tile) const {
   }
   if (!taken.voxels.empty()) {
     kept.shrink_to_fit();
+    taken.voxels.shrink_to_fit();
     tile.sorted_ = std::move(kept);
     tile.index_.rebuild(tile.sorted_.size(), tile.sorted_.size(), tile.key_at());
   }

@@ -70,13 +70,14 @@ OccupancyConfig config_of(const OctomapData& data) {
   return config;
 }
 
-/// Adds hits for all voxels whose interior a cube touches; none if it reaches out of the octree.
-void add_cube(const Eigen::Vector3d& centre_map, double side_m, double resolution_m,
+/// Adds hits for all voxels whose interior a cube touches; false, and none, if it reaches out of
+/// the octree.
+bool add_cube(const Eigen::Vector3d& centre_map, double side_m, double resolution_m,
               VoxelBricks& bricks) {
   const Eigen::Vector3d centre = (centre_map / resolution_m).array() + octree_origin;
   // Slightly smaller, so that a cube of a voxel's size touches one voxel.
   const Eigen::Vector3d half = Eigen::Vector3d::Constant(0.49 * side_m / resolution_m);
-  if (!in_octree(centre - half) || !in_octree(centre + half)) return;
+  if (!in_octree(centre - half) || !in_octree(centre + half)) return false;
   const VoxelKey first = (centre - half).array().floor().cast<std::int32_t>();
   const VoxelKey last = (centre + half).array().floor().cast<std::int32_t>();
   for (VoxelKey v = first; v.x() <= last.x(); ++v.x()) {
@@ -86,6 +87,7 @@ void add_cube(const Eigen::Vector3d& centre_map, double side_m, double resolutio
       }
     }
   }
+  return true;
 }
 
 /// Unknown until one of its tiles is reloaded.
@@ -130,21 +132,23 @@ bool OccupancyMap::apply_update(std::size_t max_bricks) {
                        {state_->octree.getProbHitLog(), state_->octree.getProbMissLog()});
 }
 
-void OccupancyMap::insert(const MapSnapshot& view, const ThrottleCallback& throttle) {
-  if (view.tiles.empty()) return;
+std::size_t OccupancyMap::insert(const MapSnapshot& view, const ThrottleCallback& throttle) {
+  if (view.tiles.empty()) return 0;
   const VoxelGrid grid(view.voxel_size_m, view.tile_size_m);
   const Eigen::Vector3d half = Eigen::Vector3d::Constant(view.voxel_size_m / 2.0);
   // Finer voxels fill those of the static map; coarser ones are those that contain its points.
   const bool is_finer = state_->config.resolution_m <= view.voxel_size_m;
   const double side_m = is_finer ? view.voxel_size_m : 0.0;
+  std::size_t left_out = 0;
   state_->begin_update();
   for (const auto& tile : view.tiles) {
     if (tile->voxels.empty()) continue;
     if (throttle) throttle();
     for (const Voxel& voxel : tile->voxels) {
       const Eigen::Vector3d centre_map = grid.corner_map(tile->info.id, voxel.index) + half;
-      add_cube(is_finer ? centre_map : voxel.mean_map.cast<double>(), side_m,
-               state_->config.resolution_m, state_->bricks);
+      if (!add_cube(is_finer ? centre_map : voxel.mean_map.cast<double>(), side_m,
+                    state_->config.resolution_m, state_->bricks))
+        ++left_out;
     }
   }
   state_->pending = state_->bricks.sorted();
@@ -152,6 +156,15 @@ void OccupancyMap::insert(const MapSnapshot& view, const ThrottleCallback& throt
   while (state_->apply(portion_bricks, {2.0F * max_log_odds, 0.0F})) {
     if (throttle) throttle();
   }
+  // Those of a whole map would be walked through with every scan that follows.
+  state_->pending = {};
+  state_->bricks = {};
+  return left_out;
+}
+
+double OccupancyMap::reach_m() const {
+  // The margin of in_octree().
+  return (octree_side - octree_origin - 1) * state_->config.resolution_m;
 }
 
 void OccupancyMap::begin_residency(const MapSnapshot& view) { state_->followed = view; }
@@ -160,15 +173,17 @@ bool OccupancyMap::sync_residency(const MapSnapshot& view) {
   const double resolution_m = state_->config.resolution_m;
   const MapSnapshot before = std::exchange(state_->followed, view);
   std::set<OctreeColumn> changed;
+  std::vector<std::shared_ptr<const Tile>> reloaded_tiles;
   const auto is_away = [](const auto& tile) { return tile && is_non_resident(*tile); };
   TileTable::for_each_difference(before.tiles, view.tiles, [&](const auto& old, const auto& now) {
     if (is_away(old) == is_away(now)) return;
+    // Also where its columns are known by other tiles.
+    if (is_away(old) && now) reloaded_tiles.push_back(now);
     const TileId id = (old ? old : now)->info.id;
     const auto columns = columns_of(id, view.tile_size_m, resolution_m);
     changed.insert(columns.begin(), columns.end());
   });
   std::set<OctreeColumn> evicted;
-  std::vector<std::shared_ptr<const Tile>> reloaded_tiles;
   for (const OctreeColumn column : changed) {
     const ColumnTiles tiles = tiles_of(column, view, resolution_m);
     const bool was_evicted = is_evicted(tiles_of(column, before, resolution_m));

@@ -47,8 +47,10 @@ class OccupancyMap {
   /// Bricks that apply_update() applies in about a millisecond.
   static constexpr std::size_t portion_bricks = 512;
 
-  /// Sets the voxels of a static map to the highest occupancy probability.
-  void insert(const MapSnapshot& view, const ThrottleCallback& throttle = {});
+  /// Sets the voxels of a static map to the highest occupancy probability. Returns how many are
+  /// left out, since the octree ends before them: it reaches `reach_m()` along each axis.
+  std::size_t insert(const MapSnapshot& view, const ThrottleCallback& throttle = {});
+  [[nodiscard]] double reach_m() const;
 
   /// The octree has the voxels of this view, whose residency is followed from here on.
   void begin_residency(const MapSnapshot& view);

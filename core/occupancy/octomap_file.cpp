@@ -81,7 +81,7 @@ void write_octomap_file(const fs::path& file, const OctomapData& data) {
   if (out && !error) return;
   std::error_code ignored;
   fs::remove(unfinished, ignored);
-  throw MapFileError(file, "cannot be written; check the folder and the space left");
+  throw MapFileWriteError(file, "cannot be written; check the folder and the space left");
 }
 
 OctomapData read_octomap_file(const fs::path& file) {

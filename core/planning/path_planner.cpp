@@ -82,12 +82,30 @@ PathPlan blocked(const TraversabilityView& view, PlanStatus status, const Goal& 
   return plan;
 }
 
-/// The map, extended to start and goal, which may lie outside it on unknown ground.
-Eigen::AlignedBox2d search_box(const TraversabilityView& view, const Goal& from, const Goal& to) {
-  Eigen::AlignedBox2d box = view.bounds_map();
-  box.extend(from.position_map);
-  box.extend(to.position_map);
-  return box;
+/// The map, extended to start and goal, which may lie outside it on unknown ground; of a map with
+/// more cells than can be searched, as much round start and goal as can be. Nothing where these
+/// alone are too far apart.
+std::optional<Eigen::AlignedBox2d> search_box(const TraversabilityView& view, const Goal& from,
+                                              const Goal& to) {
+  const auto fits = [&view](const Eigen::AlignedBox2d& box) {
+    return PlanningGrid::cells_for(box, view.cell_m) <= PlanningGrid::max_cells;
+  };
+  Eigen::AlignedBox2d ends(from.position_map);
+  ends.extend(to.position_map);
+  const Eigen::AlignedBox2d map = view.bounds_map().merged(ends);
+  if (fits(map)) return map;
+  if (!fits(ends)) return std::nullopt;
+  const auto within = [&](double margin_m) {
+    const Eigen::Vector2d margin = Eigen::Vector2d::Constant(margin_m);
+    return map.intersection(Eigen::AlignedBox2d(ends.min() - margin, ends.max() + margin));
+  };
+  double fitting_m = 0.0;
+  double too_wide_m = map.sizes().maxCoeff();
+  while (too_wide_m - fitting_m > 1.0) {
+    const double margin_m = 0.5 * (fitting_m + too_wide_m);
+    (fits(within(margin_m)) ? fitting_m : too_wide_m) = margin_m;
+  }
+  return within(fitting_m);
 }
 
 double height_at(CellLookup& lookup, const TraversabilityView& view, const PlanarPose& pose) {
@@ -193,13 +211,15 @@ std::optional<FoundPath> find_best_path(const CollisionChecker& checker, const C
 /// The search between a start and a goal that are free.
 class Search {
  public:
+  /// Within the box, which holds both.
   Search(const TraversabilityView& view, const Goal& from, const Goal& to,
-         const PlanningConfig& config)
+         const Eigen::AlignedBox2d& box, const PlanningConfig& config)
       : view_(view),
         config_(config),
         from_(from),
         to_(to),
-        grid_(view, search_box(view, from, to), config.cost_weight),
+        is_whole_map_(box.contains(view.bounds_map())),
+        grid_(view, box, config.cost_weight),
         checker_(grid_, config.reverse_factor) {}
 
   [[nodiscard]] PathPlan run(std::span<const PlanarPose> starts,
@@ -209,7 +229,10 @@ class Search {
       return failed(view_, PlanStatus::no_path,
                     "no known path from " + text_of(from_.position_map) + " to " +
                         text_of(to_.position_map) + " is wide enough for '" + view_.profile.name +
-                        "'; map more, or allow unknown ground");
+                        "'; map more, or allow unknown ground" +
+                        (is_whole_map_ ? ""
+                                       : ". The map is larger than can be searched: a way far "
+                                         "round is not seen, and intermediate goals help"));
     }
     PathPlan plan = failed(view_, PlanStatus::out_of_time, "");
     plan.route_m = route->length_m;
@@ -241,6 +264,7 @@ class Search {
   const PlanningConfig& config_;
   const Goal& from_;
   const Goal& to_;
+  bool is_whole_map_;
   PlanningGrid grid_;
   CollisionChecker checker_;
 };
@@ -261,11 +285,12 @@ std::optional<PathPlan> refusal(const TraversabilityView& view, const Goal& from
   if (!from_fault.empty()) return failed(view, invalid_request, "start: " + from_fault);
   const std::string to_fault = fault_of(view, to);
   if (!to_fault.empty()) return failed(view, invalid_request, "goal: " + to_fault);
-  const double cells = PlanningGrid::cells_for(search_box(view, from, to), view.cell_m);
-  if (cells <= PlanningGrid::max_cells) return std::nullopt;
+  if (search_box(view, from, to)) return std::nullopt;
+  Eigen::AlignedBox2d ends(from.position_map);
+  ends.extend(to.position_map);
   std::ostringstream text;
-  text << "start, goal and map span " << cells << " cells; at most " << PlanningGrid::max_cells
-       << " can be searched";
+  text << "start and goal span " << PlanningGrid::cells_for(ends, view.cell_m) << " cells; at most "
+       << PlanningGrid::max_cells << " can be searched: name a goal on the way";
   return failed(view, invalid_request, text.str());
 }
 
@@ -285,7 +310,7 @@ PathPlan plan_path(const TraversabilityView& view, const Goal& from, const Goal&
     (void)set_path(view, {{{start.poses.front(), 0.0, false}, 0.0}}, plan);
     return plan;
   }
-  return Search(view, from, to, config).run(start.poses, goal.poses);
+  return Search(view, from, to, *search_box(view, from, to), config).run(start.poses, goal.poses);
 }
 
 std::string_view name(PlannerKind kind) {

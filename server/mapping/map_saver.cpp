@@ -67,10 +67,11 @@ MapStore& MapSaver::open_store() {
   return *store_;
 }
 
-std::optional<SavedMap> MapSaver::load() {
+std::optional<SavedMap> MapSaver::load(const std::function<void(const MapSnapshot&)>& check) {
   const std::scoped_lock lock(mutex_);
   if (file_.empty()) return std::nullopt;
   SavedMap map = read(*store_);
+  if (check && !map.view.tiles.empty()) check(map.view);
   // Clients may have seen later versions than the stored one; under a new id, the versions that
   // follow cannot be confused with those. Maps of older programs all have the id 0.
   if (!map.metadata.contains(map_ended_key) || map.view.map_id == 0) {
@@ -183,6 +184,12 @@ bool MapSaver::store(CheckpointScope scope, bool has_ended) {
   const bool is_standing = !has_moved();
   const Eigen::Isometry3d T_map_base = latest_map_.newest_pose().T_map_lidar;
   RunCheckpoint checkpoint = take(scope);
+  // The map was corrected since the scope was chosen: a part of it with a part of the one before
+  // is none.
+  if (scope == CheckpointScope::changed_views && latest_map_.corrections() != corrections) {
+    scope = CheckpointScope::changed;
+    checkpoint = take(scope);
+  }
   // Nothing is stored yet of another map.
   if (checkpoint.map.view.map_id != saved_map_id_) {
     if (saved_map_id_ != 0) throw MapFileError(file_, "holds another map than the running one");

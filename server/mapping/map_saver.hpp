@@ -132,8 +132,10 @@ class MapSaver {
 
   /// What the file holds, for mapping to resume from; nothing when there is no file. With a memory
   /// limit, its tiles are non-resident. The map has a new id unless it was saved when its last run
-  /// ended. Throws MapFileError.
-  [[nodiscard]] std::optional<SavedMap> load();
+  /// ended. Throws MapFileError, and what `check` throws of what the file holds, which then stays
+  /// as it is.
+  [[nodiscard]] std::optional<SavedMap> load(
+      const std::function<void(const MapSnapshot&)>& check = {});
   /// Instead of `load`: a map that the file holds is renamed, and the file empty from now on.
   /// Returns the map's new name; nothing where the file holds none. Throws MapFileError.
   std::optional<std::filesystem::path> set_saved_map_aside();

@@ -29,9 +29,9 @@ std::optional<SavedMap> saved_map(MapSaver& saver, const ServerConfig& config) {
     }
     return std::nullopt;
   }
-  auto stored = saver.load();
+  auto stored =
+      saver.load([&](const MapSnapshot& map) { check_sizes(map, config.mapper.static_map); });
   if (stored && !stored->view.tiles.empty()) {
-    check_sizes(stored->view, config.mapper.static_map);
     spdlog::info("resuming from {}: {} tiles, {} poses", config.map.file.string(),
                  stored->view.tiles.size(), stored->trajectory.size());
   }

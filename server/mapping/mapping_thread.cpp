@@ -311,7 +311,7 @@ MappingThread::TilesOfBox MappingThread::tiles_of(const Eigen::AlignedBox3d& box
     tiles = {latest_map_.view()->map_id, map.tiles_in(box_map, max_stored_tiles + resident + 1),
              tile_store_};
     // At least so many.
-    non_resident = tiles.ids.size() - std::min(resident, tiles.ids.size());
+    non_resident = map.non_resident_among(tiles.ids);
   });
   if (non_resident > max_stored_tiles) {
     throw std::invalid_argument("the region has " + std::to_string(non_resident) +

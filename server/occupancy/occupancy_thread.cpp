@@ -1,5 +1,7 @@
 #include "server/occupancy/occupancy_thread.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <chrono>
 #include <utility>
@@ -70,7 +72,12 @@ void OccupancyThread::run(Residency job) {
 
 void OccupancyThread::run(NewMap job) {
   OccupancyMap fresh(config_);
-  fresh.insert(*job.view, throttle_);
+  if (const std::size_t left_out = fresh.insert(*job.view, throttle_); left_out > 0) {
+    spdlog::warn(
+        "{} voxels of the map lie farther than {:.0f} m from its origin, where the octree ends: "
+        "they are unknown to occupancy queries; occupancy.resolution_m makes it reach farther",
+        left_out, fresh.reach_m());
+  }
   fresh.begin_residency(*job.view);
   const std::scoped_lock lock(map_mutex_);
   map_ = std::move(fresh);

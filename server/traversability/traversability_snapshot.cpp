@@ -78,9 +78,10 @@ std::shared_ptr<const TraversabilityView> TraversabilityCache::view(
     const std::string& profile, const Eigen::AlignedBox2d& box_map) const {
   const TraversabilitySnapshot::Known kept = snapshot_.known(profile);
   const auto map = latest_map_.view();
-  if (map->tiles.empty()) return kept.view;
   auto tiles = tiles_round(*map, box_map);
-  if (std::ranges::all_of(tiles, [&](const auto& tile) { return kept.has(*tile); }))
+  // After a load or a reset what is kept is of the last map for a while.
+  const bool is_of_map = kept.map == nullptr || kept.map->map_id == map->map_id;
+  if (is_of_map && std::ranges::all_of(tiles, [&](const auto& tile) { return kept.has(*tile); }))
     return kept.view;
   if (tiles.size() > max_tiles) {
     throw std::invalid_argument(

@@ -116,6 +116,12 @@ TEST_F(LabelSynchronizerTest, MovablePointsWithLateLabelsMakeNoVoxels) {
   EXPECT_EQ(voxels_in_map(), 0U);
 }
 
+TEST_F(LabelSynchronizerTest, AScanWhoseLabelsFailLateStaysOut) {
+  process(1, pending(), Motion::highly_dynamic);
+  process(2, finished(1, {}, true));
+  EXPECT_EQ(voxels_in_map(), 0U);
+}
+
 TEST_F(LabelSynchronizerTest, PointsWithoutAClassMakeNoVoxelsBesidePropagatedLabels) {
   process(1, finished(1, one_label(road)));
   const std::size_t voxels = voxels_in_map();

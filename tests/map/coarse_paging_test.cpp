@@ -79,6 +79,18 @@ std::map<Cell, std::uint64_t> points_by_cell(const MapSnapshot& map, double reso
   return points;
 }
 
+TEST(CoarsePaging, RowsOfCellsThatAreMadeOfAWholeCityAreRefused) {
+  MapQuery query;
+  query.resolution_m = 10'000.0;
+  const MapSnapshot map = wide_map(100);
+  const auto store = std::make_shared<CountingTileStore>(map.tiles);
+  TileReader reader(store, 1 << 20);
+  const MapQueryResult answer = query_map(on_disk(map), query, nullptr, reader);
+  EXPECT_EQ(answer.status, QueryStatus::invalid_request);
+  EXPECT_NE(answer.reason.find("finer resolution_m"), std::string::npos) << answer.reason;
+  EXPECT_EQ(store->loads, 0U);
+}
+
 TEST(CoarsePaging, PagesTogetherAreTheMergedMapWhateverTheirSize) {
   const MapSnapshot map = wide_map(30);
   for (const double resolution_m : {0.5, 0.73, 7.0, 33.0, 500.0}) {

@@ -107,6 +107,13 @@ TEST_F(MapCheckTest, NamesTilesThatAreNotTheirRows) {
   EXPECT_THAT(only_fault().what, HasSubstr("says that it is tile"));
 }
 
+TEST_F(MapCheckTest, NamesRowsByWhichATileIsNotFound) {
+  alter("UPDATE tiles SET max_x = min_x - 50 WHERE (x, y) = (SELECT x, y FROM tiles LIMIT 1)");
+  EXPECT_THAT(only_fault().what, HasSubstr("number of voxels or bounds"));
+  alter("UPDATE tiles SET max_x = min_x + 50, voxel_count = voxel_count + 1");
+  EXPECT_EQ(check_map_file(file_).faults.size(), saved_.view.tiles.size());
+}
+
 TEST_F(MapCheckTest, NamesSizesAndVersionsThatCannotBe) {
   alter("UPDATE map SET version = 0");
   EXPECT_THAT(check_map_file(file_).faults.at(0).what, HasSubstr("the map is at version 0"));

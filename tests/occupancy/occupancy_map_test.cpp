@@ -120,6 +120,28 @@ TEST(OccupancyMap, InvalidPointsAndPosesAreIgnored) {
   EXPECT_EQ(map.size().nodes, 0U);
 }
 
+TEST(OccupancyMap, SaysHowManyVoxelsLieBeyondTheOctree) {
+  StaticMap near((StaticMapConfig()));
+  StaticMap both((StaticMapConfig()));
+  const LabelledScan scan = street_scan(0, 60);
+  for (int k = 0; k < 2; ++k) {
+    near.insert(scan, Eigen::Isometry3d::Identity());
+    both.insert(scan, Eigen::Isometry3d::Identity());
+    both.insert(scan, Eigen::Isometry3d(Eigen::Translation3d(7000.0, 0.0, 0.0)));
+  }
+  const auto voxels_of = [](StaticMap& map) {
+    std::size_t voxels = 0;
+    for (const auto& tile : map.view()->tiles) voxels += tile->voxels.size();
+    return voxels;
+  };
+  OccupancyMap octree((OccupancyConfig()));
+  EXPECT_NEAR(octree.reach_m(), 6553.4, 1e-6);
+  EXPECT_EQ(octree.insert(*near.view()), 0U);
+  const std::size_t beyond = voxels_of(both) - voxels_of(near);
+  ASSERT_GT(beyond, 100U);
+  EXPECT_EQ(octree.insert(*both.view()), beyond);
+}
+
 TEST(OccupancyMap, InsertsAStaticMapsVoxelsAtAnyResolution) {
   const MapSnapshot view = *street_map(10).view();
   for (const double resolution_m : {0.1, 0.2, 0.5}) {

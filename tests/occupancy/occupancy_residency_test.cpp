@@ -77,6 +77,19 @@ TEST_F(PagedStreet, InsertsTheVoxelsOfReloadedTilesAsOccupied) {
   EXPECT_GT(voxels, 100U);
 }
 
+// As the robot comes nearer, ring by ring: a tile shares its columns with one that came before.
+TEST_F(PagedStreet, InsertsTilesThatAreReloadedOneAfterTheOther) {
+  map_.sync_residency(without_tiles_before(400.0));
+  for (const double first_x_map : {300.0, 260.0, 240.0, 200.0, 160.0, 140.0, 100.0, 40.0})
+    map_.sync_residency(without_tiles_before(first_x_map));
+  map_.sync_residency(view_);
+  for (const auto& tile : view_.tiles) {
+    for (const Voxel& voxel : tile->voxels)
+      ASSERT_EQ(map_.at_point(voxel.mean_map.cast<double>()).occupancy, Occupancy::occupied)
+          << "tile " << tile->info.id.x << " " << tile->info.id.y;
+  }
+}
+
 TEST_F(PagedStreet, TreatsTilesThatWereNeverResidentAsEvicted) {
   OccupancyMap map{OccupancyConfig{}};
   const MapSnapshot stored = without_tiles_before(140.0);

@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 
+#include "core/planning/planning_grid.hpp"
 #include "tests/numbers.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
@@ -62,6 +63,17 @@ TEST(PathPlanner, ACarTurnsRoundTheEndOfTheWall) {
   EXPECT_GE(plan.cost, plan.length_m - 1e-6);
   EXPECT_NEAR(plan.poses.back().along_m, plan.length_m, 1e-9);
   EXPECT_NEAR(plan.poses.front().height_m, 0.1, 0.05);
+}
+
+TEST(PathPlanner, PlansInAMapThatIsLargerThanCanBeSearched) {
+  VoxelWorld world = two_lanes();
+  world.ground(2000, 2000, 2010, 2010, road);
+  const auto view = traversability_of(world.view(), small_car());
+  ASSERT_GT(view->bounds_map().volume() / (view->cell_m * view->cell_m), PlanningGrid::max_cells);
+  expect_drivable(*view, plan_path(*view, {{5, -3}, 0.0}, {{5, 3}, pi}));
+  const PathPlan none = plan_path(*view, {{5, -3}, 0.0}, {{2005, 2005}, 0.0});
+  EXPECT_EQ(none.status, PlanStatus::invalid_request);
+  EXPECT_THAT(none.reason, HasSubstr("goal on the way"));
 }
 
 TEST(PathPlanner, EveryPlannerFindsAPath) {

@@ -65,6 +65,25 @@ TEST_F(MapSaverTest, SavesTheLatestMap) {
   EXPECT_EQ(stored.metadata.at("sensor"), "vlp_16");
 }
 
+TEST_F(MapSaverTest, AMapThatIsRefusedKeepsItsFileAsItIs) {
+  map_.reset(77);
+  latest_map_.begin(map_.view(), {});
+  map_scan(5.0F);
+  {
+    MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
+    saver.set_source(source_);
+    saver.save_at_end();
+  }
+  const std::uint64_t map_id = open_map_file(folder_ / "map.stillmap")->load().view.map_id;
+  {
+    MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
+    const auto refuse = [](const MapSnapshot&) { throw std::invalid_argument("other voxels"); };
+    EXPECT_THROW(static_cast<void>(saver.load(refuse)), std::invalid_argument);
+  }
+  MapSaver saver(latest_map_, statistics_, folder_ / "map.stillmap", {});
+  EXPECT_EQ(saver.load()->view.map_id, map_id) << "it still says how its last run ended";
+}
+
 TEST_F(MapSaverTest, LeavesTheFileAloneUntilSomethingWasMapped) {
   map_scan(5.0F);
   {

@@ -166,6 +166,29 @@ TEST_F(TraversabilityThreadTest, FollowsToAnotherMap) {
   EXPECT_EQ(snapshot_.view("small")->map_id, other.map_id);
 }
 
+TEST_F(TraversabilityThreadTest, AnswersAreNeverOfTheMapBefore) {
+  start(0s);
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
+  thread_.reset();
+  TileReader tiles;
+  const TraversabilityCache cache(snapshot_, latest_map_, tiles);
+  const Eigen::AlignedBox2d box(Eigen::Vector2d(-2.0, -2.0), Eigen::Vector2d(4.0, 4.0));
+  EXPECT_EQ(test::look(*cache.view("small", box), 1.1, 1.1).cell.cost, 0);
+  VoxelWorld walled;
+  walled.ground(-8, -8, 8, 8, road);
+  walled.block(1, 1, 2, 2, 0.3, 2.0, building);
+  MapSnapshot other = walled.view();
+  other.map_id = latest_map_.view()->map_id + 1;
+  latest_map_.begin(shared(other), {});
+  const auto view = cache.view("small", box);
+  EXPECT_EQ(test::look(*view, 1.1, 1.1).cell.cost, 100);
+  EXPECT_EQ(view->map_id, other.map_id);
+  MapSnapshot empty;
+  empty.map_id = other.map_id + 1;
+  latest_map_.begin(shared(empty), {});
+  EXPECT_TRUE(cache.view("small", box)->tiles.empty());
+}
+
 TEST_F(TraversabilityThreadTest, NamesTheRobotsThereAre) {
   const auto refusal = [&](const std::string& profile) -> std::string {
     try {

@@ -20,6 +20,9 @@ namespace {
 /// Tiles that a first page reads to count what a query takes of each; a second or so.
 constexpr std::size_t max_counted_tiles = 10'000;
 
+/// Of a row of merged cells: 20 km of tiles of 20 m, four deep.
+constexpr std::size_t max_row_tiles = 4'000;
+
 /// Voxels that a page of a coarser answer merges, about; a second or so.
 constexpr std::uint64_t max_merged_voxels = 1'000'000;
 
@@ -236,6 +239,21 @@ Start start_of(const MapSnapshot& view, const MapQuery& query, const TileHistory
   return {token.value_or(Continuation()), token_refusal(view, query, token)};
 }
 
+/// Set where the cells are so large that one row of them is made of too many tiles: no page can
+/// end within a row.
+std::optional<Refusal> coarseness_refusal(const Selection& from) {
+  const CoarseStrips strips(from.tiles, from.query.resolution_m, from.view.tile_size_m);
+  std::size_t tiles = 0;
+  for (std::size_t strip = 0; strip < strips.size(); ++strip)
+    tiles = std::max(tiles, strips.tiles(strip).size());
+  if (tiles <= max_row_tiles) return std::nullopt;
+  std::ostringstream reason;
+  reason << "a row of cells of " << from.query.resolution_m << " m is made of " << tiles
+         << " tiles; at most " << max_row_tiles
+         << " can be merged at once: ask for parts, or with a finer resolution_m";
+  return Refusal{QueryStatus::invalid_request, reason.str()};
+}
+
 /// Set where too many tiles must be read to tell what the answer has of each: all their voxels are
 /// wanted of none.
 std::optional<Refusal> size_refusal(const Selection& from) {
@@ -270,7 +288,11 @@ MapQueryResult query_map(const MapSnapshot& view, const MapQuery& query, const T
   const Selection selection{view, query, region, selected_tiles(view, query, region), reader};
   const bool is_coarse = is_coarser_than_map(view, query.resolution_m);
   const bool counts_tiles = !is_coarse && query.continuation.empty();
-  if (counts_tiles) refusal = size_refusal(selection);
+  if (is_coarse) {
+    refusal = coarseness_refusal(selection);
+  } else if (counts_tiles) {
+    refusal = size_refusal(selection);
+  }
   if (refusal) return result_of(view, refusal->status, std::move(refusal->reason));
   MapQueryResult result = result_of(view, QueryStatus::ok, {});
   if (counts_tiles) add_tiles(selection, history, position, result);

@@ -224,7 +224,7 @@ class SqliteMapStore : public MapStore {
     } catch (const std::runtime_error& error) {
       std::error_code ignored;
       fs::remove(fresh, ignored);
-      throw MapFileError(file, std::string("cannot be written (") + error.what() + ")");
+      throw MapFileWriteError(file, std::string("cannot be written (") + error.what() + ")");
     }
   }
 
@@ -256,10 +256,10 @@ class SqliteMapStore : public MapStore {
     try {
       action();
     } catch (const SQLite::Exception& error) {
-      throw MapFileError(file_, std::string("cannot be saved (") + error.what() +
-                                    "); the last save is still there");
+      throw MapFileWriteError(file_, std::string("cannot be saved (") + error.what() +
+                                         "); the last save is still there");
     } catch (const TileCodecError& error) {
-      throw MapFileError(file_, std::string("cannot be saved: ") + error.what());
+      throw MapFileWriteError(file_, std::string("cannot be saved: ") + error.what());
     }
   }
 
@@ -337,7 +337,7 @@ void replace_map_file(const fs::path& fresh, const fs::path& file) {
   try {
     put_in_place(fresh, file);
   } catch (const fs::filesystem_error& error) {
-    throw MapFileError(file, std::string("cannot be replaced (") + error.what() + ")");
+    throw MapFileWriteError(file, std::string("cannot be replaced (") + error.what() + ")");
   }
 }
 

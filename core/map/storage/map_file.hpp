@@ -22,6 +22,17 @@ class MapFileError : public std::runtime_error {
       : std::runtime_error(file.string() + ": " + fault) {}
 };
 
+/// One that cannot be written: the disk may be full.
+class MapFileWriteError : public MapFileError {
+ public:
+  MapFileWriteError(const std::filesystem::path& file, const std::string& fault)
+      : MapFileError(file, fault), file_(file) {}
+  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+
+ private:
+  std::filesystem::path file_;
+};
+
 /// Metadata key of a map that was saved at the end of its run: all versions that a client may have
 /// seen are stored.
 inline constexpr const char* map_ended_key = "ended";

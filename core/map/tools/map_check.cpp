@@ -39,6 +39,12 @@ struct TileRow {
   std::span<const std::uint8_t> encoded;
 };
 
+/// What a row says of the tile that it holds, by which regions find it.
+struct TileRowSummary {
+  std::uint32_t voxel_count = 0;
+  Eigen::AlignedBox3d bounds_map;
+};
+
 struct PoseRow {
   std::int64_t stamp_ns = 0;
   /// x y z [m], then the quaternion's x y z w.
@@ -119,7 +125,7 @@ void guarded(MapCheck& check, const std::string& place, Part part) {
 void check_pages(const MapFileCopy& copy, MapCheck& check) {
   try {
     SQLite::Database database(copy.path().string());
-    SQLite::Statement row(database, "PRAGMA quick_check");
+    SQLite::Statement row(database, "PRAGMA integrity_check");
     while (row.executeStep()) {
       const std::string verdict = row.getColumn(0).getString();
       if (verdict != "ok") check.faults.push_back({"file", std::nullopt, verdict});
@@ -158,11 +164,35 @@ TileRow tile_row(const SQLite::Statement& row) {
           .encoded = std::span(bytes, bytes == nullptr ? 0 : size)};
 }
 
-void check_tile(const TileRow& row, const MapRow& map, MapCheck& check) {
+/// From the seven columns that begin at this one.
+TileRowSummary tile_row_summary(const SQLite::Statement& row, int column) {
+  TileRowSummary summary;
+  summary.voxel_count = row.getColumn(column).getUInt();
+  for (int axis = 0; axis < 3; ++axis) {
+    summary.bounds_map.min()[axis] = row.getColumn(column + 1 + axis).getDouble();
+    summary.bounds_map.max()[axis] = row.getColumn(column + 4 + axis).getDouble();
+  }
+  return summary;
+}
+
+bool agree(const Tile& tile, const TileRowSummary& summary, const MapRow& map) {
+  // Means are stored in a finer grid than the voxels'.
+  const double slack_m = 0.1 * map.voxel_size_m;
+  const Eigen::AlignedBox3d bounds_map = tile.info.bounds_map.cast<double>();
+  return summary.voxel_count == tile.voxels.size() &&
+         (tile.voxels.size() == 0 ||
+          ((summary.bounds_map.min() - bounds_map.min()).cwiseAbs().maxCoeff() < slack_m &&
+           (summary.bounds_map.max() - bounds_map.max()).cwiseAbs().maxCoeff() < slack_m));
+}
+
+void check_tile(const TileRow& row, const std::optional<TileRowSummary>& summary, const MapRow& map,
+                MapCheck& check) {
   try {
     const Tile tile = decode_tile(row.encoded, {map.voxel_size_m, map.tile_size_m});
     check.voxels += tile.voxels.size();
-    const std::vector<std::string> faults = tile_faults(tile, row, map);
+    std::vector<std::string> faults = tile_faults(tile, row, map);
+    if (summary && !agree(tile, *summary, map))
+      faults.emplace_back("does not agree with its row's number of voxels or bounds");
     for (const std::string& what : faults) check.faults.push_back({"tile", row.id, what});
     if (faults.empty()) ++check.sound_tiles;
   } catch (const TileCodecError& error) {
@@ -178,10 +208,17 @@ std::size_t count_tiles(SQLite::Database& database) {
 void check_tiles(SQLite::Database& database, const std::optional<MapRow>& map, MapCheck& check,
                  const CheckProgress& progress) {
   const std::size_t total = count_tiles(database);
+  const bool has_summaries = !has_first_schema(database);
   SQLite::Statement row(database,
-                        "SELECT x, y, revision, content_hash, encoded FROM tiles ORDER BY x, y");
+                        std::string("SELECT x, y, revision, content_hash, encoded") +
+                            (has_summaries ? ", voxel_count, min_x, min_y, min_z, max_x, max_y, "
+                                             "max_z"
+                                           : "") +
+                            " FROM tiles ORDER BY x, y");
   while (row.executeStep()) {
-    if (map) check_tile(tile_row(row), *map, check);
+    std::optional<TileRowSummary> summary;
+    if (has_summaries) summary = tile_row_summary(row, 5);
+    if (map) check_tile(tile_row(row), summary, *map, check);
     ++check.tiles;
     if (progress) progress(check.tiles, total);
   }
@@ -227,7 +264,7 @@ void check_session_tiles(SQLite::Database& database, const MapRow& map, MapCheck
                         "coalesce(voxel_count, 0) FROM session_tiles");
   while (row.executeStep()) {
     const TileRow tile = tile_row(row);
-    if (!row.isColumnNull(4)) check_tile(tile, map, of_session);
+    if (!row.isColumnNull(4)) check_tile(tile, std::nullopt, map, of_session);
     if (row.isColumnNull(5)) continue;
     const SQLite::Column blob = row.getColumn(5);
     check_evidence(tile.id,
