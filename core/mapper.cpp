@@ -155,7 +155,7 @@ std::optional<InertialMotion> Mapper::inertial_motion(std::int64_t stamp_ns,
 std::optional<Eigen::Isometry3d> Mapper::levelled(
     const std::optional<Eigen::Isometry3d>& T_map_lidar_prior, std::int64_t stamp_ns,
     const SweepTimes& sweep) const {
-  const bool begins_map = trajectory_.empty() && resumed_tiles_.empty();
+  const bool begins_map = !is_placed_ && resumed_tiles_.empty();
   if (T_map_lidar_prior || !begins_map) return T_map_lidar_prior;
   const auto up_lidar =
       inertial_.up_lidar(stamp_ns + std::llround((sweep.middle_s + 0.5 * sweep.duration_s) * 1e9));
@@ -164,7 +164,13 @@ std::optional<Eigen::Isometry3d> Mapper::levelled(
 }
 
 void Mapper::teach_inertial(std::int64_t middle_ns, const Odometry::Step& step) {
-  if (step.result.health == OdometryHealth::lost) return inertial_.forget_motion();
+  if (step.result.health == OdometryHealth::lost) {
+    // A gyro that went wrong would warp every scan, and none would ever show that it did.
+    constexpr int max_lost_scans = 3;
+    if (++lost_scans_ >= max_lost_scans) inertial_.withdraw_belief();
+    return inertial_.forget_motion();
+  }
+  lost_scans_ = 0;
   const Eigen::Isometry3d& T_map_lidar = step.T_map_lidar_middle;
   if (last_middle_ && step.result.health == OdometryHealth::good) {
     inertial_.learn(last_middle_->stamp_ns, middle_ns,

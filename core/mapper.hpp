@@ -198,6 +198,8 @@ class Mapper {
   std::set<TileId> resumed_tiles_;
   std::optional<Eigen::Vector3d> prior_map_added_at_map_;
   bool is_placed_ = false;
+  /// In a row.
+  int lost_scans_ = 0;
   bool hands_out_scans_ = false;
   /// Scans that are to fit after a relocation, and how many of them; 0: none.
   int scans_to_confirm_ = 0;

@@ -43,8 +43,13 @@ OdomPose OdomFrame::update(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map
     if (is_found && is_connected_ && is_believed(motion, interval_s)) {
       T_odom_base_ = orthonormal(T_odom_base_ * motion);
       if (interval_s > 0.0) velocity_ = twist_of(motion) / interval_s;
+      extrapolated_s_ = 0.0;
+    } else if (motion_prior) {
+      T_odom_base_ = orthonormal(T_odom_base_ * *motion_prior);
+      if (interval_s > 0.0) velocity_ = twist_of(*motion_prior) / interval_s;
+      extrapolated_s_ = 0.0;
     } else {
-      T_odom_base_ = orthonormal(T_odom_base_ * motion_prior.value_or(expected_motion(interval_s)));
+      T_odom_base_ = orthonormal(T_odom_base_ * extrapolate(interval_s));
     }
   }
   last_stamp_ns_ = stamp_ns;
@@ -55,9 +60,13 @@ OdomPose OdomFrame::update(std::int64_t stamp_ns, const Eigen::Isometry3d& T_map
   return pose;
 }
 
-Eigen::Isometry3d OdomFrame::expected_motion(double interval_s) const {
+Eigen::Isometry3d OdomFrame::extrapolate(double interval_s) {
   if (!velocity_) return Eigen::Isometry3d::Identity();
-  return motion_of(*velocity_ * std::min(interval_s, max_extrapolation_s));
+  const double going_on_s = std::min(interval_s, max_extrapolation_s - extrapolated_s_);
+  const Eigen::Isometry3d motion = motion_of(*velocity_ * going_on_s);
+  extrapolated_s_ += going_on_s;
+  if (extrapolated_s_ >= max_extrapolation_s) velocity_.reset();
+  return motion;
 }
 
 // Once may be a pose that is wrong; twice the same is a robot that was pushed.

@@ -34,14 +34,18 @@ class OdomFrame {
   void begin_map() { is_connected_ = false; }
 
  private:
-  [[nodiscard]] Eigen::Isometry3d expected_motion(double interval_s) const;
+  /// The motion that is expected where none is known.
+  [[nodiscard]] Eigen::Isometry3d extrapolate(double interval_s);
   [[nodiscard]] bool is_believed(const Eigen::Isometry3d& motion, double interval_s);
 
   std::optional<std::int64_t> last_stamp_ns_;
   Eigen::Isometry3d T_map_base_ = Eigen::Isometry3d::Identity();
   Eigen::Isometry3d T_odom_base_ = Eigen::Isometry3d::Identity();
-  /// Of the last motion that was believed, a twist each second.
+  /// Of the last motion that was believed, a twist each second; nothing once it has gone on for
+  /// too long.
   std::optional<Eigen::Matrix<double, 6, 1>> velocity_;
+  /// Since that motion [s].
+  double extrapolated_s_ = 0.0;
   /// The last pose is in the same map and was not lost.
   bool is_connected_ = false;
   /// Of a motion that was not believed, a scan ago.

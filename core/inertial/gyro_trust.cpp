@@ -28,16 +28,20 @@ void GyroTrust::add(const Eigen::Vector3d& registered, const Eigen::Vector3d& mi
   if (is_believed_) {
     const double bearable =
         std::max(square(registration_error_rad), 0.5 * recent_missed_by_repetition_);
-    if (recent_missed_ <= bearable) return;
-    is_believed_ = false;
-    losses_ += 1;
-    registered_ = missed_ = 0.0;
+    if (recent_missed_ > bearable) withdraw();
     return;
   }
   registered_ = proof_memory * registered_ + registered.squaredNorm();
   missed_ = proof_memory * missed_ + missed_by_gyro.squaredNorm();
   is_believed_ =
       registered_ > square(proof_rad) && missed_ < square(max_missed_share) * registered_;
+}
+
+void GyroTrust::withdraw() {
+  if (!is_believed_) return;
+  is_believed_ = false;
+  losses_ += 1;
+  registered_ = missed_ = 0.0;
 }
 
 }  // namespace stillmap

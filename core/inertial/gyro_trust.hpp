@@ -14,6 +14,9 @@ class GyroTrust {
   void add(const Eigen::Vector3d& registered, const Eigen::Vector3d& missed_by_gyro,
            const Eigen::Vector3d& missed_by_repetition);
 
+  /// Scans that it helped to register cannot be registered: it may be why.
+  void withdraw();
+
   [[nodiscard]] bool is_believed() const { return is_believed_; }
   /// How often the gyro was no longer believed.
   [[nodiscard]] int losses() const { return losses_; }

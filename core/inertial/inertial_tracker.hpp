@@ -52,6 +52,9 @@ class InertialTracker {
     rest_.reset();
   }
 
+  /// Scans cannot be registered: the gyro has to prove itself again.
+  void withdraw_belief() { trust_.withdraw(); }
+
   /// False before the first sample.
   [[nodiscard]] bool has_samples() const { return counts_.samples > 0; }
   [[nodiscard]] bool is_believed() const { return trust_.is_believed(); }

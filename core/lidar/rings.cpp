@@ -154,7 +154,12 @@ std::vector<std::uint16_t> rings_from_field(const Scan& scan, const SensorModel&
 }
 
 bool field_fits(const Scan& scan, const SensorModel& sensor) {
-  return scan.ring.size() == scan.size() &&
+  if (scan.ring.size() != scan.size()) return false;
+  // Converters that do not know the ring write the same number, 0, into all points.
+  const bool tells_nothing =
+      sensor.rings > 1 && scan.size() > 1 &&
+      std::ranges::all_of(scan.ring, [&](std::uint16_t ring) { return ring == scan.ring[0]; });
+  return !tells_nothing &&
          std::ranges::all_of(scan.ring, [&](std::uint16_t ring) { return ring < sensor.rings; });
 }
 

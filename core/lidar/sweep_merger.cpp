@@ -68,7 +68,12 @@ SensorModel merged_sensor(std::span<const PlacedSensor> sensors) {
   merged.elevation_offset = 0.0;
   merged.fov_up = -std::numbers::pi / 2.0;
   merged.fov_down = std::numbers::pi / 2.0;
+  merged.imu.reset();
   for (const PlacedSensor& placed : sensors) {
+    if (placed.sensor.imu && !merged.imu) {
+      merged.imu = placed.sensor.imu;
+      merged.imu->R_lidar_imu = placed.T_merged_lidar.linear() * merged.imu->R_lidar_imu;
+    }
     const SensorModel& sensor = placed.sensor;
     const double offset_m = placed.T_merged_lidar.translation().norm();
     merged.name += (merged.name.empty() ? "" : " + ") + sensor.name;

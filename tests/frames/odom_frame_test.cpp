@@ -77,6 +77,23 @@ TEST(OdomFrame, StandsStillInALongGapWithoutAPose) {
   EXPECT_NEAR(distance_m(pose.T_odom_base, on_road(19)), 10.0, 0.2);
 }
 
+// A lidar that is covered, on a robot that has stopped meanwhile.
+TEST(OdomFrame, StandsStillAfterASecondOfLostScans) {
+  OdomFrame frame = driven(20);
+  OdomPose pose;
+  for (int i = 20; i < 120; ++i) pose = frame.update(i * period_ns, on_road(19), lost);
+  EXPECT_NEAR(distance_m(pose.T_odom_base, on_road(19)), 10.0, 0.2);
+  EXPECT_EQ(pose.velocity.norm(), 0.0);
+  // Found where it stands, and driving on.
+  for (int i = 120; i < 123; ++i) {
+    const Eigen::Isometry3d before = pose.T_odom_base;
+    pose = frame.update(i * period_ns, on_road(19), good);
+    EXPECT_NEAR(distance_m(pose.T_odom_base, before), 0.0, 1e-9);
+  }
+  for (int i = 123; i < 130; ++i) pose = frame.update(i * period_ns, on_road(19 + i - 122), good);
+  EXPECT_NEAR(pose.velocity[0], 10.0, 0.01);
+}
+
 TEST(OdomFrame, DoesNotJumpWithAnotherMap) {
   OdomFrame frame = driven(20);
   frame.begin_map();

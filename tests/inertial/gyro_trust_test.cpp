@@ -47,5 +47,18 @@ TEST(GyroTrust, IsLostOnceTheGyroIsWrongAndComesBackWithIt) {
   EXPECT_TRUE(trust.is_believed());
 }
 
+TEST(GyroTrust, IsWithdrawnUntilItIsProvedAgain) {
+  GyroTrust trust;
+  trust.withdraw();
+  EXPECT_EQ(trust.losses(), 0) << "there was none";
+  drive(trust, 1.0, 20);
+  ASSERT_TRUE(trust.is_believed());
+  trust.withdraw();
+  EXPECT_FALSE(trust.is_believed());
+  EXPECT_EQ(trust.losses(), 1);
+  drive(trust, 1.0, 20);
+  EXPECT_TRUE(trust.is_believed());
+}
+
 }  // namespace
 }  // namespace stillmap

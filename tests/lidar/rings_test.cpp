@@ -164,6 +164,12 @@ TEST(AssignRings, DoesNotBelieveAFieldOfAnotherSensor) {
   EXPECT_EQ(assign_rings(ringed.scan, vlp_16()), ringed.truth);
 }
 
+TEST(AssignRings, DoesNotBelieveAFieldThatTellsNothing) {
+  RingedScan ringed = ring_after_ring(vlp_16(), {});
+  ringed.scan.ring.assign(ringed.scan.size(), 0);
+  EXPECT_EQ(assign_rings(ringed.scan, vlp_16()), ringed.truth);
+}
+
 TEST(AssignRings, TakesTheOrderWhereTheSensorSaysSo) {
   const RingedScan ringed = ring_after_ring(hdl_64e(), {.dropped = 0.2});
   EXPECT_EQ(assign_rings(ringed.scan, hdl_64e()), ringed.truth);

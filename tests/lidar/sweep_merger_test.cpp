@@ -86,6 +86,19 @@ TEST(MergedSensor, SeesWhatTiltedLidarsSee) {
   EXPECT_LE(merged.fov_down, -45.9 * deg);
 }
 
+TEST(MergedSensor, HasTheImuWhereItsLidarHasIt) {
+  PlacedSensor without{.sensor = vlp_16()};
+  PlacedSensor with{.sensor = vlp_16()};
+  with.T_merged_lidar = Eigen::AngleAxisd(30.0 * deg, Eigen::Vector3d::UnitY());
+  const Eigen::AngleAxisd of_imu(90.0 * deg, Eigen::Vector3d::UnitZ());
+  with.sensor.imu = ImuMount{.R_lidar_imu = of_imu.toRotationMatrix(), .time_offset_s = 0.01};
+  const SensorModel merged = merged_sensor(std::vector{without, with});
+  ASSERT_TRUE(merged.imu);
+  EXPECT_TRUE(
+      merged.imu->R_lidar_imu.isApprox(with.T_merged_lidar.linear() * of_imu.toRotationMatrix()));
+  EXPECT_EQ(merged.imu->time_offset_s, 0.01);
+}
+
 TEST(MergedSensor, OfALidarOnItsSideHasNoMoreThanASphere) {
   PlacedSensor sideways{.sensor = hdl_32e()};
   sideways.T_merged_lidar = Eigen::AngleAxisd(90.0 * deg, Eigen::Vector3d::UnitX());

@@ -35,6 +35,16 @@ TEST(ScanIntervals, AreThePeriodWhereStampsScatterAboutIt) {
   EXPECT_DOUBLE_EQ(intervals.since_last_s(4240 * ms_ns), 0.2);
 }
 
+TEST(ScanIntervals, AreTheStampsOfASensorThatTurnsFaster) {
+  for (const std::int64_t period_ms : {50, 80, 125, 200}) {
+    ScanIntervals intervals(0.1);
+    intervals.begin(0);
+    for (int k = 1; k <= 40; ++k) intervals.add(period_ms * k * ms_ns);
+    EXPECT_NEAR(intervals.since_last_s(41 * period_ms * ms_ns),
+                0.001 * static_cast<double>(period_ms), 1e-9);
+  }
+}
+
 TEST(ScanIntervals, AreTheStampsOfASensorThatKeepsNoPeriod) {
   ScanIntervals intervals(0.1);
   intervals.begin(0);
