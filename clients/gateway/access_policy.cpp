@@ -1,5 +1,7 @@
 #include "clients/gateway/access_policy.hpp"
 
+#include <arpa/inet.h>
+
 #include <algorithm>
 #include <array>
 
@@ -36,8 +38,14 @@ std::string_view without_port(std::string_view host) {
   return has_port ? host.substr(0, colon) : host;
 }
 
+/// Of 127.0.0.0/8; a name that only begins like one is none.
+bool is_loopback_address(const std::string& host) {
+  in_addr address{};
+  return inet_pton(AF_INET, host.c_str(), &address) == 1 && ntohl(address.s_addr) >> 24U == 127U;
+}
+
 bool is_this_machine(std::string_view host) {
-  return host == "localhost" || host == "127.0.0.1" || host == "[::1]";
+  return host == "localhost" || host == "[::1]" || is_loopback_address(std::string(host));
 }
 
 /// "localhost:8080" of "http://localhost:8080".

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <condition_variable>
+#include <iterator>
 #include <map>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <thread>
 #include <utility>
 
@@ -93,26 +95,40 @@ class TileSource::Fetcher {
       for (const TileId id : ids) arrived_(id, {.tile = nullptr, .fault = fault});
       return;
     }
-    hand_on(*reply);
+    hand_on(ids, *reply);
   }
 
-  void hand_on(const GetTiles_Response& reply) {
+  void hand_on(const std::vector<TileId>& ids, const GetTiles_Response& reply) {
+    std::set<TileId> unanswered(ids.begin(), ids.end());
+    const auto answer = [&](TileId id, Answer said) {
+      if (unanswered.erase(id) > 0) arrived_(id, std::move(said));
+    };
     const dds::MapIdentity map = wire::from_wire(reply.identity());
     for (const auto& message : reply.tiles()) {
       const TileId id{message.tile_x(), message.tile_y()};
       const std::optional<Tile> tile = wire::from_wire(message);
       if (!tile) {
-        arrived_(id, {.tile = nullptr, .fault = "the server has another version"});
+        answer(id, {.tile = nullptr, .fault = "the server has another version"});
         continue;
       }
-      arrived_(id, {.tile = std::make_shared<EncodedTile>(
-                        EncodedTile{tile->info.content_hash, encode_tile(*tile, map)}),
-                    .fault = {}});
+      answer(id, {.tile = std::make_shared<EncodedTile>(
+                      EncodedTile{tile->info.content_hash, encode_tile(*tile, map)}),
+                  .fault = {}});
     }
-    for (const auto& id : reply.missing()) arrived_({id.x(), id.y()}, {});
-    // What did not fit into the answer comes with the next one.
-    const std::scoped_lock lock(mutex_);
-    for (const auto& id : reply.remaining()) wanted_.insert(wanted_.begin(), {id.x(), id.y()});
+    for (const auto& id : reply.missing()) answer({id.x(), id.y()}, {});
+    // What did not fit into the answer comes with the next one, where there was anything.
+    const bool is_empty = reply.tiles().empty() && reply.missing().empty();
+    if (!is_empty) {
+      const std::scoped_lock lock(mutex_);
+      for (const auto& id : reply.remaining()) {
+        if (unanswered.erase({id.x(), id.y()}) > 0)
+          wanted_.insert(wanted_.begin(), {id.x(), id.y()});
+      }
+    }
+    const std::set<TileId> unread = std::exchange(unanswered, {});
+    for (const TileId id : unread) {
+      arrived_(id, {.tile = nullptr, .fault = "the server could not read the tile; ask again"});
+    }
   }
 
   dds::Participant& participant_;
@@ -143,17 +159,33 @@ void TileSource::get(TileId id, std::uint64_t content_hash,
     return answered({.tile = found->second.tile, .fault = {}});
   }
   auto& waiting = waiting_[id];
-  waiting.push_back(std::move(answered));
+  waiting.push_back({content_hash, std::move(answered)});
   if (waiting.size() == 1) fetcher_->add(id);
 }
 
 void TileSource::arrived(TileId id, const Answer& answer) {
   const auto found = waiting_.find(id);
   if (found == waiting_.end()) return;
-  const auto waiting = std::move(found->second);
+  auto waiting = std::move(found->second);
   waiting_.erase(found);
   if (answer.tile) keep({id, answer.tile->content_hash}, answer.tile);
-  for (const auto& answered : waiting) answered(answer);
+  // The answer may be of before a later one's state: that one is asked for once more. Whose state
+  // it is not even then gets what there is, which is newer.
+  std::vector<Waiting> others;
+  for (Waiting& one : waiting) {
+    const bool is_other = answer.tile && answer.tile->content_hash != one.content_hash;
+    if (is_other && !one.is_asked_again && one.content_hash != waiting.front().content_hash) {
+      one.is_asked_again = true;
+      others.push_back(std::move(one));
+    } else {
+      one.answered(answer);
+    }
+  }
+  if (others.empty()) return;
+  auto& again = waiting_[id];
+  const bool is_asked = !again.empty();
+  std::ranges::move(others, std::back_inserter(again));
+  if (!is_asked) fetcher_->add(id);
 }
 
 void TileSource::keep(const Key& key, const std::shared_ptr<const EncodedTile>& tile) {

@@ -61,7 +61,13 @@ class TileSource {
   /// Keys of `kept_`, the longest unused first.
   std::list<Key> uses_;
   std::size_t kept_bytes_ = 0;
-  std::map<TileId, std::vector<std::function<void(const Answer&)>>> waiting_;
+  struct Waiting {
+    std::uint64_t content_hash = 0;
+    std::function<void(const Answer&)> answered;
+    /// What came was asked for before this state was known.
+    bool is_asked_again = false;
+  };
+  std::map<TileId, std::vector<Waiting>> waiting_;
   std::unique_ptr<Fetcher> fetcher_;
 };
 

@@ -124,31 +124,24 @@ class TopicBridge::Reading {
   }
 
   /// As offered by the server; publishers that offer less are read, too, with the weakest request.
-  [[nodiscard]] dds::TopicQos reader_qos(bool as_offered) const {
+  [[nodiscard]] dds::TopicQos reader_qos() const {
     dds::TopicQos qos = topic_.qos;
     qos.keep_all = false;
     if (topic_.replaces == Replaces::last) qos.depth = 1;
     qos.depth = std::min(qos.depth, topic_.replaces == Replaces::of_publisher
                                         ? static_cast<int>(max_static_transforms)
                                         : max_waiting_in_reader);
-    qos.reliable = qos.reliable && as_offered;
-    qos.transient_local = qos.transient_local && as_offered;
+    // Publishers that offer less are forwarded, too.
+    qos.accept_best_effort = true;
     return qos;
   }
 
   void read(const std::stop_token& stop) {
-    bool as_offered = true;
-    std::optional<dds::SerializedSampleReader> reader;
-    reader.emplace(participant_, topic_.dds_name, topic_.type, reader_qos(as_offered));
+    dds::SerializedSampleReader reader(participant_, topic_.dds_name, topic_.type, reader_qos());
     SampleInfo info;
     for (std::uint64_t number = 0; !stop.stop_requested();) {
-      if (as_offered && topic_.qos.reliable && reader->events().incompatible_writers() > 0) {
-        as_offered = false;
-        reader.reset();
-        reader.emplace(participant_, topic_.dds_name, topic_.type, reader_qos(as_offered));
-      }
       auto message = std::make_shared<Message>();
-      if (!reader->take(message->bytes, info, stop, std::chrono::seconds(1))) continue;
+      if (!reader.take(message->bytes, info, stop, std::chrono::seconds(1))) continue;
       message->received_ns = wall_clock_ns();
       message->key = key_of(topic_.replaces, info, ++number);
       hand_on(std::move(message), stop);

@@ -147,6 +147,34 @@ TileVersions Client::get_tile_versions() { return get_tile_versions(unbounded_bo
 
 TileSet Client::get_tiles(std::span<const TileId> ids) { return connection_->fetch_tiles(ids); }
 
+MapSnapshot Client::get_map() {
+  for (int attempt = 1;; ++attempt) {
+    const TileVersions versions = get_tile_versions();
+    std::vector<TileId> ids;
+    for (const TileInfo& info : versions.tiles) ids.push_back(info.id);
+    TileSet set = get_tiles(ids);
+    if (!set.unreadable.empty()) {
+      const TileId id = set.unreadable.front();
+      throw ServiceError(std::to_string(set.unreadable.size()) +
+                         " tiles of the map cannot be read by the server, the first is (" +
+                         std::to_string(id.x) + ", " + std::to_string(id.y) + "): " + set.fault);
+    }
+    const bool is_of_another_map = !ids.empty() && set.map.map_id != versions.map.map_id;
+    if (is_of_another_map && attempt < max_whole_map_attempts) continue;
+    if (is_of_another_map) throw ServiceError("maps follow one another too fast; ask again");
+    MapSnapshot view{.version = ids.empty() ? versions.map.version : set.map.version,
+                     .map_id = versions.map.map_id,
+                     .tile_size_m = versions.map.tile_size_m,
+                     .voxel_size_m = versions.map.voxel_size_m,
+                     .tiles = {}};
+    std::vector<std::shared_ptr<const Tile>> tiles;
+    tiles.reserve(set.tiles.size());
+    for (Tile& tile : set.tiles) tiles.push_back(std::make_shared<const Tile>(std::move(tile)));
+    view.tiles = TileTable(std::move(tiles));
+    return view;
+  }
+}
+
 OctomapData Client::octomap(bool full) {
   const auto& service = full ? services::octomap_full : services::octomap_binary;
   const auto reply = connection_->call(service, octomap_msgs::srv::GetOctomap_Request());

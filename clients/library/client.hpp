@@ -72,10 +72,15 @@ struct TileVersions {
 };
 
 struct TileSet {
+  /// All tiles are of this map.
   dds::MapIdentity map;
   std::vector<Tile> tiles;
   /// Tiles asked for that the map does not have.
   std::vector<TileId> missing;
+  /// Those that the server could not read, also when asked again: its file is damaged there, say.
+  std::vector<TileId> unreadable;
+  /// Why; empty where none is.
+  std::string fault;
 };
 
 /// A map file that a server resumed.
@@ -166,9 +171,12 @@ class Client {
   /// Of the whole map.
   [[nodiscard]] TileVersions get_tile_versions();
 
-  /// These tiles with their voxels. Asks as often as the server's answer size needs. Voxels come
-  /// without the runner-up classes' evidence.
+  /// These tiles with their voxels. Asks as often as the server's answer size needs, and from the
+  /// beginning where another map begins meanwhile. Voxels come without the runner-up classes'
+  /// evidence.
   [[nodiscard]] TileSet get_tiles(std::span<const TileId> ids);
+  /// All tiles of the map, as they are now. Throws ServiceError where one cannot be read.
+  [[nodiscard]] MapSnapshot get_map();
 
   /// The server's octree of occupied, free and unknown space, checked: with probabilities if
   /// `full`.

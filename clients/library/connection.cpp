@@ -1,6 +1,7 @@
 #include "clients/library/connection.hpp"
 
 #include <cmath>
+#include <set>
 
 #include "idl/conversions/tile.hpp"
 #include "idl/interface/participant_diagnostics.hpp"
@@ -36,27 +37,70 @@ Client::Connection::Connection(const ClientOptions& client_options)
 }
 
 TileSet Client::Connection::fetch_tiles(std::span<const TileId> ids) {
+  constexpr int max_attempts = 5;
+  for (int attempt = 0; attempt < max_attempts; ++attempt) {
+    TileSet set;
+    const auto unread = add_tiles(ids, set);
+    // Else another map began meanwhile: tiles of two maps are none.
+    if (unread && add_unread(*unread, set)) return set;
+  }
+  throw ServiceError(name_of(dds::services::get_tiles) +
+                     ": maps follow one another too fast; ask again");
+}
+
+std::optional<std::vector<TileId>> Client::Connection::add_tiles(std::span<const TileId> ids,
+                                                                 TileSet& set) {
   constexpr const auto& service = dds::services::get_tiles;
   // More than an answer has, and few enough not to be sent again and again.
   constexpr std::size_t ids_per_request = 2000;
-  TileSet set;
+  std::set<TileId> unanswered(ids.begin(), ids.end());
+  bool is_first = set.tiles.empty() && set.missing.empty();
   auto remaining = to_wire(ids.first(std::min(ids.size(), ids_per_request)));
   for (ids = ids.subspan(remaining.size()); !remaining.empty();) {
     GetTiles_Request request;
     request.ids(remaining);
-    const auto reply = call_ok(service, std::move(request));
+    const auto next_request = [&] {
+      remaining = to_wire(ids.first(std::min(ids.size(), ids_per_request)));
+      ids = ids.subspan(remaining.size());
+    };
+    const auto reply = call_unrefused(service, std::move(request));
+    if (wire::ReplyCode{reply.status().code()} == wire::ReplyCode::failed) {
+      // None of these tiles can be read.
+      set.fault = reply.status().reason();
+      next_request();
+      continue;
+    }
     if (reply.remaining().size() >= remaining.size()) throw malformed_reply(name_of(service));
-    set.map = wire::from_wire(reply.identity());
+    const dds::MapIdentity map = wire::from_wire(reply.identity());
+    if (!is_first && map.map_id != set.map.map_id) return std::nullopt;
+    is_first = false;
+    set.map = map;
     for (const auto& tile : reply.tiles()) {
       set.tiles.push_back(require_readable(wire::from_wire(tile), service));
+      unanswered.erase(set.tiles.back().info.id);
     }
-    for (const auto& id : reply.missing()) set.missing.push_back({id.x(), id.y()});
+    for (const auto& id : reply.missing()) {
+      set.missing.push_back({id.x(), id.y()});
+      unanswered.erase(set.missing.back());
+    }
     remaining = reply.remaining();
-    if (!remaining.empty()) continue;
-    remaining = to_wire(ids.first(std::min(ids.size(), ids_per_request)));
-    ids = ids.subspan(remaining.size());
+    if (remaining.empty()) next_request();
   }
-  return set;
+  return std::vector<TileId>(unanswered.begin(), unanswered.end());
+}
+
+bool Client::Connection::add_unread(std::span<const TileId> ids, TileSet& set) {
+  if (!ids.empty()) {
+    auto unread = add_tiles(ids, set);
+    if (!unread) return false;
+    set.unreadable = *std::move(unread);
+  }
+  if (set.unreadable.empty()) {
+    set.fault.clear();
+  } else if (set.fault.empty()) {
+    set.fault = "the server could not read them; its log says why";
+  }
+  return true;
 }
 
 TileVersions Client::Connection::list_tiles(const Eigen::AlignedBox3d& box_map) {

@@ -2,9 +2,12 @@
 
 #include <map>
 #include <memory>
+#include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "clients/library/client.hpp"
 #include "idl/conversions/map_query.hpp"
@@ -44,6 +47,17 @@ struct Client::Connection {
   template <typename Request, typename Reply>
   [[nodiscard]] Reply call(const dds::ServiceSpec<Request, Reply>& spec, Request request) {
     return call(spec, std::move(request), options.request_timeout);
+  }
+
+  /// As `call`; throws ServiceError when the server refuses. That it failed is an answer.
+  template <typename Request, typename Reply>
+  [[nodiscard]] Reply call_unrefused(const dds::ServiceSpec<Request, Reply>& spec,
+                                     Request request) {
+    Reply reply = call(spec, std::move(request));
+    const auto code = static_cast<wire::ReplyCode>(reply.status().code());
+    if (code != wire::ReplyCode::ok && code != wire::ReplyCode::failed)
+      throw ServiceError(name_of(spec) + " was refused: " + reply.status().reason());
+    return reply;
   }
 
   /// As `call`; throws ServiceError when the server refuses.
@@ -90,6 +104,12 @@ struct Client::Connection {
 
   /// These tiles with their voxels, in as many requests as the server's answers need.
   [[nodiscard]] TileSet fetch_tiles(std::span<const TileId> ids);
+  /// Adds these tiles to the set, but for those that come back: the server could not read them.
+  /// Nothing where a reply is of another map than the set.
+  [[nodiscard]] std::optional<std::vector<TileId>> add_tiles(std::span<const TileId> ids,
+                                                             TileSet& set);
+  /// Asks once more for tiles that could not be read: some changed just then.
+  [[nodiscard]] bool add_unread(std::span<const TileId> ids, TileSet& set);
 
   /// The tiles whose footprint meets the box (map frame [m]), all of one map.
   [[nodiscard]] TileVersions list_tiles(const Eigen::AlignedBox3d& box_map);

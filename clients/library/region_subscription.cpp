@@ -82,9 +82,8 @@ class RegionReceiver final : public Subscription::Receiver {
   }
 
   void deliver_update() {
-    auto tiles = fetch_pending();
-    if (!tiles) return;
-    const RegionUpdate update = tracker_.take_update(*std::move(tiles));
+    // What is gone is told also while nothing can be fetched.
+    const RegionUpdate update = tracker_.take_update(fetch_pending().value_or(TileSet()));
     if (!update.appeared.empty() || !update.changed.empty() || !update.removed.empty()) {
       update_arrived_(update);
     }

@@ -52,18 +52,20 @@ std::shared_ptr<const MapSnapshot> TileMirror::wait_for_change(
   return snapshot_;
 }
 
-bool TileMirror::holds(const TileVersions& versions) const {
+std::vector<TileId> TileMirror::lacks(const TileVersions& versions) const {
   const std::lock_guard lock(mutex_);
-  if (versions.tiles.empty()) return true;
-  return versions.map.map_id == snapshot_->map_id &&
-         std::ranges::all_of(versions.tiles, [&](const TileInfo& info) {
-           const auto held = tiles_.find(info.id);
-           return held != tiles_.end() && held->second->info.revision >= info.revision;
-         });
+  const bool is_of_map = versions.map.map_id == snapshot_->map_id;
+  std::vector<TileId> lacking;
+  for (const TileInfo& info : versions.tiles) {
+    const auto held = tiles_.find(info.id);
+    if (!is_of_map || held == tiles_.end() || held->second->info.revision < info.revision)
+      lacking.push_back(info.id);
+  }
+  return lacking;
 }
 
-void wait_for_whole_map(Client& client, const TileMirror& mirror,
-                        std::chrono::milliseconds timeout) {
+std::vector<TileId> wait_for_whole_map(Client& client, const TileMirror& mirror,
+                                       std::chrono::milliseconds timeout) {
   // Repeated, since tiles of an older answer may have been removed meanwhile.
   constexpr std::chrono::milliseconds recheck_period(1000);
   const auto deadline = std::chrono::steady_clock::now() + timeout;
@@ -72,9 +74,16 @@ void wait_for_whole_map(Client& client, const TileMirror& mirror,
     const auto until = std::chrono::steady_clock::now() + recheck_period;
     while (std::chrono::steady_clock::now() < until) {
       const auto seen = mirror.snapshot();
-      if (mirror.holds(versions)) return;
+      if (mirror.holds(versions)) return {};
       (void)mirror.wait_for_change(seen, std::chrono::milliseconds(50));
     }
+    // Few are not only late.
+    constexpr std::size_t max_unreadable = 100;
+    const std::vector<TileId> lacking = mirror.lacks(versions);
+    if (lacking.empty() || lacking.size() > max_unreadable) continue;
+    if (std::vector<TileId> unreadable = client.get_tiles(lacking).unreadable;
+        unreadable.size() == lacking.size())
+      return unreadable;
   }
   throw ServiceTimeout(
       "the server's map did not arrive: " + std::to_string(mirror.snapshot()->tiles.size()) +

@@ -6,6 +6,7 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <vector>
 
 #include "clients/library/client.hpp"
 
@@ -29,7 +30,9 @@ class TileMirror {
       const std::shared_ptr<const MapSnapshot>& known, std::chrono::milliseconds timeout) const;
 
   /// Whether it holds all these tiles, as new or newer.
-  [[nodiscard]] bool holds(const TileVersions& versions) const;
+  [[nodiscard]] bool holds(const TileVersions& versions) const { return lacks(versions).empty(); }
+  /// Those of them that it does not hold so.
+  [[nodiscard]] std::vector<TileId> lacks(const TileVersions& versions) const;
 
  private:
   [[nodiscard]] std::shared_ptr<const MapSnapshot> make_snapshot(const dds::MapIdentity& map) const;
@@ -40,9 +43,9 @@ class TileMirror {
   std::shared_ptr<const MapSnapshot> snapshot_;
 };
 
-/// Returns when the mirror holds all tiles that the server's map has. Throws ServiceTimeout saying
-/// how many are missing.
-void wait_for_whole_map(Client& client, const TileMirror& mirror,
-                        std::chrono::milliseconds timeout);
+/// Returns when the mirror holds all tiles that the server's map has, but for those that the server
+/// itself cannot read, which are in the answer. Throws ServiceTimeout saying how many are missing.
+[[nodiscard]] std::vector<TileId> wait_for_whole_map(Client& client, const TileMirror& mirror,
+                                                     std::chrono::milliseconds timeout);
 
 }  // namespace stillmap

@@ -1,11 +1,13 @@
 #include <pybind11/stl.h>
 #include <pybind11/stl/filesystem.h>
 
+#include <algorithm>
 #include <array>
 #include <condition_variable>
 #include <filesystem>
 #include <mutex>
 #include <numbers>
+#include <stdexcept>
 
 #include "clients/library/client.hpp"
 #include "clients/python/bindings.hpp"
@@ -17,6 +19,10 @@ namespace stillmap::python {
 namespace {
 
 std::chrono::milliseconds duration_of(double seconds) {
+  // A year and more is for ever, which clocks cannot count to.
+  constexpr double longest_s = 4e7;
+  if (!(seconds >= 0.0)) throw std::invalid_argument("timeout_s must be 0 or more");
+  seconds = std::min(seconds, longest_s);
   return std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * seconds));
 }
 
@@ -110,19 +116,10 @@ Trajectory path_of(Client& client, double timeout_s) {
 }
 
 Map whole_map(Client& client) {
-  const TileVersions versions = client.get_tile_versions();
-  std::vector<TileId> ids;
-  for (const TileInfo& info : versions.tiles) ids.push_back(info.id);
-  TileSet set = client.get_tiles(ids);
-  std::vector<std::shared_ptr<const Tile>> tiles;
-  for (Tile& tile : set.tiles) tiles.push_back(std::make_shared<const Tile>(std::move(tile)));
-  auto view = std::make_shared<MapSnapshot>();
-  view->version = set.map.version;
-  view->map_id = set.map.map_id;
-  view->tile_size_m = versions.map.tile_size_m;
-  view->voxel_size_m = versions.map.voxel_size_m;
-  view->tiles = TileTable(std::move(tiles));
-  return {.view = std::move(view), .trajectory = {}, .metadata = {}, .read_evidence = {}};
+  return {.view = std::make_shared<const MapSnapshot>(client.get_map()),
+          .trajectory = {},
+          .metadata = {},
+          .read_evidence = {}};
 }
 
 py::object grid(Client& client, const Region& region, const std::string& robot) {

@@ -2,6 +2,8 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <filesystem>
+#include <mutex>
+#include <utility>
 
 #include "clients/python/arrays.hpp"
 #include "clients/python/bindings.hpp"
@@ -106,59 +108,73 @@ DatasetFrame frame_from_arrays(const InArray<float>& points_lidar, std::int64_t 
   return frame;
 }
 
+namespace {
+
+/// Readers of a bag keep a place in its file: threads of Python come one after the other.
+struct SharedRecording {
+  explicit SharedRecording(dds::Recording opened) : recording(std::move(opened)) {}
+  dds::Recording recording;
+  std::mutex reading;
+};
+
+}  // namespace
+
 void bind_dataset(py::module_& module) {
   bind_scan(module);
   bind_sensor(module);
-  py::class_<dds::Recording>(
+  py::class_<SharedRecording>(
       module, "Dataset", "A sequence or bag, read scan by scan: dataset[3], for scan in dataset.")
-      .def("__len__", [](const dds::Recording& r) { return r.dataset.size(); })
+      .def("__len__", [](const SharedRecording& shared) { return shared.recording.dataset.size(); })
       .def(
           "__getitem__",
-          [](const dds::Recording& recording, py::ssize_t index) {
-            const std::size_t i = index_from(recording.dataset, index);
+          [](SharedRecording& shared, py::ssize_t index) {
+            const std::size_t i = index_from(shared.recording.dataset, index);
             const py::gil_scoped_release released;
-            return recording.dataset.read(i);
+            const std::scoped_lock lock(shared.reading);
+            return shared.recording.dataset.read(i);
           },
           "Reads a scan. Raises DatasetError for a damaged one; the others can still be read.")
       .def_property_readonly(
           "stamps_ns",
-          [](const dds::Recording& recording) {
-            std::vector<std::int64_t> stamps_ns(recording.dataset.size());
-            for (std::size_t i = 0; i < stamps_ns.size(); ++i)
-              stamps_ns[i] = recording.dataset.stamp_ns(i);
+          [](const SharedRecording& shared) {
+            const ScanDataset& dataset = shared.recording.dataset;
+            std::vector<std::int64_t> stamps_ns(dataset.size());
+            for (std::size_t i = 0; i < stamps_ns.size(); ++i) stamps_ns[i] = dataset.stamp_ns(i);
             return array_of<std::int64_t>(std::move(stamps_ns));
           },
           "(n,) int64 [ns].")
       .def_property_readonly(
           "sensor",
-          [](const dds::Recording& recording) { return recording.dataset.suggested_sensor(); },
+          [](const SharedRecording& shared) { return shared.recording.dataset.suggested_sensor(); },
           "The sensor as the recording suggests it, for a Mapper.")
       .def_property_readonly(
           "truth",
-          [](const dds::Recording& recording) -> std::optional<PythonTrajectory> {
-            const auto truth = recording.dataset.truth();
+          [](const SharedRecording& shared) -> std::optional<PythonTrajectory> {
+            const auto truth = shared.recording.dataset.truth();
             return truth ? std::optional(trajectory_of(*truth)) : std::nullopt;
           },
           "True poses of the lidar in the frame of the first one, or None.")
       .def_property_readonly(
           "imu",
-          [](const dds::Recording& recording) {
+          [](SharedRecording& shared) {
             std::vector<ImuSample> samples;
             {
               const py::gil_scoped_release released;
-              samples = recording.dataset.imu();
+              const std::scoped_lock lock(shared.reading);
+              samples = shared.recording.dataset.imu();
             }
             return imu_arrays(samples);
           },
           "(stamp_ns (n,) int64, angular_velocity_imu (n, 3) [rad/s], acceleration_imu (n, 3) "
           "[m/s^2]).")
-      .def_readonly("faults", &dds::Recording::faults,
-                    "What of a bag cannot be read at all, in words.");
+      .def_property_readonly(
+          "faults", [](const SharedRecording& shared) { return shared.recording.faults; },
+          "What of a bag cannot be read at all, in words.");
   module.def(
       "open_dataset",
       [](const std::filesystem::path& path, const std::string& topic) {
         const py::gil_scoped_release released;
-        return std::make_unique<dds::Recording>(dds::open_recording(path, topic));
+        return std::make_unique<SharedRecording>(dds::open_recording(path, topic));
       },
       py::arg("path"), py::arg("topic") = "",
       "Opens a KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag "

@@ -76,7 +76,11 @@ Bag::Bag(const fs::path& path) {
   } else {
     if (path.extension() == ".bag") refuse_ros_1(path);
     const fs::path metadata = path.parent_path() / "metadata.yaml";
-    if (describes_a_bag(metadata)) compression_ = read_bag_metadata(metadata).compression;
+    try {
+      if (describes_a_bag(metadata)) compression_ = read_bag_metadata(metadata).compression;
+    } catch (const DatasetError&) {
+      // A file that is named by itself needs no description: it says what is in it.
+    }
     open({path});
   }
 }

@@ -80,6 +80,8 @@ BagScanSource::BagScanSource(const fs::path& path, const std::string& topic)
       stamp_ns = header_stamp_ns(bag_.first_bytes(messages_[i], header_bytes));
     } catch (const CdrError&) {
       // Read again, and reported then, when its turn comes.
+    } catch (const DatasetError&) {
+      // The same: a page of the file is damaged there.
     }
     stamped = stamped || stamp_ns.value_or(0) != 0;
     stamps_ns_.push_back(stamp_ns.value_or(messages_[i].received_ns));
@@ -139,6 +141,8 @@ std::vector<ImuSample> BagScanSource::imu() const {
       samples.push_back(decode_imu(bag_.bytes(message)));
     } catch (const CdrError&) {
       // One of hundreds a second; the mapper sees the gap.
+    } catch (const DatasetError&) {
+      // A damaged page of the file: the same.
     }
   }
   return samples;
@@ -151,6 +155,8 @@ std::vector<GnssFix> BagScanSource::gnss() const {
       if (const auto fix = decode_gnss(bag_.bytes(message))) fixes.push_back(*fix);
     } catch (const CdrError&) {
       // Others say where the robot was.
+    } catch (const DatasetError&) {
+      // A damaged page of the file: the same.
     }
   }
   return fixes;

@@ -1,4 +1,8 @@
 #include <SQLiteCpp/SQLiteCpp.h>
+#include <sqlite3.h>
+
+#include <algorithm>
+#include <memory>
 
 #include "core/dataset/dataset_error.hpp"
 #include "idl/bag/bag_file.hpp"
@@ -104,6 +108,18 @@ std::vector<std::uint8_t> SqliteBagFile::bytes(const BagMessage& message) const 
 }
 
 std::vector<std::uint8_t> SqliteBagFile::first_bytes(const BagMessage& message, int bytes) const {
+  // A query would read the whole blob, and with all messages the whole bag.
+  sqlite3_blob* opened = nullptr;
+  if (sqlite3_blob_open(database_->getHandle(), "main", "messages", "data", message.row, 0,
+                        &opened) == SQLITE_OK) {
+    const std::unique_ptr<sqlite3_blob, decltype(&sqlite3_blob_close)> closing(opened,
+                                                                               &sqlite3_blob_close);
+    std::vector<std::uint8_t> first(
+        static_cast<std::size_t>(std::min(bytes, sqlite3_blob_bytes(opened))));
+    if (sqlite3_blob_read(opened, first.data(), static_cast<int>(first.size()), 0) == SQLITE_OK)
+      return first;
+  }
+  // Where the table is another recorder's, or the page is damaged.
   return blob("SELECT substr(data, 1, ?2) FROM messages WHERE id = ?1", message.row, bytes);
 }
 

@@ -75,6 +75,7 @@ UntypedReader::UntypedReader(Participant& participant, const std::string& topic,
   if (!qos.reliable || !qos.accept_best_effort) return;
   make_best_effort_ = [this, &participant, topic, type, weaker = qos]() mutable {
     weaker.reliable = false;
+    weaker.transient_local = false;
     auto made = std::make_unique<BestEffort>(events_);
     made->reader = participant.make_reader(topic, type, weaker, &made->events);
     return made;

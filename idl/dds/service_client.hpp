@@ -88,15 +88,20 @@ class ServiceClient {
   /// service that changes something carries out once.
   [[nodiscard]] std::optional<Reply> call(const Request& request,
                                           std::chrono::milliseconds timeout) {
-    const std::scoped_lock lock(mutex_);
+    const auto deadline = std::chrono::steady_clock::now() + timeout;
+    // The calls before this one may take all of its time.
+    const std::unique_lock lock(mutex_, deadline);
+    if (!lock) return std::nullopt;
     if (!refusal_.empty()) throw NotPermitted(refusal_);
     Reply reply;
-    if (!client_->call(&request, &reply, timeout)) return std::nullopt;
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        deadline - std::chrono::steady_clock::now());
+    if (!client_->call(&request, &reply, left)) return std::nullopt;
     return reply;
   }
 
  private:
-  std::mutex mutex_;
+  std::timed_mutex mutex_;
   std::string refusal_;
   std::optional<UntypedServiceClient> client_;
 };

@@ -7,8 +7,8 @@ namespace stillmap::dds {
 /// Quality of service of a reader or writer, as far as Stillmap needs it.
 struct TopicQos {
   bool reliable = true;
-  /// Of a reliable reader: from writers that do not offer reliable delivery it reads by best effort
-  /// (ROS 2's "best available").
+  /// Of a reliable reader: from writers that offer less than it asks for it reads by best effort,
+  /// and what they write from then on (ROS 2's "best available").
   bool accept_best_effort = false;
   /// A late joiner gets the samples that the writer still has.
   bool transient_local = false;

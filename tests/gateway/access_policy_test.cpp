@@ -16,6 +16,9 @@ TEST(AccessPolicy, OnThisMachineAnswersUnderItsOwnNamesOnly) {
   EXPECT_EQ(policy.judge(from("localhost:8765")), allowed);
   EXPECT_EQ(policy.judge(from("127.0.0.1:8765")), allowed);
   EXPECT_EQ(policy.judge(from("[::1]:8765")), allowed);
+  EXPECT_EQ(policy.judge(from("127.0.0.2:8765")), allowed);
+  EXPECT_EQ(policy.judge(from("127.0.0.1.evil.example:8765")), wrong_host);
+  EXPECT_EQ(policy.judge(from("128.0.0.1:8765")), wrong_host);
   // A name that was made to lead here.
   EXPECT_EQ(policy.judge(from("evil.example:8765")), wrong_host);
   EXPECT_EQ(policy.judge(from("localhost.evil.example")), wrong_host);

@@ -224,6 +224,41 @@ TEST(Bag, OneDamagedMessageLeavesTheOthersReadable) {
   expect_scan(dataset.read(2).scan, bag_scan(2));
 }
 
+// Large messages lie on pages of their own, each of which names the next.
+TEST(Bag, ADamagedPageLeavesTheOtherMessagesReadable) {
+  const ScratchFolder folder;
+  Scan large = bag_scan(1);
+  for (int i = 0; i < 4000; ++i) {
+    large.points_lidar.emplace_back(1.0F, 2.0F, 3.0F);
+    large.intensity.push_back(0.1F);
+    large.time_offset_s.push_back(0.0F);
+    large.ring.push_back(1);
+  }
+  write_bag(folder / "bag",
+            {bag_message(0), serialized(wire::to_cloud(large, {}, "lidar")), bag_message(2)});
+  const fs::path file = folder / "bag" / "bag_0.db3";
+  std::string bytes = content_of(file);
+  // In the middle of the large one.
+  const std::string points("\x00\x00\x80\x3f\x00\x00\x00\x40\x00\x00\x40\x40", 12);
+  const std::size_t page = bytes.find(points, bytes.size() / 2) / 4096 * 4096;
+  ASSERT_GT(page, 0U);
+  bytes.replace(page, 4, "\xff\xff\xff\xff");
+  std::ofstream(file, std::ios::binary) << bytes;
+  const ScanDataset dataset = open_sequence(folder / "bag");
+  ASSERT_EQ(dataset.size(), 3U);
+  EXPECT_THROW((void)dataset.read(1), DatasetError);
+  expect_scan(dataset.read(0).scan, bag_scan(0));
+  expect_scan(dataset.read(2).scan, bag_scan(2));
+}
+
+TEST(Bag, AFileThatIsNamedByItselfNeedsNoMetadata) {
+  const ScratchFolder folder;
+  write_bag(folder / "bag", {bag_message(0), bag_message(1)});
+  folder.file("bag/metadata.yaml", "rosbag2_bagfile_information:\n  storage_identifier: [\n");
+  EXPECT_THAT(fault_of(folder / "bag"), HasSubstr("give the .db3 or .mcap file itself"));
+  EXPECT_EQ(open_sequence(folder / "bag" / "bag_0.db3").size(), 2U);
+}
+
 TEST(Bag, OtherFormatsAreRefusedWithTheWayOut) {
   const ScratchFolder folder;
   EXPECT_THAT(fault_of(folder.file("a/a_0.mcap", "MCAP").parent_path()),

@@ -128,6 +128,27 @@ TEST_P(OverTransport, OutlivesFilteredReadersThatComeAndGo) {
   }
 }
 
+// As of /tf_static, where one publisher keeps what it wrote and another does not.
+TEST_P(OverTransport, AWriterThatKeepsNothingCostsNothingOfOneThatDoes) {
+  const TopicQos keeping{.transient_local = true, .depth = 10};
+  Writer<PointCloud2> keeps(here_, "rt/kept", keeping);
+  ASSERT_TRUE(keeps.write(cloud_of(10, 1)));
+  Writer<PointCloud2> forgets(here_, "rt/kept", {.depth = 10});
+  TopicQos both = keeping;
+  both.accept_best_effort = true;
+  Reader<PointCloud2> reader(there_, "rt/kept", both);
+  PointCloud2 got;
+  std::set<std::uint32_t> seen;
+  ASSERT_TRUE(test::eventually(
+      [&] {
+        static_cast<void>(forgets.write(cloud_of(10, 2)));
+        while (reader.take(got, {}, 10ms)) seen.insert(got.width());
+        return seen.size() == 2;
+      },
+      discovery_timeout));
+  EXPECT_EQ(reader.matched_writers(), 2);
+}
+
 TEST_P(OverTransport, RefusesFiltersThatDoNotFitTheType) {
   const auto topic = Topics::in("stillmap").tile_index;
   using FilteredReader = Reader<stillmap_msgs::msg::TileInfo>;

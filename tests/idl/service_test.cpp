@@ -6,6 +6,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "idl/dds/service_client.hpp"
 #include "idl/dds/service_server.hpp"
@@ -88,6 +89,18 @@ TEST(Service, GivesUpWithoutAServer) {
   EXPECT_FALSE(client.call(request_for(""), 300ms));
   EXPECT_LT(std::chrono::steady_clock::now() - began, 5s);
   EXPECT_FALSE(client.wait_for_server(0ms));
+}
+
+TEST(Service, CallsThatWaitForEachOtherKeepTheirTimes) {
+  Participant client_side(loopback(false));
+  Client client(client_side, "stillmap/save_map");
+  const auto began = std::chrono::steady_clock::now();
+  {
+    std::vector<std::jthread> callers;
+    for (int i = 0; i < 20; ++i)
+      callers.emplace_back([&client] { EXPECT_FALSE(client.call(request_for(""), 500ms)); });
+  }
+  EXPECT_LT(std::chrono::steady_clock::now() - began, 8s) << "not 20 times as long";
 }
 
 TEST(Service, WhoseThreadFailsLeavesItToWhoRunsIt) {

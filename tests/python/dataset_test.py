@@ -33,6 +33,18 @@ def test_the_imu_lies_beside(city):
     assert abs(np.median(np.linalg.norm(accelerations, axis=1)) - 9.8) < 0.5
 
 
+def test_threads_may_read_one_recording(city):
+    from concurrent.futures import ThreadPoolExecutor
+
+    dataset = stillmap.open_dataset(city)
+    alone = [scan.points_lidar.copy() for scan in dataset]
+    with ThreadPoolExecutor(8) as pool:
+        for _ in range(5):
+            together = list(pool.map(lambda i: dataset[i].points_lidar.copy(), range(len(dataset))))
+            for one, other in zip(alone, together):
+                np.testing.assert_array_equal(one, other)
+
+
 def test_points_stay_when_the_scan_is_gone(city):
     points = stillmap.open_dataset(city)[0].points_lidar
     again = stillmap.open_dataset(city)[0].points_lidar

@@ -9,6 +9,7 @@
 #include <tuple>
 #include <vector>
 
+#include "clients/library/tile_mirror.hpp"
 #include "core/map/static_map.hpp"
 #include "core/map/storage/map_file.hpp"
 #include "tests/server/room_scans.hpp"
@@ -136,6 +137,15 @@ TEST(RemovedOnDisk, ATileThatCannotBeReadLosesItselfAlone) {
   for (const auto& tile : map.view.tiles) ids.push_back(tile->info.id);
   const TileSet tiles = client.get_tiles(ids);
   EXPECT_EQ(tiles.tiles.size(), ids.size() - 1);
+  EXPECT_THAT(tiles.unreadable, ElementsAre(TileId{150, -1}));
+  EXPECT_FALSE(tiles.fault.empty());
+  EXPECT_THAT(refusal([&] { static_cast<void>(client.get_map()); }), HasSubstr("(150, -1)"));
+  // It must not keep those waiting who plan elsewhere.
+  stillmap::TileMirror mirror;
+  const Subscription subscription = client.subscribe_region(
+      BoxRegion{}, [&](const RegionUpdate& update) { mirror.apply(update); });
+  EXPECT_THAT(wait_for_whole_map(client, mirror, patience), ElementsAre(TileId{150, -1}));
+  EXPECT_EQ(mirror.snapshot()->tiles.size(), ids.size() - 1);
 }
 
 TEST(RemovedOnDisk, ADiskThatFailsIsGivenUpSoon) {

@@ -110,7 +110,9 @@ std::vector<RecordableTopic> chosen_topics(const RecorderOptions& options) {
       throw std::invalid_argument("topic '" + requested + "' cannot be recorded; there are" +
                                   known);
     }
-    chosen.push_back(*found);
+    const bool is_new =
+        std::ranges::find(chosen, found->dds_name, &RecordableTopic::dds_name) == chosen.end();
+    if (is_new) chosen.push_back(*found);
   }
   return chosen;
 }
@@ -131,14 +133,13 @@ std::vector<dds::BagTopic> bag_topics(const std::vector<RecordableTopic>& topics
   return in_bag;
 }
 
-dds::TopicQos reader_qos_for(const RecordableTopic& topic, bool as_offered) {
+dds::TopicQos reader_qos_for(const RecordableTopic& topic) {
   dds::TopicQos qos = topic.offered;
   qos.keep_all = false;
   qos.depth = qos.max_keys > 1 ? max_waiting_per_key
                                : std::clamp(qos.depth, max_waiting, max_waiting_often);
-  // Publishers that offer less are recorded too, with the weakest request.
-  qos.reliable = as_offered;
-  qos.transient_local = as_offered && qos.transient_local;
+  // Publishers that offer less are recorded, too.
+  qos.accept_best_effort = true;
   return qos;
 }
 
@@ -151,20 +152,12 @@ std::int64_t wall_clock_ns() {
 class Input {
  public:
   Input(dds::Participant& participant, RecordableTopic topic)
-      : participant_(participant), topic_(std::move(topic)) {
-    listen(true);
-  }
-
-  /// Requests the weakest QoS once a publisher offers less than the request.
-  void relax_qos() {
-    if (!as_offered_ || reader_->events().incompatible_writers() == 0) return;
-    reader_.reset();
-    listen(false);
-  }
+      : topic_(std::move(topic)),
+        reader_(participant, topic_.dds_name, topic_.type, reader_qos_for(topic_)) {}
 
   [[nodiscard]] bool take(dds::SerializedSample& sample) {
     SampleInfo info;
-    if (!reader_->take(sample, info, {}, std::chrono::milliseconds(0))) return false;
+    if (!reader_.take(sample, info, {}, std::chrono::milliseconds(0))) return false;
     losses_.add(info.sample_identity);
     return true;
   }
@@ -172,18 +165,11 @@ class Input {
   [[nodiscard]] std::uint64_t lost() const {
     return topic_.offered.transient_local ? 0 : losses_.lost();
   }
-  [[nodiscard]] int publishers() const { return reader_->events().matched_writers(); }
+  [[nodiscard]] int publishers() const { return reader_.matched_writers(); }
 
  private:
-  void listen(bool as_offered) {
-    as_offered_ = as_offered;
-    reader_.emplace(participant_, topic_.dds_name, topic_.type, reader_qos_for(topic_, as_offered));
-  }
-
-  dds::Participant& participant_;
   RecordableTopic topic_;
-  std::optional<dds::SerializedSampleReader> reader_;
-  bool as_offered_ = true;
+  dds::SerializedSampleReader reader_;
   dds::SampleLosses losses_;
 };
 
@@ -196,17 +182,21 @@ class Recorder {
   /// already, std::invalid_argument for a topic that cannot be recorded.
   explicit Recorder(const RecorderOptions& options) : Recorder(options, chosen_topics(options)) {}
 
-  /// Writes what has arrived. Throws DatasetError when it cannot.
-  void write_received() {
+  /// Writes what has arrived. Returns whether more may be waiting. Throws DatasetError when it
+  /// cannot.
+  bool write_received() {
     dds::SerializedSample sample;
+    bool has_more = false;
     for (std::size_t i = 0; i < inputs_.size(); ++i) {
       Input& input = *inputs_[i];
-      input.relax_qos();
       // Bounded, so that a topic that never pauses does not starve the others.
-      for (int taken = 0; taken < max_waiting && input.take(sample); ++taken) {
+      int taken = 0;
+      for (; taken < max_waiting && input.take(sample); ++taken) {
         bag_.add(i, wall_clock_ns(), sample);
       }
+      has_more |= taken == max_waiting;
     }
+    return has_more;
   }
   /// Commits to the disk.
   void commit() { bag_.commit(); }
@@ -298,13 +288,16 @@ void record(Recorder& recorder, const RecordArguments& arguments, StopSignal& st
     return arguments.seconds > 0.0 && passed.count() >= arguments.seconds;
   };
   while (!stop.wait_for(record_poll_period) && !over()) {
-    recorder.write_received();
+    static_cast<void>(recorder.write_received());
     if (Clock::now() - committed < commit_period) continue;
     recorder.commit();
     committed = Clock::now();
     progress.update(recorder.messages(), progress_note(recorder));
   }
-  recorder.write_received();
+  // What waits; not what a sensor that goes on sends meanwhile.
+  constexpr int max_rounds = 1 + max_waiting_often / max_waiting;
+  for (int round = 0; round < max_rounds && recorder.write_received(); ++round) {
+  }
   recorder.finish();
 }
 

@@ -170,7 +170,12 @@ ExitCode plan_on_server(const PlanArguments& arguments) {
   TileMirror mirror;
   const Subscription tiles = client.subscribe_region(
       BoxRegion{}, [&](const RegionUpdate& update) { mirror.apply(update); });
-  wait_for_whole_map(client, mirror, arguments.client.timeout());
+  const auto unreadable = wait_for_whole_map(client, mirror, arguments.client.timeout());
+  if (!unreadable.empty()) {
+    std::cerr << "stillmap: the server cannot read " << unreadable.size()
+              << " tiles of its map, the first is (" << unreadable.front().x << ", "
+              << unreadable.front().y << "): there the plan knows nothing\n";
+  }
   std::optional<RobotPoseSubscription> robot;
   if (!task.from) robot.emplace(client, arguments.client.timeout());
   Replanner replanner(std::move(task));

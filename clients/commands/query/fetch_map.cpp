@@ -1,10 +1,7 @@
 #include "clients/commands/query/fetch_map.hpp"
 
-#include <algorithm>
 #include <condition_variable>
-#include <memory>
 #include <mutex>
-#include <utility>
 
 namespace stillmap::cli {
 
@@ -23,23 +20,6 @@ Trajectory fetch_trajectory(Client& client, std::chrono::milliseconds timeout) {
     throw ServiceTimeout("the server has no pose yet: it has mapped no scan");
   }
   return newest;
-}
-
-MapSnapshot fetch_map(Client& client) {
-  const TileVersions versions = client.get_tile_versions();
-  std::vector<TileId> ids;
-  for (const TileInfo& info : versions.tiles) ids.push_back(info.id);
-  TileSet set = client.get_tiles(ids);
-  MapSnapshot view{.version = set.map.version,
-                   .map_id = set.map.map_id,
-                   .tile_size_m = versions.map.tile_size_m,
-                   .voxel_size_m = versions.map.voxel_size_m,
-                   .tiles = {}};
-  std::vector<std::shared_ptr<const Tile>> tiles;
-  tiles.reserve(set.tiles.size());
-  for (Tile& tile : set.tiles) tiles.push_back(std::make_shared<const Tile>(std::move(tile)));
-  view.tiles = TileTable(std::move(tiles));
-  return view;
 }
 
 }  // namespace stillmap::cli

@@ -9,7 +9,4 @@ namespace stillmap::cli {
 /// The poses since the server's map began. Throws ServiceTimeout when there are none in time.
 [[nodiscard]] Trajectory fetch_trajectory(Client& client, std::chrono::milliseconds timeout);
 
-/// All tiles of the server's map, as they are now.
-[[nodiscard]] MapSnapshot fetch_map(Client& client);
-
 }  // namespace stillmap::cli

@@ -43,7 +43,7 @@ void draw_query(const std::string& file, Client& client, const Region& region,
                 std::chrono::milliseconds timeout) {
   MapPictureOptions options;
   options.query_box_map = RegionShape(region).bounds_map();
-  write_map_picture(file, fetch_map(client), fetch_trajectory(client, timeout), options);
+  write_map_picture(file, client.get_map(), fetch_trajectory(client, timeout), options);
 }
 
 std::optional<KnownVersion> since_of(const QueryArguments& arguments, Client& client) {

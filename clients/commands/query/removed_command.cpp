@@ -59,7 +59,7 @@ RemovedResult removed_on_server(Client& client, const RemovedArguments& argument
   const Region region = region_of(arguments.region, client, arguments.client.timeout());
   RemovedVoxels removed = client.get_removed(region);
   RemovedResult found{std::move(removed.voxels), removed.total, std::move(removed.incomplete), {}};
-  if (!arguments.picture.empty()) found.view = fetch_map(client);
+  if (!arguments.picture.empty()) found.view = client.get_map();
   return found;
 }
 
