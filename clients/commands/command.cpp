@@ -1,5 +1,6 @@
 #include "clients/commands/command.hpp"
 
+#include <filesystem>
 #include <iostream>
 #include <stdexcept>
 
@@ -21,6 +22,14 @@ ExitCode report(const std::exception& error, ExitCode code) {
   return code;
 }
 
+/// Of a file that could not be written: one in a folder that is none was never asked for rightly.
+ExitCode code_of_unwritten(const std::filesystem::path& file) {
+  std::error_code ignored;
+  const std::filesystem::path folder = file.parent_path();
+  const bool has_folder = folder.empty() || std::filesystem::is_directory(folder, ignored);
+  return has_folder ? ExitCode::failed : ExitCode::bad_input;
+}
+
 }  // namespace
 
 ExitCode run_action(const Action& action) {
@@ -37,6 +46,10 @@ ExitCode run_action(const Action& action) {
                   ExitCode::failed);
   } catch (const ServiceTimeout& error) {
     return report(error, ExitCode::no_server);
+  } catch (const DatasetWriteError& error) {
+    return report(error, code_of_unwritten(error.file()));
+  } catch (const MapFileWriteError& error) {
+    return report(error, code_of_unwritten(error.file()));
   } catch (const DatasetError& error) {
     return report(error, ExitCode::bad_input);
   } catch (const ConfigError& error) {

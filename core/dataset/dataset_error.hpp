@@ -13,4 +13,15 @@ class DatasetError : public std::runtime_error {
       : std::runtime_error(file.string() + ": " + fault) {}
 };
 
+/// One that cannot be written: nothing is wrong with what was asked for, the disk may be full.
+class DatasetWriteError : public DatasetError {
+ public:
+  DatasetWriteError(const std::filesystem::path& file, const std::string& fault)
+      : DatasetError(file, fault), file_(file) {}
+  [[nodiscard]] const std::filesystem::path& file() const { return file_; }
+
+ private:
+  std::filesystem::path file_;
+};
+
 }  // namespace stillmap

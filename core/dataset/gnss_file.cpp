@@ -80,7 +80,7 @@ void write_gnss_csv(const std::filesystem::path& file, std::span<const GnssFix> 
     out << '\n';
   }
   out.close();
-  if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
+  if (!out) throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
 }
 
 }  // namespace stillmap

@@ -98,7 +98,7 @@ void write_imu_csv(const std::filesystem::path& file, std::span<const ImuSample>
     out << '\n';
   }
   out.close();
-  if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
+  if (!out) throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
 }
 
 std::filesystem::path imu_file_in(const std::filesystem::path& folder) {

@@ -87,7 +87,7 @@ std::ofstream text_file(const std::filesystem::path& file) {
 
 void finish(std::ofstream& out, const std::filesystem::path& file) {
   out.close();
-  if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
+  if (!out) throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
 }
 
 void print_pose(std::ostream& out, const Eigen::Isometry3d& pose) {

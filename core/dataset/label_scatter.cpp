@@ -119,13 +119,16 @@ class Edits {
     fs::create_directories(labels.file.parent_path(), error);
     if (fs::exists(labels.file) && !fs::exists(backup)) {
       fs::create_directories(backup.parent_path(), error);
-      fs::copy_file(labels.file, backup, error);
-      if (error) throw DatasetError(backup, "cannot be written: " + error.message());
+      // A backup that was cut off would be taken for the whole one by the next call.
+      const fs::path whole = backup.string() + ".new";
+      fs::copy_file(labels.file, whole, fs::copy_options::overwrite_existing, error);
+      if (!error) fs::rename(whole, backup, error);
+      if (error) throw DatasetWriteError(backup, "cannot be written: " + error.message());
     }
     const fs::path fresh = labels.file.string() + ".new";
     write_kitti_labels(fresh, labels.after);
     fs::rename(fresh, labels.file, error);
-    if (error) throw DatasetError(labels.file, "cannot be replaced: " + error.message());
+    if (error) throw DatasetWriteError(labels.file, "cannot be replaced: " + error.message());
   }
 
   fs::path cloud_;

@@ -88,7 +88,7 @@ MergedCloudWriter::MergedCloudWriter(const std::filesystem::path& file,
   std::ofstream out(unfinished_file_, std::ios::binary | std::ios::trunc);
   out << header(0, origin_map);
   out.close();
-  if (!out) throw DatasetError(unfinished_file_, "cannot be written; check the folder");
+  if (!out) throw DatasetWriteError(unfinished_file_, "cannot be written; check the folder");
 }
 
 MergedCloudWriter::~MergedCloudWriter() {
@@ -119,7 +119,7 @@ void MergedCloudWriter::flush() {
   std::ofstream out(unfinished_file_, std::ios::binary | std::ios::app);
   out << buffer_;
   out.close();
-  if (!out) throw DatasetError(unfinished_file_, "cannot be written; check the space left");
+  if (!out) throw DatasetWriteError(unfinished_file_, "cannot be written; check the space left");
   buffer_.clear();
 }
 
@@ -130,7 +130,7 @@ void MergedCloudWriter::finish() {
   out.close();
   std::error_code error;
   if (out) std::filesystem::rename(unfinished_file_, file_, error);
-  if (!out || error) throw DatasetError(file_, "cannot be written; check the folder");
+  if (!out || error) throw DatasetWriteError(file_, "cannot be written; check the folder");
 }
 
 MergedCloudReader::MergedCloudReader(const std::filesystem::path& file)

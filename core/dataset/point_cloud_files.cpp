@@ -140,7 +140,7 @@ void write_cloud(const std::filesystem::path& file, const std::string& header,
     out.write(bytes.data(), point_bytes);
   }
   out.close();
-  if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
+  if (!out) throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
 }
 
 }  // namespace

@@ -39,6 +39,13 @@ void require_growing_stamps(const Trajectory& poses, const char* which) {
   }
 }
 
+/// Between poses; infinite of fewer than two.
+double mean_period_ns(const Trajectory& poses) {
+  if (poses.size() < 2) return std::numeric_limits<double>::infinity();
+  return static_cast<double>(poses.back().stamp_ns - poses.front().stamp_ns) /
+         static_cast<double>(poses.size() - 1);
+}
+
 }  // namespace
 
 PosePairs pair_by_index(std::span<const Eigen::Isometry3d> truth,
@@ -60,20 +67,26 @@ PosePairs pair_by_stamp(const Trajectory& truth, const Trajectory& estimate,
                         std::int64_t max_difference_ns) {
   require_growing_stamps(truth, "true");
   require_growing_stamps(estimate, "estimated");
+  // Of the denser one each pose of the other takes the nearest. The other way round a pose would
+  // take what is nearest to the next one.
+  const bool is_truth_denser = mean_period_ns(truth) <= mean_period_ns(estimate);
+  const Trajectory& sparse = is_truth_denser ? estimate : truth;
+  const Trajectory& dense = is_truth_denser ? truth : estimate;
   const auto apart = [](const StampedPose& a, const StampedPose& b) {
     return std::abs(a.stamp_ns - b.stamp_ns);
   };
   PosePairs pairs;
   std::size_t next = 0;
-  for (const StampedPose& pose : estimate) {
+  for (const StampedPose& pose : sparse) {
     std::size_t nearest = next;
-    while (nearest + 1 < truth.size() &&
-           apart(truth[nearest + 1], pose) < apart(truth[nearest], pose)) {
+    while (nearest + 1 < dense.size() &&
+           apart(dense[nearest + 1], pose) < apart(dense[nearest], pose)) {
       ++nearest;
     }
-    if (nearest >= truth.size() || apart(truth[nearest], pose) > max_difference_ns) continue;
-    pairs.truth.push_back(truth[nearest].T_map_lidar);
-    pairs.estimate.push_back(pose.T_map_lidar);
+    if (nearest >= dense.size() || apart(dense[nearest], pose) > max_difference_ns) continue;
+    const StampedPose& other = dense[nearest];
+    pairs.truth.push_back((is_truth_denser ? other : pose).T_map_lidar);
+    pairs.estimate.push_back((is_truth_denser ? pose : other).T_map_lidar);
     next = nearest + 1;
   }
   if (pairs.size() == 0) {

@@ -25,9 +25,9 @@ struct PosePairs {
 [[nodiscard]] PosePairs pair_by_index(std::span<const Eigen::Isometry3d> truth,
                                       std::span<const Eigen::Isometry3d> estimate);
 
-/// Pairs every estimate with the true pose nearest in time, if it is at most `max_difference_ns`
-/// away; a true pose is used once. Throws std::invalid_argument as pair_by_index does, and when
-/// stamps do not increase or no pair is found.
+/// Pairs every pose of the series with the longer period with that of the other which is nearest in
+/// time, if it is at most `max_difference_ns` away; each is used once. Throws std::invalid_argument
+/// as pair_by_index does, and when stamps do not increase or no pair is found.
 [[nodiscard]] PosePairs pair_by_stamp(const Trajectory& truth, const Trajectory& estimate,
                                       std::int64_t max_difference_ns);
 

@@ -146,7 +146,7 @@ void write_g2o(const std::filesystem::path& file, const PoseGraph& graph) {
     out << '\n';
   }
   out.close();
-  if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
+  if (!out) throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
 }
 
 }  // namespace stillmap

@@ -161,14 +161,14 @@ void ScanLog::append(const LoggedScan& scan) {
   stream_.write(reinterpret_cast<const char*>(&header), sizeof(header));
   stream_.write(reinterpret_cast<const char*>(packed.data()),
                 static_cast<std::streamsize>(packed.size()));
-  if (!stream_) throw DatasetError(file_, "cannot be written; check the space left");
+  if (!stream_) throw DatasetWriteError(file_, "cannot be written; check the space left");
   records_.push_back({header.index, end_});
   end_ += sizeof(header) + packed.size();
 }
 
 void ScanLog::flush() {
   stream_.flush();
-  if (!stream_) throw DatasetError(file_, "cannot be written; check the space left");
+  if (!stream_) throw DatasetWriteError(file_, "cannot be written; check the space left");
 }
 
 LoggedScan ScanLog::at(std::size_t place) {

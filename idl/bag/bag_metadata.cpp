@@ -119,7 +119,7 @@ void write_bag_metadata(const fs::path& file, const BagMetadata& metadata) {
   std::error_code error;
   if (out) fs::rename(unfinished, file, error);
   if (!out || error) {
-    throw DatasetError(file, "cannot be written; check the folder and the space left");
+    throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
   }
 }
 

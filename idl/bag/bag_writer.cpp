@@ -31,8 +31,8 @@ void writing(const fs::path& file, Action action) {
   try {
     action();
   } catch (const SQLite::Exception& fault) {
-    throw DatasetError(file, std::string("cannot be written: ") + fault.what() +
-                                 "; what was committed before is kept");
+    throw DatasetWriteError(file, std::string("cannot be written: ") + fault.what() +
+                                      "; what was committed before is kept");
   }
 }
 

@@ -188,8 +188,8 @@ void McapWriter::write(std::string_view bytes) {
       // A record that is cut off would end what can be read of a file that goes on after it.
       static_cast<void>(::ftruncate(descriptor_, static_cast<off_t>(written_)));
       static_cast<void>(::lseek(descriptor_, static_cast<off_t>(written_), SEEK_SET));
-      throw DatasetError(file_,
-                         "cannot be written: " + fault + "; what was committed before is kept");
+      throw DatasetWriteError(
+          file_, "cannot be written: " + fault + "; what was committed before is kept");
     }
     left.remove_prefix(static_cast<std::size_t>(put));
   }

@@ -58,7 +58,8 @@ void decompress_file(const std::filesystem::path& from, const std::filesystem::p
   }
   if (left != 0) throw DatasetError(from, "is cut off: its zstd frame does not end");
   out.close();
-  if (!out) throw DatasetError(to, "cannot be written; is the folder for temporary files full?");
+  if (!out)
+    throw DatasetWriteError(to, "cannot be written; is the folder for temporary files full?");
 }
 
 TemporaryFolder::TemporaryFolder() {

@@ -3,6 +3,8 @@
 #include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
+#include <fstream>
 #include <set>
 
 #include "tests/clients/command_test.hpp"
@@ -282,6 +284,30 @@ TEST_F(MapCommandTest, ASignalLeavesTheOldMapAndTheRunCanBeResumed) {
   EXPECT_LT(report.at("accuracy").at("ate_rmse_m"), 0.5);
   EXPECT_EQ(line_count("out/poses_lidar.txt"), 120U);
   EXPECT_FALSE(exists("out/unfinished"));
+}
+
+TEST_F(MapCommandTest, FilesThatAreNotOfARunAreLeftAlone) {
+  simulate("city", 2);
+  std::filesystem::create_directories(folder_ / "out/unfinished");
+  std::ofstream(folder_ / "out/unfinished/thesis.tex") << "chapter 1";
+  for (const char* const how : {"", "--force"}) {
+    const ProcessResult refused = map_city(how);
+    EXPECT_EQ(refused.exit_code, 2);
+    EXPECT_THAT(refused.err, HasSubstr("other files"));
+    EXPECT_EQ(content("out/unfinished/thesis.tex"), "chapter 1");
+  }
+}
+
+// A damaged state is no reason to throw it away.
+TEST_F(MapCommandTest, ARunWhoseStateCannotBeReadIsLeftAlone) {
+  simulate("city", 2);
+  std::filesystem::create_directories(folder_ / "out/unfinished");
+  std::ofstream(folder_ / "out/unfinished/run.stillmap") << std::string(5000, 'x');
+  for (const char* const how : {"", "--resume"}) {
+    EXPECT_EQ(map_city(how).exit_code, 2) << how;
+    EXPECT_TRUE(exists("out/unfinished/run.stillmap")) << how;
+  }
+  EXPECT_EQ(map_city("--force").exit_code, 0);
 }
 
 TEST_F(MapCommandTest, EveryMapHasAnIdOfItsOwn) {

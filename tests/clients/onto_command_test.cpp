@@ -39,6 +39,10 @@ class OntoCommandTest : public CommandTest {
     for (const std::string day : {"1", "2"})
       succeed("simulate " + path("day" + day) + yard + " --day " + day);
     succeed("map " + path("day1") + " --labels none --out " + path("one"));
+    // As where a receiver said where it lies.
+    SavedMap placed = open_map_file(folder_ / "one/map.stillmap")->load();
+    placed.metadata["datum"] = datum_;
+    open_map_file(folder_ / "one/map.stillmap")->save(placed);
     first_bytes_ = content("one/map.stillmap");
     succeed("map " + path("day2") + " --labels none --onto " + path("one/map.stillmap") +
             " --out " + path("both"));
@@ -63,12 +67,14 @@ class OntoCommandTest : public CommandTest {
   void expect_that_the_session_can_be_withdrawn() const;
 
   std::string first_bytes_;
+  const std::string datum_ = "48.1,11.5,500,90";
 };
 
 // One test: every one is run by itself, and would map the days again.
 TEST_F(OntoCommandTest, PutsADriveOntoTheMapOfAnotherDay) {
   ASSERT_NO_FATAL_FAILURE(map_two_days());
   EXPECT_EQ(content("one/map.stillmap"), first_bytes_);
+  EXPECT_EQ(open_map_file(folder_ / "both/map.stillmap")->load().metadata.at("datum"), datum_);
   expect_true_poses();
   expect_a_report();
   expect_that_cars_went_and_came();

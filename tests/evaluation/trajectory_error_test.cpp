@@ -109,6 +109,19 @@ TEST(PairByStamp, UsesATruePoseOnce) {
   EXPECT_EQ(pair_by_stamp(truth, estimate, 10).size(), 1U);
 }
 
+TEST(PairByStamp, AFasterEstimateIsTakenWhereTheTruthIs) {
+  Trajectory truth, estimate;
+  for (int i = 0; i <= 10; ++i) truth.push_back({100 * i, pose(i, 0, 0)});
+  for (int i = 0; i <= 100; ++i) estimate.push_back({10 * i, pose(0.1 * i, 0, 0)});
+  for (const bool is_swapped : {false, true}) {
+    const PosePairs pairs =
+        is_swapped ? pair_by_stamp(estimate, truth, 50) : pair_by_stamp(truth, estimate, 50);
+    ASSERT_EQ(pairs.size(), truth.size());
+    for (std::size_t i = 0; i < pairs.size(); ++i)
+      EXPECT_NEAR(pairs.truth[i].translation().x(), pairs.estimate[i].translation().x(), 1e-9);
+  }
+}
+
 TEST(PairByStamp, RefusesStampsThatDoNotGrowAndPathsThatNeverMeet) {
   const Trajectory good{{1, pose(0, 0, 0)}, {2, pose(1, 0, 0)}};
   const Trajectory repeated{{1, pose(0, 0, 0)}, {1, pose(1, 0, 0)}};

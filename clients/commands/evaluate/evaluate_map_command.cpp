@@ -3,6 +3,7 @@
 #include <memory>
 #include <stdexcept>
 
+#include "clients/commands/arguments/mount_arguments.hpp"
 #include "clients/commands/command.hpp"
 #include "clients/terminal/json.hpp"
 #include "clients/terminal/progress.hpp"
@@ -11,6 +12,7 @@
 #include "core/dataset/scan_dataset.hpp"
 #include "core/evaluation/map_cleaning.hpp"
 #include "core/map/storage/map_file_copy.hpp"
+#include "core/map/storage/map_sessions.hpp"
 
 namespace stillmap::cli {
 namespace {
@@ -19,19 +21,38 @@ struct EvaluateMapArguments {
   std::string truth;
   std::string map;
   std::string poses = "map";
+  MountArguments mount;
   double max_range_m = 60.0;
   double voxel_size_m = 0.2;
   bool json = false;
 };
 
-// Poses of the labelled scans in the true map. With the map's own poses the figures measure the
-// cleaning alone; with true poses drift counts as well.
+// Scans are told apart by their stamps, which those of another session may have, too.
+void require_one_session(const EvaluateMapArguments& arguments) {
+  const std::size_t sessions = read_map_sessions(arguments.map).size();
+  if (sessions <= 1) return;
+  throw std::invalid_argument(arguments.map + " is made of " + std::to_string(sessions) +
+                              " sessions, whose poses cannot be told apart by stamps; "
+                              "'stillmap sessions --withdraw' writes it as it was after the first");
+}
+
+// Poses of the lidar of the labelled scans in the true map. With the map's own poses the figures
+// measure the cleaning alone; with true poses drift counts as well.
 Trajectory poses_for_truth(const EvaluateMapArguments& arguments, const ScanDataset& dataset,
                            const SavedMap& map) {
-  if (arguments.poses == "map") return map.trajectory.to_vector();
+  const Eigen::Isometry3d T_base_lidar =
+      arguments.mount.T_base_lidar().value_or(Eigen::Isometry3d::Identity());
+  if (arguments.poses == "map") {
+    require_one_session(arguments);
+    Trajectory poses = map.trajectory.to_vector();
+    for (StampedPose& pose : poses) pose.T_map_lidar = pose.T_map_lidar * T_base_lidar;
+    return poses;
+  }
   std::optional<Trajectory> truth = dataset.truth();
   if (!truth) throw DatasetError(arguments.truth, "has no true poses; use --poses map");
-  return *truth;
+  // They begin at the lidar's first pose, the map at the robot's.
+  for (StampedPose& pose : *truth) pose.T_map_lidar = T_base_lidar * pose.T_map_lidar;
+  return *std::move(truth);
 }
 
 void add_scan(evaluation::MapTruth& truth, const DatasetFrame& frame,
@@ -143,6 +164,7 @@ void add_evaluate_map_command(CommandHandle evaluate, Action& action) {
               "drift counts as well: map, truth")
       .one_of({"map", "truth"})
       .with_default();
+  add_mount_option(command, arguments->mount, "As given to 'stillmap map'");
   command
       .option("--max-range", arguments->max_range_m,
               "True points farther from the lidar are left out [m]; as in the mapper")

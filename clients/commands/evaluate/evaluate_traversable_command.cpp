@@ -76,8 +76,11 @@ ExitCode run(const EvaluateTraversableArguments& arguments) {
   }
   const SavedMap map = read_map_file(arguments.map);
   const simulation::SimulationConfig config = simulation_config(arguments.simulation);
-  // The map's frame is the lidar's at the first scan.
-  const Eigen::Isometry3d T_city_map = simulation::Simulation(config).T_map_lidar_at(0.0);
+  // The map's frame is the lidar's at the first scan, or that of the robot with its mount.
+  const Eigen::Isometry3d T_lidar_body =
+      config.T_base_lidar.value_or(Eigen::Isometry3d::Identity()).inverse();
+  const Eigen::Isometry3d T_city_map =
+      simulation::Simulation(config).T_map_lidar_at(0.0) * T_lidar_body;
   const simulation::CityTruth truth(config);
   TraversabilityMap area({profile});
   (void)area.update(map.view);
@@ -102,6 +105,9 @@ void add_evaluate_traversable_command(CommandHandle evaluate, Action& action) {
   command.option("--traffic", simulation.traffic, "As given to 'stillmap simulate'");
   command.option("--sensor", simulation.sensor, "As given to 'stillmap simulate'").with_default();
   command.option("--seed", simulation.seed, "As given to 'stillmap simulate'").with_default();
+  command.option("--day", simulation.day, "As given to 'stillmap simulate'").with_default();
+  command.option("--motion", simulation.motion, "As given to 'stillmap simulate'").with_default();
+  add_mount_option(command, simulation.mount, "As given to 'stillmap simulate' and 'stillmap map'");
   command.option("--profile", arguments->profile, "The robot, or its file").with_default();
   command.flag("--json", arguments->json, "Print JSON");
   command.explain(

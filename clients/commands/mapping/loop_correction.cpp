@@ -30,31 +30,21 @@ constexpr double bytes_per_mib = 1024.0 * 1024.0;
 }  // namespace
 
 LoopCorrection::LoopCorrection(LoopOptions options, const SensorModel& sensor)
-    : denied_(std::move(options.denied)),
-      fixes_(std::move(options.gnss.fixes)),
+    : fixes_(std::move(options.gnss.fixes)),
       antenna_lidar_(options.gnss.antenna_lidar),
       gnss_(options.gnss.config),
       sensor_(sensor),
       log_(options.scans_file),
       closer_(LoopClosingConfig{}) {
   std::ranges::stable_sort(fixes_, {}, &GnssFix::stamp_ns);
-}
-
-void LoopCorrection::number(std::size_t index) {
-  index_.push_back(index);
-  if (index_.size() > 1) return;
-  // Scans that are skipped do not matter: a submap has more. The first ones may be among them.
-  for (const DeniedLoop& denied : denied_)
-    closer_.deny(
-        {std::max(denied.from_scan, index) - index, std::max(denied.to_scan, index) - index});
+  for (const DeniedLoop& denied : options.denied) closer_.deny(denied);
 }
 
 void LoopCorrection::resume(std::size_t next_scan) {
   const Timed timed(seconds_);
   log_.truncate_from(next_scan);
   log_.read([this](const LoggedScan& scan) {
-    number(scan.index);
-    close(scan.labelled, scan.T_odom_lidar, scan.is_confirmed);
+    close(scan.index, scan.labelled, scan.T_odom_lidar, scan.is_confirmed);
   });
 }
 
@@ -65,16 +55,16 @@ void LoopCorrection::add(std::size_t index, const MappedScan& mapped) {
                .T_odom_lidar = odometry.T_map_lidar,
                .is_confirmed = odometry.is_confirmed,
                .labelled = mapped.labelled});
-  number(index);
-  close(mapped.labelled, odometry.T_map_lidar, odometry.is_confirmed);
+  close(index, mapped.labelled, odometry.T_map_lidar, odometry.is_confirmed);
 }
 
-void LoopCorrection::close(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar,
-                           bool is_confirmed) {
+void LoopCorrection::close(std::size_t index, const LabelledScan& scan,
+                           const Eigen::Isometry3d& T_odom_lidar, bool is_confirmed) {
+  index_.push_back(index);
   const std::size_t number = T_odom_lidar_.size();
   const std::int64_t stamp_ns = scan.scan.stamp_ns;
   T_odom_lidar_.push_back(T_odom_lidar);
-  closer_.add(scan, T_odom_lidar, is_confirmed);
+  closer_.add(scan, T_odom_lidar, is_confirmed, index);
   for (; next_fix_ < fixes_.size() && fixes_[next_fix_].stamp_ns <= stamp_ns; ++next_fix_) {
     const std::string refusal = gnss_.add(fixes_[next_fix_]);
     if (refusal.empty()) continue;
@@ -101,17 +91,17 @@ MapAlignment LoopCorrection::align(const std::shared_ptr<const PlaceIndex>& map,
   return alignment;
 }
 
-void LoopCorrection::insert_into(StaticMap& map, const std::vector<Eigen::Isometry3d>& T_map_lidar,
+bool LoopCorrection::insert_into(StaticMap& map, const std::vector<Eigen::Isometry3d>& T_map_lidar,
                                  std::int64_t clock_offset_ns,
-                                 const std::function<void(std::size_t done)>& scan_done) {
+                                 const std::function<bool(std::size_t done)>& scan_done) {
   const Timed timed(seconds_);
-  std::size_t done = 0;
-  log_.read([&](LoggedScan scan) {
+  for (std::size_t i = 0; i < T_map_lidar.size(); ++i) {
+    LoggedScan scan = log_.at(i);
     scan.labelled.scan.stamp_ns += clock_offset_ns;
-    const Eigen::Isometry3d& T = T_map_lidar.at(done++);
-    if (scan.is_confirmed) insert_scan(scan.labelled, T, sensor_, map);
-    scan_done(done);
-  });
+    if (scan.is_confirmed) insert_scan(scan.labelled, T_map_lidar[i], sensor_, map);
+    if (!scan_done(i + 1)) return false;
+  }
+  return true;
 }
 
 GnssReport LoopCorrection::gnss_report() const {

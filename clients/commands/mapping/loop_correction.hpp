@@ -91,20 +91,19 @@ class LoopCorrection {
   [[nodiscard]] MapAlignment align(const std::shared_ptr<const PlaceIndex>& map,
                                    const Eigen::Matrix3d& R_body_lidar);
   /// Adds all scans to a map by these poses, their stamps later by `clock_offset_ns`. `scan_done`
-  /// is called after every scan. Throws DatasetError.
-  void insert_into(StaticMap& map, const std::vector<Eigen::Isometry3d>& T_map_lidar,
-                   std::int64_t clock_offset_ns,
-                   const std::function<void(std::size_t done)>& scan_done);
+  /// is called after every scan; where it returns false the rest is left out, and so does this.
+  /// Throws DatasetError.
+  [[nodiscard]] bool insert_into(StaticMap& map, const std::vector<Eigen::Isometry3d>& T_map_lidar,
+                                 std::int64_t clock_offset_ns,
+                                 const std::function<bool(std::size_t done)>& scan_done);
   [[nodiscard]] LoopReport report() const;
 
  private:
-  /// One more scan, by its number in the data set.
-  void number(std::size_t index);
-  /// The same to the closer, with the fixes until then.
-  void close(const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar, bool is_confirmed);
+  /// Hands a scan, by its number in the data set, to the closer, with the fixes until then.
+  void close(std::size_t index, const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar,
+             bool is_confirmed);
   [[nodiscard]] GnssReport gnss_report() const;
 
-  std::vector<DeniedLoop> denied_;
   /// By their stamps.
   std::vector<GnssFix> fixes_;
   std::size_t next_fix_ = 0;

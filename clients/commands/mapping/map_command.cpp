@@ -66,6 +66,8 @@ void save_session(const std::filesystem::path& file, const EarlierMap& earlier,
                   const MappingResult& result, SavedMap map, const std::string& source) {
   const std::int64_t clock_offset_ns = result.session->clock_offset_ns;
   map.trajectory = earlier.saved().trajectory;
+  // What is known of the map stays known: where it lies on the earth above all.
+  for (const auto& [key, value] : earlier.saved().metadata) map.metadata.try_emplace(key, value);
   for (StampedPose pose : result.trajectory) {
     pose.stamp_ns += clock_offset_ns;
     map.trajectory.push_back(pose);
@@ -190,6 +192,7 @@ MappingResult map_with_progress(const ScanDataset& dataset, const MapArguments& 
   const auto scan_moved = [&](std::size_t done, std::size_t scans) {
     if (!correction) correction.emplace("map by corrected poses", "scans", scans);
     correction->update(done);
+    return !stop.requested();
   };
   return map_dataset(
       dataset, arguments.range, config, body, std::move(labels), run_file, loops, earlier,
@@ -200,7 +203,7 @@ void write_report(const std::filesystem::path& file, const Json& report) {
   std::ofstream out(file, std::ios::trunc);
   out << report.dump(2) << "\n";
   out.close();
-  if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
+  if (!out) throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
 }
 
 /// Throws std::invalid_argument for what is not FROM:TO or not of this run's scans, and where loops
@@ -357,7 +360,7 @@ ExitCode run(const MapArguments& arguments) {
     std::cerr << "stillmap: no scan of " << arguments.dataset << " could be mapped\n";
     return ExitCode::bad_input;
   }
-  if (arguments.loops == "on" && !result.loops) {
+  if (arguments.loops == "on" && !result.loops && !result.stopped) {
     std::cerr
         << "stillmap: loops are left open, since the sequence's stamps were set back and poses "
            "of before were dropped\n";
@@ -368,7 +371,9 @@ ExitCode run(const MapArguments& arguments) {
   write_report(out.unfinished() / "report.json", report);
   out.publish(result.stopped);
   std::cout << (arguments.json ? report.dump(2) + "\n" : describe(result, output));
-  return result.stopped ? stopped_early(out, "the files hold what was mapped") : ExitCode::ok;
+  if (!result.stopped) return ExitCode::ok;
+  return stopped_early(out, "the files hold what was mapped" +
+                                std::string(arguments.loops == "on" ? ", loops open" : ""));
 }
 
 }  // namespace

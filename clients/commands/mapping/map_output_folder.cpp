@@ -1,5 +1,6 @@
 #include "clients/commands/mapping/map_output_folder.hpp"
 
+#include <algorithm>
 #include <array>
 #include <stdexcept>
 #include <string>
@@ -26,20 +27,32 @@ void make(const fs::path& folder) {
   if (error) throw DatasetError(folder, "cannot be made: " + error.message());
 }
 
-/// Whether an earlier run has saved anything there.
+/// Whether an earlier run has saved anything there. Throws MapFileError for a file that does not
+/// tell: what cannot be read today may be there tomorrow.
 bool holds_run(const fs::path& run_file) {
-  try {
-    return fs::exists(run_file) && open_map_file(run_file)->holds_map();
-  } catch (const MapFileError&) {
-    return false;
-  }
+  return fs::exists(run_file) && open_map_file(run_file)->holds_map();
+}
+
+/// Whether a run left the folder, which keeps a file of that name or one beside it from the start.
+bool is_of_run(const fs::path& unfinished, const std::string& run_name) {
+  std::error_code not_there;
+  fs::directory_iterator entries(unfinished, not_there);
+  const bool is_empty = entries == fs::directory_iterator();
+  return is_empty || std::any_of(begin(entries), end(entries), [&](const auto& entry) {
+           return entry.path().filename().string().starts_with(run_name);
+         });
 }
 
 void check(const fs::path& map_file, const fs::path& run_file, const OutputPolicy& policy) {
   if (policy.force && policy.resume) {
     throw std::invalid_argument("--force begins anew and --resume goes on: give one of them");
   }
-  const bool has_run = holds_run(run_file);
+  if (!is_of_run(run_file.parent_path(), run_file.filename().string())) {
+    throw std::invalid_argument(run_file.parent_path().string() +
+                                " is where a run is kept until it is finished, and holds other "
+                                "files: move them, or choose another --out");
+  }
+  const bool has_run = !policy.force && holds_run(run_file);
   if (policy.resume) {
     if (has_run) return;
     throw std::invalid_argument(run_file.string() +
@@ -73,8 +86,14 @@ MapOutputFolder::MapOutputFolder(fs::path folder, const OutputPolicy& policy)
 }
 
 MapOutputFolder::~MapOutputFolder() {
+  try {
+    if (holds_run(run_file())) return;
+  } catch (const MapFileError&) {
+    // A full disk, say: hours of work are not thrown away for that.
+    return;
+  }
   std::error_code ignored;
-  if (!holds_run(run_file())) fs::remove_all(unfinished_, ignored);
+  fs::remove_all(unfinished_, ignored);
 }
 
 void MapOutputFolder::discard_run() {
@@ -96,7 +115,7 @@ void MapOutputFolder::publish(bool keep_run) {
   }
   for (const fs::path& result : results) {
     fs::rename(result, folder_ / result.filename(), error);
-    if (error) throw DatasetError(result, "cannot be moved to its place: " + error.message());
+    if (error) throw DatasetWriteError(result, "cannot be moved to its place: " + error.message());
   }
   if (!keep_run) fs::remove_all(unfinished_, error);
 }

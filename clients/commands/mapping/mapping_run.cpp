@@ -89,7 +89,7 @@ class MappingRun {
     // Until the lidar is found in the earlier map, every scan is looked for where that ended.
     if (!earlier_.empty() && !is_registered_) {
       T_map_lidar_first = earlier_.back().T_map_lidar * T_body_lidar_;
-    } else if (earlier_.empty() && mapper_.trajectory().empty() && is_mounted) {
+    } else if (earlier_.empty() && !mapper_.is_placed() && is_mounted) {
       T_map_lidar_first = T_body_lidar_;
     }
     const std::optional<MappedScan> mapped =
@@ -113,14 +113,14 @@ class MappingRun {
     result_.trajectory = result_.odometry = path();
     // Submaps hold dropped poses, too: loops stay open then.
     const bool has_all_scans = loops_ && loops_->scan_count() == result_.trajectory.size();
-    if (has_all_scans) {
+    if (has_all_scans && !stopped) {
       const bool has_loops = loops_->finish();
-      if (earlier_map_ != nullptr && !stopped) {
-        put_onto_earlier_map();
+      if (earlier_map_ != nullptr) {
+        stopped = !put_onto_earlier_map();
       } else if (has_loops) {
-        correct();
+        stopped = !correct();
       }
-      result_.loops = loops_->report();
+      if (!stopped) result_.loops = loops_->report();
     } else if (earlier_map_ != nullptr && !stopped) {
       throw std::invalid_argument(
           "the sequence's stamps were set back, and poses of before were dropped: it cannot be put "
@@ -144,16 +144,20 @@ class MappingRun {
     result_.scan_of_pose.resize(std::min(before, result_.scan_of_pose.size()));
   }
 
-  /// Puts the corrected poses, and the map by them, in place of those of the odometry.
-  void correct() {
-    result_.odometry_view = mapper_.map_snapshot();
+  /// Puts the corrected poses, and the map by them, in place of those of the odometry. False where
+  /// it was stopped: then these stay.
+  [[nodiscard]] bool correct() {
+    const auto odometry_view = mapper_.map_snapshot();
     StaticMap map(mapper_.static_map().config());
     map.reset(new_map_id());
-    move_scans(loops_->T_map_lidar(), 0, std::move(map));
+    if (!move_scans(loops_->T_map_lidar(), 0, std::move(map))) return false;
+    result_.odometry_view = odometry_view;
+    return true;
   }
 
-  /// Finds the drive in the earlier map and adds its scans there. Throws MapNotRecognized.
-  void put_onto_earlier_map() {
+  /// Finds the drive in the earlier map and adds its scans there. False where it was stopped.
+  /// Throws MapNotRecognized.
+  [[nodiscard]] bool put_onto_earlier_map() {
     // What earlier scans say of a place is worth that of two seconds: the rest would outvote what
     // is seen when passing by.
     constexpr std::uint32_t max_earlier_scans = 20;
@@ -172,22 +176,28 @@ class MappingRun {
     StaticMap map(mapper_.static_map().config());
     map.resume(earlier_map_->saved().view, earlier_map_->saved().tile_evidence);
     map.begin_session(max_earlier_scans);
-    move_scans(session.alignment.T_map_lidar, session.clock_offset_ns, std::move(map));
+    if (!move_scans(session.alignment.T_map_lidar, session.clock_offset_ns, std::move(map)))
+      return false;
     session.seconds =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
     result_.session = std::move(session);
+    return true;
   }
 
-  /// Makes these the poses of the run, and a map with its scans by them the map.
-  void move_scans(const std::vector<Eigen::Isometry3d>& T_map_lidar, std::int64_t clock_offset_ns,
-                  StaticMap map) {
+  /// Makes these the poses of the run, and a map with its scans by them the map. False where it was
+  /// stopped: then both are as they were.
+  [[nodiscard]] bool move_scans(const std::vector<Eigen::Isometry3d>& T_map_lidar,
+                                std::int64_t clock_offset_ns, StaticMap map) {
     assert(T_map_lidar.size() == result_.trajectory.size());
+    const bool is_done =
+        loops_->insert_into(map, T_map_lidar, clock_offset_ns, [&](std::size_t done) {
+          return !listeners_.scan_moved || listeners_.scan_moved(done, T_map_lidar.size());
+        });
+    if (!is_done) return false;
     for (std::size_t i = 0; i < T_map_lidar.size(); ++i)
       result_.trajectory[i].T_map_lidar = T_map_lidar[i] * T_body_lidar_.inverse();
-    loops_->insert_into(map, T_map_lidar, clock_offset_ns, [&](std::size_t done) {
-      if (listeners_.scan_moved) listeners_.scan_moved(done, T_map_lidar.size());
-    });
     mapper_.static_map() = std::move(map);
+    return true;
   }
 
   /// Of the body, with what an earlier run has mapped.
@@ -268,7 +278,9 @@ MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
   while (index < end && !is_stopped) {
     run.map_scan(index++);
     is_stopped = listeners.scan_done && !listeners.scan_done(index - range.first) && index < end;
-    if (index == end || !(is_stopped || run_file.is_due())) continue;
+    // At the end, too, where loops are closed next: that may take minutes, and be stopped.
+    const bool is_before_correction = index == end && loops.has_value();
+    if (!is_before_correction && (index == end || !(is_stopped || run_file.is_due()))) continue;
     run_file.save(run.state(index));
     run.state_saved();
   }

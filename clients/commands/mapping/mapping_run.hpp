@@ -79,15 +79,16 @@ using ScanSkipped = std::function<void(const SkippedScan&)>;
 struct MappingListeners {
   ScanDone scan_done;
   ScanSkipped scan_skipped;
-  /// Called while the map is made again by corrected poses.
-  std::function<void(std::size_t done, std::size_t total)> scan_moved;
+  /// Called while the map is made again by corrected poses; returning false ends the run, which
+  /// then is as if it had been stopped before that.
+  std::function<bool(std::size_t done, std::size_t total)> scan_moved;
 };
 
 /// Maps a data set in this process. The run goes on from what `run_file` holds, and its state is
 /// saved there from time to time; what is reported of scans, but poses and map, is of the resumed
-/// part alone. With `loops`, these are closed: poses and map
-/// are corrected when all scans are mapped. With an `earlier` map, too, the drive is put onto it,
-/// unless it was stopped. Throws what reading and saving throw, and MapNotRecognized.
+/// part alone. With `loops`, these are closed: poses and map are corrected when all scans are
+/// mapped. With an `earlier` map, too, the drive is put onto it. What was stopped has poses and map
+/// as odometry made them. Throws what reading and saving throw, and MapNotRecognized.
 [[nodiscard]] MappingResult map_dataset(const ScanDataset& dataset, const ScanRange& range,
                                         const MapperConfig& config, const MappedBody& body,
                                         std::unique_ptr<Segmenter> labels, RunFile& run_file,

@@ -104,7 +104,7 @@ void write_tum(const std::filesystem::path& file, const Trajectory& trajectory,
         << q.w() << "\n";
   }
   out.close();
-  if (!out) throw DatasetError(file, "cannot be written; check the folder and the space left");
+  if (!out) throw DatasetWriteError(file, "cannot be written; check the folder and the space left");
 }
 
 void write_kitti_poses(const std::filesystem::path& file, const Trajectory& trajectory) {

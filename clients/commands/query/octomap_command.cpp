@@ -204,7 +204,13 @@ OccupancyMap open_map(const OctomapArguments& arguments) {
   OccupancyConfig config;
   config.resolution_m = arguments.resolution_m;
   OccupancyMap map(config);
-  map.insert(read_map_file(file).view);
+  const SavedMap saved = read_map_file(file);
+  if (const std::size_t left_out = map.insert(saved.view); left_out > 0) {
+    throw MapFileError(file, "has " + std::to_string(left_out) + " voxels farther than " +
+                                 fixed(map.reach_m(), 0) +
+                                 " m from its origin, where an octree of --resolution " +
+                                 fixed(arguments.resolution_m, 3) + " ends; choose a coarser one");
+  }
   return map;
 }
 

@@ -144,8 +144,8 @@ class TiffWriter {
 
   void require(bool is_done) const {
     if (is_done) return;
-    throw DatasetError(file_, "cannot be written (" + error_ +
-                                  "); its folder must exist and be writable, with room left");
+    throw DatasetWriteError(file_, "cannot be written (" + error_ +
+                                       "); its folder must exist and be writable, with room left");
   }
 
   struct Close {
