@@ -117,6 +117,18 @@ struct SharedRecording {
   std::mutex reading;
 };
 
+void bind_open_dataset(py::module_& module) {
+  module.def(
+      "open_dataset",
+      [](const std::filesystem::path& path, const std::string& topic) {
+        const py::gil_scoped_release released;
+        return std::make_unique<SharedRecording>(dds::open_recording(path, topic));
+      },
+      py::arg("path"), py::arg("topic") = "",
+      "Opens a KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag "
+      "(SQLite or MCAP). topic: of a bag with several topics of scans. Raises DatasetError.");
+}
+
 }  // namespace
 
 void bind_dataset(py::module_& module) {
@@ -170,15 +182,7 @@ void bind_dataset(py::module_& module) {
       .def_property_readonly(
           "faults", [](const SharedRecording& shared) { return shared.recording.faults; },
           "What of a bag cannot be read at all, in words.");
-  module.def(
-      "open_dataset",
-      [](const std::filesystem::path& path, const std::string& topic) {
-        const py::gil_scoped_release released;
-        return std::make_unique<SharedRecording>(dds::open_recording(path, topic));
-      },
-      py::arg("path"), py::arg("topic") = "",
-      "Opens a KITTI sequence, a folder of .bin, .pcd or .ply files, one such file, or a ROS 2 bag "
-      "(SQLite or MCAP). topic: of a bag with several topics of scans. Raises DatasetError.");
+  bind_open_dataset(module);
 }
 
 py::tuple imu_arrays(const std::vector<ImuSample>& samples) {
