@@ -254,7 +254,8 @@ TEST(Bag, ADamagedPageLeavesTheOtherMessagesReadable) {
 TEST(Bag, AFileThatIsNamedByItselfNeedsNoMetadata) {
   const ScratchFolder folder;
   write_bag(folder / "bag", {bag_message(0), bag_message(1)});
-  folder.file("bag/metadata.yaml", "rosbag2_bagfile_information:\n  storage_identifier: [\n");
+  static_cast<void>(
+      folder.file("bag/metadata.yaml", "rosbag2_bagfile_information:\n  storage_identifier: [\n"));
   EXPECT_THAT(fault_of(folder / "bag"), HasSubstr("give the .db3 or .mcap file itself"));
   EXPECT_EQ(open_sequence(folder / "bag" / "bag_0.db3").size(), 2U);
 }
