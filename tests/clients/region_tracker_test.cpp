@@ -23,7 +23,9 @@ TileInfo info(TileId id, std::uint32_t voxels = 5, std::uint64_t revision = 1) {
 
 TileSet tiles(const dds::MapIdentity& map, const std::vector<TileId>& ids,
               const std::vector<TileId>& missing = {}) {
-  TileSet set{.map = map, .tiles = {}, .missing = missing};
+  TileSet set;
+  set.map = map;
+  set.missing = missing;
   for (const TileId id : ids) set.tiles.push_back({info(id), {}});
   return set;
 }
