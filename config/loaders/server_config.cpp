@@ -241,6 +241,7 @@ void read_map(YamlSection section, MapFileConfig& map) {
   section.integer("memory_limit_mib", map.memory_limit_mib, {0, 1 << 20});
   section.integer("standing_mib_per_hour", map.standing_mib_per_hour, {0, 1 << 20});
   section.boolean("load_at_start", map.load_at_start);
+  section.integer("withdrawable_sessions", map.withdrawable_sessions, {0, 1000});
   section.boolean("close_loops", map.close_loops);
   section.integer("saved_maps", map.saved_maps, {0, 100000});
   section.integer("saved_maps_mib", map.saved_maps_mib, {0, 1 << 30});

@@ -169,6 +169,9 @@ struct MapFileConfig {
   std::uint32_t standing_mib_per_hour = 3;
   /// Resume the map in `file` when it exists; else start empty.
   bool load_at_start = true;
+  /// So many of the newest runs that went on in the file's map can be withdrawn from it; 0: none,
+  /// and they are not listed.
+  std::uint32_t withdrawable_sessions = 2;
   /// Correct map and path where the robot comes back to a place of a map that this run began.
   bool close_loops = true;
   /// How many maps, and how many MiB of them, clients may have saved or kept beside `file`.

@@ -118,9 +118,7 @@ ClassEvidence LiveTile::evidence(std::uint32_t voxel_key) const {
   return position == PositionIndex::none ? ClassEvidence() : at(position).packed.evidence;
 }
 
-void LiveTile::enter_session(std::uint32_t session, std::uint32_t max_scans,
-                             const VisibilityRule& rule) {
-  if (std::exchange(session_, session) == session) return;
+void LiveTile::begin_session(std::uint32_t max_scans, const VisibilityRule& rule) {
   for (auto* const voxels : {&sorted_, &fresh_})
     for (LiveVoxel& voxel : *voxels) forget_beyond(voxel, max_scans, rule);
 }

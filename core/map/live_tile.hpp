@@ -64,10 +64,9 @@ class LiveTile {
   /// Restores a tile from its record; adds the stamps that its voxels name.
   LiveTile(TileId id, const TileRecord& record, const VoxelGrid& grid, ScanStamps& stamps);
 
-  /// What follows is of this session of the map: where the tile has evidence of an earlier one, it
-  /// counts as that of `max_scans` scans at most, for or against a voxel. What is shown does not
-  /// change by that.
-  void enter_session(std::uint32_t session, std::uint32_t max_scans, const VisibilityRule& rule);
+  /// What is known so far is of earlier sessions of the map: it counts as that of `max_scans` scans
+  /// at most, for or against a voxel. What is shown does not change by that.
+  void begin_session(std::uint32_t max_scans, const VisibilityRule& rule);
 
   /// Points in voxels beyond the first 16,777,215 of a tile are left out.
   void insert(std::span<const TilePoint> points, std::uint32_t scan);
@@ -181,7 +180,6 @@ class LiveTile {
 
   TileId id_;
   VoxelGrid grid_;
-  std::uint32_t session_ = 0;
   /// By key; no larger than what it holds.
   std::vector<LiveVoxel> sorted_;
   /// Those that came since the last publication, in no order.

@@ -113,9 +113,9 @@ struct StaticMap::State {
   /// Keeps the view of a scan that cleared.
   void keep(RangeImageView view, std::uint32_t scan);
   void forget_views();
-  void enter_session(LiveTile& tile) const {
-    if (session > 0) tile.enter_session(session, max_earlier_scans, rule());
-  }
+  /// To be called before these tiles change, null or not. A tile that was evicted and reloaded is
+  /// in the session as it was.
+  void enter_session(std::span<LiveTile* const> changing);
   /// Scans from a position reach tiles that are this near, with a margin of two tiles [m].
   /// Non-resident tiles with voxels that the correction may move.
   [[nodiscard]] std::set<TileId> to_reload(const MapCorrection& correction) const;
@@ -125,10 +125,10 @@ struct StaticMap::State {
   MapTiles tiles;
   ScanSorter sorter;
   bool is_frozen = false;
-  /// 0: the first one.
-  std::uint32_t session = 0;
-  /// What scans of earlier sessions count at most.
-  std::uint32_t max_earlier_scans = 0;
+  /// What scans of earlier sessions count at most; nothing in the first one.
+  std::optional<std::uint32_t> max_earlier_scans;
+  /// Tiles that the session has changed.
+  std::set<TileId> in_session;
   /// Scans so far.
   std::uint64_t inserted = 0;
   /// Views of the last scans that cleared, newest last, and the number of the newest one.
@@ -151,6 +151,15 @@ bool StaticMap::State::sees_through(const RangeImageView& view,
 std::uint32_t StaticMap::State::times_free(const Eigen::Vector3f& position_map) const {
   return static_cast<std::uint32_t>(std::ranges::count_if(
       past_views, [&](const RangeImageView& view) { return sees_through(view, position_map); }));
+}
+
+void StaticMap::State::enter_session(std::span<LiveTile* const> changing) {
+  if (!max_earlier_scans) return;
+  std::vector<LiveTile*> entering;
+  for (LiveTile* const tile : changing)
+    if (tile != nullptr && in_session.insert(tile->id()).second) entering.push_back(tile);
+  tbb::parallel_for(std::size_t{0}, entering.size(),
+                    [&](std::size_t i) { entering[i]->begin_session(*max_earlier_scans, rule()); });
 }
 
 void StaticMap::State::keep(RangeImageView view, std::uint32_t scan) {
@@ -179,11 +188,11 @@ void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_
   std::vector<LiveTile*> hit(batches.size());
   std::ranges::transform(batches, hit.begin(),
                          [&](const auto& batch) { return tiles.tile(batch.tile); });
+  state_->enter_session(hit);
   // A tile belongs to one task, which takes its points in the order of the scan: the map does not
   // depend on how many threads there are.
   tbb::parallel_for(std::size_t{0}, hit.size(), [&](std::size_t i) {
     if (hit[i] == nullptr) return;
-    state_->enter_session(*hit[i]);
     hit[i]->insert(batches[i].points, number);
   });
   tiles.begin_step();
@@ -194,8 +203,8 @@ void StaticMap::insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_
 }
 
 void StaticMap::begin_session(std::uint32_t max_scans) {
-  ++state_->session;
   state_->max_earlier_scans = max_scans;
+  state_->in_session.clear();
   state_->forget_views();
 }
 
@@ -217,8 +226,8 @@ void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns) {
       .times_free_before = [&](const Eigen::Vector3f& p_map) { return state_->times_free(p_map); },
       .last_scan_cleared = state_->last_scan_cleared};
   std::vector<std::uint8_t> hides(near.size());
+  state_->enter_session(near);
   tbb::parallel_for(std::size_t{0}, near.size(), [&](std::size_t i) {
-    state_->enter_session(*near[i]);
     hides[i] = near[i]->clear_seen_through(test, scan, state_->rule()) ? 1 : 0;
   });
   state_->keep(std::move(view), scan);
@@ -283,8 +292,11 @@ std::optional<CorrectedMap> StaticMap::correct(const MapCorrection& correction,
     targets.emplace_back(tiles.tile(id), &moved);
     changed.insert(id);
   }
+  std::vector<LiveTile*> changing(targets.size());
+  std::ranges::transform(targets, changing.begin(),
+                         [](const auto& target) { return target.first; });
+  state_->enter_session(changing);
   tbb::parallel_for(std::size_t{0}, targets.size(), [&](std::size_t i) {
-    state_->enter_session(*targets[i].first);
     mover.put(*targets[i].first, std::move(*targets[i].second));
   });
   tiles.begin_step();
@@ -308,7 +320,8 @@ void StaticMap::reset(std::uint64_t map_id) {
   state_->tiles.clear(map_id);
   state_->in_checkpoint.clear();
   state_->inserted = 0;
-  state_->session = 0;
+  state_->max_earlier_scans.reset();
+  state_->in_session.clear();
   state_->forget_views();
 }
 

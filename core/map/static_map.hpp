@@ -97,11 +97,14 @@ class StaticMap {
   /// `scan.motion` is as long as the scan. The result does not depend on the number of threads.
   void insert(const LabelledScan& scan, const Eigen::Isometry3d& T_map_lidar);
 
+  /// What scans of earlier sessions say of a place is worth that of two seconds: the rest would
+  /// outvote what is seen when passing by.
+  static constexpr std::uint32_t default_earlier_scans = 20;
   /// What follows is another session of this map. Scans of those before count as `max_scans` at
   /// most, for or against a voxel, so that what is gone goes, however often it was seen before;
   /// what is shown stays until a scan says otherwise. Tiles that no scan of the session reaches
   /// stay as they are.
-  void begin_session(std::uint32_t max_scans);
+  void begin_session(std::uint32_t max_scans = default_earlier_scans);
 
   /// Whether visibility clearing is due for the scan inserted last.
   [[nodiscard]] bool clearing_due() const;

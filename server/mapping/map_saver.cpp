@@ -50,6 +50,7 @@ MapSaver::MapSaver(const LatestMap& latest_map, Statistics& statistics, const fs
       folder_(file_, limits.saved_maps),
       metadata_(std::move(metadata)),
       memory_limit_bytes_(std::size_t{limits.memory_limit_mib} << 20),
+      session_(limits.session),
       standing_allowance_(std::uint64_t{limits.standing_mib_per_hour} << 20),
       clock_(clock) {
   // Opened at the start, so that a file that cannot be written is noticed before mapping begins.
@@ -63,7 +64,11 @@ MapSaver::MapSaver(const LatestMap& latest_map, Statistics& statistics, const fs
 
 MapStore& MapSaver::open_store() {
   if (misplaced_) bring_back();
-  if (!store_) store_ = open_map_file(file_);
+  if (store_) return *store_;
+  auto store = open_map_file(file_);
+  // What the run changes from here on is another session.
+  if (is_session_) store->begin_run(saved_map_id_, session_);
+  store_ = std::move(store);
   return *store_;
 }
 
@@ -77,7 +82,8 @@ std::optional<SavedMap> MapSaver::load(const std::function<void(const MapSnapsho
   if (!map.metadata.contains(map_ended_key) || map.view.map_id == 0) {
     map.view.map_id = new_map_id();
   }
-  store_->begin_run(map.view.map_id);
+  store_->begin_run(map.view.map_id, session_);
+  is_session_ = !map.view.tiles.empty();
   if (!map.view.tiles.empty()) remember_as_saved(map.view, latest_map_.poses_added());
   remember_metadata(map);
   return map;
@@ -284,9 +290,10 @@ fs::path MapSaver::resume_from(const std::string& name, const PrepareMap& prepar
     save(CheckpointScope::changed);
   }
   // The last step that can fail.
-  source.begin_run(map.view.map_id);
+  source.begin_run(map.view.map_id, session_);
   begin();
   tiles_ = tiles;
+  is_session_ = true;
   T_map_base_saved_.reset();
   if (!is_own) {
     // The datum of another map is that in its own file.
@@ -324,6 +331,7 @@ NewMap MapSaver::begin_anew(bool discard, const BeginMap& begin) {
   // Nothing from here on can fail.
   begin(begun.map_id, tiles);
   tiles_ = tiles;
+  is_session_ = false;
   saved_map_id_ = 0;
   stored_metadata_.clear();
   if (discard && !begun.kept_file.empty()) {
@@ -349,6 +357,7 @@ std::shared_ptr<MovableTileStore> MapSaver::put_aside(const fs::path& kept) {
   }
   try {
     replace_map_file(fresh, file_);
+    is_session_ = false;
     return tiles_of(open_store());
   } catch (const MapFileError&) {
     misplaced_ = kept;

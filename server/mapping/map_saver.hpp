@@ -106,6 +106,8 @@ struct MapSaverLimits {
   /// Written while the robot stands and its map hardly changes; 0: no limit.
   std::uint32_t standing_mib_per_hour = 0;
   SavedMapsLimit saved_maps = {};
+  /// How runs that resume a stored map are remembered in its file.
+  RunSession session = {};
 };
 
 /// Writes the map to its file, and with a memory limit keeps there what is not in memory. A file
@@ -209,6 +211,9 @@ class MapSaver {
   std::map<std::string, std::string> metadata_;
   std::map<std::string, std::string> stored_metadata_;
   std::size_t memory_limit_bytes_;
+  RunSession session_;
+  /// The running map is one that was stored before this run.
+  bool is_session_ = false;
   CheckpointSource* source_ = nullptr;
   std::mutex mutex_;
   std::unique_ptr<MapStore> store_;

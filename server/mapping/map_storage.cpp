@@ -46,7 +46,9 @@ MapStorage::MapStorage(const ServerConfig& config, const std::string& label_sour
              {.memory_limit_mib = config.map.memory_limit_mib,
               .standing_mib_per_hour = config.map.standing_mib_per_hour,
               .saved_maps = {.max_maps = config.map.saved_maps,
-                             .max_bytes = std::uintmax_t{config.map.saved_maps_mib} << 20}}),
+                             .max_bytes = std::uintmax_t{config.map.saved_maps_mib} << 20},
+              .session = {.source = "server " + config.topics.name_space,
+                          .withdrawable = config.map.withdrawable_sessions}}),
       loaded_(saved_map(saver_, config)),
       tiles_(saver_.tile_store(), tile_cache_bytes(config.map)) {}
 

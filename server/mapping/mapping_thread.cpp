@@ -126,6 +126,7 @@ StaticMap MappingThread::resumed(const SavedMap& stored,
                                  const std::shared_ptr<TileStore>& tile_store) const {
   StaticMap map(map_config_);
   map.resume(stored.view, stored.tile_evidence);
+  map.begin_session();
   map.use_tile_store(tile_store);
   const SharedTrajectory& path = stored.trajectory;
   const Eigen::Vector3d last_map =

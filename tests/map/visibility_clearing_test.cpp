@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 
 #include "core/lidar/range_image_view.hpp"
 #include "core/map/static_map.hpp"
+#include "core/map/storage/map_file.hpp"
 #include "tests/map/map_worlds.hpp"
 
 namespace stillmap {
@@ -219,6 +221,23 @@ TEST_F(VisibilityClearing, WhatIsGoneInAnotherSessionGoesHoweverOftenItWasSeen) 
   see(wall, 10);
   EXPECT_LT(shown(fence), before / 10);
   EXPECT_GT(shown(building), 100);
+}
+
+TEST_F(VisibilityClearing, WhatASessionSawKeepsItsWeightWhereItsTileWasEvicted) {
+  const std::unique_ptr<MapStore> store = open_scratch_map();
+  map_.reset(7);
+  map_.use_tile_store(store->tile_store());
+  see(ghost, 2);
+  map_.begin_session(20);
+  see(ghost, 300);
+  const int before = shown(fence);
+  const MapCheckpoint checkpoint = map_.checkpoint();
+  store->save(to_saved_map(checkpoint));
+  map_.checkpoint_stored(checkpoint.step);
+  map_.evict({2000.0, 0.0, 0.0}, 8);
+  ASSERT_EQ(map_.memory_use().resident_tiles, 0U);
+  see(wall, 10);
+  EXPECT_EQ(shown(fence), before);
 }
 
 TEST_F(VisibilityClearing, WhatIsThereInAnotherSessionAppearsHoweverOftenItWasNot) {

@@ -42,7 +42,8 @@ class SavingProcess : public CheckpointSource {
   SavingProcess(const fs::path& file, std::int64_t first_ns, int reports)
       : saver_(latest_map_, statistics_, file, {{"sensor", "test"}},
                {.memory_limit_mib = 64,
-                .saved_maps = {.max_maps = 100'000, .max_bytes = std::uintmax_t{1} << 40}}),
+                .saved_maps = {.max_maps = 100'000, .max_bytes = std::uintmax_t{1} << 40},
+                .session = {.source = "test", .withdrawable = 2}}),
         next_ns_(first_ns),
         reports_(reports),
         random_(std::random_device{}()) {
@@ -155,7 +156,8 @@ enum class Begins { anew, stored };
 class OneVoxel : public CheckpointSource {
  public:
   explicit OneVoxel(const fs::path& file, Begins begins = Begins::anew)
-      : saver_(latest_map_, statistics_, file, {}, {.memory_limit_mib = 64}) {
+      : saver_(latest_map_, statistics_, file, {},
+               {.memory_limit_mib = 64, .session = {.source = "test", .withdrawable = 2}}) {
     saver_.set_source(*this);
     if (begins == Begins::stored) {
       resume(*saver_.load(), saver_.tile_store());

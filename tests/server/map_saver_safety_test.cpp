@@ -53,7 +53,11 @@ class MapSaverSafetyTest : public testing::Test {
     latest_map_.add_pose({.stamp_ns = static_cast<std::int64_t>(x)}, OdometryHealth::good, "none");
   }
   [[nodiscard]] MapSaver saver(const SavedMapsLimit& limit = {}) {
-    return {latest_map_, statistics_, file_, {{"sensor", "vlp_16"}}, {.saved_maps = limit}};
+    return {latest_map_,
+            statistics_,
+            file_,
+            {{"sensor", "vlp_16"}},
+            {.saved_maps = limit, .session = {.source = "test", .withdrawable = 2}}};
   }
   /// A map of one voxel 50 m away, as `name` in the folder.
   void save_far_map(const std::string& name) const {

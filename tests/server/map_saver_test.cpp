@@ -307,7 +307,9 @@ class StandingRobot : public MapSaverTest {
                   statistics_,
                   file_,
                   {},
-                  {.memory_limit_mib = paged_limit_mib, .standing_mib_per_hour = mib_per_hour},
+                  {.memory_limit_mib = paged_limit_mib,
+                   .standing_mib_per_hour = mib_per_hour,
+                   .session = {.source = "test", .withdrawable = 2}},
                   clock_};
 };
 

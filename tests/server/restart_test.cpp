@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "core/map/storage/map_file.hpp"
+#include "core/map/storage/map_sessions.hpp"
 #include "tests/idl/vendor_participant.hpp"
 #include "tests/server/room_scans.hpp"
 #include "tests/server/server_process.hpp"
@@ -57,6 +58,33 @@ TEST(Restart, GoesOnWithMapAndPath) {
   const Eigen::Vector3d step = stored.trajectory[8].T_map_lidar.translation() -
                                stored.trajectory[7].T_map_lidar.translation();
   EXPECT_LT(step.norm(), 0.5);
+}
+
+TEST(Restart, EachRunIsASessionThatCanBeWithdrawn) {
+  const ServiceSetup setup("every");
+  run_server(setup, 0, 8, terminate);
+  const SavedMap first = open_map_file(setup.map_file())->load();
+  run_server(setup, 8, 14, [](ServerProcess& server, Client& client) {
+    client.save_map();
+    terminate(server, client);
+  });
+  const std::vector<MapSession> sessions = read_map_sessions(setup.map_file());
+  ASSERT_EQ(sessions.size(), 2U);
+  EXPECT_EQ(sessions[0].poses, 8U);
+  EXPECT_EQ(sessions[1].poses, 6U);
+  EXPECT_THAT(sessions[1].source, testing::StartsWith("server "));
+
+  const ScratchFolder folder;
+  withdraw_newest_session(setup.map_file(), folder / "first.stillmap");
+  const SavedMap again = open_map_file(folder / "first.stillmap")->load();
+  EXPECT_EQ(again.view.version, first.view.version);
+  EXPECT_TRUE(first.metadata.contains(map_ended_key));
+  EXPECT_FALSE(again.metadata.contains(map_ended_key)) << "or versions would be given twice";
+  EXPECT_EQ(again.trajectory.size(), 8U);
+  ASSERT_EQ(again.view.tiles.size(), first.view.tiles.size());
+  for (std::size_t i = 0; i < first.view.tiles.size(); ++i) {
+    EXPECT_EQ(again.view.tiles[i]->info.content_hash, first.view.tiles[i]->info.content_hash);
+  }
 }
 
 /// Scans of the room with another clock.

@@ -113,12 +113,12 @@ void add_sessions_command(CommandHandle program, Action& action) {
       "Examples:\n"
       "  stillmap sessions both/map.stillmap\n"
       "  stillmap sessions both/map.stillmap --withdraw 2 --out monday_again.stillmap\n"
-      "A session is a drive that 'stillmap map --onto' put onto a map, or a map that 'stillmap\n"
-      "merge' did. The file keeps the tiles that a session changed as they were: without it the "
-      "map\n"
-      "is again what it was, to the last voxel. Only the newest session can be withdrawn, then "
-      "the\n"
-      "one before it; not after a server went on mapping in the file.");
+      "A session is a drive that 'stillmap map --onto' put onto a map, a map that\n"
+      "'stillmap merge' did, or a run of a server that went on in the file. The file keeps the\n"
+      "tiles that a session changed as they were: without it the map is again what it was, to the\n"
+      "last voxel. Only the newest session can be withdrawn, then the one before it; of servers'\n"
+      "runs, the newest two (map.withdrawable_sessions). To undo what a server mapped, stop it,\n"
+      "withdraw the session, and start the server with the file that --out names.");
   command.on_chosen([arguments, &action] { action = [arguments] { return run(*arguments); }; });
 }
 

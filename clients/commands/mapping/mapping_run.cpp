@@ -158,9 +158,6 @@ class MappingRun {
   /// Finds the drive in the earlier map and adds its scans there. False where it was stopped.
   /// Throws MapNotRecognized.
   [[nodiscard]] bool put_onto_earlier_map() {
-    // What earlier scans say of a place is worth that of two seconds: the rest would outvote what
-    // is seen when passing by.
-    constexpr std::uint32_t max_earlier_scans = 20;
     const auto began = std::chrono::steady_clock::now();
     SessionReport session;
     session.alignment = loops_->align(earlier_map_->index(), T_body_lidar_.linear());
@@ -175,7 +172,7 @@ class MappingRun {
       session.clock_offset_ns = earlier_map_->clock_offset_ns(result_.trajectory.front().stamp_ns);
     StaticMap map(mapper_.static_map().config());
     map.resume(earlier_map_->saved().view, earlier_map_->saved().tile_evidence);
-    map.begin_session(max_earlier_scans);
+    map.begin_session();
     if (!move_scans(session.alignment.T_map_lidar, session.clock_offset_ns, std::move(map)))
       return false;
     session.seconds =

@@ -19,6 +19,7 @@
 #include "core/map/storage/map_database.hpp"
 #include "core/map/storage/map_tables.hpp"
 #include "core/map/storage/save_marks.hpp"
+#include "core/map/storage/session_tables.hpp"
 #include "core/map/storage/tile_codec.hpp"
 
 namespace stillmap {
@@ -123,21 +124,10 @@ class SqliteMapStore : public MapStore {
     writing([&] {
       if (has_first_schema(database_)) upgrade_schema(database_);
       index_tile_infos(database_);
-      forget_if_changed_by_others();
-      if (!saved_trajectory_) saved_trajectory_ = read_trajectory(database_);
+      read_what_is_saved();
       if (!log_is_empty_) empty_log("PASSIVE");
       if (!saved_tiles_) saved_tiles_ = read_tile_infos(database_);
-      const TileTable tiles = tiles_after(map);
-      SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
-      const bool is_another_map = read_map_row(database_).map_id != map.view.map_id;
-      write_tiles(database_, *saved_tiles_, tiles, map.tile_evidence);
-      write_tile_evidence(database_, map.tile_evidence, is_another_map);
-      write_trajectory(database_, map.trajectory,
-                       SharedTrajectory::common_poses(*saved_trajectory_, map.trajectory));
-      write_metadata(database_, map);
-      commit(transaction);
-      saved_trajectory_ = map.trajectory;
-      saved_tiles_ = tiles;
+      write_with_session(map, tiles_after(map));
       std::error_code no_log;
       log_bytes = fs::file_size(beside(file_, "-wal"), no_log);
       if (no_log) log_bytes = 0;
@@ -179,9 +169,10 @@ class SqliteMapStore : public MapStore {
     return std::make_shared<SqliteTileStore>(file_, folder_);
   }
 
-  void begin_run(std::uint64_t map_id) override {
+  void begin_run(std::uint64_t map_id, const RunSession& said) override {
     writing([&] {
       if (!log_is_empty_) empty_log("PASSIVE");
+      std::optional<GrowingSession> session = session_of_run(said);
       SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
       SQLite::Statement rename(database_, "UPDATE map SET map_id = ?");
       rename.bind(1, static_cast<std::int64_t>(map_id));
@@ -190,6 +181,7 @@ class SqliteMapStore : public MapStore {
       reopen.bind(1, map_ended_key);
       reopen.exec();
       commit(transaction);
+      session_ = std::move(session);
       empty_log("TRUNCATE");
     });
   }
@@ -234,6 +226,60 @@ class SqliteMapStore : public MapStore {
     const int result = SQLite::Backup(target, database_).executeStep(-1);
     // Busy and locked are no exceptions: nothing is copied then.
     if (result != SQLITE_DONE) throw SQLite::Exception(sqlite3_errstr(result), result);
+  }
+
+  /// Nothing where there is no map yet, and where sessions cannot be read: the map can.
+  std::optional<GrowingSession> session_of_run(const RunSession& said) {
+    if (said.withdrawable == 0 || !holds_map()) return std::nullopt;
+    try {
+      read_what_is_saved();
+      return GrowingSession(database_, *saved_trajectory_, said);
+    } catch (const SQLite::Exception&) {
+      if (said.is_required) throw;
+      return std::nullopt;
+    }
+  }
+
+  void read_what_is_saved() {
+    forget_if_changed_by_others();
+    if (!saved_trajectory_) saved_trajectory_ = read_trajectory(database_);
+  }
+
+  /// A fault of the session's tables, or no room for its tiles, costs the session and not the map.
+  void write_with_session(const SavedMap& map, const TileTable& tiles) {
+    try {
+      write(map, tiles);
+    } catch (const SQLite::Exception&) {
+      if (!session_ || session_->is_required()) throw;
+      std::optional<GrowingSession> session = std::exchange(session_, std::nullopt);
+      try {
+        write(map, tiles);
+      } catch (...) {
+        // It was not the session's fault.
+        session_ = std::move(session);
+        throw;
+      }
+    }
+  }
+
+  void write(const SavedMap& map, const TileTable& tiles) {
+    SQLite::Transaction transaction(database_, SQLite::TransactionBehavior::IMMEDIATE);
+    const bool is_another_map = read_map_row(database_).map_id != map.view.map_id;
+    // Of another map, the run and its session are none.
+    if (is_another_map) session_.reset();
+    const bool is_of_session = session_ && (!map.tile_evidence.empty() ||
+                                            map.trajectory.size() != saved_trajectory_->size());
+    if (is_of_session) session_->keep_before(database_, map);
+    write_tiles(database_, *saved_tiles_, tiles, map.tile_evidence);
+    write_tile_evidence(database_, map.tile_evidence, is_another_map);
+    write_trajectory(database_, map.trajectory,
+                     SharedTrajectory::common_poses(*saved_trajectory_, map.trajectory));
+    write_metadata(database_, map);
+    if (is_of_session) session_->update(database_, map);
+    commit(transaction);
+    if (is_of_session) session_->committed();
+    saved_trajectory_ = map.trajectory;
+    saved_tiles_ = tiles;
   }
 
   void commit(SQLite::Transaction& transaction) {
@@ -304,6 +350,8 @@ class SqliteMapStore : public MapStore {
   /// What is stored, once it was read: a save looks at what differs from it.
   std::optional<SharedTrajectory> saved_trajectory_;
   std::optional<TileTable> saved_tiles_;
+  /// Of a run that resumed the map.
+  std::optional<GrowingSession> session_;
   /// SQLite's, of that time: it changes with what other connections write.
   std::int64_t data_version_ = -1;
   bool log_is_empty_ = false;

@@ -50,6 +50,19 @@ struct SavedMap {
   bool is_partial = false;
 };
 
+/// How a run that goes on in a stored map is remembered in its file (MapSession).
+struct RunSession {
+  /// Who maps, or what.
+  std::string source;
+  std::int64_t clock_offset_ns = 0;
+  std::size_t closures = 0;
+  /// The file keeps the tiles that so many of its newest sessions changed, this one included, as
+  /// they were, so that they can be withdrawn. 0: the run is no session of its own.
+  std::size_t withdrawable = 0;
+  /// Where the session cannot be kept, nothing is saved; else the map is, without it.
+  bool is_required = false;
+};
+
 /// A checkpoint as it is stored.
 [[nodiscard]] SavedMap to_saved_map(const MapCheckpoint& checkpoint);
 
@@ -72,8 +85,8 @@ class MapStore {
   /// Reads single tiles; may be used beside the store, and after it.
   [[nodiscard]] virtual std::shared_ptr<TileStore> tile_store() = 0;
   /// Mapping resumes from the stored map: sets its id and removes the mark of an ended run, in one
-  /// transaction.
-  virtual void begin_run(std::uint64_t map_id) = 0;
+  /// transaction. The saves that follow are this session of the map.
+  virtual void begin_run(std::uint64_t map_id, const RunSession& session) = 0;
   /// Whether a save or a run left any tile or pose in it.
   [[nodiscard]] virtual bool holds_map() = 0;
   /// All that was saved is in the file itself, none of it in its log: then the file may be renamed

@@ -14,7 +14,7 @@ namespace stillmap {
 struct MapSession {
   /// From 1.
   int number = 0;
-  /// What was mapped; empty where the file does not say.
+  /// What was mapped, or the server that did; empty where the file does not say.
   std::string source;
   /// Its poses in the map's path.
   std::size_t first_pose = 0;
@@ -40,13 +40,15 @@ void write_first_session(const std::filesystem::path& file, const std::string& s
 /// Saves another session into a map file: `after` is partial, with the tiles that it changed, the
 /// path of all sessions, and an id of its own. The tiles are kept as they were, so that the session
 /// can be withdrawn; other tiles are not touched. Of `session` what the path does not say is taken:
-/// source, clock offset, closures. Throws MapFileError; the file may then hold a part of it.
+/// source, clock offset, closures. Throws MapFileError; the file then has the map of before under
+/// the new id, or the session whole.
 void add_map_session(const std::filesystem::path& file, const SavedMap& after,
                      const MapSession& session);
 
 /// Writes the map as it was before its newest session, to the byte in every tile, to another file,
 /// which is replaced in one step. `file` stays as it is. Throws MapFileError where there is only
-/// one session, or the map was changed since by something else.
+/// one session, where the file does not keep the tiles of before any more, or the map was changed
+/// since by something else.
 void withdraw_newest_session(const std::filesystem::path& file, const std::filesystem::path& out);
 
 }  // namespace stillmap

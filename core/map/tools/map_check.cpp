@@ -255,7 +255,7 @@ void check_tile_evidence(SQLite::Database& database, const MapRow& map, MapCheck
   }
 }
 
-/// Tiles as they were before the newest session, which may be withdrawn.
+/// Tiles as they were before a session that may be withdrawn.
 void check_session_tiles(SQLite::Database& database, const MapRow& map, MapCheck& check) {
   if (!database.tableExists("session_tiles")) return;
   MapCheck of_session;
@@ -273,7 +273,7 @@ void check_session_tiles(SQLite::Database& database, const MapRow& map, MapCheck
                    row.getColumn(6).getInt64(), map, of_session);
   }
   for (MapFault& fault : of_session.faults) {
-    fault.what = "as it was before the newest session: " + fault.what;
+    fault.what = "as it was before a session: " + fault.what;
     check.faults.push_back(std::move(fault));
   }
 }
