@@ -93,6 +93,14 @@ void add_summary_record(Contents& contents, Counted& counted, Opcode opcode,
   }
 }
 
+/// Whether all messages are counted by channel, too: an empty list says that they are not.
+bool counts_channels(const Statistics& statistics) {
+  const auto& counts = statistics.channel_messages;
+  return std::accumulate(counts.begin(), counts.end(), std::uint64_t{0},
+                         [](std::uint64_t sum, const auto& count) { return sum + count.second; }) ==
+         statistics.messages;
+}
+
 bool has_all_schemas(const Contents& contents) {
   return std::ranges::all_of(contents.channels, [&](const auto& channel) {
     return channel.second.schema_id == 0 || contents.schemas.contains(channel.second.schema_id);
@@ -267,6 +275,7 @@ std::optional<Contents> read_summary(const InputFile& file) {
   }
   // Writers may leave indexes, statistics and definitions out.
   if (!counted.statistics || counted.statistics->messages != counted.indexed ||
+      !counts_channels(*counted.statistics) ||
       counted.statistics->channels > contents.channels.size() || !has_all_schemas(contents)) {
     return std::nullopt;
   }

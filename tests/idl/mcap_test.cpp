@@ -116,6 +116,37 @@ TEST_P(Mcap, AFileWithoutSummaryIsReadToItsLastChunk) {
   EXPECT_EQ(messages_of(cut, "/imu/data"), messages_of(whole, "/imu/data"));
 }
 
+/// Has the file's statistics count no channel's messages, as some recorders' do not.
+void forget_channel_counts(const fs::path& file) {
+  std::string bytes = content_of(file);
+  const InputFile input(file);
+  std::size_t offset =
+      mcap::parse_footer(input.read(input.size() - 8 - mcap::footer_bytes, 20)).summary_start;
+  const auto head_at = [&](std::size_t at) {
+    return mcap::parse_record_head(input.read(at, mcap::record_head_bytes));
+  };
+  while (head_at(offset).opcode != mcap::Opcode::statistics)
+    offset += mcap::record_head_bytes + head_at(offset).length;
+  // The list comes after three numbers of 64 bits, four of 32 and one of 16; the summary's CRC
+  // before the magic number.
+  bytes.replace(offset + mcap::record_head_bytes + 42, 4, 4, '\0');
+  bytes.replace(bytes.size() - 8 - 4, 4, 4, '\0');
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+TEST_P(Mcap, AFileThatCountsNoChannelsMessagesHasThemAll) {
+  write_drive(folder_ / "bag", GetParam(), 5);
+  const fs::path file = folder_ / "bag" / "bag_0.mcap";
+  const auto points = messages_of(McapBagFile(file), "/points");
+  forget_channel_counts(file);
+  ASSERT_FALSE(mcap::read_summary(InputFile(file)));
+  const McapBagFile uncounted(file);
+  ASSERT_EQ(uncounted.topics().size(), 2U);
+  EXPECT_EQ(uncounted.topics()[0].messages, 5U);
+  EXPECT_EQ(uncounted.topics()[1].messages, 15U);
+  EXPECT_EQ(messages_of(uncounted, "/points"), points);
+}
+
 /// Every message that can be read is one that was written.
 void expect_only_sound_messages(const fs::path& file, const std::set<Bytes>& written) {
   try {
