@@ -54,35 +54,41 @@ export function planOnGrid({ info, data }, from, to) {
   if (goal === undefined) return { fault: "the goal is outside of the known area" };
   if (start === undefined) return { fault: "the robot is outside of the known area" };
   if (!isFree(goal)) return { fault: costs[goal] === unknown ? "the goal is unknown ground" : "the goal is blocked" };
-  const lengths = new Map([[start, 0]]);
-  const before = new Map();
+  const lengths = new Float64Array(width * height).fill(Infinity);
+  lengths[start] = 0;
+  const before = new Int32Array(width * height).fill(-1);
+  const done = new Uint8Array(width * height);
   const left = (cell) => Math.hypot(cell % width - goal % width, Math.floor(cell / width) - Math.floor(goal / width));
-  const done = new Set();
   const queue = new Queue();
   queue.push(left(start), start);
-  while (queue.size > 0 && done.size < maxVisited) {
+  let visited = 0;
+  while (queue.size > 0 && visited < maxVisited) {
     const cell = queue.pop();
-    if (done.has(cell)) continue;
+    if (done[cell]) continue;
     if (cell === goal) return { path: pathTo(goal, before, { width, resolution, originX, originY }) };
-    done.add(cell);
+    done[cell] = 1;
+    ++visited;
     const x = cell % width;
     const y = (cell - x) / width;
     for (const [dx, dy] of neighbours) {
       const next = cell + dy * width + dx;
-      if (!isInside(x + dx, y + dy) || done.has(next) || !isFree(next)) continue;
-      const length = lengths.get(cell) + Math.hypot(dx, dy) * (1 + costWeight * costs[next] / 98);
-      if (length >= (lengths.get(next) ?? Infinity)) continue;
-      lengths.set(next, length);
-      before.set(next, cell);
+      if (!isInside(x + dx, y + dy) || done[next] || !isFree(next)) continue;
+      const length = lengths[cell] + Math.hypot(dx, dy) * (1 + costWeight * costs[next] / 98);
+      if (length >= lengths[next]) continue;
+      lengths[next] = length;
+      before[next] = cell;
       queue.push(length + left(next), next);
     }
+  }
+  if (queue.size > 0) {
+    return { fault: `no way was found in the ${maxVisited / 1e6} million cells that a browser looks at: set a nearer goal, or ask 'stillmap plan'` };
   }
   return { fault: "no free way leads there" };
 }
 
 function pathTo(goal, before, { width, resolution, originX, originY }) {
   const path = [];
-  for (let cell = goal; cell !== undefined; cell = before.get(cell)) {
+  for (let cell = goal; cell >= 0; cell = before[cell]) {
     path.push([originX + (cell % width + 0.5) * resolution, originY + (Math.floor(cell / width) + 0.5) * resolution]);
   }
   return path.reverse();
