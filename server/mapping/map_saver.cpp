@@ -17,6 +17,9 @@ constexpr std::size_t recent_saves = 10;
 /// The next save may take so many times the longest of them.
 constexpr double duration_margin = 1.5;
 
+/// Between saves is at least this part of the last one's duration.
+constexpr int pause_divisor = 10;
+
 /// A robot that has gone no farther stands [m], [rad].
 constexpr double standing_distance_m = 0.5;
 constexpr double standing_angle_rad = 0.2;
@@ -434,10 +437,14 @@ MonotonicClock::TimePoint CheckpointWorker::save_and_schedule() {
   } catch (const MapFileError& error) {
     throttled_log_.error("save", std::string("the map was not saved: ") + error.what());
   }
-  durations_.emplace_back(clock_.now() - began);
+  const auto ended = clock_.now();
+  durations_.emplace_back(ended - began);
   if (durations_.size() > recent_saves) durations_.pop_front();
   const auto due = due_after_begin(period_, *std::ranges::max_element(durations_));
-  return began + std::chrono::duration_cast<std::chrono::steady_clock::duration>(due);
+  // A mutex is not fair: without a pause, what clients ask of the saver would wait as long as saves
+  // take longer than the period.
+  return std::max(began + std::chrono::duration_cast<MonotonicClock::TimePoint::duration>(due),
+                  ended + (ended - began) / pause_divisor);
 }
 
 }  // namespace stillmap::server

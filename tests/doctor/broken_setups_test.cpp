@@ -138,8 +138,11 @@ TEST_F(BrokenSetup, WithTheServerInAnotherDomain) {
   start_server();
   const int servers_domain = domain_;
   domain_ = free_domain();
+  // The doctor of another test may be there for a moment, looking for servers as this one does.
+  const std::string here = " in domain " + std::to_string(domain_);
   EXPECT_THAT(problems(),
-              Contains(AllOf(field("what", "nobody else is in domain"),
+              Contains(AllOf(AnyOf(field("what", "nobody else is" + here),
+                                   field("what", "no server 'stillmap'" + here)),
                              field("evidence", "domain " + std::to_string(servers_domain)))));
 }
 

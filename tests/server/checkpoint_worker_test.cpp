@@ -50,6 +50,18 @@ TEST(CheckpointWorker, SchedulesByTheLongestOfTheLastSaves) {
   EXPECT_NEAR(pause->count(), 2.0, 1e-6);
 }
 
+TEST(CheckpointWorker, LetsOthersHaveTheirTurnWhereSavesTakeLongerThanThePeriod) {
+  test::ManualClock clock;
+  const CheckpointWorker worker(
+      Seconds(1.0), [&] { clock.advance(Seconds(4.0)); }, clock);
+  for (int save = 0; save < 3; ++save) {
+    const auto pause = clock.wait_for_sleeper();
+    ASSERT_TRUE(pause);
+    EXPECT_NEAR(pause->count(), 0.4, 1e-6);
+    clock.advance(*pause);
+  }
+}
+
 TEST(CheckpointWorker, GoesOnAfterAFailureAndStopsAtOnceWhileItWaits) {
   test::ManualClock clock;
   int saves = 0;
