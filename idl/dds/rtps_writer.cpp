@@ -52,7 +52,7 @@ void RtpsWriterListener::release() {
   for (const SequenceNumber_t& number : std::exchange(put_off_, {})) {
     CacheChange_t* change = nullptr;
     if (history.get_change(number, writer_.getGuid(), &change)) {
-      inner_->onWriterChangeReceivedByAll(&writer_, change);
+      inner_.load()->onWriterChangeReceivedByAll(&writer_, change);
     }
   }
 }
@@ -64,35 +64,36 @@ void RtpsWriterListener::onWriterChangeReceivedByAll(RTPSWriter* writer, CacheCh
   if (waits_to_be_sent || change->kind != ChangeKind_t::ALIVE) {
     put_off_.push_back(change->sequenceNumber);
   } else {
-    inner_->onWriterChangeReceivedByAll(writer, change);
+    inner_.load()->onWriterChangeReceivedByAll(writer, change);
   }
 }
 
 void RtpsWriterListener::onWriterMatched(RTPSWriter* writer, MatchingInfo& info) {
   reader_changed_(info.remoteEndpointGuid, info.status == MATCHED_MATCHING);
-  inner_->onWriterMatched(writer, info);
+  inner_.load()->onWriterMatched(writer, info);
 }
 
 void RtpsWriterListener::onWriterMatched(
     RTPSWriter* writer, const eprosima::fastdds::dds::PublicationMatchedStatus& info) {
-  inner_->onWriterMatched(writer, info);
+  inner_.load()->onWriterMatched(writer, info);
 }
 
 void RtpsWriterListener::on_offered_incompatible_qos(RTPSWriter* writer,
                                                      eprosima::fastdds::dds::PolicyMask qos) {
-  inner_->on_offered_incompatible_qos(writer, qos);
+  inner_.load()->on_offered_incompatible_qos(writer, qos);
 }
 
 void RtpsWriterListener::on_liveliness_lost(
     RTPSWriter* writer, const eprosima::fastrtps::LivelinessLostStatus& status) {
-  inner_->on_liveliness_lost(writer, status);
+  inner_.load()->on_liveliness_lost(writer, status);
 }
 
 void RtpsWriterListener::on_reader_discovery(RTPSWriter* writer,
                                              ReaderDiscoveryInfo::DISCOVERY_STATUS reason,
                                              const GUID& reader,
                                              const ReaderProxyData* reader_info) {
-  inner_->on_reader_discovery(writer, reason, reader, reader_info);
+  WriterListener* const inner = inner_.load();
+  if (inner != nullptr) inner->on_reader_discovery(writer, reason, reader, reader_info);
 }
 
 }  // namespace stillmap::dds

@@ -4,6 +4,7 @@
 #include <fastdds/rtps/common/SequenceNumber.h>
 #include <fastdds/rtps/writer/WriterListener.h>
 
+#include <atomic>
 #include <functional>
 #include <vector>
 
@@ -57,7 +58,8 @@ class RtpsWriterListener : public eprosima::fastrtps::rtps::WriterListener {
 
   RTPSWriter& writer_;
   ReaderCallback reader_changed_;
-  eprosima::fastrtps::rtps::WriterListener* inner_;
+  /// Fast DDS calls `on_reader_discovery` without the writer's mutex, under which it is set.
+  std::atomic<eprosima::fastrtps::rtps::WriterListener*> inner_ = nullptr;
   /// Samples of which `inner_` has not been told; guarded by the writer's mutex.
   std::vector<eprosima::fastrtps::rtps::SequenceNumber_t> put_off_;
 };
