@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/frames/rigid_motion.hpp"
 #include "core/lidar/rings.hpp"
 #include "core/map/voxel_grid.hpp"
 
@@ -126,10 +127,7 @@ std::optional<Eigen::Isometry3d> Mapper::in_odometry_frame(
 
 void Mapper::move_to_map(OdometryResult& result) const {
   result.T_map_lidar = T_map_odom_ * result.T_map_lidar;
-  Eigen::Matrix<double, 6, 6> turn = Eigen::Matrix<double, 6, 6>::Zero();
-  turn.topLeftCorner<3, 3>() = T_map_odom_.linear();
-  turn.bottomRightCorner<3, 3>() = T_map_odom_.linear();
-  result.covariance = turn * result.covariance * turn.transpose();
+  result.covariance = turned_covariance(result.covariance, T_map_odom_.linear());
 }
 
 void Mapper::take_back_static_map(const MapCorrection* correction) {
@@ -160,7 +158,7 @@ std::optional<Eigen::Isometry3d> Mapper::levelled(
   const auto up_lidar =
       inertial_.up_lidar(stamp_ns + std::llround((sweep.middle_s + 0.5 * sweep.duration_s) * 1e9));
   if (!up_lidar) return std::nullopt;
-  return Eigen::Isometry3d(Eigen::Quaterniond::FromTwoVectors(*up_lidar, Eigen::Vector3d::UnitZ()));
+  return Eigen::Isometry3d(levelling_rotation(*up_lidar));
 }
 
 void Mapper::teach_inertial(std::int64_t middle_ns, const Odometry::Step& step) {

@@ -9,6 +9,9 @@ namespace stillmap {
 [[nodiscard]] Eigen::Isometry3d from_xyz_rpy(const Eigen::Vector3d& translation_m,
                                              const Eigen::Vector3d& roll_pitch_yaw);
 
+/// R_level_body: the least turn that has `up_body`, a unit vector, point along z.
+[[nodiscard]] Eigen::Matrix3d levelling_rotation(const Eigen::Vector3d& up_body);
+
 /// The same motion of a rigid body as seen by another frame on it: `T_b_before_after` of frame b
 /// as that of frame a.
 [[nodiscard]] Eigen::Isometry3d motion_of_frame(const Eigen::Isometry3d& T_a_b,
@@ -20,7 +23,8 @@ namespace stillmap {
     const Eigen::Matrix<double, 6, 6>& covariance_a, const Eigen::Isometry3d& T_map_a,
     const Eigen::Isometry3d& T_a_b);
 
-/// A covariance of (translation, rotation) along the axes of frame b, along those of frame a.
+/// A covariance of (translation, rotation), or its inverse, along the axes of frame b, along those
+/// of frame a.
 [[nodiscard]] Eigen::Matrix<double, 6, 6> turned_covariance(
     const Eigen::Matrix<double, 6, 6>& covariance_b, const Eigen::Matrix3d& R_a_b);
 

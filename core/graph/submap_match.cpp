@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/frames/rigid_motion.hpp"
 #include "core/graph/submap_registration.hpp"
 #include "core/odometry/se3.hpp"
 
@@ -35,13 +36,6 @@ std::string fault_of(const OdometryResult& found, const SubmapMatchConfig& confi
   if (found.fit < config.min_fit || found.upright_fit < config.min_upright_fit)
     return "the submaps do not fit";
   return "";
-}
-
-Matrix6d along_key_axes(const Matrix6d& information, const Submap& submap) {
-  const Eigen::Matrix3d R = submap.T_submap_key.linear().transpose();
-  Matrix6d turn = Matrix6d::Zero();
-  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = R;
-  return turn * information * turn.transpose();
 }
 
 }  // namespace
@@ -94,7 +88,8 @@ std::optional<SubmapMatch> match_submaps(const PlacedSubmap& a, const PlacedSubm
         other.upright_fit > found.upright_fit - config.min_fit_margin)
       match.refusal = "another place fits nearly as well";
   }
-  match.key_information = along_key_axes(edge_information(found), b.submap);
+  match.key_information =
+      turned_covariance(edge_information(found), b.submap.T_submap_key.linear().transpose());
   return match;
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <vector>
 
+#include "core/frames/rigid_motion.hpp"
+
 namespace stillmap {
 namespace {
 
@@ -71,11 +73,9 @@ OdometryResult SubmapTarget::register_submap(const Submap& source,
 
 Matrix6d edge_information(const OdometryResult& registration) {
   // The covariance is along the target's axes, an edge's along those of the source.
-  const Eigen::Matrix3d R = registration.T_map_lidar.linear().transpose();
-  Matrix6d turn = Matrix6d::Zero();
-  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = R;
   Matrix6d covariance =
-      residuals_per_independent_one * turn * registration.covariance * turn.transpose();
+      residuals_per_independent_one *
+      turned_covariance(registration.covariance, registration.T_map_lidar.linear().transpose());
   covariance.diagonal().head<3>().array() += floor_translation_m * floor_translation_m;
   covariance.diagonal().tail<3>().array() += floor_rotation_rad * floor_rotation_rad;
   const Matrix6d information = covariance.ldlt().solve(Matrix6d::Identity());

@@ -5,6 +5,7 @@
 #include <numbers>
 #include <optional>
 
+#include "core/frames/rigid_motion.hpp"
 #include "core/localization/level_plane.hpp"
 #include "core/odometry/features.hpp"
 
@@ -62,7 +63,7 @@ Eigen::Isometry3d foot_of(const LevelPlane& ground_upright) {
   const Eigen::Vector3d up =
       Eigen::Vector3d(-ground_upright.slope.x(), -ground_upright.slope.y(), 1.0).normalized();
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  T.linear() = levelling_rotation(up);
   T.translation().z() = -ground_upright.height_m * up.z();
   return T;
 }

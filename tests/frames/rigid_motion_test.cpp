@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
+#include <random>
 
 #include "core/odometry/se3.hpp"
 
@@ -59,6 +61,37 @@ TEST(CovarianceOfFrame, IsTheSameForTheSameFrame) {
   EXPECT_EQ(covariance_of_frame(covariance, from_xyz_rpy({1, 2, 3}, {1, 2, 3}),
                                 Eigen::Isometry3d::Identity()),
             covariance);
+}
+
+TEST(LevellingRotation, IsTheLeastTurnThatTakesUpToZ) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> normal;
+  for (int i = 0; i < 200; ++i) {
+    // Some of them nearly upside down.
+    const double scale = std::pow(10.0, -(i % 10));
+    const Eigen::Vector3d up =
+        Eigen::Vector3d(scale * normal(random), scale * normal(random), i % 3 == 0 ? 1.0 : -1.0)
+            .normalized();
+    const Eigen::Matrix3d R = levelling_rotation(up);
+    EXPECT_LT((R * up - Eigen::Vector3d::UnitZ()).norm(), 1e-9) << up.transpose();
+    const Eigen::Matrix3d expected =
+        Eigen::Quaterniond::FromTwoVectors(up, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+    const double angle = Eigen::AngleAxisd(expected).angle();
+    EXPECT_NEAR(Eigen::AngleAxisd(R).angle(), angle, 1e-6) << up.transpose();
+  }
+  EXPECT_EQ(levelling_rotation(Eigen::Vector3d::UnitZ()), Eigen::Matrix3d::Identity());
+  EXPECT_EQ(levelling_rotation(-Eigen::Vector3d::UnitZ()) * -Eigen::Vector3d::UnitZ(),
+            Eigen::Vector3d::UnitZ());
+}
+
+TEST(TurnedCovariance, IsThatOfTheTurnedVector) {
+  const Eigen::Matrix<double, 6, 6> root = Eigen::Matrix<double, 6, 6>::Random();
+  const Eigen::Matrix<double, 6, 6> covariance = root * root.transpose();
+  const Eigen::Matrix3d R_a_b = from_xyz_rpy({0.0, 0.0, 0.0}, {0.3, -0.7, 2.0}).linear();
+  Eigen::Matrix<double, 6, 6> turn = Eigen::Matrix<double, 6, 6>::Zero();
+  turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = R_a_b;
+  EXPECT_TRUE(
+      turned_covariance(covariance, R_a_b).isApprox(turn * covariance * turn.transpose(), 1e-12));
 }
 
 TEST(TurnedCovariance, SwapsAxes) {
