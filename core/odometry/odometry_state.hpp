@@ -22,7 +22,8 @@ enum class OdometryHealth : std::uint8_t {
 struct OdometryResult {
   Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
   /// Covariance of the pose error xi = (translation [m], rotation [rad]) in the map frame, from
-  /// the normal equations of eq. (13).
+  /// the normal equations of eq. (13); 1 m in directions that the scan does not observe. Of a pose
+  /// that is not confirmed, with what may have happened since one was.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   OdometryHealth health = OdometryHealth::initialised;
   /// The scan fits what was known before anything left the place in doubt. While it is false, scans

@@ -259,44 +259,56 @@ class SweepElimination {
   PoseTangent constant_;
 };
 
-struct Step {
-  PoseTangent tangent;
-  bool degenerate = false;
-};
-
-/// Gauss-Newton step, without the directions that the scan does not observe. Rotation is scaled by
-/// the mean range, so that one unit of it moves points as far as one metre does, and an eigenvalue
-/// per unit of weight is the share of residuals that see the direction.
-Step solve(const NormalEquations& equations, double min_observability) {
-  const double mean_range = std::max(1.0, std::sqrt(equations.squared_ranges / equations.weights));
-  PoseTangent scale;
-  scale << 1.0, 1.0, 1.0, 1.0 / mean_range, 1.0 / mean_range, 1.0 / mean_range;
-  const Matrix6d scaled =
-      scale.asDiagonal() * equations.hessian * scale.asDiagonal() / equations.weights;
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> eigen(scaled);
-  PoseTangent inverse = PoseTangent::Zero();
-  Step step;
-  for (int k = 0; k < 6; ++k) {
-    if (eigen.eigenvalues()[k] > min_observability)
-      inverse[k] = 1.0 / eigen.eigenvalues()[k];
-    else
-      step.degenerate = true;
+/// The pose error along the eigenvectors of J'WJ. Rotation is scaled by the mean range, so that one
+/// unit of it moves points as far as one metre does, and an eigenvalue per unit of weight is the
+/// share of residuals that see the direction.
+class ErrorDirections {
+ public:
+  ErrorDirections(const NormalEquations& equations, double min_observability)
+      : equations_(equations), min_observability_(min_observability) {
+    const double mean_range =
+        std::max(1.0, std::sqrt(equations.squared_ranges / equations.weights));
+    scale_ << 1.0, 1.0, 1.0, 1.0 / mean_range, 1.0 / mean_range, 1.0 / mean_range;
+    eigen_.compute(scale_.asDiagonal() * equations.hessian * scale_.asDiagonal() /
+                   equations.weights);
   }
-  const PoseTangent scaled_gradient = scale.asDiagonal() * equations.gradient / equations.weights;
-  step.tangent = -(scale.asDiagonal() * (eigen.eigenvectors() * inverse.asDiagonal() *
-                                         eigen.eigenvectors().transpose() * scaled_gradient));
-  return step;
-}
 
-/// Variance of the weighted residuals times (J'WJ)^-1. Directions that are not observed get the
-/// variance of one metre.
-Matrix6d covariance_of(const NormalEquations& equations) {
-  // A line residual has two degrees of freedom, a plane residual one.
-  const double freedom = std::max(1.0, 2.0 * equations.edges + equations.planes - 6.0);
-  const double variance = std::max(equations.weighted_squares / freedom, 1e-8);
-  const Matrix6d information = equations.hessian / variance + Matrix6d::Identity();
-  return information.ldlt().solve(Matrix6d::Identity());
-}
+  /// Whether the scan observes all of them.
+  [[nodiscard]] bool are_observed() const { return observes(0); }
+
+  /// Gauss-Newton step, without the directions that the scan does not observe.
+  [[nodiscard]] PoseTangent step() const {
+    const PoseTangent gradient = scale_.asDiagonal() * equations_.gradient / equations_.weights;
+    PoseTangent along = eigen_.eigenvectors().transpose() * gradient;
+    for (int k = 0; k < 6; ++k) along[k] *= observes(k) ? -1.0 / eigen_.eigenvalues()[k] : 0.0;
+    return scale_.asDiagonal() * (eigen_.eigenvectors() * along);
+  }
+
+  /// Variance of the weighted residuals times (J'WJ)^-1. Directions that are not observed, in which
+  /// the pose is the prediction, get the variance of one metre.
+  [[nodiscard]] Matrix6d covariance() const {
+    // A line residual has two degrees of freedom, a plane residual one.
+    const double freedom = std::max(1.0, 2.0 * equations_.edges + equations_.planes - 6.0);
+    const double variance = std::max(equations_.weighted_squares / freedom, 1e-8);
+    PoseTangent deviation;
+    for (int k = 0; k < 6; ++k) {
+      const double information =
+          observes(k) ? eigen_.eigenvalues()[k] * equations_.weights / variance : 0.0;
+      deviation[k] = 1.0 / std::sqrt(1.0 + information);
+    }
+    const Matrix6d root = scale_.asDiagonal() * eigen_.eigenvectors() * deviation.asDiagonal();
+    return root * root.transpose();
+  }
+
+ private:
+  /// Eigenvalues come in rising order.
+  [[nodiscard]] bool observes(int k) const { return eigen_.eigenvalues()[k] > min_observability_; }
+
+  const NormalEquations& equations_;
+  double min_observability_;
+  PoseTangent scale_;
+  Eigen::SelfAdjointEigenSolver<Matrix6d> eigen_;
+};
 
 /// Moves the pose, and with a `sweep_prior` the motion within the sweep, by one step. `equations`
 /// are those of the pose alone afterwards. Returns whether a direction is not observed.
@@ -308,20 +320,21 @@ bool take_step(const SweepPrior* sweep_prior, const RegistrationConfig& limits,
     sweep.emplace(equations);
     equations = sweep->reduced(equations);
   }
-  const Step step = solve(equations, limits.min_observability);
+  const ErrorDirections directions(equations, limits.min_observability);
+  const PoseTangent step = directions.step();
   PoseTangent sweep_step = PoseTangent::Zero();
   if (sweep) {
-    const PoseTangent along_map = sweep->step(step.tangent);
+    const PoseTangent along_map = sweep->step(step);
     sweep_step = rotated(result.T_map_lidar.linear().transpose(), along_map);
     result.sweep_correction += sweep_step;
   }
-  result.T_map_lidar = boxplus(result.T_map_lidar, step.tangent);
+  result.T_map_lidar = boxplus(result.T_map_lidar, step);
   const auto is_small = [&](const PoseTangent& tangent) {
     return tangent.head<3>().norm() < limits.step_translation_m &&
            tangent.tail<3>().norm() < limits.step_rotation_rad;
   };
-  result.converged = is_small(step.tangent) && is_small(0.5 * sweep_step);
-  return step.degenerate;
+  result.converged = is_small(step) && is_small(0.5 * sweep_step);
+  return !directions.are_observed();
 }
 
 /// What the last iteration says of how well the scan lies on the map.
@@ -413,7 +426,7 @@ OdometryResult register_features(const FeatureSets& features, const LocalMap& ma
   }
   result.health = degenerate ? OdometryHealth::degenerate : OdometryHealth::good;
   result.rms_residual_m = std::sqrt(equations.weighted_squares / equations.weights);
-  result.covariance = covariance_of(equations);
+  result.covariance = ErrorDirections(equations, limits.min_observability).covariance();
   return result;
 }
 

@@ -47,6 +47,8 @@ class UnconfirmedStretch {
 
   /// Points that were stored before the stretch, and are near only now.
   void add_prior_map(std::span<const LabelledPoint> points_map);
+  [[nodiscard]] const Trusted& trusted() const { return trusted_; }
+  [[nodiscard]] bool has_jumped() const { return has_jumped_; }
   /// Ends the stretch.
   [[nodiscard]] Trusted take_trusted() { return std::move(trusted_); }
 

@@ -205,6 +205,32 @@ TEST_F(OdometrySequence, ScanWithoutFeaturesIsLostAtThePrediction) {
   expect_near(result.T_map_lidar, predicted, 1e-12, 1e-7);
 }
 
+TEST_F(OdometrySequence, TheCovarianceOfALostLidarGrowsWithTheTime) {
+  Odometry odometry(OdometryConfig{}, test::test_lidar());
+  const OdometryResult known = results(quiet(), odometry, true).back();
+  EXPECT_LT(known.covariance(0, 0), 0.01);
+  Scan blind;
+  blind.stamp_ns = quiet().scans.back().scan.stamp_ns;
+  double last_m = 0.9;
+  for (int k = 1; k <= 3; ++k) {
+    blind.stamp_ns += 2'000'000'000;
+    const OdometryResult lost =
+        test::register_scan(odometry, blind, PointLabels{}, std::nullopt).result;
+    ASSERT_EQ(lost.health, OdometryHealth::lost);
+    // It drove at 6 m/s.
+    const double sigma_m = std::sqrt(lost.covariance(0, 0));
+    EXPECT_GT(sigma_m, last_m + 4.0);
+    EXPECT_GT(lost.covariance(5, 5), 0.1);
+    last_m = sigma_m;
+  }
+  // Stamps of years ahead give no absurd number.
+  blind.stamp_ns += 4'000'000'000'000'000'000;
+  const OdometryResult lost =
+      test::register_scan(odometry, blind, PointLabels{}, std::nullopt).result;
+  EXPECT_LT(std::sqrt(lost.covariance(0, 0)), 1010.0);
+  EXPECT_LT(std::sqrt(lost.covariance(5, 5)), 2.0);
+}
+
 /// The street, and cars that keep the lidar's pace beside and ahead of it.
 BoxWorld street_with_convoy(std::initializer_list<double> lanes_y_m) {
   BoxWorld world = test::street();

@@ -94,6 +94,18 @@ TEST(RegisterFeatures, CorridorIsDegenerateAndKeepsThePredictionAlongIt) {
   EXPECT_GT(result.covariance(0, 0), 100.0 * result.covariance(1, 1));
 }
 
+TEST(RegisterFeatures, WhereTheScanIsNotHeardTheCovarianceIsThatOfTheGuess) {
+  const SurfaceWorld world = courtyard();
+  // Of no direction, though the scan shows each of them.
+  OdometryConfig deaf;
+  deaf.registration.min_observability = 0.99;
+  const OdometryResult result =
+      register_features(world.features(T_true, 0.01, 4), world.local_map(), T_true, deaf);
+  EXPECT_EQ(result.health, OdometryHealth::degenerate);
+  expect_near(result.T_map_lidar, T_true, 1e-12, 1e-7);
+  for (int k = 0; k < 3; ++k) EXPECT_NEAR(result.covariance(k, k), 1.0, 1e-9);
+}
+
 TEST(RegisterFeatures, TooFewCorrespondencesAreLostAtThePrediction) {
   const SurfaceWorld world = courtyard();
   FeatureSets few = world.features(T_true, 0.01, 3);
