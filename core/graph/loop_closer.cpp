@@ -280,27 +280,42 @@ void LoopCloser::place_nodes() {
     graph_.T_map_node = optimize(graph_, {.loop_scale = config_.loop_scale}).T_map_node;
     return;
   }
+  // Nothing new is far off: the narrow kernel takes nothing for a reflection that is none.
+  if (settled_doubts_ && position_counts().in_doubt <= *settled_doubts_) {
+    PoseGraph before = graph_;
+    place_by_positions(1.0);
+    if (position_counts().in_doubt <= *settled_doubts_) return;
+    take_graph(std::move(before));
+  }
+  settled_doubts_.reset();
   // Where odometry has drifted far from the positions, all of them are far off, and the kernel
   // would take them for reflections: it is narrowed step by step (A. Blake and A. Zisserman,
   // "Visual reconstruction", 1987: graduated non-convexity), while those that it puts in doubt are
   // few.
-  for (const double width : {1000.0, 30.0, 5.0, 1.0}) {
-    const PoseGraphConfig solver{.loop_scale = config_.loop_scale,
-                                 .position_scale = width * config_.position_scale,
-                                 .position_slack = config_.position_slack};
+  place_by_positions(1000.0);
+  for (const double width : {30.0, 5.0, 1.0}) {
     PoseGraph wider = graph_;
-    PoseGraphSolution solution = optimize(graph_, solver);
-    graph_.T_map_node = std::move(solution.T_map_node);
-    T_enu_map_ = graph_.T_enu_map = solution.T_enu_map;
+    place_by_positions(width);
     const PositionCounts counts = position_counts();
-    const bool is_first = width > 100.0;
-    if (is_first || static_cast<double>(counts.in_doubt) <=
-                        config_.max_doubted_share * static_cast<double>(counts.used))
-      continue;
-    graph_ = std::move(wider);
-    T_enu_map_ = graph_.T_enu_map;
-    return;
+    if (static_cast<double>(counts.in_doubt) >
+        config_.max_doubted_share * static_cast<double>(counts.used))
+      return take_graph(std::move(wider));
   }
+  settled_doubts_ = position_counts().in_doubt;
+}
+
+void LoopCloser::place_by_positions(double width) {
+  const PoseGraphConfig solver{.loop_scale = config_.loop_scale,
+                               .position_scale = width * config_.position_scale,
+                               .position_slack = config_.position_slack};
+  PoseGraphSolution solution = optimize(graph_, solver);
+  graph_.T_map_node = std::move(solution.T_map_node);
+  T_enu_map_ = graph_.T_enu_map = solution.T_enu_map;
+}
+
+void LoopCloser::take_graph(PoseGraph graph) {
+  graph_ = std::move(graph);
+  T_enu_map_ = graph_.T_enu_map;
 }
 
 void LoopCloser::solve() {

@@ -173,6 +173,9 @@ class LoopCloser {
   void use_positions();
   /// Poses of the nodes, and where the map lies.
   void place_nodes();
+  /// By the positions, too, with their kernel so many times as wide as it is to be.
+  void place_by_positions(double width);
+  void take_graph(PoseGraph graph);
   /// Solves, and takes out what the graph denies.
   void solve();
   [[nodiscard]] Eigen::Isometry3d T_map_submap(const PlacedSubmap& placed) const {
@@ -198,6 +201,8 @@ class LoopCloser {
   std::vector<PositionMeasurement> positions_;
   std::size_t known_positions_ = 0;
   std::optional<Eigen::Isometry3d> T_enu_map_;
+  /// Positions that were in doubt when the graph was last placed by all of them.
+  std::optional<std::size_t> settled_doubts_;
 };
 
 }  // namespace stillmap
