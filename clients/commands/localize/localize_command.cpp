@@ -122,7 +122,7 @@ class LocalizationRun {
   bool is_strict_;
 };
 
-Json pose_json(const Eigen::Isometry3d& T) {
+Json place_json(const Eigen::Isometry3d& T) {
   const Eigen::Quaterniond q(T.rotation());
   const Eigen::Vector3d t = T.translation();
   Json rows = Json::array();
@@ -146,7 +146,7 @@ Json to_json(const LocalizedScan& scan) {
   Json json{{"scan", scan.index},
             {"stamp_ns", scan.stamp_ns},
             {"status", name(scan.result.status)},
-            {"pose", is_found ? pose_json(scan.result.places.front().T_map_lidar) : Json(nullptr)},
+            {"pose", is_found ? place_json(scan.result.places.front().T_map_lidar) : Json(nullptr)},
             {"score", score_of(scan.result, 0)},
             {"runner_up_score", score_of(scan.result, 1)},
             {"ms", scan.ms}};

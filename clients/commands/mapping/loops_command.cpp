@@ -94,7 +94,7 @@ SubmapsOfMap submaps_of_server(const ClientArguments& arguments) {
   return *newest;
 }
 
-nlohmann::json pose_json(const Eigen::Isometry3d& T) {
+nlohmann::json transform_json(const Eigen::Isometry3d& T) {
   const Eigen::Vector3d p = T.translation();
   const Eigen::Quaterniond q(T.linear());
   return {{"position_m", {p.x(), p.y(), p.z()}}, {"quaternion_xyzw", {q.x(), q.y(), q.z(), q.w()}}};
@@ -108,13 +108,13 @@ nlohmann::json to_json(const SubmapsOfMap& submaps) {
                       {"submaps", nlohmann::json::array()},
                       {"closures", nlohmann::json::array()}};
   for (const SubmapList::Entry& entry : submaps.list.submaps) {
-    nlohmann::json submap = pose_json(entry.T_map_submap);
+    nlohmann::json submap = transform_json(entry.T_map_submap);
     submap["stamp_ns"] = entry.stamp_ns;
     submap["way_m"] = entry.way_m;
     json["submaps"].push_back(std::move(submap));
   }
   for (const SubmapList::Loop& loop : submaps.list.loops) {
-    nlohmann::json closure = pose_json(loop.T_from_to);
+    nlohmann::json closure = transform_json(loop.T_from_to);
     closure.update({{"from_submap", loop.from},
                     {"to_submap", loop.to},
                     {"overlap", loop.overlap},
