@@ -65,14 +65,15 @@ class TileSource::Fetcher {
     while (true) {
       const std::vector<TileId> ids = next(stop);
       if (ids.empty()) return;
-      fetch(ids);
+      fetch(ids, stop);
     }
   }
 
   /// Those wanted longest; none once it is to stop.
   std::vector<TileId> next(const std::stop_token& stop) {
     std::unique_lock lock(mutex_);
-    if (!changed_.wait(lock, stop, [this] { return !wanted_.empty(); })) return {};
+    changed_.wait(lock, stop, [this] { return !wanted_.empty(); });
+    if (stop.stop_requested()) return {};
     const auto count = std::min(wanted_.size(), max_tiles_per_request);
     const auto end = wanted_.begin() + static_cast<std::ptrdiff_t>(count);
     std::vector<TileId> ids(wanted_.begin(), end);
@@ -80,12 +81,12 @@ class TileSource::Fetcher {
     return ids;
   }
 
-  void fetch(const std::vector<TileId>& ids) {
+  void fetch(const std::vector<TileId>& ids, const std::stop_token& stop) {
     std::string fault;
     std::optional<GetTiles_Response> reply;
     try {
       if (!client_) client_.emplace(participant_, service_);
-      reply = client_->call(request_for(ids), timeout_);
+      reply = client_->call(request_for(ids), timeout_, stop);
       if (!reply) fault = "the server does not answer";
     } catch (const dds::DdsError& error) {
       fault = error.what();

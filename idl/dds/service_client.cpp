@@ -8,6 +8,9 @@
 namespace stillmap::dds {
 namespace {
 
+/// Whether a stop was requested is looked at this often while no server is there.
+constexpr std::chrono::milliseconds stop_period(100);
+
 std::chrono::milliseconds left_until(std::chrono::steady_clock::time_point deadline) {
   const auto left = deadline - std::chrono::steady_clock::now();
   return std::max(std::chrono::ceil<std::chrono::milliseconds>(left), std::chrono::milliseconds(0));
@@ -36,9 +39,18 @@ bool UntypedServiceClient::wait_for_server(std::chrono::milliseconds timeout) co
          replies_.events().wait_for_writer(left_until(deadline));
 }
 
-bool UntypedServiceClient::call(const void* request, void* reply,
-                                std::chrono::milliseconds timeout) {
-  return exchange(to_bytes(request_type_, request, 0), timeout, {},
+bool UntypedServiceClient::find_server(Clock::time_point deadline,
+                                       const std::stop_token& stop) const {
+  const auto period = stop.stop_possible() ? stop_period : std::chrono::milliseconds::max();
+  while (!wait_for_server(std::min(left_until(deadline), period))) {
+    if (stop.stop_requested() || Clock::now() >= deadline) return false;
+  }
+  return true;
+}
+
+bool UntypedServiceClient::call(const void* request, void* reply, std::chrono::milliseconds timeout,
+                                const std::stop_token& stop) {
+  return exchange(to_bytes(request_type_, request, 0), timeout, stop,
                   [&](SerializedSample& answer) { return from_bytes(reply_type_, answer, reply); });
 }
 
@@ -57,7 +69,7 @@ bool UntypedServiceClient::exchange(const SerializedSample& request,
                                     std::chrono::milliseconds timeout, const std::stop_token& stop,
                                     const Accept& accept) {
   const auto now = Clock::now();
-  if (!wait_for_server(timeout)) return false;
+  if (!find_server(now + timeout, stop)) return false;
   sent_.clear();
   const RequestId id{.client = replies_.guid(), .number = ++call_number_};
   for (const auto deadline : {now + timeout / 2, now + timeout}) {

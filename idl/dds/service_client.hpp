@@ -28,11 +28,12 @@ class UntypedServiceClient {
 
   [[nodiscard]] bool wait_for_server(std::chrono::milliseconds timeout) const;
 
-  /// Fills in `reply`; false after `timeout`. The objects must be of the service's types.
-  [[nodiscard]] bool call(const void* request, void* reply, std::chrono::milliseconds timeout);
+  /// Fills in `reply`; false after `timeout`, or when a stop was requested. The objects must be of
+  /// the service's types.
+  [[nodiscard]] bool call(const void* request, void* reply, std::chrono::milliseconds timeout,
+                          const std::stop_token& stop);
 
-  /// The same with bytes, neither of which is looked into. Nothing after `timeout` or, once the
-  /// request was sent, when a stop was requested.
+  /// The same with bytes, neither of which is looked into.
   [[nodiscard]] std::optional<SerializedSample> call(const SerializedSample& request,
                                                      std::chrono::milliseconds timeout,
                                                      const std::stop_token& stop);
@@ -42,6 +43,7 @@ class UntypedServiceClient {
   /// False for bytes that are no answer.
   using Accept = std::function<bool(SerializedSample&)>;
 
+  [[nodiscard]] bool find_server(Clock::time_point deadline, const std::stop_token& stop) const;
   [[nodiscard]] bool exchange(const SerializedSample& request, std::chrono::milliseconds timeout,
                               const std::stop_token& stop, const Accept& accept);
   void send(const SerializedSample& request, const RequestId& id);
@@ -85,11 +87,11 @@ class ServiceClient {
   }
 
   /// Throws NotPermitted for a service that our permissions forbid. The answer; nothing after
-  /// `timeout`. A request is sent again at half time: a server that was just restarted may have
-  /// lost the first, and the first answer that comes is taken. Both name the same call, which a
-  /// service that changes something carries out once.
-  [[nodiscard]] std::optional<Reply> call(const Request& request,
-                                          std::chrono::milliseconds timeout) {
+  /// `timeout`, or when a stop was requested. A request is sent again at half time: a server that
+  /// was just restarted may have lost the first, and the first answer that comes is taken. Both
+  /// name the same call, which a service that changes something carries out once.
+  [[nodiscard]] std::optional<Reply> call(const Request& request, std::chrono::milliseconds timeout,
+                                          const std::stop_token& stop = {}) {
     const auto deadline = std::chrono::steady_clock::now() + timeout;
     if (!refusal_.empty()) throw NotPermitted(refusal_);
     const Turn turn(*this, deadline);
@@ -98,7 +100,7 @@ class ServiceClient {
     Reply reply;
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
         deadline - std::chrono::steady_clock::now());
-    if (!client_->call(&request, &reply, left)) return std::nullopt;
+    if (!client_->call(&request, &reply, left, stop)) return std::nullopt;
     return reply;
   }
 

@@ -134,5 +134,25 @@ TEST_F(TileSourceTest, ANewerStateIsNotAnsweredByAnOlderOneThatIsOnItsWay) {
   EXPECT_EQ(got.front(), new_hash);
 }
 
+TEST_F(TileSourceTest, EndsAtOnceWhateverItStillWaitsFor) {
+  using Clock = std::chrono::steady_clock;
+  constexpr std::chrono::seconds timeout(60);
+  // One server does not answer, and one is not there.
+  for (const char* const server : {"stillmap", "nobody"}) {
+    auto source = std::make_unique<TileSource>(client_side_, server, timeout, work_.post());
+    int answered = 0;
+    for (int x = 0; x < 200; ++x)
+      source->get({x, 0}, 7, [&](const TileSource::Answer&) { ++answered; });
+    if (server == std::string("stillmap")) {
+      ASSERT_TRUE(work_.eventually([&] { return requests() == 1; }));
+    }
+    source->forget_waiting();
+    const auto began = Clock::now();
+    source = nullptr;
+    EXPECT_LT(Clock::now() - began, timeout / 4) << server;
+    EXPECT_EQ(answered, 0);
+  }
+}
+
 }  // namespace
 }  // namespace stillmap::gateway
