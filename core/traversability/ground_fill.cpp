@@ -24,9 +24,11 @@ constexpr double cross_slope = 0.06;
 constexpr double disagreement_m = 0.10;
 /// Cells over which the slope at an end is measured.
 constexpr int slope_cells = 5;
-/// Height range above the ground of objects that block a gap [m].
+/// Height range above the ground of objects that block a gap, and depth of what falls away [m],
+/// which is farther down a slope by so much per metre.
 constexpr float object_from_m = 0.25F;
 constexpr float object_to_m = 2.0F;
+constexpr double fall_slope = 0.3;
 
 struct Direction {
   int dx;
@@ -54,6 +56,12 @@ bool has_object(Column column, float ground_m) {
     const float above_m = voxel.height_m - ground_m;
     return above_m > object_from_m && above_m < object_to_m;
   });
+}
+
+/// Whether the column was measured farther down than ground falls off so far from ground.
+bool falls_away(Column column, float ground_m, double distance_m) {
+  const double fall_m = object_from_m + fall_slope * distance_m;
+  return !column.empty() && column.front().height_m < ground_m - fall_m;
 }
 
 /// Nearest ground in eight directions of every cell without ground.
@@ -86,6 +94,8 @@ class Holes {
   [[nodiscard]] std::optional<double> slope_at(const End& end, Direction outwards) const;
   [[nodiscard]] bool is_one_surface(const End& a, const End& b, std::size_t direction) const;
   [[nodiscard]] std::optional<Line> line_through(int x, int y, std::size_t direction) const;
+  /// Whether the cell was measured farther down, and one beside it, too.
+  [[nodiscard]] bool is_in_pit(int x, int y, float ground_m) const;
   [[nodiscard]] bool has_third_direction(int x, int y, std::size_t direction,
                                          const GroundCell& cell) const;
 
@@ -120,9 +130,15 @@ Reach Holes::reach_from(int x, int y, std::size_t direction) const {
     if (further == 0) return 0;
     cells += further;
   }
-  if (cells * d.length() * cell_m_ > max_filled_gap_m) return 0;
+  const double distance_m = cells * d.length() * cell_m_;
+  if (distance_m > max_filled_gap_m) return 0;
   const GroundCell& end = seen_(x + cells * d.dx, y + cells * d.dy);
-  return has_object(columns_(x, y), end.height_m) ? Reach{0} : static_cast<Reach>(cells);
+  if (has_object(columns_(x, y), end.height_m)) return 0;
+  // A pit or a ditch was measured where two cells in a row fall away; one alone may be a
+  // reflection.
+  const bool is_pit = cells > 1 && falls_away(columns_(x, y), end.height_m, distance_m) &&
+                      falls_away(columns_(next_x, next_y), end.height_m, distance_m);
+  return is_pit ? Reach{0} : static_cast<Reach>(cells);
 }
 
 std::optional<Holes::End> Holes::end(int x, int y, std::size_t direction) const {
@@ -198,8 +214,16 @@ std::optional<GroundCell> Holes::inferred(int x, int y) const {
     if (best && std::abs(best->cell.height_m - line->cell.height_m) > disagreement_m) return {};
     if (!best || line->gap_m < best->gap_m) best = line;
   }
-  if (!best) return std::nullopt;
+  if (!best || is_in_pit(x, y, best->cell.height_m)) return std::nullopt;
   return best->cell;
+}
+
+bool Holes::is_in_pit(int x, int y, float ground_m) const {
+  if (!falls_away(columns_(x, y), ground_m, 0.0)) return false;
+  return std::ranges::any_of(directions, [&](const Direction& d) {
+    return seen_.contains(x + d.dx, y + d.dy) && !seen_(x + d.dx, y + d.dy).is_known() &&
+           falls_away(columns_(x + d.dx, y + d.dy), ground_m, d.length() * cell_m_);
+  });
 }
 
 std::optional<float> Holes::nearest_height(int x, int y) const {

@@ -92,6 +92,30 @@ TEST(GroundFill, NotThroughWhatStandsInTheGap) {
   EXPECT_EQ(look(*view, 0.7, 0.1).cell.state, CellState::unknown);
 }
 
+TEST(GroundFill, NotOverAPitOrADitchWhoseBottomWasMeasured) {
+  // A workshop's pit in a hall, and a ditch whose bottom is overgrown: their banks are level.
+  struct Drop {
+    double width_m;
+    double bottom_m;
+    SemanticClass ground, bottom;
+  };
+  for (const Drop& drop :
+       {Drop{1.0, -1.7, road, road}, {2.0, -0.7, terrain, vegetation}, {0.4, -1.0, road, road}}) {
+    VoxelWorld world;
+    world.ground(-6, -6, 6, 6, drop.ground);
+    world.clear(0.0, -4.0, drop.width_m, 4.0);
+    world.block(0.0, -4.0, drop.width_m, 4.0, drop.bottom_m - 0.2, drop.bottom_m, drop.bottom);
+    const auto view = traversability_of(world.view(), square_robot());
+    for (double x_m = 0.1; x_m < drop.width_m; x_m += 0.2) {
+      for (const double y_m : {-3.9, -1.1, 0.1, 3.9})
+        EXPECT_NE(look(*view, x_m, y_m).cell.state, CellState::free)
+            << drop.width_m << " m wide, at " << x_m << ", " << y_m;
+    }
+    // What lies beside it is still ground.
+    EXPECT_EQ(surface_at(*view, -1.1, 0.1).ground.origin, GroundOrigin::seen);
+  }
+}
+
 TEST(GroundFill, BridgesTheGapsBetweenRings) {
   VoxelWorld world;
   for (double x_m = -6; x_m < 6; x_m += 1.0) world.ground(x_m, -6, x_m + 0.2, 6, road);
