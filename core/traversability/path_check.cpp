@@ -24,8 +24,10 @@ PlanarPose interpolate(const PlanarPose& a, const PlanarPose& b, double share) {
 
 std::string fault_of(const TraversabilityView& view, const PlanarPose& pose, std::size_t index) {
   std::ostringstream text;
-  if (!std::isfinite(pose.heading_rad) || std::abs(pose.heading_rad) > 1e6) {
-    text << "pose " << index << " has heading " << pose.heading_rad << "; must be finite [rad]";
+  constexpr double max_heading_rad = 1e6;
+  if (!(std::abs(pose.heading_rad) <= max_heading_rad)) {
+    text << "pose " << index << " has heading " << pose.heading_rad << " rad; must be within "
+         << max_heading_rad << " of 0";
   } else if (!view.cell_of(pose.position_map)) {
     text << "pose " << index << " is at (" << pose.position_map.x() << ", " << pose.position_map.y()
          << "); must be finite and within 100 km of the map's origin";
@@ -93,10 +95,12 @@ class PathWalk {
     bool is_inferred = false;
     std::optional<PathConflict> conflict;
     visit_footprint(view_, pose, [&](CellIndex index) {
-      const TraversabilityCell cell = lookup_.at(index).cell;
-      check_.clearance_m = std::min(check_.clearance_m, static_cast<double>(cell.clearance_m));
+      const auto [cell, surface] = lookup_.at(index);
+      // Off the map there is nothing to be near to.
+      if (surface != nullptr)
+        check_.clearance_m = std::min(check_.clearance_m, static_cast<double>(cell.clearance_m));
       is_inferred = is_inferred || cell.inferred;
-      const BlockReason reason = conflict_with(cell);
+      const BlockReason reason = conflict_with(cell, view_.profile);
       if (reason == BlockReason::none || is_more_specific(conflict, reason)) return;
       conflict = {segment, check_.checked_m, pose, view_.centre_of(index), reason};
     });
@@ -111,12 +115,6 @@ class PathWalk {
   }
 
  private:
-  [[nodiscard]] BlockReason conflict_with(const TraversabilityCell& cell) const {
-    if (cell.is_lethal_itself()) return cell.reason;
-    const bool is_closed =
-        cell.state == CellState::unknown && view_.profile.unknown == UnknownGround::blocked;
-    return is_closed ? BlockReason::unknown : BlockReason::none;
-  }
   /// A known obstacle takes precedence over unknown ground.
   static bool is_more_specific(const std::optional<PathConflict>& conflict, BlockReason reason) {
     return conflict && (conflict->reason != BlockReason::unknown || reason == BlockReason::unknown);
@@ -215,8 +213,8 @@ PathCheck check_path(const TraversabilityView& view, const PathQuery& query) {
   }
   if (!query.headings_rad.empty()) return check_path(view, with_headings(query));
   PathCheck check = check_path(view, along_segments(query.positions_map));
-  // Every second of the checked segments is a turn on the spot.
-  if (check.conflict) check.conflict->segment /= 2;
+  // Every second of the checked segments is a turn on the spot, at the position after it.
+  if (check.conflict) check.conflict->segment = (check.conflict->segment + 1) / 2;
   return check;
 }
 

@@ -121,22 +121,45 @@ double distance_to(const TraversabilityView& view, const TraversabilityTile& til
   return box.exteriorDistance(position_map);
 }
 
-void search_tile(const TraversabilityView& view, const TraversabilityTile& tile,
-                 const Eigen::Vector2d& position_map, NearestTraversable& best) {
+/// A free cell, and its distance from the position that is asked for.
+struct Candidate {
+  double distance_m = 0.0;
+  CellIndex cell;
+};
+
+/// Free cells of a tile that are nearer than `below_m`, the nearest first.
+std::vector<Candidate> candidates_in(const TraversabilityView& view, const TraversabilityTile& tile,
+                                     const Eigen::Vector2d& position_map, double below_m) {
+  // Nearer to what is lethal, the robot touches it whatever its heading.
+  const double touching_m = view.profile.inscribed_radius_m() + 0.5 * view.cell_m;
+  std::vector<Candidate> candidates;
   for (int y = 0; y < tile.side; ++y) {
     for (int x = 0; x < tile.side; ++x) {
       const TraversabilityCell& cell = tile.at(x, y);
-      if (cell.state != CellState::free) continue;
-      const Eigen::Vector2d centre_map =
-          view.centre_of({tile.id.x * tile.side + x, tile.id.y * tile.side + y});
-      const double distance_m = (centre_map - position_map).norm();
-      if (distance_m >= best.distance_m) continue;
-      best.distance_m = distance_m;
-      best.position_map = centre_map;
-      best.height_m = tile.surface->at(x, y).cell->ground.height_m;
-      best.cell = cell;
+      if (cell.state != CellState::free || cell.clearance_m <= touching_m) continue;
+      const CellIndex index{tile.id.x * tile.side + x, tile.id.y * tile.side + y};
+      const double distance_m = (view.centre_of(index) - position_map).norm();
+      if (distance_m < below_m) candidates.push_back({distance_m, index});
     }
   }
+  std::ranges::sort(candidates, {}, &Candidate::distance_m);
+  return candidates;
+}
+
+/// Whether a robot can stand there with some heading.
+bool can_stand(const TraversabilityView& view, CellLookup& lookup,
+               const Eigen::Vector2d& position_map) {
+  constexpr int headings = 16;
+  for (int i = 0; i < headings; ++i) {
+    bool is_free = true;
+    visit_footprint(
+        view, {position_map, i * 2.0 * std::numbers::pi / headings}, [&](CellIndex index) {
+          is_free =
+              is_free && conflict_with(lookup.at(index).cell, view.profile) == BlockReason::none;
+        });
+    if (is_free) return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -151,6 +174,13 @@ std::string_view name(BlockReason reason) {
       "none",      "obstacle", "low head-room", "step",   "slope",
       "roughness", "class",    "inscribed",     "unknown"};
   return names.at(static_cast<std::size_t>(reason));
+}
+
+BlockReason conflict_with(const TraversabilityCell& cell, const RobotProfile& profile) {
+  if (cell.is_lethal_itself()) return cell.reason;
+  const bool is_closed =
+      cell.state == CellState::unknown && profile.unknown == UnknownGround::blocked;
+  return is_closed ? BlockReason::unknown : BlockReason::none;
 }
 
 double clearance_limit_m(const RobotProfile& profile) {
@@ -261,17 +291,41 @@ NearestTraversable nearest_traversable(const TraversabilityView& view,
     text << "max_distance_m = " << max_distance_m << "; must be above 0";
     return refused(TraversabilityStatus::invalid_request, text.str());
   }
-  NearestTraversable best;
-  best.map_version = view.version;
-  best.distance_m = std::nextafter(max_distance_m, HUGE_VAL);
-  const double unreached_m = best.distance_m;
-  for (const auto& tile : view.tiles) {
-    if (distance_to(view, *tile, position_map) < best.distance_m) {
-      search_tile(view, *tile, position_map, best);
+  // Tiles by their distance: none behind a place that was found has a nearer one.
+  std::vector<std::pair<double, const TraversabilityTile*>> tiles;
+  for (const auto& tile : view.tiles)
+    tiles.emplace_back(distance_to(view, *tile, position_map), tile.get());
+  std::ranges::sort(tiles, {}, &std::pair<double, const TraversabilityTile*>::first);
+  // Some tenths of a second.
+  constexpr std::size_t max_tried = 20'000;
+  std::size_t tried = 0;
+  CellLookup lookup(view);
+  std::optional<Candidate> best;
+  double below_m = std::nextafter(max_distance_m, HUGE_VAL);
+  for (const auto& [tile_m, tile] : tiles) {
+    if (tile_m >= below_m || tried == max_tried) break;
+    for (const Candidate& candidate : candidates_in(view, *tile, position_map, below_m)) {
+      if (tried++ == max_tried) break;
+      if (!can_stand(view, lookup, view.centre_of(candidate.cell))) continue;
+      best = candidate;
+      below_m = candidate.distance_m;
+      break;
     }
   }
-  if (best.distance_m < unreached_m) return best;
-  text << "no free cell for '" << view.profile.name << "' within " << max_distance_m << " m of ("
+  if (best) {
+    const CellLookup::Found found = lookup.at(best->cell);
+    return {.position_map = view.centre_of(best->cell),
+            .height_m = found.surface->ground.height_m,
+            .distance_m = best->distance_m,
+            .cell = found.cell,
+            .map_version = view.version};
+  }
+  if (tried >= max_tried) {
+    text << "none of the " << max_tried << " free cells nearest to (" << position_map.x() << ", "
+         << position_map.y() << ") has room for '" << view.profile.name << "'";
+    return refused(TraversabilityStatus::not_found, text.str());
+  }
+  text << "no place for '" << view.profile.name << "' within " << max_distance_m << " m of ("
        << position_map.x() << ", " << position_map.y() << ")";
   return refused(TraversabilityStatus::not_found, text.str());
 }

@@ -82,6 +82,10 @@ struct TraversabilityTile {
   }
 };
 
+/// Why no part of the robot may be over the cell; none where it may.
+[[nodiscard]] BlockReason conflict_with(const TraversabilityCell& cell,
+                                        const RobotProfile& profile);
+
 /// Upper limit of `clearance_m` [m].
 [[nodiscard]] double clearance_limit_m(const RobotProfile& profile);
 
@@ -166,7 +170,7 @@ enum class TraversabilityStatus : std::uint8_t {
 struct NearestTraversable {
   TraversabilityStatus status = TraversabilityStatus::ok;
   std::string reason;
-  /// Centre of the nearest free cell, map frame [m].
+  /// Centre of the nearest such cell, map frame [m].
   Eigen::Vector2d position_map = Eigen::Vector2d::Zero();
   /// Height of the ground there, map frame [m].
   double height_m = 0.0;
@@ -176,8 +180,8 @@ struct NearestTraversable {
   std::uint64_t map_version = 0;
 };
 
-/// The free cell nearest to a position, at most `max_distance_m` away. Inferred ground counts,
-/// unknown ground does not.
+/// The free cell nearest to a position, at most `max_distance_m` away, on which the robot can stand
+/// with some heading. Inferred ground counts, unknown ground does not.
 [[nodiscard]] NearestTraversable nearest_traversable(const TraversabilityView& view,
                                                      const Eigen::Vector2d& position_map,
                                                      double max_distance_m = 100.0);

@@ -91,6 +91,17 @@ TEST(PathCheck, UnknownGroundStopsThoseWhomItMust) {
   EXPECT_TRUE(check(*traversability_of(map, robot), {{{-4, 0}, 0}, {{-12, 0}, 0}}).is_free);
 }
 
+TEST(PathCheck, OffTheMapThereIsNothingToBeNearTo) {
+  RobotProfile robot = square_robot();
+  robot.unknown = UnknownGround::allowed;
+  VoxelWorld world;
+  world.ground(-8, -8, 8, 8, road);
+  const auto view = traversability_of(world.view(), robot);
+  const PathCheck path = check(*view, {{{0, 0}, 0}, {{20, 0}, 0}});
+  EXPECT_TRUE(path.is_free);
+  EXPECT_EQ(path.clearance_m, clearance_limit_m(robot));
+}
+
 TEST(PathCheck, CountsTheWayOverInferredGround) {
   VoxelWorld world;
   world.ground(-8, -8, 8, 8, road);
@@ -165,6 +176,15 @@ TEST(PathQuery, AConflictCountsThePositionsAsked) {
   ASSERT_TRUE(check.conflict);
   EXPECT_EQ(check.conflict->segment, 2U);
   EXPECT_EQ(check.conflict->reason, BlockReason::obstacle);
+}
+
+TEST(PathQuery, AConflictInATurnIsAtThePositionOfTheTurn) {
+  // Along the wall there is room, but not for the robot's corners.
+  const auto view = traversability_of(walled_road().view(), square_robot());
+  const PathCheck check = check_path(*view, path({{-0.65, -6}, {-0.65, -4}, {-4, -4}}));
+  ASSERT_TRUE(check.conflict);
+  EXPECT_NEAR(check.conflict->along_m, 2.0, 1e-6);
+  EXPECT_EQ(check.conflict->segment, 1U);
 }
 
 TEST(PathQuery, WaysOfNoLengthKeepTheHeading) {

@@ -4,7 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <limits>
+#include <numbers>
+#include <span>
 
+#include "core/traversability/path_check.hpp"
 #include "tests/traversability/voxel_world.hpp"
 
 namespace stillmap {
@@ -23,13 +26,23 @@ VoxelWorld road_with_a_house() {
   return world;
 }
 
+bool has_room(const TraversabilityView& view, const Eigen::Vector2d& p_map) {
+  for (int i = 0; i < 16; ++i) {
+    const PlanarPose pose{p_map, i * std::numbers::pi / 8};
+    if (check_path(view, std::span(&pose, 1)).is_free) return true;
+  }
+  return false;
+}
+
 double by_brute_force(const TraversabilityView& view, const Eigen::Vector2d& p_map) {
   double best_m = std::numeric_limits<double>::infinity();
   CellLookup lookup(view);
   for (int y = -60; y < 60; ++y) {
     for (int x = -60; x < 60; ++x) {
       if (lookup.at({x, y}).cell.state != CellState::free) continue;
-      best_m = std::min(best_m, (view.centre_of({x, y}) - p_map).norm());
+      const Eigen::Vector2d centre_map = view.centre_of({x, y});
+      const double distance_m = (centre_map - p_map).norm();
+      if (distance_m < best_m && has_room(view, centre_map)) best_m = distance_m;
     }
   }
   return best_m;
@@ -45,6 +58,23 @@ TEST(NearestTraversable, EqualsBruteForce) {
     EXPECT_NEAR((nearest.position_map - p_map).norm(), nearest.distance_m, 1e-12);
     EXPECT_EQ(nearest.cell.state, CellState::free);
     EXPECT_NEAR(nearest.height_m, 0.1, 1e-6);
+  }
+}
+
+TEST(NearestTraversable, TheRobotCanStandThere) {
+  // Its corners reach farther than its sides: free cells are not yet room.
+  RobotProfile robot = square_robot();
+  robot.length_m = 3.0;
+  for (const UnknownGround unknown : {UnknownGround::blocked, UnknownGround::allowed}) {
+    robot.unknown = unknown;
+    const auto view = traversability_of(road_with_a_house().view(), robot);
+    for (const Eigen::Vector2d& p_map :
+         {Eigen::Vector2d(0, 0), Eigen::Vector2d(2.5, -1), Eigen::Vector2d(-11.9, 11.9)}) {
+      const NearestTraversable nearest = nearest_traversable(*view, p_map);
+      ASSERT_EQ(nearest.status, TraversabilityStatus::ok) << nearest.reason;
+      EXPECT_TRUE(has_room(*view, nearest.position_map)) << nearest.position_map.transpose();
+      EXPECT_GT(nearest.distance_m, 0.0);
+    }
   }
 }
 
