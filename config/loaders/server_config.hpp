@@ -200,7 +200,7 @@ struct TraversabilityConfig {
   double update_period_s = 1.0;
   /// The robot whose traversability is published as a grid; empty: none.
   std::string grid_profile = "car";
-  /// Edge of the square round the robot that the grid shows; 0: the whole map.
+  /// Edge of the square round the robot that the grid shows; 0: the map within 500 m of it.
   double grid_window_m = 0.0;
 };
 

@@ -1,5 +1,7 @@
 #include "server/traversability/traversability_grid.hpp"
 
+#include <cmath>
+#include <string>
 #include <utility>
 
 #include "idl/conversions/occupancy_grid.hpp"
@@ -32,11 +34,16 @@ OccupancyGrid TraversabilityGridProvider::grid() const {
   none.status = TraversabilityStatus::not_found;
   none.reason = "no grid is configured: traversability.grid_profile is empty";
   if (profile_.empty()) return none;
-  OccupancyGrid grid = occupancy_grid(*traversability_.view(profile_), window(), max_cells);
-  if (grid.status == TraversabilityStatus::too_large) {
-    grid.reason += "; traversability.grid_window_m makes it a window round the robot";
+  const auto view = traversability_.view(profile_);
+  OccupancyGrid grid = occupancy_grid(*view, window(), max_cells);
+  if (grid.status != TraversabilityStatus::too_large) return grid;
+  const double edge_m = (std::sqrt(static_cast<double>(max_cells)) - 2.0) * view->cell_m;
+  OccupancyGrid part = occupancy_grid(*view, square_round_robot(edge_m), max_cells);
+  if (part.status == TraversabilityStatus::ok) {
+    part.reason = grid.reason + "; it shows " + std::to_string(std::lround(edge_m)) +
+                  " m round the robot, less with traversability.grid_window_m";
   }
-  return grid;
+  return part;
 }
 
 nav_msgs::msg::OccupancyGrid TraversabilityGridProvider::message(const OccupancyGrid& grid) const {
@@ -44,9 +51,12 @@ nav_msgs::msg::OccupancyGrid TraversabilityGridProvider::message(const Occupancy
 }
 
 TraversabilityRegion TraversabilityGridProvider::window() const {
-  if (window_m_ == 0.0) return whole_map_region();
+  return window_m_ == 0.0 ? whole_map_region() : square_round_robot(window_m_);
+}
+
+TraversabilityRegion TraversabilityGridProvider::square_round_robot(double edge_m) const {
   const Eigen::Vector2d robot_map = latest_map_.newest_pose().T_map_lidar.translation().head<2>();
-  const Eigen::Vector2d half = Eigen::Vector2d::Constant(window_m_ / 2.0);
+  const Eigen::Vector2d half = Eigen::Vector2d::Constant(edge_m / 2.0);
   return {Eigen::AlignedBox2d(robot_map - half, robot_map + half), {}};
 }
 
@@ -58,9 +68,8 @@ TraversabilityPublisher::TraversabilityPublisher(dds::Participant& participant,
 
 void TraversabilityPublisher::publish() {
   OccupancyGrid grid = grid_provider_.grid();
-  if (grid.status == TraversabilityStatus::too_large) {
-    throttled_log_.warn("grid", "no grid is published: " + grid.reason);
-  }
+  if (grid.status == TraversabilityStatus::ok && !grid.reason.empty())
+    throttled_log_.warn("grid", "the published grid is a part of the area: " + grid.reason);
   if (is_same_grid(grid, published_)) return;
   published_ = std::move(grid);
   // A keep-last writer always has room.

@@ -20,14 +20,16 @@ class TraversabilityGridProvider {
                              const LatestMap& latest_map,
                              const TraversabilitySnapshot& traversability);
 
-  /// As of the last update. Its status is not ok without a robot or a map, for a window off the
-  /// map, and when the grid would be too large; the reason names a remedy.
+  /// As of the last update. Its status is not ok without a robot or a map, and for a window off the
+  /// map. Where it would be too large, it is a square round the robot instead, and the reason says
+  /// so.
   [[nodiscard]] OccupancyGrid grid() const;
   /// The same with the newest scan's stamp; empty when the status is not ok.
   [[nodiscard]] nav_msgs::msg::OccupancyGrid message(const OccupancyGrid& grid) const;
 
  private:
   [[nodiscard]] TraversabilityRegion window() const;
+  [[nodiscard]] TraversabilityRegion square_round_robot(double edge_m) const;
 
   std::string profile_;
   double window_m_;

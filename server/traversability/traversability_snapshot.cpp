@@ -46,11 +46,12 @@ std::vector<std::shared_ptr<const Tile>> tiles_round(const MapSnapshot& map,
 }  // namespace
 
 void TraversabilitySnapshot::publish(Views views, std::shared_ptr<const MapSnapshot> map,
-                                     const TileRange& window) {
+                                     const TileRange& window, std::uint64_t corrections) {
   const std::scoped_lock lock(mutex_);
   views_ = std::move(views);
   map_ = std::move(map);
   window_ = window;
+  corrections_ = corrections;
 }
 
 bool TraversabilitySnapshot::Known::has(const Tile& tile) const {
@@ -67,7 +68,7 @@ TraversabilitySnapshot::Known TraversabilitySnapshot::known(const std::string& p
   const auto found = std::ranges::find_if(
       views_, [&](const auto& candidate) { return candidate->profile.name == profile; });
   if (found == views_.end()) throw std::invalid_argument(unknown_profile(profile, views_));
-  return {*found, map_, window_};
+  return {*found, map_, window_, corrections_};
 }
 
 TraversabilityCache::TraversabilityCache(const TraversabilitySnapshot& snapshot,
@@ -81,13 +82,18 @@ std::shared_ptr<const TraversabilityView> TraversabilityCache::view(
   auto tiles = tiles_round(*map, box_map);
   // After a load or a reset what is kept is of the last map for a while.
   const bool is_of_map = kept.map == nullptr || kept.map->map_id == map->map_id;
-  if (is_of_map && std::ranges::all_of(tiles, [&](const auto& tile) { return kept.has(*tile); }))
+  // After a correction it holds only where that moved nothing.
+  const bool is_where_it_was = kept.map == nullptr ||
+                               kept.corrections == latest_map_.corrections() ||
+                               tiles_round(*kept.map, box_map) == tiles;
+  if (is_of_map && is_where_it_was &&
+      std::ranges::all_of(tiles, [&](const auto& tile) { return kept.has(*tile); }))
     return kept.view;
   if (tiles.size() > max_tiles) {
-    throw std::invalid_argument(
-        "the region has " + std::to_string(tiles.size()) +
-        " tiles or more, of which some are on disk or far from the robot; at most " +
-        std::to_string(max_tiles) + " can be answered: ask for parts");
+    throw std::invalid_argument("the region has " + std::to_string(tiles.size()) +
+                                " tiles or more, of which some are on disk, far from the robot or "
+                                "just corrected; at most " +
+                                std::to_string(max_tiles) + " can be answered: ask for parts");
   }
   for (auto& tile : tiles) tile = tiles_.read(tile);
   MapSnapshot part = *map;

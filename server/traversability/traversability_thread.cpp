@@ -22,6 +22,9 @@ constexpr std::chrono::seconds idle_period{1};
 /// has tiles, however large the map is.
 constexpr double window_m = 1000.0;
 
+/// A grid that shows a window round the robot follows it in such steps while the map stays [m].
+constexpr double noticed_motion_m = 1.0;
+
 TileRange window_round(const Eigen::Vector3d& robot_map, double tile_size_m) {
   if (!(tile_size_m > 0.0)) return {};
   const Eigen::Vector3d half = Eigen::Vector3d::Constant(window_m / 2.0);
@@ -66,15 +69,28 @@ TraversabilityThread::TraversabilityThread(std::vector<RobotProfile> robots,
 
 void TraversabilityThread::follow_map(const std::stop_token& stop) {
   const auto map_update = latest_map_.wait_for_update(known_, stop, idle_period);
-  if (!map_update) return;
+  if (!map_update) return follow_robot();
   clock_.sleep_until(next_update_, stop);
   if (stop.stop_requested()) return;
   next_update_ = clock_.now() + std::chrono::duration_cast<Clock::duration>(period_);
+  corrections_ = latest_map_.corrections();
   known_ = latest_map_.view();
-  window_ = window_round(latest_map_.newest_pose().T_map_lidar.translation(), known_->tile_size_m);
+  robot_map_ = latest_map_.newest_pose().T_map_lidar.translation();
+  window_ = window_round(robot_map_, known_->tile_size_m);
   update(in_memory(*known_, window_));
   const std::chrono::duration<double, std::milli> latency = Clock::now() - map_update->published_at;
   statistics_.add_latency("traversability", latency.count());
+}
+
+void TraversabilityThread::follow_robot() {
+  if (!known_) return;
+  const Eigen::Vector3d robot_map = latest_map_.newest_pose().T_map_lidar.translation();
+  if ((robot_map - robot_map_).norm() < noticed_motion_m) return;
+  robot_map_ = robot_map;
+  const TileRange window = window_round(robot_map_, known_->tile_size_m);
+  if (window.first == window_.first && window.last == window_.last) return updated_();
+  window_ = window;
+  update(in_memory(*known_, window_));
 }
 
 void TraversabilityThread::update(const MapSnapshot& map) {
@@ -90,7 +106,7 @@ void TraversabilityThread::publish() {
   for (const RobotProfile& robot : traversability_.profiles()) {
     views.push_back(traversability_.view(robot.name));
   }
-  snapshot_.publish(std::move(views), known_, window_);
+  snapshot_.publish(std::move(views), known_, window_, corrections_);
 }
 
 }  // namespace stillmap::server

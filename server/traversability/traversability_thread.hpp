@@ -19,10 +19,10 @@ namespace stillmap::server {
 /// thread of idle priority that uses one core.
 class TraversabilityThread {
  public:
-  /// `period` is the shortest time from update to update; `updated` is called after each, in this
-  /// thread. The time from a change of the map until then is the latency "traversability".
-  /// Publishes empty views at once. Throws std::invalid_argument for a robot with faults, or two of
-  /// one name.
+  /// `period` is the shortest time from update to update; `updated` is called after each, and
+  /// where the robot moved on without one, in this thread. The time from a change of the map until
+  /// then is the latency "traversability". Publishes empty views at once. Throws
+  /// std::invalid_argument for a robot with faults, or two of one name.
   TraversabilityThread(std::vector<RobotProfile> robots, std::chrono::duration<double> period,
                        const LatestMap& latest_map, TraversabilitySnapshot& snapshot,
                        Statistics& statistics, std::function<void()> updated,
@@ -32,6 +32,8 @@ class TraversabilityThread {
 
  private:
   void follow_map(const std::stop_token& stop);
+  /// While the map does not change: scans that tell no place drive through it, too.
+  void follow_robot();
   void update(const MapSnapshot& map);
   void publish();
 
@@ -46,6 +48,8 @@ class TraversabilityThread {
   BackgroundScheduling scheduling_;
   bool has_begun_ = false;
   std::shared_ptr<const MapSnapshot> known_;
+  std::uint64_t corrections_ = 0;
+  Eigen::Vector3d robot_map_ = Eigen::Vector3d::Zero();
   TileRange window_;
   MonotonicClock::TimePoint next_update_;
   // Last: stops before what it uses is gone.

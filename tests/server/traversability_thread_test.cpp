@@ -8,6 +8,7 @@
 #include <stdexcept>
 
 #include "server/traversability/traversability_grid.hpp"
+#include "tests/eventually.hpp"
 #include "tests/server/manual_clock.hpp"
 #include "tests/slowdown.hpp"
 #include "tests/traversability/voxel_world.hpp"
@@ -187,6 +188,64 @@ TEST_F(TraversabilityThreadTest, AnswersAreNeverOfTheMapBefore) {
   empty.map_id = other.map_id + 1;
   latest_map_.begin(shared(empty), {});
   EXPECT_TRUE(cache.view("small", box)->tiles.empty());
+}
+
+TEST_F(TraversabilityThreadTest, AnswersAreNeverOfTheMapBeforeItsCorrection) {
+  start(0s);
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
+  thread_.reset();
+  TileReader tiles;
+  const TraversabilityCache cache(snapshot_, latest_map_, tiles);
+  const Eigen::AlignedBox2d box(Eigen::Vector2d(-1.0, -1.0), Eigen::Vector2d(3.0, 3.0));
+  const auto before = cache.view("small", box);
+  EXPECT_EQ(test::look(*before, 1.1, 1.1).cell.cost, 0);
+  // What follows the map as it grows is as of the last update.
+  world_.block(1, 1, 2, 2, 0.3, 2.0, building);
+  latest_map_.publish(shared(world_.view()));
+  EXPECT_EQ(cache.view("small", box), before);
+  world_.block(2, 2, 3, 3, 0.3, 2.0, building);
+  latest_map_.correct(MapCorrection(std::vector{MapCorrection::Pose{.stamp_ns = 0}}),
+                      shared(world_.view()));
+  EXPECT_EQ(test::look(*cache.view("small", box), 1.1, 1.1).cell.cost, 100);
+  start(0s);
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
+  EXPECT_EQ(cache.view("small", box), snapshot_.view("small"));
+}
+
+TEST_F(TraversabilityThreadTest, TheWindowFollowsARobotThatAddsNothingToTheMap) {
+  start(0s);
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
+  const auto updates = [this] {
+    const std::scoped_lock lock(mutex_);
+    return updates_;
+  };
+  const int before = updates();
+  StampedPose pose{.stamp_ns = 5'000'000'000};
+  pose.T_map_lidar.translation().x() = 5.0;
+  latest_map_.add_pose(pose, OdometryHealth::degenerate, "");
+  EXPECT_TRUE(test::eventually([&] { return updates() > before; }));
+  // Beyond the window round where it was.
+  pose.T_map_lidar.translation().x() = 2000.0;
+  latest_map_.add_pose(pose, OdometryHealth::degenerate, "");
+  EXPECT_TRUE(test::eventually([&] { return snapshot_.view("small")->tiles.empty(); }));
+}
+
+TEST_F(TraversabilityThreadTest, AGridThatWouldBeTooLargeIsThatRoundTheRobot) {
+  // Corners of a square of a kilometre.
+  world_.ground(-502, -502, -498, -498, road);
+  world_.ground(498, 498, 502, 502, road);
+  latest_map_.publish(shared(world_.view()));
+  start(0s);
+  ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
+  TraversabilityConfig config;
+  config.profiles = {"small"};
+  config.grid_profile = "small";
+  const TraversabilityGridProvider whole(config, "map", latest_map_, snapshot_);
+  const OccupancyGrid grid = whole.grid();
+  ASSERT_EQ(grid.status, TraversabilityStatus::ok) << grid.reason;
+  EXPECT_THAT(grid.reason, HasSubstr("m round the robot"));
+  EXPECT_NEAR(grid.width, 4998.0, 2.0);
+  EXPECT_EQ(grid.data.size(), std::size_t{grid.width} * grid.height);
 }
 
 TEST_F(TraversabilityThreadTest, NamesTheRobotsThereAre) {
