@@ -284,7 +284,11 @@ void LoopCloser::place_nodes() {
   if (settled_doubts_ && position_counts().in_doubt <= *settled_doubts_) {
     PoseGraph before = graph_;
     place_by_positions(1.0);
-    if (position_counts().in_doubt <= *settled_doubts_) return;
+    // Those that are believed again must not hide as many others later.
+    if (const std::size_t doubts = position_counts().in_doubt; doubts <= *settled_doubts_) {
+      settled_doubts_ = doubts;
+      return;
+    }
     take_graph(std::move(before));
   }
   settled_doubts_.reset();
