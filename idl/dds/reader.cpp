@@ -54,7 +54,8 @@ void ReaderEvents::on_subscription_matched(DataReader*, const SubscriptionMatche
   const std::scoped_lock lock(mutex_);
   if (status.current_count_change > 0) {
     writers_.insert(writer);
-  } else {
+  } else if (status.current_count_change < 0) {
+    // Of two threads that match at once, the second may be told of no change.
     writers_.erase(writer);
   }
   changed_.notify_all();

@@ -21,6 +21,14 @@ constexpr std::chrono::duration<double> min_patience = 500ms;
 // Under a rate limit, so many times what sending all of them takes.
 constexpr double sending_margin = 2.0;
 
+/// Bytes bound what is held. The least recent reply would go first where their number did, whether
+/// its client has it or not.
+TopicQos reply_qos() {
+  TopicQos qos = service_qos();
+  qos.depth = 100'000;
+  return qos;
+}
+
 GuidPrefix_t process_of(const ServiceCall& call) { return call.request_writer.guidPrefix; }
 
 }  // namespace
@@ -38,7 +46,7 @@ ReplyWriter::ReplyWriter(Participant& participant, const std::string& service,
                          const std::string& type_name)
     : rate_bytes_per_s_(participant.options().large_message_bytes_per_s),
       filter_(std::make_unique<ToAskingProcess>()),
-      writer_(participant, reply_topic(service), type_name, service_qos()),
+      writer_(participant, reply_topic(service), type_name, reply_qos()),
       rtps_writer_(&find_rtps_writer(writer_.guid())) {
   const std::scoped_lock lock(rtps_writer_->getMutex());
   rtps_writer_->reader_data_filter(filter_.get());
