@@ -1,12 +1,14 @@
 #include "server/arguments.hpp"
 
 #include <CLI/CLI.hpp>
+#include <chrono>
 #include <iostream>
 #include <map>
 #include <string>
 
 #include "config/loaders/listening_address.hpp"
 #include "config/loaders/model_file.hpp"
+#include "idl/dds/security/identity.hpp"
 
 namespace stillmap::server {
 namespace {
@@ -56,11 +58,19 @@ void add_operation_options(CLI::App& program, OperationArguments& operation) {
       ->check(listening_address_fault);
 }
 
-/// Throws ConfigError with every fault, or ModelError.
+/// Throws ConfigError with every fault, ModelError or SecurityError.
 Arguments check_config(const std::string& file) {
   ConfigReport report;
   const ServerConfig config = load_server_config(file, report);
   const auto labels = open_segmenter(config.labels, config.mapper.sensor, true);
+  if (!config.dds.security.empty()) {
+    static_cast<void>(dds::load_identity(config.dds.security));
+    for (const std::string& warning :
+         dds::check_identity(config.dds.security, std::chrono::floor<std::chrono::seconds>(
+                                                      std::chrono::system_clock::now()))
+             .warnings)
+      std::cerr << warning << "\n";
+  }
   std::cout << file << " can be used; labels by " << labels->name() << "\n";
   if (report.changed.empty()) std::cout << "all is as by default\n";
   for (const std::string& field : report.changed) std::cout << "not the default: " << field << "\n";

@@ -7,6 +7,8 @@
 #include <cstring>
 #include <exception>
 #include <iostream>
+#include <set>
+#include <string>
 
 #include "config/loaders/model_file.hpp"
 #include "config/loaders/openmp_waits.hpp"
@@ -36,6 +38,15 @@ void notify_systemd(const char* state) {
   }
 }
 
+std::string topics_of_scans(const stillmap::ServerConfig& config) {
+  std::set<std::string> topics;
+  for (const auto& lidar : config.lidars) topics.insert("rt/" + lidar.topic);
+  if (topics.empty()) return "rt/" + config.topics.points;
+  std::string text;
+  for (const std::string& topic : topics) text += (text.empty() ? "" : ", ") + topic;
+  return text;
+}
+
 /// Returns the exit code.
 int serve(const stillmap::ServerConfig& config) {
   sigset_t signals = stillmap::block_stop_signals();
@@ -53,7 +64,9 @@ int serve(const stillmap::ServerConfig& config) {
   if (const auto hint = stillmap::better_model(config.labels, config.mapper.sensor); !hint.empty())
     spdlog::info("{}; labels.model chooses", hint);
   stillmap::server::Server server(config, std::move(labels));
-  spdlog::info("ready: scans from rt/{}, domain {}", config.topics.points, config.dds.domain_id);
+  spdlog::info("ready: scans from {}, domain {}", topics_of_scans(config), config.dds.domain_id);
+  if (config.map.file.empty())
+    spdlog::info("the map is not kept in a file: map.file is empty, and --map-file was not given");
   notify_systemd("READY=1");
   int signal = 0;
   sigwait(&signals, &signal);

@@ -150,6 +150,11 @@ void read_network(YamlSection& section, const fs::path& folder, DdsNetworkConfig
   section.text_list("peers", network.peers);
   section.text("discovery_server", network.discovery_server);
   section.integer("socket_buffer_bytes", network.socket_buffer_bytes, {0, 1U << 30U});
+  // No datagram of Fast DDS fits into less, and it says nothing.
+  constexpr std::uint32_t min_socket_buffer_bytes = 65536;
+  if (network.socket_buffer_bytes > 0 && network.socket_buffer_bytes < min_socket_buffer_bytes)
+    section.fault("socket_buffer_bytes", "is " + std::to_string(network.socket_buffer_bytes) +
+                                             "; must be 65536 or more, or 0 for the profile's");
   try {
     static_cast<void>(dds_options(network, DdsRole::server));
   } catch (const ConfigError& error) {
@@ -161,6 +166,8 @@ void read_dds(YamlSection section, const fs::path& folder, DdsConfig& dds) {
   section.integer("domain_id", dds.domain_id, {0, dds::max_domain_id});
   read_network(section, folder, dds.network);
   section.text("participant_name", dds.participant_name);
+  if (dds.participant_name.empty())
+    section.fault("participant_name", "is empty; ROS 2 and peers find the server by it");
   section.path("security", dds.security);
   if (section.has("ros_gid_bytes")) {
     section.fault(
