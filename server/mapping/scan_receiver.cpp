@@ -56,8 +56,14 @@ dds::TopicSpec<sensor_msgs::msg::PointCloud2> points_of(const ServerConfig& conf
   return dds::points_topic(ros_topic, config.input.delivery, waiting);
 }
 
-wire::CloudReadOptions reading_of(const InputConfig& input, const SensorModel& sensor) {
-  return {.fields = input.fields,
+wire::CloudReadOptions reading_of(const ServerConfig& config, const SensorModel& sensor) {
+  const InputConfig& input = config.input;
+  PointFieldNames fields = input.fields;
+  // A field that nobody reads cannot be wrong.
+  const bool reads_labels = config.labels.source == LabelProvider::automatic ||
+                            config.labels.source == LabelProvider::stream;
+  if (!reads_labels) fields.label.clear();
+  return {.fields = std::move(fields),
           .intensity_scale = sensor.intensity_scale,
           .labels_are_classes = input.label_kind == LabelKind::classes};
 }
@@ -147,7 +153,7 @@ ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& co
                      .name = "",
                      .frame = "",
                      .sensor = config.mapper.sensor,
-                     .reader = wire::CloudReader(reading_of(config.input, config.mapper.sensor))}},
+                     .reader = wire::CloudReader(reading_of(config, config.mapper.sensor))}},
                    nullptr, queue, statistics) {}
 
 ScanReceiver::ScanReceiver(dds::Participant& participant, const ServerConfig& config,
@@ -188,7 +194,7 @@ std::vector<ScanReceiver::Lidar> ScanReceiver::lidars_on(const ServerConfig& con
                       .name = lidar.name,
                       .frame = lidar.frame,
                       .sensor = lidar.sensor,
-                      .reader = wire::CloudReader(reading_of(config.input, lidar.sensor))});
+                      .reader = wire::CloudReader(reading_of(config, lidar.sensor))});
   }
   return lidars;
 }

@@ -16,7 +16,11 @@ StaticTransforms::StaticTransforms(dds::Participant& participant, const dds::Top
       reader_(participant, topics.tf_static.dds_name, topics.tf_static.reader),
       worker_(std::chrono::seconds(0),
               [this, message = tf2_msgs::msg::TFMessage()](const std::stop_token& stop) mutable {
-                if (reader_.take(message, stop, std::chrono::seconds(1))) take(message);
+                eprosima::fastdds::dds::SampleInfo info;
+                // Our own are of the map, and tell nothing of the robot.
+                if (reader_.take(message, info, stop, std::chrono::seconds(1)) &&
+                    info.sample_identity.writer_guid().guidPrefix != reader_.guid().guidPrefix)
+                  take(message);
               }) {}
 
 void StaticTransforms::take(const tf2_msgs::msg::TFMessage& message) {
