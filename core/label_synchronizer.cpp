@@ -60,7 +60,11 @@ void LabelSynchronizer::insert_late_labels(std::int64_t stamp_ns, PointLabels la
     labelled.motion[i] = movable ? Motion::semi_static : Motion::stationary;
   }
   map.insert(labelled, late.T_map_lidar);
-  remember_labelled(std::move(late));
+  // Several networks at work end in any order. A clock that was set back makes no scan older.
+  constexpr std::int64_t max_overtaking_ns = 5'000'000'000;
+  const std::int64_t older_ns =
+      last_labelled_ ? last_labelled_->labelled.scan.stamp_ns - stamp_ns : 0;
+  if (older_ns <= 0 || older_ns > max_overtaking_ns) remember_labelled(std::move(late));
 }
 
 LabelSynchronizer::Labels LabelSynchronizer::labels_for(

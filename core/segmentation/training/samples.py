@@ -145,6 +145,11 @@ class BatchesBySensor(torch.utils.data.Sampler):
         rows = np.array([self.scans.images[i].rows for i in drawn])
         for group in np.unique(rows):
             members = random.permutation(drawn[rows == group])
+            if len(members) < self.batch:
+                raise SystemExit(
+                    f"{len(members)} scans have {group} rows, fewer than optimiser.batch = "
+                    f"{self.batch}: add scans, draw them more often (data.train_draws), or lower it"
+                )
             for begin in range(0, len(members) - self.batch + 1, self.batch):
                 chosen = members[begin : begin + self.batch]
                 yield [(int(i), int(random.integers(2**31))) for i in chosen]
