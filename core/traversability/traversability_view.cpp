@@ -314,7 +314,8 @@ NearestTraversable nearest_traversable(const TraversabilityView& view,
   }
   if (best) {
     const CellLookup::Found found = lookup.at(best->cell);
-    return {.position_map = view.centre_of(best->cell),
+    return {.reason = {},
+            .position_map = view.centre_of(best->cell),
             .height_m = found.surface->ground.height_m,
             .distance_m = best->distance_m,
             .cell = found.cell,

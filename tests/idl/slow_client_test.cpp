@@ -2,9 +2,11 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <csignal>
 #include <cstddef>
 #include <fstream>
+#include <semaphore>
 
 #include "idl/dds/service_client.hpp"
 #include "idl/dds/service_server.hpp"
@@ -30,13 +32,14 @@ constexpr int stopped_requests = 90;
 constexpr int min_refused = 40;
 constexpr std::size_t large_reply_bytes = 4'000'000;
 
-/// Asks 90 times, stops itself, and looks at the replies when it goes on, until enough of them say
-/// why there is no other.
+/// Asks so many times, takes the first reply, stops itself, and counts replies when it goes on.
 class StoppingClient {
  public:
-  explicit StoppingClient(std::uint32_t domain_id)
-      : pid_(::fork()), is_child_(pid_ == 0), domain_id_(domain_id) {
-    if (is_child_) ::_exit(run());
+  using Count = int(SerializedSampleReader&);
+
+  StoppingClient(std::uint32_t domain_id, int requests, Count* count)
+      : pid_(::fork()), is_child_(pid_ == 0), domain_id_(domain_id), requests_(requests) {
+    if (is_child_) ::_exit(run(count));
   }
   ~StoppingClient() { ::kill(pid_, SIGKILL); }
   StoppingClient(const StoppingClient&) = delete;
@@ -47,17 +50,19 @@ class StoppingClient {
     return ::waitpid(pid_, &how, WUNTRACED) == pid_ && WIFSTOPPED(how);
   }
 
-  /// Lets it go on; its refused requests.
-  [[nodiscard]] int refused() const {
+  /// Lets it go on; what it counted.
+  [[nodiscard]] int counted() const {
     ::kill(pid_, SIGCONT);
     int how = 0;
     return ::waitpid(pid_, &how, 0) == pid_ && WIFEXITED(how) ? WEXITSTATUS(how) : -1;
   }
 
  private:
-  [[nodiscard]] int run() const {
+  [[nodiscard]] int run(Count* count) const {
     DdsOptions options = loopback(false);
     options.domain_id = domain_id_;
+    // Else the server forgets it on a busy machine.
+    options.lease_s = static_cast<std::uint32_t>(discovery_timeout.count());
     Participant participant(options);
     const auto request_type = type_support<SaveMap_Request>();
     SerializedSampleWriter asker(participant, request_topic(large_service),
@@ -69,7 +74,7 @@ class StoppingClient {
     const SaveMap_Request request;
     SerializedSample first;
     eprosima::fastdds::dds::SampleInfo info;
-    for (int i = 0; i < stopped_requests; ++i) {
+    for (int i = 0; i < requests_; ++i) {
       // Its reply shows that the server knows this reader, too.
       if (i == 1) static_cast<void>(replies.take(first, info, {}, discovery_timeout));
       eprosima::fastrtps::rtps::WriteParams params;
@@ -78,28 +83,35 @@ class StoppingClient {
     }
     static_cast<void>(asker.wait_for_acknowledgements(discovery_timeout));
     ::raise(SIGSTOP);
-    return count_refused(replies);
-  }
-
-  static int count_refused(SerializedSampleReader& replies) {
-    int refused = 0;
-    SerializedSample bytes;
-    eprosima::fastdds::dds::SampleInfo info;
-    while (refused < min_refused && replies.take(bytes, info, {}, discovery_timeout)) {
-      SaveMap_Response reply;
-      if (from_bytes(type_support<SaveMap_Response>(), bytes, &reply) &&
-          reply.status().code() == 3 &&
-          reply.status().reason().find("was the process stopped") != std::string::npos) {
-        ++refused;
-      }
-    }
-    return refused;
+    return count(replies);
   }
 
   pid_t pid_;
   bool is_child_;
   std::uint32_t domain_id_;
+  int requests_;
 };
+
+/// Until enough of them say why there is no other.
+int refusals(SerializedSampleReader& replies) {
+  int refused = 0;
+  SerializedSample bytes;
+  eprosima::fastdds::dds::SampleInfo info;
+  while (refused < min_refused && replies.take(bytes, info, {}, discovery_timeout)) {
+    SaveMap_Response reply;
+    if (from_bytes(type_support<SaveMap_Response>(), bytes, &reply) && reply.status().code() == 3 &&
+        reply.status().reason().find("was the process stopped") != std::string::npos) {
+      ++refused;
+    }
+  }
+  return refused;
+}
+
+int next_reply(SerializedSampleReader& replies) {
+  SerializedSample bytes;
+  eprosima::fastdds::dds::SampleInfo info;
+  return replies.take(bytes, info, {}, discovery_timeout) ? 1 : 0;
+}
 
 std::size_t memory_in_use() {
 #if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
@@ -119,7 +131,7 @@ class SlowClient : public testing::TestWithParam<std::uint32_t> {};
 
 TEST_P(SlowClient, ThatIsStoppedLosesAndIsToldAndNobodyElseNotices) {
   // Forked before this process has threads.
-  const StoppingClient stopping(test_domain_id());
+  const StoppingClient stopping(test_domain_id(), stopped_requests, refusals);
   DdsOptions options = loopback(false);
   options.large_message_bytes_per_s = GetParam();
   Participant server_side(options);
@@ -148,7 +160,32 @@ TEST_P(SlowClient, ThatIsStoppedLosesAndIsToldAndNobodyElseNotices) {
   }
   // All replies to both are 440 MB.
   EXPECT_LT(memory_in_use() - before, 220'000'000U);
-  EXPECT_GE(stopping.refused(), min_refused);
+  EXPECT_GE(stopping.counted(), min_refused);
+}
+
+TEST(PausedClient, GetsItsReplyHoweverManyOthersGetTheirsMeanwhile) {
+  const StoppingClient paused(test_domain_id(), 2, next_reply);
+  Participant server_side(loopback(false));
+  std::atomic<int> requests = 0;
+  std::binary_semaphore is_paused(0);
+  ServiceServer<SaveMap_Request, SaveMap_Response> server(server_side, large_service,
+                                                          [&](const SaveMap_Request&) {
+                                                            // Its second one.
+                                                            if (++requests == 2)
+                                                              is_paused.acquire();
+                                                            return SaveMap_Response();
+                                                          });
+  const bool has_stopped = paused.wait_until_stopped();
+  is_paused.release();
+  ASSERT_TRUE(has_stopped);
+  {
+    Participant other_side(loopback(false));
+    ServiceClient<SaveMap_Request, SaveMap_Response> other(other_side, large_service);
+    ASSERT_TRUE(other.wait_for_server(discovery_timeout));
+    for (int i = 0; i < 150; ++i)
+      ASSERT_TRUE(other.call(SaveMap_Request(), discovery_timeout)) << i;
+  }
+  EXPECT_EQ(paused.counted(), 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(Networks, SlowClient, testing::Values(0U, 40'000'000U),
