@@ -16,13 +16,13 @@ const Eigen::Isometry3d T_enu_map_true =
 /// Of a bent way, each with noise of its own.
 std::vector<PointOnEarth> points_of_way(double length_m, double sigma_m, double noise_m) {
   std::mt19937_64 random(5);
-  std::normal_distribution<double> normal(0.0, noise_m);
+  std::normal_distribution<double> normal;
   std::vector<PointOnEarth> points;
   for (double way = 0.0; way < length_m; way += 5.0) {
     PointOnEarth point;
     point.position_map = {way, 20.0 * std::sin(0.02 * way), 0.01 * way};
     point.position_enu = T_enu_map_true * point.position_map;
-    for (double& axis : point.position_enu) axis += normal(random);
+    for (double& axis : point.position_enu) axis += noise_m * normal(random);
     point.sigma_m = sigma_m;
     points.push_back(point);
   }

@@ -168,13 +168,15 @@ TEST(PausedClient, GetsItsReplyHoweverManyOthersGetTheirsMeanwhile) {
   Participant server_side(loopback(false));
   std::atomic<int> requests = 0;
   std::binary_semaphore is_paused(0);
-  ServiceServer<SaveMap_Request, SaveMap_Response> server(server_side, large_service,
-                                                          [&](const SaveMap_Request&) {
-                                                            // Its second one.
-                                                            if (++requests == 2)
-                                                              is_paused.acquire();
-                                                            return SaveMap_Response();
-                                                          });
+  const auto answer = [&](const SaveMap_Request&) {
+    SaveMap_Response reply;
+    if (++requests != 2) return reply;
+    // Its second one, of which no socket takes all while nobody reads.
+    is_paused.acquire();
+    reply.file(std::string(3 * large_reply_bytes, 'x'));
+    return reply;
+  };
+  ServiceServer<SaveMap_Request, SaveMap_Response> server(server_side, large_service, answer);
   const bool has_stopped = paused.wait_until_stopped();
   is_paused.release();
   ASSERT_TRUE(has_stopped);
