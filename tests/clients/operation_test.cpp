@@ -263,6 +263,9 @@ TEST_F(OperationTest, ChecksAConfigurationWithoutStarting) {
                                           HasSubstr("metrics.address"), HasSubstr("log.level")));
   EXPECT_EQ(check("no_model.yaml"), 2);
   EXPECT_THAT(content("check.log"), HasSubstr("missing"));
+  write("no_identity.yaml", "labels: {source: none}\ndds: {security: absent}\n");
+  EXPECT_EQ(check("no_identity.yaml"), 2);
+  EXPECT_THAT(content("check.log"), AllOf(HasSubstr("absent"), Not(HasSubstr("can be used"))));
 }
 
 TEST_F(OperationTest, LogsByLevelAndForTheJournalWithoutASecondClock) {

@@ -176,6 +176,12 @@ TEST(ServerConfig, FindsEveryFaultAtOnceWithItsLine) {
                           HasSubstr("server.yaml:6: foo")));
 }
 
+TEST(ServerConfig, RefusesWhatDdsCannotUse) {
+  EXPECT_THAT(refusal_of("dds: {socket_buffer_bytes: 1000}"), HasSubstr("must be 65536 or more"));
+  EXPECT_THAT(refusal_of("dds: {participant_name: \"\"}"),
+              HasSubstr("dds.participant_name: is empty"));
+}
+
 TEST(ServerConfig, SuggestsTheNameThatWasMeant) {
   EXPECT_THAT(refusal_of("publish: {path_period: 2}"), HasSubstr("did you mean 'path_period_s'"));
   EXPECT_THAT(refusal_of("odometri: {alpha: 0.1}"), HasSubstr("did you mean 'odometry'"));
