@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cstring>
 
 namespace stillmap::dds::mcap {
 namespace {
@@ -18,7 +17,7 @@ class Plain final : public Decompressor {
  public:
   Progress decompress(std::span<const std::uint8_t> from, std::span<std::uint8_t> to) override {
     const std::size_t bytes = std::min(from.size(), to.size());
-    std::memcpy(to.data(), from.data(), bytes);
+    std::copy_n(from.begin(), bytes, to.begin());
     return {bytes, bytes};
   }
 };
