@@ -4,7 +4,6 @@
 
 #include <cassert>
 #include <cmath>
-#include <numbers>
 #include <stdexcept>
 #include <utility>
 
@@ -33,18 +32,6 @@ constexpr double max_relocalization_reach_m = 60.0;
 /// Motion is classified again where the pose is farther than this from the predicted one [m, rad].
 constexpr double reclassify_distance_m = 0.2;
 constexpr double reclassify_angle_rad = 0.01;
-
-/// Deviations of a pose that nothing older confirms [m, rad] grow with the time since one was
-/// confirmed: by this share of the way at the speed of then, or at this one, and by this rate.
-constexpr double min_unconfirmed_speed_m_s = 1.0;
-constexpr double unconfirmed_turn_rate_rad_s = 0.2;
-/// It may have braked or turned off since, or have been found where it is not; where it was
-/// followed, or what carries it says how it moves, it has only slid.
-constexpr double guessed_share_of_way = 0.5;
-constexpr double followed_share_of_way = 0.05;
-/// Beyond these, nothing is known: of a direction, that it is one of all.
-constexpr double max_unconfirmed_m = 1000.0;
-constexpr double max_unconfirmed_rad = std::numbers::pi / std::numbers::sqrt3;
 
 }  // namespace
 
@@ -120,10 +107,8 @@ struct Odometry::State {
   void begin_anew(const FeatureSets& features, OdometryResult& result);
   /// Local map and velocity as they were before the stretch.
   void forget_stretch();
-  /// What may have happened to the pose since one was confirmed, for a scan that is not.
-  [[nodiscard]] Eigen::Matrix<double, 6, 6> drift_covariance(std::int64_t time_ns,
-                                                             const PosePrediction& prediction,
-                                                             bool is_lost) const;
+  /// To the covariance of a pose that is not confirmed.
+  void add_drift(std::int64_t time_ns, const PosePrediction& prediction, OdometryResult& result);
   [[nodiscard]] SweepPrior sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,
                                        const SweepMotion& motion) const;
   void extend_map(const ScanInParts& parts, const Step& step,
@@ -364,22 +349,14 @@ void Odometry::State::forget_stretch() {
   stretch.reset();
 }
 
-Eigen::Matrix<double, 6, 6> Odometry::State::drift_covariance(std::int64_t time_ns,
-                                                              const PosePrediction& prediction,
-                                                              bool is_lost) const {
-  if (!started) return Eigen::Matrix<double, 6, 6>::Zero();
-  const RegisteredScan& known = stretch ? stretch->trusted().last : last;
-  const ScanIntervals& since = stretch ? stretch->trusted().intervals : intervals;
-  const bool is_followed = prediction.is_prior || (stretch && !is_lost && !stretch->has_jumped());
-  const double gone_s = (is_followed ? followed_share_of_way : guessed_share_of_way) *
-                        std::max(0.0, since.since_last_s(time_ns));
-  const double speed_m_s =
-      known.interval_s > 0.0 ? known.motion.translation().norm() / known.interval_s : 0.0;
-  PoseTangent sigma;
-  sigma.head<3>().setConstant(
-      std::min(gone_s * std::max(min_unconfirmed_speed_m_s, speed_m_s), max_unconfirmed_m));
-  sigma.tail<3>().setConstant(std::min(gone_s * unconfirmed_turn_rate_rad_s, max_unconfirmed_rad));
-  return sigma.cwiseAbs2().asDiagonal();
+void Odometry::State::add_drift(std::int64_t time_ns, const PosePrediction& prediction,
+                                OdometryResult& result) {
+  if (!started) return;
+  const bool is_followed =
+      stretch && !stretch->has_jumped() && result.health != OdometryHealth::lost;
+  const double since_s = (stretch ? stretch->trusted().intervals : intervals).since_last_s(time_ns);
+  result.covariance += drift_covariance(stretch ? stretch->trusted().last : last, since_s,
+                                        is_followed || prediction.is_prior);
 }
 
 SweepPrior Odometry::State::sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,
@@ -475,8 +452,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   step.motion = classify_point_motion(scan, labels, parts.objects, parts.motion_classes,
                                       step.T_map_lidar_middle, state.map, state.config);
   const bool is_lost = step.result.health == OdometryHealth::lost;
-  if (!step.result.is_confirmed)
-    step.result.covariance += state.drift_covariance(time_ns, prediction, is_lost);
+  if (!step.result.is_confirmed) state.add_drift(time_ns, prediction, step.result);
   state.lost_scans = is_lost ? state.lost_scans + 1 : 0;
   if (!is_lost) {
     state.extend_map(parts, step, step.T_map_lidar_middle);

@@ -1,5 +1,8 @@
 #include "core/odometry/unconfirmed_stretch.hpp"
 
+#include <algorithm>
+#include <numbers>
+
 #include "core/odometry/relocalization.hpp"
 
 namespace stillmap {
@@ -31,7 +34,32 @@ constexpr int scans_to_agree_in = 20;
 /// of its motion for so long [m] that nothing of the trusted map can be in sight.
 constexpr double settling_path_m = 100.0;
 
+/// Deviations of a pose that nothing older confirms [m, rad] grow with the time since one was
+/// confirmed: by this share of the way at the speed of then, or at this one, and by this rate.
+constexpr double min_unconfirmed_speed_m_s = 1.0;
+constexpr double unconfirmed_turn_rate_rad_s = 0.2;
+/// It may have braked or turned off since, or have been found where it is not; where it was
+/// followed, or what carries it says how it moves, it has only slid.
+constexpr double guessed_share_of_way = 0.5;
+constexpr double followed_share_of_way = 0.05;
+/// Beyond these, nothing is known: of a direction, that it is one of all.
+constexpr double max_unconfirmed_m = 1000.0;
+constexpr double max_unconfirmed_rad = std::numbers::pi / std::numbers::sqrt3;
+
 }  // namespace
+
+Eigen::Matrix<double, 6, 6> drift_covariance(const RegisteredScan& known, double since_s,
+                                             bool is_followed) {
+  const double gone_s =
+      (is_followed ? followed_share_of_way : guessed_share_of_way) * std::max(0.0, since_s);
+  const double speed_m_s =
+      known.interval_s > 0.0 ? known.motion.translation().norm() / known.interval_s : 0.0;
+  PoseTangent sigma;
+  sigma.head<3>().setConstant(
+      std::min(gone_s * std::max(min_unconfirmed_speed_m_s, speed_m_s), max_unconfirmed_m));
+  sigma.tail<3>().setConstant(std::min(gone_s * unconfirmed_turn_rate_rad_s, max_unconfirmed_rad));
+  return sigma.cwiseAbs2().asDiagonal();
+}
 
 void UnconfirmedStretch::jump(double distance_m) {
   has_jumped_ = true;

@@ -9,6 +9,11 @@
 
 namespace stillmap {
 
+/// What may have happened to a pose since the last one that was confirmed: covariance of
+/// (translation [m], rotation [rad]) in the map frame. `is_followed`: it has only slid since.
+[[nodiscard]] Eigen::Matrix<double, 6, 6> drift_covariance(const RegisteredScan& known,
+                                                           double since_s, bool is_followed);
+
 /// Scans whose place nothing older than they are has confirmed, since one of them did not show all
 /// of its motion or was found where it was not expected. They extend the local map, so that the
 /// motion among them is known, and so agree with one another wherever they are. What was known
