@@ -201,9 +201,7 @@ OdometryResult Odometry::State::estimate_pose(const FeatureSets& features,
     return found;
   }
   if (lost_scans > 0 && is_searched_widely()) {
-    const double driven_m = last.interval_s > 0.0 ? last.motion.translation().norm() *
-                                                        prediction.interval_s / last.interval_s
-                                                  : 0.0;
+    const double driven_m = last.speed_m_s() * prediction.interval_s;
     const OdometryResult again =
         relocalize(features, points_of(map), map, prediction.T_map_lidar, method(),
                    std::min(relocalization_reach_m + driven_m, max_relocalization_reach_m));

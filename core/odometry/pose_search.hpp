@@ -42,6 +42,10 @@ struct RegisteredScan {
   /// Motion from the scan before it, and the time between them [s]; 0: there was none.
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
   double interval_s = 0.0;
+  /// 0 while it is not known.
+  [[nodiscard]] double speed_m_s() const {
+    return interval_s > 0.0 ? motion.translation().norm() / interval_s : 0.0;
+  }
 };
 
 /// Where the next scan is expected.

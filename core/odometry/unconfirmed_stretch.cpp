@@ -52,11 +52,9 @@ Eigen::Matrix<double, 6, 6> drift_covariance(const RegisteredScan& known, double
                                              bool is_followed) {
   const double gone_s =
       (is_followed ? followed_share_of_way : guessed_share_of_way) * std::max(0.0, since_s);
-  const double speed_m_s =
-      known.interval_s > 0.0 ? known.motion.translation().norm() / known.interval_s : 0.0;
   PoseTangent sigma;
   sigma.head<3>().setConstant(
-      std::min(gone_s * std::max(min_unconfirmed_speed_m_s, speed_m_s), max_unconfirmed_m));
+      std::min(gone_s * std::max(min_unconfirmed_speed_m_s, known.speed_m_s()), max_unconfirmed_m));
   sigma.tail<3>().setConstant(std::min(gone_s * unconfirmed_turn_rate_rad_s, max_unconfirmed_rad));
   return sigma.cwiseAbs2().asDiagonal();
 }
