@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cmath>
+#include <ctime>
 #include <filesystem>
 #include <limits>
 #include <thread>
@@ -202,6 +203,32 @@ TEST(NetworkSegmenter, GivesTheSameLabelsForSeveralScansAtATime) {
       for (int i = 0; i < 20; ++i) EXPECT_EQ(labels->segment(scans[n]).classes, expected[n]);
     });
   }
+}
+
+double cpu_s(clockid_t clock) {
+  timespec time{};
+  clock_gettime(clock, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+TEST(NetworkSegmenter, OneThreadWorksOnAScanWhereSeveralScansAreWorkedOnAtATime) {
+  ModelDescription model = test::describe_family(16, 128, 20);
+  model.network_file = write_model(test::light_bytes(8, 0, 0, 20));
+  const auto labels = open_model(model);
+  if (labels->concurrent_scans() == 1) GTEST_SKIP() << "one core";
+  const Scan scan = random_scan(600, 4);
+  labels->set_parallelism(Parallelism::across_scans);
+  static_cast<void>(labels->segment(scan));
+  std::jthread([&] {
+    static_cast<void>(labels->segment(scan));
+    const double others_before_s = cpu_s(CLOCK_PROCESS_CPUTIME_ID) - cpu_s(CLOCK_THREAD_CPUTIME_ID);
+    const double before_s = cpu_s(CLOCK_THREAD_CPUTIME_ID);
+    for (int i = 0; i < 50; ++i) static_cast<void>(labels->segment(scan));
+    const double own_s = cpu_s(CLOCK_THREAD_CPUTIME_ID) - before_s;
+    const double others_s =
+        cpu_s(CLOCK_PROCESS_CPUTIME_ID) - cpu_s(CLOCK_THREAD_CPUTIME_ID) - others_before_s;
+    EXPECT_LT(others_s, 0.2 * own_s);
+  });
 }
 
 TEST(NetworkSegmenter, KeepsTheNumberOfThreadsThatIsSet) {
