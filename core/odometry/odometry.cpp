@@ -24,8 +24,6 @@
 namespace stillmap {
 namespace {
 
-/// Time beyond which the last velocity is not extrapolated [s].
-constexpr double max_prediction_s = 1.0;
 /// A lost scan is looked for up to so far away, and farther by what was driven since [m].
 constexpr double relocalization_reach_m = 24.0;
 constexpr double max_relocalization_reach_m = 60.0;
@@ -66,13 +64,12 @@ struct Odometry::State {
   [[nodiscard]] bool is_searched_widely() const {
     return lost_scans == 0 || lost_scans % config.relocalization_interval == 1;
   }
-  [[nodiscard]] Eigen::Isometry3d motion_during(double period_s) const;
   /// The IMU's rotation once the first scans have told the velocity; before that the first scan is
   /// straightened without it. The paper has none.
   [[nodiscard]] bool follows(const std::optional<InertialMotion>& inertial) const {
     return inertial && started && !first_scan && !config.paper_exact;
   }
-  /// motion_during() since the last pose, turned as the IMU says.
+  /// By the last motion since that pose, turned as the IMU says.
   [[nodiscard]] Eigen::Isometry3d motion_to_middle(
       double interval_s, const std::optional<InertialMotion>& inertial) const;
   /// Where a scan is, by a prior or the map's origin, else by the last motion.
@@ -147,15 +144,9 @@ bool Odometry::State::has_velocity(std::int64_t stamp_ns) const {
          intervals.since_last_s(stamp_ns) <= max_prediction_s;
 }
 
-Eigen::Isometry3d Odometry::State::motion_during(double period_s) const {
-  if (last.interval_s <= 0.0 || period_s <= 0.0 || period_s > max_prediction_s)
-    return Eigen::Isometry3d::Identity();
-  return scaled_motion(last.motion, period_s / last.interval_s);
-}
-
 Eigen::Isometry3d Odometry::State::motion_to_middle(
     double interval_s, const std::optional<InertialMotion>& inertial) const {
-  const Eigen::Isometry3d T_last_middle = motion_during(interval_s);
+  const Eigen::Isometry3d T_last_middle = last.motion_during(interval_s);
   if (!follows(inertial)) return T_last_middle;
   PoseTangent twist = twist_of(T_last_middle);
   twist.tail<3>() = so3_log(inertial->R_last_middle);
@@ -404,7 +395,7 @@ SweepMotion Odometry::sweep_motion(const SweepTimes& sweep,
 }
 
 Eigen::Isometry3d Odometry::motion_during(double period_s) const {
-  return state_->motion_during(period_s);
+  return state_->last.motion_during(period_s);
 }
 
 bool Odometry::uses_rings() const {
@@ -420,7 +411,8 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   const std::int64_t time_ns = scan.stamp_ns + std::llround(sweep.middle_s * 1e9);
   const SweepMotion expected_motion = sweep_motion(sweep, inertial);
   const auto T_middle_stamp = [&] {
-    return motion_to_stamp(sweep, expected_motion, state.motion_during(std::abs(sweep.middle_s)));
+    return motion_to_stamp(sweep, expected_motion,
+                           state.last.motion_during(std::abs(sweep.middle_s)));
   };
   std::optional<Eigen::Isometry3d> T_map_middle_known = T_map_lidar_prior;
   if (!state.started && !T_map_lidar_prior) T_map_middle_known = Eigen::Isometry3d::Identity();

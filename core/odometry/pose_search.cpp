@@ -260,6 +260,12 @@ std::vector<Eigen::Isometry3d> starts_without_prediction(const RegisteredScan& l
 
 }  // namespace
 
+Eigen::Isometry3d RegisteredScan::motion_during(double period_s) const {
+  if (interval_s <= 0.0 || period_s <= 0.0 || period_s > max_prediction_s)
+    return Eigen::Isometry3d::Identity();
+  return scaled_motion(motion, period_s / interval_s);
+}
+
 void FitStatistics::add(const OdometryResult& result) {
   if (result.health == OdometryHealth::lost || result.health == OdometryHealth::initialised) return;
   ++count_;

@@ -35,6 +35,9 @@ class FitStatistics {
   int count_ = 0;
 };
 
+/// Time beyond which the last velocity is not extrapolated [s].
+constexpr double max_prediction_s = 1.0;
+
 /// The last scan that was registered.
 struct RegisteredScan {
   FeatureSets features;
@@ -46,6 +49,8 @@ struct RegisteredScan {
   [[nodiscard]] double speed_m_s() const {
     return interval_s > 0.0 ? motion.translation().norm() / interval_s : 0.0;
   }
+  /// What the velocity says of a time to come; no motion where it does not say.
+  [[nodiscard]] Eigen::Isometry3d motion_during(double period_s) const;
 };
 
 /// Where the next scan is expected.
