@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <sstream>
+#include <utility>
 
 namespace stillmap {
 namespace {
@@ -180,6 +181,46 @@ std::vector<PlanarPose> along_segments(const std::vector<Eigen::Vector2d>& posit
   return poses;
 }
 
+/// Boxes along a path are no larger, since one box round a long path that bends holds far more
+/// tiles than the path meets.
+constexpr double path_box_m = 40.0;
+/// What is beyond them, a path too long to be checked, shares the last one.
+constexpr std::size_t max_path_boxes = 10'000;
+
+/// Boxes that hold the polyline.
+class PathBoxes {
+ public:
+  void line_to(const Eigen::Vector2d& position) {
+    const Eigen::Vector2d from = boxes_.empty() ? position : last_;
+    const double length_m = (position - from).norm();
+    const double room = static_cast<double>(max_path_boxes - boxes_.size());
+    const double parts = std::ceil(std::min(length_m / path_box_m, room));
+    for (double part = 1.0; part < parts; part += 1.0) add(from + part / parts * (position - from));
+    add(position);
+  }
+
+  [[nodiscard]] std::vector<Eigen::AlignedBox2d> with_margin(double margin_m) && {
+    if (boxes_.empty()) boxes_.emplace_back(Eigen::Vector2d(0.0, 0.0));
+    const Eigen::Vector2d margin = Eigen::Vector2d::Constant(margin_m);
+    for (Eigen::AlignedBox2d& box : boxes_) box = {box.min() - margin, box.max() + margin};
+    return std::move(boxes_);
+  }
+
+ private:
+  void add(const Eigen::Vector2d& position) {
+    const Eigen::AlignedBox2d here(position);
+    const bool fits = !boxes_.empty() && boxes_.back().merged(here).diagonal().norm() <= path_box_m;
+    if (!fits && boxes_.size() < max_path_boxes)
+      boxes_.emplace_back(boxes_.empty() ? here : here.merged(Eigen::AlignedBox2d(last_)));
+    else
+      boxes_.back().extend(position);
+    last_ = position;
+  }
+
+  std::vector<Eigen::AlignedBox2d> boxes_;
+  Eigen::Vector2d last_ = Eigen::Vector2d::Zero();
+};
+
 }  // namespace
 
 PathCheck check_path(const TraversabilityView& view, std::span<const PlanarPose> path_map) {
@@ -216,6 +257,15 @@ PathCheck check_path(const TraversabilityView& view, const PathQuery& query) {
   // Every second of the checked segments is a turn on the spot, at the position after it.
   if (check.conflict) check.conflict->segment = (check.conflict->segment + 1) / 2;
   return check;
+}
+
+std::vector<Eigen::AlignedBox2d> boxes_along(std::span<const Eigen::Vector2d> positions_map,
+                                             double reach_m) {
+  PathBoxes boxes;
+  for (const Eigen::Vector2d& position : positions_map) {
+    if (position.allFinite()) boxes.line_to(position);
+  }
+  return std::move(boxes).with_margin(reach_m);
 }
 
 }  // namespace stillmap

@@ -64,4 +64,11 @@ struct PathQuery {
 /// at least two.
 [[nodiscard]] PathCheck check_path(const TraversabilityView& view, const PathQuery& query);
 
+/// Boxes that hold what is within `reach_m` of the path, a polyline through the positions that are
+/// finite (map frame [m]); never empty. They are small where the path is not too long to be
+/// checked, since one box round a long path that bends holds far more of the map than the path
+/// meets.
+[[nodiscard]] std::vector<Eigen::AlignedBox2d> boxes_along(
+    std::span<const Eigen::Vector2d> positions_map, double reach_m);
+
 }  // namespace stillmap

@@ -8,20 +8,27 @@ namespace stillmap::server {
 
 using namespace stillmap_msgs::srv;
 
+namespace {
+
+/// Boxes that hold the region, for an answer that names its faults where it has any.
+std::vector<Eigen::AlignedBox2d> boxes_round(const Region& region) {
+  if (!region_faults(region).empty()) return {Eigen::AlignedBox2d(Eigen::Vector2d(0.0, 0.0))};
+  if (const auto* corridor = std::get_if<CorridorRegion>(&region))
+    return boxes_along(corridor->path_map, corridor->half_width_m);
+  const Eigen::AlignedBox3d bounds = RegionShape(region).bounds_map();
+  return {{Eigen::Vector2d(bounds.min().head<2>()), Eigen::Vector2d(bounds.max().head<2>())}};
+}
+
+}  // namespace
+
 GetTraversableArea_Response get_traversable_area(const ServiceContext& context,
                                                  const GetTraversableArea_Request& request) {
   using Response = GetTraversableArea_Response;
   return answer<Response>(context, request, [&](const MapSnapshot&, Response& response) {
     const auto [query, fault] = wire::from_request(request);
     if (!query) throw std::invalid_argument(fault);
-    // A region with faults is answered with them.
-    Eigen::AlignedBox2d box_map(Eigen::Vector2d(0.0, 0.0));
-    if (region_faults(query->region).empty()) {
-      const Eigen::AlignedBox3d bounds = RegionShape(query->region).bounds_map();
-      box_map = {Eigen::Vector2d(bounds.min().head<2>()), Eigen::Vector2d(bounds.max().head<2>())};
-    }
-    response = wire::to_response(
-        query_traversability(*context.traversability.view(query->profile, box_map), *query));
+    const auto view = context.traversability.view(query->profile, boxes_round(query->region));
+    response = wire::to_response(query_traversability(*view, *query));
   });
 }
 
@@ -32,14 +39,8 @@ CheckPath_Response check_path(const ServiceContext& context, const CheckPath_Req
     if (!query) throw std::invalid_argument(fault);
     // Farther than any robot's footprint reaches from the path.
     constexpr double reach_m = 10.0;
-    Eigen::AlignedBox2d box_map;
-    for (const Eigen::Vector2d& position : query->positions_map) {
-      if (position.allFinite()) box_map.extend(position);
-    }
-    if (box_map.isEmpty()) box_map.extend(Eigen::Vector2d(0.0, 0.0));
-    const Eigen::Vector2d reach = Eigen::Vector2d::Constant(reach_m);
     const auto view =
-        context.traversability.view(query->profile, {box_map.min() - reach, box_map.max() + reach});
+        context.traversability.view(query->profile, boxes_along(query->positions_map, reach_m));
     PathCheck check = check_path(*view, *query);
     check.map_version = view->version;
     response = wire::to_response(check, view->map_id);

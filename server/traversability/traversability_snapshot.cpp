@@ -1,6 +1,7 @@
 #include "server/traversability/traversability_snapshot.hpp"
 
 #include <algorithm>
+#include <map>
 #include <stdexcept>
 #include <utility>
 
@@ -29,18 +30,26 @@ constexpr std::size_t max_tiles = 400;
 /// More tiles than any window has.
 constexpr std::size_t max_window_tiles = 10'000;
 
-/// The tiles in the box, and the neighbours whose surface reaches into it; no more than tell that
-/// they are too many.
-std::vector<std::shared_ptr<const Tile>> tiles_round(const MapSnapshot& map,
-                                                     const Eigen::AlignedBox2d& box_map) {
-  const Eigen::Vector2d margin = Eigen::Vector2d::Constant(map.tile_size_m);
-  const Eigen::Vector2d low = box_map.min() - margin;
-  const Eigen::Vector2d high = box_map.max() + margin;
-  return tiles_in_range(
-      map.tiles,
-      tile_range({Eigen::Vector3d(low.x(), low.y(), 0.0), Eigen::Vector3d(high.x(), high.y(), 0.0)},
-                 map.tile_size_m),
-      max_window_tiles + 1);
+/// Sorted by id, the tiles in the boxes, and the neighbours whose surface reaches into them; no
+/// more than tell that they are too many.
+std::vector<std::shared_ptr<const Tile>> tiles_round(
+    const MapSnapshot& map, std::span<const Eigen::AlignedBox2d> boxes_map) {
+  const Eigen::Vector3d margin(map.tile_size_m, map.tile_size_m, 0.0);
+  std::map<TileId, std::shared_ptr<const Tile>> tiles;
+  for (const Eigen::AlignedBox2d& box : boxes_map) {
+    const Eigen::Vector3d low(box.min().x(), box.min().y(), 0.0);
+    const Eigen::Vector3d high(box.max().x(), box.max().y(), 0.0);
+    const TileRange range = tile_range({low - margin, high + margin}, map.tile_size_m);
+    for (auto& tile : tiles_in_range(map.tiles, range, max_window_tiles + 1)) {
+      const TileId id = tile->info.id;
+      tiles.emplace(id, std::move(tile));
+    }
+    if (tiles.size() > max_window_tiles) break;
+  }
+  std::vector<std::shared_ptr<const Tile>> sorted;
+  sorted.reserve(tiles.size());
+  for (auto& [id, tile] : tiles) sorted.push_back(std::move(tile));
+  return sorted;
 }
 
 }  // namespace
@@ -76,16 +85,16 @@ TraversabilityCache::TraversabilityCache(const TraversabilitySnapshot& snapshot,
     : snapshot_(snapshot), latest_map_(latest_map), tiles_(tiles) {}
 
 std::shared_ptr<const TraversabilityView> TraversabilityCache::view(
-    const std::string& profile, const Eigen::AlignedBox2d& box_map) const {
+    const std::string& profile, std::span<const Eigen::AlignedBox2d> boxes_map) const {
   const TraversabilitySnapshot::Known kept = snapshot_.known(profile);
   const auto map = latest_map_.view();
-  auto tiles = tiles_round(*map, box_map);
+  auto tiles = tiles_round(*map, boxes_map);
   // After a load or a reset what is kept is of the last map for a while.
   const bool is_of_map = kept.map == nullptr || kept.map->map_id == map->map_id;
   // After a correction it holds only where that moved nothing.
   const bool is_where_it_was = kept.map == nullptr ||
                                kept.corrections == latest_map_.corrections() ||
-                               tiles_round(*kept.map, box_map) == tiles;
+                               tiles_round(*kept.map, boxes_map) == tiles;
   if (is_of_map && is_where_it_was &&
       std::ranges::all_of(tiles, [&](const auto& tile) { return kept.has(*tile); }))
     return kept.view;

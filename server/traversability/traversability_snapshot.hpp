@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -58,11 +59,15 @@ class TraversabilityCache {
   TraversabilityCache(const TraversabilitySnapshot& snapshot, const LatestMap& latest_map,
                       TileReader& tiles);
 
-  /// A view that is complete within the box (map frame [m]). Throws std::invalid_argument for an
-  /// unknown robot, naming the known ones, and for a box with more tiles than are computed for
+  /// A view that is complete within the boxes (map frame [m]). Throws std::invalid_argument for an
+  /// unknown robot, naming the known ones, and for boxes with more tiles than are computed for
   /// one answer; and as TileReader::read.
   [[nodiscard]] std::shared_ptr<const TraversabilityView> view(
-      const std::string& profile, const Eigen::AlignedBox2d& box_map) const;
+      const std::string& profile, std::span<const Eigen::AlignedBox2d> boxes_map) const;
+  [[nodiscard]] std::shared_ptr<const TraversabilityView> view(
+      const std::string& profile, const Eigen::AlignedBox2d& box_map) const {
+    return view(profile, std::span(&box_map, 1));
+  }
 
  private:
   const TraversabilitySnapshot& snapshot_;

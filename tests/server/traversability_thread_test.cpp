@@ -7,6 +7,7 @@
 #include <mutex>
 #include <stdexcept>
 
+#include "core/traversability/path_check.hpp"
 #include "server/traversability/traversability_grid.hpp"
 #include "tests/eventually.hpp"
 #include "tests/server/manual_clock.hpp"
@@ -19,6 +20,7 @@ namespace {
 using namespace std::chrono_literals;
 using enum SemanticClass;
 using test::square_robot;
+using test::traversability_of;
 using test::VoxelWorld;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
@@ -210,6 +212,29 @@ TEST_F(TraversabilityThreadTest, AnswersAreNeverOfTheMapBeforeItsCorrection) {
   start(0s);
   ASSERT_TRUE(wait_for_version(latest_map_.view()->version));
   EXPECT_EQ(cache.view("small", box), snapshot_.view("small"));
+}
+
+TEST_F(TraversabilityThreadTest, APathIsAnsweredByTheTilesAlongIt) {
+  VoxelWorld grid(50);
+  for (int street = -145; street < 150; street += 10)
+    grid.ground(-150, street, 150, street + 1, road);
+  latest_map_.publish(shared(grid.view()));
+  const TraversabilitySnapshot::Views nothing{traversability_of(MapSnapshot(), small_robot())};
+  snapshot_.publish(nothing, latest_map_.view(), {{99, 99}, {99, 99}});
+  TileReader tiles;
+  const TraversabilityCache cache(snapshot_, latest_map_, tiles);
+  const std::vector<Eigen::Vector2d> positions{{-144.5, -144.5}, {144.5, -144.5}, {144.5, 144.5}};
+  Eigen::AlignedBox2d round_path;
+  for (const Eigen::Vector2d& position : positions) round_path.extend(position);
+  EXPECT_THAT([&] { static_cast<void>(cache.view("small", round_path)); },
+              testing::ThrowsMessage<std::invalid_argument>(HasSubstr("ask for parts")));
+  const auto all = traversability_of(*latest_map_.view(), small_robot());
+  const auto along = cache.view("small", boxes_along(positions, 10.0));
+  EXPECT_LT(along->tiles.size(), all->tiles.size() / 2);
+  for (double x = -140.0; x < 140.0; x += 7.3) {
+    EXPECT_EQ(test::look(*along, x, -144.5).cell.cost, test::look(*all, x, -144.5).cell.cost) << x;
+    EXPECT_EQ(test::look(*along, 144.5, x).cell.cost, test::look(*all, 144.5, x).cell.cost) << x;
+  }
 }
 
 TEST_F(TraversabilityThreadTest, TheWindowFollowsARobotThatAddsNothingToTheMap) {

@@ -214,6 +214,35 @@ TEST(PathQuery, HostilePathsGetAStatusAndAReason) {
   expect(path({{0, 0}, {99'000, 0}, {0, 0}}), too_large, "ask for parts");
 }
 
+double area_m2(const std::vector<Eigen::AlignedBox2d>& boxes) {
+  double area = 0.0;
+  for (const Eigen::AlignedBox2d& box : boxes) area += box.volume();
+  return area;
+}
+
+TEST(PathBoxes, HoldWhatIsWithinReachOfALongBentPathAndLittleElse) {
+  const std::vector<Eigen::Vector2d> bent{{0, 0}, {1000, 0}, {1003, 4}, {1003, 700}};
+  const auto boxes = boxes_along(bent, 10.0);
+  EXPECT_LT(area_m2(boxes), 1700.0 * 100.0);
+  for (std::size_t i = 1; i < bent.size(); ++i) {
+    for (double part = 0.0; part <= 1.0; part += 0.001) {
+      const Eigen::Vector2d on_path = bent[i - 1] + part * (bent[i] - bent[i - 1]);
+      const Eigen::AlignedBox2d robot(on_path.array() - 9.99, on_path.array() + 9.99);
+      const auto holds = [&](const Eigen::AlignedBox2d& box) { return box.contains(robot); };
+      EXPECT_TRUE(std::ranges::any_of(boxes, holds)) << on_path.transpose();
+    }
+  }
+}
+
+TEST(PathBoxes, AreFewForAPathOfManyPositionsAndForOnesOfNoEnd) {
+  EXPECT_EQ(boxes_along(std::vector<Eigen::Vector2d>(100'000, {5, 5}), 10.0).size(), 1U);
+  EXPECT_EQ(boxes_along({}, 10.0).size(), 1U);
+  EXPECT_EQ(boxes_along(std::vector<Eigen::Vector2d>{{nan, 0}, {0, test::infinity}}, 10.0).size(), 1U);
+  std::vector<Eigen::Vector2d> endless;
+  for (int i = 0; i < 1000; ++i) endless.emplace_back(i % 2 == 0 ? -1e300 : 1e300, 1.7e308);
+  EXPECT_LE(boxes_along(endless, 10.0).size(), 10'000U);
+}
+
 }  // namespace
 
 }  // namespace stillmap
