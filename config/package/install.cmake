@@ -43,6 +43,7 @@ foreach(package server:stillmap-server tools:stillmap data:stillmap-data)
 endforeach()
 
 install(FILES ${CMAKE_CURRENT_LIST_DIR}/00-stillmap.conf DESTINATION lib/sysctl.d COMPONENT server)
+install(FILES ${CMAKE_CURRENT_LIST_DIR}/secured.conf DESTINATION share/doc/stillmap-server/examples COMPONENT server)
 # The prefix is known when installing; /usr keeps its configuration in /etc.
 set(STILLMAP_PACKAGE_SOURCES ${CMAKE_CURRENT_LIST_DIR})
 configure_file(${CMAKE_CURRENT_LIST_DIR}/install_service.cmake.in

@@ -13,7 +13,7 @@ foreach(file bin/stillmap bin/stillmap-server
         lib/systemd/system/stillmap-server.service etc/stillmap/server.yaml
         share/stillmap/models/street/model.onnx share/stillmap/models/kitti/model.onnx share/stillmap/server/default.yaml
         share/stillmap/idl/stillmap_msgs.idl share/doc/stillmap/README.md
-        share/doc/stillmap/examples/follow_and_query.cpp)
+        share/doc/stillmap/examples/follow_and_query.cpp share/doc/stillmap-server/examples/secured.conf)
   if(NOT EXISTS ${PREFIX}/${file})
     message(FATAL_ERROR "${file} was not installed")
   endif()
@@ -35,6 +35,19 @@ string(FIND "${unit}" "ExecStart=${PREFIX}/bin/stillmap-server --config ${PREFIX
 if(at EQUAL -1 OR unit MATCHES "@(prefix|etc)@")
   message(FATAL_ERROR "the unit does not start what was installed:\n${unit}")
 endif()
+
+# In a secured domain systemd hands the server all that an identity consists of.
+run(0 "" ${PREFIX}/bin/stillmap security init ${PREFIX}/keys)
+file(GLOB identity RELATIVE ${PREFIX}/keys/server ${PREFIX}/keys/server/*)
+file(READ ${PREFIX}/share/doc/stillmap-server/examples/secured.conf secured)
+foreach(file ${identity})
+  if(NOT secured MATCHES "LoadCredential=${file}:[^\n]+/${file}\n")
+    message(FATAL_ERROR "secured.conf does not load ${file}")
+  endif()
+endforeach()
+file(WRITE ${PREFIX}/secured.yaml "labels: {source: none}\n")
+run(0 "can be used" ${CMAKE_COMMAND} -E env STILLMAP_SECURITY=${PREFIX}/keys/server
+  ${PREFIX}/bin/stillmap-server --check-config ${PREFIX}/secured.yaml)
 
 # A PCD file is read with what is installed.
 file(WRITE ${PREFIX}/scans/0.pcd "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 1\n"
