@@ -14,7 +14,7 @@ ServerTraits traits(const ServerConfig& config, const InterfaceContext& context)
       .label_source = context.mapping.label_source(),
       .sensor = config.mapper.sensor.name,
       .points_topic = config.lidars.empty() ? config.topics.points : config.lidars.front().topic,
-      .host_diagnostics = host_diagnostics(context.participant.options().socket_buffer_bytes)};
+      .host_diagnostics = host_diagnostics(context.participant)};
 }
 
 }  // namespace
@@ -99,7 +99,14 @@ void Interface::start_receivers(const ServerConfig& config, const InterfaceConte
 
 std::vector<dds::Diagnostic> Interface::diagnostics() {
   std::vector<dds::Diagnostic> all = discovery_diagnostics_.diagnostics();
+  const bool has_input = no_input_reason().empty();
   for (const ScanReceiver& receiver : receivers_) {
+    if (const std::string why = receiver.no_input_reason(); has_input && !why.empty()) {
+      all.push_back({.severity = dds::Severity::problem,
+                     .what = why,
+                     .evidence = "another lidar's scans are mapped without this one's",
+                     .hint = "start its driver, or correct its topic in 'sensors'"});
+    }
     for (dds::Diagnostic& diagnostic : receiver.loss_diagnostics()) {
       all.push_back(std::move(diagnostic));
     }

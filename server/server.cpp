@@ -25,6 +25,8 @@ dds::DdsOptions server_options(const DdsConfig& config) {
   options.domain_id = config.domain_id;
   options.node_name = config.participant_name;
   options.security = config.security;
+  // One client that is not on the network yet must not keep the map from the others.
+  options.unresolved_peers_allowed = true;
   return options;
 }
 

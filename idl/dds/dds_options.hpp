@@ -44,6 +44,9 @@ struct DdsOptions {
   /// Where to look for other processes, beside or instead of multicast. One of two
   /// processes needs to list the other.
   std::vector<NetworkAddress> peers;
+  /// Join without peers whose name no address is known for (Participant::unresolved_peers()): they
+  /// may list us. Otherwise that is an error.
+  bool unresolved_peers_allowed = false;
   /// The discovery server to register with; empty host: none.
   NetworkAddress discovery_server;
   /// Be the discovery server on this port; 0: be none.

@@ -33,13 +33,19 @@ using eprosima::fastrtps::rtps::RemoteServerAttributes;
 
 constexpr const char* this_machine = "127.0.0.1";
 
+/// Nobody knows an IPv4 address of the host.
+class UnknownHost : public DdsError {
+ public:
+  using DdsError::DdsError;
+};
+
 std::string ipv4_of(const std::string& host) {
   addrinfo wanted{};
   wanted.ai_family = AF_INET;
   addrinfo* found = nullptr;
   const int error = ::getaddrinfo(host.c_str(), nullptr, &wanted, &found);
   if (error != 0) {
-    throw DdsError("no IPv4 address is known for '" + host + "': " + ::gai_strerror(error));
+    throw UnknownHost("no IPv4 address is known for '" + host + "': " + ::gai_strerror(error));
   }
   const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(found, &::freeaddrinfo);
   std::array<char, INET_ADDRSTRLEN> text{};
@@ -98,18 +104,26 @@ void set_listening_locators(const DdsOptions& options, DomainParticipantQos& qos
   data.push_back(shared_memory);
 }
 
-void add_initial_peers(const DdsOptions& options, BuiltinAttributes& builtin) {
+/// The peers that no address is known for, where these are allowed.
+std::vector<std::string> add_initial_peers(const DdsOptions& options, BuiltinAttributes& builtin) {
   const bool tcp = options.transport == NetworkTransport::tcp;
   auto& peers = builtin.initialPeersList;
+  std::vector<std::string> unresolved;
   for (const NetworkAddress& peer : options.peers) {
-    peers.push_back(tcp ? tcp_locator(peer) : udp_locator(peer));
+    try {
+      peers.push_back(tcp ? tcp_locator(peer) : udp_locator(peer));
+    } catch (const UnknownHost&) {
+      if (!options.unresolved_peers_allowed) throw;
+      unresolved.push_back(peer.host);
+    }
   }
-  if (tcp) return;
+  if (tcp) return unresolved;
   if (!options.multicast) peers.push_back(udp_locator({.host = this_machine, .port = 0}));
   // Where peers are listed, multicast is used only when it is listed as well.
   if (options.multicast && !options.peers.empty()) {
     peers.push_back(domain_multicast(options.domain_id));
   }
+  return unresolved;
 }
 
 /// What ROS 2 and `fastdds discovery` call server 0.
@@ -197,9 +211,12 @@ std::int32_t fresh_participant_id(std::uint32_t domain_id) {
 
 }  // namespace
 
-void set_discovery(const DdsOptions& options, DomainParticipantQos& qos) {
+std::vector<std::string> set_discovery(const DdsOptions& options, DomainParticipantQos& qos) {
   BuiltinAttributes& builtin = qos.wire_protocol().builtin;
-  if (options.discovery_port != 0) return configure_discovery_server(options, qos);
+  if (options.discovery_port != 0) {
+    configure_discovery_server(options, qos);
+    return {};
+  }
   const bool udp = options.transport == NetworkTransport::udp;
   // TCP peers look for the domain's first process at a port.
   if (!udp && options.listening_port != 0) qos.wire_protocol().participant_id = 0;
@@ -211,9 +228,10 @@ void set_discovery(const DdsOptions& options, DomainParticipantQos& qos) {
     qos.wire_protocol().participant_id = fresh_participant_id(options.domain_id);
   }
   if (!options.discovery_server.host.empty()) {
-    return configure_discovery_client(options.discovery_server, builtin);
+    configure_discovery_client(options.discovery_server, builtin);
+    return {};
   }
-  add_initial_peers(options, builtin);
+  return add_initial_peers(options, builtin);
 }
 
 }  // namespace stillmap::dds

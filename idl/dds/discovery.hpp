@@ -1,13 +1,17 @@
 #pragma once
 
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
+#include <string>
+#include <vector>
 
 #include "idl/dds/dds_options.hpp"
 
 namespace stillmap::dds {
 
 /// Sets how the participant finds others and is found: by multicast, at known addresses, or through
-/// a discovery server. Throws DdsError for the name of a host that cannot be found.
-void set_discovery(const DdsOptions& options, eprosima::fastdds::dds::DomainParticipantQos& qos);
+/// a discovery server. Throws DdsError for the name of a host that cannot be found; returns those
+/// of peers where these are allowed.
+[[nodiscard]] std::vector<std::string> set_discovery(
+    const DdsOptions& options, eprosima::fastdds::dds::DomainParticipantQos& qos);
 
 }  // namespace stillmap::dds

@@ -37,7 +37,6 @@ DomainParticipantQos participant_qos(const DdsOptions& options) {
   constexpr std::string_view enclave = "enclave=/;";
   qos.user_data().setValue({enclave.begin(), enclave.end()});
   set_transports(options, qos);
-  set_discovery(options, qos);
   set_flow_controllers(options, qos);
   auto& builtin = qos.wire_protocol().builtin;
   builtin.readerHistoryMemoryPolicy = builtin.writerHistoryMemoryPolicy =
@@ -133,7 +132,7 @@ Participant::~Participant() {
   const auto graph = std::move(graph_);
 }
 
-Participant::Handle Participant::join() const {
+Participant::Handle Participant::join() {
   if (options_.domain_id > max_domain_id) {
     throw failure("domain ids go from 0 to " + std::to_string(max_domain_id));
   }
@@ -154,8 +153,9 @@ Participant::Handle Participant::join() const {
   return Handle(made, leave);
 }
 
-DomainParticipantQos Participant::qos() const {
+DomainParticipantQos Participant::qos() {
   DomainParticipantQos qos = participant_qos(options_);
+  unresolved_peers_ = set_discovery(options_, qos);
   if (identity_) add_security(identity_->folder, qos.properties());
   return qos;
 }

@@ -57,6 +57,11 @@ class Participant {
 
   [[nodiscard]] const DdsOptions& options() const { return options_; }
 
+  /// Peers of the options that no address is known for, and that are not looked for therefore.
+  [[nodiscard]] const std::vector<std::string>& unresolved_peers() const {
+    return unresolved_peers_;
+  }
+
   /// What went wrong in the services that this process offers.
   [[nodiscard]] ServiceFaults& service_faults() { return service_faults_; }
   [[nodiscard]] const ServiceFaults& service_faults() const { return service_faults_; }
@@ -94,16 +99,17 @@ class Participant {
   using Handle = std::unique_ptr<eprosima::fastdds::dds::DomainParticipant,
                                  std::function<void(eprosima::fastdds::dds::DomainParticipant*)>>;
 
-  [[nodiscard]] Handle join() const;
+  [[nodiscard]] Handle join();
   [[nodiscard]] eprosima::fastdds::dds::Topic* topic(const std::string& name,
                                                      eprosima::fastdds::dds::TypeSupport type);
   [[nodiscard]] ReaderHandle own(eprosima::fastdds::dds::DataReader& reader,
                                  eprosima::fastdds::dds::ContentFilteredTopic* filtered);
   [[nodiscard]] DdsError failure(const std::string& what) const;
   void require_permission(const std::string& topic, bool to_write) const;
-  [[nodiscard]] eprosima::fastdds::dds::DomainParticipantQos qos() const;
+  [[nodiscard]] eprosima::fastdds::dds::DomainParticipantQos qos();
 
   DdsOptions options_;
+  std::vector<std::string> unresolved_peers_;
   ServiceFaults service_faults_;
   std::mutex mutex_;
   // Who we are in a secured domain; nothing without security.

@@ -81,17 +81,26 @@ std::vector<dds::Diagnostic> DiscoveryDiagnostics::collect() const {
   return all;
 }
 
-std::vector<dds::Diagnostic> host_diagnostics(std::uint32_t wanted_buffer_bytes) {
-  const std::uint32_t granted = dds::granted_socket_buffer_bytes(wanted_buffer_bytes);
-  if (granted >= wanted_buffer_bytes) return {};
-  const dds::Diagnostic diagnostic{
-      .severity = dds::Severity::advice,
-      .what = "UDP buffers are too small: large clouds over UDP can get lost",
-      .evidence = "they have " + std::to_string(granted) + " bytes instead of " +
-                  std::to_string(wanted_buffer_bytes),
-      .hint = "sudo sysctl net.core.rmem_max=" + std::to_string(wanted_buffer_bytes)};
-  log(diagnostic);
-  return {diagnostic};
+std::vector<dds::Diagnostic> host_diagnostics(const dds::Participant& participant) {
+  std::vector<dds::Diagnostic> all;
+  const std::uint32_t wanted_bytes = participant.options().socket_buffer_bytes;
+  const std::uint32_t granted_bytes = dds::granted_socket_buffer_bytes(wanted_bytes);
+  if (granted_bytes < wanted_bytes) {
+    all.push_back({.severity = dds::Severity::advice,
+                   .what = "UDP buffers are too small: large clouds over UDP can get lost",
+                   .evidence = "they have " + std::to_string(granted_bytes) + " bytes instead of " +
+                               std::to_string(wanted_bytes),
+                   .hint = "sudo sysctl net.core.rmem_max=" + std::to_string(wanted_bytes)});
+  }
+  for (const std::string& host : participant.unresolved_peers()) {
+    all.push_back({.severity = dds::Severity::problem,
+                   .what = "the peer '" + host + "' is not looked for",
+                   .evidence = "no IPv4 address was known for it when the server started",
+                   .hint = "give its address in dds.peers, or start the server again when the "
+                           "name can be resolved; a peer that lists the server finds it anyway"});
+  }
+  for (const dds::Diagnostic& diagnostic : all) log(diagnostic);
+  return all;
 }
 
 ServerReport::ServerReport(ServerTraits traits, const LatestMap& latest_map,

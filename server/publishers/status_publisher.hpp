@@ -39,8 +39,9 @@ class DiscoveryDiagnostics {
   NewLines logged_;
 };
 
-/// Problems of this machine, logged too: socket buffers smaller than wanted.
-[[nodiscard]] std::vector<dds::Diagnostic> host_diagnostics(std::uint32_t wanted_buffer_bytes);
+/// Problems of this machine, logged too: socket buffers smaller than wanted, peers that are
+/// unknown.
+[[nodiscard]] std::vector<dds::Diagnostic> host_diagnostics(const dds::Participant& participant);
 
 /// The part of the status that does not change.
 struct ServerTraits {

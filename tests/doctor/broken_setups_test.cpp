@@ -134,6 +134,12 @@ TEST_F(BrokenSetup, WithAPublisherOfAnotherType) {
                                          "Odometry_")));
 }
 
+TEST_F(BrokenSetup, WithAPeerWhoseNameIsNotKnown) {
+  start_server("--peer no-such-host..invalid");
+  EXPECT_THAT(problems(), Contains(AllOf(field("what", "'no-such-host..invalid' is not looked for"),
+                                         field("hint", "dds.peers"))));
+}
+
 TEST_F(BrokenSetup, WithTheServerInAnotherDomain) {
   start_server();
   const int servers_domain = domain_;

@@ -211,6 +211,20 @@ TEST(Network, RefusesAPeerWhoseNameIsNotKnown) {
   EXPECT_THROW(Participant participant(options), DdsError);
 }
 
+TEST(Network, APeerWhoseNameIsNotKnownIsLeftOutWhereItMayBe) {
+  DdsOptions server = without_multicast();
+  server.listening_port = test_port();
+  server.peers = {{"no-such-host..invalid", 7400}, {"localhost", 7400}};
+  server.unresolved_peers_allowed = true;
+  DdsOptions client = without_multicast();
+  client.peers = {{"localhost", server.listening_port}};
+  Participant a(server);
+  Participant b(client);
+  EXPECT_EQ(a.unresolved_peers(), std::vector<std::string>{"no-such-host..invalid"});
+  EXPECT_TRUE(b.unresolved_peers().empty());
+  EXPECT_TRUE(finds(a, b));
+}
+
 TEST(Network, LargeMessagesKeepToTheirRateAndSmallMessagesOvertakeThem) {
   DdsOptions options = loopback(false);
   options.max_datagram_bytes = 1400;

@@ -429,6 +429,18 @@ TEST_F(SeveralLidars, GoOnWithoutOneThatFallsSilent) {
   EXPECT_EQ(status.dropped(), 0U);
 }
 
+TEST_F(SeveralLidars, OneThatNeverSendsIsNamed) {
+  for (int i = 0; i < 3; ++i)
+    ASSERT_TRUE(front_->publish(mounted_scan(i, tilted_mount()), {}, patience));
+  ASSERT_TRUE(wait_for_scans(*client_, 3));
+  const dds::ServerStatus status = client_->status();
+  EXPECT_THAT(status.diagnostics,
+              testing::Contains(testing::Field(&dds::Diagnostic::what,
+                                               HasSubstr("no scan received on rt/rear/points"))));
+  EXPECT_THAT(status.diagnostics, testing::Not(testing::Contains(testing::Field(
+                                      &dds::Diagnostic::what, HasSubstr("front/points")))));
+}
+
 TEST_F(SeveralLidars, ACloudOfNoneOfThemIsRefused) {
   ScanPublisher stranger = publisher_on("rear/points", "camera");
   ASSERT_TRUE(stranger.publish(mounted_scan(0, rear_mount()), {}, patience));
