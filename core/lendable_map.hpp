@@ -35,9 +35,9 @@ class LendableMap {
 
   void insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar);
 
-  /// Until take_back().
+  /// Until reclaim().
   [[nodiscard]] StaticMap& lend();
-  void take_back() { is_lent_ = false; }
+  void reclaim() { is_lent_ = false; }
   [[nodiscard]] bool is_lent() const { return is_lent_; }
   /// Scans that wait to enter the map.
   [[nodiscard]] std::size_t kept_scans() const { return kept_.size(); }

@@ -130,8 +130,8 @@ void Mapper::move_to_map(OdometryResult& result) const {
   result.covariance = turned_covariance(result.covariance, T_map_odom_.linear());
 }
 
-void Mapper::take_back_static_map(const MapCorrection* correction) {
-  static_map_.take_back();
+void Mapper::reclaim_static_map(const MapCorrection* correction) {
+  static_map_.reclaim();
   if (correction == nullptr) return;
   for (StampedPose& pose : trajectory_) {
     if (const auto* const T_new_old = correction->at(pose.stamp_ns))

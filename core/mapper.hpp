@@ -130,14 +130,14 @@ class Mapper {
   [[nodiscard]] StaticMap& static_map() { return static_map_.map(); }
 
   /// Lends the static map to another thread, which corrects it while scans go on to be registered.
-  /// Until it is taken back only process() and add() may be called, and what tells of poses. Scans
+  /// Until it is reclaimed only process() and add() may be called, and what tells of poses. Scans
   /// are kept meanwhile; they and those after them enter the map when insert_kept_scans() is
   /// called.
   [[nodiscard]] StaticMap& lend_static_map() { return static_map_.lend(); }
   /// Poses of this map were wrong by that, and the static map was corrected: the poses so far and
   /// the scans that were kept follow, and all that come by the last of them. Odometry goes on in
   /// its own frame and never hears of it. Null: nothing was moved.
-  void take_back_static_map(const MapCorrection* correction);
+  void reclaim_static_map(const MapCorrection* correction);
   [[nodiscard]] std::size_t kept_scans() const { return static_map_.kept_scans(); }
   /// The oldest of them enter the map, which must not be lent.
   void insert_kept_scans(std::size_t max_scans = std::numeric_limits<std::size_t>::max()) {

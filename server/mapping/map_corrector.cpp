@@ -38,10 +38,10 @@ std::optional<MapCorrector::Result> MapCorrector::take(bool waits) {
     return std::nullopt;
   try {
     Result result = work_.get();
-    mapper_.take_back_static_map(result.corrected ? &result.correction : nullptr);
+    mapper_.reclaim_static_map(result.corrected ? &result.correction : nullptr);
     return result;
   } catch (...) {
-    mapper_.take_back_static_map(nullptr);
+    mapper_.reclaim_static_map(nullptr);
     throw;
   }
 }

@@ -37,7 +37,7 @@ MapCorrection of_all(const Mapper& mapper) {
 
 bool correct(Mapper& mapper, const MapCorrection& correction) {
   const bool is_corrected = mapper.lend_static_map().correct(correction).has_value();
-  mapper.take_back_static_map(is_corrected ? &correction : nullptr);
+  mapper.reclaim_static_map(is_corrected ? &correction : nullptr);
   return is_corrected;
 }
 
@@ -127,7 +127,7 @@ TEST(CorrectedMapper, ScansThatComeWhileTheMapIsLentEnterItAsThoseThatComeAfterw
     }
     if (k == 16) {
       ASSERT_TRUE(elsewhere->correct(*correction));
-      lent.take_back_static_map(&*correction);
+      lent.reclaim_static_map(&*correction);
     }
     if (k > 16) {
       EXPECT_EQ(lent.kept_scans(), k > 21 ? 0 : 23 - k);
@@ -152,7 +152,7 @@ TEST(CorrectedMapper, WhereNothingWasMovedScansThatWereKeptEnterTheMapAsTheyAre)
     ASSERT_TRUE(undisturbed.process(sequence().scans[k].scan));
     ASSERT_TRUE(lent.process(sequence().scans[k].scan));
   }
-  lent.take_back_static_map(nullptr);
+  lent.reclaim_static_map(nullptr);
   EXPECT_EQ(lent.kept_scans(), 8U);
   lent.insert_kept_scans();
   EXPECT_EQ(lent.kept_scans(), 0U);
@@ -166,7 +166,7 @@ TEST(CorrectedMapper, AnotherMapHasNoneOfTheScansThatWereKept) {
     if (k == 3) static_cast<void>(mapper.lend_static_map());
     ASSERT_TRUE(mapper.process(sequence().scans[k].scan));
   }
-  mapper.take_back_static_map(nullptr);
+  mapper.reclaim_static_map(nullptr);
   mapper.reset(77);
   EXPECT_EQ(mapper.kept_scans(), 0U);
   mapper.insert_kept_scans();

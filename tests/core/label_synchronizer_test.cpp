@@ -146,7 +146,7 @@ TEST_F(LabelSynchronizerTest, AMapThatIsLentIsNotAskedForLabels) {
   // By the last scan, and so new to the map, which has it only afterwards.
   EXPECT_GT(labels.evidence.confidence[0], 0.0F);
   EXPECT_EQ(elsewhere.evidence_at(place.cast<double>()).votes().front().weight, weight);
-  map_.take_back();
+  map_.reclaim();
   map_.insert_kept();
   EXPECT_GT(weight_in_map(), weight);
 }

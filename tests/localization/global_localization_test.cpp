@@ -91,7 +91,7 @@ TEST(GlobalLocalization, APlaceThatTheMapHoldsTwiceStaysAmbiguous) {
 }
 
 TEST(GlobalLocalization, IsFoundInThePartOfTheMapThatItIsLookedForIn) {
-  const StoredMap twice = yard_twice();
+  const MappedYard twice = yard_twice();
   const Localizer localizer(index_of(twice));
   const simulation::SimulatedScan simulated = simulation::Simulation(yard(1, 1)).scan(95);
   const Scan scan = drop_unusable_points(simulated.scan, PrepareConfig{});

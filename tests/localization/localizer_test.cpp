@@ -68,7 +68,7 @@ TEST(Localizer, SaysAmbiguousWhereTheMapHoldsAPlaceTwice) {
 }
 
 TEST(Localizer, NeedsNoTrajectory) {
-  StoredMap stored = first_yard();
+  MappedYard stored = first_yard();
   stored.trajectory.clear();
   const Localizer localizer(index_of(stored));
   const simulation::SimulatedScan scan = simulation::Simulation(yard(1, 1)).scan(95);
@@ -76,7 +76,7 @@ TEST(Localizer, NeedsNoTrajectory) {
 }
 
 TEST(Localizer, FindsNothingInAnEmptyMap) {
-  StoredMap empty{std::make_shared<const MapSnapshot>(), {}};
+  MappedYard empty{std::make_shared<const MapSnapshot>(), {}};
   const simulation::SimulatedScan scan = simulation::Simulation(yard(1, 1)).scan(95);
   EXPECT_EQ(localize(Localizer(index_of(empty)), scan).status, LocalizationStatus::no_evidence);
   // With a path, but without a voxel.
@@ -85,7 +85,7 @@ TEST(Localizer, FindsNothingInAnEmptyMap) {
 }
 
 TEST(Localizer, FindsNothingInOneTileOfAMap) {
-  StoredMap stored = first_yard();
+  MappedYard stored = first_yard();
   MapSnapshot view = *stored.view;
   view.tiles = TileTable{stored.view->tiles.front()};
   stored.view = std::make_shared<const MapSnapshot>(std::move(view));
@@ -94,7 +94,7 @@ TEST(Localizer, FindsNothingInOneTileOfAMap) {
 }
 
 TEST(Localizer, PassesOverPosesThatAreNone) {
-  StoredMap stored = first_yard();
+  MappedYard stored = first_yard();
   const double nan = std::numeric_limits<double>::quiet_NaN();
   stored.trajectory[5].T_map_lidar.translation().x() = nan;
   stored.trajectory[6].T_map_lidar.translation().y() = 1e12;

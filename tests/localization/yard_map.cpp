@@ -29,12 +29,12 @@ namespace {
 constexpr int tiles_apart = 40;
 
 /// The yard of a day, mapped with true poses.
-StoredMap mapped_yard(std::uint64_t seed) {
+MappedYard mapped_yard(std::uint64_t seed) {
   StaticMapConfig map_config;
   map_config.min_points = 1;
   StaticMap map(map_config);
   const simulation::Simulation simulation(yard(seed, 0));
-  StoredMap stored;
+  MappedYard stored;
   for (int k = 0; k < simulation.config().scans; k += 4) {
     const simulation::SimulatedScan simulated = simulation.scan(k);
     LabelledScan labelled{simulated.scan, labels_of(simulated.scan), {}};
@@ -49,20 +49,20 @@ StoredMap mapped_yard(std::uint64_t seed) {
 
 }  // namespace
 
-const StoredMap& first_yard() {
-  static const StoredMap stored = mapped_yard(1);
+const MappedYard& first_yard() {
+  static const MappedYard stored = mapped_yard(1);
   return stored;
 }
 
-std::shared_ptr<const PlaceIndex> index_of(const StoredMap& stored) {
+std::shared_ptr<const PlaceIndex> index_of(const MappedYard& stored) {
   return std::make_shared<const PlaceIndex>(stored.view, stored.trajectory,
                                             std::make_shared<TileReader>());
 }
 
 double second_yard_m() { return tiles_apart * StaticMapConfig{}.tile_size_m; }
 
-StoredMap yard_twice() {
-  StoredMap twice = first_yard();
+MappedYard yard_twice() {
+  MappedYard twice = first_yard();
   // Whole tiles farther on: the same places again.
   std::vector<TileTable::SharedTile> tiles(twice.view->tiles.begin(), twice.view->tiles.end());
   const std::size_t count = tiles.size();

@@ -17,18 +17,18 @@ namespace stillmap::test {
 /// The labels that a simulated scan brings.
 [[nodiscard]] PointLabels labels_of(const Scan& scan);
 
-struct StoredMap {
+struct MappedYard {
   std::shared_ptr<const MapSnapshot> view;
   Trajectory trajectory;
 };
 
 /// The yard of seed 1, mapped on day 0 with true poses.
-[[nodiscard]] const StoredMap& first_yard();
+[[nodiscard]] const MappedYard& first_yard();
 /// The same, and a copy of it farther on: each place is there twice.
-[[nodiscard]] StoredMap yard_twice();
+[[nodiscard]] MappedYard yard_twice();
 /// How far on along x the copy is [m].
 [[nodiscard]] double second_yard_m();
 
-[[nodiscard]] std::shared_ptr<const PlaceIndex> index_of(const StoredMap& stored);
+[[nodiscard]] std::shared_ptr<const PlaceIndex> index_of(const MappedYard& stored);
 
 }  // namespace stillmap::test

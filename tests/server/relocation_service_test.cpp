@@ -88,7 +88,7 @@ class Relocation : public testing::Test {
   }
   /// With a map that has every place twice.
   void start_in_yard_twice() {
-    const StoredMap twice = yard_twice();
+    const MappedYard twice = yard_twice();
     open_map_file(setup_.map_file())
         ->save({.view = *twice.view,
                 .tile_evidence = {},
