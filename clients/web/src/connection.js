@@ -5,6 +5,8 @@ import { MessageReader, MessageWriter } from "@foxglove/rosmsg2-serialization";
 
 const retryMs = 2000;
 const callTimeoutMs = 15000;
+/** Of what the gateway says once. */
+const onceShownMs = 10000;
 
 const definitionsOf = (schema) => parse(schema, { ros2: true });
 
@@ -19,6 +21,8 @@ export class Connection {
   #calls = new Map();
   #nextCall = 1;
   #published = new Map();
+  #warnings = new Map();
+  #heard = performance.now();
 
   /** `changed(text, isGood)`: how it is with the connection. `connected()`: services may be called. */
   constructor(url, { changed, connected }) {
@@ -40,9 +44,21 @@ export class Connection {
     this.#listeners.delete(topic);
     for (const [id, entry] of this.#subscriptions) {
       if (entry.topic !== topic) continue;
-      this.#client.unsubscribe(id);
+      this.#client?.unsubscribe(id);
       this.#subscriptions.delete(id);
     }
+  }
+
+  get isOpen() { return this.#services.size > 0; }
+
+  /** How long nothing at all has come. */
+  get quietMs() { return performance.now() - this.#heard; }
+
+  /** Gives the connection up, as one whose other side is gone without a word, and makes another. */
+  reopen() {
+    const given = this.#client;
+    this.#lost();
+    given.close();
   }
 
   hasService(name) { return this.#services.has(name); }
@@ -50,6 +66,7 @@ export class Connection {
   /** The decoded reply. Rejects with the gateway's reason. */
   call(name, request) {
     const service = this.#services.get(name);
+    if (!this.#client) return Promise.reject(new Error("there is no connection to the gateway"));
     if (!service) return Promise.reject(new Error(`the gateway offers no service ${name}`));
     service.writer ??= new MessageWriter(definitionsOf(service.request.schema));
     service.reader ??= new MessageReader(definitionsOf(service.response.schema));
@@ -83,8 +100,11 @@ export class Connection {
 
   #open() {
     this.changed("connecting", true);
-    const client = new FoxgloveClient({ ws: new WebSocket(this.#url, ["foxglove.websocket.v1"]) });
+    const socket = new WebSocket(this.#url, ["foxglove.websocket.v1"]);
+    const client = new FoxgloveClient({ ws: socket });
     this.#client = client;
+    this.#heard = performance.now();
+    socket.addEventListener("message", () => { if (client === this.#client) this.#heard = performance.now(); });
     client.on("advertise", (channels) => {
       for (const channel of channels) this.#channels.set(channel.topic, { channel });
       for (const topic of this.#listeners.keys()) this.#subscribe(topic);
@@ -95,17 +115,42 @@ export class Connection {
       this.connected();
     });
     client.on("message", ({ subscriptionId, data, timestamp }) => this.#message(subscriptionId, data, timestamp));
-    client.on("serviceCallResponse", ({ callId, data }) => this.#settle(callId, (call) =>
-      call.resolve(call.service.reader.readMessage(new DataView(data.buffer, data.byteOffset, data.byteLength)))));
+    client.on("serviceCallResponse", ({ callId, data }) => this.#settle(callId, (call) => {
+      try {
+        call.resolve(call.service.reader.readMessage(new DataView(data.buffer, data.byteOffset, data.byteLength)));
+      } catch (error) {
+        call.reject(new Error(`an answer cannot be read: ${error.message}`));
+      }
+    }));
     client.on("serviceCallFailure", ({ callId, message }) => this.#settle(callId, (call) =>
       call.reject(new Error(message))));
-    client.on("status", ({ level, message }) => { if (level > 0) this.changed(message, level < 2); });
-    client.on("removeStatus", () => this.changed("connected", true));
+    client.on("status", ({ level, message, id }) => {
+      if (level > 0) this.#warn(id ?? `once ${message}`, { message, isGood: level < 2, isOnce: id === undefined });
+    });
+    client.on("removeStatus", ({ statusIds }) => {
+      for (const id of statusIds) this.#warnings.delete(id);
+      this.#showWarnings();
+    });
     client.on("error", () => {});
-    client.on("close", () => this.#lost());
+    client.on("close", () => { if (client === this.#client) this.#lost(); });
+  }
+
+  #warn(id, warning) {
+    this.#warnings.set(id, warning);
+    this.#showWarnings();
+    if (warning.isOnce) setTimeout(() => { if (this.#warnings.delete(id)) this.#showWarnings(); }, onceShownMs);
+  }
+
+  /** The worst of what holds. */
+  #showWarnings() {
+    const all = [...this.#warnings.values()];
+    const worst = all.find(({ isGood }) => !isGood) ?? all.at(-1);
+    this.changed(worst?.message ?? "connected", worst?.isGood ?? true);
   }
 
   #lost() {
+    this.#client = undefined;
+    this.#warnings.clear();
     this.changed("no gateway: trying again", false);
     this.#channels.clear();
     this.#services.clear();

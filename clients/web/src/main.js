@@ -4,6 +4,7 @@ import { MapTiles } from "./map_tiles.js";
 import { Frames, matrixOfPose, nanoseconds } from "./poses.js";
 import { View } from "./scene.js";
 import { Server } from "./server.js";
+import { ServerWatch } from "./server_watch.js";
 import { showStatus } from "./status_panel.js";
 import { colourModes, setGrid } from "./tile_material.js";
 import { Timeline } from "./timeline.js";
@@ -17,8 +18,20 @@ const heightsBelow = 3;
 const heightsAbove = 9;
 const narrowWidth = 640;
 
+// What keeps the page from starting is said where one looks for it.
+const sayWhy = ({ message, reason }) => showConnection(message ?? reason?.message, false);
+const startFaults = ["error", "unhandledrejection"];
+for (const fault of startFaults) window.addEventListener(fault, sayWhy);
+
+/** With the token, since the cookie may be that of another gateway of this host. */
+async function factsOfGateway() {
+  const response = await fetch(`gateway.json${location.search}`);
+  if (!response.ok) throw new Error(`the gateway says: ${response.status} ${await response.text()}`);
+  return response.json();
+}
+
 const token = new URLSearchParams(location.search).get("token");
-const facts = await (await fetch("gateway.json")).json();
+const facts = await factsOfGateway();
 const prefix = `/${facts.server}`;
 const address = new URL(".", location.href);
 address.protocol = location.protocol === "https:" ? "wss:" : "ws:";
@@ -28,11 +41,13 @@ const view = new View(element("scene"));
 const frames = new Frames();
 const state = { frames, profiles: [], profile: "car", grid: undefined, robot: undefined, publishGoal };
 const connection = new Connection(address.href, { changed: showConnection, connected: begin });
-const tiles = new MapTiles(connection, prefix, facts.format_version, () => view.draw());
+const tiles = new MapTiles(connection, prefix, facts.format_version, () => view.draw(),
+  (text) => showConnection(text, false));
 const server = new Server(connection, prefix, facts.format_version);
 view.setMap(tiles);
 const tools = new Tools({ view, tiles, server, state });
 const timeline = new Timeline(view);
+const watch = new ServerWatch(connection, () => server.profiles(), showConnection);
 
 function showConnection(text, isGood) {
   element("connection").textContent = text;
@@ -55,7 +70,12 @@ async function begin() {
     choice.replaceChildren(...state.profiles.map((name) => new Option(name)));
     if (state.profiles.includes(state.profile)) choice.value = state.profile;
     else state.profile = choice.value;
-    if (!state.grid) showGrid(await server.grid());
+    if (!state.grid) {
+      const grid = await server.grid();
+      // Unless a newer one has come by topic.
+      if (isLast() && !state.grid) showGrid(grid);
+    }
+    if (isLast()) showConnection("connected", true);
   } catch (error) {
     if (!isLast()) return;
     showConnection(error.message, false);
@@ -73,7 +93,7 @@ function showRobot(matrix) {
 connection.listen("/tf_static", (message) => frames.addTransforms(message));
 connection.listen(`${prefix}/odometry`, (message) => {
   frames.addOdometry(message);
-  if (!view.isShowingPast) showRobot(frames.newest.matrix);
+  showRobot(frames.newest.matrix);
 });
 connection.listen(`${prefix}/path`, ({ poses }) => {
   const positions = new Float32Array(3 * poses.length);
@@ -84,12 +104,15 @@ connection.listen(`${prefix}/path`, ({ poses }) => {
   timeline.update(poses);
 });
 connection.listen(`${prefix}/submaps`, (list) => view.showSubmaps(list));
-connection.listen(`${prefix}/status`, showStatus);
+connection.listen(`${prefix}/status`, (status) => {
+  watch.heard();
+  showStatus(status);
+});
 connection.listen(`${prefix}/traversability`, showGrid);
 
 function showGrid(grid) {
   state.grid = grid;
-  setGrid(tiles.material, grid);
+  setGrid(tiles.material, grid, view.renderer.capabilities.maxTextureSize);
   view.draw();
 }
 
@@ -103,7 +126,9 @@ function showScans() {
 showScans();
 
 function publishGoal({ x, y, z }) {
-  const definition = connection.definition("nav_msgs/msg/Path").replace(/^geometry_msgs\/PoseStamped\[\] poses$/m,
+  const path = connection.definition("nav_msgs/msg/Path");
+  if (!path) throw new Error("there is no connection to the gateway: the goal was not sent");
+  const definition = path.replace(/^geometry_msgs\/PoseStamped\[\] poses$/m,
     "geometry_msgs/Pose pose");
   const now = Date.now();
   connection.publish("/goal_pose", "geometry_msgs/msg/PoseStamped", definition, {
@@ -152,6 +177,8 @@ function showPanel(isShown) {
 }
 element("panel-toggle").addEventListener("click", () => showPanel(element("panel").hidden));
 showPanel(window.innerWidth > narrowWidth);
+
+for (const fault of startFaults) window.removeEventListener(fault, sayWhy);
 
 // For the tests and for who is curious.
 window.stillmap = { view, tiles, server, state, tools, timeline, connection };

@@ -25,14 +25,15 @@ export function decodeTile(buffer) {
 const keyOf = (info) => `${info.tile_x}/${info.tile_y}`;
 
 export class MapTiles {
-  /** `changed()` when something is to be drawn anew. */
-  constructor(connection, prefix, formatVersion, changed) {
+  /** `changed()` when something is to be drawn anew; `failed(text)` when what was asked for does not come. */
+  constructor(connection, prefix, formatVersion, changed, failed) {
     this.group = new Group();
     this.material = tileMaterial();
     this.connection = connection;
     this.prefix = prefix;
     this.formatVersion = formatVersion;
     this.changed = changed;
+    this.failed = failed;
     this.tiles = new Map();
     this.mapId = undefined;
     this.fetching = 0;
@@ -49,7 +50,17 @@ export class MapTiles {
 
   #listSoon() {
     if (this.listing) return;
-    this.listing = setTimeout(() => this.list().catch(() => {}).finally(() => { this.listing = undefined; }), refetchMs);
+    this.listing = setTimeout(async () => {
+      try {
+        await this.list();
+        this.listing = undefined;
+      } catch (error) {
+        this.failed(`the new map cannot be listed: ${error.message}`);
+        this.listing = undefined;
+        // Another entry may be long in coming, where the map does not change.
+        if (this.connection.isOpen) this.#listSoon();
+      }
+    }, refetchMs);
   }
 
   /** Asks which tiles the whole map has: the topic has only those round the robot. Tiles that it no longer has go. */
@@ -157,7 +168,8 @@ export class MapTiles {
     tile.isFetching = true;
     tile.nextFetch = performance.now() + refetchMs;
     try {
-      const response = await fetch(`tiles/${tile.key}/${wanted}`, { credentials: "same-origin" });
+      // With the token, since the cookie may be that of another gateway of this host.
+      const response = await fetch(`tiles/${tile.key}/${wanted}${location.search}`, { credentials: "same-origin" });
       if (!response.ok && response.status !== 404) throw new Error(`status ${response.status}`);
       if (response.ok) {
         const buffer = await response.arrayBuffer();
@@ -165,7 +177,8 @@ export class MapTiles {
         if (this.tiles.get(tile.key) === tile) this.#show(tile, decodeTile(buffer));
       }
       tile.shown = wanted;
-    } catch {
+    } catch (error) {
+      this.failed(`tiles do not come: ${error.message}`);
       tile.nextFetch = performance.now() + retryMs;
     } finally {
       tile.isFetching = false;

@@ -10,6 +10,8 @@ const maxBudget = 5_000_000;
 /** Frames that take longer get fewer voxels, shorter ones more. */
 const slowFrameMs = 80;
 const fastFrameMs = 45;
+/** A frame that is asked for so soon after the last one follows it at once. */
+const framesInRowMs = 17;
 const clickPixels = 6;
 
 function lineOf(colour) {
@@ -100,6 +102,7 @@ export class View {
   draw() {
     if (this.isWaiting) return;
     this.isWaiting = true;
+    this.requestedAt = performance.now();
     requestAnimationFrame((now) => this.#frame(now));
   }
 
@@ -118,10 +121,10 @@ export class View {
     }
     this.renderer.render(this.scene, this.camera);
     ++this.frames;
-    // Only frames in a row tell how long one takes.
-    const took = now - (this.lastFrame ?? 0);
+    // Only frames in a row tell how long one takes: else it is the time until something changed.
+    if (this.requestedAt - this.frameEnd < framesInRowMs) this.#adapt(now - this.lastFrame);
     this.lastFrame = now;
-    if (took < 1000) this.#adapt(took);
+    this.frameEnd = performance.now();
     this.onDrawn?.();
   }
 
@@ -152,8 +155,9 @@ export class View {
     this.robot.matrix.copy(matrix);
     this.robot.visible = true;
     const position = new Vector3().setFromMatrixPosition(matrix);
-    if (this.tiles) this.tiles.near.copy(this.isFollowing ? position : this.controls.target);
-    if (this.isFollowing) this.lookAt(position);
+    const isFollowing = this.isFollowing && !this.isShowingPast;
+    if (this.tiles) this.tiles.near.copy(isFollowing ? position : this.controls.target);
+    if (isFollowing) this.lookAt(position);
     this.draw();
   }
 
@@ -223,12 +227,19 @@ export class View {
     this.draw();
   }
 
-  /** `clicked(ray)` for clicks and taps that move nothing. */
+  /** `clicked(ray)` for clicks and taps that move nothing, of one finger alone. */
   onClick(clicked) {
-    let from;
-    this.canvas.addEventListener("pointerdown", (event) => { from = event; });
+    const down = new Map();
+    let isGesture = false;
+    this.canvas.addEventListener("pointerdown", (event) => {
+      isGesture = down.size > 0;
+      down.set(event.pointerId, event);
+    });
+    this.canvas.addEventListener("pointercancel", (event) => { down.delete(event.pointerId); });
     this.canvas.addEventListener("pointerup", (event) => {
-      if (!from || event.button !== 0) return;
+      const from = down.get(event.pointerId);
+      down.delete(event.pointerId);
+      if (!from || isGesture || event.button !== 0) return;
       if (Math.hypot(event.clientX - from.clientX, event.clientY - from.clientY) <= clickPixels) clicked(this.rayAt(event));
     });
   }

@@ -35,7 +35,7 @@ export class Server {
   }
 
   /** {total, byClass: [[name, voxels], ...]}, most first; of all pages of one version. */
-  async voxelsIn(region) {
+  async voxelsIn(region, isWanted = () => true) {
     const counts = new Map();
     let total = 0;
     let continuation = "";
@@ -45,7 +45,7 @@ export class Server {
       for (const label of reply.voxels.label) counts.set(label, (counts.get(label) ?? 0) + 1);
       total = Number(reply.total_voxels);
       continuation = reply.continuation;
-    } while (continuation);
+    } while (continuation && isWanted());
     return { total, byClass: [...counts].sort((a, b) => b[1] - a[1]).map(([label, n]) => [className(label), n]) };
   }
 

@@ -74,10 +74,11 @@ export function tileMaterial() {
   });
 }
 
-/** Shows a nav_msgs/OccupancyGrid in the colour mode "traversability". */
-export function setGrid(material, { info, data }) {
+/** Shows a nav_msgs/OccupancyGrid in the colour mode "traversability", unless it is wider than textures may be. */
+export function setGrid(material, { info, data }, maxTextureSize) {
   const { grid, gridFrame, gridSize } = material.uniforms;
-  if (info.width === 0 || info.height === 0) { gridFrame.value.w = 0; return; }
+  const isShown = Math.min(info.width, info.height) > 0 && Math.max(info.width, info.height) <= maxTextureSize;
+  if (!isShown) { gridFrame.value.w = 0; return; }
   const texels = new Uint8Array(data.buffer, data.byteOffset, data.length).slice();
   grid.value.dispose();
   grid.value = new DataTexture(texels, info.width, info.height, RedFormat, UnsignedByteType);

@@ -17,13 +17,23 @@ export class Timeline {
     this.poses = poses;
     const slider = element("time");
     slider.max = String(Math.max(poses.length - 1, 0));
-    if (this.isLive) slider.value = slider.max;
-    this.#tell(Number(slider.value));
+    slider.value = this.isLive ? slider.max : String(this.#indexOfChosen());
+    const index = Number(slider.value);
+    // A long path comes thinned out, and after a correction elsewhere.
+    if (!this.isLive && poses[index]) this.view.showPast(matrixOfPose(poses[index].pose));
+    this.#tell(index);
+  }
+
+  /** The last pose that is not after the chosen one. */
+  #indexOfChosen() {
+    const after = this.poses.findIndex(({ header }) => nanoseconds(header.stamp) > this.chosen);
+    return after < 0 ? Math.max(this.poses.length - 1, 0) : Math.max(after - 1, 0);
   }
 
   #choose(index) {
     if (!this.poses[index]) return;
     this.isLive = false;
+    this.chosen = nanoseconds(this.poses[index].header.stamp);
     element("live").setAttribute("aria-pressed", "false");
     this.view.isShowingPast = true;
     this.view.showPast(matrixOfPose(this.poses[index].pose));

@@ -8,7 +8,7 @@ const help = {
   inspect: "Click a voxel: what it is, what was removed there, whether a robot can be there.",
   polygon: "Click the corners of a region on the map, then Ask.",
   corridor: "Click a path, then Ask: all within half the width of it.",
-  goal: "Click where to go: a path over the server's grid, checked by the server; the goal is published as /goal_pose.",
+  goal: "Click where to go: a path over the server's grid, checked by the server; where it is free, the goal is published as /goal_pose.",
 };
 const longestCheck = 400;
 
@@ -47,6 +47,8 @@ export class Tools {
   }
 
   clear() {
+    // What is asked for now shows nothing any more.
+    this.asked = (this.asked ?? 0) + 1;
     this.corners = [];
     this.view.picked.visible = false;
     this.view.showLine(this.view.outline, new Float32Array());
@@ -66,7 +68,7 @@ export class Tools {
     const place = this.#placeOn(ray);
     if (!place) return;
     if (this.tool === "inspect") this.#run(() => this.#inspect(place));
-    else if (this.tool === "goal") this.#run(() => this.#plan(place.position));
+    else if (this.tool === "goal") this.#run((isWanted) => this.#plan(place.position, isWanted));
     else this.#addCorner(place.position);
   }
 
@@ -76,13 +78,18 @@ export class Tools {
     this.#show([`${this.corners.length} corners`]);
   }
 
+  /** Shows what `work(isWanted)` answers, unless something else was asked for meanwhile. */
   async #run(work) {
+    const own = ++this.asked;
+    const isWanted = () => own === this.asked;
     this.#show(["asking ..."]);
+    let lines;
     try {
-      this.#show(await work());
+      lines = await work(isWanted);
     } catch (error) {
-      this.#show([["bad", error.message]]);
+      lines = [["bad", error.message]];
     }
+    if (isWanted()) this.#show(lines);
   }
 
   async #inspect({ position, label, isVoxel }) {
@@ -114,18 +121,18 @@ export class Tools {
     if (this.corners.length < least) return this.#show([["bad", `at least ${least} corners are needed`]]);
     const width = Number(element("corridor-width").value);
     const region = this.tool === "polygon" ? polygonRegion(this.corners) : corridorRegion(this.corners, width);
-    return this.#run(async () => {
-      const { total, byClass } = await this.server.voxelsIn(region);
+    return this.#run(async (isWanted) => {
+      const { total, byClass } = await this.server.voxelsIn(region, isWanted);
       return [`${total} voxels`, ...byClass.map(([name, n]) => `${name}: ${n}`)];
     });
   }
 
-  async #plan(goal) {
+  /** The goal is published once its path is free. */
+  async #plan(goal, isWanted) {
     const { robot } = this.state;
     if (!robot) throw new Error("the robot's pose is not known yet");
     if (!this.state.grid) throw new Error("the server publishes no grid (traversability.grid_profile)");
     const from = new Vector3().setFromMatrixPosition(robot);
-    this.state.publishGoal(goal);
     const { path, fault } = planOnGrid(this.state.grid, [from.x, from.y], [goal.x, goal.y]);
     if (fault) throw new Error(fault);
     this.view.showLine(this.view.plan, new Float32Array(path.flatMap(([x, y]) => [x, y, goal.z + 0.5])));
@@ -133,10 +140,15 @@ export class Tools {
     for (let i = 1; i < path.length; ++i) length += Math.hypot(path[i][0] - path[i - 1][0], path[i][1] - path[i - 1][1]);
     const lines = [`path of ${length.toFixed(1)} m`];
     const check = await this.server.checkPath(this.state.profile, thinned(path, longestCheck));
-    lines.push(check.isFree
-      ? ["good", `the server: free for ${this.state.profile}, clearance ${check.clearance.toFixed(1)} m`]
-      : ["bad", `the server: ${this.state.profile} would touch something at (${check.at.map((v) => v.toFixed(1)).join(", ")}): ` +
-          check.why]);
+    if (!check.isFree) {
+      lines.push(["bad", `the server: ${this.state.profile} would touch something at ` +
+        `(${check.at.map((v) => v.toFixed(1)).join(", ")}): ${check.why}; the goal was not published`]);
+      return lines;
+    }
+    lines.push(["good", `the server: free for ${this.state.profile}, clearance ${check.clearance.toFixed(1)} m`]);
+    if (!isWanted()) return lines;
+    this.state.publishGoal(goal);
+    lines.push("published as /goal_pose");
     return lines;
   }
 

@@ -1,6 +1,6 @@
 // Real processes for the tests of gateway and page: server, gateway, replay; Foxglove's own client; a browser.
-import { execFileSync, spawn } from "node:child_process";
-import { existsSync, mkdtempSync, rmSync } from "node:fs";
+import { execFileSync, spawn, spawnSync } from "node:child_process";
+import { closeSync, existsSync, mkdtempSync, openSync, rmSync } from "node:fs";
 import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -27,11 +27,22 @@ export async function eventually(what, look, timeoutMs = patienceMs) {
   throw new Error(`waited ${timeoutMs} ms for ${what}`);
 }
 
+/** A DDS domain that no other test takes while this process runs, as tests/domain_lease.hpp. */
+function freeDomain() {
+  for (;;) {
+    const domain = String(20 + Math.floor(Math.random() * 200));
+    const file = openSync(join(tmpdir(), `stillmap-test-domain-${domain}-of-${process.getuid()}`), "a");
+    // The lock belongs to the open file, which this process keeps.
+    if (spawnSync("flock", ["--nonblock", "3"], { stdio: ["ignore", "ignore", "ignore", file] }).status === 0) return domain;
+    closeSync(file);
+  }
+}
+
 /** A server and a gateway in a domain of their own. `end()` stops everything. */
 export class Stack {
   constructor() {
     this.folder = mkdtempSync(join(tmpdir(), "stillmap_web_"));
-    this.domain = String(20 + Math.floor(Math.random() * 200));
+    this.domain = freeDomain();
     this.children = [];
   }
 
