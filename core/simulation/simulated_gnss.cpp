@@ -25,13 +25,13 @@ std::vector<GnssFix> simulated_gnss(const Simulation& simulation, const GnssErro
   const double step_s = 1.0 / errors.rate_hz;
   const double kept = std::exp(-step_s / errors.wander_time_s);
   const auto count = static_cast<std::uint64_t>(config.scans * config.sensor.period_s / step_s);
-  Random start(config.seed, 61);
+  Random start(config.day_seed(), 61);
   Eigen::Vector3d wander_city = errors.wander_m * random_vector(start);
   Eigen::Vector3d reflection_city = Eigen::Vector3d::Zero();
   double reflection_ends_s = 0.0;
   std::vector<GnssFix> fixes;
   for (std::uint64_t k = 0; k <= count; ++k) {
-    Random random(config.seed, 62, k);
+    Random random(config.day_seed(), 62, k);
     const double time_s = static_cast<double>(k) * step_s;
     // First-order Gauss-Markov: its deviation stays that of the wander.
     wander_city =

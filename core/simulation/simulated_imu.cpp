@@ -51,6 +51,7 @@ double speed_at(const Simulation& simulation, double time_s) {
 std::vector<ImuSample> simulated_imu(const Simulation& simulation, const ImuErrors& errors,
                                      const ImuMount& mount) {
   const SimulationConfig& config = simulation.config();
+  // Of the device, the same every day.
   Random constant(config.seed, 51);
   const auto bias = [&](double largest) {
     return Eigen::Vector3d(constant.uniform(-largest, largest), constant.uniform(-largest, largest),
@@ -64,7 +65,7 @@ std::vector<ImuSample> simulated_imu(const Simulation& simulation, const ImuErro
   std::vector<ImuSample> samples;
   samples.reserve(count);
   for (std::uint64_t k = 0; k <= count; ++k) {
-    Random random(config.seed, 52, k);
+    Random random(config.day_seed(), 52, k);
     const double time_s = static_cast<double>(k) * step_s;
     ImuSample sample;
     sample.stamp_ns = std::llround((time_s + mount.time_offset_s) * 1e9);

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "core/lidar/prepare.hpp"
 #include "core/simulation/city.hpp"
 #include "core/simulation/random.hpp"
 #include "core/simulation/ray_scene.hpp"
@@ -162,14 +163,16 @@ struct Simulation::World {
     Eigen::Isometry3d T_map_lidar = traffic.T_map_ego_at(time_s);
     T_map_lidar.rotate(Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) *
                        Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX()));
+    // Not even a product with the identity where nothing is asked for: scans keep their bits. The
+    // robot turns, whichever way its lidar looks; a hand moves the lidar.
+    const Eigen::Isometry3d T_motion = T_vehicle_lidar_at(config.motion, time_s);
+    if (config.motion == LidarMotion::hard_turns) T_map_lidar = T_map_lidar * T_motion;
     if (config.T_base_lidar) {
       T_map_lidar = T_map_lidar * *config.T_base_lidar;
     } else {
       T_map_lidar = T_map_lidar * Eigen::Translation3d(0, 0, config.lidar_height_m);
     }
-    // Not even a product with the identity where nothing is asked for: scans keep their bits.
-    if (config.motion == LidarMotion::vehicle) return T_map_lidar;
-    return T_map_lidar * T_vehicle_lidar_at(config.motion, time_s);
+    return config.motion == LidarMotion::handheld ? T_map_lidar * T_motion : T_map_lidar;
   }
 
   [[nodiscard]] Pixel pixel_of(const RayHit& hit, const std::vector<Body>& bodies, const Ray& ray,
@@ -298,6 +301,8 @@ SimulatedScan Simulation::World::collect(int index, const std::vector<Pixel>& pi
           static_cast<float>(config.sensor.period_s * firing / firings));
     }
   }
+  // As the real one measures, of which the sensor's file says it.
+  turn_up(out.scan, -config.sensor.elevation_offset);
   return out;
 }
 

@@ -52,6 +52,15 @@ TEST(SimulatedGnss, ErrsByTheSameForAWhile) {
   EXPECT_EQ(simulated_gnss(simulation)[7].latitude_deg, simulated_gnss(simulation)[7].latitude_deg);
 }
 
+TEST(SimulatedGnss, ErrsOtherwiseOnAnotherDay) {
+  SimulationConfig tuesday = yard_drive();
+  tuesday.day = 1;
+  const Simulation first(yard_drive()), second(tuesday);
+  const auto monday_errors = errors_of(simulated_gnss(first), first);
+  const auto tuesday_errors = errors_of(simulated_gnss(second), second);
+  EXPECT_GT((monday_errors.front() - tuesday_errors.front()).norm(), 0.1);
+}
+
 TEST(SimulatedGnss, ReflectionsComeInStretchesAndTheFixDoesNotKnow) {
   const Simulation simulation(yard_drive());
   const auto fixes = simulated_gnss(simulation, {.wander_m = 0.1,

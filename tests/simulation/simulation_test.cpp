@@ -8,6 +8,8 @@
 #include <limits>
 #include <numbers>
 
+#include "core/lidar/prepare.hpp"
+
 namespace stillmap::simulation {
 namespace {
 
@@ -92,6 +94,41 @@ TEST(Simulation, BeamsLieOnTheirElevations) {
     const Eigen::Vector3f& p = scan.points_lidar[i];
     EXPECT_NEAR(std::atan2(p.z(), p.head<2>().norm()), sensor.beam_elevation(scan.ring[i]), 1e-4);
   }
+}
+
+TEST(Simulation, ElevationsAreMeasuredAsTheSensorSaysItErrs) {
+  SimulationConfig config = small();
+  const Scan exact = Simulation(config).scan(4).scan;
+  config.sensor.elevation_offset = 0.004;
+  Scan off = Simulation(config).scan(4).scan;
+  ASSERT_EQ(off.size(), exact.size());
+  const auto elevation = [](const Eigen::Vector3f& p) {
+    return std::atan2(p.z(), p.head<2>().norm());
+  };
+  EXPECT_NEAR(elevation(exact.points_lidar[99]) - elevation(off.points_lidar[99]), 0.004, 1e-6);
+  turn_up(off, config.sensor.elevation_offset);
+  for (std::size_t i = 0; i < off.size(); ++i)
+    EXPECT_LT((off.points_lidar[i] - exact.points_lidar[i]).norm(), 1e-4F);
+}
+
+TEST(Simulation, ARobotThatTurnsStaysUprightWhicheverWayItsLidarLooks) {
+  SimulationConfig config = small();
+  config.motion = LidarMotion::hard_turns;
+  config.scans = 60;
+  config.T_base_lidar =
+      Eigen::Translation3d(1.2, 0.0, 1.4) * Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY());
+  const Simulation simulation(config);
+  double turn_rad = 0.0;
+  for (double time_s = 0.0; time_s < 5.0; time_s += 0.1) {
+    const Eigen::Isometry3d T_map_base =
+        simulation.T_map_lidar_at(time_s) * config.T_base_lidar->inverse();
+    EXPECT_GT(T_map_base.linear()(2, 2), std::cos(0.05)) << time_s;
+    turn_rad =
+        std::max(turn_rad, Eigen::AngleAxisd(simulation.T_map_lidar_at(0.0).linear().transpose() *
+                                             simulation.T_map_lidar_at(time_s).linear())
+                               .angle());
+  }
+  EXPECT_GT(turn_rad, 0.5);
 }
 
 TEST(Simulation, FiringsAndBeamsAreThoseAskedFor) {
