@@ -17,6 +17,7 @@ std::string shape_of(const py::array& array) {
 
 Eigen::Isometry3d transform_at(const double* values, const std::string& name) {
   const Eigen::Map<const RowMajor4> matrix(values);
+  if (!matrix.allFinite()) throw std::invalid_argument(name + " is not finite");
   if (!matrix.row(3).isApprox(Eigen::RowVector4d(0.0, 0.0, 0.0, 1.0), 1e-9)) {
     throw std::invalid_argument(name + " is no transform: its last row is not 0 0 0 1");
   }
@@ -101,6 +102,11 @@ py::array_t<double> array_from(const Eigen::MatrixXd& matrix) {
       array.mutable_at(row, column) = matrix(row, column);
     }
   }
+  return array;
+}
+
+py::object read_only(py::array array) {
+  array.attr("setflags")(py::arg("write") = false);
   return array;
 }
 

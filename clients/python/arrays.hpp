@@ -69,6 +69,9 @@ std::vector<T> values_from(const std::optional<InArray<T>>& array, const std::st
 [[nodiscard]] py::array_t<double> array_from(std::span<const StampedPose> poses);
 [[nodiscard]] py::array_t<double> array_from(const Eigen::MatrixXd& matrix);
 
+/// The same array, which Python must not write to.
+[[nodiscard]] py::object read_only(py::array array);
+
 /// An object with these fields (types.SimpleNamespace).
 [[nodiscard]] py::object namespace_of(const py::dict& fields);
 

@@ -26,6 +26,21 @@ std::chrono::milliseconds duration_of(double seconds) {
   return std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * seconds));
 }
 
+/// Calls `wait(so long)` until it is true or the time is up; in between Ctrl-C ends it.
+template <typename Wait>
+bool wait_for(double timeout_s, Wait wait) {
+  constexpr std::chrono::milliseconds slice(200);
+  const auto end = std::chrono::steady_clock::now() + duration_of(timeout_s);
+  for (;;) {
+    const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
+        end - std::chrono::steady_clock::now());
+    if (wait(std::clamp(left, std::chrono::milliseconds(0), slice))) return true;
+    if (left <= slice) return false;
+    const py::gil_scoped_acquire held;
+    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+  }
+}
+
 std::unique_ptr<Client> connect(std::uint32_t domain, const std::string& server,
                                 const std::string& profile,
                                 const std::vector<std::string>& interfaces,
@@ -46,7 +61,17 @@ std::unique_ptr<Client> connect(std::uint32_t domain, const std::string& server,
   options.dds.domain_id = domain;
   options.dds.security = security.value_or("");
   auto client = std::make_unique<Client>(options);
-  client->wait_for_server(options.request_timeout);
+  std::string fault;
+  const bool answers = wait_for(timeout_s, [&](std::chrono::milliseconds slice) {
+    try {
+      client->wait_for_server(slice);
+      return true;
+    } catch (const ServiceTimeout& timeout) {
+      fault = timeout.what();
+      return false;
+    }
+  });
+  if (!answers) throw ServiceTimeout(fault);
   return client;
 }
 
@@ -103,10 +128,12 @@ Message newest_of(Subscribe subscribe, double timeout_s, const char* fault) {
     newest = message;
     arrived.notify_one();
   });
-  std::unique_lock lock(mutex);
-  if (!arrived.wait_for(lock, duration_of(timeout_s), [&] { return newest.has_value(); })) {
-    throw ServiceTimeout(fault);
-  }
+  const bool has_come = wait_for(timeout_s, [&](std::chrono::milliseconds slice) {
+    std::unique_lock lock(mutex);
+    return arrived.wait_for(lock, slice, [&] { return newest.has_value(); });
+  });
+  if (!has_come) throw ServiceTimeout(fault);
+  const std::lock_guard lock(mutex);
   return *newest;
 }
 
@@ -159,7 +186,10 @@ py::object removed(Client& client, const Region& region, std::uint32_t max_voxel
     const py::gil_scoped_release released;
     result = client.get_removed(region, max_voxels);
   }
-  return removed_arrays(result.voxels);
+  py::object removed = removed_arrays(result.voxels);
+  removed.attr("total") = result.total;
+  removed.attr("incomplete") = result.incomplete;
+  return removed;
 }
 
 py::object submaps(Client& client, double timeout_s) {

@@ -61,8 +61,14 @@ void bind_scan(py::module_& module) {
                              "(n,) float32: from stamp_ns on [s], or None.")
       .def_property_readonly("ring", &scan_values<std::uint16_t, &Scan::ring>,
                              "(n,) uint16 in the source's own order, or None.")
-      .def_property_readonly("labels", &scan_values<std::uint8_t, &Scan::labels>,
-                             "(n,) uint8: index of CLASS_NAMES, or None.")
+      .def_property_readonly(
+          "labels",
+          [](const py::object& self) -> py::object {
+            py::object labels = scan_values<std::uint8_t, &Scan::labels>(self);
+            // They were checked.
+            return labels.is_none() ? labels : read_only(labels);
+          },
+          "(n,) uint8: index of CLASS_NAMES, or None. Not to be written to.")
       .def_property_readonly(
           "raw_labels",
           [](const py::object& self) {

@@ -121,11 +121,6 @@ py::dtype packed_dtype() {
   return py::dtype::from_args(fields);
 }
 
-py::object read_only(py::array array) {
-  array.attr("setflags")(py::arg("write") = false);
-  return array;
-}
-
 void bind_tile(py::module_& module) {
   py::class_<TileOfMap>(module, "Tile", "A square column of the map, all heights.")
       .def_property_readonly(

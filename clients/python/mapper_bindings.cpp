@@ -2,6 +2,9 @@
 #include <pybind11/stl/filesystem.h>
 
 #include <filesystem>
+#include <mutex>
+#include <string>
+#include <utility>
 
 #include "clients/python/bindings.hpp"
 #include "clients/python/map.hpp"
@@ -28,8 +31,26 @@ LabelsConfig labels_from(LabelsConfig labels, const std::string& source) {
   return labels;
 }
 
-std::unique_ptr<Mapper> make_mapper(const SensorModel& sensor, const std::string& labels,
-                                    const std::optional<std::filesystem::path>& config_file) {
+/// A mapper that threads use one after the other.
+class SharedMapper {
+ public:
+  explicit SharedMapper(std::unique_ptr<Mapper> mapper) : mapper_(std::move(mapper)) {}
+
+  /// What `use(Mapper&)` returns. Python goes on meanwhile, and must not be used in it.
+  template <typename Use>
+  auto with(Use use) {
+    const py::gil_scoped_release released;
+    const std::scoped_lock lock(mutex_);
+    return use(*mapper_);
+  }
+
+ private:
+  std::unique_ptr<Mapper> mapper_;
+  std::mutex mutex_;
+};
+
+std::unique_ptr<SharedMapper> make_mapper(const SensorModel& sensor, const std::string& labels,
+                                          const std::optional<std::filesystem::path>& config_file) {
   const py::gil_scoped_release released;
   ServerConfig config;
   if (config_file) config = load_server_config(*config_file);
@@ -37,15 +58,14 @@ std::unique_ptr<Mapper> make_mapper(const SensorModel& sensor, const std::string
   auto mapper = std::make_unique<Mapper>(
       config.mapper, open_segmenter(labels_from(config.labels, labels), sensor));
   mapper->reset(new_map_id());
-  return mapper;
+  return std::make_unique<SharedMapper>(std::move(mapper));
 }
 
-std::optional<MappedScan> process(Mapper& mapper, const DatasetFrame& frame,
+std::optional<MappedScan> process(SharedMapper& shared, const DatasetFrame& frame,
                                   const std::optional<InArray<double>>& T_map_lidar_prior) {
   std::optional<Eigen::Isometry3d> prior;
   if (T_map_lidar_prior) prior = transform_from(*T_map_lidar_prior, "T_map_lidar_prior");
-  const py::gil_scoped_release released;
-  return mapper.process(frame.scan, prior);
+  return shared.with([&](Mapper& mapper) { return mapper.process(frame.scan, prior); });
 }
 
 Map current_map(Mapper& mapper) {
@@ -60,7 +80,6 @@ Map current_map(Mapper& mapper) {
 }
 
 void save(Mapper& mapper, const std::filesystem::path& file) {
-  const py::gil_scoped_release released;
   if (std::filesystem::exists(file)) {
     throw MapFileError(file, "is there already; name a new file, or remove it");
   }
@@ -73,11 +92,12 @@ void save(Mapper& mapper, const std::filesystem::path& file) {
   store->complete_file();
 }
 
-void add_imu(Mapper& mapper, std::int64_t stamp_ns,
+void add_imu(SharedMapper& shared, std::int64_t stamp_ns,
              const std::array<double, 3>& angular_velocity_imu,
              const std::array<double, 3>& acceleration_imu) {
-  mapper.add(ImuSample{stamp_ns, Eigen::Vector3d(angular_velocity_imu.data()),
-                       Eigen::Vector3d(acceleration_imu.data())});
+  const ImuSample sample{stamp_ns, Eigen::Vector3d(angular_velocity_imu.data()),
+                         Eigen::Vector3d(acceleration_imu.data())};
+  shared.with([&](Mapper& mapper) { mapper.add(sample); });
 }
 
 void bind_mapped_scan(py::module_& module) {
@@ -121,9 +141,10 @@ void bind_mapped_scan(py::module_& module) {
 void bind_mapper(py::module_& module) {
   module.attr("MOTIONS") = py::make_tuple("stationary", "semi_static", "highly_dynamic");
   bind_mapped_scan(module);
-  py::class_<Mapper>(module, "Mapper",
-                     "The server's pipeline in this process: poses, classes and a static map of "
-                     "scans, one after the other. One thread uses it.")
+  py::class_<SharedMapper>(
+      module, "Mapper",
+      "The server's pipeline in this process: poses, classes and a static map of scans, one after "
+      "the other. Threads that share it wait for each other.")
       .def(py::init(&make_mapper), py::arg("sensor"), py::arg("labels") = "none",
            py::arg("config") = py::none(),
            "sensor: a Sensor. labels: \"none\" (pure geometry), \"scan\" (those of the scans), "
@@ -133,18 +154,37 @@ void bind_mapper(py::module_& module) {
            "Maps a Scan. T_map_lidar_prior: (4, 4), replaces the constant-velocity prediction. "
            "None for a scan that cannot be mapped; last_rejection says why.")
       .def_property_readonly("last_rejection",
-                             [](const Mapper& mapper) { return mapper.last_rejection().reason; })
+                             [](SharedMapper& shared) {
+                               return shared.with([](const Mapper& mapper) {
+                                 return std::string(mapper.last_rejection().reason);
+                               });
+                             })
       .def("add_imu", &add_imu, py::arg("stamp_ns"), py::arg("angular_velocity_imu"),
            py::arg("acceleration_imu"),
            "A sample of the IMU [rad/s, m/s^2], before the scans that end after it.")
       .def_property_readonly(
-          "trajectory", [](const Mapper& mapper) { return trajectory_of(mapper.trajectory()); },
+          "trajectory",
+          [](SharedMapper& shared) {
+            return trajectory_of(
+                shared.with([](const Mapper& mapper) { return Trajectory(mapper.trajectory()); }));
+          },
           "Poses of the lidar so far.")
-      .def_property_readonly("label_source", &Mapper::label_source)
-      .def("map", &current_map, "The static map as it is now.")
-      .def("save", &save, py::arg("file"),
-           "Writes a new map file, which servers resume and open_map() reads. Raises "
-           "MapFileError.");
+      .def_property_readonly(
+          "label_source",
+          [](SharedMapper& shared) {
+            return shared.with([](const Mapper& mapper) { return mapper.label_source(); });
+          })
+      .def(
+          "map", [](SharedMapper& shared) { return shared.with(current_map); },
+          "The static map as it is now.")
+      .def(
+          "save",
+          [](SharedMapper& shared, const std::filesystem::path& file) {
+            shared.with([&](Mapper& mapper) { save(mapper, file); });
+          },
+          py::arg("file"),
+          "Writes a new map file, which servers resume and open_map() reads. Raises "
+          "MapFileError.");
 }
 
 }  // namespace stillmap::python

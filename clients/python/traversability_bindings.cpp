@@ -2,6 +2,7 @@
 
 #include <array>
 #include <chrono>
+#include <mutex>
 
 #include "clients/python/bindings.hpp"
 #include "clients/python/traversability.hpp"
@@ -63,7 +64,10 @@ py::object plan(const Traversability& where, const std::vector<double>& start,
   const auto from = goal_from(start, "start"), to = goal_from(goal, "goal");
   PathPlan found;
   {
+    // One at a time in a process, as OMPL's random seed is one.
+    static std::mutex planning;
     const py::gil_scoped_release released;
+    const std::scoped_lock lock(planning);
     const auto end = std::chrono::steady_clock::now() + std::chrono::duration<double>(time_limit_s);
     PlanningConfig config;
     config.seed = seed;
@@ -77,7 +81,7 @@ py::object plan(const Traversability& where, const std::vector<double>& start,
 constexpr const char* plan_help =
     "Plans a path of the robot's footprint. start, goal: (x, y) or (x, y, heading_rad), map frame "
     "[m]. The answer has is_found, status, reason, poses_map (n, 3: x, y, heading), height_m (n,), "
-    "length_m, clearance_m, cost. One plan at a time in a process.";
+    "length_m, clearance_m, cost. Threads plan one after the other.";
 
 }  // namespace
 

@@ -47,7 +47,7 @@ def take_domain():
     """A DDS domain that no other test takes, and the file that says so while it is open."""
     while True:
         domain = random.randint(20, 219)
-        lease = open(Path(tempfile.gettempdir()) / f"stillmap-test-domain-{domain}", "a")
+        lease = open(Path(tempfile.gettempdir()) / f"stillmap-test-domain-{domain}-of-{os.getuid()}", "a")
         try:
             fcntl.flock(lease, fcntl.LOCK_EX | fcntl.LOCK_NB)
             return domain, lease

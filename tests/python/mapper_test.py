@@ -90,20 +90,54 @@ def test_wrong_settings_are_refused(city):
 def test_other_threads_run_meanwhile(city):
     dataset = stillmap.open_dataset(city)
     mapper = stillmap.Mapper(dataset.sensor)
-    gaps, end = [], threading.Event()
+    is_processing, end = threading.Event(), threading.Event()
+    ticks = 0
 
     def tick():
-        last = time.monotonic()
+        nonlocal ticks
         while not end.is_set():
-            time.sleep(0.0005)
-            now = time.monotonic()
-            gaps.append(now - last)
-            last = now
+            time.sleep(0.0002)
+            ticks += is_processing.is_set()
 
     ticking = threading.Thread(target=tick)
     ticking.start()
     for scan in dataset:
+        is_processing.set()
         mapper.process(scan)
+        is_processing.clear()
     end.set()
     ticking.join()
-    assert len(gaps) > len(dataset)
+    # A lock that is held lets this thread in between calls alone.
+    assert ticks > 3 * len(dataset)
+
+
+def test_a_prior_must_be_finite():
+    prior = np.eye(4)
+    prior[0, 3] = np.nan
+    with pytest.raises(ValueError, match="T_map_lidar_prior is not finite"):
+        stillmap.Mapper(stillmap.load_sensor("vlp_16")).process(stillmap.Scan(np.zeros((0, 3))), prior)
+
+
+def test_labels_that_were_checked_stay_as_they_are():
+    scan = stillmap.Scan(np.zeros((2, 3)), labels=np.array([1, 9], np.uint8))
+    with pytest.raises(ValueError, match="read-only"):
+        scan.labels[:] = 40
+
+
+def test_threads_share_a_mapper(city):
+    dataset = stillmap.open_dataset(city)
+    mapper = stillmap.Mapper(dataset.sensor)
+    end = threading.Event()
+
+    def look():
+        while not end.is_set():
+            assert len(mapper.trajectory) <= len(dataset)
+            mapper.add_imu(0, [0, 0, 0], [0, 0, 9.8])
+
+    looking = threading.Thread(target=look)
+    looking.start()
+    for scan in dataset:
+        mapper.process(scan)
+    end.set()
+    looking.join()
+    assert len(mapper.trajectory) == len(dataset)
