@@ -50,8 +50,10 @@ class DomainLease {
   DomainLease(int domain, int file) : domain_(domain), file_(file) {}
 
   static std::optional<DomainLease> try_to_take(int domain) {
+    // Of this user: files of others cannot be opened. Their processes are seen by their sockets.
     const auto name =
-        std::filesystem::temp_directory_path() / ("stillmap-test-domain-" + std::to_string(domain));
+        std::filesystem::temp_directory_path() /
+        ("stillmap-test-domain-" + std::to_string(domain) + "-of-" + std::to_string(::getuid()));
     DomainLease lease(domain, ::open(name.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666));
     // Somebody else's process may still use it without a lease.
     if (lease.file_ < 0 || ::flock(lease.file_, LOCK_EX | LOCK_NB) != 0 ||

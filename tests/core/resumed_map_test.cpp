@@ -28,9 +28,11 @@ Scan scan_of(const ScanDataset& sequence, std::size_t k) {
 /// A real street (KITTI raw, drive 0005): every second scan makes the map, the ones between have to
 /// find their place in it, without any class to help.
 TEST(ResumedMap, ScansThatAreNotInItFindTheirPlace) {
-  const char* folder = std::getenv("STILLMAP_TEST_SEQUENCE");
-  if (folder == nullptr) GTEST_SKIP() << "STILLMAP_TEST_SEQUENCE does not name KITTI's drive 0005";
-  const ScanDataset sequence{std::filesystem::path(folder)};
+  const char* recordings = std::getenv("STILLMAP_TEST_DATA");
+  if (recordings == nullptr) GTEST_SKIP() << "STILLMAP_TEST_DATA names no folder of recordings";
+  const auto folder = std::filesystem::path(recordings) / "kitti_raw_0005";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not there";
+  const ScanDataset sequence{folder};
   Mapper maker = geometric_mapper();
   Mapper follower = geometric_mapper();
   std::vector<Eigen::Isometry3d> T_map_lidar;

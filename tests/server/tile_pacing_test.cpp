@@ -2,6 +2,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <map>
 #include <thread>
 
@@ -208,12 +209,14 @@ class TileWindow : public testing::Test {
     publisher_.publish(std::make_shared<const MapSnapshot>(view_),
                        Eigen::Vector2d(robot_m, robot_m));
   }
-  /// What arrives until nothing does.
-  std::map<TileId, std::uint64_t> take(dds::Reader<MapTile>& reader) {
-    std::map<TileId, std::uint64_t> got;
+  using Revisions = std::map<TileId, std::uint64_t>;
+  /// What arrives until `is_all`, and what comes soon after that.
+  Revisions take(dds::Reader<MapTile>& reader,
+                 const std::function<bool(const Revisions&)>& is_all) {
+    Revisions got;
     MapTile message;
-    for (std::chrono::milliseconds wait = dds::discovery_timeout; reader.take(message, {}, wait);
-         wait = 300ms) {
+    while (reader.take(message, {},
+                       is_all(got) ? 300ms : std::chrono::milliseconds(dds::discovery_timeout))) {
       got[{message.tile_x(), message.tile_y()}] = message.state().revision();
     }
     return got;
@@ -235,7 +238,8 @@ TEST_F(TileWindow, LateJoinersGetTheTilesRoundTheRobotAndWhatChangedElsewhere) {
   change({2, 2});
   publish(600.0);
   dds::Reader<MapTile> reader(there_, topics_.tiles.dds_name, topics_.tiles.reader);
-  const auto got = take(reader);
+  const auto got = take(
+      reader, [&](const Revisions& revisions) { return revisions.size() >= publisher_.held(); });
   EXPECT_EQ(got.size(), publisher_.held());
   EXPECT_EQ(got.at({2, 2}), 2U);
   for (const auto& [id, revision] : got) {
@@ -264,11 +268,18 @@ TEST_F(TileWindow, ATileThatLeavesStaysWithThoseWhoHaveIt) {
   dds::Reader<MapTile> reader(there_, topics_.tiles.dds_name, topics_.tiles.reader);
   ASSERT_TRUE(reader.events().wait_for_writer(dds::discovery_timeout));
   publish(100.0);
-  EXPECT_TRUE(take(reader).contains({5, 5}));
+  const auto has_come = [](const Revisions& revisions) { return revisions.contains({5, 5}); };
+  EXPECT_TRUE(has_come(take(reader, has_come)));
   view_.tiles.erase({5, 5});
-  ++view_.version;
+  change({5, 6});
   publish(100.0);
-  EXPECT_FALSE(take(reader).contains({5, 5})) << "disposed: no sample with voxels";
+  const auto has_followed = [&](const Revisions& revisions) {
+    const auto found = revisions.find({5, 6});
+    return found != revisions.end() && found->second == view_.version;
+  };
+  const Revisions got = take(reader, has_followed);
+  EXPECT_TRUE(has_followed(got));
+  EXPECT_FALSE(has_come(got)) << "disposed: no sample with voxels";
 }
 
 }  // namespace

@@ -187,8 +187,12 @@ TEST_F(TraversabilityService, TellsHowLongAChangeTakes) {
 TEST(TraversabilityConfiguration, AnUnknownRobotEndsTheServerWithTheNamesThereAre) {
   const ScratchFolder folder;
   std::ofstream(folder / "server.yaml") << "traversability: {profiles: [submarine]}\n";
+  testing::internal::CaptureStderr();
   ServerProcess server({"--config", (folder / "server.yaml").string()});
   EXPECT_EQ(server.wait_for_exit(patience), 2);
+  EXPECT_THAT(
+      testing::internal::GetCapturedStderr(),
+      testing::AllOf(testing::HasSubstr("submarine"), testing::HasSubstr("delivery_robot")));
 }
 
 }  // namespace
