@@ -26,16 +26,18 @@ std::chrono::milliseconds duration_of(double seconds) {
   return std::chrono::milliseconds(static_cast<std::int64_t>(1000.0 * seconds));
 }
 
-/// Calls `wait(so long)` until it is true or the time is up; in between Ctrl-C ends it.
+/// Calls `wait(so long)` until it is true or the time is up; in between Ctrl-C ends it. Waits are
+/// twice as long each time, up to `max_slice`.
 template <typename Wait>
-bool wait_for(double timeout_s, Wait wait) {
-  constexpr std::chrono::milliseconds slice(200);
+bool wait_for(double timeout_s, std::chrono::milliseconds max_slice, Wait wait) {
+  std::chrono::milliseconds slice(std::min(max_slice, std::chrono::milliseconds(500)));
   const auto end = std::chrono::steady_clock::now() + duration_of(timeout_s);
   for (;;) {
     const auto left = std::chrono::duration_cast<std::chrono::milliseconds>(
         end - std::chrono::steady_clock::now());
     if (wait(std::clamp(left, std::chrono::milliseconds(0), slice))) return true;
     if (left <= slice) return false;
+    slice = std::min(2 * slice, max_slice);
     const py::gil_scoped_acquire held;
     if (PyErr_CheckSignals() != 0) throw py::error_already_set();
   }
@@ -62,7 +64,9 @@ std::unique_ptr<Client> connect(std::uint32_t domain, const std::string& server,
   options.dds.security = security.value_or("");
   auto client = std::make_unique<Client>(options);
   std::string fault;
-  const bool answers = wait_for(timeout_s, [&](std::chrono::milliseconds slice) {
+  // An answer over a slow link takes long.
+  constexpr std::chrono::seconds max_slice(10);
+  const bool answers = wait_for(timeout_s, max_slice, [&](std::chrono::milliseconds slice) {
     try {
       client->wait_for_server(slice);
       return true;
@@ -128,7 +132,8 @@ Message newest_of(Subscribe subscribe, double timeout_s, const char* fault) {
     newest = message;
     arrived.notify_one();
   });
-  const bool has_come = wait_for(timeout_s, [&](std::chrono::milliseconds slice) {
+  constexpr std::chrono::milliseconds max_slice(200);
+  const bool has_come = wait_for(timeout_s, max_slice, [&](std::chrono::milliseconds slice) {
     std::unique_lock lock(mutex);
     return arrived.wait_for(lock, slice, [&] { return newest.has_value(); });
   });

@@ -42,7 +42,7 @@ const frames = new Frames();
 const state = { frames, profiles: [], profile: "car", grid: undefined, robot: undefined, publishGoal };
 const connection = new Connection(address.href, { changed: showConnection, connected: begin });
 const tiles = new MapTiles(connection, prefix, facts.format_version, () => view.draw(),
-  (text) => showConnection(text, false));
+  (fault) => showConnection(fault ?? "connected", fault === undefined));
 const server = new Server(connection, prefix, facts.format_version);
 view.setMap(tiles);
 const tools = new Tools({ view, tiles, server, state });

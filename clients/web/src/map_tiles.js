@@ -25,7 +25,7 @@ export function decodeTile(buffer) {
 const keyOf = (info) => `${info.tile_x}/${info.tile_y}`;
 
 export class MapTiles {
-  /** `changed()` when something is to be drawn anew; `failed(text)` when what was asked for does not come. */
+  /** `changed()` when something is to be drawn anew; `failed(text)` when what was asked for does not come; without a text, when it comes again. */
   constructor(connection, prefix, formatVersion, changed, failed) {
     this.group = new Group();
     this.material = tileMaterial();
@@ -48,14 +48,20 @@ export class MapTiles {
     });
   }
 
+  #tell(fault) {
+    if (fault !== this.fault) this.failed(fault);
+    this.fault = fault;
+  }
+
   #listSoon() {
     if (this.listing) return;
     this.listing = setTimeout(async () => {
       try {
         await this.list();
         this.listing = undefined;
+        this.#tell(undefined);
       } catch (error) {
-        this.failed(`the new map cannot be listed: ${error.message}`);
+        this.#tell(`the new map cannot be listed: ${error.message}`);
         this.listing = undefined;
         // Another entry may be long in coming, where the map does not change.
         if (this.connection.isOpen) this.#listSoon();
@@ -177,8 +183,9 @@ export class MapTiles {
         if (this.tiles.get(tile.key) === tile) this.#show(tile, decodeTile(buffer));
       }
       tile.shown = wanted;
+      this.#tell(undefined);
     } catch (error) {
-      this.failed(`tiles do not come: ${error.message}`);
+      this.#tell(`tiles do not come: ${error.message}`);
       tile.nextFetch = performance.now() + retryMs;
     } finally {
       tile.isFetching = false;

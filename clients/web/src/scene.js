@@ -232,6 +232,8 @@ export class View {
     const down = new Map();
     let isGesture = false;
     this.canvas.addEventListener("pointerdown", (event) => {
+      // The first finger again: no other one is down.
+      if (event.isPrimary) down.clear();
       isGesture = down.size > 0;
       down.set(event.pointerId, event);
     });
