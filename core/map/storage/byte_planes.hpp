@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
@@ -64,15 +65,35 @@ void append_planes(PlaneBytes& content, const std::vector<Record>& records, Visi
   }
 }
 
-/// Fills the records from planes that begin at `planes`; there are enough bytes for all.
-template <std::size_t record_bytes, typename Record, typename Visit>
-void read_planes(const std::uint8_t* planes, std::vector<Record>& records, Visit visit) {
-  const std::size_t count = records.size();
-  std::array<std::uint8_t, record_bytes> record{};
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t k = 0; k < record_bytes; ++k) record[k] = planes[k * count + i];
-    visit(FieldReader(record.data()), records[i]);
+/// Calls `use(record)` for each record of planes that begin at `planes`; there are enough bytes for
+/// all.
+template <std::size_t record_bytes, typename Record, typename Visit, typename Use>
+void for_each_in_planes(const std::uint8_t* planes, std::size_t count, Visit visit, Use use) {
+  // Plane by plane for so many records: the bytes of one lie far apart.
+  constexpr std::size_t batch = 64;
+  std::array<std::uint8_t, batch * record_bytes> records;
+  for (std::size_t begin = 0; begin < count; begin += batch) {
+    const std::size_t in_batch = std::min(batch, count - begin);
+    for (std::size_t k = 0; k < record_bytes; ++k) {
+      const std::uint8_t* const plane = planes + k * count + begin;
+      for (std::size_t i = 0; i < in_batch; ++i) records[i * record_bytes + k] = plane[i];
+    }
+    for (std::size_t i = 0; i < in_batch; ++i) {
+      Record record{};
+      visit(FieldReader(&records[i * record_bytes]), record);
+      use(record);
+    }
   }
+}
+
+/// The same records in a list.
+template <std::size_t record_bytes, typename Record, typename Visit>
+std::vector<Record> read_planes(const std::uint8_t* planes, std::size_t count, Visit visit) {
+  std::vector<Record> records;
+  records.reserve(count);
+  for_each_in_planes<record_bytes, Record>(planes, count, visit,
+                                           [&](Record& record) { records.push_back(record); });
+  return records;
 }
 
 }  // namespace stillmap

@@ -133,8 +133,7 @@ ExcludedVoxel from_stored(const StoredExcluded& stored) {
 /// Reads one list and moves on behind it.
 template <std::size_t record_bytes, typename Stored, typename Visit>
 std::vector<Stored> read_list(const std::uint8_t*& from, std::uint32_t count, Visit visit) {
-  std::vector<Stored> stored(count);
-  read_planes<record_bytes>(from, stored, visit);
+  auto stored = read_planes<record_bytes, Stored>(from, count, visit);
   from += count * record_bytes;
   return stored;
 }

@@ -121,20 +121,18 @@ void append_stamps(PlaneBytes& content, std::span<const std::int64_t> stamps_ns)
 }
 
 std::vector<std::int64_t> read_stamps(const std::uint8_t*& from, std::size_t count) {
-  std::vector<std::uint64_t> steps(count);
-  read_planes<stamp_bytes>(from, steps, visit_number);
-  from += count * stamp_bytes;
   std::vector<std::int64_t> stamps_ns;
   stamps_ns.reserve(count);
   std::uint64_t last = 0;
-  for (const std::uint64_t step : steps) {
+  for_each_in_planes<stamp_bytes, std::uint64_t>(from, count, visit_number, [&](auto step) {
     last += step;
     const auto stamp_ns = static_cast<std::int64_t>(last);
     if (!stamps_ns.empty() && stamp_ns <= stamps_ns.back()) {
       throw TileCodecError("has stamps out of order");
     }
     stamps_ns.push_back(stamp_ns);
-  }
+  });
+  from += count * stamp_bytes;
   return stamps_ns;
 }
 
@@ -155,16 +153,13 @@ void append_voxels(PlaneBytes& content, const PackedVoxels& voxels) {
 PackedVoxels read_voxels(const std::uint8_t*& from, std::size_t count,
                          std::vector<std::int64_t> stamps_ns, TileId tile, const VoxelGrid& grid,
                          FirstVotes first_votes) {
-  std::vector<StoredVoxel> stored(count);
-  read_planes<packed_voxel_bytes>(from, stored, visit_voxel);
-  from += count * packed_voxel_bytes;
   std::vector<PackedVoxel> voxels;
   SeenTimes seen{std::move(stamps_ns), {}};
   voxels.reserve(count);
   seen.stamp_of.reserve(2 * count);
   const std::size_t stamps = seen.stamps_ns.size();
   KeySteps keys;
-  for (StoredVoxel& voxel : stored) {
+  for_each_in_planes<packed_voxel_bytes, StoredVoxel>(from, count, visit_voxel, [&](auto& voxel) {
     if (first_votes == FirstVotes::by_what_lacks) turn_first_votes(voxel);
     const PackedVoxel next = from_stored(voxel, keys);
     if (!voxels.empty() && next.key <= voxels.back().key) {
@@ -174,10 +169,11 @@ PackedVoxels read_voxels(const std::uint8_t*& from, std::size_t count,
       throw TileCodecError("has a voxel without a stamp");
     }
     voxels.push_back(next);
+    const std::size_t last = std::size_t{voxel.first_stamp} + voxel.stamps_on;
     seen.stamp_of.push_back(voxel.first_stamp);
-    seen.stamp_of.push_back(
-        static_cast<std::uint32_t>((std::size_t{voxel.first_stamp} + voxel.stamps_on) % stamps));
-  }
+    seen.stamp_of.push_back(static_cast<std::uint32_t>(last < stamps ? last : last - stamps));
+  });
+  from += count * packed_voxel_bytes;
   return {tile, grid, std::move(voxels), seen};
 }
 

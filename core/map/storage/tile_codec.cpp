@@ -166,11 +166,10 @@ std::vector<Stored> all_to_stored(const std::vector<Value>& values) {
 template <std::size_t record_bytes, typename Stored, typename Value, typename Visit>
 void read_list(const std::uint8_t*& from, std::size_t count, std::vector<Value>& values,
                Visit visit) {
-  std::vector<Stored> stored(count);
-  read_planes<record_bytes>(from, stored, visit);
+  values.reserve(count);
+  for_each_in_planes<record_bytes, Stored>(
+      from, count, visit, [&](const Stored& stored) { values.push_back(from_stored(stored)); });
   from += count * record_bytes;
-  values.resize(count);
-  std::ranges::transform(stored, values.begin(), [](const Stored& s) { return from_stored(s); });
 }
 
 SeenTimes times_of(const std::vector<ExcludedVoxel>& excluded) {
@@ -194,18 +193,17 @@ void append_excluded(PlaneBytes& content, const std::vector<ExcludedVoxel>& excl
 
 std::vector<ExcludedVoxel> read_excluded(const std::uint8_t*& from, const EvidenceHeader& header) {
   const std::vector<std::int64_t> stamps_ns = read_stamps(from, header.excluded_stamps);
-  std::vector<StoredExcluded> stored(header.excluded);
-  read_planes<excluded_bytes>(from, stored, visit_excluded);
   std::vector<ExcludedVoxel> excluded;
-  excluded.reserve(stored.size());
+  excluded.reserve(header.excluded);
   KeySteps keys;
-  for (const StoredExcluded& one : stored) {
+  const auto keep = [&](const StoredExcluded& one) {
     if (one.label >= semantic_class_count || one.was_moving > 1 || one.stamp >= stamps_ns.size()) {
       throw TileCodecError("has an impossible excluded place");
     }
     excluded.push_back({voxel_index(keys.key_at(one.step)), static_cast<SemanticClass>(one.label),
                         one.was_moving == 1, stamps_ns[one.stamp]});
-  }
+  };
+  for_each_in_planes<excluded_bytes, StoredExcluded>(from, header.excluded, visit_excluded, keep);
   return excluded;
 }
 
@@ -269,7 +267,8 @@ Tile decode_tile(std::span<const std::uint8_t> bytes, const VoxelGrid& grid) {
   std::vector<std::int64_t> stamps_ns = read_stamps(from, header.stamps);
   Tile tile{header.info, read_voxels(from, count, std::move(stamps_ns), header.info.id, grid,
                                      first_votes_in(bytes))};
-  for (const Voxel& voxel : tile.voxels) tile.info.bounds_map.extend(voxel.mean_map);
+  for (const PackedVoxel& voxel : tile.voxels.packed())
+    tile.info.bounds_map.extend(mean_map(voxel, header.info.id, grid));
   return tile;
 }
 
