@@ -107,7 +107,7 @@ TEST_F(ServiceCommandTest, LosslessReplayRefusesAServerThatDropsScans) {
   EXPECT_THAT(replay.err, HasSubstr("--delivery every"));
 }
 
-TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
+TEST_F(ServiceCommandTest, AsksARunningServerForEverythingOfItsMap) {
   simulate("city", 5);
   BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
   ASSERT_EQ(run("replay " + path("city") + " --lossless" + patiently() + on_domain()).exit_code, 0)
@@ -154,6 +154,14 @@ TEST_F(ServiceCommandTest, AsksARunningServerForEverythingItOffers) {
   EXPECT_EQ(submaps.at("submaps"), nlohmann::json::array()) << "five scans are no submap";
   EXPECT_THAT(run("loops" + on_domain()).out, HasSubstr("0 submaps, 0 loops closed"));
   EXPECT_EQ(run("loops --refused" + on_domain()).exit_code, 2);
+}
+
+TEST_F(ServiceCommandTest, HasARunningServerSaveLoadAndReset) {
+  simulate("city", 5);
+  BackgroundProcess server(server_command("--delivery every"), folder_ / "server.log");
+  ASSERT_EQ(run("replay " + path("city") + " --lossless" + patiently() + on_domain()).exit_code, 0)
+      << content("server.log");
+  const nlohmann::json status = nlohmann::json::parse(run("status --json" + on_domain()).out);
 
   EXPECT_EQ(run("save saved.stillmap" + on_domain()).exit_code, 0);
   EXPECT_TRUE(exists("saved.stillmap"));

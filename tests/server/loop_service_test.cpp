@@ -22,9 +22,10 @@ simulation::SimulationConfig two_rounds() {
   return config;
 }
 
+using TruePoses = std::map<std::int64_t, Eigen::Isometry3d>;
+
 /// Of the worst pose, after the best rigid fit.
-double error_m(const std::vector<StampedPose>& path,
-               const std::map<std::int64_t, Eigen::Isometry3d>& truth) {
+double error_m(const std::vector<StampedPose>& path, const TruePoses& truth) {
   Eigen::Matrix3Xd estimated(3, path.size());
   Eigen::Matrix3Xd actual(3, path.size());
   for (std::size_t i = 0; i < path.size(); ++i) {
@@ -62,6 +63,40 @@ class Follower {
   Subscription subscription_;
 };
 
+/// Publishes the drive no faster than the search for loops, which leaves scans out else.
+TruePoses drive_two_rounds(Client& client, ScanPublisher& publisher) {
+  const simulation::Simulation simulation(two_rounds());
+  TruePoses truth;
+  for (int k = 0; k < two_rounds().scans; ++k) {
+    const simulation::SimulatedScan scan = simulation.scan(k);
+    truth[scan.scan.stamp_ns] = scan.T_map_lidar;
+    EXPECT_TRUE(publisher.publish(scan.scan, {}, patience));
+    if (k % 10 == 9) {
+      EXPECT_TRUE(wait_for_scans(client, static_cast<std::uint64_t>(k) + 1));
+    }
+  }
+  return truth;
+}
+
+std::uint64_t corrections(Client& client) { return client.status().counter("map_corrections"); }
+
+/// The search is up to twenty scans behind, and the map a correction.
+void wait_for_the_last_correction(Client& client) {
+  EXPECT_TRUE(eventually([&] { return corrections(client) > 0; }));
+  for (std::uint64_t known = 0; known != corrections(client);) {
+    known = corrections(client);
+    std::this_thread::sleep_for(std::chrono::seconds(3));
+  }
+}
+
+/// Whether each pose is one of the path's.
+bool are_on_path(const Trajectory& poses, const std::vector<StampedPose>& path) {
+  return std::ranges::all_of(poses, [&](const StampedPose& pose) {
+    const auto stored = std::ranges::find(path, pose.stamp_ns, &StampedPose::stamp_ns);
+    return stored != path.end() && pose.T_map_lidar.isApprox(stored->T_map_lidar, 1e-9);
+  });
+}
+
 TEST(LoopService, APlaceSeenAgainCorrectsTheMapThatIsServedAndStored) {
   if (slowdown > 1) GTEST_SKIP() << "1250 scans take an hour under a sanitizer";
   const ServiceSetup setup("every");
@@ -78,25 +113,9 @@ TEST(LoopService, APlaceSeenAgainCorrectsTheMapThatIsServedAndStored) {
   });
   ScanPublisher publisher(setup.publisher(true));
   ASSERT_TRUE(publisher.wait_for_subscriber(patience));
-  const simulation::Simulation simulation(two_rounds());
-  std::map<std::int64_t, Eigen::Isometry3d> truth;
-  const auto corrections = [&] { return client.status().counter("map_corrections"); };
-  for (int k = 0; k < two_rounds().scans; ++k) {
-    const simulation::SimulatedScan scan = simulation.scan(k);
-    truth[scan.scan.stamp_ns] = scan.T_map_lidar;
-    ASSERT_TRUE(publisher.publish(scan.scan, {}, patience));
-    // No faster than the search for loops, which leaves scans out else.
-    if (k % 10 == 9) {
-      ASSERT_TRUE(wait_for_scans(client, static_cast<std::uint64_t>(k) + 1));
-    }
-  }
-  ASSERT_TRUE(eventually([&] { return corrections() > 0; }));
+  const TruePoses truth = drive_two_rounds(client, publisher);
+  wait_for_the_last_correction(client);
   EXPECT_GT(client.status().counter("loops_closed"), 0U);
-  // The search is up to twenty scans behind, and the map a correction.
-  for (std::uint64_t known = 0; known != corrections();) {
-    known = corrections();
-    std::this_thread::sleep_for(std::chrono::seconds(3));
-  }
 
   // Who joins now is told where the submaps lie, as the map has them.
   SubmapsOfMap submaps;
@@ -128,20 +147,17 @@ TEST(LoopService, APlaceSeenAgainCorrectsTheMapThatIsServedAndStored) {
   });
   EXPECT_TRUE(eventually([&] {
     const std::scoped_lock lock(mutex);
-    return !published.empty() && std::ranges::all_of(published, [&](const StampedPose& pose) {
-      const auto stored = std::ranges::find(path, pose.stamp_ns, &StampedPose::stamp_ns);
-      return stored != path.end() && pose.T_map_lidar.isApprox(stored->T_map_lidar, 1e-9);
-    });
+    return !published.empty() && are_on_path(published, path);
   }));
   const std::scoped_lock lock(mutex);
   EXPECT_EQ(submaps.map_id, saved.view.map_id);
-  EXPECT_EQ(submaps.list.graph_revision, corrections());
+  EXPECT_EQ(submaps.list.graph_revision, corrections(client));
   EXPECT_GT(submaps.list.submaps.size(), 4U);
+  Trajectory submap_poses;
   for (const SubmapList::Entry& submap : submaps.list.submaps) {
-    const auto pose = std::ranges::find(path, submap.stamp_ns, &StampedPose::stamp_ns);
-    ASSERT_NE(pose, path.end());
-    EXPECT_TRUE(submap.T_map_submap.isApprox(pose->T_map_lidar, 1e-9));
+    submap_poses.push_back({submap.stamp_ns, submap.T_map_submap});
   }
+  EXPECT_TRUE(are_on_path(submap_poses, path));
   EXPECT_LT(error_m(path, truth), 0.6 * error_m(as_published, truth));
   EXPECT_LT(error_m(path, truth), 0.12);
 }
