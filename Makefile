@@ -15,10 +15,10 @@ FILES ?=
 TILES ?=
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages web-packages configure programs packaged web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench table1 relocalize drives loops loops-served sessions ros-messages parity format format-check clean
+.PHONY: help packages web-packages configure programs packaged web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench bench-web table1 relocalize drives loops loops-served sessions ros-messages parity format format-check clean
 
 # They have domains of their own, named in files; the variable would come before these.
-test test-dev test-tsan test-kill test-scale test-network fuzz soak bench relocalize loops-served parity: export ROS_DOMAIN_ID :=
+test test-dev test-tsan test-kill test-scale test-network fuzz soak bench bench-web relocalize loops-served parity: export ROS_DOMAIN_ID :=
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | awk -F '\t' '{ printf "%-16s%s\n", $$1, $$2 }'
@@ -105,6 +105,10 @@ soak: build ## A server at 10 Hz for MINUTES=30, clients coming and going, dying
 
 bench: build ## Benchmarks of every stage
 	@for b in $(BUILD)/tests/bench/*_bench; do echo "== $$b"; $$b || exit 1; done
+
+bench-web: build web ## The gateway with ten clients of 2 MB scans, and the page with 5 million voxels in headless Chromium
+	@command -v chromium > /dev/null || $(MAKE) web-packages WEB_PACKAGES=chromium
+	@for part in gateway page; do BUILD=$(CURDIR)/$(BUILD) node tests/gateway/web/bench.mjs $$part || exit 1; done
 
 table1: programs ## The paper's Table I on simulated streets, crowded and quiet
 	$(BUILD)/bin/stillmap evaluate weightings sim:crowd --seed 2 --scans 480

@@ -125,10 +125,13 @@ class Gateway::Parts {
     for (const auto& weak : sessions_) {
       if (const auto session = weak.lock()) clients.push_back(to_json(*session));
     }
-    return nlohmann::json{
-        {"server", options_.topics.server_name},      {"domain", options_.dds.domain_id},
-        {"format_version", dds::wire_format_version}, {"control", options_.services.with_control},
-        {"points", options_.topics.points},           {"clients", clients}}
+    return nlohmann::json{{"server", options_.topics.server_name},
+                          {"domain", options_.dds.domain_id},
+                          {"format_version", dds::wire_format_version},
+                          {"control", options_.services.with_control},
+                          {"points", options_.topics.points},
+                          {"timeout_ms", options_.services.timeout.count()},
+                          {"clients", clients}}
         .dump();
   }
 

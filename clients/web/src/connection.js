@@ -4,7 +4,8 @@ import { parse } from "@foxglove/rosmsg";
 import { MessageReader, MessageWriter } from "@foxglove/rosmsg2-serialization";
 
 const retryMs = 2000;
-const callTimeoutMs = 15000;
+/** The gateway gives a call up first, and says why. */
+const callMarginMs = 5000;
 /** Of what the gateway says once. */
 const onceShownMs = 10000;
 
@@ -13,6 +14,7 @@ const definitionsOf = (schema) => parse(schema, { ros2: true });
 /** Keeps a connection, joins again when it is lost. Listeners get decoded messages. */
 export class Connection {
   #url;
+  #callTimeoutMs;
   #client;
   #channels = new Map();
   #services = new Map();
@@ -24,9 +26,13 @@ export class Connection {
   #warnings = new Map();
   #heard = performance.now();
 
-  /** `changed(text, isGood)`: how it is with the connection. `connected()`: services may be called. */
-  constructor(url, { changed, connected }) {
+  /**
+   * `callTimeoutMs`: after which the gateway gives a call up. `changed(text, isGood)`: how it is with the connection.
+   * `connected()`: services may be called.
+   */
+  constructor(url, { callTimeoutMs, changed, connected }) {
     this.#url = url;
+    this.#callTimeoutMs = callTimeoutMs + callMarginMs;
     this.changed = changed;
     this.connected = connected;
     this.#open();
@@ -75,7 +81,7 @@ export class Connection {
       data: service.writer.writeMessage(request) });
     return new Promise((resolve, reject) => {
       const timer = setTimeout(() => this.#settle(callId, (call) => call.reject(new Error(`${name} did not answer`))),
-        callTimeoutMs);
+        this.#callTimeoutMs);
       this.#calls.set(callId, { service, resolve, reject, timer });
     });
   }

@@ -40,7 +40,7 @@ if (token) address.search = new URLSearchParams({ token }).toString();
 const view = new View(element("scene"));
 const frames = new Frames();
 const state = { frames, profiles: [], profile: "car", grid: undefined, robot: undefined, publishGoal };
-const connection = new Connection(address.href, { changed: showConnection, connected: begin });
+const connection = new Connection(address.href, { callTimeoutMs: facts.timeout_ms, changed: showConnection, connected: begin });
 const tiles = new MapTiles(connection, prefix, facts.format_version, () => view.draw(),
   (fault) => showConnection(fault ?? "connected", fault === undefined));
 const server = new Server(connection, prefix, facts.format_version);
@@ -112,7 +112,11 @@ connection.listen(`${prefix}/traversability`, showGrid);
 
 function showGrid(grid) {
   state.grid = grid;
-  setGrid(tiles.material, grid, view.renderer.capabilities.maxTextureSize);
+  const { maxTextureSize } = view.renderer.capabilities;
+  setGrid(tiles.material, grid, maxTextureSize);
+  const { width, height } = grid.info;
+  element("grid-note").textContent = Math.max(width, height) <= maxTextureSize ? ""
+    : `No traversability in the picture: its grid has ${width} x ${height} cells, this browser draws up to ${maxTextureSize} a side.`;
   view.draw();
 }
 

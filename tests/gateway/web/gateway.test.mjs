@@ -2,7 +2,7 @@
 import assert from "node:assert/strict";
 import { createConnection } from "node:net";
 import { after, before, describe, it } from "node:test";
-import { Client, Stack, eventually, require, sleep } from "./stack.mjs";
+import { Client, Stack, eventually, patienceMs, require, sleep } from "./stack.mjs";
 
 const WebSocket = require("ws");
 const formatVersion = 8;
@@ -161,7 +161,10 @@ describe("gateway", () => {
       socket.on("error", resolve);
     });
     assert.match(error.message, /400/);
-    assert.equal((await get(port, "/gateway.json")).status, 200);
+    const facts = await get(port, "/gateway.json");
+    assert.equal(facts.status, 200);
+    // The page waits longer for an answer than the gateway does.
+    assert.equal((await facts.json()).timeout_ms, patienceMs);
   });
 
   it("serves others while connections say nothing", async () => {

@@ -3,27 +3,13 @@ import assert from "node:assert/strict";
 import { mkdirSync } from "node:fs";
 import { join } from "node:path";
 import { after, before, describe, it } from "node:test";
-import { Stack, eventually, patienceMs, require } from "./stack.mjs";
+import { chromium, countTransfers } from "./browser.mjs";
+import { Stack, eventually } from "./stack.mjs";
 
-const puppeteer = require("puppeteer-core");
 const pictures = process.env.STILLMAP_PICTURES;
-
-const flags = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
-  "--disable-background-networking", "--disable-component-update", "--disable-sync"];
 
 /** Of the drive: more way than one submap has. */
 const scans = 45;
-
-/** Of a page's answers, what came over the network and not from the browser's cache. */
-function countTransfers(page) {
-  const counts = { bytes: 0, tiles: 0 };
-  page.on("response", async (response) => {
-    if (response.fromCache()) return;
-    counts.bytes += Number(response.headers()["content-length"] ?? 0);
-    if (response.url().includes("/tiles/")) ++counts.tiles;
-  });
-  return counts;
-}
 
 describe("page", () => {
   const stack = new Stack();
@@ -49,8 +35,7 @@ describe("page", () => {
     const port = await stack.startGateway();
     url = `http://127.0.0.1:${port}/`;
     await stack.replay(stack.simulate(scans), "--lossless").ended;
-    browser = await puppeteer.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true,
-      protocolTimeout: patienceMs, args: [...flags, `--user-data-dir=${stack.folder}/browser`] });
+    browser = await chromium(stack.folder);
     page = await browser.newPage();
     page.on("pageerror", (error) => problems.push(error.message));
     page.on("console", (message) => { if (message.type() === "error") problems.push(message.text()); });
