@@ -16,16 +16,30 @@
 namespace stillmap {
 namespace {
 
-/// The plan in this precision; for int8 the graph's channels are equalised first.
-ExecutionPlan plan_in(Precision precision, NetworkGraph& graph, const ModelDescription& model) {
-  if (precision == Precision::fp32) return plan_execution(graph, nullptr);
-  if (!model.int8) {
-    throw ModelError(model.network_file,
-                     "has no int8.yaml beside it; make it with 'stillmap model calibrate', or use "
-                     "precision: fp32");
+/// The graph in this precision; for int8 its channels are equalised first.
+std::unique_ptr<CompiledPlan> compile(Precision precision, NetworkGraph& graph,
+                                      const ModelDescription& model, int threads) {
+  std::optional<Int8Calibration> calibration;
+  if (precision == Precision::int8) {
+    if (!model.int8) {
+      throw ModelError(
+          model.network_file,
+          "has no int8.yaml beside it; make it with 'stillmap model calibrate', or use "
+          "precision: fp32");
+    }
+    calibration = equalise_channels(graph, *model.int8);
   }
-  const Int8Calibration equalised = equalise_channels(graph, *model.int8);
-  return plan_execution(graph, &equalised);
+  const auto compiled = [&](FloatSummand float_summand) {
+    const ExecutionPlan plan =
+        plan_execution(graph, calibration ? &*calibration : nullptr, float_summand);
+    return std::make_unique<CompiledPlan>(graph, plan, threads);
+  };
+  try {
+    return compiled(FloatSummand::in_place);
+  } catch (const UnsupportedLayer&) {
+    // Of this processor, maybe.
+    return compiled(FloatSummand::apart);
+  }
 }
 
 PreparedNetwork load(const ModelDescription& model) {
@@ -55,8 +69,7 @@ OneDnnNetwork::OneDnnNetwork(const ModelDescription& model, Precision precision,
     state_->outputs = model.classes.size();
     state_->precision = precision;
     state_->giga_operations = network.giga_operations;
-    const ExecutionPlan plan = plan_in(precision, graph, model);
-    state_->plan = std::make_unique<CompiledPlan>(graph, plan, threads);
+    state_->plan = compile(precision, graph, model, threads);
     const std::span<const float> scores = state_->plan->run(trial_input(model));
     require_finite_scores(model, scores);
     if (!network.had_softmax) {

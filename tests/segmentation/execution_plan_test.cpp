@@ -81,10 +81,25 @@ TEST(ExecutionPlan, ReducesTheFamilyToConvolutions) {
 
 TEST(ExecutionPlan, NeverReadsAnOverwrittenBuffer) {
   for (const NetworkGraph& graph : {darknet(), light()}) {
-    expect_right_contents(plan_execution(graph, nullptr));
     const Int8Calibration calibration = calibration_of(graph);
-    expect_right_contents(plan_execution(graph, &calibration));
+    for (const FloatSummand float_summand : {FloatSummand::in_place, FloatSummand::apart}) {
+      expect_right_contents(plan_execution(graph, nullptr, float_summand));
+      expect_right_contents(plan_execution(graph, &calibration, float_summand));
+    }
   }
+}
+
+TEST(ExecutionPlan, AddsApartWhereTheProcessorCannotAddInPlace) {
+  const NetworkGraph graph = darknet();
+  std::size_t summands = 0;
+  for (const Step& step : plan_execution(graph, nullptr, FloatSummand::apart).steps) {
+    const auto* const convolve = std::get_if<Convolve>(&step);
+    if (convolve == nullptr || !convolve->added) continue;
+    EXPECT_FALSE(convolve->sum_scale);
+    EXPECT_NE(convolve->added->buffer, convolve->to.buffer);
+    ++summands;
+  }
+  EXPECT_GT(summands, 0U);
 }
 
 TEST(ExecutionPlan, KeepsTheFirstAndTheLastLayerInFloatingPoint) {

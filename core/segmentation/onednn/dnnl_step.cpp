@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace stillmap {
 
@@ -101,14 +102,14 @@ float working_scale(const ConvolutionTensors& tensors) {
 dnnl::post_ops post_ops(const Layer& layer, const ConvolutionTensors& tensors) {
   const float scale = working_scale(tensors);
   dnnl::post_ops after;
-  bool sum_done = !tensors.sum_scale;
+  bool is_in_place = tensors.sum_scale.has_value();
+  bool is_apart = tensors.added.has_value();
   for (const PostOp& step : layer.post_ops) {
     if (const auto* const activation = std::get_if<LeakyRelu>(&step)) {
       after.append_eltwise(1.0F, dnnl::algorithm::eltwise_relu, activation->slope, 0.0F);
-    } else if (!sum_done) {
+    } else if (std::exchange(is_in_place, false)) {
       after.append_sum(*tensors.sum_scale / scale);
-      sum_done = true;
-    } else if (tensors.added) {
+    } else if (std::exchange(is_apart, false)) {
       after.append_binary(dnnl::algorithm::binary_add, tensors.added->desc());
     }
   }

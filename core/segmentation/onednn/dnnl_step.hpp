@@ -41,7 +41,7 @@ struct ConvolutionTensors {
   DnnlTensor from, to;
   /// Scale of the content of `to`, if that is added.
   std::optional<float> sum_scale;
-  /// A second summand.
+  /// Another summand.
   std::optional<DnnlTensor> added;
 };
 

@@ -53,9 +53,10 @@ std::vector<AddTensor> sums_of(const Layer& layer) {
 
 class Planner {
  public:
-  Planner(const NetworkGraph& graph, const Int8Calibration* calibration)
+  Planner(const NetworkGraph& graph, const Int8Calibration* calibration, FloatSummand float_summand)
       : graph_(graph),
         calibration_(calibration),
+        float_summand_(float_summand),
         precision_(layer_precision(graph, calibration)),
         versions_(graph.tensors.size()) {
     plan_.scale_of_tensor.assign(graph.tensors.size(), 1.0F);
@@ -99,15 +100,21 @@ class Planner {
     const std::vector<AddTensor> sums = sums_of(layer);
     std::optional<TensorPlacement> added;
     if (sums.size() > 1) added = version(sums[1].other, type);
-    const auto [to, sum_scale] = result_place(index, from, type);
-    // oneDNN can do both sums of a convolution in integers only.
-    if (added && precision_.of_layer[index] == ValueType::f32) {
-      const TensorPlacement first_sum{sums[1].own, type, to.buffer};
-      add_step(Convolve{index, from, first_sum, sum_scale, {}});
-      add_step(Sum{first_sum, *added, to});
-    } else {
+    if (precision_.of_layer[index] != ValueType::f32) {
+      const auto [to, sum_scale] = result_place(index, from, type);
       add_step(Convolve{index, from, to, sum_scale, added});
+      return;
     }
+    std::optional<TensorPlacement> apart;
+    if (!sums.empty() && float_summand_ == FloatSummand::apart) {
+      apart = version(sums.front().other, type);
+    }
+    const auto [to, sum_scale] = apart ? Result{new_place(layer.output, type), std::nullopt}
+                                       : result_place(index, from, type);
+    // oneDNN can do both sums of a convolution in integers only.
+    const TensorPlacement first_sum{added ? sums[1].own : layer.output, type, to.buffer};
+    add_step(Convolve{index, from, first_sum, sum_scale, apart});
+    if (added) add_step(Sum{first_sum, *added, to});
   }
 
   void plan_row_upsampling(std::size_t index) {
@@ -217,6 +224,7 @@ class Planner {
 
   const NetworkGraph& graph_;
   const Int8Calibration* calibration_;
+  FloatSummand float_summand_;
   LayerPrecision precision_;
   /// For each tensor its placement by type.
   std::vector<std::array<std::optional<TensorPlacement>, 2>> versions_;
@@ -229,8 +237,9 @@ const TensorPlacement& target(const Step& step) {
   return std::visit([](const auto& s) -> const TensorPlacement& { return s.to; }, step);
 }
 
-ExecutionPlan plan_execution(const NetworkGraph& graph, const Int8Calibration* calibration) {
-  return Planner(graph, calibration).plan();
+ExecutionPlan plan_execution(const NetworkGraph& graph, const Int8Calibration* calibration,
+                             FloatSummand float_summand) {
+  return Planner(graph, calibration, float_summand).plan();
 }
 
 namespace {

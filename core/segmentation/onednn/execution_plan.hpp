@@ -48,7 +48,7 @@ struct Convert {
   float factor = 1.0F;
 };
 /// A convolution with its post-ops. With `sum_scale` the content of the target, of this scale, is
-/// added, and after it the content of `added`.
+/// added, and after it, or alone, the content of `added`.
 struct Convolve {
   std::size_t layer = 0;
   TensorPlacement from, to;
@@ -85,6 +85,16 @@ struct Buffer {
   std::size_t last_step = 0;
 };
 
+/// Where a convolution in floating point finds what is added to it.
+enum class FloatSummand {
+  /// In its target.
+  in_place,
+  /// In a buffer of its own, which takes more memory: oneDNN's code for AVX2 adds in place before
+  /// the
+  /// activation only, and RangeNet++ adds after it.
+  apart,
+};
+
 /// Steps in their order, and the buffers they work on. Sums are computed in place.
 struct ExecutionPlan {
   std::vector<Step> steps;
@@ -98,7 +108,8 @@ struct ExecutionPlan {
 /// Plans a graph with shapes, in the types of layer_precision(). Throws UnsupportedLayer for layers
 /// that the passes should have replaced, GraphFault when the calibration lacks a tensor.
 [[nodiscard]] ExecutionPlan plan_execution(const NetworkGraph& graph,
-                                           const Int8Calibration* calibration);
+                                           const Int8Calibration* calibration,
+                                           FloatSummand float_summand = FloatSummand::in_place);
 
 /// Buffers in one block of memory.
 struct BufferLayout {
