@@ -5,8 +5,11 @@ import { AxesHelper, BufferAttribute, BufferGeometry, Color, ConeGeometry, Frust
 import { MapControls } from "three/examples/jsm/controls/MapControls.js";
 import { classes } from "./classes.js";
 
-const minBudget = 150_000;
+const minBudget = 50_000;
 const maxBudget = 5_000_000;
+/** Of a picture in which nothing has moved for a moment: it may take long. */
+const stillBudget = 600_000;
+const stillAfterMs = 400;
 /** Frames that take longer get fewer voxels, shorter ones more. */
 const slowFrameMs = 80;
 const fastFrameMs = 45;
@@ -99,25 +102,28 @@ export class View {
     this.scene.add(tiles.group);
   }
 
-  draw() {
+  draw() { this.#request(this.budget); }
+
+  #request(budget) {
     if (this.isWaiting) return;
     this.isWaiting = true;
     this.requestedAt = performance.now();
-    requestAnimationFrame((now) => this.#frame(now));
+    clearTimeout(this.stillTimer);
+    requestAnimationFrame((now) => this.#frame(now, budget));
   }
 
   get pixelsPerMetre() {
     return this.renderer.getDrawingBufferSize(new Vector2()).y / (2 * Math.tan(this.camera.fov * Math.PI / 360));
   }
 
-  #frame(now) {
+  #frame(now, budget) {
     this.isWaiting = false;
     this.camera.updateMatrixWorld();
     if (this.tiles) {
       const frustum = new Frustum().setFromProjectionMatrix(
         new Matrix4().multiplyMatrices(this.camera.projectionMatrix, this.camera.matrixWorldInverse));
       this.tiles.material.uniforms.pixelsPerMetre.value = this.pixelsPerMetre;
-      this.tiles.chooseDetail(this.camera, frustum, this.pixelsPerMetre, this.budget);
+      this.tiles.chooseDetail(this.camera, frustum, this.pixelsPerMetre, budget);
     }
     this.renderer.render(this.scene, this.camera);
     ++this.frames;
@@ -125,6 +131,7 @@ export class View {
     if (this.requestedAt - this.frameEnd < framesInRowMs) this.#adapt(now - this.lastFrame);
     this.lastFrame = now;
     this.frameEnd = performance.now();
+    if (budget < stillBudget) this.stillTimer = setTimeout(() => this.#request(stillBudget), stillAfterMs);
     this.onDrawn?.();
   }
 
