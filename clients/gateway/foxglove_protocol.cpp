@@ -127,16 +127,13 @@ std::string advertise(std::span<const ChannelInfo> channels) {
 std::string advertise_services(std::span<const ServiceInfo> services) {
   Json list = Json::array();
   for (const ServiceInfo& service : services) {
-    Json request = half_of_service(service.type, "_Request");
-    Json response = half_of_service(service.type, "_Response");
+    // Without requestSchema and responseSchema of the clients before 2024: Lichtblick warns of
+    // each.
     list.push_back({{"id", service.id},
                     {"name", service.name},
                     {"type", service.type},
-                    // Clients before 2024 know but these two.
-                    {"requestSchema", request["schema"]},
-                    {"responseSchema", response["schema"]},
-                    {"request", std::move(request)},
-                    {"response", std::move(response)}});
+                    {"request", half_of_service(service.type, "_Request")},
+                    {"response", half_of_service(service.type, "_Response")}});
   }
   return text_of_message({{"op", "advertiseServices"}, {"services", list}});
 }

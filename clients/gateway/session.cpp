@@ -80,13 +80,13 @@ void Session::handle(const ClientAdvertise& offer_list) {
 }
 
 void Session::offer(const ClientAdvertise::Channel& channel) {
-  if (channel.encoding != "cdr") {
-    return refuse("messages in '" + channel.encoding + "' are not published; in cdr they are");
-  }
   if (offered_.size() >= max_offered) return refuse("too many published topics");
-  const std::string refusal = bridges_.operator_topics.refusal(channel.topic, channel.type);
-  if (!refusal.empty()) return refuse(refusal);
-  offered_[channel.id] = channel.topic;
+  // Viewers offer more than they ever publish: who is refused hears of it with the first message.
+  offered_[channel.id] = {
+      channel.topic,
+      channel.encoding != "cdr"
+          ? "messages in '" + channel.encoding + "' are not published; in cdr they are"
+          : bridges_.operator_topics.refusal(channel.topic, channel.type)};
 }
 
 void Session::handle(const ClientUnadvertise& ending) {
@@ -102,7 +102,8 @@ void Session::handle(const ClientMessage& message) {
   if (found == offered_.end()) {
     return refuse("channel " + std::to_string(message.channel) + " was not advertised");
   }
-  const std::string fault = bridges_.operator_topics.publish(found->second, message.bytes);
+  if (!found->second.refusal.empty()) return refuse(found->second.refusal);
+  const std::string fault = bridges_.operator_topics.publish(found->second.topic, message.bytes);
   if (!fault.empty()) refuse(fault);
 }
 

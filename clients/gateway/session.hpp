@@ -67,6 +67,13 @@ class Session : private TopicListener, public std::enable_shared_from_this<Sessi
     bool is_warned = false;
   };
 
+  /// Of a topic that the client wants to publish.
+  struct Offer {
+    std::string topic;
+    /// Why what is sent is not published; empty where it is.
+    std::string refusal;
+  };
+
   void message_arrived(std::uint32_t subscription, const MessagePtr& message) override;
   void topic_failed(std::uint32_t subscription, const std::string& why) override;
 
@@ -92,7 +99,7 @@ class Session : private TopicListener, public std::enable_shared_from_this<Sessi
   Outbox outbox_;
   std::map<std::uint32_t, Subscription> subscriptions_;
   /// Topics by the client's numbers.
-  std::map<std::uint32_t, std::string> offered_;
+  std::map<std::uint32_t, Offer> offered_;
   int calls_under_way_ = 0;
   int refused_ = 0;
   bool has_ended_ = false;

@@ -163,7 +163,7 @@ _ROS_FIELD = re.compile(
     r"^(?P<type>[\w/]+(?:<=\d+)?)(?P<array>\[[^\]]*\])?\s+(?P<name>\w+)(?:\s+\S+)?$")
 
 
-_ROS_CONSTANT = re.compile(r"^(?P<type>\w+)\s+(?P<name>[A-Z][A-Z0-9_]*)\s*=\s*(?P<value>\d+)$")
+_ROS_CONSTANT = re.compile(r"^(?P<type>\w+)\s+(?P<name>[A-Z][A-Z0-9_]*)\s*=\s*(?P<value>-?\d+)$")
 
 
 def _is_basic(type_name: str) -> bool:

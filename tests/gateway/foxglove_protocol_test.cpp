@@ -138,7 +138,7 @@ TEST(FoxgloveProtocol, AdvertisesBothHalvesOfServices) {
   EXPECT_EQ(service["type"], "nav_msgs/srv/GetMap");
   EXPECT_EQ(service["request"]["schemaName"], "nav_msgs/srv/GetMap_Request");
   EXPECT_THAT(service["response"]["schema"].get<std::string>(), HasSubstr("OccupancyGrid map"));
-  EXPECT_EQ(service["responseSchema"], service["response"]["schema"]);
+  EXPECT_FALSE(service.contains("responseSchema")) << "Lichtblick warns of it";
 }
 
 TEST(FoxgloveProtocol, WritesNumbersLittleEndian) {

@@ -115,6 +115,7 @@ describe("gateway", () => {
     await client.ready();
     const schema = client.channels.get("/stillmap/path").schema.replace("geometry_msgs/PoseStamped[] poses", "geometry_msgs/Pose pose");
     const pose = { position: { x: 1, y: 2, z: 3 }, orientation: { x: 0, y: 0, z: 0, w: 1 } };
+    client.client.advertise({ topic: "/clicked_point", encoding: "cdr", schemaName: "geometry_msgs/PointStamped" });
     client.publish("/goal_pose", "geometry_msgs/msg/PoseStamped", schema, { header: { stamp: { sec: 1, nsec: 2 }, frame_id: "map" }, pose });
     client.publish("/tf", "tf2_msgs/msg/TFMessage", schema, { header: { stamp: { sec: 1, nsec: 2 }, frame_id: "map" }, pose });
     await eventually("a refusal", () => client.statuses.some(({ message }) => /'\/tf' is not published/.test(message)));
@@ -122,6 +123,7 @@ describe("gateway", () => {
     client.client.sendMessage(id, new Uint8Array([0, 1, 0, 0, 1, 2]));
     await eventually("a refusal", () => client.statuses.some(({ message }) => /is no geometry_msgs\/msg\/PoseWithCovarianceStamped/.test(message)));
     assert.ok(!client.statuses.some(({ message }) => /(^|for )\/goal_pose/.test(message)));
+    assert.ok(!client.statuses.some(({ message }) => /clicked_point/.test(message)), "nothing was published there");
     client.close();
   });
 
