@@ -35,8 +35,9 @@ packages: ## Install the Debian packages that are missing
 	  DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -yq --no-install-recommends $$missing; \
 	fi
 
+# The build configures itself again where a CMakeLists.txt changed.
 configure: packages
-	cmake --preset $(PRESET) $(CMAKE_OPTIONS)
+	@[ -z "$(CMAKE_OPTIONS)" ] && [ $(BUILD)/build.ninja -nt CMakePresets.json ] || cmake --preset $(PRESET) $(CMAKE_OPTIONS)
 
 programs: configure ## Build what users run, in build/release: stillmap and stillmap-server
 	cmake --build --preset $(PRESET) -j $(JOBS) --target programs
@@ -106,9 +107,10 @@ soak: build ## A server at 10 Hz for MINUTES=30, clients coming and going, dying
 bench: build ## Benchmarks of every stage
 	@for b in $(BUILD)/tests/bench/*_bench; do echo "== $$b"; $$b || exit 1; done
 
-bench-web: build web ## The gateway with ten clients of 2 MB scans, and the page with 5 million voxels in headless Chromium
+bench-web: build web ## The gateway with ten clients of 2 MB scans, the page with 5 million voxels in headless Chromium, Python
 	@command -v chromium > /dev/null || $(MAKE) web-packages WEB_PACKAGES=chromium
 	@for part in gateway page; do BUILD=$(CURDIR)/$(BUILD) node tests/gateway/web/bench.mjs $$part || exit 1; done
+	@/usr/bin/python3 tests/bench/python_bench.py $(BUILD)
 
 table1: programs ## The paper's Table I on simulated streets, crowded and quiet
 	$(BUILD)/bin/stillmap evaluate weightings sim:crowd --seed 2 --scans 480

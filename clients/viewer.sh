@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # A browser's view of a drive: a server, a replay that publishes the scans of a simulated city as a lidar
-# would, and the gateway. Prints the page's address, and runs until it is stopped.
+# would, and the gateway. Prints the page's address, and runs until it is stopped. The city is the demo's where
+# that was run, else one for a lidar of 16 beams, which is made in a moment.
 #
 # BUILD                 build folder (build/release)
 # STILLMAP_DEMO_DIR     where the sequence lies (./demo)
@@ -13,6 +14,7 @@ bin=${BUILD:-build/release}/bin
 demo=${STILLMAP_DEMO_DIR:-demo}
 scans=${STILLMAP_DEMO_SCANS:-300}
 data=${STILLMAP_VIEWER_DATA:-$demo/city_$scans}
+[ -n "${STILLMAP_VIEWER_DATA:-}" ] || [ -f "$data/complete" ] || data=$demo/view_$scans
 children=()
 
 stop_children() {
@@ -37,17 +39,16 @@ for program in stillmap stillmap-server stillmap-gateway; do
 done
 mkdir -p "$demo"
 domain=${ROS_DOMAIN_ID:-$(free_domain)}
-if [ -z "${STILLMAP_VIEWER_DATA:-}" ] && [ ! -f "$data/complete" ]; then
-  rm -rf "$data"
-  "$bin/stillmap" simulate "$data" --preset quiet --scans "$scans" --seed 1
-  touch "$data/complete"
-fi
-
 # The page opens before the first scan: nothing waits for anything.
 "$bin/stillmap-gateway" --domain "$domain" --listen "${STILLMAP_LISTEN:-127.0.0.1:8765}" &
 children+=("$!")
 "$bin/stillmap-server" --domain "$domain" > "$demo/viewer_server.log" 2>&1 &
 children+=("$!")
+if [ -z "${STILLMAP_VIEWER_DATA:-}" ] && [ ! -f "$data/complete" ]; then
+  rm -rf "$data"
+  "$bin/stillmap" simulate "$data" --preset quiet --sensor vlp_16 --scans "$scans" --seed 1
+  touch "$data/complete"
+fi
 "$bin/stillmap" replay "$data" --domain "$domain" --timeout 60 > "$demo/viewer_replay.log" 2>&1 &
 children+=("$!")
 # Ends when the gateway does, as where its port is taken.
