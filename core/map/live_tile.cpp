@@ -408,8 +408,8 @@ LiveTile::LiveTile(TileId id, const TileRecord& record, const VoxelGrid& grid, S
   const auto key = [](const LiveVoxel& voxel) { return voxel.packed.key; };
   // Stable: of a voxel that a file has twice, what is shown stays.
   std::ranges::stable_sort(sorted_, {}, key);
-  const auto doubles = std::ranges::unique(sorted_, {}, key);
-  sorted_.erase(doubles.begin(), doubles.end());
+  const auto is_same = [&](const LiveVoxel& a, const LiveVoxel& b) { return key(a) == key(b); };
+  sorted_.erase(std::unique(sorted_.begin(), sorted_.end(), is_same), sorted_.end());
   if (sorted_.size() > PositionIndex::max_entries) sorted_.resize(PositionIndex::max_entries);
   index_.rebuild(sorted_.size(), sorted_.size(), key_at());
   if (!evidence) return;

@@ -152,8 +152,7 @@ std::vector<TileId> MapTiles::in(const Eigen::AlignedBox3d& box_map, std::size_t
   }
   std::ranges::copy_if(hidden_non_resident_, std::back_inserter(ids), is_in);
   std::ranges::sort(ids);
-  const auto doubles = std::ranges::unique(ids);
-  ids.erase(doubles.begin(), doubles.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   return ids;
 }
 

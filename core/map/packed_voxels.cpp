@@ -58,8 +58,9 @@ SeenTimes seen_times(std::span<const std::int64_t> stamps_ns) {
   SeenTimes seen;
   seen.stamps_ns.assign(stamps_ns.begin(), stamps_ns.end());
   std::ranges::sort(seen.stamps_ns);
-  const auto doubles = std::ranges::unique(seen.stamps_ns);
-  seen.stamps_ns.erase(doubles.begin(), doubles.end());
+  // std::ranges::unique is nothing for clang 14, which compiles the fuzz targets.
+  seen.stamps_ns.erase(std::unique(seen.stamps_ns.begin(), seen.stamps_ns.end()),
+                       seen.stamps_ns.end());
   seen.stamp_of.reserve(stamps_ns.size());
   for (const std::int64_t stamp_ns : stamps_ns) {
     seen.stamp_of.push_back(static_cast<std::uint32_t>(

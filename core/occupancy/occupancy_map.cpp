@@ -198,8 +198,8 @@ bool OccupancyMap::sync_residency(const MapSnapshot& view) {
   }
   // A tile that touches two columns is named twice.
   std::ranges::sort(reloaded_tiles);
-  const auto doubles = std::ranges::unique(reloaded_tiles);
-  reloaded_tiles.erase(doubles.begin(), doubles.end());
+  reloaded_tiles.erase(std::unique(reloaded_tiles.begin(), reloaded_tiles.end()),
+                       reloaded_tiles.end());
   insert(
       {view.version, view.map_id, view.tile_size_m, view.voxel_size_m, TileTable(reloaded_tiles)});
   return !evicted.empty() || !reloaded_tiles.empty();
