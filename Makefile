@@ -35,9 +35,10 @@ packages: ## Install the Debian packages that are missing
 	  DEBIAN_FRONTEND=noninteractive $$sudo apt-get install -yq --no-install-recommends $$missing; \
 	fi
 
-# The build configures itself again where a CMakeLists.txt changed.
+# The build configures itself again where a CMakeLists.txt changed, but does not see what was installed since.
 configure: packages
-	@[ -z "$(CMAKE_OPTIONS)" ] && [ $(BUILD)/build.ninja -nt CMakePresets.json ] || cmake --preset $(PRESET) $(CMAKE_OPTIONS)
+	@[ -z "$(CMAKE_OPTIONS)" ] && [ $(BUILD)/build.ninja -nt CMakePresets.json ] && \
+	  [ $(BUILD)/build.ninja -nt /var/lib/dpkg/status ] || cmake --preset $(PRESET) $(CMAKE_OPTIONS)
 
 programs: configure ## Build what users run, in build/release: stillmap and stillmap-server
 	cmake --build --preset $(PRESET) -j $(JOBS) --target programs

@@ -89,9 +89,8 @@ struct Buffer {
 enum class FloatSummand {
   /// In its target.
   in_place,
-  /// In a buffer of its own, which takes more memory: oneDNN's code for AVX2 adds in place before
-  /// the
-  /// activation only, and RangeNet++ adds after it.
+  /// In a buffer of its own, which takes more memory: oneDNN's code for AVX2 adds in place only
+  /// before the activation, and RangeNet++ adds after it.
   apart,
 };
 
