@@ -289,7 +289,9 @@ void bind_map_requests(py::class_<Client>& client) {
             }
             return trajectory_of(path);
           },
-          py::arg("timeout_s") = 5.0, "The path since the map began, at most 1 s old.")
+          py::arg("timeout_s") = 5.0,
+          "The path since the map began, as last published: publish.path_period_s (1 s) ago "
+          "at most.")
       .def(
           "save_map",
           [](Client& asked, const std::string& file, bool overwrite) {

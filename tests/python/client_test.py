@@ -47,11 +47,24 @@ def test_submaps_come_as_arrays(client):
     assert submaps.loops.shape == (0, 2) and submaps.jump_m.shape == (0,)
 
 
+def pose_at(client, stamp_ns):
+    """T_map_body when the path has come there: it is published at a period of its own."""
+    end = time.monotonic() + PATIENCE_S
+    while True:
+        path = client.trajectory(PATIENCE_S)
+        at = np.flatnonzero(path.stamp_ns == stamp_ns)
+        if len(at) == 1:
+            return path.T_map_body[at[0]]
+        assert time.monotonic() < end, (stamp_ns, path.stamp_ns)
+        time.sleep(0.2)
+
+
 def test_the_robot_is_found_where_it_is(client):
-    here = client.trajectory(PATIENCE_S).T_map_body[-1]
-    heading = np.arctan2(here[1, 0], here[0, 0])
-    found = client.localize(near=(here[0, 3], here[1, 3], heading), radius_m=10.0)
+    near = client.trajectory(PATIENCE_S).T_map_body[-1]
+    heading = np.arctan2(near[1, 0], near[0, 0])
+    found = client.localize(near=(near[0, 3], near[1, 3], heading), radius_m=10.0)
     assert found.outcome == "found" and not found.applied
+    here = pose_at(client, found.stamp_ns)
     np.testing.assert_allclose(found.T_map_base[:2, 3], here[:2, 3], atol=0.5)
     with pytest.raises(stillmap.ServiceError, match="radius"):
         client.localize(near=(0.0, 0.0, 0.0), radius_m=-1.0)
