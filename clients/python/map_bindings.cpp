@@ -9,7 +9,6 @@
 #include "clients/python/traversability.hpp"
 #include "core/map/query/map_query.hpp"
 #include "core/map/storage/map_file_copy.hpp"
-#include "core/map/storage/shown_map.hpp"
 
 namespace stillmap::python {
 namespace {
@@ -234,7 +233,7 @@ py::object removed_of(const Map& map) {
 
 Map open_map(const std::filesystem::path& file) {
   const auto copy = std::make_shared<MapFileCopy>(file);
-  SavedMap saved = read_shown_map(*copy);
+  SavedMap saved = copy->load_shown();
   return {.view = std::make_shared<const MapSnapshot>(std::move(saved.view)),
           .trajectory = saved.trajectory.to_vector(),
           .metadata = std::move(saved.metadata),

@@ -468,8 +468,7 @@ TileRecord LiveTile::record(const VisibilityRule& rule, const ScanStamps& stamps
   // As published, with the current counts and times.
   auto tile = std::make_shared<Tile>(
       Tile{published_->info, PackedVoxels(id_, grid_, packed(shown), seen_times(shown, stamps))});
-  tile->info.bounds_map.setEmpty();
-  for (const Voxel& voxel : tile->voxels) tile->info.bounds_map.extend(voxel.mean_map);
+  tile->info.bounds_map = tile->voxels.bounds_map();
   return {std::move(tile), std::move(evidence)};
 }
 

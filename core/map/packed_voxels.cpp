@@ -11,10 +11,20 @@ namespace {
 
 constexpr int content_steps = 8;
 
+constexpr std::uint32_t half_steps = 2 * PackedVoxel::offset_steps / content_steps;
+
+/// 2^32 / (half_steps * n), rounded up, for n points: with dividends below 2^17 and divisors below
+/// 2^14, the product's upper word is the quotient.
+constexpr auto reciprocal_of_points = [] {
+  std::array<std::uint64_t, PackedVoxel::max_mean_points + 1> reciprocals{};
+  for (std::uint64_t n = 1; n < reciprocals.size(); ++n)
+    reciprocals[n] = ((std::uint64_t{1} << 32) - 1) / (half_steps * n) + 1;
+  return reciprocals;
+}();
+
 /// The eighth of the voxel in which the mean lies: of the middle of its step.
-std::uint32_t content_step(std::uint32_t sum, std::uint32_t points) {
-  constexpr std::uint32_t half_steps = 2 * PackedVoxel::offset_steps / content_steps;
-  return (2 * sum + points) / (half_steps * points);
+std::uint64_t content_step(std::uint32_t sum, std::uint32_t points) {
+  return (2 * sum + points) * reciprocal_of_points[points] >> 32;
 }
 
 /// The sum of offsets whose mean is nearest to `offset` [voxels].
@@ -97,14 +107,32 @@ void PackedVoxels::Content::set_stamps(const SeenTimes& seen) {
       static_cast<unsigned>(std::bit_width(std::max<std::size_t>(stamps_ns.size(), 1) - 1));
   stamp_words.assign((seen.stamp_of.size() * stamp_bits + word_bits - 1) / word_bits, 0);
   if (stamp_bits == 0) return;
-  std::size_t bit = 0;
+  auto word = stamp_words.begin();
+  std::uint64_t bits = 0;
+  unsigned filled = 0;
   for (const std::uint64_t stamp : seen.stamp_of) {
-    const std::size_t word = bit / word_bits;
-    const std::size_t shift = bit % word_bits;
-    stamp_words[word] |= stamp << shift;
-    if (shift + stamp_bits > word_bits) stamp_words[word + 1] |= stamp >> (word_bits - shift);
-    bit += stamp_bits;
+    bits |= stamp << filled;
+    filled += stamp_bits;
+    if (filled < word_bits) continue;
+    *word++ = bits;
+    filled -= word_bits;
+    bits = filled > 0 ? stamp >> (stamp_bits - filled) : 0;
   }
+  if (filled > 0) *word = bits;
+}
+
+Eigen::AlignedBox3f PackedVoxels::bounds_map() const {
+  if (empty()) return {};
+  Eigen::Array3d least = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity());
+  Eigen::Array3d most = -least;
+  for (const PackedVoxel& voxel : content_->voxels) {
+    const Eigen::Array3d mean = mean_voxels(voxel, content_->tile, content_->grid);
+    least = least.min(mean);
+    most = most.max(mean);
+  }
+  // To metres and floats at the end: rounding keeps order.
+  const double size_m = content_->grid.voxel_size_m();
+  return {(size_m * least).matrix().cast<float>(), (size_m * most).matrix().cast<float>()};
 }
 
 PackedVoxels PackedVoxels::first(std::size_t count) const {

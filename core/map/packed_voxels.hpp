@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <array>
 #include <compare>
 #include <cstddef>
@@ -43,16 +44,22 @@ inline constexpr auto share_of_points = [] {
   return shares;
 }();
 
-/// The mean of the voxel's points, map frame [m]; point_count > 0.
-[[nodiscard]] inline Eigen::Vector3f mean_map(const PackedVoxel& voxel, TileId tile,
-                                              const VoxelGrid& grid) {
+/// The mean of the voxel's points, map frame [voxels]; point_count > 0.
+[[nodiscard]] inline Eigen::Array3d mean_voxels(const PackedVoxel& voxel, TileId tile,
+                                                const VoxelGrid& grid) {
   constexpr double half_step = 0.5 / PackedVoxel::offset_steps;
   const double share = share_of_points[voxel.mean_points()];
   const VoxelIndex index = voxel_index(voxel.key);
   const Eigen::Array3d corner(static_cast<double>(tile.x) * grid.columns() + index.x,
                               static_cast<double>(tile.y) * grid.columns() + index.y, index.z);
   const Eigen::Array3d sum(voxel.offset_sum[0], voxel.offset_sum[1], voxel.offset_sum[2]);
-  return (grid.voxel_size_m() * (corner + (sum * share + half_step))).matrix().cast<float>();
+  return corner + (sum * share + half_step);
+}
+
+/// The same in metres.
+[[nodiscard]] inline Eigen::Vector3f mean_map(const PackedVoxel& voxel, TileId tile,
+                                              const VoxelGrid& grid) {
+  return (grid.voxel_size_m() * mean_voxels(voxel, tile, grid)).matrix().cast<float>();
 }
 
 /// What a client sees of a voxel, in one word: 48 bits of index, three times 3 bits of mean, 5 bits
@@ -124,6 +131,9 @@ class PackedVoxels {
   }
   /// Of the tile.
   [[nodiscard]] VoxelGrid grid() const { return content_ ? content_->grid : VoxelGrid(1.0, 1.0); }
+
+  /// Smallest box around the means, map frame [m]; empty without voxels.
+  [[nodiscard]] Eigen::AlignedBox3f bounds_map() const;
 
   /// The first ones.
   [[nodiscard]] PackedVoxels first(std::size_t count) const;

@@ -25,7 +25,7 @@ Tile make_tile(TileId id, std::uint64_t revision, PackedVoxels voxels) {
   tile.info.revision = revision;
   tile.info.content_hash = content_hash(voxels.packed());
   tile.info.voxel_count = static_cast<std::uint32_t>(voxels.size());
-  for (const Voxel& voxel : voxels) tile.info.bounds_map.extend(voxel.mean_map);
+  tile.info.bounds_map = voxels.bounds_map();
   tile.voxels = std::move(voxels);
   return tile;
 }

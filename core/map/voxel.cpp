@@ -82,16 +82,4 @@ ClassEvidence ClassEvidence::of(const std::array<Vote, candidates>& votes) {
   return evidence;
 }
 
-std::optional<ClassEvidence> ClassEvidence::of(const Bits& bits) {
-  ClassEvidence evidence;
-  evidence.bits_ = bits;
-  // Rounding adds a little to the greatest total.
-  if (evidence.total() > max_steps + candidates || (bits.classes >> (class_bits * candidates)) != 0)
-    return std::nullopt;
-  for (std::size_t i = 0; i < candidates; ++i) {
-    if (static_cast<std::size_t>(evidence.label(i)) >= semantic_class_count) return std::nullopt;
-  }
-  return evidence;
-}
-
 }  // namespace stillmap

@@ -80,7 +80,11 @@ class ClassEvidence {
   };
   [[nodiscard]] const Bits& bits() const { return bits_; }
   /// Nothing for bits that no votes lead to.
-  [[nodiscard]] static std::optional<ClassEvidence> of(const Bits& bits);
+  [[nodiscard]] static std::optional<ClassEvidence> of(const Bits& bits) {
+    ClassEvidence evidence;
+    evidence.bits_ = bits;
+    return evidence.is_possible() ? std::optional(evidence) : std::nullopt;
+  }
 
   friend bool operator==(const ClassEvidence&, const ClassEvidence&) = default;
 
@@ -105,6 +109,15 @@ class ClassEvidence {
       if (weight > most || (weight == most && label(i) < label(best))) best = i;
     }
     return best;
+  }
+  [[nodiscard]] bool is_possible() const {
+    static_assert(candidates == 3);
+    const auto is_class = [&](std::size_t i) {
+      return static_cast<std::size_t>(label(i)) < semantic_class_count;
+    };
+    // Rounding adds a little to the greatest total.
+    return total() <= max_steps + candidates && (bits_.classes >> (class_bits * candidates)) == 0 &&
+           is_class(0) && is_class(1) && is_class(2);
   }
   /// To the greatest total, where it is exceeded.
   void scale_down();

@@ -65,6 +65,30 @@ TEST(PackedVoxels, AMeanComesBackAsItWasAtAnyDistance) {
   }
 }
 
+TEST(PackedVoxels, ContentTellsTheEighthOfTheMeanForEverySum) {
+  PackedVoxel voxel;
+  voxel.key = voxel_key({1, 2, 3});
+  for (std::uint32_t points = 1; points <= PackedVoxel::max_mean_points; ++points) {
+    voxel.point_count = static_cast<std::uint16_t>(points);
+    for (std::uint32_t sum = 0; sum <= 255 * points; ++sum) {
+      voxel.offset_sum[2] = static_cast<std::uint16_t>(sum);
+      ASSERT_EQ(content_word(voxel) >> 5 & 7U, (2 * sum + points) / (64 * points))
+          << sum << " of " << points;
+    }
+  }
+}
+
+TEST(PackedVoxels, BoundsAreThoseOfTheMeans) {
+  EXPECT_TRUE(PackedVoxels().bounds_map().isEmpty());
+  for (const TileId id : {TileId{0, 0}, TileId{-50, 700}, TileId{4'000, -4'999}}) {
+    const PackedVoxels packed(id, packed_grid, row_of(id, 1000));
+    Eigen::AlignedBox3f bounds;
+    for (const Voxel& voxel : packed) bounds.extend(voxel.mean_map);
+    EXPECT_EQ(packed.bounds_map().min(), bounds.min());
+    EXPECT_EQ(packed.bounds_map().max(), bounds.max());
+  }
+}
+
 TEST(PackedVoxels, TakeFewBytes) {
   std::vector<Voxel> voxels = row_of({0, 0}, 5000);
   for (Voxel& voxel : voxels) {

@@ -49,6 +49,49 @@ TEST(TileCodec, RoundTripLosesNothing) {
   }
 }
 
+/// Of all that a voxel can be.
+PackedVoxel any_voxel(std::uint32_t key, std::mt19937& random) {
+  const auto up_to = [&](std::uint32_t most) {
+    return static_cast<std::uint16_t>(
+        std::uniform_int_distribution<std::uint32_t>(0, most)(random));
+  };
+  PackedVoxel voxel;
+  voxel.key = key;
+  voxel.point_count = static_cast<std::uint16_t>(1U + up_to(up_to(1) == 0 ? 4U : 65'534U));
+  for (auto& sum : voxel.offset_sum)
+    sum = up_to((PackedVoxel::offset_steps - 1) * voxel.mean_points());
+  ClassEvidence::Bits evidence;
+  std::uint32_t left = ClassEvidence::max_steps;
+  for (std::size_t i = 0; i < evidence.weights.size(); ++i) {
+    left -= evidence.weights[i] = up_to(left);
+    evidence.classes =
+        static_cast<std::uint16_t>(evidence.classes | up_to(semantic_class_count - 1) << (5 * i));
+  }
+  voxel.evidence = ClassEvidence::of(evidence).value();
+  return voxel;
+}
+
+TEST(TileCodec, AnyVoxelsComeBackHoweverMany) {
+  std::mt19937 random(19);
+  for (const std::size_t count : {1U, 63U, 64U, 65U, 128U, 5'000U}) {
+    std::vector<PackedVoxel> voxels;
+    SeenTimes seen{{-7, 6'000'000'000}, {}};
+    std::uint32_t key = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      key += 1 + (static_cast<std::uint32_t>(random()) >> random() % 14 >> 13);
+      voxels.push_back(any_voxel(key, random));
+      for (int k = 0; k < 2; ++k) seen.stamp_of.push_back(static_cast<std::uint32_t>(random() % 2));
+    }
+    const Tile tile = make_tile({3, -4}, 9, PackedVoxels({3, -4}, codec_grid, voxels, seen));
+    const Tile back = decode_tile(encode_tile(tile), codec_grid);
+    EXPECT_TRUE(std::ranges::equal(back.voxels.packed(), voxels)) << count;
+    for (std::size_t i = 0; i < count; ++i) {
+      EXPECT_EQ(back.voxels.first_stamp(i), seen.stamp_of[2 * i]);
+      EXPECT_EQ(back.voxels.last_stamp(i), seen.stamp_of[2 * i + 1]);
+    }
+  }
+}
+
 TEST(TileCodec, EmptyTileSurvives) {
   Tile tile;
   tile.info.id = {-5, 7};
@@ -108,8 +151,12 @@ TEST(TileCodec, ImpossibleVoxelsAreRefused) {
   using Seen = SeenTimes&;
   using Info = TileInfo&;
   expect_refused([](Voxels voxels, Seen, Info) { voxels[1].key = voxels[0].key; });
-  expect_refused([](Voxels voxels, Seen, Info) { voxels[0].offset_sum[1] = 65'535; });
-  expect_refused([](Voxels voxels, Seen, Info) { voxels[0].point_count = 0; });
+  ASSERT_GT(good.voxels.size(), 64U);
+  for (const std::size_t at : {std::size_t{0}, good.voxels.size() - 1}) {
+    expect_refused([&](Voxels voxels, Seen, Info) { voxels[at].offset_sum[1] = 65'535; });
+    expect_refused([&](Voxels voxels, Seen, Info) { voxels[at].point_count = 0; });
+  }
+  expect_refused([](Voxels voxels, Seen, Info) { std::swap(voxels.end()[-1], voxels.end()[-2]); });
   expect_refused([](Voxels, Seen seen, Info) { seen.stamps_ns = {6, 5}; });
   expect_refused([](Voxels, Seen seen, Info) { seen.stamps_ns = {}; });
   expect_refused([](Voxels voxels, Seen seen, Info) {

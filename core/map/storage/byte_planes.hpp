@@ -41,6 +41,29 @@ class FieldReader {
   const std::uint8_t* from_;
 };
 
+/// Reads the fields of `size` records at once: each field is an array, and its bytes lie in planes
+/// of `size` bytes.
+template <std::size_t size>
+class BatchReader {
+ public:
+  using Plane = std::array<std::uint8_t, size>;
+  explicit BatchReader(const Plane* planes) : plane_(planes) {}
+  template <typename Number>
+  void operator()(std::array<Number, size>& numbers) {
+    for (std::size_t i = 0; i < size; ++i) {
+      Number number = 0;
+      for (std::size_t k = 0; k < sizeof(Number); ++k) {
+        number = static_cast<Number>(number | static_cast<Number>(plane_[k][i]) << (8 * k));
+      }
+      numbers[i] = number;
+    }
+    plane_ += sizeof(Number);
+  }
+
+ private:
+  const Plane* plane_;
+};
+
 /// Bytes that are of one kind from each of these ends to the next.
 struct PlaneBytes {
   std::vector<std::uint8_t> bytes;
@@ -62,6 +85,25 @@ void append_planes(PlaneBytes& content, const std::vector<Record>& records, Visi
   for (std::size_t i = 0; i < count; ++i) {
     visit(FieldWriter(record.data()), records[i]);
     for (std::size_t k = 0; k < record_bytes; ++k) planes[k * count + i] = record[k];
+  }
+}
+
+/// Calls `use(batch, in_batch)` for `Batch::size` records of planes at a time, and for the rest. Of
+/// a batch that is not full, what follows are records of zeros. `visit(visitor, batch)` lists the
+/// fields as for single records.
+template <std::size_t record_bytes, typename Batch, typename Visit, typename Use>
+void for_each_batch_in_planes(const std::uint8_t* planes, std::size_t count, Visit visit, Use use) {
+  std::array<typename BatchReader<Batch::size>::Plane, record_bytes> parts{};
+  Batch batch;
+  for (std::size_t begin = 0; begin < count; begin += Batch::size) {
+    const std::size_t in_batch = std::min(Batch::size, count - begin);
+    for (std::size_t k = 0; k < record_bytes; ++k) {
+      std::memcpy(parts[k].data(), planes + k * count + begin, in_batch);
+      std::fill(parts[k].begin() + static_cast<std::ptrdiff_t>(in_batch), parts[k].end(),
+                std::uint8_t{0});
+    }
+    visit(BatchReader<Batch::size>(parts.data()), batch);
+    use(batch, in_batch);
   }
 }
 

@@ -206,7 +206,7 @@ Tile decode_tile(std::span<const std::uint8_t> frame, const VoxelGrid& grid) {
     voxels.push_back(from_stored(stored, tile.info.id, grid));
   }
   tile.voxels = packed(voxels, tile.info.id, grid);
-  for (const Voxel& voxel : tile.voxels) tile.info.bounds_map.extend(voxel.mean_map);
+  tile.info.bounds_map = tile.voxels.bounds_map();
   return tile;
 }
 

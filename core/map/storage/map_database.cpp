@@ -37,6 +37,8 @@ constexpr std::uint32_t application_id = 0x53744D70;  // "StMp"
 constexpr std::uint32_t schema_version = 2;
 constexpr std::uint32_t oldest_schema_version = 1;
 constexpr int busy_timeout_ms = 5000;
+/// SQLite's own limit; what lies beyond is read as ever.
+constexpr std::uint32_t max_mapped_bytes = 0x7FFF0000;
 
 constexpr const char* schema = R"sql(
   CREATE TABLE map (
@@ -182,6 +184,12 @@ SQLite::Database open_or_create(const fs::path& file) {
   return database;
 }
 
+SQLite::Database connect_as_memory(const fs::path& file) {
+  SQLite::Database database = connect(file);
+  database.exec("PRAGMA mmap_size = " + std::to_string(max_mapped_bytes));
+  return database;
+}
+
 /// What `open` returns; its errors as MapFileError.
 template <typename Open>
 SQLite::Database opened(const fs::path& file, Open open) {
@@ -249,6 +257,22 @@ void upgrade_schema(SQLite::Database& database) {
 void index_tile_infos(SQLite::Database& database) { database.exec(tile_info_index); }
 
 SQLite::Database open_map_database(const fs::path& file) { return opened(file, open_or_create); }
+
+SQLite::Database open_map_copy(const fs::path& file) {
+  return opened(file, [](const fs::path& copy) {
+    check_header(copy);
+    put_away_other_log(copy);
+    return connect_as_memory(copy);
+  });
+}
+
+void check_map_copy(const fs::path& file) {
+  static_cast<void>(opened(file, [](const fs::path& copy) {
+    SQLite::Database database = connect_as_memory(copy);
+    check_pages(database, copy);
+    return database;
+  }));
+}
 
 SQLite::Database connect_to_map_database(const fs::path& file) { return opened(file, connect); }
 

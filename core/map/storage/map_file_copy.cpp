@@ -5,12 +5,14 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <future>
 #include <memory>
 #include <string>
 #include <system_error>
 #include <utility>
 
 #include "core/map/storage/map_database.hpp"
+#include "core/map/storage/map_tables.hpp"
 #include "core/map/storage/save_marks.hpp"
 
 namespace stillmap {
@@ -108,6 +110,23 @@ SavedMap MapFileCopy::load() const {
     return open_map_file(copy_)->load();
   } catch (const MapFileError& error) {
     throw error_of(file_, copy_, error);
+  }
+}
+
+SavedMap MapFileCopy::load_shown() const {
+  try {
+    SQLite::Database database = open_map_copy(copy_);
+    // Reading the rows is as little for more than one core.
+    std::future<void> checked = std::async(std::launch::async, [&] { check_map_copy(copy_); });
+    SavedMap map{read_map_row(database), {}, read_trajectory(database), read_metadata(database)};
+    map.view.tiles = TileTable(read_tiles(database, map.view));
+    checked.get();
+    return map;
+  } catch (const MapFileError& error) {
+    throw error_of(file_, copy_, error);
+  } catch (const std::runtime_error& fault) {
+    throw MapFileError(file_, std::string("is damaged: ") + fault.what() +
+                                  "; 'stillmap map-check' names every fault");
   }
 }
 

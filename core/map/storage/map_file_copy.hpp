@@ -24,6 +24,9 @@ class MapFileCopy {
   void check_format() const;
   /// Throws as check_format does.
   [[nodiscard]] SavedMap load() const;
+  /// Without the tiles' evidence, which is the larger half: for readers of voxels. Throws as
+  /// check_format does.
+  [[nodiscard]] SavedMap load_shown() const;
 
  private:
   std::filesystem::path file_;

@@ -66,22 +66,74 @@ StoredVoxel to_stored(const PackedVoxel& voxel, KeySteps& keys) {
   return stored;
 }
 
-PackedVoxel from_stored(const StoredVoxel& stored, KeySteps& keys) {
-  PackedVoxel voxel;
-  voxel.key = keys.key_at(stored.step);
-  voxel.point_count = stored.point_count;
-  const auto evidence = ClassEvidence::of(stored.evidence);
-  if (voxel.point_count == 0 || !evidence) throw TileCodecError("has an impossible voxel");
-  voxel.evidence = *evidence;
-  const std::uint32_t points = voxel.mean_points();
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const std::uint32_t sum = stored.mean[axis] * points + stored.rest[axis];
-    if (stored.rest[axis] >= points || sum > (PackedVoxel::offset_steps - 1) * points) {
-      throw TileCodecError("has a mean outside of its voxel");
-    }
-    voxel.offset_sum[axis] = static_cast<std::uint16_t>(sum);
+/// As StoredVoxel, for so many voxels at once.
+struct StoredVoxels {
+  static constexpr std::size_t size = 64;
+  template <typename Number>
+  using Each = std::array<Number, size>;
+
+  struct {
+    Each<std::uint16_t> columns;
+    Each<std::uint16_t> layers;
+  } step;
+  std::array<Each<std::uint8_t>, 3> mean;
+  std::array<Each<std::uint8_t>, 3> rest;
+  Each<std::uint16_t> point_count;
+  struct {
+    std::array<Each<std::uint16_t>, ClassEvidence::candidates> weights;
+    Each<std::uint16_t> classes;
+  } evidence;
+  Each<std::uint32_t> first_stamp;
+  Each<std::uint32_t> stamps_on;
+};
+
+/// The inverse of the other turn_first_votes.
+void turn_first_votes(StoredVoxels& stored) {
+  constexpr std::uint16_t most_points = ClassEvidence::max_steps / ClassEvidence::confident_steps;
+  static_assert(most_points * ClassEvidence::confident_steps == ClassEvidence::max_steps);
+  auto& weights = stored.evidence.weights;
+  for (std::size_t i = 0; i < StoredVoxels::size; ++i) {
+    const std::uint16_t points = std::min(stored.point_count[i], most_points);
+    weights[0][i] = static_cast<std::uint16_t>(points * ClassEvidence::confident_steps -
+                                               weights[0][i] - weights[1][i] - weights[2][i]);
   }
-  return voxel;
+}
+
+/// What needs no voxel before.
+struct VoxelParts {
+  std::array<StoredVoxels::Each<std::uint16_t>, 3> offset_sum;
+  /// Whether the mean is none, or outside of its voxel.
+  StoredVoxels::Each<std::uint16_t> is_outside{};
+};
+
+VoxelParts parts_of(const StoredVoxels& stored) {
+  VoxelParts parts;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    for (std::size_t i = 0; i < StoredVoxels::size; ++i) {
+      const std::uint16_t points =
+          std::min<std::uint16_t>(stored.point_count[i], PackedVoxel::max_mean_points);
+      const std::uint16_t rest = stored.rest[axis][i];
+      const auto sum = static_cast<std::uint16_t>(stored.mean[axis][i] * points + rest);
+      const auto most = static_cast<std::uint16_t>((PackedVoxel::offset_steps - 1) * points);
+      parts.offset_sum[axis][i] = sum;
+      parts.is_outside[i] =
+          static_cast<std::uint16_t>(parts.is_outside[i] | (rest >= points || sum > most ? 1 : 0));
+    }
+  }
+  return parts;
+}
+
+PackedVoxel voxel_at(std::size_t i, const StoredVoxels& stored, const VoxelParts& parts,
+                     KeySteps& keys) {
+  const auto& [weights, classes] = stored.evidence;
+  const auto evidence =
+      ClassEvidence::of({{weights[0][i], weights[1][i], weights[2][i]}, classes[i]});
+  if (stored.point_count[i] == 0 || !evidence) throw TileCodecError("has an impossible voxel");
+  if (parts.is_outside[i] != 0) throw TileCodecError("has a mean outside of its voxel");
+  return {.key = keys.key_at({stored.step.columns[i], stored.step.layers[i]}),
+          .offset_sum = {parts.offset_sum[0][i], parts.offset_sum[1][i], parts.offset_sum[2][i]},
+          .point_count = stored.point_count[i],
+          .evidence = *evidence};
 }
 
 }  // namespace
@@ -159,20 +211,24 @@ PackedVoxels read_voxels(const std::uint8_t*& from, std::size_t count,
   seen.stamp_of.reserve(2 * count);
   const std::size_t stamps = seen.stamps_ns.size();
   KeySteps keys;
-  for_each_in_planes<packed_voxel_bytes, StoredVoxel>(from, count, visit_voxel, [&](auto& voxel) {
-    if (first_votes == FirstVotes::by_what_lacks) turn_first_votes(voxel);
-    const PackedVoxel next = from_stored(voxel, keys);
-    if (!voxels.empty() && next.key <= voxels.back().key) {
-      throw TileCodecError("has voxels out of order");
+  const auto read = [&](StoredVoxels& stored, std::size_t in_batch) {
+    if (first_votes == FirstVotes::by_what_lacks) turn_first_votes(stored);
+    const VoxelParts parts = parts_of(stored);
+    for (std::size_t i = 0; i < in_batch; ++i) {
+      const PackedVoxel next = voxel_at(i, stored, parts, keys);
+      if (!voxels.empty() && next.key <= voxels.back().key) {
+        throw TileCodecError("has voxels out of order");
+      }
+      const std::uint32_t first = stored.first_stamp[i];
+      const std::uint32_t on = stored.stamps_on[i];
+      if (first >= stamps || on >= stamps) throw TileCodecError("has a voxel without a stamp");
+      voxels.push_back(next);
+      const std::size_t last = std::size_t{first} + on;
+      seen.stamp_of.push_back(first);
+      seen.stamp_of.push_back(static_cast<std::uint32_t>(last < stamps ? last : last - stamps));
     }
-    if (voxel.first_stamp >= stamps || voxel.stamps_on >= stamps) {
-      throw TileCodecError("has a voxel without a stamp");
-    }
-    voxels.push_back(next);
-    const std::size_t last = std::size_t{voxel.first_stamp} + voxel.stamps_on;
-    seen.stamp_of.push_back(voxel.first_stamp);
-    seen.stamp_of.push_back(static_cast<std::uint32_t>(last < stamps ? last : last - stamps));
-  });
+  };
+  for_each_batch_in_planes<packed_voxel_bytes, StoredVoxels>(from, count, visit_voxel, read);
   from += count * packed_voxel_bytes;
   return {tile, grid, std::move(voxels), seen};
 }

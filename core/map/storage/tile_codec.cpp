@@ -267,8 +267,7 @@ Tile decode_tile(std::span<const std::uint8_t> bytes, const VoxelGrid& grid) {
   std::vector<std::int64_t> stamps_ns = read_stamps(from, header.stamps);
   Tile tile{header.info, read_voxels(from, count, std::move(stamps_ns), header.info.id, grid,
                                      first_votes_in(bytes))};
-  for (const PackedVoxel& voxel : tile.voxels.packed())
-    tile.info.bounds_map.extend(mean_map(voxel, header.info.id, grid));
+  tile.info.bounds_map = tile.voxels.bounds_map();
   return tile;
 }
 
