@@ -140,8 +140,8 @@ void Mapper::reclaim_static_map(const MapCorrection* correction) {
   label_synchronizer_.correct(*correction);
   static_map_.correct(*correction);
   T_map_odom_ = correction->latest() * T_map_odom_;
-  if (prior_map_added_at_map_)
-    prior_map_added_at_map_ = correction->latest() * *prior_map_added_at_map_;
+  // What was stored before lies elsewhere in the odometry's frame now.
+  prior_map_added_at_map_.reset();
 }
 
 std::optional<InertialMotion> Mapper::inertial_motion(std::int64_t stamp_ns,

@@ -76,7 +76,7 @@ void LiveLoopCloser::end(const char* reason) {
 
 std::optional<MapCorrection> LiveLoopCloser::correction() {
   // Without any, also where the last one was denied, poses are the odometry's.
-  if (!closer_.is_corrected() && known_closures_ == 0) return std::nullopt;
+  if (!closer_.is_corrected() && !was_corrected_) return std::nullopt;
   const std::vector<Eigen::Isometry3d> corrected = closer_.corrected_poses();
   std::vector<MapCorrection::Pose> poses(corrected.size());
   double max_shift_m = 0.0;
@@ -89,7 +89,7 @@ std::optional<MapCorrection> LiveLoopCloser::correction() {
     if (shift_m < config_.min_shift_m) poses[i].T_new_old = Eigen::Isometry3d::Identity();
   }
   if (max_shift_m < config_.min_shift_m) return std::nullopt;
-  known_closures_ = closer_.closures().size();
+  was_corrected_ = closer_.is_corrected();
   for (std::size_t i = 0; i < poses.size(); ++i)
     T_map_lidar_[i] = poses[i].T_new_old * T_map_lidar_[i];
   ++corrections_;

@@ -42,6 +42,12 @@ class LiveLoopCloser {
  public:
   explicit LiveLoopCloser(const LiveLoopConfig& config)
       : config_(config), closer_(config.closing), gnss_(config.gnss) {}
+  /// Of a run that goes on in a map which holds scans until this stamp: see LoopCloser.
+  LiveLoopCloser(const LiveLoopConfig& config, EarlierMap earlier, std::int64_t seen_until_ns)
+      : config_(config),
+        closer_(config.closing, std::move(earlier)),
+        gnss_(config.gnss),
+        last_stamp_ns_(seen_until_ns) {}
 
   /// A fix, before or after the scans around it. Returns why it is not used; empty where it is.
   [[nodiscard]] std::string add(const GnssFix& fix) { return gnss_.add(fix); }
@@ -56,6 +62,8 @@ class LiveLoopCloser {
 
   /// Believed so far.
   [[nodiscard]] const std::vector<LoopClosure>& closures() const { return closer_.closures(); }
+  /// Submaps that were found in the earlier map.
+  [[nodiscard]] std::size_t anchors() const { return closer_.anchors().size(); }
   /// What became of the fixes.
   [[nodiscard]] const GnssTrack& gnss() const { return gnss_; }
   /// By the corrections until now; nothing while it is not known.
@@ -91,8 +99,8 @@ class LiveLoopCloser {
   std::vector<Eigen::Isometry3d> T_map_lidar_;
   /// Of scans to come.
   Eigen::Isometry3d T_map_odom_ = Eigen::Isometry3d::Identity();
-  /// How many were believed when poses were corrected last.
-  std::size_t known_closures_ = 0;
+  /// Whether anything corrected poses until now.
+  bool was_corrected_ = false;
   std::size_t known_submaps_ = 0;
   std::uint64_t corrections_ = 0;
   std::string end_reason_;

@@ -31,6 +31,16 @@ double horizontal_sigma_m(const Eigen::Matrix3d& covariance_enu) {
   return std::sqrt(0.5 * covariance_enu.topLeftCorner<2, 2>().trace());
 }
 
+constexpr const char* stayed_alone = "no second closure agreed with its jump";
+
+Submap without_points(const Submap& submap) {
+  return {.key_node = submap.key_node,
+          .way_m = submap.way_m,
+          .T_submap_key = submap.T_submap_key,
+          .points_submap = {},
+          .classes = {}};
+}
+
 double angle_of(const Eigen::Isometry3d& T) { return so3_log(T.linear()).norm(); }
 
 }  // namespace
@@ -117,10 +127,7 @@ void LoopCloser::use_positions() {
 
 void LoopCloser::finish() {
   if (!builder_.empty()) close_submap();
-  for (Candidate& candidate : pending_) {
-    candidate.closure.refusal = "no second closure agreed with its jump";
-    refused_.push_back(std::move(candidate.closure));
-  }
+  for (Candidate& candidate : pending_) refuse(std::move(candidate), stayed_alone);
   pending_.clear();
 }
 
@@ -131,18 +138,47 @@ void LoopCloser::close_submap() {
   submap.way_m = nodes_[key].way_m;
   submaps_.emplace_back(std::move(submap));
   first_node_of_submap_ = nodes_.size() - 1;
+  find_in_earlier_map(submaps_.size() - 1);
   find_loops(submaps_.size() - 1);
   use_positions();
 }
 
+void LoopCloser::find_in_earlier_map(std::size_t submap) {
+  if (!earlier_) return;
+  const Submap& own = submaps_[submap].submap;
+  const auto found =
+      earlier_->match(own, graph_.T_map_node[own.key_node], way_from_earlier_map_m(submap));
+  if (!found || !found->match.refusal.empty()) return;
+  LoopClosure closure;
+  closure.jump_m = found->match.jump_m;
+  // Node 0 stays where it is, as the map does.
+  judge({.from = std::nullopt,
+         .to = submap,
+         .closure = closure,
+         .edge = {.from = 0,
+                  .to = own.key_node,
+                  .T_from_to = graph_.T_map_node[0].inverse() * found->T_map_key,
+                  .information = found->match.key_information,
+                  .is_loop = true}});
+}
+
+double LoopCloser::way_from_earlier_map_m(std::size_t submap) const {
+  const std::vector<double> ways_m = ways_from(submap);
+  double way_m = ways_m[0] + submaps_[0].submap.way_m;
+  for (const Anchor& anchor : anchors_) way_m = std::min(way_m, ways_m[anchor.submap]);
+  return way_m;
+}
+
 void LoopCloser::find_loops(std::size_t to) {
-  const std::vector<double> ways_m = ways_from(to);
-  for (const std::size_t from : candidates(to, ways_m)) {
-    if (auto candidate = verify(from, to, ways_m[from])) judge(*std::move(candidate));
+  // One that was found in the earlier map is where it belongs.
+  if (!submaps_[to].submap.points_submap.empty()) {
+    const std::vector<double> ways_m = ways_from(to);
+    for (const std::size_t from : candidates(to, ways_m)) {
+      if (auto candidate = verify(from, to, ways_m[from])) judge(*std::move(candidate));
+    }
   }
   while (!pending_.empty() && pending_.front().to + config_.agreement_submaps <= to) {
-    pending_.front().closure.refusal = "no second closure agreed with its jump";
-    refused_.push_back(std::move(pending_.front().closure));
+    refuse(std::move(pending_.front()), stayed_alone);
     pending_.pop_front();
   }
 }
@@ -153,6 +189,7 @@ std::vector<std::size_t> LoopCloser::candidates(std::size_t to,
   std::vector<std::pair<double, std::size_t>> near;
   for (std::size_t from = 0; from < to; ++from) {
     if (submaps_[to].submap.way_m - submaps_[from].submap.way_m < config_.min_way_between_m) break;
+    if (submaps_[from].submap.points_submap.empty()) continue;
     const double distance_m =
         (T_map_submap(submaps_[from]).translation() - at_map).head<2>().norm();
     const double reach_m = window_after(config_.drift, ways_m[from]).reach_m;
@@ -269,10 +306,23 @@ void LoopCloser::judge(Candidate candidate) {
 }
 
 void LoopCloser::accept(Candidate candidate) {
-  joints_.push_back({candidate.from, candidate.to, graph_.edges.size()});
+  const std::size_t edge = graph_.edges.size();
   graph_.edges.push_back(candidate.edge);
-  closures_.push_back(std::move(candidate.closure));
+  if (candidate.from) {
+    joints_.push_back({*candidate.from, candidate.to, edge});
+    closures_.push_back(std::move(candidate.closure));
+  } else {
+    anchors_.push_back({candidate.to, edge});
+    // Who comes back is found in the earlier map.
+    submaps_[candidate.to] = PlacedSubmap(without_points(submaps_[candidate.to].submap));
+  }
   solve();
+}
+
+void LoopCloser::refuse(Candidate candidate, const char* why) {
+  if (!candidate.from) return;
+  candidate.closure.refusal = why;
+  refused_.push_back(std::move(candidate.closure));
 }
 
 void LoopCloser::place_nodes() {
@@ -325,20 +375,36 @@ void LoopCloser::take_graph(PoseGraph graph) {
 void LoopCloser::solve() {
   place_nodes();
   for (std::size_t k = 0; k < joints_.size(); ++k) {
-    const PoseEdge& edge = graph_.edges[joints_[k].edge];
-    const double squared = squared_error(edge, graph_.T_map_node[edge.from],
-                                         graph_.T_map_node[edge.to], EdgeError::geodesic);
-    if (squared < config_.max_squared_error) continue;
+    const std::size_t edge = joints_[k].edge;
+    if (!is_denied_by_graph(edge)) continue;
     closures_[k].refusal = "the rest of the graph denies it";
     refused_.push_back(std::move(closures_[k]));
     closures_.erase(closures_.begin() + static_cast<std::ptrdiff_t>(k));
-    graph_.edges.erase(graph_.edges.begin() + static_cast<std::ptrdiff_t>(joints_[k].edge));
-    const std::size_t removed = joints_[k].edge;
     joints_.erase(joints_.begin() + static_cast<std::ptrdiff_t>(k));
-    for (Joint& joint : joints_)
-      if (joint.edge > removed) --joint.edge;
+    erase_edge(edge);
     return solve();
   }
+  for (std::size_t k = 0; k < anchors_.size(); ++k) {
+    const std::size_t edge = anchors_[k].edge;
+    if (!is_denied_by_graph(edge)) continue;
+    anchors_.erase(anchors_.begin() + static_cast<std::ptrdiff_t>(k));
+    erase_edge(edge);
+    return solve();
+  }
+}
+
+bool LoopCloser::is_denied_by_graph(std::size_t number) const {
+  const PoseEdge& edge = graph_.edges[number];
+  return squared_error(edge, graph_.T_map_node[edge.from], graph_.T_map_node[edge.to],
+                       EdgeError::geodesic) >= config_.max_squared_error;
+}
+
+void LoopCloser::erase_edge(std::size_t edge) {
+  graph_.edges.erase(graph_.edges.begin() + static_cast<std::ptrdiff_t>(edge));
+  for (Joint& joint : joints_)
+    if (joint.edge > edge) --joint.edge;
+  for (Anchor& anchor : anchors_)
+    if (anchor.edge > edge) --anchor.edge;
 }
 
 std::vector<Eigen::Isometry3d> LoopCloser::corrected_poses() const {

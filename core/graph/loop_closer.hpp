@@ -9,9 +9,9 @@
 
 #include "core/geodesy/earth_alignment.hpp"
 #include "core/geodesy/gnss_track.hpp"
+#include "core/graph/earlier_map.hpp"
 #include "core/graph/pose_graph.hpp"
 #include "core/graph/submap.hpp"
-#include "core/graph/submap_match.hpp"
 #include "core/lidar/labelled_scan.hpp"
 #include "core/lidar/trajectory.hpp"
 
@@ -89,6 +89,11 @@ struct DeniedLoop {
 class LoopCloser {
  public:
   explicit LoopCloser(const LoopClosingConfig& config) : config_(config), builder_(config.submap) {}
+  /// Of a drive that begins in a map made earlier, and goes on in it: poses are in that map's
+  /// frame, of which nothing moves. Submaps that are found in it are held there, and what odometry
+  /// drifts by outside of it is made up for where the drive comes back.
+  LoopCloser(const LoopClosingConfig& config, EarlierMap earlier)
+      : config_(config), earlier_(std::move(earlier)), builder_(config.submap) {}
 
   /// From now on nothing joins the submaps of these scans, nor their neighbours on the way: what
   /// looks alike does so from there, too. The scans may be still to come.
@@ -110,8 +115,10 @@ class LoopCloser {
   /// Those that are believed.
   [[nodiscard]] const std::vector<LoopClosure>& closures() const { return closures_; }
   [[nodiscard]] const std::vector<LoopClosure>& refused() const { return refused_; }
-  /// Whether closures or positions correct the poses.
-  [[nodiscard]] bool is_corrected() const { return !closures_.empty() || T_enu_map_.has_value(); }
+  /// Whether closures, an earlier map or positions correct the poses.
+  [[nodiscard]] bool is_corrected() const {
+    return !closures_.empty() || !anchors_.empty() || T_enu_map_.has_value();
+  }
   /// Where the map lies in the frame of the positions; nothing while that is not known.
   [[nodiscard]] const std::optional<Eigen::Isometry3d>& T_enu_map() const { return T_enu_map_; }
   /// Positions that take part, and how many of them the rest of the graph puts elsewhere.
@@ -144,11 +151,18 @@ class LoopCloser {
   };
   /// Of each of `closures()`.
   [[nodiscard]] const std::vector<Joint>& joints() const { return joints_; }
+  /// A submap that was found in the earlier map, and the number of its edge in the graph.
+  struct Anchor {
+    std::size_t submap = 0;
+    std::size_t edge = 0;
+  };
+  [[nodiscard]] const std::vector<Anchor>& anchors() const { return anchors_; }
 
  private:
-  /// A closure between submaps, before it is believed.
+  /// A closure between submaps, or of one with the earlier map, before it is believed.
   struct Candidate {
-    std::size_t from = 0;
+    /// Nothing: the earlier map.
+    std::optional<std::size_t> from;
     std::size_t to = 0;
     LoopClosure closure;
     PoseEdge edge;
@@ -156,6 +170,10 @@ class LoopCloser {
 
   void add_node(std::size_t scan, const Eigen::Isometry3d& T_odom_lidar);
   void close_submap();
+  /// Looks for the submap in the earlier map.
+  void find_in_earlier_map(std::size_t submap);
+  /// Of drift, from where the drive began in the earlier map or was last found in it [m].
+  [[nodiscard]] double way_from_earlier_map_m(std::size_t submap) const;
   void find_loops(std::size_t to);
   [[nodiscard]] std::vector<std::size_t> candidates(std::size_t to,
                                                     const std::vector<double>& ways_m) const;
@@ -169,6 +187,11 @@ class LoopCloser {
   [[nodiscard]] bool is_about(std::size_t number, std::size_t submap) const;
   void judge(Candidate candidate);
   void accept(Candidate candidate);
+  /// Keeps a refusal for who asks, of what joins submaps.
+  void refuse(Candidate candidate, const char* why);
+  /// Whether the rest of the graph denies this edge.
+  [[nodiscard]] bool is_denied_by_graph(std::size_t edge) const;
+  void erase_edge(std::size_t edge);
   /// Has the new positions take part, once it is known where the map lies.
   void use_positions();
   /// Poses of the nodes, and where the map lies.
@@ -183,6 +206,7 @@ class LoopCloser {
   }
 
   LoopClosingConfig config_;
+  std::optional<EarlierMap> earlier_;
   SubmapBuilder builder_;
   std::vector<Eigen::Isometry3d> T_odom_lidar_;
   /// Of the scans.
@@ -195,6 +219,7 @@ class LoopCloser {
   std::deque<Candidate> pending_;
   std::vector<LoopClosure> closures_;
   std::vector<Joint> joints_;
+  std::vector<Anchor> anchors_;
   std::vector<LoopClosure> refused_;
   std::vector<DeniedLoop> denied_;
   /// Those of the newest node may still be replaced by better ones.

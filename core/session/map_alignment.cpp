@@ -25,15 +25,6 @@ Eigen::Isometry3d carried_to(const LoopCloser& drive, std::size_t node, std::siz
   return T_map_from * T_drive_node[from].inverse() * T_drive_node[node];
 }
 
-/// The drive's submap turned upright by the map's vertical.
-PlacedSubmap levelled(const Submap& submap, const Eigen::Isometry3d& T_map_key) {
-  Submap turned = submap;
-  turned.T_submap_key = upright_from_key(T_map_key);
-  const Eigen::Isometry3f T = (turned.T_submap_key * submap.T_submap_key.inverse()).cast<float>();
-  for (Eigen::Vector3f& p : turned.points_submap) p = T * p;
-  return PlacedSubmap(std::move(turned));
-}
-
 }  // namespace
 
 std::string MapAlignment::in_words() const {
@@ -102,8 +93,9 @@ bool MapAligner::agree(const LoopCloser& drive, const Anchor& a, const Anchor& b
   const double way_m = way_between_m(drive, a.node, b.node);
   const Eigen::Isometry3d off =
       b.T_map_node.inverse() * carried_to(drive, b.node, a.node, a.T_map_node);
-  return off.translation().norm() < config_.agreement_m + config_.drift.share_of_way * way_m &&
-         angle_of(off) < config_.agreement_rad + config_.drift.heading_rad_per_m * way_m;
+  return off.translation().norm() <
+             config_.agreement_m + config_.earlier.drift.share_of_way * way_m &&
+         angle_of(off) < config_.agreement_rad + config_.earlier.drift.heading_rad_per_m * way_m;
 }
 
 std::vector<MapAligner::Anchor> MapAligner::agreeing(const LoopCloser& drive,
@@ -187,44 +179,23 @@ std::optional<MapAligner::Found> MapAligner::match(const LoopCloser& drive, std:
   const Submap& own = drive.submaps()[submap].submap;
   const std::size_t node = own.key_node;
   const Eigen::Isometry3d T_map_key = carried_to(drive, node, nearest.node, nearest.T_map_node);
-  const PlacedSubmap piece = piece_round(T_map_key);
-  const PlacedSubmap mine = levelled(own, T_map_key);
-  // Both frames are that of the expected pose, upright.
-  const auto match = match_submaps(
-      piece, mine, Eigen::Isometry3d::Identity(),
-      window_after(config_.drift, way_between_m(drive, node, nearest.node)), config_.match);
-  if (!match) return std::nullopt;
-  const Eigen::Isometry3d T_map_piece = T_map_key * piece.submap.T_submap_key.inverse();
-  const Eigen::Isometry3d found = T_map_piece * match->T_a_b * mine.submap.T_submap_key;
+  const auto found = map_.match(own, T_map_key, way_between_m(drive, node, nearest.node));
+  if (!found) return std::nullopt;
   return Found{.closure = {.scan = drive.nodes()[node].scan,
-                           .T_map_lidar = found,
-                           .fit = match->fit,
-                           .upright_fit = match->upright_fit,
-                           .overlap = match->overlap,
-                           .runner_up = match->runner_up,
-                           .jump_m = match->jump_m,
-                           .refusal = match->refusal},
-               .anchor = {node, found},
+                           .T_map_lidar = found->T_map_key,
+                           .fit = found->match.fit,
+                           .upright_fit = found->match.upright_fit,
+                           .overlap = found->match.overlap,
+                           .runner_up = found->match.runner_up,
+                           .jump_m = found->match.jump_m,
+                           .refusal = found->match.refusal},
+               .anchor = {node, found->T_map_key},
                // Node 0 of the joint graph is the map's frame.
                .edge = {.from = 0,
                         .to = node + 1,
-                        .T_from_to = found,
-                        .information = match->key_information,
+                        .T_from_to = found->T_map_key,
+                        .information = found->match.key_information,
                         .is_loop = true}};
-}
-
-PlacedSubmap MapAligner::piece_round(const Eigen::Isometry3d& T_map_key) const {
-  Submap piece;
-  piece.T_submap_key = upright_from_key(T_map_key);
-  const Eigen::Isometry3d T_piece_map = piece.T_submap_key * T_map_key.inverse();
-  const auto points = map_->points_near(T_map_key.translation().head<2>(), config_.piece_radius_m);
-  piece.points_submap.reserve(points.size());
-  piece.classes.reserve(points.size());
-  for (const LabelledPoint& point : points) {
-    piece.points_submap.push_back((T_piece_map * point.position_map.cast<double>()).cast<float>());
-    piece.classes.push_back(point.label);
-  }
-  return PlacedSubmap(std::move(piece));
 }
 
 MapAligner::Solution MapAligner::solve(const LoopCloser& drive, const std::vector<Found>& closures,

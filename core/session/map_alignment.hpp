@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "core/graph/earlier_map.hpp"
 #include "core/graph/loop_closer.hpp"
-#include "core/graph/submap_match.hpp"
 #include "core/localization/localizer.hpp"
 
 namespace stillmap {
@@ -30,10 +30,8 @@ struct MapAlignmentConfig {
   std::size_t min_agreeing = 2;
   double agreement_m = 0.8;
   double agreement_rad = 0.035;
-  /// Of the map, what is this near to a submap's key is what it is registered in [m].
-  double piece_radius_m = 55.0;
-  DriftModel drift;
-  SubmapMatchConfig match;
+  /// How submaps are looked for in the map; and what else odometry may have drifted by.
+  EarlierMapConfig earlier;
   /// A closure that is farther than this from where the last one and odometry have it needs a
   /// second one that agrees to `second_agreement_m` and `second_agreement_rad`.
   double max_single_jump_m = 1.0;
@@ -91,7 +89,11 @@ class MapAligner {
   using ScanSource = std::function<LabelledScan(std::size_t scan)>;
 
   explicit MapAligner(std::shared_ptr<const PlaceIndex> map, const MapAlignmentConfig& config = {})
-      : map_(std::move(map)), localizer_(map_), config_(config) {}
+      : localizer_(map),
+        map_([map](const Eigen::Vector2d& position_map,
+                   double radius_m) { return map->points_near(position_map, radius_m); },
+             config.earlier),
+        config_(config) {}
 
   /// `drive` is finished. Throws what `scan_at` and the map's tiles throw.
   [[nodiscard]] MapAlignment align(const LoopCloser& drive, const ScanSource& scan_at,
@@ -132,8 +134,6 @@ class MapAligner {
   [[nodiscard]] bool confirm(const LoopCloser& drive, const Found& a, const Found& b) const;
   [[nodiscard]] std::optional<Found> match(const LoopCloser& drive, std::size_t submap,
                                            const Anchor& nearest) const;
-  /// The map round a pose, in its upright frame; the key is the pose.
-  [[nodiscard]] PlacedSubmap piece_round(const Eigen::Isometry3d& T_map_key) const;
   /// Poses of the drive's nodes, and the closures that the graph denies.
   struct Solution {
     std::vector<Eigen::Isometry3d> T_map_node;
@@ -144,8 +144,8 @@ class MapAligner {
   [[nodiscard]] Solution solve(const LoopCloser& drive, const std::vector<Found>& closures,
                                double odometry_scale) const;
 
-  std::shared_ptr<const PlaceIndex> map_;
   Localizer localizer_;
+  EarlierMap map_;
   MapAlignmentConfig config_;
 };
 

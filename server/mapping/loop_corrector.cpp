@@ -18,13 +18,31 @@ constexpr std::size_t max_waiting_scans = 20;
 /// A minute at 10 Hz.
 constexpr std::size_t max_waiting_fixes = 600;
 
+/// Submaps of one run after those of another one in the same map.
+SubmapList after(SubmapList earlier, const SubmapList& later) {
+  const std::size_t known = earlier.submaps.size();
+  const double way_m = known == 0 ? 0.0 : earlier.submaps.back().way_m;
+  earlier.graph_revision += later.graph_revision;
+  for (SubmapList::Entry submap : later.submaps) {
+    submap.way_m += way_m;
+    earlier.submaps.push_back(submap);
+  }
+  for (SubmapList::Loop loop : later.loops) {
+    loop.from += known;
+    loop.to += known;
+    earlier.loops.push_back(loop);
+  }
+  return earlier;
+}
+
 }  // namespace
 
 LoopCorrector::LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Statistics& statistics,
-                             const Eigen::Vector3d& antenna_base)
+                             SeenUntil seen_until, const Eigen::Vector3d& antenna_base)
     : config_(config),
       is_lossless_(is_lossless),
       statistics_(statistics),
+      seen_until_(std::move(seen_until)),
       antenna_base_(antenna_base),
       scans_(max_waiting_scans) {
   worker_.emplace(
@@ -34,8 +52,8 @@ LoopCorrector::LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Sta
           .on_failure = [this] { failed_.request_stop(); }});
 }
 
-void LoopCorrector::begin_map(bool is_new) {
-  map_ = is_new ? ++maps_ : 0;
+void LoopCorrector::begin(const Run& run, SubmapList submaps) {
+  run_ = run;
   // The worker frees what it kept of the last one.
   scans_.edit([](std::deque<ScanOfMap>& scans) {
     scans.clear();
@@ -45,6 +63,7 @@ void LoopCorrector::begin_map(bool is_new) {
   found_.reset();
   place_.reset();
   submaps_.reset();
+  told_ = earlier_submaps_ = std::move(submaps);
   map_revision_ = 0;
   last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
   is_clock_set_back_ = false;
@@ -52,7 +71,7 @@ void LoopCorrector::begin_map(bool is_new) {
 
 void LoopCorrector::add(const GnssFix& fix) {
   const std::scoped_lock lock(mutex_);
-  // Nobody looks at scans: there are none, or the map was loaded.
+  // Nobody looks at scans: there are none, or loops stay open.
   if (fixes_.size() >= max_waiting_fixes) {
     fixes_.erase(fixes_.begin());
     statistics_.count("gnss_fixes_unused");
@@ -63,10 +82,10 @@ void LoopCorrector::add(const GnssFix& fix) {
 void LoopCorrector::add(std::shared_ptr<const LabelledScan> labelled,
                         const Eigen::Isometry3d& T_odom_lidar,
                         const Eigen::Isometry3d& T_base_lidar, bool is_confirmed) {
-  if (map_ == 0) return;
+  if (run_.map == 0) return;
   const std::int64_t stamp_ns = labelled->scan.stamp_ns;
   if (stamp_ns <= std::exchange(last_stamp_ns_, stamp_ns)) is_clock_set_back_ = true;
-  ScanOfMap scan{map_, std::move(labelled), T_odom_lidar, T_base_lidar.inverse() * antenna_base_,
+  ScanOfMap scan{run_, std::move(labelled), T_odom_lidar, T_base_lidar.inverse() * antenna_base_,
                  is_confirmed};
   if (is_lossless_) {
     // The worker outlives mapping: there is nothing else to stop for.
@@ -80,23 +99,24 @@ void LoopCorrector::add(std::shared_ptr<const LabelledScan> labelled,
 std::optional<MapCorrection> LoopCorrector::take() {
   const std::scoped_lock lock(mutex_);
   auto found = std::exchange(found_, std::nullopt);
-  if (!found || found->map != map_ || is_clock_set_back_) return std::nullopt;
+  if (!found || found->map != run_.map || is_clock_set_back_) return std::nullopt;
   taken_revision_ = found->graph_revision;
   return std::move(found->correction);
 }
 
 std::optional<MapOnEarth> LoopCorrector::take_place() {
   const std::scoped_lock lock(mutex_);
-  if (!place_ || place_->map != map_ || place_->graph_revision != map_revision_)
+  if (!place_ || place_->map != run_.map || place_->graph_revision != map_revision_)
     return std::nullopt;
   return std::exchange(place_, std::nullopt)->place;
 }
 
 std::optional<SubmapList> LoopCorrector::take_submaps() {
   const std::scoped_lock lock(mutex_);
-  if (!submaps_ || submaps_->map != map_ || submaps_->list.graph_revision != map_revision_)
+  if (!submaps_ || submaps_->map != run_.map || submaps_->list.graph_revision != map_revision_)
     return std::nullopt;
-  return std::exchange(submaps_, std::nullopt)->list;
+  told_ = after(earlier_submaps_, std::exchange(submaps_, std::nullopt)->list);
+  return told_;
 }
 
 void LoopCorrector::report(const MapCorrection& correction, const CorrectedMap& corrected,
@@ -116,13 +136,14 @@ void LoopCorrector::look_at(const ScanOfMap& scan) {
     closed_map_ = 0;
     return;
   }
-  if (std::exchange(closed_map_, scan.map) != scan.map) {
-    closer_.emplace(config_);
-    reported_ = reported_placed_ = reported_misplaced_ = handed_on_submaps_ = 0;
+  const std::uint64_t map = scan.run.map;
+  if (std::exchange(closed_map_, map) != map) {
+    closer_.emplace(closer_for(scan.run));
+    reported_ = reported_anchors_ = reported_placed_ = reported_misplaced_ = handed_on_submaps_ = 0;
   }
   const auto began = std::chrono::steady_clock::now();
   const bool had_ended = !closer_->end_reason().empty();
-  hand_on_fixes();
+  hand_on_fixes(scan.run);
   auto correction =
       closer_->add(*scan.labelled, scan.T_odom_lidar, scan.is_confirmed, scan.antenna_lidar);
   statistics_.add_latency("loops", milliseconds(std::chrono::steady_clock::now() - began));
@@ -130,14 +151,22 @@ void LoopCorrector::look_at(const ScanOfMap& scan) {
     spdlog::warn("loops stay open from here on: {}", closer_->end_reason());
   report_fixes();
   report_closures();
-  hand_on_submaps(scan.map);
+  hand_on_submaps(map);
   const std::scoped_lock lock(mutex_);
-  if (const auto place = closer_->on_earth())
-    place_ = Place{scan.map, *place, closer_->corrections()};
+  if (const auto place = closer_->on_earth()) place_ = Place{map, *place, closer_->corrections()};
   if (!correction) return;
   // Of two that were not taken yet the second is of the map after the first.
-  if (found_ && found_->map == scan.map) correction = combined(found_->correction, *correction);
-  found_ = Found{scan.map, *std::move(correction), closer_->corrections()};
+  if (found_ && found_->map == map) correction = combined(found_->correction, *correction);
+  found_ = Found{map, *std::move(correction), closer_->corrections()};
+}
+
+LiveLoopCloser LoopCorrector::closer_for(const Run& run) const {
+  if (!run.earlier_until_ns) return LiveLoopCloser(config_);
+  const std::int64_t until_ns = *run.earlier_until_ns;
+  EarlierMap earlier([this, until_ns](const Eigen::Vector2d& position_map, double radius_m) {
+    return seen_until_(until_ns, position_map, radius_m);
+  });
+  return {config_, std::move(earlier), until_ns};
 }
 
 void LoopCorrector::hand_on_submaps(std::uint64_t map) {
@@ -148,11 +177,16 @@ void LoopCorrector::hand_on_submaps(std::uint64_t map) {
   submaps_ = Submaps{map, std::move(list)};
 }
 
-void LoopCorrector::hand_on_fixes() {
+void LoopCorrector::hand_on_fixes(const Run& run) {
   std::vector<GnssFix> fixes;
   {
     const std::scoped_lock lock(mutex_);
     fixes.swap(fixes_);
+  }
+  if (run.earlier_until_ns) {
+    // Where an earlier map lies on the earth is known to who made it.
+    if (!fixes.empty()) statistics_.count("gnss_fixes_unused", fixes.size());
+    return;
   }
   for (const GnssFix& fix : fixes) {
     const std::string refusal = closer_->add(fix);
@@ -164,15 +198,17 @@ void LoopCorrector::hand_on_fixes() {
 
 void LoopCorrector::report_fixes() {
   const GnssTrack& gnss = closer_->gnss();
-  const auto count_new = [this](const char* counter, std::size_t now, std::size_t& reported) {
-    if (now > reported) statistics_.count(counter, now - reported);
-    reported = now;
-  };
   count_new("gnss_fixes", gnss.placed(), reported_placed_);
   count_new("gnss_fixes_between_no_scans", gnss.misplaced(), reported_misplaced_);
 }
 
+void LoopCorrector::count_new(const char* counter, std::size_t now, std::size_t& reported) {
+  if (now > reported) statistics_.count(counter, now - reported);
+  reported = std::max(reported, now);
+}
+
 void LoopCorrector::report_closures() {
+  count_new("submaps_in_earlier_map", closer_->anchors(), reported_anchors_);
   const auto& closures = closer_->closures();
   for (std::size_t i = reported_; i < closures.size(); ++i) {
     statistics_.count("loops_closed");

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <mutex>
@@ -24,22 +25,36 @@ namespace stillmap::server {
 /// correct the map by. All functions are the mapping thread's.
 class LoopCorrector {
  public:
-  /// The statistics must outlive it. `is_lossless`: mapping waits where the search does not keep
-  /// up; else the oldest scan that waits for it gives way.
-  /// `antenna_base`: of the receiver whose fixes it gets, on the robot [m].
+  /// Voxels of the running map that were first seen until a stamp, within a distance across of a
+  /// place [m]: means and classes.
+  using SeenUntil = std::function<std::vector<LabelledPoint>(
+      std::int64_t stamp_ns, const Eigen::Vector2d& position_map, double radius_m)>;
+
+  /// The statistics must outlive it, and what `seen_until` uses: the worker calls it.
+  /// `is_lossless`: mapping waits where the search does not keep up; else the oldest scan that
+  /// waits for it gives way. `antenna_base`: of the receiver whose fixes it gets, on the robot [m].
   LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Statistics& statistics,
-                const Eigen::Vector3d& antenna_base = {0, 0, 0});
+                SeenUntil seen_until, const Eigen::Vector3d& antenna_base = {0, 0, 0});
 
   /// A fix of the receiver. Thread-safe, unlike the others. Counted are those that are used
   /// ("gnss_fixes"), refused ("gnss_fixes_refused"), not between two scans of a moving robot
   /// ("gnss_fixes_between_no_scans"), and never looked at ("gnss_fixes_unused").
   void add(const GnssFix& fix);
 
-  /// Another map began. In one that was loaded no loops are closed: poses of earlier runs are not
-  /// known scan by scan.
-  void begin_map(bool is_new);
-  /// The robot was set elsewhere: what odometry says of the way until there is not true.
-  void end_map() { begin_map(false); }
+  /// Another map began, which is empty.
+  void begin_map() { begin({.map = ++maps_, .earlier_until_ns = std::nullopt}); }
+  /// A map was loaded, of which everything was seen until this stamp, and scans come after it. That
+  /// stays where it is, and what is seen from now on is moved to where it fits to it. Fixes are not
+  /// used.
+  void begin_in_map(std::int64_t seen_until_ns) {
+    begin({.map = ++maps_, .earlier_until_ns = seen_until_ns});
+  }
+  /// The same of the running map: the robot was set elsewhere in it. Submaps keep their numbers.
+  void go_on_in_map(std::int64_t seen_until_ns) {
+    begin({.map = ++maps_, .earlier_until_ns = seen_until_ns}, std::move(told_));
+  }
+  /// From now on loops stay open.
+  void end_map() { begin({}, std::move(told_)); }
   /// A scan of the map.
   void add(std::shared_ptr<const LabelledScan> labelled, const Eigen::Isometry3d& T_odom_lidar,
            const Eigen::Isometry3d& T_base_lidar, bool is_confirmed);
@@ -58,8 +73,15 @@ class LoopCorrector {
   void report(const MapCorrection& correction, const CorrectedMap& corrected, double ms);
 
  private:
-  struct ScanOfMap {
+  /// What scans are of.
+  struct Run {
+    /// Maps are numbered; 0: loops stay open.
     std::uint64_t map = 0;
+    /// Of what was there before it.
+    std::optional<std::int64_t> earlier_until_ns;
+  };
+  struct ScanOfMap {
+    Run run;
     /// Null: another map begins.
     std::shared_ptr<const LabelledScan> labelled;
     Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
@@ -67,23 +89,31 @@ class LoopCorrector {
     bool is_confirmed = false;
   };
 
+  /// `submaps`: those of the map that were told until now.
+  void begin(const Run& run, SubmapList submaps = {});
+
   // Of the worker.
   void look_at(const ScanOfMap& scan);
-  void hand_on_fixes();
+  [[nodiscard]] LiveLoopCloser closer_for(const Run& run) const;
+  void hand_on_fixes(const Run& run);
   void report_fixes();
   void report_closures();
+  void count_new(const char* counter, std::size_t now, std::size_t& reported);
   void hand_on_submaps(std::uint64_t map);
 
   LiveLoopConfig config_;
   bool is_lossless_;
   Statistics& statistics_;
+  SeenUntil seen_until_;
   Eigen::Vector3d antenna_base_;
-  /// Maps are numbered; 0: loops stay open.
-  std::uint64_t map_ = 0;
+  Run run_;
   std::uint64_t maps_ = 0;
   /// Of the map's scans: corrections tell them apart by their stamps.
   std::int64_t last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
   bool is_clock_set_back_ = false;
+  /// Those that were told last, and those of them that are of before the run.
+  SubmapList told_;
+  SubmapList earlier_submaps_;
   /// Of the graph, as the correction that was taken last makes the map, and as the map is.
   std::uint64_t taken_revision_ = 0;
   std::uint64_t map_revision_ = 0;
@@ -112,6 +142,7 @@ class LoopCorrector {
   std::uint64_t closed_map_ = 0;
   std::optional<LiveLoopCloser> closer_;
   std::size_t reported_ = 0;
+  std::size_t reported_anchors_ = 0;
   std::size_t reported_placed_ = 0;
   std::size_t reported_misplaced_ = 0;
   std::size_t handed_on_submaps_ = 0;

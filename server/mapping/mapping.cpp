@@ -13,6 +13,29 @@ LiveLoopConfig live_loops(const ServerConfig& config) {
   return loops;
 }
 
+/// Means and classes of the voxels that were first seen until a stamp, within this distance across
+/// of a place. Tiles that cannot be read, or have just changed on disk, are left out.
+std::vector<LabelledPoint> points_seen_until(const MapSnapshot& view, TileReader& tiles,
+                                             std::int64_t stamp_ns,
+                                             const Eigen::Vector2d& position_map, double radius_m) {
+  std::vector<LabelledPoint> points;
+  const Eigen::Vector3d centre_map(position_map.x(), position_map.y(), 0.0);
+  const Eigen::Vector3d reach(radius_m, radius_m, VoxelGrid::max_coordinate_m);
+  for (const auto& known : tiles_in_box(view, {centre_map - reach, centre_map + reach})) {
+    try {
+      for (const Voxel& voxel : tiles.read(known)->voxels) {
+        if (voxel.first_seen_ns > stamp_ns) continue;
+        const Eigen::Vector2d across = voxel.mean_map.head<2>().cast<double>() - position_map;
+        if (across.squaredNorm() > radius_m * radius_m) continue;
+        points.push_back({voxel.mean_map, voxel.evidence.winner()});
+      }
+    } catch (const std::runtime_error&) {
+      continue;
+    }
+  }
+  return points;
+}
+
 }  // namespace
 
 Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
@@ -36,8 +59,13 @@ Mapping::Mapping(const ServerConfig& config, std::unique_ptr<Segmenter> segmente
                           place_finder_, context.statistics);
   }
   if (config.map.close_loops) {
-    loops_.emplace(live_loops(config), config.input.delivery == DeliveryMode::every,
-                   context.statistics, config.gnss.antenna_base.value_or(Eigen::Vector3d::Zero()));
+    loops_.emplace(
+        live_loops(config), config.input.delivery == DeliveryMode::every, context.statistics,
+        [this](std::int64_t stamp_ns, const Eigen::Vector2d& position_map, double radius_m) {
+          return points_seen_until(*storage_.latest_map().view(), storage_.tiles(), stamp_ns,
+                                   position_map, radius_m);
+        },
+        config.gnss.antenna_base.value_or(Eigen::Vector3d::Zero()));
     submaps_.emplace(context.participant, context.topics);
   }
   if (loops_ && !config.topics.gnss.empty()) {

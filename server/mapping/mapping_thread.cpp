@@ -147,10 +147,20 @@ void MappingThread::begin_map(SharedTrajectory trajectory) {
   latest_map_.begin(mapper_.map_snapshot(), std::move(trajectory));
   if (odom_) odom_->begin_map();
   if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
-  if (outputs_.loops != nullptr) outputs_.loops->begin_map(latest_map_.view()->tiles.empty());
+  begin_loops(&LoopCorrector::begin_in_map);
   if (outputs_.earth != nullptr) outputs_.earth->forget();
   publish_submaps({});
   if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
+}
+
+void MappingThread::begin_loops(void (LoopCorrector::*in_map)(std::int64_t seen_until_ns)) {
+  if (outputs_.loops == nullptr) return;
+  if (latest_map_.view()->tiles.empty()) return outputs_.loops->begin_map();
+  const SharedTrajectory path = latest_map_.trajectory();
+  // Without a path nothing tells what was seen before from what is seen from now on.
+  if (path.empty()) return outputs_.loops->end_map();
+  const auto newest = std::ranges::max_element(path, {}, &StampedPose::stamp_ns);
+  (outputs_.loops->*in_map)((*newest).stamp_ns);
 }
 
 void MappingThread::close_loops() {
@@ -428,7 +438,7 @@ std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns)
     mapper_.hand_out_scans(false);
   } else if (outputs_.place_finder != nullptr) {
     if (const auto T_map_lidar = outputs_.place_finder->relocate(mapper_, stamp_ns)) {
-      if (outputs_.loops != nullptr) outputs_.loops->end_map();
+      begin_loops(&LoopCorrector::go_on_in_map);
       return T_map_lidar;
     }
   }

@@ -118,6 +118,9 @@ class MappingThread : public CheckpointSource {
   void feed_imu(const Scan& scan);
   /// Runs the requests, and publishes the map when that is due.
   void end_round(bool is_idle);
+  /// Loops are looked for in a map that begins empty, or by `in_map` in what is seen from now on of
+  /// one that is there.
+  void begin_loops(void (LoopCorrector::*in_map)(std::int64_t seen_until_ns));
   /// Has the map moved where a place was seen again, beside mapping.
   void close_loops();
   /// Those of the running map, by poses of the lidar.

@@ -14,6 +14,9 @@ class LiveDrive {
  public:
   explicit LiveDrive(std::uint64_t seed, const LiveLoopConfig& config = {})
       : world_(seed), closer_(config) {}
+  /// In a map of the street's first 60 m, whose last scan was taken then.
+  LiveDrive(std::uint64_t seed, std::int64_t seen_until_ns)
+      : world_(seed), closer_({}, EarlierMap(world_.earlier_map(-30.0, 60.0, 7)), seen_until_ns) {}
 
   void go(double ways_m) {
     Eigen::Isometry3d T_drift = Eigen::Isometry3d::Identity();
@@ -86,6 +89,26 @@ TEST(LiveLoopCloser, TheMapIsMovedAsSoonAsAPlaceIsSeenAgain) {
   EXPECT_LT(drive.rmse_m(), 0.6 * open_m);
   // What follows is where it belongs, too.
   EXPECT_LT((drive.in_map.back().translation() - drive.truth.back().translation()).norm(), 0.5);
+}
+
+TEST(LiveLoopCloser, WhatIsSeenFromNowOnIsMovedToFitTheMapThatWasThere) {
+  LiveDrive drive(11, 999'999'999);
+  drive.go(0.95 * StreetWorld::length_m);
+  const int corrections_in_map = drive.corrections;
+  EXPECT_GT((drive.in_map.back().translation() - drive.truth.back().translation()).norm(), 0.6)
+      << "outside nothing tells";
+  drive.go(1.2 * StreetWorld::length_m);
+  EXPECT_GT(drive.corrections, corrections_in_map);
+  EXPECT_TRUE(drive.closer().closures().empty());
+  EXPECT_LT((drive.in_map.back().translation() - drive.truth.back().translation()).norm(), 0.3);
+  EXPECT_LT((drive.in_map[20].translation() - drive.truth[20].translation()).norm(), 0.1);
+}
+
+TEST(LiveLoopCloser, ScansOfTheTimeOfTheMapThatWasThereLeaveLoopsOpen) {
+  LiveDrive drive(11, 1'000'000'000);
+  drive.go(1.2 * StreetWorld::length_m);
+  EXPECT_EQ(drive.corrections, 0);
+  EXPECT_THAT(drive.closer().end_reason(), testing::HasSubstr("set back"));
 }
 
 TEST(LiveLoopCloser, SubmapsLieWhereTheMapHasThem) {

@@ -37,14 +37,18 @@ Drive drive(const StreetWorld& world, double ways_m, double drift_rad, double dr
   return out;
 }
 
-LoopCloser closed(const StreetWorld& world, const Drive& drive, std::uint64_t seed,
-                  const LoopClosingConfig& config = {}) {
-  LoopCloser closer(config);
+LoopCloser closed(LoopCloser closer, const StreetWorld& world, const Drive& drive,
+                  std::uint64_t seed) {
   const Eigen::Isometry3d T_map_first = world.T_map_lidar_at(0.0, false);
   for (std::size_t i = 0; i < drive.truth.size(); ++i)
     closer.add(world.scan_at(T_map_first * drive.truth[i], seed + i), drive.odometry[i], true);
   closer.finish();
   return closer;
+}
+
+LoopCloser closed(const StreetWorld& world, const Drive& drive, std::uint64_t seed,
+                  const LoopClosingConfig& config = {}) {
+  return closed(LoopCloser(config), world, drive, seed);
 }
 
 double rmse_m(const std::vector<Eigen::Isometry3d>& poses, const Drive& drive) {
@@ -109,6 +113,57 @@ TEST(LoopCloser, TheStoreyAboveIsAnotherPlace) {
   EXPECT_TRUE(std::ranges::any_of(closer.refused(), [](const LoopClosure& closure) {
     return closure.refusal.find("another storey") != std::string::npos;
   }));
+}
+
+double worst_m(const std::vector<Eigen::Isometry3d>& poses, const Drive& drive, std::size_t from,
+               std::size_t to) {
+  double worst = 0.0;
+  for (std::size_t i = from; i < to; ++i)
+    worst = std::max(worst, (poses[i].translation() - drive.truth[i].translation()).norm());
+  return worst;
+}
+
+TEST(LoopCloser, ADriveComesBackToAnEarlierMapWhereItLeftIt) {
+  const StreetWorld world(11);
+  const Drive round = drive(world, 1.2 * StreetWorld::length_m, 0.0001, 0.003);
+  const auto last = static_cast<std::size_t>(StreetWorld::length_m);
+  const LoopCloser closer =
+      closed(LoopCloser(LoopClosingConfig{}, EarlierMap(world.earlier_map(-30.0, 60.0, 7))), world,
+             round, 100);
+  EXPECT_GE(closer.anchors().size(), 4U);
+  EXPECT_TRUE(closer.closures().empty()) << "what is in the earlier map is not looked for twice";
+  const auto poses = closer.corrected_poses();
+  EXPECT_GT(worst_m(round.odometry, round, last, poses.size()), 0.8);
+  EXPECT_LT(worst_m(poses, round, last, poses.size()), 0.25);
+  EXPECT_LT(worst_m(poses, round, 0, 60), 0.15);
+  EXPECT_LT(rmse_m(poses, round), 0.5 * rmse_m(round.odometry, round));
+  // Of the submaps in the earlier map nothing but their places is kept.
+  EXPECT_LT(closer.submap_bytes(), closed(world, round, 100).submap_bytes() *
+                                       (closer.submaps().size() - 3) / closer.submaps().size());
+}
+
+TEST(LoopCloser, OutsideOfAnEarlierMapLoopsAreClosedAsEver) {
+  const StreetWorld world(11);
+  const Drive two_rounds = drive(world, 1.5 * StreetWorld::length_m, 0.0001, 0.003);
+  const auto nothing = [](const Eigen::Vector2d&, double) { return std::vector<LabelledPoint>(); };
+  const LoopCloser closer =
+      closed(LoopCloser(LoopClosingConfig{}, EarlierMap(nothing)), world, two_rounds, 100);
+  EXPECT_TRUE(closer.anchors().empty());
+  const auto poses = closer.corrected_poses();
+  const auto as_ever = closed(world, two_rounds, 100).corrected_poses();
+  for (std::size_t i = 0; i < poses.size(); ++i) EXPECT_EQ(poses[i].matrix(), as_ever[i].matrix());
+}
+
+TEST(LoopCloser, AnEarlierMapOfAnotherStreetHoldsNothing) {
+  const StreetWorld world(11);
+  const Drive arc = drive(world, 0.9 * StreetWorld::length_m, 0.0001, 0.003);
+  for (const std::uint64_t other : {77U, 78U, 79U}) {
+    const LoopCloser closer = closed(
+        LoopCloser(LoopClosingConfig{}, EarlierMap(StreetWorld(other).earlier_map(0.0, 300.0, 7))),
+        world, arc, 100);
+    EXPECT_TRUE(closer.anchors().empty()) << other;
+    EXPECT_TRUE(closer.corrected_poses().back().isApprox(arc.odometry.back(), 0.0)) << other;
+  }
 }
 
 // As a run that skips damaged scans numbers those that are left.

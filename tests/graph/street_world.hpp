@@ -5,6 +5,7 @@
 #include <random>
 #include <vector>
 
+#include "core/graph/earlier_map.hpp"
 #include "core/graph/submap.hpp"
 #include "core/lidar/labelled_scan.hpp"
 
@@ -62,6 +63,27 @@ class StreetWorld {
     }
     scan.motion.assign(scan.scan.size(), Motion::stationary);
     return scan;
+  }
+
+  /// A map of a stretch, as EarlierMap reads it, in the frame of the lidar at the street's start.
+  [[nodiscard]] EarlierMap::PointsNear earlier_map(double from_m, double to_m,
+                                                   std::uint64_t seed) const {
+    std::vector<LabelledPoint> points;
+    const Eigen::Isometry3d T_map_street = T_map_lidar_at(0.0, false).inverse();
+    for (double way = from_m; way < to_m; way += 10.0) {
+      const Eigen::Isometry3d T_street_lidar = T_map_lidar_at(way, false);
+      const Eigen::Isometry3f T = (T_map_street * T_street_lidar).cast<float>();
+      for (const Eigen::Vector3f& p : scan_at(T_street_lidar, seed++).scan.points_lidar)
+        points.push_back({T * p, SemanticClass::unlabeled});
+    }
+    return [points](const Eigen::Vector2d& position_map, double radius_m) {
+      std::vector<LabelledPoint> near;
+      for (const LabelledPoint& point : points) {
+        const Eigen::Vector2d across = point.position_map.head<2>().cast<double>() - position_map;
+        if (across.norm() <= radius_m) near.push_back(point);
+      }
+      return near;
+    };
   }
 
   /// A submap of a stretch with true poses; its key is in its middle (rounded down to 2 m).

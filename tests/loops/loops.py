@@ -26,8 +26,8 @@ DRIVES = [
 ]
 
 
-def call(command):
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
+def call(command, folder=None):
+    done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False, cwd=folder)
     if done.returncode != 0:
         sys.exit(f"{' '.join(map(str, command))}: exit code {done.returncode}\n{done.stderr.strip()[-2000:]}")
     return done.stdout

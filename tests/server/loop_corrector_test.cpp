@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <atomic>
+
 #include "tests/eventually.hpp"
 #include "tests/graph/street_world.hpp"
 
@@ -42,16 +45,20 @@ class Round {
   Eigen::Isometry3d T_odom_lidar_ = Eigen::Isometry3d::Identity();
 };
 
-std::uint64_t closed(const Statistics& statistics) {
+std::vector<LabelledPoint> nothing_seen(std::int64_t, const Eigen::Vector2d&, double) { return {}; }
+
+std::uint64_t counted(const Statistics& statistics, const std::string& counter) {
   dds::ServerStatus status;
   statistics.report_to(status);
-  return status.counter("loops_closed");
+  return status.counter(counter);
 }
+
+std::uint64_t closed(const Statistics& statistics) { return counted(statistics, "loops_closed"); }
 
 TEST(LoopCorrector, SaysBesideTheDriveWhatIsToBeMoved) {
   Statistics statistics;
-  LoopCorrector loops({}, true, statistics);
-  loops.begin_map(true);
+  LoopCorrector loops({}, true, statistics, nothing_seen);
+  loops.begin_map();
   Round round(loops);
   round.go(1.25 * StreetWorld::length_m);
   ASSERT_TRUE(test::eventually([&] {
@@ -64,8 +71,8 @@ TEST(LoopCorrector, SaysBesideTheDriveWhatIsToBeMoved) {
 
 TEST(LoopCorrector, TellsSubmapsOnlyAsTheMapHasThem) {
   Statistics statistics;
-  LoopCorrector loops({}, true, statistics);
-  loops.begin_map(true);
+  LoopCorrector loops({}, true, statistics, nothing_seen);
+  loops.begin_map();
   Round round(loops);
   round.takes = false;
   round.go(0.5 * StreetWorld::length_m);
@@ -85,31 +92,72 @@ TEST(LoopCorrector, TellsSubmapsOnlyAsTheMapHasThem) {
   EXPECT_GT(list->graph_revision, 0U);
   EXPECT_FALSE(list->loops.empty());
 
-  loops.begin_map(true);
+  // The robot is set elsewhere in the map: clients count on with the submaps that they know.
+  const SubmapList before = *list;
+  loops.go_on_in_map(std::numeric_limits<std::int64_t>::min());
+  Round elsewhere(loops);
+  elsewhere.go(0.5 * StreetWorld::length_m);
+  ASSERT_TRUE(test::eventually([&] { return (list = loops.take_submaps()).has_value(); }));
+  ASSERT_GT(list->submaps.size(), before.submaps.size());
+  EXPECT_EQ(list->graph_revision, before.graph_revision);
+  EXPECT_EQ(list->loops.size(), before.loops.size());
+  for (std::size_t i = 0; i < before.submaps.size(); ++i) {
+    EXPECT_EQ(list->submaps[i].stamp_ns, before.submaps[i].stamp_ns);
+    EXPECT_GT(list->submaps.back().way_m, before.submaps[i].way_m);
+  }
+
+  loops.begin_map();
   EXPECT_FALSE(loops.take_submaps()) << "of the map before";
 }
 
-TEST(LoopCorrector, SaysNothingOfAMapThatWasLoadedOrIsNoMore) {
+TEST(LoopCorrector, SaysNothingWhereLoopsStayOpenAndOfAMapThatIsNoMore) {
   Statistics statistics;
-  LoopCorrector loops({}, true, statistics);
-  loops.begin_map(false);
-  Round loaded(loops);
-  loaded.go(1.25 * StreetWorld::length_m);
-  EXPECT_TRUE(loaded.corrections.empty());
+  LoopCorrector loops({}, true, statistics, nothing_seen);
+  loops.end_map();
+  Round open(loops);
+  open.go(1.25 * StreetWorld::length_m);
+  EXPECT_TRUE(open.corrections.empty());
   EXPECT_EQ(closed(statistics), 0U);
-  loops.begin_map(true);
+  loops.begin_map();
   Round round(loops);
   round.takes = false;
   round.go(1.25 * StreetWorld::length_m);
   ASSERT_TRUE(test::eventually([&] { return closed(statistics) > 0; }));
-  loops.begin_map(true);
+  loops.begin_map();
   EXPECT_FALSE(loops.take());
+}
+
+TEST(LoopCorrector, InAMapThatWasThereMovesWhatIsSeenAfterItsLastScan) {
+  constexpr std::int64_t last_ns = 900'000'000;
+  std::atomic<bool> asked_otherwise = false;
+  const auto street = StreetWorld(11).earlier_map(-30.0, 60.0, 7);
+  const auto seen_until = [&](std::int64_t stamp_ns, const Eigen::Vector2d& at, double radius_m) {
+    if (stamp_ns != last_ns) asked_otherwise = true;
+    return street(at, radius_m);
+  };
+  Statistics statistics;
+  LoopCorrector loops({}, true, statistics, seen_until);
+  loops.begin_in_map(last_ns);
+  loops.add(GnssFix{});
+  Round round(loops);
+  round.go(1.2 * StreetWorld::length_m);
+  ASSERT_TRUE(test::eventually([&] {
+    if (auto correction = loops.take()) round.corrections.push_back(*std::move(correction));
+    // Where the round ends, not the little that is off when it leaves the map.
+    return std::ranges::any_of(round.corrections, [](const MapCorrection& correction) {
+      return correction.latest().translation().norm() > 0.5;
+    });
+  }));
+  EXPECT_FALSE(asked_otherwise);
+  EXPECT_EQ(round.corrections.back().at(last_ns), nullptr);
+  EXPECT_GE(counted(statistics, "submaps_in_earlier_map"), 4U);
+  EXPECT_EQ(counted(statistics, "gnss_fixes_unused"), 1U);
 }
 
 TEST(LoopCorrector, MovesNothingByTimesThatCameTwice) {
   Statistics statistics;
-  LoopCorrector loops({}, true, statistics);
-  loops.begin_map(true);
+  LoopCorrector loops({}, true, statistics, nothing_seen);
+  loops.begin_map();
   Round round(loops);
   round.takes = false;
   round.go(1.25 * StreetWorld::length_m);
@@ -123,8 +171,8 @@ TEST(LoopCorrector, MovesNothingByTimesThatCameTwice) {
 
 TEST(LoopCorrector, LeavesOutScansOfALiveSensorThatItCannotLookAt) {
   Statistics statistics;
-  LoopCorrector loops({}, false, statistics);
-  loops.begin_map(true);
+  LoopCorrector loops({}, false, statistics, nothing_seen);
+  loops.begin_map();
   const StreetWorld world(11);
   for (int k = 0; k < 200; ++k) {
     auto scan = std::make_shared<LabelledScan>();
