@@ -265,6 +265,7 @@ void Mapper::clear_scan_state() {
   clock_ = {};
   resumed_tiles_ = {};
   prior_map_added_at_map_.reset();
+  is_resumed_map_held_ = false;
   is_placed_ = false;
   scans_to_confirm_ = 0;
 }
@@ -296,7 +297,7 @@ void Mapper::confirm_relocation(OdometryResult& result) {
 }
 
 void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {
-  if (resumed_tiles_.empty() || static_map_.is_lent()) return;
+  if (resumed_tiles_.empty() || static_map_.is_lent() || is_resumed_map_held_) return;
   if (prior_map_added_at_map_ &&
       (position_map - *prior_map_added_at_map_).norm() < prior_map_update_distance_m)
     return;

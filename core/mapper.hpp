@@ -126,6 +126,10 @@ class Mapper {
   /// velocity is kept.
   void relocate(Odometry followed, int confirming_scans = 5);
 
+  /// Whether scans register against what a resumed map has near them only where that was added
+  /// already. Where odometry has drifted away from it, it would be torn between both.
+  void hold_resumed_map(bool is_held) { is_resumed_map_held_ = is_held; }
+
   /// What is stored of it, what of it is in memory, and what was removed from it.
   [[nodiscard]] StaticMap& static_map() { return static_map_.map(); }
 
@@ -197,6 +201,7 @@ class Mapper {
   /// Tiles of a resumed map, and where their points were last added to the odometry's local map.
   std::set<TileId> resumed_tiles_;
   std::optional<Eigen::Vector3d> prior_map_added_at_map_;
+  bool is_resumed_map_held_ = false;
   bool is_placed_ = false;
   /// In a row.
   int lost_scans_ = 0;

@@ -64,6 +64,8 @@ class LiveLoopCloser {
   [[nodiscard]] const std::vector<LoopClosure>& closures() const { return closer_.closures(); }
   /// Submaps that were found in the earlier map.
   [[nodiscard]] std::size_t anchors() const { return closer_.anchors().size(); }
+  /// As LoopCloser, by the corrections until now; not after the end.
+  [[nodiscard]] bool is_off_earlier_map() const { return closer_.is_off_earlier_map(); }
   /// What became of the fixes.
   [[nodiscard]] const GnssTrack& gnss() const { return gnss_; }
   /// By the corrections until now; nothing while it is not known.

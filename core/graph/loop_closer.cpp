@@ -148,7 +148,10 @@ void LoopCloser::find_in_earlier_map(std::size_t submap) {
   const Submap& own = submaps_[submap].submap;
   const auto found =
       earlier_->match(own, graph_.T_map_node[own.key_node], way_from_earlier_map_m(submap));
-  if (!found || !found->match.refusal.empty()) return;
+  if (!found) return;
+  // Beside the map, but not in it, there is little that could meet.
+  if (found->match.overlap >= config_.match.min_overlap) ++missed_submaps_;
+  if (!found->match.refusal.empty()) return;
   LoopClosure closure;
   closure.jump_m = found->match.jump_m;
   // Node 0 stays where it is, as the map does.
@@ -160,6 +163,12 @@ void LoopCloser::find_in_earlier_map(std::size_t submap) {
                   .T_from_to = graph_.T_map_node[0].inverse() * found->T_map_key,
                   .information = found->match.key_information,
                   .is_loop = true}});
+}
+
+bool LoopCloser::is_off_earlier_map() const {
+  if (!earlier_ || nodes_.empty() || missed_submaps_ >= config_.max_missed_submaps) return false;
+  const double found_m = anchors_.empty() ? 0.0 : submaps_[anchors_.back().submap].submap.way_m;
+  return nodes_.back().way_m - found_m > config_.max_way_off_m;
 }
 
 double LoopCloser::way_from_earlier_map_m(std::size_t submap) const {
@@ -313,6 +322,7 @@ void LoopCloser::accept(Candidate candidate) {
     closures_.push_back(std::move(candidate.closure));
   } else {
     anchors_.push_back({candidate.to, edge});
+    missed_submaps_ = 0;
     // Who comes back is found in the earlier map.
     submaps_[candidate.to] = PlacedSubmap(without_points(submaps_[candidate.to].submap));
   }

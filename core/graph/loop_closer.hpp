@@ -56,6 +56,9 @@ struct LoopClosingConfig {
   /// More than this share of them are not reflections: odometry is worse than it says.
   double max_doubted_share = 0.25;
   EarthAlignmentConfig earth;
+  /// See LoopCloser::is_off_earlier_map [m].
+  double max_way_off_m = 60.0;
+  std::size_t max_missed_submaps = 4;
 };
 
 /// A revisited place.
@@ -157,6 +160,10 @@ class LoopCloser {
     std::size_t edge = 0;
   };
   [[nodiscard]] const std::vector<Anchor>& anchors() const { return anchors_; }
+  /// Whether odometry may have drifted away from the earlier map: it is some way since it was found
+  /// there. Not once so many submaps since then had the map beside them and were not found: then
+  /// it may be that none will be.
+  [[nodiscard]] bool is_off_earlier_map() const;
 
  private:
   /// A closure between submaps, or of one with the earlier map, before it is believed.
@@ -220,6 +227,8 @@ class LoopCloser {
   std::vector<LoopClosure> closures_;
   std::vector<Joint> joints_;
   std::vector<Anchor> anchors_;
+  /// Since the last of them.
+  std::size_t missed_submaps_ = 0;
   std::vector<LoopClosure> refused_;
   std::vector<DeniedLoop> denied_;
   /// Those of the newest node may still be replaced by better ones.

@@ -65,6 +65,7 @@ void LoopCorrector::begin(const Run& run, SubmapList submaps) {
   submaps_.reset();
   told_ = earlier_submaps_ = std::move(submaps);
   map_revision_ = 0;
+  is_off_earlier_map_ = false;
   last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
   is_clock_set_back_ = false;
 }
@@ -111,6 +112,13 @@ std::optional<MapOnEarth> LoopCorrector::take_place() {
   return std::exchange(place_, std::nullopt)->place;
 }
 
+bool LoopCorrector::is_off_earlier_map() {
+  const std::scoped_lock lock(mutex_);
+  const auto& [map, is_off, graph_revision] = off_earlier_map_;
+  if (map == run_.map && graph_revision == map_revision_) is_off_earlier_map_ = is_off;
+  return is_off_earlier_map_;
+}
+
 std::optional<SubmapList> LoopCorrector::take_submaps() {
   const std::scoped_lock lock(mutex_);
   if (!submaps_ || submaps_->map != run_.map || submaps_->list.graph_revision != map_revision_)
@@ -154,6 +162,7 @@ void LoopCorrector::look_at(const ScanOfMap& scan) {
   hand_on_submaps(map);
   const std::scoped_lock lock(mutex_);
   if (const auto place = closer_->on_earth()) place_ = Place{map, *place, closer_->corrections()};
+  off_earlier_map_ = {map, closer_->is_off_earlier_map(), closer_->corrections()};
   if (!correction) return;
   // Of two that were not taken yet the second is of the map after the first.
   if (found_ && found_->map == map) correction = combined(found_->correction, *correction);

@@ -66,6 +66,9 @@ class LoopCorrector {
   /// Where the map lies, when that was found out or found out better; once, and only as the map is:
   /// not between a correction and its report.
   [[nodiscard]] std::optional<MapOnEarth> take_place();
+  /// Whether odometry may have drifted away from what was there before the run: as LoopCloser, and
+  /// only as the map is.
+  [[nodiscard]] bool is_off_earlier_map();
   /// The submaps, by poses of the lidar, where there is another one or they were moved; once, and
   /// only as the map has them: not between a correction and its report.
   [[nodiscard]] std::optional<SubmapList> take_submaps();
@@ -117,6 +120,7 @@ class LoopCorrector {
   /// Of the graph, as the correction that was taken last makes the map, and as the map is.
   std::uint64_t taken_revision_ = 0;
   std::uint64_t map_revision_ = 0;
+  bool is_off_earlier_map_ = false;
 
   std::mutex mutex_;
   struct Found {
@@ -136,6 +140,12 @@ class LoopCorrector {
     SubmapList list;
   };
   std::optional<Submaps> submaps_;
+  struct OffEarlierMap {
+    std::uint64_t map = 0;
+    bool is_off = false;
+    std::uint64_t graph_revision = 0;
+  };
+  OffEarlierMap off_earlier_map_;
   std::vector<GnssFix> fixes_;
 
   // Of the worker.

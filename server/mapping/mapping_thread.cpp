@@ -373,6 +373,7 @@ void MappingThread::map(QueuedScan queued) {
   // that. Now no scan waits for it: none is mapped until the mapper believes the clock.
   if (corrector_.is_running() && steps_back_ >= steps_of_set_clock) end_correction();
   feed_imu(queued.scan);
+  if (outputs_.loops != nullptr) mapper_.hold_resumed_map(outputs_.loops->is_off_earlier_map());
   auto mapped = mapper_.process(std::move(queued.scan), prior_for(stamp_ns));
   if (!mapped) return drop(mapper_.last_rejection());
   steps_back_ = 0;

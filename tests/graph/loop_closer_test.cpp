@@ -142,6 +142,28 @@ TEST(LoopCloser, ADriveComesBackToAnEarlierMapWhereItLeftIt) {
                                        (closer.submaps().size() - 3) / closer.submaps().size());
 }
 
+TEST(LoopCloser, TellsWhileOdometryMayHaveLeftTheEarlierMap) {
+  const StreetWorld world(11);
+  const Drive round = drive(world, 1.2 * StreetWorld::length_m, 0.0001, 0.003);
+  const auto off_at = [&](EarlierMap earlier) {
+    LoopCloser closer(LoopClosingConfig{}, std::move(earlier));
+    const Eigen::Isometry3d T_map_first = world.T_map_lidar_at(0.0, false);
+    std::vector<bool> off;
+    for (std::size_t i = 0; i < round.truth.size(); ++i) {
+      closer.add(world.scan_at(T_map_first * round.truth[i], 100 + i), round.odometry[i], true);
+      off.push_back(closer.is_off_earlier_map());
+    }
+    return off;
+  };
+  const auto off = off_at(EarlierMap(world.earlier_map(-30.0, 60.0, 7)));
+  EXPECT_FALSE(off[90]);
+  EXPECT_TRUE(off[200] && off[280]);
+  EXPECT_FALSE(off.back()) << "it came back";
+  const auto elsewhere = off_at(EarlierMap(StreetWorld(77).earlier_map(0.0, 300.0, 7)));
+  EXPECT_TRUE(elsewhere[80]);
+  EXPECT_FALSE(elsewhere[150]) << "no more hope";
+}
+
 TEST(LoopCloser, OutsideOfAnEarlierMapLoopsAreClosedAsEver) {
   const StreetWorld world(11);
   const Drive two_rounds = drive(world, 1.5 * StreetWorld::length_m, 0.0001, 0.003);
