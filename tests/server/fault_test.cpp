@@ -40,8 +40,9 @@ void PrintTo(const Fault& fault, std::ostream* out) { *out << fault.name; }
 /// The environment of the servers that are started in its life.
 class PreloadedFaults {
  public:
-  explicit PreloadedFaults(const fs::path& folder) : control_(folder / "fault") {
-    setenv("LD_PRELOAD", STILLMAP_DISK_FAULTS, 1);
+  explicit PreloadedFaults(const fs::path& folder, const char* library = STILLMAP_DISK_FAULTS)
+      : control_(folder / "fault") {
+    setenv("LD_PRELOAD", library, 1);
     setenv("STILLMAP_FAULT", control_.c_str(), 1);
     setenv("STILLMAP_FAULT_FOLDER", folder.c_str(), 1);
   }
@@ -216,6 +217,26 @@ TEST(FullDisk, IsToldAndTheMapStopsGrowingUntilThereIsRoom) {
   EXPECT_LE(client.status().counter("scans_not_in_map"), still_out + 3);
   server.send(SIGTERM);
   EXPECT_EQ(server.wait_for_exit(patience), 0);
+}
+
+TEST(ThreadFault, EndsTheServerWithACodeThatRestartsItAndTheMapSaved) {
+  const ServiceSetup setup("every");
+  const PreloadedFaults faults(setup.map_file().parent_path(), STILLMAP_THREAD_FAULTS);
+  ServerProcess server(setup.server_arguments());
+  Client client(setup.client());
+  client.wait_for_server(patience);
+  ScanPublisher publisher(setup.publisher(true));
+  constexpr int scans = 12;
+  drive(publisher, 0, scans);
+  ASSERT_TRUE(wait_for_scans(client, scans));
+  EXPECT_TRUE(open_map_file(setup.map_file())->load().trajectory.empty()) << "saved once an hour";
+  faults.set("throw");
+  // The tiles of the next scan are hashed when they are published.
+  static_cast<void>(publisher.publish(room_scan(scans), {}, std::chrono::seconds(1)));
+  constexpr int thread_failed = 3;
+  EXPECT_EQ(server.wait_for_exit(patience), thread_failed);
+  EXPECT_GE(open_map_file(setup.map_file())->load().trajectory.size(),
+            static_cast<std::size_t>(scans));
 }
 
 INSTANTIATE_TEST_SUITE_P(
