@@ -142,6 +142,7 @@ void Mapper::reclaim_static_map(const MapCorrection* correction) {
   T_map_odom_ = correction->latest() * T_map_odom_;
   // What was stored before lies elsewhere in the odometry's frame now.
   prior_map_added_at_map_.reset();
+  tiles_reloaded_at_map_.reset();
 }
 
 std::optional<InertialMotion> Mapper::inertial_motion(std::int64_t stamp_ns,
@@ -265,6 +266,7 @@ void Mapper::clear_scan_state() {
   clock_ = {};
   resumed_tiles_ = {};
   prior_map_added_at_map_.reset();
+  tiles_reloaded_at_map_.reset();
   is_resumed_map_held_ = false;
   is_placed_ = false;
   scans_to_confirm_ = 0;
@@ -282,6 +284,8 @@ void Mapper::relocate(Odometry followed, int confirming_scans) {
   // Of this run, too.
   resumed_tiles_ = tile_ids(*static_map_.map().view());
   prior_map_added_at_map_.reset();
+  tiles_reloaded_at_map_.reset();
+  is_resumed_map_held_ = false;
 }
 
 void Mapper::confirm_relocation(OdometryResult& result) {
@@ -297,13 +301,17 @@ void Mapper::confirm_relocation(OdometryResult& result) {
 }
 
 void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {
-  if (resumed_tiles_.empty() || static_map_.is_lent() || is_resumed_map_held_) return;
-  if (prior_map_added_at_map_ &&
-      (position_map - *prior_map_added_at_map_).norm() < prior_map_update_distance_m)
-    return;
-  prior_map_added_at_map_ = position_map;
+  if (resumed_tiles_.empty() || static_map_.is_lent()) return;
+  const auto is_near = [&](const std::optional<Eigen::Vector3d>& place_map) {
+    return place_map && (position_map - *place_map).norm() < prior_map_update_distance_m;
+  };
   StaticMap& map = static_map_.map();
-  map.reload_near(position_map);
+  if (!is_near(tiles_reloaded_at_map_)) {
+    tiles_reloaded_at_map_ = position_map;
+    map.reload_near(position_map);
+  }
+  if (is_resumed_map_held_ || is_near(prior_map_added_at_map_)) return;
+  prior_map_added_at_map_ = position_map;
   const auto view = map.view();
   const Eigen::Isometry3d T_odom_map = T_map_odom_.inverse();
   std::vector<LabelledPoint> points_odom;

@@ -198,8 +198,10 @@ class Mapper {
   /// Corrections of the map so far.
   Eigen::Isometry3d T_map_odom_ = Eigen::Isometry3d::Identity();
   LendableMap static_map_;
-  /// Tiles of a resumed map, and where their points were last added to the odometry's local map.
+  /// Tiles of a resumed map, where those near the lidar were last reloaded, and where their points
+  /// were last added to the odometry's local map.
   std::set<TileId> resumed_tiles_;
+  std::optional<Eigen::Vector3d> tiles_reloaded_at_map_;
   std::optional<Eigen::Vector3d> prior_map_added_at_map_;
   bool is_resumed_map_held_ = false;
   bool is_placed_ = false;

@@ -28,9 +28,17 @@ std::optional<MapCorrection> LiveLoopCloser::add(const LabelledScan& scan,
   if (closer_.submaps().size() == known_submaps_) return std::nullopt;
   known_submaps_ = closer_.submaps().size();
   auto found = correction();
-  if (closer_.submap_bytes() > config_.max_submap_bytes)
+  if (closer_.submap_bytes() > config_.max_submap_bytes) {
     end("what is kept of the drive to find loops by has reached its limit");
+    has_dropped_submaps_ = true;
+  }
   return found;
+}
+
+bool LiveLoopCloser::is_full() const {
+  if (has_dropped_submaps_) return true;
+  return end_reason_.empty() && is_in_earlier_map_ && closer_.nodes().size() > config_.max_nodes &&
+         closer_.is_newest_submap_joined();
 }
 
 std::optional<MapOnEarth> LiveLoopCloser::on_earth() const {

@@ -25,8 +25,11 @@ struct LiveLoopConfig {
   /// [m, rad].
   double scan_spacing_m = 0.1;
   double scan_turn_rad = 0.02;
-  /// Of all submaps: beyond it loops stay open.
+  /// Of all submaps.
   std::size_t max_submap_bytes = std::size_t{1} << 30;
+  /// Of the graph of a run in an earlier map: each place that is found again costs a solution of
+  /// all.
+  std::size_t max_nodes = 5000;
 };
 
 /// Where a map lies on the earth.
@@ -47,7 +50,8 @@ class LiveLoopCloser {
       : config_(config),
         closer_(config.closing, std::move(earlier)),
         gnss_(config.gnss),
-        last_stamp_ns_(seen_until_ns) {}
+        last_stamp_ns_(seen_until_ns),
+        is_in_earlier_map_(true) {}
 
   /// A fix, before or after the scans around it. Returns why it is not used; empty where it is.
   [[nodiscard]] std::string add(const GnssFix& fix) { return gnss_.add(fix); }
@@ -66,6 +70,10 @@ class LiveLoopCloser {
   [[nodiscard]] std::size_t anchors() const { return closer_.anchors().size(); }
   /// As LoopCloser, by the corrections until now; not after the end.
   [[nodiscard]] bool is_off_earlier_map() const { return closer_.is_off_earlier_map(); }
+  /// Whether what is kept of the drive has reached its limit: then the map as it is shall be the
+  /// earlier one of the rest. Submaps are dropped at once; a graph that is too large waits until
+  /// its newest submap lies where it belongs.
+  [[nodiscard]] bool is_full() const;
   /// What became of the fixes.
   [[nodiscard]] const GnssTrack& gnss() const { return gnss_; }
   /// By the corrections until now; nothing while it is not known.
@@ -106,6 +114,8 @@ class LiveLoopCloser {
   std::size_t known_submaps_ = 0;
   std::uint64_t corrections_ = 0;
   std::string end_reason_;
+  bool is_in_earlier_map_ = false;
+  bool has_dropped_submaps_ = false;
   SubmapList last_submaps_;
 };
 

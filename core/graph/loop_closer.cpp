@@ -146,6 +146,8 @@ void LoopCloser::close_submap() {
 void LoopCloser::find_in_earlier_map(std::size_t submap) {
   if (!earlier_) return;
   const Submap& own = submaps_[submap].submap;
+  // Node 0 is held anyway.
+  if (own.key_node == 0) return;
   const auto found =
       earlier_->match(own, graph_.T_map_node[own.key_node], way_from_earlier_map_m(submap));
   if (!found) return;
@@ -322,11 +324,19 @@ void LoopCloser::accept(Candidate candidate) {
     closures_.push_back(std::move(candidate.closure));
   } else {
     anchors_.push_back({candidate.to, edge});
-    missed_submaps_ = 0;
-    // Who comes back is found in the earlier map.
-    submaps_[candidate.to] = PlacedSubmap(without_points(submaps_[candidate.to].submap));
   }
   solve();
+  if (candidate.from || anchors_.empty() || anchors_.back().submap != candidate.to) return;
+  missed_submaps_ = 0;
+  // Who comes back is found in the earlier map.
+  submaps_[candidate.to] = PlacedSubmap(without_points(submaps_[candidate.to].submap));
+}
+
+bool LoopCloser::is_newest_submap_joined() const {
+  if (submaps_.empty()) return false;
+  const std::size_t newest = submaps_.size() - 1;
+  return (!anchors_.empty() && anchors_.back().submap == newest) ||
+         (!joints_.empty() && joints_.back().to == newest);
 }
 
 void LoopCloser::refuse(Candidate candidate, const char* why) {

@@ -164,6 +164,8 @@ class LoopCloser {
   /// there. Not once so many submaps since then had the map beside them and were not found: then
   /// it may be that none will be.
   [[nodiscard]] bool is_off_earlier_map() const;
+  /// Whether the newest submap lies where its place was seen before.
+  [[nodiscard]] bool is_newest_submap_joined() const;
 
  private:
   /// A closure between submaps, or of one with the earlier map, before it is believed.

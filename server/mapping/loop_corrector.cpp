@@ -52,7 +52,27 @@ LoopCorrector::LoopCorrector(const LiveLoopConfig& config, bool is_lossless, Sta
           .on_failure = [this] { failed_.request_stop(); }});
 }
 
-void LoopCorrector::begin(const Run& run, SubmapList submaps) {
+void LoopCorrector::begin_another(Run run) {
+  run.map = ++maps_;
+  T_map_odom_.setIdentity();
+  last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
+  is_clock_set_back_ = false;
+  begin(run, {});
+}
+
+void LoopCorrector::go_on_in_map(std::int64_t seen_until_ns) {
+  T_map_odom_.setIdentity();
+  settle(seen_until_ns);
+}
+
+void LoopCorrector::settle(std::int64_t seen_until_ns) {
+  // Of before and after that, the same stamps would be.
+  if (is_clock_set_back_) return end_map();
+  begin({.map = ++maps_, .earlier_until_ns = seen_until_ns, .T_map_odom = T_map_odom_},
+        std::move(told_));
+}
+
+void LoopCorrector::begin(Run run, SubmapList submaps) {
   run_ = run;
   // The worker frees what it kept of the last one.
   scans_.edit([](std::deque<ScanOfMap>& scans) {
@@ -63,11 +83,10 @@ void LoopCorrector::begin(const Run& run, SubmapList submaps) {
   found_.reset();
   place_.reset();
   submaps_.reset();
+  full_.reset();
   told_ = earlier_submaps_ = std::move(submaps);
   map_revision_ = 0;
   is_off_earlier_map_ = false;
-  last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
-  is_clock_set_back_ = false;
 }
 
 void LoopCorrector::add(const GnssFix& fix) {
@@ -83,11 +102,11 @@ void LoopCorrector::add(const GnssFix& fix) {
 void LoopCorrector::add(std::shared_ptr<const LabelledScan> labelled,
                         const Eigen::Isometry3d& T_odom_lidar,
                         const Eigen::Isometry3d& T_base_lidar, bool is_confirmed) {
-  if (run_.map == 0) return;
   const std::int64_t stamp_ns = labelled->scan.stamp_ns;
   if (stamp_ns <= std::exchange(last_stamp_ns_, stamp_ns)) is_clock_set_back_ = true;
-  ScanOfMap scan{run_, std::move(labelled), T_odom_lidar, T_base_lidar.inverse() * antenna_base_,
-                 is_confirmed};
+  if (run_.map == 0) return;
+  ScanOfMap scan{run_, std::move(labelled), run_.T_map_odom * T_odom_lidar,
+                 T_base_lidar.inverse() * antenna_base_, is_confirmed};
   if (is_lossless_) {
     // The worker outlives mapping: there is nothing else to stop for.
     static_cast<void>(scans_.push_blocking(std::move(scan), failed_.get_token()));
@@ -114,9 +133,17 @@ std::optional<MapOnEarth> LoopCorrector::take_place() {
 
 bool LoopCorrector::is_off_earlier_map() {
   const std::scoped_lock lock(mutex_);
+  if (is_clock_set_back_) return false;
   const auto& [map, is_off, graph_revision] = off_earlier_map_;
   if (map == run_.map && graph_revision == map_revision_) is_off_earlier_map_ = is_off;
   return is_off_earlier_map_;
+}
+
+bool LoopCorrector::take_full() {
+  const std::scoped_lock lock(mutex_);
+  if (!full_ || full_->map != run_.map || full_->graph_revision != map_revision_) return false;
+  full_.reset();
+  return true;
 }
 
 std::optional<SubmapList> LoopCorrector::take_submaps() {
@@ -130,6 +157,7 @@ std::optional<SubmapList> LoopCorrector::take_submaps() {
 void LoopCorrector::report(const MapCorrection& correction, const CorrectedMap& corrected,
                            double ms) {
   map_revision_ = taken_revision_;
+  T_map_odom_ = correction.latest() * T_map_odom_;
   statistics_.count("map_corrections");
   statistics_.add_latency("correction", ms);
   spdlog::info(
@@ -155,7 +183,7 @@ void LoopCorrector::look_at(const ScanOfMap& scan) {
   auto correction =
       closer_->add(*scan.labelled, scan.T_odom_lidar, scan.is_confirmed, scan.antenna_lidar);
   statistics_.add_latency("loops", milliseconds(std::chrono::steady_clock::now() - began));
-  if (!had_ended && !closer_->end_reason().empty())
+  if (!had_ended && !closer_->end_reason().empty() && !closer_->is_full())
     spdlog::warn("loops stay open from here on: {}", closer_->end_reason());
   report_fixes();
   report_closures();
@@ -163,6 +191,7 @@ void LoopCorrector::look_at(const ScanOfMap& scan) {
   const std::scoped_lock lock(mutex_);
   if (const auto place = closer_->on_earth()) place_ = Place{map, *place, closer_->corrections()};
   off_earlier_map_ = {map, closer_->is_off_earlier_map(), closer_->corrections()};
+  if (closer_->is_full()) full_ = {map, closer_->corrections()};
   if (!correction) return;
   // Of two that were not taken yet the second is of the map after the first.
   if (found_ && found_->map == map) correction = combined(found_->correction, *correction);

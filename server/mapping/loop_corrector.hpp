@@ -42,17 +42,21 @@ class LoopCorrector {
   void add(const GnssFix& fix);
 
   /// Another map began, which is empty.
-  void begin_map() { begin({.map = ++maps_, .earlier_until_ns = std::nullopt}); }
+  void begin_map() { begin_another({}); }
   /// A map was loaded, of which everything was seen until this stamp, and scans come after it. That
   /// stays where it is, and what is seen from now on is moved to where it fits to it. Fixes are not
   /// used.
   void begin_in_map(std::int64_t seen_until_ns) {
-    begin({.map = ++maps_, .earlier_until_ns = seen_until_ns});
+    begin_another({.earlier_until_ns = seen_until_ns});
   }
-  /// The same of the running map: the robot was set elsewhere in it. Submaps keep their numbers.
-  void go_on_in_map(std::int64_t seen_until_ns) {
-    begin({.map = ++maps_, .earlier_until_ns = seen_until_ns}, std::move(told_));
-  }
+  /// A map was loaded, of which nobody knows until when it was seen: loops stay open in it.
+  void begin_open() { begin({}, {}); }
+  /// The same as begin_in_map of the running map, in which the robot was set elsewhere: odometry's
+  /// frame is the map's again. Submaps keep their numbers. After a clock that was set back loops
+  /// stay open.
+  void go_on_in_map(std::int64_t seen_until_ns);
+  /// The same where the robot is as it was: what take_full() asks for.
+  void settle(std::int64_t seen_until_ns);
   /// From now on loops stay open.
   void end_map() { begin({}, std::move(told_)); }
   /// A scan of the map.
@@ -69,6 +73,9 @@ class LoopCorrector {
   /// Whether odometry may have drifted away from what was there before the run: as LoopCloser, and
   /// only as the map is.
   [[nodiscard]] bool is_off_earlier_map();
+  /// Whether what is kept to find loops by has reached its limit, so that the map as it is shall be
+  /// the earlier one of the rest: once, and only as the map is.
+  [[nodiscard]] bool take_full();
   /// The submaps, by poses of the lidar, where there is another one or they were moved; once, and
   /// only as the map has them: not between a correction and its report.
   [[nodiscard]] std::optional<SubmapList> take_submaps();
@@ -82,6 +89,8 @@ class LoopCorrector {
     std::uint64_t map = 0;
     /// Of what was there before it.
     std::optional<std::int64_t> earlier_until_ns;
+    /// When it began.
+    Eigen::Isometry3d T_map_odom = Eigen::Isometry3d::Identity();
   };
   struct ScanOfMap {
     Run run;
@@ -93,7 +102,9 @@ class LoopCorrector {
   };
 
   /// `submaps`: those of the map that were told until now.
-  void begin(const Run& run, SubmapList submaps = {});
+  void begin(Run run, SubmapList submaps);
+  /// Of a map whose clock is nobody's until now.
+  void begin_another(Run run);
 
   // Of the worker.
   void look_at(const ScanOfMap& scan);
@@ -111,6 +122,8 @@ class LoopCorrector {
   Eigen::Vector3d antenna_base_;
   Run run_;
   std::uint64_t maps_ = 0;
+  /// By what was corrected since the map began, or odometry's frame was the map's.
+  Eigen::Isometry3d T_map_odom_ = Eigen::Isometry3d::Identity();
   /// Of the map's scans: corrections tell them apart by their stamps.
   std::int64_t last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
   bool is_clock_set_back_ = false;
@@ -146,6 +159,11 @@ class LoopCorrector {
     std::uint64_t graph_revision = 0;
   };
   OffEarlierMap off_earlier_map_;
+  struct Full {
+    std::uint64_t map = 0;
+    std::uint64_t graph_revision = 0;
+  };
+  std::optional<Full> full_;
   std::vector<GnssFix> fixes_;
 
   // Of the worker.

@@ -147,6 +147,8 @@ void MappingThread::begin_map(SharedTrajectory trajectory) {
   latest_map_.begin(mapper_.map_snapshot(), std::move(trajectory));
   if (odom_) odom_->begin_map();
   if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
+  is_past_unknown_ = latest_map_.trajectory().empty() && !latest_map_.view()->tiles.empty();
+  if (is_past_unknown_) spdlog::warn("loops stay open: the map that was loaded has no path");
   begin_loops(&LoopCorrector::begin_in_map);
   if (outputs_.earth != nullptr) outputs_.earth->forget();
   publish_submaps({});
@@ -157,10 +159,20 @@ void MappingThread::begin_loops(void (LoopCorrector::*in_map)(std::int64_t seen_
   if (outputs_.loops == nullptr) return;
   if (latest_map_.view()->tiles.empty()) return outputs_.loops->begin_map();
   const SharedTrajectory path = latest_map_.trajectory();
-  // Without a path nothing tells what was seen before from what is seen from now on.
-  if (path.empty()) return outputs_.loops->end_map();
-  const auto newest = std::ranges::max_element(path, {}, &StampedPose::stamp_ns);
-  (outputs_.loops->*in_map)((*newest).stamp_ns);
+  // Nothing tells what was seen before from what is seen from now on.
+  if (is_past_unknown_ || path.empty()) return outputs_.loops->begin_open();
+  std::int64_t newest_ns = path.back().stamp_ns;
+  for (const StampedPose& pose : path) newest_ns = std::max(newest_ns, pose.stamp_ns);
+  // A clock that was set back took poses away, but no voxels.
+  for (const auto& tile : latest_map_.view()->tiles)
+    if (!tile->voxels.empty()) newest_ns = std::max(newest_ns, tile->voxels.stamps_ns().back());
+  (outputs_.loops->*in_map)(newest_ns);
+}
+
+void MappingThread::set_elsewhere() {
+  if (outputs_.loops == nullptr) return;
+  if (const auto submaps = outputs_.loops->take_submaps()) publish_submaps(*submaps);
+  begin_loops(&LoopCorrector::go_on_in_map);
 }
 
 void MappingThread::close_loops() {
@@ -168,7 +180,8 @@ void MappingThread::close_loops() {
   if (const auto place = outputs_.loops->take_place(); place && outputs_.earth != nullptr)
     outputs_.earth->publish(latest_map_.newest_pose().stamp_ns, *place);
   if (const auto submaps = outputs_.loops->take_submaps()) publish_submaps(*submaps);
-  if (auto correction = outputs_.loops->take()) corrector_.begin(*std::move(correction));
+  if (auto correction = outputs_.loops->take()) return corrector_.begin(*std::move(correction));
+  if (outputs_.loops->take_full()) begin_loops(&LoopCorrector::settle);
 }
 
 void MappingThread::publish_submaps(const SubmapList& submaps) {
@@ -439,7 +452,7 @@ std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns)
     mapper_.hand_out_scans(false);
   } else if (outputs_.place_finder != nullptr) {
     if (const auto T_map_lidar = outputs_.place_finder->relocate(mapper_, stamp_ns)) {
-      begin_loops(&LoopCorrector::go_on_in_map);
+      set_elsewhere();
       return T_map_lidar;
     }
   }

@@ -121,6 +121,8 @@ class MappingThread : public CheckpointSource {
   /// Loops are looked for in a map that begins empty, or by `in_map` in what is seen from now on of
   /// one that is there.
   void begin_loops(void (LoopCorrector::*in_map)(std::int64_t seen_until_ns));
+  /// The robot was set elsewhere in the map.
+  void set_elsewhere();
   /// Has the map moved where a place was seen again, beside mapping.
   void close_loops();
   /// Those of the running map, by poses of the lidar.
@@ -168,6 +170,8 @@ class MappingThread : public CheckpointSource {
   /// Limit of the memory that the static map takes.
   std::size_t map_limit_bytes_;
   StaticMapConfig map_config_;
+  /// A map was loaded that has no path.
+  bool is_past_unknown_ = false;
   bool is_map_frozen_ = false;
   double sensor_period_s_;
   std::chrono::duration<double> publish_period_;

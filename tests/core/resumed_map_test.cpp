@@ -9,6 +9,7 @@
 #include "core/mapper.hpp"
 #include "core/segmentation/segmenter.hpp"
 #include "tests/odometry/poses.hpp"
+#include "tests/server/room_scans.hpp"
 
 namespace stillmap {
 namespace {
@@ -62,6 +63,33 @@ TEST(ResumedMap, ScansThatAreNotInItFindTheirPlace) {
     }
   }
   EXPECT_GE(found, tried * 9 / 10) << "of " << tried;
+}
+
+/// A hall by 16 rings.
+MapperConfig in_hall() {
+  MapperConfig config;
+  config.sensor = vlp_16();
+  return config;
+}
+
+// A robot that was off the map it had loaded, was lost, and is found in it.
+TEST(ResumedMap, ARelocatedLidarIsLookedForInItAlsoWhereItWasHeldBack) {
+  Mapper maker(in_hall(), std::make_unique<NullSegmenter>());
+  Eigen::Isometry3d T_map_hall = Eigen::Isometry3d::Identity();
+  for (int k = 0; k < 20; ++k) {
+    const auto mapped = maker.process(test::room_scan(k)).value();
+    T_map_hall = mapped.odometry.T_map_lidar * test::room_pose(k).T_map_lidar.inverse();
+  }
+  Mapper mapper(in_hall(), std::make_unique<NullSegmenter>());
+  mapper.resume(*maker.map_snapshot());
+  ASSERT_TRUE(mapper.process(test::room_scan(20), T_map_hall * test::room_pose(20).T_map_lidar));
+  mapper.hold_resumed_map(true);
+  mapper.relocate(Odometry(in_hall().odometry, vlp_16()));
+  const Eigen::Isometry3d T_map_lidar = T_map_hall * test::room_pose(60).T_map_lidar;
+  const auto found =
+      mapper.process(test::room_scan(60), T_map_lidar * test::level_pose(0.8, 0.5, 0.03));
+  ASSERT_TRUE(found);
+  EXPECT_LT(test::translation_error(found->odometry.T_map_lidar, T_map_lidar), 0.15);
 }
 
 }  // namespace

@@ -164,6 +164,17 @@ TEST(LoopCloser, TellsWhileOdometryMayHaveLeftTheEarlierMap) {
   EXPECT_FALSE(elsewhere[150]) << "no more hope";
 }
 
+TEST(LoopCloser, AFirstSubmapOfOneOrTwoNodesIsHeldByTheFirstPoseAlone) {
+  const StreetWorld world(11);
+  for (const double way_m : {1.0, 2.0, 3.0}) {
+    const LoopCloser closer =
+        closed(LoopCloser(LoopClosingConfig{}, EarlierMap(world.earlier_map(-30.0, 60.0, 7))),
+               world, drive(world, way_m, 0.0, 0.0), 100);
+    EXPECT_EQ(closer.submaps().size(), 1U);
+    EXPECT_LE(closer.anchors().size(), 1U);
+  }
+}
+
 TEST(LoopCloser, OutsideOfAnEarlierMapLoopsAreClosedAsEver) {
   const StreetWorld world(11);
   const Drive two_rounds = drive(world, 1.5 * StreetWorld::length_m, 0.0001, 0.003);

@@ -26,7 +26,7 @@ class Round {
       T_last_ = T_map_lidar;
       auto scan = std::make_shared<LabelledScan>(
           world_.scan_at(T_map_lidar, static_cast<std::uint64_t>(way_m_)));
-      scan->scan.stamp_ns = static_cast<std::int64_t>(1e8 * (10.0 + way_m_));
+      scan->scan.stamp_ns = static_cast<std::int64_t>(1e8 * (10.0 + way_m_)) + clock_offset_ns;
       loops_.add(scan, T_odom_lidar_, Eigen::Isometry3d::Identity(), true);
       if (!takes) continue;
       if (auto correction = loops_.take()) corrections.push_back(*std::move(correction));
@@ -35,6 +35,7 @@ class Round {
   }
 
   bool takes = true;
+  std::int64_t clock_offset_ns = 0;
   std::vector<MapCorrection> corrections;
 
  private:
@@ -96,6 +97,7 @@ TEST(LoopCorrector, TellsSubmapsOnlyAsTheMapHasThem) {
   const SubmapList before = *list;
   loops.go_on_in_map(std::numeric_limits<std::int64_t>::min());
   Round elsewhere(loops);
+  elsewhere.clock_offset_ns = 1'000'000'000'000;
   elsewhere.go(0.5 * StreetWorld::length_m);
   ASSERT_TRUE(test::eventually([&] { return (list = loops.take_submaps()).has_value(); }));
   ASSERT_GT(list->submaps.size(), before.submaps.size());
@@ -154,6 +156,52 @@ TEST(LoopCorrector, InAMapThatWasThereMovesWhatIsSeenAfterItsLastScan) {
   EXPECT_EQ(counted(statistics, "gnss_fixes_unused"), 1U);
 }
 
+// A robot that drives for days in a map that was loaded.
+TEST(LoopCorrector, TakesTheMapAsItIsForTheEarlierOneWhereItsGraphGrowsTooLarge) {
+  const auto street = StreetWorld(11).earlier_map(-30.0, 60.0, 7);
+  std::atomic<std::int64_t> asked_ns = 0;
+  const auto seen_until = [&](std::int64_t stamp_ns, const Eigen::Vector2d& at, double radius_m) {
+    asked_ns = stamp_ns;
+    return street(at, radius_m);
+  };
+  LiveLoopConfig small;
+  small.max_nodes = 300;
+  Statistics statistics;
+  LoopCorrector loops(small, true, statistics, seen_until);
+  loops.begin_in_map(900'000'000);
+  Round round(loops);
+  const auto carry_out = [&] {
+    while (auto correction = loops.take()) {
+      loops.report(*correction, {}, 1.0);
+      round.corrections.push_back(*std::move(correction));
+    }
+  };
+  round.takes = false;
+  round.go(0.95 * StreetWorld::length_m);
+  carry_out();
+  EXPECT_FALSE(loops.take_full()) << "it is off the map";
+  EXPECT_TRUE(loops.is_off_earlier_map());
+  round.go(1.15 * StreetWorld::length_m);
+  ASSERT_TRUE(test::eventually([&] {
+    carry_out();
+    return loops.take_full();
+  }));
+  EXPECT_FALSE(loops.is_off_earlier_map());
+  const std::size_t corrections = round.corrections.size();
+  ASSERT_GT(corrections, 0U);
+
+  constexpr std::int64_t now_ns = 40'000'000'000;
+  loops.settle(now_ns);
+  round.clock_offset_ns = now_ns;
+  round.go(1.2 * StreetWorld::length_m + 30.0);
+  ASSERT_TRUE(test::eventually([&] { return asked_ns == now_ns; }));
+  carry_out();
+  // It goes on where it was, not where odometry has it.
+  for (std::size_t i = corrections; i < round.corrections.size(); ++i)
+    EXPECT_LT(round.corrections[i].latest().translation().norm(), 0.5);
+  EXPECT_FALSE(loops.take_full()) << "its graph is a small one again";
+}
+
 TEST(LoopCorrector, MovesNothingByTimesThatCameTwice) {
   Statistics statistics;
   LoopCorrector loops({}, true, statistics, nothing_seen);
@@ -166,6 +214,12 @@ TEST(LoopCorrector, MovesNothingByTimesThatCameTwice) {
   again->scan.stamp_ns = 1;
   loops.add(again, Eigen::Isometry3d::Identity(), Eigen::Isometry3d::Identity(), true);
   ASSERT_TRUE(test::eventually([&] { return loops.waiting() == 0; }));
+  EXPECT_FALSE(loops.take());
+  // Nor where the robot is set elsewhere after that: what was seen then has stamps of what comes.
+  loops.go_on_in_map(1);
+  Round elsewhere(loops);
+  elsewhere.takes = false;
+  elsewhere.go(1.25 * StreetWorld::length_m);
   EXPECT_FALSE(loops.take());
 }
 

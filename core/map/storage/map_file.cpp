@@ -80,8 +80,9 @@ class SqliteTileStore : public TileStore {
   }
 
  private:
-  /// The mapper, the publisher of tiles and the six services that read tiles: none waits.
-  static constexpr std::size_t max_readers = 8;
+  /// The mapper, the search for loops, the publisher of tiles and the six services that read tiles:
+  /// none waits.
+  static constexpr std::size_t max_readers = 9;
 
   /// A connection that no other reader has.
   struct Use {

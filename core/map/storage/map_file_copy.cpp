@@ -116,8 +116,9 @@ SavedMap MapFileCopy::load() const {
 SavedMap MapFileCopy::load_shown() const {
   try {
     SQLite::Database database = open_map_copy(copy_);
-    // Reading the rows is as little for more than one core.
-    std::future<void> checked = std::async(std::launch::async, [&] { check_map_copy(copy_); });
+    // Reading the rows is as little for more than one core. Where no thread can be had, afterwards.
+    std::future<void> checked =
+        std::async(std::launch::async | std::launch::deferred, [&] { check_map_copy(copy_); });
     SavedMap map{read_map_row(database), {}, read_trajectory(database), read_metadata(database)};
     map.view.tiles = TileTable(read_tiles(database, map.view));
     checked.get();
