@@ -237,7 +237,8 @@ TEST(PathBoxes, HoldWhatIsWithinReachOfALongBentPathAndLittleElse) {
 TEST(PathBoxes, AreFewForAPathOfManyPositionsAndForOnesOfNoEnd) {
   EXPECT_EQ(boxes_along(std::vector<Eigen::Vector2d>(100'000, {5, 5}), 10.0).size(), 1U);
   EXPECT_EQ(boxes_along({}, 10.0).size(), 1U);
-  EXPECT_EQ(boxes_along(std::vector<Eigen::Vector2d>{{nan, 0}, {0, test::infinity}}, 10.0).size(), 1U);
+  EXPECT_EQ(boxes_along(std::vector<Eigen::Vector2d>{{nan, 0}, {0, test::infinity}}, 10.0).size(),
+            1U);
   std::vector<Eigen::Vector2d> endless;
   for (int i = 0; i < 1000; ++i) endless.emplace_back(i % 2 == 0 ? -1e300 : 1e300, 1.7e308);
   EXPECT_LE(boxes_along(endless, 10.0).size(), 10'000U);
