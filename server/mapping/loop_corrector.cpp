@@ -57,7 +57,14 @@ void LoopCorrector::begin_another(Run run) {
   T_map_odom_.setIdentity();
   last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
   is_clock_set_back_ = false;
+  is_past_unknown_ = false;
   begin(run, {});
+}
+
+void LoopCorrector::begin_open() {
+  spdlog::warn("loops stay open: the map that was loaded has no path");
+  is_past_unknown_ = true;
+  begin({}, {});
 }
 
 void LoopCorrector::go_on_in_map(std::int64_t seen_until_ns) {
@@ -67,7 +74,7 @@ void LoopCorrector::go_on_in_map(std::int64_t seen_until_ns) {
 
 void LoopCorrector::settle(std::int64_t seen_until_ns) {
   // Of before and after that, the same stamps would be.
-  if (is_clock_set_back_) return end_map();
+  if (is_clock_set_back_ || is_past_unknown_) return end_map();
   begin({.map = ++maps_, .earlier_until_ns = seen_until_ns, .T_map_odom = T_map_odom_},
         std::move(told_));
 }

@@ -50,7 +50,7 @@ class LoopCorrector {
     begin_another({.earlier_until_ns = seen_until_ns});
   }
   /// A map was loaded, of which nobody knows until when it was seen: loops stay open in it.
-  void begin_open() { begin({}, {}); }
+  void begin_open();
   /// The same as begin_in_map of the running map, in which the robot was set elsewhere: odometry's
   /// frame is the map's again. Submaps keep their numbers. After a clock that was set back loops
   /// stay open.
@@ -127,6 +127,8 @@ class LoopCorrector {
   /// Of the map's scans: corrections tell them apart by their stamps.
   std::int64_t last_stamp_ns_ = std::numeric_limits<std::int64_t>::min();
   bool is_clock_set_back_ = false;
+  /// Of a map that was begun open.
+  bool is_past_unknown_ = false;
   /// Those that were told last, and those of them that are of before the run.
   SubmapList told_;
   SubmapList earlier_submaps_;

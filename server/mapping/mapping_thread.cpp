@@ -147,8 +147,6 @@ void MappingThread::begin_map(SharedTrajectory trajectory) {
   latest_map_.begin(mapper_.map_snapshot(), std::move(trajectory));
   if (odom_) odom_->begin_map();
   if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
-  is_past_unknown_ = latest_map_.trajectory().empty() && !latest_map_.view()->tiles.empty();
-  if (is_past_unknown_) spdlog::warn("loops stay open: the map that was loaded has no path");
   begin_loops(&LoopCorrector::begin_in_map);
   if (outputs_.earth != nullptr) outputs_.earth->forget();
   publish_submaps({});
@@ -158,19 +156,13 @@ void MappingThread::begin_map(SharedTrajectory trajectory) {
 void MappingThread::begin_loops(void (LoopCorrector::*in_map)(std::int64_t seen_until_ns)) {
   if (outputs_.loops == nullptr) return;
   if (latest_map_.view()->tiles.empty()) return outputs_.loops->begin_map();
-  const SharedTrajectory path = latest_map_.trajectory();
+  const auto seen_until_ns = latest_map_.seen_until_ns();
   // Nothing tells what was seen before from what is seen from now on.
-  if (is_past_unknown_ || path.empty()) return outputs_.loops->begin_open();
-  std::int64_t newest_ns = path.back().stamp_ns;
-  for (const StampedPose& pose : path) newest_ns = std::max(newest_ns, pose.stamp_ns);
-  // A clock that was set back took poses away, but no voxels.
-  for (const auto& tile : latest_map_.view()->tiles)
-    if (!tile->voxels.empty()) newest_ns = std::max(newest_ns, tile->voxels.stamps_ns().back());
-  (outputs_.loops->*in_map)(newest_ns);
+  if (!seen_until_ns) return outputs_.loops->begin_open();
+  (outputs_.loops->*in_map)(*seen_until_ns);
 }
 
 void MappingThread::set_elsewhere() {
-  if (outputs_.loops == nullptr) return;
   if (const auto submaps = outputs_.loops->take_submaps()) publish_submaps(*submaps);
   begin_loops(&LoopCorrector::go_on_in_map);
 }
@@ -452,7 +444,7 @@ std::optional<Eigen::Isometry3d> MappingThread::prior_for(std::int64_t stamp_ns)
     mapper_.hand_out_scans(false);
   } else if (outputs_.place_finder != nullptr) {
     if (const auto T_map_lidar = outputs_.place_finder->relocate(mapper_, stamp_ns)) {
-      set_elsewhere();
+      if (outputs_.loops != nullptr) set_elsewhere();
       return T_map_lidar;
     }
   }

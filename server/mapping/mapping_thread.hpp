@@ -170,8 +170,6 @@ class MappingThread : public CheckpointSource {
   /// Limit of the memory that the static map takes.
   std::size_t map_limit_bytes_;
   StaticMapConfig map_config_;
-  /// A map was loaded that has no path.
-  bool is_past_unknown_ = false;
   bool is_map_frozen_ = false;
   double sensor_period_s_;
   std::chrono::duration<double> publish_period_;

@@ -89,6 +89,16 @@ SharedTrajectory LatestMap::trajectory() const {
   return trajectory_;
 }
 
+std::optional<std::int64_t> LatestMap::seen_until_ns() const {
+  const SharedTrajectory path = trajectory();
+  if (path.empty()) return std::nullopt;
+  std::int64_t newest_ns = path.back().stamp_ns;
+  for (const StampedPose& pose : path) newest_ns = std::max(newest_ns, pose.stamp_ns);
+  for (const auto& tile : view()->tiles)
+    if (!tile->voxels.empty()) newest_ns = std::max(newest_ns, tile->voxels.stamps_ns().back());
+  return newest_ns;
+}
+
 StampedPose LatestMap::newest_pose() const {
   const std::scoped_lock lock(mutex_);
   return trajectory_.empty() ? StampedPose{} : trajectory_.back();

@@ -49,6 +49,9 @@ class LatestMap {
   /// At most `max_poses` (>= 2) of its poses, evenly spaced, the newest always among them. The
   /// selection stays the same until the path has twice as many poses.
   [[nodiscard]] Trajectory trajectory(std::size_t max_poses) const;
+  /// The newest stamp of its poses and of its voxels in memory: a clock that was set back took
+  /// poses away, but no voxels. Nothing without poses.
+  [[nodiscard]] std::optional<std::int64_t> seen_until_ns() const;
   /// The newest pose that was not lost; the origin before the first.
   [[nodiscard]] StampedPose newest_pose() const;
   /// Expected pose of the first scan in a map that was loaded: the stored pose of its very stamp,

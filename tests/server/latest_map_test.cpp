@@ -43,6 +43,27 @@ TEST(LatestMap, KeepsThePathOfEarlierRunsWhateverTheClockSays) {
   EXPECT_EQ(stamps(latest_map), (std::vector<std::int64_t>{10, 20, 30, 1}));
 }
 
+TEST(LatestMap, TellsUntilWhenItWasSeenWhateverTheClockSays) {
+  LatestMap latest_map;
+  latest_map.begin(std::make_shared<const MapSnapshot>(), {});
+  EXPECT_FALSE(latest_map.seen_until_ns());
+  latest_map.begin(std::make_shared<const MapSnapshot>(), {{.stamp_ns = 30}, {.stamp_ns = 10}});
+  add(latest_map, 20);
+  EXPECT_EQ(latest_map.seen_until_ns(), 30);
+  // Poses were taken away by a clock that was set back, but not what was seen from them.
+  const VoxelGrid grid(0.2, 20.0);
+  Voxel voxel;
+  voxel.point_count = 1;
+  voxel.mean_map = grid.corner_map({0, 0}, voxel.index).cast<float>();
+  voxel.first_seen_ns = 70;
+  voxel.last_seen_ns = 90;
+  auto view = std::make_shared<MapSnapshot>();
+  view->tiles = TileTable({std::make_shared<const Tile>(
+      make_tile({0, 0}, 1, std::span<const Voxel>(&voxel, 1), grid))});
+  latest_map.publish(view);
+  EXPECT_EQ(latest_map.seen_until_ns(), 90);
+}
+
 TEST(LatestMap, CorrectsThePosesOfThisSessionAlone) {
   LatestMap latest_map;
   latest_map.begin(std::make_shared<const MapSnapshot>(), {{.stamp_ns = 1}, {.stamp_ns = 50}});

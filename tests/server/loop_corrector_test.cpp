@@ -156,6 +156,17 @@ TEST(LoopCorrector, InAMapThatWasThereMovesWhatIsSeenAfterItsLastScan) {
   EXPECT_EQ(counted(statistics, "gnss_fixes_unused"), 1U);
 }
 
+TEST(LoopCorrector, LeavesLoopsOpenInALoadedMapOfWhichNobodyKnowsUntilWhenItWasSeen) {
+  Statistics statistics;
+  LoopCorrector loops({}, true, statistics, nothing_seen);
+  loops.begin_open();
+  loops.go_on_in_map(1);
+  Round round(loops);
+  round.go(1.25 * StreetWorld::length_m);
+  EXPECT_TRUE(round.corrections.empty());
+  EXPECT_FALSE(loops.take_submaps());
+}
+
 // A robot that drives for days in a map that was loaded.
 TEST(LoopCorrector, TakesTheMapAsItIsForTheEarlierOneWhereItsGraphGrowsTooLarge) {
   const auto street = StreetWorld(11).earlier_map(-30.0, 60.0, 7);
