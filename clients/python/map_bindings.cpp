@@ -8,7 +8,7 @@
 #include "clients/python/map.hpp"
 #include "clients/python/traversability.hpp"
 #include "core/map/query/map_query.hpp"
-#include "core/map/storage/map_file_copy.hpp"
+#include "core/map/storage/shown_map.hpp"
 
 namespace stillmap::python {
 namespace {
@@ -232,12 +232,11 @@ py::object removed_of(const Map& map) {
 }
 
 Map open_map(const std::filesystem::path& file) {
-  const auto copy = std::make_shared<MapFileCopy>(file);
-  SavedMap saved = copy->load_shown();
+  auto [saved, read_evidence] = read_shown_map(file);
   return {.view = std::make_shared<const MapSnapshot>(std::move(saved.view)),
           .trajectory = saved.trajectory.to_vector(),
           .metadata = std::move(saved.metadata),
-          .read_evidence = [copy] { return copy->load().tile_evidence; }};
+          .read_evidence = std::move(read_evidence)};
 }
 
 }  // namespace
@@ -308,7 +307,9 @@ void bind_map(py::module_& module) {
           "winner alone.")
       .def("removed", &removed_of,
            "What is kept out of the map, and why: position_map (n, 3) float32 [m], label (n,), "
-           "reason (n,) text, last_seen_ns (n,). Empty for a map of a server; ask the client.")
+           "reason (n,) text, last_seen_ns (n,). Empty for a map of a server; ask the client. Read "
+           "from "
+           "the file when it is asked for: raises MapFileError if that was changed since.")
       .def("query", &query, py::arg("region"), py::arg("classes") = std::vector<std::string>{},
            py::arg("resolution_m") = 0.0,
            "Voxels of a region. classes: names, none are all. resolution_m: 0 is the map's own. "

@@ -9,24 +9,6 @@
 namespace stillmap {
 namespace {
 
-constexpr int content_steps = 8;
-
-constexpr std::uint32_t half_steps = 2 * PackedVoxel::offset_steps / content_steps;
-
-/// 2^32 / (half_steps * n), rounded up, for n points: with dividends below 2^17 and divisors below
-/// 2^14, the product's upper word is the quotient.
-constexpr auto reciprocal_of_points = [] {
-  std::array<std::uint64_t, PackedVoxel::max_mean_points + 1> reciprocals{};
-  for (std::uint64_t n = 1; n < reciprocals.size(); ++n)
-    reciprocals[n] = ((std::uint64_t{1} << 32) - 1) / (half_steps * n) + 1;
-  return reciprocals;
-}();
-
-/// The eighth of the voxel in which the mean lies: of the middle of its step.
-std::uint64_t content_step(std::uint32_t sum, std::uint32_t points) {
-  return (2 * sum + points) * reciprocal_of_points[points] >> 32;
-}
-
 /// The sum of offsets whose mean is nearest to `offset` [voxels].
 std::uint16_t offset_sum(double offset, std::uint32_t points) {
   const double most = (PackedVoxel::offset_steps - 1.0) * points;
@@ -35,18 +17,6 @@ std::uint16_t offset_sum(double offset, std::uint32_t points) {
 }
 
 }  // namespace
-
-std::uint64_t content_word(const PackedVoxel& voxel) {
-  const std::uint32_t points = voxel.mean_points();
-  std::uint64_t mean = 0;
-  for (const std::uint32_t sum : voxel.offset_sum) {
-    mean = mean * content_steps + content_step(sum, points);
-  }
-  const VoxelIndex index = voxel_index(voxel.key);
-  return std::uint64_t{index.x} << 48 | std::uint64_t{index.y} << 32 |
-         std::uint64_t{static_cast<std::uint16_t>(index.z)} << 16 | mean << 5 |
-         static_cast<std::uint64_t>(voxel.evidence.winner());
-}
 
 PackedVoxel pack(const Voxel& voxel, TileId tile, const VoxelGrid& grid) {
   constexpr std::uint32_t most = std::numeric_limits<std::uint16_t>::max();
@@ -123,9 +93,26 @@ void PackedVoxels::Content::set_stamps(const SeenTimes& seen) {
 
 Eigen::AlignedBox3f PackedVoxels::bounds_map() const {
   if (empty()) return {};
+  // A mean lies within its voxel: those at the sides are enough. Fields are compared where they lie
+  // in the key, columns, rows, layers.
+  constexpr std::array<std::uint32_t, 3> fields = {0xFF000000U, 0x00FF0000U, 0x0000FFFFU};
+  std::array<std::uint32_t, 3> first = fields;
+  std::array<std::uint32_t, 3> last{};
+  for (const PackedVoxel& voxel : content_->voxels) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      first[axis] = std::min(first[axis], voxel.key & fields[axis]);
+      last[axis] = std::max(last[axis], voxel.key & fields[axis]);
+    }
+  }
   Eigen::Array3d least = Eigen::Array3d::Constant(std::numeric_limits<double>::infinity());
   Eigen::Array3d most = -least;
   for (const PackedVoxel& voxel : content_->voxels) {
+    bool is_at_side = false;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::uint32_t place = voxel.key & fields[axis];
+      is_at_side |= place == first[axis] || place == last[axis];
+    }
+    if (!is_at_side) continue;
     const Eigen::Array3d mean = mean_voxels(voxel, content_->tile, content_->grid);
     least = least.min(mean);
     most = most.max(mean);

@@ -44,6 +44,9 @@ inline constexpr auto share_of_points = [] {
   return shares;
 }();
 
+/// Clients see means in eighths of a voxel.
+inline constexpr std::uint32_t content_steps = 8;
+
 /// The mean of the voxel's points, map frame [voxels]; point_count > 0.
 [[nodiscard]] inline Eigen::Array3d mean_voxels(const PackedVoxel& voxel, TileId tile,
                                                 const VoxelGrid& grid) {
@@ -62,9 +65,33 @@ inline constexpr auto share_of_points = [] {
   return (grid.voxel_size_m() * mean_voxels(voxel, tile, grid)).matrix().cast<float>();
 }
 
+/// The eighth of a voxel in which a mean lies: of the middle of its step.
+[[nodiscard]] inline std::uint64_t content_step(std::uint32_t sum, std::uint32_t points) {
+  constexpr std::uint32_t half_steps = 2 * PackedVoxel::offset_steps / content_steps;
+  // 2^32 / (half_steps * n), rounded up, for n points: with dividends below 2^17 and divisors below
+  // 2^14, the product's upper word is the quotient.
+  static constexpr auto reciprocal_of_points = [] {
+    std::array<std::uint64_t, PackedVoxel::max_mean_points + 1> reciprocals{};
+    for (std::uint64_t n = 1; n < reciprocals.size(); ++n)
+      reciprocals[n] = ((std::uint64_t{1} << 32) - 1) / (half_steps * n) + 1;
+    return reciprocals;
+  }();
+  return (2 * sum + points) * reciprocal_of_points[points] >> 32;
+}
+
 /// What a client sees of a voxel, in one word: 48 bits of index, three times 3 bits of mean, 5 bits
 /// of class.
-[[nodiscard]] std::uint64_t content_word(const PackedVoxel& voxel);
+[[nodiscard]] inline std::uint64_t content_word(const PackedVoxel& voxel) {
+  const std::uint32_t points = voxel.mean_points();
+  std::uint64_t mean = 0;
+  for (const std::uint32_t sum : voxel.offset_sum) {
+    mean = mean * content_steps + content_step(sum, points);
+  }
+  const VoxelIndex index = voxel_index(voxel.key);
+  return std::uint64_t{index.x} << 48 | std::uint64_t{index.y} << 32 |
+         std::uint64_t{static_cast<std::uint16_t>(index.z)} << 16 | mean << 5 |
+         static_cast<std::uint64_t>(voxel.evidence.winner());
+}
 
 /// The voxel without its times. The mean of a packed voxel leads to the same packed voxel again,
 /// where a float is fine enough. A mean outside of the voxel is moved to its face.
@@ -142,7 +169,7 @@ class PackedVoxels {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  static constexpr std::size_t word_bits = 64;
+  static constexpr unsigned word_bits = 64;
 
   struct Content {
     TileId tile;

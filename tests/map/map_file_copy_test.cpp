@@ -75,25 +75,6 @@ TEST_F(MapFileCopyTest, NamesWhatCannotBeRead) {
   EXPECT_THAT(refusal(), HasSubstr("is not a file"));
 }
 
-TEST_F(MapFileCopyTest, ShowsTheSameWithoutEvidence) {
-  const SavedMap saved = test::saved_map(2);
-  open_map_file(file_)->save(saved);
-  SavedMap shown = MapFileCopy(file_).load_shown();
-  EXPECT_TRUE(shown.tile_evidence.empty());
-  shown.tile_evidence = saved.tile_evidence;
-  test::expect_equal(shown, saved);
-}
-
-TEST_F(MapFileCopyTest, ADamagedFileIsNamedAndNotItsCopy) {
-  open_map_file(file_)->save(test::saved_map(2));
-  SQLite::Database database(file_.string(), SQLite::OPEN_READWRITE);
-  database.exec("UPDATE tiles SET encoded = substr(encoded, 1, 20)");
-  const auto shown = [&] { static_cast<void>(MapFileCopy(file_).load_shown()); };
-  EXPECT_THAT(message_of<MapFileError>(shown),
-              testing::AllOf(testing::StartsWith(file_.string() + ": is damaged: tile ("),
-                             HasSubstr("map-check")));
-}
-
 TEST_F(MapFileCopyTest, FiguresOfAMapAreThoseCountedByHand) {
   const SavedMap saved = test::saved_map(2);
   open_map_file(file_)->save(saved);

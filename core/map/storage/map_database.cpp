@@ -7,6 +7,7 @@
 #include <sqlite3.h>
 #include <unistd.h>
 
+#include <cctype>
 #include <cstdint>
 #include <fstream>
 #include <string>
@@ -73,6 +74,21 @@ constexpr const char* tile_info_index = R"sql(
   CREATE INDEX IF NOT EXISTS tile_infos ON tiles (
     x, y, revision, content_hash, voxel_count, min_x, min_y, min_z, max_x, max_y, max_z);
 )sql";
+
+/// A name with parameters; every byte that is more than a letter is written as its number.
+std::string sqlite_uri(const fs::path& file, const std::string& parameters) {
+  constexpr std::string_view digits = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char letter : sqlite_name(file)) {
+    const auto byte = static_cast<unsigned char>(letter);
+    if (std::isalnum(byte) != 0 || letter == '/') {
+      uri += letter;
+    } else {
+      uri += {'%', digits[byte >> 4], digits[byte & 15]};
+    }
+  }
+  return uri + "?" + parameters;
+}
 
 /// SQLite's file header has its numbers big-endian.
 std::uint32_t big_endian(std::string_view bytes) {
@@ -152,18 +168,23 @@ void create(const fs::path& file) {
   sync_folder(file);
 }
 
+/// `what`: a table, or how many faults are of interest. Not only pages: the index of tiles must say
+/// what their rows do.
+void check_integrity(SQLite::Database& database, const fs::path& file, const std::string& what) {
+  SQLite::Statement check(database, "PRAGMA integrity_check(" + what + ")");
+  check.executeStep();
+  if (const std::string verdict = check.getColumn(0).getString(); verdict != "ok") {
+    throw MapFileError(file, "is damaged (" + verdict + "); restore a copy or name another file");
+  }
+}
+
 void check_pages(SQLite::Database& database, const fs::path& file) {
   if (fs::file_size(file) > max_checked_bytes) return;
   // A log left by a crash must not be written into a file that turns out to be damaged.
   const bool has_log = fs::exists(beside(file, "-wal"));
   sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, has_log ? 1 : 0,
                     nullptr);
-  // Not only the pages: the index of tiles must say what their rows do.
-  SQLite::Statement check(database, "PRAGMA integrity_check(1)");
-  check.executeStep();
-  if (const std::string verdict = check.getColumn(0).getString(); verdict != "ok") {
-    throw MapFileError(file, "is damaged (" + verdict + "); restore a copy or name another file");
-  }
+  check_integrity(database, file, "1");
   sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
 }
 
@@ -184,10 +205,8 @@ SQLite::Database open_or_create(const fs::path& file) {
   return database;
 }
 
-SQLite::Database connect_as_memory(const fs::path& file) {
-  SQLite::Database database = connect(file);
+void read_as_memory(SQLite::Database& database) {
   database.exec("PRAGMA mmap_size = " + std::to_string(max_mapped_bytes));
-  return database;
 }
 
 /// What `open` returns; its errors as MapFileError.
@@ -262,16 +281,27 @@ SQLite::Database open_map_copy(const fs::path& file) {
   return opened(file, [](const fs::path& copy) {
     check_header(copy);
     put_away_other_log(copy);
-    return connect_as_memory(copy);
+    SQLite::Database database = connect(copy);
+    read_as_memory(database);
+    return database;
   });
 }
 
-void check_map_copy(const fs::path& file) {
-  static_cast<void>(opened(file, [](const fs::path& copy) {
-    SQLite::Database database = connect_as_memory(copy);
-    check_pages(database, copy);
+SQLite::Database open_map_in_place(const fs::path& file) {
+  return opened(file, [](const fs::path& held) {
+    check_header(held);
+    SQLite::Database database(sqlite_uri(held, "immutable=1"),
+                              SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    read_as_memory(database);
     return database;
-  }));
+  });
+}
+
+void check_shown_tables(SQLite::Database& database, const fs::path& file) {
+  if (fs::file_size(file) > max_checked_bytes) return;
+  for (const char* table : {"map", "tiles", "trajectory", "metadata"}) {
+    check_integrity(database, file, table);
+  }
 }
 
 SQLite::Database connect_to_map_database(const fs::path& file) { return opened(file, connect); }

@@ -28,8 +28,12 @@ inline constexpr std::uintmax_t max_checked_bytes = std::uintmax_t{64} << 20;
 /// The same of a copy that is nobody else's, whose pages are not checked yet. It is read as memory,
 /// which is eight times as fast; of a file that another process may cut off, this one would die.
 [[nodiscard]] SQLite::Database open_map_copy(const std::filesystem::path& file);
-/// Checks what `open_map_copy` opened, on a connection of its own. Throws as open_map_database.
-void check_map_copy(const std::filesystem::path& file);
+/// The same, for reading only, of a file that nobody can write to meanwhile (ReadLease) and that
+/// has no log: nothing is locked, made or written.
+[[nodiscard]] SQLite::Database open_map_in_place(const std::filesystem::path& file);
+/// Checks what a reader of voxels reads, and not the pages of evidence, of a file of up to
+/// `max_checked_bytes`. Throws as open_map_database.
+void check_shown_tables(SQLite::Database& database, const std::filesystem::path& file);
 /// One more connection to a file that this process has opened so, without a look at its content.
 [[nodiscard]] SQLite::Database connect_to_map_database(const std::filesystem::path& file);
 

@@ -5,14 +5,12 @@
 
 #include <cstdlib>
 #include <fstream>
-#include <future>
 #include <memory>
 #include <string>
 #include <system_error>
 #include <utility>
 
 #include "core/map/storage/map_database.hpp"
-#include "core/map/storage/map_tables.hpp"
 #include "core/map/storage/save_marks.hpp"
 
 namespace stillmap {
@@ -69,14 +67,13 @@ void copy_with_log(const fs::path& file, const fs::path& copy) {
   put_away_other_log(copy);
 }
 
-/// The error of the copy as one of the file.
+}  // namespace
+
 MapFileError error_of(const fs::path& file, const fs::path& copy, const MapFileError& error) {
   const std::string text = error.what();
   const std::string name = copy.string() + ": ";
   return {file, text.starts_with(name) ? text.substr(name.size()) : text};
 }
-
-}  // namespace
 
 MapFileCopy::MapFileCopy(fs::path file) : file_(std::move(file)) {
   check_readable(file_);
@@ -110,24 +107,6 @@ SavedMap MapFileCopy::load() const {
     return open_map_file(copy_)->load();
   } catch (const MapFileError& error) {
     throw error_of(file_, copy_, error);
-  }
-}
-
-SavedMap MapFileCopy::load_shown() const {
-  try {
-    SQLite::Database database = open_map_copy(copy_);
-    // Reading the rows is as little for more than one core. Where no thread can be had, afterwards.
-    std::future<void> checked =
-        std::async(std::launch::async | std::launch::deferred, [&] { check_map_copy(copy_); });
-    SavedMap map{read_map_row(database), {}, read_trajectory(database), read_metadata(database)};
-    map.view.tiles = TileTable(read_tiles(database, map.view));
-    checked.get();
-    return map;
-  } catch (const MapFileError& error) {
-    throw error_of(file_, copy_, error);
-  } catch (const std::runtime_error& fault) {
-    throw MapFileError(file_, std::string("is damaged: ") + fault.what() +
-                                  "; 'stillmap map-check' names every fault");
   }
 }
 

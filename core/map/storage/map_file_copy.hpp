@@ -24,15 +24,16 @@ class MapFileCopy {
   void check_format() const;
   /// Throws as check_format does.
   [[nodiscard]] SavedMap load() const;
-  /// Without the tiles' evidence, which is the larger half: for readers of voxels. Throws as
-  /// check_format does.
-  [[nodiscard]] SavedMap load_shown() const;
 
  private:
   std::filesystem::path file_;
   std::filesystem::path folder_;
   std::filesystem::path copy_;
 };
+
+/// The error of a copy as one of the file.
+[[nodiscard]] MapFileError error_of(const std::filesystem::path& file,
+                                    const std::filesystem::path& copy, const MapFileError& error);
 
 /// What a map file holds, the file left as it is. Throws MapFileError as MapFileCopy does.
 [[nodiscard]] SavedMap read_map_file(const std::filesystem::path& file);

@@ -6,6 +6,7 @@
 #include <sqlite3.h>
 #include <tbb/parallel_for.h>
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -147,8 +148,20 @@ struct TileRow {
   Blob encoded;
 };
 
-TileRow tile_row(const SQLite::Statement& row) {
-  return {column_tile_id(row), column_state(row), column_blob(row, 4)};
+/// Into a row that was read before: its memory is used again.
+void read_row(const SQLite::Statement& from, TileRow& row) {
+  row.id = column_tile_id(from);
+  row.state = column_state(from);
+  const SQLite::Column blob = from.getColumn(4);
+  const auto* bytes = static_cast<const std::uint8_t*>(blob.getBlob());
+  row.encoded.assign(bytes, bytes + blob.getBytes());
+}
+
+/// The next rows, as many as there are and fit; returns how many.
+std::size_t read_rows(SQLite::Statement& from, std::span<TileRow> rows) {
+  std::size_t count = 0;
+  while (count < rows.size() && from.executeStep()) read_row(from, rows[count++]);
+  return count;
 }
 
 /// Throws TileCodecError, also when the tile is not the one that the row is of.
@@ -284,15 +297,20 @@ MapSnapshot read_map_row(SQLite::Database& database) {
 
 std::vector<std::shared_ptr<const Tile>> read_tiles(SQLite::Database& database,
                                                     const MapSnapshot& sizes) {
-  std::vector<TileRow> rows;
+  // At a time, so that the rows' memory is small and used again: fresh pages cost more than
+  // copying.
+  std::array<TileRow, 64> rows;
+  std::vector<std::shared_ptr<const Tile>> tiles;
   SQLite::Statement row(database,
                         "SELECT x, y, revision, content_hash, encoded FROM tiles ORDER BY x, y");
-  while (row.executeStep()) rows.push_back(tile_row(row));
-  if (rows.empty()) return {};
-  const VoxelGrid grid = stored_grid(sizes.voxel_size_m, sizes.tile_size_m);
-  std::vector<std::shared_ptr<const Tile>> tiles(rows.size());
-  tbb::parallel_for(std::size_t{0}, rows.size(),
-                    [&](std::size_t i) { tiles[i] = checked_tile(rows[i], grid); });
+  while (const std::size_t count = read_rows(row, rows)) {
+    const VoxelGrid grid = stored_grid(sizes.voxel_size_m, sizes.tile_size_m);
+    const std::size_t begin = tiles.size();
+    tiles.resize(begin + count);
+    tbb::parallel_for(std::size_t{0}, count,
+                      [&](std::size_t i) { tiles[begin + i] = checked_tile(rows[i], grid); });
+    if (count < rows.size()) break;
+  }
   return tiles;
 }
 
@@ -375,7 +393,8 @@ TileRecord read_record(SQLite::Database& database, TileId id, const MapSnapshot&
       database, "SELECT x, y, revision, content_hash, encoded FROM tiles WHERE x = ? AND y = ?");
   bind_id(tile, id);
   const auto grid = [&] { return stored_grid(sizes.voxel_size_m, sizes.tile_size_m); };
-  if (tile.executeStep()) record.tile = checked_tile(tile_row(tile), grid());
+  TileRow row;
+  if (read_rows(tile, {&row, 1}) == 1) record.tile = checked_tile(row, grid());
   SQLite::Statement evidence(database, "SELECT x, y, encoded FROM memories WHERE x = ? AND y = ?");
   bind_id(evidence, id);
   if (evidence.executeStep()) {

@@ -1,6 +1,7 @@
 #include "core/map/storage/packed_codec.hpp"
 
 #include <algorithm>
+#include <optional>
 #include <utility>
 
 #include "core/map/storage/byte_planes.hpp"
@@ -123,17 +124,59 @@ VoxelParts parts_of(const StoredVoxels& stored) {
   return parts;
 }
 
-PackedVoxel voxel_at(std::size_t i, const StoredVoxels& stored, const VoxelParts& parts,
-                     KeySteps& keys) {
+ClassEvidence::Bits evidence_at(std::size_t i, const StoredVoxels& stored) {
   const auto& [weights, classes] = stored.evidence;
-  const auto evidence =
-      ClassEvidence::of({{weights[0][i], weights[1][i], weights[2][i]}, classes[i]});
-  if (stored.point_count[i] == 0 || !evidence) throw TileCodecError("has an impossible voxel");
-  if (parts.is_outside[i] != 0) throw TileCodecError("has a mean outside of its voxel");
-  return {.key = keys.key_at({stored.step.columns[i], stored.step.layers[i]}),
-          .offset_sum = {parts.offset_sum[0][i], parts.offset_sum[1][i], parts.offset_sum[2][i]},
-          .point_count = stored.point_count[i],
-          .evidence = *evidence};
+  return {{weights[0][i], weights[1][i], weights[2][i]}, classes[i]};
+}
+
+/// Loops without branches, for compilers to take several voxels at a time.
+void check_voxels(const StoredVoxels& stored, const VoxelParts& parts, std::size_t count,
+                  std::uint32_t stamps) {
+  bool is_impossible = false;
+  bool is_outside = false;
+  bool has_no_stamp = false;
+  for (std::size_t i = 0; i < count; ++i) {
+    is_impossible |= stored.point_count[i] == 0;
+    is_impossible |= !ClassEvidence::of(evidence_at(i, stored));
+  }
+  for (std::size_t i = 0; i < count; ++i) is_outside |= parts.is_outside[i] != 0;
+  for (std::size_t i = 0; i < count; ++i) {
+    has_no_stamp |= stored.first_stamp[i] >= stamps;
+    has_no_stamp |= stored.stamps_on[i] >= stamps;
+  }
+  if (is_impossible) throw TileCodecError("has an impossible voxel");
+  if (is_outside) throw TileCodecError("has a mean outside of its voxel");
+  if (has_no_stamp) throw TileCodecError("has a voxel without a stamp");
+}
+
+using VoxelBatch = std::array<PackedVoxel, StoredVoxels::size>;
+
+/// The first `count`, whose keys go on from `last_key`.
+void unpack(const StoredVoxels& stored, const VoxelParts& parts, std::size_t count, KeySteps& keys,
+            std::optional<std::uint32_t>& last_key, VoxelBatch& voxels) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t key = keys.key_at({stored.step.columns[i], stored.step.layers[i]});
+    if (last_key && key <= *last_key) throw TileCodecError("has voxels out of order");
+    last_key = key;
+    voxels[i] = {
+        .key = key,
+        .offset_sum = {parts.offset_sum[0][i], parts.offset_sum[1][i], parts.offset_sum[2][i]},
+        .point_count = stored.point_count[i],
+        .evidence = *ClassEvidence::of(evidence_at(i, stored))};
+  }
+}
+
+/// The voxel's stamps, which are checked.
+void unpack_stamps(const StoredVoxels& stored, std::size_t count, std::uint32_t stamps,
+                   std::vector<std::uint32_t>& stamp_of) {
+  std::array<std::uint32_t, 2 * StoredVoxels::size> both{};
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::uint32_t last = stored.first_stamp[i] + stored.stamps_on[i];
+    both[2 * i] = stored.first_stamp[i];
+    both[2 * i + 1] = last < stamps ? last : last - stamps;
+  }
+  stamp_of.insert(stamp_of.end(), both.begin(),
+                  both.begin() + static_cast<std::ptrdiff_t>(2 * count));
 }
 
 }  // namespace
@@ -209,24 +252,18 @@ PackedVoxels read_voxels(const std::uint8_t*& from, std::size_t count,
   SeenTimes seen{std::move(stamps_ns), {}};
   voxels.reserve(count);
   seen.stamp_of.reserve(2 * count);
-  const std::size_t stamps = seen.stamps_ns.size();
+  const auto stamps = static_cast<std::uint32_t>(seen.stamps_ns.size());
   KeySteps keys;
+  std::optional<std::uint32_t> last_key;
+  VoxelBatch batch;
   const auto read = [&](StoredVoxels& stored, std::size_t in_batch) {
     if (first_votes == FirstVotes::by_what_lacks) turn_first_votes(stored);
     const VoxelParts parts = parts_of(stored);
-    for (std::size_t i = 0; i < in_batch; ++i) {
-      const PackedVoxel next = voxel_at(i, stored, parts, keys);
-      if (!voxels.empty() && next.key <= voxels.back().key) {
-        throw TileCodecError("has voxels out of order");
-      }
-      const std::uint32_t first = stored.first_stamp[i];
-      const std::uint32_t on = stored.stamps_on[i];
-      if (first >= stamps || on >= stamps) throw TileCodecError("has a voxel without a stamp");
-      voxels.push_back(next);
-      const std::size_t last = std::size_t{first} + on;
-      seen.stamp_of.push_back(first);
-      seen.stamp_of.push_back(static_cast<std::uint32_t>(last < stamps ? last : last - stamps));
-    }
+    check_voxels(stored, parts, in_batch, stamps);
+    unpack(stored, parts, in_batch, keys, last_key, batch);
+    voxels.insert(voxels.end(), batch.begin(),
+                  batch.begin() + static_cast<std::ptrdiff_t>(in_batch));
+    unpack_stamps(stored, in_batch, stamps, seen.stamp_of);
   };
   for_each_batch_in_planes<packed_voxel_bytes, StoredVoxels>(from, count, visit_voxel, read);
   from += count * packed_voxel_bytes;

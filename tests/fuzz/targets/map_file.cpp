@@ -1,5 +1,6 @@
 // A whole map file: an SQLite database.
 
+#include "core/map/storage/shown_map.hpp"
 #include "core/map/tools/map_check.hpp"
 #include "core/map/tools/map_info.hpp"
 #include "tests/fuzz/byte_source.hpp"
@@ -21,11 +22,20 @@ void look_at(const std::filesystem::path& file) {
   }
 }
 
+/// As Python reads it, in place.
+void show(const std::filesystem::path& file) {
+  try {
+    static_cast<void>(read_shown_map(file));
+  } catch (const MapFileError&) {
+  }
+}
+
 void run(Bytes bytes) {
   const auto& folder = MemoryFolder::of_this_process();
   folder.remove("map.stillmap");
   const auto file = folder.file("map.stillmap", bytes);
   look_at(file);
+  show(file);
   load_and_resume_map(file);
 }
 
