@@ -19,10 +19,9 @@ constexpr double prior_map_update_distance_m = 20.0;
 /// How far from where it was found a lidar may have driven, until the next scan [m].
 constexpr double relocation_reach_m = 4.0;
 
-/// The tiles themselves would keep their voxels in memory, evicted or not.
-std::set<TileId> tile_ids(const MapSnapshot& view) {
-  std::set<TileId> ids;
-  for (const auto& tile : view.tiles) ids.insert(ids.end(), tile->info.id);
+std::vector<TileId> tile_ids(const MapSnapshot& view) {
+  std::vector<TileId> ids;
+  for (const auto& tile : view.tiles) ids.push_back(tile->info.id);
   return ids;
 }
 
@@ -33,6 +32,11 @@ MapperConfig checked(const MapperConfig& config) {
 }
 
 }  // namespace
+
+ResumedMap ResumedMap::of(StaticMap map) {
+  std::vector<TileId> tiles = tile_ids(*map.view());
+  return {std::move(map), std::move(tiles)};
+}
 
 std::string MapperConfig::faults() const {
   return sensor.faults() + odometry.faults() + static_map.faults();
@@ -240,13 +244,14 @@ bool Mapper::has_enough_points(const Scan& scan) {
 void Mapper::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidence) {
   StaticMap prepared(config_.static_map);
   prepared.resume(view, tile_evidence);
-  static_cast<void>(resume(std::move(prepared)));
+  static_cast<void>(resume(ResumedMap::of(std::move(prepared))));
 }
 
-StaticMap Mapper::resume(StaticMap prepared) {
-  StaticMap until_now = std::exchange(static_map_.map(), std::move(prepared));
+ResumedMap Mapper::resume(ResumedMap prepared) {
+  ResumedMap until_now{std::exchange(static_map_.map(), std::move(prepared.map)),
+                       std::exchange(resumed_tiles_, {})};
   clear_scan_state();
-  resumed_tiles_ = tile_ids(*static_map_.map().view());
+  resumed_tiles_ = std::move(prepared.tiles);
   return until_now;
 }
 
@@ -317,7 +322,7 @@ void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {
   std::vector<LabelledPoint> points_odom;
   const Eigen::Vector3d reach = Eigen::Vector3d::Constant(config_.static_map.max_range_m);
   for (const auto& tile : tiles_in_box(*view, {position_map - reach, position_map + reach})) {
-    if (!resumed_tiles_.contains(tile->info.id)) continue;
+    if (!std::ranges::binary_search(resumed_tiles_, tile->info.id)) continue;
     const Eigen::AlignedBox3d bounds_map = tile->info.bounds_map.cast<double>();
     if (bounds_map.exteriorDistance(position_map) > config_.static_map.max_range_m) continue;
     for (const Voxel& voxel : tile->voxels) {

@@ -4,9 +4,9 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "core/inertial/inertial_tracker.hpp"
 #include "core/label_synchronizer.hpp"
@@ -83,6 +83,16 @@ struct MapperListeners {
   std::function<void(const Scan& scan, const PointLabels& labels)> scan_prepared{};
 };
 
+/// A static map that resumed a stored one.
+struct ResumedMap {
+  /// Takes time in proportion to the map's tiles.
+  [[nodiscard]] static ResumedMap of(StaticMap map);
+
+  StaticMap map;
+  /// Ascending. The tiles themselves would keep their voxels in memory, evicted or not.
+  std::vector<TileId> tiles;
+};
+
 /// The pipeline of a scan: prepare, label, deskew, register, insert into the static map. One thread
 /// calls it; nothing in it waits, reads a clock or owns a thread. With a Segmenter (or a
 /// BlockingSegmenter) the result depends on the scans alone.
@@ -153,9 +163,10 @@ class Mapper {
   /// near them. Throws std::invalid_argument for voxels or tiles of another size than configured,
   /// and is then as it was.
   void resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidence = {});
-  /// The same with a static map that resumed a stored one already, elsewhere: cannot fail. Returns
-  /// the map until now, for another thread to free: that takes long for a large one.
-  [[nodiscard]] StaticMap resume(StaticMap prepared);
+  /// The same with a static map that resumed a stored one already, elsewhere: cannot fail, and
+  /// takes as long for a large map as for a small one. Returns the map until now, for another
+  /// thread to free.
+  [[nodiscard]] ResumedMap resume(ResumedMap prepared);
 
   /// Forgets poses and maps; the next scan starts map `map_id` at the origin.
   void reset(std::uint64_t map_id);
@@ -200,7 +211,7 @@ class Mapper {
   LendableMap static_map_;
   /// Tiles of a resumed map, where those near the lidar were last reloaded, and where their points
   /// were last added to the odometry's local map.
-  std::set<TileId> resumed_tiles_;
+  std::vector<TileId> resumed_tiles_;
   std::optional<Eigen::Vector3d> tiles_reloaded_at_map_;
   std::optional<Eigen::Vector3d> prior_map_added_at_map_;
   bool is_resumed_map_held_ = false;

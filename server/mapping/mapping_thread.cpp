@@ -46,6 +46,13 @@ std::size_t map_share_bytes(const MapFileConfig& config) {
 
 }  // namespace
 
+MappingThread::PreparedMap::PreparedMap(StaticMap static_map, SharedTrajectory trajectory,
+                                        std::shared_ptr<TileStore> store)
+    : map(ResumedMap::of(std::move(static_map))),
+      path(std::move(trajectory)),
+      tile_store(std::move(store)),
+      seen_until_ns(server::seen_until_ns(*map.map.view(), path)) {}
+
 MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
                              const std::optional<SavedMap>& stored,
                              const std::shared_ptr<TileStore>& tile_store, ScanQueue& queue,
@@ -81,13 +88,13 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
   const bool is_odom_own = config.frames.odom_source == FramesConfig::OdomSource::own;
   if (!odom_frame_.empty() && is_odom_own) odom_.emplace();
   if (stored && !stored->view.tiles.empty()) {
-    PreparedMap prepared{resumed(*stored, tile_store), stored->trajectory, tile_store};
+    PreparedMap prepared(resumed(*stored, tile_store), stored->trajectory, tile_store);
     exchange(prepared);
   } else {
     tile_store_ = tile_store;
     mapper_.static_map().use_tile_store(tile_store);
     mapper_.reset(new_map_id());
-    begin_map({});
+    begin_map({}, std::nullopt);
   }
   worker_.emplace(
       queue_,
@@ -106,7 +113,7 @@ void MappingThread::reset(std::uint64_t map_id, const std::shared_ptr<TileStore>
   StaticMap map(map_config_);
   map.reset(map_id);
   map.use_tile_store(tile_store);
-  PreparedMap prepared{std::move(map), {}, tile_store};
+  PreparedMap prepared(std::move(map), {}, tile_store);
   requests_.run([&] { exchange(prepared); });
   spdlog::info("reset: map {} begins", map_id);
 }
@@ -138,25 +145,26 @@ StaticMap MappingThread::resumed(const SavedMap& stored,
 void MappingThread::exchange(PreparedMap& prepared) {
   tile_store_ = std::move(prepared.tile_store);
   prepared.map = mapper_.resume(std::move(prepared.map));
-  begin_map(std::move(prepared.path));
+  begin_map(std::move(prepared.path), prepared.seen_until_ns);
 }
 
-void MappingThread::begin_map(SharedTrajectory trajectory) {
+void MappingThread::begin_map(SharedTrajectory trajectory,
+                              const std::optional<std::int64_t>& seen_until_ns) {
   mapper_.static_map().set_frozen(false);
   is_map_frozen_ = false;
   latest_map_.begin(mapper_.map_snapshot(), std::move(trajectory));
   if (odom_) odom_->begin_map();
   if (outputs_.place_finder != nullptr) outputs_.place_finder->forget();
-  begin_loops(&LoopCorrector::begin_in_map);
+  begin_loops(&LoopCorrector::begin_in_map, seen_until_ns);
   if (outputs_.earth != nullptr) outputs_.earth->forget();
   publish_submaps({});
   if (outputs_.occupancy != nullptr) outputs_.occupancy->begin(latest_map_.view());
 }
 
-void MappingThread::begin_loops(void (LoopCorrector::*in_map)(std::int64_t seen_until_ns)) {
+void MappingThread::begin_loops(void (LoopCorrector::*in_map)(std::int64_t seen_until_ns),
+                                const std::optional<std::int64_t>& seen_until_ns) {
   if (outputs_.loops == nullptr) return;
   if (latest_map_.view()->tiles.empty()) return outputs_.loops->begin_map();
-  const auto seen_until_ns = latest_map_.seen_until_ns();
   // Nothing tells what was seen before from what is seen from now on.
   if (!seen_until_ns) return outputs_.loops->begin_open();
   (outputs_.loops->*in_map)(*seen_until_ns);
@@ -164,7 +172,7 @@ void MappingThread::begin_loops(void (LoopCorrector::*in_map)(std::int64_t seen_
 
 void MappingThread::set_elsewhere() {
   if (const auto submaps = outputs_.loops->take_submaps()) publish_submaps(*submaps);
-  begin_loops(&LoopCorrector::go_on_in_map);
+  begin_loops(&LoopCorrector::go_on_in_map, latest_map_.seen_until_ns());
 }
 
 void MappingThread::close_loops() {
@@ -173,7 +181,7 @@ void MappingThread::close_loops() {
     outputs_.earth->publish(latest_map_.newest_pose().stamp_ns, *place);
   if (const auto submaps = outputs_.loops->take_submaps()) publish_submaps(*submaps);
   if (auto correction = outputs_.loops->take()) return corrector_.begin(*std::move(correction));
-  if (outputs_.loops->take_full()) begin_loops(&LoopCorrector::settle);
+  if (outputs_.loops->take_full()) begin_loops(&LoopCorrector::settle, latest_map_.seen_until_ns());
 }
 
 void MappingThread::publish_submaps(const SubmapList& submaps) {

@@ -108,9 +108,12 @@ class MappingThread : public CheckpointSource {
  private:
   /// A map that can take the running one's place.
   struct PreparedMap {
-    StaticMap map;
+    PreparedMap(StaticMap map, SharedTrajectory path, std::shared_ptr<TileStore> tile_store);
+
+    ResumedMap map;
     SharedTrajectory path;
     std::shared_ptr<TileStore> tile_store;
+    std::optional<std::int64_t> seen_until_ns;
   };
 
   void map(QueuedScan queued);
@@ -120,7 +123,8 @@ class MappingThread : public CheckpointSource {
   void end_round(bool is_idle);
   /// Loops are looked for in a map that begins empty, or by `in_map` in what is seen from now on of
   /// one that is there.
-  void begin_loops(void (LoopCorrector::*in_map)(std::int64_t seen_until_ns));
+  void begin_loops(void (LoopCorrector::*in_map)(std::int64_t seen_until_ns),
+                   const std::optional<std::int64_t>& seen_until_ns);
   /// The robot was set elsewhere in the map.
   void set_elsewhere();
   /// Has the map moved where a place was seen again, beside mapping.
@@ -134,7 +138,7 @@ class MappingThread : public CheckpointSource {
   /// Path and frames follow a map that was moved.
   void follow(const MapCorrector::Result& result);
   /// Publishes a new map, and starts a new octree from it.
-  void begin_map(SharedTrajectory trajectory);
+  void begin_map(SharedTrajectory trajectory, const std::optional<std::int64_t>& seen_until_ns);
   void forward(MappedScan mapped);
   void stage_ended(std::string_view stage);
   /// Publishes the pose before the scan is inserted into the map, to keep the latency of poses low.

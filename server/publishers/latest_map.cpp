@@ -6,6 +6,15 @@
 
 namespace stillmap::server {
 
+std::optional<std::int64_t> seen_until_ns(const MapSnapshot& view, const SharedTrajectory& path) {
+  if (path.empty()) return std::nullopt;
+  std::int64_t newest_ns = path.back().stamp_ns;
+  for (const StampedPose& pose : path) newest_ns = std::max(newest_ns, pose.stamp_ns);
+  for (const auto& tile : view.tiles)
+    if (!tile->voxels.empty()) newest_ns = std::max(newest_ns, tile->voxels.stamps_ns().back());
+  return newest_ns;
+}
+
 void LatestMap::begin(std::shared_ptr<const MapSnapshot> view, SharedTrajectory trajectory) {
   auto history = std::make_shared<const TileHistory>(history_from(*view));
   const std::scoped_lock lock(mutex_);
@@ -90,13 +99,7 @@ SharedTrajectory LatestMap::trajectory() const {
 }
 
 std::optional<std::int64_t> LatestMap::seen_until_ns() const {
-  const SharedTrajectory path = trajectory();
-  if (path.empty()) return std::nullopt;
-  std::int64_t newest_ns = path.back().stamp_ns;
-  for (const StampedPose& pose : path) newest_ns = std::max(newest_ns, pose.stamp_ns);
-  for (const auto& tile : view()->tiles)
-    if (!tile->voxels.empty()) newest_ns = std::max(newest_ns, tile->voxels.stamps_ns().back());
-  return newest_ns;
+  return server::seen_until_ns(*view(), trajectory());
 }
 
 StampedPose LatestMap::newest_pose() const {

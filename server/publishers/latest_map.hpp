@@ -16,6 +16,11 @@
 
 namespace stillmap::server {
 
+/// The newest stamp of a map's poses and of its voxels in memory: a clock that was set back took
+/// poses away, but no voxels. Nothing without poses. Takes time in proportion to both.
+[[nodiscard]] std::optional<std::int64_t> seen_until_ns(const MapSnapshot& view,
+                                                        const SharedTrajectory& path);
+
 /// What the mapping thread publishes to all other threads: immutable views, so that readers and the
 /// mapper do not wait for each other. Thread-safe.
 class LatestMap {
@@ -49,8 +54,7 @@ class LatestMap {
   /// At most `max_poses` (>= 2) of its poses, evenly spaced, the newest always among them. The
   /// selection stays the same until the path has twice as many poses.
   [[nodiscard]] Trajectory trajectory(std::size_t max_poses) const;
-  /// The newest stamp of its poses and of its voxels in memory: a clock that was set back took
-  /// poses away, but no voxels. Nothing without poses.
+  /// `stillmap::server::seen_until_ns` of it.
   [[nodiscard]] std::optional<std::int64_t> seen_until_ns() const;
   /// The newest pose that was not lost; the origin before the first.
   [[nodiscard]] StampedPose newest_pose() const;
