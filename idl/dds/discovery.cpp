@@ -7,6 +7,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cerrno>
@@ -20,6 +21,7 @@
 
 #include "idl/dds/dds_error.hpp"
 #include "idl/dds/qos.hpp"
+#include "idl/dds/transports.hpp"
 
 namespace stillmap::dds {
 namespace {
@@ -164,49 +166,55 @@ bool is_udp_port_used(std::int32_t port) {
   return used;
 }
 
-bool has_shared_memory(std::int32_t port) {
-  std::error_code unreadable;
-  return std::filesystem::exists("/dev/shm/fastrtps_port" + std::to_string(port), unreadable);
-}
-
-/// What is known of a participant's two ports.
+/// What is known of a participant's ports, from the best to the worst.
 enum class Ports {
+  /// No process had them, as far as can be seen.
   fresh,
-  /// A process that was killed, or that the server outlived, left its shared memory.
-  left,
-  /// By a living process, which may be this one.
-  used
+  /// The process that had them ended, while others still have their shared memory open; who takes
+  /// it
+  /// over is reached by these.
+  closed,
+  /// Of a living process, which may be this one, or of one that was killed: its shared memory is
+  /// made
+  /// anew, and who still has the old one open does not reach the new one.
+  taken
 };
+
+Ports shared_memory_of(std::int32_t port) {
+  const std::string file = "/dev/shm/fastrtps_port" + std::to_string(port);
+  std::error_code unreadable;
+  // The lock of who listens there.
+  if (std::filesystem::exists(file + "_el", unreadable)) return Ports::taken;
+  return std::filesystem::exists(file, unreadable) ? Ports::closed : Ports::fresh;
+}
 
 Ports ports_of(std::uint32_t domain_id, std::int32_t participant_id) {
   // As the standard maps them: discovery, and data.
   const std::int32_t discovery =
       7400 + 250 * static_cast<std::int32_t>(domain_id) + 10 + 2 * participant_id;
   const std::int32_t data = discovery + 1;
-  if (is_udp_port_used(discovery) || is_udp_port_used(data)) return Ports::used;
-  return has_shared_memory(discovery) || has_shared_memory(data) ? Ports::left : Ports::fresh;
+  if (is_udp_port_used(discovery) || is_udp_port_used(data)) return Ports::taken;
+  return std::max(shared_memory_of(discovery), shared_memory_of(data));
 }
 
-/// Ports that no process had, if there are any. By default a process gets those of the last one
-/// that was killed, and processes that still have that one's shared memory open do not reach the
-/// new one.
-std::int32_t fresh_participant_id(std::uint32_t domain_id) {
+/// By default a process gets the ports of the last one that was killed. Nothing where all are
+/// taken.
+std::optional<std::int32_t> free_participant_id(std::uint32_t domain_id) {
   // Fast DDS numbers participants without a number from 0; no two of one process may have the same
   // number, not even in different domains.
   constexpr std::int32_t first = 20;
   // The highest domain's ports end at 65535, those of others where the next domain's begin.
   const std::int32_t ids = (domain_id == max_domain_id ? 60 : 120) - first;
   static std::atomic<std::int32_t> participants_made{0};
-  std::optional<std::int32_t> left;
+  std::optional<std::int32_t> closed;
   for (int tried = 0; tried < ids; ++tried) {
     // Never the same one twice in a row: two of one process must differ.
     const std::int32_t id = first + (::getpid() + participants_made++) % ids;
     const Ports ports = ports_of(domain_id, id);
     if (ports == Ports::fresh) return id;
-    if (ports == Ports::left) left = id;
+    if (ports == Ports::closed) closed = id;
   }
-  constexpr std::int32_t chosen_by_fast_dds = -1;
-  return left.value_or(chosen_by_fast_dds);
+  return closed;
 }
 
 }  // namespace
@@ -225,7 +233,12 @@ std::vector<std::string> set_discovery(const DdsOptions& options, DomainParticip
   } else if (udp && options.shared_memory && options.discovery_server.host.empty() &&
              options.node_name.empty()) {
     // A service keeps the usual ports, where processes look for it that list it as a peer.
-    qos.wire_protocol().participant_id = fresh_participant_id(options.domain_id);
+    const auto id = free_participant_id(options.domain_id);
+    if (id) {
+      qos.wire_protocol().participant_id = *id;
+    } else {
+      leave_out_shared_memory(qos);
+    }
   }
   if (!options.discovery_server.host.empty()) {
     configure_discovery_client(options.discovery_server, builtin);

@@ -9,6 +9,7 @@
 #include <fastdds/dds/topic/ContentFilteredTopic.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 #include <fastdds/dds/topic/TypeSupport.hpp>
+#include <mutex>
 #include <sstream>
 #include <string_view>
 #include <typeinfo>
@@ -136,8 +137,14 @@ Participant::Handle Participant::join() {
   if (options_.domain_id > max_domain_id) {
     throw failure("domain ids go from 0 to " + std::to_string(max_domain_id));
   }
-  DomainParticipant* const made = factory_->create_participant(
-      static_cast<DomainId_t>(options_.domain_id), qos(), monitor_.get(), StatusMask::none());
+  DomainParticipant* const made = [&] {
+    // Of two threads of this process, the second must find the ports of the first one's used: no
+    // two of a process may have the same number.
+    static std::mutex making;
+    const std::scoped_lock lock(making);
+    return factory_->create_participant(static_cast<DomainId_t>(options_.domain_id), qos(),
+                                        monitor_.get(), StatusMask::none());
+  }();
   if (made == nullptr) {
     throw failure("Fast DDS made no participant; check that the interfaces exist on this machine " +
                   std::string("(`ip address`), that /dev/shm can be written, and that no other ") +
@@ -175,7 +182,7 @@ RemoteParticipant Participant::self() const {
   // As the others name it.
   if (!options_.node_name.empty()) self.ros_nodes = {"/" + options_.node_name};
   self.is_on_this_host = true;
-  self.uses_shared_memory = options_.shared_memory;
+  self.uses_shared_memory = has_shared_memory(handle_->get_qos());
   self.is_secured = identity_ != nullptr;
   self.endpoints = monitor_->local_endpoints();
   return self;

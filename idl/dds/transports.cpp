@@ -9,6 +9,7 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <chrono>
@@ -61,6 +62,10 @@ void require_shared_memory_room(std::uint64_t segment_mib) {
 
 // Of a peer without a port, as many processes are looked for.
 constexpr std::uint32_t max_participants_per_peer = 16;
+
+bool is_shared_memory(const std::shared_ptr<TransportDescriptorInterface>& transport) {
+  return std::dynamic_pointer_cast<SharedMemTransportDescriptor>(transport) != nullptr;
+}
 
 std::shared_ptr<TransportDescriptorInterface> udp_transport(const DdsOptions& options) {
   const auto udp = std::make_shared<UDPv4TransportDescriptor>();
@@ -160,6 +165,14 @@ void set_tcp_user_timeout(std::uint16_t listening_port, std::chrono::millisecond
     const auto timeout_ms = static_cast<unsigned int>(timeout.count());
     ::setsockopt(fd, IPPROTO_TCP, TCP_USER_TIMEOUT, &timeout_ms, sizeof timeout_ms);
   }
+}
+
+bool has_shared_memory(const eprosima::fastdds::dds::DomainParticipantQos& qos) {
+  return std::ranges::any_of(qos.transport().user_transports, is_shared_memory);
+}
+
+void leave_out_shared_memory(eprosima::fastdds::dds::DomainParticipantQos& qos) {
+  std::erase_if(qos.transport().user_transports, is_shared_memory);
 }
 
 }  // namespace stillmap::dds

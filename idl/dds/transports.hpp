@@ -12,6 +12,11 @@ namespace stillmap::dds {
 /// memory unless it is switched off.
 void set_transports(const DdsOptions& options, eprosima::fastdds::dds::DomainParticipantQos& qos);
 
+/// Whether messages go through shared memory where they can.
+[[nodiscard]] bool has_shared_memory(const eprosima::fastdds::dds::DomainParticipantQos& qos);
+/// UDP or TCP alone carries the messages.
+void leave_out_shared_memory(eprosima::fastdds::dds::DomainParticipantQos& qos);
+
 /// Receive buffer that the kernel really gives to a UDP socket asking for `wanted_bytes`
 /// (net.core.rmem_max caps it). Below 4 MB, large samples get lost over UDP. Throws DdsError when
 /// no socket can be made.
