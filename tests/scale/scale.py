@@ -100,8 +100,8 @@ class Server:
             ["nice", "-n", "19", self.options.probe, str(self.domain), mode, "0", "0", *arguments],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
         atexit.register(probe.kill)
-        if probe.stdout.readline().strip() != "ready":
-            raise SystemExit(f"scale: {mode} failed; see {self.log.name}")
+        if (said := probe.stdout.readline().strip()) != "ready":
+            raise SystemExit(f"scale: {mode} failed ({said}); see {self.log.name}")
         return probe
 
     def processor_s(self):
@@ -194,14 +194,14 @@ def measure(options, tiles, out):
     big.probe("park")
     big.stop()
     big.start("latest")
-    idle = big.probe("ages", options.seconds)
+    idle = big.probe("ages", 5 * options.seconds)
     figures["poses' p99, idle"] = idle["p99_ms"]
     if not options.base:
         for name, maps in (("19 clients", []), ("20 clients", [fresh.name, other.name])):
             busy, clients = beside_clients(big, 5 * options.seconds, *maps)
             print(f"{tiles} tiles, poses' age: idle {idle}; beside {name} {busy}; {clients}", flush=True)
             figures[f"poses' p99 beside {name} / idle"] = busy["p99_ms"] / idle["p99_ms"]
-            figures[f"poses beside {name}, share that came"] = busy["poses"] / (5 * idle["poses"])
+            figures[f"poses beside {name}, share that came"] = busy["poses"] / idle["poses"]
     if options.standing:
         figures["standing robot"] = standing_mb_a_day(big)
     big.stop()
