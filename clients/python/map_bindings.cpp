@@ -307,9 +307,9 @@ void bind_map(py::module_& module) {
           "winner alone.")
       .def("removed", &removed_of,
            "What is kept out of the map, and why: position_map (n, 3) float32 [m], label (n,), "
-           "reason (n,) text, last_seen_ns (n,). Empty for a map of a server; ask the client. Read "
-           "from "
-           "the file when it is asked for: raises MapFileError if that was changed since.")
+           "reason (n,) text, last_seen_ns (n,). Empty for a map of a server; ask the client. Of a "
+           "map file, it is read when it is asked for: raises MapFileError if the file was changed "
+           "since.")
       .def("query", &query, py::arg("region"), py::arg("classes") = std::vector<std::string>{},
            py::arg("resolution_m") = 0.0,
            "Voxels of a region. classes: names, none are all. resolution_m: 0 is the map's own. "

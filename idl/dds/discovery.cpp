@@ -14,6 +14,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <random>
 #include <sstream>
 #include <string>
 #include <system_error>
@@ -168,15 +169,14 @@ bool is_udp_port_used(std::int32_t port) {
 
 /// What is known of a participant's ports, from the best to the worst.
 enum class Ports {
-  /// No process had them, as far as can be seen.
+  /// There is no shared memory of them.
   fresh,
-  /// The process that had them ended, while others still have their shared memory open; who takes
-  /// it
-  /// over is reached by these.
+  /// Whoever had them ended by itself, as a rule, while others still have their shared memory open:
+  /// these reach who takes it over.
   closed,
-  /// Of a living process, which may be this one, or of one that was killed: its shared memory is
-  /// made
-  /// anew, and who still has the old one open does not reach the new one.
+  /// Of a living process, which may be this one, or of one that was killed. That one's shared
+  /// memory
+  /// is made anew, and who still has the old one open does not reach the new one.
   taken
 };
 
@@ -202,18 +202,21 @@ Ports ports_of(std::uint32_t domain_id, std::int32_t participant_id) {
 std::optional<std::int32_t> free_participant_id(std::uint32_t domain_id) {
   // Fast DDS numbers participants without a number from 0; no two of one process may have the same
   // number, not even in different domains.
-  constexpr std::int32_t first = 20;
+  constexpr std::uint32_t first = 20;
   // The highest domain's ports end at 65535, those of others where the next domain's begin.
-  const std::int32_t ids = (domain_id == max_domain_id ? 60 : 120) - first;
-  static std::atomic<std::int32_t> participants_made{0};
+  const std::uint32_t ids = (domain_id == max_domain_id ? 60 : 120) - first;
+  // Not the process's number: in containers, all have the same.
+  static std::atomic<std::uint32_t> next{std::random_device{}() % ids};
   std::optional<std::int32_t> closed;
-  for (int tried = 0; tried < ids; ++tried) {
+  for (std::uint32_t tried = 0; tried < ids; ++tried) {
     // Never the same one twice in a row: two of one process must differ.
-    const std::int32_t id = first + (::getpid() + participants_made++) % ids;
+    const auto id = static_cast<std::int32_t>(first + next++ % ids);
     const Ports ports = ports_of(domain_id, id);
     if (ports == Ports::fresh) return id;
-    if (ports == Ports::closed) closed = id;
+    if (ports == Ports::closed && !closed) closed = id;
   }
+  // Or the next one in another domain would begin, and end, where this one did.
+  ++next;
   return closed;
 }
 

@@ -29,6 +29,8 @@ bool is_segment_name(const std::string& name) {
   return name.starts_with("fastrtps_") && !name.ends_with("_el") && !name.ends_with("_sl");
 }
 
+bool is_port_name(const std::string& name) { return name.starts_with("fastrtps_port"); }
+
 fs::path beside(const fs::path& file, const std::string& ending) { return file.string() + ending; }
 
 void remove_segment(const fs::path& folder, const std::string& name) {
@@ -60,10 +62,12 @@ std::vector<SharedMemorySegment> shared_memory_segments(const fs::path& folder) 
   return segments;
 }
 
-int remove_stale_segments(const fs::path& folder, std::chrono::seconds min_age) {
+int remove_stale_segments(const fs::path& folder, std::chrono::seconds min_age,
+                          StaleSegments which) {
   int removed = 0;
   for (const SharedMemorySegment& segment : shared_memory_segments(folder)) {
     if (!segment.is_stale || segment.age < min_age) continue;
+    if (which == StaleSegments::without_ports && is_port_name(segment.name)) continue;
     remove_segment(folder, segment.name);
     if (!fs::exists(folder / segment.name)) ++removed;
   }

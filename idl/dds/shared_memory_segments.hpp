@@ -23,8 +23,16 @@ struct SharedMemorySegment {
 [[nodiscard]] std::vector<SharedMemorySegment> shared_memory_segments(
     const std::filesystem::path& folder);
 
+enum class StaleSegments {
+  all,
+  /// Those of messages. What lies at a port, half a MB, a living process may have open: once it is
+  /// removed, that process does not reach who comes to have the port.
+  without_ports
+};
+
 /// Removes the stale segments with their locks, where that is allowed; returns how many. One that
 /// is younger than `min_age` may not have been locked yet.
-int remove_stale_segments(const std::filesystem::path& folder, std::chrono::seconds min_age);
+int remove_stale_segments(const std::filesystem::path& folder, std::chrono::seconds min_age,
+                          StaleSegments which = StaleSegments::all);
 
 }  // namespace stillmap::dds

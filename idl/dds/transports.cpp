@@ -49,7 +49,7 @@ void require_shared_memory_room(std::uint64_t segment_mib) {
     return free_shared_memory_mib().value_or(needed_mib) >= needed_mib;
   };
   if (is_enough()) return;
-  remove_stale_segments(shared_memory_folder, min_age);
+  remove_stale_segments(shared_memory_folder, min_age, StaleSegments::without_ports);
   if (is_enough()) return;
   throw DdsError(
       "/dev/shm has " + std::to_string(free_shared_memory_mib().value_or(0)) +

@@ -88,8 +88,13 @@ TEST_F(HostFactsTest, TellSegmentsOfTheDeadFromThoseOfTheLiving) {
   // It may be about to be locked.
   EXPECT_EQ(dds::remove_stale_segments(root_ / "dev/shm", 60s), 0);
   EXPECT_TRUE(exists("dev/shm/fastrtps_0123456789abcdef"));
-  EXPECT_EQ(dds::remove_stale_segments(root_ / "dev/shm", 0s), 1);
+  write("dev/shm/fastrtps_port7410", "");
+  EXPECT_EQ(dds::remove_stale_segments(root_ / "dev/shm", 0s, dds::StaleSegments::without_ports),
+            1);
   EXPECT_FALSE(exists("dev/shm/fastrtps_0123456789abcdef"));
+  EXPECT_TRUE(exists("dev/shm/fastrtps_port7410"));
+  EXPECT_EQ(dds::remove_stale_segments(root_ / "dev/shm", 0s), 1);
+  EXPECT_FALSE(exists("dev/shm/fastrtps_port7410"));
   EXPECT_FALSE(exists("dev/shm/fastrtps_0123456789abcdef_el"));
   EXPECT_TRUE(exists("dev/shm/sem.other"));
 }

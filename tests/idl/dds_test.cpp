@@ -1,13 +1,8 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <filesystem>
 #include <fstream>
-#include <initializer_list>
 #include <memory>
-#include <mutex>
 #include <set>
-#include <sstream>
 #include <thread>
 #include <vector>
 
@@ -208,93 +203,6 @@ TEST_P(OverTransport, GivesALateJoinerTheNewestOfEveryKey) {
 
 INSTANTIATE_TEST_SUITE_P(Dds, OverTransport, testing::Values(false, true),
                          [](const auto& info) { return info.param ? "SharedMemory" : "Udp"; });
-
-constexpr int ports_of_domain = 250;
-
-/// Whose shared memory there is, of ports of the domain, while it lives.
-class LeftPorts {
- public:
-  explicit LeftPorts(std::uint32_t domain_id)
-      : first_(7400 + ports_of_domain * static_cast<int>(domain_id)) {}
-  ~LeftPorts() {
-    for (const auto& file : files_) std::filesystem::remove(file);
-  }
-  LeftPorts(const LeftPorts&) = delete;
-  LeftPorts& operator=(const LeftPorts&) = delete;
-  /// Of all but these.
-  void add(const std::string& suffix, std::initializer_list<int> others = {}) {
-    for (int port = 0; port < ports_of_domain; ++port) {
-      if (std::ranges::find(others, port) != others.end()) continue;
-      files_.emplace_back("/dev/shm/fastrtps_port" + std::to_string(first_ + port) + suffix);
-      std::ofstream(files_.back()).put('x');
-    }
-  }
-  /// Whether a process of this machine receives at it.
-  [[nodiscard]] bool is_used(int port) const {
-    std::ifstream sockets("/proc/net/udp");
-    std::ostringstream text;
-    text << sockets.rdbuf();
-    std::ostringstream wanted;
-    wanted << ':' << std::hex << std::uppercase << first_ + port << ' ';
-    return text.str().find(wanted.str()) != std::string::npos;
-  }
-
- private:
-  int first_;
-  std::vector<std::filesystem::path> files_;
-};
-
-// Where a server has outlived more processes than there are ports, each thread looks at all of
-// them.
-TEST(Participant, ThreadsThatMakeSeveralAtOnceGetDifferentPorts) {
-  const DdsOptions options = loopback(true);
-  LeftPorts left(options.domain_id);
-  left.add("");
-  constexpr int participants = 12;
-  std::mutex mutex;
-  std::vector<std::unique_ptr<Participant>> made;
-  std::vector<std::jthread> threads;
-  for (int i = 0; i < participants; ++i) {
-    threads.emplace_back([&] {
-      try {
-        auto participant = std::make_unique<Participant>(options);
-        const std::scoped_lock lock(mutex);
-        made.push_back(std::move(participant));
-      } catch (const DdsError& error) {
-        ADD_FAILURE() << error.what();
-      }
-    });
-  }
-  threads.clear();
-  EXPECT_EQ(made.size(), participants);
-}
-
-// Who still has their shared memory open would not reach it.
-TEST(Participant, LeavesThePortsOfProcessesThatWereKilledAlone) {
-  const DdsOptions options = loopback(true);
-  constexpr int discovery = 10 + 2 * 57;
-  LeftPorts left(options.domain_id);
-  left.add("");
-  left.add("_el", {discovery, discovery + 1});
-  const Participant participant(options);
-  EXPECT_TRUE(left.is_used(discovery));
-  EXPECT_TRUE(participant.self().uses_shared_memory);
-}
-
-TEST(Participant, DoesWithoutSharedMemoryWhereAllPortsAreOfProcessesThatWereKilled) {
-  const DdsOptions options = loopback(true);
-  LeftPorts left(options.domain_id);
-  left.add("_el");
-  Participant participant(options);
-  EXPECT_FALSE(participant.self().uses_shared_memory);
-  Participant third(options);
-  Writer<PointCloud2> writer(participant, "rt/points", {});
-  Reader<PointCloud2> reader(third, "rt/points", {});
-  ASSERT_TRUE(writer.readers().wait_for_any(discovery_timeout));
-  ASSERT_TRUE(writer.write(cloud_of(100, 1)));
-  PointCloud2 got;
-  EXPECT_TRUE(reader.take(got, {}, discovery_timeout));
-}
 
 TEST(Reader, StopsWaitingWhenAsked) {
   Participant participant(loopback(false));

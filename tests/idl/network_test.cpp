@@ -8,6 +8,8 @@
 #include <fastdds/dds/domain/qos/DomainParticipantQos.hpp>
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <thread>
@@ -107,30 +109,47 @@ TEST(ManyParticipants, OfOneProcessGetAlong) {
   }
 }
 
-/// What processes that were killed leave of all ports of a domain in shared memory.
-class DeadPorts {
+/// What processes leave of the ports of a domain in shared memory.
+class LeftPorts {
  public:
-  /// Of a domain where nobody left any yet.
-  DeadPorts() {
-    while (!std::ranges::none_of(files(), [](const auto& file) { return exists(file); }))
+  enum class By { ended, killed };
+
+  /// Of all ports but these, in a domain where nobody left any yet.
+  explicit LeftPorts(By by, const std::vector<std::uint32_t>& others = {}) {
+    while (!std::ranges::none_of(files(""), [](const auto& file) { return exists(file); }))
       lease_.emplace(test::DomainLease::take());
-    for (const auto& file : files()) std::ofstream(file) << "left behind";
+    for (const std::string& suffix :
+         by == By::ended ? std::vector<std::string>{""} : std::vector<std::string>{"", "_el"}) {
+      const auto all = files(suffix);
+      for (std::uint32_t port = 0; port < ports; ++port) {
+        if (std::ranges::find(others, port) != others.end()) continue;
+        std::ofstream(all[port]) << "left behind";
+      }
+    }
   }
-  ~DeadPorts() {
-    for (const auto& file : files()) std::filesystem::remove(file);
+  ~LeftPorts() {
+    std::error_code ignored;
+    for (const char* suffix : {"", "_el"})
+      for (const auto& file : files(suffix)) std::filesystem::remove(file, ignored);
   }
-  DeadPorts(const DeadPorts&) = delete;
-  DeadPorts& operator=(const DeadPorts&) = delete;
+  LeftPorts(const LeftPorts&) = delete;
+  LeftPorts& operator=(const LeftPorts&) = delete;
 
   [[nodiscard]] std::uint32_t domain_id() const {
     return static_cast<std::uint32_t>(lease_->domain());
   }
+  [[nodiscard]] bool is_there(std::uint32_t port, const std::string& suffix = "") const {
+    return exists(files(suffix)[port]);
+  }
 
  private:
-  [[nodiscard]] std::vector<std::filesystem::path> files() const {
+  static constexpr std::uint32_t ports = 250;
+
+  [[nodiscard]] std::vector<std::filesystem::path> files(const std::string& suffix) const {
     std::vector<std::filesystem::path> files;
-    for (std::uint32_t port = 0; port < 250; ++port) {
-      files.push_back("/dev/shm/fastrtps_port" + std::to_string(7400 + 250 * domain_id() + port));
+    for (std::uint32_t port = 0; port < ports; ++port) {
+      files.push_back("/dev/shm/fastrtps_port" + std::to_string(7400 + ports * domain_id() + port) +
+                      suffix);
     }
     return files;
   }
@@ -138,15 +157,70 @@ class DeadPorts {
   std::optional<test::DomainLease> lease_ = test::DomainLease::take();
 };
 
-TEST(ManyParticipants, GetAlongWhereDeadProcessesLeftAllPorts) {
-  const DeadPorts left;
+DdsOptions small_memory(const LeftPorts& left) {
   DdsOptions options = small_memory();
   options.domain_id = left.domain_id();
-  const Participant stays(options);
+  return options;
+}
+
+TEST(ManyParticipants, GetAlongWhereProcessesLeftAllPorts) {
+  const LeftPorts left(LeftPorts::By::ended);
+  const Participant stays(small_memory(left));
   for (int i = 0; i < 130; ++i) {
-    const Participant passes(options);
+    const Participant passes(small_memory(left));
     EXPECT_NE(passes.self().guid, stays.self().guid);
   }
+}
+
+// Each thread looks at all ports.
+TEST(ManyParticipants, ThatThreadsMakeAtOnceHaveDifferentPorts) {
+  const LeftPorts left(LeftPorts::By::ended);
+  constexpr int count = 12;
+  std::mutex mutex;
+  std::vector<std::unique_ptr<Participant>> made;
+  std::vector<std::jthread> threads;
+  for (int i = 0; i < count; ++i) {
+    threads.emplace_back([&] {
+      try {
+        auto participant = std::make_unique<Participant>(small_memory(left));
+        const std::scoped_lock lock(mutex);
+        made.push_back(std::move(participant));
+      } catch (const DdsError& error) {
+        ADD_FAILURE() << error.what();
+      }
+    });
+  }
+  threads.clear();
+  EXPECT_EQ(made.size(), count);
+}
+
+// Whoever still has a killed process's shared memory open does not reach who makes it anew.
+TEST(ManyParticipants, TakeOverThePortsOfThoseThatEndedAndOfNoneThatWasKilled) {
+  constexpr std::uint32_t node_port = 10;
+  constexpr std::uint32_t free_port = 10 + 2 * 57;
+  const LeftPorts left(LeftPorts::By::killed,
+                       {0, 1, node_port, node_port + 1, free_port, free_port + 1});
+  DdsOptions node = small_memory(left);
+  node.node_name = "node";
+  Participant stays(node);
+  for (int i = 0; i < 3; ++i) {
+    SCOPED_TRACE(i);
+    Participant passes(small_memory(left));
+    EXPECT_TRUE(passes.self().uses_shared_memory);
+    EXPECT_TRUE(left.is_there(free_port, "_el"));
+    expect_large_clouds_arrive(stays, passes);
+  }
+  // The node still has it open.
+  EXPECT_TRUE(left.is_there(free_port));
+  EXPECT_FALSE(left.is_there(free_port, "_el"));
+}
+
+TEST(ManyParticipants, DoWithoutSharedMemoryWhereAllPortsAreOfThoseThatWereKilled) {
+  const LeftPorts left(LeftPorts::By::killed);
+  Participant a(small_memory(left));
+  Participant b(small_memory(left));
+  EXPECT_FALSE(a.self().uses_shared_memory);
+  expect_large_clouds_arrive(a, b);
 }
 
 TEST(Network, WithoutMulticastProcessesOfOneMachineFindEachOther) {

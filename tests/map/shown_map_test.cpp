@@ -5,8 +5,13 @@
 #include <gmock/gmock.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdlib>
 #include <fstream>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <thread>
 
 #include "core/map/storage/read_lease.hpp"
 #include "tests/map/saved_maps.hpp"
@@ -38,6 +43,22 @@ class ShownMapTest : public testing::Test {
   fs::path file_ = folder_ / "city.stillmap";
 };
 
+class OtherTemporaryFolder {
+ public:
+  explicit OtherTemporaryFolder(const fs::path& folder) {
+    if (const char* const before = std::getenv("TMPDIR")) before_ = before;
+    ::setenv("TMPDIR", folder.c_str(), 1);
+  }
+  ~OtherTemporaryFolder() {
+    before_ ? ::setenv("TMPDIR", before_->c_str(), 1) : ::unsetenv("TMPDIR");
+  }
+  OtherTemporaryFolder(const OtherTemporaryFolder&) = delete;
+  OtherTemporaryFolder& operator=(const OtherTemporaryFolder&) = delete;
+
+ private:
+  std::optional<std::string> before_;
+};
+
 /// Without waiting for a lease to end.
 [[nodiscard]] bool can_be_written(const fs::path& file) {
   const int descriptor = ::open(file.c_str(), O_WRONLY | O_NONBLOCK | O_CLOEXEC);
@@ -56,11 +77,11 @@ TEST_F(ShownMapTest, IsTheMapAndTheFileStaysAsItIs) {
 TEST_F(ShownMapTest, NeedsNoCopyOfAFileThatNobodyElseHasOpen) {
   save(2);
   if (!ReadLease::take(file_)) GTEST_SKIP() << "this file system has no leases";
-  ASSERT_EQ(::setenv("TMPDIR", (folder_ / "none").c_str(), 1), 0);
+  // Nowhere could it be copied to.
+  const OtherTemporaryFolder none(folder_ / "none");
   const auto [shown, read_evidence] = read_shown_map(file_);
   EXPECT_THAT(message_of<MapFileError>([&] { static_cast<void>(read_evidence()); }),
               HasSubstr("TMPDIR"));
-  ::unsetenv("TMPDIR");
   EXPECT_EQ(shown.view.map_id, test::saved_map(2).view.map_id);
 }
 
@@ -91,14 +112,69 @@ TEST_F(ShownMapTest, BringsInTheLogOfACrash) {
 
 TEST_F(ShownMapTest, EvidenceOfAnotherStateIsNeverTaken) {
   save(2);
+  if (!ReadLease::take(file_)) GTEST_SKIP() << "this file system has no leases";
   const auto [shown, read_evidence] = read_shown_map(file_);
   const auto refusal = [&, &read = read_evidence] {
     return message_of<MapFileError>([&] { static_cast<void>(read()); });
   };
+  const auto is_changed = AllOf(StartsWith(file_.string()), HasSubstr("open it again"));
+  {
+    // The same map in the same version, a pose longer.
+    const auto store = open_map_file(file_);
+    SavedMap later = store->load();
+    StampedPose pose = later.trajectory.back();
+    pose.stamp_ns += 1;
+    later.trajectory.push_back(pose);
+    store->save(later);
+    EXPECT_THAT(refusal(), is_changed);
+  }
+  EXPECT_THAT(refusal(), is_changed);
   fs::remove(file_);
   EXPECT_THAT(refusal(), AllOf(StartsWith(file_.string()), HasSubstr("is not there")));
+}
+
+/// Somebody who opens the file for writing as soon as it is under a lease, and is let in.
+class Writer {
+ public:
+  explicit Writer(const fs::path& file)
+      : thread_([file](const std::stop_token& stop) {
+          while (!stop.stop_requested()) {
+            const int descriptor = ::open(file.c_str(), O_WRONLY | O_CLOEXEC);
+            if (descriptor >= 0) ::close(descriptor);
+          }
+        }) {}
+
+ private:
+  std::jthread thread_;
+};
+
+TEST_F(ShownMapTest, IsTheMapWhoeverWantsToWriteMeanwhile) {
+  save(2);
+  const Writer writer(file_);
+  for (int i = 0; i < 100; ++i) {
+    const auto [shown, read_evidence] = read_shown_map(file_);
+    EXPECT_EQ(shown.view.map_id, test::saved_map(2).view.map_id);
+  }
+}
+
+TEST_F(ShownMapTest, AFileThatIsReplacedMeanwhileIsOneOfTheTwo) {
+  save(2);
+  const std::string one = content_of(file_);
+  fs::remove(file_);
   save(3);
-  EXPECT_THAT(refusal(), AllOf(StartsWith(file_.string()), HasSubstr("open it again")));
+  const std::string other = content_of(file_);
+  const std::jthread replacer([&](const std::stop_token& stop) {
+    for (int i = 0; !stop.stop_requested(); ++i) {
+      std::ofstream(folder_ / "fresh", std::ios::binary) << (i % 2 == 0 ? one : other);
+      fs::rename(folder_ / "fresh", file_);
+      std::this_thread::sleep_for(std::chrono::milliseconds(2));
+    }
+  });
+  for (int i = 0; i < 100; ++i) {
+    const auto map_id = read_shown_map(file_).map.view.map_id;
+    EXPECT_TRUE(map_id == test::saved_map(2).view.map_id ||
+                map_id == test::saved_map(3).view.map_id);
+  }
 }
 
 TEST_F(ShownMapTest, NamesWhatCannotBeRead) {

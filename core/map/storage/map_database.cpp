@@ -30,6 +30,20 @@ std::string sqlite_name(const std::filesystem::path& file) {
   return std::filesystem::absolute(file).string();
 }
 
+std::string uri_without_log(const std::filesystem::path& file) {
+  constexpr std::string_view digits = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char letter : sqlite_name(file)) {
+    const auto byte = static_cast<unsigned char>(letter);
+    if (std::isalnum(byte) != 0 || letter == '/') {
+      uri += letter;
+    } else {
+      uri += {'%', digits[byte >> 4], digits[byte & 15]};
+    }
+  }
+  return uri + "?immutable=1";
+}
+
 namespace {
 
 namespace fs = std::filesystem;
@@ -74,21 +88,6 @@ constexpr const char* tile_info_index = R"sql(
   CREATE INDEX IF NOT EXISTS tile_infos ON tiles (
     x, y, revision, content_hash, voxel_count, min_x, min_y, min_z, max_x, max_y, max_z);
 )sql";
-
-/// A name with parameters; every byte that is more than a letter is written as its number.
-std::string sqlite_uri(const fs::path& file, const std::string& parameters) {
-  constexpr std::string_view digits = "0123456789ABCDEF";
-  std::string uri = "file:";
-  for (const char letter : sqlite_name(file)) {
-    const auto byte = static_cast<unsigned char>(letter);
-    if (std::isalnum(byte) != 0 || letter == '/') {
-      uri += letter;
-    } else {
-      uri += {'%', digits[byte >> 4], digits[byte & 15]};
-    }
-  }
-  return uri + "?" + parameters;
-}
 
 /// SQLite's file header has its numbers big-endian.
 std::uint32_t big_endian(std::string_view bytes) {
@@ -168,10 +167,9 @@ void create(const fs::path& file) {
   sync_folder(file);
 }
 
-/// `what`: a table, or how many faults are of interest. Not only pages: the index of tiles must say
-/// what their rows do.
-void check_integrity(SQLite::Database& database, const fs::path& file, const std::string& what) {
-  SQLite::Statement check(database, "PRAGMA integrity_check(" + what + ")");
+/// By one of SQLite's pragmas. Not only pages: the index of tiles must say what their rows do.
+void check_integrity(SQLite::Database& database, const fs::path& file, const std::string& pragma) {
+  SQLite::Statement check(database, "PRAGMA " + pragma);
   check.executeStep();
   if (const std::string verdict = check.getColumn(0).getString(); verdict != "ok") {
     throw MapFileError(file, "is damaged (" + verdict + "); restore a copy or name another file");
@@ -184,7 +182,7 @@ void check_pages(SQLite::Database& database, const fs::path& file) {
   const bool has_log = fs::exists(beside(file, "-wal"));
   sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, has_log ? 1 : 0,
                     nullptr);
-  check_integrity(database, file, "1");
+  check_integrity(database, file, "integrity_check(1)");
   sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 0, nullptr);
 }
 
@@ -290,8 +288,7 @@ SQLite::Database open_map_copy(const fs::path& file) {
 SQLite::Database open_map_in_place(const fs::path& file) {
   return opened(file, [](const fs::path& held) {
     check_header(held);
-    SQLite::Database database(sqlite_uri(held, "immutable=1"),
-                              SQLite::OPEN_READONLY | SQLite::OPEN_URI);
+    SQLite::Database database(uri_without_log(held), SQLite::OPEN_READONLY | SQLite::OPEN_URI);
     read_as_memory(database);
     return database;
   });
@@ -300,7 +297,7 @@ SQLite::Database open_map_in_place(const fs::path& file) {
 void check_shown_tables(SQLite::Database& database, const fs::path& file) {
   if (fs::file_size(file) > max_checked_bytes) return;
   for (const char* table : {"map", "tiles", "trajectory", "metadata"}) {
-    check_integrity(database, file, table);
+    check_integrity(database, file, std::string("integrity_check(") + table + ")");
   }
 }
 

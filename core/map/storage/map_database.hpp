@@ -18,6 +18,9 @@ inline constexpr std::uintmax_t max_checked_bytes = std::uintmax_t{64} << 20;
 /// such as "file:..." for a URI, which can mean any file.
 [[nodiscard]] std::string sqlite_name(const std::filesystem::path& file);
 
+/// An SQLite URI by which the file is opened as it is alone, without its log: to be read only.
+[[nodiscard]] std::string uri_without_log(const std::filesystem::path& file);
+
 /// Opens the SQLite database of a map file, made with an empty schema when there is no file yet.
 /// A file that is not a map file of this schema or the one before is refused (MapFileError) before
 /// anything could write to it, and so is a damaged one of up to `max_checked_bytes`; of a larger

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "core/map/storage/map_database.hpp"
+#include "core/map/storage/read_lease.hpp"
 #include "core/map/storage/save_marks.hpp"
 
 namespace stillmap {
@@ -56,9 +57,19 @@ std::unique_ptr<SQLite::Database> hold(const fs::path& file) {
   }
 }
 
+/// Again where another file got the name meanwhile: the size would be that of the one before.
+void copy_whole(const fs::path& file, const fs::path& copy) {
+  constexpr int max_attempts = 20;
+  for (int attempt = 0; attempt < max_attempts; ++attempt) {
+    const auto before = FileState::of(file);
+    fs::copy_file(file, copy, fs::copy_options::overwrite_existing);
+    if (FileState::of(file) == before) return;
+  }
+}
+
 void copy_with_log(const fs::path& file, const fs::path& copy) {
   const std::unique_ptr<SQLite::Database> held = hold(file);
-  fs::copy_file(file, copy);
+  copy_whole(file, copy);
   // A source that cannot be written must not make the copy so.
   fs::permissions(copy, fs::perms::owner_read | fs::perms::owner_write, fs::perm_options::add);
   const fs::path log = beside(file, "-wal");

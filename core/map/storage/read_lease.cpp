@@ -5,8 +5,16 @@
 #include <unistd.h>
 
 #include <csignal>
+#include <string>
 
 namespace stillmap {
+
+std::optional<FileState> FileState::of(const std::filesystem::path& file) {
+  struct stat facts {};
+  if (::stat(file.c_str(), &facts) != 0) return std::nullopt;
+  return FileState{facts.st_dev, facts.st_ino, facts.st_size,
+                   facts.st_mtim.tv_sec * 1'000'000'000 + facts.st_mtim.tv_nsec};
+}
 
 std::optional<ReadLease> ReadLease::take(const std::filesystem::path& file) {
   ReadLease lease(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
@@ -17,20 +25,21 @@ std::optional<ReadLease> ReadLease::take(const std::filesystem::path& file) {
       ::fcntl(lease.descriptor_, F_SETLEASE, F_RDLCK) != 0) {
     return std::nullopt;
   }
+  const auto state = FileState::of("/proc/self/fd/" + std::to_string(lease.descriptor_));
+  if (!state) return std::nullopt;
+  lease.state_ = *state;
   return lease;
 }
 
 ReadLease::~ReadLease() {
-  // Closing gives it back.
-  if (descriptor_ != no_descriptor) ::close(descriptor_);
+  if (descriptor_ == no_descriptor) return;
+  // Closing would do, but not where another thread has forked meanwhile.
+  ::fcntl(descriptor_, F_SETLEASE, F_UNLCK);
+  ::close(descriptor_);
 }
 
 bool ReadLease::is_unbroken(const std::filesystem::path& file) const {
-  struct stat held {};
-  struct stat named {};
-  return ::fcntl(descriptor_, F_GETLEASE) == F_RDLCK && ::fstat(descriptor_, &held) == 0 &&
-         ::stat(file.c_str(), &named) == 0 && held.st_dev == named.st_dev &&
-         held.st_ino == named.st_ino;
+  return ::fcntl(descriptor_, F_GETLEASE) == F_RDLCK && FileState::of(file) == state_;
 }
 
 }  // namespace stillmap

@@ -1,14 +1,27 @@
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <utility>
 
 namespace stillmap {
 
-/// A file that nobody has open for writing, and that nobody can: whoever tries waits for the end
-/// of the lease, for at most the system's lease-break-time (45 s). Linux gives it to the file's
-/// owner and to root.
+/// Which file has a name, and what changes when it is written to.
+struct FileState {
+  /// Nothing where there is no such file.
+  [[nodiscard]] static std::optional<FileState> of(const std::filesystem::path& file);
+
+  std::uint64_t device = 0;
+  std::uint64_t number = 0;
+  std::int64_t bytes = 0;
+  std::int64_t modified_ns = 0;
+  friend bool operator==(const FileState&, const FileState&) = default;
+};
+
+/// A file that no process of this machine has open for writing, and that none can: whoever tries
+/// waits for the end of the lease, for at most the system's lease-break-time (45 s). Linux gives it
+/// to the file's owner and to root.
 class ReadLease {
  public:
   /// Nothing where a program has the file open for writing, where it is another user's, or on a
@@ -16,13 +29,15 @@ class ReadLease {
   [[nodiscard]] static std::optional<ReadLease> take(const std::filesystem::path& file);
   ~ReadLease();
   ReadLease(ReadLease&& other) noexcept
-      : descriptor_(std::exchange(other.descriptor_, no_descriptor)) {}
+      : descriptor_(std::exchange(other.descriptor_, no_descriptor)), state_(other.state_) {}
   ReadLease(const ReadLease&) = delete;
   ReadLease& operator=(const ReadLease&) = delete;
   ReadLease& operator=(ReadLease&&) = delete;
 
-  /// Whether it is certain that nobody has written since: nobody waits to, and the file still has
-  /// this name.
+  /// When it was taken.
+  [[nodiscard]] const FileState& state() const { return state_; }
+  /// Whether it is certain that nobody has written since: nobody waits to, and the file of this
+  /// name is still as it was.
   [[nodiscard]] bool is_unbroken(const std::filesystem::path& file) const;
 
  private:
@@ -31,6 +46,7 @@ class ReadLease {
   explicit ReadLease(int descriptor) : descriptor_(descriptor) {}
 
   int descriptor_;
+  FileState state_;
 };
 
 }  // namespace stillmap

@@ -36,21 +36,6 @@ std::vector<std::int64_t> marks(SQLite::Database& database) {
   return all;
 }
 
-/// An SQLite URI that names the file: "immutable" reads it without its log.
-std::string uri_without_log(const fs::path& file) {
-  constexpr const char* digits = "0123456789ABCDEF";
-  std::string uri = "file:";
-  for (const char c : fs::absolute(file).string()) {
-    if (c == '?' || c == '#' || c == '%') {
-      const auto byte = static_cast<unsigned char>(c);
-      uri += {'%', digits[byte >> 4], digits[byte & 15]};
-    } else {
-      uri += c;
-    }
-  }
-  return uri + "?immutable=1";
-}
-
 /// Nothing where the file cannot be read without its log, as when a crash came while the log was
 /// written into it.
 std::optional<std::int64_t> last_mark_without_log(const fs::path& file) {

@@ -6,6 +6,8 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <system_error>
+#include <utility>
 
 #include "core/map/storage/map_database.hpp"
 #include "core/map/storage/map_file_copy.hpp"
@@ -44,33 +46,54 @@ SavedMap shown_of(const fs::path& file, const fs::path& opened, Open open) {
   }
 }
 
-/// Nothing where it is not certain that the file alone is the map, and stays so.
-std::optional<SavedMap> read_in_place(const fs::path& file) {
-  const fs::path real = real_file(file);
-  const std::optional<ReadLease> lease = ReadLease::take(real);
-  if (!lease || fs::exists(beside(real, "-wal")) || !is_map_file(real)) return std::nullopt;
-  SavedMap map = shown_of(file, real, open_map_in_place);
-  if (!lease->is_unbroken(real)) return std::nullopt;
-  return map;
+/// What a program that writes to the file, or did, may not have brought into it.
+bool has_log(const fs::path& file) {
+  std::error_code unreadable;
+  return fs::exists(beside(file, "-wal"), unreadable) || unreadable;
 }
 
-TileEvidenceMap evidence_of(const fs::path& file, std::uint64_t map_id, std::uint64_t version) {
+struct ReadInPlace {
+  SavedMap map;
+  FileState state;
+};
+
+/// Nothing where it is not certain that the file alone is the map, and stays so.
+std::optional<ReadInPlace> read_in_place(const fs::path& file) {
+  const fs::path real = real_file(file);
+  const std::optional<ReadLease> lease = ReadLease::take(real);
+  if (!lease || has_log(real) || !is_map_file(real)) return std::nullopt;
+  const auto is_certain = [&] { return lease->is_unbroken(real) && !has_log(real); };
+  try {
+    ReadInPlace read{shown_of(file, real, open_map_in_place), lease->state()};
+    if (is_certain()) return read;
+  } catch (const MapFileError&) {
+    // What was written to meanwhile looks damaged.
+    if (is_certain()) throw;
+  }
+  return std::nullopt;
+}
+
+TileEvidenceMap evidence_of(const fs::path& file, const FileState& state) {
+  const auto check = [&] {
+    const fs::path real = real_file(file);
+    const auto now = FileState::of(real);
+    if (!now || (*now == state && !has_log(real))) return;
+    throw MapFileError(file,
+                       "has been changed since it was opened, or a server has it open by now; "
+                       "open it again");
+  };
+  check();
   SavedMap map = read_map_file(file);
-  if (map.view.map_id == map_id && map.view.version == version) return map.tile_evidence;
-  throw MapFileError(file, "has been changed since it was opened (version " +
-                               std::to_string(version) + ", now " +
-                               std::to_string(map.view.version) + "); open it again");
+  check();
+  return std::move(map.tile_evidence);
 }
 
 }  // namespace
 
 ShownMap read_shown_map(const fs::path& file) {
-  if (std::optional<SavedMap> map = read_in_place(file)) {
-    const auto evidence = [file = fs::absolute(file), map_id = map->view.map_id,
-                           version = map->view.version] {
-      return evidence_of(file, map_id, version);
-    };
-    return {std::move(*map), evidence};
+  if (std::optional<ReadInPlace> read = read_in_place(file)) {
+    return {std::move(read->map),
+            [file = fs::absolute(file), state = read->state] { return evidence_of(file, state); }};
   }
   const auto copy = std::make_shared<const MapFileCopy>(file);
   return {shown_of(file, copy->path(), open_map_copy),

@@ -11,8 +11,9 @@ namespace stillmap {
 /// voxels.
 struct ShownMap {
   SavedMap map;
-  /// The evidence of the same state. Throws MapFileError where the file is not there any more or
-  /// has been changed since; one that a server had open was copied, and is read from the copy.
+  /// The evidence of the same state. Throws MapFileError where the file is not there any more, has
+  /// been changed, or is open in a server by now; one that a server had open when it was read was
+  /// copied, and its evidence is read from the copy.
   std::function<TileEvidenceMap()> read_evidence;
 };
 

@@ -11,8 +11,8 @@
 namespace stillmap {
 namespace {
 
-/// With long matches only: in planes of bytes, short ones cost more than the bytes. Half as much time
-/// as level 3, and no more bytes.
+/// With long matches only: in planes of bytes, short ones cost more than the bytes. Half as much
+/// time as level 3, and no more bytes.
 constexpr int compression_level = 1;
 constexpr int min_match_bytes = 7;
 /// Planes that are smaller share a block: each has a head, and a table of codes.
