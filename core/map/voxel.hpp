@@ -115,10 +115,9 @@ class ClassEvidence {
     const auto is_class = [&](std::size_t i) {
       return static_cast<std::size_t>(label(i)) < semantic_class_count;
     };
-    // Rounding adds a little to the greatest total. No branches: of tiles, all voxels are asked.
-    const bool is_within = total() <= max_steps + candidates;
-    const bool has_no_more = (bits_.classes >> (class_bits * candidates)) == 0;
-    return (is_within & has_no_more & is_class(0) & is_class(1) & is_class(2)) != 0;
+    // Rounding adds a little to the greatest total.
+    return total() <= max_steps + candidates && (bits_.classes >> (class_bits * candidates)) == 0 &&
+           is_class(0) && is_class(1) && is_class(2);
   }
   /// To the greatest total, where it is exceeded.
   void scale_down();
