@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <stdexcept>
 #include <utility>
@@ -45,13 +44,6 @@ std::size_t map_share_bytes(const MapFileConfig& config) {
 }
 
 }  // namespace
-
-MappingThread::PreparedMap::PreparedMap(StaticMap static_map, SharedTrajectory trajectory,
-                                        std::shared_ptr<TileStore> store)
-    : map(ResumedMap::of(std::move(static_map))),
-      path(std::move(trajectory)),
-      tile_store(std::move(store)),
-      seen_until_ns(server::seen_until_ns(*map.map.view(), path)) {}
 
 MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segmenter> segmenter,
                              const std::optional<SavedMap>& stored,

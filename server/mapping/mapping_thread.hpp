@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "config/loaders/server_config.hpp"
@@ -108,7 +109,11 @@ class MappingThread : public CheckpointSource {
  private:
   /// A map that can take the running one's place.
   struct PreparedMap {
-    PreparedMap(StaticMap map, SharedTrajectory path, std::shared_ptr<TileStore> tile_store);
+    PreparedMap(StaticMap static_map, SharedTrajectory trajectory, std::shared_ptr<TileStore> store)
+        : map(ResumedMap::of(std::move(static_map))),
+          path(std::move(trajectory)),
+          tile_store(std::move(store)),
+          seen_until_ns(server::seen_until_ns(*map.map.view(), path)) {}
 
     ResumedMap map;
     SharedTrajectory path;

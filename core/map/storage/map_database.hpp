@@ -31,8 +31,8 @@ inline constexpr std::uintmax_t max_checked_bytes = std::uintmax_t{64} << 20;
 /// The same of a copy that is nobody else's, whose pages are not checked yet. It is read as memory,
 /// which is eight times as fast; of a file that another process may cut off, this one would die.
 [[nodiscard]] SQLite::Database open_map_copy(const std::filesystem::path& file);
-/// The same, for reading only, of a file that nobody can write to meanwhile (ReadLease) and that
-/// has no log: nothing is locked, made or written.
+/// The same, for reading only, of a file under a ReadLease that has no log: nothing is locked, made
+/// or written.
 [[nodiscard]] SQLite::Database open_map_in_place(const std::filesystem::path& file);
 /// Checks what a reader of voxels reads, and not the pages of evidence, of a file of up to
 /// `max_checked_bytes`. Throws as open_map_database.

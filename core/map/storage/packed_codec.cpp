@@ -129,7 +129,7 @@ ClassEvidence::Bits evidence_at(std::size_t i, const StoredVoxels& stored) {
   return {{weights[0][i], weights[1][i], weights[2][i]}, classes[i]};
 }
 
-/// Loops without branches, for compilers to take several voxels at a time.
+/// Throws where one of the first `count` is no voxel.
 void check_voxels(const StoredVoxels& stored, const VoxelParts& parts, std::size_t count,
                   std::uint32_t stamps) {
   bool is_impossible = false;
