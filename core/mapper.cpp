@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <span>
 #include <stdexcept>
 #include <utility>
 
@@ -25,6 +26,25 @@ std::vector<TileId> tile_ids(const MapSnapshot& view) {
   return ids;
 }
 
+/// Voxels of these tiles (ascending) that have anything within `range_m` of a position, in another
+/// frame.
+std::vector<LabelledPoint> points_near(
+    const MapSnapshot& view, std::span<const TileId> tiles, const Eigen::Vector3d& position_map,
+    double range_m, const Eigen::Isometry3d& T_frame_map = Eigen::Isometry3d::Identity()) {
+  std::vector<LabelledPoint> points;
+  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(range_m);
+  for (const auto& tile : tiles_in_box(view, {position_map - reach, position_map + reach})) {
+    if (!std::ranges::binary_search(tiles, tile->info.id)) continue;
+    const Eigen::AlignedBox3d bounds_map = tile->info.bounds_map.cast<double>();
+    if (bounds_map.exteriorDistance(position_map) > range_m) continue;
+    for (const Voxel& voxel : tile->voxels) {
+      const Eigen::Vector3d p = T_frame_map * voxel.mean_map.cast<double>();
+      points.push_back({p.cast<float>(), voxel.evidence.winner()});
+    }
+  }
+  return points;
+}
+
 MapperConfig checked(const MapperConfig& config) {
   if (const std::string faults = config.faults(); !faults.empty())
     throw std::invalid_argument(faults);
@@ -35,7 +55,17 @@ MapperConfig checked(const MapperConfig& config) {
 
 ResumedMap ResumedMap::of(StaticMap map) {
   std::vector<TileId> tiles = tile_ids(*map.view());
-  return {std::move(map), std::move(tiles)};
+  return {std::move(map), std::move(tiles), std::nullopt};
+}
+
+ResumedMap ResumedMap::of(StaticMap map, const Eigen::Vector3d& position_map,
+                          const MapperConfig& config) {
+  map.reload_near(position_map);
+  ResumedMap resumed = of(std::move(map));
+  std::vector<LabelledPoint> points_map =
+      points_near(*resumed.map.view(), resumed.tiles, position_map, config.static_map.max_range_m);
+  resumed.begin = Begin{position_map, {std::move(points_map), config.odometry.local_map}};
+  return resumed;
 }
 
 std::string MapperConfig::faults() const {
@@ -249,9 +279,10 @@ void Mapper::resume(const MapSnapshot& view, const TileEvidenceMap& tile_evidenc
 
 ResumedMap Mapper::resume(ResumedMap prepared) {
   ResumedMap until_now{std::exchange(static_map_.map(), std::move(prepared.map)),
-                       std::exchange(resumed_tiles_, {})};
+                       std::exchange(resumed_tiles_, {}), std::nullopt};
   clear_scan_state();
   resumed_tiles_ = std::move(prepared.tiles);
+  begin_ = std::move(prepared.begin);
   return until_now;
 }
 
@@ -272,6 +303,7 @@ void Mapper::clear_scan_state() {
   resumed_tiles_ = {};
   prior_map_added_at_map_.reset();
   tiles_reloaded_at_map_.reset();
+  begin_.reset();
   is_resumed_map_held_ = false;
   is_placed_ = false;
   scans_to_confirm_ = 0;
@@ -290,6 +322,7 @@ void Mapper::relocate(Odometry followed, int confirming_scans) {
   resumed_tiles_ = tile_ids(*static_map_.map().view());
   prior_map_added_at_map_.reset();
   tiles_reloaded_at_map_.reset();
+  begin_.reset();
   is_resumed_map_held_ = false;
 }
 
@@ -310,6 +343,11 @@ void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {
   const auto is_near = [&](const std::optional<Eigen::Vector3d>& place_map) {
     return place_map && (position_map - *place_map).norm() < prior_map_update_distance_m;
   };
+  if (begin_ && is_near(begin_->position_map)) {
+    prior_map_added_at_map_ = tiles_reloaded_at_map_ = begin_->position_map;
+    odometry_.begin_in(std::move(begin_->prior));
+  }
+  begin_.reset();
   StaticMap& map = static_map_.map();
   if (!is_near(tiles_reloaded_at_map_)) {
     tiles_reloaded_at_map_ = position_map;
@@ -317,20 +355,8 @@ void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {
   }
   if (is_resumed_map_held_ || is_near(prior_map_added_at_map_)) return;
   prior_map_added_at_map_ = position_map;
-  const auto view = map.view();
-  const Eigen::Isometry3d T_odom_map = T_map_odom_.inverse();
-  std::vector<LabelledPoint> points_odom;
-  const Eigen::Vector3d reach = Eigen::Vector3d::Constant(config_.static_map.max_range_m);
-  for (const auto& tile : tiles_in_box(*view, {position_map - reach, position_map + reach})) {
-    if (!std::ranges::binary_search(resumed_tiles_, tile->info.id)) continue;
-    const Eigen::AlignedBox3d bounds_map = tile->info.bounds_map.cast<double>();
-    if (bounds_map.exteriorDistance(position_map) > config_.static_map.max_range_m) continue;
-    for (const Voxel& voxel : tile->voxels) {
-      const Eigen::Vector3d p_odom = T_odom_map * voxel.mean_map.cast<double>();
-      points_odom.push_back({p_odom.cast<float>(), voxel.evidence.winner()});
-    }
-  }
-  odometry_.add_prior_map(points_odom);
+  odometry_.add_prior_map(points_near(*map.view(), resumed_tiles_, position_map,
+                                      config_.static_map.max_range_m, T_map_odom_.inverse()));
 }
 
 void Mapper::end_stage(std::string_view stage) const {

@@ -87,10 +87,19 @@ struct MapperListeners {
 struct ResumedMap {
   /// Takes time in proportion to the map's tiles.
   [[nodiscard]] static ResumedMap of(StaticMap map);
+  /// The same, ready for a scan that is expected near this position: its tiles there are in memory,
+  /// and the odometry's local map is made.
+  [[nodiscard]] static ResumedMap of(StaticMap map, const Eigen::Vector3d& position_map,
+                                     const MapperConfig& config);
 
   StaticMap map;
   /// Ascending. The tiles themselves would keep their voxels in memory, evicted or not.
   std::vector<TileId> tiles;
+  struct Begin {
+    Eigen::Vector3d position_map;
+    PriorMap prior;
+  };
+  std::optional<Begin> begin;
 };
 
 /// The pipeline of a scan: prepare, label, deskew, register, insert into the static map. One thread
@@ -214,6 +223,8 @@ class Mapper {
   std::vector<TileId> resumed_tiles_;
   std::optional<Eigen::Vector3d> tiles_reloaded_at_map_;
   std::optional<Eigen::Vector3d> prior_map_added_at_map_;
+  /// For the first scan of a resumed map.
+  std::optional<ResumedMap::Begin> begin_;
   bool is_resumed_map_held_ = false;
   bool is_placed_ = false;
   /// In a row.

@@ -93,8 +93,8 @@ struct Odometry::State {
   void confirm(const FeatureSets& features, const PosePrediction& prediction,
                OdometryResult& result) const {
     if (!started || config.paper_exact || result.health == OdometryHealth::lost) return;
-    if (!fits.are_known()) result = led_by_points(result, features, map, method());
-    result = confirmed_by_points(result, features, map, method());
+    result = fits.are_known() ? confirmed_by_points(result, features, map, method())
+                              : confirmed_at_start(result, features, map, has_prior_map, method());
     keep_to_limits(last, prediction, !has_jumped, sensor.motion_limits, result);
   }
   /// Calls a pose good only where the map says so that is older than any doubt of the place.
@@ -107,7 +107,10 @@ struct Odometry::State {
   /// To the covariance of a pose that is not confirmed.
   void add_drift(std::int64_t time_ns, const PosePrediction& prediction, OdometryResult& result);
   [[nodiscard]] SweepPrior sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,
-                                       const SweepMotion& motion) const;
+                                       const SweepMotion& motion) const {
+    if (!started) return {};
+    return last.sweep_prior(intervals.since_last_s(time_ns), sweep, motion);
+  }
   void extend_map(const ScanInParts& parts, const Step& step,
                   const Eigen::Isometry3d& T_map_middle);
   /// The first scan by the motion to the second, where that one rolled.
@@ -348,19 +351,6 @@ void Odometry::State::add_drift(std::int64_t time_ns, const PosePrediction& pred
                                         is_followed || prediction.is_prior);
 }
 
-SweepPrior Odometry::State::sweep_prior(std::int64_t time_ns, const SweepTimes& sweep,
-                                        const SweepMotion& motion) const {
-  SweepPrior prior;
-  if (!started) return prior;
-  prior.T_map_lidar_last = last.T_map_lidar;
-  const double interval_s = intervals.since_last_s(time_ns);
-  if (interval_s > 0.0 && interval_s < max_prediction_s)
-    prior.duration_share = std::min(1.0, sweep.duration_s / interval_s);
-  prior.compensated = motion.twist();
-  prior.rotation_is_measured = motion.rotation_is_measured();
-  return prior;
-}
-
 void Odometry::State::extend_map(const ScanInParts& parts, const Step& step,
                                  const Eigen::Isometry3d& T_map_middle) {
   FeatureSets features = map_features(parts, step.motion, config);
@@ -468,6 +458,14 @@ void Odometry::add_prior_map(std::span<const LabelledPoint> points_map) {
   state.has_prior_map |= !points_map.empty();
   if (state.stretch) state.stretch->add_prior_map(points_map);
   if (!state.started) state.prior_map.assign(points_map.begin(), points_map.end());
+}
+
+void Odometry::begin_in(PriorMap prior) {
+  State& state = *state_;
+  assert(!state.started && state.map.points.size() == 0);
+  state.has_prior_map = !prior.points_map.empty();
+  state.map = std::move(prior.local_map);
+  state.prior_map = std::move(prior.points_map);
 }
 
 void Odometry::reset() { *state_ = State(state_->first_config, state_->sensor); }

@@ -14,6 +14,7 @@
 #include "core/odometry/feature_map.hpp"
 #include "core/odometry/odometry_config.hpp"
 #include "core/odometry/odometry_state.hpp"
+#include "core/odometry/prior_map.hpp"
 #include "core/odometry/sweep_motion.hpp"
 
 namespace stillmap {
@@ -63,6 +64,9 @@ class Odometry {
   /// Adds points of a map made earlier (map frame) to the local map. Before the first scan: that
   /// scan is then relocalized in them, round its prior (see relocalize).
   void add_prior_map(std::span<const LabelledPoint> points_map);
+  /// The same with a map that was made ready elsewhere, at once, where nothing was added since this
+  /// one began.
+  void begin_in(PriorMap prior);
 
   /// Forgets poses and local map.
   void reset();

@@ -1,5 +1,7 @@
 #include "core/odometry/pose_search.hpp"
 
+#include <tbb/parallel_for.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,8 +16,8 @@ namespace stillmap {
 namespace {
 
 /// Starts round a pose that may be far off: rings of this many directions [m].
-constexpr int alignment_rings = 2;
-constexpr int alignment_directions = 8;
+constexpr std::size_t alignment_rings = 2;
+constexpr std::size_t alignment_directions = 8;
 constexpr double alignment_spacing_m = 1.5;
 constexpr int rough_iterations = 20;
 constexpr std::size_t rough_points = 300;
@@ -192,21 +194,26 @@ Eigen::Isometry3d align_points_around(const FeatureSets& features, const LocalMa
   const auto aligned_from = [&](const Eigen::Isometry3d& T) {
     return align_points(some, map.points, T, PoseTangent::Zero(), alignment);
   };
-  PointAlignment best = aligned_from(T_map_lidar);
-  for (int ring = 1; ring <= alignment_rings; ++ring) {
-    for (int k = 0; k < alignment_directions; ++k) {
-      const double bearing = 2.0 * std::numbers::pi * k / alignment_directions;
-      const double distance_m = ring * alignment_spacing_m;
-      // Along the map's axes: the lidar may be mounted tilted.
-      const PointAlignment other =
-          aligned_from(Eigen::Translation3d(distance_m * std::cos(bearing),
-                                            distance_m * std::sin(bearing), 0.0) *
-                       T_map_lidar);
-      // Where no structure shows the motion along a street all places on it fit alike.
-      if (other.fit > min_gain_of_other_start * best.fit) best = other;
+  std::vector<PointAlignment> aligned(1 + alignment_rings * alignment_directions);
+  tbb::parallel_for(std::size_t{0}, aligned.size(), [&](std::size_t start) {
+    if (start == 0) {
+      aligned[start] = aligned_from(T_map_lidar);
+      return;
     }
-  }
-  return best.T_map_lidar;
+    const auto ring = static_cast<double>((start - 1) / alignment_directions + 1);
+    const auto direction = static_cast<double>((start - 1) % alignment_directions);
+    const double bearing = 2.0 * std::numbers::pi * direction / alignment_directions;
+    const double distance_m = ring * alignment_spacing_m;
+    // Along the map's axes: the lidar may be mounted tilted.
+    aligned[start] = aligned_from(
+        Eigen::Translation3d(distance_m * std::cos(bearing), distance_m * std::sin(bearing), 0.0) *
+        T_map_lidar);
+  });
+  const PointAlignment* best = aligned.data();
+  // Where no structure shows the motion along a street all places on it fit alike.
+  for (const PointAlignment& other : aligned)
+    if (other.fit > min_gain_of_other_start * best->fit) best = &other;
+  return best->T_map_lidar;
 }
 
 /// The motion from the first scan to the second, which may be of any speed up to 40 m/s at 10 Hz,
@@ -258,12 +265,53 @@ std::vector<Eigen::Isometry3d> starts_without_prediction(const RegisteredScan& l
   return starts;
 }
 
+/// A pose that features found, or where the points align clearly better, as confirmed_at_start
+/// says.
+OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& features,
+                             const LocalMap& map, const OdometryConfig& config) {
+  PointAlignmentConfig alignment{.without_movable = labels_tell_enough(features, config)};
+  const auto aligned_from = [&](const Eigen::Isometry3d& T_map_lidar) {
+    return align_points(features, map.points, T_map_lidar, found.sweep_correction, alignment);
+  };
+  const PointAlignment aligned =
+      aligned_from(align_points_around(features, map, found.T_map_lidar, config));
+  alignment.max_iterations = 1;
+  const double fit_there = aligned_from(found.T_map_lidar).fit;
+  const Eigen::Isometry3d T_led = moved_level(found.T_map_lidar, aligned.T_map_lidar);
+  const PoseTangent off = boxminus(T_led, found.T_map_lidar);
+  const bool agrees = off.head<3>().norm() < max_first_deviation_m &&
+                      off.tail<3>().norm() < max_first_deviation_rad;
+  // Whether traffic pulls the features shows where nothing holds the points.
+  const double min_gain = 1.0 + min_first_gain * found.fit;
+  if (agrees || aligned.fit < min_gain * fit_there) return found;
+  // What the features say of that pose, which they do not move.
+  OdometryConfig in_place = config;
+  in_place.registration.max_iterations = 1;
+  OdometryResult result = register_features(features, map, T_led, in_place, found.sweep_correction);
+  if (result.health == OdometryHealth::lost) return found;
+  result.T_map_lidar = T_led;
+  result.sweep_correction = found.sweep_correction;
+  result.health = OdometryHealth::degenerate;
+  return result;
+}
+
 }  // namespace
 
 Eigen::Isometry3d RegisteredScan::motion_during(double period_s) const {
   if (interval_s <= 0.0 || period_s <= 0.0 || period_s > max_prediction_s)
     return Eigen::Isometry3d::Identity();
   return scaled_motion(motion, period_s / interval_s);
+}
+
+SweepPrior RegisteredScan::sweep_prior(double interval_to_next_s, const SweepTimes& sweep,
+                                       const SweepMotion& compensated) const {
+  SweepPrior prior;
+  prior.T_map_lidar_last = T_map_lidar;
+  if (interval_to_next_s > 0.0 && interval_to_next_s < max_prediction_s)
+    prior.duration_share = std::min(1.0, sweep.duration_s / interval_to_next_s);
+  prior.compensated = compensated.twist();
+  prior.rotation_is_measured = compensated.rotation_is_measured();
+  return prior;
 }
 
 void FitStatistics::add(const OdometryResult& result) {
@@ -327,32 +375,16 @@ OdometryResult confirmed_by_points(const OdometryResult& found, const FeatureSet
   return doubtful;
 }
 
-OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& features,
-                             const LocalMap& map, const OdometryConfig& config) {
-  PointAlignmentConfig alignment{.without_movable = labels_tell_enough(features, config)};
-  const auto aligned_from = [&](const Eigen::Isometry3d& T_map_lidar) {
-    return align_points(features, map.points, T_map_lidar, found.sweep_correction, alignment);
-  };
-  const PointAlignment aligned =
-      aligned_from(align_points_around(features, map, found.T_map_lidar, config));
-  alignment.max_iterations = 1;
-  const double fit_there = aligned_from(found.T_map_lidar).fit;
-  const Eigen::Isometry3d T_led = moved_level(found.T_map_lidar, aligned.T_map_lidar);
-  const PoseTangent off = boxminus(T_led, found.T_map_lidar);
-  const bool agrees = off.head<3>().norm() < max_first_deviation_m &&
-                      off.tail<3>().norm() < max_first_deviation_rad;
-  // Whether traffic pulls the features shows where nothing holds the points.
-  const double min_gain = 1.0 + min_first_gain * found.fit;
-  if (agrees || aligned.fit < min_gain * fit_there) return found;
-  // What the features say of that pose, which they do not move.
-  OdometryConfig in_place = config;
-  in_place.registration.max_iterations = 1;
-  OdometryResult result = register_features(features, map, T_led, in_place, found.sweep_correction);
-  if (result.health == OdometryHealth::lost) return found;
-  result.T_map_lidar = T_led;
-  result.sweep_correction = found.sweep_correction;
-  result.health = OdometryHealth::degenerate;
-  return result;
+OdometryResult confirmed_at_start(const OdometryResult& found, const FeatureSets& features,
+                                  const LocalMap& map, bool has_prior_map,
+                                  const OdometryConfig& config) {
+  if (has_prior_map) {
+    const OdometryResult confirmed = confirmed_by_points(found, features, map, config);
+    if (confirmed.health == OdometryHealth::good &&
+        confirmed.point_deviation_m < max_first_deviation_m)
+      return confirmed;
+  }
+  return confirmed_by_points(led_by_points(found, features, map, config), features, map, config);
 }
 
 OdometryResult doubted_where_pulled(OdometryResult found, const FeatureSets& features,

@@ -2,6 +2,7 @@
 
 #include "core/odometry/registration.hpp"
 #include "core/odometry/se3.hpp"
+#include "core/odometry/sweep_motion.hpp"
 
 namespace stillmap {
 
@@ -51,6 +52,9 @@ struct RegisteredScan {
   }
   /// What the velocity says of a time to come; no motion where it does not say.
   [[nodiscard]] Eigen::Isometry3d motion_during(double period_s) const;
+  /// What it tells of a sweep so long after it, whose points were compensated for a motion.
+  [[nodiscard]] SweepPrior sweep_prior(double interval_to_next_s, const SweepTimes& sweep,
+                                       const SweepMotion& compensated) const;
 };
 
 /// Where the next scan is expected.
@@ -75,12 +79,13 @@ struct PosePrediction {
                                                  const FeatureSets& features, const LocalMap& map,
                                                  const OdometryConfig& config);
 
-/// A pose of one of the first scans, `found` by features: what of a sparse lidar's rings lies on
-/// the road goes along with it, and pulls two sparse scans together by up to a metre. Where the
-/// points align clearly better some way off, the pose there, degenerate, with its tilt and height
-/// as the features have them.
-[[nodiscard]] OdometryResult led_by_points(const OdometryResult& found, const FeatureSets& features,
-                                           const LocalMap& map, const OdometryConfig& config);
+/// The same of one of the first scans, which little is known to judge by. What of a sparse lidar's
+/// rings lies on the road goes along with it, and pulls two sparse scans together by up to a metre:
+/// where the points align clearly better some way off, the pose there, degenerate, with its tilt
+/// and height as the features have them. In a map made earlier only where the points do not stay.
+[[nodiscard]] OdometryResult confirmed_at_start(const OdometryResult& found,
+                                                const FeatureSets& features, const LocalMap& map,
+                                                bool has_prior_map, const OdometryConfig& config);
 
 /// `found`, but no pose that was found without a robust kernel is good unless it stays where it is
 /// with one: traffic pulls the one along, and not the other.

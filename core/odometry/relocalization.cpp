@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "core/odometry/correlative_search.hpp"
+#include "core/odometry/prior_map.hpp"
 #include "core/odometry/scan_features.hpp"
 #include "core/odometry/se3.hpp"
 
@@ -25,11 +26,6 @@ constexpr double max_other_share = 0.85;
 /// Places that the correlative search proposes, for registration to try.
 constexpr std::size_t proposals = 16;
 constexpr double refinement_radius_m = 0.6;
-
-bool is_pole_like(SemanticClass label) {
-  return label == SemanticClass::pole || label == SemanticClass::trunk ||
-         label == SemanticClass::traffic_sign;
-}
 
 /// Zero, and six offsets in a ring round it.
 std::vector<Eigen::Vector3d> offsets_around(double radius_m) {
@@ -127,18 +123,6 @@ std::vector<Eigen::Isometry3d> propose_poses(const FeatureSets& features,
   for (const LabelledPoint& point : points_map)
     if (is_landmark(point.label)) of_map.push_back(point.position_map);
   return correlative_search(of_scan, of_map, T_map_lidar_guess, count, {.reach_m = reach_m});
-}
-
-void insert_prior_map(std::span<const LabelledPoint> points_map, LocalMap& map) {
-  std::vector<LabelledPoint> edges;
-  std::vector<LabelledPoint> planes;
-  map.points.insert(points_map);
-  for (const LabelledPoint& point : points_map) {
-    if (is_movable(point.label)) continue;
-    (is_pole_like(point.label) ? edges : planes).push_back(point);
-  }
-  map.edges.insert(edges);
-  map.planes.insert(planes);
 }
 
 OdometryResult relocalize(const FeatureSets& features, std::span<const LabelledPoint> prior_map,

@@ -6,10 +6,6 @@
 
 namespace stillmap {
 
-/// Adds points of a prior map (map frame): poles, trunks and traffic signs to the edges, all others
-/// to the planes. Movable objects are left out.
-void insert_prior_map(std::span<const LabelledPoint> points_map, LocalMap& map);
-
 /// All points of the map.
 [[nodiscard]] std::vector<LabelledPoint> points_of(const LocalMap& map);
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numbers>
 
-#include "core/odometry/relocalization.hpp"
+#include "core/odometry/prior_map.hpp"
 
 namespace stillmap {
 namespace {

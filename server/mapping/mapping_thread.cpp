@@ -51,7 +51,7 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
                              Statistics& statistics, LatestMap& latest_map,
                              const MappingOutputs& outputs)
     : map_limit_bytes_(map_share_bytes(config.map)),
-      map_config_(config.mapper.static_map),
+      mapper_config_(config.mapper),
       sensor_period_s_(config.mapper.sensor.period_s),
       publish_period_(config.publish.tiles_period_s),
       queue_(queue),
@@ -102,10 +102,10 @@ MappingThread::MappingThread(const ServerConfig& config, std::unique_ptr<Segment
 }
 
 void MappingThread::reset(std::uint64_t map_id, const std::shared_ptr<TileStore>& tile_store) {
-  StaticMap map(map_config_);
+  StaticMap map(mapper_config_.static_map);
   map.reset(map_id);
   map.use_tile_store(tile_store);
-  PreparedMap prepared(std::move(map), {}, tile_store);
+  PreparedMap prepared(ResumedMap::of(std::move(map)), {}, tile_store);
   requests_.run([&] { exchange(prepared); });
   spdlog::info("reset: map {} begins", map_id);
 }
@@ -121,17 +121,16 @@ std::function<void()> MappingThread::prepare(const SavedMap& stored,
   };
 }
 
-StaticMap MappingThread::resumed(const SavedMap& stored,
-                                 const std::shared_ptr<TileStore>& tile_store) const {
-  StaticMap map(map_config_);
+ResumedMap MappingThread::resumed(const SavedMap& stored,
+                                  const std::shared_ptr<TileStore>& tile_store) const {
+  StaticMap map(mapper_config_.static_map);
   map.resume(stored.view, stored.tile_evidence);
   map.begin_session();
   map.use_tile_store(tile_store);
   const SharedTrajectory& path = stored.trajectory;
   const Eigen::Vector3d last_map =
       path.empty() ? Eigen::Vector3d(0.0, 0.0, 0.0) : path.back().T_map_lidar.translation();
-  map.reload_near(last_map);
-  return map;
+  return ResumedMap::of(std::move(map), last_map, mapper_config_);
 }
 
 void MappingThread::exchange(PreparedMap& prepared) {

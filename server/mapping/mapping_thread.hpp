@@ -109,8 +109,8 @@ class MappingThread : public CheckpointSource {
  private:
   /// A map that can take the running one's place.
   struct PreparedMap {
-    PreparedMap(StaticMap static_map, SharedTrajectory trajectory, std::shared_ptr<TileStore> store)
-        : map(ResumedMap::of(std::move(static_map))),
+    PreparedMap(ResumedMap resumed, SharedTrajectory trajectory, std::shared_ptr<TileStore> store)
+        : map(std::move(resumed)),
           path(std::move(trajectory)),
           tile_store(std::move(store)),
           seen_until_ns(server::seen_until_ns(*map.map.view(), path)) {}
@@ -148,9 +148,9 @@ class MappingThread : public CheckpointSource {
   void stage_ended(std::string_view stage);
   /// Publishes the pose before the scan is inserted into the map, to keep the latency of poses low.
   void pose_found(std::int64_t stamp_ns, const OdometryResult& odometry);
-  /// The stored map, its tiles round the end of its path in memory.
-  [[nodiscard]] StaticMap resumed(const SavedMap& stored,
-                                  const std::shared_ptr<TileStore>& tile_store) const;
+  /// The stored map, ready for a scan from the end of its path.
+  [[nodiscard]] ResumedMap resumed(const SavedMap& stored,
+                                   const std::shared_ptr<TileStore>& tile_store) const;
   /// To be called in the thread that maps. The map until now is left in `prepared`: the thread that
   /// asked frees it.
   void exchange(PreparedMap& prepared);
@@ -178,7 +178,7 @@ class MappingThread : public CheckpointSource {
                    const std::function<bool(std::span<const TileId> some)>& action);
   /// Limit of the memory that the static map takes.
   std::size_t map_limit_bytes_;
-  StaticMapConfig map_config_;
+  MapperConfig mapper_config_;
   bool is_map_frozen_ = false;
   double sensor_period_s_;
   std::chrono::duration<double> publish_period_;

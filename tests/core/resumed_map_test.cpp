@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
@@ -90,6 +91,48 @@ TEST(ResumedMap, ARelocatedLidarIsLookedForInItAlsoWhereItWasHeldBack) {
       mapper.process(test::room_scan(60), T_map_lidar * test::level_pose(0.8, 0.5, 0.03));
   ASSERT_TRUE(found);
   EXPECT_LT(test::translation_error(found->odometry.T_map_lidar, T_map_lidar), 0.15);
+}
+
+std::vector<Eigen::Isometry3d> poses_of(Mapper& mapper, const Eigen::Isometry3d& T_map_hall) {
+  std::vector<Eigen::Isometry3d> T_map_lidar;
+  for (int k = 20; k < 26; ++k) {
+    const auto prior =
+        k == 20 ? std::optional(T_map_hall * test::room_pose(k).T_map_lidar) : std::nullopt;
+    const auto mapped = mapper.process(test::room_scan(k), prior);
+    EXPECT_TRUE(mapped);
+    if (mapped) T_map_lidar.push_back(mapped->odometry.T_map_lidar);
+  }
+  return T_map_lidar;
+}
+
+bool are_same(const std::vector<Eigen::Isometry3d>& a, const std::vector<Eigen::Isometry3d>& b) {
+  return std::ranges::equal(a, b,
+                            [](const auto& x, const auto& y) { return x.matrix() == y.matrix(); });
+}
+
+// What was prepared beside mapping is what the first scan would have had to prepare itself, where
+// the lidar is and where it is not.
+TEST(ResumedMap, APreparedBeginningChangesNoPose) {
+  Mapper maker(in_hall(), std::make_unique<NullSegmenter>());
+  Eigen::Isometry3d T_map_hall = Eigen::Isometry3d::Identity();
+  for (int k = 0; k < 20; ++k) {
+    const auto mapped = maker.process(test::room_scan(k)).value();
+    T_map_hall = mapped.odometry.T_map_lidar * test::room_pose(k).T_map_lidar.inverse();
+  }
+  const Eigen::Vector3d expected_map = (T_map_hall * test::room_pose(20).T_map_lidar).translation();
+  Mapper unprepared(in_hall(), std::make_unique<NullSegmenter>());
+  unprepared.resume(*maker.map_snapshot());
+  const auto poses = poses_of(unprepared, T_map_hall);
+  ASSERT_EQ(poses.size(), 6U);
+  for (const double off_m : {0.0, 100.0}) {
+    StaticMap map(in_hall().static_map);
+    map.resume(*maker.map_snapshot(), {});
+    ResumedMap prepared =
+        ResumedMap::of(std::move(map), expected_map + Eigen::Vector3d(off_m, 0.0, 0.0), in_hall());
+    Mapper mapper(in_hall(), std::make_unique<NullSegmenter>());
+    static_cast<void>(mapper.resume(std::move(prepared)));
+    EXPECT_TRUE(are_same(poses_of(mapper, T_map_hall), poses)) << off_m << " m off";
+  }
 }
 
 }  // namespace
