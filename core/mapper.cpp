@@ -26,7 +26,7 @@ std::vector<TileId> tile_ids(const MapSnapshot& view) {
   return ids;
 }
 
-/// Voxels of these tiles (ascending) that have anything within `range_m` of a position, in another
+/// Voxels of those of `tiles` (ascending) that reach within `range_m` of a position, in another
 /// frame.
 std::vector<LabelledPoint> points_near(
     const MapSnapshot& view, std::span<const TileId> tiles, const Eigen::Vector3d& position_map,
@@ -343,7 +343,7 @@ void Mapper::add_prior_map_near(const Eigen::Vector3d& position_map) {
   const auto is_near = [&](const std::optional<Eigen::Vector3d>& place_map) {
     return place_map && (position_map - *place_map).norm() < prior_map_update_distance_m;
   };
-  if (begin_ && is_near(begin_->position_map)) {
+  if (begin_ && !is_resumed_map_held_ && is_near(begin_->position_map)) {
     prior_map_added_at_map_ = tiles_reloaded_at_map_ = begin_->position_map;
     odometry_.begin_in(std::move(begin_->prior));
   }

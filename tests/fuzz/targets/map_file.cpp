@@ -25,7 +25,7 @@ void look_at(const std::filesystem::path& file) {
 /// As Python reads it, in place.
 void show(const std::filesystem::path& file) {
   try {
-    static_cast<void>(read_shown_map(file));
+    static_cast<void>(read_shown_map(file).read_evidence());
   } catch (const MapFileError&) {
   }
 }
