@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
+#include <memory>
 
 #include "core/dataset/scan_dataset.hpp"
 #include "core/mapper.hpp"
@@ -73,20 +74,32 @@ MapperConfig in_hall() {
   return config;
 }
 
-// A robot that was off the map it had loaded, was lost, and is found in it.
-TEST(ResumedMap, ARelocatedLidarIsLookedForInItAlsoWhereItWasHeldBack) {
+struct MadeMap {
+  std::shared_ptr<const MapSnapshot> view;
+  Eigen::Isometry3d T_map_hall;
+};
+
+/// Of the first 20 scans.
+MadeMap map_of_hall() {
   Mapper maker(in_hall(), std::make_unique<NullSegmenter>());
   Eigen::Isometry3d T_map_hall = Eigen::Isometry3d::Identity();
   for (int k = 0; k < 20; ++k) {
     const auto mapped = maker.process(test::room_scan(k)).value();
     T_map_hall = mapped.odometry.T_map_lidar * test::room_pose(k).T_map_lidar.inverse();
   }
+  return {maker.map_snapshot(), T_map_hall};
+}
+
+// A robot that was off the map it had loaded, was lost, and is found in it.
+TEST(ResumedMap, ARelocatedLidarIsLookedForInItAlsoWhereItWasHeldBack) {
+  const MadeMap made = map_of_hall();
   Mapper mapper(in_hall(), std::make_unique<NullSegmenter>());
-  mapper.resume(*maker.map_snapshot());
-  ASSERT_TRUE(mapper.process(test::room_scan(20), T_map_hall * test::room_pose(20).T_map_lidar));
+  mapper.resume(*made.view);
+  ASSERT_TRUE(
+      mapper.process(test::room_scan(20), made.T_map_hall * test::room_pose(20).T_map_lidar));
   mapper.hold_resumed_map(true);
   mapper.relocate(Odometry(in_hall().odometry, vlp_16()));
-  const Eigen::Isometry3d T_map_lidar = T_map_hall * test::room_pose(60).T_map_lidar;
+  const Eigen::Isometry3d T_map_lidar = made.T_map_hall * test::room_pose(60).T_map_lidar;
   const auto found =
       mapper.process(test::room_scan(60), T_map_lidar * test::level_pose(0.8, 0.5, 0.03));
   ASSERT_TRUE(found);
@@ -113,25 +126,21 @@ bool are_same(const std::vector<Eigen::Isometry3d>& a, const std::vector<Eigen::
 // What was prepared beside mapping is what the first scan would have had to prepare itself, where
 // the lidar is and where it is not.
 TEST(ResumedMap, APreparedBeginningChangesNoPose) {
-  Mapper maker(in_hall(), std::make_unique<NullSegmenter>());
-  Eigen::Isometry3d T_map_hall = Eigen::Isometry3d::Identity();
-  for (int k = 0; k < 20; ++k) {
-    const auto mapped = maker.process(test::room_scan(k)).value();
-    T_map_hall = mapped.odometry.T_map_lidar * test::room_pose(k).T_map_lidar.inverse();
-  }
-  const Eigen::Vector3d expected_map = (T_map_hall * test::room_pose(20).T_map_lidar).translation();
+  const MadeMap made = map_of_hall();
+  const Eigen::Vector3d expected_map =
+      (made.T_map_hall * test::room_pose(20).T_map_lidar).translation();
   Mapper unprepared(in_hall(), std::make_unique<NullSegmenter>());
-  unprepared.resume(*maker.map_snapshot());
-  const auto poses = poses_of(unprepared, T_map_hall);
+  unprepared.resume(*made.view);
+  const auto poses = poses_of(unprepared, made.T_map_hall);
   ASSERT_EQ(poses.size(), 6U);
   for (const double off_m : {0.0, 100.0}) {
     StaticMap map(in_hall().static_map);
-    map.resume(*maker.map_snapshot(), {});
+    map.resume(*made.view, {});
     ResumedMap prepared =
         ResumedMap::of(std::move(map), expected_map + Eigen::Vector3d(off_m, 0.0, 0.0), in_hall());
     Mapper mapper(in_hall(), std::make_unique<NullSegmenter>());
     static_cast<void>(mapper.resume(std::move(prepared)));
-    EXPECT_TRUE(are_same(poses_of(mapper, T_map_hall), poses)) << off_m << " m off";
+    EXPECT_TRUE(are_same(poses_of(mapper, made.T_map_hall), poses)) << off_m << " m off";
   }
 }
 
