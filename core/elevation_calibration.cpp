@@ -47,7 +47,7 @@ std::size_t voxels_with(MapperConfig config, double offset, std::size_t scans,
   OccupiedVoxels voxels(calibration);
   for (std::size_t k = 0; k < scans; ++k) {
     const auto mapped = mapper.process(scan_at(k));
-    if (mapped && mapped->odometry.is_confirmed)
+    if (mapped && mapped->odometry.is_confirmed())
       voxels.add(mapped->labelled.scan, mapped->odometry.T_map_lidar);
   }
   return voxels.count();

@@ -67,9 +67,12 @@ class LabelSynchronizer {
                                   const StaticMap* map);
 
   /// Inserts a registered scan into `map`: with `labels` where they are final; a scan whose own
-  /// labels are pending is kept until submit() receives them. `labelled` holds `labels.labels`.
+  /// labels are pending is kept until submit() receives them. `labelled` holds `labels.labels`. One
+  /// that `waits` (MapEntry) does so in the map.
   void insert(const LabelledScan& labelled, const Labels& labels,
-              const Eigen::Isometry3d& T_map_lidar, LendableMap& map);
+              const Eigen::Isometry3d& T_map_lidar, bool waits, LendableMap& map);
+  /// What becomes of such scans, by the entry of the next one, whose labels are still to come.
+  void decide_waiting(MapEntry entry);
 
   /// Moves the scans that it keeps.
   void correct(const MapCorrection& correction);
@@ -79,15 +82,22 @@ class LabelSynchronizer {
 
  private:
   void insert_late_labels(std::int64_t stamp_ns, PointLabels labels, LendableMap& map);
-  void remember_labelled(PosedScan posed);
+  /// A registered scan, and whether it waits.
+  struct Scanned {
+    PosedScan posed;
+    bool waits = false;
+
+    [[nodiscard]] std::int64_t stamp_ns() const { return posed.labelled.scan.stamp_ns; }
+  };
+  void remember_labelled(Scanned scanned);
 
   std::unique_ptr<SegmentationPipeline> segmentation_;
   SensorModel sensor_;
   /// The scans whose own labels are still to come, the earliest first.
-  std::deque<PosedScan> pending_;
+  std::deque<Scanned> pending_;
   /// The newest scan with labels of its own; its range image is made when labels are first
   /// propagated from it.
-  std::optional<PosedScan> last_labelled_;
+  std::optional<Scanned> last_labelled_;
   std::optional<LabelledRangeImage> last_labelled_image_;
 };
 

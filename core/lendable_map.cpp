@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cassert>
+#include <iterator>
 #include <utility>
+#include <vector>
 
 #include "core/lidar/range_image_view.hpp"
 
@@ -26,23 +28,36 @@ void LendableMap::insert(const LabelledScan& labelled, const Eigen::Isometry3d& 
   kept_.push_back({labelled, T_map_lidar});
 }
 
+void LendableMap::let_wait(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar) {
+  waiting_.add({labelled, T_map_lidar}, T_map_lidar.translation(), labelled.scan.size());
+}
+
+std::size_t LendableMap::decide_waiting(MapEntry entry, bool later) {
+  std::vector<PosedScan> entering = waiting_.decided_by(entry);
+  std::ranges::move(entering, std::back_inserter(confirmed_));
+  if (!later && !is_lent_) insert_confirmed();
+  return entering.size();
+}
+
 StaticMap& LendableMap::lend() {
   assert(!is_lent_);
   is_lent_ = true;
   return map_;
 }
 
-void LendableMap::insert_kept(std::size_t max_scans) {
+void LendableMap::insert_some(std::deque<PosedScan>& scans, std::size_t max_scans) {
   assert(!is_lent_);
-  for (; max_scans > 0 && !kept_.empty(); --max_scans) {
-    const PosedScan scan = std::move(kept_.front());
-    kept_.pop_front();
+  for (; max_scans > 0 && !scans.empty(); --max_scans) {
+    const PosedScan scan = std::move(scans.front());
+    scans.pop_front();
     insert_scan(scan.labelled, scan.T_map_lidar, sensor_, map_);
   }
 }
 
 void LendableMap::correct(const MapCorrection& correction) {
-  for (PosedScan& scan : kept_) scan.correct(correction);
+  for (auto* const scans : {&kept_, &confirmed_})
+    for (PosedScan& scan : *scans) scan.correct(correction);
+  waiting_.for_each([&](PosedScan& scan) { scan.correct(correction); });
 }
 
 StaticMap& LendableMap::map() {

@@ -9,6 +9,8 @@
 #include "core/lidar/sensor_model.hpp"
 #include "core/map/map_correction.hpp"
 #include "core/map/static_map.hpp"
+#include "core/odometry/odometry_state.hpp"
+#include "core/waiting_scans.hpp"
 
 namespace stillmap {
 
@@ -34,6 +36,17 @@ class LendableMap {
       : map_(config), sensor_(sensor) {}
 
   void insert(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar);
+  /// A scan of MapEntry::waits.
+  void let_wait(const LabelledScan& labelled, const Eigen::Isometry3d& T_map_lidar);
+  /// What becomes of those by the entry of the next scan, before that is inserted: they are
+  /// inserted now, or, where the map is lent or that is said, later by insert_confirmed(). Returns
+  /// how many.
+  std::size_t decide_waiting(MapEntry entry, bool later);
+  [[nodiscard]] std::size_t confirmed_scans() const { return confirmed_.size(); }
+  /// The oldest of them enter the map, which must not be lent; not in the order of all scans.
+  void insert_confirmed(std::size_t max_scans = std::numeric_limits<std::size_t>::max()) {
+    insert_some(confirmed_, max_scans);
+  }
 
   /// Until reclaim().
   [[nodiscard]] StaticMap& lend();
@@ -42,10 +55,16 @@ class LendableMap {
   /// Scans that wait to enter the map.
   [[nodiscard]] std::size_t kept_scans() const { return kept_.size(); }
   /// The oldest of them enter the map, which must not be lent. One that cannot is gone.
-  void insert_kept(std::size_t max_scans = std::numeric_limits<std::size_t>::max());
-  /// Moves the scans that are kept.
+  void insert_kept(std::size_t max_scans = std::numeric_limits<std::size_t>::max()) {
+    insert_some(kept_, max_scans);
+  }
+  /// Moves the scans that are not in the map yet.
   void correct(const MapCorrection& correction);
-  void forget_kept() { kept_.clear(); }
+  void forget_kept() {
+    kept_.clear();
+    confirmed_.clear();
+    waiting_.clear();
+  }
 
   /// Must not be lent.
   [[nodiscard]] StaticMap& map();
@@ -53,10 +72,14 @@ class LendableMap {
   [[nodiscard]] const StaticMap* readable() const { return is_lent_ ? nullptr : &map_; }
 
  private:
+  void insert_some(std::deque<PosedScan>& scans, std::size_t max_scans);
+
   StaticMap map_;
   SensorModel sensor_;
   bool is_lent_ = false;
   std::deque<PosedScan> kept_;
+  std::deque<PosedScan> confirmed_;
+  WaitingScans<PosedScan> waiting_;
 };
 
 }  // namespace stillmap

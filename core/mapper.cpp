@@ -138,12 +138,22 @@ std::optional<MappedScan> Mapper::process(
                     labels.provenance,
                     {std::move(scan), std::move(labels.labels), std::move(step.motion)},
                     labels.unlabelled_may_move(),
-                    T_odom_lidar};
-  if (step.result.is_confirmed)
-    label_synchronizer_.insert(mapped.labelled, labels, step.result.T_map_lidar, static_map_);
+                    T_odom_lidar,
+                    0};
+  mapped.entered_before = enter_map(mapped, labels);
   remember({mapped.labelled.scan.stamp_ns, step.result.T_map_lidar});
   end_stage("static_map");
   return mapped;
+}
+
+std::size_t Mapper::enter_map(const MappedScan& mapped, const LabelSynchronizer::Labels& labels) {
+  const OdometryResult& odometry = mapped.odometry;
+  label_synchronizer_.decide_waiting(odometry.map_entry);
+  const std::size_t entered = static_map_.decide_waiting(odometry.map_entry, keeps_confirmed_);
+  const bool waits = odometry.map_entry == MapEntry::waits;
+  if (waits || odometry.is_confirmed())
+    label_synchronizer_.insert(mapped.labelled, labels, odometry.T_map_lidar, waits, static_map_);
+  return entered;
 }
 
 void Mapper::remember(const StampedPose& pose) {
@@ -328,13 +338,13 @@ void Mapper::relocate(Odometry followed, int confirming_scans) {
 
 void Mapper::confirm_relocation(OdometryResult& result) {
   if (scans_to_confirm_ == 0) return;
-  const bool fits = result.health == OdometryHealth::good && result.is_confirmed;
+  const bool fits = result.health == OdometryHealth::good && result.is_confirmed();
   confirming_scans_ = fits ? confirming_scans_ + 1 : 0;
   if (confirming_scans_ >= scans_to_confirm_) {
     scans_to_confirm_ = 0;
     return;
   }
-  result.is_confirmed = false;
+  result.map_entry = MapEntry::stays_out_with_waiting;
   if (fits) result.health = OdometryHealth::degenerate;
 }
 

@@ -43,6 +43,8 @@ struct MappedScan {
   bool unlabelled_may_move = false;
   /// The same pose in the odometry's own frame, which no correction of the map moves.
   Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
+  /// So many scans before it have waited, and enter the map with it: see MapEntry.
+  std::size_t entered_before = 0;
 };
 
 /// Why a scan was not mapped.
@@ -145,6 +147,15 @@ class Mapper {
   /// velocity is kept.
   void relocate(Odometry followed, int confirming_scans = 5);
 
+  /// Whether scans that have waited (MapEntry) enter the map by insert_confirmed_scans(), not with
+  /// the scan that confirms them: they may be hundreds.
+  void keep_confirmed_scans(bool are_kept) { keeps_confirmed_ = are_kept; }
+  [[nodiscard]] std::size_t confirmed_scans() const { return static_map_.confirmed_scans(); }
+  /// The oldest of them enter the map, which must not be lent.
+  void insert_confirmed_scans(std::size_t max_scans = std::numeric_limits<std::size_t>::max()) {
+    static_map_.insert_confirmed(max_scans);
+  }
+
   /// Whether scans register against what a resumed map has near them only where that was added
   /// already. Where odometry has drifted away from it, it would be torn between both.
   void hold_resumed_map(bool is_held) { is_resumed_map_held_ = is_held; }
@@ -204,6 +215,8 @@ class Mapper {
   [[nodiscard]] std::optional<InertialMotion> inertial_motion(std::int64_t stamp_ns,
                                                               const SweepTimes& sweep);
   void teach_inertial(std::int64_t middle_ns, const Odometry::Step& step);
+  /// By its entry, with those that wait. Returns how many of these entered.
+  std::size_t enter_map(const MappedScan& mapped, const LabelSynchronizer::Labels& labels);
   /// Where the lidar was relocated, a scan is no part of the map until enough of them fitted.
   void confirm_relocation(OdometryResult& result);
   void end_stage(std::string_view stage) const;
@@ -225,6 +238,7 @@ class Mapper {
   std::optional<Eigen::Vector3d> prior_map_added_at_map_;
   /// For the first scan of a resumed map.
   std::optional<ResumedMap::Begin> begin_;
+  bool keeps_confirmed_ = false;
   bool is_resumed_map_held_ = false;
   bool is_placed_ = false;
   /// In a row.

@@ -28,7 +28,7 @@ struct Header {
   std::array<double, 12> pose{};
   std::uint64_t points = 0;
   std::uint64_t packed_bytes = 0;
-  std::uint32_t is_confirmed = 0;
+  std::uint32_t entry = 0;
   std::uint32_t has_labels = 0;
 };
 
@@ -37,6 +37,14 @@ struct Header {
 constexpr std::size_t planes = 9;
 
 constexpr float max_steps = 32767.0F;
+
+/// By the numbers that stand in the file.
+constexpr std::array entries{MapEntry::stays_out_with_waiting, MapEntry::enters,
+                             MapEntry::enters_with_waiting, MapEntry::waits, MapEntry::stays_out};
+
+bool has_points(MapEntry entry) {
+  return entry != MapEntry::stays_out && entry != MapEntry::stays_out_with_waiting;
+}
 
 /// What is farther than that along an axis is nearer on its ray: seen through as far as it matters,
 /// and in no other direction.
@@ -116,8 +124,9 @@ Header header_of(const LoggedScan& scan) {
   header.stamp_ns = scan.labelled.scan.stamp_ns;
   Eigen::Map<Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(header.pose.data()) =
       scan.T_odom_lidar.matrix().topRows<3>();
-  header.points = scan.is_confirmed ? scan.labelled.scan.size() : 0;
-  header.is_confirmed = scan.is_confirmed ? 1U : 0U;
+  header.points = has_points(scan.entry) ? scan.labelled.scan.size() : 0;
+  header.entry =
+      static_cast<std::uint32_t>(std::ranges::find(entries, scan.entry) - entries.begin());
   header.has_labels = scan.labelled.labels.empty() ? 0U : 1U;
   return header;
 }
@@ -125,6 +134,7 @@ Header header_of(const LoggedScan& scan) {
 bool read_header(std::istream& in, Header& header) {
   in.read(reinterpret_cast<char*>(&header), sizeof(header));
   return in && header.magic_number == magic && header.points <= max_points &&
+         header.entry < entries.size() &&
          header.packed_bytes <= ZSTD_compressBound(planes * header.points) + sizeof(std::uint32_t);
 }
 
@@ -184,7 +194,7 @@ LoggedScan ScanLog::at(std::size_t place) {
   if (!stream_ || size != bytes.size()) throw DatasetError(file_, "is damaged");
   LoggedScan scan{.index = header.index,
                   .T_odom_lidar = Eigen::Isometry3d::Identity(),
-                  .is_confirmed = header.is_confirmed != 0,
+                  .entry = entries[header.entry],
                   .labelled = from_planes(bytes, header)};
   scan.T_odom_lidar.matrix().topRows<3>() =
       Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(header.pose.data());

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/lidar/labelled_scan.hpp"
+#include "core/odometry/odometry_state.hpp"
 
 namespace stillmap {
 
@@ -17,8 +18,8 @@ struct LoggedScan {
   /// Number of the scan in its sequence.
   std::uint64_t index = 0;
   Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
-  /// Only such scans have points.
-  bool is_confirmed = false;
+  /// Only scans that enter the map or may do so later have points.
+  MapEntry entry = MapEntry::enters;
   /// Points [m] in steps of 4 mm, up to 131 m along each axis; classes; confidence in 1/255;
   /// motion.
   LabelledScan labelled;

@@ -76,7 +76,7 @@ void GlobalLocalization::follow(const Scan& scan, const PointLabels& labels) {
     return step.result;
   };
   const OdometryResult followed = register_scan();
-  const bool is_lost = followed.health == OdometryHealth::lost || !followed.is_confirmed;
+  const bool is_lost = followed.health == OdometryHealth::lost || !followed.is_confirmed();
   // Nothing tells what lies between the scans before and this one.
   if (is_lost || followed.health == OdometryHealth::initialised) forget_evidence();
   if (is_lost) {

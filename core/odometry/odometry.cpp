@@ -294,6 +294,7 @@ void Odometry::State::confirm_place(const FeatureSets& features, const PosePredi
   if (result.health == OdometryHealth::lost) {
     // What the stretch has brought did not help: it is looked for in what was known before.
     if (stretch && lost_scans > 0) forget_stretch();
+    if (stretch && !stretch->has_jumped()) result.map_entry = MapEntry::stays_out;
     return;
   }
   const bool is_jump = !prediction.is_known;
@@ -313,7 +314,6 @@ void Odometry::State::confirm_place(const FeatureSets& features, const PosePredi
     fits = trusted.fits;
   }
   if (decision == confirmed || decision == settled) return stretch.reset();
-  result.is_confirmed = false;
   result.health = OdometryHealth::degenerate;
   if (decision == open) return;
   forget_stretch();
@@ -432,7 +432,7 @@ Odometry::Step Odometry::register_scan(Scan& scan, const SweepTimes& sweep,
   step.motion = classify_point_motion(scan, labels, parts.objects, parts.motion_classes,
                                       step.T_map_lidar_middle, state.map, state.config);
   const bool is_lost = step.result.health == OdometryHealth::lost;
-  if (!step.result.is_confirmed) state.add_drift(time_ns, prediction, step.result);
+  if (!step.result.is_confirmed()) state.add_drift(time_ns, prediction, step.result);
   state.lost_scans = is_lost ? state.lost_scans + 1 : 0;
   if (!is_lost) {
     state.extend_map(parts, step, step.T_map_lidar_middle);

@@ -18,6 +18,28 @@ enum class OdometryHealth : std::uint8_t {
   lost = 3,
 };
 
+/// What a pose is worth to a map: whether its scan becomes a part of it, and what becomes of the
+/// scans before it that wait. Those were followed, one from the other, since a place was left in
+/// doubt.
+enum class MapEntry : std::uint8_t {
+  /// It enters: it fits what was known before anything left the place in doubt. What waits is not
+  /// where it seemed to be.
+  enters,
+  /// It enters, and shows that what waits is where it seemed to be: that enters before it.
+  enters_with_waiting,
+  /// It waits until a later scan shows where it is. Until then scans agree at most with one
+  /// another.
+  waits,
+  /// It stays out. What waits goes on waiting.
+  stays_out,
+  /// It stays out, and nobody will know where that is what waits.
+  stays_out_with_waiting,
+};
+
+[[nodiscard]] constexpr bool is_confirmed(MapEntry entry) {
+  return entry == MapEntry::enters || entry == MapEntry::enters_with_waiting;
+}
+
 /// What registration says of one scan.
 struct OdometryResult {
   Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
@@ -26,9 +48,7 @@ struct OdometryResult {
   /// that is not confirmed, with what may have happened since one was.
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();
   OdometryHealth health = OdometryHealth::initialised;
-  /// The scan fits what was known before anything left the place in doubt. While it is false, scans
-  /// agree at most with one another, and are no part of the map.
-  bool is_confirmed = true;
+  MapEntry map_entry = MapEntry::enters;
   /// The scan fits only where what carries the lidar cannot have come; it is lost.
   bool is_beyond_limits = false;
   bool converged = false;
@@ -50,6 +70,9 @@ struct OdometryResult {
   double point_deviation_m = 0.0;
   /// Root mean square of the weighted residuals after the last iteration [m].
   double rms_residual_m = 0.0;
+
+  /// Whether the scan is a part of the map.
+  [[nodiscard]] bool is_confirmed() const { return stillmap::is_confirmed(map_entry); }
 };
 
 [[nodiscard]] constexpr const char* name(OdometryHealth health) {

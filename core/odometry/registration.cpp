@@ -373,7 +373,7 @@ OdometryResult lost_at(const Eigen::Isometry3d& T_map_lidar_predicted) {
   OdometryResult result;
   result.T_map_lidar = T_map_lidar_predicted;
   result.health = OdometryHealth::lost;
-  result.is_confirmed = false;
+  result.map_entry = MapEntry::stays_out_with_waiting;
   result.covariance = variance.asDiagonal();
   return result;
 }

@@ -18,6 +18,9 @@ constexpr int contradicting_scans = 5;
 /// which what stands up comes to the same place.
 constexpr double followed_distance_m = 1.0;
 constexpr double followed_angle_rad = 0.1;
+/// Those that were followed are where they seemed to be where the one that ends the doubt has slid
+/// no farther [m].
+constexpr double max_slide_m = 0.2;
 /// One that was looked for is confirmed by scans that each come to the place where the others have
 /// it [m, rad].
 constexpr double same_distance_m = 0.1;
@@ -85,6 +88,7 @@ UnconfirmedStretch::Decision UnconfirmedStretch::evaluate(const FeatureSets& fea
   if (found.health != OdometryHealth::good) {
     count_agreeing(false, found.T_map_lidar.translation());
     count_contradicting(false);
+    found.map_entry = entry_of_open();
     return is_overdue() ? Decision::contradicted : Decision::open;
   }
   OdometryResult in_trusted_map =
@@ -92,8 +96,20 @@ UnconfirmedStretch::Decision UnconfirmedStretch::evaluate(const FeatureSets& fea
   if (in_trusted_map.health == OdometryHealth::good)
     in_trusted_map = confirmed_by_points(in_trusted_map, features, trusted_.map, config);
   const Decision decision = decide(in_trusted_map, found);
+  const Eigen::Vector3d followed_to_map = found.T_map_lidar.translation();
   if (decision == Decision::confirmed) found = in_trusted_map;
+  if (decision == Decision::confirmed || decision == Decision::settled) {
+    const double slid_m = (found.T_map_lidar.translation() - followed_to_map).norm();
+    found.map_entry =
+        !has_jumped_ && slid_m < max_slide_m ? MapEntry::enters_with_waiting : MapEntry::enters;
+  } else {
+    found.map_entry = entry_of_open();
+  }
   return decision;
+}
+
+MapEntry UnconfirmedStretch::entry_of_open() const {
+  return has_jumped_ ? MapEntry::stays_out_with_waiting : MapEntry::waits;
 }
 
 bool UnconfirmedStretch::is_overdue() const {

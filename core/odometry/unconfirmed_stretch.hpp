@@ -46,7 +46,8 @@ class UnconfirmedStretch {
   void jump(double distance_m);
 
   /// Judges the stretch by a scan that was registered at `found`; one that is degenerate itself
-  /// tells nothing. Where it is confirmed, `found` becomes the pose in the trusted map.
+  /// tells nothing. Where it is confirmed, `found` becomes the pose in the trusted map. Says what
+  /// that is worth to a map: a stretch that was followed all along is a part of it once its end is.
   [[nodiscard]] Decision evaluate(const FeatureSets& features, const OdometryConfig& config,
                                   OdometryResult& found);
 
@@ -61,6 +62,7 @@ class UnconfirmedStretch {
   [[nodiscard]] bool stands_on_trusted_map(const OdometryResult& in_trusted_map) const;
   [[nodiscard]] Decision decide(const OdometryResult& in_trusted_map, const OdometryResult& found);
   [[nodiscard]] bool is_overdue() const;
+  [[nodiscard]] MapEntry entry_of_open() const;
 
   /// Counts the way on which scans showed all of their motion.
   void count_good(const OdometryResult& found);

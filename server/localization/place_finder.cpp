@@ -123,7 +123,7 @@ void PlaceFinder::add(const Scan& scan, const PointLabels& labels,
 void PlaceFinder::update(std::int64_t stamp_ns, const OdometryResult& odometry,
                          const Mapper& mapper) {
   const std::scoped_lock lock(mutex_);
-  if (odometry.health != OdometryHealth::lost && odometry.is_confirmed) {
+  if (odometry.health != OdometryHealth::lost && odometry.is_confirmed()) {
     lost_since_ns_.reset();
     if (search_ != 0 && !guess_) end_search();
     return;

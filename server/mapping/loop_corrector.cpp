@@ -108,12 +108,12 @@ void LoopCorrector::add(const GnssFix& fix) {
 
 void LoopCorrector::add(std::shared_ptr<const LabelledScan> labelled,
                         const Eigen::Isometry3d& T_odom_lidar,
-                        const Eigen::Isometry3d& T_base_lidar, bool is_confirmed) {
+                        const Eigen::Isometry3d& T_base_lidar, MapEntry entry) {
   const std::int64_t stamp_ns = labelled->scan.stamp_ns;
   if (stamp_ns <= std::exchange(last_stamp_ns_, stamp_ns)) is_clock_set_back_ = true;
   if (run_.map == 0) return;
   ScanOfMap scan{run_, std::move(labelled), run_.T_map_odom * T_odom_lidar,
-                 T_base_lidar.inverse() * antenna_base_, is_confirmed};
+                 T_base_lidar.inverse() * antenna_base_, entry};
   if (is_lossless_) {
     // The worker outlives mapping: there is nothing else to stop for.
     static_cast<void>(scans_.push_blocking(std::move(scan), failed_.get_token()));
@@ -176,9 +176,18 @@ void LoopCorrector::report(const MapCorrection& correction, const CorrectedMap& 
 void LoopCorrector::look_at(const ScanOfMap& scan) {
   if (scan.labelled == nullptr) {
     closer_.reset();
+    waiting_.clear();
     closed_map_ = 0;
     return;
   }
+  for (const ScanOfMap& waited : waiting_.decided_by(scan.entry)) close(waited, true);
+  if (scan.entry == MapEntry::waits)
+    return waiting_.add(scan, scan.T_odom_lidar.translation(), scan.labelled->scan.size());
+  // The closer takes scans in their order.
+  if (waiting_.empty()) close(scan, is_confirmed(scan.entry));
+}
+
+void LoopCorrector::close(const ScanOfMap& scan, bool enters) {
   const std::uint64_t map = scan.run.map;
   if (std::exchange(closed_map_, map) != map) {
     closer_.emplace(closer_for(scan.run));
@@ -187,8 +196,7 @@ void LoopCorrector::look_at(const ScanOfMap& scan) {
   const auto began = std::chrono::steady_clock::now();
   const bool had_ended = !closer_->end_reason().empty();
   hand_on_fixes(scan.run);
-  auto correction =
-      closer_->add(*scan.labelled, scan.T_odom_lidar, scan.is_confirmed, scan.antenna_lidar);
+  auto correction = closer_->add(*scan.labelled, scan.T_odom_lidar, enters, scan.antenna_lidar);
   statistics_.add_latency("loops", milliseconds(std::chrono::steady_clock::now() - began));
   if (!had_ended && !closer_->end_reason().empty() && !closer_->is_full())
     spdlog::warn("loops stay open from here on: {}", closer_->end_reason());

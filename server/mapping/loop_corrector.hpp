@@ -14,6 +14,8 @@
 #include "core/lidar/labelled_scan.hpp"
 #include "core/map/map_correction.hpp"
 #include "core/map/submap_list.hpp"
+#include "core/odometry/odometry_state.hpp"
+#include "core/waiting_scans.hpp"
 #include "server/monitoring/log.hpp"
 #include "server/monitoring/statistics.hpp"
 #include "server/threads/bounded_queue.hpp"
@@ -61,7 +63,7 @@ class LoopCorrector {
   void end_map() { begin({}, std::move(told_)); }
   /// A scan of the map.
   void add(std::shared_ptr<const LabelledScan> labelled, const Eigen::Isometry3d& T_odom_lidar,
-           const Eigen::Isometry3d& T_base_lidar, bool is_confirmed);
+           const Eigen::Isometry3d& T_base_lidar, MapEntry entry);
   /// Scans that are not looked at yet.
   [[nodiscard]] std::size_t waiting() const { return scans_.waiting(); }
   /// What is to be moved, once; it has to be. Nothing after a clock that was set back: what was
@@ -98,7 +100,7 @@ class LoopCorrector {
     std::shared_ptr<const LabelledScan> labelled;
     Eigen::Isometry3d T_odom_lidar = Eigen::Isometry3d::Identity();
     Eigen::Vector3d antenna_lidar = Eigen::Vector3d::Zero();
-    bool is_confirmed = false;
+    MapEntry entry = MapEntry::enters;
   };
 
   /// `submaps`: those of the map that were told until now.
@@ -108,6 +110,7 @@ class LoopCorrector {
 
   // Of the worker.
   void look_at(const ScanOfMap& scan);
+  void close(const ScanOfMap& scan, bool enters);
   [[nodiscard]] LiveLoopCloser closer_for(const Run& run) const;
   void hand_on_fixes(const Run& run);
   void report_fixes();
@@ -171,6 +174,8 @@ class LoopCorrector {
   // Of the worker.
   std::uint64_t closed_map_ = 0;
   std::optional<LiveLoopCloser> closer_;
+  /// Of the map that is looked at; those that stay out between them are left out.
+  WaitingScans<ScanOfMap> waiting_;
   std::size_t reported_ = 0;
   std::size_t reported_anchors_ = 0;
   std::size_t reported_placed_ = 0;

@@ -50,8 +50,12 @@ bool MapCorrector::insert_kept(const std::function<bool()>& has_time) {
   constexpr std::size_t at_once = 2;
   if (is_running()) return false;
   do {
-    mapper_.insert_kept_scans(at_once);
-  } while (mapper_.kept_scans() > 0 && has_time());
+    if (mapper_.kept_scans() > 0) {
+      mapper_.insert_kept_scans(at_once);
+    } else {
+      mapper_.insert_confirmed_scans(at_once);
+    }
+  } while (mapper_.kept_scans() + mapper_.confirmed_scans() > 0 && has_time());
   return mapper_.kept_scans() == 0;
 }
 

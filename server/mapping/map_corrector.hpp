@@ -20,7 +20,9 @@ class MapCorrector {
   /// The mapper must outlive it, and what is corrected is the one map it has: see
   /// Mapper::lend_static_map().
   MapCorrector(Mapper& mapper, std::size_t limit_bytes)
-      : mapper_(mapper), limit_bytes_(limit_bytes) {}
+      : mapper_(mapper), limit_bytes_(limit_bytes) {
+    mapper_.keep_confirmed_scans(true);
+  }
 
   /// Must not be running.
   void begin(MapCorrection correction);
@@ -38,8 +40,9 @@ class MapCorrector {
   /// for the end where that is wanted, or the mapper would keep too many scans. Throws what the
   /// correction threw.
   [[nodiscard]] std::optional<Result> take(bool waits);
-  /// Some of the scans that were kept enter the map, more than come with each that does; all while
-  /// there is time. True once none is left: then the mapper's map is nobody else's.
+  /// Some of the scans that were kept enter the map, more than come with each that does, then some
+  /// of those that were confirmed; all while there is time. True once none is kept: then the
+  /// mapper's map is nobody else's.
   [[nodiscard]] bool insert_kept(const std::function<bool()>& has_time);
 
  private:

@@ -31,8 +31,7 @@ constexpr std::size_t tiles_at_once = 8;
 // Tiles of one request that may have to be read from the disk.
 constexpr std::size_t max_stored_tiles = 4000;
 
-// Fewer than after which a mapper believes a clock (ScanClock), and more than a sender that starts
-// over repeats.
+// Fewer than make a mapper believe a clock (ScanClock), more than a new sender repeats.
 constexpr int steps_of_set_clock = 5;
 
 constexpr std::size_t no_limit = std::numeric_limits<std::size_t>::max();
@@ -220,7 +219,7 @@ void MappingThread::stop() {
 
 void MappingThread::end_correction() {
   if (const auto result = corrector_.take(true)) follow(*result);
-  mapper_.insert_kept_scans();
+  static_cast<void>(corrector_.insert_kept([] { return true; }));
 }
 
 RunCheckpoint MappingThread::checkpoint(CheckpointScope scope) {
@@ -354,7 +353,8 @@ void MappingThread::run_on_some(std::uint64_t map_id, std::span<const TileId>& l
 
 void MappingThread::end_round(bool is_idle) {
   if (!take_corrected(is_idle)) return;
-  if (std::exchange(octree_is_behind_, false)) {
+  if (octree_is_behind_ && mapper_.confirmed_scans() == 0) {
+    octree_is_behind_ = false;
     publish_snapshot();
     outputs_.occupancy->begin(latest_map_.view());
   }
@@ -422,17 +422,19 @@ void MappingThread::feed_imu(const Scan& scan) {
 
 void MappingThread::forward(MappedScan mapped) {
   const auto labelled = std::make_shared<const LabelledScan>(std::move(mapped.labelled));
-  const bool enters_map = mapped.odometry.is_confirmed && !is_map_frozen_;
-  if (outputs_.occupancy != nullptr && enters_map && !octree_is_behind_) {
+  const bool enters_map = mapped.odometry.is_confirmed() && !is_map_frozen_;
+  // Fewer that have waited are of a place that others show, too.
+  constexpr std::size_t scans_of_new_place = 10;
+  octree_is_behind_ |= outputs_.occupancy != nullptr && mapped.entered_before >= scans_of_new_place;
+  if (outputs_.occupancy != nullptr && enters_map && !octree_is_behind_)
     outputs_.occupancy->add({labelled, mapped.odometry.T_map_lidar, !mapped.unlabelled_may_move});
-  }
   if (outputs_.place_finder != nullptr) {
     const bool has_own_labels = mapped.label_provenance == LabelProvenance::fresh;
     outputs_.place_finder->keep_last(labelled, has_own_labels, frames_.T_base_lidar());
   }
   if (outputs_.loops != nullptr)
     outputs_.loops->add(labelled, mapped.T_odom_lidar, frames_.T_base_lidar(),
-                        mapped.odometry.is_confirmed);
+                        mapped.odometry.map_entry);
   if (outputs_.scans != nullptr) outputs_.scans->publish(labelled, frames_.lidar());
 }
 
@@ -491,9 +493,8 @@ void MappingThread::pose_found(std::int64_t stamp_ns, const OdometryResult& odom
 void MappingThread::publish_snapshot() {
   latest_map_.publish(mapper_.map_snapshot());
   snapshot_published_ = Clock::now();
-  if (outputs_.occupancy != nullptr && map_limit_bytes_ != no_limit) {
+  if (outputs_.occupancy != nullptr && map_limit_bytes_ != no_limit)
     outputs_.occupancy->follow(latest_map_.view());
-  }
 }
 
 }  // namespace stillmap::server

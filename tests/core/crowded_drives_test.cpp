@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
 #include "core/mapper.hpp"
 #include "core/segmentation/segmenter.hpp"
@@ -79,6 +80,50 @@ TEST(CrowdedDrives, FollowASparseLidarThroughDenseTraffic) {
     T_map_last = is_lost ? std::nullopt : std::optional(T_map_lidar);
   }
   EXPECT_LE(lost, 3);
+}
+
+/// Voxels of a map that are no ground, within 15 m of a place.
+std::size_t upright_voxels_near(const MapSnapshot& view, const Eigen::Vector3d& position_map) {
+  std::size_t count = 0;
+  for (const auto& tile : view.tiles) {
+    for (const Voxel& voxel : tile->voxels) {
+      const SemanticClass label = voxel.evidence.winner();
+      const bool is_upright =
+          label == SemanticClass::vegetation || label == SemanticClass::building;
+      if (is_upright && (voxel.mean_map.cast<double>() - position_map).norm() < 15.0) ++count;
+    }
+  }
+  return count;
+}
+
+/// For 84 scans nothing confirms the place, then a hundred metres of motion that was seen do.
+TEST(CrowdedDrives, MapWhatWasSeenWhileThePlaceWasInDoubt) {
+  SimulationConfig config = crowded_street();
+  config.seed = 4;
+  config.scans = 350;
+  constexpr int first = 225;
+  const Simulation simulation(config);
+  MapperConfig mapping;
+  mapping.sensor = config.sensor;
+  Mapper mapper(mapping, std::make_unique<PassthroughSegmenter>());
+  std::vector<Eigen::Vector3d> waiting_map;
+  std::size_t entered = 0;
+  for (int k = first; k < config.scans && entered < 20; ++k) {
+    const auto mapped = mapper.process(simulation.scan(k).scan);
+    ASSERT_TRUE(mapped);
+    const OdometryResult& odometry = mapped->odometry;
+    entered = mapped->entered_before;
+    if (odometry.map_entry == MapEntry::waits) {
+      waiting_map.push_back(odometry.T_map_lidar.translation());
+    } else if (entered < 20) {
+      waiting_map.clear();
+    }
+  }
+  ASSERT_GE(entered, 20U);
+  ASSERT_GE(waiting_map.size(), entered);
+  const auto view = mapper.map_snapshot();
+  for (const Eigen::Vector3d& position_map : waiting_map)
+    EXPECT_GT(upright_voxels_near(*view, position_map), 200U) << position_map.transpose();
 }
 
 /// What the odometry errs by from the first of these scans to the last.

@@ -184,7 +184,7 @@ TEST(HardDrives, ACoveredLidarIsGoodAgainOnceItIsSeenWhereItIs) {
     const auto mapped = mapper.process(std::move(scan));
     ASSERT_TRUE(mapped);
     if (mapped->odometry.health == OdometryHealth::good) {
-      EXPECT_TRUE(mapped->odometry.is_confirmed);
+      EXPECT_TRUE(mapped->odometry.is_confirmed());
     }
     last = mapped->odometry;
   }

@@ -45,13 +45,13 @@ class LabelSynchronizerTest : public testing::Test {
 
   /// Takes scan `number` all the way; the pipeline answers with `output`.
   LabelSynchronizer::Labels process(std::int64_t number, SegmentationPipeline::Output output,
-                                    Motion motion = Motion::stationary) {
+                                    Motion motion = Motion::stationary, bool waits = false) {
     pipeline_.next = std::move(output);
     const Scan scan = scan_at(number);
     auto submission = synchronizer_.submit(scan, map_);
     auto labels =
         synchronizer_.labels_for(scan, std::move(submission), at_origin_, map_.readable());
-    synchronizer_.insert({scan, labels.labels, {motion}}, labels, at_origin_, map_);
+    synchronizer_.insert({scan, labels.labels, {motion}}, labels, at_origin_, waits, map_);
     return labels;
   }
 
@@ -132,7 +132,7 @@ TEST_F(LabelSynchronizerTest, PointsWithoutAClassMakeNoVoxelsBesidePropagatedLab
       synchronizer_.labels_for(scan, synchronizer_.submit(scan, map_), at_origin_, map_.readable());
   ASSERT_EQ(labels.labels.classes[1], unlabeled);
   synchronizer_.insert({scan, labels.labels, {Motion::stationary, Motion::stationary}}, labels,
-                       at_origin_, map_);
+                       at_origin_, false, map_);
   EXPECT_EQ(voxels_in_map(), voxels);
 }
 
@@ -182,6 +182,35 @@ TEST_F(LabelSynchronizerTest, OfTooManyPendingScansTheEarliestStaysOut) {
   EXPECT_EQ(voxels_in_map(), 0U);
   process(count + 2, finished(count, one_label(road), true));
   EXPECT_EQ(class_in_map(), road);
+}
+
+TEST_F(LabelSynchronizerTest, AScanThatWaitsEntersTheMapWhenItIsDecidedAndLabelled) {
+  process(1, pending(), Motion::stationary, true);
+  process(2, pending(), Motion::stationary, true);
+  // The first one's labels come before it is decided where it is, those of the second afterwards.
+  process(3, finished(1, one_label(road), true), Motion::stationary, true);
+  EXPECT_EQ(voxels_in_map(), 0U);
+  synchronizer_.decide_waiting(MapEntry::enters_with_waiting);
+  EXPECT_EQ(map_.decide_waiting(MapEntry::enters_with_waiting, false), 1U);
+  EXPECT_EQ(class_in_map(), road);
+  const float weight = weight_in_map();
+  process(4, finished(2, one_label(road), true));
+  EXPECT_GT(weight_in_map(), weight);
+}
+
+TEST_F(LabelSynchronizerTest, AScanThatHasWaitedForNothingIsForgottenWithItsLabels) {
+  process(1, finished(1, one_label(road)), Motion::stationary, true);
+  process(2, pending(), Motion::stationary, true);
+  synchronizer_.decide_waiting(MapEntry::stays_out);
+  EXPECT_EQ(map_.decide_waiting(MapEntry::stays_out, false), 0U);
+  EXPECT_EQ(process(3, {}, Motion::stationary, true).provenance, LabelProvenance::propagated);
+  for (const MapEntry entry : {MapEntry::stays_out_with_waiting, MapEntry::enters_with_waiting}) {
+    synchronizer_.decide_waiting(entry);
+    EXPECT_EQ(map_.decide_waiting(entry, false), 0U);
+  }
+  const auto labels = process(4, finished(2, one_label(road), true));
+  EXPECT_EQ(labels.provenance, LabelProvenance::none) << "propagated from a place that is none";
+  EXPECT_EQ(voxels_in_map(), 0U);
 }
 
 TEST_F(LabelSynchronizerTest, ResetForgetsThePendingAndTheLastLabelledScan) {

@@ -17,7 +17,7 @@ LoggedScan random_scan(std::uint64_t index, bool has_labels) {
   LoggedScan scan{
       .index = index,
       .T_odom_lidar = Eigen::Isometry3d(Eigen::Translation3d(static_cast<double>(index), 2, 3)),
-      .is_confirmed = true,
+      .entry = MapEntry::enters,
       .labelled = {}};
   scan.labelled.scan.stamp_ns = static_cast<std::int64_t>(index) * 100'000'000;
   for (int i = 0; i < 500; ++i) {
@@ -33,7 +33,7 @@ LoggedScan random_scan(std::uint64_t index, bool has_labels) {
 
 void expect_same(const LoggedScan& read, const LoggedScan& written) {
   EXPECT_EQ(read.index, written.index);
-  EXPECT_EQ(read.is_confirmed, written.is_confirmed);
+  EXPECT_EQ(read.entry, written.entry);
   EXPECT_EQ(read.T_odom_lidar.matrix(), written.T_odom_lidar.matrix());
   EXPECT_EQ(read.labelled.scan.stamp_ns, written.labelled.scan.stamp_ns);
   ASSERT_EQ(read.labelled.scan.size(), written.labelled.scan.size());
@@ -58,14 +58,24 @@ TEST(ScanLog, ScansComeBack) {
   ScanLog log(scratch / "scans");
   const LoggedScan labelled = random_scan(3, true), plain = random_scan(5, false);
   LoggedScan lost = random_scan(6, true);
-  lost.is_confirmed = false;
-  for (const LoggedScan& scan : {labelled, plain, lost}) log.append(scan);
+  lost.entry = MapEntry::stays_out;
+  LoggedScan waits = random_scan(7, false), decides = random_scan(8, true);
+  waits.entry = MapEntry::waits;
+  decides.entry = MapEntry::enters_with_waiting;
+  LoggedScan unknown = random_scan(9, false);
+  unknown.entry = MapEntry::stays_out_with_waiting;
+  for (const LoggedScan& scan : {labelled, plain, lost, waits, decides, unknown}) log.append(scan);
   const auto read = all_of(log);
-  ASSERT_EQ(read.size(), 3U);
+  ASSERT_EQ(read.size(), 6U);
   expect_same(read[0], labelled);
   expect_same(read[1], plain);
   EXPECT_EQ(read[2].index, 6U);
+  EXPECT_EQ(read[2].entry, MapEntry::stays_out);
   EXPECT_TRUE(read[2].labelled.scan.empty());
+  expect_same(read[3], waits);
+  expect_same(read[4], decides);
+  EXPECT_EQ(read[5].entry, MapEntry::stays_out_with_waiting);
+  EXPECT_TRUE(read[5].labelled.scan.empty());
 }
 
 TEST(ScanLog, WhatIsTooFarStaysOnItsRay) {

@@ -66,6 +66,35 @@ TEST(UnconfirmedStretch, EndsWithTheFirstScanOnTheTrustedMapAndTakesItsPose) {
   OdometryResult found = good_at(T_true * level_pose(0.3, 0.1, 0.02));
   EXPECT_EQ(stretch.evaluate(here().features(T_true, 0.01, 3), {}, found), confirmed);
   expect_near(found.T_map_lidar, T_true, 0.02, 0.005);
+  // Those before it may have slid as far.
+  EXPECT_EQ(found.map_entry, MapEntry::enters);
+}
+
+TEST(UnconfirmedStretch, ThatWasFollowedAllAlongIsAPartOfTheMapOnceItsEndIs) {
+  UnconfirmedStretch stretch = stretch_of_here();
+  const Eigen::Isometry3d T_true = level_pose(3.0, 0.5, 0.02);
+  OdometryResult found = good_at(T_true);
+  found.health = OdometryHealth::degenerate;
+  ASSERT_EQ(stretch.evaluate(here().features(T_true, 0.01, 3), {}, found), open);
+  EXPECT_EQ(found.map_entry, MapEntry::waits);
+  found = good_at(T_true * level_pose(0.05, 0.0, 0.0));
+  ASSERT_EQ(stretch.evaluate(here().features(T_true, 0.01, 4), {}, found), confirmed);
+  EXPECT_EQ(found.map_entry, MapEntry::enters_with_waiting);
+}
+
+TEST(UnconfirmedStretch, ThatWasLookedForIsNoPartOfTheMapUntilItIsConfirmed) {
+  UnconfirmedStretch stretch = stretch_of_here();
+  stretch.jump(20.0);
+  for (int k = 0; k < 30; ++k) {
+    const Eigen::Isometry3d T_true = level_pose(0.5 * k, 0.0, 0.0);
+    OdometryResult found = good_at(T_true);
+    const auto decision =
+        stretch.evaluate(here().features(T_true, 0.01, static_cast<unsigned>(20 + k)), {}, found);
+    EXPECT_EQ(found.map_entry,
+              decision == open ? MapEntry::stays_out_with_waiting : MapEntry::enters);
+    if (decision != open) return;
+  }
+  FAIL() << "not confirmed";
 }
 
 TEST(UnconfirmedStretch, EndsWithScansInARowThatAgreeInThePartThatIsKnown) {
@@ -133,6 +162,7 @@ TEST(UnconfirmedStretch, SettlesOnceItsMotionWasSeenForLong) {
     OdometryResult same = found;
     EXPECT_NE(jumped.evaluate(features, {}, same), settled);
     last = followed.evaluate(features, {}, found);
+    EXPECT_EQ(found.map_entry, last == settled ? MapEntry::enters_with_waiting : MapEntry::waits);
     if (last == settled) {
       EXPECT_EQ(k, 61U);
       break;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <functional>
 
 #include "tests/eventually.hpp"
 #include "tests/graph/street_world.hpp"
@@ -27,7 +28,7 @@ class Round {
       auto scan = std::make_shared<LabelledScan>(
           world_.scan_at(T_map_lidar, static_cast<std::uint64_t>(way_m_)));
       scan->scan.stamp_ns = static_cast<std::int64_t>(1e8 * (10.0 + way_m_)) + clock_offset_ns;
-      loops_.add(scan, T_odom_lidar_, Eigen::Isometry3d::Identity(), true);
+      loops_.add(scan, T_odom_lidar_, Eigen::Isometry3d::Identity(), entry(way_m_));
       if (!takes) continue;
       if (auto correction = loops_.take()) corrections.push_back(*std::move(correction));
     }
@@ -35,6 +36,7 @@ class Round {
   }
 
   bool takes = true;
+  std::function<MapEntry(double way_m)> entry = [](double) { return MapEntry::enters; };
   std::int64_t clock_offset_ns = 0;
   std::vector<MapCorrection> corrections;
 
@@ -68,6 +70,34 @@ TEST(LoopCorrector, SaysBesideTheDriveWhatIsToBeMoved) {
   }));
   EXPECT_GT(closed(statistics), 0U);
   EXPECT_GT(round.corrections.front().latest().translation().norm(), 0.1);
+}
+
+TEST(LoopCorrector, TakesAStretchThatHasWaitedOnceItEntersTheMap) {
+  constexpr double begin_m = 40.0, end_m = 90.0;
+  const auto submaps_with = [](MapEntry last) {
+    Statistics statistics;
+    LoopCorrector loops({}, true, statistics, nothing_seen);
+    loops.begin_map();
+    Round round(loops);
+    round.entry = [&](double way_m) {
+      if (way_m < begin_m || way_m > end_m) return MapEntry::enters;
+      if (way_m == end_m) return last;
+      return way_m == begin_m + 10.0 ? MapEntry::stays_out : MapEntry::waits;
+    };
+    round.go(begin_m + 1.0);
+    round.go(end_m);
+    std::optional<SubmapList> list;
+    EXPECT_TRUE(test::eventually([&] { return (list = loops.take_submaps()).has_value(); }));
+    EXPECT_EQ(list->submaps.size(), 1U) << "of what is before the stretch";
+    round.go(end_m + 30.0);
+    EXPECT_TRUE(test::eventually([&] { return (list = loops.take_submaps()).has_value(); }));
+    return list->submaps;
+  };
+  const auto entered = submaps_with(MapEntry::enters_with_waiting);
+  const auto dropped = submaps_with(MapEntry::enters);
+  ASSERT_GE(entered.size(), 4U);
+  EXPECT_LT(dropped.size(), entered.size());
+  EXPECT_LT(entered[2].way_m - entered[1].way_m, 35.0) << "the stretch is cut as all else";
 }
 
 TEST(LoopCorrector, TellsSubmapsOnlyAsTheMapHasThem) {
@@ -223,7 +253,7 @@ TEST(LoopCorrector, MovesNothingByTimesThatCameTwice) {
   ASSERT_TRUE(test::eventually([&] { return closed(statistics) > 0; }));
   auto again = std::make_shared<LabelledScan>();
   again->scan.stamp_ns = 1;
-  loops.add(again, Eigen::Isometry3d::Identity(), Eigen::Isometry3d::Identity(), true);
+  loops.add(again, Eigen::Isometry3d::Identity(), Eigen::Isometry3d::Identity(), MapEntry::enters);
   ASSERT_TRUE(test::eventually([&] { return loops.waiting() == 0; }));
   EXPECT_FALSE(loops.take());
   // Nor where the robot is set elsewhere after that: what was seen then has stamps of what comes.
@@ -244,7 +274,7 @@ TEST(LoopCorrector, LeavesOutScansOfALiveSensorThatItCannotLookAt) {
     if (k % 100 == 0) *scan = world.scan_at(world.T_map_lidar_at(k, false), 1);
     scan->scan.stamp_ns = 1 + k;
     loops.add(scan, Eigen::Isometry3d(Eigen::Translation3d(k, 0, 0)), Eigen::Isometry3d::Identity(),
-              true);
+              MapEntry::enters);
     EXPECT_LE(loops.waiting(), 20U);
   }
   ASSERT_TRUE(test::eventually([&] { return loops.waiting() == 0; }));

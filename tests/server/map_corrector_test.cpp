@@ -110,6 +110,30 @@ TEST_F(MapCorrectorTest, WaitsWhereTheMapperWouldKeepTooManyScans) {
   EXPECT_EQ(mapper_.kept_scans(), 0U);
 }
 
+TEST_F(MapCorrectorTest, InsertsScansThatWereConfirmedALittleAtATime) {
+  LendableMap map({}, config().sensor);
+  const auto posed = [this](std::size_t k) {
+    const Scan& scan = sequence_.scans.at(k).scan;
+    return LabelledScan{scan, {}, std::vector<Motion>(scan.size(), Motion::stationary)};
+  };
+  for (std::size_t k = 0; k < 6; ++k)
+    map.let_wait(posed(k), test::level_pose(1.0 * static_cast<double>(k), 0, 0));
+  EXPECT_EQ(map.decide_waiting(MapEntry::enters_with_waiting, true), 6U);
+  EXPECT_TRUE(map.map().view()->tiles.empty());
+  map.insert(posed(7), test::level_pose(7.0, 0, 0));
+  EXPECT_EQ(map.kept_scans(), 0U) << "scans go on to enter the map";
+  map.insert_confirmed(2);
+  EXPECT_EQ(map.confirmed_scans(), 4U);
+  static_cast<void>(map.lend());
+  for (std::size_t k = 0; k < 3; ++k)
+    map.let_wait(posed(k), test::level_pose(9.0 + static_cast<double>(k), 0, 0));
+  EXPECT_EQ(map.decide_waiting(MapEntry::enters_with_waiting, false), 3U);
+  map.reclaim();
+  EXPECT_EQ(map.confirmed_scans(), 7U);
+  map.insert_confirmed();
+  EXPECT_EQ(map.confirmed_scans(), 0U);
+}
+
 TEST_F(MapCorrectorTest, ARefusedCorrectionMovesNothing) {
   map(5);
   const auto store = evict();

@@ -44,7 +44,7 @@ void LoopCorrection::resume(std::size_t next_scan) {
   const Timed timed(seconds_);
   log_.truncate_from(next_scan);
   log_.read([this](const LoggedScan& scan) {
-    close(scan.index, scan.labelled, scan.T_odom_lidar, scan.is_confirmed);
+    add(scan.index, scan.labelled, scan.T_odom_lidar, scan.entry);
   });
 }
 
@@ -53,30 +53,49 @@ void LoopCorrection::add(std::size_t index, const MappedScan& mapped) {
   const OdometryResult& odometry = mapped.odometry;
   log_.append({.index = index,
                .T_odom_lidar = odometry.T_map_lidar,
-               .is_confirmed = odometry.is_confirmed,
+               .entry = odometry.map_entry,
                .labelled = mapped.labelled});
-  close(index, mapped.labelled, odometry.T_map_lidar, odometry.is_confirmed);
+  add(index, mapped.labelled, odometry.T_map_lidar, odometry.map_entry);
 }
 
-void LoopCorrection::close(std::size_t index, const LabelledScan& scan,
-                           const Eigen::Isometry3d& T_odom_lidar, bool is_confirmed) {
+void LoopCorrection::add(std::size_t index, const LabelledScan& scan,
+                         const Eigen::Isometry3d& T_odom_lidar, MapEntry entry) {
   index_.push_back(index);
-  const std::size_t number = T_odom_lidar_.size();
-  const std::int64_t stamp_ns = scan.scan.stamp_ns;
   T_odom_lidar_.push_back(T_odom_lidar);
-  closer_.add(scan, T_odom_lidar, is_confirmed, index);
+  const bool waits = entry == MapEntry::waits;
+  if (waits || (entry == MapEntry::stays_out && !may_enter_.empty())) {
+    may_enter_.push_back(waits);
+    return;
+  }
+  close_waiting(entry);
+  close(index_.size() - 1, scan, is_confirmed(entry));
+}
+
+void LoopCorrection::close_waiting(MapEntry entry) {
+  for (const bool may_enter : std::exchange(may_enter_, {})) {
+    const std::size_t place = enters_.size();
+    close(place, log_.at(place).labelled, may_enter && entry == MapEntry::enters_with_waiting);
+  }
+}
+
+void LoopCorrection::close(std::size_t place, const LabelledScan& scan, bool enters) {
+  enters_.push_back(enters);
+  const std::int64_t stamp_ns = scan.scan.stamp_ns;
+  const Eigen::Isometry3d& T_odom_lidar = T_odom_lidar_[place];
+  closer_.add(scan, T_odom_lidar, enters, index_[place]);
   for (; next_fix_ < fixes_.size() && fixes_[next_fix_].stamp_ns <= stamp_ns; ++next_fix_) {
     const std::string refusal = gnss_.add(fixes_[next_fix_]);
     if (refusal.empty()) continue;
     if (refused_fixes_++ == 0) refusal_ = refusal;
   }
-  if (!is_confirmed) return;
-  gnss_.add_scan(number, stamp_ns, T_odom_lidar, antenna_lidar_);
+  if (!enters) return;
+  gnss_.add_scan(place, stamp_ns, T_odom_lidar, antenna_lidar_);
   for (const PositionAtScan& position : gnss_.take()) closer_.add(position);
 }
 
 bool LoopCorrection::finish() {
   const Timed timed(seconds_);
+  close_waiting(MapEntry::stays_out_with_waiting);
   closer_.finish();
   T_map_lidar_ = closer_.corrected_poses();
   return closer_.is_corrected();
@@ -98,7 +117,7 @@ bool LoopCorrection::insert_into(StaticMap& map, const std::vector<Eigen::Isomet
   for (std::size_t i = 0; i < T_map_lidar.size(); ++i) {
     LoggedScan scan = log_.at(i);
     scan.labelled.scan.stamp_ns += clock_offset_ns;
-    if (scan.is_confirmed) insert_scan(scan.labelled, T_map_lidar[i], sensor_, map);
+    if (enters_[i]) insert_scan(scan.labelled, T_map_lidar[i], sensor_, map);
     if (!scan_done(i + 1)) return false;
   }
   return true;

@@ -99,9 +99,14 @@ class LoopCorrection {
   [[nodiscard]] LoopReport report() const;
 
  private:
-  /// Hands a scan, by its number in the data set, to the closer, with the fixes until then.
-  void close(std::size_t index, const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar,
-             bool is_confirmed);
+  /// The next scan, by its number in the data set. One that waits, and those after it, are handed
+  /// to the closer once it is decided where they are.
+  void add(std::size_t index, const LabelledScan& scan, const Eigen::Isometry3d& T_odom_lidar,
+           MapEntry entry);
+  /// Hands those to the closer that have waited for this entry.
+  void close_waiting(MapEntry entry);
+  /// Hands a scan to the closer, with the fixes until then.
+  void close(std::size_t place, const LabelledScan& scan, bool enters);
   [[nodiscard]] GnssReport gnss_report() const;
 
   /// By their stamps.
@@ -117,6 +122,9 @@ class LoopCorrection {
   /// Of the scans added, in the data set.
   std::vector<std::size_t> index_;
   std::vector<Eigen::Isometry3d> T_odom_lidar_;
+  /// Of those that the closer has: whether they enter the map. Of the rest: whether they may.
+  std::vector<bool> enters_;
+  std::vector<bool> may_enter_;
   std::vector<Eigen::Isometry3d> T_map_lidar_;
   double seconds_ = 0.0;
 };
