@@ -15,7 +15,6 @@ namespace stillmap {
 namespace {
 
 /// Misses of a voxel are counted up to here.
-constexpr std::uint16_t max_misses = 1000;
 /// So many hits halve the misses of a voxel: more than a vehicle that waits at a light brings.
 constexpr std::uint16_t hits_to_settle = 32;
 /// So many points are looked up before they are added: their voxels are on their way meanwhile.
@@ -176,6 +175,8 @@ void LiveTile::hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan)
   packed.evidence.add(point.label, point.confidence);
   voxel.last_scan = scan;
   if (point.motion == Motion::semi_static) return;
+  // That it is seen again says that it was no part of what moved on.
+  if (is_new_scan && voxel.misses == misses_of_rest) voxel.misses = 0;
   if (is_new_scan && voxel.hits < max_count) {
     ++voxel.hits;
     // What stays where space was free for long becomes part of the static world in the end.
@@ -197,6 +198,7 @@ void LiveTile::exclude(Excluded& voxel, const TilePoint& point, std::uint32_t sc
 }
 
 void LiveTile::add_misses(LiveVoxel& voxel, std::uint32_t misses) {
+  if (voxel.misses == misses_of_rest) voxel.misses = 0;
   if (voxel.misses + misses > max_misses) {
     // Halved, so that something placed where space was free for long can still become visible.
     voxel.misses = max_misses / 2;
@@ -240,10 +242,14 @@ bool LiveTile::clear_seen_through(const VisibilityTest& test, std::uint32_t scan
     if (misses == 0) return;
     const bool was_hidden = is_seen_through(voxel, rule);
     add_misses(voxel, misses);
-    hides_one |= !was_hidden && is_seen_through(voxel, rule);
+    if (was_hidden || !is_seen_through(voxel, rule)) return;
+    hides_one = true;
+    if (test.stamps != nullptr) hidden_.push_back(voxel.packed.key);
   };
   std::ranges::for_each(sorted_, look_at);
   std::ranges::for_each(fresh_, look_at);
+  if (test.stamps != nullptr)
+    hides_one |= hide_rest_of_movers(*test.stamps, test.stamps->stamp_ns(scan), rule);
   return hides_one;
 }
 
@@ -434,7 +440,7 @@ void LiveTile::add(const PackedVoxels& known,
     live.first_scan = scan_of[known.first_stamp(i)];
     live.last_scan = scan_of[known.last_stamp(i)];
     live.hits = counts.hits;
-    live.misses = std::min(counts.misses, max_misses) & 0x3FFFU;
+    live.misses = std::min(counts.misses, misses_of_rest) & 0x3FFFU;
     live.was_shown = counts.was_shown ? 1 : 0;
     live.is_restored = counts.is_restored ? 1 : 0;
   }
@@ -479,8 +485,8 @@ std::size_t LiveTile::memory_bytes() const {
     return table.bucket_count() * (sizeof(Entry) + 4);
   };
   return sizeof(*this) + (sorted_.capacity() + fresh_.capacity()) * sizeof(LiveVoxel) +
-         index_.memory_bytes() + table_bytes(excluded_) +
-         (published_ ? published_->voxels.memory_bytes() : 0);
+         index_.memory_bytes() + hidden_.capacity() * sizeof(std::uint32_t) +
+         table_bytes(excluded_) + (published_ ? published_->voxels.memory_bytes() : 0);
 }
 
 }  // namespace stillmap

@@ -53,6 +53,8 @@ struct VisibilityTest {
   std::function<std::uint32_t(const Eigen::Vector3f& position_map)> times_free_before;
   /// Voxels that no scan hit until this one are asked how often they were free before.
   std::uint32_t last_scan_cleared = 0;
+  /// Those of the tile's scans; null: what is hidden says nothing of what is beside it.
+  const ScanStamps* stamps = nullptr;
 };
 
 /// The mutable side of a tile: all evidence so far, also of voxels that no snapshot shows yet, in
@@ -72,7 +74,8 @@ class LiveTile {
   void insert(std::span<const TilePoint> points, std::uint32_t scan);
 
   /// Counts a miss for each voxel that the scan saw through, and for each earlier scan that saw
-  /// through a voxel which came after it. True when this hides a voxel.
+  /// through a voxel which came after it; and hides what was a part of what is hidden. True when
+  /// this hides a voxel.
   [[nodiscard]] bool clear_seen_through(const VisibilityTest& test, std::uint32_t scan,
                                         const VisibilityRule& rule);
 
@@ -115,6 +118,9 @@ class LiveTile {
   friend class TileCorrection;
 
   static constexpr std::size_t min_changed_voxels = 16;
+  static constexpr std::uint16_t max_misses = 1000;
+  /// In place of misses: hidden as the rest of something that moved on, until it is seen again.
+  static constexpr std::uint16_t misses_of_rest = max_misses + 1;
 
   struct LiveVoxel {
     PackedVoxel packed;
@@ -157,6 +163,17 @@ class LiveTile {
   void prefetch_voxels(std::span<const TilePoint> points) const;
   static void hit(LiveVoxel& voxel, const TilePoint& point, std::uint32_t scan);
   static void add_misses(LiveVoxel& voxel, std::uint32_t misses);
+  /// Of objects that moved on, only those voxels are seen through that a ray happens to pass: hides
+  /// the rest, from those that clearing has hidden on to all that touch. True when it hides one.
+  [[nodiscard]] bool hide_rest_of_movers(const ScanStamps& stamps, std::int64_t now_ns,
+                                         const VisibilityRule& rule);
+  /// Whether the voxel, which touches one of a mover that was seen last at this time, is of the
+  /// same.
+  [[nodiscard]] bool is_of_mover(const LiveVoxel& voxel, std::int64_t mover_seen_ns,
+                                 const ScanStamps& stamps, const VisibilityRule& rule) const;
+  /// Calls `visit` with the position of each voxel that shares a side with this one.
+  template <typename Visit>
+  void for_each_neighbour(std::uint32_t key, Visit visit) const;
   static void forget_beyond(LiveVoxel& voxel, std::uint32_t max_scans, const VisibilityRule& rule);
   static void exclude(Excluded& voxel, const TilePoint& point, std::uint32_t scan);
   std::size_t restore_excluded(RemovalReason reason, const Eigen::AlignedBox3d& box_map,
@@ -185,6 +202,8 @@ class LiveTile {
   /// Those that came since the last publication, in no order.
   std::vector<LiveVoxel> fresh_;
   PositionIndex index_;
+  /// Keys of voxels that clearing has hidden, and beside which nothing was looked for yet.
+  std::vector<std::uint32_t> hidden_;
   tsl::robin_map<std::uint32_t, Excluded, IndexHash> excluded_;
   std::shared_ptr<const Tile> published_;
   /// Voxels that appeared, went or got another class since the last record.

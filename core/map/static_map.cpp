@@ -224,7 +224,8 @@ void StaticMap::clear_seen_through(RangeImageView view, std::int64_t stamp_ns) {
   const VisibilityTest test{
       .is_free = [&](const Eigen::Vector3f& p_map) { return state_->sees_through(view, p_map); },
       .times_free_before = [&](const Eigen::Vector3f& p_map) { return state_->times_free(p_map); },
-      .last_scan_cleared = state_->last_scan_cleared};
+      .last_scan_cleared = state_->last_scan_cleared,
+      .stamps = &tiles.stamps()};
   std::vector<std::uint8_t> hides(near.size());
   state_->enter_session(near);
   tbb::parallel_for(std::size_t{0}, near.size(), [&](std::size_t i) {
