@@ -241,7 +241,10 @@ bool LiveTile::clear_seen_through(const VisibilityTest& test, std::uint32_t scan
     if (voxel.last_scan != scan && test.is_free(position_map)) ++misses;
     if (misses == 0) return;
     const bool was_hidden = is_seen_through(voxel, rule);
+    const bool was_rest = voxel.misses == misses_of_rest;
     add_misses(voxel, misses);
+    // Where it takes more misses than these.
+    if (was_rest && !is_seen_through(voxel, rule)) voxel.misses = misses_of_rest;
     if (was_hidden || !is_seen_through(voxel, rule)) return;
     hides_one = true;
     if (test.stamps != nullptr) hidden_.push_back(voxel.packed.key);

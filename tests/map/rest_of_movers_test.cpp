@@ -12,7 +12,6 @@ namespace {
 
 const VoxelGrid movers_grid(0.2, 20.0);
 constexpr TileId movers_tile{0, 0};
-constexpr VisibilityRule movers_rule;
 constexpr std::int64_t movers_period_ns = 100'000'000;
 
 /// Voxels in a row, 10 m from the tile's corner.
@@ -64,6 +63,7 @@ class RestOfMovers : public testing::Test {
     tile_ = std::make_unique<LiveTile>(movers_tile, stored, movers_grid, stamps_);
   }
 
+  VisibilityRule movers_rule;
   ScanStamps stamps_;
   std::unique_ptr<LiveTile> tile_ = std::make_unique<LiveTile>(movers_tile, movers_grid);
   std::int64_t scans_ = 0;
@@ -143,6 +143,17 @@ TEST_F(RestOfMovers, ThatRaysPassLaterIsHiddenAsAllElse) {
   wait(1, {11});
   scan({mover_point(mover_key(11))});
   EXPECT_TRUE(shown().empty());
+}
+
+TEST_F(RestOfMovers, StaysHiddenWhereOneRayIsNotEnough) {
+  movers_rule.misses_to_clear = 3;
+  scan({mover_point(mover_key(10)), mover_point(mover_key(11))});
+  wait(10, {10});
+  ASSERT_TRUE(shown().empty());
+  wait(1, {11});
+  EXPECT_TRUE(shown().empty());
+  scan({mover_point(mover_key(11))});
+  EXPECT_EQ(shown(), std::set{mover_key(11)});
 }
 
 TEST_F(RestOfMovers, EndsAtTheTileAndAtWhatIsNotThere) {
