@@ -24,6 +24,21 @@ SimulationConfig crowded_street() {
   return config;
 }
 
+/// A drive that meets dense traffic, and where it shall begin.
+SimulationConfig dense_traffic(int scans) {
+  SimulationConfig config = crowded_street();
+  config.seed = 4;
+  config.scans = scans;
+  return config;
+}
+constexpr int before_dense_traffic = 225;
+
+Mapper mapper_with_labels(const SensorModel& sensor) {
+  MapperConfig config;
+  config.sensor = sensor;
+  return {config, std::make_unique<PassthroughSegmenter>()};
+}
+
 /// The motion to scan k from the one before, in truth.
 Eigen::Isometry3d true_motion(const Simulation& simulation, int k) {
   const double period_s = simulation.config().sensor.period_s;
@@ -56,17 +71,12 @@ TEST_P(WeightingOfCrowdedDrives, FindTheFirstMotionOfASparseLidar) {
 /// Traffic hides for seconds nearly all that 16 rings know: a lidar that is called lost there adds
 /// nothing to its local map, knows less with every scan, and is lost for good.
 TEST(CrowdedDrives, FollowASparseLidarThroughDenseTraffic) {
-  SimulationConfig config = crowded_street();
-  config.seed = 4;
-  config.scans = 320;
-  constexpr int first = 225;
+  const SimulationConfig config = dense_traffic(320);
   const Simulation simulation(config);
-  MapperConfig mapping;
-  mapping.sensor = config.sensor;
-  Mapper mapper(mapping, std::make_unique<PassthroughSegmenter>());
+  Mapper mapper = mapper_with_labels(config.sensor);
   std::optional<Eigen::Isometry3d> T_map_last;
   int lost = 0;
-  for (int k = first; k < config.scans; ++k) {
+  for (int k = before_dense_traffic; k < config.scans; ++k) {
     const auto mapped = mapper.process(simulation.scan(k).scan);
     ASSERT_TRUE(mapped);
     const bool is_lost = mapped->odometry.health == OdometryHealth::lost;
@@ -98,17 +108,12 @@ std::size_t upright_voxels_near(const MapSnapshot& view, const Eigen::Vector3d& 
 
 /// For 84 scans nothing confirms the place, then a hundred metres of motion that was seen do.
 TEST(CrowdedDrives, MapWhatWasSeenWhileThePlaceWasInDoubt) {
-  SimulationConfig config = crowded_street();
-  config.seed = 4;
-  config.scans = 350;
-  constexpr int first = 225;
+  const SimulationConfig config = dense_traffic(350);
   const Simulation simulation(config);
-  MapperConfig mapping;
-  mapping.sensor = config.sensor;
-  Mapper mapper(mapping, std::make_unique<PassthroughSegmenter>());
+  Mapper mapper = mapper_with_labels(config.sensor);
   std::vector<Eigen::Vector3d> waiting_map;
   std::size_t entered = 0;
-  for (int k = first; k < config.scans && entered < 20; ++k) {
+  for (int k = before_dense_traffic; k < config.scans && entered < 20; ++k) {
     const auto mapped = mapper.process(simulation.scan(k).scan);
     ASSERT_TRUE(mapped);
     const OdometryResult& odometry = mapped->odometry;
@@ -130,9 +135,7 @@ TEST(CrowdedDrives, MapWhatWasSeenWhileThePlaceWasInDoubt) {
 Eigen::Isometry3d error_over(SimulationConfig config, int first, int scans) {
   config.scans = first + scans;
   const Simulation simulation(config);
-  MapperConfig mapping;
-  mapping.sensor = config.sensor;
-  Mapper mapper(mapping, std::make_unique<PassthroughSegmenter>());
+  Mapper mapper = mapper_with_labels(config.sensor);
   Eigen::Isometry3d T_map_lidar = Eigen::Isometry3d::Identity();
   for (int k = first; k < config.scans; ++k) {
     const auto mapped = mapper.process(simulation.scan(k).scan);
