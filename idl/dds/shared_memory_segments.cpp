@@ -5,7 +5,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
 #include <ctime>
 #include <system_error>
 
@@ -46,18 +48,20 @@ void remove_segment(const fs::path& folder, const std::string& name) {
 
 std::vector<SharedMemorySegment> shared_memory_segments(const fs::path& folder) {
   std::vector<SharedMemorySegment> segments;
-  const std::time_t now = std::time(nullptr);
+  const std::time_t now = std::chrono::system_clock::to_time_t(std::chrono::system_clock::now());
   std::error_code error;
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const std::string name = entry.path().filename().string();
     struct stat facts {};
     if (!is_segment_name(name) || ::stat(entry.path().c_str(), &facts) != 0) continue;
-    segments.push_back({.name = name,
-                        .bytes = static_cast<std::uint64_t>(facts.st_size),
-                        .owner = facts.st_uid,
-                        .age = std::chrono::seconds(now - facts.st_mtim.tv_sec),
-                        .is_stale = !is_locked(beside(entry.path(), "_el")) &&
-                                    !is_locked(beside(entry.path(), "_sl"))});
+    segments.push_back(
+        {.name = name,
+         .bytes = static_cast<std::uint64_t>(facts.st_size),
+         .owner = facts.st_uid,
+         // A file may be newer than now: the clock was set back since.
+         .age = std::chrono::seconds(std::max<std::time_t>(now - facts.st_mtim.tv_sec, 0)),
+         .is_stale =
+             !is_locked(beside(entry.path(), "_el")) && !is_locked(beside(entry.path(), "_sl"))});
   }
   return segments;
 }

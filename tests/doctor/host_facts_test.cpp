@@ -99,6 +99,14 @@ TEST_F(HostFactsTest, TellSegmentsOfTheDeadFromThoseOfTheLiving) {
   EXPECT_TRUE(exists("dev/shm/sem.other"));
 }
 
+TEST_F(HostFactsTest, ASegmentFromBeforeTheClockWasSetBackIsAsNewAsCanBe) {
+  const fs::path segment = root_ / "dev/shm/fastrtps_0123456789abcdef";
+  fs::last_write_time(segment, fs::file_time_type::clock::now() + 1h);
+  EXPECT_EQ(facts().segments[0].age, 0s);
+  EXPECT_EQ(dds::remove_stale_segments(root_ / "dev/shm", 1s), 0);
+  EXPECT_EQ(dds::remove_stale_segments(root_ / "dev/shm", 0s), 1);
+}
+
 TEST(DomainPortsTest, AreThoseOfDiscoveryOnly) {
   const std::vector<std::uint16_t> ports{7400, 7410, 7650, 19900, 65400, 65500, 53};
   EXPECT_THAT(domains_with_ports(ports), ElementsAre(0U, 1U, 50U, 232U));
