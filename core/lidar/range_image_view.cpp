@@ -1,7 +1,7 @@
 #include "core/lidar/range_image_view.hpp"
 
 #include <tbb/blocked_range.h>
-#include <tbb/parallel_for.h>
+#include <tbb/parallel_reduce.h>
 
 #include <algorithm>
 #include <cmath>
@@ -50,6 +50,18 @@ Batch fast_atan2(const Batch& y, const Batch& x) {
   return (y < 0.0F).select(-angle, angle);
 }
 
+/// Between sparse beams as much is not seen to the sides as above and below.
+int columns_for_half_a_row(float rows_per_rad, int columns) {
+  const float columns_per_row = static_cast<float>(columns) / (2.0F * pi * rows_per_rad);
+  return std::clamp(static_cast<int>(std::lround(0.5F * columns_per_row)), 1,
+                    std::max(1, columns / 2));
+}
+
+/// How far below the top of its row, in 256ths of it. The outermost beams may lie beyond.
+std::uint8_t share_of_row(float row, float top) {
+  return static_cast<std::uint8_t>(std::clamp(256.0F * (row - top), 0.0F, 255.0F));
+}
+
 }  // namespace
 
 RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> labels,
@@ -58,24 +70,36 @@ RangeImageView::RangeImageView(const Scan& scan, std::span<const SemanticClass> 
       columns_(std::min(sensor.columns, max_columns)),
       fov_up_(static_cast<float>(sensor.fov_up)),
       rows_per_rad_(static_cast<float>(sensor.rings / (sensor.fov_up - sensor.fov_down))),
-      pixels_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_), 0.0F) {
+      columns_beside_(columns_for_half_a_row(rows_per_rad_, columns_)),
+      pixels_(static_cast<std::size_t>(rows_) * static_cast<std::size_t>(columns_), 0.0F),
+      below_row_top_(pixels_.size()) {
   move_to(T_map_lidar);
   std::vector<Return> returns(scan.size());
-  tbb::parallel_for(tbb::blocked_range<std::size_t>(0, scan.size(), 4096), [&](const auto& block) {
-    constexpr auto step = static_cast<std::size_t>(batch_size);
-    for (std::size_t i = block.begin(); i < block.end(); i += step) {
-      const std::size_t count = std::min(step, block.end() - i);
-      project(std::span(scan.points_lidar).subspan(i, count), std::span(returns).subspan(i, count));
-    }
-  });
+  const auto wider = [](const RowRange& a, const RowRange& b) {
+    return RowRange{std::min(a.first, b.first), std::max(a.last, b.last)};
+  };
+  seen_rows_ = tbb::parallel_reduce(
+      tbb::blocked_range<std::size_t>(0, scan.size(), 4096), RowRange{},
+      [&](const auto& block, RowRange rows) {
+        constexpr auto step = static_cast<std::size_t>(batch_size);
+        for (std::size_t i = block.begin(); i < block.end(); i += step) {
+          const std::size_t count = std::min(step, block.end() - i);
+          rows = wider(rows, project(std::span(scan.points_lidar).subspan(i, count),
+                                     std::span(returns).subspan(i, count)));
+        }
+        return rows;
+      },
+      wider);
   for (std::size_t i = 0; i < returns.size(); ++i) {
-    const auto [pixel, range_m] = returns[i];
+    const auto [pixel, row, range_m] = returns[i];
     if (pixel == none) continue;
     // Without branches: which of two returns comes first is anybody's guess.
     const float old = pixels_[pixel];
     const bool is_nearer = old == 0.0F || range_m < std::abs(old);
     const float signed_range = !labels.empty() && is_movable(labels[i]) ? range_m : -range_m;
     pixels_[pixel] = is_nearer ? signed_range : old;
+    const auto row_top = static_cast<float>(pixel / static_cast<std::uint32_t>(columns_));
+    below_row_top_[pixel] = is_nearer ? share_of_row(row, row_top) : below_row_top_[pixel];
   }
 }
 
@@ -84,8 +108,8 @@ void RangeImageView::move_to(const Eigen::Isometry3d& T_map_lidar) {
   origin_map_ = T_map_lidar.translation().cast<float>();
 }
 
-void RangeImageView::project(std::span<const Eigen::Vector3f> points_lidar,
-                             std::span<Return> returns) const {
+RangeImageView::RowRange RangeImageView::project(std::span<const Eigen::Vector3f> points_lidar,
+                                                 std::span<Return> returns) const {
   Batch x = Batch::Ones(), y = Batch::Ones(), z = Batch::Ones();
   for (std::size_t i = 0; i < points_lidar.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
@@ -97,17 +121,56 @@ void RangeImageView::project(std::span<const Eigen::Vector3f> points_lidar,
   const Batch range_m = (across.square() + z.square()).sqrt();
   const Batch row = (fov_up_ - fast_atan2(z, across)) * rows_per_rad_;
   const Batch column = 0.5F * (1.0F - fast_atan2(y, x) / pi) * static_cast<float>(columns_);
+  RowRange rows;
   for (std::size_t i = 0; i < points_lidar.size(); ++i) {
     const auto k = static_cast<Eigen::Index>(i);
-    returns[i] = {pixel_at(row[k], column[k], range_m[k]), range_m[k]};
+    returns[i] = {pixel_at(row[k], column[k], range_m[k]), row[k], range_m[k]};
+    if (returns[i].pixel == none) continue;
+    rows.first = std::min(rows.first, row[k]);
+    rows.last = std::max(rows.last, row[k]);
   }
+  return rows;
 }
 
-std::uint32_t RangeImageView::pixel_of(const Eigen::Vector3f& point_lidar, float range_m) const {
+std::optional<RangeImageView::Direction> RangeImageView::direction_of(
+    const Eigen::Vector3f& point_lidar, float range_m) const {
   const float elevation = fast_atan2(point_lidar.z(), point_lidar.head<2>().norm());
   const float turn = 0.5F * (1.0F - fast_atan2(point_lidar.y(), point_lidar.x()) / pi);
-  return pixel_at((fov_up_ - elevation) * rows_per_rad_, turn * static_cast<float>(columns_),
-                  range_m);
+  const float row = (fov_up_ - elevation) * rows_per_rad_;
+  if (row < seen_rows_.first || row > seen_rows_.last) return std::nullopt;
+  const std::uint32_t pixel = pixel_at(row, turn * static_cast<float>(columns_), range_m);
+  if (pixel == none) return std::nullopt;
+  const int r = static_cast<int>(pixel) / columns_;
+  return Direction{.row = r,
+                   .column = static_cast<int>(pixel) - r * columns_,
+                   .below_row_top = share_of_row(row, static_cast<float>(r))};
+}
+
+float RangeImageView::next_range_m(int row, int column, int step) const {
+  // Beams that are not evenly spaced leave a row empty here and there.
+  for (const int r : {row + step, row + 2 * step}) {
+    if (r < 0 || r >= rows_) break;
+    const float range_m = std::abs(pixels_[index(r, column)]);
+    if (range_m > 0.0F) return range_m;
+  }
+  return std::numeric_limits<float>::infinity();
+}
+
+float RangeImageView::nearest_m(const Direction& at) const {
+  float nearest_m = std::numeric_limits<float>::infinity();
+  for (int offset = -columns_beside_; offset <= columns_beside_; ++offset) {
+    // The image is closed at the rear.
+    int column = at.column + offset;
+    if (column < 0) column += columns_;
+    if (column >= columns_) column -= columns_;
+    const std::size_t pixel = index(at.row, column);
+    const bool has_return = pixels_[pixel] != 0.0F;
+    if (has_return) nearest_m = std::min(nearest_m, std::abs(pixels_[pixel]));
+    const bool is_above = at.below_row_top < below_row_top_[pixel];
+    if (!has_return || is_above) nearest_m = std::min(nearest_m, next_range_m(at.row, column, -1));
+    if (!has_return || !is_above) nearest_m = std::min(nearest_m, next_range_m(at.row, column, 1));
+  }
+  return nearest_m;
 }
 
 std::optional<RangeImageView::Observation> RangeImageView::observe(
@@ -115,23 +178,14 @@ std::optional<RangeImageView::Observation> RangeImageView::observe(
   const Eigen::Vector3f point_lidar = T_lidar_map_ * point_map;
   Observation observation{};
   observation.point_range_m = point_lidar.norm();
-  const std::uint32_t pixel = pixel_of(point_lidar, observation.point_range_m);
-  if (pixel == none || pixels_[pixel] == 0.0F) return std::nullopt;
-  observation.range_m = std::abs(pixels_[pixel]);
-  observation.movable = pixels_[pixel] > 0.0F;
-  observation.nearest_m = observation.range_m;
+  const std::optional<Direction> at = direction_of(point_lidar, observation.point_range_m);
+  if (!at) return std::nullopt;
+  const float pixel = pixels_[index(at->row, at->column)];
+  if (pixel == 0.0F) return std::nullopt;
+  observation.range_m = std::abs(pixel);
+  observation.movable = pixel > 0.0F;
+  observation.nearest_m = nearest_m(*at);
   observation.direction_map = (point_map - origin_map_) / observation.point_range_m;
-  const int row = static_cast<int>(pixel) / columns_;
-  const int column = static_cast<int>(pixel) - row * columns_;
-  // The image is closed at the rear.
-  const int left = column == 0 ? columns_ - 1 : column - 1;
-  const int right = column + 1 == columns_ ? 0 : column + 1;
-  for (int r = std::max(0, row - 1); r <= std::min(rows_ - 1, row + 1); ++r) {
-    for (const int c : {left, column, right}) {
-      const float range = std::abs(pixels_[static_cast<std::size_t>(r * columns_ + c)]);
-      if (range > 0.0F) observation.nearest_m = std::min(observation.nearest_m, range);
-    }
-  }
   return observation;
 }
 

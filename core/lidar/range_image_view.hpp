@@ -23,13 +23,16 @@ class RangeImageView {
   /// What was measured in the direction of a point.
   struct Observation {
     float range_m;
-    /// Smallest range in the 3 x 3 pixels around.
+    /// Smallest range in the pixels around: of the beams that pass above and below the point, and
+    /// as far to the sides as rows are apart, one column at least.
     float nearest_m;
     bool movable;
     /// From this view's lidar to the point [m].
     float point_range_m;
     Eigen::Vector3f direction_map;
   };
+  /// Empty where nothing was measured, and beyond the outermost beams: half a row below the lowest
+  /// one the ground is already nearer than what that one hit.
   [[nodiscard]] std::optional<Observation> observe(const Eigen::Vector3f& point_map) const;
 
   [[nodiscard]] const Eigen::Vector3f& origin_map() const { return origin_map_; }
@@ -42,9 +45,16 @@ class RangeImageView {
   /// Pixel and range of a measured point.
   struct Return {
     std::uint32_t pixel = 0;
+    /// As a fraction of rows from the top.
+    float row = 0.0F;
     float range_m = 0.0F;
   };
-  void project(std::span<const Eigen::Vector3f> points_lidar, std::span<Return> returns) const;
+  struct RowRange {
+    float first = std::numeric_limits<float>::max();
+    float last = std::numeric_limits<float>::lowest();
+  };
+  /// Returns the rows between which the points lie.
+  RowRange project(std::span<const Eigen::Vector3f> points_lidar, std::span<Return> returns) const;
   /// `none` outside the field of view, or without a range.
   [[nodiscard]] std::uint32_t pixel_at(float row, float column, float range_m) const {
     // Half a row of slack: the outermost beams look along the edge of the field of view.
@@ -53,16 +63,35 @@ class RangeImageView {
     const int c = std::clamp(static_cast<int>(is_seen ? column : 0.0F), 0, columns_ - 1);
     return is_seen ? static_cast<std::uint32_t>(r * columns_ + c) : none;
   }
-  [[nodiscard]] std::uint32_t pixel_of(const Eigen::Vector3f& point_lidar, float range_m) const;
+  /// Where a point is in the image.
+  struct Direction {
+    int row, column;
+    std::uint8_t below_row_top;
+  };
+  [[nodiscard]] std::optional<Direction> direction_of(const Eigen::Vector3f& point_lidar,
+                                                      float range_m) const;
+  [[nodiscard]] std::size_t index(int row, int column) const {
+    return static_cast<std::size_t>(row * columns_ + column);
+  }
+  /// Of the next row up (-1) or down (1) that measured something in a column, or the next but one;
+  /// else infinite.
+  [[nodiscard]] float next_range_m(int row, int column, int step) const;
+  [[nodiscard]] float nearest_m(const Direction& at) const;
 
   int rows_;
   int columns_;
   float fov_up_;
   float rows_per_rad_;
+  /// Of the outermost returns, as fractions of rows.
+  RowRange seen_rows_;
+  /// So many to each side are half a row wide.
+  int columns_beside_;
   Eigen::Isometry3f T_lidar_map_;
   Eigen::Vector3f origin_map_;
   /// Range [m], negative for surfaces that are not movable; 0 where nothing was measured.
   std::vector<float> pixels_;
+  /// Where in its row it was measured, in 256ths from the top: no row has just one beam.
+  std::vector<std::uint8_t> below_row_top_;
 };
 
 }  // namespace stillmap

@@ -1,0 +1,110 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "core/lidar/range_image_view.hpp"
+#include "core/map/static_map.hpp"
+#include "tests/map/map_worlds.hpp"
+
+namespace stillmap {
+namespace {
+
+using Eigen::Isometry3d;
+using Eigen::Vector3d;
+using test::add_point;
+
+constexpr double rad_per_degree = 0.017453292519943295;
+constexpr double lidar_height_m = 1.9;
+
+/// Range of what a ray from a lidar hits, in the frame of the map, without labels.
+struct SparseWorld {
+  /// A vehicle of two metres' width with its rear at this place ahead.
+  std::optional<double> vehicle_at_m = {};
+  /// Bars of a fence every three degrees, 10 m about the lidar, turned by this [degrees].
+  std::optional<double> fence_turned_by = {};
+
+  [[nodiscard]] double range_m(const Vector3d& origin, const Vector3d& direction,
+                               double azimuth_degrees) const {
+    double range_m = direction.z() < 0.0 ? -lidar_height_m / direction.z()
+                                         : std::numeric_limits<double>::infinity();
+    if (vehicle_at_m && direction.x() > 0.0) {
+      const double at_m = (*vehicle_at_m - origin.x()) / direction.x();
+      const Vector3d hit = origin + at_m * direction;
+      const double above_ground_m = hit.z() + lidar_height_m;
+      if (std::abs(hit.y()) < 1.0 && above_ground_m > 0.3 && above_ground_m < 1.6)
+        range_m = std::min(range_m, at_m);
+    }
+    if (fence_turned_by) {
+      const double off_bar = std::remainder(azimuth_degrees - *fence_turned_by, 3.0);
+      range_m = std::min(range_m, std::abs(off_bar) < 0.1 ? 10.0 : 20.0);
+    }
+    return range_m;
+  }
+};
+
+/// Clearing by the scans of a 16-beam lidar, whose beams are two degrees apart.
+class SparseBeamsClearing : public testing::Test {
+ protected:
+  void see(const SparseWorld& world, double lidar_at_m, int scans = 1) {
+    for (int i = 0; i < scans; ++i) {
+      LabelledScan scan;
+      scan.scan.stamp_ns = ++stamp_ns_;
+      Isometry3d T_map_lidar = Isometry3d::Identity();
+      T_map_lidar.translation().x() = lidar_at_m;
+      for (int ring = 0; ring < 16; ++ring) {
+        for (int shot = 0; shot < 1800; ++shot) {
+          const double elevation = (2.0 * ring - 15.0) * rad_per_degree, azimuth = 0.2 * shot - 180.0;
+          const Vector3d direction(std::cos(elevation) * std::cos(azimuth * rad_per_degree),
+                                   std::cos(elevation) * std::sin(azimuth * rad_per_degree),
+                                   std::sin(elevation));
+          const double range_m = world.range_m(T_map_lidar.translation(), direction, azimuth);
+          if (range_m > 120.0) continue;
+          add_point(scan, (range_m * direction).cast<float>(), SemanticClass::unlabeled);
+        }
+      }
+      map_.insert(scan, T_map_lidar);
+      map_.clear_seen_through(RangeImageView(scan.scan, {}, vlp_16(), T_map_lidar), stamp_ns_);
+    }
+  }
+  [[nodiscard]] std::vector<RemovedVoxel> removed() const {
+    return map_.removed(test::everywhere(), map_.tiles_in(test::everywhere())).voxels;
+  }
+  [[nodiscard]] int shown_above(double height_m) {
+    int count = 0;
+    for (const auto& tile : map_.view()->tiles)
+      count += static_cast<int>(
+          std::ranges::count_if(tile->voxels, [height_m](const Voxel& voxel) {
+            return voxel.mean_map.z() + lidar_height_m > height_m;
+          }));
+    return count;
+  }
+
+  StaticMap map_{StaticMapConfig{}};
+  std::int64_t stamp_ns_ = 0;
+};
+
+TEST_F(SparseBeamsClearing, GroundBelowTheLowestBeamStays) {
+  for (int step = 0; step < 60; ++step) see({}, 0.1 * step);
+  EXPECT_TRUE(removed().empty());
+}
+
+TEST_F(SparseBeamsClearing, TheLowerPartOfAVehicleThatLeftGoes) {
+  // The beam at -3 degrees hits it 0.75 m above the ground.
+  see({.vehicle_at_m = 22.0}, 0.0, 2);
+  ASSERT_GT(shown_above(0.6), 10);
+  // From here that is between the beams at -3 and -5, which reach 22 m; the one below does not.
+  see({}, 4.5);
+  EXPECT_EQ(shown_above(0.6), 0);
+}
+
+TEST_F(SparseBeamsClearing, BarsBesideThoseThatAreHitNowStay) {
+  see({.fence_turned_by = 0.0}, 0.0, 2);
+  see({.fence_turned_by = 0.8}, 0.0, 4);
+  EXPECT_TRUE(removed().empty());
+}
+
+}  // namespace
+}  // namespace stillmap
