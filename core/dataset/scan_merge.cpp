@@ -44,17 +44,6 @@ Trajectory poses_of(const ScanDataset& sequence) {
                      "them with 'stillmap dataset export'");
 }
 
-/// The scan as if taken in one instant, by the motion to the next scan (of the last: to it).
-Scan compensated(Scan scan, const Trajectory& poses, std::size_t index) {
-  if (scan.time_offset_s.empty() || poses.size() < 2) return scan;
-  const std::size_t from = std::min(index, poses.size() - 2);
-  const auto& [start_ns, T_map_start] = poses[from];
-  const auto& [end_ns, T_map_end] = poses[from + 1];
-  if (end_ns <= start_ns) return scan;
-  return deskew(std::move(scan), T_map_start.inverse() * T_map_end,
-                static_cast<double>(end_ns - start_ns) / 1e9);
-}
-
 /// The clouds that the points go to, one a tile.
 class Tiles {
  public:
@@ -127,6 +116,16 @@ void add_scan(const DatasetFrame& frame, std::uint32_t number, const Eigen::Isom
 
 }  // namespace
 
+Scan at_one_instant(Scan scan, const Trajectory& poses, std::size_t index) {
+  if (scan.time_offset_s.empty() || poses.size() < 2) return scan;
+  const std::size_t from = std::min(index, poses.size() - 2);
+  const auto& [start_ns, T_map_start] = poses[from];
+  const auto& [end_ns, T_map_end] = poses[from + 1];
+  if (end_ns <= start_ns) return scan;
+  return deskew(std::move(scan), T_map_start.inverse() * T_map_end,
+                static_cast<double>(end_ns - start_ns) / 1e9);
+}
+
 std::map<std::uint32_t, std::size_t> numbered_scans(const ScanDataset& dataset) {
   std::map<std::uint32_t, std::size_t> index_of;
   for (std::size_t i = 0; i < dataset.size(); ++i) {
@@ -171,7 +170,7 @@ MergedClouds merge_scans(const ScanDataset& sequence, const std::filesystem::pat
   Tiles tiles(cloud, options, merged.origin_map);
   for (const auto& [number, index] : chosen) {
     DatasetFrame frame = sequence.read(index);
-    frame.scan = compensated(std::move(frame.scan), poses, index);
+    frame.scan = at_one_instant(std::move(frame.scan), poses, index);
     add_scan(frame, number, poses[index].T_map_lidar, tiles, merged);
     if (scan_done && !scan_done(merged.scans, chosen.size())) return merged;
   }

@@ -47,6 +47,10 @@ struct MergedClouds {
   Eigen::Vector3d origin_map = Eigen::Vector3d::Zero();
 };
 
+/// The scan of `poses[index]` as if taken in one instant, by the motion to the next pose (of the
+/// last one: to it). One without times for its points, or without a motion, comes back as it is.
+[[nodiscard]] Scan at_one_instant(Scan scan, const Trajectory& poses, std::size_t index);
+
 /// Merges the scans of a SemanticKITTI sequence by their poses (paper II-B, fig. 3) into a cloud
 /// that can be labelled as a whole. All points of the scans are in it; scans with times for their
 /// points are motion-compensated. Tiles are named after their place: city.ply becomes

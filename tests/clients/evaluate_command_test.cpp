@@ -181,6 +181,15 @@ TEST_F(EvaluateCommandTest, ScoresAMapAgainstTheRecordingItWasMadeFrom) {
   EXPECT_GT(json.at("fixed_voxels"), 1000);
 }
 
+TEST_F(EvaluateCommandTest, TakesTheMotionOutOfTheScansThatAMapIsScoredAgainst) {
+  ASSERT_EQ(run("simulate " + path("city") + " --preset quiet --scans 6 --rolling").exit_code, 0);
+  ASSERT_EQ(run("map " + path("city") + " --out " + path("out")).exit_code, 0);
+  const ProcessResult result =
+      run("evaluate map --json --truth " + path("city") + " --map " + path("out/map.stillmap"));
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_GT(nlohmann::json::parse(result.out).at("preservation_rate"), 0.95);
+}
+
 TEST_F(EvaluateCommandTest, RefusesMapsThatAreNone) {
   simulate("city", 2);
   write("no_map", "this is no database");

@@ -10,6 +10,7 @@
 #include "clients/terminal/table.hpp"
 #include "core/dataset/dataset_error.hpp"
 #include "core/dataset/scan_dataset.hpp"
+#include "core/dataset/scan_merge.hpp"
 #include "core/evaluation/map_cleaning.hpp"
 #include "core/map/storage/map_file_copy.hpp"
 #include "core/map/storage/map_sessions.hpp"
@@ -81,7 +82,10 @@ evaluation::MapTruth true_map(const EvaluateMapArguments& arguments, const ScanD
     progress.update(i + 1);
     if (pose == trajectory.end() || pose->stamp_ns != dataset.stamp_ns(i)) continue;
     if (!dataset.has_labels(i)) continue;
-    add_scan(truth, dataset.read(i), pose->T_map_lidar, arguments.max_range_m);
+    DatasetFrame frame = dataset.read(i);
+    frame.scan = at_one_instant(std::move(frame.scan), trajectory,
+                                static_cast<std::size_t>(pose - trajectory.begin()));
+    add_scan(truth, frame, pose->T_map_lidar, arguments.max_range_m);
     ++used;
   }
   if (used == 0) {
