@@ -15,10 +15,10 @@ FILES ?=
 TILES ?=
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
-.PHONY: help packages web-packages configure programs packaged web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench bench-web table1 relocalize drives loops loops-served sessions ros-messages parity format format-check clean
+.PHONY: help packages web-packages configure programs packaged web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench bench-web table1 relocalize drives loops loops-served loops-killed sessions ros-messages parity format format-check clean
 
 # They have domains of their own, named in files; the variable would come before these.
-test test-dev test-tsan test-kill test-scale test-network fuzz soak bench bench-web relocalize loops-served parity: export ROS_DOMAIN_ID :=
+test test-dev test-tsan test-kill test-scale test-network fuzz soak bench bench-web relocalize loops-served loops-killed parity: export ROS_DOMAIN_ID :=
 
 help: ## Show this list
 	@grep -hE '^[a-z0-9-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | awk -F '\t' '{ printf "%-16s%s\n", $$1, $$2 }'
@@ -130,6 +130,9 @@ loops: programs ## Drives that come back to where they were: poses before and af
 
 loops-served: programs ## The same drives through servers with and without loops: paths, maps, pauses
 	@/usr/bin/python3 tests/loops/served.py --programs $(BUILD)/bin --results $(BUILD)/loops
+
+loops-killed: programs ## A server dies KILLS=50 times while it corrects its map: what it had stored is one whole map
+	@/usr/bin/python3 tests/loops/killed.py --programs $(BUILD)/bin --results $(BUILD)/loops --kills $(KILLS)
 
 sessions: programs ## Drives of another day put onto a map: every pose and closure against the truth, growth, withdrawal
 	@/usr/bin/python3 tests/loops/sessions.py --program $(BUILD)/bin/stillmap --results $(BUILD)/sessions
