@@ -13,6 +13,7 @@ BASE ?= HEAD~1
 PAGE ?= web
 FILES ?=
 TILES ?=
+KILOMETRES ?=
 PACKAGES := $(shell sed -e 's/\#.*//' -e '/^[[:space:]]*$$/d' debian-packages.txt)
 
 .PHONY: help packages web-packages configure programs packaged web viewer build deb demo test test-web test-dev test-tsan test-kill test-scale test-network test-docker tidy image fuzz soak bench bench-web table1 relocalize drives loops loops-served loops-killed sessions ros-messages parity format format-check clean
@@ -125,8 +126,9 @@ drives: programs ## Every drive, simulated and in RECORDINGS=FOLDER, into tests/
 	@/usr/bin/python3 tests/drives/drives.py --program $(BUILD)/bin/stillmap --results $(BUILD)/drives \
 	  $(if $(RECORDINGS),--recordings $(RECORDINGS)) $(DRIVES)
 
-loops: programs ## Drives that come back to where they were: poses before and after, every closure against the truth
-	@/usr/bin/python3 tests/loops/loops.py --program $(BUILD)/bin/stillmap --results $(BUILD)/loops
+loops: programs ## Drives that come back to where they were, or KILOMETRES=50 in other cities: every closure against the truth
+	@/usr/bin/python3 tests/loops/loops.py --program $(BUILD)/bin/stillmap --results $(BUILD)/loops \
+	  $(if $(KILOMETRES),--kilometres $(KILOMETRES) --no-labels)
 
 loops-served: programs ## The same drives through servers with and without loops: paths, maps, pauses
 	@/usr/bin/python3 tests/loops/served.py --programs $(BUILD)/bin --results $(BUILD)/loops

@@ -2,9 +2,11 @@
 """Closes loops on simulated drives and checks every closure against the true poses.
 
   tests/loops/loops.py --program build/release/bin/stillmap --results build/release/loops
+  tests/loops/loops.py ... --kilometres 50
 
-A drive that is there is not simulated again. Prints a table for tests/README.md. Exit code 1 when a
-closure is wrong: its motion off by more than 0.5 m or 2 degrees.
+A drive that is there is not simulated again. Prints a table for tests/README.md. With --kilometres drives in so many
+cities as it takes instead, a row for each, which are removed again. Exit code 1 when a closure is wrong: its motion
+off by more than 0.5 m or 2 degrees.
 """
 import argparse
 import json
@@ -24,6 +26,12 @@ DRIVES = [
     ("crowd, 16 rings", "--preset crowd --sensor vlp_16 --seed 4 --scans 2600", "", True),
     ("quiet, one way", "--preset quiet --sensor vlp_16 --seed 9 --scans 600", "", False),
 ]
+
+
+# Of them --kilometres takes one after the other, each with the next seed.
+MANY = ["--preset circuit --sensor vlp_16 --scans 1300", "--preset quiet --sensor vlp_16 --scans 1300",
+        "--preset crowd --sensor vlp_16 --scans 1300", "--preset circuit --sensor hdl_32e --scans 900"]
+FIRST_SEED = 1000
 
 
 def call(command, folder=None):
@@ -77,16 +85,45 @@ def row_of(name, report, poses):
                    f"{loops['submaps_mib'] / kilometres:.0f} | {loops['kept_scans_mib'] / kilometres:.0f} |")
 
 
+def mapped(arguments, sequence, out, options):
+    return json.loads(call([arguments.program, "map", sequence, "--out", out, "--force", "--json", *options.split()]))
+
+
+def close_in_many_cities(arguments):
+    """Drives so many kilometres; returns how many closures were wrong."""
+    kilometres, closures, wrong_ones, drives = 0.0, 0, 0, 0
+    sequence, out = arguments.results / "many", arguments.results / "map_many"
+    while kilometres < arguments.kilometres:
+        simulate = f"{MANY[drives % len(MANY)]} --seed {FIRST_SEED + drives}"
+        shutil.rmtree(sequence, ignore_errors=True)
+        call([arguments.program, "simulate", sequence, *simulate.split()])
+        report = mapped(arguments, sequence, out, "--labels none" if arguments.no_labels else "")
+        wrong, row = row_of(simulate.replace("--", ""), report, true_poses(sequence))
+        print(row, flush=True)
+        drives += 1
+        kilometres += report["accuracy"]["path_m"] / 1000.0
+        closures += len(report["closures"])
+        wrong_ones += wrong
+    print(f"{drives} drives, {kilometres:.1f} km, {closures} closures, {wrong_ones} wrong")
+    for folder in (sequence, out):
+        shutil.rmtree(folder, ignore_errors=True)
+    return wrong_ones
+
+
 def main():
-    parser = argparse.ArgumentParser(description=__doc__)
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--program", required=True, type=pathlib.Path)
     parser.add_argument("--results", required=True, type=pathlib.Path)
     parser.add_argument("--only", default="", help="drives with this in their name")
+    parser.add_argument("--kilometres", type=float, help="drive so many in other cities instead")
+    parser.add_argument("--no-labels", action="store_true", help="without labels, with --kilometres")
     arguments = parser.parse_args()
     wrong_ones = 0
     print("| drive | scans | km | ATE before [m] | after [m] | closures | wrong | worst error | refused | "
           "ms a scan | submaps [MiB/km] | kept scans [MiB/km] |")
     print("|---|---|---|---|---|---|---|---|---|---|---|---|", flush=True)
+    if arguments.kilometres is not None:
+        return 1 if close_in_many_cities(arguments) else 0
     for name, simulate, options, returns in DRIVES:
         if arguments.only not in name:
             continue
@@ -95,8 +132,7 @@ def main():
             shutil.rmtree(sequence, ignore_errors=True)
             call([arguments.program, "simulate", sequence, *simulate.split()])
         out = arguments.results / ("map_" + name.replace(", ", "_").replace(" ", "_"))
-        report = json.loads(call([arguments.program, "map", sequence, "--out", out, "--force", "--json",
-                                  *options.split()]))
+        report = mapped(arguments, sequence, out, options)
         wrong, row = row_of(name, report, true_poses(sequence))
         print(row, flush=True)
         wrong_ones += wrong
