@@ -56,7 +56,8 @@ class SparseBeamsClearing : public testing::Test {
       T_map_lidar.translation().x() = lidar_at_m;
       for (int ring = 0; ring < 16; ++ring) {
         for (int shot = 0; shot < 1800; ++shot) {
-          const double elevation = (2.0 * ring - 15.0) * rad_per_degree, azimuth = 0.2 * shot - 180.0;
+          const double elevation = (2.0 * ring - 15.0) * rad_per_degree,
+                       azimuth = 0.2 * shot - 180.0;
           const Vector3d direction(std::cos(elevation) * std::cos(azimuth * rad_per_degree),
                                    std::cos(elevation) * std::sin(azimuth * rad_per_degree),
                                    std::sin(elevation));
@@ -75,10 +76,9 @@ class SparseBeamsClearing : public testing::Test {
   [[nodiscard]] int shown_above(double height_m) {
     int count = 0;
     for (const auto& tile : map_.view()->tiles)
-      count += static_cast<int>(
-          std::ranges::count_if(tile->voxels, [height_m](const Voxel& voxel) {
-            return voxel.mean_map.z() + lidar_height_m > height_m;
-          }));
+      count += static_cast<int>(std::ranges::count_if(tile->voxels, [height_m](const Voxel& voxel) {
+        return voxel.mean_map.z() + lidar_height_m > height_m;
+      }));
     return count;
   }
 
