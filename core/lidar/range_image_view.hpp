@@ -90,7 +90,7 @@ class RangeImageView {
   Eigen::Vector3f origin_map_;
   /// Range [m], negative for surfaces that are not movable; 0 where nothing was measured.
   std::vector<float> pixels_;
-  /// Where in its row it was measured, in 256ths from the top: no row has just one beam.
+  /// Where in its row it was measured, in 256ths from the top: a row may have several beams.
   std::vector<std::uint8_t> below_row_top_;
 };
 

@@ -20,12 +20,10 @@ import sys
 import time
 
 from loops import call, true_poses
-from served import stored_poses
+from served import HALF_A_DEGREE_OFF, stored_poses, write_sensor
 
-DRIVE = "--preset quiet --sensor {sensor} --seed 5 --scans 1600"
-# Whoever maps with "vlp_16" has an odometry that drifts, so that corrections are large.
-SENSOR = "vlp_16_off.yaml"
-SENSORS = pathlib.Path(__file__).resolve().parents[2] / "config/sensors"
+# By a drift that makes corrections large.
+DRIVE = f"--preset quiet --sensor {HALF_A_DEGREE_OFF} --seed 5 --scans 1600"
 MIN_PRESERVED = 0.9
 MAX_STEP_ERROR_M = 0.5
 
@@ -34,10 +32,8 @@ def simulated(arguments):
     sequence = arguments.results / "killed_drive"
     if not (sequence / "times.txt").exists():
         shutil.rmtree(sequence, ignore_errors=True)
-        arguments.results.mkdir(parents=True, exist_ok=True)
-        (arguments.results / SENSOR).write_text((SENSORS / "vlp_16.yaml").read_text() + "elevation_offset_deg: 0.5\n")
-        call([arguments.programs / "stillmap", "simulate", sequence, *DRIVE.format(sensor=SENSOR).split()],
-             arguments.results)
+        write_sensor(arguments.results)
+        call([arguments.programs / "stillmap", "simulate", sequence, *DRIVE.split()], arguments.results)
     return sequence
 
 
@@ -97,7 +93,7 @@ def faults_of(arguments, sequence, folder):
     program = arguments.programs / "stillmap"
     checked = subprocess.run([program, "map-check", file], capture_output=True, text=True, check=False)
     if checked.returncode != 0:
-        return [f"map-check: {checked.stdout}{checked.stderr}".strip()], "-"
+        return [f"map-check: {checked.stdout}{checked.stderr}".strip()], "- | - | - | -"
     poses = stored_poses(folder)
     step_error_m = largest_step_error_m(sequence, poses)
     found = json.loads(call([program, "evaluate", "map", "--truth", sequence, "--map", file, "--json"]))
@@ -107,9 +103,13 @@ def faults_of(arguments, sequence, folder):
     if found["preservation_rate"] < MIN_PRESERVED:
         faults.append(f"only {100 * found['preservation_rate']:.1f} % of what its path saw is there")
     server = started(arguments, folder)
-    status = json.loads(call([program, "status", "--json", "--domain", arguments.domain, "--interface", "127.0.0.1"]))
-    server.send_signal(signal.SIGTERM)
-    if server.wait(timeout=120) != 0:
+    try:
+        status = json.loads(call([program, "status", "--json", "--domain", arguments.domain,
+                                  "--interface", "127.0.0.1"]))
+    finally:
+        server.send_signal(signal.SIGTERM)
+        server.wait(timeout=120)
+    if server.returncode != 0:
         faults.append(f"a server on it ends with {server.returncode}")
     if status["voxels"] == 0:
         faults.append("a server on it has no voxels")

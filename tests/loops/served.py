@@ -37,6 +37,11 @@ DRIVES = [
 ]
 
 
+def write_sensor(folder):
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / HALF_A_DEGREE_OFF).write_text((SENSORS / "vlp_16.yaml").read_text() + "elevation_offset_deg: 0.5\n")
+
+
 def serve(arguments, sequence, sensor, has_labels, loaded_after, folder, closes):
     """The status of a server that was sent the drive, or its rest; its map is in the folder then."""
     shutil.rmtree(folder, ignore_errors=True)
@@ -181,9 +186,7 @@ def main():
         sequence = arguments.sequence or arguments.results / simulate.replace("--", "").replace(" ", "_")
         if not (sequence / "times.txt").exists():
             shutil.rmtree(sequence, ignore_errors=True)
-            arguments.results.mkdir(parents=True, exist_ok=True)
-            (arguments.results / HALF_A_DEGREE_OFF).write_text(
-                (SENSORS / "vlp_16.yaml").read_text() + "elevation_offset_deg: 0.5\n")
+            write_sensor(arguments.results)
             # Sensor files are named from there.
             call([arguments.programs / "stillmap", "simulate", sequence, *simulate.split()], arguments.results)
         errors, reference = [], None
